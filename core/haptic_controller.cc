@@ -61,12 +61,12 @@ void HapticController::book_unseen(const Vec3& applied, const HandleSample* hand
     const std::uint64_t broken = wrench_->broken_assumptions();
     const Vec3 turn = turn_between(*last_orientation_, handle->turning->orientation);
     wrench_->observe({.applied = wrench_of(applied, handle->torque), .dx = wrench_of(dx, turn), .held = step.held});
-    step.assumption_broken = wrench_->broken_assumptions() != broken;
+    if (wrench_->broken_assumptions() != broken) step.reasons |= Reason::kAcceleration;
   } else {
     const Interval<3> interval{.applied = applied, .dx = dx, .held = step.held};
     const std::uint64_t broken = limiter_.broken_assumptions();
     limiter_.observe(interval);
-    step.assumption_broken = limiter_.broken_assumptions() != broken;
+    if (limiter_.broken_assumptions() != broken) step.reasons |= Reason::kAcceleration;
     if (admittance_) admittance_->observe(interval);
   }
   if (grip_) {
@@ -236,7 +236,7 @@ void HapticController::take(Step& step, const Motion& hand, const Vec3& applied,
   }
   if (disarmed_) step.force.setZero();
   if (wrench_) {
-    limit_wrench(applied, step);
+    limit_wrench(wanted.loop_age, applied, step);
   } else {
     limit_force(wanted, applied, step);
     if (wanted.handle && !wanted.handle->torque.isZero(0)) step.reasons |= Reason::kMaxForce;  // no motor turns it
@@ -261,9 +261,11 @@ void HapticController::take(Step& step, const Motion& hand, const Vec3& applied,
   // A limit changes the environment as the hand feels it, so its stiffness is known only for an unlimited force.
   const bool as_wanted =
       !admittance_ && !disarmed_ && saturated.reasons.empty() && slewed.reasons.empty() && step.mode == wanted.mode;
-  const LimitedForce<3> limited =
-      limiter_.limit({.force = slewed.force, .stiffness = as_wanted ? wanted.stiffness : Mat3(Mat3::Zero())});
+  const LimitedForce<3> limited = limiter_.limit(
+      {.force = slewed.force, .stiffness = as_wanted ? wanted.stiffness : Mat3(Mat3::Zero()), .age = wanted.loop_age});
   step.force = limited.force;
+  // A damper adds to what is wanted; a shorter force of the same direction is as safe.
+  if (limited.reasons.has(Reason::kDamped)) step.force = saturate(step.force, config_.max_force).force;
   step.permitted = limited.permitted;
   step.reasons |= limited.reasons;
   // Only the tightest bound is a reason: when the limiter cut further, the bounds before it made no difference.
@@ -274,7 +276,7 @@ void HapticController::take(Step& step, const Motion& hand, const Vec3& applied,
 }
 
 /// The same for force and torque together. The laws of a wrench do not use stiffness.
-void HapticController::limit_wrench(const Vec3& applied, Step& step) noexcept {
+void HapticController::limit_wrench(Duration age, const Vec3& applied, Step& step) noexcept {
   const RotationLimits& rotation = *config_.rotation;
   TurnStep& turn = *step.turn();
   Vec3 torque = turn.wanted;
@@ -288,7 +290,10 @@ void HapticController::limit_wrench(const Vec3& applied, Step& step) noexcept {
       limit_slew(saturated.wrench, wrench_of(applied, turn.was_applied), config_.max_slew, rotation.max_slew, elapsed);
   if (friction_map_) wrench_->adapt({friction_map_->at(step.hand.position), rotation.friction});
   if (config_.limiter.shared_account) settle(*wrench_, slewed.wrench, step.held);
-  const LimitedForce<6> limited = wrench_->limit({.force = slewed.wrench});
+  LimitedForce<6> limited = wrench_->limit({.force = slewed.wrench, .age = age});
+  if (limited.reasons.has(Reason::kDamped)) {
+    limited.force = saturate(limited.force, config_.max_force, rotation.max_torque).wrench;
+  }
   step.force = limited.force.head<3>();
   turn.torque = limited.force.tail<3>();
   step.permitted = limited.permitted;

@@ -55,11 +55,10 @@ struct Step {
   Vec3 wanted = Vec3::Zero();        ///< N, what the remote environment asks for, after hold or local model
   Mat3 stiffness = Mat3::Zero();     ///< N/m, −∂wanted/∂x, as the remote environment says; zero when it does not
   double permitted = 0;  ///< N, the limiter's bound on ‖force‖ (per axis: on the largest component); ∞ when off
-  Vec3 force = Vec3::Zero();       ///< N, to be applied now
-  double energy = 0;               ///< J, the limiter's account after the interval (per axis: the least)
-  Duration longest_hold{};         ///< T that `permitted` counts on: `force` may be held for so long and E stays ≥ 0
-  bool assumption_broken = false;  ///< in the interval the hand accelerated by more than bounded_acceleration allows
-  Reasons reasons;                 ///< why `force` is not `wanted`
+  Vec3 force = Vec3::Zero();  ///< N, to be applied now
+  double energy = 0;          ///< J, the limiter's account after the interval (per axis: the least)
+  Duration longest_hold{};    ///< T that `permitted` counts on: `force` may be held for so long and E stays ≥ 0
+  Reasons reasons;            ///< why `force` is not `wanted`
   Mode mode = Mode::kIdle;
   std::uint32_t channel = 0;            ///< `mode`, `force_sequence` and the ages are of this channel's force
   std::uint64_t force_sequence = 0;     ///< the remote force in use; 0 = none
@@ -87,6 +86,7 @@ struct Step {
 ///     F ← ‖F − F_before‖ ≤ max_slew · T                                     (limit_slew)
 ///     account ← what the peer's port has paid, less what this one pays      (Couplings::settle, with a purse)
 ///     F ← what the account allows, e.g. ‖F‖ ≤ f_c + 2 √(b E / T_max)         (Limiter::limit)
+///     F ← ‖F‖ ≤ max_force once more, when the limiter's damper has added to it
 ///
 /// A handle with motors that turn it goes the same way as a wrench: force and torque together are shortened, so that
 /// their direction stays, and one account bounds both (WrenchPort). Its gripper is a port of its own (GripPort).
@@ -212,7 +212,7 @@ class HapticController {
   void book_unseen(const Vec3& applied, const HandleSample* handle, Duration held) noexcept;
   void add_accounts(Step& step) const noexcept;
   void limit_force(const ForceChannels::Wanted& wanted, const Vec3& applied, Step& step) noexcept;
-  void limit_wrench(const Vec3& applied, Step& step) noexcept;
+  void limit_wrench(Duration age, const Vec3& applied, Step& step) noexcept;
   void limit_grip(Step& step) noexcept;
   void add_coupling(const Motion& hand, const HandleSample* handle, Step& step, ForceChannels::Wanted& wanted) noexcept;
   template <class Port, class Force>

@@ -71,6 +71,8 @@ void put_reasons(recorded::Reason* out, Reasons reasons) {
   out->set_watchdog(reasons.has(Reason::kWatchdog));
   out->set_unseen(reasons.has(Reason::kUnseen));
   out->set_disarmed(reasons.has(Reason::kDisarmed));
+  out->set_damped(reasons.has(Reason::kDamped));
+  out->set_acceleration(reasons.has(Reason::kAcceleration));
 }
 
 template <class Vector>

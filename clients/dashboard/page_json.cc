@@ -312,9 +312,9 @@ std::string_view name(Contact contact) noexcept {
 }
 
 std::string reason_name(std::size_t bit) {
-  static constexpr std::array<std::string_view, 14> kNames = {
-      "energy",     "max_force", "slew",         "ramp_in", "held",     "decaying", "safe_stop",
-      "not_finite", "fault",     "device_clamp", "overrun", "watchdog", "unseen",   "disarmed"};
+  static constexpr std::array<std::string_view, 16> kNames = {
+      "energy", "max_force",    "slew",    "ramp_in",  "held",   "decaying", "safe_stop", "not_finite",
+      "fault",  "device_clamp", "overrun", "watchdog", "unseen", "disarmed", "damped",    "acceleration"};
   return bit < kNames.size() ? std::string(kNames[bit]) : "bit_" + std::to_string(bit);
 }
 

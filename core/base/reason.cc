@@ -7,7 +7,7 @@
 namespace tendon {
 
 std::string to_string(Reasons reasons) {
-  static constexpr std::array<std::pair<Reason, const char*>, 14> kNames = {{
+  static constexpr std::array<std::pair<Reason, const char*>, 16> kNames = {{
       {Reason::kEnergy, "energy"},
       {Reason::kMaxForce, "max force"},
       {Reason::kSlew, "slew"},
@@ -22,6 +22,8 @@ std::string to_string(Reasons reasons) {
       {Reason::kWatchdog, "watchdog"},
       {Reason::kUnseen, "unseen"},
       {Reason::kDisarmed, "disarmed"},
+      {Reason::kDamped, "damped"},
+      {Reason::kAcceleration, "acceleration"},
   }};
   std::string text;
   for (const auto& [reason, name] : kNames) {

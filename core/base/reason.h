@@ -24,6 +24,9 @@ enum class Reason : std::uint32_t {
   kWatchdog = 1U << 11,    ///< not a limit: and for so long that the device's own watchdog ended it
   kUnseen = 1U << 12,      ///< the device gave no position this time, so no force is given out
   kDisarmed = 1U << 13,    ///< the operator has disarmed the device: no force until it is rearmed
+  kDamped = 1U << 14,      ///< the output limiter's damper: the hand vibrates in contact
+  /// Not a limit: the hand accelerated harder than bounded_acceleration counts on, so this step counts on friction alone.
+  kAcceleration = 1U << 15,
 };
 
 /// A set of reasons.

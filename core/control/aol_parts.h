@@ -31,8 +31,13 @@ inline constexpr std::tuple kAolParts{
                                           &PointAolPlus::Parts::latency_reserve},
     AolPart<PointAolPlus::BoundedAcceleration>{"bounded_acceleration", "for devices with next to no damping",
                                                &PointAolPlus::Parts::bounded_acceleration},
+    AolPart<PointAolPlus::Shaping>{"shaping", "no object is shown stiffer than this", &PointAolPlus::Parts::shaping},
     AolPart<PointAolPlus::AdaptiveFriction>{"adaptive_friction", "friction bounds by place",
                                             &PointAolPlus::Parts::adaptive_friction},
+    AolPart<PointAolPlus::Thrift>{"thrift", "the next contact finds some credit", &PointAolPlus::Parts::thrift},
+    AolPart<PointAolPlus::Damper>{"damper", "a hand that rings is damped", &PointAolPlus::Parts::damper},
+    AolPart<PointAolPlus::FadingContact>{"fading_contact", "a contact's credit fades instead of vanishing",
+                                         &PointAolPlus::Parts::fading_contact},
 };
 
 /// Calls `visit` with each part, in that order: `parts.*part.config` is the optional configuration of one.

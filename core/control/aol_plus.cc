@@ -14,6 +14,17 @@ namespace tendon {
 
 namespace {
 
+// Where thrift and damper begin: the share of the bound that is wanted, and over how much more of it they set in.
+constexpr double kThriftFrom = 0.4;
+constexpr double kThriftOver = 0.4;
+constexpr double kDamperFrom = 0.3;
+constexpr double kDamperOver = 0.4;
+constexpr double kOldAnswer = 0.01;    // s: behind an answer of this age the damper is whole
+constexpr double kSlowHand = 2e-3;     // m/s, below which the direction of motion means little
+constexpr double kDamperMemory = 0.3;  // s, for which the damper's debt is remembered
+constexpr double kCountsAhead = 4;     // counts that a growing force has to be able to pay
+constexpr double kEuler = 2.718281828459045;
+
 template <class Ledger, std::size_t Count, class Make, std::size_t... I>
 std::array<Ledger, Count> each(const Make& make, std::index_sequence<I...>) {
   return {Ledger(make(I))...};
@@ -37,9 +48,10 @@ void check(const typename AolPlus<Blocks, Size>::Config& config) {
   if (const auto& bounded = config.parts.bounded_acceleration) {
     for (std::size_t i = 0; i < Blocks; ++i) {
       expect(bounded->most[i] > 0, "bounded_acceleration.most", bounded->most[i], "a number above 0");
-      expect(bounded->shaping_viscous[i] >= config.friction[i].viscous, "bounded_acceleration.shaping_viscous",
-             bounded->shaping_viscous[i],
-             "the viscous friction of " + shortest(config.friction[i].viscous) + " N·s/m or more");
+    }
+    if (!config.parts.shaping) {
+      throw std::invalid_argument(
+          "bounded_acceleration needs shaping: nothing else would limit how hard a wall may be");
     }
     if (config.parts.latency_reserve) {
       throw std::invalid_argument(
@@ -48,6 +60,27 @@ void check(const typename AolPlus<Blocks, Size>::Config& config) {
   }
   if (const auto& adaptive = config.parts.adaptive_friction) {
     expect_above_zero(seconds(adaptive->rise), "adaptive_friction.rise");
+  }
+  if (const auto& shaping = config.parts.shaping) {
+    for (const double stiffness : shaping->stiffness) expect_above_zero(stiffness, "shaping.stiffness");
+  }
+  if (const auto& thrift = config.parts.thrift) {
+    expect(thrift->share > 0 && thrift->share <= 1, "thrift.share", thrift->share, "a number above 0, at most 1");
+    expect_above_zero(thrift->energy, "thrift.energy");
+  }
+  if (const auto& damper = config.parts.damper) {
+    for (const double viscous : damper->viscous) expect_not_negative(viscous, "damper.viscous");
+    for (const double contact : damper->contact) expect_above_zero(contact, "damper.contact");
+    expect_above_zero(seconds(damper->smoothing), "damper.smoothing");
+    expect_above_zero(seconds(damper->slow), "damper.slow");
+    expect_not_negative(damper->dead_zone, "damper.dead_zone");
+    expect_above_zero(damper->most_owed, "damper.most_owed");
+  }
+  if (const auto& fading = config.parts.fading_contact) {
+    expect_above_zero(seconds(fading->memory), "fading_contact.memory");
+    if (!config.parts.energy_cap) {
+      throw std::invalid_argument("fading_contact needs energy_cap: without it no contact has a credit of its own");
+    }
   }
 }
 
@@ -73,6 +106,9 @@ AolPlus<Blocks, Size>::AolPlus(const Config& config)
         kEach);
   }
   for (std::size_t i = 0; i < bounds_.size(); ++i) use(i, config.friction[i]);
+  const Damper damper = config.parts.damper.value_or(Damper{});
+  smoothing_ = seconds(damper.smoothing);
+  slowness_ = seconds(damper.slow);
 }
 
 template <int Blocks, int Size>
@@ -126,6 +162,12 @@ double AolPlus<Blocks, Size>::reserved() const noexcept {
   return sum;
 }
 
+/// Δ of the robust ledger over all coordinates of a group; 0 without one.
+template <int Blocks, int Size>
+double AolPlus<Blocks, Size>::count(std::size_t block) const noexcept {
+  return parts_.robust_ledger ? parts_.robust_ledger->encoder_step[block] * std::sqrt(Size) : 0.0;
+}
+
 template <int Blocks, int Size>
 void AolPlus<Blocks, Size>::forget_velocity() noexcept {
   velocity_.reset();
@@ -148,16 +190,39 @@ void AolPlus<Blocks, Size>::watch_acceleration(const Interval<kSize>& interval) 
     const double before = seconds(last_held_);
     for (int i = 0; i < Blocks; ++i) {
       const auto block = static_cast<std::size_t>(i);
-      const double count = parts_.robust_ledger ? parts_.robust_ledger->encoder_step[block] * std::sqrt(Size) : 0.0;
       const double change = (velocity - *velocity_).template segment<Size>(i * Size).norm();
       const double most = parts_.bounded_acceleration->most[block] * (held + before) / 2;
       // 1e-9: a hand exactly at the limit must not be flagged because of rounding.
-      if (!(change <= most * (1 + 1e-9) + count * (1 / held + 1 / before))) acceleration_holds_ = false;
+      if (!(change <= most * (1 + 1e-9) + count(block) * (1 / held + 1 / before))) acceleration_holds_ = false;
     }
     if (!acceleration_holds_) ++broken_;
   }
   velocity_ = velocity;
   last_held_ = interval.held;
+}
+
+template <int Blocks, int Size>
+[[gnu::noinline]] void AolPlus<Blocks, Size>::follow_hand(const Interval<kSize>& interval) noexcept {
+  const double held = seconds(interval.held);
+  if (held <= 0) return;
+  const double fast = std::min(1.0, held / smoothing_);
+  const double slow = std::min(1.0, held / slowness_);
+  once_smoothed_ += (fast / held) * interval.dx - fast * once_smoothed_;
+  smoothed_ += fast * (once_smoothed_ - smoothed_);
+  slow_ += slow * (smoothed_ - slow_);
+  if (!parts_.damper) return;
+  // What the damper has earned, less what its counts cost; forgotten slowly, and never saved up.
+  const double forgotten = std::min(1.0, held / kDamperMemory);
+  double earned = damped_.dot(interval.dx);
+  if (robust_) {
+    const Vec<kSize> change = damped_ - damped_before_;
+    for (int i = 0; i < Blocks; ++i) {
+      earned -= parts_.robust_ledger->encoder_step[static_cast<std::size_t>(i)] / 2 *
+                change.template segment<Size>(i * Size).template lpNorm<1>();
+    }
+  }
+  damper_owes_ = std::max(0.0, damper_owes_ - forgotten * damper_owes_ - earned);
+  damped_before_ = damped_;
 }
 
 template <int Blocks, int Size>
@@ -178,6 +243,8 @@ void AolPlus<Blocks, Size>::observe(const Interval<kSize>& interval) noexcept {
     travel_ += interval.dx;
   }
   if (parts_.bounded_acceleration) watch_acceleration(interval);
+  if (parts_.damper || parts_.thrift) follow_hand(interval);
+  if (parts_.thrift) held_ = interval.applied.norm();
   if (parts_.adaptive_friction) {
     const double step = std::min(1.0, std::max(0.0, seconds(interval.held) / seconds(parts_.adaptive_friction->rise)));
     for (std::size_t i = 0; i < bounds_.size(); ++i) {
@@ -199,6 +266,12 @@ void AolPlus<Blocks, Size>::observe_unseen(const Vec<kSize>& applied, Duration a
   }
   contact_ = 0;
   travel_.setZero();
+  once_smoothed_.setZero();
+  smoothed_.setZero();
+  slow_.setZero();
+  damped_.setZero();
+  damped_before_.setZero();
+  held_ = 0;
   forget_velocity();
 }
 
@@ -208,7 +281,13 @@ void AolPlus<Blocks, Size>::cap(const Vec<kSize>& wanted) noexcept {
   for (int i = 0; i < Blocks; ++i) {
     most += wanted.template segment<Size>(i * Size).norm() * travel_.template segment<Size>(i * Size).norm();
   }
-  if (wanted.dot(last_wanted_) <= 0) {
+  if (parts_.fading_contact) {
+    contact_ = std::min(contact_, parts_.energy_cap->most_contact);
+    if (contact_ > most) {
+      contact_ += (most - contact_) * std::min(1.0, seconds(longest_hold_) / seconds(parts_.fading_contact->memory));
+    }
+    if (wanted.dot(last_wanted_) < 0) travel_.setZero();
+  } else if (wanted.dot(last_wanted_) <= 0) {
     contact_ = 0;
     travel_.setZero();
   } else {
@@ -218,6 +297,107 @@ void AolPlus<Blocks, Size>::cap(const Vec<kSize>& wanted) noexcept {
   double kept = parts_.energy_cap->energy + contact_;
   if (shared_) kept += worst_loss(wanted);
   discarded_ = std::max(discarded_, account() - kept);
+}
+
+/// ℓ of a group of coordinates while `force`, of this size, is held.
+template <int Blocks, int Size>
+[[gnu::noinline]] OutputBound AolPlus<Blocks, Size>::bound_along(std::size_t block, const Vec<Size>& force, double size) const noexcept {
+  OutputBound bound = bounds_[block];
+  if (!acceleration_holds_ || size == 0) return bound;
+  const double hold = seconds(longest_hold_);
+  const double towards = velocity_->template segment<Size>(static_cast<int>(block) * Size).dot(force) / size;
+  bound.reach = hold * (towards + parts_.bounded_acceleration->most[block] * (seconds(last_held_) + hold) / 2) +
+                count(block) * hold / seconds(last_held_);
+  return bound;
+}
+
+/// The largest share of `force` that the account lets through; above 1 when more would be.
+template <int Blocks, int Size>
+double AolPlus<Blocks, Size>::largest_share(const Vec<kSize>& force, double budget) const noexcept {
+  std::array<double, Blocks> sizes{};
+  std::array<OutputBound, Blocks> bounds;
+  for (int i = 0; i < Blocks; ++i) {
+    const auto block = static_cast<std::size_t>(i);
+    const Vec<Size> part = force.template segment<Size>(i * Size);
+    sizes[block] = part.norm();
+    bounds[block] = bound_along(block, part, sizes[block]);
+  }
+  return largest_scale(bounds, sizes, budget);
+}
+
+/// The share of `force` that thrift lets through.
+template <int Blocks, int Size>
+double AolPlus<Blocks, Size>::give_back(const Vec<kSize>& force, double size, double near,
+                                        double budget) const noexcept {
+  const Thrift& thrift = *parts_.thrift;
+  const double power = force.dot(smoothed_);
+  if (power <= 0 || near <= kThriftFrom || budget >= thrift.energy) return 1;
+  const double away = std::min(1.0, power / (size * (smoothed_.norm() + kSlowHand)));
+  const double close = std::min(1.0, (near - kThriftFrom) / kThriftOver);
+  return 1 - thrift.share * away * close * (1 - std::max(budget, 0.0) / thrift.energy);
+}
+
+/// The share of a force of this size that the account can still pay the counts of.
+template <int Blocks, int Size>
+double AolPlus<Blocks, Size>::grow(double size, double budget) const noexcept {
+  if (!robust_ || parts_.robust_ledger->encoder_step[0] == 0) return 1;
+  const double most = held_ + std::max(budget, 0.0) / (kCountsAhead * parts_.robust_ledger->encoder_step[0]);
+  return std::min(1.0, std::max(most, friction_[0].coulomb) / size);
+}
+
+/// D, for a contact that shows `force`.
+template <int Blocks, int Size>
+auto AolPlus<Blocks, Size>::damping(const Vec<kSize>& force, double near, Duration age) const noexcept -> Vec<kSize> {
+  Vec<kSize> damping = Vec<kSize>::Zero();
+  const Damper& damper = *parts_.damper;
+  const double needed = std::clamp(std::max((near - kDamperFrom) / kDamperOver, seconds(age) / kOldAnswer), 0.0, 1.0);
+  const double active = needed * std::max(0.0, 1 - damper_owes_ / damper.most_owed);
+  if (active == 0) return damping;
+  for (int i = 0; i < Blocks; ++i) {
+    const auto block = static_cast<std::size_t>(i);
+    const Vec<Size> slow = slow_.template segment<Size>(i * Size);
+    const Vec<Size> fast = smoothed_.template segment<Size>(i * Size) - slow;
+    const double speed = fast.norm();
+    const double step = robust_ ? parts_.robust_ledger->encoder_step[block] : 0.0;
+    double quiet = 0;
+    if (step > 0) {
+      const double counts = slow.norm() * smoothing_ / step;
+      quiet = damper.dead_zone * step / (kEuler * smoothing_ * (1 + counts * counts));
+    }
+    if (speed <= quiet) continue;
+    const double size = force.template segment<Size>(i * Size).norm();
+    damping.template segment<Size>(i * Size) =
+        damper.viscous[block] * active * (1 - quiet / speed) * size / (size + damper.contact[block]) * fast;
+  }
+  return damping;
+}
+
+/// Thrift and damper, for a force that the account lets through. `near`: what is wanted, of what is permitted.
+template <int Blocks, int Size>
+[[gnu::noinline]] void AolPlus<Blocks, Size>::shape(Duration age, double near, double budget, LimitedForce<kSize>& result) noexcept {
+  damped_.setZero();
+  const double size = result.force.norm();
+  if (size == 0) return;
+  if (parts_.thrift) {
+    const double share = std::min(give_back(result.force, size, near, budget), grow(size, budget));
+    if (share < 1) {
+      result.force *= share;
+      result.reasons |= Reason::kEnergy;
+    }
+  }
+  if (!parts_.damper) return;
+  const Vec<kSize> spring = result.force;
+  const Vec<kSize> damper = damping(spring, near, age);
+  if (damper.isZero(0)) return;
+  result.force -= damper;
+  result.reasons |= Reason::kDamped;
+  const double share = largest_share(result.force, budget);
+  if (share < 1) {
+    result.force *= share;
+    result.reasons |= Reason::kEnergy;
+  }
+  result.permitted = std::max(result.permitted, result.force.norm());
+  damped_ = spring - result.force;
 }
 
 template <int Blocks, int Size>
@@ -236,24 +416,18 @@ auto AolPlus<Blocks, Size>::limit(const Demand<kSize>& wanted) noexcept -> Limit
     const auto block = static_cast<std::size_t>(i);
     const Vec<Size> part = force.template segment<Size>(i * Size);
     sizes[block] = part.norm();
-    if (!acceleration_holds_ || sizes[block] == 0) continue;
-    const auto& bounded = *parts_.bounded_acceleration;
-    const double hold = seconds(longest_hold_);
-    const double towards = velocity_->template segment<Size>(i * Size).dot(part) / sizes[block];
-    const double count = parts_.robust_ledger ? parts_.robust_ledger->encoder_step[block] * std::sqrt(Size) : 0.0;
-    bounds[block].reach =
-        hold * (towards + bounded.most[block] * (seconds(last_held_) + hold) / 2) + count * hold / seconds(last_held_);
-    shaping[block].viscous_per_hold = bounded.shaping_viscous[block] / hold;
+    if (acceleration_holds_) bounds[block] = bound_along(block, part, sizes[block]);
+    if (parts_.shaping) shaping[block].viscous_per_hold = parts_.shaping->stiffness[block] / 2;
   }
   double scale = 0;
   double permitted = 0;
   if constexpr (Blocks == 1) {
     permitted = bounds[0].largest(budget);
-    if (acceleration_holds_) permitted = std::min(permitted, shaping[0].largest(budget));
+    if (parts_.shaping) permitted = std::min(permitted, shaping[0].largest(budget));
     scale = size > 0 ? permitted / size : 1;
   } else {
     scale = largest_scale(bounds, sizes, budget);
-    if (acceleration_holds_) scale = std::min(scale, largest_scale(shaping, sizes, budget));
+    if (parts_.shaping) scale = std::min(scale, largest_scale(shaping, sizes, budget));
     permitted = size > 0 ? scale * size : 0;
   }
 
@@ -271,6 +445,8 @@ auto AolPlus<Blocks, Size>::limit(const Demand<kSize>& wanted) noexcept -> Limit
     result.force = force * (permitted / size);
     result.reasons = Reason::kEnergy;
   }
+
+  if (parts_.thrift || parts_.damper) shape(wanted.age, size > 0 ? 1 / scale : 0.0, budget, result);
 
   if (parts_.latency_reserve) {
     double loss = 0;
@@ -305,8 +481,9 @@ double AolPlus<Blocks, Size>::worst_loss(const Vec<kSize>& force) const noexcept
   for (int i = 0; i < Blocks; ++i) {
     const auto block = static_cast<std::size_t>(i);
     OutputBound bound = bounds_[block];
-    if (parts_.bounded_acceleration) {
-      bound.viscous_per_hold = parts_.bounded_acceleration->shaping_viscous[block] / seconds(longest_hold_);
+    if (parts_.shaping) {
+      const double shaping = parts_.shaping->stiffness[block] / 2;
+      bound.viscous_per_hold = parts_.bounded_acceleration ? shaping : std::min(shaping, bound.viscous_per_hold);
     }
     sum += forces * bound.at(force.template segment<Size>(i * Size).norm() / whole);
   }

@@ -99,9 +99,24 @@ WrenchPort::Config wrench_config(const LimiterConfig& point, const RotationLimit
       throw std::invalid_argument(
           "rotation.most_acceleration: expected a number above 0 rad/s², because bounded_acceleration is listed");
     }
-    config.parts.bounded_acceleration = {.most = {bounded->most[0], *rotation.most_acceleration},
-                                         .shaping_viscous = {bounded->shaping_viscous[0], rotation.shaping_viscous}};
+    config.parts.bounded_acceleration = {.most = {bounded->most[0], *rotation.most_acceleration}};
   }
+  if (const auto& shaping = parts.shaping) {
+    if (!rotation.shaping_stiffness) {
+      throw std::invalid_argument(
+          "rotation.shaping_stiffness: expected a number above 0 N·m/rad, because shaping is listed");
+    }
+    config.parts.shaping = {.stiffness = {shaping->stiffness[0], *rotation.shaping_stiffness}};
+  }
+  if (const auto& thrift = parts.thrift) config.parts.thrift = {thrift->share, thrift->energy};
+  if (const auto& damper = parts.damper) {
+    config.parts.damper = {.viscous = {damper->viscous[0], rotation.damping},
+                           .contact = {damper->contact[0], rotation.contact},
+                           .smoothing = damper->smoothing,
+                           .slow = damper->slow,
+                           .dead_zone = damper->dead_zone};
+  }
+  if (const auto& fading = parts.fading_contact) config.parts.fading_contact = {fading->memory};
   if (const auto& adaptive = parts.adaptive_friction) config.parts.adaptive_friction = {adaptive->rise};
   return config;
 }
@@ -116,6 +131,7 @@ GripPort::Config grip_config(const LimiterConfig& point, const GripLimits& grip)
                           .follow_holds = point.follow_holds,
                           .shared_account = point.shared_account};
   if (const auto& cap = point.parts.energy_cap) config.parts.energy_cap = {cap->energy, cap->most_contact};
+  if (const auto& fading = point.parts.fading_contact) config.parts.fading_contact = {fading->memory};
   if (const auto& knee = point.parts.knee) config.parts.knee = {knee->start};
   if (const auto& reserve = point.parts.latency_reserve) config.parts.latency_reserve = {reserve->holds};
   return config;

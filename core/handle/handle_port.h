@@ -98,9 +98,10 @@ struct RotationLimits {
   double max_torque = 0;                                      ///< N·m, > 0
   double max_slew = std::numeric_limits<double>::infinity();  ///< N·m/s, > 0
   double encoder_step = 0;                                    ///< rad, of robust_ledger; 0: exact
-  /// Of bounded_acceleration, when the point lists it: rad/s² and N·m·s/rad.
-  std::optional<double> most_acceleration{};
-  double shaping_viscous = 0;
+  std::optional<double> most_acceleration{};                  ///< rad/s², of bounded_acceleration
+  std::optional<double> shaping_stiffness{};                  ///< N·m/rad, of shaping
+  double damping = 0;                                         ///< N·m·s/rad, of damper; 0: turning is not damped
+  double contact = 0.005;                                     ///< N·m, of damper: where a contact begins
 };
 /// Throws std::invalid_argument when the point lists a part that lacks its value for rotation.
 WrenchPort::Config wrench_config(const LimiterConfig& point, const RotationLimits& rotation);
@@ -112,7 +113,7 @@ struct GripLimits {
   double max_force = 0;  ///< N, > 0
   double max_slew = std::numeric_limits<double>::infinity();  ///< N/s, > 0
 };
-/// The parts energy_cap, knee and latency_reserve of `point` hold for the gripper too; the others are about the
+/// The parts energy_cap, fading_contact, knee and latency_reserve of `point` hold for the gripper too; the others are about the
 /// position. Its account is shared where that of `point` is, by a purse of its own.
 GripPort::Config grip_config(const LimiterConfig& point, const GripLimits& grip);
 

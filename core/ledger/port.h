@@ -31,6 +31,7 @@ template <int N>
 struct Demand {
   Vec<N> force;                       ///< N, on the hand
   Mat<N> stiffness = Mat<N>::Zero();  ///< −∂F/∂x, N/m; zero when nobody knows it
+  Duration age{};                     ///< of the motion that `force` answers
 };
 
 /// A force, and why it is not the one that was wanted.

@@ -21,11 +21,14 @@ HeldForce::HeldForce(const Config& config) : config_(config) {
   expect(config.max_stiffness > 0, "max_stiffness", config.max_stiffness, "a number above 0 N/m");
   expect(config.max_angular_stiffness > 0, "max_angular_stiffness", config.max_angular_stiffness,
          "a number above 0 N·m/rad");
-  if (config.adaptive_local_model && config.output_estimator) {
-    throw std::invalid_argument("adaptive_local_model and output_estimator: expected one of them, not both");
+  if (config.adaptive_local_model.has_value() + config.output_estimator.has_value() + config.learned_model.has_value() >
+      1) {
+    throw std::invalid_argument(
+        "adaptive_local_model, output_estimator and learned_model: expected at most one of them");
   }
   if (config.adaptive_local_model) local_model_.emplace(*config.adaptive_local_model);
   if (config.output_estimator) estimator_ = std::make_unique<OutputEstimator>(*config.output_estimator);
+  if (config.learned_model) learned_ = std::make_unique<LearnedModel>(*config.learned_model);
 }
 
 bool HeldForce::observe(const RemoteForce& force) noexcept {
@@ -39,6 +42,7 @@ bool HeldForce::observe(const RemoteForce& force) noexcept {
     ramp_ = Duration(static_cast<Duration::rep>(lost * static_cast<double>(config_.ramp_in.count())));
   }
   if (anew && local_model_) local_model_.emplace(*config_.adaptive_local_model);  // there is nothing to blend it with
+  if (learned_ && (anew || force.topology_changed)) learned_->forget();
   newest_ = believed(force, config_.max_stiffness);
   if (newest_->torque) {
     if (newest_->topology_changed) newest_->torque->model.reset();
@@ -46,6 +50,7 @@ bool HeldForce::observe(const RemoteForce& force) noexcept {
   }
   if (local_model_) local_model_->observe(*newest_);
   if (estimator_) estimator_->correct(*newest_);
+  if (learned_) learned_->correct(*newest_);
   mode_ = Mode::kActive;
   return true;
 }
@@ -56,9 +61,12 @@ void HeldForce::release(std::uint32_t source, LocalTime now) noexcept {
 
 Duration HeldForce::validity() const noexcept { return std::min(newest_->valid_for, config_.max_valid_for); }
 
-Prediction HeldForce::follow(const Motion& hand) const noexcept {
+Prediction HeldForce::follow(const Motion& hand) noexcept {
   if (local_model_) {
     if (const auto blended = local_model_->predict(hand)) return *blended;
+  }
+  if (learned_ && !newest_->model) {
+    if (const auto led = learned_->predict()) return *led;
   }
   if (!estimator_) return reconstruct(*newest_, hand.position);
   return estimator_->predict(hand).value_or(Prediction{.force = newest_->force, .stiffness = Mat3::Zero()});
@@ -77,10 +85,12 @@ std::optional<HandleWanted> HeldForce::handle_wanted(const Quat* orientation, do
 
 HeldForce::Wanted HeldForce::wanted(const Motion& hand, const Quat* orientation) noexcept {
   if (estimator_) estimator_->observe(hand);
+  if (learned_) learned_->observe(hand);
   if (!newest_) return {};
   Wanted result;
   // A force may arrive after the device took this step's sample; the wire has no ages below zero.
   result.age = std::max(Duration::zero(), hand.at - newest_->received);
+  result.loop_age = std::max(Duration::zero(), hand.at - newest_->answers);
   const Duration overdue = result.age - validity();
   // Only `observe` ends a safe stop: a clock that goes back must not revive a force.
   if (mode_ == Mode::kSafeStop || overdue >= config_.safe_stop) {

@@ -8,6 +8,7 @@
 #include "core/base/motion.h"
 #include "core/base/reason.h"
 #include "core/remote/adaptive_local_model.h"
+#include "core/remote/learned_model.h"
 #include "core/remote/output_estimator.h"
 #include "core/remote/remote_force.h"
 
@@ -34,9 +35,11 @@ struct HandleWanted {
 ///                            force alone when it sent none                      (reconstruct, estimation/answer.h)
 ///     adaptive_local_model   its stiffness, but a new one is blended in          (AdaptiveLocalModel)
 ///     output_estimator       a model of the environment, learned on the way      (OutputEstimator)
+///     learned_model          … of how its force changes with the place; an answer that brings its own model is
+///                            reconstructed from that instead                     (LearnedModel)
 ///
 /// A torque is led on by its own model of rotation (answer.h), a grip force stays as it was sent. Both are held, faded
-/// and ramped in together with the force that they came with. The two parts above know forces only.
+/// and ramped in together with the force that they came with. The three parts above know forces only.
 ///
 /// Only the trustworthy part of an answer is used (answer.h): stiffness is capped at `max_stiffness`, and the model is
 /// dropped when the answer says that the topology of the body has changed.
@@ -66,9 +69,10 @@ class HeldForce {
     double max_stiffness = 5000;
     /// N·m/rad, > 0: the same for rotation.
     double max_angular_stiffness = 5;
-    /// At most one of these two. Empty: not used, costs nothing.
+    /// At most one of these three. Empty: not used, costs nothing.
     std::optional<AdaptiveLocalModel::Config> adaptive_local_model{};
     std::optional<OutputEstimator::Config> output_estimator{};
+    std::optional<LearnedModel::Config> learned_model{};
   };
 
   struct Wanted {
@@ -77,11 +81,12 @@ class HeldForce {
     Mode mode = Mode::kIdle;
     Reasons reasons;
     Duration age{};                        ///< since it was received; 0 when idle
+    Duration loop_age{};                   ///< since the motion that it answers was sampled; 0 when idle
     std::optional<HandleWanted> handle{};  ///< empty: nothing is asked of torque and grip
   };
 
   /// Throws std::invalid_argument naming the field when a duration is negative, decay is not positive, safe_stop is
-  /// shorter than hold, max_stiffness is not above zero, a part refuses its configuration, or both parts are listed.
+  /// shorter than hold, max_stiffness is not above zero, a part refuses its configuration, or several parts are listed.
   explicit HeldForce(const Config& config);
 
   /// Takes a newer force. Returns false, and changes nothing, when it is not sound.
@@ -107,7 +112,7 @@ class HeldForce {
   const std::optional<RemoteForce>& newest() const noexcept { return newest_; }
 
  private:
-  Prediction follow(const Motion& hand) const noexcept;
+  Prediction follow(const Motion& hand) noexcept;
   Duration validity() const noexcept;
   std::optional<HandleWanted> handle_wanted(const Quat* orientation, double gain, double rest) const noexcept;
 
@@ -123,6 +128,7 @@ class HeldForce {
   std::optional<HandleWanted> handle_rendered_;
   std::optional<AdaptiveLocalModel> local_model_;
   std::unique_ptr<OutputEstimator> estimator_;  ///< 100 kB, only when listed
+  std::unique_ptr<LearnedModel> learned_;       ///< 32 kB, only when listed
 };
 
 }  // namespace tendon

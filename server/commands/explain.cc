@@ -13,6 +13,7 @@
 #include <variant>
 
 #include "core/control/aol_parts.h"
+#include "core/control/preset.h"
 #include "devices/simulated/simulated_device.h"
 
 namespace tendon {
@@ -110,6 +111,8 @@ std::vector<Listable> make_listables() {
       HapticController::Config& loop = scene.loop.control;
       const bool there = drop(loop.limiter.parts.*config);
       if (!loop.limiter.parts.adaptive_friction) loop.friction_map.reset();
+      if (!loop.limiter.parts.shaping) loop.limiter.parts.bounded_acceleration.reset();  // which needs it
+      if (!loop.limiter.parts.energy_cap) loop.limiter.parts.fading_contact.reset();
       return there;
     });
   });
@@ -131,6 +134,7 @@ std::vector<Listable> make_listables() {
   between("adaptive_local_model", "models of the engine are blended and capped",
           &HeldForce::Config::adaptive_local_model);
   between("output_estimator", "the environment is learnt from its answers", &HeldForce::Config::output_estimator);
+  between("learned_model", "an answer is led to where the hand is now", &HeldForce::Config::learned_model);
   return list;
 }
 
@@ -385,6 +389,7 @@ std::string in_words(const Scene& scene, const Explanation& explanation) {
   for (const CoupledLeader& leader : scene.loop.control.leaders) {
     text << "  " << scene.channels[leader.channel].name << " counts " << leader.share << " of that\n";
   }
+  text << "the limiter's promise: " << promise_of(scene.loop.control.limiter) << '\n';
   text << "in other threads: " << scene.channels.size() << (scene.channels.size() == 1 ? " channel" : " channels")
        << " for engines" << (scene.network.keys ? ", sealed" : "") << ", "
        << (scene.recording ? "a recording" : "no recording") << '\n';
@@ -395,6 +400,7 @@ std::string in_json(const Scene& scene, const Explanation& explanation) {
   using Json = nlohmann::ordered_json;
   Json out = {{"device", scene.name},
               {"period_us", seconds(scene.loop.period) * 1e6},
+              {"promise", promise_of(scene.loop.control.limiter)},
               {"step_ns", explanation.step_ns},
               {"device_ns", explanation.device_ns},
               {"resolution_ns", explanation.resolution_ns},

@@ -22,7 +22,7 @@ void HealthMeter::observe(const StepRecord& step) noexcept {
   counted_.steps = step.tick;
   counted_.overruns += step.reasons.has(Reason::kOverrun) ? 1 : 0;
   counted_.unseen += step.reasons.has(Reason::kUnseen) ? 1 : 0;
-  counted_.broken_assumptions += step.assumption_broken ? 1 : 0;
+  counted_.broken_assumptions += step.reasons.has(Reason::kAcceleration) ? 1 : 0;
   ++counted_.lateness[lateness_bucket(step.hand.at - step.scheduled)];
 }
 

@@ -185,6 +185,8 @@ void put(pb::Reason* out, Reasons reasons) {
   out->set_watchdog(reasons.has(Reason::kWatchdog));
   out->set_unseen(reasons.has(Reason::kUnseen));
   out->set_disarmed(reasons.has(Reason::kDisarmed));
+  out->set_damped(reasons.has(Reason::kDamped));
+  out->set_acceleration(reasons.has(Reason::kAcceleration));
 }
 
 template <class Message>
@@ -253,7 +255,6 @@ std::string encode(const StepRecord& step) {
   out.set_rearmed(step.rearmed);
   out.set_disarmed(step.disarmed);
   out.set_longest_hold_ns(step.longest_hold.count());
-  out.set_assumption_broken(step.assumption_broken);
   out.set_buttons(step.buttons);
   if (const TurnStep* const turn = step.turn()) put(out.mutable_turn(), *turn);
   if (const GripStep* const grip = step.grip()) put(out.mutable_grip(), *grip);
@@ -359,7 +360,7 @@ StepRecord decode_step(std::string_view message, LocalTime at) {
   out.rearmed = in.rearmed();
   out.disarmed = in.disarmed();
   out.longest_hold = Duration(in.longest_hold_ns());
-  out.assumption_broken = in.assumption_broken();
+  if (in.assumption_broken()) out.reasons |= Reason::kAcceleration;  // as recordings of before the reason say it
   out.buttons = in.buttons();
   if (in.has_turn() || in.has_grip() || in.joint_rad_size() > 0) out.handle.emplace();
   if (in.has_turn()) out.handle->turn = turn_step(in.turn());

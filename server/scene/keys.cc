@@ -24,6 +24,23 @@ Names<Law> law_names() {
   return names;
 }
 
+Names<std::optional<Preset>> preset_names() {
+  Names<std::optional<Preset>> names{{{"none", std::nullopt}}};
+  for (const PresetInfo& preset : presets()) names.all.emplace_back(preset.name, preset.preset);
+  return names;
+}
+
+/// For the reference: what each preset is for, and promises.
+std::string preset_meanings() {
+  std::string text;
+  for (const PresetInfo& preset : presets()) {
+    const PresetDevice any{.longest_hold = std::chrono::milliseconds(1)};
+    text += (text.empty() ? "\"" : ". \"") + std::string(preset.name) + "\": " + std::string(preset.what) + "; " +
+            promise_of({.parts = preset_parts(preset.preset, any).parts});
+  }
+  return text;
+}
+
 enum class WorkspaceShape : std::uint8_t { kSphere, kBox };
 
 template <class Table>
@@ -151,8 +168,9 @@ void declare_parts(Table& limiter, Draft& draft) {
   limiter.part("bounded_acceleration", parts.bounded_acceleration, [&draft](Table& keys, Plus::BoundedAcceleration&) {
     keys.key("most_m_per_s2", draft.most_acceleration, kAboveZero,
              "the handle never accelerates harder: the largest forces of hand and motors, over the apparent mass");
-    keys.key("shaping_viscous_n_s_per_m", draft.shaping_viscous, kAboveZero,
-             "stiffness stays below twice this over the longest hold. Not below the viscous friction");
+  });
+  limiter.part("shaping", parts.shaping, [&draft](Table& keys, Plus::Shaping&) {
+    keys.key("stiffness_n_per_m", draft.shaping_stiffness, kAboveZero, "no object is shown stiffer than this");
   });
   limiter.part("adaptive_friction", parts.adaptive_friction, [&draft](Table& keys, Plus::AdaptiveFriction& adaptive) {
     keys.key("rise_ms", adaptive.rise, kAboveZero, "time constant with which the bounds may rise; they fall at once");
@@ -165,6 +183,22 @@ void declare_parts(Table& limiter, Draft& draft) {
         "reach_mm", draft.reach, kZeroOrMore,
         "the limiter uses the least bound of the nearest place and of all places within this distance of the hand");
   });
+  limiter.part("thrift", parts.thrift, [](Table& keys, Plus::Thrift& thrift) {
+    keys.key("share", thrift.share, Number{.least = 0.01, .most = 1},
+             "the most of a force that is kept back while the hand is let out");
+    keys.key("energy_mj", thrift.energy, kAboveZero, "with more credit than this nothing is kept back");
+  });
+  limiter.part("damper", parts.damper, [&draft](Table& keys, Plus::Damper& damper) {
+    keys.key("damping_n_s_per_m", draft.damping, kAboveZero, "what a vibration of the hand in contact is damped with");
+    keys.key("smoothing_ms", damper.smoothing, kAboveZero, "time constant of the velocity's two filters");
+    keys.key("slow_ms", damper.slow, kAboveZero, "motion slower than this is not vibration");
+    keys.key("dead_zone", damper.dead_zone, kZeroOrMore,
+             "in pulses that one encoder count makes: a smaller motion is not damped");
+  });
+  limiter.part("fading_contact", parts.fading_contact, [](Table& keys, Plus::FadingContact& fading) {
+    keys.key("memory_ms", fading.memory, kAboveZero,
+             "for energy_cap: time constant with which the credit of a contact that has ended fades");
+  });
 }
 
 Names<OutputEstimator::Model> estimator_models() {
@@ -172,7 +206,7 @@ Names<OutputEstimator::Model> estimator_models() {
   return {{{"polynomial", kPolynomial}, {"spring-and-bias", kSpringAndBias}, {"output-error", kOutputError}}};
 }
 
-/// How the force follows the hand between two arrivals without the engine's own model. At most one table.
+/// How the force follows the hand between two arrivals. At most one table.
 template <class Table>
 void declare_between(Table& force, HeldForce::Config& hold) {
   force.part("adaptive_local_model", hold.adaptive_local_model, [](Table& keys, AdaptiveLocalModel::Config& config) {
@@ -194,6 +228,14 @@ void declare_between(Table& force, HeldForce::Config& hold) {
     keys.key("largest_n", config.max_force, kAboveZero, "the largest estimate of the force, on each axis");
     keys.key("resolution_um", config.resolution, kZeroOrMore, "one encoder count: motion below it teaches nothing");
   });
+  force.part("learned_model", hold.learned_model, [](Table& keys, LearnedModel::Config& config) {
+    keys.key("least_travel_um", config.least_travel, kAboveZero, "a hand that has moved less teaches nothing");
+    keys.key("gain", config.gain, Number{.least = 0.01, .most = 1}, "share of an error that one lesson corrects");
+    keys.key("forgetting", config.forgetting, Number{.least = 0.5, .most = 0.999},
+             "factor by which each lesson lowers the weight of those before, for trust");
+    keys.key("max_stiffness_n_per_m", config.max_stiffness, kAboveZero, "no stiffer environment is believed");
+    keys.key("blend_ms", config.blend, kZeroOrMore, "a new answer is blended in with this time constant at most");
+  });
 }
 
 /// What the limiter counts on of a handle that turns and grips.
@@ -208,8 +250,11 @@ void declare_handle_bounds(Table& limiter, Draft& draft) {
     keys.key("most_rad_per_s2", draft.most_angular_acceleration, kAboveZero,
              "for bounded_acceleration: the largest angular acceleration of the handle",
              Absent{.text = "required with bounded_acceleration"});
-    keys.key("shaping_viscous_nm_s_per_rad", draft.angular_shaping_viscous, kZeroOrMore,
-             "for bounded_acceleration: angular stiffness stays below twice this over the longest hold");
+    keys.key("shaping_stiffness_nm_per_rad", draft.angular_shaping_stiffness, kAboveZero,
+             "for shaping: no object is shown stiffer than this to a hand that turns",
+             Absent{.text = "required with shaping"});
+    keys.key("damping_nm_s_per_rad", draft.angular_damping, kZeroOrMore,
+             "for damper: what a vibration of the turning is damped with; 0: it is not");
   });
   limiter.table("gripper", [&draft](Table& keys) {
     constexpr Absent kMotor{.text = "required of a device whose gripper has a motor"};
@@ -300,6 +345,11 @@ void declare_scene(Table& scene, Draft& draft) {
                 kProfiles);
     limiter.key("viscous_friction_n_s_per_m", draft.viscous_bound, kZeroOrMore,
                 "lower bound of the device's viscous friction", kProfiles);
+    limiter.key(
+        "preset", draft.preset, preset_names(),
+        "for \"aol+\": lists the parts below that the scene does not list, and force.learned_model, with values "
+        "that were measured together. " +
+            preset_meanings());
     declare_handle_bounds(limiter, draft);
     declare_law(limiter, draft);
   });

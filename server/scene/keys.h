@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include "core/control/preset.h"
 #include "devices/simulated/profiles.h"
 #include "devices/simulated/recorded_motion.h"
 #include "server/scene/scene.h"
@@ -57,15 +58,18 @@ struct Draft {
   FrictionBounds rotation_bounds;  ///< N·m, N·m·s/rad
   FrictionBounds grip_bounds;      ///< N, N·s/m
   std::optional<double> most_angular_acceleration;
-  double angular_shaping_viscous = 0;
+  std::optional<double> angular_shaping_stiffness;
+  double angular_damping = 0;
   std::optional<double> max_torque;  ///< N·m
   double max_torque_slew = 50;       ///< N·m/s: 1 N per step, as for the force, at a lever of 5 cm
   std::optional<double> max_grip;    ///< N
   std::optional<double> ledger_step;
   /// 8.5 N on a handle of 75 g that nobody holds are 113 m/s²; a tap is some 200 (control.md 8.7).
   double most_acceleration = 300;
-  /// With more, delayed walls stay passive but buzz (control.md 8.7).
-  double shaping_viscous = 0.3;
+  double shaping_stiffness = 1000;  ///< N/m
+  double damping = 24;              ///< N·s/m
+  double damper_contact = 0.1;      ///< N
+  std::optional<Preset> preset;
   Coupling::Config coupling;             ///< of [teleoperation], when there is one
   Vec3 map_rotation = Vec3::Zero();      ///< rad, rotation vector
   std::optional<double> coupling_force;  ///< N

@@ -19,6 +19,8 @@
 #include <vector>
 
 #include "core/base/rotation.h"
+#include "core/control/aol_parts.h"
+#include "core/control/preset.h"
 #include "core/handle/turn_friction.h"
 #include "devices/simulated/recorded_motion.h"
 #include "server/machine/regular_file.h"
@@ -312,6 +314,7 @@ class SceneResolver {
     control.limiter.friction.viscous = friction_bound("viscous_friction_n_s_per_m", draft_.viscous_bound,
                                                       profile ? &profile->viscous_bound : nullptr, truth.viscous, 1);
     resolve_parts(control.limiter);
+    resolve_preset(control);
     resolve_places(control);
     resolve_rotation(control);
     resolve_grip(control);
@@ -541,7 +544,8 @@ class SceneResolver {
                                       .max_slew = draft_.max_torque_slew,
                                       .encoder_step = device->encoder_step.value_or(0),
                                       .most_acceleration = draft_.most_angular_acceleration,
-                                      .shaping_viscous = std::max(draft_.angular_shaping_viscous, friction.viscous)};
+                                      .shaping_stiffness = draft_.angular_shaping_stiffness,
+                                      .damping = draft_.angular_damping};
   }
 
   void resolve_grip(HapticController::Config& control) const {
@@ -618,7 +622,48 @@ class SceneResolver {
     }
   }
 
+  /// What a preset lists and the scene does not.
+  void resolve_preset(HapticController::Config& control) const {
+    if (!draft_.preset) return;
+    LimiterConfig& limiter = control.limiter;
+    if (limiter.law != Law::kAolPlus) {
+      blame("limiter.preset", {"limiter.preset", "limiter.kind"},
+            "expected kind \"aol+\", whose parts a preset lists, found " + in_quotes(info(limiter.law).name));
+    }
+    const std::optional<double> step = draft_.ledger_step ? draft_.ledger_step : draft_.simulated.encoder_step;
+    if (!step && draft_.scene.driver().moves_a_hand) {
+      blame("limiter.robust_ledger.encoder_step_um", {"limiter.preset"},
+            "missing, expected " + kZeroOrMore.expected(unit_of("_um")) +
+                ", because the preset has to know the device's counts");
+    }
+    const PresetParts chosen = preset_parts(
+        *draft_.preset,
+        {.friction = limiter.friction, .longest_hold = limiter.longest_hold, .encoder_step = step.value_or(0)});
+    if (limiter.parts.latency_reserve && chosen.parts.bounded_acceleration) {
+      blame("limiter.latency_reserve", {"limiter.latency_reserve", "limiter.preset"},
+            "expected none with a preset that lists bounded_acceleration, which is not proved for forces that are held "
+            "late: take \"" +
+                std::string(info(Preset::kFeelUnconditional).name) + "\"");
+    }
+    for_each_aol_part([&](const auto& part) {
+      auto& listed = limiter.parts.*part.config;
+      if (!listed) listed = chosen.parts.*part.config;
+    });
+    HeldForce::Config& hold = control.hold;
+    if (!hold.adaptive_local_model && !hold.output_estimator && !hold.learned_model) {
+      hold.learned_model = chosen.learned_model;
+    }
+  }
+
   void resolve_parts(LimiterConfig& limiter) const {
+    if (limiter.parts.bounded_acceleration && !limiter.parts.shaping && !draft_.preset) {
+      blame("limiter.shaping", {"limiter.bounded_acceleration"},
+            "missing, expected this table with bounded_acceleration: nothing else limits how hard a wall may be");
+    }
+    if (limiter.parts.fading_contact && !limiter.parts.energy_cap && !draft_.preset) {
+      blame("limiter.energy_cap", {"limiter.fading_contact"},
+            "missing, expected this table with fading_contact: without it no contact has a credit of its own");
+    }
     if (limiter.parts.robust_ledger) {
       const std::optional<double> step = draft_.ledger_step ? draft_.ledger_step : draft_.simulated.encoder_step;
       if (!step) {
@@ -630,8 +675,11 @@ class SceneResolver {
     }
     if (limiter.parts.bounded_acceleration) {
       limiter.parts.bounded_acceleration->most = {draft_.most_acceleration};
-      limiter.parts.bounded_acceleration->shaping_viscous = {
-          std::max(draft_.shaping_viscous, limiter.friction.viscous)};
+    }
+    if (limiter.parts.shaping) limiter.parts.shaping->stiffness = {draft_.shaping_stiffness};
+    if (limiter.parts.damper) {
+      limiter.parts.damper->viscous = {draft_.damping};
+      limiter.parts.damper->contact = {draft_.damper_contact};
     }
   }
 

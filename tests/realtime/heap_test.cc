@@ -187,7 +187,7 @@ TEST(SafeDevice, MakesNoHeapCallWhateverHappens) {
 // Every law of the catalogue, every part of AOL+, every way to follow the hand between two forces.
 TEST(HapticController, NoLawAndNoPartMakesAHeapCallInTheLoop) {
   for (const LawInfo& law : laws()) {
-    for (int between = 0; between < 3; ++between) {
+    for (int between = 0; between < 4; ++between) {
       HapticController::Config config;
       config.limiter = {.law = law.law, .friction = {0.05, 0.26}, .longest_hold = milliseconds(1)};
       config.limiter.max_force = 3;
@@ -195,12 +195,17 @@ TEST(HapticController, NoLawAndNoPartMakesAHeapCallInTheLoop) {
       config.limiter.parts = {.energy_cap = {{}},
                               .robust_ledger = {{.encoder_step = {30e-6}}},
                               .knee = {{}},
-                              .bounded_acceleration = {{.most = {300}, .shaping_viscous = {0.3}}},
-                              .adaptive_friction = {{}}};
+                              .bounded_acceleration = {{.most = {300}}},
+                              .shaping = {{.stiffness = {1000}}},
+                              .adaptive_friction = {{}},
+                              .thrift = {{}},
+                              .damper = {{.viscous = {24}, .contact = {0.1}}},
+                              .fading_contact = {{}}};
       config.max_force = 8;
       config.max_slew = 1000;
       if (between == 1) config.hold.adaptive_local_model.emplace();
       if (between == 2) config.hold.output_estimator.emplace();
+      if (between == 3) config.hold.learned_model.emplace();
       HapticController controller(config);
       Vec3 applied = Vec3::Zero();
       const HeapGuard guard;

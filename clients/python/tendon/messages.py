@@ -94,6 +94,8 @@ class Reason(IntFlag):
     WATCHDOG = 2048
     UNSEEN = 4096
     DISARMED = 8192
+    DAMPED = 16384
+    ACCELERATION = 32768
 
 
 @dataclass(frozen=True, slots=True)

@@ -619,6 +619,7 @@ export interface Refused {
 const kReasons = [
   "energy", "max force", "slew", "ramp-in", "held", "decaying", "safe stop", "not finite", "fault", "device clamp",
   "overrun", "watchdog", "position unseen", "disarmed",
+  "damped", "acceleration",
 ] as const;
 
 /** The names of the bits of DeviceState.reasons. */

@@ -38,8 +38,8 @@ TEST(Catalogue, EveryPartOfAolPlusIsARowOfTheReadme) {
 TEST(Catalogue, EachPartOfAolPlusIsListedOnce) {
   // Does not compile when Parts gains a member: then kAolParts needs one more row, too.
   PointAolPlus::Parts parts;
-  const auto& [cap, robust, knee, reserve, bounded, adaptive] = parts;
-  EXPECT_EQ(std::tuple_size_v<decltype(kAolParts)>, 6U);
+  const auto& [cap, robust, knee, reserve, bounded, shaping, adaptive, thrift, damper, fading] = parts;
+  EXPECT_EQ(std::tuple_size_v<decltype(kAolParts)>, 10U);
   std::set<std::string_view> names;
   std::set<const void*> members;
   for_each_aol_part([&](const auto& part) {
@@ -47,9 +47,9 @@ TEST(Catalogue, EachPartOfAolPlusIsListedOnce) {
     members.insert(&(parts.*part.config));
     (parts.*part.config).emplace();
   });
-  EXPECT_EQ(names.size(), 6U);
-  EXPECT_EQ(members.size(), 6U);
-  EXPECT_TRUE(cap && robust && knee && reserve && bounded && adaptive);
+  EXPECT_EQ(names.size(), 10U);
+  EXPECT_EQ(members.size(), 10U);
+  EXPECT_TRUE(cap && robust && knee && reserve && bounded && shaping && adaptive && thrift && damper && fading);
 }
 
 }  // namespace

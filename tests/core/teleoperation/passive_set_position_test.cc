@@ -161,7 +161,8 @@ double least_energy(std::uint64_t seed, double truth, int& clipped, std::uint64_
   Dice dice(seed);
   PassiveSetPosition<3> spring(kStiff);
   AolPlus<1, 3>::Parts parts;
-  parts.bounded_acceleration = AolPlus<1, 3>::BoundedAcceleration{.most = {40}, .shaping_viscous = {0.26}};
+  parts.bounded_acceleration = AolPlus<1, 3>::BoundedAcceleration{.most = {40}};
+  parts.shaping = AolPlus<1, 3>::Shaping{.stiffness = {520}};
   AolPlus<1, 3> limiter({{kSlippery}, kPeriod, parts});
   Vec3 x = Vec3::Zero();
   Vec3 v = Vec3::Zero();

@@ -107,7 +107,7 @@ TEST(HealthMeter, ABrokenAccelerationBoundDegradesTheDeviceInThatReportOnly) {
   meter.observe(step);
   const Health before = meter.counted();
   step.tick = 1;
-  step.assumption_broken = true;
+  step.reasons |= Reason::kAcceleration;
   meter.observe(step);
   const Health broken = meter.counted();
   EXPECT_EQ(broken.broken_assumptions, 1U);

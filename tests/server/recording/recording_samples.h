@@ -86,7 +86,7 @@ inline StepRecord sample_step(std::uint64_t tick) {
   }
   if (step.handle && !step.handle->turn && !step.handle->grip && !step.handle->joints) step.handle.reset();
   step.longest_hold = std::chrono::microseconds(2000 + tick);
-  step.assumption_broken = tick % 11 == 0;
+  if (tick % 11 == 0) step.reasons |= Reason::kAcceleration;
   if (tick % 4 < 2) step.stiffness << 500, -1, 2, -1, 600, 3, 2, 3.5, 700 + t;
   return step;
 }
@@ -142,9 +142,9 @@ inline bool same(const StepRecord& a, const StepRecord& b) {
          same(a.was_applied, b.was_applied) && same(a.wanted, b.wanted) && same(a.permitted, b.permitted) &&
          same(a.force, b.force) && same(a.applied, b.applied) && same(a.energy, b.energy) && a.reasons == b.reasons &&
          a.mode == b.mode && a.rearmed == b.rearmed && a.disarmed == b.disarmed && a.buttons == b.buttons &&
-         a.longest_hold == b.longest_hold && a.assumption_broken == b.assumption_broken && same(a.handle, b.handle) &&
-         a.force_sequence == b.force_sequence && a.force_age == b.force_age && a.loop_age == b.loop_age &&
-         a.channel == b.channel && a.force_error.has_value() == b.force_error.has_value() &&
+         a.longest_hold == b.longest_hold && same(a.handle, b.handle) && a.force_sequence == b.force_sequence &&
+         a.force_age == b.force_age && a.loop_age == b.loop_age && a.channel == b.channel &&
+         a.force_error.has_value() == b.force_error.has_value() &&
          same(a.force_error.value_or(0), b.force_error.value_or(0)) &&
          std::equal(a.stiffness.reshaped().begin(), a.stiffness.reshaped().end(), b.stiffness.reshaped().begin());
 }

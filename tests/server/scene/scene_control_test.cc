@@ -108,11 +108,42 @@ TEST(Scene, TheRobustLedgerTakesTheDevicesEncoderAndTheKeyOverrides) {
   EXPECT_EQ(step("encoder_step_um = 100\n"), 1e-4);
 }
 
-TEST(Scene, BoundedAccelerationNeverShapesBelowTheFrictionItself) {
-  const auto parts = minimal_and("[limiter.bounded_acceleration]\nmost_m_per_s2 = 200\n").loop.control.limiter.parts;
+TEST(Scene, APresetListsItsPartsAndATableOfTheScenesGoesBeforeThem) {
+  const Scene scene = minimal_and("[limiter]\npreset = \"feel\"\n[limiter.knee]\nstart = 0.9\n");
+  const HapticController::Config& control = scene.loop.control;
+  const auto& parts = control.limiter.parts;
+  EXPECT_EQ(parts.knee->start, 0.9);
+  EXPECT_TRUE(parts.energy_cap && parts.fading_contact && parts.bounded_acceleration && parts.thrift && parts.damper);
+  EXPECT_EQ(parts.robust_ledger->encoder_step[0], find_device_profile("falcon")->encoder_step.value);
+  EXPECT_EQ(parts.shaping->stiffness[0], 1500);
+  EXPECT_TRUE(control.hold.learned_model);
+  EXPECT_FALSE(minimal_and("[limiter]\npreset = \"feel\"\n[force.output_estimator]\n").loop.control.hold.learned_model);
+  EXPECT_FALSE(minimal_and("[limiter]\n").loop.control.limiter.parts.damper) << "nothing is listed by itself";
+  EXPECT_FALSE(
+      minimal_and("[limiter]\npreset = \"feel-unconditional\"\n").loop.control.limiter.parts.bounded_acceleration);
+}
+
+TEST(Scene, RefusesAPresetThatItsLimiterCannotKeep) {
+  EXPECT_NE(error_of_minimal_and("[limiter]\nkind = \"aol\"\npreset = \"feel\"\n").find("expected kind \"aol+\""),
+            std::string::npos);
+  EXPECT_NE(
+      error_of_minimal_and("[limiter]\npreset = \"feel\"\n[limiter.latency_reserve]\n").find("feel-unconditional"),
+      std::string::npos);
+  EXPECT_NE(error_of_minimal_and("[limiter]\npreset = \"fell\"\n").find("feel-unconditional"), std::string::npos);
+}
+
+TEST(Scene, APartThatNeedsAnotherNamesIt) {
+  EXPECT_NE(error_of_minimal_and("[limiter.fading_contact]\n").find("limiter.energy_cap"), std::string::npos);
+  EXPECT_NE(error_of_minimal_and("[limiter.bounded_acceleration]\n").find("limiter.shaping"), std::string::npos);
+}
+
+TEST(Scene, BoundedAccelerationIsWhatTheSceneSays) {
+  const auto parts = minimal_and(
+                         "[limiter.bounded_acceleration]\nmost_m_per_s2 = 200\n"
+                         "[limiter.shaping]\nstiffness_n_per_m = 700\n")
+                         .loop.control.limiter.parts;
   EXPECT_EQ(parts.bounded_acceleration->most[0], 200);
-  EXPECT_EQ(parts.bounded_acceleration->shaping_viscous[0],
-            std::max(0.3, find_device_profile("falcon")->viscous_bound.value));
+  EXPECT_EQ(parts.shaping->stiffness[0], 700);
 }
 
 TEST(Scene, HasOneChannelForAllWhoNameNone) {

@@ -28,6 +28,7 @@ ForceChannels::Wanted wanted_in(const StepRecord& recorded) {
   wanted.mode = recorded.mode;
   wanted.reasons = Reasons::from_bits(recorded.reasons.bits() & kUpstream);
   wanted.age = recorded.force_age;
+  wanted.loop_age = recorded.loop_age;
   wanted.channel = recorded.channel;
   if (recorded.turn() || recorded.grip()) wanted.handle.emplace();
   if (recorded.turn()) wanted.handle->torque = recorded.turn()->wanted;

@@ -19,6 +19,7 @@ export const kReasons: readonly ReasonWords[] = [
   { bit: 5, name: "Fading", meaning: "no fresh force has come, and the last one fades", limits: true },
   { bit: 4, name: "Held", meaning: "the newest force has outlived its validity and is held", limits: true },
   { bit: 0, name: "Energy limit", meaning: "a larger force would give out energy that the device never took in", limits: true },
+  { bit: 14, name: "Damped", meaning: "the hand vibrates in contact, and is damped", limits: true },
   { bit: 1, name: "Force limit", meaning: "the largest force of the device or the scene", limits: true },
   { bit: 2, name: "Growth limit", meaning: "the force may not grow that fast", limits: true },
   { bit: 3, name: "Ramp-in", meaning: "forces have just begun again", limits: true },
@@ -26,6 +27,7 @@ export const kReasons: readonly ReasonWords[] = [
   { bit: 9, name: "Device clamp", meaning: "the device gave out less than it was told to", limits: true },
   { bit: 12, name: "Unseen", meaning: "the device gave no position, so it gives no force", limits: true },
   { bit: 10, name: "Overrun", meaning: "a step came later than the control law allows for", limits: false },
+  { bit: 15, name: "Hard hand", meaning: "the hand accelerated harder than the limiter counts on: in that step it counted on friction alone", limits: false },
   { bit: 11, name: "Watchdog", meaning: "a step came so late that the device's own watchdog let go", limits: false },
 ];
 

@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "core/control/preset.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+
+#include "core/base/expect.h"
+
+namespace tendon {
+namespace {
+
+constexpr std::array kPresets = {
+    PresetInfo{Preset::kFeel, "feel", "quiet, and true to the object, on every device"},
+    PresetInfo{Preset::kFeelUnconditional, "feel-unconditional",
+               "the same without an assumption about the hand, for devices with 0.1 N·s/m of friction and more"},
+};
+
+constexpr double kMostAcceleration = 300;  // m/s²: 8.5 N on a handle of 75 g are 113, a tap is some 200
+constexpr double kStiffness = 1500;        // N/m
+constexpr double kDamping = 24;            // N·s/m
+constexpr double kContact = 0.1;           // N
+constexpr double kCount = 30e-6;           // m, for which the smoothing was chosen
+constexpr double kSmoothing = 2.2e-3;      // s, of the damper at that count
+
+}  // namespace
+
+std::span<const PresetInfo> presets() noexcept { return kPresets; }
+
+const PresetInfo& info(Preset preset) noexcept { return kPresets[static_cast<std::size_t>(preset)]; }
+
+PresetParts preset_parts(Preset preset, const PresetDevice& device) noexcept {
+  PresetParts chosen;
+  AolPlus<1, 3>::Parts& parts = chosen.parts;
+  parts.energy_cap.emplace();
+  parts.fading_contact.emplace();
+  if (device.encoder_step > 0) parts.robust_ledger.emplace().encoder_step = {device.encoder_step};
+  parts.knee.emplace().start = 0.7;
+  if (preset == Preset::kFeel) parts.bounded_acceleration.emplace().most = {kMostAcceleration};
+  // Never softer than the friction alone allows.
+  const double by_friction = 2 * device.friction.viscous / seconds(device.longest_hold);
+  parts.shaping.emplace().stiffness = {std::max(kStiffness, by_friction)};
+  parts.thrift.emplace();
+  auto& damper = parts.damper.emplace();
+  damper.viscous = {kDamping};
+  damper.contact = {kContact};
+  damper.smoothing = from_seconds(kSmoothing * std::clamp(std::sqrt(device.encoder_step / kCount), 0.6, 2.0));
+  chosen.learned_model.emplace();
+  return chosen;
+}
+
+std::string promise_of(const LimiterConfig& limiter) {
+  if (!info(limiter.law).passive) return "no promise for every object: " + std::string(info(limiter.law).what);
+  const auto& bounded = limiter.parts.bounded_acceleration;
+  if (limiter.law != Law::kAolPlus || !bounded) return "passive whatever the hand does";
+  return "passive while the handle accelerates by less than " + shortest(bounded->most[0]) +
+         " m/s²; a step beyond that counts on friction alone";
+}
+
+}  // namespace tendon

@@ -1,0 +1,212 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// What each of the parts for a quiet hand does by itself. That none of them costs the promise is in aol_plus_test.cc.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "core/base/portable_math.h"
+#include "core/control/aol_plus.h"
+#include "core/control/preset.h"
+
+namespace tendon {
+namespace {
+
+using std::chrono::milliseconds;
+
+AolPlus<1>::Config device(Duration period, double viscous = 0.005, double coulomb = 0.04) {
+  return {.friction = {Friction{coulomb, viscous}}, .longest_hold = period};
+}
+
+/// The stiffness that a hand feels which goes 10 mm into `stiffness` at 20 mm/s.
+double displayed(const AolPlus<1>::Config& config, double stiffness) {
+  AolPlus<1> law(config);
+  const double step = 0.02 * seconds(config.longest_hold);
+  double applied = 0;
+  double x = 0;
+  while (x < 0.01) {
+    law.observe({.applied = Vec<1>(applied), .dx = Vec<1>(step), .held = config.longest_hold});
+    x += step;
+    applied = law.limit({.force = Vec<1>(-stiffness * x)}).force[0];
+  }
+  return -applied / x;
+}
+
+TEST(Shaping, ShowsNoObjectStifferWhateverThePeriodIs) {
+  for (const int us : {250, 500, 1000, 2000, 4000}) {
+    auto config = device(std::chrono::microseconds(us));
+    config.parts.bounded_acceleration = {{.most = {100}}};
+    config.parts.shaping = {{.stiffness = {900}}};
+    EXPECT_LE(displayed(config, 20000), 900 * 1.06) << "friction earns, too; " << us << " us";
+    if (us > 1000) continue;  // 4 mm of reach in a hold are worth more than the spring
+    EXPECT_GE(displayed(config, 20000), 900 * 0.9) << us << " us";
+  }
+}
+
+TEST(Shaping, LeavesASofterObjectAsItIs) {
+  auto config = device(milliseconds(1));
+  config.parts.bounded_acceleration = {{.most = {100}}};
+  config.parts.shaping = {{.stiffness = {900}}};
+  EXPECT_NEAR(displayed(config, 300), 300, 6);
+}
+
+TEST(Thrift, KeepsBackOnlyWhileTheHandIsLetOutAndThePurseIsLow) {
+  const auto share = [](double dx, double earned) {
+    auto config = device(milliseconds(1), 0.26, 0.02);
+    config.parts.thrift = {{.share = 0.5, .energy = 0.004}};
+    AolPlus<1> law(config);
+    law.credit(earned);
+    for (int n = 0; n < 50; ++n) law.observe({.applied = Vec<1>(0), .dx = Vec<1>(dx), .held = milliseconds(1)});
+    const auto limited = law.limit({.force = Vec<1>(-1e3)});
+    return -limited.force[0] / limited.permitted;
+  };
+  EXPECT_NEAR(share(2e-5, 0), 1, 1e-12) << "the hand presses";
+  EXPECT_LT(share(-2e-5, 0), 0.7) << "the hand is let out";
+  EXPECT_NEAR(share(-2e-5, 0.01), 1, 1e-12) << "there is plenty";
+}
+
+TEST(Thrift, AForceGrowsOnlyByWhatTheAccountCanPayTheCountsOf) {
+  auto config = device(milliseconds(1), 0.26, 0.02);
+  config.parts.robust_ledger = {{.encoder_step = {1e-4}}};
+  config.parts.thrift.emplace();
+  AolPlus<1> law(config);
+  law.credit(1e-4);
+  law.observe({.applied = Vec<1>(0), .dx = Vec<1>(0), .held = milliseconds(1)});
+  const auto limited = law.limit({.force = Vec<1>(-1e3)});
+  EXPECT_NEAR(-limited.force[0], 1e-4 / (4 * 1e-4), 1e-9);
+  EXPECT_LT(-limited.force[0], 0.9 * limited.permitted) << "the bound itself is not what held it back";
+}
+
+/// A hand that vibrates by `amplitude` (m/s) at 20 Hz in a contact of 2 N: the work that the damper took in a second, J.
+double damped(const AolPlus<1>::Config& config, double amplitude, double slow_speed = 0, double slow_hz = 0) {
+  AolPlus<1> law(config);
+  law.credit(0.05);
+  double taken = 0;
+  double x = 0;
+  double seen = 0;
+  const double count = config.parts.robust_ledger ? config.parts.robust_ledger->encoder_step[0] : 0;
+  Vec<1> applied = Vec<1>::Zero();
+  for (int n = 0; n < 1000; ++n) {
+    const double t = n * 1e-3;
+    x += 1e-3 * (amplitude * portable::sin(2 * std::numbers::pi * 20 * t) +
+                 slow_speed * portable::sin(2 * std::numbers::pi * slow_hz * t));
+    const double now = count > 0 ? std::round(x / count) * count : x;
+    law.observe({.applied = applied, .dx = Vec<1>(now - seen), .held = milliseconds(1)});
+    taken += (-2 - applied[0]) * (now - seen);
+    seen = now;
+    applied = law.limit({.force = Vec<1>(-2), .age = milliseconds(20)}).force;
+  }
+  return taken;
+}
+
+AolPlus<1>::Config with_damper(double count) {
+  auto config = device(milliseconds(1), 0.26, 0.02);
+  config.parts.damper = {{.viscous = {24}, .contact = {0.1}}};
+  if (count > 0) config.parts.robust_ledger = {{.encoder_step = {count}}};
+  return config;
+}
+
+TEST(Damper, TakesWorkFromAVibrationAndHardlyAnyFromASlowHand) {
+  const double vibration = damped(with_damper(0), 0.02);
+  EXPECT_GT(vibration, 0.3 * 24 * 0.02 * 0.02 / 2) << "of B v²/2, what a damper without filters would take in a second";
+  EXPECT_LT(std::abs(damped(with_damper(0), 0, 0.02, 0.5)), 0.03 * vibration);
+}
+
+TEST(Damper, IsBlindToTheCountsOfASlowHand) {
+  auto config = with_damper(3e-5);
+  AolPlus<1> law(config);
+  law.credit(0.05);
+  Vec<1> applied = Vec<1>::Zero();
+  for (int n = 0; n < 2000; ++n) {  // a count every 20 ms: 1.5 mm/s
+    law.observe({.applied = applied, .dx = Vec<1>(n % 20 == 0 ? 3e-5 : 0.0), .held = milliseconds(1)});
+    const auto limited = law.limit({.force = Vec<1>(-2), .age = milliseconds(20)});
+    const double pulse = 24 * 3e-5 / (std::numbers::e * 2.2e-3);
+    ASSERT_LT(std::abs(limited.force[0] + 2), n > 200 ? 0.4 * pulse : pulse) << n;
+    applied = limited.force;
+  }
+}
+
+TEST(Damper, StopsWhenItOwesMoreThanItHasEarned) {
+  auto poor = with_damper(1e-4);
+  poor.parts.damper->dead_zone = 0;
+  poor.parts.damper->most_owed = 1e-6;
+  auto rich = poor;
+  rich.parts.damper->most_owed = 1;
+  const auto spent = [](const AolPlus<1>::Config& config) {
+    AolPlus<1> law(config);
+    law.credit(0.05);
+    Vec<1> applied = Vec<1>::Zero();
+    for (int n = 0; n < 1000; ++n) {  // 10 mm/s: a count every 10 ms, nothing else moves
+      law.observe({.applied = applied, .dx = Vec<1>(n % 10 == 0 ? 1e-4 : 0.0), .held = milliseconds(1)});
+      applied = law.limit({.force = Vec<1>(-2), .age = milliseconds(20)}).force;
+    }
+    return 0.05 + 2 * 0.01 - law.spendable();
+  };
+  EXPECT_LT(spent(poor), 0.3 * spent(rich));
+}
+
+TEST(Damper, IsOffInFreeSpaceAndWhereAFreshAnswerIsShownWell) {
+  AolPlus<1> law(with_damper(0));
+  law.credit(0.05);
+  for (int n = 0; n < 30; ++n)
+    law.observe({.applied = Vec<1>(0), .dx = Vec<1>(n % 10 < 5 ? 1e-5 : -1e-5), .held = milliseconds(1)});
+  EXPECT_EQ(law.limit({.force = Vec<1>(0), .age = milliseconds(20)}).force[0], 0);
+  const auto fresh = law.limit({.force = Vec<1>(-0.5)});
+  EXPECT_EQ(fresh.force[0], -0.5);
+  EXPECT_TRUE(fresh.reasons.empty());
+  const auto old = law.limit({.force = Vec<1>(-0.5), .age = milliseconds(20)});
+  EXPECT_NE(old.force[0], -0.5);
+  EXPECT_TRUE(old.reasons.has(Reason::kDamped));
+}
+
+TEST(FadingContact, KeepsForAWhileWhatAContactHadPutIn) {
+  const auto left_after = [](bool fading, int pause_ms) {
+    auto config = device(milliseconds(1), 0.26, 0.02);
+    config.parts.energy_cap = {{.energy = 1e-3}};
+    if (fading) config.parts.fading_contact.emplace();
+    AolPlus<1> law(config);
+    law.credit(1e-3);
+    Vec<1> applied = Vec<1>::Zero();
+    double x = 0;
+    const auto step = [&](double dx, double wanted) {
+      law.observe({.applied = applied, .dx = Vec<1>(dx), .held = milliseconds(1)});
+      x += dx;
+      applied = law.limit({.force = Vec<1>(wanted)}).force;
+    };
+    for (int n = 0; n < 500; ++n) step(2e-5, -400 * x);
+    for (int n = 0; n < pause_ms; ++n) step(0, 0);  // the object is gone
+    return law.spendable();
+  };
+  EXPECT_NEAR(left_after(false, 1), 1e-3, 1e-9);
+  const double soon = left_after(true, 1);
+  EXPECT_GT(soon, 1e-2);
+  EXPECT_NEAR(left_after(true, 300) - 1e-3, (soon - 1e-3) * std::exp(-1.0), 0.05 * soon);
+  EXPECT_LT(left_after(true, 3000), 1.01e-3);
+}
+
+TEST(Preset, ListsWhatItsPromiseSaysAndNothingThatTheDeviceLacks) {
+  for (const PresetInfo& preset : presets()) {
+    const PresetDevice falcon{.friction = {0.02, 0.26}, .longest_hold = milliseconds(1), .encoder_step = 3e-5};
+    const PresetParts chosen = preset_parts(preset.preset, falcon);
+    const std::string promise = promise_of({.parts = chosen.parts});
+    EXPECT_EQ(promise, preset.preset == Preset::kFeel
+                           ? "passive while the handle accelerates by less than 300 m/s²; a step beyond that counts on "
+                             "friction alone"
+                           : "passive whatever the hand does");
+    EXPECT_TRUE(chosen.parts.robust_ledger && chosen.learned_model) << preset.name;
+    AolPlus<1, 3>({.friction = {falcon.friction}, .longest_hold = falcon.longest_hold, .parts = chosen.parts});
+    const PresetParts exact = preset_parts(preset.preset, {.friction = {0.02, 0.26}, .longest_hold = milliseconds(1)});
+    EXPECT_FALSE(exact.parts.robust_ledger) << preset.name;
+  }
+}
+
+TEST(Preset, IsNeverSofterThanTheFrictionAlone) {
+  const PresetParts damped =
+      preset_parts(Preset::kFeel, {.friction = {0.02, 2}, .longest_hold = milliseconds(1), .encoder_step = 3e-5});
+  EXPECT_GE(damped.parts.shaping->stiffness[0], 2 * 2 / 1e-3);
+}
+
+}  // namespace
+}  // namespace tendon
