@@ -31,10 +31,7 @@ constexpr std::array kDevices = {TestDevice{"0.26 N s/m", {.coulomb = 0.02, .vis
 constexpr std::array kStiffnesses = {100.0, 300.0, 500.0, 1000.0, 2000.0, 8000.0};  // N/m
 constexpr Duration kLength = std::chrono::seconds(2);
 
-/// Bounded acceleration where 2b/T is less than what objects are made of.
-AolPlus<1, 3>::Parts parts_for(const Friction& friction) {
-  return friction.viscous >= 0.1 ? default_parts(kPaperEncoder) : low_friction_parts(kPaperEncoder);
-}
+Trial trial_of(const Situation& situation, std::uint64_t seed);
 
 std::string text(const char* format, double value) {
   std::array<char, 64> buffer{};
@@ -61,7 +58,7 @@ constexpr const char* kColumns =
 void write_csv(std::ostream& out, const Cell& cell, std::uint64_t seed) {
   const Situation& s = cell.situation;
   const Outcome& o = cell.outcome;
-  out << info(cell.law).name;
+  out << cell.name();
   for (const double value :
        {s.stiffness, s.delay_ms, s.jitter_ms, s.rate_hz, s.loss, s.friction.viscous, s.friction.coulomb}) {
     out << "," << shortest(value);
@@ -78,7 +75,7 @@ std::string to_json(const Cell& cell, std::uint64_t seed) {
   const Situation& s = cell.situation;
   const Outcome& o = cell.outcome;
   return JsonLine()
-      .add("law", info(cell.law).name)
+      .add("law", cell.name())
       .add("stiffness_n_per_m", s.stiffness)
       .add("delay_ms", s.delay_ms)
       .add("jitter_ms", s.jitter_ms)
@@ -103,7 +100,7 @@ std::string to_json(const Cell& cell, std::uint64_t seed) {
 
 /// Some of the cells by law: what they come down to.
 struct Summary {
-  Law law;
+  Contender contender;
   std::size_t cells = 0;
   double passive = 0;    ///< share
   double stable = 0;     ///< share
@@ -116,14 +113,14 @@ struct Summary {
 
 std::vector<Summary> summaries(const std::vector<Cell>& cells, const std::function<bool(const Situation&)>& where) {
   std::vector<Summary> result;
-  for (const LawInfo& law : laws()) {
-    Summary summary{.law = law.law};
+  for (const Contender& contender : contenders()) {
+    Summary summary{.contender = contender};
     std::vector<double> errors;
     std::vector<double> vibrations;
     std::vector<double> limited;
     std::vector<double> latencies;
     for (const Cell& cell : cells) {
-      if (cell.law != law.law || !where(cell.situation)) continue;
+      if (cell.name() != contender.name || !where(cell.situation)) continue;
       summary.passive += cell.passive() ? 1 : 0;
       summary.stable += cell.outcome.stable ? 1 : 0;
       summary.given_out = std::max(summary.given_out, -cell.outcome.least_energy);
@@ -153,7 +150,7 @@ void recommend(std::ostream& out, const std::string& where, const std::vector<Su
     const Summary* best = nullptr;
     for (const bool stable : {true, false}) {
       for (const Summary& law : laws) {
-        if (law.law == Law::kNone || info(law.law).passive != promised || law.passive < 1) continue;
+        if (law.contender.law == Law::kNone || law.contender.promises != promised || law.passive < 1) continue;
         if (stable && law.stable < 1) continue;
         if (best == nullptr || law.error < best->error) best = &law;
       }
@@ -169,18 +166,18 @@ void recommend(std::ostream& out, const std::string& where, const std::vector<Su
     out << "none that keeps its promise.\n";
     return;
   }
-  out << info(safe->law).name << " (force error " << percent(safe->error) << ", stable in " << percent(safe->stable)
+  out << safe->contender.name << " (force error " << percent(safe->error) << ", stable in " << percent(safe->stable)
       << " of " << safe->cells << " cells)";
   if (lucky != nullptr && lucky->error < safe->error && lucky->stable >= safe->stable) {
-    out << "; without a promise for every object: " << info(lucky->law).name << " (" << percent(lucky->error) << ")";
+    out << "; without a promise for every object: " << lucky->contender.name << " (" << percent(lucky->error) << ")";
   }
   out << ".\n";
 }
 
 void draw(const std::filesystem::path& folder, const std::vector<Cell>& cells, std::vector<std::string>& pictures) {
   constexpr std::array kColours = {kOrange, kBlue, kGreen, kVermilion, kPurple, kSky};
-  constexpr std::array kDrawn = {Law::kPassivityController, Law::kAol, Law::kAolPlus, Law::kEnergyBounding,
-                                 Law::kPassiveSynthesis};
+  const std::array kDrawn = {info(Law::kPassivityController).name, info(Law::kAol).name, info(Law::kAolPlus).name,
+                             info(Law::kEnergyBounding).name, info(Preset::kFeel).name};
   std::vector<Panel> panels;
   for (const TestDevice& device : {kDevices.front(), kDevices.back()}) {
     const bool damped = device.friction.viscous == kDevices.front().friction.viscous;
@@ -192,14 +189,14 @@ void draw(const std::filesystem::path& folder, const std::vector<Cell>& cells, s
                     .log_x = true,
                     .log_y = true};
     for (std::size_t i = 0; i < kDrawn.size(); ++i) {
-      Curve errors{.name = std::string(info(kDrawn[i]).name), .colour = kColours[i]};
+      Curve errors{.name = std::string(kDrawn[i]), .colour = kColours[i]};
       Curve vibrations = errors;
       for (const double k : kStiffnesses) {
         const auto at = summaries(cells, [&](const Situation& s) {
           return s.friction.viscous == device.friction.viscous && s.stiffness == k;
         });
         for (const Summary& summary : at) {
-          if (summary.law != kDrawn[i]) continue;
+          if (summary.contender.name != kDrawn[i]) continue;
           errors.points.emplace_back(k, summary.error * 100);
           vibrations.points.emplace_back(k, std::max(summary.vibration * 1e3, 1e-3));
         }
@@ -246,10 +243,25 @@ std::vector<Situation> comparison_grid() {
 }
 
 Cell compare_cell(const Situation& situation, Law law, std::uint64_t seed) {
-  return compare_cell(situation, law, seed, parts_for(situation.friction));
+  return compare_cell(situation, law, seed, parts_without_preset(situation.friction, kPaperEncoder));
+}
+
+Cell compare_cell(const Situation& situation, Preset preset, std::uint64_t seed) {
+  Cell cell{.situation = situation, .law = Law::kAolPlus, .outcome = {}, .preset = preset};
+  cell.outcome = outcome_of({.name = info(preset).name, .preset = preset}, trial_of(situation, seed));
+  return cell;
 }
 
 Cell compare_cell(const Situation& situation, Law law, std::uint64_t seed, const AolPlus<1, 3>::Parts& parts) {
+  Experiment set = trial_of(situation, seed).experiment;
+  set.limiter.law = law;
+  set.limiter.parts = parts;
+  return {situation, law, outcome(run(set), set.period)};
+}
+
+namespace {
+
+Trial trial_of(const Situation& situation, std::uint64_t seed) {
   FreeHand hand = paper_hand(situation.friction);
   hand.hand->motion = ScriptedMotion(ScriptedMotion::Sine{.amplitude = 0.015, .frequency = 0.5});
   if (situation.firm) {
@@ -264,29 +276,30 @@ Cell compare_cell(const Situation& situation, Law law, std::uint64_t seed, const
                      .jitter = from_seconds(situation.jitter_ms * 1e-3),
                      .loss = situation.loss};
   set.hand = hand;
-  set.limiter.law = law;
   set.limiter.friction = situation.friction;
-  set.limiter.parts = parts;
   set.limiter.environment_stiffness = situation.stiffness;
   set.limiter.environment_delay = set.environment.delay;
   set.length = kLength;
   set.max_force = kPaperMaxForce;
   set.seed = seed;
-  return {situation, law, outcome(run(set), set.period)};
+  return {.experiment = set, .encoder_step = kPaperEncoder, .stiffness = situation.stiffness, .drawn = {}};
 }
+
+}  // namespace
 
 Verdict verdict(const std::vector<Cell>& cells, std::uint64_t seed, std::size_t every) {
   Verdict result;
-  const std::size_t each = laws().size();
+  const std::size_t each = contenders().size();
   for (std::size_t first = 0; first + each <= cells.size(); first += each) {
     const auto begin = cells.begin() + static_cast<std::ptrdiff_t>(first);
     const auto end = begin + static_cast<std::ptrdiff_t>(each);
-    const auto plus = std::find_if(begin, end, [](const Cell& cell) { return cell.law == Law::kAolPlus; });
+    const auto plus =
+        std::find_if(begin, end, [](const Cell& cell) { return cell.law == Law::kAolPlus && !cell.preset; });
     ++result.cells;
     if (plus->passive()) ++result.passive;
     const Cell* best = nullptr;
     for (auto cell = begin; cell != end; ++cell) {
-      if (cell == plus || !info(cell->law).passive || !cell->passive()) continue;
+      if (cell == plus || cell->preset || !info(cell->law).passive || !cell->passive()) continue;
       if (best == nullptr || cell->outcome.force_error < best->outcome.force_error) best = &*cell;
     }
     if (best == nullptr || best->outcome.force_error >= plus->outcome.force_error) continue;
@@ -294,7 +307,7 @@ Verdict verdict(const std::vector<Cell>& cells, std::uint64_t seed, std::size_t 
     if (best->outcome.force_error < 0.95 * plus->outcome.force_error) ++result.beaten_clearly;
 
     const auto without = [&](auto drop) {
-      auto parts = parts_for(plus->situation.friction);
+      auto parts = parts_without_preset(plus->situation.friction, kPaperEncoder);
       drop(parts);
       const Cell cell = compare_cell(plus->situation, Law::kAolPlus, seed + first / each * every, parts);
       return cell.outcome.force_error <= best->outcome.force_error;
@@ -322,8 +335,9 @@ void compare(const CompareOptions& options, std::ostream& out) {
   const std::vector<Situation> grid = comparison_grid();
   std::vector<Cell> cells;
   for (std::size_t i = 0; i < grid.size(); i += options.every) {
-    for (const LawInfo& law : laws()) {
-      cells.push_back(compare_cell(grid[i], law.law, options.seed + i));
+    for (const Contender& contender : contenders()) {
+      cells.push_back(contender.preset ? compare_cell(grid[i], *contender.preset, options.seed + i)
+                                       : compare_cell(grid[i], contender.law, options.seed + i));
       if (options.json) out << to_json(cells.back(), options.seed + i) << "\n";
     }
     if (options.progress) std::cerr << "\r" << i + 1 << " of " << grid.size() << " situations" << std::flush;
@@ -337,7 +351,7 @@ void compare(const CompareOptions& options, std::ostream& out) {
     std::ofstream csv(*options.out / "compare.csv");
     csv << kColumns << "\n";
     for (std::size_t i = 0; i < cells.size(); ++i) {
-      write_csv(csv, cells[i], options.seed + i / laws().size() * options.every);
+      write_csv(csv, cells[i], options.seed + i / contenders().size() * options.every);
     }
     if (!csv.flush()) throw std::runtime_error("cannot write " + (*options.out / "compare.csv").string());
     written.push_back((*options.out / "compare.csv").string());
@@ -348,15 +362,15 @@ void compare(const CompareOptions& options, std::ostream& out) {
     return;
   }
 
-  out << cells.size() << " cells: " << cells.size() / laws().size() << " situations, " << laws().size()
-      << " laws; seed " << options.seed << ", commit " << kCommit << "\n\n";
+  out << cells.size() << " cells: " << cells.size() / contenders().size() << " situations, " << laws().size()
+      << " laws and " << presets().size() << " presets; seed " << options.seed << ", commit " << kCommit << "\n\n";
   std::array<char, 200> line{};
   std::snprintf(line.data(), line.size(), "%-26s %8s %8s %12s %10s %12s %9s %9s\n", "law", "passive", "stable",
                 "given out J", "error", "vibration", "limited", "latency");
   out << line.data();
   for (const Summary& s : summaries(cells, [](const Situation&) { return true; })) {
     std::snprintf(line.data(), line.size(), "%-26s %6.1f %% %6.1f %% %12.2g %8.0f %% %7.1f mm/s %7.0f %% %6.0f ms\n",
-                  std::string(info(s.law).name).c_str(), s.passive * 100, s.stable * 100, std::max(0.0, s.given_out),
+                  std::string(s.contender.name).c_str(), s.passive * 100, s.stable * 100, std::max(0.0, s.given_out),
                   s.error * 100, s.vibration * 1e3, s.limited * 100, s.latency * 1e3);
     out << line.data();
   }

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "tests/tools/lab/experiments/experiment.h"
+#include "tests/tools/lab/experiments/situations.h"
 
 namespace tendon::lab {
 
@@ -31,6 +31,9 @@ struct Cell {
   Situation situation;
   Law law;
   Outcome outcome;
+  std::optional<Preset> preset{};  ///< of AOL+
+
+  std::string_view name() const noexcept { return preset ? info(*preset).name : info(law).name; }
 
   /// The device gave out nothing that had not been put in; rounding aside. Exact positions, true friction.
   bool passive() const noexcept { return outcome.least_energy >= -1e-9; }
@@ -43,7 +46,10 @@ Cell compare_cell(const Situation& situation, Law law, std::uint64_t seed);
 /// … or those of `parts`.
 Cell compare_cell(const Situation& situation, Law law, std::uint64_t seed, const AolPlus<1, 3>::Parts& parts);
 
-/// What AOL+ has against every other law that promises to be passive.
+/// … or those of a preset, with its learned model.
+Cell compare_cell(const Situation& situation, Preset preset, std::uint64_t seed);
+
+/// What AOL+ without a preset has against every other law that promises to be passive.
 struct Verdict {
   std::size_t cells = 0;    ///< of AOL+
   std::size_t passive = 0;  ///< … in which it was

@@ -132,6 +132,7 @@ HapticController::Config controller(const Experiment& experiment) {
   config.hold.ramp_in = Duration::zero();
   config.hold.max_valid_for = std::chrono::hours(1);
   config.hold.output_estimator = experiment.estimator;
+  config.hold.learned_model = experiment.learned_model;
   return config;
 }
 

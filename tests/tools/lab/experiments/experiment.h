@@ -55,7 +55,8 @@ struct Experiment {
   Environment environment;
   std::variant<PrescribedMotion, FreeHand> hand;
   LimiterConfig limiter;  ///< its longest_hold is `period`, its max_force that of the experiment
-  std::optional<OutputEstimator::Config> estimator{};  ///< between two forces; left out: the last one is held
+  std::optional<OutputEstimator::Config> estimator{};   ///< between two forces; left out: the last one is held
+  std::optional<LearnedModel::Config> learned_model{};  ///< … or this
   Duration period = std::chrono::milliseconds(1);
   Duration length = std::chrono::seconds(5);
   double max_force = 0;    ///< N

@@ -176,8 +176,12 @@ AolPlus<1, 3>::Parts low_friction_parts(double encoder_step) {
   AolPlus<1, 3>::Parts parts = default_parts(encoder_step);
   auto& bounded = parts.bounded_acceleration.emplace();
   bounded.most = {300};
-  bounded.shaping_viscous = {0.3};
+  parts.shaping.emplace().stiffness = {600};
   return parts;
+}
+
+AolPlus<1, 3>::Parts parts_without_preset(const Friction& friction, double encoder_step) {
+  return friction.viscous >= 0.1 ? default_parts(encoder_step) : low_friction_parts(encoder_step);
 }
 
 PrescribedMotion paper_motion(const Friction& friction, double encoder_step, const Vec3& direction) {
@@ -206,7 +210,7 @@ FreeHand paper_hand(const Friction& friction, const Vec3& direction) {
 
 double PaperRow::least_energy() const { return std::min(prescribed.least_energy, free.least_energy); }
 
-PaperRow paper_row(const PaperExperiment& experiment, Law law) {
+PaperRow paper_row(const PaperExperiment& experiment, Law law, std::optional<Preset> preset) {
   const bool improved = law == Law::kAolPlus;
   const double encoder = improved ? kPaperEncoder : 0;
   Experiment set;
@@ -216,11 +220,18 @@ PaperRow paper_row(const PaperExperiment& experiment, Law law) {
   set.period = improved ? milliseconds(1) : experiment.period;
   set.max_force = kPaperMaxForce;
   set.estimator = experiment.estimator;
+  if (preset) {
+    const PresetParts chosen =
+        preset_parts(*preset, {.friction = kPaperFriction, .longest_hold = set.period, .encoder_step = kPaperEncoder});
+    set.limiter.parts = chosen.parts;
+    set.learned_model = chosen.learned_model;
+    set.estimator.reset();
+  }
   set.hand = paper_motion(kPaperFriction, encoder);
 
   PaperRow row;
   row.experiment = experiment.name;
-  row.law = info(law).name;
+  row.law = preset ? info(*preset).name : info(law).name;
   row.k_op_paper = experiment.k_op;
   row.prescribed_record = run(set);
   row.prescribed = outcome(row.prescribed_record, set.period);
@@ -259,9 +270,9 @@ void paper(const PaperOptions& options, std::ostream& out) {
   for (const PaperExperiment& experiment : paper_experiments()) {
     std::vector<PaperRow> rows;
     if (!options.json) out << experiment.name << "  " << experiment.what << "\n";
-    for (const Law law : kPaperLaws) {
-      rows.push_back(paper_row(experiment, law));
-      const PaperRow& row = rows.back();
+    for (const Law law : kPaperLaws) rows.push_back(paper_row(experiment, law));
+    rows.push_back(paper_row(experiment, Law::kAolPlus, Preset::kFeel));
+    for (const PaperRow& row : rows) {
       if (options.json) {
         out << to_json(row) << "\n";
         continue;
@@ -272,7 +283,8 @@ void paper(const PaperOptions& options, std::ostream& out) {
           << cell(fixed(row.prescribed.largest_force, 2), 17)
           << cell(fixed(row.prescribed.limited_share * 100, 0) + " %", 9) << "\n";
     }
-    if (!options.json) out << "     assumed: " << experiment.assumed << "; aol+: " << experiment.better << "\n";
+    if (!options.json)
+      out << "     assumed: " << experiment.assumed << "; aol+ and feel: " << experiment.better << "\n";
     if (options.out) {
       const auto drawn = draw_panels(
           *options.out / ("paper-" + experiment.name), "Experiment " + experiment.name + ": " + experiment.what,

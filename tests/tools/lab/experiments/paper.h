@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "core/control/preset.h"
 #include "tests/tools/lab/experiments/experiment.h"
 
 namespace tendon::lab {
@@ -41,6 +42,8 @@ inline constexpr double kPaperEncoder = 30e-6;  ///< m, of the device with the f
 AolPlus<1, 3>::Parts default_parts(double encoder_step);
 /// … and for a device with next to no damping: bounded acceleration too (control.md 8.7, 8.12).
 AolPlus<1, 3>::Parts low_friction_parts(double encoder_step);
+/// The one of these two that this device needs: bounded acceleration where 2b/T is less than what objects are made of.
+AolPlus<1, 3>::Parts parts_without_preset(const Friction& friction, double encoder_step);
 
 /// 15 mm · sin(2π · 0.25 Hz · t) along `direction`, whatever the hand feels.
 PrescribedMotion paper_motion(const Friction& friction, double encoder_step, const Vec3& direction = Vec3::UnitX());
@@ -50,7 +53,7 @@ FreeHand paper_hand(const Friction& friction, const Vec3& direction = Vec3::Unit
 /// `law` on an experiment: displayed stiffness on the prescribed motion, stability on the free hand.
 struct PaperRow {
   std::string experiment;
-  std::string law;  ///< none, aol or aol+
+  std::string law;  ///< none, aol, aol+ or the name of a preset
   std::optional<double> k_op_paper;
   Outcome prescribed;
   Outcome free;
@@ -60,7 +63,7 @@ struct PaperRow {
   double least_energy() const;
 };
 
-PaperRow paper_row(const PaperExperiment& experiment, Law law);
+PaperRow paper_row(const PaperExperiment& experiment, Law law, std::optional<Preset> preset = {});
 
 /// One line of JSON; `commit` is that of the build.
 std::string to_json(const PaperRow& row);

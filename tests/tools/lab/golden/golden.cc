@@ -38,8 +38,8 @@ constexpr std::array kFigures = {
     Figure{"largest_force_n", &Outcome::largest_force}, Figure{"late_vibration_m_per_s", &Outcome::late_vibration},
     Figure{"limited_share", &Outcome::limited_share},   Figure{"latency_s", &Outcome::latency}};
 
-GoldenTable::Row row_of(Law law, std::string situation, const Outcome& outcome) {
-  GoldenTable::Row row{.law = std::string(info(law).name), .situation = std::move(situation), .figures = {}};
+GoldenTable::Row row_of(std::string_view law, std::string situation, const Outcome& outcome) {
+  GoldenTable::Row row{.law = std::string(law), .situation = std::move(situation), .figures = {}};
   for (const Figure& figure : kFigures) row.figures.push_back(shortest(outcome.*figure.value));
   return row;
 }
@@ -79,14 +79,20 @@ GoldenTable golden_laws() {
   const std::vector<Situation> grid = comparison_grid();
   for (const LawInfo& law : laws()) {
     for (std::size_t i = 0; i < grid.size(); i += kEvery) {
-      table.rows.push_back(row_of(law.law, name_of(grid[i]), compare_cell(grid[i], law.law, kSeed + i).outcome));
+      table.rows.push_back(row_of(law.name, name_of(grid[i]), compare_cell(grid[i], law.law, kSeed + i).outcome));
+    }
+  }
+  for (const PresetInfo& preset : presets()) {
+    for (std::size_t i = 0; i < grid.size(); i += kEvery) {
+      table.rows.push_back(
+          row_of(preset.name, name_of(grid[i]), compare_cell(grid[i], preset.preset, kSeed + i).outcome));
     }
   }
   for (const PaperExperiment& experiment : paper_experiments()) {
     for (const Law law : kPaperLaws) {
       const PaperRow row = paper_row(experiment, law);
-      table.rows.push_back(row_of(law, "paper " + experiment.name + " prescribed motion", row.prescribed));
-      table.rows.push_back(row_of(law, "paper " + experiment.name + " free hand", row.free));
+      table.rows.push_back(row_of(info(law).name, "paper " + experiment.name + " prescribed motion", row.prescribed));
+      table.rows.push_back(row_of(info(law).name, "paper " + experiment.name + " free hand", row.free));
     }
   }
   return table;

@@ -4,7 +4,9 @@
 // line for each law: its name. Callgrind counts within `step_law`, and writes a file each time that returns.
 #include <cstddef>
 #include <iostream>
+#include <string_view>
 
+#include "core/control/preset.h"
 #include "tests/tools/lab/experiments/law_steps.h"
 #include "tests/tools/lab/experiments/paper.h"
 
@@ -17,14 +19,30 @@ extern "C" [[gnu::noinline]] void step_law(lab::LawSteps& law, int periods) {
   }
 }
 
+namespace {
+
+void count(const LimiterConfig& config, std::string_view name) {
+  for (const int periods : {1, 2}) {
+    lab::LawSteps steps(config);
+    step_law(steps, periods);
+  }
+  std::cout << name << "\n";
+}
+
+}  // namespace
+
 int main() {
   for (const LawInfo& law : laws()) {
     LimiterConfig config = lab::measured_limiter(law.law);
     config.parts = lab::default_parts(lab::kPaperEncoder);
-    for (const int periods : {1, 2}) {
-      lab::LawSteps steps(config);
-      step_law(steps, periods);
-    }
-    std::cout << law.name << "\n";
+    count(config, law.name);
+  }
+  for (const PresetInfo& preset : presets()) {
+    LimiterConfig config = lab::measured_limiter(Law::kAolPlus);
+    config.parts = preset_parts(preset.preset, {.friction = config.friction,
+                                                .longest_hold = config.longest_hold,
+                                                .encoder_step = lab::kPaperEncoder})
+                       .parts;
+    count(config, preset.name);
   }
 }

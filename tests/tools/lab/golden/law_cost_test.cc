@@ -7,6 +7,7 @@
 #include <sstream>
 
 #include "core/control/limiter.h"
+#include "core/control/preset.h"
 #include "tests/support/instruction_test.h"
 
 namespace tendon::lab {
@@ -25,10 +26,13 @@ TEST_F(LawCost, AStepOfEveryLawCostsWhatTheCommittedTableSays) {
       << found << "If the change is meant: tendon-lab golden --cost --write, and commit the table with it.";
 }
 
-TEST(LawCostTable, HasEveryLawInOrder) {
+TEST(LawCostTable, HasEveryLawAndPresetInOrder) {
   const CostTable table = read_costs(kTable);
-  ASSERT_EQ(table.rows.size(), laws().size());
-  for (std::size_t i = 0; i < table.rows.size(); ++i) EXPECT_EQ(table.rows[i].law, laws()[i].name);
+  ASSERT_EQ(table.rows.size(), laws().size() + presets().size());
+  for (std::size_t i = 0; i < laws().size(); ++i) EXPECT_EQ(table.rows[i].law, laws()[i].name);
+  for (std::size_t i = 0; i < presets().size(); ++i) {
+    EXPECT_EQ(table.rows[laws().size() + i].law, presets()[i].name);
+  }
 }
 
 TEST(LawCostTable, IsReadBackAsItWasWritten) {

@@ -38,6 +38,8 @@ constexpr std::array kReasonNames = {
     ReasonName{Reason::kDeviceClamp, "device_clamp", "the device gave less"},
     ReasonName{Reason::kUnseen, "unseen", "the device gave no position"},
     ReasonName{Reason::kDisarmed, "disarmed", "the operator disarmed"},
+    ReasonName{Reason::kDamped, "damped", "the limiter: a vibration is damped"},
+    ReasonName{Reason::kAcceleration, "acceleration", "no limit: the hand accelerated too hard"},
 };
 
 // ---- For people -------------------------------------------------------------------------------------------------

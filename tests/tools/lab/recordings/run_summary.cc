@@ -22,8 +22,9 @@ namespace {
 constexpr double kFastestChosenMotion = 3;  // Hz: above it, hands tremble or are shaken
 constexpr double kSnap = 0.99;              // cosine of 8°
 
-constexpr std::uint32_t kLimits = ~(static_cast<std::uint32_t>(Reason::kOverrun) |  //
-                                    static_cast<std::uint32_t>(Reason::kWatchdog));
+constexpr std::uint32_t kLimits =
+    ~(static_cast<std::uint32_t>(Reason::kOverrun) |  //
+      static_cast<std::uint32_t>(Reason::kWatchdog) | static_cast<std::uint32_t>(Reason::kAcceleration));
 
 bool any(Reasons reasons, std::initializer_list<Reason> of) {
   return std::ranges::any_of(of, [reasons](Reason reason) { return reasons.has(reason); });
@@ -38,7 +39,12 @@ struct Asked {
 struct Edge {
   double first;  ///< the outermost place with a force
   double at;     ///< where the force begins
+  double sum;    ///< N, of all forces
 };
+
+/// A force that a model leads to the hand may pull for a moment where a contact ends: as much less than the contact's
+/// other forces is no contact of its own.
+constexpr double kOnlyLed = 0.1;
 
 /// Where a contact that lies towards larger x begins. A force counts when it is above `least`.
 std::optional<Edge> find_edge(const std::vector<Asked>& asked, double least) {
@@ -67,7 +73,7 @@ std::optional<Edge> find_edge(const std::vector<Asked>& asked, double least) {
     products += (a.x - sum_x / n) * (a.outward - sum_f / n);
   }
   const double begins = products > 0 ? (sum_x - sum_f * squares / products) / n : first;
-  return Edge{first, std::clamp(begins, last_without, first)};
+  return Edge{first, std::clamp(begins, last_without, first), sum_f};
 }
 
 std::optional<Spread> spread(const Thinned<Duration>& times) {
@@ -220,9 +226,16 @@ std::optional<Contact> RunObserver::contact(const Vec3& axis) const {
     down.push_back({.x = -x, .outward = force});
     largest = std::max(largest, std::abs(force));
   }
-  const std::optional<Edge> above = find_edge(up, 0.01 * largest);
-  const std::optional<Edge> below = find_edge(down, 0.01 * largest);
+  std::optional<Edge> above = find_edge(up, 0.01 * largest);
+  std::optional<Edge> below = find_edge(down, 0.01 * largest);
   if (!above && !below) return std::nullopt;
+  if (above && below && -below->first > above->first) {
+    if (below->sum < kOnlyLed * above->sum) {
+      below.reset();
+    } else if (above->sum < kOnlyLed * below->sum) {
+      above.reset();
+    }
+  }
   if (above && below && -below->first > above->first) return std::nullopt;
   Contact contact;
   if (above) contact.above = above->at;

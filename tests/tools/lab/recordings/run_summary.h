@@ -101,7 +101,7 @@ struct RunSummary {
 /// what the environment does *there*, however late it comes. A contact begins between the last position that was
 /// answered without a force and the first one with a force along the axis (above 1 % of the largest; forces that ramp
 /// in or fade say nothing): where the straight line through all positions and forces of the contact has no force. There
-/// is no contact when forces of both signs were asked for at the same places.
+/// is no contact when forces of both signs were asked for at the same places, neither of them ten times the other.
 ///
 /// **Operational stiffness**: what stiffness the hand felt, whatever was asked for. The mean of the secants
 ///

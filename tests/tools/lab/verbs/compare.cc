@@ -6,6 +6,8 @@
 #include <iostream>
 
 #include "tests/tools/lab/experiments/compare.h"
+#include "tests/tools/lab/experiments/compare_kinds.h"
+#include "tests/tools/lab/experiments/situations.h"
 #include "tests/tools/lab/verbs/verb.h"
 
 namespace tendon::lab {
@@ -13,6 +15,17 @@ namespace {
 
 void add(CLI::App& verb, int& /*exit*/) {
   static CompareOptions options;
+  static CompareKindsOptions drawn;
+  std::string names = "all";
+  for (const SituationKind& kind : situation_kinds()) names += ", " + std::string(kind.name);
+  verb.add_option("--kinds", drawn.kinds, "instead of the grid, situations that are drawn from seeds: " + names)
+      ->delimiter(',')
+      ->type_name("KIND,…");
+  verb.add_option("--count", drawn.count, "with --kinds: situations of each kind")->capture_default_str();
+  verb.add_option("--laws", drawn.laws, "with --kinds: laws and presets; left out: those that promise to be passive")
+      ->delimiter(',')
+      ->type_name("NAME,…");
+  verb.add_flag("--held-out", drawn.held_out, "with --kinds: seeds on which no law was tuned");
   verb.add_option("--every", options.every, "take every so-manieth situation of the grid")->capture_default_str();
   verb.add_option("--seed", options.seed, "of the network; the same for all laws")->capture_default_str();
   verb.add_option("--out", options.out, "write compare.csv and a figure there, SVG and PNG (needs gnuplot)")
@@ -20,10 +33,17 @@ void add(CLI::App& verb, int& /*exit*/) {
   verb.add_flag("--json", options.json, "one JSON object for each cell instead of the table");
   verb.footer(
       "\nExample: all of it, some minutes\n  tendon-lab compare --out comparison\n"
+      "Example: what the grid does not have, on seeds that no law was tuned on\n"
+      "  tendon-lab compare --kinds all --held-out --count 100\n"
       "\nExit: 0 done; 1 cannot write, or gnuplot failed; 2 wrong usage.");
   verb.callback([] {
     options.progress = isatty(STDERR_FILENO) != 0;
-    compare(options, std::cout);
+    if (drawn.kinds.empty()) return compare(options, std::cout);
+    drawn.seed = options.seed;
+    drawn.out = options.out;
+    drawn.json = options.json;
+    drawn.progress = options.progress;
+    compare_kinds(drawn, std::cout);
   });
 }
 

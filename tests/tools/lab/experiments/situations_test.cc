@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tests/tools/lab/experiments/situations.h"
+
+#include <gtest/gtest.h>
+
+#include <set>
+#include <sstream>
+#include <string>
+
+#include "tests/tools/lab/experiments/compare_kinds.h"
+
+namespace tendon::lab {
+namespace {
+
+const Contender kFeel{.name = "feel", .preset = Preset::kFeel, .promises = true};
+
+TEST(Situations, TheSameSeedDrawsTheSameSituationAndAnotherSeedAnother) {
+  for (const SituationKind& kind : situation_kinds()) {
+    const auto one = draw_situation(kind.name, 7);
+    if (!one) continue;  // recorded hands, without TENDON_DATA
+    const auto again = draw_situation(kind.name, 7);
+    EXPECT_EQ(one->drawn, again->drawn) << kind.name;
+    EXPECT_EQ(outcome_of(kFeel, *one).force_error, outcome_of(kFeel, *again).force_error) << kind.name;
+    std::set<std::string> drawn;
+    for (std::uint64_t seed = 1; seed <= 10; ++seed) drawn.insert(draw_situation(kind.name, seed)->drawn);
+    EXPECT_GT(drawn.size(), 8U) << kind.name;
+  }
+}
+
+TEST(Situations, EveryKindIsFeltAndNoPresetGivesOutAnythingInASampleHeldOut) {
+  for (const SituationKind& kind : situation_kinds()) {
+    double felt = 0;
+    for (std::uint64_t seed = kHeldOutSeeds + 500; seed < kHeldOutSeeds + 510; ++seed) {
+      const auto trial = draw_situation(kind.name, seed);
+      if (!trial) continue;
+      for (const Contender& contender : contenders()) {
+        if (!contender.preset) continue;
+        const Outcome outcome = outcome_of(contender, *trial);
+        EXPECT_GE(outcome.least_energy, -1e-9) << kind.name << " " << contender.name << " seed " << seed;
+        felt = std::max(felt, outcome.largest_force);
+      }
+      EXPECT_GT(felt, 0.05) << kind.name;
+    }
+  }
+}
+
+TEST(Situations, AnObjectWithAMemoryIsAskedApartFromItsTruth) {
+  const auto trial = draw_situation("adhesion", 3);
+  ASSERT_TRUE(trial->experiment.environment.truth);
+  const auto& answers = trial->experiment.environment.force;
+  const auto& truth = trial->experiment.environment.truth;
+  answers(0, Vec3(0.001, 0, 0));                                 // pressed: it sticks
+  EXPECT_NE(answers(0, Vec3(-0.0001, 0, 0)), Vec3::Zero());      // … and pulls
+  EXPECT_EQ(truth(0, Vec3(-0.0001, 0, 0)), Vec3(Vec3::Zero()));  // which nobody has pressed
+}
+
+TEST(CompareKinds, RefusesANameThatIsNoneAndSaysWhichThereAre) {
+  const auto complaint = [](const CompareKindsOptions& options) -> std::string {
+    try {
+      std::ostringstream out;
+      compare_kinds(options, out);
+    } catch (const std::invalid_argument& refused) {
+      return refused.what();
+    }
+    return "none";
+  };
+  EXPECT_NE(complaint({.kinds = {"walls"}}).find("expected one of grid, counts"), std::string::npos);
+  EXPECT_NE(complaint({.kinds = {"wall"}, .laws = {"feeel"}}).find("feel-unconditional"), std::string::npos);
+}
+
+TEST(CompareKinds, TheSeedOfTheWorstSituationShowsItAgainByItself) {
+  const CompareKindsOptions options{.kinds = {"wall"}, .count = 12, .laws = {"aol", "aol+", "feel"}, .json = true};
+  const auto field = [](const std::string& text, const std::string& law, const std::string& name) {
+    const auto row = text.find("\"law\":\"" + law + "\"");
+    const auto key = text.find("\"" + name + "\":", row) + name.size() + 3;
+    return text.substr(key, text.find_first_of(",}", key) - key);
+  };
+  std::ostringstream all;
+  compare_kinds(options, all);
+  CompareKindsOptions one = options;
+  one.seed = std::stoull(field(all.str(), "feel", "worst_seed"));
+  one.count = 1;
+  std::ostringstream again;
+  compare_kinds(one, again);
+  EXPECT_EQ(field(again.str(), "feel", "worst_points"), field(all.str(), "feel", "worst_points"));
+}
+
+}  // namespace
+}  // namespace tendon::lab
