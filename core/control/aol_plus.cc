@@ -301,7 +301,8 @@ void AolPlus<Blocks, Size>::cap(const Vec<kSize>& wanted) noexcept {
 
 /// ℓ of a group of coordinates while `force`, of this size, is held.
 template <int Blocks, int Size>
-[[gnu::noinline]] OutputBound AolPlus<Blocks, Size>::bound_along(std::size_t block, const Vec<Size>& force, double size) const noexcept {
+[[gnu::noinline]] OutputBound AolPlus<Blocks, Size>::bound_along(std::size_t block, const Vec<Size>& force,
+                                                                 double size) const noexcept {
   OutputBound bound = bounds_[block];
   if (!acceleration_holds_ || size == 0) return bound;
   const double hold = seconds(longest_hold_);
@@ -374,7 +375,8 @@ auto AolPlus<Blocks, Size>::damping(const Vec<kSize>& force, double near, Durati
 
 /// Thrift and damper, for a force that the account lets through. `near`: what is wanted, of what is permitted.
 template <int Blocks, int Size>
-[[gnu::noinline]] void AolPlus<Blocks, Size>::shape(Duration age, double near, double budget, LimitedForce<kSize>& result) noexcept {
+[[gnu::noinline]] void AolPlus<Blocks, Size>::shape(Duration age, double near, double budget,
+                                                    LimitedForce<kSize>& result) noexcept {
   damped_.setZero();
   const double size = result.force.norm();
   if (size == 0) return;

@@ -21,7 +21,7 @@ constexpr double kMostAcceleration = 300;  // m/s²: 8.5 N on a handle of 75 g a
 constexpr double kStiffness = 1500;        // N/m
 constexpr double kDamping = 24;            // N·s/m
 constexpr double kContact = 0.1;           // N
-constexpr double kCount = 30e-6;           // m, for which the smoothing was chosen
+constexpr double kUsualCount = 30e-6;      // m, for which the smoothing was chosen
 constexpr double kSmoothing = 2.2e-3;      // s, of the damper at that count
 
 }  // namespace
@@ -45,7 +45,7 @@ PresetParts preset_parts(Preset preset, const PresetDevice& device) noexcept {
   auto& damper = parts.damper.emplace();
   damper.viscous = {kDamping};
   damper.contact = {kContact};
-  damper.smoothing = from_seconds(kSmoothing * std::clamp(std::sqrt(device.encoder_step / kCount), 0.6, 2.0));
+  damper.smoothing = from_seconds(kSmoothing * std::clamp(std::sqrt(device.encoder_step / kUsualCount), 0.6, 2.0));
   chosen.learned_model.emplace();
   return chosen;
 }
