@@ -36,7 +36,7 @@ bool one_has(const std::vector<std::string>& sentences, const std::string& words
 }
 
 TEST(Plug, AProgramThatOnlyReadsGetsEveryStateAndTakesNoChannel) {
-  World world("demo.toml");
+  World world("demo_parts.toml");
   Plug& reader = world.add_plug();
   Plug& engine = world.add_plug();
   world.run(100);
@@ -49,7 +49,7 @@ TEST(Plug, AProgramThatOnlyReadsGetsEveryStateAndTakesNoChannel) {
 }
 
 TEST(Plug, TheStatesGoOnWithoutAHoleWhenItBecomesAController) {
-  World world("demo.toml");
+  World world("demo_parts.toml");
   Plug& plug = world.add_plug();
   world.run(100);
   std::uint64_t tick = plug.state()->tick;
@@ -64,7 +64,7 @@ TEST(Plug, TheStatesGoOnWithoutAHoleWhenItBecomesAController) {
 }
 
 TEST(Plug, AForceIsOnTheWireInTheTurnInWhichItWasAskedFor) {
-  World world("demo.toml");
+  World world("demo_parts.toml");
   Plug& plug = world.add_plug();
   world.run(100);
   world.run(200, [&] { plug.ask(kOld, world.now, world.now + milliseconds(50), pushes_by(0)); });
@@ -78,7 +78,7 @@ TEST(Plug, AForceIsOnTheWireInTheTurnInWhichItWasAskedFor) {
 }
 
 TEST(Plug, AForceThatIsTooOldIsNotSentAgainAndTheLadderLetsGo) {
-  World world("demo.toml");
+  World world("demo_parts.toml");
   Plug& plug = world.add_plug();
   world.run(100);
   world.run(200, [&] { plug.ask(kOld, world.now, world.now + milliseconds(50), pushes_by(0.5)); });
@@ -97,7 +97,7 @@ TEST(Plug, AForceThatIsTooOldIsNotSentAgainAndTheLadderLetsGo) {
 }
 
 TEST(Plug, APushIsSentOnceHoweverManyStatesCome) {
-  World world("demo.toml");
+  World world("demo_parts.toml");
   Plug& plug = world.add_plug();
   world.run(100);
   const auto push = [&] { plug.push(kOld, world.now, world.now + milliseconds(100), Vec3(0, 0.5, 0)); };
@@ -114,7 +114,7 @@ TEST(Plug, APushIsSentOnceHoweverManyStatesCome) {
 
 TEST(Plug, ReadsWhatStillComesForASessionThatHasEnded) {
   // A datagram that nobody reads would wake a sleeping bridge for ever.
-  World world("demo.toml", {}, 5);
+  World world("demo_parts.toml", {}, 5);
   Plug& plug = world.add_plug();
   world.run(100);
   world.run(1500, [&] { plug.push(kOld, world.now, world.now + milliseconds(100), Vec3(0, 0.5, 0)); });
@@ -124,7 +124,7 @@ TEST(Plug, ReadsWhatStillComesForASessionThatHasEnded) {
 }
 
 TEST(Plug, TheFirstProgramThatAsksOwnsTheDeviceUntilItLeavesOrIsSilent) {
-  World world("demo.toml");
+  World world("demo_parts.toml");
   Plug& plug = world.add_plug();
   world.run(100);
   const auto ask = [&](Plug::Program program) {
@@ -149,7 +149,7 @@ TEST(Plug, TheFirstProgramThatAsksOwnsTheDeviceUntilItLeavesOrIsSilent) {
 }
 
 TEST(Plug, GivesTheChannelBackWhenNoProgramAsksForASecond) {
-  World world("demo.toml");
+  World world("demo_parts.toml");
   Plug& plug = world.add_plug();
   Plug& other = world.add_plug();
   world.run(100);
@@ -171,7 +171,7 @@ TEST(Plug, GivesTheChannelBackWhenNoProgramAsksForASecond) {
 }
 
 TEST(Plug, ThatObservesSendsNothing) {
-  World world("demo.toml");
+  World world("demo_parts.toml");
   Plug& plug = world.add_plug({.observe = true});
   world.run(200, [&] {
     EXPECT_EQ(plug.ask(kOld, world.now, world.now + milliseconds(50), pushes_by(1)), Plug::Answer::kObserving);
@@ -182,7 +182,7 @@ TEST(Plug, ThatObservesSendsNothing) {
 }
 
 TEST(Plug, FindsAServerThatComesBackAndPushesAgain) {
-  World world("demo.toml");
+  World world("demo_parts.toml");
   Plug& plug = world.add_plug();
   const auto ask = [&] { plug.ask(kOld, world.now, world.now + milliseconds(50), pushes_by(0.5)); };
   world.run(300, ask);
@@ -205,7 +205,7 @@ TEST(Plug, FindsAServerThatComesBackAndPushesAgain) {
 }
 
 TEST(Plug, AStallOf200MsFadesTheForceAndEndsWithoutASecondHandshake) {
-  World world("demo.toml");
+  World world("demo_parts.toml");
   Plug& plug = world.add_plug();
   const auto ask = [&] { plug.ask(kOld, world.now, world.now + milliseconds(50), pushes_by(0.5)); };
   world.run(500, ask);
@@ -221,14 +221,14 @@ TEST(Plug, AStallOf200MsFadesTheForceAndEndsWithoutASecondHandshake) {
 }
 
 TEST(Plug, SaysOnceWhenItDoesNotKnowHowTheDeviceLies) {
-  World unknown("demo.toml");
+  World unknown("demo_parts.toml");
   Plug& plug = unknown.add_plug();
   unknown.run(200);
   EXPECT_TRUE(one_has(sentences_of(plug), "does not say how it lies"));
   unknown.run(200, [&] { plug.push(kOld, unknown.now, unknown.now + milliseconds(50), Vec3(0, 0, 0)); });
   EXPECT_FALSE(one_has(sentences_of(plug), "does not say how it lies"));
 
-  World known("demo.toml");
+  World known("demo_parts.toml");
   known.handle.operator_from_device = Quat{};
   known.kill_server();
   known.open_server();
@@ -238,7 +238,7 @@ TEST(Plug, SaysOnceWhenItDoesNotKnowHowTheDeviceLies) {
 }
 
 TEST(Plug, SaysByeToTheServerAndIsSilentAfterwards) {
-  World world("demo.toml");
+  World world("demo_parts.toml");
   Plug& plug = world.add_plug();
   world.run(200, [&] { plug.ask(kOld, world.now, world.now + milliseconds(50), pushes_by(0.5)); });
   plug.stop(world.now);

@@ -109,7 +109,7 @@ TEST(Explain, SaysHowACouplingIsFeltByEachMethod) {
 TEST(Explain, ACostIsTheDifferenceToTheSceneWithoutThePart) {
   // A round of 200 steps lasts one tick, but the second trial without a part, that without the hand's friction, whose
   // steps are free: so the whole 5 ns of a step are the part's.
-  const Scene scene = shipped("demo.toml");
+  const Scene scene = shipped("demo_parts.toml");
   std::size_t looks = 0;
   const std::size_t trials = 3 + 11;  // twice the whole scene, once without its device, and 11 parts
   Duration now{};

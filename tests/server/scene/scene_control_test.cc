@@ -63,7 +63,7 @@ TEST(Scene, AnEstimatorIsThereWhenItsTableIs) {
   ASSERT_TRUE(sent.adaptive_local_model && !sent.output_estimator);
   EXPECT_EQ(sent.adaptive_local_model->share, 0.8);
   EXPECT_EQ(error_of_minimal_and("[force.output_estimator]\n[force.adaptive_local_model]\n"),
-            "s.toml:4: force: adaptive_local_model and output_estimator: expected one of them, not both");
+            "s.toml:4: force: adaptive_local_model, output_estimator and learned_model: expected at most one of them");
 }
 
 TEST(Scene, AToolNeedsADeviceThatMeasuresTheHand) {

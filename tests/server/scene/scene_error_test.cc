@@ -230,17 +230,17 @@ TEST(SceneError, RefusesPartsThatCannotBe) {
        "s.toml:4: limiter.environment_stiffness_n_per_m: missing, expected a number above 0 N/m"},
       {"[limiter]\nkind = \"aol\"\nclamp_n = 1\n",
        "s.toml:6: limiter.clamp_n: unknown key; known here: kind, coulomb_friction_n, viscous_friction_n_s_per_m, "
-       "rotation, gripper"},
+       "preset, rotation, gripper"},
       {"[limiter]\nkind = \"aol\"\n[limiter.knee]\n",
        "s.toml:6: limiter.knee: unknown table; known here: kind, coulomb_friction_n, viscous_friction_n_s_per_m, "
-       "rotation, gripper"},
+       "preset, rotation, gripper"},
       {"[limiter.knee]\nstart = 1\n", "s.toml:5: limiter.knee.start: expected a number from 0.01 to 0.99, found 1"},
       {"[limiter.latency_reserve]\nholds = 17\n",
        "s.toml:5: limiter.latency_reserve.holds: expected a whole number from 1 to 16, found 17"},
       {"[device.effects]\nencoder_step_um = false\n[limiter.robust_ledger]\n",
        "s.toml:6: limiter.robust_ledger.encoder_step_um: missing, expected a number of 0 µm or more, because the "
        "device has no encoder_step_um"},
-      {"[limiter.latency_reserve]\n[limiter.bounded_acceleration]\n",
+      {"[limiter.latency_reserve]\n[limiter.bounded_acceleration]\n[limiter.shaping]\n",
        "s.toml:4: limiter: bounded_acceleration is not proved for forces that are held late: not together with "
        "latency_reserve"},
   });

@@ -79,7 +79,9 @@ std::vector<Case> cases() {
   cases.push_back(
       {"PartsOfAolPlus",
        {"limiter.energy_cap={}", "limiter.knee={}", "limiter.robust_ledger={}", "limiter.latency_reserve={}"}});
-  cases.push_back({"BoundedAcceleration", {"limiter.bounded_acceleration={most_m_per_s2=50}"}});
+  cases.push_back({"BoundedAcceleration",
+                   {"limiter.bounded_acceleration={most_m_per_s2=50}", "limiter.shaping={stiffness_n_per_m=600}"}});
+  cases.push_back({"APreset", {"limiter.preset=\"feel\""}});
   cases.push_back({"AnEstimatorOfTheEnvironment", {"force.output_estimator={}"}});
   cases.push_back({"ALocalModel", {"force.adaptive_local_model={}"}});
   cases.push_back({"AWatchdog", {"device.effects.watchdog_ms=5"}});

@@ -55,7 +55,7 @@ const std::vector<Vec3> kSeen = {Vec3(-1, 0, 0), Vec3(0, -1, 0), Vec3(0, 0, 1)};
 
 TEST(Chai3dHost, AHandThatMovesAlongEachAxisIsSeenOnChai3dsOwn) {
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    Theatre theatre("demo.toml", {"device.hand.motion.direction=" + kDirections[axis]}, kWooden);
+    Theatre theatre("demo_parts.toml", {"device.hand.motion.direction=" + kDirections[axis]}, kWooden);
     theatre.run(500);  // a sine of 0.5 Hz: at its far end
     const Vec3 seen(theatre.hand.position.data());
     EXPECT_GT(seen.dot(kSeen[axis]), 0.010) << axis;
@@ -65,7 +65,7 @@ TEST(Chai3dHost, AHandThatMovesAlongEachAxisIsSeenOnChai3dsOwn) {
 
 TEST(Chai3dHost, AForceAlongEachOfChai3dsAxesPushesTheRightWay) {
   for (int axis = 0; axis < 3; ++axis) {
-    Theatre theatre("demo.toml", {}, kWooden);
+    Theatre theatre("demo_parts.toml", {}, kWooden);
     theatre.asks = true;
     theatre.asked.force[static_cast<std::size_t>(axis)] = 1;
     theatre.run(200);
@@ -103,7 +103,7 @@ TEST(Chai3dHost, ATorqueGoesToADeviceThatHasMotorsForIt) {
 }
 
 TEST(Chai3dHost, AProgramThatStandsStillForASecondIsNotFeltForASecond) {
-  Theatre theatre("demo.toml");
+  Theatre theatre("demo_parts.toml");
   theatre.asks = true;
   theatre.asked.force = {0, 0, 0.5};
   theatre.run(500);
@@ -114,7 +114,7 @@ TEST(Chai3dHost, AProgramThatStandsStillForASecondIsNotFeltForASecond) {
 }
 
 TEST(Chai3dHost, AForceThatIsReadLateIsOldAndNotSent) {
-  Theatre theatre("demo.toml");
+  Theatre theatre("demo_parts.toml");
   theatre.run(200);
   theatre.asked = {.at_ns = std::chrono::nanoseconds(theatre.world.now.time_since_epoch()).count(),
                    .count = 1,
@@ -128,7 +128,7 @@ TEST(Chai3dHost, AForceThatIsReadLateIsOldAndNotSent) {
 }
 
 TEST(Chai3dHost, CloseLetsTheDeviceGo) {
-  Theatre theatre("demo.toml");
+  Theatre theatre("demo_parts.toml");
   theatre.asks = true;
   theatre.run(200);
   EXPECT_NE(theatre.plug.owner(), 0U);
@@ -141,7 +141,7 @@ TEST(Chai3dHost, CloseLetsTheDeviceGo) {
 }
 
 TEST(Chai3dHost, IsReadyWhenEveryDeviceHasToldWhereItIs) {
-  Theatre theatre("demo.toml");
+  Theatre theatre("demo_parts.toml");
   EXPECT_EQ(theatre.hands->ready, 0U);
   theatre.run(100);
   EXPECT_EQ(theatre.hands->ready, 1U);
@@ -150,7 +150,7 @@ TEST(Chai3dHost, IsReadyWhenEveryDeviceHasToldWhereItIs) {
 }
 
 TEST(Chai3dHost, TellsTheAgeOfTheLastPlaceWhenTheServerHasGone) {
-  Theatre theatre("demo.toml");
+  Theatre theatre("demo_parts.toml");
   theatre.run(200);
   const std::int64_t before = theatre.hand.at_ns;
   theatre.world.kill_server();

@@ -79,7 +79,7 @@ const json& refused(const json& reply) { return reply.at("tendon").at("refused")
 const std::string kProbe = R"({"inverse3":[{"device_id":"0","commands":{"probe_position":{}}}]})";
 
 TEST(InverseSession, SpeaksFirstAndListsAGripEvenWhereNothingMeasuresIt) {
-  Bridge bridge("demo.toml");  // a Falcon has no orientation
+  Bridge bridge("demo_parts.toml");  // a Falcon has no orientation
   const auto client = bridge.client();
   const json first = json::parse(client->greeting(bridge.world.now));
   EXPECT_EQ(first.at("session_id"), 1);
@@ -92,7 +92,7 @@ TEST(InverseSession, SpeaksFirstAndListsAGripEvenWhereNothingMeasuresIt) {
 }
 
 TEST(InverseSession, HundredThousandMessagesHaveExactlyOneReplyEach) {
-  Bridge bridge("demo.toml");
+  Bridge bridge("demo_parts.toml");
   const auto client = bridge.client();
   std::mt19937_64 random(221);
   const std::vector<std::string> kinds = {bridge.force(Vec3(0, 0.5, 0)), bridge.force(Vec3(0, 0.5, 0), "values"),
@@ -119,7 +119,7 @@ TEST(InverseSession, HundredThousandMessagesHaveExactlyOneReplyEach) {
 }
 
 TEST(InverseSession, OfTooManyMessagesTheOlderAreSkippedAndTheNewestIsTaken) {
-  Bridge bridge("demo.toml");
+  Bridge bridge("demo_parts.toml");
   const auto client = bridge.client();
   const int batch = 64;
   std::uint64_t messages = 0;
@@ -137,7 +137,7 @@ TEST(InverseSession, OfTooManyMessagesTheOlderAreSkippedAndTheNewestIsTaken) {
 }
 
 TEST(InverseSession, ASpinningClientSendsOneForceForEachState) {
-  Bridge bridge("demo.toml");
+  Bridge bridge("demo_parts.toml");
   const auto client = bridge.client();
   bridge.run(300, *client, bridge.force(Vec3(0, 0, 0.3)));
   const std::uint64_t before = bridge.plug->forces();
@@ -160,7 +160,7 @@ TEST(InverseSession, PositionAndForceAreRightAlongEachAxis) {
   // The device lies as WoodenHaptics does: x ahead, y left, z up. Its hand moves along its x, so ahead: the client's y.
   HandleDescription handle;
   handle.operator_from_device = quaternion_of(operator_from_device("right=-y up=z user=-x"));
-  Bridge bridge("demo.toml", {}, handle);
+  Bridge bridge("demo_parts.toml", {}, handle);
   const auto client = bridge.client();
   const struct {
     Vec3 of_client;
@@ -181,7 +181,7 @@ TEST(InverseSession, PositionAndForceAreRightAlongEachAxis) {
 }
 
 TEST(InverseSession, ABasisTurnsWhatIsSeenAndWhatIsAskedFor) {
-  Bridge bridge("demo.toml");
+  Bridge bridge("demo_parts.toml");
   const auto client = bridge.client();
   const json reply = bridge.say(*client, R"({"session":{"configure":{"basis":{"permutation":"-XZY"}},
                                              "force_render_full_state":{}}})");
@@ -243,7 +243,7 @@ TEST(InverseSession, APressBetweenTwoRepliesIsInTheNextOneAndInNoLaterOne) {
 }
 
 TEST(InverseSession, ATorqueForADeviceThatCannotTurnIsRefusedInASentence) {
-  Bridge bridge("demo.toml");
+  Bridge bridge("demo_parts.toml");
   const auto client = bridge.client();
   const json reply = bridge.say(*client, bridge.command(R"({"tendon":{"torque_nm":{"x":0,"y":0,"z":1}}})"));
   ASSERT_EQ(refused(reply).size(), 1U);
@@ -251,7 +251,7 @@ TEST(InverseSession, ATorqueForADeviceThatCannotTurnIsRefusedInASentence) {
 }
 
 TEST(InverseSession, ASilenceOf150MsFadesTheForceAndOneOf400MsEndsIt) {
-  Bridge bridge("demo.toml");
+  Bridge bridge("demo_parts.toml");
   const auto client = bridge.client();
   bridge.run(500, *client, bridge.force(Vec3(0, 0, 0.5)));
   const auto applied = [&] { return bridge.world.step.applied.y(); };
@@ -273,7 +273,7 @@ TEST(InverseSession, ASilenceOf150MsFadesTheForceAndOneOf400MsEndsIt) {
 }
 
 TEST(InverseSession, MessagesWithoutAForceDoNotKeepTheOldOneAlive) {
-  Bridge bridge("demo.toml");
+  Bridge bridge("demo_parts.toml");
   const auto client = bridge.client();
   bridge.run(300, *client, bridge.force(Vec3(0, 0, 0.5)));
   bridge.run(400, *client, kProbe);
@@ -284,7 +284,7 @@ TEST(InverseSession, MessagesWithoutAForceDoNotKeepTheOldOneAlive) {
 }
 
 TEST(InverseSession, ASecondClientThatAsksForAForceIsToldAndTheFirstKeepsIt) {
-  Bridge bridge("demo.toml");
+  Bridge bridge("demo_parts.toml");
   const auto first = bridge.client();
   auto second = bridge.client();
   json told;
@@ -308,7 +308,7 @@ TEST(InverseSession, ASecondClientThatAsksForAForceIsToldAndTheFirstKeepsIt) {
 }
 
 TEST(InverseSession, AForceOfZeroClaimsNothingAndCountsFromTheOwner) {
-  Bridge bridge("demo.toml");
+  Bridge bridge("demo_parts.toml");
   const auto reader = bridge.client();
   const auto engine = bridge.client();
   bridge.run(300, *reader, bridge.force(Vec3::Zero(), "values"));
@@ -325,7 +325,7 @@ TEST(InverseSession, AForceOfZeroClaimsNothingAndCountsFromTheOwner) {
 }
 
 TEST(InverseSession, TheServerDiesAndComesBackAndTheClientGoesOn) {
-  Bridge bridge("demo.toml");
+  Bridge bridge("demo_parts.toml");
   const auto client = bridge.client();
   const std::string force = bridge.force(Vec3(0, 0, 0.5));
   bridge.run(300, *client, force);
@@ -342,7 +342,7 @@ TEST(InverseSession, TheServerDiesAndComesBackAndTheClientGoesOn) {
 }
 
 TEST(InverseSession, AStallOf200MsFadesTheForceAndIsSeenAsTheAgeOfTheState) {
-  Bridge bridge("demo.toml");
+  Bridge bridge("demo_parts.toml");
   const auto client = bridge.client();
   const std::string force = bridge.force(Vec3(0, 0, 0.5));
   bridge.run(500, *client, force);
@@ -357,7 +357,7 @@ TEST(InverseSession, AStallOf200MsFadesTheForceAndIsSeenAsTheAgeOfTheState) {
 }
 
 TEST(InverseSession, ThatOnlyLooksOnSaysSo) {
-  Bridge bridge("demo.toml", {.observe = true});
+  Bridge bridge("demo_parts.toml", {.observe = true});
   const auto client = bridge.client();
   const json reply = bridge.run(300, *client, bridge.force(Vec3(0, 0, 0.5)));
   ASSERT_EQ(refused(reply).size(), 1U);
@@ -365,7 +365,7 @@ TEST(InverseSession, ThatOnlyLooksOnSaysSo) {
 }
 
 TEST(InverseSession, AnUnknownDeviceIsRefusedInASentence) {
-  Bridge bridge("demo.toml");
+  Bridge bridge("demo_parts.toml");
   const auto client = bridge.client();
   const json reply = bridge.say(*client, kProbe);
   ASSERT_EQ(refused(reply).size(), 1U);
@@ -373,7 +373,7 @@ TEST(InverseSession, AnUnknownDeviceIsRefusedInASentence) {
 }
 
 TEST(InverseSession, TheLimiterIsSeenInOurOwnWords) {
-  Bridge bridge("demo.toml");
+  Bridge bridge("demo_parts.toml");
   const auto client = bridge.client();
   const json reply = bridge.run(500, *client, bridge.force(Vec3(0, 0, 9)));
   const json& told = ours(reply);
@@ -386,7 +386,7 @@ TEST(InverseSession, TheLimiterIsSeenInOurOwnWords) {
 }
 
 TEST(InverseSession, DevicesOfOneNameHaveIdsOfTheirOwn) {
-  Bridge bridge("demo.toml");
+  Bridge bridge("demo_parts.toml");
   const std::vector<std::pair<std::string, Plug*>> twins(3, {"right", bridge.plug});
   const auto devices = inverse_devices(twins);
   std::vector<std::string> ids;

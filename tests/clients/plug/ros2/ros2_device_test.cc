@@ -35,7 +35,7 @@ bool has(const std::vector<std::string>& all, const std::string& words) {
 RosWrench push(double left_n) { return {.header = {}, .force = {0, left_n, 0}, .torque = {0, 0.01, 0}}; }
 
 struct Stage {
-  explicit Stage(const std::string& scene = "demo.toml", RosDevice::Config config = {.name = "right"},
+  explicit Stage(const std::string& scene = "demo_parts.toml", RosDevice::Config config = {.name = "right"},
                  Plug::Config of_plug = {}, int delay_ms = 0)
       : world(scene, {}, delay_ms), plug(world.add_plug(std::move(of_plug))), device(plug, std::move(config)) {
     world.handle.operator_from_device = Quat{};
@@ -104,7 +104,7 @@ TEST(RosDevice, EveryStateIsAPoseAndJoyIsFiftyASecond) {
 }
 
 TEST(RosDevice, ARateLeavesStatesOutAndSendsTheNewest) {
-  Stage stage("demo.toml", {.name = "right", .rate_hz = 100});
+  Stage stage("demo_parts.toml", {.name = "right", .rate_hz = 100});
   stage.run(100);
   const int poses = stage.poses;
   stage.run(1000);
@@ -114,7 +114,7 @@ TEST(RosDevice, ARateLeavesStatesOutAndSendsTheNewest) {
 
 TEST(RosDevice, AStampIsTheSystemsTimeOfTheSample) {
   constexpr int kDelay = 20;
-  Stage stage("demo.toml", {.name = "right"}, {}, kDelay);
+  Stage stage("demo_parts.toml", {.name = "right"}, {}, kDelay);
   stage.run(1000);
   const Duration stamp =
       seconds(stage.pose.header.stamp.sec) + std::chrono::nanoseconds(stage.pose.header.stamp.nanosec);
@@ -146,7 +146,7 @@ TEST(RosDevice, AForceAlongEachAxisOfRep103IsFeltAlongTheHands) {
 }
 
 TEST(RosDevice, NegateTurnsItAround) {
-  Stage stage("demo.toml", {.name = "right", .negate = true});
+  Stage stage("demo_parts.toml", {.name = "right", .negate = true});
   stage.run(100);
   stage.run(300, [&] { stage.command(kWriter, 0.5); });
   EXPECT_NEAR(stage.world.step.applied.x(), 0.5, 1e-9);
@@ -254,7 +254,7 @@ TEST(RosDevice, TheSeventeenthPublisherIsRefused) {
 }
 
 TEST(RosDevice, ObservingSendsNoForceAndSaysSo) {
-  Stage stage("demo.toml", {.name = "right"}, {.observe = true});
+  Stage stage("demo_parts.toml", {.name = "right"}, {.observe = true});
   stage.run(100);
   stage.run(300, [&] { stage.command(kWriter, 0.5); });
   EXPECT_TRUE(stage.world.step.applied.isZero());

@@ -117,7 +117,7 @@ TEST(VrpnWorld, AForceAlongEachAxisPushesThatWayAndTheHandsMotionIsSeenThere) {
 }
 
 TEST(VrpnWorld, AChangeOfAFieldIsInTheNextDatagram) {
-  World world("demo.toml");
+  World world("demo_parts.toml");
   Plug& plug = world.add_plug();
   Station station{.name = "Phantom0"};
   Old old(world, plug, station, 1);
@@ -138,7 +138,7 @@ TEST(VrpnWorld, AChangeOfAFieldIsInTheNextDatagram) {
 }
 
 TEST(VrpnWorld, AProgramThatSendsWithoutAPauseMakesNoFloodOfForces) {
-  World world("demo.toml");
+  World world("demo_parts.toml");
   Plug& plug = world.add_plug();
   Station station{.name = "Phantom0"};
   Old old(world, plug, station, 1);
@@ -163,7 +163,7 @@ TEST(VrpnWorld, AProgramThatSendsWithoutAPauseMakesNoFloodOfForces) {
 }
 
 TEST(VrpnWorld, EveryStateIsOnePoseAndNoForceIsAskedForByOneThatWatches) {
-  World world("demo.toml");
+  World world("demo_parts.toml");
   Plug& plug = world.add_plug();
   Station station{.name = "Phantom0"};
   Old old(world, plug, station, 1);
@@ -299,7 +299,7 @@ TEST_F(VrpnOnAStillHand, AServerThatDiesAndComesBackIsFoundAndFeltAgain) {
 /// Given out by the device through 20 ms each way, J: the program answers each pose with the force of a wall.
 double given_out(bool limited, bool as_plane) {
   // Two scenes with one hand; the limiter of the first has parts that none has.
-  World world = limited ? World("demo.toml", {}, 20) : World("left.toml", {"limiter.kind=\"none\""}, 20);
+  World world = limited ? World("demo_parts.toml", {}, 20) : World("left.toml", {"limiter.kind=\"none\""}, 20);
   Plug& plug = world.add_plug();
   Station station{.name = "Phantom0"};
   Old old(world, plug, station, 1);
