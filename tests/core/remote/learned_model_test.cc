@@ -155,6 +155,22 @@ TEST(LearnedModel, AHandAtRestTeachesNothingHoweverNoisyTheAnswersAre) {
   EXPECT_EQ(wild, 0) << "of 60 seeds";
 }
 
+TEST(LearnedModel, DoesNotLeadAForceFarBeyondWhatFrictionLimitsItTo) {
+  // A bristle of 8000 N/m that slides at 1 N: between two answers it looks stiff, over the delay it is not.
+  const auto slides = [] {
+    return [foot = 0.0](double, const Vec3& x) mutable {
+      foot = std::clamp(foot, x.x() - 1.0 / 8000, x.x() + 1.0 / 8000);
+      return Vec3(-8000 * (x.x() - foot), 0, 0);
+    };
+  };
+  LearnedModel model({});
+  double most = 0;
+  follow(model, slides(), sway, {.every = 5, .late = 80}, 4000,
+         [&](double, const Vec3& force, const Vec3&) { most = std::max(most, force.norm()); });
+  EXPECT_GT(most, 0.9);
+  EXPECT_LT(most, 1.5 * 1.0 + 1.0) << "1.5 of the largest answer, and what is left of the one before";
+}
+
 TEST(LearnedModel, AnAnswerNeverMakesTheForceJump) {
   LearnedModel model({});
   std::optional<Vec3> before;

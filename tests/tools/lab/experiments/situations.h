@@ -31,10 +31,10 @@ inline constexpr std::uint64_t kHeldOutSeeds = 1'000'000;
 
 /// A situation without a law: the same for every law that is tried in it.
 struct Trial {
-  Experiment experiment{};    ///< its limiter has the friction of the device, and no law
+  Experiment experiment{};  ///< its limiter has the friction of the device, and no law
   double encoder_step = 0;  ///< m
   double stiffness = 0;     ///< N/m, of the object where it is pressed
-  std::string drawn{};        ///< what was drawn, for people and for the CSV
+  std::string drawn{};      ///< what was drawn, for people and for the CSV
 };
 
 /// The situation of this kind that `seed` draws; empty for the recorded hands when TENDON_DATA is not set. The same seed
