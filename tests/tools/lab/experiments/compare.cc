@@ -176,7 +176,7 @@ void recommend(std::ostream& out, const std::string& where, const std::vector<Su
 
 void draw(const std::filesystem::path& folder, const std::vector<Cell>& cells, std::vector<std::string>& pictures) {
   constexpr std::array kColours = {kOrange, kBlue, kGreen, kVermilion, kPurple, kSky};
-  const std::array kDrawn = {info(Law::kPassivityController).name, info(Law::kAol).name, info(Law::kAolPlus).name,
+  const std::array drawn = {info(Law::kPassivityController).name, info(Law::kAol).name, info(Law::kAolPlus).name,
                              info(Law::kEnergyBounding).name, info(Preset::kFeel).name};
   std::vector<Panel> panels;
   for (const TestDevice& device : {kDevices.front(), kDevices.back()}) {
@@ -188,15 +188,15 @@ void draw(const std::filesystem::path& folder, const std::vector<Cell>& cells, s
                     .x_label = "stiffness, N/m",
                     .log_x = true,
                     .log_y = true};
-    for (std::size_t i = 0; i < kDrawn.size(); ++i) {
-      Curve errors{.name = std::string(kDrawn[i]), .colour = kColours[i]};
+    for (std::size_t i = 0; i < drawn.size(); ++i) {
+      Curve errors{.name = std::string(drawn[i]), .colour = kColours[i]};
       Curve vibrations = errors;
       for (const double k : kStiffnesses) {
         const auto at = summaries(cells, [&](const Situation& s) {
           return s.friction.viscous == device.friction.viscous && s.stiffness == k;
         });
         for (const Summary& summary : at) {
-          if (summary.contender.name != kDrawn[i]) continue;
+          if (summary.contender.name != drawn[i]) continue;
           errors.points.emplace_back(k, summary.error * 100);
           vibrations.points.emplace_back(k, std::max(summary.vibration * 1e3, 1e-3));
         }

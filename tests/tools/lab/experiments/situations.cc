@@ -170,9 +170,12 @@ void drawn_out(Draft& draft) {
   draft.frequency = 0;
 }
 
+/// The folder of recordings, or null.
+const char* data_folder() { return std::getenv("TENDON_DATA"); }  // NOLINT(concurrency-mt-unsafe): nobody sets it
+
 /// A person's hand on a real lever (TENDON_DATA/tue-1dof-teleop: its SOURCE.txt), as what this hand intends.
 void recorded(Draft& draft) {
-  const std::filesystem::path folder = std::filesystem::path(std::getenv("TENDON_DATA")) / "tue-1dof-teleop";
+  const std::filesystem::path folder = std::filesystem::path(data_folder()) / "tue-1dof-teleop";
   const bool foam = draft.dice.chance(0.5);
   const std::filesystem::path file = folder / (foam ? "m2_question1d_foam.csv" : "m2_question1d_rigid.csv");
   std::ifstream csv(file);
@@ -242,7 +245,7 @@ std::optional<Trial> draw_situation(std::string_view kind, std::uint64_t seed) {
   if (found == kKinds.end()) {
     throw std::invalid_argument("kind \"" + std::string(kind) + "\": expected one of " + names_of_kinds());
   }
-  if (kind == "recorded" && std::getenv("TENDON_DATA") == nullptr) return std::nullopt;
+  if (kind == "recorded" && data_folder() == nullptr) return std::nullopt;
   Dice dice(seed);
   Draft draft{.dice = dice, .trial = {}, .hand = {}};
   Trial& trial = draft.trial;
