@@ -276,22 +276,31 @@ void AolPlus<Blocks, Size>::observe_unseen(const Vec<kSize>& applied, Duration a
 }
 
 template <int Blocks, int Size>
+[[gnu::noinline]] void AolPlus<Blocks, Size>::fade_contact(double most) noexcept {
+  contact_ = std::min(contact_, parts_.energy_cap->most_contact);
+  if (contact_ <= most) return;
+  contact_ += (most - contact_) * std::min(1.0, seconds(longest_hold_) / seconds(parts_.fading_contact->memory));
+}
+
+template <int Blocks, int Size>
 void AolPlus<Blocks, Size>::cap(const Vec<kSize>& wanted) noexcept {
-  double most = 0;
-  for (int i = 0; i < Blocks; ++i) {
-    most += wanted.template segment<Size>(i * Size).norm() * travel_.template segment<Size>(i * Size).norm();
-  }
-  if (parts_.fading_contact) {
-    contact_ = std::min(contact_, parts_.energy_cap->most_contact);
-    if (contact_ > most) {
-      contact_ += (most - contact_) * std::min(1.0, seconds(longest_hold_) / seconds(parts_.fading_contact->memory));
+  // C_b: what a spring that shows this force over this travel gives back at the most.
+  const auto most = [&] {
+    double sum = 0;
+    for (int i = 0; i < Blocks; ++i) {
+      sum += wanted.template segment<Size>(i * Size).norm() * travel_.template segment<Size>(i * Size).norm();
     }
-    if (wanted.dot(last_wanted_) < 0) travel_.setZero();
-  } else if (wanted.dot(last_wanted_) <= 0) {
+    return sum;
+  };
+  const double along = wanted.dot(last_wanted_);
+  if (parts_.fading_contact) {
+    fade_contact(most());
+    if (along < 0) travel_.setZero();
+  } else if (along <= 0) {
     contact_ = 0;
     travel_.setZero();
   } else {
-    contact_ = std::min({contact_, most, parts_.energy_cap->most_contact});
+    contact_ = std::min({contact_, most(), parts_.energy_cap->most_contact});
   }
   last_wanted_ = wanted;
   double kept = parts_.energy_cap->energy + contact_;
@@ -322,6 +331,25 @@ double AolPlus<Blocks, Size>::largest_share(const Vec<kSize>& force, double budg
     const Vec<Size> part = force.template segment<Size>(i * Size);
     sizes[block] = part.norm();
     bounds[block] = bound_along(block, part, sizes[block]);
+  }
+  return largest_scale(bounds, sizes, budget);
+}
+
+/// ℓ_s of a group of coordinates.
+template <int Blocks, int Size>
+OutputBound AolPlus<Blocks, Size>::shaping_along(std::size_t block) const noexcept {
+  return {.coulomb = friction_[block].coulomb, .viscous_per_hold = parts_.shaping->stiffness[block] / 2};
+}
+
+/// As largest_share, of shaping.
+template <int Blocks, int Size>
+double AolPlus<Blocks, Size>::shaped_share(const Vec<kSize>& force, double budget) const noexcept {
+  std::array<double, Blocks> sizes{};
+  std::array<OutputBound, Blocks> bounds;
+  for (int i = 0; i < Blocks; ++i) {
+    const auto block = static_cast<std::size_t>(i);
+    sizes[block] = force.template segment<Size>(i * Size).norm();
+    bounds[block] = shaping_along(block);
   }
   return largest_scale(bounds, sizes, budget);
 }
@@ -411,25 +439,15 @@ auto AolPlus<Blocks, Size>::limit(const Demand<kSize>& wanted) noexcept -> Limit
   if (parts_.energy_cap) cap(force);
   const double budget = payable();
 
-  std::array<double, Blocks> sizes{};
-  std::array<OutputBound, Blocks> bounds = bounds_;
-  std::array<OutputBound, Blocks> shaping = bounds_;
-  for (int i = 0; i < Blocks; ++i) {
-    const auto block = static_cast<std::size_t>(i);
-    const Vec<Size> part = force.template segment<Size>(i * Size);
-    sizes[block] = part.norm();
-    if (acceleration_holds_) bounds[block] = bound_along(block, part, sizes[block]);
-    if (parts_.shaping) shaping[block].viscous_per_hold = parts_.shaping->stiffness[block] / 2;
-  }
   double scale = 0;
   double permitted = 0;
   if constexpr (Blocks == 1) {
-    permitted = bounds[0].largest(budget);
-    if (parts_.shaping) permitted = std::min(permitted, shaping[0].largest(budget));
+    permitted = (acceleration_holds_ ? bound_along(0, force, size) : bounds_[0]).largest(budget);
+    if (parts_.shaping) permitted = std::min(permitted, shaping_along(0).largest(budget));
     scale = size > 0 ? permitted / size : 1;
   } else {
-    scale = largest_scale(bounds, sizes, budget);
-    if (parts_.shaping) scale = std::min(scale, largest_scale(shaping, sizes, budget));
+    scale = largest_share(force, budget);
+    if (parts_.shaping) scale = std::min(scale, shaped_share(force, budget));
     permitted = size > 0 ? scale * size : 0;
   }
 

@@ -196,6 +196,7 @@ class AolPlus {
  private:
   double account() const noexcept;
   void cap(const Vec<kSize>& wanted) noexcept;
+  void fade_contact(double most) noexcept;
   double reserved() const noexcept;
   void watch_acceleration(const Interval<kSize>& interval) noexcept;
   void follow_hand(const Interval<kSize>& interval) noexcept;
@@ -203,6 +204,8 @@ class AolPlus {
   double count(std::size_t block) const noexcept;
   OutputBound bound_along(std::size_t block, const Vec<Size>& force, double size) const noexcept;
   double largest_share(const Vec<kSize>& force, double budget) const noexcept;
+  OutputBound shaping_along(std::size_t block) const noexcept;
+  double shaped_share(const Vec<kSize>& force, double budget) const noexcept;
   double give_back(const Vec<kSize>& force, double size, double near, double budget) const noexcept;
   double grow(double size, double budget) const noexcept;
   Vec<kSize> damping(const Vec<kSize>& force, double near, Duration age) const noexcept;

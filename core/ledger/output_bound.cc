@@ -31,16 +31,6 @@ double OutputBound::at(double force) const noexcept {
   return travel * ((force - coulomb) - viscous_per_hold * travel);
 }
 
-double OutputBound::largest(double energy) const noexcept {
-  if (reach <= 0) return kInfinite;
-  // max(E, 0) written so that a NaN energy permits friction only.
-  if (!(energy > 0)) return coulomb;
-  if (std::isfinite(reach) && energy > viscous_per_hold * reach * reach) {
-    return coulomb + viscous_per_hold * reach + energy / reach;
-  }
-  return coulomb + 2 * std::sqrt(viscous_per_hold * energy);
-}
-
 template <std::size_t Parts>
 double largest_scale(const std::array<OutputBound, Parts>& bounds, const std::array<double, Parts>& sizes,
                      double energy) noexcept {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <limits>
 
@@ -53,7 +54,15 @@ struct OutputBound {
   ///     f_c + b L/T + E/L            beyond;   ∞ when L ≤ 0
   ///
   /// f_c when `energy` (J) is not a number.
-  double largest(double energy) const noexcept;
+  double largest(double energy) const noexcept {
+    if (reach <= 0) return std::numeric_limits<double>::infinity();
+    // max(E, 0) written so that a NaN energy permits friction only.
+    if (!(energy > 0)) return coulomb;
+    if (reach < std::numeric_limits<double>::infinity() && energy > viscous_per_hold * reach * reach) {
+      return coulomb + viscous_per_hold * reach + energy / reach;
+    }
+    return coulomb + 2 * std::sqrt(viscous_per_hold * energy);
+  }
 
   /// Shortens `wanted` (N, on the hand) to f_max and keeps its direction. A force that is not finite becomes zero, with
   /// the reason.

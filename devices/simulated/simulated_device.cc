@@ -103,10 +103,11 @@ SimulatedDevice::SimulatedDevice(Config config) : config_(std::move(config)) {
   if (config_.hand) hand_.emplace(*std::exchange(config_.hand, std::nullopt));
   for (const Config::Press& press : config_.presses) check(press);
   if (config_.amplifier_bandwidth) amplifier_force_ = Vec3::Zero();
-  const Rub rub = joints_ ? Rub::kJoints : config_.coulomb_friction ? Rub::kHandle : Rub::kNone;
-  const Far far = config_.structural_mode ? Far::kMode : environment_ ? Far::kEnvironment : Far::kNone;
-  take_substeps_ = substeps_with(
-      {.rub = rub, .hand = hand_.has_value(), .lag = config_.amplifier_bandwidth.has_value(), .far = far});
+  if (config_.lets_go_after) {
+    expect(*config_.lets_go_after >= Duration::zero() && hand_, "hand.lets_go_after", seconds(*config_.lets_go_after),
+           "0 s or more, of a device with a hand");
+  }
+  choose_substeps();
 
   info_ = {.name = config_.name,
            .max_force = config_.max_force.value_or(std::numeric_limits<double>::infinity()),
@@ -275,7 +276,31 @@ Duration SimulatedDevice::live_with_watchdog(Duration gap) noexcept {
   return gap - before;
 }
 
+void SimulatedDevice::choose_substeps() noexcept {
+  const Rub rub = joints_ ? Rub::kJoints : config_.coulomb_friction ? Rub::kHandle : Rub::kNone;
+  const Far far = config_.structural_mode ? Far::kMode : environment_ ? Far::kEnvironment : Far::kNone;
+  take_substeps_ = substeps_with(
+      {.rub = rub, .hand = hand_.has_value(), .lag = config_.amplifier_bandwidth.has_value(), .far = far});
+}
+
 void SimulatedDevice::integrate(Duration span) noexcept {
+  if (config_.lets_go_after && hand_) span = move_until_let_go(span);
+  move(span);
+}
+
+/// Returns the rest of the span: all of it while the hand holds on throughout.
+Duration SimulatedDevice::move_until_let_go(Duration span) noexcept {
+  const Duration held = std::max(*config_.lets_go_after - lived_, Duration::zero());
+  if (held > span) return span;
+  move(held);
+  settle_energies();
+  hand_.reset();
+  truth_.hand_force.setZero();
+  choose_substeps();
+  return span - held;
+}
+
+void SimulatedDevice::move(Duration span) noexcept {
   if (span <= Duration::zero()) return;
   if (turns_or_grips_) turn_and_grip(span);
   const auto substeps = substeps_in(span);

@@ -126,6 +126,8 @@ class SimulatedDevice final : public Device {
     std::optional<SimulatedEnvironment::Config> environment{};
 
     std::optional<OperatorHand::Config> hand;
+    /// So long after the first `read` the hand lets go of the handle, for good, and takes its mass with it.
+    std::optional<Duration> lets_go_after{};
     std::optional<Duration> button_after;  ///< so long after the first `read` the hand presses button 0, and holds it
     /// The hand presses a button.
     struct Press {
@@ -241,6 +243,9 @@ class SimulatedDevice final : public Device {
   Duration live_to_last_arrival(Duration gap) noexcept;
   Duration live_with_watchdog(Duration gap) noexcept;
   void integrate(Duration span) noexcept;
+  void move(Duration span) noexcept;
+  [[gnu::noinline]] Duration move_until_let_go(Duration span) noexcept;
+  void choose_substeps() noexcept;
   using Substeps = void (SimulatedDevice::*)(Duration::rep count, double h) noexcept;
   static Substeps substeps_with(const Effects& effects);
   template <Effects kEffects>

@@ -369,6 +369,8 @@ void declare(Table& keys, SimulatedDevice::Config& /*device*/, Draft& draft) {
              Absent{.required = profile == nullptr, .text = "the profile's; required without a profile"});
     hand.key("damping_n_s_per_m", draft.hand.damping, kZeroOrMore, "of the grip", kProfiles);
     hand.key("mass_kg", draft.hand.mass, kZeroOrMore, "moves with the handle", kProfiles);
+    hand.key("lets_go_after_ms", draft.simulated.lets_go_after, kZeroOrMore,
+             "after this time it lets go of the handle, for good", Absent{.text = "never"});
     hand.key("button_after_ms", draft.simulated.button_after, kZeroOrMore,
              "after this time it presses button 0, and holds it", Absent{.text = "never"});
     hand.tables("press", draft.simulated.presses, kMostPresses,

@@ -81,6 +81,32 @@ TEST(SimulatedDevice, DoesNotDependOnHowOftenItIsRead) {
   }
 }
 
+TEST(SimulatedDevice, AHandThatHasLetGoPushesNoMoreAndTakesItsMassWithIt) {
+  auto config = bare();
+  config.hand = waving_hand();
+  config.lets_go_after = 33'333us;  // between two reads, and within a substep
+  Bench often(config);
+  Bench seldom(config);
+  auto holding = config;
+  holding.lets_go_after.reset();
+  Bench held(holding);
+  for (int i = 0; i < 100; ++i) {
+    held.wait(1ms);
+    often.wait(1ms);
+    if (i % 10 == 9) seldom.wait(10ms);
+    if (i == 32) {
+      ASSERT_EQ(often.truth().position, held.truth().position) << "it held on until then";
+    }
+    if (i == 50) often.device().apply(Vec3(0, 1, 0));
+    if (i == 50) seldom.device().apply(Vec3(0, 1, 0));
+  }
+  EXPECT_LT((often.truth().position - seldom.truth().position).norm(), 1.1e-3) << "a force that came 1 ms apart";
+  EXPECT_EQ(often.truth().hand_force, Vec3::Zero());
+  EXPECT_NEAR(often.truth().velocity.y(), 0.049 / 0.075, 1e-9) << "the mass of the device alone";
+  EXPECT_GT(often.truth().velocity.x(), 0.05) << "it goes on as it was";
+  EXPECT_NEAR(often.truth().kinetic_energy, often.truth().velocity.squaredNorm() * 0.075 / 2, 1e-12);
+}
+
 // ---- viscous friction ------------------------------------------------------------------------------------------
 
 TEST(ViscousFriction, LetsTheVelocityFallAsTheExponentialOfTheClosedForm) {
@@ -566,6 +592,12 @@ TEST(SimulatedDevice, RefusesImpossibleValuesAndNamesTheField) {
       {[](Config& c) { c.watchdog = Duration(0); }, "watchdog = 0: expected a duration above 0 s"},
       {[](Config& c) { c.start_position = Vec3(0, kNan, 0); }, "start_position.y = nan: expected a finite number"},
       {[](Config& c) { c.start_velocity.z() = kInf; }, "start_velocity.z = inf: expected a finite number"},
+      {[](Config& c) { c.lets_go_after = -1s; }, "hand.lets_go_after = -1: expected 0 s or more"},
+      {[](Config& c) {
+         c.hand.reset();
+         c.lets_go_after = 1s;
+       },
+       "hand.lets_go_after = 1: expected 0 s or more, of a device with a hand"},
       {[](Config& c) { c.hand->stiffness = 0; }, "hand.stiffness = 0: expected"},
       {[](Config& c) { c.hand->damping = -1; }, "hand.damping = -1: expected 0 N·s/m or more"},
       {[](Config& c) { c.hand->mass = -0.1; }, "hand.mass = -0.1: expected 0 kg or more"},

@@ -8,13 +8,17 @@
 #include <fstream>
 #include <functional>
 #include <iostream>
+#include <map>
 #include <stdexcept>
+#include <tuple>
 
 #include "core/base/expect.h"
 #include "server/build_info.h"
 #include "tests/support/files.h"
 #include "tests/support/json_line.h"
+#include "tests/tools/lab/experiments/floor.h"
 #include "tests/tools/lab/experiments/paper.h"
+#include "tests/tools/lab/experiments/perception.h"
 #include "tests/tools/lab/pictures/gnuplot.h"
 #include "tests/tools/lab/pictures/panels.h"
 
@@ -53,7 +57,8 @@ double median(std::vector<double> values) {
 constexpr const char* kColumns =
     "law,stiffness_n_per_m,delay_ms,jitter_ms,rate_hz,loss,b_n_s_per_m,fc_n,hand,passive,energy_given_out_j,k_op_n_per_"
     "m,"
-    "force_error_n,true_force_n,hf_velocity_m_s,limited_share,latency_s,max_force_n,seed,commit";
+    "force_error_n,true_force_n,hf_velocity_m_s,sensation_db,noticed_share,limited_share,latency_s,max_force_n,seed,"
+    "commit";
 
 void write_csv(std::ostream& out, const Cell& cell, std::uint64_t seed) {
   const Situation& s = cell.situation;
@@ -64,8 +69,9 @@ void write_csv(std::ostream& out, const Cell& cell, std::uint64_t seed) {
     out << "," << shortest(value);
   }
   out << "," << (s.firm ? "firm" : "loose") << "," << (cell.passive() ? 1 : 0);
-  for (const double value : {std::max(0.0, -o.least_energy), o.operational_stiffness, o.force_error, o.true_force,
-                             o.late_vibration, o.limited_share, o.latency, o.largest_force}) {
+  for (const double value :
+       {std::max(0.0, -o.least_energy), o.operational_stiffness, o.force_error, o.true_force, o.late_vibration,
+        o.sensation, o.noticed_share, o.limited_share, o.latency, o.largest_force}) {
     out << "," << shortest(value);
   }
   out << "," << seed << "," << kCommit << "\n";
@@ -90,6 +96,8 @@ std::string to_json(const Cell& cell, std::uint64_t seed) {
       .add("force_error_n", o.force_error)
       .add("true_force_n", o.true_force)
       .add("hf_velocity_m_s", o.late_vibration)
+      .add("sensation_db", o.sensation)
+      .add("noticed_share", o.noticed_share)
       .add("limited_share", o.limited_share)
       .add("latency_s", o.latency)
       .add("max_force_n", o.largest_force)
@@ -106,6 +114,8 @@ struct Summary {
   double stable = 0;     ///< share
   double error = 0;      ///< median of the relative force error
   double vibration = 0;  ///< m/s, median
+  double sensation = 0;  ///< dB above what a hand just feels, median
+  double noticed = 0;    ///< share of the time, median
   double given_out = 0;  ///< J, the most
   double limited = 0;    ///< median share
   double latency = 0;    ///< s, median
@@ -117,6 +127,8 @@ std::vector<Summary> summaries(const std::vector<Cell>& cells, const std::functi
     Summary summary{.contender = contender};
     std::vector<double> errors;
     std::vector<double> vibrations;
+    std::vector<double> sensations;
+    std::vector<double> noticed;
     std::vector<double> limited;
     std::vector<double> latencies;
     for (const Cell& cell : cells) {
@@ -126,6 +138,8 @@ std::vector<Summary> summaries(const std::vector<Cell>& cells, const std::functi
       summary.given_out = std::max(summary.given_out, -cell.outcome.least_energy);
       errors.push_back(relative_error(cell));
       vibrations.push_back(cell.outcome.late_vibration);
+      sensations.push_back(cell.outcome.sensation);
+      noticed.push_back(cell.outcome.noticed_share);
       limited.push_back(cell.outcome.limited_share);
       latencies.push_back(cell.outcome.latency);
     }
@@ -136,12 +150,51 @@ std::vector<Summary> summaries(const std::vector<Cell>& cells, const std::functi
     summary.stable /= n;
     summary.error = median(errors);
     summary.vibration = median(vibrations);
+    summary.sensation = median(sensations);
+    summary.noticed = median(noticed);
     summary.limited = median(limited);
     summary.latency = median(latencies);
     result.push_back(summary);
   }
   return result;
 }
+
+/// In which sense a law promises to be passive on this device; laws that promise nothing are held against the freest.
+Passive sense_of(const Contender& contender, const Friction& friction) {
+  if (!contender.promises) return Passive::kOnThisMotion;
+  if (contender.law != Law::kAolPlus) return Passive::kWhateverComes;
+  const AolPlus<1, 3>::Parts parts =
+      contender.preset
+          ? preset_parts(
+                *contender.preset,
+                {.friction = friction, .longest_hold = std::chrono::milliseconds(1), .encoder_step = kPaperEncoder})
+                .parts
+          : parts_without_preset(friction, kPaperEncoder);
+  return parts.bounded_acceleration ? Passive::kAccelerating : Passive::kWhateverComes;
+}
+
+/// The floors of the hands of the grid on perfect springs: each is computed when it is first asked for.
+class Floors {
+ public:
+  /// Of each cell of `contender`, as a share of the true force; the median.
+  double median_of(const Contender& contender, const std::vector<Cell>& cells) {
+    std::vector<double> floors;
+    for (const Cell& cell : cells) {
+      if (cell.name() != contender.name) continue;
+      const Situation& s = cell.situation;
+      const Passive sense = sense_of(contender, s.friction);
+      const auto key = std::tuple(s.stiffness, s.friction.viscous, s.firm, sense);
+      if (!known_.contains(key)) {
+        known_[key] = floor_of(on_perfect_spring(s.stiffness, s.friction, s.firm), sense).error;
+      }
+      floors.push_back(known_[key]);
+    }
+    return median(floors);
+  }
+
+ private:
+  std::map<std::tuple<double, double, bool, Passive>, double> known_;
+};
 
 /// A sentence: the law with the least force error of those that promise to be passive, and were, and were stable
 /// throughout; and what would have been better still here, without a promise.
@@ -177,7 +230,7 @@ void recommend(std::ostream& out, const std::string& where, const std::vector<Su
 void draw(const std::filesystem::path& folder, const std::vector<Cell>& cells, std::vector<std::string>& pictures) {
   constexpr std::array kColours = {kOrange, kBlue, kGreen, kVermilion, kPurple, kSky};
   const std::array drawn = {info(Law::kPassivityController).name, info(Law::kAol).name, info(Law::kAolPlus).name,
-                             info(Law::kEnergyBounding).name, info(Preset::kFeel).name};
+                            info(Law::kEnergyBounding).name, info(Preset::kFeel).name};
   std::vector<Panel> panels;
   for (const TestDevice& device : {kDevices.front(), kDevices.back()}) {
     const bool damped = device.friction.viscous == kDevices.front().friction.viscous;
@@ -365,19 +418,24 @@ void compare(const CompareOptions& options, std::ostream& out) {
   out << cells.size() << " cells: " << cells.size() / contenders().size() << " situations, " << laws().size()
       << " laws and " << presets().size() << " presets; seed " << options.seed << ", commit " << kCommit << "\n\n";
   std::array<char, 200> line{};
-  std::snprintf(line.data(), line.size(), "%-26s %8s %8s %12s %10s %12s %9s %9s\n", "law", "passive", "stable",
-                "given out J", "error", "vibration", "limited", "latency");
+  std::snprintf(line.data(), line.size(), "%-26s %8s %8s %11s %7s %6s %12s %7s %7s %7s %7s\n", "law", "passive",
+                "stable", "given out J", "error", "floor", "vibration", "felt", "noticed", "limited", "latency");
   out << line.data();
+  Floors floors;
   for (const Summary& s : summaries(cells, [](const Situation&) { return true; })) {
-    std::snprintf(line.data(), line.size(), "%-26s %6.1f %% %6.1f %% %12.2g %8.0f %% %7.1f mm/s %7.0f %% %6.0f ms\n",
+    std::snprintf(line.data(), line.size(),
+                  "%-26s %6.1f %% %6.1f %% %11.2g %5.0f %% %4.0f %% %7.1f mm/s %4.0f dB %5.0f %% %5.0f %% %4.0f ms\n",
                   std::string(s.contender.name).c_str(), s.passive * 100, s.stable * 100, std::max(0.0, s.given_out),
-                  s.error * 100, s.vibration * 1e3, s.limited * 100, s.latency * 1e3);
+                  s.error * 100, floors.median_of(s.contender, cells) * 100, s.vibration * 1e3, s.sensation,
+                  s.noticed * 100, s.limited * 100, s.latency * 1e3);
     out << line.data();
   }
-  out << "\npassive: the true ledger never below -1 nJ; given out: the most in any cell; error (rms, of the true "
-         "force), "
-         "vibration (last\nsecond), limited and latency: medians. Stable: vibration at most 8 mm/s.\n";
-
+  out << "\npassive: the true ledger never below -1 nJ. given out: the most in any cell. Medians: error (rms, of the "
+         "true "
+         "force);\nfloor (the least error of any law that is passive in this one's sense, on the perfect spring: "
+         "tendon-lab floor);\nvibration (last second), and felt, the same as a hand feels it: dB above what it just "
+         "feels; noticed (share of the time in\nwhich the force is off by more than "
+      << kForceWeber * 100 << " %, which a hand tells); limited; latency. Stable: vibration at most 8 mm/s.\n";
   out << "\nWhich one to use (the least median force error among the laws that promise to be passive and were, if "
          "possible stable\nthroughout):\n";
   for (const TestDevice& device : kDevices) {

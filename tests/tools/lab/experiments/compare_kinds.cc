@@ -43,7 +43,7 @@ double median_of(std::vector<double> values) {
 struct Line {
   std::size_t cells = 0;
   double passive = 0, within8 = 0, within3 = 0, within1_5 = 0;  ///< shares
-  double error = 0, vibration = 0;                              ///< medians, % and mm/s
+  double error = 0, vibration = 0, sensation = 0, noticed = 0;  ///< medians: %, mm/s, dB, share
   std::size_t beaten = 0;                                       ///< by more than 3 points
   double worst = 0;  ///< points above the best other one that promises to be passive, and was
   std::uint64_t worst_seed = 0;
@@ -54,6 +54,8 @@ Line line_of(const std::vector<Result>& results, const std::vector<Contender>& a
   Line line{.cells = results.size()};
   std::vector<double> errors;
   std::vector<double> vibrations;
+  std::vector<double> sensations;
+  std::vector<double> noticed;
   for (const Result& result : results) {
     const Outcome& own = result.outcomes[of];
     const double vibration = own.late_vibration * 1e3;
@@ -63,6 +65,8 @@ Line line_of(const std::vector<Result>& results, const std::vector<Contender>& a
     line.within1_5 += vibration <= 1.5;
     errors.push_back(error_of(own));
     vibrations.push_back(vibration);
+    sensations.push_back(own.sensation);
+    noticed.push_back(own.noticed_share);
     for (std::size_t i = 0; i < all.size(); ++i) {
       if (i == of || !all[i].promises || all[i].preset || !passive(result.outcomes[i])) continue;
       const double above = error_of(own) - error_of(result.outcomes[i]);
@@ -83,6 +87,8 @@ Line line_of(const std::vector<Result>& results, const std::vector<Contender>& a
   for (double* share : {&line.passive, &line.within8, &line.within3, &line.within1_5}) *share /= n;
   line.error = median_of(errors);
   line.vibration = median_of(vibrations);
+  line.sensation = median_of(sensations);
+  line.noticed = median_of(noticed);
   return line;
 }
 
@@ -154,7 +160,9 @@ void compare_kinds(const CompareKindsOptions& options, std::ostream& out) {
     const std::filesystem::path file = *options.out / "compare_kinds.csv";
     expect_replaceable(file, {"kind,"});
     csv.open(file);
-    csv << "kind,seed,drawn,law,passive,energy_given_out_j,force_error_percent,true_force_n,vibration_mm_s,commit\n";
+    csv << "kind,seed,drawn,law,passive,energy_given_out_j,force_error_percent,true_force_n,vibration_mm_s,sensation_"
+           "db,"
+           "noticed_share,commit\n";
   }
   for (const std::string& kind : kinds) {
     if (!draw_situation(kind, first)) {
@@ -168,7 +176,8 @@ void compare_kinds(const CompareKindsOptions& options, std::ostream& out) {
           const Outcome& o = result.outcomes[i];
           csv << kind << "," << result.seed << "," << result.drawn << "," << all[i].name << "," << passive(o) << ","
               << shortest(std::max(0.0, -o.least_energy)) << "," << shortest(error_of(o)) << ","
-              << shortest(o.true_force) << "," << shortest(o.late_vibration * 1e3) << "," << kCommit << "\n";
+              << shortest(o.true_force) << "," << shortest(o.late_vibration * 1e3) << "," << shortest(o.sensation)
+              << "," << shortest(o.noticed_share) << "," << kCommit << "\n";
         }
       }
     }
@@ -176,7 +185,8 @@ void compare_kinds(const CompareKindsOptions& options, std::ostream& out) {
       const auto info = std::ranges::find(situation_kinds(), kind, &SituationKind::name);
       out << kind << ": " << info->what << "; n = " << results.size() << ", seeds " << first << " to "
           << first + options.count - 1 << ", commit " << kCommit << "\n"
-          << "law                         passive  <= 8  <= 3  <= 1.5 mm/s  error  vibration  beaten  worst at seed\n";
+          << "law                         passive  <= 8  <= 3  <= 1.5 mm/s  error  vibration   felt  noticed  "
+             "beaten  worst at seed\n";
     }
     for (std::size_t i = 0; i < all.size(); ++i) {
       const Line line = line_of(results, all, i);
@@ -191,6 +201,8 @@ void compare_kinds(const CompareKindsOptions& options, std::ostream& out) {
                    .add("within_1_5_mm_s_share", line.within1_5)
                    .add("error_percent", line.error)
                    .add("vibration_mm_s", line.vibration)
+                   .add("sensation_db", line.sensation)
+                   .add("noticed_share", line.noticed)
                    .add("beaten_by_3_points", line.beaten)
                    .add("worst_points", line.worst)
                    .add("worst_seed", line.worst_seed)
@@ -202,18 +214,22 @@ void compare_kinds(const CompareKindsOptions& options, std::ostream& out) {
       }
       std::array<char, 200> text{};
       std::snprintf(text.data(), text.size(),
-                    "%-26s %6.1f %% %5.1f %5.1f %7.1f %% %7.1f %% %6.2f mm/s %6zu %6.1f %7llu\n",
+                    "%-26s %6.1f %% %5.1f %5.1f %7.1f %% %7.1f %% %6.2f mm/s %3.0f dB %6.1f %% %6zu %6.1f %7llu\n",
                     std::string(all[i].name).c_str(), line.passive * 100, line.within8 * 100, line.within3 * 100,
-                    line.within1_5 * 100, line.error, line.vibration, line.beaten, line.worst,
-                    static_cast<unsigned long long>(line.worst_seed));
+                    line.within1_5 * 100, line.error, line.vibration, line.sensation, line.noticed * 100, line.beaten,
+                    line.worst, static_cast<unsigned long long>(line.worst_seed));
       out << text.data();
     }
     if (!options.json) out << "\n";
   }
   if (!options.json) {
-    out << "passive: the true ledger never below -1 nJ. error (rms, of the true force) and vibration (last second): "
-           "medians. beaten: situations in\nwhich a law that promises to be passive, and was, has an error more than 3 "
-           "points lower; worst: points above the best of them.\n";
+    out << "passive: the true ledger never below -1 nJ. Medians: error (rms, of the true force); vibration (last "
+           "second) "
+           "and felt, the\nsame as a hand feels it: dB above what it just feels; noticed: share of the time in which "
+           "the "
+           "force is off by more than a\nhand tells. beaten: situations in which a law that promises to be passive, "
+           "and "
+           "was, has an error more than 3 points lower;\nworst: points above the best of them.\n";
   }
   if (!out.flush() || (csv.is_open() && !csv.flush())) throw std::runtime_error("cannot write: is the disk full?");
 }

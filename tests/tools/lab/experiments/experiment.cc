@@ -10,6 +10,7 @@
 #include "core/ledger/energy_ledger.h"
 #include "tests/support/dice.h"
 #include "tests/tools/injector/injector.h"
+#include "tests/tools/lab/experiments/perception.h"
 
 namespace tendon::lab {
 namespace {
@@ -218,28 +219,35 @@ std::vector<Moment> run(const Experiment& experiment) {
   return record;
 }
 
-double vibration(const std::vector<Moment>& record, Duration period, double last) {
+std::vector<Vec3> fast_velocity(const std::vector<Moment>& record, Duration period, double last) {
   const auto half = static_cast<std::size_t>(kMeanOver / seconds(period) / 2);
   const auto wanted = static_cast<std::size_t>(std::llround(last / seconds(period)));
   // A mean of two neighbours and the sample itself is the least that tells vibration from motion.
   const std::size_t reach = std::max<std::size_t>(half, 1);
-  if (record.size() < 2 * reach + 2) return 0;
+  if (record.size() < 2 * reach + 2) return {};
   const std::size_t end = record.size() - reach;
   const std::size_t begin = std::max(reach, record.size() > wanted ? record.size() - wanted : 0);
-  if (begin >= end) return 0;
 
   std::vector<Vec3> sums(record.size() + 1, Vec3::Zero());
   for (std::size_t i = 0; i < record.size(); ++i) sums[i + 1] = sums[i] + record[i].velocity;
-  const auto fast = [&](std::size_t i) {
-    return Vec3(record[i].velocity - (sums[i + reach + 1] - sums[i - reach]) / static_cast<double>(2 * reach + 1));
-  };
+  std::vector<Vec3> fast;
+  for (std::size_t i = begin; i < end; ++i) {
+    fast.emplace_back(record[i].velocity -
+                      (sums[i + reach + 1] - sums[i - reach]) / static_cast<double>(2 * reach + 1));
+  }
+  return fast;
+}
+
+double vibration(const std::vector<Moment>& record, Duration period, double last) {
+  const std::vector<Vec3> fast = fast_velocity(record, period, last);
+  if (fast.empty()) return 0;
   Vec3 mean = Vec3::Zero();
   double squares = 0;
-  for (std::size_t i = begin; i < end; ++i) {
-    mean += fast(i);
-    squares += fast(i).squaredNorm();
+  for (const Vec3& v : fast) {
+    mean += v;
+    squares += v.squaredNorm();
   }
-  const auto n = static_cast<double>(end - begin);
+  const auto n = static_cast<double>(fast.size());
   return std::sqrt(std::max(0.0, squares / n - (mean / n).squaredNorm()));
 }
 
@@ -293,19 +301,26 @@ Outcome outcome(const std::vector<Moment>& record, Duration period) {
   result.operational_stiffness = stiffness(record);
   result.late_vibration = vibration(record, period, 1);
   result.vibration = vibration(record, period, 4);
+  result.sensation = sensation_level(fast_velocity(record, period, 1), period);
   result.stable = result.late_vibration <= kMostVibration;
   double error = 0;
   double truth = 0;
   double limited = 0;
+  double judged = 0;
+  double noticed = 0;
   for (const Moment& m : record) {
     result.least_energy = std::min(result.least_energy, m.energy);
     result.largest_force = std::max(result.largest_force, m.step.force.norm());
     if (m.step.reasons.has(Reason::kEnergy)) limited += 1;
     error += (m.step.force - m.true_force).squaredNorm();
     truth += m.true_force.squaredNorm();
+    if (m.true_force.norm() < kLeastJudged) continue;
+    judged += 1;
+    if (notices(m.step.force, m.true_force)) noticed += 1;
   }
   const auto n = static_cast<double>(record.size());
   result.limited_share = limited / n;
+  result.noticed_share = judged > 0 ? noticed / judged : 0;
   result.force_error = std::sqrt(error / n);
   result.true_force = std::sqrt(truth / n);
   result.latency = latency(record, period);

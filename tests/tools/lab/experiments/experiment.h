@@ -79,6 +79,8 @@ struct Outcome {
   double least_energy = 0;    ///< J, of the true ledger; negative: the device gave out what nobody had put in
   double late_vibration = 0;  ///< m/s, rms of velocity less its mean over 50 ms, in the last second
   double vibration = 0;       ///< m/s, the same in the last four seconds
+  double sensation = 0;       ///< dB above what a hand just feels (perception.h), in the last second
+  double noticed_share = 0;   ///< of the periods that are judged: a hand tells what it feels from what is true
   double largest_force = 0;   ///< N
   double limited_share = 0;   ///< of the periods: the law changed what was wanted
   double force_error = 0;     ///< N, rms of what is felt less what is true
@@ -100,8 +102,11 @@ std::vector<Moment> run(const Experiment& experiment);
 /// `period` as in the experiment.
 Outcome outcome(const std::vector<Moment>& record, Duration period);
 
-/// std of velocity less its mean over 50 ms (along each axis, summed), over the last `last` seconds of the record
-/// but for the 25 ms at its end which have no such mean.
+/// Velocity (m/s) less its mean over 50 ms, in the last `last` seconds of the record but for the 25 ms at its end which
+/// have no such mean.
+std::vector<Vec3> fast_velocity(const std::vector<Moment>& record, Duration period, double last);
+
+/// Standard deviation (m/s) of fast_velocity, its axes summed.
 double vibration(const std::vector<Moment>& record, Duration period, double last);
 
 }  // namespace tendon::lab

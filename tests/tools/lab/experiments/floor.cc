@@ -156,34 +156,6 @@ class Programme {
   std::vector<double> earned_;  ///< J, by friction in each hold
 };
 
-/// The motion of a hand on the perfect spring: the experiment of `compare` without a law and a network, at 50 kHz.
-FloorProblem perfect(double stiffness, const Friction& friction, bool firm) {
-  constexpr int kFiner = 50;
-  FreeHand hand = paper_hand(friction);
-  hand.encoder_step.reset();
-  hand.hand->motion = ScriptedMotion(ScriptedMotion::Sine{.amplitude = 0.015, .frequency = 0.5});
-  if (firm) {
-    hand.hand->stiffness = 800;
-    hand.hand->damping = 3;
-    hand.hand->mass = 0.1;
-  }
-  Experiment set;
-  set.period = std::chrono::microseconds(1000 / kFiner);
-  set.environment = {.force = [stiffness](double, const Vec3& x) { return Vec3(-stiffness * x); },
-                     .period = set.period};
-  set.hand = hand;
-  set.limiter = {.law = Law::kNone, .friction = friction};
-  set.length = std::chrono::seconds(2);
-  set.max_force = kPaperMaxForce;
-  const std::vector<Moment> record = run(set);
-  FloorProblem problem{.friction = friction, .period = std::chrono::milliseconds(1), .max_force = kPaperMaxForce};
-  for (std::size_t i = 0; i + kFiner < record.size(); i += kFiner) {
-    problem.dx.push_back(record[i + kFiner].position.x() - record[i].position.x());
-    problem.truth.push_back(-stiffness * record[i].position.x());
-  }
-  return problem;
-}
-
 }  // namespace
 
 Floor floor_of(const FloorProblem& problem, Passive sense) {
@@ -220,6 +192,33 @@ std::optional<double> floor_of(const std::vector<Moment>& record, const Friction
   return floor_of(problem, sense).error;
 }
 
+FloorProblem on_perfect_spring(double stiffness, const Friction& friction, bool firm) {
+  constexpr int kFiner = 50;  // 50 kHz: next to nothing is left of the sampled spring
+  FreeHand hand = paper_hand(friction);
+  hand.encoder_step.reset();
+  hand.hand->motion = ScriptedMotion(ScriptedMotion::Sine{.amplitude = 0.015, .frequency = 0.5});
+  if (firm) {
+    hand.hand->stiffness = 800;
+    hand.hand->damping = 3;
+    hand.hand->mass = 0.1;
+  }
+  Experiment set;
+  set.period = std::chrono::microseconds(1000 / kFiner);
+  set.environment = {.force = [stiffness](double, const Vec3& x) { return Vec3(-stiffness * x); },
+                     .period = set.period};
+  set.hand = hand;
+  set.limiter = {.law = Law::kNone, .friction = friction};
+  set.length = std::chrono::seconds(2);
+  set.max_force = kPaperMaxForce;
+  const std::vector<Moment> record = run(set);
+  FloorProblem problem{.friction = friction, .period = std::chrono::milliseconds(1), .max_force = kPaperMaxForce};
+  for (std::size_t i = 0; i + kFiner < record.size(); i += kFiner) {
+    problem.dx.push_back(record[i + kFiner].position.x() - record[i].position.x());
+    problem.truth.push_back(-stiffness * record[i].position.x());
+  }
+  return problem;
+}
+
 void floors(const FloorOptions& options, std::ostream& out) {
   constexpr std::array kDevices = {Friction{.coulomb = 0.02, .viscous = 0.26},
                                    Friction{.coulomb = 0.04, .viscous = 0.05},
@@ -254,7 +253,7 @@ void floors(const FloorOptions& options, std::ostream& out) {
       for (const double stiffness : kStiffnesses) {
         std::array<double, 2> percent{};
         for (const bool firm : {false, true}) {
-          const Floor floor = floor_of(perfect(stiffness, friction, firm), sense);
+          const Floor floor = floor_of(on_perfect_spring(stiffness, friction, firm), sense);
           percent[firm ? 1 : 0] = floor.error * 100;
           if (csv.is_open()) {
             csv << shortest(friction.viscous) << "," << shortest(friction.coulomb) << "," << shortest(stiffness) << ","

@@ -58,6 +58,9 @@ Floor floor_of(const FloorProblem& problem, Passive sense);
 std::optional<double> floor_of(const std::vector<Moment>& record, const Friction& friction, Duration period,
                                double max_force, Passive sense);
 
+/// The motion of a hand of `compare` on the perfect spring, which shows −stiffness · x (N/m) at once: 2 s, T = 1 ms.
+FloorProblem on_perfect_spring(double stiffness, const Friction& friction, bool firm);
+
 struct FloorOptions {
   std::optional<std::filesystem::path> out{};  ///< folder for floor.csv
   bool json = false;

@@ -170,6 +170,64 @@ void drawn_out(Draft& draft) {
   draft.frequency = 0;
 }
 
+constexpr double kInFree = 10;   // s, before the wall
+constexpr double kWall = 20000;  // N/m
+
+/// 10 s of waving to and fro before a wall, and then 12 mm into it, as far as the hand comes.
+void into_a_wall(Draft& draft) {
+  const double amplitude = draft.dice.chance(0.5) ? 0.015 : 0.03;
+  const double hz = draft.dice.chance(0.5) ? 0.5 : 1;
+  draft.say("waves", amplitude * 1e3, "mm");
+  draft.say("waves", hz, "Hz");
+  ScriptedMotion::Recorded motion;
+  for (int i = 0; i <= 1400; ++i) {
+    const double t = i * 0.01;
+    const double x = t < kInFree ? -0.05 + amplitude * portable::sin(2 * std::numbers::pi * hz * t)
+                                 : std::min(-0.05 + 0.08 * (t - kInFree), 0.012);
+    motion.samples.push_back({t, x});
+  }
+  draft.hand.hand->motion = ScriptedMotion(motion);
+  draft.frequency = 0;
+  draft.trial.experiment.length = std::chrono::seconds(14);
+  draft.k = kWall;
+  draft.say("then", kWall, "N/m");
+}
+
+void waving(Draft& draft) {
+  draft.object([](double, const Vec3& x) { return towards_x(x.x() > 0 ? -kWall * x.x() : 0); });
+  into_a_wall(draft);
+}
+
+/// … within a viscous object of 5 N·s/m, into which the hand puts work without end.
+void stirring(Draft& draft) {
+  draft.remembering([] {
+    return [before = Vec3(Vec3::Zero()), then = -1.0, speed = Vec3(Vec3::Zero())](double t, const Vec3& x) mutable {
+      constexpr double kViscous = 5;     // N·s/m
+      constexpr double kWithin = 0.005;  // s, over which the object's engine looks at the motion
+      if (then < 0 || t - then >= kWithin) {
+        if (then >= 0) speed = (x - before) / (t - then);
+        before = x;
+        then = t;
+      }
+      return Vec3(-kViscous * speed + towards_x(x.x() > 0 ? -kWall * x.x() : 0));
+    };
+  });
+  into_a_wall(draft);
+}
+
+/// The hand presses for a second, and then lets go of the handle.
+void letting_go(Draft& draft) {
+  draft.object([k = draft.k](double, const Vec3& x) { return towards_x(x.x() > 0 ? -k * x.x() : 0); });
+  const double depth = draft.dice.within(0.005, 0.015);
+  draft.hand.hand->motion = ScriptedMotion(
+      ScriptedMotion::MinimumJerk{.points = {Vec3(-0.005, 0, 0), Vec3(depth, 0, 0), Vec3(depth, 0, 0)},
+                                  .durations = {std::chrono::milliseconds(500), std::chrono::milliseconds(500)},
+                                  .back_and_forth = false});
+  draft.hand.lets_go_after = std::chrono::seconds(1);
+  draft.frequency = 0;
+  draft.say("pressed", depth * 1e3, "mm");
+}
+
 /// The folder of recordings, or null.
 const char* data_folder() { return std::getenv("TENDON_DATA"); }  // NOLINT(concurrency-mt-unsafe): nobody sets it
 
@@ -221,6 +279,9 @@ constexpr std::array kKinds = {
     Kind{{"loop", "device loops of 250 Hz to 4 kHz"}, loop},
     Kind{{"circle", "a circle in space on a spring that differs by direction"}, circle},
     Kind{{"drawn-out", "a hand that is drawn out of a contact within 60 ms"}, drawn_out},
+    Kind{{"letting-go", "a hand that lets go of the handle in contact"}, letting_go},
+    Kind{{"waving", "10 s of waving, then a wall of 20 kN/m"}, waving},
+    Kind{{"stirring", "10 s of stirring 5 N s/m, then a wall of 20 kN/m"}, stirring},
     Kind{{"recorded", "recorded hands on springs (TENDON_DATA)"}, recorded},
 };
 
