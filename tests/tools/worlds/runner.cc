@@ -127,6 +127,14 @@ void tell(const Broken& broken, bool json, std::ostream& out) {
       << "\n  the promise: " << oracle.sentence << "\n  again with:  " << reproduce(broken.seed) << '\n';
 }
 
+/// What happened, for people.
+void tell_events(const Tally& tally, std::ostream& out) {
+  out << tally.steps << " haptic steps, " << tally.datagrams << " datagrams; forces felt in " << tally.felt
+      << " worlds, limited in " << tally.limited << ", torques in " << tally.turned << ", grips in " << tally.gripped
+      << "; " << tally.presses << " presses shown; recovery checked in " << tally.recovered << "; least energy "
+      << tally.least_energy << " J\n";
+}
+
 void tell(const Tally& tally, double elapsed, bool json, std::ostream& out) {
   const double simulated = static_cast<double>(tally.worlds) * seconds(DrawnWorld::kLength);
   const auto worlds = static_cast<double>(tally.worlds);
@@ -153,45 +161,151 @@ void tell(const Tally& tally, double elapsed, bool json, std::ostream& out) {
   out << tally.worlds << " worlds of " << seconds(DrawnWorld::kLength) << " s in " << std::fixed << std::setprecision(1)
       << elapsed << " s: " << worlds / elapsed << " per second, " << std::setprecision(0) << simulated / elapsed
       << " times real time\n"
-      << std::defaultfloat << std::setprecision(6) << tally.steps << " haptic steps, " << tally.datagrams
-      << " datagrams; forces felt in " << tally.felt << " worlds, limited in " << tally.limited << ", torques in "
-      << tally.turned << ", grips in " << tally.gripped << "; " << tally.presses
-      << " presses shown; recovery checked in " << tally.recovered << "; least energy " << tally.least_energy << " J\n";
+      << std::defaultfloat << std::setprecision(6);
+  tell_events(tally, out);
 }
 
-}  // namespace
+/// Everything that is known of a world, as text.
+std::string whole(const Outcome& outcome) {
+  JsonLine line;
+  if (outcome.breach) {
+    line.add("oracle", info(outcome.breach->oracle).name)
+        .add("at_s", seconds(outcome.breach->at.time_since_epoch()))
+        .add("what", outcome.breach->what);
+  }
+  return line.add("felt", outcome.felt)
+      .add("limited", outcome.limited)
+      .add("turned", outcome.turned)
+      .add("gripped", outcome.gripped)
+      .add("presses", outcome.presses)
+      .add("recovered", outcome.recovered)
+      .add("least_energy_j", outcome.least_energy)
+      .add("steps", outcome.steps)
+      .add("sent", outcome.network.sent)
+      .add("copies", outcome.network.copies)
+      .add("delivered", outcome.network.delivered)
+      .add("lost", outcome.network.lost)
+      .add("nowhere", outcome.network.nowhere)
+      .str();
+}
 
-bool explore(const RunOptions& options, std::ostream& out, std::ostream& progress) {
-  Exploration exploration(options);
-  std::vector<std::exception_ptr> failures(options.jobs);
+ShardEnd end_of(const Units& seeds, const Tally& tally, std::uint64_t broken, const UnitDigest& digest) {
+  return {.units = seeds,
+          .totals = {{"worlds", tally.worlds},
+                     {"broken", broken},
+                     {"haptic_steps", tally.steps},
+                     {"datagrams", tally.datagrams},
+                     {"felt", tally.felt},
+                     {"limited", tally.limited},
+                     {"turned", tally.turned},
+                     {"gripped", tally.gripped},
+                     {"presses", tally.presses},
+                     {"recovered", tally.recovered}},
+          .least = {{"least_energy_j", tally.least_energy}},
+          .digest = digest};
+}
+
+/// Worlds in which nothing happens would prove nothing.
+void expect_events(const Tally& tally) {
+  if (tally.worlds >= kEnoughToJudge &&
+      (tally.felt < tally.worlds * 8 / 10 || tally.limited < tally.worlds * 6 / 10 ||
+       tally.turned < tally.worlds / 20 || tally.gripped < tally.worlds / 20 || tally.presses < tally.worlds / 20 ||
+       tally.recovered < tally.worlds * 8 / 10)) {
+    throw std::runtime_error("too little happens in these worlds for them to prove anything");
+  }
+}
+
+/// Runs `work` on so many threads, and passes on what one of them throws.
+void on_threads(unsigned jobs, const std::function<void()>& work) {
+  std::vector<std::exception_ptr> failures(jobs);
   {
     std::vector<std::jthread> threads;
-    for (unsigned i = 0; i < options.jobs; ++i) {
-      threads.emplace_back([&exploration, &progress, &failure = failures[i]] {
+    for (unsigned i = 0; i < jobs; ++i) {
+      threads.emplace_back([&work, &failure = failures[i]] {
         try {
-          exploration.work(progress);
+          work();
         } catch (...) {
           failure = std::current_exception();
         }
       });
     }
   }
-  if (options.progress) progress << "\r\x1b[K";
   for (const auto& failure : failures) {
     if (failure) std::rethrow_exception(failure);
   }
+}
+
+}  // namespace
+
+bool explore(const RunOptions& options, std::ostream& out, std::ostream& progress) {
+  Exploration exploration(options);
+  on_threads(options.jobs, [&] { exploration.work(progress); });
+  if (options.progress) progress << "\r\x1b[K";
   const std::vector<Broken> broken = exploration.broken();
   const Tally& tally = exploration.tally();
   for (const Broken& one : broken) tell(one, options.json, out);
   tell(tally, seconds(options.elapsed()), options.json, out);
-  // Worlds in which nothing happens would prove nothing.
-  if (broken.empty() && tally.worlds >= kEnoughToJudge &&
-      (tally.felt < tally.worlds * 8 / 10 || tally.limited < tally.worlds * 6 / 10 ||
-       tally.turned < tally.worlds / 20 || tally.gripped < tally.worlds / 20 || tally.presses < tally.worlds / 20 ||
-       tally.recovered < tally.worlds * 8 / 10)) {
-    throw std::runtime_error("too little happens in these worlds for them to prove anything");
-  }
+  if (broken.empty()) expect_events(tally);
   return broken.empty();
+}
+
+void explore_units(const Units& seeds, unsigned jobs, std::ostream& out) {
+  std::atomic<std::uint64_t> next{0};
+  std::mutex mutex;
+  Tally tally;
+  UnitDigest digest;
+  std::vector<Broken> broken;
+  on_threads(jobs, [&] {
+    for (std::uint64_t i = next++; i < seeds.count; i = next++) {
+      const std::uint64_t seed = seeds.first + i;
+      const Outcome outcome = run(draw_world(seed));
+      const std::scoped_lock lock(mutex);
+      tally.add(outcome);
+      digest.add(seed, whole(outcome));
+      if (outcome.breach) broken.push_back({seed, *outcome.breach});
+    }
+  });
+  std::ranges::sort(broken, {}, &Broken::seed);
+  for (const Broken& one : broken) tell(one, true, out);
+  out << end_of(seeds, tally, broken.size(), digest).line() << '\n';
+}
+
+bool judge(std::istream& lines, std::ostream& out) {
+  std::optional<ShardEnd> end;
+  std::string line;
+  for (int number = 1; std::getline(lines, line); ++number) {
+    const auto refuse = [number](const std::string& expected) {
+      throw std::invalid_argument("line " + std::to_string(number) + ": expected " + expected);
+    };
+    if (end) refuse("nothing after the end");
+    if (line.starts_with(R"({"kind":"broken",)")) {
+      out << line << '\n';
+      continue;
+    }
+    if (!line.starts_with(R"({"kind":"end",)")) refuse("a broken world or the end of a sweep");
+    end = ShardEnd::parse(line);
+  }
+  if (!end) throw std::invalid_argument("no end of a sweep");
+  const Tally tally{.worlds = end->total("worlds"),
+                    .steps = end->total("haptic_steps"),
+                    .datagrams = end->total("datagrams"),
+                    .felt = end->total("felt"),
+                    .limited = end->total("limited"),
+                    .turned = end->total("turned"),
+                    .gripped = end->total("gripped"),
+                    .presses = end->total("presses"),
+                    .recovered = end->total("recovered"),
+                    .least_energy = end->least_of("least_energy_j")};
+  out << tally.worlds << " worlds of " << seconds(DrawnWorld::kLength) << " s, seeds " << end->units.first << " to "
+      << end->units.first + end->units.count - 1 << "; digest " << end->digest.text() << '\n';
+  tell_events(tally, out);
+  if (end->total("broken") > 0) {
+    out << end->total("broken") << " broke a promise: tendon-worlds run --seed N --verbose\n";
+    return false;
+  }
+  expect_events(tally);
+  out << "every promise was kept\n";
+  return true;
 }
 
 bool run_one(std::uint64_t seed, bool verbose, std::ostream& out) {

@@ -4,11 +4,13 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <istream>
 #include <optional>
 #include <ostream>
 #include <vector>
 
 #include "core/base/time.h"
+#include "tests/support/units.h"
 
 namespace tendon::simulation {
 
@@ -27,6 +29,14 @@ struct RunOptions {
 /// way are finished, and each broken one is named with its oracle and the command that reproduces it. Says at the end
 /// how many there were, how fast, and in how many of them something happened at all. True when every promise was kept.
 bool explore(const RunOptions& options, std::ostream& out, std::ostream& progress);
+
+/// Runs all these seeds and stops at none: a shard of a sweep (tests/support/units.h). A line for each broken world and
+/// one end line, in JSON.
+void explore_units(const Units& seeds, unsigned jobs, std::ostream& out);
+
+/// What `explore` says at its end, of the lines of explore_units. True when every promise was kept. Throws
+/// std::invalid_argument naming the line that is none of these, std::runtime_error when too little happened.
+bool judge(std::istream& lines, std::ostream& out);
 
 /// One world, and its story when `verbose`. True when it has kept every promise.
 bool run_one(std::uint64_t seed, bool verbose, std::ostream& out);

@@ -6,6 +6,7 @@
 #include <chrono>
 #include <ctime>
 #include <exception>
+#include <fstream>
 #include <iostream>
 #include <optional>
 #include <stdexcept>
@@ -34,12 +35,23 @@ struct RunArguments {
   std::optional<std::uint64_t> seed;
   std::optional<double> for_s;
   std::string seeds_file;
+  std::string units;
+  std::string from;
   bool verbose = false;
 };
 
 int run(RunArguments& arguments) {
   RunOptions& options = arguments.options;
   if (arguments.seed) return run_one(*arguments.seed, arguments.verbose, std::cout) ? kDone : kFailed;
+  if (!arguments.units.empty()) {
+    explore_units(parse_units(arguments.units), options.jobs, std::cout);
+    if (!std::cout.flush()) throw std::runtime_error("cannot write: is the disk full?");
+    return kDone;
+  }
+  if (!arguments.from.empty()) {
+    std::ifstream lines(arguments.from);
+    return judge(lines, std::cout) ? kDone : kFailed;
+  }
   if (!arguments.seeds_file.empty()) options.seeds = read_seeds(arguments.seeds_file);
   const auto began = std::chrono::steady_clock::now();
   options.elapsed = [began] { return std::chrono::duration_cast<Duration>(std::chrono::steady_clock::now() - began); };
@@ -68,13 +80,21 @@ void add_run(CLI::App& app, RunArguments& arguments) {
       ->type_name("FILE")
       ->check(CLI::ExistingFile.description(""));
   auto* const seed = verb->add_option("--seed", arguments.seed, "this world and no other")->type_name("N");
+  verb->add_option("--units", arguments.units,
+                   "these seeds, all of them, as a shard of a sweep: lines of JSON that depend on nothing else")
+      ->type_name("FIRST:COUNT")
+      ->excludes(seed, count);
+  verb->add_option("--from", arguments.from, "runs nothing; judges what shards of a sweep came to (tendon-sweep merge)")
+      ->type_name("FILE")
+      ->check(CLI::ExistingFile.description(""))
+      ->excludes(seed, count);
   verb->add_flag("--verbose", arguments.verbose, "say what the world is like, and what happened")->needs(seed);
   verb->add_flag("--json", arguments.options.json, "one JSON object for each broken world, and one at the end");
   verb->footer(
       "\nExample: ten minutes, then the world that it names\n"
       "  tendon-worlds run --for-s 600\n"
       "  tendon-worlds run --seed 1234 --verbose\n"
-      "\nExit: 0 every promise was kept; 1 one was broken; 2 wrong usage.");
+      "\nExit: 0 every promise was kept, or with --units all were run; 1 one was broken; 2 wrong usage.");
 }
 
 struct ShrinkArguments {

@@ -9,6 +9,8 @@
 #include <functional>
 #include <iostream>
 #include <map>
+#include <nlohmann/json.hpp>
+#include <sstream>
 #include <stdexcept>
 #include <tuple>
 
@@ -92,6 +94,7 @@ std::string to_json(const Cell& cell, std::uint64_t seed) {
       .add("hand", s.firm ? "firm" : "loose")
       .add("passive", cell.passive())
       .add("energy_given_out_j", std::max(0.0, -o.least_energy))
+      .add("least_energy_j", o.least_energy)
       .add("k_op_n_per_m", o.operational_stiffness)
       .add("force_error_n", o.force_error)
       .add("true_force_n", o.true_force)
@@ -383,20 +386,135 @@ Verdict verdict(const std::vector<Cell>& cells, std::uint64_t seed, std::size_t 
   return result;
 }
 
+namespace {
+
+/// All cells of a situation.
+std::vector<Cell> cells_of(const Situation& situation, std::uint64_t seed) {
+  std::vector<Cell> cells;
+  for (const Contender& contender : contenders()) {
+    cells.push_back(contender.preset ? compare_cell(situation, *contender.preset, seed)
+                                     : compare_cell(situation, contender.law, seed));
+  }
+  return cells;
+}
+
+void write_lines(std::ostream& out, const std::vector<Cell>& cells, std::uint64_t seed) {
+  for (const Cell& cell : cells) out << to_json(cell, seed) << "\n";
+}
+
+void report(const std::vector<Cell>& cells, const CompareOptions& options, std::ostream& out);
+
+}  // namespace
+
 void compare(const CompareOptions& options, std::ostream& out) {
   if (options.every == 0) throw std::invalid_argument("--every must be 1 or more");
   const std::vector<Situation> grid = comparison_grid();
   std::vector<Cell> cells;
   for (std::size_t i = 0; i < grid.size(); i += options.every) {
-    for (const Contender& contender : contenders()) {
-      cells.push_back(contender.preset ? compare_cell(grid[i], *contender.preset, options.seed + i)
-                                       : compare_cell(grid[i], contender.law, options.seed + i));
-      if (options.json) out << to_json(cells.back(), options.seed + i) << "\n";
-    }
+    const std::vector<Cell> here = cells_of(grid[i], options.seed + i);
+    if (options.json) write_lines(out, here, options.seed + i);
+    cells.insert(cells.end(), here.begin(), here.end());
     if (options.progress) std::cerr << "\r" << i + 1 << " of " << grid.size() << " situations" << std::flush;
   }
   if (options.progress) std::cerr << "\n";
+  report(cells, options, out);
+}
 
+void compare_units(const Units& situations, const CompareOptions& options, std::ostream& out) {
+  const std::vector<Situation> grid = comparison_grid();
+  if (situations.first >= grid.size() || situations.count > grid.size() - situations.first) {
+    throw std::invalid_argument("units " + std::to_string(situations.first) + ":" + std::to_string(situations.count) +
+                                ": expected some of 0 to " + std::to_string(grid.size() - 1));
+  }
+  ShardEnd end{.units = situations,
+               .totals = {{"cells", 0}, {"passive", 0}, {"stable", 0}},
+               .least = {{"energy_j", 0}},
+               .largest = {{"force_n", 0}}};
+  for (std::uint64_t unit = situations.first; unit < situations.first + situations.count; ++unit) {
+    const std::vector<Cell> cells = cells_of(grid[unit], options.seed + unit);
+    std::ostringstream lines;
+    write_lines(lines, cells, options.seed + unit);
+    out << lines.str();
+    end.digest.add(unit, lines.str());
+    for (const Cell& cell : cells) {
+      ++end.totals[0].second;
+      end.totals[1].second += cell.passive() ? 1U : 0U;
+      end.totals[2].second += cell.outcome.stable ? 1U : 0U;
+      end.least[0].second = std::min(end.least[0].second, cell.outcome.least_energy);
+      end.largest[0].second = std::max(end.largest[0].second, cell.outcome.largest_force);
+    }
+  }
+  out << end.line() << "\n";
+  if (!out.flush()) throw std::runtime_error("cannot write the cells: is the disk full?");
+}
+
+namespace {
+
+/// The cell of a line of to_json, and its seed. Throws nlohmann's exception or std::invalid_argument.
+std::pair<Cell, std::uint64_t> cell_of(const std::string& line) {
+  const auto json = nlohmann::json::parse(line);
+  const auto number = [&json](const char* name) { return json.at(name).get<double>(); };
+  Cell cell{.situation = {.stiffness = number("stiffness_n_per_m"),
+                          .delay_ms = number("delay_ms"),
+                          .jitter_ms = number("jitter_ms"),
+                          .rate_hz = number("rate_hz"),
+                          .loss = number("loss"),
+                          .friction = {.coulomb = number("fc_n"), .viscous = number("b_n_s_per_m")},
+                          .firm = json.at("hand") == "firm"},
+            .law = Law::kAolPlus,
+            .outcome = {.operational_stiffness = number("k_op_n_per_m"),
+                        .least_energy = number("least_energy_j"),
+                        .late_vibration = number("hf_velocity_m_s"),
+                        .sensation = number("sensation_db"),
+                        .noticed_share = number("noticed_share"),
+                        .largest_force = number("max_force_n"),
+                        .limited_share = number("limited_share"),
+                        .force_error = number("force_error_n"),
+                        .true_force = number("true_force_n"),
+                        .latency = number("latency_s")}};
+  cell.outcome.stable = cell.outcome.late_vibration <= kMostVibration;
+  const std::string name = json.at("law");
+  for (const Contender& contender : contenders()) {
+    if (contender.name != name) continue;
+    cell.law = contender.law;
+    cell.preset = contender.preset;
+    return {cell, json.at("seed").get<std::uint64_t>()};
+  }
+  throw std::invalid_argument("law \"" + name + "\" is none of ours");
+}
+
+}  // namespace
+
+void compare_from(std::istream& lines, const CompareOptions& options, std::ostream& out) {
+  std::vector<Cell> cells;
+  CompareOptions as_run = options;
+  std::optional<ShardEnd> end;
+  std::string line;
+  for (int number = 1; std::getline(lines, line); ++number) {
+    try {
+      if (end) throw std::invalid_argument("nothing was expected after the end");
+      if (line.starts_with(R"({"kind":"end",)")) {
+        end = ShardEnd::parse(line);
+        continue;
+      }
+      const auto [cell, seed] = cell_of(line);
+      if (cells.empty()) as_run.seed = seed;
+      cells.push_back(cell);
+    } catch (const std::exception& error) {
+      throw std::invalid_argument("line " + std::to_string(number) + ": expected a cell of compare: " + error.what());
+    }
+  }
+  const std::size_t whole = comparison_grid().size() * contenders().size();
+  if (!end || cells.size() != whole) {
+    throw std::invalid_argument(std::to_string(cells.size()) + " cells" + (end ? "" : " without an end") +
+                                ": expected all " + std::to_string(whole) + " of the grid");
+  }
+  report(cells, as_run, out);
+}
+
+namespace {
+
+void report(const std::vector<Cell>& cells, const CompareOptions& options, std::ostream& out) {
   std::vector<std::string> written;
   if (options.out) {
     std::filesystem::create_directories(*options.out);
@@ -472,4 +590,5 @@ void compare(const CompareOptions& options, std::ostream& out) {
   if (!out.flush()) throw std::runtime_error("cannot write the table: is the disk full?");
 }
 
+}  // namespace
 }  // namespace tendon::lab

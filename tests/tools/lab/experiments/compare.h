@@ -4,11 +4,13 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <istream>
 #include <optional>
 #include <ostream>
 #include <string>
 #include <vector>
 
+#include "tests/support/units.h"
 #include "tests/tools/lab/experiments/situations.h"
 
 namespace tendon::lab {
@@ -70,6 +72,14 @@ struct CompareOptions {
   bool json = false;
   bool progress = false;  ///< on standard error
 };
+
+/// A shard of a sweep (tests/support/units.h) whose units are situations of the grid, from 0 on: a line for each cell,
+/// and an end. `out` in options and `every` do not count. Throws std::invalid_argument when the grid has no such unit.
+void compare_units(const Units& situations, const CompareOptions& options, std::ostream& out);
+
+/// `compare` of the lines that shards have written: the same table, pictures and CSV as from one process. Throws
+/// std::invalid_argument naming the line that is no cell of the grid, or the unit that is missing.
+void compare_from(std::istream& lines, const CompareOptions& options, std::ostream& out);
 
 /// `tendon-lab compare`: every law in every situation, with the same seeds, and which one to use where.
 void compare(const CompareOptions& options, std::ostream& out);

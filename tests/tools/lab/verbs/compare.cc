@@ -3,6 +3,7 @@
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
+#include <fstream>
 #include <iostream>
 
 #include "tests/tools/lab/experiments/compare.h"
@@ -16,6 +17,8 @@ namespace {
 void add(CLI::App& verb, int& /*exit*/) {
   static CompareOptions options;
   static CompareKindsOptions drawn;
+  static std::string units;
+  static std::string from;
   std::string names = "all";
   for (const SituationKind& kind : situation_kinds()) names += ", " + std::string(kind.name);
   verb.add_option("--kinds", drawn.kinds, "instead of the grid, situations that are drawn from seeds: " + names)
@@ -28,6 +31,11 @@ void add(CLI::App& verb, int& /*exit*/) {
   verb.add_flag("--held-out", drawn.held_out, "with --kinds: seeds on which no law was tuned");
   verb.add_option("--every", options.every, "take every so-manieth situation of the grid")->capture_default_str();
   verb.add_option("--seed", options.seed, "of the network; the same for all laws")->capture_default_str();
+  verb.add_option("--units", units, "these situations of the grid, from 0 on, as a shard of a sweep: lines of JSON")
+      ->type_name("FIRST:COUNT");
+  verb.add_option("--from", from, "runs nothing; the table of what the shards of a sweep came to (tendon-sweep merge)")
+      ->type_name("FILE")
+      ->check(CLI::ExistingFile.description(""));
   verb.add_option("--out", options.out, "write compare.csv and a figure there, SVG and PNG (needs gnuplot)")
       ->type_name("DIR");
   verb.add_flag("--json", options.json, "one JSON object for each cell instead of the table");
@@ -38,6 +46,11 @@ void add(CLI::App& verb, int& /*exit*/) {
       "\nExit: 0 done; 1 cannot write, or gnuplot failed; 2 wrong usage.");
   verb.callback([] {
     options.progress = isatty(STDERR_FILENO) != 0;
+    if (!units.empty()) return compare_units(parse_units(units), options, std::cout);
+    if (!from.empty()) {
+      std::ifstream lines(from);
+      return compare_from(lines, options, std::cout);
+    }
     if (drawn.kinds.empty()) return compare(options, std::cout);
     drawn.seed = options.seed;
     drawn.out = options.out;

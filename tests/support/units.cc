@@ -1,0 +1,143 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tests/support/units.h"
+
+#include <xxhash.h>
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+
+namespace tendon {
+namespace {
+
+constexpr std::size_t kDigits = 16;  // of a half
+
+bool whole(std::string_view text, std::uint64_t& value, int base = 10) {
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value, base);
+  return error == std::errc() && end == text.data() + text.size() && !text.empty();
+}
+
+std::string sixteen_digits(std::uint64_t value) {
+  std::array<char, kDigits> digits{};
+  const auto [end, error] = std::to_chars(digits.data(), digits.data() + digits.size(), value, 16);
+  const std::string text(digits.data(), end);
+  return std::string(kDigits - text.size(), '0') + text;
+}
+
+template <class Value>
+JsonLine object_of(const std::vector<std::pair<std::string, Value>>& figures) {
+  JsonLine object;
+  for (const auto& [name, value] : figures) object.add(name, value);
+  return object;
+}
+
+template <class Value>
+std::vector<std::pair<std::string, Value>> figures_of(const nlohmann::ordered_json& object) {
+  std::vector<std::pair<std::string, Value>> figures;
+  for (const auto& [name, value] : object.items()) figures.emplace_back(name, value.template get<Value>());
+  return figures;
+}
+
+template <class Value, class Join>
+void join(std::vector<std::pair<std::string, Value>>& sums, const std::vector<std::pair<std::string, Value>>& next,
+          const Join& how) {
+  if (sums.size() != next.size()) throw std::invalid_argument("the ends of two shards have other figures");
+  for (std::size_t i = 0; i < sums.size(); ++i) {
+    if (sums[i].first != next[i].first) {
+      throw std::invalid_argument("the end of a shard has \"" + next[i].first + "\" where the one before has \"" +
+                                  sums[i].first + "\"");
+    }
+    sums[i].second = how(sums[i].second, next[i].second);
+  }
+}
+
+template <class Value>
+Value figure(const std::vector<std::pair<std::string, Value>>& figures, std::string_view name) {
+  const auto found = std::ranges::find(figures, name, &std::pair<std::string, Value>::first);
+  if (found == figures.end()) throw std::invalid_argument("an end without \"" + std::string(name) + "\"");
+  return found->second;
+}
+
+}  // namespace
+
+Units parse_units(std::string_view text) {
+  const auto colon = text.find(':');
+  Units units;
+  if (colon == std::string_view::npos || !whole(text.substr(0, colon), units.first) ||
+      !whole(text.substr(colon + 1), units.count) || units.count == 0 ||
+      units.first > std::numeric_limits<std::uint64_t>::max() - (units.count - 1)) {
+    throw std::invalid_argument("units \"" + std::string(text) +
+                                "\": expected FIRST:COUNT, two whole numbers with COUNT above 0, as 1:1000");
+  }
+  return units;
+}
+
+void UnitDigest::add(std::uint64_t unit, std::string_view outcome) noexcept {
+  const XXH128_hash_t hash = XXH3_128bits_withSeed(outcome.data(), outcome.size(), unit);
+  UnitDigest one;
+  one.low_ = hash.low64;
+  one.high_ = hash.high64;
+  add(one);
+}
+
+void UnitDigest::add(const UnitDigest& other) noexcept {
+  low_ += other.low_;
+  high_ += other.high_ + (low_ < other.low_ ? 1U : 0U);
+}
+
+std::string UnitDigest::text() const { return sixteen_digits(high_) + sixteen_digits(low_); }
+
+UnitDigest UnitDigest::parse(std::string_view text) {
+  UnitDigest digest;
+  if (text.size() != 2 * kDigits || !whole(text.substr(0, kDigits), digest.high_, 16) ||
+      !whole(text.substr(kDigits), digest.low_, 16)) {
+    throw std::invalid_argument("digest \"" + std::string(text) + "\": expected 32 hexadecimal digits");
+  }
+  return digest;
+}
+
+void ShardEnd::add(const ShardEnd& next) {
+  if (next.units.first != units.first + units.count) {
+    throw std::invalid_argument("units " + std::to_string(next.units.first) + " and on come after " +
+                                std::to_string(units.first + units.count - 1) + ": some are missing, or came twice");
+  }
+  units.count += next.units.count;
+  join(totals, next.totals, [](std::uint64_t a, std::uint64_t b) { return a + b; });
+  join(least, next.least, [](double a, double b) { return std::min(a, b); });
+  join(largest, next.largest, [](double a, double b) { return std::max(a, b); });
+  digest.add(next.digest);
+}
+
+std::string ShardEnd::line() const {
+  return JsonLine()
+      .add("kind", "end")
+      .add("first", units.first)
+      .add("count", units.count)
+      .add("totals", object_of(totals))
+      .add("least", object_of(least))
+      .add("largest", object_of(largest))
+      .add("digest", digest.text())
+      .str();
+}
+
+ShardEnd ShardEnd::parse(std::string_view line) {
+  try {
+    const auto json = nlohmann::ordered_json::parse(line);
+    if (json.at("kind") != "end") throw std::invalid_argument("another kind of line");
+    return {.units = {.first = json.at("first"), .count = json.at("count")},
+            .totals = figures_of<std::uint64_t>(json.at("totals")),
+            .least = figures_of<double>(json.at("least")),
+            .largest = figures_of<double>(json.at("largest")),
+            .digest = UnitDigest::parse(json.at("digest").get<std::string>())};
+  } catch (const std::exception& error) {
+    throw std::invalid_argument("the end of a shard, {\"kind\":\"end\",…}, was expected: " + std::string(error.what()));
+  }
+}
+
+std::uint64_t ShardEnd::total(std::string_view name) const { return figure(totals, name); }
+double ShardEnd::least_of(std::string_view name) const { return figure(least, name); }
+
+}  // namespace tendon

@@ -1,0 +1,44 @@
+# SPDX-License-Identifier: Apache-2.0
+# Can the tests of tendon-sweep fail? Each mutant is tendon-sweep with one planted bug: a copy of one source file in
+# which one text was replaced by another, linked ahead of the library that it comes from.
+
+# tendon_sweep_mutant(name SOURCE results.cc REPLACE "text" "by" TEST Name): the test Sweep.Name finds it.
+function(tendon_sweep_mutant name)
+  cmake_parse_arguments(ARG "" "SOURCE;TEST" "REPLACE" ${ARGN})
+  set(original ${CMAKE_CURRENT_SOURCE_DIR}/${ARG_SOURCE})
+  set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${original})
+  file(READ ${original} text)
+  list(POP_FRONT ARG_REPLACE from to)
+  string(FIND "${text}" "${from}" at)
+  if(at EQUAL -1)
+    message(FATAL_ERROR "mutant ${name}: ${ARG_SOURCE} no longer has \"${from}\"; plant its bug anew in ${CMAKE_CURRENT_FUNCTION_LIST_FILE}")
+  endif()
+  string(REPLACE "${from}" "${to}" text "${text}")
+  set(mutated ${CMAKE_CURRENT_BINARY_DIR}/mutants/${name}.cc)
+  file(CONFIGURE OUTPUT ${mutated} CONTENT "${text}" @ONLY)
+  add_executable(tendon-sweep-${name} ${mutated} sweep_main.cc)
+  set_target_properties(tendon-sweep-${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/tests)
+  target_link_libraries(tendon-sweep-${name} PRIVATE
+    tendon_build_info tendon_protocol tendon_scene tendon_sweep nlohmann_json::nlohmann_json CLI11::CLI11 tendon_warnings)
+  add_test(NAME Sweep.Find.${name} COMMAND sweep_test --gtest_filter=Sweep.${ARG_TEST})
+  set_tests_properties(Sweep.Find.${name} PROPERTIES LABELS e2e TIMEOUT 60
+    ENVIRONMENT "TENDON_SWEEP_PROGRAM=$<TARGET_FILE:tendon-sweep-${name}>"
+    PASS_REGULAR_EXPRESSION "FAILED  \\] Sweep.${ARG_TEST}")
+endfunction()
+
+# A second result takes the place of the first.
+tendon_sweep_mutant(rename-for-link SOURCE results.cc
+  REPLACE "if (link(path_.c_str(), name.c_str()) == 0)" "if (rename(path_.c_str(), name.c_str()) == 0)"
+  TEST TwoResultsThatDifferAreBothKeptAndMergeNamesTheUnits)
+# After a power cut a result may be there, and empty.
+tendon_sweep_mutant(no-sync SOURCE results.cc
+  REPLACE "if (fsync(file_) != 0)" "if (false)"
+  TEST AResultIsSyncedBeforeItHasItsName)
+# Whatever a program prints is a result when it ends well.
+tendon_sweep_mutant(believes-any-output SOURCE shards.cc
+  REPLACE "end_of(end.output, units)" "(void)units"
+  TEST AShardThatIsKilledOrBreaksOffIsNotDoneAndRunsAgain)
+# A newer build goes on with the shards of an older one.
+tendon_sweep_mutant(any-program SOURCE shards.cc
+  REPLACE "here != plan.sha256" "here.empty()"
+  TEST AnotherPlanAnotherProgramOrNoneIsRefused)
