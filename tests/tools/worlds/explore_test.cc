@@ -61,6 +61,44 @@ TEST(Worlds, SoDoesOnePercentMoreTorqueOrGrip) {
   EXPECT_GT(broken_by({.grip = 1.01}), 3);
 }
 
+std::string lines_of(const Units& seeds, unsigned jobs) {
+  std::ostringstream out;
+  explore_units(seeds, jobs, out);
+  return out.str();
+}
+
+TEST(Worlds, UnitsHaveOneDigestHoweverTheyAreCutAndOnAnyNumberOfThreads) {
+  const std::string whole = lines_of({1, 24}, 2);
+  EXPECT_EQ(lines_of({1, 24}, 1), whole);
+  ShardEnd end = ShardEnd::parse(lines_of({1, 7}, 1));
+  end.add(ShardEnd::parse(lines_of({8, 17}, 3)));
+  EXPECT_EQ(end.line() + "\n", whole);
+  EXPECT_NE(ShardEnd::parse(lines_of({2, 24}, 2)).digest.text(), end.digest.text());
+}
+
+TEST(Worlds, ASweepIsJudgedByWhatItsShardsPrinted) {
+  const std::string kept = lines_of({1, 3}, 1);
+  std::istringstream lines(kept);
+  std::ostringstream said;
+  EXPECT_TRUE(judge(lines, said));
+  EXPECT_NE(said.str().find("3 worlds of 10 s, seeds 1 to 3; digest "), std::string::npos) << said.str();
+
+  std::string broken = kept;
+  broken.replace(broken.find("\"broken\":0"), 10, "\"broken\":1");
+  std::istringstream one("{\"kind\":\"broken\",\"seed\":2}\n" + broken);
+  EXPECT_FALSE(judge(one, said));
+
+  std::string idle = kept;
+  idle.replace(idle.find("\"worlds\":3"), 10, "\"worlds\":900");
+  std::istringstream nothing_happens(idle);
+  EXPECT_THROW(judge(nothing_happens, said), std::runtime_error);
+
+  for (const std::string& bad : {std::string(), std::string("a line\n") + kept, kept + kept}) {
+    std::istringstream refused(bad);
+    EXPECT_THROW(judge(refused, said), std::invalid_argument) << bad;
+  }
+}
+
 TEST(Worlds, EveryOracleHasANameAndASentence) {
   for (std::size_t i = 0; i < oracles().size(); ++i) {
     EXPECT_EQ(static_cast<std::size_t>(oracles()[i].oracle), i);
