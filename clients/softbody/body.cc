@@ -153,6 +153,7 @@ static_assert(each_is_at_its_kind(kModels) && kModels.back().kind == ModelKind::
 /// A model, and typed pointers to it for kinds that offer more than Model.
 struct Made {
   std::unique_ptr<Model> model;
+  std::optional<double> linear_up_to{};  ///< m, where a table tells it
   const CondensedModel* condensed = nullptr;
   StiffeningModel* stiffening = nullptr;
 };
@@ -189,10 +190,39 @@ std::vector<int> touchable(const BodyConfig& config, const TouchSurface& surface
   return config.reach ? surface.nodes_of_patches(surface.across(config.middle), *config.reach) : surface.nodes();
 }
 
+/// N/m, at first touch.
+double stiffness_under(Model& model, const Patch& patch) { return model.press(patch, Given::kForce, 1).stiffness; }
+
+/// The model of a table that was made before. Refuses one of another body, of a smaller part of it, and one that does
+/// not answer as it did when it was made.
+std::unique_ptr<CondensedModel> condensed_from(const BodyConfig& config, const Solid& solid,
+                                               const TouchSurface& surface, double& linear_up_to) {
+  SurfaceTable table = read_table(*config.table_file);
+  const auto refuse = [&](const std::string& why) { throw std::invalid_argument(config.table_file->string() + why); };
+  if (table.body != digest_of(solid, surface.normal())) {
+    refuse(" is the table of another body: make it anew with tendon-softbody condense");
+  }
+  for (const int node : touchable(config, surface)) {
+    if (!std::ranges::binary_search(table.nodes, node)) refuse(" does not reach as far as reach_mm");
+  }
+  linear_up_to = table.linear_up_to;
+  const double expected = table.stiffness;
+  const TouchSurface then(solid.mesh(), surface.normal(), table.patch_radius);
+  const auto patch = then.patch(table.middle);
+  auto model =
+      std::make_unique<CondensedModel>(solid.mesh().nodes.size(), std::move(table.nodes), std::move(table.compliance));
+  constexpr double kSame = 1e-9;  // of the same sum in another order
+  if (!patch || !(std::abs(stiffness_under(*model, *patch) / expected - 1) < kSame)) {
+    refuse(" does not answer as it did when it was made");
+  }
+  return model;
+}
+
 Made model_of(const BodyConfig& config, const Solid& solid, const TouchSurface& surface) {
   Made made;
   if (config.model == ModelKind::kCondensed) {
-    auto condensed = std::make_unique<CondensedModel>(solid, surface, touchable(config, surface));
+    auto condensed = config.table_file ? condensed_from(config, solid, surface, made.linear_up_to.emplace())
+                                       : std::make_unique<CondensedModel>(solid, surface, touchable(config, surface));
     made.condensed = condensed.get();
     made.model = std::move(condensed);
   } else {
@@ -232,6 +262,14 @@ const BodyConfig& checked(const BodyConfig& config) {
     if (config.stiffening) throw std::invalid_argument(tool + " wants a body that does not stiffen");
     if (config.side == PatchContact::Side::kBilateral) throw std::invalid_argument(tool + " does not stick");
   }
+  if (config.table_file) {
+    if (config.model != ModelKind::kCondensed) {
+      throw std::invalid_argument("a table in a file is for the model \"condensed\"");
+    }
+    if (config.tool == BodyConfig::Tool::kCapsule) {
+      throw std::invalid_argument("a capsule wants more than a table in a file has");
+    }
+  }
   expect(std::abs(config.tool_axis.norm() - 1) < 1e-9, "norm of tool_axis", config.tool_axis.norm(), "1");
   expect(config.tool_offset.allFinite(), "tool_offset", config.tool_offset.norm(), "finite numbers");
   return config;
@@ -240,6 +278,16 @@ const BodyConfig& checked(const BodyConfig& config) {
 std::unique_ptr<Friction> friction_of(const BodyConfig& config) {
   if (!config.friction) return nullptr;
   return std::make_unique<Friction>(*config.friction, sideways_stiffness(config.material, config.patch_radius));
+}
+
+/// m: how deep the patch may be pressed before the material turns anywhere by more than Body::kLargestTurn.
+double linear_limit(const Solid& solid, const TouchSurface& surface, const Patch& patch) {
+  const VectorXd load = solid.to_free(patch_load(solid, surface.normal(), patch));
+  const VectorXd per_newton = LinearModel(solid, surface).displacements(patch);
+  const double depth = 1e-6 * surface.radius();  // so small that the rotation is proportional to it
+  VectorXd u = VectorXd::Zero(solid.size());
+  solid.add_free(depth / load.dot(per_newton) * per_newton, u);
+  return depth * Body::kLargestTurn / solid.largest_turn(u);
 }
 
 Patch middle_patch(const TouchSurface& surface, const Vec3& middle) {
@@ -413,16 +461,27 @@ Reaction Body::settle(Given given, double value) {
   return softbody::settle(parts_->model, parts_->patch, given, value);
 }
 
+SurfaceTable condense(const BodyConfig& config) {
+  if (config.model != ModelKind::kCondensed) throw std::invalid_argument("only the model \"condensed\" has a table");
+  BodyConfig anew = config;
+  anew.table_file.reset();
+  anew.tool = BodyConfig::Tool::kPatch;
+  const Solid solid = solid_of(checked(anew));
+  const TouchSurface surface(solid.mesh(), anew.towards_tool, anew.patch_radius);
+  CondensedModel model(solid, surface, touchable(anew, surface));
+  return {.body = digest_of(solid, surface.normal()),
+          .patch_radius = anew.patch_radius,
+          .stiffness = stiffness_under(model, middle_patch(surface, anew.middle)),
+          .linear_up_to = linear_limit(solid, surface, middle_patch(surface, anew.middle)),
+          .middle = surface.across(anew.middle),
+          .nodes = model.nodes(),
+          .compliance = model.table()};
+}
+
 double Body::linear_up_to() const {
   if (parts_->knows_turns) return std::numeric_limits<double>::infinity();
-  const Solid& solid = parts_->solid;
-  const TouchSurface& surface = parts_->surface;
-  const VectorXd load = solid.to_free(patch_load(solid, surface.normal(), parts_->patch));
-  const VectorXd per_newton = LinearModel(solid, surface).displacements(parts_->patch);
-  const double depth = 1e-6 * surface.radius();  // so small that the rotation is proportional to it
-  VectorXd u = VectorXd::Zero(solid.size());
-  solid.add_free(depth / load.dot(per_newton) * per_newton, u);
-  return depth * kLargestTurn / solid.largest_turn(u);
+  if (parts_->made.linear_up_to) return *parts_->made.linear_up_to;
+  return linear_limit(parts_->solid, parts_->surface, parts_->patch);
 }
 
 double Body::step() const noexcept { return parts_->model.step(); }

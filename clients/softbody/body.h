@@ -19,6 +19,7 @@
 #include "clients/softbody/models/plasticity.h"
 #include "clients/softbody/models/quasi_static.h"
 #include "clients/softbody/models/stiffening.h"
+#include "clients/softbody/models/surface_table.h"
 #include "clients/softbody/touch/contact.h"
 
 namespace tendon::softbody {
@@ -115,6 +116,8 @@ struct BodyConfig {
   Element element = Element::kHex8Sri;
   Material material;
   ModelKind model = ModelKind::kCondensed;
+  std::optional<std::filesystem::path>
+      table_file{};  ///< kCondensed: where condense() has put its table; else it is made
   int max_iterations = QuasiStaticModel::Config{}.max_iterations;  ///< for models that iterate until they converge
   int iterations = 10;                                             ///< for models with a fixed number of iterations
   int swings = 30;                                                 ///< kModal: vibration modes
@@ -153,6 +156,9 @@ Vec3 lowest_of_tool(const BodyConfig& config, const Mat3& turn);
 /// The effects that `config` simulates, including those of its model.
 EffectSet effects_of(const BodyConfig& config);
 
+/// The table of a kCondensed body, to be kept in a file. Throws what Body throws.
+SurfaceTable condense(const BodyConfig& config);
+
 /// Mesh, model and contact of one body, built from a BodyConfig. Thread-safe: no. Realtime-safe: no.
 class Body {
  public:
@@ -184,7 +190,7 @@ class Body {
 
   /// m, how deep the middle may be pressed before the material rotates anywhere by more than kLargestTurn. Beyond that,
   /// a model without geometric nonlinearity mistakes rotations for strains (of 1 − cos) and gives wrong forces; ∞ for
-  /// the other models. Each call makes a factor.
+  /// the other models. Each call makes a factor, but for a table from a file, which tells it.
   double linear_up_to() const;
   static constexpr double kLargestTurn = 0.1;  ///< rad; B1's force is then 5 to 7 % above corotational's
 

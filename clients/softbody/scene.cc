@@ -388,6 +388,11 @@ Scene parse_scene(std::string_view text, const std::string& name, const std::fil
     case ModelKind::kProjective:
       scene.body.iterations = model.count("iterations", 1000, scene.body.iterations);
       break;
+    case ModelKind::kCondensed:
+      if (model.find("table") != nullptr) {
+        scene.body.table_file = directory / model.text("table", "the path of a table of tendon-softbody condense");
+      }
+      break;
     case ModelKind::kModal:
       scene.body.swings = model.count("swings", 10'000, scene.body.swings);
       if (model.find("static_modes") != nullptr) scene.body.static_modes = model.count("static_modes", 20);
@@ -455,6 +460,9 @@ std::string scene_reference() {
           "kind                     how it is computed:\n";
   for (const auto& each : models()) text << "    " << each.name << ": " << each.what << '\n';
   const BodyConfig defaults;
+  text << "table                    of condensed: a file of `tendon-softbody condense SCENE FILE`; without it the "
+          "table is made "
+          "at the start\n";
   text
       << "max_iterations = " << defaults.max_iterations
       << "      of one answer: corotational, stvk, neo-hookean, mass-spring, and linear with plasticity\n"

@@ -2,7 +2,9 @@
 // tendon-softbody: the reference physics engine, a guest like any other.
 #include <ctime>
 #include <exception>
+#include <filesystem>
 #include <iostream>
+#include <nlohmann/json.hpp>
 #include <string>
 #include <string_view>
 
@@ -33,22 +35,59 @@ int test(const softbody::Scene& scene, const Options& options) {
   return result.passed() ? 0 : 1;
 }
 
+/// `tendon-softbody condense SCENE FILE`.
+int condense(int argc, char** argv) {
+  Options options{.client = {.name = "tendon-softbody condense"}};
+  std::string scene_file;
+  std::string table_file;
+  CommandLine line("Makes the table of a scene's condensed body once, for as many servers and starts as there are.",
+                   options);
+  line.add_argument("SCENE", scene_file, "Scene file, with the model condensed");
+  line.add_argument("FILE", table_file, "The table; a scene names it under [model] table");
+  if (const auto exit_code = line.parse(argc, argv)) return *exit_code;
+  const softbody::Scene scene = softbody::read_scene(scene_file);
+  const softbody::SurfaceTable table = softbody::condense(scene.body);
+  softbody::write_table(table_file, table);
+  const auto bytes = std::filesystem::file_size(table_file);
+  if (options.json) {
+    const nlohmann::ordered_json made = {{"file", table_file},
+                                         {"nodes", table.nodes.size()},
+                                         {"bytes", bytes},
+                                         {"stiffness_n_per_m", table.stiffness},
+                                         {"linear_up_to_m", table.linear_up_to}};
+    std::cout << made.dump() << '\n';
+  } else {
+    std::cout << table_file << ": " << table.nodes.size() << " nodes, " << bytes << " bytes, " << table.stiffness
+              << " N/m at first touch\n";
+  }
+  return 0;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
   const std::string_view first = argc > 1 ? argv[1] : "";
+  if (first == "condense") {
+    try {
+      return condense(argc - 1, argv + 1);
+    } catch (const std::exception& error) {
+      std::cerr << "tendon-softbody: " << error.what() << '\n';
+      return 1;
+    }
+  }
   const bool explains = first == "explain";
   const bool tests = first == "selftest";
   const int skip = explains || tests ? 1 : 0;
   Options options{.client = {.name = "tendon-softbody", .rate_hz = 500}};
   if (skip == 1) options.client.name += ' ' + std::string(first);
   std::string file;
-  CommandLine line(explains ? "Says what a scene simulates, what not, and what each part costs; no server is needed."
-                   : tests
-                       ? "Presses a scene by a script and says what of it would be felt as wrong; no server is needed."
-                       : "A soft body that the hand can touch; `tendon-softbody explain SCENE` says what it simulates, "
-                         "`tendon-softbody selftest SCENE` whether it is passive.",
-                   options);
+  CommandLine line(
+      explains ? "Says what a scene simulates, what not, and what each part costs; no server is needed."
+      : tests  ? "Presses a scene by a script and says what of it would be felt as wrong; no server is needed."
+               : "A soft body that the hand can touch; `tendon-softbody explain SCENE` says what it simulates, "
+                 "`tendon-softbody selftest SCENE` whether it is passive, `tendon-softbody condense SCENE FILE` "
+                 "makes a table before.",
+      options);
   line.add_argument("SCENE", file, "Scene file; its keys:\n" + softbody::scene_reference());
   if (const auto exit_code = line.parse(argc - skip, argv + skip)) return *exit_code;
 

@@ -153,6 +153,11 @@ CondensedModel::CondensedModel(const Solid& solid, const TouchSurface& surface, 
   table_ = 0.5 * (table_ + table_.transpose()).eval();
 }
 
+CondensedModel::CondensedModel(std::size_t mesh_nodes, std::vector<int> nodes, MatrixXd table)
+    : nodes_(std::move(nodes)), row_of_(mesh_nodes, -1), table_(std::move(table)) {
+  for (std::size_t i = 0; i < nodes_.size(); ++i) row_of_.at(at(nodes_[i])) = static_cast<int>(i);
+}
+
 Reaction CondensedModel::press(const Patch& patch, Given given, double value) {
   rows_.clear();
   for (const int node : patch.nodes) {

@@ -52,6 +52,8 @@ class CondensedModel : public Model {
   /// Makes the table of `nodes` (TouchSurface::nodes_of_patches), by one solution for each. Keeps neither the solid nor
   /// the surface.
   CondensedModel(const Solid& solid, const TouchSurface& surface, const std::vector<int>& nodes);
+  /// From a table that was made before, of a mesh with so many nodes (SurfaceTable).
+  CondensedModel(std::size_t mesh_nodes, std::vector<int> nodes, MatrixXd table);
 
   /// Throws std::out_of_range when the patch has a node that is not in the table.
   Reaction press(const Patch& patch, Given given, double value) override;

@@ -29,6 +29,15 @@ std::string refusal(const std::string& text) {
   return "";
 }
 
+TEST(SoftbodyScene, ATableInAFileIsForTheModelCondensedAndBesideTheScene) {
+  const Scene scene =
+      parse_scene(with("kind = \"condensed\"", "kind = \"condensed\"\ntable = \"b.table\""), "s.toml", "/scenes");
+  EXPECT_EQ(scene.body.table_file, "/scenes/b.table");
+  EXPECT_FALSE(parse_scene(kGood, "s.toml", ".").body.table_file);
+  EXPECT_THROW(parse_scene(with("kind = \"condensed\"", "kind = \"linear\"\ntable = \"b.table\""), "s.toml", "."),
+               SceneError);
+}
+
 TEST(SoftbodyScene, EveryValueArrives) {
   const Scene scene = parse_scene(kGood, "s.toml", ".");
   const auto& block = std::get<BlockShape>(scene.body.shape);

@@ -1,0 +1,151 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "clients/softbody/models/surface_table.h"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <iterator>
+#include <stdexcept>
+#include <string>
+
+#include "clients/softbody/body.h"
+#include "clients/softbody/scene.h"
+#include "tests/clients/softbody/pressed_block.h"
+#include "tests/server/scratch_folder.h"
+
+namespace tendon::softbody {
+namespace {
+
+using testing::pressed_body;
+
+class SurfaceTableFile : public ::testing::Test {
+ protected:
+  std::filesystem::path file() const { return scratch_.path() / "block.table"; }
+  std::string bytes() const {
+    std::ifstream in(file(), std::ios::binary);
+    return {std::istreambuf_iterator<char>(in), {}};
+  }
+  void put(const std::string& bytes) const { std::ofstream(file(), std::ios::binary) << bytes; }
+  static std::string refusal(const std::function<void()>& attempt) {
+    try {
+      attempt();
+    } catch (const std::invalid_argument& error) {
+      return error.what();
+    }
+    return "nothing was refused";
+  }
+  std::string reading() const {
+    return refusal([&] { read_table(file()); });
+  }
+  /// A block of n cells, of which the middle can be touched.
+  static BodyConfig block(int n) {
+    BodyConfig config = pressed_body(ModelKind::kCondensed, Element::kHex8Sri, n);
+    config.reach = 0.01;
+    return config;
+  }
+  BodyConfig from_file(int n) const {
+    BodyConfig config = block(n);
+    config.table_file = file();
+    return config;
+  }
+
+ private:
+  tendon::testing::ScratchFolder scratch_;
+};
+
+TEST_F(SurfaceTableFile, ABodyFromItAnswersBitForBitAsTheOneThatMakesItsTable) {
+  write_table(file(), condense(block(8)));
+  Body made(block(8));
+  Body read(from_file(8));
+  for (const Vec3& off : {Vec3(0, 0, -0.001), Vec3(0.004, -0.003, -0.002), Vec3(-0.009, 0.001, -0.004)}) {
+    const Vec3 tool = made.touch_point() + off;
+    const Feel expected = made.touch(tool);
+    const Feel felt = read.touch(tool);
+    EXPECT_EQ(felt.force, expected.force);
+    EXPECT_EQ(felt.stiffness, expected.stiffness);
+    EXPECT_GT(felt.force.z(), 0.1);
+  }
+  EXPECT_EQ(read.linear_up_to(), made.linear_up_to());
+}
+
+TEST_F(SurfaceTableFile, ComesBackBitForBitAndMayBeMadeAnew) {
+  const SurfaceTable table = condense(block(4));
+  write_table(file(), table);
+  write_table(file(), table);
+  const SurfaceTable read = read_table(file());
+  EXPECT_EQ(read.compliance, table.compliance);
+  EXPECT_EQ(read.nodes, table.nodes);
+  EXPECT_EQ(read.stiffness, table.stiffness);
+  put("a letter to a friend\n");
+  EXPECT_THROW(write_table(file(), table), std::runtime_error);
+  EXPECT_EQ(bytes(), "a letter to a friend\n");
+}
+
+TEST_F(SurfaceTableFile, OfAnotherBodyIsRefused) {
+  write_table(file(), condense(block(8)));
+  EXPECT_NE(refusal([&] { Body{from_file(4)}; }).find("is the table of another body"), std::string::npos);
+  BodyConfig harder = from_file(8);
+  harder.material.young *= 1.0000001;
+  EXPECT_NE(refusal([&] { Body{harder}; }).find("is the table of another body"), std::string::npos);
+  BodyConfig farther = from_file(8);
+  farther.reach = 0.03;
+  EXPECT_NE(refusal([&] { Body{farther}; }).find("does not reach as far as reach_mm"), std::string::npos);
+  BodyConfig nearer = from_file(8);
+  nearer.reach = 0.005;
+  EXPECT_NO_THROW(Body{nearer}) << "a smaller part of it is there";
+}
+
+TEST_F(SurfaceTableFile, ThatHasChangedBreaksOffOrIsNoneIsRefused) {
+  EXPECT_NE(reading().find("there is no such file"), std::string::npos);
+  write_table(file(), condense(block(4)));
+  const std::string whole = bytes();
+  for (const std::size_t at : {9U, 20U, 40U, 80U, 200U}) {
+    std::string changed = whole;
+    changed[at] = static_cast<char>(changed[at] ^ 1);
+    put(changed);
+    EXPECT_NE(reading().find("no table of a surface that can be used"), std::string::npos) << at;
+  }
+  put(whole.substr(0, whole.size() - 8));
+  EXPECT_NE(reading().find("bytes, expected"), std::string::npos);
+  put("TENDONST");
+  EXPECT_NE(reading().find("it breaks off"), std::string::npos);
+  put(whole + "1");
+  EXPECT_NE(reading().find("bytes, expected"), std::string::npos);
+}
+
+TEST_F(SurfaceTableFile, ThatWouldGiveOutEnergyOrAnswersOtherwiseIsRefused) {
+  SurfaceTable table = condense(block(4));
+  SurfaceTable active = table;
+  active.compliance(0, 1) = active.compliance(1, 0) = 2 * active.compliance(0, 0);
+  write_table(file(), active);
+  EXPECT_NE(reading().find("it is not positive semidefinite"), std::string::npos);
+  SurfaceTable softer = table;
+  softer.compliance *= 1.001;
+  write_table(file(), softer);
+  EXPECT_NE(refusal([&] { Body{from_file(4)}; }).find("does not answer as it did"), std::string::npos);
+  SurfaceTable infinite = table;
+  infinite.compliance(0, 0) = std::numeric_limits<double>::infinity();
+  write_table(file(), infinite);
+  EXPECT_NE(reading().find("not finite"), std::string::npos);
+}
+
+TEST_F(SurfaceTableFile, IsForTheModelCondensedAndForPatchesAndSpheres) {
+  write_table(file(), condense(block(4)));
+  BodyConfig linear = from_file(4);
+  linear.model = ModelKind::kLinear;
+  EXPECT_EQ(refusal([&] { Body{linear}; }), "a table in a file is for the model \"condensed\"");
+  EXPECT_EQ(refusal([&] { condense(linear); }), "only the model \"condensed\" has a table");
+  BodyConfig capsule = from_file(4);
+  capsule.tool = BodyConfig::Tool::kCapsule;
+  capsule.tool_radius = 0.02;
+  EXPECT_EQ(refusal([&] { Body{capsule}; }), "a capsule wants more than a table in a file has");
+  BodyConfig sphere = from_file(4);
+  sphere.tool = BodyConfig::Tool::kSphere;
+  sphere.tool_radius = 0.02;
+  EXPECT_NO_THROW(Body{sphere});
+}
+
+}  // namespace
+}  // namespace tendon::softbody
