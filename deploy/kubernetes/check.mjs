@@ -1,0 +1,201 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// What deploy/kubernetes/check looks at: types, misspelt keys, the rules of README.md, and that everything that is named
+// is there. It prints a line for each fault, and how much was looked at.
+import { execFileSync } from "node:child_process";
+import { existsSync, mkdtempSync, readdirSync, readFileSync, rmSync, writeFileSync } from "node:fs";
+import { tmpdir } from "node:os";
+import { dirname, join, relative } from "node:path";
+import { fileURLToPath } from "node:url";
+import { parseAllDocuments } from "yaml";
+
+const here = dirname(fileURLToPath(import.meta.url));
+const [, , folder = here, programs = ""] = process.argv;
+const faults = [];
+const fault = (file, what) => faults.push(`${relative(folder, file)}: ${what}`);
+
+// ---- Reading ---------------------------------------------------------------------------------------------------------
+
+const read = (file) => {
+  const documents = parseAllDocuments(readFileSync(file, "utf8"), { uniqueKeys: true });
+  for (const document of documents) for (const error of document.errors) fault(file, error.message.split("\n")[0]);
+  return documents.map((document) => document.toJS()).filter((value) => value !== null);
+};
+
+const kustomizations = [];
+const find = (place) => {
+  for (const entry of readdirSync(place, { withFileTypes: true })) {
+    if (entry.name === "node_modules") continue;
+    const path = join(place, entry.name);
+    if (entry.isDirectory()) find(path);
+    else if (entry.name === "kustomization.yaml") kustomizations.push(path);
+  }
+};
+find(folder);
+
+/** {file, value, patch} of everything that the kustomizations name. */
+const documents = [];
+const known = ["apiVersion", "kind", "namespace", "resources", "images", "patches", "configMapGenerator"];
+for (const file of kustomizations) {
+  const [value] = read(file);
+  for (const key of Object.keys(value)) if (!known.includes(key)) fault(file, `unknown key ${key}`);
+  const named = (name, patch) => {
+    const path = join(dirname(file), name);
+    if (!existsSync(path)) return fault(file, `${name} is not there`);
+    if (existsSync(join(path, "kustomization.yaml"))) return;
+    for (const one of read(path)) documents.push({ file: path, value: one, patch });
+  };
+  for (const name of value.resources ?? []) named(name, false);
+  for (const { path } of value.patches ?? []) named(path, true);
+  for (const { files = [] } of value.configMapGenerator ?? []) {
+    for (const name of files) if (!existsSync(join(dirname(file), name))) fault(file, `${name} is not there`);
+  }
+}
+// The job of a sweep, as tendon-sweep writes it.
+if (programs !== "" && existsSync(join(programs, "tendon-sweep"))) {
+  const sweep = mkdtempSync(join(tmpdir(), "tendon-check-"));
+  const say = (...words) => execFileSync(join(programs, "tendon-sweep"), words, { encoding: "utf8" });
+  say("plan", sweep, "--units", "1:10", "--per-shard", "2", "--", "tendon-worlds", "run");
+  const [job] = parseAllDocuments(say("submit", sweep, "--to", "kubernetes", "--image", "tendon", "--volume", "sweep"));
+  documents.push({ file: join(folder, "tendon-sweep submit --to kubernetes"), value: job.toJS(), patch: false });
+  rmSync(sweep, { recursive: true });
+}
+const whole = documents.filter((document) => !document.patch);
+const find_one = (kind, name) => whole.find((d) => d.value.kind === kind && d.value.metadata?.name === name)?.value;
+for (const { file, value, patch } of documents) {
+  if (patch && !find_one(value.kind, value.metadata?.name)) {
+    fault(file, `changes ${value.kind} ${value.metadata?.name}, which the base does not have`);
+  }
+}
+
+// ---- Types, by TypeScript and the published types of Kubernetes: a key that a type does not have is an error there -----
+
+const partial = "type Part<T> = T extends object ? { [K in keyof T]?: Part<T[K]> } : T;\n";
+const modules = { "apps/v1": "apps/v1", "policy/v1": "policy/v1", "scheduling.k8s.io/v1": "scheduling.k8s.io/v1", "batch/v1": "batch/v1", v1: "v1" };
+const work = mkdtempSync(join(here, "node_modules", ".check-"));
+try {
+  documents.forEach(({ file, value, patch }, index) => {
+    const module = modules[value.apiVersion];
+    if (module === undefined) return fault(file, `apiVersion ${value.apiVersion}: expected one of ${Object.keys(modules)}`);
+    const type = `I${value.kind}`;
+    writeFileSync(
+      join(work, `d${index}.ts`),
+      `import type { ${type} } from "kubernetes-models/${module}";\n${partial}` +
+        `const d: ${patch ? `Part<${type}>` : type} = ${JSON.stringify(value, null, 1)};\nexport default d;\n`,
+    );
+  });
+  const tsc = join(here, "node_modules", "typescript", "bin", "tsc");
+  const options = ["--noEmit", "--strict", "--skipLibCheck", "--moduleResolution", "bundler", "--module", "esnext"];
+  const sources = readdirSync(work).map((name) => join(work, name));
+  try {
+    execFileSync(process.execPath, [tsc, ...options, ...sources], { encoding: "utf8", stdio: "pipe" });
+  } catch (error) {
+    for (const line of error.stdout.split("\n")) {
+      const found = /d(\d+)\.ts\((\d+),\d+\): error \w+: (.*)/.exec(line);
+      if (!found) continue;
+      const where = readFileSync(join(work, `d${found[1]}.ts`), "utf8").split("\n")[found[2] - 1].trim();
+      fault(documents[found[1]].file, `${found[3]} At: ${where}`);
+    }
+  }
+  for (const { file, value, patch } of documents) {
+    if (patch || modules[value.apiVersion] === undefined) continue;
+    const models = await import(`kubernetes-models/${modules[value.apiVersion]}`);
+    try {
+      new models[value.kind](value).validate();
+    } catch (error) {
+      fault(file, `${value.kind}: ${error.message}`);
+    }
+  }
+} finally {
+  rmSync(work, { recursive: true });
+}
+
+// ---- The rules of README.md ----------------------------------------------------------------------------------------
+
+const rule = (name, holds) => {
+  let kept = false;
+  try {
+    kept = holds();
+  } catch {
+    // Something that the rule is about is not there.
+  }
+  if (!kept) faults.push(`rule: ${name}`);
+};
+const same = (a, b) => JSON.stringify(a) === JSON.stringify(b);
+const server = find_one("DaemonSet", "server");
+const engine = find_one("Deployment", "engine");
+const pod = server?.spec?.template?.spec ?? {};
+const all_of = (spec) => [...(spec?.initContainers ?? []), ...(spec?.containers ?? [])];
+const everywhere = [...all_of(pod), ...all_of(engine?.spec?.template?.spec)];
+const one = (name) => all_of(pod).find((container) => container.name === name);
+
+rule("the server is on its node's network", () => pod.hostNetwork === true && pod.dnsPolicy === "ClusterFirstWithHostNet");
+rule("no container has a port of the node", () => !JSON.stringify(documents).includes('"hostPort"'));
+rule("nothing stands behind a Service", () => whole.every((d) => d.value.kind !== "Service"));
+rule("requests are limits, in whole cores, in patches too", () =>
+  everywhere.every((c) => c.resources) &&
+  documents.flatMap((d) => all_of(d.value.spec?.template?.spec)).filter((c) => c.resources).every((c) =>
+    same(c.resources.requests, c.resources.limits) && /^[1-9]\d*$/.test(c.resources.limits.cpu) && c.resources.limits.memory));
+rule("the server has two rights, and no others", () =>
+  ["doctor", "tendond"].every((name) => same(one(name).securityContext.capabilities, { drop: ["ALL"], add: ["SYS_NICE", "IPC_LOCK"] })));
+rule("the others have none, and are not root", () =>
+  everywhere.filter((c) => !["doctor", "tendond"].includes(c.name)).every((c) => same(c.securityContext.capabilities, { drop: ["ALL"] }) && c.securityContext.runAsNonRoot));
+rule("nobody gains rights, and nobody writes to the image", () =>
+  everywhere.every((c) => c.securityContext.allowPrivilegeEscalation === false && c.securityContext.readOnlyRootFilesystem === true));
+rule("nobody is privileged, and nobody sees the host's files", () =>
+  !JSON.stringify(documents).includes('"privileged":true') && !JSON.stringify(documents).includes('"hostPath"'));
+rule("a device comes by name", () =>
+  documents.some((d) => d.patch && JSON.stringify(d.value).includes('"tendon.dev/falcon":"1"')));
+rule("a server is replaced by hand only", () => server.spec.updateStrategy.type === "OnDelete");
+rule("nobody evicts a server", () => {
+  const budget = find_one("PodDisruptionBudget", "server").spec;
+  return budget.maxUnavailable === 0 && same(budget.selector.matchLabels, server.spec.template.metadata.labels);
+});
+rule("a server stands above batch work", () => find_one("PriorityClass", pod.priorityClassName).value >= 1000000);
+rule("a server has 30 s to let go", () => pod.terminationGracePeriodSeconds === 30);
+rule("no probe restarts a server under a hand", () => !JSON.stringify(documents).includes("livenessProbe"));
+rule("the dashboard says whether the server is ready", () => one("dash").readinessProbe.httpGet.path === "/metrics");
+rule("the doctor looks first", () => same(pod.initContainers[0].command.slice(0, 2), ["tendond", "doctor"]));
+rule("keys are a secret", () =>
+  pod.volumes.find((v) => v.name === "keys").secret.secretName === "tendon-keys" &&
+  everywhere.flatMap((c) => c.volumeMounts ?? []).every((m) => m.name !== "keys" || m.readOnly === true));
+rule("recordings have a bound", () => Boolean(pod.volumes.find((v) => v.name === "recordings").emptyDir.sizeLimit));
+rule("no pod may talk to the cluster", () =>
+  [pod, engine.spec.template.spec].every((spec) => spec.automountServiceAccountToken === false));
+rule("an engine listens nowhere", () => all_of(engine.spec.template.spec).every((c) => c.ports === undefined));
+rule("there is one engine at a time", () => engine.spec.replicas === 1 && engine.spec.strategy.type === "Recreate");
+rule("every volume that is mounted is there", () =>
+  [pod, engine.spec.template.spec].every((spec) =>
+    all_of(spec).flatMap((c) => c.volumeMounts ?? []).every((m) => spec.volumes.some((v) => v.name === m.name))));
+
+// ---- Programs and their options are those of this tree --------------------------------------------------------------
+
+let asked = 0;
+if (programs !== "") {
+  const helps = new Map();
+  const help_of = (command) => {
+    const sub = /^[a-z]+$/.test(command[1]) ? [command[1]] : [];
+    const key = [command[0], ...sub].join(" ");
+    if (!helps.has(key)) helps.set(key, execFileSync(join(programs, command[0]), [...sub, "--help"], { encoding: "utf8" }));
+    return helps.get(key);
+  };
+  const commands = documents.flatMap(({ file, value }) =>
+    all_of(value.spec?.template?.spec).filter((c) => c.command).map((c) => ({ file, command: c.command })));
+  for (const { file, command } of commands) {
+    if (!existsSync(join(programs, command[0]))) {
+      fault(file, `${command[0]} is no program of this tree`);
+      continue;
+    }
+    for (const option of command.filter((word) => word.startsWith("--"))) {
+      asked += 1;
+      if (!help_of(command).includes(option)) fault(file, `${command[0]} has no option ${option}`);
+    }
+  }
+}
+
+for (const line of faults) console.log(line);
+console.log(
+  `${documents.length} documents of ${kustomizations.length} kustomizations, ${asked} options of programs: ` +
+    (faults.length === 0 ? "as they have to be" : `${faults.length} faults`),
+);
+process.exit(faults.length === 0 ? 0 : 1);
