@@ -281,9 +281,9 @@ std::unique_ptr<Friction> friction_of(const BodyConfig& config) {
 }
 
 /// m: how deep the patch may be pressed before the material turns anywhere by more than Body::kLargestTurn.
-double linear_limit(const Solid& solid, const TouchSurface& surface, const Patch& patch) {
+double linear_limit(const Solid& solid, const TouchSurface& surface, const Patch& patch, const Solver& solver) {
   const VectorXd load = solid.to_free(patch_load(solid, surface.normal(), patch));
-  const VectorXd per_newton = LinearModel(solid, surface).displacements(patch);
+  const VectorXd per_newton = solver.solve(load);
   const double depth = 1e-6 * surface.radius();  // so small that the rotation is proportional to it
   VectorXd u = VectorXd::Zero(solid.size());
   solid.add_free(depth / load.dot(per_newton) * per_newton, u);
@@ -461,27 +461,30 @@ Reaction Body::settle(Given given, double value) {
   return softbody::settle(parts_->model, parts_->patch, given, value);
 }
 
-SurfaceTable condense(const BodyConfig& config) {
+SurfaceTable condense(const BodyConfig& config, const std::function<std::unique_ptr<Solver>(const Solid&)>& solver_of) {
   if (config.model != ModelKind::kCondensed) throw std::invalid_argument("only the model \"condensed\" has a table");
   BodyConfig anew = config;
   anew.table_file.reset();
   anew.tool = BodyConfig::Tool::kPatch;
   const Solid solid = solid_of(checked(anew));
   const TouchSurface surface(solid.mesh(), anew.towards_tool, anew.patch_radius);
-  CondensedModel model(solid, surface, touchable(anew, surface));
+  const Patch patch = middle_patch(surface, anew.middle);
+  const std::unique_ptr<Solver> solver = solver_of(solid);
+  const std::vector<int> nodes = touchable(anew, surface);
+  CondensedModel model(solid.mesh().nodes.size(), nodes, surface_compliance(solid, surface.normal(), nodes, *solver));
   return {.body = digest_of(solid, surface.normal()),
           .patch_radius = anew.patch_radius,
-          .stiffness = stiffness_under(model, middle_patch(surface, anew.middle)),
-          .linear_up_to = linear_limit(solid, surface, middle_patch(surface, anew.middle)),
+          .stiffness = stiffness_under(model, patch),
+          .linear_up_to = linear_limit(solid, surface, patch, *solver),
           .middle = surface.across(anew.middle),
-          .nodes = model.nodes(),
+          .nodes = nodes,
           .compliance = model.table()};
 }
 
 double Body::linear_up_to() const {
   if (parts_->knows_turns) return std::numeric_limits<double>::infinity();
   if (parts_->made.linear_up_to) return *parts_->made.linear_up_to;
-  return linear_limit(parts_->solid, parts_->surface, parts_->patch);
+  return linear_limit(parts_->solid, parts_->surface, parts_->patch, *with_factor(parts_->solid));
 }
 
 double Body::step() const noexcept { return parts_->model.step(); }

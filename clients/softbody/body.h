@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <initializer_list>
 #include <memory>
 #include <optional>
@@ -16,6 +17,7 @@
 #include "clients/softbody/effects/cutting.h"
 #include "clients/softbody/effects/effects.h"
 #include "clients/softbody/fem/material.h"
+#include "clients/softbody/models/linear.h"
 #include "clients/softbody/models/plasticity.h"
 #include "clients/softbody/models/quasi_static.h"
 #include "clients/softbody/models/stiffening.h"
@@ -156,8 +158,10 @@ Vec3 lowest_of_tool(const BodyConfig& config, const Mat3& turn);
 /// The effects that `config` simulates, including those of its model.
 EffectSet effects_of(const BodyConfig& config);
 
-/// The table of a kCondensed body, to be kept in a file. Throws what Body throws.
-SurfaceTable condense(const BodyConfig& config);
+/// The table of a kCondensed body, to be kept in a file. `solver` says how the body is solved: on this machine
+/// (with_factor), or on many (mpi/spread_solver.h). Throws what Body throws, and what the solver throws.
+SurfaceTable condense(const BodyConfig& config,
+                      const std::function<std::unique_ptr<Solver>(const Solid&)>& solver = with_factor);
 
 /// Mesh, model and contact of one body, built from a BodyConfig. Thread-safe: no. Realtime-safe: no.
 class Body {

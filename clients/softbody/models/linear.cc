@@ -125,33 +125,50 @@ MatrixXd compliance_of(const Solid& solid, const std::vector<int>& nodes) {
   return 0.5 * (compliance + compliance.transpose());
 }
 
-CondensedModel::CondensedModel(const Solid& solid, const TouchSurface& surface, const std::vector<int>& nodes)
-    : nodes_(nodes), row_of_(solid.mesh().nodes.size(), -1) {
-  const Factor factor = factor_of(stiffness_of(solid, {}));
-  const auto count = static_cast<Eigen::Index>(nodes_.size());
-  for (Eigen::Index i = 0; i < count; ++i) row_of_[at(nodes_[static_cast<std::size_t>(i)])] = static_cast<int>(i);
-  table_.resize(count, count);
+namespace {
+
+class FactorSolver : public Solver {
+ public:
+  explicit FactorSolver(const Solid& solid) : factor_(factor_of(stiffness_of(solid, {}))) {}
+  MatrixXd solve(const MatrixXd& loads) const override { return factor_.solve(loads); }
+
+ private:
+  Factor factor_;
+};
+
+}  // namespace
+
+std::unique_ptr<Solver> with_factor(const Solid& solid) { return std::make_unique<FactorSolver>(solid); }
+
+MatrixXd surface_compliance(const Solid& solid, const Vec3& normal, const std::vector<int>& nodes,
+                            const Solver& solver) {
+  const auto count = static_cast<Eigen::Index>(nodes.size());
+  MatrixXd table(count, count);
   for (Eigen::Index first = 0; first < count; first += kAtOnce) {
     const Eigen::Index some = std::min(kAtOnce, count - first);
     MatrixXd loads(solid.free_count(), some);
     for (Eigen::Index j = 0; j < some; ++j) {
       Patch alone;
-      alone.nodes = {nodes_[static_cast<std::size_t>(first + j)]};
+      alone.nodes = {nodes[static_cast<std::size_t>(first + j)]};
       alone.weights = VectorXd::Ones(1);
-      loads.col(j) = solid.to_free(patch_load(solid, surface.normal(), alone));
+      loads.col(j) = solid.to_free(patch_load(solid, normal, alone));
     }
     // The functional that reads the depth is the one that wrote the load, so the table is symmetric.
-    const MatrixXd solution = factor.solve(loads);
+    const MatrixXd solution = solver.solve(loads);
     for (Eigen::Index j = 0; j < some; ++j) {
       VectorXd all = VectorXd::Zero(solid.size());
       solid.add_free(solution.col(j), all);
       for (Eigen::Index i = 0; i < count; ++i) {
-        table_(i, first + j) = -surface.normal().dot(all.segment<3>(3 * nodes_[static_cast<std::size_t>(i)]));
+        table(i, first + j) = -normal.dot(all.segment<3>(3 * nodes[static_cast<std::size_t>(i)]));
       }
     }
   }
-  table_ = 0.5 * (table_ + table_.transpose()).eval();
+  return 0.5 * (table + table.transpose());
 }
+
+CondensedModel::CondensedModel(const Solid& solid, const TouchSurface& surface, const std::vector<int>& nodes)
+    : CondensedModel(solid.mesh().nodes.size(), nodes,
+                     surface_compliance(solid, surface.normal(), nodes, *with_factor(solid))) {}
 
 CondensedModel::CondensedModel(std::size_t mesh_nodes, std::vector<int> nodes, MatrixXd table)
     : nodes_(std::move(nodes)), row_of_(mesh_nodes, -1), table_(std::move(table)) {

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <memory>
+
 #include "clients/softbody/effects/effects.h"
 #include "clients/softbody/fem/solid.h"
 #include "clients/softbody/models/model.h"
@@ -43,6 +45,24 @@ MatrixXd compliance_of(const Solid& solid, const std::vector<int>& nodes);
 
 /// The reaction of a linear body, from the depth of each node of the patch under 1 N on the patch.
 Reaction linear_reaction(const Patch& patch, const VectorXd& depth_per_newton, Given given, double value);
+
+/// K u = f of a linear body: forces on its free components (N; a column each) to their displacements (m).
+class Solver {
+ public:
+  Solver() = default;
+  virtual ~Solver() = default;
+  Solver(const Solver&) = delete;
+  Solver& operator=(const Solver&) = delete;
+
+  virtual MatrixXd solve(const MatrixXd& loads) const = 0;
+};
+
+/// By a Cholesky factor on this machine. Throws std::runtime_error when the solid is not held fast.
+std::unique_ptr<Solver> with_factor(const Solid& solid);
+
+/// G of CondensedModel, m/N, symmetric: rows and columns in the order of `nodes`. One solution for each node.
+MatrixXd surface_compliance(const Solid& solid, const Vec3& normal, const std::vector<int>& nodes,
+                            const Solver& solver);
 
 /// The same answers from a table G: how far each touchable node gives way along the normal when another node is pushed
 /// with 1 N (a discrete Green's function; James & Pai 1999). An answer is wᵀ G w over the patch, so the inside of the

@@ -1,0 +1,134 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// tendon-fem under mpirun, against the engine of one process.
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/wait.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <string>
+#include <thread>
+
+#include "clients/softbody/scene.h"
+#include "tests/server/scratch_folder.h"
+
+namespace tendon::softbody {
+namespace {
+
+std::string contents(const std::filesystem::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+class Fem : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    for (const char* name : {"OMPI_ALLOW_RUN_AS_ROOT", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "OMP_NUM_THREADS",
+                             "OMPI_MCA_mpi_yield_when_idle"}) {
+      setenv(name, "1", 1);  // NOLINT(concurrency-mt-unsafe): one thread
+    }
+  }
+  std::string path(const std::string& name) const { return (scratch_.path() / name).string(); }
+  /// B1 with n cells along its sides, of which the middle can be touched.
+  std::string scene(const std::string& element, int n, double poisson, const std::string& model = "condensed") const {
+    const std::string file = path("scene.toml");
+    std::ofstream(file) << "effects = [\"contact\"]\n[body]\nshape = \"block\"\nsize_mm = [100, 100, 50]\n"
+                        << "cells = [" << n << ", " << n << ", " << n / 2 << "]\nelement = \"" << element
+                        << "\"\nmaterial = { young_pa = 10000, poisson = " << poisson << " }\n[model]\nkind = \""
+                        << model << "\"\n[touch]\npatch_radius_mm = 20\nreach_mm = 5\n";
+    return file;
+  }
+  static std::string mpirun(int ranks) { return "mpirun --oversubscribe -n " + std::to_string(ranks) + " " TENDON_FEM; }
+  int condense_on(int ranks, const std::string& scene, const std::string& table, const std::string& before = "") const {
+    const std::string command =
+        before + mpirun(ranks) + " condense " + scene + " " + path(table) + " > " + path("said") + " 2>&1";
+    return std::system(command.c_str());  // NOLINT(concurrency-mt-unsafe): one thread
+  }
+  std::string said() const { return contents(path("said")); }
+
+  /// The largest difference, of the largest entry.
+  static double off(const SurfaceTable& table, const SurfaceTable& truth) {
+    return (table.compliance - truth.compliance).cwiseAbs().maxCoeff() / truth.compliance.maxCoeff();
+  }
+
+ private:
+  tendon::testing::ScratchFolder scratch_;
+};
+
+TEST_F(Fem, OneRankAndTwoMakeTheTableOfOneProcess) {
+  struct Body {
+    const char* element;
+    int n;
+    double poisson;
+  };
+  for (const Body& body :
+       {Body{"hex27", 4, 0.45}, Body{"hex8-sri", 8, 0.45}, Body{"tet4", 8, 0.3}, Body{"hex27-sri", 4, 0.499}}) {
+    const std::string file = scene(body.element, body.n, body.poisson);
+    const SurfaceTable truth = condense(read_scene(file).body);
+    for (const int ranks : {1, 2}) {
+      ASSERT_EQ(condense_on(ranks, file, "t.table"), 0) << said();
+      const SurfaceTable table = read_table(path("t.table"));
+      EXPECT_LT(off(table, truth), 1e-9) << body.element << " on " << ranks;
+      EXPECT_NEAR(table.stiffness / truth.stiffness, 1, 1e-9) << body.element << " on " << ranks;
+      EXPECT_NEAR(table.linear_up_to / truth.linear_up_to, 1, 1e-7) << body.element << " on " << ranks;
+      EXPECT_EQ(table.body, truth.body);
+    }
+  }
+}
+
+TEST_F(Fem, ABodyAnswersFromATableOfTwoRanks) {
+  BodyConfig config = read_scene(scene("hex27", 4, 0.45)).body;
+  ASSERT_EQ(condense_on(2, path("scene.toml"), "t.table"), 0) << said();
+  Body made(config);
+  config.table_file = path("t.table");
+  Body read(config);
+  EXPECT_NEAR(read.press(Given::kDepth, 0.002).force / made.press(Given::kDepth, 0.002).force, 1, 1e-9);
+}
+
+TEST_F(Fem, AsManyRanksGiveTheSameBytes) {
+  const std::string file = scene("hex8-sri", 8, 0.45);
+  ASSERT_EQ(condense_on(2, file, "one.table"), 0) << said();
+  ASSERT_EQ(condense_on(2, file, "two.table"), 0) << said();
+  EXPECT_EQ(contents(path("one.table")), contents(path("two.table")));
+}
+
+TEST_F(Fem, AnotherSolverIsChosenByTheEnvironment) {
+  const std::string file = scene("hex8-sri", 8, 0.45);
+  const SurfaceTable truth = condense(read_scene(file).body);
+  ASSERT_EQ(condense_on(2, file, "cg.table", "PETSC_OPTIONS='-ksp_type cg -pc_type gamg -ksp_rtol 1e-10' "), 0)
+      << said();
+  const SurfaceTable table = read_table(path("cg.table"));
+  EXPECT_LT(off(table, truth), 1e-7);
+  EXPECT_NE(table.compliance, truth.compliance) << "it was another one";
+}
+
+TEST_F(Fem, ASolverThatDoesNotConvergeMakesNoTable) {
+  const std::string file = scene("hex8-sri", 8, 0.45);
+  EXPECT_NE(condense_on(2, file, "no.table", "PETSC_OPTIONS='-ksp_type cg -pc_type none -ksp_max_it 2' "), 0);
+  EXPECT_NE(said().find("tendon-fem: PETSc: the solver did not converge"), std::string::npos) << said();
+  EXPECT_FALSE(std::filesystem::exists(path("no.table")));
+}
+
+TEST_F(Fem, RefusesASceneOfAnotherModelInOneSentence) {
+  EXPECT_NE(condense_on(2, scene("hex8-sri", 4, 0.45, "linear"), "no.table"), 0);
+  const std::string text = said();
+  const auto at = text.find("tendon-fem: only the model \"condensed\" has a table");
+  EXPECT_NE(at, std::string::npos) << text;
+  EXPECT_EQ(text.find("tendon-fem:", at + 1), std::string::npos) << "said once";
+}
+
+TEST_F(Fem, ARankThatIsKilledLeavesNoTable) {
+  const std::string file = scene("hex27", 12, 0.45);
+  const std::string command = mpirun(2) + " condense " + file + " " + path("killed.table") + " > /dev/null 2>&1 & " +
+                              "for i in $(seq 100); do pid=$(pgrep -n -f \"^" TENDON_FEM " condense " + file +
+                              "\") && [ $(pgrep -c -f \"^" TENDON_FEM " condense " + file +
+                              "\") = 2 ] && kill -9 $pid && break; sleep 0.05; done; wait $!";
+  EXPECT_NE(std::system(command.c_str()), 0);  // NOLINT(concurrency-mt-unsafe): one thread
+  EXPECT_FALSE(std::filesystem::exists(path("killed.table")));
+}
+
+}  // namespace
+}  // namespace tendon::softbody
