@@ -19,8 +19,10 @@ constexpr double kThriftFrom = 0.4;
 constexpr double kThriftOver = 0.4;
 constexpr double kDamperFrom = 0.3;
 constexpr double kDamperOver = 0.4;
+constexpr double kStiffEnough = 0.3;   // of shaping's stiffness
 constexpr double kOldAnswer = 0.01;    // s: behind an answer of this age the damper is whole
 constexpr double kSlowHand = 2e-3;     // m/s, below which the direction of motion means little
+constexpr double kMostDamping = 1;     // of the force that is damped
 constexpr double kDamperMemory = 0.3;  // s, for which the damper's debt is remembered
 constexpr double kCountsAhead = 4;     // counts that a growing force has to be able to pay
 constexpr double kEuler = 2.718281828459045;
@@ -374,14 +376,26 @@ double AolPlus<Blocks, Size>::grow(double size, double budget) const noexcept {
   return std::min(1.0, std::max(most, friction_[0].coulomb) / size);
 }
 
+/// How stiff the contact is, of the stiffness from which on a late answer needs all of the damper.
+template <int Blocks, int Size>
+double AolPlus<Blocks, Size>::stiff(std::size_t block) const noexcept {
+  if (!parts_.energy_cap || !parts_.shaping) return 1;
+  const int at = static_cast<int>(block) * Size;
+  const double travel = travel_.template segment<Size>(at).norm();
+  const double force = last_wanted_.template segment<Size>(at).norm();
+  const double enough = kStiffEnough * parts_.shaping->stiffness[block] * travel;
+  return force < enough ? force / enough : 1;
+}
+
 /// D, for a contact that shows `force`.
 template <int Blocks, int Size>
 auto AolPlus<Blocks, Size>::damping(const Vec<kSize>& force, double near, Duration age) const noexcept -> Vec<kSize> {
   Vec<kSize> damping = Vec<kSize>::Zero();
   const Damper& damper = *parts_.damper;
-  const double needed = std::clamp(std::max((near - kDamperFrom) / kDamperOver, seconds(age) / kOldAnswer), 0.0, 1.0);
-  const double active = needed * std::max(0.0, 1 - damper_owes_ / damper.most_owed);
-  if (active == 0) return damping;
+  const double close = (near - kDamperFrom) / kDamperOver;
+  const double late = seconds(age) / kOldAnswer;
+  const double left = std::max(0.0, 1 - damper_owes_ / damper.most_owed);
+  if (left == 0 || std::max(close, late) <= 0) return damping;
   for (int i = 0; i < Blocks; ++i) {
     const auto block = static_cast<std::size_t>(i);
     const Vec<Size> slow = slow_.template segment<Size>(i * Size);
@@ -394,9 +408,10 @@ auto AolPlus<Blocks, Size>::damping(const Vec<kSize>& force, double near, Durati
       quiet = damper.dead_zone * step / (kEuler * smoothing_ * (1 + counts * counts));
     }
     if (speed <= quiet) continue;
+    const double active = left * std::clamp(std::max(close, late * stiff(block)), 0.0, 1.0);
     const double size = force.template segment<Size>(i * Size).norm();
-    damping.template segment<Size>(i * Size) =
-        damper.viscous[block] * active * (1 - quiet / speed) * size / (size + damper.contact[block]) * fast;
+    const double wanted = damper.viscous[block] * active * (1 - quiet / speed) * size / (size + damper.contact[block]);
+    damping.template segment<Size>(i * Size) = std::min(wanted, kMostDamping * size / speed) * fast;
   }
   return damping;
 }

@@ -75,11 +75,13 @@ namespace tendon {
 /// **damper** For the hand that rings on a late or a clipped spring: a damper on fast motion, blind to counts, in contact
 /// only, behind the clip. With the velocity v of the interval, the filters and the force of one group of coordinates
 ///     u₁ ← u₁ + (T/τ_v)(v − u₁),   u ← u + (T/τ_v)(u₁ − u),   s ← s + (T/τ_h)(u − s),   w = u − s       m/s
-///     D = B h (1 − O/O_most)₊ (1 − v_q/‖w‖)₊ ‖F₁‖/(‖F₁‖ + f_s) w                                        N
+///     D = min(B h (1 − O/O_most)₊ (1 − v_q/‖w‖)₊ ‖F₁‖/(‖F₁‖ + f_s), ‖F₁‖/‖w‖) w                         N
 ///     v_q = z Δ/(e τ_v) / (1 + (‖s‖ τ_v/Δ)²)                                                            m/s
-///     h = clamp(max((‖F_wanted‖/f_γ − 0.3)/0.4, age/10 ms), 0, 1): none where a fresh answer is shown well inside
-///                                                                 the bound
+///     h = clamp(max((‖F_wanted‖/f_γ − 0.3)/0.4, age/10 ms · min(1, k/(0.3 K_s))), 0, 1)
+///     k = ‖F_wanted‖/‖travel since the contact began‖ with energy_cap and shaping, else ∞                 N/m
 ///     O ← max(0, O − O T/0.3 s − D_held·Δx + (Δ/2)‖D_held − D_before‖₁)                                 J
+/// None is needed where a fresh answer is shown well inside the bound. A late spring gives the hand −k · age N·s/m, so a
+/// soft one needs little. And a damper never turns a force round: a hand that is drawn out is not held.
 /// Δ/(e τ_v) is the height of the pulse that one lone count Δ makes behind the two filters; where counts come faster
 /// than the filters forget them, pulses run together and only a ripple is left. A count costs the robust ledger the
 /// variation of the damper's force times Δ/2, which is B Δ²/(e τ_v), and friction pays f_c Δ: without the dead zone (z
@@ -208,6 +210,7 @@ class AolPlus {
   double shaped_share(const Vec<kSize>& force, double budget) const noexcept;
   double give_back(const Vec<kSize>& force, double size, double near, double budget) const noexcept;
   double grow(double size, double budget) const noexcept;
+  double stiff(std::size_t block) const noexcept;
   Vec<kSize> damping(const Vec<kSize>& force, double near, Duration age) const noexcept;
   void shape(Duration age, double near, double budget, LimitedForce<kSize>& result) noexcept;
   void use(std::size_t block, const Friction& friction) noexcept;

@@ -161,6 +161,46 @@ TEST(Damper, IsOffInFreeSpaceAndWhereAFreshAnswerIsShownWell) {
   EXPECT_TRUE(old.reasons.has(Reason::kDamped));
 }
 
+TEST(Damper, NeverTurnsAForceRoundNorMoreThanDoublesIt) {
+  for (const double speed : {-0.4, 0.4}) {  // drawn out, pushed in
+    AolPlus<1> law(with_damper(0));
+    law.credit(0.05);
+    Vec<1> applied = Vec<1>::Zero();
+    double least = 0;
+    double largest = -10;
+    for (int n = 0; n < 60; ++n) {
+      law.observe({.applied = applied, .dx = Vec<1>(n < 20 ? 0 : speed * 1e-3), .held = milliseconds(1)});
+      applied = law.limit({.force = Vec<1>(-0.5), .age = milliseconds(20)}).force;
+      least = std::min(least, applied[0]);
+      largest = std::max(largest, applied[0]);
+    }
+    EXPECT_LE(largest, 1e-12) << speed;
+    EXPECT_GE(least, -1 - 1e-12) << speed;
+    EXPECT_NEAR(speed < 0 ? largest : least, speed < 0 ? 0 : -1, 1e-9) << "it would have taken more";
+  }
+}
+
+TEST(Damper, ASoftLateSpringIsDampedLessThanAStiffOne) {
+  const auto taken = [](double stiffness) {
+    auto config = with_damper(0);
+    config.parts.energy_cap = {{.energy = 1, .most_contact = 1}};
+    config.parts.shaping = {{.stiffness = {1500}}};
+    AolPlus<1> law(config);
+    law.credit(0.05);
+    Vec<1> applied = Vec<1>::Zero();
+    double x = 0;
+    for (int n = 0; n < 200; ++n) {  // 10 mm in, and there a step of 10 mm/s
+      const double dx = n < 100 ? 1e-4 : 1e-5;
+      law.observe({.applied = applied, .dx = Vec<1>(n == 101 ? 4e-5 : dx), .held = milliseconds(1)});
+      x += dx;
+      applied = law.limit({.force = Vec<1>(-stiffness * x), .age = milliseconds(10)}).force;
+      if (n == 104) break;
+    }
+    return std::abs(applied[0] + stiffness * x) / (stiffness * x / (stiffness * x + 0.1));
+  };
+  EXPECT_LT(taken(45), 0.15 * taken(450)) << "a tenth of the stiffness from which on it is whole";
+}
+
 TEST(FadingContact, KeepsForAWhileWhatAContactHadPutIn) {
   const auto left_after = [](bool fading, int pause_ms) {
     auto config = device(milliseconds(1), 0.26, 0.02);
