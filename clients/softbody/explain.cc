@@ -14,7 +14,7 @@ namespace {
 
 constexpr double kWay = 0.003;  // m
 constexpr int kAnswers = 40;    // there and back
-constexpr int kMostRounds = 4;
+constexpr int kMostTurns = 4;
 constexpr double kEnough = 3;       // s: no further round after so much processor time
 constexpr double kInterval = 0.01;  // s, between two answers
 
@@ -120,7 +120,7 @@ Explanation explain(const Scene& scene, const std::function<double()>& processor
   std::vector<Explanation::Cost> least(bodies.size(), {std::numeric_limits<double>::infinity(), 0});
   const Mat3 turn = to_device(scene).transpose();
   const double start = processor_time();
-  for (int round = 0; round < kMostRounds && (round == 0 || processor_time() - start < kEnough); ++round) {
+  for (int round = 0; round < kMostTurns && (round == 0 || processor_time() - start < kEnough); ++round) {
     for (std::size_t i = 0; i < bodies.size(); ++i) {
       const Explanation::Cost cost = press_and_come_back(bodies[i], turn, processor_time);
       least[i] = {std::min(least[i].answer_s, cost.answer_s), cost.bytes};

@@ -15,7 +15,7 @@ namespace tendon::softbody {
 namespace {
 
 constexpr double kPrecision = 1e-7;
-constexpr Eigen::Index kMostRounds = 1000;
+constexpr Eigen::Index kMostRestarts = 1000;
 
 /// With y = M^½ x the problem is symmetric, M^−½ K M^−½ y = ω² y, and its inverse gives the slowest modes first.
 template <class Apply>
@@ -39,7 +39,7 @@ Spectra::SymEigsSolver<Operator<Apply>> largest(Operator<Apply>& op, int count) 
   const auto size = op.rows();
   Spectra::SymEigsSolver<Operator<Apply>> solver(op, count, std::min<Eigen::Index>(size, std::max(2 * count, 20)));
   solver.init();
-  if (solver.compute(Spectra::SortRule::LargestAlge, kMostRounds, kPrecision) < count) {
+  if (solver.compute(Spectra::SortRule::LargestAlge, kMostRestarts, kPrecision) < count) {
     throw std::runtime_error("the swings of the body were not found: Lanczos' method did not converge");
   }
   return solver;

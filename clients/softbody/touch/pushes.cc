@@ -11,7 +11,7 @@ namespace {
 /// In the first rounds all wrong nodes change sides. That may go round in circles; in later rounds only the most wrong
 /// node changes, so the energy falls in every round and the search is sure to end (Lawson & Hanson 1974).
 constexpr int kQuickRounds = 20;
-constexpr int kMostRounds = 1000;
+constexpr int kMostSweeps = 1000;
 
 }  // namespace
 
@@ -21,7 +21,7 @@ Pushes least_pushes(const MatrixXd& table, const VectorXd& depth, std::vector<bo
   const double nothing = 1e-12 * depth.maxCoeff();
   Pushes found;
   auto& [set, push, factor] = found;
-  for (int round = 0; round < kMostRounds; ++round) {
+  for (int round = 0; round < kMostSweeps; ++round) {
     set.clear();
     for (Eigen::Index i = 0; i < count; ++i) {
       if (active[static_cast<std::size_t>(i)]) set.push_back(i);

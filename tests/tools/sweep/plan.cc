@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <fstream>
-#include <iterator>
 #include <nlohmann/json.hpp>
 #include <span>
 #include <stdexcept>
@@ -13,12 +12,6 @@
 
 namespace tendon::sweep {
 namespace {
-
-std::string whole_file(const std::filesystem::path& file) {
-  std::ifstream in(file, std::ios::binary);
-  if (!in) throw std::runtime_error(file.string() + ": cannot be read");
-  return {std::istreambuf_iterator<char>(in), {}};
-}
 
 std::string text_of(const Plan& plan) {
   nlohmann::ordered_json json;
@@ -56,7 +49,7 @@ void write_plan(const std::filesystem::path& folder, const Plan& plan) {
 Plan read_plan(const std::filesystem::path& folder) {
   const std::filesystem::path file = folder / "plan.json";
   try {
-    const auto json = nlohmann::json::parse(whole_file(file));
+    const auto json = nlohmann::json::parse(contents_of(file));
     Plan plan{
         .program = json.at("program").get<std::string>(),
         .sha256 = json.at("sha256"),
@@ -73,7 +66,7 @@ Plan read_plan(const std::filesystem::path& folder) {
 }
 
 std::string sha256_of(const std::filesystem::path& file) {
-  const std::string bytes = whole_file(file);
+  const std::string bytes = contents_of(file);
   std::string text;
   for (const std::byte byte : crypto::sha256({std::as_bytes(std::span(bytes))})) {
     constexpr std::string_view kDigits = "0123456789abcdef";

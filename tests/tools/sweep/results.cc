@@ -78,18 +78,18 @@ void sync_folder(const std::filesystem::path& folder) {
   close(file);
 }
 
-std::string whole_file(const std::filesystem::path& file) {
-  std::ifstream in(file, std::ios::binary);
-  if (!in) throw std::runtime_error(file.string() + ": cannot be read");
-  return {std::istreambuf_iterator<char>(in), {}};
-}
-
 std::string six_digits(std::uint64_t shard) {
   const std::string number = std::to_string(shard);
   return std::string(number.size() < 6 ? 6 - number.size() : 0, '0') + number;
 }
 
 }  // namespace
+
+std::string contents_of(const std::filesystem::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  if (!in) throw std::runtime_error(file.string() + ": cannot be read");
+  return {std::istreambuf_iterator<char>(in), {}};
+}
 
 std::filesystem::path result_file(const std::filesystem::path& folder, std::uint64_t shard) {
   return folder / "done" / (six_digits(shard) + ".json");
@@ -108,7 +108,7 @@ Kept keep(const std::filesystem::path& file, std::string_view text) {
     sync_folder(file.parent_path());
     return Kept::kNew;
   }
-  return whole_file(file) == text ? Kept::kSame : Kept::kOther;
+  return contents_of(file) == text ? Kept::kSame : Kept::kOther;
 }
 
 Kept keep_result(const std::filesystem::path& folder, std::uint64_t shard, std::string_view text) {
@@ -124,7 +124,7 @@ Kept keep_result(const std::filesystem::path& folder, std::uint64_t shard, std::
 std::optional<std::string> result_of(const std::filesystem::path& folder, const Plan& plan, std::uint64_t shard) {
   const std::filesystem::path file = result_file(folder, shard);
   if (!std::filesystem::exists(file)) return std::nullopt;
-  std::string text = whole_file(file);
+  std::string text = contents_of(file);
   try {
     end_of(text, plan.shard(shard));
   } catch (const std::invalid_argument& error) {

@@ -31,6 +31,9 @@ enum class Kept : std::uint8_t {
 /// Gives `file` this text, all of it or none, and never in place of another. Whoever sees the file sees it synced.
 Kept keep(const std::filesystem::path& file, std::string_view text);
 
+/// All of a file. Throws std::runtime_error, naming it.
+std::string contents_of(const std::filesystem::path& file);
+
 /// What a shard printed becomes its result. kOther: it is kept beside, as .differs.
 Kept keep_result(const std::filesystem::path& folder, std::uint64_t shard, std::string_view text);
 
