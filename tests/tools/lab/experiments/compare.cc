@@ -101,6 +101,7 @@ std::string to_json(const Cell& cell, std::uint64_t seed) {
       .add("hf_velocity_m_s", o.late_vibration)
       .add("sensation_db", o.sensation)
       .add("noticed_share", o.noticed_share)
+      .add("stiffness_noticed", notices_stiffness(o.operational_stiffness, s.stiffness))
       .add("limited_share", o.limited_share)
       .add("latency_s", o.latency)
       .add("max_force_n", o.largest_force)

@@ -46,4 +46,9 @@ inline bool notices(const Vec3& felt, const Vec3& truth) noexcept {
   return truth.norm() >= kLeastJudged && (felt - truth).norm() > kForceWeber * truth.norm();
 }
 
+/// A hand tells the stiffness that it is shown (N/m) from the true one (> 0).
+inline bool notices_stiffness(double shown, double truth) noexcept {
+  return !(shown >= (1 - kStiffnessWeber) * truth && shown <= (1 + kStiffnessWeber) * truth);
+}
+
 }  // namespace tendon::lab

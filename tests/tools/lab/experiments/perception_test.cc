@@ -80,6 +80,14 @@ TEST(NoticedForce, IsOffByMoreThanAWeberFraction) {
   EXPECT_FALSE(notices(Vec3::Zero(), Vec3(0.4, 0, 0))) << "smaller forces are not judged";
 }
 
+TEST(NoticedStiffness, IsOffByMoreThanAWeberFraction) {
+  EXPECT_FALSE(notices_stiffness(390, 500));
+  EXPECT_FALSE(notices_stiffness(610, 500));
+  EXPECT_TRUE(notices_stiffness(380, 500));
+  EXPECT_TRUE(notices_stiffness(620, 500));
+  EXPECT_TRUE(notices_stiffness(std::nan(""), 500));
+}
+
 TEST(NoticedShare, IsThatOfTheMomentsWhichAreJudged) {
   std::vector<Moment> record(100);
   for (std::size_t i = 0; i < record.size(); ++i) {
