@@ -6,9 +6,9 @@
 #include <netinet/tcp.h>
 #include <signal.h>
 #include <sys/epoll.h>
-#include <sys/pidfd.h>
 #include <sys/prctl.h>
 #include <sys/socket.h>
+#include <sys/syscall.h>
 #include <sys/un.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -204,6 +204,7 @@ void Crew::launch(const std::string& secret) {
   if (files_->pid != 0) kill();
   secret_ = secret;
   reader_ = RecordReader();
+  ended_ = false;
   const std::string address = std::string(kAddressVariable) + "=" + address_;
   const std::string word = std::string(kSecretVariable) + "=" + secret;
   std::vector<const char*> environment;
@@ -233,7 +234,7 @@ void Crew::launch(const std::string& secret) {
     ::_exit(127);
   }
   files_->pid = pid;
-  files_->process = File(::pidfd_open(pid, 0));
+  files_->process = File(static_cast<int>(::syscall(SYS_pidfd_open, pid, 0)));
   if (!files_->process.is_open()) fail_with("pidfd_open");
   files_->watch(files_->process);
 }
@@ -267,9 +268,8 @@ void Crew::reap() {
 /// The worker is of no use any more. Only the first reason counts.
 void Crew::fail(const std::string& why) {
   files_->stream = File();
-  if (std::ranges::none_of(events_, [](const Event& event) { return std::holds_alternative<Ended>(event); })) {
-    events_.emplace_back(Ended{why});
-  }
+  secret_.clear();
+  if (!std::exchange(ended_, true)) events_.emplace_back(Ended{why});
 }
 
 void Crew::send(const Record& record) {

@@ -53,11 +53,8 @@ class Crew {
     std::string why;
   };
   using Event = std::variant<Opened, Record, Ended>;
-  /// The next thing that has happened; call it until it is empty.
+  /// The next thing that has happened; call it until it is empty. Of each program, one Ended.
   std::optional<Event> next();
-  /// Whether processes are being ended and next() is to be called soon, although the descriptor cannot be read.
-  bool ending() const noexcept { return ending_; }
-
   /// For poll(): readable when next() has something.
   int descriptor() const noexcept;
 
@@ -77,7 +74,8 @@ class Crew {
   std::unique_ptr<Files> files_;
   RecordReader reader_;
   std::vector<Event> events_;
-  bool ending_ = false;
+  bool ended_ = false;   ///< it has been said of the present program
+  bool ending_ = false;  ///< processes of earlier programs are left
 };
 
 }  // namespace tendon::worker

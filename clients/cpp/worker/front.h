@@ -47,17 +47,17 @@ class Front {
   struct Stats {
     Worker worker = Worker::kAbsent;
     std::uint64_t launches = 0;
-    std::uint64_t asked = 0;            ///< states that went to a worker
-    std::uint64_t answers = 0;          ///< in time
-    std::uint64_t unknown = 0;          ///< of these, without a force
-    std::uint64_t late = 0;             ///< not sent
-    std::uint64_t refused = 0;          ///< unusable answers, not sent
-    std::string_view why_refused{};     ///< the newest of them
-    std::uint64_t fallback = 0;         ///< answers of the fallback
-    double fallback_difference = 0;     ///< N, its last distance to an answer of the worker
-    std::uint64_t given_up = 0;         ///< workers
-    std::string why_given_up{};         ///< the last of them
-    Duration median{};                  ///< of the newest answers, late ones too
+    std::uint64_t asked = 0;         ///< states that went to a worker
+    std::uint64_t answers = 0;       ///< in time
+    std::uint64_t unknown = 0;       ///< of these, without a force
+    std::uint64_t late = 0;          ///< not sent
+    std::uint64_t refused = 0;       ///< unusable answers, not sent
+    std::string_view why_refused{};  ///< the newest of them
+    std::uint64_t fallback = 0;      ///< answers of the fallback
+    double fallback_difference = 0;  ///< N, its last distance to an answer of the worker
+    std::uint64_t given_up = 0;      ///< workers
+    std::string why_given_up{};      ///< the last of them
+    Duration median{};               ///< of the newest answers, late ones too
   };
 
   /// Throws std::invalid_argument "FIELD = VALUE: expected …". The first worker is due at once.
@@ -103,8 +103,8 @@ class Front {
 
   Config config_;
   Worker worker_ = Worker::kAbsent;
-  LocalTime due_;  ///< kAbsent: of the next launch; kStarting: the end of patience
-  Duration wait_;  ///< after the next failure
+  LocalTime due_;                          ///< kAbsent: of the next launch; kStarting: the end of patience
+  Duration wait_;                          ///< after the next failure
   std::optional<LocalTime> first_answer_;  ///< of this worker
   LocalTime asked_{};
   std::uint64_t sequence_ = 0;

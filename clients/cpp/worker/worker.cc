@@ -52,8 +52,8 @@ int connect_to_host(const std::string& name) {
     to.sin6_family = AF_INET6;
     to.sin6_port = htons(address.port);
     std::memcpy(&to.sin6_addr, address.ip.data(), address.ip.size());
-    const int socket = connected(::socket(AF_INET6, SOCK_STREAM | SOCK_CLOEXEC, 0),
-                                 reinterpret_cast<const sockaddr*>(&to), sizeof to);
+    const int socket =
+        connected(::socket(AF_INET6, SOCK_STREAM | SOCK_CLOEXEC, 0), reinterpret_cast<const sockaddr*>(&to), sizeof to);
     if (socket < 0) continue;
     const int yes = 1;
     ::setsockopt(socket, IPPROTO_TCP, TCP_NODELAY, &yes, sizeof yes);
