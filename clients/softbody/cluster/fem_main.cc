@@ -138,6 +138,7 @@ int run_command(int argc, char** argv) {
       "(`tendon-fem serve --help`); the others prepare that.",
       "tendon-fem");
   app.require_subcommand(1);
+  app.set_version_flag("--version", TENDON_VERSION);
   Arguments arguments;
   app.add_subcommand("serve", "Answers the hand by workers that it starts, asks and replaces when they die");
   CLI::App* const condenses = app.add_subcommand("condense", "Makes the table of a scene on many machines");

@@ -141,6 +141,7 @@ int main(int argc, char** argv) {
       "A soft body on as many ranks as MPI is started on, as tendon-fem starts them: with SCENE alone it answers the "
       "front that the environment names.",
       "tendon-fem-worker");
+  app.set_version_flag("--version", TENDON_VERSION);
   Arguments arguments;
   const auto add_common = [&](CLI::App& to) {
     to.add_option("SCENE", arguments.scene, "Scene file, with the model linear or condensed");
