@@ -11,7 +11,6 @@
 #include <vector>
 
 #include "clients/cpp/worker/stream.h"
-#include "core/base/time.h"
 
 namespace tendon::worker {
 

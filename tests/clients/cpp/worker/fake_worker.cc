@@ -47,7 +47,7 @@ int main(int argc, char** argv) {
       if (way == "stops") std::raise(SIGSTOP);
       if (way == "exits") return 7;
       if (way == "is-slow") ::usleep(120'000);
-      if (way == "sleeps") ::sleep(1000);
+      while (way == "sleeps") ::pause();
       if (way == "nan") touch.force.x() = std::numeric_limits<double>::quiet_NaN();
       if (way == "another-sequence") ++sequence;
       if (way == "babbles") {
