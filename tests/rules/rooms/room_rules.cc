@@ -138,6 +138,7 @@ const Names kClockReaders = {"server/machine/clock.h",
                              "tests/tools/lab/experiments/meter.cc",
                              "tests/tools/injector/proxy/real_time.cc",
                              "tests/tools/conformance/udp_wire.cc",
+                             "tests/tools/conformance/worker_wire.cc",
                              "*_main.cc"};
 
 // ---- Reading --------------------------------------------------------------------------------------------------------
