@@ -5,26 +5,22 @@ from __future__ import annotations
 
 import json
 import os
-import shutil
-import socket
 import subprocess
 import sys
 import threading
+from contextlib import AbstractContextManager
 from dataclasses import replace
-from importlib.util import find_spec
 from math import inf, isnan
 from pathlib import Path
 from queue import Queue
 
 import pytest
 from conftest import ROOT
+from front import HAND, SECRET, Front, mpirun, running
 from processes import EXAMPLES, PATIENCE_S, PROGRAMS
 
-from tendon import Contact, DeviceState, ForceTable, Grip, Joints, Mode, Touch, Turning, codec, limits, worker
-from tendon.messages import ForceCommand
+from tendon import Contact, DeviceState, ForceTable, Grip, Joints, Touch, Turning, codec, limits, tendon_pb2, worker
 
-SECRET = "0123456789abcdef" * 4
-HAND = DeviceState(7, 12_000_000, (0.01, -0.02, 0.03), (0, 0, 0.5), (0, 0, 1), 0.25, 8, 0, 0, 0, Mode.ACTIVE)
 WHOLE_HAND = replace(
     HAND,
     tick=2**53 + 1,
@@ -44,58 +40,6 @@ WHOLE_HAND = replace(
     hand_force=(0.3, -0.4, 0.5),
     joints=Joints((0.1,) * 8, (0.01,) * 8),
 )
-
-
-class Front:
-    """What a front does on its end of the stream, byte by byte as clients/cpp/worker/stream.h says."""
-
-    def __init__(self, road: str, folder: Path) -> None:
-        if road == "unix":
-            self._listener = socket.socket(socket.AF_UNIX)
-            self._listener.bind(str(folder / "front"))
-            self.address = f"unix:{folder / 'front'}"
-        else:
-            self._listener = socket.socket()
-            self._listener.bind(("127.0.0.1", 0))
-            self.address = f"tcp:127.0.0.1:{self._listener.getsockname()[1]}"
-        self._listener.listen()
-        self._listener.settimeout(PATIENCE_S)
-        self.link = self._listener
-
-    def accept(self) -> tuple[int, bytes]:
-        """The first record of the worker that comes."""
-        self.link, _ = self._listener.accept()
-        self.link.settimeout(PATIENCE_S)
-        return self.read()
-
-    def read(self) -> tuple[int, bytes]:
-        length = int.from_bytes(self._take(4), "little")
-        record = self._take(length)
-        return int.from_bytes(record[:8], "little"), record[8:]
-
-    def say(self, sequence: int, body: bytes) -> None:
-        self.link.sendall((8 + len(body)).to_bytes(4, "little") + sequence.to_bytes(8, "little") + body)
-
-    def ask(self, sequence: int, hand: DeviceState) -> ForceCommand | None:
-        """The answer, once it is one to this question."""
-        self.say(sequence, codec.write_frame(hand))
-        answered, body = self.read()
-        assert answered == sequence
-        content = codec.read_data(body)
-        assert content is not None and content.invalid == 0 and len(content.frames) <= 1
-        return content.frames[0] if content.frames else None
-
-    def close(self) -> None:
-        self.link.close()
-        self._listener.close()
-
-    def _take(self, size: int) -> bytes:
-        taken = b""
-        while len(taken) < size:
-            piece = self.link.recv(size - len(taken))
-            assert piece, "the worker has ended the stream"
-            taken += piece
-        return taken
 
 
 @pytest.fixture(params=["unix", "tcp"])
@@ -129,33 +73,33 @@ class Running(threading.Thread):
 
 
 def test_the_stream_opens_with_the_secret_and_its_end_ends_the_worker(front):
-    running = Running(lambda hand: None)
+    thread = Running(lambda hand: None)
     assert front.accept() == (0, b"tendon worker 1\n" + SECRET.encode())
     front.close()
-    assert running.end() is None
+    assert thread.end() is None
 
 
 def test_every_part_of_a_state_reaches_the_answer(front):
     seen = []
-    running = Running(lambda hand: seen.append(hand))
+    thread = Running(lambda hand: seen.append(hand))
     front.accept()
     for sequence, hand in enumerate((HAND, WHOLE_HAND), 1):
         assert front.ask(sequence, hand) is None
     front.close()
-    assert running.end() is None
+    assert thread.end() is None
     assert seen == [HAND, WHOLE_HAND]
 
 
-def test_every_part_of_a_touch_reaches_the_front_with_the_tick_that_it_answers(front):
+def test_every_part_of_a_touch_reaches_the_front_with_its_tick(front):
     table = ForceTable(0, 0.001, (1, 2, 3))
     touch = Touch(
         (1, 2, 3), 400, 0.01, Contact((0, 0, 1), -0.002, table), True, 0.5, (0.1, 0, 0), (1, 2, 3), -2.5
     )
-    running = Running(lambda hand: touch)
+    thread = Running(lambda hand: touch)
     front.accept()
     command = front.ask(1, WHOLE_HAND)
     front.close()
-    assert running.end() is None
+    assert thread.end() is None
     assert (command.sequence, command.based_on_tick, command.force) == (1, 2**53 + 1, (1, 2, 3))
     assert 1 <= command.valid_for_us <= limits.MAX_VALID_FOR_US
     assert command.model.at == HAND.position
@@ -169,17 +113,17 @@ def test_every_part_of_a_touch_reaches_the_front_with_the_tick_that_it_answers(f
 
 def test_a_force_may_be_plain_numbers_and_none_is_no_force(front):
     answers = iter([[-5, 0, 0], None, (0, 0, 1)])
-    running = Running(lambda hand: next(answers))
+    thread = Running(lambda hand: next(answers))
     front.accept()
     assert front.ask(1, HAND).force == (-5, 0, 0)
     assert front.ask(2, HAND) is None
     assert front.ask(3, HAND).force == (0, 0, 1)
     front.close()
-    assert running.end() is None
+    assert thread.end() is None
 
 
 def test_a_state_may_come_byte_by_byte(front):
-    running = Running(lambda hand: (hand.position[0], 0, 0))
+    thread = Running(lambda hand: (hand.position[0], 0, 0))
     front.accept()
     body = codec.write_frame(WHOLE_HAND)
     for byte in (8 + len(body)).to_bytes(4, "little") + (1).to_bytes(8, "little") + body:
@@ -188,20 +132,18 @@ def test_a_state_may_come_byte_by_byte(front):
     assert sequence == 1
     assert codec.read_data(answer).frames[0].force == (0.01, 0, 0)
     front.close()
-    assert running.end() is None
+    assert thread.end() is None
 
 
 def test_a_force_that_is_no_number_goes_out_for_the_front_to_refuse(front):
-    running = Running(lambda hand: (float("nan"), 0, 0))
+    thread = Running(lambda hand: (float("nan"), 0, 0))
     front.accept()
     front.say(1, codec.write_frame(HAND))
     _, body = front.read()
     assert codec.read_data(body).invalid == 1
-    from tendon import tendon_pb2
-
     assert isnan(tendon_pb2.Datagram.FromString(body).frames[0].force.force_n.x)
     front.close()
-    assert running.end() is None
+    assert thread.end() is None
 
 
 @pytest.mark.parametrize(
@@ -213,10 +155,10 @@ def test_a_force_that_is_no_number_goes_out_for_the_front_to_refuse(front):
     ],
 )
 def test_an_answer_of_a_wrong_shape_is_an_error_with_a_sentence(front, touch, sentence):
-    running = Running(lambda hand: touch)
+    thread = Running(lambda hand: touch)
     front.accept()
     front.say(1, codec.write_frame(HAND))
-    error = running.end()
+    error = thread.end()
     assert isinstance(error, ValueError) and sentence in str(error)
 
 
@@ -224,10 +166,10 @@ def test_an_exception_of_the_answer_passes_through(front):
     def fail(hand):
         raise ZeroDivisionError("singular")
 
-    running = Running(fail)
+    thread = Running(fail)
     front.accept()
     front.say(1, codec.write_frame(HAND))
-    assert isinstance(running.end(), ZeroDivisionError)
+    assert isinstance(thread.end(), ZeroDivisionError)
 
 
 @pytest.mark.parametrize(
@@ -240,10 +182,10 @@ def test_an_exception_of_the_answer_passes_through(front):
     ],
 )
 def test_a_front_that_sends_no_state_is_an_error_with_a_sentence(front, bytes_, sentence):
-    running = Running(lambda hand: None)
+    thread = Running(lambda hand: None)
     front.accept()
     front.link.sendall(bytes_)
-    error = running.end()
+    error = thread.end()
     assert isinstance(error, RuntimeError) and sentence in str(error)
 
 
@@ -302,33 +244,33 @@ def test_every_rank_gets_each_state_and_rank_0_answers(front):
     def answer_of(rank):
         return lambda hand: seen[rank.number].append(hand) or (float(rank.number), 0, 0)
 
-    running = [Running(answer_of(rank), rank) for rank in ranks(3)]
+    threads = [Running(answer_of(rank), rank) for rank in ranks(3)]
     front.accept()
     assert front.ask(1, HAND).force == (0, 0, 0)
     assert front.ask(2, WHOLE_HAND).force == (0, 0, 0)
     front.close()
-    assert [one.end() for one in running] == [None] * 3
+    assert [one.end() for one in threads] == [None] * 3
     assert seen == [[HAND, WHOLE_HAND]] * 3
 
 
 def test_a_rank_that_fails_ends_all_of_them(front, capsys):
     first, second = ranks(2)
-    running = [Running(lambda hand: None, first), Running(lambda hand: 1 / 0, second)]
+    threads = [Running(lambda hand: None, first), Running(lambda hand: 1 / 0, second)]
     front.accept()
     front.say(1, codec.write_frame(HAND))
-    assert isinstance(running[1].end(), ZeroDivisionError)
+    assert isinstance(threads[1].end(), ZeroDivisionError)
     assert second.aborted == [1]
     assert "ZeroDivisionError" in capsys.readouterr().err
     front.close()
-    assert running[0].end() is None
+    assert threads[0].end() is None
 
 
 def test_without_a_front_the_other_ranks_end(front):
     front.close()
     Path(front.address.removeprefix("unix:")).unlink(missing_ok=True)
-    running = [Running(lambda hand: None, rank) for rank in ranks(2)]
-    assert isinstance(running[0].end(), ConnectionError)
-    assert running[1].end() is None
+    threads = [Running(lambda hand: None, rank) for rank in ranks(2)]
+    assert isinstance(threads[0].end(), ConnectionError)
+    assert threads[1].end() is None
 
 
 ON_RANKS = """
@@ -348,18 +290,14 @@ tendon.worker.run(answer, comm)
 """
 
 
-def mpirun(script: Path) -> subprocess.Popen[str]:
-    if shutil.which("mpirun") is None or find_spec("mpi4py") is None:
-        pytest.skip("no openmpi-bin or python3-mpi4py")
-    as_root = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}  # as tests in containers are
-    environment = {**os.environ, **as_root, "PYTHONPATH": str(ROOT / "clients" / "python")}
-    command = ["mpirun", "--oversubscribe", "--mca", "mpi_yield_when_idle", "1", "-n", "2", sys.executable, str(script)]
-    return subprocess.Popen(command, env=environment, stderr=subprocess.PIPE, text=True)
+def on_ranks(tmp_path: Path) -> AbstractContextManager[subprocess.Popen[str]]:
+    script = tmp_path / "on_ranks.py"
+    script.write_text(ON_RANKS, encoding="utf-8")
+    return running(mpirun(sys.executable, script), stderr=subprocess.PIPE, text=True)
 
 
 def test_two_ranks_of_mpi_answer_together_and_a_failure_of_one_ends_both(front, tmp_path):
-    (tmp_path / "on_ranks.py").write_text(ON_RANKS, encoding="utf-8")
-    with mpirun(tmp_path / "on_ranks.py") as program:
+    with on_ranks(tmp_path) as program:
         assert front.accept() == (0, b"tendon worker 1\n" + SECRET.encode())
         for sequence in range(1, 20):
             assert front.ask(sequence, HAND).force == pytest.approx((0.03, 0, 2))
@@ -370,8 +308,7 @@ def test_two_ranks_of_mpi_answer_together_and_a_failure_of_one_ends_both(front, 
 
 
 def test_two_ranks_of_mpi_end_with_the_stream(front, tmp_path):
-    (tmp_path / "on_ranks.py").write_text(ON_RANKS, encoding="utf-8")
-    with mpirun(tmp_path / "on_ranks.py") as program:
+    with on_ranks(tmp_path) as program:
         front.accept()
         front.ask(1, HAND)
         front.close()
