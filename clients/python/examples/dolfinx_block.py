@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""A worker whose solver is DOLFINx 0.5 (Debian: python3-dolfinx-real): an elastic block in front of the hand.
+"""A worker whose solver is DOLFINx 0.5 (Debian: python3-dolfinx): an elastic block in front of the hand.
 
 The block B1 of clients/softbody: 100 x 100 x 50 mm, 10 kPa, Poisson's ratio 0.45, linear, quadratic hexahedra. Its free
 face is the plane x = 0, its back is held. The hand presses it along +x with a patch of 20 mm around where it is.

@@ -35,7 +35,7 @@ patch_radius_mm = 20
 """
 
 pytestmark = pytest.mark.skipif(
-    find_spec("dolfinx") is None or find_spec("petsc4py") is None, reason="no DOLFINx: apt-get install python3-dolfinx-real"
+    find_spec("dolfinx") is None or find_spec("petsc4py") is None, reason="no DOLFINx: apt-get install python3-dolfinx"
 )
 
 
