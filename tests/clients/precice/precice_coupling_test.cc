@@ -7,44 +7,23 @@
 #include <unistd.h>
 
 #include <filesystem>
-#include <precice/precice.hpp>
 #include <string>
-#include <vector>
 
 #include "clients/precice/precice_engine.h"
 
 namespace tendon::precice_worker {
 namespace {
 
-constexpr double kStiffness = 500;  // N/m
-
-/// A solver of nothing but springs, with a mesh of its own. Each node that holds is told to preCICE as its force.
-void be_the_body(const std::string& file, const std::vector<double>& places) {
-  precice::Participant participant("Body", file, 0, 1);
-  std::vector<precice::VertexID> nodes(places.size() / 3);
-  participant.setMeshVertices("Body-Mesh", places, nodes);
-  participant.initialize();
-  std::vector<double> values(places.size());
-  while (participant.isCouplingOngoing()) {
-    const double step = participant.getMaxTimeStepSize();
-    participant.readData("Body-Mesh", "Displacement", nodes, step, values);
-    for (double& value : values) value *= kStiffness / static_cast<double>(nodes.size());
-    participant.writeData("Body-Mesh", "Force", nodes, values);
-    participant.advance(step);
-  }
-}
+/// What spring_body_main.cc is made of, N/m.
+constexpr double kStiffness = 500;
 
 /// The body's process; it is gone at the end.
 class Body {
  public:
-  Body(const std::string& file, const std::vector<double>& places) : pid_(::fork()) {
+  explicit Body(const std::string& file) : pid_(::fork()) {
     if (pid_ != 0) return;
-    try {
-      be_the_body(file, places);
-    } catch (const std::exception&) {
-      ::_exit(1);  // its peer has gone
-    }
-    ::_exit(0);
+    ::execl(TENDON_SPRING_BODY, TENDON_SPRING_BODY, file.c_str(), nullptr);
+    ::_exit(127);
   }
   ~Body() {
     ::kill(pid_, SIGKILL);
@@ -63,7 +42,7 @@ TEST(PreciceCoupling, EachForceAnswersTheStateOfItsOwnWindow) {
   std::filesystem::current_path(folder);  // where both look for each other's address
   const PreciceEngine::Config config{.file = TENDON_PRECICE_CONFIG};
   {
-    const Body body(config.file, TouchedPatch(config.patch).places());
+    const Body body(config.file);
     PreciceEngine engine(config);
     for (int i = 1; i <= 50; ++i) {
       DeviceState hand;
