@@ -41,7 +41,7 @@ class TouchedPatch {
   std::vector<double> displacements(const DeviceState& hand) const;
 
   /// `held` are the forces that it takes to hold the nodes where displacements(hand) says: x, y, z of each, N. Throws
-  /// std::invalid_argument when there are not as many. What is not finite goes into the force as it is.
+  /// std::invalid_argument when there are not as many. A sum that is not finite is the force, as it is.
   Touch answer(const DeviceState& hand, std::span<const double> held);
 
  private:

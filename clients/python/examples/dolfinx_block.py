@@ -16,7 +16,9 @@ PATCH = 0.02  # m
 
 parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
 parser.add_argument("scene", nargs="?", help="A front hands its scene on; this block is always the same")
-parser.add_argument("--cells", type=int, default=8, choices=range(2, 65, 2), metavar="N", help="Along y and z [%(default)s]")
+parser.add_argument(
+    "--cells", type=int, default=8, choices=range(2, 65, 2), metavar="N", help="Along y and z, an even number [%(default)s]"
+)
 options = parser.parse_args()
 
 import numpy as np  # noqa: E402  --help works without these

@@ -7,7 +7,8 @@
         client.drive(lambda hand: [-500 * x for x in hand.position])
 
 `Client` waits; `tendon.aio.Client` is the same for asyncio; `ForceClient` is the whole behaviour without socket and
-clock, for a loop of your own. `tendon.worker.run(answer)` is a program that a front asks instead of the server. SI units, device base frame; a force is what the device exerts **on the hand**.
+clock, for a loop of your own. `tendon.worker.run(answer)` is all of a program that a front asks. SI units, device base
+frame; a force is what the device exerts **on the hand**.
 """
 
 from . import aio, cli, worker

@@ -84,8 +84,8 @@ def mpirun(*command: str | Path) -> list[str]:
 
 @contextmanager
 def running(command: Sequence[str | Path], **options: Any) -> Iterator[subprocess.Popen[Any]]:
-    """A worker with this package. It is gone when the `with` is left. Open MPI asks for leave to run as root, which tests
-    in containers are."""
+    """A worker with this package. It is gone when the `with` is left. Open MPI asks for leave to run as root, which
+    tests in containers are."""
     environment = {**os.environ, "PYTHONPATH": str(ROOT / "clients" / "python"), "OMP_NUM_THREADS": "1"}
     environment |= {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
     program = subprocess.Popen([str(word) for word in command], env=environment, **options)

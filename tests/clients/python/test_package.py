@@ -92,7 +92,8 @@ def test_an_example_has_at_most_30_lines_and_explains_itself(file):
 def test_an_example_of_a_worker_explains_itself(file):
     help_text = run(sys.executable, file, "--help", env={"PYTHONPATH": str(PACKAGE), "PATH": ""})
     assert f"Example: tendon-fem serve SCENE --worker \"python3 {file.name}\"" in help_text
-    done = subprocess.run([sys.executable, file], env=os.environ | {"PYTHONPATH": str(PACKAGE)}, capture_output=True, text=True)
+    environment = os.environ | {"PYTHONPATH": str(PACKAGE)}
+    done = subprocess.run([sys.executable, file], env=environment, capture_output=True, text=True)
     if "ModuleNotFoundError" in done.stderr:
         pytest.skip(done.stderr.splitlines()[-1])
     assert done.returncode == 1 and "TENDON_WORKER_ADDRESS: expected in the environment" in done.stderr
