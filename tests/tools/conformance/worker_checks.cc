@@ -226,7 +226,7 @@ void WorkerJudge::converse() {
   for (int i = 0; i < kFirstStates; ++i) {
     if (!ask(next_state(), "answer-comes")) return;
   }
-  // In the length, after it, in the sequence, in the body, before the last byte.
+  // In the length, after it, in the sequence, in the body, near its end.
   pb::DeviceState state = next_state();
   const std::size_t size = 12 + state.ByteSizeLong();
   const std::array<std::size_t, 5> cuts = {2, 4, 9, 30, size};
