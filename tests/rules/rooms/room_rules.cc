@@ -82,6 +82,7 @@ const std::vector<Door>& front_doors() {
         "clients/plug/inverse/inverse_json.cc", "clients/softbody/cluster/estimate.cc", "clients/softbody/explain.cc",
         "*_main.cc"}},
       {"PETSc", {"petscksp.h"}, {"clients/softbody/mpi/spread_solver.cc"}},
+      {"preCICE", {"precice/"}, {"clients/precice/precice_engine.cc", "tests/clients/precice/"}},
       {"prometheus-cpp", {"prometheus/"}, {"clients/dashboard/metrics.cc"}},
       {"protobuf",
        {"google/protobuf/", "*.pb.h", "protocol/wire/fields.h", "protocol/wire/frame_codec.h"},
@@ -138,6 +139,7 @@ const Names kClockReaders = {"server/machine/clock.h",
                              "tests/tools/lab/experiments/meter.cc",
                              "tests/tools/injector/proxy/real_time.cc",
                              "tests/tools/conformance/udp_wire.cc",
+                             "tests/tools/conformance/worker_wire.cc",
                              "*_main.cc"};
 
 // ---- Reading --------------------------------------------------------------------------------------------------------
