@@ -14,11 +14,10 @@ namespace tendon {
 /// the rows of the table".
 inline void add_part_options(CLI::App& verb, Part& part, const std::string& units) {
   part.progress = isatty(STDERR_FILENO) != 0;
-  CLI::Option* const these =
-      verb.add_option_function<std::string>(
-              "--units", [&part](const std::string& text) { part.units = parse_units(text); },
-              "a shard of a sweep: these units of " + units + "; lines of JSON (tendon-sweep)")
-          ->type_name("FIRST:COUNT");
+  CLI::Option* const these = verb.add_option_function<std::string>(
+                                     "--units", [&part](const std::string& text) { part.units = parse_units(text); },
+                                     "a shard of a sweep: these units of " + units + "; lines of JSON (tendon-sweep)")
+                                 ->type_name("FIRST:COUNT");
   verb.add_option_function<std::string>(
           "--from", [&part](const std::string& file) { part.from = file; },
           "runs nothing: says what the shards of a sweep came to (tendon-sweep merge)")

@@ -221,7 +221,8 @@ std::vector<std::string> read_shards(std::istream& lines, std::uint64_t all) {
       try {
         end = ShardEnd::parse(line);
       } catch (const std::invalid_argument& error) {
-        refuse("the line of a unit, {\"unit\":0,…}, or " + std::string(error.what()));
+        throw std::invalid_argument("line " + std::to_string(number) + ": no line of a unit, {\"unit\":0,…}, and " +
+                                    error.what());
       }
     } else if (!units.empty() && *unit == units.size() - 1) {
       units.back() += line + "\n";

@@ -502,8 +502,9 @@ void check(const AccuracyOptions& options) {
   }
   options.block.check();
   if (options.errors_only && (options.network || options.budget_ms)) {
-    throw std::invalid_argument("--errors-only, --units and --from: not with --network or --budget-ms, whose answers "
-                                "depend on times");
+    throw std::invalid_argument(
+        "--errors-only, --units and --from: not with --network or --budget-ms, whose answers "
+        "depend on times");
   }
   if (options.network) route_of(*options.network, 0);  // an unknown one is refused before anything is measured
 }

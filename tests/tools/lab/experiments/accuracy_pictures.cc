@@ -185,8 +185,8 @@ void draw(const AccuracyOptions& options, const Ladders& ladders, double round_t
     panels.push_back(felt_over("… over the time of an update", "ms", ladders, true,
                                [](const AccuracyPoint& p) { return p.update_ms_p50; }));
   }
-  draw_panels(*options.out / "accuracy", "What accuracy costs in time",
-              "processor time of one core; " + commit, panels);
+  draw_panels(*options.out / "accuracy", "What accuracy costs in time", "processor time of one core; " + commit,
+              panels);
 }
 
 }  // namespace tendon::lab

@@ -68,7 +68,8 @@ Figures figures(const AccuracyPoint& p, const TruthFigures& truth, const Pressed
               {"truth_uncertainty_percent", 100 * truth.uncertainty}};
   if (!p.timed) {
     constexpr std::array kOfAClock = {"update_ms_p50", "setup_s", "update_ms_p99", "hz", "instructions"};
-    std::erase_if(all, [&](const auto& figure) { return std::ranges::count(kOfAClock, std::string_view(figure.first)) > 0; });
+    std::erase_if(
+        all, [&](const auto& figure) { return std::ranges::count(kOfAClock, std::string_view(figure.first)) > 0; });
   }
   if (p.felt) {
     all.insert(all.end(), {{"felt_error_percent", 100 * p.felt->force_error},
@@ -126,9 +127,11 @@ const char* const kFeltHeading =
     "model                      n      ms    small  with K     held                     %      mm/s        ms\n";
 
 std::string heading(bool timed) {
-  return std::string("                                           error %   error % | of the hard load's    | tangent  ") +
+  return std::string(
+             "                                           error %   error % | of the hard load's    | tangent  ") +
          "script lateral |" + (timed ? "  update ms                        set-up" : "") +
-         "      MB\nmodel                      n  nodes    K N/m   small     hard |  model    mesh  solver |       %       "
+         "      MB\nmodel                      n  nodes    K N/m   small     hard |  model    mesh  solver |       %   "
+         "    "
          "%        % |" +
          (timed ? "       p50       p99       Hz        s" : "") + "\n";
 }

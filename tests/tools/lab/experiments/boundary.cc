@@ -52,7 +52,7 @@ bool grows(const SampledSpring& spring) {
   return late > early;
 }
 
-constexpr std::array kDelays = {0, 1, 2, 3, 5, 8, 13, 20, 32, 50};                      // samples of 1 ms
+constexpr std::array kDelays = {0, 1, 2, 3, 5, 8, 13, 20, 32, 50};                        // samples of 1 ms
 constexpr std::array kRates = {25.0, 50.0, 100.0, 200.0, 500.0, 1000.0, 2000.0, 4000.0};  // Hz
 constexpr int kMapped = 6;  // springs below the exact limit and above it, to a quarter and to four times of it
 
@@ -206,8 +206,8 @@ void boundary(const BoundaryOptions& options, std::ostream& out) {
       continue;
     }
     std::array<char, 120> line{};
-    std::snprintf(line.data(), line.size(), "%10.0f %9.0f %11.1f %12.1f %12.1f %9.1f\n", hz_of(p), ms_of(p), p.simulated,
-                  p.eigenvalues, p.linear, p.passive);
+    std::snprintf(line.data(), line.size(), "%10.0f %9.0f %11.1f %12.1f %12.1f %9.1f\n", hz_of(p), ms_of(p),
+                  p.simulated, p.eigenvalues, p.linear, p.passive);
     out << line.data();
   }
   if (options.out) {

@@ -93,15 +93,17 @@ void add(CLI::App& verb, int& /*exit*/) {
   verb.add_option("--elements", arguments.elements, elements + "; left out: all")
       ->type_name("NAME,...")
       ->delimiter(',');
-  CLI::Option* const slowest = verb.add_option("--slowest-ms", options.slowest_ms, "a model is refined no further than this for an update")
-      ->check(CLI::PositiveNumber)
-      ->capture_default_str();
+  CLI::Option* const slowest =
+      verb.add_option("--slowest-ms", options.slowest_ms, "a model is refined no further than this for an update")
+          ->check(CLI::PositiveNumber)
+          ->capture_default_str();
   CLI::Option* const setup = verb.add_option("--longest-setup-s", options.longest_setup_s,
-                  "… and this for its set-up; left out: 30, with a budget 5")
-      ->check(CLI::PositiveNumber);
-  CLI::Option* const point = verb.add_option("--longest-point-s", options.longest_point_s, "… and this to measure it, all in all")
-      ->check(CLI::PositiveNumber)
-      ->capture_default_str();
+                                             "… and this for its set-up; left out: 30, with a budget 5")
+                                 ->check(CLI::PositiveNumber);
+  CLI::Option* const point =
+      verb.add_option("--longest-point-s", options.longest_point_s, "… and this to measure it, all in all")
+          ->check(CLI::PositiveNumber)
+          ->capture_default_str();
   verb.add_option("--network", arguments.network,
                   "what is left at the hand behind it: " + injector::names_of_profiles())
       ->type_name("NAME|LINE");
