@@ -40,7 +40,7 @@ struct SweptWork {
   std::function<Outcome(std::uint64_t unit)> run{};
   /// One or more, without the unit's number. They have all of an outcome that the program's judgement needs.
   std::function<std::vector<JsonLine>(std::uint64_t unit, const Outcome& outcome)> lines{};
-  /// Of what lines() wrote. May throw whatever it likes for anything else.
+  /// Reads what lines() wrote. May throw whatever it likes for anything else.
   std::function<Outcome(std::uint64_t unit, const std::vector<nlohmann::json>& lines)> read{};
   /// Adds an outcome to the totals and extremes of a shard.
   std::function<void(const Outcome& outcome, ShardEnd& end)> count{};

@@ -9,6 +9,7 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
+#include <utility>
 
 namespace tendon {
 namespace {
@@ -207,39 +208,45 @@ void write_shard(const Units& units, std::uint64_t all,
   if (!out.flush()) throw std::runtime_error("cannot write the units: is the disk full?");
 }
 
-std::vector<std::string> read_shards(std::istream& lines, std::uint64_t all) {
-  std::vector<std::string> units;
+ShardEnd read_to_end(std::istream& lines, const std::function<void(const std::string& line)>& take) {
   std::optional<ShardEnd> end;
   std::string line;
   for (int number = 1; std::getline(lines, line); ++number) {
-    const auto refuse = [number](const std::string& expected) {
-      throw std::invalid_argument("line " + std::to_string(number) + ": expected " + expected);
-    };
-    if (end) refuse("nothing after the end");
-    const auto unit = unit_of(line);
-    if (!unit) {
-      try {
+    try {
+      if (end) throw std::invalid_argument("expected nothing after the end");
+      if (line.starts_with(R"({"kind":"end",)")) {
         end = ShardEnd::parse(line);
-      } catch (const std::invalid_argument& error) {
-        throw std::invalid_argument("line " + std::to_string(number) + ": no line of a unit, {\"unit\":0,…}, and " +
-                                    error.what());
+      } else {
+        take(line);
       }
-    } else if (!units.empty() && *unit == units.size() - 1) {
-      units.back() += line + "\n";
-    } else if (*unit == units.size() && *unit < all) {
-      units.push_back(line + "\n");
-    } else {
-      refuse("unit " + std::to_string(units.size()) + " of 0 to " + std::to_string(all - 1) + ", found " +
-             std::to_string(*unit));
+    } catch (const std::invalid_argument& error) {
+      throw std::invalid_argument("line " + std::to_string(number) + ": " + error.what());
     }
   }
-  if (!end || units.size() != all) {
-    throw std::invalid_argument(std::to_string(units.size()) + " units" + (end ? "" : " without an end") +
-                                ": expected all, 0 to " + std::to_string(all - 1));
+  if (!end) throw std::invalid_argument("no end of a sweep");
+  return std::move(*end);
+}
+
+std::vector<std::string> read_shards(std::istream& lines, std::uint64_t all) {
+  std::vector<std::string> units;
+  const ShardEnd end = read_to_end(lines, [&](const std::string& line) {
+    const auto unit = unit_of(line);
+    if (!unit) throw std::invalid_argument("expected the line of a unit, {\"unit\":0,…}, or the end");
+    if (*unit == units.size() && *unit < all) {
+      units.push_back(line + "\n");
+    } else if (!units.empty() && *unit == units.size() - 1) {
+      units.back() += line + "\n";
+    } else {
+      throw std::invalid_argument("expected unit " + std::to_string(units.size()) + " of 0 to " +
+                                  std::to_string(all - 1) + ", found " + std::to_string(*unit));
+    }
+  });
+  if (units.size() != all) {
+    throw std::invalid_argument(std::to_string(units.size()) + " units: expected all, 0 to " + std::to_string(all - 1));
   }
   UnitDigest digest;
   for (std::uint64_t unit = 0; unit < all; ++unit) digest.add(unit, units[unit]);
-  if (digest != end->digest || end->units != Units{0, all}) {
+  if (digest != end.digest || end.units != Units{0, all}) {
     throw std::invalid_argument("the end is not that of the units before it");
   }
   return units;

@@ -96,6 +96,10 @@ std::optional<std::uint64_t> unit_of(std::string_view line);
 void write_shard(const Units& units, std::uint64_t all,
                  const std::function<std::string(std::uint64_t unit, ShardEnd& end)>& run, std::ostream& out);
 
+/// The lines of one shard, or of many that were merged: `take` gets all but the end. Throws std::invalid_argument, naming
+/// the line, when `take` does, and when the end is missing or not the last.
+ShardEnd read_to_end(std::istream& lines, const std::function<void(const std::string& line)>& take);
+
 /// The lines of each of the units 0 to `all` − 1, that write_shard has printed in one shard or in many that were merged.
 /// Throws std::invalid_argument, naming the line or unit, unless they are all there, once, with an end whose digest is
 /// theirs.

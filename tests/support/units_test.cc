@@ -148,11 +148,11 @@ TEST(Shards, AreWrittenAndReadAgainUnitByUnit) {
 TEST(Shards, ThatLackAUnitHaveOneTwiceOrAnotherOutcomeAreRefused) {
   const std::string whole = shard({0, 20});
   EXPECT_EQ(refusal_of(whole), "none");
-  EXPECT_EQ(refusal_of(""), "0 units without an end: expected all, 0 to 19");
+  EXPECT_EQ(refusal_of(""), "no end of a sweep");
   EXPECT_EQ(refusal_of(shard({0, 19})), "19 units: expected all, 0 to 19");
   EXPECT_EQ(refusal_of(shard({1, 19})), "line 1: expected unit 0 of 0 to 19, found 1");
   EXPECT_EQ(refusal_of(whole + whole), "line 42: expected nothing after the end");
-  EXPECT_EQ(refusal_of("a line\n" + whole).substr(0, 28), "line 1: no line of a unit, {");
+  EXPECT_EQ(refusal_of("a line\n" + whole), "line 1: expected the line of a unit, {\"unit\":0,…}, or the end");
   std::string other = whole;
   other.replace(other.find("\"part\":1"), 8, "\"part\":2");
   EXPECT_EQ(refusal_of(other), "the end is not that of the units before it");
