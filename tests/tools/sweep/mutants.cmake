@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-# Can the tests of tendon-sweep and of what it sweeps fail? Each mutant is tendon-sweep or tendon-lab with one planted bug:
-# which one text was replaced by another, linked ahead of the library that it comes from.
+# Can the tests of tendon-sweep and of what it sweeps fail? Each mutant is tendon-sweep or tendon-lab with one planted
+# bug: a copy of one source file in which one text was replaced by another, linked ahead of the library that it comes
+# from.
 
 # tendon_sweep_mutant(name SOURCE results.cc REPLACE "text" "by" TEST Suite.Name): that test finds it. With PROGRAM
 # tendon-lab it is tendon-lab that has the bug.

@@ -127,12 +127,13 @@ const char* const kFeltHeading =
     "model                      n      ms    small  with K     held                     %      mm/s        ms\n";
 
 std::string heading(bool timed) {
-  return std::string(
-             "                                           error %   error % | of the hard load's    | tangent  ") +
-         "script lateral |" + (timed ? "  update ms                        set-up" : "") +
-         "      MB\nmodel                      n  nodes    K N/m   small     hard |  model    mesh  solver |       %   "
-         "    "
-         "%        % |" +
+  const std::string above =
+      "                                           error %   error % | of the hard load's    | tangent"
+      "  script lateral |";
+  const std::string below =
+      "model                      n  nodes    K N/m   small     hard |  model    mesh  solver |       %"
+      "       %        % |";
+  return above + (timed ? "  update ms                        set-up" : "") + "      MB\n" + below +
          (timed ? "       p50       p99       Hz        s" : "") + "\n";
 }
 

@@ -34,8 +34,9 @@ struct IdentifyOptions {
 /// Identifies the friction and writes to `out` a table, which method is trusted and why, and a fragment of a scene with
 /// the lower bounds; or one line of JSON for each run and a last one for the result.
 ///
-/// But for a shard of a sweep nothing is written before all is known. Throws std::invalid_argument when the options make no sense, before anything
-/// is read; std::runtime_error when a file cannot be read or a run cannot be used, naming the file.
+/// But for a shard of a sweep nothing is written before all is known. Throws std::invalid_argument when the options make
+/// no sense, before anything is read; std::runtime_error when a file cannot be read or a run cannot be used, naming the
+/// file.
 void identify(const IdentifyOptions& options, std::ostream& out);
 
 }  // namespace tendon::lab

@@ -131,7 +131,10 @@ void add(CLI::App& verb, int& /*exit*/) {
       "\nExample: errors of the finest meshes, by many machines\n"
       "  tendon-sweep plan a --units 0:24 --per-shard 1 -- tendon-lab accuracy --models condensed --n 12,16,24,32\n"
       "\nTimes are those of this machine, now. Exit: 0 done; 1 cannot write, or gnuplot failed; 2 wrong usage.");
-  verb.callback([models, elements] {
+  verb.callback([models, elements, slowest, setup, point] {
+    if ((options.part.units || options.part.from) && (*slowest || *setup || *point)) {
+      throw std::invalid_argument("--units, --from: not with a limit of time, since they look at no clock");
+    }
     options.models = named(arguments.models, softbody::model_named, models);
     options.elements = named(arguments.elements, softbody::element_named, elements);
     options.block = {.size = lengths(arguments.block_mm),
