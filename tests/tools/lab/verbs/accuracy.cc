@@ -129,7 +129,7 @@ void add(CLI::App& verb, int& /*exit*/) {
       "all of it, in half an hour or more\n  tendon-lab accuracy --network wifi-good --out figures\n"
       "what to take\n  tendon-lab accuracy --budget-ms 5 --network wifi-good --json\n"
       "\nExample: errors of the finest meshes, by many machines\n"
-      "  tendon-sweep plan a --units 0:24 --per-shard 1 -- tendon-lab accuracy --models condensed --n 12,16,24,32\n"
+      "  tendon-sweep plan a --units 0:24 --per-shard 1 -- tendon-lab accuracy --models condensed --n 8,12,16,20\n"
       "\nTimes are those of this machine, now. Exit: 0 done; 1 cannot write, or gnuplot failed; 2 wrong usage.");
   verb.callback([models, elements, slowest, setup, point] {
     if ((options.part.units || options.part.from) && (*slowest || *setup || *point)) {
