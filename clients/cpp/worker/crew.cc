@@ -91,6 +91,9 @@ File listen_at_path(const std::string& path) {
 /// Listens at `name`, whose port may be 0, and puts the port in use into it.
 File listen_at(const ServerName& name, std::uint16_t& port) {
   const Address address = name.look_up().front();
+  if (address.ip == parse_address("0.0.0.0:0").ip || address.ip == Address{}.ip) {
+    throw std::runtime_error("listen: expected the address by which workers reach this machine, got " + name.text());
+  }
   sockaddr_in6 to{};
   to.sin6_family = AF_INET6;
   to.sin6_port = htons(address.port);

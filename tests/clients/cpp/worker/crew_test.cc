@@ -14,6 +14,7 @@
 #include <fstream>
 #include <iterator>
 #include <optional>
+#include <stdexcept>
 #include <string>
 
 namespace tendon::worker {
@@ -181,6 +182,12 @@ TEST(Crew, AStrangerWithoutTheSecretDoesNotOpenTheStream) {
   ASSERT_EQ(::write(late, word.data(), word.size()), static_cast<ssize_t>(word.size()));
   EXPECT_FALSE(next(crew, 300).has_value());
   for (const int socket : {silent, wrong, right, late}) ::close(socket);
+}
+
+TEST(Crew, DoesNotListenWhereNoWorkerCouldFindIt) {
+  for (const char* any : {"0.0.0.0:0", "[::]:0"}) {
+    EXPECT_THROW(Crew({.command = "true", .listen = any}), std::runtime_error) << any;
+  }
 }
 
 TEST(Crew, TheSocketIsInAFolderOfThisUserAlone) {
