@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <set>
 #include <stdexcept>
 #include <vector>
@@ -167,6 +168,58 @@ TEST(ForceClient, SendsAForceInTheTurnAfterItsComputationWhichIsDueAtOnce) {
   EXPECT_EQ(world.a_port.sent, sent);
   world.a->turn(world.now + milliseconds(3));
   EXPECT_EQ(world.a_port.sent, sent + 1);
+}
+
+// An engine that computes elsewhere: its callback knows no force, and the answer comes later.
+TEST(ForceClient, ALaterAnswerIsSentUnlessANewerStateWasAnswered) {
+  World world(24, kFineWeather);
+  std::vector<Seen> seen;
+  world.connect({}, [&](const DeviceState& hand) {
+    seen.push_back({.hand = hand, .session = 1});
+    Touch later;
+    later.unknown = true;
+    return later;
+  });
+  world.run(kSecond);
+  ASSERT_GT(seen.size(), 500U);
+  EXPECT_TRUE(world.z->forces.empty());
+  const auto give = [&](std::size_t which) {
+    const bool sent = world.a->answer(world.now, {.to = seen[which], .touch = answer(seen[which].hand)});
+    world.run(milliseconds(20));
+    return sent;
+  };
+  EXPECT_TRUE(give(100));
+  EXPECT_TRUE(give(300));
+  EXPECT_FALSE(give(200)) << "an older motion";
+  EXPECT_TRUE(give(300)) << "the same one again";
+  Touch unknown;
+  unknown.unknown = true;
+  EXPECT_FALSE(world.a->answer(world.now, {.to = seen[400], .touch = unknown}));
+  ASSERT_EQ(world.z->forces.size(), 3U);
+  EXPECT_EQ(world.z->forces.back().second.based_on_tick, seen[300].hand.tick);
+  EXPECT_EQ(world.z->forces.back().second.force, answer(seen[300].hand));
+}
+
+TEST(ForceClient, ALaterAnswerToAStateOfAnotherSessionIsNotSent) {
+  World world(25, kFineWeather);
+  std::optional<Seen> newest;
+  world.connect({}, [&](const DeviceState& hand) {
+    newest = Seen{.hand = hand, .session = world.a ? world.a->stats().sessions : 1};
+    Touch later;
+    later.unknown = true;
+    return later;
+  });
+  world.run(kSecond);
+  const Seen old = *newest;
+  ASSERT_EQ(old.session, 1U);
+  world.restart_server();
+  EXPECT_FALSE(world.a->answer(world.now, {.to = Seen{}, .touch = Vec3(1, 0, 0)}));
+  world.run(4 * kSecond);
+  ASSERT_EQ(world.a->stats().sessions, 2U);
+  EXPECT_FALSE(world.a->answer(world.now, {.to = old, .touch = Vec3(1, 0, 0)}));
+  EXPECT_TRUE(world.a->answer(world.now, {.to = *newest, .touch = Vec3(1, 0, 0)}));
+  world.a->give_lease();
+  EXPECT_FALSE(world.a->answer(world.now, {.to = *newest, .touch = Vec3(1, 0, 0)})) << "another may hold the channel";
 }
 
 TEST(ForceClient, AForceIsValidForThreePeriodsAndAtLeastTwentyMilliseconds) {
