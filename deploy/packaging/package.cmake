@@ -113,7 +113,7 @@ set(CPACK_DEBIAN_PLUG_DESCRIPTION "Haptic devices of a Tendon server for program
  anywhere on the network, behind an output limiter that bounds its energy.")
 set(CPACK_DEBIAN_DEV_PACKAGE_NAME libtendon-dev)
 set(CPACK_DEBIAN_DEV_PACKAGE_SECTION libdevel)
-set(CPACK_DEBIAN_DEV_PACKAGE_DEPENDS "libeigen3-dev, libprotobuf-dev, libsodium-dev")
+set(CPACK_DEBIAN_DEV_PACKAGE_DEPENDS "libeigen3-dev, libprotobuf-dev, libsodium-dev, libsystemd-dev")
 set(CPACK_DEBIAN_DEV_DESCRIPTION "Library to write a physics engine for the Tendon haptics server
  A session over UDP, newest pose wins, one callback: position in, force out.")
 include(CPack)
