@@ -31,11 +31,12 @@ constexpr unsigned kNoAddress = 8;  ///< AVAHI_LOOKUP_NO_ADDRESS
 // µs. Avahi asks again after 1 and 3 s: a lost question does not matter.
 constexpr std::uint64_t kResolveFor = 3'000'000;
 constexpr std::uint64_t kBrowseFor = 4'000'000;
+/// Avahi says "all for now" a second after it has begun to ask. Where many answer, or answers were lost and asked for
+/// again, more come after that: a list is whole when so long nothing has come.
+constexpr std::uint64_t kQuiet = 1'000'000;
 /// After the first address: a host that answers by IPv4 and IPv6 answers at once.
 constexpr std::uint64_t kOtherAddress = 200'000;
 
-/// Avahi gives a client 1024 objects. So many resolutions run at once.
-constexpr std::size_t kAtOnce = 64;
 /// No link has so many devices, and a stranger can announce for ever.
 constexpr std::size_t kMaxFound = 4096;
 
@@ -63,10 +64,9 @@ class Conversation {
     end_after(longest);
   }
 
-  void end_after(std::uint64_t microseconds) {
-    if (sd_event_add_time_relative(loop_.get(), nullptr, CLOCK_MONOTONIC, microseconds, 1000, end_loop, nullptr) < 0) {
-      end();
-    }
+  void end_after(std::uint64_t microseconds) { call_after(microseconds, end_loop, nullptr); }
+  void call_after(std::uint64_t microseconds, sd_event_time_handler_t handler, void* self) {
+    if (sd_event_add_time_relative(loop_.get(), nullptr, CLOCK_MONOTONIC, microseconds, 1000, handler, self) < 0) end();
   }
   void end() noexcept { sd_event_exit(loop_.get(), 0); }
 
@@ -164,8 +164,9 @@ class Resolution {
  public:
   explicit Resolution(const Instance& instance)
       : what_("dns-sd:" + to_string(instance)), avahi_(what_, kResolveFor), found_{.instance = instance} {
+    // Avahi does not tell IPv4 addresses over IPv6 (publish-a-on-ipv6): each kind is asked for over itself.
     for (const int family : {kIpv4, kIpv6}) {
-      avahi_.call(answered, this, "ResolveService", "iisssiu", kAny, kAny, instance.name.c_str(), kService, kLocal,
+      avahi_.call(answered, this, "ResolveService", "iisssiu", kAny, family, instance.name.c_str(), kService, kLocal,
                   family, 0U);
     }
   }
@@ -220,8 +221,6 @@ class Browsing {
   /// Of one instance. The address stays the same, because Avahi's answer comes to it.
   struct One {
     Browsing* all;
-    int interface;
-    int protocol;
     Found found;
   };
 
@@ -234,16 +233,30 @@ class Browsing {
     auto& browsing = *static_cast<Browsing*>(self);
     const std::string_view what = sd_bus_message_get_member(signal);
     if (what == "ItemNew") browsing.add(signal);
-    if (what == "AllForNow") browsing.complete_ = true;
-    browsing.go_on();
+    if (what == "AllForNow") browsing.watch();
     return 0;
+  }
+
+  static int watched(sd_event_source* /*unused*/, std::uint64_t /*at*/, void* self) noexcept {
+    auto& browsing = *static_cast<Browsing*>(self);
+    if (browsing.open_ > 0 || browsing.watched_ < browsing.found_.size()) {
+      browsing.watch();
+    } else {
+      browsing.avahi_.end();
+    }
+    return 0;
+  }
+
+  /// Ends when nothing has come for a while.
+  void watch() {
+    watched_ = found_.size();
+    avahi_.call_after(kQuiet, watched, this);
   }
 
   static int described(sd_bus_message* answer, void* of, sd_bus_error* /*unused*/) noexcept {
     One& one = *static_cast<One*>(of);
     if (sd_bus_message_is_method_error(answer, nullptr) == 0) read_service(answer, one.found);
     --one.all->open_;
-    one.all->go_on();
     return 0;
   }
 
@@ -253,26 +266,17 @@ class Browsing {
     const char* name = nullptr;
     if (sd_bus_message_read(signal, "iis", &interface, &protocol, &name) < 0 || !is_instance_name(name)) return;
     if (found_.size() == kMaxFound) return;
-    const auto [place, is_new] = found_.try_emplace(name, One{this, interface, protocol, {.instance = {name}}});
-    if (is_new) waiting_.push_back(&place->second);
-  }
-
-  /// Asks for what is to be said of each, and ends when all is known.
-  void go_on() {
-    for (; open_ < kAtOnce && next_ < waiting_.size(); ++open_, ++next_) {
-      One& one = *waiting_[next_];
-      avahi_.call(described, &one, "ResolveService", "iisssiu", one.interface, one.protocol,
-                  one.found.instance.name.c_str(), kService, kLocal, kAny, kNoAddress);
-    }
-    if (complete_ && open_ == 0) avahi_.end();
+    const auto [place, is_new] = found_.try_emplace(name, One{this, {.instance = {name}}});
+    if (!is_new || found_.size() > kDescribed) return;
+    ++open_;
+    avahi_.call(described, &place->second, "ResolveService", "iisssiu", interface, protocol, name, kService, kLocal, kAny,
+                kNoAddress);
   }
 
   Conversation avahi_;
   std::map<std::string, One> found_;
-  std::vector<One*> waiting_;
-  std::size_t next_ = 0;  ///< of them, to ask for
-  std::size_t open_ = 0;  ///< questions
-  bool complete_ = false;
+  std::size_t open_ = 0;     ///< questions
+  std::size_t watched_ = 0;  ///< had been found when watch() was called
 };
 
 }  // namespace

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -30,9 +31,10 @@ struct Found {
 /// one, at the first address that came and what came 0.2 s after it; waits at most 3 s.
 std::vector<Found> resolve(const Instance& instance);
 
-/// All instances of a domain, by name; may be empty. Of "local" waits at most 4 s. Each has its host and TXT record
-/// where those came within that time, in another domain the first 64 have.
+/// All instances of a domain, by name; may be empty. Of "local" waits 2 to 4 s. The first kDescribed that come have
+/// their host and TXT record, where somebody answered for those: each is two more questions to everybody.
 std::vector<Found> browse(const std::string& domain);
+inline constexpr std::size_t kDescribed = 64;
 
 /// What the two do for the domain "local".
 std::vector<Found> resolve_by_avahi(const Instance& instance);

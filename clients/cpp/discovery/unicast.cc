@@ -19,8 +19,6 @@ namespace tendon::dns_sd {
 namespace {
 
 constexpr std::size_t kMaxAnswer = 65'535;
-/// Of a list, so many are described: each takes two questions, one after the other.
-constexpr std::size_t kDescribed = 64;
 
 struct Record {
   std::uint16_t type;
