@@ -123,19 +123,14 @@ TEST(UnicastDiscovery, NamesThatPointAtEachOtherLeadNowhere) {
   EXPECT_NE(ring, "");
 }
 
-TEST(UnicastDiscovery, AnAnswerThatIsCutAnywhereIsNoCrash) {
+TEST(UnicastDiscovery, AnAnswerThatEndsTooSoonIsRefused) {
   for (const std::uint16_t type : {kSrv, kTxt}) {
-    for (std::size_t size = 12; size < 90; ++size) {
+    for (std::size_t lost = 1; lost < 22; lost += 4) {  // with all of the question, so that the resolver takes it
       const FakeDns server([&](const Question& question, bool tcp) {
         const std::string whole = sound(question, tcp);
-        return question.type == type ? whole.substr(0, std::min(size, whole.size())) : whole;
+        return question.type == type ? whole.substr(0, whole.size() - lost) : whole;
       });
-      if (size % 6 != 0) continue;  // one that is no answer at all costs the resolver's patience
-      try {
-        for (const Found& found : resolve_by_dns(kFalcon, server.address())) EXPECT_EQ(found.host, "localhost");
-      } catch (const std::runtime_error& error) {
-        EXPECT_NE(std::string(error.what()).find("_tendon._udp.example.org"), std::string::npos) << error.what();
-      }
+      EXPECT_THROW(resolve_by_dns(kFalcon, server.address()), std::runtime_error) << type << ", " << lost;
     }
   }
 }
