@@ -48,9 +48,10 @@ std::optional<int> list_servers(const ServerName& server, bool json) {
     const auto name = [](const dns_sd::Found& found) { return "dns-sd:" + to_string(found.instance); };
     for (const dns_sd::Found& found : all) width = std::max(width, name(found).size());
     for (const dns_sd::Found& found : all) {
-      std::string line = name(found);
-      if (!json) line.resize(width + 2, ' ');
-      std::cout << (json ? in_json(found, line) : line + in_words(found)) << '\n';
+      const std::string words = in_words(found);
+      std::string line = json ? in_json(found, name(found)) : name(found);
+      if (!json && !words.empty()) line += std::string(width + 2 - line.size(), ' ') + words;
+      std::cout << line << '\n';
     }
     std::cout.flush();
     if (all.empty()) std::cerr << "nobody answers for " << full_name(*server.instance()) << '\n';

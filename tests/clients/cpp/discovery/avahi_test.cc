@@ -91,7 +91,7 @@ TEST_F(AvahiDiscovery, AListHasEachNameOnceAndNothingThatATerminalObeys) {
   ::testing::internal::CaptureStdout();
   EXPECT_EQ(list_servers("dns-sd:", false), 0);
   EXPECT_EQ(::testing::internal::GetCapturedStdout(),
-            "dns-sd:evil          \n"
+            "dns-sd:evil\n"
             "dns-sd:falcon v1\\.2  left, 1000 Hz, channels a b, at bench.local:47100\n");
   ::testing::internal::CaptureStdout();
   EXPECT_EQ(list_servers("dns-sd:", true), 0);
