@@ -88,7 +88,8 @@ std::optional<int> parse(int argc, char** argv, Options& options) {
         }
       },
       "");
-  app.add_option("--server", server, "Where tendond listens: an address, or a host name or dns-sd:NAME, which is looked up once")
+  app.add_option("--server", server,
+                 "Where tendond listens: an address, or a host name or dns-sd:NAME, which is looked up once")
       ->type_name("HOST:PORT")
       ->capture_default_str()
       ->check(name);

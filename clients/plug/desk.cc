@@ -30,8 +30,8 @@ Desk::Place::Place(const DeskConfig& config, const std::string& device, LocalTim
     : name(device.empty() ? "device" : device),
       watcher(config.server, config.client.key.has_value()),
       controller(config.server, config.client.key.has_value()),
-      plug({watcher, watcher.server()}, {controller, controller.server()},
-           config_of(config, device, watcher.device()), now) {}
+      plug({watcher, watcher.server()}, {controller, controller.server()}, config_of(config, device, watcher.device()),
+           now) {}
 
 Desk::Desk(DeskConfig config, LocalTime now) : config_(std::move(config)), next_line_(now + kLineEvery) {
   if (config_.devices.empty()) config_.devices.emplace_back();

@@ -10,6 +10,8 @@ install(TARGETS tendond tendon-softbody tendon-lab tendon-report tendon-identify
 install(DIRECTORY deploy/scenes/ DESTINATION ${CMAKE_INSTALL_DATADIR}/tendon/scenes COMPONENT programs
         FILES_MATCHING PATTERN "*.toml" PATTERN "*.msh")
 install(FILES README.md CHANGELOG.md LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT programs)
+install(FILES deploy/discovery/README.md deploy/discovery/records.md deploy/discovery/tendon.service.in
+        DESTINATION ${CMAKE_INSTALL_DATADIR}/tendon/discovery COMPONENT programs)
 if(TARGET tendon-dash)
   list(APPEND programs tendon-dash)
   install(TARGETS tendon-dash COMPONENT programs)
@@ -101,6 +103,7 @@ set(CPACK_DEBIAN_RUN_PACKAGE_NAME tendon)
 set(CPACK_DEBIAN_RUN_PACKAGE_SECTION science)
 set(CPACK_DEBIAN_RUN_PACKAGE_SHLIBDEPS ON)
 set(CPACK_DEBIAN_RUN_PACKAGE_RECOMMENDS gnuplot-nox)
+set(CPACK_DEBIAN_RUN_PACKAGE_SUGGESTS avahi-daemon)
 set(CPACK_DEBIAN_RUN_DESCRIPTION "Networked haptics server with an energy-bounding output limiter
  Runs the loop of a haptic device at 1 kHz and bounds every force so that the device never gives out more energy than it took in,
  while physics engines anywhere on the network send forces late, rarely or wrong.")

@@ -156,8 +156,8 @@ class Announcer::Avahi {
   }
 
   void lost(const std::string& why) {
-    say(true, "not announced by [discovery]: " + why + ". Expected a running avahi-daemon; clients find this server by " +
-                  "its address all the same");
+    say(true, "not announced by [discovery]: " + why +
+                  ". Expected a running avahi-daemon; clients find this server by " + "its address all the same");
   }
 
   /// Tries again later: this may be a callback of the bus.
@@ -301,9 +301,10 @@ class Announcer::Avahi {
 
 Announcer::Announcer(std::vector<Device> devices, const Address& listen, Say say) {
   if (is_loopback(listen)) {
-    throw std::runtime_error("[discovery] announce: the server listens on " + to_string(listen) +
-                             ", which no other machine reaches; expected [network] with listen = \"0.0.0.0:47100\", or " +
-                             "another address of this machine, and keys");
+    throw std::runtime_error(
+        "[discovery] announce: the server listens on " + to_string(listen) +
+        ", which no other machine reaches; expected [network] with listen = \"0.0.0.0:47100\", or " +
+        "another address of this machine, and keys");
   }
   avahi_ = std::make_unique<Avahi>(std::move(devices), listen, std::move(say));
 }

@@ -44,9 +44,9 @@ class Discovery : public ::testing::Test {
       std::filesystem::create_directory(folder.path() / keys);
       Process keygen(program("tendond"), {"keygen", "wall", "--out", keys + "/wall.key"}, folder.path());
       if (keygen.wait() != 0) throw std::runtime_error(keygen.err());
-      write(folder.path() / (keys + ".toml"), "[device]\nkind = \"simulated\"\nprofile = \"falcon\"\n[network]\nkeys = \"" +
-                                                  keys + "\"\nlisten = \"0.0.0.0:0\"\n[discovery]\nannounce = true\n" +
-                                                  "name = \"" + kName + "\"\n");
+      write(folder.path() / (keys + ".toml"),
+            "[device]\nkind = \"simulated\"\nprofile = \"falcon\"\n[network]\nkeys = \"" + keys +
+                "\"\nlisten = \"0.0.0.0:0\"\n[discovery]\nannounce = true\n" + "name = \"" + kName + "\"\n");
     }
   }
 

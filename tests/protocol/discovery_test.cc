@@ -43,8 +43,7 @@ TEST(Discovery, ANameHas63BytesOfUtf8WithoutControlCharacters) {
   EXPECT_TRUE(is_instance_name("\xE5\x8A\x9B 3"));
   EXPECT_FALSE(is_instance_name(longest + "x"));
   EXPECT_FALSE(is_instance_name(std::string_view("a\0b", 3)));
-  for (const char* const name :
-       {"", "a\nb", "\x7F", "\x1B[2J", "\xC2\x9B[2J", "\xC3", "\xFF", "\xED\xA0\x80"}) {
+  for (const char* const name : {"", "a\nb", "\x7F", "\x1B[2J", "\xC2\x9B[2J", "\xC3", "\xFF", "\xED\xA0\x80"}) {
     EXPECT_FALSE(is_instance_name(name)) << name;
   }
 }
@@ -58,7 +57,8 @@ TEST(Discovery, WhatIsNoNameIsRefusedWithTheReason) {
   EXPECT_NE(refusal(std::string(64, 'a')).find("63 bytes"), std::string::npos);
   const std::string too_long(64, 'a');
   for (const std::string_view domain : {".", "..", "a..b", "exa mple", "a/b", "-.\n", too_long.c_str()}) {
-    EXPECT_NE(refusal("a." + std::string(domain)).find("after the first dot comes a domain"), std::string::npos) << domain;
+    EXPECT_NE(refusal("a." + std::string(domain)).find("after the first dot comes a domain"), std::string::npos)
+        << domain;
   }
   std::string of_254_bytes(62, 'a');
   while (of_254_bytes.size() < 254) of_254_bytes.append(1, '.').append(63, 'b');
@@ -67,8 +67,8 @@ TEST(Discovery, WhatIsNoNameIsRefusedWithTheReason) {
 }
 
 TEST(Discovery, WhatIsWrittenIsReadAgain) {
-  for (const Instance& instance : {Instance{"a.b\\c d", "local"}, Instance{"\\065", "example.org"}, Instance{"", "local"},
-                                   Instance{"", "example.org"}, Instance{"\xC3\xA4.", "x"}}) {
+  for (const Instance& instance : {Instance{"a.b\\c d", "local"}, Instance{"\\065", "example.org"},
+                                   Instance{"", "local"}, Instance{"", "example.org"}, Instance{"\xC3\xA4.", "x"}}) {
     EXPECT_EQ(parse_instance(to_string(instance)), instance) << to_string(instance);
   }
   EXPECT_EQ(to_string({"falcon at bench 3", "local"}), "falcon at bench 3");

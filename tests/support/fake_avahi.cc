@@ -32,7 +32,8 @@ std::vector<std::string> read_strings(sd_bus_message* message) {
 
 /// As Avahi sends it, through a bus that says who that is.
 template <class... Values>
-void emit(sd_bus* bus, const char* path, const char* interface, const char* member, const char* types, Values... values) {
+void emit(sd_bus* bus, const char* path, const char* interface, const char* member, const char* types,
+          Values... values) {
   sd_bus_message* signal = nullptr;
   sd_bus_message_new_signal(bus, &signal, path, interface, member);
   sd_bus_message_set_sender(signal, ":1.7");
@@ -98,8 +99,8 @@ struct FakeAvahi::Peer {
   static void add(sd_bus_message* call, Announced& service) {
     const char* name = nullptr;
     const char* type = nullptr;
-    sd_bus_message_read(call, "iiussssq", &service.interface, &service.protocol, nullptr, &name, &type, nullptr, nullptr,
-                        &service.port);
+    sd_bus_message_read(call, "iiussssq", &service.interface, &service.protocol, nullptr, &name, &type, nullptr,
+                        nullptr, &service.port);
     service.name = name;
     service.type = type;
     service.txt = read_strings(call);

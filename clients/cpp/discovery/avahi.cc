@@ -73,7 +73,8 @@ class Conversation {
   /// Calls a method of Avahi's server; `answered` gets the answer, or an error.
   template <class... Values>
   void call(sd_bus_message_handler_t answered, void* self, const char* method, const char* types, Values... values) {
-    asked(sd_bus_call_method_async(bus_.get(), nullptr, kAvahi, "/", kServer, method, answered, self, types, values...));
+    asked(
+        sd_bus_call_method_async(bus_.get(), nullptr, kAvahi, "/", kServer, method, answered, self, types, values...));
   }
   void listen(const char* interface, sd_bus_message_handler_t heard, void* self) {
     asked(sd_bus_match_signal_async(bus_.get(), nullptr, kAvahi, nullptr, interface, nullptr, heard, nullptr, self));
@@ -269,8 +270,8 @@ class Browsing {
     const auto [place, is_new] = found_.try_emplace(name, One{this, {.instance = {name}}});
     if (!is_new || found_.size() > kDescribed) return;
     ++open_;
-    avahi_.call(described, &place->second, "ResolveService", "iisssiu", interface, protocol, name, kService, kLocal, kAny,
-                kNoAddress);
+    avahi_.call(described, &place->second, "ResolveService", "iisssiu", interface, protocol, name, kService, kLocal,
+                kAny, kNoAddress);
   }
 
   Conversation avahi_;

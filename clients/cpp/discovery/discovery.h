@@ -22,9 +22,9 @@ namespace tendon::dns_sd {
 struct Found {
   Instance instance;
   About about{};
-  std::string host{};                 ///< as is_domain(), "bench3.local"; empty: nobody has said it
+  std::string host{};  ///< as is_domain(), "bench3.local"; empty: nobody has said it
   std::uint16_t port = 0;
-  std::vector<Address> addresses{};   ///< of the host, the one to prefer first; of "local" alone, and not in a list
+  std::vector<Address> addresses{};  ///< of the host, the one to prefer first; of "local" alone, and not in a list
 };
 
 /// Where `instance` is; one entry for each host that has it, the one to prefer first, at least one. Of "local" there is

@@ -13,7 +13,7 @@ namespace tendon {
 ///
 /// A line for each device, the name as --server takes it, "dns-sd:falcon at bench 3", then what is said of it; with
 /// `json`, {"server":"dns-sd:falcon at bench 3","device":"falcon","hz":1000,"suite":1,"channels":["main"],"version":1,
-/// "host":"bench3.local","port":47100}. What is said is not to be believed.
+/// "host":"bench3.local","port":47100}. Nobody vouches for any of it.
 std::optional<int> list_servers(const ServerName& server, bool json);
 
 }  // namespace tendon

@@ -78,8 +78,8 @@ const std::vector<Door>& front_doors() {
       {"nlohmann's JSON",
        {"nlohmann/"},
        {"server/commands/", "server/main.cc", "clients/cpp/discovery/list.cc", "clients/cpp/engine/self_test.cc",
-        "clients/cpp/run.cc", "clients/dashboard/page_json.cc", "clients/dashboard/foxglove_text.cc", "clients/plug/desk.cc",
-        "clients/plug/inverse/inverse_json.cc", "clients/softbody/explain.cc", "*_main.cc"}},
+        "clients/cpp/run.cc", "clients/dashboard/page_json.cc", "clients/dashboard/foxglove_text.cc",
+        "clients/plug/desk.cc", "clients/plug/inverse/inverse_json.cc", "clients/softbody/explain.cc", "*_main.cc"}},
       {"PETSc", {"petscksp.h"}, {"clients/softbody/mpi/spread_solver.cc"}},
       {"prometheus-cpp", {"prometheus/"}, {"clients/dashboard/metrics.cc"}},
       {"protobuf",
@@ -181,8 +181,8 @@ struct Include {
 bool is_cpp(std::string_view path) { return path.ends_with(".h") || path.ends_with(".cc"); }
 
 bool is_source(const File& file) {
-  return one_of(file.path, {"*.h", "*.cc", "*.in", "*.proto", "*.cmake", "*CMakeLists.txt", "*.mjs", "*.js", "*.ts",
-                            "*.py", "*.sh", "*.toml"}) ||
+  return one_of(file.path, {"*.h", "*.cc", "*.h.in", "*.cc.in", "*.cmake.in", "*.proto", "*.cmake", "*CMakeLists.txt",
+                            "*.mjs", "*.js", "*.ts", "*.py", "*.sh", "*.toml"}) ||
          file.text.starts_with("#!");
 }
 

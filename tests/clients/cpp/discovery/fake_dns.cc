@@ -38,8 +38,8 @@ std::string srv(unsigned priority, unsigned weight, unsigned port, const std::st
 }
 
 std::string answer(const Question& question, const std::vector<std::string>& records, unsigned flags) {
-  std::string bytes = question.id + two(flags) + two(1) + two(static_cast<unsigned>(records.size())) + two(0) + two(0) +
-                      question.bytes;
+  std::string bytes =
+      question.id + two(flags) + two(1) + two(static_cast<unsigned>(records.size())) + two(0) + two(0) + question.bytes;
   for (const std::string& one : records) bytes += one;
   return bytes;
 }

@@ -17,7 +17,10 @@ using testing::FakeDns;
 using namespace testing::dns;
 
 const Instance kFalcon{"falcon v1.2", "example.org"};
-const std::string kText = "\x03v=1\x0D" "device=falcon\x07" "hz=1000";
+const std::string kText =
+    "\x03v=1\x0D"
+    "device=falcon\x07"
+    "hz=1000";
 
 /// What a name server that has the falcon says.
 std::string sound(const Question& question, bool /*tcp*/) {
@@ -79,9 +82,8 @@ TEST(UnicastDiscovery, ListsADomain) {
 }
 
 TEST(UnicastDiscovery, ACutAnswerIsAskedForAgainByTcp) {
-  const FakeDns server([](const Question& question, bool tcp) {
-    return tcp ? sound(question, tcp) : answer(question, {}, 0x8380);
-  });
+  const FakeDns server(
+      [](const Question& question, bool tcp) { return tcp ? sound(question, tcp) : answer(question, {}, 0x8380); });
   EXPECT_EQ(resolve_by_dns(kFalcon, server.address()).at(0).host, "localhost");
 }
 
@@ -94,9 +96,10 @@ TEST(UnicastDiscovery, ANameThatIsNotThereIsSaidAndWhereToLook) {
 }
 
 TEST(UnicastDiscovery, SilenceEndsWithASentence) {
-  EXPECT_EQ(problem_with([](const Question&, bool) { return ""; }),
-            "cannot look for falcon v1\\.2._tendon._udp.example.org: no name server answers. Expected records of DNS-SD "
-            "in that domain, or HOST:PORT in place of a name");
+  EXPECT_EQ(
+      problem_with([](const Question&, bool) { return ""; }),
+      "cannot look for falcon v1\\.2._tendon._udp.example.org: no name server answers. Expected records of DNS-SD "
+      "in that domain, or HOST:PORT in place of a name");
 }
 
 TEST(UnicastDiscovery, AnAnswerToAnotherQuestionIsNone) {
