@@ -31,7 +31,7 @@ struct Found {
 /// one, at the first address that came and what came 0.2 s after it; waits at most 3 s.
 std::vector<Found> resolve(const Instance& instance);
 
-/// All instances of a domain, by name; may be empty. Of "local" waits 2 to 4 s. The first kDescribed that come have
+/// All instances of a domain, by name; may be empty. Of "local" waits 1 to 4 s. The first kDescribed that come have
 /// their host and TXT record, where somebody answered for those: each is two more questions to everybody.
 std::vector<Found> browse(const std::string& domain);
 inline constexpr std::size_t kDescribed = 64;
