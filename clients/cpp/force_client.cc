@@ -214,6 +214,7 @@ void ForceClient::open(LocalTime now, const Welcome& welcome) {
   peer_reports_.clear();
   if (config_.state_hz > 0) session.request(SetStateRate{.hz = config_.state_hz, .device = place_.device});
   sequence_ = 0;
+  answered_tick_ = 0;
   if (config_.deadband)
     deadband_ = HandleDeadband::of_forces(*config_.deadband);  // this session was sent none of the forces before
   stats_.phase = Phase::kOpen;
@@ -342,40 +343,33 @@ bool ForceClient::call(LocalTime now) {
   }
 }
 
-/// The torque and the grip of an answer, as far as they can be sent.
-void ForceClient::add_handle(const Touch& touch, const DeviceState& answered, ForceCommand& command) {
+bool ForceClient::answer(LocalTime now, const Reply& reply) {
+  if (connection_.session() == nullptr || stats_.phase != Phase::kOpen || reply.to.session != stats_.sessions ||
+      !holds_ || reply.to.hand.tick < answered_tick_ || reply.touch.unknown) {
+    return false;
+  }
+  send(now, reply.touch, reply.to.hand);
+  return true;
+}
+
+/// Takes from a command what this server or its device does not know.
+void ForceClient::leave_out(const Touch& touch, const DeviceState& answered, ForceCommand& command) {
+  if (!agreed_to(kFeatureLocalModel)) command.model.reset();
   if (!touch.torque && !touch.angular_stiffness && !touch.grip_force) return;
   if (!agreed_to(kFeatureHandle)) {
     stats_.left_out = "torque and grip force: the server does not know them";
-    return;
-  }
-  command.grip_force = touch.grip_force;
-  if (!touch.torque && !touch.angular_stiffness) return;
-  RemoteTorque& torque = command.torque.emplace();
-  torque.torque = touch.torque.value_or(Vec3(Vec3::Zero()));
-  if (!touch.angular_stiffness) return;
-  if (answered.turning) {
-    torque.model = RotationModel{.at = answered.turning->orientation, .stiffness = *touch.angular_stiffness};
-  } else {
+    command.torque.reset();
+    command.grip_force.reset();
+  } else if (touch.angular_stiffness && !answered.turning) {
     stats_.left_out = "angular stiffness: the device does not measure its orientation";
   }
 }
 
 void ForceClient::send(LocalTime now, const Touch& touch, const DeviceState& answered) {
-  ForceCommand command;
-  command.based_on_tick = answered.tick;
-  command.force = touch.force;
+  ForceCommand command = to_command(touch, answered);
   command.device = place_.device;
   command.channel = place_.channel;
-  command.topology_changed = touch.topology_changed;
-  command.error = touch.error;
-  if ((touch.stiffness || touch.contact) && agreed_to(kFeatureLocalModel)) {
-    command.model = LocalModel{.at = answered.position,
-                               .stiffness = touch.stiffness.value_or(Mat3(Mat3::Zero())),
-                               .valid_radius = touch.valid_radius,
-                               .contact = touch.contact};
-  }
-  add_handle(touch, answered, command);
+  leave_out(touch, answered, command);
   if (!in_bounds(command)) {
     ++stats_.forces_unusable;
     stats_.unusable = objection(command);

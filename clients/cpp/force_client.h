@@ -12,6 +12,7 @@
 #include <string_view>
 #include <vector>
 
+#include "clients/cpp/touch.h"
 #include "protocol/connection.h"
 #include "protocol/link.h"
 #include "protocol/messages.h"
@@ -21,33 +22,16 @@
 
 namespace tendon {
 
-/// The physics engine's answer to one device state.
-struct Touch {
-  Touch() = default;
-  /// Implicit, so that a callback may simply return a Vec3.
-  Touch(const Vec3& f) : force(f) {}  // NOLINT(google-explicit-constructor)
+/// A state that an engine was shown, to be named when its answer comes later.
+struct Seen {
+  DeviceState hand{};
+  std::uint64_t session = 0;  ///< ForceClient::Stats::sessions when it came
+};
 
-  Vec3 force = Vec3::Zero();  ///< N, on the hand: a wall that resists motion along +x sends −x
-  // The rest lets the device loop follow the hand until the next answer (core/remote/answer.h). The engine gives as
-  // much of it as it knows; the server uses it when both have agreed to `kFeatureLocalModel`.
-  std::optional<Mat3> stiffness{};  ///< N/m, −∂force/∂position at the state's position; a wall with normal n: k·n·nᵀ
-  double valid_radius = std::numeric_limits<double>::infinity();  ///< m, how far from there the stiffness holds
-  std::optional<Contact> contact{};  ///< the surface, with the force at other depths in a table where that is known
-  /// The body has been cut or torn since the previous answer: the server then uses neither answer's stiffness or table.
-  bool topology_changed = false;
-  std::optional<double> error{};  ///< N, the engine's own estimate of the error of `force`; recorded with it
-  // For a device whose handle has more motors than those of its position (ForceClient::handle()), of a server that
-  // knows `kFeatureHandle`; another one is sent `force` without these (Stats::left_out).
-  std::optional<Vec3> torque{};  ///< N·m, on the hand, base frame axes, about the handle's position
-  /// N·m/rad, −∂torque/∂θ at the state's orientation: with it the device loop follows the turning hand. Symmetric; a
-  /// spring is positive. Only in answer to a state with an orientation.
-  std::optional<Mat3> angular_stiffness{};
-  std::optional<double> grip_force{};  ///< N, on the fingers of the gripper; > 0 opens them
-  /// How long the server may take this answer as fresh, for an engine that knows it: cut to 1 µs … limits::kMaxValidFor.
-  /// Empty: Config::valid_for.
-  std::optional<Duration> valid_for{};
-  /// The engine knows no force: nothing is sent, because a zero would look known. The rest does not matter.
-  bool unknown = false;
+/// An answer that took its time, and the state that it is to (ForceClient::answer).
+struct Reply {
+  Seen to{};
+  Touch touch{};
 };
 
 /// The physics engine as a function: device state in, force out. It may take its time: while it computes, newer states
@@ -189,6 +173,12 @@ class ForceClient {
   /// that state, and for which the next state would come late. Nothing happens without a state.
   void answer_again() { unseen_ = newest_; }
 
+  /// For an engine that computes elsewhere while this thread goes on: its callback returned an unknown force, and this
+  /// is what it has come to. The force leaves with the next turn, which is due at once. False, and nothing is sent:
+  /// the session of that state is over, another client holds the channel, or a newer state has been answered. No force
+  /// answers an older motion than the one before.
+  bool answer(LocalTime now, const Reply& reply);
+
   /// Asks the server to clear a latched fault of its device, and to take a disarm back; with a safety layer it is the
   /// request to arm. Controllers only: an observer is refused. False when there is no session to ask in, or too many
   /// requests are open.
@@ -270,7 +260,7 @@ class ForceClient {
   bool call(LocalTime now);
   std::optional<DeviceState> due_state(LocalTime now);
   void send(LocalTime now, const Touch& touch, const DeviceState& answered);
-  void add_handle(const Touch& touch, const DeviceState& answered, ForceCommand& command);
+  void leave_out(const Touch& touch, const DeviceState& answered, ForceCommand& command);
   Duration valid_for(std::uint64_t tick) const;
   Duration haptic_period() const;
   LocalTime next_call() const;

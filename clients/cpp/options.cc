@@ -130,6 +130,11 @@ void CommandLine::add(const std::string& name, double& value, const std::string&
   parser_->app.add_option(name, value, meaning)->capture_default_str()->check(at_least(least));
 }
 
+void CommandLine::add(const std::string& name, std::string& value, const std::string& type,
+                      const std::string& meaning) {
+  parser_->app.add_option(name, value, meaning)->capture_default_str()->type_name(type);
+}
+
 void CommandLine::add(const std::string& name, bool& value, const std::string& meaning) {
   parser_->app.add_flag(name, value, meaning);
 }

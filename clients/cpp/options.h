@@ -28,6 +28,8 @@ class CommandLine {
                     const std::string& meaning);
   /// A finite number ≥ `least`: "--stiffness-n-per-m".
   void add(const std::string& name, double& value, const std::string& meaning, double least = 0);
+  /// A text: "--launch COMMAND", where `type` is "COMMAND".
+  void add(const std::string& name, std::string& value, const std::string& type, const std::string& meaning);
   /// A switch: "--local-model".
   void add(const std::string& name, bool& value, const std::string& meaning);
 

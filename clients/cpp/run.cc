@@ -50,6 +50,8 @@ class Guest {
   /// Does what is due at `now` and says what has changed. The latest time for the next turn; empty when it is over for
   /// good.
   std::optional<LocalTime> turn(LocalTime now);
+  void answer(LocalTime now, const Reply& reply) { client_.answer(now, reply); }
+  std::uint64_t sessions() const { return client_.stats().sessions; }
   /// Says Bye.
   void leave(LocalTime now) { client_.stop(now); }
   /// Says Bye, and sums up. Whether there was a session.
@@ -212,9 +214,30 @@ bool Guest::end(LocalTime now, Duration duration) {
   return stats.sessions > 0;
 }
 
+/// What a run does beside its callbacks.
+struct Beside {
+  bool* heard = nullptr;           ///< set by the callback: Options::on_silence
+  Elsewhere* elsewhere = nullptr;  ///< its states come by the callback
+  std::optional<DeviceState>* seen = nullptr;
+};
+
+/// Shows the engine what was seen, and sends what it has come to. When the next turn is due.
+LocalTime turn_elsewhere(const Beside& beside, Guest& guest, LocalTime now) {
+  if (beside.seen->has_value()) {
+    beside.elsewhere->see(now, {.hand = **beside.seen, .session = guest.sessions()});
+    beside.seen->reset();
+  }
+  bool answered = false;
+  while (const auto reply = beside.elsewhere->turn(now)) {
+    guest.answer(now, *reply);
+    answered = true;
+  }
+  return answered ? now : beside.elsewhere->next_turn();
+}
+
 /// One session for each callback, by the name of its device; "" is whatever the options name.
 template <typename Callback>
-int run_with(const Options& options, const std::map<std::string, Callback>& callbacks, bool* heard = nullptr) {
+int run_with(const Options& options, const std::map<std::string, Callback>& callbacks, const Beside& beside = {}) {
   try {
     const StopSignals signals;
     const LocalTime start = read_clock();
@@ -225,6 +248,7 @@ int run_with(const Options& options, const std::map<std::string, Callback>& call
       transports.push_back(&guests.emplace_back(options, device, callback, start).transport());
     }
     LocalTime now = start;
+    bool* const heard = beside.heard;
     LocalTime quiet = heard != nullptr ? start + options.silence : LocalTime::max();
     while (now < end && !signals.asked()) {
       LocalTime next = end;
@@ -236,13 +260,15 @@ int run_with(const Options& options, const std::map<std::string, Callback>& call
         }
         next = std::min(next, *due);
       }
+      if (beside.elsewhere != nullptr) next = std::min(next, turn_elsewhere(beside, guests.front(), now));
       if (heard != nullptr) {
         const bool answered = std::exchange(*heard, false);
         if (!answered && now >= quiet) options.on_silence(now);
         if (answered || now >= quiet) quiet = now + options.silence;
         next = std::min(next, quiet);
       }
-      UdpTransport::wait_for_any(transports, std::min(next - now, kLongestWait));
+      UdpTransport::wait_for_any(transports, std::min(next - now, kLongestWait),
+                                 beside.elsewhere != nullptr ? beside.elsewhere->descriptor() : -1);
       now = read_clock();
     }
     bool all = true;
@@ -267,7 +293,7 @@ int run(const Options& options, Physics physics) {
     heard = true;
     return physics(hand);
   };
-  return run_with<Physics>(options, {{"", hears}}, &heard);
+  return run_with<Physics>(options, {{"", hears}}, {.heard = &heard});
 }
 int run(const Options& options, Watch watch) { return run_with<Watch>(options, {{"", std::move(watch)}}); }
 
@@ -281,6 +307,17 @@ int run(const Options& options, const std::map<std::string, Physics>& physics) {
     return 1;
   }
   return run_with(options, physics);
+}
+
+int run(const Options& options, Elsewhere& engine) {
+  std::optional<DeviceState> seen;
+  const auto sees = [&](const DeviceState& hand) {
+    seen = hand;
+    Touch later;
+    later.unknown = true;
+    return later;
+  };
+  return run_with<Physics>(options, {{"", sees}}, {.elsewhere = &engine, .seen = &seen});
 }
 
 }  // namespace tendon

@@ -3,6 +3,7 @@
 
 #include <functional>
 #include <map>
+#include <optional>
 #include <string>
 
 #include "clients/cpp/force_client.h"
@@ -44,5 +45,24 @@ int run(const Options& options, Watch watch);      ///< an observer
 /// `options.client.device` must be empty. 0 means that every session was open once; the run ends when one ends for
 /// good.
 int run(const Options& options, const std::map<std::string, Physics>& physics);
+
+/// An engine that computes elsewhere: in another process, or on many machines. run() never waits for it.
+class Elsewhere {
+ public:
+  virtual ~Elsewhere() = default;
+
+  /// The newest state of the hand. Returns at once.
+  virtual void see(LocalTime now, const Seen& seen) = 0;
+  /// Does what is due at `now`. The next answer, if there is one: called until it is empty.
+  virtual std::optional<Reply> turn(LocalTime now) = 0;
+  /// The latest time for the next turn. A descriptor that can be read makes it due at once.
+  virtual LocalTime next_turn() const = 0;
+  /// For poll(): readable when there is something to do.
+  virtual int descriptor() const = 0;
+};
+
+/// The same as a controller whose forces come from `engine`, for one device. Forces that come too late to be sent
+/// (ForceClient::answer) are dropped.
+int run(const Options& options, Elsewhere& engine);
 
 }  // namespace tendon

@@ -98,8 +98,9 @@ void UdpTransport::wait(Duration timeout) {
   wait_for_any({&alone, 1}, timeout);
 }
 
-void UdpTransport::wait_for_any(std::span<UdpTransport* const> transports, Duration timeout) {
+void UdpTransport::wait_for_any(std::span<UdpTransport* const> transports, Duration timeout, int also) {
   std::vector<pollfd> readable;
+  if (also >= 0) readable.push_back({also, POLLIN, 0});
   for (UdpTransport* const transport : transports) {
     readable.push_back({transport->descriptor(), POLLIN, 0});
   }

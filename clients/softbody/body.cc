@@ -158,6 +158,23 @@ struct Made {
   StiffeningModel* stiffening = nullptr;
 };
 
+Patch middle_patch(const TouchSurface& surface, const Vec3& middle) {
+  if (auto found = surface.patch(surface.across(middle))) return *std::move(found);
+  throw std::invalid_argument("the middle of the touched side is not on the body");
+}
+
+/// A linear body that something else than this machine's factor solves.
+std::unique_ptr<Model> solved_model_of(const BodyConfig& config, const Solid& solid, const TouchSurface& surface,
+                                       const SolverOf& solver) {
+  EffectSet known = info(ModelKind::kLinear).always;
+  known.add(kFriction);
+  if (config.model != ModelKind::kLinear || !effects_of(config).within(known)) {
+    throw std::invalid_argument(
+        "on many machines a body has the model \"linear\", and no effects but contact and friction");
+  }
+  return std::make_unique<SolvedModel>(solid, surface, middle_patch(surface, config.middle), solver(solid));
+}
+
 std::unique_ptr<Model> plain_model_of(const BodyConfig& config, const Solid& solid, const TouchSurface& surface) {
   QuasiStaticModel::Config newton{.max_iterations = config.max_iterations};
   if (config.self_collision) newton.self_collision = config.material.young / *config.self_collision;
@@ -218,9 +235,11 @@ std::unique_ptr<CondensedModel> condensed_from(const BodyConfig& config, const S
   return model;
 }
 
-Made model_of(const BodyConfig& config, const Solid& solid, const TouchSurface& surface) {
+Made model_of(const BodyConfig& config, const Solid& solid, const TouchSurface& surface, const SolverOf& solver) {
   Made made;
-  if (config.model == ModelKind::kCondensed) {
+  if (solver) {
+    made.model = solved_model_of(config, solid, surface, solver);
+  } else if (config.model == ModelKind::kCondensed) {
     auto condensed = config.table_file ? condensed_from(config, solid, surface, made.linear_up_to.emplace())
                                        : std::make_unique<CondensedModel>(solid, surface, touchable(config, surface));
     made.condensed = condensed.get();
@@ -290,11 +309,6 @@ double linear_limit(const Solid& solid, const TouchSurface& surface, const Patch
   return depth * Body::kLargestTurn / solid.largest_turn(u);
 }
 
-Patch middle_patch(const TouchSurface& surface, const Vec3& middle) {
-  if (auto found = surface.patch(surface.across(middle))) return *std::move(found);
-  throw std::invalid_argument("the middle of the touched side is not on the body");
-}
-
 }  // namespace
 
 std::span<const EffectInfo> effects() noexcept { return kEffects; }
@@ -339,10 +353,10 @@ EffectSet effects_of(const BodyConfig& config) {
 }
 
 struct Body::Parts {
-  explicit Parts(const BodyConfig& config)
+  Parts(const BodyConfig& config, const SolverOf& solver)
       : solid(solid_of(checked(config))),
         surface(solid.mesh(), config.towards_tool, config.patch_radius),
-        made(model_of(config, solid, surface)),
+        made(model_of(config, solid, surface, solver)),
         model(*made.model),
         contact(model, surface, config.tool_radius, config.side, friction_of(config)),
         patch(middle_patch(surface, config.middle)),
@@ -420,7 +434,8 @@ void Body::Parts::note(Feel& feel) {
   cut(PlannedCut::When::kForce, feel.force.dot(surface.normal()));
 }
 
-Body::Body(const BodyConfig& config) : parts_(std::make_unique<Parts>(config)) {}
+Body::Body(const BodyConfig& config) : Body(config, SolverOf()) {}
+Body::Body(const BodyConfig& config, const SolverOf& solver) : parts_(std::make_unique<Parts>(config, solver)) {}
 Body::~Body() = default;
 Body::Body(Body&&) noexcept = default;
 Body& Body::operator=(Body&&) noexcept = default;
@@ -461,7 +476,7 @@ Reaction Body::settle(Given given, double value) {
   return softbody::settle(parts_->model, parts_->patch, given, value);
 }
 
-SurfaceTable condense(const BodyConfig& config, const std::function<std::unique_ptr<Solver>(const Solid&)>& solver_of) {
+SurfaceTable condense(const BodyConfig& config, const SolverOf& solver_of) {
   if (config.model != ModelKind::kCondensed) throw std::invalid_argument("only the model \"condensed\" has a table");
   BodyConfig anew = config;
   anew.table_file.reset();
@@ -505,6 +520,14 @@ Body::Size Body::size() const {
           static_cast<std::size_t>(parts_->solid.free_count()), parts_->surface.nodes().size(),
           parts_->model.bytes() + parts_->contact.bytes() + (parts_->capsule ? parts_->capsule->bytes() : 0) +
               (parts_->cutting ? parts_->cutting->cuts.bytes() : 0)};
+}
+
+Body::Size Body::size_of(const BodyConfig& config, int& under_patch) {
+  const Solid solid = solid_of(checked(config));
+  const TouchSurface surface(solid.mesh(), config.towards_tool, config.patch_radius);
+  under_patch = static_cast<int>(middle_patch(surface, config.middle).nodes.size());
+  return {solid.mesh().nodes.size(), static_cast<std::size_t>(solid.mesh().element_count()),
+          static_cast<std::size_t>(solid.free_count()), touchable(config, surface).size(), 0};
 }
 
 }  // namespace tendon::softbody

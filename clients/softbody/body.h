@@ -5,7 +5,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
-#include <functional>
 #include <initializer_list>
 #include <memory>
 #include <optional>
@@ -50,6 +49,7 @@ class EffectSet {
   }
   constexpr void add(EffectKind kind) { bits_ |= bit(kind); }
   constexpr bool has(EffectKind kind) const { return (bits_ & bit(kind)) != 0; }
+  constexpr bool within(EffectSet other) const { return (bits_ & ~other.bits_) == 0; }
 
  private:
   static constexpr unsigned bit(EffectKind kind) { return 1U << static_cast<unsigned>(kind); }
@@ -160,8 +160,7 @@ EffectSet effects_of(const BodyConfig& config);
 
 /// The table of a kCondensed body, to be kept in a file. `solver` says how the body is solved: on this machine
 /// (with_factor), or on many (mpi/spread_solver.h). Throws what Body throws, and what the solver throws.
-SurfaceTable condense(const BodyConfig& config,
-                      const std::function<std::unique_ptr<Solver>(const Solid&)>& solver = with_factor);
+SurfaceTable condense(const BodyConfig& config, const SolverOf& solver = with_factor);
 
 /// Mesh, model and contact of one body, built from a BodyConfig. Thread-safe: no. Realtime-safe: no.
 class Body {
@@ -169,6 +168,8 @@ class Body {
   /// Throws std::invalid_argument with a sentence when the values describe no possible body, or when the cuts leave
   /// nothing to touch.
   explicit Body(const BodyConfig& config);
+  /// The same, solved by `solver`: a kLinear body without effects but contact and friction; others are refused.
+  Body(const BodyConfig& config, const SolverOf& solver);
   ~Body();
   Body(Body&&) noexcept;
   Body& operator=(Body&&) noexcept;
@@ -212,6 +213,9 @@ class Body {
     std::size_t bytes;      ///< kept by the model, effects included
   };
   Size size() const;
+  /// The size of the body that `config` describes, without its model: `bytes` is 0. `under_patch`: the nodes of the
+  /// patch around the middle. Throws as the constructor does.
+  static Size size_of(const BodyConfig& config, int& under_patch);
 
  private:
   struct Parts;

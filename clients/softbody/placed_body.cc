@@ -5,14 +5,15 @@
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
+#include <utility>
 
 #include "core/base/arithmetic.h"
 #include "protocol/rotation.h"
 
 namespace tendon::softbody {
 
-PlacedBody::PlacedBody(const Scene& scene)
-    : body_(scene.body),
+PlacedBody::PlacedBody(const Scene& scene, Body body)
+    : body_(std::move(body)),
       to_device_(to_device(scene)),
       origin_(scene.at - to_device_ * body_.touch_point()),
       normal_(to_device_ * body_.normal()),

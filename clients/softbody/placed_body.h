@@ -13,7 +13,9 @@ namespace tendon::softbody {
 class PlacedBody {
  public:
   /// Throws std::invalid_argument when the scene describes no possible body.
-  explicit PlacedBody(const Scene& scene);
+  explicit PlacedBody(const Scene& scene) : PlacedBody(scene, Body(scene.body)) {}
+  /// The same with its body made already.
+  PlacedBody(const Scene& scene, Body body);
 
   /// The force on the hand at `position` (m, device frame) with the handle not turned, or at `handle`; all vectors are
   /// in the device frame. A body with time advances by one step.

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <limits>
 #include <stdexcept>
+#include <utility>
 
 #include "core/base/expect.h"
 
@@ -18,20 +19,6 @@ constexpr double kOtherSlope = 1.5;
 constexpr std::size_t kEnoughRuns = 3;
 
 using Runs = std::vector<const RunEstimate*>;
-
-RunEstimate estimate_of(const RampRun& run, const IdentificationConfig& config) {
-  const Slide slide = slide_of(run, config.encoder_step);
-  RunEstimate estimate;
-  estimate.place = run.place;
-  estimate.direction = slide.direction;
-  estimate.travel = slide.samples.back().position;
-  estimate.integral = integral_fit(slide, config.mass);
-  if (!(estimate.integral.mass > 0)) {
-    throw std::invalid_argument("the mass cannot be told from friction in this run: give it");
-  }
-  estimate.kelly = kelly_fit(slide, estimate.integral.mass);
-  return estimate;
-}
 
 struct Mean {
   double value = 0;
@@ -208,22 +195,43 @@ std::string_view to_string(Trust trust) noexcept {
   return "unknown";
 }
 
+RunEstimate fit_run(const RampRun& run, const IdentificationConfig& config) {
+  const Slide slide = slide_of(run, config.encoder_step);
+  RunEstimate estimate;
+  estimate.place = run.place;
+  estimate.direction = slide.direction;
+  estimate.travel = slide.samples.back().position;
+  estimate.integral = integral_fit(slide, config.mass);
+  if (!(estimate.integral.mass > 0)) {
+    throw std::invalid_argument("the mass cannot be told from friction in this run: give it");
+  }
+  estimate.kelly = kelly_fit(slide, estimate.integral.mass);
+  return estimate;
+}
+
 Identification identify_friction(std::span<const RampRun> runs, const IdentificationConfig& config) {
+  std::vector<RunEstimate> fits;
+  for (const RampRun& run : runs) {
+    try {
+      fits.push_back(fit_run(run, config));
+    } catch (const std::invalid_argument& error) {
+      throw std::invalid_argument("run " + std::to_string(fits.size() + 1) + ": " + error.what());
+    }
+  }
+  return identify_friction(std::move(fits));
+}
+
+Identification identify_friction(std::vector<RunEstimate> runs) {
   if (runs.empty()) throw std::invalid_argument("expected one run or more, found none");
   Identification result;
   double squares = 0;
   double unit = 0;
-  for (const RampRun& run : runs) {
-    try {
-      result.runs.push_back(estimate_of(run, config));
-    } catch (const std::invalid_argument& error) {
-      throw std::invalid_argument("run " + std::to_string(result.runs.size() + 1) + ": " + error.what());
-    }
-    const IntegralFit& fit = result.runs.back().integral;
-    squares += fit.residual_squares;
-    unit += fit.unit_residual;
-    result.mass += fit.mass / static_cast<double>(runs.size());
+  for (const RunEstimate& run : runs) {
+    squares += run.integral.residual_squares;
+    unit += run.integral.unit_residual;
+    result.mass += run.integral.mass / static_cast<double>(runs.size());
   }
+  result.runs = std::move(runs);
   // One device, one noise: a single run knows its own only roughly.
   result.force_noise = std::sqrt(squares / unit);
   for (RunEstimate& run : result.runs) {

@@ -77,8 +77,16 @@ struct IdentificationConfig {
   double encoder_step = 0;     ///< m, one count
 };
 
-/// Throws std::invalid_argument when there are no runs, or "run i: …" (counted from 1) with the message of slide_of,
-/// kelly_fit or integral_fit.
+/// The fits of one run, which know nothing of the others: without RunEstimate::integral_error, which takes all. Throws
+/// std::invalid_argument with the message of slide_of, kelly_fit or integral_fit.
+/// Thread-safe: yes. Realtime-safe: no.
+RunEstimate fit_run(const RampRun& run, const IdentificationConfig& config);
+
+/// What the runs say together, by their fits. Throws std::invalid_argument when there are no runs.
+/// Thread-safe: yes. Realtime-safe: no.
+Identification identify_friction(std::vector<RunEstimate> runs);
+
+/// Both. Throws std::invalid_argument when there are no runs, or "run i: …" (counted from 1) with the message of fit_run.
 /// Thread-safe: yes. Realtime-safe: no.
 Identification identify_friction(std::span<const RampRun> runs, const IdentificationConfig& config);
 

@@ -7,10 +7,11 @@
         client.drive(lambda hand: [-500 * x for x in hand.position])
 
 `Client` waits; `tendon.aio.Client` is the same for asyncio; `ForceClient` is the whole behaviour without socket and
-clock, for a loop of your own. SI units, device base frame; a force is what the device exerts **on the hand**.
+clock, for a loop of your own. `tendon.worker.run(answer)` is all of a program that a front asks. SI units, device base
+frame; a force is what the device exerts **on the hand**.
 """
 
-from . import aio, cli
+from . import aio, cli, worker
 from .client import Client
 from .deadband import ForceDeadband
 from .force_client import Config, ForceClient, Phase, Stats
@@ -86,4 +87,5 @@ __all__ = [
     "aio",
     "cli",
     "read_key",
+    "worker",
 ]

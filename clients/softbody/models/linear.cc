@@ -2,6 +2,7 @@
 #include "clients/softbody/models/linear.h"
 
 #include <algorithm>
+#include <cmath>
 #include <stdexcept>
 
 #include "clients/softbody/effects/cutting.h"
@@ -25,6 +26,17 @@ Factor factor_of(const SymmetricMatrix& stiffness) {
     throw std::runtime_error("the body can still move as a whole: more of its nodes must be fixed");
   }
   return factor;
+}
+
+/// How deep each node of the patch is.
+VectorXd depth_of(const Solid& solid, const Vec3& normal, const Patch& patch, const VectorXd& displacements) {
+  VectorXd all = VectorXd::Zero(solid.size());
+  solid.add_free(displacements, all);
+  VectorXd depth(patch.weights.size());
+  for (Eigen::Index i = 0; i < depth.size(); ++i) {
+    depth[i] = -normal.dot(all.segment<3>(3 * patch.nodes[static_cast<std::size_t>(i)]));
+  }
+  return depth;
 }
 
 }  // namespace
@@ -73,13 +85,7 @@ VectorXd LinearModel::untouched() const {
 
 Reaction LinearModel::press(const Patch& patch, Given given, double value) {
   if (!effects_.empty()) return press_among_effects(patch, given, value);
-  VectorXd all = VectorXd::Zero(solid_.size());
-  solid_.add_free(displacements(patch), all);
-  VectorXd depth(patch.weights.size());
-  for (Eigen::Index i = 0; i < depth.size(); ++i) {
-    depth[i] = -normal_.dot(all.segment<3>(3 * patch.nodes[static_cast<std::size_t>(i)]));
-  }
-  return linear_reaction(patch, depth, given, value);
+  return linear_reaction(patch, depth_of(solid_, normal_, patch, displacements(patch)), given, value);
 }
 
 Reaction LinearModel::press_among_effects(const Patch& patch, Given given, double value) {
@@ -164,6 +170,40 @@ MatrixXd surface_compliance(const Solid& solid, const Vec3& normal, const std::v
     }
   }
   return 0.5 * (table + table.transpose());
+}
+
+Solver::Rough Solver::solve_roughly(const VectorXd& load) const {
+  Rough rough{.displacements = solve(load)};
+  rough.compliance = load.dot(rough.displacements);
+  return rough;
+}
+
+SolvedModel::SolvedModel(const Solid& solid, const TouchSurface& surface, const Patch& middle,
+                         std::unique_ptr<Solver> solver)
+    : solid_(solid), normal_(surface.normal()), solver_(std::move(solver)), slope_factor_(0) {
+  if (solid.law() != Law::kLinear) throw std::invalid_argument("a linear model wants the linear law");
+  MatrixXd loads(solid.free_count(), 2);
+  for (Eigen::Index axis = 0; axis < 2; ++axis) {
+    Patch reads = middle;
+    reads.weights = middle.slopes.row(axis).transpose();
+    loads.col(axis) = solid.to_free(patch_load(solid, normal_, reads));
+  }
+  constexpr double kOtherPlaces = 1.2;
+  slope_factor_ = kOtherPlaces * std::sqrt(loads.cwiseProduct(solver_->solve(loads)).sum());
+}
+
+Reaction SolvedModel::press(const Patch& patch, Given given, double value) {
+  const Solver::Rough rough = solver_->solve_roughly(solid_.to_free(patch_load(solid_, normal_, patch)));
+  const VectorXd depth = depth_of(solid_, normal_, patch, rough.displacements);
+  Reaction reaction = linear_reaction(patch, depth, given, value);
+  reaction.stiffness = 1 / rough.compliance;
+  reaction.force = constrained_force(given, value, 0, rough.compliance);
+  reaction.depth = given == Given::kDepth ? value : reaction.force * rough.compliance;
+  const double force = std::abs(reaction.force);
+  const double along = force * rough.missing / (rough.compliance + rough.missing);
+  const double aside = force * force * slope_factor_ * std::sqrt(rough.missing);
+  reaction.error = std::hypot(along, along * reaction.slope.norm(), aside);
+  return reaction;
 }
 
 CondensedModel::CondensedModel(const Solid& solid, const TouchSurface& surface, const std::vector<int>& nodes)

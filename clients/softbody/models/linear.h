@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <functional>
 #include <memory>
 
 #include "clients/softbody/effects/effects.h"
@@ -55,7 +56,17 @@ class Solver {
   Solver& operator=(const Solver&) = delete;
 
   virtual MatrixXd solve(const MatrixXd& loads) const = 0;
+
+  /// A solution that may be rough. The compliance under `load` is loadᵀ K⁻¹ load ∈ [compliance, compliance + missing].
+  struct Rough {
+    VectorXd displacements;  ///< m
+    double compliance = 0;   ///< load · displacements, and what the residual says of the rest
+    double missing = 0;      ///< a bound
+  };
+  /// One load (N). A solver that iterates stops when the force of a press is known to about a thousandth.
+  virtual Rough solve_roughly(const VectorXd& load) const;
 };
+using SolverOf = std::function<std::unique_ptr<Solver>(const Solid&)>;
 
 /// By a Cholesky factor on this machine. Throws std::runtime_error when the solid is not held fast.
 std::unique_ptr<Solver> with_factor(const Solid& solid);
@@ -63,6 +74,27 @@ std::unique_ptr<Solver> with_factor(const Solid& solid);
 /// G of CondensedModel, m/N, symmetric: rows and columns in the order of `nodes`. One solution for each node.
 MatrixXd surface_compliance(const Solid& solid, const Vec3& normal, const std::vector<int>& nodes,
                             const Solver& solver);
+
+/// The answers of LinearModel by a Solver, one rough solution each, for a body that is too large for one machine. No
+/// effects.
+///
+/// Reaction::error covers what the roughness leaves of the force F. With c the compliance and m what may be missing of
+/// it, F is at most F m / (c + m) too large, and by Cauchy and Schwarz the slope is off by at most F q √m, where q² is
+/// sᵀ K⁻¹ s for the loads s that read the slope: taken at the middle, a fifth more for other places.
+class SolvedModel : public Model {
+ public:
+  /// `middle` is a patch like those to come. The solid must outlive this.
+  SolvedModel(const Solid& solid, const TouchSurface& surface, const Patch& middle, std::unique_ptr<Solver> solver);
+
+  Reaction press(const Patch& patch, Given given, double value) override;
+  std::size_t bytes() const noexcept override { return 0; }  // the solver's, which may be elsewhere
+
+ private:
+  const Solid& solid_;
+  Vec3 normal_;
+  std::unique_ptr<Solver> solver_;
+  double slope_factor_;  ///< q, 1/√(N m)
+};
 
 /// The same answers from a table G: how far each touchable node gives way along the normal when another node is pushed
 /// with 1 N (a discrete Green's function; James & Pai 1999). An answer is wᵀ G w over the patch, so the inside of the

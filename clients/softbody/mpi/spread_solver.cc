@@ -3,10 +3,16 @@
 
 #include <petscksp.h>
 
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <cstdlib>
 #include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
+
+#include "clients/softbody/mpi/grid_levels.h"
 
 namespace tendon::softbody {
 namespace {
@@ -39,6 +45,11 @@ class Owned {
 };
 using Matrix = Owned<Mat, MatDestroy>;
 using Krylov = Owned<KSP, KSPDestroy>;
+using Vector = Owned<Vec, VecDestroy>;
+using NullSpace = Owned<MatNullSpace, MatNullSpaceDestroy>;
+
+constexpr double kFineTolerance = 1e-10;
+constexpr int kRemembered = 10;  // answers
 
 int rank_of(MPI_Comm comm) {
   int rank = 0;
@@ -77,24 +88,73 @@ MatrixXd stiffness_of_element(const Solid& solid, int element) {
 
 class SpreadSolver : public Solver {
  public:
-  explicit SpreadSolver(const Solid& solid)
+  SpreadSolver(const Solid& solid, Way way)
       : comm_(PETSC_COMM_WORLD),
         size_(solid.free_count()),
-        first_(share(size_, rank_of(comm_), count_of(comm_))),
-        rows_(share(size_, rank_of(comm_) + 1, count_of(comm_)) - first_) {
+        first_(first_row(rank_of(comm_))),
+        rows_(first_row(rank_of(comm_) + 1) - first_),
+        iterates_(way == Way::kMultigrid ||
+                  (way == Way::kChosen && size_ >= kMostForFactor && solid.material().poisson <= kMostPoisson)) {
+    if (size_ % 3 != 0) throw std::invalid_argument("on many ranks a node is held whole, or not at all");
     assemble(solid);
     check(KSPCreate(comm_, krylov_.address()));
     check(KSPSetOperators(krylov_, matrix_, matrix_));
-    check(KSPSetType(krylov_, KSPPREONLY));
     PC preconditioner = nullptr;
     check(KSPGetPC(krylov_, &preconditioner));
-    check(PCSetType(preconditioner, PCCHOLESKY));
-    check(PCFactorSetMatSolverType(preconditioner, MATSOLVERMUMPS));
+    if (iterates_) {
+      iterate(solid, preconditioner);
+    } else {
+      check(KSPSetType(krylov_, KSPPREONLY));
+      check(PCSetType(preconditioner, PCCHOLESKY));
+      check(PCFactorSetMatSolverType(preconditioner, MATSOLVERMUMPS));
+    }
     check(KSPSetFromOptions(krylov_));
     check(KSPSetUp(krylov_));
+    if (iterates_) know_the_spectrum();
+  }
+
+  Rough solve_roughly(const VectorXd& load) const override {
+    if (!iterates_) return Solver::solve_roughly(load);
+    put(load, load_);
+    Rough rough;
+    // The scale of the compliance is that of the answer before: patches of one body differ little.
+    double end = std::sqrt(kRough * least_ * compliance_);
+    constexpr int kTries = 4;
+    for (int i = 0; i < kTries; ++i) {
+      check(KSPSetTolerances(krylov_, compliance_ > 0 ? 1e-14 : kRough, end, PETSC_DEFAULT, kMostRounds));
+      check(KSPSolve(krylov_, load_, solution_));
+      expect_convergence();
+      check(MatMult(matrix_, solution_, residual_));
+      check(VecAYPX(residual_, -1, load_));
+      PetscReal of_residual = 0;
+      check(KSPGetResidualNorm(krylov_, &of_residual));
+      PetscScalar by_load = 0;
+      PetscScalar by_residual = 0;
+      check(VecDot(load_, solution_, &by_load));
+      check(VecDot(residual_, solution_, &by_residual));
+      rough.compliance = by_load + by_residual;
+      rough.missing = of_residual * of_residual / least_;
+      if (rough.missing <= kRough * rough.compliance) break;
+      end = 0.5 * std::sqrt(kRough * least_ * std::max(rough.compliance, 0.0));
+      compliance_ = rough.compliance;
+    }
+    compliance_ = rough.compliance;
+    rough.displacements = gathered(solution_);
+    return rough;
   }
 
   MatrixXd solve(const MatrixXd& loads) const override {
+    if (iterates_) {
+      check(KSPSetTolerances(krylov_, kFineTolerance, 0, PETSC_DEFAULT, kMostRounds));
+      MatrixXd solutions(size_, loads.cols());
+      for (Eigen::Index j = 0; j < loads.cols(); ++j) {
+        put(loads.col(j), load_);
+        check(KSPSolve(krylov_, load_, solution_));
+        expect_convergence();
+        solutions.col(j) = gathered(solution_);
+      }
+      return solutions;
+    }
     const auto columns = static_cast<PetscInt>(loads.cols());
     Matrix right;
     Matrix left;
@@ -109,15 +169,121 @@ class SpreadSolver : public Solver {
     check(MatDenseRestoreArrayWrite(right, &values));
     check(MatDuplicate(right, MAT_DO_NOT_COPY_VALUES, left.address()));
     check(KSPMatSolve(krylov_, right, left));
+    expect_convergence();
+    return gathered(left, loads.cols());
+  }
+
+ private:
+  static constexpr PetscInt kMostRounds = 1000;
+
+  /// Whole nodes belong to a rank.
+  PetscInt first_row(int rank) const { return 3 * share(size_ / 3, rank, count_of(comm_)); }
+
+  void expect_convergence() const {
     KSPConvergedReason reason = KSP_CONVERGED_ITERATING;
     check(KSPGetConvergedReason(krylov_, &reason));
     if (reason < 0) {
       throw std::runtime_error("PETSc: the solver did not converge (" + std::string(KSPConvergedReasons[reason]) + ")");
     }
-    return gathered(left, loads.cols());
   }
 
- private:
+  void iterate(const Solid& solid, PC preconditioner) {
+    check(KSPSetType(krylov_, KSPCG));
+    check(KSPSetNormType(krylov_, KSP_NORM_NATURAL));
+    check(KSPSetComputeSingularValues(krylov_, PETSC_TRUE));  // before KSPSetUp
+    check(MatCreateVecs(matrix_, solution_.address(), load_.address()));
+    check(VecDuplicate(load_, residual_.address()));
+    const std::vector<GridLevel> levels = grid_levels(solid);
+    if (levels.empty()) {
+      tell_rigid_motions(solid);
+      check(PCSetType(preconditioner, PCGAMG));
+      return;
+    }
+    check(PCSetType(preconditioner, PCMG));
+    check(PCMGSetLevels(preconditioner, static_cast<PetscInt>(levels.size()) + 1, nullptr));
+    check(PCMGSetGalerkin(preconditioner, PC_MG_GALERKIN_BOTH));
+    for (std::size_t i = 0; i < levels.size(); ++i) {
+      Matrix interpolation;
+      make_interpolation(levels[i], interpolation);
+      check(PCMGSetInterpolation(preconditioner, static_cast<PetscInt>(levels.size() - i), interpolation));
+    }
+  }
+
+  void make_interpolation(const GridLevel& level, Matrix& to) const {
+    const auto share_of = [&](std::size_t nodes, int rank) {
+      return share(static_cast<PetscInt>(nodes), rank, count_of(comm_));
+    };
+    const int rank = rank_of(comm_);
+    const PetscInt from = share_of(level.rows.size(), rank);
+    const PetscInt till = share_of(level.rows.size(), rank + 1);
+    const auto coarse = static_cast<std::size_t>(level.nodes);
+    const PetscInt columns = 3 * (share_of(coarse, rank + 1) - share_of(coarse, rank));
+    check(MatCreate(comm_, to.address()));
+    check(MatSetSizes(to, 3 * (till - from), columns, 3 * static_cast<PetscInt>(level.rows.size()), 3 * level.nodes));
+    check(MatSetType(to, MATAIJ));
+    std::vector<PetscInt> rows;
+    std::vector<PetscInt> across;
+    std::vector<PetscScalar> values;
+    for (PetscInt node = from; node < till; ++node) {
+      for (const GridLevel::Weight& weight : level.rows[static_cast<std::size_t>(node)]) {
+        for (PetscInt c = 0; c < 3; ++c) {
+          rows.push_back(3 * node + c);
+          across.push_back(3 * weight.node + c);
+          values.push_back(weight.value);
+        }
+      }
+    }
+    check(MatSetPreallocationCOO(to, static_cast<PetscCount>(values.size()), rows.data(), across.data()));
+    check(MatSetValuesCOO(to, values.data(), INSERT_VALUES));
+  }
+
+  /// What GAMG wants to know of elasticity: that a body can move as a whole.
+  void tell_rigid_motions(const Solid& solid) {
+    check(MatSetBlockSize(matrix_, 3));
+    Vector places;
+    check(VecCreate(comm_, places.address()));
+    check(VecSetSizes(places, rows_, size_));
+    check(VecSetBlockSize(places, 3));
+    check(VecSetUp(places));
+    VectorXd all(solid.size());
+    for (std::size_t i = 0; i < solid.mesh().nodes.size(); ++i) {
+      all.segment<3>(3 * static_cast<Eigen::Index>(i)) = solid.mesh().nodes[i];
+    }
+    put(solid.to_free(all), places);
+    NullSpace motions;
+    check(MatNullSpaceCreateRigidBody(places, motions.address()));
+    check(MatSetNearNullSpace(matrix_, motions));
+  }
+
+  /// λ: how much the multigrid may take too little of a residual.
+  void know_the_spectrum() {
+    VectorXd load(size_);  // something of every shape, the same on every rank and machine
+    std::uint64_t state = 1;
+    for (double& entry : load) {
+      state = state * 6364136223846793005ULL + 1442695040888963407ULL;
+      entry = static_cast<double>(state >> 40U) / (1U << 24U) - 0.5;
+    }
+    put(load, load_);
+    check(KSPSetTolerances(krylov_, kFineTolerance, 0, PETSC_DEFAULT, kMostRounds));
+    check(KSPSolve(krylov_, load_, solution_));
+    expect_convergence();
+    PetscReal most = 0;
+    PetscReal least = 0;
+    check(KSPComputeExtremeSingularValues(krylov_, &most, &least));
+    check(KSPSetComputeSingularValues(krylov_, PETSC_FALSE));
+    if (!(least > 0)) throw std::runtime_error("PETSc: the body can still move as a whole: more nodes must be fixed");
+    least_ = 0.8 * least;
+    check(KSPSetUseFischerGuess(krylov_, 1, kRemembered));
+  }
+
+  /// This rank's rows of a vector that is whole here.
+  void put(const VectorXd& from, Vec to) const {
+    PetscScalar* values = nullptr;
+    check(VecGetArrayWrite(to, &values));
+    for (PetscInt i = 0; i < rows_; ++i) values[i] = from[first_ + i];
+    check(VecRestoreArrayWrite(to, &values));
+  }
+
   void assemble(const Solid& solid) {
     const int elements = solid.mesh().element_count();
     const PetscInt from = share(elements, rank_of(comm_), count_of(comm_));
@@ -148,25 +314,33 @@ class SpreadSolver : public Solver {
     check(MatSetOption(matrix_, MAT_SPD, PETSC_TRUE));
   }
 
-  /// All rows, on every rank.
-  MatrixXd gathered(Mat spread, Eigen::Index columns) const {
+  /// All rows of a column, on every rank.
+  void gather(const PetscScalar* values, double* whole) const {
     const int ranks = count_of(comm_);
     std::vector<int> sizes(static_cast<std::size_t>(ranks));
     std::vector<int> starts(static_cast<std::size_t>(ranks));
     for (int r = 0; r < ranks; ++r) {
-      starts[static_cast<std::size_t>(r)] = share(size_, r, ranks);
-      sizes[static_cast<std::size_t>(r)] = share(size_, r + 1, ranks) - share(size_, r, ranks);
+      starts[static_cast<std::size_t>(r)] = first_row(r);
+      sizes[static_cast<std::size_t>(r)] = first_row(r + 1) - first_row(r);
     }
+    MPI_Allgatherv(values, rows_, MPI_DOUBLE, whole, sizes.data(), starts.data(), MPI_DOUBLE, comm_);
+  }
+  MatrixXd gathered(Mat spread, Eigen::Index columns) const {
     MatrixXd whole(size_, columns);
     const PetscScalar* values = nullptr;
     PetscInt stride = 0;
     check(MatDenseGetArrayRead(spread, &values));
     check(MatDenseGetLDA(spread, &stride));
-    for (Eigen::Index j = 0; j < columns; ++j) {
-      MPI_Allgatherv(values + j * stride, rows_, MPI_DOUBLE, whole.col(j).data(), sizes.data(), starts.data(),
-                     MPI_DOUBLE, comm_);
-    }
+    for (Eigen::Index j = 0; j < columns; ++j) gather(values + j * stride, whole.col(j).data());
     check(MatDenseRestoreArrayRead(spread, &values));
+    return whole;
+  }
+  VectorXd gathered(Vec spread) const {
+    VectorXd whole(size_);
+    const PetscScalar* values = nullptr;
+    check(VecGetArrayRead(spread, &values));
+    gather(values, whole.data());
+    check(VecRestoreArrayRead(spread, &values));
     return whole;
   }
 
@@ -174,8 +348,15 @@ class SpreadSolver : public Solver {
   PetscInt size_;
   PetscInt first_;
   PetscInt rows_;
+  bool iterates_;
   Matrix matrix_;
   Krylov krylov_;
+  // Of multigrid:
+  Vector load_;
+  Vector solution_;
+  Vector residual_;
+  double least_ = 0;               ///< λ
+  mutable double compliance_ = 0;  ///< m/N, of the last rough solution
 };
 
 }  // namespace
@@ -194,6 +375,18 @@ Ranks::~Ranks() {
 int Ranks::rank() const noexcept { return rank_of(PETSC_COMM_WORLD); }
 int Ranks::count() const noexcept { return count_of(PETSC_COMM_WORLD); }
 
-std::unique_ptr<Solver> on_ranks(const Solid& solid) { return std::make_unique<SpreadSolver>(solid); }
+std::unique_ptr<Solver> on_ranks(const Solid& solid, Way way) { return std::make_unique<SpreadSolver>(solid, way); }
+
+void share_out(std::vector<std::byte>& bytes) {
+  auto size = static_cast<std::uint64_t>(bytes.size());
+  MPI_Bcast(&size, 1, MPI_UINT64_T, 0, PETSC_COMM_WORLD);
+  bytes.resize(size);
+  MPI_Bcast(bytes.data(), static_cast<int>(size), MPI_BYTE, 0, PETSC_COMM_WORLD);
+}
+
+void end_all_ranks() {
+  MPI_Abort(MPI_COMM_WORLD, 1);
+  std::abort();
+}
 
 }  // namespace tendon::softbody

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The package as strangers get it: generated code, types, a wheel, examples, a page."""
 
+import os
 import re
 import shutil
 import subprocess
@@ -16,6 +17,9 @@ from tendon import tendon_pb2
 from tendon.messages import Code, Mode, Role
 
 PACKAGE = ROOT / "clients" / "python"
+EXAMPLES = sorted((PACKAGE / "examples").glob("*.py"))
+WORKERS = [file for file in EXAMPLES if "worker.run(" in file.read_text(encoding="utf-8")]
+GUESTS = [file for file in EXAMPLES if file not in WORKERS]
 
 
 def run(*command, **options):
@@ -72,7 +76,7 @@ def test_the_version_is_that_of_the_project():
     assert package[1] == project[1]
 
 
-@pytest.mark.parametrize("file", sorted((PACKAGE / "examples").glob("*.py")), ids=lambda file: file.stem)
+@pytest.mark.parametrize("file", GUESTS, ids=lambda file: file.stem)
 def test_an_example_has_at_most_30_lines_and_explains_itself(file):
     assert len(file.read_text(encoding="utf-8").splitlines()) <= 30
     help_text = run(sys.executable, file, "--help", env={"PYTHONPATH": str(PACKAGE), "PATH": ""})
@@ -82,6 +86,17 @@ def test_an_example_has_at_most_30_lines_and_explains_itself(file):
     for wrong in (["--server", "nowhere"], ["--rate-hz", "nan"], ["--duration-s", "-1"]):
         done = subprocess.run([sys.executable, file, *wrong], env={"PYTHONPATH": str(PACKAGE)}, capture_output=True)
         assert done.returncode == 2 and b"expected" in done.stderr
+
+
+@pytest.mark.parametrize("file", WORKERS, ids=lambda file: file.stem)
+def test_an_example_of_a_worker_explains_itself(file):
+    help_text = run(sys.executable, file, "--help", env={"PYTHONPATH": str(PACKAGE), "PATH": ""})
+    assert f"Example: tendon-fem serve SCENE --worker \"python3 {file.name}\"" in help_text
+    environment = os.environ | {"PYTHONPATH": str(PACKAGE)}
+    done = subprocess.run([sys.executable, file], env=environment, capture_output=True, text=True)
+    if "ModuleNotFoundError" in done.stderr:
+        pytest.skip(done.stderr.splitlines()[-1])
+    assert done.returncode == 1 and "TENDON_WORKER_ADDRESS: expected in the environment" in done.stderr
 
 
 def test_the_code_on_the_page_compiles():

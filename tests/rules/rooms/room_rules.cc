@@ -79,8 +79,10 @@ const std::vector<Door>& front_doors() {
        {"nlohmann/"},
        {"server/commands/", "server/main.cc", "clients/cpp/discovery/list.cc", "clients/cpp/engine/self_test.cc",
         "clients/cpp/run.cc", "clients/dashboard/page_json.cc", "clients/dashboard/foxglove_text.cc",
-        "clients/plug/desk.cc", "clients/plug/inverse/inverse_json.cc", "clients/softbody/explain.cc", "*_main.cc"}},
+        "clients/plug/desk.cc", "clients/plug/inverse/inverse_json.cc", "clients/softbody/cluster/estimate.cc",
+        "clients/softbody/explain.cc", "*_main.cc"}},
       {"PETSc", {"petscksp.h"}, {"clients/softbody/mpi/spread_solver.cc"}},
+      {"preCICE", {"precice/"}, {"clients/precice/precice_engine.cc", "tests/clients/precice/"}},
       {"prometheus-cpp", {"prometheus/"}, {"clients/dashboard/metrics.cc"}},
       {"protobuf",
        {"google/protobuf/", "*.pb.h", "protocol/wire/fields.h", "protocol/wire/frame_codec.h"},
@@ -141,6 +143,7 @@ const Names kClockReaders = {"server/machine/clock.h",
                              "tests/tools/lab/experiments/meter.cc",
                              "tests/tools/injector/proxy/real_time.cc",
                              "tests/tools/conformance/udp_wire.cc",
+                             "tests/tools/conformance/worker_wire.cc",
                              "*_main.cc"};
 
 // ---- Reading --------------------------------------------------------------------------------------------------------

@@ -15,9 +15,17 @@
 namespace tendon::conformance {
 namespace {
 
+/// "WIRE.md" or "stream.h", whose text is that of its comments.
 std::string text_of_file(const std::string& name) {
-  std::ifstream stream(std::filesystem::path(TENDON_PROTOCOL) / name);
-  return {std::istreambuf_iterator<char>(stream), {}};
+  const std::filesystem::path source(TENDON_SOURCE);
+  const bool is_header = name.ends_with(".h");
+  std::ifstream stream(source / (is_header ? "clients/cpp/worker" : "protocol") / name);
+  if (!is_header) return {std::istreambuf_iterator<char>(stream), {}};
+  std::string text;
+  for (std::string line; std::getline(stream, line);) {
+    if (line.starts_with("// ")) text += line.substr(3) + '\n';
+  }
+  return text;
 }
 
 /// Without emphasis, code marks and line breaks.
@@ -32,8 +40,9 @@ std::string words(std::string_view text) {
   return out;
 }
 
-/// What stands between this heading and the next of its rank or above; empty when there is none.
+/// What stands between this heading and the next of its rank or above; empty when there is none. All, without a title.
 std::string section(const std::string& text, std::string_view title) {
+  if (title.empty()) return text;
   std::string heading = "\n## ";
   heading.append(title).append("\n");
   const auto begin = text.find(heading);

@@ -14,6 +14,7 @@ namespace {
 
 constexpr std::string_view kWire = "WIRE.md";
 constexpr std::string_view kSession = "SESSION.md";
+constexpr std::string_view kStream = "stream.h";
 constexpr std::string_view kHeader = "Header: 16 bytes in the clear";
 constexpr std::string_view kHello = "Type 1, Hello: client → server, always 1200 bytes";
 constexpr std::string_view kRetry = "Type 2, Retry: server → client, 48 bytes";
@@ -32,6 +33,7 @@ constexpr std::string_view kTeleoperation = "Teleoperation";
 constexpr Side kServer = Side::kServer;
 constexpr Side kClient = Side::kClient;
 constexpr Side kBoth = Side::kBoth;
+constexpr Side kWorker = Side::kWorker;
 
 constexpr std::array kChecks = {
     // Opening, as a client does it.
@@ -194,6 +196,23 @@ constexpr std::array kChecks = {
     Check{"bye-thrice", kBoth, kSession, kStates, "Bye is said three times, what was not sent is dropped"},
     Check{"timeout", kBoth, kSession, kSent,
           "A replayed, malformed or foreign datagram does not count as a sign of life."},
+    // A worker's stream.
+    Check{"stream-opens", kWorker, kStream, "",
+          "The worker opens the stream: sequence 0, the body kOpeningMagic and 64 hexadecimal digits of the secret."},
+    Check{"record-length", kWorker, kStream, "", "n, the length of what follows, little-endian: 8 … 8 + kMaxDatagram"},
+    Check{"stream-silent", kWorker, kStream, "", "There is one state at a time: the next comes after the answer."},
+    Check{"answer-comes", kWorker, kStream, "", "worker → front the same sequence, one frame force"},
+    Check{"answer-sequence", kWorker, kStream, "", "worker → front the same sequence"},
+    Check{"answer-body", kWorker, kStream, "",
+          "each body is a Datagram of tendon.proto, without the header that it has on the network"},
+    Check{"answer-names-state", kWorker, kStream, "",
+          "one frame force with based_on_tick = the state's tick and sequence = that sequence"},
+    Check{"answer-bounds", kWorker, kStream, "", "valid_for_us is not used, but must be within its bounds"},
+    Check{"state-in-pieces", kWorker, kStream, "", "records on a stream of bytes"},
+    Check{"state-of-a-handle", kWorker, kWire, kData, "bit i: button i is held"},
+    Check{"state-unknown-field", kWorker, kWire, "Ground rules", "Unknown fields, frames and requests are not errors."},
+    Check{"states-in-a-row", kWorker, kStream, "", "front → worker sequence 1, 2, 3 …, one frame state"},
+    Check{"stream-ends", kWorker, kStream, "", "The end of the stream ends the worker."},
 };
 
 bool concerns(const Check& check, Side side) {
@@ -219,7 +238,8 @@ std::string_view word(Outcome outcome) {
 std::span<const Check> checks() { return kChecks; }
 
 std::string anchor(const Check& check) {
-  std::string out = std::string(check.document) + '#';
+  std::string out(check.document);
+  if (!check.section.empty()) out += '#';
   for (const char c : check.section) {
     const auto byte = static_cast<unsigned char>(c);
     if (std::isalnum(byte) != 0 || c == '-' || c == '_') out += static_cast<char>(std::tolower(byte));

@@ -10,22 +10,23 @@
 namespace tendon::conformance {
 
 /// Who is judged.
-enum class Side : std::uint8_t { kServer = 1, kClient = 2, kBoth = 3 };
+enum class Side : std::uint8_t { kServer = 1, kClient = 2, kBoth = 3, kWorker = 4 };
 
-/// One rule of the documents. `sentence` stands there word for word, below the heading `section`
-/// (tests/tools/conformance/documents_test.cc looks it up).
+/// One rule of the documents. `sentence` stands there word for word, below the heading `section`, or in the header's
+/// comments (tests/tools/conformance/documents_test.cc looks it up).
 struct Check {
   std::string_view name;
   Side side;
-  std::string_view document;  ///< "WIRE.md", "SESSION.md"
-  std::string_view section;
+  std::string_view document;  ///< "WIRE.md", "SESSION.md", "stream.h" (of clients/cpp/worker)
+  std::string_view section;   ///< empty in a header
   std::string_view sentence;
 };
 
 /// Every check there is, in the order in which they are reported.
 std::span<const Check> checks();
 
-/// "WIRE.md#type-2-retry-server--client-48-bytes": where a web page of the document has the section.
+/// "WIRE.md#type-2-retry-server--client-48-bytes": where a web page of the document has the section. A header has none:
+/// "stream.h".
 std::string anchor(const Check& check);
 
 enum class Outcome : std::uint8_t { kUnreached, kPassed, kFailed, kNotApplicable };

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// tendon-conformance: is this peer one that WIRE.md and SESSION.md describe?
+// tendon-conformance: is this peer one that WIRE.md and SESSION.md describe, or this worker one for a front?
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <exception>
@@ -11,6 +11,8 @@
 #include "tests/tools/conformance/client_checks.h"
 #include "tests/tools/conformance/server_checks.h"
 #include "tests/tools/conformance/udp_wire.h"
+#include "tests/tools/conformance/worker_checks.h"
+#include "tests/tools/conformance/worker_wire.h"
 
 namespace tendon::conformance {
 namespace {
@@ -26,7 +28,19 @@ struct Line {
   bool json = false;
 };
 
-const char* name_of(Side side) { return side == Side::kServer ? "server" : side == Side::kClient ? "client" : "both"; }
+const char* name_of(Side side) {
+  switch (side) {
+    case Side::kServer:
+      return "server";
+    case Side::kClient:
+      return "client";
+    case Side::kWorker:
+      return "worker";
+    case Side::kBoth:
+      break;
+  }
+  return "both";
+}
 
 int list(bool json) {
   for (const Check& check : checks()) {
@@ -86,11 +100,23 @@ int judge_client(Line line) {
   return tell(report, line.json);
 }
 
+int judge_worker(const Line& line) {
+  WorkerProgram worker(line.command, line.log, parse_address(line.listen));
+  Report report(Side::kWorker);
+  conformance::judge_worker(worker, report);
+  return tell(report, line.json);
+}
+
 int run(int argc, char** argv) {
-  CLI::App app("Talks to a client or a server over UDP and judges it by WIRE.md and SESSION.md.", "tendon-conformance");
+  CLI::App app(
+      "Talks to a client or a server over UDP and judges it by WIRE.md and SESSION.md, or to a worker as its front "
+      "does "
+      "(clients/cpp/worker/stream.h).",
+      "tendon-conformance");
   app.footer(
       "Examples: tendon-conformance server 127.0.0.1:47100\n"
       "          tendon-conformance client --key wall.key -- python3 my_client.py --server {} --key wall.key\n"
+      "          tendon-conformance worker -- mpirun -n 2 ./my_worker\n"
       "Exit status: 0 all checks that apply passed, 1 one failed or was not reached, 2 wrong usage.");
   app.set_version_flag("--version", version_text());
   Line line;
@@ -116,6 +142,14 @@ int run(int argc, char** argv) {
   client->add_option("COMMAND", line.command, "The client; {} stands for the address, which is else the last argument")
       ->required();
   common(client);
+  CLI::App* const worker =
+      app.add_subcommand("worker",
+                         "Be the front of a worker, which is started twice: its stream is a Unix socket, then TCP.\n"
+                         "Example: tendon-conformance worker -- mpirun -n 2 ./my_worker");
+  worker->add_option("--listen", line.listen, "Where to wait for it over TCP; port 0: any")->capture_default_str();
+  worker->add_option("--log", line.log, "A file for what the worker says")->type_name("FILE");
+  worker->add_option("COMMAND", line.command, "The worker; its environment has the address and the secret")->required();
+  worker->add_flag("--json", line.json, "One JSON object per check on stdout");
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
@@ -124,6 +158,7 @@ int run(int argc, char** argv) {
   if (list_only) return list(line.json);
   if (*server) return judge_server(line);
   if (*client) return judge_client(line);
+  if (*worker) return judge_worker(line);
   std::fprintf(stderr, "%s", app.help().c_str());
   return 2;
 }

@@ -26,8 +26,13 @@ Arithmetic arithmetic_of(std::string_view name) {
 }
 
 std::vector<std::string> environment_of(Arithmetic arithmetic) {
-  if (arithmetic == Arithmetic::kNative) return {};
-  return {"GLIBC_TUNABLES=glibc.cpu.hwcaps=-AVX2,-FMA,-FMA4", "OPENBLAS_CORETYPE=Nehalem"};
+  // As many threads as cores would sum in as many parts.
+  std::vector<std::string> environment = {"OPENBLAS_NUM_THREADS=1", "OMP_NUM_THREADS=1"};
+  if (arithmetic == Arithmetic::kPortable) {
+    environment.insert(environment.end(),
+                       {"GLIBC_TUNABLES=glibc.cpu.hwcaps=-AVX2,-FMA,-FMA4", "OPENBLAS_CORETYPE=Nehalem"});
+  }
+  return environment;
 }
 
 Fingerprint fingerprint() {

@@ -10,6 +10,7 @@
 #include <cstring>
 #include <fstream>
 #include <iterator>
+#include <map>
 #include <stdexcept>
 #include <system_error>
 
@@ -121,15 +122,75 @@ Kept keep_result(const std::filesystem::path& folder, std::uint64_t shard, std::
   return kept;
 }
 
-std::optional<std::string> result_of(const std::filesystem::path& folder, const Plan& plan, std::uint64_t shard) {
-  const std::filesystem::path file = result_file(folder, shard);
+namespace {
+
+/// Empty when there is no such file.
+std::optional<std::string> result_in(const std::filesystem::path& file, const Units& units) {
   if (!std::filesystem::exists(file)) return std::nullopt;
   std::string text = contents_of(file);
   try {
-    end_of(text, plan.shard(shard));
+    end_of(text, units);
   } catch (const std::invalid_argument& error) {
     throw std::runtime_error(file.string() + ": " + error.what());
   }
+  return text;
+}
+
+/// The lines of each unit that has some.
+std::map<std::uint64_t, std::string> lines_by_unit(std::string_view output) {
+  std::map<std::uint64_t, std::string> lines;
+  while (!output.empty()) {
+    const std::string_view line = output.substr(0, output.find('\n') + 1);
+    if (const auto unit = unit_of(line)) lines[*unit] += line;
+    output.remove_prefix(line.size());
+  }
+  return lines;
+}
+
+}  // namespace
+
+std::optional<std::string> result_of(const std::filesystem::path& folder, const Plan& plan, std::uint64_t shard) {
+  return result_in(result_file(folder, shard), plan.shard(shard));
+}
+
+std::optional<std::string> other_result_of(const std::filesystem::path& folder, const Plan& plan, std::uint64_t shard) {
+  return result_in(result_file(folder, shard).replace_extension(".differs"), plan.shard(shard));
+}
+
+std::string lines_of(std::string_view output, std::uint64_t unit) {
+  const auto lines = lines_by_unit(output);
+  const auto found = lines.find(unit);
+  return found == lines.end() ? "" : found->second;
+}
+
+std::vector<std::uint64_t> differing_units(std::string_view one, std::string_view other, const Units& units) {
+  const auto lines = lines_by_unit(one);
+  const auto others = lines_by_unit(other);
+  std::vector<std::uint64_t> differing;
+  for (std::uint64_t unit = units.first; unit < units.first + units.count; ++unit) {
+    const auto here = lines.find(unit);
+    const auto there = others.find(unit);
+    const bool same = here == lines.end() || there == others.end() ? (here == lines.end()) == (there == others.end())
+                                                                   : here->second == there->second;
+    if (!same) differing.push_back(unit);
+  }
+  if (!differing.empty()) return differing;
+  const auto told = end_of(one, units).digest.differs_at(end_of(other, units).digest, units);
+  if (told) differing.push_back(*told);
+  return differing;
+}
+
+std::string difference(std::string_view one, std::string_view other, const Units& units) {
+  const std::vector<std::uint64_t> differing = differing_units(one, other, units);
+  if (differing.empty()) {
+    return end_of(one, units).digest == end_of(other, units).digest ? "no unit, but in their ends" : "several units";
+  }
+  constexpr std::size_t kMost = 8;
+  std::string text = differing.size() == 1 ? "unit " : "units ";
+  for (std::size_t i = 0; i < differing.size() && i < kMost; ++i) {
+    text += (i == 0 ? "" : ", ") + std::to_string(differing[i]);
+  }
+  if (differing.size() > kMost) text += " and " + std::to_string(differing.size() - kMost) + " more";
   return text;
 }
 

@@ -40,6 +40,20 @@ Kept keep_result(const std::filesystem::path& folder, std::uint64_t shard, std::
 /// A shard's result; empty when there is none. Throws std::runtime_error when it is not one of this shard.
 std::optional<std::string> result_of(const std::filesystem::path& folder, const Plan& plan, std::uint64_t shard);
 
+/// … and the one that differs from it, if it has had two.
+std::optional<std::string> other_result_of(const std::filesystem::path& folder, const Plan& plan, std::uint64_t shard);
+
+/// The lines of a unit in a program's output; empty when it has none.
+std::string lines_of(std::string_view output, std::uint64_t unit);
+
+/// The units in which two outputs of the same units differ: by their lines; where no line differs, the one that the
+/// digests tell. Empty when they do not: several units differ, or none and only the end does.
+std::vector<std::uint64_t> differing_units(std::string_view one, std::string_view other, const Units& units);
+
+/// Where two outputs of the same units differ, for people: "unit 13", "units 13, 17", "several units", "no unit, but in
+/// their ends".
+std::string difference(std::string_view one, std::string_view other, const Units& units);
+
 /// Throws std::invalid_argument unless this is the whole output of a program that has run these units.
 ShardEnd end_of(std::string_view output, const Units& units);
 

@@ -10,6 +10,7 @@
 #include <sstream>
 #include <stdexcept>
 #include <thread>
+#include <utility>
 
 #include "tests/tools/sweep/child.h"
 
@@ -23,8 +24,6 @@ Child program_of(const Plan& plan, const std::vector<std::string>& more) {
   return child;
 }
 
-std::string text_of(const Units& units) { return std::to_string(units.first) + ":" + std::to_string(units.count); }
-
 /// The lines before the end.
 std::string_view body_of(std::string_view result) {
   result.remove_suffix(1);
@@ -32,18 +31,18 @@ std::string_view body_of(std::string_view result) {
   return last == std::string_view::npos ? std::string_view() : result.substr(0, last + 1);
 }
 
-/// The first line in which two results differ.
-std::string first_difference(const std::string& one, const std::string& other) {
-  std::istringstream a(one);
-  std::istringstream b(other);
-  std::string line_a;
-  std::string line_b;
-  for (int number = 1;; ++number) {
-    const bool more_a = static_cast<bool>(std::getline(a, line_a));
-    const bool more_b = static_cast<bool>(std::getline(b, line_b));
-    if (!more_a && !more_b) return "nowhere";
-    if (more_a != more_b || line_a != line_b) return "first in line " + std::to_string(number) + ": " + line_a;
+/// Runs these units; `why` says why they are not done, and is empty when they are.
+ChildEnd run_units(const Plan& plan, const Units& units, std::string& why) {
+  ChildEnd end = run(program_of(plan, {"--units", text_of(units), "--json"}));
+  why = end.status == 0 ? "" : end.text();
+  if (why.empty()) {
+    try {
+      end_of(end.output, units);
+    } catch (const std::invalid_argument& error) {
+      why = error.what();
+    }
   }
+  return end;
 }
 
 bool has_from(const Plan& plan) {
@@ -79,17 +78,19 @@ void expect_as_planned(const Plan& plan, const std::filesystem::path& self) {
                                 : "its C library or OpenBLAS is another version; run on nodes with the same packages"));
 }
 
+std::string text_of(const Units& units) { return std::to_string(units.first) + ":" + std::to_string(units.count); }
+
+std::string output_of(const Plan& plan, const Units& units) {
+  std::string why;
+  ChildEnd end = run_units(plan, units, why);
+  if (!why.empty()) throw std::runtime_error("units " + text_of(units) + ": " + why + "\n" + end.errors);
+  return std::move(end.output);
+}
+
 bool run_shard(const std::filesystem::path& folder, const Plan& plan, std::uint64_t shard, std::ostream& out) {
   const Units units = plan.shard(shard);
-  const ChildEnd end = run(program_of(plan, {"--units", text_of(units), "--json"}));
-  std::string why = end.status == 0 ? "" : end.text();
-  if (why.empty()) {
-    try {
-      end_of(end.output, units);
-    } catch (const std::invalid_argument& error) {
-      why = error.what();
-    }
-  }
+  std::string why;
+  const ChildEnd end = run_units(plan, units, why);
   const std::string name = "shard " + std::to_string(shard) + ", units " + text_of(units) + ": ";
   if (!why.empty()) {
     std::filesystem::create_directories(folder / "failed");
@@ -150,12 +151,11 @@ int merge(const std::filesystem::path& folder, const Plan& plan, std::ostream& o
                              " shards are missing: " + ranges(status.missing));
   }
   for (const std::uint64_t shard : status.differing) {
-    std::filesystem::path other = result_file(folder, shard);
-    std::ostringstream differs;
-    differs << std::ifstream(other.replace_extension(".differs")).rdbuf();
-    throw std::runtime_error("shard " + std::to_string(shard) + ", units " + text_of(plan.shard(shard)) +
-                             ", has had two results, which differ " +
-                             first_difference(*result_of(folder, plan, shard), differs.str()));
+    const Units units = plan.shard(shard);
+    const std::string where = difference(*result_of(folder, plan, shard), *other_result_of(folder, plan, shard), units);
+    throw std::runtime_error("shard " + std::to_string(shard) + ", units " + text_of(units) +
+                             ", has had two results, which differ in " + where + ": tendon-sweep run " +
+                             folder.string() + " --shard " + std::to_string(shard) + " --bisect tells more");
   }
   std::string lines;
   std::optional<ShardEnd> whole;

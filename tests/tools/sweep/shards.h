@@ -19,6 +19,13 @@ void expect_as_planned(const Plan& plan, const std::filesystem::path& self);
 /// What a process with this arithmetic computes on this node.
 Fingerprint fingerprint_of(Arithmetic arithmetic, const std::filesystem::path& self);
 
+/// "FIRST:COUNT".
+std::string text_of(const Units& units);
+
+/// What the program prints of these units. Throws std::runtime_error, with the end of what it complained about, when it
+/// does not end well.
+std::string output_of(const Plan& plan, const Units& units);
+
 /// Runs one shard and keeps its result, or the end of what it complained about. Says in a line on `out` what became of
 /// it. True when the shard is done now, by us or by another. Thread-safe: yes, but for `out`.
 bool run_shard(const std::filesystem::path& folder, const Plan& plan, std::uint64_t shard, std::ostream& out);

@@ -13,6 +13,7 @@
 #include "server/build_info.h"
 #include "tests/support/json_line.h"
 #include "tests/support/run_tool.h"
+#include "tests/tools/sweep/bisect.h"
 #include "tests/tools/sweep/child.h"
 #include "tests/tools/sweep/shards.h"
 #include "tests/tools/sweep/submit.h"
@@ -29,6 +30,7 @@ struct Arguments {
   std::vector<std::string> command;
   // run
   std::optional<std::uint64_t> shard, task, of;
+  bool bisect = false;
   // here
   unsigned jobs = std::max(1U, std::thread::hardware_concurrency());
   // submit
@@ -78,6 +80,7 @@ int run(const Arguments& arguments) {
   expect_as_planned(plan, self());
   if (arguments.shard) {
     plan.shard(*arguments.shard);
+    if (arguments.bisect) return bisect(arguments.folder, plan, *arguments.shard, std::cout) ? 0 : 1;
     return run_shard(arguments.folder, plan, *arguments.shard, std::cout) ? 0 : 1;
   }
   if (!arguments.task || !arguments.of || *arguments.of == 0 || *arguments.task >= *arguments.of) {
@@ -192,11 +195,16 @@ int main_of(int argc, char** argv) {
   plan_verb->footer("\nExample:\n  tendon-sweep plan w --units 1:1000000 --per-shard 5000 -- tendon-worlds run\n");
 
   CLI::App* const run_verb = add_verb(app, arguments, "run", "Runs one shard, or every so-manieth");
-  run_verb->add_option("--shard", arguments.shard, "this one, even if it is done")->type_name("N");
+  CLI::Option* const shard =
+      run_verb->add_option("--shard", arguments.shard, "this one, even if it is done")->type_name("N");
+  run_verb
+      ->add_flag("--bisect", arguments.bisect,
+                 "of a shard that has had two results: in which units do they differ, and is it the program or a node?")
+      ->needs(shard);
   run_verb->add_option("--task", arguments.task, "with --of: shards I, I+T, I+2T …, but for those that are done")
       ->type_name("I");
   run_verb->add_option("--of", arguments.of, "tasks in all")->type_name("T");
-  run_verb->footer("\nExample:\n  tendon-sweep run w --shard 17\n");
+  run_verb->footer("\nExample:\n  tendon-sweep run w --shard 17\n  tendon-sweep run w --shard 17 --bisect\n");
 
   CLI::App* const here_verb = add_verb(app, arguments, "here", "Runs all that is missing on this machine");
   here_verb->add_option("--jobs", arguments.jobs, "shards at a time")

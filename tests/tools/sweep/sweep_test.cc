@@ -105,18 +105,72 @@ TEST_F(Sweep, AShardThatRanTwiceCountsOnce) {
   EXPECT_EQ(merged(), toy("1:20"));
 }
 
-TEST_F(Sweep, TwoResultsThatDifferAreBothKeptAndMergeNamesTheUnits) {
+TEST_F(Sweep, TwoResultsThatDifferAreBothKeptAndMergeNamesTheUnit) {
   ASSERT_EQ(plan("1:20", "10").status, 0);
   EXPECT_EQ(sweep({"here", folder()}).status, 0);
   const std::string before = contents(folder() + "/done/000001.json");
-  fault("other");
+  fault("mind-13");
   EXPECT_EQ(sweep({"run", folder(), "--shard", "1"}).status, 1);
   EXPECT_EQ(contents(folder() + "/done/000001.json"), before) << "nothing that exists is overwritten";
   const ChildEnd end = sweep({"merge", folder()});
   EXPECT_EQ(end.status, 1);
-  EXPECT_NE(end.errors.find("shard 1, units 11:10, has had two results, which differ first in line 11"),
+  EXPECT_NE(end.errors.find("shard 1, units 11:10, has had two results, which differ in unit 13: tendon-sweep run " +
+                            folder() + " --shard 1 --bisect"),
             std::string::npos)
       << end.errors;
+}
+
+TEST_F(Sweep, BisectNamesTheUnitWithALineAndWithoutOne) {
+  for (const bool quiet : {false, true}) {
+    if (quiet) fault("quiet");
+    ASSERT_EQ(plan("1:20", "10").status, 0);
+    EXPECT_EQ(sweep({"here", folder()}).status, 0);
+    EXPECT_EQ(sweep({"run", folder(), "--shard", "1", "--bisect"}).status, 2) << "one result";
+    fault("mind-13");
+    EXPECT_EQ(sweep({"run", folder(), "--shard", "1"}).status, 1);
+    const ChildEnd end = sweep({"run", folder(), "--shard", "1", "--bisect"});
+    EXPECT_EQ(end.status, 0) << end.errors;
+    for (const char* said :
+         {"two results, which differ in unit 13\n", "here and now the shard comes to a third\n",
+          "unit 13, run 3 times by itself: 3 results\n", "The program comes to another result each time"}) {
+      EXPECT_NE(end.output.find(said), std::string::npos) << said << " in " << end.output;
+    }
+    EXPECT_EQ(end.output.find("second: {\"unit\":13,\"value\":170}") == std::string::npos, quiet) << end.output;
+    std::filesystem::remove(faults() + "/mind-13");
+    std::filesystem::remove_all(folder());
+  }
+}
+
+TEST_F(Sweep, BisectNamesAUnitThatDifferedOnceAndSaysThatThisNodeIsSure) {
+  fault("quiet");
+  ASSERT_EQ(plan("1:20", "10").status, 0);
+  fault("mind-13");
+  EXPECT_EQ(sweep({"run", folder(), "--shard", "1"}).status, 0);
+  std::filesystem::remove(faults() + "/mind-13");
+  EXPECT_EQ(sweep({"run", folder(), "--shard", "1"}).status, 1);
+  const ChildEnd end = sweep({"run", folder(), "--shard", "1", "--bisect"});
+  EXPECT_EQ(end.status, 0) << end.errors;
+  for (const char* said :
+       {"two results, which differ in unit 13\n", "here and now the shard comes to the second, ",
+        "unit 13, run 3 times by itself: the same each time\n", "This node stays with its result."}) {
+    EXPECT_NE(end.output.find(said), std::string::npos) << said << " in " << end.output;
+  }
+}
+
+TEST_F(Sweep, BisectFindsOneOfSeveralUnitsWithoutLinesByHalves) {
+  fault("quiet");
+  ASSERT_EQ(plan("1:20", "10").status, 0);
+  for (const char* unit : {"mind-12", "mind-13", "mind-19"}) fault(unit);
+  EXPECT_EQ(sweep({"run", folder(), "--shard", "1"}).status, 0);
+  EXPECT_EQ(sweep({"run", folder(), "--shard", "1"}).status, 1);
+  const ChildEnd end = sweep({"run", folder(), "--shard", "1", "--bisect"});
+  EXPECT_EQ(end.status, 0) << end.errors;
+  for (const char* said :
+       {"two results, which differ in several units\n", "units 11:5 come to another result each time\n",
+        "units 11:2 come to another result each time, and differ in unit 12\n",
+        "unit 12, run 3 times by itself: 3 results\n"}) {
+    EXPECT_NE(end.output.find(said), std::string::npos) << said << " in " << end.output;
+  }
 }
 
 TEST_F(Sweep, ABrokenPromiseIsTheExitOfMergeAndNotOfAShard) {
@@ -170,6 +224,74 @@ TEST_F(Sweep, SameBytesWithAndWithoutFma) {
   EXPECT_NE(refused.errors.find("plan with --arithmetic portable"), std::string::npos) << refused.errors;
 }
 
+/// A program of ours, as a sweep of it in shards and as one process.
+class SweepOf : public Sweep {
+ protected:
+  void expect_the_same(std::vector<std::string> command, const std::string& units, const std::string& per_shard) {
+    command.front() = program_of(command.front());
+    std::vector<std::string> planned = {"plan",    folder(),       "--units", units, "--per-shard",
+                                        per_shard, "--arithmetic", "native",  "--"};
+    planned.insert(planned.end(), command.begin(), command.end());
+    ASSERT_EQ(sweep(planned).status, 0);
+    const ChildEnd here = sweep({"here", folder(), "--jobs", "1"});
+    EXPECT_EQ(here.status, 0) << here.output;
+    const ChildEnd merged = sweep({"merge", folder()});
+    EXPECT_EQ(merged.status, 0) << merged.errors;
+    const ChildEnd one = run({.command = command});
+    EXPECT_EQ(one.status, 0) << one.errors;
+    EXPECT_GT(one.output.size(), 100U);
+    EXPECT_EQ(merged.output, one.output);
+  }
+
+ private:
+  /// Or one of its mutants.
+  static std::string program_of(const std::string& name) {
+    const char* const other = std::getenv("TENDON_LAB_PROGRAM");  // NOLINT(concurrency-mt-unsafe): nobody sets it
+    return other != nullptr && name == "tendon-lab" ? other : TENDON_BIN "/" + name;
+  }
+};
+
+TEST_F(SweepOf, CompareIsWhatOneProcessSays) {
+  expect_the_same({"tendon-lab", "compare", "--every", "1153", "--seed", "7"}, "0:2", "1");
+}
+
+TEST_F(SweepOf, BoundaryIsWhatOneProcessSays) {
+  expect_the_same({"tendon-lab", "boundary", "--mass", "0.01"}, "0:18", "7");
+}
+
+TEST_F(SweepOf, PaperIsWhatOneProcessSays) { expect_the_same({"tendon-lab", "paper"}, "0:31", "9"); }
+
+TEST_F(SweepOf, TeleopIsWhatOneProcessSays) {
+  expect_the_same({"tendon-lab", "teleop", "--hands", "1", "--seed", "5"}, "0:48", "31");
+}
+
+TEST_F(SweepOf, AccuracyIsWhatOneProcessSaysWithoutAClock) {
+  expect_the_same({"tendon-lab", "accuracy", "--errors-only", "--block-mm", "60x60x30", "--truth-cells", "2",
+                   "--models", "condensed,stvk", "--elements", "hex8-sri", "--n", "3,4"},
+                  "0:4", "3");
+}
+
+TEST_F(SweepOf, IdentifyIsWhatOneProcessSays) {
+  expect_the_same({"tendon-identify", "--simulate-friction", "0.005,0.05"}, "0:30", "11");
+  std::filesystem::remove_all(folder());
+  expect_the_same({"tendon-identify", "--of", "rotation", "--simulate-friction", "0.0005,0.001", "--json"}, "0:30",
+                  "30");
+}
+
+TEST_F(SweepOf, LinesOfOtherArgumentsAreRefused) {
+  const std::string identify = TENDON_BIN "/tendon-identify";
+  const std::string lines = faults() + "/lines";
+  std::ofstream(lines)
+      << run({.command = {identify, "--simulate-friction", "0.005,0.05", "--units", "0:30", "--json"}}).output;
+  const ChildEnd other =
+      run({.command = {identify, "--of", "rotation", "--simulate-friction", "0.005,0.05", "--from", lines}});
+  EXPECT_EQ(other.status, 2);
+  EXPECT_NE(other.errors.find("unit 0 of the runs: "), std::string::npos) << other.errors;
+  const ChildEnd beyond = run({.command = {identify, "--simulate-friction", "0.005,0.05", "--units", "29:2"}});
+  EXPECT_EQ(beyond.status, 2);
+  EXPECT_NE(beyond.errors.find("units 29:2: expected some of 0 to 29"), std::string::npos) << beyond.errors;
+}
+
 TEST_F(Sweep, AResultIsSyncedBeforeItHasItsName) {
   if (sweep({"--version"}, {std::string("LD_PRELOAD=") + TENDON_SYNC_WITNESS}).status != 0) {
     GTEST_SKIP() << "nothing can be preloaded into this build";
@@ -196,6 +318,14 @@ TEST_F(Sweep, OfManyThatKeepAFileOneHasMadeItAndTheOthersSeeTheSame) {
   std::size_t files = 0;
   for ([[maybe_unused]] const auto& one : std::filesystem::directory_iterator(faults())) ++files;
   EXPECT_EQ(files, 1U) << "no draft is left";
+}
+
+TEST_F(Sweep, TwoResultsMayDifferInTheirEndsAlone) {
+  const std::string one = toy("1:5");
+  std::string other = one;
+  other.replace(other.find("\"broken\":0"), 10, "\"broken\":1");
+  EXPECT_EQ(difference(one, other, {1, 5}), "no unit, but in their ends");
+  EXPECT_EQ(difference(one, one.substr(one.find('\n') + 1), {1, 5}), "unit 1") << "a line is missing";
 }
 
 TEST_F(Sweep, RangesAreWhatSlurmReads) {

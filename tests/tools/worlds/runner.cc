@@ -271,36 +271,25 @@ void explore_units(const Units& seeds, unsigned jobs, std::ostream& out) {
 }
 
 bool judge(std::istream& lines, std::ostream& out) {
-  std::optional<ShardEnd> end;
-  std::string line;
-  for (int number = 1; std::getline(lines, line); ++number) {
-    const auto refuse = [number](const std::string& expected) {
-      throw std::invalid_argument("line " + std::to_string(number) + ": expected " + expected);
-    };
-    if (end) refuse("nothing after the end");
-    if (line.starts_with(R"({"kind":"broken",)")) {
-      out << line << '\n';
-      continue;
-    }
-    if (!line.starts_with(R"({"kind":"end",)")) refuse("a broken world or the end of a sweep");
-    end = ShardEnd::parse(line);
-  }
-  if (!end) throw std::invalid_argument("no end of a sweep");
-  const Tally tally{.worlds = end->total("worlds"),
-                    .steps = end->total("haptic_steps"),
-                    .datagrams = end->total("datagrams"),
-                    .felt = end->total("felt"),
-                    .limited = end->total("limited"),
-                    .turned = end->total("turned"),
-                    .gripped = end->total("gripped"),
-                    .presses = end->total("presses"),
-                    .recovered = end->total("recovered"),
-                    .least_energy = end->least_of("least_energy_j")};
-  out << tally.worlds << " worlds of " << seconds(DrawnWorld::kLength) << " s, seeds " << end->units.first << " to "
-      << end->units.first + end->units.count - 1 << "; digest " << end->digest.text() << '\n';
+  const ShardEnd end = read_to_end(lines, [&out](const std::string& line) {
+    if (!line.starts_with(R"({"kind":"broken",)")) throw std::invalid_argument("expected a broken world or the end");
+    out << line << '\n';
+  });
+  const Tally tally{.worlds = end.total("worlds"),
+                    .steps = end.total("haptic_steps"),
+                    .datagrams = end.total("datagrams"),
+                    .felt = end.total("felt"),
+                    .limited = end.total("limited"),
+                    .turned = end.total("turned"),
+                    .gripped = end.total("gripped"),
+                    .presses = end.total("presses"),
+                    .recovered = end.total("recovered"),
+                    .least_energy = end.least_of("least_energy_j")};
+  out << tally.worlds << " worlds of " << seconds(DrawnWorld::kLength) << " s, seeds " << end.units.first << " to "
+      << end.units.first + end.units.count - 1 << "; digest " << end.digest.text() << '\n';
   tell_events(tally, out);
-  if (end->total("broken") > 0) {
-    out << end->total("broken") << " broke a promise: tendon-worlds run --seed N --verbose\n";
+  if (end.total("broken") > 0) {
+    out << end.total("broken") << " broke a promise: tendon-worlds run --seed N --verbose\n";
     return false;
   }
   expect_events(tally);

@@ -7,8 +7,11 @@
 #include <limits>
 #include <map>
 #include <memory>
+#include <new>
+#include <nlohmann/json.hpp>
 #include <stdexcept>
 #include <tuple>
+#include <type_traits>
 #include <utility>
 
 #include "clients/softbody/fem/mesh.h"
@@ -17,6 +20,7 @@
 #include "clients/softbody/models/linear.h"
 #include "clients/softbody/models/quasi_static.h"
 #include "core/base/expect.h"
+#include "server/build_info.h"
 #include "tests/tools/injector/injector.h"
 #include "tests/tools/injector/profile/named_profiles.h"
 #include "tests/tools/lab/experiments/accuracy_pictures.h"
@@ -199,16 +203,17 @@ void walk(const Body& body, const std::vector<Touched>& script, std::size_t to, 
   for (int step = 1; step <= steps; ++step) touch(from + static_cast<double>(step) / steps * (script[to].tool - from));
 }
 
-/// Follows the script and times the updates; again, as often as their median asks for.
-void follow_script(Body& body, const std::vector<Touched>& script, const Meter& meter, double slowest_ms,
+/// Follows the script once; with a meter it times the updates, and does so again as often as their median asks for.
+void follow_script(Body& body, const std::vector<Touched>& script, const Meter* meter, double slowest_ms,
                    AccuracyPoint& point) {
-  const double floor = floor_of(meter);
+  const double floor = meter != nullptr ? floor_of(*meter) : 0;
   std::vector<double> times;
   std::vector<double> instructions;
   const auto touch = [&](const Vec3& tool) {
-    const Meter::Reading before = meter.read();
+    if (meter == nullptr) return body.touch(tool).force;
+    const Meter::Reading before = meter->read();
     const Feel feel = body.touch(tool);
-    const Meter::Reading took = meter.read() - before;
+    const Meter::Reading took = meter->read() - before;
     if (feel.touching) {
       times.push_back(std::max(0.0, took.processor - floor));
       if (took.instructions) instructions.push_back(static_cast<double>(*took.instructions));
@@ -220,7 +225,7 @@ void follow_script(Body& body, const std::vector<Touched>& script, const Meter& 
     return feel.force;
   };
 
-  const Meter::Reading start = meter.read();
+  const Meter::Reading start = meter != nullptr ? meter->read() : Meter::Reading{};
   double squares = 0;
   double true_squares = 0;
   double largest = 0;
@@ -239,8 +244,9 @@ void follow_script(Body& body, const std::vector<Touched>& script, const Meter& 
   point.force_relative = std::sqrt(squares / true_squares);
   point.lateral = aside / largest;
 
+  if (meter == nullptr) return;
   bool settled = times.empty();
-  while (!settled && times.size() < kManyUpdates && (meter.read() - start).processor < kLongestTiming) {
+  while (!settled && times.size() < kManyUpdates && (meter->read() - start).processor < kLongestTiming) {
     const double before = quantile(times, 0.5);
     for (std::size_t i = 0; i < script.size(); ++i) walk(body, script, i, touch);
     settled = std::abs(quantile(times, 0.5) / before - 1) < kSettled;
@@ -284,7 +290,7 @@ std::vector<AccuracyPoint> ladder(ModelKind model, Element element, const Accura
       left_out.push_back(name + ": would take too long");
       break;
     }
-    if (options.progress) std::cerr << "\r" << name << "            " << std::flush;
+    if (options.part.progress) std::cerr << "\r" << name << "            " << std::flush;
     try {
       points.push_back(measured(candidate));
     } catch (const TooSlow& error) {
@@ -325,13 +331,14 @@ struct Trial {
   Body body;
 };
 
-/// What it costs and answers. Whose fault its errors are, and what is left at the hand, is not asked.
-Trial tried(const Candidate& candidate, Truth& truth, const Meter& meter, double slowest_ms) {
+/// What it answers, and with a meter what it costs. Whose fault its errors are, and what is left at the hand, is not
+/// asked.
+Trial tried(const Candidate& candidate, Truth& truth, const Meter* meter, double slowest_ms) {
   const PressedBlock& block = truth.block();
-  const Meter::Reading before = meter.read();
-  Trial trial{.point = {.candidate = candidate}, .body = Body(body_of(block, candidate))};
+  const Meter::Reading before = meter != nullptr ? meter->read() : Meter::Reading{};
+  Trial trial{.point = {.candidate = candidate, .timed = meter != nullptr}, .body = Body(body_of(block, candidate))};
   AccuracyPoint& point = trial.point;
-  point.setup_s = (meter.read() - before).processor;
+  if (meter != nullptr) point.setup_s = (meter->read() - before).processor;
   point.size = trial.body.size();
   point.step_ms = 1e3 * trial.body.step();
   follow_script(trial.body, truth.script(), meter, slowest_ms, point);
@@ -353,7 +360,7 @@ AccuracyPoint measure(const Candidate& candidate, Truth& truth, OnMesh& on_mesh,
   truth.script();
   truth.limit(info(candidate.model).law, material_of(truth.block(), candidate.model), 0);
   const Meter::Reading before = meter.read();
-  Trial trial = tried(candidate, truth, meter, patience.update_ms);
+  Trial trial = tried(candidate, truth, &meter, patience.update_ms);
   split_error(trial.point, truth, on_mesh);
   if (network) feel(trial, truth, *network, patience.felt_s);
   trial.point.measuring_s = (meter.read() - before).processor;
@@ -444,7 +451,7 @@ std::optional<AccuracyPoint> best_within(const AccuracyOptions& options, Truth& 
     for (const Element element : elements_of(options)) {
       ladder(model, element, options, left_out, [&](const Candidate& candidate) {
         const Meter::Reading before = meter.read();
-        Trial trial = tried(candidate, truth, meter, *options.budget_ms);
+        Trial trial = tried(candidate, truth, &meter, *options.budget_ms);
         trial.point.measuring_s = (meter.read() - before).processor;
         AccuracyPoint point = trial.point;
         if (point.update_ms_p50 <= *options.budget_ms) keep(std::move(trial));
@@ -454,14 +461,14 @@ std::optional<AccuracyPoint> best_within(const AccuracyOptions& options, Truth& 
   }
   std::vector<AccuracyPoint> at_hand;
   for (Trial& trial : kept) {
-    if (options.progress) {
+    if (options.part.progress) {
       std::cerr << "\rat the hand: " << trial.point.candidate.name() << " n=" << trial.point.candidate.n
                 << "            " << std::flush;
     }
     feel(trial, truth, *options.network, std::numeric_limits<double>::infinity());
     at_hand.push_back(trial.point);
   }
-  if (options.progress) std::cerr << "\n";
+  if (options.part.progress) std::cerr << "\n";
   const AccuracyPoint* const best = closest_at_the_hand(at_hand, *options.budget_ms);
   return best == nullptr ? std::nullopt : std::optional(*best);
 }
@@ -482,7 +489,9 @@ double round_trip_ms(const Network& network) {
 
 }  // namespace
 
-void accuracy(const AccuracyOptions& options, std::ostream& out) {
+namespace {
+
+void check(const AccuracyOptions& options) {
   if (options.resolutions.empty() || options.resolutions.front() < 1 ||
       !std::ranges::is_sorted(options.resolutions, std::less_equal<>())) {
     throw std::invalid_argument("--n: expected ascending numbers of cells, as in 4,8,16");
@@ -491,8 +500,174 @@ void accuracy(const AccuracyOptions& options, std::ostream& out) {
   if (options.budget_ms && options.out) {
     throw std::invalid_argument("--out: there is no figure with --budget-ms, which measures no more than it must");
   }
+  options.block.check();
+  if (options.errors_only && (options.network || options.budget_ms)) {
+    throw std::invalid_argument(
+        "--errors-only, --units and --from: not with --network or --budget-ms, whose answers "
+        "depend on times");
+  }
   if (options.network) route_of(*options.network, 0);  // an unknown one is refused before anything is measured
-  if (options.progress) std::cerr << "the truth …" << std::flush;
+}
+
+// ---- Errors alone ---------------------------------------------------------------------------------------------------
+
+std::vector<Candidate> candidates(const AccuracyOptions& options) {
+  std::vector<Candidate> all;
+  for (const ModelKind model : models_of(options)) {
+    for (const Element element : elements_of(options)) {
+      if (info(model).tetrahedra && element != Element::kTet4) continue;
+      for (const int n : options.resolutions) all.push_back({model, element, n});
+    }
+  }
+  return all;
+}
+
+/// What a mesh comes to without a clock.
+struct MeshErrors {
+  AccuracyPoint point;
+  TruthFigures truth{};
+  std::string left_out{};  ///< why there is no point
+};
+
+/// Of a point's numbers those that are there without a clock, with their names: to write them and to read them.
+template <class Errors, class Visit>
+void visit_numbers(Errors& errors, Visit visit) {
+  auto& p = errors.point;
+  for (std::size_t load = 0; load < p.at_load.size(); ++load) {
+    const std::string which = load == 0 ? "small_" : "hard_";
+    auto& at = p.at_load[load];
+    visit(which + "k_n_per_m", at.k);
+    visit(which + "error", at.total);
+    visit(which + "model", at.model);
+    visit(which + "discretisation", at.discretisation);
+    visit(which + "solver", at.solver);
+    visit(which + "tangent", at.tangent);
+  }
+  visit("lateral", p.lateral);
+  visit("script_rms_error_n", p.force_error);
+  visit("script_largest_error_n", p.force_most);
+  visit("script_rms_error", p.force_relative);
+  visit("step_ms", p.step_ms);
+  visit("nodes", p.size.nodes);
+  visit("elements", p.size.elements);
+  visit("free", p.size.free);
+  visit("bytes", p.size.bytes);
+  visit("truth_linear_k_n_per_m", errors.truth.linear);
+  visit("truth_k_n_per_m", errors.truth.small);
+  visit("truth_hard_k_n_per_m", errors.truth.hard);
+  visit("truth_uncertainty", errors.truth.uncertainty);
+}
+
+/// What the meshes of a process have in common, from the first one on.
+struct Bench {
+  explicit Bench(const AccuracyOptions& options) : truth(options.block, options.truth), on_mesh(truth.block()) {
+    truth.script();
+  }
+  Truth truth;
+  OnMesh on_mesh;
+};
+
+MeshErrors errors_of(const Candidate& candidate, Bench& bench) {
+  MeshErrors errors{.point = {.candidate = candidate, .timed = false}, .truth = figures_of(bench.truth)};
+  try {
+    Trial trial = tried(candidate, bench.truth, nullptr, 0);
+    split_error(trial.point, bench.truth, bench.on_mesh);
+    errors.point = trial.point;
+  } catch (const std::bad_alloc&) {
+    throw;  // another machine has more memory
+  } catch (const std::exception& error) {
+    errors.left_out = error.what();
+  }
+  return errors;
+}
+
+JsonLine line_of(const MeshErrors& errors) {
+  JsonLine line;
+  line.add("model", errors.point.candidate.name()).add("n", errors.point.candidate.n);
+  line.add("left_out", errors.left_out);
+  visit_numbers(errors, [&](const std::string& name, const auto& value) { line.add(name, value); });
+  line.add("commit", kCommit);
+  return line;
+}
+
+MeshErrors errors_of(const Candidate& candidate, const nlohmann::json& line) {
+  MeshErrors errors{.point = {.candidate = candidate, .timed = false}, .left_out = line.at("left_out")};
+  visit_numbers(errors, [&](const std::string& name, auto& value) {
+    if constexpr (std::is_same_v<std::remove_cvref_t<decltype(value)>, double>) {
+      value = number_of(line, name);
+    } else {
+      line.at(name).get_to(value);
+    }
+  });
+  return errors;
+}
+
+void errors_only(const AccuracyOptions& options, std::ostream& out) {
+  const std::vector<Candidate> meshes = candidates(options);
+  if (meshes.empty()) throw std::invalid_argument("--models, --elements: no such model has such an element");
+  std::unique_ptr<Bench> bench;
+  const SweptWork<MeshErrors> work{
+      .what = "meshes",
+      .units = meshes.size(),
+      .run =
+          [&](std::uint64_t unit) {
+            if (!bench) bench = std::make_unique<Bench>(options);
+            return errors_of(meshes.at(unit), *bench);
+          },
+      .lines =
+          [](std::uint64_t /*unit*/, const MeshErrors& errors) {
+            std::vector<JsonLine> lines;
+            lines.push_back(line_of(errors));
+            return lines;
+          },
+      .read = [&](std::uint64_t unit,
+                  const std::vector<nlohmann::json>& lines) { return errors_of(meshes.at(unit), lines.at(0)); },
+      .count =
+          [](const MeshErrors& errors, ShardEnd& end) {
+            end.count("meshes", 1);
+            end.count("left_out", errors.left_out.empty() ? 0 : 1);
+            end.count("unknowns", errors.point.size.free);
+          }};
+  const auto all = outcomes(work, options.part, out);
+  if (!all) return;
+  Ladders ladders;
+  std::vector<AccuracyPoint> points;
+  for (const MeshErrors& one : *all) {
+    if (!one.left_out.empty()) continue;
+    if (points.empty() || points.back().candidate.name() != one.point.candidate.name()) ladders.emplace_back();
+    ladders.back().push_back(one.point);
+    points.push_back(one.point);
+  }
+  const TruthFigures& truth = all->front().truth;
+  if (options.json) {
+    for (const AccuracyPoint& point : points) out << to_json(point, truth, options.block) << "\n";
+  } else {
+    write_truth(out, truth, options.block);
+    out << heading(false);
+    for (const AccuracyPoint& point : points) write_row(out, point);
+    for (const MeshErrors& one : *all) {
+      if (one.left_out.empty()) continue;
+      out << "left out: " << one.point.candidate.name() << " n=" << one.point.candidate.n << ": " << one.left_out
+          << "\n";
+    }
+  }
+  if (options.out) {
+    std::filesystem::create_directories(*options.out);
+    write_csv(*options.out / "accuracy.csv", points, truth, options.block);
+    if (!ladders.empty()) draw(options, ladders, 0);
+    if (!options.json) out << "written: " << (*options.out / "accuracy.csv").string() << " and a figure\n";
+  }
+  if (!out.flush()) throw std::runtime_error("cannot write the table: is the disk full?");
+}
+
+}  // namespace
+
+void accuracy(const AccuracyOptions& given, std::ostream& out) {
+  AccuracyOptions options = given;
+  options.errors_only = given.errors_only || given.part.units || given.part.from;
+  check(options);
+  if (options.errors_only) return errors_only(options, out);
+  if (options.part.progress) std::cerr << "the truth …" << std::flush;
   Truth truth(options.block, options.truth);
   truth.script();  // all that every point needs of it, so that the first one is not charged with it
   const Meter meter;
@@ -503,8 +678,8 @@ void accuracy(const AccuracyOptions& options, std::ostream& out) {
   }
   const bool rows = !options.json;
   if (rows) {
-    write_truth(out, truth);
-    out << kHeading;
+    write_truth(out, figures_of(truth), options.block);
+    out << heading(true);
   }
   std::vector<std::string> left_out;
   Ladders ladders;
@@ -526,10 +701,10 @@ void accuracy(const AccuracyOptions& options, std::ostream& out) {
       if (!points.empty()) ladders.push_back(std::move(points));
     }
   }
-  if (options.progress) std::cerr << "\n";
+  if (options.part.progress) std::cerr << "\n";
   if (rows) {
     out << "\nThe best, small load: nothing else is both quicker and closer (errors that cancel do not count):\n"
-        << kHeading;
+        << heading(true);
     for (const AccuracyPoint& point : pareto_front(all, 0)) write_row(out, point);
     write_exponents(out, ladders);
     if (options.network) {
@@ -548,7 +723,7 @@ void accuracy(const AccuracyOptions& options, std::ostream& out) {
   }
   if (options.out) {
     std::filesystem::create_directories(*options.out);
-    write_csv(*options.out / "accuracy.csv", all, truth);
+    write_csv(*options.out / "accuracy.csv", all, figures_of(truth), options.block);
     if (!ladders.empty()) draw(options, ladders, options.network ? round_trip_ms(*options.network) : 0);
     if (rows) out << "written: " << (*options.out / "accuracy.csv").string() << " and a figure\n";
   }

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "clients/softbody/body.h"
+#include "tests/support/swept_work.h"
 #include "tests/tools/lab/experiments/felt.h"
 #include "tests/tools/lab/experiments/meter.h"
 #include "tests/tools/lab/experiments/pressed_block.h"
@@ -50,6 +51,7 @@ struct Accuracy {
 /// A candidate, measured.
 struct AccuracyPoint {
   Candidate candidate;
+  bool timed = true;  ///< else what depends on a clock is not there: times, instructions, what is felt
   softbody::Body::Size size{};
   std::array<Accuracy, 2> at_load{};  ///< PressedBlock::loads
   double lateral = 0;                 ///< largest error across of a press straight down, over the largest true force
@@ -114,9 +116,14 @@ struct AccuracyOptions {
   /// Answers one question: what is best at the hand of that which needs at most so long for an update. Of those that
   /// are beaten without the loop (may_be_best) the loop is not run.
   std::optional<double> budget_ms{};
+  /// No clock is looked at: errors and sizes alone, which are the same each time, of all that is asked for, however long
+  /// it takes. Not with a network or a budget, which ask for times.
+  bool errors_only = false;
   std::optional<std::filesystem::path> out{};  ///< folder for accuracy.csv and the figures
   bool json = false;
-  bool progress = false;  ///< on standard error
+  /// Its units are the meshes: each n of each element of each model, in that order, where there is such a model. A shard
+  /// of them, and what is made of shards, has errors only.
+  Part part{};
 };
 
 /// `tendon-lab accuracy`: what accuracy costs in time, model by model and mesh by mesh.

@@ -167,6 +167,11 @@ Panel felt_over(const std::string& title, const std::string& label, const Ladder
 }  // namespace
 
 void draw(const AccuracyOptions& options, const Ladders& ladders, double round_trip_ms) {
+  const std::string commit = "commit " + std::string(kCommit);
+  if (options.errors_only) {
+    draw_panels(*options.out / "accuracy", "What finer meshes bring", commit, {error_over_n(ladders)});
+    return;
+  }
   const auto& loads = options.block.loads;
   std::vector<Panel> panels{
       error_over_time("|error| of K, %, under " + load_text(loads[0]) + ", over the time of an update", ladders, 0, 0),
@@ -180,8 +185,8 @@ void draw(const AccuracyOptions& options, const Ladders& ladders, double round_t
     panels.push_back(felt_over("… over the time of an update", "ms", ladders, true,
                                [](const AccuracyPoint& p) { return p.update_ms_p50; }));
   }
-  draw_panels(*options.out / "accuracy", "What accuracy costs in time",
-              "processor time of one core; commit " + std::string(kCommit), panels);
+  draw_panels(*options.out / "accuracy", "What accuracy costs in time", "processor time of one core; " + commit,
+              panels);
 }
 
 }  // namespace tendon::lab

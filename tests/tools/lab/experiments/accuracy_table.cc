@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tests/tools/lab/experiments/accuracy_table.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
@@ -9,6 +10,7 @@
 #include <fstream>
 #include <limits>
 #include <stdexcept>
+#include <string_view>
 #include <utility>
 #include <variant>
 #include <vector>
@@ -27,10 +29,10 @@ constexpr double kNoNumber = std::numeric_limits<double>::quiet_NaN();
 using Figure = std::variant<std::int64_t, double>;
 using Figures = std::vector<std::pair<const char*, Figure>>;
 std::int64_t count(std::size_t n) { return static_cast<std::int64_t>(n); }
-Figures figures(const AccuracyPoint& p, Truth& truth) {
+Figures figures(const AccuracyPoint& p, const TruthFigures& truth, const PressedBlock& block) {
   const Accuracy& small = p.at_load[0];
   const Accuracy& hard = p.at_load[1];
-  const auto& loads = truth.block().loads;
+  const auto& loads = block.loads;
   Figures all{{"n", p.candidate.n},
               {"nodes", count(p.size.nodes)},
               {"k_n_per_m", small.k},
@@ -62,8 +64,13 @@ Figures figures(const AccuracyPoint& p, Truth& truth) {
               {"instructions", p.instructions.value_or(kNoNumber)},
               {"elements", count(p.size.elements)},
               {"free", count(p.size.free)},
-              {"truth_k_n_per_m", truth.stiffness(0).secant},
-              {"truth_uncertainty_percent", 100 * truth.uncertainty()}};
+              {"truth_k_n_per_m", truth.small},
+              {"truth_uncertainty_percent", 100 * truth.uncertainty}};
+  if (!p.timed) {
+    constexpr std::array kOfAClock = {"update_ms_p50", "setup_s", "update_ms_p99", "hz", "instructions"};
+    std::erase_if(
+        all, [&](const auto& figure) { return std::ranges::count(kOfAClock, std::string_view(figure.first)) > 0; });
+  }
   if (p.felt) {
     all.insert(all.end(), {{"felt_error_percent", 100 * p.felt->force_error},
                            {"felt_error_held_percent", 100 * p.felt->held_error},
@@ -88,17 +95,25 @@ std::string with_tenths(double value) {
 
 }  // namespace
 
-void write_csv(const std::filesystem::path& file, const std::vector<AccuracyPoint>& points, Truth& truth) {
+TruthFigures figures_of(Truth& truth) {
+  return {.linear = truth.limit(softbody::Law::kLinear, 0)->secant,
+          .small = truth.stiffness(0).secant,
+          .hard = truth.stiffness(1).secant,
+          .uncertainty = truth.uncertainty()};
+}
+
+void write_csv(const std::filesystem::path& file, const std::vector<AccuracyPoint>& points, const TruthFigures& truth,
+               const PressedBlock& block) {
   expect_replaceable(file, {"model,"});
   std::ofstream csv(file);
   csv << "model";
   if (!points.empty()) {
-    for (const auto& [name, value] : figures(points.front(), truth)) csv << ',' << name;
+    for (const auto& [name, value] : figures(points.front(), truth, block)) csv << ',' << name;
   }
   csv << ",commit\n";
   for (const AccuracyPoint& point : points) {
     csv << point.candidate.name();
-    for (const auto& [name, value] : figures(point, truth)) {
+    for (const auto& [name, value] : figures(point, truth, block)) {
       const double number = std::visit([](auto v) { return static_cast<double>(v); }, value);
       csv << ',' << (std::isfinite(number) ? shortest(number) : std::string());
     }
@@ -111,25 +126,34 @@ const char* const kFeltHeading =
     "                              update  error %        felt error %   shows %  limited vibration   latency\n"
     "model                      n      ms    small  with K     held                     %      mm/s        ms\n";
 
-const char* const kHeading =
-    "                                           error %   error % | of the hard load's    | tangent  script lateral |"
-    "  update ms                        set-up      MB\n"
-    "model                      n  nodes    K N/m   small     hard |  model    mesh  solver |       %       %        % "
-    "|"
-    "       p50       p99       Hz        s\n";
+std::string heading(bool timed) {
+  const std::string above =
+      "                                           error %   error % | of the hard load's    | tangent"
+      "  script lateral |";
+  const std::string below =
+      "model                      n  nodes    K N/m   small     hard |  model    mesh  solver |       %"
+      "       %        % |";
+  return above + (timed ? "  update ms                        set-up" : "") + "      MB\n" + below +
+         (timed ? "       p50       p99       Hz        s" : "") + "\n";
+}
 
 void write_row(std::ostream& out, const AccuracyPoint& p) {
   const Accuracy& small = p.at_load[0];
   const Accuracy& hard = p.at_load[1];
-  std::array<char, 220> line{};
-  std::snprintf(line.data(), line.size(),
-                "%-24s %3d %6zu %8.1f %+8.1f %+8.1f | %+6.1f %+7.1f %+7.2f | %7.1f %7.1f %8.2f | %9.4f %9.4f %8.0f "
-                "%8.2f %8.2f\n",
+  std::array<char, 160> text{};
+  std::snprintf(text.data(), text.size(),
+                "%-24s %3d %6zu %8.1f %+8.1f %+8.1f | %+6.1f %+7.1f %+7.2f | %7.1f %7.1f %8.2f |",
                 p.candidate.name().c_str(), p.candidate.n, p.size.nodes, small.k, 100 * small.total, 100 * hard.total,
                 100 * hard.model, 100 * hard.discretisation, 100 * hard.solver, 100 * hard.tangent,
-                100 * p.force_relative, 100 * p.lateral, p.update_ms_p50, p.update_ms_p99, 1e3 / p.update_ms_p50,
-                p.setup_s, static_cast<double>(p.size.bytes) / 1e6);
-  out << line.data();
+                100 * p.force_relative, 100 * p.lateral);
+  out << text.data();
+  if (p.timed) {
+    std::snprintf(text.data(), text.size(), " %9.4f %9.4f %8.0f %8.2f", p.update_ms_p50, p.update_ms_p99,
+                  1e3 / p.update_ms_p50, p.setup_s);
+    out << text.data();
+  }
+  std::snprintf(text.data(), text.size(), " %8.2f\n", static_cast<double>(p.size.bytes) / 1e6);
+  out << text.data();
 }
 
 void write_felt(std::ostream& out, const AccuracyPoint& p) {
@@ -143,19 +167,22 @@ void write_felt(std::ostream& out, const AccuracyPoint& p) {
 
 std::string load_text(double newtons) { return shortest(newtons) + " N"; }
 
-std::string to_json(const AccuracyPoint& point, Truth& truth) {
+std::string to_json(const AccuracyPoint& point, const TruthFigures& truth, const PressedBlock& block) {
   JsonLine line;
   line.add("model", point.candidate.name());
-  for (const auto& [name, value] : figures(point, truth)) add(line, name, value);
+  for (const auto& [name, value] : figures(point, truth, block)) add(line, name, value);
   return line.add("commit", kCommit).str();
 }
 
-void write_truth(std::ostream& out, Truth& truth) {
-  const auto& loads = truth.block().loads;
-  out << "The truth: " << with_tenths(truth.limit(softbody::Law::kLinear, 0)->secant)
-      << " N/m while strains are small, " << with_tenths(truth.stiffness(0).secant) << " N/m under "
-      << load_text(loads[0]) << ", " << with_tenths(truth.stiffness(1).secant) << " N/m under " << load_text(loads[1])
-      << "; its own meshes leave " << with_tenths(100 * truth.uncertainty()) << " % open. Commit " << kCommit << "\n\n";
+std::string to_json(const AccuracyPoint& point, Truth& truth) {
+  return to_json(point, figures_of(truth), truth.block());
+}
+
+void write_truth(std::ostream& out, const TruthFigures& truth, const PressedBlock& block) {
+  out << "The truth: " << with_tenths(truth.linear) << " N/m while strains are small, " << with_tenths(truth.small)
+      << " N/m under " << load_text(block.loads[0]) << ", " << with_tenths(truth.hard) << " N/m under "
+      << load_text(block.loads[1]) << "; its own meshes leave " << with_tenths(100 * truth.uncertainty)
+      << " % open. Commit " << kCommit << "\n\n";
 }
 
 void write_exponents(std::ostream& out, const Ladders& ladders) {
@@ -178,7 +205,7 @@ void write_answer(std::ostream& out, const AccuracyOptions& options, const std::
     line.add("budget_ms", *options.budget_ms).add("network", options.network->name);
     if (best) {
       line.add("model", best->candidate.name());
-      for (const auto& [name, value] : figures(*best, truth)) add(line, name, value);
+      for (const auto& [name, value] : figures(*best, figures_of(truth), truth.block())) add(line, name, value);
     } else {
       line.add("model", std::optional<double>());
     }

@@ -16,17 +16,28 @@ namespace tendon::lab {
 /// A ladder is one model and element on finer and finer meshes; none is empty.
 using Ladders = std::vector<std::vector<AccuracyPoint>>;
 
-extern const char* const kHeading;
+/// What is said of the truth, and stays when it is gone.
+struct TruthFigures {
+  double linear = 0;  ///< N/m while strains are small
+  double small = 0;   ///< N/m under the small load
+  double hard = 0;    ///< N/m under the hard one
+  double uncertainty = 0;
+};
+TruthFigures figures_of(Truth& truth);
+
+std::string heading(bool timed);
 void write_row(std::ostream& out, const AccuracyPoint& p);
 extern const char* const kFeltHeading;
 void write_felt(std::ostream& out, const AccuracyPoint& p);
-void write_truth(std::ostream& out, Truth& truth);
+void write_truth(std::ostream& out, const TruthFigures& truth, const PressedBlock& block);
 /// What refining costs: a line for each ladder.
 void write_exponents(std::ostream& out, const Ladders& ladders);
 /// Which one to take.
 void write_answer(std::ostream& out, const AccuracyOptions& options, const std::optional<AccuracyPoint>& best,
                   Truth& truth);
-void write_csv(const std::filesystem::path& file, const std::vector<AccuracyPoint>& points, Truth& truth);
+void write_csv(const std::filesystem::path& file, const std::vector<AccuracyPoint>& points, const TruthFigures& truth,
+               const PressedBlock& block);
+std::string to_json(const AccuracyPoint& point, const TruthFigures& truth, const PressedBlock& block);
 
 /// "0.3 N"
 std::string load_text(double newtons);

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <cstdio>
 #include <deque>
+#include <nlohmann/json.hpp>
+#include <span>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -50,31 +52,47 @@ bool grows(const SampledSpring& spring) {
   return late > early;
 }
 
+constexpr std::array kDelays = {0, 1, 2, 3, 5, 8, 13, 20, 32, 50};                        // samples of 1 ms
+constexpr std::array kRates = {25.0, 50.0, 100.0, 200.0, 500.0, 1000.0, 2000.0, 4000.0};  // Hz
+constexpr int kMapped = 6;  // springs below the exact limit and above it, to a quarter and to four times of it
+
+/// A row of the table, and a column of the map that the figure shows.
 struct Point {
   SampledSpring spring;
-  double simulated, eigenvalues, linear, passive;
+  double simulated = 0, eigenvalues = 0, linear = 0, passive = 0;
+  std::string map{};  ///< 'x' for a spring that swings up, '.' for one that comes to rest; empty when nobody draws it
 };
 
-Point point(const SampledSpring& spring) {
-  return {spring, simulated_stiffness_limit(spring), largest_stable_stiffness(spring), gil_stiffness(spring).stiffness,
-          largest_passive_stiffness(spring)};
+double mapped_stiffness(const Point& point, int i) { return point.eigenvalues * std::pow(4, i / 6.0); }
+
+Point point(const SampledSpring& spring, bool mapped) {
+  Point p{.spring = spring,
+          .simulated = simulated_stiffness_limit(spring),
+          .eigenvalues = largest_stable_stiffness(spring),
+          .linear = gil_stiffness(spring).stiffness,
+          .passive = largest_passive_stiffness(spring)};
+  SampledSpring tried = spring;
+  for (int i = -kMapped; mapped && i <= kMapped; ++i) {
+    tried.stiffness = mapped_stiffness(p, i);
+    p.map += grows(tried) ? 'x' : '.';
+  }
+  return p;
 }
 
 /// What SimulatedDevice does below and above the boundary: the map over which the curves are drawn.
-std::pair<Curve, Curve> field(const std::vector<Point>& points, double (*x)(const SampledSpring&)) {
+std::pair<Curve, Curve> field(std::span<const Point> points, double (*x)(const SampledSpring&)) {
   Curve rests{.name = "comes to rest", .colour = kSky, .style = Curve::Style::kPoints};
   Curve swings{.name = "swings up", .colour = kOrange, .style = Curve::Style::kPoints};
   for (const Point& p : points) {
-    SampledSpring spring = p.spring;
-    for (int i = -6; i <= 6; ++i) {  // a quarter to four times the exact limit
-      spring.stiffness = p.eigenvalues * std::pow(4, i / 6.0);
-      (grows(spring) ? swings : rests).points.emplace_back(x(spring), spring.stiffness);
+    for (int i = -kMapped; i <= kMapped; ++i) {
+      const bool swung = p.map.at(static_cast<std::size_t>(i + kMapped)) == 'x';
+      (swung ? swings : rests).points.emplace_back(x(p.spring), mapped_stiffness(p, i));
     }
   }
   return {rests, swings};
 }
 
-Panel panel(const std::string& title, const std::string& label, const std::vector<Point>& points,
+Panel panel(const std::string& title, const std::string& label, std::span<const Point> points,
             double (*x)(const SampledSpring&)) {
   Panel result{.title = title, .x_label = label, .log_x = true, .log_y = true};
   const auto [rests, swings] = field(points, x);
@@ -109,60 +127,99 @@ double simulated_stiffness_limit(const SampledSpring& spring) {
   return (stable + unstable) / 2;
 }
 
-void boundary(const BoundaryOptions& options, std::ostream& out) {
-  SampledSpring base{.mass = options.mass, .viscous = options.viscous, .period = std::chrono::milliseconds(1)};
-  check(base);
-  std::vector<Point> delays;
-  for (const int d : {0, 1, 2, 3, 5, 8, 13, 20, 32, 50}) {
-    base.delay_samples = d;
-    delays.push_back(point(base));
-  }
-  base.delay_samples = 0;
-  std::vector<Point> rates;
-  for (const double hz : {25.0, 50.0, 100.0, 200.0, 500.0, 1000.0, 2000.0, 4000.0}) {
-    base.period = from_seconds(1 / hz);
-    rates.push_back(point(base));
-  }
+namespace {
 
+/// Of the rows: delays at 1 kHz, then rates without delay.
+SampledSpring spring_of(const BoundaryOptions& options, std::uint64_t unit) {
+  SampledSpring spring{.mass = options.mass, .viscous = options.viscous, .period = std::chrono::milliseconds(1)};
+  if (unit < kDelays.size()) {
+    spring.delay_samples = kDelays.at(unit);
+  } else {
+    spring.period = from_seconds(1 / kRates.at(unit - kDelays.size()));
+  }
+  return spring;
+}
+
+double hz_of(const Point& p) { return 1 / seconds(p.spring.period); }
+double ms_of(const Point& p) { return seconds(p.spring.period) * p.spring.delay_samples * 1e3; }
+
+JsonLine json_of(const Point& p) {
+  JsonLine line;
+  line.add("rate_hz", hz_of(p))
+      .add("delay_ms", ms_of(p))
+      .add("mass_kg", p.spring.mass)
+      .add("b_n_s_per_m", p.spring.viscous)
+      .add("simulated_n_per_m", p.simulated)
+      .add("eigenvalues_n_per_m", p.eigenvalues)
+      .add("gil_n_per_m", p.linear)
+      .add("passive_n_per_m", p.passive)
+      .add("commit", kCommit);
+  return line;
+}
+
+SweptWork<Point> work_of(const BoundaryOptions& options) {
+  const bool mapped = options.out || options.part.units;
+  return {.what = "rows",
+          .units = kDelays.size() + kRates.size(),
+          .run = [options, mapped](std::uint64_t unit) { return point(spring_of(options, unit), mapped); },
+          .lines =
+              [](std::uint64_t /*unit*/, const Point& p) {
+                std::vector<JsonLine> lines;
+                lines.push_back(json_of(p));
+                lines.back().add("swings_up", p.map);
+                return lines;
+              },
+          .read =
+              [options](std::uint64_t unit, const std::vector<nlohmann::json>& lines) {
+                const nlohmann::json& line = lines.at(0);
+                Point p{.spring = spring_of(options, unit),
+                        .simulated = number_of(line, "simulated_n_per_m"),
+                        .eigenvalues = number_of(line, "eigenvalues_n_per_m"),
+                        .linear = number_of(line, "gil_n_per_m"),
+                        .passive = number_of(line, "passive_n_per_m"),
+                        .map = line.at("swings_up")};
+                if (p.map.size() != 2 * kMapped + 1) throw std::invalid_argument("another map");
+                return p;
+              },
+          .count =
+              [](const Point& p, ShardEnd& end) {
+                end.count("rows", 1);
+                end.lower("simulated_n_per_m", p.simulated);
+                end.raise("simulated_n_per_m", p.simulated);
+              }};
+}
+
+}  // namespace
+
+void boundary(const BoundaryOptions& options, std::ostream& out) {
+  check(spring_of(options, 0));
+  const auto points = outcomes(work_of(options), options.part, out);
+  if (!points) return;
   if (!options.json) {
     out << "The stiffest spring, N/m: " << options.mass << " kg, " << options.viscous
         << " N s/m, nobody holds it; commit " << kCommit
         << "\n\n   rate Hz  delay ms   simulated  eigenvalues  b/(T/2+t_d)   passive\n";
   }
-  for (const auto* const points : {&delays, &rates}) {
-    for (const Point& p : *points) {
-      const double hz = 1 / seconds(p.spring.period);
-      const double ms = seconds(p.spring.period) * p.spring.delay_samples * 1e3;
-      if (options.json) {
-        out << JsonLine()
-                   .add("rate_hz", hz)
-                   .add("delay_ms", ms)
-                   .add("mass_kg", p.spring.mass)
-                   .add("b_n_s_per_m", p.spring.viscous)
-                   .add("simulated_n_per_m", p.simulated)
-                   .add("eigenvalues_n_per_m", p.eigenvalues)
-                   .add("gil_n_per_m", p.linear)
-                   .add("passive_n_per_m", p.passive)
-                   .add("commit", kCommit)
-                   .str()
-            << "\n";
-        continue;
-      }
-      std::array<char, 120> line{};
-      std::snprintf(line.data(), line.size(), "%10.0f %9.0f %11.1f %12.1f %12.1f %9.1f\n", hz, ms, p.simulated,
-                    p.eigenvalues, p.linear, p.passive);
-      out << line.data();
+  for (const Point& p : *points) {
+    if (options.json) {
+      out << json_of(p).str() << "\n";
+      continue;
     }
+    std::array<char, 120> line{};
+    std::snprintf(line.data(), line.size(), "%10.0f %9.0f %11.1f %12.1f %12.1f %9.1f\n", hz_of(p), ms_of(p),
+                  p.simulated, p.eigenvalues, p.linear, p.passive);
+    out << line.data();
   }
   if (options.out) {
     std::filesystem::create_directories(*options.out);
-    delays.erase(delays.begin());  // no delay has no place on a logarithmic axis
+    const std::span<const Point> all(*points);
     const auto files = draw_panels(
         *options.out / "boundary", "How stiff a sampled spring may be",
         shortest(options.mass) + " kg, " + shortest(options.viscous) + " N s/m; commit " + std::string(kCommit),
-        {panel("Stiffness, N/m, over delay at 1 kHz", "delay, ms", delays,
+        {panel("Stiffness, N/m, over delay at 1 kHz", "delay, ms",
+               all.subspan(1, kDelays.size() - 1),  // no delay has no place on a logarithmic axis
                [](const SampledSpring& s) { return seconds(s.period) * s.delay_samples * 1e3; }),
-         panel("Stiffness, N/m, over rate without delay", "rate, Hz", rates,
+         panel("Stiffness, N/m, over rate without delay", "rate, Hz", all.subspan(kDelays.size()),
                [](const SampledSpring& s) { return 1 / seconds(s.period); })});
     if (!options.json) {
       for (const auto& file : files) out << "picture: " << file.string() << "\n";

@@ -6,6 +6,7 @@
 #include <ostream>
 
 #include "core/stability/sampled_spring.h"
+#include "tests/support/swept_work.h"
 
 namespace tendon::lab {
 
@@ -19,6 +20,7 @@ struct BoundaryOptions {
   double viscous = 0.26;                       ///< N·s/m
   std::optional<std::filesystem::path> out{};  ///< folder for the figure
   bool json = false;
+  Part part{};  ///< its units are the rows of the table, 0 to 17
 };
 
 /// `tendon-lab boundary`: how stiff a spring may be over delay and over rate, simulated beside the closed forms.

@@ -7,10 +7,8 @@
 #include <cstdio>
 #include <fstream>
 #include <functional>
-#include <iostream>
 #include <map>
 #include <nlohmann/json.hpp>
-#include <sstream>
 #include <stdexcept>
 #include <tuple>
 
@@ -79,11 +77,11 @@ void write_csv(std::ostream& out, const Cell& cell, std::uint64_t seed) {
   out << "," << seed << "," << kCommit << "\n";
 }
 
-std::string to_json(const Cell& cell, std::uint64_t seed) {
+JsonLine json_of(const Cell& cell, std::uint64_t seed) {
   const Situation& s = cell.situation;
   const Outcome& o = cell.outcome;
-  return JsonLine()
-      .add("law", cell.name())
+  JsonLine line;
+  line.add("law", cell.name())
       .add("stiffness_n_per_m", s.stiffness)
       .add("delay_ms", s.delay_ms)
       .add("jitter_ms", s.jitter_ms)
@@ -106,8 +104,8 @@ std::string to_json(const Cell& cell, std::uint64_t seed) {
       .add("latency_s", o.latency)
       .add("max_force_n", o.largest_force)
       .add("seed", seed)
-      .add("commit", kCommit)
-      .str();
+      .add("commit", kCommit);
+  return line;
 }
 
 /// Some of the cells by law: what they come down to.
@@ -399,62 +397,8 @@ std::vector<Cell> cells_of(const Situation& situation, std::uint64_t seed) {
   return cells;
 }
 
-void write_lines(std::ostream& out, const std::vector<Cell>& cells, std::uint64_t seed) {
-  for (const Cell& cell : cells) out << to_json(cell, seed) << "\n";
-}
-
-void report(const std::vector<Cell>& cells, const CompareOptions& options, std::ostream& out);
-
-}  // namespace
-
-void compare(const CompareOptions& options, std::ostream& out) {
-  if (options.every == 0) throw std::invalid_argument("--every must be 1 or more");
-  const std::vector<Situation> grid = comparison_grid();
-  std::vector<Cell> cells;
-  for (std::size_t i = 0; i < grid.size(); i += options.every) {
-    const std::vector<Cell> here = cells_of(grid[i], options.seed + i);
-    if (options.json) write_lines(out, here, options.seed + i);
-    cells.insert(cells.end(), here.begin(), here.end());
-    if (options.progress) std::cerr << "\r" << i + 1 << " of " << grid.size() << " situations" << std::flush;
-  }
-  if (options.progress) std::cerr << "\n";
-  report(cells, options, out);
-}
-
-void compare_units(const Units& situations, const CompareOptions& options, std::ostream& out) {
-  const std::vector<Situation> grid = comparison_grid();
-  if (situations.first >= grid.size() || situations.count > grid.size() - situations.first) {
-    throw std::invalid_argument("units " + std::to_string(situations.first) + ":" + std::to_string(situations.count) +
-                                ": expected some of 0 to " + std::to_string(grid.size() - 1));
-  }
-  ShardEnd end{.units = situations,
-               .totals = {{"cells", 0}, {"passive", 0}, {"stable", 0}},
-               .least = {{"energy_j", 0}},
-               .largest = {{"force_n", 0}}};
-  for (std::uint64_t unit = situations.first; unit < situations.first + situations.count; ++unit) {
-    const std::vector<Cell> cells = cells_of(grid[unit], options.seed + unit);
-    std::ostringstream lines;
-    write_lines(lines, cells, options.seed + unit);
-    out << lines.str();
-    end.digest.add(unit, lines.str());
-    for (const Cell& cell : cells) {
-      ++end.totals[0].second;
-      end.totals[1].second += cell.passive() ? 1U : 0U;
-      end.totals[2].second += cell.outcome.stable ? 1U : 0U;
-      end.least[0].second = std::min(end.least[0].second, cell.outcome.least_energy);
-      end.largest[0].second = std::max(end.largest[0].second, cell.outcome.largest_force);
-    }
-  }
-  out << end.line() << "\n";
-  if (!out.flush()) throw std::runtime_error("cannot write the cells: is the disk full?");
-}
-
-namespace {
-
-/// The cell of a line of to_json, and its seed. Throws nlohmann's exception or std::invalid_argument.
-std::pair<Cell, std::uint64_t> cell_of(const std::string& line) {
-  const auto json = nlohmann::json::parse(line);
-  const auto number = [&json](const char* name) { return json.at(name).get<double>(); };
+Cell cell_of(const nlohmann::json& json) {
+  const auto number = [&json](const char* name) { return number_of(json, name); };
   Cell cell{.situation = {.stiffness = number("stiffness_n_per_m"),
                           .delay_ms = number("delay_ms"),
                           .jitter_ms = number("jitter_ms"),
@@ -479,38 +423,63 @@ std::pair<Cell, std::uint64_t> cell_of(const std::string& line) {
     if (contender.name != name) continue;
     cell.law = contender.law;
     cell.preset = contender.preset;
-    return {cell, json.at("seed").get<std::uint64_t>()};
+    return cell;
   }
   throw std::invalid_argument("law \"" + name + "\" is none of ours");
 }
 
+using Cells = std::vector<Cell>;
+
+SweptWork<Cells> work_of(const CompareOptions& options) {
+  std::vector<Situation> taken;
+  const std::vector<Situation> grid = comparison_grid();
+  for (std::size_t i = 0; i < grid.size(); i += options.every) taken.push_back(grid[i]);
+  const std::uint64_t units = taken.size();
+  const auto seed_of = [options](std::uint64_t unit) { return options.seed + unit * options.every; };
+  return {.what = "situations",
+          .units = units,
+          .run = [taken, seed_of](std::uint64_t unit) { return cells_of(taken[unit], seed_of(unit)); },
+          .lines =
+              [seed_of](std::uint64_t unit, const Cells& cells) {
+                std::vector<JsonLine> lines;
+                for (const Cell& cell : cells) lines.push_back(json_of(cell, seed_of(unit)));
+                return lines;
+              },
+          .read =
+              [](std::uint64_t /*unit*/, const std::vector<nlohmann::json>& lines) {
+                Cells cells;
+                for (const auto& line : lines) cells.push_back(cell_of(line));
+                if (cells.size() != contenders().size()) throw std::invalid_argument("expected a cell of each law");
+                return cells;
+              },
+          .count =
+              [](const Cells& cells, ShardEnd& end) {
+                for (const Cell& cell : cells) {
+                  end.count("cells", 1);
+                  end.count("passive", cell.passive() ? 1 : 0);
+                  end.count("stable", cell.outcome.stable ? 1 : 0);
+                  end.lower("energy_j", cell.outcome.least_energy);
+                  end.raise("force_n", cell.outcome.largest_force);
+                }
+              }};
+}
+
+void report(const std::vector<Cell>& cells, const CompareOptions& options, std::ostream& out);
+
 }  // namespace
 
-void compare_from(std::istream& lines, const CompareOptions& options, std::ostream& out) {
+void compare(const CompareOptions& options, std::ostream& out) {
+  if (options.every == 0) throw std::invalid_argument("--every must be 1 or more");
   std::vector<Cell> cells;
-  CompareOptions as_run = options;
-  std::optional<ShardEnd> end;
-  std::string line;
-  for (int number = 1; std::getline(lines, line); ++number) {
-    try {
-      if (end) throw std::invalid_argument("nothing was expected after the end");
-      if (line.starts_with(R"({"kind":"end",)")) {
-        end = ShardEnd::parse(line);
-        continue;
-      }
-      const auto [cell, seed] = cell_of(line);
-      if (cells.empty()) as_run.seed = seed;
-      cells.push_back(cell);
-    } catch (const std::exception& error) {
-      throw std::invalid_argument("line " + std::to_string(number) + ": expected a cell of compare: " + error.what());
+  std::uint64_t seed = options.seed;
+  const auto situations = outcomes<Cells>(work_of(options), options.part, out, [&](const Cells& here) {
+    if (options.json) {
+      for (const Cell& cell : here) out << json_of(cell, seed).str() << "\n";
     }
-  }
-  const std::size_t whole = comparison_grid().size() * contenders().size();
-  if (!end || cells.size() != whole) {
-    throw std::invalid_argument(std::to_string(cells.size()) + " cells" + (end ? "" : " without an end") +
-                                ": expected all " + std::to_string(whole) + " of the grid");
-  }
-  report(cells, as_run, out);
+    cells.insert(cells.end(), here.begin(), here.end());
+    seed += options.every;
+  });
+  if (situations) report(cells, options, out);
 }
 
 namespace {

@@ -4,13 +4,12 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
-#include <istream>
 #include <optional>
 #include <ostream>
 #include <string>
 #include <vector>
 
-#include "tests/support/units.h"
+#include "tests/support/swept_work.h"
 #include "tests/tools/lab/experiments/situations.h"
 
 namespace tendon::lab {
@@ -70,16 +69,8 @@ struct CompareOptions {
   std::uint64_t seed = 1;
   std::optional<std::filesystem::path> out{};  ///< folder for compare.csv and the figures
   bool json = false;
-  bool progress = false;  ///< on standard error
+  Part part{};  ///< its units are the situations that are taken, from 0 on, each with all laws
 };
-
-/// A shard of a sweep (tests/support/units.h) whose units are situations of the grid, from 0 on: a line for each cell,
-/// and an end. `out` in options and `every` do not count. Throws std::invalid_argument when the grid has no such unit.
-void compare_units(const Units& situations, const CompareOptions& options, std::ostream& out);
-
-/// `compare` of the lines that shards have written: the same table, pictures and CSV as from one process. Throws
-/// std::invalid_argument naming the line that is no cell of the grid, or the unit that is missing.
-void compare_from(std::istream& lines, const CompareOptions& options, std::ostream& out);
 
 /// `tendon-lab compare`: every law in every situation, with the same seeds, and which one to use where.
 void compare(const CompareOptions& options, std::ostream& out);

@@ -65,30 +65,6 @@ TEST(Compare, TheUnconditionalPresetIsQuieterAndTruerThanThreeParts) {
   EXPECT_LT(error, error_today);
 }
 
-TEST(Compare, UnitsHaveOneDigestHoweverTheyAreCutAndAllOfThemMakeATable) {
-  const auto lines_of = [](const Units& units) {
-    std::ostringstream out;
-    compare_units(units, {}, out);
-    return out.str();
-  };
-  const auto end_of = [](const std::string& lines) {
-    return ShardEnd::parse(lines.substr(lines.rfind('\n', lines.size() - 2) + 1, std::string::npos));
-  };
-  const std::string whole = lines_of({700, 2});
-  ShardEnd end = end_of(lines_of({700, 1}));
-  end.add(end_of(lines_of({701, 1})));
-  EXPECT_EQ(end.line(), end_of(whole).line());
-  EXPECT_EQ(end.total("cells"), 2 * contenders().size());
-  EXPECT_THROW(lines_of({2304, 1}), std::invalid_argument);
-  EXPECT_THROW(lines_of({2300, 5}), std::invalid_argument);
-
-  std::istringstream some(whole);
-  std::ostringstream table;
-  EXPECT_THROW(compare_from(some, {}, table), std::invalid_argument) << "not the whole grid";
-  std::istringstream other("{\"law\":\"aol\"}\n");
-  EXPECT_THROW(compare_from(other, {}, table), std::invalid_argument);
-}
-
 TEST(Compare, TheSameSeedGivesTheSameCell) {
   const Situation situation = comparison_grid()[100];
   const Outcome first = compare_cell(situation, Law::kAol, 7).outcome;

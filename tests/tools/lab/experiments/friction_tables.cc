@@ -3,9 +3,12 @@
 
 #include <array>
 #include <cstdio>
+#include <nlohmann/json.hpp>
+#include <string>
 
 #include "server/build_info.h"
 #include "tests/support/json_line.h"
+#include "tests/support/swept_work.h"
 #include "tests/tools/lab/identify/simulated_ramps.h"
 
 namespace tendon::lab {
@@ -17,22 +20,18 @@ constexpr std::uint64_t kSeed = 1;
 
 }  // namespace
 
-std::vector<FrictionTable> friction_tables() {
-  std::vector<FrictionTable> tables;
-  for (const double viscous : {0.26, 0.05, 0.005}) {
-    const Friction truth{.coulomb = 0.05, .viscous = viscous};
-    SimulatedDevice::Config device;
-    device.mass = kMass;
-    device.viscous_friction = truth.viscous;
-    device.coulomb_friction = truth.coulomb;
-    device.encoder_step = kEncoderStep;
-    RampExperiment ramps{.device = device};
-    ramps.seed = kSeed;
-    tables.push_back({.truth = truth,
-                      .found = identify_friction(simulated_ramps(ramps), {.mass = kMass, .encoder_step = kEncoderStep}),
-                      .seed = kSeed});
-  }
-  return tables;
+FrictionTable friction_table(double damping) {
+  const Friction truth{.coulomb = 0.05, .viscous = damping};
+  SimulatedDevice::Config device;
+  device.mass = kMass;
+  device.viscous_friction = truth.viscous;
+  device.coulomb_friction = truth.coulomb;
+  device.encoder_step = kEncoderStep;
+  RampExperiment ramps{.device = device};
+  ramps.seed = kSeed;
+  return {.truth = truth,
+          .found = identify_friction(simulated_ramps(ramps), {.mass = kMass, .encoder_step = kEncoderStep}),
+          .seed = kSeed};
 }
 
 void write(std::ostream& out, const std::vector<FrictionTable>& tables) {
@@ -50,10 +49,10 @@ void write(std::ostream& out, const std::vector<FrictionTable>& tables) {
   out << "     assumed: Tables II and III are lost; ramps, travel, encoder and noise are control.md 2's\n";
 }
 
-std::string to_json(const FrictionTable& table) {
+JsonLine json_of(const FrictionTable& table) {
   const PlaceEstimate& place = table.found.places.front();
-  return JsonLine()
-      .add("experiment", "II/III")
+  JsonLine line;
+  line.add("experiment", "II/III")
       .add("b_true_n_s_per_m", table.truth.viscous)
       .add("b_kelly_n_s_per_m", place.kelly.viscous)
       .add("b_integral_n_s_per_m", place.integral.viscous)
@@ -66,8 +65,25 @@ std::string to_json(const FrictionTable& table) {
       .add("reason", table.found.reason)
       .add("seed", table.seed)
       .add("scene", "ramps of 0.05, 0.1, 0.5 N/s, 5 each way, 0.25 m, 75 g, 30 um, 5 mN")
-      .add("commit", kCommit)
-      .str();
+      .add("commit", kCommit);
+  return line;
+}
+
+FrictionTable friction_table_of(const nlohmann::json& line) {
+  const auto friction = [&line](const std::string& which) {
+    return Friction{.coulomb = number_of(line, "fc_" + which + "_n"),
+                    .viscous = number_of(line, "b_" + which + "_n_s_per_m")};
+  };
+  FrictionTable table{.truth = friction("true"), .found = {}, .seed = line.at("seed")};
+  PlaceEstimate& place = table.found.places.emplace_back();
+  place.integral = friction("integral");
+  place.kelly = friction("kelly");
+  table.found.lower_bound = friction("at_least");
+  table.found.reason = line.at("reason");
+  for (const Trust trust : {Trust::kIntegral, Trust::kBoth, Trust::kNeither}) {
+    if (line.at("trust") == to_string(trust)) table.found.trust = trust;
+  }
+  return table;
 }
 
 }  // namespace tendon::lab

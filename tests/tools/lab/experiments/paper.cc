@@ -5,8 +5,10 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <nlohmann/json.hpp>
 #include <numbers>
 #include <stdexcept>
+#include <variant>
 
 #include "core/base/portable_math.h"
 #include "server/build_info.h"
@@ -22,7 +24,13 @@ using std::chrono::milliseconds;
 
 constexpr double kAmplitude = 0.015;  // m
 constexpr double kFrequency = 0.25;   // Hz
-constexpr std::array kPaperLaws = {Law::kNone, Law::kAol, Law::kAolPlus};
+/// The rows of an experiment; the figures show the first three.
+struct RowKind {
+  Law law;
+  std::optional<Preset> preset{};
+};
+constexpr std::array kRowKinds = {RowKind{Law::kNone}, RowKind{Law::kAol}, RowKind{Law::kAolPlus},
+                                  RowKind{Law::kAolPlus, Preset::kFeel}};
 
 Environment spring(double stiffness) {
   return {.force = [stiffness](double, const Vec3& x) { return Vec3(-stiffness * x); }};
@@ -242,9 +250,11 @@ PaperRow paper_row(const PaperExperiment& experiment, Law law, std::optional<Pre
   return row;
 }
 
-std::string to_json(const PaperRow& row) {
-  return JsonLine()
-      .add("experiment", row.experiment)
+namespace {
+
+JsonLine json_of(const PaperRow& row) {
+  JsonLine line;
+  line.add("experiment", row.experiment)
       .add("law", row.law)
       .add("k_op_n_per_m", row.prescribed.operational_stiffness)
       .add("k_op_paper", row.k_op_paper)
@@ -255,11 +265,69 @@ std::string to_json(const PaperRow& row) {
       .add("limited_share", row.prescribed.limited_share)
       .add("seed", 0)
       .add("scene", "15 mm at 0.25 Hz, b 0.26 N s/m, f_c 0.005 N")
-      .add("commit", kCommit)
-      .str();
+      .add("commit", kCommit);
+  return line;
 }
 
+/// Of such a line, as much as is in it.
+PaperRow row_of(const nlohmann::json& line) {
+  PaperRow row;
+  row.experiment = line.at("experiment");
+  row.law = line.at("law");
+  if (const auto& k = line.at("k_op_paper"); !k.is_null()) row.k_op_paper = k.get<double>();
+  row.prescribed.operational_stiffness = number_of(line, "k_op_n_per_m");
+  row.prescribed.least_energy = row.free.least_energy = number_of(line, "min_energy_j");
+  row.prescribed.largest_force = number_of(line, "max_force_n");
+  row.prescribed.limited_share = number_of(line, "limited_share");
+  row.free.late_vibration = number_of(line, "hf_velocity_m_s");
+  row.free.stable = line.at("stable");
+  return row;
+}
+
+/// A row of the table: of an experiment, or of Tables II and III.
+using AnyRow = std::variant<PaperRow, FrictionTable>;
+
+/// `drawn`: with the motion that a figure shows.
+PaperRow run_row(std::size_t experiment, std::size_t kind, bool drawn) {
+  PaperRow row = paper_row(paper_experiments().at(experiment), kRowKinds.at(kind).law, kRowKinds.at(kind).preset);
+  row.prescribed_record = {};
+  if (!drawn) row.free_record = {};
+  return row;
+}
+
+SweptWork<AnyRow> work_of(const PaperOptions& options) {
+  const bool drawn = options.out && !options.part.units;
+  const std::size_t experiments = paper_experiments().size() * kRowKinds.size();
+  return {.what = "rows",
+          .units = experiments + kTableDampings.size(),
+          .run = [experiments, drawn](std::uint64_t unit) -> AnyRow {
+            if (unit >= experiments) return friction_table(kTableDampings.at(unit - experiments));
+            return run_row(unit / kRowKinds.size(), unit % kRowKinds.size(), drawn);
+          },
+          .lines =
+              [](std::uint64_t /*unit*/, const AnyRow& row) {
+                std::vector<JsonLine> lines;
+                lines.push_back(std::visit([](const auto& one) { return json_of(one); }, row));
+                return lines;
+              },
+          .read = [experiments](std::uint64_t unit, const std::vector<nlohmann::json>& lines) -> AnyRow {
+            if (unit >= experiments) return friction_table_of(lines.at(0));
+            return row_of(lines.at(0));
+          },
+          .count =
+              [](const AnyRow& row, ShardEnd& end) {
+                const PaperRow* const one = std::get_if<PaperRow>(&row);
+                end.count("rows", 1);
+                end.count("stable", one != nullptr && one->free.stable ? 1 : 0);
+                end.lower("energy_j", one != nullptr ? one->least_energy() : 0);
+              }};
+}
+
+}  // namespace
+
 void paper(const PaperOptions& options, std::ostream& out) {
+  const auto all = outcomes(work_of(options), options.part, out);
+  if (!all) return;
   if (options.out) std::filesystem::create_directories(*options.out);
   if (!options.json) {
     out << "Lee & Lee 2009, section III: b = 0.26 N s/m, f_c = 0.005 N, 15 mm at 0.25 Hz, 5 s; commit " << kCommit
@@ -267,14 +335,16 @@ void paper(const PaperOptions& options, std::ostream& out) {
         << "     law    K_op N/m     paper  least energy J  vibration m/s  stable  largest force N  limited\n";
   }
   std::vector<std::filesystem::path> pictures;
-  for (const PaperExperiment& experiment : paper_experiments()) {
+  for (std::size_t i = 0; i < paper_experiments().size(); ++i) {
+    const PaperExperiment& experiment = paper_experiments()[i];
     std::vector<PaperRow> rows;
+    for (std::size_t kind = 0; kind < kRowKinds.size(); ++kind) {
+      rows.push_back(std::get<PaperRow>(all->at(i * kRowKinds.size() + kind)));
+    }
     if (!options.json) out << experiment.name << "  " << experiment.what << "\n";
-    for (const Law law : kPaperLaws) rows.push_back(paper_row(experiment, law));
-    rows.push_back(paper_row(experiment, Law::kAolPlus, Preset::kFeel));
     for (const PaperRow& row : rows) {
       if (options.json) {
-        out << to_json(row) << "\n";
+        out << json_of(row).str() << "\n";
         continue;
       }
       out << cell(row.law, 8) << cell(fixed(row.prescribed.operational_stiffness, 0), 12)
@@ -286,15 +356,21 @@ void paper(const PaperOptions& options, std::ostream& out) {
     if (!options.json)
       out << "     assumed: " << experiment.assumed << "; aol+ and feel: " << experiment.better << "\n";
     if (options.out) {
+      if (options.part.from) {
+        for (std::size_t kind = 0; kind < 3; ++kind) rows[kind] = run_row(i, kind, true);
+      }
       const auto drawn = draw_panels(
           *options.out / ("paper-" + experiment.name), "Experiment " + experiment.name + ": " + experiment.what,
           "free hand; commit " + std::string(kCommit), figure(experiment, rows[0], rows[1], rows[2]));
       pictures.insert(pictures.end(), drawn.begin(), drawn.end());
     }
   }
-  const std::vector<FrictionTable> friction = friction_tables();
+  std::vector<FrictionTable> friction;
+  for (const AnyRow& row : *all) {
+    if (const auto* const table = std::get_if<FrictionTable>(&row)) friction.push_back(*table);
+  }
   if (options.json) {
-    for (const FrictionTable& table : friction) out << to_json(table) << "\n";
+    for (const FrictionTable& table : friction) out << json_of(table).str() << "\n";
   } else {
     write(out, friction);
     out << "\nK_op, largest force and share limited on the prescribed motion; vibration (rms faster than 50 ms, last "

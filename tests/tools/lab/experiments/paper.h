@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "core/control/preset.h"
+#include "tests/support/swept_work.h"
 #include "tests/tools/lab/experiments/experiment.h"
 
 namespace tendon::lab {
@@ -65,12 +66,12 @@ struct PaperRow {
 
 PaperRow paper_row(const PaperExperiment& experiment, Law law, std::optional<Preset> preset = {});
 
-/// One line of JSON; `commit` is that of the build.
-std::string to_json(const PaperRow& row);
-
 struct PaperOptions {
   std::optional<std::filesystem::path> out{};  ///< folder for the figures
   bool json = false;
+  /// Its units are the rows of the table: four for each experiment, then those of Tables II and III. With `from` the
+  /// figures' motions are run again: no line has a motion.
+  Part part{};
 };
 
 /// `tendon-lab paper`: all of it, as a table or JSON and as figures. Throws std::runtime_error when it cannot write.

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <iomanip>
+#include <nlohmann/json.hpp>
 #include <sstream>
 #include <stdexcept>
 #include <string>
@@ -69,25 +70,106 @@ double median(std::vector<double>& of) {
   return *middle;
 }
 
-TeleopRow measure(CouplingMethod method, int round_trip_ms, int hands, std::uint64_t seed) {
+/// What one hand felt.
+struct Trial {
+  double first = 0;  ///< as in TeleopRow
+  double second = 0;
+  double buzz = 0;
+  double pair = 0;
+  bool live = false;  ///< engaged, to the end
+};
+
+Trial trial(CouplingMethod method, int round_trip_ms, std::uint64_t seed) {
+  Pressing with = by(method);
+  with.one_way = round_trip_ms / 2;
+  with.seed = seed;
+  with.hand = Dice(seed).within(150, 600);
+  const Felt felt = feel(with);
+  return {.first = felt.first / rigid(with),
+          .second = felt.second / rigid(with),
+          .buzz = felt.buzz,
+          .pair = felt.sum,
+          .live = felt.live};
+}
+
+TeleopRow row_of(CouplingMethod method, int round_trip_ms, std::span<const Trial> trials) {
   TeleopRow row{.method = method, .round_trip_ms = round_trip_ms};
   std::vector<double> first;
   std::vector<double> second;
-  Pressing with = by(method);
-  with.one_way = round_trip_ms / 2;
-  for (int hand = 0; hand < hands; ++hand) {
-    with.seed = seed + static_cast<std::uint64_t>(hand);
-    with.hand = Dice(with.seed).within(150, 600);
-    const Felt felt = feel(with);
-    if (!felt.live) throw std::runtime_error(std::string(to_string(method)) + " did not stay engaged");
-    first.push_back(felt.first / rigid(with));
-    second.push_back(felt.second / rigid(with));
-    row.buzz = std::max(row.buzz, felt.buzz);
-    row.pair = std::min(row.pair, felt.sum);
+  for (const Trial& one : trials) {
+    if (!one.live) throw std::runtime_error(std::string(to_string(method)) + " did not stay engaged");
+    first.push_back(one.first);
+    second.push_back(one.second);
+    row.buzz = std::max(row.buzz, one.buzz);
+    row.pair = std::min(row.pair, one.pair);
   }
   row.first = median(first);
   row.second = median(second);
   return row;
+}
+
+/// Every hand at every round trip of every method, in that order.
+class Trials {
+ public:
+  Trials(int hands, std::uint64_t seed, std::span<const int> round_trips_ms)
+      : hands_(static_cast<std::size_t>(hands)), seed_(seed), round_trips_(round_trips_ms) {
+    if (hands < 1 || hands > 1000) throw std::invalid_argument("hands: expected 1 to 1000");
+  }
+
+  std::uint64_t count() const { return std::size(kMethods) * round_trips_.size() * hands_; }
+  CouplingMethod method(std::uint64_t i) const { return kMethods[i / hands_ / round_trips_.size()]; }
+  int round_trip(std::uint64_t i) const { return round_trips_[i / hands_ % round_trips_.size()]; }
+  std::uint64_t seed(std::uint64_t i) const { return seed_ + i % hands_; }
+  Trial run(std::uint64_t i) const { return trial(method(i), round_trip(i), seed(i)); }
+
+  std::vector<TeleopRow> rows(const std::vector<Trial>& trials) const {
+    std::vector<TeleopRow> rows;
+    for (std::size_t i = 0; i < trials.size(); i += hands_) {
+      rows.push_back(row_of(method(i), round_trip(i), std::span(trials).subspan(i, hands_)));
+    }
+    return rows;
+  }
+
+ private:
+  std::size_t hands_;
+  std::uint64_t seed_;
+  std::span<const int> round_trips_;
+};
+
+SweptWork<Trial> work_of(const Trials& trials) {
+  return {.what = "trials",
+          .units = trials.count(),
+          .run = [trials](std::uint64_t unit) { return trials.run(unit); },
+          .lines =
+              [trials](std::uint64_t unit, const Trial& one) {
+                std::vector<JsonLine> lines;
+                lines.emplace_back()
+                    .add("method", to_string(trials.method(unit)))
+                    .add("round_trip_ms", trials.round_trip(unit))
+                    .add("seed", trials.seed(unit))
+                    .add("felt_first", one.first)
+                    .add("felt_second", one.second)
+                    .add("buzz_mps", one.buzz)
+                    .add("pair_j", one.pair)
+                    .add("engaged", one.live);
+                return lines;
+              },
+          .read =
+              [](std::uint64_t /*unit*/, const std::vector<nlohmann::json>& lines) {
+                const nlohmann::json& line = lines.at(0);
+                return Trial{.first = number_of(line, "felt_first"),
+                             .second = number_of(line, "felt_second"),
+                             .buzz = number_of(line, "buzz_mps"),
+                             .pair = number_of(line, "pair_j"),
+                             .live = line.at("engaged")};
+              },
+          .count =
+              [](const Trial& one, ShardEnd& end) {
+                end.count("trials", 1);
+                end.count("engaged", one.live ? 1 : 0);
+                end.lower("pair_j", one.pair);
+                end.raise("buzz_mps", one.buzz);
+              }};
 }
 
 std::string table_of(const std::vector<TeleopRow>& rows) {
@@ -131,16 +213,17 @@ void draw(const std::vector<TeleopRow>& rows, const TeleopOptions& options, std:
 }  // namespace
 
 std::vector<TeleopRow> teleop_rows(int hands, std::uint64_t seed, std::span<const int> round_trips_ms) {
-  if (hands < 1 || hands > 1000) throw std::invalid_argument("hands: expected 1 to 1000");
-  std::vector<TeleopRow> rows;
-  for (const CouplingMethod method : kMethods) {
-    for (const int round_trip : round_trips_ms) rows.push_back(measure(method, round_trip, hands, seed));
-  }
-  return rows;
+  const Trials trials(hands, seed, round_trips_ms);
+  std::vector<Trial> all;
+  for (std::uint64_t i = 0; i < trials.count(); ++i) all.push_back(trials.run(i));
+  return trials.rows(all);
 }
 
 void teleop(const TeleopOptions& options, std::ostream& out) {
-  const auto rows = teleop_rows(options.hands, options.seed, kRoundTrips);
+  const Trials trials(options.hands, options.seed, kRoundTrips);
+  const auto all = outcomes(work_of(trials), options.part, out);
+  if (!all) return;
+  const auto rows = trials.rows(*all);
   if (options.json) {
     for (const TeleopRow& row : rows) {
       out << JsonLine()

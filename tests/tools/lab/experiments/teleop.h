@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "core/teleoperation/port_state.h"
+#include "tests/support/swept_work.h"
 
 namespace tendon::lab {
 
@@ -17,6 +18,7 @@ struct TeleopOptions {
   std::uint64_t seed = 1;                      ///< of the first one
   std::optional<std::filesystem::path> out{};  ///< folder for the figure
   bool json = false;
+  Part part{};  ///< its units are trials: each hand at each round trip of each method, in that order
 };
 
 /// A method at a round trip: medians over the hands, and the worst of what must not be.

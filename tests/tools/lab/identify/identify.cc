@@ -6,7 +6,9 @@
 #include <charconv>
 #include <cmath>
 #include <cstdio>
-#include <span>
+#include <functional>
+#include <limits>
+#include <nlohmann/json.hpp>
 #include <stdexcept>
 #include <string_view>
 #include <utility>
@@ -27,11 +29,13 @@ constexpr double kSimulatedInertia = 1e-4;  // kg·m²
 
 double usual_step(Freedom freedom) { return freedom == Freedom::kRotation ? kAngularStep : kEncoderStep; }
 
+/// Where runs come from, and by what their fits are made.
 struct Source {
   FreedomInfo freedom = info(Freedom::kMovement);
-  std::vector<RampRun> runs{};
   std::vector<std::string> names{};  ///< of the runs, for people
+  std::vector<std::string> places{};
   IdentificationConfig config{};
+  std::function<RampRun(std::size_t)> run{};
 };
 
 void check(const IdentifyOptions& options) {
@@ -113,39 +117,39 @@ RampExperiment experiment_of(const IdentifyOptions& options) {
 Source simulated(const IdentifyOptions& options) {
   const RampExperiment experiment = experiment_of(options);
   Source source{.freedom = info(options.freedom)};
-  source.runs = simulated_ramps(experiment);
-  for (std::size_t i = 0; i < source.runs.size(); ++i) {
-    source.names.push_back("simulated " + std::to_string(i + 1));
-    source.runs[i].place = "x";
-  }
+  const std::size_t runs = 2 * experiment.rates.size() * static_cast<std::size_t>(experiment.repeats);
+  for (std::size_t i = 0; i < runs; ++i) source.names.push_back("simulated " + std::to_string(i + 1));
+  source.places.resize(runs, "x");
   const bool turns = options.freedom == Freedom::kRotation;
   const bool moves = options.freedom == Freedom::kMovement;
   const double step = moves ? experiment.device.encoder_step.value_or(0) : usual_step(options.freedom);
   source.config = {.mass = options.mass.value_or(turns ? kSimulatedInertia : experiment.device.mass),
                    .encoder_step = options.encoder_step.value_or(step)};
+  // The noise of a run goes on where that of the one before has ended: whoever needs one simulates all.
+  source.run = [experiment, all = std::vector<RampRun>()](std::size_t i) mutable {
+    if (all.empty()) all = simulated_ramps(experiment);
+    return all.at(i);
+  };
   return source;
 }
 
 Source recorded(const IdentifyOptions& options) {
   Source source{.freedom = info(options.freedom)};
-  for (std::size_t i = 0; i < options.files.size(); ++i) {
-    RampRun run = load_ramp_csv(options.files[i], options.freedom);
-    if (!options.places.empty()) run.place = options.places[i];
-    source.runs.push_back(std::move(run));
-    source.names.push_back(options.files[i].string());
-  }
+  for (const std::filesystem::path& file : options.files) source.names.push_back(file.string());
+  source.places = options.places;
   source.config = {.mass = options.mass, .encoder_step = options.encoder_step.value_or(usual_step(options.freedom))};
+  source.run = [options](std::size_t i) { return load_ramp_csv(options.files.at(i), options.freedom); };
   return source;
 }
 
-/// Which run it is that cannot be used is known by name here only: one by one first.
-void check_runs(const Source& source) {
-  for (std::size_t i = 0; i < source.runs.size(); ++i) {
-    try {
-      ramp_of(slide_of(source.runs[i], source.config.encoder_step));
-    } catch (const std::invalid_argument& error) {
-      throw std::runtime_error(source.names[i] + ": " + error.what());
-    }
+/// Throws std::runtime_error, naming the run, when it cannot be used.
+RunEstimate fit_of(const Source& source, std::size_t i) {
+  RampRun run = source.run(i);
+  if (!source.places.empty()) run.place = source.places.at(i);
+  try {
+    return fit_run(run, source.config);
+  } catch (const std::invalid_argument& error) {
+    throw std::runtime_error(source.names.at(i) + ": " + error.what());
   }
 }
 
@@ -249,19 +253,82 @@ void write_json(const Source& source, const Identification& result, std::ostream
   out << line.str() << '\n';
 }
 
+// ---- A sweep ----------------------------------------------------------------------------------------------------
+
+JsonLine line_of(const std::string& name, const RunEstimate& run, bool turns) {
+  const std::string effort = turns ? "_nm" : "_n";
+  const std::string inertia = turns ? "inertia_kg_m2" : "mass_kg";
+  JsonLine line;
+  line.add("run", name).add("place", run.place).add("direction", run.direction);
+  line.add(turns ? "travel_rad" : "travel_m", run.travel);
+  add(line, "kelly_", run.kelly.friction, turns);
+  line.add("kelly_rate" + effort + "_per_s", run.kelly.rate)
+      .add("kelly_slide_s", run.kelly.slide_time)
+      .add("kelly_time_constant_s", run.kelly.time_constant);
+  add(line, "integral_", run.integral.friction, turns);
+  line.add("integral_" + inertia, run.integral.mass)
+      .add("viscous_variance_of_unit_noise", run.integral.unit_covariance(0, 0))
+      .add("coulomb_variance_of_unit_noise", run.integral.unit_covariance(1, 1))
+      .add("residual_squares", run.integral.residual_squares)
+      .add("residual_squares_of_unit_noise", run.integral.unit_residual);
+  return line;
+}
+
+/// As much as identify_friction needs: not how the errors of b and f_c hang together.
+RunEstimate estimate_of(const nlohmann::json& line, bool turns) {
+  const std::string effort = turns ? "_nm" : "_n";
+  const auto friction = [&](const std::string& prefix) {
+    return Friction{.coulomb = number_of(line, prefix + "coulomb" + effort),
+                    .viscous = number_of(line, prefix + (turns ? "viscous_nm_s_per_rad" : "viscous_n_s_per_m"))};
+  };
+  RunEstimate run;
+  run.place = line.at("place");
+  run.direction = number_of(line, "direction");
+  run.travel = number_of(line, turns ? "travel_rad" : "travel_m");
+  run.kelly = {.friction = friction("kelly_"),
+               .rate = number_of(line, "kelly_rate" + effort + "_per_s"),
+               .slide_time = number_of(line, "kelly_slide_s"),
+               .time_constant = number_of(line, "kelly_time_constant_s")};
+  // JSON has no infinity.
+  if (std::isnan(run.kelly.time_constant)) run.kelly.time_constant = std::numeric_limits<double>::infinity();
+  run.integral.friction = friction("integral_");
+  run.integral.mass = number_of(line, turns ? "integral_inertia_kg_m2" : "integral_mass_kg");
+  run.integral.unit_covariance(0, 0) = number_of(line, "viscous_variance_of_unit_noise");
+  run.integral.unit_covariance(1, 1) = number_of(line, "coulomb_variance_of_unit_noise");
+  run.integral.residual_squares = number_of(line, "residual_squares");
+  run.integral.unit_residual = number_of(line, "residual_squares_of_unit_noise");
+  return run;
+}
+
+SweptWork<RunEstimate> work_of(const Source& source) {
+  const bool turns = source.freedom.freedom == Freedom::kRotation;
+  return {.what = "runs",
+          .units = source.names.size(),
+          .run = [&source](std::uint64_t unit) { return fit_of(source, unit); },
+          .lines =
+              [&source, turns](std::uint64_t unit, const RunEstimate& run) {
+                std::vector<JsonLine> lines;
+                lines.push_back(line_of(source.names.at(unit), run, turns));
+                return lines;
+              },
+          .read = [turns](std::uint64_t /*unit*/,
+                          const std::vector<nlohmann::json>& lines) { return estimate_of(lines.at(0), turns); },
+          .count =
+              [](const RunEstimate& run, ShardEnd& end) {
+                end.count("runs", 1);
+                end.count("kelly_long_enough", run.kelly.long_enough() ? 1 : 0);
+                end.lower("integral_viscous", run.integral.friction.viscous);
+                end.lower("integral_coulomb", run.integral.friction.coulomb);
+              }};
+}
+
 }  // namespace
 
 void identify(const IdentifyOptions& options, std::ostream& out) {
   check(options);
   const Source source = options.files.empty() ? simulated(options) : recorded(options);
-  check_runs(source);
-  Identification result;
-  try {
-    result = identify_friction(source.runs, source.config);
-  } catch (const std::invalid_argument& error) {
-    throw std::runtime_error(error.what());  // of the runs, not of the options
-  }
-  (options.json ? write_json : write_table)(source, result, out);
+  const auto fits = outcomes(work_of(source), options.part, out);
+  if (fits) (options.json ? write_json : write_table)(source, identify_friction(*fits), out);
 }
 
 }  // namespace tendon::lab

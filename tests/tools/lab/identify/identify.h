@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "core/ledger/friction.h"
+#include "tests/support/swept_work.h"
 #include "tests/tools/lab/identify/freedom.h"
 
 namespace tendon::lab {
@@ -27,13 +28,15 @@ struct IdentifyOptions {
   std::optional<double> mass = {};          ///< kg or kg·m²; left out: fitted, or that of the simulated device
   std::optional<double> encoder_step = {};  ///< m or rad; left out: 30 µm, 0.1 mrad, or as simulated
   bool json = false;
+  Part part{};  ///< its units are the runs, in their order: the files, or 30 that are simulated
 };
 
 /// Identifies the friction and writes to `out` a table, which method is trusted and why, and a fragment of a scene with
 /// the lower bounds; or one line of JSON for each run and a last one for the result.
 ///
-/// Nothing is written before all is known. Throws std::invalid_argument when the options make no sense, before anything
-/// is read; std::runtime_error when a file cannot be read or a run cannot be used, naming the file.
+/// But for a shard of a sweep nothing is written before all is known. Throws std::invalid_argument when the options make
+/// no sense, before anything is read; std::runtime_error when a file cannot be read or a run cannot be used, naming the
+/// file.
 void identify(const IdentifyOptions& options, std::ostream& out);
 
 }  // namespace tendon::lab

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "server/build_info.h"
+#include "tests/support/part_options.h"
 #include "tests/support/run_tool.h"
 #include "tests/tools/lab/identify/identify.h"
 
@@ -61,6 +62,7 @@ int main(int argc, char** argv) {
       ->delimiter(',')
       ->expected(2);
   app.add_option("--seed", options.seed, "of the simulation's noise")->type_name("N");
+  add_part_options(app, options.part, "the runs, in their order from 0 on: the files, or 30 that are simulated");
   app.add_flag("--json", options.json, "one JSON object for each run and a last one for the result");
 
   return run_tool(app, argc, argv, [&] {

@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // tendon-lab accuracy: its command line.
-#include <unistd.h>
-
 #include <CLI/CLI.hpp>
 #include <charconv>
 #include <cstdint>
@@ -15,6 +13,7 @@
 
 #include "tests/tools/injector/profile/named_profiles.h"
 
+#include "tests/support/part_options.h"
 #include "tests/tools/lab/experiments/accuracy.h"
 #include "tests/tools/lab/verbs/verb.h"
 
@@ -94,15 +93,17 @@ void add(CLI::App& verb, int& /*exit*/) {
   verb.add_option("--elements", arguments.elements, elements + "; left out: all")
       ->type_name("NAME,...")
       ->delimiter(',');
-  verb.add_option("--slowest-ms", options.slowest_ms, "a model is refined no further than this for an update")
-      ->check(CLI::PositiveNumber)
-      ->capture_default_str();
-  verb.add_option("--longest-setup-s", options.longest_setup_s,
-                  "… and this for its set-up; left out: 30, with a budget 5")
-      ->check(CLI::PositiveNumber);
-  verb.add_option("--longest-point-s", options.longest_point_s, "… and this to measure it, all in all")
-      ->check(CLI::PositiveNumber)
-      ->capture_default_str();
+  CLI::Option* const slowest =
+      verb.add_option("--slowest-ms", options.slowest_ms, "a model is refined no further than this for an update")
+          ->check(CLI::PositiveNumber)
+          ->capture_default_str();
+  CLI::Option* const setup = verb.add_option("--longest-setup-s", options.longest_setup_s,
+                                             "… and this for its set-up; left out: 30, with a budget 5")
+                                 ->check(CLI::PositiveNumber);
+  CLI::Option* const point =
+      verb.add_option("--longest-point-s", options.longest_point_s, "… and this to measure it, all in all")
+          ->check(CLI::PositiveNumber)
+          ->capture_default_str();
   verb.add_option("--network", arguments.network,
                   "what is left at the hand behind it: " + injector::names_of_profiles())
       ->type_name("NAME|LINE");
@@ -114,6 +115,11 @@ void add(CLI::App& verb, int& /*exit*/) {
   verb.add_option("--truth-cells", options.truth.cells, "of the mesh of the truth, to the patch's radius")
       ->check(CLI::Range(2.0, 8.0))
       ->capture_default_str();
+  verb.add_flag("--errors-only", options.errors_only,
+                "no times: errors and sizes, which are the same each time, of every mesh, however long it takes")
+      ->excludes(slowest, setup, point);
+  add_part_options(verb, options.part,
+                   "the meshes, from 0 on: each n of each element of each model; has, and makes, --errors-only");
   verb.add_option("--out", options.out, "write accuracy.csv and a figure there, SVG and PNG (needs gnuplot)")
       ->type_name("DIR");
   verb.add_flag("--json", options.json, "one JSON object for each model and mesh instead of the table");
@@ -122,8 +128,13 @@ void add(CLI::App& verb, int& /*exit*/) {
       "  tendon-lab accuracy --models condensed --n 4,8,16 --longest-setup-s 5\n"
       "all of it, in half an hour or more\n  tendon-lab accuracy --network wifi-good --out figures\n"
       "what to take\n  tendon-lab accuracy --budget-ms 5 --network wifi-good --json\n"
+      "\nExample: errors of the finest meshes, by many machines\n"
+      "  tendon-sweep plan a --units 0:24 --per-shard 1 -- tendon-lab accuracy --models condensed --n 8,12,16,20\n"
       "\nTimes are those of this machine, now. Exit: 0 done; 1 cannot write, or gnuplot failed; 2 wrong usage.");
-  verb.callback([models, elements] {
+  verb.callback([models, elements, slowest, setup, point] {
+    if ((options.part.units || options.part.from) && (*slowest || *setup || *point)) {
+      throw std::invalid_argument("--units, --from: not with a limit of time, since they look at no clock");
+    }
     options.models = named(arguments.models, softbody::model_named, models);
     options.elements = named(arguments.elements, softbody::element_named, elements);
     options.block = {.size = lengths(arguments.block_mm),
@@ -133,7 +144,6 @@ void add(CLI::App& verb, int& /*exit*/) {
                      .loads = {arguments.loads_n.at(0), arguments.loads_n.at(1)}};
     if (!arguments.network.empty()) options.network = {.name = arguments.network, .seed = arguments.seed};
     if (options.budget_ms) options.slowest_ms = *options.budget_ms;
-    options.progress = isatty(STDERR_FILENO) != 0;
     accuracy(options, std::cout);
   });
 }

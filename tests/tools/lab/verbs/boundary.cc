@@ -3,6 +3,7 @@
 #include <CLI/CLI.hpp>
 #include <iostream>
 
+#include "tests/support/part_options.h"
 #include "tests/tools/lab/experiments/boundary.h"
 #include "tests/tools/lab/verbs/verb.h"
 
@@ -14,6 +15,7 @@ void add(CLI::App& verb, int& /*exit*/) {
   verb.add_option("--mass", options.mass, "of the device, kg")->capture_default_str();
   verb.add_option("--b", options.viscous, "viscous friction of the device, N s/m")->capture_default_str();
   verb.add_option("--out", options.out, "draw the figure there, SVG and PNG (needs gnuplot)")->type_name("DIR");
+  add_part_options(verb, options.part, "0 to 17, the rows of the table");
   verb.add_flag("--json", options.json, "one JSON object for each point instead of the table");
   verb.footer(
       "\nExample\n  tendon-lab boundary --b 0.26 --out figures\n"

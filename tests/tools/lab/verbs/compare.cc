@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // tendon-lab compare: its command line.
-#include <unistd.h>
-
 #include <CLI/CLI.hpp>
-#include <fstream>
 #include <iostream>
+#include <stdexcept>
 
+#include "tests/support/part_options.h"
 #include "tests/tools/lab/experiments/compare.h"
 #include "tests/tools/lab/experiments/compare_kinds.h"
 #include "tests/tools/lab/experiments/situations.h"
@@ -17,8 +16,6 @@ namespace {
 void add(CLI::App& verb, int& /*exit*/) {
   static CompareOptions options;
   static CompareKindsOptions drawn;
-  static std::string units;
-  static std::string from;
   std::string names = "all";
   for (const SituationKind& kind : situation_kinds()) names += ", " + std::string(kind.name);
   verb.add_option("--kinds", drawn.kinds, "instead of the grid, situations that are drawn from seeds: " + names)
@@ -31,11 +28,7 @@ void add(CLI::App& verb, int& /*exit*/) {
   verb.add_flag("--held-out", drawn.held_out, "with --kinds: seeds on which no law was tuned");
   verb.add_option("--every", options.every, "take every so-manieth situation of the grid")->capture_default_str();
   verb.add_option("--seed", options.seed, "of the network; the same for all laws")->capture_default_str();
-  verb.add_option("--units", units, "these situations of the grid, from 0 on, as a shard of a sweep: lines of JSON")
-      ->type_name("FIRST:COUNT");
-  verb.add_option("--from", from, "runs nothing; the table of what the shards of a sweep came to (tendon-sweep merge)")
-      ->type_name("FILE")
-      ->check(CLI::ExistingFile.description(""));
+  add_part_options(verb, options.part, "0 to 2303, the situations of the grid (with --every, those that are taken)");
   verb.add_option("--out", options.out, "write compare.csv and a figure there, SVG and PNG (needs gnuplot)")
       ->type_name("DIR");
   verb.add_flag("--json", options.json, "one JSON object for each cell instead of the table");
@@ -45,17 +38,12 @@ void add(CLI::App& verb, int& /*exit*/) {
       "  tendon-lab compare --kinds all --held-out --count 100\n"
       "\nExit: 0 done; 1 cannot write, or gnuplot failed; 2 wrong usage.");
   verb.callback([] {
-    options.progress = isatty(STDERR_FILENO) != 0;
-    if (!units.empty()) return compare_units(parse_units(units), options, std::cout);
-    if (!from.empty()) {
-      std::ifstream lines(from);
-      return compare_from(lines, options, std::cout);
-    }
     if (drawn.kinds.empty()) return compare(options, std::cout);
+    if (options.part.units || options.part.from) throw std::invalid_argument("--kinds: cannot be swept; the grid can");
     drawn.seed = options.seed;
     drawn.out = options.out;
     drawn.json = options.json;
-    drawn.progress = options.progress;
+    drawn.progress = options.part.progress;
     compare_kinds(drawn, std::cout);
   });
 }

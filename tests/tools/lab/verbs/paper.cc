@@ -3,6 +3,7 @@
 #include <CLI/CLI.hpp>
 #include <iostream>
 
+#include "tests/support/part_options.h"
 #include "tests/tools/lab/experiments/paper.h"
 #include "tests/tools/lab/verbs/verb.h"
 
@@ -13,6 +14,7 @@ void add(CLI::App& verb, int& /*exit*/) {
   static PaperOptions options;
   verb.add_option("--out", options.out, "draw a figure of each experiment there, SVG and PNG (needs gnuplot)")
       ->type_name("DIR");
+  add_part_options(verb, options.part, "0 to 30, the rows of the table");
   verb.add_flag("--json", options.json, "one JSON object for each experiment and law instead of the table");
   verb.footer(
       "\nExample: table and figures\n  tendon-lab paper --out figures\n"

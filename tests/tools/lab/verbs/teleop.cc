@@ -3,6 +3,7 @@
 #include <CLI/CLI.hpp>
 #include <iostream>
 
+#include "tests/support/part_options.h"
 #include "tests/tools/lab/experiments/teleop.h"
 #include "tests/tools/lab/verbs/verb.h"
 
@@ -14,6 +15,7 @@ void add(CLI::App& verb, int& /*exit*/) {
   verb.add_option("--hands", options.hands, "drawn for each method and round trip")->capture_default_str();
   verb.add_option("--seed", options.seed, "of the first hand and its network")->capture_default_str();
   verb.add_option("--out", options.out, "draw the figure there, SVG and PNG (needs gnuplot)")->type_name("DIR");
+  add_part_options(verb, options.part, "0 to 48 * HANDS - 1, the trials: each hand at each round trip of each method");
   verb.add_flag("--json", options.json, "one JSON object for each line instead of the table");
   verb.footer(
       "\nExample\n  tendon-lab teleop --hands 21 --out figures     three minutes\n"

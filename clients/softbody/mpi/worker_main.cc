@@ -1,19 +1,25 @@
 // SPDX-License-Identifier: Apache-2.0
-// tendon-fem: what a soft body's engine has done by many machines, before anybody touches it.
+// tendon-fem-worker: a soft body on as many ranks as MPI is started on. tendon-fem starts it.
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
 #include <exception>
 #include <filesystem>
 #include <iostream>
+#include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 #include <string>
 #include <utility>
+#include <vector>
 
+#include "clients/cpp/worker/worker.h"
 #include "clients/softbody/mpi/spread_solver.h"
+#include "clients/softbody/placed_body.h"
 #include "clients/softbody/scene.h"
 
 using namespace tendon::softbody;
@@ -30,7 +36,7 @@ void expect_right_answers() {
   block.patch_radius = 0.02;
   block.reach = 0.005;
   const SurfaceTable ours = condense(block);
-  const SurfaceTable theirs = condense(block, on_ranks);
+  const SurfaceTable theirs = condense(block, [](const Solid& solid) { return on_ranks(solid, Way::kFactor); });
   const double off = (theirs.compliance - ours.compliance).cwiseAbs().maxCoeff() / ours.compliance.maxCoeff();
   if (!(off < 1e-7)) {
     throw std::runtime_error("PETSc's answers about a small block are off by " + std::to_string(off) +
@@ -41,13 +47,14 @@ void expect_right_answers() {
 struct Arguments {
   std::string scene;
   std::string file;
+  Way way = Way::kChosen;
   bool json = false;
 };
 
 /// On all ranks, and says on a terminal how far it is.
 class Told : public Solver {
  public:
-  explicit Told(const Solid& solid) : solver_(on_ranks(solid)) {}
+  Told(const Solid& solid, Way way) : solver_(on_ranks(solid, way)) {}
   Eigen::MatrixXd solve(const Eigen::MatrixXd& loads) const override {
     Eigen::MatrixXd solution = solver_->solve(loads);
     columns_ += loads.cols();
@@ -64,9 +71,10 @@ int condense_scene(const Arguments& arguments, const Ranks& ranks) {
   expect_right_answers();
   const Scene scene = read_scene(arguments.scene);
   const bool tells = ranks.rank() == 0 && isatty(STDERR_FILENO) != 0;
-  const SurfaceTable table = condense(scene.body, [tells](const Solid& solid) -> std::unique_ptr<Solver> {
-    if (tells) return std::make_unique<Told>(solid);
-    return on_ranks(solid);
+  const Way way = arguments.way;
+  const SurfaceTable table = condense(scene.body, [tells, way](const Solid& solid) -> std::unique_ptr<Solver> {
+    if (tells) return std::make_unique<Told>(solid, way);
+    return on_ranks(solid, way);
   });
   if (tells) std::cerr << "\n";
   if (ranks.rank() != 0) return 0;
@@ -86,26 +94,76 @@ int condense_scene(const Arguments& arguments, const Ranks& ranks) {
   return 0;
 }
 
+/// The body that answers: condensed is linear, by a table that is not made here.
+Body live_body(BodyConfig config, Way way) {
+  if (config.model == ModelKind::kCondensed) config.model = ModelKind::kLinear;
+  config.table_file.reset();
+  return Body(config, [way](const Solid& solid) { return on_ranks(solid, way); });
+}
+
+/// Answers the front until it ends the stream. Rank 0 has the stream; every rank answers every state.
+int answer(const Arguments& arguments, const Ranks& ranks) {
+  expect_right_answers();
+  const Scene scene = read_scene(arguments.scene);
+  PlacedBody body(scene, live_body(scene.body, arguments.way));
+  std::unique_ptr<tendon::worker::WorkerStream> stream;
+  if (ranks.rank() == 0) {
+    try {
+      stream = std::make_unique<tendon::worker::WorkerStream>();
+    } catch (const std::exception& error) {
+      std::cerr << "tendon-fem-worker: " << error.what() << '\n';
+      end_all_ranks();  // the others wait for a state
+    }
+  }
+  tendon::worker::Codec codec;
+  for (;;) {
+    std::vector<std::byte> bytes;
+    std::uint64_t sequence = 0;
+    if (stream) {
+      if (auto record = stream->next()) {
+        bytes = std::move(record->body);
+        sequence = record->sequence;
+      }
+    }
+    share_out(bytes);
+    if (bytes.empty()) return 0;
+    const auto hand = codec.read_state({.body = bytes});
+    if (!hand) throw std::runtime_error("the front has sent what is no state");
+    const tendon::Touch touch = body.answer(*hand);
+    if (stream) stream->send(codec.answer(sequence, *hand, touch));
+  }
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
   CLI::App app(
-      "Makes the table of a scene's condensed body on as many machines as MPI is started on. tendon-softbody answers "
-      "from it "
-      "in microseconds, near the device, without MPI.",
-      "tendon-fem");
-  app.require_subcommand(1);
+      "A soft body on as many ranks as MPI is started on, as tendon-fem starts them: with SCENE alone it answers the "
+      "front that the environment names.",
+      "tendon-fem-worker");
+  app.set_version_flag("--version", TENDON_VERSION);
   Arguments arguments;
+  const auto add_common = [&](CLI::App& to) {
+    to.add_option("SCENE", arguments.scene, "Scene file, with the model linear or condensed");
+    to.add_option("--way", arguments.way, "How the body is solved")
+        ->transform(CLI::CheckedTransformer(std::map<std::string, Way>{
+            {"chosen", Way::kChosen}, {"factor", Way::kFactor}, {"multigrid", Way::kMultigrid}}))
+        ->default_str("chosen");
+  };
+  add_common(app);
   CLI::App* const verb = app.add_subcommand("condense", "The table of a scene's condensed body, for [model] table");
-  verb->add_option("SCENE", arguments.scene, "Scene file, with the model condensed")->required();
+  add_common(*verb);
   verb->add_option("FILE", arguments.file, "The table")->required();
   verb->add_flag("--json", arguments.json, "One JSON object on stdout");
-  verb->footer(
-      "\nExample:\n  mpirun -n 64 tendon-fem condense liver.toml liver.table\n"
-      "\nPETSC_OPTIONS chooses another solver than MUMPS' factor: \"-ksp_type cg -pc_type gamg -ksp_rtol 1e-10\".\n"
+  app.footer(
+      "\nExamples:\n  mpirun -n 64 tendon-fem-worker condense liver.toml liver.table\n"
+      "  tendon-fem serve liver.toml --launch \"mpirun -n 64\"\n"
+      "\n`chosen` is a factor by MUMPS for small bodies, conjugate gradients with multigrid for large ones.\n"
+      "PETSC_OPTIONS chooses another solver: \"-ksp_type cg -pc_type gamg -ksp_rtol 1e-10\".\n"
       "Exit: 0 done; 1 it failed, with a sentence; 2 wrong usage.");
   try {
     app.parse(argc, argv);
+    if (arguments.scene.empty()) throw CLI::RequiredError("SCENE");
   } catch (const CLI::ParseError& error) {
     const int code = app.exit(error);
     return code == 0 ? 0 : 2;
@@ -114,14 +172,14 @@ int main(int argc, char** argv) {
   try {
     const Ranks ranks(none, argv);
     try {
-      return condense_scene(arguments, ranks);
+      return verb->parsed() ? condense_scene(arguments, ranks) : answer(arguments, ranks);
     } catch (const std::exception& error) {
       // All ranks fail alike but for what only rank 0 does: others must not wait for it.
-      if (ranks.rank() == 0) std::cerr << "tendon-fem: " << error.what() << '\n';
+      if (ranks.rank() == 0) std::cerr << "tendon-fem-worker: " << error.what() << '\n';
       return 1;
     }
   } catch (const std::exception& error) {
-    std::cerr << "tendon-fem: " << error.what() << '\n';
+    std::cerr << "tendon-fem-worker: " << error.what() << '\n';
     return 1;
   }
 }

@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "clients/cpp/worker/front_engine.h"
+
+#include <array>
+#include <cstddef>
+#include <ostream>
+#include <utility>
+#include <variant>
+
+#include "clients/cpp/machine.h"
+
+namespace tendon::worker {
+namespace {
+
+/// A new one for each launch.
+std::string secret_from_system() {
+  constexpr std::string_view kDigits = "0123456789abcdef";
+  std::string secret;
+  for (const auto byte : seed_from_system().bytes) {
+    const auto value = static_cast<unsigned>(byte);
+    secret += kDigits[value >> 4U];
+    secret += kDigits[value & 15U];
+  }
+  return secret;
+}
+
+}  // namespace
+
+FrontEngine::FrontEngine(const Config& config, LocalTime now, std::ostream& says)
+    : name_(config.name), says_(says), front_(config.front, now), crew_(config.crew) {}
+
+void FrontEngine::see(LocalTime /*now*/, const Seen& seen) { front_.see(seen); }
+
+std::optional<Reply> FrontEngine::turn(LocalTime now) {
+  for (;;) {
+    if (const auto event = crew_.next()) {
+      take(now, *event);
+    } else if (const auto order = front_.turn(now)) {
+      if (auto answer = carry_out(now, *order)) return answer;
+    } else {
+      return std::nullopt;
+    }
+  }
+}
+
+void FrontEngine::take(LocalTime now, const Crew::Event& event) {
+  if (std::holds_alternative<Crew::Opened>(event)) {
+    front_.opened();
+    say("worker " + std::to_string(front_.stats().launches) + " is ready");
+  } else if (const auto* ended = std::get_if<Crew::Ended>(&event)) {
+    front_.ended(now, ended->why);
+  } else {
+    const auto answer = codec_.read_answer(std::get<Record>(event), question_.sequence, question_.hand);
+    if (answer.touch) return front_.answered(now, *answer.touch);
+    front_.refused(answer.refused);
+    if (answer.refused != std::exchange(refused_, answer.refused)) {
+      say("an answer of the worker is refused: " + std::string(answer.refused));
+    }
+  }
+}
+
+std::optional<Reply> FrontEngine::carry_out(LocalTime now, const Front::Order& order) {
+  if (const auto* answer = std::get_if<Reply>(&order)) return *answer;
+  if (const auto* ask = std::get_if<Front::Ask>(&order)) {
+    question_ = *ask;
+    crew_.send(codec_.state(ask->sequence, ask->hand));
+  } else if (const auto* give_up = std::get_if<Front::GiveUp>(&order)) {
+    crew_.kill();
+    const auto wait = std::chrono::duration<double>(front_.next_turn() - now).count();
+    says_ << name_ << ": worker " << front_.stats().launches << " is given up: " << give_up->why
+          << "; the next one starts in " << wait << " s\n"
+          << std::flush;
+  } else {
+    crew_.launch(secret_from_system());
+  }
+  return std::nullopt;
+}
+
+void FrontEngine::say(const std::string& text) { says_ << name_ << ": " << text << '\n' << std::flush; }
+
+}  // namespace tendon::worker

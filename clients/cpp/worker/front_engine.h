@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <iosfwd>
+#include <optional>
+#include <string>
+
+#include "clients/cpp/run.h"
+#include "clients/cpp/worker/crew.h"
+#include "clients/cpp/worker/front.h"
+
+namespace tendon::worker {
+
+/// A front: an engine for run() whose answers come from a worker, a program that may take its time, stop or die. The
+/// session with the server goes on whatever the worker does.
+///
+/// Thread-safe: no. Realtime-safe: no.
+class FrontEngine : public Elsewhere {
+ public:
+  struct Config {
+    std::string name;  ///< of the program, in front of what is said
+    Front::Config front{};
+    Crew::Config crew;
+  };
+
+  /// `says` gets a sentence for each change of the worker, and must outlive this. Throws what Front and Crew throw.
+  FrontEngine(const Config& config, LocalTime now, std::ostream& says);
+
+  void see(LocalTime now, const Seen& seen) override;
+  std::optional<Reply> turn(LocalTime now) override;
+  LocalTime next_turn() const override { return front_.next_turn(); }
+  int descriptor() const override { return crew_.descriptor(); }
+
+  Front::Stats stats() const { return front_.stats(); }
+
+ private:
+  void take(LocalTime now, const Crew::Event& event);
+  std::optional<Reply> carry_out(LocalTime now, const Front::Order& order);
+  void say(const std::string& text);
+
+  std::string name_;
+  std::ostream& says_;
+  Front front_;
+  Crew crew_;
+  Codec codec_;
+  Front::Ask question_{};
+  std::string_view refused_{};  ///< the newest reason that was said
+};
+
+}  // namespace tendon::worker

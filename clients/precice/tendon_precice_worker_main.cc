@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: Apache-2.0
+// tendon-precice-worker: a worker whose solver is any program that preCICE couples.
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <exception>
+#include <string>
+#include <vector>
+
+#include "clients/cpp/worker/worker.h"
+#include "clients/precice/precice_engine.h"
+
+namespace {
+
+using tendon::precice_worker::PreciceEngine;
+
+int run(int argc, char** argv) {
+  CLI::App app(
+      "A worker that hands each state to a solver coupled by preCICE: participant Hand, whose mesh is a round patch of "
+      "the body's surface. It writes the displacement of the patch and reads the force that holds it there.",
+      "tendon-precice-worker");
+  app.footer(
+      "Example: tendon-fem serve SCENE --worker \"tendon-precice-worker --config precice-config.xml\"\n"
+      "Exit status: 0 the front has ended the stream, 1 failed, 2 wrong usage.");
+  app.set_version_flag("--version", TENDON_VERSION);
+  PreciceEngine::Config config;
+  std::string scene;
+  std::vector<double> middle_mm = {0, 0, 0};
+  std::vector<double> normal = {-1, 0, 0};
+  double radius_mm = 1e3 * config.patch.radius;
+  app.add_option("SCENE", scene, "A front hands its scene on; the body is the solver's");
+  app.add_option("--config", config.file, "preCICE's configuration")->type_name("FILE")->required();
+  app.add_option("--participant", config.participant, "Its name of this program")->capture_default_str();
+  app.add_option("--mesh", config.mesh, "… of the patch's mesh")->capture_default_str();
+  app.add_option("--displacement", config.displacement, "… of the data that is written, m")->capture_default_str();
+  app.add_option("--force", config.force, "… of the data that is read, N")->capture_default_str();
+  app.add_option("--middle-mm", middle_mm, "Of the patch on the surface at rest, in the hand's frame")
+      ->expected(3)
+      ->capture_default_str();
+  app.add_option("--normal", normal, "Out of the body, to the hand")->expected(3)->capture_default_str();
+  app.add_option("--radius-mm", radius_mm, "Of the patch")->capture_default_str();
+  app.add_option("--rings", config.patch.rings, "Of nodes around its middle")->capture_default_str();
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 2;
+  }
+  config.patch.middle = 1e-3 * tendon::Vec3(middle_mm[0], middle_mm[1], middle_mm[2]);
+  config.patch.normal = tendon::Vec3(normal[0], normal[1], normal[2]);
+  config.patch.radius = 1e-3 * radius_mm;
+  PreciceEngine engine(config);
+  tendon::worker::work([&](const tendon::DeviceState& hand) { return engine.answer(hand); });
+  return 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  try {
+    return run(argc, argv);
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "tendon-precice-worker: %s\n", error.what());
+    return 1;
+  }
+}

@@ -1,0 +1,184 @@
+// SPDX-License-Identifier: Apache-2.0
+// tendon-fem: a soft body whose answers are computed by many machines. No MPI is in it: it starts the workers, and keeps
+// the session with the server whatever they do.
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <chrono>
+#include <exception>
+#include <filesystem>
+#include <iostream>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "clients/cpp/machine.h"
+#include "clients/cpp/options.h"
+#include "clients/cpp/worker/front_engine.h"
+#include "clients/softbody/cluster/estimate.h"
+#include "clients/softbody/placed_body.h"
+
+using namespace tendon;
+
+namespace {
+
+double milliseconds(Duration d) { return std::chrono::duration<double, std::milli>(d).count(); }
+
+Duration from_milliseconds(double ms) { return from_seconds(ms / 1000); }
+
+/// A word for /bin/sh that it does not read anything into.
+std::string shell_word(const std::string& word) {
+  std::string text = "'";
+  for (const char c : word) text += c == '\'' ? std::string("'\\''") : std::string(1, c);
+  return text + "'";
+}
+
+/// The worker beside this program, where it is installed and where it is built.
+std::string own_worker() {
+  std::error_code error;
+  const auto beside = std::filesystem::read_symlink("/proc/self/exe", error).replace_filename("tendon-fem-worker");
+  return !error && std::filesystem::exists(beside) ? shell_word(beside.string()) : "tendon-fem-worker";
+}
+
+/// The body of a scene, answered from a table.
+softbody::PlacedBody from_table(const std::string& scene_file, const std::string& table_file) {
+  softbody::Scene scene = softbody::read_scene(scene_file);
+  scene.body.model = softbody::ModelKind::kCondensed;
+  scene.body.table_file = table_file;
+  return softbody::PlacedBody(scene);
+}
+
+nlohmann::ordered_json to_json(const worker::Front::Stats& stats) {
+  return {{"launches", stats.launches}, {"asked", stats.asked},       {"answers", stats.answers},
+          {"unknown", stats.unknown},   {"late", stats.late},         {"refused", stats.refused},
+          {"fallback", stats.fallback}, {"given_up", stats.given_up}, {"median_ms", milliseconds(stats.median)}};
+}
+
+int serve(int argc, char** argv) {
+  Options options{.client = {.name = "tendon-fem serve"}};
+  std::string scene;
+  std::string launch;
+  std::string program;
+  std::string fallback;
+  worker::FrontEngine::Config config;
+  double deadline_ms = 0;
+  double dead_ms = milliseconds(config.front.dead);
+  double start_s = seconds(config.front.start);
+  CommandLine line(
+      "Answers the hand by workers that it starts, asks, and replaces when they die. The session with the server "
+      "lives on meanwhile.",
+      options);
+  line.add_argument("SCENE", scene, "Scene file, handed to the worker");
+  line.add("--launch", launch, "COMMAND", "What starts the worker: \"mpirun -n 64\", \"srun\"; none: it starts itself");
+  line.add("--worker", program, "COMMAND", "The worker, if not tendon-fem-worker: any program that can be one");
+  line.add("--fallback", fallback, "FILE", "A table (tendon-fem condense) that answers while no worker can");
+  line.add("--listen", config.crew.listen, "HOST:PORT",
+           "TCP, in the clear, for workers of other machines; else a Unix socket");
+  line.add("--deadline-ms", deadline_ms, "Later answers are not sent; 0 = three times the median, at least 50 ms");
+  line.add("--dead-ms", dead_ms, "Without an answer for so long a worker is replaced", 1);
+  line.add("--start-s", start_s, "A worker that is not ready after so long is replaced", 0.1);
+  if (const auto exit_code = line.parse(argc, argv)) return *exit_code;
+
+  config.name = "tendon-fem";
+  config.crew.command =
+      launch + (launch.empty() ? "" : " ") + (program.empty() ? own_worker() : program) + " " + shell_word(scene);
+  config.front.deadline = from_milliseconds(deadline_ms);
+  config.front.dead = from_milliseconds(dead_ms);
+  config.front.start = from_seconds(start_s);
+  std::optional<softbody::PlacedBody> table;
+  if (!fallback.empty()) {
+    table.emplace(from_table(scene, fallback));
+    config.front.fallback = [&](const DeviceState& hand) { return table->answer(hand); };
+  }
+  worker::FrontEngine engine(config, read_clock(), std::cerr);
+  const int code = run(options, engine);
+  const worker::Front::Stats stats = engine.stats();
+  if (options.json) {
+    std::cout << nlohmann::ordered_json{{"workers", to_json(stats)}} << std::endl;
+  } else {
+    std::cerr << "tendon-fem: " << stats.launches << " workers, " << stats.asked << " states, " << stats.answers
+              << " answers in time (median " << milliseconds(stats.median) << " ms), " << stats.late << " late, "
+              << stats.refused << " refused, " << stats.fallback << " by the fallback\n";
+  }
+  return code;
+}
+
+struct Arguments {
+  std::string scene;
+  std::string table;
+  std::string launch;
+  std::string way = "chosen";
+  std::vector<int> ranks = {1, 16, 64, 256, 1024};
+  bool json = false;
+};
+
+/// Becomes the worker that makes the table.
+int condense(const Arguments& arguments) {
+  const std::string command = "exec " + arguments.launch + " " + own_worker() + " condense --way " +
+                              shell_word(arguments.way) + (arguments.json ? " --json " : " ") + shell_word(arguments.scene) +
+                              " " + shell_word(arguments.table);
+  ::execl("/bin/sh", "sh", "-c", command.c_str(), nullptr);
+  throw std::runtime_error("/bin/sh cannot be started");
+}
+
+int explain(const Arguments& arguments) {
+  int under_patch = 0;
+  const auto size = softbody::Body::size_of(softbody::read_scene(arguments.scene).body, under_patch);
+  const softbody::Estimate estimate = softbody::estimate(size, under_patch, arguments.ranks);
+  std::cout << (arguments.json ? softbody::in_json(estimate) : softbody::in_words(estimate));
+  return 0;
+}
+
+int run_command(int argc, char** argv) {
+  CLI::App app(
+      "A soft body whose answers many machines compute. `tendon-fem serve SCENE` answers the hand by workers "
+      "(`tendon-fem serve --help`); the others prepare that.",
+      "tendon-fem");
+  app.require_subcommand(1);
+  app.set_version_flag("--version", TENDON_VERSION);
+  Arguments arguments;
+  app.add_subcommand("serve", "Answers the hand by workers that it starts, asks and replaces when they die");
+  CLI::App* const condenses = app.add_subcommand("condense", "Makes the table of a scene on many machines");
+  CLI::App* const explains =
+      app.add_subcommand("explain", "How large the body is, what each way to answer costs, and which one to take");
+  for (CLI::App* const verb : {condenses, explains}) {
+    verb->add_option("SCENE", arguments.scene, "Scene file")->required();
+    verb->add_flag("--json", arguments.json, "One JSON object on stdout");
+  }
+  condenses->add_option("FILE", arguments.table, "The table; a scene names it under [model] table")->required();
+  condenses->add_option("--launch", arguments.launch, "What starts the worker: \"mpirun -n 64\", \"srun\"")
+      ->type_name("COMMAND");
+  condenses->add_option("--way", arguments.way, "How the body is solved")
+      ->capture_default_str()
+      ->check(CLI::IsMember({"chosen", "factor", "multigrid"}));
+  explains->add_option("--ranks", arguments.ranks, "Numbers of ranks to predict for")
+      ->delimiter(',')
+      ->capture_default_str()
+      ->check(CLI::Range(1, 1'000'000));
+  condenses->footer("\nExample:\n  tendon-fem condense liver.toml liver.table --launch \"mpirun -n 64\"");
+  explains->footer("\nExample:\n  tendon-fem explain liver.toml --ranks 1,64,1024");
+  app.footer(
+      "\nExample:\n  tendon-fem serve liver.toml --launch \"mpirun -n 64\" --server haptics.lab:47100 --key fem.key");
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 2;
+  }
+  return condenses->parsed() ? condense(arguments) : explain(arguments);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  try {
+    // `serve` has the command line that all guests share.
+    if (argc > 1 && std::string_view(argv[1]) == "serve") return serve(argc - 1, argv + 1);
+    return run_command(argc, argv);
+  } catch (const std::exception& error) {
+    std::cerr << "tendon-fem: " << error.what() << '\n';
+    return 1;
+  }
+}

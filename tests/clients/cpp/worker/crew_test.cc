@@ -1,0 +1,206 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "clients/cpp/worker/crew.h"
+
+#include <gtest/gtest.h>
+#include <poll.h>
+#include <signal.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <optional>
+#include <stdexcept>
+#include <string>
+
+namespace tendon::worker {
+namespace {
+
+const std::string kSecret(kSecretDigits, '5');
+constexpr int kPatienceMs = 30'000;
+
+std::string fake(const std::string& arguments) { return TENDON_FAKE_WORKER " " + arguments; }
+
+/// Waits for the next event.
+std::optional<Crew::Event> next(Crew& crew, int patience_ms = kPatienceMs) {
+  for (int waited = 0;;) {
+    if (auto event = crew.next()) return event;
+    if (waited >= patience_ms) return std::nullopt;
+    pollfd readable{.fd = crew.descriptor(), .events = POLLIN, .revents = 0};
+    waited += ::poll(&readable, 1, 100) == 0 ? 100 : 0;
+  }
+}
+
+bool opened(Crew& crew) {
+  const auto event = next(crew);
+  return event && std::holds_alternative<Crew::Opened>(*event);
+}
+
+/// Why it ended.
+std::string ended(Crew& crew) {
+  const auto event = next(crew);
+  const auto* end = event ? std::get_if<Crew::Ended>(&*event) : nullptr;
+  return end != nullptr ? end->why : "it has not ended";
+}
+
+/// Processes whose command line has `text` in it, zombies not counted.
+int running(const std::string& text) {
+  int count = 0;
+  std::error_code ignored;
+  for (const auto& entry : std::filesystem::directory_iterator("/proc", ignored)) {
+    std::ifstream file(entry.path() / "cmdline", std::ios::binary);
+    const std::string line{std::istreambuf_iterator<char>(file), {}};
+    count += line.find(text) != std::string::npos ? 1 : 0;
+  }
+  return count;
+}
+
+/// Until everything has gone, at most kPatienceMs.
+bool gone(Crew& crew, const std::string& text) {
+  for (int i = 0; i < kPatienceMs / 10; ++i) {
+    crew.next();
+    if (running(text) == 0) return true;
+    ::usleep(10'000);
+  }
+  return false;
+}
+
+class CrewTest : public ::testing::TestWithParam<const char*> {
+ protected:
+  static Crew::Config config(const std::string& arguments) {
+    return {.command = fake(arguments), .listen = GetParam()};
+  }
+};
+
+TEST_P(CrewTest, AWorkerOpensAndAnswers) {
+  Crew crew(config("well"));
+  crew.launch(kSecret);
+  ASSERT_TRUE(opened(crew));
+  Codec codec;
+  for (std::uint64_t i = 1; i <= 100; ++i) {
+    DeviceState hand;
+    hand.tick = i;
+    hand.position = Vec3(0.001 * static_cast<double>(i), 0, 0);
+    crew.send(codec.state(i, hand));
+    const auto event = next(crew);
+    ASSERT_TRUE(event && std::holds_alternative<Record>(*event));
+    const auto answer = codec.read_answer(std::get<Record>(*event), i, hand);
+    ASSERT_TRUE(answer.touch.has_value()) << answer.refused;
+    EXPECT_DOUBLE_EQ(answer.touch->force.x(), -0.2 * static_cast<double>(i));
+  }
+}
+
+TEST_P(CrewTest, WhatEndsAWorkerIsSaid) {
+  struct Case {
+    const char* way;
+    const char* why;
+  };
+  for (const Case& one : {Case{"dies 0", "it was ended by signal 9"}, Case{"exits 0", "it ended with exit status 7"},
+                          Case{"ends-at-once", "it ended with exit status 3"}}) {
+    Crew crew(config(one.way));
+    crew.launch(kSecret);
+    if (std::string(one.way) != "ends-at-once") {
+      ASSERT_TRUE(opened(crew)) << one.way;
+      Codec codec;
+      crew.send(codec.state(1, DeviceState{}));
+    }
+    const std::string why = ended(crew);
+    EXPECT_TRUE(why == one.why || why == "its stream has ended") << one.way << ": " << why;
+    EXPECT_FALSE(next(crew, 100).has_value()) << "once";
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Streams, CrewTest, ::testing::Values("", "127.0.0.1:0"),
+                         [](const auto& stream) { return stream.param[0] == '\0' ? "Unix" : "Tcp"; });
+
+TEST(Crew, ACommandThatIsNotThereIsSaid) {
+  Crew crew({.command = "/nonexistent/tendon-fem-worker scene.toml"});
+  crew.launch(kSecret);
+  EXPECT_EQ(ended(crew), "it ended with exit status 127");
+}
+
+TEST(Crew, EndsEvenWhatHasLeftItsProcessGroupAndWhatIsStopped) {
+  const std::string mark = "with-a-child 987123";
+  Crew crew({.command = fake(mark)});
+  crew.launch(kSecret);
+  ASSERT_TRUE(opened(crew));
+  ASSERT_EQ(running("987123"), 2);
+  crew.kill();
+  EXPECT_TRUE(gone(crew, "987123"));
+
+  Crew::Config stops{.command = fake("stops 0 987124")};
+  Crew other(stops);
+  other.launch(kSecret);
+  ASSERT_TRUE(opened(other));
+  Codec codec;
+  other.send(codec.state(1, DeviceState{}));
+  EXPECT_FALSE(next(other, 300).has_value());
+  ASSERT_EQ(running("987124"), 1);
+  other.kill();
+  EXPECT_TRUE(gone(other, "987124"));
+}
+
+TEST(Crew, TheNextWorkerIsLeftAloneWhileTheLastOneIsEnded) {
+  Crew crew({.command = fake("with-a-child 987125")});
+  for (int i = 0; i < 5; ++i) {
+    crew.launch(kSecret);
+    ASSERT_TRUE(opened(crew)) << i;
+    EXPECT_FALSE(next(crew, 50).has_value()) << "it goes on";
+  }
+  crew.kill();
+  EXPECT_TRUE(gone(crew, "987125"));
+}
+
+/// A stranger's connection to a Unix socket.
+int connect_to(const std::string& address) {
+  const std::string path = address.substr(5);
+  sockaddr_un to{};
+  to.sun_family = AF_UNIX;
+  std::strncpy(to.sun_path, path.c_str(), sizeof to.sun_path - 1);
+  const int socket = ::socket(AF_UNIX, SOCK_STREAM, 0);
+  EXPECT_EQ(::connect(socket, reinterpret_cast<const sockaddr*>(&to), sizeof to), 0);
+  return socket;
+}
+
+TEST(Crew, AStrangerWithoutTheSecretDoesNotOpenTheStream) {
+  Crew crew({.command = fake("never-opens")});
+  crew.launch(kSecret);
+  const int silent = connect_to(crew.address());
+  const int wrong = connect_to(crew.address());
+  const auto guess = to_bytes(opening(std::string(kSecretDigits, '6')));
+  ASSERT_EQ(::write(wrong, guess.data(), guess.size()), static_cast<ssize_t>(guess.size()));
+  EXPECT_FALSE(next(crew, 300).has_value());
+  const int right = connect_to(crew.address());
+  const auto word = to_bytes(opening(kSecret));
+  ASSERT_EQ(::write(right, word.data(), word.size()), static_cast<ssize_t>(word.size()));
+  EXPECT_TRUE(opened(crew));
+  const int late = connect_to(crew.address());  // the same secret a second time
+  ASSERT_EQ(::write(late, word.data(), word.size()), static_cast<ssize_t>(word.size()));
+  EXPECT_FALSE(next(crew, 300).has_value());
+  for (const int socket : {silent, wrong, right, late}) ::close(socket);
+}
+
+TEST(Crew, DoesNotListenWhereNoWorkerCouldFindIt) {
+  for (const char* any : {"0.0.0.0:0", "[::]:0"}) {
+    EXPECT_THROW(Crew({.command = "true", .listen = any}), std::runtime_error) << any;
+  }
+}
+
+TEST(Crew, TheSocketIsInAFolderOfThisUserAlone) {
+  std::string path;
+  {
+    const Crew crew({.command = "true"});
+    path = crew.address().substr(5);
+    struct stat status {};
+    ASSERT_EQ(::stat(std::filesystem::path(path).parent_path().c_str(), &status), 0);
+    EXPECT_EQ(status.st_mode & 0777U, 0700U);
+  }
+  EXPECT_FALSE(std::filesystem::exists(path));
+}
+
+}  // namespace
+}  // namespace tendon::worker

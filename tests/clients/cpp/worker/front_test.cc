@@ -1,0 +1,318 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "clients/cpp/worker/front.h"
+
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+namespace tendon::worker {
+namespace {
+
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+
+Seen at_tick(std::uint64_t tick) {
+  Seen seen{.hand = {}, .session = 1};
+  seen.hand.tick = tick;
+  return seen;
+}
+
+Touch force(double newtons) { return Vec3(newtons, 0, 0); }
+
+/// A front, and all that it has ordered since.
+class Played {
+ public:
+  explicit Played(const Front::Config& config = {}) : front(config, now) { turn(); }
+
+  void turn() {
+    while (const auto order = front.turn(now)) {
+      if (std::holds_alternative<Front::Launch>(*order)) said.emplace_back("launch");
+      if (std::holds_alternative<Front::GiveUp>(*order)) said.emplace_back("give up");
+      if (const auto* ask = std::get_if<Front::Ask>(&*order)) said.push_back("ask " + std::to_string(ask->hand.tick));
+      if (const auto* reply = std::get_if<Reply>(&*order)) {
+        said.push_back("send " + std::to_string(reply->to.hand.tick));
+        sent.push_back(*reply);
+      }
+    }
+  }
+  void after(Duration time) {
+    now += time;
+    turn();
+  }
+  void see(std::uint64_t tick) {
+    front.see(at_tick(tick));
+    turn();
+  }
+  void open() {
+    front.opened();
+    turn();
+  }
+  void answer(double newtons = 1) {
+    front.answered(now, force(newtons));
+    turn();
+  }
+  void die() {
+    front.ended(now, "it was ended by signal 9");
+    turn();
+  }
+  /// What was said since the last time.
+  std::string news() {
+    std::string all;
+    for (const std::string& one : said) all += (all.empty() ? "" : ", ") + one;
+    said.clear();
+    return all;
+  }
+
+  LocalTime now{};
+  Front front;
+  std::vector<std::string> said;
+  std::vector<Reply> sent;
+};
+
+TEST(Front, AWorkerHasOneStateAtATimeAndThenTheNewest) {
+  Played played;
+  EXPECT_EQ(played.news(), "launch");
+  played.see(1);
+  EXPECT_EQ(played.news(), "") << "nobody is there yet";
+  played.open();
+  EXPECT_EQ(played.news(), "ask 1");
+  for (const std::uint64_t tick : {2, 3, 4}) played.see(tick);
+  EXPECT_EQ(played.news(), "");
+  played.answer();
+  EXPECT_EQ(played.news(), "send 1, ask 4");
+  EXPECT_EQ(played.sent.at(0).touch.force.x(), 1);
+}
+
+TEST(Front, ALateAnswerIsNotSentAndTheWorkerStays) {
+  Played played;
+  played.open();
+  played.see(1);
+  played.after(milliseconds(51));
+  played.see(9);
+  played.news();
+  played.answer();
+  EXPECT_EQ(played.news(), "ask 9");
+  EXPECT_EQ(played.front.stats().late, 1U);
+  EXPECT_EQ(played.front.stats().answers, 0U);
+}
+
+TEST(Front, TheDeadlineIsThreeTimesTheMedian) {
+  Played played({.dead = seconds(9)});
+  played.open();
+  for (std::uint64_t tick = 1; tick <= 63; ++tick) {  // 40 ms each: the deadline becomes 120 ms
+    played.see(tick);
+    played.after(milliseconds(40));
+    played.answer();
+  }
+  played.see(100);
+  played.after(milliseconds(119));
+  played.answer();
+  EXPECT_EQ(played.front.stats().late, 0U);
+  played.see(101);
+  played.after(milliseconds(121));
+  played.answer();
+  EXPECT_EQ(played.front.stats().late, 1U);
+  EXPECT_EQ(played.front.stats().median, milliseconds(40));
+}
+
+TEST(Front, AWorkerThatDoesNotAnswerIsReplaced) {
+  Played played;
+  played.open();
+  played.see(1);
+  played.news();
+  played.after(milliseconds(500));
+  EXPECT_EQ(played.news(), "");
+  EXPECT_EQ(played.front.next_turn(), played.now + Duration(1));
+  played.after(Duration(1));
+  EXPECT_EQ(played.news(), "give up");
+  EXPECT_EQ(played.front.stats().why_given_up, "it has not answered for 500 ms");
+  played.after(milliseconds(499));
+  EXPECT_EQ(played.news(), "");
+  played.see(7);
+  played.after(milliseconds(1));
+  EXPECT_EQ(played.news(), "launch");
+  played.see(8);
+  played.open();
+  EXPECT_EQ(played.news(), "ask 8") << "the newest, no queue";
+}
+
+TEST(Front, AWorkerThatIsNotAskedMayBeSilentForEver) {
+  Played played;
+  played.open();
+  played.news();
+  played.after(std::chrono::hours(9));
+  EXPECT_EQ(played.news(), "");
+  EXPECT_EQ(played.front.next_turn(), LocalTime::max());
+}
+
+TEST(Front, TheNextWorkersComeLaterAndLater) {
+  Played played;
+  std::vector<int> waits;
+  for (int i = 0; i < 9; ++i) {
+    played.open();
+    played.die();
+    played.news();
+    const Duration wait = played.front.next_turn() - played.now;
+    waits.push_back(static_cast<int>(wait / milliseconds(1)));
+    played.after(wait - Duration(1));
+    EXPECT_EQ(played.news(), "");
+    played.after(Duration(1));
+    EXPECT_EQ(played.news(), "launch");
+  }
+  EXPECT_EQ(waits, (std::vector<int>{500, 1000, 2000, 4000, 8000, 16000, 30000, 30000, 30000}));
+}
+
+TEST(Front, AWorkerThatLastedSetsTheWaitBack) {
+  Played played;
+  for (int i = 0; i < 3; ++i) {
+    played.open();
+    played.die();
+    played.after(played.front.next_turn() - played.now);
+  }
+  played.open();
+  for (std::uint64_t tick = 1; tick < 60; ++tick) {  // 5.9 s, longer than the 4 s that the next wait would be
+    played.see(tick);
+    played.after(milliseconds(40));
+    played.answer();
+    played.after(milliseconds(60));
+  }
+  played.die();
+  EXPECT_EQ(played.front.next_turn() - played.now, milliseconds(500));
+}
+
+TEST(Front, AWorkerThatDiesAtOnceDoesNotSetTheWaitBack) {
+  Played played;
+  for (int i = 0; i < 3; ++i) {
+    played.open();
+    played.see(static_cast<std::uint64_t>(i));
+    played.answer();
+    played.die();
+    EXPECT_EQ(played.front.next_turn() - played.now, milliseconds(500 << i));
+    played.after(played.front.next_turn() - played.now);
+  }
+}
+
+TEST(Front, AWorkerThatDoesNotOpenItsStreamIsReplaced) {
+  Played played({.start = seconds(5)});
+  played.news();
+  played.after(seconds(5));
+  EXPECT_EQ(played.news(), "give up");
+}
+
+TEST(Front, WhatAnOldWorkerSaysAfterwardsIsNotSent) {
+  Played played;
+  played.open();
+  played.see(1);
+  played.die();
+  played.news();
+  played.answer();
+  played.open();
+  EXPECT_EQ(played.news(), "");
+}
+
+TEST(Front, AnUnusableAnswerIsCountedAndDoesNotKeepTheWorkerAlive) {
+  Played played;
+  played.open();
+  played.see(1);
+  played.news();
+  for (int i = 0; i < 5; ++i) {
+    played.after(milliseconds(100));
+    played.front.refused("a number of it is not finite");
+  }
+  EXPECT_EQ(played.front.stats().refused, 5U);
+  EXPECT_EQ(played.front.stats().why_refused, "a number of it is not finite");
+  played.after(milliseconds(1));
+  EXPECT_EQ(played.news(), "give up");
+}
+
+TEST(Front, AnUnknownForceIsNotSent) {
+  Played played;
+  played.open();
+  played.see(1);
+  played.news();
+  Touch unknown;
+  unknown.unknown = true;
+  played.front.answered(played.now, unknown);
+  played.see(2);
+  EXPECT_EQ(played.news(), "ask 2");
+  EXPECT_EQ(played.front.stats().unknown, 1U);
+}
+
+Front::Config with_fallback() {
+  Front::Config config;
+  config.fallback = [](const DeviceState&) {
+    Touch touch = Vec3(3, 0, 0);
+    touch.error = 0.5;
+    return touch;
+  };
+  return config;
+}
+
+TEST(Front, WithAFallbackEveryStateIsAnsweredWhileNoWorkerCan) {
+  Played played(with_fallback());
+  played.news();
+  played.see(1);
+  played.see(2);
+  EXPECT_EQ(played.news(), "send 1, send 2") << "while the worker starts";
+  played.open();
+  played.news();
+  played.see(3);
+  EXPECT_EQ(played.news(), "") << "the worker has a state, and is not late";
+  EXPECT_EQ(played.front.next_turn(), played.now + milliseconds(50) + Duration(1));
+  played.after(milliseconds(51));
+  EXPECT_EQ(played.news(), "send 3") << "late";
+  played.see(4);
+  EXPECT_EQ(played.news(), "send 4");
+  played.die();
+  played.see(5);
+  EXPECT_EQ(played.news(), "give up, send 5");
+  EXPECT_EQ(played.front.stats().fallback, 5U);
+}
+
+TEST(Front, TheFallbacksErrorIsRaisedByWhatItLastDifferedFromAnAnswer) {
+  Played played(with_fallback());
+  played.open();
+  played.see(1);
+  played.answer(1);
+  played.die();
+  played.see(2);
+  ASSERT_EQ(played.sent.size(), 2U);
+  EXPECT_FALSE(played.sent[0].touch.error.has_value());
+  EXPECT_EQ(played.sent[1].touch.error, 0.5 + 2);
+}
+
+TEST(Front, TicksOfTheAnswersNeverFall) {
+  Played played(with_fallback());
+  std::uint64_t tick = 0;
+  for (int round = 0; round < 20; ++round) {
+    for (int i = 0; i < 7; ++i) {
+      played.see(++tick);
+      played.after(milliseconds(13));
+    }
+    if (round % 5 == 4) {
+      played.die();
+      played.after(seconds(31));
+      played.open();
+    } else {
+      played.open();
+      played.answer();
+    }
+  }
+  ASSERT_GT(played.sent.size(), 25U);
+  EXPECT_GT(played.front.stats().answers, 3U);
+  for (std::size_t i = 1; i < played.sent.size(); ++i) {
+    EXPECT_GE(played.sent[i].to.hand.tick, played.sent[i - 1].to.hand.tick);
+  }
+}
+
+TEST(Front, RefusesTimesThatAreNone) {
+  EXPECT_THROW(Front({.dead = Duration(0)}, LocalTime{}), std::invalid_argument);
+  EXPECT_THROW(Front({.deadline = Duration(-1)}, LocalTime{}), std::invalid_argument);
+  EXPECT_THROW(Front({.retry_min = seconds(40)}, LocalTime{}), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace tendon::worker

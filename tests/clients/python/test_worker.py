@@ -1,0 +1,354 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A worker in Python: beside a front in Python, on several ranks, and judged by tendon-conformance."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import threading
+from contextlib import AbstractContextManager
+from dataclasses import replace
+from math import inf, isnan
+from pathlib import Path
+from queue import Queue
+
+import pytest
+from conftest import ROOT
+from front import HAND, SECRET, Front, mpirun, running
+from processes import EXAMPLES, PATIENCE_S, PROGRAMS
+
+from tendon import Contact, DeviceState, ForceTable, Grip, Joints, Touch, Turning, codec, limits, tendon_pb2, worker
+
+WHOLE_HAND = replace(
+    HAND,
+    tick=2**53 + 1,
+    permitted_force=inf,
+    reasons=0xFFFF,
+    force_sequence=2**40,
+    force_age_ns=12_000_000,
+    device=15,
+    channel=7,
+    force_wanted=(1, -2, 3),
+    stiffness_wanted=((500, 10, 0), (10, 400, 0), (0, 0, 300)),
+    buttons=0xFFFF,
+    turning=Turning((0.5, -0.5, 0.5, -0.5), (0.1, 0, -0.1)),
+    torque_applied=(0.01, 0.02, -0.03),
+    grip=Grip(0.4, -0.1),
+    grip_applied=1.5,
+    hand_force=(0.3, -0.4, 0.5),
+    joints=Joints((0.1,) * 8, (0.01,) * 8),
+)
+
+
+@pytest.fixture(params=["unix", "tcp"])
+def front(request, tmp_path, monkeypatch):
+    it = Front(request.param, tmp_path)
+    monkeypatch.setenv("TENDON_WORKER_ADDRESS", it.address)
+    monkeypatch.setenv("TENDON_WORKER_SECRET", SECRET)
+    yield it
+    it.close()
+
+
+class Running(threading.Thread):
+    """run() in a thread; `end()` gives the exception that came out of it, or None."""
+
+    def __init__(self, answer, comm=None):
+        super().__init__(daemon=True)
+        self._arguments = (answer, comm)
+        self.error = None
+        self.start()
+
+    def run(self):
+        try:
+            worker.run(*self._arguments)
+        except BaseException as error:
+            self.error = error
+
+    def end(self):
+        self.join(PATIENCE_S)
+        assert not self.is_alive()
+        return self.error
+
+
+def test_the_stream_opens_with_the_secret_and_its_end_ends_the_worker(front):
+    thread = Running(lambda hand: None)
+    assert front.accept() == (0, b"tendon worker 1\n" + SECRET.encode())
+    front.close()
+    assert thread.end() is None
+
+
+def test_every_part_of_a_state_reaches_the_answer(front):
+    seen = []
+    thread = Running(lambda hand: seen.append(hand))
+    front.accept()
+    for sequence, hand in enumerate((HAND, WHOLE_HAND), 1):
+        assert front.ask(sequence, hand) is None
+    front.close()
+    assert thread.end() is None
+    assert seen == [HAND, WHOLE_HAND]
+
+
+def test_every_part_of_a_touch_reaches_the_front_with_its_tick(front):
+    table = ForceTable(0, 0.001, (1, 2, 3))
+    touch = Touch(
+        (1, 2, 3), 400, 0.01, Contact((0, 0, 1), -0.002, table), True, 0.5, (0.1, 0, 0), (1, 2, 3), -2.5
+    )
+    thread = Running(lambda hand: touch)
+    front.accept()
+    command = front.ask(1, WHOLE_HAND)
+    front.close()
+    assert thread.end() is None
+    assert (command.sequence, command.based_on_tick, command.force) == (1, 2**53 + 1, (1, 2, 3))
+    assert 1 <= command.valid_for_us <= limits.MAX_VALID_FOR_US
+    assert command.model.at == HAND.position
+    assert command.model.stiffness == ((400, 0, 0), (0, 400, 0), (0, 0, 400))
+    assert (command.model.valid_radius, command.model.contact) == (0.01, Contact((0, 0, 1), -0.002, table))
+    assert (command.topology_changed, command.error, command.grip_force) == (True, 0.5, -2.5)
+    assert command.torque.torque == (0.1, 0, 0)
+    assert command.torque.model.at == WHOLE_HAND.turning.orientation
+    assert command.torque.model.stiffness == ((1, 0, 0), (0, 2, 0), (0, 0, 3))
+
+
+def test_a_force_may_be_plain_numbers_and_none_is_no_force(front):
+    answers = iter([[-5, 0, 0], None, (0, 0, 1)])
+    thread = Running(lambda hand: next(answers))
+    front.accept()
+    assert front.ask(1, HAND).force == (-5, 0, 0)
+    assert front.ask(2, HAND) is None
+    assert front.ask(3, HAND).force == (0, 0, 1)
+    front.close()
+    assert thread.end() is None
+
+
+def test_a_state_may_come_byte_by_byte(front):
+    thread = Running(lambda hand: (hand.position[0], 0, 0))
+    front.accept()
+    body = codec.write_frame(WHOLE_HAND)
+    for byte in (8 + len(body)).to_bytes(4, "little") + (1).to_bytes(8, "little") + body:
+        front.link.sendall(bytes([byte]))
+    sequence, answer = front.read()
+    assert sequence == 1
+    assert codec.read_data(answer).frames[0].force == (0.01, 0, 0)
+    front.close()
+    assert thread.end() is None
+
+
+def test_a_force_that_is_no_number_goes_out_for_the_front_to_refuse(front):
+    thread = Running(lambda hand: (float("nan"), 0, 0))
+    front.accept()
+    front.say(1, codec.write_frame(HAND))
+    _, body = front.read()
+    assert codec.read_data(body).invalid == 1
+    assert isnan(tendon_pb2.Datagram.FromString(body).frames[0].force.force_n.x)
+    front.close()
+    assert thread.end() is None
+
+
+@pytest.mark.parametrize(
+    "touch, sentence",
+    [
+        ((1, 2), "expected a force of three numbers"),
+        (Touch(stiffness=(1, 2)), "expected a stiffness of one number, three, or 3 × 3"),
+        (Touch(contact=Contact((0, 0, 1), 0, ForceTable(0, 1, (1,) * 1000))), "expected at most 1200"),
+    ],
+)
+def test_an_answer_of_a_wrong_shape_is_an_error_with_a_sentence(front, touch, sentence):
+    thread = Running(lambda hand: touch)
+    front.accept()
+    front.say(1, codec.write_frame(HAND))
+    error = thread.end()
+    assert isinstance(error, ValueError) and sentence in str(error)
+
+
+def test_an_exception_of_the_answer_passes_through(front):
+    def fail(hand):
+        raise ZeroDivisionError("singular")
+
+    thread = Running(fail)
+    front.accept()
+    front.say(1, codec.write_frame(HAND))
+    assert isinstance(thread.end(), ZeroDivisionError)
+
+
+@pytest.mark.parametrize(
+    "bytes_, sentence",
+    [
+        ((7).to_bytes(4, "little"), "a record of 7 bytes: expected 8 to 1208"),
+        ((1209).to_bytes(4, "little"), "a record of 1209 bytes: expected 8 to 1208"),
+        ((8).to_bytes(4, "little") + (1).to_bytes(8, "little"), "what is no state"),
+        ((10).to_bytes(4, "little") + (1).to_bytes(8, "little") + b"\xff\xff", "what is no state"),
+    ],
+)
+def test_a_front_that_sends_no_state_is_an_error_with_a_sentence(front, bytes_, sentence):
+    thread = Running(lambda hand: None)
+    front.accept()
+    front.link.sendall(bytes_)
+    error = thread.end()
+    assert isinstance(error, RuntimeError) and sentence in str(error)
+
+
+@pytest.mark.parametrize("missing", ["TENDON_WORKER_ADDRESS", "TENDON_WORKER_SECRET"])
+def test_without_a_front_the_error_names_the_variable(front, monkeypatch, missing):
+    monkeypatch.delenv(missing)
+    with pytest.raises(RuntimeError, match=f"{missing}: expected in the environment of a worker"):
+        worker.run(lambda hand: None)
+
+
+@pytest.mark.parametrize("address", ["unix:", "udp:127.0.0.1:1", "tcp:127.0.0.1", "tcp:127.0.0.1:0", "127.0.0.1:4"])
+def test_an_address_of_another_form_is_told_what_is_expected(front, monkeypatch, address):
+    monkeypatch.setenv("TENDON_WORKER_ADDRESS", address)
+    with pytest.raises(RuntimeError, match=f'expected unix:PATH or tcp:HOST:PORT, found "{address}"'):
+        worker.run(lambda hand: None)
+
+
+def test_where_no_front_listens_the_error_names_the_place(front):
+    front.close()
+    Path(front.address.removeprefix("unix:")).unlink(missing_ok=True)
+    with pytest.raises(ConnectionError, match=f"TENDON_WORKER_ADDRESS: no front listens at {front.address}: "):
+        worker.run(lambda hand: None)
+
+
+class Rank:
+    """One of several ranks that are threads: what run() needs of mpi4py's communicators."""
+
+    def __init__(self, number: int, mail: list[Queue]) -> None:
+        self.number = number
+        self._mail = mail
+        self.aborted: list[int] = []
+
+    def Get_rank(self) -> int:
+        return self.number
+
+    def bcast(self, obj, root=0):
+        assert root == 0
+        if self.number > 0:
+            return self._mail[self.number].get(timeout=PATIENCE_S)
+        for box in self._mail[1:]:
+            box.put(obj)
+        return obj
+
+    def Abort(self, errorcode=0):
+        self.aborted.append(errorcode)
+
+
+def ranks(count: int) -> list[Rank]:
+    mail: list[Queue] = [Queue() for _ in range(count)]
+    return [Rank(number, mail) for number in range(count)]
+
+
+def test_every_rank_gets_each_state_and_rank_0_answers(front):
+    seen: list[list[DeviceState]] = [[], [], []]
+
+    def answer_of(rank):
+        return lambda hand: seen[rank.number].append(hand) or (float(rank.number), 0, 0)
+
+    threads = [Running(answer_of(rank), rank) for rank in ranks(3)]
+    front.accept()
+    assert front.ask(1, HAND).force == (0, 0, 0)
+    assert front.ask(2, WHOLE_HAND).force == (0, 0, 0)
+    front.close()
+    assert [one.end() for one in threads] == [None] * 3
+    assert seen == [[HAND, WHOLE_HAND]] * 3
+
+
+def test_a_rank_that_fails_ends_all_of_them(front, capsys):
+    first, second = ranks(2)
+    threads = [Running(lambda hand: None, first), Running(lambda hand: 1 / 0, second)]
+    front.accept()
+    front.say(1, codec.write_frame(HAND))
+    assert isinstance(threads[1].end(), ZeroDivisionError)
+    assert second.aborted == [1]
+    assert "ZeroDivisionError" in capsys.readouterr().err
+    front.close()
+    assert threads[0].end() is None
+
+
+def test_without_a_front_the_other_ranks_end(front):
+    front.close()
+    Path(front.address.removeprefix("unix:")).unlink(missing_ok=True)
+    threads = [Running(lambda hand: None, rank) for rank in ranks(2)]
+    assert isinstance(threads[0].end(), ConnectionError)
+    assert threads[1].end() is None
+
+
+ON_RANKS = """
+from mpi4py import MPI
+import tendon
+
+comm = MPI.COMM_WORLD
+
+
+def answer(hand):
+    if hand.buttons and comm.rank == 1:
+        raise ArithmeticError("on rank 1")
+    return (comm.allreduce((comm.rank + 1) * hand.position[0]), comm.rank, comm.size)
+
+
+tendon.worker.run(answer, comm)
+"""
+
+
+def on_ranks(tmp_path: Path) -> AbstractContextManager[subprocess.Popen[str]]:
+    script = tmp_path / "on_ranks.py"
+    script.write_text(ON_RANKS, encoding="utf-8")
+    return running(mpirun(sys.executable, script), stderr=subprocess.PIPE, text=True)
+
+
+def test_two_ranks_of_mpi_answer_together_and_a_failure_of_one_ends_both(front, tmp_path):
+    with on_ranks(tmp_path) as program:
+        assert front.accept() == (0, b"tendon worker 1\n" + SECRET.encode())
+        for sequence in range(1, 20):
+            assert front.ask(sequence, HAND).force == pytest.approx((0.03, 0, 2))
+        front.say(20, codec.write_frame(replace(HAND, buttons=1)))
+        _, said = program.communicate(timeout=PATIENCE_S)
+        assert program.returncode != 0
+        assert "ArithmeticError: on rank 1" in said
+
+
+def test_two_ranks_of_mpi_end_with_the_stream(front, tmp_path):
+    with on_ranks(tmp_path) as program:
+        front.accept()
+        front.ask(1, HAND)
+        front.close()
+        program.communicate(timeout=PATIENCE_S)
+        assert program.returncode == 0
+
+
+# ---- tendon-conformance: real programs that it must pass, and that it must not ----
+
+
+def judged(tmp_path: Path, *command: str | Path) -> dict[str, str]:
+    """The result of each check."""
+    kit = PROGRAMS / "tendon-conformance"
+    if not kit.exists():
+        pytest.skip(f"{kit} is not built; TENDON_PROGRAMS names another folder")
+    environment = {**os.environ, "PYTHONPATH": str(ROOT / "clients" / "python")}
+    words = [kit, "worker", "--json", "--log", tmp_path / "log", "--", *command]
+    done = subprocess.run(words, env=environment, stdout=subprocess.PIPE, text=True, timeout=4 * PATIENCE_S)
+    verdicts = {line["check"]: line["result"] for line in map(json.loads, done.stdout.splitlines())}
+    assert (done.returncode == 0) == (set(verdicts.values()) <= {"pass", "not applicable"})
+    return verdicts
+
+
+def test_the_kit_passes_the_example(tmp_path):
+    assert set(judged(tmp_path, sys.executable, EXAMPLES / "spring_worker.py").values()) == {"pass"}
+
+
+@pytest.mark.parametrize(
+    "program, failed",
+    [
+        ("raise SystemExit(3)", "stream-opens"),
+        ("tendon.worker.OPENING_MAGIC = b'tendon worker 2'; run(lambda hand: None)", "stream-opens"),
+        ("run(lambda hand: (float('nan'), 0, 0))", "answer-bounds"),
+        ("run(lambda hand: 1 / 0)", "answer-comes"),
+        ("run(lambda hand: (0, 0, 0) if hand.buttons == 0 else sys.exit())", "state-of-a-handle"),
+        ("run(lambda hand: None); time.sleep(100)", "stream-ends"),
+    ],
+)
+def test_the_kit_fails_a_program_that(tmp_path, program, failed):
+    script = tmp_path / "broken.py"
+    script.write_text(f"import sys, time\nimport tendon\nrun = tendon.worker.run\n{program}\n", encoding="utf-8")
+    verdicts = judged(tmp_path, sys.executable, script)
+    assert [check for check, result in verdicts.items() if result == "fail"] == [failed]

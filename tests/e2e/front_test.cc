@@ -1,0 +1,233 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// A front (tendon-fem serve) in front of a hand, with workers that go wrong in every way. Nothing here measures a time.
+#include <gtest/gtest.h>
+#include <signal.h>
+
+#include <algorithm>
+#include <chrono>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <string>
+#include <string_view>
+#include <thread>
+#include <vector>
+
+#include "tests/e2e/stage/stage.h"
+#include "tests/server/scratch_folder.h"
+
+namespace tendon::e2e {
+namespace {
+
+using testing::ScratchFolder;
+
+/// Forces fade soon, so that a gap of half a second, which a front leaves at least, has every stage.
+constexpr std::string_view kHand = R"([device]
+kind = "simulated"
+profile = "falcon"
+
+[device.hand]
+stiffness_n_per_m = 300
+damping_n_s_per_m = 3
+mass_kg = 0.05
+
+[device.hand.motion]
+kind = "ramp-hold"
+from_mm = [-10, 0, 0]
+to_mm = [15, 0, 0]
+ramp_ms = 300
+
+[force]
+hold_ms = 100
+safe_stop_ms = 200
+)";
+
+/// What came of a front with the worker `fake_worker WAY`.
+struct Outcome {
+  std::string out;  ///< of the front
+  std::string err;
+  Recording recording;
+  std::vector<Mode> modes;  ///< each change
+  std::uint64_t late_engine = 0;
+  std::uint64_t late_network = 0;
+
+  std::uint64_t workers(const std::string& key) const { return count_in(out.substr(out.rfind(R"({"workers")")), key); }
+  std::uint64_t sessions() const { return count_in(out.substr(out.rfind(R"({"summary")")), "sessions"); }
+  /// Whether these modes followed each other, others between them or not.
+  bool went_through(const std::vector<Mode>& wanted) const {
+    auto next = wanted.begin();
+    for (const Mode mode : modes) {
+      if (next != wanted.end() && mode == *next) ++next;
+    }
+    return next == wanted.end();
+  }
+};
+
+Outcome run(const std::string& way, const std::vector<std::string>& more = {}, const std::string& seconds = "2") {
+  const ScratchFolder folder;
+  const auto scene_file = folder.path() / "hand.toml";
+  write(scene_file, kHand);
+  const auto file = folder.path() / "run.mcap";
+  Server server(folder.path(), scene_file, {"--record", file.string()});
+  std::vector<std::string> arguments = {"serve",        "scene.toml",     "--worker",  TENDON_FAKE_WORKER " " + way,
+                                        "--server",     server.address(), "--dead-ms", "200",
+                                        "--duration-s", seconds,          "--json"};
+  arguments.insert(arguments.end(), more.begin(), more.end());
+  Process front(program("tendon-fem"), arguments, folder.path());
+  EXPECT_EQ(front.wait(), 0) << front.err();
+  server.stop();
+  Outcome run{.out = front.out(), .err = front.err(), .recording = read_recording(file), .modes = {}};
+  for (std::size_t at = 0; (at = run.out.find(R"({"report")", at)) != std::string::npos; ++at) {
+    run.late_engine += count_in(run.out.substr(at), "late_engine");
+    run.late_network += count_in(run.out.substr(at), "late_network");
+  }
+  expect_passive(run.recording, read_scene(scene_file));
+  LocalTime newest{};
+  std::uint64_t sequence = 0;
+  for (const StepRecord& step : run.recording.steps) {
+    if (run.modes.empty() || run.modes.back() != step.mode) run.modes.push_back(step.mode);
+    if (step.force_sequence == sequence || step.force_sequence == 0) continue;
+    sequence = step.force_sequence;
+    const LocalTime answered = step.hand.at - step.loop_age;
+    EXPECT_GE(answered, newest) << "a force answers an older motion than the one before";
+    newest = answered;
+  }
+  return run;
+}
+
+const std::vector<Mode> kLadder = {Mode::kActive, Mode::kHolding, Mode::kDecaying, Mode::kSafeStop, Mode::kActive};
+
+class FrontWorker : public ::testing::TestWithParam<const char*> {};
+
+TEST_P(FrontWorker, ThatGoesWrongIsReplacedInOneSession) {
+  const std::string way = GetParam();
+  const Outcome gone = run(way + " 300");
+  EXPECT_TRUE(gone.went_through(kLadder)) << gone.err;
+  EXPECT_EQ(gone.sessions(), 1U);
+  EXPECT_GE(gone.workers("launches"), 2U) << gone.err;
+  EXPECT_GE(gone.workers("answers"), 300U);
+  EXPECT_GT(gone.late_engine, gone.late_network) << "blamed on the engine, not on the network";
+  EXPECT_NE(gone.err.find("tendon-fem: worker 1 is given up: "), std::string::npos) << gone.err;
+}
+
+INSTANTIATE_TEST_SUITE_P(AllWays, FrontWorker, ::testing::Values("dies", "stops", "sleeps", "nan", "shouts"),
+                         [](const auto& way) {
+                           std::string name = way.param;
+                           std::erase(name, '-');
+                           return name;
+                         });
+
+TEST(Front, RefusesNoiseAndTakesTheAnswerAfterIt) {
+  const Outcome noise = run("babbles 300");
+  EXPECT_GE(noise.workers("refused"), 1000U);
+  EXPECT_GE(noise.workers("answers"), 301U);
+  EXPECT_NE(noise.err.find("an answer of the worker is refused: it is no Datagram"), std::string::npos) << noise.err;
+}
+
+TEST(Front, DoesNotSendLateAnswersAndKeepsTheWorker) {
+  const Outcome late = run("is-slow 300", {"--deadline-ms", "60"});
+  EXPECT_TRUE(late.went_through({Mode::kActive, Mode::kHolding, Mode::kDecaying, Mode::kSafeStop})) << late.err;
+  EXPECT_EQ(late.workers("launches"), 1U) << late.err;
+  EXPECT_GE(late.workers("late"), 3U);
+  EXPECT_GT(late.late_engine, late.late_network);
+}
+
+TEST(Front, WithoutAWorkerThatStartsIsASilentEngine) {
+  const Outcome none = run("ends-at-once");
+  EXPECT_EQ(none.sessions(), 1U);
+  EXPECT_GE(none.workers("launches"), 2U);
+  EXPECT_EQ(none.modes, std::vector<Mode>{Mode::kIdle});
+  EXPECT_NE(none.err.find("it ended with exit status 3; the next one starts in 0.5 s"), std::string::npos) << none.err;
+}
+
+TEST(Front, AnswersFromATableUntilTheNextWorker) {
+  const ScratchFolder folder;
+  const auto scene = demo_scene().replace_filename("softbody.toml").string();
+  const auto table = (folder.path() / "soft.table").string();
+  Process condense(program("tendon-softbody"), {"condense", scene, table}, folder.path());
+  ASSERT_EQ(condense.wait(), 0) << condense.err();
+  std::ifstream in(scene);
+  const std::string text{std::istreambuf_iterator<char>(in), {}};
+  const auto scene_file = folder.path() / "hand.toml";
+  write(scene_file, kHand);
+  write(folder.path() / "scene.toml", text);
+  const auto file = folder.path() / "run.mcap";
+  Server server(folder.path(), scene_file, {"--record", file.string()});
+  Process front(program("tendon-fem"),
+                {"serve", "scene.toml", "--worker", TENDON_FAKE_WORKER " dies 300", "--server", server.address(),
+                 "--fallback", table, "--duration-s", "3", "--json"},
+                folder.path());
+  EXPECT_EQ(front.wait(), 0) << front.err();
+  server.stop();
+  const std::string workers = front.out().substr(front.out().rfind(R"({"workers")"));
+  EXPECT_GE(count_in(workers, "launches"), 2U) << front.err();
+  EXPECT_GE(count_in(workers, "fallback"), 100U);
+  EXPECT_GE(count_in(workers, "answers"), 300U);
+
+  const Scene hand = read_scene(scene_file);
+  const Recording recording = read_recording(file);
+  expect_passive(recording, hand);
+  bool begun = false;
+  std::size_t with_error = 0;
+  for (const StepRecord& step : recording.steps) {
+    begun = begun || step.mode == Mode::kActive;
+    if (begun) {
+      EXPECT_NE(step.mode, Mode::kSafeStop) << "never worse than fading";
+    }
+    with_error += step.force_error && *step.force_error > 0.02 ? 1 : 0;  // a live answer says 0.01
+    const double grows = step.force.norm() - step.was_applied.norm();
+    EXPECT_LE(grows, 1.001 * hand.loop.control.max_slew * 1e-9 * static_cast<double>(step.held.count()) + 1e-9);
+  }
+  EXPECT_GE(with_error, 50U) << "the fallback's error is raised by what it differs from live answers";
+}
+
+TEST(Front, KilledLeavesNoWorkerBehind) {
+  const ScratchFolder folder;
+  const auto scene_file = folder.path() / "hand.toml";
+  write(scene_file, kHand);
+  const auto file = folder.path() / "run.mcap";
+  Server server(folder.path(), scene_file, {"--record", file.string()});
+  {
+    Process front(
+        program("tendon-fem"),
+        {"serve", "scene-of-a-killed-front.toml", "--worker", TENDON_FAKE_WORKER, "--server", server.address()},
+        folder.path());
+    front.wait_for_line("worker 1 is ready");
+    std::this_thread::sleep_for(std::chrono::milliseconds(500));
+    front.signal(SIGKILL);
+    front.wait();
+  }
+  const auto left = [] {
+    int count = 0;
+    std::error_code ignored;
+    for (const auto& entry : std::filesystem::directory_iterator("/proc", ignored)) {
+      std::ifstream process(entry.path() / "cmdline", std::ios::binary);
+      const std::string line{std::istreambuf_iterator<char>(process), {}};
+      count += line.find("scene-of-a-killed-front") != std::string::npos ? 1 : 0;
+    }
+    return count;
+  };
+  for (int i = 0; i < 300 && left() > 0; ++i) std::this_thread::sleep_for(std::chrono::milliseconds(100));
+  EXPECT_EQ(left(), 0);
+  std::this_thread::sleep_for(std::chrono::milliseconds(500));
+  server.stop();
+  const Recording recording = read_recording(file);
+  expect_passive(recording, read_scene(scene_file));
+  EXPECT_EQ(recording.steps.back().mode, Mode::kSafeStop);
+}
+
+TEST(Front, ExplainsABodyWithoutAServer) {
+  const ScratchFolder folder;
+  const auto scene = demo_scene().replace_filename("softbody.toml").string();
+  Process explain(program("tendon-fem"), {"explain", scene, "--ranks", "1,64"}, folder.path());
+  EXPECT_EQ(explain.wait(), 0) << explain.err();
+  EXPECT_NE(explain.out().find("Take: the table"), std::string::npos) << explain.out();
+  Process wrong(program("tendon-fem"), {"explain", scene, "--ranks", "0"}, folder.path());
+  EXPECT_EQ(wrong.wait(), 2);
+  Process none(program("tendon-fem"), {}, folder.path());
+  EXPECT_EQ(none.wait(), 2);
+}
+
+}  // namespace
+}  // namespace tendon::e2e

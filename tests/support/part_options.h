@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <string>
+
+#include "tests/support/swept_work.h"
+
+namespace tendon {
+
+/// `--units` and `--from` of a program or verb that can be swept. `units`: says to people which units there are, "0 to 17:
+/// the rows of the table".
+inline void add_part_options(CLI::App& verb, Part& part, const std::string& units) {
+  part.progress = isatty(STDERR_FILENO) != 0;
+  CLI::Option* const these = verb.add_option_function<std::string>(
+                                     "--units", [&part](const std::string& text) { part.units = parse_units(text); },
+                                     "a shard of a sweep: these units of " + units + "; lines of JSON (tendon-sweep)")
+                                 ->type_name("FIRST:COUNT");
+  verb.add_option_function<std::string>(
+          "--from", [&part](const std::string& file) { part.from = file; },
+          "runs nothing: says what the shards of a sweep came to (tendon-sweep merge)")
+      ->type_name("FILE")
+      ->check(CLI::ExistingFile.description(""))
+      ->excludes(these);
+}
+
+}  // namespace tendon

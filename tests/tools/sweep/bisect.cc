@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tests/tools/sweep/bisect.h"
+
+#include <optional>
+#include <set>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "tests/tools/sweep/results.h"
+#include "tests/tools/sweep/shards.h"
+
+namespace tendon::sweep {
+namespace {
+
+using Named = std::vector<std::uint64_t>;
+
+constexpr int kAlone = 3;         // runs of a unit by itself
+constexpr std::size_t kMost = 8;  // units that are run by themselves
+
+/// Runs `half` twice: empty when it came to the same, else the units that are known to differ, if any.
+std::optional<Named> run_twice(const Plan& plan, const Units& half) {
+  const std::string once = output_of(plan, half);
+  const std::string again = output_of(plan, half);
+  if (once == again) return std::nullopt;
+  return differing_units(once, again, half);
+}
+
+/// Halves of what comes to another result each time, until the units are known; none when it no longer does, or never
+/// did.
+Named by_halves(const Plan& plan, Units part, std::ostream& out) {
+  while (part.count > 1) {
+    const Units left{.first = part.first, .count = part.count / 2};
+    const Units right{.first = part.first + left.count, .count = part.count - left.count};
+    std::optional<Named> differ = run_twice(plan, left);
+    part = differ ? left : right;
+    if (!differ) differ = run_twice(plan, right);
+    if (!differ) break;
+    out << "units " << text_of(part) << " come to another result each time";
+    if (!differ->empty()) {
+      out << ", and differ in unit " << differ->front() << "\n";
+      return *differ;
+    }
+    out << "\n" << std::flush;
+  }
+  return {};
+}
+
+/// Says how a unit ends by itself. `here`: what the shard came to on this node. True when it is the same each time.
+bool run_alone(const Plan& plan, std::uint64_t unit, const std::string& here, std::ostream& out) {
+  std::set<std::string> ends;
+  for (int i = 0; i < kAlone; ++i) ends.insert(output_of(plan, {.first = unit, .count = 1}));
+  out << "unit " << unit << ", run " << kAlone << " times by itself: ";
+  if (ends.size() > 1) {
+    out << ends.size() << " results\n" << std::flush;
+    return false;
+  }
+  const std::string lines = lines_of(*ends.begin(), unit);
+  out << "the same each time" << (lines == lines_of(here, unit) ? "" : ", and not what it comes to in its shard")
+      << "\n"
+      << std::flush;
+  return true;
+}
+
+}  // namespace
+
+bool bisect(const std::filesystem::path& folder, const Plan& plan, std::uint64_t shard, std::ostream& out) {
+  const Units units = plan.shard(shard);
+  const std::optional<std::string> first = result_of(folder, plan, shard);
+  const std::optional<std::string> second = other_result_of(folder, plan, shard);
+  if (!first || !second) {
+    throw std::invalid_argument("shard " + std::to_string(shard) + ": has not had two results that differ");
+  }
+  const std::filesystem::path file = result_file(folder, shard);
+  Named named = differing_units(*first, *second, units);
+  out << "shard " << shard << ", units " << text_of(units) << ": two results, which differ in "
+      << difference(*first, *second, units) << "\n";
+  const std::string lines = named.empty() ? "" : lines_of(*first, named.front());
+  if (!lines.empty()) out << "first:  " << lines << "second: " << lines_of(*second, named.front());
+  out << std::flush;
+
+  const std::string here = output_of(plan, units);
+  const bool third = here != *first && here != *second;
+  out << "here and now the shard comes to "
+      << (third            ? "a third"
+          : here == *first ? "the first, " + file.string()
+                           : "the second, " + std::filesystem::path(file).replace_extension(".differs").string())
+      << "\n"
+      << std::flush;
+  if (named.empty()) named = differing_units(*first, here, units);
+  if (named.empty()) named = differing_units(*second, here, units);
+  if (named.empty()) named = by_halves(plan, units, out);
+  bool same = true;
+  for (std::size_t i = 0; i < named.size() && i < kMost; ++i) same = run_alone(plan, named[i], here, out) && same;
+
+  if (!same) {
+    out << "The program comes to another result each time: it depends on more than its units.\n";
+  } else if (third) {
+    out << "That makes three results. Run this command again: a fourth is the program's fault, not a node's.\n";
+  } else {
+    out << "This node stays with its result. The other is of another node, or of a fault: run this command there,\n"
+           "take the wrong file away, and give the right one the name "
+        << file.string() << "\n";
+  }
+  if (named.empty()) out << "No unit is named: several differ that have no lines, or none does.\n";
+  return !named.empty();
+}
+
+}  // namespace tendon::sweep
