@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 // A worker that pulls the hand to the middle, and goes wrong as it is told: fake_worker [WAY [AFTER]] SCENE. After so
 // many answers it …
-#include <sys/socket.h>
 #include <unistd.h>
 
 #include <csignal>
+#include <cstddef>
 #include <cstdlib>
-#include <iostream>
 #include <limits>
 #include <string>
+#include <vector>
 
 #include "clients/cpp/worker/worker.h"
 
@@ -55,10 +55,7 @@ int main(int argc, char** argv) {
              ++i) {
         }
       }
-      if (way == "shouts") {  // a length that cannot be
-        const std::string noise(4096, '\xff');
-        if (::write(3, noise.data(), noise.size()) < 0) return 1;
-      }
+      if (way == "shouts") stream.send({.sequence = sequence, .body = std::vector<std::byte>(2000)});  // too long
     }
     if (!stream.send(codec.answer(sequence, *hand, touch))) return 0;
   }
