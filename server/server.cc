@@ -1,8 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "server/server.h"
 
+#include <unistd.h>
+
 #include <algorithm>
+#include <array>
 #include <bit>
+#include <climits>
 #include <cmath>
 #include <filesystem>
 #include <span>
@@ -12,6 +16,8 @@
 #include <variant>
 
 #include "core/base/frames.h"
+#include "protocol/discovery.h"
+#include "protocol/wire/text.h"
 #include "server/build_info.h"
 #include "server/device_factory.h"
 #include "server/guests/couple.h"
@@ -30,6 +36,10 @@ constexpr auto kLogPeriod = std::chrono::milliseconds(20);
 /// Trouble is logged at most this often, with its count.
 constexpr auto kTellPeriod = std::chrono::seconds(1);
 
+std::uint32_t loop_hz(const Scene& scene) {
+  return static_cast<std::uint32_t>(std::lround(1 / seconds(scene.loop.period)));
+}
+
 DeviceDescription description_of(const Scene& scene, const DeviceInfo& device) {
   DeviceDescription about;
   about.name = scene.name;
@@ -38,7 +48,7 @@ DeviceDescription description_of(const Scene& scene, const DeviceInfo& device) {
   if (!scene.driver().exerts_force) about.max_force = 0;
   if (scene.safety && device.max_force > 0) about.max_force = std::min(about.max_force, device.max_force);
   about.position_resolution = device.position_resolution;
-  about.loop_hz = static_cast<std::uint32_t>(std::lround(1 / seconds(scene.loop.period)));
+  about.loop_hz = loop_hz(scene);
   for (const Scene::Channel& channel : scene.channels) {
     about.channels.push_back({.name = channel.name, .rule = channel.rule, .lease = channel.lease, .holder = {}});
   }
@@ -132,6 +142,33 @@ std::unique_ptr<PartRecorder> recorder_of(const std::vector<Scene>& scenes, Loca
   config.rotate_after = from_seconds(recording->rotate_after);
   config.budget_bytes = static_cast<std::uint64_t>(recording->budget_bytes.value_or(0));
   return std::make_unique<PartRecorder>(config);
+}
+
+std::string host_name() {
+  std::array<char, HOST_NAME_MAX + 1> name{};
+  ::gethostname(name.data(), name.size() - 1);
+  const std::string whole = name.data();
+  return whole.substr(0, whole.find('.'));
+}
+
+/// Of the scenes that ask for it. Null: there is nothing to announce.
+std::unique_ptr<Announcer> announcer_of(const std::vector<Scene>& scenes, const Address& listen) {
+  std::vector<Announcer::Device> devices;
+  for (const Scene& scene : scenes) {
+    if (!scene.discovery || !scene.discovery->announce) continue;
+    Announcer::Device& device = devices.emplace_back();
+    const std::string& name = scene.discovery->name;
+    device.name = name.empty() ? clip(scene.name + " at " + host_name(), dns_sd::kMaxName) : name;
+    device.about = {.version = kProtocolVersion,
+                    .device = scene.name,
+                    .hz = loop_hz(scene),
+                    .suite = scenes.front().network.keys ? 1U : 0U};
+    for (const Scene::Channel& channel : scene.channels) device.about.channels.push_back(channel.name);
+  }
+  if (devices.empty()) return nullptr;
+  return std::make_unique<Announcer>(std::move(devices), listen, [](bool warning, const std::string& sentence) {
+    warning ? log::warn(sentence) : log::info(sentence);
+  });
 }
 
 std::string haptic_name(const Scene& scene) { return "haptic-" + std::to_string(scene.loop.device); }
@@ -230,6 +267,7 @@ Server::Server(const std::vector<Scene>& scenes)
       link_(scenes.front().network.listen, scenes.front().network.keys ? Reach::kAnywhere : Reach::kThisMachine),
       network_(network_config(devices_), link_, mail_of(devices_)),
       tell_next_(started_ + kTellPeriod) {
+  announcer_ = announcer_of(scenes, link_.local_address());
   recorder_ = recorder_of(scenes, started_);  // last, so that a refusal before it leaves no file behind
 }
 
@@ -248,6 +286,12 @@ void Server::start(std::optional<Duration> run_for) {
   if (const auto& refused = wakeful_.emplace().refused()) log::warn(*refused);
   try {
     log_thread_ = thread_of("log", [this] { run_log(); });
+    if (announcer_) {
+      announce_thread_ = thread_of("announce", [this] {
+        name_thread("announce");
+        announcer_->run();
+      });
+    }
     network_thread_ = thread_of("network", [this] { run_network(); });
     for (auto& runtime : devices_) {
       runtime->thread = thread_of(haptic_name(runtime->scene), [this, &runtime = *runtime] { run_haptic(runtime); });
@@ -262,11 +306,13 @@ void Server::end_threads() {
   const auto join = [](std::thread& thread) {
     if (thread.joinable()) thread.join();
   };
+  if (announcer_) announcer_->stop();
   stop_haptic_.store(true, std::memory_order_release);
   for (auto& runtime : devices_) join(runtime->thread);
   stop_network_.store(true, std::memory_order_release);
   stepped_.ring();
   join(network_thread_);
+  join(announce_thread_);
   stop_log_.store(true, std::memory_order_release);
   join(log_thread_);
   wakeful_.reset();

@@ -17,6 +17,7 @@
 #include "devices/safety/safe_device.h"
 #include "server/guests/health.h"
 #include "server/haptic_loop.h"
+#include "server/machine/announcer.h"
 #include "server/machine/doorbell.h"
 #include "server/machine/realtime.h"
 #include "server/machine/udp_link.h"
@@ -35,6 +36,7 @@ namespace tendon {
 /// | haptic… | HapticLoop, Device           | the absolute time of its next step      | nothing but compute     |
 /// | network | NetworkLoop, UdpLink         | a datagram, a haptic step, a timer      | allocate, log rarely    |
 /// | log     | PartRecorder, meters          | 20 ms                                   | allocate, write, log    |
+/// | announce| Announcer, if a scene has one | D-Bus                                   | allocate, log           |
 ///
 /// They share the Mailboxes of each device, and nothing else.
 class Server {
@@ -125,6 +127,7 @@ class Server {
   UdpLink link_;
   Doorbell stepped_;
   NetworkLoop network_;
+  std::unique_ptr<Announcer> announcer_;    ///< null when no scene is announced
   std::unique_ptr<PartRecorder> recorder_;  ///< null when the scene records nothing
 
   // What run_log has told the operator already.
@@ -141,6 +144,7 @@ class Server {
   std::optional<WakefulProcessors> wakeful_;  ///< while the threads run
   std::thread network_thread_;
   std::thread log_thread_;
+  std::thread announce_thread_;  ///< where there is an announcer
 };
 
 }  // namespace tendon

@@ -8,6 +8,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "clients/cpp/discovery/list.h"
 #include "clients/cpp/key_file.h"
 
 namespace tendon {
@@ -88,7 +89,7 @@ CommandLine::CommandLine(std::string purpose, Options& options)
   app.set_version_flag("--version", TENDON_VERSION);
   app.add_option_function<std::string>(
          "--server", [&](const std::string& text) { options.server = text; },
-         "Where tendond listens: a host name or an address")
+         "Where tendond listens: a host name or an address; or dns-sd:NAME, where dns-sd: lists the names")
       ->type_name("HOST:PORT")
       ->default_str(options.server.text())
       ->check(CLI::Validator(check_server, ""));
@@ -141,7 +142,7 @@ void CommandLine::add(const std::string& name, bool& value, const std::string& m
 std::optional<int> CommandLine::parse(int argc, const char* const* argv) {
   try {
     parser_->app.parse(argc, argv);
-    return std::nullopt;
+    return list_servers(parser_->options.server, parser_->options.json);
   } catch (const CLI::ParseError& error) {
     return parser_->app.exit(error) == 0 ? 0 : 2;  // prints the help, or what is wrong
   }

@@ -34,7 +34,7 @@ class CommandLine {
   void add(const std::string& name, bool& value, const std::string& meaning);
 
   /// Empty: go on. Otherwise the exit code to leave with: 0 after --help, 2 after a wrong usage, which has
-  /// been explained on stderr.
+  /// been explained on stderr; that of list_servers() after `--server dns-sd:`.
   std::optional<int> parse(int argc, const char* const* argv);
 
  private:

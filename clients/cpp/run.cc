@@ -42,7 +42,7 @@ class Guest {
       : options_(options),
         device_(device),
         who_(options.client.name + (device.empty() ? "" : " at " + device)),
-        transport_(options.server),
+        transport_(options.server, options.client.key.has_value()),
         client_(transport_, transport_.server(), config(options, device), std::move(callback), start) {}
   Guest(const Guest&) = delete;
   Guest& operator=(const Guest&) = delete;
@@ -60,7 +60,7 @@ class Guest {
   UdpTransport& transport() { return transport_; }
 
  private:
-  static ForceClient::Config config(const Options& options, const std::string& device);
+  ForceClient::Config config(const Options& options, const std::string& device) const;
   std::string sentence() const;
   void say(const std::string& text) const { std::cerr << who_ << ": " << text << '\n'; }
   void look_up_again();
@@ -75,15 +75,17 @@ class Guest {
   ForceClient client_;
 
   std::string said_;
+  std::string missing_;        ///< said of the last look-up; empty: it found the server
   std::string_view unusable_;  // the newest reason that was said
   std::string_view left_out_;  ///< likewise, of a part of a force
   ForceClient::Phase phase_ = ForceClient::Phase::kGreeting;
   PeerTime reported_{};
 };
 
-ForceClient::Config Guest::config(const Options& options, const std::string& device) {
+ForceClient::Config Guest::config(const Options& options, const std::string& device) const {
   ForceClient::Config config = options.client;
   if (!device.empty()) config.device = device;
+  if (config.device.empty()) config.device = transport_.device();
   config.seed = seed_from_system();
   return config;
 }
@@ -152,8 +154,9 @@ void Guest::look_up_again() {
   try {
     transport_.look_up_again(client_.phase() == ForceClient::Phase::kUnanswered);
     client_.move_to(transport_.server());
+    missing_.clear();
   } catch (const std::runtime_error& error) {
-    say(error.what());
+    if (missing_ != error.what()) say(missing_ = error.what());
   }
 }
 

@@ -17,6 +17,8 @@
 #include <system_error>
 #include <utility>
 
+#include "clients/cpp/discovery/discovery.h"
+
 namespace tendon {
 namespace {
 
@@ -49,6 +51,14 @@ std::optional<HostAndPort> split(const std::string& text) {
   return HostAndPort{host, port->port};
 }
 
+/// Empty for what does not begin as a name of DNS-SD does.
+std::optional<dns_sd::Instance> instance_in(std::string_view text) {
+  for (const std::string_view scheme : {"dns-sd:", "tendon://"}) {
+    if (text.starts_with(scheme)) return dns_sd::parse_instance(text.substr(scheme.size()));
+  }
+  return std::nullopt;
+}
+
 Address from_system(const addrinfo& found, std::uint16_t port) {
   Address address;
   if (found.ai_family == AF_INET) {
@@ -65,17 +75,8 @@ Address from_system(const addrinfo& found, std::uint16_t port) {
   return address;
 }
 
-}  // namespace
-
-ServerName::ServerName(std::string text) : text_(std::move(text)) {
-  if (!split(text_)) parse_address(text_);  // throws what is wrong
-}
-
-ServerName::ServerName(const Address& address) : text_(to_string(address)) {}
-
-std::vector<Address> ServerName::look_up() const {
-  if (const auto address = numeric(text_)) return {*address};
-  const auto [host, port] = *split(text_);
+/// The addresses of a host, by the system.
+std::vector<Address> addresses_of(const std::string& host, std::uint16_t port) {
   addrinfo hints{};
   hints.ai_family = AF_UNSPEC;
   hints.ai_socktype = SOCK_DGRAM;
@@ -91,6 +92,34 @@ std::vector<Address> ServerName::look_up() const {
   }
   if (addresses.empty()) throw std::runtime_error("cannot find " + host + ": it has no IP address");
   return addresses;
+}
+
+}  // namespace
+
+ServerName::ServerName(std::string text) : text_(std::move(text)), instance_(instance_in(text_)) {
+  if (!instance_ && !split(text_)) parse_address(text_);  // throws what is wrong
+}
+
+ServerName::ServerName(const Address& address) : text_(to_string(address)) {}
+
+ServerName::Place ServerName::look_up(bool has_key) const {
+  if (const auto address = numeric(text_)) return {{*address}, {}};
+  if (!instance_) {
+    const auto [host, port] = *split(text_);
+    return {addresses_of(host, port), {}};
+  }
+  if (instance_->name.empty()) throw std::runtime_error(text_ + " is a list, which echo_motion --server " + text_ + " prints: expected a name in it");
+  if (!has_key) {
+    throw std::runtime_error(text_ + ": anybody can announce this name, and a key alone tells whose it is: expected " +
+                             "a key (--key FILE) besides, or HOST:PORT in place of the name");
+  }
+  Place place;
+  for (const dns_sd::Found& found : dns_sd::resolve(*instance_)) {
+    if (place.addresses.empty()) place.device = found.about.device;
+    const auto more = found.addresses.empty() ? addresses_of(found.host, found.port) : found.addresses;
+    place.addresses.insert(place.addresses.end(), more.begin(), more.end());
+  }
+  return place;
 }
 
 std::string ServerName::at(const Address& address) const {

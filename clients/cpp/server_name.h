@@ -1,18 +1,24 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "protocol/discovery.h"
 #include "protocol/link.h"
 
 namespace tendon {
 
 /// Where a server is, as a person writes it: "haptics.lab:47100", "127.0.0.1:47100", "[::1]:47100" or
-/// "localhost:47100", which is 127.0.0.1.
+/// "localhost:47100", which is 127.0.0.1; or the name of a device that DNS-SD finds (clients/cpp/discovery):
+///
+///     dns-sd:falcon at bench 3              on the local network; tendon://falcon at bench 3 is the same
+///     dns-sd:falcon at bench 3.example.org  by the name servers of that domain
+///     dns-sd:  dns-sd:.example.org          all of the local network, of that domain: list_servers() prints them
 class ServerName {
  public:
-  /// Looks nothing up. Throws std::invalid_argument when `text` is not HOST:PORT:
+  /// Looks nothing up. Throws std::invalid_argument when `text` is none of these:
   /// `expected HOST:PORT like 127.0.0.1:47100, got "…"`.
   ServerName(std::string text);                                    // NOLINT(google-explicit-constructor)
   ServerName(const char* text) : ServerName(std::string(text)) {}  // NOLINT(google-explicit-constructor)
@@ -20,16 +26,28 @@ class ServerName {
 
   const std::string& text() const noexcept { return text_; }
 
-  /// The addresses of this name, the one to prefer first. A numeric address is its own, at once. A host name is looked
-  /// up by the system (/etc/hosts, DNS, …), which waits, up to some seconds where no name server answers. Throws
-  /// std::runtime_error when there is none: "cannot find haptics.lab: Name or service not known".
-  std::vector<Address> look_up() const;
+  /// What DNS-SD is to look for; empty for HOST:PORT.
+  const std::optional<dns_sd::Instance>& instance() const noexcept { return instance_; }
+
+  struct Place {
+    std::vector<Address> addresses;  ///< the one to prefer first; at least one
+    std::string device;              ///< that DNS-SD names; empty: none
+  };
+
+  /// Where this name leads. A numeric address is its own, at once. A host name is looked up by the system (/etc/hosts,
+  /// DNS, …), which waits, up to some seconds where no name server answers; so does DNS-SD. Throws std::runtime_error
+  /// when there is nothing: "cannot find haptics.lab: Name or service not known".
+  ///
+  /// Anybody can announce any name, and without a key a client believes whoever answers. So a name of DNS-SD is refused
+  /// unless the caller `has_key`, and speaks with that key alone.
+  Place look_up(bool has_key = false) const;
 
   /// This name, with the address in use where that is not the same: "haptics.lab:47100 (192.0.2.7:47100)".
   std::string at(const Address& address) const;
 
  private:
   std::string text_;
+  std::optional<dns_sd::Instance> instance_;
 };
 
 }  // namespace tendon

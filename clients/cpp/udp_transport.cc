@@ -37,7 +37,11 @@ struct UdpTransport::Socket {
   udp::socket socket{context};
 };
 
-UdpTransport::UdpTransport(const ServerName& server) : name_(server) { connect(name_.look_up(), 0); }
+UdpTransport::UdpTransport(const ServerName& server, bool has_key) : name_(server), has_key_(has_key) {
+  ServerName::Place place = name_.look_up(has_key_);
+  connect(place.addresses, 0);
+  device_ = std::move(place.device);
+}
 
 UdpTransport::~UdpTransport() = default;
 
@@ -61,7 +65,7 @@ void UdpTransport::connect(const std::vector<Address>& addresses, std::size_t fi
 }
 
 void UdpTransport::look_up_again(bool another) {
-  const std::vector<Address> addresses = name_.look_up();
+  const std::vector<Address> addresses = name_.look_up(has_key_).addresses;
   const auto present = std::find(addresses.begin(), addresses.end(), server_);
   if (present != addresses.end() && (!another || addresses.size() == 1)) return;
   connect(addresses, present == addresses.end() ? 0 : static_cast<std::size_t>(present - addresses.begin()) + 1);

@@ -19,12 +19,15 @@ class UdpTransport : public Link {
  public:
   /// Looks the name up (ServerName::look_up, which may wait) and takes the first address that the system can reach.
   /// Throws std::runtime_error when there is none: "cannot find haptics.lab: Name or service not known",
-  /// "cannot reach 192.0.2.1:47100: Network is unreachable".
-  explicit UdpTransport(const ServerName& server);
+  /// "cannot reach 192.0.2.1:47100: Network is unreachable"; and for a name of DNS-SD unless `has_key` promises that
+  /// the sessions here have a key.
+  explicit UdpTransport(const ServerName& server, bool has_key = false);
   ~UdpTransport() override;
 
   /// The address in use.
   const Address& server() const noexcept { return server_; }
+  /// The device that DNS-SD names beside it; empty: none.
+  const std::string& device() const noexcept { return device_; }
 
   /// Looks the name up again, which may wait: to be called while no session is open. Stays with the present address
   /// where the name still has it, or, with `another`, goes on to the one after it. Throws as the constructor does; then
@@ -55,7 +58,9 @@ class UdpTransport : public Link {
   void connect(const std::vector<Address>& addresses, std::size_t first);
 
   ServerName name_;
+  bool has_key_;
   Address server_;
+  std::string device_;
   std::unique_ptr<Socket> socket_;
 };
 

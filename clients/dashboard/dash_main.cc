@@ -88,7 +88,8 @@ std::optional<int> parse(int argc, char** argv, Options& options) {
         }
       },
       "");
-  app.add_option("--server", server, "Where tendond listens: an address, or a host name, which is looked up once")
+  app.add_option("--server", server,
+                 "Where tendond listens: an address, or a host name or dns-sd:NAME, which is looked up once")
       ->type_name("HOST:PORT")
       ->capture_default_str()
       ->check(name);
@@ -146,7 +147,7 @@ int run(const Options& options) {
   std::optional<Recordings> recordings;
   if (!options.recordings.empty()) recordings.emplace(options.recordings);
 
-  const std::vector<Address> addresses = options.server.look_up();
+  const std::vector<Address> addresses = options.server.look_up(key.has_value()).addresses;
   WebServer::Config web_config = options.web;
   web_config.server = addresses.front();
   const LocalTime start = read_clock();

@@ -18,9 +18,9 @@ namespace {
 constexpr Duration kLongestWait = std::chrono::milliseconds(100);
 constexpr Duration kLineEvery = std::chrono::seconds(1);
 
-Plug::Config config_of(const DeskConfig& config, const std::string& device) {
+Plug::Config config_of(const DeskConfig& config, const std::string& device, const std::string& found) {
   Plug::Config of_plug{.client = config.client, .new_seed = seed_from_system, .observe = config.observe};
-  of_plug.client.device = device;
+  of_plug.client.device = device.empty() ? found : device;
   return of_plug;
 }
 
@@ -28,9 +28,10 @@ Plug::Config config_of(const DeskConfig& config, const std::string& device) {
 
 Desk::Place::Place(const DeskConfig& config, const std::string& device, LocalTime now)
     : name(device.empty() ? "device" : device),
-      watcher(config.server),
-      controller(config.server),
-      plug({watcher, watcher.server()}, {controller, controller.server()}, config_of(config, device), now) {}
+      watcher(config.server, config.client.key.has_value()),
+      controller(config.server, config.client.key.has_value()),
+      plug({watcher, watcher.server()}, {controller, controller.server()}, config_of(config, device, watcher.device()),
+           now) {}
 
 Desk::Desk(DeskConfig config, LocalTime now) : config_(std::move(config)), next_line_(now + kLineEvery) {
   if (config_.devices.empty()) config_.devices.emplace_back();

@@ -33,7 +33,7 @@ void add_common(CLI::App& app, DeskConfig& desk) {
   desk.client.name = "tendon-plug " + app.get_name();
   app.add_option_function<std::string>(
          "--server", [&](const std::string& text) { desk.server = text; },
-         "Where tendond listens: a host name or an address")
+         "Where tendond listens: a host name or an address; or dns-sd:NAME, which --key has to go with")
       ->type_name("HOST:PORT")
       ->default_str(desk.server.text())
       ->check(accepted_by([](const std::string& text) { ServerName{text}; }));

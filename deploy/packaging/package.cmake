@@ -10,6 +10,8 @@ install(TARGETS tendond tendon-softbody tendon-lab tendon-report tendon-identify
 install(DIRECTORY deploy/scenes/ DESTINATION ${CMAKE_INSTALL_DATADIR}/tendon/scenes COMPONENT programs
         FILES_MATCHING PATTERN "*.toml" PATTERN "*.msh")
 install(FILES README.md CHANGELOG.md LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT programs)
+install(FILES deploy/discovery/README.md deploy/discovery/records.md deploy/discovery/tendon.service.in
+        DESTINATION ${CMAKE_INSTALL_DATADIR}/tendon/discovery COMPONENT programs)
 if(TARGET tendon-dash)
   list(APPEND programs tendon-dash)
   install(TARGETS tendon-dash COMPONENT programs)
@@ -101,6 +103,7 @@ set(CPACK_DEBIAN_RUN_PACKAGE_NAME tendon)
 set(CPACK_DEBIAN_RUN_PACKAGE_SECTION science)
 set(CPACK_DEBIAN_RUN_PACKAGE_SHLIBDEPS ON)
 set(CPACK_DEBIAN_RUN_PACKAGE_RECOMMENDS gnuplot-nox)
+set(CPACK_DEBIAN_RUN_PACKAGE_SUGGESTS avahi-daemon)
 set(CPACK_DEBIAN_RUN_DESCRIPTION "Networked haptics server with an energy-bounding output limiter
  Runs the loop of a haptic device at 1 kHz and bounds every force so that the device never gives out more energy than it took in,
  while physics engines anywhere on the network send forces late, rarely or wrong.")
@@ -113,7 +116,7 @@ set(CPACK_DEBIAN_PLUG_DESCRIPTION "Haptic devices of a Tendon server for program
  anywhere on the network, behind an output limiter that bounds its energy.")
 set(CPACK_DEBIAN_DEV_PACKAGE_NAME libtendon-dev)
 set(CPACK_DEBIAN_DEV_PACKAGE_SECTION libdevel)
-set(CPACK_DEBIAN_DEV_PACKAGE_DEPENDS "libeigen3-dev, libprotobuf-dev, libsodium-dev")
+set(CPACK_DEBIAN_DEV_PACKAGE_DEPENDS "libeigen3-dev, libprotobuf-dev, libsodium-dev, libsystemd-dev")
 set(CPACK_DEBIAN_DEV_DESCRIPTION "Library to write a physics engine for the Tendon haptics server
  A session over UDP, newest pose wins, one callback: position in, force out.")
 include(CPack)

@@ -423,6 +423,15 @@ void declare_scene(Table& scene, Draft& draft) {
              "names of the keys (without keys: of the clients) that may take a channel from its holder at once");
   });
 
+  scene.part("discovery", draft.scene.discovery, [](Table& keys, Scene::Discovery& discovery) {
+    keys.key("announce", discovery.announce, YesNo{},
+             "announces this device on the local network by DNS-SD, service _tendon._udp, where avahi-daemon runs; "
+             "clients find it by --server dns-sd:NAME. Whoever listens learns that it is there; only a key lets in",
+             kRequired);
+    keys.key("name", discovery.name, InstanceName{}, "the NAME of that. A taken one is followed by \"NAME #2\"",
+             Absent{.text = "\"DEVICE at HOST\", of this device and this machine"});
+  });
+
   scene.part("recording", draft.scene.recording, [](Table& keys, Scene::Recording& recording) {
     keys.key(
         "path", recording.path, Path{},

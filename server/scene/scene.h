@@ -58,6 +58,12 @@ struct Scene {
     double datagram_bytes_per_s = 4e6;
   };
 
+  /// How clients find this device by name (DNS-SD); see Announcer.
+  struct Discovery {
+    bool announce = false;
+    std::string name;  ///< empty: "NAME at HOST", of the device and the machine
+  };
+
   /// How this device finds the one that it is coupled to; the law is loop.control.coupling.
   struct Teleoperation {
     std::optional<Address> dial;               ///< empty: the peer dials this server
@@ -85,6 +91,7 @@ struct Scene {
   bool has_network = false;                    ///< the file has a table [network]
   std::optional<Teleoperation> teleoperation;  ///< empty: the device is not coupled
   std::optional<Recording> recording;          ///< empty: nothing is recorded
+  std::optional<Discovery> discovery{};        ///< empty: nothing is announced
   std::string text;  ///< for the recording: the file, whole; with settings, the scene that they make
 
   /// The row of its device.

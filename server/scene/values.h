@@ -20,6 +20,7 @@
 
 #include "core/base/motion.h"
 #include "core/base/time.h"
+#include "protocol/discovery.h"
 #include "protocol/limits.h"
 #include "protocol/link.h"
 
@@ -263,6 +264,22 @@ struct Label {
     const bool good = text != nullptr && !(*text)->empty() && (*text)->size() <= limits::kMaxLabel &&
                       std::all_of((*text)->begin(), (*text)->end(), in_a_label);
     if (!good) return Refusal{&node, expected(unit)};
+    to = **text;
+    return {};
+  }
+
+  static std::string shown(const Unit&, const std::string& value) { return in_quotes(value); }
+};
+
+/// A name by which DNS-SD finds a device.
+struct InstanceName {
+  static std::string expected(const Unit&) {
+    return "a name of 1 to " + std::to_string(dns_sd::kMaxName) + " bytes like \"falcon at bench 3\"";
+  }
+
+  static Verdict take(const toml::node& node, const Unit& unit, std::string& to) {
+    const auto* text = node.as_string();
+    if (text == nullptr || !dns_sd::is_instance_name(**text)) return Refusal{&node, expected(unit)};
     to = **text;
     return {};
   }

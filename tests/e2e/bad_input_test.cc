@@ -115,6 +115,10 @@ TEST(BadInput, OfTheInjectorIsAnsweredWithWhatIsWrongAndExitCode2) {
            "tendon-inject",
            {"--listen", "127.0.0.1:0", "--to", "haptics"},
            {"--to", "HOST:PORT"}},
+          {"name of DNS-SD, without a key",
+           "tendon-inject",
+           {"--listen", "127.0.0.1:0", "--to", "dns-sd:falcon"},
+           {"--to", "HOST:PORT", "no key"}},
           {"a count without a dry run", "tendon-inject", with("--count", "5"), {"--count", "--dry-run"}},
           {"unknown option", "tendon-inject", with("--lose", "2%"), {"--lose"}},
       });
@@ -125,6 +129,7 @@ TEST(BadInput, OfAClientIsAnsweredWithWhatIsWrongAndExitCode2) {
   std::vector<BadInput> inputs;
   for (const std::string client : {"virtual_wall", "echo_motion"}) {
     inputs.push_back({"bad address", client, {"--server", "there"}, {"--server", "expected HOST:PORT", "there"}});
+    inputs.push_back({"bad name", client, {"--server", "dns-sd:a."}, {"--server", "expected NAME", "a domain"}});
     inputs.push_back({"port too high", client, {"--server", "127.0.0.1:70000"}, {"--server", "127.0.0.1:70000"}});
     inputs.push_back({"negative rate", client, {"--rate-hz", "-1"}, {"--rate-hz", "-1"}});
     inputs.push_back({"unknown option", client, {"--sevrer", "127.0.0.1:47100"}, {"--sevrer"}});

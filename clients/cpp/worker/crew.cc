@@ -90,7 +90,7 @@ File listen_at_path(const std::string& path) {
 
 /// Listens at `name`, whose port may be 0, and puts the port in use into it.
 File listen_at(const ServerName& name, std::uint16_t& port) {
-  const Address address = name.look_up().front();
+  const Address address = name.look_up().addresses.front();
   if (address.ip == parse_address("0.0.0.0:0").ip || address.ip == Address{}.ip) {
     throw std::runtime_error("listen: expected the address by which workers reach this machine, got " + name.text());
   }

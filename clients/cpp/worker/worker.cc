@@ -47,7 +47,7 @@ int connect_to_path(const std::string& path) {
 }
 
 int connect_to_host(const std::string& name) {
-  for (const Address& address : ServerName(name).look_up()) {
+  for (const Address& address : ServerName(name).look_up().addresses) {
     sockaddr_in6 to{};
     to.sin6_family = AF_INET6;
     to.sin6_port = htons(address.port);

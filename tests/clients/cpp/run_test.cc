@@ -29,7 +29,7 @@ TEST(Run, TriesEachAddressOfANameInItsTurn) {
   testing::internal::CaptureStderr();
   EXPECT_EQ(run(options, [](const DeviceState&) { return Vec3(0, 0, 0); }), 1);
   const std::string said = testing::internal::GetCapturedStderr();
-  for (const Address& address : options.server.look_up()) {
+  for (const Address& address : options.server.look_up().addresses) {
     EXPECT_NE(said.find("no answer from LOCALHOST:9 (" + to_string(address) + ")"), std::string::npos) << said;
   }
 }

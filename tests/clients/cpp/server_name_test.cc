@@ -14,19 +14,19 @@ namespace {
 TEST(ServerName, AnAddressIsItsOwn) {
   for (const std::string text : {"127.0.0.1:47100", "[::1]:5000", "192.0.2.7:0"}) {
     const ServerName name(text);
-    ASSERT_EQ(name.look_up().size(), 1U) << text;
-    EXPECT_EQ(to_string(name.look_up().front()), text);
-    EXPECT_EQ(name.at(name.look_up().front()), text);
+    ASSERT_EQ(name.look_up().addresses.size(), 1U) << text;
+    EXPECT_EQ(to_string(name.look_up().addresses.front()), text);
+    EXPECT_EQ(name.at(name.look_up().addresses.front()), text);
   }
 }
 
 TEST(ServerName, LocalhostIsThisMachine) {
-  EXPECT_EQ(to_string(ServerName("localhost:47100").look_up().front()), "127.0.0.1:47100");
+  EXPECT_EQ(to_string(ServerName("localhost:47100").look_up().addresses.front()), "127.0.0.1:47100");
 }
 
 TEST(ServerName, TheSystemLooksAHostNameUp) {
   // Neither numeric nor "localhost" as parse_address() reads them: /etc/hosts answers.
-  const auto addresses = ServerName("LOCALHOST:47100").look_up();
+  const auto addresses = ServerName("LOCALHOST:47100").look_up().addresses;
   ASSERT_FALSE(addresses.empty());
   for (const Address& address : addresses) {
     EXPECT_TRUE(is_loopback(address)) << to_string(address);

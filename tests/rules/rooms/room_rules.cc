@@ -77,17 +77,21 @@ const std::vector<Door>& front_doors() {
       // What programs and their libraries print and pages read: no haptic thread writes JSON.
       {"nlohmann's JSON",
        {"nlohmann/"},
-       {"server/commands/", "server/main.cc", "clients/cpp/engine/self_test.cc", "clients/cpp/run.cc",
-        "clients/dashboard/page_json.cc", "clients/dashboard/foxglove_text.cc", "clients/plug/desk.cc",
-        "clients/plug/inverse/inverse_json.cc", "clients/softbody/cluster/estimate.cc", "clients/softbody/explain.cc",
-        "*_main.cc"}},
+       {"server/commands/", "server/main.cc", "clients/cpp/discovery/list.cc", "clients/cpp/engine/self_test.cc",
+        "clients/cpp/run.cc", "clients/dashboard/page_json.cc", "clients/dashboard/foxglove_text.cc",
+        "clients/plug/desk.cc", "clients/plug/inverse/inverse_json.cc", "clients/softbody/cluster/estimate.cc",
+        "clients/softbody/explain.cc", "*_main.cc"}},
       {"PETSc", {"petscksp.h"}, {"clients/softbody/mpi/spread_solver.cc"}},
       {"preCICE", {"precice/"}, {"clients/precice/precice_engine.cc", "tests/clients/precice/"}},
       {"prometheus-cpp", {"prometheus/"}, {"clients/dashboard/metrics.cc"}},
       {"protobuf",
        {"google/protobuf/", "*.pb.h", "protocol/wire/fields.h", "protocol/wire/frame_codec.h"},
        {"protocol/wire/", "server/recording/recording_codec.cc", "clients/dashboard/foxglove_message.cc"}},
-      {"libsystemd", {"systemd/"}, {"server/machine/service.cc"}},
+      // The C library's own resolver, for records that getaddrinfo() does not know.
+      {"libresolv", {"resolv.h"}, {"clients/cpp/discovery/unicast.cc"}},
+      {"libsystemd",
+       {"systemd/"},
+       {"server/machine/announcer.cc", "server/machine/service.cc", "clients/cpp/discovery/avahi.cc"}},
       {"Spectra", {"Spectra/"}, {"clients/softbody/fem/spectrum.cc"}},
       {"spdlog", {"spdlog/"}, {"server/machine/log.cc"}},
       {"toml++", {"toml++/"}, {"server/scene/", "clients/softbody/scene.cc"}},
@@ -180,8 +184,8 @@ struct Include {
 bool is_cpp(std::string_view path) { return path.ends_with(".h") || path.ends_with(".cc"); }
 
 bool is_source(const File& file) {
-  return one_of(file.path, {"*.h", "*.cc", "*.in", "*.proto", "*.cmake", "*CMakeLists.txt", "*.mjs", "*.js", "*.ts",
-                            "*.py", "*.sh", "*.toml"}) ||
+  return one_of(file.path, {"*.h", "*.cc", "*.h.in", "*.cc.in", "*.cmake.in", "*.proto", "*.cmake", "*CMakeLists.txt",
+                            "*.mjs", "*.js", "*.ts", "*.py", "*.sh", "*.toml"}) ||
          file.text.starts_with("#!");
 }
 

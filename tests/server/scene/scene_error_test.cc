@@ -123,7 +123,7 @@ TEST(SceneError, FindsAnUnknownKeyInEveryTable) {
   }
   EXPECT_EQ(error_of_minimal_and("[other]\nzzzzzz = 1\n"),
             "s.toml:4: other: unknown table; known here: device, loop, safety, limiter, admittance, force, channel, "
-            "teleoperation, network, recording");
+            "teleoperation, network, discovery, recording");
 }
 
 TEST(SceneError, TheKeysOfOneKindOfMotionAreUnknownToAnother) {
@@ -169,6 +169,8 @@ TEST(SceneError, TellsWhatWasExpectedAndWhatWasFound) {
       {"start_position_mm = [1,\n 2, \"3\"]\n",
        "s.toml:5: device.start_position_mm: expected a number of mm, found \"3\""},
       {"start_position_mm = [1, nan, 2]\n", "s.toml:4: device.start_position_mm: expected a number of mm, found nan"},
+      {"[discovery]\nannounce = true\nname = \"\"\n",
+       "s.toml:6: discovery.name: expected a name of 1 to 63 bytes like \"falcon at bench 3\", found \"\""},
       {"[recording]\npath = 3\n", "s.toml:5: recording.path: expected a path in quotes, found 3"},
       {"[recording]\npath = \"\"\n", "s.toml:5: recording.path: expected a path in quotes, found \"\""},
       {"[network]\nmax_observers = 2.5\n",
@@ -257,6 +259,7 @@ TEST(SceneError, NamesWhatIsMissing) {
             "s.toml:1: device.effects.mass_kg: missing, expected a number above 0 kg");
   expect_errors({
       {"[recording]\n", "s.toml:4: recording.path: missing, expected a path in quotes"},
+      {"[discovery]\n", "s.toml:4: discovery.announce: missing, expected true or false"},
       {"[device.hand]\n", "s.toml:4: device.hand.stiffness_n_per_m: missing, expected a number above 0 N/m"},
       {"[device.hand]\nstiffness_n_per_m = 1\n",
        "s.toml:4: device.hand.motion.kind: missing, expected one of \"sine\", \"ramp-hold\", \"minimum-jerk\", "
@@ -412,8 +415,7 @@ TEST(SceneError, SurvivesTheDeepestNestingThatFits) {
   while (deep.size() + 4 < kMaxSceneBytes) deep += ".a";
   EXPECT_EQ(error_of(deep + "]\n"),
             "s.toml:1: a: unknown table; known here: device, loop, safety, limiter, admittance, force, channel, "
-            "teleoperation, network, "
-            "recording");
+            "teleoperation, network, discovery, recording");
   EXPECT_TRUE(error_of("a = " + std::string(16'000, '[')).starts_with("s.toml:1: not TOML: "));
 }
 

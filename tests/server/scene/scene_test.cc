@@ -83,6 +83,7 @@ TEST(Scene, TakesWhatItDoesNotSayFromTheProfileAndTheStructs) {
   EXPECT_EQ(scene.network.controller_timeout, NetworkLoop::Config{}.controller_timeout);
   EXPECT_EQ(scene.network.observer_timeout, NetworkLoop::Config{}.observer_timeout);
   EXPECT_FALSE(scene.recording);
+  EXPECT_FALSE(scene.discovery);
   EXPECT_EQ(scene.text, kMinimal);
 }
 
@@ -135,6 +136,10 @@ max_observers = 3
 controller_timeout_ms = 1500
 observer_timeout_ms = 2500
 adapt_state_rate = true
+[discovery]
+announce = true
+name = "falcon at bench 3"
+
 [recording]
 path = "run.mcap"
 rotate_mb = 50
@@ -181,6 +186,9 @@ datagrams_kb_per_s = 100
   EXPECT_EQ(scene.network.controller_timeout, 1500ms);
   EXPECT_EQ(scene.network.observer_timeout, 2500ms);
   EXPECT_TRUE(scene.network.adapt_state_rate);
+  ASSERT_TRUE(scene.discovery);
+  EXPECT_TRUE(scene.discovery->announce);
+  EXPECT_EQ(scene.discovery->name, "falcon at bench 3");
   ASSERT_TRUE(scene.recording);
   EXPECT_EQ(scene.recording->path, "run.mcap");
   EXPECT_DOUBLE_EQ(scene.recording->rotate_bytes, 50e6);

@@ -265,6 +265,10 @@ LiveTask live_task(Said said) {
   LiveRun& run = task.run;
   run.listen = parse_option<Address>("--listen", said.listen);
   run.server = parse_option<ServerName>("--to", said.to);
+  if (run.server.instance()) {
+    throw std::invalid_argument("--to: expected HOST:PORT, got \"" + said.to +
+                                "\": a proxy has no key, and only a key tells whose a name of DNS-SD is");
+  }
   if (!is_loopback(run.listen) && !said.open_to_network) {
     throw std::invalid_argument("refusing to listen on " + said.listen +
                                 ": anyone on the network could send to the server through this proxy; use a loopback "

@@ -105,7 +105,7 @@ class DriverThread {
 
 /// The first address of the server's name that this machine can send to.
 Address address_of(const LiveRun& options) {
-  const std::vector<Address> addresses = options.server.look_up();
+  const std::vector<Address> addresses = options.server.look_up().addresses;
   if (addresses.front().port == 0) {
     throw std::invalid_argument("--to: expected a port other than 0, got " + options.server.text());
   }

@@ -1,0 +1,318 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Avahi over D-Bus (org.freedesktop.Avahi.Server.xml and EntryGroup.xml of Avahi 0.8).
+#include "server/machine/announcer.h"
+
+#include <ifaddrs.h>
+#include <net/if.h>
+#include <netinet/in.h>
+#include <sys/epoll.h>
+#include <systemd/sd-bus.h>
+#include <systemd/sd-event.h>
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <ctime>
+#include <deque>
+#include <stdexcept>
+#include <string_view>
+#include <system_error>
+#include <utility>
+
+#include "server/machine/doorbell.h"
+
+namespace tendon {
+namespace {
+
+constexpr const char* kAvahi = "org.freedesktop.Avahi";
+constexpr const char* kServer = "org.freedesktop.Avahi.Server";
+constexpr const char* kEntryGroup = "org.freedesktop.Avahi.EntryGroup";
+constexpr int kAnyInterface = -1;
+constexpr int kIpv4 = 0;
+constexpr int kIpv6 = 1;
+
+// What EntryGroup.StateChanged tells.
+constexpr int kEstablished = 2;
+constexpr int kCollision = 3;
+constexpr int kFailure = 4;
+// What Server.StateChanged tells.
+constexpr int kRunning = 2;
+
+/// µs until the next try to reach a D-Bus system bus; the bus itself tells when avahi-daemon comes and goes.
+constexpr std::uint64_t kTryAgain = 5'000'000;
+/// Names that are tried for one device: more hosts that take each of them are an attack.
+constexpr int kMostNames = 100;
+
+struct Release {
+  void operator()(sd_event* loop) const { sd_event_unref(loop); }
+  void operator()(sd_bus* bus) const { sd_bus_close_unref(bus); }
+  void operator()(sd_bus_message* message) const { sd_bus_message_unref(message); }
+  void operator()(sd_bus_slot* question) const { sd_bus_slot_unref(question); }
+};
+
+bool same_ip(const sockaddr* address, const Address& ours) {
+  if (address == nullptr) return false;
+  if (address->sa_family == AF_INET && is_ipv4(ours)) {
+    sockaddr_in v4{};
+    std::memcpy(&v4, address, sizeof v4);
+    return std::memcmp(&v4.sin_addr, &ours.ip[12], 4) == 0;
+  }
+  if (address->sa_family != AF_INET6) return false;
+  sockaddr_in6 v6{};
+  std::memcpy(&v6, address, sizeof v6);
+  return std::memcmp(&v6.sin6_addr, ours.ip.data(), ours.ip.size()) == 0;
+}
+
+/// The number of the interface that has this address; all when none has.
+int interface_of(const Address& address) {
+  ifaddrs* all = nullptr;
+  if (::getifaddrs(&all) != 0) return kAnyInterface;
+  const std::unique_ptr<ifaddrs, decltype(&::freeifaddrs)> owner(all, &::freeifaddrs);
+  for (const ifaddrs* one = all; one != nullptr; one = one->ifa_next) {
+    if (same_ip(one->ifa_addr, address)) return static_cast<int>(::if_nametoindex(one->ifa_name));
+  }
+  return kAnyInterface;
+}
+
+}  // namespace
+
+class Announcer::Avahi {
+ public:
+  Avahi(std::vector<Device> devices, const Address& listen, Say say)
+      : port_(listen.port),
+        interface_(interface_of(listen)),
+        protocol_(is_ipv4(listen) ? kIpv4 : kIpv6),
+        say_(std::move(say)) {
+    for (Device& device : devices) entries_.push_back({.avahi = this, .device = std::move(device)});
+    sd_event* loop = nullptr;
+    if (sd_event_new(&loop) < 0) throw std::runtime_error("[discovery] announce: the system gives no event loop");
+    loop_.reset(loop);
+    if (sd_event_add_io(loop, nullptr, end_.fd(), EPOLLIN, on_end, nullptr) < 0) {
+      throw std::runtime_error("[discovery] announce: the system gives no event loop");
+    }
+  }
+
+  void run() {
+    open();
+    sd_event_loop(loop_.get());
+    close();
+  }
+  void stop() noexcept { end_.ring(); }
+
+ private:
+  /// One device, and where Avahi has it.
+  struct Entry {
+    Avahi* avahi;
+    Device device;
+    std::string name{};   ///< announced or tried
+    std::string group{};  ///< D-Bus path of its entry group; empty: none yet
+    int attempt = 1;
+    std::unique_ptr<sd_bus_slot, Release> question{};  ///< the answer to an earlier one does not matter any more
+  };
+
+  static int on_end(sd_event_source* source, int, std::uint32_t, void*) noexcept {
+    return sd_event_exit(sd_event_source_get_event(source), 0);
+  }
+  static int on_time(sd_event_source*, std::uint64_t, void* self) noexcept {
+    static_cast<Avahi*>(self)->open();
+    return 0;
+  }
+  static int on_bus_lost(sd_bus_message*, void* self, sd_bus_error*) noexcept {
+    static_cast<Avahi*>(self)->no_bus("it has ended the connection");
+    return 0;
+  }
+  static int on_owner(sd_bus_message* signal, void* self, sd_bus_error*) noexcept {
+    static_cast<Avahi*>(self)->owner_changed(signal);
+    return 0;
+  }
+  static int on_server(sd_bus_message* signal, void* self, sd_bus_error*) noexcept {
+    std::int32_t state = 0;
+    // Its host name may be another one now.
+    if (sd_bus_message_read(signal, "i", &state) > 0 && state == kRunning) static_cast<Avahi*>(self)->announce();
+    return 0;
+  }
+  static int on_group(sd_bus_message* signal, void* self, sd_bus_error*) noexcept {
+    static_cast<Avahi*>(self)->group_changed(signal);
+    return 0;
+  }
+  static int on_new_group(sd_bus_message* answer, void* entry, sd_bus_error*) noexcept {
+    Entry& one = *static_cast<Entry*>(entry);
+    one.avahi->group_made(one, answer);
+    return 0;
+  }
+  static int on_added(sd_bus_message* answer, void* entry, sd_bus_error*) noexcept {
+    Entry& one = *static_cast<Entry*>(entry);
+    one.avahi->added(one, answer);
+    return 0;
+  }
+
+  void say(bool warning, const std::string& sentence) {
+    if (warning && sentence == said_) return;
+    said_ = warning ? sentence : std::string();
+    say_(warning, sentence);
+  }
+
+  void lost(const std::string& why) {
+    say(true, "not announced by [discovery]: " + why +
+                  ". Expected a running avahi-daemon; clients find this server by " + "its address all the same");
+  }
+
+  /// Tries again later: this may be a callback of the bus.
+  void no_bus(const std::string& why) {
+    lost("there is no D-Bus system bus (" + why + ")");
+    if (waits_) return;
+    waits_ = sd_event_add_time_relative(loop_.get(), nullptr, CLOCK_MONOTONIC, kTryAgain, 0, on_time, this) >= 0;
+  }
+
+  /// Avahi then takes back what we have announced.
+  void close() {
+    for (Entry& entry : entries_) {
+      entry.group.clear();
+      entry.question.reset();
+    }
+    bus_.reset();
+  }
+
+  void open() {
+    waits_ = false;
+    close();
+    sd_bus* bus = nullptr;
+    if (const int error = sd_bus_open_system(&bus); error < 0) return no_bus(std::generic_category().message(-error));
+    bus_.reset(bus);
+    sd_bus_match_signal(bus, nullptr, "org.freedesktop.DBus.Local", "/org/freedesktop/DBus/Local",
+                        "org.freedesktop.DBus.Local", "Disconnected", on_bus_lost, this);
+    sd_bus_match_signal_async(bus, nullptr, "org.freedesktop.DBus", "/org/freedesktop/DBus", "org.freedesktop.DBus",
+                              "NameOwnerChanged", on_owner, nullptr, this);
+    sd_bus_match_signal_async(bus, nullptr, kAvahi, "/", kServer, "StateChanged", on_server, nullptr, this);
+    sd_bus_match_signal_async(bus, nullptr, kAvahi, nullptr, kEntryGroup, "StateChanged", on_group, nullptr, this);
+    if (sd_bus_attach_event(bus, loop_.get(), 0) < 0) return no_bus("it is gone");
+    announce();
+  }
+
+  /// All devices, anew.
+  void announce() {
+    for (Entry& entry : entries_) {
+      if (!entry.group.empty()) tell(entry, "Free");
+      entry.group.clear();
+      entry.attempt = 1;
+      entry.name = entry.device.name;
+      sd_bus_slot* question = nullptr;
+      sd_bus_call_method_async(bus_.get(), &question, kAvahi, "/", kServer, "EntryGroupNew", on_new_group, &entry,
+                               nullptr);
+      entry.question.reset(question);
+    }
+  }
+
+  void tell(const Entry& entry, const char* what) {
+    sd_bus_call_method_async(bus_.get(), nullptr, kAvahi, entry.group.c_str(), kEntryGroup, what, nullptr, nullptr,
+                             nullptr);
+  }
+
+  void group_made(Entry& entry, sd_bus_message* answer) {
+    const char* path = nullptr;
+    if (sd_bus_message_is_method_error(answer, nullptr) > 0 || sd_bus_message_read(answer, "o", &path) < 0) {
+      return refused(answer);
+    }
+    entry.group = path;
+    add(entry);
+  }
+
+  void add(Entry& entry) {
+    sd_bus_message* made = nullptr;
+    if (sd_bus_message_new_method_call(bus_.get(), &made, kAvahi, entry.group.c_str(), kEntryGroup, "AddService") < 0) {
+      return no_bus("it is gone");
+    }
+    const std::unique_ptr<sd_bus_message, Release> message(made);
+    // An empty domain and host: those of avahi-daemon.
+    sd_bus_message_append(made, "iiussssq", interface_, protocol_, 0U, entry.name.c_str(), dns_sd::kService, "", "",
+                          port_);
+    sd_bus_message_open_container(made, 'a', "ay");
+    for (const std::string& text : dns_sd::to_txt(entry.device.about)) {
+      sd_bus_message_append_array(made, 'y', text.data(), text.size());
+    }
+    sd_bus_message_close_container(made);
+    sd_bus_slot* question = nullptr;
+    sd_bus_call_async(bus_.get(), &question, made, on_added, &entry, 0);
+    entry.question.reset(question);
+  }
+
+  void added(Entry& entry, sd_bus_message* answer) {
+    if (sd_bus_message_is_method_error(answer, "org.freedesktop.Avahi.CollisionError") > 0) return rename(entry);
+    if (sd_bus_message_is_method_error(answer, nullptr) > 0) return refused(answer);
+    tell(entry, "Commit");
+  }
+
+  /// By another name, which the network may or may not have.
+  void rename(Entry& entry) {
+    if (++entry.attempt > kMostNames) return lost(std::to_string(kMostNames) + " names are taken on this network");
+    entry.name = dns_sd::another_name(entry.device.name, entry.attempt);
+    add(entry);
+  }
+
+  void refused(sd_bus_message* answer) {
+    const sd_bus_error* error = sd_bus_message_get_error(answer);
+    const char* why = error == nullptr ? "no answer" : error->message != nullptr ? error->message : error->name;
+    lost(std::string("avahi-daemon does not take it (") + why + ")");
+  }
+
+  void owner_changed(sd_bus_message* signal) {
+    std::array<const char*, 3> names{};
+    if (sd_bus_message_read(signal, "sss", &names[0], &names[1], &names[2]) <= 0) return;
+    if (std::string_view(names[0]) != kAvahi) return;
+    if (*names[2] == '\0') {
+      for (Entry& entry : entries_) entry.group.clear();
+      return lost("avahi-daemon has ended");
+    }
+    announce();
+  }
+
+  void group_changed(sd_bus_message* signal) {
+    const char* const path = sd_bus_message_get_path(signal);
+    const auto entry = std::find_if(entries_.begin(), entries_.end(),
+                                    [path](const Entry& one) { return path != nullptr && one.group == path; });
+    std::int32_t state = 0;
+    const char* error = nullptr;
+    if (entry == entries_.end() || sd_bus_message_read(signal, "is", &state, &error) <= 0) return;
+    if (state == kEstablished) {
+      say(false, "announced as \"" + entry->name + "\" (" + dns_sd::kService + ", port " + std::to_string(port_) + ")" +
+                     (entry->attempt > 1 ? ", because \"" + entry->device.name + "\" is taken" : ""));
+    } else if (state == kCollision) {
+      tell(*entry, "Reset");
+      rename(*entry);
+    } else if (state == kFailure) {
+      lost(std::string("avahi-daemon gives it up (") + error + ")");
+    }
+  }
+
+  std::uint16_t port_;
+  int interface_;
+  int protocol_;
+  Say say_;
+  std::string said_;  ///< the last warning, until something is announced
+  bool waits_ = false;
+  Doorbell end_;
+  std::unique_ptr<sd_event, Release> loop_;
+  std::unique_ptr<sd_bus, Release> bus_;
+  std::deque<Entry> entries_;  // which stay where they are: answers come to them
+};
+
+Announcer::Announcer(std::vector<Device> devices, const Address& listen, Say say) {
+  if (is_loopback(listen)) {
+    throw std::runtime_error(
+        "[discovery] announce: the server listens on " + to_string(listen) +
+        ", which no other machine reaches; expected [network] with listen = \"0.0.0.0:47100\", or " +
+        "another address of this machine, and keys");
+  }
+  avahi_ = std::make_unique<Avahi>(std::move(devices), listen, std::move(say));
+}
+
+Announcer::~Announcer() = default;
+
+void Announcer::run() { avahi_->run(); }
+
+void Announcer::stop() noexcept { avahi_->stop(); }
+
+}  // namespace tendon
