@@ -1,15 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
 # What `cmake --install` brings, and the Debian packages that `cpack` makes of it: `tendon`, to run; `tendon-plug`, for the
 # machine of a program that exists already, which needs nothing else; `libtendon-dev`, to write an engine with:
-# find_package(tendon), tendon::client; and `tendon-fem`, which alone needs PETSc and MPI, where they are.
+# find_package(tendon), tendon::client; and `tendon-fem-worker`, which alone needs PETSc and MPI, where they are.
 # Sweeps and the shipping of recordings are in `tendon`: they need nothing more, and its image is the one that a sweep's job runs.
 include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
 
 set(programs tendond tendon-inject tendon-softbody tendon-lab tendon-report tendon-identify tendon-replay tendon-conformance
-    tendon-sweep tendon-worlds)
-install(TARGETS tendond tendon-softbody tendon-lab tendon-report tendon-identify tendon-replay tendon-sweep tendon-worlds
-        COMPONENT programs)
+    tendon-fem tendon-sweep tendon-worlds)
+install(TARGETS tendond tendon-softbody tendon-lab tendon-report tendon-identify tendon-replay tendon-fem tendon-sweep
+        tendon-worlds COMPONENT programs)
 install(DIRECTORY deploy/scenes/ DESTINATION ${CMAKE_INSTALL_DATADIR}/tendon/scenes COMPONENT programs
         FILES_MATCHING PATTERN "*.toml" PATTERN "*.msh")
 install(FILES README.md CHANGELOG.md LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT programs)
@@ -23,9 +23,9 @@ endif()
 set(ship ${CMAKE_RUNTIME_OUTPUT_DIRECTORY}/tendon-ship)
 configure_file(deploy/recordings/ship ${ship} COPYONLY)
 install(PROGRAMS ${ship} DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT programs)
-if(TARGET tendon-fem)
-  install(TARGETS tendon-fem COMPONENT fem)
-  install(FILES LICENSE DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/tendon-fem COMPONENT fem)
+if(TARGET tendon-fem-worker)
+  install(TARGETS tendon-fem-worker COMPONENT worker)
+  install(FILES LICENSE DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/tendon-fem-worker COMPONENT worker)
 endif()
 install(TARGETS tendon-plug COMPONENT plug)
 # Where the program looks for them: beside its own folder.
@@ -72,8 +72,8 @@ foreach(program ${programs})
 endforeach()
 describe_program(tendon-ship programs ${ship})
 describe_program(tendon-plug plug)
-if(TARGET tendon-fem)
-  describe_program(tendon-fem fem)
+if(TARGET tendon-fem-worker)
+  describe_program(tendon-fem-worker worker)
 endif()
 add_custom_target(man ALL DEPENDS ${pages})
 
@@ -112,8 +112,8 @@ set(CPACK_PACKAGE_DIRECTORY ${CMAKE_CURRENT_BINARY_DIR}/packages)
 set(CPACK_STRIP_FILES ON)
 set(CPACK_DEB_COMPONENT_INSTALL ON)
 set(CPACK_COMPONENTS_ALL programs machine injector conformance plug development)
-if(TARGET tendon-fem)
-  list(APPEND CPACK_COMPONENTS_ALL fem)
+if(TARGET tendon-fem-worker)
+  list(APPEND CPACK_COMPONENTS_ALL worker)
 endif()
 set(CPACK_COMPONENT_PROGRAMS_GROUP run)
 set(CPACK_COMPONENT_MACHINE_GROUP run)
@@ -121,13 +121,13 @@ set(CPACK_COMPONENT_INJECTOR_GROUP run)
 set(CPACK_COMPONENT_CONFORMANCE_GROUP run)
 set(CPACK_COMPONENT_PLUG_GROUP plug)
 set(CPACK_COMPONENT_DEVELOPMENT_GROUP dev)
-set(CPACK_COMPONENT_FEM_GROUP fem)
+set(CPACK_COMPONENT_WORKER_GROUP worker)
 set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
 set(CPACK_DEBIAN_RUN_PACKAGE_NAME tendon)
 set(CPACK_DEBIAN_RUN_PACKAGE_SECTION science)
 set(CPACK_DEBIAN_RUN_PACKAGE_SHLIBDEPS ON)
 set(CPACK_DEBIAN_RUN_PACKAGE_RECOMMENDS gnuplot-nox)
-set(CPACK_DEBIAN_RUN_PACKAGE_SUGGESTS rclone)
+set(CPACK_DEBIAN_RUN_PACKAGE_SUGGESTS "rclone, tendon-fem-worker")
 set(CPACK_DEBIAN_RUN_DESCRIPTION "Networked haptics server with an energy-bounding output limiter
  Runs the loop of a haptic device at 1 kHz and bounds every force so that the device never gives out more energy than it took in,
  while physics engines anywhere on the network send forces late, rarely or wrong.")
@@ -138,12 +138,12 @@ set(CPACK_DEBIAN_PLUG_PACKAGE_SHLIBDEPS ON)
 set(CPACK_DEBIAN_PLUG_DESCRIPTION "Haptic devices of a Tendon server for programs that exist already
  Runs beside a program that knows CHAI3D, VRPN, Inverse-compatible JSON or ROS 2, and gives it the device of a Tendon server
  anywhere on the network, behind an output limiter that bounds its energy.")
-set(CPACK_DEBIAN_FEM_PACKAGE_NAME tendon-fem)
-set(CPACK_DEBIAN_FEM_PACKAGE_SECTION science)
-set(CPACK_DEBIAN_FEM_PACKAGE_SHLIBDEPS ON)
-set(CPACK_DEBIAN_FEM_PACKAGE_DEPENDS openmpi-bin)
-set(CPACK_DEBIAN_FEM_DESCRIPTION "Large soft bodies for the Tendon haptics server, by PETSc on MPI
- Spreads the finite elements of a soft body that a hand touches over the cores of many machines.")
+set(CPACK_DEBIAN_WORKER_PACKAGE_NAME tendon-fem-worker)
+set(CPACK_DEBIAN_WORKER_PACKAGE_SECTION science)
+set(CPACK_DEBIAN_WORKER_PACKAGE_SHLIBDEPS ON)
+set(CPACK_DEBIAN_WORKER_PACKAGE_DEPENDS openmpi-bin)
+set(CPACK_DEBIAN_WORKER_DESCRIPTION "Large soft bodies for the Tendon haptics server, by PETSc on MPI
+ The workers that tendon-fem starts: they spread the finite elements of a soft body that a hand touches over many cores and machines.")
 set(CPACK_DEBIAN_DEV_PACKAGE_NAME libtendon-dev)
 set(CPACK_DEBIAN_DEV_PACKAGE_SECTION libdevel)
 set(CPACK_DEBIAN_DEV_PACKAGE_DEPENDS "libeigen3-dev, libprotobuf-dev, libsodium-dev")
