@@ -1,16 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <array>
 #include <cctype>
 #include <cerrno>
 #include <csignal>
+#include <cstddef>
+#include <cstdint>
 #include <ctime>
 #include <exception>
 #include <filesystem>
 #include <fstream>
 #include <iostream>
+#include <mutex>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <span>
 #include <string>
 #include <utility>
 #include <variant>
@@ -39,9 +44,53 @@ using namespace tendon;
 
 using Json = nlohmann::ordered_json;
 
-/// A line on stdout.
-void print(const Json& object) {
-  std::cout << object.dump(-1, ' ', false, Json::error_handler_t::replace) << std::endl;
+/// The lines of --json on stdout. Thread-safe.
+class Lines {
+ public:
+  /// What was added before follows.
+  void begin(const Json& first) {
+    const std::scoped_lock lock(mutex_);
+    write(first);
+    for (const Json& line : std::exchange(early_, {})) write(line);
+    begun_ = true;
+  }
+  void add(const Json& line) {
+    const std::scoped_lock lock(mutex_);
+    begun_ ? write(line) : early_.push_back(line);
+  }
+
+ private:
+  static void write(const Json& line) {
+    std::cout << line.dump(-1, ' ', false, Json::error_handler_t::replace) << std::endl;
+  }
+
+  std::mutex mutex_;
+  bool begun_ = false;
+  std::vector<Json> early_;
+};
+
+/// A session's name among those of all servers: 32 hexadecimal digits, as traces have them. `run` is random, of this run
+/// of the server; the last eight digits are the connection id, by which its datagrams are found in a recording.
+std::string session_name(std::span<const std::byte> run, std::uint32_t connection) {
+  std::string name;
+  const auto add = [&name](unsigned byte) {
+    for (const unsigned digit : {byte >> 4U, byte & 0xfU}) name += "0123456789abcdef"[digit];
+  };
+  for (const std::byte byte : run) add(std::to_integer<unsigned>(byte));
+  for (const unsigned shift : {24U, 16U, 8U, 0U}) add(connection >> shift & 0xffU);
+  return name;
+}
+
+Json in_json(const NetworkLoop::SessionChange& change, std::span<const std::byte> run) {
+  Json line = {{"event", change.came ? "welcomed" : "left"},
+               {"session", session_name(run, change.connection)},
+               {"device", change.device},
+               {"tick", change.tick},
+               {"client", change.client},
+               {"role", change.role == Role::kController ? "controller" : "observer"},
+               {"address", to_string(change.address)}};
+  if (!change.came) line["why"] = change.why;
+  return line;
 }
 
 /// A year. Longer is a typo.
@@ -121,7 +170,7 @@ Json by_device(const Server::Summary& summary) {
   return devices;
 }
 
-void print_json(const Server::Summary& summary) {
+Json in_json(const Server::Summary& summary) {
   const HapticLoop::Stats haptic = total(summary.devices);
   const auto& [devices, network, recording, uptime] = summary;
   Json out = {{"event", "stopped"}};
@@ -182,7 +231,7 @@ void print_json(const Server::Summary& summary) {
     add("recording_ended_early", !recording->error.empty());
   }
   add("devices", by_device(summary));
-  print(out);
+  return out;
 }
 
 std::string what_is_missing(const PartRecorder::Status& recording) {
@@ -200,8 +249,15 @@ int run(const std::vector<Scene>& scenes, double duration_s, bool json) {
   std::signal(SIGXFSZ, SIG_IGN);
   std::signal(SIGPIPE, SIG_IGN);
 
+  // Before the server, whose threads use them.
+  Lines lines;
+  std::array<std::byte, 12> name_of_run;
+  fill_random(name_of_run);
   Server server(scenes);
   const auto recording = server.recording();
+  if (json) {
+    server.tell_sessions([&](const NetworkLoop::SessionChange& change) { lines.add(in_json(change, name_of_run)); });
+  }
   server.start(duration_s > 0 ? std::optional(from_seconds(duration_s)) : std::nullopt);
   log::info("tendond " + version_text() + " listens on " + to_string(server.address()));
   if (recording) {
@@ -212,7 +268,7 @@ int run(const std::vector<Scene>& scenes, double duration_s, bool json) {
   if (json) {
     Json listening = {{"event", "listening"}, {"address", to_string(server.address())}};
     if (recording) listening["recording"] = recording->string();
-    print(listening);
+    lines.begin(listening);
   }
   service::ready();
   const std::string why = wait_for_the_end(signals, duration_s, server);
@@ -221,7 +277,7 @@ int run(const std::vector<Scene>& scenes, double duration_s, bool json) {
   const HapticLoop::Stats haptic = total(summary.devices);
   log::info("stopped: " + why + "; " + std::to_string(haptic.steps) + " steps, " + std::to_string(haptic.overruns) +
             " overruns, " + std::to_string(summary.network.forces) + " forces");
-  if (json) print_json(summary);
+  if (json) lines.add(in_json(summary));
   if (!summary.recording || summary.recording->complete()) return 0;
   log::error("the recording is not whole: " + what_is_missing(*summary.recording));
   return 1;
@@ -355,7 +411,8 @@ int main(int argc, char** argv) {
     to.add_flag("--accept-unknown-firmware", accept_unknown_firmware, "… also one that is none of the known files");
   };
   add_firmware(app);
-  app.add_flag("--json", json, "One JSON object per line on stdout: listening, stopped");
+  app.add_flag("--json", json,
+               "One JSON object per line on stdout: listening; welcomed and left, for each session; stopped");
   app.add_flag("--profiles", profiles,
                "Print the profiles of devices and operators, and how each of their numbers is known");
   app.add_flag("--scene-help", scene_help, "Print every key that a scene may have");

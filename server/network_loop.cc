@@ -260,9 +260,11 @@ void NetworkLoop::open(LocalTime now, Guest guest) {
   }
   std::erase_if(guests_, [](const Guest& present) { return present.gone; });
   ++stats_.welcomed;
-  notice(false, "welcomed " + std::string(guest.role == Role::kController ? "controller" : "observer") + " \"" +
-                    guest.name + "\" at " + to_string(guest.address) +
-                    (guest.key != nullptr ? " with the key \"" + guest.key->name + "\"" : ""));
+  notice(false,
+         "welcomed " + std::string(guest.role == Role::kController ? "controller" : "observer") + " \"" + guest.name +
+             "\" at " + to_string(guest.address) +
+             (guest.key != nullptr ? " with the key \"" + guest.key->name + "\"" : ""),
+         change_of(guest, true, ""));
   if (guest.role == Role::kController) guest.meter.emplace(now);
   if (config_.adapt_state_rate) guest.adaptation.emplace(RateAdaptation::Config{}, now);
   guests_.push_back(std::move(guest));
@@ -628,19 +630,21 @@ void NetworkLoop::answer(LocalTime now, Guest& guest, std::uint32_t id, const Re
 void NetworkLoop::leave(Guest& guest, const std::string& how) {
   guest.gone = true;
   add(stats_.dropped, guest.session.stats());
-  notice(guest.role == Role::kController,
-         "\"" + guest.name + "\" at " + to_string(guest.address) + " has left: " + how);
+  notice(guest.role == Role::kController, "\"" + guest.name + "\" at " + to_string(guest.address) + " has left: " + how,
+         change_of(guest, false, how));
   leases_.give_all(guest.id());
   if (guest.role == Role::kController) stats_.controller_clock = guest.session.peer_clock();
 }
 
 void NetworkLoop::close(LocalTime now) {
   for (Dialled& dialled : dialled_) dialled.peer->close(now);
+  const std::string why = "the server is going down";
   for (Guest& guest : guests_) {
-    guest.session.close(Code::kShutdown, "the server is going down");
+    guest.session.close(Code::kShutdown, why);
     send_all(now, guest);
     add(stats_.dropped, guest.session.stats());
     if (guest.role == Role::kController) stats_.controller_clock = guest.session.peer_clock();
+    notice(false, "\"" + guest.name + "\" is sent away: " + why, change_of(guest, false, why));
   }
   guests_.clear();
   half_open_.clear();
@@ -697,8 +701,23 @@ void NetworkLoop::tap(LocalTime now, DatagramRecord::Direction direction, Datagr
   mail.datagrams.push();
 }
 
-void NetworkLoop::notice(bool warning, std::string text) {
-  if (notices_.size() < kMaxNotices) notices_.push_back({warning, std::move(text)});
+NetworkLoop::SessionChange NetworkLoop::change_of(const Guest& guest, bool came, const std::string& why) const {
+  SessionChange change{.connection = guest.id(),
+                       .came = came,
+                       .client = guest.name,
+                       .role = guest.role,
+                       .address = guest.address,
+                       .why = why};
+  if (!guest.views.empty()) {
+    const ServedDevice& device = devices_[guest.views.front().device];
+    change.device = device.about.name;
+    change.tick = device.sampled.newest();
+  }
+  return change;
+}
+
+void NetworkLoop::notice(bool warning, std::string text, std::optional<SessionChange> session) {
+  if (notices_.size() < kMaxNotices) notices_.push_back({warning, std::move(text), std::move(session)});
 }
 
 std::vector<NetworkLoop::Notice> NetworkLoop::take_notices() { return std::exchange(notices_, {}); }

@@ -131,10 +131,23 @@ class NetworkLoop {
     std::optional<ClockOffsetEstimator::Estimate> controller_clock;  ///< … and its clock, by ours
   };
 
+  /// A guest has come or gone: the same for programs that follow sessions.
+  struct SessionChange {
+    std::uint32_t connection = 0;  ///< that of its datagrams
+    bool came = false;
+    std::string client{};  ///< the name it gave itself
+    Role role = Role::kObserver;
+    Address address{};
+    std::string device{};    ///< the first of those that it asked for
+    std::uint64_t tick = 0;  ///< that device's newest step then
+    std::string why{};       ///< it went
+  };
+
   /// What the operator should read in the log.
   struct Notice {
     bool warning = false;
     std::string text;
+    std::optional<SessionChange> session{};
   };
 
   /// One of `mail` for each device; datagrams are recorded in the first. They and `link` must outlive the loop. Throws
@@ -193,7 +206,8 @@ class NetworkLoop {
   void send(LocalTime now, DatagramSieve::Sender partner, const Address& to, std::span<const std::byte> datagram);
   void tap(LocalTime now, DatagramRecord::Direction direction, DatagramSieve::Sender partner, const Address& peer,
            std::span<const std::byte> datagram, std::size_t size);
-  void notice(bool warning, std::string text);
+  SessionChange change_of(const Guest& guest, bool came, const std::string& why) const;
+  void notice(bool warning, std::string text, std::optional<SessionChange> session = std::nullopt);
 
   Config config_;
   Link& link_;

@@ -373,9 +373,17 @@ void Server::run_network() {
     const LocalTime before = clock::now();
     if (due > before) link_.wait(std::min<Duration>(due - before, std::chrono::seconds(1)), &stepped_);
     due = network_.turn(clock::now());
-    for (const auto& [warning, text] : network_.take_notices()) warning ? log::warn(text) : log::info(text);
+    tell_notices();
   }
   network_.close(clock::now());
+  tell_notices();
+}
+
+void Server::tell_notices() {
+  for (const auto& [warning, text, session] : network_.take_notices()) {
+    warning ? log::warn(text) : log::info(text);
+    if (session && tell_session_) tell_session_(*session);
+  }
 }
 
 void Server::run_log() {

@@ -5,10 +5,12 @@
 #include <atomic>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "devices/counts.h"
@@ -66,6 +68,10 @@ class Server {
   /// its first step: it takes run_for / period steps, or fewer when some came too late.
   void start(std::optional<Duration> run_for = std::nullopt);
 
+  /// Called by the network thread for each guest that comes or goes, those that the end of the server sends away too.
+  /// Before `start` only. It may block no longer than a line of the log does.
+  void tell_sessions(std::function<void(const NetworkLoop::SessionChange&)> tell) { tell_session_ = std::move(tell); }
+
   /// Zero force first; then goodbye to the guests; then the end of the recording.
   Summary stop();
 
@@ -110,6 +116,7 @@ class Server {
   void end_threads();  ///< those that run: the haptic ones first, with zero force
   void run_haptic(DeviceRuntime& runtime);
   void run_network();
+  void tell_notices();
   void run_log();
   void drain_to_recorder(LocalTime now);
   void record_left_out(LocalTime now);
@@ -137,7 +144,8 @@ class Server {
   bool recording_stopped_ = false;
   LocalTime tell_next_{};
 
-  std::optional<Duration> run_for_;  ///< set before the threads start
+  std::optional<Duration> run_for_;  ///< set before the threads start, as the next is
+  std::function<void(const NetworkLoop::SessionChange&)> tell_session_;
   std::atomic<bool> stop_haptic_{false};
   std::atomic<bool> stop_network_{false};
   std::atomic<bool> stop_log_{false};

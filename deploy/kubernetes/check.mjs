@@ -3,7 +3,7 @@
 // What deploy/kubernetes/check looks at: types, misspelt keys, the rules of README.md, and that everything that is named
 // is there. It prints a line for each fault, and how much was looked at.
 import { execFileSync } from "node:child_process";
-import { existsSync, mkdtempSync, readdirSync, readFileSync, rmSync, writeFileSync } from "node:fs";
+import { copyFileSync, existsSync, mkdtempSync, readdirSync, readFileSync, rmSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { dirname, join, relative } from "node:path";
 import { fileURLToPath } from "node:url";
@@ -71,7 +71,10 @@ for (const { file, value, patch } of documents) {
 // ---- Types, by TypeScript and the published types of Kubernetes: a key that a type does not have is an error there -----
 
 const partial = "type Part<T> = T extends object ? { [K in keyof T]?: Part<T[K]> } : T;\n";
-const modules = { "apps/v1": "apps/v1", "policy/v1": "policy/v1", "scheduling.k8s.io/v1": "scheduling.k8s.io/v1", "batch/v1": "batch/v1", v1: "v1" };
+const modules = {
+  ...Object.fromEntries(["apps/v1", "policy/v1", "scheduling.k8s.io/v1", "batch/v1", "v1"].map((name) => [name, `kubernetes-models/${name}`])),
+  "agones.dev/v1": "./agones",
+};
 const work = mkdtempSync(join(here, "node_modules", ".check-"));
 try {
   documents.forEach(({ file, value, patch }, index) => {
@@ -80,10 +83,11 @@ try {
     const type = `I${value.kind}`;
     writeFileSync(
       join(work, `d${index}.ts`),
-      `import type { ${type} } from "kubernetes-models/${module}";\n${partial}` +
+      `import type { ${type} } from "${module}";\n${partial}` +
         `const d: ${patch ? `Part<${type}>` : type} = ${JSON.stringify(value, null, 1)};\nexport default d;\n`,
     );
   });
+  copyFileSync(join(here, "agones.ts"), join(work, "agones.ts"));
   const tsc = join(here, "node_modules", "typescript", "bin", "tsc");
   const options = ["--noEmit", "--strict", "--skipLibCheck", "--moduleResolution", "bundler", "--module", "esnext"];
   const sources = readdirSync(work).map((name) => join(work, name));
@@ -98,8 +102,8 @@ try {
     }
   }
   for (const { file, value, patch } of documents) {
-    if (patch || modules[value.apiVersion] === undefined) continue;
-    const models = await import(`kubernetes-models/${modules[value.apiVersion]}`);
+    if (patch || !modules[value.apiVersion]?.startsWith("kubernetes-models")) continue;
+    const models = await import(modules[value.apiVersion]);
     try {
       new models[value.kind](value).validate();
     } catch (error) {
@@ -123,10 +127,10 @@ const rule = (name, holds) => {
 };
 const same = (a, b) => JSON.stringify(a) === JSON.stringify(b);
 const server = find_one("DaemonSet", "server");
-const engine = find_one("Deployment", "engine");
+const engines = whole.filter((d) => d.value.kind === "Deployment").map((d) => d.value);
 const pod = server?.spec?.template?.spec ?? {};
 const all_of = (spec) => [...(spec?.initContainers ?? []), ...(spec?.containers ?? [])];
-const everywhere = [...all_of(pod), ...all_of(engine?.spec?.template?.spec)];
+const everywhere = [pod, ...engines.map((engine) => engine.spec?.template?.spec)].flatMap(all_of);
 const one = (name) => all_of(pod).find((container) => container.name === name);
 
 rule("the server is on its node's network", () => pod.hostNetwork === true && pod.dnsPolicy === "ClusterFirstWithHostNet");
@@ -161,11 +165,31 @@ rule("keys are a secret", () =>
   everywhere.flatMap((c) => c.volumeMounts ?? []).every((m) => m.name !== "keys" || m.readOnly === true));
 rule("recordings have a bound", () => Boolean(pod.volumes.find((v) => v.name === "recordings").emptyDir.sizeLimit));
 rule("no pod may talk to the cluster", () =>
-  [pod, engine.spec.template.spec].every((spec) => spec.automountServiceAccountToken === false));
-rule("an engine listens nowhere", () => all_of(engine.spec.template.spec).every((c) => c.ports === undefined));
-rule("there is one engine at a time", () => engine.spec.replicas === 1 && engine.spec.strategy.type === "Recreate");
+  [pod, ...engines.map((engine) => engine.spec.template.spec)].every((spec) => spec.automountServiceAccountToken === false));
+rule("there are two engines: of one process, and of many ranks", () => same(engines.map((d) => d.metadata.name).sort(), ["engine", "fem"]));
+rule("an engine listens nowhere", () => everywhere.every((c) => c.ports === undefined));
+rule("there is one of each engine at a time", () =>
+  engines.every((engine) => engine.spec.replicas === 1 && engine.spec.strategy.type === "Recreate"));
+rule("each rank has a core, and the front one more", () => {
+  const [fem] = engines.find((d) => d.metadata.name === "fem").spec.template.spec.containers;
+  const launch = fem.command[fem.command.indexOf("--launch") + 1];
+  return launch === `mpirun -n ${Number(fem.resources.limits.cpu) - 1}` &&
+    same(fem.volumeMounts.filter((m) => !m.readOnly).map((m) => m.mountPath), ["/tmp", "/dev/shm"]);
+});
+// Of Agones, where nothing has a device.
+const fleet = find_one("Fleet", "simulated")?.spec?.template?.spec ?? {};
+rule("a simulated server has no device, no rights, and its node's network", () =>
+  fleet.template.spec.hostNetwork === true && !JSON.stringify(fleet).includes("tendon.dev/") &&
+  all_of(fleet.template.spec).every((c) => same(c.securityContext.capabilities, { drop: ["ALL"] }) && c.securityContext.runAsNonRoot &&
+    c.securityContext.allowPrivilegeEscalation === false && c.securityContext.readOnlyRootFilesystem === true && c.resources));
+rule("a simulated server is not taken away under a session", () => fleet.eviction.safe === "Never" && fleet.health.disabled === true);
+rule("the port is the node's own", () => same(fleet.ports.map((p) => [p.portPolicy, p.protocol]), [["Passthrough", "UDP"]]));
+rule("Agones is told by follow, which is there", () =>
+  fleet.container === "tendond" && fleet.template.spec.containers[0].command[1] === "/follow/follow" &&
+  fleet.template.spec.containers[0].command.includes("--json") &&
+  fleet.template.spec.volumes.some((v) => v.configMap?.name === "agones-follow"));
 rule("every volume that is mounted is there", () =>
-  [pod, engine.spec.template.spec].every((spec) =>
+  [pod, ...engines.map((engine) => engine.spec.template.spec), fleet.template.spec].every((spec) =>
     all_of(spec).flatMap((c) => c.volumeMounts ?? []).every((m) => spec.volumes.some((v) => v.name === m.name))));
 
 // ---- Programs and their options are those of this tree --------------------------------------------------------------
@@ -179,8 +203,9 @@ if (programs !== "") {
     if (!helps.has(key)) helps.set(key, execFileSync(join(programs, command[0]), [...sub, "--help"], { encoding: "utf8" }));
     return helps.get(key);
   };
+  const pod_of = (value) => value.spec?.template?.spec?.template?.spec ?? value.spec?.template?.spec;
   const commands = documents.flatMap(({ file, value }) =>
-    all_of(value.spec?.template?.spec).filter((c) => c.command).map((c) => ({ file, command: c.command })));
+    all_of(pod_of(value)).filter((c) => c.command).map((c) => ({ file, command: c.command.slice(c.command[0] === "bash" ? 2 : 0) })));
   for (const { file, command } of commands) {
     if (!existsSync(join(programs, command[0]))) {
       fault(file, `${command[0]} is no program of this tree`);

@@ -14,4 +14,5 @@ _tendon() {
   fi
 }
 complete -o default -F _tendon \
-  tendond tendon-inject tendon-softbody tendon-lab tendon-report tendon-identify tendon-replay tendon-conformance tendon-dash tendon-plug
+  tendond tendon-inject tendon-softbody tendon-lab tendon-report tendon-identify tendon-replay tendon-conformance tendon-dash tendon-plug \
+  tendon-sweep tendon-worlds tendon-ship tendon-fem tendon-fem-worker

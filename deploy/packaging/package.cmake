@@ -1,12 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
-# What `cmake --install` brings, and the three Debian packages that `cpack` makes of it: `tendon`, to run; `tendon-plug`, for the
-# machine of a program that exists already, which needs nothing else; and `libtendon-dev`, to write an engine with:
-# find_package(tendon), tendon::client.
+# What `cmake --install` brings, and the Debian packages that `cpack` makes of it: `tendon`, to run; `tendon-plug`, for the
+# machine of a program that exists already, which needs nothing else; `libtendon-dev`, to write an engine with:
+# find_package(tendon), tendon::client; and `tendon-fem-worker`, which alone needs PETSc and MPI, where they are.
+# Sweeps and the shipping of recordings are in `tendon`: they need nothing more, and its image is the one that a sweep's job runs.
 include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
 
-set(programs tendond tendon-inject tendon-softbody tendon-lab tendon-report tendon-identify tendon-replay tendon-conformance)
-install(TARGETS tendond tendon-softbody tendon-lab tendon-report tendon-identify tendon-replay COMPONENT programs)
+set(programs tendond tendon-inject tendon-softbody tendon-lab tendon-report tendon-identify tendon-replay tendon-conformance
+    tendon-fem tendon-sweep tendon-worlds)
+install(TARGETS tendond tendon-softbody tendon-lab tendon-report tendon-identify tendon-replay tendon-fem tendon-sweep
+        tendon-worlds COMPONENT programs)
 install(DIRECTORY deploy/scenes/ DESTINATION ${CMAKE_INSTALL_DATADIR}/tendon/scenes COMPONENT programs
         FILES_MATCHING PATTERN "*.toml" PATTERN "*.msh")
 install(FILES README.md CHANGELOG.md LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT programs)
@@ -15,7 +18,16 @@ install(FILES deploy/discovery/README.md deploy/discovery/records.md deploy/disc
 if(TARGET tendon-dash)
   list(APPEND programs tendon-dash)
   install(TARGETS tendon-dash COMPONENT programs)
-  install(DIRECTORY deploy/monitoring DESTINATION ${CMAKE_INSTALL_DATADIR}/tendon COMPONENT programs)
+  install(DIRECTORY deploy/monitoring DESTINATION ${CMAKE_INSTALL_DATADIR}/tendon COMPONENT programs
+          PATTERN check EXCLUDE PATTERN otelcol-contrib.txt EXCLUDE)
+endif()
+# By its installed name, as its manual page has it.
+set(ship ${CMAKE_RUNTIME_OUTPUT_DIRECTORY}/tendon-ship)
+configure_file(deploy/recordings/ship ${ship} COPYONLY)
+install(PROGRAMS ${ship} DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT programs)
+if(TARGET tendon-fem-worker)
+  install(TARGETS tendon-fem-worker COMPONENT worker)
+  install(FILES LICENSE DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/tendon-fem-worker COMPONENT worker)
 endif()
 install(TARGETS tendon-plug COMPONENT plug)
 # Where the program looks for them: beside its own folder.
@@ -23,39 +35,49 @@ install(TARGETS hdPhantom HD LIBRARY DESTINATION lib/tendon/chai3d COMPONENT plu
 install(FILES LICENSE DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/tendon-plug COMPONENT plug)
 # What belongs to the whole machine is for packages only: `cmake --install` into a home folder leaves /etc alone.
 install(FILES deploy/udev/60-tendon.rules DESTINATION lib/udev/rules.d COMPONENT machine EXCLUDE_FROM_ALL)
-install(FILES deploy/systemd/tendond.service DESTINATION lib/systemd/system COMPONENT machine EXCLUDE_FROM_ALL)
+install(FILES deploy/systemd/tendond.service deploy/recordings/tendon-ship.service deploy/recordings/tendon-ship.timer
+        DESTINATION lib/systemd/system COMPONENT machine EXCLUDE_FROM_ALL)
 install(FILES deploy/scenes/demo.toml DESTINATION /etc/tendon RENAME scene.toml COMPONENT machine EXCLUDE_FROM_ALL)
 
-# One file completes all programs; bash-completion looks for one by the name of each.
-set(completions ${CMAKE_INSTALL_DATADIR}/bash-completion/completions)
-foreach(program ${programs})
-  install(FILES deploy/packaging/completion.bash DESTINATION ${completions} RENAME ${program} COMPONENT programs)
-endforeach()
-install(FILES deploy/packaging/completion.bash DESTINATION ${completions} RENAME tendon-plug COMPONENT plug)
-
-# A manual page is what --help says.
+# Every program has a manual page, which is what --help says, and completion: one file completes all, and bash-completion looks
+# for one by the name of each.
 find_program(HELP2MAN help2man)
-if(HELP2MAN)
-  set(pages)
-  foreach(program ${programs} tendon-plug)
-    set(page ${CMAKE_CURRENT_BINARY_DIR}/man/${program}.1)
-    add_custom_command(OUTPUT ${page}.gz
-      COMMAND ${HELP2MAN} --no-info --no-discard-stderr --section 1 --version-string ${PROJECT_VERSION}
-              --name "$<IF:$<STREQUAL:${program},tendond>,networked haptics server,part of the Tendon haptics server>"
-              --output ${page} $<TARGET_FILE:${program}>
-      COMMAND gzip -9nf ${page}
-      DEPENDS ${program} VERBATIM)
-    list(APPEND pages ${page}.gz)
-    if(program STREQUAL "tendon-plug")
-      install(FILES ${page}.gz DESTINATION ${CMAKE_INSTALL_MANDIR}/man1 COMPONENT plug)
-    else()
-      install(FILES ${page}.gz DESTINATION ${CMAKE_INSTALL_MANDIR}/man1 COMPONENT programs)
-    endif()
-  endforeach()
-  add_custom_target(man ALL DEPENDS ${pages})
-else()
+if(NOT HELP2MAN)
   message(STATUS "No help2man: no manual pages")
 endif()
+set(completions ${CMAKE_INSTALL_DATADIR}/bash-completion/completions)
+set(pages)
+# describe_program(NAME COMPONENT [FILE]): FILE where it is no target.
+function(describe_program program component)
+  install(FILES deploy/packaging/completion.bash DESTINATION ${completions} RENAME ${program} COMPONENT ${component})
+  if(NOT HELP2MAN)
+    return()
+  endif()
+  set(file ${ARGN})
+  set(depends ${ARGN})
+  if(NOT file)
+    set(file $<TARGET_FILE:${program}>)
+    set(depends ${program})
+  endif()
+  set(page ${CMAKE_CURRENT_BINARY_DIR}/man/${program}.1)
+  add_custom_command(OUTPUT ${page}.gz
+    COMMAND ${HELP2MAN} --no-info --no-discard-stderr --section 1 --version-string ${PROJECT_VERSION}
+            --name "$<IF:$<STREQUAL:${program},tendond>,networked haptics server,part of the Tendon haptics server>"
+            --output ${page} ${file}
+    COMMAND gzip -9nf ${page}
+    DEPENDS ${depends} VERBATIM)
+  install(FILES ${page}.gz DESTINATION ${CMAKE_INSTALL_MANDIR}/man1 COMPONENT ${component})
+  set(pages ${pages} ${page}.gz PARENT_SCOPE)
+endfunction()
+foreach(program ${programs})
+  describe_program(${program} programs)
+endforeach()
+describe_program(tendon-ship programs ${ship})
+describe_program(tendon-plug plug)
+if(TARGET tendon-fem-worker)
+  describe_program(tendon-fem-worker worker)
+endif()
+add_custom_target(man ALL DEPENDS ${pages})
 
 # The client's library. Headers keep the names that they have here: #include "clients/cpp/run.h".
 set(libraries tendon_client tendon_server_name tendon_protocol tendon_address tendon_proto tendon_core tendon_core_design)
@@ -92,18 +114,22 @@ set(CPACK_PACKAGE_DIRECTORY ${CMAKE_CURRENT_BINARY_DIR}/packages)
 set(CPACK_STRIP_FILES ON)
 set(CPACK_DEB_COMPONENT_INSTALL ON)
 set(CPACK_COMPONENTS_ALL programs machine injector conformance plug development)
+if(TARGET tendon-fem-worker)
+  list(APPEND CPACK_COMPONENTS_ALL worker)
+endif()
 set(CPACK_COMPONENT_PROGRAMS_GROUP run)
 set(CPACK_COMPONENT_MACHINE_GROUP run)
 set(CPACK_COMPONENT_INJECTOR_GROUP run)
 set(CPACK_COMPONENT_CONFORMANCE_GROUP run)
 set(CPACK_COMPONENT_PLUG_GROUP plug)
 set(CPACK_COMPONENT_DEVELOPMENT_GROUP dev)
+set(CPACK_COMPONENT_WORKER_GROUP worker)
 set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
 set(CPACK_DEBIAN_RUN_PACKAGE_NAME tendon)
 set(CPACK_DEBIAN_RUN_PACKAGE_SECTION science)
 set(CPACK_DEBIAN_RUN_PACKAGE_SHLIBDEPS ON)
 set(CPACK_DEBIAN_RUN_PACKAGE_RECOMMENDS gnuplot-nox)
-set(CPACK_DEBIAN_RUN_PACKAGE_SUGGESTS avahi-daemon)
+set(CPACK_DEBIAN_RUN_PACKAGE_SUGGESTS "avahi-daemon, rclone, tendon-fem-worker")
 set(CPACK_DEBIAN_RUN_DESCRIPTION "Networked haptics server with an energy-bounding output limiter
  Runs the loop of a haptic device at 1 kHz and bounds every force so that the device never gives out more energy than it took in,
  while physics engines anywhere on the network send forces late, rarely or wrong.")
@@ -114,6 +140,12 @@ set(CPACK_DEBIAN_PLUG_PACKAGE_SHLIBDEPS ON)
 set(CPACK_DEBIAN_PLUG_DESCRIPTION "Haptic devices of a Tendon server for programs that exist already
  Runs beside a program that knows CHAI3D, VRPN, Inverse-compatible JSON or ROS 2, and gives it the device of a Tendon server
  anywhere on the network, behind an output limiter that bounds its energy.")
+set(CPACK_DEBIAN_WORKER_PACKAGE_NAME tendon-fem-worker)
+set(CPACK_DEBIAN_WORKER_PACKAGE_SECTION science)
+set(CPACK_DEBIAN_WORKER_PACKAGE_SHLIBDEPS ON)
+set(CPACK_DEBIAN_WORKER_PACKAGE_DEPENDS openmpi-bin)
+set(CPACK_DEBIAN_WORKER_DESCRIPTION "Large soft bodies for the Tendon haptics server, by PETSc on MPI
+ The workers that tendon-fem starts: they spread the finite elements of a soft body that a hand touches over many cores and machines.")
 set(CPACK_DEBIAN_DEV_PACKAGE_NAME libtendon-dev)
 set(CPACK_DEBIAN_DEV_PACKAGE_SECTION libdevel)
 set(CPACK_DEBIAN_DEV_PACKAGE_DEPENDS "libeigen3-dev, libprotobuf-dev, libsodium-dev, libsystemd-dev")

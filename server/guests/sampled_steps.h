@@ -31,6 +31,9 @@ class SampledSteps {
   /// Empty when there was no such step, or it was longer ago than kRemembered steps.
   std::optional<Step> find(std::uint64_t tick) const;
 
+  /// The newest tick that was observed; 0 before the first.
+  std::uint64_t newest() const noexcept { return newest_; }
+
  private:
   struct Numbered {
     std::uint64_t tick = 0;

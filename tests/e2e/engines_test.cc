@@ -4,7 +4,10 @@
 // time.
 #include <gtest/gtest.h>
 
+#include <nlohmann/json.hpp>
+#include <sstream>
 #include <string>
+#include <vector>
 
 #include "tests/e2e/stage/stage.h"
 #include "tests/server/scratch_folder.h"
@@ -75,6 +78,55 @@ TEST(Engines, TwoDevicesEachHaveTheirOwnHandAndEngine) {
   EXPECT_NE(end.find(R"({"name":"left","steps":)"), std::string::npos) << end;
   EXPECT_NE(end.find(R"({"name":"right","steps":)"), std::string::npos) << end;
   EXPECT_EQ(end.find(R"("forces":0)"), std::string::npos) << "both devices had forces: " << end;
+}
+
+/// The lines of `tendond --json` that tell of sessions.
+std::vector<nlohmann::json> session_lines(const std::string& output) {
+  std::vector<nlohmann::json> found;
+  std::istringstream lines(output);
+  for (std::string line; std::getline(lines, line);) {
+    if (!line.starts_with(R"({"event":)")) continue;
+    auto json = nlohmann::json::parse(line);
+    if (json["event"] == "welcomed" || json["event"] == "left") found.push_back(std::move(json));
+  }
+  return found;
+}
+
+TEST(Engines, EachSessionIsToldByOneNameFromItsBeginningToItsEnd) {
+  const ScratchFolder folder;
+  const auto scene = folder.path() / "device.toml";
+  write(scene, std::string(kPressingHand));
+  Server server(folder.path(), scene);
+  Client echo("echo_motion", server.address(), folder.path(), {"--json"});
+  wait_until_felt(echo, -1);  // it has come
+  Client wall("virtual_wall", server.address(), folder.path());
+  wait_until_felt(echo, 0.3);
+  wall.signal(SIGTERM);
+  wall.wait();
+  server.stop();
+  const auto lines = session_lines(server.process().out());
+  ASSERT_EQ(lines.size(), 4U) << server.process().out();
+  const auto expect_one_session = [](const nlohmann::json& came, const nlohmann::json& left) {
+    EXPECT_EQ(came["event"], "welcomed");
+    EXPECT_EQ(left["event"], "left");
+    const std::string name = came["session"];
+    EXPECT_EQ(name.size(), 32U);
+    EXPECT_EQ(name.find_first_not_of("0123456789abcdef"), std::string::npos) << name;
+    for (const char* const same : {"session", "device", "client", "role", "address"}) EXPECT_EQ(came[same], left[same]);
+    EXPECT_EQ(came["device"], "device");
+    EXPECT_GT(left["tick"], came["tick"]);
+  };
+  expect_one_session(lines[0], lines[3]);
+  expect_one_session(lines[1], lines[2]);
+  EXPECT_EQ(lines[0]["role"], "observer");
+  EXPECT_EQ(lines[1]["client"], "virtual_wall");
+  EXPECT_EQ(lines[1]["role"], "controller");
+  EXPECT_EQ(lines[3]["why"], "the server is going down");
+  // The same run of the server, and a connection each.
+  const std::string first = lines[0]["session"];
+  const std::string second = lines[1]["session"];
+  EXPECT_EQ(first.substr(0, 24), second.substr(0, 24));
+  EXPECT_NE(first, second);
 }
 
 }  // namespace
