@@ -211,6 +211,11 @@ if (programs !== "") {
       fault(file, `${command[0]} is no program of this tree`);
       continue;
     }
+    const [program, verb] = command;
+    if (/^[a-z]+$/.test(verb) && !new RegExp(`^  ${verb}\\b`, "m").test(help_of([program]))) {
+      fault(file, `${program} has no ${verb}`);
+      continue;
+    }
     for (const option of command.filter((word) => word.startsWith("--"))) {
       asked += 1;
       if (!help_of(command).includes(option)) fault(file, `${command[0]} has no option ${option}`);
