@@ -87,7 +87,8 @@ class Resolver {
       if (ns_parserr(&message, ns_s_an, i, &record) != 0) refuse(name, "the name server's answer cannot be read");
       if (ns_rr_type(record) != type) continue;
       const auto* const data = reinterpret_cast<const std::byte*>(ns_rr_rdata(record));
-      answer.records.push_back({ns_rr_type(record), std::vector(data, data + ns_rr_rdlen(record)),
+      answer.records.push_back({static_cast<std::uint16_t>(ns_rr_type(record)),
+                                std::vector(data, data + ns_rr_rdlen(record)),
                                 static_cast<std::size_t>(ns_rr_rdata(record) - answer.bytes.data())});
     }
     return answer;
@@ -111,7 +112,7 @@ std::vector<Found> hosts_of(Resolver& resolver, const Instance& instance) {
     const std::string host = answer.name(record, kTarget);
     if (!is_domain(host)) continue;  // ".": decidedly not here
     Found found{.instance = instance, .host = host, .port = two_bytes(record, 4)};
-    ranked.push_back({{two_bytes(record, 0), -two_bytes(record, 2)}, std::move(found)});
+    ranked.emplace_back(std::pair<int, int>(two_bytes(record, 0), -two_bytes(record, 2)), std::move(found));
   }
   std::stable_sort(ranked.begin(), ranked.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
   std::vector<Found> all;

@@ -85,7 +85,8 @@ std::pair<Curve, Curve> field(std::span<const Point> points, double (*x)(const S
   Curve swings{.name = "swings up", .colour = kOrange, .style = Curve::Style::kPoints};
   for (const Point& p : points) {
     for (int i = -kMapped; i <= kMapped; ++i) {
-      const bool swung = p.map.at(static_cast<std::size_t>(i + kMapped)) == 'x';
+      const int place = i + kMapped;
+      const bool swung = p.map.at(static_cast<std::size_t>(place)) == 'x';
       (swung ? swings : rests).points.emplace_back(x(p.spring), mapped_stiffness(p, i));
     }
   }

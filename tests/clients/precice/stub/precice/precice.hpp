@@ -10,6 +10,7 @@
 // What clients/precice uses of preCICE 3's interface, with a partner in this process: springs that hold each node. It
 // refuses, as preCICE does, calls in the wrong order and names that it does not know.
 
+// NOLINTBEGIN(readability-identifier-naming): the names are preCICE's
 namespace precice {
 
 using VertexID = int;
@@ -93,3 +94,4 @@ class Participant {
 };
 
 }  // namespace precice
+// NOLINTEND(readability-identifier-naming)
