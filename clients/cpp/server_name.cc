@@ -108,7 +108,9 @@ ServerName::Place ServerName::look_up(bool has_key) const {
     const auto [host, port] = *split(text_);
     return {addresses_of(host, port), {}};
   }
-  if (instance_->name.empty()) throw std::runtime_error(text_ + " is a list, which echo_motion --server " + text_ + " prints: expected a name in it");
+  if (instance_->name.empty())
+    throw std::runtime_error(text_ + " is a list, which echo_motion --server " + text_ +
+                             " prints: expected a name in it");
   if (!has_key) {
     throw std::runtime_error(text_ + ": anybody can announce this name, and a key alone tells whose it is: expected " +
                              "a key (--key FILE) besides, or HOST:PORT in place of the name");

@@ -10,7 +10,6 @@
 #include <fstream>
 #include <iterator>
 #include <string>
-#include <string_view>
 #include <thread>
 #include <vector>
 
@@ -22,26 +21,12 @@ namespace {
 
 using testing::ScratchFolder;
 
-/// Forces fade soon, so that a gap of half a second, which a front leaves at least, has every stage.
-constexpr std::string_view kHand = R"([device]
-kind = "simulated"
-profile = "falcon"
-
-[device.hand]
-stiffness_n_per_m = 300
-damping_n_s_per_m = 3
-mass_kg = 0.05
-
-[device.hand.motion]
-kind = "ramp-hold"
-from_mm = [-10, 0, 0]
-to_mm = [15, 0, 0]
-ramp_ms = 300
-
-[force]
-hold_ms = 100
-safe_stop_ms = 200
-)";
+/// kPressingHand, whose forces fade so soon that a gap of half a second, which a front leaves at least, has every stage.
+std::string pressing_hand() {
+  std::string text(kPressingHand);
+  const auto force = text.find("[force]");
+  return text.replace(force, std::string::npos, "[force]\nhold_ms = 100\nsafe_stop_ms = 200\n");
+}
 
 /// What came of a front with the worker `fake_worker WAY`.
 struct Outcome {
@@ -67,7 +52,7 @@ struct Outcome {
 Outcome run(const std::string& way, const std::vector<std::string>& more = {}, const std::string& seconds = "2") {
   const ScratchFolder folder;
   const auto scene_file = folder.path() / "hand.toml";
-  write(scene_file, kHand);
+  write(scene_file, pressing_hand());
   const auto file = folder.path() / "run.mcap";
   Server server(folder.path(), scene_file, {"--record", file.string()});
   std::vector<std::string> arguments = {"serve",        "scene.toml",     "--worker",  TENDON_FAKE_WORKER " " + way,
@@ -150,7 +135,7 @@ TEST(Front, AnswersFromATableUntilTheNextWorker) {
   std::ifstream in(scene);
   const std::string text{std::istreambuf_iterator<char>(in), {}};
   const auto scene_file = folder.path() / "hand.toml";
-  write(scene_file, kHand);
+  write(scene_file, pressing_hand());
   write(folder.path() / "scene.toml", text);
   const auto file = folder.path() / "run.mcap";
   Server server(folder.path(), scene_file, {"--record", file.string()});
@@ -185,7 +170,7 @@ TEST(Front, AnswersFromATableUntilTheNextWorker) {
 TEST(Front, KilledLeavesNoWorkerBehind) {
   const ScratchFolder folder;
   const auto scene_file = folder.path() / "hand.toml";
-  write(scene_file, kHand);
+  write(scene_file, pressing_hand());
   const auto file = folder.path() / "run.mcap";
   Server server(folder.path(), scene_file, {"--record", file.string()});
   {

@@ -38,7 +38,8 @@ std::string_view name_of(Estimate::Take take) {
 
 }  // namespace
 
-Estimate estimate(const Body::Size& size, int under_patch, const std::vector<int>& ranks) {
+Estimate estimate(const Body::Size& size, int under_patch, std::vector<int> ranks) {
+  std::ranges::sort(ranks);
   const auto unknowns = static_cast<double>(size.free);
   const auto columns = static_cast<double>(size.touchable);
   const double larger = unknowns / kMeasured;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -37,7 +38,9 @@ inline constexpr double kFeltLate = 0.01;       ///< s
 inline constexpr double kMostTableBytes = 4e9;  ///< of a table and a factor on one machine
 inline constexpr double kMostFactorBytes = 16e9;
 
-Estimate estimate(const Body::Size& size, int under_patch, const std::vector<int>& ranks);
+/// `under_patch`: nodes below the patch (Body::size_of). `ranks`: one number of ranks or more, each at
+/// least 1.
+Estimate estimate(const Body::Size& size, int under_patch, std::vector<int> ranks);
 
 std::string in_words(const Estimate& estimate);
 std::string in_json(const Estimate& estimate);

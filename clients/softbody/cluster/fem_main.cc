@@ -118,8 +118,8 @@ struct Arguments {
 /// Becomes the worker that makes the table.
 int condense(const Arguments& arguments) {
   const std::string command = "exec " + arguments.launch + " " + own_worker() + " condense --way " +
-                              shell_word(arguments.way) + (arguments.json ? " --json " : " ") + shell_word(arguments.scene) +
-                              " " + shell_word(arguments.table);
+                              shell_word(arguments.way) + (arguments.json ? " --json " : " ") +
+                              shell_word(arguments.scene) + " " + shell_word(arguments.table);
   ::execl("/bin/sh", "sh", "-c", command.c_str(), nullptr);
   throw std::runtime_error("/bin/sh cannot be started");
 }
