@@ -24,11 +24,11 @@ double OutputBound::slope(double force) const noexcept {
   return std::min((force - coulomb) / (2 * viscous_per_hold), reach);
 }
 
-double OutputBound::at(double force) const noexcept {
-  const double travel = slope(force);
-  if (travel == 0) return 0;
+double OutputBound::beyond_friction(double excess) const noexcept {
+  if (!(excess > 0) || reach <= 0) return 0;
+  const double travel = std::min(excess / (2 * viscous_per_hold), reach);
   if (std::isinf(travel)) return kInfinite;
-  return travel * ((force - coulomb) - viscous_per_hold * travel);
+  return travel * (excess - viscous_per_hold * travel);
 }
 
 template <std::size_t Parts>
@@ -38,41 +38,48 @@ double largest_scale(const std::array<OutputBound, Parts>& bounds, const std::ar
     return sizes[0] > 0 ? bounds[0].largest(energy) / sizes[0] : kInfinite;
   }
   const double budget = energy > 0 ? energy : 0;
-  const auto loss_at = [&](double scale) {
-    double sum = 0;
-    for (std::size_t i = 0; i < Parts; ++i) sum += bounds[i].at(scale * sizes[i]);
-    return sum;
-  };
-  // The sum is convex and smooth between the scales at which a part leaves Coulomb friction or meets its reach.
+  // Where a part leaves Coulomb friction, and where it meets its reach. All that follows is measured from these scales:
+  // a scale times a size may round to above Coulomb friction at the very scale where the part leaves it.
+  std::array<double, Parts> starts;
   std::array<double, 2 * Parts> corners;
   std::size_t count = 0;
   double ceiling = kInfinite;  // where friction gives no bound of the loss at all
   for (std::size_t i = 0; i < Parts; ++i) {
     const OutputBound& bound = bounds[i];
+    starts[i] = kInfinite;
     if (!(sizes[i] > 0) || bound.reach <= 0) continue;
-    corners[count++] = bound.coulomb / sizes[i];
+    starts[i] = bound.coulomb / sizes[i];
+    corners[count++] = starts[i];
     if (std::isfinite(bound.reach)) {
       corners[count++] = (bound.coulomb + 2 * bound.viscous_per_hold * bound.reach) / sizes[i];
     } else if (bound.viscous_per_hold == 0) {
-      ceiling = std::min(ceiling, bound.coulomb / sizes[i]);
+      ceiling = std::min(ceiling, starts[i]);
     }
   }
+  if (count == 0) return kInfinite;
+  const auto loss_at = [&](double scale) {
+    double sum = 0;
+    for (std::size_t i = 0; i < Parts; ++i) {
+      if (scale > starts[i]) sum += bounds[i].beyond_friction((scale - starts[i]) * sizes[i]);
+    }
+    return sum;
+  };
+  // The sum is convex and smooth between the corners, and zero at the first.
   std::sort(corners.begin(), corners.begin() + static_cast<std::ptrdiff_t>(count));
-  double from = 0;
-  for (std::size_t k = 0; k < count && corners[k] <= ceiling && loss_at(corners[k]) <= budget; ++k) from = corners[k];
+  double from = corners[0];
+  for (std::size_t k = 1; k < count && corners[k] <= ceiling && loss_at(corners[k]) <= budget; ++k) from = corners[k];
 
   // From `from` on the sum is ℓ₀ + ℓ₁ δ + ℓ₂ δ² up to the next corner, behind which it exceeds the budget.
   double slope = 0;
   double curvature = 0;
   for (std::size_t i = 0; i < Parts; ++i) {
     const OutputBound& bound = bounds[i];
-    // Compare quotients, as for the corners: `from` times the size may round to just below a corner.
-    if (!(sizes[i] > 0) || bound.reach <= 0 || from < bound.coulomb / sizes[i]) continue;
+    if (from < starts[i]) continue;
     if (bound.viscous_per_hold == 0) {
       if (std::isfinite(bound.reach)) slope += bound.reach * sizes[i];
       continue;
     }
-    slope += bound.slope(from * sizes[i]) * sizes[i];
+    slope += std::min((from - starts[i]) * sizes[i] / (2 * bound.viscous_per_hold), bound.reach) * sizes[i];
     if (from < (bound.coulomb + 2 * bound.viscous_per_hold * bound.reach) / sizes[i]) {
       curvature += sizes[i] * sizes[i] / (4 * bound.viscous_per_hold);
     }
@@ -80,7 +87,8 @@ double largest_scale(const std::array<OutputBound, Parts>& bounds, const std::ar
   const double left = budget - loss_at(from);
   if (left <= 0) return std::min(from, ceiling);
   const double divisor = slope + std::sqrt(slope * slope + 4 * curvature * left);
-  return std::min(divisor > 0 ? from + 2 * left / divisor : kInfinite, ceiling);
+  if (divisor > 0) return std::min(from + 2 * left / divisor, ceiling);
+  return slope + curvature > 0 ? from : ceiling;  // of a budget so small that its square root is lost
 }
 
 template double largest_scale<1>(const std::array<OutputBound, 1>&, const std::array<double, 1>&, double) noexcept;

@@ -45,7 +45,9 @@ struct OutputBound {
   static OutputBound of(const Friction& friction, Duration longest_hold);
 
   /// ℓ(force), J; +∞ where friction does not bound it (b = 0, L = ∞, force above f_c).
-  double at(double force) const noexcept;
+  double at(double force) const noexcept { return beyond_friction(force - coulomb); }
+  /// ℓ(f_c + excess), J.
+  double beyond_friction(double excess) const noexcept;
   /// dℓ/df at `force`, m: the worst travel.
   double slope(double force) const noexcept;
   /// f_max, the largest force (N) with ℓ ≤ max(energy, 0):

@@ -216,5 +216,27 @@ TEST(OutputBound, TheLargestScaleSpendsTheBudgetAndNotMore) {
   }
 }
 
+// World 29091: 2e-42 J were left, a corner rounded to just above Coulomb friction, and nothing bounded the wrench.
+TEST(OutputBound, AlmostNoBudgetPermitsFrictionAndNoMoreThanEachPartAlone) {
+  Dice dice(29091);
+  for (int trial = 0; trial < 20000; ++trial) {
+    std::array<OutputBound, 2> bounds;
+    std::array<double, 2> sizes;
+    double friction = kInf;
+    for (std::size_t i = 0; i < 2; ++i) {
+      bounds[i] = {.coulomb = dice.chance(0.3) ? 0 : dice.decades(-5, 0), .viscous_per_hold = dice.decades(-5, 3)};
+      sizes[i] = dice.decades(-5, 2);
+      friction = std::min(friction, bounds[i].coulomb / sizes[i]);
+    }
+    const double budget = dice.chance(0.1) ? 0 : dice.decades(-323, -20);
+    const double scale = largest_scale(bounds, sizes, budget);
+    ASSERT_GE(scale, friction) << "trial " << trial << ", " << budget << " J";
+    for (std::size_t i = 0; i < 2; ++i) {
+      const double most = bounds[i].largest(budget) * (1 + 1e-12) + 1e-100;  // whose square is lost
+      ASSERT_LE(scale * sizes[i], most) << "trial " << trial << ", " << budget << " J";
+    }
+  }
+}
+
 }  // namespace
 }  // namespace tendon

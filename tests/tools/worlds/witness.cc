@@ -96,7 +96,6 @@ Witness::Witness(const DrawnWorld& drawn, World& world, const WatchedDevice& por
       safe_stop_(drawn.config.loop.control.hold.safe_stop),
       slew_time_([&] {
         const HapticController::Config& control = drawn.config.loop.control;
-        // The limit counts at most the longest hold of each interval; pauses add nothing.
         double slowest = control.max_force / control.max_slew;
         if (control.rotation) slowest = std::max(slowest, control.rotation->max_torque / control.rotation->max_slew);
         if (control.grip) slowest = std::max(slowest, control.grip->max_force / control.grip->max_slew);
@@ -207,14 +206,18 @@ void Witness::see_age(const StepRecord& step) {
     if (port_.told() != Effort{}) report(Oracle::kStopped, words(port_.told()) + ", and nobody sees the hand");
     return;
   }
-  // Down to zero through the slew limit. (Other laws than these may have a spring of their own to let go of.)
-  if (!over && step.mode != Mode::kFault)
-    silent_since_.reset();
-  else if (!silent_since_)
-    silent_since_ = now;
-  if (aol_ && silent_since_ && now - *silent_since_ > slew_time_ && port_.told() != Effort{}) {
-    report(Oracle::kStopped,
-           words(port_.told()) + " are given out, " + ms(now - *silent_since_) + " after there should be none");
+  // Down to zero through the slew limit, which counts at most the longest hold of each interval: a pause adds no more.
+  // (Other laws than these may have a spring of their own to let go of.)
+  if (!over && step.mode != Mode::kFault) {
+    silent_for_.reset();
+  } else if (!silent_for_) {
+    silent_for_ = Duration::zero();
+  } else {
+    *silent_for_ += std::min(step.held, drawn_.config.loop.control.limiter.longest_hold);
+  }
+  if (aol_ && silent_for_ && *silent_for_ > slew_time_ && port_.told() != Effort{}) {
+    report(Oracle::kStopped, words(port_.told()) + " are given out, " + ms(*silent_for_) +
+                                 " after there should be none, pauses left out");
   }
   if (may_replay_ticks_ || step.force_sequence == 0) return;
   const LocalTime answered = now - step.loop_age;

@@ -129,7 +129,7 @@ class Witness {
   std::uint64_t forces_ = 0;        ///< that the server has handed to the haptic loop
   std::optional<LocalTime> last_force_;
   LocalTime answered_ = LocalTime::min();  ///< when the motion was sampled which the rendered force answers
-  std::optional<LocalTime> silent_since_;  ///< there should be no force
+  std::optional<Duration> silent_for_;     ///< there should be no force, for so long as the slew limit counts it
   double last_account_ = 0;
   double last_grip_ = 0;
   Duration bound_ = Duration::max();  ///< so long the force held now may be held, by the step that chose it

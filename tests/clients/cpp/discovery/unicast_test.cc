@@ -41,11 +41,14 @@ std::string problem_with(FakeDns::Answer answers) {
 
 TEST(UnicastDiscovery, FindsHostPortAndText) {
   std::string asked;
-  const FakeDns server([&](const Question& question, bool tcp) {
-    if (question.type == kSrv) asked = question.bytes;
-    return sound(question, tcp);
-  });
-  const std::vector<Found> found = resolve_by_dns(kFalcon, server.address());
+  std::vector<Found> found;
+  {
+    const FakeDns server([&](const Question& question, bool tcp) {
+      if (question.type == kSrv) asked = question.bytes;
+      return sound(question, tcp);
+    });
+    found = resolve_by_dns(kFalcon, server.address());
+  }  // ends the thread of the server, which wrote what was asked
   ASSERT_EQ(found.size(), 1U);
   EXPECT_EQ(found[0].host, "localhost");
   EXPECT_EQ(found[0].port, 47100);
