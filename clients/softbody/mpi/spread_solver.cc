@@ -69,9 +69,10 @@ PetscInt share(PetscInt whole, int index, int parts) {
 }
 
 /// The stiffness of an element of linear, isotropic material: Σ V (λ gᵢ gⱼᵀ + µ (gⱼ gᵢᵀ + gᵢ·gⱼ)).
-MatrixXd stiffness_of_element(const Solid& solid, int element) {
+using StiffnessOfElement = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+StiffnessOfElement stiffness_of_element(const Solid& solid, int element) {
   const auto nodes = static_cast<Eigen::Index>(solid.mesh().element(element).size());
-  MatrixXd k = MatrixXd::Zero(3 * nodes, 3 * nodes);
+  StiffnessOfElement k = StiffnessOfElement::Zero(3 * nodes, 3 * nodes);
   for (int q = 0; q < solid.points_per_element(); ++q) {
     const Solid::Point& point = solid.point(element, q);
     const auto g = solid.gradient(element, q);
@@ -246,7 +247,6 @@ class SpreadSolver : public Solver {
 
   /// What GAMG wants to know of elasticity: that a body can move as a whole.
   void tell_rigid_motions(const Solid& solid) {
-    check(MatSetBlockSize(matrix_, 3));
     Vector places;
     check(VecCreate(comm_, places.address()));
     check(VecSetSizes(places, rows_, size_));
@@ -291,33 +291,66 @@ class SpreadSolver : public Solver {
     check(VecRestoreArrayWrite(to, &values));
   }
 
+  /// The rows of this rank's nodes, from every element that has one of them, in the order of the elements: nothing is
+  /// sent, and a row has the same bits on any number of ranks.
   void assemble(const Solid& solid) {
-    const int elements = solid.mesh().element_count();
-    const PetscInt from = share(elements, rank_of(comm_), count_of(comm_));
-    const PetscInt to = share(elements, rank_of(comm_) + 1, count_of(comm_));
-    std::vector<PetscInt> rows;
-    std::vector<PetscInt> columns;
-    std::vector<PetscScalar> values;
-    for (PetscInt e = from; e < to; ++e) {
-      const MatrixXd k = stiffness_of_element(solid, e);
-      const auto nodes = solid.mesh().element(e);
-      const auto free = [&](Eigen::Index i) {
-        return solid.free_of(3 * nodes[static_cast<std::size_t>(i / 3)] + static_cast<int>(i % 3));
-      };
-      for (Eigen::Index i = 0; i < k.rows(); ++i) {
-        for (Eigen::Index j = 0; j < k.cols(); ++j) {
-          if (free(i) < 0 || free(j) < 0) continue;
-          rows.push_back(free(i));
-          columns.push_back(free(j));
-          values.push_back(k(i, j));
+    const Mesh& mesh = solid.mesh();
+    const PetscInt first = first_ / 3;
+    const PetscInt mine = rows_ / 3;
+    const auto free_node = [&](int node) {
+      const int free = solid.free_of(3 * node);
+      return free < 0 ? -1 : free / 3;
+    };
+    const auto is_mine = [&](int free) { return free >= first && free < first + mine; };
+    std::vector<int> elements;  // with a node of this rank
+    std::vector<std::vector<int>> beside(static_cast<std::size_t>(mine));
+    for (int e = 0; e < mesh.element_count(); ++e) {
+      const auto nodes = mesh.element(e);
+      const auto touched = elements.size();
+      for (const int node : nodes) {
+        const int row = free_node(node);
+        if (!is_mine(row)) continue;
+        if (elements.size() == touched) elements.push_back(e);
+        beside[static_cast<std::size_t>(row - first)].push_back(e);
+      }
+    }
+    // Exactly as many blocks as a row of nodes has.
+    std::vector<PetscInt> here(static_cast<std::size_t>(mine));
+    std::vector<PetscInt> elsewhere(static_cast<std::size_t>(mine));
+    std::vector<int> neighbours;
+    for (std::size_t row = 0; row < beside.size(); ++row) {
+      neighbours.clear();
+      for (const int e : beside[row]) {
+        for (const int node : mesh.element(e)) {
+          if (const int free = free_node(node); free >= 0) neighbours.push_back(free);
         }
       }
+      std::ranges::sort(neighbours);
+      const auto all = std::unique(neighbours.begin(), neighbours.end()) - neighbours.begin();
+      here[row] = static_cast<PetscInt>(std::count_if(neighbours.begin(), neighbours.begin() + all, is_mine));
+      elsewhere[row] = static_cast<PetscInt>(all) - here[row];
     }
     check(MatCreate(comm_, matrix_.address()));
     check(MatSetSizes(matrix_, rows_, rows_, size_, size_));
     check(MatSetType(matrix_, MATAIJ));
-    check(MatSetPreallocationCOO(matrix_, static_cast<PetscCount>(values.size()), rows.data(), columns.data()));
-    check(MatSetValuesCOO(matrix_, values.data(), ADD_VALUES));
+    check(MatSetBlockSize(matrix_, 3));
+    check(MatXAIJSetPreallocation(matrix_, 3, here.data(), elsewhere.data(), nullptr, nullptr));
+    check(MatSetOption(matrix_, MAT_NO_OFF_PROC_ENTRIES, PETSC_TRUE));
+    std::vector<PetscInt> rows;
+    std::vector<PetscInt> columns;
+    for (const int e : elements) {
+      const StiffnessOfElement k = stiffness_of_element(solid, e);
+      rows.clear();
+      columns.clear();
+      for (const int node : mesh.element(e)) {  // PETSc leaves negative ones out
+        columns.push_back(free_node(node));
+        rows.push_back(is_mine(columns.back()) ? columns.back() : -1);
+      }
+      const auto count = static_cast<PetscInt>(rows.size());
+      check(MatSetValuesBlocked(matrix_, count, rows.data(), count, columns.data(), k.data(), ADD_VALUES));
+    }
+    check(MatAssemblyBegin(matrix_, MAT_FINAL_ASSEMBLY));
+    check(MatAssemblyEnd(matrix_, MAT_FINAL_ASSEMBLY));
     check(MatSetOption(matrix_, MAT_SPD, PETSC_TRUE));
   }
 
