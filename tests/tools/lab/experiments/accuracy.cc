@@ -25,6 +25,7 @@
 #include "tests/tools/injector/profile/named_profiles.h"
 #include "tests/tools/lab/experiments/accuracy_pictures.h"
 #include "tests/tools/lab/experiments/accuracy_table.h"
+#include "tests/tools/lab/experiments/pressed_engine.h"
 
 namespace tendon::lab {
 namespace {
@@ -36,7 +37,6 @@ constexpr std::size_t kManyUpdates = 400;  // timed; fewer if …
 constexpr double kSettled = 0.03;          // two times through the script have so nearly the same median, or after …
 constexpr double kLongestTiming = 4;       // s
 constexpr std::size_t kFirstUpdates = 10;  // show whether it is far too slow
-constexpr int kMostPresses = 10;           // of Newton's method, for an answer under a load
 constexpr double kReach = 0.3;             // patch radii, that a table of the surface holds
 constexpr int kStaticModes = 3;            // along each axis of that, of a modal body
 constexpr double kUnfeltMs = 0.1;          // a tenth of a period of the device: nobody feels who is quicker by less
@@ -127,25 +127,14 @@ class OnMesh {
   std::map<Key, std::array<Stiffness, 2>> known_;
 };
 
-/// A body with time waits until it is at rest, and rounds until they change nothing. Newton's method is there at once;
-/// or never, where the body collapses.
-Reaction at_rest(Body& body, ModelKind model, double load) {
-  if (body.step() > 0 || model == ModelKind::kProjective) return body.settle(Given::kForce, load);
-  Reaction reaction;
-  for (int i = 0; i < kMostPresses && !(i > 0 && reaction.error <= 1e-4 * load); ++i) {
-    reaction = body.press(Given::kForce, load);
-  }
-  return reaction;
-}
-
 /// What a settled answer comes to; whose fault it is is not known yet.
-Accuracy accuracy_of(const Reaction& reaction, const Stiffness& right) {
+Accuracy accuracy_of(const Reaction& reaction, const Stiffness& right, double solver) {
   const double k = reaction.force / reaction.depth;
   return {.k = k,
           .total = k / right.secant - 1,
           .model = kNoNumber,
           .discretisation = kNoNumber,
-          .solver = kNoNumber,
+          .solver = solver,
           .tangent = reaction.stiffness / right.tangent - 1};
 }
 
@@ -157,6 +146,11 @@ void split_error(AccuracyPoint& point, Truth& truth, OnMesh& on_mesh) {
     if (!limit) continue;
     Accuracy& error = point.at_load[load];
     const double right = truth.stiffness(load).secant;
+    if (point.candidate.elsewhere) {
+      error.model = limit->secant / right - 1;
+      error.discretisation = error.total - error.model - error.solver;
+      continue;
+    }
     const double mesh = on_mesh.of(point.candidate)[load].secant;
     if (model == ModelKind::kMassSpring) {
       // They have settled, on a mesh whose error is that of the body with ν = 1/4.
@@ -196,27 +190,28 @@ double floor_of(const Meter& meter) {
 
 /// The tool goes from one place of the script to the next, in as many steps as a body with time makes meanwhile.
 template <class Touch>
-void walk(const Body& body, const std::vector<Touched>& script, std::size_t to, Touch touch) {
+void walk(const PressedEngine& engine, const std::vector<Touched>& script, std::size_t to, Touch touch) {
   const int steps =
-      body.step() > 0 ? std::max(1, static_cast<int>(std::lround(Truth::kScriptInterval / body.step()))) : 1;
+      engine.step() > 0 ? std::max(1, static_cast<int>(std::lround(Truth::kScriptInterval / engine.step()))) : 1;
   const Vec3& from = script[to == 0 ? 0 : to - 1].tool;
   for (int step = 1; step <= steps; ++step) touch(from + static_cast<double>(step) / steps * (script[to].tool - from));
 }
 
 /// Follows the script once; with a meter it times the updates, and does so again as often as their median asks for.
-void follow_script(Body& body, const std::vector<Touched>& script, const Meter* meter, double slowest_ms,
+void follow_script(PressedEngine& engine, const std::vector<Touched>& script, const Meter* meter, double slowest_ms,
                    AccuracyPoint& point) {
   const double floor = meter != nullptr ? floor_of(*meter) : 0;
   std::vector<double> times;
   std::vector<double> instructions;
   const auto touch = [&](const Vec3& tool) {
-    if (meter == nullptr) return body.touch(tool).force;
+    if (meter == nullptr) return engine.touch(tool).force;
     const Meter::Reading before = meter->read();
-    const Feel feel = body.touch(tool);
+    const Feel feel = engine.touch(tool);
     const Meter::Reading took = meter->read() - before;
     if (feel.touching) {
-      times.push_back(std::max(0.0, took.processor - floor));
-      if (took.instructions) instructions.push_back(static_cast<double>(*took.instructions));
+      times.push_back(std::max(0.0, engine.took(took) - floor));
+      if (took.instructions && !point.candidate.elsewhere)
+        instructions.push_back(static_cast<double>(*took.instructions));
       // Twice as long is no accident of a busy machine.
       if (times.size() == kFirstUpdates && 1e3 * quantile(times, 0.5) > 2 * slowest_ms) {
         throw TooSlow("an update takes more than " + shortest(slowest_ms) + " ms");
@@ -232,7 +227,7 @@ void follow_script(Body& body, const std::vector<Touched>& script, const Meter* 
   double aside = 0;
   for (std::size_t i = 0; i < script.size(); ++i) {
     Vec3 force = Vec3::Zero();
-    walk(body, script, i, [&](const Vec3& tool) { force = touch(tool); });
+    walk(engine, script, i, [&](const Vec3& tool) { force = touch(tool); });
     const Vec3 error = force - script[i].force;
     squares += error.squaredNorm();
     true_squares += script[i].force.squaredNorm();
@@ -246,9 +241,9 @@ void follow_script(Body& body, const std::vector<Touched>& script, const Meter* 
 
   if (meter == nullptr) return;
   bool settled = times.empty();
-  while (!settled && times.size() < kManyUpdates && (meter->read() - start).processor < kLongestTiming) {
+  while (!settled && times.size() < kManyUpdates && engine.took(meter->read() - start) < kLongestTiming) {
     const double before = quantile(times, 0.5);
-    for (std::size_t i = 0; i < script.size(); ++i) walk(body, script, i, touch);
+    for (std::size_t i = 0; i < script.size(); ++i) walk(engine, script, i, touch);
     settled = std::abs(quantile(times, 0.5) / before - 1) < kSettled;
   }
   point.update_ms_p50 = 1e3 * quantile(times, 0.5);
@@ -276,13 +271,12 @@ constexpr double kPowerOfMeasuring = 2;  // much of it is the loop at the hand, 
 /// The same model and element on finer and finer meshes, up to what an update, a set-up and all of the measuring may
 /// cost. `measured` makes a point of a candidate, or throws.
 template <class Measured>
-std::vector<AccuracyPoint> ladder(ModelKind model, Element element, const AccuracyOptions& options,
+std::vector<AccuracyPoint> ladder(Candidate candidate, const AccuracyOptions& options,
                                   std::vector<std::string>& left_out, Measured measured) {
   std::vector<AccuracyPoint> points;
-  if (info(model).tetrahedra && element != Element::kTet4) return points;
   const double longest_setup = options.longest_setup_s.value_or(options.budget_ms ? 5 : 30);
   for (const int n : options.resolutions) {
-    const Candidate candidate{model, element, n};
+    candidate.n = n;
     const std::string name = candidate.name() + " n=" + std::to_string(n);
     if (predicted(points, n, &AccuracyPoint::update_ms_p50, kPowerOfSolutions) > options.slowest_ms ||
         predicted(points, n, &AccuracyPoint::setup_s, kPowerOfFactors) > longest_setup ||
@@ -319,51 +313,74 @@ std::vector<Element> elements_of(const AccuracyOptions& options) {
   return all;
 }
 
+/// Each model on each element, on no mesh yet; a worker answers after the others.
+std::vector<Candidate> families(const AccuracyOptions& options) {
+  std::vector<Candidate> all;
+  for (const ModelKind model : models_of(options)) {
+    for (const Element element : elements_of(options)) {
+      if (info(model).tetrahedra && element != Element::kTet4) continue;
+      all.push_back({model, element, 0});
+    }
+  }
+  if (!options.worker.empty()) {
+    for (const Element element : elements_of(options)) all.push_back({ModelKind::kLinear, element, 0, true});
+  }
+  return all;
+}
+
 }  // namespace
 
-std::string Candidate::name() const { return std::string(info(model).name) + "-" + std::string(info(element).name); }
+std::string Candidate::name() const {
+  return (elsewhere ? "worker" : std::string(info(model).name)) + "-" + std::string(info(element).name);
+}
 
 namespace {
 
 /// A candidate on its way to a point: what has been measured of it, and the body for what has not.
 struct Trial {
   AccuracyPoint point;
-  Body body;
+  std::unique_ptr<PressedEngine> engine;
 };
 
 /// What it answers, and with a meter what it costs. Whose fault its errors are, and what is left at the hand, is not
 /// asked.
-Trial tried(const Candidate& candidate, Truth& truth, const Meter* meter, double slowest_ms) {
+Trial tried(const Candidate& candidate, Truth& truth, const Meter* meter, double slowest_ms,
+            const std::string& worker = {}) {
   const PressedBlock& block = truth.block();
   const Meter::Reading before = meter != nullptr ? meter->read() : Meter::Reading{};
-  Trial trial{.point = {.candidate = candidate, .timed = meter != nullptr}, .body = Body(body_of(block, candidate))};
+  const BodyConfig config = body_of(block, candidate);
+  Trial trial{.point = {.candidate = candidate, .timed = meter != nullptr},
+              .engine = candidate.elsewhere ? worker_engine(config, worker) : own_engine(config)};
   AccuracyPoint& point = trial.point;
-  if (meter != nullptr) point.setup_s = (meter->read() - before).processor;
-  point.size = trial.body.size();
-  point.step_ms = 1e3 * trial.body.step();
-  follow_script(trial.body, truth.script(), meter, slowest_ms, point);
+  PressedEngine& engine = *trial.engine;
+  if (meter != nullptr) point.setup_s = engine.took(meter->read() - before);
+  point.size = engine.size();
+  point.step_ms = 1e3 * engine.step();
+  follow_script(engine, truth.script(), meter, slowest_ms, point);
   for (std::size_t load = 0; load < point.at_load.size(); ++load) {
-    point.at_load[load] = accuracy_of(at_rest(trial.body, candidate.model, block.loads[load]), truth.stiffness(load));
+    const Reaction reaction = engine.under(block.loads[load]);
+    point.at_load[load] =
+        accuracy_of(reaction, truth.stiffness(load), candidate.elsewhere ? reaction.error / reaction.force : kNoNumber);
   }
   return trial;
 }
 
 void feel(Trial& trial, Truth& truth, const Network& network, double longest_s) {
   AccuracyPoint& point = trial.point;
-  point.felt =
-      felt(trial.body, truth, route_of(network, std::max(point.update_ms_p50, point.step_ms)), network.seed, longest_s);
+  point.felt = felt(*trial.engine, truth, route_of(network, std::max(point.update_ms_p50, point.step_ms)), network.seed,
+                    longest_s);
 }
 
 AccuracyPoint measure(const Candidate& candidate, Truth& truth, OnMesh& on_mesh, const Meter& meter,
-                      const std::optional<Network>& network, const Patience& patience) {
+                      const std::optional<Network>& network, const Patience& patience, const std::string& worker) {
   // Work that is done once for all points does not count as this one's.
   truth.script();
   truth.limit(info(candidate.model).law, material_of(truth.block(), candidate.model), 0);
   const Meter::Reading before = meter.read();
-  Trial trial = tried(candidate, truth, &meter, patience.update_ms);
+  Trial trial = tried(candidate, truth, &meter, patience.update_ms, worker);
   split_error(trial.point, truth, on_mesh);
   if (network) feel(trial, truth, *network, patience.felt_s);
-  trial.point.measuring_s = (meter.read() - before).processor;
+  trial.point.measuring_s = trial.engine->took(meter.read() - before);
   return trial.point;
 }
 
@@ -372,9 +389,9 @@ double at_the_hand_ms(const AccuracyPoint& p) { return std::max({p.update_ms_p50
 }  // namespace
 
 AccuracyPoint measure(const Candidate& candidate, Truth& truth, const Meter& meter,
-                      const std::optional<Network>& network, const Patience& patience) {
+                      const std::optional<Network>& network, const Patience& patience, const std::string& worker) {
   OnMesh on_mesh(truth.block());
-  return measure(candidate, truth, on_mesh, meter, network, patience);
+  return measure(candidate, truth, on_mesh, meter, network, patience, worker);
 }
 
 bool may_be_best(const AccuracyPoint& point, const std::vector<AccuracyPoint>& others) {
@@ -447,17 +464,15 @@ std::optional<AccuracyPoint> best_within(const AccuracyOptions& options, Truth& 
     for (const Trial& one : kept) rivals.push_back(one.point);
   };
   std::vector<std::string> left_out;
-  for (const ModelKind model : models_of(options)) {
-    for (const Element element : elements_of(options)) {
-      ladder(model, element, options, left_out, [&](const Candidate& candidate) {
-        const Meter::Reading before = meter.read();
-        Trial trial = tried(candidate, truth, &meter, *options.budget_ms);
-        trial.point.measuring_s = (meter.read() - before).processor;
-        AccuracyPoint point = trial.point;
-        if (point.update_ms_p50 <= *options.budget_ms) keep(std::move(trial));
-        return point;
-      });
-    }
+  for (const Candidate& family : families(options)) {
+    ladder(family, options, left_out, [&](const Candidate& candidate) {
+      const Meter::Reading before = meter.read();
+      Trial trial = tried(candidate, truth, &meter, *options.budget_ms, options.worker);
+      trial.point.measuring_s = trial.engine->took(meter.read() - before);
+      AccuracyPoint point = trial.point;
+      if (point.update_ms_p50 <= *options.budget_ms) keep(std::move(trial));
+      return point;
+    });
   }
   std::vector<AccuracyPoint> at_hand;
   for (Trial& trial : kept) {
@@ -506,6 +521,10 @@ void check(const AccuracyOptions& options) {
         "--errors-only, --units and --from: not with --network or --budget-ms, whose answers "
         "depend on times");
   }
+  if (options.errors_only && !options.worker.empty()) {
+    throw std::invalid_argument(
+        "--worker: not with --errors-only, --units or --from, whose last bits are the same always");
+  }
   if (options.network) route_of(*options.network, 0);  // an unknown one is refused before anything is measured
 }
 
@@ -513,10 +532,10 @@ void check(const AccuracyOptions& options) {
 
 std::vector<Candidate> candidates(const AccuracyOptions& options) {
   std::vector<Candidate> all;
-  for (const ModelKind model : models_of(options)) {
-    for (const Element element : elements_of(options)) {
-      if (info(model).tetrahedra && element != Element::kTet4) continue;
-      for (const int n : options.resolutions) all.push_back({model, element, n});
+  for (Candidate candidate : families(options)) {
+    for (const int n : options.resolutions) {
+      candidate.n = n;
+      all.push_back(candidate);
     }
   }
   return all;
@@ -684,22 +703,21 @@ void accuracy(const AccuracyOptions& given, std::ostream& out) {
   std::vector<std::string> left_out;
   Ladders ladders;
   std::vector<AccuracyPoint> all;
-  for (const ModelKind model : models_of(options)) {
-    for (const Element element : elements_of(options)) {
-      std::vector<AccuracyPoint> points = ladder(model, element, options, left_out, [&](const Candidate& candidate) {
-        const AccuracyPoint point = measure(candidate, truth, on_mesh, meter, options.network,
-                                            {.update_ms = options.slowest_ms, .felt_s = options.longest_point_s});
-        if (rows) {
-          write_row(out, point);
-        } else {
-          out << to_json(point, truth) << "\n";
-        }
-        out.flush();
-        return point;
-      });
-      all.insert(all.end(), points.begin(), points.end());
-      if (!points.empty()) ladders.push_back(std::move(points));
-    }
+  for (const Candidate& family : families(options)) {
+    std::vector<AccuracyPoint> points = ladder(family, options, left_out, [&](const Candidate& candidate) {
+      const AccuracyPoint point =
+          measure(candidate, truth, on_mesh, meter, options.network,
+                  {.update_ms = options.slowest_ms, .felt_s = options.longest_point_s}, options.worker);
+      if (rows) {
+        write_row(out, point);
+      } else {
+        out << to_json(point, truth) << "\n";
+      }
+      out.flush();
+      return point;
+    });
+    all.insert(all.end(), points.begin(), points.end());
+    if (!points.empty()) ladders.push_back(std::move(points));
   }
   if (options.part.progress) std::cerr << "\n";
   if (rows) {
@@ -711,6 +729,10 @@ void accuracy(const AccuracyOptions& given, std::ostream& out) {
       out << "\nAt the hand, behind " << options.network->name << ", seed " << options.network->seed << ":\n"
           << kFeltHeading;
       for (const AccuracyPoint& point : all) write_felt(out, point);
+    }
+    if (!options.worker.empty()) {
+      out << "\nworker: " << options.worker
+          << "; its times are on the wall, its solver's error is the bound that it sends\n";
     }
     for (const std::string& one : left_out) out << "left out: " << one << "\n";
   }

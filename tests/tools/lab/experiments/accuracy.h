@@ -25,12 +25,14 @@ struct Candidate {
   softbody::ModelKind model;
   softbody::Element element;
   int n;
+  bool elsewhere = false;  ///< AccuracyOptions::worker answers, and no body of this process
 
-  std::string name() const;  ///< "linear-hex8-sri"
+  std::string name() const;  ///< "linear-hex8-sri", "worker-hex8-sri"
 };
 
 /// How a model answers one load. Shares, of the true stiffness: total = model + discretisation + solver. The parts are
-/// NaN where on an endlessly fine mesh the model does not stand the load.
+/// NaN where on an endlessly fine mesh the model does not stand the load. A worker's `solver` is the bound of its error
+/// that it has sent.
 ///
 /// Of two models the law on a fine mesh is that of another material: elements that are as rigid as possible
 /// (projective) have µ, but λ = 0. Springs along the edges are, where strains are small, a body whose forces are all
@@ -59,7 +61,7 @@ struct AccuracyPoint {
   double force_most = 0;              ///< N, largest
   double force_relative = 0;          ///< rms, over that of the true force
   double measuring_s = 0;             ///< of processor time for all of this
-  double setup_s = 0;                 ///< of processor time, as are the next two
+  double setup_s = 0;                 ///< of processor time, as are the next two; of a worker, on the wall
   double update_ms_p50 = 0;
   double update_ms_p99 = 0;
   double step_ms = 0;                    ///< of the body's own time, that an update lasts; 0: it has none
@@ -82,8 +84,10 @@ struct Patience {
 
 /// Measures one. Throws what the model throws when there is none of that kind on that mesh, std::invalid_argument when
 /// there is no such network, and TooSlow.
+/// `worker`: its command, for a candidate that is answered elsewhere.
 AccuracyPoint measure(const Candidate& candidate, Truth& truth, const Meter& meter,
-                      const std::optional<Network>& network = {}, const Patience& patience = {});
+                      const std::optional<Network>& network = {}, const Patience& patience = {},
+                      const std::string& worker = {});
 
 /// The points that no other is both quicker and closer than, by time; closer without luck, so that whose parts are not
 /// known is not among them.
@@ -108,6 +112,9 @@ struct AccuracyOptions {
   std::vector<softbody::ModelKind> models;
   std::vector<softbody::Element> elements;  ///< none: all
   std::vector<int> resolutions{4, 6, 8, 10, 12, 16};
+  /// The command of a worker that answers for the linear block as well, without its scene; empty: none. Not with
+  /// errors_only: its last bits depend on how many ranks it has.
+  std::string worker{};
   Truth::Config truth;
   double slowest_ms = 200;                  ///< a refinement ladder ends where an update would take longer …
   std::optional<double> longest_setup_s{};  ///< … or the set-up; none: 30, with a budget 5

@@ -114,6 +114,45 @@ TEST(Accuracy, TheScriptSeesTheErrorOfTheStiffnessAndNoPushAside) {
   EXPECT_GT(measure({ModelKind::kCondensed, Element::kTet4, 5}, truth(), meter).lateral, 10 * point.lateral);
 }
 
+TEST(Accuracy, AWorkersRowIsThatOfTheSameBodyHereWithinTheErrorThatItSends) {
+  const std::string worker = TENDON_FEM_WORKER;
+  if (worker.empty()) GTEST_SKIP() << "tendon-fem-worker is not built here: it needs PETSc and MPI";
+  for (const char* name : {"OMPI_ALLOW_RUN_AS_ROOT", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "OMP_NUM_THREADS"}) {
+    setenv(name, "1", 1);  // NOLINT(concurrency-mt-unsafe): one thread
+  }
+  const Meter meter;
+  const Network near{.name = "base=0.05ms"};
+  Candidate candidate{ModelKind::kLinear, Element::kHex27Sri, 4};
+  const AccuracyPoint here = measure(candidate, truth(), meter, near);
+  candidate.elsewhere = true;
+  const AccuracyPoint there = measure(candidate, truth(), meter, near, {}, worker + " --way multigrid");
+  EXPECT_EQ(there.candidate.name(), "worker-hex27-sri");
+  EXPECT_EQ(there.size.free, here.size.free);
+  EXPECT_FALSE(there.instructions) << "they would be those of waiting";
+  for (std::size_t load = 0; load < 2; ++load) {
+    const Accuracy& at = there.at_load[load];
+    EXPECT_GT(at.solver, 0);
+    EXPECT_LT(at.solver, 0.01);
+    EXPECT_NEAR(at.total, here.at_load[load].total, at.solver);
+    EXPECT_NEAR(at.tangent, here.at_load[load].tangent, at.solver);
+    EXPECT_NEAR(at.model + at.discretisation + at.solver, at.total, 1e-12);
+  }
+  EXPECT_NEAR(there.force_relative, here.force_relative, 0.01);
+  EXPECT_LT(there.lateral, 0.01);
+  EXPECT_GT(there.update_ms_p50, 0);
+  EXPECT_NEAR(there.felt->displayed, here.felt->displayed, 0.05);
+}
+
+TEST(Accuracy, AWorkerThatDoesNotStartIsOneSentence) {
+  const Meter meter;
+  try {
+    measure({ModelKind::kLinear, Element::kHex8Sri, 4, true}, truth(), meter, {}, {}, "no-such-worker");
+    FAIL();
+  } catch (const std::runtime_error& error) {
+    EXPECT_NE(std::string(error.what()).find("no-such-worker"), std::string::npos) << error.what();
+  }
+}
+
 TEST(Accuracy, TheParetoFrontKeepsWhatNothingElseIsBothQuickerAndCloserThan) {
   const auto point = [](double ms, double model, double mesh) {
     AccuracyPoint p{.candidate = {ModelKind::kLinear, Element::kTet4, 4}};

@@ -23,8 +23,8 @@ constexpr Friction kDevice{.coulomb = 0.02, .viscous = 0.26};
 class Answers {
  public:
   /// `compute`: s, that the engine takes for a step of the body's time or for an answer of one without.
-  Answers(softbody::Body& body, double compute, double longest)
-      : body_(body), pace_(std::max(body.step(), compute)), longest_(longest) {}
+  Answers(PressedEngine& engine, double compute, double longest)
+      : engine_(engine), pace_(std::max(engine.step(), compute)), longest_(longest) {}
 
   /// Time begins anew, for another hand.
   void restart() {
@@ -42,7 +42,8 @@ class Answers {
 
   const softbody::Feel& at(double t, const Vec3& tool) {
     if (t == asked_at_ && tool == asked_) return feel_;
-    if ((meter_.read() - start_).processor > longest_) throw TooSlow("what is left at the hand takes too long to find");
+    if (engine_.took(meter_.read() - start_) > longest_)
+      throw TooSlow("what is left at the hand takes too long to find");
     if (next_ < given_.size() && given_[next_].t == t && given_[next_].tool == tool) {
       feel_ = given_[next_++].feel;
     } else {
@@ -62,14 +63,14 @@ class Answers {
 
   void go_on(double t, const Vec3& tool) {
     const Vec3 from = asked_.value_or(tool);
-    const double steps = body_.step() > 0 ? std::max(1.0, std::floor((t - went_on_to_) / pace_)) : 1;
-    for (double step = 1; step <= steps; ++step) feel_ = body_.touch(from + step / steps * (tool - from));
+    const double steps = engine_.step() > 0 ? std::max(1.0, std::floor((t - went_on_to_) / pace_)) : 1;
+    for (double step = 1; step <= steps; ++step) feel_ = engine_.touch(from + step / steps * (tool - from));
     went_on_to_ += steps * pace_;
     given_.resize(next_++);  // whatever was to come after this is of another hand
     given_.push_back({t, tool, feel_});
   }
 
-  softbody::Body& body_;
+  PressedEngine& engine_;
   double pace_;     ///< s
   double longest_;  ///< s
   Meter meter_;
@@ -105,10 +106,10 @@ double relative_error(const Outcome& outcome) { return outcome.force_error / out
 
 }  // namespace
 
-Felt felt(softbody::Body& body, Truth& truth, const Route& route, std::uint64_t seed, double longest_s) {
+Felt felt(PressedEngine& engine, Truth& truth, const Route& route, std::uint64_t seed, double longest_s) {
   const Vec3 surface = truth.block().touch_point();
   const double deepest = truth.block().loads[1] / truth.stiffness(1).secant;
-  Answers answers(body, seconds(route.compute), longest_s);
+  Answers answers(engine, seconds(route.compute), longest_s);
 
   Experiment set;
   set.environment.force = [&](double t, const Vec3& tool) { return answers.at(t, tool).force; };

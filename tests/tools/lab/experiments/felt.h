@@ -4,9 +4,9 @@
 #include <cstdint>
 #include <limits>
 
-#include "clients/softbody/body.h"
 #include "tests/tools/lab/experiments/experiment.h"
 #include "tests/tools/lab/experiments/pressed_block.h"
+#include "tests/tools/lab/experiments/pressed_engine.h"
 
 namespace tendon::lab {
 
@@ -23,9 +23,9 @@ struct Felt {
 };
 
 /// A hand that presses in and comes off again 0.8 times a second, not quite evenly, for 3 s, as deep as the hard load
-/// goes at the most; device of 0.26 N·s/m at 1 kHz. `body` is the block of `truth` in its own frame.
-/// Throws TooSlow after `longest_s` of processor time: Newton's method takes long over a body that collapses.
-Felt felt(softbody::Body& body, Truth& truth, const Route& route, std::uint64_t seed,
+/// goes at the most; device of 0.26 N·s/m at 1 kHz. `engine` has the block of `truth`.
+/// Throws TooSlow after `longest_s` (PressedEngine::took): Newton's method takes long over a body that collapses.
+Felt felt(PressedEngine& engine, Truth& truth, const Route& route, std::uint64_t seed,
           double longest_s = std::numeric_limits<double>::infinity());
 
 }  // namespace tendon::lab

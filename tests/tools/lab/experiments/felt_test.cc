@@ -14,7 +14,6 @@
 namespace tendon::lab {
 namespace {
 
-using softbody::Body;
 using softbody::BodyConfig;
 
 Truth& truth() {
@@ -23,7 +22,7 @@ Truth& truth() {
 }
 
 /// A few percent too stiff, like the truth otherwise, and at once.
-Body good_body() {
+std::unique_ptr<PressedEngine> good_body() {
   const PressedBlock& block = truth().block();
   BodyConfig config;
   config.shape = softbody::BlockShape{block.size, {6, 6, 3}};
@@ -32,7 +31,7 @@ Body good_body() {
   config.patch_radius = block.patch_radius;
   config.reach = 0.006;
   config.middle = block.touch_point();
-  return Body(config);
+  return own_engine(config);
 }
 
 Route route(const std::string& profile, double compute_ms) {
@@ -42,18 +41,18 @@ Route route(const std::string& profile, double compute_ms) {
 }
 
 TEST(Felt, AQuickBodyNearByIsFeltAsItIs) {
-  Body body = good_body();
-  const Felt near = felt(body, truth(), route("base=0.05ms", 0.01), 1);
+  const auto body = good_body();
+  const Felt near = felt(*body, truth(), route("base=0.05ms", 0.01), 1);
   EXPECT_LT(near.force_error, 0.06);
   EXPECT_NEAR(near.displayed, 1, 0.06);
   EXPECT_LT(near.vibration, kMostVibration);
 }
 
 TEST(Felt, TheSameBodyIsFeltWorseTheLongerAnAnswerTakes) {
-  Body body = good_body();
+  const auto body = good_body();
   double before = 0;
   for (const double ms : {0.01, 10.0, 50.0}) {
-    const Felt here = felt(body, truth(), route("base=0.05ms", ms), 1);
+    const Felt here = felt(*body, truth(), route("base=0.05ms", ms), 1);
     EXPECT_GT(here.force_error, before) << ms;
     EXPECT_GT(here.held_error, before) << ms;
     before = here.force_error;
@@ -62,8 +61,8 @@ TEST(Felt, TheSameBodyIsFeltWorseTheLongerAnAnswerTakes) {
 }
 
 TEST(Felt, AStiffnessThatIsSentAlongMakesUpForMostOfTheWait) {
-  Body body = good_body();
-  const Felt here = felt(body, truth(), route("base=1ms", 10), 1);
+  const auto body = good_body();
+  const Felt here = felt(*body, truth(), route("base=1ms", 10), 1);
   EXPECT_LT(here.force_error, 0.7 * here.held_error);
 }
 
@@ -78,12 +77,12 @@ TEST(Felt, ABodyOfManyShortStepsKeepsUpWithTheHand) {
   config.patch_radius = block.patch_radius;
   config.model = softbody::ModelKind::kTensorMass;
   config.effects = {.density = 1000, .step = 2e-4, .inertia = true, .damping = 40};
-  Body body(config);
-  const Felt quick = felt(body, truth(), route("base=0.05ms", 0.2), 1);
+  const auto body = own_engine(config);
+  const Felt quick = felt(*body, truth(), route("base=0.05ms", 0.2), 1);
   EXPECT_GT(quick.displayed, 0.4);
   EXPECT_LT(quick.latency, 0.006);
   // Five times as slow as the hand's time: it is still where the hand was.
-  const Felt slow = felt(body, truth(), route("base=0.05ms", 1), 1);
+  const Felt slow = felt(*body, truth(), route("base=0.05ms", 1), 1);
   EXPECT_LT(slow.displayed, 0.8 * quick.displayed);
 }
 

@@ -93,6 +93,8 @@ void add(CLI::App& verb, int& /*exit*/) {
   verb.add_option("--elements", arguments.elements, elements + "; left out: all")
       ->type_name("NAME,...")
       ->delimiter(',');
+  verb.add_option("--worker", options.worker, "command of a worker that answers for the linear block, too")
+      ->type_name("COMMAND");
   CLI::Option* const slowest =
       verb.add_option("--slowest-ms", options.slowest_ms, "a model is refined no further than this for an update")
           ->check(CLI::PositiveNumber)
@@ -128,6 +130,8 @@ void add(CLI::App& verb, int& /*exit*/) {
       "  tendon-lab accuracy --models condensed --n 4,8,16 --longest-setup-s 5\n"
       "all of it, in half an hour or more\n  tendon-lab accuracy --network wifi-good --out figures\n"
       "what to take\n  tendon-lab accuracy --budget-ms 5 --network wifi-good --json\n"
+      "\nExample: a body on two ranks beside the same one in this process\n"
+      "  tendon-lab accuracy --models linear --elements hex27-sri --worker \"mpirun -n 2 tendon-fem-worker\"\n"
       "\nExample: errors of the finest meshes, by many machines\n"
       "  tendon-sweep plan a --units 0:24 --per-shard 1 -- tendon-lab accuracy --models condensed --n 8,12,16,20\n"
       "\nTimes are those of this machine, now. Exit: 0 done; 1 cannot write, or gnuplot failed; 2 wrong usage.");

@@ -1,0 +1,136 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tests/tools/lab/experiments/pressed_engine.h"
+
+#include <unistd.h>
+
+#include <cstdlib>
+#include <fstream>
+#include <stdexcept>
+#include <variant>
+
+#include "clients/softbody/scene.h"
+#include "core/base/expect.h"
+#include "tests/clients/softbody/mpi/live_worker.h"
+
+namespace tendon::lab {
+namespace {
+
+using namespace softbody;
+
+constexpr int kMostPresses = 10;  // of Newton's method, for an answer under a load
+constexpr int kPatienceS = 600;
+constexpr double kFirstDepth = 1e-4;  // m, to see how stiff it is
+
+class OwnEngine final : public PressedEngine {
+ public:
+  explicit OwnEngine(const BodyConfig& config) : model_(config.model), body_(config) {}
+
+  Feel touch(const Vec3& tool) override { return body_.touch(tool); }
+  /// A body with time waits until it is at rest, and rounds until they change nothing. Newton's method is there at once;
+  /// or never, where the body collapses.
+  Reaction under(double load) override {
+    if (body_.step() > 0 || model_ == ModelKind::kProjective) return body_.settle(Given::kForce, load);
+    Reaction reaction;
+    for (int i = 0; i < kMostPresses && !(i > 0 && reaction.error <= 1e-4 * load); ++i) {
+      reaction = body_.press(Given::kForce, load);
+    }
+    return reaction;
+  }
+  double step() const override { return body_.step(); }
+  Body::Size size() const override { return body_.size(); }
+  double took(const Meter::Reading& cost) const override { return cost.processor; }
+
+ private:
+  ModelKind model_;
+  Body body_;
+};
+
+std::string in_mm(const Vec3& metres) {
+  return "[" + shortest(1e3 * metres.x()) + ", " + shortest(1e3 * metres.y()) + ", " + shortest(1e3 * metres.z()) + "]";
+}
+
+std::string scene_of(const BodyConfig& config) {
+  const auto& block = std::get<BlockShape>(config.shape);
+  std::string text = "effects = [\"contact\"]\n[body]\nshape = \"block\"\nsize_mm = " + in_mm(block.size);
+  text += "\ncells = [" + std::to_string(block.cells[0]) + ", " + std::to_string(block.cells[1]) + ", " +
+          std::to_string(block.cells[2]) + "]\nelement = \"" + std::string(info(config.element).name) + "\"";
+  text += "\nmaterial = { young_pa = " + shortest(config.material.young) +
+          ", poisson = " + shortest(config.material.poisson) + " }";
+  text += "\n[model]\nkind = \"linear\"\n[touch]\npatch_radius_mm = " + shortest(1e3 * config.patch_radius) +
+          "\nmiddle_mm = " + in_mm(config.middle) + "\n";
+  return text;
+}
+
+/// A file of its own, gone at the end.
+class SceneFile {
+ public:
+  explicit SceneFile(const std::string& text) {
+    std::string name = (std::filesystem::temp_directory_path() / "tendon-lab-XXXXXX.toml").string();
+    const int file = ::mkstemps(name.data(), 5);
+    if (file < 0) throw std::runtime_error("cannot make a file in " + std::filesystem::temp_directory_path().string());
+    ::close(file);
+    path_ = name;
+    std::ofstream(path_) << text;
+  }
+  ~SceneFile() {
+    std::error_code ignored;
+    std::filesystem::remove(path_, ignored);
+  }
+  SceneFile(const SceneFile&) = delete;
+  SceneFile& operator=(const SceneFile&) = delete;
+  const std::filesystem::path& path() const { return path_; }
+
+ private:
+  std::filesystem::path path_;
+};
+
+class WorkerEngine final : public PressedEngine {
+ public:
+  WorkerEngine(const BodyConfig& block, const std::string& command)
+      : file_(scene_of(block)),
+        scene_(read_scene(file_.path())),
+        middle_(block.middle),
+        size_(Body::size_of(scene_.body, under_patch_)),
+        worker_(command + " " + file_.path().string(), kPatienceS) {}
+
+  Feel touch(const Vec3& tool) override {
+    const Mat3 frame = to_device(scene_);
+    const Touch touch = worker_.answer(Vec3(scene_.at + frame * (tool - middle_)));
+    Feel feel;
+    feel.force = frame.transpose() * touch.force;
+    feel.touching = !feel.force.isZero(0);
+    if (touch.stiffness) feel.stiffness = frame.transpose() * *touch.stiffness * frame;
+    feel.valid_radius = touch.valid_radius;
+    feel.error = touch.error.value_or(0);
+    return feel;
+  }
+  /// It is linear: the second press is as deep as the load is.
+  Reaction under(double load) override {
+    double depth = kFirstDepth;
+    Feel feel = touch(middle_ - Vec3(0, 0, depth));
+    depth *= load / feel.force.z();
+    feel = touch(middle_ - Vec3(0, 0, depth));
+    return {.force = feel.force.z(), .depth = depth, .stiffness = feel.stiffness(2, 2), .error = feel.error};
+  }
+  double step() const override { return 0; }
+  Body::Size size() const override { return size_; }
+  double took(const Meter::Reading& cost) const override { return cost.wall; }
+
+ private:
+  SceneFile file_;
+  Scene scene_;
+  Vec3 middle_;  ///< m, of the patch at rest, body frame
+  int under_patch_ = 0;
+  Body::Size size_;
+  LiveWorker worker_;
+};
+
+}  // namespace
+
+std::unique_ptr<PressedEngine> own_engine(const BodyConfig& config) { return std::make_unique<OwnEngine>(config); }
+
+std::unique_ptr<PressedEngine> worker_engine(const BodyConfig& block, const std::string& command) {
+  return std::make_unique<WorkerEngine>(block, command);
+}
+
+}  // namespace tendon::lab
