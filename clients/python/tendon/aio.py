@@ -34,6 +34,7 @@ class Client(AnyClient):
         self._guest.moved = self._watch_another
         self._timer: asyncio.TimerHandle | None = None
         self._waiter: asyncio.Future[None] | None = None
+        self._timer_due: Instant = NEVER
         self._wake_at: Instant = NEVER
 
     async def states(self, duration_s: float | None = None) -> AsyncIterator[DeviceState]:
@@ -43,13 +44,15 @@ class Client(AnyClient):
         now = time.monotonic_ns()
         end = NEVER if duration_s is None else now + duration_s * 1e9
         while now < end:
-            guest.turn(now)
-            guest.raise_if_refused()
+            now = guest.take(now)
             state = core.next_state(now)
             if state is not None:
-                yield state
+                yield state  # is answered before anything else is done
+                guest.tend(time.monotonic_ns())
                 await asyncio.sleep(0)  # the other tasks get their turn, however fast states come
             else:
+                guest.tend(now)
+                guest.raise_if_refused()
                 await self._wait_until(min(core.next_state_due(), end))
             now = time.monotonic_ns()
 
@@ -79,10 +82,11 @@ class Client(AnyClient):
         loop.add_reader(new, self._turn)
 
     def _turn(self) -> None:
-        """Runs when something has come in or is due, and wakes the task that waits for a state."""
-        self._guest.turn(time.monotonic_ns())
+        """Runs when something has come in or is due. A task that waits for a state is woken, and does the rest."""
         if self._waiter is not None and not self._waiter.done():
             self._waiter.set_result(None)
+            return
+        self._guest.turn(time.monotonic_ns())
         self._set_timer()
 
     async def _wait_until(self, instant: Instant) -> None:
@@ -95,12 +99,22 @@ class Client(AnyClient):
         finally:
             self._waiter = None
             self._wake_at = NEVER
+            if self._timer is None:  # this task may never wait again
+                self._set_timer()
 
     def _set_timer(self) -> None:
-        if self._timer is not None:
-            self._timer.cancel()
-            self._timer = None
+        """Before the next turn is due. A timer that ends sooner stays: it asks again."""
         due = min(self._guest.core.next_turn(), self._wake_at)
+        if self._timer is not None:
+            if self._timer_due <= due:
+                return
+            self._timer.cancel()
+        self._timer = None
         if due != NEVER:
             delay_s = max(due - time.monotonic_ns(), 0) / 1e9
-            self._timer = asyncio.get_running_loop().call_later(delay_s, self._turn)
+            self._timer = asyncio.get_running_loop().call_later(delay_s, self._on_timer)
+            self._timer_due = due
+
+    def _on_timer(self) -> None:
+        self._timer = None
+        self._turn()

@@ -40,9 +40,9 @@ class Answer:
 
     def objection(self) -> str:
         """Why this answer cannot be used; empty when it can."""
-        if not all(map(math.isfinite, self.force)):
-            return "the force is not finite (NaN or infinity)"
         if not _usable(self.force):
+            if not all(map(math.isfinite, self.force)):
+                return "the force is not finite (NaN or infinity)"
             return f"the force is beyond {limits.MAX_VALUE:g} N"
         if self.torque is not None and not all(map(math.isfinite, self.torque)):
             return "the torque is not finite (NaN or infinity)"
@@ -96,7 +96,9 @@ def read_touch(touch: Touch) -> Answer:
 
 
 def _usable(vector: Vec3) -> bool:
-    return all(abs(component) <= limits.MAX_VALUE for component in vector)  # nor is NaN
+    x, y, z = vector
+    most = limits.MAX_VALUE
+    return -most <= x <= most and -most <= y <= most and -most <= z <= most  # nor is NaN
 
 
 def _vector(numbers: Sequence[float], expected: str = "a force of three numbers") -> Vec3:

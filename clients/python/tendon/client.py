@@ -50,18 +50,20 @@ class Client(AnyClient):
         end = NEVER if duration_s is None else now + duration_s * 1e9
         quiet = now + silence_ns
         while now < end:
-            guest.turn(now)
-            guest.raise_if_refused()
+            now = guest.take(now)
             state = core.next_state(now)
             if state is not None:
-                yield state
-            elif on_silence is not None and now >= quiet:
-                on_silence(now)
+                yield state  # is answered before anything else is done
+                guest.tend(time.monotonic_ns())
             else:
-                wait_s = (min(core.next_turn(), core.next_state_due(), end, quiet) - now) / 1e9
-                select.select([guest.socket], [], [], max(wait_s, 0))
-                now = time.monotonic_ns()
-                continue
+                guest.tend(now)
+                guest.raise_if_refused()
+                if on_silence is None or now < quiet:
+                    wait_s = (min(core.next_turn(), core.next_state_due(), end, quiet) - now) / 1e9
+                    select.select([guest.socket], [], [], max(wait_s, 0))
+                    now = time.monotonic_ns()
+                    continue
+                on_silence(now)
             now = time.monotonic_ns()
             quiet = now + silence_ns
 

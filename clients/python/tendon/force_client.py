@@ -460,6 +460,11 @@ class ForceClient:
         link = self._stats.link if self._session is None else self._session.stats
         return replace(self._stats, link=replace(link))
 
+    @property
+    def live_stats(self) -> Stats:
+        """The statistics themselves, to look at now and not to keep or change; their `link` is not up to date."""
+        return self._stats
+
     # ---- Inside ----
 
     def _claims(self) -> tuple[Claim, ...]:
@@ -543,7 +548,7 @@ class ForceClient:
         self._back_off = min(2 * self._back_off, _ns(self.config.retry_max_s))
 
     def _take_events(self, now: int) -> None:
-        while self._session is not None and (event := self._session.next_event()) is not None:
+        while self._session is not None and self._session.has_events and (event := self._session.next_event()) is not None:
             if isinstance(event, DeviceState):
                 self._stats.states += 1
                 self._stats.states_skipped += self._unseen is not None

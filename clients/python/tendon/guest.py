@@ -79,9 +79,16 @@ class Guest:
         self._said_unusable = ""
         self._said_left_out = ""
         self._told: LinkReport | None = None
+        self._seen_phase: Phase | None = None
+        self._seen_reason = ""
 
     def turn(self, now: int) -> None:
         """Takes what has come in, does what is due, sends what is to be sent."""
+        self.tend(self.take(now))
+
+    def take(self, now: int) -> int:
+        """The first half of a turn: takes what has come in, and gives the time at which that was. A state that is waited
+        for is answered before the other half."""
         for _ in range(MAX_DATAGRAMS):
             datagram = self._receive()
             if datagram is None:
@@ -89,6 +96,10 @@ class Guest:
             # The datagram may have come since the turn began, so its time of arrival is taken now.
             now = max(now, self.clock())
             self.core.receive(now, datagram)
+        return now
+
+    def tend(self, now: int) -> None:
+        """The other half."""
         self.core.tick(now)
         self.flush(now)
         self._follow_the_name()
@@ -123,11 +134,12 @@ class Guest:
     def _follow_the_name(self) -> None:
         """Between two attempts the name is looked up again: the server may have another address by now. Where nobody
         answered at one address, the next one of the name is tried."""
-        waits = self.core.phase in (Phase.UNANSWERED, Phase.REFUSED, Phase.LOST)
+        phase = self.core.phase
+        waits = phase in (Phase.UNANSWERED, Phase.REFUSED, Phase.LOST)
         if waits and not self._waited and not _is_numeric(self.server):
             threading.Thread(target=self._look_up_again, name="tendon-look-up", daemon=True).start()
         self._waited = waits
-        if self._found and self.core.phase is not Phase.OPEN:
+        if self._found and phase is not Phase.OPEN:
             found, self._found = self._found, []
             self._move_to(found)
 
@@ -166,23 +178,25 @@ class Guest:
         return None
 
     def _say(self) -> None:
-        report = self.core.report
-        if report is not None and report is not self._told:
+        """Says what is new. Each turn asks, so what is not new costs comparisons only."""
+        report, stats = self.core.report, self.core.live_stats
+        if report is not self._told and report is not None:
             self._told = report
             if report.words:
                 log.warning("the server says: %s", report.words)
-        unusable = self.core.stats.unusable
-        if unusable and unusable != self._said_unusable:
-            self._said_unusable = unusable
-            log.warning("a force is not sent: %s", unusable)
-        left_out = self.core.stats.left_out
-        if left_out and left_out != self._said_left_out:
-            self._said_left_out = left_out
-            log.warning("not sent with a force: %s", left_out)
+        if stats.unusable != self._said_unusable and stats.unusable:
+            self._said_unusable = stats.unusable
+            log.warning("a force is not sent: %s", stats.unusable)
+        if stats.left_out != self._said_left_out and stats.left_out:
+            self._said_left_out = stats.left_out
+            log.warning("not sent with a force: %s", stats.left_out)
+        if stats.phase is self._seen_phase and stats.reason == self._seen_reason:
+            return
+        self._seen_phase, self._seen_reason = stats.phase, stats.reason
         sentence = self._sentence()
         if sentence and sentence != self._said:
             self._said = sentence
-            log.log(logging.INFO if self.core.phase is Phase.OPEN else logging.WARNING, sentence)
+            log.log(logging.INFO if stats.phase is Phase.OPEN else logging.WARNING, sentence)
 
     def _sentence(self) -> str:
         phase, welcome = self.core.phase, self.core.welcome
@@ -191,9 +205,9 @@ class Guest:
         if phase is Phase.UNANSWERED:
             return f"no answer from {self.server}; {self._doubt}? Trying on"
         if phase is Phase.REFUSED:
-            return f"{self.server} refuses: {self.core.stats.reason}"
+            return f"{self.server} refuses: {self.core.live_stats.reason}"
         if phase is Phase.LOST:
-            return f"lost {self.server}: {self.core.stats.reason}"
+            return f"lost {self.server}: {self.core.live_stats.reason}"
         return ""
 
 

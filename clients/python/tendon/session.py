@@ -107,6 +107,8 @@ class Session:
         self._answering = IncomingRequests()
         self._round_trip = RoundTrip()
         # To tell.
+        self.has_events = False
+        """Whether next_event() is worth a call; it may still say None."""
         self._state_arrived: DeviceState | None = None
         self._force_arrived: ForceCommand | None = None
         self._report_arrived: LinkReport | None = None
@@ -198,8 +200,10 @@ class Session:
         if now - self._last_heard >= TIMEOUT_NS:
             self.open = False
             self._closed = Closed(Code.TIMED_OUT, f"nothing heard for {TIMEOUT_NS // 1_000_000} ms")
+            self.has_events = True
         elif now >= self._expires:
             self._closed = Closed(Code.EXPIRED, "the session has reached its age")
+            self.has_events = True
             self.close(self._closed.code, self._closed.reason)
 
     # ---- Out ----
@@ -229,6 +233,7 @@ class Session:
             event, self._state_arrived = self._state_arrived, None
         if event is None:
             event, self._closed = self._closed, None
+            self.has_events = event is not None
         return event
 
     def next_turn(self) -> Instant:
@@ -260,6 +265,7 @@ class Session:
             self._observe(now, content.sent_ns, content.echo)
         for frame in content.frames:
             self._take(frame)
+            self.has_events = True
 
     def _take(self, frame: Frame) -> None:
         if isinstance(frame, DeviceState):

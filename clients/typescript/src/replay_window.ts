@@ -14,6 +14,7 @@ const kRemembered = (kWords - 1n) * 64n;
 export class ReplayWindow {
   readonly #words = new BigUint64Array(Number(kWords));
   #highest = -1n;
+  #mask = 0;
   #count = 0n;
 
   /** True when `number` was inserted, or is too old to know. */
@@ -29,21 +30,20 @@ export class ReplayWindow {
       const to = number / 64n;
       const steps = to - from < kWords ? to - from : kWords;
       for (let i = 0n; i < steps; ++i) this.#words[Number((to - i) % kWords)] = 0n;
+      const ahead = this.#highest < 0n ? 33 : Math.min(Number(number - this.#highest), 33);
+      this.#mask = ahead > 32 ? 0 : ((ahead > 31 ? 0 : this.#mask << ahead) | (1 << (ahead - 1))) >>> 0;
       this.#highest = number;
+    } else {
+      const before = this.#highest - number;
+      if (before <= 32n) this.#mask = (this.#mask | (1 << (Number(before) - 1))) >>> 0;
     }
     this.#words[word(number)]! |= bit(number);
     ++this.#count;
   }
 
-  /** Bit i: (number − 1 − i) is known to have been inserted. */
-  maskBefore(number: bigint): number {
-    let mask = 0;
-    for (let i = 0; i < 32; ++i) {
-      const earlier = number - 1n - BigInt(i);
-      if (earlier < 0n) break;
-      if (this.#highest - earlier < kRemembered && this.#has(earlier)) mask |= 1 << i;
-    }
-    return mask >>> 0;
+  /** Bit i: (highest − 1 − i) is known to have been inserted. */
+  get mask(): number {
+    return this.#mask;
   }
 
   /** −1 before the first. */

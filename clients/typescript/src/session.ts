@@ -408,7 +408,7 @@ export class Session {
    */
   #write(now: Nanoseconds): Uint8Array {
     const { connectionId, seal, minResend } = this.#config;
-    const echo = this.#echo && { ...this.#echo, receivedMask: this.#seen.maskBefore(this.#echo.packetNumber) };
+    const echo = this.#echo && { ...this.#echo, receivedMask: this.#seen.mask };
     let body = encodeHead(now, echo);
     const add = (frame: Frame): boolean => {
       const piece = encodeFrame(frame);

@@ -1,8 +1,9 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""From a state handed to the socket to the force that answers it, decoded: C++ and Python virtual_wall by turns, on loopback,
-against the same stand-in server, which gives states at 1 kHz. What the stand-in itself costs is in both. `answered` is the
-share of the states that got a force of their own, `core_share` how much of one processor core the client took, its start included."""
+"""From a state's datagram handed to the socket to the datagram of the force that answers it, taken out of the socket: clients by
+turns, on loopback, against the same stand-in server, which gives states at 1 kHz. A floor is a program in the client's language
+that answers as many bytes with as many, and knows nothing else; to_floor is a client's median over it. `answered` is the share of the states that
+got a force of their own, `core_share` how much of one processor core the client took, its start included."""
 
 from __future__ import annotations
 
@@ -24,12 +25,83 @@ from stand_in import StandIn
 from tendon.messages import DeviceState, ForceCommand, Mode
 
 PERIOD_NS = 1_000_000
+PYTHON_FLOOR, NODE_FLOOR = "floor in Python", "floor in Node"
+TYPESCRIPT_WALL = ROOT / "clients" / "typescript" / "dist" / "examples" / "virtual_wall.js"
 ZERO = (0.0, 0.0, 0.0)
 
 
-def serve(program: list[str], key: bytes | None, seconds: float) -> tuple[int, list[int]]:
+STATE_BYTES, FORCE_BYTES = 189, 81
+FLOOR = f"""
+import socket, sys, time
+host, port = sys.argv[sys.argv.index("--server") + 1].rsplit(":", 1)
+end = time.monotonic() + float(sys.argv[sys.argv.index("--duration-s") + 1])
+wire = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+wire.connect((host, int(port)))
+wire.settimeout(1)
+wire.send(bytes({FORCE_BYTES}))
+while time.monotonic() < end:
+    wire.send(wire.recv(1201)[:{FORCE_BYTES}])
+"""
+"""The first 8 bytes are the tick."""
+FLOOR_IN_NODE = f"""
+const socket = require("node:dgram").createSocket("udp4");
+const after = (name) => process.argv[process.argv.indexOf(name) + 1];
+const [host, port] = after("--server").split(":");
+socket.on("message", (datagram) => socket.send(datagram.subarray(0, {FORCE_BYTES}), () => {{}}));
+socket.connect(Number(port), host, () => socket.send(Buffer.alloc({FORCE_BYTES})));
+setTimeout(() => process.exit(0), 1000 * Number(after("--duration-s")));
+"""
+
+
+class Floor:
+    """The stand-in of the floor: no session at all."""
+
+    def __init__(self) -> None:
+        self._state = b""
+
+    def receive(self, now: int, datagram: bytes) -> int | None:
+        return int.from_bytes(datagram[:8], "little") or None
+
+    def give(self, tick: int, now: int) -> bool:
+        self._state = tick.to_bytes(8, "little").ljust(STATE_BYTES, b"\0")
+        return True
+
+    def next_datagram(self, now: int) -> bytes | None:
+        datagram, self._state = self._state, b""
+        return datagram or None
+
+
+class Server:
+    """The stand-in of a client."""
+
+    def __init__(self, key: bytes | None) -> None:
+        self._server = StandIn(key)
+
+    def receive(self, now: int, datagram: bytes) -> int | None:
+        """The tick that it answers."""
+        server = self._server
+        server.receive(now, datagram)
+        answered = None
+        while server.session is not None and (event := server.session.next_event()) is not None:
+            if isinstance(event, ForceCommand):
+                answered = event.based_on_tick
+        return answered
+
+    def give(self, tick: int, now: int) -> bool:
+        session = self._server.session
+        if session is None or not session.open:
+            return False
+        inside = (1e-3, 0.0, 0.0)
+        session.send(DeviceState(tick, now, inside, ZERO, ZERO, 0.0, 8.0, 0, 0, 0, Mode.ACTIVE))
+        return True
+
+    def next_datagram(self, now: int) -> bytes | None:
+        self._server.tick(now)
+        return self._server.next_datagram(now)
+
+
+def serve(program: list[str], server: Floor | Server, seconds: float) -> tuple[int, list[int]]:
     """States sent, and the turnaround of each that was answered, ns."""
-    server = StandIn(key)
     peer = None
     sent: dict[int, int] = {}
     turnarounds: list[int] = []
@@ -42,28 +114,23 @@ def serve(program: list[str], key: bytes | None, seconds: float) -> tuple[int, l
         with subprocess.Popen([*program, *arguments], env=environment, stderr=subprocess.DEVNULL) as client:
             tick, due = 0, time.monotonic_ns()
             while client.poll() is None:
-                now = time.monotonic_ns()
-                select.select([wire], [], [], max(0, due - now) / 1e9)
+                select.select([wire], [], [], max(0, due - time.monotonic_ns()) / 1e9)
                 while True:
                     try:
                         datagram, peer = wire.recvfrom(1201)
                     except BlockingIOError:
                         break
                     now = time.monotonic_ns()
-                    server.receive(now, datagram)
-                    while server.session is not None and (event := server.session.next_event()) is not None:
-                        if isinstance(event, ForceCommand) and event.based_on_tick in sent:
-                            turnarounds.append(now - sent.pop(event.based_on_tick))
+                    answered = server.receive(now, datagram)
+                    if answered in sent:
+                        turnarounds.append(now - sent.pop(answered))
                 now = time.monotonic_ns()
-                server.tick(now)
-                if now >= due:
+                if peer is not None and now >= due:
                     due = max(due + PERIOD_NS, now)
-                    if server.session is not None and server.session.open:
-                        tick += 1
-                        inside = (1e-3, 0.0, 0.0)
-                        server.session.send(DeviceState(tick, now, inside, ZERO, ZERO, 0.0, 8.0, 0, 0, 0, Mode.ACTIVE))
-                        sent[tick] = time.monotonic_ns()
+                    given = server.give(tick + 1, now)
+                    tick += given
                 while peer is not None and (answer := server.next_datagram(time.monotonic_ns())) is not None:
+                    sent.setdefault(tick, time.monotonic_ns())
                     wire.sendto(answer, peer)
     return tick, turnarounds
 
@@ -85,19 +152,31 @@ def main() -> int:
     key_file.touch(mode=0o600)
     key_file.write_text(f"controller {key.hex()}\n", encoding="utf-8")
     wall = [sys.executable, str(EXAMPLES / "virtual_wall.py")]
-    clients: dict[str, tuple[list[str], bytes | None]] = {
-        "C++": ([str(options.programs / "virtual_wall")], None),
-        "Python": (wall, None),
-        "Python, sealed": ([*wall, "--key", str(key_file)], key),
+    asynchronous = [sys.executable, str(Path(__file__).parent / "turnaround_aio.py")]
+    # Program, its key, and its floor.
+    clients: dict[str, tuple[list[str], bytes | None, str]] = {
+        PYTHON_FLOOR: ([sys.executable, "-c", FLOOR], None, PYTHON_FLOOR),
+        "C++": ([str(options.programs / "virtual_wall")], None, PYTHON_FLOOR),
+        "Python": (wall, None, PYTHON_FLOOR),
+        "Python, sealed": ([*wall, "--key", str(key_file)], key, PYTHON_FLOOR),
+        "Python, asyncio": (asynchronous, None, PYTHON_FLOOR),
     }
+    if TYPESCRIPT_WALL.exists():
+        node = ["node", str(TYPESCRIPT_WALL)]
+        clients[NODE_FLOOR] = (["node", "-e", FLOOR_IN_NODE, "--"], None, NODE_FLOOR)
+        clients["TypeScript"] = (node, None, NODE_FLOOR)
+        clients["TypeScript, sealed"] = ([*node, "--key", str(key_file)], key, NODE_FLOOR)
+    else:
+        print(f"turnaround: no row of TypeScript: {TYPESCRIPT_WALL} is not built (npm run build there)", file=sys.stderr)
     states = dict.fromkeys(clients, 0)
     core_s = dict.fromkeys(clients, 0.0)
     turnarounds: dict[str, list[int]] = {name: [] for name in clients}
     try:
         for _ in range(options.rounds):
-            for name, (program, secret) in clients.items():
+            for name, (program, secret, floor) in clients.items():
                 before = resource.getrusage(resource.RUSAGE_CHILDREN)
-                given, took = serve(program, secret, options.seconds)
+                server = Floor() if name == floor else Server(secret)
+                given, took = serve(program, server, options.seconds)
                 after = resource.getrusage(resource.RUSAGE_CHILDREN)
                 core_s[name] += after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
                 states[name] += given
@@ -114,6 +193,7 @@ def main() -> int:
             "answered": round(len(took) / states[name], 4),
             "core_share": round(core_s[name] / options.seconds / options.rounds, 3),
             "p50_us": round(percentile(took, 0.5), 1),
+            "to_floor": round(percentile(took, 0.5) / percentile(turnarounds[clients[name][2]], 0.5), 2),
             "p99_us": round(percentile(took, 0.99), 1),
         }
         print(json.dumps(row) if options.json else "  ".join(f"{word} {value}" for word, value in row.items()), flush=True)

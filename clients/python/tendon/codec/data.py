@@ -49,7 +49,9 @@ def write_data_head(sent_ns: int, echo: Echo | None) -> bytes:
 
 
 def write_frame(frame: Frame) -> bytes:
-    return bytes(pb.Datagram(frames=[frames.write(frame)]).SerializeToString())
+    message = pb.Datagram()
+    frames.write_into(message.frames.add(), frame)
+    return bytes(message.SerializeToString())
 
 
 def _read_echo(message: pb.Echo) -> Echo:

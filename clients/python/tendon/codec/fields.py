@@ -88,7 +88,9 @@ def whole(value: int, least: int, most: int) -> int:
 
 
 def time(ns: int) -> int:
-    return whole(ns, -limits.MAX_TIME_NS, limits.MAX_TIME_NS)
+    if not -limits.MAX_TIME_NS <= ns <= limits.MAX_TIME_NS:
+        raise OutOfBounds
+    return ns
 
 
 def length(ns: int) -> int:
@@ -161,19 +163,27 @@ def _is_whole(body: bytes) -> bool:
     """Whether the whole body is one message. Some versions of protobuf, Debian's among them, end the message at a
     field 0 or at the end of a group that has not begun, and ignore the rest. Raises IndexError when
     that is not protobuf."""
-    at, groups = 0, 0
-    while at < len(body):
-        tag, at = _varint(body, at)
-        field, kind = tag >> 3, tag & 7
-        if field == 0:
+    at, groups, end = 0, 0, len(body)
+    while at < end:
+        tag = body[at]
+        at += 1
+        if tag >= 0x80:
+            tag, at = _varint(body, at - 1)
+        kind = tag & 7
+        if tag < 8:  # field 0
             return False
-        if kind == 0:
-            at = _varint(body, at)[1]
+        if kind == 2:
+            size = body[at]
+            at += 1
+            if size >= 0x80:
+                size, at = _varint(body, at - 1)
+            at += size
+        elif kind == 0:
+            while body[at] >= 0x80:
+                at += 1
+            at += 1
         elif kind == 1:
             at += 8
-        elif kind == 2:
-            size, at = _varint(body, at)
-            at += size
         elif kind == 5:
             at += 4
         else:

@@ -68,6 +68,8 @@ def _read_grip(message: pb.DeviceState) -> Grip | None:
 
 
 def _read_joints(message: pb.DeviceState) -> Joints | None:
+    if not message.joint_rad and not message.joint_velocity_radps:
+        return None
     angles = tuple(fields.number(angle) for angle in message.joint_rad)
     told = tuple(fields.number(velocity) for velocity in message.joint_velocity_radps)
     if max(len(angles), len(told)) > limits.MAX_JOINTS:
@@ -77,32 +79,32 @@ def _read_joints(message: pb.DeviceState) -> Joints | None:
 
 
 def _read_state(message: pb.DeviceState) -> DeviceState:
-    permitted = message.permitted_force_n
+    permitted, mode = message.permitted_force_n, fields.MODES.get(message.mode)
+    if mode is None or not permitted >= 0 or (permitted > limits.MAX_VALUE and permitted != inf):
+        raise fields.OutOfBounds
     return DeviceState(
-        tick=message.tick,
-        sampled_ns=fields.time(message.sampled_ns),
-        position=fields.vector(message.position_m),
-        velocity=fields.vector(message.velocity_mps),
-        force_applied=fields.vector(message.force_applied_n),
-        energy=fields.number(message.energy_j),
-        permitted_force=permitted if permitted == inf else fields.magnitude(permitted),
-        reasons=message.reasons,
-        force_sequence=message.force_sequence,
-        force_age_ns=fields.length(message.force_age_ns),
-        mode=fields.enum(fields.MODES, message.mode),
-        device=fields.device(message.device),
-        channel=fields.channel(message.channel),
-        force_wanted=fields.vector(message.force_wanted_n) if message.HasField("force_wanted_n") else None,
-        stiffness_wanted=fields.matrix(message.stiffness_wanted_npm) if message.stiffness_wanted_npm else None,
-        buttons=message.buttons,
-        turning=_read_turning(message),
-        torque_applied=fields.vector(message.torque_applied_nm) if message.HasField("torque_applied_nm") else None,
-        grip=_read_grip(message),
-        grip_applied=fields.number(message.gripper_force_applied_n)
-        if message.HasField("gripper_force_applied_n")
-        else None,
-        hand_force=fields.vector(message.hand_force_n) if message.HasField("hand_force_n") else None,
-        joints=_read_joints(message),
+        message.tick,
+        fields.time(message.sampled_ns),
+        fields.vector(message.position_m),
+        fields.vector(message.velocity_mps),
+        fields.vector(message.force_applied_n),
+        fields.number(message.energy_j),
+        permitted,
+        message.reasons,
+        message.force_sequence,
+        fields.length(message.force_age_ns),
+        mode,
+        fields.device(message.device),
+        fields.channel(message.channel),
+        fields.vector(message.force_wanted_n) if message.HasField("force_wanted_n") else None,
+        fields.matrix(message.stiffness_wanted_npm) if message.stiffness_wanted_npm else None,
+        message.buttons,
+        _read_turning(message),
+        fields.vector(message.torque_applied_nm) if message.HasField("torque_applied_nm") else None,
+        _read_grip(message),
+        fields.number(message.gripper_force_applied_n) if message.HasField("gripper_force_applied_n") else None,
+        fields.vector(message.hand_force_n) if message.HasField("hand_force_n") else None,
+        _read_joints(message),
     )
 
 
@@ -543,23 +545,40 @@ def _write_set_output(request: SetOutput) -> pb.SetOutput:
     return pb.SetOutput(device=request.device, output=request.output, vibration=pulse)
 
 
-def write(frame: Frame) -> pb.Frame:
+def write_into(piece: pb.Frame, frame: Frame) -> None:
+    """Into an empty one."""
     if isinstance(frame, ForceCommand):
-        force = pb.ForceCommand(
-            sequence=frame.sequence,
-            based_on_tick=frame.based_on_tick,
-            force_n=_write_vector(frame.force),
-            model=_write_model(frame.model) if frame.model else None,
-            valid_for_us=frame.valid_for_us,
-            device=frame.device,
-            channel=frame.channel,
-            topology_changed=frame.topology_changed,
-            error_n=frame.error,
-            torque_nm=None if frame.torque is None else _write_vector(frame.torque.torque),
-            rotation_model=_write_rotation_model(frame.torque.model) if frame.torque and frame.torque.model else None,
-            gripper_force_n=frame.grip_force,
-        )
-        return pb.Frame(force=force)
+        _write_force(piece.force, frame)  # in its place: messages that are put into each other are copied
+    else:
+        piece.CopyFrom(_write(frame))
+
+
+def _write_force(message: pb.ForceCommand, frame: ForceCommand) -> None:
+    message.sequence = frame.sequence
+    message.based_on_tick = frame.based_on_tick
+    force = message.force_n
+    force.x, force.y, force.z = frame.force
+    force.SetInParent()  # where all of it is zero
+    message.valid_for_us = frame.valid_for_us
+    if frame.device:
+        message.device = frame.device
+    if frame.channel:
+        message.channel = frame.channel
+    if frame.model is not None:
+        message.model.CopyFrom(_write_model(frame.model))
+    if frame.topology_changed:
+        message.topology_changed = True
+    if frame.error is not None:
+        message.error_n = frame.error
+    if frame.torque is not None:
+        message.torque_nm.CopyFrom(_write_vector(frame.torque.torque))
+        if frame.torque.model is not None:
+            message.rotation_model.CopyFrom(_write_rotation_model(frame.torque.model))
+    if frame.grip_force is not None:
+        message.gripper_force_n = frame.grip_force
+
+
+def _write(frame: Frame) -> pb.Frame:
     if isinstance(frame, DeviceState):
         turning = frame.turning
         state = pb.DeviceState(
@@ -610,6 +629,7 @@ def write(frame: Frame) -> pb.Frame:
         return pb.Frame(peer_report=_write_peer_report(frame))
     if isinstance(frame, PortState):
         return pb.Frame(port_state=ports.write_port(frame))
+    assert isinstance(frame, Bye)
     bye = pb.Bye(code=cast(pb.Code, frame.code), reason=fields.clip(frame.reason, limits.MAX_DETAIL))
     return pb.Frame(bye=bye)
 
