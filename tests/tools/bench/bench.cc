@@ -14,6 +14,7 @@
 
 #include "server/machine/clock.h"
 #include "tests/support/files.h"
+#include "tests/tools/bench/chart.h"
 
 namespace tendon::bench {
 
@@ -61,6 +62,10 @@ void bench(const BenchOptions& options, std::ostream& out) {
     }
   }
   if (options.write) expect_replaceable(*options.write, {kPageBegins});
+  const auto& only = options.only;
+  if (options.plot && !only.empty() && std::find(only.begin(), only.end(), "512") == only.end()) {
+    throw std::invalid_argument("--plot: draws the section 512, which --only leaves out");
+  }
   { const AtPriority may_we(options.priority); }  // or say so before an hour has passed
 
   Circumstances here = look_around();
@@ -96,6 +101,10 @@ void bench(const BenchOptions& options, std::ostream& out) {
   out << (options.json ? to_json(here) + "\n" : "\n" + to_text(here)) << std::flush;
   if (!out) throw std::runtime_error("cannot write the table: is the disk full?");
 
+  if (options.plot) {
+    for (const auto& file : draw_devices(*options.plot, here, run.rows))
+      std::cerr << "written: " << file.string() << "\n";
+  }
   if (!options.write) return;
   std::ofstream page(*options.write);
   page << to_markdown(here, run.rows) << std::flush;

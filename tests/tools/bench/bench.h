@@ -17,6 +17,7 @@ namespace tendon::bench {
 struct BenchOptions {
   std::vector<std::string> only{};               ///< names of sections; empty: all
   std::optional<std::filesystem::path> write{};  ///< a page in Markdown
+  std::optional<std::filesystem::path> plot{};   ///< a chart of the section 512, without .svg or .png
   bool json = false;
   bool quick = false;     ///< only that it runs: the figures mean nothing
   bool progress = false;  ///< on standard error

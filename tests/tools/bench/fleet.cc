@@ -212,7 +212,11 @@ class Host {
       for (std::size_t i = 0; i < lanes_.size(); ++i) {
         Mailboxes& mail = lanes_[i]->mail;
         while (const StepRecord* step = mail.steps.front()) {
-          if (counts && step->mode == Mode::kActive) result_.loop_age.observe(step->loop_age);
+          if (counts) ++result_.steps_owed;
+          if (counts && step->mode == Mode::kActive) {
+            result_.loop_age.observe(step->loop_age);
+            if (step->loop_age < kPeriod * 3 / 2) ++result_.answered_in_time;
+          }
           mail.steps.pop();
         }
         while (const DatagramRecord* record = mail.datagrams.front()) {
@@ -287,6 +291,7 @@ class Host {
       result_.controllers += plan.controls ? 1 : 0;
     }
     result_.states_owed = static_cast<std::uint64_t>(result_.seconds * static_cast<double>(seen) * fleet_.state_hz);
+    result_.steps_owed += result_.missed * fleet_.devices;
     result_.forces_owed = static_cast<std::uint64_t>(result_.seconds * static_cast<double>(controlled) *
                                                      std::min(fleet_.force_hz, fleet_.state_hz));
   }

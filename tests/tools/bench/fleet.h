@@ -53,6 +53,10 @@ struct FleetResult {
   std::uint64_t states_received = 0;
   std::uint64_t forces_owed = 0;
   std::uint64_t forces_taken = 0;
+  /// The strict measure: steps whose force answers the motion of the step before, less than 1.5 periods old. So the state
+  /// came to its guest, and the force back, within a period.
+  std::uint64_t answered_in_time = 0;
+  std::uint64_t steps_owed = 0;     ///< of all devices
   std::uint64_t out_datagrams = 0;  ///< server → guests
   std::uint64_t out_bytes = 0;
   std::uint64_t in_datagrams = 0;

@@ -130,6 +130,7 @@ std::string to_json(const Row& row) {
       .add("ratio", row.ratio)
       .add("instructions", row.instructions);
   if (row.target) json.add("target", row.target->text).add("met", row.target->met);
+  for (const auto& [name, value] : row.figures) json.add(name.c_str(), value);
   return json.add("note", row.note).str();
 }
 

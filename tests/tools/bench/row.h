@@ -5,6 +5,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 namespace tendon::bench {
@@ -31,6 +32,8 @@ struct Row {
   std::optional<Target> target{};
   std::optional<double> instructions{};  ///< of one, in user space, where the kernel lets us count them
   std::string note;
+  /// What the note says in words, where a chart wants it: a name and its value, in the order of the chart.
+  std::vector<std::pair<std::string, double>> figures{};
 };
 
 /// Where, what of, and how the lines came about.

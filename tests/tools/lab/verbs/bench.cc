@@ -23,12 +23,16 @@ void add(CLI::App& verb, int& /*exit*/) {
       ->check(CLI::Range(1, 60));
   verb.add_option("--seed", options.seed, "of worlds, keys and networks")->capture_default_str();
   verb.add_option("--write", options.write, "write the table as a page in Markdown, too")->type_name("FILE.md");
+  verb.add_option("--plot", options.plot,
+                  "draw what devices cost (section 512), as STEM.svg and STEM.png; needs gnuplot")
+      ->type_name("STEM");
   verb.add_flag("--quick", options.quick, "only that it runs: seconds, and the figures mean nothing");
   verb.add_flag("--json", options.json, "one JSON object for each line of the table, and one for its circumstances");
   verb.footer(
       "\nExample: all of it, some minutes, with its page\n"
       "  tendon-lab bench --fifo 50 --write tests/tools/bench/RESULTS.md\n"
       "one part\n  tendon-lab bench --only steps --json\n"
+      "cost against devices\n  tendon-lab bench --only 512 --fifo 50 --plot devices\n"
       "\nTimes are those of this machine, now. Exit: 0 measured, whatever the figures; 1 it could not be; 2 wrong "
       "usage.");
   verb.callback([] {
