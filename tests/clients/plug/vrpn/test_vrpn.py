@@ -264,9 +264,11 @@ def test_a_program_without_a_pause_is_felt_by_its_newest_field(stage, udp):
             client.force_field(force=(0, last, 0))
             if abs(client.wait(FORCE)[1] - last) < 1e-6:
                 break
-    assert abs(after["reports"] - before["reports"] - after["states"] + before["states"]) <= 2
+    states = after["states"] - before["states"]
+    # Of states that come at once, while it is busy with fields, it reports the newest.
+    assert 0.8 * states < after["reports"] - before["reports"] <= states + 2
     assert after["skipped"] > before["skipped"]
-    assert after["forces"] - before["forces"] < 7 * (after["states"] - before["states"])
+    assert after["forces"] - before["forces"] < 7 * states
 
 
 def test_a_button_is_told_and_a_server_that_comes_back_is_found(tmp_path):
