@@ -15,4 +15,4 @@ _tendon() {
 }
 complete -o default -F _tendon \
   tendond tendon-inject tendon-softbody tendon-lab tendon-report tendon-identify tendon-replay tendon-conformance tendon-dash tendon-plug \
-  tendon-sweep tendon-worlds tendon-ship tendon-fem tendon-fem-worker
+  tendon-sweep tendon-worlds tendon-ship tendon-fem tendon-fem-worker tendon-mesh

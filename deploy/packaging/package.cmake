@@ -7,8 +7,8 @@ include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
 
 set(programs tendond tendon-inject tendon-softbody tendon-lab tendon-report tendon-identify tendon-replay tendon-conformance
-    tendon-fem tendon-sweep tendon-worlds)
-install(TARGETS tendond tendon-softbody tendon-lab tendon-report tendon-identify tendon-replay tendon-fem tendon-sweep
+    tendon-fem tendon-mesh tendon-sweep tendon-worlds)
+install(TARGETS tendond tendon-softbody tendon-lab tendon-report tendon-identify tendon-replay tendon-fem tendon-mesh tendon-sweep
         tendon-worlds COMPONENT programs)
 install(DIRECTORY deploy/scenes/ DESTINATION ${CMAKE_INSTALL_DATADIR}/tendon/scenes COMPONENT programs
         FILES_MATCHING PATTERN "*.toml" PATTERN "*.msh")
@@ -129,7 +129,7 @@ set(CPACK_DEBIAN_RUN_PACKAGE_NAME tendon)
 set(CPACK_DEBIAN_RUN_PACKAGE_SECTION science)
 set(CPACK_DEBIAN_RUN_PACKAGE_SHLIBDEPS ON)
 set(CPACK_DEBIAN_RUN_PACKAGE_RECOMMENDS gnuplot-nox)
-set(CPACK_DEBIAN_RUN_PACKAGE_SUGGESTS "avahi-daemon, rclone, tendon-fem-worker")
+set(CPACK_DEBIAN_RUN_PACKAGE_SUGGESTS "avahi-daemon, gmsh, rclone, tendon-fem-worker")
 set(CPACK_DEBIAN_RUN_DESCRIPTION "Networked haptics server with an energy-bounding output limiter
  Runs the loop of a haptic device at 1 kHz and bounds every force so that the device never gives out more energy than it took in,
  while physics engines anywhere on the network send forces late, rarely or wrong.")

@@ -1,0 +1,272 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <cmath>
+#include <cstdlib>
+#include <cstring>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <sstream>
+#include <stdexcept>
+#include <string>
+
+#include "clients/softbody/body.h"
+#include "clients/softbody/fem/gmsh.h"
+#include "clients/softbody/mesher/triangles.h"
+#include "clients/softbody/mesher/volume.h"
+#include "tests/server/scratch_folder.h"
+
+namespace tendon::softbody {
+namespace {
+
+/// A block of 100 × 100 × 50 mm, its middle above the origin, in mm.
+Triangles block_surface() {
+  Triangles surface;
+  for (const double z : {0.0, 50.0}) {
+    for (const double y : {-50.0, 50.0}) {
+      for (const double x : {-50.0, 50.0}) surface.points.emplace_back(x, y, z);
+    }
+  }
+  constexpr std::array<std::array<int, 4>, 6> kSides{
+      {{0, 2, 3, 1}, {4, 5, 7, 6}, {0, 1, 5, 4}, {2, 6, 7, 3}, {0, 4, 6, 2}, {1, 3, 7, 5}}};
+  for (const auto& side : kSides) {
+    surface.facets.push_back({side[0], side[1], side[2]});
+    surface.facets.push_back({side[0], side[2], side[3]});
+  }
+  return surface;
+}
+
+std::string off_of(const Triangles& surface) {
+  std::ostringstream text;
+  text << "OFF\n" << surface.points.size() << " " << surface.facets.size() << " 0\n";
+  for (const Vec3& point : surface.points) text << point.x() << " " << point.y() << " " << point.z() << "\n";
+  for (const auto& facet : surface.facets) text << "3 " << facet[0] << " " << facet[1] << " " << facet[2] << "\n";
+  return text.str();
+}
+
+std::string obj_of(const Triangles& surface) {
+  std::ostringstream text;
+  text << "# by hand\no thing\n";
+  for (const Vec3& point : surface.points) text << "v " << point.x() << " " << point.y() << " " << point.z() << "\n";
+  for (const auto& facet : surface.facets) {
+    text << "f " << facet[0] + 1 << "/1/1 " << facet[1] + 1 << "//2 " << facet[2] - 8 << "\n";  // from the end
+  }
+  return text.str();
+}
+
+std::string ascii_stl_of(const Triangles& surface) {
+  std::ostringstream text;
+  text << "solid thing\n";
+  for (const auto& facet : surface.facets) {
+    text << "facet normal 0 0 0\nouter loop\n";
+    for (const int corner : facet) {
+      const Vec3& point = surface.points[at(corner)];
+      text << "vertex " << point.x() << " " << point.y() << " " << point.z() << "\n";
+    }
+    text << "endloop\nendfacet\n";
+  }
+  text << "endsolid thing\n";
+  return text.str();
+}
+
+std::string binary_stl_of(const Triangles& surface) {
+  const tendon::testing::ScratchFolder scratch;
+  write_stl(scratch.path() / "a.stl", surface);
+  std::ifstream file(scratch.path() / "a.stl", std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+template <class Call>
+std::string problem(const Call& call) {
+  try {
+    call();
+  } catch (const std::invalid_argument& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST(Triangles, EveryFormatGivesTheSameClosedBlock) {
+  const Triangles block = block_surface();
+  const std::pair<const char*, std::string> files[] = {
+      {".off", off_of(block)}, {".obj", obj_of(block)}, {".STL", ascii_stl_of(block)}, {".stl", binary_stl_of(block)}};
+  for (const auto& [ending, text] : files) {
+    const Triangles read = parse_surface(text, ending, "a");
+    EXPECT_EQ(read.points.size(), 8U) << ending << ": corners that lie on each other are one";
+    EXPECT_EQ(read.facets.size(), 12U) << ending;
+    EXPECT_NEAR(read.volume(), 500'000, 1e-6) << ending;
+    EXPECT_EQ(problem([&] { check(read, "a"); }), "") << ending;
+  }
+}
+
+TEST(Triangles, APolygonBecomesTrianglesAroundItsFirstCorner) {
+  const std::string text = "OFF 5 1 0\n0 0 0\n2 0 0\n3 1 0\n2 2 0\n0 2 0\n5 0 1 2 3 4\n";
+  EXPECT_EQ(parse_surface(text, ".off", "a").facets,
+            (std::vector<std::array<int, 3>>{{0, 1, 2}, {0, 2, 3}, {0, 3, 4}}));
+}
+
+TEST(Triangles, WhatIsNoFileOfItsKindIsRefusedWithItsPlace) {
+  const auto parse = [](const char* ending, const std::string& text) {
+    return problem([&] { parse_surface(text, ending, "a" + std::string(ending)); });
+  };
+  EXPECT_EQ(parse(".ply", "ply"), "a.ply: expected a surface: a file .stl, .obj or .off");
+  EXPECT_EQ(parse(".obj", "v 0 0 0\nv 1 0 x\n"), "a.obj: line 2: expected a number, found \"x\"");
+  EXPECT_EQ(parse(".obj", "v 0 0 nan\n"), "a.obj: line 1: expected a number, found \"nan\"");
+  EXPECT_EQ(parse(".obj", "v 0 0 0\nf 1 2 3\n"), "a.obj: line 2: there is no vertex 2");
+  EXPECT_EQ(parse(".obj", "v 0 0 0\nf 1 1\n"), "a.obj: line 2: expected three corners or more");
+  EXPECT_EQ(parse(".off", "OFF\n2 1 0\n0 0 0\n"), "a.off: ends after 1 points of 2");
+  EXPECT_EQ(parse(".off", "OFF\n1 1 0\n0 0 0\n3 0 0 1\n"), "a.off: line 4: there is no point 1");
+  EXPECT_EQ(parse(".stl", "solid\nvertex 0 0 0\nvertex 1 0 0\nendloop\n"),
+            "a.stl: line 4: expected three corners, found 2");
+  EXPECT_EQ(parse(".stl", "nothing"),
+            "a.stl: expected an STL file: text that begins with \"solid\", or 84 bytes and 50 for each facet");
+  EXPECT_EQ(parse(".obj", "v 0 0 0\n"), "a.obj: has no facet");
+  std::string bytes = binary_stl_of(block_surface());
+  const float infinity = INFINITY;
+  std::memcpy(bytes.data() + 84 + 50 + 12, &infinity, sizeof infinity);
+  EXPECT_EQ(parse(".stl", bytes), "a.stl: facet 2: a number is not finite");
+}
+
+TEST(Triangles, ASurfaceWithoutAnInsideIsRefusedByTheFacet) {
+  Triangles open = block_surface();
+  open.facets.pop_back();
+  EXPECT_NE(problem([&] { check(open, "a"); }).find("has an edge that no other facet has: the surface is not closed"),
+            std::string::npos);
+
+  Triangles turned = block_surface();
+  std::swap(turned.facets[4][0], turned.facets[4][1]);
+  const std::string sentence = problem([&] { check(turned, "a"); });
+  EXPECT_NE(sentence.find("turned inside out, or more than two facets meet there"), std::string::npos) << sentence;
+
+  Triangles inside_out = block_surface();
+  for (auto& facet : inside_out.facets) std::swap(facet[0], facet[1]);
+  EXPECT_EQ(problem([&] { check(inside_out, "a"); }),
+            "a: the surface is turned inside out: its facets must run anticlockwise, seen from outside");
+
+  Triangles crossing = block_surface();  // and the same once more, moved by half of itself in every direction
+  const int first = 8;
+  for (int i = 0; i < first; ++i) crossing.points.emplace_back(crossing.points[at(i)] + Vec3(50, 43, 25));
+  for (const auto& facet : block_surface().facets) {
+    crossing.facets.push_back({facet[0] + first, facet[1] + first, facet[2] + first});
+  }
+  const std::string cut = problem([&] { check(crossing, "a"); });
+  EXPECT_NE(cut.find("cut each other"), std::string::npos) << cut;
+  EXPECT_NE(cut.find("facet "), std::string::npos) << cut;
+}
+
+TEST(MeshReport, KnowsACubeARegularTetrahedronAndASkewedCell) {
+  const Mesh cube = block(Shape::kHex8, Vec3(1, 1, 1), {1, 1, 1});
+  Triangles surface = block_surface();
+  for (Vec3& point : surface.points) point = Vec3(point.x() / 100, point.y() / 100, point.z() / 50);
+  const MeshReport of_cube = report_on(cube, surface);
+  EXPECT_NEAR(of_cube.worst, 1, 1e-12);
+  EXPECT_NEAR(of_cube.volume_error, 0, 1e-12);
+  EXPECT_NEAR(of_cube.longest_edge, 1, 1e-12);
+  EXPECT_TRUE(of_cube.warnings.empty());
+
+  Mesh skewed = cube;
+  for (Vec3& node : skewed.nodes) node.x() += 20 * node.z();
+  const MeshReport of_skewed = report_on(skewed, surface);
+  EXPECT_NEAR(of_skewed.worst, 1 / std::hypot(1, 20), 1e-9);
+  ASSERT_EQ(of_skewed.warnings.size(), 1U);
+  EXPECT_NE(of_skewed.warnings[0].find("scaled Jacobian"), std::string::npos);
+
+  Mesh tetrahedron{
+      .shape = Shape::kTet4,
+      .nodes = {{0, 0, 0}, {1, 0, 0}, {0.5, std::sqrt(3.0) / 2, 0}, {0.5, std::sqrt(3.0) / 6, std::sqrt(2.0 / 3)}},
+      .elements = {0, 1, 2, 3}};
+  EXPECT_NEAR(report_on(tetrahedron, surface).worst, 1, 1e-9);
+}
+
+TEST(MeshReport, SaysWhenTheMeshIsNotAsLargeAsTheSurface) {
+  const MeshReport report = report_on(block(Shape::kHex8, Vec3(90, 100, 50), {2, 2, 1}), block_surface());
+  EXPECT_NEAR(report.volume_error, -0.1, 1e-12);
+  ASSERT_EQ(report.warnings.size(), 1U);
+}
+
+bool has_gmsh() { return std::system("gmsh --version > /dev/null 2>&1") == 0; }  // NOLINT(concurrency-mt-unsafe)
+
+class Meshing : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    if (!has_gmsh()) GTEST_SKIP() << "gmsh is not installed (package gmsh)";
+  }
+  std::string path(const char* name) const { return (scratch_.path() / name).string(); }
+  /// Exit code; all that it says is in said().
+  int run(const std::string& arguments) const {
+    const std::string command = std::string(TENDON_MESH) + " " + arguments + " > " + path("said") + " 2>&1";
+    return WEXITSTATUS(std::system(command.c_str()));  // NOLINT(concurrency-mt-unsafe): one thread
+  }
+  std::string said() const {
+    std::ifstream file(path("said"));
+    return {std::istreambuf_iterator<char>(file), {}};
+  }
+  double stiffness(const std::string& mesh, Element element) const {
+    BodyConfig config;
+    config.shape = FileShape{mesh, 1e-3};
+    config.element = element;
+    config.material = {.young = 1e4, .poisson = 0.45};
+    config.patch_radius = 0.02;
+    config.reach = 0.005;
+    config.middle = Vec3(0, 0, 0.05);
+    config.clamped_below = 1e-5;
+    return condense(config).stiffness;
+  }
+
+ private:
+  tendon::testing::ScratchFolder scratch_;
+};
+
+// B1 of clients/softbody/README.md: 420.2 N/m. Cubes of 12.5 mm are 9.5 % off, of 6.25 mm 2.5 %.
+TEST_F(Meshing, ABlockOfHexahedraIsNearlyAsStiffAsOneOfCubes) {
+  std::ofstream(path("block.off")) << off_of(block_surface());
+  ASSERT_EQ(run(path("block.off") + " --size 8 --at 0,0,50 --reach 30 --coarsest 2 --json --out " + path("block.msh")),
+            0)
+      << said();
+  const auto report = nlohmann::json::parse(said());
+  EXPECT_GT(report["scaled_jacobian"]["worst"].get<double>(), kPoorElement);
+  EXPECT_NEAR(report["volume"].get<double>(), 500'000, 1);
+  const double hexahedra = stiffness(path("block.msh"), Element::kHex8Sri);
+  EXPECT_GT(hexahedra, 420.2);
+  EXPECT_LT(hexahedra, 420.2 * 1.09);
+  ASSERT_EQ(
+      run(path("block.off") + " --size 8 --at 0,0,50 --reach 30 --coarsest 2 --tetrahedra --out " + path("t.msh")), 0)
+      << said();
+  EXPECT_GT(stiffness(path("t.msh"), Element::kTet4), 420.2 * 1.2) << "which is why hexahedra are made";
+}
+
+TEST_F(Meshing, ElementsAreSmallWhereTheBodyIsTouchedAndLargeElsewhere) {
+  const auto around = [&](const Vec3& touched) {
+    std::string words;
+    const Mesh mesh = volume_of(block_surface(), {.size = 5, .coarsest = 3, .touched = touched, .reach = 20}, words);
+    int near = 0;
+    for (const Vec3& node : mesh.nodes) near += (node - Vec3(0, 0, 50)).norm() < 15 ? 1 : 0;
+    return near;
+  };
+  EXPECT_GT(around(Vec3(0, 0, 50)), 3 * around(Vec3(50, 50, 0)));
+}
+
+TEST_F(Meshing, NothingThatIsThereIsOverwrittenAndABadSurfaceMakesNothing) {
+  std::ofstream(path("kept.msh")) << "mine";
+  std::ofstream(path("block.off")) << off_of(block_surface());
+  EXPECT_EQ(run(path("block.off") + " --size 10 --out " + path("kept.msh")), 1);
+  EXPECT_NE(said().find("is there already, and is not overwritten"), std::string::npos) << said();
+  Triangles open = block_surface();
+  open.facets.pop_back();
+  std::ofstream(path("open.off")) << off_of(open);
+  EXPECT_EQ(run(path("open.off") + " --size 10 --out " + path("new.msh")), 1);
+  EXPECT_NE(said().find("open.off: facet"), std::string::npos) << said();
+  EXPECT_FALSE(std::filesystem::exists(path("new.msh")));
+  EXPECT_EQ(run(path("block.off") + " --size -1 --out " + path("new.msh")), 2);
+  EXPECT_EQ(run(path("block.off") + " --size 10 --at 0,0,50 --out " + path("new.msh")), 2) << "how far from there?";
+}
+
+TEST_F(Meshing, TheSameSurfaceGivesTheSameMesh) {
+  std::string words;
+  const VolumeConfig config{.size = 12};
+  EXPECT_EQ(to_gmsh(volume_of(block_surface(), config, words)), to_gmsh(volume_of(block_surface(), config, words)));
+}
+
+}  // namespace
+}  // namespace tendon::softbody
