@@ -198,7 +198,7 @@ class Session:
         if now - self._last_heard >= TIMEOUT_NS:
             self.open = False
             self._closed = Closed(Code.TIMED_OUT, f"nothing heard for {TIMEOUT_NS // 1_000_000} ms")
-        elif now >= self._expires:
+        elif now >= self._expires or self.stats.forged >= limits.MAX_FORGED:
             self._closed = Closed(Code.EXPIRED, "the session has reached its age")
             self.close(self._closed.code, self._closed.reason)
 

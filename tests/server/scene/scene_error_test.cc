@@ -371,6 +371,20 @@ TEST(SceneError, WithoutKeysItListensOnThisMachineOnly) {
   }
 }
 
+TEST(SceneError, OfTheSuitesSaysWhichThereAreAndWhatTheyNeed) {
+  const std::string known = "[…], each one of \"aes-256-gcm\", \"chacha20-poly1305\"";
+  EXPECT_EQ(error_of_minimal_and("[network]\nkeys = \"keys\"\nsuites = [\"plain\"]\n"),
+            "s.toml:6: network.suites: expected one of \"aes-256-gcm\", \"chacha20-poly1305\", found \"plain\"");
+  EXPECT_EQ(error_of_minimal_and("[network]\nkeys = \"keys\"\nsuites = \"aes-256-gcm\"\n"),
+            "s.toml:6: network.suites: expected " + known + ", found \"aes-256-gcm\"");
+  EXPECT_EQ(error_of_minimal_and("[network]\nkeys = \"keys\"\nsuites = []\n"),
+            "s.toml:6: network.suites: expected some of aes-256-gcm, chacha20-poly1305, found none to seal by");
+  EXPECT_EQ(error_of_minimal_and("[network]\nsuites = [\"aes-256-gcm\"]\n"),
+            "s.toml:5: network.suites: expected none without keys: nothing is sealed then");
+  const Scene scene = parse(std::string(kMinimal) + "[network]\nkeys = \"keys\"\n", "lab");
+  EXPECT_EQ(scene.network.suites, all_suites());
+}
+
 TEST(SceneError, PassesOnWhatIsWrongWithARecordedMotion) {
   const ScratchFolder folder;
   const std::string csv = (folder.path() / "hand.csv").string();
