@@ -59,7 +59,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     const auto reply = door.receive(now, from, std::span(buffer).first(said), answer);
     fuzz::require(reply.size <= said);
     std::size_t length = reply.size;
-    std::optional<SessionKeys> there;
+    std::optional<SessionKeys> its;
     if (reply.guest) {
       // In suite 1 only what the holder of the key wrote gets here; its cookie apart, every byte counts.
       if (reply.guest->key != nullptr) fuzz::require(reply.guest->hello.name == "a");
@@ -70,7 +70,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       fuzz::require(reply.guest->suite.has_value() || (&door == &strict && which == 1));
       const Doorman::Answered answered =
           reply.guest->suite ? door.welcome(*reply.guest, 1, welcome, answer) : door.refuse(*reply.guest, {}, answer);
-      there = answered.keys;
+      its = answered.keys;
       length = answered.size;
       fuzz::require(length < said);
     }
@@ -86,11 +86,11 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     }
     if (sealed && !was_open && client.outcome()) {
       const auto* accepted = std::get_if<ClientHandshake::Accepted>(&*client.outcome());
-      fuzz::require((accepted != nullptr) == there.has_value());
+      fuzz::require((accepted != nullptr) == its.has_value());
       if (accepted != nullptr) {
-        fuzz::require(accepted->keys->suite == there->suite);
-        fuzz::require(accepted->keys->send.bytes() == there->receive.bytes());
-        fuzz::require(accepted->keys->receive.bytes() == there->send.bytes());
+        fuzz::require(accepted->keys->suite == its->suite);
+        fuzz::require(accepted->keys->send.bytes() == its->receive.bytes());
+        fuzz::require(accepted->keys->receive.bytes() == its->send.bytes());
       }
     }
     if (client.outcome()) client = fresh[which];

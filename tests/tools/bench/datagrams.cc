@@ -133,7 +133,7 @@ void codec(Run& run, std::size_t blocks, const std::string& name, const Message&
 
 /// libsodium's bare calls over as many bytes: what sealing and opening cannot be cheaper than.
 struct BareSeal {
-  BareSeal(Suite suite, std::size_t datagram) : suite(suite), size(datagram - kHeaderSize) {
+  BareSeal(Suite by, std::size_t datagram) : suite(by), size(datagram - kHeaderSize) {
     if (suite == Suite::kAesGcm) crypto_aead_aes256gcm_beforenm(&schedule, key.data());
     seal();
   }
