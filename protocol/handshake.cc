@@ -193,9 +193,8 @@ Doorman::Reply Doorman::receive(LocalTime now, const Address& from, std::span<co
     ++stats_.limited;
     return {};
   }
-  Reply reply{
-      .size = 0,
-      .guest = Guest{.hello = {}, .random = hello->random, .version = 0, .suite = {}, .key = {}, .noise = {}}};
+  Reply reply{.size = 0,
+              .guest = Guest{.hello = {}, .random = hello->random, .version = 0, .suite = {}, .key = {}, .noise = {}}};
   if (!read(*hello, *reply.guest)) reply.guest.reset();
   return reply;
 }

@@ -173,8 +173,8 @@ struct Session::State {
            silent_too_long(now);
   }
   bool too_old(LocalTime now) const noexcept {
-    return sealer && (now - opened >= config.life || next_packet >= config.max_datagrams ||
-                      stats.forged >= config.max_forged);
+    return sealer &&
+           (now - opened >= config.life || next_packet >= config.max_datagrams || stats.forged >= config.max_forged);
   }
   void close(Code code, std::string reason);
   Header begin(LocalTime now, std::span<std::byte, kMaxDatagram> buffer);

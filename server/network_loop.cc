@@ -191,9 +191,9 @@ void NetworkLoop::admit(LocalTime now, const Address& from, const Doorman::Guest
   if (answer_again(now, from, guest)) return;
   if (guest.version == 0) return refuse(now, from, guest, {Code::kUnsupported, "no protocol version in common"});
   if (!guest.suite) {
-    return refuse(now, from, guest,
-                  {Code::kUnsupported, "this server seals by " + names_of(config_.suites) +
-                                           " only, and you do not offer it"});
+    return refuse(
+        now, from, guest,
+        {Code::kUnsupported, "this server seals by " + names_of(config_.suites) + " only, and you do not offer it"});
   }
   auto claimed = Admission::seats_of(guest.hello, devices_);
   if (auto* const cannot_be = std::get_if<Refusal>(&claimed)) return refuse(now, from, guest, std::move(*cannot_be));

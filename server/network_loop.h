@@ -48,10 +48,10 @@ namespace tendon {
 class NetworkLoop {
  public:
   struct Config {
-    Bytes32 secret{};                       ///< of cookies and ephemeral keys; random at start
-    std::vector<ClientKey> keys{};          ///< who may come in; empty: anybody on this machine, in the clear
+    Bytes32 secret{};                          ///< of cookies and ephemeral keys; random at start
+    std::vector<ClientKey> keys{};             ///< who may come in; empty: anybody on this machine, in the clear
     Suites suites = suites_of_this_machine();  ///< by which the sessions of those may be sealed
-    std::uint32_t first_connection_id = 1;  ///< random at start, so that a restarted server does not know old guests
+    std::uint32_t first_connection_id = 1;     ///< random at start, so that a restarted server does not know old guests
     std::string server_name = "tendond";
     /// What guests are told of each device; its number is its place, `holder` does not count.
     std::vector<DeviceDescription> devices{};

@@ -52,9 +52,9 @@ Opener::Verdict Opener::open(LocalTime now, const Header& header, std::span<cons
 
   const auto ahead = static_cast<std::uint8_t>(header.epoch - epoch_);
   const SealingKey* const key = ahead == 0                   ? &present_
-                         : ahead == 1                 ? &next_
-                         : ahead == 0xFF && previous_ ? &*previous_
-                                                      : nullptr;
+                                : ahead == 1                 ? &next_
+                                : ahead == 0xFF && previous_ ? &*previous_
+                                                             : nullptr;
   if (key == nullptr) return Verdict::kOldKey;
   const auto associated = datagram.first(kHeaderSize);
   const auto sealed = datagram.subspan(kHeaderSize);

@@ -38,8 +38,9 @@ void expect_speakable(const Suites& suites) {
   if (suites.empty()) throw std::invalid_argument("no suite to seal by: expected some of " + names_of(here));
   for (const Suite suite : suites) {
     if (contains(here, suite)) continue;
-    throw std::invalid_argument(suite == Suite::kAesGcm ? "this processor has no AES instructions: expected " + names_of(here)
-                                                        : "expected suites that seal: " + names_of(here));
+    throw std::invalid_argument(suite == Suite::kAesGcm
+                                    ? "this processor has no AES instructions: expected " + names_of(here)
+                                    : "expected suites that seal: " + names_of(here));
   }
 }
 

@@ -33,7 +33,7 @@ enum class Suite : std::uint8_t {
 struct Header {
   DatagramType type = DatagramType::kData;
   Suite suite = Suite::kPlain;
-  std::uint8_t epoch = 0;           ///< how often the sender has renewed its key, modulo 256; Data of suites 1 and 2 only
+  std::uint8_t epoch = 0;  ///< how often the sender has renewed its key, modulo 256; Data of suites 1 and 2 only
   std::uint32_t connection_id = 0;  ///< 0 before the server has given one
   std::uint64_t packet_number = 0;  ///< 0, 1, 2 … per direction in Data, 0 in all others
   bool operator==(const Header&) const = default;

@@ -181,7 +181,8 @@ Finding aes(const fs::path& root) {
     std::istringstream words(cpus);
     return std::find(std::istream_iterator<std::string>(words), {}, flag) != std::istream_iterator<std::string>();
   };
-  if (has("aes") && has("pclmulqdq")) return {"aes", "in hardware: sessions are sealed by " + names_of(all_suites()), ""};
+  if (has("aes") && has("pclmulqdq"))
+    return {"aes", "in hardware: sessions are sealed by " + names_of(all_suites()), ""};
   return {"aes", "none: sessions are sealed by " + names_of({Suite::kNoise}),
           "sealing by AES costs a third of that: in a virtual machine, a CPU model that shows the host's AES"};
 }
@@ -216,8 +217,7 @@ Diagnosis::WakeUps measure_wake_ups(const WakeUpClock& clock, Duration period, s
 
 std::vector<Diagnosis::Finding> look_around(const fs::path& root) {
   return {kernel(root),      tick(root),      machine(root), governor(root),   priority_limit(root), memory_limit(root),
-          autosuspend(root), isolation(root), sleep(root),   throttling(root), slack(root),
-          aes(root)};
+          autosuspend(root), isolation(root), sleep(root),   throttling(root), slack(root),          aes(root)};
 }
 
 Diagnosis diagnose(const WakeUpClock& clock) {

@@ -399,8 +399,7 @@ std::string in_words(const Scene& scene, const Explanation& explanation) {
   }
   text << "the limiter's promise: " << promise_of(scene.loop.control.limiter) << '\n';
   text << "in other threads: " << scene.channels.size() << (scene.channels.size() == 1 ? " channel" : " channels")
-       << " for engines"
-       << (scene.network.keys ? ", sealed by " + spoken_here(scene.network.suites) : "") << ", "
+       << " for engines" << (scene.network.keys ? ", sealed by " + spoken_here(scene.network.suites) : "") << ", "
        << (scene.recording ? "a recording" : "no recording")
        << (scene.discovery && scene.discovery->announce ? ", announced on the network" : "") << '\n';
   return text.str();

@@ -53,9 +53,9 @@ TEST_F(Noise, TheKeysOfSuite2AreBoundToTheWholeHandshake) {
   EXPECT_NE(split_of_suite_2(one).responder_to_initiator.bytes(),
             split_of_suite_2(other).responder_to_initiator.bytes());
   // And no key of one suite is a key of the other.
-  const std::set<Bytes32> all = {
-      one.initiator_to_responder.bytes(), one.responder_to_initiator.bytes(),
-      split_of_suite_2(one).initiator_to_responder.bytes(), split_of_suite_2(one).responder_to_initiator.bytes()};
+  const std::set<Bytes32> all = {one.initiator_to_responder.bytes(), one.responder_to_initiator.bytes(),
+                                 split_of_suite_2(one).initiator_to_responder.bytes(),
+                                 split_of_suite_2(one).responder_to_initiator.bytes()};
   EXPECT_EQ(all.size(), 4U);
 }
 

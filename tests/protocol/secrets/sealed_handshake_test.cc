@@ -252,7 +252,7 @@ class TwoSuites : public SealedHandshake {
     if (!crypto::has_aes()) GTEST_SKIP() << "this processor has no AES";
   }
   struct Met {
-    std::optional<Suite> chosen;     ///< by the door; empty: it refuses
+    std::optional<Suite> chosen;      ///< by the door; empty: it refuses
     std::optional<SessionKeys> here;  ///< the client's
     std::optional<SessionKeys> there;
     std::optional<Refused> refused;  ///< what the client made of it
@@ -306,10 +306,10 @@ TEST_F(TwoSuites, TheFastestThatBothHaveIsTakenAndAnOlderPeerIsServed) {
     Suites client, door;
     Suite agreed;
   };
-  for (const auto& [client, door, agreed] : {Case{kNew, kNew, Suite::kAesGcm}, Case{kNew, kOld, Suite::kNoise},
-                                             Case{kOld, kNew, Suite::kNoise}, Case{kOld, kOld, Suite::kNoise},
-                                             Case{kAesOnly, kNew, Suite::kAesGcm}, Case{kNew, kAesOnly, Suite::kAesGcm},
-                                             Case{kAesOnly, kAesOnly, Suite::kAesGcm}}) {
+  for (const auto& [client, door, agreed] :
+       {Case{kNew, kNew, Suite::kAesGcm}, Case{kNew, kOld, Suite::kNoise}, Case{kOld, kNew, Suite::kNoise},
+        Case{kOld, kOld, Suite::kNoise}, Case{kAesOnly, kNew, Suite::kAesGcm}, Case{kNew, kAesOnly, Suite::kAesGcm},
+        Case{kAesOnly, kAesOnly, Suite::kAesGcm}}) {
     SCOPED_TRACE(names_of(client) + " meets " + names_of(door));
     const Met met = meet(client, door);
     ASSERT_TRUE(met.here && met.there);

@@ -266,7 +266,8 @@ std::optional<ClientJudge::Session> ClientJudge::welcome() {
   std::ranges::copy(random16(), ephemeral.begin() + 16);
   const Answered answered = answer_to(*greeting, id, welcome_to(greeting->hello, 1, options_.aes), Key(ephemeral));
   if (options_.aes) {
-    report_.judge("suite-2", answered.suite == 2, greeting->hello.ShortDebugString(), "a Hello that offers aes-256-gcm");
+    report_.judge("suite-2", answered.suite == 2, greeting->hello.ShortDebugString(),
+                  "a Hello that offers aes-256-gcm");
   } else {
     report_.not_applicable("suite-2", "suite 2 was not asked for (--suite 2)");
   }

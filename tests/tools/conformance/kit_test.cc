@@ -26,9 +26,7 @@ struct Broken {
 };
 
 /// Those that this processor can speak.
-int suites_here() {
-  return contains(suites_of_this_machine(), Suite::kAesGcm) ? 3 : 2;
-}
+int suites_here() { return contains(suites_of_this_machine(), Suite::kAesGcm) ? 3 : 2; }
 
 std::optional<Key> key_of(int suite) {
   if (suite == 0) return std::nullopt;
@@ -54,11 +52,10 @@ std::set<std::string_view> failed(const Report& report) {
 
 Report server_report(int suite, Fault fault) {
   crypto::start();
-  const Options options{
-      .key = key_of(suite),
-      .aes = suite == 2,
-      .long_checks = fault == Fault::kNeverRenews,
-      .follower = fault != Fault::kKnowsNoCoupling};
+  const Options options{.key = key_of(suite),
+                        .aes = suite == 2,
+                        .long_checks = fault == Fault::kNeverRenews,
+                        .follower = fault != Fault::kKnowsNoCoupling};
   ToyServer server(options.key, fault);
   ToyWire wire(server, true);
   Report report(Side::kServer);

@@ -117,7 +117,8 @@ std::optional<ServerGuest::Session> ServerGuest::enter(const pb::Hello& words) {
   if (!answered || !answered->body.has_welcome()) return std::nullopt;
   judge_welcome(words, *this, attempt, *answered);
   if (options.aes) {
-    report.judge("suite-2", answered->suite == 2, answered->body.ShortDebugString(), "a Welcome that names aes-256-gcm");
+    report.judge("suite-2", answered->suite == 2, answered->body.ShortDebugString(),
+                 "a Welcome that names aes-256-gcm");
   } else {
     report.not_applicable("suite-2", "suite 2 was not asked for (--suite 2)");
   }

@@ -132,8 +132,7 @@ int run(int argc, char** argv) {
     auto* const key =
         command->add_option("--key", line.key, "Sealed, with this key file (of a controller); without one suite 0")
             ->type_name("FILE");
-    command
-        ->add_option("--suite", line.suite, "With a key, of Data: 2 offers and chooses suite 2, and judges by it")
+    command->add_option("--suite", line.suite, "With a key, of Data: 2 offers and chooses suite 2, and judges by it")
         ->check(CLI::IsMember({1, 2}))
         ->needs(key)
         ->capture_default_str();

@@ -428,8 +428,8 @@ std::string describe(const DrawnWorld& world) {
   if (world.pauses()) text += ", pauses of " + ms(config.pause);
   if (world.port.unseen > 0) text += ", readings fail";
   const bool aes = contains(config.suites, Suite::kAesGcm);
-  text += world.sealed() ? (aes ? "; by " + names_of(config.suites) : "; suite 1") + ", a key for " + std::to_string(config.rekey.datagrams) + " datagrams or " +
-                               ms(config.rekey.age)
+  text += world.sealed() ? (aes ? "; by " + names_of(config.suites) : "; suite 1") + ", a key for " +
+                               std::to_string(config.rekey.datagrams) + " datagrams or " + ms(config.rekey.age)
                          : "; suite 0";
   for (const DrawnClient& client : world.clients) {
     switch (client.kind) {

@@ -64,7 +64,7 @@ class World {
     /// Of the server and of the clients that have a key. Suite 2 takes a processor with AES; a world of suite 1 is the
     /// same on all.
     Suites suites = {Suite::kNoise};
-    Rekey rekey{};                  ///< of what the server says
+    Rekey rekey{};                                   ///< of what the server says
     Duration session_life = Session::Config{}.life;  ///< by the server
 
     static Network::Weather bad();
