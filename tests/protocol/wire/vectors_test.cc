@@ -101,7 +101,8 @@ TEST(Vectors, ChaCha20Poly1305GivesTheAnswersOfRfc8439) {
 
 TEST(Vectors, Aes256GcmGivesTheAnswersOfItsAuthors) {
   if (!crypto::has_aes()) GTEST_SKIP() << "this processor has no AES";
-  for (const Json& v : read("primitives.json").at("aes256_gcm")) {
+  const Json file = read("primitives.json");
+  for (const Json& v : file.at("aes256_gcm")) {
     const Bytes nonce = bytes(v, "nonce");
     std::uint64_t number = 0;
     for (std::size_t i = 4; i < 12; ++i) number = number << 8U | std::to_integer<std::uint64_t>(nonce.at(i));
