@@ -115,7 +115,7 @@ Key renewed(const Key& key) noexcept {
   });
 }
 
-bool has_aes() noexcept { return crypto_aead_aes256gcm_is_available() == 1; }
+bool has_aes() noexcept { return sodium_init() >= 0 && crypto_aead_aes256gcm_is_available() == 1; }
 
 AesGcm::AesGcm(const Key& key) noexcept {
   crypto_aead_aes256gcm_beforenm(reinterpret_cast<crypto_aead_aes256gcm_state*>(schedule_.data()), in(key.bytes()));

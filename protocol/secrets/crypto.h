@@ -61,7 +61,7 @@ bool open(const Key& key, std::uint64_t number, std::span<const std::byte> assoc
 Key renewed(const Key& key) noexcept;
 
 /// Whether this processor has the instructions that AES-256-GCM takes here (AES-NI, CLMUL). In software AES is slow, or
-/// its time tells of the key, so libsodium has none. False before start().
+/// its time tells of the key, so libsodium has none. Starts libsodium.
 bool has_aes() noexcept;
 
 /// AES-256-GCM under one key, whose schedule is computed once. Not to be made where has_aes() is false.
