@@ -111,7 +111,8 @@ class ForceClient {
     /// With a Watch: be a controller that sends no force. It may rearm, disarm and hold a
     /// channel.
     bool operates = false;
-    /// Shared with the server: all is sealed then, and nothing in the clear is heard. Without one the server must be on this machine.
+    /// Shared with the server: all is sealed then, and nothing in the clear is heard. Without one the server must be on
+    /// this machine.
     std::optional<Key> key{};
     /// With a key: by which of them the session may be sealed; the server chooses.
     Suites suites = suites_of_this_machine();

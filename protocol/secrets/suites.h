@@ -21,6 +21,7 @@ struct NamedSuite {
 inline constexpr std::array kSealedSuites = {NamedSuite{Suite::kAesGcm, "aes-256-gcm"},
                                              NamedSuite{Suite::kNoise, "chacha20-poly1305"}};
 inline constexpr std::string_view kFeatureAesGcm = kSealedSuites[0].name;
+static_assert(kSealedSuites[0].suite == Suite::kAesGcm);
 
 /// Some of them, each once.
 using Suites = std::vector<Suite>;

@@ -173,7 +173,7 @@ Finding machine(const fs::path& root) {
   return {"machine", "virtual", "not for a real device: the host may stop the whole machine for 20 ms and more"};
 }
 
-/// What sealing costs: see protocol/secrets/suites.h.
+/// By what sessions are sealed here (protocol/secrets/suites.h).
 Finding aes(const fs::path& root) {
   const std::string cpus = text_of(root / "proc/cpuinfo");
   if (cpus.empty()) return {"aes", "unknown", ""};
@@ -181,10 +181,11 @@ Finding aes(const fs::path& root) {
     std::istringstream words(cpus);
     return std::find(std::istream_iterator<std::string>(words), {}, flag) != std::istream_iterator<std::string>();
   };
-  if (has("aes") && has("pclmulqdq"))
+  if (has("aes") && has("pclmulqdq")) {
     return {"aes", "in hardware: sessions are sealed by " + names_of(all_suites()), ""};
+  }
   return {"aes", "none: sessions are sealed by " + names_of({Suite::kNoise}),
-          "sealing by AES costs a third of that: in a virtual machine, a CPU model that shows the host's AES"};
+          "sealing by AES costs half of that, and less: in a virtual machine, a CPU model that shows the host's AES"};
 }
 
 double us(Duration time) { return seconds(time) * 1e6; }

@@ -366,7 +366,8 @@ std::string spoken_here(const Suites& wanted) {
   Suites here = suites_of_this_machine();
   std::erase_if(here, [&](Suite suite) { return !contains(wanted, suite); });
   if (here.empty()) return "nothing that this processor can: it has no AES instructions";
-  return names_of(here) + (here.size() < wanted.size() ? " (this processor has no AES instructions)" : "");
+  const bool lacks_one = contains(wanted, Suite::kAesGcm) && !contains(here, Suite::kAesGcm);
+  return names_of(here) + (lacks_one ? " (this processor has no AES instructions)" : "");
 }
 
 }  // namespace
