@@ -19,6 +19,7 @@ void Connection::greet(LocalTime now, const Hello& hello) {
   config.hello = hello;
   const Key random = secrets_.next();
   std::copy_n(random.bytes().begin(), config.random.size(), config.random.begin());
+  config.suites = config_.suites;
   if (config_.key) config.secret = {.key = *config_.key, .ephemeral = secrets_.next()};
   handshake_.emplace(config, now);
   give_up_ = now + config_.patience;

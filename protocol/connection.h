@@ -34,7 +34,8 @@ namespace tendon {
 class Connection {
  public:
   struct Config {
-    std::optional<Key> key{};                             ///< suite 1 when set, and only that
+    std::optional<Key> key{};                             ///< when set, sessions are sealed, and only so
+    Suites suites = suites_of_this_machine();             ///< … by one of these
     Seed seed{};                                          ///< of randoms and ephemeral keys: 32 bytes from the system
     Duration patience = std::chrono::seconds(2);          ///< of one attempt; > 0
     Duration retry_min = std::chrono::milliseconds(100);  ///< first wait before the next attempt; > 0

@@ -34,6 +34,20 @@ std::vector<std::byte> prologue(const KeyId& id, const ClientRandom& random) {
   return out;
 }
 
+/// Both ends of suite 2 have named it, inside the sealed messages of the handshake: that binds the choice.
+bool names_aes(const std::vector<std::string>& features) noexcept {
+  return std::find(features.begin(), features.end(), kFeatureAesGcm) != features.end();
+}
+
+Hello offering(Hello hello, const Suites& suites) {
+  if (contains(suites, Suite::kAesGcm)) hello.features.emplace_back(kFeatureAesGcm);
+  return hello;
+}
+
+NoiseSplit split_of(Suite suite, const NoiseSplit& split) noexcept {
+  return suite == Suite::kAesGcm ? split_of_suite_2(split) : split;
+}
+
 std::int64_t floor_divide(std::int64_t a, std::int64_t b) noexcept { return a / b - (a % b < 0 ? 1 : 0); }
 
 }  // namespace
@@ -45,7 +59,8 @@ ClientHandshake::ClientHandshake(const Config& config, LocalTime now)
       version_max_(config.hello.version_max),
       random_(config.random),
       resend_(config.resend),
-      body_(write_body(config.hello)),
+      suites_(config.suites),
+      body_(write_body(config.secret ? offering(config.hello, config.suites) : config.hello)),
       next_tick_(now) {
   constexpr std::size_t kMost = kMaxHandshakeBody - sizeof(KeyId) - kNoiseOverhead;
   if (body_.size() > kMost) {
@@ -53,7 +68,7 @@ ClientHandshake::ClientHandshake(const Config& config, LocalTime now)
                                 ": claim less, or by shorter names");
   }
   if (!config.secret) return;
-  crypto::start();
+  expect_speakable(suites_);
   const KeyId id = key_id(config.secret->key);
   noise_.emplace(config.secret->key, config.secret->ephemeral, prologue(id, random_), body_);
   body_.assign(id.begin(), id.end());
@@ -90,9 +105,19 @@ void ClientHandshake::settle(const AnswerDatagram& datagram) {
   } else {
     auto& welcome = std::get<Welcome>(*answer);
     if (welcome.version < version_min_ || welcome.version > version_max_) return;
+    const bool aes = contains(suites_, Suite::kAesGcm) && names_aes(welcome.features);
     Accepted accepted{.connection_id = datagram.connection_id, .welcome = std::move(welcome), .keys = {}};
-    if (opened) accepted.keys = {opened->split.initiator_to_responder, opened->split.responder_to_initiator};
-    outcome_ = std::move(accepted);
+    if (opened) {
+      const Suite suite = aes ? Suite::kAesGcm : Suite::kNoise;
+      const NoiseSplit split = split_of(suite, opened->split);
+      accepted.keys = {split.initiator_to_responder, split.responder_to_initiator, suite};
+    }
+    if (accepted.keys && !contains(suites_, accepted.keys->suite)) {
+      outcome_ = Refused{Code::kUnsupported, "the server seals by " + names_of({accepted.keys->suite}) +
+                                                 ", this client by " + names_of(suites_) + " only"};
+    } else {
+      outcome_ = std::move(accepted);
+    }
   }
   noise_.reset();  // wipes the ephemeral key
   due_ = false;
@@ -119,6 +144,7 @@ std::size_t ClientHandshake::next_datagram(LocalTime now, std::span<std::byte, k
 Doorman::Doorman(const Config& config)
     : version_min_(config.version_min),
       version_max_(config.version_max),
+      suites_(config.suites),
       key_lifetime_(config.key_lifetime),
       cookie_secret_(crypto::hmac_sha256(config.secret, {text("tendon-cookies")})),
       ephemerals_(Seed(crypto::hmac_sha256(config.secret, {text("tendon-ephemerals")}))),
@@ -127,7 +153,7 @@ Doorman::Doorman(const Config& config)
   if (config.version_min < 1 || config.version_min > config.version_max) {
     throw std::invalid_argument("doorman: version_min must be at least 1 and at most version_max");
   }
-  crypto::start();
+  expect_speakable(suites_);
   for (const ClientKey& key : config.keys) {
     const auto [present, added] = keys_.emplace(key_id(key.key), key);
     if (!added) {
@@ -167,7 +193,8 @@ Doorman::Reply Doorman::receive(LocalTime now, const Address& from, std::span<co
     ++stats_.limited;
     return {};
   }
-  Reply reply{.size = 0, .guest = Guest{.hello = {}, .random = hello->random, .version = 0, .key = {}, .noise = {}}};
+  Reply reply{.size = 0,
+              .guest = Guest{.hello = {}, .random = hello->random, .version = 0, .suite = {}, .key = {}, .noise = {}}};
   if (!read(*hello, *reply.guest)) reply.guest.reset();
   return reply;
 }
@@ -202,7 +229,17 @@ bool Doorman::read(const HelloDatagram& datagram, Guest& guest) {
   guest.hello = std::move(*hello);
   const std::uint32_t highest = std::min(guest.hello.version_max, version_max_);
   guest.version = highest >= std::max(guest.hello.version_min, version_min_) ? highest : 0;
+  guest.suite = suite_for(guest);
   return true;
+}
+
+std::optional<Suite> Doorman::suite_for(const Guest& guest) const noexcept {
+  if (!guest.noise) return Suite::kPlain;
+  for (const NamedSuite& one : kSealedSuites) {
+    const bool theirs = one.suite == Suite::kNoise || names_aes(guest.hello.features);
+    if (theirs && contains(suites_, one.suite)) return one.suite;
+  }
+  return std::nullopt;
 }
 
 Doorman::Answered Doorman::answer(const Guest& guest, std::uint32_t connection_id, const Answer& body,
@@ -219,14 +256,19 @@ Doorman::Answered Doorman::answer(const Guest& guest, std::uint32_t connection_i
     return {};
   }
   datagram.body = reply->message;
-  return {
-      .size = encode(datagram, buffer),
-      .keys = SessionKeys{.send = reply->split.responder_to_initiator, .receive = reply->split.initiator_to_responder}};
+  Answered answered{.size = encode(datagram, buffer), .keys = {}};
+  if (guest.suite) {
+    const NoiseSplit split = split_of(*guest.suite, reply->split);
+    answered.keys = {split.responder_to_initiator, split.initiator_to_responder, *guest.suite};
+  }
+  return answered;
 }
 
 Doorman::Answered Doorman::welcome(const Guest& guest, std::uint32_t connection_id, const Welcome& welcome,
                                    std::span<std::byte, kMaxDatagram> buffer) {
-  return answer(guest, connection_id, welcome, buffer);
+  Welcome whole = welcome;
+  if (guest.suite == Suite::kAesGcm) whole.features.emplace(whole.features.begin(), kFeatureAesGcm);  // never cut off
+  return answer(guest, connection_id, whole, buffer);
 }
 
 Doorman::Answered Doorman::refuse(const Guest& guest, const Refused& refused,

@@ -19,6 +19,7 @@
 #include "protocol/secrets/hello_limit.h"
 #include "protocol/secrets/noise.h"
 #include "protocol/secrets/seal.h"
+#include "protocol/secrets/suites.h"
 #include "protocol/wire/handshake_codec.h"
 
 namespace tendon {
@@ -32,23 +33,27 @@ class ClientHandshake {
   struct Config {
     Hello hello;
     ClientRandom random{};  ///< from a cryptographic source, new for each attempt
-    /// When set, the client speaks suite 1 only: no answer can make it fall back to suite 0.
+    /// When set, the handshake is sealed: no answer can make the client fall back to suite 0.
     struct Secret {
       Key key;        ///< ClientKey::key
       Key ephemeral;  ///< from a cryptographic source, new for each attempt
     };
     std::optional<Secret> secret{};
+    /// With a secret: the suites that the session may be sealed by. The Hello offers suite 2, by kFeatureAesGcm, where
+    /// it is among them; a server that chooses none of them has refused us (kUnsupported).
+    Suites suites = suites_of_this_machine();
     /// A lost Hello delays the client by 0.1 s, which nobody notices; a dead server is sent 12 kB/s.
     Duration resend = std::chrono::milliseconds(100);
   };
   struct Accepted {
     std::uint32_t connection_id;
     Welcome welcome;
-    std::optional<SessionKeys> keys;  ///< in suite 1
+    std::optional<SessionKeys> keys;  ///< in suites 1 and 2
   };
   using Outcome = std::variant<Accepted, Refused>;
 
-  /// Throws std::invalid_argument when the Hello does not fit into a datagram (too many claims with long names).
+  /// Throws std::invalid_argument when the Hello does not fit into a datagram (too many claims with long names), or
+  /// this processor cannot speak one of the suites.
   ClientHandshake(const Config& config, LocalTime now);
 
   void receive(LocalTime now, std::span<const std::byte> datagram);
@@ -67,7 +72,8 @@ class ClientHandshake {
   std::uint32_t version_max_;
   ClientRandom random_;
   Duration resend_;
-  std::optional<NoiseInitiator> noise_;  ///< in suite 1
+  Suites suites_;
+  std::optional<NoiseInitiator> noise_;  ///< with a secret
   std::vector<std::byte> body_;          ///< of the Hello: written once, the same for every cookie
   std::optional<Cookie> cookie_;
   std::optional<Outcome> outcome_;
@@ -90,8 +96,10 @@ class Doorman {
     /// Drawn at start. Cookie keys are derived from it and the time, ephemeral keys by a Ratchet. Wipe it after the
     /// construction: with it, later handshakes could be opened.
     Bytes32 secret{};
-    /// The clients that may enter by suite 1.
+    /// The clients that may enter with a key.
     std::vector<ClientKey> keys{};
+    /// The suites that their sessions may be sealed by; of those that a client has too, the first of kSealedSuites.
+    Suites suites = suites_of_this_machine();
     std::uint32_t version_min = kProtocolVersion;
     std::uint32_t version_max = kProtocolVersion;
     /// Longer than any client takes to return with its cookie; short enough that a stolen cookie is of little use.
@@ -102,8 +110,9 @@ class Doorman {
     Hello hello;
     ClientRandom random;                  ///< the same random means a resent Hello: repeat the answer
     std::uint32_t version;                ///< the highest that both speak; 0 = none: refuse, with our range
+    std::optional<Suite> suite{};         ///< of its Data; empty = none in common: refuse
     const ClientKey* key = nullptr;       ///< null in suite 0
-    std::optional<NoiseResponder> noise;  ///< in suite 1
+    std::optional<NoiseResponder> noise;  ///< with a key
   };
   struct Reply {
     std::size_t size = 0;  ///< bytes of `answer` to send back; 0 = stay silent
@@ -111,7 +120,7 @@ class Doorman {
   };
   struct Answered {
     std::size_t size = 0;             ///< of the Answer; 0 = stay silent
-    std::optional<SessionKeys> keys;  ///< in suite 1
+    std::optional<SessionKeys> keys;  ///< with a key, of a guest that is admitted
   };
   /// Hellos that did not lead to a Guest, by reason.
   struct Stats {
@@ -123,8 +132,8 @@ class Doorman {
     std::uint64_t forged = 0;       ///< not sealed with the key that it names
   };
 
-  /// Throws std::invalid_argument when `key_lifetime` is not positive, the version range is empty or two
-  /// clients have one key, and std::runtime_error when libsodium cannot start.
+  /// Throws std::invalid_argument when `key_lifetime` is not positive, the version range is empty, two clients have one
+  /// key, or this processor cannot speak one of the suites; and std::runtime_error when libsodium cannot start.
   explicit Doorman(const Config& config);
   // A Guest points at our keys.
   Doorman(const Doorman&) = delete;
@@ -134,8 +143,9 @@ class Doorman {
   Reply receive(LocalTime now, const Address& from, std::span<const std::byte> datagram,
                 std::span<std::byte, kMaxDatagram> answer);
 
-  /// Writes the Answer that admits the guest, or refuses it; both are shorter than a Hello. In suite 1 each call draws
-  /// new keys and so writes other bytes: keep them, for when the same Hello comes again.
+  /// Writes the Answer that admits the guest, or refuses it; both are shorter than a Hello. With a key each call draws
+  /// new keys and so writes other bytes: keep them, for when the same Hello comes again. A Welcome into suite 2 says so
+  /// by kFeatureAesGcm, which is added here. Only a guest with a `suite` may be welcomed.
   Answered welcome(const Guest& guest, std::uint32_t connection_id, const Welcome& welcome,
                    std::span<std::byte, kMaxDatagram> buffer);
   Answered refuse(const Guest& guest, const Refused& refused, std::span<std::byte, kMaxDatagram> buffer);
@@ -145,11 +155,13 @@ class Doorman {
  private:
   Cookie cookie(std::int64_t key_number, const Address& from, const ClientRandom& random) const noexcept;
   bool read(const HelloDatagram& datagram, Guest& guest);
+  std::optional<Suite> suite_for(const Guest& guest) const noexcept;
   Answered answer(const Guest& guest, std::uint32_t connection_id, const Answer& body,
                   std::span<std::byte, kMaxDatagram> buffer);
 
   std::uint32_t version_min_;
   std::uint32_t version_max_;
+  Suites suites_;
   Duration key_lifetime_;
   Key cookie_secret_;
   Ratchet ephemerals_;

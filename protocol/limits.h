@@ -83,6 +83,13 @@ inline constexpr Duration kMaxTimeout = std::chrono::hours(1);
 /// Packet numbers are below this, far from 2⁶⁴ − 1, the nonce that renews a key. At 1 MHz it takes 36 000 years.
 inline constexpr std::uint64_t kMaxPacketNumber = std::uint64_t{1} << 60;
 
+/// Datagrams that one key may seal. AES-GCM's secrecy wears off with the blocks that a key has sealed: RFC 9001, 6.6
+/// allows 2²³ packets of any size. Rekey is far below.
+inline constexpr std::uint64_t kMaxDatagramsOfKey = std::uint64_t{1} << 23;
+/// Datagrams of one session that do not open, before it ends. Each is a guess at a tag; of ChaCha20-Poly1305 RFC 9001,
+/// 6.6 allows 2³⁶ in a connection, of AES-GCM 2⁵². At 1 MHz it takes 19 h.
+inline constexpr std::uint64_t kMaxForged = std::uint64_t{1} << 36;
+
 /// How often a Bye is sent: at 10 % loss, one conversation in a thousand loses all three and ends by timeout.
 inline constexpr int kByes = 3;
 

@@ -85,8 +85,9 @@ struct Session::State {
   State(const Config& the_config, const SessionKeys* keys, LocalTime the_opening)
       : config(the_config), opened(the_opening), latest(the_opening), last_heard(the_opening) {
     if (keys == nullptr) return;
-    sealer.emplace(keys->send, config.rekey, opened);
-    opener.emplace(keys->receive, config.rekey);
+    suite = keys->suite;
+    sealer.emplace(SealingKey(suite, keys->send), config.rekey, opened);
+    opener.emplace(SealingKey(suite, keys->receive), config.rekey);
   }
 
   Config config;
@@ -95,7 +96,8 @@ struct Session::State {
   bool open = true;
   LinkStats stats;
 
-  // In suite 1.
+  // In suites 1 and 2.
+  Suite suite = Suite::kPlain;
   std::optional<Sealer> sealer;
   std::optional<Opener> opener;
   std::array<std::byte, kMaxDatagram> opened_body{};
@@ -135,7 +137,6 @@ struct Session::State {
   Newest<PortFrame> ports_arrived;
   std::optional<Closed> closed;
 
-  Suite suite() const noexcept { return sealer ? Suite::kNoise : Suite::kPlain; }
   std::optional<std::span<const std::byte>> open_body(LocalTime now, const Header& header,
                                                       std::span<const std::byte> datagram);
   bool accept(LocalTime now, std::uint64_t number, const DataContent& content);
@@ -172,7 +173,8 @@ struct Session::State {
            silent_too_long(now);
   }
   bool too_old(LocalTime now) const noexcept {
-    return sealer && (now - opened >= config.life || next_packet >= config.max_datagrams);
+    return sealer &&
+           (now - opened >= config.life || next_packet >= config.max_datagrams || stats.forged >= config.max_forged);
   }
   void close(Code code, std::string reason);
   Header begin(LocalTime now, std::span<std::byte, kMaxDatagram> buffer);
@@ -189,6 +191,8 @@ Session::Session(const Config& config, const SessionKeys* keys, LocalTime opened
   expect_above_zero(seconds(config.life), "life_s");
   expect_above_zero(seconds(config.rekey.age), "rekey.age_s");
   expect_above_zero(seconds(config.rekey.overlap), "rekey.overlap_s");
+  expect(config.rekey.datagrams <= limits::kMaxDatagramsOfKey, "rekey.datagrams",
+         static_cast<double>(config.rekey.datagrams), "at most 2^23, which AES-256-GCM bears");
   state_ = std::make_unique<State>(config, keys, opened);
 }
 Session::~Session() = default;
@@ -207,7 +211,7 @@ bool Session::receive(LocalTime now, std::span<const std::byte> datagram) {
     ++my.stats.duplicated;  // a copy of the handshake that took its time
     return false;
   }
-  if (!header || header->suite != my.suite() || header->connection_id != my.config.connection_id ||
+  if (!header || header->suite != my.suite || header->connection_id != my.config.connection_id ||
       header->packet_number >= limits::kMaxPacketNumber) {
     ++my.stats.malformed;
     return false;
@@ -367,7 +371,7 @@ void Session::tick(LocalTime now) {
 Header Session::State::begin(LocalTime now, std::span<std::byte, kMaxDatagram> buffer) {
   if (echo) echo->received_mask = seen.mask_before(echo->packet_number);
   const Header header{.type = DatagramType::kData,
-                      .suite = suite(),
+                      .suite = suite,
                       .epoch = sealer ? sealer->next_epoch(now) : std::uint8_t{0},
                       .connection_id = config.connection_id,
                       .packet_number = next_packet};
@@ -447,6 +451,7 @@ LocalTime Session::next_tick() const noexcept {
 
 bool Session::open() const noexcept { return state_->open; }
 std::uint32_t Session::connection_id() const noexcept { return state_->config.connection_id; }
+Suite Session::suite() const noexcept { return state_->suite; }
 const LinkStats& Session::stats() const noexcept { return state_->stats; }
 const std::optional<ClockExchange>& Session::newest_exchange() const noexcept { return state_->exchange; }
 std::optional<ClockOffsetEstimator::Estimate> Session::peer_clock() const noexcept {

@@ -31,8 +31,8 @@ struct LinkStats {
   std::uint64_t reordered = 0;           ///< accepted, but older than one seen before
   std::uint64_t duplicated = 0;          ///< seen before, too old to tell, or a late handshake datagram: dropped
   std::uint64_t malformed = 0;           ///< not a datagram of this conversation: dropped
-  std::uint64_t forged = 0;              ///< suite 1: not authentic (forged, or damaged on the way): dropped
-  std::uint64_t old_key = 0;             ///< suite 1: sealed with a key no longer or not yet held: dropped
+  std::uint64_t forged = 0;              ///< sealed suites: not authentic (forged, or damaged on the way): dropped
+  std::uint64_t old_key = 0;             ///< sealed suites: sealed with a key no longer or not yet held: dropped
   std::uint64_t invalid = 0;             ///< well-formed, with a value out of bounds (NaN, Inf …): frame dropped
   std::uint64_t stale = 0;               ///< state, force or report not newer than the newest one: frame dropped
   RefusedForces refused_forces{};        ///< of `invalid` and `stale`, those that are an engine's mistake
@@ -75,19 +75,22 @@ class Session {
     /// scheduled late, which takes tens of ms on a virtual machine.
     Duration min_resend = std::chrono::milliseconds(20);
 
-    // In suite 1:
+    // In suites 1 and 2:
     Rekey rekey{};
     /// A session of this age ends with kExpired. The client then shakes hands again, so no key is older than a day.
     Duration life = std::chrono::hours(24);
     /// It also ends after this many datagrams of ours, so that no packet number is used twice.
     std::uint64_t max_datagrams = limits::kMaxPacketNumber;
+    /// And after this many datagrams that did not open, so that nobody can go on guessing tags.
+    std::uint64_t max_forged = limits::kMaxForged;
   };
 
   /// Either end of a conversation of suite 0. `opened` is the instant at which the handshake ended. The first datagram
   /// is due at once: it tells the peer that we are there, and gives both ends a round trip.
-  /// Throws std::invalid_argument when a duration of `config` is not positive.
+  /// Throws std::invalid_argument when a duration of `config` is not positive, or a key is to seal more than
+  /// limits::kMaxDatagramsOfKey.
   Session(const Config& config, LocalTime opened);
-  /// The same in suite 1: datagrams are sealed with `keys`.
+  /// The same in suite 1 or 2: datagrams are sealed with `keys`.
   Session(const Config& config, const SessionKeys& keys, LocalTime opened);
   ~Session();
   Session(Session&&) noexcept;
@@ -134,7 +137,7 @@ class Session {
   // In.
   /// Takes any bytes. A datagram that does not belong to this conversation, or is malformed, is counted and dropped.
   /// True when the datagram was accepted and is the newest so far: its source is then the peer's present address. Only
-  /// suite 1 proves that.
+  /// suites 1 and 2 prove that.
   bool receive(LocalTime now, std::span<const std::byte> datagram);
   void send(const DeviceState& state);
   void send(const ForceCommand& command);
@@ -166,6 +169,7 @@ class Session {
 
   bool open() const noexcept;
   std::uint32_t connection_id() const noexcept;
+  Suite suite() const noexcept;
   const LinkStats& stats() const noexcept;
   /// The four time stamps of the newest echo; empty before the first.
   const std::optional<ClockExchange>& newest_exchange() const noexcept;

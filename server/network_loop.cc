@@ -50,7 +50,7 @@ NetworkLoop::NetworkLoop(const Config& config, Link& link, const std::vector<Mai
       link_(link),
       sieve_(config.recorded),
       devices_(served_devices(config.devices, config.handles, mail)),
-      doorman_({.secret = config.secret, .keys = config.keys}),
+      doorman_({.secret = config.secret, .keys = config.keys, .suites = config.suites}),
       admission_({.keys = config.keys.size(), .max_observers = config.max_observers}),
       next_connection_id_(config.first_connection_id) {
   half_open_.reserve(config.max_half_open);
@@ -190,6 +190,11 @@ void NetworkLoop::refuse(LocalTime now, const Address& from, const Doorman::Gues
 void NetworkLoop::admit(LocalTime now, const Address& from, const Doorman::Guest& guest) {
   if (answer_again(now, from, guest)) return;
   if (guest.version == 0) return refuse(now, from, guest, {Code::kUnsupported, "no protocol version in common"});
+  if (!guest.suite) {
+    return refuse(
+        now, from, guest,
+        {Code::kUnsupported, "this server seals by " + names_of(config_.suites) + " only, and you do not offer it"});
+  }
   auto claimed = Admission::seats_of(guest.hello, devices_);
   if (auto* const cannot_be = std::get_if<Refusal>(&claimed)) return refuse(now, from, guest, std::move(*cannot_be));
   auto& seats = std::get<std::vector<Seat>>(claimed);
@@ -263,7 +268,9 @@ void NetworkLoop::open(LocalTime now, Guest guest) {
   notice(false,
          "welcomed " + std::string(guest.role == Role::kController ? "controller" : "observer") + " \"" + guest.name +
              "\" at " + to_string(guest.address) +
-             (guest.key != nullptr ? " with the key \"" + guest.key->name + "\"" : ""),
+             (guest.key != nullptr
+                  ? " with the key \"" + guest.key->name + "\", sealed by " + names_of({guest.session.suite()})
+                  : ""),
          change_of(guest, true, ""));
   if (guest.role == Role::kController) guest.meter.emplace(now);
   if (config_.adapt_state_rate) guest.adaptation.emplace(RateAdaptation::Config{}, now);

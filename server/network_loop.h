@@ -36,7 +36,7 @@ namespace tendon {
 /// second how the devices' loops and the engines do. Each turn drains the link, so that nothing new waits behind
 /// something old. Of forces the newest wins; every request is answered.
 ///
-/// Without keys, guests speak in the clear, from this machine only. With keys they speak suite 1 only. A guest is
+/// Without keys, guests speak in the clear, from this machine only. With keys all is sealed, by `suites`. A guest is
 /// half-open until its first authentic Data, and until then nothing changes for anybody else. Its address is the one
 /// its newest authentic datagram came from. A controller that comes again with its key takes its own place.
 ///
@@ -48,9 +48,10 @@ namespace tendon {
 class NetworkLoop {
  public:
   struct Config {
-    Bytes32 secret{};                       ///< of cookies and ephemeral keys; random at start
-    std::vector<ClientKey> keys{};          ///< who may come in; empty: anybody on this machine, in the clear
-    std::uint32_t first_connection_id = 1;  ///< random at start, so that a restarted server does not know old guests
+    Bytes32 secret{};                          ///< of cookies and ephemeral keys; random at start
+    std::vector<ClientKey> keys{};             ///< who may come in; empty: anybody on this machine, in the clear
+    Suites suites = suites_of_this_machine();  ///< by which the sessions of those may be sealed
+    std::uint32_t first_connection_id = 1;     ///< random at start, so that a restarted server does not know old guests
     std::string server_name = "tendond";
     /// What guests are told of each device; its number is its place, `holder` does not count.
     std::vector<DeviceDescription> devices{};
@@ -76,7 +77,7 @@ class NetworkLoop {
     /// than start within a round trip; the oldest gives way.
     std::size_t max_half_open = 16;
     Duration half_open_timeout = std::chrono::seconds(5);
-    Rekey rekey{};  ///< of the sessions of suite 1, as their `life`
+    Rekey rekey{};  ///< of sealed sessions, as their `life`
     Duration session_life = Session::Config{}.life;
     /// Sends fewer states to a guest whose link is full (RateAdaptation). Where even the lowest rate loses a tenth,
     /// forces are not handed on, and the device comes to its safe stop.

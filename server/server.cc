@@ -227,6 +227,11 @@ NetworkLoop::Config Server::network_config(const DeviceRuntimes& devices) {
   fill_random(std::as_writable_bytes(std::span(&config.first_connection_id, 1)));
   config.first_connection_id |= 1;  // never 0
   if (scene.network.keys) config.keys = read_key_folder(*scene.network.keys);
+  std::erase_if(config.suites, [&](Suite suite) { return !contains(scene.network.suites, suite); });
+  if (config.suites.empty()) {
+    throw std::invalid_argument("network.suites: this processor has no AES instructions, so it cannot seal by " +
+                                names_of(scene.network.suites) + " only: expected chacha20-poly1305 besides");
+  }
   config.server_name = "tendond " + std::string(kVersion);
   for (const auto& runtime : devices) {
     const DeviceInfo info = runtime->safe ? runtime->safe->info() : runtime->device->info();

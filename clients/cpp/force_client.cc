@@ -73,6 +73,7 @@ ForceClient::ForceClient(Link& link, const Address& server, const Config& config
       period_(config.rate_hz > 0 ? from_seconds(1 / config.rate_hz) : Duration::zero()),
       connection_(link, server,
                   {.key = config.key,
+                   .suites = config.suites,
                    .seed = config.seed,
                    .patience = config.patience,
                    .retry_min = config.retry_min,

@@ -111,8 +111,11 @@ class ForceClient {
     /// With a Watch: be a controller that sends no force. It may rearm, disarm and hold a
     /// channel.
     bool operates = false;
-    /// Shared with the server: suite 1, and nothing else. Without one the server must be on this machine.
+    /// Shared with the server: all is sealed then, and nothing in the clear is heard. Without one the server must be on
+    /// this machine.
     std::optional<Key> key{};
+    /// With a key: by which of them the session may be sealed; the server chooses.
+    Suites suites = suites_of_this_machine();
     Seed seed{};  ///< of the randoms and keys of the handshakes; 32 bytes from the system at each start
     /// How long one attempt waits for an answer: 20 Hellos at the handshake's 100 ms, enough for a round
     /// trip of 1 s at 50 % loss.

@@ -24,6 +24,32 @@ Nonce nonce(std::uint64_t number) noexcept {
   return nonce;
 }
 
+/// The nonce of AESGCM: the same with the number's highest byte first.
+Nonce nonce_of_aes(std::uint64_t number) noexcept {
+  Nonce nonce{};
+  for (std::size_t i = 0; i < sizeof number; ++i) nonce[4 + i] = static_cast<unsigned char>(number >> (56 - 8 * i));
+  return nonce;
+}
+
+/// REKEY of Noise: the first half of 32 zeros sealed under the number that no datagram has.
+template <class Seal>
+Key renewed_by(const Seal& seal) noexcept {
+  constexpr Bytes32 kZeros{};
+  std::array<std::byte, sizeof(Bytes32) + crypto::kTagSize> sealed;
+  seal(~std::uint64_t{0}, kZeros, sealed);
+  Key next;
+  std::copy_n(sealed.begin(), sizeof(Bytes32), next.bytes().begin());
+  sodium_memzero(sealed.data(), sealed.size());
+  return next;
+}
+
+const crypto_aead_aes256gcm_state* schedule_of(const std::array<std::byte, 512>& bytes) noexcept {
+  return reinterpret_cast<const crypto_aead_aes256gcm_state*>(bytes.data());
+}
+
+static_assert(sizeof(crypto_aead_aes256gcm_state) == 512 && alignof(crypto_aead_aes256gcm_state) <= 16);
+static_assert(crypto_aead_aes256gcm_NPUBBYTES == sizeof(Nonce) && crypto_aead_aes256gcm_ABYTES == crypto::kTagSize);
+static_assert(crypto_aead_aes256gcm_KEYBYTES == sizeof(Bytes32));
 static_assert(crypto_hash_sha256_BYTES == sizeof(Bytes32) && crypto_auth_hmacsha256_BYTES == sizeof(Bytes32));
 static_assert(crypto_scalarmult_BYTES == sizeof(Bytes32) && crypto_scalarmult_SCALARBYTES == sizeof(Bytes32));
 static_assert(crypto_aead_chacha20poly1305_IETF_KEYBYTES == sizeof(Bytes32));
@@ -84,13 +110,36 @@ bool open(const Key& key, std::uint64_t number, std::span<const std::byte> assoc
 }
 
 Key renewed(const Key& key) noexcept {
-  constexpr Bytes32 kZeros{};
-  std::array<std::byte, sizeof(Bytes32) + kTagSize> sealed;
-  seal(key, ~std::uint64_t{0}, {}, kZeros, sealed);
-  Key next;
-  std::copy_n(sealed.begin(), sizeof(Bytes32), next.bytes().begin());
-  sodium_memzero(sealed.data(), sealed.size());
-  return next;
+  return renewed_by([&](std::uint64_t number, const Bytes32& zeros, std::span<std::byte> sealed) {
+    seal(key, number, {}, zeros, sealed);
+  });
+}
+
+bool has_aes() noexcept { return sodium_init() >= 0 && crypto_aead_aes256gcm_is_available() == 1; }
+
+AesGcm::AesGcm(const Key& key) noexcept {
+  crypto_aead_aes256gcm_beforenm(reinterpret_cast<crypto_aead_aes256gcm_state*>(schedule_.data()), in(key.bytes()));
+}
+
+AesGcm::~AesGcm() { sodium_memzero(schedule_.data(), schedule_.size()); }
+
+void AesGcm::seal(std::uint64_t number, std::span<const std::byte> associated, std::span<const std::byte> text,
+                  std::span<std::byte> sealed) const noexcept {
+  crypto_aead_aes256gcm_encrypt_afternm(out(sealed), nullptr, in(text), text.size(), in(associated), associated.size(),
+                                        nullptr, nonce_of_aes(number).data(), schedule_of(schedule_));
+}
+
+bool AesGcm::open(std::uint64_t number, std::span<const std::byte> associated, std::span<const std::byte> sealed,
+                  std::span<std::byte> text) const noexcept {
+  return crypto_aead_aes256gcm_decrypt_afternm(out(text), nullptr, nullptr, in(sealed), sealed.size(), in(associated),
+                                               associated.size(), nonce_of_aes(number).data(),
+                                               schedule_of(schedule_)) == 0;
+}
+
+Key AesGcm::renewed() const noexcept {
+  return renewed_by([this](std::uint64_t number, const Bytes32& zeros, std::span<std::byte> sealed) {
+    seal(number, {}, zeros, sealed);
+  });
 }
 
 bool equal(std::span<const std::byte> a, std::span<const std::byte> b) noexcept {

@@ -7,8 +7,8 @@
 #include <initializer_list>
 #include <span>
 
-// The few primitives of suite 1, as functions of bytes: SHA-256, HMAC-SHA-256 (RFC 4231),
-// X25519 (RFC 7748) and ChaCha20-Poly1305 (RFC 8439). crypto.cc is the only file that knows libsodium.
+// The few primitives of suites 1 and 2, as functions of bytes: SHA-256, HMAC-SHA-256 (RFC 4231), X25519 (RFC 7748),
+// ChaCha20-Poly1305 (RFC 8439) and AES-256-GCM (NIST SP 800-38D). crypto.cc is the only file that knows libsodium.
 
 namespace tendon {
 
@@ -59,6 +59,29 @@ bool open(const Key& key, std::uint64_t number, std::span<const std::byte> assoc
 
 /// REKEY(key) of Noise: the next key. The present one cannot be computed from it.
 Key renewed(const Key& key) noexcept;
+
+/// Whether this processor has the instructions that AES-256-GCM takes here (AES-NI, CLMUL). In software AES is slow, or
+/// its time tells of the key, so libsodium has none. Starts libsodium.
+bool has_aes() noexcept;
+
+/// AES-256-GCM under one key, whose schedule is computed once. Not to be made where has_aes() is false.
+class AesGcm {
+ public:
+  explicit AesGcm(const Key& key) noexcept;
+  AesGcm(const AesGcm&) = default;
+  AesGcm& operator=(const AesGcm&) = default;
+  ~AesGcm();
+
+  /// As the functions above, with the nonce that Noise gives to AESGCM: 4 zeros and `number` as 8 bytes **BE**.
+  void seal(std::uint64_t number, std::span<const std::byte> associated, std::span<const std::byte> text,
+            std::span<std::byte> sealed) const noexcept;
+  bool open(std::uint64_t number, std::span<const std::byte> associated, std::span<const std::byte> sealed,
+            std::span<std::byte> text) const noexcept;
+  Key renewed() const noexcept;
+
+ private:
+  alignas(16) std::array<std::byte, 512> schedule_;
+};
 
 /// Compares in constant time, so the time taken does not show how much of a guess was right. False when the sizes
 /// differ.

@@ -10,6 +10,7 @@ namespace tendon {
 namespace {
 
 constexpr std::string_view kName = "Noise_NNpsk0_25519_ChaChaPoly_SHA256";
+constexpr std::string_view kSuite2 = "tendon-suite-2";
 
 using Bytes = std::span<const std::byte>;
 
@@ -94,6 +95,15 @@ NoiseSplit split(const NoiseState& state) noexcept {
 }
 
 }  // namespace
+
+NoiseSplit split_of_suite_2(const NoiseSplit& split) noexcept {
+  const auto of_suite_2 = [&](const Key& key) {
+    return Key(crypto::hmac_sha256(key.bytes(), {std::as_bytes(std::span(kSuite2)), split.handshake_hash}));
+  };
+  return {.initiator_to_responder = of_suite_2(split.initiator_to_responder),
+          .responder_to_initiator = of_suite_2(split.responder_to_initiator),
+          .handshake_hash = split.handshake_hash};
+}
 
 NoiseInitiator::NoiseInitiator(const Key& psk, const Key& ephemeral, Bytes prologue, Bytes payload)
     : ephemeral_(ephemeral), state_(begin(psk, prologue)) {

@@ -32,6 +32,11 @@ struct NoiseState {
   Key key;
 };
 
+/// The keys of suite 2 from those of a handshake: each HMAC-SHA-256(key, "tendon-suite-2" ‖ handshake hash). So no key
+/// serves two ciphers; and because the hash is over Hello and Answer, two ends that saw another offer or another choice
+/// have no key in common.
+NoiseSplit split_of_suite_2(const NoiseSplit& split) noexcept;
+
 inline constexpr std::size_t kNoisePublicSize = 32;
 /// A message is this many bytes longer than its payload.
 inline constexpr std::size_t kNoiseOverhead = kNoisePublicSize + crypto::kTagSize;

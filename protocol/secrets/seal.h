@@ -13,26 +13,46 @@
 
 namespace tendon {
 
-/// The keys of one conversation of suite 1: those with which this end sends and receives.
+/// The keys of one sealed conversation: those with which this end sends and receives, and the suite that they are for.
 struct SessionKeys {
   Key send;
   Key receive;
+  Suite suite = Suite::kNoise;
 };
 
 /// When keys are renewed. The sender decides; the receiver follows the epoch in the header.
 struct Rekey {
-  /// A key is renewed after this many datagrams, 17 min at 1 kHz. ChaCha20-Poly1305 would bear 2⁶⁰ and more of our
-  /// size; but a key that is read from memory now opens minutes of the conversation, not a day.
+  /// A key is renewed after this many datagrams, 17 min at 1 kHz; at most limits::kMaxDatagramsOfKey. Both ciphers
+  /// would bear more; but a key that is read from memory now opens minutes of the conversation, not a day.
   std::uint64_t datagrams = std::uint64_t{1} << 20;
   Duration age = std::chrono::minutes(10);
   /// How long the previous key is still accepted: longer than any useful datagram is on its way.
   Duration overlap = std::chrono::seconds(2);
 };
 
+/// The key of one direction in one epoch, with what its suite computes from it once. Suite 2 takes a processor that
+/// can (crypto::has_aes).
+class SealingKey {
+ public:
+  SealingKey(Suite suite, const Key& key) noexcept;
+
+  /// As crypto::seal and crypto::open, by the suite's cipher.
+  void seal(std::uint64_t number, std::span<const std::byte> associated, std::span<const std::byte> text,
+            std::span<std::byte> sealed) const noexcept;
+  bool open(std::uint64_t number, std::span<const std::byte> associated, std::span<const std::byte> sealed,
+            std::span<std::byte> text) const noexcept;
+  /// The key of the next epoch.
+  SealingKey renewed() const noexcept;
+
+ private:
+  Key key_;
+  std::optional<crypto::AesGcm> aes_;  ///< in suite 2
+};
+
 /// Seals the datagrams of one direction.
 class Sealer {
  public:
-  Sealer(const Key& key, const Rekey& rekey, LocalTime opened) noexcept;
+  Sealer(const SealingKey& key, const Rekey& rekey, LocalTime opened) noexcept;
 
   /// The epoch for the next datagram. Renews the key first when that is due.
   std::uint8_t next_epoch(LocalTime now) noexcept;
@@ -43,7 +63,7 @@ class Sealer {
 
  private:
   Rekey rekey_;
-  Key key_;
+  SealingKey key_;
   std::uint8_t epoch_ = 0;
   std::uint64_t sealed_ = 0;  ///< datagrams, with the present key
   LocalTime since_;           ///< start of the present key
@@ -52,7 +72,7 @@ class Sealer {
 /// Opens the datagrams of the other direction.
 class Opener {
  public:
-  Opener(const Key& key, const Rekey& rekey) noexcept;
+  Opener(const SealingKey& key, const Rekey& rekey) noexcept;
 
   enum class Verdict : std::uint8_t {
     kOpened,
@@ -67,9 +87,9 @@ class Opener {
  private:
   Rekey rekey_;
   std::uint8_t epoch_ = 0;
-  std::optional<Key> previous_;
-  Key present_;
-  Key next_;
+  std::optional<SealingKey> previous_;
+  SealingKey present_;
+  SealingKey next_;
   LocalTime moved_on_{};
 };
 

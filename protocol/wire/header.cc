@@ -31,9 +31,9 @@ std::optional<Header> decode_header(std::span<const std::byte> datagram) noexcep
   if (type < 1 || type > static_cast<std::uint8_t>(DatagramType::kAnswer)) return {};
   const auto epoch = std::to_integer<std::uint8_t>(datagram[2]);
   const auto suite = std::to_integer<std::uint8_t>(datagram[3]);
-  if (suite > static_cast<std::uint8_t>(Suite::kNoise)) return {};
-  const bool renews_keys =
-      suite != static_cast<std::uint8_t>(Suite::kPlain) && type == static_cast<std::uint8_t>(DatagramType::kData);
+  const bool is_data = type == static_cast<std::uint8_t>(DatagramType::kData);
+  if (suite > static_cast<std::uint8_t>(is_data ? Suite::kAesGcm : Suite::kNoise)) return {};
+  const bool renews_keys = is_data && suite != static_cast<std::uint8_t>(Suite::kPlain);
   if (epoch != 0 && !renews_keys) return {};
   return Header{.type = static_cast<DatagramType>(type),
                 .suite = static_cast<Suite>(suite),

@@ -361,6 +361,15 @@ void put_coupling(const Coupling::Config& coupling, const LimiterConfig& limiter
   }
 }
 
+/// Those of the scene's suites that are spoken here, by name.
+std::string spoken_here(const Suites& wanted) {
+  Suites here = suites_of_this_machine();
+  std::erase_if(here, [&](Suite suite) { return !contains(wanted, suite); });
+  if (here.empty()) return "nothing that this processor can: it has no AES instructions";
+  const bool lacks_one = contains(wanted, Suite::kAesGcm) && !contains(here, Suite::kAesGcm);
+  return names_of(here) + (lacks_one ? " (this processor has no AES instructions)" : "");
+}
+
 }  // namespace
 
 std::string in_words(const Scene& scene, const Explanation& explanation) {
@@ -391,7 +400,7 @@ std::string in_words(const Scene& scene, const Explanation& explanation) {
   }
   text << "the limiter's promise: " << promise_of(scene.loop.control.limiter) << '\n';
   text << "in other threads: " << scene.channels.size() << (scene.channels.size() == 1 ? " channel" : " channels")
-       << " for engines" << (scene.network.keys ? ", sealed" : "") << ", "
+       << " for engines" << (scene.network.keys ? ", sealed by " + spoken_here(scene.network.suites) : "") << ", "
        << (scene.recording ? "a recording" : "no recording")
        << (scene.discovery && scene.discovery->announce ? ", announced on the network" : "") << '\n';
   return text.str();
@@ -405,6 +414,7 @@ std::string in_json(const Scene& scene, const Explanation& explanation) {
               {"step_ns", explanation.step_ns},
               {"device_ns", explanation.device_ns},
               {"resolution_ns", explanation.resolution_ns},
+              {"sealed_by", scene.network.keys ? Json(spoken_here(scene.network.suites)) : Json(nullptr)},
               {"parts", Json::array()}};
   for (const auto& part : explanation.parts) {
     out["parts"].push_back({{"key", part.key},

@@ -30,6 +30,12 @@ Names<std::optional<Preset>> preset_names() {
   return names;
 }
 
+Names<Suite> suite_names() {
+  Names<Suite> names;
+  for (const NamedSuite& one : kSealedSuites) names.all.emplace_back(one.name, one.suite);
+  return names;
+}
+
 /// For the reference: what each preset is for, and promises.
 std::string preset_meanings() {
   std::string text;
@@ -414,6 +420,9 @@ void declare_scene(Table& scene, Draft& draft) {
              "port 0 lets the system choose one. Without keys a loopback address");
     keys.key("keys", network.keys, Path{},
              "folder with a file NAME.key for each client, relative to this file; only they are let in");
+    keys.key("suites", network.suites, ListOf<Names<Suite>>{suite_names()},
+             "by which those with a key may seal their sessions; the fastest that both ends and their processors have "
+             "is taken. Leave one out to forbid it");
     keys.key("max_observers", network.max_observers, kObservers, "guests besides the controller");
     keys.key("controller_timeout_ms", network.controller_timeout, kTimeout, "a controller silent for so long has left");
     keys.key("observer_timeout_ms", network.observer_timeout, kTimeout, "an observer silent for so long has left");

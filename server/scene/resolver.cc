@@ -266,6 +266,12 @@ class SceneResolver {
   void resolve_network(const std::filesystem::path& directory) {
     Scene::Network& network = draft_.scene.network;
     if (network.keys) network.keys = directory / *network.keys;
+    if (network.suites.empty()) {
+      blame("network.suites", {}, "expected some of " + names_of(all_suites()) + ", found none to seal by");
+    }
+    if (!network.keys && file_.at_path("network.suites")) {
+      blame("network.suites", {}, "expected none without keys: nothing is sealed then");
+    }
     // UdpLink refuses it too, but cannot name the line.
     if (!network.keys && !is_loopback(network.listen)) {
       blame("network.listen", {},

@@ -33,6 +33,8 @@ struct Scene {
   struct Network {
     Address listen = parse_address("127.0.0.1:47100");
     std::optional<std::filesystem::path> keys;  ///< folder; empty: anybody on this machine may come in
+    /// By which those with a key may seal their sessions. The server speaks those of them that its processor can.
+    Suites suites = all_suites();
     std::size_t max_observers = NetworkLoop::Config{}.max_observers;
     Duration controller_timeout = NetworkLoop::Config{}.controller_timeout;
     Duration observer_timeout = NetworkLoop::Config{}.observer_timeout;

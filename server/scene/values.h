@@ -242,8 +242,10 @@ struct ListOf {
   }
 
   template <class T>
-  static std::string shown(const Unit&, const std::vector<T>&) {
-    return "[]";
+  std::string shown(const Unit& unit, const std::vector<T>& values) const {
+    std::string text;
+    for (const T& value : values) text += (text.empty() ? "" : ", ") + rule.shown(unit, value);
+    return "[" + text + "]";
   }
 };
 

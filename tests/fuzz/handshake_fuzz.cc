@@ -6,8 +6,8 @@
 
 #include "tests/fuzz/target.h"
 
-// Strangers at the door and strangers who answer: no reply is longer than what asked, nobody gets in without the key,
-// and no answer that we did not write ends a handshake of suite 1.
+// Strangers at the door and strangers who answer: no reply is longer than what asked, nobody gets in without the key, no
+// answer that we did not write ends a sealed handshake, and both ends of one end with the same suite and keys.
 
 using namespace tendon;
 
@@ -16,16 +16,20 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   Ratchet random(1);
   LocalTime now{std::chrono::seconds(1000)};
   const ClientKey key{.name = "a", .role = Role::kController, .key = random.next()};
-  Doorman door({.keys = {key}});
-  const auto client_of = [&](bool sealed) {
+  const Suites all = suites_of_this_machine();
+  // The other seals by its first suite only; both know the same cookies.
+  Doorman every({.keys = {key}, .suites = all});
+  Doorman strict({.keys = {key}, .suites = {all.front()}});
+  const auto client_of = [&](const Suites& suites) {
     ClientHandshake::Config config;
     config.hello = {.role = Role::kController, .name = "a", .features = {}};
-    if (sealed) config.secret = {.key = key.key, .ephemeral = random.next()};
+    if (!suites.empty()) config.secret = {.key = key.key, .ephemeral = random.next()};
+    if (!suites.empty()) config.suites = suites;
     return ClientHandshake(config, now);
   };
-  // Made once and copied: half of what a run costs is the curve.
-  static const std::array<ClientHandshake, 2> fresh = {client_of(false), client_of(true)};
-  std::array<ClientHandshake, 2> clients = fresh;
+  // Made once and copied: half of what a run costs is the curve. In the clear, of suite 1 only, and of all.
+  static const std::array<ClientHandshake, 3> fresh = {client_of({}), client_of({Suite::kNoise}), client_of(all)};
+  std::array<ClientHandshake, 3> clients = fresh;
   const Address here = parse_address("127.0.0.1:4000");
   const Address there = parse_address("192.0.2.1:4000");
   std::array<std::byte, kMaxDatagram> buffer;
@@ -43,7 +47,9 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   while (!input.empty()) {
     const std::uint8_t choice = input.byte();
     const bool sealed = choice % 2 == 1;
-    ClientHandshake& client = clients[sealed ? 1 : 0];
+    const std::size_t which = sealed ? (choice & 4U ? 2 : 1) : 0;
+    ClientHandshake& client = clients[which];
+    Doorman& door = choice & 8U ? strict : every;
     const Address& from = choice & 2U ? here : there;
     now += std::chrono::milliseconds(input.byte());
     client.tick(now);
@@ -53,6 +59,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     const auto reply = door.receive(now, from, std::span(buffer).first(said), answer);
     fuzz::require(reply.size <= said);
     std::size_t length = reply.size;
+    std::optional<SessionKeys> its;
     if (reply.guest) {
       // In suite 1 only what the holder of the key wrote gets here; its cookie apart, every byte counts.
       if (reply.guest->key != nullptr) fuzz::require(reply.guest->hello.name == "a");
@@ -60,7 +67,11 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       welcome.version = 1;
       welcome.loop_hz = 1000;
       welcome.timeout = std::chrono::seconds(1);
-      length = door.welcome(*reply.guest, 1, welcome, answer).size;
+      fuzz::require(reply.guest->suite.has_value() || (&door == &strict && which == 1));
+      const Doorman::Answered answered =
+          reply.guest->suite ? door.welcome(*reply.guest, 1, welcome, answer) : door.refuse(*reply.guest, {}, answer);
+      its = answered.keys;
+      length = answered.size;
       fuzz::require(length < said);
     }
     if (length == 0) continue;
@@ -73,7 +84,16 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       fuzz::require(std::equal(buffer.begin() + kHeaderSize, buffer.begin() + static_cast<long>(length),
                                answer.begin() + kHeaderSize));
     }
-    if (client.outcome()) client = fresh[sealed ? 1 : 0];
+    if (sealed && !was_open && client.outcome()) {
+      const auto* accepted = std::get_if<ClientHandshake::Accepted>(&*client.outcome());
+      fuzz::require((accepted != nullptr) == its.has_value());
+      if (accepted != nullptr) {
+        fuzz::require(accepted->keys->suite == its->suite);
+        fuzz::require(accepted->keys->send.bytes() == its->receive.bytes());
+        fuzz::require(accepted->keys->receive.bytes() == its->send.bytes());
+      }
+    }
+    if (client.outcome()) client = fresh[which];
   }
   return 0;
 }

@@ -19,7 +19,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   session.next_datagram(kOpened, buffer);
 
   const auto body = std::as_bytes(std::span(data, std::min(size, kMaxDatagram - kHeaderSize - crypto::kTagSize)));
-  Sealer peer(keys.receive, {}, kOpened);
+  Sealer peer(SealingKey(Suite::kNoise, keys.receive), {}, kOpened);
   const Header header{.suite = Suite::kNoise, .connection_id = kConnection};
   const auto clear = encode_header(header);
   std::copy(clear.begin(), clear.end(), buffer.begin());

@@ -2,6 +2,7 @@
 #include <deque>
 #include <vector>
 
+#include "protocol/secrets/suites.h"
 #include "protocol/session.h"
 #include "tests/fuzz/target.h"
 
@@ -13,12 +14,14 @@ using namespace tendon;
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   fuzz::Input input(data, size);
   LocalTime now{std::chrono::seconds(100)};
-  const bool sealed = input.byte() % 4 != 0;
+  const std::uint8_t first = input.byte();
+  const bool sealed = first % 4 != 0;
+  const Suite suite = (first & 4U) != 0 ? suites_of_this_machine().front() : Suite::kNoise;
   Session::Config config{.connection_id = 7};
   config.rekey = {.datagrams = 5, .age = std::chrono::seconds(1), .overlap = std::chrono::milliseconds(500)};
   Ratchet random(1);
-  const SessionKeys keys{.send = random.next(), .receive = random.next()};
-  const SessionKeys turned{.send = keys.receive, .receive = keys.send};
+  const SessionKeys keys{.send = random.next(), .receive = random.next(), .suite = suite};
+  const SessionKeys turned{.send = keys.receive, .receive = keys.send, .suite = suite};
   std::array<Session, 2> ends = {sealed ? Session(config, keys, now) : Session(config, now),
                                  sealed ? Session(config, turned, now) : Session(config, now)};
   using Datagram = std::vector<std::byte>;

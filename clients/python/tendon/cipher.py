@@ -1,12 +1,28 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Protects a session's datagrams: not at all (suite 0), or by ChaCha20-Poly1305 with renewed keys (suite 1)."""
+"""Protects a session's datagrams: not at all (suite 0), or with renewed keys by ChaCha20-Poly1305 (suite 1) or
+AES-256-GCM (suite 2)."""
 
 from __future__ import annotations
 
-from typing import Protocol
+from collections.abc import Iterable
+from typing import Protocol, Union
 
-from . import noise
+from . import aes, noise
 from .codec import Suite
+
+SUITE_NAMES = {Suite.AES_GCM: "aes-256-gcm", Suite.NOISE: "chacha20-poly1305"}
+"""The suites that seal; the first that both ends have is taken. The name of suite 2 is also the feature by which a client
+offers it and a server chooses it."""
+
+
+def usable_suites() -> tuple[Suite, ...]:
+    """Those of them that can be spoken here: suite 2 takes the package `cryptography`."""
+    return tuple(suite for suite in SUITE_NAMES if suite is not Suite.AES_GCM or aes.AVAILABLE)
+
+
+def names_of(suites: Iterable[Suite]) -> str:
+    return ", ".join(SUITE_NAMES.get(suite, "plain") for suite in suites)
+
 
 RENEW_AFTER_DATAGRAMS = 1 << 20
 RENEW_AFTER_NS = 600_000_000_000
@@ -51,26 +67,46 @@ class Plain:
         return body
 
 
+class _ChaCha:
+    """One key of suite 1, in the form of an AesGcm."""
+
+    def __init__(self, key: bytes) -> None:
+        self._key = key
+
+    def seal(self, number: int, associated: bytes, plain: bytes) -> bytes:
+        return noise.seal(self._key, number, associated, plain)
+
+    def unseal(self, number: int, associated: bytes, sealed: bytes) -> bytes | None:
+        return noise.unseal(self._key, number, associated, sealed)
+
+    def renewed(self) -> _ChaCha:
+        return _ChaCha(noise.renewed(self._key))
+
+
+_Key = Union[_ChaCha, aes.AesGcm]
+
+
 class Sealed:
-    suite = Suite.NOISE
     overhead = noise.TAG_SIZE
 
-    def __init__(self, ours: bytes, theirs: bytes, now: int) -> None:
+    def __init__(self, ours: bytes, theirs: bytes, now: int, suite: Suite = Suite.NOISE) -> None:
         """`ours` seals what we send, `theirs` what the peer sends, from `now` on."""
-        self._ours = ours
+        key_of: type[_Key] = aes.AesGcm if suite is Suite.AES_GCM else _ChaCha
+        self.suite = suite
+        self._ours: _Key = key_of(ours)
         self._our_epoch = 0
         self._sealed = 0  # datagrams under our present key
         self._renewed_at = now
 
-        self._theirs = theirs
-        self._their_next = noise.renewed(theirs)
+        self._theirs: _Key = key_of(theirs)
+        self._their_next: _Key = self._theirs.renewed()
         self._their_epoch = 0
-        self._their_previous: bytes | None = None
+        self._their_previous: _Key | None = None
         self._moved_on_at = now
 
     def next_epoch(self, now: int) -> int:
         if self._sealed >= RENEW_AFTER_DATAGRAMS or now - self._renewed_at >= RENEW_AFTER_NS:
-            self._ours = noise.renewed(self._ours)
+            self._ours = self._ours.renewed()
             self._our_epoch = (self._our_epoch + 1) % 256
             self._sealed = 0
             self._renewed_at = now
@@ -78,7 +114,7 @@ class Sealed:
 
     def seal(self, number: int, header: bytes, body: bytes) -> bytes:
         self._sealed += 1
-        return noise.seal(self._ours, number, header, body)
+        return self._ours.seal(number, header, body)
 
     def open(self, now: int, epoch: int, number: int, header: bytes, body: bytes) -> bytes:
         ahead = (epoch - self._their_epoch) % 256
@@ -87,7 +123,7 @@ class Sealed:
         if ahead == 1:
             plain = _opened(self._their_next, number, header, body)
             self._their_previous, self._theirs = self._theirs, self._their_next
-            self._their_next = noise.renewed(self._theirs)
+            self._their_next = self._theirs.renewed()
             self._their_epoch = epoch
             self._moved_on_at = now
             return plain
@@ -96,8 +132,8 @@ class Sealed:
         raise OldKey
 
 
-def _opened(key: bytes, number: int, header: bytes, body: bytes) -> bytes:
-    plain = noise.unseal(key, number, header, body)
+def _opened(key: _Key, number: int, header: bytes, body: bytes) -> bytes:
+    plain = key.unseal(number, header, body)
     if plain is None:
         raise Forged
     return plain

@@ -12,6 +12,8 @@ from enum import Enum
 
 from . import limits
 from .answer import Answer, read_touch
+from .cipher import names_of, usable_suites
+from .codec import Suite
 from .codec.fields import is_setting
 from .codec.ports import is_scale, is_share
 from .deadband import Deadband, ForceDeadband, check_state_deadband, foretell
@@ -92,7 +94,10 @@ class Config:
     """When another controller holds the channel's lease: keep asking until we have it. We ask again when the server
     says that the lease may be over."""
     key: bytes | None = field(default=None, repr=False)
-    """32 bytes that the server knows too (`read_key`): suite 1. None: plain, which servers accept on loopback only."""
+    """32 bytes that the server knows too (`read_key`): all is sealed. None: plain, which servers accept on loopback
+    only."""
+    suites: tuple[Suite, ...] = usable_suites()
+    """With a key: by which of them the session may be sealed; the server chooses."""
     rate_hz: float = 0
     """States handed out per second: at multiples of 1/rate_hz, or as soon after as there is a new one; after
     a delay of a whole period the grid starts anew, it never catches up. 0 = every new state, once."""
@@ -139,6 +144,8 @@ class Config:
         expect_at_most(limits.MAX_LABEL, self.channel, "channel")
         if self.key is not None:
             expect(len(self.key) == KEY_SIZE, "key.size", len(self.key), f"{KEY_SIZE} bytes")
+        usable = bool(self.suites) and set(self.suites) <= set(usable_suites())
+        expect(usable, "suites", names_of(self.suites), f"some of {names_of(usable_suites())}")
         rate_possible = self.rate_hz == 0 or MIN_RATE_HZ <= self.rate_hz <= MAX_RATE_HZ
         expect(rate_possible, "rate_hz", self.rate_hz, "0, or 0.001 to 100000")
         expect(0 <= self.state_hz <= limits.MAX_LOOP_HZ, "state_hz", self.state_hz, "0 to 1000000")
@@ -486,7 +493,9 @@ class ForceClient:
         hello = Hello(self.config.role, self.config.name, features, claims=self._claims())
         key = self.config.key
         ephemeral = b"" if key is None else self._random(KEY_SIZE)
-        self._handshake = ClientHandshake(hello, self._random(16), now, key=key, ephemeral=ephemeral)
+        self._handshake = ClientHandshake(
+            hello, self._random(16), now, key=key, ephemeral=ephemeral, suites=self.config.suites
+        )
         self._give_up = now + _ns(self.config.patience_s)
         self._stats.phase = Phase.GREETING
         self._stats.attempts += 1

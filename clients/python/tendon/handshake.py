@@ -3,16 +3,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from hashlib import sha256
 from typing import Union
 
 from . import codec, noise
-from .cipher import Cipher, Plain, Sealed
+from .cipher import SUITE_NAMES, Cipher, Plain, Sealed, names_of, usable_suites
 from .codec import Suite
-from .messages import NEVER, Hello, Instant, Refused, Welcome
+from .messages import NEVER, Code, Hello, Instant, Refused, Welcome
 
 RESEND_NS = 100_000_000
+_AES_GCM = SUITE_NAMES[Suite.AES_GCM]
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,12 +42,25 @@ class ClientHandshake:
     It never gives up; its owner may. It ignores datagrams that are malformed, not authentic, or of another attempt.
     """
 
-    def __init__(self, hello: Hello, random: bytes, now: int, *, key: bytes | None = None, ephemeral: bytes = b""):
-        """`random`: 16 bytes, new for each attempt. With `key`, suite 1; `ephemeral`: 32 bytes, new for each attempt."""
+    def __init__(
+        self,
+        hello: Hello,
+        random: bytes,
+        now: int,
+        *,
+        key: bytes | None = None,
+        ephemeral: bytes = b"",
+        suites: tuple[Suite, ...] = usable_suites(),
+    ):
+        """`random`: 16 bytes, new for each attempt. With `key` all is sealed; `ephemeral`: 32 bytes, new for each
+        attempt. The session is sealed by one of `suites`, as the server chooses, or it has refused us."""
         self._hello = hello
         self._random = random
+        self._suites = suites
         self._initiator: noise.Initiator | None = None
         self._suite = Suite.PLAIN
+        if key is not None and Suite.AES_GCM in suites:
+            hello = replace(hello, features=(*hello.features, _AES_GCM))
         self._body = codec.write_hello(hello)
         if key is not None:
             self._suite = Suite.NOISE
@@ -96,10 +110,16 @@ class ClientHandshake:
             if read is None:
                 return None
             body, split = read
-            cipher = Sealed(split.initiator_to_responder, split.responder_to_initiator, now)
         said = codec.read_answer(body)
         if not isinstance(said, Welcome):
             return said
         if not self._hello.version_min <= said.version <= self._hello.version_max:
             return None
+        if self._initiator is not None:
+            suite = Suite.AES_GCM if Suite.AES_GCM in self._suites and _AES_GCM in said.features else Suite.NOISE
+            if suite not in self._suites:
+                theirs, ours = names_of([suite]), names_of(self._suites)
+                return Refused(Code.UNSUPPORTED, f"the server seals by {theirs}, this client by {ours} only", 0, 0)
+            keys = split.of_suite_2() if suite is Suite.AES_GCM else split
+            cipher = Sealed(keys.initiator_to_responder, keys.responder_to_initiator, now, suite)
         return Accepted(answer.connection_id, said, cipher)

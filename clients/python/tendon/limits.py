@@ -59,4 +59,6 @@ BYES = 3
 PACKET_NUMBERS = 1 << 60
 """Packet numbers are below this: a nonce is never used twice."""
 LIFE_NS = 24 * 3600 * 1_000_000_000
-"""Age of a session of suite 1."""
+"""Age of a sealed session."""
+MAX_FORGED = 1 << 36
+"""It also ends after so many datagrams that did not open, so that nobody can go on guessing tags."""

@@ -67,6 +67,14 @@ class Split:
     responder_to_initiator: bytes
     handshake_hash: bytes  # hash of the whole handshake
 
+    def of_suite_2(self) -> Split:
+        """The keys of suite 2: bound to Hello and Answer, and none of them a key of suite 1."""
+        ours, theirs = (
+            hmac.digest(key, b"tendon-suite-2" + self.handshake_hash, "sha256")
+            for key in (self.initiator_to_responder, self.responder_to_initiator)
+        )
+        return Split(ours, theirs, self.handshake_hash)
+
 
 class SymmetricState:
     """The symmetric state of Noise: the hash and key that both ends have mixed so far.

@@ -7,8 +7,11 @@ import { kProtocolVersion } from "./messages.js";
 export const DatagramType = { Hello: 1, Retry: 2, Data: 3, Answer: 4 } as const;
 export type DatagramType = (typeof DatagramType)[keyof typeof DatagramType];
 
-/** 0: nothing is encrypted, loopback only. 1: Noise_NNpsk0_25519_ChaChaPoly_SHA256. */
-export const CipherSuite = { Plain: 0, Noise: 1 } as const;
+/**
+ * 0: nothing is encrypted, loopback only. 1: Noise_NNpsk0_25519_ChaChaPoly_SHA256. 2: the handshake of suite 1, and
+ * AES-256-GCM from then on: Data only.
+ */
+export const CipherSuite = { Plain: 0, Noise: 1, AesGcm: 2 } as const;
 export type CipherSuite = (typeof CipherSuite)[keyof typeof CipherSuite];
 
 const kMagic = 0x54; // 'T'
@@ -51,8 +54,9 @@ export function decodeHeader(datagram: Uint8Array): Header | undefined {
   const epoch = view.getUint8(2);
   const suite = view.getUint8(3);
   if (view.getUint8(0) !== kMagic || second >> 4 !== kProtocolVersion) return undefined;
-  if (type < DatagramType.Hello || type > DatagramType.Answer || suite > CipherSuite.Noise) return undefined;
-  if (epoch !== 0 && (suite === CipherSuite.Plain || type !== DatagramType.Data)) return undefined;
+  if (type < DatagramType.Hello || type > DatagramType.Answer || suite > CipherSuite.AesGcm) return undefined;
+  if (type !== DatagramType.Data && (epoch !== 0 || suite === CipherSuite.AesGcm)) return undefined;
+  if (epoch !== 0 && suite === CipherSuite.Plain) return undefined;
   return {
     type: type as DatagramType,
     epoch,

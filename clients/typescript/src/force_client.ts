@@ -4,6 +4,7 @@ import { objection, usable, type Touch } from "./answer.js";
 import { isSetting, type ControlAck } from "./codec.js";
 import { isSetScale, isSetShare } from "./codec_ports.js";
 import { checkForceDeadband, checkStateDeadband, Deadband, foretell, type ForceDeadband } from "./deadband.js";
+import type { CipherSuite } from "./datagram.js";
 import { expect } from "./expect.js";
 import { ClientHandshake } from "./handshake.js";
 import { kMaxLabel, kMaxLoopHz, kMaxName, kMaxValidForMs } from "./limits.js";
@@ -14,6 +15,7 @@ import {
 } from "./messages.js";
 import { kKeySize } from "./noise.js";
 import { Session, type LinkStats } from "./session.js";
+import { kUsableSuites, namesOf } from "./suites.js";
 import { earliest, fromMilliseconds, kNever, latest, type Nanoseconds } from "./time.js";
 
 /** The physics engine, seen from here. While it computes, newer states replace older ones. null: it knows no force, and none is sent. */
@@ -35,6 +37,8 @@ export interface ClientConfig {
   readonly takeLease?: boolean;
   /** The 32 bytes that the server knows too: everything is encrypted, and only loopback does without. */
   readonly key?: Uint8Array | undefined;
+  /** With a key: by which suites the session may be sealed; the server chooses. Default: all that this runtime has. */
+  readonly suites?: readonly CipherSuite[];
   /** Calls of the callback per second, 0.001 … 100 000; 0 = one for every new state. */
   readonly rateHz?: number;
   /** States per second to ask the server for; 0 = what the server gives by itself. */
@@ -120,6 +124,7 @@ const kAskLeaseAgain = fromMilliseconds(50);
 const kDefaults: Required<Omit<ClientConfig, "key" | "deadband" | "stateDeadband">> = {
   name: "guest", device: "", channel: "", takeLease: false, rateHz: 0, stateHz: 0, validForMs: 0, diagnostics: false,
   joints: false, outputs: false, patienceMs: 2000, retryMinMs: 100, retryMaxMs: 2000, random: randomBytes,
+  suites: kUsableSuites,
 };
 
 /** The numbers of a client that names no device and no channel. */
@@ -139,6 +144,8 @@ function checked(config: ClientConfig): Required<ClientConfig> {
   expectAtMost(kMaxLabel, full.device, "device");
   expectAtMost(kMaxLabel, full.channel, "channel");
   expect(!key || key.length === kKeySize, "key.size", key?.length, `${kKeySize} bytes`);
+  const usable = full.suites.length > 0 && full.suites.every((suite) => kUsableSuites.includes(suite));
+  expect(usable, "suites", `[${full.suites.join(", ")}]`, `numbers of some of ${namesOf(kUsableSuites)}`);
   expect(rateHz === 0 || (rateHz >= 1e-3 && rateHz <= 1e5), "rateHz", rateHz, "0, or 0.001 to 100000");
   expect(Number.isInteger(stateHz) && stateHz >= 0 && stateHz <= kMaxLoopHz, "stateHz", stateHz,
     `a whole number from 0 to ${kMaxLoopHz}`);
@@ -401,7 +408,8 @@ export class ForceClient {
       ],
       claims: this.#claims ? [{ device, channel, role: this.#role }] : [],
     };
-    this.#handshake = new ClientHandshake(hello, this.#config.key, this.#config.random, now);
+    const { key, random, suites } = this.#config;
+    this.#handshake = new ClientHandshake(hello, key, random, now, suites);
     this.#giveUp = now + fromMilliseconds(this.#config.patienceMs);
     this.#stats.phase = "greeting";
     ++this.#stats.attempts;

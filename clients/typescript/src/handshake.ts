@@ -3,9 +3,10 @@ import { decodeAnswerMessage, encodeHelloMessage } from "./codec.js";
 import {
   CipherSuite, concat, decodeAnswer, decodeRetry, encodeHello, equal, helloHeader, type AnswerDatagram,
 } from "./datagram.js";
-import type { Hello, Refused, Welcome } from "./messages.js";
-import { Initiator, keyId } from "./noise.js";
+import { Code, type Hello, type Refused, type Welcome } from "./messages.js";
+import { Initiator, keyId, keyOfSuite2, type Finished } from "./noise.js";
 import { NoiseSeal, PlainSeal, type Seal } from "./seal.js";
+import { kFeatureAesGcm, kUsableSuites, namesOf } from "./suites.js";
 import { kMillisecond, kNever, type Nanoseconds } from "./time.js";
 
 /** How an attempt ended. */
@@ -31,14 +32,22 @@ export class ClientHandshake {
   #outcome: Outcome | undefined;
 
   /**
-   * `random` gives that many bytes from a cryptographic source. With a `key` of 32 bytes the conversation is of suite 1,
-   * and whoever answers has proved that it knows the key.
+   * `random` gives that many bytes from a cryptographic source. With a `key` of 32 bytes all is sealed, and whoever
+   * answers has proved that it knows the key; the session is of one of `suites`, as the server chooses, or it has refused
+   * us.
    */
-  constructor(hello: Hello, key: Uint8Array | undefined, random: (size: number) => Uint8Array, now: Nanoseconds) {
+  constructor(
+    hello: Hello,
+    key: Uint8Array | undefined,
+    random: (size: number) => Uint8Array,
+    now: Nanoseconds,
+    private readonly suites: readonly CipherSuite[] = kUsableSuites,
+  ) {
     this.#hello = hello;
     this.#random = random(16);
     this.#nextTick = now;
-    const message = encodeHelloMessage(hello);
+    const offers = key && suites.includes(CipherSuite.AesGcm) ? [kFeatureAesGcm] : [];
+    const message = encodeHelloMessage({ ...hello, features: [...hello.features, ...offers] });
     if (key) {
       const id = keyId(key);
       this.#suite = CipherSuite.Noise;
@@ -103,7 +112,19 @@ export class ClientHandshake {
     if (!message) return undefined;
     if ("code" in message) return { kind: "refused", refused: message };
     if (message.version < this.#hello.versionMin || message.version > this.#hello.versionMax) return undefined;
-    const seal = finished ? new NoiseSeal(finished, now) : new PlainSeal();
-    return { kind: "accepted", connectionId: answer.connectionId, welcome: message, seal };
+    const accepted = { kind: "accepted", connectionId: answer.connectionId, welcome: message } as const;
+    if (!finished) return { ...accepted, seal: new PlainSeal() };
+    const aes = this.suites.includes(CipherSuite.AesGcm) && message.features.includes(kFeatureAesGcm);
+    const suite = aes ? CipherSuite.AesGcm : CipherSuite.Noise;
+    if (!this.suites.includes(suite)) {
+      const detail = `the server seals by ${namesOf([suite])}, this client by ${namesOf(this.suites)} only`;
+      return { kind: "refused", refused: { code: Code.UNSUPPORTED, detail, versionMin: 0, versionMax: 0 } };
+    }
+    return { ...accepted, seal: new NoiseSeal(aes ? keysOfSuite2(finished) : finished, now, NoiseSeal.kRenewAfter, suite) };
   }
 }
+
+const keysOfSuite2 = ({ sendKey, receiveKey, hash }: Finished): Pick<Finished, "sendKey" | "receiveKey"> => ({
+  sendKey: keyOfSuite2(sendKey, hash),
+  receiveKey: keyOfSuite2(receiveKey, hash),
+});

@@ -58,3 +58,5 @@ export const kMaxOneIn = 1000;
 export const kMaxTimeoutMs = 3_600_000;
 /** How many times a Bye is sent. */
 export const kByes = 3;
+/** A sealed session ends after so many datagrams that did not open, so that nobody can go on guessing tags. */
+export const kMaxForged = 2 ** 36;

@@ -114,6 +114,10 @@ export interface Finished {
   readonly hash: Uint8Array;
 }
 
+/** A key of suite 2, from that of a direction: bound to Hello and Answer, and never a key of suite 1. */
+export const keyOfSuite2 = (key: Uint8Array, hash: Uint8Array): Uint8Array =>
+  hmac(sha256, key, concat(ascii("tendon-suite-2"), hash));
+
 /** The initiator of NNpsk0: psk, e → and ← e, ee. `secret` is the ephemeral one: 32 new random bytes for each attempt. */
 export class Initiator {
   /** e, payload, tag. */

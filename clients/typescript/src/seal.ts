@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // How the body of a Data datagram is closed and opened: in the clear, or sealed with keys that are renewed.
+import { AesKey } from "./aes.js";
 import { CipherSuite, concat, DatagramType, encodeHeader, kHeaderSize, type Header } from "./datagram.js";
 import { decrypt, encrypt, rekey } from "./noise.js";
 import { kSecond, type Nanoseconds } from "./time.js";
@@ -28,40 +29,60 @@ export class PlainSeal implements Seal {
   }
 }
 
-/** Suite 1: ChaCha20-Poly1305 with the packet number as nonce and the header as associated data. */
+/** One key of suite 1, in the form of an AesKey. */
+class ChaChaKey {
+  constructor(private readonly key: Uint8Array) {}
+
+  encrypt(number: bigint, header: Uint8Array, plain: Uint8Array): Uint8Array {
+    return encrypt(this.key, number, header, plain);
+  }
+  decrypt(number: bigint, header: Uint8Array, sealed: Uint8Array): Uint8Array | undefined {
+    return decrypt(this.key, number, header, sealed);
+  }
+  rekey(): ChaChaKey {
+    return new ChaChaKey(rekey(this.key));
+  }
+}
+
+type SealingKey = ChaChaKey | AesKey;
+
+/**
+ * Suites 1 and 2: ChaCha20-Poly1305 or AES-256-GCM with the packet number as nonce and the header as associated data.
+ */
 export class NoiseSeal implements Seal {
   /** The sender renews its key after this many datagrams or this much time, whichever comes first. */
   static readonly kRenewAfter = { datagrams: 1n << 20n, time: 600n * kSecond };
   /** How long the previous key stays valid after a renewal. */
   static readonly kOverlap = 2n * kSecond;
 
-  readonly suite = CipherSuite.Noise;
   readonly overhead = 16;
 
-  #sendKey: Uint8Array;
+  #sendKey: SealingKey;
   #sendEpoch = 0;
   #renewed: Nanoseconds;
   #closed = 0n;
 
-  #receiveKey: Uint8Array;
-  #nextReceiveKey: Uint8Array;
+  #receiveKey: SealingKey;
+  #nextReceiveKey: SealingKey;
   #receiveEpoch = 0;
-  #before: { readonly key: Uint8Array; readonly until: Nanoseconds } | undefined;
+  #before: { readonly key: SealingKey; readonly until: Nanoseconds } | undefined;
 
   constructor(
     keys: { readonly sendKey: Uint8Array; readonly receiveKey: Uint8Array },
     opened: Nanoseconds,
     private readonly renewAfter: { readonly datagrams: bigint; readonly time: Nanoseconds } = NoiseSeal.kRenewAfter,
+    readonly suite: CipherSuite = CipherSuite.Noise,
   ) {
-    this.#sendKey = keys.sendKey;
-    this.#receiveKey = keys.receiveKey;
-    this.#nextReceiveKey = rekey(keys.receiveKey);
+    const Key = suite === CipherSuite.AesGcm ? AesKey : ChaChaKey;
+    this.#sendKey = new Key(keys.sendKey);
+    this.#receiveKey = new Key(keys.receiveKey);
+    this.#nextReceiveKey = this.#receiveKey.rekey();
     this.#renewed = opened;
   }
 
   close(now: Nanoseconds, connectionId: number, packetNumber: bigint, body: Uint8Array): Uint8Array {
     if (this.#closed >= this.renewAfter.datagrams || now - this.#renewed >= this.renewAfter.time) {
-      this.#sendKey = rekey(this.#sendKey);
+      this.#sendKey = this.#sendKey.rekey();
       this.#sendEpoch = (this.#sendEpoch + 1) % 256;
       this.#renewed = now;
       this.#closed = 0n;
@@ -70,12 +91,12 @@ export class NoiseSeal implements Seal {
     const header = encodeHeader({
       type: DatagramType.Data, epoch: this.#sendEpoch, suite: this.suite, connectionId, packetNumber,
     });
-    return concat(header, encrypt(this.#sendKey, packetNumber, header, body));
+    return concat(header, this.#sendKey.encrypt(packetNumber, header, body));
   }
 
   open(now: Nanoseconds, header: Header, datagram: Uint8Array): Uint8Array | "forged" | "oldKey" {
-    const opened = (key: Uint8Array): Uint8Array | "forged" =>
-      decrypt(key, header.packetNumber, datagram.subarray(0, kHeaderSize), datagram.subarray(kHeaderSize)) ?? "forged";
+    const opened = (key: SealingKey): Uint8Array | "forged" =>
+      key.decrypt(header.packetNumber, datagram.subarray(0, kHeaderSize), datagram.subarray(kHeaderSize)) ?? "forged";
     switch ((header.epoch - this.#receiveEpoch + 256) % 256) {
       case 0:
         return opened(this.#receiveKey);
@@ -84,7 +105,7 @@ export class NoiseSeal implements Seal {
         if (body !== "forged") {
           this.#before = { key: this.#receiveKey, until: now + NoiseSeal.kOverlap };
           this.#receiveKey = this.#nextReceiveKey;
-          this.#nextReceiveKey = rekey(this.#receiveKey);
+          this.#nextReceiveKey = this.#receiveKey.rekey();
           this.#receiveEpoch = header.epoch;
         }
         return body;

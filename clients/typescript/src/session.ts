@@ -3,7 +3,7 @@ import {
   decodeData, encodeFrame, encodeHead, type ControlAck, type DataContent, type Echo, type Frame,
 } from "./codec.js";
 import { CipherSuite, DatagramType, decodeHeader, kHeaderSize, concat } from "./datagram.js";
-import { kByes, kMaxDatagram, kMaxPacketNumber } from "./limits.js";
+import { kByes, kMaxDatagram, kMaxForged, kMaxPacketNumber } from "./limits.js";
 import {
   Code, type DeviceReport, type DeviceState, type ForceCommand, type LinkReport, type PeerReport, type PortState, type Request,
 } from "./messages.js";
@@ -31,7 +31,7 @@ export interface LinkStats {
   duplicated: number;
   /** Not a datagram of this conversation: dropped. */
   malformed: number;
-  /** Suite 1: did not open; forged, or damaged under way: dropped. */
+  /** Suites 1 and 2: did not open; forged, or damaged under way: dropped. */
   forged: number;
   /** Suite 1: of a key that is over, or far ahead: dropped. */
   oldKey: number;
@@ -220,6 +220,9 @@ export class Session {
   request(request: Request): number | undefined {
     return this.#asked.add(request);
   }
+  get suite(): CipherSuite {
+    return this.#config.seal.suite;
+  }
   /** Answers a request; an id that waits for no answer is ignored. */
   answer(answer: ControlAck): void {
     this.#answering.answer(answer);
@@ -239,7 +242,10 @@ export class Session {
     if (now - this.#lastHeard >= timeout) {
       this.#open = false;
       this.#closed = { kind: "closed", code: Code.TIMED_OUT, reason: `nothing heard for ${toMilliseconds(timeout)} ms` };
-    } else if (seal.suite !== CipherSuite.Plain && (now - this.#opened >= life || this.#nextPacket >= kMaxPacketNumber)) {
+    } else if (
+      seal.suite !== CipherSuite.Plain &&
+      (now - this.#opened >= life || this.#nextPacket >= kMaxPacketNumber || this.stats.forged >= kMaxForged)
+    ) {
       const reason = "the session has reached its age";
       this.close(Code.EXPIRED, reason);
       this.#closed = { kind: "closed", code: Code.EXPIRED, reason };

@@ -370,7 +370,8 @@ class Dice(random.Random):
             return codec.encode_answer(codec.AnswerDatagram(random16, answer.SerializeToString(), connection_id, suite))
         if kind == "retry":
             return codec.encode_retry(codec.RetryDatagram(random16, self.randbytes(16), suite))
-        epoch = self.randrange(256) if suite is Suite.NOISE else 0
+        suite = self.choice([suite, suite, suite, Suite.AES_GCM]) if suite is Suite.NOISE else suite
+        epoch = 0 if suite is Suite.PLAIN else self.randrange(256)
         header = codec.Header(DatagramType.DATA, suite, epoch, self.getrandbits(32), self.whole(64))
         datagram = pb.Datagram()
         self.fill(datagram)

@@ -3,10 +3,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from responder import Responder
 
 from tendon import codec
-from tendon.cipher import Cipher, Plain, Sealed
+from tendon.cipher import SUITE_NAMES, Cipher, Plain, Sealed
 from tendon.codec import DatagramType, Header, Suite
 from tendon.handshake import key_id, prologue
 from tendon.messages import NEVER, Grant, Hello, Instant, Refused, Welcome
@@ -18,8 +20,9 @@ COOKIE = bytes(range(1, 17))
 class StandIn:
     """`refusal`: what it says instead of Welcome. `deaf`: it answers nothing at all. `grants`: to whatever is claimed."""
 
-    def __init__(self, key: bytes | None = None) -> None:
+    def __init__(self, key: bytes | None = None, suites: tuple[Suite, ...] = (Suite.NOISE,)) -> None:
         self.key = key
+        self.suites = suites  # by which it seals; the first that it has been offered
         self.refusal: Refused | None = None
         self.deaf = False
         self.features: tuple[str, ...] = ("local-model",)
@@ -78,11 +81,17 @@ class StandIn:
             self.version, self.features, said.role, "stand-in", 8.0, 0.0, 1000, 2000, "test", self.grants
         )
         connection_id = 0 if self.refusal else self._welcomed
+        word = SUITE_NAMES[Suite.AES_GCM]
+        aes = responder is not None and Suite.AES_GCM in self.suites and word in said.features
+        if aes and isinstance(answer, Welcome):
+            answer = replace(answer, features=(word, *answer.features))
         body = codec.write_answer(answer)
         cipher: Cipher = Plain()
         if responder is not None:
             body, split = responder.reply(bytes(31) + bytes([self._welcomed]), body)
-            cipher = Sealed(split.responder_to_initiator, split.initiator_to_responder, now)
+            keys = split.of_suite_2() if aes else split
+            suite = Suite.AES_GCM if aes else Suite.NOISE
+            cipher = Sealed(keys.responder_to_initiator, keys.initiator_to_responder, now, suite)
         if self.refusal is None:
             self.session = Session(connection_id, now, cipher)
         datagram = codec.AnswerDatagram(hello.random, body, connection_id, hello.suite)

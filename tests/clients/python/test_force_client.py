@@ -22,6 +22,7 @@ from tendon import (
     Role,
     SetStateDeadband,
     Touch,
+    aes,
 )
 from tendon.codec import (
     AnswerDatagram,
@@ -60,6 +61,49 @@ def test_with_a_key_nothing_but_the_hellos_frame_is_readable():
     assert len(sent) > 100
     assert all(b"must not show" not in datagram for datagram in sent)
     assert {decode_header(datagram).suite for datagram in sent} == {1}
+
+
+OLD, BOTH, AES_ONLY = (Suite.NOISE,), (Suite.AES_GCM, Suite.NOISE), (Suite.AES_GCM,)
+
+
+@pytest.mark.skipif(not aes.AVAILABLE, reason="python3-cryptography is missing")
+@pytest.mark.parametrize(
+    "ours, theirs, agreed",
+    [(BOTH, BOTH, 2), (BOTH, OLD, 1), (OLD, BOTH, 1), (OLD, OLD, 1), (AES_ONLY, BOTH, 2), (BOTH, AES_ONLY, 2)],
+    ids=["both", "old server", "old client", "both old", "client forbids suite 1", "server forbids suite 1"],
+)
+def test_the_suite_is_the_fastest_that_both_have(ours, theirs, agreed):
+    stage = Stage(Config(key=KEY, suites=ours), StandIn(KEY, theirs))
+    stage.run(1 * SECOND)
+    assert stage.client.phase is Phase.OPEN
+    assert len(stage.forces) > 100
+    headers = [decode_header(datagram) for datagram in stage.world.there.delivered]
+    assert {header.suite for header in headers if header.type is DatagramType.DATA} == {agreed}
+    assert {header.suite for header in headers if header.type is DatagramType.HELLO} == {1}
+
+
+@pytest.mark.skipif(not aes.AVAILABLE, reason="python3-cryptography is missing")
+def test_a_server_that_has_none_of_our_suites_is_one_that_refuses():
+    stage = Stage(Config(key=KEY, suites=AES_ONLY), StandIn(KEY, OLD))
+    stage.run(1 * SECOND)
+    assert stage.client.phase is Phase.REFUSED
+    assert stage.client.stats.code is Code.UNSUPPORTED
+    assert stage.client.stats.reason == "the server seals by chacha20-poly1305, this client by aes-256-gcm only"
+
+
+def test_a_suite_that_was_not_offered_is_not_taken():
+    server = StandIn(KEY, OLD)
+    server.features = ("aes-256-gcm", *server.features)
+    stage = Stage(Config(key=KEY, suites=OLD), server)
+    stage.run(1 * SECOND)
+    assert stage.client.phase is Phase.OPEN
+    assert len(stage.forces) > 100
+
+
+@pytest.mark.parametrize("suites", [(), (Suite.PLAIN,)], ids=["none", "one that does not seal"])
+def test_suites_that_cannot_be_are_refused(suites):
+    with pytest.raises(ValueError, match="suites = .*: expected some of"):
+        Config(key=KEY, suites=suites)
 
 
 @pytest.mark.parametrize("key", [None, bytes(32)], ids=["no key", "another key"])

@@ -1,12 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Cipher suite 1 against itself; test_vectors.py has the public vectors."""
+"""Cipher suites 1 and 2 against themselves; test_vectors.py has the public vectors."""
 
 
 import pytest
 from responder import Responder
 
-from tendon import noise
+from tendon import aes, noise
 from tendon.cipher import OVERLAP_NS, RENEW_AFTER_NS, Forged, OldKey, Sealed
+from tendon.codec import Suite
+
 
 def handshake(psk=bytes(range(32)), other=None):
     initiator = noise.Initiator(psk, bytes(31) + b"\1", b"prologue", b"hello")
@@ -46,17 +48,29 @@ def test_a_point_of_low_order_is_not_authentic():
     assert initiator.read(bytes(64)) is None
 
 
+def test_the_keys_of_suite_2_are_bound_to_the_whole_handshake():
+    one, other = noise.Split(bytes(32), bytes(31) + b"\1", bytes(32)), noise.Split(bytes(32), bytes(31) + b"\1", b"h" * 32)
+    assert one.of_suite_2().initiator_to_responder != other.of_suite_2().initiator_to_responder
+    assert one.of_suite_2().responder_to_initiator != other.of_suite_2().responder_to_initiator
+    keys = {one.initiator_to_responder, one.responder_to_initiator}
+    assert not keys & {one.of_suite_2().initiator_to_responder, one.of_suite_2().responder_to_initiator}
+
+
 # ---- Sealed datagrams ----
 
 ONE, OTHER = bytes(32), bytes(31) + b"\1"
 HEADER = b"sixteen bytes..."
 
 
-def peers():
-    return Sealed(ONE, OTHER, 0), Sealed(OTHER, ONE, 0)
+NEEDS_AES = pytest.mark.skipif(not aes.AVAILABLE, reason="python3-cryptography is missing")
 
 
-def test_a_sealed_body_opens_with_its_header_and_number_only():
+@pytest.fixture(params=[Suite.NOISE, pytest.param(Suite.AES_GCM, marks=NEEDS_AES)], ids=["suite 1", "suite 2"])
+def peers(request):
+    return lambda: (Sealed(ONE, OTHER, 0, request.param), Sealed(OTHER, ONE, 0, request.param))
+
+
+def test_a_sealed_body_opens_with_its_header_and_number_only(peers):
     ours, theirs = peers()
     sealed = ours.seal(7, HEADER, b"body")
     assert theirs.open(0, 0, 7, HEADER, sealed) == b"body"
@@ -65,7 +79,7 @@ def test_a_sealed_body_opens_with_its_header_and_number_only():
             theirs.open(0, 0, number, header, body)
 
 
-def test_the_key_is_renewed_after_600_s_and_the_old_one_is_good_for_2_s():
+def test_the_key_is_renewed_after_600_s_and_the_old_one_is_good_for_2_s(peers):
     ours, theirs = peers()
     assert ours.next_epoch(RENEW_AFTER_NS - 1) == 0
     late = ours.seal(1, HEADER, b"late")
@@ -79,7 +93,7 @@ def test_the_key_is_renewed_after_600_s_and_the_old_one_is_good_for_2_s():
         theirs.open(now + OVERLAP_NS, 0, 1, HEADER, late)
 
 
-def test_the_key_is_renewed_after_2_to_the_20_datagrams(monkeypatch):
+def test_the_key_is_renewed_after_2_to_the_20_datagrams(peers, monkeypatch):
     monkeypatch.setattr("tendon.cipher.RENEW_AFTER_DATAGRAMS", 3)
     ours, _ = peers()
     epochs = []
@@ -89,7 +103,7 @@ def test_the_key_is_renewed_after_2_to_the_20_datagrams(monkeypatch):
     assert epochs == [0, 0, 0, 1, 1, 1, 2]
 
 
-def test_a_forged_epoch_moves_nothing():
+def test_a_forged_epoch_moves_nothing(peers):
     ours, theirs = peers()
     with pytest.raises(Forged):
         theirs.open(0, 1, 1, HEADER, bytes(40))
@@ -99,7 +113,7 @@ def test_a_forged_epoch_moves_nothing():
     assert theirs.open(0, 0, 1, HEADER, ours.seal(1, HEADER, b"body")) == b"body"
 
 
-def test_the_epoch_wraps_after_256_renewals():
+def test_the_epoch_wraps_after_256_renewals(peers):
     ours, theirs = peers()
     now = 0
     for number in range(600):

@@ -3,15 +3,16 @@
 
 import hmac
 import json
+from dataclasses import replace
 
 import pytest
 from conftest import ROOT
 from google.protobuf import json_format
 from responder import Responder
 
-from tendon import codec, noise, read_key
+from tendon import aes, codec, noise, read_key
 from tendon import tendon_pb2 as pb
-from tendon.cipher import Forged, Sealed
+from tendon.cipher import SUITE_NAMES, Forged, Sealed
 from tendon.codec import DatagramType, Header, Suite
 from tendon.handshake import Accepted, ClientHandshake, key_id, prologue
 from tendon.messages import Refused
@@ -34,8 +35,10 @@ def unhex(value):
     }
 
 
-PLAIN, SEALED = (unhex(load(name)) for name in ("plain", "sealed"))
-FILES = [pytest.param(PLAIN, id="plain"), pytest.param(SEALED, id="sealed")]
+PLAIN, SEALED, SEALED_AES = (unhex(load(name)) for name in ("plain", "sealed", "sealed_aes"))
+NEEDS_AES = pytest.mark.skipif(not aes.AVAILABLE, reason="python3-cryptography is missing")
+SEALED_FILES = [pytest.param(SEALED, id="sealed"), pytest.param(SEALED_AES, id="sealed_aes", marks=NEEDS_AES)]
+FILES = [pytest.param(PLAIN, id="plain"), *SEALED_FILES]
 
 
 def cases(vectors, name="name"):
@@ -65,6 +68,20 @@ def test_hmac_sha256(vector):
     assert hmac.digest(key, data, "sha256").hex() == vector["result"]
 
 
+@NEEDS_AES
+@pytest.mark.parametrize("vector", cases(PRIMITIVES["aes256_gcm"], "source"))
+def test_aes256_gcm(vector):
+    nonce = bytes.fromhex(vector["nonce"])
+    if nonce[:4] != bytes(4):
+        pytest.skip("a nonce that Noise has not")
+    number = int.from_bytes(nonce[4:], "big")
+    key, associated, plain, sealed = (
+        bytes.fromhex(vector[name]) for name in ("key", "associated_data", "text", "sealed")
+    )
+    assert aes.AesGcm(key).seal(number, associated, plain) == sealed
+    assert aes.AesGcm(key).unseal(number, associated, sealed) == plain
+
+
 def test_noise_is_that_of_the_public_vector():
     (vector,) = load("noise")["vectors"]
     (psk,) = map(bytes.fromhex, vector["init_psks"])
@@ -92,7 +109,12 @@ def test_noise_is_that_of_the_public_vector():
 
 def handshake(file, now=0):
     hello = codec.read_hello(unhex(file["hello"])["body"])
-    secret = {"key": file["psk"], "ephemeral": file["client_ephemeral"]} if file["suite"] else {}
+    secret = {}
+    if file["suite"]:
+        suites = (Suite.AES_GCM, Suite.NOISE) if file["suite"] == 2 else (Suite.NOISE,)
+        secret = {"key": file["psk"], "ephemeral": file["client_ephemeral"], "suites": suites}
+        words = tuple(word for word in hello.features if word != SUITE_NAMES[Suite.AES_GCM])  # the client adds it
+        hello = replace(hello, features=words)
     return ClientHandshake(hello, file["client_random"], now, **secret)
 
 
@@ -131,6 +153,7 @@ def test_the_answer_is_read_as_it_is_here(file, name):
         assert isinstance(client.outcome, Accepted)
         assert client.outcome.connection_id == file["connection_id"]
         assert client.outcome.welcome == codec.read_answer(answer["body"])
+        assert client.outcome.cipher.suite == Suite(file["suite"])
 
 
 # ---- Data ----
@@ -143,10 +166,13 @@ def number_of(vector):
 def all_data(files):
     for suite, file in files:
         for vector in file["data"]:
-            yield pytest.param(file, unhex(vector), id=f"{suite}: {vector['name']}")
+            marks = [NEEDS_AES] if file is SEALED_AES else []
+            yield pytest.param(file, unhex(vector), id=f"{suite}: {vector['name']}", marks=marks)
 
 
-@pytest.mark.parametrize("file, vector", all_data([("plain", PLAIN), ("sealed", SEALED)]))
+@pytest.mark.parametrize(
+    "file, vector", all_data([("plain", PLAIN), ("sealed", SEALED), ("sealed_aes", SEALED_AES)])
+)
 def test_a_datagram_is_written_and_read_as_it_is_here(file, vector):
     body = vector["body"]
     assert encoded(pb.Datagram, vector["message"]) == body
@@ -156,7 +182,11 @@ def test_a_datagram_is_written_and_read_as_it_is_here(file, vector):
     header = codec.encode_header(
         Header(DatagramType.DATA, Suite(file["suite"]), vector.get("epoch", 0), file["connection_id"], number_of(vector))
     )
-    sealed = noise.seal(vector["key"], number_of(vector), header, body) if file["suite"] else body
+    sealed = body
+    if file["suite"] == 1:
+        sealed = noise.seal(vector["key"], number_of(vector), header, body)
+    elif file["suite"] == 2:
+        sealed = aes.AesGcm(vector["key"]).seal(number_of(vector), header, body)
     assert header + sealed == vector["datagram"]
 
 
@@ -177,11 +207,13 @@ def test_bounds_are_those_of_the_proto_file():
     assert len(vectors) > 300 and not wrong
 
 
-def test_the_conversation_here_can_be_held_with_the_keys_of_its_welcome():
-    welcome = unhex(SEALED["welcome"])
+@pytest.mark.parametrize("file", SEALED_FILES)
+def test_the_conversation_here_can_be_held_with_the_keys_of_its_welcome(file):
+    welcome = unhex(file["welcome"])
     ours, theirs = welcome["client_to_server_key"], welcome["server_to_client_key"]
-    client, server = Sealed(ours, theirs, 0), Sealed(theirs, ours, 0)
-    for vector in map(unhex, SEALED["data"]):
+    suite = Suite(file["suite"])
+    client, server = Sealed(ours, theirs, 0, suite), Sealed(theirs, ours, 0, suite)
+    for vector in map(unhex, file["data"]):
         end = server if vector["direction"] == "client_to_server" else client
         header, sealed = vector["datagram"][:16], vector["datagram"][16:]
         assert end.open(0, vector["epoch"], number_of(vector), header, sealed) == vector["body"]
@@ -190,10 +222,16 @@ def test_the_conversation_here_can_be_held_with_the_keys_of_its_welcome():
             other.open(0, vector["epoch"] and 1, number_of(vector), header, sealed)
 
 
-@pytest.mark.parametrize("vector", cases(map(unhex, SEALED["dropped"])))
-def test_what_is_dropped_here_is_dropped_and_counted(vector):
-    client = handshake(SEALED)
-    client.receive(0, unhex(SEALED["welcome"])["datagram"])
+def all_dropped():
+    for suite, file, marks in [("sealed", SEALED, []), ("sealed_aes", SEALED_AES, [NEEDS_AES])]:
+        for vector in map(unhex, file["dropped"]):
+            yield pytest.param(file, vector, id=f"{suite}: {vector['name']}", marks=marks)
+
+
+@pytest.mark.parametrize("file, vector", all_dropped())
+def test_what_is_dropped_here_is_dropped_and_counted(file, vector):
+    client = handshake(file)
+    client.receive(0, unhex(file["welcome"])["datagram"])
     session = Session(client.outcome.connection_id, 0, client.outcome.cipher)
     session.receive(0, vector["datagram"])
     assert session.stats.datagrams_received == 0

@@ -331,7 +331,7 @@ def test_data_is_written_and_read_as_the_page_has_it(name):
 
 @pytest.mark.parametrize(
     "at, value",
-    [(0, 0x55), (1, 0x23), (1, 0x15), (1, 0x10), (2, 1), (3, 2)],
+    [(0, 0x55), (1, 0x23), (1, 0x15), (1, 0x10), (2, 1), (3, 3)],
     ids=["magic", "version", "type", "type 0", "epoch of plain", "suite"],
 )
 def test_a_header_that_the_page_does_not_know_is_refused(at, value):

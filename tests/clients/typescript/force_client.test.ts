@@ -3,8 +3,9 @@
 // ForceClient against a server on virtual time, over a network that a seed makes.
 import assert from "node:assert/strict";
 import { describe, it } from "node:test";
+import { kHasAes } from "../../../clients/typescript/src/aes.js";
 import { decodeData, encodeAnswerMessage } from "../../../clients/typescript/src/codec.js";
-import { encodeAnswer } from "../../../clients/typescript/src/datagram.js";
+import { CipherSuite, encodeAnswer } from "../../../clients/typescript/src/datagram.js";
 import { ForceClient, type ClientConfig } from "../../../clients/typescript/src/force_client.js";
 import { Code, Mode, PortPhase, Role, type DeviceState, type PortState } from "../../../clients/typescript/src/messages.js";
 import { NoiseSeal } from "../../../clients/typescript/src/seal.js";
@@ -17,12 +18,14 @@ import { controller, kFair, kFoul, kPush, kWelcome, World, type ServerConduct } 
 
 const kKey = new Random(99).bytes(32);
 const kNowhere = { x: 0, y: 0, z: 0 };
-const kSuites = [["suite 0", undefined], ["suite 1", kKey]] as const;
+const kSuites = [
+  ["suite 0", undefined, false], ["suite 1", kKey, false], ...(kHasAes ? [["suite 2", kKey, true] as const] : []),
+] as const;
 
-for (const [suite, key] of kSuites) {
+for (const [suite, key, aes] of kSuites) {
   describe(`over a fair network, ${suite}`, () => {
     it("a controller sees every state once and answers it with a force", () => {
-      const { seen, world } = controller(1, kFair, { name: "wall", key }, { key });
+      const { seen, world } = controller(1, kFair, { name: "wall", key }, { key, aes });
       world.runMs(1000);
       const { forces, hellos, session } = world.server;
       assert.equal(hellos.length, 1);
@@ -56,7 +59,7 @@ for (const [suite, key] of kSuites) {
     it("the newest states and forces arrive; requests are answered in order", () => {
       for (let seed = 1; seed <= 10; ++seed) {
         const renewAfter = { datagrams: 50n, time: 600n * kSecond };
-        const { seen, world } = controller(seed, kFoul, { key, stateHz: 1000 }, { key, renewAfter });
+        const { seen, world } = controller(seed, kFoul, { key, stateHz: 1000 }, { key, aes, renewAfter });
         world.runMs(3000);
         for (let i = 0; i < 9; ++i) assert.equal(world.client.rearm(), true);
         assert.equal(world.client.disarm(), true);
@@ -156,6 +159,39 @@ describe("the handshake", () => {
       assert.equal(world.client.stats().sessions, 0);
       assert.equal(world.server.hellos.length, 0);
     }
+  });
+
+  const both: readonly CipherSuite[] = [CipherSuite.AesGcm, CipherSuite.Noise];
+  const old: readonly CipherSuite[] = [CipherSuite.Noise];
+  const aesOnly: readonly CipherSuite[] = [CipherSuite.AesGcm];
+  for (const [what, suites, aes, agreed] of [
+    ["both have it", both, true, 2], ["an older server", both, false, 1], ["an older client", old, true, 1],
+    ["a client that forbids suite 1", aesOnly, true, 2], ["suite 1 forbidden, and an older server", aesOnly, false, undefined],
+  ] as const) {
+    it(`seals by the fastest suite that both have: ${what}`, { skip: !kHasAes }, () => {
+      const { world } = controller(1, kFair, { key: kKey, suites }, { key: kKey, aes });
+      world.runMs(500);
+      if (agreed === undefined) {
+        assert.equal(world.client.phase, "refused");
+        assert.equal(world.client.stats().code, Code.UNSUPPORTED);
+        const reason = "the server seals by chacha20-poly1305, this client by aes-256-gcm only";
+        assert.equal(world.client.stats().reason, reason);
+        return;
+      }
+      assert.equal(world.client.phase, "open");
+      assert.ok(world.server.forces.length > 300);
+      assert.equal(world.server.session!.suite, agreed);
+      assert.equal(world.server.hellos[0]!.datagram.suite, CipherSuite.Noise);
+      assert.equal(world.server.hellos[0]!.hello.features.includes("aes-256-gcm"), suites.includes(CipherSuite.AesGcm));
+    });
+  }
+
+  it("does not take a suite that it has not offered", () => {
+    const { world } = controller(1, kFair, { key: kKey, suites: old }, { key: kKey, features: ["aes-256-gcm"] });
+    world.runMs(500);
+    assert.equal(world.client.phase, "open");
+    assert.equal(world.server.session!.suite, CipherSuite.Noise);
+    assert.ok(world.server.forces.length > 300);
   });
 
   it("says Hello at once after the first Retry only", () => {
@@ -399,6 +435,8 @@ describe("an impossible configuration", () => {
       [{ device: "ä".repeat(13) }, /^RangeError: device.size = 26: expected at most 24 bytes$/],
       [{ channel: "c".repeat(25) }, /^RangeError: channel.size = 25: expected at most 24 bytes$/],
       [{ key: new Uint8Array(31) }, /^RangeError: key.size = 31: expected 32 bytes$/],
+      [{ suites: [0] }, /^RangeError: suites = \[0\]: expected numbers of some of /],
+      [{ suites: [] }, /^RangeError: suites = \[\]: expected/],
       [{ rateHz: -1 }, /^RangeError: rateHz = -1: expected 0, or 0.001 to 100000$/], [{ rateHz: NaN }, /^RangeError: rateHz = NaN: expected 0/],
       [{ stateHz: 1.5 }, /^RangeError: stateHz = 1.5: expected a whole number from 0 to 1000000$/],
       [{ validForMs: 10_001 }, /^RangeError: validForMs = 10001: expected 0 to 10000$/],

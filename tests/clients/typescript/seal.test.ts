@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 import assert from "node:assert/strict";
+import { createCipheriv } from "node:crypto";
 import { describe, it } from "node:test";
-import { decodeHeader } from "../../../clients/typescript/src/datagram.js";
-import { rekey } from "../../../clients/typescript/src/noise.js";
+import { CipherSuite, decodeHeader } from "../../../clients/typescript/src/datagram.js";
 import { ReplayWindow } from "../../../clients/typescript/src/replay_window.js";
 import { NoiseSeal } from "../../../clients/typescript/src/seal.js";
+import { kUsableSuites } from "../../../clients/typescript/src/suites.js";
 import { kSecond, type Nanoseconds } from "../../../clients/typescript/src/time.js";
 import { ascii, flipped } from "./support/bytes.js";
 import { Random } from "./support/random.js";
@@ -12,14 +13,19 @@ import { Random } from "./support/random.js";
 const kId = 7;
 const kBody = ascii("the hand is at x");
 
+interface Pair {
+  readonly a: NoiseSeal;
+  readonly z: NoiseSeal;
+}
+
 /** Two ends that renew their keys after so many datagrams. */
-function pair(datagrams = 1n << 20n): { readonly a: NoiseSeal; readonly z: NoiseSeal } {
+function pairOf(suite: CipherSuite, datagrams: bigint): Pair {
   const random = new Random(4);
   const [first, second] = [random.bytes(32), random.bytes(32)];
   const renewAfter = { datagrams, time: 600n * kSecond };
   return {
-    a: new NoiseSeal({ sendKey: first, receiveKey: second }, 0n, renewAfter),
-    z: new NoiseSeal({ sendKey: second, receiveKey: first }, 0n, renewAfter),
+    a: new NoiseSeal({ sendKey: first, receiveKey: second }, 0n, renewAfter, suite),
+    z: new NoiseSeal({ sendKey: second, receiveKey: first }, 0n, renewAfter, suite),
   };
 }
 
@@ -29,69 +35,77 @@ function open(seal: NoiseSeal, now: Nanoseconds, datagram: Uint8Array): Uint8Arr
   return typeof body === "string" ? undefined : body;
 }
 
-describe("a sealed datagram", () => {
-  it("opens at the other end, and not when any one of its bits has changed", () => {
-    const { a, z } = pair();
-    const datagram = a.close(0n, kId, 5n, kBody);
-    assert.equal(datagram.length, 16 + kBody.length + 16);
-    for (let at = 0; at < datagram.length; ++at) assert.equal(open(z, 0n, flipped(datagram, at)), undefined, `byte ${at}`);
-    assert.deepEqual(open(z, 0n, datagram), kBody);
-    assert.equal(open(a, 0n, datagram), undefined, "sent back to its sender");
-  });
-});
+for (const suite of kUsableSuites) {
+  const pair = (datagrams = 1n << 20n): Pair => pairOf(suite, datagrams);
 
-describe("keys", () => {
-  it("are renewed after 2²⁰ datagrams or 600 s, whichever comes first", () => {
-    assert.deepEqual(NoiseSeal.kRenewAfter, { datagrams: 1n << 20n, time: 600n * kSecond });
-    const { a } = pair(3n);
-    const epochs = [0n, 1n, 2n, 3n, 4n].map((n) => decodeHeader(a.close(0n, kId, n, kBody))!.epoch);
-    assert.deepEqual(epochs, [0, 0, 0, 1, 1]);
-    const { z } = pair();
-    assert.equal(decodeHeader(z.close(600n * kSecond - 1n, kId, 0n, kBody))!.epoch, 0);
-    assert.equal(decodeHeader(z.close(600n * kSecond, kId, 1n, kBody))!.epoch, 1);
-    assert.equal(decodeHeader(z.close(601n * kSecond, kId, 2n, kBody))!.epoch, 1);
+  describe(`a sealed datagram of suite ${suite}`, () => {
+    it("opens at the other end, and not when any one of its bits has changed", () => {
+      const { a, z } = pair();
+      const datagram = a.close(0n, kId, 5n, kBody);
+      assert.equal(datagram.length, 16 + kBody.length + 16);
+      for (let at = 0; at < datagram.length; ++at) assert.equal(open(z, 0n, flipped(datagram, at)), undefined, `byte ${at}`);
+      assert.deepEqual(open(z, 0n, datagram), kBody);
+      assert.equal(open(a, 0n, datagram), undefined, "sent back to its sender");
+    });
   });
 
-  it("are those of Noise's REKEY, each direction by itself", () => {
-    const key = new Random(4).bytes(32);
-    const { a, z } = pair(1n);
-    a.close(0n, kId, 0n, kBody);
-    const second = a.close(0n, kId, 1n, kBody);
-    const renewed = new NoiseSeal({ sendKey: key, receiveKey: rekey(key) }, 0n);
-    assert.deepEqual(renewed.open(0n, { ...decodeHeader(second)!, epoch: 0 }, second), kBody);
-    assert.equal(decodeHeader(z.close(0n, kId, 0n, kBody))!.epoch, 0);
-  });
+  describe(`keys of suite ${suite}`, () => {
+    it("are renewed after 2²⁰ datagrams or 600 s, whichever comes first", () => {
+      assert.deepEqual(NoiseSeal.kRenewAfter, { datagrams: 1n << 20n, time: 600n * kSecond });
+      const { a } = pair(3n);
+      const epochs = [0n, 1n, 2n, 3n, 4n].map((n) => decodeHeader(a.close(0n, kId, n, kBody))!.epoch);
+      assert.deepEqual(epochs, [0, 0, 0, 1, 1]);
+      const { z } = pair();
+      assert.equal(decodeHeader(z.close(600n * kSecond - 1n, kId, 0n, kBody))!.epoch, 0);
+      assert.equal(decodeHeader(z.close(600n * kSecond, kId, 1n, kBody))!.epoch, 1);
+      assert.equal(decodeHeader(z.close(601n * kSecond, kId, 2n, kBody))!.epoch, 1);
+    });
 
-  it("follow the sender through more than 256 epochs with every third lost", () => {
-    const { a, z } = pair(2n);
-    for (let n = 0n; n < 1200n; ++n) {
-      const datagram = a.close(0n, kId, n, kBody);
-      if (n % 3n !== 0n) assert.deepEqual(open(z, 0n, datagram), kBody, `number ${n}`);
-    }
-  });
+    it("are those of Noise's REKEY, each direction by itself", () => {
+      const key = new Random(4).bytes(32);
+      const { a, z } = pair(1n);
+      a.close(0n, kId, 0n, kBody);
+      const second = a.close(0n, kId, 1n, kBody);
+      const nonce = Buffer.from("00000000ffffffffffffffff", "hex");
+      const cipher = suite === CipherSuite.AesGcm
+        ? createCipheriv("aes-256-gcm", key, nonce) : createCipheriv("chacha20-poly1305", key, nonce, { authTagLength: 16 });
+      const next = Uint8Array.from(cipher.update(Buffer.alloc(32)));
+      const renewed = new NoiseSeal({ sendKey: key, receiveKey: next }, 0n, undefined, suite);
+      assert.deepEqual(renewed.open(0n, { ...decodeHeader(second)!, epoch: 0 }, second), kBody);
+      assert.equal(decodeHeader(z.close(0n, kId, 0n, kBody))!.epoch, 0);
+    });
 
-  it("are good for 2 s after the next has been used, and no longer", () => {
-    const { a, z } = pair(1n);
-    const [old, late, fresh] = [a.close(0n, kId, 0n, kBody), a.close(0n, kId, 1n, kBody), a.close(0n, kId, 2n, kBody)];
-    assert.ok(open(z, 0n, old));
-    assert.ok(open(z, kSecond, late));
-    assert.ok(open(z, 3n * kSecond - 1n, old));
-    assert.equal(open(z, 3n * kSecond, old), undefined);
-    assert.ok(open(z, 3n * kSecond, late));
-    assert.ok(open(z, 3n * kSecond, fresh));
-    assert.equal(open(z, 3n * kSecond, old), undefined, "two epochs back");
-  });
+    it("follow the sender through more than 256 epochs with every third lost", () => {
+      const { a, z } = pair(2n);
+      for (let n = 0n; n < 1200n; ++n) {
+        const datagram = a.close(0n, kId, n, kBody);
+        if (n % 3n !== 0n) assert.deepEqual(open(z, 0n, datagram), kBody, `number ${n}`);
+      }
+    });
 
-  it("stay for a forged datagram of the next epoch, and for one two ahead", () => {
-    const { a, z } = pair(1n);
-    const [first, second, third] = [a.close(0n, kId, 0n, kBody), a.close(0n, kId, 1n, kBody), a.close(0n, kId, 2n, kBody)];
-    assert.equal(open(z, 0n, flipped(second, 20)), undefined);
-    assert.equal(open(z, 0n, third), undefined);
-    assert.ok(open(z, 10n * kSecond, first), "still the present epoch");
-    assert.ok(open(z, 10n * kSecond, second));
-    assert.ok(open(z, 10n * kSecond, third));
+    it("are good for 2 s after the next has been used, and no longer", () => {
+      const { a, z } = pair(1n);
+      const [old, late, fresh] = [a.close(0n, kId, 0n, kBody), a.close(0n, kId, 1n, kBody), a.close(0n, kId, 2n, kBody)];
+      assert.ok(open(z, 0n, old));
+      assert.ok(open(z, kSecond, late));
+      assert.ok(open(z, 3n * kSecond - 1n, old));
+      assert.equal(open(z, 3n * kSecond, old), undefined);
+      assert.ok(open(z, 3n * kSecond, late));
+      assert.ok(open(z, 3n * kSecond, fresh));
+      assert.equal(open(z, 3n * kSecond, old), undefined, "two epochs back");
+    });
+
+    it("stay for a forged datagram of the next epoch, and for one two ahead", () => {
+      const { a, z } = pair(1n);
+      const [first, second, third] = [a.close(0n, kId, 0n, kBody), a.close(0n, kId, 1n, kBody), a.close(0n, kId, 2n, kBody)];
+      assert.equal(open(z, 0n, flipped(second, 20)), undefined);
+      assert.equal(open(z, 0n, third), undefined);
+      assert.ok(open(z, 10n * kSecond, first), "still the present epoch");
+      assert.ok(open(z, 10n * kSecond, second));
+      assert.ok(open(z, 10n * kSecond, third));
+    });
   });
-});
+}
 
 describe("ReplayWindow", () => {
   it("agrees with a set of all inserted numbers up to 1983 behind", () => {

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <set>
+
 #include "tests/protocol/examples.h"
 
 // The known answer of cacophony is in vectors_test.cc.
@@ -37,6 +39,24 @@ TEST_F(Noise, BothEndsEndWithTheSameKeysAndEachOthersWords) {
   EXPECT_EQ(answer->split.initiator_to_responder.bytes(), reply->split.initiator_to_responder.bytes());
   EXPECT_EQ(answer->split.responder_to_initiator.bytes(), reply->split.responder_to_initiator.bytes());
   EXPECT_NE(answer->split.initiator_to_responder.bytes(), answer->split.responder_to_initiator.bytes());
+}
+
+TEST_F(Noise, TheKeysOfSuite2AreBoundToTheWholeHandshake) {
+  const auto z = NoiseResponder::read(psk_, prologue_, a_.message());
+  const Key ephemeral = random_.next();
+  // The same key agreement, two answers: what Split() gives does not know of the second payload, suite 2 does.
+  const NoiseSplit one = z->reply(ephemeral, text("welcome"))->split;
+  const NoiseSplit other = z->reply(ephemeral, text("welcome to suite 2"))->split;
+  ASSERT_EQ(one.initiator_to_responder.bytes(), other.initiator_to_responder.bytes());
+  EXPECT_NE(split_of_suite_2(one).initiator_to_responder.bytes(),
+            split_of_suite_2(other).initiator_to_responder.bytes());
+  EXPECT_NE(split_of_suite_2(one).responder_to_initiator.bytes(),
+            split_of_suite_2(other).responder_to_initiator.bytes());
+  // And no key of one suite is a key of the other.
+  const std::set<Bytes32> all = {one.initiator_to_responder.bytes(), one.responder_to_initiator.bytes(),
+                                 split_of_suite_2(one).initiator_to_responder.bytes(),
+                                 split_of_suite_2(one).responder_to_initiator.bytes()};
+  EXPECT_EQ(all.size(), 4U);
 }
 
 TEST_F(Noise, EveryBitOfBothMessagesCounts) {

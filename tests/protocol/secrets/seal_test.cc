@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
+#include "protocol/secrets/suites.h"
 #include "tests/protocol/examples.h"
 
 namespace tendon {
@@ -16,12 +17,15 @@ using std::chrono::seconds;
 constexpr LocalTime kOpened{seconds(100)};
 
 /// One direction, from the one who seals to the one who opens.
-class Seal : public testing::Test {
+class Seal : public testing::TestWithParam<Suite> {
  protected:
   explicit Seal(const Rekey& rekey = {}) : rekey_(rekey) {}
+  void SetUp() override {
+    if (GetParam() == Suite::kAesGcm && !crypto::has_aes()) GTEST_SKIP() << "this processor has no AES";
+  }
 
   Bytes sealed(LocalTime now, std::uint64_t number) {
-    const Header header{.suite = Suite::kNoise,
+    const Header header{.suite = GetParam(),
                         .epoch = sealer_.next_epoch(now),
                         .connection_id = examples::kConnection,
                         .packet_number = number};
@@ -38,7 +42,7 @@ class Seal : public testing::Test {
   }
 
   Rekey rekey_;
-  Key key_ = Ratchet(1).next();
+  SealingKey key_{suites_of_this_machine().size() > 1 ? GetParam() : Suite::kNoise, Ratchet(1).next()};
   Sealer sealer_{key_, rekey_, kOpened};
   Opener opener_{key_, rekey_};
   std::array<std::byte, kMaxDatagram> body_{};
@@ -49,7 +53,13 @@ class SealWithRekeys : public Seal {
   SealWithRekeys() : Seal({.datagrams = 10, .age = seconds(5), .overlap = seconds(2)}) {}
 };
 
-TEST_F(Seal, WhatWasSealedOpensAndIsNotReadableBefore) {
+std::string name_of(const testing::TestParamInfo<Suite>& suite) {
+  return "Suite" + std::to_string(static_cast<int>(suite.param));
+}
+INSTANTIATE_TEST_SUITE_P(Of, Seal, testing::Values(Suite::kNoise, Suite::kAesGcm), name_of);
+INSTANTIATE_TEST_SUITE_P(Of, SealWithRekeys, testing::Values(Suite::kNoise, Suite::kAesGcm), name_of);
+
+TEST_P(Seal, WhatWasSealedOpensAndIsNotReadableBefore) {
   const Bytes plain = examples::data(7, {}, examples::state());
   const Bytes datagram = sealed(kOpened, 7);
   EXPECT_EQ(datagram.size(), plain.size() + 16);
@@ -58,7 +68,7 @@ TEST_F(Seal, WhatWasSealedOpensAndIsNotReadableBefore) {
   EXPECT_TRUE(std::equal(plain.begin() + kHeaderSize, plain.end(), body_.begin()));
 }
 
-TEST_F(Seal, EveryBitOfADatagramCounts) {
+TEST_P(Seal, EveryBitOfADatagramCounts) {
   const Bytes good = sealed(kOpened, 7);
   for (std::size_t bit = 0; bit < 8 * good.size(); ++bit) {
     Bytes bad = good;
@@ -73,7 +83,7 @@ TEST_F(Seal, EveryBitOfADatagramCounts) {
   }
 }
 
-TEST_F(SealWithRekeys, TheKeyIsRenewedAfterSoManyDatagrams) {
+TEST_P(SealWithRekeys, TheKeyIsRenewedAfterSoManyDatagrams) {
   for (std::uint64_t number = 0; number < 35; ++number) {
     const Bytes datagram = sealed(kOpened, number);
     EXPECT_EQ(decode_header(datagram)->epoch, number / 10);
@@ -81,14 +91,14 @@ TEST_F(SealWithRekeys, TheKeyIsRenewedAfterSoManyDatagrams) {
   }
 }
 
-TEST_F(SealWithRekeys, TheKeyIsRenewedAfterSoLong) {
+TEST_P(SealWithRekeys, TheKeyIsRenewedAfterSoLong) {
   LocalTime now = kOpened;
   EXPECT_EQ(decode_header(sealed(now, 0))->epoch, 0);
   EXPECT_EQ(decode_header(sealed(now + milliseconds(4999), 1))->epoch, 0);
   EXPECT_EQ(decode_header(sealed(now + milliseconds(5000), 2))->epoch, 1);
 }
 
-TEST_F(SealWithRekeys, TheEpochWrapsAround) {
+TEST_P(SealWithRekeys, TheEpochWrapsAround) {
   for (std::uint64_t number = 0; number < 10 * 600; ++number) {
     const Bytes datagram = sealed(kOpened, number);
     ASSERT_EQ(decode_header(datagram)->epoch, number / 10 % 256);
@@ -96,7 +106,7 @@ TEST_F(SealWithRekeys, TheEpochWrapsAround) {
   }
 }
 
-TEST_F(SealWithRekeys, TheKeyBeforeIsGoodForTwoSecondsMore) {
+TEST_P(SealWithRekeys, TheKeyBeforeIsGoodForTwoSecondsMore) {
   const Bytes early = sealed(kOpened, 0);
   const Bytes late = sealed(kOpened, 1);
   for (std::uint64_t number = 2; number < 10; ++number) sealed(kOpened, number);
@@ -105,7 +115,7 @@ TEST_F(SealWithRekeys, TheKeyBeforeIsGoodForTwoSecondsMore) {
   EXPECT_EQ(open(kOpened + milliseconds(2000), late), Opener::Verdict::kOldKey);
 }
 
-TEST_F(SealWithRekeys, AForgedDatagramOfTheNextEpochMovesNobodyOn) {
+TEST_P(SealWithRekeys, AForgedDatagramOfTheNextEpochMovesNobodyOn) {
   const Bytes good = sealed(kOpened, 0);
   Bytes forged = good;
   forged[2] = std::byte{1};
@@ -113,7 +123,25 @@ TEST_F(SealWithRekeys, AForgedDatagramOfTheNextEpochMovesNobodyOn) {
   EXPECT_EQ(open(kOpened + seconds(60), good), Opener::Verdict::kOpened);
 }
 
-TEST_F(SealWithRekeys, TwoEpochsAheadIsNotOpened) {
+TEST_P(Seal, BytesOfAnyLengthOpenAsTheyWereAndOnlyUnderTheirNumber) {
+  for (std::size_t size = 0; size <= kMaxDatagram - kHeaderSize - crypto::kTagSize; size += size < 80 ? 1 : 61) {
+    Bytes plain(size);
+    for (std::size_t i = 0; i < size; ++i) plain[i] = static_cast<std::byte>(i * 7 + size);
+    Bytes apart(size + crypto::kTagSize);
+    Bytes in_place = plain;
+    in_place.resize(apart.size());
+    const std::uint64_t number = (std::uint64_t{1} << 40) + size;  // of no palindrome
+    key_.seal(number, {}, plain, apart);
+    key_.seal(number, {}, std::span(in_place).first(size), in_place);
+    EXPECT_EQ(in_place, apart) << size;
+    Bytes opened(size);
+    EXPECT_TRUE(key_.open(number, {}, apart, opened)) << size;
+    EXPECT_EQ(opened, plain) << size;
+    EXPECT_FALSE(key_.open(number + 1, {}, apart, opened)) << size;
+  }
+}
+
+TEST_P(SealWithRekeys, TwoEpochsAheadIsNotOpened) {
   for (std::uint64_t number = 0; number < 20; ++number) sealed(kOpened, number);
   const Bytes ahead = sealed(kOpened, 20);
   ASSERT_EQ(decode_header(ahead)->epoch, 2);

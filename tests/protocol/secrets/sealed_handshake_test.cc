@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "protocol/handshake.h"
+#include "protocol/session.h"
 #include "tests/protocol/examples.h"
 
 // The door in suite 1: who gets in, who hears nothing, and what it costs us.
@@ -236,6 +237,167 @@ TEST_F(SealedHandshake, NoReplyIsEverLongerThanWhatItAnswers) {
     ASSERT_LT(z_.welcome(*reply.guest, 1, fullest, answer_).size, bad.size());
     ASSERT_LT(z_.refuse(*reply.guest, longest, answer_).size, bad.size());
   }
+}
+
+// ---- Which suite ----
+
+const Suites kOld = {Suite::kNoise};  ///< as a peer from before suite 2, or one whose processor has no AES
+const Suites kNew = all_suites();
+const Suites kAesOnly = {Suite::kAesGcm};
+
+/// A client meets a door, each with its suites.
+class TwoSuites : public SealedHandshake {
+ protected:
+  void SetUp() override {
+    if (!crypto::has_aes()) GTEST_SKIP() << "this processor has no AES";
+  }
+  struct Met {
+    std::optional<Suite> chosen;      ///< by the door; empty: it refuses
+    std::optional<SessionKeys> here;  ///< the client's
+    std::optional<SessionKeys> there;
+    std::optional<Refused> refused;  ///< what the client made of it
+    std::vector<std::string> features;
+  };
+  template <class OnTheWay>
+  Met meet(const Suites& client_suites, const Suites& door_suites, Welcome welcome, OnTheWay on_the_way) {
+    ClientHandshake::Config config = client_config();
+    config.suites = client_suites;
+    ClientHandshake client(config, now_);
+    Doorman::Config door = door_config();
+    door.suites = door_suites;
+    Doorman z(door);
+    const auto said = [&] { return first(buffer_, client.next_datagram(now_, buffer_)); };
+    client.receive(now_, first(answer_, z.receive(now_, from_, said(), answer_).size));
+    Bytes hello = said();
+    on_the_way(hello);
+    const auto reply = z.receive(now_, from_, hello, answer_);
+    if (!reply.guest) return {};
+    const auto answered = reply.guest->suite ? z.welcome(*reply.guest, 77, welcome, answer_)
+                                             : z.refuse(*reply.guest, examples::refused(), answer_);
+    client.receive(now_, first(answer_, answered.size));
+    Met met{.chosen = reply.guest->suite, .here = {}, .there = answered.keys, .refused = {}, .features = {}};
+    if (!client.outcome()) return met;
+    if (const auto* accepted = std::get_if<ClientHandshake::Accepted>(&*client.outcome())) {
+      met.here = accepted->keys;
+      met.features = accepted->welcome.features;
+    } else {
+      met.refused = std::get<Refused>(*client.outcome());
+    }
+    return met;
+  }
+  Met meet(const Suites& client_suites, const Suites& door_suites) {
+    return meet(client_suites, door_suites, examples::welcome(), [](Bytes&) {});
+  }
+  /// Whether what one end seals the other opens, both ways.
+  static bool talk(const Met& met) {
+    if (!met.here || !met.there) return false;
+    Session a({.connection_id = 77}, *met.here, LocalTime{seconds(1)});
+    Session z({.connection_id = 77}, *met.there, LocalTime{seconds(1)});
+    Buffer buffer;
+    const std::size_t up = a.next_datagram(LocalTime{seconds(1)}, buffer);
+    if (!z.receive(LocalTime{seconds(1)}, std::span(buffer).first(up))) return false;
+    const std::size_t down = z.next_datagram(LocalTime{seconds(1)}, buffer);
+    return a.receive(LocalTime{seconds(1)}, std::span(buffer).first(down));
+  }
+};
+
+TEST_F(TwoSuites, TheFastestThatBothHaveIsTakenAndAnOlderPeerIsServed) {
+  struct Case {
+    Suites client, door;
+    Suite agreed;
+  };
+  for (const auto& [client, door, agreed] :
+       {Case{kNew, kNew, Suite::kAesGcm}, Case{kNew, kOld, Suite::kNoise}, Case{kOld, kNew, Suite::kNoise},
+        Case{kOld, kOld, Suite::kNoise}, Case{kAesOnly, kNew, Suite::kAesGcm}, Case{kNew, kAesOnly, Suite::kAesGcm},
+        Case{kAesOnly, kAesOnly, Suite::kAesGcm}}) {
+    SCOPED_TRACE(names_of(client) + " meets " + names_of(door));
+    const Met met = meet(client, door);
+    ASSERT_TRUE(met.here && met.there);
+    EXPECT_EQ(met.here->suite, agreed);
+    EXPECT_EQ(met.there->suite, agreed);
+    EXPECT_TRUE(talk(met));
+    EXPECT_EQ(std::count(met.features.begin(), met.features.end(), kFeatureAesGcm), agreed == Suite::kAesGcm ? 1 : 0);
+  }
+}
+
+TEST_F(TwoSuites, ADoorThatForbidsSuite1RefusesWhoHasNothingElse) {
+  const Met met = meet(kOld, kAesOnly);
+  EXPECT_FALSE(met.chosen);
+  EXPECT_FALSE(met.there);
+  EXPECT_FALSE(met.here);
+  EXPECT_EQ(met.refused.value().code, examples::refused().code);
+}
+
+TEST_F(TwoSuites, AClientThatForbidsSuite1LeavesWithASentence) {
+  const Met met = meet(kAesOnly, kOld);
+  EXPECT_FALSE(met.here);
+  ASSERT_TRUE(met.refused);
+  EXPECT_EQ(met.refused->code, Code::kUnsupported);
+  EXPECT_EQ(met.refused->detail, "the server seals by chacha20-poly1305, this client by aes-256-gcm only");
+}
+
+TEST_F(TwoSuites, NobodyOnTheWayCanTakeTheOfferOutOrSayItIsAnOlderOne) {
+  for (std::size_t at = 0; at < 300; ++at) {
+    const Met met = meet(kNew, kNew, examples::welcome(), [&](Bytes& hello) { hello[at] ^= std::byte{1}; });
+    EXPECT_FALSE(met.here) << at;  // it may be lost; it is never another offer
+    now_ += seconds(1);            // for the limit of Hellos
+  }
+}
+
+TEST_F(TwoSuites, AChoiceThatWasNotOfferedIsNone) {
+  Welcome pushy = examples::welcome();
+  pushy.features.emplace_back(kFeatureAesGcm);
+  const Met met = meet(kOld, kNew, pushy, [](Bytes&) {});
+  EXPECT_EQ(met.here.value().suite, Suite::kNoise);
+  EXPECT_TRUE(talk(met));
+}
+
+TEST_F(TwoSuites, TwoEndsThatBelieveInDifferentSuitesHearNothingOfEachOther) {
+  for (const Suites& door : {kNew, kOld}) {
+    Met met = meet(kNew, door);
+    ASSERT_TRUE(talk(met));
+    met.there->suite = met.there->suite == Suite::kAesGcm ? Suite::kNoise : Suite::kAesGcm;
+    EXPECT_FALSE(talk(met));
+  }
+}
+
+TEST_F(TwoSuites, TheChoiceIsThereHoweverManyFeaturesThereAre) {
+  Welcome full = examples::welcome();
+  full.features.assign(limits::kMaxFeatures, "a-feature");
+  const Met met = meet(kNew, kNew, full, [](Bytes&) {});
+  EXPECT_EQ(met.here.value().suite, Suite::kAesGcm);
+  EXPECT_TRUE(talk(met));
+}
+
+TEST_F(TwoSuites, InTheClearThereIsNothingToChoose) {
+  Doorman::Config config = door_config();
+  Doorman z(config);
+  Hello hello = examples::hello();
+  hello.features.emplace_back(kFeatureAesGcm);
+  ClientHandshake client({.hello = hello, .suites = kNew}, now_);
+  from_ = parse_address("127.0.0.1:4000");
+  client.receive(now_, first(answer_, z.receive(now_, from_, said_by(client), answer_).size));
+  const auto reply = z.receive(now_, from_, said_by(client), answer_);
+  ASSERT_TRUE(reply.guest.has_value());
+  EXPECT_EQ(reply.guest->suite, Suite::kPlain);
+  const auto answered = z.welcome(*reply.guest, 77, examples::welcome(), answer_);
+  client.receive(now_, first(answer_, answered.size));
+  const auto& accepted = std::get<ClientHandshake::Accepted>(client.outcome().value());
+  EXPECT_FALSE(accepted.keys);
+  EXPECT_EQ(accepted.welcome.features, examples::welcome().features);
+}
+
+TEST(SealedSuites, AreRefusedWhereTheyCannotBeSpoken) {
+  for (const Suites& suites : {Suites{}, Suites{Suite::kPlain}}) {
+    Doorman::Config config;
+    config.suites = suites;
+    EXPECT_THROW(Doorman{config}, std::invalid_argument);
+  }
+  EXPECT_EQ(contains(suites_of_this_machine(), Suite::kAesGcm), crypto::has_aes());
+  if (crypto::has_aes()) return;
+  Doorman::Config config;
+  config.suites = all_suites();
+  EXPECT_THROW(Doorman{config}, std::invalid_argument);
 }
 
 TEST_F(SealedHandshake, TwoClientsWithOneKeyAreAMistakeThatIsToldAtOnce) {

@@ -136,6 +136,30 @@ TEST_F(ShortSealedSession, EndsAtItsAgeWithAByeAndSaysSo) {
   EXPECT_EQ(std::get<Session::Closed>(*z_.next_event()).code, Code::kExpired);
 }
 
+TEST_F(SealedSession, EndsWhenSomebodyHasGuessedAtTagsForTooLong) {
+  Session::Config config{.connection_id = examples::kConnection};
+  config.max_forged = 3;
+  Session z(config, turned(some_keys()), kOpened);
+  Bytes forged = force(1);
+  forged.back() ^= std::byte{1};
+  for (int guesses = 0; guesses < 3; ++guesses) {
+    z.tick(now_);
+    EXPECT_TRUE(z.open()) << guesses;
+    z.receive(now_, forged);
+  }
+  z.tick(now_);
+  EXPECT_FALSE(z.open());
+  EXPECT_EQ(std::get<Session::Closed>(*z.next_event()).code, Code::kExpired);
+}
+
+TEST_F(SealedSession, AKeyIsNotToSealMoreThanItsCipherBears) {
+  Session::Config config{.connection_id = examples::kConnection};
+  config.rekey.datagrams = limits::kMaxDatagramsOfKey;
+  EXPECT_NO_THROW(Session(config, some_keys(), kOpened));
+  ++config.rekey.datagrams;
+  EXPECT_THROW(Session(config, some_keys(), kOpened), std::invalid_argument);
+}
+
 TEST_F(ShortSealedSession, EndsBeforeAPacketNumberCouldComeTwice) {
   std::uint64_t sent = 0;
   for (std::uint64_t i = 1; a_.open() && i < 5000; ++i) {

@@ -251,12 +251,13 @@ std::string plain_file() {
          "\n";
 }
 
-/// The server's answer to one Noise message 1.
+/// The server's answer to one Noise message 1, and the keys that seal by `suite` after it.
 struct Answered {
   std::string json;
   NoiseSplit split;
+  NoiseSplit keys;
 };
-Answered answered(const Key& psk, std::span<const std::byte> prologue, const NoiseInitiator& client,
+Answered answered(Suite suite, const Key& psk, std::span<const std::byte> prologue, const NoiseInitiator& client,
                   std::string_view ephemeral_name, std::uint32_t connection_id, const Answer& answer) {
   const Key ephemeral = key_of(ephemeral_name);
   const Bytes body = write_body(answer);
@@ -264,31 +265,52 @@ Answered answered(const Key& psk, std::span<const std::byte> prologue, const Noi
   const auto reply = server->reply(ephemeral, body);
   const AnswerDatagram datagram{
       .suite = Suite::kNoise, .connection_id = connection_id, .random = examples::random(), .body = reply->message};
+  const NoiseSplit keys = suite == Suite::kAesGcm ? split_of_suite_2(reply->split) : reply->split;
   Object json;
   json.json("message", meaning<v1::Answer>(body))
       .bytes("body", body)
       .bytes("server_ephemeral", ephemeral.bytes())
       .bytes("noise_message", reply->message)
       .bytes("datagram", examples::encoded(datagram))
-      .bytes("handshake_hash", reply->split.handshake_hash)
-      .bytes("client_to_server_key", reply->split.initiator_to_responder.bytes())
-      .bytes("server_to_client_key", reply->split.responder_to_initiator.bytes());
-  return {json.str(), reply->split};
+      .bytes("handshake_hash", reply->split.handshake_hash);
+  if (suite == Suite::kAesGcm) {
+    json.bytes("split_client_to_server_key", reply->split.initiator_to_responder.bytes())
+        .bytes("split_server_to_client_key", reply->split.responder_to_initiator.bytes());
+  }
+  json.bytes("client_to_server_key", keys.initiator_to_responder.bytes())
+      .bytes("server_to_client_key", keys.responder_to_initiator.bytes());
+  return {json.str(), reply->split, keys};
 }
 
-Bytes sealed(const Key& key, Header header, std::span<const std::byte> body) {
-  header.suite = Suite::kNoise;
+Bytes sealed(Suite suite, const Key& key, Header header, std::span<const std::byte> body) {
+  header.suite = suite;
   const auto clear = encode_header(header);
   Bytes out(clear.begin(), clear.end());
   out.resize(kHeaderSize + body.size() + crypto::kTagSize);
-  crypto::seal(key, header.packet_number, clear, body, std::span(out).subspan(kHeaderSize));
+  SealingKey(suite, key).seal(header.packet_number, clear, body, std::span(out).subspan(kHeaderSize));
   return out;
 }
 
-std::string sealed_file() {
+Key renewed(Suite suite, const Key& key) {
+  return suite == Suite::kAesGcm ? crypto::AesGcm(key).renewed() : crypto::renewed(key);
+}
+
+/// The example with the word for suite 2, as a client adds it and a server puts it first.
+Hello offering(Suite suite) {
+  Hello hello = examples::hello();
+  if (suite == Suite::kAesGcm) hello.features.emplace_back(kFeatureAesGcm);
+  return hello;
+}
+Welcome choosing(Suite suite) {
+  Welcome welcome = examples::welcome();
+  if (suite == Suite::kAesGcm) welcome.features.emplace(welcome.features.begin(), kFeatureAesGcm);
+  return welcome;
+}
+
+std::string sealed_file(Suite suite) {
   const Key psk = key_of("key");
   const KeyId id = key_id(psk);
-  const Bytes hello = write_body(examples::hello());
+  const Bytes hello = write_body(offering(suite));
 
   Bytes prologue;
   const auto append = [](Bytes& to, std::span<const std::byte> piece) {
@@ -305,13 +327,14 @@ std::string sealed_file() {
     return examples::encoded(
         HelloDatagram{.suite = Suite::kNoise, .random = examples::random(), .cookie = cookie, .body = body});
   };
-  const auto welcome = answered(psk, prologue, client, "server ephemeral", examples::kConnection, examples::welcome());
-  const auto refused = answered(psk, prologue, client, "another server ephemeral", 0, examples::refused());
+  const auto welcome =
+      answered(suite, psk, prologue, client, "server ephemeral", examples::kConnection, choosing(suite));
+  const auto refused = answered(suite, psk, prologue, client, "another server ephemeral", 0, examples::refused());
 
-  const Key& up = welcome.split.initiator_to_responder;
-  const Key& down = welcome.split.responder_to_initiator;
-  const Key next_up = crypto::renewed(up);
-  const Key next_down = crypto::renewed(down);
+  const Key& up = welcome.keys.initiator_to_responder;
+  const Key& down = welcome.keys.responder_to_initiator;
+  const Key next_up = renewed(suite, up);
+  const Key next_down = renewed(suite, down);
   std::vector<Shown> all = shown(std::uint64_t{1} << 32);
   // The bye stays last: of the key before, and late.
   const std::uint64_t far = (std::uint64_t{1} << 32) + 1;
@@ -331,7 +354,7 @@ std::string sealed_file() {
                        .bytes("key", key.bytes())
                        .json("message", meaning<v1::Datagram>(plain))
                        .bytes("body", plain)
-                       .bytes("datagram", sealed(key, header, plain))
+                       .bytes("datagram", sealed(suite, key, header, plain))
                        .str());
   }
 
@@ -344,32 +367,43 @@ std::string sealed_file() {
     dropped.push_back(Object().text("name", name).text("counter", counter).bytes("datagram", datagram).str());
   };
   const auto spoiled = [&](std::size_t at, bool from_end) {
-    Bytes bad = sealed(down, good, state);
+    Bytes bad = sealed(suite, down, good, state);
     bad[from_end ? bad.size() - at : at] ^= std::byte{1};
     return bad;
   };
   const auto with = [&](auto change, const Key& key) {
     Header header = good;
     change(header);
-    return sealed(key, header, state);
+    return sealed(suite, key, header, state);
   };
   drop("a bit of the packet number has changed", "forged", spoiled(8, false));
   drop("a bit of the body has changed", "forged", spoiled(kHeaderSize, false));
   drop("a bit of the tag has changed", "forged", spoiled(1, true));
-  drop("sealed with the key of the other direction", "forged", sealed(up, good, state));
+  drop("sealed with the key of the other direction", "forged", sealed(suite, up, good, state));
   drop("says epoch 1, sealed with the key of epoch 0", "forged", with([](Header& h) { h.epoch = 1; }, down));
-  drop("epoch 2", "old_key", with([](Header& h) { h.epoch = 2; }, crypto::renewed(next_down)));
+  drop("epoch 2", "old_key", with([](Header& h) { h.epoch = 2; }, renewed(suite, next_down)));
   drop("epoch 255, before the first", "old_key", with([](Header& h) { h.epoch = 255; }, down));
   drop("packet number 2^60", "malformed", with([](Header& h) { h.packet_number = std::uint64_t{1} << 60; }, down));
   drop("connection id of somebody else", "malformed", with([](Header& h) { ++h.connection_id; }, down));
   drop("in the clear, suite 0", "malformed", examples::data(1, examples::echo(), examples::state()));
-  drop("authentic, but no protobuf", "malformed", sealed(down, good, Bytes(3, std::byte{0xFF})));
-  Bytes cut = sealed(down, good, state);
+  drop("authentic, but no protobuf", "malformed", sealed(suite, down, good, Bytes(3, std::byte{0xFF})));
+  if (suite == Suite::kAesGcm) {
+    const Key& split = welcome.split.responder_to_initiator;
+    drop("in suite 1, with the key that Split() gave", "malformed", sealed(Suite::kNoise, split, good, state));
+    drop("the key that Split() gave", "forged", sealed(suite, split, good, state));
+    // The number's bytes turned round, under a header that says the number itself: what a little-endian nonce makes.
+    const auto clear = encode_header({.suite = suite, .connection_id = examples::kConnection, .packet_number = 1});
+    Bytes turned(clear.begin(), clear.end());
+    turned.resize(kHeaderSize + state.size() + crypto::kTagSize);
+    SealingKey(suite, down).seal(std::uint64_t{1} << 56, clear, state, std::span(turned).subspan(kHeaderSize));
+    drop("the nonce little-endian", "forged", turned);
+  }
+  Bytes cut = sealed(suite, down, good, state);
   cut.resize(kHeaderSize + crypto::kTagSize / 2);
   drop("header and half a tag", "forged", cut);
 
   return Object()
-             .number("suite", 1)
+             .number("suite", static_cast<std::uint64_t>(suite))
              .text("protocol", "Noise_NNpsk0_25519_ChaChaPoly_SHA256")
              .bytes("psk", psk.bytes())
              .bytes("key_id", id)
@@ -532,7 +566,8 @@ std::string bounds_file() {
 std::map<std::string, std::string> files() {
   return {{"bounds.json", bounds_file()},
           {"plain.json", plain_file()},
-          {"sealed.json", sealed_file()},
+          {"sealed.json", sealed_file(Suite::kNoise)},
+          {"sealed_aes.json", sealed_file(Suite::kAesGcm)},
           {"replay.json", replay_file()},
           {"key_files.json", key_files()}};
 }

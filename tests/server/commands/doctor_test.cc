@@ -68,6 +68,7 @@ TEST(Doctor, HasAdviceForEverythingThatAnOrdinaryMachineLacks) {
   EXPECT_EQ(findings.at("cpu_sleep").found, "up to 133 µs to wake");
   EXPECT_EQ(findings.at("rt_throttling").found, "100000 of each 1000000 µs for real-time threads");
   EXPECT_EQ(findings.at("machine").found, "virtual");
+  EXPECT_EQ(findings.at("aes").found, "none: sessions are sealed by chacha20-poly1305");
   for (const auto& [key, finding] : findings) {
     EXPECT_EQ(finding.advice.empty(), key == "timer_slack") << key;
   }
@@ -87,10 +88,11 @@ TEST(Doctor, HasNoneForAMachineThatIsReady) {
   machine.say("dev/cpu_dma_latency", "");
   machine.say("proc/sys/kernel/sched_rt_runtime_us", "950000");
   machine.say("proc/sys/kernel/sched_rt_period_us", "1000000");
-  machine.say("proc/cpuinfo", "flags : fpu lahf_lm");
+  machine.say("proc/cpuinfo", "flags : fpu pclmulqdq aes lahf_lm");
   const auto findings = machine.look();
   EXPECT_EQ(findings.at("kernel").found, "6.1.0-22-rt-amd64, PREEMPT_RT");
   EXPECT_EQ(findings.at("isolated_cpus").found, "3, without tick 3");
+  EXPECT_EQ(findings.at("aes").found, "in hardware: sessions are sealed by aes-256-gcm, chacha20-poly1305");
   EXPECT_EQ(findings.at("cpu_sleep").found, "up to 133 µs to wake (the server forbids it while it runs)");
   for (const auto& [key, finding] : findings) EXPECT_EQ(finding.advice, "") << key;
 }

@@ -138,6 +138,21 @@ TEST(Explain, TheDeviceNeverCostsMoreThanTheWholeStep) {
   EXPECT_GE(slows.device_ns, 0);
 }
 
+TEST(Explain, SaysByWhichSuitesSessionsAreSealed) {
+  Scene scene = shipped("demo.toml");
+  EXPECT_EQ(in_words(scene, {}).find("sealed"), std::string::npos);
+  EXPECT_TRUE(nlohmann::json::parse(in_json(scene, {}))["sealed_by"].is_null());
+  scene.network.keys = "keys";
+  scene.network.suites = {Suite::kNoise};
+  EXPECT_NE(in_words(scene, {}).find("for engines, sealed by chacha20-poly1305, "), std::string::npos);
+  EXPECT_EQ(nlohmann::json::parse(in_json(scene, {}))["sealed_by"], "chacha20-poly1305");
+  scene.network.suites = all_suites();
+  const std::string both = nlohmann::json::parse(in_json(scene, {}))["sealed_by"];
+  EXPECT_EQ(both, contains(suites_of_this_machine(), Suite::kAesGcm)
+                      ? "aes-256-gcm, chacha20-poly1305"
+                      : "chacha20-poly1305 (this processor has no AES instructions)");
+}
+
 TEST(Explain, JsonOfAnyNameIsJson) {
   Scene scene = shipped("demo.toml");
   scene.name = "a \"hand\"\x01\xff";

@@ -47,6 +47,53 @@ TEST_F(SealedServer, TellsAPlainClientOnThisMachineThatItWantsAKey) {
   EXPECT_EQ(a.client->stats().reason, "this server lets in those who have a key: --key FILE");
 }
 
+TEST_F(SealedServer, SealsByAesWhereBothCanAndServesWhoCannot) {
+  if (!crypto::has_aes()) GTEST_SKIP() << "this processor has no AES";
+  Client a = controller(wall_, "192.0.2.1:4000");
+  run(milliseconds(300), {&a});
+  EXPECT_EQ(phase(a), Phase::kOpen);
+  Client old = of_suites(other_, "192.0.2.2:4000", {Suite::kNoise}, true);
+  Client screen = of_suites(screen_, "192.0.2.3:4000", {Suite::kNoise}, false);
+  std::set<std::uint8_t> suites;  // of the datagrams of the session with the screen
+  run(milliseconds(300), {&a, &old, &screen}, [&](const Datagram& datagram) {
+    if (datagram.to == screen.end->self && (datagram.bytes[1] & std::byte{0x0F}) == std::byte{3}) {
+      suites.insert(std::to_integer<std::uint8_t>(datagram.bytes[3]));
+    }
+    return true;
+  });
+  EXPECT_EQ(phase(screen), Phase::kOpen);
+  EXPECT_EQ(suites, std::set<std::uint8_t>{1});
+  EXPECT_EQ(old.client->stats().code, Code::kBusy);
+  std::string said;
+  for (const auto& [warning, text, session] : loop_->take_notices()) said += text + "\n";
+  EXPECT_NE(said.find("with the key \"wall\", sealed by aes-256-gcm\n"), std::string::npos) << said;
+  EXPECT_NE(said.find("with the key \"screen\", sealed by chacha20-poly1305\n"), std::string::npos) << said;
+}
+
+TEST_F(SealedServer, ASuiteThatItForbidsIsRefusedWithASentence) {
+  if (!crypto::has_aes()) GTEST_SKIP() << "this processor has no AES";
+  NetworkLoop::Config config;
+  config.keys = {wall_, other_, screen_};
+  config.suites = {Suite::kAesGcm};
+  restart(config);
+  Client old = of_suites(wall_, "192.0.2.1:4000", {Suite::kNoise}, true);
+  run(milliseconds(300), {&old});
+  EXPECT_EQ(phase(old), Phase::kRefused);
+  EXPECT_EQ(old.client->stats().code, Code::kUnsupported);
+  EXPECT_EQ(old.client->stats().reason, "this server seals by aes-256-gcm only, and you do not offer it");
+  EXPECT_EQ(loop_->stats().welcomed, 0U);
+  Client other = controller(other_, "192.0.2.2:4000");
+  run(milliseconds(300), {&old, &other});
+  EXPECT_EQ(phase(other), Phase::kOpen);
+
+  config.suites = {Suite::kNoise};
+  restart(config);
+  Client only = of_suites(wall_, "192.0.2.4:4000", {Suite::kAesGcm}, true);
+  run(milliseconds(300), {&only});
+  EXPECT_EQ(phase(only), Phase::kRefused);
+  EXPECT_EQ(only.client->stats().reason, "the server seals by chacha20-poly1305, this client by aes-256-gcm only");
+}
+
 TEST_F(SealedServer, AnObserversKeyDoesNotControl) {
   Client a = controller(screen_, "192.0.2.1:4000");
   Client b = observer(screen_, "192.0.2.2:4000");

@@ -71,6 +71,21 @@ class SealedServer : public testing::Test {
     return client;
   }
 
+  /// A client that has these suites only: an older one, or one on another processor.
+  Client of_suites(const ClientKey& key, const std::string& address, const Suites& suites, bool controls) {
+    Client client{std::make_unique<End>(wire_, parse_address(address)), nullptr};
+    ForceClient::Config config = config_of(key, ++seed_);
+    config.suites = suites;
+    if (controls) {
+      client.client = std::make_unique<ForceClient>(
+          *client.end, server_.self, config, [](const DeviceState&) { return Touch(Vec3(1, 0, 0)); }, now_);
+    } else {
+      client.client = std::make_unique<ForceClient>(
+          *client.end, server_.self, config, [](const DeviceState&, const LinkStats&) {}, now_);
+    }
+    return client;
+  }
+
   /// Time passes, 1 ms at a time; the device makes a step in each. `on_the_way` may change or drop.
   template <class OnTheWay>
   void run(Duration length, std::vector<Client*> clients, OnTheWay on_the_way) {

@@ -133,9 +133,10 @@ TEST(SceneError, TheKeysOfOneKindOfMotionAreUnknownToAnother) {
 }
 
 TEST(SceneError, ReportsTheFirstMistakeInTheFile) {
-  EXPECT_EQ(error_of_minimal_and("[network]\nzzzzzz = 1\n[loop]\naaaaaa = 1\n"),
-            "s.toml:5: network.zzzzzz: unknown key; known here: listen, keys, max_observers, controller_timeout_ms, "
-            "observer_timeout_ms, adapt_state_rate, takeover");
+  EXPECT_EQ(
+      error_of_minimal_and("[network]\nzzzzzz = 1\n[loop]\naaaaaa = 1\n"),
+      "s.toml:5: network.zzzzzz: unknown key; known here: listen, keys, suites, max_observers, controller_timeout_ms, "
+      "observer_timeout_ms, adapt_state_rate, takeover");
   EXPECT_EQ(error_of_minimal_and("[loop]\nperiod_us = \"x\"\n[force]\nhold_us = 1\n"),
             "s.toml:5: loop.period_us: expected a number from 100 to 4000 µs, found \"x\"");
 }
@@ -369,6 +370,20 @@ TEST(SceneError, WithoutKeysItListensOnThisMachineOnly) {
               "s.toml:5: network.listen: expected an address like \"127.0.0.1:47100\" or \"[::1]:47100\", found \"" +
                   text + "\"");
   }
+}
+
+TEST(SceneError, OfTheSuitesSaysWhichThereAreAndWhatTheyNeed) {
+  const std::string known = "[…], each one of \"aes-256-gcm\", \"chacha20-poly1305\"";
+  EXPECT_EQ(error_of_minimal_and("[network]\nkeys = \"keys\"\nsuites = [\"plain\"]\n"),
+            "s.toml:6: network.suites: expected one of \"aes-256-gcm\", \"chacha20-poly1305\", found \"plain\"");
+  EXPECT_EQ(error_of_minimal_and("[network]\nkeys = \"keys\"\nsuites = \"aes-256-gcm\"\n"),
+            "s.toml:6: network.suites: expected " + known + ", found \"aes-256-gcm\"");
+  EXPECT_EQ(error_of_minimal_and("[network]\nkeys = \"keys\"\nsuites = []\n"),
+            "s.toml:6: network.suites: expected some of aes-256-gcm, chacha20-poly1305, found none to seal by");
+  EXPECT_EQ(error_of_minimal_and("[network]\nsuites = [\"aes-256-gcm\"]\n"),
+            "s.toml:5: network.suites: expected none without keys: nothing is sealed then");
+  const Scene scene = parse(std::string(kMinimal) + "[network]\nkeys = \"keys\"\n", "lab");
+  EXPECT_EQ(scene.network.suites, all_suites());
 }
 
 TEST(SceneError, PassesOnWhatIsWrongWithARecordedMotion) {

@@ -12,6 +12,7 @@
 
 #include "protocol/secrets/noise.h"
 #include "protocol/secrets/seal.h"
+#include "protocol/secrets/suites.h"
 #include "protocol/wire/codec.h"
 #include "protocol/wire/handshake_codec.h"
 #include "server/machine/udp_link.h"
@@ -132,37 +133,51 @@ void codec(Run& run, std::size_t blocks, const std::string& name, const Message&
 
 /// libsodium's bare calls over as many bytes: what sealing and opening cannot be cheaper than.
 struct BareSeal {
-  explicit BareSeal(std::size_t datagram) : size(datagram - kHeaderSize) { seal(); }
+  BareSeal(Suite by, std::size_t datagram) : suite(by), size(datagram - kHeaderSize) {
+    if (suite == Suite::kAesGcm) crypto_aead_aes256gcm_beforenm(&schedule, key.data());
+    seal();
+  }
   void seal() {
-    crypto_aead_chacha20poly1305_ietf_encrypt(sealed.data(), nullptr, plain.data(), size, header.data(), header.size(),
-                                              nullptr, nonce.data(), key.data());
+    if (suite == Suite::kAesGcm) {
+      crypto_aead_aes256gcm_encrypt_afternm(sealed.data(), nullptr, plain.data(), size, header.data(), header.size(),
+                                            nullptr, nonce.data(), &schedule);
+    } else {
+      crypto_aead_chacha20poly1305_ietf_encrypt(sealed.data(), nullptr, plain.data(), size, header.data(),
+                                                header.size(), nullptr, nonce.data(), key.data());
+    }
     keep(sealed);
   }
   void open() {
-    if (crypto_aead_chacha20poly1305_ietf_decrypt(plain.data(), nullptr, nullptr, sealed.data(),
-                                                  size + crypto::kTagSize, header.data(), header.size(), nonce.data(),
-                                                  key.data()) != 0) {
-      throw std::runtime_error("libsodium did not open what it sealed");
-    }
+    const std::size_t whole = size + crypto::kTagSize;
+    const int refused =
+        suite == Suite::kAesGcm
+            ? crypto_aead_aes256gcm_decrypt_afternm(plain.data(), nullptr, nullptr, sealed.data(), whole, header.data(),
+                                                    header.size(), nonce.data(), &schedule)
+            : crypto_aead_chacha20poly1305_ietf_decrypt(plain.data(), nullptr, nullptr, sealed.data(), whole,
+                                                        header.data(), header.size(), nonce.data(), key.data());
+    if (refused != 0) throw std::runtime_error("libsodium did not open what it sealed");
     keep(plain);
   }
+  Suite suite;
   std::size_t size;
   std::array<unsigned char, kHeaderSize> header{};
   std::array<unsigned char, kMaxDatagram> plain{};
   std::array<unsigned char, kMaxDatagram + crypto::kTagSize> sealed{};
-  std::array<unsigned char, crypto_aead_chacha20poly1305_IETF_KEYBYTES> key{};
+  std::array<unsigned char, sizeof(Key)> key{};
+  crypto_aead_aes256gcm_state schedule{};
   std::array<unsigned char, crypto_aead_chacha20poly1305_IETF_NPUBBYTES> nonce{};
 };
 
-void sealing(Run& run, std::size_t blocks, std::size_t size) {
+void sealing(Run& run, std::size_t blocks, Suite suite, std::size_t size) {
   const LocalTime now(std::chrono::seconds(7));
-  BareSeal bare(size);
-  Sealer sealer(Key{}, {}, now);
-  Opener opener(Key{}, {});
+  BareSeal bare(suite, size);
+  const SealingKey key(suite, Key{});
+  Sealer sealer(key, {}, now);
+  Opener opener(key, {});
   Buffer buffer{};
   Buffer body{};
-  Header header{.suite = Suite::kNoise, .connection_id = 7};
-  const std::string bytes = std::to_string(size) + " bytes";
+  Header header{.suite = suite, .connection_id = 7};
+  const std::string bytes = std::to_string(size) + " bytes by " + names_of({suite});
   run.add(row_of(in_turns(
                      blocks, kCalls,
                      [&](std::size_t) {
@@ -174,8 +189,8 @@ void sealing(Run& run, std::size_t blocks, std::size_t size) {
                      },
                      [&](std::size_t) { bare.seal(); }),
                  "seal " + bytes, "libsodium seals them"));
-  Sealer first(Key{}, {}, now);
-  const Header fixed{.suite = Suite::kNoise, .connection_id = 7};
+  Sealer first(key, {}, now);
+  const Header fixed{.suite = suite, .connection_id = 7};
   const auto datagram = std::span<const std::byte>(buffer).first(first.seal(fixed, buffer, size));
   run.add(row_of(in_turns(
                      blocks, kCalls,
@@ -294,8 +309,8 @@ void measure_datagrams(Run& run) {
   DataWriter writer;
   Buffer buffer{};
   write(writer, buffer, some_state(), 1);
-  sealing(run, blocks, writer.size());
-  sealing(run, blocks, kMaxDatagram - crypto::kTagSize);
+  for (const Suite suite : suites_of_this_machine()) sealing(run, blocks, suite, writer.size());
+  for (const Suite suite : suites_of_this_machine()) sealing(run, blocks, suite, kMaxDatagram - crypto::kTagSize);
   handshake(run, blocks / 4 + 1);
   batches(run, blocks, 200);
   batches(run, blocks, 1100);

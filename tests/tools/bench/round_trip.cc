@@ -3,8 +3,8 @@
 // From a state handed over to the force that answers it, decoded in its box, over the loopback and back through a
 // client like `virtual_wall` in another process; and a bare ping-pong of datagrams of the same sizes between the same
 // two processes and the same kinds of sockets that waits in the same way. The two take turns in blocks, so that what
-// else the machine does falls on both. For suite 1 there is a second floor: the ping-pong that seals and opens each
-// datagram with libsodium, and does nothing else.
+// else the machine does falls on both. For the suites that seal there is a second floor: the ping-pong that seals and
+// opens each datagram with libsodium, and does nothing else.
 #include <netinet/in.h>
 #include <poll.h>
 #include <sys/mman.h>
@@ -30,7 +30,8 @@
 
 #include "clients/cpp/force_client.h"
 #include "clients/cpp/udp_transport.h"
-#include "protocol/secrets/crypto.h"
+#include "protocol/secrets/seal.h"
+#include "protocol/secrets/suites.h"
 #include "protocol/wire/header.h"
 #include "server/machine/clock.h"
 #include "server/machine/udp_link.h"
@@ -65,17 +66,18 @@ struct Orders {
 };
 
 /// One end of a bare ping-pong. The server's is one socket for whoever comes, as a server's is; the client's is
-/// connected. `sealed`: what follows the first 16 bytes is sealed and opened by libsodium.
+/// connected. With a `suite`, what follows the first 16 bytes is sealed and opened by libsodium.
 class BareSocket {
  public:
-  BareSocket(int fd, const Address* peer, Wait wait, bool sealed) : fd_(fd), wait_(wait), sealed_(sealed) {
+  BareSocket(int fd, const Address* peer, Wait wait, std::optional<Suite> suite) : fd_(fd), wait_(wait) {
     if (peer != nullptr) to_ = to_sockaddr(*peer);
+    if (suite) key_.emplace(*suite, Key{});
   }
 
   void send(std::size_t size) {
-    if (sealed_) {
+    if (key_) {
       const auto body = std::span(buffer_).subspan(kHeaderSize, size - kHeaderSize);
-      crypto::seal(key_, 0, std::span(buffer_).first(kHeaderSize), body.first(body.size() - crypto::kTagSize), body);
+      key_->seal(0, std::span(buffer_).first(kHeaderSize), body.first(body.size() - crypto::kTagSize), body);
     }
     const auto* const to = to_ ? reinterpret_cast<const sockaddr*>(&*to_) : nullptr;
     if (::sendto(fd_, buffer_.data(), size, 0, to, to_ ? sizeof *to_ : 0) < 0) {
@@ -93,10 +95,9 @@ class BareSocket {
     socklen_t length = sizeof from;
     const ssize_t size = ::recvfrom(fd_, buffer_.data(), buffer_.size(), MSG_DONTWAIT,
                                     to_ ? reinterpret_cast<sockaddr*>(&from) : nullptr, to_ ? &length : nullptr);
-    if (size <= 0 || !sealed_) return size > 0;
+    if (size <= 0 || !key_) return size > 0;
     const auto body = std::span(buffer_).subspan(kHeaderSize, static_cast<std::size_t>(size) - kHeaderSize);
-    return crypto::open(key_, 0, std::span(buffer_).first(kHeaderSize), body,
-                        body.first(body.size() - crypto::kTagSize));
+    return key_->open(0, std::span(buffer_).first(kHeaderSize), body, body.first(body.size() - crypto::kTagSize));
   }
 
   static sockaddr_in to_sockaddr(const Address& ipv4) {
@@ -110,8 +111,7 @@ class BareSocket {
  private:
   int fd_;
   Wait wait_;
-  bool sealed_;
-  Key key_;
+  std::optional<SealingKey> key_;
   std::optional<sockaddr_in> to_;
   std::array<std::byte, kMaxDatagram> buffer_{};
 };
@@ -150,7 +150,8 @@ void connect(int fd, const Address& to) {
 }
 
 /// The other process: a wall at x = 0, or the echo.
-void serve(Orders& orders, const Address& server, int echo, Wait wait, const std::optional<Key>& key) {
+void serve(Orders& orders, const Address& server, int echo, Wait wait, const std::optional<Key>& key,
+           std::optional<Suite> suite) {
   UdpTransport transport(server);
   ForceClient::Config config;
   config.name = "wall";
@@ -160,8 +161,8 @@ void serve(Orders& orders, const Address& server, int echo, Wait wait, const std
       transport, server, config,
       [](const DeviceState& hand) -> Touch { return Vec3(-2000 * std::max(0.0, hand.position.x()), 0, 0); },
       clock::now());
-  BareSocket bare(echo, nullptr, wait, false);
-  BareSocket sealed(echo, nullptr, wait, true);
+  BareSocket bare(echo, nullptr, wait, std::nullopt);
+  BareSocket sealed(echo, nullptr, wait, suite);
   for (;;) {
     const int job = orders.job.load(std::memory_order_acquire);
     orders.at_work.store(job, std::memory_order_release);
@@ -181,7 +182,7 @@ void serve(Orders& orders, const Address& server, int echo, Wait wait, const std
 
 struct Result {
   std::vector<double> bare;    ///< µs, each
-  std::vector<double> sealed;  ///< suite 1: as `bare`, with libsodium at both ends
+  std::vector<double> sealed;  ///< with a suite: as `bare`, with libsodium at both ends
   std::vector<double> tendon;
   std::size_t state_bytes = 0;
   std::size_t force_bytes = 0;
@@ -191,11 +192,15 @@ double us(Duration d) { return 1e6 * seconds(d); }
 
 class RoundTrip {
  public:
-  RoundTrip(const Options& options, Wait wait, bool sealed)
-      : options_(options), wait_(wait), sealed_(sealed), key_(Ratchet(3).next()) {
+  /// Sealed by `suite`; in the clear without one.
+  RoundTrip(const Options& options, Wait wait, std::optional<Suite> suite)
+      : options_(options), wait_(wait), suite_(suite), key_(Ratchet(3).next()) {
     NetworkLoop::Config config;
     config.devices = {{.name = "bench", .model = "bench", .max_force = 10, .loop_hz = 1000, .channels = {{}}}};
-    if (sealed) config.keys = {{.name = "wall", .role = Role::kController, .key = key_}};
+    if (suite) {
+      config.keys = {{.name = "wall", .role = Role::kController, .key = key_}};
+      config.suites = {*suite};
+    }
     network_.emplace(config, watched_, std::vector{&mail_});
     connect(bare_client_.fd(), bare_server_.local_address());
     void* const shared = ::mmap(nullptr, sizeof(Orders), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
@@ -208,7 +213,7 @@ class RoundTrip {
       end_with_parent();
       try {
         const AtPriority high(options.priority);
-        serve(*orders_, server, bare_client_.fd(), wait, sealed ? std::optional(key_) : std::nullopt);
+        serve(*orders_, server, bare_client_.fd(), wait, suite ? std::optional(key_) : std::nullopt, suite);
         ::_exit(0);
       } catch (const std::exception& error) {
         std::fprintf(stderr, "tendon-lab bench: the client: %s\n", error.what());
@@ -232,7 +237,7 @@ class RoundTrip {
     for (int block = 0; block < options_.blocks; ++block) {
       orders_->echo_bytes = static_cast<int>(force_bytes_);
       ping_pong(Orders::kEcho, result.bare);
-      if (sealed_) ping_pong(Orders::kSealedEcho, result.sealed);
+      if (suite_) ping_pong(Orders::kSealedEcho, result.sealed);
       order(Orders::kTendon);
       for (int i = -options_.warm_up; i < options_.exchanges; ++i) {
         const Duration took = exchange();
@@ -251,7 +256,7 @@ class RoundTrip {
 
   void ping_pong(Orders::Job job, std::vector<double>& times) {
     const Address peer = bare_client_.local_address();
-    BareSocket socket(bare_server_.fd(), &peer, wait_, job == Orders::kSealedEcho);
+    BareSocket socket(bare_server_.fd(), &peer, wait_, job == Orders::kSealedEcho ? suite_ : std::nullopt);
     order(job);
     for (int i = -options_.warm_up; i < options_.exchanges; ++i) {
       const LocalTime began = clock::now();
@@ -315,7 +320,7 @@ class RoundTrip {
 
   Options options_;
   Wait wait_;
-  bool sealed_;
+  std::optional<Suite> suite_;
   Key key_;
   Mailboxes mail_{{.steps = 16, .flight = 16, .datagrams = 1024}};
   UdpLink link_{parse_address("127.0.0.1:0")};
@@ -337,15 +342,17 @@ void measure_round_trip(Run& run) {
   if (run.options.quick) options = {.blocks = 1, .exchanges = 20, .warm_up = 1};
   options.priority = run.options.priority;
   for (const Wait wait : {Wait::kBusy, Wait::kBlocking}) {
-    for (const bool sealed : {false, true}) {
-      RoundTrip round_trip(options, wait, sealed);  // forks before it has a priority of its own
+    std::vector<std::optional<Suite>> suites = {std::nullopt, Suite::kNoise};
+    if (contains(suites_of_this_machine(), Suite::kAesGcm)) suites.emplace_back(Suite::kAesGcm);
+    for (const std::optional<Suite> suite : suites) {
+      RoundTrip round_trip(options, wait, suite);  // forks before it has a priority of its own
       const AtPriority high(options.priority);
       const Result r = round_trip.run();
       const double ratio = quantile(r.tendon, 0.5) / quantile(r.bare, 0.5);
       const double target = wait == Wait::kBusy ? 1.3 : 1.15;
       Row row{.section = {},
               .what = std::string("state → force, ") + (wait == Wait::kBusy ? "busy-polling" : "blocking") +
-                      (sealed ? ", sealed" : ""),
+                      (suite ? ", sealed by " + names_of({*suite}) : ""),
               .unit = "µs",
               .n = r.tendon.size(),
               .p50 = quantile(r.tendon, 0.5),
@@ -357,7 +364,7 @@ void measure_round_trip(Run& run) {
               .ratio = ratio,
               .target = Row::Target{wait == Wait::kBusy ? "≤ 1.3 × the floor" : "≤ 1.15 × the floor", ratio <= target},
               .note = {}};
-      if (sealed) {
+      if (suite) {
         char note[120];
         const double bare = quantile(r.sealed, 0.5);
         std::snprintf(note, sizeof note, "a ping-pong that libsodium seals and opens: %.1f; to that %.2f", bare,

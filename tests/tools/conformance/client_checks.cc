@@ -264,11 +264,17 @@ std::optional<ClientJudge::Session> ClientJudge::welcome() {
   Bytes32 ephemeral{};
   std::ranges::copy(random16(), ephemeral.begin());
   std::ranges::copy(random16(), ephemeral.begin() + 16);
-  const Answered answered = answer_to(*greeting, id, welcome_to(greeting->hello, 1), Key(ephemeral));
+  const Answered answered = answer_to(*greeting, id, welcome_to(greeting->hello, 1, options_.aes), Key(ephemeral));
+  if (options_.aes) {
+    report_.judge("suite-2", answered.suite == 2, greeting->hello.ShortDebugString(),
+                  "a Hello that offers aes-256-gcm");
+  } else {
+    report_.not_applicable("suite-2", "suite 2 was not asked for (--suite 2)");
+  }
   wire_.send(port_, answered.datagram);
   return Session{greeting->hello, Conversation(wire_, report_,
                                                {.port = port_,
-                                                .suite = options_.suite(),
+                                                .suite = answered.suite,
                                                 .connection_id = id,
                                                 .send = answered.server_to_client,
                                                 .receive = answered.client_to_server})};

@@ -5,6 +5,8 @@
 #include <limits>
 #include <utility>
 
+#include "protocol/secrets/seal.h"
+
 namespace tendon::conformance {
 namespace {
 
@@ -14,6 +16,12 @@ constexpr std::int64_t kFarthest = std::int64_t{1} << 60;
 std::int64_t ns(LocalTime time) { return time.time_since_epoch().count(); }
 
 std::string packet(std::uint64_t number) { return "packet " + std::to_string(number); }
+
+SealingKey sealing(std::uint8_t suite, const Key& key) { return {suite == 2 ? Suite::kAesGcm : Suite::kNoise, key}; }
+
+Key renewed(std::uint8_t suite, const Key& key) {
+  return suite == 2 ? crypto::AesGcm(key).renewed() : crypto::renewed(key);
+}
 
 std::string must_drop(const std::string& wrong) { return "dropped: its datagram had " + wrong; }
 
@@ -54,12 +62,12 @@ void Conversation::stamp(pb::Datagram& body) const {
 Bytes Conversation::seal(Head head, Span body, int epochs) const {
   Key key = send_key_;
   if (epochs < 0 && previous_key_) key = *previous_key_;
-  for (int i = 0; i < epochs; ++i) key = crypto::renewed(key);
+  for (int i = 0; i < epochs; ++i) key = renewed(setup_.suite, key);
   head.epoch = static_cast<std::uint8_t>(head.epoch + epochs);
   Bytes out = write(head);
   if (setup_.suite == 0) return out + body;
   Bytes sealed(body.size() + crypto::kTagSize);
-  crypto::seal(key, head.number, out, body, sealed);
+  sealing(setup_.suite, key).seal(head.number, out, body, sealed);
   return std::move(out) + sealed;
 }
 
@@ -104,7 +112,7 @@ void Conversation::say_bad(std::string_view check, std::uint64_t number, Span da
 
 void Conversation::renew_key() {
   previous_key_ = send_key_;
-  send_key_ = crypto::renewed(send_key_);
+  send_key_ = renewed(setup_.suite, send_key_);
   ++epoch_;
 }
 
@@ -164,18 +172,19 @@ void Conversation::hear(const Wire::Arrival& arrival) {
                 "at most 1200 bytes");
 
   Bytes body(arrival.datagram.begin() + kHeadSize, arrival.datagram.end());
-  if (setup_.suite == 1) {
+  if (setup_.suite != 0) {
     const Span all(arrival.datagram);
-    const bool renewed = head->epoch == static_cast<std::uint8_t>(receive_epoch_ + 1);
-    const Key key = renewed ? crypto::renewed(receive_key_) : receive_key_;
+    const bool is_next = head->epoch == static_cast<std::uint8_t>(receive_epoch_ + 1);
+    const Key key = is_next ? renewed(setup_.suite, receive_key_) : receive_key_;
     Bytes text(body.size() < crypto::kTagSize ? 0 : body.size() - crypto::kTagSize);
-    const bool opened = (renewed || head->epoch == receive_epoch_) && body.size() >= crypto::kTagSize &&
-                        crypto::open(key, head->number, all.first(kHeadSize), all.subspan(kHeadSize), text);
+    const bool opened =
+        (is_next || head->epoch == receive_epoch_) && body.size() >= crypto::kTagSize &&
+        sealing(setup_.suite, key).open(head->number, all.first(kHeadSize), all.subspan(kHeadSize), text);
     report_.judge("data-opens", opened,
                   packet(head->number) + " of epoch " + std::to_string(head->epoch) + ": " + hex(all),
                   "opens with this direction's key of epoch " + std::to_string(receive_epoch_) + " or the next one");
     if (!opened) return;
-    if (renewed) {
+    if (is_next) {
       receive_key_ = key;
       ++receive_epoch_;
     }

@@ -30,7 +30,7 @@ class Conversation {
     int port = 0;
     std::uint8_t suite = 0;
     std::uint32_t connection_id = 0;
-    Key send{};  ///< in suite 1
+    Key send{};  ///< in suites 1 and 2
     Key receive{};
     std::uint8_t version = 1;
   };

@@ -9,6 +9,7 @@
 #include <string_view>
 #include <vector>
 
+#include "protocol/secrets/suites.h"
 #include "tests/tools/conformance/client_checks.h"
 #include "tests/tools/conformance/server_checks.h"
 #include "tests/tools/conformance/toy/client.h"
@@ -21,8 +22,11 @@ namespace {
 struct Broken {
   Fault fault;
   std::string_view check;
-  int suites = 2;  ///< 0 or 1: shows in this suite only; 2: in both
+  int suites = 2;  ///< 0: shows in suite 0 only; 1: where there is a key; 2: in all
 };
+
+/// Those that this processor can speak.
+int suites_here() { return contains(suites_of_this_machine(), Suite::kAesGcm) ? 3 : 2; }
 
 std::optional<Key> key_of(int suite) {
   if (suite == 0) return std::nullopt;
@@ -48,8 +52,10 @@ std::set<std::string_view> failed(const Report& report) {
 
 Report server_report(int suite, Fault fault) {
   crypto::start();
-  const Options options{
-      .key = key_of(suite), .long_checks = fault == Fault::kNeverRenews, .follower = fault != Fault::kKnowsNoCoupling};
+  const Options options{.key = key_of(suite),
+                        .aes = suite == 2,
+                        .long_checks = fault == Fault::kNeverRenews,
+                        .follower = fault != Fault::kKnowsNoCoupling};
   ToyServer server(options.key, fault);
   ToyWire wire(server, true);
   Report report(Side::kServer);
@@ -59,7 +65,7 @@ Report server_report(int suite, Fault fault) {
 
 Report client_report(int suite, Fault fault, pb::Role role = pb::ROLE_CONTROLLER) {
   crypto::start();
-  const Options options{.key = key_of(suite), .long_checks = fault == Fault::kNeverRenews};
+  const Options options{.key = key_of(suite), .aes = suite == 2, .long_checks = fault == Fault::kNeverRenews};
   const bool asks = role == pb::ROLE_CONTROLLER;
   ToyClient client(options.key, role, asks, fault);
   ToyWire wire(client, false);
@@ -109,8 +115,8 @@ class BrokenToy : public testing::TestWithParam<Case> {};
 
 TEST_P(BrokenToy, FailsTheCheckOfTheRuleItBreaksAndNoOther) {
   const auto& [toy, broken] = GetParam();
-  for (int suite = 0; suite < 2; ++suite) {
-    if (broken.suites != 2 && broken.suites != suite) continue;
+  for (int suite = 0; suite < suites_here(); ++suite) {
+    if (broken.suites != 2 && (broken.suites == 1) != (suite > 0)) continue;
     SCOPED_TRACE("suite " + std::to_string(suite));
     const Report report =
         toy == Toy::kServer
@@ -138,14 +144,14 @@ std::string name_of(const testing::TestParamInfo<Case>& info) {
 }
 
 TEST(ConformanceKit, AServerThatKeepsAllRulesPasses) {
-  for (int suite = 0; suite < 2; ++suite) {
+  for (int suite = 0; suite < suites_here(); ++suite) {
     const Report report = server_report(suite, Fault::kNone);
     EXPECT_TRUE(report.passed()) << "suite " << suite << "\n" << told(report);
   }
 }
 
 TEST(ConformanceKit, AServerThatKnowsNoChannelsPassesAndIsNotJudgedByThem) {
-  for (int suite = 0; suite < 2; ++suite) {
+  for (int suite = 0; suite < suites_here(); ++suite) {
     const Report all = server_report(suite, Fault::kNone);
     const Report older = server_report(suite, Fault::kKnowsNoChannels);
     EXPECT_TRUE(older.passed()) << "suite " << suite << "\n" << told(older);
@@ -154,7 +160,7 @@ TEST(ConformanceKit, AServerThatKnowsNoChannelsPassesAndIsNotJudgedByThem) {
 }
 
 TEST(ConformanceKit, AServerThatKnowsNoCouplingPassesAndIsNotJudgedByIt) {
-  for (int suite = 0; suite < 2; ++suite) {
+  for (int suite = 0; suite < suites_here(); ++suite) {
     const Report all = server_report(suite, Fault::kNone);
     const Report older = server_report(suite, Fault::kKnowsNoCoupling);
     EXPECT_TRUE(older.passed()) << "suite " << suite << "\n" << told(older);
@@ -163,12 +169,26 @@ TEST(ConformanceKit, AServerThatKnowsNoCouplingPassesAndIsNotJudgedByIt) {
 }
 
 TEST(ConformanceKit, AClientThatKeepsAllRulesPasses) {
-  for (int suite = 0; suite < 2; ++suite) {
+  for (int suite = 0; suite < suites_here(); ++suite) {
     for (const pb::Role role : {pb::ROLE_CONTROLLER, pb::ROLE_OBSERVER}) {
       const Report report = client_report(suite, Fault::kNone, role);
       EXPECT_TRUE(report.passed()) << "suite " << suite << ", role " << role << "\n" << told(report);
     }
   }
+}
+
+TEST(ConformanceKit, APeerThatDoesNotKnowSuite2PassesUnlessItIsAskedFor) {
+  EXPECT_TRUE(server_report(1, Fault::kKnowsNoAes).passed());
+  EXPECT_TRUE(client_report(1, Fault::kKnowsNoAes).passed());
+  if (suites_here() < 3) GTEST_SKIP() << "this processor has no AES";
+  EXPECT_EQ(failed(server_report(2, Fault::kKnowsNoAes)), std::set<std::string_view>{"suite-2"});
+  EXPECT_EQ(failed(client_report(2, Fault::kKnowsNoAes)), std::set<std::string_view>{"suite-2"});
+}
+
+TEST(ConformanceKit, TellsANonceWithTheWrongEndInFront) {
+  if (suites_here() < 3) GTEST_SKIP() << "this processor has no AES";
+  EXPECT_TRUE(failed(server_report(2, Fault::kLittleEndianNonce)).contains("data-opens"));
+  EXPECT_TRUE(failed(client_report(2, Fault::kLittleEndianNonce)).contains("data-opens"));
 }
 
 INSTANTIATE_TEST_SUITE_P(ServerData, BrokenToy, testing::ValuesIn(cases(Toy::kServer, of_either_end())), name_of);

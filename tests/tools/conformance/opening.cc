@@ -23,6 +23,17 @@ std::string out_of_bounds(const pb::Hello& hello) {
   return {};
 }
 
+/// By suite 2 when the Answer names it.
+void take_keys(const NoiseSplit& split, Answered& out) {
+  const bool aes = out.body.has_welcome() && names_aes(out.body.welcome());
+  const auto key_of = [&](const Key& key) {
+    return aes ? Key(crypto::hmac_sha256(key.bytes(), {bytes_of("tendon-suite-2"), split.handshake_hash})) : key;
+  };
+  out.suite = aes ? 2 : 1;
+  out.client_to_server = key_of(split.initiator_to_responder);
+  out.server_to_client = key_of(split.responder_to_initiator);
+}
+
 }  // namespace
 
 Bytes key_id(const Key& key) {
@@ -46,14 +57,15 @@ std::optional<Answered> Attempt::read(Span datagram) const {
   if (!head || head->type != kAnswerType || datagram.size() < kAnswerAt || sixteen(datagram, 16) != random_) return {};
   Answered out{.head = *head, .datagram = {datagram.begin(), datagram.end()}, .body = {}};
   Bytes body(datagram.begin() + kAnswerAt, datagram.end());
+  std::optional<NoiseSplit> split;
   if (noise_ && head->suite == 1) {
     auto opened = noise_->read(body);
     if (!opened) return {};
     body = std::move(opened->payload);
-    out.client_to_server = opened->split.initiator_to_responder;
-    out.server_to_client = opened->split.responder_to_initiator;
+    split = opened->split;
   }
   if (!conformance::read(body, out.body)) return {};
+  if (split) take_keys(*split, out);
   return out;
 }
 
@@ -107,21 +119,20 @@ Answered answer_to(const Greeting& greeting, std::uint32_t connection_id, const 
     auto reply = greeting.noise->reply(ephemeral, bytes);
     if (!reply) return out;
     bytes = std::move(reply->message);
-    out.client_to_server = reply->split.initiator_to_responder;
-    out.server_to_client = reply->split.responder_to_initiator;
+    take_keys(reply->split, out);
   }
   out.datagram = answer(greeting.noise ? 1 : 0, connection_id, greeting.random, bytes);
   out.head = *read_head(out.datagram);
   return out;
 }
 
-pb::Answer welcome_to(const pb::Hello& hello, std::uint32_t version) {
+pb::Answer welcome_to(const pb::Hello& hello, std::uint32_t version, bool aes) {
   pb::Answer out;
   pb::Welcome& welcome = *out.mutable_welcome();
   welcome.set_version(version);
   welcome.set_role(hello.role() == pb::ROLE_CONTROLLER ? pb::ROLE_CONTROLLER : pb::ROLE_OBSERVER);
   for (const auto& feature : hello.features()) {
-    if (feature == "local-model") welcome.add_features(feature);
+    if (feature == "local-model" || (aes && feature == kAesGcm)) welcome.add_features(feature);
   }
   welcome.set_device_name("conformance");
   welcome.set_max_force_n(8);

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <optional>
+#include <string_view>
 #include <vector>
 
 #include "protocol/secrets/crypto.h"
@@ -15,20 +17,29 @@ namespace tendon::conformance {
 /// How a peer is judged.
 struct Options {
   std::optional<Key> key{};  ///< suite 1 when set
+  bool aes = false;          ///< with a key: suite 2 is offered, and chosen, so that Data are of it
   bool loopback = true;      ///< the peer is on this machine
   bool long_checks = false;  ///< also those that take ten minutes
   bool follower = false;     ///< a server's device 0 is a follower that fits the kit (server_coupling_checks.h)
-  std::uint8_t suite() const noexcept { return key ? 1 : 0; }
+  std::uint8_t suite() const noexcept { return key ? 1 : 0; }  ///< of the handshake
 };
+
+/// The feature by which suite 2 is offered and chosen.
+inline constexpr std::string_view kAesGcm = "aes-256-gcm";
+template <class Words>
+bool names_aes(const Words& words) {
+  return std::ranges::count(words.features(), kAesGcm) > 0;
+}
 
 Bytes key_id(const Key& key);
 Bytes prologue(const Key& key, const Sixteen& random);
 
-/// An Answer that was read: of suite 1, with the keys it brings.
+/// An Answer that was read: of suite 1, with the keys it brings, and the suite of the Data that follow.
 struct Answered {
   Head head;
   Bytes datagram;
   pb::Answer body;
+  std::uint8_t suite = 0;
   Key client_to_server{};
   Key server_to_client{};
 };
@@ -70,6 +81,7 @@ std::optional<Greeting> read_greeting(Span datagram, const Options& options, std
 /// The bytes of an Answer to `greeting`, sealed in suite 1 with a fresh ephemeral key.
 Answered answer_to(const Greeting& greeting, std::uint32_t connection_id, const pb::Answer& body, const Key& ephemeral);
 
-pb::Answer welcome_to(const pb::Hello& hello, std::uint32_t version);
+/// `aes`: suite 2 is chosen where it is offered.
+pb::Answer welcome_to(const pb::Hello& hello, std::uint32_t version, bool aes = false);
 
 }  // namespace tendon::conformance

@@ -21,6 +21,7 @@ constexpr std::string_view kRetry = "Type 2, Retry: server → client, 48 bytes"
 constexpr std::string_view kAnswer = "Type 4, Answer: server → client, shorter than a Hello";
 constexpr std::string_view kData = "Type 3, Data: either way";
 constexpr std::string_view kSuite1 = "Cipher suite 1";
+constexpr std::string_view kSuite2 = "Cipher suite 2";
 constexpr std::string_view kOpening = "Opening";
 constexpr std::string_view kStates = "States";
 constexpr std::string_view kSent = "What is sent when";
@@ -58,7 +59,7 @@ constexpr std::array kChecks = {
     Check{"version-not-offered", kClient, kSession, kOpening,
           "An Answer with a version that was not offered is ignored."},
     Check{"bad-answer", kClient, kWire, kAnswer, "Bytes 16–31 the client random of the Hello, then to the end message"},
-    Check{"plain-answer", kClient, kSession, kOpening, "A client with a key speaks suite 1 only."},
+    Check{"plain-answer", kClient, kSession, kOpening, "A client with a key never speaks suite 0."},
     Check{"refused", kClient, kWire, kAnswer, "why"},
     // Opening, as a server does it.
     Check{"retry", kServer, kWire, kRetry, "Bytes 16–31 the client random of the Hello, 32–47 the cookie."},
@@ -91,7 +92,9 @@ constexpr std::array kChecks = {
     Check{"data-header", kBoth, kWire, kHeader, "Type 3 has the version that the Answer names."},
     Check{"data-size", kBoth, kWire, "Ground rules", "One UDP datagram is one unit; none is longer than 1200 bytes."},
     Check{"data-opens", kBoth, kWire, kSuite1, "Nonce: 4 zeros ‖ packet number as 8 bytes LE"},
-    Check{"data-body", kBoth, kWire, kData, "After the header, to the end, message Datagram (suite 1: sealed):"},
+    Check{"suite-2", kBoth, kWire, kSuite2,
+          "A server that chooses it names it in its Welcome, and Data are of suite 2 both ways."},
+    Check{"data-body", kBoth, kWire, kData, "After the header, to the end, message Datagram (suites 1 and 2: sealed):"},
     Check{"packet-numbers", kBoth, kWire, kHeader, "Data: 0, 1, 2 … per direction, never twice; 0 in all others"},
     Check{"tx-time", kBoth, kWire, "Ground rules",
           "Times are nanoseconds of the sender's monotonic clock, |t| ≤ 2⁶⁰, never of the wall clock."},
@@ -121,7 +124,7 @@ constexpr std::array kChecks = {
           "the next one, to which it moves on once such a datagram has opened"},
     Check{"old-key-overlap", kBoth, kWire, kSuite1, "the previous one for 2 s after moving on"},
     Check{"old-key-over", kBoth, kSession, kDropped,
-          "suite 1: the key of its epoch is not held: over, or more than one epoch ahead"},
+          "suites 1 and 2: the key of its epoch is not held: over, or more than one epoch ahead"},
     Check{"rekey-sent", kBoth, kWire, kSuite1, "The sender renews its key at the latest after 2²⁰ datagrams or 600 s."},
     // Frames.
     Check{"states", kServer, kWire, kData, "number of the haptic step"},

@@ -53,6 +53,7 @@ pb::Hello ServerGuest::hello(pb::Role role) const {
   out.set_role(role);
   out.set_name("conformance");
   out.add_features("local-model");
+  if (options.aes) out.add_features(std::string(kAesGcm));
   return out;
 }
 
@@ -92,7 +93,7 @@ std::optional<Answered> ServerGuest::ask(int port, const Attempt& attempt, const
 
 Conversation::Setup ServerGuest::setup(int port, const Answered& answered) const {
   return {.port = port,
-          .suite = options.suite(),
+          .suite = answered.suite,
           .connection_id = answered.head.connection_id,
           .send = answered.client_to_server,
           .receive = answered.server_to_client,
@@ -115,6 +116,12 @@ std::optional<ServerGuest::Session> ServerGuest::enter(const pb::Hello& words) {
                answered ? answered->body.ShortDebugString() : "no answer", "a Welcome");
   if (!answered || !answered->body.has_welcome()) return std::nullopt;
   judge_welcome(words, *this, attempt, *answered);
+  if (options.aes) {
+    report.judge("suite-2", answered->suite == 2, answered->body.ShortDebugString(),
+                 "a Welcome that names aes-256-gcm");
+  } else {
+    report.not_applicable("suite-2", "suite 2 was not asked for (--suite 2)");
+  }
   Session session{answered->body.welcome(), attempt, *cookie, Conversation(wire, report, setup(port, *answered))};
   const std::size_t before = session.talk.heard().size();
   session.talk.say();

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "clients/cpp/key_file.h"
+#include "protocol/secrets/suites.h"
 #include "server/build_info.h"
 #include "tests/tools/conformance/client_checks.h"
 #include "tests/tools/conformance/server_checks.h"
@@ -26,6 +27,7 @@ struct Line {
   bool long_checks = false;
   bool follower = false;
   bool json = false;
+  int suite = 1;
 };
 
 const char* name_of(Side side) {
@@ -68,6 +70,8 @@ int tell(const Report& report, bool json) {
 Options options_of(const Line& line) {
   Options options{.long_checks = line.long_checks};
   if (!line.key.empty()) options.key = read_client_key(line.key).key;
+  options.aes = line.suite == 2;
+  if (options.aes) expect_speakable(all_suites());
   return options;
 }
 
@@ -125,8 +129,13 @@ int run(int argc, char** argv) {
   app.add_flag("--json", line.json, "One JSON object per check on stdout");
   app.require_subcommand(0, 1);
   const auto common = [&](CLI::App* command) {
-    command->add_option("--key", line.key, "Suite 1, with this key file (of a controller); without one suite 0")
-        ->type_name("FILE");
+    auto* const key =
+        command->add_option("--key", line.key, "Sealed, with this key file (of a controller); without one suite 0")
+            ->type_name("FILE");
+    command->add_option("--suite", line.suite, "With a key, of Data: 2 offers and chooses suite 2, and judges by it")
+        ->check(CLI::IsMember({1, 2}))
+        ->needs(key)
+        ->capture_default_str();
     command->add_flag("--long", line.long_checks, "Also the check that takes 610 s: the peer renews its key");
     command->add_flag("--json", line.json, "One JSON object per check on stdout");
   };

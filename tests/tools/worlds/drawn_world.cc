@@ -316,6 +316,19 @@ void draw_suite(Dice dice, DrawnWorld& world) {
   }
 }
 
+/// From kFirstSeedOfSuite2 on, half of the sealed worlds have a server that seals by AES, and a third of those forbid
+/// anything else; where it is not forbidden, some clients are older than suite 2. Drawn apart, so that nothing else of a
+/// world depends on it.
+void draw_aes(Dice dice, DrawnWorld& world) {
+  for (DrawnClient& client : world.clients) client.config.suites = client.rogue.suites = world.config.suites;
+  if (world.seed < kFirstSeedOfSuite2 || !world.sealed() || dice.chance(0.5)) return;
+  const bool only = dice.chance(0.33);
+  world.config.suites = only ? Suites{Suite::kAesGcm} : all_suites();
+  for (DrawnClient& client : world.clients) {
+    if (only || dice.chance(0.7)) client.config.suites = client.rogue.suites = world.config.suites;
+  }
+}
+
 }  // namespace
 
 bool DrawnWorld::rogue() const {
@@ -378,6 +391,7 @@ DrawnWorld draw_world(std::uint64_t seed, const Sabotage& sabotage) {
   fair.down.delay = injector::ConstantDelay{world.one_way_down};
   world.changes.push_back({world.clears, fair});
   draw_suite(Dice(~seed), world);
+  draw_aes(Dice(~seed ^ 0x510e527fade682d1), world);
   draw_mechanism(Dice(seed ^ 0x9e3779b97f4a7c15), world);
   draw_handle(Dice(seed ^ 0x2545f4914f6cdd1d), world, sabotage);
   return world;
@@ -413,8 +427,9 @@ std::string describe(const DrawnWorld& world) {
   if (config.latest_wake > Duration::zero()) text += ", woken up to " + ms(config.latest_wake) + " late";
   if (world.pauses()) text += ", pauses of " + ms(config.pause);
   if (world.port.unseen > 0) text += ", readings fail";
-  text += world.sealed() ? "; suite 1, a key for " + std::to_string(config.rekey.datagrams) + " datagrams or " +
-                               ms(config.rekey.age)
+  const bool aes = contains(config.suites, Suite::kAesGcm);
+  text += world.sealed() ? (aes ? "; by " + names_of(config.suites) : "; suite 1") + ", a key for " +
+                               std::to_string(config.rekey.datagrams) + " datagrams or " + ms(config.rekey.age)
                          : "; suite 0";
   for (const DrawnClient& client : world.clients) {
     switch (client.kind) {
@@ -431,6 +446,7 @@ std::string describe(const DrawnWorld& world) {
                 " until " + ms(client.rogue.quits.time_since_epoch());
         break;
     }
+    if (aes && !contains(client.config.suites, Suite::kAesGcm)) text += ", older than suite 2";
     text += ", from " + ms(client.joins);
     if (client.killed) text += ", killed at " + ms(*client.killed);
     if (client.restarted) text += ", again at " + ms(*client.restarted);

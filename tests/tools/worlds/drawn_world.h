@@ -75,7 +75,10 @@ struct DrawnWorld {
   bool exact() const;  ///< a simulated device whose truth the account of the port must match
 };
 
-/// With sabotage the device is an adversary's.
+/// A seed below this one draws the world that it drew before there was suite 2.
+inline constexpr std::uint64_t kFirstSeedOfSuite2 = 1'000'000'000;
+
+/// With sabotage the device is an adversary's. From kFirstSeedOfSuite2 on, some worlds take a processor with AES.
 DrawnWorld draw_world(std::uint64_t seed, const Sabotage& sabotage = {});
 
 /// One direction of a bad network: any model of the injector but changes of address and flipped bits.

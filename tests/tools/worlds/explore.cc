@@ -55,7 +55,7 @@ void add(World& world, const DrawnClient& client, LocalTime began, Watch watch) 
 }
 
 /// Random bytes from a stranger, or in the name of a client.
-void forge_garbage(World& world, bool sealed, Dice& dice) {
+void forge_garbage(World& world, const DrawnWorld& drawn, Dice& dice) {
   std::vector<std::byte> bytes(1 + dice.bits() % kMaxDatagram);
   for (std::byte& b : bytes) b = static_cast<std::byte>(dice.bits());
   Address from = world.server_address();
@@ -66,10 +66,10 @@ void forge_garbage(World& world, bool sealed, Dice& dice) {
     bytes[1] = static_cast<std::byte>(0x10 | (1 + dice.bits() % 4));
     bytes[2] = bytes[3] = std::byte{0};
   }
-  // … of a session of suite 1.
-  if (sealed && dice.chance(0.5) && bytes.size() >= kHeaderSize) {
+  // … of a sealed session.
+  if (drawn.sealed() && dice.chance(0.5) && bytes.size() >= kHeaderSize) {
     std::ranges::copy(encode_header({.type = DatagramType::kData,
-                                     .suite = Suite::kNoise,
+                                     .suite = drawn.config.suites.front(),
                                      .epoch = static_cast<std::uint8_t>(dice.bits() % 3),
                                      .connection_id = static_cast<std::uint32_t>(1 + dice.bits() % 4),
                                      .packet_number = dice.bits() % 10'000}),
@@ -114,7 +114,7 @@ Outcome run(const DrawnWorld& drawn, const Extras& extras) {
   Dice garbage(drawn.seed ^ 0x6a09e667f3bcc908);
   if (drawn.garbage_hz > 0) {
     for (Duration at{}; at < drawn.clears; at += from_seconds(1 / drawn.garbage_hz)) {
-      events.push_back({at, [&world, &drawn, &garbage] { forge_garbage(world, drawn.sealed(), garbage); }});
+      events.push_back({at, [&world, &drawn, &garbage] { forge_garbage(world, drawn, garbage); }});
     }
   }
   events.push_back({drawn.clears, [&] {

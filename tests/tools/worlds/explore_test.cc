@@ -29,6 +29,27 @@ TEST(Worlds, SameSeedSameWorld) {
   }
 }
 
+TEST(Worlds, OnlySeedsFromABillionOnDrawSuite2) {
+  for (std::uint64_t seed = 1; seed <= 500; ++seed) {
+    EXPECT_EQ(draw_world(seed).config.suites, Suites{Suite::kNoise}) << seed;
+    EXPECT_EQ(describe(draw_world(seed)).find("aes"), std::string::npos) << seed;
+  }
+  int by_aes = 0;
+  int with_older_clients = 0;
+  int forbid_suite_1 = 0;
+  for (std::uint64_t seed = kFirstSeedOfSuite2; seed < kFirstSeedOfSuite2 + 500; ++seed) {
+    const DrawnWorld world = draw_world(seed);
+    if (!contains(world.config.suites, Suite::kAesGcm)) continue;
+    ++by_aes;
+    forbid_suite_1 += world.config.suites.size() == 1 ? 1 : 0;
+    with_older_clients += describe(world).find("older than suite 2") != std::string::npos ? 1 : 0;
+    EXPECT_TRUE(world.sealed());
+  }
+  EXPECT_GT(by_aes, 80);
+  EXPECT_GT(with_older_clients, 15);
+  EXPECT_GT(forbid_suite_1, 15);
+}
+
 TEST(Worlds, ItsRecordedNetworkMakesTheSameWorldAgain) {
   for (std::uint64_t seed = 1; seed <= 8; ++seed) {
     const DrawnWorld world = draw_world(seed);

@@ -24,7 +24,8 @@ class Rogue final : public Guest {
     Role role = Role::kController;
     std::uint64_t seed = 0;
     LocalTime quits{};
-    std::optional<Key> key{};  ///< suite 1
+    std::optional<Key> key{};  ///< all is sealed then
+    Suites suites = {Suite::kNoise};
   };
 
   Rogue(Link& link, const Address& server, const Config& config)
@@ -52,6 +53,7 @@ class Rogue final : public Guest {
     config.hello.name = "rogue";
     config.hello.features = {std::string(kFeatureLocalModel)};
     for (std::byte& b : config.random) b = static_cast<std::byte>(dice_.bits());
+    config.suites = config_.suites;
     if (config_.key) config.secret = {.key = *config_.key, .ephemeral = Ratchet(dice_.bits()).next()};
     handshake_.emplace(config, now);
   }

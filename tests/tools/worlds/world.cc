@@ -62,6 +62,7 @@ World::World(const Config& config, Device& device)
             network.max_observers = config.max_observers;
             network.adapt_state_rate = config.adapt_state_rate;
             network.keys = config.keys;
+            network.suites = config.suites;
             network.rekey = config.rekey;
             network.session_life = config.session_life;
             return network;

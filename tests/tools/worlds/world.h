@@ -60,8 +60,11 @@ class World {
     Mailboxes::Capacities mail{.steps = 16, .flight = 2048, .datagrams = 1};
     std::size_t max_observers = 8;
     bool adapt_state_rate = false;
-    std::vector<ClientKey> keys{};  ///< of those who may come in, by suite 1; empty: everybody, by suite 0
-    Rekey rekey{};                  ///< of what the server says
+    std::vector<ClientKey> keys{};  ///< of those who may come in; empty: everybody, by suite 0
+    /// Of the server and of the clients that have a key. Suite 2 takes a processor with AES; a world of suite 1 is the
+    /// same on all.
+    Suites suites = {Suite::kNoise};
+    Rekey rekey{};                                   ///< of what the server says
     Duration session_life = Session::Config{}.life;  ///< by the server
 
     static Network::Weather bad();

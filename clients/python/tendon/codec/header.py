@@ -19,19 +19,20 @@ class DatagramType(IntEnum):
 
 
 class Suite(IntEnum):
-    """How a conversation is protected; chosen by the client in its first Hello."""
+    """How a datagram is protected."""
 
     PLAIN = 0  # not at all: loopback only
     NOISE = 1  # Noise_NNpsk0_25519_ChaChaPoly_SHA256
+    AES_GCM = 2  # the handshake of suite 1, and AES-256-GCM from then on: Data only
 
 
 @dataclass(frozen=True, slots=True)
 class Header:
-    """The 16 bytes in the clear at the front of every datagram; suite 1 authenticates them."""
+    """The 16 bytes in the clear at the front of every datagram; suites 1 and 2 authenticate them."""
 
     type: DatagramType
     suite: Suite = Suite.PLAIN
-    epoch: int = 0  # how often the sender has renewed its key, modulo 256; Data of suite 1 only
+    epoch: int = 0  # how often the sender has renewed its key, modulo 256; Data of suites 1 and 2 only
     connection_id: int = 0  # 0 before the server has given one
     packet_number: int = 0  # 0, 1, 2 … per direction in Data, 0 in all others
 
@@ -58,6 +59,8 @@ def decode_header(datagram: bytes) -> Header | None:
     suite = _SUITES.get(suite_number)
     if magic != _MAGIC or kind is None or suite is None:
         return None
-    if epoch != 0 and (suite is Suite.PLAIN or kind is not DatagramType.DATA):
+    if kind is not DatagramType.DATA and (epoch != 0 or suite is Suite.AES_GCM):
+        return None
+    if epoch != 0 and suite is Suite.PLAIN:
         return None
     return Header(kind, suite, epoch, connection_id, packet_number)

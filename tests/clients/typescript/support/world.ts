@@ -9,13 +9,14 @@ import { ForceClient, type ClientConfig } from "../../../../clients/typescript/s
 import {
   Code, Mode, type DeviceState, type ForceCommand, type Grant, type Hello, type Refused, type Request, type Welcome,
 } from "../../../../clients/typescript/src/messages.js";
-import { keyId } from "../../../../clients/typescript/src/noise.js";
-import { NoiseSeal, PlainSeal, type Seal } from "../../../../clients/typescript/src/seal.js";
+import { keyId, keyOfSuite2 } from "../../../../clients/typescript/src/noise.js";
+import { NoiseSeal, PlainSeal } from "../../../../clients/typescript/src/seal.js";
 import { Session } from "../../../../clients/typescript/src/session.js";
+import { kFeatureAesGcm } from "../../../../clients/typescript/src/suites.js";
 import { fromMilliseconds, kNever, kSecond, type Nanoseconds } from "../../../../clients/typescript/src/time.js";
 import { ascii } from "./bytes.js";
 import { Random } from "./random.js";
-import { readMessage1 } from "./responder.js";
+import { readMessage1, type Answered } from "./responder.js";
 
 export interface Weather {
   readonly loss: number;
@@ -58,8 +59,10 @@ export interface ServerConduct {
   refuse: Refused | undefined;
   features: string[];
   grants: readonly Grant[];
-  /** Suite 1 with this key; undefined: suite 0. */
+  /** Sealed with this key; undefined: suite 0. */
   key: Uint8Array | undefined;
+  /** … by suite 2, where it is offered. */
+  aes: boolean;
   /** When it renews its key, so often that a test sees it. */
   renewAfter: { datagrams: bigint; time: Nanoseconds };
   state: (tick: bigint) => DeviceState;
@@ -82,6 +85,7 @@ export class Server {
     features: ["local-model"],
     grants: [],
     key: undefined,
+    aes: false,
     renewAfter: NoiseSeal.kRenewAfter,
     every: 1n,
     answer: () => ({ code: Code.OK, detail: "done" }),
@@ -154,7 +158,9 @@ export class Server {
     if (!hello) return;
     this.hellos.push({ datagram, hello });
 
-    const answer = refuse ?? { ...kWelcome, features, role: hello.role, grants };
+    const aes = this.conduct.aes && hello.features.includes(kFeatureAesGcm);
+    const agreed = aes ? [kFeatureAesGcm, ...features] : features;
+    const answer = refuse ?? { ...kWelcome, features: agreed, role: hello.role, grants };
     const finished = noise?.answer(this.random.bytes(32), encodeAnswerMessage(answer));
     const connectionId = refuse ? 0 : this.#nextId++;
     const content = finished?.message2 ?? encodeAnswerMessage(answer);
@@ -163,11 +169,20 @@ export class Server {
       datagram: encodeAnswer({ suite: datagram.suite, connectionId, random: datagram.random, content }),
     };
     if (!refuse) {
-      const seal: Seal = finished ? new NoiseSeal(finished, this.clock(now), renewAfter) : new PlainSeal();
+      const seal = finished ? sealOf(finished, aes, this.clock(now), renewAfter) : new PlainSeal();
       this.session = new Session({ connectionId, seal }, this.clock(now));
     }
     send(this.#answered.datagram);
   }
+}
+
+function sealOf(
+  { sendKey, receiveKey, hash }: Answered, aes: boolean, now: Nanoseconds, renewAfter: ServerConduct["renewAfter"],
+): NoiseSeal {
+  const keys = aes
+    ? { sendKey: keyOfSuite2(sendKey, hash), receiveKey: keyOfSuite2(receiveKey, hash) }
+    : { sendKey, receiveKey };
+  return new NoiseSeal(keys, now, renewAfter, aes ? CipherSuite.AesGcm : CipherSuite.Noise);
 }
 
 export class World {

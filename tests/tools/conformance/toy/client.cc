@@ -32,6 +32,7 @@ void ToyClient::begin() {
   hello.set_version_max(1);
   if (!is(Fault::kNoRole)) hello.set_role(role_);
   hello.set_name("toy");
+  if (key_ && !is(Fault::kKnowsNoAes)) hello.add_features(std::string(kAesGcm));
   const Sixteen random{std::byte{0xAA}, is(Fault::kRandomStays) ? std::byte{1} : std::byte{attempts_}};
   const Key ephemeral = key_from(is(Fault::kRandomStays) ? 100 : static_cast<std::uint8_t>(100 + attempts_));
   attempt_.emplace(key_, bytes_of(hello), random, ephemeral);
@@ -83,7 +84,7 @@ void ToyClient::settle(LocalTime now, Span datagram) {
                     welcome.role() != 0 && welcome.max_force_n() >= 0;
   if (welcome.version() != 1 && !(is(Fault::kTakesAnyVersion) && good)) return;
   if (!good && !is(Fault::kTakesBadWelcome)) return;
-  session_.emplace(key_ && head->suite == 1 ? 1 : 0, head->connection_id, answered->client_to_server,
+  session_.emplace(key_ && head->suite == 1 ? answered->suite : 0, head->connection_id, answered->client_to_server,
                    answered->server_to_client, fault_, now);
 }
 

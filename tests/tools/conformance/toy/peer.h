@@ -44,6 +44,8 @@ enum class Fault : std::uint8_t {
   kNoTimeout,
   kAnythingIsALifeSign,
   kBodyIsNoMessage,
+  kKnowsNoAes,
+  kLittleEndianNonce,  ///< in suite 2
   // A server's.
   kLongRetry,
   kTwoRetries,

@@ -112,7 +112,7 @@ void ToyServer::greet(LocalTime now, int port, Span datagram) {
   const bool knows_channels = !is(Fault::kKnowsNoChannels);
   if (knows_channels && !claims_good(hello) && !is(Fault::kGrantsAnything))
     return refuse(port, *greeting, pb::CODE_INVALID);
-  pb::Answer yes = welcome_to(hello, version);
+  pb::Answer yes = welcome_to(hello, version, !plain && !is(Fault::kKnowsNoAes));
   if (knows_channels) {
     if (std::ranges::count(hello.features(), "channels") > 0) yes.mutable_welcome()->add_features("channels");
     for (const pb::Claim& claim : hello.claims()) yes.mutable_welcome()->add_grants()->set_role(claim.role());
@@ -139,7 +139,7 @@ void ToyServer::greet(LocalTime now, int port, Span datagram) {
       .role = hello.role(),
       .random = random,
       .answer = answered.datagram,
-      .session = ToySession(head->suite, id, answered.server_to_client, answered.client_to_server, fault_, now),
+      .session = ToySession(answered.suite, id, answered.server_to_client, answered.client_to_server, fault_, now),
       .open = false,
       .waiting = {},
       .answered = {}};
@@ -234,13 +234,13 @@ std::optional<pb::Frame> ToyServer::report(LocalTime now, Member& member) const 
 
 void ToyServer::receive(LocalTime now, int port, Span datagram) {
   const auto head = read_head(datagram);
-  if (!head || head->magic != 0x54 || head->version != 1 || head->suite > 1) {
+  if (!head || head->magic != 0x54 || head->version != 1 || head->suite > 2) {
     if (!is(Fault::kTakesForeignHeaders) || !head) return;
   }
   if (head->type == kHelloType) return greet(now, port, datagram);
   for (Member& member : members_) {
     if (member.session.connection_id() != head->connection_id) continue;
-    const bool roams = head->suite == 1 || is(Fault::kRoamsByAnything);
+    const bool roams = head->suite != 0 || is(Fault::kRoamsByAnything);
     if (!roams && member.port != port) return;
     const auto content = member.session.receive(now, datagram);
     if (!content) return;

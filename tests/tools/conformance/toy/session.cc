@@ -5,6 +5,8 @@
 #include <limits>
 #include <utility>
 
+#include "core/base/bytes.h"
+
 namespace tendon::conformance {
 
 using std::chrono::milliseconds;
@@ -44,6 +46,12 @@ ToySession::ToySession(std::uint8_t suite, std::uint32_t connection_id, const Ke
       fault_(fault),
       last_heard_(now) {}
 
+SealingKey ToySession::sealing(const Key& key) const { return {suite_ == 2 ? Suite::kAesGcm : Suite::kNoise, key}; }
+
+Key ToySession::renewed(const Key& key) const {
+  return suite_ == 2 ? crypto::AesGcm(key).renewed() : crypto::renewed(key);
+}
+
 bool ToySession::good_header(const Head& head) const {
   if (is(Fault::kTakesForeignHeaders)) return head.connection_id == connection_id_ && head.number < 1ULL << 60;
   return head.magic == 0x54 && head.version == 1 && head.type == kDataType && head.suite == suite_ &&
@@ -65,7 +73,7 @@ std::optional<Bytes> ToySession::open(LocalTime now, const Head& head, Span data
   const auto ahead = static_cast<std::uint8_t>(head.epoch - receive_epoch_);
   Key key = receive_;
   if (ahead == 1 && !is(Fault::kDoesNotFollowRekey)) {
-    key = crypto::renewed(receive_);
+    key = renewed(receive_);
   } else if (ahead == 0xFF && previous_ && !is(Fault::kNoOverlap)) {
     key = *previous_;
   } else if (ahead != 0) {
@@ -73,7 +81,7 @@ std::optional<Bytes> ToySession::open(LocalTime now, const Head& head, Span data
   }
   Bytes text(datagram.size() - kHeadSize - crypto::kTagSize);
   const Span sealed = datagram.subspan(kHeadSize);
-  if (!crypto::open(key, head.number, datagram.first(kHeadSize), sealed, text)) {
+  if (!sealing(key).open(head.number, datagram.first(kHeadSize), sealed, text)) {
     if (is(Fault::kTakesForged)) return Bytes();
     return std::nullopt;
   }
@@ -139,8 +147,8 @@ Bytes ToySession::say(LocalTime now, const std::vector<pb::Frame>& frames) {
     echo.set_received_mask(is(Fault::kEmptyMask) ? 0 : mask);
   }
   for (const pb::Frame& frame : frames) *body.add_frames() = frame;
-  if (suite_ == 1 && !is(Fault::kNeverRenews) && now - renewed_ >= seconds(600)) {
-    send_ = crypto::renewed(send_);
+  if (suite_ != 0 && !is(Fault::kNeverRenews) && now - renewed_ >= seconds(600)) {
+    send_ = renewed(send_);
     ++send_epoch_;
     renewed_ = now;
   }
@@ -151,7 +159,13 @@ Bytes ToySession::say(LocalTime now, const std::vector<pb::Frame>& frames) {
                             .number = next_});
   const Bytes text = is(Fault::kBodyIsNoMessage) && frames.empty() && next_ % 2 == 1 ? from_hex("ff") : bytes_of(body);
   Bytes sealed(text.size() + crypto::kTagSize);
-  crypto::seal(send_, next_, head, text, sealed);
+  std::uint64_t number = next_;
+  if (is(Fault::kLittleEndianNonce)) {
+    auto bytes = little_endian(number);
+    std::ranges::reverse(bytes);
+    number = get_little_endian<std::uint64_t>(bytes.data());
+  }
+  sealing(send_).seal(number, head, text, sealed);
   next_ += is(Fault::kSkipsNumbers) && next_ == 3 ? 2 : 1;
   last_sent_ = now;
   return head + (suite_ == 0 ? text : sealed);

@@ -6,6 +6,7 @@
 #include <set>
 #include <vector>
 
+#include "protocol/secrets/seal.h"
 #include "tests/tools/conformance/toy/peer.h"
 
 namespace tendon::conformance {
@@ -32,6 +33,8 @@ class ToySession {
   bool closed = false;
 
  private:
+  SealingKey sealing(const Key& key) const;
+  Key renewed(const Key& key) const;
   bool good_header(const Head& head) const;
   bool seen(std::uint64_t number) const;
   std::optional<Bytes> open(LocalTime now, const Head& head, Span datagram);

@@ -1,0 +1,43 @@
+# SPDX-License-Identifier: Apache-2.0
+"""AES-256-GCM for cipher suite 2. The only module that knows `cryptography` (OpenSSL): PyNaCl has no AES. Without that
+package there is no suite 2."""
+
+from __future__ import annotations
+
+try:
+    from cryptography.exceptions import InvalidTag
+    from cryptography.hazmat.primitives.ciphers.aead import AESGCM
+except ImportError:
+    AVAILABLE = False
+else:
+    AVAILABLE = True
+
+TAG_SIZE = 16
+
+
+class AesGcm:
+    """One key, whose schedule is computed once."""
+
+    def __init__(self, key: bytes) -> None:
+        self._aes = AESGCM(key)
+
+    def seal(self, number: int, associated: bytes, plain: bytes) -> bytes:
+        return self._aes.encrypt(_nonce(number), plain, associated)
+
+    def unseal(self, number: int, associated: bytes, sealed: bytes) -> bytes | None:
+        """None when it is not authentic."""
+        if len(sealed) < TAG_SIZE:  # it would raise something else
+            return None
+        try:
+            return self._aes.decrypt(_nonce(number), sealed, associated)
+        except InvalidTag:
+            return None
+
+    def renewed(self) -> AesGcm:
+        """REKEY(key) of Noise: the next key, from which this one cannot be computed."""
+        return AesGcm(self.seal(2**64 - 1, b"", bytes(32))[:32])
+
+
+def _nonce(number: int) -> bytes:
+    """That of Noise's AESGCM: unlike ChaChaPoly's, it has the highest byte first."""
+    return bytes(4) + number.to_bytes(8, "big")

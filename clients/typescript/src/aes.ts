@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: Apache-2.0
+// AES-256-GCM of suite 2, in Node only. WebCrypto would do, but it answers by promises; and AES in plain JavaScript tells
+// of the key by the time that it takes. So pages speak suite 1.
+import { concat } from "./datagram.js";
+
+/** Node 20.16 or newer; undefined elsewhere. */
+const crypto = globalThis.process?.getBuiltinModule?.("node:crypto");
+export const kHasAes = crypto !== undefined;
+
+const kTagSize = 16;
+const kCipher = "aes-256-gcm";
+/** The nonce of REKEY. */
+const kMaxNonce = 0xffff_ffff_ffff_ffffn;
+
+/** 4 zeros, then the number: big-endian, unlike suite 1's. */
+function nonce(number: bigint): Uint8Array {
+  const bytes = new Uint8Array(12);
+  new DataView(bytes.buffer).setBigUint64(4, number);
+  return bytes;
+}
+
+/** One key of suite 2. Only where kHasAes. */
+export class AesKey {
+  readonly #key;
+
+  constructor(key: Uint8Array) {
+    this.#key = crypto!.createSecretKey(key);
+  }
+
+  /** Ciphertext and tag. */
+  encrypt(number: bigint, header: Uint8Array, plain: Uint8Array): Uint8Array {
+    const cipher = crypto!.createCipheriv(kCipher, this.#key, nonce(number), { authTagLength: kTagSize });
+    cipher.setAAD(header);
+    return concat(cipher.update(plain), cipher.final(), cipher.getAuthTag());
+  }
+
+  /** Undefined when it is not authentic. */
+  decrypt(number: bigint, header: Uint8Array, sealed: Uint8Array): Uint8Array | undefined {
+    if (sealed.length < kTagSize) return undefined;
+    const decipher = crypto!.createDecipheriv(kCipher, this.#key, nonce(number), { authTagLength: kTagSize });
+    decipher.setAAD(header);
+    decipher.setAuthTag(sealed.subarray(sealed.length - kTagSize));
+    const plain = decipher.update(sealed.subarray(0, sealed.length - kTagSize));
+    try {
+      return concat(plain, decipher.final());
+    } catch {
+      return undefined;
+    }
+  }
+
+  /** The key that follows this one, from which this one cannot be computed. */
+  rekey(): AesKey {
+    return new AesKey(this.encrypt(kMaxNonce, new Uint8Array(0), new Uint8Array(32)).slice(0, 32));
+  }
+}
