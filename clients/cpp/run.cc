@@ -240,6 +240,7 @@ template <typename Callback>
 int run_with(const Options& options, const std::map<std::string, Callback>& callbacks, const Beside& beside = {}) {
   try {
     const StopSignals signals;
+    const Punctual punctual;
     const LocalTime start = read_clock();
     const LocalTime end = options.duration > Duration::zero() ? start + options.duration : LocalTime::max();
     std::deque<Guest> guests;
@@ -267,6 +268,8 @@ int run_with(const Options& options, const std::map<std::string, Callback>& call
         if (answered || now >= quiet) quiet = now + options.silence;
         next = std::min(next, quiet);
       }
+      now = read_clock();  // the turns have taken their time
+      if (now >= next) continue;
       UdpTransport::wait_for_any(transports, std::min(next - now, kLongestWait),
                                  beside.elsewhere != nullptr ? beside.elsewhere->descriptor() : -1);
       now = read_clock();

@@ -89,7 +89,7 @@ std::size_t UdpTransport::receive(Address& from, std::span<std::byte> buffer) {
   return 0;
 }
 
-LocalTime UdpTransport::received_by(LocalTime now) const { return std::max(now, read_clock()); }
+LocalTime UdpTransport::present(LocalTime now) const { return std::max(now, read_clock()); }
 
 int UdpTransport::descriptor() const { return socket_->socket.native_handle(); }
 

@@ -41,7 +41,7 @@ class UdpTransport : public Link {
   std::size_t receive(Address& from, std::span<std::byte> buffer) override;
 
   /// The time by std::chrono::steady_clock, as run() passes it.
-  LocalTime received_by(LocalTime now) const override;
+  LocalTime present(LocalTime now) const override;
 
   /// The socket's file descriptor, for a caller that sleeps on other things too: poll() says when it can be read. Another
   /// one after look_up_again().
