@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "clients/cpp/machine.h"
 
+#include <sched.h>
 #include <sys/prctl.h>
 #include <sys/random.h>
 
@@ -10,6 +11,11 @@
 namespace tendon {
 
 LocalTime read_clock() { return LocalTime(std::chrono::steady_clock::now().time_since_epoch()); }
+
+bool has_one_processor() {
+  cpu_set_t allowed;
+  return sched_getaffinity(0, sizeof allowed, &allowed) == 0 && CPU_COUNT(&allowed) == 1;
+}
 
 Punctual::Punctual() noexcept : slack_ns_(::prctl(PR_GET_TIMERSLACK, 0UL, 0UL, 0UL, 0UL)) {
   ::prctl(PR_SET_TIMERSLACK, 1UL, 0UL, 0UL, 0UL);

@@ -14,6 +14,9 @@ namespace tendon {
 /// Thread-safe.
 LocalTime read_clock();
 
+/// Whether this process may run on one processor only.
+bool has_one_processor();
+
 /// While it lives, the calling thread is woken from a sleep when it is over, and not up to 50 µs later as the kernel
 /// allows itself by default (timer slack). Afterwards as before. To be made and destroyed on one thread.
 class Punctual {

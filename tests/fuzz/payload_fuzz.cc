@@ -5,7 +5,7 @@
 #include "tests/protocol/wire/told.h"
 
 // What an honest key says that its holder should not: the input is sealed as the peer would, and a session takes it.
-// What is read of it by hand is what protobuf alone would read.
+// Both ways of reading it agree: by hand, and by protobuf alone.
 
 using namespace tendon;
 

@@ -84,6 +84,33 @@ TEST(Sleeps, AGuestSleepsOnceForEachStateThatItAnswers) {
   EXPECT_LE(slept, forces + kOthers) << "a sleep between a state and its force would double them";
 }
 
+TEST(Sleeps, ABusyGuestNeverSleepsAndStillEndsInTime) {
+  Server server;
+  Options options = wall_at(server);
+  options.busy = true;
+  const std::uint64_t before = sleeps();
+  ASSERT_EQ(run(options, push), 0);
+  const std::uint64_t slept = sleeps() - before;
+  ASSERT_GT(server.forces(), 20U);
+  EXPECT_LE(slept, 10U) << "none for a state: these are of the start and the end";
+}
+
+TEST(Sleeps, ABusyGuestHasItsTimersServed) {
+  Options options;
+  options.client.name = "wall";
+  options.server = "127.0.0.1:9";  // nobody is there
+  options.client.patience = options.client.retry_min = options.client.retry_max = milliseconds(5);
+  options.duration = milliseconds(200);
+  options.busy = true;
+  options.silence = milliseconds(10);
+  int silences = 0;
+  options.on_silence = [&](LocalTime /*now*/) { ++silences; };
+  const std::uint64_t before = sleeps();
+  EXPECT_EQ(run(options, push), 1);
+  EXPECT_LE(sleeps() - before, 10U);
+  EXPECT_GE(silences, 2);
+}
+
 TEST(Sleeps, TheThreadHasItsTimerSlackBackAfterwards) {
   const int before = ::prctl(PR_GET_TIMERSLACK, 0UL, 0UL, 0UL, 0UL);
   ASSERT_GT(before, 1);
