@@ -67,7 +67,7 @@ std::optional<Connection::Event> Connection::receive(LocalTime& now) {
     return {};
   }
   more_ = --left_ == 0;
-  now = link_.received_by(now);
+  now = link_.present(now);
   if (from != server_) {
     ++strangers_;
     return {};

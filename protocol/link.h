@@ -52,11 +52,11 @@ class Link {
   /// A datagram larger than the buffer is cut, and its full size returned, so that the caller can tell.
   virtual std::size_t receive(Address& from, std::span<std::byte> buffer) = 0;
 
-  /// A time, not before `now`, by which the datagram that receive() has just returned had certainly arrived. When a
-  /// turn is preempted after it has read `now`, it may find datagrams that arrived later. With `now` as their time of
-  /// arrival their round trip would look too short, and ClockOffsetEstimator trusts the shortest round trips most. A
-  /// link without a clock returns `now`.
-  virtual LocalTime received_by(LocalTime now) const { return now; }
+  /// The present time, never before `now`: a turn reads it when it may have become later than it believes. When a turn
+  /// is preempted after it has read `now`, it may find datagrams that arrived later. With `now` as their time of arrival
+  /// their round trip would look too short, and ClockOffsetEstimator trusts the shortest round trips most. An engine
+  /// that a turn calls may take its time, too. A link without a clock returns `now`.
+  virtual LocalTime present(LocalTime now) const { return now; }
 };
 
 }  // namespace tendon

@@ -99,7 +99,7 @@ bool NetworkLoop::drain(LocalTime& now) {
     Address from;
     const std::size_t size = link_.receive(from, buffer);
     if (size == 0) return false;
-    now = link_.received_by(now);
+    now = link_.present(now);
     const auto datagram = std::span(buffer).first(std::min(size, buffer.size()));
     if (size > buffer.size()) {
       ++stats_.malformed;

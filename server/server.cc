@@ -171,6 +171,17 @@ std::unique_ptr<Announcer> announcer_of(const std::vector<Scene>& scenes, const 
   });
 }
 
+/// Throws std::runtime_error, a sentence for the operator, when the machine has no processor for a thread that never
+/// sleeps.
+const std::vector<Scene>& checked(const std::vector<Scene>& scenes) {
+  if (scenes.front().network.busy && processors_allowed() == 1) {
+    throw std::runtime_error(
+        "[network] busy = true takes a whole processor, and this server may run on one only: nothing else would get "
+        "its turn");
+  }
+  return scenes;
+}
+
 std::string haptic_name(const Scene& scene) { return "haptic-" + std::to_string(scene.loop.device); }
 
 /// Throws std::runtime_error, a sentence for the operator, when the system refuses the thread.
@@ -267,10 +278,11 @@ NetworkLoop::Config Server::network_config(const DeviceRuntimes& devices) {
 
 Server::Server(const std::vector<Scene>& scenes)
     : started_(clock::now()),
-      guardian_(make_guardian(scenes)),
+      guardian_(make_guardian(checked(scenes))),
       devices_(runtimes_of(scenes, guardian_.get())),
       link_(scenes.front().network.listen, scenes.front().network.keys ? Reach::kAnywhere : Reach::kThisMachine),
-      network_(network_config(devices_), link_, mail_of(devices_)),
+      network_(network_config(devices_), scenes.front().network.busy ? static_cast<Link&>(busy_link_) : link_,
+               mail_of(devices_)),
       tell_next_(started_ + kTellPeriod) {
   announcer_ = announcer_of(scenes, link_.local_address());
   recorder_ = recorder_of(scenes, started_);  // last, so that a refusal before it leaves no file behind
@@ -373,15 +385,28 @@ void Server::run_haptic(DeviceRuntime& runtime) {
 void Server::run_network() {
   name_thread("network");
   enter_punctual();
+  const bool busy = devices_.front()->scene.network.busy;
   LocalTime due = clock::now();
   while (!stop_network_.load(std::memory_order_acquire)) {
     const LocalTime before = clock::now();
-    if (due > before) link_.wait(std::min<Duration>(due - before, std::chrono::seconds(1)), &stepped_);
+    if (busy) {
+      watch_until(due);
+    } else if (due > before) {
+      link_.wait(std::min<Duration>(due - before, std::chrono::seconds(1)), &stepped_);
+    }
     due = network_.turn(clock::now());
     tell_notices();
   }
   network_.close(clock::now());
   tell_notices();
+}
+
+/// Until a datagram can be received, the doorbell rings, or it is `due`; without a sleep.
+void Server::watch_until(LocalTime due) {
+  LocalTime now = clock::now();
+  while (now < due && !stepped_.rung() && !busy_link_.look(now)) {
+  }
+  if (stepped_.rung()) stepped_.answer();
 }
 
 void Server::tell_notices() {

@@ -17,6 +17,7 @@
 #include "devices/device.h"
 #include "devices/safety/guardian.h"
 #include "devices/safety/safe_device.h"
+#include "protocol/busy_link.h"
 #include "server/guests/health.h"
 #include "server/haptic_loop.h"
 #include "server/machine/announcer.h"
@@ -116,6 +117,7 @@ class Server {
   void end_threads();  ///< those that run: the haptic ones first, with zero force
   void run_haptic(DeviceRuntime& runtime);
   void run_network();
+  void watch_until(LocalTime due);
   void tell_notices();
   void run_log();
   void drain_to_recorder(LocalTime now);
@@ -132,6 +134,7 @@ class Server {
   std::unique_ptr<Guardian> guardian_;  ///< of real devices; null when there are none
   DeviceRuntimes devices_;
   UdpLink link_;
+  BusyLink busy_link_{link_};  ///< used where the scene says `busy`
   Doorbell stepped_;
   NetworkLoop network_;
   std::unique_ptr<Announcer> announcer_;    ///< null when no scene is announced

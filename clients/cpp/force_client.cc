@@ -69,6 +69,7 @@ ForceClient::Phase phase_after(const Connection::Ended& ended) {
 
 ForceClient::ForceClient(Link& link, const Address& server, const Config& config, Role role, LocalTime now)
     : config_(checked(config)),
+      link_(link),
       role_(role),
       period_(config.rate_hz > 0 ? from_seconds(1 / config.rate_hz) : Duration::zero()),
       connection_(link, server,
@@ -150,15 +151,16 @@ bool ForceClient::give_lease() {
 
 LocalTime ForceClient::turn(LocalTime now) {
   if (stats_.phase == Phase::kStopped) return LocalTime::max();
-  connection_.flush(now);  // the force of the last turn waits for no system call
+  connection_.flush(now);  // an answer() since the last turn waits for no system call
   connection_.begin_turn();
   const LocalTime begun = now;  // what is read moves `now` on to when it was read
   while (const auto event = connection_.next(now)) take(now, *event);
   if (connection_.session() != nullptr && now >= ask_lease_ && !asked_lease_ && !take_lease()) {
     ask_lease_ = now + kAskLeaseAgain;
   }
-  connection_.flush(now);
-  return call(now) || connection_.more() ? begun : next_turn();
+  connection_.flush(now);  // nothing that is due waits for the engine
+  if (call(now)) connection_.flush(link_.present(now));
+  return connection_.more() ? begun : next_turn();
 }
 
 void ForceClient::stop(LocalTime now) {
@@ -319,7 +321,7 @@ std::optional<DeviceState> ForceClient::due_state(LocalTime now) {
   return state;
 }
 
-/// True when a force now waits to be sent.
+/// True when the engine has answered: a force may wait to be sent.
 bool ForceClient::call(LocalTime now) {
   if (now < next_call_ || (physics_ && !holds_)) return false;
   std::optional<DeviceState> due = due_state(now);

@@ -167,9 +167,9 @@ class ForceClient {
   /// force.
   ForceClient(Link& link, const Address& server, const Config& config, Watch watch, LocalTime now);
 
-  /// Does everything due at `now` and returns the latest time for the next call; call earlier when a
-  /// datagram arrives. The callback's exceptions pass through, after a Bye
-  /// to the server.
+  /// Does everything due at `now` and returns the latest time for the next call; call earlier when a datagram arrives.
+  /// A force leaves in the turn that has computed it. The callback may have taken its time: read the clock again
+  /// before a sleep until then. The callback's exceptions pass through, after a Bye to the server.
   LocalTime turn(LocalTime now);
 
   /// Shows the callback the newest state once more, in the next turn: for an engine whose answer has changed since it saw
@@ -270,6 +270,7 @@ class ForceClient {
   LocalTime next_turn() const;
 
   Config config_;
+  Link& link_;
   Role role_;
   Physics physics_;  ///< the controller's callback
   Watch watch_;      ///< the observer's callback

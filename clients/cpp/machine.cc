@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "clients/cpp/machine.h"
 
+#include <sched.h>
+#include <sys/prctl.h>
 #include <sys/random.h>
 
 #include <chrono>
@@ -9,6 +11,19 @@
 namespace tendon {
 
 LocalTime read_clock() { return LocalTime(std::chrono::steady_clock::now().time_since_epoch()); }
+
+bool has_one_processor() {
+  cpu_set_t allowed;
+  return sched_getaffinity(0, sizeof allowed, &allowed) == 0 && CPU_COUNT(&allowed) == 1;
+}
+
+Punctual::Punctual() noexcept : slack_ns_(::prctl(PR_GET_TIMERSLACK, 0UL, 0UL, 0UL, 0UL)) {
+  ::prctl(PR_SET_TIMERSLACK, 1UL, 0UL, 0UL, 0UL);
+}
+
+Punctual::~Punctual() {
+  if (slack_ns_ > 0) ::prctl(PR_SET_TIMERSLACK, static_cast<unsigned long>(slack_ns_), 0UL, 0UL, 0UL);
+}
 
 Seed seed_from_system() {
   Seed seed;

@@ -110,6 +110,8 @@ CommandLine::CommandLine(std::string purpose, Options& options)
          "--duration-s", [&](double s) { options.duration = from_seconds(s); }, "Stop after this time; 0 = at Ctrl-C")
       ->default_str("0")
       ->check(number(0, kMaxDurationS));
+  app.add_flag("--busy", options.busy,
+               "Never sleep: answers some 10 to 50 µs sooner, for a whole processor all the time");
   app.add_flag("--json", options.json, "One JSON object per line on stdout");
 }
 

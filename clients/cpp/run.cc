@@ -16,6 +16,7 @@
 #include "clients/cpp/machine.h"
 #include "clients/cpp/stop_signals.h"
 #include "clients/cpp/udp_transport.h"
+#include "protocol/busy_link.h"
 
 namespace tendon {
 namespace {
@@ -43,7 +44,8 @@ class Guest {
         device_(device),
         who_(options.client.name + (device.empty() ? "" : " at " + device)),
         transport_(options.server, options.client.key.has_value()),
-        client_(transport_, transport_.server(), config(options, device), std::move(callback), start) {}
+        client_(options.busy ? static_cast<Link&>(busy_) : transport_, transport_.server(), config(options, device),
+                std::move(callback), start) {}
   Guest(const Guest&) = delete;
   Guest& operator=(const Guest&) = delete;
 
@@ -58,6 +60,8 @@ class Guest {
   bool end(LocalTime now, Duration duration);
 
   UdpTransport& transport() { return transport_; }
+  /// With Options::busy: whether a datagram can be received. `now` becomes the present time.
+  bool look(LocalTime& now) { return busy_.look(now); }
 
  private:
   ForceClient::Config config(const Options& options, const std::string& device) const;
@@ -72,6 +76,7 @@ class Guest {
   std::string device_;
   std::string who_;
   UdpTransport transport_;
+  BusyLink busy_{transport_};
   ForceClient client_;
 
   std::string said_;
@@ -235,11 +240,26 @@ LocalTime turn_elsewhere(const Beside& beside, Guest& guest, LocalTime now) {
   return answered ? now : beside.elsewhere->next_turn();
 }
 
+/// Until one of the guests can receive, or the file `also` can be read (−1: none), or it is `end`; without a sleep.
+LocalTime watch(std::deque<Guest>& guests, int also, LocalTime now, LocalTime end) {
+  while (now < end) {
+    for (Guest& guest : guests) {
+      if (guest.look(now)) return now;
+    }
+    if (also >= 0 && UdpTransport::wait_for_any({}, Duration::zero(), also)) return now;
+  }
+  return now;
+}
+
 /// One session for each callback, by the name of its device; "" is whatever the options name.
 template <typename Callback>
 int run_with(const Options& options, const std::map<std::string, Callback>& callbacks, const Beside& beside = {}) {
   try {
     const StopSignals signals;
+    const Punctual punctual;
+    if (options.busy && has_one_processor()) {
+      std::cerr << options.client.name << ": busy: this machine has one processor, and nothing else gets its turn\n";
+    }
     const LocalTime start = read_clock();
     const LocalTime end = options.duration > Duration::zero() ? start + options.duration : LocalTime::max();
     std::deque<Guest> guests;
@@ -267,9 +287,16 @@ int run_with(const Options& options, const std::map<std::string, Callback>& call
         if (answered || now >= quiet) quiet = now + options.silence;
         next = std::min(next, quiet);
       }
-      UdpTransport::wait_for_any(transports, std::min(next - now, kLongestWait),
-                                 beside.elsewhere != nullptr ? beside.elsewhere->descriptor() : -1);
-      now = read_clock();
+      now = read_clock();  // the turns have taken their time
+      if (now >= next) continue;
+      const Duration wait = std::min(next - now, kLongestWait);
+      const int also = beside.elsewhere != nullptr ? beside.elsewhere->descriptor() : -1;
+      if (options.busy) {
+        now = watch(guests, also, now, now + wait);
+      } else {
+        UdpTransport::wait_for_any(transports, wait, also);
+        now = read_clock();
+      }
     }
     bool all = true;
     for (Guest& guest : guests) all = guest.end(now, now - start) && all;

@@ -16,7 +16,10 @@ struct Options {
   ServerName server = "127.0.0.1:47100";  ///< looked up at the start, and again before each further attempt
   ForceClient::Config client;             ///< `seed` is replaced by one from the system
   Duration duration{};                    ///< ends after this time; 0 = at SIGINT or SIGTERM
-  bool json = false;                      ///< the closing summary as one JSON object on stdout, not as text on stderr
+  /// Never sleeps: a state is answered some 10 to 50 µs sooner, and a whole processor is taken all the time. run() says
+  /// so where there is only one.
+  bool busy = false;
+  bool json = false;  ///< the closing summary as one JSON object on stdout, not as text on stderr
   /// Called with read_clock()'s time (machine.h) whenever `silence` (at least 1 ms) has passed without a state for the
   /// callback, also before the first: what must not go on without a hand stops there. For one device alone.
   std::function<void(LocalTime now)> on_silence{};

@@ -89,7 +89,7 @@ std::size_t UdpTransport::receive(Address& from, std::span<std::byte> buffer) {
   return 0;
 }
 
-LocalTime UdpTransport::received_by(LocalTime now) const { return std::max(now, read_clock()); }
+LocalTime UdpTransport::present(LocalTime now) const { return std::max(now, read_clock()); }
 
 int UdpTransport::descriptor() const { return socket_->socket.native_handle(); }
 
@@ -98,7 +98,7 @@ void UdpTransport::wait(Duration timeout) {
   wait_for_any({&alone, 1}, timeout);
 }
 
-void UdpTransport::wait_for_any(std::span<UdpTransport* const> transports, Duration timeout, int also) {
+bool UdpTransport::wait_for_any(std::span<UdpTransport* const> transports, Duration timeout, int also) {
   std::vector<pollfd> readable;
   if (also >= 0) readable.push_back({also, POLLIN, 0});
   for (UdpTransport* const transport : transports) {
@@ -107,7 +107,7 @@ void UdpTransport::wait_for_any(std::span<UdpTransport* const> transports, Durat
   const Duration left = std::max(timeout, Duration::zero());
   const auto whole = std::chrono::duration_cast<std::chrono::seconds>(left);
   const timespec time{static_cast<time_t>(whole.count()), static_cast<long>((left - whole).count())};
-  ::ppoll(readable.data(), readable.size(), &time, nullptr);
+  return ::ppoll(readable.data(), readable.size(), &time, nullptr) > 0;
 }
 
 }  // namespace tendon

@@ -41,7 +41,7 @@ class UdpTransport : public Link {
   std::size_t receive(Address& from, std::span<std::byte> buffer) override;
 
   /// The time by std::chrono::steady_clock, as run() passes it.
-  LocalTime received_by(LocalTime now) const override;
+  LocalTime present(LocalTime now) const override;
 
   /// The socket's file descriptor, for a caller that sleeps on other things too: poll() says when it can be read. Another
   /// one after look_up_again().
@@ -50,8 +50,9 @@ class UdpTransport : public Link {
   /// Sleeps until a datagram can be received or `timeout` is over; a signal handler may end it sooner.
   /// A timeout of zero or less does not sleep.
   void wait(Duration timeout);
-  /// The same, until one of `transports` can receive, or the file `also` can be read (−1: none).
-  static void wait_for_any(std::span<UdpTransport* const> transports, Duration timeout, int also = -1);
+  /// The same, until one of `transports` can receive, or the file `also` can be read (−1: none). Whether one of these is
+  /// so.
+  static bool wait_for_any(std::span<UdpTransport* const> transports, Duration timeout, int also = -1);
 
  private:
   struct Socket;  // keeps Asio out of this header

@@ -120,7 +120,7 @@ class ServerSocket : public Link {
     return 0;
   }
 
-  LocalTime received_by(LocalTime now) const override { return std::max(now, clock_()); }
+  LocalTime present(LocalTime now) const override { return std::max(now, clock_()); }
 
   template <class Handler>
   void when_readable(Handler handler) {

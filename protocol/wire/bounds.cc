@@ -38,6 +38,11 @@ bool in_bounds(const RemoteTorque& torque) noexcept {
          (!torque.model || (is_rotation(torque.model->at) && all_bounded(torque.model->stiffness)));
 }
 
+bool in_bounds(const Joints& joints) noexcept {
+  return joints.count <= Joints::kMost && std::ranges::all_of(joints.angle, bounded) &&
+         std::ranges::all_of(joints.velocity, bounded);
+}
+
 bool is_finite(const RemoteTorque& torque) noexcept {
   if (!torque.torque.allFinite()) return false;
   if (!torque.model) return true;
@@ -52,6 +57,29 @@ bool in_bounds(const ForceCommand& command) noexcept {
   return all_bounded(command.force) && (!command.model || in_bounds(*command.model)) &&
          (!command.error || (bounded(*command.error) && *command.error >= 0)) &&
          (!command.torque || in_bounds(*command.torque)) && (!command.grip_force || bounded(*command.grip_force));
+}
+
+bool is_receivable(const ForceCommand& command) noexcept {
+  return command.sequence > 0 && in_bounds(command) && command.valid_for > Duration::zero() &&
+         command.valid_for <= limits::kMaxValidFor && command.device < limits::kMaxDevices &&
+         command.channel < limits::kMaxChannels;
+}
+
+bool in_bounds(const DeviceState& state) noexcept {
+  const auto is_time = [](Duration since) { return since >= -limits::kMaxTime && since <= limits::kMaxTime; };
+  const auto fits = [](const auto& vector) { return !vector || all_bounded(*vector); };
+  const bool unlimited = state.permitted_force == std::numeric_limits<double>::infinity();
+  return is_time(state.sampled.time_since_epoch()) && all_bounded(state.position) && all_bounded(state.velocity) &&
+         all_bounded(state.force_applied) && bounded(state.energy) && (unlimited || bounded(state.permitted_force)) &&
+         state.permitted_force >= 0 && is_time(state.force_age) && state.force_age >= Duration::zero() &&
+         state.mode >= Mode::kIdle && state.mode <= Mode::kFault && state.device < limits::kMaxDevices &&
+         state.channel < limits::kMaxChannels && fits(state.force_wanted) && fits(state.stiffness_wanted) &&
+         (!state.turning ||
+          (is_rotation(state.turning->orientation) && all_bounded(state.turning->angular_velocity))) &&
+         fits(state.torque_applied) &&
+         (!state.grip || (bounded(state.grip->opening) && bounded(state.grip->velocity))) &&
+         (!state.grip_applied || bounded(*state.grip_applied)) && fits(state.hand_force) &&
+         (!state.joints || in_bounds(*state.joints));
 }
 
 bool in_bounds(const SetOutput& wanted) noexcept {

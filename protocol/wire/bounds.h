@@ -19,6 +19,11 @@ inline bool bounded(double value) noexcept { return std::abs(value) <= limits::k
 /// Whether a receiver accepts what `command` says of the force: `force`, `model` and `error` are within their bounds
 /// (WIRE.md).
 bool in_bounds(const ForceCommand& command) noexcept;
+/// … and all else of it: it has a sequence, a validity, and numbers of a device and a channel.
+bool is_receivable(const ForceCommand& command) noexcept;
+
+/// Whether a receiver accepts that state.
+bool in_bounds(const DeviceState& state) noexcept;
 
 /// Whether a receiver accepts that setting; the number of the device is another matter.
 bool in_bounds(const SetOutput& wanted) noexcept;

@@ -14,6 +14,7 @@
 #include "protocol/wire/bounds.h"
 #include "protocol/wire/fields.h"
 #include "protocol/wire/frame_codec.h"
+#include "protocol/wire/hand_codec.h"
 
 namespace tendon {
 namespace {
@@ -51,7 +52,7 @@ pb::Datagram& new_datagram(google::protobuf::Arena& arena) {
 /// One small Datagram for each kind of frame. Protobuf defines the concatenation of two messages as their merge, so a
 /// datagram with several frames is written piece by piece, and each piece keeps its objects for the next datagram.
 struct DataWriter::Pieces {
-  pb::Datagram head, state, force, control, ack, bye, report, device_report, peer_report, port;
+  pb::Datagram state, force, control, ack, bye, report, device_report, peer_report, port;
   pb::Frame& state_frame = *state.add_frames();
   pb::Frame& force_frame = *force.add_frames();
   pb::Frame& control_frame = *control.add_frames();
@@ -68,14 +69,13 @@ DataWriter::~DataWriter() = default;
 DataWriter::DataWriter(DataWriter&&) noexcept = default;
 DataWriter& DataWriter::operator=(DataWriter&&) noexcept = default;
 
+/// Each piece has one frame.
 template <class Piece>
 bool DataWriter::append(const Piece& piece) {
   const std::size_t size = piece.ByteSizeLong();
-  if (size > buffer_.size() - size_ || frames_ + piece.frames_size() > limits::kMaxFrames) return false;
+  if (size > buffer_.size() - size_ || frames_ == limits::kMaxFrames) return false;
   piece.SerializeWithCachedSizesToArray(wire::as_bytes(buffer_.data() + size_));
-  size_ += size;
-  frames_ += piece.frames_size();
-  return true;
+  return count(size);
 }
 
 void DataWriter::begin(std::span<std::byte> buffer, const Header& header, LocalTime sent,
@@ -85,25 +85,33 @@ void DataWriter::begin(std::span<std::byte> buffer, const Header& header, LocalT
   size_ = kHeaderSize;
   frames_ = 0;
 
-  pb::Datagram& head = pieces_->head;
-  head.set_tx_time_ns(sent.time_since_epoch().count());
-  if (echo) {
-    pb::Echo& out = *head.mutable_echo();
-    out.set_peer_tx_time_ns(echo->sent.time_since_epoch().count());
-    out.set_rx_time_ns(echo->received.time_since_epoch().count());
-    out.set_peer_packet_number(echo->packet_number);
-    out.set_received_mask(echo->received_mask);
-  } else {
-    head.clear_echo();
-  }
-  append(head);
+  std::array<std::uint8_t, wire::kMostHead> head;
+  const std::size_t size = wire::write_head(head.data(), sent, echo);
+  if (size > buffer_.size() - size_) return;
+  std::copy_n(head.begin(), size, wire::as_bytes(buffer_.data() + size_));
+  size_ += size;
+}
+
+/// By hand where there is room for any frame; protobuf knows whether this one fits.
+template <class Value>
+std::size_t DataWriter::write_by_hand(const Value& value) noexcept {
+  if (buffer_.size() - size_ < wire::kMostFrame || frames_ == limits::kMaxFrames) return 0;
+  return wire::write_frame(wire::as_bytes(buffer_.data() + size_), value);
 }
 
 bool DataWriter::add(const DeviceState& state) {
+  if (const std::size_t size = write_by_hand(state); size > 0) return count(size);
+  return add_by_protobuf(state);
+}
+bool DataWriter::add(const ForceCommand& command) {
+  if (const std::size_t size = write_by_hand(command); size > 0) return count(size);
+  return add_by_protobuf(command);
+}
+bool DataWriter::add_by_protobuf(const DeviceState& state) {
   wire::write(state, *pieces_->state_frame.mutable_state());
   return append(pieces_->state);
 }
-bool DataWriter::add(const ForceCommand& command) {
+bool DataWriter::add_by_protobuf(const ForceCommand& command) {
   wire::write(command, *pieces_->force_frame.mutable_force());
   return append(pieces_->force);
 }
@@ -151,19 +159,19 @@ DataReader::DataReader(DataReader&&) noexcept = default;
 DataReader& DataReader::operator=(DataReader&&) noexcept = default;
 
 const DataContent* DataReader::read(std::span<const std::byte> body) {
+  return wire::read_by_hand(body, memory_->content) ? &memory_->content : read_by_protobuf(body);
+}
+
+const DataContent* DataReader::read_by_protobuf(std::span<const std::byte> body) {
   memory_->arena.Reset();
   auto& datagram = new_datagram(memory_->arena);
   DataContent& content = memory_->content;
   if (body.size() > kMaxDatagram || !wire::parse(body, datagram) || datagram.frames_size() > limits::kMaxFrames) {
     return nullptr;
   }
+  wire::empty(content);
   if (!wire::read(datagram.tx_time_ns(), content.sent)) return nullptr;
 
-  content.frames.clear();
-  content.invalid = 0;
-  content.forces_not_finite = 0;
-  content.forces_out_of_bounds = 0;
-  content.echo.reset();
   if (datagram.has_echo() && !read_echo(datagram.echo(), content.echo.emplace())) {
     content.echo.reset();
     ++content.invalid;

@@ -21,8 +21,8 @@
 
 namespace tendon {
 
-/// Writes one Data datagram after the other, in the clear. Keeps its protobuf objects: after the first of
-/// its kind, a state or a force costs no heap call (a request, or a long text, does).
+/// Writes one Data datagram after the other, in the clear. States and forces are written by hand (hand_codec.h), all else
+/// by protobuf, which keeps its objects: a state or a force costs no heap call (a request, or a long text, does).
 ///
 /// Use: `begin`, `add` until it is false or nothing is left, then send `size()` bytes.
 ///
@@ -50,12 +50,23 @@ class DataWriter {
   bool add(const PeerReport& report);
   bool add(const PortFrame& port);
 
+  /// The same by protobuf alone: what `add` does with the rare parts of these two frames. It writes the same bytes.
+  bool add_by_protobuf(const DeviceState& state);
+  bool add_by_protobuf(const ForceCommand& command);
+
   std::size_t size() const noexcept { return size_; }
 
  private:
   struct Pieces;
+  template <class Value>
+  std::size_t write_by_hand(const Value& value) noexcept;
   template <class Piece>
   bool append(const Piece& piece);
+  bool count(std::size_t size) noexcept {
+    size_ += size;
+    ++frames_;
+    return true;
+  }
 
   std::unique_ptr<Pieces> pieces_;
   std::span<std::byte> buffer_;
@@ -87,6 +98,8 @@ class DataReader {
   /// `body` is what follows the header. Null when it is malformed: not protobuf, too many frames, or
   /// without a usable tx_time. The content lives until the next call.
   const DataContent* read(std::span<const std::byte> body);
+  /// The same by protobuf alone: what `read` does with all but usual states and forces. It gives the same content.
+  const DataContent* read_by_protobuf(std::span<const std::byte> body);
 
  private:
   struct Memory;

@@ -68,34 +68,41 @@ bool read(bool there, const pb::Vec3& from, std::optional<Vec3>& to) noexcept {
   return !there || read(from, to.emplace());
 }
 
-bool read(const Entries& k, Mat3& to) noexcept {
-  switch (k.size()) {
+bool matrix_of(std::span<const double> entries, Mat3& to) noexcept {
+  switch (entries.size()) {
     case 1:
-      to = k.Get(0) * Mat3::Identity();
+      to = entries[0] * Mat3::Identity();
       return true;
     case 3:
-      to = Vec3(k.Get(0), k.Get(1), k.Get(2)).asDiagonal();
+      to = Vec3(entries[0], entries[1], entries[2]).asDiagonal();
       return true;
     case 9:
-      to = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(k.data());
+      to = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(entries.data());
       return true;
     default:
       return false;
   }
 }
 
-void write(const Mat3& k, Entries& to) {
-  to.Clear();
+std::size_t entries_of(const Mat3& k, std::array<double, 9>& entries) noexcept {
   const bool diagonal = k(0, 1) == 0 && k(0, 2) == 0 && k(1, 0) == 0 && k(1, 2) == 0 && k(2, 0) == 0 && k(2, 1) == 0;
-  if (diagonal && k(0, 0) == k(1, 1) && k(0, 0) == k(2, 2)) {
-    to.Add(k(0, 0));
-  } else if (diagonal) {
-    for (int i = 0; i < 3; ++i) to.Add(k(i, i));
-  } else {
-    for (int row = 0; row < 3; ++row) {
-      for (int column = 0; column < 3; ++column) to.Add(k(row, column));
-    }
+  if (!diagonal) {
+    Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(entries.data()) = k;
+    return 9;
   }
+  entries = {k(0, 0), k(1, 1), k(2, 2)};
+  return k(0, 0) == k(1, 1) && k(0, 0) == k(2, 2) ? 1 : 3;
+}
+
+bool read(const Entries& from, Mat3& to) noexcept {
+  return matrix_of(std::span(from.data(), static_cast<std::size_t>(from.size())), to);
+}
+
+void write(const Mat3& from, Entries& to) {
+  std::array<double, 9> entries{};
+  const std::size_t size = entries_of(from, entries);
+  to.Clear();
+  to.Add(entries.begin(), entries.begin() + size);
 }
 
 static_assert(limits::kMaxJoints == Joints::kMost);
@@ -133,6 +140,12 @@ bool read(std::uint64_t ns, Duration& to) noexcept {
   to = Duration{static_cast<Duration::rep>(ns)};
   return ns <= static_cast<std::uint64_t>(limits::kMaxTime.count());
 }
+std::uint32_t validity_us(Duration valid_for) noexcept {
+  const bool possible = valid_for > Duration::zero() && valid_for <= limits::kMaxValidFor;
+  const auto us = std::chrono::ceil<std::chrono::microseconds>(possible ? valid_for : Duration::zero());
+  return static_cast<std::uint32_t>(us.count());
+}
+
 std::uint64_t unsigned_ns(Duration d) noexcept { return static_cast<std::uint64_t>(d.count()); }
 
 bool read(pb::Mode from, Mode& to) noexcept { return read_enum(from, Mode::kFault, to); }

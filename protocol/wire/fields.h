@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
@@ -32,9 +33,11 @@ bool read(bool there, const pb::Vec3& from, std::optional<Vec3>& to) noexcept;
 
 /// A stiffness of 1, 3 or 9 entries: k·I, its diagonal, or all of it row by row. False for any other number of them;
 /// the entries are for in_bounds.
+bool matrix_of(std::span<const double> entries, Mat3& to) noexcept;
+/// The shortest of the three forms that says the same: how many of `entries` it takes.
+std::size_t entries_of(const Mat3& from, std::array<double, 9>& entries) noexcept;
 using Entries = google::protobuf::RepeatedField<double>;
 bool read(const Entries& from, Mat3& to) noexcept;
-/// The shortest of the three forms that says the same.
 void write(const Mat3& from, Entries& to);
 
 /// The angles and velocities of joints. Missing velocities are 0, those without an angle are left out; no angle: empty.
@@ -48,6 +51,9 @@ bool read(std::int64_t ns, PeerTime& to) noexcept;
 bool read(std::uint64_t ns, Duration& to) noexcept;
 std::uint64_t unsigned_ns(Duration d) noexcept;
 bool in_time(Duration d) noexcept;
+/// How long a force is valid, in µs, rounded up. One out of range becomes 0, which the receiver refuses; a cast would
+/// make it look valid.
+std::uint32_t validity_us(Duration valid_for) noexcept;
 bool read_ms(std::uint32_t from, Duration& to) noexcept;
 /// Rounded up: who waits for so long has waited long enough.
 std::uint32_t in_ms(Duration from) noexcept;

@@ -188,6 +188,29 @@ Finding aes(const fs::path& root) {
           "sealing by AES costs half of that, and less: in a virtual machine, a CPU model that shows the host's AES"};
 }
 
+/// "0-3,5" has five.
+std::optional<std::int64_t> count_of(const std::string& list) {
+  std::int64_t count = 0;
+  std::istringstream ranges(list);
+  for (std::string range; std::getline(ranges, range, ',');) {
+    const auto dash = range.find('-');
+    const auto first = number_of(range.substr(0, dash));
+    const auto last = dash == std::string::npos ? first : number_of(range.substr(dash + 1));
+    if (!first || !last) return {};
+    count += *last - *first + 1;
+  }
+  return count > 0 ? std::optional(count) : std::nullopt;
+}
+
+Finding processors(const fs::path& root) {
+  const auto count = count_of(text_of(root / "sys/devices/system/cpu/online"));
+  if (!count) return {"processors", "unknown", ""};
+  if (*count == 1) {
+    return {"processors", "1", "another one for the network thread and engines; `[network] busy = true` is refused"};
+  }
+  return {"processors", std::to_string(*count) + " (`[network] busy = true` would take one of them all the time)", ""};
+}
+
 double us(Duration time) { return seconds(time) * 1e6; }
 
 nlohmann::ordered_json as_json(const Diagnosis::WakeUps& wakes) {
@@ -217,8 +240,9 @@ Diagnosis::WakeUps measure_wake_ups(const WakeUpClock& clock, Duration period, s
 }
 
 std::vector<Diagnosis::Finding> look_around(const fs::path& root) {
-  return {kernel(root),      tick(root),      machine(root), governor(root),   priority_limit(root), memory_limit(root),
-          autosuspend(root), isolation(root), sleep(root),   throttling(root), slack(root),          aes(root)};
+  return {kernel(root),         tick(root),         machine(root),     processors(root), governor(root),
+          priority_limit(root), memory_limit(root), autosuspend(root), isolation(root),  sleep(root),
+          throttling(root),     slack(root),        aes(root)};
 }
 
 Diagnosis diagnose(const WakeUpClock& clock) {

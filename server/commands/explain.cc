@@ -403,6 +403,7 @@ std::string in_words(const Scene& scene, const Explanation& explanation) {
        << " for engines" << (scene.network.keys ? ", sealed by " + spoken_here(scene.network.suites) : "") << ", "
        << (scene.recording ? "a recording" : "no recording")
        << (scene.discovery && scene.discovery->announce ? ", announced on the network" : "") << '\n';
+  if (scene.network.busy) text << "network.busy: its thread never sleeps and takes a whole processor, all the time\n";
   return text.str();
 }
 
@@ -415,6 +416,7 @@ std::string in_json(const Scene& scene, const Explanation& explanation) {
               {"device_ns", explanation.device_ns},
               {"resolution_ns", explanation.resolution_ns},
               {"sealed_by", scene.network.keys ? Json(spoken_here(scene.network.suites)) : Json(nullptr)},
+              {"network_busy", scene.network.busy},
               {"parts", Json::array()}};
   for (const auto& part : explanation.parts) {
     out["parts"].push_back({{"key", part.key},

@@ -18,6 +18,7 @@ Doorbell::~Doorbell() { ::close(fd_); }
 
 void Doorbell::ring() noexcept {
   const int saved = errno;
+  rung_.store(true, std::memory_order_release);
   const std::uint64_t one = 1;
   // Fails only when 2⁶⁴ − 2 rings are unanswered, and then the bell is ringing already.
   [[maybe_unused]] const auto written = ::write(fd_, &one, sizeof one);
@@ -25,6 +26,7 @@ void Doorbell::ring() noexcept {
 }
 
 void Doorbell::answer() noexcept {
+  rung_.store(false, std::memory_order_relaxed);  // what rings from here on counts anew
   std::uint64_t rings = 0;
   // Fails only when nobody has rung.
   [[maybe_unused]] const auto got = ::read(fd_, &rings, sizeof rings);

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <atomic>
+
 namespace tendon {
 
 /// Wakes the one thread that waits for it, from another thread or from a signal handler: the haptic
@@ -18,6 +20,9 @@ class Doorbell {
   /// that never waits, no heap, no lock of ours.
   void ring() noexcept;
 
+  /// Whether it has rung since the last answer: for a thread that does not sleep. No system call.
+  bool rung() const noexcept { return rung_.load(std::memory_order_acquire); }
+
   /// Answers the rings so far. A caller that waits on fd() itself calls this; UdpLink::wait does so by itself.
   void answer() noexcept;
 
@@ -25,7 +30,9 @@ class Doorbell {
   int fd() const noexcept { return fd_; }
 
  private:
+  static_assert(std::atomic<bool>::is_always_lock_free);  // signal handlers ring, too
   int fd_;
+  std::atomic<bool> rung_{false};
 };
 
 }  // namespace tendon

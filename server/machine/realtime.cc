@@ -29,6 +29,11 @@ void touch_stack() {
 
 void name_thread(const std::string& name) { prctl(PR_SET_NAME, name.c_str(), 0UL, 0UL, 0UL); }
 
+int processors_allowed() {
+  cpu_set_t allowed;
+  return sched_getaffinity(0, sizeof allowed, &allowed) == 0 ? CPU_COUNT(&allowed) : 1;
+}
+
 void enter_punctual() { prctl(PR_SET_TIMERSLACK, 1UL, 0UL, 0UL, 0UL); }
 
 std::vector<std::string> enter_realtime(int priority) {

@@ -23,6 +23,9 @@ std::vector<std::string> enter_realtime(int priority);
 /// sentence when the kernel refuses; the thread then runs where it did.
 std::optional<std::string> stay_on(std::uint32_t cpu);
 
+/// Processors that this process may run on, at least 1.
+int processors_allowed();
+
 /// While it lives, keeps the processors out of sleep states that are slow to leave: it holds /dev/cpu_dma_latency open,
 /// with 0 µs written to it as 32 bits (Documentation/power/pm_qos_interface.rst). Costs power. A kernel without that
 /// file has no such states, or does not offer the choice: that does not count as a refusal.

@@ -91,7 +91,7 @@ std::size_t UdpLink::receive(Address& from, std::span<std::byte> buffer) {
   return 0;
 }
 
-LocalTime UdpLink::received_by(LocalTime now) const { return std::max(now, clock::now()); }
+LocalTime UdpLink::present(LocalTime now) const { return std::max(now, clock::now()); }
 
 void UdpLink::wait(Duration timeout, Doorbell* doorbell) {
   // poll() ignores an entry with a negative descriptor.

@@ -40,7 +40,7 @@ class UdpLink : public Link {
   std::size_t receive(Address& from, std::span<std::byte> buffer) override;
 
   /// The time by clock::now().
-  LocalTime received_by(LocalTime now) const override;
+  LocalTime present(LocalTime now) const override;
 
   /// Waits until a datagram can be received, or the doorbell rings (it is then answered), or
   /// `timeout` is over, whichever comes first; a signal handler may end it sooner. A timeout of zero

@@ -430,6 +430,9 @@ void declare_scene(Table& scene, Draft& draft) {
              "sends fewer states to a guest whose network is full, down to 1 in 20");
     keys.key("takeover", network.takeover, ListOf<Label>{},
              "names of the keys (without keys: of the clients) that may take a channel from its holder at once");
+    keys.key("busy", network.busy, YesNo{},
+             "its thread never sleeps: a datagram is read some 10 to 50 µs sooner, and a whole processor is taken all "
+             "the time. Refused on a machine of one");
   });
 
   scene.part("discovery", draft.scene.discovery, [](Table& keys, Scene::Discovery& discovery) {

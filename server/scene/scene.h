@@ -40,6 +40,7 @@ struct Scene {
     Duration observer_timeout = NetworkLoop::Config{}.observer_timeout;
     bool adapt_state_rate = NetworkLoop::Config{}.adapt_state_rate;
     std::vector<std::string> takeover{};  ///< see NetworkLoop
+    bool busy = false;                    ///< its thread never sleeps (BusyLink)
   };
   struct Channel {
     std::string name = "main";

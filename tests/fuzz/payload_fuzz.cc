@@ -2,8 +2,10 @@
 #include "protocol/session.h"
 #include "protocol/wire/bounds.h"
 #include "tests/fuzz/target.h"
+#include "tests/protocol/wire/told.h"
 
 // What an honest key says that its holder should not: the input is sealed as the peer would, and a session takes it.
+// Both ways of reading it agree: by hand, and by protobuf alone.
 
 using namespace tendon;
 
@@ -19,6 +21,9 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   session.next_datagram(kOpened, buffer);
 
   const auto body = std::as_bytes(std::span(data, std::min(size, kMaxDatagram - kHeaderSize - crypto::kTagSize)));
+  DataReader reader;
+  DataReader reference;
+  fuzz::require(told(reader.read(body)) == told(reference.read_by_protobuf(body)));
   Sealer peer(SealingKey(Suite::kNoise, keys.receive), {}, kOpened);
   const Header header{.suite = Suite::kNoise, .connection_id = kConnection};
   const auto clear = encode_header(header);

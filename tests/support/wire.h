@@ -39,7 +39,7 @@ class End : public Link {
     std::copy_n(datagram.bytes.begin(), std::min(buffer.size(), datagram.bytes.size()), buffer.begin());
     return datagram.bytes.size();
   }
-  LocalTime received_by(LocalTime now) const override { return std::max(now, taken); }
+  LocalTime present(LocalTime now) const override { return std::max(now, taken); }
 
   Address self;
   LocalTime taken{};  ///< when it was read, where that is later than the turn's time

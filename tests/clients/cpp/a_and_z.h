@@ -86,6 +86,8 @@ class Server {
   /// The position of the hand at a tick, m.
   static Vec3 position(std::uint64_t tick) { return {1e-3 * static_cast<double>(tick), 0, -1}; }
   void say_bye(LocalTime now, Code code);
+  /// Of the open session.
+  const LinkStats& link_stats() const { return session_->stats(); }
 
   std::optional<Refused> refusal;  ///< set: everybody is refused with it
   bool features = true;            ///< agree to whatever is offered, or to nothing

@@ -150,26 +150,6 @@ TEST(ForceClient, NumbersTheForcesWithoutAGap) {
 }
 
 // The work of the physics lies between the two turns; a time stamp from before it would hide it.
-TEST(ForceClient, SendsAForceInTheTurnAfterItsComputationWhichIsDueAtOnce) {
-  World world(9, kFineWeather);
-  bool called = false;
-  world.connect({}, [&](const DeviceState& hand) {
-    called = true;
-    return answer(hand);
-  });
-  world.run(kSecond);
-  // Z's next state is on its way; let it arrive.
-  called = false;
-  world.z->turn(world.now += milliseconds(1));
-  world.now += milliseconds(5);
-  const int sent = world.a_port.sent;
-  EXPECT_EQ(world.a->turn(world.now), world.now);
-  EXPECT_TRUE(called);
-  EXPECT_EQ(world.a_port.sent, sent);
-  world.a->turn(world.now + milliseconds(3));
-  EXPECT_EQ(world.a_port.sent, sent + 1);
-}
-
 // An engine that computes elsewhere: its callback knows no force, and the answer comes later.
 TEST(ForceClient, ALaterAnswerIsSentUnlessANewerStateWasAnswered) {
   World world(24, kFineWeather);
@@ -676,7 +656,7 @@ class LateLink : public Link {
   explicit LateLink(Link& link) : link_(link) {}
   void send(const Address& to, std::span<const std::byte> datagram) override { link_.send(to, datagram); }
   std::size_t receive(Address& from, std::span<std::byte> buffer) override { return link_.receive(from, buffer); }
-  LocalTime received_by(LocalTime now) const override { return now + std::chrono::microseconds(34); }
+  LocalTime present(LocalTime now) const override { return now + std::chrono::microseconds(34); }
 
  private:
   Link& link_;
@@ -696,6 +676,55 @@ TEST(ForceClient, AForceLeavesAtOnceThoughItsStateIsReadAfterTheTurnBegan) {
   for (std::size_t i = 0; i < world.z->forces.size(); ++i) {
     EXPECT_EQ(world.z->forces[i].first - computed[i], milliseconds(5)) << i;
   }
+}
+
+TEST(ForceClient, AForceLeavesInTheTurnThatHasComputedIt) {
+  World world(12, kFineWeather);
+  int computed = 0;
+  world.connect({}, [&](const DeviceState& hand) {
+    ++computed;
+    return answer(hand);
+  });
+  ASSERT_TRUE(world.run_until(Phase::kOpen, kSecond));
+  world.run(kSecond);  // the descriptions have come
+  int answers = 0;
+  for (int i = 0; i < 1000; ++i) {  // Z turns once a millisecond
+    world.now += milliseconds(1);
+    world.z->turn(world.now);
+    const int sent_before = world.a_port.sent;
+    const int computed_before = computed;
+    const LocalTime next = world.a->turn(world.now);
+    answers += computed - computed_before;
+    EXPECT_EQ(world.a_port.sent - sent_before, computed - computed_before) << i;
+    EXPECT_GT(next, world.now) << "a further turn at once would have nothing to do";
+  }
+  EXPECT_GT(answers, 900);
+}
+
+/// A link with a clock that the callback lets run.
+class ClockedLink : public Link {
+ public:
+  ClockedLink(Link& link, const LocalTime& clock) : link_(link), clock_(clock) {}
+  void send(const Address& to, std::span<const std::byte> datagram) override { link_.send(to, datagram); }
+  std::size_t receive(Address& from, std::span<std::byte> buffer) override { return link_.receive(from, buffer); }
+  LocalTime present(LocalTime now) const override { return std::max(now, clock_); }
+
+ private:
+  Link& link_;
+  const LocalTime& clock_;
+};
+
+TEST(ForceClient, ASlowEngineIsNoDelayOfTheNetwork) {
+  World world(13, kFineWeather);
+  ClockedLink link(world.a_port, world.now);
+  const Physics slow = [&](const DeviceState&) {
+    world.now += milliseconds(3);
+    return Vec3(1, 0, 0);
+  };
+  world.a.emplace(link, a_and_z::z_address, ForceClient::Config{.rate_hz = 10}, slow, world.now);
+  world.run(2 * kSecond);
+  ASSERT_GT(world.z->forces.size(), 15U);
+  EXPECT_EQ(world.z->link_stats().smoothed_round_trip, milliseconds(10)) << "there and back, without the engine";
 }
 
 }  // namespace

@@ -79,8 +79,8 @@ TEST(UdpTransport, TalksWithItsServer) {
 TEST(UdpTransport, WhatItHasReceivedWasHereByNowAndNotBeforeTheTurn) {
   const UdpTransport link(parse_address("127.0.0.1:9"));
   const LocalTime long_ago{};
-  EXPECT_GT(link.received_by(long_ago), long_ago);
-  EXPECT_EQ(link.received_by(LocalTime::max()), LocalTime::max());
+  EXPECT_GT(link.present(long_ago), long_ago);
+  EXPECT_EQ(link.present(LocalTime::max()), LocalTime::max());
 }
 
 TEST(UdpTransport, TellsTheFullSizeOfADatagramItHadToCut) {

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <fstream>
 #include <regex>
+#include <stdexcept>
 
 namespace tendon::e2e {
 
@@ -14,6 +15,20 @@ std::set<std::string> threads_of(pid_t process) {
     if (std::getline(std::ifstream(task.path() / "comm"), name)) names.insert(name);
   }
   return names;
+}
+
+std::uint64_t sleeps_of(pid_t process, const std::string& thread) {
+  for (const auto& task : std::filesystem::directory_iterator("/proc/" + std::to_string(process) + "/task")) {
+    std::string name;
+    std::getline(std::ifstream(task.path() / "comm"), name);
+    if (name != thread) continue;
+    std::ifstream status(task.path() / "status");
+    for (std::string word; status >> word;) {
+      std::uint64_t count = 0;
+      if (word == "voluntary_ctxt_switches:" && status >> count) return count;
+    }
+  }
+  throw std::runtime_error("no thread " + thread + " in process " + std::to_string(process));
 }
 
 std::string general_name(const std::string& thread) { return std::regex_replace(thread, std::regex("-[0-9]+$"), "-N"); }

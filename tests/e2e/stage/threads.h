@@ -3,6 +3,7 @@
 
 #include <sys/types.h>
 
+#include <cstdint>
 #include <set>
 #include <string>
 
@@ -10,6 +11,10 @@ namespace tendon::e2e {
 
 /// The names of a process's threads at this moment, as `top -H` shows them.
 std::set<std::string> threads_of(pid_t process);
+
+/// How often the thread of that name has gone to sleep, not counting when it lost its processor to another one. Throws
+/// std::runtime_error when there is no such thread.
+std::uint64_t sleeps_of(pid_t process, const std::string& thread);
 
 /// "haptic-3": "haptic-N", as server/THREADS.md calls them all.
 std::string general_name(const std::string& thread);

@@ -57,6 +57,7 @@ TEST(Doctor, HasAdviceForEverythingThatAnOrdinaryMachineLacks) {
   machine.say("proc/sys/kernel/sched_rt_runtime_us", "100000");
   machine.say("proc/sys/kernel/sched_rt_period_us", "1000000");
   machine.say("proc/cpuinfo", "flags : fpu hypervisor lahf_lm");
+  machine.say("sys/devices/system/cpu/online", "0");
   const auto findings = machine.look();
   EXPECT_EQ(findings.at("kernel").found, "6.1.0-22-amd64, without PREEMPT_RT");
   EXPECT_EQ(findings.at("tick").found, "250 Hz, and timers that wait for it");
@@ -69,6 +70,7 @@ TEST(Doctor, HasAdviceForEverythingThatAnOrdinaryMachineLacks) {
   EXPECT_EQ(findings.at("rt_throttling").found, "100000 of each 1000000 µs for real-time threads");
   EXPECT_EQ(findings.at("machine").found, "virtual");
   EXPECT_EQ(findings.at("aes").found, "none: sessions are sealed by chacha20-poly1305");
+  EXPECT_EQ(findings.at("processors").found, "1");
   for (const auto& [key, finding] : findings) {
     EXPECT_EQ(finding.advice.empty(), key == "timer_slack") << key;
   }
@@ -89,10 +91,12 @@ TEST(Doctor, HasNoneForAMachineThatIsReady) {
   machine.say("proc/sys/kernel/sched_rt_runtime_us", "950000");
   machine.say("proc/sys/kernel/sched_rt_period_us", "1000000");
   machine.say("proc/cpuinfo", "flags : fpu pclmulqdq aes lahf_lm");
+  machine.say("sys/devices/system/cpu/online", "0-2,5");
   const auto findings = machine.look();
   EXPECT_EQ(findings.at("kernel").found, "6.1.0-22-rt-amd64, PREEMPT_RT");
   EXPECT_EQ(findings.at("isolated_cpus").found, "3, without tick 3");
   EXPECT_EQ(findings.at("aes").found, "in hardware: sessions are sealed by aes-256-gcm, chacha20-poly1305");
+  EXPECT_EQ(findings.at("processors").found, "4 (`[network] busy = true` would take one of them all the time)");
   EXPECT_EQ(findings.at("cpu_sleep").found, "up to 133 µs to wake (the server forbids it while it runs)");
   for (const auto& [key, finding] : findings) EXPECT_EQ(finding.advice, "") << key;
 }

@@ -153,6 +153,17 @@ TEST(Explain, SaysByWhichSuitesSessionsAreSealed) {
                       : "chacha20-poly1305 (this processor has no AES instructions)");
 }
 
+TEST(Explain, SaysThatABusyNetworkThreadTakesAProcessor) {
+  Scene scene = shipped("demo.toml");
+  const Explanation explanation = explain(scene, ticking(), kRounds);
+  EXPECT_EQ(in_words(scene, explanation).find("network.busy"), std::string::npos);
+  EXPECT_EQ(nlohmann::json::parse(in_json(scene, explanation)).at("network_busy"), false);
+  scene.network.busy = true;
+  EXPECT_NE(in_words(scene, explanation).find("network.busy: its thread never sleeps and takes a whole processor"),
+            std::string::npos);
+  EXPECT_EQ(nlohmann::json::parse(in_json(scene, explanation)).at("network_busy"), true);
+}
+
 TEST(Explain, JsonOfAnyNameIsJson) {
   Scene scene = shipped("demo.toml");
   scene.name = "a \"hand\"\x01\xff";

@@ -82,6 +82,7 @@ TEST(Scene, TakesWhatItDoesNotSayFromTheProfileAndTheStructs) {
   EXPECT_EQ(scene.network.max_observers, NetworkLoop::Config{}.max_observers);
   EXPECT_EQ(scene.network.controller_timeout, NetworkLoop::Config{}.controller_timeout);
   EXPECT_EQ(scene.network.observer_timeout, NetworkLoop::Config{}.observer_timeout);
+  EXPECT_FALSE(scene.network.busy);
   EXPECT_FALSE(scene.recording);
   EXPECT_FALSE(scene.discovery);
   EXPECT_EQ(scene.text, kMinimal);
@@ -138,6 +139,7 @@ max_observers = 3
 controller_timeout_ms = 1500
 observer_timeout_ms = 2500
 adapt_state_rate = true
+busy = true
 [discovery]
 announce = true
 name = "falcon at bench 3"
@@ -189,6 +191,7 @@ datagrams_kb_per_s = 100
   EXPECT_EQ(scene.network.controller_timeout, 1500ms);
   EXPECT_EQ(scene.network.observer_timeout, 2500ms);
   EXPECT_TRUE(scene.network.adapt_state_rate);
+  EXPECT_TRUE(scene.network.busy);
   ASSERT_TRUE(scene.discovery);
   EXPECT_TRUE(scene.discovery->announce);
   EXPECT_EQ(scene.discovery->name, "falcon at bench 3");

@@ -126,7 +126,7 @@ class WatchedLink : public Link {
     look();
     return link_.receive(from, buffer);
   }
-  LocalTime received_by(LocalTime now) const override { return link_.received_by(now); }
+  LocalTime present(LocalTime now) const override { return link_.present(now); }
   void look() {
     const RemoteForce* const force = mail_.forces.front().take();
     if (force == nullptr) return;

@@ -1,0 +1,125 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// How often a guest on real sockets sleeps. Sleeps are counted, not timed.
+#include <gtest/gtest.h>
+#include <sys/prctl.h>
+#include <sys/resource.h>
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <cstdint>
+#include <thread>
+
+#include "clients/cpp/machine.h"
+#include "clients/cpp/run.h"
+#include "server/machine/clock.h"
+#include "server/machine/udp_link.h"
+#include "tests/clients/cpp/a_and_z.h"
+
+namespace tendon {
+namespace {
+
+using std::chrono::milliseconds;
+
+/// Z at a real socket, with states at 1 kHz, on a thread of its own.
+class Server {
+ public:
+  Server()
+      : thread_([this] {
+          while (!stop_) {
+            const LocalTime next = z_.turn(clock::now());
+            link_.wait(std::min<Duration>(next - clock::now(), milliseconds(10)));
+          }
+        }) {}
+  ~Server() { end(); }
+  Server(const Server&) = delete;
+  Server& operator=(const Server&) = delete;
+
+  Address address() const { return link_.local_address(); }
+  /// Forces that came. Ends the thread.
+  std::uint64_t forces() {
+    end();
+    return z_.forces.size();
+  }
+
+ private:
+  void end() {
+    stop_ = true;
+    if (thread_.joinable()) thread_.join();
+  }
+
+  UdpLink link_{parse_address("127.0.0.1:0")};
+  a_and_z::Server z_{link_, std::uint8_t{1}};
+  std::atomic<bool> stop_{false};
+  std::thread thread_;
+};
+
+/// Times that this thread has gone to sleep; losing the processor to another one is none.
+std::uint64_t sleeps() {
+  rusage usage{};
+  ::getrusage(RUSAGE_THREAD, &usage);
+  return static_cast<std::uint64_t>(usage.ru_nvcsw);
+}
+
+Options wall_at(const Server& server) {
+  Options options;
+  options.server = to_string(server.address());
+  options.client.name = "wall";
+  options.duration = milliseconds(600);
+  return options;
+}
+
+Vec3 push(const DeviceState& hand) { return -100 * hand.position; }
+
+TEST(Sleeps, AGuestSleepsOnceForEachStateThatItAnswers) {
+  Server server;
+  const Options options = wall_at(server);
+  const std::uint64_t before = sleeps();
+  ASSERT_EQ(run(options, push), 0);
+  const std::uint64_t slept = sleeps() - before;
+  const std::uint64_t forces = server.forces();
+  ASSERT_GT(forces, 20U);
+  constexpr std::uint64_t kOthers = 60;  // the handshake, the answers to its questions, keep-alives
+  EXPECT_LE(slept, forces + kOthers) << "a sleep between a state and its force would double them";
+}
+
+TEST(Sleeps, ABusyGuestNeverSleepsAndStillEndsInTime) {
+  Server server;
+  Options options = wall_at(server);
+  options.busy = true;
+  const std::uint64_t before = sleeps();
+  ASSERT_EQ(run(options, push), 0);
+  const std::uint64_t slept = sleeps() - before;
+  ASSERT_GT(server.forces(), 20U);
+  EXPECT_LE(slept, 10U) << "none for a state: these are of the start and the end";
+}
+
+TEST(Sleeps, ABusyGuestHasItsTimersServed) {
+  Options options;
+  options.client.name = "wall";
+  options.server = "127.0.0.1:9";  // nobody is there
+  options.client.patience = options.client.retry_min = options.client.retry_max = milliseconds(5);
+  options.duration = milliseconds(200);
+  options.busy = true;
+  options.silence = milliseconds(10);
+  int silences = 0;
+  options.on_silence = [&](LocalTime /*now*/) { ++silences; };
+  const std::uint64_t before = sleeps();
+  EXPECT_EQ(run(options, push), 1);
+  EXPECT_LE(sleeps() - before, 10U);
+  EXPECT_GE(silences, 2);
+}
+
+TEST(Sleeps, TheThreadHasItsTimerSlackBackAfterwards) {
+  const int before = ::prctl(PR_GET_TIMERSLACK, 0UL, 0UL, 0UL, 0UL);
+  ASSERT_GT(before, 1);
+  {
+    const Punctual punctual;
+    EXPECT_EQ(::prctl(PR_GET_TIMERSLACK, 0UL, 0UL, 0UL, 0UL), 1);
+  }
+  EXPECT_EQ(::prctl(PR_GET_TIMERSLACK, 0UL, 0UL, 0UL, 0UL), before);
+}
+
+}  // namespace
+}  // namespace tendon

@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// What the datagrams of each step cost to write and to read, in instructions by callgrind, beside protobuf.
+#include <gtest/gtest.h>
+
+#include <iostream>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "tests/support/callgrind.h"
+#include "tests/support/instruction_test.h"
+
+namespace tendon {
+namespace {
+
+constexpr double kTimes = 1100 - 100;  // between the two run lengths of codec-proof
+
+using CodecProof = testing::InstructionTest;
+
+struct Bound {
+  std::string what;
+  double instructions;  ///< by hand, a few percent above what it takes
+  double times;         ///< as many by protobuf, at least
+};
+
+TEST_F(CodecProof, AStateAndAForceCostFarLessThanByProtobuf) {
+  std::map<std::string, double> cost;
+  for (const auto& [line, instructions] : testing::count_instructions(TENDON_CODEC_PROOF, "", "in_turn")) {
+    cost[line] = instructions / kTimes;
+    std::cout << line << ": " << cost[line] << " instructions\n";
+  }
+  ASSERT_EQ(cost.size(), 8U);
+  const std::vector<Bound> bounds = {
+      {"write state", 490, 2.4}, {"read state", 930, 3.5}, {"write force", 495, 2.4}, {"read force", 885, 3.5}};
+  for (const auto& [what, most, times] : bounds) {
+    const double by_hand = cost.at(what + " by hand");
+    EXPECT_LE(by_hand, most) << what;
+    EXPECT_GE(by_hand, 0.5 * most) << what << ": it does not do the work, or this bound is old";
+    EXPECT_GE(cost.at(what + " by protobuf"), times * by_hand) << what;
+  }
+}
+
+}  // namespace
+}  // namespace tendon
