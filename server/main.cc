@@ -32,6 +32,7 @@
 #include "server/machine/clock.h"
 #include "server/machine/log.h"
 #include "server/machine/randomness.h"
+#include "server/machine/realtime.h"
 #include "server/machine/regular_file.h"
 #include "server/machine/service.h"
 #include "server/scene/key_folder.h"
@@ -249,6 +250,7 @@ int run(const std::vector<Scene>& scenes, double duration_s, bool json) {
   std::signal(SIGXFSZ, SIG_IGN);
   std::signal(SIGPIPE, SIG_IGN);
 
+  use_small_stacks();
   // Before the server, whose threads use them.
   Lines lines;
   std::array<std::byte, 12> name_of_run;

@@ -681,6 +681,7 @@ void NetworkLoop::send(LocalTime now, DatagramSieve::Sender partner, const Addre
 /// Puts the datagram into the recording unless the sieve leaves it out. `partner` is the other end's address.
 void NetworkLoop::tap(LocalTime now, DatagramRecord::Direction direction, DatagramSieve::Sender partner,
                       const Address& peer, std::span<const std::byte> datagram, std::size_t size) {
+  if (!config_.record) return;
   Mailboxes& mail = *devices_.front().mail;
   const auto left_out = [](std::atomic<std::uint64_t>& count) { count.fetch_add(1, std::memory_order_relaxed); };
   switch (sieve_.judge(now, partner, size)) {

@@ -83,6 +83,7 @@ class NetworkLoop {
     bool adapt_state_rate = false;
     /// Datagrams taken in one turn: a flood must not keep states from being sent. A 1 kHz engine sends one per turn.
     std::size_t max_datagrams = 256;
+    bool record = true;                ///< false: no datagram goes to the log thread
     DatagramSieve::Config recorded{};  ///< of the datagrams in and out
   };
 

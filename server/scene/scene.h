@@ -96,6 +96,8 @@ struct Scene {
 
   /// The row of its device.
   const Driver& driver() const;
+  /// Its device has no plug, so that it computes and never waits: one haptic thread may step several of them.
+  bool shares_thread() const { return driver().ids.empty(); }
   /// The simulated device itself; for any other, the simulation that stands in where the cost of a step is measured.
   SimulatedDevice::Config simulated() const;
 };
