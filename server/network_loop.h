@@ -36,7 +36,8 @@ namespace tendon {
 /// second how the devices' loops and the engines do. Each turn drains the link, so that nothing new waits behind
 /// something old. Of forces the newest wins; every request is answered.
 ///
-/// Without keys, guests speak in the clear, from this machine only. With keys they speak suite 1 only. A guest is
+/// Without keys, guests speak in the clear, from this machine only. With keys they speak suite 1 only, but for those that
+/// come through a Unix socket, whose key is the permission to write to its file. A guest is
 /// half-open until its first authentic Data, and until then nothing changes for anybody else. Its address is the one
 /// its newest authentic datagram came from. A controller that comes again with its key takes its own place.
 ///
@@ -48,8 +49,11 @@ namespace tendon {
 class NetworkLoop {
  public:
   struct Config {
-    Bytes32 secret{};                       ///< of cookies and ephemeral keys; random at start
-    std::vector<ClientKey> keys{};          ///< who may come in; empty: anybody on this machine, in the clear
+    Bytes32 secret{};               ///< of cookies and ephemeral keys; random at start
+    std::vector<ClientKey> keys{};  ///< who may come in; empty: anybody on this machine, in the clear
+    /// Whether the system has made sure who speaks from an address (UnixSocket::is_peer): a guest there needs no key.
+    /// Null: none.
+    bool (*needs_no_key)(const Address& from) noexcept = nullptr;
     std::uint32_t first_connection_id = 1;  ///< random at start, so that a restarted server does not know old guests
     std::string server_name = "tendond";
     /// What guests are told of each device; its number is its place, `holder` does not count.
@@ -203,7 +207,7 @@ class NetworkLoop {
   void measure(LocalTime now, Guest& guest);
   void adapt(LocalTime now, Guest& guest);
   void report(LocalTime now);
-  DatagramSieve::Sender sender_of(const Doorman::Guest& guest) const;
+  DatagramSieve::Sender sender_of(const Doorman::Guest& guest, const Address& from) const;
   void send(LocalTime now, DatagramSieve::Sender partner, const Address& to, std::span<const std::byte> datagram);
   void tap(LocalTime now, DatagramRecord::Direction direction, DatagramSieve::Sender partner, const Address& peer,
            std::span<const std::byte> datagram, std::size_t size);

@@ -256,6 +256,7 @@ NetworkLoop::Config Server::network_config(const DeviceRuntimes& devices) {
   fill_random(std::as_writable_bytes(std::span(&config.first_connection_id, 1)));
   config.first_connection_id |= 1;  // never 0
   if (scene.network.keys) config.keys = read_key_folder(*scene.network.keys);
+  if (scene.network.unix_path) config.needs_no_key = UnixSocket::is_peer;
   config.server_name = "tendond " + std::string(kVersion);
   for (const auto& runtime : devices) {
     const DeviceInfo info = runtime->safe ? runtime->safe->info() : runtime->device->info();
@@ -294,7 +295,8 @@ Server::Server(const std::vector<Scene>& scenes)
     : started_(clock::now()),
       guardian_(make_guardian(scenes)),
       devices_(runtimes_of(scenes, guardian_.get())),
-      link_(scenes.front().network.listen, scenes.front().network.keys ? Reach::kAnywhere : Reach::kThisMachine),
+      link_(scenes.front().network.listen, scenes.front().network.keys ? Reach::kAnywhere : Reach::kThisMachine,
+            scenes.front().network.unix_path),
       network_(network_config(devices_), link_, mail_of(devices_)),
       tell_next_(started_ + kTellPeriod),
       haptic_threads_(haptic_threads_of(devices_)) {

@@ -32,7 +32,8 @@ namespace tendon {
 struct Scene {
   struct Network {
     Address listen = parse_address("127.0.0.1:47100");
-    std::optional<std::filesystem::path> keys;  ///< folder; empty: anybody on this machine may come in
+    std::optional<std::filesystem::path> unix_path{};  ///< see UnixSocket; relative to the current directory
+    std::optional<std::filesystem::path> keys;         ///< folder; empty: anybody on this machine may come in
     std::size_t max_observers = NetworkLoop::Config{}.max_observers;
     Duration controller_timeout = NetworkLoop::Config{}.controller_timeout;
     Duration observer_timeout = NetworkLoop::Config{}.observer_timeout;

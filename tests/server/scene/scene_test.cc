@@ -79,6 +79,7 @@ TEST(Scene, TakesWhatItDoesNotSayFromTheProfileAndTheStructs) {
   EXPECT_EQ(control.hold.max_valid_for, HeldForce::Config{}.max_valid_for);
 
   EXPECT_EQ(to_string(scene.network.listen), "127.0.0.1:47100");
+  EXPECT_EQ(scene.network.unix_path, std::nullopt);
   EXPECT_EQ(scene.network.max_observers, NetworkLoop::Config{}.max_observers);
   EXPECT_EQ(scene.network.controller_timeout, NetworkLoop::Config{}.controller_timeout);
   EXPECT_EQ(scene.network.observer_timeout, NetworkLoop::Config{}.observer_timeout);
@@ -132,6 +133,7 @@ ramp_in_ms = 40
 max_valid_for_ms = 50
 [network]
 listen = "[::1]:5000"
+unix = "/run/tendon.sock"
 max_observers = 3
 controller_timeout_ms = 1500
 observer_timeout_ms = 2500
@@ -182,6 +184,7 @@ datagrams_kb_per_s = 100
   EXPECT_EQ(control.hold.ramp_in, 40ms);
   EXPECT_EQ(control.hold.max_valid_for, 50ms);
   EXPECT_EQ(to_string(scene.network.listen), "[::1]:5000");
+  EXPECT_EQ(scene.network.unix_path, "/run/tendon.sock");
   EXPECT_EQ(scene.network.max_observers, 3U);
   EXPECT_EQ(scene.network.controller_timeout, 1500ms);
   EXPECT_EQ(scene.network.observer_timeout, 2500ms);
