@@ -36,10 +36,10 @@ namespace tendon {
 /// second how the devices' loops and the engines do. Each turn drains the link, so that nothing new waits behind
 /// something old. Of forces the newest wins; every request is answered.
 ///
-/// Without keys, guests speak in the clear, from this machine only. With keys they speak suite 1 only, but for those that
-/// come through a Unix socket, whose key is the permission to write to its file. A guest is
-/// half-open until its first authentic Data, and until then nothing changes for anybody else. Its address is the one
-/// its newest authentic datagram came from. A controller that comes again with its key takes its own place.
+/// Without keys, guests speak in the clear, from this machine only. With keys they speak suite 1 only, except through a
+/// Unix socket, where the permission to write to its file is the key. A guest is half-open until its first authentic
+/// Data, and until then nothing changes for anybody else. Its address is the one its newest authentic datagram came
+/// from. A controller that comes again with its key takes its own place.
 ///
 /// The files of guests/ decide: who comes in (admission.h), who holds which channel (leases.h), what a request does
 /// (requests.h), why a force is late (lateness.h), what is told once a second (reports.h). This class moves datagrams,

@@ -36,8 +36,8 @@ constexpr auto kLogPeriod = std::chrono::milliseconds(20);
 /// Trouble is logged at most this often, with its count.
 constexpr auto kTellPeriod = std::chrono::seconds(1);
 
-/// The time that one thread takes for a device in each period, at most: the dearest step that we ship takes less than half
-/// of it (tests/tools/lab, `golden --cost`).
+/// The time that one thread has for each of its devices in a period. The dearest step that we ship takes half of it
+/// (`tendond explain deploy/scenes/mechanism.toml`: 9.8 µs).
 constexpr auto kStepBudget = std::chrono::microseconds(20);
 
 std::uint32_t loop_hz(const Scene& scene) {

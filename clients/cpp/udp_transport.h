@@ -31,8 +31,8 @@ class UdpTransport : public Link {
   const std::string& device() const noexcept { return device_; }
 
   /// Looks the name up again, which may wait: to be called while no session is open. Stays with the present address
-  /// where the name still has it (a Unix socket's file may be another server's: it is opened again), or, with `another`, goes on to the one after it. Throws as the constructor does; then
-  /// the present address stays in use.
+  /// where the name still has it, or, with `another`, goes on to the one after it. A Unix socket's file may be another
+  /// server's by now: it is opened again. Throws as the constructor does; then the present address stays in use.
   void look_up_again(bool another);
 
   /// `to` must be server(); a datagram to anybody else, or one that the system does not take, is lost.

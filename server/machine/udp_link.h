@@ -20,8 +20,8 @@ enum class Reach : std::uint8_t {
   kAnywhere,     ///< only for servers that require a key
 };
 
-/// The real link: one UDP socket on one address of this machine, IPv4 or IPv6; and, on demand, a Unix socket for engines
-/// on the same machine.
+/// The real link: one UDP socket on one address of this machine, IPv4 or IPv6; and, on demand, a Unix socket for
+/// engines on the same machine.
 ///
 /// send() and receive() never wait; wait() is the only place where the network thread sleeps.
 /// Anybody may send anything; nothing here looks inside the datagrams.
