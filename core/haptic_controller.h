@@ -46,8 +46,8 @@ struct HandleStep {
   std::optional<Joints> joints{};  ///< empty: the device does not tell them; no law looks at them
 };
 
-/// One haptic step: its input and its result. It holds enough to take the step again (tests/tools/replay).
-struct Step {
+/// What every handle's step has.
+struct PositionStep {
   Motion hand;                       ///< the motion it saw; hand.at = when
   Duration held{};                   ///< T_act: length of the interval that this step ended; 0 in the first
   Vec3 was_applied = Vec3::Zero();   ///< N, the force held during it
@@ -65,7 +65,11 @@ struct Step {
   Duration force_age{};                 ///< since it arrived
   Duration loop_age{};                  ///< since the motion it answers was sampled
   std::optional<double> force_error{};  ///< N, what its engine thinks that it may be wrong by; empty: it does not say
-  std::optional<HandleStep> handle{};   ///< empty: the device has a position only
+};
+
+/// One haptic step: its input and its result. It holds enough to take the step again (tests/tools/replay).
+struct Step : PositionStep {
+  std::optional<HandleStep> handle{};  ///< empty: the device has a position only
 
   /// Null when the device does not measure its orientation, or has no gripper.
   TurnStep* turn() noexcept { return handle && handle->turn ? &*handle->turn : nullptr; }

@@ -32,6 +32,9 @@ struct DeviceInfo {
   std::vector<std::string> joints{};  ///< names of its joints, at most Joints::kMost; empty: it does not tell them
   std::vector<OutputDescription> outputs{};  ///< lamps and vibration, at most 8; empty: none
   Duration watchdog{};                       ///< the force drops to zero when no command comes for this long; 0 = none
+
+  /// It tells neither orientation nor gripper nor joints.
+  bool position_only() const noexcept { return !measures_orientation && !gripper && joints.empty(); }
 };
 
 /// One encoder reading.

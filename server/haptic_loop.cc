@@ -72,8 +72,7 @@ HapticLoop::HapticLoop(const Config& config, Device& device, Mailboxes& mail)
       has_outputs_(!device.info().outputs.empty()) {
   if (config.period <= Duration::zero()) throw std::invalid_argument("period must be above zero");
   if (config.control.channels.size() > limits::kMaxChannels) throw std::invalid_argument("too many channels");
-  const DeviceInfo& info = device.info();
-  if (info.measures_orientation || info.gripper || !info.joints.empty()) rest_.emplace(info);
+  if (!device.info().position_only()) rest_.emplace(device.info());
 }
 
 HapticLoop::Rest::Rest(const DeviceInfo& info)

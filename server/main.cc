@@ -32,6 +32,7 @@
 #include "server/machine/clock.h"
 #include "server/machine/log.h"
 #include "server/machine/randomness.h"
+#include "server/machine/realtime.h"
 #include "server/machine/regular_file.h"
 #include "server/machine/service.h"
 #include "server/scene/key_folder.h"
@@ -249,6 +250,7 @@ int run(const std::vector<Scene>& scenes, double duration_s, bool json) {
   std::signal(SIGXFSZ, SIG_IGN);
   std::signal(SIGPIPE, SIG_IGN);
 
+  use_small_stacks();
   // Before the server, whose threads use them.
   Lines lines;
   std::array<std::byte, 12> name_of_run;
@@ -259,7 +261,9 @@ int run(const std::vector<Scene>& scenes, double duration_s, bool json) {
     server.tell_sessions([&](const NetworkLoop::SessionChange& change) { lines.add(in_json(change, name_of_run)); });
   }
   server.start(duration_s > 0 ? std::optional(from_seconds(duration_s)) : std::nullopt);
-  log::info("tendond " + version_text() + " listens on " + to_string(server.address()));
+  const auto& file = scenes.front().network.unix_path;
+  log::info("tendond " + version_text() + " listens on " + to_string(server.address()) +
+            (file ? " and on unix:" + file->string() : ""));
   if (recording) {
     const std::filesystem::path& wanted = scenes.front().recording->path;
     log::info("recording to " + recording->string() +

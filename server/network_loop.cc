@@ -51,7 +51,8 @@ NetworkLoop::NetworkLoop(const Config& config, Link& link, const std::vector<Mai
       sieve_(config.recorded),
       devices_(served_devices(config.devices, config.handles, mail)),
       doorman_({.secret = config.secret, .keys = config.keys, .suites = config.suites}),
-      admission_({.keys = config.keys.size(), .max_observers = config.max_observers}),
+      admission_(
+          {.keys = config.keys.size(), .needs_no_key = config.needs_no_key, .max_observers = config.max_observers}),
       next_connection_id_(config.first_connection_id) {
   half_open_.reserve(config.max_half_open);
   for (std::size_t i = 0; i < std::min(config.couplings.size(), devices_.size()); ++i) {
@@ -153,15 +154,16 @@ void NetworkLoop::receive(LocalTime now, const Address& from, std::span<const st
 void NetworkLoop::greet(LocalTime now, const Address& from, std::span<const std::byte> datagram) {
   std::array<std::byte, kMaxDatagram> answer;
   const Doorman::Reply reply = doorman_.receive(now, from, datagram, answer);
-  const DatagramSieve::Sender sender = reply.guest ? sender_of(*reply.guest) : kStranger;
+  const DatagramSieve::Sender sender = reply.guest ? sender_of(*reply.guest, from) : kStranger;
   tap(now, DatagramRecord::Direction::kIn, sender, from, datagram, datagram.size());
   if (reply.guest) return admit(now, from, *reply.guest);
   if (reply.size > 0) send(now, sender, from, std::span(answer).first(reply.size));
 }
 
-/// With keys configured, a guest without a key is a stranger.
-DatagramSieve::Sender NetworkLoop::sender_of(const Doorman::Guest& guest) const {
-  return guest.key != nullptr || config_.keys.empty() ? kGuest : kStranger;
+/// With keys configured, a guest without a key is a stranger, unless it needs none.
+DatagramSieve::Sender NetworkLoop::sender_of(const Doorman::Guest& guest, const Address& from) const {
+  const bool let_in = config_.keys.empty() || (config_.needs_no_key != nullptr && config_.needs_no_key(from));
+  return guest.key != nullptr || let_in ? kGuest : kStranger;
 }
 
 /// Sends the same answer again to a guest that asks again because the first one was lost. In suite 1 it may ask from
@@ -171,7 +173,7 @@ bool NetworkLoop::answer_again(LocalTime now, const Address& from, const Doorman
     for (const Guest& present : *list) {
       if (present.random != guest.random || present.key != guest.key || present.gone) continue;
       if (present.key == nullptr && present.address != from) continue;
-      send(now, sender_of(guest), from, present.answer);
+      send(now, sender_of(guest, from), from, present.answer);
       return true;
     }
   }
@@ -184,7 +186,7 @@ void NetworkLoop::refuse(LocalTime now, const Address& from, const Doorman::Gues
   notice(true, "refused \"" + guest.hello.name + "\" at " + to_string(from) + ": " + refusal.reason);
   const Refused refused{refusal.code, std::move(refusal.reason), kProtocolVersion, kProtocolVersion};
   const auto size = doorman_.refuse(guest, refused, answer).size;
-  send(now, sender_of(guest), from, std::span(answer).first(size));
+  send(now, sender_of(guest, from), from, std::span(answer).first(size));
 }
 
 void NetworkLoop::admit(LocalTime now, const Address& from, const Doorman::Guest& guest) {
@@ -216,7 +218,7 @@ void NetworkLoop::admit(LocalTime now, const Address& from, const Doorman::Guest
   const Doorman::Answered answered = doorman_.welcome(guest, session.connection_id, welcome, answer);
   if (answered.size == 0) return;
   const auto bytes = std::span(answer).first(answered.size);
-  send(now, sender_of(guest), from, bytes);
+  send(now, sender_of(guest, from), from, bytes);
 
   std::vector<View> views = Admission::views_of(seats);
   Guest arrived{from,
@@ -688,6 +690,7 @@ void NetworkLoop::send(LocalTime now, DatagramSieve::Sender partner, const Addre
 /// Puts the datagram into the recording unless the sieve leaves it out. `partner` is the other end's address.
 void NetworkLoop::tap(LocalTime now, DatagramRecord::Direction direction, DatagramSieve::Sender partner,
                       const Address& peer, std::span<const std::byte> datagram, std::size_t size) {
+  if (!config_.record) return;
   Mailboxes& mail = *devices_.front().mail;
   const auto left_out = [](std::atomic<std::uint64_t>& count) { count.fetch_add(1, std::memory_order_relaxed); };
   switch (sieve_.judge(now, partner, size)) {

@@ -36,9 +36,10 @@ namespace tendon {
 /// second how the devices' loops and the engines do. Each turn drains the link, so that nothing new waits behind
 /// something old. Of forces the newest wins; every request is answered.
 ///
-/// Without keys, guests speak in the clear, from this machine only. With keys all is sealed, by `suites`. A guest is
-/// half-open until its first authentic Data, and until then nothing changes for anybody else. Its address is the one
-/// its newest authentic datagram came from. A controller that comes again with its key takes its own place.
+/// Without keys, guests speak in the clear, from this machine only. With keys all is sealed, by `suites`, except through
+/// a Unix socket, where the permission to write to its file is the key. A guest is half-open until its first authentic
+/// Data, and until then nothing changes for anybody else. Its address is the one its newest authentic datagram came
+/// from. A controller that comes again with its key takes its own place.
 ///
 /// The files of guests/ decide: who comes in (admission.h), who holds which channel (leases.h), what a request does
 /// (requests.h), why a force is late (lateness.h), what is told once a second (reports.h). This class moves datagrams,
@@ -51,7 +52,10 @@ class NetworkLoop {
     Bytes32 secret{};                          ///< of cookies and ephemeral keys; random at start
     std::vector<ClientKey> keys{};             ///< who may come in; empty: anybody on this machine, in the clear
     Suites suites = suites_of_this_machine();  ///< by which the sessions of those may be sealed
-    std::uint32_t first_connection_id = 1;     ///< random at start, so that a restarted server does not know old guests
+    /// Whether the system has made sure who speaks from an address (UnixSocket::is_peer): a guest there needs no key.
+    /// Null: none.
+    bool (*needs_no_key)(const Address& from) noexcept = nullptr;
+    std::uint32_t first_connection_id = 1;  ///< random at start, so that a restarted server does not know old guests
     std::string server_name = "tendond";
     /// What guests are told of each device; its number is its place, `holder` does not count.
     std::vector<DeviceDescription> devices{};
@@ -84,6 +88,7 @@ class NetworkLoop {
     bool adapt_state_rate = false;
     /// Datagrams taken in one turn: a flood must not keep states from being sent. A 1 kHz engine sends one per turn.
     std::size_t max_datagrams = 256;
+    bool record = true;                ///< false: no datagram goes to the log thread
     DatagramSieve::Config recorded{};  ///< of the datagrams in and out
   };
 
@@ -203,7 +208,7 @@ class NetworkLoop {
   void measure(LocalTime now, Guest& guest);
   void adapt(LocalTime now, Guest& guest);
   void report(LocalTime now);
-  DatagramSieve::Sender sender_of(const Doorman::Guest& guest) const;
+  DatagramSieve::Sender sender_of(const Doorman::Guest& guest, const Address& from) const;
   void send(LocalTime now, DatagramSieve::Sender partner, const Address& to, std::span<const std::byte> datagram);
   void tap(LocalTime now, DatagramRecord::Direction direction, DatagramSieve::Sender partner, const Address& peer,
            std::span<const std::byte> datagram, std::size_t size);

@@ -36,6 +36,10 @@ constexpr auto kLogPeriod = std::chrono::milliseconds(20);
 /// Trouble is logged at most this often, with its count.
 constexpr auto kTellPeriod = std::chrono::seconds(1);
 
+/// The time that one thread has for each of its devices in a period. The dearest step that we ship takes half of it
+/// (`tendond explain deploy/scenes/mechanism.toml`: 9.8 µs).
+constexpr auto kStepBudget = std::chrono::microseconds(20);
+
 std::uint32_t loop_hz(const Scene& scene) {
   return static_cast<std::uint32_t>(std::lround(1 / seconds(scene.loop.period)));
 }
@@ -182,7 +186,10 @@ const std::vector<Scene>& checked(const std::vector<Scene>& scenes) {
   return scenes;
 }
 
-std::string haptic_name(const Scene& scene) { return "haptic-" + std::to_string(scene.loop.device); }
+Mailboxes::Capacities for_device(Mailboxes::Capacities capacities, const DeviceInfo& device) {
+  capacities.flight_handles = !device.position_only();
+  return capacities;
+}
 
 /// Throws std::runtime_error, a sentence for the operator, when the system refuses the thread.
 template <class Run>
@@ -201,7 +208,7 @@ Server::DeviceRuntime::DeviceRuntime(const Scene& the_scene, const Mailboxes::Ca
     : scene(the_scene),
       device(make_device(scene, guardian)),
       safe(scene.safety ? std::make_unique<SafeDevice>(*scene.safety, *device) : nullptr),
-      mail(capacities),
+      mail(for_device(capacities, device->info())),
       haptic(scene.loop, safe ? *safe : *device, mail),
       meter(scene.loop.period) {
   told_phase.fill(PortPhase::kAlone);
@@ -216,6 +223,7 @@ Server::DeviceRuntimes Server::runtimes_of(const std::vector<Scene>& scenes, Gua
           static_cast<std::uint64_t>((clock::now().time_since_epoch() + clock::unix_offset()).count());
     }
     Mailboxes::Capacities capacities;
+    if (!scenes.front().recording) capacities = Mailboxes::Capacities::unrecorded(scene.loop.period);
     if (!devices.empty()) capacities.datagrams = 1;  // all go to the first
     // A power of two.
     const std::size_t couplings = std::max<std::size_t>(scene.loop.control.leaders.size(), 1);
@@ -223,6 +231,27 @@ Server::DeviceRuntimes Server::runtimes_of(const std::vector<Scene>& scenes, Gua
     devices.push_back(std::make_unique<DeviceRuntime>(scene, capacities, guardian));
   }
   return devices;
+}
+
+std::string Server::HapticThread::name() const {
+  return "haptic-" + std::to_string(devices.front()->scene.loop.device);
+}
+
+std::vector<Server::HapticThread> Server::haptic_threads_of(const DeviceRuntimes& devices) {
+  std::vector<HapticThread> threads;
+  for (const auto& runtime : devices) {
+    const Scene& scene = runtime->scene;
+    const auto has_room = [&scene](const HapticThread& thread) {
+      const Scene& other = thread.devices.front()->scene;
+      const auto count = static_cast<Duration::rep>(thread.devices.size());
+      return scene.shares_thread() && other.shares_thread() && other.loop.period == scene.loop.period &&
+             other.cpu == scene.cpu && kStepBudget * (count + 1) <= scene.loop.period;
+    };
+    auto place = std::ranges::find_if(threads, has_room);
+    if (place == threads.end()) place = threads.emplace(threads.end());
+    place->devices.push_back(runtime.get());
+  }
+  return threads;
 }
 
 std::vector<Mailboxes*> Server::mail_of(const DeviceRuntimes& devices) {
@@ -243,6 +272,7 @@ NetworkLoop::Config Server::network_config(const DeviceRuntimes& devices) {
     throw std::invalid_argument("network.suites: this processor has no AES instructions, so it cannot seal by " +
                                 names_of(scene.network.suites) + " only: expected chacha20-poly1305 besides");
   }
+  if (scene.network.unix_path) config.needs_no_key = UnixSocket::is_peer;
   config.server_name = "tendond " + std::string(kVersion);
   for (const auto& runtime : devices) {
     const DeviceInfo info = runtime->safe ? runtime->safe->info() : runtime->device->info();
@@ -272,6 +302,7 @@ NetworkLoop::Config Server::network_config(const DeviceRuntimes& devices) {
   config.controller_timeout = scene.network.controller_timeout;
   config.observer_timeout = scene.network.observer_timeout;
   config.adapt_state_rate = scene.network.adapt_state_rate;
+  config.record = scene.recording.has_value();
   if (scene.recording) config.recorded.bytes_per_s = static_cast<std::uint64_t>(scene.recording->datagram_bytes_per_s);
   return config;
 }
@@ -280,10 +311,12 @@ Server::Server(const std::vector<Scene>& scenes)
     : started_(clock::now()),
       guardian_(make_guardian(checked(scenes))),
       devices_(runtimes_of(scenes, guardian_.get())),
-      link_(scenes.front().network.listen, scenes.front().network.keys ? Reach::kAnywhere : Reach::kThisMachine),
+      link_(scenes.front().network.listen, scenes.front().network.keys ? Reach::kAnywhere : Reach::kThisMachine,
+            scenes.front().network.unix_path),
       network_(network_config(devices_), scenes.front().network.busy ? static_cast<Link&>(busy_link_) : link_,
                mail_of(devices_)),
-      tell_next_(started_ + kTellPeriod) {
+      tell_next_(started_ + kTellPeriod),
+      haptic_threads_(haptic_threads_of(devices_)) {
   announcer_ = announcer_of(scenes, link_.local_address());
   recorder_ = recorder_of(scenes, started_);  // last, so that a refusal before it leaves no file behind
 }
@@ -310,8 +343,11 @@ void Server::start(std::optional<Duration> run_for) {
       });
     }
     network_thread_ = thread_of("network", [this] { run_network(); });
-    for (auto& runtime : devices_) {
-      runtime->thread = thread_of(haptic_name(runtime->scene), [this, &runtime = *runtime] { run_haptic(runtime); });
+    for (HapticThread& haptic : haptic_threads_) {
+      haptic.thread = thread_of(haptic.name(), [this, &haptic] {
+        name_thread(haptic.name());
+        run_haptic(haptic.devices);
+      });
     }
   } catch (...) {
     end_threads();
@@ -325,7 +361,7 @@ void Server::end_threads() {
   };
   if (announcer_) announcer_->stop();
   stop_haptic_.store(true, std::memory_order_release);
-  for (auto& runtime : devices_) join(runtime->thread);
+  for (HapticThread& haptic : haptic_threads_) join(haptic.thread);
   stop_network_.store(true, std::memory_order_release);
   stepped_.ring();
   join(network_thread_);
@@ -362,24 +398,25 @@ bool Server::turning() {
   return all;
 }
 
-void Server::run_haptic(DeviceRuntime& runtime) {
-  name_thread(haptic_name(runtime.scene));
-  const bool first = &runtime == devices_.front().get();
+void Server::run_haptic(const std::vector<DeviceRuntime*>& devices) {
+  DeviceRuntime& first = *devices.front();
   for (const std::string& refused : enter_realtime(kHapticPriority)) {
-    if (first) log::warn(refused);  // to all of them alike
-    runtime.not_realtime.store(true, std::memory_order_relaxed);
+    if (&first == devices_.front().get()) log::warn(refused);  // to all of them alike
+    for (DeviceRuntime* runtime : devices) runtime->not_realtime.store(true, std::memory_order_relaxed);
   }
-  if (runtime.scene.cpu) {
-    if (const auto refused = stay_on(*runtime.scene.cpu)) log::warn(prefix(runtime) + *refused);
+  if (first.scene.cpu) {
+    if (const auto refused = stay_on(*first.scene.cpu)) log::warn(prefix(first) + *refused);
   }
   LocalTime due = clock::now();
   const LocalTime end = run_for_ ? due + *run_for_ : LocalTime::max();
   while (!stop_haptic_.load(std::memory_order_acquire) && due < end) {
-    due = runtime.haptic.step(clock::now());
+    // With one instant for all, and one period, all are due together again: one wake-up, however late.
+    const LocalTime now = clock::now();
+    for (DeviceRuntime* runtime : devices) due = runtime->haptic.step(now);
     stepped_.ring();
     clock::sleep_until(due);
   }
-  runtime.haptic.stop();
+  for (DeviceRuntime* runtime : devices) runtime->haptic.stop();
 }
 
 void Server::run_network() {
@@ -465,7 +502,8 @@ void Server::drain_to_recorder(LocalTime now) {
   const std::uint64_t datagrams_lost = news(first.datagrams_lost, told_datagrams_lost_);
   if (steps_lost > 0 || datagrams_lost > 0) {
     log::warn("the log thread could not follow: " + std::to_string(steps_lost) + " steps and " +
-              std::to_string(datagrams_lost) + " datagrams are missing");
+              std::to_string(datagrams_lost) + " datagrams are missing" +
+              (recorder_ ? "" : " in the counts of health"));
     if (recorder_) recorder_->lost({.at = now, .steps = steps_lost, .datagrams = datagrams_lost});
   }
   if (!recorder_) return;

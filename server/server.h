@@ -31,12 +31,13 @@
 
 namespace tendon {
 
-/// The server: a device with its haptic loop for each scene, one network loop and one recording, each on a thread of
-/// its own.
+/// The server: a device with its haptic loop for each scene, one network loop and one recording. A device with a plug
+/// has a haptic thread of its own, so that none waits for it; of the others all with the same period and processor
+/// share one, and are stepped one after the other at the same instant.
 ///
 /// | thread  | owns                         | waits for                               | may                     |
 /// |---------|------------------------------|-----------------------------------------|-------------------------|
-/// | haptic… | HapticLoop, Device           | the absolute time of its next step      | nothing but compute     |
+/// | haptic… | HapticLoops, Devices         | the absolute time of their next step    | nothing but compute     |
 /// | network | NetworkLoop, UdpLink         | a datagram, a haptic step, a timer      | allocate, log rarely    |
 /// | log     | PartRecorder, meters          | 20 ms                                   | allocate, write, log    |
 /// | announce| Announcer, if a scene has one | D-Bus                                   | allocate, log           |
@@ -94,7 +95,6 @@ class Server {
     std::unique_ptr<SafeDevice> safe;  ///< around it; null when the scene lists none
     Mailboxes mail;
     HapticLoop haptic;
-    std::thread thread;
     std::atomic<bool> not_realtime{false};  ///< the kernel refused its haptic thread something
     std::uint64_t steps_seen = 0;           ///< by turning()
     HealthMeter meter;                      ///< the log thread's
@@ -109,13 +109,21 @@ class Server {
   };
   using DeviceRuntimes = std::vector<std::unique_ptr<DeviceRuntime>>;
 
+  /// Steps devices of one period, on one processor.
+  struct HapticThread {
+    std::vector<DeviceRuntime*> devices;
+    std::string name() const;  ///< of its first device
+    std::thread thread{};
+  };
+
   static DeviceRuntimes runtimes_of(const std::vector<Scene>& scenes, Guardian* guardian);
+  static std::vector<HapticThread> haptic_threads_of(const DeviceRuntimes& devices);
   static NetworkLoop::Config network_config(const DeviceRuntimes& devices);
   static std::vector<Mailboxes*> mail_of(const DeviceRuntimes& devices);
   /// "left: ", where there is more than one.
   std::string prefix(const DeviceRuntime& runtime) const;
   void end_threads();  ///< those that run: the haptic ones first, with zero force
-  void run_haptic(DeviceRuntime& runtime);
+  void run_haptic(const std::vector<DeviceRuntime*>& devices);
   void run_network();
   void watch_until(LocalTime due);
   void tell_notices();
@@ -153,6 +161,7 @@ class Server {
   std::atomic<bool> stop_network_{false};
   std::atomic<bool> stop_log_{false};
   std::optional<WakefulProcessors> wakeful_;  ///< while the threads run
+  std::vector<HapticThread> haptic_threads_;
   std::thread network_thread_;
   std::thread log_thread_;
   std::thread announce_thread_;  ///< where there is an announcer

@@ -4,6 +4,7 @@
 #include <netdb.h>
 #include <netinet/in.h>
 #include <sys/socket.h>
+#include <sys/un.h>
 
 #include <algorithm>
 #include <cctype>
@@ -59,6 +60,19 @@ std::optional<dns_sd::Instance> instance_in(std::string_view text) {
   return std::nullopt;
 }
 
+/// The file of "unix:PATH"; empty for what does not begin so.
+std::string unix_path_in(std::string_view text) {
+  constexpr std::string_view kScheme = "unix:";
+  constexpr std::size_t kMost = sizeof sockaddr_un::sun_path - 1;
+  if (!text.starts_with(kScheme)) return {};
+  text.remove_prefix(kScheme.size());
+  if (text.empty() || text.size() > kMost || text.find('\0') != std::string_view::npos) {
+    throw std::invalid_argument("expected unix:PATH with a path of 1 to " + std::to_string(kMost) +
+                                " bytes, like unix:/run/tendon.sock, got \"unix:" + std::string(text) + "\"");
+  }
+  return std::string(text);
+}
+
 Address from_system(const addrinfo& found, std::uint16_t port) {
   Address address;
   if (found.ai_family == AF_INET) {
@@ -96,13 +110,15 @@ std::vector<Address> addresses_of(const std::string& host, std::uint16_t port) {
 
 }  // namespace
 
-ServerName::ServerName(std::string text) : text_(std::move(text)), instance_(instance_in(text_)) {
-  if (!instance_ && !split(text_)) parse_address(text_);  // throws what is wrong
+ServerName::ServerName(std::string text)
+    : text_(std::move(text)), unix_path_(unix_path_in(text_)), instance_(instance_in(text_)) {
+  if (unix_path_.empty() && !instance_ && !split(text_)) parse_address(text_);  // throws what is wrong
 }
 
 ServerName::ServerName(const Address& address) : text_(to_string(address)) {}
 
 ServerName::Place ServerName::look_up(bool has_key) const {
+  if (!unix_path_.empty()) return {{parse_address("127.240.0.0:0")}, {}};
   if (const auto address = numeric(text_)) return {{*address}, {}};
   if (!instance_) {
     const auto [host, port] = *split(text_);
@@ -125,6 +141,7 @@ ServerName::Place ServerName::look_up(bool has_key) const {
 }
 
 std::string ServerName::at(const Address& address) const {
+  if (!unix_path_.empty()) return text_;
   const auto own = numeric(text_);
   return own && *own == address ? text_ : text_ + " (" + to_string(address) + ")";
 }

@@ -11,7 +11,9 @@
 namespace tendon {
 
 /// Where a server is, as a person writes it: "haptics.lab:47100", "127.0.0.1:47100", "[::1]:47100" or
-/// "localhost:47100", which is 127.0.0.1; or the name of a device that DNS-SD finds (clients/cpp/discovery):
+/// "localhost:47100", which is 127.0.0.1; "unix:/run/tendon.sock", the file of a server on this machine ([network] unix
+/// of its scene), where the file's permissions are the key; or the name of a device that DNS-SD finds
+/// (clients/cpp/discovery):
 ///
 ///     dns-sd:falcon at bench 3              on the local network; tendon://falcon at bench 3 is the same
 ///     dns-sd:falcon at bench 3.example.org  by the name servers of that domain
@@ -26,6 +28,9 @@ class ServerName {
 
   const std::string& text() const noexcept { return text_; }
 
+  /// The file of a Unix socket, of at most 107 bytes; empty for all else.
+  const std::string& unix_path() const noexcept { return unix_path_; }
+
   /// What DNS-SD is to look for; empty for HOST:PORT.
   const std::optional<dns_sd::Instance>& instance() const noexcept { return instance_; }
 
@@ -34,9 +39,10 @@ class ServerName {
     std::string device;              ///< that DNS-SD names; empty: none
   };
 
-  /// Where this name leads. A numeric address is its own, at once. A host name is looked up by the system (/etc/hosts,
-  /// DNS, …), which waits, up to some seconds where no name server answers; so does DNS-SD. Throws std::runtime_error
-  /// when there is nothing: "cannot find haptics.lab: Name or service not known".
+  /// Where this name leads. A numeric address is its own, at once; the file of a socket stands for "127.240.0.0:0". A
+  /// host name is looked up by the system (/etc/hosts, DNS, …), which waits, up to some seconds where no name server
+  /// answers; so does DNS-SD. Throws std::runtime_error when there is nothing: "cannot find haptics.lab: Name or
+  /// service not known".
   ///
   /// Anybody can announce any name, and without a key a client believes whoever answers. So a name of DNS-SD is refused
   /// unless the caller `has_key`, and speaks with that key alone.
@@ -47,6 +53,7 @@ class ServerName {
 
  private:
   std::string text_;
+  std::string unix_path_;
   std::optional<dns_sd::Instance> instance_;
 };
 

@@ -5,8 +5,11 @@
 #include <sys/socket.h>
 
 #include <algorithm>
+#include <asio/generic/datagram_protocol.hpp>
 #include <asio/io_context.hpp>
 #include <asio/ip/udp.hpp>
+#include <asio/local/datagram_protocol.hpp>
+#include <cerrno>
 #include <chrono>
 #include <ctime>
 #include <stdexcept>
@@ -34,8 +37,26 @@ udp::endpoint to_endpoint(const Address& address) {
 
 struct UdpTransport::Socket {
   asio::io_context context;
-  udp::socket socket{context};
+  asio::generic::datagram_protocol::socket socket{context};
 };
+
+/// From a name of the kernel's (unix(7), autobind), so that the server can answer.
+void UdpTransport::connect_to_file() {
+  const asio::local::datagram_protocol::endpoint file(name_.unix_path());
+  try {
+    auto socket = std::make_unique<Socket>();
+    socket->socket.open(file.protocol());
+    const sockaddr unnamed{.sa_family = AF_UNIX, .sa_data = {}};
+    if (::bind(socket->socket.native_handle(), &unnamed, sizeof unnamed.sa_family) != 0) {
+      throw std::system_error(errno, std::system_category());
+    }
+    socket->socket.connect(file);
+    socket->socket.non_blocking(true);
+    socket_ = std::move(socket);
+  } catch (const std::system_error& error) {
+    throw std::runtime_error("cannot reach " + name_.text() + ": " + error.code().message());
+  }
+}
 
 UdpTransport::UdpTransport(const ServerName& server, bool has_key) : name_(server), has_key_(has_key) {
   ServerName::Place place = name_.look_up(has_key_);
@@ -47,6 +68,11 @@ UdpTransport::~UdpTransport() = default;
 
 /// Connects to the first one that the system can reach, in their order, beginning with the one at `first`.
 void UdpTransport::connect(const std::vector<Address>& addresses, std::size_t first) {
+  if (!name_.unix_path().empty()) {
+    connect_to_file();
+    server_ = addresses.front();
+    return;
+  }
   std::string problem;
   for (std::size_t i = 0; i < addresses.size(); ++i) {
     const Address& address = addresses[(first + i) % addresses.size()];
@@ -67,7 +93,8 @@ void UdpTransport::connect(const std::vector<Address>& addresses, std::size_t fi
 void UdpTransport::look_up_again(bool another) {
   const std::vector<Address> addresses = name_.look_up(has_key_).addresses;
   const auto present = std::find(addresses.begin(), addresses.end(), server_);
-  if (present != addresses.end() && (!another || addresses.size() == 1)) return;
+  const bool stays = name_.unix_path().empty() && present != addresses.end();
+  if (stays && (!another || addresses.size() == 1)) return;
   connect(addresses, present == addresses.end() ? 0 : static_cast<std::size_t>(present - addresses.begin()) + 1);
 }
 

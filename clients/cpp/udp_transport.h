@@ -11,8 +11,9 @@
 
 namespace tendon {
 
-/// The guest's end of the wire: a UDP socket that talks to one server, from a port that the system chooses. The socket
-/// is connected, so the kernel drops what others send to it.
+/// The guest's end of the wire: a UDP socket that talks to one server, from a port that the system chooses; or, for
+/// "unix:PATH", a Unix datagram socket that talks to a server on this machine, from a name that the kernel chooses. The
+/// socket is connected, so the kernel drops what others send to it.
 ///
 /// Thread-safe: no. Realtime-safe: no (system calls).
 class UdpTransport : public Link {
@@ -30,8 +31,8 @@ class UdpTransport : public Link {
   const std::string& device() const noexcept { return device_; }
 
   /// Looks the name up again, which may wait: to be called while no session is open. Stays with the present address
-  /// where the name still has it, or, with `another`, goes on to the one after it. Throws as the constructor does; then
-  /// the present address stays in use.
+  /// where the name still has it, or, with `another`, goes on to the one after it. A Unix socket's file may be another
+  /// server's by now: it is opened again. Throws as the constructor does; then the present address stays in use.
   void look_up_again(bool another);
 
   /// `to` must be server(); a datagram to anybody else, or one that the system does not take, is lost.
@@ -56,6 +57,7 @@ class UdpTransport : public Link {
 
  private:
   struct Socket;  // keeps Asio out of this header
+  void connect_to_file();
   void connect(const std::vector<Address>& addresses, std::size_t first);
 
   ServerName name_;

@@ -399,6 +399,9 @@ std::string in_words(const Scene& scene, const Explanation& explanation) {
     text << "  " << scene.channels[leader.channel].name << " counts " << leader.share << " of that\n";
   }
   text << "the limiter's promise: " << promise_of(scene.loop.control.limiter) << '\n';
+  text << "its haptic thread: "
+       << (scene.shares_thread() ? "one with all devices without a plug that have this period and processor\n"
+                                 : "its own, so that no other device waits for its plug\n");
   text << "in other threads: " << scene.channels.size() << (scene.channels.size() == 1 ? " channel" : " channels")
        << " for engines" << (scene.network.keys ? ", sealed by " + spoken_here(scene.network.suites) : "") << ", "
        << (scene.recording ? "a recording" : "no recording")

@@ -86,7 +86,8 @@ std::optional<Refusal> Admission::reason_to_refuse(const Address& from, const Cl
                                                    const std::vector<Seat>& seats,
                                                    const std::vector<ServedDevice>& devices,
                                                    const std::vector<Guest>& guests) const {
-  if (key == nullptr && config_.keys > 0) {
+  const bool let_in = config_.keys == 0 || (config_.needs_no_key != nullptr && config_.needs_no_key(from));
+  if (key == nullptr && !let_in) {
     return Refusal{Code::kDenied, "this server lets in those who have a key: --key FILE"};
   }
   const bool controls = std::any_of(seats.begin(), seats.end(), is_controller);
@@ -111,7 +112,7 @@ std::optional<Refusal> Admission::reason_to_refuse(const Address& from, const Cl
   if (const std::size_t observers = count(observes); !controls && observers >= config_.max_observers) {
     return Refusal{Code::kBusy, "there are " + std::to_string(observers) + " observers already"};
   }
-  if (!controls && config_.keys > 1) {
+  if (!controls && key != nullptr && config_.keys > 1) {
     const std::size_t of_key = count([&](const Guest& guest) { return observes(guest) && guest.key == key; });
     // One key gets at most half of the places (at least one), so that it cannot keep all the others out.
     if (of_key >= std::max<std::size_t>((config_.max_observers + 1) / 2, 1)) {

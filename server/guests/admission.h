@@ -24,7 +24,8 @@ struct Refusal {
 class Admission {
  public:
   struct Config {
-    std::size_t keys = 0;           ///< of the server; 0: it lets in whoever comes, in the clear
+    std::size_t keys = 0;  ///< of the server; 0: it lets in whoever comes, in the clear
+    bool (*needs_no_key)(const Address& from) noexcept = nullptr;  ///< see NetworkLoop::Config
     std::size_t max_observers = 8;  ///< where there are several keys, one key has at most half of them, rounded up
   };
 

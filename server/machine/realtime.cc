@@ -8,9 +8,15 @@
 #include <sys/prctl.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <cstddef>
+#include <cstdint>
+#include <fstream>
+#include <ranges>
+#include <sstream>
+#include <string_view>
 #include <system_error>
 
 namespace tendon {
@@ -25,7 +31,67 @@ void touch_stack() {
   for (std::size_t i = 0; i < kBytes; i += kPage) stack[i] = std::byte{0};
 }
 
+/// A line of /proc/self/maps.
+struct Mapping {
+  std::uintptr_t from = 0;
+  std::uintptr_t to = 0;
+  bool readable = false;
+  std::string of;  ///< a file, or "[heap]"; empty: memory without a name
+};
+
+std::vector<Mapping> mappings() {
+  std::vector<Mapping> found;
+  std::ifstream maps("/proc/self/maps");
+  for (std::string line; std::getline(maps, line);) {
+    Mapping mapping;
+    std::istringstream words(line);
+    std::string access;
+    std::string skipped;
+    char dash = 0;
+    words >> std::hex >> mapping.from >> dash >> mapping.to >> access >> skipped >> skipped >> skipped >> mapping.of;
+    mapping.readable = access.starts_with('r');
+    found.push_back(std::move(mapping));
+  }
+  return found;
+}
+
+/// Whether a haptic step runs, reads or writes what is mapped from there: not the libraries of the network and of the
+/// log.
+bool is_of_a_step(const Mapping& mapping, const std::string& program) {
+  if (mapping.of == program || mapping.of == "[heap]") return true;
+  constexpr std::array<std::string_view, 2> kLibraries = {"libc.so", "libm.so"};
+  const std::string_view file = std::string_view(mapping.of).substr(mapping.of.rfind('/') + 1);
+  return std::ranges::any_of(kLibraries, [file](std::string_view library) { return file.starts_with(library); });
+}
+
+/// Locks each page from its first use on, and uses now what a step may use later. 0, or an errno.
+int lock_memory() {
+  if (mlockall(MCL_CURRENT | MCL_FUTURE | MCL_ONFAULT) != 0) return errno;
+  const std::vector<Mapping> all = mappings();
+  if (all.empty()) return mlockall(MCL_CURRENT | MCL_FUTURE) == 0 ? 0 : errno;  // without /proc: everything
+  const std::string& program = all.front().of;
+  bool before = false;  // the mapping just below is of a step: variables without a value lie behind their program
+  std::uintptr_t below = 0;
+  for (const Mapping& mapping : all) {
+    const bool goes_on = before && mapping.of.empty() && mapping.from == below;
+    before = mapping.readable && (goes_on || is_of_a_step(mapping, program));
+    below = mapping.to;
+    // The address is a number in that file.
+    if (before && mlock(reinterpret_cast<const void*>(mapping.from), mapping.to - mapping.from) != 0) return errno;
+  }
+  return 0;
+}
+
 }  // namespace
+
+void use_small_stacks() {
+  // A haptic thread touches 136 kB beforehand; network and log, with sessions and a recording, have used 16.
+  constexpr std::size_t kBytes = 256 * 1024;
+  pthread_attr_t attributes;
+  if (pthread_attr_init(&attributes) != 0) return;
+  if (pthread_attr_setstacksize(&attributes, kBytes) == 0) pthread_setattr_default_np(&attributes);
+  pthread_attr_destroy(&attributes);
+}
 
 void name_thread(const std::string& name) { prctl(PR_SET_NAME, name.c_str(), 0UL, 0UL, 0UL); }
 
@@ -47,9 +113,9 @@ std::vector<std::string> enter_realtime(int priority) {
                       "); expect late steps under load. Grant it with LimitRTPRIO= in the unit, or rtprio in "
                       "/etc/security/limits.d");
   }
-  if (mlockall(MCL_CURRENT | MCL_FUTURE) != 0) {
+  if (const int error = lock_memory(); error != 0) {
     refused.push_back(
-        "memory is not locked (mlockall: " + std::system_category().message(errno) +
+        "memory is not locked (mlockall: " + std::system_category().message(error) +
         "); a page fault may delay a step. Grant it with LimitMEMLOCK=infinity in the unit, or memlock in "
         "/etc/security/limits.d");
   }

@@ -12,9 +12,15 @@ namespace tendon {
 /// Below the kernel's own watchdog and migration threads (99) and above ordinary IRQ threads (50).
 inline constexpr int kHapticPriority = 70;
 
+/// Gives each thread that the process starts from now on a stack of 256 kB. The system's 8 MB for each would count in
+/// full where locked memory is limited (RLIMIT_MEMLOCK). Before the first thread.
+void use_small_stacks();
+
 /// Asks the kernel to treat the calling thread as a haptic thread: SCHED_FIFO, no timer slack, memory locked, stack
-/// touched beforehand. Returns a plain sentence for each request that was refused, which says what would grant it. The
-/// thread then runs all the same, but may wake late.
+/// touched beforehand. Every page of the process is locked from its first use on. Those that a step may use are brought
+/// in now: the program, the C library and its mathematics, the heap; rings and mailboxes are written when they are
+/// made. Returns a plain sentence for each request that was refused, which says what would grant it. The thread then
+/// runs all the same, but may wake late.
 ///
 /// `priority`: 1…99.
 std::vector<std::string> enter_realtime(int priority);

@@ -48,7 +48,8 @@ struct UdpLink::Socket {
   asio::ip::udp::socket udp{context};
 };
 
-UdpLink::UdpLink(const Address& listen, Reach reach) : socket_(std::make_unique<Socket>()) {
+UdpLink::UdpLink(const Address& listen, Reach reach, const std::optional<std::filesystem::path>& file)
+    : socket_(std::make_unique<Socket>()) {
   if (reach == Reach::kThisMachine && !is_loopback(listen)) {
     throw std::invalid_argument("refusing to listen on " + to_string(listen) +
                                 ": there are no keys, so anyone on the network could command forces; use a loopback "
@@ -65,17 +66,30 @@ UdpLink::UdpLink(const Address& listen, Reach reach) : socket_(std::make_unique<
   } catch (const std::system_error& error) {
     throw std::runtime_error("cannot listen on " + to_string(listen) + ": " + error.code().message());
   }
+  if (file) unix_.emplace(*file);
 }
 
 UdpLink::~UdpLink() = default;
 
 void UdpLink::send(const Address& to, std::span<const std::byte> datagram) {
+  if (unix_ && UnixSocket::is_peer(to)) {
+    if (!unix_->send(to, datagram)) send_failures_.add();
+    return;
+  }
   asio::error_code error;
   socket_->udp.send_to(asio::buffer(datagram.data(), datagram.size()), to_endpoint(to), 0, error);
   if (error) send_failures_.add();
 }
 
 std::size_t UdpLink::receive(Address& from, std::span<std::byte> buffer) {
+  if (!unix_) return receive_from_network(from, buffer);
+  unix_first_ = !unix_first_;
+  const std::size_t size = unix_first_ ? unix_->receive(from, buffer) : receive_from_network(from, buffer);
+  if (size != 0) return size;
+  return unix_first_ ? receive_from_network(from, buffer) : unix_->receive(from, buffer);
+}
+
+std::size_t UdpLink::receive_from_network(Address& from, std::span<std::byte> buffer) {
   // Asio cannot tell the full size of a truncated datagram, so this calls the system directly.
   udp::endpoint endpoint;
   for (int i = 0; i < kMaxEmptyDatagrams; ++i) {
@@ -86,6 +100,7 @@ std::size_t UdpLink::receive(Address& from, std::span<std::byte> buffer) {
     if (size < 0) return 0;
     endpoint.resize(length);
     from = to_address(endpoint);
+    if (UnixSocket::is_peer(from)) continue;  // no port is 0, unless somebody makes it up
     return static_cast<std::size_t>(size);
   }
   return 0;
@@ -95,7 +110,8 @@ LocalTime UdpLink::present(LocalTime now) const { return std::max(now, clock::no
 
 void UdpLink::wait(Duration timeout, Doorbell* doorbell) {
   // poll() ignores an entry with a negative descriptor.
-  std::array<pollfd, 2> fds = {pollfd{fd(), POLLIN, 0}, pollfd{doorbell != nullptr ? doorbell->fd() : -1, POLLIN, 0}};
+  std::array<pollfd, 3> fds = {pollfd{fd(), POLLIN, 0}, pollfd{doorbell != nullptr ? doorbell->fd() : -1, POLLIN, 0},
+                               pollfd{unix_ ? unix_->fd() : -1, POLLIN, 0}};
   const Duration left = std::max(timeout, Duration::zero());
   const auto whole = std::chrono::duration_cast<std::chrono::seconds>(left);
   const timespec time{static_cast<time_t>(whole.count()), static_cast<long>((left - whole).count())};

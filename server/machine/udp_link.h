@@ -2,12 +2,15 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
 #include <memory>
+#include <optional>
 
 #include "core/base/time.h"
 #include "core/exchange/counter.h"
 #include "protocol/link.h"
 #include "server/machine/doorbell.h"
+#include "server/machine/unix_socket.h"
 
 namespace tendon {
 
@@ -17,7 +20,8 @@ enum class Reach : std::uint8_t {
   kAnywhere,     ///< only for servers that require a key
 };
 
-/// The real link: one UDP socket on one address of this machine, IPv4 or IPv6.
+/// The real link: one UDP socket on one address of this machine, IPv4 or IPv6; and, on demand, a Unix socket for
+/// engines on the same machine.
 ///
 /// send() and receive() never wait; wait() is the only place where the network thread sleeps.
 /// Anybody may send anything; nothing here looks inside the datagrams.
@@ -29,14 +33,18 @@ class UdpLink : public Link {
   /// `listen` is not a loopback address and the caller has not allowed others: without keys anybody on the network
   /// could command forces. Throws std::runtime_error when the system refuses: "cannot listen on 127.0.0.1:47100:
   /// Address already in use".
-  explicit UdpLink(const Address& listen, Reach reach = Reach::kThisMachine);
+  ///
+  /// `file`: of the Unix socket; throws as UnixSocket does.
+  explicit UdpLink(const Address& listen, Reach reach = Reach::kThisMachine,
+                   const std::optional<std::filesystem::path>& file = std::nullopt);
   ~UdpLink() override;
 
   /// A datagram that the system does not take at once (full buffer, no route, other address family)
   /// is lost, and counted in send_failures().
   void send(const Address& to, std::span<const std::byte> datagram) override;
 
-  /// As Link says. Empty datagrams are skipped: they say nothing, and 0 means that none is waiting.
+  /// As Link says, of both sockets in turns. Empty datagrams are skipped: they say nothing, and 0 means that none is
+  /// waiting.
   std::size_t receive(Address& from, std::span<std::byte> buffer) override;
 
   /// The time by clock::now().
@@ -54,12 +62,16 @@ class UdpLink : public Link {
   /// Datagrams that send() could not hand to the system. From any thread.
   std::uint64_t send_failures() const noexcept { return send_failures_.value(); }
 
-  /// The socket's file descriptor, for whoever polls several links at once.
+  /// The UDP socket's file descriptor, for whoever polls several links at once.
   int fd() const noexcept;
 
  private:
   struct Socket;  // keeps Asio out of this header
+  std::size_t receive_from_network(Address& from, std::span<std::byte> buffer);
+
   std::unique_ptr<Socket> socket_;
+  std::optional<UnixSocket> unix_;
+  bool unix_first_ = false;  ///< a flood through the one must not close the other
   Counter send_failures_;
 };
 

@@ -25,7 +25,7 @@ std::unique_ptr<FileSink> open_flight(const std::optional<std::filesystem::path>
   }
 }
 
-void write_flight(const FlightRecorder<StepRecord>& flight, const Recorder::Config& config, ByteSink& sink) {
+void write_flight(const StepFlight& flight, const Recorder::Config& config, ByteSink& sink) {
   Recorder recorder(config, sink);
   for (std::size_t i = 0; i < flight.size(); ++i) recorder.record(flight[i]);
   recorder.close();

@@ -6,10 +6,10 @@
 #include <optional>
 #include <string>
 
-#include "core/exchange/flight_recorder.h"
 #include "server/recording/byte_sink.h"
 #include "server/recording/recorder.h"
 #include "server/recording/records.h"
+#include "server/recording/step_flight.h"
 
 namespace tendon {
 
@@ -27,6 +27,6 @@ std::unique_ptr<FileSink> open_flight(const std::optional<std::filesystem::path>
 ///
 /// `flight` must be frozen, and is left so. Throws std::runtime_error with the sink's reason when not all of them could
 /// be written. Log thread only.
-void write_flight(const FlightRecorder<StepRecord>& flight, const Recorder::Config& config, ByteSink& sink);
+void write_flight(const StepFlight& flight, const Recorder::Config& config, ByteSink& sink);
 
 }  // namespace tendon

@@ -11,8 +11,8 @@
 
 namespace tendon {
 
-/// One haptic step, as it is recorded: all inputs that are needed to repeat it, and what the device did.
-struct StepRecord : Step {
+/// What the loop knows of a step besides the controller.
+struct LoopStep {
   std::uint64_t tick = 0;
   LocalTime scheduled{};        ///< when the step was due
   Vec3 applied = Vec3::Zero();  ///< N, really given out by the device (`force` is what it was told)
@@ -20,6 +20,9 @@ struct StepRecord : Step {
   bool disarmed = false;        ///< the operator had disarmed the device
   std::uint32_t buttons = 0;    ///< bit i is set while button i of the handle was held
 };
+
+/// One haptic step, as it is recorded: all inputs that are needed to repeat it, and what the device did.
+struct StepRecord : Step, LoopStep {};
 
 /// What a coupling did in one haptic step: with the StepRecord of the same tick, and the other couplings of that tick
 /// in their order, enough to repeat it.

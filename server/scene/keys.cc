@@ -418,6 +418,10 @@ void declare_scene(Table& scene, Draft& draft) {
     Scene::Network& network = draft.scene.network;
     keys.key("listen", network.listen, NetworkAddress{},
              "port 0 lets the system choose one. Without keys a loopback address");
+    keys.key(
+        "unix", network.unix_path, Path{},
+        "file of a socket for engines on this machine, which come in by --server unix:PATH; its user and group may. "
+        "Relative to the current directory, at most 107 bytes");
     keys.key("keys", network.keys, Path{},
              "folder with a file NAME.key for each client, relative to this file; only they are let in");
     keys.key("suites", network.suites, ListOf<Names<Suite>>{suite_names()},

@@ -24,6 +24,7 @@
 #include "core/handle/turn_friction.h"
 #include "devices/simulated/recorded_motion.h"
 #include "server/machine/regular_file.h"
+#include "server/machine/unix_socket.h"
 #include "server/scene/reader.h"
 #include "server/scene/recorded_hand.h"
 #include "server/scene/values.h"
@@ -272,7 +273,12 @@ class SceneResolver {
     if (!network.keys && file_.at_path("network.suites")) {
       blame("network.suites", {}, "expected none without keys: nothing is sealed then");
     }
-    // UdpLink refuses it too, but cannot name the line.
+    // UdpLink refuses these too, but cannot name the line.
+    if (network.unix_path && network.unix_path->native().size() > UnixSocket::kMostPath) {
+      blame("network.unix", {},
+            "expected a path of at most " + std::to_string(UnixSocket::kMostPath) + " bytes, found " +
+                std::to_string(network.unix_path->native().size()));
+    }
     if (!network.keys && !is_loopback(network.listen)) {
       blame("network.listen", {},
             "expected a loopback address like \"127.0.0.1:47100\" or \"[::1]:47100\", or a folder of keys besides: "

@@ -32,7 +32,8 @@ namespace tendon {
 struct Scene {
   struct Network {
     Address listen = parse_address("127.0.0.1:47100");
-    std::optional<std::filesystem::path> keys;  ///< folder; empty: anybody on this machine may come in
+    std::optional<std::filesystem::path> unix_path{};  ///< see UnixSocket; relative to the current directory
+    std::optional<std::filesystem::path> keys;         ///< folder; empty: anybody on this machine may come in
     /// By which those with a key may seal their sessions. The server speaks those of them that its processor can.
     Suites suites = all_suites();
     std::size_t max_observers = NetworkLoop::Config{}.max_observers;
@@ -99,6 +100,8 @@ struct Scene {
 
   /// The row of its device.
   const Driver& driver() const;
+  /// Its device has no plug, so that it computes and never waits: one haptic thread may step several of them.
+  bool shares_thread() const { return driver().ids.empty(); }
   /// The simulated device itself; for any other, the simulation that stands in where the cost of a step is measured.
   SimulatedDevice::Config simulated() const;
 };

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
 
+#include <csignal>
 #include <filesystem>
+#include <memory>
 #include <string>
 
 #include "tests/e2e/stage/process.h"
@@ -63,6 +65,40 @@ TEST(Security, AClientWithItsKeyControlsAndAnObserverWatches) {
   }
   // Each said Bye three times; what comes in a turn after the first belongs to nobody.
   EXPECT_LE(count_in(end, "unknown_connection"), 4U);
+}
+
+TEST(Security, ThePermissionToWriteToTheSocketsFileIsAKey) {
+  Lab lab;
+  const std::string scene = write(lab.folder() / "near.toml",
+                                  "[device]\nkind = \"simulated\"\nprofile = \"falcon\"\n"
+                                  "[network]\nkeys = \"keys\"\nlisten = \"0.0.0.0:0\"\nunix = \"near.sock\"\n");
+  Server server(lab.folder(), scene);
+  Client wall("virtual_wall", "unix:near.sock", lab.folder());
+  wall.wait_for_line("connected to falcon");
+  Client screen("echo_motion", "unix:" + (lab.folder() / "near.sock").string(), lab.folder());
+  screen.wait_for_line("position");
+  Client plain("virtual_wall", on_this_machine(server.address()), lab.folder());
+  EXPECT_EQ(plain.wait(), 1);
+  EXPECT_NE(plain.err().find("this server lets in those who have a key: --key FILE"), std::string::npos) << plain.err();
+  wall.signal(SIGTERM);
+  EXPECT_EQ(wall.wait(), 0);
+  EXPECT_EQ(count_in(server.stop(), "welcomed"), 2U);
+  EXPECT_FALSE(std::filesystem::exists(lab.folder() / "near.sock"));
+}
+
+TEST(Security, AGuestOfASocketsFileFindsTheServerAgainThatIsStartedAnew) {
+  const ScratchFolder folder;
+  const std::string scene = write(folder.path() / "near.toml",
+                                  "[device]\nkind = \"simulated\"\nprofile = \"falcon\"\n"
+                                  "[network]\nunix = \"near.sock\"\n");
+  auto server = std::make_unique<Server>(folder.path(), scene);
+  Client wall("virtual_wall", "unix:near.sock", folder.path());
+  wall.wait_for_line("connected to falcon");
+  server->process().signal(SIGKILL);
+  server.reset();
+  EXPECT_TRUE(std::filesystem::exists(folder.path() / "near.sock")) << "a killed server leaves its file";
+  Server next(folder.path(), scene);
+  wall.wait_for_line("connected to falcon");
 }
 
 TEST(Security, WithoutAKeyOrWithTheWrongOneNobodyGetsIn) {

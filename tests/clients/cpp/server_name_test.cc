@@ -11,6 +11,30 @@
 namespace tendon {
 namespace {
 
+TEST(ServerName, OfASocketsFileIsItsPath) {
+  const ServerName name = "unix:/run/tendon.sock";
+  EXPECT_EQ(name.unix_path(), "/run/tendon.sock");
+  const auto [addresses, device] = name.look_up();
+  ASSERT_EQ(addresses.size(), 1U);
+  EXPECT_TRUE(is_loopback(addresses.front()));
+  EXPECT_EQ(name.at(addresses.front()), name.text());
+  EXPECT_EQ(ServerName("unix:" + std::string(107, 'x')).unix_path().size(), 107U);
+  EXPECT_EQ(ServerName("127.0.0.1:47100").unix_path(), "");
+}
+
+TEST(ServerName, OfASocketsFileHasAPathThatASocketCanHave) {
+  for (const std::string& path : {std::string(), std::string(108, 'x')}) {
+    try {
+      const ServerName name("unix:" + path);
+      FAIL() << path;
+    } catch (const std::invalid_argument& wrong) {
+      EXPECT_EQ(
+          wrong.what(),
+          "expected unix:PATH with a path of 1 to 107 bytes, like unix:/run/tendon.sock, got \"unix:" + path + '"');
+    }
+  }
+}
+
 TEST(ServerName, AnAddressIsItsOwn) {
   for (const std::string text : {"127.0.0.1:47100", "[::1]:5000", "192.0.2.7:0"}) {
     const ServerName name(text);

@@ -33,6 +33,18 @@ std::uint32_t last_of(const cpu_set_t& set) {
   return last;
 }
 
+TEST(SmallStacks, AreThoseOfThreadsThatBeginAfterwards) {
+  use_small_stacks();
+  std::thread([] {
+    pthread_attr_t attributes;
+    ASSERT_EQ(pthread_getattr_np(pthread_self(), &attributes), 0);
+    std::size_t bytes = 0;
+    pthread_attr_getstacksize(&attributes, &bytes);
+    pthread_attr_destroy(&attributes);
+    EXPECT_EQ(bytes, 256U * 1024);
+  }).join();
+}
+
 TEST(StayOn, KeepsTheThreadThatAsksOnThatProcessorAndNoOther) {
   const cpu_set_t before = allowed();
   const std::uint32_t cpu = last_of(before);

@@ -43,13 +43,13 @@ TEST(FlightFile, OfAnEarlierRunStays) {
   for (int fault = 1; fault <= 3; ++fault) {
     const auto sink = open_flight(recording, "");
     EXPECT_EQ(sink->path(), flight_path(recording, "", fault));
-    write_flight(FlightRecorder<StepRecord>(2), testing::sample_config(), *sink);
+    write_flight(StepFlight(2), testing::sample_config(), *sink);
   }
   EXPECT_EQ(open_flight(recording, "left")->path(), flight_path(recording, "left", 1));
 }
 
 TEST(FlightFile, ThatDoesNotTakeItAllIsAnErrorWithTheReason) {
-  FlightRecorder<StepRecord> flight(128);
+  StepFlight flight(128);
   for (std::uint64_t tick = 0; tick < 100; ++tick) flight.record(testing::sample_step(tick));
   flight.freeze();
   FileSink full("/dev/full");

@@ -145,7 +145,7 @@ TEST(PartRecorder, ABudgetDeletesItsOwnOldestPartsAndNothingElse) {
   EXPECT_EQ(whole_run(path, 3000), "run.mcap") << "without a budget: it is kept";
   {
     const auto fault = open_flight(path, "");
-    FlightRecorder<StepRecord> flight(8);
+    StepFlight flight(8);
     for (std::uint64_t tick = 0; tick < 5; ++tick) flight.record(sample_step(tick));
     write_flight(flight, config_at(path).run, *fault);
   }

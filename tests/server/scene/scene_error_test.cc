@@ -133,10 +133,10 @@ TEST(SceneError, TheKeysOfOneKindOfMotionAreUnknownToAnother) {
 }
 
 TEST(SceneError, ReportsTheFirstMistakeInTheFile) {
-  EXPECT_EQ(
-      error_of_minimal_and("[network]\nzzzzzz = 1\n[loop]\naaaaaa = 1\n"),
-      "s.toml:5: network.zzzzzz: unknown key; known here: listen, keys, suites, max_observers, controller_timeout_ms, "
-      "observer_timeout_ms, adapt_state_rate, takeover, busy");
+  EXPECT_EQ(error_of_minimal_and("[network]\nzzzzzz = 1\n[loop]\naaaaaa = 1\n"),
+            "s.toml:5: network.zzzzzz: unknown key; known here: listen, unix, keys, suites, max_observers, "
+            "controller_timeout_ms, "
+            "observer_timeout_ms, adapt_state_rate, takeover, busy");
   EXPECT_EQ(error_of_minimal_and("[loop]\nperiod_us = \"x\"\n[force]\nhold_us = 1\n"),
             "s.toml:5: loop.period_us: expected a number from 100 to 4000 µs, found \"x\"");
 }
@@ -176,6 +176,8 @@ TEST(SceneError, TellsWhatWasExpectedAndWhatWasFound) {
       {"[recording]\npath = \"\"\n", "s.toml:5: recording.path: expected a path in quotes, found \"\""},
       {"[network]\nmax_observers = 2.5\n",
        "s.toml:5: network.max_observers: expected a whole number from 0 to 1000, found 2.5"},
+      {"[network]\nunix = \"" + std::string(108, 'x') + "\"\n",
+       "s.toml:5: network.unix: expected a path of at most 107 bytes, found 108"},
       {"[network]\nmax_observers = -1\n",
        "s.toml:5: network.max_observers: expected a whole number from 0 to 1000, found -1"},
       {"[[loop]]\n", "s.toml:4: loop: expected a table, found an array of 1"},

@@ -79,6 +79,7 @@ TEST(Scene, TakesWhatItDoesNotSayFromTheProfileAndTheStructs) {
   EXPECT_EQ(control.hold.max_valid_for, HeldForce::Config{}.max_valid_for);
 
   EXPECT_EQ(to_string(scene.network.listen), "127.0.0.1:47100");
+  EXPECT_EQ(scene.network.unix_path, std::nullopt);
   EXPECT_EQ(scene.network.max_observers, NetworkLoop::Config{}.max_observers);
   EXPECT_EQ(scene.network.controller_timeout, NetworkLoop::Config{}.controller_timeout);
   EXPECT_EQ(scene.network.observer_timeout, NetworkLoop::Config{}.observer_timeout);
@@ -135,6 +136,7 @@ max_valid_for_ms = 50
 listen = "[::1]:5000"
 keys = "keys"
 suites = ["chacha20-poly1305"]
+unix = "/run/tendon.sock"
 max_observers = 3
 controller_timeout_ms = 1500
 observer_timeout_ms = 2500
@@ -187,6 +189,7 @@ datagrams_kb_per_s = 100
   EXPECT_EQ(control.hold.max_valid_for, 50ms);
   EXPECT_EQ(to_string(scene.network.listen), "[::1]:5000");
   EXPECT_EQ(scene.network.suites, Suites{Suite::kNoise});
+  EXPECT_EQ(scene.network.unix_path, "/run/tendon.sock");
   EXPECT_EQ(scene.network.max_observers, 3U);
   EXPECT_EQ(scene.network.controller_timeout, 1500ms);
   EXPECT_EQ(scene.network.observer_timeout, 2500ms);

@@ -7,7 +7,6 @@
 
 #include "core/base/rotation.h"
 #include "core/estimation/velocity_estimator.h"
-#include "core/exchange/flight_recorder.h"
 #include "core/exchange/spsc_ring.h"
 #include "core/haptic_controller.h"
 #include "core/ledger/energy_ledger.h"
@@ -15,6 +14,7 @@
 #include "server/recording/byte_sink.h"
 #include "server/recording/recorder.h"
 #include "server/recording/records.h"
+#include "server/recording/step_flight.h"
 #include "tests/tools/bench/bench.h"
 #include "tests/tools/bench/measure.h"
 #include "tests/tools/lab/experiments/paper.h"
@@ -192,7 +192,7 @@ void measure_steps(Run& run) {
     keep(copy);
   };
   SpscRing<StepRecord> ring(1024);
-  FlightRecorder<StepRecord> flight(1024);
+  StepFlight flight(1024);
   run.add(row_of(in_turns(
                      blocks, kCalls,
                      [&](std::size_t) {

@@ -1,0 +1,117 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// How much memory a server takes, and how much a device and a session add. Each bound is a quarter or so above what was
+// measured.
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <cstdint>
+#include <fstream>
+#include <iterator>
+#include <memory>
+#include <sstream>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "tests/e2e/stage/stage.h"
+#include "tests/server/scratch_folder.h"
+
+namespace tendon::e2e {
+namespace {
+
+constexpr std::int64_t kMegabyte = 1 << 20;
+
+/// In bytes, a row of /proc/PID/status.
+std::int64_t bytes(pid_t process, const std::string& row) {
+  std::ifstream status("/proc/" + std::to_string(process) + "/status");
+  for (std::string line; std::getline(status, line);) {
+    if (line.starts_with(row + ":")) return std::stoll(line.substr(row.size() + 1)) * 1024;
+  }
+  throw std::runtime_error("no " + row + " of process " + std::to_string(process));
+}
+
+/// Page faults that needed no disk.
+std::int64_t faults(pid_t process) {
+  std::ifstream stat("/proc/" + std::to_string(process) + "/stat");
+  const std::string all{std::istreambuf_iterator<char>(stat), {}};
+  std::istringstream words(all.substr(all.rfind(')') + 1));
+  std::string word;
+  for (int field = 3; field <= 10; ++field) words >> word;  // proc(5) counts from 1
+  return std::stoll(word);
+}
+
+/// A server with `count` devices that records nothing, and has taken some hundred steps.
+class Fleet {
+ public:
+  explicit Fleet(std::size_t count) {
+    std::vector<std::string> scenes;
+    for (std::size_t i = 0; i < count; ++i) {
+      scenes.push_back(write(folder_.path() / ("hand-" + std::to_string(i) + ".toml"), kPressingHand));
+    }
+    server_ = std::make_unique<Server>(folder_.path(), scenes.front(),
+                                       std::vector<std::string>(scenes.begin() + 1, scenes.end()));
+    faults_ = faults(pid());
+    Client watcher("echo_motion", server_->address(), folder_.path());
+    for (int line = 0; line < 6; ++line) watcher.wait_for_line("position");
+  }
+
+  pid_t pid() { return server_->process().pid(); }
+  const std::string& address() const { return server_->address(); }
+  const std::filesystem::path& folder() const { return folder_.path(); }
+  std::int64_t own() { return bytes(pid(), "RssAnon"); }
+  std::int64_t faults_at_start() const { return faults_; }
+
+ private:
+  testing::ScratchFolder folder_;
+  std::unique_ptr<Server> server_;
+  std::int64_t faults_ = 0;
+};
+
+TEST(Memory, OfAServerWithADeviceIsSmall) {
+  Fleet one(1);
+  EXPECT_LT(bytes(one.pid(), "VmRSS"), 17 * kMegabyte);
+  EXPECT_LT(one.own(), 3 * kMegabyte);
+  EXPECT_LT(one.faults_at_start(), 1000);
+}
+
+TEST(Memory, OfAFurtherDeviceIsAMegabyte) {
+  Fleet one(1);
+  Fleet nine(9);
+  EXPECT_LT(nine.own() - one.own(), 8 * kMegabyte * 5 / 4);
+  EXPECT_LT(nine.faults_at_start() - one.faults_at_start(), 8 * 350);
+}
+
+TEST(Memory, OfAFurtherSessionIsAFewPages) {
+  Fleet one(1);
+  const std::int64_t before = one.own();
+  std::vector<std::unique_ptr<Client>> guests;
+  for (int i = 0; i < 7; ++i) {
+    guests.push_back(std::make_unique<Client>("echo_motion", one.address(), one.folder()));
+    guests.back()->wait_for_line("position");
+  }
+  EXPECT_LT(one.own() - before, 7 * kMegabyte / 8);
+}
+
+TEST(Memory, OfAStepIsInPlaceBeforeItIsUsed) {
+  Fleet one(1);
+  if (bytes(one.pid(), "VmLck") == 0) GTEST_SKIP() << "no permission to lock memory";
+  const std::string program = tendon::e2e::program("tendond");
+  std::ifstream maps("/proc/" + std::to_string(one.pid()) + "/smaps");
+  int of_the_program = 0;
+  for (std::string line; std::getline(maps, line);) {
+    if (!line.ends_with("/tendond")) continue;
+    ++of_the_program;
+    std::int64_t size = 0;
+    std::int64_t resident = -1;
+    for (std::string row; resident < 0 && std::getline(maps, row);) {
+      if (row.starts_with("Size:")) size = std::stoll(row.substr(5));
+      if (row.starts_with("Rss:")) resident = std::stoll(row.substr(4));
+    }
+    EXPECT_EQ(resident, size) << line;
+  }
+  EXPECT_GE(of_the_program, 3);
+}
+
+}  // namespace
+}  // namespace tendon::e2e

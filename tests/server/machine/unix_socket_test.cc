@@ -1,0 +1,222 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/machine/unix_socket.h"
+
+#include <gtest/gtest.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <sys/un.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <filesystem>
+#include <fstream>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "server/machine/udp_link.h"
+#include "tests/server/scratch_folder.h"
+
+namespace tendon {
+namespace {
+
+using testing::ScratchFolder;
+
+std::vector<std::byte> bytes(std::size_t size, int first) {
+  std::vector<std::byte> result(size);
+  for (std::size_t i = 0; i < size; ++i) result[i] = static_cast<std::byte>(first + static_cast<int>(i));
+  return result;
+}
+
+sockaddr_un name_of(const std::filesystem::path& file) {
+  sockaddr_un name{};
+  name.sun_family = AF_UNIX;
+  std::copy_n(file.c_str(), file.native().size(), name.sun_path);
+  return name;
+}
+
+/// An engine's end.
+class Peer {
+ public:
+  explicit Peer(const std::filesystem::path& file, bool named = true) : fd_(::socket(AF_UNIX, SOCK_DGRAM, 0)) {
+    const sockaddr unnamed{.sa_family = AF_UNIX, .sa_data = {}};
+    if (named) ::bind(fd_, &unnamed, sizeof unnamed.sa_family);
+    const sockaddr_un name = name_of(file);
+    refused_ = ::connect(fd_, reinterpret_cast<const sockaddr*>(&name), sizeof name) == 0 ? 0 : errno;
+  }
+  ~Peer() { ::close(fd_); }
+  Peer(const Peer&) = delete;
+  Peer& operator=(const Peer&) = delete;
+
+  int refused() const { return refused_; }
+  void send(const std::vector<std::byte>& datagram) { ::send(fd_, datagram.data(), datagram.size(), 0); }
+  std::vector<std::byte> receive() {
+    std::vector<std::byte> buffer(kMaxDatagram);
+    buffer.resize(static_cast<std::size_t>(std::max<ssize_t>(::recv(fd_, buffer.data(), buffer.size(), 0), 0)));
+    return buffer;
+  }
+
+ private:
+  int fd_;
+  int refused_ = 0;
+};
+
+std::string complaint_about(const std::filesystem::path& file) {
+  try {
+    const UnixSocket socket(file);
+  } catch (const std::runtime_error& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST(UnixSocket, BringsDatagramsThereAndBackByTheirSender) {
+  const ScratchFolder folder;
+  const auto file = folder.path() / "s";
+  UnixSocket server(file);
+  Peer a(file);
+  Peer z(file);
+  a.send(bytes(3, 1));
+  z.send(bytes(kMaxDatagram, 2));
+  std::vector<std::byte> buffer(kMaxDatagram);
+  Address from_a;
+  ASSERT_EQ(server.receive(from_a, buffer), 3U);
+  EXPECT_TRUE(UnixSocket::is_peer(from_a)) << to_string(from_a);
+  EXPECT_TRUE(is_loopback(from_a));
+  EXPECT_EQ(parse_address(to_string(from_a)), from_a);
+  Address from_z;
+  ASSERT_EQ(server.receive(from_z, buffer), kMaxDatagram);
+  EXPECT_NE(from_z, from_a);
+  EXPECT_EQ(server.receive(from_z, buffer), 0U);
+  EXPECT_TRUE(server.send(from_z, bytes(7, 3)));
+  EXPECT_TRUE(server.send(from_a, bytes(5, 4)));
+  EXPECT_EQ(a.receive(), bytes(5, 4));
+  EXPECT_EQ(z.receive(), bytes(7, 3));
+}
+
+TEST(UnixSocket, SkipsWhoHasNoNameAndWhatIsEmpty) {
+  const ScratchFolder folder;
+  UnixSocket server(folder.path() / "s");
+  Peer nameless(folder.path() / "s", false);
+  Peer named(folder.path() / "s");
+  nameless.send(bytes(3, 1));
+  named.send({});
+  named.send(bytes(5000, 2));
+  std::vector<std::byte> buffer(kMaxDatagram);
+  Address from;
+  EXPECT_EQ(server.receive(from, buffer), 5000U) << "cut, and the full size is told";
+}
+
+TEST(UnixSocket, LosesADatagramToAPeerThatHasGone) {
+  const ScratchFolder folder;
+  UdpLink link(parse_address("127.0.0.1:0"), Reach::kThisMachine, folder.path() / "s");
+  auto peer = std::make_unique<Peer>(folder.path() / "s");
+  peer->send(bytes(3, 1));
+  link.wait(std::chrono::seconds(10));
+  std::vector<std::byte> buffer(kMaxDatagram);
+  Address from;
+  ASSERT_EQ(link.receive(from, buffer), 3U);
+  peer.reset();
+  link.send(from, bytes(3, 1));
+  EXPECT_EQ(link.send_failures(), 1U);
+}
+
+TEST(UnixSocket, ALinkTakesFromBothSocketsInTurns) {
+  const ScratchFolder folder;
+  UdpLink link(parse_address("127.0.0.1:0"), Reach::kThisMachine, folder.path() / "s");
+  UdpLink far(parse_address("127.0.0.1:0"));
+  Peer near(folder.path() / "s");
+  for (int i = 0; i < 3; ++i) {
+    near.send(bytes(3, 1));
+    far.send(link.local_address(), bytes(4, 1));
+  }
+  std::vector<std::byte> buffer(kMaxDatagram);
+  std::vector<bool> through_the_file;
+  Address from;
+  while (link.receive(from, buffer) != 0) through_the_file.push_back(UnixSocket::is_peer(from));
+  EXPECT_EQ(through_the_file, (std::vector<bool>{true, false, true, false, true, false}));
+  link.wait(std::chrono::milliseconds(1));
+}
+
+TEST(UnixSocket, ReplacesTheFileThatADeadServerHasLeft) {
+  const ScratchFolder folder;
+  const auto file = folder.path() / "s";
+  const int dead = ::socket(AF_UNIX, SOCK_DGRAM, 0);
+  const sockaddr_un name = name_of(file);
+  ASSERT_EQ(::bind(dead, reinterpret_cast<const sockaddr*>(&name), sizeof name), 0);
+  ::close(dead);
+  ASSERT_TRUE(std::filesystem::exists(file));
+  const UnixSocket server(file);
+  EXPECT_EQ(Peer(file).refused(), 0);
+}
+
+TEST(UnixSocket, RefusesAFileBehindWhichAServerListens) {
+  const ScratchFolder folder;
+  const auto file = folder.path() / "s";
+  const UnixSocket first(file);
+  EXPECT_EQ(complaint_about(file), "cannot listen on unix:" + file.string() + ": another server listens there");
+  EXPECT_EQ(Peer(file).refused(), 0) << "the first one still does";
+}
+
+TEST(UnixSocket, LeavesAFileThatIsNoSocketAsItIs) {
+  const ScratchFolder folder;
+  const auto file = folder.path() / "notes";
+  std::ofstream(file) << "mine";
+  EXPECT_EQ(complaint_about(file),
+            "cannot listen on unix:" + file.string() + ": there is a file that is no socket; it stays as it is");
+  std::string text;
+  std::ifstream(file) >> text;
+  EXPECT_EQ(text, "mine");
+  const auto link = folder.path() / "link";
+  std::filesystem::create_symlink(folder.path() / "nowhere", link);
+  EXPECT_NE(complaint_about(link).find("no socket"), std::string::npos);
+}
+
+TEST(UnixSocket, SaysWhatIsWrongWithAPath) {
+  const ScratchFolder folder;
+  const std::string longest = (folder.path() / std::string(107 - folder.path().native().size() - 1, 'x')).string();
+  EXPECT_EQ(complaint_about(longest), "");
+  EXPECT_EQ(complaint_about(longest + "x"),
+            "cannot listen on unix:" + longest + "x: expected a path of 1 to 107 bytes, found 108");
+  const auto nowhere = folder.path() / "no" / "s";
+  EXPECT_EQ(complaint_about(nowhere), "cannot listen on unix:" + nowhere.string() + ": No such file or directory");
+}
+
+TEST(UnixSocket, TakesItsFileAwayAndNotThatOfAnother) {
+  const ScratchFolder folder;
+  const auto file = folder.path() / "s";
+  { const UnixSocket server(file); }
+  EXPECT_FALSE(std::filesystem::exists(file));
+  {
+    const UnixSocket server(file);
+    std::filesystem::remove(file);
+    std::ofstream(file) << "mine";
+  }
+  EXPECT_TRUE(std::filesystem::exists(file));
+}
+
+TEST(UnixSocket, LetsInItsUserAndGroupOnly) {
+  const ScratchFolder folder;
+  const auto file = folder.path() / "s";
+  const UnixSocket server(file);
+  struct stat found {};
+  ASSERT_EQ(::stat(file.c_str(), &found), 0);
+  EXPECT_EQ(found.st_mode & 07777U, 0660U);
+  if (::geteuid() != 0) GTEST_SKIP() << "only root can be somebody else";
+  std::filesystem::permissions(folder.path(), std::filesystem::perms(0755));
+  const pid_t stranger = ::fork();
+  if (stranger == 0) {
+    const bool other = ::setgid(65534) == 0 && ::setuid(65534) == 0;
+    ::_exit(other && Peer(file).refused() == EACCES ? 0 : 1);
+  }
+  int status = 0;
+  ASSERT_EQ(::waitpid(stranger, &status, 0), stranger);
+  EXPECT_EQ(status, 0);
+}
+
+}  // namespace
+}  // namespace tendon
