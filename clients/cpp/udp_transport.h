@@ -51,8 +51,8 @@ class UdpTransport : public Link {
   /// Sleeps until a datagram can be received or `timeout` is over; a signal handler may end it sooner.
   /// A timeout of zero or less does not sleep.
   void wait(Duration timeout);
-  /// The same, until one of `transports` can receive, or the file `also` can be read (−1: none). Whether one of these is
-  /// so.
+  /// The same, until one of `transports` can receive, or the file `also` can be read (−1: none). Whether one of these
+  /// is so.
   static bool wait_for_any(std::span<UdpTransport* const> transports, Duration timeout, int also = -1);
 
  private:

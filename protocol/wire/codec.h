@@ -21,8 +21,8 @@
 
 namespace tendon {
 
-/// Writes one Data datagram after the other, in the clear. States and forces are written by hand (hand_codec.h), all else
-/// by protobuf, which keeps its objects: a state or a force costs no heap call (a request, or a long text, does).
+/// Writes one Data datagram after the other, in the clear. States and forces are written by hand (hand_codec.h), all
+/// else by protobuf, which keeps its objects: a state or a force costs no heap call (a request, or a long text, does).
 ///
 /// Use: `begin`, `add` until it is false or nothing is left, then send `size()` bytes.
 ///

@@ -298,8 +298,9 @@ class Reader {
   std::uint64_t count_up_to(std::uint64_t most, std::uint64_t absent) noexcept {
     std::uint64_t value = absent;
     count<kField>(value);
-    if (value > most) stop();
-    return value;
+    if (value <= most) return value;
+    stop();
+    return absent;
   }
   template <unsigned kField, unsigned kType, class Value>
   void fixed(Value& value) noexcept {

@@ -23,8 +23,8 @@ inline constexpr std::size_t kMostFrame = 384;
 /// Writes `Datagram.tx_time_ns` and `echo` to `to`, which has room for kMostHead bytes. How many it took.
 std::size_t write_head(std::uint8_t* to, LocalTime sent, const std::optional<OutgoingEcho>& echo) noexcept;
 
-/// Writes one of `Datagram.frames` to `to`, which has room for kMostFrame bytes. How many it took; 0, whatever `to` then
-/// holds: it has a part that is left to protobuf (joints, a wanted stiffness; a model's contact).
+/// Writes one of `Datagram.frames` to `to`, which has room for kMostFrame bytes. How many it took; 0, whatever `to`
+/// then holds: it has a part that is left to protobuf (joints, a wanted stiffness; a model's contact).
 std::size_t write_frame(std::uint8_t* to, const DeviceState& state) noexcept;
 std::size_t write_frame(std::uint8_t* to, const ForceCommand& command) noexcept;
 

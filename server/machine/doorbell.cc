@@ -26,7 +26,7 @@ void Doorbell::ring() noexcept {
 }
 
 void Doorbell::answer() noexcept {
-  rung_.store(false, std::memory_order_relaxed);  // what rings from here on counts anew
+  rung_.exchange(false, std::memory_order_acq_rel);  // what was done before a ring is seen; later ones count anew
   std::uint64_t rings = 0;
   // Fails only when nobody has rung.
   [[maybe_unused]] const auto got = ::read(fd_, &rings, sizeof rings);

@@ -13,7 +13,6 @@
 
 #include "clients/cpp/machine.h"
 #include "clients/cpp/run.h"
-#include "server/machine/clock.h"
 #include "server/machine/udp_link.h"
 #include "tests/clients/cpp/a_and_z.h"
 
@@ -28,8 +27,8 @@ class Server {
   Server()
       : thread_([this] {
           while (!stop_) {
-            const LocalTime next = z_.turn(clock::now());
-            link_.wait(std::min<Duration>(next - clock::now(), milliseconds(10)));
+            const LocalTime next = z_.turn(link_.present({}));
+            link_.wait(std::min<Duration>(next - link_.present({}), milliseconds(10)));
           }
         }) {}
   ~Server() { end(); }

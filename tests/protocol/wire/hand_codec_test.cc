@@ -7,6 +7,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
@@ -299,6 +300,30 @@ TEST(HandCodec, LeavesToProtobufWhatNoWriterOfOursDoes) {
   }
   DataContent content;
   EXPECT_TRUE(wire::read_by_hand(frame(usual), content)) << "the others fail for their own reason";
+  // The tick, 05, as 85 00: the lengths of state, frame and all grow by one.
+  Bytes longer = frame(usual);
+  const auto tick = std::find(longer.begin() + 9, longer.end(), std::byte{5});
+  ASSERT_NE(tick, longer.end());
+  *tick |= std::byte{0x80};
+  longer.insert(tick + 1, std::byte{0});
+  longer[10] = static_cast<std::byte>(std::to_integer<int>(longer[10]) + 1);
+  longer[12] = static_cast<std::byte>(std::to_integer<int>(longer[12]) + 1);
+  EXPECT_FALSE(wire::read_by_hand(longer, content)) << "a number in a longer form than it needs";
+  EXPECT_TRUE(readers.agree(longer));
+  DataReader reader;
+  ASSERT_NE(reader.read(longer), nullptr);
+  EXPECT_EQ(std::get<DeviceState>(reader.read(longer)->frames.at(0)).tick, 5U);
+}
+
+TEST(HandCodec, ADatagramHasAtMostAsManyFramesAsProtobufTakes) {
+  RawProtobuf datagram;
+  BothReaders readers;
+  DataContent content;
+  for (int frames = 1; frames <= limits::kMaxFrames + 1; ++frames) {
+    datagram.message(3, RawProtobuf().message(1, RawProtobuf().varint(11, 2)));
+    EXPECT_EQ(wire::read_by_hand(datagram.bytes(), content), frames <= limits::kMaxFrames) << frames;
+    EXPECT_TRUE(readers.agree(datagram.bytes())) << frames;
+  }
 }
 
 TEST(HandCodec, NoFrameTakesMoreThanItSays) {

@@ -156,6 +156,18 @@ TEST(Doorbell, IsReadableFromTheFirstRingUntilItIsAnswered) {
   bell.answer();
 }
 
+TEST(Doorbell, TellsAThreadThatDoesNotSleepThatItHasRung) {
+  Doorbell bell;
+  EXPECT_FALSE(bell.rung());
+  bell.ring();
+  bell.ring();
+  EXPECT_TRUE(bell.rung());
+  bell.answer();
+  EXPECT_FALSE(bell.rung());
+  bell.ring();
+  EXPECT_TRUE(bell.rung());
+}
+
 TEST(Doorbell, KeepsErrnoForTheCodeThatASignalInterrupted) {
   Doorbell bell;
   errno = ENOENT;
