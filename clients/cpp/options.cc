@@ -89,7 +89,8 @@ CommandLine::CommandLine(std::string purpose, Options& options)
   app.set_version_flag("--version", TENDON_VERSION);
   app.add_option_function<std::string>(
          "--server", [&](const std::string& text) { options.server = text; },
-         "Where tendond listens: a host name or an address; or dns-sd:NAME, where dns-sd: lists the names")
+         "Where tendond listens: a host name or an address; unix:PATH on this machine; or dns-sd:NAME, where dns-sd: "
+         "lists the names")
       ->type_name("HOST:PORT")
       ->default_str(options.server.text())
       ->check(CLI::Validator(check_server, ""));

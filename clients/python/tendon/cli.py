@@ -16,7 +16,7 @@ from contextlib import AsyncExitStack
 from . import aio
 from .client import Client, Physics
 from .force_client import MAX_RATE_HZ, MIN_RATE_HZ, Config, Stats
-from .guest import RefusedForGood, log, parse_address
+from .guest import RefusedForGood, log, parse_address, unix_path
 from .keys import read_key
 from .messages import Delays, DeviceReport, DeviceState, LinkReport, LinkStats, PeerReport, Role
 
@@ -58,7 +58,8 @@ def at_least(least: float) -> Callable[[str], float]:
 
 def _address(text: str) -> str:
     try:
-        parse_address(text)
+        if unix_path(text) is None:
+            parse_address(text)
     except ValueError as error:
         raise argparse.ArgumentTypeError(str(error)) from None
     return text
@@ -81,7 +82,7 @@ def parser(name: str, purpose: str | None, rate_hz: float = 0) -> argparse.Argum
         type=_address,
         default="127.0.0.1:47100",
         metavar="HOST:PORT",
-        help="Where tendond listens: a host name or an address [%(default)s]",
+        help="Where tendond listens: a host name or an address, or unix:PATH on this machine [%(default)s]",
     )
     line.add_argument(
         "--key", type=_key, metavar="FILE", help="The client's key; without one only a server on this machine can be reached"

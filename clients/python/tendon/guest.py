@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import logging
 import ipaddress
+import os
 import socket
 import threading
 import time
@@ -58,11 +59,26 @@ def parse_address(text: str) -> tuple[str, int]:
     return (host[1:-1] if bracketed else host, int(port))
 
 
+_MAX_UNIX_PATH = 107
+"""Bytes; the system has room for no more in a socket's address."""
+
+
+def unix_path(server: str) -> str | None:
+    """The file of "unix:/run/tendon.sock", a server's Unix socket on this machine; None for all else. Raises ValueError
+    for a path that no socket can have."""
+    if not server.startswith("unix:"):
+        return None
+    path = server.removeprefix("unix:")
+    if not 0 < len(os.fsencode(path)) <= _MAX_UNIX_PATH or "\0" in path:
+        raise ValueError(f'expected unix:PATH with a path of 1 to {_MAX_UNIX_PATH} bytes, got "{server}"')
+    return path
+
+
 class Guest:
     """`turn(now)` does everything that is due. Only one thread or event loop may use a guest at a time."""
 
     def __init__(self, server: str, config: Config, now: int, clock: Callable[[], int] = time.monotonic_ns) -> None:
-        """Raises ValueError when `server` is no HOST:PORT, OSError when there is no such host or the system cannot
+        """Raises ValueError when `server` is neither HOST:PORT nor unix:PATH, OSError when there is no such host or the system cannot
         reach it. A host name is looked up here, which may wait, and again, in a thread of its own, before each further
         attempt."""
         self.server = server
@@ -156,7 +172,8 @@ class Guest:
             place = found[0]
         elif silent:
             place = found[(found.index(place) + 1) % len(found)]
-        if place == self._place:
+        # The same file may be another server's socket by now.
+        if place == self._place and unix_path(self.server) is None:
             return
         try:
             new = _connected(self.server, place)
@@ -324,6 +341,8 @@ def _is_numeric(server: str) -> bool:
 
 def _look_up(server: str) -> list[Place]:
     """The addresses of a server's name, the one to prefer first. Raises OSError with the host's name."""
+    if (path := unix_path(server)) is not None:
+        return [(socket.AF_UNIX, 0, path)]
     host, port = parse_address(server)
     try:
         found = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)
@@ -334,11 +353,14 @@ def _look_up(server: str) -> list[Place]:
 
 
 def _connected(server: str, place: Place) -> socket.socket:
-    """A socket on a port that the system chooses. It is connected, so the kernel drops datagrams from other senders."""
+    """A socket on a port that the system chooses, or, to a Unix socket, with a name that it chooses. It is connected, so
+    the kernel drops datagrams from other senders."""
     family, protocol, address = place
     connected = socket.socket(family, socket.SOCK_DGRAM, protocol)
     try:
         connected.setblocking(False)
+        if family == getattr(socket, "AF_UNIX", None):
+            connected.bind("")
         connected.connect(address)
     except OSError as error:
         connected.close()

@@ -44,6 +44,28 @@ def test_a_wall_of_the_blocking_client_is_felt(tmp_path):
         assert server.end()["forces"] >= forces - 1
 
 
+def test_a_socket_file_leads_to_its_server_and_to_the_next_one_there(tmp_path):
+    near = {"scene": scene("demo") + '\n[network]\nunix = "near.sock"\n'}
+    with Server(tmp_path, scenes=near) as first:
+        with Client(f"unix:{tmp_path / 'near.sock'}", Config(name="wall", rate_hz=200)) as client:
+            hands = client.states(30)
+            assert next(hands).tick > 0
+            first.stop(signal.SIGKILL)
+            with Server(tmp_path, scenes=near):
+                for hand in hands:
+                    client.send(hand, wall(hand))
+                    if client.stats.sessions == 2 and felt(hand):
+                        break
+                else:
+                    pytest.fail("the second server was not found")
+
+
+@pytest.mark.parametrize("path", ["", "x" * 108])
+def test_a_socket_file_needs_a_path_that_a_socket_can_have(path):
+    with pytest.raises(ValueError, match="expected unix:PATH with a path of 1 to 107 bytes"):
+        Client(f"unix:{path}", Config(name="wall"))
+
+
 def test_a_wall_of_the_asyncio_client_is_felt_while_other_tasks_run(tmp_path):
     async def main(address):
         turns = 0
