@@ -24,8 +24,9 @@ class FlightRecorder {
     expect(std::has_single_bit(capacity), "capacity", static_cast<double>(capacity), "a power of two");
   }
 
-  /// Recording thread. Does nothing while frozen.
-  void record(const T& value) {
+  /// Recording thread. Does nothing while frozen. `value` is a T, or what a T takes a part of when it is assigned.
+  template <typename U = T>
+  void record(const U& value) {
     if (frozen()) return;
     values_[count_ & (capacity_ - 1)] = value;
     ++count_;

@@ -21,7 +21,7 @@ class StepFlight {
   }
 
   void record(const StepRecord& step) {
-    steps_.record({static_cast<const PositionStep&>(step), static_cast<const LoopStep&>(step)});
+    steps_.record(step);
     if (handles_) handles_->record(step.handle);
   }
 
@@ -39,16 +39,19 @@ class StepFlight {
   std::size_t size() const noexcept { return steps_.size(); }
   StepRecord operator[](std::size_t i) const noexcept {
     StepRecord step;
-    static_cast<PositionStep&>(step) = steps_[i].position;
-    static_cast<LoopStep&>(step) = steps_[i].loop;
+    static_cast<PositionStep&>(step) = steps_[i];
+    static_cast<LoopStep&>(step) = steps_[i];
     if (handles_) step.handle = (*handles_)[i];
     return step;
   }
 
  private:
-  struct Kept {
-    PositionStep position;
-    LoopStep loop;
+  struct Kept : PositionStep, LoopStep {
+    Kept& operator=(const StepRecord& step) {
+      PositionStep::operator=(step);
+      LoopStep::operator=(step);
+      return *this;
+    }
   };
 
   FlightRecorder<Kept> steps_;
