@@ -28,6 +28,9 @@ constexpr double kTangentPrecision = 2e-3;
 constexpr double kGlidePrecision = 1e-2;
 constexpr int kTangentRounds = 5;
 
+/// A shape whose force may be wrong by a larger share is none of rest: how it would glide means nothing.
+constexpr double kAtRest = 0.1;
+
 /// How a body gives way to a gliding patch is kept while load and force differ by at most this share.
 constexpr double kGlidesAlike = 0.04;
 
@@ -312,7 +315,8 @@ double QuasiStaticModel::newton(const VectorXd& load, const Patch* patch, Given 
     if (!moved || error <= enough) break;
     exact = false;
   }
-  if (step_ == 0) find_tangent(load, patch, {step.by_tool, now, among_sides}, reaction);
+  const bool at_rest = error <= kAtRest * std::abs(reaction.force);
+  if (step_ == 0) find_tangent(load, at_rest ? patch : nullptr, {step.by_tool, now, among_sides}, reaction);
   return error;
 }
 
