@@ -172,11 +172,13 @@ PlasticModel::PlasticModel(const Solid& solid, const TouchSurface& surface, cons
                            const EffectsConfig& effects, const Yield& yield)
     : solid_(solid, yield), model_(solid_, surface, config, effects) {
   solid_.advance(model_.displacements());
+  model_.forget_forces();
 }
 
 Reaction PlasticModel::press(const Patch& patch, Given given, double value) {
   const Reaction reaction = model_.press(patch, given, value);
   solid_.advance(model_.displacements());
+  model_.forget_forces();
   return reaction;
 }
 

@@ -23,8 +23,10 @@ constexpr double kShortest = 1.0 / 64;
 constexpr int kPatience = 16;
 constexpr double kSlow = 1.0 / 16;
 
-/// An answer's stiffness is right to this share, and what of it makes a gliding patch to this share of that.
-constexpr double kTangentPrecision = 2e-3;
+/// What H says of the stiffness is wrong by the first order of H's error, and the energy of the shape by the second: where
+/// the two differ by at most this share, the second serves.
+constexpr double kTangentAlike = 0.02;
+/// How a body gives way to a gliding patch is right to this share.
 constexpr double kGlidePrecision = 1e-2;
 constexpr int kTangentRounds = 5;
 
@@ -231,7 +233,7 @@ void QuasiStaticModel::find_tangent(const VectorXd& load, const Patch* patch, co
   VectorXd by_shape = needed(shape, tangent.now);
   double stiffness = shape.dot(by_shape);
   double guess = reaction.stiffness;
-  for (int round = 0; std::abs(guess - stiffness) > kTangentPrecision * std::abs(stiffness) && round < kTangentRounds;
+  for (int round = 0; std::abs(guess - stiffness) > kTangentAlike * std::abs(stiffness) && round < kTangentRounds;
        ++round) {
     const VectorXd back = solve_at_depth(by_shape, tangent.among_sides, load, tangent.by_tool);
     const VectorXd by_back = needed(back, tangent.now);
@@ -269,8 +271,10 @@ double QuasiStaticModel::newton(const VectorXd& load, const Patch* patch, Given 
   bool exact = false;  // true when the factor is that of the present shape
   bool among_sides = false;
   Step step;
-  Elastic::Forces now = forces();
+  Elastic::Forces now = known_ ? std::move(known_->forces) : forces();
   VectorXd solved;  // by the factor alone, as the next
+  if (known_) solved = std::move(known_->solved);
+  known_.reset();
   VectorXd solved_load;
   for (iterations_ = 0; iterations_ < config_.max_iterations;) {
     ++iterations_;
@@ -278,10 +282,8 @@ double QuasiStaticModel::newton(const VectorXd& load, const Patch* patch, Given 
       factorize();
       exact = true;
     }
-    if (exact || iterations_ == 1) {
-      solved = factor_.solve(now.force);
-      solved_load = factor_.solve(load);
-    }
+    if (exact || solved.size() == 0) solved = factor_.solve(now.force);
+    if (exact || iterations_ == 1) solved_load = factor_.solve(load);
     step.by_itself = -pairs_.times(now.force, solved);
     step.by_tool = pairs_.times(load, solved_load);
     if (self_collision_) among_sides = foresee(now.force, load, given, value);
@@ -315,6 +317,8 @@ double QuasiStaticModel::newton(const VectorXd& load, const Patch* patch, Given 
     if (!moved || error <= enough) break;
     exact = false;
   }
+  const bool lasts = effects_.empty() && self_collision_ == nullptr;
+  if (lasts && !stale_) known_ = Known{now, solved};
   const bool at_rest = error <= kAtRest * std::abs(reaction.force);
   if (step_ == 0) find_tangent(load, at_rest ? patch : nullptr, {step.by_tool, now, among_sides}, reaction);
   return error;
@@ -359,6 +363,7 @@ void QuasiStaticModel::cut(const Division& division, const EffectsConfig& effect
   stiffness_ = elastic_.pattern();
   pairs_.clear();
   glided_.reset();
+  known_.reset();
   factor_ = Factor(stiffness_);  // a split factor would not serve: under load the shape changes in the first step
   stale_ = true;
 }

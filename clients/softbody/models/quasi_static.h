@@ -49,7 +49,10 @@ class QuasiStaticModel : public Model {
   void set_displacements(const VectorXd& u) {
     u_ = u;
     stale_ = true;
+    forget_forces();
   }
+  /// For an Elastic that changes without moving: the forces are summed anew in the next answer.
+  void forget_forces() { known_.reset(); }
   /// Takes the tool away and finds the shape at rest, or after one step of time. Returns the remaining energy, J.
   double release();
 
@@ -101,6 +104,12 @@ class QuasiStaticModel : public Model {
   };
   std::optional<Glided> glided_;
   VectorXd rest_;  ///< m, all nodes: the shape at rest; empty without time
+  /// The forces where the last answer ended, and what the factor makes of them; empty where they do not last.
+  struct Known {
+    Elastic::Forces forces;
+    VectorXd solved;
+  };
+  std::optional<Known> known_;
   int iterations_ = 0;
   int factors_ = 0;
   int in_vain_ = 0;    ///< iterations since an answer was good enough, or the factor new
