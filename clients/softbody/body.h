@@ -123,8 +123,8 @@ struct BodyConfig {
   int max_iterations = QuasiStaticModel::Config{}.max_iterations;  ///< for models that iterate until they converge
   /// Of the force, for the same models: an answer ends when it may be wrong by so much, and says so (Feel::error).
   double tolerance = QuasiStaticModel::Config{}.tolerance;
-  int iterations = 10;                                             ///< for models with a fixed number of iterations
-  int swings = 30;                                                 ///< kModal: vibration modes
+  int iterations = 10;    ///< for models with a fixed number of iterations
+  int swings = 30;        ///< kModal: vibration modes
   int static_modes = 0;   ///< kModal: patches along each axis of a square of 2 `reach`; 1: only the one in the middle
   EffectsConfig effects;  ///< effects that act on the whole body
   std::optional<double> friction;  ///< coefficient

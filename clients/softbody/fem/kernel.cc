@@ -89,7 +89,8 @@ bool wide() {
 }  // namespace
 
 Kernel::Kernel(Law law, int nodes, int points) : law_(law), per_element_(nodes), points_(points) {
-  if (nodes != 4 && nodes != 8 && nodes != 20 && nodes != 27) throw std::invalid_argument("no element has so many nodes");
+  if (nodes != 4 && nodes != 8 && nodes != 20 && nodes != 27)
+    throw std::invalid_argument("no element has so many nodes");
 }
 
 void Kernel::add_element(std::span<const int> nodes) {

@@ -68,7 +68,8 @@ template <class Number>
 
 /// Adds the energy at F to `energy`; `p` becomes P.
 template <Law kLaw, class Number>
-[[gnu::always_inline]] inline void respond(const Number* f, const Number& mu, const Number& lambda, Number& energy, Number* p) {
+[[gnu::always_inline]] inline void respond(const Number* f, const Number& mu, const Number& lambda, Number& energy,
+                                           Number* p) {
   if constexpr (kLaw == Law::kNeoHookean) {
     Number c[9];
     cofactor(f, c);
@@ -96,8 +97,8 @@ template <Law kLaw, class Number>
     for (int j = 0; j < 3; ++j) {
       for (int i = 0; i < 3; ++i) {
         if constexpr (kLaw == Law::kStVenantKirchhoff) {
-          strain[i + 3 * j] =
-              0.5 * (f[3 * i] * f[3 * j] + f[3 * i + 1] * f[3 * j + 1] + f[3 * i + 2] * f[3 * j + 2] - (i == j ? 1 : 0));
+          strain[i + 3 * j] = 0.5 * (f[3 * i] * f[3 * j] + f[3 * i + 1] * f[3 * j + 1] + f[3 * i + 2] * f[3 * j + 2] -
+                                     (i == j ? 1 : 0));
         } else {
           strain[i + 3 * j] = 0.5 * (f[i + 3 * j] + f[j + 3 * i]) - (i == j ? 1.0 : 0.0);
         }
@@ -110,9 +111,8 @@ template <Law kLaw, class Number>
     for (int i = 0; i < 9; ++i) energy += 0.5 * s[i] * strain[i];
     for (int j = 0; j < 3; ++j) {
       for (int i = 0; i < 3; ++i) {
-        p[i + 3 * j] = kLaw == Law::kLinear
-                           ? s[i + 3 * j]
-                           : f[i] * s[3 * j] + f[i + 3] * s[3 * j + 1] + f[i + 6] * s[3 * j + 2];
+        p[i + 3 * j] =
+            kLaw == Law::kLinear ? s[i + 3 * j] : f[i] * s[3 * j] + f[i + 3] * s[3 * j + 1] + f[i + 6] * s[3 * j + 2];
       }
     }
   }

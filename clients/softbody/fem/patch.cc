@@ -194,10 +194,10 @@ std::optional<Patch> TouchSurface::patch_around(const Vec2& middle, double least
     if constexpr (kCurved) {
       // The second derivative of a quotient.
       const Vec2 slope = patch.slopes.col(i);
-      patch.curvatures.col(i) = (sums[node].template tail<3>() - patch.weights[i] * total.template tail<3>() -
-                                 Vec3(2 * slope.x() * all.x(), slope.x() * all.y() + slope.y() * all.x(),
-                                      2 * slope.y() * all.y())) /
-                                total[0];
+      patch.curvatures.col(i) =
+          (sums[node].template tail<3>() - patch.weights[i] * total.template tail<3>() -
+           Vec3(2 * slope.x() * all.x(), slope.x() * all.y() + slope.y() * all.x(), 2 * slope.y() * all.y())) /
+          total[0];
     }
   }
   return patch;

@@ -21,9 +21,9 @@ using Mat2 = Eigen::Matrix2d;
 /// with consistent shares for the nodes. The size a is fixed because the stiffness under a patch converges as the mesh
 /// becomes finer; under a single node it does not (displacements go as 1/r, Boussinesq).
 struct Patch {
-  std::vector<int> nodes;                           ///< ascending
-  VectorXd weights;                                 ///< their sum is 1
-  Eigen::Matrix<double, 2, Eigen::Dynamic> slopes;  ///< 1/m, how the weights change as the middle moves
+  std::vector<int> nodes;                               ///< ascending
+  VectorXd weights;                                     ///< their sum is 1
+  Eigen::Matrix<double, 2, Eigen::Dynamic> slopes;      ///< 1/m, how the weights change as the middle moves
   Eigen::Matrix<double, 3, Eigen::Dynamic> curvatures;  ///< 1/m², ∂²weights: xx, xy, yy; empty unless asked for
   double covered = 0;                                   ///< the fraction of the patch that lies on the body, 0 … 1
 };

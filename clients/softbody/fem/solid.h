@@ -47,7 +47,7 @@ class Solid : public Elastic {
   const Point& point(int element, int index) const { return points_[at(element * per_element_ + index)]; }
   using Nodal = Kernel::Nodal;
   Kernel::Gradient gradient(int element, int point) const { return kernel_.gradient(element, point); }  ///< ∂Nᵢ/∂X, 1/m
-  Nodal displacements(const VectorXd& u, int element) const;       ///< of an element's nodes, m
+  Nodal displacements(const VectorXd& u, int element) const;  ///< of an element's nodes, m
 
  protected:
   /// The stiffness of a material with the tangent `tangent_at(element, point, F)`.
@@ -61,10 +61,10 @@ class Solid : public Elastic {
   Element element_;
   Material material_;
   Law law_;
-  int per_element_;                ///< points of integration
-  std::vector<Point> points_;      ///< of each element, one after the other
+  int per_element_;            ///< points of integration
+  std::vector<Point> points_;  ///< of each element, one after the other
   Kernel kernel_;
-  std::vector<int> slots_;         ///< where each entry of an element's lower triangle goes; −1: nowhere
+  std::vector<int> slots_;  ///< where each entry of an element's lower triangle goes; −1: nowhere
 };
 
 template <class TangentAt>

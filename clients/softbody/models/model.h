@@ -35,7 +35,7 @@ struct Reaction {
   };
   Glide glide;
   bool knows_glide = false;  ///< else `glide` is zero; see Model::glides()
-  double error = 0;           ///< N, the distance that may remain to the mesh's exact answer; not the mesh's own error
+  double error = 0;          ///< N, the distance that may remain to the mesh's exact answer; not the mesh's own error
 };
 
 /// The force (N) with which a tool reaches the given depth or force, when the depth without it is `untouched` (m) and

@@ -127,8 +127,10 @@ bool QuasiStaticModel::foresee(const VectorXd& internal, const VectorXd& load, G
     self_collision_->foresee(factor_, u_, b + value * load, nullptr, 0);
   } else {
     const double by = value - load.dot(elastic_.to_free(u_));
-    const double force = self_collision_->foresee(factor_, u_, b, &load, by);
-    if (given == Given::kLeastDepth && force < 0) self_collision_->foresee(factor_, u_, b, nullptr, 0);
+    const bool pulls = self_collision_->foresee(factor_, u_, b, &load, by) < 0 && given == Given::kLeastDepth;
+    if (pulls) {
+      self_collision_->foresee(factor_, u_, b, nullptr, 0);
+    }
   }
   return self_collision_->pushes(u_);
 }
@@ -264,10 +266,10 @@ void QuasiStaticModel::find_tangent(const VectorXd& load, const Patch* patch, co
   reaction.knows_glide = true;
 }
 
-double QuasiStaticModel::newton(const VectorXd& load, const Patch* patch, Given given, double value, Reaction& reaction) {
+double QuasiStaticModel::newton(const VectorXd& load, const Patch* patch, Given given, double value,
+                                Reaction& reaction) {
   double error = std::numeric_limits<double>::infinity();
   double before = std::numeric_limits<double>::infinity();
-  double enough = 0;
   bool exact = false;  // true when the factor is that of the present shape
   bool among_sides = false;
   Step step;
@@ -276,14 +278,13 @@ double QuasiStaticModel::newton(const VectorXd& load, const Patch* patch, Given 
   if (known_) solved = std::move(known_->solved);
   known_.reset();
   VectorXd solved_load;
-  for (iterations_ = 0; iterations_ < config_.max_iterations;) {
-    ++iterations_;
+  for (iterations_ = 0;;) {
     if (stale_) {
       factorize();
       exact = true;
     }
     if (exact || solved.size() == 0) solved = factor_.solve(now.force);
-    if (exact || iterations_ == 1) solved_load = factor_.solve(load);
+    if (exact || solved_load.size() == 0) solved_load = factor_.solve(load);
     step.by_itself = -pairs_.times(now.force, solved);
     step.by_tool = pairs_.times(load, solved_load);
     if (self_collision_) among_sides = foresee(now.force, load, given, value);
@@ -295,8 +296,10 @@ double QuasiStaticModel::newton(const VectorXd& load, const Patch* patch, Given 
     const VectorXd move = step.by_itself + reaction.force * step.by_tool;
     // −slope = moveᵀ K move is twice the energy that has still to be lost; a force error of √(… K) would explain it.
     const double slope = (now.force - reaction.force * load).dot(move);
-    error = std::sqrt(std::max(0.0, -slope) * reaction.stiffness);
-    enough = config_.tolerance * std::abs(reaction.force) + kUnseen * reaction.stiffness;
+    error = std::sqrt(std::abs(slope * reaction.stiffness));
+    const double enough = config_.tolerance * std::abs(reaction.force) + kUnseen * reaction.stiffness;
+    if (error <= enough) in_vain_ = 0;
+    if (error <= enough || iterations_ == config_.max_iterations) break;
     stale_ = !exact && in_vain_ >= kPatience;
     if (among_sides) stale_ = !exact && -slope > kSlow * before;
     if (stale_) continue;
@@ -305,26 +308,27 @@ double QuasiStaticModel::newton(const VectorXd& load, const Patch* patch, Given 
     const bool moved = go(move, load, reaction.force, slope, now);
     stale_ = !moved && !exact;
     if (stale_) continue;
+    if (!moved) break;
     before = -slope;
-    in_vain_ = error <= enough ? 0 : in_vain_ + 1;
-    if (moved && (now.force - force_before).norm() > kHeard * now.force.norm()) {
-      const VectorXd there = factor_.solve(now.force);
-      pairs_.add(elastic_.to_free(u_) - start, now.force - force_before, there - solved);
-      solved = there;
-    } else if (moved) {
-      solved = factor_.solve(now.force);
-    }
-    if (!moved || error <= enough) break;
+    ++iterations_;
+    ++in_vain_;
     exact = false;
+    const VectorXd there = factor_.solve(now.force);
+    const VectorXd change = now.force - force_before;
+    if (change.norm() > kHeard * now.force.norm()) {
+      pairs_.add(elastic_.to_free(u_) - start, change, there - solved);
+    }
+    solved = there;
   }
   const bool lasts = effects_.empty() && self_collision_ == nullptr;
-  if (lasts && !stale_) known_ = Known{now, solved};
+  if (lasts) known_ = Known{now, solved};
   const bool at_rest = error <= kAtRest * std::abs(reaction.force);
   if (step_ == 0) find_tangent(load, at_rest ? patch : nullptr, {step.by_tool, now, among_sides}, reaction);
   return error;
 }
 
-double QuasiStaticModel::part_sides(const VectorXd& load, const Patch* patch, Given given, double value, Reaction& reaction) {
+double QuasiStaticModel::part_sides(const VectorXd& load, const Patch* patch, Given given, double value,
+                                    Reaction& reaction) {
   int iterations = iterations_;
   double error = reaction.error;
   for (int looks = 1;; ++looks) {

@@ -28,7 +28,7 @@ Mat3 not_negative(const Mat3& stiffness);
 
 /// The answer to one position of the tool.
 struct Feel {
-  Vec3 force = Vec3::Zero();      ///< N, on the hand
+  Vec3 force = Vec3::Zero();  ///< N, on the hand
   /// N/m, −∂force/∂position, symmetric. It may have negative directions, in which the tool would rather slip away.
   Mat3 stiffness = Mat3::Zero();
   /// m, the distance from the tool to the body along the normal; below 0: inside. While the tool touches, the distance

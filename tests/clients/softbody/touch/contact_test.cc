@@ -120,7 +120,8 @@ TEST(ExactStiffness, OfABodyThatBendsAndStretchesIsTheForcesOwnSlope) {
     PatchContact contact(model, top, 0, PatchContact::Side::kUnilateral);
     const auto touched = [&](const Vec3& tool) { return contact.at(tool); };
     for (const Vec3& tool : {Vec3(0.013, 0.007, 0.045), Vec3(-0.03, 0.02, 0.047), Vec3(0, 0, 0.0465)}) {
-      for (double depth = 1e-3; depth < 0.05 - tool.z(); depth += 1e-3) contact.at(Vec3(tool.x(), tool.y(), 0.05 - depth));
+      for (double depth = 1e-3; depth < 0.05 - tool.z(); depth += 1e-3)
+        contact.at(Vec3(tool.x(), tool.y(), 0.05 - depth));
       const Mat3 given = contact.at(tool).stiffness;
       EXPECT_LT((given - by_differences(touched, tool)).norm(), 0.01 * given.norm())
           << static_cast<int>(law) << ' ' << tool.transpose();
