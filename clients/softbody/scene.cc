@@ -384,7 +384,7 @@ Scene parse_scene(std::string_view text, const std::string& name, const std::fil
     case ModelKind::kNeoHookean:
     case ModelKind::kMassSpring:
       scene.body.max_iterations = model.count("max_iterations", 1000, scene.body.max_iterations);
-      scene.body.tolerance = model.number("error_percent", 0, false, kMaxError, 100, 100 * scene.body.tolerance);
+      scene.body.tolerance = model.number("error_percent", 0, false, kMaxError, 100, scene.body.tolerance);
       break;
     case ModelKind::kXpbd:
     case ModelKind::kProjective:
