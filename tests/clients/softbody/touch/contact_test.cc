@@ -130,7 +130,7 @@ TEST(ExactStiffness, OfABodyThatBendsAndStretchesIsTheForcesOwnSlope) {
   }
 }
 
-TEST(ExactStiffness, OfTheLiverIsRightToTwoNewtonsAMetreAlsoWhereItIsNegative) {
+TEST(ExactStiffness, OfTheLiverIsRightToTwoNewtonsAMetreAlsoBelowZero) {
   BodyConfig config = read_scene(TENDON_SCENES "/liver.toml").body;
   config.tolerance = 1e-9;
   config.max_iterations = 100;
