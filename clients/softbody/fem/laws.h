@@ -8,8 +8,8 @@
 
 namespace tendon::softbody {
 
-/// The laws of material.h for numbers of either kind: a double, or Lanes, which are four at a time. µ and λ
-/// come multiplied by the volume that they are integrated over, so energies are in J, and P in N·m.
+/// The laws of material.h for numbers of either kind: a double, or Lanes, which are four at a time. µ and λ come
+/// multiplied by the volume that they are integrated over, so energies are in J, and P in N·m.
 
 /// How often Newton's iteration turns F towards its rotation, and the square of the last change that is too large: the
 /// rotation of that lane is then found alone, by nearest_rotation(). Below this det F it is not tried.

@@ -323,7 +323,8 @@ double QuasiStaticModel::newton(const VectorXd& load, const Patch* patch, Given 
   const bool lasts = effects_.empty() && self_collision_ == nullptr;
   if (lasts) known_ = Known{now, solved};
   const bool at_rest = error <= kAtRest * std::abs(reaction.force);
-  if (step_ == 0) find_tangent(load, at_rest ? patch : nullptr, {step.by_tool, now, among_sides}, reaction);
+  if (step_ == 0 && patch != nullptr)
+    find_tangent(load, at_rest ? patch : nullptr, {step.by_tool, now, among_sides}, reaction);
   return error;
 }
 

@@ -19,8 +19,7 @@ namespace tendon::softbody {
 /// The factor is kept from step to step and from answer to answer, and brought along by what the last eight steps taught
 /// (Pairs). It is made anew only when it no longer serves: a factor costs as much as thirty steps. It is the factor of
 /// the exact second derivative; where that is not positive definite, the negative eigenvalues are removed at every point
-/// of integration.
-/// A line search makes the energy fall in every step. So a body that was turned inside out returns to its shape
+/// of integration. A line search makes the energy fall in every step. So a body that was turned inside out returns to its shape
 /// (Law::kCorotational), or at least comes to rest with no element inverted (kNeoHookean): the neo-Hookean energy has
 /// further minima, in which an edge of the body is wound around itself.
 class QuasiStaticModel : public Model {
@@ -49,6 +48,7 @@ class QuasiStaticModel : public Model {
   void set_displacements(const VectorXd& u) {
     u_ = u;
     stale_ = true;
+    glided_.reset();
     forget_forces();
   }
   /// For an Elastic that changes without moving: the forces are summed anew in the next answer.
