@@ -121,7 +121,7 @@ TEST(QuasiStatic, HalfAPercentIsWorthFewStepsAndNoFactorOnAHardPath) {
       steps += asked.iterations();
       ++answers;
     }
-    EXPECT_LE(steps, 4 * answers) << static_cast<int>(law);
+    EXPECT_LE(steps, 2 * answers) << static_cast<int>(law);
     EXPECT_EQ(asked.factors(), 0) << static_cast<int>(law);
   }
 }
