@@ -176,7 +176,7 @@ std::unique_ptr<Model> solved_model_of(const BodyConfig& config, const Solid& so
 }
 
 std::unique_ptr<Model> plain_model_of(const BodyConfig& config, const Solid& solid, const TouchSurface& surface) {
-  QuasiStaticModel::Config newton{.max_iterations = config.max_iterations};
+  QuasiStaticModel::Config newton{.max_iterations = config.max_iterations, .tolerance = config.tolerance};
   if (config.self_collision) newton.self_collision = config.material.young / *config.self_collision;
   const EffectsConfig& effects = config.effects;
   if (config.plasticity) return std::make_unique<PlasticModel>(solid, surface, newton, effects, *config.plasticity);

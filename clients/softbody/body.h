@@ -121,8 +121,10 @@ struct BodyConfig {
   std::optional<std::filesystem::path>
       table_file{};  ///< kCondensed: where condense() has put its table; else it is made
   int max_iterations = QuasiStaticModel::Config{}.max_iterations;  ///< for models that iterate until they converge
-  int iterations = 10;                                             ///< for models with a fixed number of iterations
-  int swings = 30;                                                 ///< kModal: vibration modes
+  /// Of the force, for the same models: an answer ends when it may be wrong by so much, and says so (Feel::error).
+  double tolerance = QuasiStaticModel::Config{}.tolerance;
+  int iterations = 10;    ///< for models with a fixed number of iterations
+  int swings = 30;        ///< kModal: vibration modes
   int static_modes = 0;   ///< kModal: patches along each axis of a square of 2 `reach`; 1: only the one in the middle
   EffectsConfig effects;  ///< effects that act on the whole body
   std::optional<double> friction;  ///< coefficient

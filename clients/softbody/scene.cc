@@ -23,6 +23,7 @@ namespace {
 constexpr std::uintmax_t kMaxSceneBytes = 16'384;
 constexpr double kMaxLength = 1e3;  // m: a larger value is a mistaken unit
 constexpr std::int64_t kMaxCells = 200;
+constexpr double kMaxError = 10;  // %: more is felt
 
 template <class Infos>
 std::string names(const Infos& infos) {
@@ -383,6 +384,7 @@ Scene parse_scene(std::string_view text, const std::string& name, const std::fil
     case ModelKind::kNeoHookean:
     case ModelKind::kMassSpring:
       scene.body.max_iterations = model.count("max_iterations", 1000, scene.body.max_iterations);
+      scene.body.tolerance = model.number("error_percent", 0, false, kMaxError, 100, scene.body.tolerance);
       break;
     case ModelKind::kXpbd:
     case ModelKind::kProjective:
@@ -466,6 +468,9 @@ std::string scene_reference() {
   text
       << "max_iterations = " << defaults.max_iterations
       << "      of one answer: corotational, stvk, neo-hookean, mass-spring, and linear with plasticity\n"
+         "error_percent = "
+      << 100 * defaults.tolerance
+      << "   of the force, of the same: an answer ends when it may be wrong by so much, and says by how much\n"
          "iterations = "
       << defaults.iterations << "          of every answer: xpbd, projective\nswings = " << defaults.swings
       << "              of modal\n"

@@ -286,6 +286,10 @@ double SelfCollision::foresee(const Factor& factor, const VectorXd& u, const Vec
   return held != nullptr ? force - across.dot(push) / compliance : 0;
 }
 
+bool SelfCollision::pushes(const VectorXd& u) const {
+  return std::ranges::any_of(pairs_, [&](const Pair& pair) { return pair.pushed || pair.gap(u) < 0; });
+}
+
 VectorXd SelfCollision::foreseen_forces(const VectorXd& u) const {
   VectorXd all = VectorXd::Zero(u.size());
   for (const Pair& pair : pairs_) {

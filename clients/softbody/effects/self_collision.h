@@ -51,6 +51,9 @@ class SelfCollision {
   /// 5).
   double foresee(const Factor& factor, const VectorXd& u, const VectorXd& b, const VectorXd* held, double by);
 
+  /// Whether any node is pushed at u, or will be at the end of the step.
+  bool pushes(const VectorXd& u) const;
+
   /// The forces on the free displacements at u if exactly those nodes are pushed, or pulled, minus the present forces.
   VectorXd foreseen_forces(const VectorXd& u) const;
 

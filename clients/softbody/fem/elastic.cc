@@ -83,6 +83,15 @@ VectorXd patch_load(const Elastic& elastic, const Vec3& normal, const Patch& pat
   return all;
 }
 
+MatrixXd patch_load_slopes(const Elastic& elastic, const Vec3& normal, const Patch& patch) {
+  MatrixXd all = MatrixXd::Zero(elastic.size(), 2);
+  for (Eigen::Index i = 0; i < patch.weights.size(); ++i) {
+    const int node = patch.nodes[static_cast<std::size_t>(i)];
+    all.middleRows<3>(3 * node) = -normal * patch.slopes.col(i).transpose();
+  }
+  return all;
+}
+
 double depth_below(const Patch& patch, const Vec3& normal, const VectorXd& u) {
   double depth = 0;
   for (Eigen::Index i = 0; i < patch.weights.size(); ++i) {
@@ -97,6 +106,14 @@ Vec2 slope_below(const Patch& patch, const Vec3& normal, const VectorXd& u) {
     slope -= patch.slopes.col(i) * normal.dot(u.segment<3>(3 * patch.nodes[static_cast<std::size_t>(i)]));
   }
   return slope;
+}
+
+Mat2 curve_below(const Patch& patch, const Vec3& normal, const VectorXd& u) {
+  Vec3 curve = Vec3::Zero();
+  for (Eigen::Index i = 0; i < patch.weights.size(); ++i) {
+    curve -= patch.curvatures.col(i) * normal.dot(u.segment<3>(3 * patch.nodes[static_cast<std::size_t>(i)]));
+  }
+  return (Mat2() << curve[0], curve[1], curve[1], curve[2]).finished();
 }
 
 }  // namespace tendon::softbody

@@ -84,8 +84,13 @@ VectorXd lumped_mass(const Elastic& elastic, double density);
 /// 1 N on the patch, against the normal, as forces on all nodes.
 VectorXd patch_load(const Elastic& elastic, const Vec3& normal, const Patch& patch);
 
+/// How patch_load() changes as the patch moves, N/m: a column for each axis across.
+MatrixXd patch_load_slopes(const Elastic& elastic, const Vec3& normal, const Patch& patch);
+
 /// The mean depth of a patch, m, and its derivative as the patch moves, for a body with the displacements u.
 double depth_below(const Patch& patch, const Vec3& normal, const VectorXd& u);
 Vec2 slope_below(const Patch& patch, const Vec3& normal, const VectorXd& u);
+/// The second derivative; the patch has its curvatures.
+Mat2 curve_below(const Patch& patch, const Vec3& normal, const VectorXd& u);
 
 }  // namespace tendon::softbody

@@ -131,16 +131,26 @@ std::vector<int> TouchSurface::nodes_of_patches(const Vec2& middle, double reach
 }
 
 std::optional<Patch> TouchSurface::patch(const Vec2& middle, double least_covered) const {
+  return patch_around<false>(middle, least_covered);
+}
+
+std::optional<Patch> TouchSurface::patch_with_curvatures(const Vec2& middle, double least_covered) const {
+  return patch_around<true>(middle, least_covered);
+}
+
+template <bool kCurved>
+std::optional<Patch> TouchSurface::patch_around(const Vec2& middle, double least_covered) const {
+  using Share = Eigen::Matrix<double, kCurved ? 6 : 3, 1>;  // weight; slope x, y; curvature xx, xy, yy
   if (!middle.allFinite()) return std::nullopt;
   const double top = 3 / (std::numbers::pi * radius_ * radius_);
-  std::vector<Vec3> sums(nodes_.size(), Vec3::Zero());  // weight, slope x, slope y
+  std::vector<Share> sums(nodes_.size(), Share::Zero());
   std::vector<bool> below(nodes_.size());
-  Vec3 total = Vec3::Zero();
+  Share total = Share::Zero();
   int count = 0;
   for (const Pieces& facet : facets_) {
     if ((facet.middle - middle).squaredNorm() >= (radius_ + facet.reach) * (radius_ + facet.reach)) continue;
-    std::array<Vec3, kMostFacetNodes> of_facet;
-    of_facet.fill(Vec3::Zero());
+    std::array<Share, kMostFacetNodes> of_facet;
+    of_facet.fill(Share::Zero());
     const std::size_t corners = facet.nodes.size();
     bool touched = false;
     for (Eigen::Index i = 0; i < facet.area.size(); ++i) {
@@ -148,7 +158,13 @@ std::optional<Patch> TouchSurface::patch(const Vec2& middle, double least_covere
       const double left = 1 - from.squaredNorm();
       if (left <= 0) continue;
       const double scale = top * facet.area[i] * left;
-      const Vec3 share(scale * left, 4 * scale * from.x() / radius_, 4 * scale * from.y() / radius_);
+      Share share;
+      share.template head<3>() << scale * left, 4 * scale * from.x() / radius_, 4 * scale * from.y() / radius_;
+      if constexpr (kCurved) {
+        const double curve = 4 * top * facet.area[i] / (radius_ * radius_);
+        share.template tail<3>() << curve * (2 * from.x() * from.x() - left), curve * 2 * from.x() * from.y(),
+            curve * (2 * from.y() * from.y() - left);
+      }
       total += share;
       const double* const shares = facet.shares.col(i).data();
       for (std::size_t corner = 0; corner < corners; ++corner) of_facet[corner] += shares[corner] * share;
@@ -167,12 +183,22 @@ std::optional<Patch> TouchSurface::patch(const Vec2& middle, double least_covere
   patch.covered = std::min(1.0, total[0]);
   patch.weights.resize(count);
   patch.slopes.resize(2, count);
+  if constexpr (kCurved) patch.curvatures.resize(3, count);
   for (std::size_t node = 0; node < nodes_.size(); ++node) {
     if (!below[node]) continue;
     const auto i = static_cast<Eigen::Index>(patch.nodes.size());
     patch.nodes.push_back(nodes_[node]);
     patch.weights[i] = sums[node][0] / total[0];
-    patch.slopes.col(i) = (sums[node].tail<2>() - patch.weights[i] * total.tail<2>()) / total[0];
+    const Vec2 all = total.template segment<2>(1);
+    patch.slopes.col(i) = (sums[node].template segment<2>(1) - patch.weights[i] * all) / total[0];
+    if constexpr (kCurved) {
+      // The second derivative of a quotient.
+      const Vec2 slope = patch.slopes.col(i);
+      patch.curvatures.col(i) =
+          (sums[node].template tail<3>() - patch.weights[i] * total.template tail<3>() -
+           Vec3(2 * slope.x() * all.x(), slope.x() * all.y() + slope.y() * all.x(), 2 * slope.y() * all.y())) /
+          total[0];
+    }
   }
   return patch;
 }

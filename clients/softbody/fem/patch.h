@@ -11,6 +11,7 @@
 namespace tendon::softbody {
 
 using Vec2 = Eigen::Vector2d;
+using Mat2 = Eigen::Matrix2d;
 
 /// The patch on which a tool presses, as weights of nodes: the mean of any field over the patch is Σ wᵢ·fieldᵢ, and a
 /// force F on it is F·wᵢ on each node. The weight of a point at the distance r from the middle is
@@ -20,10 +21,11 @@ using Vec2 = Eigen::Vector2d;
 /// with consistent shares for the nodes. The size a is fixed because the stiffness under a patch converges as the mesh
 /// becomes finer; under a single node it does not (displacements go as 1/r, Boussinesq).
 struct Patch {
-  std::vector<int> nodes;                           ///< ascending
-  VectorXd weights;                                 ///< their sum is 1
-  Eigen::Matrix<double, 2, Eigen::Dynamic> slopes;  ///< 1/m, how the weights change as the middle moves
-  double covered = 0;                               ///< the fraction of the patch that lies on the body, 0 … 1
+  std::vector<int> nodes;                               ///< ascending
+  VectorXd weights;                                     ///< their sum is 1
+  Eigen::Matrix<double, 2, Eigen::Dynamic> slopes;      ///< 1/m, how the weights change as the middle moves
+  Eigen::Matrix<double, 3, Eigen::Dynamic> curvatures;  ///< 1/m², ∂²weights: xx, xy, yy; empty unless asked for
+  double covered = 0;                                   ///< the fraction of the patch that lies on the body, 0 … 1
 };
 
 /// The side of a body that a tool can touch, seen along one direction: the facets that face it, as a height field over
@@ -42,6 +44,8 @@ class TouchSurface {
   /// Position across the normal, m, and the way back.
   Vec2 across(const Vec3& position) const { return across_ * position; }
   Vec3 from_across(const Vec2& along) const { return across_.transpose() * along; }
+  /// The same of a quadratic form.
+  Mat3 form_from_across(const Mat2& form) const { return across_.transpose() * form * across_; }
 
   /// All nodes of the facets, ascending, and those of patches whose middle is within `reach` of `middle`.
   const std::vector<int>& nodes() const noexcept { return nodes_; }
@@ -49,6 +53,9 @@ class TouchSurface {
 
   /// The patch around `middle`; empty where less of it than `least_covered` lies on the body.
   std::optional<Patch> patch(const Vec2& middle, double least_covered = 0.5) const;
+
+  /// The same with its curvatures.
+  std::optional<Patch> patch_with_curvatures(const Vec2& middle, double least_covered = 0.5) const;
 
   /// A node's position across the normal, and its height along the normal; m.
   const Vec2& place(int node) const { return places_[static_cast<std::size_t>(node)]; }
@@ -66,6 +73,8 @@ class TouchSurface {
   };
 
   void add(const Mesh& mesh, const Facet& facet);
+  template <bool kCurved>
+  std::optional<Patch> patch_around(const Vec2& middle, double least_covered) const;
 
   Vec3 normal_;
   double radius_;

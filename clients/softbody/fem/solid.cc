@@ -15,27 +15,31 @@ Solid::Solid(Mesh at_rest, Element element, const Material& material, Law law, c
       element_(element),
       material_(material),
       law_(law),
-      per_element_(static_cast<int>(quadrature(element).size())) {
+      per_element_(static_cast<int>(quadrature(element).size())),
+      kernel_(law, nodes_of(mesh().shape), per_element_) {
   softbody::check(material);
   if (info(element).shape != mesh().shape) {
     throw std::invalid_argument("the mesh has no elements of the kind " + std::string(info(element).name));
   }
-  for (int e = 0; e < mesh().element_count(); ++e) {
-    for (const QuadraturePoint& point : quadrature(element_)) place(point, mesh().element(e));
-  }
+  for (int e = 0; e < mesh().element_count(); ++e) place(e);
   connect();
 }
 
-void Solid::place(const QuadraturePoint& point, std::span<const int> nodes) {
-  const ShapeValues shape = shape_at(mesh().shape, point.at);
-  Mat3 jacobian = Mat3::Zero();
-  for (int i = 0; i < shape.value.size(); ++i) {
-    jacobian += mesh().nodes[at(nodes[at(i)])] * shape.gradient.col(i).transpose();
+void Solid::place(int element) {
+  const auto nodes = mesh().element(element);
+  kernel_.add_element(nodes);
+  for (int q = 0; q < per_element_; ++q) {
+    const QuadraturePoint& point = quadrature(element_)[at(q)];
+    const ShapeValues shape = shape_at(mesh().shape, point.at);
+    Mat3 jacobian = Mat3::Zero();
+    for (int i = 0; i < shape.value.size(); ++i) {
+      jacobian += mesh().nodes[at(nodes[at(i)])] * shape.gradient.col(i).transpose();
+    }
+    const Point& placed = points_.emplace_back(
+        Point{point.weight * jacobian.determinant(), point.mu * material_.mu(), point.lambda * material_.lambda()});
+    const Nodal gradient = jacobian.inverse().transpose() * shape.gradient;
+    kernel_.set_point(element, q, gradient, placed.volume * placed.mu, placed.volume * placed.lambda);
   }
-  points_.push_back(
-      {point.weight * jacobian.determinant(), point.mu * material_.mu(), point.lambda * material_.lambda()});
-  const Nodal gradient = jacobian.inverse().transpose() * shape.gradient;
-  gradients_.insert(gradients_.end(), gradient.data(), gradient.data() + gradient.size());
 }
 
 void Solid::connect() {
@@ -57,29 +61,10 @@ Solid::Nodal Solid::displacements(const VectorXd& u, int element) const {
   return local;
 }
 
-Eigen::Map<const Solid::Nodal> Solid::gradient(int element, int point) const {
-  const int nodes = nodes_of(mesh().shape);
-  return {gradients_.data() + static_cast<std::ptrdiff_t>(element * per_element_ + point) * 3 * nodes, 3, nodes};
-}
-
-double Solid::energy(const VectorXd& u) const {
-  double sum = 0;
-  for (int e = 0; e < mesh().element_count(); ++e) {
-    const Nodal local = displacements(u, e);
-    for (int q = 0; q < per_element_; ++q) {
-      const Point& point = points_[at(e * per_element_ + q)];
-      const Mat3 f = Mat3::Identity() + local * gradient(e, q).transpose();
-      sum += point.volume * stress(law_, f, point.mu, point.lambda).energy;
-    }
-  }
-  return sum;
-}
-
 Solid::Forces Solid::forces(const VectorXd& u) const {
-  return sum_forces(u, [this](int element, int index, const Mat3& f) {
-    const Point& here = point(element, index);
-    return stress(law_, f, here.mu, here.lambda);
-  });
+  Forces all{0, VectorXd::Zero(size())};
+  all.energy = kernel_.add_forces(u, all.force);
+  return all;
 }
 
 void Solid::stiffness(const VectorXd& u, Curvature curvature, SymmetricMatrix& to) const {
@@ -117,8 +102,7 @@ double Solid::largest_turn(const VectorXd& u) const {
 }
 
 std::size_t Solid::bytes() const noexcept {
-  return mesh_bytes() + slots_.size() * sizeof(int) + points_.size() * sizeof(Point) +
-         gradients_.size() * sizeof(double);
+  return mesh_bytes() + slots_.size() * sizeof(int) + points_.size() * sizeof(Point) + kernel_.bytes();
 }
 
 }  // namespace tendon::softbody

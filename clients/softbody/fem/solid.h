@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "clients/softbody/fem/elastic.h"
+#include "clients/softbody/fem/kernel.h"
 #include "clients/softbody/fem/material.h"
 
 namespace tendon::softbody {
@@ -24,7 +25,8 @@ class Solid : public Elastic {
   const Material& material() const noexcept { return material_; }
   Law law() const noexcept { return law_; }
 
-  double energy(const VectorXd& u) const override;
+  double energy(const VectorXd& u) const override { return forces(u).energy; }
+  /// Four elements at a time (kernel.h).
   Forces forces(const VectorXd& u) const override;
   void stiffness(const VectorXd& u, Curvature curvature, SymmetricMatrix& to) const override;
 
@@ -43,49 +45,27 @@ class Solid : public Elastic {
   };
   int points_per_element() const noexcept { return per_element_; }
   const Point& point(int element, int index) const { return points_[at(element * per_element_ + index)]; }
-  using Nodal = Eigen::Matrix<double, 3, Eigen::Dynamic, 0, 3, kMaxNodes>;
-  Eigen::Map<const Nodal> gradient(int element, int point) const;  ///< ∂Nᵢ/∂X there, 1/m
-  Nodal displacements(const VectorXd& u, int element) const;       ///< of an element's nodes, m
+  using Nodal = Kernel::Nodal;
+  Kernel::Gradient gradient(int element, int point) const { return kernel_.gradient(element, point); }  ///< ∂Nᵢ/∂X, 1/m
+  Nodal displacements(const VectorXd& u, int element) const;  ///< of an element's nodes, m
 
  protected:
-  /// Energy and forces of a material with the Stress `stress_at(element, point, F)`.
-  template <class StressAt>
-  Forces sum_forces(const VectorXd& u, const StressAt& stress_at) const;
   /// The stiffness of a material with the tangent `tangent_at(element, point, F)`.
   template <class TangentAt>
   void sum_stiffness(const VectorXd& u, const TangentAt& tangent_at, SymmetricMatrix& to) const;
 
  private:
-  void place(const QuadraturePoint& point, std::span<const int> nodes);
+  void place(int element);
   void connect();
 
   Element element_;
   Material material_;
   Law law_;
-  int per_element_;                ///< points of integration
-  std::vector<Point> points_;      ///< of each element, one after the other
-  std::vector<double> gradients_;  ///< ∂N/∂X of each point: 3 × nodes
-  std::vector<int> slots_;         ///< where each entry of an element's lower triangle goes; −1: nowhere
+  int per_element_;            ///< points of integration
+  std::vector<Point> points_;  ///< of each element, one after the other
+  Kernel kernel_;
+  std::vector<int> slots_;  ///< where each entry of an element's lower triangle goes; −1: nowhere
 };
-
-template <class StressAt>
-Solid::Forces Solid::sum_forces(const VectorXd& u, const StressAt& stress_at) const {
-  Forces all{0, VectorXd::Zero(size())};
-  for (int e = 0; e < mesh().element_count(); ++e) {
-    const Nodal local = displacements(u, e);
-    Nodal force = Nodal::Zero(3, local.cols());
-    for (int q = 0; q < per_element_; ++q) {
-      const double volume = point(e, q).volume;
-      const auto g = gradient(e, q);
-      const Stress here = stress_at(e, q, Mat3::Identity() + local * g.transpose());
-      all.energy += volume * here.energy;
-      force += volume * here.piola * g;
-    }
-    const auto nodes = mesh().element(e);
-    for (int i = 0; i < local.cols(); ++i) all.force.segment<3>(3 * nodes[at(i)]) += force.col(i);
-  }
-  return all;
-}
 
 template <class TangentAt>
 void Solid::sum_stiffness(const VectorXd& u, const TangentAt& tangent_at, SymmetricMatrix& to) const {

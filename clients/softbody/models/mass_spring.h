@@ -50,6 +50,7 @@ class MassSpringModel : public Model {
   Reaction press(const Patch& patch, Given given, double value) override { return newton_.press(patch, given, value); }
   double step() const noexcept override { return newton_.step(); }
   bool still() const noexcept override { return newton_.still(); }
+  bool glides() const noexcept override { return newton_.glides(); }
   std::size_t bytes() const noexcept override { return springs_.bytes() + newton_.bytes(); }
 
  private:

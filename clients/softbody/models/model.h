@@ -26,7 +26,16 @@ struct Reaction {
   /// evenly does not feel the stiffness that inertia adds within one step.
   double stiffness = 0;
   Vec2 slope = Vec2::Zero();  ///< ∂depth/∂(place of the patch) with the body held as it is: the mean tilt below it
-  double error = 0;           ///< N, the distance that may remain to the mesh's exact answer; not the mesh's own error
+  /// How force and slope change as the patch glides by c: what PatchContact needs for the whole stiffness. With w the
+  /// patch's weights as a load, W = ∂w/∂c and A the body's stiffness.
+  struct Glide {
+    Vec2 tilting = Vec2::Zero();  ///< 1/m, ∂slope/∂depth as the patch is pressed on
+    Mat2 curving = Mat2::Zero();  ///< 1/m, ∂slope/∂c with the body held as it is
+    Mat2 giving = Mat2::Zero();   ///< 1/(N m), Wᵀ A⁻¹ W at a held depth
+  };
+  Glide glide;
+  bool knows_glide = false;  ///< else `glide` is zero; see Model::glides()
+  double error = 0;          ///< N, the distance that may remain to the mesh's exact answer; not the mesh's own error
 };
 
 /// The force (N) with which a tool reaches the given depth or force, when the depth without it is `untouched` (m) and
@@ -59,6 +68,9 @@ class Model {
 
   /// True when the body always has the shape of its mesh while nothing touches it: then it need not be asked.
   virtual bool still() const noexcept { return true; }
+
+  /// True when Reaction::glide is given for a patch that has its curvatures.
+  virtual bool glides() const noexcept { return false; }
 
   /// Bytes of the model's matrices and state.
   virtual std::size_t bytes() const noexcept = 0;

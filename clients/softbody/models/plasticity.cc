@@ -91,26 +91,21 @@ PlasticSolid::Flow PlasticSolid::flow(int element, int point, const Mat3& strain
   return flow;
 }
 
-Stress PlasticSolid::stress_at(int element, int point, const Mat3& f) const {
-  const Point& here = this->point(element, point);
-  Stress stress = softbody::stress(law(), f, here.mu, here.lambda);
-  const auto add = [&](const Flow& flow, const Mat3& strain) {
+Stress PlasticSolid::flow_at(int element, int point, const Mat3& f) const {
+  const double mu = this->point(element, point).mu;
+  const auto energy = [&](const Flow& flow, const Mat3& strain) {
     const Mat3& p = flow.plastic;
-    stress.energy +=
-        -2 * here.mu * p.cwiseProduct(strain).sum() + (here.mu + yield_.hardening / 3) * p.squaredNorm() + flow.lost;
+    return -2 * mu * p.cwiseProduct(strain).sum() + (mu + yield_.hardening / 3) * p.squaredNorm() + flow.lost;
   };
   if (law() == Law::kLinear) {
     const Mat3 strain = sym(f) - Mat3::Identity();
     const Flow step = flow(element, point, strain);
-    add(step, strain);
-    stress.piola -= 2 * here.mu * step.plastic;
-  } else {
-    const Stretch stretch(f);
-    const Flow step = flow(element, point, stretch.strain());
-    add(step, stretch.strain());
-    stress.piola -= 4 * here.mu * f * stretch.share(step.plastic);  // ∂(p:S)/∂F = 2 F share(p)
+    return {energy(step, strain), -2 * mu * step.plastic};
   }
-  return stress;
+  const Stretch stretch(f);
+  const Flow step = flow(element, point, stretch.strain());
+  // ∂(p:S)/∂F = 2 F share(p)
+  return {energy(step, stretch.strain()), -4 * mu * f * stretch.share(step.plastic)};
 }
 
 Mat9 PlasticSolid::tangent_at(int element, int point, const Mat3& f) const {
@@ -133,7 +128,22 @@ Mat9 PlasticSolid::tangent_at(int element, int point, const Mat3& f) const {
 }
 
 Solid::Forces PlasticSolid::forces(const VectorXd& u) const {
-  return sum_forces(u, [this](int element, int point, const Mat3& f) { return stress_at(element, point, f); });
+  Forces all = Solid::forces(u);
+  for (int e = 0; e < mesh().element_count(); ++e) {
+    const Nodal local = displacements(u, e);
+    const auto nodes = mesh().element(e);
+    for (int q = 0; q < points_per_element(); ++q) {
+      const Point& here = point(e, q);
+      if (here.mu == 0) continue;
+      const auto g = gradient(e, q);
+      const Stress flow = flow_at(e, q, Mat3::Identity() + local * g.transpose());
+      if (flow.energy == 0 && flow.piola.isZero(0)) continue;
+      all.energy += here.volume * flow.energy;
+      const Nodal force = here.volume * flow.piola * g;
+      for (int i = 0; i < force.cols(); ++i) all.force.segment<3>(3 * nodes[at(i)]) += force.col(i);
+    }
+  }
+  return all;
 }
 
 void PlasticSolid::stiffness(const VectorXd& u, Curvature curvature, SymmetricMatrix& to) const {
@@ -162,11 +172,13 @@ PlasticModel::PlasticModel(const Solid& solid, const TouchSurface& surface, cons
                            const EffectsConfig& effects, const Yield& yield)
     : solid_(solid, yield), model_(solid_, surface, config, effects) {
   solid_.advance(model_.displacements());
+  model_.forget_forces();
 }
 
 Reaction PlasticModel::press(const Patch& patch, Given given, double value) {
   const Reaction reaction = model_.press(patch, given, value);
   solid_.advance(model_.displacements());
+  model_.forget_forces();
   return reaction;
 }
 

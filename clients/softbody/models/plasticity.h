@@ -53,7 +53,7 @@ class PlasticSolid : public Solid {
  private:
   struct Flow;
   Flow flow(int element, int point, const Mat3& strain) const;
-  Stress stress_at(int element, int point, const Mat3& f) const;
+  Stress flow_at(int element, int point, const Mat3& f) const;  ///< what plastic strain adds to the elastic stress
   Mat9 tangent_at(int element, int point, const Mat3& f) const;
 
   Yield yield_;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "clients/softbody/models/quasi_static.h"
 
+#include <Eigen/Cholesky>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
@@ -14,24 +15,38 @@ namespace {
 
 /// Armijo's share of the predicted decrease that a step must bring, and the shortest step tried.
 constexpr double kDecrease = 1e-4;
-constexpr double kShortest = 1.0 / 1024;
+constexpr double kShortest = 1.0 / 64;
 
-/// A factor serves while each step with it leaves at most this share of the energy that has still to be lost, which is
-/// a quarter of the error.
+/// A factor is made anew after so many steps without an answer that is good enough. Of a body whose sides push each
+/// other it serves only while each step with it leaves at most this share of the energy that has still to be lost, a
+/// quarter of the error: who is pushed changes, so that earlier steps teach nothing.
+constexpr int kPatience = 16;
 constexpr double kSlow = 1.0 / 16;
 
-/// The rounds for an answer's stiffness end when one lowers it by at most this share; another would remove only a part
-/// of that.
-constexpr double kTangentPrecision = 2e-3;
+/// What H says of the stiffness is wrong by the first order of H's error, and the energy of the shape by the second: where
+/// the two differ by at most this share, the second serves.
+constexpr double kTangentAlike = 0.02;
+/// How a body gives way to a gliding patch is right to this share.
+constexpr double kGlidePrecision = 1e-2;
 constexpr int kTangentRounds = 5;
 
-/// m, the step with which a slope of the force is measured: for a body of some mm the next derivative adds 1e-4 of it.
+/// A shape whose force may be wrong by a larger share is none of rest: how it would glide means nothing.
+constexpr double kAtRest = 0.1;
+
+/// How a body gives way to a gliding patch is kept while load and force differ by at most this share.
+constexpr double kGlidesAlike = 0.04;
+
+/// m, how far at most a node is moved to measure a slope of the force: for a body of some mm the next derivative adds
+/// 1e-4 of it.
 constexpr double kNudge = 1e-7;
 
 /// How often at most the neighbouring sides are looked up for one answer, and the relative change of their forces that
 /// ends this.
 constexpr int kLooks = 10;
 constexpr double kParted = 1e-3;
+
+/// A change of forces of a smaller share is rounding, and teaches nothing.
+constexpr double kHeard = 1e-8;
 
 /// m: an error of the force that so small a change of depth explains counts as zero, even when there is no force to
 /// compare it with.
@@ -78,6 +93,8 @@ void QuasiStaticModel::stiffness(Elastic::Curvature curvature) {
 void QuasiStaticModel::factorize() {
   ++factors_;
   stale_ = false;
+  in_vain_ = 0;
+  pairs_.clear();
   stiffness(Elastic::Curvature::kExact);
   if (factor_.factorize(stiffness_)) return;
   stiffness(Elastic::Curvature::kWithoutNegative);
@@ -94,28 +111,34 @@ void QuasiStaticModel::factorize() {
   }
 }
 
-MatrixXd QuasiStaticModel::solve(const MatrixXd& forces) const {
-  if (self_collision_) return self_collision_->solve(factor_, forces);
-  return factor_.solve(forces);
+VectorXd QuasiStaticModel::solve(const VectorXd& b, bool among_sides) const {
+  return among_sides ? VectorXd(self_collision_->solve(factor_, b)) : pairs_.times(b, factor_.solve(b));
 }
 
-void QuasiStaticModel::foresee(const VectorXd& internal, const VectorXd& load, Given given, double value) {
+VectorXd QuasiStaticModel::solve_at_depth(const VectorXd& b, bool among_sides, const VectorXd& load,
+                                          const VectorXd& by_tool) const {
+  const VectorXd x = solve(b, among_sides);
+  return x - load.dot(x) / load.dot(by_tool) * by_tool;
+}
+
+bool QuasiStaticModel::foresee(const VectorXd& internal, const VectorXd& load, Given given, double value) {
   const VectorXd b = self_collision_->free_forces(u_) - internal;
   if (given == Given::kForce) {
     self_collision_->foresee(factor_, u_, b + value * load, nullptr, 0);
-    return;
+  } else {
+    const double by = value - load.dot(elastic_.to_free(u_));
+    const bool pulls = self_collision_->foresee(factor_, u_, b, &load, by) < 0 && given == Given::kLeastDepth;
+    if (pulls) {
+      self_collision_->foresee(factor_, u_, b, nullptr, 0);
+    }
   }
-  const double by = value - load.dot(elastic_.to_free(u_));
-  const double force = self_collision_->foresee(factor_, u_, b, &load, by);
-  if (given != Given::kLeastDepth || force >= 0) return;
-  self_collision_->foresee(factor_, u_, b, nullptr, 0);
+  return self_collision_->pushes(u_);
 }
 
-QuasiStaticModel::Step QuasiStaticModel::solve(const VectorXd& internal, const VectorXd& load) const {
+QuasiStaticModel::Step QuasiStaticModel::step_among_sides(const VectorXd& internal, const VectorXd& load) const {
   MatrixXd right(internal.size(), 2);
-  right << -internal, load;
-  if (self_collision_) right.col(0) -= self_collision_->foreseen_forces(u_);
-  const MatrixXd solution = solve(right);
+  right << -internal - self_collision_->foreseen_forces(u_), load;
+  const MatrixXd solution = self_collision_->solve(factor_, right);
   return {solution.col(0), solution.col(1)};
 }
 
@@ -137,68 +160,176 @@ bool QuasiStaticModel::go(const VectorXd& step, const VectorXd& load, double for
   return false;
 }
 
-/// ∂force/∂depth of the present shape, by the factor of an older one. Rayleigh quotient: the body's own shape minimises
-/// the stiffness over all shapes with unit depth, so a first-order error of the shape (the factor is old) is only a
-/// second-order error of the stiffness. Every round removes the same share of the rest.
-double QuasiStaticModel::tangent(const VectorXd& load, const VectorXd& by_tool, const Elastic::Forces& now) {
-  const double compliance = load.dot(by_tool);
+VectorXd QuasiStaticModel::needed(const VectorXd& shape, const Elastic::Forces& now) {
+  const double nudge = kNudge / shape.lpNorm<Eigen::Infinity>();
+  if (!std::isfinite(nudge)) return VectorXd::Zero(shape.size());
   const VectorXd start = u_;
-  VectorXd shape = by_tool / compliance;
-  double stiffness = std::numeric_limits<double>::infinity();
-  for (int i = 0; i < kTangentRounds; ++i) {
-    u_ = start;
-    elastic_.add_free(kNudge * shape, u_);
-    const VectorXd needed = (forces().force - now.force) / kNudge;
-    const double before = stiffness;
-    stiffness = shape.dot(needed);
-    if (before - stiffness <= kTangentPrecision * stiffness) break;
-    const VectorXd back = solve(needed);
-    shape -= back - load.dot(back) / compliance * by_tool;
-  }
+  elastic_.add_free(nudge * shape, u_);
+  VectorXd change = (forces().force - now.force) / nudge;
   u_ = start;
-  return stiffness;
+  return change;
 }
 
-double QuasiStaticModel::newton(const VectorXd& load, Given given, double value, Reaction& reaction) {
+/// Where the last step of an answer began: H is that of Pairs, or of who is pushed.
+struct QuasiStaticModel::Tangent {
+  const VectorXd& by_tool;  ///< H w
+  const Elastic::Forces& now;
+  bool among_sides;
+};
+
+/// The shapes Y at a held depth with A Y = W there: Y minimises ½ YᵀAY − WᵀY over all shapes of a growing space
+/// (Galerkin), so that what they are wrong by counts squared. Nothing is found where the body is not stable at a held
+/// depth.
+void QuasiStaticModel::find_shapes(const VectorXd& load, const MatrixXd& slopes, const Tangent& tangent) {
+  const auto products = [&](const MatrixXd& shapes) {
+    MatrixXd all(shapes.rows(), shapes.cols());
+    for (Eigen::Index i = 0; i < shapes.cols(); ++i) all.col(i) = needed(shapes.col(i), tangent.now);
+    return all;
+  };
+  const auto solved = [&](const MatrixXd& loads) {
+    MatrixXd all(loads.rows(), loads.cols());
+    for (Eigen::Index i = 0; i < loads.cols(); ++i) {
+      all.col(i) = solve_at_depth(loads.col(i), tangent.among_sides, load, tangent.by_tool);
+    }
+    return all;
+  };
+  MatrixXd space = solved(slopes);
+  MatrixXd by_space = products(space);
+  Glided found;
+  glided_.reset();
+  for (int round = 0;; ++round) {
+    const MatrixXd gram = space.transpose() * by_space;
+    const Eigen::LLT<MatrixXd> energies((gram + gram.transpose()) / 2);
+    if (energies.info() != Eigen::Success || !gram.allFinite()) return;
+    const MatrixXd shares = energies.solve(space.transpose() * slopes);
+    found.shapes = space * shares;
+    found.giving = slopes.transpose() * found.shapes;
+    const MatrixXd by_shapes = by_space * shares;
+    const MatrixXd left = slopes - by_shapes;
+    const MatrixXd more = solved(left);
+    const Mat2 missing = left.transpose() * more;
+    if (round == kTangentRounds || missing.norm() <= kGlidePrecision * found.giving.norm()) {
+      found.shapes += more;
+      found.giving += missing;
+      break;
+    }
+    // Of one size, so that the sums are well conditioned.
+    space = (MatrixXd(space.rows(), 4) << found.shapes, more).finished();
+    by_space = (MatrixXd(space.rows(), 4) << by_shapes, products(more)).finished();
+    for (int i = 0; i < 4; ++i) {
+      const double size = 1 / space.col(i).norm();
+      space.col(i) *= size;
+      by_space.col(i) *= size;
+    }
+  }
+  found.giving = (found.giving + found.giving.transpose()).eval() / 2;
+  glided_ = std::move(found);
+}
+
+/// Stiffness and glide of the present shape, by the factor of an older one. Rayleigh quotient: the body's own shape
+/// minimises the stiffness over all shapes with unit depth, so a first-order error of the shape is only a second-order
+/// error of the stiffness. Every round removes the most that one more direction can.
+void QuasiStaticModel::find_tangent(const VectorXd& load, const Patch* patch, const Tangent& tangent,
+                                    Reaction& reaction) {
+  VectorXd shape = tangent.by_tool / load.dot(tangent.by_tool);
+  VectorXd by_shape = needed(shape, tangent.now);
+  double stiffness = shape.dot(by_shape);
+  double guess = reaction.stiffness;
+  for (int round = 0; std::abs(guess - stiffness) > kTangentAlike * std::abs(stiffness) && round < kTangentRounds;
+       ++round) {
+    const VectorXd back = solve_at_depth(by_shape, tangent.among_sides, load, tangent.by_tool);
+    const VectorXd by_back = needed(back, tangent.now);
+    const double less = back.dot(by_shape);
+    const double share = less / back.dot(by_back);
+    shape -= share * back;
+    by_shape -= share * by_back;
+    guess = stiffness;
+    stiffness = shape.dot(by_shape);
+  }
+  reaction.stiffness = stiffness;
+  if (patch == nullptr || patch->curvatures.size() == 0) return;
+  MatrixXd slopes(load.size(), 2);
+  const MatrixXd all = patch_load_slopes(elastic_, normal_, *patch);
+  for (int axis = 0; axis < 2; ++axis) slopes.col(axis) = elastic_.to_free(all.col(axis));
+  const bool alike = glided_ && (glided_->load - load).norm() <= kGlidesAlike * load.norm() &&
+                     std::abs(glided_->force - reaction.force) <= kGlidesAlike * std::abs(reaction.force);
+  if (!alike) {
+    find_shapes(load, slopes, tangent);
+    if (!glided_) return;
+    glided_->load = load;
+    glided_->force = reaction.force;
+  }
+  // What the shape of unit depth is still wrong by is seen by the shapes of the glide.
+  reaction.glide = {.tilting = slopes.transpose() * shape - glided_->shapes.transpose() * by_shape,
+                    .curving = curve_below(*patch, normal_, u_),
+                    .giving = glided_->giving};
+  reaction.knows_glide = true;
+}
+
+double QuasiStaticModel::newton(const VectorXd& load, const Patch* patch, Given given, double value,
+                                Reaction& reaction) {
   double error = std::numeric_limits<double>::infinity();
   double before = std::numeric_limits<double>::infinity();
-  double enough = 0;
   bool exact = false;  // true when the factor is that of the present shape
-  VectorXd by_tool;
-  Elastic::Forces now = forces();
-  for (iterations_ = 0; iterations_ < config_.max_iterations;) {
-    ++iterations_;
+  bool among_sides = false;
+  Step step;
+  Elastic::Forces now = known_ ? std::move(known_->forces) : forces();
+  VectorXd solved;  // by the factor alone, as the next
+  if (known_) solved = std::move(known_->solved);
+  known_.reset();
+  VectorXd solved_load;
+  for (iterations_ = 0;;) {
     if (stale_) {
       factorize();
       exact = true;
     }
-    if (self_collision_) foresee(now.force, load, given, value);
-    const Step step = solve(now.force, load);
+    if (exact || solved.size() == 0) solved = factor_.solve(now.force);
+    if (exact || solved_load.size() == 0) solved_load = factor_.solve(load);
+    step.by_itself = -pairs_.times(now.force, solved);
+    step.by_tool = pairs_.times(load, solved_load);
+    if (self_collision_) among_sides = foresee(now.force, load, given, value);
+    if (among_sides) step = step_among_sides(now.force, load);
     const double compliance = load.dot(step.by_tool);
     const double depth = load.dot(elastic_.to_free(u_));
     reaction.stiffness = 1 / compliance;
     reaction.force = constrained_force(given, value, depth + load.dot(step.by_itself), compliance);
-    by_tool = step.by_tool;
     const VectorXd move = step.by_itself + reaction.force * step.by_tool;
     // −slope = moveᵀ K move is twice the energy that has still to be lost; a force error of √(… K) would explain it.
     const double slope = (now.force - reaction.force * load).dot(move);
-    error = std::sqrt(std::max(0.0, -slope) * reaction.stiffness);
-    enough = config_.tolerance * std::abs(reaction.force) + kUnseen * reaction.stiffness;
-    stale_ = !exact && -slope > kSlow * before;
+    error = std::sqrt(std::abs(slope * reaction.stiffness));
+    const double enough = config_.tolerance * std::abs(reaction.force) + kUnseen * reaction.stiffness;
+    if (error <= enough) in_vain_ = 0;
+    if (error <= enough || iterations_ == config_.max_iterations) break;
+    stale_ = !exact && in_vain_ >= kPatience;
+    if (among_sides) stale_ = !exact && -slope > kSlow * before;
     if (stale_) continue;
+    const VectorXd start = elastic_.to_free(u_);
+    const VectorXd force_before = now.force;
     const bool moved = go(move, load, reaction.force, slope, now);
     stale_ = !moved && !exact;
     if (stale_) continue;
+    if (!moved) break;
     before = -slope;
-    if (!moved || error <= enough) break;
+    ++iterations_;
+    ++in_vain_;
     exact = false;
+    const VectorXd there = factor_.solve(now.force);
+    const VectorXd change = now.force - force_before;
+    if (change.norm() > kHeard * now.force.norm()) {
+      pairs_.add(elastic_.to_free(u_) - start, change, there - solved);
+    }
+    solved = there;
   }
-  if (error > enough) stale_ = true;
-  if (step_ == 0 && !exact && !stale_) reaction.stiffness = tangent(load, by_tool, now);
+  const bool lasts = effects_.empty() && self_collision_ == nullptr;
+  if (lasts) known_ = Known{now, solved};
+  const bool at_rest = error <= kAtRest * std::abs(reaction.force);
+  if (step_ == 0 && patch != nullptr)
+    find_tangent(load, at_rest ? patch : nullptr, {step.by_tool, now, among_sides}, reaction);
   return error;
 }
 
-double QuasiStaticModel::part_sides(const VectorXd& load, Given given, double value, Reaction& reaction) {
+double QuasiStaticModel::part_sides(const VectorXd& load, const Patch* patch, Given given, double value,
+                                    Reaction& reaction) {
   int iterations = iterations_;
   double error = reaction.error;
   for (int looks = 1;; ++looks) {
@@ -207,7 +338,7 @@ double QuasiStaticModel::part_sides(const VectorXd& load, Given given, double va
       iterations_ = iterations;
       return changed <= kParted ? error : error + changed * std::abs(reaction.force);
     }
-    error = newton(load, given, value, reaction);
+    error = newton(load, patch, given, value, reaction);
     iterations += iterations_;
   }
 }
@@ -219,8 +350,8 @@ Reaction QuasiStaticModel::press(const Patch& patch, Given given, double value) 
     return reaction;
   }
   const VectorXd load = elastic_.to_free(patch_load(elastic_, normal_, patch));
-  reaction.error = newton(load, given, value, reaction);
-  if (self_collision_) reaction.error = part_sides(load, given, value, reaction);
+  reaction.error = newton(load, &patch, given, value, reaction);
+  if (self_collision_) reaction.error = part_sides(load, &patch, given, value, reaction);
   for (const auto& effect : effects_) effect->advance(elastic_.to_free(u_));
   reaction.depth = depth_below(patch, normal_, u_);
   reaction.slope = slope_below(patch, normal_, u_);
@@ -235,6 +366,9 @@ void QuasiStaticModel::cut(const Division& division, const EffectsConfig& effect
   effects_ = effects_at_rest(effects, elastic_);
   if (self_collision_) self_collision_ = std::make_unique<SelfCollision>(elastic_, *config_.self_collision, u_);
   stiffness_ = elastic_.pattern();
+  pairs_.clear();
+  glided_.reset();
+  known_.reset();
   factor_ = Factor(stiffness_);  // a split factor would not serve: under load the shape changes in the first step
   stale_ = true;
 }
@@ -243,14 +377,14 @@ double QuasiStaticModel::release() {
   Reaction free;
   VectorXd nothing = VectorXd::Zero(elastic_.free_count());
   nothing[0] = 1;  // any direction, with no force along it
-  free.error = newton(nothing, Given::kForce, 0, free);
-  if (self_collision_) part_sides(nothing, Given::kForce, 0, free);
+  free.error = newton(nothing, nullptr, Given::kForce, 0, free);
+  if (self_collision_) part_sides(nothing, nullptr, Given::kForce, 0, free);
   for (const auto& effect : effects_) effect->advance(elastic_.to_free(u_));
   return forces().energy;
 }
 
 std::size_t QuasiStaticModel::bytes() const noexcept {
-  return stiffness_.bytes() + factor_.bytes() + softbody::bytes(effects_) +
+  return stiffness_.bytes() + factor_.bytes() + pairs_.bytes() + softbody::bytes(effects_) +
          (self_collision_ ? self_collision_->bytes() : 0) +
          static_cast<std::size_t>(u_.size() + rest_.size()) * sizeof(double);
 }

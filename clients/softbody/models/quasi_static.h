@@ -7,6 +7,7 @@
 #include "clients/softbody/effects/effects.h"
 #include "clients/softbody/effects/self_collision.h"
 #include "clients/softbody/models/model.h"
+#include "clients/softbody/models/pairs.h"
 
 namespace tendon::softbody {
 
@@ -15,17 +16,17 @@ namespace tendon::softbody {
 /// mass. Effects that act on the whole body add their energies; with inertia this is the implicit Euler method, solved
 /// to convergence.
 ///
-/// The factor is kept from step to step and from answer to answer, and made anew only when it no longer serves: a hand
-/// moves little between two answers, and a factor costs as much as twenty steps. It is the factor of the exact second
-/// derivative; where that is not positive definite, the negative eigenvalues are removed at every point of integration.
-/// A line search makes the energy fall in every step. So a body that was turned inside out returns to its shape
+/// The factor is kept from step to step and from answer to answer, and brought along by what the last eight steps taught
+/// (Pairs). It is made anew only when it no longer serves: a factor costs as much as thirty steps. It is the factor of
+/// the exact second derivative; where that is not positive definite, the negative eigenvalues are removed at every point
+/// of integration. A line search makes the energy fall in every step. So a body that was turned inside out returns to its shape
 /// (Law::kCorotational), or at least comes to rest with no element inverted (kNeoHookean): the neo-Hookean energy has
 /// further minima, in which an edge of the body is wound around itself.
 class QuasiStaticModel : public Model {
  public:
   struct Config {
-    int max_iterations = 30;                    ///< for an answer; the rest is in Reaction::error
-    double tolerance = 1e-6;                    ///< of the force, relative
+    int max_iterations = 30;  ///< for an answer; the rest is in Reaction::error, and the next answer goes on
+    double tolerance = 1e-6;  ///< of the force, relative: an answer ends when its error is at most so large
     std::optional<double> self_collision = {};  ///< Pa/m: the bed c of SelfCollision
   };
   /// `elastic` must outlive this. It begins at rest, under its weight if it has any.
@@ -36,6 +37,7 @@ class QuasiStaticModel : public Model {
   void cut(const Division& division, const EffectsConfig& effects) override;
   double step() const noexcept override { return step_; }
   bool still() const noexcept override { return effects_.empty(); }
+  bool glides() const noexcept override { return step_ == 0; }
   std::size_t bytes() const noexcept override;
 
   int iterations() const noexcept { return iterations_; }  ///< in the last answer
@@ -46,42 +48,71 @@ class QuasiStaticModel : public Model {
   void set_displacements(const VectorXd& u) {
     u_ = u;
     stale_ = true;
+    glided_.reset();
+    forget_forces();
   }
+  /// For an Elastic that changes without moving: the forces are summed anew in the next answer.
+  void forget_forces() { known_.reset(); }
   /// Takes the tool away and finds the shape at rest, or after one step of time. Returns the remaining energy, J.
   double release();
 
  private:
   struct Step {
-    VectorXd by_itself;  ///< K⁻¹(−internal force)
-    VectorXd by_tool;    ///< K⁻¹ w
+    VectorXd by_itself;  ///< H(−internal force), with H the inverse of the stiffness, nearly
+    VectorXd by_tool;    ///< H w
   };
   Elastic::Forces forces() const;
   void stiffness(Elastic::Curvature curvature);
   void factorize();
-  void foresee(const VectorXd& internal, const VectorXd& load, Given given, double value);
-  MatrixXd solve(const MatrixXd& forces) const;
-  Step solve(const VectorXd& internal, const VectorXd& load) const;
+  /// Whether sides will push each other, or do.
+  bool foresee(const VectorXd& internal, const VectorXd& load, Given given, double value);
+  Step step_among_sides(const VectorXd& internal, const VectorXd& load) const;
+  /// H b, and what of it keeps the tool's depth, by H w.
+  VectorXd solve(const VectorXd& b, bool among_sides) const;
+  VectorXd solve_at_depth(const VectorXd& b, bool among_sides, const VectorXd& load, const VectorXd& by_tool) const;
   /// Goes along `step` as far as the energy minus the tool's work falls. False when it does not fall. `now` has the
   /// forces before the call, and those of the new shape after it.
   bool go(const VectorXd& step, const VectorXd& load, double force, double slope, Elastic::Forces& now);
-  double tangent(const VectorXd& load, const VectorXd& by_tool, const Elastic::Forces& now);
-  /// Solves with the neighbouring sides of the body as they were last looked up. Returns the error, N.
-  double newton(const VectorXd& load, Given given, double value, Reaction& reaction);
+  /// The stiffness times `shape`, N.
+  VectorXd needed(const VectorXd& shape, const Elastic::Forces& now);
+  struct Tangent;
+  void find_shapes(const VectorXd& load, const MatrixXd& slopes, const Tangent& tangent);
+  void find_tangent(const VectorXd& load, const Patch* patch, const Tangent& tangent, Reaction& reaction);
+  /// Solves with the neighbouring sides of the body as they were last looked up. Returns the error, N. With a patch
+  /// that has its curvatures the reaction has its glide.
+  double newton(const VectorXd& load, const Patch* patch, Given given, double value, Reaction& reaction);
   /// Looks up the neighbouring sides and solves again, until they stay the same. Returns the error, N.
-  double part_sides(const VectorXd& load, Given given, double value, Reaction& reaction);
+  double part_sides(const VectorXd& load, const Patch* patch, Given given, double value, Reaction& reaction);
 
   const Elastic& elastic_;
   Vec3 normal_;
   Config config_;
   SymmetricMatrix stiffness_;
   Factor factor_;
+  Pairs pairs_;
   VectorXd u_;
   double step_;
   Effects effects_;
   std::unique_ptr<SelfCollision> self_collision_;
+  /// How the body gives way to a patch that glides at a held depth, as it was last found: the load then, the force, and
+  /// a shape (m) for each column of the load's slopes.
+  struct Glided {
+    VectorXd load;
+    double force = 0;
+    MatrixXd shapes;
+    Mat2 giving;
+  };
+  std::optional<Glided> glided_;
   VectorXd rest_;  ///< m, all nodes: the shape at rest; empty without time
+  /// The forces where the last answer ended, and what the factor makes of them; empty where they do not last.
+  struct Known {
+    Elastic::Forces forces;
+    VectorXd solved;
+  };
+  std::optional<Known> known_;
   int iterations_ = 0;
   int factors_ = 0;
+  int in_vain_ = 0;    ///< iterations since an answer was good enough, or the factor new
   bool stale_ = true;  ///< the factor no longer serves
 };
 

@@ -43,6 +43,7 @@ Reaction StiffeningModel::press(const Patch& patch, Given given, double value) {
   reaction.force *= factor_;
   reaction.stiffness *= factor_;
   reaction.error *= factor_;
+  reaction.glide.giving /= factor_;
   return reaction;
 }
 

@@ -40,6 +40,7 @@ class StiffeningModel : public Model {
   void cut(const Division& division, const EffectsConfig& effects) override { model_->cut(division, effects); }
   double step() const noexcept override { return model_->step(); }
   bool still() const noexcept override { return model_->still(); }
+  bool glides() const noexcept override { return model_->glides(); }
   std::size_t bytes() const noexcept override;
 
  private:

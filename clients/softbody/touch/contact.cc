@@ -26,7 +26,9 @@ PatchContact::PatchContact(Model& model, const TouchSurface& surface, double too
 Feel PatchContact::at(const Vec3& tool) {
   Feel feel;
   feel.gap = std::numeric_limits<double>::infinity();
-  const auto patch = tool.allFinite() ? surface_.patch(surface_.across(tool)) : std::nullopt;
+  const bool glides = model_.glides();
+  const Vec2 place = surface_.across(tool);
+  const auto patch = glides ? surface_.patch_with_curvatures(place) : surface_.patch(place);
   if (!patch) {
     stuck_ = false;
     if (friction_) friction_->let_go();
@@ -36,11 +38,14 @@ Feel PatchContact::at(const Vec3& tool) {
   const Vec3& n = surface_.normal();
   double height = 0;
   Vec2 height_slope = Vec2::Zero();
+  Vec3 curve = Vec3::Zero();
   for (Eigen::Index i = 0; i < patch->weights.size(); ++i) {
     const double here = surface_.height(patch->nodes[static_cast<std::size_t>(i)]);
     height += patch->weights[i] * here;
     height_slope += patch->slopes.col(i) * here;
+    if (glides) curve += patch->curvatures.col(i) * here;
   }
+  const Mat2 height_curve = (Mat2() << curve[0], curve[1], curve[1], curve[2]).finished();
   feel.gap = n.dot(tool) - tool_radius_ - height;
   Reaction reaction;
   feel.touching = stuck_;
@@ -58,11 +63,22 @@ Feel PatchContact::at(const Vec3& tool) {
 
   const Vec3 tilt = surface_.from_across(reaction.slope - height_slope);
   feel.force = reaction.force * (n + tilt);
-  const Vec3 steepest = n + surface_.from_across(2 * reaction.slope - height_slope);
-  feel.stiffness = reaction.stiffness * steepest * steepest.transpose();
+  if (reaction.knows_glide) {
+    const Reaction::Glide& glide = reaction.glide;
+    const double force = reaction.force;
+    const Vec3 steepest = n + tilt;
+    const Vec3 tilting = surface_.from_across(glide.tilting);
+    const Mat2 across = height_curve - glide.curving - force * glide.giving;
+    feel.stiffness = reaction.stiffness * steepest * steepest.transpose() +
+                     force * (steepest * tilting.transpose() + tilting * steepest.transpose()) +
+                     force * surface_.form_from_across(across);
+  } else {
+    const Vec3 steepest = n + surface_.from_across(2 * reaction.slope - height_slope);
+    feel.stiffness = reaction.stiffness * steepest * steepest.transpose();
+  }
   feel.error = reaction.error;
   feel.valid_radius = surface_.radius() / 4;  // further away, across, the patch has other nodes
-  if (friction_) rub(surface_.across(tool), reaction.force, feel);
+  if (friction_) rub(place, reaction.force, feel);
   return feel;
 }
 

@@ -28,8 +28,9 @@ Mat3 not_negative(const Mat3& stiffness);
 
 /// The answer to one position of the tool.
 struct Feel {
-  Vec3 force = Vec3::Zero();      ///< N, on the hand
-  Mat3 stiffness = Mat3::Zero();  ///< N/m, −∂force/∂position, symmetric, not negative
+  Vec3 force = Vec3::Zero();  ///< N, on the hand
+  /// N/m, −∂force/∂position, symmetric. It may have negative directions, in which the tool would rather slip away.
+  Mat3 stiffness = Mat3::Zero();
   /// m, the distance from the tool to the body along the normal; below 0: inside. While the tool touches, the distance
   /// is to the body's surface at rest.
   double gap = 0;
@@ -51,11 +52,14 @@ struct Feel {
 ///
 ///     force = F·n + F·(∂depth/∂c − ∂h/∂c)
 ///
-/// The part across is the effect of the deformed surface's slope on a gliding tool. A linear body has the stiffness
+/// The part across is the effect of the deformed surface's slope on a gliding tool. With k = ∂F/∂δ, P the projection
+/// across, g = ∂depth/∂c − ∂h/∂c, and of the body's Reaction::Glide t = tilting, M = curving and D = giving, each where
+/// the body is:
 ///
-///     K = k·v·vᵀ + (second derivatives by c),   v = n + 2 ∂depth/∂c − ∂h/∂c,   k = ∂F/∂δ
+///     K = k v vᵀ + F (v (Pᵀt)ᵀ + Pᵀt vᵀ) + F Pᵀ (∂²h/∂c² − M − F D) P,   v = n + Pᵀg
 ///
-/// `Feel` has only the first term, which is never negative. For a body with time each answer simulates one
+/// the second derivative of E. Of a model that knows no Glide `Feel` has k v vᵀ with v = n + Pᵀ(2 ∂depth/∂c − ∂h/∂c),
+/// which is what a linear body has without second derivatives. For a body with time each answer simulates one
 /// Model::step(). Friction adds its force and stiffness across.
 ///
 /// Thread-safe: no. Realtime-safe: no.

@@ -152,6 +152,20 @@ TEST(SoftbodyScene, WhatIsWrongWithAModulusOverTimeIsNamed) {
   EXPECT_EQ(refusal(listing("condensed", effects, "")), "s.toml: stiffening: expected a table, found nothing");
 }
 
+TEST(SoftbodyScene, HowWrongAnAnswerMayBeArrivesAndIsForNewtonsMethodAlone) {
+  const std::string effects = "[\"contact\", \"geometric-nonlinearity\"]";
+  const auto asking = [&](const std::string& percent) {
+    return listing("corotational\"\nerror_percent = " + percent + " #", effects, "");
+  };
+  EXPECT_NEAR(parse_scene(asking("0.5"), "s.toml", ".").body.tolerance, 5e-3, 1e-15);
+  EXPECT_NEAR(parse_scene(listing("corotational", effects, ""), "s.toml", ".").body.tolerance, 1e-6, 1e-18);
+  for (const char* bad : {"0", "-1", "11", "true", "\"half\""}) {
+    EXPECT_EQ(refusal(asking(bad)), "s.toml:10: model.error_percent: expected a number above 0 and at most 10") << bad;
+  }
+  EXPECT_EQ(refusal(listing("condensed\"\nerror_percent = 1 #", "[\"contact\"]", "")),
+            "s.toml:10: model.error_percent: unknown key; expected one of kind, table");
+}
+
 TEST(SoftbodyScene, AYieldArrivesAndWhatIsWrongWithItIsNamed) {
   const std::string effects = "[\"contact\", \"geometric-nonlinearity\",\n\"plasticity\"]";
   const std::string table = "[plasticity]\nyield_pa = 500\nhardening_pa = 2000\n";

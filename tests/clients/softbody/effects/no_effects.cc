@@ -41,6 +41,9 @@ double SelfCollision::look(const VectorXd&) { std::abort(); }
 double SelfCollision::foresee(const Factor&, const VectorXd&, const VectorXd&, const VectorXd*, double) {
   std::abort();
 }
+bool SelfCollision::pushes(const VectorXd&) const { std::abort(); }
+VectorXd SelfCollision::foreseen_forces(const VectorXd&) const { std::abort(); }
+MatrixXd SelfCollision::solve(const Factor&, const MatrixXd&) const { std::abort(); }
 VectorXd SelfCollision::forces(const VectorXd&) const { std::abort(); }
 std::size_t SelfCollision::bytes() const noexcept { return 0; }
 

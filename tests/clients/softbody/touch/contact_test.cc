@@ -3,12 +3,15 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/Eigenvalues>
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <numbers>
 #include <stdexcept>
 
 #include "clients/softbody/models/linear.h"
+#include "clients/softbody/scene.h"
 #include "tests/clients/softbody/pressed_block.h"
 #include "tests/support/dice.h"
 
@@ -95,6 +98,54 @@ TEST_F(Contacts, StiffnessIsTheForcesOwnSlopeAlongTheNormal) {
     }
     EXPECT_LT((k - measured).norm(), 0.05 * k.norm());  // what is left out is ∂²/∂c²
   }
+}
+
+/// −∂force/∂position by differences.
+template <class Touched>
+Mat3 by_differences(Touched& touched, const Vec3& tool) {
+  constexpr double kStep = 2e-5;
+  Mat3 all;
+  for (int c = 0; c < 3; ++c) {
+    const Vec3 step = kStep * Vec3::Unit(c);
+    all.col(c) = -(touched(tool + step).force - touched(tool - step).force) / (2 * kStep);
+  }
+  return all;
+}
+
+TEST(ExactStiffness, OfABodyThatBendsAndStretchesIsTheForcesOwnSlope) {
+  for (const Law law : {Law::kNeoHookean, Law::kCorotational, Law::kStVenantKirchhoff}) {
+    const Solid solid = pressed_block(Element::kHex8Sri, 8, 0.45, law);
+    const TouchSurface top(solid.mesh(), Vec3::UnitZ(), kB1PatchRadius);
+    QuasiStaticModel model(solid, top, {.max_iterations = 100, .tolerance = 1e-9});
+    PatchContact contact(model, top, 0, PatchContact::Side::kUnilateral);
+    const auto touched = [&](const Vec3& tool) { return contact.at(tool); };
+    for (const Vec3& tool : {Vec3(0.013, 0.007, 0.045), Vec3(-0.03, 0.02, 0.047), Vec3(0, 0, 0.0465)}) {
+      for (double depth = 1e-3; depth < 0.05 - tool.z(); depth += 1e-3)
+        contact.at(Vec3(tool.x(), tool.y(), 0.05 - depth));
+      const Mat3 given = contact.at(tool).stiffness;
+      EXPECT_LT((given - by_differences(touched, tool)).norm(), 0.01 * given.norm())
+          << static_cast<int>(law) << ' ' << tool.transpose();
+      EXPECT_LT((given - given.transpose()).norm(), 1e-9 * given.norm());
+    }
+  }
+}
+
+TEST(ExactStiffness, OfTheLiverIsRightToTwoNewtonsAMetreAlsoBelowZero) {
+  BodyConfig config = read_scene(TENDON_SCENES "/liver.toml").body;
+  config.tolerance = 1e-9;
+  config.max_iterations = 100;
+  Body body(config);
+  const auto touched = [&](const Vec3& tool) { return body.touch(tool); };
+  double lowest = 0;
+  for (const Vec2& aside : {Vec2(0, 0), Vec2(-0.003, 0.006)}) {
+    const Vec3 above = body.touch_point() + Vec3(aside.x(), aside.y(), 0);
+    for (double depth = 5e-4; depth < 3e-3; depth += 5e-4) body.touch(above - depth * Vec3::UnitZ());
+    const Vec3 tool = above - 3e-3 * Vec3::UnitZ();
+    const Mat3 given = body.touch(tool).stiffness;
+    EXPECT_LT((given - by_differences(touched, tool)).cwiseAbs().maxCoeff(), 2) << given;
+    lowest = std::min(lowest, Eigen::SelfAdjointEigenSolver<Mat3>(given).eigenvalues()[0]);
+  }
+  EXPECT_LT(lowest, -20);  // N/m: there the patch would rather slip away
 }
 
 TEST_F(Contacts, OffTheBodyOrNowhereNothingIsFelt) {

@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "clients/softbody/models/pairs.h"
+
+namespace tendon::softbody {
+namespace {
+
+/// The least cosine of the angle between a step and the forces that it changed.
+constexpr double kLeastCurvature = 1e-8;
+
+}  // namespace
+
+void Pairs::add(const VectorXd& step, const VectorXd& change, const VectorXd& solved) {
+  if (!(step.dot(change) > kLeastCurvature * step.norm() * change.norm())) return;
+  if (steps_.rows() != step.size()) {
+    order_.clear();
+    steps_.resize(step.size(), kMost);
+    changes_.resize(step.size(), kMost);
+    solved_.resize(step.size(), kMost);
+  }
+  int column = count();
+  if (column == kMost) {
+    column = order_.front();
+    order_.erase(order_.begin());
+  }
+  order_.push_back(column);
+  steps_.col(column) = step;
+  changes_.col(column) = change;
+  solved_.col(column) = solved;
+  for (const int i : order_) {
+    steps_changes_(i, column) = steps_.col(i).dot(change);
+    steps_changes_(column, i) = step.dot(changes_.col(i));
+    changes_solved_(i, column) = changes_solved_(column, i) = solved_.col(i).dot(change);
+  }
+}
+
+VectorXd Pairs::times(const VectorXd& b, const VectorXd& solved) const {
+  VectorXd x = solved;
+  const auto size = order_.size();
+  std::array<double, kMost> taken{};
+  for (std::size_t i = size; i-- > 0;) {
+    const int own = order_[i];
+    double along = steps_.col(own).dot(b);
+    for (std::size_t j = i + 1; j < size; ++j) along -= taken[j] * steps_changes_(own, order_[j]);
+    taken[i] = along / steps_changes_(own, own);
+  }
+  std::array<double, kMost> given{};
+  for (std::size_t i = 0; i < size; ++i) {
+    const int own = order_[i];
+    double along = solved_.col(own).dot(b);
+    for (std::size_t j = 0; j < size; ++j) along -= taken[j] * changes_solved_(own, order_[j]);
+    for (std::size_t j = 0; j < i; ++j) along += given[j] * steps_changes_(order_[j], own);
+    given[i] = taken[i] - along / steps_changes_(own, own);
+  }
+  for (std::size_t i = 0; i < size; ++i) x += given[i] * steps_.col(order_[i]) - taken[i] * solved_.col(order_[i]);
+  return x;
+}
+
+std::size_t Pairs::bytes() const noexcept {
+  return static_cast<std::size_t>(steps_.size() + changes_.size() + solved_.size()) * sizeof(double);
+}
+
+}  // namespace tendon::softbody
