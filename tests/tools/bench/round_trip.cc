@@ -402,8 +402,6 @@ void measure_round_trip(Run& run) {
     }
     run.add(row);
   }
-  run.add(row);
-}
 }
 
 }  // namespace tendon::bench

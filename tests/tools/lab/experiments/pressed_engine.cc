@@ -110,7 +110,12 @@ class WorkerEngine final : public PressedEngine {
     Feel feel = touch(middle_ - Vec3(0, 0, depth));
     depth *= load / feel.force.z();
     feel = touch(middle_ - Vec3(0, 0, depth));
-    return {.force = feel.force.z(), .depth = depth, .stiffness = feel.stiffness(2, 2), .error = feel.error};
+    Reaction reaction;
+    reaction.force = feel.force.z();
+    reaction.depth = depth;
+    reaction.stiffness = feel.stiffness(2, 2);
+    reaction.error = feel.error;
+    return reaction;
   }
   double step() const override { return 0; }
   Body::Size size() const override { return size_; }
