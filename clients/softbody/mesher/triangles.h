@@ -16,7 +16,7 @@ struct Triangles {
   std::vector<Vec3> points;
   std::vector<std::array<int, 3>> facets;
 
-  /// Of what the surface encloses; below 0 when it is turned inside out.
+  /// The volume that the surface encloses; below 0 when it is turned inside out.
   double volume() const;
   double longest_side() const;  ///< of the box around it
 };

@@ -14,6 +14,7 @@ const kRemembered = (kWords - 1n) * 64n;
 export class ReplayWindow {
   readonly #words = new BigUint64Array(Number(kWords));
   #highest = -1n;
+  /** maskBefore(highest). */
   #mask = 0;
   #count = 0n;
 
@@ -41,9 +42,16 @@ export class ReplayWindow {
     ++this.#count;
   }
 
-  /** Bit i: (highest − 1 − i) is known to have been inserted. */
-  get mask(): number {
-    return this.#mask;
+  /** Bit i: (number − 1 − i) is known to have been inserted. */
+  maskBefore(number: bigint): number {
+    if (number === this.#highest) return this.#mask; // nearly always
+    let mask = 0;
+    for (let i = 0; i < 32; ++i) {
+      const earlier = number - 1n - BigInt(i);
+      if (earlier < 0n) break;
+      if (this.#highest - earlier < kRemembered && this.#has(earlier)) mask |= 1 << i;
+    }
+    return mask >>> 0;
   }
 
   /** −1 before the first. */

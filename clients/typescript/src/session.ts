@@ -414,7 +414,7 @@ export class Session {
    */
   #write(now: Nanoseconds): Uint8Array {
     const { connectionId, seal, minResend } = this.#config;
-    const echo = this.#echo && { ...this.#echo, receivedMask: this.#seen.mask };
+    const echo = this.#echo && { ...this.#echo, receivedMask: this.#seen.maskBefore(this.#echo.packetNumber) };
     let body = encodeHead(now, echo);
     const add = (frame: Frame): boolean => {
       const piece = encodeFrame(frame);
