@@ -18,6 +18,7 @@
 #include <sstream>
 #include <string_view>
 #include <system_error>
+#include <thread>
 
 namespace tendon {
 
@@ -87,10 +88,20 @@ int lock_memory() {
 void use_small_stacks() {
   // A haptic thread touches 136 kB beforehand; network and log, with sessions and a recording, have used 16.
   constexpr std::size_t kBytes = 256 * 1024;
-  pthread_attr_t attributes;
-  if (pthread_attr_init(&attributes) != 0) return;
-  if (pthread_attr_setstacksize(&attributes, kBytes) == 0) pthread_setattr_default_np(&attributes);
-  pthread_attr_destroy(&attributes);
+  pthread_attr_t usual;
+  if (pthread_getattr_default_np(&usual) != 0) return;
+  pthread_attr_t small;
+  if (pthread_attr_init(&small) == 0) {
+    if (pthread_attr_setstacksize(&small, kBytes) == 0 && pthread_setattr_default_np(&small) == 0) {
+      try {
+        std::thread([] {}).join();
+      } catch (const std::system_error&) {  // all that is local to a thread lies on its stack, too
+        pthread_setattr_default_np(&usual);
+      }
+    }
+    pthread_attr_destroy(&small);
+  }
+  pthread_attr_destroy(&usual);
 }
 
 void name_thread(const std::string& name) { prctl(PR_SET_NAME, name.c_str(), 0UL, 0UL, 0UL); }

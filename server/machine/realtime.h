@@ -13,7 +13,8 @@ namespace tendon {
 inline constexpr int kHapticPriority = 70;
 
 /// Gives each thread that the process starts from now on a stack of 256 kB. The system's 8 MB for each would count in
-/// full where locked memory is limited (RLIMIT_MEMLOCK). Before the first thread.
+/// full where locked memory is limited (RLIMIT_MEMLOCK). Stacks stay as they are where what is local to a thread does not
+/// fit, as with the thread sanitizer. Before the first thread.
 void use_small_stacks();
 
 /// Asks the kernel to treat the calling thread as a haptic thread: SCHED_FIFO, no timer slack, memory locked, stack

@@ -42,7 +42,7 @@ class Kernel {
 
  private:
   std::size_t group(int element, int point) const {
-    return static_cast<std::size_t>(element / static_cast<int>(kLanes) * points_ + point);
+    return at(element / static_cast<int>(kLanes)) * at(points_) + at(point);
   }
   template <Law kLaw, int kNodes>
   double sum(const double* u, double* force) const;
