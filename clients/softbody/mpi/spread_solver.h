@@ -33,9 +33,9 @@ inline constexpr int kMostForFactor = 100'000;
 /// Near incompressibility multigrid wants hundreds of rounds.
 inline constexpr double kMostPoisson = 0.49;
 
-/// Linear elasticity, K u = f, by PETSc on all ranks: each assembles its share of the elements and keeps its share of
-/// the rows. The environment variable PETSC_OPTIONS chooses otherwise ("-ksp_type cg -pc_type gamg -ksp_rtol 1e-10").
-/// Loads and solutions are whole on every rank.
+/// Linear elasticity, K u = f, by PETSc on all ranks: each assembles the rows that it keeps, which have the same bits on
+/// any number of ranks. The environment variable PETSC_OPTIONS chooses otherwise
+/// ("-ksp_type cg -pc_type gamg -ksp_rtol 1e-10"). Loads and solutions are whole on every rank.
 ///
 /// By multigrid solve() ends at 1e-10 of the energy. solve_roughly() begins with what the last ten answers say of this
 /// one (Fischer 1998) and ends when, with the residual r = f − K u and M the multigrid,
