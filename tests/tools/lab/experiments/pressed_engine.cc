@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tests/tools/lab/experiments/pressed_engine.h"
 
-#include <unistd.h>
-
-#include <cstdlib>
 #include <fstream>
 #include <stdexcept>
 #include <variant>
@@ -11,6 +8,7 @@
 #include "clients/softbody/scene.h"
 #include "core/base/expect.h"
 #include "tests/clients/softbody/mpi/live_worker.h"
+#include "tests/server/scratch_folder.h"
 
 namespace tendon::lab {
 namespace {
@@ -61,37 +59,21 @@ std::string scene_of(const BodyConfig& config) {
   return text;
 }
 
-/// A file of its own, gone at the end.
-class SceneFile {
- public:
-  explicit SceneFile(const std::string& text) {
-    std::string name = (std::filesystem::temp_directory_path() / "tendon-lab-XXXXXX.toml").string();
-    const int file = ::mkstemps(name.data(), 5);
-    if (file < 0) throw std::runtime_error("cannot make a file in " + std::filesystem::temp_directory_path().string());
-    ::close(file);
-    path_ = name;
-    std::ofstream(path_) << text;
-  }
-  ~SceneFile() {
-    std::error_code ignored;
-    std::filesystem::remove(path_, ignored);
-  }
-  SceneFile(const SceneFile&) = delete;
-  SceneFile& operator=(const SceneFile&) = delete;
-  const std::filesystem::path& path() const { return path_; }
-
- private:
-  std::filesystem::path path_;
-};
+std::filesystem::path written(const std::filesystem::path& file, const std::string& text) {
+  std::ofstream out(file);
+  out << text;
+  if (!out.flush()) throw std::runtime_error("cannot write " + file.string());
+  return file;
+}
 
 class WorkerEngine final : public PressedEngine {
  public:
   WorkerEngine(const BodyConfig& block, const std::string& command)
-      : file_(scene_of(block)),
-        scene_(read_scene(file_.path())),
+      : file_(written(scratch_.path() / "scene.toml", scene_of(block))),
+        scene_(read_scene(file_)),
         middle_(block.middle),
         size_(Body::size_of(scene_.body, under_patch_)),
-        worker_(command + " " + file_.path().string(), kPatienceS) {}
+        worker_(command + " " + file_.string(), kPatienceS) {}
 
   Feel touch(const Vec3& tool) override {
     const Mat3 frame = to_device(scene_);
@@ -122,7 +104,8 @@ class WorkerEngine final : public PressedEngine {
   double took(const Meter::Reading& cost) const override { return cost.wall; }
 
  private:
-  SceneFile file_;
+  tendon::testing::ScratchFolder scratch_;
+  std::filesystem::path file_;
   Scene scene_;
   Vec3 middle_;  ///< m, of the patch at rest, body frame
   int under_patch_ = 0;
