@@ -16,7 +16,8 @@ class NoThread : public ::testing::TestWithParam<const char*> {};
 
 TEST_P(NoThread, AServerWithoutIsStoppedInOrderAndSaysWhich) {
   const tendon::testing::ScratchFolder folder;
-  const int number = std::string(GetParam()) == "log" ? 1 : std::string(GetParam()) == "network" ? 2 : 3;
+  // The server's first thread tries whether small stacks are enough; it ends at once, and nothing needs it.
+  const int number = std::string(GetParam()) == "log" ? 2 : std::string(GetParam()) == "network" ? 3 : 4;
   const std::string scenes = TENDON_SCENES;
   Process server(std::filesystem::path(TENDON_PROGRAMS) / "tendond",
                  {scenes + "/left.toml", scenes + "/right.toml", "--listen", "127.0.0.1:0", "--record", "/dev/null"},
