@@ -16,35 +16,42 @@ Elastic::Elastic(Mesh mesh, const Fixed& fixed) : mesh_(std::move(mesh)) {
     free_of_.push_back(fixed[i] ? -1 : static_cast<int>(all_of_.size()));
     if (!fixed[i]) all_of_.push_back(static_cast<int>(i));
   }
-  // Neighbours of each node, itself included.
-  std::vector<std::vector<int>> near(mesh_.nodes.size());
-  for (int e = 0; e < mesh_.element_count(); ++e) {
-    for (const int a : mesh_.element(e)) {
-      near[at(a)].insert(near[at(a)].end(), mesh_.element(e).begin(), mesh_.element(e).end());
-    }
-  }
-  for (auto& list : near) {
-    std::ranges::sort(list);
-    list.erase(std::unique(list.begin(), list.end()), list.end());
-  }
-  pattern_.size = free_count();
-  pattern_.column_starts.push_back(0);
-  for (int column = 0; column < free_count(); ++column) {
-    for (const int node : near[at(all_of_[at(column)] / 3)]) {
-      for (int c = 0; c < 3; ++c) {
-        const int row = free_of_[at(3 * node + c)];
-        if (row >= column) pattern_.rows.push_back(row);
+}
+
+const SymmetricMatrix& Elastic::pattern() const {
+  return pattern_.get([this] {
+    SymmetricMatrix pattern;
+    // Neighbours of each node, itself included.
+    std::vector<std::vector<int>> near(mesh_.nodes.size());
+    for (int e = 0; e < mesh_.element_count(); ++e) {
+      for (const int a : mesh_.element(e)) {
+        near[at(a)].insert(near[at(a)].end(), mesh_.element(e).begin(), mesh_.element(e).end());
       }
     }
-    pattern_.column_starts.push_back(static_cast<int>(pattern_.rows.size()));
-  }
-  pattern_.values.assign(pattern_.rows.size(), 0);
+    for (auto& list : near) {
+      std::ranges::sort(list);
+      list.erase(std::unique(list.begin(), list.end()), list.end());
+    }
+    pattern.size = free_count();
+    pattern.column_starts.push_back(0);
+    for (int column = 0; column < free_count(); ++column) {
+      for (const int node : near[at(all_of_[at(column)] / 3)]) {
+        for (int c = 0; c < 3; ++c) {
+          const int row = free_of_[at(3 * node + c)];
+          if (row >= column) pattern.rows.push_back(row);
+        }
+      }
+      pattern.column_starts.push_back(static_cast<int>(pattern.rows.size()));
+    }
+    pattern.values.assign(pattern.rows.size(), 0);
+    return pattern;
+  });
 }
 
 int Elastic::slot(int row_component, int column_component) const {
   const int row = free_of(row_component);
   const int column = free_of(column_component);
-  return column < 0 || row < column ? -1 : pattern_.slot(row, column);
+  return column < 0 || row < column ? -1 : pattern().slot(row, column);
 }
 
 Fixed Elastic::fixed() const {
@@ -65,7 +72,7 @@ void Elastic::add_free(const VectorXd& free, VectorXd& all) const {
 
 std::size_t Elastic::mesh_bytes() const noexcept {
   return mesh_.nodes.size() * sizeof(Vec3) + mesh_.elements.size() * sizeof(int) +
-         (free_of_.size() + all_of_.size()) * sizeof(int) + pattern_.bytes();
+         (free_of_.size() + all_of_.size()) * sizeof(int) + (pattern_.made() != nullptr ? pattern_.made()->bytes() : 0);
 }
 
 VectorXd lumped_mass(const Elastic& elastic, double density) {

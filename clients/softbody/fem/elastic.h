@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "clients/softbody/fem/lazy.h"
 #include "clients/softbody/fem/mesh.h"
 #include "clients/softbody/fem/patch.h"
 #include "clients/softbody/fem/sparse.h"
@@ -54,8 +55,8 @@ class Elastic {
   enum class Curvature : std::uint8_t { kExact, kWithoutNegative };
   /// The second derivative with respect to the free displacements, N/m.
   virtual void stiffness(const VectorXd& u, Curvature curvature, SymmetricMatrix& to) const = 0;
-  /// Its pattern; all values are zero.
-  const SymmetricMatrix& pattern() const noexcept { return pattern_; }
+  /// Its pattern; all values are zero. Made when it is first asked for.
+  const SymmetricMatrix& pattern() const;
 
   virtual std::size_t bytes() const noexcept = 0;
 
@@ -75,7 +76,7 @@ class Elastic {
   Mesh mesh_;
   std::vector<int> free_of_;  ///< by component
   std::vector<int> all_of_;   ///< by free component
-  SymmetricMatrix pattern_;
+  Lazy<SymmetricMatrix> pattern_;
 };
 
 /// The mass of each free displacement, kg.

@@ -8,6 +8,7 @@
 
 #include "clients/softbody/fem/elastic.h"
 #include "clients/softbody/fem/kernel.h"
+#include "clients/softbody/fem/lazy.h"
 #include "clients/softbody/fem/material.h"
 
 namespace tendon::softbody {
@@ -44,9 +45,15 @@ class Solid : public Elastic {
     double lambda;  ///< Pa; 0 where only µ is
   };
   int points_per_element() const noexcept { return per_element_; }
-  const Point& point(int element, int index) const { return points_[at(element * per_element_ + index)]; }
+  const Point& point(int element, int index) const { return parts().points[at(element * per_element_ + index)]; }
   using Nodal = Kernel::Nodal;
-  Kernel::Gradient gradient(int element, int point) const { return kernel_.gradient(element, point); }  ///< ∂Nᵢ/∂X, 1/m
+  Kernel::Gradient gradient(int element, int point) const { return parts().kernel.gradient(element, point); }  ///< 1/m
+  /// The same two, computed and not kept: for who looks at an element once.
+  struct Part {
+    Point point;
+    Nodal gradient;  ///< ∂Nᵢ/∂X, 1/m
+  };
+  Part part(int element, int index) const;
   Nodal displacements(const VectorXd& u, int element) const;  ///< of an element's nodes, m
 
  protected:
@@ -55,16 +62,24 @@ class Solid : public Elastic {
   void sum_stiffness(const VectorXd& u, const TangentAt& tangent_at, SymmetricMatrix& to) const;
 
  private:
-  void place(int element);
-  void connect();
+  /// All integration points; made when one is first asked for.
+  struct Parts {
+    std::vector<Point> points;  ///< of each element, one after the other
+    Kernel kernel;
+  };
+  const Parts& parts() const {
+    const Parts* const made = parts_.made();
+    return made != nullptr ? *made : make_parts();
+  }
+  const Parts& make_parts() const;
+  const std::vector<int>& slots() const;
 
   Element element_;
   Material material_;
   Law law_;
-  int per_element_;            ///< points of integration
-  std::vector<Point> points_;  ///< of each element, one after the other
-  Kernel kernel_;
-  std::vector<int> slots_;  ///< where each entry of an element's lower triangle goes; −1: nowhere
+  int per_element_;  ///< points of integration
+  Lazy<Parts> parts_;
+  Lazy<std::vector<int>> slots_;  ///< where each entry of an element's matrix goes; −1: nowhere
 };
 
 template <class TangentAt>
@@ -72,7 +87,7 @@ void Solid::sum_stiffness(const VectorXd& u, const TangentAt& tangent_at, Symmet
   std::ranges::fill(to.values, 0.0);
   const int nodes = nodes_of(mesh().shape);
   Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 3 * kMaxNodes, 3 * kMaxNodes> k(3 * nodes, 3 * nodes);
-  auto slot = slots_.begin();
+  auto slot = slots().begin();
   for (int e = 0; e < mesh().element_count(); ++e) {
     const Nodal local = displacements(u, e);
     k.setZero();
