@@ -145,6 +145,8 @@ std::unique_ptr<PartRecorder> recorder_of(const std::vector<Scene>& scenes, Loca
   config.rotate_bytes = static_cast<std::uint64_t>(recording->rotate_bytes);
   config.rotate_after = from_seconds(recording->rotate_after);
   config.budget_bytes = static_cast<std::uint64_t>(recording->budget_bytes.value_or(0));
+  config.keep = recording->keep;
+  config.one_in = recording->one_in.value_or(0);
   return std::make_unique<PartRecorder>(config);
 }
 
