@@ -106,6 +106,9 @@ constexpr std::array kModels{
               kAllOfRounds, false},
     ModelInfo{ModelKind::kModal, Law::kLinear, "modal",
               "for comparison: a few swings of the body, too stiff where it is touched", kSmall, kOfTables, false},
+    ModelInfo{ModelKind::kNear, Law::kCorotational, "near",
+              "large rotations, or strains, near the tool, and a linear body elsewhere", kLargeRotations,
+              kOfTables | kMaterialNonlinearity, false},
 };
 
 Mesh mesh_of(const BodyConfig& config) {
@@ -124,7 +127,8 @@ Solid solid_of(const BodyConfig& config) {
   for (const Vec3& node : mesh.nodes) lowest = std::min(lowest, node.z());
   const double held = lowest + std::max(config.clamped_below, 1e-9);
   const Fixed fixed = fix_where(mesh, [&](const Vec3& node) { return node.z() <= held; });
-  return {std::move(mesh), config.element, config.material, info(config.model).law, fixed};
+  const Law law = config.model == ModelKind::kNear ? config.law : info(config.model).law;
+  return {std::move(mesh), config.element, config.material, law, fixed};
 }
 
 ModalModel::Config modal_config(const BodyConfig& config, const TouchSurface& surface) {
@@ -148,7 +152,7 @@ constexpr bool each_is_at_its_kind(const std::array<Info, kCount>& rows) {
 }
 // info() uses the kind as the index.
 static_assert(each_is_at_its_kind(kEffects) && kEffects.back().kind == kSelfCollision);
-static_assert(each_is_at_its_kind(kModels) && kModels.back().kind == ModelKind::kModal);
+static_assert(each_is_at_its_kind(kModels) && kModels.back().kind == ModelKind::kNear);
 
 /// A model, and typed pointers to it for kinds that offer more than Model.
 struct Made {
@@ -156,6 +160,7 @@ struct Made {
   std::optional<double> linear_up_to{};  ///< m, where a table tells it
   const CondensedModel* condensed = nullptr;
   StiffeningModel* stiffening = nullptr;
+  const NearModel* near = nullptr;
 };
 
 Patch middle_patch(const TouchSurface& surface, const Vec3& middle) {
@@ -196,7 +201,8 @@ std::unique_ptr<Model> plain_model_of(const BodyConfig& config, const Solid& sol
       return std::make_unique<XpbdModel>(solid, surface, config.iterations, effects);
     case ModelKind::kProjective:
       return std::make_unique<ProjectiveModel>(solid, surface, config.iterations, effects);
-    case ModelKind::kCondensed:  // made below
+    case ModelKind::kCondensed:  // made below, as is kNear
+    case ModelKind::kNear:
     case ModelKind::kModal:
       break;
   }
@@ -244,6 +250,12 @@ Made model_of(const BodyConfig& config, const Solid& solid, const TouchSurface& 
                                        : std::make_unique<CondensedModel>(solid, surface, touchable(config, surface));
     made.condensed = condensed.get();
     made.model = std::move(condensed);
+  } else if (config.model == ModelKind::kNear) {
+    const QuasiStaticModel::Config newton{.max_iterations = config.max_iterations, .tolerance = config.tolerance};
+    auto near = std::make_unique<NearModel>(solid, surface, middle_patch(surface, config.middle),
+                                            NearModel::Config{.newton = newton});
+    made.near = near.get();
+    made.model = std::move(near);
   } else {
     made.model = plain_model_of(config, solid, surface);
   }
@@ -273,6 +285,9 @@ const BodyConfig& checked(const BodyConfig& config) {
   }
   if (model.tetrahedra && config.element != Element::kTet4) {
     throw std::invalid_argument("the model \"" + std::string(model.name) + "\" wants the element tet4");
+  }
+  if (config.model == ModelKind::kNear && config.law == Law::kLinear) {
+    throw std::invalid_argument("the law of the model \"near\" cannot be linear");
   }
   if (config.tool != BodyConfig::Tool::kPatch) {
     const std::string tool = config.tool == BodyConfig::Tool::kSphere ? "a sphere" : "a capsule";
@@ -340,6 +355,7 @@ Vec3 lowest_of_tool(const BodyConfig& config, const Mat3& turn) {
 
 EffectSet effects_of(const BodyConfig& config) {
   EffectSet set = info(config.model).always;
+  if (config.model == ModelKind::kNear && config.law == Law::kNeoHookean) set.add(kMaterialNonlinearity);
   if (config.effects.gravity) set.add(kGravity);
   if (config.effects.inertia) set.add(kInertia);
   if (config.effects.damping) set.add(kDamping);
@@ -520,6 +536,10 @@ Body::Size Body::size() const {
           static_cast<std::size_t>(parts_->solid.free_count()), parts_->surface.nodes().size(),
           parts_->model.bytes() + parts_->contact.bytes() + (parts_->capsule ? parts_->capsule->bytes() : 0) +
               (parts_->cutting ? parts_->cutting->cuts.bytes() : 0)};
+}
+
+std::optional<NearModel::Size> Body::near_field() const {
+  return parts_->made.near == nullptr ? std::nullopt : std::optional(parts_->made.near->size());
 }
 
 Body::Size Body::size_of(const BodyConfig& config, int& under_patch) {

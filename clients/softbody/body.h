@@ -21,6 +21,7 @@
 #include "clients/softbody/models/quasi_static.h"
 #include "clients/softbody/models/stiffening.h"
 #include "clients/softbody/models/surface_table.h"
+#include "clients/softbody/near/near_model.h"
 #include "clients/softbody/touch/contact.h"
 
 namespace tendon::softbody {
@@ -65,7 +66,7 @@ struct EffectInfo {
 std::span<const EffectInfo> effects() noexcept;  ///< in the order of their kinds
 const EffectInfo& info(EffectKind kind) noexcept;
 
-/// The models that a scene can choose; folder models/ has a file for each family.
+/// The models that a scene can choose; folder models/ has a file for each family, near/ the last.
 enum class ModelKind : std::uint8_t {
   kLinear,
   kCondensed,
@@ -77,12 +78,13 @@ enum class ModelKind : std::uint8_t {
   kTled,
   kXpbd,
   kProjective,
-  kModal
+  kModal,
+  kNear
 };
 
 struct ModelInfo {
   ModelKind kind;
-  Law law;
+  Law law;                ///< of kNear the usual one: see BodyConfig::law
   std::string_view name;  ///< in scenes, tables and command lines
   std::string_view what;  ///< one line
   EffectSet always;       ///< always simulated
@@ -118,6 +120,7 @@ struct BodyConfig {
   Element element = Element::kHex8Sri;
   Material material;
   ModelKind model = ModelKind::kCondensed;
+  Law law = Law::kCorotational;  ///< kNear: of the near elements; not kLinear
   std::optional<std::filesystem::path>
       table_file{};  ///< kCondensed: where condense() has put its table; else it is made
   int max_iterations = QuasiStaticModel::Config{}.max_iterations;  ///< for models that iterate until they converge
@@ -215,6 +218,8 @@ class Body {
     std::size_t bytes;      ///< kept by the model, effects included
   };
   Size size() const;
+  /// The near field, of a kNear body.
+  std::optional<NearModel::Size> near_field() const;
   /// The size of the body that `config` describes, without its model: `bytes` is 0. `under_patch`: the nodes of the
   /// patch around the middle. Throws as the constructor does.
   static Size size_of(const BodyConfig& config, int& under_patch);

@@ -307,9 +307,26 @@ double read_self_collision(Table table) {
   return layer;
 }
 
+constexpr std::string_view kLaws = "corotational, stvk, neo-hookean";
+
+std::optional<Law> law_named(std::string_view name) {
+  if (name == "corotational") return Law::kCorotational;
+  if (name == "stvk") return Law::kStVenantKirchhoff;
+  return name == "neo-hookean" ? std::optional(Law::kNeoHookean) : std::nullopt;
+}
+
+/// Large strains are an effect of one law of the model "near".
+void check_law(Table& root, Law law, EffectSet listed) {
+  const bool simulates = law == Law::kNeoHookean;
+  if (simulates == listed.has(EffectKind::kMaterialNonlinearity)) return;
+  root.fail(*root.find("effects"), "effects",
+            simulates ? "the law \"neo-hookean\" simulates \"material-nonlinearity\", which is not listed"
+                      : "the law simulates no \"material-nonlinearity\", which is listed: only \"neo-hookean\" does");
+}
+
 /// Reads the list of effects. It must have all effects that the model always simulates, and only effects that the model
-/// can simulate.
-void read_effects(Table& root, const ModelInfo& model, BodyConfig& body) {
+/// can simulate. Returns what is listed.
+EffectSet read_effects(Table& root, const ModelInfo& model, BodyConfig& body) {
   const toml::node& node = root.need("effects", "a list of effects");
   const auto* list = node.as_array();
   if (list == nullptr) root.fail(node, "effects", "expected a list of effects");
@@ -356,6 +373,7 @@ void read_effects(Table& root, const ModelInfo& model, BodyConfig& body) {
   if (listed.has(EffectKind::kPlasticity)) body.plasticity = read_plasticity(root.table("plasticity"));
   if (listed.has(EffectKind::kSelfCollision)) body.self_collision = read_self_collision(root.table("self-collision"));
   if (config.has_time()) config.step = root.number("step_ms", 0, false, 1e3, 1e3);
+  return listed;
 }
 
 }  // namespace
@@ -374,8 +392,14 @@ Scene parse_scene(std::string_view text, const std::string& name, const std::fil
   Table model = root.table("model");
   scene.body.model = model.choice("kind", names(models()), model_named);
   const ModelInfo& chosen = info(scene.body.model);
-  read_effects(root, chosen, scene.body);
+  const EffectSet listed = read_effects(root, chosen, scene.body);
   switch (chosen.kind) {
+    case ModelKind::kNear:
+      if (model.find("law") != nullptr) scene.body.law = model.choice("law", std::string(kLaws), law_named);
+      check_law(root, scene.body.law, listed);
+      scene.body.max_iterations = model.count("max_iterations", 1000, scene.body.max_iterations);
+      scene.body.tolerance = model.number("error_percent", 0, false, kMaxError, 100, scene.body.tolerance);
+      break;
     case ModelKind::kLinear:
       if (!scene.body.plasticity) break;
       [[fallthrough]];
@@ -465,12 +489,15 @@ std::string scene_reference() {
   text << "table                    of condensed: a file of `tendon-softbody condense SCENE FILE`; without it the "
           "table is made "
           "at the start\n";
+  text << "law = \"corotational\"     of near: how the elements near the tool respond, one of " << kLaws
+       << ";\n                         elsewhere the body is linear. The last wants the effect material-nonlinearity\n";
   text
       << "max_iterations = " << defaults.max_iterations
-      << "      of one answer: corotational, stvk, neo-hookean, mass-spring, and linear with plasticity\n"
+      << "      of one answer: corotational, stvk, neo-hookean, near, mass-spring, and linear with plasticity\n"
          "error_percent = "
       << 100 * defaults.tolerance
-      << "   of the force, of the same: an answer ends when it may be wrong by so much, and says by how much\n"
+      << "   of the force, of the same: an answer ends when it may be wrong by so much, and says by how much;\n"
+         "                         near adds what the linear far field may leave out\n"
          "iterations = "
       << defaults.iterations << "          of every answer: xpbd, projective\nswings = " << defaults.swings
       << "              of modal\n"

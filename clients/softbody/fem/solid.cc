@@ -22,6 +22,35 @@ Solid::Solid(Mesh at_rest, Element element, const Material& material, Law law, c
   }
 }
 
+Solid::Solid(Mesh at_rest, const Solid& whole, const Fixed& fixed)
+    : Elastic(std::move(at_rest), fixed, Together{}),
+      element_(whole.element_),
+      material_(whole.material_),
+      law_(whole.law_),
+      per_element_(whole.per_element_) {}
+
+Solid Solid::part_of(const Solid& whole, const std::vector<int>& elements, std::vector<int>& nodes) {
+  const Mesh& all = whole.mesh();
+  std::vector<int> own(all.nodes.size(), -1);
+  for (const int element : elements) {
+    for (const int node : all.element(element)) own[at(node)] = 0;
+  }
+  Mesh mesh{.shape = all.shape, .nodes = {}, .elements = {}};
+  Fixed fixed;
+  nodes.clear();
+  for (std::size_t i = 0; i < own.size(); ++i) {
+    if (own[i] < 0) continue;
+    own[i] = static_cast<int>(nodes.size());
+    nodes.push_back(static_cast<int>(i));
+    mesh.nodes.push_back(all.nodes[i]);
+    for (int c = 0; c < 3; ++c) fixed.push_back(whole.free_of(3 * nodes.back() + c) < 0);
+  }
+  for (const int element : elements) {
+    for (const int node : all.element(element)) mesh.elements.push_back(own[at(node)]);
+  }
+  return {std::move(mesh), whole, fixed};
+}
+
 Solid::Part Solid::part(int element, int index) const {
   const auto nodes = mesh().element(element);
   const QuadraturePoint& point = quadrature(element_)[at(index)];

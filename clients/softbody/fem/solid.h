@@ -22,6 +22,10 @@ class Solid : public Elastic {
   /// impossible or nothing is fixed.
   Solid(Mesh at_rest, Element element, const Material& material, Law law, const Fixed& fixed);
 
+  /// Some elements of another solid, in their order, with what is fixed of their nodes. Nothing has to hold them.
+  /// `nodes` becomes the number in `whole` of each node, ascending.
+  static Solid part_of(const Solid& whole, const std::vector<int>& elements, std::vector<int>& nodes);
+
   Element element() const noexcept { return element_; }
   const Material& material() const noexcept { return material_; }
   Law law() const noexcept { return law_; }
@@ -62,6 +66,8 @@ class Solid : public Elastic {
   void sum_stiffness(const VectorXd& u, const TangentAt& tangent_at, SymmetricMatrix& to) const;
 
  private:
+  Solid(Mesh at_rest, const Solid& whole, const Fixed& fixed);
+
   /// All integration points; made when one is first asked for.
   struct Parts {
     std::vector<Point> points;  ///< of each element, one after the other

@@ -8,6 +8,7 @@
 #include <string>
 #include <string_view>
 
+#include "clients/cpp/engine/self_test.h"
 #include "core/base/rotation.h"
 #include "core/remote/answer.h"
 #include "tests/clients/softbody/scene_text.h"
@@ -207,6 +208,21 @@ TEST(PlacedBody, AnswersForEveryModelThatASceneCanName) {
       EXPECT_NEAR(stiffness, 470, 3) << model.name;
     }
   }
+}
+
+/// On its closed ways the hand goes far enough aside to leave the near field, and comes back.
+TEST(PlacedBody, ANearFieldThatFollowsTheHandPassesTheSelfTest) {
+  std::string text = scene_of(info(ModelKind::kNear));
+  text.replace(text.find("[4, 4, 2]"), 9, "[8, 8, 4]");
+  text.replace(text.find("\"near\""), 6, "\"near\"\nerror_percent = 0.01");
+  PlacedBody body(parse_scene(text, "s.toml", "."));
+  SelfTestScript script;
+  script.start = Vec3(0.007, 0, 0);
+  script.depth = 0.006;
+  script.slide = 0.012;
+  script.rate_hz = 200;
+  const SelfTest result = self_test([&](const DeviceState& hand) { return body.answer(hand); }, script);
+  EXPECT_TRUE(result.passed()) << result.text();
 }
 
 TEST(PlacedBody, WhatIsPlannedOverTimeCountsFromTheFirstAnswersSample) {

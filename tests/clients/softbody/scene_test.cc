@@ -166,6 +166,29 @@ TEST(SoftbodyScene, HowWrongAnAnswerMayBeArrivesAndIsForNewtonsMethodAlone) {
             "s.toml:10: model.error_percent: unknown key; expected one of kind, table");
 }
 
+TEST(SoftbodyScene, ALawOfTheElementsNearTheToolArrivesAndFitsTheEffects) {
+  const std::string rotations = "[\"contact\", \"geometric-nonlinearity\"]";
+  const std::string strains = "[\"contact\", \"geometric-nonlinearity\", \"material-nonlinearity\"]";
+  const auto near = [](const std::string& more, const std::string& effects) {
+    return listing("near\"\n" + more + " #", effects, "");
+  };
+  const BodyConfig body = parse_scene(near("law = \"neo-hookean\"\nerror_percent = 2", strains), "s.toml", ".").body;
+  EXPECT_EQ(body.model, ModelKind::kNear);
+  EXPECT_EQ(body.law, Law::kNeoHookean);
+  EXPECT_NEAR(body.tolerance, 0.02, 1e-15);
+  EXPECT_EQ(parse_scene(near("law = \"stvk\"", rotations), "s.toml", ".").body.law, Law::kStVenantKirchhoff);
+  EXPECT_EQ(parse_scene(near("", rotations), "s.toml", ".").body.law, Law::kCorotational);
+  EXPECT_EQ(refusal(near("law = \"linear\"", rotations)),
+            "s.toml:10: model.law: expected one of corotational, stvk, neo-hookean, found \"linear\"");
+  EXPECT_EQ(refusal(near("law = \"neo-hookean\"", rotations)),
+            "s.toml:1: effects: the law \"neo-hookean\" simulates \"material-nonlinearity\", which is not listed");
+  EXPECT_EQ(refusal(near("law = \"stvk\"", strains)),
+            "s.toml:1: effects: the law simulates no \"material-nonlinearity\", which is listed: only \"neo-hookean\" "
+            "does");
+  EXPECT_EQ(refusal(listing("corotational\"\nlaw = \"stvk\" #", rotations, "")),
+            "s.toml:10: model.law: unknown key; expected one of error_percent, kind, max_iterations");
+}
+
 TEST(SoftbodyScene, AYieldArrivesAndWhatIsWrongWithItIsNamed) {
   const std::string effects = "[\"contact\", \"geometric-nonlinearity\",\n\"plasticity\"]";
   const std::string table = "[plasticity]\nyield_pa = 500\nhardening_pa = 2000\n";
