@@ -131,8 +131,13 @@ Solid solid_of(const BodyConfig& config) {
   return {std::move(mesh), config.element, config.material, law, fixed};
 }
 
+/// Whether a model that can do without it is to tell its Glide.
+bool wants_glide(const BodyConfig& config, const TouchSurface& surface) {
+  return config.whole_stiffness || surface.curved();
+}
+
 ModalModel::Config modal_config(const BodyConfig& config, const TouchSurface& surface) {
-  ModalModel::Config modal{.swings = config.swings, .patches = {}};
+  ModalModel::Config modal{.swings = config.swings, .patches = {}, .glides = wants_glide(config, surface)};
   const double reach = config.reach.value_or(config.patch_radius);
   const int count = config.static_modes;
   const auto along = [&](int i) { return count > 1 ? reach * (2.0 * i / (count - 1) - 1) : 0; };
@@ -182,12 +187,13 @@ std::unique_ptr<Model> solved_model_of(const BodyConfig& config, const Solid& so
 
 std::unique_ptr<Model> plain_model_of(const BodyConfig& config, const Solid& solid, const TouchSurface& surface) {
   QuasiStaticModel::Config newton{.max_iterations = config.max_iterations, .tolerance = config.tolerance};
+  if (config.plasticity) newton.glides = wants_glide(config, surface);
   if (config.self_collision) newton.self_collision = config.material.young / *config.self_collision;
   const EffectsConfig& effects = config.effects;
   if (config.plasticity) return std::make_unique<PlasticModel>(solid, surface, newton, effects, *config.plasticity);
   switch (config.model) {
     case ModelKind::kLinear:
-      return std::make_unique<LinearModel>(solid, surface, effects);
+      return std::make_unique<LinearModel>(solid, surface, effects, wants_glide(config, surface));
     case ModelKind::kCorotational:
     case ModelKind::kStVenantKirchhoff:
     case ModelKind::kNeoHookean:
@@ -232,8 +238,8 @@ std::unique_ptr<CondensedModel> condensed_from(const BodyConfig& config, const S
   const double expected = table.stiffness;
   const TouchSurface then(solid.mesh(), surface.normal(), table.patch_radius);
   const auto patch = then.patch(table.middle);
-  auto model =
-      std::make_unique<CondensedModel>(solid.mesh().nodes.size(), std::move(table.nodes), std::move(table.compliance));
+  auto model = std::make_unique<CondensedModel>(solid.mesh().nodes.size(), std::move(table.nodes),
+                                                std::move(table.compliance), wants_glide(config, surface));
   constexpr double kSame = 1e-9;  // of the same sum in another order
   if (!patch || !(std::abs(stiffness_under(*model, *patch) / expected - 1) < kSame)) {
     refuse(" does not answer as it did when it was made");
@@ -247,7 +253,8 @@ Made model_of(const BodyConfig& config, const Solid& solid, const TouchSurface& 
     made.model = solved_model_of(config, solid, surface, solver);
   } else if (config.model == ModelKind::kCondensed) {
     auto condensed = config.table_file ? condensed_from(config, solid, surface, made.linear_up_to.emplace())
-                                       : std::make_unique<CondensedModel>(solid, surface, touchable(config, surface));
+                                       : std::make_unique<CondensedModel>(solid, surface, touchable(config, surface),
+                                                                          wants_glide(config, surface));
     made.condensed = condensed.get();
     made.model = std::move(condensed);
   } else if (config.model == ModelKind::kNear) {

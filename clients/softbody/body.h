@@ -152,6 +152,9 @@ struct BodyConfig {
   Vec3 tool_axis = Vec3::UnitZ();   ///< kCapsule: unit vector, handle frame, from end to end
   Vec3 tool_offset = Vec3::Zero();  ///< m, handle frame, from the handle's position to the tool's middle
   PatchContact::Side side = PatchContact::Side::kUnilateral;
+  /// The stiffness is the whole second derivative of the energy also where that costs more than a few percent matter: of
+  /// linear models and of plasticity on a flat surface. On a curved one, and of other models at rest, it always is.
+  bool whole_stiffness = false;
 };
 
 /// Whether contact gives a torque: the tool is a capsule, or its middle is not where the handle is.

@@ -78,6 +78,15 @@ class Table {
   /// A length in mm above 0.
   double length(std::string_view key) { return number(key, 0, false, 1e3 * kMaxLength, 1e3); }
 
+  /// false where it is left out.
+  bool flag(std::string_view key) {
+    const toml::node* node = find(key);
+    if (node == nullptr) return false;
+    const auto* value = node->as_boolean();
+    if (value == nullptr) fail(*node, key, "expected true or false");
+    return **value;
+  }
+
   int count(std::string_view key, std::int64_t most, std::optional<int> otherwise = {}) {
     const std::string expected = "a whole number from 1 to " + std::to_string(most);
     const toml::node* node = find(key);
@@ -255,6 +264,12 @@ void read_touch(Table table, Scene& scene) {
       if (name == "unilateral") return std::optional(PatchContact::Side::kUnilateral);
       return name == "bilateral" ? std::optional(PatchContact::Side::kBilateral) : std::nullopt;
     });
+  }
+  const EffectSet simulated = effects_of(body);
+  const bool can_leave_out = info(body.model).law == Law::kLinear || simulated.has(EffectKind::kPlasticity);
+  const bool patch = body.tool == BodyConfig::Tool::kPatch;
+  if (can_leave_out && patch && !info(body.model).tetrahedra && !body.effects.has_time()) {
+    body.whole_stiffness = table.flag("whole_stiffness");
   }
   if (const toml::node* asked = table.find("table_mm")) {
     scene.table = table.length("table_mm");
@@ -516,6 +531,10 @@ std::string scene_reference() {
          "offset,\n"
          "                         and a capsule, give a torque about the handle\n"
          "side = \"unilateral\"      or bilateral: once it has touched, the tool sticks, and pulls\n"
+         "whole_stiffness = false  of linear, condensed, modal, plasticity; at rest: also a flat surface is sent with "
+         "its "
+         "whole\n"
+         "                         stiffness, as a curved one and Newton's method always are\n"
          "table_mm                 answers bring the force at 16 depths over so much, for a slow network: 17 answers'\n"
          "                         time. Of condensed, unilateral, without friction\n"
          "[place]\n"

@@ -4,9 +4,12 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <fstream>
 #include <numbers>
+#include <sstream>
 #include <string>
 #include <string_view>
+#include <utility>
 
 #include "clients/cpp/engine/self_test.h"
 #include "core/base/rotation.h"
@@ -259,6 +262,40 @@ TEST(PlacedBody, ABodyWithTimeAdvancesByTheTimeBetweenSamples) {
   const Vec3 after_a_pause = often.answer(hand_at(4e-4, std::chrono::seconds(100))).force;
   EXPECT_EQ(after_a_pause, seldom.answer(hand_at(4e-4, std::chrono::seconds(1))).force);
   EXPECT_TRUE(often.answer(hand_at(4e-4, Duration(0))).force.allFinite());
+}
+
+std::string text_of(const std::string& file) {
+  std::ifstream stream(file);
+  std::ostringstream text;
+  text << stream.rdbuf();
+  return text.str();
+}
+
+/// What `tendon-softbody selftest` finds.
+void expect_passed(const Scene& scene) {
+  PlacedBody body(scene);
+  SelfTestScript script;
+  script.start = scene.at + 0.003 * scene.towards_hand;
+  script.into = -scene.towards_hand;
+  script.depth = 0.006;
+  script.slide = 0.003;
+  const SelfTest result = self_test([&](const DeviceState& hand) { return body.answer(hand); }, script);
+  EXPECT_TRUE(result.passed()) << result.text();
+}
+
+TEST(PlacedBody, TheKidneyPassesTheSelfTest) { expect_passed(read_scene(TENDON_SCENES "/kidney.toml")); }
+
+TEST(PlacedBody, ALiverOfALinearMaterialPassesTheSelfTestAtEveryPoint) {
+  std::string text = text_of(TENDON_SCENES "/liver.toml");
+  for (const auto& [old, replacement] :
+       {std::pair(", \"geometric-nonlinearity\", \"material-nonlinearity\"", ""), std::pair("error_percent", "# ")}) {
+    text.replace(text.find(old), std::string_view(old).size(), replacement);
+  }
+  for (const std::string model : {"condensed", "linear"}) {
+    std::string of_model = text;
+    of_model.replace(of_model.find("neo-hookean"), 11, model);
+    expect_passed(parse_scene(of_model, "liver.toml", TENDON_SCENES));
+  }
 }
 
 }  // namespace

@@ -50,7 +50,7 @@ TEST(SoftbodyScene, EveryValueArrives) {
 }
 
 TEST(SoftbodyScene, ThoseThatAreShippedMakeBodiesThatNobodyHasToBeWarnedOf) {
-  for (const char* name : {"softbody.toml", "liver.toml"}) {
+  for (const char* name : {"softbody.toml", "liver.toml", "kidney.toml"}) {
     const Scene scene = read_scene(std::filesystem::path(TENDON_SCENES) / name);
     EXPECT_EQ(warnings(scene.body), std::vector<std::string>{}) << name;
     Body body(scene.body);
@@ -231,6 +231,17 @@ TEST(SoftbodyScene, ALayerBetweenTheSidesArrivesAndWhatIsWrongWithItIsNamed) {
             "s.toml:2: effects: the model \"linear\" does not simulate \"self-collision\", which is listed");
 }
 
+TEST(SoftbodyScene, TheWholeStiffnessIsAskedForWhereAModelLeavesItOut) {
+  const std::string asked = "patch_radius_mm = 20\nwhole_stiffness = true";
+  EXPECT_FALSE(parse_scene(kGood, "s.toml", ".").body.whole_stiffness);
+  EXPECT_TRUE(parse_scene(with("patch_radius_mm = 20", asked), "s.toml", ".").body.whole_stiffness);
+  EXPECT_EQ(refusal(with("patch_radius_mm = 20", "patch_radius_mm = 20\nwhole_stiffness = 1")),
+            "s.toml:12: touch.whole_stiffness: expected true or false");
+  std::string newton = listing("corotational", "[\"contact\", \"geometric-nonlinearity\"]", "");
+  newton.replace(newton.find("patch_radius_mm = 20"), 20, asked);
+  EXPECT_NE(refusal(newton).find("touch.whole_stiffness: unknown key"), std::string::npos);
+}
+
 TEST(SoftbodyScene, MistakesAreNamedWithLineKeyAndWhatWasExpected) {
   EXPECT_EQ(refusal(with("cells = [4, 4, 2]", "cells = [4, 4]")),
             "s.toml:5: body.cells: expected three whole numbers from 1 to 200");
@@ -244,7 +255,7 @@ TEST(SoftbodyScene, MistakesAreNamedWithLineKeyAndWhatWasExpected) {
             "s.toml: touch.patch_radius_mm: expected a number above 0 and at most 1e+06, found nothing");
   EXPECT_EQ(refusal(with("patch_radius_mm = 20", "patch_radius_mm = 20\nfriction = 1")),
             "s.toml:12: touch.friction: unknown key; expected one of from, middle_mm, patch_radius_mm, reach_mm, side, "
-            "table_mm, tool, tool_offset_mm, tool_radius_mm");
+            "table_mm, tool, tool_offset_mm, tool_radius_mm, whole_stiffness");
   EXPECT_EQ(
       refusal(with("patch_radius_mm = 20", "patch_radius_mm = 20\nside = \"bilateral\"\ntable_mm = 5")),
       "s.toml:13: touch.table_mm: only for the model condensed, unilateral and without friction: others remember");
