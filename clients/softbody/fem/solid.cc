@@ -10,14 +10,20 @@
 
 namespace tendon::softbody {
 
-Solid::Solid(Mesh at_rest, Element element, const Material& material, Law law, const Fixed& fixed)
+Solid::Solid(Mesh at_rest, Element element, const Material& material, Law law, const Fixed& fixed,
+             std::vector<Material> of_elements)
     : Elastic(std::move(at_rest), fixed),
       element_(element),
       material_(material),
+      of_elements_(std::move(of_elements)),
       law_(law),
       per_element_(static_cast<int>(quadrature(element).size())),
       kernel_(law, nodes_of(mesh().shape), per_element_) {
   softbody::check(material);
+  for (const Material& each : of_elements_) softbody::check(each);
+  if (!of_elements_.empty() && of_elements_.size() != at(mesh().element_count())) {
+    throw std::invalid_argument("of_elements: expected a material for each element, or none");
+  }
   if (info(element).shape != mesh().shape) {
     throw std::invalid_argument("the mesh has no elements of the kind " + std::string(info(element).name));
   }
@@ -27,6 +33,7 @@ Solid::Solid(Mesh at_rest, Element element, const Material& material, Law law, c
 
 void Solid::place(int element) {
   const auto nodes = mesh().element(element);
+  const Material& material = this->material(element);
   kernel_.add_element(nodes);
   for (int q = 0; q < per_element_; ++q) {
     const QuadraturePoint& point = quadrature(element_)[at(q)];
@@ -36,7 +43,7 @@ void Solid::place(int element) {
       jacobian += mesh().nodes[at(nodes[at(i)])] * shape.gradient.col(i).transpose();
     }
     const Point& placed = points_.emplace_back(
-        Point{point.weight * jacobian.determinant(), point.mu * material_.mu(), point.lambda * material_.lambda()});
+        Point{point.weight * jacobian.determinant(), point.mu * material.mu(), point.lambda * material.lambda()});
     const Nodal gradient = jacobian.inverse().transpose() * shape.gradient;
     kernel_.set_point(element, q, gradient, placed.volume * placed.mu, placed.volume * placed.lambda);
   }
@@ -89,6 +96,12 @@ int Solid::inverted(const VectorXd& u) const {
   return count;
 }
 
+double Solid::largest_poisson() const {
+  double largest = material_.poisson;
+  for (const Material& each : of_elements_) largest = std::max(largest, each.poisson);
+  return largest;
+}
+
 double Solid::largest_turn(const VectorXd& u) const {
   double largest = 0;
   for (int e = 0; e < mesh().element_count(); ++e) {
@@ -102,7 +115,8 @@ double Solid::largest_turn(const VectorXd& u) const {
 }
 
 std::size_t Solid::bytes() const noexcept {
-  return mesh_bytes() + slots_.size() * sizeof(int) + points_.size() * sizeof(Point) + kernel_.bytes();
+  return mesh_bytes() + slots_.size() * sizeof(int) + points_.size() * sizeof(Point) +
+         of_elements_.size() * sizeof(Material) + kernel_.bytes();
 }
 
 }  // namespace tendon::softbody
