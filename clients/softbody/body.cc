@@ -128,7 +128,8 @@ Solid solid_of(const BodyConfig& config) {
   const double held = lowest + std::max(config.clamped_below, 1e-9);
   const Fixed fixed = fix_where(mesh, [&](const Vec3& node) { return node.z() <= held; });
   const Law law = config.model == ModelKind::kNear ? config.law : info(config.model).law;
-  return {std::move(mesh), config.element, config.material, law, fixed};
+  std::vector<Material> of_elements = materials_of(mesh, config.material, config.regions);
+  return {std::move(mesh), config.element, config.material, law, fixed, std::move(of_elements)};
 }
 
 /// Whether a model that can do without it is to tell its Glide.
@@ -444,7 +445,11 @@ Body::Parts::Planned::Planned(const BodyConfig& config, const Mesh& mesh, const 
 void Body::Parts::cut(PlannedCut::When when, double value) {
   while (cutting->cuts.due(when, value)) {
     const Division division = divide(solid.mesh(), solid.fixed(), cutting->cuts.make_next());
-    solid = Solid(division.mesh, solid.element(), solid.material(), solid.law(), division.fixed);
+    std::vector<Material> of_elements;
+    if (!solid.of_elements().empty()) {
+      for (const int before : division.element_before) of_elements.push_back(solid.material(before));
+    }
+    solid = Solid(division.mesh, solid.element(), solid.material(), solid.law(), division.fixed, of_elements);
     surface = TouchSurface(solid.mesh(), surface.normal(), surface.radius());
     patch = middle_patch(surface, cutting->middle);
     model.cut(division, cutting->effects);

@@ -16,6 +16,7 @@
 #include "clients/softbody/effects/cutting.h"
 #include "clients/softbody/effects/effects.h"
 #include "clients/softbody/fem/material.h"
+#include "clients/softbody/fem/region.h"
 #include "clients/softbody/models/linear.h"
 #include "clients/softbody/models/plasticity.h"
 #include "clients/softbody/models/quasi_static.h"
@@ -119,6 +120,7 @@ struct BodyConfig {
   std::variant<BlockShape, CylinderShape, FileShape> shape;
   Element element = Element::kHex8Sri;
   Material material;
+  std::vector<Region> regions{};  ///< parts of another material; where two overlap, the later one counts
   ModelKind model = ModelKind::kCondensed;
   Law law = Law::kCorotational;  ///< kNear: of the near elements; not kLinear
   std::optional<std::filesystem::path>

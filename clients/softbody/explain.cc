@@ -148,6 +148,11 @@ std::string in_words(const Scene& scene, const Explanation& explanation) {
   std::ostringstream text;
   text << "simulated:\n  contact: " << (body.side == PatchContact::Side::kUnilateral ? "unilateral" : "bilateral")
        << touched_by(body) << "\n  elasticity: " << model.name << ", " << model.what << '\n';
+  for (std::size_t i = 0; i < body.regions.size(); ++i) {
+    const Material& material = body.regions[i].material;
+    text << "  region " << i + 1 << ": " << material.young << " Pa, Poisson's ratio " << material.poisson
+         << "; elsewhere " << body.material.young << " Pa, " << body.material.poisson << '\n';
+  }
   for (const auto& [kind, simulated, adds] : explanation.parts) {
     if (!simulated || kind == EffectKind::kContact) continue;
     const EffectInfo& effect = info(kind);
@@ -204,7 +209,8 @@ std::string in_json(const Scene& scene, const Explanation& explanation) {
                {"bytes", explanation.size.bytes},      {"step_s", explanation.step},
                {"k_n_per_m", explanation.stiffness},   {"linear_up_to_m", explanation.linear_up_to},  // infinite: null
                {"answer_s", explanation.all.answer_s}, {"resolution_s", explanation.resolution_s},
-               {"effects", std::move(parts)},          {"warnings", warnings(scene.body)}};
+               {"regions", scene.body.regions.size()}, {"effects", std::move(parts)},
+               {"warnings", warnings(scene.body)}};
   if (const auto& near = explanation.near) {
     json["near"] = {{"radius_m", near->radius},
                     {"elements", near->elements},

@@ -202,6 +202,17 @@ class Table {
   std::set<std::string, std::less<>> known_;
 };
 
+/// With the density, kg/m³, where one is wanted.
+Material read_material(Table& of, double* density = nullptr) {
+  Table table = of.table("material");
+  Material material;
+  material.young = table.number("young_pa", 0, false, 1e12, 1);
+  material.poisson = table.number("poisson", 0, true, 0.4999, 1);
+  if (density != nullptr) *density = table.number("density_kg_per_m3", 0, false, 1e6, 1);
+  table.check_unknown();
+  return material;
+}
+
 void read_body(Table table, const std::filesystem::path& directory, BodyConfig& body) {
   const std::string kind = table.choice("shape", "block, cylinder, file", [](std::string_view name) {
     return name == "block" || name == "cylinder" || name == "file" ? std::optional(std::string(name)) : std::nullopt;
@@ -229,15 +240,29 @@ void read_body(Table table, const std::filesystem::path& directory, BodyConfig& 
                            1 / table.number("units_per_m", 0, false, 1e9, 1)};
   }
   body.clamped_below = table.number("clamped_below_mm", 0, true, 1e3 * kMaxLength, 1e3, 0);
-  Table material = table.table("material");
-  body.material.young = material.number("young_pa", 0, false, 1e12, 1);
-  const double poisson = material.number("poisson", 0, true, 0.4999, 1);
-  body.material.poisson = poisson;
-  if (body.effects.gravity || body.effects.inertia || body.effects.damping) {
-    body.effects.density = material.number("density_kg_per_m3", 0, false, 1e6, 1);
-  }
-  material.check_unknown();
+  const bool has_mass = body.effects.gravity || body.effects.inertia || body.effects.damping;
+  body.material = read_material(table, has_mass ? &body.effects.density : nullptr);
   table.check_unknown();
+}
+
+std::vector<Region> read_regions(Table& root) {
+  std::vector<Region> regions;
+  for (Table& table : root.tables("region", "one or more tables [[region]]")) {
+    const bool ball = table.find("radius_mm") != nullptr;
+    if (ball == (table.find("size_mm") != nullptr)) table.fail("expected either radius_mm or size_mm");
+    const Vec3 middle = table.vector("middle_mm", 1e3 * kMaxLength, 1e3);
+    Region& region = regions.emplace_back();
+    if (ball) {
+      region.where = Region::Ball{.middle = middle, .radius = table.length("radius_mm")};
+    } else {
+      const Vec3 size = table.vector("size_mm", 1e3 * kMaxLength, 1e3);
+      if (!(size.array() > 0).all()) table.fail(*table.find("size_mm"), "size_mm", "expected lengths above 0");
+      region.where = Region::Box{.middle = middle, .size = size};
+    }
+    region.material = read_material(table);
+    table.check_unknown();
+  }
+  return regions;
 }
 
 void read_touch(Table table, Scene& scene) {
@@ -443,6 +468,7 @@ Scene parse_scene(std::string_view text, const std::string& name, const std::fil
   }
   model.check_unknown();
   read_body(root.table("body"), directory, scene.body);
+  if (root.find("region") != nullptr) scene.body.regions = read_regions(root);
   read_touch(root.table("touch"), scene);
   if (root.find("place") != nullptr) {
     Table place = root.table("place");
@@ -497,6 +523,11 @@ std::string scene_reference() {
           "[body.material]\n"
           "young_pa, poisson        0 to 0.4999\n"
           "density_kg_per_m3        with gravity, inertia or damping\n"
+          "[[region]]               a part of another material, a table for each; where two overlap, the later one "
+          "counts\n"
+          "middle_mm                in the body's frame at rest; it has the elements whose middle lies in it\n"
+          "radius_mm, or size_mm    of a ball; of a box, [x, y, z]\n"
+          "material                 young_pa, poisson; the density is the body's\n"
           "[model]\n"
           "kind                     how it is computed:\n";
   for (const auto& each : models()) text << "    " << each.name << ": " << each.what << '\n';
@@ -554,10 +585,12 @@ std::string turned_too_far(double linear_up_to) {
 std::vector<std::string> warnings(const BodyConfig& body) {
   std::vector<std::string> all;
   const ElementInfo& element = info(body.element);
-  if (body.material.poisson > element.locks_above) {
+  double poisson = body.material.poisson;
+  for (const Region& region : body.regions) poisson = std::max(poisson, region.material.poisson);
+  if (poisson > element.locks_above) {
     std::ostringstream text;
-    text << element.name << " locks above a Poisson ratio of " << element.locks_above << " (here "
-         << body.material.poisson << "): forces come out far too large; use hex8-sri or hex27-sri";
+    text << element.name << " locks above a Poisson ratio of " << element.locks_above << " (here " << poisson
+         << "): forces come out far too large; use hex8-sri or hex27-sri";
     all.push_back(text.str());
   }
   return all;

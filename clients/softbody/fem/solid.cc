@@ -10,22 +10,29 @@
 
 namespace tendon::softbody {
 
-Solid::Solid(Mesh at_rest, Element element, const Material& material, Law law, const Fixed& fixed)
+Solid::Solid(Mesh at_rest, Element element, const Material& material, Law law, const Fixed& fixed,
+             std::vector<Material> of_elements)
     : Elastic(std::move(at_rest), fixed),
       element_(element),
       material_(material),
+      of_elements_(std::move(of_elements)),
       law_(law),
       per_element_(static_cast<int>(quadrature(element).size())) {
   softbody::check(material);
+  for (const Material& each : of_elements_) softbody::check(each);
+  if (!of_elements_.empty() && of_elements_.size() != at(mesh().element_count())) {
+    throw std::invalid_argument("of_elements: expected a material for each element, or none");
+  }
   if (info(element).shape != mesh().shape) {
     throw std::invalid_argument("the mesh has no elements of the kind " + std::string(info(element).name));
   }
 }
 
-Solid::Solid(Mesh at_rest, const Solid& whole, const Fixed& fixed)
+Solid::Solid(Mesh at_rest, const Solid& whole, const Fixed& fixed, std::vector<Material> of_elements)
     : Elastic(std::move(at_rest), fixed, Together{}),
       element_(whole.element_),
       material_(whole.material_),
+      of_elements_(std::move(of_elements)),
       law_(whole.law_),
       per_element_(whole.per_element_) {}
 
@@ -48,7 +55,11 @@ Solid Solid::part_of(const Solid& whole, const std::vector<int>& elements, std::
   for (const int element : elements) {
     for (const int node : all.element(element)) mesh.elements.push_back(own[at(node)]);
   }
-  return {std::move(mesh), whole, fixed};
+  std::vector<Material> of_elements;
+  for (const int element : elements) {
+    if (!whole.of_elements_.empty()) of_elements.push_back(whole.material(element));
+  }
+  return {std::move(mesh), whole, fixed, std::move(of_elements)};
 }
 
 Solid::Part Solid::part(int element, int index) const {
@@ -59,7 +70,8 @@ Solid::Part Solid::part(int element, int index) const {
   for (int i = 0; i < shape.value.size(); ++i) {
     jacobian += mesh().nodes[at(nodes[at(i)])] * shape.gradient.col(i).transpose();
   }
-  return {{point.weight * jacobian.determinant(), point.mu * material_.mu(), point.lambda * material_.lambda()},
+  const Material& material = this->material(element);
+  return {{point.weight * jacobian.determinant(), point.mu * material.mu(), point.lambda * material.lambda()},
           jacobian.inverse().transpose() * shape.gradient};
 }
 
@@ -131,6 +143,12 @@ int Solid::inverted(const VectorXd& u) const {
   return count;
 }
 
+double Solid::largest_poisson() const {
+  double largest = material_.poisson;
+  for (const Material& each : of_elements_) largest = std::max(largest, each.poisson);
+  return largest;
+}
+
 double Solid::largest_turn(const VectorXd& u) const {
   double largest = 0;
   for (int e = 0; e < mesh().element_count(); ++e) {
@@ -144,7 +162,7 @@ double Solid::largest_turn(const VectorXd& u) const {
 }
 
 std::size_t Solid::bytes() const noexcept {
-  std::size_t sum = mesh_bytes();
+  std::size_t sum = mesh_bytes() + of_elements_.size() * sizeof(Material);
   if (const std::vector<int>* const slots = slots_.made()) sum += slots->size() * sizeof(int);
   if (const Parts* const parts = parts_.made()) sum += parts->points.size() * sizeof(Point) + parts->kernel.bytes();
   return sum;

@@ -18,9 +18,11 @@ namespace tendon::softbody {
 /// Without state. Thread-safe: yes, once built. Realtime-safe: no.
 class Solid : public Elastic {
  public:
-  /// Throws std::invalid_argument when the mesh is not sound, the element is not of the mesh's shape, the material is
-  /// impossible or nothing is fixed.
-  Solid(Mesh at_rest, Element element, const Material& material, Law law, const Fixed& fixed);
+  /// `of_elements`: the material of each element, where not all are of `material` (region.h). Throws
+  /// std::invalid_argument when the mesh is not sound, the element is not of the mesh's shape, a material is impossible
+  /// or nothing is fixed.
+  Solid(Mesh at_rest, Element element, const Material& material, Law law, const Fixed& fixed,
+        std::vector<Material> of_elements = {});
 
   /// Some elements of another solid, in their order, with what is fixed of their nodes. Nothing has to hold them.
   /// `nodes` becomes the number in `whole` of each node, ascending.
@@ -28,6 +30,10 @@ class Solid : public Elastic {
 
   Element element() const noexcept { return element_; }
   const Material& material() const noexcept { return material_; }
+  const Material& material(int element) const { return of_elements_.empty() ? material_ : of_elements_[at(element)]; }
+  /// Empty where all are of material().
+  const std::vector<Material>& of_elements() const noexcept { return of_elements_; }
+  double largest_poisson() const;  ///< of its materials
   Law law() const noexcept { return law_; }
 
   double energy(const VectorXd& u) const override { return forces(u).energy; }
@@ -66,7 +72,7 @@ class Solid : public Elastic {
   void sum_stiffness(const VectorXd& u, const TangentAt& tangent_at, SymmetricMatrix& to) const;
 
  private:
-  Solid(Mesh at_rest, const Solid& whole, const Fixed& fixed);
+  Solid(Mesh at_rest, const Solid& whole, const Fixed& fixed, std::vector<Material> of_elements);
 
   /// All integration points; made when one is first asked for.
   struct Parts {
@@ -82,6 +88,7 @@ class Solid : public Elastic {
 
   Element element_;
   Material material_;
+  std::vector<Material> of_elements_;
   Law law_;
   int per_element_;  ///< points of integration
   Lazy<Parts> parts_;

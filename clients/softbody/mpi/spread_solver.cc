@@ -94,7 +94,7 @@ class SpreadSolver : public Solver {
         first_(first_row(rank_of(comm_))),
         rows_(first_row(rank_of(comm_) + 1) - first_),
         iterates_(way == Way::kMultigrid ||
-                  (way == Way::kChosen && size_ >= kMostForFactor && solid.material().poisson <= kMostPoisson)) {
+                  (way == Way::kChosen && size_ >= kMostForFactor && solid.largest_poisson() <= kMostPoisson)) {
     if (size_ % 3 != 0) throw std::invalid_argument("on many ranks a node is held whole, or not at all");
     assemble(solid);
     check(KSPCreate(comm_, krylov_.address()));

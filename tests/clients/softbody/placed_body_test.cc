@@ -283,7 +283,9 @@ void expect_passed(const Scene& scene) {
   EXPECT_TRUE(result.passed()) << result.text();
 }
 
-TEST(PlacedBody, TheKidneyPassesTheSelfTest) { expect_passed(read_scene(TENDON_SCENES "/kidney.toml")); }
+TEST(PlacedBody, TheKidneyAndTheLumpInABlockPassTheSelfTest) {
+  for (const std::string name : {"kidney", "tumour"}) expect_passed(read_scene(TENDON_SCENES "/" + name + ".toml"));
+}
 
 TEST(PlacedBody, ALiverOfALinearMaterialPassesTheSelfTestAtEveryPoint) {
   std::string text = text_of(TENDON_SCENES "/liver.toml");
