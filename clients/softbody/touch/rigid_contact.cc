@@ -405,6 +405,7 @@ void RigidContact::put_down(std::size_t tool, const Pose& handle) {
 }
 
 std::vector<Feel> RigidContact::press(std::span<const std::optional<Pose>> handles) {
+  expect(handles.size() == tools_.size(), "handles", static_cast<double>(handles.size()), "one for each tool");
   std::vector<std::optional<Pose>> to(handles.begin(), handles.end());
   std::vector<bool> lost(to.size());
   for (std::size_t t = 0; t < to.size(); ++t) {

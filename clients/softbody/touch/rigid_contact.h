@@ -49,7 +49,8 @@ class RigidContact {
                const Config& config);
 
   /// What each hand feels with the handles there (body frame); empty: that hand is nowhere. One solution for all. A
-  /// pose that is not finite changes nothing: that hand gets no force, and its tool stays where it was.
+  /// pose that is not finite changes nothing: that hand gets no force, and its tool stays where it was. Throws
+  /// std::invalid_argument when there are not as many as tools.
   std::vector<Feel> press(std::span<const std::optional<Pose>> handles);
 
   int iterations() const noexcept { return iterations_; }  ///< steps of Newton's method in the last answer
