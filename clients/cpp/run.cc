@@ -54,6 +54,7 @@ class Guest {
   std::optional<LocalTime> turn(LocalTime now);
   void answer(LocalTime now, const Reply& reply) { client_.answer(now, reply); }
   std::uint64_t sessions() const { return client_.stats().sessions; }
+  bool open() const { return client_.phase() == ForceClient::Phase::kOpen; }
   /// Says Bye.
   void leave(LocalTime now) { client_.stop(now); }
   /// Says Bye, and sums up. Whether there was a session.
@@ -219,11 +220,19 @@ bool Guest::end(LocalTime now, Duration duration) {
   return stats.sessions > 0;
 }
 
+/// An engine of several hands, and the newest state of each.
+struct AllHands {
+  const Together& engine;
+  std::vector<std::optional<DeviceState>> hands;
+  bool fresh = false;  ///< it has not seen one of them
+};
+
 /// What a run does beside its callbacks.
 struct Beside {
   bool* heard = nullptr;           ///< set by the callback: Options::on_silence
   Elsewhere* elsewhere = nullptr;  ///< its states come by the callback
   std::optional<DeviceState>* seen = nullptr;
+  AllHands* all_hands = nullptr;  ///< the same, of a guest for each hand
 };
 
 /// Shows the engine what was seen, and sends what it has come to. When the next turn is due.
@@ -240,6 +249,22 @@ LocalTime turn_elsewhere(const Beside& beside, Guest& guest, LocalTime now) {
   return answered ? now : beside.elsewhere->next_turn();
 }
 
+/// Shows the engine all hands where one of them has a new state, and sends each its answer. When the next turn is due.
+LocalTime turn_together(AllHands& all, std::deque<Guest>& guests, LocalTime now) {
+  for (std::size_t i = 0; i < guests.size(); ++i) {
+    if (guests[i].open() || !all.hands[i]) continue;
+    all.hands[i].reset();
+    all.fresh = true;  // the others feel that it has let go
+  }
+  if (!std::exchange(all.fresh, false)) return LocalTime::max();
+  const std::vector<Touch> touches = all.engine(all.hands);
+  for (std::size_t i = 0; i < guests.size(); ++i) {
+    if (!all.hands[i]) continue;
+    guests[i].answer(now, {.to = {.hand = *all.hands[i], .session = guests[i].sessions()}, .touch = touches.at(i)});
+  }
+  return now;
+}
+
 /// Until one of the guests can receive, or the file `also` can be read (−1: none), or it is `end`; without a sleep.
 LocalTime watch(std::deque<Guest>& guests, int also, LocalTime now, LocalTime end) {
   while (now < end) {
@@ -251,9 +276,17 @@ LocalTime watch(std::deque<Guest>& guests, int also, LocalTime now, LocalTime en
   return now;
 }
 
-/// One session for each callback, by the name of its device; "" is whatever the options name.
+/// A session to be: its options, the name of its device ("" is whatever these name) and its callback.
 template <typename Callback>
-int run_with(const Options& options, const std::map<std::string, Callback>& callbacks, const Beside& beside = {}) {
+struct Seat {
+  const Options* options;
+  std::string device;
+  Callback callback;
+};
+
+/// One session for each seat.
+template <typename Callback>
+int run_with(const Options& options, const std::vector<Seat<Callback>>& seats, const Beside& beside = {}) {
   try {
     const StopSignals signals;
     const Punctual punctual;
@@ -264,8 +297,8 @@ int run_with(const Options& options, const std::map<std::string, Callback>& call
     const LocalTime end = options.duration > Duration::zero() ? start + options.duration : LocalTime::max();
     std::deque<Guest> guests;
     std::vector<UdpTransport*> transports;
-    for (const auto& [device, callback] : callbacks) {
-      transports.push_back(&guests.emplace_back(options, device, callback, start).transport());
+    for (const auto& [own, device, callback] : seats) {
+      transports.push_back(&guests.emplace_back(*own, device, callback, start).transport());
     }
     LocalTime now = start;
     bool* const heard = beside.heard;
@@ -281,6 +314,14 @@ int run_with(const Options& options, const std::map<std::string, Callback>& call
         next = std::min(next, *due);
       }
       if (beside.elsewhere != nullptr) next = std::min(next, turn_elsewhere(beside, guests.front(), now));
+      if (beside.all_hands != nullptr) {
+        try {
+          next = std::min(next, turn_together(*beside.all_hands, guests, now));
+        } catch (...) {
+          for (Guest& guest : guests) guest.leave(now);
+          throw;
+        }
+      }
       if (heard != nullptr) {
         const bool answered = std::exchange(*heard, false);
         if (!answered && now >= quiet) options.on_silence(now);
@@ -310,7 +351,7 @@ int run_with(const Options& options, const std::map<std::string, Callback>& call
 }  // namespace
 
 int run(const Options& options, Physics physics) {
-  if (!options.on_silence || !physics) return run_with<Physics>(options, {{"", std::move(physics)}});
+  if (!options.on_silence || !physics) return run_with<Physics>(options, {{&options, "", std::move(physics)}});
   if (options.silence < std::chrono::milliseconds(1)) {
     std::cerr << options.client.name << ": silence: expected at least 1 ms\n";
     return 1;
@@ -320,9 +361,9 @@ int run(const Options& options, Physics physics) {
     heard = true;
     return physics(hand);
   };
-  return run_with<Physics>(options, {{"", hears}}, {.heard = &heard});
+  return run_with<Physics>(options, {{&options, "", hears}}, {.heard = &heard});
 }
-int run(const Options& options, Watch watch) { return run_with<Watch>(options, {{"", std::move(watch)}}); }
+int run(const Options& options, Watch watch) { return run_with<Watch>(options, {{&options, "", std::move(watch)}}); }
 
 int run(const Options& options, const std::map<std::string, Physics>& physics) {
   if (physics.empty() || physics.contains("") || !options.client.device.empty()) {
@@ -333,7 +374,31 @@ int run(const Options& options, const std::map<std::string, Physics>& physics) {
     std::cerr << options.client.name << ": on_silence is for one device alone\n";
     return 1;
   }
-  return run_with(options, physics);
+  std::vector<Seat<Physics>> seats;
+  for (const auto& [device, callback] : physics) seats.push_back({&options, device, callback});
+  return run_with(options, seats);
+}
+
+int run(const Options& options, const std::vector<HandAt>& hands, const Together& engine) {
+  if (hands.empty() || !options.client.device.empty() || options.on_silence) {
+    std::cerr << options.client.name << ": this program names its devices itself, at least one, without on_silence\n";
+    return 1;
+  }
+  AllHands all{engine, std::vector<std::optional<DeviceState>>(hands.size())};
+  std::deque<Options> own;
+  std::vector<Seat<Physics>> seats;
+  for (std::size_t i = 0; i < hands.size(); ++i) {
+    Options& of_hand = own.emplace_back(options);
+    if (hands[i].server) of_hand.server = *hands[i].server;
+    seats.push_back({&of_hand, hands[i].device, [&all, i](const DeviceState& hand) {
+                       all.hands[i] = hand;
+                       all.fresh = true;
+                       Touch later;
+                       later.unknown = true;
+                       return later;
+                     }});
+  }
+  return run_with(options, seats, {.all_hands = &all});
 }
 
 int run(const Options& options, Elsewhere& engine) {
@@ -344,7 +409,7 @@ int run(const Options& options, Elsewhere& engine) {
     later.unknown = true;
     return later;
   };
-  return run_with<Physics>(options, {{"", sees}}, {.elsewhere = &engine, .seen = &seen});
+  return run_with<Physics>(options, {{&options, "", sees}}, {.elsewhere = &engine, .seen = &seen});
 }
 
 }  // namespace tendon

@@ -4,7 +4,9 @@
 #include <functional>
 #include <map>
 #include <optional>
+#include <span>
 #include <string>
+#include <vector>
 
 #include "clients/cpp/force_client.h"
 #include "clients/cpp/server_name.h"
@@ -48,6 +50,22 @@ int run(const Options& options, Watch watch);      ///< an observer
 /// `options.client.device` must be empty. 0 means that every session was open once; the run ends when one ends for
 /// good.
 int run(const Options& options, const std::map<std::string, Physics>& physics);
+
+/// One of several hands that hold the same object.
+struct HandAt {
+  std::string device;                  ///< its name at its server
+  std::optional<ServerName> server{};  ///< empty: Options::server
+};
+
+/// An engine that several hands touch at once: the newest state of each in, empty while that hand is not there; the
+/// answer to each of these states out, in the same order. One for an empty state does not matter.
+using Together = std::function<std::vector<Touch>(std::span<const std::optional<DeviceState>> hands)>;
+
+/// The same for an engine with one solution for all hands, at devices of one server or of several, which share
+/// `options.client.key`. It is called when a hand has a state that it has not seen, and all answers leave in one turn,
+/// each stamped with the state of its own hand: a hand that stands still is answered anew when another one moves. At
+/// least one hand; what the engine throws ends the run after a Bye to each server.
+int run(const Options& options, const std::vector<HandAt>& hands, const Together& engine);
 
 /// An engine that computes elsewhere: in another process, or on many machines. run() never waits for it.
 class Elsewhere {

@@ -20,6 +20,7 @@
 #include "clients/softbody/models/xpbd.h"
 #include "clients/softbody/touch/capsule.h"
 #include "clients/softbody/touch/friction.h"
+#include "clients/softbody/touch/rigid_contact.h"
 #include "clients/softbody/touch/sphere.h"
 #include "protocol/expect.h"
 
@@ -165,6 +166,7 @@ struct Made {
   std::unique_ptr<Model> model;
   std::optional<double> linear_up_to{};  ///< m, where a table tells it
   const CondensedModel* condensed = nullptr;
+  QuasiStaticModel* newton = nullptr;  ///< for rigid tools
   StiffeningModel* stiffening = nullptr;
   const NearModel* near = nullptr;
 };
@@ -266,6 +268,7 @@ Made model_of(const BodyConfig& config, const Solid& solid, const TouchSurface& 
     made.model = std::move(near);
   } else {
     made.model = plain_model_of(config, solid, surface);
+    if (is_rigid_on_nonlinear(config)) made.newton = static_cast<QuasiStaticModel*>(made.model.get());
   }
   if (config.stiffening) {
     auto stiffening = std::make_unique<StiffeningModel>(std::move(made.model), *config.stiffening);
@@ -298,11 +301,29 @@ const BodyConfig& checked(const BodyConfig& config) {
     throw std::invalid_argument("the law of the model \"near\" cannot be linear");
   }
   if (config.tool != BodyConfig::Tool::kPatch) {
-    const std::string tool = config.tool == BodyConfig::Tool::kSphere ? "a sphere" : "a capsule";
-    if (config.model != ModelKind::kCondensed) throw std::invalid_argument(tool + " wants the model \"condensed\"");
-    if (config.friction) throw std::invalid_argument(tool + " has no friction");
+    const std::string tool = config.tool == BodyConfig::Tool::kSphere    ? "a sphere"
+                             : config.tool == BodyConfig::Tool::kCapsule ? "a capsule"
+                                                                         : "a box";
+    if (is_rigid_on_nonlinear(config)) {
+      for (const EffectKind effect : {kInertia, kDamping, kViscosity, kCutting, kPlasticity, kSelfCollision}) {
+        if (simulated.has(effect)) {
+          throw std::invalid_argument(tool + " presses no body with " + std::string(info(effect).name));
+        }
+      }
+    } else if (config.tool == BodyConfig::Tool::kBox) {
+      throw std::invalid_argument(tool + " wants the model \"corotational\", \"stvk\" or \"neo-hookean\"");
+    } else if (config.model != ModelKind::kCondensed) {
+      throw std::invalid_argument(tool +
+                                  " wants the model \"condensed\", \"corotational\", \"stvk\" or \"neo-hookean\"");
+    } else if (config.friction) {
+      throw std::invalid_argument(tool + " has no friction on the model \"condensed\"");
+    }
     if (config.stiffening) throw std::invalid_argument(tool + " wants a body that does not stiffen");
     if (config.side == PatchContact::Side::kBilateral) throw std::invalid_argument(tool + " does not stick");
+  }
+  if (config.hands != 1 && !is_rigid_on_nonlinear(config)) {
+    throw std::invalid_argument(
+        "several hands want a rigid tool and the model \"corotational\", \"stvk\" or \"neo-hookean\"");
   }
   if (config.table_file) {
     if (config.model != ModelKind::kCondensed) {
@@ -320,6 +341,26 @@ const BodyConfig& checked(const BodyConfig& config) {
 std::unique_ptr<Friction> friction_of(const BodyConfig& config) {
   if (!config.friction) return nullptr;
   return std::make_unique<Friction>(*config.friction, sideways_stiffness(config.material, config.patch_radius));
+}
+
+RigidShape shape_of(const BodyConfig& config) {
+  if (config.tool == BodyConfig::Tool::kBox) return RigidShape::box(config.tool_size, config.tool_edge);
+  if (config.tool == BodyConfig::Tool::kSphere) return RigidShape::sphere(config.tool_radius);
+  return RigidShape::capsule(config.tool_radius, config.tool_half_length, config.tool_axis);
+}
+
+RigidContact rigid_contact_of(const BodyConfig& config, QuasiStaticModel& body, const Solid& solid,
+                              const TouchSurface& surface) {
+  RigidContact::Config made;
+  made.layer = {.thickness = config.layer,
+                .young = config.material.young,
+                .friction = config.friction.value_or(0),
+                .shear = config.material.mu(),
+                .piece = shape_of(config).reach() / 10};
+  made.tolerance = config.tolerance;
+  made.max_iterations = config.max_iterations;
+  made.turns = turns_the_hand(config);
+  return {body, solid, surface, std::vector<HeldTool>(config.hands, {shape_of(config), config.tool_offset}), made};
 }
 
 /// m: how deep the patch may be pressed before the material turns anywhere by more than Body::kLargestTurn.
@@ -347,11 +388,21 @@ std::optional<ModelKind> model_named(std::string_view name) noexcept {
   return found == kModels.end() ? std::nullopt : std::optional(found->kind);
 }
 
+bool is_rigid_on_nonlinear(const BodyConfig& config) {
+  return config.tool != BodyConfig::Tool::kPatch &&
+         (config.model == ModelKind::kCorotational || config.model == ModelKind::kStVenantKirchhoff ||
+          config.model == ModelKind::kNeoHookean);
+}
+
 bool turns_the_hand(const BodyConfig& config) {
-  return config.tool == BodyConfig::Tool::kCapsule || config.tool_offset != Vec3::Zero();
+  return config.tool == BodyConfig::Tool::kCapsule || config.tool == BodyConfig::Tool::kBox ||
+         config.tool_offset != Vec3::Zero();
 }
 
 Vec3 lowest_of_tool(const BodyConfig& config, const Mat3& turn) {
+  if (config.tool == BodyConfig::Tool::kBox) {
+    return turn * (config.tool_offset + shape_of(config).farthest(turn.transpose() * -config.towards_tool));
+  }
   Vec3 lowest = turn * config.tool_offset - config.tool_radius * config.towards_tool;
   if (config.tool == BodyConfig::Tool::kCapsule) {
     const Vec3 half = turn * (config.tool_half_length * config.tool_axis);
@@ -388,7 +439,12 @@ struct Body::Parts {
         turns(turns_the_hand(config)),
         offset(config.tool_offset),
         axis(config.tool_axis) {
-    // checked() has made sure that the model of a sphere or a capsule is condensed.
+    // checked() has made sure that the model of any other sphere or capsule is condensed.
+    if (made.newton != nullptr) {
+      rigid.emplace(rigid_contact_of(config, *made.newton, solid, surface));
+      hands.resize(config.hands);
+      return;
+    }
     if (config.tool == BodyConfig::Tool::kSphere) sphere.emplace(*made.condensed, surface, config.tool_radius);
     if (config.tool == BodyConfig::Tool::kCapsule) {
       capsule.emplace(solid, surface, touchable(config, surface), config.tool_radius, config.tool_half_length);
@@ -414,9 +470,11 @@ struct Body::Parts {
   PatchContact contact;
   std::optional<SphereContact> sphere;    ///< instead of `contact`
   std::optional<CapsuleContact> capsule;  ///< the same
-  Patch patch;                            ///< around the middle
-  bool knows_turns;                       ///< simulates large rotations
-  bool turns;                             ///< turns_the_hand()
+  std::optional<RigidContact> rigid;      ///< the same
+  std::vector<std::optional<Pose>> hands;
+  Patch patch;       ///< around the middle
+  bool knows_turns;  ///< simulates large rotations
+  bool turns;        ///< turns_the_hand()
   Vec3 offset;
   Vec3 axis;
   std::unique_ptr<Planned> cutting;
@@ -469,13 +527,23 @@ Body::Body(Body&&) noexcept = default;
 Body& Body::operator=(Body&&) noexcept = default;
 
 Feel Body::touch(const Vec3& tool) {
+  if (parts_->rigid) return touch(Pose{.position = tool - parts_->offset});
   if (parts_->capsule) return parts_->capsule->at(tool, parts_->axis, tool);
   Feel feel = parts_->sphere ? parts_->sphere->at(tool) : parts_->contact.at(tool);
   if (parts_->cutting) parts_->note(feel);
   return feel;
 }
 
+std::vector<Feel> Body::touch(std::span<const std::optional<Pose>> handles) {
+  if (parts_->rigid) return parts_->rigid->press(handles);
+  return {handles.front() ? touch(*handles.front()) : Feel{}};
+}
+
 Feel Body::touch(const Pose& handle) {
+  if (parts_->rigid) {
+    parts_->hands.front() = handle;
+    return parts_->rigid->press(parts_->hands).front();
+  }
   if (!parts_->turns) return touch(handle.position);
   const Vec3 lever = handle.turn * parts_->offset;
   const Vec3 tool = handle.position + lever;
@@ -547,7 +615,7 @@ Body::Size Body::size() const {
   return {parts_->solid.mesh().nodes.size(), static_cast<std::size_t>(parts_->solid.mesh().element_count()),
           static_cast<std::size_t>(parts_->solid.free_count()), parts_->surface.nodes().size(),
           parts_->model.bytes() + parts_->contact.bytes() + (parts_->capsule ? parts_->capsule->bytes() : 0) +
-              (parts_->cutting ? parts_->cutting->cuts.bytes() : 0)};
+              (parts_->rigid ? parts_->rigid->bytes() : 0) + (parts_->cutting ? parts_->cutting->cuts.bytes() : 0)};
 }
 
 std::optional<NearModel::Size> Body::near_field() const {

@@ -146,12 +146,17 @@ struct BodyConfig {
   std::optional<double> reach;
   Vec3 middle = Vec3::Zero();  ///< m; only its position across `towards_tool` counts
   double tool_radius = 0;      ///< m; 0: a point
-  /// The tool presses a patch of fixed size, or is rigid and its contact grows (kCondensed only): a sphere of
-  /// `tool_radius`, or a capsule of it.
-  enum class Tool : std::uint8_t { kPatch, kSphere, kCapsule };
+  /// The tool presses a patch of fixed size, or is rigid and its contact grows: a sphere of `tool_radius`, a capsule of
+  /// it, or a box. kCondensed has sphere and capsule, without friction; kCorotational, kStVenantKirchhoff and
+  /// kNeoHookean have all three (touch/rigid_contact.h).
+  enum class Tool : std::uint8_t { kPatch, kSphere, kCapsule, kBox };
   Tool tool = Tool::kPatch;
   double tool_half_length = 0;      ///< kCapsule: m, from its middle to the centre of each end
   Vec3 tool_axis = Vec3::UnitZ();   ///< kCapsule: unit vector, handle frame, from end to end
+  Vec3 tool_size = Vec3::Zero();    ///< kBox: m, along the handle's axes
+  double tool_edge = 0;             ///< kBox: m, the radius of its edges and corners
+  double layer = 1e-4;              ///< m, rigid tools on nonlinear bodies: Layer::Config::thickness
+  std::size_t hands = 1;            ///< rigid tools on nonlinear bodies: how many hands hold one each
   Vec3 tool_offset = Vec3::Zero();  ///< m, handle frame, from the handle's position to the tool's middle
   PatchContact::Side side = PatchContact::Side::kUnilateral;
   /// The stiffness is the whole second derivative of the energy also where that costs more than a few percent matter: of
@@ -159,7 +164,10 @@ struct BodyConfig {
   bool whole_stiffness = false;
 };
 
-/// Whether contact gives a torque: the tool is a capsule, or its middle is not where the handle is.
+/// Whether the tool is rigid and presses a nonlinear body: RigidContact.
+bool is_rigid_on_nonlinear(const BodyConfig& config);
+
+/// Whether contact gives a torque: the tool is a capsule or a box, or its middle is not where the handle is.
 bool turns_the_hand(const BodyConfig& config);
 
 /// From the handle to the tool's point that is farthest in the body, m, body frame, with the handle turned by `turn`.
@@ -192,6 +200,10 @@ class Body {
   /// The same with the handle at `handle` (body frame): the tool is at its offset from there, and where
   /// turns_the_hand() the answer has the torque about the handle's position.
   Feel touch(const Pose& handle);
+
+  /// The same for a body that several hands hold at once: one solution, and what each of them feels. Empty: that hand
+  /// is nowhere. As many as BodyConfig::hands.
+  std::vector<Feel> touch(std::span<const std::optional<Pose>> handles);
 
   /// Sets the time since the scene began, s: Young's modulus becomes that of `time`, and cuts that are due are made. An
   /// earlier time undoes no cut.

@@ -83,9 +83,14 @@ std::string touched_by(const BodyConfig& body) {
       text << ", a capsule of " << 1e3 * body.tool_radius << " mm, " << 2e3 * body.tool_half_length
            << " mm between the centres of its ends";
       break;
+    case BodyConfig::Tool::kBox:
+      text << ", a box of " << (1e3 * body.tool_size).transpose() << " mm with edges of " << 1e3 * body.tool_edge
+           << " mm";
+      break;
   }
   if (body.tool_offset != Vec3::Zero()) text << ", " << 1e3 * body.tool_offset.norm() << " mm from the handle";
   if (turns_the_hand(body)) text << "; with a torque";
+  if (body.hands > 1) text << "; " << body.hands << " hands at once";
   return text.str();
 }
 

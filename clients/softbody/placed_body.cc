@@ -19,18 +19,29 @@ PlacedBody::PlacedBody(const Scene& scene, Body body)
       normal_(to_device_ * body_.normal()),
       only_pushes_(scene.body.side == PatchContact::Side::kUnilateral),
       turns_(turns_the_hand(scene.body)),
-      depths_(scene.table) {}
+      depths_(scene.table) {
+  for (const Scene::Hand& hand : scene.hands) origins_.emplace_back(hand.at - to_device_ * body_.touch_point());
+}
+
+Pose PlacedBody::to_body(const Pose& handle, const Vec3& origin) const {
+  return {to_device_.transpose() * (handle.position - origin), to_device_.transpose() * handle.turn};
+}
 
 Feel PlacedBody::touch(const Pose& handle) {
-  const Vec3 position = to_device_.transpose() * (handle.position - origin_);
-  Feel feel = turns_ ? body_.touch(Pose{position, to_device_.transpose() * handle.turn}) : body_.touch(position);
+  const Pose placed = to_body(handle, origin_);
+  Feel feel = turns_ ? body_.touch(placed) : body_.touch(placed.position);
+  turn_to_device(feel);
+  return feel;
+}
+
+void PlacedBody::turn_to_device(Feel& feel) const {
   feel.force = to_device_ * feel.force;
   feel.stiffness = to_device_ * feel.stiffness * to_device_.transpose();
   if (feel.torque) {
     feel.torque->torque = to_device_ * feel.torque->torque;
     feel.torque->stiffness = to_device_ * feel.torque->stiffness * to_device_.transpose();
   }
-  return feel;
+  if (feel.normal) feel.normal = to_device_ * *feel.normal;
 }
 
 Pose PlacedBody::pose(const DeviceState& hand) const {
@@ -44,7 +55,29 @@ Pose PlacedBody::pose(const DeviceState& hand) const {
 Touch PlacedBody::answer(const DeviceState& hand) {
   const DenormalsOff off;
   if (body_.has_clock()) tick(hand.sampled);
-  const Feel feel = body_.step() > 0 ? follow(hand) : touch(pose(hand));
+  return touch_of(body_.step() > 0 ? follow(hand) : touch(pose(hand)), hand);
+}
+
+std::vector<Touch> PlacedBody::answer(std::span<const std::optional<DeviceState>> hands) {
+  const DenormalsOff off;
+  std::vector<std::optional<Pose>> handles(hands.size());
+  for (std::size_t i = 0; i < hands.size(); ++i) {
+    if (hands[i]) handles[i] = to_body(pose(*hands[i]), origins_.at(i));
+  }
+  std::vector<Feel> feels = body_.touch(handles);
+  std::vector<Touch> touches(hands.size());
+  for (std::size_t i = 0; i < hands.size(); ++i) {
+    turn_to_device(feels.at(i));
+    if (hands[i]) {
+      touches[i] = touch_of(feels[i], *hands[i]);
+    } else {
+      touches[i].unknown = true;
+    }
+  }
+  return touches;
+}
+
+Touch PlacedBody::touch_of(const Feel& feel, const DeviceState& hand) {
   deepest_ = std::max(deepest_, -feel.gap);
   Touch touch = feel.force;
   touch.stiffness = feel.stiffness;
@@ -52,7 +85,8 @@ Touch PlacedBody::answer(const DeviceState& hand) {
   touch.error = feel.error;
   touch.topology_changed = feel.topology_changed;
   if (only_pushes_ && std::isfinite(feel.gap)) {
-    touch.contact = Contact{.normal = normal_, .gap = feel.gap, .table = table(pose(hand), feel.gap)};
+    touch.contact =
+        Contact{.normal = feel.normal.value_or(normal_), .gap = feel.gap, .table = table(pose(hand), feel.gap)};
   }
   if (feel.torque) {
     touch.torque = feel.torque->torque;

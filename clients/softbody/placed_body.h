@@ -3,6 +3,8 @@
 
 #include <chrono>
 #include <optional>
+#include <span>
+#include <vector>
 
 #include "clients/cpp/force_client.h"
 #include "clients/softbody/scene.h"
@@ -35,6 +37,10 @@ class PlacedBody {
   Touch answer(const DeviceState& hand);
   static constexpr Duration kMostBehind = std::chrono::milliseconds(200);
 
+  /// The answers to all hands of the scene at once, by their order there: one solution, each the answer to its own
+  /// state. Empty: that hand is nowhere, and so is its answer (Touch::unknown).
+  std::vector<Touch> answer(std::span<const std::optional<DeviceState>> hands);
+
   double linear_up_to() const { return body_.linear_up_to(); }  ///< see Body
   double deepest() const noexcept { return deepest_; }          ///< m, the greatest depth of the tool so far
 
@@ -43,6 +49,9 @@ class PlacedBody {
   Feel follow(const DeviceState& hand);
   std::optional<ForceTable> table(const Pose& handle, double gap);
   Pose pose(const DeviceState& hand) const;
+  Pose to_body(const Pose& handle, const Vec3& origin) const;
+  void turn_to_device(Feel& feel) const;
+  Touch touch_of(const Feel& feel, const DeviceState& hand);
   struct Followed {
     PeerTime sampled;
     Pose handle;
@@ -52,8 +61,9 @@ class PlacedBody {
 
   Body body_;
   Mat3 to_device_;
-  Vec3 origin_;  ///< of the body's frame, in the device's
-  Vec3 normal_;  ///< towards the hand
+  Vec3 origin_;                ///< of the body's frame, in the device's
+  std::vector<Vec3> origins_;  ///< the same for each of several hands
+  Vec3 normal_;                ///< towards the hand
   bool only_pushes_;
   bool turns_;                     ///< turns_the_hand()
   double depths_;                  ///< m, the depth of the table

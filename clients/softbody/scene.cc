@@ -8,6 +8,7 @@
 #include <array>
 #include <cmath>
 #include <iomanip>
+#include <limits>
 #include <optional>
 #include <set>
 #include <sstream>
@@ -273,9 +274,10 @@ void read_touch(Table table, Scene& scene) {
   body.tool_radius = table.number("tool_radius_mm", 0, true, 1e3 * kMaxLength, 1e3, 0);
   if (table.find("reach_mm") != nullptr) body.reach = table.length("reach_mm");
   if (table.find("tool") != nullptr) {
-    body.tool = table.choice("tool", "patch, sphere, capsule", [](std::string_view name) {
+    body.tool = table.choice("tool", "patch, sphere, capsule, box", [](std::string_view name) {
       if (name == "patch") return std::optional(BodyConfig::Tool::kPatch);
       if (name == "sphere") return std::optional(BodyConfig::Tool::kSphere);
+      if (name == "box") return std::optional(BodyConfig::Tool::kBox);
       return name == "capsule" ? std::optional(BodyConfig::Tool::kCapsule) : std::nullopt;
     });
   }
@@ -284,6 +286,13 @@ void read_touch(Table table, Scene& scene) {
     body.tool_half_length = table.number("tool_length_mm", 0, true, 1e3 * kMaxLength, 1e3) / 2;
     body.tool_axis = table.direction("tool_axis", Vec3::UnitZ());
   }
+  if (body.tool == BodyConfig::Tool::kBox) {
+    body.tool_size = table.vector("tool_size_mm", 1e3 * kMaxLength, 1e3);
+    const toml::node& size = *table.find("tool_size_mm");
+    if (!(body.tool_size.array() > 0).all()) table.fail(size, "tool_size_mm", "expected lengths above 0");
+    body.tool_edge = table.number("tool_edge_mm", 0, false, 1e3 * body.tool_size.minCoeff() / 2, 1e3);
+  }
+  if (is_rigid_on_nonlinear(body)) body.layer = table.number("layer_mm", 0, false, 1e3 * kMaxLength, 1e3, body.layer);
   if (table.find("side") != nullptr) {
     body.side = table.choice("side", "unilateral, bilateral", [](std::string_view name) {
       if (name == "unilateral") return std::optional(PatchContact::Side::kUnilateral);
@@ -362,6 +371,25 @@ void check_law(Table& root, Law law, EffectSet listed) {
   root.fail(*root.find("effects"), "effects",
             simulates ? "the law \"neo-hookean\" simulates \"material-nonlinearity\", which is not listed"
                       : "the law simulates no \"material-nonlinearity\", which is listed: only \"neo-hookean\" does");
+}
+
+std::vector<Scene::Hand> read_hands(Table& root) {
+  std::vector<Scene::Hand> hands;
+  for (Table& table : root.tables("hands", "two or more tables [[hands]]")) {
+    Scene::Hand& hand = hands.emplace_back();
+    hand.device = table.text("device", "the name of a device");
+    if (hand.device.empty()) table.fail(*table.find("device"), "device", "expected the name of a device");
+    if (table.find("server") != nullptr) hand.server = table.text("server", "HOST:PORT");
+    hand.at = table.vector("at_mm", 1e3 * kMaxLength, 1e3);
+    table.check_unknown();
+    for (const Scene::Hand& other : hands) {
+      if (&other != &hand && other.device == hand.device && other.server == hand.server) {
+        table.fail("two hands at one device, \"" + hand.device + '"');
+      }
+    }
+  }
+  if (hands.size() < 2) root.fail(*root.find("hands"), "hands", "expected two or more; one hand needs no [[hands]]");
+  return hands;
 }
 
 /// Reads the list of effects. It must have all effects that the model always simulates, and only effects that the model
@@ -470,9 +498,14 @@ Scene parse_scene(std::string_view text, const std::string& name, const std::fil
   read_body(root.table("body"), directory, scene.body);
   if (root.find("region") != nullptr) scene.body.regions = read_regions(root);
   read_touch(root.table("touch"), scene);
+  if (root.find("hands") != nullptr) {
+    scene.hands = read_hands(root);
+    scene.body.hands = scene.hands.size();
+    scene.at = scene.hands.front().at;
+  }
   if (root.find("place") != nullptr) {
     Table place = root.table("place");
-    scene.at = place.vector("at_mm", 1e3 * kMaxLength, 1e3, Vec3(Vec3::Zero()));
+    if (scene.hands.empty()) scene.at = place.vector("at_mm", 1e3 * kMaxLength, 1e3, Vec3(Vec3::Zero()));
     scene.towards_hand = place.direction("towards_hand", Vec3::UnitZ());
     place.check_unknown();
   }
@@ -553,14 +586,17 @@ std::string scene_reference() {
          "from = [0, 0, 1]         the way to the tool, in the body's frame\n"
          "middle_mm = [0, 0, 0]    of the side that is touched; its place across `from` counts\n"
          "reach_mm                 for condensed, modal: touched only so far from the middle. Without: anywhere\n"
-         "tool = \"patch\"           or sphere, or capsule: rigid, its contact grows as it is pressed in; condensed "
-         "alone\n"
+         "tool = \"patch\"           or sphere, capsule: rigid, its contact grows as it is pressed in; of condensed\n"
+         "                         (without friction), corotational, stvk, neo-hookean; or box: of the last three\n"
          "tool_radius_mm = 0       how much earlier a patch touches; the sphere's, the capsule's\n"
          "tool_length_mm           of a capsule: between the centres of its ends\n"
          "tool_axis = [0, 0, 1]    of a capsule: from end to end, in the handle's frame\n"
+         "tool_size_mm, tool_edge_mm     of a box: [x, y, z] along the handle's axes, and how round its edges are\n"
+         "layer_mm = 0.1           of rigid tools on corotational, stvk, neo-hookean: how thick the layer is that they "
+         "press\n"
          "tool_offset_mm = [0, 0, 0]     from the handle to the tool's middle, in the handle's frame. A tool at an "
          "offset,\n"
-         "                         and a capsule, give a torque about the handle\n"
+         "                         a capsule and a box, give a torque about the handle\n"
          "side = \"unilateral\"      or bilateral: once it has touched, the tool sticks, and pulls\n"
          "whole_stiffness = false  of linear, condensed, modal, plasticity; at rest: also a flat surface is sent with "
          "its "
@@ -568,9 +604,28 @@ std::string scene_reference() {
          "                         stiffness, as a curved one and Newton's method always are\n"
          "table_mm                 answers bring the force at 16 depths over so much, for a slow network: 17 answers'\n"
          "                         time. Of condensed, unilateral, without friction\n"
+         "[[hands]]                two or more that hold the body at once, a table for each; of rigid tools on\n"
+         "                         corotational, stvk, neo-hookean\n"
+         "device, server           the name of the hand's device; HOST:PORT of its server, where it is another one\n"
+         "at_mm                    in place of that of [place], in the frame of this device\n"
          "[place]\n"
          "at_mm = [0, 0, 0]        where in the device's frame the middle of the touched side is\n"
          "towards_hand = [0, 0, 1] the way from there to the hand, in the device's frame\n";
+  return text.str();
+}
+
+double patch_up_to(const BodyConfig& body) {
+  const bool nonlinear = info(body.model).always.has(EffectKind::kGeometricNonlinearity);
+  constexpr double kDeepest = 0.3;  // of the radius: beyond, the pressure of fixed profile nears its limit load
+  return nonlinear && body.tool == BodyConfig::Tool::kPatch ? kDeepest * body.patch_radius
+                                                            : std::numeric_limits<double>::infinity();
+}
+
+std::string beyond_the_patch(const BodyConfig& body) {
+  std::ostringstream text;
+  text << std::setprecision(2) << "pressed deeper than " << 1e3 * patch_up_to(body)
+       << " mm, 0.3 of the patch's radius: the body gives way under a patch of fixed size as under no tool; "
+          "tool = \"sphere\", \"capsule\" or \"box\" is rigid and can be pressed in far";
   return text.str();
 }
 

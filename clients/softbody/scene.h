@@ -16,7 +16,14 @@ struct Scene {
   BodyConfig body;
   Vec3 at = Vec3::Zero();             ///< m, device frame: the touch point of the body at rest
   Vec3 towards_hand = Vec3::UnitZ();  ///< unit vector, device frame: the direction from the body to the tool
-  double table = 0;                   ///< m, the depths that an answer's table of forces covers; 0: no table
+  /// Several hands that hold the body at once, each at a device of its own; empty: one hand, at `at`.
+  struct Hand {
+    std::string device;      ///< its name at its server
+    std::string server;      ///< HOST:PORT; empty: the one of the command line
+    Vec3 at = Vec3::Zero();  ///< m, as Scene::at, in the frame of this device
+  };
+  std::vector<Hand> hands = {};
+  double table = 0;  ///< m, the depths that an answer's table of forces covers; 0: no table
 };
 
 /// Turns the body's frame into the device's.
@@ -41,6 +48,11 @@ std::string scene_reference();
 
 /// Warnings to read before trusting this body.
 std::vector<std::string> warnings(const BodyConfig& body);
+
+/// m, how deep a patch may press a nonlinear body before its fixed size makes a force that a rigid tool would not have;
+/// ∞ for other models and tools. And the warning for one that is deeper.
+double patch_up_to(const BodyConfig& body);
+std::string beyond_the_patch(const BodyConfig& body);
 
 /// The warning for a tool that is deeper than Body::linear_up_to(), m.
 std::string turned_too_far(double linear_up_to);

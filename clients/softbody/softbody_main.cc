@@ -1,12 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 // tendon-softbody: the reference physics engine, a guest like any other.
+#include <algorithm>
 #include <ctime>
 #include <exception>
 #include <filesystem>
 #include <iostream>
 #include <nlohmann/json.hpp>
+#include <optional>
+#include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "clients/cpp/engine/self_test.h"
 #include "clients/cpp/options.h"
@@ -30,7 +34,15 @@ int test(const softbody::Scene& scene, const Options& options) {
   script.depth = 2 * kWay;
   script.slide = kWay;
   if (options.client.rate_hz > 0) script.rate_hz = options.client.rate_hz;
-  const SelfTest result = self_test([&](const DeviceState& hand) { return body.answer(hand); }, script);
+  // Of several hands the first one moves, and the others are nowhere.
+  std::vector<std::optional<DeviceState>> hands(scene.hands.size());
+  const SelfTest result = self_test(
+      [&](const DeviceState& hand) {
+        if (hands.empty()) return body.answer(hand);
+        hands.front() = hand;
+        return body.answer(hands).front();
+      },
+      script);
   std::cout << (options.json ? result.json() : result.text());
   return result.passed() ? 0 : 1;
 }
@@ -105,13 +117,28 @@ int main(int argc, char** argv) {
     if (tests) return test(scene, options);
     softbody::PlacedBody body(scene);
     const double linear_up_to = body.linear_up_to();
+    const double patch_up_to = softbody::patch_up_to(scene.body);
     bool told = false;
+    const auto watch_depth = [&] {
+      if (told || body.deepest() <= std::min(linear_up_to, patch_up_to)) return;
+      told = true;
+      std::cerr << "tendon-softbody: warning: "
+                << (body.deepest() > linear_up_to ? softbody::turned_too_far(linear_up_to)
+                                                  : softbody::beyond_the_patch(scene.body))
+                << '\n';
+    };
+    if (!scene.hands.empty()) {
+      std::vector<HandAt> hands;
+      for (const softbody::Scene::Hand& hand : scene.hands) {
+        HandAt& own = hands.emplace_back(HandAt{.device = hand.device});
+        if (!hand.server.empty()) own.server = hand.server;
+      }
+      return run(options, hands,
+                 [&](std::span<const std::optional<DeviceState>> states) { return body.answer(states); });
+    }
     return run(options, [&](const DeviceState& hand) {
       Touch touch = body.answer(hand);
-      if (!told && body.deepest() > linear_up_to) {
-        told = true;
-        std::cerr << "tendon-softbody: warning: " << softbody::turned_too_far(linear_up_to) << '\n';
-      }
+      watch_depth();
       return touch;
     });
   } catch (const std::exception& error) {

@@ -55,6 +55,25 @@ VectorXd Pairs::times(const VectorXd& b, const VectorXd& solved) const {
   return x;
 }
 
+MatrixXd Pairs::adds(const std::vector<int>& unknowns) const {
+  const auto size = static_cast<Eigen::Index>(unknowns.size());
+  const int pairs = count();
+  if (pairs == 0) return MatrixXd::Zero(size, size);
+  // The compact form (Byrd, Nocedal & Schnabel 1994): with S, Y the pairs and R the upper triangle of SᵀY,
+  // H − K₀⁻¹ = [S, K₀⁻¹Y] [[R⁻ᵀ(diag R + Yᵀ K₀⁻¹ Y)R⁻¹, −R⁻ᵀ], [−R⁻¹, 0]] [S, K₀⁻¹Y]ᵀ.
+  MatrixXd both(size, 2 * pairs);
+  both << steps_(unknowns, order_), solved_(unknowns, order_);
+  const MatrixXd upper = MatrixXd(steps_changes_(order_, order_)).triangularView<Eigen::Upper>();
+  MatrixXd within = changes_solved_(order_, order_);
+  within.diagonal() += upper.diagonal();
+  const MatrixXd inverse = upper.triangularView<Eigen::Upper>().solve(MatrixXd::Identity(pairs, pairs));
+  MatrixXd middle = MatrixXd::Zero(2 * pairs, 2 * pairs);
+  middle.topLeftCorner(pairs, pairs) = inverse.transpose() * within * inverse;
+  middle.topRightCorner(pairs, pairs) = -inverse.transpose();
+  middle.bottomLeftCorner(pairs, pairs) = -inverse;
+  return both * middle * both.transpose();
+}
+
 std::size_t Pairs::bytes() const noexcept {
   return static_cast<std::size_t>(steps_.size() + changes_.size() + solved_.size()) * sizeof(double);
 }

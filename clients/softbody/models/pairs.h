@@ -30,6 +30,9 @@ class Pairs {
   /// H b, from `solved` = K₀⁻¹ b.
   VectorXd times(const VectorXd& b, const VectorXd& solved) const;
 
+  /// H − K₀⁻¹ among some of the unknowns: its rows and columns, in the order of `unknowns`.
+  MatrixXd adds(const std::vector<int>& unknowns) const;
+
   int count() const noexcept { return static_cast<int>(order_.size()); }
   std::size_t bytes() const noexcept;
 

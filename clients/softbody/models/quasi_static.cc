@@ -85,6 +85,12 @@ Elastic::Forces QuasiStaticModel::forces() const {
   return all;
 }
 
+void QuasiStaticModel::move(const VectorXd& free) {
+  elastic_.add_free(free, u_);
+  glided_.reset();
+  forget_forces();
+}
+
 void QuasiStaticModel::stiffness(Elastic::Curvature curvature) {
   elastic_.stiffness(u_, curvature, stiffness_);
   for (const auto& effect : effects_) effect->add_stiffness(stiffness_);

@@ -57,12 +57,19 @@ class QuasiStaticModel : public Model {
   /// Takes the tool away and finds the shape at rest, or after one step of time. Returns the remaining energy, J.
   double release();
 
+  // For a contact that solves for itself (RigidContact): the body as it lies, without a tool.
+  /// Energy, and the forces on free displacements, effects included.
+  Elastic::Forces forces() const;
+  /// The stiffness with which `factor` was made is an earlier shape's; renew_factor() makes it that of this shape.
+  const Factor& factor() const noexcept { return factor_; }
+  void renew_factor() { factorize(); }
+  void move(const VectorXd& free);  ///< by so much, m
+
  private:
   struct Step {
     VectorXd by_itself;  ///< H(−internal force), with H the inverse of the stiffness, nearly
     VectorXd by_tool;    ///< H w
   };
-  Elastic::Forces forces() const;
   void stiffness(Elastic::Curvature curvature);
   void factorize();
   /// Whether sides will push each other, or do.

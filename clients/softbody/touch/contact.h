@@ -39,7 +39,8 @@ struct Feel {
   double valid_radius = 0;
   double error = 0;  ///< N, the solver's estimate of its own error
   bool touching = false;
-  bool topology_changed = false;       ///< this is the first answer since the body was cut; earlier ones no longer hold
+  std::optional<Vec3> normal{};   ///< where the tool is from the body, a unit vector; empty: towards the scene's tool
+  bool topology_changed = false;  ///< this is the first answer since the body was cut; earlier ones no longer hold
   std::optional<FeltTorque> torque{};  ///< empty: the tool is where the handle is, and no force turns it
 };
 

@@ -4,7 +4,11 @@
 #include <gtest/gtest.h>
 
 #include <chrono>
+#include <map>
+#include <optional>
+#include <span>
 #include <string>
+#include <vector>
 
 namespace tendon {
 namespace {
@@ -62,6 +66,26 @@ TEST(Run, WithSeveralDevicesTakesNoOtherNameOfOne) {
   const std::string said = testing::internal::GetCapturedStderr();
   const std::string refusal = "rod: this program names its devices itself\n";
   EXPECT_EQ(said, refusal + refusal + refusal);
+}
+
+TEST(Run, WithHandsTogetherEachHasItsDeviceAndItsServer) {
+  Options options;
+  options.client.name = "grasp";
+  options.client.patience = std::chrono::milliseconds(50);
+  options.duration = std::chrono::milliseconds(200);
+  options.server = "127.0.0.1:9";
+  const Together nothing = [](std::span<const std::optional<DeviceState>> hands) {
+    return std::vector<Touch>(hands.size());
+  };
+  testing::internal::CaptureStderr();
+  EXPECT_EQ(run(options, {HandAt{.device = "left"}, HandAt{.device = "right", .server = "127.0.0.1:19"}}, nothing), 1);
+  EXPECT_EQ(run(options, std::vector<HandAt>{}, nothing), 1);
+  const std::string said = testing::internal::GetCapturedStderr();
+  for (const std::string line :
+       {"grasp at left: no answer from 127.0.0.1:9", "grasp at right: no answer from 127.0.0.1:19",
+        "grasp: this program names its devices itself"}) {
+    EXPECT_NE(said.find(line), std::string::npos) << said;
+  }
 }
 
 }  // namespace

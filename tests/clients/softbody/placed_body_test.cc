@@ -6,10 +6,12 @@
 #include <cmath>
 #include <fstream>
 #include <numbers>
+#include <optional>
 #include <sstream>
 #include <string>
 #include <string_view>
 #include <utility>
+#include <vector>
 
 #include "clients/cpp/engine/self_test.h"
 #include "core/base/rotation.h"
@@ -40,6 +42,34 @@ TEST(PlacedBody, PushesTheHandBackAlongTheWayItCame) {
   EXPECT_NEAR((touch.contact->normal - -Vec3::UnitX()).norm(), 0, 1e-12);
   EXPECT_NEAR(touch.contact->gap, -0.002, 1e-9);
   EXPECT_FALSE(touch.contact->table);
+}
+
+TEST(PlacedBody, TwoHandsAreAnsweredAtOnceEachInItsOwnDevicesFrame) {
+  const std::string text =
+      testing::listing("corotational", R"(["contact", "geometric-nonlinearity"])",
+                       "[[hands]]\ndevice = \"left\"\nat_mm = [10, 30, 0]\n[[hands]]\ndevice = \"right\"\nat_mm = [10, "
+                       "-30, 0]\n");
+  std::string rigid = text;
+  rigid.replace(rigid.find("at_mm = [10, 0, 0]\n"), 19, "");
+  rigid.replace(rigid.find("patch_radius_mm"), 0, "tool = \"sphere\"\ntool_radius_mm = 10\n");
+  PlacedBody body(parse_scene(rigid, "s.toml", "."));
+  std::vector<std::optional<DeviceState>> hands(2);
+  hands[0].emplace().position = Vec3(0.003, 0, 0);  // 3 mm in
+  hands[1].emplace().position = Vec3(0.003, 0.001, 0);
+  const std::vector<Touch> both = body.answer(hands);
+  for (const Touch& touch : both) {
+    EXPECT_FALSE(touch.unknown);
+    EXPECT_LT(touch.force.x(), -0.1);
+    EXPECT_GT((*touch.stiffness)(0, 0), 50);
+    ASSERT_TRUE(touch.contact);
+    EXPECT_LT(touch.contact->normal.x(), -0.9);
+    EXPECT_NEAR(touch.contact->gap, -0.0031, 4e-4);  // points are 3 mm apart here
+  }
+  EXPECT_LT(both[0].force.y() * both[1].force.y(), 0);  // one is on the left, one on the right
+  hands[1].reset();
+  const std::vector<Touch> one = body.answer(hands);
+  EXPECT_TRUE(one[1].unknown);
+  EXPECT_LT(one[0].force.x(), -0.1);
 }
 
 TEST(PlacedBody, ABodyThatSticksSendsNoSurfaceThatOnlyPushes) {

@@ -91,7 +91,7 @@ TEST(SoftbodyScene, AnEffectsKeysAreKnownOnlyWhereItIsListed) {
   EXPECT_EQ(body.effects.density, 900);
   EXPECT_EQ(body.friction, 0.5);
   EXPECT_EQ(refusal(with("[body]", "friction = 0.5\n[body]")),
-            "s.toml:2: friction: unknown key; expected one of body, effects, model, place, region, touch");
+            "s.toml:2: friction: unknown key; expected one of body, effects, hands, model, place, region, touch");
   EXPECT_EQ(refusal(with("[\"contact\"]", "[\"contact\", \"friction\"]")),
             "s.toml: friction: expected a number of at least 0 and at most 10, found nothing");
   EXPECT_EQ(refusal(with("[\"contact\"]", "[\"contact\",\n\"inertia\"]")),
@@ -133,7 +133,7 @@ TEST(SoftbodyScene, WhatIsWrongWithACutIsNamed) {
   EXPECT_EQ(refusal(listing("linear", effects, "")),
             "s.toml: cutting: expected one or more tables [[cutting]], found nothing");
   EXPECT_EQ(refusal(listing("linear", "[\"contact\"]", cut + "at_s = 1\n")),
-            "s.toml:15: cutting: unknown key; expected one of body, effects, model, place, region, touch");
+            "s.toml:15: cutting: unknown key; expected one of body, effects, hands, model, place, region, touch");
   EXPECT_EQ(refusal(listing("linear", effects, cut)), "s.toml:16: cutting[1].: expected either at_s or above_n");
   EXPECT_EQ(refusal(listing("linear", effects, cut + "at_s = 1\nabove_n = 1\n")),
             "s.toml:16: cutting[1].: expected either at_s or above_n");
@@ -208,7 +208,7 @@ TEST(SoftbodyScene, AYieldArrivesAndWhatIsWrongWithItIsNamed) {
   EXPECT_EQ(refusal(listing("corotational", effects, table + "creep = 1\n")),
             "s.toml:19: plasticity.creep: unknown key; expected one of hardening_pa, yield_pa");
   EXPECT_EQ(refusal(listing("linear", "[\"contact\"]", table)),
-            "s.toml:15: plasticity: unknown key; expected one of body, effects, model, place, region, touch");
+            "s.toml:15: plasticity: unknown key; expected one of body, effects, hands, model, place, region, touch");
   for (const std::string model : {"condensed", "modal", "neo-hookean", "stvk", "mass-spring", "tled"}) {
     EXPECT_EQ(refusal(listing(model, "[\"contact\",\n\"plasticity\"]", table)),
               "s.toml:2: effects: the model \"" + model + "\" does not simulate \"plasticity\", which is listed");

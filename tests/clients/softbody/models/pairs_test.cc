@@ -56,6 +56,9 @@ TEST(Pairs, AreTheInverseOfTheFactorBroughtAlongByTheLastEight) {
     const VectorXd b = drawn(dice);
     EXPECT_LT((pairs.times(b, drawn_one.inverse * b) - expected * b).norm(), 1e-10 * (expected * b).norm()) << i;
     EXPECT_LT((pairs.times(change, drawn_one.inverse * change) - step).norm(), 1e-10 * step.norm());
+    const std::vector<int> some{3, 7, 8, 19};
+    const MatrixXd among = (expected - drawn_one.inverse)(some, some);
+    EXPECT_LT((pairs.adds(some) - among).norm(), 1e-9 * among.norm()) << i;
   }
   EXPECT_EQ(pairs.count(), Pairs::kMost);
 }

@@ -1,0 +1,51 @@
+# SPDX-License-Identifier: Apache-2.0
+"""deploy/scenes/grasp.toml: two hands at two devices hold one liver, which another process simulates."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import re
+import sys
+
+import pytest
+from conftest import ROOT
+from processes import EXAMPLES, PROGRAMS, Process, Server, scene
+
+ECHO = [sys.executable, EXAMPLES / "echo_motion.py", "--json", "--rate-hz", "0"]
+
+
+@pytest.mark.parametrize("servers", [1, 2])
+def test_two_hands_hold_one_liver_and_are_answered_together(tmp_path, servers):
+    program = PROGRAMS / "tendon-softbody"
+    if not program.exists():
+        pytest.skip(f"{program} is not built; TENDON_PROGRAMS names another folder")
+    hands = {
+        "left": scene("left").replace("amplitude_mm = 15", "amplitude_mm = 5"),
+        "right": scene("right").replace("amplitude_mm = 10", "amplitude_mm = 0"),
+    }
+    grasp = scene("grasp").replace('file = "liver.msh"', f'file = "{ROOT}/deploy/scenes/liver.msh"')
+    with contextlib.ExitStack() as stack:
+        if servers == 1:
+            addresses = [stack.enter_context(Server(tmp_path, scenes=hands)).address] * 2
+        else:
+            each = [stack.enter_context(Server(tmp_path, scenes={name: text})) for name, text in hands.items()]
+            addresses = [server.address for server in each]
+            grasp = grasp.replace('device = "right"', f'device = "right"\nserver = "{addresses[1]}"')
+        (tmp_path / "grasp.toml").write_text(grasp, encoding="utf-8")
+        command = [program, "grasp.toml", "--server", addresses[0], "--rate-hz", "20", "--duration-s", "6", "--json"]
+        with Process(tmp_path, command) as engine:
+            for _ in range(2):
+                engine.wait_for_line("connected to")
+            watch = [*ECHO, "--server", addresses[1], "--device", "right", "--duration-s", "3"]
+            with Process(tmp_path, watch) as look:
+                assert look.wait() == 0, look.said
+            assert engine.wait() == 0, engine.said
+    said = [json.loads(line)["summary"] for line in engine.said if line.startswith('{"summary"')]
+    forces = {summary["device"]: summary["forces"] for summary in said}
+    assert forces["left"] > 10 and all(summary["forces_unusable"] == 0 for summary in said), said
+    # Both in one turn: only those before the other was there are of one hand alone.
+    assert abs(forces["left"] - forces["right"]) <= 10, forces
+    lines = [json.loads(line) for line in look.said if re.match(r'\{"tick"', line)]
+    wanted = [line["force_wanted_n"] for line in lines if line["force_wanted_n"]]
+    assert min(force[1] for force in wanted) < -0.3 or max(force[1] for force in wanted) > 0.3, wanted[-1:]
