@@ -271,7 +271,7 @@ FRAMES = {
 HANDSHAKE = {"hello", "retry", "welcome", "refused"}
 
 
-@pytest.mark.parametrize("name", sorted(GOLDEN))
+@pytest.mark.parametrize("name", sorted(GOLDEN.keys() - {"state-columns"}))
 def test_every_golden_datagram_is_read_and_written_again_to_the_bit(name):
     golden = GOLDEN[name]
     header = codec.decode_header(golden)
@@ -291,6 +291,11 @@ def test_every_golden_datagram_is_read_and_written_again_to_the_bit(name):
         body = codec.write_answer(codec.read_answer(answer.body))
         again = codec.encode_answer(AnswerDatagram(answer.random, body, answer.connection_id))
     assert again == golden
+
+
+def test_states_in_columns_which_this_client_does_not_ask_for_are_left_out():
+    content = codec.read_data(GOLDEN["state-columns"][codec.HEADER_SIZE :])
+    assert content == codec.DataContent(TX_TIME, None, [], invalid=0)
 
 
 def test_every_golden_datagram_known_here_is_on_the_page():
