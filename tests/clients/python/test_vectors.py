@@ -202,8 +202,7 @@ def is_taken(vector):
 
 
 def test_bounds_are_those_of_the_proto_file():
-    # A client of one device does not ask for states in columns.
-    vectors = [vector for vector in load("bounds")["bounds"] if not vector["field"].startswith("DeviceStates.")]
+    vectors = load("bounds")["bounds"]
     wrong = [(vector["field"], vector["value"]) for vector in vectors if is_taken(vector) != vector["accepted"]]
     assert len(vectors) > 300 and not wrong
 

@@ -293,9 +293,21 @@ def test_every_golden_datagram_is_read_and_written_again_to_the_bit(name):
     assert again == golden
 
 
-def test_states_in_columns_which_this_client_does_not_ask_for_are_left_out():
+def test_states_in_columns_are_read_one_by_one_and_not_written():
+    third = replace(
+        STATE,
+        device=2,
+        position=(0.03, -0.01, 0.02),
+        velocity=(0.0, 0.25, -0.5),
+        force_applied=(0.0, 0.0, 0.5),
+        energy=0.125,
+        permitted_force=inf,
+        force_sequence=100,
+        mode=Mode.HOLDING,
+        buttons=1,
+    )
     content = codec.read_data(GOLDEN["state-columns"][codec.HEADER_SIZE :])
-    assert content == codec.DataContent(TX_TIME, None, [], invalid=0)
+    assert content == codec.DataContent(TX_TIME, None, [replace(STATE, channel=1), third], invalid=0)
 
 
 def test_every_golden_datagram_known_here_is_on_the_page():
