@@ -413,6 +413,27 @@ TEST(HandCodec, ColumnsKeepAllButThePrecisionThatTheyNameAndThePosition) {
   }
 }
 
+TEST(HandCodec, AStateWithAPartThatColumnsCannotSayStaysWhole) {
+  const std::vector<std::function<void(DeviceState&)>> parts = {
+      [](DeviceState& state) { state.force_wanted = Vec3::Zero(); },
+      [](DeviceState& state) { state.stiffness_wanted = Mat3::Zero(); },
+      [](DeviceState& state) { state.turning = Turning{}; },
+      [](DeviceState& state) { state.torque_applied = Vec3::Zero(); },
+      [](DeviceState& state) { state.grip = Grip{}; },
+      [](DeviceState& state) { state.grip_applied = 0; },
+      [](DeviceState& state) { state.hand_force = Vec3::Zero(); },
+      [](DeviceState& state) { state.joints = Joints{}; },
+  };
+  DeviceState plain = examples::state();
+  plain.buttons = 1;
+  EXPECT_TRUE(fits_columns(plain));
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    DeviceState state = plain;
+    parts[i](state);
+    EXPECT_FALSE(fits_columns(state)) << i;
+  }
+}
+
 /// One of a step's states that cannot be takes the others of its frame with it, and nothing else.
 TEST(HandCodec, AColumnOfAnotherLengthOrAValueOutOfBoundsDropsTheFrame) {
   const auto columns = [](const std::function<void(v1::DeviceStates&)>& change) {
