@@ -395,6 +395,10 @@ inline constexpr std::string_view kFeatureOutputs = "outputs";
 /// is sent those of both ends.
 inline constexpr std::string_view kFeatureTeleoperation = "teleoperation";
 
+/// A feature: states of several devices at one step come together in columns, where it takes half the bytes: all but
+/// positions in single precision. For a client with more devices than seven, whose whole states fit one datagram.
+inline constexpr std::string_view kFeatureStateColumns = "state-columns";
+
 /// A feature: an observer is told what the engines ask for, and how the loops and the engines do (DeviceReport,
 /// PeerReport). A controller that names it is not granted it.
 inline constexpr std::string_view kFeatureDiagnostics = "diagnostics";

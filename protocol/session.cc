@@ -2,6 +2,7 @@
 #include "protocol/session.h"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <type_traits>
 #include <utility>
@@ -48,6 +49,20 @@ class Newest {
     next->waiting = false;
     --waiting_;
     return &next->value;
+  }
+
+  void for_each_waiting(auto visit) const {
+    for (const Stream& stream : streams_) {
+      if (stream.waiting) visit(stream.value);
+    }
+  }
+  /// Takes it out; for_each_waiting() has shown it.
+  void take(const Value* value) {
+    for (Stream& stream : streams_) {
+      if (&stream.value != value) continue;
+      stream.waiting = false;
+      --waiting_;
+    }
   }
 
  private:
@@ -205,6 +220,7 @@ struct Session::State {
   Header begin(LocalTime now, std::span<std::byte, kMaxDatagram> buffer);
   std::size_t sent(LocalTime now, const Header& header, std::span<std::byte, kMaxDatagram> buffer) noexcept;
   void fill(LocalTime now);
+  void fill_columns();
 };
 
 Session::Session(const Config& config, LocalTime opened) : Session(config, nullptr, opened) {}
@@ -412,9 +428,28 @@ std::size_t Session::State::sent(LocalTime now, const Header& header,
   return sealer ? sealer->seal(header, buffer, writer.size()) : writer.size();
 }
 
+/// The states that columns can say: a frame for each instant, in the order of the devices.
+void Session::State::fill_columns() {
+  for (;;) {
+    std::array<const DeviceState*, limits::kMaxDevices> together{};
+    const DeviceState* first = nullptr;
+    states_to_send.for_each_waiting([&](const DeviceState& state) {
+      if (!fits_columns(state) || state.device >= together.size()) return;
+      if (first == nullptr) first = &state;
+      if (state.tick == first->tick && state.sampled == first->sampled) together[state.device] = &state;
+    });
+    if (first == nullptr) return;
+    const std::span states(together.begin(), std::remove(together.begin(), together.end(), nullptr));
+    const std::size_t taken = writer.add(states);
+    if (taken == 0) return;
+    for (const DeviceState* state : states.first(taken)) states_to_send.take(state);
+  }
+}
+
 /// As much as fits, what ages fastest first. The rest stays due and goes into the next datagram; a state
 /// and a force always fit together.
 void Session::State::fill(LocalTime now) {
+  if (config.states_in_columns) fill_columns();
   while (states_to_send.first() && writer.add(*states_to_send.first())) states_to_send.take();
   while (ports_to_send.first() && writer.add(*ports_to_send.first())) ports_to_send.take();
   while (forces_to_send.first() && writer.add(*forces_to_send.first())) forces_to_send.take();

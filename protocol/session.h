@@ -74,6 +74,8 @@ class Session {
     /// A request is sent again after max(this, SRTT + 4 RTTVAR). A shorter wait would ask twice whenever the peer is
     /// scheduled late, which takes tens of ms on a virtual machine.
     Duration min_resend = std::chrono::milliseconds(20);
+    /// States leave in columns where these can say all of them: to a client that was granted kFeatureStateColumns.
+    bool states_in_columns = false;
 
     // In suites 1 and 2:
     Rekey rekey{};

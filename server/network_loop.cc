@@ -7,6 +7,7 @@
 #include <limits>
 #include <utility>
 
+#include "protocol/wire/codec.h"
 #include "protocol/wire/header.h"
 #include "server/guests/requests.h"
 
@@ -212,6 +213,7 @@ void NetworkLoop::admit(LocalTime now, const Address& from, const Doorman::Guest
   session.rekey = config_.rekey;
   session.life = config_.session_life;
   Welcome welcome = Admission::welcome_for(guest, from, seats, devices_, guests_);
+  session.states_in_columns = contains(welcome.features, kFeatureStateColumns);
   welcome.timeout = session.timeout;
   welcome.server = config_.server_name;
   std::array<std::byte, kMaxDatagram> answer;
@@ -233,6 +235,7 @@ void NetworkLoop::admit(LocalTime now, const Address& from, const Doorman::Guest
                 contains(welcome.features, kFeatureTeleoperation) && role == Role::kController,
                 contains(welcome.features, kFeatureTeleoperation) && role == Role::kObserver,
                 contains(welcome.features, kFeatureOutputs),
+                session.states_in_columns,
                 std::move(seats),
                 std::move(views),
                 {bytes.begin(), bytes.end()},
@@ -420,6 +423,8 @@ void NetworkLoop::publish(LocalTime now) {
       if (!guest.sees_handle) leave_out_handle(told);
       if (!guest.sees_joints) told.joints.reset();
       told.buttons = view->pressed;
+      // The guest foretells from the rounded values that it is sent.
+      if (guest.sees_columns && fits_columns(told)) round_to_columns(told);
       if (view->deadband && !view->deadband->passes(told)) {
         ++stats_.foretold;
         view->pressed = 0;  // it believes just these to be held: a release that comes next is news

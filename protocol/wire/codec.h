@@ -21,6 +21,15 @@
 
 namespace tendon {
 
+/// Whether a DeviceState has nothing that columns cannot say: a wanted force, a handle that turns, grips or has joints.
+inline bool fits_columns(const DeviceState& state) noexcept {
+  return !state.force_wanted && !state.stiffness_wanted && !state.turning && !state.torque_applied && !state.grip &&
+         !state.grip_applied && !state.hand_force && !state.joints;
+}
+
+/// As it is when it has come in columns: all but its position rounded to single precision.
+void round_to_columns(DeviceState& state) noexcept;
+
 /// Writes one Data datagram after the other, in the clear. States and forces are written by hand (hand_codec.h), all
 /// else by protobuf, which keeps its objects: a state or a force costs no heap call (a request, or a long text, does).
 ///
@@ -50,8 +59,15 @@ class DataWriter {
   bool add(const PeerReport& report);
   bool add(const PortFrame& port);
 
-  /// The same by protobuf alone: what `add` does with the rare parts of these two frames. It writes the same bytes.
+  /// Appends states as one frame in columns: as many of the first ones as fit, and how many they were; 0: none, and the
+  /// datagram is as before. They are of one tick and one instant, in the order of their devices, each has
+  /// fits_columns(), and there are at most kMaxDevices of them.
+  std::size_t add(std::span<const DeviceState* const> states);
+
+  /// The same by protobuf alone: what `add` does with the rare parts of these two frames, and on a machine that holds
+  /// numbers the other way round. It writes the same bytes.
   bool add_by_protobuf(const DeviceState& state);
+  std::size_t add_by_protobuf(std::span<const DeviceState* const> states);
   bool add_by_protobuf(const ForceCommand& command);
 
   std::size_t size() const noexcept { return size_; }
@@ -78,7 +94,7 @@ class DataWriter {
 struct DataContent {
   PeerTime sent{};
   std::optional<IncomingEcho> echo;
-  std::vector<Frame> frames;  ///< in the order of the datagram, every value within bounds
+  std::vector<Frame> frames;  ///< in the order of the datagram, every value within bounds; of columns each state
   std::uint32_t invalid = 0;  ///< frames (and echoes) left out because a value was out of bounds
   // Of these, the forces:
   std::uint32_t forces_not_finite = 0;

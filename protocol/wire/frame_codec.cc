@@ -2,6 +2,7 @@
 #include "protocol/wire/frame_codec.h"
 
 #include <algorithm>
+#include <bit>
 #include <chrono>
 #include <limits>
 #include <utility>
@@ -98,6 +99,69 @@ void write(const DeviceState& from, pb::DeviceState& to) {
   if (from.stiffness_wanted) write(*from.stiffness_wanted, *to.mutable_stiffness_wanted_npm());
   write_handle(from, to);
   write(from.joints, *to.mutable_joint_rad(), *to.mutable_joint_velocity_radps());
+}
+
+bool read(const pb::DeviceStates& from, const std::function<DeviceState&()>& next) {
+  if (from.devices() == 0 || from.devices() >= 1U << limits::kMaxDevices) return false;
+  const int count = std::popcount(from.devices());
+  const auto has = [&](const auto& column, int entries) { return column.size() == entries * count; };
+  const auto may_have = [&](const auto& column) { return column.empty() || has(column, 1); };
+  if (!has(from.position_m(), 3) || !has(from.velocity_mps(), 3) || !has(from.force_applied_n(), 3) ||
+      !has(from.energy_j(), 1) || !has(from.permitted_force_n(), 1) || !has(from.mode(), 1) ||
+      !may_have(from.reasons()) || !may_have(from.force_sequence()) || !may_have(from.force_age_ns()) ||
+      !may_have(from.channel()) || !may_have(from.buttons())) {
+    return false;
+  }
+  std::uint32_t left = from.devices();
+  for (int i = 0; i < count; ++i, left &= left - 1) {
+    DeviceState& to = next();
+    const auto vector = [&](const auto& column) {
+      return Vec3(column.Get(3 * i), column.Get(3 * i + 1), column.Get(3 * i + 2));
+    };
+    const auto number = [&](const auto& column) { return column.empty() ? 0 : column.Get(i); };
+    to.tick = from.tick();
+    to.device = static_cast<std::uint32_t>(std::countr_zero(left));
+    to.position = vector(from.position_m());
+    to.velocity = vector(from.velocity_mps());
+    to.force_applied = vector(from.force_applied_n());
+    to.energy = from.energy_j().Get(i);
+    to.permitted_force = from.permitted_force_n().Get(i);
+    to.reasons = number(from.reasons());
+    to.force_sequence = number(from.force_sequence());
+    to.channel = number(from.channel());
+    to.buttons = number(from.buttons());
+    const bool good = read(from.sampled_ns(), to.sampled) && read(number(from.force_age_ns()), to.force_age) &&
+                      read(static_cast<pb::Mode>(from.mode().Get(i)), to.mode) && in_bounds(to);
+    if (!good) return false;
+  }
+  return true;
+}
+
+void write(std::span<const DeviceState* const> from, pb::DeviceStates& to) {
+  to.Clear();
+  to.set_tick(from.front()->tick);
+  to.set_sampled_ns(from.front()->sampled.time_since_epoch().count());
+  std::uint32_t devices = 0;
+  const auto single = [](double number) { return static_cast<float>(number); };
+  for (const DeviceState* state : from) {
+    devices |= 1U << state->device;
+    for (const double x : state->position) to.add_position_m(x);
+    for (const double v : state->velocity) to.add_velocity_mps(single(v));
+    for (const double f : state->force_applied) to.add_force_applied_n(single(f));
+    to.add_energy_j(single(state->energy));
+    to.add_permitted_force_n(single(state->permitted_force));
+    to.add_mode(static_cast<pb::Mode>(state->mode));
+  }
+  to.set_devices(devices);
+  const auto column = [&](auto value, auto add) {
+    if (std::ranges::all_of(from, [&](const DeviceState* state) { return value(*state) == 0; })) return;
+    for (const DeviceState* state : from) add(value(*state));
+  };
+  column([](const DeviceState& s) { return s.reasons; }, [&](auto value) { to.add_reasons(value); });
+  column([](const DeviceState& s) { return s.force_sequence; }, [&](auto value) { to.add_force_sequence(value); });
+  column([](const DeviceState& s) { return unsigned_ns(s.force_age); }, [&](auto age) { to.add_force_age_ns(age); });
+  column([](const DeviceState& s) { return s.channel; }, [&](auto value) { to.add_channel(value); });
+  column([](const DeviceState& s) { return s.buttons; }, [&](auto value) { to.add_buttons(value); });
 }
 
 namespace {

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <functional>
+#include <span>
+
 #include "protocol/messages.h"
 #include "protocol/wire/fields.h"
 #include "protocol/wire/frame.h"
@@ -13,6 +16,9 @@ namespace tendon::wire {
 
 bool read(const pb::DeviceState& from, DeviceState& to) noexcept;
 void write(const DeviceState& from, pb::DeviceState& to);
+/// Columns: `next` gives the place of each state. False: some have been given, and none counts.
+bool read(const pb::DeviceStates& from, const std::function<DeviceState&()>& next);
+void write(std::span<const DeviceState* const> from, pb::DeviceStates& to);
 bool read(const pb::ForceCommand& from, ForceCommand& to) noexcept;
 void write(const ForceCommand& from, pb::ForceCommand& to);
 bool read(const pb::Control& from, Control& to);

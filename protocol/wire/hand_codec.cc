@@ -14,6 +14,7 @@ namespace tendon::wire {
 namespace {
 
 using Byte = std::uint8_t;
+using States = std::span<const DeviceState* const>;
 
 /// Bytes are moved as the machine holds them. One that holds numbers the other way round leaves all to protobuf.
 constexpr bool kLittleEndian = std::endian::native == std::endian::little;
@@ -109,6 +110,19 @@ class Writer {
       std::memcpy(at_, entries.data(), size);
       at_ += size;
     });
+  }
+  /// A column of numbers, `kWidth` of each state: value(state, i).
+  template <unsigned kField, class Number, int kWidth, class Value>
+  void column(States states, Value value) noexcept {
+    tag<kField, kLength>();
+    varint(states.size() * kWidth * sizeof(Number));
+    for (const DeviceState* state : states) {
+      for (int i = 0; i < kWidth; ++i) {
+        const auto number = static_cast<Number>(value(*state, i));
+        std::memcpy(at_, &number, sizeof number);
+        at_ += sizeof number;
+      }
+    }
   }
   /// A part that may be absent; its first field is `kField`.
   template <unsigned kField, unsigned /*kType*/, class Value, class Fields>
@@ -253,6 +267,27 @@ class Reader {
   template <unsigned kField>
   void radius(double& value) noexcept {
     present<kField>(value);
+  }
+
+  /// A column of numbers that all take as many bytes.
+  template <unsigned kField, class Number>
+  void column(std::span<Number> to) noexcept {
+    std::uint64_t size = 0;
+    if (take<kField, kLength>()) varint(size);
+    if (size != to.size_bytes() || size > static_cast<std::uint64_t>(end_ - at_)) return stop();
+    std::memcpy(to.data(), at_, size);
+    at_ += size;
+  }
+  /// A column of varints, each at most `most`. Absent, it leaves `to` as it is.
+  template <unsigned kField>
+  void column(std::span<std::uint64_t> to, std::uint64_t most) noexcept {
+    Reader inside(nullptr, nullptr);
+    if (!enter<kField>(inside)) return;
+    for (std::uint64_t& value : to) {
+      inside.varint(value);
+      if (value > most) return stop();
+    }
+    if (!inside.done()) return stop();
   }
 
   /// The length of a message, and what is in it.
@@ -416,7 +451,11 @@ void echo_fields(Way& way, Echo& echo) noexcept {
   way.template bits<4>(echo.received_mask);
 }
 
-constexpr std::size_t size_of_varint(std::size_t value) noexcept { return value < 0x80 ? 1 : 2; }
+/// Of a length within a datagram.
+constexpr std::size_t size_of_length(std::size_t value) noexcept { return value < 0x80 ? 1 : 2; }
+constexpr std::size_t size_of_varint(std::uint64_t value) noexcept {
+  return (static_cast<std::size_t>(std::bit_width(value | 1U)) * 9 + 64) / 64;  // a seventh, rounded up
+}
 
 /// `Datagram.frames` with one field of `Frame`: two tags and two lengths, and then what `fields` writes. It is written
 /// behind the place that these usually take, and moved when they take another one.
@@ -425,8 +464,8 @@ std::size_t write_framed(Byte* to, Fields fields) noexcept {
   Writer body(to + kUsualFront);
   fields(body);
   const auto size = static_cast<std::size_t>(body.at() - to) - kUsualFront;
-  const std::size_t frame = 1 + size_of_varint(size) + size;
-  const std::size_t front = 1 + size_of_varint(frame) + frame - size;
+  const std::size_t frame = 1 + size_of_length(size) + size;
+  const std::size_t front = 1 + size_of_length(frame) + frame - size;
   if (front != kUsualFront) std::memmove(to + front, to + kUsualFront, size);
   Writer out(to);
   out.tag<3, kLength>();
@@ -434,6 +473,97 @@ std::size_t write_framed(Byte* to, Fields fields) noexcept {
   out.tag<kBody, kLength>();
   out.varint(size);
   return front + size;
+}
+
+/// The columns of DeviceStates that hold varints: the first field, how many there are, and what each says of a state.
+constexpr unsigned kFirstCount = 9;
+constexpr std::size_t kCounts = 6;
+template <class Visit>
+void for_each_count(Visit visit) noexcept {
+  visit(std::size_t{0}, [](const DeviceState& state) { return static_cast<std::uint64_t>(state.mode); });
+  visit(std::size_t{1}, [](const DeviceState& state) { return std::uint64_t{state.reasons}; });
+  visit(std::size_t{2}, [](const DeviceState& state) { return state.force_sequence; });
+  visit(std::size_t{3}, [](const DeviceState& state) { return unsigned_ns(state.force_age); });
+  visit(std::size_t{4}, [](const DeviceState& state) { return std::uint64_t{state.channel}; });
+  visit(std::size_t{5}, [](const DeviceState& state) { return std::uint64_t{state.buttons}; });
+}
+
+/// What columns of some states take.
+struct ColumnSizes {
+  std::array<std::size_t, kCounts> counts;  ///< bytes in each column of varints; 0: all are 0, and it is left out
+  std::uint32_t devices = 0;
+  std::size_t body = 0;  ///< of the message
+
+  explicit ColumnSizes(States states) noexcept {
+    for (const DeviceState* state : states) devices |= 1U << state->device;
+    body = 1 + size_of_varint(devices) + of_field(states.size() * 3 * sizeof(double)) +
+           2 * of_field(states.size() * 3 * sizeof(float)) + 2 * of_field(states.size() * sizeof(float));
+    if (states.front()->tick != 0) body += 1 + size_of_varint(states.front()->tick);
+    if (states.front()->sampled != PeerTime{}) body += 1 + sizeof(std::int64_t);
+    for_each_count([&](std::size_t column, auto value) {
+      std::uint64_t any = 0;
+      std::size_t bytes = 0;
+      for (const DeviceState* state : states) {
+        any |= value(*state);
+        bytes += size_of_varint(value(*state));
+      }
+      counts[column] = any != 0 || column == 0 ? bytes : 0;  // a mode must be there
+      body += counts[column] > 0 ? of_field(counts[column]) : 0;
+    });
+  }
+  static std::size_t of_field(std::size_t inside) noexcept { return 1 + size_of_length(inside) + inside; }
+};
+
+/// DeviceStates as states, behind those that `content` holds. False, whatever it then holds: leave it to protobuf.
+bool read_columns(Reader& in, DataContent& content) {
+  std::uint64_t tick = 0;
+  PeerTime sampled{};
+  std::uint32_t devices = 0;
+  in.count<1>(tick);
+  in.time<2>(sampled);
+  in.count<3>(devices);
+  if (devices == 0 || devices >= 1U << limits::kMaxDevices) return false;
+  const auto count = static_cast<std::size_t>(std::popcount(devices));
+  constexpr std::size_t kMost = limits::kMaxDevices;
+  std::array<double, 3 * kMost> position;
+  std::array<float, 3 * kMost> velocity;
+  std::array<float, 3 * kMost> force;
+  std::array<float, kMost> energy;
+  std::array<float, kMost> permitted;
+  in.column<4>(std::span(position).first(3 * count));
+  in.column<5>(std::span(velocity).first(3 * count));
+  in.column<6>(std::span(force).first(3 * count));
+  in.column<7>(std::span(energy).first(count));
+  in.column<8>(std::span(permitted).first(count));
+  std::array<std::array<std::uint64_t, kMost>, kCounts> counts{};
+  auto& [mode, reasons, sequence, age, channel, buttons] = counts;
+  constexpr std::uint64_t kMost32 = std::numeric_limits<std::uint32_t>::max();
+  in.column<9>(std::span(mode).first(count), std::numeric_limits<std::uint8_t>::max());
+  in.column<10>(std::span(reasons).first(count), kMost32);
+  in.column<11>(std::span(sequence).first(count), std::numeric_limits<std::uint64_t>::max());
+  in.column<12>(std::span(age).first(count), static_cast<std::uint64_t>(limits::kMaxTime.count()));
+  in.column<13>(std::span(channel).first(count), kMost32);
+  in.column<14>(std::span(buttons).first(count), kMost32);
+  if (!in.done()) return false;
+  for (std::size_t i = 0; i < count; ++i, devices &= devices - 1) {
+    auto& state = std::get<DeviceState>(content.frames.emplace_back(DeviceState{.tick = tick}));
+    const auto vector = [&](const auto& column) { return Vec3(column[3 * i], column[3 * i + 1], column[3 * i + 2]); };
+    state.sampled = sampled;
+    state.position = vector(position);
+    state.velocity = vector(velocity);
+    state.force_applied = vector(force);
+    state.energy = energy[i];
+    state.permitted_force = permitted[i];
+    state.reasons = static_cast<std::uint32_t>(reasons[i]);
+    state.force_sequence = sequence[i];
+    state.force_age = Duration(static_cast<std::int64_t>(age[i]));
+    state.mode = static_cast<Mode>(mode[i]);
+    state.device = static_cast<std::uint32_t>(std::countr_zero(devices));
+    state.channel = static_cast<std::uint32_t>(channel[i]);
+    state.buttons = static_cast<std::uint32_t>(buttons[i]);
+    if (!in_bounds(state)) return false;
+  }
+  return true;
 }
 
 }  // namespace
@@ -455,6 +585,38 @@ std::size_t write_frame(Byte* to, const ForceCommand& command) noexcept {
   return write_framed<2, 4>(to, [&](Writer& out) { force_fields(out, command); });
 }
 
+std::optional<WrittenColumns> write_columns(Byte* to, std::size_t room, States states) noexcept {
+  if (!kLittleEndian) return std::nullopt;
+  const auto whole = [](const ColumnSizes& sizes) { return ColumnSizes::of_field(ColumnSizes::of_field(sizes.body)); };
+  States taken = states;
+  std::optional<ColumnSizes> sizes;
+  for (; !taken.empty(); taken = taken.first(taken.size() - 1)) {
+    sizes.emplace(taken);
+    if (whole(*sizes) <= room) break;
+  }
+  if (taken.empty()) return WrittenColumns{};
+  Writer out(to);
+  out.tag<3, kLength>();
+  out.varint(ColumnSizes::of_field(sizes->body));
+  out.tag<10, kLength>();
+  out.varint(sizes->body);
+  out.count<1>(taken.front()->tick);
+  out.time<2>(taken.front()->sampled);
+  out.count<3>(sizes->devices);
+  out.column<4, double, 3>(taken, [](const DeviceState& state, int i) { return state.position[i]; });
+  out.column<5, float, 3>(taken, [](const DeviceState& state, int i) { return state.velocity[i]; });
+  out.column<6, float, 3>(taken, [](const DeviceState& state, int i) { return state.force_applied[i]; });
+  out.column<7, float, 1>(taken, [](const DeviceState& state, int) { return state.energy; });
+  out.column<8, float, 1>(taken, [](const DeviceState& state, int) { return state.permitted_force; });
+  for_each_count([&](std::size_t column, auto value) {
+    if (sizes->counts[column] == 0) return;
+    out.varint((kFirstCount + column) << 3U | kLength);
+    out.varint(sizes->counts[column]);
+    for (const DeviceState* state : taken) out.varint(value(*state));
+  });
+  return WrittenColumns{.states = taken.size(), .bytes = whole(*sizes)};
+}
+
 bool read_by_hand(std::span<const std::byte> body, DataContent& content) {
   if (!kLittleEndian || body.size() > kMaxDatagram) return false;
   empty(content);
@@ -467,10 +629,10 @@ bool read_by_hand(std::span<const std::byte> body, DataContent& content) {
   if (!is_time(content.sent)) return false;
   if (content.echo && !(is_time(content.echo->sent) && is_time(content.echo->received))) return false;
   // With a member named, an aggregate is made member by member. Without, all of its bytes are set to 0 before that.
-  while (in.next_is<3, kLength>()) {
+  for (int frames = 0; in.next_is<3, kLength>(); ++frames) {
     Reader frame(nullptr, nullptr);
     Reader fields(nullptr, nullptr);
-    if (content.frames.size() == limits::kMaxFrames || !in.enter<3>(frame)) return false;
+    if (frames == limits::kMaxFrames || !in.enter<3>(frame)) return false;
     if (frame.enter<1>(fields)) {
       auto& state = std::get<DeviceState>(content.frames.emplace_back(DeviceState{.tick = 0}));
       state_fields(fields, state);
@@ -479,6 +641,8 @@ bool read_by_hand(std::span<const std::byte> body, DataContent& content) {
       auto& command = std::get<ForceCommand>(content.frames.emplace_back(ForceCommand{.sequence = 0}));
       force_fields(fields, command);
       if (!fields.done() || !is_receivable(command)) return false;
+    } else if (frame.enter<10>(fields)) {
+      if (!read_columns(fields, content)) return false;
     } else {
       return false;
     }

@@ -28,6 +28,16 @@ std::size_t write_head(std::uint8_t* to, LocalTime sent, const std::optional<Out
 std::size_t write_frame(std::uint8_t* to, const DeviceState& state) noexcept;
 std::size_t write_frame(std::uint8_t* to, const ForceCommand& command) noexcept;
 
+/// The states that write_columns() took, the first ones, and the bytes of their frame.
+struct WrittenColumns {
+  std::size_t states = 0;
+  std::size_t bytes = 0;
+};
+/// Writes as many of `states` as fit `room` bytes as one frame in columns to `to` (DataWriter::add says of which states).
+/// Empty: left to protobuf.
+std::optional<WrittenColumns> write_columns(std::uint8_t* to, std::size_t room,
+                                            std::span<const DeviceState* const> states) noexcept;
+
 /// Nothing is in it, as when it was made; its frames keep their memory.
 inline void empty(DataContent& content) noexcept {
   content.sent = {};

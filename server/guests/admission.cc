@@ -11,7 +11,7 @@ namespace {
 
 /// The features that this server supports beyond the version's minimum.
 constexpr std::array kFeatures = {kFeatureLocalModel, kFeatureChannels,      kFeatureDiagnostics, kFeatureHandle,
-                                  kFeatureJoints,     kFeatureTeleoperation, kFeatureOutputs};
+                                  kFeatureJoints,     kFeatureTeleoperation, kFeatureOutputs,     kFeatureStateColumns};
 
 std::vector<std::string> in_common(const std::vector<std::string>& offered, Role role) {
   std::vector<std::string> both;

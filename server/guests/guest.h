@@ -60,6 +60,7 @@ struct Guest {
   bool may_couple;          ///< … and kFeatureTeleoperation, as a controller
   bool sees_ports;          ///< … and kFeatureTeleoperation, as an observer
   bool sees_outputs;        ///< … and kFeatureOutputs
+  bool sees_columns;        ///< … and kFeatureStateColumns
   std::vector<Seat> seats;  ///< `role` is what its Welcome says
   std::vector<View> views;
   std::vector<std::byte> answer;  ///< to its Hello, for when it was lost

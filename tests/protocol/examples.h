@@ -402,6 +402,34 @@ Bytes data(std::uint64_t packet_number, const std::optional<OutgoingEcho>& with_
   return {buffer.begin(), buffer.begin() + static_cast<std::ptrdiff_t>(writer.size())};
 }
 
+/// To a client that named "state-columns": the first and the third device at one step, with all that columns say. All
+/// numbers are such that single precision holds them.
+inline std::array<DeviceState, 2> states_in_columns() {
+  DeviceState first = state();
+  first.channel = 1;
+  DeviceState third = state();
+  third.device = 2;
+  third.position = {0.03, -0.01, 0.02};
+  third.velocity = {0, 0.25, -0.5};
+  third.force_applied = {0, 0, 0.5};
+  third.energy = 0.125;
+  third.permitted_force = std::numeric_limits<double>::infinity();
+  third.force_sequence = 100;
+  third.mode = Mode::kHolding;
+  third.buttons = 1;
+  return {first, third};
+}
+inline Bytes data_in_columns(std::uint64_t packet_number, std::span<const DeviceState> states) {
+  std::array<std::byte, kMaxDatagram> buffer;
+  DataWriter writer;
+  writer.begin(buffer, {.connection_id = kConnection, .packet_number = packet_number},
+               LocalTime{Duration{1'000'100'000}}, {});
+  std::vector<const DeviceState*> each;
+  for (const DeviceState& state : states) each.push_back(&state);
+  writer.add(each);
+  return {buffer.begin(), buffer.begin() + static_cast<std::ptrdiff_t>(writer.size())};
+}
+
 template <class Handshake>
 Bytes encoded(const Handshake& message) {
   std::array<std::byte, kMaxDatagram> buffer;
@@ -478,6 +506,7 @@ inline std::vector<Named> datagrams() {
       {"control-couple-all", data(92, {}, Control{.id = 20, .request = couple_with_all()})},
       {"control-set-scale", data(93, {}, Control{.id = 21, .request = set_scale()})},
       {"control-set-share", data(94, {}, Control{.id = 22, .request = set_share()})},
+      {"state-columns", data_in_columns(95, states_in_columns())},
   };
 }
 

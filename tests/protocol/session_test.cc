@@ -149,6 +149,84 @@ TEST_F(TwoEnds, StatesOfSixteenDevicesShareThreeDatagrams) {
   }
 }
 
+/// 16 devices that move on all axes, at one step.
+std::vector<DeviceState> moving(std::uint64_t tick) {
+  std::vector<DeviceState> states(limits::kMaxDevices, state(tick));
+  for (std::uint32_t device = 0; device < states.size(); ++device) {
+    states[device].device = device;
+    states[device].position = Vec3(0.1, 0.2, 0.3) / (device + 3);
+    states[device].velocity = Vec3(0.1, 0.2, 0.3) / (device + 7);
+    states[device].force_applied = Vec3(1, 2, 3) / (device + 7);
+  }
+  return states;
+}
+
+TEST_F(TwoEnds, InColumnsSixteenStatesShareOneDatagramAndRoundAsTheySay) {
+  Session::Config columns = config();
+  columns.states_in_columns = true;
+  Session server(columns, kOpened);
+  std::vector<DeviceState> sent = moving(8);
+  for (std::size_t i = sent.size(); i > 0; --i) server.send(sent[i - 1]);  // in any order
+  const auto datagrams = pull(server, now_);
+  EXPECT_EQ(datagrams.size(), 1U);
+  deliver(a_, now_, datagrams);
+  const auto told = events(a_);
+  ASSERT_EQ(told.size(), sent.size());
+  for (std::size_t i = 0; i < told.size(); ++i) {
+    const DeviceState& got = std::get<Session::StateArrived>(told[i]).state;
+    round_to_columns(sent[i]);
+    EXPECT_EQ(got.device, i);
+    EXPECT_EQ(got.position, sent[i].position);
+    EXPECT_EQ(got.velocity, sent[i].velocity);
+    EXPECT_EQ(got.force_applied, sent[i].force_applied);
+  }
+  EXPECT_EQ(a_.stats().invalid, 0U);
+}
+
+TEST_F(TwoEnds, ColumnsOfTwoInstantsAreTwoFramesAndAHandleThatTurnsIsNone) {
+  Session::Config columns = config();
+  columns.states_in_columns = true;
+  Session server(columns, kOpened);
+  std::vector<DeviceState> sent = moving(8);
+  sent.resize(4);
+  sent[1].tick = 9;
+  sent[2].sampled += milliseconds(1);
+  sent[3].turning = Turning{};
+  for (const DeviceState& state : sent) server.send(state);
+  DataReader reader;
+  const auto datagrams = pull(server, now_);
+  ASSERT_EQ(datagrams.size(), 1U);
+  deliver(a_, now_, datagrams);
+  std::array<DeviceState, 4> got;
+  for (const auto& event : events(a_)) {
+    const DeviceState& state = std::get<Session::StateArrived>(event).state;
+    got.at(state.device) = state;
+  }
+  for (std::size_t i = 0; i < got.size(); ++i) {
+    EXPECT_EQ(got[i].tick, sent[i].tick) << i;
+    EXPECT_EQ(got[i].sampled, sent[i].sampled) << i;
+    EXPECT_EQ(got[i].turning, sent[i].turning) << i;
+    EXPECT_EQ(got[i].velocity == sent[i].velocity, i == 3) << i << ": whole states lose nothing";
+  }
+}
+
+TEST_F(TwoEnds, WhatDoesNotFitTheColumnsOfOneDatagramIsInTheNext) {
+  Session::Config columns = config();
+  columns.states_in_columns = true;
+  Session server(columns, kOpened);
+  std::vector<DeviceState> sent = moving(8);
+  for (DeviceState& state : sent) {
+    state.force_sequence = std::uint64_t{1} << 60U;
+    state.reasons = 1U << 31U;
+    server.send(state);
+  }
+  const auto datagrams = pull(server, now_);
+  EXPECT_EQ(datagrams.size(), 2U);
+  deliver(a_, now_, datagrams);
+  EXPECT_EQ(events(a_).size(), sent.size());
+  EXPECT_EQ(a_.stats().stale + a_.stats().invalid, 0U);
+}
+
 TEST_F(TwoEnds, AnOlderForceOrStateThatComesLateIsDroppedAndCounted) {
   a_.send(force(1));
   const auto old_force = pull(a_, now_);

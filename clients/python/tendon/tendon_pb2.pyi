@@ -346,6 +346,38 @@ class DeviceState(_message.Message):
     velocity_mps: Vec3
     def __init__(self, tick: _Optional[int] = ..., sampled_ns: _Optional[int] = ..., position_m: _Optional[_Union[Vec3, _Mapping]] = ..., velocity_mps: _Optional[_Union[Vec3, _Mapping]] = ..., force_applied_n: _Optional[_Union[Vec3, _Mapping]] = ..., energy_j: _Optional[float] = ..., permitted_force_n: _Optional[float] = ..., reasons: _Optional[int] = ..., force_sequence: _Optional[int] = ..., force_age_ns: _Optional[int] = ..., mode: _Optional[_Union[Mode, str]] = ..., device: _Optional[int] = ..., channel: _Optional[int] = ..., force_wanted_n: _Optional[_Union[Vec3, _Mapping]] = ..., orientation: _Optional[_Union[Quat, _Mapping]] = ..., angular_velocity_radps: _Optional[_Union[Vec3, _Mapping]] = ..., buttons: _Optional[int] = ..., torque_applied_nm: _Optional[_Union[Vec3, _Mapping]] = ..., gripper_rad: _Optional[float] = ..., gripper_velocity_radps: _Optional[float] = ..., gripper_force_applied_n: _Optional[float] = ..., hand_force_n: _Optional[_Union[Vec3, _Mapping]] = ..., joint_rad: _Optional[_Iterable[float]] = ..., joint_velocity_radps: _Optional[_Iterable[float]] = ..., stiffness_wanted_npm: _Optional[_Iterable[float]] = ...) -> None: ...
 
+class DeviceStates(_message.Message):
+    __slots__ = ["buttons", "channel", "devices", "energy_j", "force_age_ns", "force_applied_n", "force_sequence", "mode", "permitted_force_n", "position_m", "reasons", "sampled_ns", "tick", "velocity_mps"]
+    BUTTONS_FIELD_NUMBER: _ClassVar[int]
+    CHANNEL_FIELD_NUMBER: _ClassVar[int]
+    DEVICES_FIELD_NUMBER: _ClassVar[int]
+    ENERGY_J_FIELD_NUMBER: _ClassVar[int]
+    FORCE_AGE_NS_FIELD_NUMBER: _ClassVar[int]
+    FORCE_APPLIED_N_FIELD_NUMBER: _ClassVar[int]
+    FORCE_SEQUENCE_FIELD_NUMBER: _ClassVar[int]
+    MODE_FIELD_NUMBER: _ClassVar[int]
+    PERMITTED_FORCE_N_FIELD_NUMBER: _ClassVar[int]
+    POSITION_M_FIELD_NUMBER: _ClassVar[int]
+    REASONS_FIELD_NUMBER: _ClassVar[int]
+    SAMPLED_NS_FIELD_NUMBER: _ClassVar[int]
+    TICK_FIELD_NUMBER: _ClassVar[int]
+    VELOCITY_MPS_FIELD_NUMBER: _ClassVar[int]
+    buttons: _containers.RepeatedScalarFieldContainer[int]
+    channel: _containers.RepeatedScalarFieldContainer[int]
+    devices: int
+    energy_j: _containers.RepeatedScalarFieldContainer[float]
+    force_age_ns: _containers.RepeatedScalarFieldContainer[int]
+    force_applied_n: _containers.RepeatedScalarFieldContainer[float]
+    force_sequence: _containers.RepeatedScalarFieldContainer[int]
+    mode: _containers.RepeatedScalarFieldContainer[Mode]
+    permitted_force_n: _containers.RepeatedScalarFieldContainer[float]
+    position_m: _containers.RepeatedScalarFieldContainer[float]
+    reasons: _containers.RepeatedScalarFieldContainer[int]
+    sampled_ns: int
+    tick: int
+    velocity_mps: _containers.RepeatedScalarFieldContainer[float]
+    def __init__(self, tick: _Optional[int] = ..., sampled_ns: _Optional[int] = ..., devices: _Optional[int] = ..., position_m: _Optional[_Iterable[float]] = ..., velocity_mps: _Optional[_Iterable[float]] = ..., force_applied_n: _Optional[_Iterable[float]] = ..., energy_j: _Optional[_Iterable[float]] = ..., permitted_force_n: _Optional[_Iterable[float]] = ..., mode: _Optional[_Iterable[_Union[Mode, str]]] = ..., reasons: _Optional[_Iterable[int]] = ..., force_sequence: _Optional[_Iterable[int]] = ..., force_age_ns: _Optional[_Iterable[int]] = ..., channel: _Optional[_Iterable[int]] = ..., buttons: _Optional[_Iterable[int]] = ...) -> None: ...
+
 class Disarm(_message.Message):
     __slots__ = ["device"]
     DEVICE_FIELD_NUMBER: _ClassVar[int]
@@ -415,7 +447,7 @@ class ForceTable(_message.Message):
     def __init__(self, first_depth_m: _Optional[float] = ..., step_m: _Optional[float] = ..., force_n: _Optional[_Iterable[float]] = ...) -> None: ...
 
 class Frame(_message.Message):
-    __slots__ = ["bye", "control", "control_ack", "device_report", "force", "peer_report", "port_state", "report", "state"]
+    __slots__ = ["bye", "control", "control_ack", "device_report", "force", "peer_report", "port_state", "report", "state", "states"]
     BYE_FIELD_NUMBER: _ClassVar[int]
     CONTROL_ACK_FIELD_NUMBER: _ClassVar[int]
     CONTROL_FIELD_NUMBER: _ClassVar[int]
@@ -424,6 +456,7 @@ class Frame(_message.Message):
     PEER_REPORT_FIELD_NUMBER: _ClassVar[int]
     PORT_STATE_FIELD_NUMBER: _ClassVar[int]
     REPORT_FIELD_NUMBER: _ClassVar[int]
+    STATES_FIELD_NUMBER: _ClassVar[int]
     STATE_FIELD_NUMBER: _ClassVar[int]
     bye: Bye
     control: Control
@@ -434,7 +467,8 @@ class Frame(_message.Message):
     port_state: PortState
     report: LinkReport
     state: DeviceState
-    def __init__(self, state: _Optional[_Union[DeviceState, _Mapping]] = ..., force: _Optional[_Union[ForceCommand, _Mapping]] = ..., control: _Optional[_Union[Control, _Mapping]] = ..., control_ack: _Optional[_Union[ControlAck, _Mapping]] = ..., bye: _Optional[_Union[Bye, _Mapping]] = ..., report: _Optional[_Union[LinkReport, _Mapping]] = ..., device_report: _Optional[_Union[DeviceReport, _Mapping]] = ..., peer_report: _Optional[_Union[PeerReport, _Mapping]] = ..., port_state: _Optional[_Union[PortState, _Mapping]] = ...) -> None: ...
+    states: DeviceStates
+    def __init__(self, state: _Optional[_Union[DeviceState, _Mapping]] = ..., force: _Optional[_Union[ForceCommand, _Mapping]] = ..., control: _Optional[_Union[Control, _Mapping]] = ..., control_ack: _Optional[_Union[ControlAck, _Mapping]] = ..., bye: _Optional[_Union[Bye, _Mapping]] = ..., report: _Optional[_Union[LinkReport, _Mapping]] = ..., device_report: _Optional[_Union[DeviceReport, _Mapping]] = ..., peer_report: _Optional[_Union[PeerReport, _Mapping]] = ..., port_state: _Optional[_Union[PortState, _Mapping]] = ..., states: _Optional[_Union[DeviceStates, _Mapping]] = ...) -> None: ...
 
 class GiveLease(_message.Message):
     __slots__ = ["channel", "device"]

@@ -102,7 +102,7 @@ export function decodeData(body: Uint8Array): DataContent | undefined {
   const frames: Frame[] = [];
   let invalid = 0;
   for (const { body } of datagram.frames) {
-    if (body.case === undefined) continue; // a frame of a newer peer
+    if (body.case === undefined || body.case === "states") continue; // of a newer peer, or not asked for
     const frame = readBody(body);
     if (frame) frames.push(frame);
     else ++invalid;
@@ -169,7 +169,7 @@ function parse<Schema extends DescMessage>(schema: Schema, bytes: Uint8Array): M
 
 // ---- Messages
 
-type Body = Exclude<pb.Frame["body"], { case: undefined }>;
+type Body = Exclude<pb.Frame["body"], { case: undefined } | { case: "states" }>;
 
 function readBody(body: Body): Frame | undefined {
   switch (body.case) {

@@ -271,7 +271,7 @@ FRAMES = {
 HANDSHAKE = {"hello", "retry", "welcome", "refused"}
 
 
-@pytest.mark.parametrize("name", sorted(GOLDEN))
+@pytest.mark.parametrize("name", sorted(GOLDEN.keys() - {"state-columns"}))
 def test_every_golden_datagram_is_read_and_written_again_to_the_bit(name):
     golden = GOLDEN[name]
     header = codec.decode_header(golden)
@@ -291,6 +291,23 @@ def test_every_golden_datagram_is_read_and_written_again_to_the_bit(name):
         body = codec.write_answer(codec.read_answer(answer.body))
         again = codec.encode_answer(AnswerDatagram(answer.random, body, answer.connection_id))
     assert again == golden
+
+
+def test_states_in_columns_are_read_one_by_one_and_not_written():
+    third = replace(
+        STATE,
+        device=2,
+        position=(0.03, -0.01, 0.02),
+        velocity=(0.0, 0.25, -0.5),
+        force_applied=(0.0, 0.0, 0.5),
+        energy=0.125,
+        permitted_force=inf,
+        force_sequence=100,
+        mode=Mode.HOLDING,
+        buttons=1,
+    )
+    content = codec.read_data(GOLDEN["state-columns"][codec.HEADER_SIZE :])
+    assert content == codec.DataContent(TX_TIME, None, [replace(STATE, channel=1), third], invalid=0)
 
 
 def test_every_golden_datagram_known_here_is_on_the_page():

@@ -211,30 +211,44 @@ class Maker {
       const int last = type.value(type.value_count() - 1)->number();
       const int least = type.value(0)->name().ends_with("_UNSPECIFIED") ? 1 : 0;
       for (const int value : {0, 1, last, last + 1}) {
-        changed(std::to_string(value), value >= least && value <= last,
-                [&] { reflection.SetEnumValue(&message, &field, value); });
+        changed(std::to_string(value), value >= least && value <= last, [&] {
+          if (field.is_repeated()) return reflection.SetRepeatedEnumValue(&message, &field, 0, value);
+          reflection.SetEnumValue(&message, &field, value);
+        });
       }
       return;
     }
     seen_.insert(found->first);
     const Bound& bound = found->second;
-    if (bound.value && field.cpp_type() == FieldDescriptor::CPPTYPE_DOUBLE) {
+    const bool is_single = field.cpp_type() == FieldDescriptor::CPPTYPE_FLOAT;
+    if (bound.value && (is_single || field.cpp_type() == FieldDescriptor::CPPTYPE_DOUBLE)) {
       const auto set = [&](double value, bool accepted) {
         std::ostringstream words;
         words.precision(17);
         words << value;
         changed(words.str(), accepted, [&] {
+          if (is_single) return reflection.SetRepeatedFloat(&message, &field, 0, static_cast<float>(value));
           if (field.is_repeated()) return reflection.SetRepeatedDouble(&message, &field, 0, value);
           reflection.SetDouble(&message, &field, value);
         });
       };
       constexpr double kInfinity = std::numeric_limits<double>::infinity();
-      const double least = number(bound.value->least);
-      const double most = number(bound.value->most);
+      // The numbers of single precision that are nearest within: a bound need not be one of them.
+      const auto held = [&](double value) {
+        const auto single = static_cast<float>(value);
+        if (!is_single) return value;
+        return static_cast<double>(std::abs(single) > std::abs(value) ? std::nextafter(single, 0.0F) : single);
+      };
+      const auto next = [&](double from, double to) {
+        if (!is_single) return std::nextafter(from, to);
+        return static_cast<double>(std::nextafter(static_cast<float>(from), static_cast<float>(to)));
+      };
+      const double least = held(number(bound.value->least));
+      const double most = held(number(bound.value->most));
       set(least, !bound.value->beyond);
-      set(std::nextafter(least, bound.value->beyond ? kInfinity : -kInfinity), bound.value->beyond);
+      set(next(least, bound.value->beyond ? kInfinity : -kInfinity), bound.value->beyond);
       set(most, true);
-      set(std::nextafter(most, kInfinity), false);
+      set(next(most, kInfinity), false);
       if (bound.value->zero) {
         set(0, true);
         set(std::nextafter(0, kInfinity), false);
@@ -249,8 +263,14 @@ class Maker {
             case FieldDescriptor::CPPTYPE_INT64:
               return reflection.SetInt64(&message, &field, value);
             case FieldDescriptor::CPPTYPE_UINT64:
+              if (field.is_repeated()) {
+                return reflection.SetRepeatedUInt64(&message, &field, 0, static_cast<std::uint64_t>(value));
+              }
               return reflection.SetUInt64(&message, &field, static_cast<std::uint64_t>(value));
             case FieldDescriptor::CPPTYPE_UINT32:
+              if (field.is_repeated()) {
+                return reflection.SetRepeatedUInt32(&message, &field, 0, static_cast<std::uint32_t>(value));
+              }
               return reflection.SetUInt32(&message, &field, static_cast<std::uint32_t>(value));
             default:
               throw std::invalid_argument(path + ": bounds.cc does not set its type yet");
@@ -325,8 +345,11 @@ bool needs_a_bound(const FieldDescriptor& field) {
     case FieldDescriptor::TYPE_DOUBLE:
     case FieldDescriptor::TYPE_SFIXED64:
     case FieldDescriptor::TYPE_SINT64:
+    case FieldDescriptor::TYPE_FLOAT:
     case FieldDescriptor::TYPE_STRING:
       return true;
+    case FieldDescriptor::TYPE_ENUM:  // its named values
+      return false;
     default:
       return field.is_repeated();
   }

@@ -144,7 +144,7 @@ class Writer {
     }
   }
 
-  /// Doubles have a line each; shorter numbers stand beside one another.
+  /// Floating-point numbers have a line each; others stand beside one another.
   void packed(const FieldDescriptor& about, std::size_t size, int depth, const std::string& words,
               const std::string& head) {
     const Bytes all = rest_.first(std::min(size, rest_.size()));
@@ -156,7 +156,7 @@ class Writer {
       entries.emplace_back(from.first(from.size() - rest_.size()), std::move(value));
     }
     line(head, depth, words + ": " + std::to_string(entries.size()) + " entries");
-    if (about.type() == FieldDescriptor::TYPE_DOUBLE) {
+    if (about.type() == FieldDescriptor::TYPE_DOUBLE || about.type() == FieldDescriptor::TYPE_FLOAT) {
       for (const auto& [bytes, value] : entries) line(hex(bytes), depth + 1, value);
       return;
     }
@@ -170,6 +170,8 @@ class Writer {
     switch (about.type()) {
       case FieldDescriptor::TYPE_DOUBLE:
         return shortest(std::bit_cast<double>(get_little_endian<std::uint64_t>(take(8).data())));
+      case FieldDescriptor::TYPE_FLOAT:
+        return shortest(std::bit_cast<float>(get_little_endian<std::uint32_t>(take(4).data())));
       case FieldDescriptor::TYPE_SFIXED64:
         return grouped(std::bit_cast<std::int64_t>(get_little_endian<std::uint64_t>(take(8).data())));
       case FieldDescriptor::TYPE_FIXED32:

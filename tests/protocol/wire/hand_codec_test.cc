@@ -10,6 +10,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
+#include <iostream>
 #include <limits>
 #include <string>
 #include <variant>
@@ -138,6 +140,39 @@ std::optional<OutgoingEcho> an_echo(Dice& dice) {
                       .received_mask = static_cast<std::uint32_t>(a_count(dice))};
 }
 
+/// States as a session puts them into columns; `many`: as long as can be, else one, two or all devices.
+std::vector<DeviceState> states_of_a_step(Dice& dice, double spoilt) {
+  DeviceState common = a_state(dice);
+  std::vector<DeviceState> states;
+  const double share = dice.chance(0.5) ? 1 : 0.2;
+  const bool usual = dice.chance(0.5);
+  for (std::uint32_t device = 0; device < limits::kMaxDevices; ++device) {
+    if (!dice.chance(share) && device > 0) continue;
+    DeviceState state = a_state(dice);
+    if (usual) {
+      state.reasons = 1;
+      state.force_sequence = 1'000'000 + device;
+      state.force_age = Duration(1'500'000);
+      state.channel = state.buttons = 0;
+    }
+    state.tick = common.tick;
+    state.sampled = common.sampled;
+    state.device = device;
+    if (dice.chance(spoilt)) spoil(dice, state);
+    state.device = device;
+    state.force_wanted.reset();
+    state.stiffness_wanted.reset();
+    state.turning.reset();
+    state.torque_applied.reset();
+    state.grip.reset();
+    state.grip_applied.reset();
+    state.hand_force.reset();
+    state.joints.reset();
+    states.push_back(state);
+  }
+  return states;
+}
+
 /// A datagram of a few states or forces; `spoilt`: with the share of impossible ones. By hand and by protobuf.
 struct Written {
   Bytes by_hand;
@@ -147,6 +182,8 @@ Written a_datagram(Dice& dice, double spoilt) {
   const auto echo = an_echo(dice);
   const LocalTime sent(a_time(dice));
   std::vector<std::variant<DeviceState, ForceCommand>> frames;
+  const std::vector<DeviceState> together =
+      dice.chance(0.2) ? states_of_a_step(dice, 0.1 * spoilt) : std::vector<DeviceState>();
   for (std::uint64_t left = dice.chance(0.8) ? 1 : dice.bits() % 9; left > 0; --left) {
     if (dice.chance(0.5)) {
       frames.emplace_back(a_state(dice));
@@ -155,15 +192,27 @@ Written a_datagram(Dice& dice, double spoilt) {
     }
     std::visit([&](auto& frame) { dice.chance(spoilt) ? spoil(dice, frame) : void(); }, frames.back());
   }
+  std::vector<const DeviceState*> columns;
+  for (const DeviceState& state : together) columns.push_back(&state);
   std::array<std::byte, kMaxDatagram> buffer{};
   DataWriter writer;
   const auto write = [&](auto add) {
     writer.begin(buffer, {.connection_id = 7}, sent, echo);
+    if (!columns.empty()) add(std::span<const DeviceState* const>(columns));
     for (const auto& frame : frames) std::visit(add, frame);
     return Bytes(buffer.begin() + kHeaderSize, buffer.begin() + static_cast<std::ptrdiff_t>(writer.size()));
   };
   return {write([&](const auto& frame) { writer.add(frame); }),
           write([&](const auto& frame) { writer.add_by_protobuf(frame); })};
+}
+
+/// All of a state, bit for bit.
+Bytes told_of(const DeviceState& state) {
+  std::array<std::byte, kMaxDatagram> buffer{};
+  DataWriter writer;
+  writer.begin(buffer, {}, LocalTime{}, {});
+  writer.add_by_protobuf(state);
+  return {buffer.begin(), buffer.begin() + static_cast<std::ptrdiff_t>(writer.size())};
 }
 
 /// `read` and `read_by_protobuf` of the same bytes. Each reader has been used for other bytes before.
@@ -313,6 +362,123 @@ TEST(HandCodec, LeavesToProtobufWhatNoWriterOfOursDoes) {
   DataReader reader;
   ASSERT_NE(reader.read(longer), nullptr);
   EXPECT_EQ(std::get<DeviceState>(reader.read(longer)->frames.at(0)).tick, 5U);
+}
+
+TEST(HandCodec, SixteenDevicesThatMoveOnAllAxesFitOneSealedDatagram) {
+  Dice dice(5);
+  std::vector<DeviceState> states(limits::kMaxDevices, examples::state());
+  for (std::uint32_t device = 0; device < states.size(); ++device) {
+    DeviceState& state = states[device];
+    state.device = device;
+    state.tick = 100'000'000;  // a day at 1 kHz
+    state.position = {dice.within(-0.1, 0.1), dice.within(-0.1, 0.1), dice.within(-0.1, 0.1)};
+    state.velocity = {dice.within(-1, 1), dice.within(-1, 1), dice.within(-1, 1)};
+    state.force_applied = {dice.within(-8, 8), dice.within(-8, 8), dice.within(-8, 8)};
+    state.force_sequence = state.tick;
+    state.force_age = std::chrono::milliseconds(20);
+  }
+  std::vector<const DeviceState*> each;
+  for (const DeviceState& state : states) each.push_back(&state);
+  const OutgoingEcho echo{PeerTime(std::chrono::hours(24)), LocalTime(std::chrono::hours(24)), 100'000'000, ~0U};
+  std::array<std::byte, kMaxDatagram> buffer{};
+  DataWriter writer;
+  const auto room = std::span(buffer).first(kMaxDatagram - 16);  // a seal's tag
+  writer.begin(room, {.packet_number = 100'000'000}, LocalTime(std::chrono::hours(24)), echo);
+  EXPECT_EQ(writer.add(std::span<const DeviceState* const>(each)), each.size());
+  const auto bytes = writer.size();
+  std::cout << "16 states in columns: " << bytes + 16 << " bytes sealed\n";
+  std::size_t plain = 0;
+  for (std::size_t i = 0; i < states.size(); ++plain) {
+    writer.begin(room, {.packet_number = 100'000'000}, LocalTime(std::chrono::hours(24)), echo);
+    while (i < states.size() && writer.add(states[i])) ++i;
+  }
+  EXPECT_EQ(plain, 3U) << "else columns save nothing";
+}
+
+TEST(HandCodec, ColumnsKeepAllButThePrecisionThatTheyNameAndThePosition) {
+  Dice dice(6);
+  DataReader reader;
+  for (int i = 0; i < 1000; ++i) {
+    std::vector<DeviceState> states = states_of_a_step(dice, 0);
+    const Bytes datagram = examples::data_in_columns(1, states);
+    const DataContent* content = read(reader, datagram);
+    ASSERT_NE(content, nullptr);
+    ASSERT_GT(content->frames.size(), 0U);
+    for (std::size_t k = 0; k < content->frames.size(); ++k) {
+      round_to_columns(states[k]);
+      EXPECT_TRUE(told_of(std::get<DeviceState>(content->frames[k])) == told_of(states[k])) << i << " " << k;
+    }
+    DataContent by_hand;
+    EXPECT_TRUE(wire::read_by_hand(body(datagram), by_hand));
+  }
+}
+
+TEST(HandCodec, AStateWithAPartThatColumnsCannotSayStaysWhole) {
+  const std::vector<std::function<void(DeviceState&)>> parts = {
+      [](DeviceState& state) { state.force_wanted = Vec3::Zero(); },
+      [](DeviceState& state) { state.stiffness_wanted = Mat3::Zero(); },
+      [](DeviceState& state) { state.turning = Turning{}; },
+      [](DeviceState& state) { state.torque_applied = Vec3::Zero(); },
+      [](DeviceState& state) { state.grip = Grip{}; },
+      [](DeviceState& state) { state.grip_applied = 0; },
+      [](DeviceState& state) { state.hand_force = Vec3::Zero(); },
+      [](DeviceState& state) { state.joints = Joints{}; },
+  };
+  DeviceState plain = examples::state();
+  plain.buttons = 1;
+  EXPECT_TRUE(fits_columns(plain));
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    DeviceState state = plain;
+    parts[i](state);
+    EXPECT_FALSE(fits_columns(state)) << i;
+  }
+}
+
+/// One of a step's states that cannot be takes the others of its frame with it, and nothing else.
+TEST(HandCodec, AColumnOfAnotherLengthOrAValueOutOfBoundsDropsTheFrame) {
+  const auto columns = [](const std::function<void(v1::DeviceStates&)>& change) {
+    const Bytes datagram = examples::data_in_columns(1, examples::states_in_columns());
+    v1::Datagram parsed;
+    EXPECT_TRUE(parsed.ParseFromArray(body(datagram).data(), static_cast<int>(body(datagram).size())));
+    change(*parsed.mutable_frames(0)->mutable_states());
+    parsed.add_frames()->mutable_state()->set_mode(v1::MODE_IDLE);
+    const std::string bytes = parsed.SerializeAsString();
+    const auto* const begin = reinterpret_cast<const std::byte*>(bytes.data());
+    return Bytes(begin, begin + bytes.size());
+  };
+  const std::vector<std::pair<std::string, std::function<void(v1::DeviceStates&)>>> bad = {
+      {"no device", [](v1::DeviceStates& s) { s.set_devices(0); }},
+      {"a third device", [](v1::DeviceStates& s) { s.set_devices(7); }},
+      {"device 16", [](v1::DeviceStates& s) { s.set_devices(1U << 16U | 1U); }},
+      {"a position more", [](v1::DeviceStates& s) { s.add_position_m(0); }},
+      {"no velocity", [](v1::DeviceStates& s) { s.clear_velocity_mps(); }},
+      {"a force less", [](v1::DeviceStates& s) { s.mutable_force_applied_n()->RemoveLast(); }},
+      {"no energy", [](v1::DeviceStates& s) { s.clear_energy_j(); }},
+      {"no bound", [](v1::DeviceStates& s) { s.clear_permitted_force_n(); }},
+      {"no mode", [](v1::DeviceStates& s) { s.clear_mode(); }},
+      {"a reason less", [](v1::DeviceStates& s) { s.mutable_reasons()->RemoveLast(); }},
+      {"a sequence more", [](v1::DeviceStates& s) { s.add_force_sequence(1); }},
+      {"an age less", [](v1::DeviceStates& s) { s.mutable_force_age_ns()->RemoveLast(); }},
+      {"a channel more", [](v1::DeviceStates& s) { s.add_channel(0); }},
+      {"buttons of one", [](v1::DeviceStates& s) { s.mutable_buttons()->RemoveLast(); }},
+      {"NaN", [](v1::DeviceStates& s) { s.set_velocity_mps(4, std::numeric_limits<float>::quiet_NaN()); }},
+      {"a mode that is none", [](v1::DeviceStates& s) { s.set_mode(1, static_cast<v1::Mode>(7)); }},
+      {"channel 8", [](v1::DeviceStates& s) { s.set_channel(1, 8); }},
+      {"an age of more than 2^60", [](v1::DeviceStates& s) { s.set_force_age_ns(0, (1ULL << 60U) + 1); }},
+  };
+  BothReaders readers;
+  DataReader reader;
+  for (const auto& [what, change] : bad) {
+    const Bytes bytes = columns(change);
+    EXPECT_TRUE(readers.agree(bytes)) << what;
+    const DataContent* content = reader.read(bytes);
+    ASSERT_NE(content, nullptr) << what;
+    EXPECT_EQ(content->invalid, 1U) << what;
+    EXPECT_EQ(content->frames.size(), 1U) << what << ": the frame behind it";
+  }
+  const Bytes good = columns([](v1::DeviceStates&) {});
+  ASSERT_NE(reader.read(good), nullptr);
+  EXPECT_EQ(reader.read(good)->frames.size(), 3U);
 }
 
 TEST(HandCodec, ADatagramHasAtMostAsManyFramesAsProtobufTakes) {

@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "protocol/wire/codec.h"
 #include "tests/server/guests/sealed_server.h"
 
 namespace tendon {
@@ -164,6 +165,50 @@ TEST_F(Handle, IsSeenOnlyByThoseThatNamedTheFeature) {
       }
     }
     EXPECT_GT(states, 100U);
+  }
+}
+
+/// A client that did not name the feature, as all older ones, is sent the whole states of before.
+TEST_F(Handle, ColumnsAreSentOnlyToThoseThatNamedTheFeature) {
+  for (const bool names : {false, true}) {
+    restart({});
+    look_.velocity = Vec3(0.1, 0.2, 0.3);
+    DeviceState rounded = look_;
+    round_to_columns(rounded);
+    ASSERT_NE(rounded.velocity, look_.velocity);
+    End end(wire_, parse_address("127.0.0.1:4000"));
+    std::vector<std::string> features;
+    if (names) features.emplace_back(kFeatureStateColumns);
+    ClientHandshake handshake({.hello = {.role = Role::kObserver, .name = "foreign", .features = features}}, now_);
+    std::optional<Session> session;
+    std::array<std::byte, kMaxDatagram> buffer;
+    const auto say = [&](auto& mine) {
+      while (const std::size_t size = mine.next_datagram(now_, buffer)) {
+        deliver(end.self, Bytes(buffer.begin(), buffer.begin() + static_cast<int>(size)));
+      }
+    };
+    std::size_t states = 0;
+    for (int i = 0; i < 100; ++i) {
+      session ? say(*session) : say(handshake);
+      run(milliseconds(1), {});
+      count_ = 0;
+      for (const Datagram& datagram : std::exchange(wire_, {})) {
+        session ? void(session->receive(now_, datagram.bytes)) : handshake.receive(now_, datagram.bytes);
+      }
+      if (!session && handshake.outcome()) {
+        const auto& accepted = std::get<ClientHandshake::Accepted>(*handshake.outcome());
+        EXPECT_EQ(accepted.welcome.features, features);
+        session.emplace(Session::Config{.connection_id = accepted.connection_id}, now_);
+      }
+      while (const auto event = session ? session->next_event() : std::nullopt) {
+        const auto* seen = std::get_if<Session::StateArrived>(&*event);
+        if (seen == nullptr) continue;
+        ++states;
+        EXPECT_EQ(seen->state.position, look_.position);
+        EXPECT_EQ(seen->state.velocity, names ? rounded.velocity : look_.velocity);
+      }
+    }
+    EXPECT_GT(states, 50U);
   }
 }
 

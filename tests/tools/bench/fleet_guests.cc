@@ -115,6 +115,7 @@ class Guest {
     config.hello.role = plan_.controls ? Role::kController : Role::kObserver;
     config.hello.name = "guest";
     config.hello.features = {std::string(kFeatureChannels)};
+    if (plan_.claims.size() > 7) config.hello.features.emplace_back(kFeatureStateColumns);
     config.hello.claims = plan_.claims;
     const Key random = secrets_.next();
     std::copy_n(random.bytes().begin(), config.random.size(), config.random.begin());

@@ -29,7 +29,7 @@ class DataContent:
 
     sent_ns: int
     echo: Echo | None
-    frames: list[Frame]  # in the order of the datagram, every value within bounds
+    frames: list[Frame]  # in the order of the datagram, every value within bounds; of columns each state
     invalid: int  # frames (and echoes) left out because a value was out of bounds
 
 
@@ -82,6 +82,9 @@ def read_data(body: bytes) -> DataContent | None:
     content: list[Frame] = []
     for piece in message.frames:
         try:
+            if piece.HasField("states"):
+                content += frames.read_states(piece.states)
+                continue
             frame = frames.read(piece)
         except fields.OutOfBounds:
             invalid += 1

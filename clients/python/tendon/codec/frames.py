@@ -34,6 +34,7 @@ from ..messages import (
     LeaseLost,
     LinkReport,
     LocalModel,
+    Mode,
     OutputDescription,
     PeerReport,
     PortState,
@@ -78,10 +79,17 @@ def _read_joints(message: pb.DeviceState) -> Joints | None:
     return Joints(angles, velocities) if angles else None
 
 
-def _read_state(message: pb.DeviceState) -> DeviceState:
-    permitted, mode = message.permitted_force_n, fields.MODES.get(message.mode)
-    if mode is None or not permitted >= 0 or (permitted > limits.MAX_VALUE and permitted != inf):
+def _mode(mode: int, permitted: float) -> Mode:
+    """The mode of a state, whose bound on the force is within bounds too."""
+    known = fields.MODES.get(mode)
+    if known is None or not permitted >= 0 or (permitted > limits.MAX_VALUE and permitted != inf):
         raise fields.OutOfBounds
+    return known
+
+
+def _read_state(message: pb.DeviceState) -> DeviceState:
+    permitted = message.permitted_force_n
+    mode = _mode(message.mode, permitted)
     return DeviceState(
         message.tick,
         fields.time(message.sampled_ns),
@@ -106,6 +114,49 @@ def _read_state(message: pb.DeviceState) -> DeviceState:
         fields.vector(message.hand_force_n) if message.HasField("hand_force_n") else None,
         _read_joints(message),
     )
+
+
+def read_states(message: pb.DeviceStates) -> list[DeviceState]:
+    """States in columns, one by one; each column has an entry of each device, or where it may be absent none."""
+    devices = [device for device in range(limits.MAX_DEVICES) if message.devices >> device & 1]
+    count = len(devices)
+    vectors = (message.position_m, message.velocity_mps, message.force_applied_n)
+    numbers = (message.energy_j, message.permitted_force_n, message.mode)
+    counts = (message.reasons, message.force_sequence, message.force_age_ns, message.channel, message.buttons)
+    if (
+        not count
+        or message.devices >> limits.MAX_DEVICES
+        or any(len(column) != 3 * count for column in vectors)
+        or any(len(column) != count for column in numbers)
+        or any(len(column) not in (0, count) for column in counts)
+    ):
+        raise fields.OutOfBounds
+    states = []
+    for i, device in enumerate(devices):
+        position, velocity, force = (
+            (fields.number(column[3 * i]), fields.number(column[3 * i + 1]), fields.number(column[3 * i + 2]))
+            for column in vectors
+        )
+        reasons, sequence, age, channel, buttons = (column[i] if column else 0 for column in counts)
+        permitted = message.permitted_force_n[i]
+        state = DeviceState(
+            message.tick,
+            fields.time(message.sampled_ns),
+            position,
+            velocity,
+            force,
+            fields.number(message.energy_j[i]),
+            permitted,
+            reasons,
+            sequence,
+            fields.length(age),
+            _mode(message.mode[i], permitted),
+            device,
+            fields.channel(channel),
+            buttons=buttons,
+        )
+        states.append(state)
+    return states
 
 
 def is_radius(metres: float) -> bool:

@@ -12,7 +12,7 @@ import type { Message } from "@bufbuild/protobuf";
  * Describes the file tendon.proto.
  */
 export const file_tendon: GenFile = /*@__PURE__*/
-  fileDesc("Cgx0ZW5kb24ucHJvdG8SCXRlbmRvbi52MSJfCghEYXRhZ3JhbRISCgp0eF90aW1lX25zGAEgASgQEh0KBGVjaG8YAiABKAsyDy50ZW5kb24udjEuRWNobxIgCgZmcmFtZXMYAyADKAsyEC50ZW5kb24udjEuRnJhbWUiZgoERWNobxIXCg9wZWVyX3R4X3RpbWVfbnMYASABKBASEgoKcnhfdGltZV9ucxgCIAEoEBIaChJwZWVyX3BhY2tldF9udW1iZXIYAyABKAQSFQoNcmVjZWl2ZWRfbWFzaxgEIAEoByKLAwoFRnJhbWUSJwoFc3RhdGUYASABKAsyFi50ZW5kb24udjEuRGV2aWNlU3RhdGVIABIoCgVmb3JjZRgCIAEoCzIXLnRlbmRvbi52MS5Gb3JjZUNvbW1hbmRIABIlCgdjb250cm9sGAMgASgLMhIudGVuZG9uLnYxLkNvbnRyb2xIABIsCgtjb250cm9sX2FjaxgEIAEoCzIVLnRlbmRvbi52MS5Db250cm9sQWNrSAASHQoDYnllGAUgASgLMg4udGVuZG9uLnYxLkJ5ZUgAEicKBnJlcG9ydBgGIAEoCzIVLnRlbmRvbi52MS5MaW5rUmVwb3J0SAASMAoNZGV2aWNlX3JlcG9ydBgHIAEoCzIXLnRlbmRvbi52MS5EZXZpY2VSZXBvcnRIABIsCgtwZWVyX3JlcG9ydBgIIAEoCzIVLnRlbmRvbi52MS5QZWVyUmVwb3J0SAASKgoKcG9ydF9zdGF0ZRgJIAEoCzIULnRlbmRvbi52MS5Qb3J0U3RhdGVIAEIGCgRib2R5IicKBFZlYzMSCQoBeBgBIAEoARIJCgF5GAIgASgBEgkKAXoYAyABKAEiMgoEUXVhdBIJCgF3GAEgASgBEgkKAXgYAiABKAESCQoBeRgDIAEoARIJCgF6GAQgASgBIrwGCgtEZXZpY2VTdGF0ZRIMCgR0aWNrGAEgASgEEhIKCnNhbXBsZWRfbnMYAiABKBASIwoKcG9zaXRpb25fbRgDIAEoCzIPLnRlbmRvbi52MS5WZWMzEiUKDHZlbG9jaXR5X21wcxgEIAEoCzIPLnRlbmRvbi52MS5WZWMzEigKD2ZvcmNlX2FwcGxpZWRfbhgFIAEoCzIPLnRlbmRvbi52MS5WZWMzEhAKCGVuZXJneV9qGAYgASgBEhkKEXBlcm1pdHRlZF9mb3JjZV9uGAcgASgBEg8KB3JlYXNvbnMYCCABKAcSFgoOZm9yY2Vfc2VxdWVuY2UYCSABKAQSFAoMZm9yY2VfYWdlX25zGAogASgEEh0KBG1vZGUYCyABKA4yDy50ZW5kb24udjEuTW9kZRIOCgZkZXZpY2UYDCABKA0SDwoHY2hhbm5lbBgNIAEoDRInCg5mb3JjZV93YW50ZWRfbhgOIAEoCzIPLnRlbmRvbi52MS5WZWMzEiQKC29yaWVudGF0aW9uGA8gASgLMg8udGVuZG9uLnYxLlF1YXQSLwoWYW5ndWxhcl92ZWxvY2l0eV9yYWRwcxgQIAEoCzIPLnRlbmRvbi52MS5WZWMzEg8KB2J1dHRvbnMYESABKAcSKgoRdG9ycXVlX2FwcGxpZWRfbm0YEiABKAsyDy50ZW5kb24udjEuVmVjMxIYCgtncmlwcGVyX3JhZBgTIAEoAUgAiAEBEiMKFmdyaXBwZXJfdmVsb2NpdHlfcmFkcHMYFCABKAFIAYgBARIkChdncmlwcGVyX2ZvcmNlX2FwcGxpZWRfbhgVIAEoAUgCiAEBEiUKDGhhbmRfZm9yY2VfbhgWIAEoCzIPLnRlbmRvbi52MS5WZWMzEhUKCWpvaW50X3JhZBgXIAMoAUICEAESIAoUam9pbnRfdmVsb2NpdHlfcmFkcHMYGCADKAFCAhABEiAKFHN0aWZmbmVzc193YW50ZWRfbnBtGBkgAygBQgIQAUIOCgxfZ3JpcHBlcl9yYWRCGQoXX2dyaXBwZXJfdmVsb2NpdHlfcmFkcHNCGgoYX2dyaXBwZXJfZm9yY2VfYXBwbGllZF9uIvoCCgxGb3JjZUNvbW1hbmQSEAoIc2VxdWVuY2UYASABKAQSFQoNYmFzZWRfb25fdGljaxgCIAEoBBIgCgdmb3JjZV9uGAMgASgLMg8udGVuZG9uLnYxLlZlYzMSJAoFbW9kZWwYBCABKAsyFS50ZW5kb24udjEuTG9jYWxNb2RlbBIUCgx2YWxpZF9mb3JfdXMYBSABKA0SDgoGZGV2aWNlGAYgASgNEg8KB2NoYW5uZWwYByABKA0SGAoQdG9wb2xvZ3lfY2hhbmdlZBgIIAEoCBIUCgdlcnJvcl9uGAkgASgBSACIAQESIgoJdG9ycXVlX25tGAogASgLMg8udGVuZG9uLnYxLlZlYzMSHAoPZ3JpcHBlcl9mb3JjZV9uGAsgASgBSAGIAQESMAoOcm90YXRpb25fbW9kZWwYDiABKAsyGC50ZW5kb24udjEuUm90YXRpb25Nb2RlbEIKCghfZXJyb3JfbkISChBfZ3JpcHBlcl9mb3JjZV9uIl4KDVJvdGF0aW9uTW9kZWwSJwoOYXRfb3JpZW50YXRpb24YASABKAsyDy50ZW5kb24udjEuUXVhdBIkChhhbmd1bGFyX3N0aWZmbmVzc19ubXByYWQYAiADKAFCAhABIpsBCgpMb2NhbE1vZGVsEh0KBGF0X20YASABKAsyDy50ZW5kb24udjEuVmVjMxIZCg1zdGlmZm5lc3NfbnBtGAIgAygBQgIQARIbCg52YWxpZF9yYWRpdXNfbRgDIAEoAUgAiAEBEiMKB2NvbnRhY3QYBCABKAsyEi50ZW5kb24udjEuQ29udGFjdEIRCg9fdmFsaWRfcmFkaXVzX20iXwoHQ29udGFjdBIfCgZub3JtYWwYASABKAsyDy50ZW5kb24udjEuVmVjMxINCgVnYXBfbRgCIAEoARIkCgV0YWJsZRgDIAEoCzIVLnRlbmRvbi52MS5Gb3JjZVRhYmxlIkgKCkZvcmNlVGFibGUSFQoNZmlyc3RfZGVwdGhfbRgBIAEoARIOCgZzdGVwX20YAiABKAESEwoHZm9yY2VfbhgDIAMoAUICEAEi8wQKB0NvbnRyb2wSCgoCaWQYASABKA0SMQoOc2V0X3N0YXRlX3JhdGUYAiABKAsyFy50ZW5kb24udjEuU2V0U3RhdGVSYXRlSAASIQoFcmVhcm0YAyABKAsyEC50ZW5kb24udjEuUmVhcm1IABInCghkZXNjcmliZRgEIAEoCzITLnRlbmRvbi52MS5EZXNjcmliZUgAEioKCnRha2VfbGVhc2UYBSABKAsyFC50ZW5kb24udjEuVGFrZUxlYXNlSAASKgoKZ2l2ZV9sZWFzZRgGIAEoCzIULnRlbmRvbi52MS5HaXZlTGVhc2VIABI5ChJzZXRfc3RhdGVfZGVhZGJhbmQYCCABKAsyGy50ZW5kb24udjEuU2V0U3RhdGVEZWFkYmFuZEgAEiMKBmRpc2FybRgJIAEoCzIRLnRlbmRvbi52MS5EaXNhcm1IABIqCgpzZXRfb3V0cHV0GAogASgLMhQudGVuZG9uLnYxLlNldE91dHB1dEgAEiMKBmNvdXBsZRgLIAEoCzIRLnRlbmRvbi52MS5Db3VwbGVIABIjCgZlbmdhZ2UYDCABKAsyES50ZW5kb24udjEuRW5nYWdlSAASKQoJZGlzZW5nYWdlGA0gASgLMhQudGVuZG9uLnYxLkRpc2VuZ2FnZUgAEigKCXNldF9zY2FsZRgOIAEoCzITLnRlbmRvbi52MS5TZXRTY2FsZUgAEigKCXNldF9zaGFyZRgPIAEoCzITLnRlbmRvbi52MS5TZXRTaGFyZUgAEioKCmxlYXNlX2xvc3QYByABKAsyFC50ZW5kb24udjEuTGVhc2VMb3N0SABCBAoCb3AiKgoMU2V0U3RhdGVSYXRlEgoKAmh6GAEgASgNEg4KBmRldmljZRgCIAEoDSJMChBTZXRTdGF0ZURlYWRiYW5kEg0KBXNoYXJlGAEgASgBEhEKCWZsb29yX21wcxgCIAEoARIWCg5tYXhfc2lsZW5jZV91cxgDIAEoDSIXCgVSZWFybRIOCgZkZXZpY2UYASABKA0iGAoGRGlzYXJtEg4KBmRldmljZRgBIAEoDSKfBAoGQ291cGxlEg4KBmRldmljZRgBIAEoDRIPCgdjaGFubmVsGAIgASgNEiEKBHJvbGUYAyABKA4yEy50ZW5kb24udjEuUG9ydFJvbGUSKQoGbWV0aG9kGAQgASgOMhkudGVuZG9uLnYxLkNvdXBsaW5nTWV0aG9kEhYKDnBvc2l0aW9uX3NjYWxlGAUgASgBEhMKC2ZvcmNlX3NjYWxlGAYgASgBEiEKCHJvdGF0aW9uGAcgASgLMg8udGVuZG9uLnYxLlF1YXQSDAoEYXhlcxgIIAEoDRIVCg1zdGlmZm5lc3NfbnBtGAkgASgBEhsKE211dHVhbF9kYW1waW5nX25zcG0YCiABKAESFAoMZGFtcGluZ19uc3BtGAsgASgBEhYKDmFkYXB0X3RvX2RlbGF5GAwgASgIEg0KBXB1cnNlGA0gASgIEhEKCXBlcmlvZF91cxgOIAEoDRIQCghhYnNvbHV0ZRgPIAEoCBIdChV0dXJuX3N0aWZmbmVzc19ubXByYWQYECABKAESHAoUdHVybl9kYW1waW5nX25tc3ByYWQYESABKAESGgoSZ3JpcF9zdGlmZm5lc3NfbnBtGBIgASgBEhkKEWdyaXBfZGFtcGluZ19uc3BtGBMgASgBEhgKEGRyaWZ0X3JhdGVfcGVyX3MYFCABKAESJAoEcmF0ZRgVIAEoCzIWLnRlbmRvbi52MS5SYXRlQ29udHJvbCJNCgtSYXRlQ29udHJvbBITCgtkZWFkX3pvbmVfbRgBIAEoARISCgpnYWluX3Blcl9zGAIgASgBEhUKDW1heF9zcGVlZF9tcHMYAyABKAEiGAoGRW5nYWdlEg4KBmRldmljZRgBIAEoDSIbCglEaXNlbmdhZ2USDgoGZGV2aWNlGAEgASgNIkcKCFNldFNjYWxlEg4KBmRldmljZRgBIAEoDRIWCg5wb3NpdGlvbl9zY2FsZRgCIAEoARITCgtmb3JjZV9zY2FsZRgDIAEoASI6CghTZXRTaGFyZRIOCgZkZXZpY2UYASABKA0SDwoHY2hhbm5lbBgCIAEoDRINCgVzaGFyZRgDIAEoASJwCglTZXRPdXRwdXQSDgoGZGV2aWNlGAEgASgNEg4KBm91dHB1dBgCIAEoDRINCgNyZ2IYAyABKAdIABIpCgl2aWJyYXRpb24YBCABKAsyFC50ZW5kb24udjEuVmlicmF0aW9uSABCCQoHc2V0dGluZyJJCglWaWJyYXRpb24SEQoJYW1wbGl0dWRlGAEgASgBEhQKDGZyZXF1ZW5jeV9oehgCIAEoARITCgtkdXJhdGlvbl9tcxgDIAEoDSIqCghEZXNjcmliZRIOCgZkZXZpY2UYASABKA0SDgoGaGFuZGxlGAIgASgIIiwKCVRha2VMZWFzZRIOCgZkZXZpY2UYASABKA0SDwoHY2hhbm5lbBgCIAEoDSIsCglHaXZlTGVhc2USDgoGZGV2aWNlGAEgASgNEg8KB2NoYW5uZWwYAiABKA0iOAoJTGVhc2VMb3N0Eg4KBmRldmljZRgBIAEoDRIPCgdjaGFubmVsGAIgASgNEgoKAnRvGAMgASgJIrQBCgpDb250cm9sQWNrEgoKAmlkGAEgASgNEh0KBGNvZGUYAiABKA4yDy50ZW5kb24udjEuQ29kZRIOCgZkZXRhaWwYAyABKAkSDwoHd2FpdF9tcxgEIAEoDRIsCgZkZXZpY2UYBSABKAsyHC50ZW5kb24udjEuRGV2aWNlRGVzY3JpcHRpb24SLAoGaGFuZGxlGAYgASgLMhwudGVuZG9uLnYxLkhhbmRsZURlc2NyaXB0aW9uIuoCChFEZXZpY2VEZXNjcmlwdGlvbhIOCgZkZXZpY2UYASABKA0SDAoEbmFtZRgCIAEoCRINCgVtb2RlbBgDIAEoCRIUCgxwb3NpdGlvbl9kb2YYBCABKA0SEQoJZm9yY2VfZG9mGAUgASgNEigKD3dvcmtzcGFjZV9taW5fbRgGIAEoCzIPLnRlbmRvbi52MS5WZWMzEigKD3dvcmtzcGFjZV9tYXhfbRgHIAEoCzIPLnRlbmRvbi52MS5WZWMzEhMKC21heF9mb3JjZV9uGAggASgBEhoKEmNvbnRpbnVvdXNfZm9yY2VfbhgJIAEoARIZChFtYXhfc3RpZmZuZXNzX25wbRgKIAEoARIdChVwb3NpdGlvbl9yZXNvbHV0aW9uX20YCyABKAESDwoHbG9vcF9oehgMIAEoDRIvCghjaGFubmVscxgNIAMoCzIdLnRlbmRvbi52MS5DaGFubmVsRGVzY3JpcHRpb24i1gIKEUhhbmRsZURlc2NyaXB0aW9uEg4KBmRldmljZRgBIAEoDRItChRvcGVyYXRvcl9mcm9tX2RldmljZRgCIAEoCzIPLnRlbmRvbi52MS5RdWF0Eg8KB2J1dHRvbnMYAyADKAkSHAoUb3JpZW50YXRpb25fbWVhc3VyZWQYBCABKAgSFQoNbWF4X3RvcnF1ZV9ubRgFIAEoARIdChBncmlwcGVyX29wZW5fcmFkGAYgASgBSACIAQESGwoTbWF4X2dyaXBwZXJfZm9yY2VfbhgHIAEoARINCgVncm91cBgIIAEoCRIdCgRoYW5kGAkgASgOMg8udGVuZG9uLnYxLkhhbmQSDgoGam9pbnRzGAogAygJEi0KB291dHB1dHMYCyADKAsyHC50ZW5kb24udjEuT3V0cHV0RGVzY3JpcHRpb25CEwoRX2dyaXBwZXJfb3Blbl9yYWQiRgoRT3V0cHV0RGVzY3JpcHRpb24SDAoEbmFtZRgBIAEoCRIjCgRraW5kGAIgASgOMhUudGVuZG9uLnYxLk91dHB1dEtpbmQiagoSQ2hhbm5lbERlc2NyaXB0aW9uEgwKBG5hbWUYASABKAkSJAoEcnVsZRgCIAEoDjIWLnRlbmRvbi52MS5DaGFubmVsUnVsZRIQCghsZWFzZV9tcxgDIAEoDRIOCgZob2xkZXIYBCABKAkiNAoDQnllEh0KBGNvZGUYASABKA4yDy50ZW5kb24udjEuQ29kZRIOCgZyZWFzb24YAiABKAki3gQKCkxpbmtSZXBvcnQSDgoGbnVtYmVyGAEgASgEEhAKCHVudGlsX25zGAIgASgQEg8KB3NwYW5fbnMYAyABKAQSDgoGZm9yY2VzGAQgASgEEhMKC2xhdGVfc2VydmVyGAUgASgEEhQKDGxhdGVfbmV0d29yaxgGIAEoBBITCgtsYXRlX2VuZ2luZRgHIAEoBBIVCg13b3JzdF9sYXRlX25zGAggASgEEhYKDmxvbmdlc3RfZ2FwX25zGAkgASgEEiUKCnJvdW5kX3RyaXAYCiABKAsyES50ZW5kb24udjEuRGVsYXlzEiQKCXRvX3NlcnZlchgLIAEoCzIRLnRlbmRvbi52MS5EZWxheXMSJAoJdG9fY2xpZW50GAwgASgLMhEudGVuZG9uLnYxLkRlbGF5cxIXCg9jbG9ja19vZmZzZXRfbnMYDSABKBISFwoPY2xvY2tfZHJpZnRfcHBtGA4gASgBEhYKDmNsb2NrX2Vycm9yX25zGA8gASgEEhAKCHJlY2VpdmVkGBAgASgEEgwKBGxvc3QYESABKAQSEQoJcmVvcmRlcmVkGBIgASgEEhIKCmR1cGxpY2F0ZWQYEyABKAQSDQoFd29yZHMYFCABKAkSFAoMbGF0ZV91bmtub3duGBUgASgEEhoKEnJlZnVzZWRfbm90X2Zpbml0ZRgWIAEoBBIdChVyZWZ1c2VkX291dF9vZl9ib3VuZHMYFyABKAQSHAoUcmVmdXNlZF91bmtub3duX3RpY2sYGCABKAQSHAoUcmVmdXNlZF9vbGRfc2VxdWVuY2UYGSABKAQiKwoGRGVsYXlzEhEKCW1lZGlhbl9ucxgBIAEoEhIOCgZwOTlfbnMYAiABKBIi4wUKCVBvcnRTdGF0ZRIOCgZkZXZpY2UYASABKA0SDwoHY2hhbm5lbBgCIAEoDRINCgVlcG9jaBgDIAEoBBIQCghzZXF1ZW5jZRgEIAEoBBIVCg1hbnN3ZXJzX2Vwb2NoGAUgASgEEg8KB2Fuc3dlcnMYBiABKAQSDwoHdGltZV9ucxgHIAEoEBIVCg1yb3VuZF90cmlwX25zGAggASgEEiMKBXBoYXNlGAkgASgOMhQudGVuZG9uLnYxLlBvcnRQaGFzZRISCgplbmdhZ2VtZW50GAogASgEEg8KB2J1dHRvbnMYCyABKAcSIwoKcG9zaXRpb25fbRgMIAEoCzIPLnRlbmRvbi52MS5WZWMzEiUKDHZlbG9jaXR5X21wcxgNIAEoCzIPLnRlbmRvbi52MS5WZWMzEiAKB2ZvcmNlX24YDiABKAsyDy50ZW5kb24udjEuVmVjMxIoCg9jb250YWN0X2ZvcmNlX24YDyABKAsyDy50ZW5kb24udjEuVmVjMxIRCglhY2NvdW50X2oYECABKAESDgoGbmVlZF9qGBEgASgBEg8KB2dpdmVuX2oYEiABKAESDwoHdGFrZW5fahgTIAEoARImCg13YXZlX2ludGVncmFsGBQgASgLMg8udGVuZG9uLnYxLlZlYzMSFQoNd2F2ZV9lbmVyZ3lfahgVIAEoARInCgdzdXJmYWNlGBYgASgLMhYudGVuZG9uLnYxLlBvcnRTdXJmYWNlEiEKBHR1cm4YFyABKAsyEy50ZW5kb24udjEuUG9ydFR1cm4SIQoEZ3JpcBgYIAEoCzITLnRlbmRvbi52MS5Qb3J0R3JpcBITCgtlbmVyZ3lfaW5fahgZIAEoARISCgVzaGFyZRgaIAEoAUgAiAEBEhYKDnBvc2l0aW9uX3NjYWxlGBsgASgBEhMKC2ZvcmNlX3NjYWxlGBwgASgBEg8KB29mX3BlZXIYHSABKAhCCAoGX3NoYXJlIn4KCFBvcnRUdXJuEh0KBHR1cm4YASABKAsyDy50ZW5kb24udjEuUXVhdBIvChZhbmd1bGFyX3ZlbG9jaXR5X3JhZHBzGAIgASgLMg8udGVuZG9uLnYxLlZlYzMSIgoJdG9ycXVlX25tGAMgASgLMg8udGVuZG9uLnYxLlZlYzMiiQEKCFBvcnRHcmlwEhEKCW9wZW5pbmdfbRgBIAEoARIUCgx2ZWxvY2l0eV9tcHMYAiABKAESDwoHZm9yY2VfbhgDIAEoARIRCglhY2NvdW50X2oYBCABKAESDgoGbmVlZF9qGAUgASgBEg8KB2dpdmVuX2oYBiABKAESDwoHdGFrZW5fahgHIAEoASJXCgtQb3J0U3VyZmFjZRIfCgZub3JtYWwYASABKAsyDy50ZW5kb24udjEuVmVjMxIQCghvZmZzZXRfbRgCIAEoARIVCg1zdGlmZm5lc3NfbnBtGAMgASgBIvQBCgxEZXZpY2VSZXBvcnQSDgoGbnVtYmVyGAEgASgEEhAKCHVudGlsX25zGAIgASgQEg8KB3NwYW5fbnMYAyABKAQSDgoGZGV2aWNlGAQgASgNEg0KBXN0ZXBzGAUgASgEEg4KBm1pc3NlZBgGIAEoBBIQCghvdmVycnVucxgHIAEoBBIOCgZ1bnNlZW4YCCABKAQSHAoQbGF0ZW5lc3NfdXNfbG9nMhgJIAMoBEICEAESIQoGc2FmZXR5GAogASgOMhEudGVuZG9uLnYxLlNhZmV0eRINCgVmYXVsdBgLIAEoCRIQCghkZWdyYWRlZBgMIAEoCSKOAQoKUGVlclJlcG9ydBIOCgZkZXZpY2UYASABKA0SDwoHY2hhbm5lbBgCIAEoDRIMCgRuYW1lGAMgASgJEhQKDHN0YXRlX29uZV9pbhgEIAEoDRIWCg5mb3JjZXNfcmVmdXNlZBgFIAEoCBIjCgRsaW5rGAYgASgLMhUudGVuZG9uLnYxLkxpbmtSZXBvcnQikgEKBUhlbGxvEhMKC3ZlcnNpb25fbWluGAEgASgNEhMKC3ZlcnNpb25fbWF4GAIgASgNEh0KBHJvbGUYAyABKA4yDy50ZW5kb24udjEuUm9sZRIMCgRuYW1lGAQgASgJEhAKCGZlYXR1cmVzGAUgAygJEiAKBmNsYWltcxgGIAMoCzIQLnRlbmRvbi52MS5DbGFpbSJHCgVDbGFpbRIOCgZkZXZpY2UYASABKAkSDwoHY2hhbm5lbBgCIAEoCRIdCgRyb2xlGAMgASgOMg8udGVuZG9uLnYxLlJvbGUiXgoGQW5zd2VyEiUKB3dlbGNvbWUYASABKAsyEi50ZW5kb24udjEuV2VsY29tZUgAEiUKB3JlZnVzZWQYAiABKAsyEi50ZW5kb24udjEuUmVmdXNlZEgAQgYKBGJvZHki6wEKB1dlbGNvbWUSDwoHdmVyc2lvbhgBIAEoDRIQCghmZWF0dXJlcxgCIAMoCRIdCgRyb2xlGAMgASgOMg8udGVuZG9uLnYxLlJvbGUSEwoLZGV2aWNlX25hbWUYBCABKAkSEwoLbWF4X2ZvcmNlX24YBSABKAESHQoVcG9zaXRpb25fcmVzb2x1dGlvbl9tGAYgASgBEg8KB2xvb3BfaHoYByABKA0SEgoKdGltZW91dF9tcxgIIAEoDRIOCgZzZXJ2ZXIYCSABKAkSIAoGZ3JhbnRzGAogAygLMhAudGVuZG9uLnYxLkdyYW50IkcKBUdyYW50Eg4KBmRldmljZRgBIAEoDRIPCgdjaGFubmVsGAIgASgNEh0KBHJvbGUYAyABKA4yDy50ZW5kb24udjEuUm9sZSJiCgdSZWZ1c2VkEh0KBGNvZGUYASABKA4yDy50ZW5kb24udjEuQ29kZRIOCgZkZXRhaWwYAiABKAkSEwoLdmVyc2lvbl9taW4YAyABKA0SEwoLdmVyc2lvbl9tYXgYBCABKA0qhQEKBE1vZGUSFAoQTU9ERV9VTlNQRUNJRklFRBAAEg0KCU1PREVfSURMRRABEg8KC01PREVfQUNUSVZFEAISEAoMTU9ERV9IT0xESU5HEAMSEQoNTU9ERV9ERUNBWUlORxAEEhIKDk1PREVfU0FGRV9TVE9QEAUSDgoKTU9ERV9GQVVMVBAGKlMKCFBvcnRSb2xlEhkKFVBPUlRfUk9MRV9VTlNQRUNJRklFRBAAEhQKEFBPUlRfUk9MRV9MRUFERVIQARIWChJQT1JUX1JPTEVfRk9MTE9XRVIQAiqPAgoOQ291cGxpbmdNZXRob2QSHwobQ09VUExJTkdfTUVUSE9EX1VOU1BFQ0lGSUVEEAASJQohQ09VUExJTkdfTUVUSE9EX1BPU0lUSU9OX1BPU0lUSU9OEAESIgoeQ09VUExJTkdfTUVUSE9EX1BPU0lUSU9OX0ZPUkNFEAISGQoVQ09VUExJTkdfTUVUSE9EX1dBVkVTEAMSGwoXQ09VUExJTkdfTUVUSE9EX1NVUkZBQ0UQBBIdChlDT1VQTElOR19NRVRIT0RfUEFTU0lWSVRZEAUSIAocQ09VUExJTkdfTUVUSE9EX1NFVF9QT1NJVElPThAGEhgKFENPVVBMSU5HX01FVEhPRF9SQVRFEAcqSwoKT3V0cHV0S2luZBIWChJPVVRQVVRfVU5TUEVDSUZJRUQQABIPCgtPVVRQVVRfTEFNUBABEhQKEE9VVFBVVF9WSUJSQVRJT04QAiozCgRIYW5kEgwKCEhBTkRfQU5ZEAASDQoJSEFORF9MRUZUEAESDgoKSEFORF9SSUdIVBACKlwKC0NoYW5uZWxSdWxlEhwKGENIQU5ORUxfUlVMRV9VTlNQRUNJRklFRBAAEhQKEENIQU5ORUxfUlVMRV9TVU0QARIZChVDSEFOTkVMX1JVTEVfUFJJT1JJVFkQAirKAQoJUG9ydFBoYXNlEhoKFlBPUlRfUEhBU0VfVU5TUEVDSUZJRUQQABIUChBQT1JUX1BIQVNFX0FMT05FEAESFgoSUE9SVF9QSEFTRV9DT1VQTEVEEAISFwoTUE9SVF9QSEFTRV9BTElHTklORxADEhYKElBPUlRfUEhBU0VfRU5HQUdFRBAEEhcKE1BPUlRfUEhBU0VfQ0xVVENIRUQQBRITCg9QT1JUX1BIQVNFX0xPU1QQBhIUChBQT1JUX1BIQVNFX0ZBVUxUEAcqvAEKBlNhZmV0eRIWChJTQUZFVFlfVU5TUEVDSUZJRUQQABIRCg1TQUZFVFlfQUJTRU5UEAESEgoOU0FGRVRZX09QRU5JTkcQAhITCg9TQUZFVFlfRklSTVdBUkUQAxISCg5TQUZFVFlfVU5IT01FRBAEEhAKDFNBRkVUWV9IT01FRBAFEhAKDFNBRkVUWV9BUk1FRBAGEhAKDFNBRkVUWV9GQVVMVBAHEhQKEFNBRkVUWV9VTkdVQVJERUQQCCq9AQoEQ29kZRIUChBDT0RFX1VOU1BFQ0lGSUVEEAASCwoHQ09ERV9PSxABEhAKDENPREVfSU5WQUxJRBACEhQKEENPREVfVU5TVVBQT1JURUQQAxINCglDT0RFX0JVU1kQBBIPCgtDT0RFX0RFTklFRBAFEhEKDUNPREVfU0hVVERPV04QBhISCg5DT0RFX1RJTUVEX09VVBAHEhAKDENPREVfRVhQSVJFRBAIEhEKDUNPREVfUkVQTEFDRUQQCSpECgRSb2xlEhQKEFJPTEVfVU5TUEVDSUZJRUQQABIRCg1ST0xFX09CU0VSVkVSEAESEwoPUk9MRV9DT05UUk9MTEVSEAJiBnByb3RvMw");
+  fileDesc("Cgx0ZW5kb24ucHJvdG8SCXRlbmRvbi52MSJfCghEYXRhZ3JhbRISCgp0eF90aW1lX25zGAEgASgQEh0KBGVjaG8YAiABKAsyDy50ZW5kb24udjEuRWNobxIgCgZmcmFtZXMYAyADKAsyEC50ZW5kb24udjEuRnJhbWUiZgoERWNobxIXCg9wZWVyX3R4X3RpbWVfbnMYASABKBASEgoKcnhfdGltZV9ucxgCIAEoEBIaChJwZWVyX3BhY2tldF9udW1iZXIYAyABKAQSFQoNcmVjZWl2ZWRfbWFzaxgEIAEoByK2AwoFRnJhbWUSJwoFc3RhdGUYASABKAsyFi50ZW5kb24udjEuRGV2aWNlU3RhdGVIABIoCgVmb3JjZRgCIAEoCzIXLnRlbmRvbi52MS5Gb3JjZUNvbW1hbmRIABIlCgdjb250cm9sGAMgASgLMhIudGVuZG9uLnYxLkNvbnRyb2xIABIsCgtjb250cm9sX2FjaxgEIAEoCzIVLnRlbmRvbi52MS5Db250cm9sQWNrSAASHQoDYnllGAUgASgLMg4udGVuZG9uLnYxLkJ5ZUgAEicKBnJlcG9ydBgGIAEoCzIVLnRlbmRvbi52MS5MaW5rUmVwb3J0SAASMAoNZGV2aWNlX3JlcG9ydBgHIAEoCzIXLnRlbmRvbi52MS5EZXZpY2VSZXBvcnRIABIsCgtwZWVyX3JlcG9ydBgIIAEoCzIVLnRlbmRvbi52MS5QZWVyUmVwb3J0SAASKgoKcG9ydF9zdGF0ZRgJIAEoCzIULnRlbmRvbi52MS5Qb3J0U3RhdGVIABIpCgZzdGF0ZXMYCiABKAsyFy50ZW5kb24udjEuRGV2aWNlU3RhdGVzSABCBgoEYm9keSInCgRWZWMzEgkKAXgYASABKAESCQoBeRgCIAEoARIJCgF6GAMgASgBIjIKBFF1YXQSCQoBdxgBIAEoARIJCgF4GAIgASgBEgkKAXkYAyABKAESCQoBehgEIAEoASK8BgoLRGV2aWNlU3RhdGUSDAoEdGljaxgBIAEoBBISCgpzYW1wbGVkX25zGAIgASgQEiMKCnBvc2l0aW9uX20YAyABKAsyDy50ZW5kb24udjEuVmVjMxIlCgx2ZWxvY2l0eV9tcHMYBCABKAsyDy50ZW5kb24udjEuVmVjMxIoCg9mb3JjZV9hcHBsaWVkX24YBSABKAsyDy50ZW5kb24udjEuVmVjMxIQCghlbmVyZ3lfahgGIAEoARIZChFwZXJtaXR0ZWRfZm9yY2VfbhgHIAEoARIPCgdyZWFzb25zGAggASgHEhYKDmZvcmNlX3NlcXVlbmNlGAkgASgEEhQKDGZvcmNlX2FnZV9ucxgKIAEoBBIdCgRtb2RlGAsgASgOMg8udGVuZG9uLnYxLk1vZGUSDgoGZGV2aWNlGAwgASgNEg8KB2NoYW5uZWwYDSABKA0SJwoOZm9yY2Vfd2FudGVkX24YDiABKAsyDy50ZW5kb24udjEuVmVjMxIkCgtvcmllbnRhdGlvbhgPIAEoCzIPLnRlbmRvbi52MS5RdWF0Ei8KFmFuZ3VsYXJfdmVsb2NpdHlfcmFkcHMYECABKAsyDy50ZW5kb24udjEuVmVjMxIPCgdidXR0b25zGBEgASgHEioKEXRvcnF1ZV9hcHBsaWVkX25tGBIgASgLMg8udGVuZG9uLnYxLlZlYzMSGAoLZ3JpcHBlcl9yYWQYEyABKAFIAIgBARIjChZncmlwcGVyX3ZlbG9jaXR5X3JhZHBzGBQgASgBSAGIAQESJAoXZ3JpcHBlcl9mb3JjZV9hcHBsaWVkX24YFSABKAFIAogBARIlCgxoYW5kX2ZvcmNlX24YFiABKAsyDy50ZW5kb24udjEuVmVjMxIVCglqb2ludF9yYWQYFyADKAFCAhABEiAKFGpvaW50X3ZlbG9jaXR5X3JhZHBzGBggAygBQgIQARIgChRzdGlmZm5lc3Nfd2FudGVkX25wbRgZIAMoAUICEAFCDgoMX2dyaXBwZXJfcmFkQhkKF19ncmlwcGVyX3ZlbG9jaXR5X3JhZHBzQhoKGF9ncmlwcGVyX2ZvcmNlX2FwcGxpZWRfbiLdAgoMRGV2aWNlU3RhdGVzEgwKBHRpY2sYASABKAQSEgoKc2FtcGxlZF9ucxgCIAEoEBIPCgdkZXZpY2VzGAMgASgNEhYKCnBvc2l0aW9uX20YBCADKAFCAhABEhgKDHZlbG9jaXR5X21wcxgFIAMoAkICEAESGwoPZm9yY2VfYXBwbGllZF9uGAYgAygCQgIQARIUCghlbmVyZ3lfahgHIAMoAkICEAESHQoRcGVybWl0dGVkX2ZvcmNlX24YCCADKAJCAhABEiEKBG1vZGUYCSADKA4yDy50ZW5kb24udjEuTW9kZUICEAESEwoHcmVhc29ucxgKIAMoDUICEAESGgoOZm9yY2Vfc2VxdWVuY2UYCyADKARCAhABEhgKDGZvcmNlX2FnZV9ucxgMIAMoBEICEAESEwoHY2hhbm5lbBgNIAMoDUICEAESEwoHYnV0dG9ucxgOIAMoDUICEAEi+gIKDEZvcmNlQ29tbWFuZBIQCghzZXF1ZW5jZRgBIAEoBBIVCg1iYXNlZF9vbl90aWNrGAIgASgEEiAKB2ZvcmNlX24YAyABKAsyDy50ZW5kb24udjEuVmVjMxIkCgVtb2RlbBgEIAEoCzIVLnRlbmRvbi52MS5Mb2NhbE1vZGVsEhQKDHZhbGlkX2Zvcl91cxgFIAEoDRIOCgZkZXZpY2UYBiABKA0SDwoHY2hhbm5lbBgHIAEoDRIYChB0b3BvbG9neV9jaGFuZ2VkGAggASgIEhQKB2Vycm9yX24YCSABKAFIAIgBARIiCgl0b3JxdWVfbm0YCiABKAsyDy50ZW5kb24udjEuVmVjMxIcCg9ncmlwcGVyX2ZvcmNlX24YCyABKAFIAYgBARIwCg5yb3RhdGlvbl9tb2RlbBgOIAEoCzIYLnRlbmRvbi52MS5Sb3RhdGlvbk1vZGVsQgoKCF9lcnJvcl9uQhIKEF9ncmlwcGVyX2ZvcmNlX24iXgoNUm90YXRpb25Nb2RlbBInCg5hdF9vcmllbnRhdGlvbhgBIAEoCzIPLnRlbmRvbi52MS5RdWF0EiQKGGFuZ3VsYXJfc3RpZmZuZXNzX25tcHJhZBgCIAMoAUICEAEimwEKCkxvY2FsTW9kZWwSHQoEYXRfbRgBIAEoCzIPLnRlbmRvbi52MS5WZWMzEhkKDXN0aWZmbmVzc19ucG0YAiADKAFCAhABEhsKDnZhbGlkX3JhZGl1c19tGAMgASgBSACIAQESIwoHY29udGFjdBgEIAEoCzISLnRlbmRvbi52MS5Db250YWN0QhEKD192YWxpZF9yYWRpdXNfbSJfCgdDb250YWN0Eh8KBm5vcm1hbBgBIAEoCzIPLnRlbmRvbi52MS5WZWMzEg0KBWdhcF9tGAIgASgBEiQKBXRhYmxlGAMgASgLMhUudGVuZG9uLnYxLkZvcmNlVGFibGUiSAoKRm9yY2VUYWJsZRIVCg1maXJzdF9kZXB0aF9tGAEgASgBEg4KBnN0ZXBfbRgCIAEoARITCgdmb3JjZV9uGAMgAygBQgIQASLzBAoHQ29udHJvbBIKCgJpZBgBIAEoDRIxCg5zZXRfc3RhdGVfcmF0ZRgCIAEoCzIXLnRlbmRvbi52MS5TZXRTdGF0ZVJhdGVIABIhCgVyZWFybRgDIAEoCzIQLnRlbmRvbi52MS5SZWFybUgAEicKCGRlc2NyaWJlGAQgASgLMhMudGVuZG9uLnYxLkRlc2NyaWJlSAASKgoKdGFrZV9sZWFzZRgFIAEoCzIULnRlbmRvbi52MS5UYWtlTGVhc2VIABIqCgpnaXZlX2xlYXNlGAYgASgLMhQudGVuZG9uLnYxLkdpdmVMZWFzZUgAEjkKEnNldF9zdGF0ZV9kZWFkYmFuZBgIIAEoCzIbLnRlbmRvbi52MS5TZXRTdGF0ZURlYWRiYW5kSAASIwoGZGlzYXJtGAkgASgLMhEudGVuZG9uLnYxLkRpc2FybUgAEioKCnNldF9vdXRwdXQYCiABKAsyFC50ZW5kb24udjEuU2V0T3V0cHV0SAASIwoGY291cGxlGAsgASgLMhEudGVuZG9uLnYxLkNvdXBsZUgAEiMKBmVuZ2FnZRgMIAEoCzIRLnRlbmRvbi52MS5FbmdhZ2VIABIpCglkaXNlbmdhZ2UYDSABKAsyFC50ZW5kb24udjEuRGlzZW5nYWdlSAASKAoJc2V0X3NjYWxlGA4gASgLMhMudGVuZG9uLnYxLlNldFNjYWxlSAASKAoJc2V0X3NoYXJlGA8gASgLMhMudGVuZG9uLnYxLlNldFNoYXJlSAASKgoKbGVhc2VfbG9zdBgHIAEoCzIULnRlbmRvbi52MS5MZWFzZUxvc3RIAEIECgJvcCIqCgxTZXRTdGF0ZVJhdGUSCgoCaHoYASABKA0SDgoGZGV2aWNlGAIgASgNIkwKEFNldFN0YXRlRGVhZGJhbmQSDQoFc2hhcmUYASABKAESEQoJZmxvb3JfbXBzGAIgASgBEhYKDm1heF9zaWxlbmNlX3VzGAMgASgNIhcKBVJlYXJtEg4KBmRldmljZRgBIAEoDSIYCgZEaXNhcm0SDgoGZGV2aWNlGAEgASgNIp8ECgZDb3VwbGUSDgoGZGV2aWNlGAEgASgNEg8KB2NoYW5uZWwYAiABKA0SIQoEcm9sZRgDIAEoDjITLnRlbmRvbi52MS5Qb3J0Um9sZRIpCgZtZXRob2QYBCABKA4yGS50ZW5kb24udjEuQ291cGxpbmdNZXRob2QSFgoOcG9zaXRpb25fc2NhbGUYBSABKAESEwoLZm9yY2Vfc2NhbGUYBiABKAESIQoIcm90YXRpb24YByABKAsyDy50ZW5kb24udjEuUXVhdBIMCgRheGVzGAggASgNEhUKDXN0aWZmbmVzc19ucG0YCSABKAESGwoTbXV0dWFsX2RhbXBpbmdfbnNwbRgKIAEoARIUCgxkYW1waW5nX25zcG0YCyABKAESFgoOYWRhcHRfdG9fZGVsYXkYDCABKAgSDQoFcHVyc2UYDSABKAgSEQoJcGVyaW9kX3VzGA4gASgNEhAKCGFic29sdXRlGA8gASgIEh0KFXR1cm5fc3RpZmZuZXNzX25tcHJhZBgQIAEoARIcChR0dXJuX2RhbXBpbmdfbm1zcHJhZBgRIAEoARIaChJncmlwX3N0aWZmbmVzc19ucG0YEiABKAESGQoRZ3JpcF9kYW1waW5nX25zcG0YEyABKAESGAoQZHJpZnRfcmF0ZV9wZXJfcxgUIAEoARIkCgRyYXRlGBUgASgLMhYudGVuZG9uLnYxLlJhdGVDb250cm9sIk0KC1JhdGVDb250cm9sEhMKC2RlYWRfem9uZV9tGAEgASgBEhIKCmdhaW5fcGVyX3MYAiABKAESFQoNbWF4X3NwZWVkX21wcxgDIAEoASIYCgZFbmdhZ2USDgoGZGV2aWNlGAEgASgNIhsKCURpc2VuZ2FnZRIOCgZkZXZpY2UYASABKA0iRwoIU2V0U2NhbGUSDgoGZGV2aWNlGAEgASgNEhYKDnBvc2l0aW9uX3NjYWxlGAIgASgBEhMKC2ZvcmNlX3NjYWxlGAMgASgBIjoKCFNldFNoYXJlEg4KBmRldmljZRgBIAEoDRIPCgdjaGFubmVsGAIgASgNEg0KBXNoYXJlGAMgASgBInAKCVNldE91dHB1dBIOCgZkZXZpY2UYASABKA0SDgoGb3V0cHV0GAIgASgNEg0KA3JnYhgDIAEoB0gAEikKCXZpYnJhdGlvbhgEIAEoCzIULnRlbmRvbi52MS5WaWJyYXRpb25IAEIJCgdzZXR0aW5nIkkKCVZpYnJhdGlvbhIRCglhbXBsaXR1ZGUYASABKAESFAoMZnJlcXVlbmN5X2h6GAIgASgBEhMKC2R1cmF0aW9uX21zGAMgASgNIioKCERlc2NyaWJlEg4KBmRldmljZRgBIAEoDRIOCgZoYW5kbGUYAiABKAgiLAoJVGFrZUxlYXNlEg4KBmRldmljZRgBIAEoDRIPCgdjaGFubmVsGAIgASgNIiwKCUdpdmVMZWFzZRIOCgZkZXZpY2UYASABKA0SDwoHY2hhbm5lbBgCIAEoDSI4CglMZWFzZUxvc3QSDgoGZGV2aWNlGAEgASgNEg8KB2NoYW5uZWwYAiABKA0SCgoCdG8YAyABKAkitAEKCkNvbnRyb2xBY2sSCgoCaWQYASABKA0SHQoEY29kZRgCIAEoDjIPLnRlbmRvbi52MS5Db2RlEg4KBmRldGFpbBgDIAEoCRIPCgd3YWl0X21zGAQgASgNEiwKBmRldmljZRgFIAEoCzIcLnRlbmRvbi52MS5EZXZpY2VEZXNjcmlwdGlvbhIsCgZoYW5kbGUYBiABKAsyHC50ZW5kb24udjEuSGFuZGxlRGVzY3JpcHRpb24i6gIKEURldmljZURlc2NyaXB0aW9uEg4KBmRldmljZRgBIAEoDRIMCgRuYW1lGAIgASgJEg0KBW1vZGVsGAMgASgJEhQKDHBvc2l0aW9uX2RvZhgEIAEoDRIRCglmb3JjZV9kb2YYBSABKA0SKAoPd29ya3NwYWNlX21pbl9tGAYgASgLMg8udGVuZG9uLnYxLlZlYzMSKAoPd29ya3NwYWNlX21heF9tGAcgASgLMg8udGVuZG9uLnYxLlZlYzMSEwoLbWF4X2ZvcmNlX24YCCABKAESGgoSY29udGludW91c19mb3JjZV9uGAkgASgBEhkKEW1heF9zdGlmZm5lc3NfbnBtGAogASgBEh0KFXBvc2l0aW9uX3Jlc29sdXRpb25fbRgLIAEoARIPCgdsb29wX2h6GAwgASgNEi8KCGNoYW5uZWxzGA0gAygLMh0udGVuZG9uLnYxLkNoYW5uZWxEZXNjcmlwdGlvbiLWAgoRSGFuZGxlRGVzY3JpcHRpb24SDgoGZGV2aWNlGAEgASgNEi0KFG9wZXJhdG9yX2Zyb21fZGV2aWNlGAIgASgLMg8udGVuZG9uLnYxLlF1YXQSDwoHYnV0dG9ucxgDIAMoCRIcChRvcmllbnRhdGlvbl9tZWFzdXJlZBgEIAEoCBIVCg1tYXhfdG9ycXVlX25tGAUgASgBEh0KEGdyaXBwZXJfb3Blbl9yYWQYBiABKAFIAIgBARIbChNtYXhfZ3JpcHBlcl9mb3JjZV9uGAcgASgBEg0KBWdyb3VwGAggASgJEh0KBGhhbmQYCSABKA4yDy50ZW5kb24udjEuSGFuZBIOCgZqb2ludHMYCiADKAkSLQoHb3V0cHV0cxgLIAMoCzIcLnRlbmRvbi52MS5PdXRwdXREZXNjcmlwdGlvbkITChFfZ3JpcHBlcl9vcGVuX3JhZCJGChFPdXRwdXREZXNjcmlwdGlvbhIMCgRuYW1lGAEgASgJEiMKBGtpbmQYAiABKA4yFS50ZW5kb24udjEuT3V0cHV0S2luZCJqChJDaGFubmVsRGVzY3JpcHRpb24SDAoEbmFtZRgBIAEoCRIkCgRydWxlGAIgASgOMhYudGVuZG9uLnYxLkNoYW5uZWxSdWxlEhAKCGxlYXNlX21zGAMgASgNEg4KBmhvbGRlchgEIAEoCSI0CgNCeWUSHQoEY29kZRgBIAEoDjIPLnRlbmRvbi52MS5Db2RlEg4KBnJlYXNvbhgCIAEoCSLeBAoKTGlua1JlcG9ydBIOCgZudW1iZXIYASABKAQSEAoIdW50aWxfbnMYAiABKBASDwoHc3Bhbl9ucxgDIAEoBBIOCgZmb3JjZXMYBCABKAQSEwoLbGF0ZV9zZXJ2ZXIYBSABKAQSFAoMbGF0ZV9uZXR3b3JrGAYgASgEEhMKC2xhdGVfZW5naW5lGAcgASgEEhUKDXdvcnN0X2xhdGVfbnMYCCABKAQSFgoObG9uZ2VzdF9nYXBfbnMYCSABKAQSJQoKcm91bmRfdHJpcBgKIAEoCzIRLnRlbmRvbi52MS5EZWxheXMSJAoJdG9fc2VydmVyGAsgASgLMhEudGVuZG9uLnYxLkRlbGF5cxIkCgl0b19jbGllbnQYDCABKAsyES50ZW5kb24udjEuRGVsYXlzEhcKD2Nsb2NrX29mZnNldF9ucxgNIAEoEhIXCg9jbG9ja19kcmlmdF9wcG0YDiABKAESFgoOY2xvY2tfZXJyb3JfbnMYDyABKAQSEAoIcmVjZWl2ZWQYECABKAQSDAoEbG9zdBgRIAEoBBIRCglyZW9yZGVyZWQYEiABKAQSEgoKZHVwbGljYXRlZBgTIAEoBBINCgV3b3JkcxgUIAEoCRIUCgxsYXRlX3Vua25vd24YFSABKAQSGgoScmVmdXNlZF9ub3RfZmluaXRlGBYgASgEEh0KFXJlZnVzZWRfb3V0X29mX2JvdW5kcxgXIAEoBBIcChRyZWZ1c2VkX3Vua25vd25fdGljaxgYIAEoBBIcChRyZWZ1c2VkX29sZF9zZXF1ZW5jZRgZIAEoBCIrCgZEZWxheXMSEQoJbWVkaWFuX25zGAEgASgSEg4KBnA5OV9ucxgCIAEoEiLjBQoJUG9ydFN0YXRlEg4KBmRldmljZRgBIAEoDRIPCgdjaGFubmVsGAIgASgNEg0KBWVwb2NoGAMgASgEEhAKCHNlcXVlbmNlGAQgASgEEhUKDWFuc3dlcnNfZXBvY2gYBSABKAQSDwoHYW5zd2VycxgGIAEoBBIPCgd0aW1lX25zGAcgASgQEhUKDXJvdW5kX3RyaXBfbnMYCCABKAQSIwoFcGhhc2UYCSABKA4yFC50ZW5kb24udjEuUG9ydFBoYXNlEhIKCmVuZ2FnZW1lbnQYCiABKAQSDwoHYnV0dG9ucxgLIAEoBxIjCgpwb3NpdGlvbl9tGAwgASgLMg8udGVuZG9uLnYxLlZlYzMSJQoMdmVsb2NpdHlfbXBzGA0gASgLMg8udGVuZG9uLnYxLlZlYzMSIAoHZm9yY2VfbhgOIAEoCzIPLnRlbmRvbi52MS5WZWMzEigKD2NvbnRhY3RfZm9yY2VfbhgPIAEoCzIPLnRlbmRvbi52MS5WZWMzEhEKCWFjY291bnRfahgQIAEoARIOCgZuZWVkX2oYESABKAESDwoHZ2l2ZW5fahgSIAEoARIPCgd0YWtlbl9qGBMgASgBEiYKDXdhdmVfaW50ZWdyYWwYFCABKAsyDy50ZW5kb24udjEuVmVjMxIVCg13YXZlX2VuZXJneV9qGBUgASgBEicKB3N1cmZhY2UYFiABKAsyFi50ZW5kb24udjEuUG9ydFN1cmZhY2USIQoEdHVybhgXIAEoCzITLnRlbmRvbi52MS5Qb3J0VHVybhIhCgRncmlwGBggASgLMhMudGVuZG9uLnYxLlBvcnRHcmlwEhMKC2VuZXJneV9pbl9qGBkgASgBEhIKBXNoYXJlGBogASgBSACIAQESFgoOcG9zaXRpb25fc2NhbGUYGyABKAESEwoLZm9yY2Vfc2NhbGUYHCABKAESDwoHb2ZfcGVlchgdIAEoCEIICgZfc2hhcmUifgoIUG9ydFR1cm4SHQoEdHVybhgBIAEoCzIPLnRlbmRvbi52MS5RdWF0Ei8KFmFuZ3VsYXJfdmVsb2NpdHlfcmFkcHMYAiABKAsyDy50ZW5kb24udjEuVmVjMxIiCgl0b3JxdWVfbm0YAyABKAsyDy50ZW5kb24udjEuVmVjMyKJAQoIUG9ydEdyaXASEQoJb3BlbmluZ19tGAEgASgBEhQKDHZlbG9jaXR5X21wcxgCIAEoARIPCgdmb3JjZV9uGAMgASgBEhEKCWFjY291bnRfahgEIAEoARIOCgZuZWVkX2oYBSABKAESDwoHZ2l2ZW5fahgGIAEoARIPCgd0YWtlbl9qGAcgASgBIlcKC1BvcnRTdXJmYWNlEh8KBm5vcm1hbBgBIAEoCzIPLnRlbmRvbi52MS5WZWMzEhAKCG9mZnNldF9tGAIgASgBEhUKDXN0aWZmbmVzc19ucG0YAyABKAEi9AEKDERldmljZVJlcG9ydBIOCgZudW1iZXIYASABKAQSEAoIdW50aWxfbnMYAiABKBASDwoHc3Bhbl9ucxgDIAEoBBIOCgZkZXZpY2UYBCABKA0SDQoFc3RlcHMYBSABKAQSDgoGbWlzc2VkGAYgASgEEhAKCG92ZXJydW5zGAcgASgEEg4KBnVuc2VlbhgIIAEoBBIcChBsYXRlbmVzc191c19sb2cyGAkgAygEQgIQARIhCgZzYWZldHkYCiABKA4yES50ZW5kb24udjEuU2FmZXR5Eg0KBWZhdWx0GAsgASgJEhAKCGRlZ3JhZGVkGAwgASgJIo4BCgpQZWVyUmVwb3J0Eg4KBmRldmljZRgBIAEoDRIPCgdjaGFubmVsGAIgASgNEgwKBG5hbWUYAyABKAkSFAoMc3RhdGVfb25lX2luGAQgASgNEhYKDmZvcmNlc19yZWZ1c2VkGAUgASgIEiMKBGxpbmsYBiABKAsyFS50ZW5kb24udjEuTGlua1JlcG9ydCKSAQoFSGVsbG8SEwoLdmVyc2lvbl9taW4YASABKA0SEwoLdmVyc2lvbl9tYXgYAiABKA0SHQoEcm9sZRgDIAEoDjIPLnRlbmRvbi52MS5Sb2xlEgwKBG5hbWUYBCABKAkSEAoIZmVhdHVyZXMYBSADKAkSIAoGY2xhaW1zGAYgAygLMhAudGVuZG9uLnYxLkNsYWltIkcKBUNsYWltEg4KBmRldmljZRgBIAEoCRIPCgdjaGFubmVsGAIgASgJEh0KBHJvbGUYAyABKA4yDy50ZW5kb24udjEuUm9sZSJeCgZBbnN3ZXISJQoHd2VsY29tZRgBIAEoCzISLnRlbmRvbi52MS5XZWxjb21lSAASJQoHcmVmdXNlZBgCIAEoCzISLnRlbmRvbi52MS5SZWZ1c2VkSABCBgoEYm9keSLrAQoHV2VsY29tZRIPCgd2ZXJzaW9uGAEgASgNEhAKCGZlYXR1cmVzGAIgAygJEh0KBHJvbGUYAyABKA4yDy50ZW5kb24udjEuUm9sZRITCgtkZXZpY2VfbmFtZRgEIAEoCRITCgttYXhfZm9yY2VfbhgFIAEoARIdChVwb3NpdGlvbl9yZXNvbHV0aW9uX20YBiABKAESDwoHbG9vcF9oehgHIAEoDRISCgp0aW1lb3V0X21zGAggASgNEg4KBnNlcnZlchgJIAEoCRIgCgZncmFudHMYCiADKAsyEC50ZW5kb24udjEuR3JhbnQiRwoFR3JhbnQSDgoGZGV2aWNlGAEgASgNEg8KB2NoYW5uZWwYAiABKA0SHQoEcm9sZRgDIAEoDjIPLnRlbmRvbi52MS5Sb2xlImIKB1JlZnVzZWQSHQoEY29kZRgBIAEoDjIPLnRlbmRvbi52MS5Db2RlEg4KBmRldGFpbBgCIAEoCRITCgt2ZXJzaW9uX21pbhgDIAEoDRITCgt2ZXJzaW9uX21heBgEIAEoDSqFAQoETW9kZRIUChBNT0RFX1VOU1BFQ0lGSUVEEAASDQoJTU9ERV9JRExFEAESDwoLTU9ERV9BQ1RJVkUQAhIQCgxNT0RFX0hPTERJTkcQAxIRCg1NT0RFX0RFQ0FZSU5HEAQSEgoOTU9ERV9TQUZFX1NUT1AQBRIOCgpNT0RFX0ZBVUxUEAYqUwoIUG9ydFJvbGUSGQoVUE9SVF9ST0xFX1VOU1BFQ0lGSUVEEAASFAoQUE9SVF9ST0xFX0xFQURFUhABEhYKElBPUlRfUk9MRV9GT0xMT1dFUhACKo8CCg5Db3VwbGluZ01ldGhvZBIfChtDT1VQTElOR19NRVRIT0RfVU5TUEVDSUZJRUQQABIlCiFDT1VQTElOR19NRVRIT0RfUE9TSVRJT05fUE9TSVRJT04QARIiCh5DT1VQTElOR19NRVRIT0RfUE9TSVRJT05fRk9SQ0UQAhIZChVDT1VQTElOR19NRVRIT0RfV0FWRVMQAxIbChdDT1VQTElOR19NRVRIT0RfU1VSRkFDRRAEEh0KGUNPVVBMSU5HX01FVEhPRF9QQVNTSVZJVFkQBRIgChxDT1VQTElOR19NRVRIT0RfU0VUX1BPU0lUSU9OEAYSGAoUQ09VUExJTkdfTUVUSE9EX1JBVEUQBypLCgpPdXRwdXRLaW5kEhYKEk9VVFBVVF9VTlNQRUNJRklFRBAAEg8KC09VVFBVVF9MQU1QEAESFAoQT1VUUFVUX1ZJQlJBVElPThACKjMKBEhhbmQSDAoISEFORF9BTlkQABINCglIQU5EX0xFRlQQARIOCgpIQU5EX1JJR0hUEAIqXAoLQ2hhbm5lbFJ1bGUSHAoYQ0hBTk5FTF9SVUxFX1VOU1BFQ0lGSUVEEAASFAoQQ0hBTk5FTF9SVUxFX1NVTRABEhkKFUNIQU5ORUxfUlVMRV9QUklPUklUWRACKsoBCglQb3J0UGhhc2USGgoWUE9SVF9QSEFTRV9VTlNQRUNJRklFRBAAEhQKEFBPUlRfUEhBU0VfQUxPTkUQARIWChJQT1JUX1BIQVNFX0NPVVBMRUQQAhIXChNQT1JUX1BIQVNFX0FMSUdOSU5HEAMSFgoSUE9SVF9QSEFTRV9FTkdBR0VEEAQSFwoTUE9SVF9QSEFTRV9DTFVUQ0hFRBAFEhMKD1BPUlRfUEhBU0VfTE9TVBAGEhQKEFBPUlRfUEhBU0VfRkFVTFQQByq8AQoGU2FmZXR5EhYKElNBRkVUWV9VTlNQRUNJRklFRBAAEhEKDVNBRkVUWV9BQlNFTlQQARISCg5TQUZFVFlfT1BFTklORxACEhMKD1NBRkVUWV9GSVJNV0FSRRADEhIKDlNBRkVUWV9VTkhPTUVEEAQSEAoMU0FGRVRZX0hPTUVEEAUSEAoMU0FGRVRZX0FSTUVEEAYSEAoMU0FGRVRZX0ZBVUxUEAcSFAoQU0FGRVRZX1VOR1VBUkRFRBAIKr0BCgRDb2RlEhQKEENPREVfVU5TUEVDSUZJRUQQABILCgdDT0RFX09LEAESEAoMQ09ERV9JTlZBTElEEAISFAoQQ09ERV9VTlNVUFBPUlRFRBADEg0KCUNPREVfQlVTWRAEEg8KC0NPREVfREVOSUVEEAUSEQoNQ09ERV9TSFVURE9XThAGEhIKDkNPREVfVElNRURfT1VUEAcSEAoMQ09ERV9FWFBJUkVEEAgSEQoNQ09ERV9SRVBMQUNFRBAJKkQKBFJvbGUSFAoQUk9MRV9VTlNQRUNJRklFRBAAEhEKDVJPTEVfT0JTRVJWRVIQARITCg9ST0xFX0NPTlRST0xMRVIQAmIGcHJvdG8z");
 
 /**
  * @generated from message tendon.v1.Datagram
@@ -170,6 +170,16 @@ export type Frame = Message<"tendon.v1.Frame"> & {
      */
     value: PortState;
     case: "portState";
+  } | {
+    /**
+     * Only to a client that named the feature "state-columns"
+     *
+     * server → client, unreliable, of each device the newest tick wins
+     *
+     * @generated from field: tendon.v1.DeviceStates states = 10;
+     */
+    value: DeviceStates;
+    case: "states";
   } | { case: undefined; value?: undefined };
 };
 
@@ -449,6 +459,121 @@ export const DeviceStateSchema: GenMessage<DeviceState> = /*@__PURE__*/
   messageDesc(file_tendon, 5);
 
 /**
+ * States of several devices at one haptic step, in columns: half the bytes of as many DeviceState, as all but the
+ * positions are rounded to single precision. Entry i of a column is of the i-th device in `devices`, in the order of
+ * their numbers; of a vector it is three entries. A frame with a column of another length is refused, and one without
+ * any device. All but the last five columns must be there.
+ *
+ * @generated from message tendon.v1.DeviceStates
+ */
+export type DeviceStates = Message<"tendon.v1.DeviceStates"> & {
+  /**
+   * number of the haptic step, of all of them
+   *
+   * @generated from field: uint64 tick = 1;
+   */
+  tick: bigint;
+
+  /**
+   * [-2^60, 2^60]: when the positions were sampled
+   *
+   * @generated from field: sfixed64 sampled_ns = 2;
+   */
+  sampledNs: bigint;
+
+  /**
+   * bit i: device i is among them
+   *
+   * @generated from field: uint32 devices = 3;
+   */
+  devices: number;
+
+  /**
+   * [-1e12, 1e12]
+   *
+   * @generated from field: repeated double position_m = 4 [packed = true];
+   */
+  positionM: number[];
+
+  /**
+   * [-1e12, 1e12]
+   *
+   * @generated from field: repeated float velocity_mps = 5 [packed = true];
+   */
+  velocityMps: number[];
+
+  /**
+   * [-1e12, 1e12]
+   *
+   * @generated from field: repeated float force_applied_n = 6 [packed = true];
+   */
+  forceAppliedN: number[];
+
+  /**
+   * [-1e12, 1e12]
+   *
+   * @generated from field: repeated float energy_j = 7 [packed = true];
+   */
+  energyJ: number[];
+
+  /**
+   * [0, 1e12] or +infinity
+   *
+   * @generated from field: repeated float permitted_force_n = 8 [packed = true];
+   */
+  permittedForceN: number[];
+
+  /**
+   * @generated from field: repeated tendon.v1.Mode mode = 9 [packed = true];
+   */
+  mode: Mode[];
+
+  /**
+   * None: 0, for each device.
+   *
+   * [0, …]
+   *
+   * @generated from field: repeated uint32 reasons = 10 [packed = true];
+   */
+  reasons: number[];
+
+  /**
+   * [0, …]
+   *
+   * @generated from field: repeated uint64 force_sequence = 11 [packed = true];
+   */
+  forceSequence: bigint[];
+
+  /**
+   * [0, 2^60]
+   *
+   * @generated from field: repeated uint64 force_age_ns = 12 [packed = true];
+   */
+  forceAgeNs: bigint[];
+
+  /**
+   * [0, 7]
+   *
+   * @generated from field: repeated uint32 channel = 13 [packed = true];
+   */
+  channel: number[];
+
+  /**
+   * [0, …]
+   *
+   * @generated from field: repeated uint32 buttons = 14 [packed = true];
+   */
+  buttons: number[];
+};
+
+/**
+ * Describes the message tendon.v1.DeviceStates.
+ * Use `create(DeviceStatesSchema)` to create a new message.
+ */
+export const DeviceStatesSchema: GenMessage<DeviceStates> = /*@__PURE__*/
+  messageDesc(file_tendon, 6);
+
+/**
  * The force that the physics engine wants.
  *
  * @generated from message tendon.v1.ForceCommand
@@ -546,7 +671,7 @@ export type ForceCommand = Message<"tendon.v1.ForceCommand"> & {
  * Use `create(ForceCommandSchema)` to create a new message.
  */
 export const ForceCommandSchema: GenMessage<ForceCommand> = /*@__PURE__*/
-  messageDesc(file_tendon, 6);
+  messageDesc(file_tendon, 7);
 
 /**
  * The torque near one orientation, so that the device loop can follow the hand's turns. With p = (w, v) = the rotation
@@ -578,7 +703,7 @@ export type RotationModel = Message<"tendon.v1.RotationModel"> & {
  * Use `create(RotationModelSchema)` to create a new message.
  */
 export const RotationModelSchema: GenMessage<RotationModel> = /*@__PURE__*/
-  messageDesc(file_tendon, 7);
+  messageDesc(file_tendon, 8);
 
 /**
  * The remote environment near one position, so that the device loop can follow the hand:
@@ -623,7 +748,7 @@ export type LocalModel = Message<"tendon.v1.LocalModel"> & {
  * Use `create(LocalModelSchema)` to create a new message.
  */
 export const LocalModelSchema: GenMessage<LocalModel> = /*@__PURE__*/
-  messageDesc(file_tendon, 8);
+  messageDesc(file_tendon, 9);
 
 /**
  * A surface that the tool touches or is about to. It only pushes, unless a table says otherwise.
@@ -658,7 +783,7 @@ export type Contact = Message<"tendon.v1.Contact"> & {
  * Use `create(ContactSchema)` to create a new message.
  */
 export const ContactSchema: GenMessage<Contact> = /*@__PURE__*/
-  messageDesc(file_tendon, 9);
+  messageDesc(file_tendon, 10);
 
 /**
  * The force along the normal, at the depths first_depth_m + i · step_m below at_m: at_m − depth · normal.
@@ -693,7 +818,7 @@ export type ForceTable = Message<"tendon.v1.ForceTable"> & {
  * Use `create(ForceTableSchema)` to create a new message.
  */
 export const ForceTableSchema: GenMessage<ForceTable> = /*@__PURE__*/
-  messageDesc(file_tendon, 10);
+  messageDesc(file_tendon, 11);
 
 /**
  * @generated from message tendon.v1.Control
@@ -807,7 +932,7 @@ export type Control = Message<"tendon.v1.Control"> & {
  * Use `create(ControlSchema)` to create a new message.
  */
 export const ControlSchema: GenMessage<Control> = /*@__PURE__*/
-  messageDesc(file_tendon, 11);
+  messageDesc(file_tendon, 12);
 
 /**
  * How many states of a device per second the client wants.
@@ -833,7 +958,7 @@ export type SetStateRate = Message<"tendon.v1.SetStateRate"> & {
  * Use `create(SetStateRateSchema)` to create a new message.
  */
 export const SetStateRateSchema: GenMessage<SetStateRate> = /*@__PURE__*/
-  messageDesc(file_tendon, 12);
+  messageDesc(file_tendon, 13);
 
 /**
  * Leave out the states that this client can foretell: after a state with velocity v the next one that is sent is the
@@ -870,7 +995,7 @@ export type SetStateDeadband = Message<"tendon.v1.SetStateDeadband"> & {
  * Use `create(SetStateDeadbandSchema)` to create a new message.
  */
 export const SetStateDeadbandSchema: GenMessage<SetStateDeadband> = /*@__PURE__*/
-  messageDesc(file_tendon, 13);
+  messageDesc(file_tendon, 14);
 
 /**
  * Clears a latched fault, and takes a Disarm back. With a safety layer it is the operator's request to arm. Only from a
@@ -892,7 +1017,7 @@ export type Rearm = Message<"tendon.v1.Rearm"> & {
  * Use `create(RearmSchema)` to create a new message.
  */
 export const RearmSchema: GenMessage<Rearm> = /*@__PURE__*/
-  messageDesc(file_tendon, 14);
+  messageDesc(file_tendon, 15);
 
 /**
  * No force from the next haptic step on, without a ramp, whatever engines ask for, until a Rearm: neither a new force
@@ -916,7 +1041,7 @@ export type Disarm = Message<"tendon.v1.Disarm"> & {
  * Use `create(DisarmSchema)` to create a new message.
  */
 export const DisarmSchema: GenMessage<Disarm> = /*@__PURE__*/
-  messageDesc(file_tendon, 15);
+  messageDesc(file_tendon, 16);
 
 /**
  * My device is the other end of this one: what my end is like. From whoever has claimed the channel as a controller, to
@@ -1078,7 +1203,7 @@ export type Couple = Message<"tendon.v1.Couple"> & {
  * Use `create(CoupleSchema)` to create a new message.
  */
 export const CoupleSchema: GenMessage<Couple> = /*@__PURE__*/
-  messageDesc(file_tendon, 16);
+  messageDesc(file_tendon, 17);
 
 /**
  * The leader's handle, pulled back to its centre, says how fast the follower moves.
@@ -1113,7 +1238,7 @@ export type RateControl = Message<"tendon.v1.RateControl"> & {
  * Use `create(RateControlSchema)` to create a new message.
  */
 export const RateControlSchema: GenMessage<RateControl> = /*@__PURE__*/
-  messageDesc(file_tendon, 17);
+  messageDesc(file_tendon, 18);
 
 /**
  * The operator's act: couples the handles, at the leader's server. Only from a controller of the device. CODE_OK: the
@@ -1135,7 +1260,7 @@ export type Engage = Message<"tendon.v1.Engage"> & {
  * Use `create(EngageSchema)` to create a new message.
  */
 export const EngageSchema: GenMessage<Engage> = /*@__PURE__*/
-  messageDesc(file_tendon, 18);
+  messageDesc(file_tendon, 19);
 
 /**
  * Ends that, at either end. Only from a controller of the device.
@@ -1156,7 +1281,7 @@ export type Disengage = Message<"tendon.v1.Disengage"> & {
  * Use `create(DisengageSchema)` to create a new message.
  */
 export const DisengageSchema: GenMessage<Disengage> = /*@__PURE__*/
-  messageDesc(file_tendon, 19);
+  messageDesc(file_tendon, 20);
 
 /**
  * The scales of the coupling from now on, at the leader's server. Only from a controller of the device, while the
@@ -1193,7 +1318,7 @@ export type SetScale = Message<"tendon.v1.SetScale"> & {
  * Use `create(SetScaleSchema)` to create a new message.
  */
 export const SetScaleSchema: GenMessage<SetScale> = /*@__PURE__*/
-  messageDesc(file_tendon, 20);
+  messageDesc(file_tendon, 21);
 
 /**
  * How much the leader of that channel counts among the leaders of a follower, at the follower's server. It gets there
@@ -1230,7 +1355,7 @@ export type SetShare = Message<"tendon.v1.SetShare"> & {
  * Use `create(SetShareSchema)` to create a new message.
  */
 export const SetShareSchema: GenMessage<SetShare> = /*@__PURE__*/
-  messageDesc(file_tendon, 21);
+  messageDesc(file_tendon, 22);
 
 /**
  * Sets a lamp of the device, or makes it vibrate: from a controller of the device that holds one of its channels. To a
@@ -1282,7 +1407,7 @@ export type SetOutput = Message<"tendon.v1.SetOutput"> & {
  * Use `create(SetOutputSchema)` to create a new message.
  */
 export const SetOutputSchema: GenMessage<SetOutput> = /*@__PURE__*/
-  messageDesc(file_tendon, 22);
+  messageDesc(file_tendon, 23);
 
 /**
  * A pulse. It ends by itself; another one takes its place at once.
@@ -1317,7 +1442,7 @@ export type Vibration = Message<"tendon.v1.Vibration"> & {
  * Use `create(VibrationSchema)` to create a new message.
  */
 export const VibrationSchema: GenMessage<Vibration> = /*@__PURE__*/
-  messageDesc(file_tendon, 23);
+  messageDesc(file_tendon, 24);
 
 /**
  * What a device is and can do: answered with a DeviceDescription. Of any device that the server has, claimed or not.
@@ -1345,7 +1470,7 @@ export type Describe = Message<"tendon.v1.Describe"> & {
  * Use `create(DescribeSchema)` to create a new message.
  */
 export const DescribeSchema: GenMessage<Describe> = /*@__PURE__*/
-  messageDesc(file_tendon, 24);
+  messageDesc(file_tendon, 25);
 
 /**
  * I want to be the one whose forces this channel takes. From whoever has claimed it as a controller. CODE_OK: you are,
@@ -1374,7 +1499,7 @@ export type TakeLease = Message<"tendon.v1.TakeLease"> & {
  * Use `create(TakeLeaseSchema)` to create a new message.
  */
 export const TakeLeaseSchema: GenMessage<TakeLease> = /*@__PURE__*/
-  messageDesc(file_tendon, 25);
+  messageDesc(file_tendon, 26);
 
 /**
  * I do not want to be it any more.
@@ -1402,7 +1527,7 @@ export type GiveLease = Message<"tendon.v1.GiveLease"> & {
  * Use `create(GiveLeaseSchema)` to create a new message.
  */
 export const GiveLeaseSchema: GenMessage<GiveLease> = /*@__PURE__*/
-  messageDesc(file_tendon, 26);
+  messageDesc(file_tendon, 27);
 
 /**
  * You are not it any more. Only to a client that named the feature "channels".
@@ -1437,7 +1562,7 @@ export type LeaseLost = Message<"tendon.v1.LeaseLost"> & {
  * Use `create(LeaseLostSchema)` to create a new message.
  */
 export const LeaseLostSchema: GenMessage<LeaseLost> = /*@__PURE__*/
-  messageDesc(file_tendon, 27);
+  messageDesc(file_tendon, 28);
 
 /**
  * @generated from message tendon.v1.ControlAck
@@ -1489,7 +1614,7 @@ export type ControlAck = Message<"tendon.v1.ControlAck"> & {
  * Use `create(ControlAckSchema)` to create a new message.
  */
 export const ControlAckSchema: GenMessage<ControlAck> = /*@__PURE__*/
-  messageDesc(file_tendon, 28);
+  messageDesc(file_tendon, 29);
 
 /**
  * What a device is and can do.
@@ -1592,7 +1717,7 @@ export type DeviceDescription = Message<"tendon.v1.DeviceDescription"> & {
  * Use `create(DeviceDescriptionSchema)` to create a new message.
  */
 export const DeviceDescriptionSchema: GenMessage<DeviceDescription> = /*@__PURE__*/
-  messageDesc(file_tendon, 29);
+  messageDesc(file_tendon, 30);
 
 /**
  * What the handle of a device is and can do. To a client of a server that granted the feature "handle".
@@ -1685,7 +1810,7 @@ export type HandleDescription = Message<"tendon.v1.HandleDescription"> & {
  * Use `create(HandleDescriptionSchema)` to create a new message.
  */
 export const HandleDescriptionSchema: GenMessage<HandleDescription> = /*@__PURE__*/
-  messageDesc(file_tendon, 30);
+  messageDesc(file_tendon, 31);
 
 /**
  * @generated from message tendon.v1.OutputDescription
@@ -1709,7 +1834,7 @@ export type OutputDescription = Message<"tendon.v1.OutputDescription"> & {
  * Use `create(OutputDescriptionSchema)` to create a new message.
  */
 export const OutputDescriptionSchema: GenMessage<OutputDescription> = /*@__PURE__*/
-  messageDesc(file_tendon, 31);
+  messageDesc(file_tendon, 32);
 
 /**
  * @generated from message tendon.v1.ChannelDescription
@@ -1749,7 +1874,7 @@ export type ChannelDescription = Message<"tendon.v1.ChannelDescription"> & {
  * Use `create(ChannelDescriptionSchema)` to create a new message.
  */
 export const ChannelDescriptionSchema: GenMessage<ChannelDescription> = /*@__PURE__*/
-  messageDesc(file_tendon, 32);
+  messageDesc(file_tendon, 33);
 
 /**
  * @generated from message tendon.v1.Bye
@@ -1773,7 +1898,7 @@ export type Bye = Message<"tendon.v1.Bye"> & {
  * Use `create(ByeSchema)` to create a new message.
  */
 export const ByeSchema: GenMessage<Bye> = /*@__PURE__*/
-  messageDesc(file_tendon, 33);
+  messageDesc(file_tendon, 34);
 
 /**
  * What became of a client's forces and datagrams, as the server saw it: why a force was late, and what the network
@@ -1957,7 +2082,7 @@ export type LinkReport = Message<"tendon.v1.LinkReport"> & {
  * Use `create(LinkReportSchema)` to create a new message.
  */
 export const LinkReportSchema: GenMessage<LinkReport> = /*@__PURE__*/
-  messageDesc(file_tendon, 34);
+  messageDesc(file_tendon, 35);
 
 /**
  * @generated from message tendon.v1.Delays
@@ -1983,7 +2108,7 @@ export type Delays = Message<"tendon.v1.Delays"> & {
  * Use `create(DelaysSchema)` to create a new message.
  */
 export const DelaysSchema: GenMessage<Delays> = /*@__PURE__*/
-  messageDesc(file_tendon, 35);
+  messageDesc(file_tendon, 36);
 
 /**
  * One end of a coupling of two devices, told to the other. Vectors are in the base frame and the scale of the SENDER's
@@ -2203,7 +2328,7 @@ export type PortState = Message<"tendon.v1.PortState"> & {
  * Use `create(PortStateSchema)` to create a new message.
  */
 export const PortStateSchema: GenMessage<PortState> = /*@__PURE__*/
-  messageDesc(file_tendon, 36);
+  messageDesc(file_tendon, 37);
 
 /**
  * How a handle has turned since its offset was taken.
@@ -2236,7 +2361,7 @@ export type PortTurn = Message<"tendon.v1.PortTurn"> & {
  * Use `create(PortTurnSchema)` to create a new message.
  */
 export const PortTurnSchema: GenMessage<PortTurn> = /*@__PURE__*/
-  messageDesc(file_tendon, 37);
+  messageDesc(file_tendon, 38);
 
 /**
  * A gripper, measured at its fingers. It is a port of its own, with an account of its own.
@@ -2299,7 +2424,7 @@ export type PortGrip = Message<"tendon.v1.PortGrip"> & {
  * Use `create(PortGripSchema)` to create a new message.
  */
 export const PortGripSchema: GenMessage<PortGrip> = /*@__PURE__*/
-  messageDesc(file_tendon, 38);
+  messageDesc(file_tendon, 39);
 
 /**
  * A flat, springy surface that the sender's tool touches, or touched last. It only pushes.
@@ -2334,7 +2459,7 @@ export type PortSurface = Message<"tendon.v1.PortSurface"> & {
  * Use `create(PortSurfaceSchema)` to create a new message.
  */
 export const PortSurfaceSchema: GenMessage<PortSurface> = /*@__PURE__*/
-  messageDesc(file_tendon, 39);
+  messageDesc(file_tendon, 40);
 
 /**
  * How a device's loop does. Numbers of things are of the time that the report tells of.
@@ -2434,7 +2559,7 @@ export type DeviceReport = Message<"tendon.v1.DeviceReport"> & {
  * Use `create(DeviceReportSchema)` to create a new message.
  */
 export const DeviceReportSchema: GenMessage<DeviceReport> = /*@__PURE__*/
-  messageDesc(file_tendon, 40);
+  messageDesc(file_tendon, 41);
 
 /**
  * How the engine does whose forces a channel takes.
@@ -2490,7 +2615,7 @@ export type PeerReport = Message<"tendon.v1.PeerReport"> & {
  * Use `create(PeerReportSchema)` to create a new message.
  */
 export const PeerReportSchema: GenMessage<PeerReport> = /*@__PURE__*/
-  messageDesc(file_tendon, 41);
+  messageDesc(file_tendon, 42);
 
 /**
  * @generated from message tendon.v1.Hello
@@ -2540,7 +2665,7 @@ export type Hello = Message<"tendon.v1.Hello"> & {
  * Use `create(HelloSchema)` to create a new message.
  */
 export const HelloSchema: GenMessage<Hello> = /*@__PURE__*/
-  messageDesc(file_tendon, 42);
+  messageDesc(file_tendon, 43);
 
 /**
  * With claims, `role` of the Hello is the highest among them.
@@ -2573,7 +2698,7 @@ export type Claim = Message<"tendon.v1.Claim"> & {
  * Use `create(ClaimSchema)` to create a new message.
  */
 export const ClaimSchema: GenMessage<Claim> = /*@__PURE__*/
-  messageDesc(file_tendon, 43);
+  messageDesc(file_tendon, 44);
 
 /**
  * @generated from message tendon.v1.Answer
@@ -2602,7 +2727,7 @@ export type Answer = Message<"tendon.v1.Answer"> & {
  * Use `create(AnswerSchema)` to create a new message.
  */
 export const AnswerSchema: GenMessage<Answer> = /*@__PURE__*/
-  messageDesc(file_tendon, 44);
+  messageDesc(file_tendon, 45);
 
 /**
  * @generated from message tendon.v1.Welcome
@@ -2682,7 +2807,7 @@ export type Welcome = Message<"tendon.v1.Welcome"> & {
  * Use `create(WelcomeSchema)` to create a new message.
  */
 export const WelcomeSchema: GenMessage<Welcome> = /*@__PURE__*/
-  messageDesc(file_tendon, 45);
+  messageDesc(file_tendon, 46);
 
 /**
  * @generated from message tendon.v1.Grant
@@ -2715,7 +2840,7 @@ export type Grant = Message<"tendon.v1.Grant"> & {
  * Use `create(GrantSchema)` to create a new message.
  */
 export const GrantSchema: GenMessage<Grant> = /*@__PURE__*/
-  messageDesc(file_tendon, 46);
+  messageDesc(file_tendon, 47);
 
 /**
  * @generated from message tendon.v1.Refused
@@ -2751,7 +2876,7 @@ export type Refused = Message<"tendon.v1.Refused"> & {
  * Use `create(RefusedSchema)` to create a new message.
  */
 export const RefusedSchema: GenMessage<Refused> = /*@__PURE__*/
-  messageDesc(file_tendon, 47);
+  messageDesc(file_tendon, 48);
 
 /**
  * @generated from enum tendon.v1.Mode
