@@ -35,7 +35,7 @@ Vec<N> VelocityEstimatorOf<N>::observe(LocalTime at, const Vec<N>& position) noe
   for (Eigen::Index axis = 0; axis < N; ++axis) {
     std::size_t& same = same_[static_cast<std::size_t>(axis)];
     const bool stands = count_ > 0 && is_same(position[axis], now[1].position[axis]);
-    same = stands ? std::min(same + 1, kWindow) : 0;
+    same = stands ? same + 1 : 0;
   }
   count_ = std::min(count_ + 1, kWindow + 1);
 

@@ -55,7 +55,7 @@ class VelocityEstimatorOf {
   std::array<Sample, kSlots> samples_{};
   std::size_t newest_ = kSlots;
   std::size_t count_ = 0;  ///< from `newest_` on, at most kWindow + 1
-  /// Of each axis: how many samples just before the newest have the same position, to the bit; less than `count_`.
+  /// Of each axis: how many samples just before the newest have the same position, to the bit.
   std::array<std::size_t, static_cast<std::size_t>(N)> same_{};
   Vec<N> velocity_ = Vec<N>::Zero();
 };
