@@ -2,12 +2,21 @@
 #include "core/estimation/velocity_estimator.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 
 #include "core/base/expect.h"
 
 namespace tendon {
+namespace {
+
+/// To the bit: −0 less 0 is not 0 less 0.
+bool is_same(double a, double b) noexcept { return std::bit_cast<std::uint64_t>(a) == std::bit_cast<std::uint64_t>(b); }
+
+}  // namespace
+
 template <int N>
 VelocityEstimatorOf<N>::VelocityEstimatorOf(double resolution) : resolution_(resolution) {
   expect_not_negative(resolution, "resolution");
@@ -23,28 +32,47 @@ Vec<N> VelocityEstimatorOf<N>::observe(LocalTime at, const Vec<N>& position) noe
   }
   const Sample* const now = &samples_[--newest_];
   samples_[newest_] = {at, position};
+  for (Eigen::Index axis = 0; axis < N; ++axis) {
+    std::size_t& same = same_[static_cast<std::size_t>(axis)];
+    const bool stands = count_ > 0 && is_same(position[axis], now[1].position[axis]);
+    same = stands ? same + 1 : 0;
+  }
   count_ = std::min(count_ + 1, kWindow + 1);
 
-  // Divisions are nearly all that this would cost: one for each sample serves all axes.
+  // Divisions are nearly all that this would cost: one for each sample that is looked at serves all axes.
   std::array<double, kWindow + 1> rate;  // 1/s
-  std::array<double, kWindow + 1> margin;
-  for (std::size_t i = 1; i < count_; ++i) {
-    rate[i] = 1e9 / static_cast<double>((at - now[i].at).count());
-    margin[i] = resolution_ * rate[i];
-  }
+  std::size_t known = 1;                 // of the first samples before the newest
+  const auto know = [&](std::size_t i) {
+    for (; known <= i; ++known) rate[known] = 1e9 / static_cast<double>((at - now[known].at).count());
+  };
 
   for (Eigen::Index axis = 0; axis < N; ++axis) {
     // A line of slope v through the newest sample passes within `resolution` of sample i just when v lies within
-    // `margin` of the slope to it: keep the intersection.
+    // resolution · r(i) of the slope to it: keep the intersection.
     double lowest = -std::numeric_limits<double>::infinity();
     double highest = std::numeric_limits<double>::infinity();
     double velocity = 0;
-    for (std::size_t i = 1; i < count_; ++i) {
+    const auto narrow = [&](std::size_t i) {
       const double slope = (position[axis] - now[i].position[axis]) * rate[i];
-      if (slope < lowest || slope > highest) break;
+      if (slope < lowest || slope > highest) return false;
       velocity = slope;
-      lowest = std::max(lowest, slope - margin[i]);
-      highest = std::min(highest, slope + margin[i]);
+      const double margin = resolution_ * rate[i];
+      lowest = std::max(lowest, slope - margin);
+      highest = std::min(highest, slope + margin);
+      return true;
+    };
+    // The slopes to samples at the same position are 0, and the last of them, whose r(i) is the least, allows least.
+    std::size_t i = same_[static_cast<std::size_t>(axis)];
+    if (i > 0 && i + 1 < count_) {
+      know(i);
+      highest = resolution_ * rate[i];
+      lowest = -highest;
+    }
+    bool fits = true;
+    for (++i; fits && i < std::min(known, count_); ++i) fits = narrow(i);
+    for (; fits && i < count_; ++i) {
+      know(i);
+      fits = narrow(i);
     }
     velocity_[axis] = velocity;
   }

@@ -24,7 +24,9 @@ namespace tendon {
 /// Source: Janabi-Sharifi, Hayward, Chen, "Discrete-time adaptive windowing for velocity estimation",
 /// IEEE TCST 8(6), 2000 (end-fit form), with measured time stamps in place of a fixed period.
 ///
-/// Thread-safe: no. Realtime-safe: yes; at most 3 · kWindow steps per sample.
+/// A sample costs what it has to look at: of each axis its window, but for the counts since which it has stood still.
+///
+/// Thread-safe: no. Realtime-safe: yes; at most N · kWindow steps per sample.
 template <int N>
 class VelocityEstimatorOf {
  public:
@@ -53,6 +55,8 @@ class VelocityEstimatorOf {
   std::array<Sample, kSlots> samples_{};
   std::size_t newest_ = kSlots;
   std::size_t count_ = 0;  ///< from `newest_` on, at most kWindow + 1
+  /// Of each axis: how many samples just before the newest have the same position, to the bit.
+  std::array<std::size_t, static_cast<std::size_t>(N)> same_{};
   Vec<N> velocity_ = Vec<N>::Zero();
 };
 
