@@ -215,7 +215,7 @@ Reaction blended(const Reaction& from, const Reaction& to, double share) {
   all.knows_glide = from.knows_glide && to.knows_glide;
   if (!all.knows_glide) return all;
   // PatchContact's K in parts: k along the normal, k s + F t beside it, and across k s sᵀ + F (s tᵀ + t sᵀ − M − F D).
-  // What the surface at rest adds is the same of both. `giving` stays 0, and `curving` has both.
+  // The surface at rest adds the same to both. `giving` stays 0, and `curving` has both.
   const auto beside = [](const Reaction& r) { return Vec2(r.stiffness * r.slope + r.force * r.glide.tilting); };
   const auto across = [](const Reaction& r) {
     const Mat2 turned = r.slope * r.glide.tilting.transpose();
