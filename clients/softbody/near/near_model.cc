@@ -22,6 +22,10 @@ constexpr double kBlendOver = 0.25;
 constexpr double kFarSafety = 3;
 constexpr double kModesSafety = 3;
 
+/// Elements: how exactly it is looked up how far a patch may go, and how far it goes at least before there is a new field.
+constexpr double kServedStep = 1.0 / 8;
+constexpr double kLeastServed = 1.0 / 4;
+
 /// How deep the first touch is, in radii of the patch.
 constexpr double kFirstTouch = 1e-4;
 
@@ -65,7 +69,7 @@ Factor factor_at_rest(const Solid& solid) {
 struct NearModel::Field {
   Vec3 middle;
   double radius;
-  double serves;                   ///< m: so far from the middle a patch keeps an element's distance from the far field
+  double serves;                   ///< m: farther from the middle a patch wants a new field
   std::unique_ptr<NearBody> body;  ///< null: all of the body is near
   QuasiStaticModel model;
   double missed = 0;  ///< share of the force, by too few modes
@@ -77,11 +81,20 @@ struct NearModel::Field {
     return body == nullptr || ((place - middle).norm() <= serves && holds(patch));
   }
 
+  /// Its modes were looked at so far from its middle.
+  bool just_holds(const Patch& patch, const Vec3& place) const {
+    return body == nullptr || ((place - middle).norm() <= 2 * serves && holds(patch));
+  }
+
   Reaction press(const Patch& patch, Given given, double value) {
     if (body == nullptr) return model.press(patch, given, value);
     Patch own = patch;
     for (int& node : own.nodes) node = body->own_node(node);
     Reaction reaction = model.press(own, given, value);
+    if (reaction.error > std::abs(reaction.force)) {  // lost on the way from the last shape
+      model.set_displacements(VectorXd::Zero(body->size()));
+      reaction = model.press(own, given, value);
+    }
     const double depth = std::abs(reaction.depth);
     const double far = depth > 0 ? std::abs(body->left_out(model.displacements())) / depth : 0;
     reaction.error += kFarSafety * far + missed * std::abs(reaction.force);
@@ -92,22 +105,31 @@ struct NearModel::Field {
 };
 
 NearModel::NearModel(const Solid& solid, const TouchSurface& surface, const Patch& first, const Config& config)
-    : solid_(solid), surface_(surface), config_(config), at_rest_(factor_at_rest(solid)), field_(field_around(first)) {
-  last_ = place_of(solid.mesh(), first);
-}
+    : solid_(solid),
+      surface_(surface),
+      config_(config),
+      at_rest_(factor_at_rest(solid)),
+      field_(field_around(first, 0)),
+      last_(place_of(solid.mesh(), first)) {}
 
 NearModel::~NearModel() = default;
 
-std::unique_ptr<NearModel::Field> NearModel::field_around(const Patch& patch) {
-  ++fields_;
+std::unique_ptr<NearModel::Field> NearModel::field_around(const Patch& patch, double depth) {
   const Vec3 place = place_of(solid_.mesh(), patch);
   const double element = element_below(solid_.mesh(), patch);
   const double least = solid_.material().poisson > kIncompressible ? kRadiusIncompressible : kRadius;
   double radius = std::max(least * surface_.radius(), surface_.radius() + kElementsBeyond * element);
-  // Where elements are of several sizes, a node of the patch may still lie on Γ.
+  // Where elements are of several sizes, Γ may still be too close.
   for (;; radius += element) {
     auto field = field_of(patch, place, radius, element);
-    if (field->holds(patch)) return field;
+    if (!field->holds(patch)) continue;
+    if (depth > 0) {
+      // Pressed once more, by the factor of that shape: it serves the answers around it better than that of the rest.
+      field->press(patch, Given::kDepth, depth);
+      field->model.set_displacements(field->model.displacements());
+      field->press(patch, Given::kDepth, depth);
+    }
+    return field;
   }
 }
 
@@ -116,7 +138,13 @@ std::unique_ptr<NearModel::Field> NearModel::field_of(const Patch& patch, const 
   const auto load_of = [&](const Patch& at) { return solid_.to_free(patch_load(solid_, surface_.normal(), at)); };
   auto body = NearBody::of(solid_, at_rest_, {place, radius, config_.modes, load_of(patch)});
   const Elastic& elastic = body ? static_cast<const Elastic&>(*body) : solid_;
-  const double serves = radius - surface_.radius() - element;
+  const auto holds_patches_within = [&](double distance) {
+    return std::ranges::all_of(surface_.nodes_of_patches(surface_.across(place), distance),
+                               [&](int node) { return body->own_node(node) >= 0; });
+  };
+  double held = 0;
+  while (body && holds_patches_within(held + kServedStep * element)) held += kServedStep * element;
+  const double serves = std::max(held / 2, kLeastServed * element);
   std::unique_ptr<Field> field(new Field{.middle = place,
                                          .radius = radius,
                                          .serves = serves,
@@ -124,7 +152,7 @@ std::unique_ptr<NearModel::Field> NearModel::field_of(const Patch& patch, const 
                                          .model = {elastic, surface_, config_.newton}});
   if (field->body == nullptr) return field;
   const Vec2 across = surface_.across(place);
-  for (const Vec2& off : {Vec2(0, 0), Vec2(serves, 0), Vec2(-serves, 0), Vec2(0, serves), Vec2(0, -serves)}) {
+  for (const Vec2& off : {Vec2(0, 0), Vec2(held, 0), Vec2(-held, 0), Vec2(0, held), Vec2(0, -held)}) {
     const auto there = surface_.patch(across + off);
     if (!there || !field->holds(*there)) continue;
     const VectorXd load = load_of(*there);
@@ -145,28 +173,30 @@ Reaction NearModel::press(const Patch& patch, Given given, double value) {
   blended_ += std::hypot((place - last_).norm(), depth - last_depth_);
   last_ = place;
   last_depth_ = depth;
-  if (before_ && (blended_ >= blend_over_ || !before_->holds(patch))) before_.reset();
   if (!field_->comfortably_holds(patch, place)) {
-    before_ = std::move(field_);
-    field_ = field_around(patch);
-    if (!before_->holds(patch)) before_.reset();
+    before_ = std::exchange(field_, field_around(patch, depth));
+    ++fields_;
     blended_ = 0;
-    blend_over_ = kBlendOver * surface_.radius();
+    blend_over_ = std::min(kBlendOver * surface_.radius(), field_->serves);
   }
+  if (before_ && (blended_ >= blend_over_ || !before_->just_holds(patch, place))) before_.reset();
   const Reaction reaction = field_->press(patch, given, value);
   return before_ ? blended(before_->press(patch, given, value), reaction, blended_ / blend_over_) : reaction;
 }
 
 NearModel::Size NearModel::size() const {
   if (field_->body == nullptr) {
-    return {.elements = static_cast<std::size_t>(solid_.mesh().element_count()), .unknowns = solid_.free_count()};
+    return {.elements = static_cast<std::size_t>(solid_.mesh().element_count()),
+            .unknowns = solid_.free_count(),
+            .made = fields_};
   }
   const NearBody& body = *field_->body;
   return {.radius = field_->radius,
           .elements = static_cast<std::size_t>(body.mesh().element_count()),
           .interface = body.interface(),
           .modes = body.modes(),
-          .unknowns = body.free_count()};
+          .unknowns = body.free_count(),
+          .made = fields_};
 }
 
 std::size_t NearModel::bytes() const noexcept {
@@ -185,7 +215,7 @@ Reaction blended(const Reaction& from, const Reaction& to, double share) {
   all.knows_glide = from.knows_glide && to.knows_glide;
   if (!all.knows_glide) return all;
   // PatchContact's K in parts: k along the normal, k s + F t beside it, and across k s sᵀ + F (s tᵀ + t sᵀ − M − F D).
-  // What the surface at rest adds is the same of both. `giving` stays 0, and `curving` has both.
+  // The surface at rest adds the same to both. `giving` stays 0, and `curving` has both.
   const auto beside = [](const Reaction& r) { return Vec2(r.stiffness * r.slope + r.force * r.glide.tilting); };
   const auto across = [](const Reaction& r) {
     const Mat2 turned = r.slope * r.glide.tilting.transpose();

@@ -13,10 +13,11 @@ namespace tendon::softbody {
 /// An answer costs what the near elements cost, whatever the size of the mesh.
 ///
 /// The near field has the radius ρ = max(1.5 a, a + 2 elements) around the patch's place at rest, and 2 a at least where
-/// ν > 0.45; a is the patch's radius. When the patch comes within an element of the far field, a near field around its
-/// place is made in that answer, which takes as long as two answers for each mode by a factor of the whole body. From
-/// there on the answers of both are blended over a way of the hand of a/4, however long that takes. A field that cannot
-/// have the patch any more gives none. A body that is all near is the whole model, QuasiStaticModel.
+/// ν > 0.45; a is the patch's radius. When the patch has gone half of the way to where it would touch the far field, a
+/// near field around its place is made within that answer: two solutions for each mode by a factor of the whole body.
+/// The answers of both are then blended over a way of the hand of a/4, or of the other half, however long that takes;
+/// where the old field cannot have the patch, the new one answers alone. A body that is all near is the whole model,
+/// QuasiStaticModel.
 ///
 /// Within one near field the force is the slope of one energy. Blended answers are not: by going on and back over
 /// different ways a hand may gain their difference times a/4, and they say this difference as an error.
@@ -24,6 +25,8 @@ namespace tendon::softbody {
 /// Reaction::error is of Newton's method, and of what the linear far field and the few modes leave out beside the whole
 /// mesh: three times what NearBody::left_out() says that the far field's law adds to the force, and three times the
 /// largest excess of stiffness over that of the whole body at first touch, of five places of the near field.
+///
+/// A BLAS need not allow two threads at once (OpenBLAS without threads does not), so that no field is made on another.
 class NearModel : public Model {
  public:
   struct Config {
@@ -45,22 +48,23 @@ class NearModel : public Model {
     int interface = 0;         ///< unknowns of the nodes that near and far have in common
     int modes = 0;             ///< take their place
     int unknowns = 0;
+    int made = 0;  ///< near fields since construction
   };
   Size size() const;
-  int fields() const noexcept { return fields_; }  ///< made since construction
 
  private:
   struct Field;
-  std::unique_ptr<Field> field_around(const Patch& patch);
+  /// Pressed to `depth` already, with the factor of that shape.
+  std::unique_ptr<Field> field_around(const Patch& patch, double depth);
   std::unique_ptr<Field> field_of(const Patch& patch, const Vec3& place, double radius, double element);
 
   const Solid& solid_;
   const TouchSurface& surface_;
   Config config_;
   Factor at_rest_;  ///< of the whole body
-  int fields_ = 0;
+  int fields_ = 1;
   std::unique_ptr<Field> field_;
-  std::unique_ptr<Field> before_;  ///< the one before, while answers are blended
+  std::unique_ptr<Field> before_;  ///< the one before, while answers are blended; or null
   double blend_over_ = 0;          ///< m
   double blended_ = 0;             ///< m, of it
   Vec3 last_ = Vec3::Zero();       ///< m: the last patch's place, and how deep it was pressed

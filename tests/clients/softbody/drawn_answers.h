@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <gtest/gtest.h>
+
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include "clients/softbody/models/quasi_static.h"
@@ -61,6 +64,17 @@ ErrorsSaid errors_said(int paths, double deepest, const BlockOf& block_of) {
   }
   std::ranges::sort(said.times);
   return said;
+}
+
+/// The error said is at least the true one of 99 in 100 answers, and not more than 20 times as large.
+inline void expect_covered(const ErrorsSaid& said) {
+  EXPECT_EQ(said.answers, 200);
+  EXPECT_GE(said.covered, said.answers * 99 / 100);
+  ASSERT_FALSE(said.times.empty());
+  EXPECT_LE(said.median(), 20) << said.times.size();
+  ::testing::Test::RecordProperty("covered", said.covered);
+  ::testing::Test::RecordProperty("above_half_a_percent", static_cast<int>(said.times.size()));
+  ::testing::Test::RecordProperty("median_of_said_over_true", static_cast<int>(said.median()));
 }
 
 }  // namespace tendon::softbody::testing

@@ -134,6 +134,7 @@ const Names kClockReaders = {"server/machine/clock.h",
                              "clients/cpp/machine.cc",
                              "clients/plug/chai3d/hd_phantom.cc",  // in a stranger's process, whose threads call it
                              "clients/softbody/softbody_main.cc",
+                             "tests/clients/softbody/bench.cc",
                              "tests/tools/bench/",
                              "tests/e2e/",
                              "tests/realtime/",
