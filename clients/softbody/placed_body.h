@@ -3,6 +3,7 @@
 
 #include <chrono>
 #include <optional>
+#include <utility>
 
 #include "clients/cpp/force_client.h"
 #include "clients/softbody/scene.h"
@@ -34,6 +35,9 @@ class PlacedBody {
   /// the first answer.
   Touch answer(const DeviceState& hand);
   static constexpr Duration kMostBehind = std::chrono::milliseconds(200);
+
+  /// See Body.
+  void prepare_cuts_by(Body::Background background) { body_.prepare_cuts_by(std::move(background)); }
 
   double linear_up_to() const { return body_.linear_up_to(); }  ///< see Body
   double deepest() const noexcept { return deepest_; }          ///< m, the greatest depth of the tool so far

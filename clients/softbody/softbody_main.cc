@@ -3,10 +3,13 @@
 #include <ctime>
 #include <exception>
 #include <filesystem>
+#include <future>
 #include <iostream>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <string_view>
+#include <thread>
+#include <utility>
 
 #include "clients/cpp/engine/self_test.h"
 #include "clients/cpp/options.h"
@@ -103,7 +106,9 @@ int main(int argc, char** argv) {
       std::cerr << "tendon-softbody: warning: " << warning << '\n';
     }
     if (tests) return test(scene, options);
+    std::jthread knife;  // one cut is prepared at a time
     softbody::PlacedBody body(scene);
+    body.prepare_cuts_by([&](std::packaged_task<void()> work) { knife = std::jthread(std::move(work)); });
     const double linear_up_to = body.linear_up_to();
     bool told = false;
     return run(options, [&](const DeviceState& hand) {

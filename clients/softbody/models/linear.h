@@ -22,6 +22,7 @@ class LinearModel : public Model {
 
   Reaction press(const Patch& patch, Given given, double value) override;
   void cut(const Division& division, const EffectsConfig& effects) override;
+  void go_on_from(const Model&, std::span<const int>) override {}  // its shape is that of the tool alone
   double step() const noexcept override { return step_; }
   bool still() const noexcept override { return effects_.empty(); }
   bool glides() const noexcept override { return glides_ && step_ == 0; }

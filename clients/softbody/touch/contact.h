@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <utility>
 
 #include "clients/softbody/models/model.h"
 #include "clients/softbody/touch/friction.h"
@@ -77,6 +78,12 @@ class PatchContact {
   /// The answer with the tool's middle at `tool` (m, body frame). There is no force when the patch is not on the body,
   /// or when `tool` is not finite.
   Feel at(const Vec3& tool);
+
+  /// Goes on as `before` did, which gives its friction away.
+  void go_on_from(PatchContact& before) {
+    stuck_ = before.stuck_;
+    friction_ = std::move(before.friction_);
+  }
 
   std::size_t bytes() const noexcept { return friction_ ? friction_->bytes() : 0; }  ///< bytes of its effects
 
