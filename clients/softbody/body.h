@@ -153,8 +153,8 @@ struct BodyConfig {
   Vec3 tool_axis = Vec3::UnitZ();   ///< kCapsule: unit vector, handle frame, from end to end
   Vec3 tool_offset = Vec3::Zero();  ///< m, handle frame, from the handle's position to the tool's middle
   PatchContact::Side side = PatchContact::Side::kUnilateral;
-  /// The stiffness of linear models, and with plasticity, is the whole second derivative of the energy on a flat surface
-  /// too. On a curved one, and of other models at rest, it always is.
+  /// The stiffness of linear models, and with plasticity, is the whole second derivative of the energy on a flat
+  /// surface too. On a curved one, and of other models at rest, it always is.
   bool whole_stiffness = false;
 };
 
@@ -194,10 +194,10 @@ class Body {
 
   /// Takes the work of a cut: calls it once, on any thread, at any time. It owns all that it touches.
   using Background = std::function<void(std::packaged_task<void()>)>;
-  /// From now on no answer waits for a cut. `background` is called when a cut is due; until its work has been done answers
-  /// are those of the body before the cut, and their error is at least their force: the cut body may push so much less.
-  /// The first answer after the work continues from the shape before the cut, with what has been prepared. Without this
-  /// call a cut is made between two answers.
+  /// From now on no answer waits for a cut. `background` is called when a cut is due; until its work has been done
+  /// answers are those of the body before the cut, and their error is at least their force: the cut body may push so
+  /// much less. The first touch() after the work continues from the shape before the cut, with what has been prepared,
+  /// and throws what the work threw. Without this call a cut is made between two answers.
   void prepare_cuts_by(Background background);
 
   /// Sets the time since the scene began, s: Young's modulus becomes that of `time`, and cuts that are due are made. An
