@@ -4,7 +4,9 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <cmath>
+#include <exception>
 #include <limits>
 #include <span>
 #include <stdexcept>
@@ -428,8 +430,12 @@ EffectSet effects_of(const BodyConfig& config) {
 }
 
 struct Body::Parts {
-  Parts(const BodyConfig& config, const SolverOf& solver)
-      : solid(solid_of(checked(config))),
+  Parts(const BodyConfig& config, const SolverOf& solver) : Parts(config, solver, solid_of(checked(config))) {
+    if (!config.cuts.empty()) cutting = std::make_unique<Planned>(config, solid.mesh(), solid.fixed(), surface);
+  }
+  /// With no cut planned.
+  Parts(const BodyConfig& config, const SolverOf& solver, Solid of)
+      : solid(std::move(of)),
         surface(solid.mesh(), config.towards_tool, config.patch_radius),
         made(model_of(config, solid, surface, solver)),
         model(*made.model),
@@ -449,18 +455,20 @@ struct Body::Parts {
     if (config.tool == BodyConfig::Tool::kCapsule) {
       capsule.emplace(solid, surface, touchable(config, surface), config.tool_radius, config.tool_half_length);
     }
-    if (!config.cuts.empty()) cutting = std::make_unique<Planned>(config, solid.mesh(), solid.fixed(), surface);
   }
 
   void cut(PlannedCut::When when, double value);
+  void prepare();
+  void go_on_from(Parts& before);
   void note(Feel& feel);
 
   /// The cuts that are still to be made, and the values that they need.
   struct Planned {
     Planned(const BodyConfig& config, const Mesh& mesh, const Fixed& fixed, const TouchSurface& surface);
     Cutting cuts;
-    EffectsConfig effects;
-    Vec3 middle;
+    BodyConfig described;
+    Background background{};
+    std::future<std::unique_ptr<Parts>> next{};  ///< the body after the next cut, while it is prepared
   };
 
   Solid solid;
@@ -478,12 +486,13 @@ struct Body::Parts {
   Vec3 offset;
   Vec3 axis;
   std::unique_ptr<Planned> cutting;
+  std::vector<int> node_before{};  ///< of a body that was prepared: each node's number before the cut
 };
 
 /// Makes the cuts once, on a mesh only: so a plan that cannot work is refused before anything is touched.
 Body::Parts::Planned::Planned(const BodyConfig& config, const Mesh& mesh, const Fixed& fixed,
                               const TouchSurface& surface)
-    : cuts(config.cuts), effects(config.effects), middle(config.middle) {
+    : cuts(config.cuts), described(config) {
   Division body{.mesh = mesh, .fixed = fixed, .node_before = {}};
   for (Cutting trial = cuts; trial.left() > 0;) {
     const std::span<const Cut> done = trial.make_next();
@@ -493,30 +502,66 @@ Body::Parts::Planned::Planned(const BodyConfig& config, const Mesh& mesh, const 
     }
     body = divide(body.mesh, body.fixed, done);
     try {
-      middle_patch(TouchSurface(body.mesh, surface.normal(), surface.radius()), middle);
+      middle_patch(TouchSurface(body.mesh, surface.normal(), surface.radius()), config.middle);
     } catch (const std::invalid_argument& error) {
       throw std::invalid_argument(which + " leaves nothing to be touched: " + error.what());
     }
   }
 }
 
+namespace {
+
+Solid divided(const Solid& solid, const Division& division) {
+  std::vector<Material> of_elements;
+  if (!solid.of_elements().empty()) {
+    for (const int before : division.element_before) of_elements.push_back(solid.material(before));
+  }
+  return {division.mesh, solid.element(), solid.material(), solid.law(), division.fixed, std::move(of_elements)};
+}
+
+}  // namespace
+
 void Body::Parts::cut(PlannedCut::When when, double value) {
   while (cutting->cuts.due(when, value)) {
-    const Division division = divide(solid.mesh(), solid.fixed(), cutting->cuts.make_next());
-    std::vector<Material> of_elements;
-    if (!solid.of_elements().empty()) {
-      for (const int before : division.element_before) of_elements.push_back(solid.material(before));
+    if (cutting->background) {
+      if (!cutting->next.valid()) prepare();
+      return;
     }
-    solid = Solid(division.mesh, solid.element(), solid.material(), solid.law(), division.fixed, of_elements);
+    const Division division = divide(solid.mesh(), solid.fixed(), cutting->cuts.make_next());
+    solid = divided(solid, division);
     surface = TouchSurface(solid.mesh(), surface.normal(), surface.radius());
-    patch = middle_patch(surface, cutting->middle);
-    model.cut(division, cutting->effects);
+    patch = middle_patch(surface, cutting->described.middle);
+    model.cut(division, cutting->described.effects);
     if (when == PlannedCut::When::kForce) return;  // the force on the cut body is not known yet
   }
 }
 
+void Body::Parts::prepare() {
+  std::promise<std::unique_ptr<Parts>> done;
+  cutting->next = done.get_future();
+  cutting->background(std::packaged_task<void()>([config = cutting->described, before = solid,
+                                                  cuts = cutting->cuts.with_next(), done = std::move(done)]() mutable {
+    try {
+      Division division = divide(before.mesh(), before.fixed(), cuts);
+      auto parts = std::make_unique<Parts>(config, SolverOf(), divided(before, division));
+      parts->node_before = std::move(division.node_before);
+      done.set_value(std::move(parts));
+    } catch (...) {
+      done.set_exception(std::current_exception());
+    }
+  }));
+}
+
+void Body::Parts::go_on_from(Parts& before) {
+  model.go_on_from(before.model, node_before);
+  contact.go_on_from(before.contact);
+  cutting = std::move(before.cutting);
+  cutting->cuts.make_next();
+}
+
 void Body::Parts::note(Feel& feel) {
   feel.topology_changed = cutting->cuts.take_changed();
+  if (cutting->next.valid()) feel.error = std::max(feel.error, feel.force.norm());
   cut(PlannedCut::When::kForce, feel.force.dot(surface.normal()));
 }
 
@@ -526,8 +571,21 @@ Body::~Body() = default;
 Body::Body(Body&&) noexcept = default;
 Body& Body::operator=(Body&&) noexcept = default;
 
+void Body::prepare_cuts_by(Background background) {
+  if (parts_->cutting) parts_->cutting->background = std::move(background);
+}
+
+void Body::take_prepared() {
+  std::future<std::unique_ptr<Parts>>& next = parts_->cutting->next;
+  if (!next.valid() || next.wait_for(std::chrono::seconds(0)) != std::future_status::ready) return;
+  std::unique_ptr<Parts> parts = next.get();
+  parts->go_on_from(*parts_);
+  parts_ = std::move(parts);
+}
+
 Feel Body::touch(const Vec3& tool) {
   if (parts_->rigid) return touch(Pose{.position = tool - parts_->offset});
+  if (parts_->cutting) take_prepared();
   if (parts_->capsule) return parts_->capsule->at(tool, parts_->axis, tool);
   Feel feel = parts_->sphere ? parts_->sphere->at(tool) : parts_->contact.at(tool);
   if (parts_->cutting) parts_->note(feel);

@@ -5,6 +5,8 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
+#include <future>
 #include <initializer_list>
 #include <memory>
 #include <optional>
@@ -159,8 +161,8 @@ struct BodyConfig {
   std::size_t hands = 1;            ///< rigid tools on nonlinear bodies: how many hands hold one each
   Vec3 tool_offset = Vec3::Zero();  ///< m, handle frame, from the handle's position to the tool's middle
   PatchContact::Side side = PatchContact::Side::kUnilateral;
-  /// The stiffness is the whole second derivative of the energy also where that costs more than a few percent matter: of
-  /// linear models and of plasticity on a flat surface. On a curved one, and of other models at rest, it always is.
+  /// The stiffness of linear models, and with plasticity, is the whole second derivative of the energy on a flat
+  /// surface too. On a curved one, and of other models at rest, it always is.
   bool whole_stiffness = false;
 };
 
@@ -205,6 +207,14 @@ class Body {
   /// is nowhere. As many as BodyConfig::hands.
   std::vector<Feel> touch(std::span<const std::optional<Pose>> handles);
 
+  /// Takes the work of a cut: calls it once, on any thread, at any time. It owns all that it touches.
+  using Background = std::function<void(std::packaged_task<void()>)>;
+  /// From now on no answer waits for a cut. `background` is called when a cut is due; until its work has been done
+  /// answers are those of the body before the cut, and their error is at least their force: the cut body may push so
+  /// much less. The first touch() after the work continues from the shape before the cut, with what has been prepared,
+  /// and throws what the work threw. Without this call a cut is made between two answers.
+  void prepare_cuts_by(Background background);
+
   /// Sets the time since the scene began, s: Young's modulus becomes that of `time`, and cuts that are due are made. An
   /// earlier time undoes no cut.
   void tick(double time);
@@ -243,6 +253,7 @@ class Body {
 
  private:
   struct Parts;
+  void take_prepared();
   std::unique_ptr<Parts> parts_;
 };
 

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <optional>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "clients/cpp/force_client.h"
@@ -40,6 +41,9 @@ class PlacedBody {
   /// The answers to all hands of the scene at once, by their order there: one solution, each the answer to its own
   /// state. Empty: that hand is nowhere, and so is its answer (Touch::unknown).
   std::vector<Touch> answer(std::span<const std::optional<DeviceState>> hands);
+
+  /// See Body.
+  void prepare_cuts_by(Body::Background background) { body_.prepare_cuts_by(std::move(background)); }
 
   double linear_up_to() const { return body_.linear_up_to(); }  ///< see Body
   double deepest() const noexcept { return deepest_; }          ///< m, the greatest depth of the tool so far

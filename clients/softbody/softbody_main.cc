@@ -4,12 +4,15 @@
 #include <ctime>
 #include <exception>
 #include <filesystem>
+#include <future>
 #include <iostream>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <span>
 #include <string>
 #include <string_view>
+#include <thread>
+#include <utility>
 #include <vector>
 
 #include "clients/cpp/engine/self_test.h"
@@ -115,7 +118,9 @@ int main(int argc, char** argv) {
       std::cerr << "tendon-softbody: warning: " << warning << '\n';
     }
     if (tests) return test(scene, options);
+    std::jthread knife;  // one cut is prepared at a time
     softbody::PlacedBody body(scene);
+    body.prepare_cuts_by([&](std::packaged_task<void()> work) { knife = std::jthread(std::move(work)); });
     const double linear_up_to = body.linear_up_to();
     const double patch_up_to = softbody::patch_up_to(scene.body);
     bool told = false;

@@ -193,6 +193,12 @@ std::span<const Cut> Cutting::make_next() {
   return made_;
 }
 
+std::vector<Cut> Cutting::with_next() const {
+  std::vector<Cut> all = made_;
+  all.push_back(plan_[made_.size()].cut);
+  return all;
+}
+
 bool Cutting::take_changed() noexcept { return std::exchange(changed_, false); }
 
 std::size_t Cutting::bytes() const noexcept {

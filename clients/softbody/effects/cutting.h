@@ -58,7 +58,8 @@ class Cutting {
   explicit Cutting(std::vector<PlannedCut> plan);
 
   bool due(PlannedCut::When when, double value) const noexcept;
-  std::span<const Cut> make_next();  ///< all that are made then; one must be left
+  std::span<const Cut> make_next();    ///< all that are made then; one must be left
+  std::vector<Cut> with_next() const;  ///< the same, and it is not made yet
   std::size_t left() const noexcept { return plan_.size() - made_.size(); }
   bool take_changed() noexcept;  ///< true when cuts were made since the last call
   std::size_t bytes() const noexcept;

@@ -16,12 +16,13 @@ namespace tendon::softbody {
 class LinearModel : public Model {
  public:
   /// Throws std::invalid_argument when the solid's law is not linear, std::runtime_error when it is not held fast. The
-  /// solid must outlive this. It begins at rest, under its weight if it has any. With `glides` an answer at rest has its
-  /// Glide, by two more solutions in one answer of many.
+  /// solid must outlive this. It begins at rest, under its weight if it has any. With `glides` an answer at rest has
+  /// its Glide, by two more solutions in one answer of many.
   LinearModel(const Solid& solid, const TouchSurface& surface, const EffectsConfig& effects = {}, bool glides = false);
 
   Reaction press(const Patch& patch, Given given, double value) override;
   void cut(const Division& division, const EffectsConfig& effects) override;
+  void go_on_from(const Model&, std::span<const int>) override {}  // its shape is that of the tool alone
   double step() const noexcept override { return step_; }
   bool still() const noexcept override { return effects_.empty(); }
   bool glides() const noexcept override { return glides_ && step_ == 0; }
@@ -44,8 +45,8 @@ class LinearModel : public Model {
   bool glides_;
   Effects effects_;
   VectorXd rest_;  ///< m, all nodes: the shape at rest; empty without time
-  /// Of a place where the patch has been, by node: W, and what it makes the surface give way, A⁻¹ W. Empty where none are
-  /// known.
+  /// Of a place where the patch has been, by node: W, and what it makes the surface give way, A⁻¹ W. Empty where none
+  /// are known.
   MatrixXd slopes_;
   MatrixXd given_way_;
   Mat2 given_ = Mat2::Zero();  ///< Wᵀ A⁻¹ W there

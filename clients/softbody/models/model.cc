@@ -28,6 +28,10 @@ void Model::cut(const Division&, const EffectsConfig&) {
   throw std::logic_error("a model was cut that is not one of those that can be");
 }
 
+void Model::go_on_from(const Model&, std::span<const int>) {
+  throw std::logic_error("a model was cut that is not one of those that can be");
+}
+
 Reaction settle(Model& model, const Patch& patch, Given given, double value, double tolerance, double most) {
   const int apart = model.step() > 0 ? std::max(1, static_cast<int>(std::lround(kApart / model.step()))) : 1;
   const int rounds = static_cast<int>(std::ceil(most / kApart));

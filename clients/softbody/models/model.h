@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <span>
 
 #include "clients/softbody/fem/patch.h"
 
@@ -62,6 +63,10 @@ class Model {
   /// Call it after the solid has been cut in place. Continues from the current displacements, and reuses the factor of
   /// the system where it can. Throws std::logic_error when the model's ModelInfo::may lacks kCutting.
   virtual void cut(const Division& division, const EffectsConfig& effects);
+
+  /// Goes on from the shape of `before`, a model of the same kind and effects of the body before it was cut. Node i of
+  /// this one was node_before[i] there. Throws as cut() does.
+  virtual void go_on_from(const Model& before, std::span<const int> node_before);
 
   /// The time that one press simulates, s. 0: the body is at rest at every instant.
   virtual double step() const noexcept { return 0; }

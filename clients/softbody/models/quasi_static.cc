@@ -379,6 +379,16 @@ void QuasiStaticModel::cut(const Division& division, const EffectsConfig& effect
   stale_ = true;
 }
 
+void QuasiStaticModel::go_on_from(const Model& before, std::span<const int> node_before) {
+  const VectorXd& u = static_cast<const QuasiStaticModel&>(before).u_;  // of the same kind
+  for (int i = 0; i < u_.size(); ++i) u_[i] = u[3 * node_before[at(i / 3)] + i % 3];
+  if (self_collision_) self_collision_ = std::make_unique<SelfCollision>(elastic_, *config_.self_collision, u_);
+  pairs_.clear();
+  glided_.reset();
+  known_.reset();
+  in_vain_ = 0;
+}
+
 double QuasiStaticModel::release() {
   Reaction free;
   VectorXd nothing = VectorXd::Zero(elastic_.free_count());

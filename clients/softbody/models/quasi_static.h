@@ -36,6 +36,8 @@ class QuasiStaticModel : public Model {
 
   Reaction press(const Patch& patch, Given given, double value) override;
   void cut(const Division& division, const EffectsConfig& effects) override;
+  /// Keeps its own factor, and what steps taught is learned anew.
+  void go_on_from(const Model& before, std::span<const int> node_before) override;
   double step() const noexcept override { return step_; }
   bool still() const noexcept override { return effects_.empty(); }
   bool glides() const noexcept override { return step_ == 0 && config_.glides; }

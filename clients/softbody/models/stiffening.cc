@@ -38,6 +38,12 @@ std::size_t StiffeningModel::bytes() const noexcept {
   return sizeof *this + (law_.at.size() + law_.factor.size()) * sizeof(double) + model_->bytes();
 }
 
+void StiffeningModel::go_on_from(const Model& before, std::span<const int> node_before) {
+  const auto& same = static_cast<const StiffeningModel&>(before);  // of the same kind
+  factor_ = same.factor_;
+  model_->go_on_from(*same.model_, node_before);
+}
+
 Reaction StiffeningModel::press(const Patch& patch, Given given, double value) {
   Reaction reaction = model_->press(patch, given, given == Given::kForce ? value / factor_ : value);
   reaction.force *= factor_;

@@ -38,6 +38,7 @@ class StiffeningModel : public Model {
 
   Reaction press(const Patch& patch, Given given, double value) override;
   void cut(const Division& division, const EffectsConfig& effects) override { model_->cut(division, effects); }
+  void go_on_from(const Model& before, std::span<const int> node_before) override;
   double step() const noexcept override { return model_->step(); }
   bool still() const noexcept override { return model_->still(); }
   bool glides() const noexcept override { return model_->glides(); }

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <utility>
 
 #include "clients/softbody/models/model.h"
 #include "clients/softbody/touch/friction.h"
@@ -59,9 +60,9 @@ struct Feel {
 ///
 ///     K = k v vᵀ + F (v (Pᵀt)ᵀ + Pᵀt vᵀ) + F Pᵀ (∂²h/∂c² − M − F D) P,   v = n + Pᵀg
 ///
-/// the second derivative of E. Of a model that knows no Glide, or is not asked for it, `Feel` has k v vᵀ with v = n + Pᵀ(2 ∂depth/∂c − ∂h/∂c),
-/// which is what a linear body has without second derivatives. For a body with time each answer simulates one
-/// Model::step(). Friction adds its force and stiffness across.
+/// the second derivative of E. Of a model that knows no Glide, or is not asked for it, `Feel` has k v vᵀ with
+/// v = n + Pᵀ(2 ∂depth/∂c − ∂h/∂c), which is what a linear body has without second derivatives. For a body with time
+/// each answer simulates one Model::step(). Friction adds its force and stiffness across.
 ///
 /// Thread-safe: no. Realtime-safe: no.
 class PatchContact {
@@ -78,6 +79,12 @@ class PatchContact {
   /// The answer with the tool's middle at `tool` (m, body frame). There is no force when the patch is not on the body,
   /// or when `tool` is not finite.
   Feel at(const Vec3& tool);
+
+  /// Goes on as `before` did, which gives its friction away.
+  void go_on_from(PatchContact& before) {
+    stuck_ = before.stuck_;
+    friction_ = std::move(before.friction_);
+  }
 
   std::size_t bytes() const noexcept { return friction_ ? friction_->bytes() : 0; }  ///< bytes of its effects
 

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <future>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -315,6 +316,94 @@ TEST(Cutting, IsMadeInItsOrderAtItsTimeOrForceAndSaidOnce) {
   body.tick(1);
   EXPECT_LT(stiffness(2e-3).first, 0.999 * twice);
   EXPECT_GT(Body(config).size().bytes, Body(pressed_body(ModelKind::kLinear, Element::kHex8Sri, 4)).size().bytes);
+}
+
+/// What a body has handed out to be done elsewhere.
+struct Later {
+  explicit Later(Body& body) {
+    body.prepare_cuts_by([this](std::packaged_task<void()> work) { left.push_back(std::move(work)); });
+  }
+  std::vector<std::packaged_task<void()>> left;
+};
+
+TEST(PreparedCut, AnswersGoOnUncutAndFlaggedAndThenAreThoseOfTheCutBody) {
+  for (const ModelInfo& model : models()) {
+    if (!model.may.has(EffectKind::kCutting)) continue;
+    BodyConfig config = pressed_body(model.kind, Element::kHex8Sri, 4);
+    config.tolerance = 1e-9;
+    config.max_iterations = 100;
+    config.friction = 0.3;
+    Body whole(config);
+    config.stiffening = StiffnessOverTime{.at = {0, 1}, .factor = {1, 1}};
+    config.cuts = {{across(0.025, 0.025), PlannedCut::When::kTime, 1}, {narrow(0.0125), PlannedCut::When::kTime, 1}};
+    Body at_once(config);
+    Body body(config);
+    Later later(body);
+    Vec3 tool(0, 0, 0.048);
+    for (Body* each : {&whole, &at_once, &body}) each->touch(tool);
+    body.tick(1);
+    at_once.tick(1);
+    ASSERT_EQ(later.left.size(), 1U) << model.name;
+    for (int i = 0; i < 3; ++i) {
+      tool.x() += 1e-4;
+      body.tick(1);
+      const Feel feel = body.touch(tool);
+      at_once.touch(tool);
+      EXPECT_EQ(feel.force, whole.touch(tool).force) << model.name;
+      EXPECT_GE(feel.error, feel.force.norm());
+      EXPECT_FALSE(feel.topology_changed);
+    }
+    ASSERT_EQ(later.left.size(), 1U) << "the second cut waits for the first";
+    later.left[0]();
+    body.tick(1);
+    const Feel first = body.touch(tool);
+    EXPECT_TRUE(first.topology_changed);
+    EXPECT_LT(first.force.z(), 0.999 * whole.touch(tool).force.z()) << model.name;
+    body.tick(1);
+    ASSERT_EQ(later.left.size(), 2U);
+    later.left[1]();
+    const Feel both = body.touch(tool);
+    const Feel expected = at_once.touch(tool);
+    EXPECT_TRUE(both.topology_changed);
+    EXPECT_LT(both.force.z(), first.force.z());
+    // The drag too: the spring of friction goes on from where it was.
+    EXPECT_LT((both.force - expected.force).norm(), 1e-5 * expected.force.norm()) << model.name;
+    EXPECT_LT(both.error, 1e-3 * both.force.norm());
+    EXPECT_FALSE(body.touch(tool).topology_changed);
+  }
+}
+
+TEST(PreparedCut, PutsInNoEnergy) {
+  for (const Law law : {Law::kCorotational, Law::kNeoHookean}) {
+    const Solid whole = pressed_block(Element::kHex8Sri, 4, 0.45, law);
+    const TouchSurface top(whole.mesh(), Vec3::UnitZ(), kB1PatchRadius);
+    QuasiStaticModel before(whole, top, {});
+    const double force = before.press(*top.patch(Vec2::Zero()), Given::kDepth, 4e-3).force;
+    const std::vector<Cut> cut{across(0, 0.025)};
+    const Division division = divide(whole.mesh(), whole.fixed(), cut);
+    const Solid parted = after(whole, division);
+    const TouchSurface there(parted.mesh(), Vec3::UnitZ(), kB1PatchRadius);
+    QuasiStaticModel model(parted, there, {});
+    const int factors = model.factors();
+    model.go_on_from(before, division.node_before);
+    EXPECT_NEAR(parted.energy(model.displacements()) / whole.energy(before.displacements()), 1, 1e-12);
+    EXPECT_LT(model.press(*there.patch(Vec2::Zero()), Given::kDepth, 4e-3).force, 0.99 * force);
+    EXPECT_EQ(model.factors(), factors);  // that of the cut body at rest serves
+    EXPECT_LT(parted.energy(model.displacements()), whole.energy(before.displacements()));
+  }
+}
+
+TEST(PreparedCut, MayBeDoneWhenTheBodyIsGone) {
+  BodyConfig config = pressed_body(ModelKind::kLinear, Element::kHex8Sri, 4);
+  config.cuts = {{across(0, 0.025), PlannedCut::When::kForce, 0.1}};
+  std::vector<std::packaged_task<void()>> left;
+  {
+    Body body(config);
+    body.prepare_cuts_by([&](std::packaged_task<void()> work) { left.push_back(std::move(work)); });
+    body.touch(Vec3(0, 0, 0.048));
+  }
+  ASSERT_EQ(left.size(), 1U);
+  left[0]();
 }
 
 TEST(Cutting, APlanThatGoesWrongIsRefusedBeforeAnythingIsTouched) {

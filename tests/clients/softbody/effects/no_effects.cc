@@ -34,6 +34,7 @@ std::vector<int> twins(const Elastic&, const Division&) { std::abort(); }
 Cutting::Cutting(std::vector<PlannedCut>) { abort_with(changed_ ? 1 : 0); }
 bool Cutting::due(PlannedCut::When, double) const noexcept { return false; }
 std::span<const Cut> Cutting::make_next() { return made_; }
+std::vector<Cut> Cutting::with_next() const { std::abort(); }
 bool Cutting::take_changed() noexcept { return false; }
 std::size_t Cutting::bytes() const noexcept { return 0; }
 
@@ -51,6 +52,7 @@ double StiffnessOverTime::factor_at(double) const { std::abort(); }
 void check(const StiffnessOverTime&) {}
 // NOLINTNEXTLINE(performance-unnecessary-value-param): as it is declared
 StiffeningModel::StiffeningModel(std::unique_ptr<Model>, StiffnessOverTime) { abort_with(factor_); }
+void StiffeningModel::go_on_from(const Model&, std::span<const int>) { std::abort(); }
 Reaction StiffeningModel::press(const Patch&, Given, double) { std::abort(); }
 std::size_t StiffeningModel::bytes() const noexcept { return 0; }
 
