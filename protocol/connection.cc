@@ -31,46 +31,46 @@ void Connection::begin_turn() noexcept {
   ticked_ = false;
 }
 
-std::optional<Connection::Event> Connection::next(LocalTime& now) {
+const Connection::Event* Connection::next(LocalTime& now) {
   for (;;) {
-    if (auto event = next_of_session(now)) return event;
+    if (const Event* const event = next_of_session(now)) return event;
     if (left_ > 0) {
-      if (auto event = receive(now)) return event;
+      if (const Event* const event = receive(now)) return event;
     } else if (!std::exchange(ticked_, true)) {
-      if (auto event = tick(now)) return event;
+      if (const Event* const event = tick(now)) return event;
     } else {
-      return {};
+      return nullptr;
     }
   }
 }
 
-std::optional<Connection::Event> Connection::next_of_session(LocalTime now) {
-  if (!session_) return {};
-  std::optional<Session::Event> event = session_->next_event();
-  if (!event) return {};
-  if (auto* closed = std::get_if<Session::Closed>(&*event)) {
+const Connection::Event* Connection::next_of_session(LocalTime now) {
+  const Session::Event* const event = session_ ? session_->next_event() : nullptr;
+  if (event == nullptr) return nullptr;
+  if (const auto* closed = std::get_if<Session::Closed>(event)) {
     flush(now);  // a Bye of our own
-    return end(now, Cause::kLost, closed->code, std::move(closed->reason));
+    return end(now, Cause::kLost, closed->code, closed->reason);
   }
   if (std::holds_alternative<Session::StateArrived>(*event)) back_off_ = config_.retry_min;
-  return std::move(*event);
+  told_ = event;
+  return &told_;
 }
 
 /// Takes one datagram from the link.
-std::optional<Connection::Event> Connection::receive(LocalTime& now) {
+const Connection::Event* Connection::receive(LocalTime& now) {
   // One byte more than the largest datagram: one that is too large stays too large after the cut.
   std::array<std::byte, kMaxDatagram + 1> buffer;
   Address from;
   const std::size_t size = link_.receive(from, buffer);
   if (size == 0) {
     left_ = 0;
-    return {};
+    return nullptr;
   }
   more_ = --left_ == 0;
-  now = link_.present(now);
+  now = link_.arrived(now);
   if (from != server_) {
     ++strangers_;
-    return {};
+    return nullptr;
   }
   const auto datagram = std::span<const std::byte>(buffer).first(std::min(size, buffer.size()));
   if (handshake_) {
@@ -78,11 +78,11 @@ std::optional<Connection::Event> Connection::receive(LocalTime& now) {
     return settle(now);
   }
   if (session_) session_->receive(now, datagram);
-  return {};
+  return nullptr;
 }
 
 /// Does what is due by time.
-std::optional<Connection::Event> Connection::tick(LocalTime now) {
+const Connection::Event* Connection::tick(LocalTime now) {
   if (session_) {
     session_->tick(now);
   } else if (handshake_) {
@@ -91,14 +91,15 @@ std::optional<Connection::Event> Connection::tick(LocalTime now) {
     }
     handshake_->tick(now);
   } else if (now >= retry_) {
-    return GreetingDue{};
+    told_ = GreetingDue{};
+    return &told_;
   }
-  return {};
+  return nullptr;
 }
 
 /// Acts on the server's answer, once it is there.
-std::optional<Connection::Event> Connection::settle(LocalTime now) {
-  if (!handshake_->outcome()) return {};
+const Connection::Event* Connection::settle(LocalTime now) {
+  if (!handshake_->outcome()) return nullptr;
   ClientHandshake::Outcome outcome = *handshake_->outcome();
   if (auto* refused = std::get_if<Refused>(&outcome)) {
     return end(now, Cause::kRefused, refused->code, std::move(refused->detail));
@@ -112,12 +113,14 @@ std::optional<Connection::Event> Connection::settle(LocalTime now) {
   } else {
     session_.emplace(config, now);
   }
-  return Opened{std::move(accepted.welcome)};
+  told_ = Opened{std::move(accepted.welcome)};
+  return &told_;
 }
 
-Connection::Ended Connection::end(LocalTime now, Cause cause, Code code, std::string reason) {
+const Connection::Event* Connection::end(LocalTime now, Cause cause, Code code, std::string reason) {
   drop(now);
-  return {cause, code, std::move(reason)};
+  told_ = Ended{cause, code, std::move(reason)};
+  return &told_;
 }
 
 void Connection::drop(LocalTime now) {

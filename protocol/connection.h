@@ -60,8 +60,8 @@ class Connection {
     Code code;
     std::string reason;  ///< the server's words where it had any
   };
-  /// A Session::Event in here is never Session::Closed: that is told as Ended.
-  using Event = std::variant<GreetingDue, Opened, Ended, Session::Event>;
+  /// A Session::Event in here is never Session::Closed: that is told as Ended. It is the session's own.
+  using Event = std::variant<GreetingDue, Opened, Ended, const Session::Event*>;
 
   /// `link` must outlive this object. Nothing is sent before greet().
   Connection(Link& link, const Address& server, const Config& config);
@@ -72,8 +72,9 @@ class Connection {
 
   /// Opens a turn: next() may take Config::max_datagrams from the link again.
   void begin_turn() noexcept;
-  /// The next thing to act on; empty when this turn has no more. `now` grows to when a datagram was certainly here.
-  std::optional<Event> next(LocalTime& now);
+  /// The next thing to act on, null when this turn has no more. It stays until the next call. `now` grows to when a
+  /// datagram was certainly here.
+  const Event* next(LocalTime& now);
   /// The link may hold more than one turn may take: the next turn is due at once.
   bool more() const noexcept { return more_; }
   /// Sends all that is due.
@@ -99,11 +100,11 @@ class Connection {
   std::uint64_t strangers() const noexcept { return strangers_; }
 
  private:
-  std::optional<Event> next_of_session(LocalTime now);
-  std::optional<Event> receive(LocalTime& now);
-  std::optional<Event> tick(LocalTime now);
-  std::optional<Event> settle(LocalTime now);
-  Ended end(LocalTime now, Cause cause, Code code, std::string reason);
+  const Event* next_of_session(LocalTime now);
+  const Event* receive(LocalTime& now);
+  const Event* tick(LocalTime now);
+  const Event* settle(LocalTime now);
+  const Event* end(LocalTime now, Cause cause, Code code, std::string reason);
   void forget_session();
 
   Link& link_;
@@ -120,6 +121,7 @@ class Connection {
   int left_ = 0;         ///< datagrams that this turn may still take
   bool more_ = false;
   bool ticked_ = true;  ///< in this turn
+  Event told_;          ///< the newest one
 };
 
 }  // namespace tendon

@@ -57,6 +57,10 @@ class Link {
   /// their round trip would look too short, and ClockOffsetEstimator trusts the shortest round trips most. An engine
   /// that a turn calls may take its time, too. A link without a clock returns `now`.
   virtual LocalTime present(LocalTime now) const { return now; }
+
+  /// A time by which the datagram that receive() gave last had certainly come, never before `now`. It is the present
+  /// time, unless the link knows an earlier one: that saves a reading of the clock.
+  virtual LocalTime arrived(LocalTime now) const { return present(now); }
 };
 
 }  // namespace tendon

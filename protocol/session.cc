@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -16,19 +17,16 @@
 namespace tendon {
 namespace {
 
-/// Of each stream, a device's states and reports or a channel's, the newest value. Takes memory at a stream's first
-/// value only (and for a report's text); their number is bounded by the codec: kMaxDevices, and kMaxDevices ·
-/// kMaxChannels.
-template <class Value>
+/// Of each stream, a device's states and reports or a channel's, the newest value, by itself or as an event `Told`.
+/// Takes memory at a stream's first value only (and for a report's text); their number is bounded by the codec:
+/// kMaxDevices, and kMaxDevices · kMaxChannels.
+template <class Value, class Told = void>
 class Newest {
  public:
+  using Kept = std::conditional_t<std::is_void_v<Told>, Value, Session::Event>;
+
   /// Replaces what was not taken.
-  void put(const Value& value) {
-    Stream& mine = stream(value);
-    waiting_ += mine.waiting ? 0 : 1;
-    mine.value = value;
-    mine.waiting = true;
-  }
+  void put(const Value& value) { put(stream(value), value); }
   /// As `put`; false, and nothing is changed, when `number` is not higher than any before of the highest epoch of its
   /// stream.
   bool put_if_newer(const Value& value, std::uint64_t number, std::uint64_t epoch = 0) {
@@ -36,29 +34,44 @@ class Newest {
     const std::pair both(epoch, number);
     if (mine.number && both <= *mine.number) return false;
     mine.number = both;
-    put(value);
+    put(mine, value);
     return true;
   }
 
   bool empty() const noexcept { return waiting_ == 0; }
 
   /// The value to be taken next, null when there is none; streams come in the order of their first values.
-  const Value* first() const noexcept { return empty() ? nullptr : &next_waiting()->value; }
-  /// Takes it out.
-  Value take() {
+  const Kept* first() const noexcept { return empty() ? nullptr : &next_waiting()->value; }
+  /// Takes it out. It stays as it is until the next `put`.
+  const Kept* take() noexcept {
     const auto next = streams_.begin() + (next_waiting() - streams_.cbegin());
     next->waiting = false;
     --waiting_;
-    return next->value;
+    return &next->value;
   }
 
  private:
   struct Stream {
-    Value value;
+    Kept value;
     bool waiting = false;
     std::optional<std::pair<std::uint64_t, std::uint64_t>> number;  ///< epoch first
   };
 
+  static const Value& in(const Value& kept) noexcept { return kept; }
+  static const Value& in(const Session::Event& kept) noexcept {
+    const auto& [value] = *std::get_if<Told>(&kept);
+    return value;
+  }
+  void put(Stream& mine, const Value& value) {
+    waiting_ += mine.waiting ? 0 : 1;
+    if constexpr (std::is_void_v<Told>) {
+      mine.value = value;
+    } else {
+      auto& [kept] = *std::get_if<Told>(&mine.value);
+      kept = value;
+    }
+    mine.waiting = true;
+  }
   static bool same(const DeviceState& a, const DeviceState& b) noexcept { return a.device == b.device; }
   static bool same(const DeviceReport& a, const DeviceReport& b) noexcept { return a.device == b.device; }
   static bool same(const PortFrame& a, const PortFrame& b) noexcept {
@@ -70,9 +83,13 @@ class Newest {
   }
   Stream& stream(const Value& value) {
     const auto found =
-        std::find_if(streams_.begin(), streams_.end(), [&](const Stream& s) { return same(s.value, value); });
+        std::find_if(streams_.begin(), streams_.end(), [&](const Stream& s) { return same(in(s.value), value); });
     if (found != streams_.end()) return *found;
-    return streams_.emplace_back(Stream{.value = value, .waiting = false, .number = {}});
+    if constexpr (std::is_void_v<Told>) {
+      return streams_.emplace_back(Stream{.value = value, .waiting = false, .number = {}});
+    } else {
+      return streams_.emplace_back(Stream{.value = Told{value}, .waiting = false, .number = {}});
+    }
   }
 
   std::vector<Stream> streams_;
@@ -129,13 +146,14 @@ struct Session::State {
   ClockOffsetEstimator peer_clock;
 
   // To tell.
-  Newest<DeviceState> states_arrived;
-  Newest<ForceCommand> forces_arrived;
+  Newest<DeviceState, StateArrived> states_arrived;
+  Newest<ForceCommand, ForceArrived> forces_arrived;
   std::optional<LinkReport> report_arrived;
-  Newest<DeviceReport> device_reports_arrived;
-  Newest<PeerReport> peer_reports_arrived;
-  Newest<PortFrame> ports_arrived;
+  Newest<DeviceReport, DeviceReportArrived> device_reports_arrived;
+  Newest<PeerReport, PeerReportArrived> peer_reports_arrived;
+  Newest<PortFrame, PortArrived> ports_arrived;
   std::optional<Closed> closed;
+  Event rare;  ///< the newest one of the others that was told
 
   std::optional<std::span<const std::byte>> open_body(LocalTime now, const Header& header,
                                                       std::span<const std::byte> datagram);
@@ -176,6 +194,13 @@ struct Session::State {
     return sealer &&
            (now - opened >= config.life || next_packet >= config.max_datagrams || stats.forged >= config.max_forged);
   }
+  /// Nearly every datagram asks for it in vain.
+  bool something_to_tell() const noexcept {
+    return !forces_arrived.empty() || !states_arrived.empty() || !ports_arrived.empty() || report_arrived ||
+           !device_reports_arrived.empty() || !peer_reports_arrived.empty() || closed || answering.has_next() ||
+           asked.has_answer();
+  }
+  const Event* tell();
   void close(Code code, std::string reason);
   Header begin(LocalTime now, std::span<std::byte, kMaxDatagram> buffer);
   std::size_t sent(LocalTime now, const Header& header, std::span<std::byte, kMaxDatagram> buffer) noexcept;
@@ -420,25 +445,32 @@ std::size_t Session::next_datagram(LocalTime now, std::span<std::byte, kMaxDatag
   return my.sent(now, header, buffer);
 }
 
-std::optional<Session::Event> Session::next_event() {
-  State& my = *state_;
-  if (const auto control = my.answering.next()) return RequestArrived{.id = control->id, .request = *control->request};
-  if (auto ack = my.asked.next_answer()) {
-    return RequestAnswered{.id = ack->id,
-                           .code = ack->code,
-                           .detail = std::move(ack->detail),
-                           .wait = ack->wait,
-                           .device = std::move(ack->device),
-                           .handle = std::move(ack->handle)};
+const Session::Event* Session::next_event() { return state_->something_to_tell() ? state_->tell() : nullptr; }
+
+const Session::Event* Session::State::tell() {
+  const auto keep = [&](auto event) {
+    rare = std::move(event);
+    return &rare;
+  };
+  if (const Control* const control = answering.next()) {
+    return keep(RequestArrived{.id = control->id, .request = *control->request});
   }
-  if (!my.forces_arrived.empty()) return ForceArrived{.command = my.forces_arrived.take()};
-  if (!my.ports_arrived.empty()) return PortArrived{.port = my.ports_arrived.take()};
-  if (my.report_arrived) return ReportArrived{.report = *std::exchange(my.report_arrived, std::nullopt)};
-  if (!my.device_reports_arrived.empty()) return DeviceReportArrived{.report = my.device_reports_arrived.take()};
-  if (!my.peer_reports_arrived.empty()) return PeerReportArrived{.report = my.peer_reports_arrived.take()};
-  if (!my.states_arrived.empty()) return StateArrived{.state = my.states_arrived.take()};
-  if (my.closed) return *std::exchange(my.closed, std::nullopt);
-  return {};
+  if (auto ack = asked.next_answer()) {
+    return keep(RequestAnswered{.id = ack->id,
+                                .code = ack->code,
+                                .detail = std::move(ack->detail),
+                                .wait = ack->wait,
+                                .device = std::move(ack->device),
+                                .handle = std::move(ack->handle)});
+  }
+  if (!forces_arrived.empty()) return forces_arrived.take();
+  if (!ports_arrived.empty()) return ports_arrived.take();
+  if (report_arrived) return keep(ReportArrived{.report = *std::exchange(report_arrived, std::nullopt)});
+  if (!device_reports_arrived.empty()) return device_reports_arrived.take();
+  if (!peer_reports_arrived.empty()) return peer_reports_arrived.take();
+  if (!states_arrived.empty()) return states_arrived.take();
+  if (closed) return keep(*std::exchange(closed, std::nullopt));
+  return nullptr;
 }
 
 LocalTime Session::next_tick() const noexcept {

@@ -96,7 +96,7 @@ class Session {
   Session(Session&&) noexcept;
   Session& operator=(Session&&) noexcept;
 
-  // Events for the owner.
+  // Events for the owner. A state or a force waits as the event that tells it, so that telling copies nothing.
   struct StateArrived {
     DeviceState state;
   };
@@ -162,8 +162,9 @@ class Session {
   // Out.
   /// Writes the next datagram to send into `buffer` and returns its size; 0 = nothing to send now.
   std::size_t next_datagram(LocalTime now, std::span<std::byte, kMaxDatagram> buffer);
-  /// The next event, or empty; Closed is the last one.
-  std::optional<Event> next_event();
+  /// The next event, null when there is none; Closed is the last one. It stays until the next call of this function or
+  /// of `receive`.
+  const Event* next_event();
   /// When to call `tick` and `next_datagram` next; not in the future when something waits to be sent.
   LocalTime next_tick() const noexcept;
 

@@ -223,6 +223,7 @@ Json in_json(const Server::Summary& summary) {
   }
   if (recording) {
     add("recorded_parts", recording->parts);
+    add("parts_not_kept", recording->parts_not_kept);
     add("recorded_bytes", recording->bytes);
     add("recorded_steps", recording->steps);
     add("lost_steps", recording->lost_steps);
@@ -281,6 +282,10 @@ int run(const std::vector<Scene>& scenes, double duration_s, bool json) {
   const HapticLoop::Stats haptic = total(summary.devices);
   log::info("stopped: " + why + "; " + std::to_string(haptic.steps) + " steps, " + std::to_string(haptic.overruns) +
             " overruns, " + std::to_string(summary.network.forces) + " forces");
+  if (summary.recording && summary.recording->parts_not_kept > 0) {
+    log::info(std::to_string(summary.recording->parts_not_kept) + " of " + std::to_string(summary.recording->parts) +
+              " recorded files not kept: no fault ([recording] keep)");
+  }
   if (json) lines.add(in_json(summary));
   if (!summary.recording || summary.recording->complete()) return 0;
   log::error("the recording is not whole: " + what_is_missing(*summary.recording));

@@ -24,13 +24,6 @@ bool contains(const std::vector<std::string>& features, std::string_view feature
   return std::find(features.begin(), features.end(), feature) != features.end();
 }
 
-template <class... Ts>
-struct Overloaded : Ts... {
-  using Ts::operator()...;
-};
-template <class... Ts>
-Overloaded(Ts...) -> Overloaded<Ts...>;  // clang 14 does not deduce it
-
 void add(NetworkLoop::Dropped& sum, const LinkStats& link) {
   sum.duplicated += link.duplicated;
   sum.malformed += link.malformed;
@@ -41,6 +34,13 @@ void add(NetworkLoop::Dropped& sum, const LinkStats& link) {
   sum.forces.not_finite += link.refused_forces.not_finite;
   sum.forces.out_of_bounds += link.refused_forces.out_of_bounds;
   sum.forces.old_sequence += link.refused_forces.old_sequence;
+}
+
+/// As the present controller, or the last one.
+void remember(NetworkLoop::Stats& stats, const Guest& guest) {
+  if (guest.role != Role::kController) return;
+  stats.controller = guest.session.stats();
+  stats.controller_clock = guest.session.peer_clock();
 }
 
 }  // namespace
@@ -81,7 +81,6 @@ LocalTime NetworkLoop::turn(LocalTime now) {
   for (Guest& guest : guests_) {
     if (!guest.gone) guest.session.tick(now);
     take_events(now, guest);
-    if (guest.role == Role::kController) stats_.controller = guest.session.stats();
     send_all(now, guest);
   }
   std::erase_if(guests_, [](const Guest& guest) { return guest.gone; });
@@ -100,7 +99,7 @@ bool NetworkLoop::drain(LocalTime& now) {
     Address from;
     const std::size_t size = link_.receive(from, buffer);
     if (size == 0) return false;
-    now = link_.present(now);
+    now = link_.arrived(now);
     const auto datagram = std::span(buffer).first(std::min(size, buffer.size()));
     if (size > buffer.size()) {
       ++stats_.malformed;
@@ -134,9 +133,10 @@ void NetworkLoop::receive(LocalTime now, const Address& from, std::span<const st
       guest->address = from;
       ++stats_.roamed;
     }
-    if (newest) measure(now, *guest);
+    if (newest) hear(now, *guest);
     take_refused(*guest);
-    take_events(now, *guest);  // a force waits for no further system call
+    take_events(now, *guest);  // a force waits for no further system call, and for nothing that is only told later
+    if (newest) measure(now, *guest);
   } else if (const auto waiting = std::find_if(half_open_.begin(), half_open_.end(), is_meant);
              waiting != half_open_.end()) {
     if (!waiting->session.receive(now, datagram)) return tap_from(kStranger);
@@ -326,21 +326,33 @@ void NetworkLoop::adapt(LocalTime now, Guest& guest) {
   }
 }
 
-void NetworkLoop::measure(LocalTime now, Guest& guest) {
+namespace {
+
+/// The exchange that the datagram of this instant has ended; null when it had no echo.
+const ClockExchange* exchange_of(LocalTime now, const Guest& guest) {
   const auto& exchange = guest.session.newest_exchange();
-  const bool has_echo = exchange && exchange->answered_at == now;  // this datagram
-  const auto sent = has_echo ? std::optional(exchange->answered) : std::nullopt;
+  return exchange && exchange->answered_at == now ? &*exchange : nullptr;
+}
+
+}  // namespace
+
+/// What the forces of the newest datagram are judged by.
+void NetworkLoop::hear(LocalTime now, Guest& guest) {
+  const ClockExchange* const exchange = exchange_of(now, guest);
+  const auto sent = exchange != nullptr ? std::optional(exchange->answered) : std::nullopt;
   for (const Seat& seat : guest.seats) {
     ServedChannel& channel = devices_[seat.device].channels[seat.channel];
     if (channel.holder == guest.id()) channel.lateness.heard(now, sent, guest.session.stats().lost);
   }
-  if (guest.meter) {
-    guest.meter->heard(now);
-    if (has_echo) {
-      if (const auto clock = guest.session.peer_clock()) guest.meter->observe(*exchange, *clock);
-    }
-  }
   adapt(now, guest);
+}
+
+void NetworkLoop::measure(LocalTime now, Guest& guest) {
+  if (!guest.meter) return;
+  guest.meter->heard(now);
+  const ClockExchange* const exchange = exchange_of(now, guest);
+  if (exchange == nullptr) return;
+  if (const auto clock = guest.session.peer_clock()) guest.meter->observe(*exchange, *clock);
 }
 
 void NetworkLoop::report(LocalTime now) {
@@ -393,15 +405,14 @@ void NetworkLoop::publish(LocalTime now) {
     const DeviceState* state = devices_[number].mail->state.take();
     if (state == nullptr) continue;
     devices_[number].sampled.observe(state->tick, LocalTime(state->sampled.time_since_epoch()), now);
-    DeviceState all = *state;
-    leave_out_what_no_frame_carries(all);
     for (Guest& guest : guests_) {
       View* const view = view_of(guest, number);
       if (view == nullptr || (guest.coupled && guest.coupled->device == number)) continue;
       if (guest.sees_handle) view->pressed |= state->buttons;
       const std::uint64_t one_in = guest.adaptation ? guest.adaptation->one_in() : 1;
       if (state->tick - view->last_state < std::max(view->state_every, one_in)) continue;
-      DeviceState told = all;
+      DeviceState told = *state;
+      leave_out_what_no_frame_carries(told);
       if (!guest.diagnoses) {
         told.force_wanted.reset();
         told.stiffness_wanted.reset();
@@ -423,18 +434,17 @@ void NetworkLoop::publish(LocalTime now) {
 }
 
 void NetworkLoop::take_events(LocalTime now, Guest& guest) {
-  while (const auto event = guest.session.next_event()) {
-    std::visit(Overloaded{
-                   [&](const Session::ForceArrived& arrived) { take_force(now, guest, arrived.command); },
-                   [&](const Session::PortArrived& arrived) { take_port(now, guest, arrived.port); },
-                   [&](const Session::RequestArrived& arrived) { answer(now, guest, arrived.id, arrived.request); },
-                   [&](const Session::Closed& closed) {
-                     if (closed.code == Code::kTimedOut) ++stats_.timed_out;
-                     leave(guest, closed.reason);
-                   },
-                   [](const auto&) {},  // a server receives no states and no answers
-               },
-               *event);
+  while (const Session::Event* const event = guest.session.next_event()) {
+    if (const auto* force = std::get_if<Session::ForceArrived>(event)) {
+      take_force(now, guest, force->command);
+    } else if (const auto* port = std::get_if<Session::PortArrived>(event)) {
+      take_port(now, guest, port->port);
+    } else if (const auto* asked = std::get_if<Session::RequestArrived>(event)) {
+      answer(now, guest, asked->id, asked->request);
+    } else if (const auto* closed = std::get_if<Session::Closed>(event)) {
+      if (closed->code == Code::kTimedOut) ++stats_.timed_out;
+      leave(guest, closed->reason);
+    }  // a server receives no states and no answers
   }
 }
 
@@ -475,7 +485,7 @@ void NetworkLoop::take_force(LocalTime now, Guest& guest, const ForceCommand& co
                             .round_trip = link.round_trip,
                             .valid_for = command.valid_for,
                             .lost = lost > std::exchange(guest.lost, lost)});
-  RemoteForce force;
+  RemoteForce& force = device.mail->forces[command.channel].back();  // an older one: each member is written
   force.sequence = command.sequence;
   force.answers_tick = command.based_on_tick;
   force.answers = answered->at;
@@ -488,7 +498,7 @@ void NetworkLoop::take_force(LocalTime now, Guest& guest, const ForceCommand& co
   force.error = command.error;
   force.torque = command.torque;
   force.grip_force = command.grip_force;
-  device.mail->forces[command.channel].put(force);
+  device.mail->forces[command.channel].put();
   ++channel.forces;
   ++stats_.forces;
 }
@@ -642,7 +652,7 @@ void NetworkLoop::leave(Guest& guest, const std::string& how) {
   notice(guest.role == Role::kController, "\"" + guest.name + "\" at " + to_string(guest.address) + " has left: " + how,
          change_of(guest, false, how));
   leases_.give_all(guest.id());
-  if (guest.role == Role::kController) stats_.controller_clock = guest.session.peer_clock();
+  remember(stats_, guest);
 }
 
 void NetworkLoop::close(LocalTime now) {
@@ -652,7 +662,7 @@ void NetworkLoop::close(LocalTime now) {
     guest.session.close(Code::kShutdown, why);
     send_all(now, guest);
     add(stats_.dropped, guest.session.stats());
-    if (guest.role == Role::kController) stats_.controller_clock = guest.session.peer_clock();
+    remember(stats_, guest);
     notice(false, "\"" + guest.name + "\" is sent away: " + why, change_of(guest, false, why));
   }
   guests_.clear();
@@ -676,7 +686,7 @@ NetworkLoop::Stats NetworkLoop::stats() const {
   }
   for (const Guest& guest : guests_) {
     add(stats.dropped, guest.session.stats());
-    if (guest.role == Role::kController) stats.controller_clock = guest.session.peer_clock();
+    remember(stats, guest);
   }
   return stats;
 }

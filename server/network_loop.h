@@ -205,6 +205,7 @@ class NetworkLoop {
   void leave(Guest& guest, const std::string& how);
   void send_all(LocalTime now, Guest& guest);
   void publish(LocalTime now);
+  void hear(LocalTime now, Guest& guest);
   void measure(LocalTime now, Guest& guest);
   void adapt(LocalTime now, Guest& guest);
   void report(LocalTime now);

@@ -145,6 +145,8 @@ std::unique_ptr<PartRecorder> recorder_of(const std::vector<Scene>& scenes, Loca
   config.rotate_bytes = static_cast<std::uint64_t>(recording->rotate_bytes);
   config.rotate_after = from_seconds(recording->rotate_after);
   config.budget_bytes = static_cast<std::uint64_t>(recording->budget_bytes.value_or(0));
+  config.keep = recording->keep;
+  config.one_in = recording->one_in.value_or(0);
   return std::make_unique<PartRecorder>(config);
 }
 
@@ -423,27 +425,31 @@ void Server::run_network() {
   name_thread("network");
   enter_punctual();
   const bool busy = devices_.front()->scene.network.busy;
-  LocalTime due = clock::now();
+  LocalTime now = clock::now();
+  LocalTime due = now;
   while (!stop_network_.load(std::memory_order_acquire)) {
-    const LocalTime before = clock::now();
     if (busy) {
-      watch_until(due);
-    } else if (due > before) {
-      link_.wait(std::min<Duration>(due - before, std::chrono::seconds(1)), &stepped_);
+      now = watch_until(due);
+    } else {
+      if (due > now) link_.wait(std::min<Duration>(due - now, std::chrono::seconds(1)), &stepped_);
+      now = clock::now();
     }
-    due = network_.turn(clock::now());
+    due = network_.turn(now);
     tell_notices();
+    if (!busy) now = clock::now();  // the turn has taken its time
   }
   network_.close(clock::now());
   tell_notices();
 }
 
-/// Until a datagram can be received, the doorbell rings, or it is `due`; without a sleep.
-void Server::watch_until(LocalTime due) {
+/// Until a datagram can be received, the doorbell rings, or it is `due`; without a sleep. The present time.
+LocalTime Server::watch_until(LocalTime due) {
   LocalTime now = clock::now();
   while (now < due && !stepped_.rung() && !busy_link_.look(now)) {
   }
-  if (stepped_.rung()) stepped_.answer();
+  if (!stepped_.rung()) return now;
+  stepped_.answer();
+  return clock::now();  // not before the step that has rung
 }
 
 void Server::tell_notices() {

@@ -125,7 +125,7 @@ class Server {
   void end_threads();  ///< those that run: the haptic ones first, with zero force
   void run_haptic(const std::vector<DeviceRuntime*>& devices);
   void run_network();
-  void watch_until(LocalTime due);
+  LocalTime watch_until(LocalTime due);
   void tell_notices();
   void run_log();
   void drain_to_recorder(LocalTime now);

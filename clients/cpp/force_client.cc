@@ -229,14 +229,14 @@ void ForceClient::end(Phase phase, Code code, std::string reason) {
   stats_.code = code;
   stats_.reason = std::move(reason);
   holds_ = false;
-  unseen_.reset();
+  unseen_ = false;
   newest_.reset();
   pressed_ = 0;
 }
 
 void ForceClient::take(LocalTime now, const Connection::Event& event) {
-  if (const auto* of_session = std::get_if<Session::Event>(&event)) {
-    take_event(now, *of_session);
+  if (const auto* of_session = std::get_if<const Session::Event*>(&event)) {
+    take_event(now, **of_session);
   } else if (const auto* opened = std::get_if<Connection::Opened>(&event)) {
     open(now, opened->welcome);
   } else if (const auto* ended = std::get_if<Connection::Ended>(&event)) {
@@ -261,7 +261,8 @@ void ForceClient::take_event(LocalTime now, const Session::Event& event) {
   if (const auto* arrived = std::get_if<Session::StateArrived>(&event)) {
     ++stats_.states;
     if (unseen_) ++stats_.states_skipped;
-    unseen_ = newest_ = arrived->state;
+    newest_ = arrived->state;
+    unseen_ = true;
     if (physics_ && !holds_) pressed_ = 0;  // a press of that time was another engine's
     pressed_ |= arrived->state.buttons;
     newest_arrived_ = now;
@@ -312,11 +313,11 @@ void ForceClient::take_request(LocalTime now, const Session::RequestArrived& arr
 
 /// The state that the callback is due to see; empty when there is nothing new.
 std::optional<DeviceState> ForceClient::due_state(LocalTime now) {
-  if (!foretell_) return std::exchange(unseen_, std::nullopt);
+  if (!foretell_) return std::exchange(unseen_, false) ? newest_ : std::nullopt;
   if (!newest_ || now - newest_arrived_ > config_.state_deadband->max_silence) return {};
   const DeviceState state = foretell(*newest_, now - newest_arrived_, haptic_period());
   if (state.tick <= seen_tick_) return {};  // the previous state took less time to arrive
-  unseen_.reset();
+  unseen_ = false;
   stats_.states_foretold += state.tick > newest_->tick ? 1 : 0;
   return state;
 }

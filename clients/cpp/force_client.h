@@ -174,7 +174,7 @@ class ForceClient {
 
   /// Shows the callback the newest state once more, in the next turn: for an engine whose answer has changed since it saw
   /// that state, and for which the next state would come late. Nothing happens without a state.
-  void answer_again() { unseen_ = newest_; }
+  void answer_again() { unseen_ = newest_.has_value(); }
 
   /// For an engine that computes elsewhere while this thread goes on: its callback returned an unknown force, and this
   /// is what it has come to. The force leaves with the next turn, which is due at once. False, and nothing is sent:
@@ -287,9 +287,9 @@ class ForceClient {
   std::optional<std::uint32_t> asked_lease_;  ///< the request that waits for its answer
   LocalTime ask_lease_ = LocalTime::max();    ///< when to ask (again)
 
-  std::optional<DeviceState> unseen_;  ///< newest state that the callback has not seen
-  std::uint32_t pressed_ = 0;          ///< buttons held in any of the states since the one that it has seen
-  std::optional<DeviceState> newest_;  ///< newest state, seen or not
+  std::optional<DeviceState> newest_;
+  bool unseen_ = false;        ///< the callback has not seen it
+  std::uint32_t pressed_ = 0;  ///< buttons held in any of the states since the one that it has seen
   LocalTime newest_arrived_{};
   std::uint64_t seen_tick_ = 0;                      ///< newest tick that the callback has seen
   std::optional<std::uint32_t> deadband_request_{};  ///< … of the states

@@ -88,8 +88,8 @@ void Observer::end(const Connection::Ended& ended) {
 }
 
 void Observer::take(LocalTime now, const Connection::Event& event) {
-  if (const auto* of_session = std::get_if<Session::Event>(&event)) {
-    take_event(now, *of_session);
+  if (const auto* of_session = std::get_if<const Session::Event*>(&event)) {
+    take_event(now, **of_session);
   } else if (const auto* opened = std::get_if<Connection::Opened>(&event)) {
     open(now, opened->welcome);
   } else if (const auto* ended = std::get_if<Connection::Ended>(&event)) {

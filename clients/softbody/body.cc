@@ -107,6 +107,9 @@ constexpr std::array kModels{
               kAllOfRounds, false},
     ModelInfo{ModelKind::kModal, Law::kLinear, "modal",
               "for comparison: a few swings of the body, too stiff where it is touched", kSmall, kOfTables, false},
+    ModelInfo{ModelKind::kNear, Law::kCorotational, "near",
+              "large rotations, or strains, near the tool, and a linear body elsewhere", kLargeRotations,
+              kOfTables | kMaterialNonlinearity, false},
 };
 
 Mesh mesh_of(const BodyConfig& config) {
@@ -125,11 +128,18 @@ Solid solid_of(const BodyConfig& config) {
   for (const Vec3& node : mesh.nodes) lowest = std::min(lowest, node.z());
   const double held = lowest + std::max(config.clamped_below, 1e-9);
   const Fixed fixed = fix_where(mesh, [&](const Vec3& node) { return node.z() <= held; });
-  return {std::move(mesh), config.element, config.material, info(config.model).law, fixed};
+  const Law law = config.model == ModelKind::kNear ? config.law : info(config.model).law;
+  std::vector<Material> of_elements = materials_of(mesh, config.material, config.regions);
+  return {std::move(mesh), config.element, config.material, law, fixed, std::move(of_elements)};
+}
+
+/// Whether a model that can do without it is to tell its Glide.
+bool wants_glide(const BodyConfig& config, const TouchSurface& surface) {
+  return config.whole_stiffness || surface.curved();
 }
 
 ModalModel::Config modal_config(const BodyConfig& config, const TouchSurface& surface) {
-  ModalModel::Config modal{.swings = config.swings, .patches = {}};
+  ModalModel::Config modal{.swings = config.swings, .patches = {}, .glides = wants_glide(config, surface)};
   const double reach = config.reach.value_or(config.patch_radius);
   const int count = config.static_modes;
   const auto along = [&](int i) { return count > 1 ? reach * (2.0 * i / (count - 1) - 1) : 0; };
@@ -149,7 +159,7 @@ constexpr bool each_is_at_its_kind(const std::array<Info, kCount>& rows) {
 }
 // info() uses the kind as the index.
 static_assert(each_is_at_its_kind(kEffects) && kEffects.back().kind == kSelfCollision);
-static_assert(each_is_at_its_kind(kModels) && kModels.back().kind == ModelKind::kModal);
+static_assert(each_is_at_its_kind(kModels) && kModels.back().kind == ModelKind::kNear);
 
 /// A model, and typed pointers to it for kinds that offer more than Model.
 struct Made {
@@ -158,6 +168,7 @@ struct Made {
   const CondensedModel* condensed = nullptr;
   QuasiStaticModel* newton = nullptr;  ///< for rigid tools
   StiffeningModel* stiffening = nullptr;
+  const NearModel* near = nullptr;
 };
 
 Patch middle_patch(const TouchSurface& surface, const Vec3& middle) {
@@ -179,12 +190,13 @@ std::unique_ptr<Model> solved_model_of(const BodyConfig& config, const Solid& so
 
 std::unique_ptr<Model> plain_model_of(const BodyConfig& config, const Solid& solid, const TouchSurface& surface) {
   QuasiStaticModel::Config newton{.max_iterations = config.max_iterations, .tolerance = config.tolerance};
+  if (config.plasticity) newton.glides = wants_glide(config, surface);
   if (config.self_collision) newton.self_collision = config.material.young / *config.self_collision;
   const EffectsConfig& effects = config.effects;
   if (config.plasticity) return std::make_unique<PlasticModel>(solid, surface, newton, effects, *config.plasticity);
   switch (config.model) {
     case ModelKind::kLinear:
-      return std::make_unique<LinearModel>(solid, surface, effects);
+      return std::make_unique<LinearModel>(solid, surface, effects, wants_glide(config, surface));
     case ModelKind::kCorotational:
     case ModelKind::kStVenantKirchhoff:
     case ModelKind::kNeoHookean:
@@ -198,7 +210,8 @@ std::unique_ptr<Model> plain_model_of(const BodyConfig& config, const Solid& sol
       return std::make_unique<XpbdModel>(solid, surface, config.iterations, effects);
     case ModelKind::kProjective:
       return std::make_unique<ProjectiveModel>(solid, surface, config.iterations, effects);
-    case ModelKind::kCondensed:  // made below
+    case ModelKind::kCondensed:  // made below, as is kNear
+    case ModelKind::kNear:
     case ModelKind::kModal:
       break;
   }
@@ -228,8 +241,8 @@ std::unique_ptr<CondensedModel> condensed_from(const BodyConfig& config, const S
   const double expected = table.stiffness;
   const TouchSurface then(solid.mesh(), surface.normal(), table.patch_radius);
   const auto patch = then.patch(table.middle);
-  auto model =
-      std::make_unique<CondensedModel>(solid.mesh().nodes.size(), std::move(table.nodes), std::move(table.compliance));
+  auto model = std::make_unique<CondensedModel>(solid.mesh().nodes.size(), std::move(table.nodes),
+                                                std::move(table.compliance), wants_glide(config, surface));
   constexpr double kSame = 1e-9;  // of the same sum in another order
   if (!patch || !(std::abs(stiffness_under(*model, *patch) / expected - 1) < kSame)) {
     refuse(" does not answer as it did when it was made");
@@ -243,9 +256,16 @@ Made model_of(const BodyConfig& config, const Solid& solid, const TouchSurface& 
     made.model = solved_model_of(config, solid, surface, solver);
   } else if (config.model == ModelKind::kCondensed) {
     auto condensed = config.table_file ? condensed_from(config, solid, surface, made.linear_up_to.emplace())
-                                       : std::make_unique<CondensedModel>(solid, surface, touchable(config, surface));
+                                       : std::make_unique<CondensedModel>(solid, surface, touchable(config, surface),
+                                                                          wants_glide(config, surface));
     made.condensed = condensed.get();
     made.model = std::move(condensed);
+  } else if (config.model == ModelKind::kNear) {
+    const QuasiStaticModel::Config newton{.max_iterations = config.max_iterations, .tolerance = config.tolerance};
+    auto near = std::make_unique<NearModel>(solid, surface, middle_patch(surface, config.middle),
+                                            NearModel::Config{.newton = newton});
+    made.near = near.get();
+    made.model = std::move(near);
   } else {
     made.model = plain_model_of(config, solid, surface);
     if (is_rigid_on_nonlinear(config)) made.newton = static_cast<QuasiStaticModel*>(made.model.get());
@@ -276,6 +296,9 @@ const BodyConfig& checked(const BodyConfig& config) {
   }
   if (model.tetrahedra && config.element != Element::kTet4) {
     throw std::invalid_argument("the model \"" + std::string(model.name) + "\" wants the element tet4");
+  }
+  if (config.model == ModelKind::kNear && config.law == Law::kLinear) {
+    throw std::invalid_argument("the law of the model \"near\" cannot be linear");
   }
   if (config.tool != BodyConfig::Tool::kPatch) {
     const std::string tool = config.tool == BodyConfig::Tool::kSphere    ? "a sphere"
@@ -391,6 +414,7 @@ Vec3 lowest_of_tool(const BodyConfig& config, const Mat3& turn) {
 
 EffectSet effects_of(const BodyConfig& config) {
   EffectSet set = info(config.model).always;
+  if (config.model == ModelKind::kNear && config.law == Law::kNeoHookean) set.add(kMaterialNonlinearity);
   if (config.effects.gravity) set.add(kGravity);
   if (config.effects.inertia) set.add(kInertia);
   if (config.effects.damping) set.add(kDamping);
@@ -479,7 +503,11 @@ Body::Parts::Planned::Planned(const BodyConfig& config, const Mesh& mesh, const 
 void Body::Parts::cut(PlannedCut::When when, double value) {
   while (cutting->cuts.due(when, value)) {
     const Division division = divide(solid.mesh(), solid.fixed(), cutting->cuts.make_next());
-    solid = Solid(division.mesh, solid.element(), solid.material(), solid.law(), division.fixed);
+    std::vector<Material> of_elements;
+    if (!solid.of_elements().empty()) {
+      for (const int before : division.element_before) of_elements.push_back(solid.material(before));
+    }
+    solid = Solid(division.mesh, solid.element(), solid.material(), solid.law(), division.fixed, of_elements);
     surface = TouchSurface(solid.mesh(), surface.normal(), surface.radius());
     patch = middle_patch(surface, cutting->middle);
     model.cut(division, cutting->effects);
@@ -588,6 +616,10 @@ Body::Size Body::size() const {
           static_cast<std::size_t>(parts_->solid.free_count()), parts_->surface.nodes().size(),
           parts_->model.bytes() + parts_->contact.bytes() + (parts_->capsule ? parts_->capsule->bytes() : 0) +
               (parts_->rigid ? parts_->rigid->bytes() : 0) + (parts_->cutting ? parts_->cutting->cuts.bytes() : 0)};
+}
+
+std::optional<NearModel::Size> Body::near_field() const {
+  return parts_->made.near == nullptr ? std::nullopt : std::optional(parts_->made.near->size());
 }
 
 Body::Size Body::size_of(const BodyConfig& config, int& under_patch) {

@@ -16,11 +16,13 @@
 #include "clients/softbody/effects/cutting.h"
 #include "clients/softbody/effects/effects.h"
 #include "clients/softbody/fem/material.h"
+#include "clients/softbody/fem/region.h"
 #include "clients/softbody/models/linear.h"
 #include "clients/softbody/models/plasticity.h"
 #include "clients/softbody/models/quasi_static.h"
 #include "clients/softbody/models/stiffening.h"
 #include "clients/softbody/models/surface_table.h"
+#include "clients/softbody/near/near_model.h"
 #include "clients/softbody/touch/contact.h"
 
 namespace tendon::softbody {
@@ -65,7 +67,7 @@ struct EffectInfo {
 std::span<const EffectInfo> effects() noexcept;  ///< in the order of their kinds
 const EffectInfo& info(EffectKind kind) noexcept;
 
-/// The models that a scene can choose; folder models/ has a file for each family.
+/// The models that a scene can choose; folder models/ has a file for each family, near/ the last.
 enum class ModelKind : std::uint8_t {
   kLinear,
   kCondensed,
@@ -77,12 +79,13 @@ enum class ModelKind : std::uint8_t {
   kTled,
   kXpbd,
   kProjective,
-  kModal
+  kModal,
+  kNear
 };
 
 struct ModelInfo {
   ModelKind kind;
-  Law law;
+  Law law;                ///< of kNear the usual one: see BodyConfig::law
   std::string_view name;  ///< in scenes, tables and command lines
   std::string_view what;  ///< one line
   EffectSet always;       ///< always simulated
@@ -117,7 +120,9 @@ struct BodyConfig {
   std::variant<BlockShape, CylinderShape, FileShape> shape;
   Element element = Element::kHex8Sri;
   Material material;
+  std::vector<Region> regions{};  ///< parts of another material; where two overlap, the later one counts
   ModelKind model = ModelKind::kCondensed;
+  Law law = Law::kCorotational;  ///< kNear: of the near elements; not kLinear
   std::optional<std::filesystem::path>
       table_file{};  ///< kCondensed: where condense() has put its table; else it is made
   int max_iterations = QuasiStaticModel::Config{}.max_iterations;  ///< for models that iterate until they converge
@@ -154,6 +159,9 @@ struct BodyConfig {
   std::size_t hands = 1;            ///< rigid tools on nonlinear bodies: how many hands hold one each
   Vec3 tool_offset = Vec3::Zero();  ///< m, handle frame, from the handle's position to the tool's middle
   PatchContact::Side side = PatchContact::Side::kUnilateral;
+  /// The stiffness is the whole second derivative of the energy also where that costs more than a few percent matter: of
+  /// linear models and of plasticity on a flat surface. On a curved one, and of other models at rest, it always is.
+  bool whole_stiffness = false;
 };
 
 /// Whether the tool is rigid and presses a nonlinear body: RigidContact.
@@ -227,6 +235,8 @@ class Body {
     std::size_t bytes;      ///< kept by the model, effects included
   };
   Size size() const;
+  /// The near field, of a kNear body.
+  std::optional<NearModel::Size> near_field() const;
   /// The size of the body that `config` describes, without its model: `bytes` is 0. `under_patch`: the nodes of the
   /// patch around the middle. Throws as the constructor does.
   static Size size_of(const BodyConfig& config, int& under_patch);

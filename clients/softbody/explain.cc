@@ -47,9 +47,11 @@ BodyConfig without(BodyConfig body, EffectKind effect) {
     case EffectKind::kSelfCollision:
       body.self_collision.reset();
       break;
+    case EffectKind::kMaterialNonlinearity:
+      body.law = Law::kCorotational;
+      break;
     case EffectKind::kContact:
     case EffectKind::kGeometricNonlinearity:
-    case EffectKind::kMaterialNonlinearity:
       break;
   }
   return body;
@@ -109,6 +111,7 @@ Explanation explain(const Scene& scene, const std::function<double()>& processor
   Explanation out{.parts = {},
                   .all = {},
                   .size = body.size(),
+                  .near = body.near_field(),
                   .step = body.step(),
                   .stiffness = body.settle(Given::kForce, push).stiffness,
                   .linear_up_to = body.linear_up_to()};
@@ -150,6 +153,11 @@ std::string in_words(const Scene& scene, const Explanation& explanation) {
   std::ostringstream text;
   text << "simulated:\n  contact: " << (body.side == PatchContact::Side::kUnilateral ? "unilateral" : "bilateral")
        << touched_by(body) << "\n  elasticity: " << model.name << ", " << model.what << '\n';
+  for (std::size_t i = 0; i < body.regions.size(); ++i) {
+    const Material& material = body.regions[i].material;
+    text << "  region " << i + 1 << ": " << material.young << " Pa, Poisson's ratio " << material.poisson
+         << "; elsewhere " << body.material.young << " Pa, " << body.material.poisson << '\n';
+  }
   for (const auto& [kind, simulated, adds] : explanation.parts) {
     if (!simulated || kind == EffectKind::kContact) continue;
     const EffectInfo& effect = info(kind);
@@ -164,6 +172,15 @@ std::string in_words(const Scene& scene, const Explanation& explanation) {
     if (simulated) continue;
     text << "  " << info(kind).name
          << (kind == EffectKind::kGeometricNonlinearity ? ": " + turned_too_far(explanation.linear_up_to) : "") << '\n';
+  }
+  if (explanation.near && explanation.near->radius > 0) {
+    const NearModel::Size& near = *explanation.near;
+    const std::string_view law = std::ranges::find(models(), body.law, &ModelInfo::law)->name;
+    text << "near the tool: " << law << ", " << near.elements << " of " << size.elements << " elements, within "
+         << 1e3 * near.radius << " mm; " << near.unknowns << " unknowns, of them " << near.modes
+         << " modes in place of the " << near.interface << " that near and far have in common\n";
+  } else if (explanation.near) {
+    text << "near the tool: the whole body, which is not larger\n";
   }
   if (explanation.step > 0) {
     text << "time: every answer is a step of " << 1e3 * explanation.step << " ms\n";
@@ -191,14 +208,21 @@ std::string in_json(const Scene& scene, const Explanation& explanation) {
     }
     parts.push_back(std::move(part));
   }
-  const Json json = {
-      {"model", info(scene.body.model).name}, {"element", info(scene.body.element).name},
-      {"nodes", explanation.size.nodes},      {"elements", explanation.size.elements},
-      {"unknowns", explanation.size.free},    {"touchable_nodes", explanation.size.touchable},
-      {"bytes", explanation.size.bytes},      {"step_s", explanation.step},
-      {"k_n_per_m", explanation.stiffness},   {"linear_up_to_m", explanation.linear_up_to},  // infinite: null
-      {"answer_s", explanation.all.answer_s}, {"resolution_s", explanation.resolution_s},
-      {"effects", std::move(parts)},          {"warnings", warnings(scene.body)}};
+  Json json = {{"model", info(scene.body.model).name}, {"element", info(scene.body.element).name},
+               {"nodes", explanation.size.nodes},      {"elements", explanation.size.elements},
+               {"unknowns", explanation.size.free},    {"touchable_nodes", explanation.size.touchable},
+               {"bytes", explanation.size.bytes},      {"step_s", explanation.step},
+               {"k_n_per_m", explanation.stiffness},   {"linear_up_to_m", explanation.linear_up_to},  // infinite: null
+               {"answer_s", explanation.all.answer_s}, {"resolution_s", explanation.resolution_s},
+               {"regions", scene.body.regions.size()}, {"effects", std::move(parts)},
+               {"warnings", warnings(scene.body)}};
+  if (const auto& near = explanation.near) {
+    json["near"] = {{"radius_m", near->radius},
+                    {"elements", near->elements},
+                    {"unknowns", near->unknowns},
+                    {"modes", near->modes},
+                    {"interface", near->interface}};
+  }
   return json.dump(-1, ' ', false, Json::error_handler_t::replace) + '\n';
 }
 

@@ -31,9 +31,10 @@ struct Explanation {
   Cost all;
   double resolution_s = 0;  ///< the difference of two measurements of the same body; smaller costs mean nothing
   Body::Size size;
-  double step = 0;          ///< s, the time step of an answer; 0: the body is at rest at every instant
-  double stiffness = 0;     ///< N/m, at first touch
-  double linear_up_to = 0;  ///< m; see Body
+  std::optional<NearModel::Size> near;  ///< of the model "near"
+  double step = 0;                      ///< s, the time step of an answer; 0: the body is at rest at every instant
+  double stiffness = 0;                 ///< N/m, at first touch
+  double linear_up_to = 0;              ///< m; see Body
 };
 
 /// `processor_time` of the calling thread, s.

@@ -79,6 +79,15 @@ class Table {
   /// A length in mm above 0.
   double length(std::string_view key) { return number(key, 0, false, 1e3 * kMaxLength, 1e3); }
 
+  /// false where it is left out.
+  bool flag(std::string_view key) {
+    const toml::node* node = find(key);
+    if (node == nullptr) return false;
+    const auto* value = node->as_boolean();
+    if (value == nullptr) fail(*node, key, "expected true or false");
+    return **value;
+  }
+
   int count(std::string_view key, std::int64_t most, std::optional<int> otherwise = {}) {
     const std::string expected = "a whole number from 1 to " + std::to_string(most);
     const toml::node* node = find(key);
@@ -194,6 +203,17 @@ class Table {
   std::set<std::string, std::less<>> known_;
 };
 
+/// With the density, kg/m³, where one is wanted.
+Material read_material(Table& of, double* density = nullptr) {
+  Table table = of.table("material");
+  Material material;
+  material.young = table.number("young_pa", 0, false, 1e12, 1);
+  material.poisson = table.number("poisson", 0, true, 0.4999, 1);
+  if (density != nullptr) *density = table.number("density_kg_per_m3", 0, false, 1e6, 1);
+  table.check_unknown();
+  return material;
+}
+
 void read_body(Table table, const std::filesystem::path& directory, BodyConfig& body) {
   const std::string kind = table.choice("shape", "block, cylinder, file", [](std::string_view name) {
     return name == "block" || name == "cylinder" || name == "file" ? std::optional(std::string(name)) : std::nullopt;
@@ -221,15 +241,29 @@ void read_body(Table table, const std::filesystem::path& directory, BodyConfig& 
                            1 / table.number("units_per_m", 0, false, 1e9, 1)};
   }
   body.clamped_below = table.number("clamped_below_mm", 0, true, 1e3 * kMaxLength, 1e3, 0);
-  Table material = table.table("material");
-  body.material.young = material.number("young_pa", 0, false, 1e12, 1);
-  const double poisson = material.number("poisson", 0, true, 0.4999, 1);
-  body.material.poisson = poisson;
-  if (body.effects.gravity || body.effects.inertia || body.effects.damping) {
-    body.effects.density = material.number("density_kg_per_m3", 0, false, 1e6, 1);
-  }
-  material.check_unknown();
+  const bool has_mass = body.effects.gravity || body.effects.inertia || body.effects.damping;
+  body.material = read_material(table, has_mass ? &body.effects.density : nullptr);
   table.check_unknown();
+}
+
+std::vector<Region> read_regions(Table& root) {
+  std::vector<Region> regions;
+  for (Table& table : root.tables("region", "one or more tables [[region]]")) {
+    const bool ball = table.find("radius_mm") != nullptr;
+    if (ball == (table.find("size_mm") != nullptr)) table.fail("expected either radius_mm or size_mm");
+    const Vec3 middle = table.vector("middle_mm", 1e3 * kMaxLength, 1e3);
+    Region& region = regions.emplace_back();
+    if (ball) {
+      region.where = Region::Ball{.middle = middle, .radius = table.length("radius_mm")};
+    } else {
+      const Vec3 size = table.vector("size_mm", 1e3 * kMaxLength, 1e3);
+      if (!(size.array() > 0).all()) table.fail(*table.find("size_mm"), "size_mm", "expected lengths above 0");
+      region.where = Region::Box{.middle = middle, .size = size};
+    }
+    region.material = read_material(table);
+    table.check_unknown();
+  }
+  return regions;
 }
 
 void read_touch(Table table, Scene& scene) {
@@ -264,6 +298,12 @@ void read_touch(Table table, Scene& scene) {
       if (name == "unilateral") return std::optional(PatchContact::Side::kUnilateral);
       return name == "bilateral" ? std::optional(PatchContact::Side::kBilateral) : std::nullopt;
     });
+  }
+  const EffectSet simulated = effects_of(body);
+  const bool can_leave_out = info(body.model).law == Law::kLinear || simulated.has(EffectKind::kPlasticity);
+  const bool patch = body.tool == BodyConfig::Tool::kPatch;
+  if (can_leave_out && patch && !info(body.model).tetrahedra && !body.effects.has_time()) {
+    body.whole_stiffness = table.flag("whole_stiffness");
   }
   if (const toml::node* asked = table.find("table_mm")) {
     scene.table = table.length("table_mm");
@@ -316,6 +356,23 @@ double read_self_collision(Table table) {
   return layer;
 }
 
+constexpr std::string_view kLaws = "corotational, stvk, neo-hookean";
+
+std::optional<Law> law_named(std::string_view name) {
+  if (name == "corotational") return Law::kCorotational;
+  if (name == "stvk") return Law::kStVenantKirchhoff;
+  return name == "neo-hookean" ? std::optional(Law::kNeoHookean) : std::nullopt;
+}
+
+/// Large strains are an effect of one law of the model "near".
+void check_law(Table& root, Law law, EffectSet listed) {
+  const bool simulates = law == Law::kNeoHookean;
+  if (simulates == listed.has(EffectKind::kMaterialNonlinearity)) return;
+  root.fail(*root.find("effects"), "effects",
+            simulates ? "the law \"neo-hookean\" simulates \"material-nonlinearity\", which is not listed"
+                      : "the law simulates no \"material-nonlinearity\", which is listed: only \"neo-hookean\" does");
+}
+
 std::vector<Scene::Hand> read_hands(Table& root) {
   std::vector<Scene::Hand> hands;
   for (Table& table : root.tables("hands", "two or more tables [[hands]]")) {
@@ -336,8 +393,8 @@ std::vector<Scene::Hand> read_hands(Table& root) {
 }
 
 /// Reads the list of effects. It must have all effects that the model always simulates, and only effects that the model
-/// can simulate.
-void read_effects(Table& root, const ModelInfo& model, BodyConfig& body) {
+/// can simulate. Returns what is listed.
+EffectSet read_effects(Table& root, const ModelInfo& model, BodyConfig& body) {
   const toml::node& node = root.need("effects", "a list of effects");
   const auto* list = node.as_array();
   if (list == nullptr) root.fail(node, "effects", "expected a list of effects");
@@ -384,6 +441,7 @@ void read_effects(Table& root, const ModelInfo& model, BodyConfig& body) {
   if (listed.has(EffectKind::kPlasticity)) body.plasticity = read_plasticity(root.table("plasticity"));
   if (listed.has(EffectKind::kSelfCollision)) body.self_collision = read_self_collision(root.table("self-collision"));
   if (config.has_time()) config.step = root.number("step_ms", 0, false, 1e3, 1e3);
+  return listed;
 }
 
 }  // namespace
@@ -402,8 +460,14 @@ Scene parse_scene(std::string_view text, const std::string& name, const std::fil
   Table model = root.table("model");
   scene.body.model = model.choice("kind", names(models()), model_named);
   const ModelInfo& chosen = info(scene.body.model);
-  read_effects(root, chosen, scene.body);
+  const EffectSet listed = read_effects(root, chosen, scene.body);
   switch (chosen.kind) {
+    case ModelKind::kNear:
+      if (model.find("law") != nullptr) scene.body.law = model.choice("law", std::string(kLaws), law_named);
+      check_law(root, scene.body.law, listed);
+      scene.body.max_iterations = model.count("max_iterations", 1000, scene.body.max_iterations);
+      scene.body.tolerance = model.number("error_percent", 0, false, kMaxError, 100, scene.body.tolerance);
+      break;
     case ModelKind::kLinear:
       if (!scene.body.plasticity) break;
       [[fallthrough]];
@@ -432,6 +496,7 @@ Scene parse_scene(std::string_view text, const std::string& name, const std::fil
   }
   model.check_unknown();
   read_body(root.table("body"), directory, scene.body);
+  if (root.find("region") != nullptr) scene.body.regions = read_regions(root);
   read_touch(root.table("touch"), scene);
   if (root.find("hands") != nullptr) {
     scene.hands = read_hands(root);
@@ -491,6 +556,11 @@ std::string scene_reference() {
           "[body.material]\n"
           "young_pa, poisson        0 to 0.4999\n"
           "density_kg_per_m3        with gravity, inertia or damping\n"
+          "[[region]]               a part of another material, a table for each; where two overlap, the later one "
+          "counts\n"
+          "middle_mm                in the body's frame at rest; it has the elements whose middle lies in it\n"
+          "radius_mm, or size_mm    of a ball; of a box, [x, y, z]\n"
+          "material                 young_pa, poisson; the density is the body's\n"
           "[model]\n"
           "kind                     how it is computed:\n";
   for (const auto& each : models()) text << "    " << each.name << ": " << each.what << '\n';
@@ -498,12 +568,15 @@ std::string scene_reference() {
   text << "table                    of condensed: a file of `tendon-softbody condense SCENE FILE`; without it the "
           "table is made "
           "at the start\n";
+  text << "law = \"corotational\"     of near: how the elements near the tool respond, one of " << kLaws
+       << ";\n                         elsewhere the body is linear. The last wants the effect material-nonlinearity\n";
   text
       << "max_iterations = " << defaults.max_iterations
-      << "      of one answer: corotational, stvk, neo-hookean, mass-spring, and linear with plasticity\n"
+      << "      of one answer: corotational, stvk, neo-hookean, near, mass-spring, and linear with plasticity\n"
          "error_percent = "
       << 100 * defaults.tolerance
-      << "   of the force, of the same: an answer ends when it may be wrong by so much, and says by how much\n"
+      << "   of the force, of the same: an answer ends when it may be wrong by so much, and says by how much;\n"
+         "                         near adds what the linear far field may leave out\n"
          "iterations = "
       << defaults.iterations << "          of every answer: xpbd, projective\nswings = " << defaults.swings
       << "              of modal\n"
@@ -525,6 +598,10 @@ std::string scene_reference() {
          "offset,\n"
          "                         a capsule and a box, give a torque about the handle\n"
          "side = \"unilateral\"      or bilateral: once it has touched, the tool sticks, and pulls\n"
+         "whole_stiffness = false  of linear, condensed, modal, plasticity; at rest: also a flat surface is sent with "
+         "its "
+         "whole\n"
+         "                         stiffness, as a curved one and Newton's method always are\n"
          "table_mm                 answers bring the force at 16 depths over so much, for a slow network: 17 answers'\n"
          "                         time. Of condensed, unilateral, without friction\n"
          "[[hands]]                two or more that hold the body at once, a table for each; of rigid tools on\n"
@@ -563,10 +640,12 @@ std::string turned_too_far(double linear_up_to) {
 std::vector<std::string> warnings(const BodyConfig& body) {
   std::vector<std::string> all;
   const ElementInfo& element = info(body.element);
-  if (body.material.poisson > element.locks_above) {
+  double poisson = body.material.poisson;
+  for (const Region& region : body.regions) poisson = std::max(poisson, region.material.poisson);
+  if (poisson > element.locks_above) {
     std::ostringstream text;
-    text << element.name << " locks above a Poisson ratio of " << element.locks_above << " (here "
-         << body.material.poisson << "): forces come out far too large; use hex8-sri or hex27-sri";
+    text << element.name << " locks above a Poisson ratio of " << element.locks_above << " (here " << poisson
+         << "): forces come out far too large; use hex8-sri or hex27-sri";
     all.push_back(text.str());
   }
   return all;

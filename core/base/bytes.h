@@ -2,8 +2,11 @@
 #pragma once
 
 #include <array>
+#include <bit>
 #include <concepts>
 #include <cstddef>
+#include <cstring>
+#include <type_traits>
 
 namespace tendon {
 
@@ -15,6 +18,10 @@ namespace tendon {
 /// Writes `value` to the `sizeof(T)` bytes at `to`.
 template <std::unsigned_integral T>
 constexpr void put_little_endian(T value, std::byte* to) noexcept {
+  if (!std::is_constant_evaluated() && std::endian::native == std::endian::little) {
+    std::memcpy(to, &value, sizeof value);  // one store; no compiler sees that in the loop
+    return;
+  }
   for (std::size_t i = 0; i < sizeof(T); ++i) to[i] = static_cast<std::byte>(value >> (8 * i) & 0xFFU);
 }
 
@@ -22,6 +29,10 @@ constexpr void put_little_endian(T value, std::byte* to) noexcept {
 template <std::unsigned_integral T>
 constexpr T get_little_endian(const std::byte* from) noexcept {
   T value = 0;
+  if (!std::is_constant_evaluated() && std::endian::native == std::endian::little) {
+    std::memcpy(&value, from, sizeof value);
+    return value;
+  }
   for (std::size_t i = 0; i < sizeof(T); ++i) {
     value = static_cast<T>(value | static_cast<T>(std::to_integer<T>(from[i]) << (8 * i)));
   }

@@ -14,7 +14,7 @@ std::optional<std::uint32_t> OutgoingRequests::add(const Request& request) {
   return next_++;
 }
 
-const Control* OutgoingRequests::next_due(LocalTime now) const noexcept {
+const Control* OutgoingRequests::first_due(LocalTime now) const noexcept {
   for (std::uint32_t id = oldest_; id != next_; ++id) {
     if (!slot(id).answer && slot(id).due <= now) return &slot(id).control;
   }
@@ -29,7 +29,7 @@ void OutgoingRequests::sent(std::uint32_t id, LocalTime now, Duration timeout) n
   ++sent.times_sent;
 }
 
-LocalTime OutgoingRequests::next_due_time() const noexcept {
+LocalTime OutgoingRequests::first_due_time() const noexcept {
   LocalTime next = LocalTime::max();
   for (std::uint32_t id = oldest_; id != next_; ++id) {
     if (!slot(id).answer) next = std::min(next, slot(id).due);
@@ -47,7 +47,7 @@ bool OutgoingRequests::acknowledge(const ControlAck& ack) {
 }
 
 std::optional<ControlAck> OutgoingRequests::next_answer() {
-  if (oldest_ == next_ || !slot(oldest_).answer) return {};
+  if (!has_answer()) return {};
   return std::exchange(slot(oldest_++).answer, std::nullopt);
 }
 
@@ -65,15 +65,15 @@ bool IncomingRequests::take(const Control& control) {
   return true;
 }
 
-std::optional<Control> IncomingRequests::next() {
+const Control* IncomingRequests::next() {
   // Bounded: a slot that is handed out is no longer kArrived.
-  while (slot(next_).stage == Slot::Stage::kArrived) {
+  while (has_next()) {
     Slot& mine = slot(next_++);
     mine.stage = Slot::Stage::kTaken;
-    if (mine.control.request) return mine.control;
+    if (mine.control.request) return &mine.control;
     answer({mine.control.id, Code::kUnsupported, "this version does not know that request"});
   }
-  return {};
+  return nullptr;
 }
 
 void IncomingRequests::answer(ControlAck ack) {
@@ -89,8 +89,7 @@ void IncomingRequests::set_due(Slot& slot, bool due) noexcept {
   slot.due = due;
 }
 
-const ControlAck* IncomingRequests::next_due() const noexcept {
-  if (due_ == 0) return nullptr;
+const ControlAck* IncomingRequests::first_due() const noexcept {
   const auto due = std::find_if(slots_.begin(), slots_.end(), [](const Slot& slot) { return slot.due; });
   return due == slots_.end() ? nullptr : &due->answer;
 }

@@ -30,16 +30,17 @@ class OutgoingRequests {
   std::optional<std::uint32_t> add(const Request& request);
 
   /// The first request that is due to be sent, or sent again; null when none is.
-  const Control* next_due(LocalTime now) const noexcept;
+  const Control* next_due(LocalTime now) const noexcept { return oldest_ == next_ ? nullptr : first_due(now); }
   /// Request `id` has been sent. It is due again after `timeout`, doubled for each earlier time, at most kMaxWait.
   void sent(std::uint32_t id, LocalTime now, Duration timeout) noexcept;
   /// When the next request is due: LocalTime::min() = one was never sent, LocalTime::max() = none is open.
-  LocalTime next_due_time() const noexcept;
+  LocalTime next_due_time() const noexcept { return oldest_ == next_ ? LocalTime::max() : first_due_time(); }
 
   /// Takes an answer. False when it answers a request that was never sent.
   bool acknowledge(const ControlAck& ack);
   /// The next answer, in the order of the requests.
   std::optional<ControlAck> next_answer();
+  bool has_answer() const noexcept { return oldest_ != next_ && slot(oldest_).answer.has_value(); }
 
  private:
   struct Slot {
@@ -50,6 +51,8 @@ class OutgoingRequests {
   };
   Slot& slot(std::uint32_t id) noexcept { return slots_[id % limits::kRequestWindow]; }
   const Slot& slot(std::uint32_t id) const noexcept { return slots_[id % limits::kRequestWindow]; }
+  const Control* first_due(LocalTime now) const noexcept;
+  LocalTime first_due_time() const noexcept;
 
   std::array<Slot, limits::kRequestWindow> slots_;
   std::uint32_t oldest_ = 1;  ///< oldest request whose answer was not taken out
@@ -62,13 +65,15 @@ class IncomingRequests {
   /// Takes a request, in any order. The answer to one that was answered before is sent again. False when a correct peer
   /// cannot use that id yet.
   bool take(const Control& control);
-  /// The next request: each exactly once, in order. Requests that this version does not know are answered here.
-  std::optional<Control> next();
+  /// The next request, null when there is none: each exactly once, in order. It stays until the next `take`. Requests
+  /// that this version does not know are answered here.
+  const Control* next();
+  bool has_next() const noexcept { return slots_[next_ % limits::kRequestWindow].stage == Slot::Stage::kArrived; }
   /// Answers a request that `next` returned; any other id is ignored.
   void answer(ControlAck ack);
 
   /// The first answer that is due to be sent; null when none is.
-  const ControlAck* next_due() const noexcept;
+  const ControlAck* next_due() const noexcept { return due_ == 0 ? nullptr : first_due(); }
   void sent(std::uint32_t id) noexcept;
 
  private:
@@ -81,6 +86,7 @@ class IncomingRequests {
   };
   Slot& slot(std::uint32_t id) noexcept { return slots_[id % limits::kRequestWindow]; }
   void set_due(Slot& slot, bool due) noexcept;
+  const ControlAck* first_due() const noexcept;
 
   std::array<Slot, limits::kRequestWindow> slots_;
   std::uint32_t next_ = 1;  ///< the next request to hand out

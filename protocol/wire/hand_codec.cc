@@ -204,6 +204,7 @@ class Reader {
   }
   template <unsigned kField>
   void vector(Vec3& value) noexcept {
+    if (take_three<kField>(value)) return;  // nearly always
     message<kField>([&](Reader& in) {
       value.setZero();  // a new part of a message has no values yet
       in.number<1>(value.x());
@@ -275,6 +276,26 @@ class Reader {
 
  private:
   void stop() noexcept { good_ = false; }
+  /// A vector none of whose numbers is absent, in one go.
+  template <unsigned kField>
+  bool take_three(Vec3& value) noexcept {
+    constexpr std::size_t kTag = Tag<kField, kLength>::kSize;
+    constexpr std::size_t kNumber = 1 + sizeof(double);
+    constexpr std::size_t kSize = kTag + 1 + 3 * kNumber;
+    if (static_cast<std::size_t>(end_ - at_) < kSize || !next_is<kField, kLength>()) return false;
+    const Byte* const x = at_ + kTag + 1;
+    const Byte* const y = x + kNumber;
+    const Byte* const z = y + kNumber;
+    if (x[-1] != 3 * kNumber || *x != Tag<1, kFixed64>::kFirst || *y != Tag<2, kFixed64>::kFirst ||
+        *z != Tag<3, kFixed64>::kFirst) {
+      return false;
+    }
+    std::memcpy(&value.x(), x + 1, sizeof(double));
+    std::memcpy(&value.y(), y + 1, sizeof(double));
+    std::memcpy(&value.z(), z + 1, sizeof(double));
+    at_ += kSize;
+    return true;
+  }
   template <unsigned kField, unsigned kType>
   bool take() noexcept {
     if (!next_is<kField, kType>()) return false;

@@ -70,8 +70,8 @@ void Peer::greet(LocalTime now) {
 }
 
 void Peer::take(LocalTime now, const Connection::Event& event) {
-  if (const auto* of_session = std::get_if<Session::Event>(&event)) {
-    take(now, *of_session);
+  if (const auto* of_session = std::get_if<const Session::Event*>(&event)) {
+    take(now, **of_session);
   } else if (const auto* opened = std::get_if<Connection::Opened>(&event)) {
     open(opened->welcome);
     if (connection_.session() != nullptr) ask_again_ = now;

@@ -107,13 +107,15 @@ bool is_in_use(const fs::path& path) {
 }  // namespace
 
 std::unique_ptr<FileSink> open_next_part(const fs::path& path) {
-  if (auto sink = FileSink::open_new(path)) return sink;
-  if (!looks_like_a_recording(path)) {
+  std::uint64_t highest = 1;
+  for (const Part& part : parts_of(path)) highest = std::max(highest, part.number);
+  if (highest == 1) {
+    if (auto sink = FileSink::open_new(path)) return sink;
+  }
+  if (fs::exists(path) && !looks_like_a_recording(path)) {
     throw std::runtime_error("cannot write recording " + path.string() +
                              ": there is a file of that name, which is no recording; it is left as it is");
   }
-  std::uint64_t highest = 1;
-  for (const Part& part : parts_of(path)) highest = std::max(highest, part.number);
   for (;;) {
     if (auto sink = FileSink::open_new(numbered(path, ++highest))) return sink;
   }

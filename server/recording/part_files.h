@@ -13,7 +13,8 @@
 
 namespace tendon {
 
-/// A new file for the next part: `path` if it does not exist or is empty, else the first free number after the highest.
+/// A new file for the next part: `path` when no part exists, or when that is empty and the only one; else the first free
+/// number after the highest.
 /// So any number of parts and runs share a name, and none overwrites another. A device such as /dev/null is opened as
 /// it is.
 ///

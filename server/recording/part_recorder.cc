@@ -12,6 +12,8 @@ namespace tendon {
 namespace {
 
 constexpr std::size_t kMostChunks = 65'536;
+constexpr Duration kBeforeAFault = std::chrono::seconds(60);
+constexpr Duration kAfterAFault = std::chrono::seconds(10);
 
 /// A part exceeds its share by its last chunk and its index; some of the budget is kept for these.
 std::uint64_t part_of_budget(std::uint64_t budget) { return budget / 4 - budget / 32; }
@@ -27,11 +29,14 @@ PartRecorder::PartRecorder(const Config& config) : config_(config) {
     config_.rotate_bytes = std::min(config_.rotate_bytes, part_of_budget(config_.budget_bytes));
     config_.run.scene.budget_bytes = config_.budget_bytes;
   }
+  if (config_.keep == Keep::kFaults) config_.rotate_after = std::min(config_.rotate_after, kBeforeAFault);
+  faulty_.resize(1 + config_.run.more_devices.size());
   closed_.path = config_.path;
   open_part(config_.run.started);
 }
 
 void PartRecorder::record(const StepRecord& step, std::size_t device) {
+  see_faults(step, device);
   if (!recorder_) {
     ++missing_.steps;
     return;
@@ -79,7 +84,8 @@ void PartRecorder::close(LocalTime now) {
   if (!recorder_) return;
   recorder_->close();
   if (recorder_->failed()) return stop(now, recorder_->status().error);
-  finish_part();
+  finish_part(now);
+  decide(LocalTime::max());  // no fault comes any more
 }
 
 PartRecorder::Status PartRecorder::status() const {
@@ -110,6 +116,7 @@ bool PartRecorder::open_part(LocalTime now) {
   part.scene.part = static_cast<std::uint32_t>(closed_.parts + 1);
   part.started = now;
   part_began_ = now;
+  stays_ = (config_.one_in > 0 && closed_.parts % config_.one_in == 0) || (fault_ && now < *fault_ + kAfterAFault);
   told_ = {};
   recorder_.emplace(part, *sink_);
   if (recorder_->failed()) {
@@ -129,7 +136,7 @@ void PartRecorder::look_after(LocalTime now) {
   if (!due) return;
   recorder_->close();
   if (recorder_->failed()) return stop(now, recorder_->status().error);
-  finish_part();
+  finish_part(now);
   try {
     if (open_part(now)) notices_.push_back({false, "recording goes on in " + closed_.path.string()});
   } catch (const std::runtime_error& refused) {
@@ -138,7 +145,7 @@ void PartRecorder::look_after(LocalTime now) {
 }
 
 /// Adds the open part's counts to the totals, even when the part has failed.
-void PartRecorder::finish_part() {
+void PartRecorder::finish_part(LocalTime now) {
   const Recorder::Status part = recorder_->status();
   closed_.bytes += part.bytes;
   closed_.steps += part.steps;
@@ -150,11 +157,36 @@ void PartRecorder::finish_part() {
   const bool empty = sink_->is_file() && sink_->size() == 0;
   std::error_code ignored;
   if (empty) std::filesystem::remove(sink_->path(), ignored);
+  if (config_.keep == Keep::kFaults && sink_->is_file() && !empty && !stays_) {
+    undecided_.push_back({sink_->path(), now});
+  }
   sink_.reset();
+  decide(now);
+}
+
+void PartRecorder::see_faults(const StepRecord& step, std::size_t device) {
+  const bool faulty = step.reasons.has(Reason::kFault);
+  const bool begins = faulty && !faulty_[device];
+  faulty_[device] = faulty;
+  if (!begins) return;
+  fault_ = step.hand.at;
+  stays_ = true;
+  decide(step.hand.at);
+  undecided_.clear();
+}
+
+/// Deletes the parts that no fault after `now` keeps.
+void PartRecorder::decide(LocalTime now) {
+  const auto over = [now](const Undecided& part) { return part.ended < now - kBeforeAFault; };
+  for (const Undecided& part : undecided_) {
+    std::error_code refused;
+    if (over(part) && std::filesystem::remove(part.path, refused)) ++closed_.parts_not_kept;
+  }
+  std::erase_if(undecided_, over);
 }
 
 void PartRecorder::stop(LocalTime now, std::string why) {
-  if (recorder_) finish_part();
+  if (recorder_) finish_part(now);
   try_again_ = now + config_.retry_after;
   if (closed_.error.empty()) {
     notices_.push_back({true, "recording has stopped, the device runs on: " + why + "; it goes on when there is room"});

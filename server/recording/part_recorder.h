@@ -11,6 +11,7 @@
 
 #include "core/base/time.h"
 #include "server/recording/byte_sink.h"
+#include "server/recording/keep.h"
 #include "server/recording/recorder.h"
 
 namespace tendon {
@@ -25,6 +26,10 @@ namespace tendon {
 ///
 /// With a budget the oldest parts are deleted before a new one begins, so that all of them together stay within it.
 ///
+/// With Keep::kFaults a part takes a minute at the most, and stays only when a fault began in it, in the minute after it
+/// or in the 10 s before it, or when its number says so. It is deleted as soon as neither can be: the last ones when the run ends without a
+/// fault. A run that is killed leaves those that were not decided yet.
+///
 /// Records come in the order of Recorder. Thread-safe: no; the log thread owns it. Realtime-safe: no.
 class PartRecorder {
  public:
@@ -36,12 +41,16 @@ class PartRecorder {
     /// Bytes of all parts with this name, including those of earlier runs; 0: nothing is deleted. With a budget a part
     /// has at most a quarter of it.
     std::uint64_t budget_bytes = 0;
+    Keep keep = Keep::kAll;
+    /// With Keep::kFaults, part 1 of this run, 1 + one_in, 1 + 2 one_in … stay, too; 0: no part stays for its number.
+    std::uint64_t one_in = 0;
     /// The time between two looks for free space while recording has stopped.
     Duration retry_after = std::chrono::seconds(1);
   };
   struct Status {
     std::filesystem::path path;  ///< of the newest part
     std::uint64_t parts = 0;
+    std::uint64_t parts_not_kept = 0;         ///< of these; deleted by Config::keep
     std::uint64_t bytes = 0;                  ///< in all parts of this run
     std::uint64_t steps = 0;                  ///< likewise, or in the open chunk
     std::uint64_t datagrams = 0;              ///< likewise
@@ -85,7 +94,9 @@ class PartRecorder {
 
   bool open_part(LocalTime now);
   void look_after(LocalTime now);
-  void finish_part();
+  void finish_part(LocalTime now);
+  void see_faults(const StepRecord& step, std::size_t device);
+  void decide(LocalTime now);
   void stop(LocalTime now, std::string why);
   void go_on(LocalTime now);
 
@@ -93,8 +104,17 @@ class PartRecorder {
   std::unique_ptr<FileSink> sink_;
   std::optional<Recorder> recorder_;  ///< of the open part; empty while recording has stopped, and after `close`
   LocalTime part_began_{};
-  Counts told_;     ///< losses that the open part was told of
-  Counts missing_;  ///< since recording stopped
+  /// A closed part that stays when a fault comes soon enough.
+  struct Undecided {
+    std::filesystem::path path;
+    LocalTime ended;
+  };
+  std::vector<Undecided> undecided_;
+  std::vector<bool> faulty_;        ///< by device, in its newest step
+  std::optional<LocalTime> fault_;  ///< when the newest began
+  bool stays_ = false;              ///< the open part
+  Counts told_;                     ///< losses that the open part was told of
+  Counts missing_;                  ///< since recording stopped
   LocalTime try_again_{};
   Status closed_;  ///< of the parts before, and all losses that were told
   std::vector<Notice> notices_;

@@ -463,6 +463,13 @@ void declare_scene(Table& scene, Draft& draft) {
         "keeps all files of this name that have a budget within it: the oldest are deleted, but never a fault's. One "
         "file takes at most a quarter of it",
         Absent{.text = "nothing is deleted"});
+    keys.key(
+        "keep", recording.keep, Names<Keep>{{{"all", Keep::kAll}, {"faults", Keep::kFaults}}},
+        "which files stay. faults: a file takes a minute at most, and stays only when it has a part of the time from "
+        "60 s before a device's fault to 10 s after its beginning; the others are deleted");
+    keys.key("one_in", recording.one_in, Count{1'000'000, 1},
+             "with keep = \"faults\": of this many files the first stays in any case",
+             Absent{.text = "none stays without a fault"});
     keys.key("datagrams_kb_per_s", recording.datagram_bytes_per_s, Number{.least = 1, .most = 1e6},
              "the most that is recorded of guests' datagrams; steps are always recorded");
   });

@@ -53,6 +53,7 @@ class SceneResolver {
     resolve_network(directory);
     resolve_structural_mode();
     resolve_joint_friction();
+    resolve_recording();
     resolve_control();
     resolve_teleoperation(directory);
     resolve_replay(directory);
@@ -197,6 +198,12 @@ class SceneResolver {
     blame("device.effects.structural_mode.handle_mass_kg", {},
           "expected less than mass_kg, of which it is a part and which is " + digits(device.mass) + " kg, found " +
               digits(device.structural_mode->handle_mass));
+  }
+
+  void resolve_recording() const {
+    const auto& recording = draft_.scene.recording;
+    if (!recording || !recording->one_in || recording->keep == Keep::kFaults) return;
+    blame("recording.one_in", {}, "expected keep = \"faults\" beside it, found keep = \"all\": every file stays");
   }
 
   /// Friction is in the joints or at the handle. Profiles know only that at the handle.

@@ -24,6 +24,7 @@
 #include "protocol/link.h"
 #include "server/haptic_loop.h"
 #include "server/network_loop.h"
+#include "server/recording/keep.h"
 
 namespace tendon {
 
@@ -59,6 +60,8 @@ struct Scene {
     double rotate_bytes = 4e9;
     double rotate_after = 4 * 3600;        ///< s
     std::optional<double> budget_bytes{};  ///< empty: nothing is ever deleted
+    Keep keep = Keep::kAll;
+    std::optional<std::uint64_t> one_in{};  ///< empty: none stays for its number
     double datagram_bytes_per_s = 4e6;
   };
 

@@ -54,7 +54,7 @@ TEST(BusyLink, HandsOutWhatTheLookHasTaken) {
   BusyLink busy(queue);
   LocalTime now{};
   EXPECT_FALSE(busy.look(now));
-  EXPECT_EQ(now, LocalTime(std::chrono::seconds(1)));
+  EXPECT_EQ(now, queue.clock);
   queue.sizes = {40};
   EXPECT_TRUE(busy.look(now));
   EXPECT_TRUE(busy.look(now)) << "it is there until it is received";
@@ -69,7 +69,7 @@ TEST(BusyLink, HandsOutWhatTheLookHasTaken) {
 TEST(BusyLink, AsksNoSecondTimeAfterADatagramThatCameAlone) {
   Queue queue;
   BusyLink busy(queue);
-  LocalTime now{};
+  LocalTime now = queue.clock;
   busy.look(now);
   queue.sizes = {40};
   ASSERT_TRUE(busy.look(now));
@@ -84,14 +84,35 @@ TEST(BusyLink, AsksNoSecondTimeAfterADatagramThatCameAlone) {
 TEST(BusyLink, AfterAPauseItAsksForAllThatHasComeMeanwhile) {
   Queue queue;
   BusyLink busy(queue);
-  LocalTime now{};
-  busy.look(now);
-  queue.sizes = {40, 50, 60};
-  queue.clock += microseconds(21);  // the thread had no processor
+  for (const bool before_its_clock_was_read : {false, true}) {
+    LocalTime now = queue.clock;
+    if (before_its_clock_was_read) queue.took = microseconds(21);  // the thread had no processor
+    busy.look(now);
+    queue.took = microseconds(1);
+    queue.sizes = {40, 50, 60};
+    if (!before_its_clock_was_read) queue.clock += microseconds(21);
+    ASSERT_TRUE(busy.look(now));
+    std::vector<std::size_t> sizes;
+    while (const std::size_t size = receive(busy).size) sizes.push_back(size);
+    EXPECT_EQ(sizes, (std::vector<std::size_t>{40, 50, 60})) << "in their order, and none is left behind";
+  }
+}
+
+TEST(BusyLink, WhatALookHasTakenHadComeByThenAndAllElseByNow) {
+  Queue queue;
+  BusyLink busy(queue);
+  LocalTime now = queue.clock;
+  queue.sizes = {40, 50};
   ASSERT_TRUE(busy.look(now));
-  std::vector<std::size_t> sizes;
-  while (const std::size_t size = receive(busy).size) sizes.push_back(size);
-  EXPECT_EQ(sizes, (std::vector<std::size_t>{40, 50, 60})) << "in their order, and none is left behind";
+  const LocalTime looked = now;
+  EXPECT_EQ(looked, queue.clock);
+  queue.clock += microseconds(5);
+  ASSERT_EQ(receive(busy).size, 40U);
+  EXPECT_EQ(busy.arrived(now), looked) << "no further reading of the clock";
+  EXPECT_EQ(busy.arrived(looked + microseconds(2)), looked + microseconds(2)) << "never before what a turn believes";
+  EXPECT_EQ(busy.present(now), queue.clock);
+  ASSERT_EQ(receive(busy).size, 50U);
+  EXPECT_EQ(busy.arrived(now), queue.clock);
 }
 
 TEST(BusyLink, TellsTheFullSizeOfADatagramThatIsCut) {

@@ -35,7 +35,7 @@ std::vector<Bytes> pull(Session& session, LocalTime now) {
 
 std::vector<Session::Event> events(Session& session) {
   std::vector<Session::Event> out;
-  while (auto event = session.next_event()) out.push_back(std::move(*event));
+  while (const auto* event = session.next_event()) out.push_back(*event);
   return out;
 }
 

@@ -84,8 +84,8 @@ class World {
   LocalTime at_z() const { return now + kClockOffset; }
 
   LocalTime now{std::chrono::seconds(100)};
-  std::function<void(Session::Event)> on_a = [](const Session::Event&) {};
-  std::function<void(Session::Event)> on_z = [](const Session::Event&) {};
+  std::function<void(const Session::Event&)> on_a = [](const Session::Event&) {};
+  std::function<void(const Session::Event&)> on_z = [](const Session::Event&) {};
   /// What the owners want to do next, besides what the sessions want: LocalTime::max() = nothing.
   LocalTime wake = LocalTime::max();
   Session a;
@@ -104,8 +104,8 @@ class World {
     while (const auto datagram = a_to_z.receive(now)) z.receive(at_z(), *datagram);
     a.tick(at_a());
     z.tick(at_z());
-    while (auto event = a.next_event()) on_a(std::move(*event));
-    while (auto event = z.next_event()) on_z(std::move(*event));
+    while (const auto* event = a.next_event()) on_a(*event);
+    while (const auto* event = z.next_event()) on_z(*event);
     each_turn();
     pull(a, at_a(), a_to_z);
     pull(z, at_z(), z_to_a);

@@ -37,13 +37,6 @@ class Groups {
   std::vector<int> of_;
 };
 
-Vec3 middle(const Mesh& mesh, int element) {
-  Vec3 sum = Vec3::Zero();
-  const auto corners = mesh.element(element).first(at(corners_of(mesh.shape)));
-  for (const int node : corners) sum += mesh.nodes[at(node)];
-  return sum / static_cast<double>(corners.size());
-}
-
 bool between(const Cut& cut, const Vec3& from, const Vec3& to) {
   const Vec3 normal = cut.along.cross(cut.deep);
   const double least = kOnPlane * normal.norm() * (to - from).norm();
@@ -80,6 +73,8 @@ void part_nodes(const Mesh& mesh, std::span<const Cut> cuts, const Fixed& fixed,
   std::vector<int> number_of(mesh.elements.size(), -1);  // by group
   to.mesh = mesh;
   to.fixed = fixed;
+  to.element_before.resize(at(mesh.element_count()));
+  std::iota(to.element_before.begin(), to.element_before.end(), 0);
   to.node_before.resize(mesh.nodes.size());
   std::iota(to.node_before.begin(), to.node_before.end(), 0);
   for (std::size_t i = 0; i < mesh.elements.size(); ++i) {
@@ -128,6 +123,7 @@ void drop_loose(Division& to) {
     }
   }
   std::vector<int> kept;
+  std::vector<int> kept_before;
   std::vector<bool> used(mesh.nodes.size());
   for (int e = 0; e < mesh.element_count(); ++e) {
     const auto nodes = mesh.element(e);
@@ -136,10 +132,12 @@ void drop_loose(Division& to) {
       continue;
     }
     kept.insert(kept.end(), nodes.begin(), nodes.end());
+    kept_before.push_back(to.element_before[at(e)]);
     for (const int node : nodes) used[at(node)] = true;
   }
   if (to.lost == 0) return;
   mesh.elements = std::move(kept);
+  to.element_before = std::move(kept_before);
   for (std::size_t i = 0; i < to.fixed.size(); ++i) to.fixed[i] = to.fixed[i] || !used[i / 3];
 }
 

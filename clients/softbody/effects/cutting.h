@@ -23,10 +23,11 @@ struct Cut {
 /// there is no copy.
 struct Division {
   Mesh mesh;
-  Fixed fixed;                   ///< copies of held nodes are held, and so are nodes without an element
-  std::vector<int> node_before;  ///< for each node: its number before the cuts
-  int opened = 0;                ///< faces, including those opened before
-  int lost = 0;                  ///< elements removed with pieces that nothing holds (three held nodes hold one)
+  Fixed fixed;                        ///< copies of held nodes are held, and so are nodes without an element
+  std::vector<int> node_before;       ///< for each node: its number before the cuts
+  std::vector<int> element_before{};  ///< for each element: its number before the cuts
+  int opened = 0;                     ///< faces, including those opened before
+  int lost = 0;                       ///< elements removed with pieces that nothing holds (three held nodes hold one)
 };
 
 /// `cuts`: all that were ever made in this mesh, even those that it shows already: a later cut can split a node for

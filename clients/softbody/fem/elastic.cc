@@ -7,44 +7,65 @@
 
 namespace tendon::softbody {
 
-Elastic::Elastic(Mesh mesh, const Fixed& fixed) : mesh_(std::move(mesh)) {
-  check(mesh_, "mesh");
-  if (fixed.size() != 3 * mesh_.nodes.size() || std::ranges::find(fixed, true) == fixed.end()) {
+Elastic::Elastic(Mesh mesh, const Fixed& fixed) : Elastic(std::move(mesh), fixed, Together{}) {
+  if (free_count() == size()) {
     throw std::invalid_argument("nothing holds the body: some of its nodes must be fixed");
   }
-  for (std::size_t i = 0; i < fixed.size(); ++i) {
-    free_of_.push_back(fixed[i] ? -1 : static_cast<int>(all_of_.size()));
-    if (!fixed[i]) all_of_.push_back(static_cast<int>(i));
+}
+
+Elastic::Elastic(Mesh mesh, const Fixed& fixed, Together together)
+    : mesh_(std::move(mesh)), together_(std::move(together)) {
+  check(mesh_, "mesh");
+  if (fixed.size() != 3 * mesh_.nodes.size()) throw std::invalid_argument("fixed: expected 3 for each node");
+  for (std::size_t i = 0; i < fixed.size() + at(together_.count); ++i) {
+    const bool free = i >= fixed.size() || !fixed[i];
+    free_of_.push_back(free ? static_cast<int>(all_of_.size()) : -1);
+    if (free) all_of_.push_back(static_cast<int>(i));
   }
-  // Neighbours of each node, itself included.
-  std::vector<std::vector<int>> near(mesh_.nodes.size());
-  for (int e = 0; e < mesh_.element_count(); ++e) {
-    for (const int a : mesh_.element(e)) {
-      near[at(a)].insert(near[at(a)].end(), mesh_.element(e).begin(), mesh_.element(e).end());
-    }
-  }
-  for (auto& list : near) {
-    std::ranges::sort(list);
-    list.erase(std::unique(list.begin(), list.end()), list.end());
-  }
-  pattern_.size = free_count();
-  pattern_.column_starts.push_back(0);
-  for (int column = 0; column < free_count(); ++column) {
-    for (const int node : near[at(all_of_[at(column)] / 3)]) {
-      for (int c = 0; c < 3; ++c) {
-        const int row = free_of_[at(3 * node + c)];
-        if (row >= column) pattern_.rows.push_back(row);
+}
+
+const SymmetricMatrix& Elastic::pattern() const {
+  return pattern_.get([this] {
+    SymmetricMatrix pattern;
+    // Neighbours of each node, itself included.
+    std::vector<std::vector<int>> near(mesh_.nodes.size());
+    for (int e = 0; e < mesh_.element_count(); ++e) {
+      for (const int a : mesh_.element(e)) {
+        near[at(a)].insert(near[at(a)].end(), mesh_.element(e).begin(), mesh_.element(e).end());
       }
     }
-    pattern_.column_starts.push_back(static_cast<int>(pattern_.rows.size()));
-  }
-  pattern_.values.assign(pattern_.rows.size(), 0);
+    for (auto& list : near) {
+      std::ranges::sort(list);
+      list.erase(std::unique(list.begin(), list.end()), list.end());
+    }
+    std::vector<bool> on_rim(mesh_.nodes.size());
+    for (const int node : together_.rim) on_rim[at(node)] = true;
+    pattern.size = free_count();
+    pattern.column_starts.push_back(0);
+    const int of_nodes = free_count() - together_.count;
+    for (int column = 0; column < free_count(); ++column) {
+      bool beside_rim = column >= of_nodes;
+      if (column < of_nodes) {
+        for (const int node : near[at(all_of_[at(column)] / 3)]) {
+          beside_rim = beside_rim || on_rim[at(node)];
+          for (int c = 0; c < 3; ++c) {
+            const int row = free_of_[at(3 * node + c)];
+            if (row >= column) pattern.rows.push_back(row);
+          }
+        }
+      }
+      for (int row = std::max(column, of_nodes); beside_rim && row < free_count(); ++row) pattern.rows.push_back(row);
+      pattern.column_starts.push_back(static_cast<int>(pattern.rows.size()));
+    }
+    pattern.values.assign(pattern.rows.size(), 0);
+    return pattern;
+  });
 }
 
 int Elastic::slot(int row_component, int column_component) const {
   const int row = free_of(row_component);
   const int column = free_of(column_component);
-  return column < 0 || row < column ? -1 : pattern_.slot(row, column);
+  return column < 0 || row < column ? -1 : pattern().slot(row, column);
 }
 
 Fixed Elastic::fixed() const {
@@ -65,7 +86,7 @@ void Elastic::add_free(const VectorXd& free, VectorXd& all) const {
 
 std::size_t Elastic::mesh_bytes() const noexcept {
   return mesh_.nodes.size() * sizeof(Vec3) + mesh_.elements.size() * sizeof(int) +
-         (free_of_.size() + all_of_.size()) * sizeof(int) + pattern_.bytes();
+         (free_of_.size() + all_of_.size()) * sizeof(int) + (pattern_.made() != nullptr ? pattern_.made()->bytes() : 0);
 }
 
 VectorXd lumped_mass(const Elastic& elastic, double density) {

@@ -5,13 +5,15 @@
 #include <cstdint>
 #include <vector>
 
+#include "clients/softbody/fem/lazy.h"
 #include "clients/softbody/fem/mesh.h"
 #include "clients/softbody/fem/patch.h"
 #include "clients/softbody/fem/sparse.h"
 
 namespace tendon::softbody {
 
-/// Which displacements are fixed, and which are unknown. Component c of node i has the number 3 i + c.
+/// Which displacements are fixed, and which are unknown. Component c of node i has the number 3 i + c; what an Elastic
+/// has beside its nodes comes after them.
 using Fixed = std::vector<bool>;
 
 /// The number 3 i + c of every component of every node for which `holds(position)`.
@@ -36,7 +38,8 @@ class Elastic {
 
   const Mesh& mesh() const noexcept { return mesh_; }
 
-  int size() const noexcept { return static_cast<int>(free_of_.size()); }  ///< of u: 3 for each node
+  /// Of u: 3 for each node, and further unknowns where there are some.
+  int size() const noexcept { return static_cast<int>(free_of_.size()); }
   int free_count() const noexcept { return static_cast<int>(all_of_.size()); }
   int free_of(int component) const noexcept { return free_of_[at(component)]; }  ///< its number among the free, or −1
   Fixed fixed() const;
@@ -54,14 +57,22 @@ class Elastic {
   enum class Curvature : std::uint8_t { kExact, kWithoutNegative };
   /// The second derivative with respect to the free displacements, N/m.
   virtual void stiffness(const VectorXd& u, Curvature curvature, SymmetricMatrix& to) const = 0;
-  /// Its pattern; all values are zero.
-  const SymmetricMatrix& pattern() const noexcept { return pattern_; }
+  /// Its pattern; all values are zero. Made when it is first asked for.
+  const SymmetricMatrix& pattern() const;
 
   virtual std::size_t bytes() const noexcept = 0;
 
  protected:
   /// Throws std::invalid_argument when the mesh is not sound or nothing is fixed.
   Elastic(Mesh mesh, const Fixed& fixed);
+  /// Further unknowns, which move the nodes of `rim` together: those are fixed by themselves.
+  struct Together {
+    int count = 0;
+    std::vector<int> rim = {};
+  };
+  /// The same where something else may hold the body, and with further unknowns behind those of its nodes. They act on
+  /// each other, and on every node that shares an element with the rim.
+  Elastic(Mesh mesh, const Fixed& fixed, Together together);
   Elastic(const Elastic&) = default;
   Elastic(Elastic&&) = default;
   Elastic& operator=(const Elastic&) = default;
@@ -75,7 +86,8 @@ class Elastic {
   Mesh mesh_;
   std::vector<int> free_of_;  ///< by component
   std::vector<int> all_of_;   ///< by free component
-  SymmetricMatrix pattern_;
+  Together together_;
+  Lazy<SymmetricMatrix> pattern_;
 };
 
 /// The mass of each free displacement, kg.

@@ -331,4 +331,11 @@ std::vector<int> nodes_on(const Mesh& mesh, const Facet& facet) {
   return nodes;
 }
 
+Vec3 middle(const Mesh& mesh, int element) {
+  Vec3 sum = Vec3::Zero();
+  const auto corners = mesh.element(element).first(at(corners_of(mesh.shape)));
+  for (const int node : corners) sum += mesh.nodes[at(node)];
+  return sum / static_cast<double>(corners.size());
+}
+
 }  // namespace tendon::softbody

@@ -46,6 +46,9 @@ inline constexpr double kLeastQuality = 1e-9;
 /// scaled so that their sum is the volume (Hinton, Rock & Zienkiewicz 1976).
 std::vector<double> nodal_volumes(const Mesh& mesh);
 
+/// The mean of an element's corners, m.
+Vec3 middle(const Mesh& mesh, int element);
+
 /// A face of an element.
 struct Facet {
   int element;

@@ -2,6 +2,7 @@
 #include "clients/softbody/fem/patch.h"
 
 #include <Eigen/Geometry>
+#include <Eigen/QR>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -29,6 +30,9 @@ constexpr int kMostCuts = 32;
 
 constexpr int kMostFacetNodes = 9;
 
+/// Of the touchable side's width: nodes that are so little above a plane lie in it.
+constexpr double kFlat = 1e-6;
+
 }  // namespace
 
 TouchSurface::TouchSurface(const Mesh& mesh, const Vec3& towards_tool, double radius)
@@ -51,6 +55,21 @@ TouchSurface::TouchSurface(const Mesh& mesh, const Vec3& towards_tool, double ra
   for (Pieces& facet : facets_) {
     for (int& node : facet.nodes) node = static_cast<int>(std::ranges::lower_bound(nodes_, node) - nodes_.begin());
   }
+  look_for_a_curve();
+}
+
+void TouchSurface::look_for_a_curve() {
+  // The plane next to all nodes: height = a + b · place.
+  MatrixXd places(static_cast<Eigen::Index>(nodes_.size()), 3);
+  VectorXd heights(places.rows());
+  for (Eigen::Index i = 0; i < places.rows(); ++i) {
+    const int node = nodes_[static_cast<std::size_t>(i)];
+    places.row(i) << 1, place(node).transpose();
+    heights[i] = height(node);
+  }
+  const Eigen::Vector3d plane = places.colPivHouseholderQr().solve(heights);
+  const double width = (places.colwise().maxCoeff() - places.colwise().minCoeff()).norm();
+  curved_ = (places * plane - heights).lpNorm<Eigen::Infinity>() > kFlat * width;
 }
 
 void TouchSurface::add(const Mesh& mesh, const Facet& facet) {

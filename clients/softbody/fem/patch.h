@@ -40,6 +40,8 @@ class TouchSurface {
 
   const Vec3& normal() const noexcept { return normal_; }
   double radius() const noexcept { return radius_; }
+  /// True where what can be touched does not lie in one plane.
+  bool curved() const noexcept { return curved_; }
 
   /// Position across the normal, m, and the way back.
   Vec2 across(const Vec3& position) const { return across_ * position; }
@@ -73,6 +75,7 @@ class TouchSurface {
   };
 
   void add(const Mesh& mesh, const Facet& facet);
+  void look_for_a_curve();
   template <bool kCurved>
   std::optional<Patch> patch_around(const Vec2& middle, double least_covered) const;
 
@@ -83,6 +86,7 @@ class TouchSurface {
   std::vector<double> heights_;
   std::vector<Pieces> facets_;
   std::vector<int> nodes_;
+  bool curved_ = false;
 };
 
 }  // namespace tendon::softbody

@@ -8,6 +8,7 @@
 
 #include "clients/softbody/fem/elastic.h"
 #include "clients/softbody/fem/kernel.h"
+#include "clients/softbody/fem/lazy.h"
 #include "clients/softbody/fem/material.h"
 
 namespace tendon::softbody {
@@ -17,12 +18,22 @@ namespace tendon::softbody {
 /// Without state. Thread-safe: yes, once built. Realtime-safe: no.
 class Solid : public Elastic {
  public:
-  /// Throws std::invalid_argument when the mesh is not sound, the element is not of the mesh's shape, the material is
-  /// impossible or nothing is fixed.
-  Solid(Mesh at_rest, Element element, const Material& material, Law law, const Fixed& fixed);
+  /// `of_elements`: the material of each element, where not all are of `material` (region.h). Throws
+  /// std::invalid_argument when the mesh is not sound, the element is not of the mesh's shape, a material is impossible
+  /// or nothing is fixed.
+  Solid(Mesh at_rest, Element element, const Material& material, Law law, const Fixed& fixed,
+        std::vector<Material> of_elements = {});
+
+  /// Some elements of another solid, in their order, with what is fixed of their nodes. Nothing has to hold them.
+  /// `nodes` becomes the number in `whole` of each node, ascending.
+  static Solid part_of(const Solid& whole, const std::vector<int>& elements, std::vector<int>& nodes);
 
   Element element() const noexcept { return element_; }
   const Material& material() const noexcept { return material_; }
+  const Material& material(int element) const { return of_elements_.empty() ? material_ : of_elements_[at(element)]; }
+  /// Empty where all are of material().
+  const std::vector<Material>& of_elements() const noexcept { return of_elements_; }
+  double largest_poisson() const;  ///< of its materials
   Law law() const noexcept { return law_; }
 
   double energy(const VectorXd& u) const override { return forces(u).energy; }
@@ -44,9 +55,15 @@ class Solid : public Elastic {
     double lambda;  ///< Pa; 0 where only µ is
   };
   int points_per_element() const noexcept { return per_element_; }
-  const Point& point(int element, int index) const { return points_[at(element * per_element_ + index)]; }
+  const Point& point(int element, int index) const { return parts().points[at(element * per_element_ + index)]; }
   using Nodal = Kernel::Nodal;
-  Kernel::Gradient gradient(int element, int point) const { return kernel_.gradient(element, point); }  ///< ∂Nᵢ/∂X, 1/m
+  Kernel::Gradient gradient(int element, int point) const { return parts().kernel.gradient(element, point); }  ///< 1/m
+  /// The same two, computed and not kept: for who looks at an element once.
+  struct Part {
+    Point point;
+    Nodal gradient;  ///< ∂Nᵢ/∂X, 1/m
+  };
+  Part part(int element, int index) const;
   Nodal displacements(const VectorXd& u, int element) const;  ///< of an element's nodes, m
 
  protected:
@@ -55,16 +72,27 @@ class Solid : public Elastic {
   void sum_stiffness(const VectorXd& u, const TangentAt& tangent_at, SymmetricMatrix& to) const;
 
  private:
-  void place(int element);
-  void connect();
+  Solid(Mesh at_rest, const Solid& whole, const Fixed& fixed, std::vector<Material> of_elements);
+
+  /// All integration points; made when one is first asked for.
+  struct Parts {
+    std::vector<Point> points;  ///< of each element, one after the other
+    Kernel kernel;
+  };
+  const Parts& parts() const {
+    const Parts* const made = parts_.made();
+    return made != nullptr ? *made : make_parts();
+  }
+  const Parts& make_parts() const;
+  const std::vector<int>& slots() const;
 
   Element element_;
   Material material_;
+  std::vector<Material> of_elements_;
   Law law_;
-  int per_element_;            ///< points of integration
-  std::vector<Point> points_;  ///< of each element, one after the other
-  Kernel kernel_;
-  std::vector<int> slots_;  ///< where each entry of an element's lower triangle goes; −1: nowhere
+  int per_element_;  ///< points of integration
+  Lazy<Parts> parts_;
+  Lazy<std::vector<int>> slots_;  ///< where each entry of an element's matrix goes; −1: nowhere
 };
 
 template <class TangentAt>
@@ -72,7 +100,7 @@ void Solid::sum_stiffness(const VectorXd& u, const TangentAt& tangent_at, Symmet
   std::ranges::fill(to.values, 0.0);
   const int nodes = nodes_of(mesh().shape);
   Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 3 * kMaxNodes, 3 * kMaxNodes> k(3 * nodes, 3 * nodes);
-  auto slot = slots_.begin();
+  auto slot = slots().begin();
   for (int e = 0; e < mesh().element_count(); ++e) {
     const Nodal local = displacements(u, e);
     k.setZero();

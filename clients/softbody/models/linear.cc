@@ -10,6 +10,13 @@
 namespace tendon::softbody {
 namespace {
 
+/// How a body gives way to a gliding patch is found by the shapes of an earlier place while W differs by at most this
+/// share: its square is what may be wrong.
+constexpr double kSlopesAlike = 0.1;
+
+/// A surface steeper than this is none of a linear body: how a patch would glide there means nothing.
+constexpr double kSteepest = 10;
+
 constexpr Eigen::Index kAtOnce = 64;  // columns: CHOLMOD's blocks are then products of matrices
 
 SymmetricMatrix stiffness_of(const Solid& solid, const Effects& effects) {
@@ -51,11 +58,22 @@ Reaction linear_reaction(const Patch& patch, const VectorXd& depth_per_newton, G
   return reaction;
 }
 
-LinearModel::LinearModel(const Solid& solid, const TouchSurface& surface, const EffectsConfig& effects)
+void add_glide(const Patch& patch, const VectorXd& depth_per_newton, const Mat2& giving, Reaction& to) {
+  const Vec2 tilt = patch.slopes * depth_per_newton;
+  if (to.slope.norm() > kSteepest) return;
+  const Vec3 curve = to.force * (patch.curvatures * depth_per_newton);
+  to.glide = {.tilting = to.stiffness * tilt,
+              .curving = (Mat2() << curve[0], curve[1], curve[1], curve[2]).finished(),
+              .giving = giving - to.stiffness * tilt * tilt.transpose()};
+  to.knows_glide = true;
+}
+
+LinearModel::LinearModel(const Solid& solid, const TouchSurface& surface, const EffectsConfig& effects, bool glides)
     : solid_(solid),
       normal_(surface.normal()),
       factor_(factor_of(stiffness_of(solid, {}))),
       step_(effects.has_time() ? effects.step : 0),
+      glides_(glides),
       effects_(effects_at_rest(effects, solid)) {
   if (effects.has_time()) {
     const VectorXd rest = untouched();
@@ -68,12 +86,48 @@ LinearModel::LinearModel(const Solid& solid, const TouchSurface& surface, const 
 
 void LinearModel::cut(const Division& division, const EffectsConfig& effects) {
   effects_ = effects_at_rest(effects, solid_);
+  slopes_.resize(0, 0);
   const SymmetricMatrix stiffness = stiffness_of(solid_, effects_);
   if (division.lost > 0 || !factor_.split(stiffness, twins(solid_, division))) factor_ = factor_of(stiffness);
 }
 
 VectorXd LinearModel::displacements(const Patch& patch) const {
   return factor_.solve(solid_.to_free(patch_load(solid_, normal_, patch)));
+}
+
+Mat2 LinearModel::giving(const Patch& patch) {
+  const auto alike = [&] {
+    double common = 0;
+    for (Eigen::Index i = 0; i < patch.slopes.cols(); ++i) {
+      common += slopes_.row(patch.nodes[static_cast<std::size_t>(i)]).dot(patch.slopes.col(i));
+    }
+    const double size = slopes_.squaredNorm();
+    return patch.slopes.squaredNorm() - 2 * common + size <= kSlopesAlike * kSlopesAlike * size;
+  };
+  if (slopes_.size() == 0 || !alike()) glide_from(patch);
+  // 2 WᵀY − YᵀAY is largest, and right, for the shapes Y of W itself: what those of a place nearby are wrong by counts
+  // squared.
+  Mat2 across = Mat2::Zero();
+  for (Eigen::Index i = 0; i < patch.slopes.cols(); ++i) {
+    across += patch.slopes.col(i) * given_way_.row(patch.nodes[static_cast<std::size_t>(i)]);
+  }
+  return across + across.transpose() - given_;
+}
+
+void LinearModel::glide_from(const Patch& patch) {
+  const MatrixXd loads = patch_load_slopes(solid_, normal_, patch);
+  const auto nodes = static_cast<Eigen::Index>(solid_.mesh().nodes.size());
+  slopes_ = MatrixXd::Zero(nodes, 2);
+  given_way_.resize(nodes, 2);
+  for (Eigen::Index i = 0; i < patch.slopes.cols(); ++i) {
+    slopes_.row(patch.nodes[static_cast<std::size_t>(i)]) = patch.slopes.col(i).transpose();
+  }
+  for (Eigen::Index axis = 0; axis < 2; ++axis) {
+    VectorXd all = VectorXd::Zero(solid_.size());
+    solid_.add_free(factor_.solve(solid_.to_free(loads.col(axis))), all);
+    given_way_.col(axis) = -all.reshaped(3, nodes).transpose() * normal_;
+  }
+  given_ = slopes_.transpose() * given_way_;
 }
 
 VectorXd LinearModel::untouched() const {
@@ -85,7 +139,13 @@ VectorXd LinearModel::untouched() const {
 
 Reaction LinearModel::press(const Patch& patch, Given given, double value) {
   if (!effects_.empty()) return press_among_effects(patch, given, value);
-  return linear_reaction(patch, depth_of(solid_, normal_, patch, displacements(patch)), given, value);
+  if (patch.curvatures.size() == 0) {
+    return linear_reaction(patch, depth_of(solid_, normal_, patch, displacements(patch)), given, value);
+  }
+  const VectorXd depth = depth_of(solid_, normal_, patch, displacements(patch));
+  Reaction reaction = linear_reaction(patch, depth, given, value);
+  add_glide(patch, depth, giving(patch), reaction);
+  return reaction;
 }
 
 Reaction LinearModel::press_among_effects(const Patch& patch, Given given, double value) {
@@ -103,11 +163,16 @@ Reaction LinearModel::press_among_effects(const Patch& patch, Given given, doubl
   reaction.depth = depth_below(patch, normal_, all);
   reaction.slope = slope_below(patch, normal_, all);
   reaction.stiffness = step_ > 0 ? secant(reaction, depth_below(patch, normal_, rest_)) : 1 / compliance;
+  if (patch.curvatures.size() > 0) {
+    add_glide(patch, depth_of(solid_, normal_, patch, per_newton), giving(patch), reaction);
+    reaction.glide.curving = curve_below(patch, normal_, all);  // of the weight too
+  }
   return reaction;
 }
 
 std::size_t LinearModel::bytes() const noexcept {
-  return factor_.bytes() + softbody::bytes(effects_) + static_cast<std::size_t>(rest_.size()) * sizeof(double);
+  return factor_.bytes() + softbody::bytes(effects_) +
+         static_cast<std::size_t>(rest_.size() + slopes_.size() + given_way_.size()) * sizeof(double);
 }
 
 MatrixXd compliance_of(const Solid& solid, const std::vector<int>& nodes) {
@@ -206,12 +271,13 @@ Reaction SolvedModel::press(const Patch& patch, Given given, double value) {
   return reaction;
 }
 
-CondensedModel::CondensedModel(const Solid& solid, const TouchSurface& surface, const std::vector<int>& nodes)
+CondensedModel::CondensedModel(const Solid& solid, const TouchSurface& surface, const std::vector<int>& nodes,
+                               bool glides)
     : CondensedModel(solid.mesh().nodes.size(), nodes,
-                     surface_compliance(solid, surface.normal(), nodes, *with_factor(solid))) {}
+                     surface_compliance(solid, surface.normal(), nodes, *with_factor(solid)), glides) {}
 
-CondensedModel::CondensedModel(std::size_t mesh_nodes, std::vector<int> nodes, MatrixXd table)
-    : nodes_(std::move(nodes)), row_of_(mesh_nodes, -1), table_(std::move(table)) {
+CondensedModel::CondensedModel(std::size_t mesh_nodes, std::vector<int> nodes, MatrixXd table, bool glides)
+    : nodes_(std::move(nodes)), row_of_(mesh_nodes, -1), table_(std::move(table)), glides_(glides) {
   for (std::size_t i = 0; i < nodes_.size(); ++i) row_of_.at(at(nodes_[i])) = static_cast<int>(i);
 }
 
@@ -229,7 +295,20 @@ Reaction CondensedModel::press(const Patch& patch, Given given, double value) {
     const double* const column = table_.col(rows_[static_cast<std::size_t>(j)]).data();
     for (Eigen::Index i = 0; i < size; ++i) depth[i] += weight * column[rows_[static_cast<std::size_t>(i)]];
   }
-  return linear_reaction(patch, depth, given, value);
+  Reaction reaction = linear_reaction(patch, depth, given, value);
+  if (patch.curvatures.size() > 0) add_glide(patch, depth, giving(patch), reaction);
+  return reaction;
+}
+
+Mat2 CondensedModel::giving(const Patch& patch) const {
+  Mat2 half = Mat2::Zero();  // the table is symmetric
+  for (Eigen::Index j = 0; j < patch.slopes.cols(); ++j) {
+    const double* const column = table_.col(rows_[static_cast<std::size_t>(j)]).data();
+    Vec2 below = 0.5 * column[rows_[static_cast<std::size_t>(j)]] * patch.slopes.col(j);
+    for (Eigen::Index i = 0; i < j; ++i) below += column[rows_[static_cast<std::size_t>(i)]] * patch.slopes.col(i);
+    half += below * patch.slopes.col(j).transpose();
+  }
+  return half + half.transpose();
 }
 
 std::size_t CondensedModel::bytes() const noexcept {

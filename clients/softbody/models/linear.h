@@ -16,19 +16,24 @@ namespace tendon::softbody {
 class LinearModel : public Model {
  public:
   /// Throws std::invalid_argument when the solid's law is not linear, std::runtime_error when it is not held fast. The
-  /// solid must outlive this. It begins at rest, under its weight if it has any.
-  LinearModel(const Solid& solid, const TouchSurface& surface, const EffectsConfig& effects = {});
+  /// solid must outlive this. It begins at rest, under its weight if it has any. With `glides` an answer at rest has its
+  /// Glide, by two more solutions in one answer of many.
+  LinearModel(const Solid& solid, const TouchSurface& surface, const EffectsConfig& effects = {}, bool glides = false);
 
   Reaction press(const Patch& patch, Given given, double value) override;
   void cut(const Division& division, const EffectsConfig& effects) override;
   double step() const noexcept override { return step_; }
   bool still() const noexcept override { return effects_.empty(); }
+  bool glides() const noexcept override { return glides_ && step_ == 0; }
   std::size_t bytes() const noexcept override;
 
   /// The displacements (m, free ones) that 1 N on the patch adds.
   VectorXd displacements(const Patch& patch) const;
 
  private:
+  /// Wᵀ A⁻¹ W of Reaction::Glide, without a held depth.
+  Mat2 giving(const Patch& patch);
+  void glide_from(const Patch& patch);
   Reaction press_among_effects(const Patch& patch, Given given, double value);
   VectorXd untouched() const;
 
@@ -36,8 +41,14 @@ class LinearModel : public Model {
   Vec3 normal_;
   Factor factor_;
   double step_;
+  bool glides_;
   Effects effects_;
   VectorXd rest_;  ///< m, all nodes: the shape at rest; empty without time
+  /// Of a place where the patch has been, by node: W, and what it makes the surface give way, A⁻¹ W. Empty where none are
+  /// known.
+  MatrixXd slopes_;
+  MatrixXd given_way_;
+  Mat2 given_ = Mat2::Zero();  ///< Wᵀ A⁻¹ W there
 };
 
 /// How a linear solid gives way where single nodes are pushed: the compliance (m/N) of `nodes`, three rows and columns
@@ -46,6 +57,9 @@ MatrixXd compliance_of(const Solid& solid, const std::vector<int>& nodes);
 
 /// The reaction of a linear body, from the depth of each node of the patch under 1 N on the patch.
 Reaction linear_reaction(const Patch& patch, const VectorXd& depth_per_newton, Given given, double value);
+
+/// The reaction's Glide, for a patch that has its curvatures; the same depths, and Wᵀ A⁻¹ W without a held depth.
+void add_glide(const Patch& patch, const VectorXd& depth_per_newton, const Mat2& giving, Reaction& to);
 
 /// K u = f of a linear body: forces on its free components (N; a column each) to their displacements (m).
 class Solver {
@@ -102,13 +116,14 @@ class SolvedModel : public Model {
 class CondensedModel : public Model {
  public:
   /// Makes the table of `nodes` (TouchSurface::nodes_of_patches), by one solution for each. Keeps neither the solid nor
-  /// the surface.
-  CondensedModel(const Solid& solid, const TouchSurface& surface, const std::vector<int>& nodes);
+  /// the surface. With `glides` an answer has its Glide.
+  CondensedModel(const Solid& solid, const TouchSurface& surface, const std::vector<int>& nodes, bool glides = false);
   /// From a table that was made before, of a mesh with so many nodes (SurfaceTable).
-  CondensedModel(std::size_t mesh_nodes, std::vector<int> nodes, MatrixXd table);
+  CondensedModel(std::size_t mesh_nodes, std::vector<int> nodes, MatrixXd table, bool glides = false);
 
   /// Throws std::out_of_range when the patch has a node that is not in the table.
   Reaction press(const Patch& patch, Given given, double value) override;
+  bool glides() const noexcept override { return glides_; }
   std::size_t bytes() const noexcept override;
 
   /// m/N, symmetric: rows and columns in the order of `nodes`.
@@ -116,9 +131,13 @@ class CondensedModel : public Model {
   const std::vector<int>& nodes() const noexcept { return nodes_; }
 
  private:
+  /// Wᵀ A⁻¹ W of Reaction::Glide for the patch whose rows are known, without a held depth.
+  Mat2 giving(const Patch& patch) const;
+
   std::vector<int> nodes_;
   std::vector<int> row_of_;  ///< by node; −1 = not in the table
   MatrixXd table_;
+  bool glides_;
   std::vector<int> rows_;  ///< rows of the present patch
 };
 

@@ -14,17 +14,25 @@ namespace {
 /// The share of its length at rest below which a spring has no direction, because its ends are in one place.
 constexpr double kShortest = 1e-9;
 
+std::vector<double> factors_of(const Solid& solid) {
+  std::vector<double> factors;
+  for (const Material& each : solid.of_elements()) factors.push_back(each.young / solid.material().young);
+  return factors;
+}
+
 }  // namespace
 
-SpringNet::SpringNet(const Mesh& at_rest, double young, const Fixed& fixed) : Elastic(at_rest, fixed) {
+SpringNet::SpringNet(const Mesh& at_rest, double young, const Fixed& fixed, const std::vector<double>& factors)
+    : Elastic(at_rest, fixed) {
   if (mesh().shape != Shape::kTet4) throw std::invalid_argument("a net of springs wants a mesh of tetrahedra");
-  std::map<std::pair<int, int>, double> volumes;  // around each edge
+  std::map<std::pair<int, int>, double> volumes;  // around each edge, times their factors
   for (int e = 0; e < mesh().element_count(); ++e) {
     const auto nodes = mesh().element(e);
     Mat3 edges;
     for (int i = 0; i < 3; ++i) edges.col(i) = mesh().nodes[at(nodes[at(i + 1)])] - mesh().nodes[at(nodes[0])];
+    const double volume = edges.determinant() / 6 * (factors.empty() ? 1 : factors[at(e)]);
     for (std::size_t i = 0; i < 4; ++i) {
-      for (std::size_t j = 0; j < i; ++j) volumes[std::minmax(nodes[i], nodes[j])] += edges.determinant() / 6;
+      for (std::size_t j = 0; j < i; ++j) volumes[std::minmax(nodes[i], nodes[j])] += volume;
     }
   }
   for (const auto& [edge, volume] : volumes) {
@@ -91,6 +99,7 @@ std::size_t SpringNet::bytes() const noexcept {
 
 MassSpringModel::MassSpringModel(const Solid& solid, const TouchSurface& surface,
                                  const QuasiStaticModel::Config& config, const EffectsConfig& effects)
-    : springs_(solid.mesh(), solid.material().young, solid.fixed()), newton_(springs_, surface, config, effects) {}
+    : springs_(solid.mesh(), solid.material().young, solid.fixed(), factors_of(solid)),
+      newton_(springs_, surface, config, effects) {}
 
 }  // namespace tendon::softbody

@@ -12,13 +12,14 @@ namespace tendon::softbody {
 /// 1998, with the factor that makes a stretched tetrahedron correct). V are the volumes of the tetrahedra that share
 /// the edge, L is its length at rest, l its present length:
 ///
-///     energy ½ k (l − L)²,   k = E Σ V / L²
+///     energy ½ k (l − L)²,   k = Σ E V / L²
 ///
 /// It has no Poisson ratio, and nothing keeps a tetrahedron from being pressed flat. It is here for comparison.
 class SpringNet : public Elastic {
  public:
-  /// Throws std::invalid_argument when the mesh is not of tetrahedra.
-  SpringNet(const Mesh& at_rest, double young, const Fixed& fixed);
+  /// `factors`: by how much the modulus of each tetrahedron is larger than `young`; empty: 1. Throws
+  /// std::invalid_argument when the mesh is not of tetrahedra.
+  SpringNet(const Mesh& at_rest, double young, const Fixed& fixed, const std::vector<double>& factors = {});
 
   double energy(const VectorXd& u) const override;
   Forces forces(const VectorXd& u) const override;

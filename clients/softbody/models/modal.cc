@@ -16,7 +16,7 @@ constexpr double kNew = 1e-6;
 }  // namespace
 
 ModalModel::ModalModel(const Solid& solid, const TouchSurface& surface, const Config& config)
-    : row_of_(solid.mesh().nodes.size(), -1) {
+    : row_of_(solid.mesh().nodes.size(), -1), glides_(config.glides) {
   LinearModel linear(solid, surface);
   SymmetricMatrix stiffness = solid.pattern();
   solid.stiffness(VectorXd::Zero(solid.size()), Elastic::Curvature::kExact, stiffness);
@@ -55,7 +55,16 @@ Reaction ModalModel::press(const Patch& patch, Given given, double value) {
   for (Eigen::Index i = 0; i < depth.size(); ++i) {
     depth[i] = surface_.row(row_of_[at(patch.nodes[static_cast<std::size_t>(i)])]) * shares;
   }
-  return linear_reaction(patch, depth, given, value);
+  Reaction reaction = linear_reaction(patch, depth, given, value);
+  if (patch.curvatures.size() > 0) {
+    MatrixXd tilted = MatrixXd::Zero(surface_.cols(), 2);  // shares of each shape, of the slopes of the load
+    for (Eigen::Index i = 0; i < depth.size(); ++i) {
+      tilted += surface_.row(row_of_[at(patch.nodes[static_cast<std::size_t>(i)])]).transpose() *
+                patch.slopes.col(i).transpose();
+    }
+    add_glide(patch, depth, tilted.transpose() * tilted, reaction);
+  }
+  return reaction;
 }
 
 std::size_t ModalModel::bytes() const noexcept {

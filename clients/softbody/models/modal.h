@@ -18,17 +18,20 @@ class ModalModel : public Model {
     int swings = 30;
     /// The static displacements of patches around these middles (m, across) become shapes too.
     std::vector<Vec2> patches;
+    bool glides = false;  ///< an answer has its Glide
   };
   /// The density is the same everywhere, so its value does not matter. Throws std::invalid_argument when the law of the
   /// solid is not linear, or the solid has fewer modes than `swings`. Keeps neither the solid nor the surface.
   ModalModel(const Solid& solid, const TouchSurface& surface, const Config& config);
 
   Reaction press(const Patch& patch, Given given, double value) override;
+  bool glides() const noexcept override { return glides_; }
   std::size_t bytes() const noexcept override;
 
  private:
   std::vector<int> row_of_;  ///< by node; −1: not on the surface
   MatrixXd surface_;         ///< B: depth of each touchable node (rows) in each shape, m/√J
+  bool glides_;
 };
 
 }  // namespace tendon::softbody

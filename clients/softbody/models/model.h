@@ -69,7 +69,7 @@ class Model {
   /// True when the body always has the shape of its mesh while nothing touches it: then it need not be asked.
   virtual bool still() const noexcept { return true; }
 
-  /// True when Reaction::glide is given for a patch that has its curvatures.
+  /// True when Reaction::glide is wanted, and given for a patch that has its curvatures.
   virtual bool glides() const noexcept { return false; }
 
   /// Bytes of the model's matrices and state.

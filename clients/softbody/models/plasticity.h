@@ -75,6 +75,7 @@ class PlasticModel : public Model {
 
   Reaction press(const Patch& patch, Given given, double value) override;
   bool still() const noexcept override { return model_.still() && !solid_.yielded(); }
+  bool glides() const noexcept override { return model_.glides(); }
   std::size_t bytes() const noexcept override { return solid_.bytes() + model_.bytes(); }
 
   const PlasticSolid& solid() const noexcept { return solid_; }

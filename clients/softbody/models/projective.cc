@@ -88,9 +88,13 @@ VectorXd ProjectiveModel::rotation_force() const {
     for (int q = 0; q < solid_.points_per_element(); ++q) {
       const Solid::Point& point = solid_.point(e, q);
       if (point.mu == 0) continue;
+      // Node by node: the numbers of a gradient lie apart (kernel.h).
       const auto gradient = solid_.gradient(e, q);
-      const Mat3 rotation = nearest_rotation(Mat3::Identity() + local * gradient.transpose());
-      force += 2 * point.mu * point.volume * (rotation - Mat3::Identity()) * gradient;
+      Mat3 change = Mat3::Zero();
+      for (int i = 0; i < local.cols(); ++i) change += local.col(i) * Vec3(gradient.col(i)).transpose();
+      const Mat3 rotation = nearest_rotation(Mat3::Identity() + change);
+      const Mat3 pull = 2 * point.mu * point.volume * (rotation - Mat3::Identity());
+      for (int i = 0; i < local.cols(); ++i) force.col(i) += pull * Vec3(gradient.col(i));
     }
     const auto nodes = solid_.mesh().element(e);
     for (int i = 0; i < local.cols(); ++i) all.segment<3>(3 * nodes[at(i)]) += force.col(i);

@@ -28,6 +28,7 @@ class QuasiStaticModel : public Model {
     int max_iterations = 30;  ///< for an answer; the rest is in Reaction::error, and the next answer goes on
     double tolerance = 1e-6;  ///< of the force, relative: an answer ends when its error is at most so large
     std::optional<double> self_collision = {};  ///< Pa/m: the bed c of SelfCollision
+    bool glides = true;                         ///< an answer at rest has its Glide
   };
   /// `elastic` must outlive this. It begins at rest, under its weight if it has any.
   QuasiStaticModel(const Elastic& elastic, const TouchSurface& surface, const Config& config,
@@ -37,7 +38,7 @@ class QuasiStaticModel : public Model {
   void cut(const Division& division, const EffectsConfig& effects) override;
   double step() const noexcept override { return step_; }
   bool still() const noexcept override { return effects_.empty(); }
-  bool glides() const noexcept override { return step_ == 0; }
+  bool glides() const noexcept override { return step_ == 0 && config_.glides; }
   std::size_t bytes() const noexcept override;
 
   int iterations() const noexcept { return iterations_; }  ///< in the last answer

@@ -110,6 +110,10 @@ std::uint64_t digest_of(const Solid& solid, const Vec3& normal) {
   put(bytes, static_cast<std::uint32_t>(solid.element()));
   put(bytes, solid.material().young);
   put(bytes, solid.material().poisson);
+  for (const Material& each : solid.of_elements()) {
+    put(bytes, each.young);
+    put(bytes, each.poisson);
+  }
   for (const double x : normal) put(bytes, x);
   return XXH3_64bits(bytes.data(), bytes.size());
 }

@@ -16,8 +16,6 @@ XpbdModel::XpbdModel(const Solid& solid, const TouchSurface& surface, int iterat
       dt_(effects.step),
       iterations_(iterations),
       slowing_(1 / (1 + effects.damping.value_or(0) * effects.step)),
-      mu_(solid.material().mu()),
-      lambda_(solid.material().lambda()),
       per_mass_(VectorXd::Zero(solid.size())),
       u_(VectorXd::Zero(solid.size())),
       velocity_(VectorXd::Zero(solid.size())) {
@@ -26,7 +24,14 @@ XpbdModel::XpbdModel(const Solid& solid, const TouchSurface& surface, int iterat
   expect(iterations >= 1, "iterations", iterations, "1 or more");
   for (int e = 0; e < solid.mesh().element_count(); ++e) {
     const auto nodes = solid.mesh().element(e);
-    tets_.push_back({{nodes[0], nodes[1], nodes[2], nodes[3]}, solid.gradient(e, 0), solid.point(e, 0).volume, 0, 0});
+    const Material& material = solid.material(e);
+    tets_.push_back({.nodes = {nodes[0], nodes[1], nodes[2], nodes[3]},
+                     .gradient = solid.gradient(e, 0),
+                     .volume = solid.point(e, 0).volume,
+                     .mu = material.mu(),
+                     .both = material.lambda() + material.mu(),
+                     .lambda_shape = 0,
+                     .lambda_volume = 0});
   }
   solid.add_free(lumped_mass(solid, effects.density).cwiseInverse(), per_mass_);
   if (effects.gravity) {
@@ -54,11 +59,11 @@ void XpbdModel::relax(Tet& tet) {
   };
   Mat3 f = Mat3::Identity() + local * tet.gradient.transpose();
   const double size = f.norm();
-  if (size > 0) correct(size, f / size, mu_, tet.lambda_shape);
+  if (size > 0) correct(size, f / size, tet.mu, tet.lambda_shape);
   f = Mat3::Identity() + local * tet.gradient.transpose();
   Mat3 cofactor;
   cofactor << f.col(1).cross(f.col(2)), f.col(2).cross(f.col(0)), f.col(0).cross(f.col(1));
-  correct(f.determinant() - 1 - mu_ / (lambda_ + mu_), cofactor, lambda_ + mu_, tet.lambda_volume);
+  correct(f.determinant() - 1 - tet.mu / tet.both, cofactor, tet.both, tet.lambda_volume);
   for (int i = 0; i < 4; ++i) u_.segment<3>(3 * tet.nodes[at(i)]) = local.col(i);
 }
 

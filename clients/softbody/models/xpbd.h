@@ -35,6 +35,8 @@ class XpbdModel : public Model {
     std::array<int, 4> nodes;
     Eigen::Matrix<double, 3, 4> gradient;  ///< ∂N/∂X, 1/m
     double volume;                         ///< m³
+    double mu;                             ///< Pa
+    double both;                           ///< λ + µ, Pa
     double lambda_shape;                   ///< multipliers that the two constraints have gathered in this step
     double lambda_volume;
   };
@@ -44,8 +46,6 @@ class XpbdModel : public Model {
   double dt_;
   int iterations_;
   double slowing_;  ///< 1/(1 + rate dt); 1 without damping
-  double mu_;
-  double lambda_;
   std::vector<Tet> tets_;
   VectorXd per_mass_;  ///< 1/kg, all nodes; 0 where they are held
   VectorXd u_;         ///< m, all nodes

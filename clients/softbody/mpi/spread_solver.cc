@@ -74,8 +74,7 @@ StiffnessOfElement stiffness_of_element(const Solid& solid, int element) {
   const auto nodes = static_cast<Eigen::Index>(solid.mesh().element(element).size());
   StiffnessOfElement k = StiffnessOfElement::Zero(3 * nodes, 3 * nodes);
   for (int q = 0; q < solid.points_per_element(); ++q) {
-    const Solid::Point& point = solid.point(element, q);
-    const auto g = solid.gradient(element, q);
+    const auto [point, g] = solid.part(element, q);
     for (Eigen::Index i = 0; i < nodes; ++i) {
       for (Eigen::Index j = 0; j < nodes; ++j) {
         k.block<3, 3>(3 * i, 3 * j) += point.volume * (point.lambda * g.col(i) * g.col(j).transpose() +
@@ -95,7 +94,7 @@ class SpreadSolver : public Solver {
         first_(first_row(rank_of(comm_))),
         rows_(first_row(rank_of(comm_) + 1) - first_),
         iterates_(way == Way::kMultigrid ||
-                  (way == Way::kChosen && size_ >= kMostForFactor && solid.material().poisson <= kMostPoisson)) {
+                  (way == Way::kChosen && size_ >= kMostForFactor && solid.largest_poisson() <= kMostPoisson)) {
     if (size_ % 3 != 0) throw std::invalid_argument("on many ranks a node is held whole, or not at all");
     assemble(solid);
     check(KSPCreate(comm_, krylov_.address()));

@@ -59,7 +59,7 @@ struct Feel {
 ///
 ///     K = k v vᵀ + F (v (Pᵀt)ᵀ + Pᵀt vᵀ) + F Pᵀ (∂²h/∂c² − M − F D) P,   v = n + Pᵀg
 ///
-/// the second derivative of E. Of a model that knows no Glide `Feel` has k v vᵀ with v = n + Pᵀ(2 ∂depth/∂c − ∂h/∂c),
+/// the second derivative of E. Of a model that knows no Glide, or is not asked for it, `Feel` has k v vᵀ with v = n + Pᵀ(2 ∂depth/∂c − ∂h/∂c),
 /// which is what a linear body has without second derivatives. For a body with time each answer simulates one
 /// Model::step(). Friction adds its force and stiffness across.
 ///

@@ -56,8 +56,8 @@ LocalTime Server::turn(LocalTime now) {
     next_state_ = now + from_seconds(1.0 / state_hz);
   }
   while (session_) {
-    const std::optional<Session::Event> event = session_->next_event();
-    if (!event) break;
+    const Session::Event* const event = session_->next_event();
+    if (event == nullptr) break;
     if (const auto* force = std::get_if<Session::ForceArrived>(&*event)) {
       forces.emplace_back(now, force->command);
     } else if (const auto* request = std::get_if<Session::RequestArrived>(&*event)) {

@@ -55,6 +55,25 @@ TEST(SoftbodyExplain, EveryEffectIsNamedWhereItIsListedAndWhereItIsNot) {
   }
 }
 
+TEST(SoftbodyExplain, SaysHowMuchOfABodyIsNearTheTool) {
+  Scene scene{.body = pressed_body(ModelKind::kNear, Element::kHex8Sri, 8)};
+  const Explanation explanation = explain(scene, saying({0, 1e6}));
+  const std::string text = in_words(scene, explanation);
+  EXPECT_NE(
+      text.find("near the tool: corotational, 104 of 256 elements, within 45 mm; 264 unknowns, of them 60 modes in "
+                "place of the 408 that near and far have in common\n"),
+      std::string::npos)
+      << text;
+  const auto json = nlohmann::json::parse(in_json(scene, explanation));
+  EXPECT_EQ(json["near"]["elements"], 104);
+  EXPECT_EQ(json["near"]["modes"], 60);
+  EXPECT_GT(json["bytes"], 100'000);
+  scene.body.shape = BlockShape{Vec3(0.1, 0.1, 0.05), {4, 4, 2}};
+  EXPECT_NE(explained(scene).find("near the tool: the whole body"), std::string::npos);
+  scene.body.model = ModelKind::kLinear;
+  EXPECT_EQ(explained(scene).find("near the tool"), std::string::npos);
+}
+
 TEST(SoftbodyExplain, WhatAnEffectAddsIsTheDifferenceToTheBodyWithoutIt) {
   Scene scene{.body = pressed_body(ModelKind::kLinear, Element::kHex8Sri, 4)};
   const auto bytes = [](const BodyConfig& body) { return static_cast<std::int64_t>(Body(body).size().bytes); };

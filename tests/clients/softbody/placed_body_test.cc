@@ -4,12 +4,16 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <fstream>
 #include <numbers>
 #include <optional>
+#include <sstream>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
+#include "clients/cpp/engine/self_test.h"
 #include "core/base/rotation.h"
 #include "core/remote/answer.h"
 #include "tests/clients/softbody/scene_text.h"
@@ -239,6 +243,21 @@ TEST(PlacedBody, AnswersForEveryModelThatASceneCanName) {
   }
 }
 
+/// On its closed ways the hand goes far enough aside to leave the near field, and comes back.
+TEST(PlacedBody, ANearFieldThatFollowsTheHandPassesTheSelfTest) {
+  std::string text = scene_of(info(ModelKind::kNear));
+  text.replace(text.find("[4, 4, 2]"), 9, "[8, 8, 4]");
+  text.replace(text.find("\"near\""), 6, "\"near\"\nerror_percent = 0.01");
+  PlacedBody body(parse_scene(text, "s.toml", "."));
+  SelfTestScript script;
+  script.start = Vec3(0.007, 0, 0);
+  script.depth = 0.006;
+  script.slide = 0.012;
+  script.rate_hz = 200;
+  const SelfTest result = self_test([&](const DeviceState& hand) { return body.answer(hand); }, script);
+  EXPECT_TRUE(result.passed()) << result.text();
+}
+
 TEST(PlacedBody, WhatIsPlannedOverTimeCountsFromTheFirstAnswersSample) {
   std::string text = with("\"condensed\"", "\"linear\"");
   text.replace(text.find("[\"contact\"]"), 11, "[\"contact\", \"cutting\", \"stiffening\"]");
@@ -273,6 +292,42 @@ TEST(PlacedBody, ABodyWithTimeAdvancesByTheTimeBetweenSamples) {
   const Vec3 after_a_pause = often.answer(hand_at(4e-4, std::chrono::seconds(100))).force;
   EXPECT_EQ(after_a_pause, seldom.answer(hand_at(4e-4, std::chrono::seconds(1))).force);
   EXPECT_TRUE(often.answer(hand_at(4e-4, Duration(0))).force.allFinite());
+}
+
+std::string text_of(const std::string& file) {
+  std::ifstream stream(file);
+  std::ostringstream text;
+  text << stream.rdbuf();
+  return text.str();
+}
+
+/// What `tendon-softbody selftest` finds.
+void expect_passed(const Scene& scene) {
+  PlacedBody body(scene);
+  SelfTestScript script;
+  script.start = scene.at + 0.003 * scene.towards_hand;
+  script.into = -scene.towards_hand;
+  script.depth = 0.006;
+  script.slide = 0.003;
+  const SelfTest result = self_test([&](const DeviceState& hand) { return body.answer(hand); }, script);
+  EXPECT_TRUE(result.passed()) << result.text();
+}
+
+TEST(PlacedBody, TheKidneyAndTheLumpInABlockPassTheSelfTest) {
+  for (const std::string name : {"kidney", "tumour"}) expect_passed(read_scene(TENDON_SCENES "/" + name + ".toml"));
+}
+
+TEST(PlacedBody, ALiverOfALinearMaterialPassesTheSelfTestAtEveryPoint) {
+  std::string text = text_of(TENDON_SCENES "/liver.toml");
+  for (const auto& [old, replacement] :
+       {std::pair(", \"geometric-nonlinearity\", \"material-nonlinearity\"", ""), std::pair("error_percent", "# ")}) {
+    text.replace(text.find(old), std::string_view(old).size(), replacement);
+  }
+  for (const std::string model : {"condensed", "linear"}) {
+    std::string of_model = text;
+    of_model.replace(of_model.find("neo-hookean"), 11, model);
+    expect_passed(parse_scene(of_model, "liver.toml", TENDON_SCENES));
+  }
 }
 
 }  // namespace

@@ -50,7 +50,7 @@ TEST(SoftbodyScene, EveryValueArrives) {
 }
 
 TEST(SoftbodyScene, ThoseThatAreShippedMakeBodiesThatNobodyHasToBeWarnedOf) {
-  for (const char* name : {"softbody.toml", "liver.toml"}) {
+  for (const char* name : {"softbody.toml", "liver.toml", "kidney.toml", "tumour.toml"}) {
     const Scene scene = read_scene(std::filesystem::path(TENDON_SCENES) / name);
     EXPECT_EQ(warnings(scene.body), std::vector<std::string>{}) << name;
     Body body(scene.body);
@@ -91,7 +91,7 @@ TEST(SoftbodyScene, AnEffectsKeysAreKnownOnlyWhereItIsListed) {
   EXPECT_EQ(body.effects.density, 900);
   EXPECT_EQ(body.friction, 0.5);
   EXPECT_EQ(refusal(with("[body]", "friction = 0.5\n[body]")),
-            "s.toml:2: friction: unknown key; expected one of body, effects, hands, model, place, touch");
+            "s.toml:2: friction: unknown key; expected one of body, effects, hands, model, place, region, touch");
   EXPECT_EQ(refusal(with("[\"contact\"]", "[\"contact\", \"friction\"]")),
             "s.toml: friction: expected a number of at least 0 and at most 10, found nothing");
   EXPECT_EQ(refusal(with("[\"contact\"]", "[\"contact\",\n\"inertia\"]")),
@@ -133,7 +133,7 @@ TEST(SoftbodyScene, WhatIsWrongWithACutIsNamed) {
   EXPECT_EQ(refusal(listing("linear", effects, "")),
             "s.toml: cutting: expected one or more tables [[cutting]], found nothing");
   EXPECT_EQ(refusal(listing("linear", "[\"contact\"]", cut + "at_s = 1\n")),
-            "s.toml:15: cutting: unknown key; expected one of body, effects, hands, model, place, touch");
+            "s.toml:15: cutting: unknown key; expected one of body, effects, hands, model, place, region, touch");
   EXPECT_EQ(refusal(listing("linear", effects, cut)), "s.toml:16: cutting[1].: expected either at_s or above_n");
   EXPECT_EQ(refusal(listing("linear", effects, cut + "at_s = 1\nabove_n = 1\n")),
             "s.toml:16: cutting[1].: expected either at_s or above_n");
@@ -166,6 +166,29 @@ TEST(SoftbodyScene, HowWrongAnAnswerMayBeArrivesAndIsForNewtonsMethodAlone) {
             "s.toml:10: model.error_percent: unknown key; expected one of kind, table");
 }
 
+TEST(SoftbodyScene, ALawOfTheElementsNearTheToolArrivesAndFitsTheEffects) {
+  const std::string rotations = "[\"contact\", \"geometric-nonlinearity\"]";
+  const std::string strains = "[\"contact\", \"geometric-nonlinearity\", \"material-nonlinearity\"]";
+  const auto near = [](const std::string& more, const std::string& effects) {
+    return listing("near\"\n" + more + " #", effects, "");
+  };
+  const BodyConfig body = parse_scene(near("law = \"neo-hookean\"\nerror_percent = 2", strains), "s.toml", ".").body;
+  EXPECT_EQ(body.model, ModelKind::kNear);
+  EXPECT_EQ(body.law, Law::kNeoHookean);
+  EXPECT_NEAR(body.tolerance, 0.02, 1e-15);
+  EXPECT_EQ(parse_scene(near("law = \"stvk\"", rotations), "s.toml", ".").body.law, Law::kStVenantKirchhoff);
+  EXPECT_EQ(parse_scene(near("", rotations), "s.toml", ".").body.law, Law::kCorotational);
+  EXPECT_EQ(refusal(near("law = \"linear\"", rotations)),
+            "s.toml:10: model.law: expected one of corotational, stvk, neo-hookean, found \"linear\"");
+  EXPECT_EQ(refusal(near("law = \"neo-hookean\"", rotations)),
+            "s.toml:1: effects: the law \"neo-hookean\" simulates \"material-nonlinearity\", which is not listed");
+  EXPECT_EQ(refusal(near("law = \"stvk\"", strains)),
+            "s.toml:1: effects: the law simulates no \"material-nonlinearity\", which is listed: only \"neo-hookean\" "
+            "does");
+  EXPECT_EQ(refusal(listing("corotational\"\nlaw = \"stvk\" #", rotations, "")),
+            "s.toml:10: model.law: unknown key; expected one of error_percent, kind, max_iterations");
+}
+
 TEST(SoftbodyScene, AYieldArrivesAndWhatIsWrongWithItIsNamed) {
   const std::string effects = "[\"contact\", \"geometric-nonlinearity\",\n\"plasticity\"]";
   const std::string table = "[plasticity]\nyield_pa = 500\nhardening_pa = 2000\n";
@@ -185,7 +208,7 @@ TEST(SoftbodyScene, AYieldArrivesAndWhatIsWrongWithItIsNamed) {
   EXPECT_EQ(refusal(listing("corotational", effects, table + "creep = 1\n")),
             "s.toml:19: plasticity.creep: unknown key; expected one of hardening_pa, yield_pa");
   EXPECT_EQ(refusal(listing("linear", "[\"contact\"]", table)),
-            "s.toml:15: plasticity: unknown key; expected one of body, effects, hands, model, place, touch");
+            "s.toml:15: plasticity: unknown key; expected one of body, effects, hands, model, place, region, touch");
   for (const std::string model : {"condensed", "modal", "neo-hookean", "stvk", "mass-spring", "tled"}) {
     EXPECT_EQ(refusal(listing(model, "[\"contact\",\n\"plasticity\"]", table)),
               "s.toml:2: effects: the model \"" + model + "\" does not simulate \"plasticity\", which is listed");
@@ -208,6 +231,17 @@ TEST(SoftbodyScene, ALayerBetweenTheSidesArrivesAndWhatIsWrongWithItIsNamed) {
             "s.toml:2: effects: the model \"linear\" does not simulate \"self-collision\", which is listed");
 }
 
+TEST(SoftbodyScene, TheWholeStiffnessIsAskedForWhereAModelLeavesItOut) {
+  const std::string asked = "patch_radius_mm = 20\nwhole_stiffness = true";
+  EXPECT_FALSE(parse_scene(kGood, "s.toml", ".").body.whole_stiffness);
+  EXPECT_TRUE(parse_scene(with("patch_radius_mm = 20", asked), "s.toml", ".").body.whole_stiffness);
+  EXPECT_EQ(refusal(with("patch_radius_mm = 20", "patch_radius_mm = 20\nwhole_stiffness = 1")),
+            "s.toml:12: touch.whole_stiffness: expected true or false");
+  std::string newton = listing("corotational", "[\"contact\", \"geometric-nonlinearity\"]", "");
+  newton.replace(newton.find("patch_radius_mm = 20"), 20, asked);
+  EXPECT_NE(refusal(newton).find("touch.whole_stiffness: unknown key"), std::string::npos);
+}
+
 TEST(SoftbodyScene, MistakesAreNamedWithLineKeyAndWhatWasExpected) {
   EXPECT_EQ(refusal(with("cells = [4, 4, 2]", "cells = [4, 4]")),
             "s.toml:5: body.cells: expected three whole numbers from 1 to 200");
@@ -221,7 +255,7 @@ TEST(SoftbodyScene, MistakesAreNamedWithLineKeyAndWhatWasExpected) {
             "s.toml: touch.patch_radius_mm: expected a number above 0 and at most 1e+06, found nothing");
   EXPECT_EQ(refusal(with("patch_radius_mm = 20", "patch_radius_mm = 20\nfriction = 1")),
             "s.toml:12: touch.friction: unknown key; expected one of from, middle_mm, patch_radius_mm, reach_mm, side, "
-            "table_mm, tool, tool_offset_mm, tool_radius_mm");
+            "table_mm, tool, tool_offset_mm, tool_radius_mm, whole_stiffness");
   EXPECT_EQ(
       refusal(with("patch_radius_mm = 20", "patch_radius_mm = 20\nside = \"bilateral\"\ntable_mm = 5")),
       "s.toml:13: touch.table_mm: only for the model condensed, unilateral and without friction: others remember");

@@ -32,7 +32,7 @@ TEST_F(CodecProof, AStateAndAForceCostFarLessThanByProtobuf) {
   }
   ASSERT_EQ(cost.size(), 8U);
   const std::vector<Bound> bounds = {
-      {"write state", 490, 2.4}, {"read state", 930, 3.5}, {"write force", 495, 2.4}, {"read force", 885, 3.5}};
+      {"write state", 430, 2.6}, {"read state", 950, 3.4}, {"write force", 435, 2.6}, {"read force", 900, 3.4}};
   for (const auto& [what, most, times] : bounds) {
     const double by_hand = cost.at(what + " by hand");
     EXPECT_LE(by_hand, most) << what;

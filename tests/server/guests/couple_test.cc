@@ -50,7 +50,7 @@ class Viewer {
       const auto& accepted = std::get<ClientHandshake::Accepted>(*handshake_.outcome());
       session.emplace(Session::Config{.connection_id = accepted.connection_id}, now);
     }
-    while (const auto event = session ? session->next_event() : std::nullopt) {
+    while (const auto event = session ? session->next_event() : nullptr) {
       if (const auto* port = std::get_if<Session::PortArrived>(&*event)) {
         (port->port.of_peer ? peers : own).push_back({now, port->port});
       }

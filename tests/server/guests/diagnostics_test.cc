@@ -201,7 +201,7 @@ TEST_F(SealedServer, AControllerIsNotGrantedTheFeatureAndIsToldNothingOfIt) {
       EXPECT_EQ(accepted.welcome.features, std::vector<std::string>{std::string(kFeatureLocalModel)});
       session.emplace(Session::Config{.connection_id = accepted.connection_id}, now_);
     }
-    while (const auto event = session ? session->next_event() : std::nullopt) {
+    while (const auto event = session ? session->next_event() : nullptr) {
       const auto* arrived = std::get_if<Session::StateArrived>(&*event);
       ASSERT_NE(arrived, nullptr);
       EXPECT_FALSE(arrived->state.force_wanted.has_value());

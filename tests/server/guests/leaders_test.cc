@@ -39,9 +39,9 @@ class Desk {
   void step(LocalTime now) {
     connection_.begin_turn();
     while (const auto event = connection_.next(now)) {
-      const auto* of_session = std::get_if<Session::Event>(&*event);
+      const auto* of_session = std::get_if<const Session::Event*>(event);
       if (of_session == nullptr) continue;
-      if (const auto* told = std::get_if<Session::RequestAnswered>(of_session)) answer = *told;
+      if (const auto* told = std::get_if<Session::RequestAnswered>(*of_session)) answer = *told;
     }
     if (wanted_ && connection_.session() != nullptr && connection_.session()->request(*wanted_)) wanted_.reset();
     connection_.flush(now);

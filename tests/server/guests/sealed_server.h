@@ -153,7 +153,7 @@ class SealedServer : public testing::Test {
         const auto& accepted = std::get<ClientHandshake::Accepted>(*handshake.outcome());
         session.emplace(Session::Config{.connection_id = accepted.connection_id}, now_);
       }
-      while (const auto event = session ? session->next_event() : std::nullopt) {
+      while (const auto event = session ? session->next_event() : nullptr) {
         if (const auto* told = std::get_if<Session::ReportArrived>(&*event)) report = told->report;
         const auto* seen = std::get_if<Session::StateArrived>(&*event);
         if (seen == nullptr) continue;

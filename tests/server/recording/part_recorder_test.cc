@@ -128,6 +128,76 @@ TEST(PartRecorder, EachPartIsAWholeRecordingAndNoStepIsMissing) {
   EXPECT_EQ(tick, 3500U);
 }
 
+/// Ten steps in a second, of which those from `first_fault` to `last_fault` (s) are in a fault.
+void record_seconds(PartRecorder& recorder, int from, int until, int first_fault = -1, int last_fault = -1) {
+  for (int tick = 10 * from; tick < 10 * until; ++tick) {
+    StepRecord step = sample_step(static_cast<std::uint64_t>(100 * tick));
+    if (tick >= 10 * first_fault && tick < 10 * last_fault) step.reasons |= Reason::kFault;
+    recorder.record(step);
+    recorder.tick(ms(100 * tick));
+  }
+}
+
+PartRecorder::Config config_of_faults(const ScratchFolder& folder) {
+  PartRecorder::Config config = config_at(folder.path() / "run.mcap");
+  config.keep = Keep::kFaults;
+  return config;
+}
+
+TEST(PartRecorder, OfFaultsKeepsTheMinuteOfEachAndTheOneBefore) {
+  const ScratchFolder folder;
+  PartRecorder recorder(config_of_faults(folder));
+  record_seconds(recorder, 0, 900, 330, 700);
+  recorder.close(ms(900'000));
+  EXPECT_EQ(names_in(folder.path()), (std::set<std::string>{"run-5.mcap", "run-6.mcap"}))
+      << "a fault that stays has begun once";
+  const Contents before = read_file(folder.path() / "run-5.mcap");
+  EXPECT_LE(before.steps.front().tick, 330'000U - 60'000U);
+  const Contents with = read_file(folder.path() / "run-6.mcap");
+  EXPECT_EQ(with.steps.front().tick - before.steps.back().tick, 100U) << "nothing is missing between them";
+  EXPECT_FALSE(with.steps.front().reasons.has(Reason::kFault));
+  EXPECT_TRUE(with.steps.back().reasons.has(Reason::kFault));
+  EXPECT_EQ(recorder.status().parts, 15U);
+  EXPECT_EQ(recorder.status().parts_not_kept, 13U);
+  EXPECT_TRUE(recorder.status().complete()) << "what is not kept is not missing";
+}
+
+TEST(PartRecorder, OfFaultsKeepsEnoughBeforeOneThatComesFirstInAPart) {
+  const ScratchFolder folder;
+  PartRecorder::Config config = config_of_faults(folder);
+  config.rotate_after = std::chrono::seconds(20);
+  PartRecorder recorder(config);
+  record_seconds(recorder, 0, 400, 200, 201);
+  recorder.close(ms(400'000));
+  const auto names = names_in(folder.path());
+  EXPECT_EQ(names, (std::set<std::string>{"run-7.mcap", "run-8.mcap", "run-9.mcap", "run-10.mcap", "run-11.mcap"}))
+      << "the fault is the last step of run-10, and what came of it is in run-11";
+  EXPECT_LE(read_file(folder.path() / "run-7.mcap").steps.front().tick, 140'000U);
+}
+
+TEST(PartRecorder, OfFaultsOneInSoManyStaysWithoutAFault) {
+  const ScratchFolder folder;
+  PartRecorder::Config config = config_of_faults(folder);
+  config.one_in = 4;
+  PartRecorder recorder(config);
+  record_seconds(recorder, 0, 600);
+  recorder.close(ms(600'000));
+  EXPECT_EQ(names_in(folder.path()), (std::set<std::string>{"run.mcap", "run-5.mcap", "run-9.mcap"}));
+}
+
+TEST(PartRecorder, OfFaultsAKilledRunLeavesItsLastMinutes) {
+  const ScratchFolder folder;
+  {
+    PartRecorder recorder(config_of_faults(folder));
+    record_seconds(recorder, 0, 290);
+  }
+  EXPECT_TRUE(fs::exists(folder.path() / "run-5.mcap"));
+  EXPECT_TRUE(fs::exists(folder.path() / "run-4.mcap"));
+  EXPECT_FALSE(fs::exists(folder.path() / "run-2.mcap"));
+  PartRecorder next(config_of_faults(folder));
+  EXPECT_EQ(next.status().path.filename(), "run-6.mcap") << "the order of the numbers is that of the runs";
+}
+
 TEST(PartRecorder, APartIsNoLargerThanItMayBe) {
   const ScratchFolder folder;
   PartRecorder::Config config = config_at(folder.path() / "run.mcap");

@@ -92,7 +92,7 @@ TEST(SceneError, NamesTheClosestKeyOrAllOfThem) {
       {"[limitre]\n", "s.toml:4: limitre: unknown table; did you mean limiter?"},
       {"[recording]\nfilename = \"x\"\n",
        "s.toml:5: recording.filename: unknown key; known here: path, rotate_mb, rotate_min, "
-       "budget_mb, datagrams_kb_per_s"},
+       "budget_mb, keep, one_in, datagrams_kb_per_s"},
       {"[device.gravity]\n",
        "s.toml:4: device.gravity: unknown table; known here: kind, name, axes, group, held_by, profile, "
        "start_position_mm, effects, "
@@ -372,6 +372,12 @@ TEST(SceneError, WithoutKeysItListensOnThisMachineOnly) {
               "s.toml:5: network.listen: expected an address like \"127.0.0.1:47100\" or \"[::1]:47100\", found \"" +
                   text + "\"");
   }
+}
+
+TEST(SceneError, OneInOfARecordingThatKeepsAllIsRefused) {
+  expect_errors({{"[recording]\npath = \"x.mcap\"\none_in = 10\n",
+                  "s.toml:6: recording.one_in: expected keep = \"faults\" beside it, found keep = \"all\": every file "
+                  "stays"}});
 }
 
 TEST(SceneError, OfTheSuitesSaysWhichThereAreAndWhatTheyNeed) {

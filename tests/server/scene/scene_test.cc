@@ -151,6 +151,8 @@ path = "run.mcap"
 rotate_mb = 50
 rotate_min = 90
 budget_mb = 200.5
+keep = "faults"
+one_in = 1000
 datagrams_kb_per_s = 100
 )");
   EXPECT_EQ(scene.simulated().start_position, Vec3(0.001, -0.0025, 0.003));
@@ -203,6 +205,8 @@ datagrams_kb_per_s = 100
   EXPECT_DOUBLE_EQ(scene.recording->rotate_bytes, 50e6);
   EXPECT_DOUBLE_EQ(scene.recording->rotate_after, 5400);
   EXPECT_DOUBLE_EQ(scene.recording->budget_bytes.value(), 200.5e6);
+  EXPECT_EQ(scene.recording->keep, Keep::kFaults);
+  EXPECT_EQ(scene.recording->one_in, 1000U);
   EXPECT_DOUBLE_EQ(scene.recording->datagram_bytes_per_s, 100e3);
 }
 

@@ -128,6 +128,7 @@ class WatchedLink : public Link {
     return link_.receive(from, buffer);
   }
   LocalTime present(LocalTime now) const override { return link_.present(now); }
+  LocalTime arrived(LocalTime now) const override { return link_.arrived(now); }
   void look() {
     const RemoteForce* const force = mail_.forces.front().take();
     if (force == nullptr) return;

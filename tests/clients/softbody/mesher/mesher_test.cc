@@ -306,6 +306,19 @@ TEST_F(Meshing, OnACurvedSurfaceNodesGoAsFarAsElementsStayWellShaped) {
   EXPECT_LT(report.volume_error, 0);
 }
 
+TEST_F(Meshing, TheKidneysMeshIsWhatItsSurfaceMakes) {
+  const std::string scenes = TENDON_SCENES;
+  const std::string surface = path("kidney.off");
+  // NOLINTNEXTLINE(concurrency-mt-unsafe): one thread
+  ASSERT_EQ(std::system(("python3 " + scenes + "/kidney_surface > " + surface).c_str()), 0);
+  ASSERT_EQ(run(surface + " --size 6 --at 0,0,22 --reach 25 --coarsest 1.5 --out " + path("kidney.msh")), 0) << said();
+  const Mesh made = read_gmsh(path("kidney.msh"), 1e-3);
+  const Mesh kept = read_gmsh(scenes + "/kidney.msh", 1e-3);
+  // Another gmsh places other nodes.
+  EXPECT_NEAR(check(made, "made") / check(kept, "kept"), 1, 0.01);
+  EXPECT_NEAR(static_cast<double>(made.nodes.size()) / static_cast<double>(kept.nodes.size()), 1, 0.2);
+}
+
 TEST_F(Meshing, TheSameSurfaceGivesTheSameMesh) {
   std::string words;
   const VolumeConfig config{.size = 12};

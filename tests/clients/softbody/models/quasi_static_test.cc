@@ -5,13 +5,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstddef>
+#include <memory>
 #include <stdexcept>
-#include <vector>
 
 #include "clients/softbody/models/linear.h"
+#include "tests/clients/softbody/drawn_answers.h"
 #include "tests/clients/softbody/pressed_block.h"
-#include "tests/support/dice.h"
 
 namespace tendon::softbody {
 namespace {
@@ -126,44 +125,23 @@ TEST(QuasiStatic, HalfAPercentIsWorthFewStepsAndNoFactorOnAHardPath) {
   }
 }
 
-/// Presses and strokes as they come, of bodies that are asked for 0.3 to 30 %, or given one step: seed 1.
+/// Of bodies that are asked for 0.3 to 30 %, or given one step.
 TEST(QuasiStatic, TheErrorSaidCoversTheTrueOneOfTwoHundredDrawnAnswers) {
-  constexpr int kPaths = 20;
-  constexpr int kAnswers = 10;
-  Dice dice(1);
-  int covered = 0;
-  std::vector<double> too_careful;
-  for (int path = 0; path < kPaths; ++path) {
-    const Law law = kLaws[path % 3];
-    const Solid solid = pressed_block(Element::kHex8Sri, 4, path % 2 == 0 ? 0.45 : 0.499, law);
-    const TouchSurface top(solid.mesh(), Vec3::UnitZ(), kB1PatchRadius);
-    const double tolerance = dice.decades(-2.5, -0.5);
-    QuasiStaticModel asked(solid, top, {.max_iterations = path % 4 == 0 ? 1 : 30, .tolerance = tolerance});
-    QuasiStaticModel exact(solid, top, {.max_iterations = 200, .tolerance = 1e-9});
-    const double widest = dice.decades(-4, -2);  // m, between two answers
-    Vec2 place(dice.within(-0.02, 0.02), dice.within(-0.02, 0.02));
-    double depth = 0;
-    for (int i = 0; i < kAnswers; ++i) {
-      const auto moved = [&](double from, double low, double high) {
-        return std::clamp(from + dice.within(-widest, widest), low, high);
-      };
-      place = Vec2(moved(place.x(), -0.03, 0.03), moved(place.y(), -0.03, 0.03));
-      depth = moved(depth + widest / 3, 2e-4, 4e-3);
-      const Patch patch = *top.patch(place);
-      const Reaction found = asked.press(patch, Given::kDepth, depth);
-      const double truth = exact.press(patch, Given::kDepth, depth).force;
-      const double wrong = std::abs(found.force - truth);
-      covered += wrong <= found.error + 1e-9 * std::abs(truth) ? 1 : 0;
-      if (wrong > 5e-3 * std::abs(truth)) too_careful.push_back(found.error / wrong);
-    }
-  }
-  EXPECT_GE(covered, kPaths * kAnswers * 99 / 100);
-  ASSERT_FALSE(too_careful.empty());
-  const auto middle = too_careful.begin() + static_cast<std::ptrdiff_t>(too_careful.size() / 2);
-  std::ranges::nth_element(too_careful, middle);
-  EXPECT_LE(*middle, 20) << too_careful.size();
-  RecordProperty("covered", covered);
-  RecordProperty("median_of_said_over_true", static_cast<int>(*middle));
+  const testing::ErrorsSaid said = testing::errors_said(20, 4e-3, [](int path, double tolerance) {
+    const double poisson = path % 2 == 0 ? 0.45 : 0.499;
+    auto block =
+        std::make_unique<testing::AskedAndExact>(pressed_block(Element::kHex8Sri, 4, poisson, kLaws[path % 3]));
+    block->asked = std::make_unique<QuasiStaticModel>(
+        block->solid, block->top,
+        QuasiStaticModel::Config{.max_iterations = path % 4 == 0 ? 1 : 30, .tolerance = tolerance});
+    return block;
+  });
+  EXPECT_EQ(said.answers, 200);
+  EXPECT_GE(said.covered, said.answers * 99 / 100);
+  ASSERT_FALSE(said.times.empty());
+  EXPECT_LE(said.median(), 20) << said.times.size();
+  RecordProperty("covered", said.covered);
+  RecordProperty("median_of_said_over_true", static_cast<int>(said.median()));
 }
 
 TEST(QuasiStatic, WhatCannotBeIsRefused) {

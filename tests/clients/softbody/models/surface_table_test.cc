@@ -86,6 +86,9 @@ TEST_F(SurfaceTableFile, ComesBackBitForBitAndMayBeMadeAnew) {
 TEST_F(SurfaceTableFile, OfAnotherBodyIsRefused) {
   write_table(file(), condense(block(8)));
   EXPECT_NE(refusal([&] { Body{from_file(4)}; }).find("is the table of another body"), std::string::npos);
+  BodyConfig lumpy = from_file(8);
+  lumpy.regions = {{.where = Region::Ball{.middle = Vec3(0, 0, 0.03), .radius = 0.02}, .material = {1e5, 0.4}}};
+  EXPECT_NE(refusal([&] { Body{lumpy}; }).find("is the table of another body"), std::string::npos);
   BodyConfig harder = from_file(8);
   harder.material.young *= 1.0000001;
   EXPECT_NE(refusal([&] { Body{harder}; }).find("is the table of another body"), std::string::npos);

@@ -9,6 +9,7 @@
 #include <limits>
 #include <numbers>
 #include <stdexcept>
+#include <vector>
 
 #include "clients/softbody/models/linear.h"
 #include "clients/softbody/scene.h"
@@ -146,6 +147,72 @@ TEST(ExactStiffness, OfTheLiverIsRightToTwoNewtonsAMetreAlsoBelowZero) {
     lowest = std::min(lowest, Eigen::SelfAdjointEigenSolver<Mat3>(given).eigenvalues()[0]);
   }
   EXPECT_LT(lowest, -20);  // N/m: there the patch would rather slip away
+}
+
+/// The models that leave the whole stiffness out where nobody misses it.
+std::vector<BodyConfig> linear_ones(BodyConfig config) {
+  std::vector<BodyConfig> all;
+  config.max_iterations = 100;
+  config.tolerance = 1e-9;
+  for (const ModelKind kind : {ModelKind::kLinear, ModelKind::kCondensed, ModelKind::kModal}) {
+    config.model = kind;
+    all.push_back(config);
+  }
+  config.model = ModelKind::kLinear;
+  config.effects = {.density = 1000, .gravity = Vec3(0.5, 0, -1)};
+  all.push_back(config);
+  config.effects = {};
+  config.plasticity = Yield{.stress = 1e5, .hardening = 1e4};  // it does not yield
+  all.push_back(config);
+  config.plasticity.reset();
+  config.stiffening = StiffnessOverTime{.at = {0}, .factor = {3}};
+  all.push_back(config);
+  return all;
+}
+
+void expect_slope_of_its_force(const BodyConfig& config, const Vec2& aside, double depth, double share) {
+  Body body(config);
+  body.tick(0);
+  const auto touched = [&](const Vec3& tool) { return body.touch(tool); };
+  const Vec3 above = body.touch_point() + Vec3(aside.x(), aside.y(), 0);
+  body.touch(above + Vec3(1e-3, 1e-3, -depth));  // what it keeps of one place serves another
+  const Mat3 given = body.touch(above - depth * Vec3::UnitZ()).stiffness;
+  EXPECT_LT((given - by_differences(touched, above - depth * Vec3::UnitZ())).norm(), share * given.norm())
+      << info(config.model).name << '\n'
+      << given;
+}
+
+TEST(ExactStiffness, OfALinearBodyOnAFlatSideIsTheForcesOwnSlopeWhenAsked) {
+  BodyConfig block = testing::pressed_body(ModelKind::kLinear, Element::kHex8Sri, 8);
+  block.whole_stiffness = true;
+  for (const BodyConfig& config : linear_ones(block)) {
+    for (const Vec2& aside : {Vec2(0.013, 0.007), Vec2(-0.03, 0.02)}) {
+      expect_slope_of_its_force(config, aside, 3e-3, 5e-3);
+    }
+  }
+}
+
+TEST(ExactStiffness, OfALinearBodyOnACurvedSideIsTheForcesOwnSlopeUnasked) {
+  BodyConfig liver = read_scene(TENDON_SCENES "/liver.toml").body;
+  for (const BodyConfig& config : linear_ones(liver)) {
+    for (const Vec2& aside : {Vec2(0, 0), Vec2(-0.003, 0.006)}) expect_slope_of_its_force(config, aside, 3e-3, 5e-3);
+  }
+}
+
+TEST(ExactStiffness, IsNotPaidForOnAFlatSideUnlessItIsAskedFor) {
+  const Solid flat = pressed_block(Element::kHex8Sri, 4, 0.45);
+  const TouchSurface top(flat.mesh(), Vec3::UnitZ(), kB1PatchRadius);
+  EXPECT_FALSE(top.curved());
+  EXPECT_FALSE(CondensedModel(flat, top, top.nodes()).glides());
+  EXPECT_FALSE(LinearModel(flat, top).glides());
+  EXPECT_TRUE(LinearModel(flat, top, {}, true).glides());
+  EXPECT_FALSE(LinearModel(flat, top, {.density = 1000, .step = 1e-3, .inertia = true}, true).glides());
+  EXPECT_TRUE(TouchSurface(flat.mesh(), Vec3(1, 0, 1).normalized(), kB1PatchRadius).curved());  // around an edge
+  EXPECT_FALSE(TouchSurface(flat.mesh(), Vec3(0.1, 0, 1).normalized(), kB1PatchRadius).curved());
+  const LinearModel still(flat, top);
+  LinearModel asked(flat, top, {}, true);
+  asked.press(*top.patch_with_curvatures(Vec2::Zero()), Given::kDepth, 1e-3);
+  EXPECT_GT(asked.bytes(), still.bytes());
 }
 
 TEST_F(Contacts, OffTheBodyOrNowhereNothingIsFelt) {

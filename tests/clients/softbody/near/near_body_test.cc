@@ -1,0 +1,114 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "clients/softbody/near/near_body.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <stdexcept>
+
+#include "tests/clients/softbody/pressed_block.h"
+
+namespace tendon::softbody {
+namespace {
+
+using testing::kB1PatchRadius;
+using testing::pressed_block;
+
+/// B1, the factor of its stiffness at rest, and a press of the middle of its top.
+struct AtRest {
+  AtRest(int n, double poisson, Law law)
+      : solid(pressed_block(Element::kHex8Sri, n, poisson, law)),
+        top(solid.mesh(), Vec3::UnitZ(), kB1PatchRadius),
+        stiffness(solid.pattern()),
+        factor(stiffness),
+        load(patch_load(solid, Vec3::UnitZ(), *top.patch(Vec2::Zero()))) {
+    solid.stiffness(VectorXd::Zero(solid.size()), Elastic::Curvature::kExact, stiffness);
+    if (!factor.factorize(stiffness)) throw std::runtime_error("not held");
+  }
+  std::unique_ptr<NearBody> near(double radius, int modes = NearBody::Config{}.modes) const {
+    return NearBody::of(solid, factor, {Vec3(0, 0, 0.05), radius, modes, solid.to_free(load)});
+  }
+  Solid solid;
+  TouchSurface top;
+  SymmetricMatrix stiffness;
+  Factor factor;
+  VectorXd load;
+};
+
+/// The load on the nodes of a near body.
+VectorXd own_load(const NearBody& body, const VectorXd& load) {
+  VectorXd own = VectorXd::Zero(body.size());
+  for (int node = 0; 3 * node < load.size(); ++node) {
+    if (body.own_node(node) >= 0) own.segment<3>(3 * body.own_node(node)) = load.segment<3>(3 * node);
+  }
+  return body.to_free(own);
+}
+
+TEST(NearBody, ForcesAreTheSlopeOfTheEnergyAndTheStiffnessThatOfTheForces) {
+  for (const Law law : {Law::kNeoHookean, Law::kCorotational, Law::kStVenantKirchhoff}) {
+    const AtRest block(8, 0.45, law);
+    const auto body = block.near(0.035);
+    ASSERT_GT(body->modes(), 20);
+    VectorXd u = VectorXd::Zero(body->size());
+    VectorXd way = VectorXd::Zero(body->free_count());
+    const int inner = body->free_count() - body->modes();
+    for (int i = 0; i < body->free_count(); ++i) way[i] = (i < inner ? 1e-3 : 3e-3) * std::sin(3.0 * i);
+    body->add_free(way, u);
+    SymmetricMatrix stiffness = body->pattern();
+    body->stiffness(u, Elastic::Curvature::kExact, stiffness);
+    const double h = 1e-7;
+    for (int i = 0; i < body->free_count(); i += 7) {
+      VectorXd low = u;
+      VectorXd high = u;
+      body->add_free(-h * VectorXd::Unit(body->free_count(), i), low);
+      body->add_free(h * VectorXd::Unit(body->free_count(), i), high);
+      const VectorXd force = body->to_free(body->forces(u).force);
+      EXPECT_NEAR((body->energy(high) - body->energy(low)) / (2 * h), force[i], 1e-6 * force.lpNorm<Eigen::Infinity>());
+      const VectorXd slope = body->to_free(body->forces(high).force - body->forces(low).force) / (2 * h);
+      const VectorXd column = stiffness.times(VectorXd::Unit(body->free_count(), i));
+      EXPECT_LT((slope - column).norm(), 1e-5 * column.norm()) << i;
+    }
+  }
+}
+
+TEST(NearBody, WithItsExactInterfaceItIsTheWholeBodyAtFirstTouch) {
+  const AtRest block(8, 0.45, Law::kNeoHookean);
+  const double whole = block.solid.to_free(block.load).dot(block.factor.solve(block.solid.to_free(block.load)).col(0));
+  const auto compliance = [&](int modes) {
+    const auto body = block.near(0.045, modes);
+    SymmetricMatrix stiffness = body->pattern();
+    body->stiffness(VectorXd::Zero(body->size()), Elastic::Curvature::kExact, stiffness);
+    Factor factor(stiffness);
+    EXPECT_TRUE(factor.factorize(stiffness));
+    const VectorXd load = own_load(*body, block.load);
+    return load.dot(factor.solve(load).col(0));
+  };
+  EXPECT_NEAR(compliance(100'000) / whole, 1, 1e-7);
+  // Fewer modes hold it back.
+  EXPECT_LT(compliance(60), whole);
+  EXPECT_NEAR(compliance(60) / whole, 1, 5e-3);
+  EXPECT_LT(compliance(10), compliance(60));
+}
+
+TEST(NearBody, OfABodyThatEndsBeforeItsRadiusThereIsNone) {
+  const AtRest block(4, 0.45, Law::kNeoHookean);
+  EXPECT_EQ(block.near(0.2), nullptr);
+  EXPECT_NE(block.near(0.055), nullptr);
+}
+
+TEST(NearBody, NoToolPressesOnTheInterfaceOrBeyond) {
+  const AtRest block(8, 0.45, Law::kNeoHookean);
+  const auto body = block.near(0.045);
+  int near = 0;
+  for (int node = 0; 3 * node < block.solid.size(); ++node) {
+    if (body->own_node(node) < 0) continue;
+    ++near;
+    EXPECT_EQ(body->mesh().nodes[at(body->own_node(node))], block.solid.mesh().nodes[at(node)]);
+    EXPECT_LT((block.solid.mesh().nodes[at(node)] - Vec3(0, 0, 0.05)).norm(), 0.055);
+  }
+  EXPECT_GT(near, 40);
+  EXPECT_LT(near + body->interface() / 3, static_cast<int>(body->mesh().nodes.size()) + 1);
+}
+
+}  // namespace
+}  // namespace tendon::softbody

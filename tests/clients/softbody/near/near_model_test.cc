@@ -1,0 +1,239 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "clients/softbody/near/near_model.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <utility>
+
+#include "clients/softbody/body.h"
+#include "clients/softbody/touch/contact.h"
+#include "tests/clients/softbody/drawn_answers.h"
+#include "tests/clients/softbody/pressed_block.h"
+
+namespace tendon::softbody {
+namespace {
+
+using testing::AskedAndExact;
+using testing::kB1PatchRadius;
+using testing::pressed_block;
+using testing::pressed_body;
+
+constexpr Law kLaws[] = {Law::kNeoHookean, Law::kCorotational, Law::kStVenantKirchhoff};
+
+/// B1 with a near field in its middle.
+struct Near : AskedAndExact {
+  Near(int n, double poisson, Law law, double tolerance = 1e-6, int modes = NearBody::Config{}.modes)
+      : AskedAndExact(pressed_block(Element::kHex8Sri, n, poisson, law)),
+        model(solid, top, *top.patch(Vec2::Zero()), {{.max_iterations = 100, .tolerance = tolerance}, modes}) {}
+  Reaction press(const Vec2& place, double depth) {
+    return model.press(*top.patch_with_curvatures(place), Given::kDepth, depth);
+  }
+  NearModel model;
+};
+
+TEST(Near, PressesAreThoseOfTheWholeMeshWithinTwoPercentAndTheErrorSaid) {
+  for (const int n : {8, 12}) {
+    for (const Law law : kLaws) {
+      Near near(n, 0.45, law, 5e-3);
+      ASSERT_GT(near.model.size().radius, 0);
+      for (const double depth : {1e-3, 3e-3, 5e-3}) {
+        if (law == Law::kStVenantKirchhoff && depth > 4e-3) continue;  // it collapses
+        const double truth = near.exact.press(*near.top.patch(Vec2::Zero()), Given::kDepth, depth).force;
+        const Reaction found = near.press(Vec2::Zero(), depth);
+        EXPECT_NEAR(found.force, truth, 0.02 * truth) << n << ' ' << static_cast<int>(law) << ' ' << depth;
+        EXPECT_GE(found.error, std::abs(found.force - truth)) << n << ' ' << static_cast<int>(law) << ' ' << depth;
+        EXPECT_NEAR(found.depth, depth, 1e-12);
+      }
+    }
+  }
+}
+
+TEST(Near, ABodySmallerThanItsNearFieldIsTheWholeModelBitByBit) {
+  Near near(4, 0.45, Law::kNeoHookean);
+  EXPECT_EQ(near.model.size().radius, 0);
+  QuasiStaticModel whole(near.solid, near.top, {.max_iterations = 100, .tolerance = 1e-6});
+  for (const double depth : {1e-3, 4e-3, 2e-3}) {
+    const Patch patch = *near.top.patch_with_curvatures(Vec2(depth, 0.01));
+    const Reaction expected = whole.press(patch, Given::kDepth, depth);
+    const Reaction found = near.model.press(patch, Given::kDepth, depth);
+    EXPECT_EQ(found.force, expected.force);
+    EXPECT_EQ(found.stiffness, expected.stiffness);
+    EXPECT_EQ(found.error, expected.error);
+  }
+  EXPECT_EQ(near.model.fields(), 1);
+}
+
+TEST(Near, SixtyModesAreTheExactInterfaceWithinHalfAPercent) {
+  for (const auto& [n, poisson] : {std::pair(8, 0.3), std::pair(8, 0.499), std::pair(12, 0.45)}) {
+    Near few(n, poisson, Law::kNeoHookean);
+    Near all(n, poisson, Law::kNeoHookean, 1e-6, 1'000'000);
+    EXPECT_EQ(all.model.size().modes, all.model.size().interface);
+    EXPECT_LE(few.model.size().modes, 60);
+    for (const Vec2& place : {Vec2(0, 0), Vec2(0.004, -0.003)}) {
+      for (const double depth : {1e-3, 4e-3}) {
+        const double exact = all.press(place, depth).force;
+        EXPECT_NEAR(few.press(place, depth).force, exact, 5e-3 * exact) << n << ' ' << poisson;
+      }
+    }
+  }
+}
+
+/// Two laws, ν up to 0.499, every answer as far off as it likes.
+TEST(Near, TheErrorSaidCoversTheTrueOneOfTwoHundredDrawnAnswers) {
+  const testing::ErrorsSaid said = testing::errors_said(20, 5e-3, [](int path, double tolerance) {
+    auto block = std::make_unique<AskedAndExact>(
+        pressed_block(Element::kHex8Sri, 8, path % 4 == 3 ? 0.499 : 0.45, kLaws[path % 2]));
+    block->asked =
+        std::make_unique<NearModel>(block->solid, block->top, *block->top.patch(Vec2::Zero()),
+                                    NearModel::Config{.newton = {.max_iterations = 30, .tolerance = tolerance}});
+    return block;
+  });
+  EXPECT_EQ(said.answers, 200);
+  EXPECT_GE(said.covered, said.answers * 99 / 100);
+  ASSERT_FALSE(said.times.empty());
+  EXPECT_LE(said.median(), 20) << said.times.size();
+  RecordProperty("covered", said.covered);
+  RecordProperty("above_half_a_percent", static_cast<int>(said.times.size()));
+  RecordProperty("median_of_said_over_true", static_cast<int>(said.median()));
+}
+
+/// What the linear far field leaves out is seen: where it is much, much is said.
+TEST(Near, AFarFieldThatIsNotLinearIsSaid) {
+  Near near(12, 0.45, Law::kNeoHookean, 1e-9);
+  double before = 0;
+  for (const double depth : {1e-3, 3e-3, 5e-3, 8e-3}) {
+    const double truth = near.exact.press(*near.top.patch(Vec2::Zero()), Given::kDepth, depth).force;
+    const Reaction found = near.press(Vec2::Zero(), depth);
+    EXPECT_GT(found.error, before);
+    EXPECT_GE(found.error, std::abs(found.force - truth));
+    before = found.error;
+  }
+}
+
+TEST(Near, OnItsWayAsideItFollowsTheWholeMeshThroughSeveralCentres) {
+  for (const Law law : {Law::kNeoHookean, Law::kCorotational}) {
+    Near near(8, 0.45, law, 5e-3);
+    double last = 0;
+    for (int i = 0; i <= 40; ++i) {
+      const Vec2 place(5e-4 * i, 0);
+      const double truth = near.exact.press(*near.top.patch(place), Given::kDepth, 4e-3).force;
+      const Reaction found = near.press(place, 4e-3);
+      EXPECT_NEAR(found.force, truth, 0.02 * truth) << i;
+      EXPECT_GE(found.error, std::abs(found.force - truth)) << i;
+      if (i > 0) {  // no jump where a field takes over
+        EXPECT_NEAR(found.force, last, 0.01 * truth) << i;
+      }
+      last = found.force;
+    }
+    EXPECT_GE(near.model.fields(), 2);
+    EXPECT_LE(near.model.fields(), 5);
+  }
+}
+
+TEST(Near, AHandThatHoversWhereTheFieldChangesMakesOneNewField) {
+  Near near(8, 0.45, Law::kCorotational);
+  double edge = 0;
+  while (near.model.fields() == 1) near.press(Vec2(edge += 2e-4, 0), 2e-3);
+  for (int i = 0; i < 40; ++i) near.press(Vec2(edge + (i % 2 == 0 ? -1e-3 : 1e-3), 0), 2e-3);
+  EXPECT_EQ(near.model.fields(), 2);
+}
+
+TEST(Near, AHandThatJumpsFarIsAnsweredAtOnce) {
+  Near near(12, 0.45, Law::kNeoHookean, 5e-3);
+  near.press(Vec2(-0.025, -0.025), 3e-3);
+  for (const Vec2& place : {Vec2(0.025, 0.01), Vec2(0.045, 0.045)}) {  // far away; a corner, half off the body
+    const auto patch = near.top.patch(place, 0.2);
+    ASSERT_TRUE(patch);
+    const double truth = near.exact.press(*patch, Given::kDepth, 3e-3).force;
+    const Reaction found = near.model.press(*patch, Given::kDepth, 3e-3);
+    EXPECT_NEAR(found.force, truth, 0.02 * truth);
+    EXPECT_GE(found.error, std::abs(found.force - truth));
+  }
+}
+
+TEST(Near, APoseThatIsNoPlaceLeavesTheStateBitByBit) {
+  BodyConfig config = pressed_body(ModelKind::kNear, Element::kHex8Sri, 8);
+  Body one(config);
+  Body other(config);
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  for (int i = 0; i < 12; ++i) {
+    const Vec3 tool(2e-3 * i, 0, 0.047);
+    const Feel expected = one.touch(tool);
+    other.touch(Vec3(nan, 0, 0.047));
+    other.touch(Vec3(0, 0, nan));
+    const Feel found = other.touch(tool);
+    EXPECT_EQ(found.force, expected.force) << i;
+    EXPECT_EQ(found.stiffness, expected.stiffness) << i;
+    EXPECT_EQ(found.error, expected.error) << i;
+  }
+}
+
+TEST(Near, TheStiffnessSentIsTheForcesOwnSlope) {
+  for (const Law law : kLaws) {
+    Near near(8, 0.45, law, 1e-9);
+    PatchContact contact(near.model, near.top, 0, PatchContact::Side::kUnilateral);
+    for (const Vec3& tool : {Vec3(0.005, 0.003, 0.0455), Vec3(-0.03, 0.02, 0.047)}) {
+      for (double depth = 1e-3; depth < 0.05 - tool.z(); depth += 1e-3)
+        contact.at(Vec3(tool.x(), tool.y(), 0.05 - depth));
+      contact.at(tool + Vec3(0.004, 0.004, 0));  // no two fields are blended any more
+      const Mat3 given = contact.at(tool).stiffness;
+      Mat3 measured;
+      constexpr double kStep = 2e-5;
+      for (int c = 0; c < 3; ++c) {
+        const Vec3 step = kStep * Vec3::Unit(c);
+        measured.col(c) = -(contact.at(tool + step).force - contact.at(tool - step).force) / (2 * kStep);
+      }
+      EXPECT_LT((given - measured).norm(), 0.01 * given.norm()) << static_cast<int>(law) << '\n' << given - measured;
+      EXPECT_LT((given - given.transpose()).norm(), 1e-9 * given.norm());
+    }
+  }
+}
+
+/// A body that always answers the same.
+class Same : public Model {
+ public:
+  explicit Same(Reaction reaction) : reaction_(std::move(reaction)) {}
+  Reaction press(const Patch&, Given, double) override { return reaction_; }
+  bool glides() const noexcept override { return true; }
+  std::size_t bytes() const noexcept override { return 0; }
+
+ private:
+  Reaction reaction_;
+};
+
+TEST(Near, BlendedAnswersAreBetweenTheTwoInForceAndInStiffness) {
+  const Solid solid = pressed_block(Element::kHex8Sri, 8, 0.45);
+  const TouchSurface slanting(solid.mesh(), Vec3(0.3, -0.2, 1).normalized(), kB1PatchRadius);
+  Reaction one;
+  one.force = 2;
+  one.stiffness = 400;
+  one.slope = Vec2(0.1, -0.2);
+  one.error = 0.01;
+  one.knows_glide = true;
+  one.glide.tilting = Vec2(3, 5);
+  one.glide.curving << 7, 1, 1, -4;
+  one.glide.giving << 20, 3, 3, 30;
+  Reaction other = one;
+  other.force = 2.1;
+  other.stiffness = 430;
+  other.slope = Vec2(-0.05, 0.3);
+  other.glide.tilting = Vec2(-2, 1);
+  const auto felt = [&](const Reaction& reaction) {
+    Same model(reaction);
+    return PatchContact(model, slanting, 0, PatchContact::Side::kUnilateral).at(Vec3(0.001, 0.002, 0.046));
+  };
+  for (const double share : {0.0, 0.3, 1.0}) {
+    const Reaction both = blended(one, other, share);
+    const Feel found = felt(both);
+    EXPECT_LT((found.force - (1 - share) * felt(one).force - share * felt(other).force).norm(), 1e-12);
+    EXPECT_LT((found.stiffness - (1 - share) * felt(one).stiffness - share * felt(other).stiffness).norm(), 1e-9);
+    EXPECT_NEAR(both.error, 0.01 + 0.1, 1e-12);
+  }
+}
+
+}  // namespace
+}  // namespace tendon::softbody

@@ -1,0 +1,162 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// What turn_proof_test.cc counts: the way of a state from its box to an engine, and of the force back into its own,
+// through the server's network loop and a client, both busy-polling, in the clear and without sockets. One line: clock
+// readings, looks at a link and datagrams of the longer run. Callgrind counts within `exchange_in_turn`, and writes a
+// file each time it returns.
+#include <algorithm>
+#include <array>
+#include <cstdlib>
+#include <iostream>
+#include <memory>
+#include <vector>
+
+#include "clients/cpp/force_client.h"
+#include "protocol/busy_link.h"
+#include "server/network_loop.h"
+
+using namespace tendon;
+
+namespace {
+
+/// A clock that goes on by itself, so that a turn takes time; it counts who asks.
+struct Clock {
+  LocalTime now{std::chrono::seconds(1)};
+  std::uint64_t readings = 0;
+  LocalTime read() noexcept {
+    ++readings;
+    return now += std::chrono::nanoseconds(100);
+  }
+};
+
+/// Half of the wire: the datagram under way to this end. There is never more than one, but while they shake hands.
+struct Half {
+  struct Datagram {
+    std::array<std::byte, kMaxDatagram> bytes;
+    std::size_t size = 0;
+  };
+  std::array<Datagram, 8> ring;
+  std::size_t put = 0;
+  std::size_t taken = 0;
+};
+
+class MemoryLink final : public Link {
+ public:
+  MemoryLink(Half& in, Half& out, Clock& clock, const Address& peer) : in_(in), out_(out), clock_(clock), peer_(peer) {}
+  void send(const Address& to, std::span<const std::byte> datagram) override {
+    if (to != peer_ || out_.put - out_.taken == out_.ring.size()) std::abort();
+    Half::Datagram& free = out_.ring[out_.put++ % out_.ring.size()];
+    std::copy(datagram.begin(), datagram.end(), free.bytes.begin());
+    free.size = datagram.size();
+    ++sent;
+  }
+  std::size_t receive(Address& from, std::span<std::byte> buffer) override {
+    ++looks;
+    if (in_.taken == in_.put) return 0;
+    const Half::Datagram& next = in_.ring[in_.taken++ % in_.ring.size()];
+    std::copy_n(next.bytes.begin(), std::min(next.size, buffer.size()), buffer.begin());
+    from = peer_;
+    return next.size;
+  }
+  LocalTime present(LocalTime now) const override { return std::max(now, clock_.read()); }
+
+  std::uint64_t looks = 0;
+  std::uint64_t sent = 0;
+
+ private:
+  Half& in_;
+  Half& out_;
+  Clock& clock_;
+  Address peer_;
+};
+
+/// The server's network thread and the client's, one after the other.
+class Pair {
+ public:
+  /// The handshake, and what both ask each other first.
+  Pair() {
+    for (int i = 0; i < 20; ++i) exchange();
+    if (client_.phase() != ForceClient::Phase::kOpen) std::abort();
+  }
+
+  /// A state into its box, as a haptic step puts it, and the force out of its own.
+  void exchange() {
+    clock_.now += std::chrono::microseconds(990);
+    DeviceState& state = mail_->state.back();
+    state.tick = ++tick_;
+    state.sampled = PeerTime(clock_.now.time_since_epoch());
+    state.position = Vec3(0.0123, -0.0456, 0.0789);
+    state.velocity = Vec3(0.1, -0.2, 0.3);
+    state.force_applied = Vec3(-1.5, 2.5, 0.25);
+    state.energy = 0.0123;
+    state.permitted_force = 3.4;
+    state.force_sequence = tick_;
+    state.force_age = std::chrono::milliseconds(7);
+    state.mode = Mode::kActive;
+    mail_->state.put();
+    // Each end looks in vain before it finds something.
+    LocalTime at_client = clock_.now;
+    LocalTime at_server = clock_.now;
+    client_busy_.look(at_client);
+    network_.turn(clock_.read());
+    server_busy_.look(at_server);
+    if (client_busy_.look(at_client) || client_.phase() != ForceClient::Phase::kOpen) client_.turn(at_client);
+    if (server_busy_.look(at_server)) network_.turn(at_server);
+    while (mail_->datagrams.front() != nullptr) mail_->datagrams.pop();
+    const RemoteForce* const force = mail_->forces[0].take();
+    forces += force != nullptr && force->answers_tick == tick_ ? 1 : 0;
+  }
+
+  std::uint64_t readings() const noexcept { return clock_.readings; }
+  std::uint64_t looks() const noexcept { return server_link_.looks + client_link_.looks; }
+  std::uint64_t sent() const noexcept { return server_link_.sent + client_link_.sent; }
+  std::uint64_t forces = 0;  ///< that answered the state of their turn
+
+ private:
+  static NetworkLoop::Config server_config() {
+    NetworkLoop::Config config;
+    config.devices = {{.name = "proof", .model = "proof", .max_force = 200, .loop_hz = 1000, .channels = {{}}}};
+    return config;
+  }
+  static ForceClient::Config client_config() {
+    ForceClient::Config config;
+    config.name = "wall";
+    config.seed = 7;
+    return config;
+  }
+
+  const Address server_ = parse_address("127.0.0.1:47100");
+  const Address guest_ = parse_address("127.0.0.1:50000");
+  Clock clock_;
+  Half to_server_, to_client_;
+  MemoryLink server_link_{to_server_, to_client_, clock_, guest_};
+  MemoryLink client_link_{to_client_, to_server_, clock_, server_};
+  BusyLink server_busy_{server_link_};
+  BusyLink client_busy_{client_link_};
+  std::unique_ptr<Mailboxes> mail_ = std::make_unique<Mailboxes>();
+  NetworkLoop network_{server_config(), server_busy_, std::vector<Mailboxes*>{mail_.get()}};
+  ForceClient client_{
+      client_busy_, server_, client_config(),
+      [](const DeviceState& hand) -> Touch { return Vec3(-2000 * std::max(0.0, hand.position.x()), 0, 0); },
+      clock_.now};
+  std::uint64_t tick_ = 0;
+};
+
+}  // namespace
+
+/// A name that callgrind finds: not inlined, not mangled.
+extern "C" [[gnu::noinline]] void exchange_in_turn(Pair& pair, std::uint64_t times) {
+  for (std::uint64_t i = 0; i < times; ++i) pair.exchange();
+}
+
+int main() {
+  Pair pair;
+  exchange_in_turn(pair, 100);
+  const std::uint64_t readings = pair.readings();
+  const std::uint64_t looks = pair.looks();
+  const std::uint64_t sent = pair.sent();
+  const std::uint64_t forces = pair.forces;
+  exchange_in_turn(pair, 600);
+  std::cout << pair.readings() - readings << ' ' << pair.looks() - looks << ' ' << pair.sent() - sent << ' '
+            << pair.forces - forces << '\n';
+}
