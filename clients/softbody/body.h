@@ -209,7 +209,8 @@ class Body {
 
   /// Takes the work of a cut: calls it once, on any thread, at any time. It owns all that it touches.
   using Background = std::function<void(std::packaged_task<void()>)>;
-  /// From now on no answer waits for a cut. `background` is called when a cut is due; until its work has been done
+  /// From now on no answer waits for a cut; where factors_may_work_at_once() is false, the work must not be done beside
+  /// an answer. `background` is called when a cut is due; until its work has been done
   /// answers are those of the body before the cut, and their error is at least their force: the cut body may push so
   /// much less. The first touch() after the work continues from the shape before the cut, with what has been prepared,
   /// and throws what the work threw. Without this call a cut is made between two answers.

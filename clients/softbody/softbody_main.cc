@@ -120,7 +120,13 @@ int main(int argc, char** argv) {
     if (tests) return test(scene, options);
     std::jthread knife;  // one cut is prepared at a time
     softbody::PlacedBody body(scene);
-    body.prepare_cuts_by([&](std::packaged_task<void()> work) { knife = std::jthread(std::move(work)); });
+    if (softbody::factors_may_work_at_once()) {
+      body.prepare_cuts_by([&](std::packaged_task<void()> work) { knife = std::jthread(std::move(work)); });
+    } else if (!scene.body.cuts.empty()) {
+      std::cerr
+          << "tendon-softbody: warning: an answer waits for each cut, because this OpenBLAS is built for one thread; "
+             "with libopenblas0-pthread and OPENBLAS_NUM_THREADS=1 answers go on\n";
+    }
     const double linear_up_to = body.linear_up_to();
     const double patch_up_to = softbody::patch_up_to(scene.body);
     bool told = false;

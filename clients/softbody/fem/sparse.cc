@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "clients/softbody/fem/sparse.h"
 
+#include <dlfcn.h>
+
 #include <Eigen/Cholesky>
 #include <Eigen/CholmodSupport>
 #include <Eigen/SparseCore>
@@ -135,6 +137,12 @@ std::size_t Factor::bytes() const noexcept {
            static_cast<std::size_t>(split.coupling.nonZeros()) * (sizeof(double) + sizeof(int));
   }
   return sum;
+}
+
+bool factors_may_work_at_once() {
+  // Other implementations of the BLAS have no such function. 0: built for one thread.
+  const auto parallel = reinterpret_cast<int (*)()>(dlsym(RTLD_DEFAULT, "openblas_get_parallel"));
+  return parallel == nullptr || parallel() != 0;
 }
 
 }  // namespace tendon::softbody

@@ -66,4 +66,8 @@ class Factor {
   std::vector<Split> splits_;
 };
 
+/// Whether two threads may make or use factors at once, each its own. False where the BLAS is an OpenBLAS that was built
+/// for one thread (libopenblas0-serial): it hands the same buffers to both, and most factors come out wrong.
+bool factors_may_work_at_once();
+
 }  // namespace tendon::softbody

@@ -241,6 +241,29 @@ TEST(CutUnderLoad, ABodyThatSagsSagsMoreWhenItIsCut) {
   }
 }
 
+TEST(Factor, OfTwoThreadsAtOnceIsRightWhereThatIsSaid) {
+  if (!factors_may_work_at_once()) GTEST_SKIP() << "this OpenBLAS is built for one thread";
+  const auto off_at_most = [](int cells) {
+    const Solid solid = pressed_block(Element::kHex8Sri, cells, 0.45);
+    SymmetricMatrix matrix = solid.pattern();
+    solid.stiffness(VectorXd::Zero(solid.size()), Solid::Curvature::kExact, matrix);
+    const MatrixXd load = MatrixXd::Ones(matrix.size, 4);
+    double off = 0;
+    for (int i = 0; i < 20; ++i) {
+      Factor factor(matrix);
+      if (!factor.factorize(matrix)) return 1.0;
+      const MatrixXd solution = factor.solve(load);
+      for (Eigen::Index j = 0; j < load.cols(); ++j) {
+        off = std::max(off, (matrix.times(solution.col(j)) - load.col(j)).lpNorm<Eigen::Infinity>());
+      }
+    }
+    return off;
+  };
+  auto other = std::async(std::launch::async, off_at_most, 10);
+  EXPECT_LT(off_at_most(12), 1e-6);
+  EXPECT_LT(other.get(), 1e-6);
+}
+
 TEST(Factor, SplitsAreSolvedAsByANewFactorOrRefused) {
   const Solid whole = pressed_block(Element::kHex8Sri, 8, 0.45);
   const auto stiffness = [](const Solid& solid) {
