@@ -177,8 +177,8 @@ std::string in_words(const Scene& scene, const Explanation& explanation) {
     const NearModel::Size& near = *explanation.near;
     const std::string_view law = std::ranges::find(models(), body.law, &ModelInfo::law)->name;
     text << "near the tool: " << law << ", " << near.elements << " of " << size.elements << " elements, within "
-         << 1e3 * near.radius << " mm; " << near.unknowns << " unknowns, of them " << near.modes
-         << " modes in place of the " << near.interface << " that near and far have in common\n";
+         << 1e3 * near.radius << " mm or where the tool goes next; " << near.unknowns << " unknowns, of them "
+         << near.modes << " modes in place of the " << near.interface << " that near and far have in common\n";
   } else if (explanation.near) {
     text << "near the tool: the whole body, which is not larger\n";
   }

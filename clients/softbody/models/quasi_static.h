@@ -47,6 +47,8 @@ class QuasiStaticModel : public Model {
   int factors() const noexcept { return factors_; }        ///< made since construction
   const VectorXd& displacements() const noexcept { return u_; }
   const SelfCollision* self_collision() const noexcept { return self_collision_.get(); }  ///< null: not simulated
+  /// For the answers from now on.
+  void set_max_iterations(int count) { config_.max_iterations = count; }
   /// Puts the nodes elsewhere, m; the fixed ones too.
   void set_displacements(const VectorXd& u) {
     u_ = u;

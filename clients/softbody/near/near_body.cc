@@ -15,6 +15,9 @@ namespace {
 constexpr int kLoadsPerMode = 2;
 constexpr double kLeft = 1e-3;
 
+/// For so many loads solutions are found at once.
+constexpr Eigen::Index kLoadsAtOnce = 8;
+
 /// So many far elements at most are asked for what the linear far field leaves out.
 constexpr std::size_t kWatched = 96;
 
@@ -65,28 +68,36 @@ struct NearBody::Parts {
   }
 };
 
-std::unique_ptr<NearBody> NearBody::of(const Solid& whole, const Factor& at_rest, const Config& config) {
+Pieces NearBody::make(const Solid& whole, const Factor& at_rest, Config config, std::unique_ptr<NearBody>& made) {
+  made.reset();
   const Mesh& mesh = whole.mesh();
   std::vector<int> near;
   std::vector<std::pair<double, int>> far;  // by distance from the middle
   std::vector<bool> touches_far(mesh.nodes.size());
+  std::vector<bool> reached(mesh.nodes.size());
+  for (const int node : config.pressed) reached[at(node)] = true;
   for (int e = 0; e < mesh.element_count(); ++e) {
     const double distance = (middle_of(mesh, e) - config.middle).norm();
-    if (distance <= config.radius) {
+    if (distance <= config.radius ||
+        std::ranges::any_of(mesh.element(e), [&](int node) { return reached[at(node)]; })) {
       near.push_back(e);
     } else {
       far.emplace_back(distance, e);
       for (const int node : mesh.element(e)) touches_far[at(node)] = true;
     }
   }
-  if (far.empty()) return nullptr;
+  if (far.empty()) co_return;
   std::ranges::sort(far);
   std::vector<int> watched;
   for (std::size_t i = 0; i < std::min(far.size(), kWatched); ++i) watched.push_back(far[i].second);
   std::vector<int> nodes;
   std::vector<int> watched_nodes;
-  Parts parts{.part = Solid::part_of(whole, near, nodes), .watched = Solid::part_of(whole, watched, watched_nodes)};
+  Solid near_part = Solid::part_of(whole, near, nodes);
+  co_await kPieceDone;
+  Solid watched_part = Solid::part_of(whole, watched, watched_nodes);
+  Parts parts{.part = std::move(near_part), .watched = std::move(watched_part)};
   const Solid& part = parts.part;
+  co_await kPieceDone;
 
   parts.own_of.assign(mesh.nodes.size(), -1);
   std::vector<int> whole_of;  // of each free component of the part, its free number in the whole
@@ -119,21 +130,27 @@ std::unique_ptr<NearBody> NearBody::of(const Solid& whole, const Factor& at_rest
     for (Eigen::Index j = 0; j < loads_count; ++j) loads(whole_of[i], j) = weight[i] * noise.next();
   }
   loads.col(loads_count) = config.press;
-  const MatrixXd shapes = at_rest.solve(loads);
+  const SymmetricMatrix near_stiffness = stiffness_at_rest(part);
+  co_await kPieceDone;
 
+  MatrixXd shapes(loads.rows(), loads.cols());
   // What the far field's force on Γ is in each of these shapes: that of the load and of the near field is missing.
   MatrixXd traces(interface, loads_count);
   MatrixXd forces(interface, loads_count);
-  const SymmetricMatrix near_stiffness = stiffness_at_rest(part);
   VectorXd local(part.free_count());
-  for (Eigen::Index j = 0; j < loads_count; ++j) {
-    for (int i = 0; i < part.free_count(); ++i) local[i] = shapes(whole_of[at(i)], j);
-    const VectorXd by_near = near_stiffness.times(local);
-    for (Eigen::Index i = 0; i < interface; ++i) {
-      const int free = rim_free[static_cast<std::size_t>(i)];
-      traces(i, j) = local[free];
-      forces(i, j) = loads(whole_of[at(free)], j) - by_near[free];
+  for (Eigen::Index first = 0; first < loads.cols(); first += kLoadsAtOnce) {
+    const Eigen::Index count = std::min(kLoadsAtOnce, loads.cols() - first);
+    shapes.middleCols(first, count) = at_rest.solve(loads.middleCols(first, count));
+    for (Eigen::Index j = first; j < std::min(first + count, loads_count); ++j) {
+      for (int i = 0; i < part.free_count(); ++i) local[i] = shapes(whole_of[at(i)], j);
+      const VectorXd by_near = near_stiffness.times(local);
+      for (Eigen::Index i = 0; i < interface; ++i) {
+        const int free = rim_free[static_cast<std::size_t>(i)];
+        traces(i, j) = local[free];
+        forces(i, j) = loads(whole_of[at(free)], j) - by_near[free];
+      }
     }
+    co_await kPieceDone;
   }
   const Eigen::SelfAdjointEigenSolver<MatrixXd> parts_of_traces(traces.transpose() * traces);
   const VectorXd& squares = parts_of_traces.eigenvalues();  // ascending
@@ -149,6 +166,8 @@ std::unique_ptr<NearBody> NearBody::of(const Solid& whole, const Factor& at_rest
   parts.modes = traces * mix;
   const MatrixXd far_forces = parts.modes.transpose() * forces * mix;
   parts.far = (far_forces + far_forces.transpose()) / 2;
+
+  co_await kPieceDone;
 
   const Solid& sentinels = parts.watched;
   parts.linear = stiffness_at_rest(sentinels);
@@ -169,7 +188,8 @@ std::unique_ptr<NearBody> NearBody::of(const Solid& whole, const Factor& at_rest
   const double all = whole_free.dot(whole.to_free(whole.forces(pressed).force) - unit * config.press) -
                      excess(part, near_stiffness, pressed_near);
   parts.share = std::clamp(excess(sentinels, parts.linear, pressed_watched) / all, 0.25, 1.0);
-  return std::unique_ptr<NearBody>(new NearBody(std::move(parts)));
+  co_await kPieceDone;
+  made.reset(new NearBody(std::move(parts)));
 }
 
 NearBody::NearBody(Parts parts)

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "clients/softbody/fem/solid.h"
+#include "clients/softbody/near/pieces.h"
 
 namespace tendon::softbody {
 
@@ -29,11 +30,14 @@ class NearBody : public Elastic {
     double radius = 0;           ///< m: an element is near when its middle is not farther from there
     /// At most; fewer where these leave 1e-3 of the traces. As many as Γ has unknowns, or more: the exact interface.
     int modes = 60;
-    VectorXd press;  ///< N, free components of the whole: a load as a tool at the middle gives it
+    std::vector<int> pressed;  ///< nodes where a tool may press; all elements of these are near, too
+    VectorXd press;            ///< N, free components of the whole: a load as a tool at the middle gives it
   };
 
-  /// `at_rest` is the factor of the whole stiffness at rest. Null when no element is far. `whole` may die.
-  static std::unique_ptr<NearBody> of(const Solid& whole, const Factor& at_rest, const Config& config);
+  /// The last piece sets `made`: null when no element is far. `at_rest` is the factor of the whole stiffness at rest;
+  /// it and `whole` may die when all pieces are done. There are the same pieces on every machine. Most are solutions for
+  /// a few of the 2 modes + 1 loads.
+  static Pieces make(const Solid& whole, const Factor& at_rest, Config config, std::unique_ptr<NearBody>& made);
 
   double energy(const VectorXd& u) const override { return forces(u).energy; }
   Forces forces(const VectorXd& u) const override;

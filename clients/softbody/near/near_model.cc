@@ -2,9 +2,12 @@
 #include "clients/softbody/near/near_model.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <optional>
 #include <stdexcept>
 #include <utility>
+#include <vector>
 
 namespace tendon::softbody {
 namespace {
@@ -18,13 +21,26 @@ constexpr double kElementsBeyond = 2;
 /// How much of a patch's radius the hand goes while one field takes over from another.
 constexpr double kBlendOver = 0.25;
 
+/// A new field is made while the patch goes from so far from the old one's middle as this serves, to so many times as far:
+/// at least a piece with each answer, and so many evenly over this way. Sixty modes have 30 pieces. The way to twice as
+/// far as it serves is for blending.
+constexpr double kWaits = 1.7;
+constexpr double kPiecesOnTheWay = 30;
+
+/// So many places are pressed in a piece, to see what the modes miss.
+constexpr std::size_t kChecksAtOnce = 2;
+
+/// Iterations of Newton's method in a piece; so many pieces press the new field, and the factor is made in one of them.
+constexpr int kIterationsAtOnce = 6;
+constexpr int kPresses = 4;
+constexpr int kFactorAt = 1;
+
 /// By how much more the true error may be than what is seen of it.
 constexpr double kFarSafety = 3;
 constexpr double kModesSafety = 3;
 
-/// Elements: how exactly it is looked up how far a patch may go, and how far it goes at least before there is a new field.
-constexpr double kServedStep = 1.0 / 8;
-constexpr double kLeastServed = 1.0 / 4;
+/// A field has every patch whose place is so many patch's radii at most from its middle.
+constexpr double kReach = 0.45;
 
 /// How deep the first touch is, in radii of the patch.
 constexpr double kFirstTouch = 1e-4;
@@ -69,39 +85,50 @@ Factor factor_at_rest(const Solid& solid) {
 struct NearModel::Field {
   Vec3 middle;
   double radius;
-  double serves;                   ///< m: farther from the middle a patch wants a new field
-  std::unique_ptr<NearBody> body;  ///< null: all of the body is near
-  QuasiStaticModel model;
+  std::unique_ptr<NearBody> body = nullptr;  ///< null: all of the body is near
+  std::unique_ptr<QuasiStaticModel> model = nullptr;
+  double serves = 0;  ///< m: farther from the middle a patch wants a new field
   double missed = 0;  ///< share of the force, by too few modes
 
   bool holds(const Patch& patch) const {
     return body == nullptr || std::ranges::all_of(patch.nodes, [&](int node) { return body->own_node(node) >= 0; });
   }
-  bool comfortably_holds(const Patch& patch, const Vec3& place) const {
-    return body == nullptr || ((place - middle).norm() <= serves && holds(patch));
+  /// Its modes were looked at up to twice as far from its middle as it serves.
+  bool holds(const Patch& patch, const Vec3& place, double times) const {
+    return body == nullptr || ((place - middle).norm() <= times * serves && holds(patch));
   }
 
-  /// Its modes were looked at so far from its middle.
-  bool just_holds(const Patch& patch, const Vec3& place) const {
-    return body == nullptr || ((place - middle).norm() <= 2 * serves && holds(patch));
+  /// With its own numbers of the nodes.
+  Patch own(Patch patch) const {
+    for (int& node : patch.nodes) node = body->own_node(node);
+    return patch;
   }
 
   Reaction press(const Patch& patch, Given given, double value) {
-    if (body == nullptr) return model.press(patch, given, value);
-    Patch own = patch;
-    for (int& node : own.nodes) node = body->own_node(node);
-    Reaction reaction = model.press(own, given, value);
+    if (body == nullptr) return model->press(patch, given, value);
+    const Patch here = own(patch);
+    Reaction reaction = model->press(here, given, value);
     if (reaction.error > std::abs(reaction.force)) {  // lost on the way from the last shape
-      model.set_displacements(VectorXd::Zero(body->size()));
-      reaction = model.press(own, given, value);
+      model->set_displacements(VectorXd::Zero(body->size()));
+      reaction = model->press(here, given, value);
     }
     const double depth = std::abs(reaction.depth);
-    const double far = depth > 0 ? std::abs(body->left_out(model.displacements())) / depth : 0;
+    const double far = depth > 0 ? std::abs(body->left_out(model->displacements())) / depth : 0;
     reaction.error += kFarSafety * far + missed * std::abs(reaction.force);
     return reaction;
   }
 
-  std::size_t bytes() const { return model.bytes() + (body ? body->bytes() : 0); }
+  std::size_t bytes() const { return model->bytes() + (body ? body->bytes() : 0); }
+};
+
+struct NearModel::Making {
+  Patch first;  ///< around which it is
+  Vec3 middle;
+  Patch patch;  ///< where the hand is now
+  double depth;
+  std::unique_ptr<Field> field = nullptr;
+  std::optional<Pieces> work = {};
+  int done = 0;  ///< pieces
 };
 
 NearModel::NearModel(const Solid& solid, const TouchSurface& surface, const Patch& first, const Config& config)
@@ -109,61 +136,97 @@ NearModel::NearModel(const Solid& solid, const TouchSurface& surface, const Patc
       surface_(surface),
       config_(config),
       at_rest_(factor_at_rest(solid)),
-      field_(field_around(first, 0)),
-      last_(place_of(solid.mesh(), first)) {}
+      last_(place_of(solid.mesh(), first)) {
+  begin(first, 0);
+  go_on(first, 0);
+}
 
 NearModel::~NearModel() = default;
 
-std::unique_ptr<NearModel::Field> NearModel::field_around(const Patch& patch, double depth) {
+void NearModel::begin(const Patch& patch, double depth) {
+  making_.reset(new Making{.first = patch, .middle = place_of(solid_.mesh(), patch), .patch = patch, .depth = depth});
+  making_->work = pieces_of(*making_);
+}
+
+void NearModel::go_on(const Patch& patch, double depth) {
   const Vec3 place = place_of(solid_.mesh(), patch);
-  const double element = element_below(solid_.mesh(), patch);
-  const double least = solid_.material().poisson > kIncompressible ? kRadiusIncompressible : kRadius;
-  double radius = std::max(least * surface_.radius(), surface_.radius() + kElementsBeyond * element);
-  // Where elements are of several sizes, Γ may still be too close.
-  for (;; radius += element) {
-    auto field = field_of(patch, place, radius, element);
-    if (!field->holds(patch)) continue;
-    if (depth > 0) {
-      // Pressed once more, by the factor of that shape: it serves the answers around it better than that of the rest.
-      field->press(patch, Given::kDepth, depth);
-      field->model.set_displacements(field->model.displacements());
-      field->press(patch, Given::kDepth, depth);
-    }
-    return field;
+  const bool waits = field_ && field_->holds(patch, place, kWaits);
+  std::unique_ptr<Making> making = std::move(making_);
+  making->patch = patch;
+  making->depth = depth;
+  bool more = true;
+  const auto due = [&] {  // pieces
+    return kPiecesOnTheWay * ((place - field_->middle).norm() / field_->serves - 1) / (kWaits - 1);
+  };
+  do {
+    more = making->work->next();
+    ++making->done;
+    ++pieces_;
+  } while (more && (!waits || making->done < due()));
+  if (more) {
+    making_ = std::move(making);
+  } else if (making->field->holds(patch, place, 1)) {
+    before_ = std::exchange(field_, std::move(making->field));
+    ++fields_;
+    blended_ = 0;
+    blend_over_ = std::min(kBlendOver * surface_.radius(), field_->serves);
+    // The old field may have the patch only a part of that way.
+    if (before_) blend_over_ = std::min(blend_over_, 2 * before_->serves - (place - before_->middle).norm());
+  } else if (!waits) {
+    begin(patch, depth);
+    go_on(patch, depth);
   }
 }
 
-std::unique_ptr<NearModel::Field> NearModel::field_of(const Patch& patch, const Vec3& place, double radius,
-                                                      double element) {
-  const auto load_of = [&](const Patch& at) { return solid_.to_free(patch_load(solid_, surface_.normal(), at)); };
-  auto body = NearBody::of(solid_, at_rest_, {place, radius, config_.modes, load_of(patch)});
-  const Elastic& elastic = body ? static_cast<const Elastic&>(*body) : solid_;
-  const auto holds_patches_within = [&](double distance) {
-    return std::ranges::all_of(surface_.nodes_of_patches(surface_.across(place), distance),
-                               [&](int node) { return body->own_node(node) >= 0; });
-  };
-  double held = 0;
-  while (body && holds_patches_within(held + kServedStep * element)) held += kServedStep * element;
-  const double serves = std::max(held / 2, kLeastServed * element);
-  std::unique_ptr<Field> field(new Field{.middle = place,
-                                         .radius = radius,
-                                         .serves = serves,
-                                         .body = std::move(body),
-                                         .model = {elastic, surface_, config_.newton}});
-  if (field->body == nullptr) return field;
-  const Vec2 across = surface_.across(place);
-  for (const Vec2& off : {Vec2(0, 0), Vec2(held, 0), Vec2(-held, 0), Vec2(0, held), Vec2(0, -held)}) {
-    const auto there = surface_.patch(across + off);
-    if (!there || !field->holds(*there)) continue;
-    const VectorXd load = load_of(*there);
-    const double depth = kFirstTouch * surface_.radius();
-    const double whole = depth / load.dot(VectorXd(at_rest_.solve(load)));
-    Patch own = *there;
-    for (int& node : own.nodes) node = field->body->own_node(node);
-    const double near = field->model.press(own, Given::kDepth, depth).force;
-    field->missed = std::max(field->missed, kModesSafety * std::abs(near / whole - 1));
+Pieces NearModel::pieces_of(Making& making) {
+  const Patch& patch = making.first;
+  const double element = element_below(solid_.mesh(), patch);
+  const double least = solid_.material().poisson > kIncompressible ? kRadiusIncompressible : kRadius;
+  const double a = surface_.radius();
+  making.field.reset(new Field{
+      .middle = making.middle, .radius = std::max(least * a, a + kElementsBeyond * element), .serves = kReach * a / 2});
+  Field& field = *making.field;
+  const Vec2 across = surface_.across(field.middle);
+  {
+    std::vector<int> pressed = surface_.nodes_of_patches(across, kReach * a);
+    pressed.insert(pressed.end(), patch.nodes.begin(), patch.nodes.end());  // half off the body it may be farther away
+    const VectorXd press = solid_.to_free(patch_load(solid_, surface_.normal(), patch));
+    Pieces body = NearBody::make(solid_, at_rest_,
+                                 {field.middle, field.radius, config_.modes, std::move(pressed), press}, field.body);
+    while (body.next()) co_await kPieceDone;
   }
-  return field;
+  co_await kPieceDone;
+  const Elastic& elastic = field.body ? static_cast<const Elastic&>(*field.body) : solid_;
+  field.model = std::make_unique<QuasiStaticModel>(elastic, surface_, config_.newton);
+  if (field.body == nullptr) co_return;
+  co_await kPieceDone;
+
+  const double held = kReach * a;
+  const std::array places{Vec2(0, 0), Vec2(held, 0), Vec2(-held, 0), Vec2(0, held), Vec2(0, -held)};
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    if (i % kChecksAtOnce == 1) co_await kPieceDone;
+    const auto there = surface_.patch(across + places[i]);
+    if (!there || !field.holds(*there)) continue;
+    const VectorXd load = solid_.to_free(patch_load(solid_, surface_.normal(), *there));
+    const double depth = kFirstTouch * a;
+    const double whole = depth / load.dot(VectorXd(at_rest_.solve(load)));
+    const double near = field.model->press(field.own(*there), Given::kDepth, depth).force;
+    field.missed = std::max(field.missed, kModesSafety * std::abs(near / whole - 1));
+  }
+
+  if (making.depth == 0) co_return;
+  co_await kPieceDone;
+  // Pressed once more, by the factor of that shape: it serves the answers around it better than that of the rest.
+  field.model->set_max_iterations(std::min(kIterationsAtOnce, config_.newton.max_iterations));
+  for (int i = 0; i < kPresses; ++i) {
+    Patch here = field.own(field.holds(making.patch) ? making.patch : patch);
+    here.curvatures = {};
+    if (i == kFactorAt) field.model->set_displacements(field.model->displacements());
+    const Reaction reaction = field.model->press(here, Given::kDepth, making.depth);
+    co_await kPieceDone;
+    if (i >= kFactorAt && reaction.error <= config_.newton.tolerance * std::abs(reaction.force)) break;
+  }
+  field.model->set_max_iterations(config_.newton.max_iterations);
 }
 
 Reaction NearModel::press(const Patch& patch, Given given, double value) {
@@ -173,13 +236,11 @@ Reaction NearModel::press(const Patch& patch, Given given, double value) {
   blended_ += std::hypot((place - last_).norm(), depth - last_depth_);
   last_ = place;
   last_depth_ = depth;
-  if (!field_->comfortably_holds(patch, place)) {
-    before_ = std::exchange(field_, field_around(patch, depth));
-    ++fields_;
-    blended_ = 0;
-    blend_over_ = std::min(kBlendOver * surface_.radius(), field_->serves);
-  }
-  if (before_ && (blended_ >= blend_over_ || !before_->just_holds(patch, place))) before_.reset();
+  // Where the hand has gone elsewhere meanwhile.
+  if (making_ && (making_->middle - place).norm() > field_->serves) making_.reset();
+  if (!making_ && !field_->holds(patch, place, 1)) begin(patch, depth);
+  if (making_) go_on(patch, depth);
+  if (before_ && (blended_ >= blend_over_ || !before_->holds(patch, place, 2))) before_.reset();
   const Reaction reaction = field_->press(patch, given, value);
   return before_ ? blended(before_->press(patch, given, value), reaction, blended_ / blend_over_) : reaction;
 }
@@ -188,7 +249,8 @@ NearModel::Size NearModel::size() const {
   if (field_->body == nullptr) {
     return {.elements = static_cast<std::size_t>(solid_.mesh().element_count()),
             .unknowns = solid_.free_count(),
-            .made = fields_};
+            .made = fields_,
+            .pieces = pieces_};
   }
   const NearBody& body = *field_->body;
   return {.radius = field_->radius,
@@ -196,7 +258,8 @@ NearModel::Size NearModel::size() const {
           .interface = body.interface(),
           .modes = body.modes(),
           .unknowns = body.free_count(),
-          .made = fields_};
+          .made = fields_,
+          .pieces = pieces_};
 }
 
 std::size_t NearModel::bytes() const noexcept {

@@ -3,8 +3,12 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <memory>
 #include <stdexcept>
+#include <string>
+#include <vector>
 
 #include "tests/clients/softbody/pressed_block.h"
 
@@ -25,8 +29,13 @@ struct AtRest {
     solid.stiffness(VectorXd::Zero(solid.size()), Elastic::Curvature::kExact, stiffness);
     if (!factor.factorize(stiffness)) throw std::runtime_error("not held");
   }
-  std::unique_ptr<NearBody> near(double radius, int modes = NearBody::Config{}.modes) const {
-    return NearBody::of(solid, factor, {Vec3(0, 0, 0.05), radius, modes, solid.to_free(load)});
+  std::unique_ptr<NearBody> near(double radius, int modes = NearBody::Config{}.modes,
+                                 const std::vector<int>& pressed = {}) const {
+    std::unique_ptr<NearBody> body;
+    Pieces pieces =
+        NearBody::make(solid, factor, {Vec3(0, 0, 0.05), radius, modes, pressed, solid.to_free(load)}, body);
+    while (pieces.next()) continue;
+    return body;
   }
   Solid solid;
   TouchSurface top;
@@ -108,6 +117,49 @@ TEST(NearBody, NoToolPressesOnTheInterfaceOrBeyond) {
   }
   EXPECT_GT(near, 40);
   EXPECT_LT(near + body->interface() / 3, static_cast<int>(body->mesh().nodes.size()) + 1);
+}
+
+TEST(NearBody, AToolMayPressWhereItIsSaidToHoweverFar) {
+  const AtRest block(8, 0.45, Law::kNeoHookean);
+  const std::vector<int> pressed = block.top.nodes_of_patches(Vec2::Zero(), 0.015);
+  const auto lacking = [&](const NearBody& body) {
+    return std::ranges::count_if(pressed, [&](int node) { return body.own_node(node) < 0; });
+  };
+  EXPECT_GT(lacking(*block.near(0.03)), 0);
+  EXPECT_EQ(lacking(*block.near(0.03, 60, pressed)), 0);
+}
+
+Pieces letters(std::string& to) {
+  to += 'a';
+  co_await kPieceDone;
+  to += 'b';
+  co_await kPieceDone;
+  to += 'c';
+}
+
+Pieces failing() {
+  co_await kPieceDone;
+  throw std::runtime_error("no");
+}
+
+TEST(Pieces, AreDoneOneByOne) {
+  std::string done;
+  Pieces pieces = letters(done);
+  EXPECT_EQ(done, "");
+  EXPECT_TRUE(pieces.next());
+  EXPECT_EQ(done, "a");
+  EXPECT_TRUE(pieces.next());
+  EXPECT_FALSE(pieces.next());
+  EXPECT_EQ(done, "abc");
+  EXPECT_FALSE(pieces.next());
+  EXPECT_EQ(done, "abc");
+}
+
+TEST(Pieces, OneThatThrowsIsTheLast) {
+  Pieces pieces = failing();
+  EXPECT_TRUE(pieces.next());
+  EXPECT_THROW(pieces.next(), std::runtime_error);
+  EXPECT_FALSE(pieces.next());
 }
 
 }  // namespace

@@ -136,6 +136,74 @@ TEST(Near, AHandThatHoversWhereTheFieldChangesMakesOneNewField) {
   EXPECT_EQ(near.model.size().made, 2);
 }
 
+/// Of a field that is being made there is one piece in an answer, and it is whole before the old one no longer has the
+/// patch: else all that is left would be made in one answer.
+TEST(Near, AHandOfATenthOfAMillimetreAnAnswerNeverWaitsForAField) {
+  for (const Law law : {Law::kNeoHookean, Law::kCorotational}) {
+    Near near(12, 0.45, law, 5e-3);
+    near.press(Vec2::Zero(), 3e-3);
+    double last = near.press(Vec2::Zero(), 3e-3).force;
+    int most = 0;
+    for (int i = 1; i <= 140; ++i) {
+      const int before = near.model.size().pieces;
+      const double force = near.press(Vec2(1e-4 * i, 2e-5 * i), 3e-3).force;
+      most = std::max(most, near.model.size().pieces - before);
+      EXPECT_NEAR(force, last, 2e-3 * last) << i;
+      last = force;
+    }
+    EXPECT_EQ(most, 1);
+    EXPECT_GE(near.model.size().made, 3);
+  }
+}
+
+TEST(Near, AFieldIsMadeOnWhileTheHandIsStill) {
+  Near near(8, 0.45, Law::kNeoHookean, 5e-3);
+  const int pieces = near.model.size().pieces;
+  const Vec2 place(0.00455, 0);  // farther away than the field serves, and not as far as it has the patch
+  int answers = 0;
+  for (; near.model.size().made == 1 && answers < 100; ++answers) near.press(place, 2e-3);
+  EXPECT_EQ(near.model.size().made, 2);
+  EXPECT_EQ(near.model.size().pieces - pieces, answers);
+  EXPECT_GE(answers, 20);
+  for (int i = 0; i < 10; ++i) near.press(place, 2e-3);
+  EXPECT_EQ(near.model.size().pieces - pieces, answers);
+}
+
+TEST(Near, AFieldThatTheHandHasLeftBeforeItIsWholeIsNotMadeToItsEnd) {
+  Near near(8, 0.45, Law::kNeoHookean, 5e-3);
+  near.press(Vec2(0.005, 0), 3e-3);
+  const int pieces = near.model.size().pieces;
+  const Vec2 place(-0.02, 0.01);
+  const double truth = near.exact.press(*near.top.patch(place), Given::kDepth, 3e-3).force;
+  EXPECT_NEAR(near.press(place, 3e-3).force, truth, 0.02 * truth);
+  EXPECT_EQ(near.model.size().made, 2);
+  EXPECT_LE(near.model.size().pieces - pieces, 31);
+  // There it is at home.
+  near.press(place, 3e-3);
+  EXPECT_LE(near.model.size().pieces - pieces, 31);
+}
+
+TEST(Near, AHandThatLeavesTheFieldHasTheRestOfTheNextOneAtOnce) {
+  Near near(8, 0.45, Law::kNeoHookean, 5e-3);
+  near.press(Vec2(0.005, 0), 3e-3);
+  near.press(Vec2(0.0087, 0), 3e-3);
+  EXPECT_EQ(near.model.size().made, 2);
+}
+
+TEST(Near, TheSameWayHasTheSameAnswersBitByBit) {
+  Near one(8, 0.45, Law::kCorotational, 5e-3);
+  Near other(8, 0.45, Law::kCorotational, 5e-3);
+  for (int i = 0; i < 80; ++i) {
+    const Vec2 place(2e-4 * i, 1e-4 * i);
+    const Reaction expected = one.press(place, 3e-3);
+    const Reaction found = other.press(place, 3e-3);
+    EXPECT_EQ(found.force, expected.force) << i;
+    EXPECT_EQ(found.stiffness, expected.stiffness) << i;
+    EXPECT_EQ(found.error, expected.error) << i;
+  }
+  EXPECT_GE(one.model.size().made, 3);
+}
+
 TEST(Near, AHandThatJumpsFarIsAnsweredAtOnce) {
   Near near(12, 0.45, Law::kNeoHookean, 5e-3);
   near.press(Vec2(-0.025, -0.025), 3e-3);
