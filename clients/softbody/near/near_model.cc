@@ -181,7 +181,7 @@ void NearModel::go_on(const Patch& patch, double depth) {
 Pieces NearModel::pieces_of(Making& making) {
   const Patch& patch = making.first;
   const double element = element_below(solid_.mesh(), patch);
-  const double least = solid_.material().poisson > kIncompressible ? kRadiusIncompressible : kRadius;
+  const double least = solid_.largest_poisson() > kIncompressible ? kRadiusIncompressible : kRadius;
   const double a = surface_.radius();
   making.field.reset(new Field{
       .middle = making.middle, .radius = std::max(least * a, a + kElementsBeyond * element), .serves = kReach * a / 2});
