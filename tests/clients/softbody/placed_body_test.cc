@@ -313,8 +313,9 @@ void expect_passed(const Scene& scene) {
   EXPECT_TRUE(result.passed()) << result.text();
 }
 
-TEST(PlacedBody, TheKidneyAndTheLumpInABlockPassTheSelfTest) {
-  for (const std::string name : {"kidney", "tumour"}) expect_passed(read_scene(TENDON_SCENES "/" + name + ".toml"));
+TEST(PlacedBody, TheShippedOrgansPassTheSelfTest) {
+  for (const std::string name : {"kidney", "tumour", "liver_near"})
+    expect_passed(read_scene(TENDON_SCENES "/" + name + ".toml"));
 }
 
 TEST(PlacedBody, ALiverOfALinearMaterialPassesTheSelfTestAtEveryPoint) {

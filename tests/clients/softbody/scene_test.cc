@@ -50,7 +50,7 @@ TEST(SoftbodyScene, EveryValueArrives) {
 }
 
 TEST(SoftbodyScene, ThoseThatAreShippedMakeBodiesThatNobodyHasToBeWarnedOf) {
-  for (const char* name : {"softbody.toml", "liver.toml", "kidney.toml", "tumour.toml"}) {
+  for (const char* name : {"softbody.toml", "liver.toml", "liver_near.toml", "kidney.toml", "tumour.toml"}) {
     const Scene scene = read_scene(std::filesystem::path(TENDON_SCENES) / name);
     EXPECT_EQ(warnings(scene.body), std::vector<std::string>{}) << name;
     Body body(scene.body);
