@@ -22,7 +22,7 @@ constexpr double kElementsBeyond = 2;
 constexpr double kBlendOver = 0.25;
 
 /// A new field is made while the patch goes from so far from the old one's middle as this serves, to so many times as far:
-/// at least a piece with each answer, and so many evenly over this way. Sixty modes have 30 pieces. The way to twice as
+/// at least a piece with each answer, and so many evenly over this way. Sixty modes have 29 pieces. The way to twice as
 /// far as it serves is for blending.
 constexpr double kWaits = 1.7;
 constexpr double kPiecesOnTheWay = 30;
