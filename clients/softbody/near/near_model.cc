@@ -214,7 +214,7 @@ Pieces NearModel::pieces_of(Making& making) {
     field.missed = std::max(field.missed, kModesSafety * std::abs(near / whole - 1));
   }
 
-  if (making.depth == 0) co_return;
+  if (making.depth <= 0) co_return;
   co_await kPieceDone;
   // Pressed once more, by the factor of that shape: it serves the answers around it better than that of the rest.
   field.model->set_max_iterations(std::min(kIterationsAtOnce, config_.newton.max_iterations));
