@@ -22,7 +22,7 @@ constexpr double kElementsBeyond = 2;
 constexpr double kBlendOver = 0.25;
 
 /// A new field is made while the patch goes from so far from the old one's middle as this serves, to so many times as far:
-/// at least a piece with each answer, and so many evenly over this way. Sixty modes have 30 pieces. The way to twice as
+/// at least a piece with each answer, and so many evenly over this way. Sixty modes have 29 pieces. The way to twice as
 /// far as it serves is for blending.
 constexpr double kWaits = 1.7;
 constexpr double kPiecesOnTheWay = 30;
@@ -214,7 +214,7 @@ Pieces NearModel::pieces_of(Making& making) {
     field.missed = std::max(field.missed, kModesSafety * std::abs(near / whole - 1));
   }
 
-  if (making.depth == 0) co_return;
+  if (making.depth <= 0) co_return;
   co_await kPieceDone;
   // Pressed once more, by the factor of that shape: it serves the answers around it better than that of the rest.
   field.model->set_max_iterations(std::min(kIterationsAtOnce, config_.newton.max_iterations));

@@ -19,10 +19,10 @@ namespace tendon::softbody {
 /// answer makes one piece, and goes on by the old field. When the new one is whole, the answers of both are blended over
 /// a way of the hand of a/4, or as far as the old field has the patch, however long that takes.
 ///
-/// A hand that is faster than a hundredth of the way of 0.45 a with each answer has more pieces in an answer, evenly
-/// over the way to 0.38 a. One that jumps out of the old field has all that are left, or a field of its own, in that
-/// answer, and no blending. Counts and places choose, and no clock: the answers are the same on every machine. A body
-/// that is all near is the whole model, QuasiStaticModel.
+/// A hand that goes farther than a/200 with each answer has more pieces in an answer, evenly over the way to 0.38 a.
+/// One that jumps out of the old field has all that are left, or a field of its own, in that answer, and no blending.
+/// Counts and places choose, and no clock: the answers are the same on every machine. A body that is all near is the
+/// whole model, QuasiStaticModel.
 ///
 /// Within one near field the force is the slope of one energy. Blended answers are not: by going on and back over
 /// different ways a hand may gain their difference times a/4, and they say this difference as an error.

@@ -200,7 +200,7 @@ TEST_F(Handle, ColumnsAreSentOnlyToThoseThatNamedTheFeature) {
         EXPECT_EQ(accepted.welcome.features, features);
         session.emplace(Session::Config{.connection_id = accepted.connection_id}, now_);
       }
-      while (const auto event = session ? session->next_event() : std::nullopt) {
+      while (const auto event = session ? session->next_event() : nullptr) {
         const auto* seen = std::get_if<Session::StateArrived>(&*event);
         if (seen == nullptr) continue;
         ++states;
