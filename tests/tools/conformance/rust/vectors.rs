@@ -250,6 +250,9 @@ fn every_bound_is_kept() {
     let mut judged = 0;
     for case in Json::load("bounds").at("bounds").list() {
         let (field, body) = (case.at("field").text(), case.at("body").bytes());
+        if field.starts_with("DeviceStates.") {
+            continue; // only who names `state-columns` is sent them
+        }
         let accepted = match case.at("message").text() {
             "Hello" => continue,
             "Answer" => decode(&ANSWER, &body).map_or(false, |answer| fits(&ANSWER, &answer)),
