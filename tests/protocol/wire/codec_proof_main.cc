@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // What codec_proof_test.cc counts instructions of: a datagram with a state, one with a force, and one with the states of
-// 16 devices in columns, written and read, by hand and by protobuf. A line for each. Callgrind counts within `in_turn`, and writes a file each time it returns.
+// 16 devices in columns, written and read, by hand and by protobuf. A line for each. Callgrind counts within `in_turn`,
+// and writes a file each time it returns.
 #include <array>
 #include <cstdlib>
 #include <iostream>
