@@ -31,7 +31,7 @@ TEST_F(CodecProof, StatesAndForcesCostFarLessThanByProtobuf) {
     std::cout << line << ": " << cost[line] << " instructions\n";
   }
   ASSERT_EQ(cost.size(), 12U);
-  const std::vector<Bound> bounds = {{"write state", 430, 2.6},    {"read state", 950, 3.4},
+  const std::vector<Bound> bounds = {{"write state", 430, 2.6},    {"read state", 980, 3.4},
                                      {"write force", 435, 2.6},    {"read force", 900, 3.4},
                                      {"write columns", 4500, 1.6}, {"read columns", 8400, 1.75}};
   for (const auto& [what, most, times] : bounds) {
