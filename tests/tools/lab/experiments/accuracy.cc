@@ -57,12 +57,18 @@ Solid solid_of(const PressedBlock& block, const Candidate& candidate, softbody::
   return {std::move(mesh), candidate.element, material, law, fixed};
 }
 
+/// `near` may have several laws: here it has that of the truth.
+softbody::Law law_of(ModelKind model) {
+  return model == ModelKind::kNear ? softbody::Law::kNeoHookean : info(model).law;
+}
+
 BodyConfig body_of(const PressedBlock& block, const Candidate& candidate) {
   BodyConfig config;
   config.shape = BlockShape{block.size, cells_of(block, candidate.n)};
   config.element = candidate.element;
   config.material = block.material;
   config.model = candidate.model;
+  config.law = law_of(candidate.model);
   config.patch_radius = block.patch_radius;
   config.reach = kReach * block.patch_radius;
   config.middle = block.touch_point();
@@ -71,7 +77,7 @@ BodyConfig body_of(const PressedBlock& block, const Candidate& candidate) {
     // Slowed enough to be at rest soon. Explicit steps as long as they may be, with something to spare for a body that
     // is pressed together, and none longer than a period of the device.
     const double step = std::min(
-        1e-3, 0.7 * largest_step(solid_of(block, candidate, info(candidate.model).law, block.material), kDensity));
+        1e-3, 0.7 * largest_step(solid_of(block, candidate, law_of(candidate.model), block.material), kDensity));
     config.effects = {.density = kDensity, .step = step, .inertia = true, .damping = 40};
   }
   return config;
@@ -97,7 +103,7 @@ class OnMesh {
 
   const std::array<Stiffness, 2>& of(const Candidate& candidate) {
     const Material material = material_of(block_, candidate.model);
-    const Key key{info(candidate.model).law, candidate.element, candidate.n, material.young, material.poisson};
+    const Key key{law_of(candidate.model), candidate.element, candidate.n, material.young, material.poisson};
     const auto known = known_.find(key);
     return known != known_.end() ? known->second : known_.emplace(key, found(candidate, material)).first->second;
   }
@@ -106,7 +112,7 @@ class OnMesh {
   using Key = std::tuple<softbody::Law, Element, int, double, double>;
 
   std::array<Stiffness, 2> found(const Candidate& candidate, const Material& material) const {
-    const Solid solid = solid_of(block_, candidate, info(candidate.model).law, material);
+    const Solid solid = solid_of(block_, candidate, law_of(candidate.model), material);
     const TouchSurface top(solid.mesh(), Vec3::UnitZ(), block_.patch_radius);
     const Patch patch = *top.patch(top.across(block_.touch_point()));
     std::unique_ptr<Model> model;
@@ -142,7 +148,7 @@ void split_error(AccuracyPoint& point, Truth& truth, OnMesh& on_mesh) {
   const ModelKind model = point.candidate.model;
   const Material material = material_of(truth.block(), model);
   for (std::size_t load = 0; load < point.at_load.size(); ++load) {
-    const auto limit = truth.limit(info(model).law, material, load);
+    const auto limit = truth.limit(law_of(model), material, load);
     if (!limit) continue;
     Accuracy& error = point.at_load[load];
     const double right = truth.stiffness(load).secant;
@@ -375,7 +381,7 @@ AccuracyPoint measure(const Candidate& candidate, Truth& truth, OnMesh& on_mesh,
                       const std::optional<Network>& network, const Patience& patience, const std::string& worker) {
   // Work that is done once for all points does not count as this one's.
   truth.script();
-  truth.limit(info(candidate.model).law, material_of(truth.block(), candidate.model), 0);
+  truth.limit(law_of(candidate.model), material_of(truth.block(), candidate.model), 0);
   const Meter::Reading before = meter.read();
   Trial trial = tried(candidate, truth, &meter, patience.update_ms, worker);
   split_error(trial.point, truth, on_mesh);
