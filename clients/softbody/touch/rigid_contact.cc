@@ -23,12 +23,12 @@ constexpr double kMargin = 0.25;
 
 /// Armijo's share of the predicted decrease that a step must bring, the shortest step tried, and the rounding of an
 /// energy. Near the least energy a step that is right changes it by less than its rounding.
-constexpr double kDecrease = 1e-4;
-constexpr double kShortest = 1.0 / 64;
+constexpr double kToolDecrease = 1e-4;
+constexpr double kToolShortest = 1.0 / 64;
 constexpr double kRounding = 1e-13;
 
 /// Of the whole body: a factor is made anew after so many steps without an answer that is good enough.
-constexpr int kPatience = 16;
+constexpr int kToolPatience = 16;
 /// Of the unknowns near the tools.
 constexpr int kMostMeets = 60;
 /// The energy that is left there, as a share of that which an answer may leave.
@@ -36,19 +36,19 @@ constexpr double kMet = 1e-3;
 constexpr double kNoDrop = 1e-24;  // of the energy: a step along which it falls less is one of rounding
 
 /// m: an error of the force that so small a motion of the tool explains counts as zero.
-constexpr double kUnseen = 1e-12;
+constexpr double kToolUnseen = 1e-12;
 /// m: the same while nothing touches.
 constexpr double kUnfelt = 1e-10;
 
 /// A change of forces of a smaller share is rounding, and teaches nothing.
-constexpr double kHeard = 1e-8;
+constexpr double kToolHeard = 1e-8;
 
 /// The stiffness is right to this share of its norm, or has taken so many rounds.
 constexpr double kCurveError = 2e-3;
 constexpr int kCurveRounds = 12;
 
 /// m, how far at most a node is moved to measure a slope of the force.
-constexpr double kNudge = 1e-7;
+constexpr double kToolNudge = 1e-7;
 
 /// Unknowns whose compliance is kept, at the least.
 constexpr int kKept = 600;
@@ -199,12 +199,12 @@ VectorXd RigidContact::meet(const Local& local, const VectorXd& free, double eno
     const double drop = down.dot(step);
     if (!(drop > std::max(enough, kNoDrop * std::abs(energy)))) break;
     bool fell = false;
-    for (double share = 1; share >= kShortest / 64 && !fell; share /= 2) {
+    for (double share = 1; share >= kToolShortest / 64 && !fell; share /= 2) {
       const VectorXd there = by + share * step;
       const VectorXd pull_there = local.stiffness * (there - free);
       const Layer::Press press = layer_.press(local.near, placed_, local.moved(there), Layer::Order::kCurve);
       const double energy_there = press.energy + (there - free).dot(pull_there) / 2;
-      fell = energy_there - energy <= -kDecrease * share * drop + kRounding * std::abs(energy);
+      fell = energy_there - energy <= -kToolDecrease * share * drop + kRounding * std::abs(energy);
       if (!fell) continue;
       by = there;
       pull = pull_there;
@@ -236,14 +236,14 @@ VectorXd RigidContact::solve(const Local& local, const VectorXd& b) const {
 bool RigidContact::go(const VectorXd& step, double slope, Local& local) {
   const double before = local.now.energy + local.press.energy;
   double gone = 0;
-  for (double share = 1; share >= kShortest; share /= 2) {
+  for (double share = 1; share >= kToolShortest; share /= 2) {
     body_.move((share - gone) * step);
     gone = share;
     Elastic::Forces there = body_.forces();
     const double layer =
         layer_.press(local.near, placed_, layer_.places(local.near, body_.displacements()), Layer::Order::kEnergy)
             .energy;
-    if (there.energy + layer - before <= kDecrease * share * slope + kRounding * std::abs(before)) {
+    if (there.energy + layer - before <= kToolDecrease * share * slope + kRounding * std::abs(before)) {
       local.now = std::move(there);
       return true;
     }
@@ -284,7 +284,7 @@ void RigidContact::settle(Local& local, bool arrives) {
       force = std::max(force, local.press.felt[t].slope.head<3>().norm());
       stiffness = std::max(stiffness, stiffest(local, t));
     }
-    const double enough = tolerance * force + (force > 0 ? kUnseen : kUnfelt) * stiffness;
+    const double enough = tolerance * force + (force > 0 ? kToolUnseen : kUnfelt) * stiffness;
 
     const VectorXd free = -pairs_.times(local.now.force, local.solved);
     VectorXd step = free;
@@ -298,7 +298,7 @@ void RigidContact::settle(Local& local, bool arrives) {
     const bool good = error_ <= enough && (round > 0 || !layer_.rubs());
     if (error_ <= enough) in_vain_ = 0;
     if (good || round == most) break;
-    stale = !fresh && in_vain_ >= kPatience;
+    stale = !fresh && in_vain_ >= kToolPatience;
     if (stale) continue;
     const VectorXd before = local.now.force;
     const VectorXd start = elastic_.to_free(body_.displacements());
@@ -310,7 +310,7 @@ void RigidContact::settle(Local& local, bool arrives) {
     ++in_vain_;
     const VectorXd solved = body_.factor().solve(local.now.force);
     const VectorXd change = local.now.force - before;
-    if (change.norm() > kHeard * local.now.force.norm()) {
+    if (change.norm() > kToolHeard * local.now.force.norm()) {
       pairs_.add(elastic_.to_free(body_.displacements()) - start, change, solved - local.solved);
     }
     local.solved = solved;
@@ -320,7 +320,7 @@ void RigidContact::settle(Local& local, bool arrives) {
 
 /// The stiffness of body and layer times `shape`, N.
 VectorXd RigidContact::needed(const Local& local, const VectorXd& shape) {
-  const double nudge = kNudge / shape.lpNorm<Eigen::Infinity>();
+  const double nudge = kToolNudge / shape.lpNorm<Eigen::Infinity>();
   if (!std::isfinite(nudge)) return VectorXd::Zero(shape.size());
   body_.move(nudge * shape);
   VectorXd all = (body_.forces().force - local.now.force) / nudge;
