@@ -20,6 +20,15 @@ constexpr double kGrown = 1.5;
 
 Mat3 cross(const Vec3& v) { return (Mat3() << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0).finished(); }
 
+Eigen::Matrix3Xd places_of(const Mesh& mesh, const std::vector<int>& nodes, const VectorXd& u) {
+  Eigen::Matrix3Xd all(3, static_cast<Eigen::Index>(nodes.size()));
+  for (Eigen::Index i = 0; i < all.cols(); ++i) {
+    const int node = nodes[static_cast<std::size_t>(i)];
+    all.col(i) = mesh.nodes[at(node)] + u.segment<3>(3 * node);
+  }
+  return all;
+}
+
 }  // namespace
 
 Distance HeldTool::distance(const Pose& handle, const Vec3& x) const {
@@ -84,12 +93,7 @@ Layer::Layer(const Elastic& elastic, const Config& config) : elastic_(elastic), 
 }
 
 Eigen::Matrix3Xd Layer::corners(const FacetOfPoints& facet, const VectorXd& u) const {
-  Eigen::Matrix3Xd all(3, static_cast<Eigen::Index>(facet.nodes.size()));
-  for (Eigen::Index i = 0; i < all.cols(); ++i) {
-    const int node = facet.nodes[static_cast<std::size_t>(i)];
-    all.col(i) = elastic_.mesh().nodes[at(node)] + u.segment<3>(3 * node);
-  }
-  return all;
+  return places_of(elastic_.mesh(), facet.nodes, u);
 }
 
 double Layer::pressure(double overlap, double& stiffness, double& energy) const {
@@ -145,12 +149,7 @@ Layer::Near Layer::near(std::span<const Placed> tools, const VectorXd& u, double
 }
 
 Eigen::Matrix3Xd Layer::places(const Near& near, const VectorXd& u) const {
-  Eigen::Matrix3Xd all(3, static_cast<Eigen::Index>(near.nodes.size()));
-  for (Eigen::Index i = 0; i < all.cols(); ++i) {
-    const int node = near.nodes[static_cast<std::size_t>(i)];
-    all.col(i) = elastic_.mesh().nodes[at(node)] + u.segment<3>(3 * node);
-  }
-  return all;
+  return places_of(elastic_.mesh(), near.nodes, u);
 }
 
 /// visit(site, point, x).

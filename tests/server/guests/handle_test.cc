@@ -40,6 +40,36 @@ class Handle : public SealedServer {
         [&seen](const DeviceState& state, const LinkStats&) { seen.push_back(state.buttons); }, now_);
     return client;
   }
+
+  /// Runs for so many milliseconds with an observer of another make, which names `features`, and shows what it is sent.
+  template <class See>
+  void for_each_state_seen(const std::vector<std::string>& features, int ms, const See& see) {
+    End end(wire_, parse_address("127.0.0.1:4000"));
+    ClientHandshake handshake({.hello = {.role = Role::kObserver, .name = "foreign", .features = features}}, now_);
+    std::optional<Session> session;
+    std::array<std::byte, kMaxDatagram> buffer;
+    const auto say = [&](auto& mine) {
+      while (const std::size_t size = mine.next_datagram(now_, buffer)) {
+        deliver(end.self, Bytes(buffer.begin(), buffer.begin() + static_cast<int>(size)));
+      }
+    };
+    for (int i = 0; i < ms; ++i) {
+      session ? say(*session) : say(handshake);
+      run(milliseconds(1), {});
+      count_ = 0;
+      for (const Datagram& datagram : std::exchange(wire_, {})) {
+        session ? void(session->receive(now_, datagram.bytes)) : handshake.receive(now_, datagram.bytes);
+      }
+      if (!session && handshake.outcome()) {
+        const auto& accepted = std::get<ClientHandshake::Accepted>(*handshake.outcome());
+        EXPECT_EQ(accepted.welcome.features, features);
+        session.emplace(Session::Config{.connection_id = accepted.connection_id}, now_);
+      }
+      while (const auto* const event = session ? session->next_event() : nullptr) {
+        if (const auto* seen = std::get_if<Session::StateArrived>(event)) see(seen->state);
+      }
+    }
+  }
 };
 
 TEST_F(Handle, APressBetweenTwoStatesIsInTheNextOneAndThenOver) {
@@ -128,42 +158,18 @@ TEST_F(Handle, IsSeenOnlyByThoseThatNamedTheFeature) {
     look_.grip = Grip{.opening = 0.2, .velocity = 0.3};
     look_.grip_applied = 1.5;
     look_.hand_force = Vec3(1, 2, 3);
-    End end(wire_, parse_address("127.0.0.1:4000"));
     std::vector<std::string> features;
     if (names) features.emplace_back(kFeatureHandle);
-    ClientHandshake handshake({.hello = {.role = Role::kObserver, .name = "foreign", .features = features}}, now_);
-    std::optional<Session> session;
-    std::array<std::byte, kMaxDatagram> buffer;
-    const auto say = [&](auto& mine) {
-      while (const std::size_t size = mine.next_datagram(now_, buffer)) {
-        deliver(end.self, Bytes(buffer.begin(), buffer.begin() + static_cast<int>(size)));
-      }
-    };
     std::size_t states = 0;
-    for (int i = 0; i < 300; ++i) {
-      session ? say(*session) : say(handshake);
-      run(milliseconds(1), {});
-      count_ = 0;
-      for (const Datagram& datagram : std::exchange(wire_, {})) {
-        session ? void(session->receive(now_, datagram.bytes)) : handshake.receive(now_, datagram.bytes);
-      }
-      if (!session && handshake.outcome()) {
-        const auto& accepted = std::get<ClientHandshake::Accepted>(*handshake.outcome());
-        EXPECT_EQ(accepted.welcome.features, features);
-        session.emplace(Session::Config{.connection_id = accepted.connection_id}, now_);
-      }
-      while (const auto event = session ? session->next_event() : nullptr) {
-        const auto* seen = std::get_if<Session::StateArrived>(&*event);
-        if (seen == nullptr) continue;
-        ++states;
-        EXPECT_EQ(seen->state.buttons, names ? 1U : 0U);
-        EXPECT_EQ(seen->state.turning, names ? look_.turning : std::nullopt);
-        EXPECT_EQ(seen->state.torque_applied, names ? look_.torque_applied : std::nullopt);
-        EXPECT_EQ(seen->state.grip, names ? look_.grip : std::nullopt);
-        EXPECT_EQ(seen->state.grip_applied, names ? look_.grip_applied : std::nullopt);
-        EXPECT_EQ(seen->state.hand_force, names ? look_.hand_force : std::nullopt);
-      }
-    }
+    for_each_state_seen(features, 300, [&](const DeviceState& seen) {
+      ++states;
+      EXPECT_EQ(seen.buttons, names ? 1U : 0U);
+      EXPECT_EQ(seen.turning, names ? look_.turning : std::nullopt);
+      EXPECT_EQ(seen.torque_applied, names ? look_.torque_applied : std::nullopt);
+      EXPECT_EQ(seen.grip, names ? look_.grip : std::nullopt);
+      EXPECT_EQ(seen.grip_applied, names ? look_.grip_applied : std::nullopt);
+      EXPECT_EQ(seen.hand_force, names ? look_.hand_force : std::nullopt);
+    });
     EXPECT_GT(states, 100U);
   }
 }
@@ -176,38 +182,14 @@ TEST_F(Handle, ColumnsAreSentOnlyToThoseThatNamedTheFeature) {
     DeviceState rounded = look_;
     round_to_columns(rounded);
     ASSERT_NE(rounded.velocity, look_.velocity);
-    End end(wire_, parse_address("127.0.0.1:4000"));
     std::vector<std::string> features;
     if (names) features.emplace_back(kFeatureStateColumns);
-    ClientHandshake handshake({.hello = {.role = Role::kObserver, .name = "foreign", .features = features}}, now_);
-    std::optional<Session> session;
-    std::array<std::byte, kMaxDatagram> buffer;
-    const auto say = [&](auto& mine) {
-      while (const std::size_t size = mine.next_datagram(now_, buffer)) {
-        deliver(end.self, Bytes(buffer.begin(), buffer.begin() + static_cast<int>(size)));
-      }
-    };
     std::size_t states = 0;
-    for (int i = 0; i < 100; ++i) {
-      session ? say(*session) : say(handshake);
-      run(milliseconds(1), {});
-      count_ = 0;
-      for (const Datagram& datagram : std::exchange(wire_, {})) {
-        session ? void(session->receive(now_, datagram.bytes)) : handshake.receive(now_, datagram.bytes);
-      }
-      if (!session && handshake.outcome()) {
-        const auto& accepted = std::get<ClientHandshake::Accepted>(*handshake.outcome());
-        EXPECT_EQ(accepted.welcome.features, features);
-        session.emplace(Session::Config{.connection_id = accepted.connection_id}, now_);
-      }
-      while (const auto event = session ? session->next_event() : nullptr) {
-        const auto* seen = std::get_if<Session::StateArrived>(&*event);
-        if (seen == nullptr) continue;
-        ++states;
-        EXPECT_EQ(seen->state.position, look_.position);
-        EXPECT_EQ(seen->state.velocity, names ? rounded.velocity : look_.velocity);
-      }
-    }
+    for_each_state_seen(features, 100, [&](const DeviceState& seen) {
+      ++states;
+      EXPECT_EQ(seen.position, look_.position);
+      EXPECT_EQ(seen.velocity, names ? rounded.velocity : look_.velocity);
+    });
     EXPECT_GT(states, 50U);
   }
 }
