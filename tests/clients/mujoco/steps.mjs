@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // node steps.mjs: what a step costs and what a sphere 2 mm deep in B1 feels, by fineness; the tables in
-// clients/mujoco/README.md. Then what an answer of the peg costs, wedged in its hole. Wants tests/clients/typescript/run
-// mujoco build.
+// clients/mujoco/README.md. Then how stiff B1 is under a patch, at rest, as in tests/tools/lab/ACCURACY.md; and what an
+// answer of the peg costs, wedged in its hole. Wants tests/clients/typescript/run mujoco build.
 import { readFileSync } from "node:fs";
 import { TouchableScene, zUp } from "../../../clients/mujoco/build/clients/mujoco/src/index.js";
+import { press } from "../../../clients/mujoco/build/tests/clients/mujoco/pressed_block.js";
 import { block } from "../../../clients/mujoco/build/tests/clients/mujoco/scenes.js";
 
 for (const n of [4, 8, 12, 16]) {
@@ -19,6 +20,22 @@ for (const n of [4, 8, 12, 16]) {
   console.log(`n = ${n}: ${scene.model.nv} degrees of freedom, ${scene.stats().steps - from} steps, ${ms.toFixed(2)} ms of processor time ` +
     `each = ${Math.round(1000 / ms)} steps/s, ${force.z.toFixed(3)} N up, ${Math.hypot(force.x, force.y).toFixed(3)} N aside`);
   scene.delete();
+}
+
+const kSteps = 150; // of 20 ms, after which B1 is at rest under its load
+for (const n of [4, 6, 8, 12]) {
+  const told = [];
+  let ms = 0;
+  for (const newtons of [0.3, 1]) {
+    const scene = await TouchableScene.load(block({ n, option: 'timestep="0.02" integrator="discrete"' }), { tool: "tool" });
+    const before = process.cpuUsage();
+    const depth = press(scene, n, newtons, kSteps);
+    const { user, system } = process.cpuUsage(before);
+    ms = (user + system) / 1000 / kSteps;
+    told.push(`${(newtons / depth).toFixed(1)} N/m under ${newtons} N`);
+    scene.delete();
+  }
+  console.log(`n = ${n}: ${told.join(", ")}; ${ms.toFixed(2)} ms of processor time each of ${kSteps} steps`);
 }
 
 const example = readFileSync(new URL("../../../clients/mujoco/examples/peg_in_hole.ts", import.meta.url), "utf8");
