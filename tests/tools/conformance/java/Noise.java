@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 import java.io.ByteArrayOutputStream;
 import java.math.BigInteger;
-import java.nio.ByteBuffer;
-import java.nio.ByteOrder;
 import java.nio.charset.StandardCharsets;
 import java.security.GeneralSecurityException;
 import java.security.InvalidKeyException;
@@ -14,11 +12,8 @@ import java.security.spec.NamedParameterSpec;
 import java.security.spec.XECPrivateKeySpec;
 import java.security.spec.XECPublicKeySpec;
 import java.util.Arrays;
-import javax.crypto.AEADBadTagException;
-import javax.crypto.Cipher;
 import javax.crypto.KeyAgreement;
 import javax.crypto.Mac;
-import javax.crypto.spec.IvParameterSpec;
 import javax.crypto.spec.SecretKeySpec;
 
 /**
@@ -26,12 +21,17 @@ import javax.crypto.spec.SecretKeySpec;
  * attempt: message 1 is written once.
  */
 final class Noise {
-  static final int TAG = 16;
+  /** A key for each direction. */
+  record Keys(byte[] clientToServer, byte[] serverToClient) {
+    /** Those of suite 2, from what Split() gives and h after message 2. */
+    Keys ofSuite2(byte[] hash) {
+      byte[] label = ascii("tendon-suite-2");
+      return new Keys(hmac(clientToServer, label, hash), hmac(serverToClient, label, hash));
+    }
+  }
 
-  /** What Split() gives. */
-  record Keys(byte[] clientToServer, byte[] serverToClient) {}
-
-  record Opened(byte[] payload, Keys keys) {}
+  /** `hash`: h after message 2. */
+  record Opened(byte[] payload, Keys keys, byte[] hash) {}
 
   private final byte[] ephemeral;
   private final State state = new State();
@@ -56,7 +56,7 @@ final class Noise {
 
   /** Message 2; null when it is not authentic, and a later one may be. */
   Opened read(byte[] answer) {
-    if (answer.length < 32 + TAG) return null;
+    if (answer.length < 32 + Aead.TAG) return null;
     State next = state.copy();
     byte[] theirs = Arrays.copyOf(answer, 32);
     next.mixHash(theirs);
@@ -64,10 +64,11 @@ final class Noise {
     byte[] shared = x25519(ephemeral, theirs);
     if (shared == null) return null;
     next.mixKey(shared);
-    byte[] payload = open(next.key, 0, next.hash, answer, 32);
+    byte[] payload = Aead.CHACHA_POLY.open(next.key, 0, next.hash, answer, 32);
     if (payload == null) return null;
+    next.mixHash(Arrays.copyOfRange(answer, 32, answer.length));
     byte[][] keys = hkdf(next.chain, new byte[0], 2);
-    return new Opened(payload, new Keys(keys[0], keys[1]));
+    return new Opened(payload, new Keys(keys[0], keys[1]), next.hash);
   }
 
   private static final class State {
@@ -101,7 +102,7 @@ final class Noise {
     }
 
     byte[] encryptAndHash(byte[] text) {
-      byte[] sealed = seal(key, 0, hash, text);
+      byte[] sealed = Aead.CHACHA_POLY.seal(key, 0, hash, text);
       mixHash(sealed);
       return sealed;
     }
@@ -166,39 +167,6 @@ final class Noise {
     } catch (GeneralSecurityException error) {
       throw new IllegalStateException(error);
     }
-  }
-
-  static byte[] seal(byte[] key, long number, byte[] associated, byte[] text) {
-    try {
-      return cipher(Cipher.ENCRYPT_MODE, key, number, associated).doFinal(text);
-    } catch (GeneralSecurityException error) {
-      throw new IllegalStateException(error);
-    }
-  }
-
-  /** What `bytes` seals from index `at` on; null when it is not authentic. */
-  static byte[] open(byte[] key, long number, byte[] associated, byte[] bytes, int at) {
-    if (bytes.length - at < TAG) return null;
-    try {
-      return cipher(Cipher.DECRYPT_MODE, key, number, associated).doFinal(bytes, at, bytes.length - at);
-    } catch (AEADBadTagException forged) {
-      return null;
-    } catch (GeneralSecurityException error) {
-      throw new IllegalStateException(error);
-    }
-  }
-
-  private static Cipher cipher(int mode, byte[] key, long number, byte[] associated) throws GeneralSecurityException {
-    Cipher cipher = Cipher.getInstance("ChaCha20-Poly1305");
-    byte[] nonce = ByteBuffer.allocate(12).order(ByteOrder.LITTLE_ENDIAN).putInt(0).putLong(number).array();
-    cipher.init(mode, new SecretKeySpec(key, "ChaCha20"), new IvParameterSpec(nonce));
-    cipher.updateAAD(associated);
-    return cipher;
-  }
-
-  /** The next key of a direction. */
-  static byte[] renewed(byte[] key) {
-    return Arrays.copyOf(seal(key, -1, new byte[0], new byte[32]), 32);
   }
 
   static byte[] ascii(String text) {

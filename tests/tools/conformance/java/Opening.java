@@ -11,6 +11,7 @@ final class Opening {
   static final int HEADER = 16;
   static final int LARGEST = 1200;
   private static final long REPEAT_NS = 100_000_000;
+  private static final String AES = "aes-256-gcm"; // the feature by which suite 2 is offered and chosen
 
   private final int suite;
   private final byte[] random = new byte[16];
@@ -26,26 +27,26 @@ final class Opening {
 
   /** `key` is null in suite 0. */
   Opening(byte[] key, SecureRandom source) {
-    Tendon.Hello hello =
+    Tendon.Hello.Builder hello =
         Tendon.Hello.newBuilder()
             .setVersionMin(1)
             .setVersionMax(1)
             .setRole(Tendon.Role.ROLE_CONTROLLER)
             .setName("spring.java")
-            .addFeatures("handle")
-            .build();
+            .addFeatures("handle");
     suite = key == null ? 0 : 1;
     source.nextBytes(random);
     if (key == null) {
       noise = null;
-      body = hello.toByteArray();
+      body = hello.build().toByteArray();
       return;
     }
+    hello.addFeatures(AES);
     byte[] ephemeral = new byte[32];
     source.nextBytes(ephemeral);
     byte[] keyId = Arrays.copyOf(Noise.sha256(Noise.ascii("tendon-key-id"), key), 8);
     byte[] prologue = Noise.join(Noise.ascii("tendon-1"), header(1, 0, suite, 0, 0), keyId, random);
-    noise = new Noise(key, ephemeral, prologue, hello.toByteArray());
+    noise = new Noise(key, ephemeral, prologue, hello.build().toByteArray());
     body = Noise.join(keyId, noise.message());
   }
 
@@ -93,12 +94,11 @@ final class Opening {
 
   private void settle(long now, byte[] datagram) {
     byte[] bytes = Arrays.copyOfRange(datagram, 32, datagram.length);
-    Noise.Keys keys = null;
+    Noise.Opened opened = null;
     if (noise != null) {
-      Noise.Opened opened = noise.read(bytes);
+      opened = noise.read(bytes);
       if (opened == null) return;
       bytes = opened.payload();
-      keys = opened.keys();
     }
     Tendon.Answer answer;
     try {
@@ -110,7 +110,13 @@ final class Opening {
     if (answer.hasRefused() && Bounds.good(answer.getRefused())) {
       refused = answer.getRefused();
     } else if (answer.hasWelcome() && Bounds.good(answer.getWelcome())) {
-      session = new Session(connection, suite, keys, now);
+      if (opened == null) {
+        session = new Session(connection, now);
+      } else if (answer.getWelcome().getFeaturesList().contains(AES)) {
+        session = new Session(connection, Aead.AES_GCM, opened.keys().ofSuite2(opened.hash()), now);
+      } else {
+        session = new Session(connection, Aead.CHACHA_POLY, opened.keys(), now);
+      }
     }
   }
 }

@@ -20,6 +20,7 @@ final class Session {
   private static final int RING = 2048;
 
   private final int connection;
+  private final Aead aead; // null in suite 0
   private final int suite;
   private final long opened;
 
@@ -58,9 +59,15 @@ final class Session {
 
   int endCode;
 
-  Session(int connection, int suite, Noise.Keys keys, long now) {
+  /** In suite 0. */
+  Session(int connection, long now) {
+    this(connection, null, null, now);
+  }
+
+  Session(int connection, Aead aead, Noise.Keys keys, long now) {
     this.connection = connection;
-    this.suite = suite;
+    this.aead = aead;
+    suite = aead == null ? 0 : aead.suite;
     opened = now;
     lastHeard = now;
     keySince = now;
@@ -78,11 +85,11 @@ final class Session {
     long number = header.getLong(8);
     if (datagram[0] != 0x54 || datagram[1] != 0x13 || datagram[3] != suite || header.getInt(4) != connection) return;
     if (number < 0 || number >= 1L << 60 || contains(number)) return;
-    byte[] body = suite == 0 ? Arrays.copyOfRange(datagram, Opening.HEADER, datagram.length) : open(now, datagram, number);
+    byte[] body = aead == null ? Arrays.copyOfRange(datagram, Opening.HEADER, datagram.length) : open(now, datagram, number);
     if (body == null) return;
     Tendon.Datagram content = parse(body);
     if (content == null) {
-      if (suite == 1) insert(number);
+      if (aead != null) insert(number);
       return;
     }
     if (number > echoNumber) {
@@ -108,9 +115,9 @@ final class Session {
   private byte[] open(long now, byte[] datagram, long number) {
     if (previousKey != null && now - movedOn >= OVERLAP) previousKey = null;
     int ahead = (datagram[2] - receiveEpoch) & 0xFF;
-    byte[] key = ahead == 0 ? receiveKey : ahead == 1 ? Noise.renewed(receiveKey) : ahead == 0xFF ? previousKey : null;
+    byte[] key = ahead == 0 ? receiveKey : ahead == 1 ? aead.renewed(receiveKey) : ahead == 0xFF ? previousKey : null;
     if (key == null) return null;
-    byte[] body = Noise.open(key, number, Arrays.copyOf(datagram, Opening.HEADER), datagram, Opening.HEADER);
+    byte[] body = aead.open(key, number, Arrays.copyOf(datagram, Opening.HEADER), datagram, Opening.HEADER);
     if (body != null && ahead == 1) {
       previousKey = receiveKey;
       receiveKey = key;
@@ -166,7 +173,7 @@ final class Session {
   void tick(long now) {
     if (end != null) return;
     if (now - lastHeard >= TIMEOUT) end = "nothing heard for 2 s";
-    if (suite == 1 && now - opened >= LIFE) end = "the session has reached its age";
+    if (aead != null && now - opened >= LIFE) end = "the session has reached its age";
   }
 
   // ---- Out ----
@@ -220,16 +227,16 @@ final class Session {
 
   private byte[] finish(long now, Tendon.Datagram.Builder body) {
     lastSent = now;
-    if (suite == 0) return Noise.join(Opening.header(3, 0, suite, connection, next++), body.build().toByteArray());
+    if (aead == null) return Noise.join(Opening.header(3, 0, suite, connection, next++), body.build().toByteArray());
     if (sealed >= KEY_DATAGRAMS || now - keySince >= KEY_AGE) {
-      sendKey = Noise.renewed(sendKey);
+      sendKey = aead.renewed(sendKey);
       sendEpoch = (sendEpoch + 1) & 0xFF;
       sealed = 0;
       keySince = now;
     }
     ++sealed;
     byte[] header = Opening.header(3, sendEpoch, suite, connection, next);
-    return Noise.join(header, Noise.seal(sendKey, next++, header, body.build().toByteArray()));
+    return Noise.join(header, aead.seal(sendKey, next++, header, body.build().toByteArray()));
   }
 
   long waitNs(long now) {

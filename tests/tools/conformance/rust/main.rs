@@ -2,6 +2,7 @@
 //! A client of six degrees of freedom: it pulls the hand to a point with a spring, turns the handle upright, and opens
 //! the gripper half. Button 0 carries the point along. Socket, clock, signals and physics; the rest is in the modules.
 
+mod aead;
 mod noise;
 mod opening;
 mod protobuf;

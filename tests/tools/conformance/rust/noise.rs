@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-//! Cipher suite 1 (WIRE.md): Noise_NNpsk0_25519_ChaChaPoly_SHA256 of the client, key files, and the keys of a session.
-//! The primitives are libsodium's.
+//! The handshake of cipher suites 1 and 2 (WIRE.md): Noise_NNpsk0_25519_ChaChaPoly_SHA256 of the client, key files, and
+//! the keys of a session. The primitives are libsodium's.
 
 use std::os::raw::{c_int, c_uchar, c_ulonglong, c_void};
+
+use crate::aead::{Cipher, Sealing};
 
 extern "C" {
     fn sodium_init() -> c_int;
@@ -10,28 +12,6 @@ extern "C" {
     fn crypto_scalarmult_curve25519(out: *mut c_uchar, scalar: *const c_uchar, point: *const c_uchar) -> c_int;
     fn crypto_scalarmult_curve25519_base(out: *mut c_uchar, scalar: *const c_uchar) -> c_int;
     fn crypto_hash_sha256(out: *mut c_uchar, text: *const c_uchar, size: c_ulonglong) -> c_int;
-    fn crypto_aead_chacha20poly1305_ietf_encrypt(
-        out: *mut c_uchar,
-        out_size: *mut c_ulonglong,
-        text: *const c_uchar,
-        size: c_ulonglong,
-        associated: *const c_uchar,
-        associated_size: c_ulonglong,
-        secret_nonce: *const c_uchar,
-        nonce: *const c_uchar,
-        key: *const c_uchar,
-    ) -> c_int;
-    fn crypto_aead_chacha20poly1305_ietf_decrypt(
-        out: *mut c_uchar,
-        out_size: *mut c_ulonglong,
-        secret_nonce: *mut c_uchar,
-        sealed: *const c_uchar,
-        size: c_ulonglong,
-        associated: *const c_uchar,
-        associated_size: c_ulonglong,
-        nonce: *const c_uchar,
-        key: *const c_uchar,
-    ) -> c_int;
 }
 
 pub type Key = [u8; 32];
@@ -82,61 +62,32 @@ pub fn x25519(secret: &Key, public: &Key) -> Option<Key> {
     Some(out)
 }
 
-fn nonce_bytes(nonce: u64) -> [u8; 12] {
-    let mut bytes = [0; 12];
-    bytes[4..].copy_from_slice(&nonce.to_le_bytes());
-    bytes
-}
-
-pub fn seal(key: &Key, nonce: u64, associated: &[u8], text: &[u8]) -> Vec<u8> {
-    seal_with(key, &nonce_bytes(nonce), associated, text)
-}
-
-pub fn seal_with(key: &Key, nonce: &[u8; 12], associated: &[u8], text: &[u8]) -> Vec<u8> {
-    let mut out = vec![0; text.len() + 16];
-    unsafe {
-        crypto_aead_chacha20poly1305_ietf_encrypt(
-            out.as_mut_ptr(),
-            std::ptr::null_mut(),
-            text.as_ptr(),
-            text.len() as c_ulonglong,
-            associated.as_ptr(),
-            associated.len() as c_ulonglong,
-            std::ptr::null(),
-            nonce.as_ptr(),
-            key.as_ptr(),
-        );
-    }
-    out
-}
-
-pub fn open(key: &Key, nonce: u64, associated: &[u8], sealed: &[u8]) -> Option<Vec<u8>> {
-    let mut out = vec![0; sealed.len().checked_sub(16)?];
-    let failed = unsafe {
-        crypto_aead_chacha20poly1305_ietf_decrypt(
-            out.as_mut_ptr(),
-            std::ptr::null_mut(),
-            std::ptr::null_mut(),
-            sealed.as_ptr(),
-            sealed.len() as c_ulonglong,
-            associated.as_ptr(),
-            associated.len() as c_ulonglong,
-            nonce_bytes(nonce).as_ptr(),
-            key.as_ptr(),
-        )
-    };
-    if failed != 0 {
-        return None;
-    }
-    Some(out)
-}
-
-pub fn next_key(key: &Key) -> Key {
-    seal(key, u64::MAX, &[], &[0; 32])[..32].try_into().unwrap()
-}
-
 pub fn key_id(key: &Key) -> [u8; 8] {
     sha256(&[b"tendon-key-id", key.as_slice()].concat())[..8].try_into().unwrap()
+}
+
+/// What seals Data, client → server and server → client.
+#[derive(Clone, Copy)]
+pub struct Keys {
+    pub send: Sealing,
+    pub receive: Sealing,
+}
+
+/// The payload of message 2, the keys of suite 1, and h.
+pub struct Finished {
+    pub text: Vec<u8>,
+    pub keys: Keys,
+    pub hash: Key,
+}
+
+impl Finished {
+    pub fn keys_of_suite_2(&self) -> Keys {
+        let bound = |of: &Sealing| Sealing {
+            cipher: Cipher::AesGcm,
+            key: hmac(&of.key, &[b"tendon-suite-2".as_slice(), &self.hash].concat()),
+        };
+        Keys { send: bound(&self.keys.send), receive: bound(&self.keys.receive) }
+    }
 }
 
 /// A client's half of one attempt. The state after message 1 stays as it is, whatever messages 2 come.
@@ -154,6 +105,9 @@ struct Symmetric {
 }
 
 impl Symmetric {
+    fn sealing(&self) -> Sealing {
+        Sealing { cipher: Cipher::ChaChaPoly, key: self.key }
+    }
     fn mix_hash(&mut self, data: &[u8]) {
         self.hash = sha256(&[&self.hash, data].concat());
     }
@@ -189,22 +143,24 @@ impl Handshake {
         let public = public_of(&ephemeral);
         state.mix_hash(&public);
         state.mix_key(&public); // with a psk an ephemeral key goes into the key, too
-        let sealed = seal(&state.key, state.nonce, &state.hash, text);
+        let sealed = state.sealing().seal(state.nonce, &state.hash, text);
         state.nonce += 1;
         state.mix_hash(&sealed);
         (Handshake { ephemeral, state }, [public.as_slice(), &sealed].concat())
     }
 
-    /// Reads Noise message 2: its payload, and the keys client → server and server → client.
-    pub fn finish(&self, message: &[u8]) -> Option<(Vec<u8>, Key, Key)> {
+    /// Reads Noise message 2.
+    pub fn finish(&self, message: &[u8]) -> Option<Finished> {
         let theirs: Key = message.get(..32)?.try_into().ok()?;
         let mut state = self.state.clone();
         state.mix_hash(&theirs);
         state.mix_key(&theirs);
         state.mix_key(&x25519(&self.ephemeral, &theirs)?);
-        let text = open(&state.key, state.nonce, &state.hash, &message[32..])?;
+        let text = state.sealing().open(state.nonce, &state.hash, &message[32..])?;
+        state.mix_hash(&message[32..]);
         let [send, receive, _] = state.derive(&[]);
-        Some((text, send, receive))
+        let [send, receive] = [send, receive].map(|key| Sealing { cipher: Cipher::ChaChaPoly, key });
+        Some(Finished { text, keys: Keys { send, receive }, hash: state.hash })
     }
 }
 

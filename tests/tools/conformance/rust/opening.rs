@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //! The handshake (SESSION.md, "Opening"), without socket or clock: datagrams and instants go in and come out.
 
-use crate::noise::{self, Handshake, Key};
+use crate::aead;
+use crate::noise::{self, Handshake, Key, Keys};
 use crate::protobuf::{decode, fits, Node, Value, Writer};
 use crate::schema::ANSWER;
 
@@ -12,12 +13,13 @@ pub const ANSWER_TYPE: u8 = 4;
 pub const OBSERVER: i128 = 1;
 pub const CONTROLLER: i128 = 2;
 pub const FEATURES: [&str; 2] = ["local-model", "handle"];
+const AES: &str = "aes-256-gcm"; // offers suite 2, and chooses it
 const VERSION: i128 = 1;
 const REPETITION_NS: i64 = 100_000_000;
 
-pub fn header(kind: u8, epoch: u8, sealed: bool, connection: u32, number: u64) -> [u8; 16] {
+pub fn header(kind: u8, epoch: u8, suite: u8, connection: u32, number: u64) -> [u8; 16] {
     let mut bytes = [0; 16];
-    bytes[..4].copy_from_slice(&[0x54, 1 << 4 | kind, epoch, u8::from(sealed)]);
+    bytes[..4].copy_from_slice(&[0x54, 1 << 4 | kind, epoch, suite]);
     bytes[4..8].copy_from_slice(&connection.to_le_bytes());
     bytes[8..].copy_from_slice(&number.to_le_bytes());
     bytes
@@ -31,8 +33,8 @@ pub struct Welcome {
     pub handle: bool,
     pub max_force_n: f64,
     pub device_name: String,
-    /// Client → server and server → client, in suite 1.
-    pub keys: Option<(Key, Key)>,
+    /// Nothing in suite 0.
+    pub keys: Option<Keys>,
 }
 
 pub enum Outcome {
@@ -60,13 +62,16 @@ impl Attempt {
         for feature in FEATURES {
             hello.text(5, feature);
         }
+        if key.is_some() && aead::has_aes() {
+            hello.text(5, AES);
+        }
         let random: [u8; 16] = noise::random();
         let mut state = None;
         let body = match key {
             None => hello.0,
             Some(key) => {
                 let id = noise::key_id(key);
-                let prologue = [b"tendon-1".as_slice(), &header(HELLO, 0, true, 0, 0), &id, &random].concat();
+                let prologue = [b"tendon-1".as_slice(), &header(HELLO, 0, 1, 0, 0), &id, &random].concat();
                 let (handshake, message) = Handshake::begin(key, &prologue, noise::random(), &hello.0);
                 state = Some(handshake);
                 [id.as_slice(), &message].concat()
@@ -75,13 +80,18 @@ impl Attempt {
         Attempt { random, cookie: None, noise: state, controls, body, due_ns: now_ns }
     }
 
+    /// Of the handshake: 0 or 1.
+    fn suite(&self) -> u8 {
+        u8::from(self.noise.is_some())
+    }
+
     /// The Hello, when it is due.
     pub fn next(&mut self, now_ns: i64) -> Option<Vec<u8>> {
         if now_ns < self.due_ns {
             return None;
         }
         self.due_ns = now_ns + REPETITION_NS;
-        let mut bytes = header(HELLO, 0, self.noise.is_some(), 0, 0).to_vec();
+        let mut bytes = header(HELLO, 0, self.suite(), 0, 0).to_vec();
         bytes.extend(self.random);
         bytes.extend(self.cookie.unwrap_or_default());
         bytes.extend((self.body.len() as u16).to_le_bytes());
@@ -97,7 +107,7 @@ impl Attempt {
             None => return Outcome::Nothing,
         };
         let is = |kind: u8, connection: u32| {
-            bytes.starts_with(&header(kind, 0, self.noise.is_some(), connection, 0))
+            bytes.starts_with(&header(kind, 0, self.suite(), connection, 0))
                 && bytes.get(16..32) == Some(&self.random)
         };
         if bytes.len() == 48 && is(RETRY, 0) {
@@ -114,14 +124,12 @@ impl Attempt {
     }
 
     fn answer(&self, connection: u32, body: &[u8]) -> Option<Outcome> {
-        let (text, keys) = match &self.noise {
-            None => (body.to_vec(), None),
-            Some(noise) => {
-                let (text, send, receive) = noise.finish(body)?;
-                (text, Some((send, receive)))
-            }
+        let finished = match &self.noise {
+            None => None,
+            Some(noise) => Some(noise.finish(body)?),
         };
-        let answer = decode(&ANSWER, &text).ok().filter(|answer| fits(&ANSWER, answer))?;
+        let text = finished.as_ref().map_or(body, |finished| &finished.text);
+        let answer = decode(&ANSWER, text).ok().filter(|answer| fits(&ANSWER, answer))?;
         if let Some(refused) = answer.sub(2) {
             let outcome = Outcome::Refused { code: refused.whole(1), detail: refused.text(2).to_string() };
             return Some(outcome);
@@ -132,6 +140,8 @@ impl Attempt {
         }
         let granted =
             |name: &str| welcome.all(2).iter().any(|feature| matches!(feature, Value::Text(text) if text == name));
+        let aes = aead::has_aes() && granted(AES);
+        let keys = finished.map(|finished| if aes { finished.keys_of_suite_2() } else { finished.keys });
         Some(Outcome::Welcome(Welcome {
             connection,
             controls: self.controls && welcome.whole(3) == CONTROLLER,

@@ -3,7 +3,7 @@
 
 use std::collections::{BTreeMap, VecDeque};
 
-use crate::noise::{self, Key};
+use crate::aead::Sealing;
 use crate::opening::{header, Welcome, ANSWER_TYPE, DATA, RETRY};
 use crate::protobuf::{decode, fits, Node, Writer};
 use crate::schema::{usable_time, DATAGRAM, ECHO, FORCE, FRAME};
@@ -70,6 +70,10 @@ pub struct Counters {
     pub reordered: u64,
 }
 
+fn suite_of(key: &Option<Sealing>) -> u8 {
+    key.map_or(0, |key| key.cipher as u8)
+}
+
 pub enum Event {
     State(Node),
     /// The answer to the request with this number.
@@ -105,14 +109,14 @@ pub struct Session {
     opened_ns: i64,
     heard_ns: i64,
     sent_ns: i64,
-    send_key: Option<Key>,
+    send_key: Option<Sealing>, // nothing in suite 0
     send_epoch: u8,
     send_number: u64,
     key_number: u64,
     key_ns: i64,
-    receive_key: Option<Key>,
+    receive_key: Option<Sealing>,
     receive_epoch: u8,
-    previous: Option<(Key, i64)>,
+    previous: Option<(Sealing, i64)>,
     window: Window,
     newest: Option<Newest>,
     smoothed_ns: Option<(i64, i64)>,
@@ -138,12 +142,12 @@ impl Session {
             opened_ns: now_ns,
             heard_ns: now_ns,
             sent_ns: now_ns,
-            send_key: welcome.keys.map(|keys| keys.0),
+            send_key: welcome.keys.map(|keys| keys.send),
             send_epoch: 0,
             send_number: 0,
             key_number: 0,
             key_ns: now_ns,
-            receive_key: welcome.keys.map(|keys| keys.1),
+            receive_key: welcome.keys.map(|keys| keys.receive),
             receive_epoch: 0,
             previous: None,
             window: Window::new(),
@@ -201,14 +205,14 @@ impl Session {
             self.counters.malformed += 1;
             return;
         }
-        let late = [RETRY, ANSWER_TYPE].iter().any(|kind| bytes[..4] == header(*kind, 0, sealed, 0, 0)[..4]);
+        let late = [RETRY, ANSWER_TYPE].iter().any(|kind| bytes[..4] == header(*kind, 0, u8::from(sealed), 0, 0)[..4]);
         if late && self.random.is_some() && bytes.get(16..32) == self.random.as_ref().map(|random| random.as_slice()) {
             self.counters.duplicated += 1;
             return;
         }
         let number = u64::from_le_bytes(bytes[8..16].try_into().unwrap());
         let epoch = bytes[2];
-        if bytes[..8] != header(DATA, epoch, sealed, self.connection, 0)[..8]
+        if bytes[..8] != header(DATA, epoch, suite_of(&self.receive_key), self.connection, 0)[..8]
             || number >= NUMBERS
             || (!sealed && epoch != 0)
         {
@@ -260,14 +264,14 @@ impl Session {
         let key = if epoch == self.receive_epoch {
             current
         } else if next {
-            noise::next_key(&current)
+            current.next()
         } else if let (true, Some((key, _))) = (epoch.wrapping_add(1) == self.receive_epoch, self.previous) {
             key
         } else {
             self.counters.old_key += 1;
             return None;
         };
-        let text = noise::open(&key, number, &bytes[..16], &bytes[16..]);
+        let text = key.open(number, &bytes[..16], &bytes[16..]);
         if text.is_none() {
             self.counters.forged += 1;
         } else if next {
@@ -492,7 +496,7 @@ impl Session {
         }
         if let Some(key) = self.send_key {
             if self.send_number - self.key_number >= KEY_DATAGRAMS || now_ns - self.key_ns >= KEY_AGE_NS {
-                self.send_key = Some(noise::next_key(&key));
+                self.send_key = Some(key.next());
                 self.send_epoch = self.send_epoch.wrapping_add(1);
                 self.key_number = self.send_number;
                 self.key_ns = now_ns;
@@ -501,9 +505,9 @@ impl Session {
         let number = self.send_number;
         self.send_number += 1;
         self.sent_ns = now_ns;
-        let mut bytes = header(DATA, self.send_epoch, self.send_key.is_some(), self.connection, number).to_vec();
+        let mut bytes = header(DATA, self.send_epoch, suite_of(&self.send_key), self.connection, number).to_vec();
         let body = match &self.send_key {
-            Some(key) => noise::seal(key, number, &bytes, &datagram.0),
+            Some(key) => key.seal(number, &bytes, &datagram.0),
             None => datagram.0,
         };
         bytes.extend(body);

@@ -3,7 +3,8 @@
 
 use std::collections::BTreeMap;
 
-use crate::noise::{self, Handshake, Key};
+use crate::aead::{self, Cipher, Sealing};
+use crate::noise::{self, Handshake, Key, Keys};
 use crate::opening::{header, Attempt, Outcome, Welcome};
 use crate::protobuf::{decode, fits, Node, Value, Writer};
 use crate::schema::{usable_time, ANSWER, DATAGRAM, ECHO, FORCE, FRAME};
@@ -117,7 +118,7 @@ impl Json {
     }
 }
 
-fn welcome(file: &Json, keys: Option<(Key, Key)>) -> Welcome {
+fn welcome(file: &Json, keys: Option<Keys>) -> Welcome {
     let connection = file.at("connection_id").number() as u32;
     Welcome {
         connection,
@@ -130,9 +131,17 @@ fn welcome(file: &Json, keys: Option<(Key, Key)>) -> Welcome {
     }
 }
 
-fn sealed_keys(file: &Json) -> (Key, Key) {
-    let answer = file.at("welcome");
-    (answer.at("client_to_server_key").array(), answer.at("server_to_client_key").array())
+fn sealed_keys(file: &Json) -> Keys {
+    let cipher = if file.at("suite").number() as u8 == 2 { Cipher::AesGcm } else { Cipher::ChaChaPoly };
+    let key = |name: &str| Sealing { cipher, key: file.at("welcome").at(name).array() };
+    Keys { send: key("client_to_server_key"), receive: key("server_to_client_key") }
+}
+
+/// The files of suites 1 and 2; not of 2 where the processor has no AES.
+fn sealed_files() -> Vec<Json> {
+    noise::start();
+    let names: &[&str] = if aead::has_aes() { &["sealed", "sealed_aes"] } else { &["sealed"] };
+    names.iter().map(|name| Json::load(name)).collect()
 }
 
 #[test]
@@ -148,10 +157,15 @@ fn primitives_are_those_of_the_rfcs() {
         let result = case.at("result").bytes();
         assert_eq!(noise::hmac(&case.at("key").bytes(), &case.at("data").bytes())[..result.len()], result);
     }
-    for case in file.at("chacha20_poly1305").list() {
-        let associated = case.at("associated_data").bytes();
-        let (key, nonce) = (case.at("key").array(), case.at("nonce").array());
-        assert_eq!(noise::seal_with(&key, &nonce, &associated, &case.at("text").bytes()), case.at("sealed").bytes());
+    for (name, cipher) in [("chacha20_poly1305", Cipher::ChaChaPoly), ("aes256_gcm", Cipher::AesGcm)] {
+        if cipher == Cipher::AesGcm && !aead::has_aes() {
+            continue;
+        }
+        for case in file.at(name).list() {
+            let associated = case.at("associated_data").bytes();
+            let (key, nonce) = (case.at("key").array(), case.at("nonce").array());
+            assert_eq!(cipher.seal(&key, &nonce, &associated, &case.at("text").bytes()), case.at("sealed").bytes());
+        }
     }
 }
 
@@ -163,60 +177,63 @@ fn a_point_of_low_order_has_no_secret() {
 
 #[test]
 fn the_handshake_is_that_of_the_vectors() {
-    noise::start();
-    let file = Json::load("sealed");
-    let psk: Key = file.at("psk").array();
-    assert_eq!(noise::key_id(&psk).to_vec(), file.at("key_id").bytes());
-    let hello = file.at("hello");
-    let (handshake, message) = Handshake::begin(
-        &psk,
-        &hello.at("prologue").bytes(),
-        file.at("client_ephemeral").array(),
-        &hello.at("body").bytes(),
-    );
-    assert_eq!(message, hello.at("noise_message").bytes());
-    for name in ["welcome", "refused"] {
-        let answer = file.at(name);
-        let (body, send, receive) = handshake.finish(&answer.at("noise_message").bytes()).unwrap();
-        assert_eq!(body, answer.at("body").bytes());
-        assert_eq!(send.to_vec(), answer.at("client_to_server_key").bytes());
-        assert_eq!(receive.to_vec(), answer.at("server_to_client_key").bytes());
+    for file in sealed_files() {
+        let psk: Key = file.at("psk").array();
+        assert_eq!(noise::key_id(&psk).to_vec(), file.at("key_id").bytes());
+        let hello = file.at("hello");
+        let (handshake, message) = Handshake::begin(
+            &psk,
+            &hello.at("prologue").bytes(),
+            file.at("client_ephemeral").array(),
+            &hello.at("body").bytes(),
+        );
+        assert_eq!(message, hello.at("noise_message").bytes());
+        for name in ["welcome", "refused"] {
+            let answer = file.at(name);
+            let finished = handshake.finish(&answer.at("noise_message").bytes()).unwrap();
+            assert_eq!(finished.text, answer.at("body").bytes());
+            let aes = file.at("suite").number() as u8 == 2;
+            let keys = if aes { finished.keys_of_suite_2() } else { finished.keys };
+            assert_eq!(keys.send.key.to_vec(), answer.at("client_to_server_key").bytes());
+            assert_eq!(keys.receive.key.to_vec(), answer.at("server_to_client_key").bytes());
+        }
     }
 }
 
 #[test]
 fn the_keys_seal_and_open_every_datagram() {
-    noise::start();
-    let file = Json::load("sealed");
-    for case in file.at("data").list() {
-        let (bytes, number) = (case.at("datagram").bytes(), case.at("packet_number").text().parse().unwrap());
-        let sends = case.at("direction").text() == "client_to_server";
-        let mut key = if sends { sealed_keys(&file).0 } else { sealed_keys(&file).1 };
-        for _ in 0..case.at("epoch").number() as u32 {
-            key = noise::next_key(&key);
+    for file in sealed_files() {
+        for case in file.at("data").list() {
+            let (bytes, number) = (case.at("datagram").bytes(), case.at("packet_number").text().parse().unwrap());
+            let sends = case.at("direction").text() == "client_to_server";
+            let mut key = if sends { sealed_keys(&file).send } else { sealed_keys(&file).receive };
+            for _ in 0..case.at("epoch").number() as u32 {
+                key = key.next();
+            }
+            let (epoch, connection) = (case.at("epoch").number() as u8, file.at("connection_id").number() as u32);
+            let head = header(3, epoch, key.cipher as u8, connection, number);
+            assert_eq!(bytes[..16], head);
+            assert_eq!(bytes[16..], key.seal(number, &head, &case.at("body").bytes()));
+            assert_eq!(key.open(number, &head, &bytes[16..]).unwrap(), case.at("body").bytes());
         }
-        let head = header(3, case.at("epoch").number() as u8, true, file.at("connection_id").number() as u32, number);
-        assert_eq!(bytes[..16], head);
-        assert_eq!(bytes[16..], noise::seal(&key, number, &head, &case.at("body").bytes()));
-        assert_eq!(noise::open(&key, number, &head, &bytes[16..]).unwrap(), case.at("body").bytes());
     }
 }
 
 #[test]
 fn each_datagram_to_drop_is_counted_as_what_it_is() {
-    noise::start();
-    let file = Json::load("sealed");
-    for case in file.at("dropped").list() {
-        let mut session = Session::new(&welcome(&file, Some(sealed_keys(&file))), None, 0);
-        session.receive(&case.at("datagram").bytes(), 0);
-        let mut expected = Counters::default();
-        match case.at("counter").text() {
-            "forged" => expected.forged = 1,
-            "old_key" => expected.old_key = 1,
-            "malformed" => expected.malformed = 1,
-            other => panic!("{}", other),
+    for file in sealed_files() {
+        for case in file.at("dropped").list() {
+            let mut session = Session::new(&welcome(&file, Some(sealed_keys(&file))), None, 0);
+            session.receive(&case.at("datagram").bytes(), 0);
+            let mut expected = Counters::default();
+            match case.at("counter").text() {
+                "forged" => expected.forged = 1,
+                "old_key" => expected.old_key = 1,
+                "malformed" => expected.malformed = 1,
+                other => panic!("{}", other),
+            }
+            assert_eq!(session.counters, expected, "{}", case.at("name").text());
         }
-        assert_eq!(session.counters, expected, "{}", case.at("name").text());
     }
 }
 
