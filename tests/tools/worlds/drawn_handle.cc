@@ -14,16 +14,16 @@
 
 namespace tendon::simulation {
 
-namespace {
-
-constexpr double kInf = std::numeric_limits<double>::infinity();
-constexpr double kMargin = 1.02;  ///< of true friction over what the limiter is told, at the least
-
 std::string number(double value) {
   std::array<char, 32> buffer{};
   std::snprintf(buffer.data(), buffer.size(), "%.4g", value);
   return buffer.data();
 }
+
+namespace {
+
+constexpr double kInf = std::numeric_limits<double>::infinity();
+constexpr double kMargin = 1.02;  ///< of true friction over what the limiter is told, at the least
 
 Friction draw_friction(Dice& dice, double coulomb_decade, double viscous_decade) {
   return {dice.chance(0.2) ? 0.0 : dice.decades(coulomb_decade - 1, coulomb_decade),

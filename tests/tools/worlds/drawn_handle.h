@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <cstdint>
+#include <string>
 
 #include "clients/cpp/force_client.h"
 #include "tests/tools/worlds/drawn_world.h"
 
 namespace tendon::simulation {
+
+/// In four digits, for people.
+std::string number(double value);
 
 /// Gives the device of `world` what a handle can have beyond a position: it turns, with motors or as the hand turns it,
 /// it grips, and its buttons are pressed. Only a device whose law is one of HandlePort's has such motors. True friction

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdio>
 #include <limits>
 #include <utility>
 
@@ -16,16 +15,11 @@ namespace tendon::simulation {
 
 namespace {
 
-constexpr double kInf = std::numeric_limits<double>::infinity();
+constexpr double kEndless = std::numeric_limits<double>::infinity();
 constexpr std::array<const char*, 6> kEngineNames = {"spring",      "wall with local model", "a million newton",
                                                      "force steps", "negative spring",       "pushes along"};
 using std::chrono::milliseconds;
 
-std::string number(double value) {
-  std::array<char, 32> buffer{};
-  std::snprintf(buffer.data(), buffer.size(), "%.4g", value);
-  return buffer.data();
-}
 std::string ms(Duration duration) { return number(seconds(duration) * 1e3) + " ms"; }
 
 Duration whole_ms(Dice& dice, double low, double high) {
@@ -200,7 +194,7 @@ void draw_device(Dice& dice, DrawnWorld& world, bool sabotaged) {
     device.hostility = dice.uniform();
     device.largest_move = dice.decades(-4, -2);
     if (dice.chance(0.5)) device.clamp = control.max_force * dice.uniform();
-    if (sabotaged) device.clamp = kInf;
+    if (sabotaged) device.clamp = kEndless;
     world.device = device;
     return;
   }
@@ -359,7 +353,7 @@ DrawnWorld draw_world(std::uint64_t seed, const Sabotage& sabotage) {
   config.latest_wake = punctual ? Duration::zero() : config.loop.period;
   control.limiter.longest_hold = punctual ? config.loop.period : 2 * config.loop.period;
   control.max_force = dice.decades(0, 2);
-  control.max_slew = dice.chance(0.3) ? kInf : dice.decades(2, 5);
+  control.max_slew = dice.chance(0.3) ? kEndless : dice.decades(2, 5);
   if (dice.chance(0.1) && !sabotaged) {
     config.pause_probability = 2e-3;
     config.pause = dice.milliseconds(5, 60);
@@ -477,7 +471,7 @@ Physics make_physics(const DrawnClient& client) {
   const double k = client.stiffness;
   auto of_a_point = [client, k, dice = Dice(client.seed)](const DeviceState& hand) mutable -> Touch {
     if (client.bad_days > 0 && dice.chance(client.bad_days)) {
-      return Vec3(dice.chance(0.5) ? Vec3(Vec3::Constant(std::nan(""))) : Vec3(0, kInf, 0));
+      return Vec3(dice.chance(0.5) ? Vec3(Vec3::Constant(std::nan(""))) : Vec3(0, kEndless, 0));
     }
     switch (client.engine) {
       case Engine::kSpring:
