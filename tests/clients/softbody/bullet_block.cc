@@ -21,10 +21,10 @@
 namespace tendon::softbody {
 namespace {
 
-constexpr btScalar kStep = 0.01;     // s
-constexpr int kSteps = 400;          // after which nothing moves
-constexpr btScalar kDamping = 0.05;  // Pa·s, of both moduli
-constexpr btScalar kMass = 0.5;      // kg
+constexpr btScalar kStep = 0.01F;     // s
+constexpr int kSteps = 400;           // after which nothing moves
+constexpr btScalar kDamping = 0.05F;  // Pa·s, of both moduli
+constexpr btScalar kMass = 0.5F;      // kg
 
 /// A force on the patch, downwards, whatever the body does.
 class Press final : public btDeformableLagrangianForce {
@@ -92,8 +92,8 @@ void press(Law law, int n, double newtons) {
     const auto tetrahedron = mesh.element(e);
     body.appendTetra(tetrahedron[0], tetrahedron[1], tetrahedron[2], tetrahedron[3]);
   }
-  body.m_tetraScratches.resize(body.m_tetras.size());  // as Bullet's own readers of meshes do
-  body.m_tetraScratchesTn.resize(body.m_tetras.size());
+  body.m_tetraScratches.resizeNoInitialize(body.m_tetras.size());  // as Bullet's own readers of meshes do
+  body.m_tetraScratchesTn.resizeNoInitialize(body.m_tetras.size());
   body.initializeDmInverse();
   body.setTotalMass(kMass);
   for (int i = 0; i < nodes.size(); ++i) {
