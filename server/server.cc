@@ -193,6 +193,12 @@ Mailboxes::Capacities for_device(Mailboxes::Capacities capacities, const DeviceI
   return capacities;
 }
 
+/// How many devices of that period one thread takes: whole banks, so that the states of a session leave together.
+std::size_t devices_of_a_thread(Duration period) {
+  const auto fit = static_cast<std::size_t>(period / kStepBudget);
+  return fit < limits::kMaxDevices ? fit : fit - fit % limits::kMaxDevices;
+}
+
 /// Throws std::runtime_error, a sentence for the operator, when the system refuses the thread.
 template <class Run>
 std::thread thread_of(const std::string& name, Run run) {
@@ -224,8 +230,8 @@ Server::DeviceRuntimes Server::runtimes_of(const std::vector<Scene>& scenes, Gua
       coupling->spring.epoch =
           static_cast<std::uint64_t>((clock::now().time_since_epoch() + clock::unix_offset()).count());
     }
-    Mailboxes::Capacities capacities;
-    if (!scenes.front().recording) capacities = Mailboxes::Capacities::unrecorded(scene.loop.period);
+    Mailboxes::Capacities capacities = scenes.front().recording ? Mailboxes::Capacities::recorded(scenes.size())
+                                                                : Mailboxes::Capacities::unrecorded(scene.loop.period);
     if (!devices.empty()) capacities.datagrams = 1;  // all go to the first
     // A power of two.
     const std::size_t couplings = std::max<std::size_t>(scene.loop.control.leaders.size(), 1);
@@ -245,9 +251,8 @@ std::vector<Server::HapticThread> Server::haptic_threads_of(const DeviceRuntimes
     const Scene& scene = runtime->scene;
     const auto has_room = [&scene](const HapticThread& thread) {
       const Scene& other = thread.devices.front()->scene;
-      const auto count = static_cast<Duration::rep>(thread.devices.size());
       return scene.shares_thread() && other.shares_thread() && other.loop.period == scene.loop.period &&
-             other.cpu == scene.cpu && kStepBudget * (count + 1) <= scene.loop.period;
+             other.cpu == scene.cpu && thread.devices.size() < devices_of_a_thread(scene.loop.period);
     };
     auto place = std::ranges::find_if(threads, has_room);
     if (place == threads.end()) place = threads.emplace(threads.end());

@@ -448,6 +448,9 @@ void declare_device(Table& device, Draft& draft) {
   device.kind(kinds, [&draft](Table& keys, std::size_t kind) {
     keys.key("name", draft.scene.name, Label{}, "the name by which clients ask for this device, of several",
              Absent{.text = "the name of the scene file"});
+    keys.key("count", draft.scene.count, Count{kMostDevices, 1},
+             "for \"simulated\": so many devices, all alike, named NAME-0, NAME-1 … A session has devices of one bank "
+             "of 16: NAME-0 to NAME-15, NAME-16 to NAME-31 …");
     keys.key("axes", draft.scene.axes, Axes{},
              "how its base frame lies before the operator; programs turn positions by it",
              Absent{.text = "the driver's; of a recorded hand it is not known"});
