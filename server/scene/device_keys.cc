@@ -356,6 +356,9 @@ void declare(Table& keys, SimulatedDevice::Config& /*device*/, Draft& draft) {
   SimulatedDevice::Config& config = draft.simulated;
   keys.key("profile", draft.profile, profile_names(), "the effects of a real device; each key below overrides one");
   if (draft.profile != nullptr) config = draft.profile->device();
+  keys.key(
+      "substep_us", config.max_substep, Number{.least = 10, .most = 4000},
+      "the longest step of the simulation: longer ones cost less, and are as right where nothing stiff is simulated");
   keys.key("start_position_mm", config.start_position, Vector{}, "of the handle",
            Absent{.text = "where the hand starts, or the origin"});
   keys.table("effects", [&draft](Table& effects) { declare_effects(effects, draft); });
