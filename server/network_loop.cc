@@ -58,7 +58,9 @@ NetworkLoop::NetworkLoop(const Config& config, Link& link, const std::vector<Mai
   half_open_.reserve(config.max_half_open);
   for (std::size_t i = 0; i < std::min(config.couplings.size(), devices_.size()); ++i) {
     devices_[i].coupling = config.couplings[i];
+    if (config.couplings[i]) coupled_.push_back(static_cast<std::uint32_t>(i));
   }
+  for (Mailboxes* const each : mail) states_.push_back({&each->state});
   for (std::size_t i = 0; i < std::min(config.leaders.size(), devices_.size()); ++i) {
     devices_[i].leaders = config.leaders[i];
   }
@@ -405,16 +407,15 @@ void leave_out_handle(DeviceState& state) {
 
 /// The states of a guest leave before those of the next one are looked at.
 void NetworkLoop::publish(LocalTime now) {
-  for (std::uint32_t place = 0; place < devices_.size(); ++place) {
-    ServedDevice& device = devices_[place];
-    if (device.coupling) publish_ports(now, place);
-    device.fresh = device.mail->state.take();
-    if (device.fresh == nullptr) continue;
-    device.sampled.observe(device.fresh->tick, LocalTime(device.fresh->sampled.time_since_epoch()), now);
+  for (const std::uint32_t place : coupled_) publish_ports(now, place);
+  for (std::size_t place = 0; place < states_.size(); ++place) {
+    const DeviceState* const fresh = states_[place].fresh = states_[place].box->take();
+    if (fresh == nullptr) continue;
+    devices_[place].sampled.observe(fresh->tick, LocalTime(fresh->sampled.time_since_epoch()), now);
   }
   for (Guest& guest : guests_) {
     for (View& view : guest.views) {
-      if (const DeviceState* const state = devices_[view.device].fresh) tell_state(guest, view, *state);
+      if (const DeviceState* const state = states_[view.device].fresh) tell_state(guest, view, *state);
     }
     send_all(now, guest);
   }

@@ -217,10 +217,18 @@ class NetworkLoop {
   SessionChange change_of(const Guest& guest, bool came, const std::string& why) const;
   void notice(bool warning, std::string text, std::optional<SessionChange> session = std::nullopt);
 
+  /// Of a device, apart from all else of it: each turn looks at every one of them.
+  struct NewestState {
+    Latest<DeviceState>* box;
+    const DeviceState* fresh = nullptr;  ///< came since the turn before; null: none
+  };
+
   Config config_;
   Link& link_;
   DatagramSieve sieve_;
   std::vector<ServedDevice> devices_;
+  std::vector<NewestState> states_;     ///< by place, as the devices
+  std::vector<std::uint32_t> coupled_;  ///< places of the devices that may be coupled
   Doorman doorman_;
   Admission admission_;
   Leases leases_{devices_};

@@ -474,6 +474,7 @@ void Server::run_log() {
     drain_to_recorder(now);
     for (auto& runtime : devices_) report_health(now, *runtime);
     if (now >= tell_next_ || last) {
+      for (const HapticThread& thread : haptic_threads_) report_overruns(thread);
       for (auto& runtime : devices_) report_trouble(*runtime);
       record_left_out(now);
       tell_next_ = now + kTellPeriod;
@@ -597,16 +598,27 @@ void Server::report_phase(DeviceRuntime& runtime, const PortRecord& port) {
   trouble ? log::warn(text) : log::info(text);
 }
 
+/// All devices of a thread are late together: one line says it, with the most that one of them has had.
+void Server::report_overruns(const HapticThread& thread) const {
+  std::uint64_t most = 0;
+  Duration longest{};
+  for (const DeviceRuntime* runtime : thread.devices) {
+    const HapticLoop::Stats now = runtime->haptic.stats();
+    most = std::max(most, now.overruns - runtime->told.overruns);
+    longest = std::max(longest, now.longest_interval);
+  }
+  if (most == 0) return;
+  const std::size_t others = thread.devices.size() - 1;
+  log::warn(prefix(*thread.devices.front()) + std::to_string(most) + " overruns in the last second" +
+            (others > 0 ? ", as of " + std::to_string(others) + " more on its thread" : "") +
+            "; longest interval so far " +
+            std::to_string(std::chrono::duration_cast<std::chrono::microseconds>(longest).count()) + " µs");
+}
+
 void Server::report_trouble(DeviceRuntime& runtime) {
   report_safety(runtime);
   report_counts(runtime);
   const HapticLoop::Stats now = runtime.haptic.stats();
-  if (now.overruns > runtime.told.overruns) {
-    log::warn(prefix(runtime) + std::to_string(now.overruns - runtime.told.overruns) +
-              " overruns in the last second; longest interval so far " +
-              std::to_string(std::chrono::duration_cast<std::chrono::microseconds>(now.longest_interval).count()) +
-              " µs");
-  }
   if (now.device != runtime.told.device) log::info(prefix(runtime) + describe(now.device, runtime.scene));
   // Each fault of the controller or of the safety layer freezes the flight recorder once, and saving thaws it.
   // report_safety names the faults of the safety layer.

@@ -123,7 +123,6 @@ struct ServedDevice {
   DeviceDescription about;  ///< with its number in a session, as `handle`
   HandleDescription handle;
   Mailboxes* mail;
-  const DeviceState* fresh = nullptr;  ///< the state that came since the turn before; null: none
   SampledSteps sampled{};
   std::vector<ServedChannel> channels{};
   std::optional<Couple> coupling{};     ///< what our end is like; empty: it is not to be coupled

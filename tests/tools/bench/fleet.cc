@@ -101,15 +101,15 @@ class Trial {
   void measure() {
     clock::sleep_until(clock::now() + fleet_.settle);
     wait_for(Shared::kMeasuring);
+    const LocalTime start = clock::now();
     const ServerProcess::Spent before = server_.spent();
     const Duration guests_before = guests_->processor_time();
-    const LocalTime start = clock::now();
     clock::sleep_until(start + fleet_.length);
     while (shared_->states == 0 && clock::now() - start < kPatience) clock::sleep_until(clock::now() + milliseconds(1));
     const ServerProcess::Spent after = server_.spent();
     result_.guests = guests_->processor_time() - guests_before;
-    result_.seconds = seconds(clock::now() - start);
     wait_for(Shared::kReporting);
+    result_.seconds = seconds(shared_->until - shared_->from);
     result_.resident = server_.resident();
     result_.haptic = after.haptic - before.haptic;
     result_.network = after.network - before.network;

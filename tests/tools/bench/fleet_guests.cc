@@ -222,6 +222,7 @@ void serve_guests(const std::vector<Plan>& plans, const Address& server, const F
     if (phase != shared.at_work.load(std::memory_order_relaxed)) {
       Guest::unix_offset = clock::unix_offset();
       Guest::measuring = phase == Shared::kMeasuring;
+      (phase == Shared::kMeasuring ? shared.from : shared.until) = clock::now();
       if (phase == Shared::kMeasuring) lost_before = lost();
       if (phase == Shared::kReporting) shared.lost = lost() - lost_before;
       shared.at_work.store(phase, std::memory_order_release);

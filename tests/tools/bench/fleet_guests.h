@@ -42,6 +42,8 @@ struct Shared {
   // Written by the guests before they are at kReporting.
   injector::DurationHistogram state_age;
   injector::DurationHistogram loop_age;
+  LocalTime from{};  ///< that it was measured, as they saw it
+  LocalTime until{};
   std::atomic<std::uint64_t> states{0};
   std::uint64_t answered_in_time = 0;
   std::uint64_t lost = 0;

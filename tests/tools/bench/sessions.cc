@@ -23,10 +23,9 @@ double percent(std::uint64_t part, std::uint64_t whole) {
 }
 
 /// As many datagrams of such sizes as the fleet's, bare.
-BareResult floor_of(const Fleet& fleet, const FleetResult& result, std::size_t sockets) {
+BareResult floor_of(const Fleet& fleet, const FleetResult& result) {
   BareTraffic bare;
   bare.sessions = result.sessions;
-  bare.sockets = sockets;
   bare.period = from_seconds(1.0 / fleet.state_hz);
   bare.length = fleet.length / 2;
   bare.priority = fleet.priority;
@@ -127,7 +126,7 @@ void measure_sessions(Run& run) {
       const std::string what = std::to_string(count) + " sessions, states at " + std::to_string(state_hz) + " Hz";
       const FleetResult result = run_fleet(fleet);
       came(result, what);
-      Row row = row_of(fleet, result, floor_of(fleet, result, 1), what + ": age of a state");
+      Row row = row_of(fleet, result, floor_of(fleet, result), what + ": age of a state");
       if (result.controllers < result.sessions) {
         row.note = std::to_string(result.controllers) + " controllers, the others observers; " + row.note;
       }
@@ -156,7 +155,7 @@ void measure_512(Run& run) {
     const std::string what = std::to_string(count) + " devices, states and forces at 1 kHz, sealed";
     const FleetResult result = run_fleet(fleet);
     came(result, what);
-    Row row = row_of(fleet, result, floor_of(fleet, result, result.sessions), what + ": age of a state");
+    Row row = row_of(fleet, result, floor_of(fleet, result), what + ": age of a state");
     const double in_time = percent(result.answered_in_time, result.steps_owed);
     const double cores = seconds(server_time(result)) / result.seconds;
     if (in_time >= kInTime) knee = count;
