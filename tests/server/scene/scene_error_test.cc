@@ -113,9 +113,8 @@ TEST(SceneError, NamesTheClosestKeyOrAllOfThem) {
        "s.toml:5: recording.filename: unknown key; known here: path, rotate_mb, rotate_min, "
        "budget_mb, keep, one_in, datagrams_kb_per_s"},
       {"[device.gravity]\n",
-       "s.toml:4: device.gravity: unknown table; known here: kind, name, axes, group, held_by, profile, "
-       "start_position_mm, effects, "
-       "hand, "
+       "s.toml:4: device.gravity: unknown table; known here: kind, name, count, axes, group, held_by, profile, "
+       "substep_us, start_position_mm, effects, hand, "
        "environment, rotation, gripper"},
       {"[loop]\n" + std::string(10'000, 'x') + " = 1\n", "s.toml:5: loop." + std::string(10'000, 'x') +
                                                              ": unknown key; known here: period_us, longest_hold_us, "
