@@ -80,6 +80,14 @@ class TwoBanks : public testing::Test {
           out.welcome = accepted->welcome;
           session.emplace(Session::Config{.connection_id = accepted->connection_id}, now_);
           for (const Request& request : asks) session->request(request);
+          if (says_bye_) {
+            session->close(Code::kShutdown, "done");
+            const std::size_t size = session->next_datagram(now_, buffer);
+            server_.inbox.push_back(
+                {end.self, server_.self, Bytes(buffer.begin(), buffer.begin() + static_cast<int>(size))});
+            loop_->turn(now_);
+            return out;
+          }
         }
       }
       while (const auto event = session ? session->next_event() : nullptr) {
@@ -104,6 +112,7 @@ class TwoBanks : public testing::Test {
   End server_{wire_, parse_address("127.0.0.1:47100")};
   std::vector<std::unique_ptr<Mailboxes>> boxes_;
   std::unique_ptr<NetworkLoop> loop_;
+  bool says_bye_ = false;  ///< in its first datagram; the further ones are lost
   std::uint64_t tick_ = 0;
   std::uint16_t port_ = 4000;
 };
@@ -178,6 +187,13 @@ TEST_F(TwoBanks, WhoKnowsNoClaimsHasTheFirstDevice) {
   EXPECT_TRUE(told.welcome->grants.empty());
   EXPECT_GT(told.states[0], 200U);
   EXPECT_EQ(told.seen[0], 0U);
+}
+
+TEST_F(TwoBanks, WhoseFirstWordIsByeHasLeft) {
+  says_bye_ = true;
+  run({17});
+  EXPECT_EQ(loop_->stats().welcomed, 1U);
+  EXPECT_EQ(loop_->stats().channels.at(17).holder, "");
 }
 
 TEST_F(TwoBanks, MoreDevicesThanAServerMayHaveAreRefused) {
