@@ -40,7 +40,7 @@ inline constexpr double kMaxDeadbandFloor = 0.1;  ///< m/s
 inline constexpr Duration kMinStateSilence = std::chrono::milliseconds(1);
 inline constexpr Duration kMaxStateSilence = std::chrono::milliseconds(20);
 
-/// Devices of one server, numbered from 0: ten fingers of two hands, and six more for tools. Each has a thread.
+/// Devices of one session, numbered from 0: ten fingers of two hands, and six more for tools.
 inline constexpr std::uint32_t kMaxDevices = 16;
 /// Channels of one device, numbered from 0. Each adds a reconstruction to every haptic step.
 inline constexpr std::uint32_t kMaxChannels = 8;

@@ -49,7 +49,7 @@ enum class Code : std::uint8_t {
   kReplaced = 9,     ///< another program with the same key has taken this place: do not come back unasked
 };
 
-// Devices of a server and channels of a device are numbered from 0: below limits::kMaxDevices and kMaxChannels. A
+// Devices of a session and channels of a device are numbered from 0: below limits::kMaxDevices and kMaxChannels. A
 // channel is where one engine's forces come in; the device renders what its channels make together.
 
 /// Server → client, unreliable, newest wins for each device: the device at one haptic step.

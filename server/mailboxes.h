@@ -76,6 +76,15 @@ struct Mailboxes {
     std::size_t datagrams = 4096;
     bool flight_handles = true;  ///< the device has more than a position
 
+    /// Of one of so many devices in a server that records. The steps of more than 16 have no more room than those of 16
+    /// together: 512 steps for each of 512 devices, half a second at 1 kHz.
+    static Capacities recorded(std::size_t devices) {
+      constexpr Capacities kOfFew;
+      const std::size_t share =
+          kOfFew.steps * limits::kMaxDevices / std::max<std::size_t>(devices, limits::kMaxDevices);
+      return {.steps = std::bit_floor(share)};
+    }
+
     /// Of a loop with this period in a server that does not record: nobody waits for a disk, the log thread counts the
     /// steps and comes every 20 ms. A ring of at least 125 ms; 0.9 MB in all for a device that has a position only.
     static Capacities unrecorded(Duration period) {

@@ -391,7 +391,8 @@ int main(int argc, char** argv) {
       "remote physics engines send forces over UDP.\n\n"
       "Example:  tendond deploy/scenes/demo.toml --record run.mcap\n\n"
       "Several devices: a scene for each; [network] and [recording] are in the first one only.\n"
-      "Example:  tendond deploy/scenes/left.toml deploy/scenes/right.toml\n");
+      "Example:  tendond deploy/scenes/left.toml deploy/scenes/right.toml\n"
+      "Many simulated ones: [device] count = 512 in one scene.\n");
   std::vector<std::filesystem::path> scene_files;
   std::string record;
   std::string listen;
@@ -485,7 +486,7 @@ int main(int argc, char** argv) {
     if (!listen.empty()) scenes.front().network.listen = parse_address(listen);
     if (!dial.empty()) dial_instead(scenes, parse_address(dial));
     set_falcon(scenes, firmware_file, accept_unknown_firmware);
-    return run(scenes, duration_s, json);
+    return run(each_device(scenes), duration_s, json);
   } catch (const std::exception& problem) {
     log::error(problem.what());
     return 2;

@@ -58,7 +58,9 @@ NetworkLoop::NetworkLoop(const Config& config, Link& link, const std::vector<Mai
   half_open_.reserve(config.max_half_open);
   for (std::size_t i = 0; i < std::min(config.couplings.size(), devices_.size()); ++i) {
     devices_[i].coupling = config.couplings[i];
+    if (config.couplings[i]) coupled_.push_back(static_cast<std::uint32_t>(i));
   }
+  for (Mailboxes* const each : mail) states_.push_back({&each->state});
   for (std::size_t i = 0; i < std::min(config.leaders.size(), devices_.size()); ++i) {
     devices_[i].leaders = config.leaders[i];
   }
@@ -80,6 +82,7 @@ LocalTime NetworkLoop::turn(LocalTime now) {
   const bool more = drain(now);
   report(now);
   for (Guest& guest : guests_) {
+    if (guest.session.open() && guest.session.next_tick() > now) continue;  // of many guests few have something to do
     if (!guest.gone) guest.session.tick(now);
     take_events(now, guest);
     send_all(now, guest);
@@ -287,7 +290,7 @@ void NetworkLoop::open(LocalTime now, Guest guest) {
     if (holder == nullptr) {
       leases_.hold(now, seat.device, seat.channel, arrived);
     } else if (arrived.can_lose) {  // needed only when somebody has come while it was half-open
-      arrived.session.request(LeaseLost{.device = seat.device, .channel = seat.channel, .to = holder->name});
+      arrived.session.request(LeaseLost{.device = number_of(seat.device), .channel = seat.channel, .to = holder->name});
     }
   }
 }
@@ -303,7 +306,7 @@ void NetworkLoop::dispossess(LocalTime now, Guest& loser, const Guest& winner, c
   notice(false, "\"" + winner.name + "\" takes " + about.name + "/" + about.channels[lost.channel].name + " from \"" +
                     loser.name + "\"");
   loser.uncouple(lost.device, lost.channel);
-  const LeaseLost news{.device = lost.device, .channel = lost.channel, .to = winner.name};
+  const LeaseLost news{.device = number_of(lost.device), .channel = lost.channel, .to = winner.name};
   if (loser.can_lose && loser.session.request(news)) return;
   // The guest does not know the request, or does not answer.
   loser.session.close(Code::kReplaced, "\"" + winner.name + "\" has taken this place");
@@ -402,40 +405,47 @@ void leave_out_handle(DeviceState& state) {
 
 }  // namespace
 
+/// The states of a guest leave before those of the next one are looked at.
 void NetworkLoop::publish(LocalTime now) {
-  for (std::uint32_t number = 0; number < devices_.size(); ++number) {
-    if (devices_[number].coupling) publish_ports(now, number);
-    const DeviceState* state = devices_[number].mail->state.take();
-    if (state == nullptr) continue;
-    devices_[number].sampled.observe(state->tick, LocalTime(state->sampled.time_since_epoch()), now);
-    for (Guest& guest : guests_) {
-      View* const view = view_of(guest, number);
-      if (view == nullptr || (guest.coupled && guest.coupled->device == number)) continue;
-      if (guest.sees_handle) view->pressed |= state->buttons;
-      const std::uint64_t one_in = guest.adaptation ? guest.adaptation->one_in() : 1;
-      if (state->tick - view->last_state < std::max(view->state_every, one_in)) continue;
-      DeviceState told = *state;
-      leave_out_what_no_frame_carries(told);
-      if (!guest.diagnoses) {
-        told.force_wanted.reset();
-        told.stiffness_wanted.reset();
-      }
-      if (!guest.sees_handle) leave_out_handle(told);
-      if (!guest.sees_joints) told.joints.reset();
-      told.buttons = view->pressed;
-      // The guest foretells from the rounded values that it is sent.
-      if (guest.sees_columns && fits_columns(told)) round_to_columns(told);
-      if (view->deadband && !view->deadband->passes(told)) {
-        ++stats_.foretold;
-        view->pressed = 0;  // it believes just these to be held: a release that comes next is news
-        continue;
-      }
-      view->last_state = state->tick;
-      view->pressed = 0;
-      guest.session.send(told);
-    }
+  for (const std::uint32_t place : coupled_) publish_ports(now, place);
+  for (std::size_t place = 0; place < states_.size(); ++place) {
+    const DeviceState* const fresh = states_[place].fresh = states_[place].box->take();
+    if (fresh == nullptr) continue;
+    devices_[place].sampled.observe(fresh->tick, LocalTime(fresh->sampled.time_since_epoch()), now);
   }
-  for (Guest& guest : guests_) send_all(now, guest);
+  for (Guest& guest : guests_) {
+    for (View& view : guest.views) {
+      if (const DeviceState* const state = states_[view.device].fresh) tell_state(guest, view, *state);
+    }
+    send_all(now, guest);
+  }
+}
+
+void NetworkLoop::tell_state(Guest& guest, View& view, const DeviceState& state) {
+  if (guest.coupled && guest.coupled->device == view.device) return;
+  if (guest.sees_handle) view.pressed |= state.buttons;
+  const std::uint64_t one_in = guest.adaptation ? guest.adaptation->one_in() : 1;
+  if (state.tick - view.last_state < std::max(view.state_every, one_in)) return;
+  DeviceState told = state;
+  told.device = number_of(view.device);
+  leave_out_what_no_frame_carries(told);
+  if (!guest.diagnoses) {
+    told.force_wanted.reset();
+    told.stiffness_wanted.reset();
+  }
+  if (!guest.sees_handle) leave_out_handle(told);
+  if (!guest.sees_joints) told.joints.reset();
+  told.buttons = view.pressed;
+  // The guest foretells from the rounded values that it is sent.
+  if (guest.sees_columns && fits_columns(told)) round_to_columns(told);
+  if (view.deadband && !view.deadband->passes(told)) {
+    ++stats_.foretold;
+    view.pressed = 0;  // it believes just these to be held: a release that comes next is news
+    return;
+  }
+  view.last_state = state.tick;
+  view.pressed = 0;
+  guest.session.send(told);
 }
 
 void NetworkLoop::take_events(LocalTime now, Guest& guest) {
@@ -461,12 +471,13 @@ void NetworkLoop::send_all(LocalTime now, Guest& guest) {
 }
 
 void NetworkLoop::take_force(LocalTime now, Guest& guest, const ForceCommand& command) {
-  const bool there = command.device < devices_.size() && command.channel < devices_[command.device].channels.size();
-  if (!there || leases_.holder(command.device, command.channel) != guest.id()) {
+  const std::uint32_t place = guest.device_of(command.device);
+  const bool there = place < devices_.size() && command.channel < devices_[place].channels.size();
+  if (!there || leases_.holder(place, command.channel) != guest.id()) {
     ++stats_.denied;
     return;
   }
-  ServedDevice& device = devices_[command.device];
+  ServedDevice& device = devices_[place];
   ServedChannel& channel = device.channels[command.channel];
   const auto answered = device.sampled.find(command.based_on_tick);
   if (!answered) {
@@ -479,7 +490,7 @@ void NetworkLoop::take_force(LocalTime now, Guest& guest, const ForceCommand& co
     ++stats_.hopeless;
     return;
   }
-  leases_.renew(now, command.device, command.channel);
+  leases_.renew(now, place, command.channel);
   const double bound = device.about.max_force;  // N; 0: the device has not said it
   if (bound > 0 && command.force.squaredNorm() > bound * bound) channel.lateness.cut();
   const LinkStats& link = guest.session.stats();
@@ -510,30 +521,31 @@ void NetworkLoop::take_force(LocalTime now, Guest& guest, const ForceCommand& co
 
 /// The other end of a device, while its client holds the channel.
 void NetworkLoop::take_port(LocalTime now, Guest& guest, const PortFrame& port) {
-  const bool coupled = guest.coupled && guest.coupled->device == port.device && guest.coupled->channel == port.channel;
-  if (!coupled || leases_.holder(port.device, port.channel) != guest.id()) {
+  const std::uint32_t place = guest.device_of(port.device);
+  const bool coupled = guest.coupled && guest.coupled->device == place && guest.coupled->channel == port.channel;
+  if (!coupled || leases_.holder(place, port.channel) != guest.id()) {
     ++stats_.denied;
     return;
   }
-  leases_.renew(now, port.device, port.channel);
-  const auto coupling = coupling_by(devices_[port.device], port.channel);
-  if (coupling) arrived(now, port.device, *coupling, port.channel, port);
+  leases_.renew(now, place, port.channel);
+  const auto coupling = coupling_by(devices_[place], port.channel);
+  if (coupling) arrived(now, place, *coupling, port.channel, port);
 }
 
 /// For the haptic thread; and for observers, when they are told next.
-void NetworkLoop::arrived(LocalTime now, std::uint32_t number, std::uint32_t coupling, std::uint32_t channel,
+void NetworkLoop::arrived(LocalTime now, std::uint32_t place, std::uint32_t coupling, std::uint32_t channel,
                           const PortState& port) {
-  ServedDevice& device = devices_[number];
+  ServedDevice& device = devices_[place];
   device.mail->port_in[coupling].put({port, now, device.peers[coupling]});
   const auto waits = [&](Guest& guest) {
-    View* const view = guest.sees_ports ? view_of(guest, number) : nullptr;
+    View* const view = guest.sees_ports ? view_of(guest, place) : nullptr;
     if (view != nullptr) view->ports[coupling].peer_waits = true;
     return view != nullptr;
   };
   if (std::count_if(guests_.begin(), guests_.end(), waits) == 0) return;
   PortFrame& frame = device.peer_ports[coupling];
   static_cast<PortState&>(frame) = port;
-  frame.device = number;
+  frame.device = number_of(place);
   frame.channel = channel;
   frame.of_peer = true;
 }
@@ -553,7 +565,7 @@ void NetworkLoop::publish_port(LocalTime now, std::uint32_t device, std::uint32_
   }
   PortFrame frame;
   static_cast<PortState&>(frame) = port;
-  frame.device = device;
+  frame.device = number_of(device);
   const auto& leaders = devices_[device].leaders;
   if (coupling < leaders.size()) frame.channel = leaders[coupling];
   for (Guest& guest : guests_) {
@@ -562,17 +574,17 @@ void NetworkLoop::publish_port(LocalTime now, std::uint32_t device, std::uint32_
     frame.channel = guest.coupled->channel;
     guest.session.send(frame);
   }
-  show_ports(now, coupling, frame);
+  show_ports(now, device, coupling, frame);
 }
 
 /// Both ends of a coupling go to the observers that want them, as often as they want states and at most 50 times a
 /// second. `mine` is our end, with the channel of the other one.
-void NetworkLoop::show_ports(LocalTime now, std::uint32_t coupling, PortFrame mine) {
-  ServedDevice& device = devices_[mine.device];
+void NetworkLoop::show_ports(LocalTime now, std::uint32_t place, std::uint32_t coupling, PortFrame mine) {
+  ServedDevice& device = devices_[place];
   PortFrame& theirs = device.peer_ports[coupling];
   tell_scales(device.coupling->role == PortRole::kLeader ? mine : theirs, *device.coupling);
   for (Guest& guest : guests_) {
-    View* const view = guest.sees_ports && !guest.gone ? view_of(guest, mine.device) : nullptr;
+    View* const view = guest.sees_ports && !guest.gone ? view_of(guest, place) : nullptr;
     if (view == nullptr || now < view->ports[coupling].due) continue;
     const std::uint64_t every =
         std::max<std::uint64_t>(view->state_every, guest.adaptation ? guest.adaptation->one_in() : 1);
@@ -637,7 +649,11 @@ void NetworkLoop::blame(const Guest& guest, Lateness::Cause cause, std::uint64_t
   }
 }
 
-void NetworkLoop::answer(LocalTime now, Guest& guest, std::uint32_t id, const Request& request) {
+void NetworkLoop::answer(LocalTime now, Guest& guest, std::uint32_t id, Request request) {
+  const auto find_device = [&guest](auto& wanted) {
+    if constexpr (requires { wanted.device; }) wanted.device = guest.device_of(wanted.device);
+  };
+  std::visit(find_device, request);
   const Asker asker{
       .guest = guest, .may_take_over = may_take_over(guest), .devices = devices_, .guests = guests_, .leases = leases_};
   Outcome outcome = tendon::answer(now, asker, request);

@@ -57,7 +57,7 @@ class NetworkLoop {
     bool (*needs_no_key)(const Address& from) noexcept = nullptr;
     std::uint32_t first_connection_id = 1;  ///< random at start, so that a restarted server does not know old guests
     std::string server_name = "tendond";
-    /// What guests are told of each device; its number is its place, `holder` does not count.
+    /// What guests are told of each device, by its place (kMostDevices at the most); number and `holder` do not count.
     std::vector<DeviceDescription> devices{};
     std::vector<HandleDescription> handles{};  ///< likewise; fewer: of the others nothing is known
     /// Likewise; empty: that device is not to be coupled.
@@ -194,17 +194,18 @@ class NetworkLoop {
   LocalTime turn_peers(LocalTime now);
   void publish_ports(LocalTime now, std::uint32_t device);
   void publish_port(LocalTime now, std::uint32_t device, std::uint32_t coupling, const PortState& port);
-  void show_ports(LocalTime now, std::uint32_t coupling, PortFrame mine);
-  void arrived(LocalTime now, std::uint32_t number, std::uint32_t coupling, std::uint32_t channel,
+  void show_ports(LocalTime now, std::uint32_t place, std::uint32_t coupling, PortFrame mine);
+  void arrived(LocalTime now, std::uint32_t place, std::uint32_t coupling, std::uint32_t channel,
                const PortState& port);
   void take_refused(Guest& guest);
   void blame(const Guest& guest, Lateness::Cause cause, std::uint64_t count);
-  void answer(LocalTime now, Guest& guest, std::uint32_t id, const Request& request);
+  void answer(LocalTime now, Guest& guest, std::uint32_t id, Request request);
   void dispossess(LocalTime now, Guest& loser, const Guest& winner, const TakeLease& lost);
   bool may_take_over(const Guest& guest) const;
   void leave(Guest& guest, const std::string& how);
   void send_all(LocalTime now, Guest& guest);
   void publish(LocalTime now);
+  void tell_state(Guest& guest, View& view, const DeviceState& state);
   void hear(LocalTime now, Guest& guest);
   void measure(LocalTime now, Guest& guest);
   void adapt(LocalTime now, Guest& guest);
@@ -216,10 +217,18 @@ class NetworkLoop {
   SessionChange change_of(const Guest& guest, bool came, const std::string& why) const;
   void notice(bool warning, std::string text, std::optional<SessionChange> session = std::nullopt);
 
+  /// Of a device, apart from all else of it: each turn looks at every one of them.
+  struct NewestState {
+    Latest<DeviceState>* box;
+    const DeviceState* fresh = nullptr;  ///< came since the turn before; null: none
+  };
+
   Config config_;
   Link& link_;
   DatagramSieve sieve_;
   std::vector<ServedDevice> devices_;
+  std::vector<NewestState> states_;     ///< by place, as the devices
+  std::vector<std::uint32_t> coupled_;  ///< places of the devices that may be coupled
   Doorman doorman_;
   Admission admission_;
   Leases leases_{devices_};

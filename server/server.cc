@@ -193,6 +193,12 @@ Mailboxes::Capacities for_device(Mailboxes::Capacities capacities, const DeviceI
   return capacities;
 }
 
+/// How many devices of that period one thread takes: whole banks, so that the states of a session leave together.
+std::size_t devices_of_a_thread(Duration period) {
+  const auto fit = static_cast<std::size_t>(period / kStepBudget);
+  return fit < limits::kMaxDevices ? fit : fit - fit % limits::kMaxDevices;
+}
+
 /// Throws std::runtime_error, a sentence for the operator, when the system refuses the thread.
 template <class Run>
 std::thread thread_of(const std::string& name, Run run) {
@@ -224,8 +230,8 @@ Server::DeviceRuntimes Server::runtimes_of(const std::vector<Scene>& scenes, Gua
       coupling->spring.epoch =
           static_cast<std::uint64_t>((clock::now().time_since_epoch() + clock::unix_offset()).count());
     }
-    Mailboxes::Capacities capacities;
-    if (!scenes.front().recording) capacities = Mailboxes::Capacities::unrecorded(scene.loop.period);
+    Mailboxes::Capacities capacities = scenes.front().recording ? Mailboxes::Capacities::recorded(scenes.size())
+                                                                : Mailboxes::Capacities::unrecorded(scene.loop.period);
     if (!devices.empty()) capacities.datagrams = 1;  // all go to the first
     // A power of two.
     const std::size_t couplings = std::max<std::size_t>(scene.loop.control.leaders.size(), 1);
@@ -245,9 +251,8 @@ std::vector<Server::HapticThread> Server::haptic_threads_of(const DeviceRuntimes
     const Scene& scene = runtime->scene;
     const auto has_room = [&scene](const HapticThread& thread) {
       const Scene& other = thread.devices.front()->scene;
-      const auto count = static_cast<Duration::rep>(thread.devices.size());
       return scene.shares_thread() && other.shares_thread() && other.loop.period == scene.loop.period &&
-             other.cpu == scene.cpu && kStepBudget * (count + 1) <= scene.loop.period;
+             other.cpu == scene.cpu && thread.devices.size() < devices_of_a_thread(scene.loop.period);
     };
     auto place = std::ranges::find_if(threads, has_room);
     if (place == threads.end()) place = threads.emplace(threads.end());
@@ -469,6 +474,7 @@ void Server::run_log() {
     drain_to_recorder(now);
     for (auto& runtime : devices_) report_health(now, *runtime);
     if (now >= tell_next_ || last) {
+      for (const HapticThread& thread : haptic_threads_) report_overruns(thread);
       for (auto& runtime : devices_) report_trouble(*runtime);
       record_left_out(now);
       tell_next_ = now + kTellPeriod;
@@ -592,16 +598,27 @@ void Server::report_phase(DeviceRuntime& runtime, const PortRecord& port) {
   trouble ? log::warn(text) : log::info(text);
 }
 
+/// All devices of a thread are late together: one line says it, with the most that one of them has had.
+void Server::report_overruns(const HapticThread& thread) const {
+  std::uint64_t most = 0;
+  Duration longest{};
+  for (const DeviceRuntime* runtime : thread.devices) {
+    const HapticLoop::Stats now = runtime->haptic.stats();
+    most = std::max(most, now.overruns - runtime->told.overruns);
+    longest = std::max(longest, now.longest_interval);
+  }
+  if (most == 0) return;
+  const std::size_t others = thread.devices.size() - 1;
+  log::warn(prefix(*thread.devices.front()) + std::to_string(most) + " overruns in the last second" +
+            (others > 0 ? ", as of " + std::to_string(others) + " more on its thread" : "") +
+            "; longest interval so far " +
+            std::to_string(std::chrono::duration_cast<std::chrono::microseconds>(longest).count()) + " µs");
+}
+
 void Server::report_trouble(DeviceRuntime& runtime) {
   report_safety(runtime);
   report_counts(runtime);
   const HapticLoop::Stats now = runtime.haptic.stats();
-  if (now.overruns > runtime.told.overruns) {
-    log::warn(prefix(runtime) + std::to_string(now.overruns - runtime.told.overruns) +
-              " overruns in the last second; longest interval so far " +
-              std::to_string(std::chrono::duration_cast<std::chrono::microseconds>(now.longest_interval).count()) +
-              " µs");
-  }
   if (now.device != runtime.told.device) log::info(prefix(runtime) + describe(now.device, runtime.scene));
   // Each fault of the controller or of the safety layer freezes the flight recorder once, and saving thaws it.
   // report_safety names the faults of the safety layer.

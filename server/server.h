@@ -134,6 +134,7 @@ class Server {
   void report_health(LocalTime now, DeviceRuntime& runtime);
   void report_counts(DeviceRuntime& runtime);
   void report_phase(DeviceRuntime& runtime, const PortRecord& port);
+  void report_overruns(const HapticThread& thread) const;
   void report_trouble(DeviceRuntime& runtime);
   void report_safety(DeviceRuntime& runtime);
   void save_flight(DeviceRuntime& runtime);

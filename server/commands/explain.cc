@@ -394,6 +394,12 @@ std::string in_words(const Scene& scene, const Explanation& explanation) {
        << " ns are the simulated device"
        << (!std::holds_alternative<SimulatedDevice::Config>(scene.device) ? ", which stands in for the real one" : "")
        << "; measured here and now, ± " << std::llround(std::ceil(resolution_ns)) << " ns\n";
+  if (scene.count > 1) {
+    const double share = 1e-9 * step_ns * scene.count / seconds(scene.loop.period);
+    text << "device.count: " << scene.count << " such devices, " << scene.name_of(0) << " to "
+         << scene.name_of(scene.count - 1) << "; their steps take " << std::llround(100 * share)
+         << " % of a processor, and each 1 MB, without a recording\n";
+  }
   if (const auto& coupling = scene.loop.control.coupling) put_coupling(*coupling, scene.loop.control.limiter, text);
   for (const CoupledLeader& leader : scene.loop.control.leaders) {
     text << "  " << scene.channels[leader.channel].name << " counts " << leader.share << " of that\n";
@@ -413,6 +419,7 @@ std::string in_words(const Scene& scene, const Explanation& explanation) {
 std::string in_json(const Scene& scene, const Explanation& explanation) {
   using Json = nlohmann::ordered_json;
   Json out = {{"device", scene.name},
+              {"count", scene.count},
               {"period_us", seconds(scene.loop.period) * 1e6},
               {"promise", promise_of(scene.loop.control.limiter)},
               {"step_ns", explanation.step_ns},

@@ -43,6 +43,10 @@ std::optional<std::uint32_t> place_of(const std::vector<Named>& all, const std::
 template <class Named>
 Refusal not_there(const std::string& what, const std::string& name, const std::vector<Named>& all) {
   std::string reason = "there is no " + what + " \"" + name + "\", only";
+  if (all.size() > limits::kMaxDevices) {
+    reason += " \"" + name_of(all.front()) + "\" to \"" + name_of(all.back()) + "\"";
+    return {Code::kInvalid, reason};
+  }
   for (const Named& one : all) reason += (&one == &all.front() ? " \"" : ", \"") + name_of(one) + "\"";
   return {Code::kInvalid, reason};
 }
@@ -59,6 +63,13 @@ std::variant<std::vector<Seat>, Refusal> Admission::seats_of(const Hello& hello,
   for (const Claim& claim : hello.claims) {
     const auto device = place_of(devices, claim.device);
     if (!device) return not_there("device", claim.device, devices);
+    if (!seats.empty() && bank_of(*device) != bank_of(seats.front().device)) {
+      const auto name = [&](std::size_t place) { return "\"" + devices[place].about.name + "\""; };
+      const std::size_t first = seats.front().device - number_of(seats.front().device);
+      const std::size_t last = std::min<std::size_t>(first + limits::kMaxDevices, devices.size()) - 1;
+      return Refusal{Code::kInvalid, "a session has devices of one bank: " + name(first) + " to " + name(last) +
+                                         ", and not " + name(*device)};
+    }
     const auto& channels = devices[*device].about.channels;
     const auto channel = claim.role == Role::kController ? place_of(channels, claim.channel) : 0;
     if (!channel) return not_there("channel", claim.channel, channels);
@@ -143,7 +154,8 @@ Welcome Admission::welcome_for(const Doorman::Guest& guest, const Address& from,
   for (const Seat& seat : seats) {
     const Guest* const holder = guest_of(guests, devices[seat.device].channels[seat.channel].holder);
     const bool free = holder == nullptr || takes_the_place_of(*holder, from, guest.key, seats);
-    if (seat.by_name) welcome.grants.push_back({seat.device, seat.channel, free ? seat.role : Role::kObserver});
+    const Role role = free ? seat.role : Role::kObserver;
+    if (seat.by_name) welcome.grants.push_back({number_of(seat.device), seat.channel, role});
   }
   return welcome;
 }

@@ -31,8 +31,8 @@ class Admission {
 
   explicit Admission(const Config& config) : config_(config) {}
 
-  /// The seats that a Hello claims, by number; refused when it claims what is not there, the same twice, or a role that
-  /// is not the highest among its claims.
+  /// The seats that a Hello claims; refused when it claims what is not there, the same twice, devices of two banks, or a
+  /// role that is not the highest among its claims.
   static std::variant<std::vector<Seat>, Refusal> seats_of(const Hello& hello,
                                                            const std::vector<ServedDevice>& devices);
 

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <stdexcept>
+#include <string_view>
+#include <unordered_set>
 #include <utility>
 
 namespace tendon {
@@ -15,9 +17,9 @@ void check_names(const std::vector<Named>& all, std::size_t most, const std::str
     throw std::invalid_argument("expected 1 to " + std::to_string(most) + " " + what + "s, got " +
                                 std::to_string(all.size()));
   }
-  for (auto one = all.begin(); one != all.end(); ++one) {
-    const bool twice = std::any_of(all.begin(), one, [&](const Named& before) { return before.name == one->name; });
-    if (twice) throw std::invalid_argument("two " + what + "s have one name: " + one->name);
+  std::unordered_set<std::string_view> names;
+  for (const Named& one : all) {
+    if (!names.insert(one.name).second) throw std::invalid_argument("two " + what + "s have one name: " + one.name);
   }
 }
 
@@ -69,14 +71,14 @@ std::optional<std::uint32_t> coupling_by(const ServedDevice& device, std::uint32
 std::vector<ServedDevice> served_devices(const std::vector<DeviceDescription>& about,
                                          const std::vector<HandleDescription>& handles,
                                          const std::vector<Mailboxes*>& mail) {
-  check_names(about, limits::kMaxDevices, "device");
+  check_names(about, kMostDevices, "device");
   if (mail.size() != about.size()) throw std::invalid_argument("expected mailboxes for each device");
   std::vector<ServedDevice> devices;
   for (std::size_t i = 0; i < mail.size(); ++i) {
     ServedDevice& device = devices.emplace_back(ServedDevice{
         .about = about[i], .handle = i < handles.size() ? handles[i] : HandleDescription{}, .mail = mail[i]});
     check_names(device.about.channels, limits::kMaxChannels, "channel");
-    device.about.device = device.handle.device = static_cast<std::uint32_t>(i);
+    device.about.device = device.handle.device = number_of(static_cast<std::uint32_t>(i));
     device.channels.resize(device.about.channels.size());
   }
   return devices;

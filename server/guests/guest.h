@@ -23,6 +23,12 @@
 
 namespace tendon {
 
+/// Devices of a server: 64 banks. Here a device is known by its place among all of them. A session has numbers for 16
+/// devices, those of one bank, in their order (WIRE.md, "Devices and channels").
+inline constexpr std::size_t kMostDevices = 1024;
+constexpr std::uint32_t bank_of(std::uint32_t device) { return device / limits::kMaxDevices; }
+constexpr std::uint32_t number_of(std::uint32_t device) { return device % limits::kMaxDevices; }
+
 /// A place that a guest has claimed.
 struct Seat {
   std::uint32_t device = 0;
@@ -53,16 +59,16 @@ struct Guest {
   const ClientKey* key;  ///< null in suite 0
   std::string name;
   Role role;
-  bool can_lose;            ///< it can be told that it has lost a lease
-  bool diagnoses;           ///< it has asked for what only kFeatureDiagnostics brings
-  bool sees_handle;         ///< … and kFeatureHandle
-  bool sees_joints;         ///< … and kFeatureJoints
-  bool may_couple;          ///< … and kFeatureTeleoperation, as a controller
-  bool sees_ports;          ///< … and kFeatureTeleoperation, as an observer
-  bool sees_outputs;        ///< … and kFeatureOutputs
-  bool sees_columns;        ///< … and kFeatureStateColumns
-  std::vector<Seat> seats;  ///< `role` is what its Welcome says
-  std::vector<View> views;
+  bool can_lose;                  ///< it can be told that it has lost a lease
+  bool diagnoses;                 ///< it has asked for what only kFeatureDiagnostics brings
+  bool sees_handle;               ///< … and kFeatureHandle
+  bool sees_joints;               ///< … and kFeatureJoints
+  bool may_couple;                ///< … and kFeatureTeleoperation, as a controller
+  bool sees_ports;                ///< … and kFeatureTeleoperation, as an observer
+  bool sees_outputs;              ///< … and kFeatureOutputs
+  bool sees_columns;              ///< … and kFeatureStateColumns
+  std::vector<Seat> seats;        ///< `role` is what its Welcome says
+  std::vector<View> views;        ///< at least one; all of one bank
   std::vector<std::byte> answer;  ///< to its Hello, for when it was lost
   Session session;
   LocalTime arrived;
@@ -77,6 +83,10 @@ struct Guest {
   bool gone = false;                 ///< it has left, and is forgotten at the end of the turn
 
   std::uint32_t id() const noexcept { return session.connection_id(); }
+  /// The device that its session calls by this number; of a last bank that is not full it may not exist.
+  std::uint32_t device_of(std::uint32_t number) const noexcept {
+    return bank_of(views.front().device) * limits::kMaxDevices + number;
+  }
   /// It does not hold the channel any more.
   void uncouple(std::uint32_t device, std::uint32_t channel) noexcept {
     if (coupled && coupled->device == device && coupled->channel == channel) coupled.reset();
@@ -110,7 +120,7 @@ struct ServedChannel {
 
 /// A device, as guests meet it.
 struct ServedDevice {
-  DeviceDescription about;
+  DeviceDescription about;  ///< with its number in a session, as `handle`
   HandleDescription handle;
   Mailboxes* mail;
   SampledSteps sampled{};
@@ -133,8 +143,8 @@ std::optional<std::uint32_t> coupling_by(const ServedDevice& device, std::uint32
 /// order.
 bool renew_peer(ServedDevice& device, std::uint32_t coupling);
 
-/// The devices, one for each of `mail`; a device's number is its place. Throws std::invalid_argument when the number of
-/// devices or channels is out of range, two of them share a name, or there are not as many mailboxes as devices.
+/// The devices, one for each of `mail`. Throws std::invalid_argument when the number of devices or channels is out of
+/// range, two of them share a name, or there are not as many mailboxes as devices.
 /// `handles` may be fewer: nothing is known of the handles of the others.
 std::vector<ServedDevice> served_devices(const std::vector<DeviceDescription>& about,
                                          const std::vector<HandleDescription>& handles,

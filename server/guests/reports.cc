@@ -16,6 +16,7 @@ RefusedForces since(const RefusedForces& before, const RefusedForces& now) {
           .old_sequence = now.old_sequence - before.old_sequence};
 }
 
+/// `device`: its place.
 template <class Report>
 void tell_observers(std::uint32_t device, const Report& report, std::vector<Guest>& guests) {
   for (Guest& guest : guests) {
@@ -25,14 +26,15 @@ void tell_observers(std::uint32_t device, const Report& report, std::vector<Gues
 
 /// Skips a device whose health the log thread has not renewed.
 void tell_of_devices(std::vector<ServedDevice>& devices, std::vector<Guest>& guests) {
-  for (ServedDevice& device : devices) {
+  for (std::uint32_t place = 0; place < devices.size(); ++place) {
+    ServedDevice& device = devices[place];
     const Health* const health = device.mail->health.take();
     if (health == nullptr) continue;
     if (device.told) {
       DeviceReport report = tendon::report(*device.told, *health);
       report.number = ++device.reports;
       report.device = device.about.device;
-      tell_observers(report.device, report, guests);
+      tell_observers(place, report, guests);
     }
     device.told = *health;
   }
@@ -83,7 +85,7 @@ void Reports::tell_of_engine(LocalTime now, const Guest& engine, const LinkMeter
     ServedChannel& channel = devices[seat.device].channels[seat.channel];
     if (seat.role != Role::kController || channel.holder != engine.id()) continue;
     PeerReport report;
-    report.device = seat.device;
+    report.device = number_of(seat.device);
     report.channel = seat.channel;
     report.name = engine.name;
     report.state_one_in = engine.adaptation ? engine.adaptation->one_in() : 1;

@@ -356,6 +356,9 @@ void declare(Table& keys, SimulatedDevice::Config& /*device*/, Draft& draft) {
   SimulatedDevice::Config& config = draft.simulated;
   keys.key("profile", draft.profile, profile_names(), "the effects of a real device; each key below overrides one");
   if (draft.profile != nullptr) config = draft.profile->device();
+  keys.key(
+      "substep_us", config.max_substep, Number{.least = 10, .most = 4000},
+      "the longest step of the simulation: longer ones cost less, and are as right where nothing stiff is simulated");
   keys.key("start_position_mm", config.start_position, Vector{}, "of the handle",
            Absent{.text = "where the hand starts, or the origin"});
   keys.table("effects", [&draft](Table& effects) { declare_effects(effects, draft); });
@@ -448,6 +451,9 @@ void declare_device(Table& device, Draft& draft) {
   device.kind(kinds, [&draft](Table& keys, std::size_t kind) {
     keys.key("name", draft.scene.name, Label{}, "the name by which clients ask for this device, of several",
              Absent{.text = "the name of the scene file"});
+    keys.key("count", draft.scene.count, Count{kMostDevices, 1},
+             "for \"simulated\": so many devices, all alike, named NAME-0, NAME-1 … A session has devices of one bank "
+             "of 16: NAME-0 to NAME-15, NAME-16 to NAME-31 …");
     keys.key("axes", draft.scene.axes, Axes{},
              "how its base frame lies before the operator; programs turn positions by it",
              Absent{.text = "the driver's; of a recorded hand it is not known"});

@@ -2,13 +2,17 @@
 #include <toml++/toml.h>
 
 #include <cstddef>
+#include <cstdint>
 #include <fstream>
 #include <sstream>
 #include <stdexcept>
 #include <string>
 #include <string_view>
+#include <unordered_set>
 #include <utility>
 
+#include "protocol/limits.h"
+#include "server/guests/guest.h"
 #include "server/machine/regular_file.h"
 #include "server/scene/keys.h"
 #include "server/scene/reader.h"
@@ -122,16 +126,28 @@ Scene read_scene(const std::filesystem::path& file) {
 
 std::vector<Scene> read_scenes(const std::vector<std::filesystem::path>& files, const Overrides& overrides) {
   std::vector<Scene> scenes;
+  std::unordered_set<std::string> names;
+  std::uint32_t place = 0;
   for (const std::filesystem::path& file : files) {
     Scene scene = read_scene(file);
     if (const auto settings = overrides ? overrides(scene) : std::vector<std::string>(); !settings.empty()) {
       scene = parse_scene(scene.text, file.string(), file.parent_path(), settings);
     }
-    scene.loop.device = static_cast<std::uint32_t>(scenes.size());
-    for (const Scene& before : scenes) {
-      if (scene.name != before.name) continue;
+    scene.loop.device = place;
+    place += scene.count;
+    if (place > kMostDevices) {
+      throw SceneError(file.string() + ": device.count: expected at most " + std::to_string(kMostDevices) +
+                       " devices of all scenes, found " + std::to_string(place));
+    }
+    if (!scene.shares_thread() && scene.loop.device >= limits::kMaxDevices) {
+      throw SceneError(file.string() + ": device.kind: expected devices with a plug among the first " +
+                       std::to_string(limits::kMaxDevices) + ", found " + std::to_string(scene.loop.device) +
+                       " before it: name its scene before theirs");
+    }
+    for (std::uint32_t index = 0; index < scene.count; ++index) {
+      if (names.insert(scene.name_of(index)).second) continue;
       throw SceneError(file.string() + ": device.name: expected a name of its own, found " +
-                       scene_file::in_quotes(scene.name) + " again");
+                       scene_file::in_quotes(scene.name_of(index)) + " again");
     }
     for (const auto& [name, there] :
          {std::pair("network", scene.has_network), std::pair("recording", scene.recording.has_value())}) {

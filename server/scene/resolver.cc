@@ -58,6 +58,7 @@ class SceneResolver {
     resolve_teleoperation(directory);
     resolve_replay(directory);
     resolve_channels();
+    resolve_count();
     // The constructors check rules that the keys do not.
     Scene& scene = draft_.scene;
     SimulatedDevice::Config& simulated = draft_.simulated;
@@ -198,6 +199,24 @@ class SceneResolver {
     blame("device.effects.structural_mode.handle_mass_kg", {},
           "expected less than mass_kg, of which it is a part and which is " + digits(device.mass) + " kg, found " +
               digits(device.structural_mode->handle_mass));
+  }
+
+  void resolve_count() const {
+    const Scene& scene = draft_.scene;
+    if (scene.count == 1) return;
+    const auto refuse = [&](const std::string& expected) {
+      blame("device.count", {}, "expected " + expected + ", found " + std::to_string(scene.count));
+    };
+    if (!std::holds_alternative<SimulatedDevice::Config>(scene.device)) {
+      refuse("1, because kind is \"" + std::string(scene.driver().kind) + "\" and only simulated devices are counted");
+    }
+    if (scene.teleoperation) refuse("1 beside [teleoperation], which couples one device");
+    if (scene.discovery && scene.discovery->announce) refuse("1 beside [discovery], which announces one device");
+    const std::string longest = scene.name_of(scene.count - 1);
+    if (longest.size() <= limits::kMaxLabel) return;
+    blame("device.name", {"device.count"},
+          "expected a name that leaves \"" + longest + "\" at most " + std::to_string(limits::kMaxLabel) +
+              " letters, found " + std::to_string(longest.size()));
   }
 
   void resolve_recording() const {

@@ -28,6 +28,21 @@ SimulatedDevice::Config Scene::simulated() const {
   return std::visit([](const auto& config) { return stand_in(config); }, device);
 }
 
+std::string Scene::name_of(std::uint32_t index) const { return count == 1 ? name : name + '-' + std::to_string(index); }
+
+std::vector<Scene> each_device(const std::vector<Scene>& scenes) {
+  std::vector<Scene> each;
+  for (const Scene& scene : scenes) {
+    for (std::uint32_t index = 0; index < scene.count; ++index) {
+      Scene& one = each.emplace_back(scene);
+      one.name = scene.name_of(index);
+      one.count = 1;
+      one.loop.device = scene.loop.device + index;
+    }
+  }
+  return each;
+}
+
 const std::vector<const Driver*>& drivers() {
   static const std::vector<const Driver*> kRows =
       rows_of(std::make_index_sequence<std::variant_size_v<Scene::AnyDevice>>());

@@ -85,7 +85,8 @@ struct Scene {
     std::vector<Leader> leaders{};  ///< loop.control.leaders has them by number; empty: one, by any channel
   };
 
-  std::string name;  ///< of the device, as clients claim it
+  std::string name;         ///< of the device, as clients claim it
+  std::uint32_t count = 1;  ///< above 1: so many such simulated devices, NAME-0, NAME-1 …
   AnyDevice device;
   std::string axes;   ///< of its base frame, "right=x up=y user=z"; empty: not known
   std::string group;  ///< devices of one body have the same; empty: by itself
@@ -101,6 +102,8 @@ struct Scene {
   std::optional<Discovery> discovery{};        ///< empty: nothing is announced
   std::string text;  ///< for the recording: the file, whole; with settings, the scene that they make
 
+  /// As clients claim its device of that index, below `count`.
+  std::string name_of(std::uint32_t index) const;
   /// The row of its device.
   const Driver& driver() const;
   /// Its device has no plug, so that it computes and never waits: one haptic thread may step several of them.
@@ -131,11 +134,15 @@ inline constexpr std::size_t kMaxSceneBytes = 16'384;
 /// right, because a misspelt key is both unknown and missing.
 Scene read_scene(const std::filesystem::path& file);
 
-/// The scenes of the devices that one server runs. Only the first may have [network] and [recording]; a later scene
-/// with such a table is refused, and so are two devices with one name. `overrides` returns the settings (parse_scene)
-/// that the command line makes in a scene which has been read.
+/// The scenes that one server runs; `loop.device` is the place of a scene's first device. Only the first may have
+/// [network] and [recording]; a later scene with such a table is refused, and so are two devices with one name, more
+/// than kMostDevices, and a device with a plug that is not among the first limits::kMaxDevices. `overrides` returns the
+/// settings (parse_scene) that the command line makes in a scene which has been read.
 using Overrides = std::function<std::vector<std::string>(const Scene&)>;
 std::vector<Scene> read_scenes(const std::vector<std::filesystem::path>& files, const Overrides& overrides = {});
+
+/// A scene for each device of those: of one with a count of N there are N, which differ in name and place.
+std::vector<Scene> each_device(const std::vector<Scene>& scenes);
 
 /// The same for a scene in memory. `name` is what errors call it; a recorded motion is looked for
 /// relative to `directory`.

@@ -61,6 +61,28 @@ TEST(Engines, ALeaseIsTakenFromAnEngineThatHangs) {
   EXPECT_EQ(count_in(end, "welcomed"), 3U);
 }
 
+TEST(Engines, OfManyCountedDevicesEachIsFoundByItsName) {
+  const ScratchFolder folder;
+  const auto scene = folder.path() / "finger.toml";
+  std::string text(kPressingHand);
+  write(scene, text.insert(text.find("profile"), "count = 40\n"));
+  Server server(folder.path(), scene);
+  Client first("virtual_wall", server.address(), folder.path(), {"--device", "finger-5"});
+  Client second("virtual_wall", server.address(), folder.path(), {"--device", "finger-37"});
+  Client echo("echo_motion", server.address(), folder.path(), {"--json", "--device", "finger-37"});
+  wait_until_felt(echo, 1);
+  Client third("virtual_wall", server.address(), folder.path(), {"--device", "finger-40"});
+  server.process().wait_for_line("there is no device \"finger-40\", only \"finger-0\" to \"finger-39\"");
+  const auto end = nlohmann::json::parse(server.stop());
+  ASSERT_EQ(end.at("devices").size(), 40U);
+  for (const auto& device : end.at("devices")) {
+    const std::string name = device.at("name");
+    const std::uint64_t forces = device.at("channels").at(0).at("forces");
+    EXPECT_EQ(forces > 0, name == "finger-5" || name == "finger-37") << name;
+  }
+  EXPECT_EQ(end.at("denied"), 0);
+}
+
 TEST(Engines, TwoDevicesEachHaveTheirOwnHandAndEngine) {
   const ScratchFolder folder;
   const auto left = folder.path() / "left.toml";

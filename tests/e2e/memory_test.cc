@@ -82,6 +82,20 @@ TEST(Memory, OfAFurtherDeviceIsAMegabyte) {
   EXPECT_LT(nine.faults_at_start() - one.faults_at_start(), 8 * 350);
 }
 
+TEST(Memory, OfADeviceThatIsCountedIsAMegabyte) {
+  const testing::ScratchFolder folder;
+  const auto own = [&folder](int count) {
+    const auto file = folder.path() / ("hand-" + std::to_string(count) + ".toml");
+    Server server(
+        folder.path(),
+        write(file, "[device]\nkind = \"simulated\"\nprofile = \"falcon\"\ncount = " + std::to_string(count) + "\n"));
+    Client watcher("echo_motion", server.address(), folder.path());
+    for (int line = 0; line < 6; ++line) watcher.wait_for_line("position");
+    return bytes(server.process().pid(), "RssAnon");
+  };
+  EXPECT_LT(own(65) - own(1), 64 * kMegabyte);
+}
+
 TEST(Memory, OfAFurtherSessionIsAFewPages) {
   Fleet one(1);
   const std::int64_t before = one.own();

@@ -164,6 +164,19 @@ TEST(Explain, SaysThatABusyNetworkThreadTakesAProcessor) {
   EXPECT_EQ(nlohmann::json::parse(in_json(scene, explanation)).at("network_busy"), true);
 }
 
+TEST(Explain, SaysWhatCountedDevicesTakeTogether) {
+  Scene scene = shipped("demo.toml");
+  Explanation explanation;
+  explanation.step_ns = 500;
+  EXPECT_EQ(in_words(scene, explanation).find("device.count"), std::string::npos);
+  EXPECT_EQ(nlohmann::json::parse(in_json(scene, explanation)).at("count"), 1);
+  scene.count = 512;
+  EXPECT_NE(in_words(scene, explanation)
+                .find("device.count: 512 such devices, demo-0 to demo-511; their steps take 26 % of a processor"),
+            std::string::npos);
+  EXPECT_EQ(nlohmann::json::parse(in_json(scene, explanation)).at("count"), 512);
+}
+
 TEST(Explain, JsonOfAnyNameIsJson) {
   Scene scene = shipped("demo.toml");
   scene.name = "a \"hand\"\x01\xff";

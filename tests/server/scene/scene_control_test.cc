@@ -5,12 +5,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <filesystem>
 #include <string>
 #include <vector>
 
 #include "devices/simulated/profiles.h"
 #include "tests/server/scene/scene_text.h"
+#include "tests/server/scratch_folder.h"
 
 namespace tendon {
 namespace {
@@ -186,6 +188,64 @@ TEST(Scene, SeveralMakeOneServerWhoseNetworkIsTheFirstOnes) {
   EXPECT_TRUE(error_of_both(shipped / "left.toml").ends_with("expected a name of its own, found \"left\" again"));
   EXPECT_NE(error_of_both(shipped / "demo.toml").find("recording: expected in the first scene only"),
             std::string::npos);
+}
+
+TEST(Scene, ACountMakesSoManyDevicesWithNamesAndPlacesOfTheirOwn) {
+  const testing::ScratchFolder folder;
+  const std::string hand = (folder.path() / "hand.toml").string();
+  const std::string finger = (folder.path() / "finger.toml").string();
+  write(hand, kMinimal);
+  write(finger, std::string(kMinimal) + "count = 20\n");
+  const auto scenes = read_scenes({hand, finger});
+  ASSERT_EQ(scenes.size(), 2U);
+  EXPECT_EQ(scenes[1].count, 20U);
+  const auto devices = each_device(scenes);
+  ASSERT_EQ(devices.size(), 21U);
+  for (std::uint32_t place = 0; place < devices.size(); ++place) {
+    EXPECT_EQ(devices[place].loop.device, place);
+    EXPECT_EQ(devices[place].name, place == 0 ? "hand" : "finger-" + std::to_string(place - 1));
+    EXPECT_EQ(devices[place].count, 1U);
+  }
+}
+
+TEST(Scene, TheDevicesOfAllCountsHaveNamesOfTheirOwnAndAreNotTooMany) {
+  const testing::ScratchFolder folder;
+  const auto error_of = [&](const std::string& first, const std::string& second) -> std::string {
+    const std::string a = (folder.path() / "a.toml").string();
+    const std::string b = (folder.path() / "b.toml").string();
+    write(a, std::string(kMinimal) + first);
+    write(b, std::string(kMinimal) + second);
+    try {
+      read_scenes({a, b});
+    } catch (const SceneError& error) {
+      return std::string(error.what()).substr(b.size());
+    }
+    return "none";
+  };
+  EXPECT_EQ(error_of("count = 2\n", "name = \"a-1\"\n"),
+            ": device.name: expected a name of its own, found \"a-1\" again");
+  EXPECT_EQ(error_of("count = 2\n", "name = \"a-2\"\n"), "none");
+  EXPECT_EQ(error_of("count = 1000\n", "count = 24\n"), "none");
+  EXPECT_EQ(error_of("count = 1000\n", "count = 25\n"),
+            ": device.count: expected at most 1024 devices of all scenes, found 1025");
+}
+
+TEST(Scene, ADeviceWithAPlugIsAmongTheFirst) {
+  const testing::ScratchFolder folder;
+  const std::filesystem::path falcon = std::filesystem::path(TENDON_SCENES) / "falcon.toml";
+  const std::string fingers = (folder.path() / "finger.toml").string();
+  write(fingers, std::string(kMinimal) + "count = 16\n");
+  try {
+    read_scenes({fingers, falcon});
+    ADD_FAILURE() << "no error";
+  } catch (const SceneError& error) {
+    EXPECT_EQ(std::string(error.what()),
+              falcon.string() +
+                  ": device.kind: expected devices with a plug among the first 16, found 16 before it: "
+                  "name its scene before theirs");
+  }
+  write(fingers, std::string(kMinimal) + "count = 15\n");
+  EXPECT_EQ(read_scenes({fingers, falcon}).back().loop.device, 15U);
 }
 
 }  // namespace

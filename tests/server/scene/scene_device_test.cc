@@ -111,9 +111,10 @@ TEST(Scene, AFalconIsARealDeviceWhoseFrictionIsToldNotTaken) {
 
 TEST(Scene, AFalconHasNoKeysOfTheSimulatedDeviceAndIsNotWithoutALimiter) {
   const std::string falcon = "[device]\nkind = \"falcon\"\n";
-  EXPECT_EQ(error_of(falcon + "profile = \"falcon\"\n"),
-            "s.toml:3: device.profile: unknown key; known here: kind, name, axes, group, held_by, port, firmware, "
-            "accept_unknown_firmware");
+  EXPECT_EQ(
+      error_of(falcon + "profile = \"falcon\"\n"),
+      "s.toml:3: device.profile: unknown key; known here: kind, name, count, axes, group, held_by, port, firmware, "
+      "accept_unknown_firmware");
   EXPECT_EQ(error_of(falcon + "port = \"left\"\n"),
             "s.toml:3: device.port: expected a port as `tendond devices` names it, like \"1-2.3\", found \"left\"");
   EXPECT_EQ(error_of(falcon + "[limiter]\nkind = \"none\"\n"),

@@ -55,6 +55,25 @@ TEST(SceneError, NamesTheLineOfASyntaxError) {
   });
 }
 
+TEST(SceneError, OfACountSaysWhatMayBeCounted) {
+  expect_errors({
+      {"count = 0\n", "s.toml:4: device.count: expected a whole number from 1 to 1024, found 0"},
+      {"count = 1025\n", "s.toml:4: device.count: expected a whole number from 1 to 1024, found 1025"},
+      {"name = \"abcdefghijklmnopqrstuvw\"\ncount = 11\n",
+       "s.toml:5: device.name: expected a name that leaves \"abcdefghijklmnopqrstuvw-10\" at most 24 letters, found "
+       "26"},
+      {"count = 2\n[discovery]\nannounce = true\n",
+       "s.toml:4: device.count: expected 1 beside [discovery], which announces one device, found 2"},
+      {"count = 1\n[discovery]\nannounce = true\n", "no error"},
+      {"count = 1024\n", "no error"},
+      {"substep_us = 5\n", "s.toml:4: device.substep_us: expected a number from 10 to 4000 µs, found 5"},
+  });
+  EXPECT_EQ(error_of("[device]\nkind = \"falcon\"\ncount = 2\n[limiter]\ncoulomb_friction_n = 0.1\n"
+                     "viscous_friction_n_s_per_m = 0.1\n"),
+            "s.toml:3: device.count: expected 1, because kind is \"falcon\" and only simulated devices are counted, "
+            "found 2");
+}
+
 TEST(SceneError, OfTheSafetyLayerNamesTheLine) {
   expect_errors({
       {"[safety]\narm = \"now\"\n",
@@ -94,9 +113,8 @@ TEST(SceneError, NamesTheClosestKeyOrAllOfThem) {
        "s.toml:5: recording.filename: unknown key; known here: path, rotate_mb, rotate_min, "
        "budget_mb, keep, one_in, datagrams_kb_per_s"},
       {"[device.gravity]\n",
-       "s.toml:4: device.gravity: unknown table; known here: kind, name, axes, group, held_by, profile, "
-       "start_position_mm, effects, "
-       "hand, "
+       "s.toml:4: device.gravity: unknown table; known here: kind, name, count, axes, group, held_by, profile, "
+       "substep_us, start_position_mm, effects, hand, "
        "environment, rotation, gripper"},
       {"[loop]\n" + std::string(10'000, 'x') + " = 1\n", "s.toml:5: loop." + std::string(10'000, 'x') +
                                                              ": unknown key; known here: period_us, longest_hold_us, "

@@ -75,14 +75,11 @@ void answer_bare(const BareTraffic& traffic, const std::vector<std::unique_ptr<G
 
 BareResult run_bare(const BareTraffic& traffic) {
   raise_file_limit();
-  std::vector<std::unique_ptr<UdpLink>> host;
-  for (std::size_t s = 0; s < traffic.sockets; ++s) {
-    host.push_back(std::make_unique<UdpLink>(parse_address("127.0.0.1:0")));
-  }
+  const UdpLink host(parse_address("127.0.0.1:0"));
   std::vector<std::unique_ptr<GuestSocket>> sockets;
   std::vector<sockaddr_in> addresses(traffic.sessions);
   for (std::size_t i = 0; i < traffic.sessions; ++i) {
-    sockets.push_back(std::make_unique<GuestSocket>(host[i % host.size()]->local_address(), i));
+    sockets.push_back(std::make_unique<GuestSocket>(host.local_address(), i));
     socklen_t size = sizeof addresses[i];
     if (::getsockname(sockets[i]->fd(), reinterpret_cast<sockaddr*>(&addresses[i]), &size) != 0) fail("getsockname");
   }
@@ -98,8 +95,7 @@ BareResult run_bare(const BareTraffic& traffic) {
   std::thread thread([&] {
     enter_punctual();
     const AtPriority high(traffic.priority);
-    std::vector<pollfd> fds;
-    for (const auto& link : host) fds.push_back({link->fd(), POLLIN, 0});
+    pollfd readable{host.fd(), POLLIN, 0};
     std::array<std::byte, kMaxDatagram> buffer{};
     const Duration began = clock::processor_time();
     const Duration guests_began = guests->processor_time();
@@ -109,7 +105,7 @@ BareResult run_bare(const BareTraffic& traffic) {
       std::memcpy(buffer.data(), &stamp, sizeof stamp);
       for (std::size_t i = 0; i < traffic.sessions; ++i) {
         for (std::size_t k = 0; k < traffic.out_per_round; ++k) {
-          result.sent += ::sendto(fds[i % host.size()].fd, buffer.data(), traffic.out_bytes, 0,
+          result.sent += ::sendto(host.fd(), buffer.data(), traffic.out_bytes, 0,
                                   reinterpret_cast<const sockaddr*>(&addresses[i]), sizeof addresses[i]) > 0
                              ? 1
                              : 0;
@@ -118,15 +114,12 @@ BareResult run_bare(const BareTraffic& traffic) {
       ++result.rounds;
       for (LocalTime now = clock::now(); now < due + traffic.period; now = clock::now()) {
         const timespec left{0, static_cast<long>((due + traffic.period - now).count())};
-        if (::ppoll(fds.data(), fds.size(), &left, nullptr) <= 0) continue;
-        for (const pollfd& fd : fds) {
-          if (fd.revents == 0) continue;
-          sockaddr_in from{};
-          socklen_t size = sizeof from;
-          while (::recvfrom(fd.fd, buffer.data(), buffer.size(), MSG_DONTWAIT, reinterpret_cast<sockaddr*>(&from),
-                            &size) > 0) {
-            ++result.received;
-          }
+        if (::ppoll(&readable, 1, &left, nullptr) <= 0) continue;
+        sockaddr_in from{};
+        socklen_t size = sizeof from;
+        while (::recvfrom(host.fd(), buffer.data(), buffer.size(), MSG_DONTWAIT, reinterpret_cast<sockaddr*>(&from),
+                          &size) > 0) {
+          ++result.received;
         }
       }
     }

@@ -9,11 +9,10 @@
 
 namespace tendon::bench {
 
-/// The floor of such a fleet: as many datagrams of such sizes there and back, in the same rhythm, between as many
-/// sockets of two processes, with nothing in them.
+/// The floor of such a fleet: as many datagrams of such sizes there and back, in the same rhythm, between one socket and
+/// those of as many sessions in another process, with nothing in them.
 struct BareTraffic {
   std::size_t sessions = 0;
-  std::size_t sockets = 1;  ///< of the host
   Duration period = std::chrono::milliseconds(1);
   std::size_t out_per_round = 1;  ///< datagrams to each session in a period
   std::size_t out_bytes = 0;

@@ -21,18 +21,17 @@ namespace tendon::bench {
 
 using std::chrono::milliseconds;
 
-std::string device_name(std::size_t i) { return "d" + std::to_string(i); }
+std::string device_name(const Fleet& fleet, std::size_t i) {
+  return fleet.devices == 1 ? kFleetName : kFleetName + ("-" + std::to_string(i));
+}
 std::string channel_name(std::size_t i) { return "c" + std::to_string(i); }
 
 std::vector<Plan> plans_of(const Fleet& fleet, Ratchet& secrets) {
   std::vector<Plan> plans;
-  const std::size_t servers = (fleet.devices + limits::kMaxDevices - 1) / limits::kMaxDevices;
   if (fleet.one_session_for_16) {
-    for (std::size_t s = 0; s < servers; ++s) {
-      Plan plan{.server = s, .claims = {}};
-      const std::size_t here = std::min<std::size_t>(limits::kMaxDevices, fleet.devices - s * limits::kMaxDevices);
-      for (std::size_t d = 0; d < here; ++d) plan.claims.push_back({device_name(d), "", Role::kController});
-      plans.push_back(plan);
+    for (std::size_t d = 0; d < fleet.devices; ++d) {
+      if (d % limits::kMaxDevices == 0) plans.push_back({});
+      plans.back().claims.push_back({device_name(fleet, d), "", Role::kController});
     }
   } else {
     const std::size_t wanted = fleet.sessions > 0 ? fleet.sessions : fleet.devices * fleet.channels;
@@ -40,15 +39,12 @@ std::vector<Plan> plans_of(const Fleet& fleet, Ratchet& secrets) {
       const std::size_t device = i % fleet.devices;
       const std::size_t channel = i / fleet.devices;
       const bool controls = channel < fleet.channels;
-      plans.push_back({.server = device / limits::kMaxDevices,
-                       .claims = {{device_name(device % limits::kMaxDevices), controls ? channel_name(channel) : "",
+      plans.push_back({.claims = {{device_name(fleet, device), controls ? channel_name(channel) : "",
                                    controls ? Role::kController : Role::kObserver}},
                        .controls = controls});
     }
   }
-  if (fleet.sealed) {
-    for (Plan& plan : plans) plan.key = secrets.next();
-  }
+  for (Plan& plan : plans) plan.key = secrets.next();
   return plans;
 }
 
@@ -71,6 +67,10 @@ class Guest {
     Duration at{};
     while (const std::size_t size = socket_.receive(buffer, at)) {
       const auto datagram = std::span<const std::byte>(buffer).first(size);
+      if (measuring) {
+        ++shared_.out_datagrams;
+        shared_.out_bytes += size;
+      }
       if (session_) {
         session_->receive(now, datagram);
         take_events(at);
@@ -96,7 +96,12 @@ class Guest {
       if (session_) return session_->next_datagram(now, buffer);
       return handshake_ ? handshake_->next_datagram(now, buffer) : std::size_t{0};
     };
-    while (const std::size_t size = next()) socket_.send(std::span<const std::byte>(buffer).first(size));
+    while (const std::size_t size = next()) {
+      socket_.send(std::span<const std::byte>(buffer).first(size));
+      if (!measuring) continue;
+      ++shared_.in_datagrams;
+      shared_.in_bytes += size;
+    }
   }
 
   LocalTime next_tick() const {
@@ -145,26 +150,43 @@ class Guest {
           ++shared_.states;
           shared_.state_age.observe(at - unix_offset - arrived->state.sampled.time_since_epoch());
         }
-        if (plan_.controls) answer(arrived->state);
+        if (!plan_.controls) continue;
+        if (measuring) judge(arrived->state);
+        answer(arrived->state);
       } else if (const auto* closed = std::get_if<Session::Closed>(&*event)) {
         if (measuring) throw std::runtime_error("a session has ended: " + closed->reason);
       }
     }
   }
 
+  /// The number of a force is the tick that it answers, so the state tells which motion the force in use is for.
+  void judge(const DeviceState& state) {
+    if (state.mode != Mode::kActive) return;
+    shared_.loop_age.observe(kPeriod * static_cast<Duration::rep>(state.tick - state.force_sequence));
+    const Answered& last = answered_.at(state.device);
+    const bool of_step_before = state.force_sequence == last.tick && state.tick == last.tick + 1;
+    if (of_step_before && state.sampled - last.sampled < kPeriod * 3 / 2) ++shared_.answered_in_time;
+  }
+
   void answer(const DeviceState& state) {
-    std::uint64_t& last = answered_.at(state.device);
-    if (state.tick < last + every_) return;
-    last = state.tick;
+    Answered& last = answered_.at(state.device);
+    if (state.tick < last.tick + every_) return;
+    last = {state.tick, state.sampled};
     ForceCommand force;
-    force.sequence = ++sequence_;
+    force.sequence = state.tick;
     force.based_on_tick = state.tick;
     force.force = -300 * state.position;
     force.valid_for = milliseconds(50);
     force.device = state.device;
     force.channel = grants_.front().channel;
     session_->send(force);
+    ++shared_.forces_sent;
   }
+
+  struct Answered {
+    std::uint64_t tick = 0;
+    PeerTime sampled{};
+  };
 
   Plan plan_;
   Shared& shared_;
@@ -175,14 +197,12 @@ class Guest {
   std::optional<ClientHandshake> handshake_;
   std::unique_ptr<Session> session_;
   std::vector<Grant> grants_;
-  std::vector<std::uint64_t> answered_;  ///< tick, by device
-  std::uint64_t sequence_ = 0;
+  std::vector<Answered> answered_;  ///< by device
 };
 
 }  // namespace
 
-void serve_guests(const std::vector<Plan>& plans, const std::vector<Address>& servers, const Fleet& fleet,
-                  Shared& shared) {
+void serve_guests(const std::vector<Plan>& plans, const Address& server, const Fleet& fleet, Shared& shared) {
   const AtPriority high(fleet.priority);
   ::prctl(PR_SET_TIMERSLACK, 1UL, 0UL, 0UL, 0UL);
   std::vector<std::unique_ptr<Guest>> guests;
@@ -202,6 +222,7 @@ void serve_guests(const std::vector<Plan>& plans, const std::vector<Address>& se
     if (phase != shared.at_work.load(std::memory_order_relaxed)) {
       Guest::unix_offset = clock::unix_offset();
       Guest::measuring = phase == Shared::kMeasuring;
+      (phase == Shared::kMeasuring ? shared.from : shared.until) = clock::now();
       if (phase == Shared::kMeasuring) lost_before = lost();
       if (phase == Shared::kReporting) shared.lost = lost() - lost_before;
       shared.at_work.store(phase, std::memory_order_release);
@@ -220,7 +241,7 @@ void serve_guests(const std::vector<Plan>& plans, const std::vector<Address>& se
     // A server answers 16 half-open ones at a time.
     if (guests.size() < plans.size() && guests.size() < open + 8) {
       const std::size_t number = guests.size();
-      guests.push_back(std::make_unique<Guest>(plans[number], servers[plans[number].server], number, fleet, shared));
+      guests.push_back(std::make_unique<Guest>(plans[number], server, number, fleet, shared));
       epoll_event event{};
       event.events = EPOLLIN;
       event.data.u32 = static_cast<std::uint32_t>(number);

@@ -19,12 +19,13 @@ namespace tendon::bench {
 
 inline constexpr Duration kPeriod = std::chrono::milliseconds(1);
 
-std::string device_name(std::size_t i);
+/// The name of the scene of so many devices, and of each of them.
+inline constexpr const char* kFleetName = "d";
+std::string device_name(const Fleet& fleet, std::size_t i);
 std::string channel_name(std::size_t i);
 
 /// Who comes, and what for.
 struct Plan {
-  std::size_t server = 0;
   std::vector<Claim> claims;
   bool controls = true;
   std::optional<Key> key{};
@@ -40,12 +41,20 @@ struct Shared {
   std::atomic<std::size_t> open{0};    ///< sessions
   // Written by the guests before they are at kReporting.
   injector::DurationHistogram state_age;
+  injector::DurationHistogram loop_age;
+  LocalTime from{};  ///< that it was measured, as they saw it
+  LocalTime until{};
   std::atomic<std::uint64_t> states{0};
+  std::uint64_t answered_in_time = 0;
   std::uint64_t lost = 0;
+  std::uint64_t out_datagrams = 0;  ///< to the guests
+  std::uint64_t out_bytes = 0;
+  std::uint64_t in_datagrams = 0;
+  std::uint64_t in_bytes = 0;
+  std::uint64_t forces_sent = 0;  ///< from the first on, also after that
 };
 
-/// Opens a session for each plan at the server that it names, and answers states until `shared` says kQuit.
-void serve_guests(const std::vector<Plan>& plans, const std::vector<Address>& servers, const Fleet& fleet,
-                  Shared& shared);
+/// Opens a session for each plan, and answers states until `shared` says kQuit.
+void serve_guests(const std::vector<Plan>& plans, const Address& server, const Fleet& fleet, Shared& shared);
 
 }  // namespace tendon::bench

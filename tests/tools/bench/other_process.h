@@ -5,6 +5,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <csignal>
 #include <cstdio>
 #include <ctime>
 #include <exception>
@@ -17,7 +18,7 @@
 
 namespace tendon::bench {
 
-// The guests' process, and what it shares with the host's.
+// The processes beside the bench's own, and what they share with it.
 
 /// Throws std::system_error of errno.
 [[noreturn]] void fail(const std::string& what);
@@ -57,7 +58,7 @@ class OtherProcess {
       work();
       ::_exit(0);
     } catch (const std::exception& error) {
-      std::fprintf(stderr, "tendon-lab bench: guests: %s\n", error.what());
+      std::fprintf(stderr, "tendon-lab bench: another process: %s\n", error.what());
       ::_exit(1);
     }
   }
@@ -68,8 +69,10 @@ class OtherProcess {
   /// Throws when it has ended by itself.
   void check() const {
     int status = 0;
-    if (::waitpid(pid_, &status, WNOHANG) == pid_) throw std::runtime_error("the guests' process has ended");
+    if (::waitpid(pid_, &status, WNOHANG) == pid_) throw std::runtime_error("another process has ended");
   }
+  void signal(int number) const { ::kill(pid_, number); }
+  pid_t pid() const { return pid_; }
   Duration processor_time() const {
     clockid_t clock{};
     ::clock_getcpuclockid(pid_, &clock);

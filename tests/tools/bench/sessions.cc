@@ -23,10 +23,9 @@ double percent(std::uint64_t part, std::uint64_t whole) {
 }
 
 /// As many datagrams of such sizes as the fleet's, bare.
-BareResult floor_of(const Fleet& fleet, const FleetResult& result, std::size_t sockets) {
+BareResult floor_of(const Fleet& fleet, const FleetResult& result) {
   BareTraffic bare;
   bare.sessions = result.sessions;
-  bare.sockets = sockets;
   bare.period = from_seconds(1.0 / fleet.state_hz);
   bare.length = fleet.length / 2;
   bare.priority = fleet.priority;
@@ -43,6 +42,9 @@ BareResult floor_of(const Fleet& fleet, const FleetResult& result, std::size_t s
   return run_bare(bare);
 }
 
+/// Of all its threads.
+Duration server_time(const FleetResult& result) { return result.haptic + result.network + result.log; }
+
 /// The age of a state when its guest's kernel has it, beside a datagram that is sent at once.
 Row row_of(const Fleet& fleet, const FleetResult& result, const BareResult& bare, std::string what) {
   const double period = us(from_seconds(1.0 / fleet.state_hz));
@@ -57,7 +59,6 @@ Row row_of(const Fleet& fleet, const FleetResult& result, const BareResult& bare
           .floor_p99 = us(bare.age.quantile(0.99)),
           .note = {}};
   if (*row.floor_p50 > 0) row.ratio = row.p50 / *row.floor_p50;
-  const double rounds_owed = static_cast<double>(result.rounds + result.missed);
   const auto per_device = [&](Duration spent) {
     return us(spent) / (1000 * result.seconds) / static_cast<double>(fleet.devices);
   };
@@ -67,35 +68,36 @@ Row row_of(const Fleet& fleet, const FleetResult& result, const BareResult& bare
   char note[600];
   std::snprintf(
       note, sizeof note,
-      "p99 is %.0f %% of a period; states received %.1f %%, forces taken %.1f %% of those owed; haptic rounds late by "
-      "%.0f µs (p99), %.2f %% missed; %.0f + %.0f datagrams/s of %.0f/%.0f bytes, lost %llu; processors: haptic %.2f "
-      "(%.2f µs a device and ms), network %.2f (%.2f), guests %.2f; bare %.2f, guests %.2f; force's whole loop %.1f ms "
-      "(p50), %.1f ms (p99)",
+      "p99 is %.0f %% of a period; states received %.1f %% of those owed, forces taken %.1f %% of those sent; %.2f %% "
+      "of "
+      "the steps overrun; %.0f + %.0f datagrams/s of %.0f/%.0f bytes, lost %llu; processors: haptic %.2f (%.2f µs a "
+      "device and ms), network %.2f (%.2f), rest %.2f, guests %.2f; bare %.2f, guests %.2f; force's whole loop %.1f ms "
+      "(p50), %.1f ms (p99); listening after %.0f ms, %.0f MB resident",
       100 * row.p99 / period, percent(result.states_received, result.states_owed),
-      percent(result.forces_taken, result.forces_owed), us(result.late.quantile(0.99)),
-      100 * static_cast<double>(result.missed) / std::max(1.0, rounds_owed),
+      percent(result.forces_taken, result.forces_sent), percent(result.overruns, result.steps),
       static_cast<double>(result.out_datagrams) / result.seconds,
       static_cast<double>(result.in_datagrams) / result.seconds,
       static_cast<double>(result.out_bytes) / std::max(1.0, static_cast<double>(result.out_datagrams)),
       static_cast<double>(result.in_bytes) / std::max(1.0, static_cast<double>(result.in_datagrams)),
       static_cast<unsigned long long>(result.lost), of_cores(result.haptic), per_device(result.haptic),
-      of_cores(result.network), per_device(result.network), of_cores(result.guests), bare_cores(bare.host),
-      bare_cores(bare.guests), 1e3 * seconds(result.loop_age.quantile(0.5)),
-      1e3 * seconds(result.loop_age.quantile(0.99)));
+      of_cores(result.network), per_device(result.network), of_cores(result.log), of_cores(result.guests),
+      bare_cores(bare.host), bare_cores(bare.guests), 1e3 * seconds(result.loop_age.quantile(0.5)),
+      1e3 * seconds(result.loop_age.quantile(0.99)), 1e3 * seconds(result.started),
+      static_cast<double>(result.resident) / 1e6);
   row.note = note;
   row.figures = {{"devices", static_cast<double>(fleet.devices)},
                  {"answered_in_time_percent", in_time},
                  {"haptic_us", per_device(result.haptic)},
                  {"network_us", per_device(result.network)},
                  {"floor_us", 1e6 * bare_cores(bare.host) / 1000 / static_cast<double>(fleet.devices)},
-                 {"server_cores", of_cores(result.haptic + result.network)},
+                 {"server_cores", of_cores(server_time(result))},
                  {"floor_cores", bare_cores(bare.host)}};
   return row;
 }
 
 bool keeps_up(const FleetResult& result) {
   return result.all_came && percent(result.states_received, result.states_owed) >= 99 &&
-         percent(result.forces_taken, result.forces_owed) >= 99 && result.missed * 100 <= result.rounds;
+         percent(result.forces_taken, result.forces_sent) >= 99 && result.overruns * 100 <= result.steps;
 }
 
 void came(const FleetResult& result, const std::string& what) {
@@ -124,7 +126,7 @@ void measure_sessions(Run& run) {
       const std::string what = std::to_string(count) + " sessions, states at " + std::to_string(state_hz) + " Hz";
       const FleetResult result = run_fleet(fleet);
       came(result, what);
-      Row row = row_of(fleet, result, floor_of(fleet, result, 1), what + ": age of a state");
+      Row row = row_of(fleet, result, floor_of(fleet, result), what + ": age of a state");
       if (result.controllers < result.sessions) {
         row.note = std::to_string(result.controllers) + " controllers, the others observers; " + row.note;
       }
@@ -153,9 +155,9 @@ void measure_512(Run& run) {
     const std::string what = std::to_string(count) + " devices, states and forces at 1 kHz, sealed";
     const FleetResult result = run_fleet(fleet);
     came(result, what);
-    Row row = row_of(fleet, result, floor_of(fleet, result, result.sessions), what + ": age of a state");
+    Row row = row_of(fleet, result, floor_of(fleet, result), what + ": age of a state");
     const double in_time = percent(result.answered_in_time, result.steps_owed);
-    const double cores = seconds(result.haptic + result.network) / result.seconds;
+    const double cores = seconds(server_time(result)) / result.seconds;
     if (in_time >= kInTime) knee = count;
     char strict[120];
     std::snprintf(strict, sizeof strict, "answered in the next step %.2f %%; server %.2f cores; ", in_time, cores);

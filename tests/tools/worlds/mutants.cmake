@@ -75,7 +75,7 @@ tendon_mutant(grip-sign SOURCE core/haptic_controller.cc LIBRARY tendon_core
   ORACLES "ledger")
 # A press that ends before the next state of a client is forgotten.
 tendon_mutant(forgets-presses SOURCE server/network_loop.cc LIBRARY tendon_loops
-  REPLACE "view->pressed |= state->buttons" "view->pressed = state->buttons"
+  REPLACE "view.pressed |= state.buttons" "view.pressed = state.buttons"
   ORACLES "press")
 # … or that a client's callback skips.
 tendon_mutant(skips-presses SOURCE clients/cpp/force_client.cc LIBRARY tendon_client
