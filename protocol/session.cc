@@ -147,6 +147,7 @@ struct Session::State {
   OutgoingRequests asked;
   Bye bye;
   int byes_left = 0;
+  LocalTime silent_until = LocalTime::min();  ///< nothing is to be said before; min: not known since the last news()
 
   // In.
   DataReader reader;
@@ -168,7 +169,8 @@ struct Session::State {
   Newest<PeerReport, PeerReportArrived> peer_reports_arrived;
   Newest<PortFrame, PortArrived> ports_arrived;
   std::optional<Closed> closed;
-  Event rare;  ///< the newest one of the others that was told
+  bool untold = false;  ///< something of these, of `asked` or of `answering` may wait
+  Event rare;           ///< the newest one of the others that was told
 
   std::optional<std::span<const std::byte>> open_body(LocalTime now, const Header& header,
                                                       std::span<const std::byte> datagram);
@@ -195,28 +197,33 @@ struct Session::State {
   void take(const PortFrame& port, bool /*newest*/) {
     stats.stale += ports_arrived.put_if_newer(port, port.sequence, port.epoch) ? 0 : 1;
   }
-  void take(const Control& control, bool /*newest*/) { stats.invalid += answering.take(control) ? 0 : 1; }
-  void take(const ControlAck& ack, bool /*newest*/) { stats.invalid += asked.acknowledge(ack) ? 0 : 1; }
+  void take(const Control& control, bool /*newest*/) { stats.invalid += news().answering.take(control) ? 0 : 1; }
+  void take(const ControlAck& ack, bool /*newest*/) { stats.invalid += news().asked.acknowledge(ack) ? 0 : 1; }
   void take(const Bye& said, bool newest);
 
   bool silent_too_long(LocalTime now) const noexcept { return !last_sent || now - *last_sent >= config.keep_alive; }
-  bool something_to_say(LocalTime now) const noexcept {
-    return !states_to_send.empty() || !forces_to_send.empty() || report_to_send || !device_reports_to_send.empty() ||
-           !peer_reports_to_send.empty() || !ports_to_send.empty() || answering.next_due() || asked.next_due(now) ||
-           silent_too_long(now);
+  /// What is to be said, or when, changes: it is looked for again.
+  State& news() noexcept {
+    silent_until = LocalTime::min();
+    return *this;
+  }
+  bool something_to_say(LocalTime now) noexcept {
+    if (now < silent_until) return false;
+    if (!states_to_send.empty() || !forces_to_send.empty() || report_to_send || !device_reports_to_send.empty() ||
+        !peer_reports_to_send.empty() || !ports_to_send.empty() || answering.next_due() || asked.next_due(now) ||
+        silent_too_long(now)) {
+      return true;
+    }
+    silent_until = std::min(*last_sent + config.keep_alive, asked.next_due_time());
+    return false;
   }
   bool too_old(LocalTime now) const noexcept {
     return sealer &&
            (now - opened >= config.life || next_packet >= config.max_datagrams || stats.forged >= config.max_forged);
   }
-  /// Nearly every datagram asks for it in vain.
-  bool something_to_tell() const noexcept {
-    return !forces_arrived.empty() || !states_arrived.empty() || !ports_arrived.empty() || report_arrived ||
-           !device_reports_arrived.empty() || !peer_reports_arrived.empty() || closed || answering.has_next() ||
-           asked.has_answer();
-  }
   const Event* tell();
   void close(Code code, std::string reason);
+  std::size_t say(LocalTime now, std::span<std::byte, kMaxDatagram> buffer);
   Header begin(LocalTime now, std::span<std::byte, kMaxDatagram> buffer);
   std::size_t sent(LocalTime now, const Header& header, std::span<std::byte, kMaxDatagram> buffer) noexcept;
   void fill(LocalTime now);
@@ -305,6 +312,7 @@ bool Session::State::accept(LocalTime now, std::uint64_t number, const DataConte
     echo = {.sent = content.sent, .received = now, .packet_number = number, .received_mask = 0};
   }
   if (content.echo) observe(now, content.sent, *content.echo);
+  untold |= !content.frames.empty();
   for (const Frame& frame : content.frames) {
     std::visit([&](const auto& body) { take(body, newest); }, frame);
   }
@@ -355,32 +363,32 @@ void Session::State::take(const Bye& said, bool /*newest*/) {
   closed = Closed{.code = said.code, .reason = said.reason};
 }
 
-void Session::send(const DeviceState& state) { state_->states_to_send.put(state); }
+void Session::send(const DeviceState& state) { state_->news().states_to_send.put(state); }
 
-void Session::send(const ForceCommand& command) { state_->forces_to_send.put(command); }
+void Session::send(const ForceCommand& command) { state_->news().forces_to_send.put(command); }
 
-void Session::send(const LinkReport& report) { state_->report_to_send = report; }
+void Session::send(const LinkReport& report) { state_->news().report_to_send = report; }
 
-void Session::send(const DeviceReport& report) { state_->device_reports_to_send.put(report); }
+void Session::send(const DeviceReport& report) { state_->news().device_reports_to_send.put(report); }
 
-void Session::send(const PeerReport& report) { state_->peer_reports_to_send.put(report); }
+void Session::send(const PeerReport& report) { state_->news().peer_reports_to_send.put(report); }
 
-void Session::send(const PortFrame& port) { state_->ports_to_send.put(port); }
+void Session::send(const PortFrame& port) { state_->news().ports_to_send.put(port); }
 
-std::optional<std::uint32_t> Session::request(const Request& request) { return state_->asked.add(request); }
+std::optional<std::uint32_t> Session::request(const Request& request) { return state_->news().asked.add(request); }
 
 void Session::answer(std::uint32_t id, Code code, std::string detail, Duration wait) {
-  state_->answering.answer({.id = id, .code = code, .detail = std::move(detail), .wait = wait});
+  state_->news().answering.answer({.id = id, .code = code, .detail = std::move(detail), .wait = wait});
 }
 
 void Session::answer(std::uint32_t id, DeviceDescription device) {
-  state_->answering.answer({.id = id, .code = Code::kOk, .detail = {}, .wait = {}, .device = std::move(device)});
+  state_->news().answering.answer({.id = id, .code = Code::kOk, .detail = {}, .wait = {}, .device = std::move(device)});
 }
 
 void Session::answer(std::uint32_t id, HandleDescription handle) {
   ControlAck ack{.id = id, .code = Code::kOk, .detail = {}};
   ack.handle = std::move(handle);
-  state_->answering.answer(std::move(ack));
+  state_->news().answering.answer(std::move(ack));
 }
 
 void Session::close(Code code, std::string reason) { state_->close(code, std::move(reason)); }
@@ -399,10 +407,12 @@ void Session::tick(LocalTime now) {
   if (now - my.last_heard >= my.config.timeout) {
     const auto ms = std::chrono::duration_cast<std::chrono::milliseconds>(my.config.timeout).count();
     my.open = false;
+    my.untold = true;
     my.closed = Closed{.code = Code::kTimedOut, .reason = "nothing heard for " + std::to_string(ms) + " ms"};
   } else if (my.too_old(now)) {
     const std::string reason = "the session has reached its age";
     my.close(Code::kExpired, reason);
+    my.untold = true;
     my.closed = Closed{.code = Code::kExpired, .reason = reason};
   }
 }
@@ -468,35 +478,48 @@ void Session::State::fill(LocalTime now) {
 std::size_t Session::next_datagram(LocalTime now, std::span<std::byte, kMaxDatagram> buffer) {
   State& my = *state_;
   my.latest = now;
-  if (my.byes_left > 0) {
-    --my.byes_left;
-    const Header header = my.begin(now, buffer);
-    my.writer.add(my.bye);
-    return my.sent(now, header, buffer);
-  }
-  if (!my.open || !my.something_to_say(now)) return 0;
-  const Header header = my.begin(now, buffer);
-  my.fill(now);
-  return my.sent(now, header, buffer);
+  if (now < my.silent_until && my.byes_left == 0) return 0;  // most ask in vain
+  return my.say(now, buffer);
 }
 
-const Session::Event* Session::next_event() { return state_->something_to_tell() ? state_->tell() : nullptr; }
+std::size_t Session::State::say(LocalTime now, std::span<std::byte, kMaxDatagram> buffer) {
+  if (byes_left > 0) {
+    --byes_left;
+    const Header header = begin(now, buffer);
+    writer.add(bye);
+    return sent(now, header, buffer);
+  }
+  if (!open || !something_to_say(now)) return 0;
+  const Header header = begin(now, buffer);
+  fill(now);
+  return sent(now, header, buffer);
+}
+
+const Session::Event* Session::next_event() {
+  State& my = *state_;
+  if (!my.untold) return nullptr;
+  const Event* const event = my.tell();
+  my.untold = event != nullptr;
+  return event;
+}
 
 const Session::Event* Session::State::tell() {
   const auto keep = [&](auto event) {
     rare = std::move(event);
     return &rare;
   };
-  if (const Control* const control = answering.next()) {
-    return keep(RequestArrived{.id = control->id, .request = *control->request});
+  if (answering.has_next()) {
+    const Control* const control = news().answering.next();  // which answers one that it does not know
+    if (control != nullptr) return keep(RequestArrived{.id = control->id, .request = *control->request});
   }
-  if (auto ack = asked.next_answer()) {
-    return keep(RequestAnswered{.id = ack->id,
-                                .code = ack->code,
-                                .detail = std::move(ack->detail),
-                                .wait = ack->wait,
-                                .device = std::move(ack->device),
-                                .handle = std::move(ack->handle)});
+  if (asked.has_answer()) {
+    ControlAck ack = *asked.next_answer();
+    return keep(RequestAnswered{.id = ack.id,
+                                .code = ack.code,
+                                .detail = std::move(ack.detail),
+                                .wait = ack.wait,
+                                .device = std::move(ack.device),
+                                .handle = std::move(ack.handle)});
   }
   if (!forces_arrived.empty()) return forces_arrived.take();
   if (!ports_arrived.empty()) return ports_arrived.take();
@@ -509,11 +532,11 @@ const Session::Event* Session::State::tell() {
 }
 
 LocalTime Session::next_tick() const noexcept {
-  const State& my = *state_;
+  State& my = *state_;
   if (!my.open) return my.byes_left > 0 ? my.latest : LocalTime::max();
   if (my.something_to_say(my.latest)) return my.latest;
   if (my.too_old(my.latest)) return my.latest;
-  return std::min({my.last_heard + my.config.timeout, *my.last_sent + my.config.keep_alive, my.asked.next_due_time()});
+  return std::min(my.last_heard + my.config.timeout, my.silent_until);
 }
 
 bool Session::open() const noexcept { return state_->open; }

@@ -358,7 +358,7 @@ bool ForceClient::answer(LocalTime now, const Reply& reply) {
 
 /// Takes from a command what this server or its device does not know.
 void ForceClient::leave_out(const Touch& touch, const DeviceState& answered, ForceCommand& command) {
-  if (!agreed_to(kFeatureLocalModel)) command.model.reset();
+  if (command.model && !agreed_to(kFeatureLocalModel)) command.model.reset();
   if (!touch.torque && !touch.angular_stiffness && !touch.grip_force) return;
   if (!agreed_to(kFeatureHandle)) {
     stats_.left_out = "torque and grip force: the server does not know them";

@@ -3,9 +3,9 @@
 
 #include <poll.h>
 #include <sys/socket.h>
+#include <unistd.h>
 
 #include <algorithm>
-#include <asio/generic/datagram_protocol.hpp>
 #include <asio/io_context.hpp>
 #include <asio/ip/udp.hpp>
 #include <asio/local/datagram_protocol.hpp>
@@ -35,24 +35,26 @@ udp::endpoint to_endpoint(const Address& address) {
 
 }  // namespace
 
-struct UdpTransport::Socket {
-  asio::io_context context;
-  asio::generic::datagram_protocol::socket socket{context};
-};
+/// In place of the socket before. Asio has given it away: it watches its sockets with an epoll, which each datagram would
+/// wake, and nobody waits for.
+void UdpTransport::use(int connected) noexcept {
+  if (fd_ >= 0) ::close(fd_);
+  fd_ = connected;
+}
 
 /// From a name of the kernel's (unix(7), autobind), so that the server can answer.
 void UdpTransport::connect_to_file() {
   const asio::local::datagram_protocol::endpoint file(name_.unix_path());
   try {
-    auto socket = std::make_unique<Socket>();
-    socket->socket.open(file.protocol());
+    asio::io_context context;
+    asio::local::datagram_protocol::socket socket(context, file.protocol());
     const sockaddr unnamed{.sa_family = AF_UNIX, .sa_data = {}};
-    if (::bind(socket->socket.native_handle(), &unnamed, sizeof unnamed.sa_family) != 0) {
+    if (::bind(socket.native_handle(), &unnamed, sizeof unnamed.sa_family) != 0) {
       throw std::system_error(errno, std::system_category());
     }
-    socket->socket.connect(file);
-    socket->socket.non_blocking(true);
-    socket_ = std::move(socket);
+    socket.connect(file);
+    socket.non_blocking(true);
+    use(socket.release());
   } catch (const std::system_error& error) {
     throw std::runtime_error("cannot reach " + name_.text() + ": " + error.code().message());
   }
@@ -64,7 +66,7 @@ UdpTransport::UdpTransport(const ServerName& server, bool has_key) : name_(serve
   device_ = std::move(place.device);
 }
 
-UdpTransport::~UdpTransport() = default;
+UdpTransport::~UdpTransport() { use(-1); }
 
 /// Connects to the first one that the system can reach, in their order, beginning with the one at `first`.
 void UdpTransport::connect(const std::vector<Address>& addresses, std::size_t first) {
@@ -77,10 +79,12 @@ void UdpTransport::connect(const std::vector<Address>& addresses, std::size_t fi
   for (std::size_t i = 0; i < addresses.size(); ++i) {
     const Address& address = addresses[(first + i) % addresses.size()];
     try {
-      auto socket = std::make_unique<Socket>();
-      socket->socket.connect(to_endpoint(address));
-      socket->socket.non_blocking(true);
-      socket_ = std::move(socket);
+      asio::io_context context;
+      const udp::endpoint endpoint = to_endpoint(address);
+      udp::socket socket(context, endpoint.protocol());
+      socket.connect(endpoint);
+      socket.non_blocking(true);
+      use(socket.release());
       server_ = address;
       return;
     } catch (const std::system_error& error) {
@@ -100,25 +104,21 @@ void UdpTransport::look_up_again(bool another) {
 
 void UdpTransport::send(const Address& to, std::span<const std::byte> datagram) {
   if (to != server_) return;
-  asio::error_code lost;
-  socket_->socket.send(asio::buffer(datagram.data(), datagram.size()), 0, lost);
+  [[maybe_unused]] const ssize_t sent = ::send(fd_, datagram.data(), datagram.size(), MSG_NOSIGNAL);
 }
 
 std::size_t UdpTransport::receive(Address& from, std::span<std::byte> buffer) {
   from = server_;
   for (int i = 0; i < kMaxSkips; ++i) {
-    asio::error_code error;
     // MSG_TRUNC: the size is that of the datagram, even when the buffer is smaller.
-    const std::size_t size = socket_->socket.receive(asio::buffer(buffer.data(), buffer.size()), MSG_TRUNC, error);
-    if (!error && size > 0) return size;
-    if (error == asio::error::would_block) return 0;
+    const ssize_t size = ::recv(fd_, buffer.data(), buffer.size(), MSG_TRUNC);
+    if (size > 0) return static_cast<std::size_t>(size);
+    if (size < 0 && (errno == EAGAIN || errno == EWOULDBLOCK)) return 0;
   }
   return 0;
 }
 
 LocalTime UdpTransport::present(LocalTime now) const { return std::max(now, read_clock()); }
-
-int UdpTransport::descriptor() const { return socket_->socket.native_handle(); }
 
 void UdpTransport::wait(Duration timeout) {
   UdpTransport* const alone = this;

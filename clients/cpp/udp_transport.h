@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <memory>
 #include <span>
 #include <vector>
 
@@ -24,6 +23,8 @@ class UdpTransport : public Link {
   /// the sessions here have a key.
   explicit UdpTransport(const ServerName& server, bool has_key = false);
   ~UdpTransport() override;
+  UdpTransport(const UdpTransport&) = delete;
+  UdpTransport& operator=(const UdpTransport&) = delete;
 
   /// The address in use.
   const Address& server() const noexcept { return server_; }
@@ -46,7 +47,7 @@ class UdpTransport : public Link {
 
   /// The socket's file descriptor, for a caller that sleeps on other things too: poll() says when it can be read. Another
   /// one after look_up_again().
-  int descriptor() const;
+  int descriptor() const noexcept { return fd_; }
 
   /// Sleeps until a datagram can be received or `timeout` is over; a signal handler may end it sooner.
   /// A timeout of zero or less does not sleep.
@@ -56,15 +57,15 @@ class UdpTransport : public Link {
   static bool wait_for_any(std::span<UdpTransport* const> transports, Duration timeout, int also = -1);
 
  private:
-  struct Socket;  // keeps Asio out of this header
   void connect_to_file();
   void connect(const std::vector<Address>& addresses, std::size_t first);
+  void use(int connected) noexcept;
 
   ServerName name_;
   bool has_key_;
   Address server_;
   std::string device_;
-  std::unique_ptr<Socket> socket_;
+  int fd_ = -1;
 };
 
 }  // namespace tendon

@@ -27,13 +27,14 @@ std::optional<ClockOffsetEstimator::Sample> ClockOffsetEstimator::sample_of(cons
   if (ours < Duration::zero() || theirs < Duration::zero()) return std::nullopt;
   Duration round_trip = ours - theirs;
   // An answer held for long by a peer with a faster clock.
-  if (seconds(round_trip) < -fastest_drift_ * seconds(theirs)) return std::nullopt;
-  const double doubt = static_cast<double>(round_trip.count()) + fastest_drift_ * static_cast<double>(ours.count());
+  const auto ns = [](Duration time) { return static_cast<double>(time.count()); };
+  if (ns(round_trip) < -fastest_drift_ * ns(theirs)) return std::nullopt;
+  const double doubt = ns(round_trip) + fastest_drift_ * ns(ours);
   round_trip = std::max(round_trip, Duration::zero());
   const std::int64_t there = (e.received.time_since_epoch() - e.sent.time_since_epoch()).count();
   const std::int64_t back = (e.answered.time_since_epoch() - e.answered_at.time_since_epoch()).count();
   return Sample{e.sent + ours / 2, there + (back - there) / 2, round_trip.count(),
-                std::llround(std::ceil(std::max(doubt, 0.0) + kRounding))};
+                static_cast<std::int64_t>(std::ceil(std::max(doubt, 0.0) + kRounding))};
 }
 
 template <class Visit>
@@ -119,7 +120,7 @@ std::optional<ClockOffsetEstimator::Estimate> ClockOffsetEstimator::estimate(Loc
   const double bound = std::max({offset - interval.low, interval.high - offset, 0.0});
   return Estimate{.offset = Duration(anchor->offset_ns + std::llround(offset)),
                   .drift = drift,
-                  .error_bound = Duration(std::llround(std::ceil(bound))),
+                  .error_bound = Duration(static_cast<std::int64_t>(std::ceil(bound))),
                   .least_round_trip = Duration(anchor->round_trip)};
 }
 

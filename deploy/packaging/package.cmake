@@ -128,6 +128,11 @@ set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
 set(CPACK_DEBIAN_RUN_PACKAGE_NAME tendon)
 set(CPACK_DEBIAN_RUN_PACKAGE_SECTION science)
 set(CPACK_DEBIAN_RUN_PACKAGE_SHLIBDEPS ON)
+# What tendond loads for a scene that lists it, which no tool sees in the program.
+set(CPACK_DEBIAN_RUN_PACKAGE_DEPENDS "libsystemd0")
+if(TARGET PkgConfig::libusb)
+  string(APPEND CPACK_DEBIAN_RUN_PACKAGE_DEPENDS ", libusb-1.0-0")
+endif()
 set(CPACK_DEBIAN_RUN_PACKAGE_RECOMMENDS gnuplot-nox)
 set(CPACK_DEBIAN_RUN_PACKAGE_SUGGESTS "avahi-daemon, gmsh, rclone, tendon-fem-worker")
 set(CPACK_DEBIAN_RUN_DESCRIPTION "Networked haptics server with an energy-bounding output limiter

@@ -15,6 +15,7 @@
 #include <thread>
 
 #include "core/exchange/spsc_ring.h"
+#include "devices/late_library.h"
 #include "devices/usb/usb.h"
 
 namespace tendon::usb {
@@ -28,10 +29,45 @@ constexpr int kLookAgain_ms = 200;
 constexpr std::size_t kInPackets = 256;
 constexpr std::size_t kOutPackets = 16;
 
+/// What is used of libusb. It comes into the process with the first pipe, or the first look at what is plugged in.
+struct Libusb {
+  LateLibrary file{"libusb-1.0.so.0"};
+  decltype(&::libusb_alloc_transfer) alloc_transfer = file["libusb_alloc_transfer"];
+  decltype(&::libusb_cancel_transfer) cancel_transfer = file["libusb_cancel_transfer"];
+  decltype(&::libusb_claim_interface) claim_interface = file["libusb_claim_interface"];
+  decltype(&::libusb_close) close = file["libusb_close"];
+  decltype(&::libusb_exit) exit = file["libusb_exit"];
+  decltype(&::libusb_free_device_list) free_device_list = file["libusb_free_device_list"];
+  decltype(&::libusb_free_pollfds) free_pollfds = file["libusb_free_pollfds"];
+  decltype(&::libusb_free_transfer) free_transfer = file["libusb_free_transfer"];
+  decltype(&::libusb_get_bus_number) get_bus_number = file["libusb_get_bus_number"];
+  decltype(&::libusb_get_device_address) get_device_address = file["libusb_get_device_address"];
+  decltype(&::libusb_get_device_descriptor) get_device_descriptor = file["libusb_get_device_descriptor"];
+  decltype(&::libusb_get_device_list) get_device_list = file["libusb_get_device_list"];
+  decltype(&::libusb_get_next_timeout) get_next_timeout = file["libusb_get_next_timeout"];
+  decltype(&::libusb_get_pollfds) get_pollfds = file["libusb_get_pollfds"];
+  decltype(&::libusb_get_port_numbers) get_port_numbers = file["libusb_get_port_numbers"];
+  decltype(&::libusb_handle_events_timeout_completed) handle_events_timeout_completed =
+      file["libusb_handle_events_timeout_completed"];
+  decltype(&::libusb_init) init = file["libusb_init"];
+  decltype(&::libusb_release_interface) release_interface = file["libusb_release_interface"];
+  decltype(&::libusb_set_auto_detach_kernel_driver) set_auto_detach_kernel_driver =
+      file["libusb_set_auto_detach_kernel_driver"];
+  decltype(&::libusb_set_option) set_option = file["libusb_set_option"];
+  decltype(&::libusb_strerror) strerror = file["libusb_strerror"];
+  decltype(&::libusb_submit_transfer) submit_transfer = file["libusb_submit_transfer"];
+  decltype(&::libusb_wrap_sys_device) wrap_sys_device = file["libusb_wrap_sys_device"];
+};
+
+const Libusb& libusb() {
+  static const Libusb kLoaded;
+  return kLoaded;
+}
+
 struct Free {
-  void operator()(libusb_context* context) const { libusb_exit(context); }
-  void operator()(libusb_transfer* transfer) const { libusb_free_transfer(transfer); }
-  void operator()(libusb_device_handle* handle) const { libusb_close(handle); }
+  void operator()(libusb_context* context) const { libusb().exit(context); }
+  void operator()(libusb_transfer* transfer) const { libusb().free_transfer(transfer); }
+  void operator()(libusb_device_handle* handle) const { libusb().close(handle); }
 };
 using Context = std::unique_ptr<libusb_context, Free>;
 using Transfer = std::unique_ptr<libusb_transfer, Free>;
@@ -39,8 +75,8 @@ using Handle = std::unique_ptr<libusb_device_handle, Free>;
 
 Context make_context() {
   libusb_context* context = nullptr;
-  if (const int error = libusb_init(&context); error != LIBUSB_SUCCESS) {
-    throw std::runtime_error(std::string("this machine has no USB that can be used: ") + libusb_strerror(error));
+  if (const int error = libusb().init(&context); error != LIBUSB_SUCCESS) {
+    throw std::runtime_error(std::string("this machine has no USB that can be used: ") + libusb().strerror(error));
   }
   return Context(context);
 }
@@ -48,9 +84,9 @@ Context make_context() {
 /// The devices that are plugged in at this moment.
 class List {
  public:
-  explicit List(libusb_context* context) { size_ = std::max<ssize_t>(0, libusb_get_device_list(context, &devices_)); }
+  explicit List(libusb_context* context) { size_ = std::max<ssize_t>(0, libusb().get_device_list(context, &devices_)); }
   ~List() {
-    if (devices_ != nullptr) libusb_free_device_list(devices_, 1);
+    if (devices_ != nullptr) libusb().free_device_list(devices_, 1);
   }
   List(const List&) = delete;
   List& operator=(const List&) = delete;
@@ -65,18 +101,18 @@ class List {
 PluggedIn describe(libusb_device* device) {
   PluggedIn plugged;
   libusb_device_descriptor descriptor{};
-  if (libusb_get_device_descriptor(device, &descriptor) == LIBUSB_SUCCESS) {
+  if (libusb().get_device_descriptor(device, &descriptor) == LIBUSB_SUCCESS) {
     plugged.id = {descriptor.idVendor, descriptor.idProduct};
   }
   std::array<std::uint8_t, 7> ports{};  // USB 3.0, 8.9: no more tiers
-  const int count = libusb_get_port_numbers(device, ports.data(), static_cast<int>(ports.size()));
-  plugged.port = std::to_string(libusb_get_bus_number(device));
+  const int count = libusb().get_port_numbers(device, ports.data(), static_cast<int>(ports.size()));
+  plugged.port = std::to_string(libusb().get_bus_number(device));
   for (int i = 0; i < count; ++i) {
     plugged.port += (i == 0 ? "-" : ".") + std::to_string(ports.at(static_cast<std::size_t>(i)));
   }
   std::array<char, 32> node{};
-  std::snprintf(node.data(), node.size(), "/dev/bus/usb/%03u/%03u", unsigned{libusb_get_bus_number(device)},
-                unsigned{libusb_get_device_address(device)});
+  std::snprintf(node.data(), node.size(), "/dev/bus/usb/%03u/%03u", unsigned{libusb().get_bus_number(device)},
+                unsigned{libusb().get_device_address(device)});
   plugged.node = node.data();
   plugged.has_node = access(node.data(), F_OK) == 0;
   plugged.may_open = access(node.data(), R_OK | W_OK) == 0;
@@ -117,7 +153,7 @@ class LibusbPipe final : public Pipe {
   /// A transfer and the memory it uses.
   struct Slot {
     LibusbPipe* pipe = nullptr;
-    Transfer transfer{libusb_alloc_transfer(0)};
+    Transfer transfer{libusb().alloc_transfer(0)};
     std::array<std::uint8_t, kPacketSize> bytes{};
     bool under_way = false;
   };
@@ -175,7 +211,7 @@ class LibusbPipe final : public Pipe {
 
 LibusbPipe::LibusbPipe(const PipeConfig& config) : config_(config) {
   // The node comes from elsewhere, so this works without /dev/bus/usb too.
-  if (config_.node) libusb_set_option(nullptr, LIBUSB_OPTION_NO_DEVICE_DISCOVERY);
+  if (config_.node) libusb().set_option(nullptr, LIBUSB_OPTION_NO_DEVICE_DISCOVERY);
   context_ = make_context();
   bell_ = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
   if (bell_ < 0) throw std::system_error(errno, std::generic_category(), "eventfd");
@@ -270,7 +306,7 @@ int LibusbPipe::open_node() {
   // Each look uses a new context. A context that is kept learns of new devices only from udevd, which is missing in
   // some containers and small systems.
   libusb_context* looking = nullptr;
-  if (libusb_init(&looking) != LIBUSB_SUCCESS) return -1;
+  if (libusb().init(&looking) != LIBUSB_SUCCESS) return -1;
   const Context look(looking);
   std::string why;  // empty: the device is not plugged in, which is no fault
   for (libusb_device* device : List(look.get())) {
@@ -289,16 +325,16 @@ bool LibusbPipe::open() {
   node_ = open_node();
   if (node_ < 0) return false;
   libusb_device_handle* handle = nullptr;
-  int error = libusb_wrap_sys_device(context_.get(), node_, &handle);
+  int error = libusb().wrap_sys_device(context_.get(), node_, &handle);
   handle_.reset(handle);
   if (error == LIBUSB_SUCCESS) {
     // A SpaceMouse belongs to the kernel driver usbhid. FTDI's driver does not know the Falcon, but a user may have
     // added its id.
-    libusb_set_auto_detach_kernel_driver(handle, 1);
-    error = libusb_claim_interface(handle, 0);
+    libusb().set_auto_detach_kernel_driver(handle, 1);
+    error = libusb().claim_interface(handle, 0);
   }
   if (error != LIBUSB_SUCCESS) {
-    tell(std::string("the USB device cannot be used, is it in use elsewhere? ") + libusb_strerror(error));
+    tell(std::string("the USB device cannot be used, is it in use elsewhere? ") + libusb().strerror(error));
     close_node();
     return false;
   }
@@ -330,7 +366,7 @@ void LibusbPipe::fill(Slot& slot, std::uint8_t endpoint, std::size_t size, libus
 }
 
 void LibusbPipe::submit(Slot& slot) noexcept {
-  slot.under_way = libusb_submit_transfer(slot.transfer.get()) == LIBUSB_SUCCESS;
+  slot.under_way = libusb().submit_transfer(slot.transfer.get()) == LIBUSB_SUCCESS;
   if (!slot.under_way) broken_ = true;
 }
 
@@ -382,7 +418,7 @@ void LibusbPipe::close() {
     if (!broken_ && sending()) wait(-1);
   }
   const auto cancel = [](Slot& slot) {
-    if (slot.under_way) libusb_cancel_transfer(slot.transfer.get());
+    if (slot.under_way) libusb().cancel_transfer(slot.transfer.get());
   };
   std::ranges::for_each(in_, cancel);
   std::ranges::for_each(out_, cancel);
@@ -390,24 +426,24 @@ void LibusbPipe::close() {
   while (under_way()) wait(kLookAgain_ms);
   discard();
   if (config_.opened) config_.opened(-1);
-  libusb_release_interface(handle_.get(), 0);
+  libusb().release_interface(handle_.get(), 0);
   close_node();
   look_at_descriptors();
 }
 
 void LibusbPipe::look_at_descriptors() {
   descriptors_.assign(1, {bell_, POLLIN, 0});
-  const libusb_pollfd** const all = libusb_get_pollfds(context_.get());
+  const libusb_pollfd** const all = libusb().get_pollfds(context_.get());
   for (const libusb_pollfd** one = all; one != nullptr && *one != nullptr; ++one) {
     descriptors_.push_back({(*one)->fd, (*one)->events, 0});
   }
-  libusb_free_pollfds(all);
+  libusb().free_pollfds(all);
 }
 
 // libusb's own wait watches only libusb's descriptors; this one also wakes for the bell.
 void LibusbPipe::wait(int most_ms) {
   timeval due{};
-  if (libusb_get_next_timeout(context_.get(), &due) == 1) {
+  if (libusb().get_next_timeout(context_.get(), &due) == 1) {
     const int due_ms = static_cast<int>(due.tv_sec * 1000 + (due.tv_usec + 999) / 1000);
     most_ms = most_ms < 0 ? due_ms : std::min(most_ms, due_ms);
   }
@@ -415,7 +451,7 @@ void LibusbPipe::wait(int most_ms) {
   std::uint64_t rung = 0;
   [[maybe_unused]] const ssize_t heard = ::read(bell_, &rung, sizeof rung);
   timeval at_once{};
-  libusb_handle_events_timeout_completed(context_.get(), &at_once, nullptr);
+  libusb().handle_events_timeout_completed(context_.get(), &at_once, nullptr);
 }
 
 void LibusbPipe::came_in(libusb_transfer* transfer) noexcept {

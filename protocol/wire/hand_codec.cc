@@ -373,6 +373,17 @@ class Reader {
   bool good_ = true;
 };
 
+/// Appends what `make` returns to `frames`, made where it will stay: what is made elsewhere has to be moved.
+template <class Make>
+auto& append(std::vector<Frame>& frames, Make make) {
+  using Value = decltype(make());
+  struct Made {
+    Make make;
+    operator Value() const noexcept { return make(); }
+  };
+  return std::get<Value>(frames.emplace_back(std::in_place_type<Value>, Made{make}));
+}
+
 // The fields of each message in their order, for both ways: `State` is const for a Writer.
 
 template <class Way, class State>
@@ -546,7 +557,7 @@ bool read_columns(Reader& in, DataContent& content) {
   in.column<14>(std::span(buttons).first(count), kMost32);
   if (!in.done()) return false;
   for (std::size_t i = 0; i < count; ++i, devices &= devices - 1) {
-    auto& state = std::get<DeviceState>(content.frames.emplace_back(DeviceState{.tick = tick}));
+    DeviceState& state = append(content.frames, [tick] { return DeviceState{.tick = tick}; });
     const auto vector = [&](const auto& column) { return Vec3(column[3 * i], column[3 * i + 1], column[3 * i + 2]); };
     state.sampled = sampled;
     state.position = vector(position);
@@ -634,11 +645,11 @@ bool read_by_hand(std::span<const std::byte> body, DataContent& content) {
     Reader fields(nullptr, nullptr);
     if (frames == limits::kMaxFrames || !in.enter<3>(frame)) return false;
     if (frame.enter<1>(fields)) {
-      auto& state = std::get<DeviceState>(content.frames.emplace_back(DeviceState{.tick = 0}));
+      DeviceState& state = append(content.frames, [] { return DeviceState{.tick = 0}; });
       state_fields(fields, state);
       if (!fields.done() || !in_bounds(state)) return false;
     } else if (frame.enter<2>(fields)) {
-      auto& command = std::get<ForceCommand>(content.frames.emplace_back(ForceCommand{.sequence = 0}));
+      ForceCommand& command = append(content.frames, [] { return ForceCommand{.sequence = 0}; });
       force_fields(fields, command);
       if (!fields.done() || !is_receivable(command)) return false;
     } else if (frame.enter<10>(fields)) {

@@ -22,6 +22,7 @@
 #include <system_error>
 #include <utility>
 
+#include "devices/late_library.h"
 #include "server/machine/doorbell.h"
 
 namespace tendon {
@@ -46,11 +47,46 @@ constexpr std::uint64_t kTryAgain = 5'000'000;
 /// Names that are tried for one device: more hosts that take each of them are an attack.
 constexpr int kMostNames = 100;
 
+/// What is used of libsystemd. It comes into the process with the first announcer.
+struct Systemd {
+  LateLibrary file{"libsystemd.so.0"};
+  decltype(&::sd_bus_attach_event) bus_attach_event = file["sd_bus_attach_event"];
+  decltype(&::sd_bus_call_async) bus_call_async = file["sd_bus_call_async"];
+  decltype(&::sd_bus_call_method_async) bus_call_method_async = file["sd_bus_call_method_async"];
+  decltype(&::sd_bus_close_unref) bus_close_unref = file["sd_bus_close_unref"];
+  decltype(&::sd_bus_match_signal) bus_match_signal = file["sd_bus_match_signal"];
+  decltype(&::sd_bus_match_signal_async) bus_match_signal_async = file["sd_bus_match_signal_async"];
+  decltype(&::sd_bus_message_append) bus_message_append = file["sd_bus_message_append"];
+  decltype(&::sd_bus_message_append_array) bus_message_append_array = file["sd_bus_message_append_array"];
+  decltype(&::sd_bus_message_close_container) bus_message_close_container = file["sd_bus_message_close_container"];
+  decltype(&::sd_bus_message_get_error) bus_message_get_error = file["sd_bus_message_get_error"];
+  decltype(&::sd_bus_message_get_path) bus_message_get_path = file["sd_bus_message_get_path"];
+  decltype(&::sd_bus_message_is_method_error) bus_message_is_method_error = file["sd_bus_message_is_method_error"];
+  decltype(&::sd_bus_message_new_method_call) bus_message_new_method_call = file["sd_bus_message_new_method_call"];
+  decltype(&::sd_bus_message_open_container) bus_message_open_container = file["sd_bus_message_open_container"];
+  decltype(&::sd_bus_message_read) bus_message_read = file["sd_bus_message_read"];
+  decltype(&::sd_bus_message_unref) bus_message_unref = file["sd_bus_message_unref"];
+  decltype(&::sd_bus_open_system) bus_open_system = file["sd_bus_open_system"];
+  decltype(&::sd_bus_slot_unref) bus_slot_unref = file["sd_bus_slot_unref"];
+  decltype(&::sd_event_add_io) event_add_io = file["sd_event_add_io"];
+  decltype(&::sd_event_add_time_relative) event_add_time_relative = file["sd_event_add_time_relative"];
+  decltype(&::sd_event_exit) event_exit = file["sd_event_exit"];
+  decltype(&::sd_event_loop) event_loop = file["sd_event_loop"];
+  decltype(&::sd_event_new) event_new = file["sd_event_new"];
+  decltype(&::sd_event_source_get_event) event_source_get_event = file["sd_event_source_get_event"];
+  decltype(&::sd_event_unref) event_unref = file["sd_event_unref"];
+};
+
+const Systemd& sd() {
+  static const Systemd kLoaded;
+  return kLoaded;
+}
+
 struct Release {
-  void operator()(sd_event* loop) const { sd_event_unref(loop); }
-  void operator()(sd_bus* bus) const { sd_bus_close_unref(bus); }
-  void operator()(sd_bus_message* message) const { sd_bus_message_unref(message); }
-  void operator()(sd_bus_slot* question) const { sd_bus_slot_unref(question); }
+  void operator()(sd_event* loop) const { sd().event_unref(loop); }
+  void operator()(sd_bus* bus) const { sd().bus_close_unref(bus); }
+  void operator()(sd_bus_message* message) const { sd().bus_message_unref(message); }
+  void operator()(sd_bus_slot* question) const { sd().bus_slot_unref(question); }
 };
 
 bool same_ip(const sockaddr* address, const Address& ours) {
@@ -88,16 +124,16 @@ class Announcer::Avahi {
         say_(std::move(say)) {
     for (Device& device : devices) entries_.push_back({.avahi = this, .device = std::move(device)});
     sd_event* loop = nullptr;
-    if (sd_event_new(&loop) < 0) throw std::runtime_error("[discovery] announce: the system gives no event loop");
+    if (sd().event_new(&loop) < 0) throw std::runtime_error("[discovery] announce: the system gives no event loop");
     loop_.reset(loop);
-    if (sd_event_add_io(loop, nullptr, end_.fd(), EPOLLIN, on_end, nullptr) < 0) {
+    if (sd().event_add_io(loop, nullptr, end_.fd(), EPOLLIN, on_end, nullptr) < 0) {
       throw std::runtime_error("[discovery] announce: the system gives no event loop");
     }
   }
 
   void run() {
     open();
-    sd_event_loop(loop_.get());
+    sd().event_loop(loop_.get());
     close();
   }
   void stop() noexcept { end_.ring(); }
@@ -114,7 +150,7 @@ class Announcer::Avahi {
   };
 
   static int on_end(sd_event_source* source, int, std::uint32_t, void*) noexcept {
-    return sd_event_exit(sd_event_source_get_event(source), 0);
+    return sd().event_exit(sd().event_source_get_event(source), 0);
   }
   static int on_time(sd_event_source*, std::uint64_t, void* self) noexcept {
     static_cast<Avahi*>(self)->open();
@@ -131,7 +167,7 @@ class Announcer::Avahi {
   static int on_server(sd_bus_message* signal, void* self, sd_bus_error*) noexcept {
     std::int32_t state = 0;
     // Its host name may be another one now.
-    if (sd_bus_message_read(signal, "i", &state) > 0 && state == kRunning) static_cast<Avahi*>(self)->announce();
+    if (sd().bus_message_read(signal, "i", &state) > 0 && state == kRunning) static_cast<Avahi*>(self)->announce();
     return 0;
   }
   static int on_group(sd_bus_message* signal, void* self, sd_bus_error*) noexcept {
@@ -164,7 +200,7 @@ class Announcer::Avahi {
   void no_bus(const std::string& why) {
     lost("there is no D-Bus system bus (" + why + ")");
     if (waits_) return;
-    waits_ = sd_event_add_time_relative(loop_.get(), nullptr, CLOCK_MONOTONIC, kTryAgain, 0, on_time, this) >= 0;
+    waits_ = sd().event_add_time_relative(loop_.get(), nullptr, CLOCK_MONOTONIC, kTryAgain, 0, on_time, this) >= 0;
   }
 
   /// Avahi then takes back what we have announced.
@@ -180,15 +216,15 @@ class Announcer::Avahi {
     waits_ = false;
     close();
     sd_bus* bus = nullptr;
-    if (const int error = sd_bus_open_system(&bus); error < 0) return no_bus(std::generic_category().message(-error));
+    if (const int error = sd().bus_open_system(&bus); error < 0) return no_bus(std::generic_category().message(-error));
     bus_.reset(bus);
-    sd_bus_match_signal(bus, nullptr, "org.freedesktop.DBus.Local", "/org/freedesktop/DBus/Local",
-                        "org.freedesktop.DBus.Local", "Disconnected", on_bus_lost, this);
-    sd_bus_match_signal_async(bus, nullptr, "org.freedesktop.DBus", "/org/freedesktop/DBus", "org.freedesktop.DBus",
-                              "NameOwnerChanged", on_owner, nullptr, this);
-    sd_bus_match_signal_async(bus, nullptr, kAvahi, "/", kServer, "StateChanged", on_server, nullptr, this);
-    sd_bus_match_signal_async(bus, nullptr, kAvahi, nullptr, kEntryGroup, "StateChanged", on_group, nullptr, this);
-    if (sd_bus_attach_event(bus, loop_.get(), 0) < 0) return no_bus("it is gone");
+    sd().bus_match_signal(bus, nullptr, "org.freedesktop.DBus.Local", "/org/freedesktop/DBus/Local",
+                          "org.freedesktop.DBus.Local", "Disconnected", on_bus_lost, this);
+    sd().bus_match_signal_async(bus, nullptr, "org.freedesktop.DBus", "/org/freedesktop/DBus", "org.freedesktop.DBus",
+                                "NameOwnerChanged", on_owner, nullptr, this);
+    sd().bus_match_signal_async(bus, nullptr, kAvahi, "/", kServer, "StateChanged", on_server, nullptr, this);
+    sd().bus_match_signal_async(bus, nullptr, kAvahi, nullptr, kEntryGroup, "StateChanged", on_group, nullptr, this);
+    if (sd().bus_attach_event(bus, loop_.get(), 0) < 0) return no_bus("it is gone");
     announce();
   }
 
@@ -200,20 +236,20 @@ class Announcer::Avahi {
       entry.attempt = 1;
       entry.name = entry.device.name;
       sd_bus_slot* question = nullptr;
-      sd_bus_call_method_async(bus_.get(), &question, kAvahi, "/", kServer, "EntryGroupNew", on_new_group, &entry,
-                               nullptr);
+      sd().bus_call_method_async(bus_.get(), &question, kAvahi, "/", kServer, "EntryGroupNew", on_new_group, &entry,
+                                 nullptr);
       entry.question.reset(question);
     }
   }
 
   void tell(const Entry& entry, const char* what) {
-    sd_bus_call_method_async(bus_.get(), nullptr, kAvahi, entry.group.c_str(), kEntryGroup, what, nullptr, nullptr,
-                             nullptr);
+    sd().bus_call_method_async(bus_.get(), nullptr, kAvahi, entry.group.c_str(), kEntryGroup, what, nullptr, nullptr,
+                               nullptr);
   }
 
   void group_made(Entry& entry, sd_bus_message* answer) {
     const char* path = nullptr;
-    if (sd_bus_message_is_method_error(answer, nullptr) > 0 || sd_bus_message_read(answer, "o", &path) < 0) {
+    if (sd().bus_message_is_method_error(answer, nullptr) > 0 || sd().bus_message_read(answer, "o", &path) < 0) {
       return refused(answer);
     }
     entry.group = path;
@@ -222,26 +258,27 @@ class Announcer::Avahi {
 
   void add(Entry& entry) {
     sd_bus_message* made = nullptr;
-    if (sd_bus_message_new_method_call(bus_.get(), &made, kAvahi, entry.group.c_str(), kEntryGroup, "AddService") < 0) {
+    if (sd().bus_message_new_method_call(bus_.get(), &made, kAvahi, entry.group.c_str(), kEntryGroup, "AddService") <
+        0) {
       return no_bus("it is gone");
     }
     const std::unique_ptr<sd_bus_message, Release> message(made);
     // An empty domain and host: those of avahi-daemon.
-    sd_bus_message_append(made, "iiussssq", interface_, protocol_, 0U, entry.name.c_str(), dns_sd::kService, "", "",
-                          port_);
-    sd_bus_message_open_container(made, 'a', "ay");
+    sd().bus_message_append(made, "iiussssq", interface_, protocol_, 0U, entry.name.c_str(), dns_sd::kService, "", "",
+                            port_);
+    sd().bus_message_open_container(made, 'a', "ay");
     for (const std::string& text : dns_sd::to_txt(entry.device.about)) {
-      sd_bus_message_append_array(made, 'y', text.data(), text.size());
+      sd().bus_message_append_array(made, 'y', text.data(), text.size());
     }
-    sd_bus_message_close_container(made);
+    sd().bus_message_close_container(made);
     sd_bus_slot* question = nullptr;
-    sd_bus_call_async(bus_.get(), &question, made, on_added, &entry, 0);
+    sd().bus_call_async(bus_.get(), &question, made, on_added, &entry, 0);
     entry.question.reset(question);
   }
 
   void added(Entry& entry, sd_bus_message* answer) {
-    if (sd_bus_message_is_method_error(answer, "org.freedesktop.Avahi.CollisionError") > 0) return rename(entry);
-    if (sd_bus_message_is_method_error(answer, nullptr) > 0) return refused(answer);
+    if (sd().bus_message_is_method_error(answer, "org.freedesktop.Avahi.CollisionError") > 0) return rename(entry);
+    if (sd().bus_message_is_method_error(answer, nullptr) > 0) return refused(answer);
     tell(entry, "Commit");
   }
 
@@ -253,14 +290,14 @@ class Announcer::Avahi {
   }
 
   void refused(sd_bus_message* answer) {
-    const sd_bus_error* error = sd_bus_message_get_error(answer);
+    const sd_bus_error* error = sd().bus_message_get_error(answer);
     const char* why = error == nullptr ? "no answer" : error->message != nullptr ? error->message : error->name;
     lost(std::string("avahi-daemon does not take it (") + why + ")");
   }
 
   void owner_changed(sd_bus_message* signal) {
     std::array<const char*, 3> names{};
-    if (sd_bus_message_read(signal, "sss", &names[0], &names[1], &names[2]) <= 0) return;
+    if (sd().bus_message_read(signal, "sss", &names[0], &names[1], &names[2]) <= 0) return;
     if (std::string_view(names[0]) != kAvahi) return;
     if (*names[2] == '\0') {
       for (Entry& entry : entries_) entry.group.clear();
@@ -270,12 +307,12 @@ class Announcer::Avahi {
   }
 
   void group_changed(sd_bus_message* signal) {
-    const char* const path = sd_bus_message_get_path(signal);
+    const char* const path = sd().bus_message_get_path(signal);
     const auto entry = std::find_if(entries_.begin(), entries_.end(),
                                     [path](const Entry& one) { return path != nullptr && one.group == path; });
     std::int32_t state = 0;
     const char* error = nullptr;
-    if (entry == entries_.end() || sd_bus_message_read(signal, "is", &state, &error) <= 0) return;
+    if (entry == entries_.end() || sd().bus_message_read(signal, "is", &state, &error) <= 0) return;
     if (state == kEstablished) {
       say(false, "announced as \"" + entry->name + "\" (" + dns_sd::kService + ", port " + std::to_string(port_) + ")" +
                      (entry->attempt > 1 ? ", because \"" + entry->device.name + "\" is taken" : ""));

@@ -1,23 +1,67 @@
 // SPDX-License-Identifier: Apache-2.0
+//
+// The two protocols of sd_notify(3) and sd_watchdog_enabled(3): a datagram, and two variables. libsystemd would bring
+// seven libraries into the process for them.
 #include "server/machine/service.h"
 
-#include <systemd/sd-daemon.h>
+#include <sys/socket.h>
+#include <sys/un.h>
+#include <unistd.h>
 
+#include <algorithm>
+#include <charconv>
 #include <chrono>
+#include <cstddef>
 #include <cstdint>
+#include <cstdlib>
+#include <string_view>
 
 namespace tendon::service {
+namespace {
 
-void ready() { sd_notify(0, "READY=1"); }
-
-void stopping() { sd_notify(0, "STOPPING=1"); }
-
-std::optional<Duration> watch_period() {
-  std::uint64_t microseconds = 0;
-  if (sd_watchdog_enabled(0, &microseconds) <= 0) return {};
-  return std::chrono::microseconds(microseconds / 2);
+/// Empty when it is not set.
+std::string_view variable(const char* name) {
+  const char* const value = std::getenv(name);  // NOLINT(concurrency-mt-unsafe): nobody sets it
+  return value == nullptr ? std::string_view() : value;
 }
 
-void alive() { sd_notify(0, "WATCHDOG=1"); }
+/// Empty when it is no whole number above 0, or not set.
+std::optional<std::int64_t> number(const char* name) {
+  const std::string_view text = variable(name);
+  std::int64_t value = 0;
+  const auto [stop, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc{} || stop != text.data() + text.size() || value <= 0) return {};
+  return value;
+}
+
+void tell(std::string_view state) {
+  const std::string_view manager = variable("NOTIFY_SOCKET");
+  sockaddr_un to{};
+  to.sun_family = AF_UNIX;
+  if (manager.empty() || manager.size() > sizeof to.sun_path) return;
+  std::copy(manager.begin(), manager.end(), to.sun_path);
+  if (to.sun_path[0] == '@') to.sun_path[0] = '\0';  // a name that is no file (unix(7))
+  const int from = ::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+  if (from < 0) return;
+  ::sendto(from, state.data(), state.size(), MSG_NOSIGNAL, reinterpret_cast<const sockaddr*>(&to),
+           static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + manager.size()));
+  ::close(from);
+}
+
+}  // namespace
+
+void ready() { tell("READY=1"); }
+
+void stopping() { tell("STOPPING=1"); }
+
+std::optional<Duration> watch_period() {
+  const auto microseconds = number("WATCHDOG_USEC");
+  if (!microseconds) return {};
+  // Set, it names the process that is watched: not one that inherits the variables.
+  if (!variable("WATCHDOG_PID").empty() && number("WATCHDOG_PID") != ::getpid()) return {};
+  return std::chrono::microseconds(*microseconds / 2);
+}
+
+void alive() { tell("WATCHDOG=1"); }
 
 }  // namespace tendon::service

@@ -3,6 +3,7 @@
 
 #include <poll.h>
 #include <sys/socket.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <array>
@@ -12,6 +13,7 @@
 #include <cerrno>
 #include <ctime>
 #include <stdexcept>
+#include <system_error>
 
 #include "server/machine/clock.h"
 
@@ -43,42 +45,40 @@ Address to_address(const udp::endpoint& endpoint) {
 
 }  // namespace
 
-struct UdpLink::Socket {
-  asio::io_context context;
-  asio::ip::udp::socket udp{context};
-};
-
-UdpLink::UdpLink(const Address& listen, Reach reach, const std::optional<std::filesystem::path>& file)
-    : socket_(std::make_unique<Socket>()) {
+UdpLink::UdpLink(const Address& listen, Reach reach, const std::optional<std::filesystem::path>& file) {
   if (reach == Reach::kThisMachine && !is_loopback(listen)) {
     throw std::invalid_argument("refusing to listen on " + to_string(listen) +
                                 ": there are no keys, so anyone on the network could command forces; use a loopback "
                                 "address (127.0.0.1 or [::1]), or give each client a key (`tendond keygen NAME`, and "
                                 "`keys` in the scene's [network])");
   }
+  if (file) unix_.emplace(*file);
   const udp::endpoint endpoint = to_endpoint(listen);
   try {
-    socket_->udp.open(endpoint.protocol());
-    if (endpoint.protocol() == udp::v6()) socket_->udp.set_option(asio::ip::v6_only(true));
-    socket_->udp.set_option(asio::socket_base::receive_buffer_size(kReceiveBufferBytes));
-    socket_->udp.non_blocking(true);
-    socket_->udp.bind(endpoint);
+    asio::io_context context;
+    udp::socket socket(context, endpoint.protocol());
+    if (endpoint.protocol() == udp::v6()) socket.set_option(asio::ip::v6_only(true));
+    socket.set_option(asio::socket_base::receive_buffer_size(kReceiveBufferBytes));
+    socket.non_blocking(true);
+    socket.bind(endpoint);
+    // Asio watches its sockets with an epoll, which each datagram would wake, and nobody waits for.
+    fd_ = socket.release();
   } catch (const std::system_error& error) {
     throw std::runtime_error("cannot listen on " + to_string(listen) + ": " + error.code().message());
   }
-  if (file) unix_.emplace(*file);
 }
 
-UdpLink::~UdpLink() = default;
+UdpLink::~UdpLink() { ::close(fd_); }
 
 void UdpLink::send(const Address& to, std::span<const std::byte> datagram) {
   if (unix_ && UnixSocket::is_peer(to)) {
     if (!unix_->send(to, datagram)) send_failures_.add();
     return;
   }
-  asio::error_code error;
-  socket_->udp.send_to(asio::buffer(datagram.data(), datagram.size()), to_endpoint(to), 0, error);
-  if (error) send_failures_.add();
+  const udp::endpoint endpoint = to_endpoint(to);
+  const ssize_t sent = ::sendto(fd_, datagram.data(), datagram.size(), MSG_NOSIGNAL, endpoint.data(),
+                                static_cast<socklen_t>(endpoint.size()));
+  if (sent < 0) send_failures_.add();
 }
 
 std::size_t UdpLink::receive(Address& from, std::span<std::byte> buffer) {
@@ -90,12 +90,11 @@ std::size_t UdpLink::receive(Address& from, std::span<std::byte> buffer) {
 }
 
 std::size_t UdpLink::receive_from_network(Address& from, std::span<std::byte> buffer) {
-  // Asio cannot tell the full size of a truncated datagram, so this calls the system directly.
   udp::endpoint endpoint;
   for (int i = 0; i < kMaxEmptyDatagrams; ++i) {
     auto length = static_cast<socklen_t>(endpoint.capacity());
     const ssize_t size =
-        ::recvfrom(fd(), buffer.data(), buffer.size(), MSG_TRUNC | MSG_DONTWAIT, endpoint.data(), &length);
+        ::recvfrom(fd_, buffer.data(), buffer.size(), MSG_TRUNC | MSG_DONTWAIT, endpoint.data(), &length);
     if (size == 0 || (size < 0 && errno == EINTR)) continue;
     if (size < 0) return 0;
     endpoint.resize(length);
@@ -110,7 +109,7 @@ LocalTime UdpLink::present(LocalTime now) const { return std::max(now, clock::no
 
 void UdpLink::wait(Duration timeout, Doorbell* doorbell) {
   // poll() ignores an entry with a negative descriptor.
-  std::array<pollfd, 3> fds = {pollfd{fd(), POLLIN, 0}, pollfd{doorbell != nullptr ? doorbell->fd() : -1, POLLIN, 0},
+  std::array<pollfd, 3> fds = {pollfd{fd_, POLLIN, 0}, pollfd{doorbell != nullptr ? doorbell->fd() : -1, POLLIN, 0},
                                pollfd{unix_ ? unix_->fd() : -1, POLLIN, 0}};
   const Duration left = std::max(timeout, Duration::zero());
   const auto whole = std::chrono::duration_cast<std::chrono::seconds>(left);
@@ -119,8 +118,12 @@ void UdpLink::wait(Duration timeout, Doorbell* doorbell) {
   if (ready > 0 && fds[1].revents != 0) doorbell->answer();
 }
 
-Address UdpLink::local_address() const { return to_address(socket_->udp.local_endpoint()); }
-
-int UdpLink::fd() const noexcept { return socket_->udp.native_handle(); }
+Address UdpLink::local_address() const {
+  udp::endpoint endpoint;
+  auto length = static_cast<socklen_t>(endpoint.capacity());
+  if (::getsockname(fd_, endpoint.data(), &length) != 0) throw std::system_error(errno, std::system_category());
+  endpoint.resize(length);
+  return to_address(endpoint);
+}
 
 }  // namespace tendon

@@ -3,7 +3,6 @@
 
 #include <cstdint>
 #include <filesystem>
-#include <memory>
 #include <optional>
 
 #include "core/base/time.h"
@@ -38,6 +37,8 @@ class UdpLink : public Link {
   explicit UdpLink(const Address& listen, Reach reach = Reach::kThisMachine,
                    const std::optional<std::filesystem::path>& file = std::nullopt);
   ~UdpLink() override;
+  UdpLink(const UdpLink&) = delete;
+  UdpLink& operator=(const UdpLink&) = delete;
 
   /// A datagram that the system does not take at once (full buffer, no route, other address family)
   /// is lost, and counted in send_failures().
@@ -63,13 +64,12 @@ class UdpLink : public Link {
   std::uint64_t send_failures() const noexcept { return send_failures_.value(); }
 
   /// The UDP socket's file descriptor, for whoever polls several links at once.
-  int fd() const noexcept;
+  int fd() const noexcept { return fd_; }
 
  private:
-  struct Socket;  // keeps Asio out of this header
   std::size_t receive_from_network(Address& from, std::span<std::byte> buffer);
 
-  std::unique_ptr<Socket> socket_;
+  int fd_ = -1;
   std::optional<UnixSocket> unix_;
   bool unix_first_ = false;  ///< a flood through the one must not close the other
   Counter send_failures_;

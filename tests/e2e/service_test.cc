@@ -7,11 +7,12 @@
 #include <unistd.h>
 
 #include <array>
+#include <chrono>
+#include <cstddef>
 #include <cstdlib>
-#include <cstring>
-#include <filesystem>
 #include <stdexcept>
 #include <string>
+#include <thread>
 
 #include "tests/e2e/stage/process.h"
 #include "tests/e2e/stage/stage.h"
@@ -22,12 +23,15 @@ namespace {
 
 class Manager {
  public:
-  explicit Manager(const std::filesystem::path& path) : socket_(socket(AF_UNIX, SOCK_DGRAM, 0)) {
+  /// `path` is a file, or "@" and a name that is no file.
+  explicit Manager(const std::string& path) : socket_(socket(AF_UNIX, SOCK_DGRAM, 0)) {
     sockaddr_un address{};
     address.sun_family = AF_UNIX;
-    std::strncpy(address.sun_path, path.c_str(), sizeof(address.sun_path) - 1);
-    if (bind(socket_, reinterpret_cast<const sockaddr*>(&address), sizeof(address)) != 0) {
-      throw std::runtime_error("cannot bind " + path.string());
+    path.copy(address.sun_path, sizeof(address.sun_path) - 1);
+    if (path.starts_with('@')) address.sun_path[0] = '\0';
+    const auto size = static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + path.size());
+    if (bind(socket_, reinterpret_cast<const sockaddr*>(&address), size) != 0) {
+      throw std::runtime_error("cannot bind " + path);
     }
     const timeval patience{.tv_sec = kPatience.count(), .tv_usec = 0};
     setsockopt(socket_, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof(patience));
@@ -37,6 +41,7 @@ class Manager {
     close(socket_);
     unsetenv("NOTIFY_SOCKET");
     unsetenv("WATCHDOG_USEC");
+    unsetenv("WATCHDOG_PID");
   }
   Manager(const Manager&) = delete;
   Manager& operator=(const Manager&) = delete;
@@ -54,7 +59,7 @@ class Manager {
 
 TEST(Service, IsSaidToBeReadyAliveAndStopping) {
   const testing::ScratchFolder folder;
-  const Manager manager(folder.path() / "notify");
+  const Manager manager((folder.path() / "notify").string());
   setenv("WATCHDOG_USEC", "100000", 1);
   Server server(folder.path(), demo_scene());
   EXPECT_EQ(manager.next(), "READY=1");
@@ -65,11 +70,22 @@ TEST(Service, IsSaidToBeReadyAliveAndStopping) {
   EXPECT_EQ(last, "STOPPING=1");
 }
 
-TEST(Service, WithoutAWatchdogNothingIsSaidBetweenTheBeginningAndTheEnd) {
+TEST(Service, IsSaidToAManagerWhoseSocketIsNoFile) {
   const testing::ScratchFolder folder;
-  const Manager manager(folder.path() / "notify");
+  const Manager manager("@tendon-service-test-" + std::to_string(getpid()));
   Server server(folder.path(), demo_scene());
   EXPECT_EQ(manager.next(), "READY=1");
+}
+
+TEST(Service, WithoutAWatchdogNothingIsSaidBetweenTheBeginningAndTheEnd) {
+  const testing::ScratchFolder folder;
+  const Manager manager((folder.path() / "notify").string());
+  // The watchdog of another process, whose variables this one has inherited.
+  setenv("WATCHDOG_USEC", "100000", 1);
+  setenv("WATCHDOG_PID", "1", 1);
+  Server server(folder.path(), demo_scene());
+  EXPECT_EQ(manager.next(), "READY=1");
+  std::this_thread::sleep_for(std::chrono::milliseconds(200));
   server.stop();
   EXPECT_EQ(manager.next(), "STOPPING=1");
 }

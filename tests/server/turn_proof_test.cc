@@ -17,7 +17,7 @@ namespace {
 constexpr std::uint64_t kTurns = 600;       // of the longer run of turn-proof
 constexpr double kCounted = 600.0 - 100.0;  // between its two lengths
 
-constexpr double kMost = 9600;  // a few percent above what it takes
+constexpr double kMost = 9150;  // a few percent above what it takes
 
 using TurnProof = testing::InstructionTest;
 

@@ -8,6 +8,9 @@
 #include <unistd.h>
 
 #include <array>
+#include <cstddef>
+#include <filesystem>
+#include <iterator>
 #include <string>
 #include <vector>
 
@@ -61,6 +64,22 @@ class Z {
 };
 
 constexpr std::array<std::byte, 8> kWords{};
+
+/// Of this process, the one that reads the folder among them.
+std::ptrdiff_t open_files() {
+  return std::distance(std::filesystem::directory_iterator("/proc/self/fd"), std::filesystem::directory_iterator());
+}
+
+// An epoll that watched it would cost each datagram a wake-up for nobody.
+TEST(UdpTransport, HasASocketAndNoOtherFile) {
+  Z z;
+  const std::ptrdiff_t before = open_files();
+  {
+    const UdpTransport transport(z.address());
+    EXPECT_EQ(open_files(), before + 1);
+  }
+  EXPECT_EQ(open_files(), before);
+}
 
 TEST(UdpTransport, TalksWithItsServer) {
   Z z;

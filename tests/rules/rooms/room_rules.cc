@@ -89,9 +89,7 @@ const std::vector<Door>& front_doors() {
        {"protocol/wire/", "server/recording/recording_codec.cc", "clients/dashboard/foxglove_message.cc"}},
       // The C library's own resolver, for records that getaddrinfo() does not know.
       {"libresolv", {"resolv.h"}, {"clients/cpp/discovery/unicast.cc"}},
-      {"libsystemd",
-       {"systemd/"},
-       {"server/machine/announcer.cc", "server/machine/service.cc", "clients/cpp/discovery/avahi.cc"}},
+      {"libsystemd", {"systemd/"}, {"server/machine/announcer.cc", "clients/cpp/discovery/avahi.cc"}},
       {"Spectra", {"Spectra/"}, {"clients/softbody/fem/spectrum.cc"}},
       {"spdlog", {"spdlog/"}, {"server/machine/log.cc"}},
       {"toml++", {"toml++/"}, {"server/scene/", "clients/softbody/scene.cc"}},

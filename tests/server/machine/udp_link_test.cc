@@ -5,6 +5,8 @@
 #include <poll.h>
 
 #include <cerrno>
+#include <filesystem>
+#include <iterator>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -41,7 +43,24 @@ bool is_readable(int fd) {
   return ::poll(&entry, 1, 0) == 1;
 }
 
+/// Of this process, the one that reads the folder among them.
+std::ptrdiff_t open_files() {
+  return std::distance(std::filesystem::directory_iterator("/proc/self/fd"), std::filesystem::directory_iterator());
+}
+
 class UdpLinkTest : public testing::TestWithParam<Address> {};
+
+// An epoll that watched it would cost each datagram a wake-up for nobody.
+TEST_P(UdpLinkTest, HasASocketAndNoOtherFile) {
+  const std::ptrdiff_t before = open_files();
+  {
+    const UdpLink link(GetParam());
+    EXPECT_EQ(open_files(), before + 1);
+    EXPECT_THROW(UdpLink(link.local_address()), std::runtime_error);
+    EXPECT_EQ(open_files(), before + 1);
+  }
+  EXPECT_EQ(open_files(), before);
+}
 
 TEST_P(UdpLinkTest, BringsDatagramsFromAToZInOrderWithTheirSender) {
   UdpLink a(GetParam());

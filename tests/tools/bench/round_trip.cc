@@ -4,7 +4,8 @@
 // client like `virtual_wall` in another process; and a bare ping-pong of datagrams of the same sizes between the same
 // two processes and the same kinds of sockets that waits in the same way. The two take turns in blocks, so that what
 // else the machine does falls on both. For the suites that seal there is a second floor: the ping-pong that seals and
-// opens each datagram with libsodium, and does nothing else.
+// opens each datagram with libsodium, and does nothing else. Over a Unix socket the floor is one over Unix sockets, and
+// the ping-pong over UDP takes turns with both.
 #include <netinet/in.h>
 #include <poll.h>
 #include <sys/mman.h>
@@ -15,16 +16,15 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
-#include <cerrno>
 #include <chrono>
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
+#include <filesystem>
 #include <new>
 #include <optional>
 #include <stdexcept>
 #include <string>
-#include <system_error>
 #include <thread>
 #include <vector>
 
@@ -39,6 +39,7 @@
 #include "server/network_loop.h"
 #include "tests/tools/bench/bench.h"
 #include "tests/tools/bench/measure.h"
+#include "tests/tools/bench/other_process.h"
 
 namespace tendon::bench {
 namespace {
@@ -57,21 +58,76 @@ struct Options {
 };
 
 enum class Wait : std::uint8_t { kBusy, kBlocking };
+enum class Way : std::uint8_t { kUdp, kUnix };
 
 /// Orders to the other process, in memory that both share.
 struct Orders {
-  enum Job : int { kRest, kEcho, kSealedEcho, kTendon, kQuit };
+  enum Job : int { kRest, kEcho, kSealedEcho, kUdpEcho, kTendon, kQuit };
   std::atomic<int> job{kRest};
   std::atomic<int> at_work{kRest};  ///< what it does
   std::atomic<int> echo_bytes{0};   ///< what it echoes with
 };
 
-/// One end of a bare ping-pong. The server's is one socket for whoever comes, as a server's is; the client's is
-/// connected. With a `suite`, what follows the first 16 bytes is sealed and opened by libsodium.
+/// What a socket is called.
+struct Name {
+  sockaddr_storage bytes{};
+  socklen_t size = sizeof bytes;
+
+  sockaddr* get() noexcept { return reinterpret_cast<sockaddr*>(&bytes); }
+  const sockaddr* get() const noexcept { return reinterpret_cast<const sockaddr*>(&bytes); }
+};
+
+/// Two sockets that do not wait: the server's for whoever comes, as a server's is; the client's is connected to it.
+class BarePair {
+ public:
+  explicit BarePair(Way way) : server_(named(way)), client_(named(way)), client_name_(name_of(client_)) {
+    const Name server = name_of(server_);
+    if (::connect(client_, server.get(), server.size) != 0) fail("cannot connect a bare socket");
+  }
+  ~BarePair() {
+    ::close(server_);
+    ::close(client_);
+  }
+  BarePair(const BarePair&) = delete;
+  BarePair& operator=(const BarePair&) = delete;
+
+  int server() const noexcept { return server_; }
+  int client() const noexcept { return client_; }
+  const Name& client_name() const noexcept { return client_name_; }
+
+ private:
+  /// The kernel chooses the name.
+  static int named(Way way) {
+    Name any;
+    if (way == Way::kUdp) {
+      auto& loopback = reinterpret_cast<sockaddr_in&>(any.bytes);
+      loopback.sin_family = AF_INET;
+      loopback.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+      any.size = sizeof loopback;
+    } else {
+      any.bytes.ss_family = AF_UNIX;
+      any.size = sizeof(sa_family_t);
+    }
+    const int fd = ::socket(any.bytes.ss_family, SOCK_DGRAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
+    if (fd < 0 || ::bind(fd, any.get(), any.size) != 0) fail("cannot open a bare socket");
+    return fd;
+  }
+  static Name name_of(int fd) {
+    Name name;
+    if (::getsockname(fd, name.get(), &name.size) != 0) fail("getsockname");
+    return name;
+  }
+
+  int server_;
+  int client_;
+  Name client_name_;
+};
+
+/// One end of a bare ping-pong. With a `suite`, what follows the first 16 bytes is sealed and opened by libsodium.
 class BareSocket {
  public:
-  BareSocket(int fd, const Address* peer, Wait wait, std::optional<Suite> suite) : fd_(fd), wait_(wait) {
-    if (peer != nullptr) to_ = to_sockaddr(*peer);
+  /// `peer`: whom a server's socket answers; null for a client's, which is connected.
+  BareSocket(int fd, const Name* peer, Wait wait, std::optional<Suite> suite) : fd_(fd), wait_(wait), to_(peer) {
     if (suite) key_.emplace(*suite, Key{});
   }
 
@@ -80,10 +136,8 @@ class BareSocket {
       const auto body = std::span(buffer_).subspan(kHeaderSize, size - kHeaderSize);
       key_->seal(0, std::span(buffer_).first(kHeaderSize), body.first(body.size() - crypto::kTagSize), body);
     }
-    const auto* const to = to_ ? reinterpret_cast<const sockaddr*>(&*to_) : nullptr;
-    if (::sendto(fd_, buffer_.data(), size, 0, to, to_ ? sizeof *to_ : 0) < 0) {
-      throw std::system_error(errno, std::generic_category(), "send");
-    }
+    const sockaddr* const to = to_ != nullptr ? to_->get() : nullptr;
+    if (::sendto(fd_, buffer_.data(), size, 0, to, to_ != nullptr ? to_->size : 0) < 0) fail("send");
   }
   /// True when a datagram has come; waits as long as it may.
   bool receive() {
@@ -92,28 +146,20 @@ class BareSocket {
       const timespec time{0, 1'000'000};
       ::ppoll(&readable, 1, &time, nullptr);
     }
-    sockaddr_in from{};
-    socklen_t length = sizeof from;
-    const ssize_t size = ::recvfrom(fd_, buffer_.data(), buffer_.size(), MSG_DONTWAIT,
-                                    to_ ? reinterpret_cast<sockaddr*>(&from) : nullptr, to_ ? &length : nullptr);
+    from_.size = sizeof from_.bytes;
+    const ssize_t size = ::recvfrom(fd_, buffer_.data(), buffer_.size(), 0, to_ != nullptr ? from_.get() : nullptr,
+                                    to_ != nullptr ? &from_.size : nullptr);
     if (size <= 0 || !key_) return size > 0;
     const auto body = std::span(buffer_).subspan(kHeaderSize, static_cast<std::size_t>(size) - kHeaderSize);
     return key_->open(0, std::span(buffer_).first(kHeaderSize), body, body.first(body.size() - crypto::kTagSize));
-  }
-
-  static sockaddr_in to_sockaddr(const Address& ipv4) {
-    sockaddr_in to{};
-    to.sin_family = AF_INET;
-    to.sin_port = htons(ipv4.port);
-    std::copy(ipv4.ip.end() - 4, ipv4.ip.end(), reinterpret_cast<std::uint8_t*>(&to.sin_addr));
-    return to;
   }
 
  private:
   int fd_;
   Wait wait_;
   std::optional<SealingKey> key_;
-  std::optional<sockaddr_in> to_;
+  const Name* to_;
+  Name from_;
   std::array<std::byte, kMaxDatagram> buffer_{};
 };
 
@@ -144,15 +190,8 @@ class WatchedLink : public Link {
   Mailboxes& mail_;
 };
 
-void connect(int fd, const Address& to) {
-  const sockaddr_in address = BareSocket::to_sockaddr(to);
-  if (::connect(fd, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
-    throw std::system_error(errno, std::generic_category(), "cannot connect a bare socket");
-  }
-}
-
 /// The other process: a wall at x = 0, or the echo.
-void serve(Orders& orders, const Address& server, int echo, Wait wait, const std::optional<Key>& key,
+void serve(Orders& orders, const ServerName& server, int echo, int udp_echo, Wait wait, const std::optional<Key>& key,
            std::optional<Suite> suite) {
   UdpTransport transport(server);
   BusyLink busy(transport);
@@ -161,18 +200,19 @@ void serve(Orders& orders, const Address& server, int echo, Wait wait, const std
   config.key = key;
   config.seed = 7;
   ForceClient client(
-      wait == Wait::kBusy ? static_cast<Link&>(busy) : transport, server, config,
+      wait == Wait::kBusy ? static_cast<Link&>(busy) : transport, transport.server(), config,
       [](const DeviceState& hand) -> Touch { return Vec3(-2000 * std::max(0.0, hand.position.x()), 0, 0); },
       clock::now());
   BareSocket bare(echo, nullptr, wait, std::nullopt);
   BareSocket sealed(echo, nullptr, wait, suite);
+  BareSocket udp(udp_echo, nullptr, wait, std::nullopt);
   LocalTime now = clock::now();
   for (;;) {
     const int job = orders.job.load(std::memory_order_acquire);
     orders.at_work.store(job, std::memory_order_release);
     if (job == Orders::kQuit) return;
-    if (job == Orders::kEcho || job == Orders::kSealedEcho) {
-      BareSocket& socket = job == Orders::kEcho ? bare : sealed;
+    if (job == Orders::kEcho || job == Orders::kSealedEcho || job == Orders::kUdpEcho) {
+      BareSocket& socket = job == Orders::kEcho ? bare : job == Orders::kSealedEcho ? sealed : udp;
       if (socket.receive()) socket.send(static_cast<std::size_t>(orders.echo_bytes.load(std::memory_order_relaxed)));
     } else if (job == Orders::kTendon) {
       const LocalTime next = client.turn(now);
@@ -195,6 +235,7 @@ void serve(Orders& orders, const Address& server, int echo, Wait wait, const std
 struct Result {
   std::vector<double> bare;    ///< µs, each
   std::vector<double> sealed;  ///< with a suite: as `bare`, with libsodium at both ends
+  std::vector<double> udp;     ///< over a Unix socket: as `bare`, over UDP
   std::vector<double> tendon;
   std::size_t state_bytes = 0;
   std::size_t force_bytes = 0;
@@ -204,9 +245,9 @@ double us(Duration d) { return 1e6 * seconds(d); }
 
 class RoundTrip {
  public:
-  /// Sealed by `suite`; in the clear without one.
-  RoundTrip(const Options& options, Wait wait, std::optional<Suite> suite)
-      : options_(options), wait_(wait), suite_(suite), key_(Ratchet(3).next()) {
+  /// Sealed by `suite`; in the clear without one, as always over a Unix socket.
+  RoundTrip(const Options& options, Wait wait, Way way, std::optional<Suite> suite)
+      : options_(options), wait_(wait), way_(way), suite_(suite), key_(Ratchet(3).next()) {
     NetworkLoop::Config config;
     config.devices = {{.name = "bench", .model = "bench", .max_force = 10, .loop_hz = 1000, .channels = {{}}}};
     if (suite) {
@@ -214,18 +255,17 @@ class RoundTrip {
       config.suites = {*suite};
     }
     network_.emplace(config, watched_, std::vector{&mail_});
-    connect(bare_client_.fd(), bare_server_.local_address());
     void* const shared = ::mmap(nullptr, sizeof(Orders), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
-    if (shared == MAP_FAILED) throw std::system_error(errno, std::generic_category(), "mmap");
+    if (shared == MAP_FAILED) fail("mmap");
     orders_ = new (shared) Orders;
-    const Address server = link_.local_address();
+    const ServerName server = file_ ? ServerName("unix:" + file_->string()) : ServerName(link_.local_address());
     child_ = ::fork();
-    if (child_ < 0) throw std::system_error(errno, std::generic_category(), "fork");
+    if (child_ < 0) fail("fork");
     if (child_ == 0) {
       end_with_parent();
       try {
         const AtPriority high(options.priority);
-        serve(*orders_, server, bare_client_.fd(), wait, suite ? std::optional(key_) : std::nullopt, suite);
+        serve(*orders_, server, bare_.client(), udp_.client(), wait, suite ? std::optional(key_) : std::nullopt, suite);
         ::_exit(0);
       } catch (const std::exception& error) {
         std::fprintf(stderr, "tendon-lab bench: the client: %s\n", error.what());
@@ -250,6 +290,7 @@ class RoundTrip {
       orders_->echo_bytes = static_cast<int>(force_bytes_);
       ping_pong(Orders::kEcho, result.bare);
       if (suite_) ping_pong(Orders::kSealedEcho, result.sealed);
+      if (way_ == Way::kUnix) ping_pong(Orders::kUdpEcho, result.udp);
       order(Orders::kTendon);
       for (int i = -options_.warm_up; i < options_.exchanges; ++i) {
         const Duration took = exchange();
@@ -267,8 +308,8 @@ class RoundTrip {
   }
 
   void ping_pong(Orders::Job job, std::vector<double>& times) {
-    const Address peer = bare_client_.local_address();
-    BareSocket socket(bare_server_.fd(), &peer, wait_, job == Orders::kSealedEcho ? suite_ : std::nullopt);
+    const BarePair& pair = job == Orders::kUdpEcho ? udp_ : bare_;
+    BareSocket socket(pair.server(), &pair.client_name(), wait_, job == Orders::kSealedEcho ? suite_ : std::nullopt);
     order(job);
     for (int i = -options_.warm_up; i < options_.exchanges; ++i) {
       const LocalTime began = clock::now();
@@ -338,15 +379,21 @@ class RoundTrip {
 
   Options options_;
   Wait wait_;
+  Way way_;
   std::optional<Suite> suite_;
   Key key_;
+  /// Of the server's Unix socket, which takes it away when it ends.
+  std::optional<std::filesystem::path> file_ =
+      way_ == Way::kUnix ? std::optional(std::filesystem::temp_directory_path() /
+                                         ("tendon-bench-" + std::to_string(::getpid()) + ".sock"))
+                         : std::nullopt;
   Mailboxes mail_{{.steps = 16, .flight = 16, .datagrams = 1024}};
-  UdpLink link_{parse_address("127.0.0.1:0")};
+  UdpLink link_{parse_address("127.0.0.1:0"), Reach::kThisMachine, file_};
   BusyLink busy_{link_};
   WatchedLink watched_{wait_ == Wait::kBusy ? static_cast<Link&>(busy_) : link_, mail_};
   std::optional<NetworkLoop> network_;
-  UdpLink bare_server_{parse_address("127.0.0.1:0")};
-  UdpLink bare_client_{parse_address("127.0.0.1:0")};
+  BarePair bare_{way_};
+  BarePair udp_{Way::kUdp};
   Orders* orders_ = nullptr;
   pid_t child_ = 0;
   std::uint64_t tick_ = 0;
@@ -362,6 +409,7 @@ void measure_round_trip(Run& run) {
   options.priority = run.options.priority;
   struct Kind {
     Wait wait;
+    Way way;
     std::optional<Suite> suite;
     double goal;
     const char* words;
@@ -369,20 +417,22 @@ void measure_round_trip(Run& run) {
   std::vector<Kind> kinds;
   for (const Wait wait : {Wait::kBusy, Wait::kBlocking}) {
     const bool busy = wait == Wait::kBusy;
-    kinds.push_back({wait, std::nullopt, busy ? 1.10 : 1.05, busy ? "≤ 1.10 × the floor" : "≤ 1.05 × the floor"});
+    kinds.push_back(
+        {wait, Way::kUdp, std::nullopt, busy ? 1.10 : 1.05, busy ? "≤ 1.10 × the floor" : "≤ 1.05 × the floor"});
+    kinds.push_back({wait, Way::kUnix, std::nullopt, 0, ""});  // without a goal
     for (const Suite suite : {Suite::kNoise, Suite::kAesGcm}) {
       if (!contains(suites_of_this_machine(), suite)) continue;
-      kinds.push_back({wait, suite, busy ? 1.25 : 1.08, busy ? "≤ 1.25 × the floor" : "≤ 1.08 × the floor"});
+      kinds.push_back({wait, Way::kUdp, suite, busy ? 1.25 : 1.08, busy ? "≤ 1.25 × the floor" : "≤ 1.08 × the floor"});
     }
   }
-  for (const auto& [wait, suite, goal, words] : kinds) {
-    RoundTrip round_trip(options, wait, suite);  // forks before it has a priority of its own
+  for (const auto& [wait, way, suite, goal, words] : kinds) {
+    RoundTrip round_trip(options, wait, way, suite);  // forks before it has a priority of its own
     const AtPriority high(options.priority);
     const Result r = round_trip.run();
     const double ratio = quantile(r.tendon, 0.5) / quantile(r.bare, 0.5);
     Row row{.section = {},
             .what = std::string("state → force, ") + (wait == Wait::kBusy ? "busy-polling" : "blocking") +
-                    (suite ? ", sealed by " + names_of({*suite}) : ""),
+                    (way == Way::kUnix ? ", Unix socket" : "") + (suite ? ", sealed by " + names_of({*suite}) : ""),
             .unit = "µs",
             .n = r.tendon.size(),
             .p50 = quantile(r.tendon, 0.5),
@@ -392,8 +442,14 @@ void measure_round_trip(Run& run) {
             .floor_p50 = quantile(r.bare, 0.5),
             .floor_p99 = quantile(r.bare, 0.99),
             .ratio = ratio,
-            .target = Row::Target{words, ratio <= goal},
+            .target = way == Way::kUdp ? std::optional(Row::Target{words, ratio <= goal}) : std::nullopt,
             .note = {}};
+    if (way == Way::kUnix) {
+      char note[120];
+      const double udp = quantile(r.udp, 0.5);
+      std::snprintf(note, sizeof note, "a bare ping-pong over UDP: %.1f; to that %.2f", udp, row.p50 / udp);
+      row.note = note;
+    }
     if (suite) {
       char note[120];
       const double bare = quantile(r.sealed, 0.5);

@@ -168,6 +168,13 @@ TEST(ConformanceKit, AServerThatKnowsNoCouplingPassesAndIsNotJudgedByIt) {
   }
 }
 
+TEST(ConformanceKit, AServerThatKnowsNoColumnsPassesAndIsNotJudgedByThem) {
+  const Report all = server_report(0, Fault::kNone);
+  const Report older = server_report(0, Fault::kKnowsNoColumns);
+  EXPECT_TRUE(older.passed()) << told(older);
+  EXPECT_EQ(older.count(Outcome::kNotApplicable), all.count(Outcome::kNotApplicable) + 1);
+}
+
 TEST(ConformanceKit, AClientThatKeepsAllRulesPasses) {
   for (int suite = 0; suite < suites_here(); ++suite) {
     for (const pb::Role role : {pb::ROLE_CONTROLLER, pb::ROLE_OBSERVER}) {
@@ -244,6 +251,11 @@ INSTANTIATE_TEST_SUITE_P(Server, BrokenToy,
                                                      {Fault::kDiagnosesUnasked, "diagnostics-unasked"},
                                                      {Fault::kTellsOfTheHandleUnasked, "handle-unasked"},
                                                      {Fault::kTellsTheOrientationUnasked, "handle-unasked"},
+                                                     {Fault::kColumnsUnasked, "columns-unasked"},
+                                                     {Fault::kNoColumns, "columns"},
+                                                     {Fault::kShortColumns, "columns"},
+                                                     {Fault::kCoarseColumns, "columns"},
+                                                     {Fault::kPositionsInSingle, "columns"},
                                                      {Fault::kCouplesUnasked, "couple-unasked"},
                                                      {Fault::kCouplesWhatDiffers, "couple-differs"},
                                                      {Fault::kDiffersWithoutAWord, "couple-differs"},

@@ -179,6 +179,11 @@ constexpr std::array kChecks = {
           "Only an observer that named the feature diagnostics is told these"},
     Check{"handle-unasked", kServer, kSession, "Report",
           "Only a client that named the feature handle is told which buttons are held."},
+    Check{"columns-unasked", kServer, kWire, kData,
+          "server → client, with the feature state-columns only: states of several devices at one haptic step, in "
+          "columns"},
+    Check{"columns", kServer, kWire, kData,
+          "A position loses nothing, all else of it is within 6 · 10⁻⁸ of its value."},
     Check{"couple-unasked", kServer, kSession, kTeleoperation,
           "that device is not to be coupled, or the feature was not granted"},
     Check{"couple-differs", kServer, kSession, kTeleoperation,

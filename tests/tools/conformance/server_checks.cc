@@ -2,13 +2,16 @@
 #include "tests/tools/conformance/server_checks.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <map>
 #include <set>
 #include <string>
 #include <vector>
 
+#include "protocol/messages.h"
 #include "tests/tools/conformance/conversation.h"
 #include "tests/tools/conformance/server_channel_checks.h"
 #include "tests/tools/conformance/server_coupling_checks.h"
@@ -44,6 +47,80 @@ pb::ForceTable& table(pb::ForceCommand& force) {
   made.set_step_m(0.001);
   made.mutable_force_n()->Resize(2, 0.0);
   return made;
+}
+
+/// Whether a column has an entry for each of `count` states, or none where it may have none.
+bool has_its_entries(const pb::DeviceStates& columns, int count) {
+  const auto each = [count](const auto& column, int width) { return column.size() == width * count; };
+  const auto each_or_none = [&](const auto& column) { return column.empty() || each(column, 1); };
+  return count > 0 && each(columns.position_m(), 3) && each(columns.velocity_mps(), 3) &&
+         each(columns.force_applied_n(), 3) && each(columns.energy_j(), 1) && each(columns.permitted_force_n(), 1) &&
+         each(columns.mode(), 1) && each_or_none(columns.reasons()) && each_or_none(columns.force_sequence()) &&
+         each_or_none(columns.force_age_ns()) && each_or_none(columns.channel()) && each_or_none(columns.buttons());
+}
+
+/// Whether entry `k` of columns that have their entries says what `whole` says, the state of that device at that step.
+bool says(const pb::DeviceStates& columns, int k, const pb::DeviceState& whole) {
+  const auto near = [](double single, double exact) {
+    constexpr double kLeast = std::numeric_limits<float>::min();  // below it single precision has fewer digits
+    return single == exact || std::abs(single - exact) <= 6e-8 * std::abs(exact) + kLeast;
+  };
+  const auto vector = [k](const auto& column, const pb::Vec3& exact, auto same) {
+    return same(column.Get(3 * k), exact.x()) && same(column.Get(3 * k + 1), exact.y()) &&
+           same(column.Get(3 * k + 2), exact.z());
+  };
+  const auto count = [k](const auto& column, std::uint64_t exact) {
+    return (column.empty() ? 0 : static_cast<std::uint64_t>(column.Get(k))) == exact;
+  };
+  return columns.sampled_ns() == whole.sampled_ns() &&
+         vector(columns.position_m(), whole.position_m(), std::equal_to<double>()) &&
+         vector(columns.velocity_mps(), whole.velocity_mps(), near) &&
+         vector(columns.force_applied_n(), whole.force_applied_n(), near) &&
+         near(columns.energy_j(k), whole.energy_j()) && near(columns.permitted_force_n(k), whole.permitted_force_n()) &&
+         columns.mode(k) == whole.mode() && count(columns.reasons(), whole.reasons()) &&
+         count(columns.force_sequence(), whole.force_sequence()) &&
+         count(columns.force_age_ns(), whole.force_age_ns()) && count(columns.channel(), whole.channel()) &&
+         count(columns.buttons(), whole.buttons());
+}
+
+/// States in columns, beside those that `whole` is sent: an observer that has not named the feature.
+void check_columns(ServerGuest& guest, Conversation& whole, Conversation& controller) {
+  pb::Hello words = guest.hello(pb::ROLE_OBSERVER);
+  words.add_features(std::string(kFeatureStateColumns));
+  auto session = guest.enter(words);
+  if (!session) return;
+  if (std::ranges::count(session->welcome.features(), kFeatureStateColumns) == 0) {
+    guest.report.not_applicable("columns", "this server does not know state-columns");
+    return say_bye(session->talk);
+  }
+  constexpr int kEnough = 20;
+  int compared = 0;
+  const std::size_t before = whole.heard().size();
+  for (const LocalTime end = whole.now() + kPatience; compared < kEnough && whole.now() < end;) {
+    session->talk.listen(milliseconds(50));
+    whole.listen(milliseconds(50));
+    controller.say();  // we are still there
+    std::map<std::uint64_t, pb::DeviceState> of_tick;
+    whole.for_each_frame(before, [&](const pb::Frame& frame) {
+      if (frame.has_state()) of_tick[frame.state().tick()] = frame.state();
+    });
+    compared = 0;
+    session->talk.for_each_frame(0, [&](const pb::Frame& frame) {
+      if (!frame.has_states()) return;
+      const pb::DeviceStates& columns = frame.states();
+      const bool entries = has_its_entries(columns, std::popcount(columns.devices()));
+      guest.report.judge("columns", entries, columns.ShortDebugString(), "an entry for each device in each column");
+      const auto at = of_tick.find(columns.tick());
+      // The other observer sees device 0, the first where it is among them.
+      if (!entries || at == of_tick.end() || (columns.devices() & 1U) == 0) return;
+      ++compared;
+      guest.report.judge("columns", says(columns, 0, at->second), columns.ShortDebugString(),
+                         "within single precision: " + at->second.ShortDebugString());
+    });
+  }
+  guest.report.judge("columns", compared > 0, "no state in columns at a step that another observer was told of",
+                     "states in columns: the feature was granted");
+  say_bye(session->talk);
 }
 
 void check_observer(ServerGuest& guest, ChannelChecks& channels, Conversation& controller) {
@@ -83,6 +160,7 @@ void check_observer(ServerGuest& guest, ChannelChecks& channels, Conversation& c
   const bool not_done = refused && (refused->code() == pb::CODE_DENIED || refused->code() == pb::CODE_UNSUPPORTED);
   guest.report.judge("disarm-by-controller", not_done, refused ? refused->ShortDebugString() : "nothing",
                      "CODE_DENIED to an observer");
+  check_columns(guest, talk, controller);
   channels.check_from_outside(talk, 3);
   controller.say();
   say_bye(talk);
@@ -140,6 +218,8 @@ void check_states(Report& report, const Conversation& talk) {
                  "nothing of it: nobody named the feature");
     report.judge("handle-unasked", !tells_of_the_handle(frame.state()), frame.ShortDebugString(),
                  "nothing of the handle: nobody named the feature");
+    report.judge("columns-unasked", !frame.has_states(), frame.ShortDebugString(),
+                 "whole states: nobody named the feature");
     if (!frame.has_state()) return;
     const pb::DeviceState& state = frame.state();
     ++count;

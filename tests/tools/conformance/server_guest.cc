@@ -129,7 +129,8 @@ std::optional<ServerGuest::Session> ServerGuest::enter(const pb::Hello& words) {
       kPatience, [&] { return session.talk.heard().size() > before; }, false);
   report.judge("first-data", spoke, "nothing came", "Data 0");
   session.talk.listen_until(kPatience, [&] {
-    return session.talk.count_frames(0, [](const pb::Frame& frame) { return frame.has_state(); }) > 0;
+    return session.talk.count_frames(
+               0, [](const pb::Frame& frame) { return frame.has_state() || frame.has_states(); }) > 0;
   });
   return session;
 }

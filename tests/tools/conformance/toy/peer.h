@@ -93,6 +93,11 @@ enum class Fault : std::uint8_t {
   kDiagnosesUnasked,
   kTellsOfTheHandleUnasked,
   kTellsTheOrientationUnasked,
+  kColumnsUnasked,
+  kNoColumns,
+  kShortColumns,
+  kCoarseColumns,
+  kPositionsInSingle,
   kCouplesUnasked,
   kCouplesWhatDiffers,
   kDiffersWithoutAWord,
@@ -108,6 +113,7 @@ enum class Fault : std::uint8_t {
   kSetsAnyOutput,
   kKnowsNoChannels,  ///< no fault: an older server
   kKnowsNoCoupling,  ///< nor that
+  kKnowsNoColumns,   ///< nor that
   // A client's.
   kShortHello,
   kHelloWithConnection,

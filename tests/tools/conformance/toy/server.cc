@@ -121,6 +121,9 @@ void ToyServer::greet(LocalTime now, int port, Span datagram) {
     const bool asked = std::ranges::count(hello.features(), feature) > 0;
     if (asked && !is(Fault::kKnowsNoCoupling)) yes.mutable_welcome()->add_features(feature);
   }
+  if (std::ranges::count(hello.features(), "state-columns") > 0 && !is(Fault::kKnowsNoColumns)) {
+    yes.mutable_welcome()->add_features("state-columns");
+  }
   if (is(Fault::kGrantsUnasked) && hello.claims().empty()) {
     yes.mutable_welcome()->add_grants()->set_role(hello.role());
   }
@@ -205,6 +208,25 @@ void ToyServer::couple(Member& member, const pb::Couple& theirs, pb::ControlAck&
     return ack.set_code(pb::CODE_INVALID);
   }
   member.coupled = what.empty();
+}
+
+pb::Frame ToyServer::in_columns(const pb::DeviceState& state) const {
+  pb::Frame frame;
+  pb::DeviceStates& columns = *frame.mutable_states();
+  columns.set_tick(state.tick());
+  columns.set_sampled_ns(state.sampled_ns());
+  columns.set_devices(1);
+  const double x = state.position_m().x();
+  columns.add_position_m(is(Fault::kPositionsInSingle) ? static_cast<float>(x) : x);
+  columns.add_velocity_mps(static_cast<float>(state.velocity_mps().x()) * (is(Fault::kCoarseColumns) ? 1.000001F : 1));
+  columns.mutable_position_m()->Resize(3, 0);
+  columns.mutable_velocity_mps()->Resize(3, 0);
+  columns.mutable_force_applied_n()->Resize(is(Fault::kShortColumns) ? 2 : 3, 0);
+  columns.add_energy_j(0);
+  columns.add_permitted_force_n(0);
+  columns.add_mode(state.mode());
+  if (state.force_sequence() > 0) columns.add_force_sequence(state.force_sequence());
+  return frame;
 }
 
 pb::Frame ToyServer::port(LocalTime now, Member& member) const {
@@ -355,6 +377,11 @@ void ToyServer::tick(LocalTime now) {
       if (is(Fault::kDiagnosesUnasked)) state.mutable_force_wanted_n()->set_x(1);
       if (is(Fault::kTellsOfTheHandleUnasked)) state.set_buttons(1);
       if (is(Fault::kTellsTheOrientationUnasked)) state.mutable_orientation()->set_w(1);
+      state.mutable_position_m()->set_x(1.0 / 3);
+      state.mutable_velocity_mps()->set_x(1.0 / 3);
+      const bool asked = std::ranges::count(member.features, "state-columns") > 0;
+      if (asked && !is(Fault::kNoColumns)) frames.back() = in_columns(state);
+      if (!asked && is(Fault::kColumnsUnasked)) frames.push_back(in_columns(state));
     }
     // What is due may be more than fits: eight frames a time.
     do {

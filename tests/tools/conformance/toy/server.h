@@ -47,6 +47,7 @@ class ToyServer : public ToyPeer {
   void take(Member& member, const pb::Frame& frame);
   void execute(Member& member, const pb::Control& control);
   void couple(Member& member, const pb::Couple& theirs, pb::ControlAck& ack) const;
+  pb::Frame in_columns(const pb::DeviceState& state) const;
   pb::Frame port(LocalTime now, Member& member) const;
   pb::Code set_deadband(Member& member, const pb::SetStateDeadband& asked) const;
   pb::DeviceDescription describe() const;

@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "devices/late_library.h"
+
+#include <dlfcn.h>
+
+#include <stdexcept>
+
+namespace tendon {
+
+LateLibrary::LateLibrary(const std::string& file) {
+  // As if linked: its symbols are for all, and all that it needs is looked up now and not by a thread that must not wait.
+  if (dlopen(file.c_str(), RTLD_NOW | RTLD_GLOBAL) != nullptr) return;
+  throw std::runtime_error(dlerror());  // NOLINT(concurrency-mt-unsafe): the C library has one for each thread
+}
+
+LateLibrary::Function LateLibrary::operator[](const char* name) const {
+  if (void* const found = dlsym(RTLD_DEFAULT, name); found != nullptr) return Function(found);
+  throw std::runtime_error(dlerror());  // NOLINT(concurrency-mt-unsafe): the C library has one for each thread
+}
+
+}  // namespace tendon
