@@ -252,6 +252,10 @@ std::unique_ptr<CondensedModel> condensed_from(const BodyConfig& config, const S
   return model;
 }
 
+int near_modes(const BodyConfig& config) {
+  return config.exact_interface ? std::numeric_limits<int>::max() : NearModel::Config{}.modes;
+}
+
 Made model_of(const BodyConfig& config, const Solid& solid, const TouchSurface& surface, const SolverOf& solver) {
   Made made;
   if (solver) {
@@ -265,7 +269,7 @@ Made model_of(const BodyConfig& config, const Solid& solid, const TouchSurface& 
   } else if (config.model == ModelKind::kNear) {
     const QuasiStaticModel::Config newton{.max_iterations = config.max_iterations, .tolerance = config.tolerance};
     auto near = std::make_unique<NearModel>(solid, surface, middle_patch(surface, config.middle),
-                                            NearModel::Config{.newton = newton});
+                                            NearModel::Config{.newton = newton, .modes = near_modes(config)});
     made.near = near.get();
     made.model = std::move(near);
   } else {
@@ -305,14 +309,15 @@ const BodyConfig& checked(const BodyConfig& config) {
   if (config.tool != BodyConfig::Tool::kPatch) {
     const std::string tool = config.tool == BodyConfig::Tool::kSphere    ? "a sphere"
                              : config.tool == BodyConfig::Tool::kCapsule ? "a capsule"
-                                                                         : "a box";
+                             : config.tool == BodyConfig::Tool::kBox     ? "a box"
+                                                                         : "a tool of a file";
     if (is_rigid_on_nonlinear(config)) {
       for (const EffectKind effect : {kInertia, kDamping, kViscosity, kCutting, kPlasticity, kSelfCollision}) {
         if (simulated.has(effect)) {
           throw std::invalid_argument(tool + " presses no body with " + std::string(info(effect).name));
         }
       }
-    } else if (config.tool == BodyConfig::Tool::kBox) {
+    } else if (config.tool == BodyConfig::Tool::kBox || config.tool == BodyConfig::Tool::kMesh) {
       throw std::invalid_argument(tool + " wants the model \"corotational\", \"stvk\" or \"neo-hookean\"");
     } else if (config.model != ModelKind::kCondensed) {
       throw std::invalid_argument(tool +
@@ -345,24 +350,19 @@ std::unique_ptr<Friction> friction_of(const BodyConfig& config) {
   return std::make_unique<Friction>(*config.friction, sideways_stiffness(config.material, config.patch_radius));
 }
 
-RigidShape shape_of(const BodyConfig& config) {
-  if (config.tool == BodyConfig::Tool::kBox) return RigidShape::box(config.tool_size, config.tool_edge);
-  if (config.tool == BodyConfig::Tool::kSphere) return RigidShape::sphere(config.tool_radius);
-  return RigidShape::capsule(config.tool_radius, config.tool_half_length, config.tool_axis);
-}
-
 RigidContact rigid_contact_of(const BodyConfig& config, QuasiStaticModel& body, const Solid& solid,
                               const TouchSurface& surface) {
+  const RigidShape shape = shape_of_tool(config);
   RigidContact::Config made;
   made.layer = {.thickness = config.layer,
                 .young = config.material.young,
                 .friction = config.friction.value_or(0),
                 .shear = config.material.mu(),
-                .piece = shape_of(config).reach() / 10};
+                .piece = std::min(shape.reach() / 10, shape.thinnest())};
   made.tolerance = config.tolerance;
   made.max_iterations = config.max_iterations;
   made.turns = turns_the_hand(config);
-  return {body, solid, surface, std::vector<HeldTool>(config.hands, {shape_of(config), config.tool_offset}), made};
+  return {body, solid, surface, std::vector<HeldTool>(config.hands, {shape, config.tool_offset}), made};
 }
 
 /// m: how deep the patch may be pressed before the material turns anywhere by more than Body::kLargestTurn.
@@ -397,13 +397,31 @@ bool is_rigid_on_nonlinear(const BodyConfig& config) {
 }
 
 bool turns_the_hand(const BodyConfig& config) {
-  return config.tool == BodyConfig::Tool::kCapsule || config.tool == BodyConfig::Tool::kBox ||
-         config.tool_offset != Vec3::Zero();
+  const bool round = config.tool == BodyConfig::Tool::kPatch || config.tool == BodyConfig::Tool::kSphere;
+  return !round || config.tool_offset != Vec3::Zero();
+}
+
+RigidShape shape_of_tool(const BodyConfig& config) {
+  switch (config.tool) {
+    case BodyConfig::Tool::kCapsule:
+      return RigidShape::capsule(config.tool_radius, config.tool_half_length, config.tool_axis);
+    case BodyConfig::Tool::kBox:
+      return RigidShape::box(config.tool_size, config.tool_edge);
+    case BodyConfig::Tool::kMesh: {
+      if (!config.tool_file) throw std::invalid_argument("a tool of a file wants the file");
+      const ToolFile& of = *config.tool_file;
+      return RigidShape::mesh(read_surface(of.file), of.scale, of.cell, config.layer, of.file.string());
+    }
+    case BodyConfig::Tool::kPatch:
+    case BodyConfig::Tool::kSphere:
+      break;
+  }
+  return RigidShape::sphere(config.tool_radius);
 }
 
 Vec3 lowest_of_tool(const BodyConfig& config, const Mat3& turn) {
-  if (config.tool == BodyConfig::Tool::kBox) {
-    return turn * (config.tool_offset + shape_of(config).farthest(turn.transpose() * -config.towards_tool));
+  if (config.tool == BodyConfig::Tool::kBox || config.tool == BodyConfig::Tool::kMesh) {
+    return turn * (config.tool_offset + shape_of_tool(config).farthest(turn.transpose() * -config.towards_tool));
   }
   Vec3 lowest = turn * config.tool_offset - config.tool_radius * config.towards_tool;
   if (config.tool == BodyConfig::Tool::kCapsule) {

@@ -26,6 +26,7 @@
 #include "clients/softbody/models/surface_table.h"
 #include "clients/softbody/near/near_model.h"
 #include "clients/softbody/touch/contact.h"
+#include "clients/softbody/touch/rigid_shape.h"
 
 namespace tendon::softbody {
 
@@ -116,6 +117,12 @@ struct FileShape {
   std::filesystem::path file;
   double scale;  ///< from the file's units to m
 };
+/// A rigid tool that a file describes: RigidShape::mesh().
+struct ToolFile {
+  std::filesystem::path file;  ///< a closed surface, as read_surface() reads it; its axes are the handle's
+  double scale;                ///< from the file's units to m
+  double cell;                 ///< m, of the grid of distances
+};
 
 /// The description of a soft body that a tool touches, as plain values. Blocks and cylinders stand on z = 0.
 struct BodyConfig {
@@ -125,6 +132,7 @@ struct BodyConfig {
   std::vector<Region> regions{};  ///< parts of another material; where two overlap, the later one counts
   ModelKind model = ModelKind::kCondensed;
   Law law = Law::kCorotational;  ///< kNear: of the near elements; not kLinear
+  bool exact_interface = false;  ///< kNear: all unknowns of the boundary in place of modes; slow, to compare with
   std::optional<std::filesystem::path>
       table_file{};  ///< kCondensed: where condense() has put its table; else it is made
   int max_iterations = QuasiStaticModel::Config{}.max_iterations;  ///< for models that iterate until they converge
@@ -149,17 +157,18 @@ struct BodyConfig {
   Vec3 middle = Vec3::Zero();  ///< m; only its position across `towards_tool` counts
   double tool_radius = 0;      ///< m; 0: a point
   /// The tool presses a patch of fixed size, or is rigid and its contact grows: a sphere of `tool_radius`, a capsule of
-  /// it, or a box. kCondensed has sphere and capsule, without friction; kCorotational, kStVenantKirchhoff and
-  /// kNeoHookean have all three (touch/rigid_contact.h).
-  enum class Tool : std::uint8_t { kPatch, kSphere, kCapsule, kBox };
+  /// it, a box, or the inside of a surface. kCondensed has sphere and capsule, without friction; kCorotational,
+  /// kStVenantKirchhoff and kNeoHookean have all (touch/rigid_contact.h).
+  enum class Tool : std::uint8_t { kPatch, kSphere, kCapsule, kBox, kMesh };
   Tool tool = Tool::kPatch;
-  double tool_half_length = 0;      ///< kCapsule: m, from its middle to the centre of each end
-  Vec3 tool_axis = Vec3::UnitZ();   ///< kCapsule: unit vector, handle frame, from end to end
-  Vec3 tool_size = Vec3::Zero();    ///< kBox: m, along the handle's axes
-  double tool_edge = 0;             ///< kBox: m, the radius of its edges and corners
-  double layer = 1e-4;              ///< m, rigid tools on nonlinear bodies: Layer::Config::thickness
-  std::size_t hands = 1;            ///< rigid tools on nonlinear bodies: how many hands hold one each
-  Vec3 tool_offset = Vec3::Zero();  ///< m, handle frame, from the handle's position to the tool's middle
+  double tool_half_length = 0;          ///< kCapsule: m, from its middle to the centre of each end
+  Vec3 tool_axis = Vec3::UnitZ();       ///< kCapsule: unit vector, handle frame, from end to end
+  Vec3 tool_size = Vec3::Zero();        ///< kBox: m, along the handle's axes
+  double tool_edge = 0;                 ///< kBox: m, the radius of its edges and corners
+  std::optional<ToolFile> tool_file{};  ///< kMesh
+  double layer = 1e-4;                  ///< m, rigid tools on nonlinear bodies: Layer::Config::thickness
+  std::size_t hands = 1;                ///< rigid tools on nonlinear bodies: how many hands hold one each
+  Vec3 tool_offset = Vec3::Zero();      ///< m, handle frame, from the handle's position to the tool's middle
   PatchContact::Side side = PatchContact::Side::kUnilateral;
   /// The stiffness of linear models, and with plasticity, is the whole second derivative of the energy on a flat
   /// surface too. On a curved one, and of other models at rest, it always is.
@@ -169,8 +178,12 @@ struct BodyConfig {
 /// Whether the tool is rigid and presses a nonlinear body: RigidContact.
 bool is_rigid_on_nonlinear(const BodyConfig& config);
 
-/// Whether contact gives a torque: the tool is a capsule or a box, or its middle is not where the handle is.
+/// Whether contact gives a torque: the tool is neither a patch nor a sphere, or its middle is not where the handle is.
 bool turns_the_hand(const BodyConfig& config);
+
+/// The shape of a rigid tool. Makes the grid of one that a file describes: that takes some tenths of a second. Throws
+/// std::invalid_argument when the file or its surface is refused.
+RigidShape shape_of_tool(const BodyConfig& config);
 
 /// From the handle to the tool's point that is farthest in the body, m, body frame, with the handle turned by `turn`.
 Vec3 lowest_of_tool(const BodyConfig& config, const Mat3& turn);

@@ -7,6 +7,7 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <sstream>
+#include <stdexcept>
 #include <utility>
 
 namespace tendon::softbody {
@@ -57,10 +58,10 @@ BodyConfig without(BodyConfig body, EffectKind effect) {
   return body;
 }
 
-Explanation::Cost press_and_come_back(const BodyConfig& config, const Mat3& turn,
+Explanation::Cost press_and_come_back(const BodyConfig& config, const Mat3& turn, const Vec3& lowest,
                                       const std::function<double()>& processor_time) {
   Body body(config);
-  const Vec3 surface = body.touch_point() - lowest_of_tool(config, turn);
+  const Vec3 surface = body.touch_point() - lowest;
   const double start = processor_time();
   for (int i = 0; i < kAnswers; ++i) {
     const double depth = kWay * (1 - std::abs(2.0 * i / kAnswers - 1));
@@ -87,6 +88,9 @@ std::string touched_by(const BodyConfig& body) {
       text << ", a box of " << (1e3 * body.tool_size).transpose() << " mm with edges of " << 1e3 * body.tool_edge
            << " mm";
       break;
+    case BodyConfig::Tool::kMesh:
+      text << ", a tool whose surface is " << body.tool_file->file.string();
+      break;
   }
   if (body.tool_offset != Vec3::Zero()) text << ", " << 1e3 * body.tool_offset.norm() << " mm from the handle";
   if (turns_the_hand(body)) text << "; with a torque";
@@ -103,7 +107,30 @@ std::string milliseconds(double s, double resolution) {
 
 }  // namespace
 
+double off_the_exact_interface(const BodyConfig& config) {
+  if (config.model != ModelKind::kNear) {
+    throw std::invalid_argument("only the model \"near\" has an interface, and can be compared with the exact one");
+  }
+  BodyConfig every = config;
+  every.exact_interface = true;
+  Body modes(config);
+  Body exact(every);
+  double most = 0;
+  for (const double share : {0.01, 0.1, 0.2}) {
+    const double depth = share * config.patch_radius;
+    const double expected = exact.settle(Given::kDepth, depth).force;
+    most = std::max(most, std::abs(modes.settle(Given::kDepth, depth).force / expected - 1));
+  }
+  return most;
+}
+
 Explanation explain(const Scene& scene, const std::function<double()>& processor_time) {
+  std::optional<Explanation::Tool> tool;
+  if (scene.body.tool == BodyConfig::Tool::kMesh) {
+    const double start = processor_time();
+    const RigidShape shape = shape_of_tool(scene.body);
+    tool = {*shape.mesh_facts(), processor_time() - start};
+  }
   Body body(scene.body);
   // The push is so small that the answer is linear. It is a force because the weight moves the surface away from the
   // mesh's.
@@ -112,6 +139,8 @@ Explanation explain(const Scene& scene, const std::function<double()>& processor
                   .all = {},
                   .size = body.size(),
                   .near = body.near_field(),
+                  .tool = tool,
+                  .off_exact = {},
                   .step = body.step(),
                   .stiffness = body.settle(Given::kForce, push).stiffness,
                   .linear_up_to = body.linear_up_to()};
@@ -127,10 +156,11 @@ Explanation explain(const Scene& scene, const std::function<double()>& processor
   }
   std::vector<Explanation::Cost> least(bodies.size(), {std::numeric_limits<double>::infinity(), 0});
   const Mat3 turn = to_device(scene).transpose();
+  const Vec3 lowest = lowest_of_tool(scene.body, turn);
   const double start = processor_time();
   for (int round = 0; round < kMostTurns && (round == 0 || processor_time() - start < kEnough); ++round) {
     for (std::size_t i = 0; i < bodies.size(); ++i) {
-      const Explanation::Cost cost = press_and_come_back(bodies[i], turn, processor_time);
+      const Explanation::Cost cost = press_and_come_back(bodies[i], turn, lowest, processor_time);
       least[i] = {std::min(least[i].answer_s, cost.answer_s), cost.bytes};
     }
   }
@@ -173,12 +203,24 @@ std::string in_words(const Scene& scene, const Explanation& explanation) {
     text << "  " << info(kind).name
          << (kind == EffectKind::kGeometricNonlinearity ? ": " + turned_too_far(explanation.linear_up_to) : "") << '\n';
   }
+  if (explanation.tool) {
+    const auto& [facts, made_s] = *explanation.tool;
+    text << "tool: " << facts.facets << " facets, " << 1e3 * facts.size.x() << " x " << 1e3 * facts.size.y() << " x "
+         << 1e3 * facts.size.z() << " mm; " << facts.points << " distances on a grid with cells of " << 1e3 * facts.cell
+         << " mm, " << static_cast<double>(facts.bytes) / 1e6 << " MB, made in " << milliseconds(made_s, 0)
+         << " of processor time; its surface is right to " << 1e3 * facts.error << " mm\n";
+  }
   if (explanation.near && explanation.near->radius > 0) {
     const NearModel::Size& near = *explanation.near;
     const std::string_view law = std::ranges::find(models(), body.law, &ModelInfo::law)->name;
     text << "near the tool: " << law << ", " << near.elements << " of " << size.elements << " elements, within "
          << 1e3 * near.radius << " mm or where the tool goes next; " << near.unknowns << " unknowns, of them "
          << near.modes << " modes in place of the " << near.interface << " that near and far have in common\n";
+    if (explanation.off_exact) {
+      text << "  beside the exact interface: forces differ by " << std::setprecision(2) << 100 * *explanation.off_exact
+           << " % at most, pressed by up to " << 200 * body.patch_radius << " mm\n"
+           << std::setprecision(6);
+    }
   } else if (explanation.near) {
     text << "near the tool: the whole body, which is not larger\n";
   }
@@ -222,6 +264,14 @@ std::string in_json(const Scene& scene, const Explanation& explanation) {
                     {"unknowns", near->unknowns},
                     {"modes", near->modes},
                     {"interface", near->interface}};
+    if (explanation.off_exact) json["near"]["off_exact"] = *explanation.off_exact;
+  }
+  if (const auto& tool = explanation.tool) {
+    const Vec3& size = tool->facts.size;
+    json["tool"] = {{"facets", tool->facts.facets}, {"size_m", {size.x(), size.y(), size.z()}},
+                    {"cell_m", tool->facts.cell},   {"points", tool->facts.points},
+                    {"bytes", tool->facts.bytes},   {"error_m", tool->facts.error},
+                    {"made_s", tool->made_s}};
   }
   return json.dump(-1, ' ', false, Json::error_handler_t::replace) + '\n';
 }

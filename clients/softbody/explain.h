@@ -32,10 +32,22 @@ struct Explanation {
   double resolution_s = 0;  ///< the difference of two measurements of the same body; smaller costs mean nothing
   Body::Size size;
   std::optional<NearModel::Size> near;  ///< of the model "near"
-  double step = 0;                      ///< s, the time step of an answer; 0: the body is at rest at every instant
-  double stiffness = 0;                 ///< N/m, at first touch
-  double linear_up_to = 0;              ///< m; see Body
+  /// A tool that a file describes.
+  struct Tool {
+    RigidShape::MeshFacts facts;
+    double made_s;  ///< s of processor time, at each start
+  };
+  std::optional<Tool> tool;
+  std::optional<double> off_exact;  ///< off_the_exact_interface(), where it has been asked for
+  double step = 0;                  ///< s, the time step of an answer; 0: the body is at rest at every instant
+  double stiffness = 0;             ///< N/m, at first touch
+  double linear_up_to = 0;          ///< m; see Body
 };
+
+/// By how much of the force 60 modes answer otherwise than the exact interface of near and far, at the most of three
+/// depths down to a fifth of the patch's radius: a check of the model "near", which takes the time of some whole
+/// solutions. Throws std::invalid_argument for another model.
+double off_the_exact_interface(const BodyConfig& body);
 
 /// `processor_time` of the calling thread, s.
 Explanation explain(const Scene& scene, const std::function<double()>& processor_time);

@@ -266,7 +266,7 @@ std::vector<Region> read_regions(Table& root) {
   return regions;
 }
 
-void read_touch(Table table, Scene& scene) {
+void read_touch(Table table, const std::filesystem::path& directory, Scene& scene) {
   BodyConfig& body = scene.body;
   body.towards_tool = table.direction("from", Vec3::UnitZ());
   body.middle = table.vector("middle_mm", 1e3 * kMaxLength, 1e3, Vec3(Vec3::Zero()));
@@ -274,10 +274,11 @@ void read_touch(Table table, Scene& scene) {
   body.tool_radius = table.number("tool_radius_mm", 0, true, 1e3 * kMaxLength, 1e3, 0);
   if (table.find("reach_mm") != nullptr) body.reach = table.length("reach_mm");
   if (table.find("tool") != nullptr) {
-    body.tool = table.choice("tool", "patch, sphere, capsule, box", [](std::string_view name) {
+    body.tool = table.choice("tool", "patch, sphere, capsule, box, mesh", [](std::string_view name) {
       if (name == "patch") return std::optional(BodyConfig::Tool::kPatch);
       if (name == "sphere") return std::optional(BodyConfig::Tool::kSphere);
       if (name == "box") return std::optional(BodyConfig::Tool::kBox);
+      if (name == "mesh") return std::optional(BodyConfig::Tool::kMesh);
       return name == "capsule" ? std::optional(BodyConfig::Tool::kCapsule) : std::nullopt;
     });
   }
@@ -291,6 +292,10 @@ void read_touch(Table table, Scene& scene) {
     const toml::node& size = *table.find("tool_size_mm");
     if (!(body.tool_size.array() > 0).all()) table.fail(size, "tool_size_mm", "expected lengths above 0");
     body.tool_edge = table.number("tool_edge_mm", 0, false, 1e3 * body.tool_size.minCoeff() / 2, 1e3);
+  }
+  if (body.tool == BodyConfig::Tool::kMesh) {
+    body.tool_file = ToolFile{directory / table.text("tool_file", "the path of a surface: .stl, .obj or .off"),
+                              1 / table.number("tool_units_per_m", 0, false, 1e9, 1), table.length("tool_cell_mm")};
   }
   if (is_rigid_on_nonlinear(body)) body.layer = table.number("layer_mm", 0, false, 1e3 * kMaxLength, 1e3, body.layer);
   if (table.find("side") != nullptr) {
@@ -497,7 +502,7 @@ Scene parse_scene(std::string_view text, const std::string& name, const std::fil
   model.check_unknown();
   read_body(root.table("body"), directory, scene.body);
   if (root.find("region") != nullptr) scene.body.regions = read_regions(root);
-  read_touch(root.table("touch"), scene);
+  read_touch(root.table("touch"), directory, scene);
   if (root.find("hands") != nullptr) {
     scene.hands = read_hands(root);
     scene.body.hands = scene.hands.size();
@@ -587,16 +592,24 @@ std::string scene_reference() {
          "middle_mm = [0, 0, 0]    of the side that is touched; its place across `from` counts\n"
          "reach_mm                 for condensed, modal: touched only so far from the middle. Without: anywhere\n"
          "tool = \"patch\"           or sphere, capsule: rigid, its contact grows as it is pressed in; of condensed\n"
-         "                         (without friction), corotational, stvk, neo-hookean; or box: of the last three\n"
+         "                         (without friction), corotational, stvk, neo-hookean; or box, mesh: of the last "
+         "three\n"
          "tool_radius_mm = 0       how much earlier a patch touches; the sphere's, the capsule's\n"
          "tool_length_mm           of a capsule: between the centres of its ends\n"
          "tool_axis = [0, 0, 1]    of a capsule: from end to end, in the handle's frame\n"
          "tool_size_mm, tool_edge_mm     of a box: [x, y, z] along the handle's axes, and how round its edges are\n"
+         "tool_file, tool_units_per_m    of a mesh: a closed surface (.stl, .obj, .off), along the handle's axes "
+         "around "
+         "the\n"
+         "                         tool's middle; 1000 when it is in mm\n"
+         "tool_cell_mm             of a mesh: its distances are kept on a grid of so much; at most half of its "
+         "thinnest "
+         "part\n"
          "layer_mm = 0.1           of rigid tools on corotational, stvk, neo-hookean: the layer that they press, how\n"
          "                         thick\n"
          "tool_offset_mm = [0, 0, 0]     from the handle to the tool's middle, in the handle's frame. A tool at an "
          "offset,\n"
-         "                         a capsule and a box, give a torque about the handle\n"
+         "                         a capsule, a box and a mesh, give a torque about the handle\n"
          "side = \"unilateral\"      or bilateral: once it has touched, the tool sticks, and pulls\n"
          "whole_stiffness = false  of linear, condensed, modal, plasticity, at rest: the stiffness of a flat surface "
          "is\n"

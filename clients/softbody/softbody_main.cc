@@ -103,14 +103,19 @@ int main(int argc, char** argv) {
                  "`tendon-softbody selftest SCENE` whether it is passive, `tendon-softbody condense SCENE FILE` "
                  "makes a table before.",
       options);
+  bool exact = false;
+  if (explains) {
+    line.add("--exact", exact, "Says too by how much the modes of the model near differ from its exact interface");
+  }
   line.add_argument("SCENE", file, "Scene file; its keys:\n" + softbody::scene_reference());
   if (const auto exit_code = line.parse(argc - skip, argv + skip)) return *exit_code;
 
   try {
     const softbody::Scene scene = softbody::read_scene(file);
     if (explains) {
-      const softbody::Explanation explanation = softbody::explain(
+      softbody::Explanation explanation = softbody::explain(
           scene, [] { return static_cast<double>(std::clock()) / static_cast<double>(CLOCKS_PER_SEC); });
+      if (exact) explanation.off_exact = softbody::off_the_exact_interface(scene.body);
       std::cout << (options.json ? in_json(scene, explanation) : in_words(scene, explanation));
       return 0;
     }

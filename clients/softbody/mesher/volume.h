@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "clients/softbody/fem/mesh.h"
-#include "clients/softbody/mesher/triangles.h"
+#include "clients/softbody/fem/triangles.h"
 
 namespace tendon::softbody {
 

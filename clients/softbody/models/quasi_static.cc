@@ -2,6 +2,7 @@
 #include "clients/softbody/models/quasi_static.h"
 
 #include <Eigen/Cholesky>
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
@@ -23,8 +24,9 @@ constexpr double kShortest = 1.0 / 64;
 constexpr int kPatience = 16;
 constexpr double kSlow = 1.0 / 16;
 
-/// What H says of the stiffness is wrong by the first order of H's error, and the energy of the shape by the second: where
-/// the two differ by at most this share, the second serves.
+/// What H says of the stiffness is wrong by the first order of H's error, and the energy of the shape by the second. Where
+/// the two differ by at most this share, and H finds no more than this that another shape would take off, that is taken
+/// off and serves. The two alone may agree by accident, as near an edge.
 constexpr double kTangentAlike = 0.02;
 /// How a body gives way to a gliding patch is right to this share.
 constexpr double kGlidePrecision = 1e-2;
@@ -241,18 +243,19 @@ void QuasiStaticModel::find_tangent(const VectorXd& load, const Patch* patch, co
   VectorXd by_shape = needed(shape, tangent.now);
   double stiffness = shape.dot(by_shape);
   double guess = reaction.stiffness;
-  for (int round = 0; std::abs(guess - stiffness) > kTangentAlike * std::abs(stiffness) && round < kTangentRounds;
-       ++round) {
+  for (int round = 0;; ++round) {
     const VectorXd back = solve_at_depth(by_shape, tangent.among_sides, load, tangent.by_tool);
-    const VectorXd by_back = needed(back, tangent.now);
     const double less = back.dot(by_shape);
+    reaction.stiffness = stiffness - less;
+    const double apart = std::max(std::abs(less), std::abs(guess - stiffness));
+    if (apart <= kTangentAlike * std::abs(stiffness) || round == kTangentRounds) break;
+    const VectorXd by_back = needed(back, tangent.now);
     const double share = less / back.dot(by_back);
     shape -= share * back;
     by_shape -= share * by_back;
     guess = stiffness;
     stiffness = shape.dot(by_shape);
   }
-  reaction.stiffness = stiffness;
   if (patch == nullptr || patch->curvatures.size() == 0) return;
   MatrixXd slopes(load.size(), 2);
   const MatrixXd all = patch_load_slopes(elastic_, normal_, *patch);

@@ -32,7 +32,7 @@ Eigen::Matrix3Xd places_of(const Mesh& mesh, const std::vector<int>& nodes, cons
 }  // namespace
 
 Distance HeldTool::distance(const Pose& handle, const Vec3& x) const {
-  Distance found = shape.distance(handle.turn.transpose() * (x - handle.position) - offset);
+  Distance found = shape.distance(in_tool(handle, x));
   found.gradient = handle.turn * found.gradient;
   found.curvature = handle.turn * found.curvature * handle.turn.transpose();
   return found;
@@ -127,9 +127,10 @@ Layer::Near Layer::near(std::span<const Placed> tools, const VectorXd& u, double
       const HeldTool& tool = *tools[t].tool;
       const double far = tool.shape.reach() + kGrown * facet.reach + apart;
       if ((middle - tool.middle(*tools[t].handle)).squaredNorm() > far * far) continue;
+      if (tool.value(*tools[t].handle, middle) > apart + kGrown * facet.reach) continue;
       bool close = false;
       for (std::size_t p = facet.first; p < facet.first + facet.count && !close; ++p) {
-        close = tool.distance(*tools[t].handle, places * points_[p].shares.transpose()).value < apart;
+        close = tool.value(*tools[t].handle, places * points_[p].shares.transpose()) < apart;
       }
       if (!close) continue;
       found.sites.push_back({t, static_cast<int>(f), {}});
@@ -182,15 +183,16 @@ Layer::Press Layer::press(const Near& near, std::span<const Placed> tools, const
     all.felt.resize(tools.size());
     for (Felt& felt : all.felt) felt.mixed = MatrixXd::Zero(size, 6);
   }
+  std::vector<std::vector<Vec3>> pressed(tools.size());
   each_point(near, places, [&](const Near::Site& site, std::size_t p, const Vec3& x) {
     const Placed& placed = tools[site.tool];
     const PointOfFacet& point = points_[p];
+    const Tie* tie = rubs() && ties_[site.tool][p].most > 0 ? &ties_[site.tool][p] : nullptr;
+    if (tie == nullptr && placed.tool->value(*placed.handle, x) >= config_.thickness) return;
     const Distance d = placed.tool->distance(*placed.handle, x);
     double stiffness = 0;
     double energy = 0;
     const double push = pressure(config_.thickness - d.value, stiffness, energy);
-    const Tie* tie = rubs() && ties_[site.tool][p].most > 0 ? &ties_[site.tool][p] : nullptr;
-    if (push == 0 && tie == nullptr) return;
     Vec3 slope = -push * d.gradient;  // of the energy of 1 m², by x
     Mat3 curve = stiffness * d.gradient * d.gradient.transpose() - push * d.curvature;
     Vec3 drag = Vec3::Zero();
@@ -250,17 +252,12 @@ Layer::Press Layer::press(const Near& near, std::span<const Placed> tools, const
     if (push == 0) return;
     felt.area += point.area;
     felt.middle += point.area * x;
+    pressed[site.tool].push_back(x);
   });
-  for (Felt& felt : all.felt) {
+  for (std::size_t t = 0; t < all.felt.size(); ++t) {
+    Felt& felt = all.felt[t];
     if (felt.area > 0) felt.middle /= felt.area;
-  }
-  if (order == Order::kFelt) {
-    each_point(near, places, [&](const Near::Site& site, std::size_t, const Vec3& x) {
-      const Placed& placed = tools[site.tool];
-      if (placed.tool->distance(*placed.handle, x).value >= config_.thickness) return;
-      Felt& felt = all.felt[site.tool];
-      felt.spread = std::max(felt.spread, (x - felt.middle).norm());
-    });
+    for (const Vec3& x : pressed[t]) felt.spread = std::max(felt.spread, (x - felt.middle).norm());
   }
   return all;
 }
@@ -272,8 +269,8 @@ void Layer::hold(const Near& near, std::span<const Placed> tools, const Eigen::M
     const Distance d = tools[site.tool].tool->distance(*tools[site.tool].handle, x);
     double stiffness = 0;
     double energy = 0;
-    tie.most = config_.friction * pressure(config_.thickness - d.value, stiffness, energy);
-    tie.normal = d.gradient;
+    tie.most = config_.friction * pressure(config_.thickness - d.value, stiffness, energy) * d.gradient.norm();
+    tie.normal = d.gradient.normalized();
   });
 }
 
@@ -285,11 +282,11 @@ Layer::Dissipated Layer::advance(const Near& near, std::span<const Placed> tools
   each_point(near, places, [&](const Near::Site& site, std::size_t p, const Vec3& x) {
     const Pose& handle = *tools[site.tool].handle;
     Tie& tie = ties_[site.tool][p];
+    if (tools[site.tool].tool->value(handle, x) >= config_.thickness) return;
     const Distance d = tools[site.tool].tool->distance(handle, x);
     double stiffness = 0;
     double energy = 0;
     const double push = pressure(config_.thickness - d.value, stiffness, energy);
-    if (push == 0) return;
     pressed[site.tool][p] = true;
     Vec3 stretched = Vec3::Zero();
     if (tie.tied) {
@@ -304,7 +301,8 @@ Layer::Dissipated Layer::advance(const Near& near, std::span<const Placed> tools
         stretched *= most / length;
       }
     }
-    tie = {true, handle.turn.transpose() * (x - stretched - handle.position), config_.friction * push, d.gradient};
+    tie = {true, handle.turn.transpose() * (x - stretched - handle.position),
+           config_.friction * push * d.gradient.norm(), d.gradient.normalized()};
   });
   for (std::size_t t = 0; t < ties_.size(); ++t) {
     for (std::size_t p = 0; p < points_.size(); ++p) {
@@ -317,16 +315,19 @@ Layer::Dissipated Layer::advance(const Near& near, std::span<const Placed> tools
 Layer::Gap Layer::gap(const Placed& placed, const VectorXd& u) const {
   Gap least{std::numeric_limits<double>::infinity(), Vec3::Zero()};
   if (!placed.handle) return least;
-  const Vec3 middle = placed.tool->middle(*placed.handle);
+  Vec3 nearest = Vec3::Zero();
   for (const FacetOfPoints& facet : facets_) {
     const Eigen::Matrix3Xd places = corners(facet, u);
-    const double far = least.value + placed.tool->shape.reach() + kGrown * facet.reach;
-    if ((places.rowwise().mean() - middle).norm() > far) continue;
+    if (placed.tool->value(*placed.handle, places.rowwise().mean()) > least.value + kGrown * facet.reach) continue;
     for (std::size_t p = facet.first; p < facet.first + facet.count; ++p) {
-      const Distance d = placed.tool->distance(*placed.handle, places * points_[p].shares.transpose());
-      if (d.value < least.value) least = {d.value, -d.gradient};
+      const Vec3 x = places * points_[p].shares.transpose();
+      const double value = placed.tool->value(*placed.handle, x);
+      if (!(value < least.value)) continue;
+      least.value = value;
+      nearest = x;
     }
   }
+  if (std::isfinite(least.value)) least.normal = -placed.tool->distance(*placed.handle, nearest).gradient.normalized();
   return least;
 }
 

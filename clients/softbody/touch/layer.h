@@ -20,6 +20,10 @@ struct HeldTool {
   Vec3 middle(const Pose& handle) const { return handle.position + handle.turn * offset; }
   /// From a point x of the body to the tool's surface; all in the frame of `handle`.position.
   Distance distance(const Pose& handle, const Vec3& x) const;
+  double value(const Pose& handle, const Vec3& x) const { return shape.value(in_tool(handle, x)); }  ///< φ alone
+  Vec3 in_tool(const Pose& handle, const Vec3& x) const {
+    return handle.turn.transpose() * (x - handle.position) - offset;
+  }
 };
 
 /// A thin elastic layer on the surface of a body, which rigid tools press: contact as an energy. With the pose p of a

@@ -225,9 +225,9 @@ VectorXd RigidContact::by_near(const Local& local, const VectorXd& forces) const
   return pairs_.times(local.spread(forces, elastic_.free_count()), solved);
 }
 
-/// By Woodbury's identity: (H⁻¹ + A)⁻¹ b, with A among the near unknowns.
-VectorXd RigidContact::solve(const Local& local, const VectorXd& b) const {
-  const VectorXd free = pairs_.times(b, body_.factor().solve(b));
+/// By Woodbury's identity: (H⁻¹ + A)⁻¹ b, with A among the near unknowns and `by_factor` = K₀⁻¹ b.
+VectorXd RigidContact::solve(const Local& local, const VectorXd& b, const VectorXd& by_factor) const {
+  const VectorXd free = pairs_.times(b, by_factor);
   if (local.unknowns.empty()) return free;
   const VectorXd near = local.held.solve(local.stiffness * free(local.unknowns));
   return free - by_near(local, local.curve_held * near);
@@ -339,13 +339,14 @@ Layer::Mat6 RigidContact::curve(const Local& local, std::size_t tool) {
     loads.col(c) = local.spread(felt.mixed.col(c)(local.rows), elastic_.free_count());
   }
   MatrixXd shapes(loads.rows(), motions);
-  for (int c = 0; c < motions; ++c) shapes.col(c) = solve(local, loads.col(c));
+  const MatrixXd by_factor = body_.factor().solve(loads);
+  for (int c = 0; c < motions; ++c) shapes.col(c) = solve(local, loads.col(c), by_factor.col(c));
   const MatrixXd guess = felt.curve.topLeftCorner(motions, motions) - loads.transpose() * shapes;
   MatrixXd left(loads.rows(), motions);
   for (int c = 0; c < motions; ++c) {
     const double scale = guess.block(c / 3 * 3, c / 3 * 3, 3, 3).norm();
     VectorXd rest = loads.col(c) - needed(local, shapes.col(c));
-    VectorXd better = solve(local, rest);
+    VectorXd better = solve(local, rest, body_.factor().solve(rest));
     VectorXd way = better;
     double gain = rest.dot(better);
     for (int round = 0; round < kCurveRounds && std::abs(gain) > kCurveError * scale; ++round) {
@@ -354,7 +355,7 @@ Layer::Mat6 RigidContact::curve(const Local& local, std::size_t tool) {
       if (!(bend > 0) || !(gain > 0)) break;  // the body is not stable here
       shapes.col(c) += gain / bend * way;
       rest -= gain / bend * by_way;
-      better = solve(local, rest);
+      better = solve(local, rest, body_.factor().solve(rest));
       const double next = rest.dot(better);
       way = better + next / gain * way;
       gain = next;
@@ -395,6 +396,13 @@ Feel RigidContact::feel(const Local& local, std::size_t tool) {
   return feel;
 }
 
+/// m, that a tool may go before the body must follow.
+double RigidContact::longest_step() const {
+  double most = layer_.least_facet() / 2;
+  for (const HeldTool& tool : tools_) most = std::min(most, tool.shape.thinnest() / 4);
+  return most;
+}
+
 /// Puts a tool where it comes from, just outside of the body.
 void RigidContact::put_down(std::size_t tool, const Pose& handle) {
   placed_[tool].handle = handle;
@@ -416,7 +424,7 @@ std::vector<Feel> RigidContact::press(std::span<const std::optional<Pose>> handl
   for (Feel& feel : feels) feel.gap = std::numeric_limits<double>::infinity();
   if (std::ranges::find(lost, false) == lost.end()) return feels;
 
-  const double most = layer_.least_facet() / 2;
+  const double most = longest_step();
   const auto way = [&](std::size_t t) {
     const HeldTool& tool = tools_[t];
     const Pose& from = *placed_[t].handle;

@@ -12,7 +12,7 @@
 
 namespace tendon::softbody {
 
-/// Rigid tools that press a nonlinear body at rest: a sphere, a capsule, a box, one or several at once. With the elastic
+/// Rigid tools that press a nonlinear body at rest: any RigidShape, one or several at once. With the elastic
 /// energy W, the layer's energy Ψ (layer.h) and the poses p of all tools, the body takes the shape of least
 ///
 ///     Π(u, p) = W(u) + Ψ(u, p)
@@ -30,9 +30,9 @@ namespace tendon::softbody {
 /// rest of the body follows by one solution. A line search makes Π fall. K comes by conjugate gradients with the same
 /// inverse, and differences of the forces, to 0.2 %.
 ///
-/// Between two answers the tools go in steps of at most half a facet, so that a fast one does not come out on the other
-/// side. One that jumps by more than kMostSteps of these is put down anew: it comes back from where the model's surface
-/// is touched from.
+/// Between two answers the tools go in steps of at most half a facet, and a quarter of what the thinnest tool is thick,
+/// so that a fast one does not come out on the other side. One that jumps by more than kMostSteps of these is put down
+/// anew: it comes back from where the model's surface is touched from.
 ///
 /// Thread-safe: no. Realtime-safe: no.
 class RigidContact {
@@ -68,9 +68,10 @@ class RigidContact {
   void look(Local& local);
   VectorXd meet(const Local& local, const VectorXd& free, double enough) const;
   VectorXd by_near(const Local& local, const VectorXd& forces) const;
-  VectorXd solve(const Local& local, const VectorXd& b) const;
+  VectorXd solve(const Local& local, const VectorXd& b, const VectorXd& by_factor) const;
   bool go(const VectorXd& step, double slope, Local& local);
   double stiffest(const Local& local, std::size_t tool) const;
+  double longest_step() const;
   Layer::Mat6 curve(const Local& local, std::size_t tool);
   VectorXd needed(const Local& local, const VectorXd& shape);
   Feel feel(const Local& local, std::size_t tool);

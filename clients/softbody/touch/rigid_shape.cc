@@ -2,11 +2,68 @@
 #include "clients/softbody/touch/rigid_shape.h"
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
+#include <limits>
+#include <sstream>
+#include <stdexcept>
+#include <string>
+#include <utility>
 
+#include "clients/softbody/touch/surface_distance.h"
 #include "protocol/expect.h"
 
 namespace tendon::softbody {
+namespace {
+
+/// Cells, of the thinnest part of a surface.
+constexpr double kThinnestInCells = 2;
+
+Triangles in_metres(const Triangles& surface, double scale) {
+  Triangles made = surface;
+  for (Vec3& point : made.points) point *= scale;
+  return made;
+}
+
+/// Of the rounding: what is not farther from the core lies inside it.
+constexpr double kCoreShare = 1e-9;
+
+/// m, in whole cells: how thick the surface is behind the middles of its facets, where it is thinnest.
+double thickness_of(const Triangles& surface, const SurfaceDistance& distance, double cell, std::string_view name) {
+  double least = std::numeric_limits<double>::infinity();
+  for (std::size_t f = 0; f < surface.facets.size(); ++f) {
+    const auto& facet = surface.facets[f];
+    const Vec3& a = surface.points[at(facet[0])];
+    const Vec3& b = surface.points[at(facet[1])];
+    const Vec3& c = surface.points[at(facet[2])];
+    const Vec3 middle = (a + b + c) / 3;
+    const Vec3 normal = (b - a).cross(c - a).normalized();
+    double behind = 0;
+    while (behind < least && distance.at(middle - (behind + cell) * normal) < 0) behind += cell;
+    least = std::min(least, behind);
+    if (behind > (kThinnestInCells - 0.5) * cell) continue;
+    std::ostringstream text;
+    text << name << ": facet " << f + 1 << " at (" << 1e3 * middle.x() << ", " << 1e3 * middle.y() << ", "
+         << 1e3 * middle.z() << ") mm: the surface is thinner there than " << kThinnestInCells << " cells of "
+         << 1e3 * cell << " mm: smaller cells";
+    throw std::invalid_argument(text.str());
+  }
+  return least;
+}
+
+}  // namespace
+
+RigidShape::RigidShape(const Vec3& core, double rounding, const Mat3& turn)
+    : core_(core),
+      rounding_(rounding),
+      turn_(turn),
+      reach_(core.norm() + rounding),
+      thinnest_(2 * (rounding + core.minCoeff())) {}
+
+RigidShape::RigidShape(std::shared_ptr<const Mesh> mesh)
+    : mesh_(std::move(mesh)),
+      reach_(std::ranges::max(mesh_->points, {}, &Vec3::squaredNorm).norm()),
+      thinnest_(mesh_->thinnest) {}
 
 RigidShape RigidShape::sphere(double radius) {
   expect_above_zero(radius, "radius");
@@ -27,14 +84,63 @@ RigidShape RigidShape::box(const Vec3& size, double edge) {
   return {size / 2 - Vec3::Constant(edge), edge, Mat3::Identity()};
 }
 
+RigidShape RigidShape::mesh(const Triangles& surface, double scale, double cell, double around, std::string_view name) {
+  expect_above_zero(scale, "scale");
+  expect_above_zero(cell, "cell");
+  expect_not_negative(around, "around");
+  check(surface, name);
+  const Triangles made = in_metres(surface, scale);
+  const SurfaceDistance exact(made);
+  const double thinnest = thickness_of(made, exact, cell, name);
+  Vec3 low = Vec3::Constant(std::numeric_limits<double>::infinity());
+  Vec3 high = -low;
+  for (const Vec3& point : made.points) {
+    low = low.cwiseMin(point);
+    high = high.cwiseMax(point);
+  }
+  Vec3 last = low;
+  double there = std::numeric_limits<double>::infinity();
+  const auto distance = [&](const Vec3& x) {
+    const double value = exact.at(x, there + (x - last).norm());
+    last = x;
+    there = std::abs(value);
+    return value;
+  };
+  const Vec3 border = Vec3::Constant(around + cell);
+  try {
+    const DistanceGrid grid(distance, low - border, high + border, cell);
+    MeshFacts facts{.facets = made.facets.size(),
+                    .size = high - low,
+                    .cell = cell,
+                    .points = grid.points(),
+                    .bytes = grid.bytes() + made.points.size() * sizeof(Vec3),
+                    .error = 0};
+    const auto judge = [&](const Vec3& x) { facts.error = std::max(facts.error, std::abs(grid.at(x).value)); };
+    for (const auto& facet : made.facets) {
+      Vec3 middle = Vec3::Zero();
+      for (std::size_t i = 0; i < 3; ++i) {
+        const Vec3& corner = made.points[at(facet[i])];
+        judge(corner);
+        judge((corner + made.points[at(facet[(i + 1) % 3])]) / 2);
+        middle += corner / 3;
+      }
+      judge(middle);
+    }
+    return RigidShape(std::make_shared<const Mesh>(Mesh{made.points, grid, facts, thinnest}));
+  } catch (const std::invalid_argument& refused) {
+    throw std::invalid_argument(std::string(name) + ": " + refused.what());
+  }
+}
+
 Distance RigidShape::distance(const Vec3& x) const {
+  if (mesh_) return mesh_->grid.at(x);
   const Vec3 at = turn_.transpose() * x;
   const Vec3 sign = at.unaryExpr([](double value) { return std::copysign(1.0, value); });
   const Vec3 beyond = at.cwiseAbs() - core_;
   const Vec3 out = beyond.cwiseMax(0.0);
   const double away = out.norm();
   Distance found;
-  if (away > 1e-9 * rounding_) {
+  if (away > kCoreShare * rounding_) {
     const Vec3 normal = sign.cwiseProduct(out) / away;
     const Vec3 round = (beyond.array() > 0).cast<double>();
     found.value = away - rounding_;
@@ -49,7 +155,17 @@ Distance RigidShape::distance(const Vec3& x) const {
   return found;
 }
 
+double RigidShape::value(const Vec3& x) const {
+  if (mesh_) return mesh_->grid.value(x);
+  const Vec3 beyond = (turn_.transpose() * x).cwiseAbs() - core_;
+  const double away = beyond.cwiseMax(0.0).norm();
+  return (away > kCoreShare * rounding_ ? away : beyond.maxCoeff()) - rounding_;
+}
+
 Vec3 RigidShape::farthest(const Vec3& direction) const {
+  if (mesh_) {
+    return std::ranges::max(mesh_->points, {}, [&](const Vec3& point) { return point.dot(direction); });
+  }
   Vec3 point = rounding_ * direction;
   for (int i = 0; i < 3; ++i) {
     const double along = turn_.col(i).dot(direction);

@@ -1,16 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "clients/softbody/fem/element.h"
+#include <cstddef>
+#include <memory>
+#include <string_view>
+#include <vector>
+
+#include "clients/softbody/fem/triangles.h"
+#include "clients/softbody/touch/distance_grid.h"
 
 namespace tendon::softbody {
-
-/// The signed distance of a point from a surface, and its first two derivatives by the place of the point.
-struct Distance {
-  double value = 0;               ///< φ, m; below 0 inside
-  Vec3 gradient = Vec3::Zero();   ///< ∇φ, a unit vector away from the surface's inside
-  Mat3 curvature = Mat3::Zero();  ///< ∇∇φ, 1/m
-};
 
 /// The shape of a rigid tool, around its own middle, as a signed distance: all points within `rounding` of a box, the
 /// core. A core without size makes a sphere, one of a single length a capsule, and any other a box with round edges.
@@ -20,6 +19,9 @@ struct Distance {
 ///
 /// φ is the exact distance everywhere outside the core. There it has one derivative everywhere, and a second one that
 /// jumps where a flat side meets a round edge. Inside the core it lacks the first one halfway between two sides.
+///
+/// Or the inside of a closed surface of triangles, whose distances are kept on a grid (DistanceGrid): φ then has two
+/// continuous derivatives everywhere, and is right to what MeshFacts says.
 ///
 /// Without state. Thread-safe: yes. Realtime-safe: yes, once built.
 class RigidShape {
@@ -31,23 +33,54 @@ class RigidShape {
   /// `size`: of the whole box along its three axes; `edge`: the radius of its edges and corners, above 0 and at most
   /// half of the least size.
   static RigidShape box(const Vec3& size, double edge);
+  /// The inside of `surface` (in units of which `scale` is one in m), around its origin; with cells of `cell`, m, on a
+  /// grid that goes on for `around`, m, outside of it. Takes some µs for each point of the grid. Throws
+  /// std::invalid_argument, which begins with `name`, when the surface does not pass check(), has parts within others,
+  /// or is somewhere thinner than 2 cells: the grid would not see that. The sentence names the place.
+  static RigidShape mesh(const Triangles& surface, double scale, double cell, double around, std::string_view name);
 
-  /// At `x`, m, in the tool's frame.
+  /// At `x`, m, in the tool's frame; and φ alone, for a fraction of the work.
   Distance distance(const Vec3& x) const;
+  double value(const Vec3& x) const;
 
   /// m, from the middle to the point of the surface that is farthest from it.
-  double reach() const noexcept { return core_.norm() + rounding_; }
+  double reach() const noexcept { return reach_; }
+
+  /// m, how thick the tool is where it is thinnest, or less: a point that goes a quarter as far cannot come through it
+  /// unseen.
+  double thinnest() const noexcept { return thinnest_; }
 
   /// m, from the middle to the point of the surface that is farthest along `direction`, a unit vector in the tool's
   /// frame.
   Vec3 farthest(const Vec3& direction) const;
 
- private:
-  RigidShape(const Vec3& core, double rounding, const Mat3& turn) : core_(core), rounding_(rounding), turn_(turn) {}
+  /// What a surface and its grid are.
+  struct MeshFacts {
+    std::size_t facets;
+    Vec3 size;           ///< m, of the box around the surface
+    double cell;         ///< m
+    std::size_t points;  ///< of the grid
+    std::size_t bytes;   ///< kept, once for all copies of the shape
+    double error;  ///< m, the largest |φ| at corners and in the middles of edges and facets, where φ should be 0
+  };
+  const MeshFacts* mesh_facts() const noexcept { return mesh_ ? &mesh_->facts : nullptr; }  ///< of mesh(), or null
 
-  Vec3 core_;  ///< half of the core's size, m
-  double rounding_;
-  Mat3 turn_;  ///< the core's axes, as columns, in the tool's frame
+ private:
+  RigidShape(const Vec3& core, double rounding, const Mat3& turn);
+  struct Mesh {
+    std::vector<Vec3> points;
+    DistanceGrid grid;
+    MeshFacts facts;
+    double thinnest;  ///< m
+  };
+  explicit RigidShape(std::shared_ptr<const Mesh> mesh);
+
+  Vec3 core_ = Vec3::Zero();  ///< half of the core's size, m
+  double rounding_ = 0;
+  Mat3 turn_ = Mat3::Identity();      ///< the core's axes, as columns, in the tool's frame
+  std::shared_ptr<const Mesh> mesh_;  ///< in place of these
+  double reach_;
+  double thinnest_;
 };
 
 }  // namespace tendon::softbody

@@ -8,8 +8,10 @@
 #include <cstdint>
 #include <functional>
 #include <nlohmann/json.hpp>
+#include <stdexcept>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "tests/clients/softbody/pressed_block.h"
@@ -71,6 +73,49 @@ TEST(SoftbodyExplain, SaysHowMuchOfABodyIsNearTheTool) {
   EXPECT_NE(explained(scene).find("near the tool: the whole body"), std::string::npos);
   scene.body.model = ModelKind::kLinear;
   EXPECT_EQ(explained(scene).find("near the tool"), std::string::npos);
+}
+
+TEST(SoftbodyExplain, SixtyModesAreTheExactInterfaceToHalfAPercentWhenAsked) {
+  for (const auto& [n, poisson] : {std::pair(8, 0.3), std::pair(12, 0.499), std::pair(16, 0.45)}) {
+    Scene scene{.body = pressed_body(ModelKind::kNear, Element::kHex8Sri, n)};
+    scene.body.material.poisson = poisson;
+    const double off = off_the_exact_interface(scene.body);
+    EXPECT_GT(off, 1e-6) << n;  // they are not the same
+    EXPECT_LT(off, 0.005) << n;
+    if (n > 8) continue;
+    Explanation explanation = explain(scene, saying({0, 1e6}));
+    EXPECT_EQ(in_words(scene, explanation).find("beside the exact interface"), std::string::npos);
+    EXPECT_FALSE(nlohmann::json::parse(in_json(scene, explanation))["near"].contains("off_exact"));
+    explanation.off_exact = 0.00123;
+    EXPECT_NE(in_words(scene, explanation)
+                  .find("beside the exact interface: forces differ by 0.12 % at most, pressed by up to 4 mm\n"),
+              std::string::npos)
+        << in_words(scene, explanation);
+    EXPECT_EQ(nlohmann::json::parse(in_json(scene, explanation))["near"]["off_exact"], 0.00123);
+  }
+  EXPECT_THROW(off_the_exact_interface(pressed_body(ModelKind::kLinear, Element::kHex8Sri, 4)), std::invalid_argument);
+}
+
+TEST(SoftbodyExplain, SaysWhatAToolOfAFileIsAndCosts) {
+  Scene scene{.body = pressed_body(ModelKind::kNeoHookean, Element::kHex8Sri, 4)};
+  EXPECT_EQ(explained(scene).find("\ntool: "), std::string::npos);
+  scene.body.tool = BodyConfig::Tool::kMesh;
+  scene.body.tool_file = ToolFile{TENDON_SCENES "/spoon.off", 1e-3, 8e-4};
+  const Explanation explanation = explain(scene, saying({0, 0.25, 1e6}));
+  const RigidShape::MeshFacts& facts = explanation.tool.value().facts;
+  EXPECT_EQ(facts.facets, 1720);
+  EXPECT_EQ(explanation.tool->made_s, 0.25);
+  const std::string text = in_words(scene, explanation);
+  EXPECT_NE(text.find("a tool whose surface is " TENDON_SCENES "/spoon.off; with a torque"), std::string::npos) << text;
+  EXPECT_NE(text.find("\ntool: 1720 facets, 76 x "), std::string::npos) << text;
+  EXPECT_NE(text.find(std::to_string(facts.points) + " distances on a grid with cells of 0.8 mm, "), std::string::npos)
+      << text;
+  EXPECT_NE(text.find(" MB, made in 250 ms of processor time; its surface is right to "), std::string::npos) << text;
+  const auto json = nlohmann::json::parse(in_json(scene, explanation));
+  EXPECT_EQ(json["tool"]["bytes"], facts.bytes);
+  EXPECT_EQ(json["tool"]["points"], facts.points);
+  EXPECT_NEAR(json["tool"]["size_m"][0].get<double>(), 0.076, 1e-6);
+  EXPECT_EQ(json["tool"]["made_s"], 0.25);
 }
 
 TEST(SoftbodyExplain, WhatAnEffectAddsIsTheDifferenceToTheBodyWithoutIt) {

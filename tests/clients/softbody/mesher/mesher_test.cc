@@ -14,7 +14,7 @@
 
 #include "clients/softbody/body.h"
 #include "clients/softbody/fem/gmsh.h"
-#include "clients/softbody/mesher/triangles.h"
+#include "clients/softbody/fem/triangles.h"
 #include "clients/softbody/mesher/volume.h"
 #include "tests/server/scratch_folder.h"
 

@@ -8,6 +8,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <filesystem>
 #include <limits>
 #include <numbers>
 #include <optional>
@@ -25,39 +26,20 @@
 #include "tests/clients/softbody/scene_text.h"
 #include "tests/clients/softbody/touch/contact_integral.h"
 #include "tests/clients/softbody/touch/half_space.h"
+#include "tests/clients/softbody/touch/pressed_by_tools.h"
 
 namespace tendon::softbody {
 namespace {
 
+using testing::config_of;
+using testing::kExact;
+using testing::one;
+using testing::PressedByTools;
+using testing::slopes;
+using testing::support;
+
 constexpr double kRadius = 0.01;  // m
-constexpr double kExact = 1e-11;  // of the force
 constexpr Material kSoft{.young = 1e4, .poisson = 0.3};
-
-std::vector<HeldTool> one(const RigidShape& shape, const Vec3& offset = Vec3::Zero()) { return {{shape, offset}}; }
-
-RigidContact::Config config_of(const Material& material, double friction = 0, double tolerance = 1e-6) {
-  RigidContact::Config config;
-  config.tolerance = tolerance;
-  config.layer = {.young = material.young, .friction = friction, .shear = material.mu(), .piece = 0.001};
-  return config;
-}
-
-/// B1, and tools that press it.
-struct PressedByTools {
-  PressedByTools(Law law, std::vector<HeldTool> tools, double friction = 0, double tolerance = 1e-6)
-      : solid(testing::pressed_block(Element::kHex8Sri, 8, 0.45, law)),
-        top(solid.mesh(), Vec3::UnitZ(), testing::kB1PatchRadius),
-        model(solid, top, {}),
-        contact(model, solid, top, std::move(tools), config_of(solid.material(), friction, tolerance)) {}
-
-  Feel at(const Pose& handle) { return contact.press(std::vector{std::optional(handle)}).front(); }
-  Feel at(const Vec3& place) { return at(Pose{.position = place}); }
-
-  Solid solid;
-  TouchSurface top;
-  QuasiStaticModel model;
-  RigidContact contact;
-};
 
 TEST(RigidContact, ASphereOnAHalfSpaceIsNearHertzAndTheCondensedSphere) {
   constexpr double kDeepest = 0.02 * kRadius;
@@ -116,23 +98,6 @@ TEST(RigidContact, PressesALinearBodyAsAContactIntegralOfAnotherWay) {
   }
 }
 
-/// −∂(force, torque)/∂(place, turn), by differences.
-Layer::Mat6 slopes(PressedByTools& pressed, const Pose& handle) {
-  constexpr double kStep = 2e-6;  // m, rad
-  Layer::Mat6 all;
-  const auto felt = [&](int axis, double way) {
-    Pose there = handle;
-    if (axis < 3)
-      there.position += way * Vec3::Unit(axis);
-    else
-      there.turn = Eigen::AngleAxisd(way, Vec3::Unit(axis - 3)).toRotationMatrix() * there.turn;
-    const Feel feel = pressed.at(there);
-    return (Layer::Vec6() << feel.force, feel.torque->torque).finished();
-  };
-  for (int axis = 0; axis < 6; ++axis) all.col(axis) = (felt(axis, -kStep) - felt(axis, kStep)) / (2 * kStep);
-  return all;
-}
-
 TEST(RigidContact, ItsStiffnessesAreTheSlopesOfForceAndTorque) {
   for (const Law law : {Law::kCorotational, Law::kNeoHookean, Law::kStVenantKirchhoff}) {
     const std::vector<std::pair<HeldTool, Pose>> cases{
@@ -156,16 +121,6 @@ TEST(RigidContact, ItsStiffnessesAreTheSlopesOfForceAndTorque) {
   }
 }
 
-/// What the body's own support pushes, N.
-Vec3 support(const PressedByTools& pressed) {
-  const VectorXd force = pressed.solid.forces(pressed.model.displacements()).force;
-  Vec3 sum = Vec3::Zero();
-  for (int i = 0; i < pressed.solid.size(); ++i) {
-    if (pressed.solid.free_of(i) < 0) sum[i % 3] += force[i];
-  }
-  return sum;
-}
-
 TEST(RigidContact, AClosedWayOfPlacesAndTurnsGivesBackExactlyWhatItTook) {
   PressedByTools pressed(Law::kNeoHookean, one(RigidShape::box(Vec3(0.03, 0.02, 0.02), 0.004), Vec3(0.01, 0, -0.05)));
   const auto handle = [](double t) {
@@ -175,23 +130,10 @@ TEST(RigidContact, AClosedWayOfPlacesAndTurnsGivesBackExactlyWhatItTook) {
                          Eigen::AngleAxisd(0.05 * std::cos(angle), Vec3::UnitY()))
                             .toRotationMatrix()};
   };
-  double work = 0;
-  double most = 0;
-  double turning = 0;
-  constexpr int kSteps = 120;
-  for (int i = 0; i < kSteps; ++i) {
-    const Pose from = handle(static_cast<double>(i) / kSteps);
-    const Pose to = handle((i + 1.0) / kSteps);
-    const Feel feel = pressed.at(handle((i + 0.5) / kSteps));
-    const Eigen::AngleAxisd turned(Mat3(to.turn * from.turn.transpose()));
-    const double by_turning = feel.torque->torque.dot(turned.angle() * turned.axis());
-    work -= feel.force.dot(to.position - from.position) + by_turning;
-    turning += std::abs(by_turning);
-    most = std::max(most, std::abs(work));
-  }
-  EXPECT_GT(most, 1e-3);
-  EXPECT_GT(turning, 0.05 * most);
-  EXPECT_LT(std::abs(work), 2e-3 * most);
+  const testing::ClosedWay way = testing::closed_way(pressed, handle, 120);
+  EXPECT_GT(way.most, 1e-3);
+  EXPECT_GT(way.turning, 0.05 * way.most);
+  EXPECT_LT(std::abs(way.work), 2e-3 * way.most);
 }
 
 TEST(RigidContact, AFastToolDoesNotComeOutOnTheOtherSide) {
@@ -314,6 +256,20 @@ TEST(RigidContact, FrictionGivesNothingOnAClosedWay) {
   EXPECT_LT(given, -1e-5);
   EXPECT_GE(least, 0);
   EXPECT_NEAR(lost / -given, 1, 0.1);  // what is lost is what the hand has put in; ties that let go are not counted
+}
+
+TEST(RigidContact, FrictionIsBoundedByThePressureOfItsOwnAnswer) {
+  constexpr double kFriction = 0.4;
+  PressedByTools rough(Law::kNeoHookean, one(RigidShape::sphere(0.015)), kFriction);
+  PressedByTools smooth(Law::kNeoHookean, one(RigidShape::sphere(0.015)));
+  for (double z = 0.064; z > 0.0599; z -= 0.0005) rough.at(Vec3(0, 0, z));
+  // In one answer nearly out of the body, and aside.
+  const Vec3 light(0.002, 0, 0.0635);
+  const Feel feel = rough.at(light);
+  EXPECT_GT(feel.force.z(), 0.01);
+  const double drag = smooth.at(light).force.x() - feel.force.x();
+  EXPECT_GT(drag, 0.1 * kFriction * feel.force.z());
+  EXPECT_LT(drag, 1.2 * kFriction * feel.force.z());
 }
 
 TEST(RigidContact, TwoHandsAreHeldByTheSupportTogether) {
@@ -444,6 +400,21 @@ TEST(RigidScene, ItsKeysAreItsOwnAndItRefusesWhatItCannotDo) {
         std::string("tool = \"box\"\ntool_size_mm = [20, 0, 12]\ntool_edge_mm = 2"), std::string("layer_mm = 1")}) {
     EXPECT_THROW(scene(wrong), SceneError) << wrong;
   }
+  // A surface from a file is read where the body is made.
+  const std::string mesh = "tool = \"mesh\"\ntool_file = \"spoon.off\"\ntool_units_per_m = 1000\n";
+  const BodyConfig spoon = scene(mesh + "tool_cell_mm = 0.8").body;
+  EXPECT_EQ(spoon.tool, BodyConfig::Tool::kMesh);
+  EXPECT_EQ(spoon.tool_file.value().file, std::filesystem::path(".") / "spoon.off");
+  EXPECT_DOUBLE_EQ(spoon.tool_file.value().scale, 0.001);
+  EXPECT_DOUBLE_EQ(spoon.tool_file.value().cell, 0.0008);
+  EXPECT_TRUE(turns_the_hand(spoon));
+  EXPECT_THROW(Body{spoon}, std::invalid_argument);  // it is not there
+  for (const std::string& wrong : {mesh, mesh + "tool_cell_mm = 0", mesh + "tool_cell_mm = 1\ntool_edge_mm = 1",
+                                   std::string("tool = \"mesh\"\ntool_cell_mm = 1\ntool_units_per_m = 1000"),
+                                   std::string("tool = \"mesh\"\ntool_file = \"spoon.off\"\ntool_cell_mm = 1"),
+                                   std::string("tool = \"sphere\"\ntool_file = \"spoon.off\"")}) {
+    EXPECT_THROW(scene(wrong), SceneError) << wrong;
+  }
   const std::string left = "[[hands]]\ndevice = \"left\"\nat_mm = [0, 0, 0]\n";
   for (const std::string& wrong : {left, left + left, left + "[[hands]]\ndevice = \"\"\nat_mm = [0, 0, 0]\n",
                                    left + "[[hands]]\ndevice = \"right\"\n"}) {
@@ -451,6 +422,12 @@ TEST(RigidScene, ItsKeysAreItsOwnAndItRefusesWhatItCannotDo) {
   }
   BodyConfig other = config;
   other.model = ModelKind::kCondensed;  // a box
+  EXPECT_THROW(Body{other}, std::invalid_argument);
+  other = spoon;
+  other.model = ModelKind::kCondensed;
+  EXPECT_THROW(Body{other}, std::invalid_argument);
+  other = spoon;
+  other.tool_file.reset();
   EXPECT_THROW(Body{other}, std::invalid_argument);
   other.tool = BodyConfig::Tool::kPatch;
   other.hands = 2;

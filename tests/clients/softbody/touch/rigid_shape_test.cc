@@ -13,6 +13,7 @@
 #include <string>
 #include <vector>
 
+#include "tests/clients/softbody/touch/surfaces.h"
 #include "tests/support/dice.h"
 
 namespace tendon::softbody {
@@ -51,6 +52,7 @@ TEST(RigidShape, ItsDerivativesAreThoseOfItsDistance) {
         smooth = smooth && (ahead.curvature - behind.curvature).norm() < 0.01 * (1 + here.curvature.norm());
       }
       EXPECT_NEAR(here.gradient.norm(), 1, 1e-12) << name;
+      EXPECT_EQ(shape.value(x), here.value) << name;
       EXPECT_LT((slope - here.gradient).norm(), 1e-6) << name;
       if (!smooth) continue;  // where a flat side meets a round edge
       ++judged;
@@ -60,9 +62,16 @@ TEST(RigidShape, ItsDerivativesAreThoseOfItsDistance) {
   }
 }
 
+TEST(RigidShape, ItIsSoThickWhereItIsThinnest) {
+  EXPECT_DOUBLE_EQ(RigidShape::sphere(0.01).thinnest(), 0.02);
+  EXPECT_DOUBLE_EQ(RigidShape::capsule(0.004, 0.012, Vec3::UnitX()).thinnest(), 0.008);
+  EXPECT_DOUBLE_EQ(RigidShape::box(Vec3(0.02, 0.03, 0.012), 0.002).thinnest(), 0.012);
+}
+
 TEST(RigidShape, ItsSignSaysWhichSideOfTheSurfaceAPointIsOn) {
   const RigidShape sphere = RigidShape::sphere(0.01);
   EXPECT_NEAR(sphere.distance(Vec3::Zero()).value, -0.01, 1e-15);
+  EXPECT_NEAR(sphere.value(Vec3::Zero()), -0.01, 1e-15);
   EXPECT_NEAR(sphere.distance(Vec3(0, 0.006, 0.008)).value, 0, 1e-15);
   EXPECT_NEAR(sphere.distance(Vec3(0, 600, 800)).value, 999.99, 1e-9);
 
@@ -73,7 +82,8 @@ TEST(RigidShape, ItsSignSaysWhichSideOfTheSurfaceAPointIsOn) {
   EXPECT_NEAR(capsule.distance(Vec3(0.005, 0, -0.01)).value, 0.006, 1e-15);
 
   const RigidShape box = RigidShape::box(Vec3(0.02, 0.03, 0.012), 0.002);
-  EXPECT_NEAR(box.distance(Vec3::Zero()).value, -0.006, 1e-15);       // to the nearest side
+  EXPECT_NEAR(box.distance(Vec3::Zero()).value, -0.006, 1e-15);  // to the nearest side
+  EXPECT_NEAR(box.value(Vec3::Zero()), -0.006, 1e-15);
   EXPECT_NEAR(box.distance(Vec3(0, 0, 0.007)).value, 0.001, 1e-15);   // above a side
   EXPECT_NEAR(box.distance(Vec3(0.009, 0, 0)).value, -0.001, 1e-15);  // below one
   EXPECT_GT(box.distance(Vec3(0.01, 0.015, 0.006)).value, 0.001);     // where a sharp corner would be
@@ -111,6 +121,67 @@ TEST(RigidShape, NoPointOfItsSurfaceIsFartherThanItsFarthest) {
   }
 }
 
+constexpr double kMillimetres = 1e-3;
+
+TEST(RigidShape, AMeshOfABallIsThatBallToWhatItsFactsSay) {
+  const Triangles ball = testing::ball(10, 64);  // mm
+  const RigidShape shape = RigidShape::mesh(ball, kMillimetres, 0.0008, 0.001, "ball.off");
+  const RigidShape sphere = RigidShape::sphere(0.01);
+  const RigidShape::MeshFacts& facts = *shape.mesh_facts();
+  EXPECT_EQ(sphere.mesh_facts(), nullptr);
+  EXPECT_EQ(facts.facets, ball.facets.size());
+  EXPECT_NEAR(facts.size.z(), 0.02, 1e-4);
+  EXPECT_LT(facts.error, 0.05 * facts.cell);
+  EXPECT_NEAR(shape.reach(), 0.01, 2e-5);
+  EXPECT_GT(shape.thinnest(), 0.0184);  // whole cells
+  EXPECT_LT(shape.thinnest(), 0.02);
+  Dice dice(8);
+  for (int i = 0; i < 1000; ++i) {
+    const Vec3 way = Vec3(dice.within(-1, 1), dice.within(-1, 1), dice.within(-1, 1)).normalized();
+    const Vec3 x = dice.within(0.005, 0.03) * way;
+    EXPECT_NEAR(shape.distance(x).value, sphere.distance(x).value, x.norm() < 0.012 ? 2e-5 : 5e-4);
+    EXPECT_LT((shape.distance(x).gradient - way).norm(), 0.11);  // a facet is 0.1 rad wide
+    EXPECT_LT((shape.farthest(way) - 0.01 * way).norm(), 0.0008);
+  }
+}
+
+TEST(RigidShape, AMeshWithSharpEdgesIsRightToAFifthOfACellAndSaysSo) {
+  const RigidShape shape =
+      RigidShape::mesh(testing::box_surface(Vec3(20, 30, 12)), kMillimetres, 0.001, 0.001, "box.off");
+  EXPECT_LT(shape.mesh_facts()->error, 0.0002);
+  EXPECT_GT(shape.mesh_facts()->error, 0.0001);  // its corners are round
+  EXPECT_NEAR(shape.distance(Vec3(0, 0, 0.006)).value, 0, 1e-6);
+  EXPECT_NEAR(shape.distance(Vec3(0.003, 0.001, 0.008)).value, 0.002, 1e-6);
+  EXPECT_EQ(shape.farthest(Vec3(0.6, -0.64, 0.48)), Vec3(0.01, -0.015, 0.006));
+}
+
+std::string refusal_of(const Triangles& surface, double cell) {
+  try {
+    RigidShape::mesh(surface, kMillimetres, cell, 1e-4, "tool.stl");
+  } catch (const std::invalid_argument& refused) {
+    return refused.what();
+  }
+  return {};
+}
+
+TEST(RigidShape, AMeshWithoutInsideOrTooThinForItsGridIsRefusedByItsPlace) {
+  Triangles open = testing::ball(10, 12);
+  open.facets.erase(open.facets.begin() + 20);
+  EXPECT_NE(refusal_of(open, 0.001).find("tool.stl: facet "), std::string::npos) << refusal_of(open, 0.001);
+  EXPECT_NE(refusal_of(open, 0.001).find("the surface is not closed"), std::string::npos);
+  EXPECT_NE(refusal_of(testing::turned_inside_out(testing::ball(10, 12)), 0.001).find("inside out"), std::string::npos);
+  const std::string nested = refusal_of(testing::together(testing::ball(10, 12), testing::ball(4, 12)), 0.001);
+  EXPECT_NE(nested.find("tool.stl: the distance jumps"), std::string::npos) << nested;
+  EXPECT_NE(nested.find("parts of the surface lie within others"), std::string::npos) << nested;
+
+  const Triangles plate = testing::box_surface(Vec3(30, 30, 1.9));  // mm
+  EXPECT_EQ(refusal_of(plate, 0.0009), "");
+  const std::string thin = refusal_of(plate, 0.001);
+  EXPECT_NE(thin.find("tool.stl: facet 1 at (-5, 5, -0.95) mm: the surface is thinner there"), std::string::npos)
+      << thin;
+  EXPECT_NE(refusal_of(plate, 1e-6).find("points of a grid, expected at most"), std::string::npos);
+}
+
 TEST(RigidShape, RefusesWhatIsNoShape) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   for (const double bad : {0.0, -1.0, nan}) {
@@ -122,6 +193,11 @@ TEST(RigidShape, RefusesWhatIsNoShape) {
   EXPECT_THROW(RigidShape::capsule(0.01, -1, Vec3::UnitX()), std::invalid_argument);
   EXPECT_THROW(RigidShape::capsule(0.01, 0.01, Vec3(0, 0, 2)), std::invalid_argument);
   EXPECT_THROW(RigidShape::box(Vec3(0.01, 0.02, 0.03), 0.0051), std::invalid_argument);
+  for (const double bad : {0.0, -1.0, nan}) {
+    EXPECT_THROW(RigidShape::mesh(testing::ball(10, 12), bad, 0.001, 0.001, "t"), std::invalid_argument);
+    EXPECT_THROW(RigidShape::mesh(testing::ball(10, 12), 0.001, bad, 0.001, "t"), std::invalid_argument);
+  }
+  EXPECT_THROW(RigidShape::mesh(testing::ball(10, 12), 0.001, 0.001, nan, "t"), std::invalid_argument);
 }
 
 }  // namespace

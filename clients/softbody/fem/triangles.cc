@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "clients/softbody/mesher/triangles.h"
+#include "clients/softbody/fem/triangles.h"
 
 #include <Eigen/Geometry>
 #include <algorithm>

@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "clients/softbody/touch/layer.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <stdexcept>
+#include <vector>
+
+#include "tests/clients/softbody/pressed_block.h"
+
+namespace tendon::softbody {
+namespace {
+
+constexpr double kThickness = 2e-4;  // m
+constexpr double kYoung = 1e4;       // Pa
+
+/// A box that covers the whole top of B1, flat on it, so that every point is pressed alike.
+struct Covered {
+  Covered() : solid(testing::pressed_block(Element::kHex8Sri, 4, 0.45)), layer(solid, config()) {}
+  static Layer::Config config() {
+    Layer::Config made;
+    made.thickness = kThickness;
+    made.young = kYoung;
+    made.piece = 0.01;
+    return made;
+  }
+  /// With the box so deep in the layer.
+  Layer::Press at(double overlap) const {
+    const std::vector<Layer::Placed> placed{{&tool, Pose{.position = Vec3(0, 0, 0.05 + 0.01 + kThickness - overlap)}}};
+    const VectorXd rest = VectorXd::Zero(solid.size());
+    const Layer::Near near = layer.near(placed, rest, 0);
+    return layer.press(near, placed, layer.places(near, rest), Layer::Order::kFelt);
+  }
+
+  Solid solid;
+  Layer layer;
+  HeldTool tool{RigidShape::box(Vec3(0.2, 0.2, 0.02), 0.002)};
+};
+
+TEST(Layer, PressesWithYoungsModulusAndBeginsWithoutAStepInForceOrStiffness) {
+  const Covered covered;
+  constexpr double kArea = 0.01;                          // m²
+  constexpr double kOnset = kThickness / 10;              // m
+  constexpr double kStiff = kArea * kYoung / kThickness;  // N/m, past the onset
+  EXPECT_EQ(covered.at(-1e-9).energy, 0);
+  for (const double share : {0.001, 0.25, 0.5, 0.999}) {  // of the onset
+    const Layer::Press press = covered.at(share * kOnset);
+    EXPECT_NEAR(press.felt[0].curve(2, 2), share * kStiff, 1e-6 * kStiff) << share;
+    EXPECT_NEAR(-press.felt[0].slope[2], share * share * kOnset * kStiff / 2, 1e-6 * kOnset * kStiff) << share;
+    EXPECT_NEAR(press.energy, share * share * share * kOnset * kOnset * kStiff / 6, 1e-6 * kOnset * kOnset * kStiff);
+    EXPECT_NEAR(press.felt[0].area, kArea, 1e-9);
+  }
+  for (const double overlap : {kOnset, 0.4 * kThickness, kThickness, 2 * kThickness}) {
+    const Layer::Press press = covered.at(overlap);
+    EXPECT_NEAR(press.felt[0].curve(2, 2), kStiff, 1e-6 * kStiff) << overlap;
+    EXPECT_NEAR(-press.felt[0].slope[2], kStiff * (overlap - kOnset / 2), 1e-6 * kStiff * kThickness) << overlap;
+    // What the tool gets, the nodes get the other way round.
+    double nodes = 0;
+    for (Eigen::Index i = 2; i < press.slope.size(); i += 3) nodes += press.slope[i];
+    EXPECT_NEAR(nodes, -press.felt[0].slope[2], 1e-12);
+  }
+}
+
+TEST(Layer, RefusesWhatIsNoLayer) {
+  const Solid solid = testing::pressed_block(Element::kHex8Sri, 2, 0.3);
+  const auto refused = [&](auto change) {
+    Layer::Config config = Covered::config();
+    change(config);
+    EXPECT_THROW(Layer(solid, config), std::invalid_argument);
+  };
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  for (const double bad : {0.0, -1.0, nan}) {
+    refused([&](Layer::Config& config) { config.thickness = bad; });
+    refused([&](Layer::Config& config) { config.young = bad; });
+    refused([&](Layer::Config& config) { config.piece = bad; });
+    refused([&](Layer::Config& config) {
+      config.friction = 0.5;
+      config.shear = bad;
+    });
+  }
+  refused([](Layer::Config& config) { config.friction = -0.1; });
+}
+
+}  // namespace
+}  // namespace tendon::softbody

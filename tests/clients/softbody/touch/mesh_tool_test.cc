@@ -1,0 +1,134 @@
+// SPDX-License-Identifier: Apache-2.0
+// Tools that a file describes, on a body: rigid_contact_test.cc has the others.
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "clients/softbody/fem/triangles.h"
+#include "clients/softbody/scene.h"
+#include "tests/clients/softbody/touch/pressed_by_tools.h"
+#include "tests/clients/softbody/touch/surfaces.h"
+
+namespace tendon::softbody {
+namespace {
+
+using testing::kExact;
+using testing::one;
+using testing::PressedByTools;
+
+constexpr double kMillimetre = 1e-3;
+constexpr double kAround = 1e-4;  // m, as thick as the layer
+
+RigidShape spoon() {
+  return RigidShape::mesh(read_surface(TENDON_SCENES "/spoon.off"), kMillimetre, 0.0006, kAround, "spoon.off");
+}
+
+RigidShape plate() {
+  return RigidShape::mesh(testing::box_surface(Vec3(30, 30, 3)), kMillimetre, 0.001, kAround, "plate");
+}
+
+TEST(MeshTool, ABallOfFacetsPressesAsTheSphereThatItIs) {
+  const Vec3 lever(0.004, 0, -0.03);
+  const RigidShape ball = RigidShape::mesh(testing::ball(15, 96), kMillimetre, 0.001, kAround, "ball");
+  for (const Law law : {Law::kCorotational, Law::kNeoHookean}) {
+    PressedByTools faceted(law, one(ball, lever));
+    PressedByTools round(law, one(RigidShape::sphere(0.015), lever));
+    for (const double depth : {0.002, 0.005}) {
+      const Pose handle{.position = Vec3(0.006, -0.003, 0.05 + 0.015 - depth) - lever};
+      const Feel expected = round.at(handle);
+      const Feel found = faceted.at(handle);
+      EXPECT_GT(expected.force.z(), 0.2);
+      EXPECT_LT((found.force - expected.force).norm(), 0.005 * expected.force.norm()) << depth;
+      EXPECT_LT((found.torque->torque - expected.torque->torque).norm(), 0.005 * lever.norm() * expected.force.norm());
+      EXPECT_LT((found.stiffness - expected.stiffness).norm(), 0.01 * expected.stiffness.norm()) << depth;
+      EXPECT_NEAR(found.gap, expected.gap, 3e-5);
+    }
+  }
+}
+
+/// The bowl's back in the block, the handle up.
+Pose palpating(double depth, double turn) {
+  return {.position = Vec3(0.003, -0.004, 0.05 + 0.0038 - depth),
+          .turn = (Eigen::AngleAxisd(0.3 * turn, Vec3::UnitZ()) * Eigen::AngleAxisd(-0.15 * turn, Vec3::UnitY()))
+                      .toRotationMatrix()};
+}
+
+TEST(MeshTool, ItsStiffnessesAreTheSlopesOfForceAndTorque) {
+  for (const Law law : {Law::kCorotational, Law::kNeoHookean}) {
+    PressedByTools pressed(law, one(spoon()), 0, kExact);
+    const Pose pose = palpating(0.003, 1);
+    const Feel feel = pressed.at(pose);
+    const Layer::Mat6 found = testing::slopes(pressed, pose);
+    const Mat3 moved = found.topLeftCorner<3, 3>();
+    const Mat3 turned = found.bottomRightCorner<3, 3>();
+    EXPECT_GT(feel.force.norm(), 0.2);
+    EXPECT_LT((feel.stiffness - moved).norm(), 0.01 * moved.norm());
+    EXPECT_LT((feel.torque->stiffness - not_negative(turned)).norm(), 0.01 * turned.norm());
+  }
+}
+
+/// From outside to outside, with a turn.
+Pose stroke(double t) {
+  const double angle = 2 * std::numbers::pi * t;
+  Pose pose = palpating(0.001 - 0.0022 * std::cos(angle), std::sin(angle));
+  pose.position.x() += 0.003 * std::sin(2 * angle);
+  return pose;
+}
+
+TEST(MeshTool, AClosedWayGivesNothingAndWithFrictionEveryPointLoses) {
+  PressedByTools smooth(Law::kNeoHookean, one(spoon()));
+  const testing::ClosedWay without = testing::closed_way(smooth, stroke, 80);
+  EXPECT_GT(without.most, 1e-4);
+  EXPECT_GT(without.turning, 0.02 * without.most);
+  EXPECT_LT(std::abs(without.work), 2e-3 * without.most);
+  PressedByTools rough(Law::kNeoHookean, one(spoon()), 0.4);
+  const testing::ClosedWay with = testing::closed_way(rough, stroke, 40);
+  EXPECT_GT(with.work, 0.05 * with.most);
+  EXPECT_GE(with.least, 0);
+  EXPECT_GT(with.lost, 0);  // points that let go lose more, which is not counted
+  EXPECT_LT(with.lost, with.work);
+}
+
+TEST(MeshTool, AThinPlateThatComesFastDoesNotComeOutOnTheOtherSide) {
+  const Vec3 deep(0.002, 0, 0.05 + 0.0015 - 0.006);
+  PressedByTools slow(Law::kNeoHookean, one(plate()));
+  for (double z = 0.053; z > deep.z(); z -= 0.0005) slow.at(Vec3(deep.x(), 0, z));
+  const Feel expected = slow.at(deep);
+  EXPECT_GT(expected.force.z(), 0.5);
+  PressedByTools fast(Law::kNeoHookean, one(plate()));
+  fast.at(Vec3(0.002, 0, 0.06));
+  EXPECT_LT((fast.at(deep).force - expected.force).norm(), 1e-3 * expected.force.norm());
+  EXPECT_EQ(fast.solid.inverted(fast.model.displacements()), 0);
+}
+
+TEST(MeshTool, APoseThatIsNotFiniteChangesNoBit) {
+  PressedByTools pressed(Law::kCorotational, one(plate()));
+  const Vec3 place(0.002, 0.001, 0.05);
+  pressed.at(place);
+  const VectorXd before = pressed.model.displacements();
+  for (const double bad : {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
+    EXPECT_EQ(pressed.at(Vec3(bad, 0, 0)).force, Vec3::Zero());
+    EXPECT_EQ(pressed.at(Pose{.position = place, .turn = Mat3::Constant(bad)}).force, Vec3::Zero());
+  }
+  EXPECT_EQ(pressed.model.displacements(), before);
+  // Far beyond the grid the gap is the way to the surface.
+  EXPECT_NEAR(pressed.at(Vec3(0, 0, 1.05)).gap, 1 - 0.0015 - 1e-4, 1e-3);
+}
+
+TEST(MeshTool, ItsSceneIsTheSpoonThatItsFileDescribes) {
+  const Scene scene = read_scene(TENDON_SCENES "/spoon.toml");
+  Body body(scene.body);
+  const Vec3 lowest = lowest_of_tool(scene.body, Mat3::Identity());
+  EXPECT_NEAR(lowest.z(), -0.00364, 1e-5);
+  const Vec3 up = body.touch_point() - lowest;
+  const Feel feel = body.touch(Pose{.position = up - Vec3(0, 0, 0.003)});
+  EXPECT_GT(feel.force.z(), 0.2);
+  ASSERT_TRUE(feel.torque);
+  EXPECT_FALSE(body.touch(Pose{.position = up + Vec3(0, 0, 0.001)}).touching);
+}
+
+}  // namespace
+}  // namespace tendon::softbody

@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "clients/softbody/touch/rigid_contact.h"
+#include "tests/clients/softbody/pressed_block.h"
+
+namespace tendon::softbody::testing {
+
+inline constexpr double kExact = 1e-11;  // of the force
+
+inline std::vector<HeldTool> one(const RigidShape& shape, const Vec3& offset = Vec3::Zero()) {
+  return {{shape, offset}};
+}
+
+inline RigidContact::Config config_of(const Material& material, double friction = 0, double tolerance = 1e-6) {
+  RigidContact::Config config;
+  config.tolerance = tolerance;
+  config.layer = {.young = material.young, .friction = friction, .shear = material.mu(), .piece = 0.001};
+  return config;
+}
+
+/// B1, and tools that press it.
+struct PressedByTools {
+  PressedByTools(Law law, std::vector<HeldTool> tools, double friction = 0, double tolerance = 1e-6)
+      : solid(pressed_block(Element::kHex8Sri, 8, 0.45, law)),
+        top(solid.mesh(), Vec3::UnitZ(), kB1PatchRadius),
+        model(solid, top, {}),
+        contact(model, solid, top, std::move(tools), config_of(solid.material(), friction, tolerance)) {}
+
+  Feel at(const Pose& handle) { return contact.press(std::vector{std::optional(handle)}).front(); }
+  Feel at(const Vec3& place) { return at(Pose{.position = place}); }
+
+  Solid solid;
+  TouchSurface top;
+  QuasiStaticModel model;
+  RigidContact contact;
+};
+
+/// −∂(force, torque)/∂(place, turn), by differences.
+inline Layer::Mat6 slopes(PressedByTools& pressed, const Pose& handle) {
+  constexpr double kStep = 2e-6;  // m, rad
+  Layer::Mat6 all;
+  const auto felt = [&](int axis, double way) {
+    Pose there = handle;
+    if (axis < 3)
+      there.position += way * Vec3::Unit(axis);
+    else
+      there.turn = Eigen::AngleAxisd(way, Vec3::Unit(axis - 3)).toRotationMatrix() * there.turn;
+    const Feel feel = pressed.at(there);
+    return (Layer::Vec6() << feel.force, feel.torque->torque).finished();
+  };
+  for (int axis = 0; axis < 6; ++axis) all.col(axis) = (felt(axis, -kStep) - felt(axis, kStep)) / (2 * kStep);
+  return all;
+}
+
+/// What the body's own support pushes, N.
+inline Vec3 support(const PressedByTools& pressed) {
+  const VectorXd force = pressed.solid.forces(pressed.model.displacements()).force;
+  Vec3 sum = Vec3::Zero();
+  for (int i = 0; i < pressed.solid.size(); ++i) {
+    if (pressed.solid.free_of(i) < 0) sum[i % 3] += force[i];
+  }
+  return sum;
+}
+
+/// What a closed way of one hand costs it.
+struct ClosedWay {
+  double work = 0;     ///< J, from the hand to the body, on the whole way
+  double most = 0;     ///< J, the most that it had given
+  double turning = 0;  ///< J, of turns, without signs
+  double lost = 0;     ///< J, by friction
+  double least = 0;    ///< J, the least that a tie has lost at once
+};
+/// `handle` of 0 to 1, in so many steps; each answer is the one of the middle of its step.
+template <class Way>
+ClosedWay closed_way(PressedByTools& pressed, const Way& handle, int steps) {
+  ClosedWay sum;
+  for (int i = 0; i < steps; ++i) {
+    const Pose from = handle(static_cast<double>(i) / steps);
+    const Pose to = handle((i + 1.0) / steps);
+    const Feel feel = pressed.at(handle((i + 0.5) / steps));
+    const Eigen::AngleAxisd turned(Mat3(to.turn * from.turn.transpose()));
+    const double by_turning = feel.torque->torque.dot(turned.angle() * turned.axis());
+    sum.work -= feel.force.dot(to.position - from.position) + by_turning;
+    sum.turning += std::abs(by_turning);
+    sum.most = std::max(sum.most, std::abs(sum.work));
+    sum.lost += pressed.contact.dissipated().sum;
+    sum.least = std::min(sum.least, pressed.contact.dissipated().least);
+  }
+  return sum;
+}
+
+}  // namespace tendon::softbody::testing
