@@ -170,7 +170,7 @@ struct Made {
   const CondensedModel* condensed = nullptr;
   QuasiStaticModel* newton = nullptr;  ///< for rigid tools
   StiffeningModel* stiffening = nullptr;
-  const NearModel* near = nullptr;
+  NearModel* near = nullptr;
 };
 
 Patch middle_patch(const TouchSurface& surface, const Vec3& middle) {
@@ -589,7 +589,8 @@ Body::~Body() = default;
 Body::Body(Body&&) noexcept = default;
 Body& Body::operator=(Body&&) noexcept = default;
 
-void Body::prepare_cuts_by(Background background) {
+void Body::prepare_by(Background background) {
+  if (parts_->made.near != nullptr) parts_->made.near->make_fields_by(background);
   if (parts_->cutting) parts_->cutting->background = std::move(background);
 }
 

@@ -5,7 +5,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
-#include <functional>
 #include <future>
 #include <initializer_list>
 #include <memory>
@@ -15,6 +14,7 @@
 #include <variant>
 #include <vector>
 
+#include "clients/softbody/background.h"
 #include "clients/softbody/effects/cutting.h"
 #include "clients/softbody/effects/effects.h"
 #include "clients/softbody/fem/material.h"
@@ -220,14 +220,13 @@ class Body {
   /// is nowhere. As many as BodyConfig::hands.
   std::vector<Feel> touch(std::span<const std::optional<Pose>> handles);
 
-  /// Takes the work of a cut: calls it once, on any thread, at any time. It owns all that it touches.
-  using Background = std::function<void(std::packaged_task<void()>)>;
-  /// From now on no answer waits for a cut; where factors_may_work_at_once() is false, the work must not be done beside
-  /// an answer. `background` is called when a cut is due; until its work has been done
-  /// answers are those of the body before the cut, and their error is at least their force: the cut body may push so
-  /// much less. The first touch() after the work continues from the shape before the cut, with what has been prepared,
-  /// and throws what the work threw. Without this call a cut is made between two answers.
-  void prepare_cuts_by(Background background);
+  /// From now on no answer waits for a cut, nor for a near field. `background` is called when a cut is due: until its
+  /// work has been done answers are those of the body before the cut, and their error is at least their force, because
+  /// the cut body may push so much less. The first touch() after the work continues from the shape before the cut, with
+  /// what has been prepared. `background` is also called when a kNear body wants its next near field
+  /// (NearModel::make_fields_by). What the work throws, the next touch() throws. Without this call a cut is made between
+  /// two answers, and a near field in pieces within them.
+  void prepare_by(Background background);
 
   /// Sets the time since the scene began, s: Young's modulus becomes that of `time`, and cuts that are due are made. An
   /// earlier time undoes no cut.

@@ -71,6 +71,26 @@ Explanation::Cost press_and_come_back(const BodyConfig& config, const Mat3& turn
   return {(processor_time() - start) / kAnswers, static_cast<std::int64_t>(body.size().bytes)};
 }
 
+/// The same way, with the other thread's work done in between, and measured.
+std::optional<Explanation::Beside> fields_beside(const BodyConfig& config, const Mat3& turn,
+                                                 const std::function<double()>& processor_time) {
+  Body body(config);
+  if (!body.near_field() || body.near_field()->radius == 0 || !factors_may_work_at_once()) return std::nullopt;
+  double spent = 0;
+  int made = 0;
+  body.prepare_by([&](std::packaged_task<void()> work) {
+    const double start = processor_time();
+    work();
+    spent += processor_time() - start;
+    ++made;
+  });
+  const Vec3 surface = body.touch_point() - lowest_of_tool(config, turn);
+  for (int i = 0; i <= kAnswers / 2 || made == 0; ++i) {
+    body.touch(Pose{surface - kWay * 2 * i / kAnswers * body.normal(), turn});
+  }
+  return Explanation::Beside{spent / made, body.near_field()->elsewhere};
+}
+
 std::string touched_by(const BodyConfig& body) {
   std::ostringstream text;
   switch (body.tool) {
@@ -141,6 +161,7 @@ Explanation explain(const Scene& scene, const std::function<double()>& processor
                   .near = body.near_field(),
                   .tool = tool,
                   .off_exact = {},
+                  .beside = fields_beside(scene.body, to_device(scene).transpose(), processor_time),
                   .step = body.step(),
                   .stiffness = body.settle(Given::kForce, push).stiffness,
                   .linear_up_to = body.linear_up_to()};
@@ -221,6 +242,14 @@ std::string in_words(const Scene& scene, const Explanation& explanation) {
            << " % at most, pressed by up to " << 200 * body.patch_radius << " mm\n"
            << std::setprecision(6);
     }
+    if (explanation.beside) {
+      text << "the next near field: by another thread, about the shape there; "
+           << milliseconds(explanation.beside->field_s, 0) << " of its processor time, and it keeps "
+           << static_cast<double>(explanation.beside->bytes) / 1e6 << " MB\n";
+    } else {
+      text << "the next near field: about the shape at rest, in pieces by the answers, because this OpenBLAS is built "
+              "for one thread\n";
+    }
   } else if (explanation.near) {
     text << "near the tool: the whole body, which is not larger\n";
   }
@@ -265,6 +294,10 @@ std::string in_json(const Scene& scene, const Explanation& explanation) {
                     {"modes", near->modes},
                     {"interface", near->interface}};
     if (explanation.off_exact) json["near"]["off_exact"] = *explanation.off_exact;
+    if (explanation.beside) {
+      json["near"]["field_s"] = explanation.beside->field_s;
+      json["near"]["thread_bytes"] = explanation.beside->bytes;
+    }
   }
   if (const auto& tool = explanation.tool) {
     const Vec3& size = tool->facts.size;

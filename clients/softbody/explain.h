@@ -39,9 +39,16 @@ struct Explanation {
   };
   std::optional<Tool> tool;
   std::optional<double> off_exact;  ///< off_the_exact_interface(), where it has been asked for
-  double step = 0;                  ///< s, the time step of an answer; 0: the body is at rest at every instant
-  double stiffness = 0;             ///< N/m, at first touch
-  double linear_up_to = 0;          ///< m; see Body
+  /// The thread that makes near fields beside the answers; empty where no field is made, or two threads may not factorise
+  /// at once, so that answers make them.
+  struct Beside {
+    double field_s = 0;     ///< s of processor time for a field
+    std::size_t bytes = 0;  ///< that it keeps
+  };
+  std::optional<Beside> beside;
+  double step = 0;          ///< s, the time step of an answer; 0: the body is at rest at every instant
+  double stiffness = 0;     ///< N/m, at first touch
+  double linear_up_to = 0;  ///< m; see Body
 };
 
 /// By how much of the force 60 modes answer otherwise than the exact interface of near and far, at the most of three

@@ -43,10 +43,11 @@ class PlacedBody {
   std::vector<Touch> answer(std::span<const std::optional<DeviceState>> hands);
 
   /// See Body.
-  void prepare_cuts_by(Body::Background background) { body_.prepare_cuts_by(std::move(background)); }
+  void prepare_by(Background background) { body_.prepare_by(std::move(background)); }
 
-  double linear_up_to() const { return body_.linear_up_to(); }  ///< see Body
-  double deepest() const noexcept { return deepest_; }          ///< m, the greatest depth of the tool so far
+  std::optional<NearModel::Size> near_field() const { return body_.near_field(); }  ///< see Body
+  double linear_up_to() const { return body_.linear_up_to(); }                      ///< see Body
+  double deepest() const noexcept { return deepest_; }  ///< m, the greatest depth of the tool so far
 
  private:
   void tick(PeerTime sampled);

@@ -11,12 +11,12 @@
 #include <span>
 #include <string>
 #include <string_view>
-#include <thread>
 #include <utility>
 #include <vector>
 
 #include "clients/cpp/engine/self_test.h"
 #include "clients/cpp/options.h"
+#include "clients/softbody/background.h"
 #include "clients/softbody/explain.h"
 #include "clients/softbody/placed_body.h"
 
@@ -78,6 +78,49 @@ int condense(int argc, char** argv) {
   return 0;
 }
 
+/// Makes the thread that cuts the body and makes near fields, where the scene has either and it may.
+void prepare_beside(const softbody::Scene& scene, std::optional<softbody::BackgroundThread>& thread,
+                    softbody::PlacedBody& body) {
+  const bool cuts = !scene.body.cuts.empty();
+  if (!cuts && scene.body.model != softbody::ModelKind::kNear) return;
+  if (softbody::factors_may_work_at_once()) {
+    thread.emplace();
+    body.prepare_by([&](std::packaged_task<void()> work) { thread->give(std::move(work)); });
+    return;
+  }
+  std::cerr << "tendon-softbody: warning: "
+            << (cuts ? "an answer waits for each cut" : "answers make the near fields themselves")
+            << ", because this OpenBLAS is built for one thread; with libopenblas0-pthread they go on\n";
+}
+
+/// Runs until it is told to stop; the exit code.
+int answer(const softbody::Scene& scene, const Options& options, softbody::PlacedBody& body) {
+  const double linear_up_to = body.linear_up_to();
+  const double patch_up_to = softbody::patch_up_to(scene.body);
+  bool told = false;
+  const auto watch_depth = [&] {
+    if (told || body.deepest() <= std::min(linear_up_to, patch_up_to)) return;
+    told = true;
+    std::cerr << "tendon-softbody: warning: "
+              << (body.deepest() > linear_up_to ? softbody::turned_too_far(linear_up_to)
+                                                : softbody::beyond_the_patch(scene.body))
+              << '\n';
+  };
+  if (!scene.hands.empty()) {
+    std::vector<HandAt> hands;
+    for (const softbody::Scene::Hand& hand : scene.hands) {
+      HandAt& own = hands.emplace_back(HandAt{.device = hand.device});
+      if (!hand.server.empty()) own.server = hand.server;
+    }
+    return run(options, hands, [&](std::span<const std::optional<DeviceState>> states) { return body.answer(states); });
+  }
+  return run(options, [&](const DeviceState& hand) {
+    Touch touch = body.answer(hand);
+    watch_depth();
+    return touch;
+  });
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -123,40 +166,16 @@ int main(int argc, char** argv) {
       std::cerr << "tendon-softbody: warning: " << warning << '\n';
     }
     if (tests) return test(scene, options);
-    std::jthread knife;  // one cut is prepared at a time
+    std::optional<softbody::BackgroundThread> thread;
     softbody::PlacedBody body(scene);
-    if (softbody::factors_may_work_at_once()) {
-      body.prepare_cuts_by([&](std::packaged_task<void()> work) { knife = std::jthread(std::move(work)); });
-    } else if (!scene.body.cuts.empty()) {
-      std::cerr
-          << "tendon-softbody: warning: an answer waits for each cut, because this OpenBLAS is built for one thread; "
-             "with libopenblas0-pthread and OPENBLAS_NUM_THREADS=1 answers go on\n";
+    prepare_beside(scene, thread, body);
+    const int exit_code = answer(scene, options, body);
+    if (const auto fields = body.near_field(); fields && thread) {
+      std::cerr << "tendon-softbody: the other thread made " << fields->made - 1 + fields->late << " near fields, "
+                << fields->late << " of them too late; " << fields->linear
+                << " answers were those of the linear body\n";
     }
-    const double linear_up_to = body.linear_up_to();
-    const double patch_up_to = softbody::patch_up_to(scene.body);
-    bool told = false;
-    const auto watch_depth = [&] {
-      if (told || body.deepest() <= std::min(linear_up_to, patch_up_to)) return;
-      told = true;
-      std::cerr << "tendon-softbody: warning: "
-                << (body.deepest() > linear_up_to ? softbody::turned_too_far(linear_up_to)
-                                                  : softbody::beyond_the_patch(scene.body))
-                << '\n';
-    };
-    if (!scene.hands.empty()) {
-      std::vector<HandAt> hands;
-      for (const softbody::Scene::Hand& hand : scene.hands) {
-        HandAt& own = hands.emplace_back(HandAt{.device = hand.device});
-        if (!hand.server.empty()) own.server = hand.server;
-      }
-      return run(options, hands,
-                 [&](std::span<const std::optional<DeviceState>> states) { return body.answer(states); });
-    }
-    return run(options, [&](const DeviceState& hand) {
-      Touch touch = body.answer(hand);
-      watch_depth();
-      return touch;
-    });
+    return exit_code;
   } catch (const std::exception& error) {
     std::cerr << "tendon-softbody: " << error.what() << '\n';
     return 1;

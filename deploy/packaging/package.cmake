@@ -133,7 +133,7 @@ set(CPACK_DEBIAN_RUN_PACKAGE_DEPENDS "libsystemd0")
 if(TARGET PkgConfig::libusb)
   string(APPEND CPACK_DEBIAN_RUN_PACKAGE_DEPENDS ", libusb-1.0-0")
 endif()
-set(CPACK_DEBIAN_RUN_PACKAGE_RECOMMENDS gnuplot-nox)
+set(CPACK_DEBIAN_RUN_PACKAGE_RECOMMENDS "gnuplot-nox, libopenblas0-pthread")
 set(CPACK_DEBIAN_RUN_PACKAGE_SUGGESTS "avahi-daemon, gmsh, rclone, tendon-fem-worker")
 set(CPACK_DEBIAN_RUN_DESCRIPTION "Networked haptics server with an energy-bounding output limiter
  Runs the loop of a haptic device at 1 kHz and bounds every force so that the device never gives out more energy than it took in,

@@ -5,7 +5,10 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <fstream>
+#include <iterator>
 #include <string>
+#include <string_view>
 
 #include "tests/e2e/stage/stage.h"
 #include "tests/server/scratch_folder.h"
@@ -47,6 +50,48 @@ TEST(Softbody, AHandFeelsASoftBlockAsStiffAsTheSceneMakesIt) {
   EXPECT_GT(peak, 0.5);
   EXPECT_GT(deep, 200U);
   EXPECT_GT(as_stiff, deep / 2);
+}
+
+/// Where two threads may not factorise at once, the engine says so and answers all the same.
+TEST(Softbody, ANearFieldAndACutAreMadeBesideTheAnswers) {
+  const ScratchFolder folder;
+  std::ifstream liver(demo_scene().replace_filename("liver_near.toml"));
+  std::string near{std::istreambuf_iterator<char>(liver), {}};
+  near.replace(near.find("liver.msh"), 9, demo_scene().replace_filename("liver.msh").string());
+  constexpr std::string_view kCut = R"(effects = ["contact", "geometric-nonlinearity", "cutting"]
+[[cutting]]
+corner_mm = [0, -60, 25]
+along_mm = [0, 120, 0]
+deep_mm = [0, 0, 30]
+at_s = 0.2
+[body]
+shape = "block"
+size_mm = [100, 100, 50]
+cells = [8, 8, 4]
+element = "hex8-sri"
+material = { young_pa = 10_000, poisson = 0.45 }
+[model]
+kind = "corotational"
+error_percent = 0.5
+[touch]
+patch_radius_mm = 20
+[place]
+towards_hand = [-1, 0, 0]
+)";
+  for (const std::string& scene : {write(folder.path() / "near.toml", near), write(folder.path() / "cut.toml", kCut)}) {
+    Server server(folder.path(), demo_scene());
+    Process body(program("tendon-softbody"),
+                 {scene, "--server", server.address(), "--duration-s", "3", "--rate-hz", "500", "--json"},
+                 folder.path());
+    EXPECT_EQ(body.wait(), 0) << body.err();
+    EXPECT_GT(count_in(body.out(), "forces"), 50U);
+    EXPECT_EQ(count_in(body.out(), "forces_unusable"), 0U);
+    server.stop();
+    if (body.err().find("this OpenBLAS is built for one thread") != std::string::npos) continue;
+    if (scene.ends_with("near.toml")) {
+      EXPECT_NE(body.err().find("the other thread made "), std::string::npos) << body.err();
+    }
+  }
 }
 
 TEST(Softbody, PassesItsSelfTest) {

@@ -46,6 +46,9 @@ class Elastic {
   VectorXd to_free(const VectorXd& all) const;
   void add_free(const VectorXd& free, VectorXd& all) const;  ///< all += free; the fixed ones stay
 
+  /// The shape from which a solver begins, m: where the energy is one about another shape than that of the mesh, this.
+  virtual VectorXd beginning() const { return VectorXd::Zero(size()); }
+
   virtual double energy(const VectorXd& u) const = 0;  ///< J
   /// ∂energy/∂u, N: the external forces that hold the nodes there.
   struct Forces {

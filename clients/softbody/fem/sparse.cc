@@ -28,6 +28,25 @@ View view(const SymmetricMatrix& matrix) {
           matrix.values.data()};
 }
 
+/// A function of a library that may be another one; then it is null.
+template <class Function>
+Function* function_named(const char* name) {
+  return reinterpret_cast<Function*>(dlsym(RTLD_DEFAULT, name));
+}
+
+/// An answer is due in less time than threads take to meet, and who wants two factors at once has a thread for each.
+/// OpenBLAS is told for the process. CHOLMOD assembles by four threads of OpenMP, whatever OMP_NUM_THREADS says, and
+/// each thread that calls it has to allow none.
+void one_thread_for_a_factor() {
+  const auto told = [](const char* name, int count) {
+    auto* const set = function_named<void(int)>(name);
+    if (set != nullptr) set(count);
+    return true;
+  };
+  [[maybe_unused]] static const bool openblas = told("openblas_set_num_threads", 1);
+  [[maybe_unused]] thread_local const bool openmp = told("omp_set_max_active_levels", 0);
+}
+
 }  // namespace
 
 VectorXd SymmetricMatrix::times(const VectorXd& x) const { return view(*this).selfadjointView<Eigen::Lower>() * x; }
@@ -67,6 +86,7 @@ Factor& Factor::operator=(Factor&&) noexcept = default;
 bool Factor::factorize(const SymmetricMatrix& matrix) {
   if (!splits_.empty()) cholmod_->analyze(matrix);
   splits_.clear();
+  one_thread_for_a_factor();
   cholmod_->llt.factorize(view(matrix));
   return cholmod_->llt.info() == Eigen::Success;
 }
@@ -140,9 +160,8 @@ std::size_t Factor::bytes() const noexcept {
 }
 
 bool factors_may_work_at_once() {
-  // Other implementations of the BLAS have no such function. 0: built for one thread.
-  const auto parallel = reinterpret_cast<int (*)()>(dlsym(RTLD_DEFAULT, "openblas_get_parallel"));
-  return parallel == nullptr || parallel() != 0;
+  auto* const parallel = function_named<int()>("openblas_get_parallel");
+  return parallel == nullptr || parallel() != 0;  // 0: built for one thread
 }
 
 }  // namespace tendon::softbody

@@ -27,7 +27,10 @@ struct SymmetricMatrix {
 /// once for each pattern; factorize() then uses it for new values. After split() the pattern is the grown one, and the
 /// next factorize() finds its order.
 ///
-/// Thread-safe: no. Realtime-safe: no.
+/// factorize() tells OpenBLAS to use one thread for each call, in the whole process, and OpenMP to use none beside the
+/// calling thread.
+///
+/// Thread-safe: no; two threads may each have their own where factors_may_work_at_once(). Realtime-safe: no.
 class Factor {
  public:
   /// Finds the order of elimination; has no values yet.

@@ -63,7 +63,7 @@ QuasiStaticModel::QuasiStaticModel(const Elastic& elastic, const TouchSurface& s
       config_(config),
       stiffness_(elastic.pattern()),
       factor_(stiffness_),
-      u_(VectorXd::Zero(elastic.size())),
+      u_(elastic.beginning()),
       step_(effects.has_time() ? effects.step : 0),
       effects_(effects_at_rest(effects, elastic)) {
   expect(config.max_iterations >= 1, "max_iterations", config.max_iterations, "1 or more");
@@ -98,13 +98,13 @@ void QuasiStaticModel::stiffness(Elastic::Curvature curvature) {
   for (const auto& effect : effects_) effect->add_stiffness(stiffness_);
 }
 
-void QuasiStaticModel::factorize() {
+bool QuasiStaticModel::factorize() {
   ++factors_;
   stale_ = false;
   in_vain_ = 0;
   pairs_.clear();
   stiffness(Elastic::Curvature::kExact);
-  if (factor_.factorize(stiffness_)) return;
+  if (factor_.factorize(stiffness_)) return true;
   stiffness(Elastic::Curvature::kWithoutNegative);
   // Where points are crushed flat, no stiffness may be left in some direction; a millionth of the largest entry is then
   // added.
@@ -117,6 +117,7 @@ void QuasiStaticModel::factorize() {
     }
     if (!std::isfinite(shift)) throw std::runtime_error("the stiffness of the body is not finite");
   }
+  return false;
 }
 
 VectorXd QuasiStaticModel::solve(const VectorXd& b, bool among_sides) const {

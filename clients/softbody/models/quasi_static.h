@@ -64,9 +64,13 @@ class QuasiStaticModel : public Model {
   // For a contact that solves for itself (RigidContact): the body as it lies, without a tool.
   /// Energy, and the forces on free displacements, effects included.
   Elastic::Forces forces() const;
-  /// The stiffness with which `factor` was made is an earlier shape's; renew_factor() makes it that of this shape.
+  /// The stiffness with which `factor` was made is an earlier shape's; renew_factor() makes it that of this shape. False
+  /// where that is not positive definite, and another stands in for it.
   const Factor& factor() const noexcept { return factor_; }
-  void renew_factor() { factorize(); }
+  bool renew_factor() {
+    forget_forces();  // what the older factor made of them is forgotten with them
+    return factorize();
+  }
   void move(const VectorXd& free);  ///< by so much, m
 
  private:
@@ -75,7 +79,7 @@ class QuasiStaticModel : public Model {
     VectorXd by_tool;    ///< H w
   };
   void stiffness(Elastic::Curvature curvature);
-  void factorize();
+  bool factorize();
   /// Whether sides will push each other, or do.
   bool foresee(const VectorXd& internal, const VectorXd& load, Given given, double value);
   Step step_among_sides(const VectorXd& internal, const VectorXd& load) const;

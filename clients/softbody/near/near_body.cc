@@ -36,30 +36,41 @@ class Noise {
   std::mt19937_64 random_{1};
 };
 
-double excess(const Solid& solid, const SymmetricMatrix& linear, const VectorXd& u) {
-  const VectorXd free = solid.to_free(u);
-  return free.dot(solid.to_free(solid.forces(u).force) - linear.times(free));
+SymmetricMatrix stiffness_at(const Solid& solid, const VectorXd& u) {
+  SymmetricMatrix stiffness = solid.pattern();
+  solid.stiffness(u, Elastic::Curvature::kExact, stiffness);
+  return stiffness;
 }
 
-SymmetricMatrix stiffness_at_rest(const Solid& solid) {
-  SymmetricMatrix stiffness = solid.pattern();
-  solid.stiffness(VectorXd::Zero(solid.size()), Elastic::Curvature::kExact, stiffness);
-  return stiffness;
+/// Of the displacements of a whole those of a part, whose nodes have these numbers there.
+VectorXd of_nodes(const VectorXd& all, const std::vector<int>& nodes) {
+  VectorXd own(3 * static_cast<Eigen::Index>(nodes.size()));
+  for (Eigen::Index i = 0; i < own.size(); ++i) own[i] = all[3 * nodes[static_cast<std::size_t>(i / 3)] + i % 3];
+  return own;
 }
 
 }  // namespace
 
+NearBody::Linear::Linear(const Solid& solid, VectorXd u)
+    : about(std::move(u)), forces(solid.to_free(solid.forces(about).force)), stiffness(stiffness_at(solid, about)) {}
+
+double NearBody::Linear::excess(const Solid& solid, const VectorXd& moved, const VectorXd& along) const {
+  const VectorXd by_law = solid.to_free(solid.forces(about + moved).force) - forces;
+  return solid.to_free(along).dot(by_law - stiffness.times(solid.to_free(moved)));
+}
+
 struct NearBody::Parts {
   Solid part;
-  Solid watched;
+  Watched watched;
   std::vector<int> rim{};        ///< components in `part`
   std::vector<int> rim_nodes{};  ///< in `part`
   std::vector<int> own_of{};
   MatrixXd modes{};
   MatrixXd far{};
-  SymmetricMatrix linear{};
-  MatrixXd followed{};
-  double share = 1;
+  VectorXd held{};
+  VectorXd on_rim{};
+  VectorXd beginning{};
+  double about_depth = 0;
 
   Fixed fixed() const {
     Fixed fixed = part.fixed();
@@ -68,7 +79,7 @@ struct NearBody::Parts {
   }
 };
 
-Pieces NearBody::make(const Solid& whole, const Factor& at_rest, Config config, std::unique_ptr<NearBody>& made) {
+Pieces NearBody::make(const Solid& whole, const Factor& factor, Config config, std::unique_ptr<NearBody>& made) {
   made.reset();
   const Mesh& mesh = whole.mesh();
   std::vector<int> near;
@@ -95,8 +106,11 @@ Pieces NearBody::make(const Solid& whole, const Factor& at_rest, Config config, 
   Solid near_part = Solid::part_of(whole, near, nodes);
   co_await kPieceDone;
   Solid watched_part = Solid::part_of(whole, watched, watched_nodes);
-  Parts parts{.part = std::move(near_part), .watched = std::move(watched_part)};
+  const VectorXd about = config.about.size() > 0 ? config.about : VectorXd::Zero(whole.size());
+  Parts parts{
+      .part = std::move(near_part), .watched = {.part = std::move(watched_part)}, .about_depth = config.about_depth};
   const Solid& part = parts.part;
+  const VectorXd about_near = of_nodes(about, nodes);
   co_await kPieceDone;
 
   parts.own_of.assign(mesh.nodes.size(), -1);
@@ -130,7 +144,13 @@ Pieces NearBody::make(const Solid& whole, const Factor& at_rest, Config config, 
     for (Eigen::Index j = 0; j < loads_count; ++j) loads(whole_of[i], j) = weight[i] * noise.next();
   }
   loads.col(loads_count) = config.press;
-  const SymmetricMatrix near_stiffness = stiffness_at_rest(part);
+  const Linear near_field(part, about_near);
+  const VectorXd whole_forces = whole.to_free(whole.forces(about).force);
+  VectorXd by_far(interface);
+  for (Eigen::Index i = 0; i < interface; ++i) {
+    const int free = rim_free[static_cast<std::size_t>(i)];
+    by_far[i] = whole_forces[whole_of[at(free)]] - near_field.forces[free];
+  }
   co_await kPieceDone;
 
   MatrixXd shapes(loads.rows(), loads.cols());
@@ -140,10 +160,10 @@ Pieces NearBody::make(const Solid& whole, const Factor& at_rest, Config config, 
   VectorXd local(part.free_count());
   for (Eigen::Index first = 0; first < loads.cols(); first += kLoadsAtOnce) {
     const Eigen::Index count = std::min(kLoadsAtOnce, loads.cols() - first);
-    shapes.middleCols(first, count) = at_rest.solve(loads.middleCols(first, count));
+    shapes.middleCols(first, count) = factor.solve(loads.middleCols(first, count));
     for (Eigen::Index j = first; j < std::min(first + count, loads_count); ++j) {
       for (int i = 0; i < part.free_count(); ++i) local[i] = shapes(whole_of[at(i)], j);
-      const VectorXd by_near = near_stiffness.times(local);
+      const VectorXd by_near = near_field.stiffness.times(local);
       for (Eigen::Index i = 0; i < interface; ++i) {
         const int free = rim_free[static_cast<std::size_t>(i)];
         traces(i, j) = local[free];
@@ -166,28 +186,30 @@ Pieces NearBody::make(const Solid& whole, const Factor& at_rest, Config config, 
   parts.modes = traces * mix;
   const MatrixXd far_forces = parts.modes.transpose() * forces * mix;
   parts.far = (far_forces + far_forces.transpose()) / 2;
+  parts.held = parts.modes.transpose() * by_far;
+  parts.on_rim.resize(interface);
+  for (Eigen::Index i = 0; i < interface; ++i) parts.on_rim[i] = about_near[parts.rim[static_cast<std::size_t>(i)]];
+  parts.beginning.resize(about_near.size() + count);
+  parts.beginning << about_near, VectorXd::Zero(count);
 
   co_await kPieceDone;
 
-  const Solid& sentinels = parts.watched;
-  parts.linear = stiffness_at_rest(sentinels);
-  parts.followed = MatrixXd::Zero(sentinels.size(), count);
+  Watched& sentinels = parts.watched;
+  sentinels.linear = Linear(sentinels.part, of_nodes(about, watched_nodes));
+  sentinels.followed = MatrixXd::Zero(sentinels.part.size(), count);
+  for (int i = 0; i < sentinels.part.size(); ++i) {
+    const int free = whole.free_of(3 * watched_nodes[at(i / 3)] + i % 3);
+    if (free >= 0) sentinels.followed.row(i) = shapes.row(free).head(loads_count) * mix;
+  }
   VectorXd pressed = VectorXd::Zero(whole.size());
   const double unit = 0.1 * config.radius / shapes.col(loads_count).lpNorm<Eigen::Infinity>();
   whole.add_free(unit * shapes.col(loads_count), pressed);
-  VectorXd pressed_near = VectorXd::Zero(part.size());
-  VectorXd pressed_watched = VectorXd::Zero(sentinels.size());
-  for (int i = 0; i < part.size(); ++i) pressed_near[i] = pressed[3 * nodes[at(i / 3)] + i % 3];
-  for (int i = 0; i < sentinels.size(); ++i) {
-    const int component = 3 * watched_nodes[at(i / 3)] + i % 3;
-    pressed_watched[i] = pressed[component];
-    const int free = whole.free_of(component);
-    if (free >= 0) parts.followed.row(i) = shapes.row(free).head(loads_count) * mix;
-  }
-  const VectorXd whole_free = whole.to_free(pressed);
-  const double all = whole_free.dot(whole.to_free(whole.forces(pressed).force) - unit * config.press) -
-                     excess(part, near_stiffness, pressed_near);
-  parts.share = std::clamp(excess(sentinels, parts.linear, pressed_watched) / all, 0.25, 1.0);
+  const VectorXd pressed_near = of_nodes(pressed, nodes);
+  const VectorXd pressed_watched = of_nodes(pressed, watched_nodes);
+  const VectorXd added = whole.to_free(whole.forces(about + pressed).force) - whole_forces - unit * config.press;
+  const double all = whole.to_free(pressed).dot(added) - near_field.excess(part, pressed_near, pressed_near);
+  const double of_sentinels = sentinels.linear.excess(sentinels.part, pressed_watched, pressed_watched);
+  sentinels.share = std::clamp(of_sentinels / all, 0.25, 1.0);
   co_await kPieceDone;
   made.reset(new NearBody(std::move(parts)));
 }
@@ -199,15 +221,16 @@ NearBody::NearBody(Parts parts)
       rim_(std::move(parts.rim)),
       modes_(std::move(parts.modes)),
       far_(std::move(parts.far)),
+      held_(std::move(parts.held)),
+      on_rim_(std::move(parts.on_rim)),
+      beginning_(std::move(parts.beginning)),
+      about_depth_(parts.about_depth),
       own_of_(std::move(parts.own_of)),
-      watched_(std::move(parts.watched)),
-      linear_(std::move(parts.linear)),
-      followed_(std::move(parts.followed)),
-      watched_share_(parts.share) {}
+      watched_(std::move(parts.watched)) {}
 
 VectorXd NearBody::placed(const VectorXd& u) const {
   VectorXd all = u.head(part_.size());
-  const VectorXd on_rim = modes_ * u.tail(modes());
+  const VectorXd on_rim = on_rim_ + modes_ * u.tail(modes());
   for (std::size_t i = 0; i < rim_.size(); ++i) all[rim_[i]] = on_rim[static_cast<Eigen::Index>(i)];
   return all;
 }
@@ -218,8 +241,8 @@ Elastic::Forces NearBody::forces(const VectorXd& u) const {
   for (std::size_t i = 0; i < rim_.size(); ++i) on_rim[static_cast<Eigen::Index>(i)] = near.force[rim_[i]];
   const auto y = u.tail(modes());
   const VectorXd of_far = far_ * y;
-  Forces all{near.energy + y.dot(of_far) / 2, VectorXd(size())};
-  all.force << near.force, modes_.transpose() * on_rim + of_far;
+  Forces all{near.energy + held_.dot(y) + y.dot(of_far) / 2, VectorXd(size())};
+  all.force << near.force, modes_.transpose() * on_rim + held_ + of_far;
   return all;
 }
 
@@ -265,14 +288,21 @@ void NearBody::stiffness(const VectorXd& u, Curvature curvature, SymmetricMatrix
   }
 }
 
-double NearBody::left_out(const VectorXd& u) const {
-  return excess(watched_, linear_, followed_ * u.tail(modes())) / watched_share_;
+double NearBody::left_out(const VectorXd& u, double depth) const {
+  const VectorXd moved = watched_.followed * u.tail(modes());
+  const VectorXd shape = depth > about_depth_ ? VectorXd(watched_.linear.about + moved) : watched_.linear.about;
+  const double deep = std::max(depth, about_depth_);
+  return deep > 0 ? watched_.linear.excess(watched_.part, moved, shape) / (deep * watched_.share) : 0;
 }
 
 std::size_t NearBody::bytes() const noexcept {
-  return mesh_bytes() + part_.bytes() + watched_.bytes() + linear_.bytes() +
+  const Watched& watched = watched_;
+  return mesh_bytes() + part_.bytes() + watched.part.bytes() + watched.linear.stiffness.bytes() +
          (rim_.size() + own_of_.size()) * sizeof(int) +
-         static_cast<std::size_t>(modes_.size() + far_.size() + followed_.size()) * sizeof(double);
+         static_cast<std::size_t>(modes_.size() + far_.size() + held_.size() + on_rim_.size() + beginning_.size() +
+                                  watched.linear.about.size() + watched.linear.forces.size() +
+                                  watched.followed.size()) *
+             sizeof(double);
 }
 
 }  // namespace tendon::softbody

@@ -3,11 +3,16 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
+#include <exception>
+#include <future>
 #include <optional>
 #include <stdexcept>
 #include <utility>
 #include <vector>
+
+#include "core/exchange/latest.h"
 
 namespace tendon::softbody {
 namespace {
@@ -18,17 +23,14 @@ constexpr double kRadiusIncompressible = 2;
 constexpr double kIncompressible = 0.45;
 constexpr double kElementsBeyond = 2;
 
-/// How much of a patch's radius the hand goes while one field takes over from another.
-constexpr double kBlendOver = 0.25;
+/// How much of a patch's radius the hand goes until an answer is that of a new field alone.
+constexpr double kFadesOver = 0.25;
 
-/// A new field is made while the patch goes from so far from the old one's middle as this serves, to so many times as far:
-/// at least a piece with each answer, and so many evenly over this way. Sixty modes have 29 pieces. The way to twice as
-/// far as it serves is for blending.
+/// Without another thread a new field is made while the patch goes from so far from the old one's middle as this serves,
+/// to so many times as far: at least a piece with each answer, and so many evenly over this way. Sixty modes have 29
+/// pieces. The old field has the patch to twice as far as it serves.
 constexpr double kWaits = 1.7;
 constexpr double kPiecesOnTheWay = 30;
-
-/// So many places are pressed in a piece, to see what the modes miss.
-constexpr std::size_t kChecksAtOnce = 2;
 
 /// Iterations of Newton's method in a piece; so many pieces press the new field, and the factor is made in one of them.
 constexpr int kIterationsAtOnce = 6;
@@ -38,12 +40,24 @@ constexpr int kFactorAt = 1;
 /// By how much more the true error may be than what is seen of it.
 constexpr double kFarSafety = 3;
 constexpr double kModesSafety = 3;
+constexpr double kLinearSafety = 6;
 
 /// A field has every patch whose place is so many patch's radii at most from its middle.
 constexpr double kReach = 0.45;
 
-/// How deep the first touch is, in radii of the patch.
-constexpr double kFirstTouch = 1e-4;
+/// The other thread is asked for a field about another shape when the tool is so many patch's radii deeper, or less deep.
+constexpr double kDeeper = 0.1;
+
+/// Of the force: how wrong a shape of the whole body may be, and how often at most it is pressed for some iterations to
+/// become so right. One that stays ten times as wrong is none to be linear about.
+constexpr double kShape = 1e-3;
+constexpr int kShapePresses = 6;
+
+/// A field whose middle is so many times as far from the hand as it serves is not made to its end.
+constexpr double kLeft = 3;
+
+/// The way of the hand in an answer is a mean over about so many.
+constexpr double kAnswersInMean = 16;
 
 Vec3 place_of(const Mesh& mesh, const Patch& patch) {
   Vec3 place = Vec3::Zero();
@@ -83,12 +97,16 @@ Factor factor_at_rest(const Solid& solid) {
 }  // namespace
 
 struct NearModel::Field {
-  Vec3 middle;
-  double radius;
-  std::unique_ptr<NearBody> body = nullptr;  ///< null: all of the body is near
-  std::unique_ptr<QuasiStaticModel> model = nullptr;
-  double serves = 0;  ///< m: farther from the middle a patch wants a new field
-  double missed = 0;  ///< share of the force, by too few modes
+  Vec3 middle = Vec3::Zero();
+  double radius = 0;
+  double depth = 0;                                   ///< m, of the tool, for which it was made
+  double serves = 0;                                  ///< m: farther from the middle a patch wants a new field
+  std::unique_ptr<NearBody> body = nullptr;           ///< null: all of the body is near
+  std::unique_ptr<QuasiStaticModel> model = nullptr;  ///< null: it was given up
+  double missed = 0;                                  ///< share of the force, by too few modes and by a rough u*
+  Handover handover = {};                             ///< from the hand's last answer that it knew
+  std::exception_ptr failed = nullptr;
+  std::unique_ptr<Field> behind = nullptr;
 
   bool holds(const Patch& patch) const {
     return body == nullptr || std::ranges::all_of(patch.nodes, [&](int node) { return body->own_node(node) >= 0; });
@@ -97,6 +115,7 @@ struct NearModel::Field {
   bool holds(const Patch& patch, const Vec3& place, double times) const {
     return body == nullptr || ((place - middle).norm() <= times * serves && holds(patch));
   }
+  double away(const Vec3& place, double deep) const { return std::hypot((place - middle).norm(), deep - depth); }
 
   /// With its own numbers of the nodes.
   Patch own(Patch patch) const {
@@ -109,50 +128,103 @@ struct NearModel::Field {
     const Patch here = own(patch);
     Reaction reaction = model->press(here, given, value);
     if (reaction.error > std::abs(reaction.force)) {  // lost on the way from the last shape
-      model->set_displacements(VectorXd::Zero(body->size()));
+      model->set_displacements(body->beginning());
       reaction = model->press(here, given, value);
     }
-    const double depth = std::abs(reaction.depth);
-    const double far = depth > 0 ? std::abs(body->left_out(model->displacements())) / depth : 0;
-    reaction.error += kFarSafety * far + missed * std::abs(reaction.force);
+    const double far = body->left_out(model->displacements(), std::abs(reaction.depth));
+    reaction.error += kFarSafety * std::abs(far) + missed * std::abs(reaction.force);
     return reaction;
   }
 
-  std::size_t bytes() const { return model->bytes() + (body ? body->bytes() : 0); }
+  std::size_t bytes() const {
+    return (model ? model->bytes() : 0) + (body ? body->bytes() : 0) + (behind ? behind->bytes() : 0);
+  }
 };
 
+/// Of one field. What it refers to must live as long as its pieces.
 struct NearModel::Making {
+  const Solid& solid;
+  const TouchSurface& surface;
+  const Factor& factor;  ///< of the whole stiffness about the shape
+  const Config& config;
   Patch first;  ///< around which it is
-  Vec3 middle;
-  Patch patch;  ///< where the hand is now
   double depth;
+  Hand hand;            ///< the newest
+  VectorXd about = {};  ///< the shape, all nodes; empty: at rest
+  double unsure = 0;    ///< share of the force, by a rough shape
   std::unique_ptr<Field> field = nullptr;
   std::optional<Pieces> work = {};
   int done = 0;  ///< pieces
+  Vec3 middle = place_of(solid.mesh(), first);
+
+  /// Makes the field: pressed by the hand already, where that presses, and at rest with the factor of that shape.
+  Pieces pieces();
+
+ private:
+  void look_at_modes(const Vec2& across);
+};
+
+/// What the other thread makes fields from, with a body of its own. Both threads touch the first three.
+struct NearModel::Oracle {
+  Oracle(const Solid& of, const TouchSurface& touched, const Config& with)
+      : solid(of),
+        surface(touched),
+        config(with),
+        whole(solid, surface, {.max_iterations = kIterationsAtOnce, .tolerance = kShape, .glides = false}),
+        bytes(solid.bytes() + whole.bytes()) {}
+  ~Oracle() { delete made.load(); }
+  Oracle(const Oracle&) = delete;
+  Oracle& operator=(const Oracle&) = delete;
+
+  Latest<Hand> hand;
+  std::atomic<Field*> made{nullptr};  ///< to be taken
+  std::atomic<bool> left{false};      ///< nobody will take it
+
+  const Solid solid;
+  const TouchSurface surface;
+  const Config config;
+  QuasiStaticModel whole;
+  bool at_rest = true;  ///< the whole's shape and factor
+  const std::size_t bytes;
+
+  std::unique_ptr<Field> make(const Vec3& ahead, const Hand& newest);
+
+ private:
+  Pieces pieces(Making& making);
 };
 
 NearModel::NearModel(const Solid& solid, const TouchSurface& surface, const Patch& first, const Config& config)
-    : solid_(solid),
-      surface_(surface),
-      config_(config),
-      at_rest_(factor_at_rest(solid)),
-      last_(place_of(solid.mesh(), first)) {
+    : solid_(solid), surface_(surface), config_(config), at_rest_(factor_at_rest(solid)) {
+  last_.place = place_of(solid.mesh(), first);
   begin(first, 0);
-  go_on(first, 0);
+  go_on(first, last_.place, 0);
 }
 
-NearModel::~NearModel() = default;
+NearModel::~NearModel() {
+  if (oracle_) oracle_->left = true;
+}
+
+void NearModel::make_fields_by(Background background) {
+  making_.reset();
+  background_ = std::move(background);
+  oracle_ = std::make_shared<Oracle>(solid_, surface_, config_);
+}
 
 void NearModel::begin(const Patch& patch, double depth) {
-  making_.reset(new Making{.first = patch, .middle = place_of(solid_.mesh(), patch), .patch = patch, .depth = depth});
-  making_->work = pieces_of(*making_);
+  making_.reset(new Making{.solid = solid_,
+                           .surface = surface_,
+                           .factor = at_rest_,
+                           .config = config_,
+                           .first = patch,
+                           .depth = depth,
+                           .hand = last_});
+  making_->work = making_->pieces();
 }
 
-void NearModel::go_on(const Patch& patch, double depth) {
-  const Vec3 place = place_of(solid_.mesh(), patch);
+void NearModel::go_on(const Patch& patch, const Vec3& place, double depth) {
   const bool waits = field_ && field_->holds(patch, place, kWaits);
   std::unique_ptr<Making> making = std::move(making_);
-  making->patch = patch;
+  making->hand = last_;
   making->depth = depth;
   bool more = true;
   const auto due = [&] {  // pieces
@@ -161,132 +233,285 @@ void NearModel::go_on(const Patch& patch, double depth) {
   do {
     more = making->work->next();
     ++making->done;
-    ++pieces_;
+    ++size_.pieces;
   } while (more && (!waits || making->done < due()));
   if (more) {
     making_ = std::move(making);
   } else if (making->field->holds(patch, place, 1)) {
-    before_ = std::exchange(field_, std::move(making->field));
-    ++fields_;
-    blended_ = 0;
-    blend_over_ = std::min(kBlendOver * surface_.radius(), field_->serves);
-    // The old field may have the patch only a part of that way.
-    if (before_) blend_over_ = std::min(blend_over_, 2 * before_->serves - (place - before_->middle).norm());
+    take_over(std::move(making->field));
   } else if (!waits) {
     begin(patch, depth);
-    go_on(patch, depth);
+    go_on(patch, place, depth);
   }
 }
 
-Pieces NearModel::pieces_of(Making& making) {
-  const Patch& patch = making.first;
-  const double element = element_below(solid_.mesh(), patch);
-  const double least = solid_.largest_poisson() > kIncompressible ? kRadiusIncompressible : kRadius;
-  const double a = surface_.radius();
-  making.field.reset(new Field{
-      .middle = making.middle, .radius = std::max(least * a, a + kElementsBeyond * element), .serves = kReach * a / 2});
-  Field& field = *making.field;
-  const Vec2 across = surface_.across(field.middle);
+void NearModel::take_over(std::unique_ptr<Field> field) {
+  ++size_.made;
+  handover_ = field->handover;
+  fading_over_ = std::min(kFadesOver * surface_.radius(), field->serves);
+  faded_ = 0;
+  by_linear_ = false;
+  std::swap(field_, field);
+  if (!oracle_) return;
+  field->behind = std::move(spent_);
+  spent_ = std::move(field);
+}
+
+Pieces NearModel::Making::pieces() {
+  const double element = element_below(solid.mesh(), first);
+  const double least = solid.largest_poisson() > kIncompressible ? kRadiusIncompressible : kRadius;
+  const double a = surface.radius();
+  field.reset(new Field{.middle = middle,
+                        .radius = std::max(least * a, a + kElementsBeyond * element),
+                        .depth = depth,
+                        .serves = kReach * a / 2,
+                        .missed = unsure});
+  const Vec2 across = surface.across(middle);
   {
-    std::vector<int> pressed = surface_.nodes_of_patches(across, kReach * a);
-    pressed.insert(pressed.end(), patch.nodes.begin(), patch.nodes.end());  // half off the body it may be farther away
-    const VectorXd press = solid_.to_free(patch_load(solid_, surface_.normal(), patch));
-    Pieces body = NearBody::make(solid_, at_rest_,
-                                 {field.middle, field.radius, config_.modes, std::move(pressed), press}, field.body);
+    std::vector<int> pressed = surface.nodes_of_patches(across, kReach * a);
+    pressed.insert(pressed.end(), first.nodes.begin(), first.nodes.end());  // half off the body it may be farther away
+    Pieces body = NearBody::make(solid, factor,
+                                 {.middle = middle,
+                                  .radius = field->radius,
+                                  .modes = config.modes,
+                                  .pressed = std::move(pressed),
+                                  .press = solid.to_free(patch_load(solid, surface.normal(), first)),
+                                  .about = about,
+                                  .about_depth = about.size() > 0 ? depth : 0},
+                                 field->body);
     while (body.next()) co_await kPieceDone;
   }
   co_await kPieceDone;
-  const Elastic& elastic = field.body ? static_cast<const Elastic&>(*field.body) : solid_;
-  field.model = std::make_unique<QuasiStaticModel>(elastic, surface_, config_.newton);
-  if (field.body == nullptr) co_return;
+  const Elastic& elastic = field->body ? static_cast<const Elastic&>(*field->body) : solid;
+  field->model = std::make_unique<QuasiStaticModel>(elastic, surface, config.newton);
+  if (field->body == nullptr) co_return;
   co_await kPieceDone;
+  look_at_modes(across);
 
-  const double held = kReach * a;
-  const std::array places{Vec2(0, 0), Vec2(held, 0), Vec2(-held, 0), Vec2(0, held), Vec2(0, -held)};
-  for (std::size_t i = 0; i < places.size(); ++i) {
-    if (i % kChecksAtOnce == 1) co_await kPieceDone;
-    const auto there = surface_.patch(across + places[i]);
-    if (!there || !field.holds(*there)) continue;
-    const VectorXd load = solid_.to_free(patch_load(solid_, surface_.normal(), *there));
-    const double depth = kFirstTouch * a;
-    const double whole = depth / load.dot(VectorXd(at_rest_.solve(load)));
-    const double near = field.model->press(field.own(*there), Given::kDepth, depth).force;
-    field.missed = std::max(field.missed, kModesSafety * std::abs(near / whole - 1));
-  }
-
-  if (making.depth <= 0) co_return;
+  if (depth <= 0) co_return;
   co_await kPieceDone;
-  // Pressed once more, by the factor of that shape: it serves the answers around it better than that of the rest.
-  field.model->set_max_iterations(std::min(kIterationsAtOnce, config_.newton.max_iterations));
+  // At rest pressed once more, by the factor of that shape: it serves the answers around it better than that of the rest.
+  field->model->set_max_iterations(std::min(kIterationsAtOnce, config.newton.max_iterations));
   for (int i = 0; i < kPresses; ++i) {
-    Patch here = field.own(field.holds(making.patch) ? making.patch : patch);
+    const bool held = !hand.patch.nodes.empty() && hand.felt.depth > 0 && field->holds(hand.patch, hand.place, 2);
+    const double deep = held ? hand.felt.depth : depth;
+    if (i == kFactorAt && about.size() == 0) field->model->set_displacements(field->model->displacements());
+    Patch here = field->own(held ? hand.patch : first);
     here.curvatures = {};
-    if (i == kFactorAt) field.model->set_displacements(field.model->displacements());
-    const Reaction reaction = field.model->press(here, Given::kDepth, making.depth);
+    const Reaction reaction = field->model->press(here, Given::kDepth, deep);
+    field->handover = held ? handover(hand.felt, reaction, deep) : Handover{};
     co_await kPieceDone;
-    if (i >= kFactorAt && reaction.error <= config_.newton.tolerance * std::abs(reaction.force)) break;
+    if (i >= kFactorAt && reaction.error <= config.newton.tolerance * std::abs(reaction.force)) break;
   }
-  field.model->set_max_iterations(config_.newton.max_iterations);
+  field->model->set_max_iterations(config.newton.max_iterations);
+}
+
+/// How much stiffer they make the body, at the middle and as far from it as the field has the patch.
+void NearModel::Making::look_at_modes(const Vec2& across) {
+  const NearBody& body = *field->body;
+  const double held = kReach * surface.radius();
+  MatrixXd loads(solid.free_count(), 0);
+  MatrixXd own(body.free_count(), 0);
+  for (const Vec2& there : {Vec2(0, 0), Vec2(held, 0), Vec2(-held, 0), Vec2(0, held), Vec2(0, -held)}) {
+    const auto patch = surface.patch(across + there);
+    if (!patch || !field->holds(*patch)) continue;
+    const Eigen::Index count = loads.cols() + 1;
+    loads.conservativeResize(Eigen::NoChange, count);
+    own.conservativeResize(Eigen::NoChange, count);
+    loads.rightCols(1) = solid.to_free(patch_load(solid, surface.normal(), *patch));
+    own.rightCols(1) = body.to_free(patch_load(body, surface.normal(), field->own(*patch)));
+  }
+  if (loads.cols() == 0) return;
+  const VectorXd whole = factor.solve(loads).cwiseProduct(loads).colwise().sum();
+  const VectorXd near = field->model->factor().solve(own).cwiseProduct(own).colwise().sum();
+  field->missed += kModesSafety * (whole.cwiseQuotient(near).array() - 1).abs().maxCoeff();
+}
+
+Pieces NearModel::Oracle::pieces(Making& making) {
+  Reaction pressed;
+  bool bent = false;
+  for (int i = 0; making.depth > 0 && i < kShapePresses && !bent; ++i) {
+    pressed = whole.press(making.first, Given::kDepth, making.depth);
+    bent = pressed.error <= kShape * std::abs(pressed.force);
+    co_await kPieceDone;
+  }
+  bent = making.depth > 0 && pressed.error <= 10 * kShape * std::abs(pressed.force) && whole.renew_factor();
+  if (bent) {
+    making.about = whole.displacements();
+    making.unsure = pressed.error / std::abs(pressed.force);
+  } else if (!at_rest) {
+    whole.set_displacements(VectorXd::Zero(solid.size()));
+    whole.renew_factor();
+  }
+  at_rest = !bent;
+  co_await kPieceDone;
+  Pieces rest = making.pieces();
+  while (rest.next()) co_await kPieceDone;
+}
+
+std::unique_ptr<NearModel::Field> NearModel::Oracle::make(const Vec3& ahead, const Hand& newest) {
+  const auto patch = surface.patch(surface.across(ahead));
+  Making making{.solid = solid,
+                .surface = surface,
+                .factor = whole.factor(),
+                .config = config,
+                .first = patch ? *patch : newest.patch,
+                .depth = std::max(0.0, newest.felt.depth),
+                .hand = newest};
+  Pieces work = pieces(making);
+  while (work.next()) {
+    if (const Hand* const newer = hand.take()) making.hand = *newer;
+    const double away = (making.hand.place - making.middle).norm();
+    if (left || away > kLeft * kReach * surface.radius() / 2) return std::make_unique<Field>();
+  }
+  return std::move(making.field);
+}
+
+void NearModel::ask() {
+  const Vec3 way = last_took_ * per_answer_;
+  const double most = kReach * surface_.radius();
+  const Vec3 ahead = last_.place + way * std::min(1.0, most / std::max(way.norm(), most * 1e-9));
+  const bool gone = (ahead - field_->middle).norm() > field_->serves;
+  if (!gone && std::abs(std::max(0.0, last_.felt.depth) - field_->depth) <= kDeeper * surface_.radius()) return;
+  asked_ = true;
+  since_asked_ = 0;
+  background_(std::packaged_task<void()>(
+      [oracle = oracle_, ahead, hand = last_, spent = std::shared_ptr<Field>(std::move(spent_))]() mutable {
+        spent.reset();
+        std::unique_ptr<Field> made;
+        try {
+          made = oracle->make(ahead, hand);
+        } catch (...) {
+          made = std::make_unique<Field>();
+          made->failed = std::current_exception();
+        }
+        oracle->made.store(made.release(), std::memory_order_release);
+      }));
+}
+
+void NearModel::take_made(const Patch& patch, const Vec3& place, double depth) {
+  ++since_asked_;
+  std::unique_ptr<Field> made(oracle_->made.exchange(nullptr, std::memory_order_acq_rel));
+  if (made == nullptr) return;
+  asked_ = false;
+  last_took_ = since_asked_;
+  if (made->failed) std::rethrow_exception(made->failed);
+  const bool nearer = !field_->holds(patch, place, 2) || made->away(place, depth) < field_->away(place, depth);
+  if (made->model != nullptr && made->holds(patch, place, 2) && nearer) return take_over(std::move(made));
+  ++size_.late;
+  made->behind = std::move(spent_);
+  spent_ = std::move(made);
+}
+
+Reaction NearModel::linear_press(const Patch& patch, Given given, double value) const {
+  const VectorXd load = solid_.to_free(patch_load(solid_, surface_.normal(), patch));
+  const VectorXd per_newton = at_rest_.solve(load);
+  const double compliance = load.dot(per_newton);
+  VectorXd u = VectorXd::Zero(solid_.size());
+  Reaction reaction;
+  reaction.stiffness = 1 / compliance;
+  reaction.force = constrained_force(given, value, 0, compliance);
+  solid_.add_free(reaction.force * per_newton, u);
+  reaction.depth = depth_below(patch, surface_.normal(), u);
+  reaction.slope = slope_below(patch, surface_.normal(), u);
+  // The work of this shape by the body's law, for each metre.
+  const double work = per_newton.dot(solid_.to_free(solid_.forces(u).force)) / compliance;
+  reaction.error = kLinearSafety * std::abs(work - reaction.force);
+  if (!std::isfinite(reaction.error)) reaction.error = std::abs(reaction.force);
+  return reaction;
+}
+
+Reaction NearModel::press_by_field_or_linear(const Patch& patch, const Vec3& place, Given given, double value) {
+  if (field_->holds(patch, place, 2)) {
+    Reaction reaction = field_->press(patch, given, value);
+    if (by_linear_) {  // the hand has come back
+      handover_ = handover(kept(handover_, 1, linear_press(patch, given, value)), reaction, reaction.depth);
+      faded_ = 0;
+      by_linear_ = false;
+    }
+    return kept(handover_, std::max(0.0, 1 - faded_ / fading_over_), reaction);
+  }
+  ++size_.linear;
+  if (!by_linear_) {
+    by_linear_ = true;
+    handover_ = {};
+    if (last_.felt.depth > 0) {
+      const Reaction there = linear_press(last_.patch, Given::kDepth, last_.felt.depth);
+      handover_ = handover(last_.felt, there, last_.felt.depth);
+    }
+  }
+  return kept(handover_, 1, linear_press(patch, given, value));
 }
 
 Reaction NearModel::press(const Patch& patch, Given given, double value) {
   if (patch.nodes.empty()) return {};
+  if (field_->body == nullptr) return field_->press(patch, given, value);
   const Vec3 place = place_of(solid_.mesh(), patch);
-  const double depth = given == Given::kForce ? last_depth_ : value;
-  blended_ += std::hypot((place - last_).norm(), depth - last_depth_);
-  last_ = place;
-  last_depth_ = depth;
-  // Where the hand has gone elsewhere meanwhile.
-  if (making_ && (making_->middle - place).norm() > field_->serves) making_.reset();
-  if (!making_ && !field_->holds(patch, place, 1)) begin(patch, depth);
-  if (making_) go_on(patch, depth);
-  if (before_ && (blended_ >= blend_over_ || !before_->holds(patch, place, 2))) before_.reset();
-  const Reaction reaction = field_->press(patch, given, value);
-  return before_ ? blended(before_->press(patch, given, value), reaction, blended_ / blend_over_) : reaction;
+  const double depth = given == Given::kForce ? last_.felt.depth : value;
+  const Vec3 way = place - last_.place;
+  faded_ += std::hypot(way.norm(), depth - last_.felt.depth);
+  Reaction reaction;
+  if (oracle_) {
+    per_answer_ += (way - per_answer_) / kAnswersInMean;
+    if (way.norm() > field_->serves) per_answer_.setZero();
+    take_made(patch, place, depth);
+    reaction = press_by_field_or_linear(patch, place, given, value);
+  } else {
+    // Where the hand has gone elsewhere meanwhile.
+    if (making_ && (making_->middle - place).norm() > field_->serves) making_.reset();
+    if (!making_ && !field_->holds(patch, place, 1)) begin(patch, depth);
+    if (making_) go_on(patch, place, depth);
+    reaction = field_->press(patch, given, value);
+    reaction = kept(handover_, std::max(0.0, 1 - faded_ / fading_over_), reaction);
+  }
+  last_.patch.nodes = patch.nodes;
+  last_.patch.weights = patch.weights;
+  last_.patch.slopes = patch.slopes;
+  last_.place = place;
+  last_.felt = reaction;
+  if (oracle_ && !asked_) ask();
+  if (asked_) oracle_->hand.put(last_);
+  return reaction;
 }
 
 NearModel::Size NearModel::size() const {
+  Size size = size_;
+  size.elsewhere = oracle_ ? oracle_->bytes : 0;
   if (field_->body == nullptr) {
-    return {.elements = static_cast<std::size_t>(solid_.mesh().element_count()),
-            .unknowns = solid_.free_count(),
-            .made = fields_,
-            .pieces = pieces_};
+    size.elements = static_cast<std::size_t>(solid_.mesh().element_count());
+    size.unknowns = solid_.free_count();
+    return size;
   }
   const NearBody& body = *field_->body;
-  return {.radius = field_->radius,
-          .elements = static_cast<std::size_t>(body.mesh().element_count()),
-          .interface = body.interface(),
-          .modes = body.modes(),
-          .unknowns = body.free_count(),
-          .made = fields_,
-          .pieces = pieces_};
+  size.radius = field_->radius;
+  size.elements = static_cast<std::size_t>(body.mesh().element_count());
+  size.interface = body.interface();
+  size.modes = body.modes();
+  size.unknowns = body.free_count();
+  return size;
 }
 
 std::size_t NearModel::bytes() const noexcept {
-  return at_rest_.bytes() + field_->bytes() + (before_ ? before_->bytes() : 0);
+  return at_rest_.bytes() + field_->bytes() + (spent_ ? spent_->bytes() : 0) + (oracle_ ? oracle_->bytes : 0);
 }
 
-Reaction blended(const Reaction& from, const Reaction& to, double share) {
-  const auto mix = [&](const auto& a, const auto& b) { return ((1 - share) * a + share * b); };
-  Reaction all;
-  all.force = mix(from.force, to.force);
-  all.depth = mix(from.depth, to.depth);
-  all.stiffness = mix(from.stiffness, to.stiffness);
-  all.error = mix(from.error, to.error) + std::abs(from.force - to.force);
-  if (!(std::abs(all.force) > 0)) return all;
-  all.slope = mix(Vec2(from.force * from.slope), Vec2(to.force * to.slope)) / all.force;
-  all.knows_glide = from.knows_glide && to.knows_glide;
-  if (!all.knows_glide) return all;
-  // PatchContact's K in parts: k along the normal, k s + F t beside it, and across k s sᵀ + F (s tᵀ + t sᵀ − M − F D).
-  // The surface at rest adds the same to both. `giving` stays 0, and `curving` has both.
-  const auto beside = [](const Reaction& r) { return Vec2(r.stiffness * r.slope + r.force * r.glide.tilting); };
-  const auto across = [](const Reaction& r) {
-    const Mat2 turned = r.slope * r.glide.tilting.transpose();
-    return Mat2(r.stiffness * r.slope * r.slope.transpose() +
-                r.force * (turned + turned.transpose() - r.glide.curving - r.force * r.glide.giving));
-  };
-  all.glide.tilting = (mix(beside(from), beside(to)) - all.stiffness * all.slope) / all.force;
-  all.glide.curving = (across(all) - mix(across(from), across(to))) / all.force;
+Handover handover(const Reaction& before, const Reaction& after, double depth) {
+  const double ratio = before.force / after.force;
+  if (!(before.force > 0 && after.force > 0 && std::isfinite(ratio))) return {};
+  return {ratio, before.slope - after.slope, depth};
+}
+
+Reaction kept(const Handover& before, double share, const Reaction& reaction) {
+  if (!(share > 0 && before.depth > 0)) return reaction;
+  const double left = share * std::min(1.0, before.depth / std::abs(reaction.depth));
+  const double times = 1 + left * (before.ratio - 1);
+  Reaction all = reaction;
+  all.force *= times;
+  all.stiffness *= times;
+  all.slope += left * before.slope;
+  all.glide.giving /= times;
+  const double force = std::max(std::abs(reaction.force), std::abs(all.force));
+  all.error = std::max(1.0, times) * reaction.error + force * std::hypot(times - 1, left * before.slope.norm());
   return all;
 }
 

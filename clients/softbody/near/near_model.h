@@ -4,34 +4,53 @@
 #include <cstddef>
 #include <memory>
 
+#include "clients/softbody/background.h"
 #include "clients/softbody/models/quasi_static.h"
 #include "clients/softbody/near/near_body.h"
 
 namespace tendon::softbody {
+
+/// How answers before one differ from those after it, where they meet.
+struct Handover {
+  double ratio = 1;           ///< of the force before to that after
+  Vec2 slope = Vec2::Zero();  ///< that before minus that after
+  double depth = 0;           ///< m, of the tool there
+};
+Handover handover(const Reaction& before, const Reaction& after, double depth);
+
+/// The reaction that keeps `share` (0 … 1) of what was before, force, stiffness and slope alike. Less deep it is the
+/// ratio of the forces that is kept, and deeper their difference. `error` adds what differs.
+Reaction kept(const Handover& before, double share, const Reaction& reaction);
 
 /// Large rotations and strains near the tool, a linear body elsewhere: Newton's method on a NearBody around the patch.
 /// An answer costs what the near elements cost, whatever the size of the mesh.
 ///
 /// The near field has the radius ρ = max(1.5 a, a + 2 elements) around the patch's place at rest, and 2 a at least where
 /// ν > 0.45; a is the patch's radius. Beyond ρ it has what the patch touches on its way of 0.45 a to any side. When the
-/// patch has gone half of this way, a near field around its place is begun. It is made in about 30 pieces: most are
-/// solutions by a factor of the whole body, eight at a time, and the longest are the two factors of the near field. Each
-/// answer makes one piece, and goes on by the old field. When the new one is whole, the answers of both are blended over
-/// a way of the hand of a/4, or as far as the old field has the patch, however long that takes.
+/// patch has gone half of this way, a near field around its place is begun. A body that is all near is the whole model,
+/// QuasiStaticModel.
 ///
-/// A hand that goes farther than a/200 with each answer has more pieces in an answer, evenly over the way to 0.38 a.
-/// One that jumps out of the old field has all that are left, or a field of its own, in that answer, and no blending.
-/// Counts and places choose, and no clock: the answers are the same on every machine. A body that is all near is the
-/// whole model, QuasiStaticModel.
+/// Without another thread a field is made in about 30 pieces, linear about the shape at rest: most are solutions by a
+/// factor of the whole body, eight at a time, and the longest are the two factors of the near field. Each answer makes
+/// one piece, and goes on by the old field. A hand that goes farther than a/200 with each answer has more pieces in an
+/// answer, evenly over the way to 0.38 a. One that jumps out of the old field has all that are left, or a field of its
+/// own, in that answer. Counts and places choose, and no clock: the answers are the same on every machine.
 ///
-/// Within one near field the force is the slope of one energy. Blended answers are not: by going on and back over
-/// different ways a hand may gain their difference times a/4, and they say this difference as an error.
+/// With make_fields_by() no answer makes a piece. Where the patch has gone half of its way, or a tenth of a deeper or
+/// less deep than when the field was asked for, the other thread is asked for the next one. It presses the whole body
+/// by Newton's method, and makes the field about this shape, ahead of the hand by the way that it goes meanwhile. What
+/// is made goes through one atomic pointer, and fields that have served go back to be freed there: an answer takes no
+/// lock and never waits. A field that the hand has left before it is whole is thrown away. While no field has the patch,
+/// answers are those of the linear body, with an error that says so.
+///
+/// Where a field takes over, the force goes on from what was felt: the ratio of both forces fades over a way of the hand
+/// of a/4, however long that takes, and so does the difference of the slopes. Within one near field the force is the
+/// slope of one energy. While a ratio fades it is not: by going on and back over different ways a hand may gain the
+/// difference times a/4, and answers say this difference as an error.
 ///
 /// Reaction::error is of Newton's method, and of what the linear far field and the few modes leave out beside the whole
 /// mesh: three times what NearBody::left_out() says that the far field's law adds to the force, and three times the
-/// largest excess of stiffness over that of the whole body at first touch, of five places of the near field.
-///
-/// A BLAS need not allow two threads at once (OpenBLAS without threads does not), so that no thread makes fields.
+/// largest excess of stiffness over that of the whole body, of five places of the near field.
 class NearModel : public Model {
  public:
   struct Config {
@@ -42,51 +61,75 @@ class NearModel : public Model {
   NearModel(const Solid& solid, const TouchSurface& surface, const Patch& first, const Config& config);
   ~NearModel() override;
 
+  /// From now on the next fields are made by `background`, one at a time, by work that has a body of its own. Where the
+  /// work throws, the next press() throws that.
+  void make_fields_by(Background background);
+
   Reaction press(const Patch& patch, Given given, double value) override;
   bool glides() const noexcept override { return true; }
-  /// Without what is being made: two numbers for each unknown of the whole body and each of the 2 modes + 1 loads, for a
-  /// while.
+  /// With all that the other thread keeps. Without what is being made: two numbers for each unknown of the whole body and
+  /// each of the 2 modes + 1 loads, for a while.
   std::size_t bytes() const noexcept override;
 
-  /// The present near field.
+  /// The present near field, and what was done since construction.
   struct Size {
     double radius = 0;         ///< ρ, m; 0: the whole body is near
     std::size_t elements = 0;  ///< near ones
     int interface = 0;         ///< unknowns of the nodes that near and far have in common
     int modes = 0;             ///< take their place
     int unknowns = 0;
-    int made = 0;    ///< near fields since construction
-    int pieces = 0;  ///< of such, also of those that are not whole
+    int made = 0;               ///< near fields that took over, the first included
+    int pieces = 0;             ///< made by answers, also of fields that are not whole
+    int late = 0;               ///< fields of the other thread that were thrown away
+    int linear = 0;             ///< answers of the linear body, where no field had the patch
+    std::size_t elsewhere = 0;  ///< bytes that the other thread keeps, of bytes(); 0: there is none
   };
   Size size() const;
 
  private:
+  /// What was answered last.
+  struct Hand {
+    Patch patch;  ///< without curvatures
+    Vec3 place = Vec3::Zero();
+    Reaction felt;
+  };
   struct Field;
   struct Making;
+  struct Oracle;
+
   /// A field around the patch, in place of what is being made.
   void begin(const Patch& patch, double depth);
-  /// Makes the field of `making`: pressed by the hand already, where that presses, with the factor of that shape.
-  Pieces pieces_of(Making& making);
   /// Does a piece of what is being made, or all of them where the present field cannot wait.
-  void go_on(const Patch& patch, double depth);
+  void go_on(const Patch& patch, const Vec3& place, double depth);
+  void take_over(std::unique_ptr<Field> field);
+
+  // With another thread.
+  void take_made(const Patch& patch, const Vec3& place, double depth);
+  void ask();
+  /// By the present field; where it does not have the patch, by the linear body.
+  Reaction press_by_field_or_linear(const Patch& patch, const Vec3& place, Given given, double value);
+  Reaction linear_press(const Patch& patch, Given given, double value) const;
 
   const Solid& solid_;
   const TouchSurface& surface_;
   Config config_;
   Factor at_rest_;  ///< of the whole body
-  int fields_ = 0;
-  int pieces_ = 0;
+  Size size_;
   std::unique_ptr<Making> making_;  ///< the next field, or null
   std::unique_ptr<Field> field_;
-  std::unique_ptr<Field> before_;  ///< the one before, while answers are blended; or null
-  double blend_over_ = 0;          ///< m
-  double blended_ = 0;             ///< m, of it
-  Vec3 last_ = Vec3::Zero();       ///< m: the last patch's place, and how deep it was pressed
-  double last_depth_ = 0;
-};
+  Hand last_;
+  Handover handover_;
+  double fading_over_ = 0;  ///< m
+  double faded_ = 0;        ///< m, of it
 
-/// The reaction whose force, and whose stiffness however a surface lies, are so far between those of two as `share`
-/// (0 … 1) says. `error` adds how far they are apart.
-Reaction blended(const Reaction& from, const Reaction& to, double share);
+  std::shared_ptr<Oracle> oracle_;  ///< null: none
+  Background background_;
+  std::unique_ptr<Field> spent_;  ///< to be freed there, one behind the other
+  bool asked_ = false;
+  bool by_linear_ = false;          ///< the last answer was
+  int since_asked_ = 0;             ///< answers
+  int last_took_ = 0;               ///< answers, from asking to taking
+  Vec3 per_answer_ = Vec3::Zero();  ///< m, how far the hand goes
+};
 
 }  // namespace tendon::softbody

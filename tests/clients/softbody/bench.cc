@@ -7,9 +7,12 @@
 #include <algorithm>
 #include <cmath>
 #include <ctime>
+#include <future>
 #include <memory>
+#include <optional>
 #include <string>
 #include <type_traits>
+#include <utility>
 #include <vector>
 
 #include "clients/softbody/body.h"
@@ -56,13 +59,34 @@ double processor_time() {
   return 1e3 * static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_nsec);
 }
 
+/// The other thread of a body, as if it had a processor of its own, and an answer were due in each millisecond: what it is
+/// given is done as many answers later as the last field took milliseconds.
+struct Beside {
+  explicit Beside(Body& body) {
+    body.prepare_by([this](std::packaged_task<void()> work) { given.push_back(std::move(work)); });
+  }
+  void answered() {
+    if (given.empty() || ++waited < times.back()) return;
+    const double start = processor_time();
+    std::exchange(given, {}).front()();
+    times.push_back(processor_time() - start);
+    waited = 0;
+  }
+  std::vector<std::packaged_task<void()>> given{};
+  std::vector<double> times{20};  ///< ms; the first is a guess
+  double waited = 0;
+};
+
 /// 5 mm down, 20 mm aside and back again, by state.range(1) µm with each answer, asked for to half a percent. Answers that
-/// make pieces of a near field count as all others do; the slowest of them is told apart, too.
-void path(benchmark::State& state, ModelKind model, Law law) {
+/// make pieces of a near field count as all others do; the slowest of them is told apart, too. With
+/// `with_thread` another thread makes the fields.
+void path(benchmark::State& state, ModelKind model, Law law, bool with_thread) {
   BodyConfig config = testing::pressed_body(model, Element::kHex8Sri, static_cast<int>(state.range(0)));
   config.law = law;
   config.tolerance = 5e-3;
   Body body(config);
+  std::optional<Beside> beside;
+  if (with_thread) beside.emplace(body);
   const double step = 1e-6 * static_cast<double>(state.range(1));
   std::vector<double> times;
   double with_pieces = 0;
@@ -74,6 +98,7 @@ void path(benchmark::State& state, ModelKind model, Law law) {
     const double start = processor_time();
     const Feel feel = body.touch(Vec3(aside, 0, 0.05 - depth));
     const double time = processor_time() - start;
+    if (beside) beside->answered();
     times.push_back(time);
     said = std::max(said, feel.error / feel.force.z());
     if (pieces() == before) return;
@@ -95,6 +120,13 @@ void path(benchmark::State& state, ModelKind model, Law law) {
     state.counters["slowest_with_pieces_ms"] = slowest_with_pieces;
   }
   state.counters["said_percent"] = 100 * said;
+  if (beside) {
+    const NearModel::Size fields = body.near_field().value_or(NearModel::Size{});
+    state.counters["field_ms"] = *std::ranges::max_element(beside->times);
+    state.counters["fields"] = fields.made;
+    state.counters["late"] = fields.late;
+    state.counters["linear"] = fields.linear;
+  }
   state.counters["model_mb"] = static_cast<double>(body.size().bytes) / 1e6;
 }
 
@@ -179,16 +211,22 @@ BENCHMARK_CAPTURE(still, corotational_hex8_sri, ModelKind::kCorotational, Elemen
 BENCHMARK_CAPTURE(still, neo_hookean_hex8_sri, ModelKind::kNeoHookean, Element::kHex8Sri)->Arg(4)->Arg(8);
 BENCHMARK_CAPTURE(within_half_a_percent, corotational_hex8_sri, ModelKind::kCorotational)->Arg(8)->Arg(12);
 BENCHMARK_CAPTURE(within_half_a_percent, neo_hookean_hex8_sri, ModelKind::kNeoHookean)->Arg(8)->Arg(12);
-BENCHMARK_CAPTURE(path, near_neo_hookean, ModelKind::kNear, Law::kNeoHookean)
+BENCHMARK_CAPTURE(path, near_neo_hookean, ModelKind::kNear, Law::kNeoHookean, false)
     ->ArgsProduct({{8, 12, 16}, {1000, 100}})
     ->Iterations(2);
-BENCHMARK_CAPTURE(path, near_corotational, ModelKind::kNear, Law::kCorotational)
+BENCHMARK_CAPTURE(path, near_corotational, ModelKind::kNear, Law::kCorotational, false)
     ->ArgsProduct({{8, 12, 16}, {1000, 100}})
     ->Iterations(2);
-BENCHMARK_CAPTURE(path, whole_neo_hookean, ModelKind::kNeoHookean, Law::kNeoHookean)
+BENCHMARK_CAPTURE(path, near_beside_neo_hookean, ModelKind::kNear, Law::kNeoHookean, true)
+    ->ArgsProduct({{8, 12, 16}, {100}})
+    ->Iterations(2);
+BENCHMARK_CAPTURE(path, near_beside_corotational, ModelKind::kNear, Law::kCorotational, true)
+    ->ArgsProduct({{8, 12, 16}, {100}})
+    ->Iterations(2);
+BENCHMARK_CAPTURE(path, whole_neo_hookean, ModelKind::kNeoHookean, Law::kNeoHookean, false)
     ->ArgsProduct({{8, 12, 16}, {1000, 100}})
     ->Iterations(2);
-BENCHMARK_CAPTURE(path, whole_corotational, ModelKind::kCorotational, Law::kCorotational)
+BENCHMARK_CAPTURE(path, whole_corotational, ModelKind::kCorotational, Law::kCorotational, false)
     ->ArgsProduct({{8, 12, 16}, {1000, 100}})
     ->Iterations(2);
 BENCHMARK_CAPTURE(still, mass_spring, ModelKind::kMassSpring, Element::kTet4)->Arg(8);

@@ -69,6 +69,13 @@ TEST(SoftbodyExplain, SaysHowMuchOfABodyIsNearTheTool) {
   EXPECT_EQ(json["near"]["elements"], 112);
   EXPECT_EQ(json["near"]["modes"], 60);
   EXPECT_GT(json["bytes"], 100'000);
+  const bool beside = factors_may_work_at_once();
+  EXPECT_NE(
+      text.find(beside ? "the next near field: by another thread" : "the next near field: about the shape at rest"),
+      std::string::npos)
+      << text;
+  EXPECT_EQ(json["near"].contains("field_s"), beside);
+  EXPECT_EQ(json["near"].contains("thread_bytes"), beside);
   scene.body.shape = BlockShape{Vec3(0.1, 0.1, 0.05), {4, 4, 2}};
   EXPECT_NE(explained(scene).find("near the tool: the whole body"), std::string::npos);
   scene.body.model = ModelKind::kLinear;

@@ -344,7 +344,7 @@ TEST(Cutting, IsMadeInItsOrderAtItsTimeOrForceAndSaidOnce) {
 /// What a body has handed out to be done elsewhere.
 struct Later {
   explicit Later(Body& body) {
-    body.prepare_cuts_by([this](std::packaged_task<void()> work) { left.push_back(std::move(work)); });
+    body.prepare_by([this](std::packaged_task<void()> work) { left.push_back(std::move(work)); });
   }
   std::vector<std::packaged_task<void()>> left;
 };
@@ -422,7 +422,7 @@ TEST(PreparedCut, MayBeDoneWhenTheBodyIsGone) {
   std::vector<std::packaged_task<void()>> left;
   {
     Body body(config);
-    body.prepare_cuts_by([&](std::packaged_task<void()> work) { left.push_back(std::move(work)); });
+    body.prepare_by([&](std::packaged_task<void()> work) { left.push_back(std::move(work)); });
     body.touch(Vec3(0, 0, 0.048));
   }
   ASSERT_EQ(left.size(), 1U);

@@ -8,8 +8,10 @@
 #include <memory>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include "clients/softbody/models/quasi_static.h"
 #include "tests/clients/softbody/pressed_block.h"
 
 namespace tendon::softbody {
@@ -31,9 +33,11 @@ struct AtRest {
   }
   std::unique_ptr<NearBody> near(double radius, int modes = NearBody::Config{}.modes,
                                  const std::vector<int>& pressed = {}) const {
+    return made({Vec3(0, 0, 0.05), radius, modes, pressed, solid.to_free(load)}, factor);
+  }
+  std::unique_ptr<NearBody> made(NearBody::Config config, const Factor& of) const {
     std::unique_ptr<NearBody> body;
-    Pieces pieces =
-        NearBody::make(solid, factor, {Vec3(0, 0, 0.05), radius, modes, pressed, solid.to_free(load)}, body);
+    Pieces pieces = NearBody::make(solid, of, std::move(config), body);
     while (pieces.next()) continue;
     return body;
   }
@@ -42,6 +46,27 @@ struct AtRest {
   SymmetricMatrix stiffness;
   Factor factor;
   VectorXd load;
+};
+
+/// The same pressed by 4 mm, and a body about this shape.
+struct Pressed : AtRest {
+  Pressed(Law law, double radius, int modes)
+      : AtRest(8, 0.45, law), whole(solid, top, {.max_iterations = 100, .tolerance = 1e-10, .glides = false}) {
+    force = whole.press(*top.patch(Vec2::Zero()), Given::kDepth, kDepth).force;
+    if (!whole.renew_factor()) throw std::runtime_error("not definite");
+    body = made({.middle = Vec3(0, 0, 0.05),
+                 .radius = radius,
+                 .modes = modes,
+                 .pressed = {},
+                 .press = solid.to_free(load),
+                 .about = whole.displacements(),
+                 .about_depth = kDepth},
+                whole.factor());
+  }
+  static constexpr double kDepth = 4e-3;
+  QuasiStaticModel whole;
+  double force;
+  std::unique_ptr<NearBody> body;
 };
 
 /// The load on the nodes of a near body.
@@ -54,11 +79,13 @@ VectorXd own_load(const NearBody& body, const VectorXd& load) {
 }
 
 TEST(NearBody, ForcesAreTheSlopeOfTheEnergyAndTheStiffnessThatOfTheForces) {
-  for (const Law law : {Law::kNeoHookean, Law::kCorotational, Law::kStVenantKirchhoff}) {
-    const AtRest block(8, 0.45, law);
-    const auto body = block.near(0.035);
+  constexpr Law kLaws[] = {Law::kNeoHookean, Law::kCorotational, Law::kStVenantKirchhoff};
+  std::vector<std::unique_ptr<NearBody>> bodies;
+  for (const Law law : kLaws) bodies.push_back(AtRest(8, 0.45, law).near(0.035));
+  for (const Law law : kLaws) bodies.push_back(std::move(Pressed(law, 0.035, 60).body));
+  for (const auto& body : bodies) {
     ASSERT_GT(body->modes(), 20);
-    VectorXd u = VectorXd::Zero(body->size());
+    VectorXd u = body->beginning();
     VectorXd way = VectorXd::Zero(body->free_count());
     const int inner = body->free_count() - body->modes();
     for (int i = 0; i < body->free_count(); ++i) way[i] = (i < inner ? 1e-3 : 3e-3) * std::sin(3.0 * i);
@@ -97,6 +124,39 @@ TEST(NearBody, WithItsExactInterfaceItIsTheWholeBodyAtFirstTouch) {
   EXPECT_LT(compliance(60), whole);
   EXPECT_NEAR(compliance(60) / whole, 1, 5e-3);
   EXPECT_LT(compliance(10), compliance(60));
+}
+
+TEST(NearBody, AboutAPressedShapeItBeginsThereAtRestAsStiffAsTheWholeBody) {
+  for (const Law law : {Law::kNeoHookean, Law::kCorotational}) {
+    const Pressed exact(law, 0.045, 100'000);
+    const NearBody& body = *exact.body;
+    const VectorXd load = own_load(body, exact.load);
+    const VectorXd left = body.to_free(body.forces(body.beginning()).force) - exact.force * load;
+    EXPECT_LT(left.norm(), 1e-8 * exact.force);
+    SymmetricMatrix stiffness = body.pattern();
+    body.stiffness(body.beginning(), Elastic::Curvature::kExact, stiffness);
+    Factor factor(stiffness);
+    ASSERT_TRUE(factor.factorize(stiffness));
+    const VectorXd whole_load = exact.solid.to_free(exact.load);
+    const double whole = whole_load.dot(exact.whole.factor().solve(whole_load).col(0));
+    EXPECT_NEAR(load.dot(factor.solve(load).col(0)) / whole, 1, 1e-7);
+  }
+}
+
+TEST(NearBody, AboutAPressedShapeNothingIsLeftOutThereAndFarFromItMuch) {
+  const Pressed pressed(Law::kNeoHookean, 0.045, 60);
+  const NearBody& body = *pressed.body;
+  EXPECT_LT(std::abs(body.left_out(body.beginning(), Pressed::kDepth)), 1e-12);
+  QuasiStaticModel model(body, pressed.top, {.max_iterations = 100, .tolerance = 1e-9, .glides = false});
+  Patch patch = *pressed.top.patch(Vec2::Zero());
+  for (int& node : patch.nodes) node = body.own_node(node);
+  double before = 0;
+  for (const double depth : {3.5e-3, 2e-3, 1e-5}) {
+    model.press(patch, Given::kDepth, depth);
+    const double left_out = std::abs(body.left_out(model.displacements(), depth));
+    EXPECT_GT(left_out, before) << depth;
+    before = left_out;
+  }
 }
 
 TEST(NearBody, OfABodyThatEndsBeforeItsRadiusThereIsNone) {

@@ -269,11 +269,12 @@ class Same : public Model {
   Reaction reaction_;
 };
 
-TEST(Near, BlendedAnswersAreBetweenTheTwoInForceAndInStiffness) {
+TEST(Near, WhereAFieldTakesOverForceAndStiffnessGoOnAndFadeTogether) {
   const Solid solid = pressed_block(Element::kHex8Sri, 8, 0.45);
   const TouchSurface slanting(solid.mesh(), Vec3(0.3, -0.2, 1).normalized(), kB1PatchRadius);
   Reaction one;
   one.force = 2;
+  one.depth = 4e-3;
   one.stiffness = 400;
   one.slope = Vec2(0.1, -0.2);
   one.error = 0.01;
@@ -281,22 +282,34 @@ TEST(Near, BlendedAnswersAreBetweenTheTwoInForceAndInStiffness) {
   one.glide.tilting = Vec2(3, 5);
   one.glide.curving << 7, 1, 1, -4;
   one.glide.giving << 20, 3, 3, 30;
-  Reaction other = one;
-  other.force = 2.1;
-  other.stiffness = 430;
-  other.slope = Vec2(-0.05, 0.3);
-  other.glide.tilting = Vec2(-2, 1);
+  Reaction before = one;
+  before.force = 2.1;
+  const Handover met = handover(before, one, one.depth);
   const auto felt = [&](const Reaction& reaction) {
     Same model(reaction);
     return PatchContact(model, slanting, 0, PatchContact::Side::kUnilateral).at(Vec3(0.001, 0.002, 0.046));
   };
   for (const double share : {0.0, 0.3, 1.0}) {
-    const Reaction both = blended(one, other, share);
-    const Feel found = felt(both);
-    EXPECT_LT((found.force - (1 - share) * felt(one).force - share * felt(other).force).norm(), 1e-12);
-    EXPECT_LT((found.stiffness - (1 - share) * felt(one).stiffness - share * felt(other).stiffness).norm(), 1e-9);
-    EXPECT_NEAR(both.error, 0.01 + 0.1, 1e-12);
+    const Reaction both = kept(met, share, one);
+    const double times = 1 + share * 0.05;
+    EXPECT_LT((felt(both).force - times * felt(one).force).norm(), 1e-12);
+    EXPECT_LT((felt(both).stiffness - times * felt(one).stiffness).norm(), 1e-9);
+    EXPECT_NEAR(both.error, times * 0.01 + both.force * share * 0.05, 1e-12);
   }
+  // Less deep the ratio is kept, and deeper the difference.
+  Reaction less = one;
+  less.force = 1;
+  less.depth = 2e-3;
+  EXPECT_NEAR(kept(met, 1, less).force, 1.05, 1e-12);
+  Reaction more = one;
+  more.force = 4;
+  more.depth = 8e-3;
+  EXPECT_NEAR(kept(met, 1, more).force, 4.1, 1e-12);
+  before.slope = Vec2(0.12, -0.2);
+  EXPECT_EQ(kept(handover(before, one, one.depth), 1, one).slope, before.slope);
+  // Where nothing was felt, or there is nothing to feel, nothing goes on.
+  EXPECT_EQ(kept(handover({}, one, one.depth), 1, one).force, one.force);
+  EXPECT_EQ(kept(handover(one, {}, one.depth), 1, one).force, one.force);
 }
 
 }  // namespace
