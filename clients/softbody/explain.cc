@@ -49,6 +49,7 @@ BodyConfig without(BodyConfig body, EffectKind effect) {
       break;
     case EffectKind::kMaterialNonlinearity:
       body.law = Law::kCorotational;
+      body.learned = learn(body, {});  // what was learned is of the other law
       break;
     case EffectKind::kContact:
     case EffectKind::kGeometricNonlinearity:
@@ -104,7 +105,9 @@ std::string milliseconds(double s, double resolution) {
 }  // namespace
 
 Explanation explain(const Scene& scene, const std::function<double()>& processor_time) {
-  Body body(scene.body);
+  BodyConfig config = scene.body;
+  if (!config.learned) config.learned = learn(config, {});
+  Body body(config);
   // The push is so small that the answer is linear. It is a force because the weight moves the surface away from the
   // mesh's.
   const double push = 1e-3 * scene.body.material.young * scene.body.patch_radius * scene.body.patch_radius;
@@ -112,19 +115,28 @@ Explanation explain(const Scene& scene, const std::function<double()>& processor
                   .all = {},
                   .size = body.size(),
                   .near = body.near_field(),
+                  .learned = {},
                   .step = body.step(),
                   .stiffness = body.settle(Given::kForce, push).stiffness,
                   .linear_up_to = body.linear_up_to()};
 
-  std::vector<BodyConfig> bodies{scene.body, scene.body};  // the second shows how far the first can be trusted
+  std::vector<BodyConfig> bodies{config, config};  // the second shows how far the first can be trusted
   const EffectSet simulated = effects_of(scene.body);
   const EffectSet always = info(scene.body.model).always;
   for (const EffectInfo& effect : effects()) {
     out.parts.push_back({effect.kind, simulated.has(effect.kind), {}});
     if (!simulated.has(effect.kind) || always.has(effect.kind)) continue;
     out.parts.back().adds = Explanation::Cost{};
-    bodies.push_back(without(scene.body, effect.kind));
+    bodies.push_back(without(config, effect.kind));
   }
+  // Each rung where it is the first.
+  const std::size_t first_rung = bodies.size();
+  for (const Ladder::Step& step : body.ladder()) {
+    out.learned.push_back({.size = step.size});
+    bodies.push_back(config);
+    (config.tabulate ? config.tabulate : config.learn) = false;
+  }
+  if (!out.learned.empty()) bodies.push_back(config);
   std::vector<Explanation::Cost> least(bodies.size(), {std::numeric_limits<double>::infinity(), 0});
   const Mat3 turn = to_device(scene).transpose();
   const double start = processor_time();
@@ -142,6 +154,8 @@ Explanation explain(const Scene& scene, const std::function<double()>& processor
     const Explanation::Cost& less = least[next++];
     part.adds = {out.all.answer_s - less.answer_s, out.all.bytes - less.bytes};
   }
+  for (std::size_t i = 0; i < out.learned.size(); ++i) out.learned[i].answer_s = least[first_rung + i].answer_s;
+  if (!out.learned.empty()) out.near_answer_s = least.back().answer_s;
   return out;
 }
 
@@ -172,6 +186,16 @@ std::string in_words(const Scene& scene, const Explanation& explanation) {
     if (simulated) continue;
     text << "  " << info(kind).name
          << (kind == EffectKind::kGeometricNonlinearity ? ": " + turned_too_far(explanation.linear_up_to) : "") << '\n';
+  }
+  for (const auto& [rung, answer_s] : explanation.learned) {
+    text << "answers where it is good enough: " << rung.name << ", within "
+         << milliseconds(answer_s, explanation.resolution_s) << "; in " << rung.cells << " of " << rung.of_cells
+         << " cells, wrong by " << std::setprecision(2) << 100 * rung.error << std::setprecision(6) << " % at most; ";
+    if (rung.shapes > 0) text << rung.shapes << " shapes, summed over " << rung.elements << " elements; ";
+    text << static_cast<double>(rung.bytes) / 1e6 << " MB\n";
+  }
+  if (!explanation.learned.empty()) {
+    text << "answers elsewhere: the near field, within " << milliseconds(explanation.near_answer_s, 0) << '\n';
   }
   if (explanation.near && explanation.near->radius > 0) {
     const NearModel::Size& near = *explanation.near;
@@ -223,6 +247,17 @@ std::string in_json(const Scene& scene, const Explanation& explanation) {
                     {"modes", near->modes},
                     {"interface", near->interface}};
   }
+  for (const auto& [rung, answer_s] : explanation.learned) {
+    json["learned"].push_back({{"name", rung.name},
+                               {"answer_s", answer_s},
+                               {"cells", rung.cells},
+                               {"of_cells", rung.of_cells},
+                               {"error", rung.error},
+                               {"shapes", rung.shapes},
+                               {"elements", rung.elements},
+                               {"bytes", rung.bytes}});
+  }
+  if (!explanation.learned.empty()) json["near"]["answer_s"] = explanation.near_answer_s;
   return json.dump(-1, ' ', false, Json::error_handler_t::replace) + '\n';
 }
 

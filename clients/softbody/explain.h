@@ -32,6 +32,13 @@ struct Explanation {
   double resolution_s = 0;  ///< the difference of two measurements of the same body; smaller costs mean nothing
   Body::Size size;
   std::optional<NearModel::Size> near;  ///< of the model "near"
+  /// What answers before the near field, the first one first; and what an answer costs where it is the first.
+  struct Learned {
+    Rung::Size size;
+    double answer_s = 0;  ///< s of processor time
+  };
+  std::vector<Learned> learned;
+  double near_answer_s = 0;             ///< s, of the near field, where something answers before it
   double step = 0;                      ///< s, the time step of an answer; 0: the body is at rest at every instant
   double stiffness = 0;                 ///< N/m, at first touch
   double linear_up_to = 0;              ///< m; see Body

@@ -47,6 +47,16 @@ class Presser {
     return solved;
   }
 
+  /// At rest, before the first press.
+  SolvedPress touch(const std::optional<Patch>& patch, const Vec3& normal) const {
+    SolvedPress solved;
+    if (!patch) return solved;
+    const VectorXd load = solid_.to_free(patch_load(solid_, normal, *patch));
+    solved.reaction.stiffness = 1 / load.dot(VectorXd(model_.factor().solve(load)));
+    solved.good = true;
+    return solved;
+  }
+
   VectorXd shape() const { return solid_.to_free(model_.displacements()); }
 
  private:
@@ -112,6 +122,11 @@ SolvedPresses solve_presses(const Solid& solid, const TouchSurface& surface, con
   };
   // To and fro, down and up: each press is next to the one before.
   Presser presser(solid, surface);
+  for (int i = 0; i < side; ++i) {
+    for (int j = 0; j < side; ++j) {
+      all.knots[at(grid.knot(i, j, 0))] = presser.touch(surface.patch(grid.place(i, j)), surface.normal());
+    }
+  }
   bool down = true;
   int good = 0;
   const auto order = [](int i, int k, int count) { return i % 2 == 0 ? k : count - 1 - k; };
