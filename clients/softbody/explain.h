@@ -38,10 +38,10 @@ struct Explanation {
     double answer_s = 0;  ///< s of processor time
   };
   std::vector<Learned> learned;
-  double near_answer_s = 0;             ///< s, of the near field, where something answers before it
-  double step = 0;                      ///< s, the time step of an answer; 0: the body is at rest at every instant
-  double stiffness = 0;                 ///< N/m, at first touch
-  double linear_up_to = 0;              ///< m; see Body
+  double near_answer_s = 0;  ///< s, of the near field, where something answers before it
+  double step = 0;           ///< s, the time step of an answer; 0: the body is at rest at every instant
+  double stiffness = 0;      ///< N/m, at first touch
+  double linear_up_to = 0;   ///< m; see Body
 };
 
 /// `processor_time` of the calling thread, s.

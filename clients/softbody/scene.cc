@@ -24,7 +24,7 @@ namespace {
 constexpr std::uintmax_t kMaxSceneBytes = 16'384;
 constexpr double kMaxLength = 1e3;  // m: a larger value is a mistaken unit
 constexpr std::int64_t kMaxCells = 200;
-constexpr double kMaxError = 10;  // %: more is felt
+constexpr double kMaxError = 10;          // %: more is felt
 constexpr double kErrorOfLearned = 0.02;  // of the force, where a scene that learns asks for nothing else
 
 template <class Infos>
@@ -590,7 +590,8 @@ std::string scene_reference() {
       << 100 * defaults.tolerance
       << "   of the force, of the same: an answer ends when it may be wrong by so much, and says by how much;\n"
          "                         near adds what the linear far field may leave out\n"
-         "learn = false            of near: presses within reach_mm of the middle, up and down and to and fro, are solved\n"
+         "learn = false            of near: presses within reach_mm of the middle, up and down and to and fro, are "
+         "solved\n"
          "                         at the start; few shapes of these answer all between. error_percent = "
       << 100 * kErrorOfLearned
       << " then: where\n"
@@ -605,8 +606,10 @@ std::string scene_reference() {
          "patch_radius_mm          the tool presses on a patch of this size\n"
          "from = [0, 0, 1]         the way to the tool, in the body's frame\n"
          "middle_mm = [0, 0, 0]    of the side that is touched; its place across `from` counts\n"
-         "reach_mm                 for condensed, modal: touched only so far from the middle. Without: anywhere; for near\n"
-         "                         with learn or tabulate: they answer so far along each axis, at most 1.5 patch radii\n"
+         "reach_mm                 for condensed, modal: touched only so far from the middle. Without: anywhere; for "
+         "near\n"
+         "                         with learn or tabulate: they answer so far along each axis, at most 1.5 patch "
+         "radii\n"
          "tool = \"patch\"           or sphere, capsule: rigid, its contact grows as it is pressed in; of condensed\n"
          "                         (without friction), corotational, stvk, neo-hookean; or box: of the last three\n"
          "tool_radius_mm = 0       how much earlier a patch touches; the sphere's, the capsule's\n"

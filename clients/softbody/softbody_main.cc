@@ -59,7 +59,8 @@ void learn(softbody::BodyConfig& body) {
     if (tells) std::cerr << "\r\033[K" << what << std::flush;
   });
   if (tells) std::cerr << "\r\033[K";
-  for (const std::string& warning : body.learned->warnings) std::cerr << "tendon-softbody: warning: " << warning << '\n';
+  for (const std::string& warning : body.learned->warnings)
+    std::cerr << "tendon-softbody: warning: " << warning << '\n';
 }
 
 /// `tendon-softbody condense SCENE FILE`.

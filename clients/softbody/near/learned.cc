@@ -35,15 +35,19 @@ constexpr double kLeastNudge = 1e-9;
 constexpr int kMostSteps = 8;
 constexpr double kShortestShare = 1.0 / 64;
 constexpr double kShareOfDecrease = 1e-4;
+/// The least cosine of the angle between a step and what it changes.
+constexpr double kLeastCurved = 1e-8;
 
 /// Shares of what an answer may be wrong by: for Newton's method. The rest is for the shapes.
 constexpr double kForNewton = 0.25;
 
-/// To what share of the force knots are solved, and learned answers that are judged.
+/// To what share of the force knots are solved, and learned answers that are judged: what the force is wrong by is of the
+/// second order of this.
 constexpr double kExactly = 1e-6;
+constexpr double kJudged = 1e-4;
 
 /// Rounds of Rayleigh's quotient for the stiffness, until so small a share of it is doubtful.
-constexpr int kStiffnessRounds = 3;
+constexpr int kStiffnessRounds = 5;
 constexpr double kStiffnessAlike = 0.02;
 
 /// The corners of each element have numbers of their own, so that its forces are its alone.
@@ -248,6 +252,15 @@ bool go(const LearnedBody& body, const VectorXd& step, double& energy, VectorXd&
   return false;
 }
 
+/// What a step and the change of forces along it teach of the inverse (BFGS).
+void learn_step(const VectorXd& step, const VectorXd& change, MatrixXd& inverse) {
+  const double stiff = step.dot(change);
+  if (!(stiff > kLeastCurved * step.norm() * change.norm())) return;
+  const VectorXd solved = inverse * change;
+  const VectorXd mixed = ((1 + change.dot(solved) / stiff) / 2 * step - solved) / stiff;
+  inverse += mixed * step.transpose() + step * mixed.transpose();
+}
+
 /// Finds the shape of a knot and the inverse there. False where there is none.
 bool solve_knot(const LearnedBody& body, const VectorXd& load, double depth, VectorXd& q, MatrixXd& inverse) {
   VectorXd slope(q.size());
@@ -301,8 +314,9 @@ LearnedShapes learn_shapes(const Solid& solid, const TouchSurface& surface, cons
     few.col(i) = learned.shapes.transpose() * force;
   }
   learned.linear = MatrixXd::Identity(count, count) - (few + few.transpose()) / 2;
-  if (tell) tell("learning: " + std::to_string(learned.elements.size()) + " elements of " +
-                 std::to_string(solid.mesh().element_count()));
+  if (tell)
+    tell("learning: " + std::to_string(learned.elements.size()) + " elements of " +
+         std::to_string(solid.mesh().element_count()));
 
   // The knots, and how wrong answers are there and in the middles of cells.
   learned.knots = MatrixXd::Zero(count, grid.knots());
@@ -345,8 +359,12 @@ LearnedShapes learn_shapes(const Solid& solid, const TouchSurface& surface, cons
         const int cell = grid.cell(i, j, level);
         const SolvedPress& truth = presses.middles[at(cell)];
         const double depth = (level + 0.5) * grid.step;
-        const auto found = body.press(*patch, depth, *grid.find(place, depth), kExactly);
-        if (truth.good && found) in_middles[at(cell)] = share_of(found->force, truth.reaction.force);
+        const auto found = body.press(*patch, depth, *grid.find(place, depth), kJudged);
+        if (!truth.good || !found) continue;
+        in_middles[at(cell)] = share_of(found->force, truth.reaction.force);
+        if (level > 0) continue;
+        const double rest = share_of(1 / body.load(*patch).squaredNorm(), presses.at_rest[at(grid.column(i, j))]);
+        in_middles[at(cell)] = std::max(in_middles[at(cell)], rest);
       }
     }
   }
@@ -356,8 +374,8 @@ LearnedShapes learn_shapes(const Solid& solid, const TouchSurface& surface, cons
 
 LearnedBody::LearnedBody(const Solid& solid, const TouchSurface& surface, const LearnedShapes& learned)
     : grid_(learned.grid),
-      kernel_(apart(solid, solid.law(), learned.elements, Corners(solid.mesh(), learned.elements).own,
-                    learned.weights)),
+      kernel_(
+          apart(solid, solid.law(), learned.elements, Corners(solid.mesh(), learned.elements).own, learned.weights)),
       shapes_(learned.shapes),
       depths_(learned.depths),
       column_of_(solid.mesh().nodes.size(), -1),
@@ -398,8 +416,8 @@ std::optional<Reaction> LearnedBody::press(const Patch& patch, double depth, con
     q += share * knots_.col(knot);
     inverse += share * inverses_.middleCols(size * knot, size);
   }
-  const VectorXd by_tool = inverse * load;
-  const double compliance = load.dot(by_tool);
+  VectorXd by_tool = inverse * load;
+  double compliance = load.dot(by_tool);
   q += (depth - load.dot(q)) / compliance * by_tool;
   VectorXd slope(size);
   double energy = this->energy(q, slope);
@@ -410,7 +428,12 @@ std::optional<Reaction> LearnedBody::press(const Patch& patch, double depth, con
     const double left = -slope.dot(move);
     reaction.error = std::sqrt(std::abs(left / compliance));
     if (reaction.error <= tolerance * std::abs(reaction.force)) break;
+    const VectorXd from = q;
+    const VectorXd before = slope;
     if (step == kMostSteps || !(left > 0) || !go(*this, move, energy, q, slope)) return std::nullopt;
+    learn_step(q - from, slope - before, inverse);
+    by_tool = inverse * load;
+    compliance = load.dot(by_tool);
   }
   reaction.depth = load.dot(q);
   reaction.slope = patch.slopes * (below.transpose() * q);
@@ -456,13 +479,11 @@ std::optional<Reaction> LearnedBody::press(const Patch& patch, double depth, con
 
 std::size_t LearnedBody::bytes() const noexcept {
   return kernel_.bytes() + column_of_.size() * sizeof(int) +
-         static_cast<std::size_t>(shapes_.size() + depths_.size() + linear_.size() + knots_.size() +
-                                  inverses_.size()) *
+         static_cast<std::size_t>(shapes_.size() + depths_.size() + linear_.size() + knots_.size() + inverses_.size()) *
              sizeof(double);
 }
 
-LearnedRung::LearnedRung(const Solid& solid, const TouchSurface& surface, const LearnedShapes& shapes,
-                         double tolerance)
+LearnedRung::LearnedRung(const Solid& solid, const TouchSurface& surface, const LearnedShapes& shapes, double tolerance)
     : body_(solid, surface, shapes),
       trust_(shapes.grid, shapes.errors),
       allowed_(trust_, (1 - kForNewton) * tolerance),

@@ -20,10 +20,10 @@ struct LearnedShapes {
   PressGrid grid;
   std::vector<int> elements{};  ///< ascending
   VectorXd weights{};           ///< ω
-  MatrixXd shapes{};  ///< Φ: three rows for each node of the elements, ascending; √m/√N, displacements for √J
-  MatrixXd depths{};  ///< a row for each shape, a column for each touchable node, ascending: how deep it makes it
-  MatrixXd linear{};  ///< 1 − Σ_e ω_e Φ_eᵀ K₀ₑ Φ_e
-  MatrixXd knots{};   ///< a column q for each knot of the grid
+  MatrixXd shapes{};    ///< Φ: three rows for each node of the elements, ascending; √m/√N, displacements for √J
+  MatrixXd depths{};    ///< a row for each shape, a column for each touchable node, ascending: how deep it makes it
+  MatrixXd linear{};    ///< 1 − Σ_e ω_e Φ_eᵀ K₀ₑ Φ_e
+  MatrixXd knots{};     ///< a column q for each knot of the grid
   MatrixXd inverses{};  ///< for each knot r columns: the inverse of E's second derivative there
   std::vector<double> errors{};  ///< Trust::errors()
 };
@@ -34,8 +34,8 @@ LearnedShapes learn_shapes(const Solid& solid, const TouchSurface& surface, cons
                            const Tell& tell);
 
 /// The body as these shapes have it: Newton's method on E, with the depth held. It begins between the shapes at the knots
-/// around, with the inverse of the stiffness between theirs, and a line search makes the energy fall in every step. The
-/// stiffness is exact to the second order of what is wrong in that inverse.
+/// around, with the inverse of the stiffness between theirs, which steps improve (BFGS), and a line search makes the energy
+/// fall in every step. The stiffness is exact to the second order of what is wrong in that inverse.
 ///
 /// Thread-safe: yes, once built. Realtime-safe: no.
 class LearnedBody {

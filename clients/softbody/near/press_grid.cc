@@ -57,6 +57,13 @@ class Presser {
     return solved;
   }
 
+  /// The same press with a factor of its shape: stiffness and glide are then exact.
+  void sharpen(const Patch& patch, double depth, SolvedPress& solved) {
+    model_.renew_factor();
+    model_.forget_forces();
+    take(patch, depth, solved);
+  }
+
   VectorXd shape() const { return solid_.to_free(model_.displacements()); }
 
  private:
@@ -109,7 +116,7 @@ std::array<PressGrid::Corner, 8> PressGrid::corners(const Point& point) const {
 }
 
 SolvedPresses solve_presses(const Solid& solid, const TouchSurface& surface, const PressGrid& grid, const Tell& tell) {
-  SolvedPresses all{.grid = grid, .knots = {}, .middles = {}};
+  SolvedPresses all{.grid = grid, .knots = {}, .middles = {}, .at_rest = {}};
   all.knots.resize(at(grid.knots()));
   all.middles.resize(at(grid.cells()));
   const int side = grid.side();
@@ -127,6 +134,12 @@ SolvedPresses solve_presses(const Solid& solid, const TouchSurface& surface, con
       all.knots[at(grid.knot(i, j, 0))] = presser.touch(surface.patch(grid.place(i, j)), surface.normal());
     }
   }
+  for (int i = 0; i + 1 < side; ++i) {
+    for (int j = 0; j + 1 < side; ++j) {
+      const auto patch = surface.patch(grid.place(i + 0.5, j + 0.5));
+      all.at_rest.push_back(presser.touch(patch, surface.normal()).reaction.stiffness);
+    }
+  }
   bool down = true;
   int good = 0;
   const auto order = [](int i, int k, int count) { return i % 2 == 0 ? k : count - 1 - k; };
@@ -138,6 +151,7 @@ SolvedPresses solve_presses(const Solid& solid, const TouchSurface& surface, con
         const int level = down ? step + 1 : PressGrid::kLevels - step;
         SolvedPress& solved = all.knots[at(grid.knot(i, j, level))];
         solved = presser.press(patch, level * grid.step, grid.step);
+        if (solved.good) presser.sharpen(*patch, level * grid.step, solved);
         if (!solved.good) continue;
         solved.shape = presser.shape();
         ++good;

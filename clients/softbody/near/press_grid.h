@@ -34,8 +34,9 @@ struct PressGrid {
 
   /// A knot is a place and a depth, a cell what is between eight of them. Both have numbers from 0, depths first.
   int knot(int i, int j, int level) const noexcept { return (i * side() + j) * (kLevels + 1) + level; }
-  int cell(int i, int j, int level) const noexcept { return (i * 2 * around + j) * kLevels + level; }
-  /// The place of a knot; of a cell's middle with 0.5 more.
+  int cell(int i, int j, int level) const noexcept { return column(i, j) * kLevels + level; }
+  /// The cells below each other, too. A place is that of a knot; with 0.5 more that of a cell's middle.
+  int column(int i, int j) const noexcept { return i * 2 * around + j; }
   Vec2 place(double i, double j) const { return middle + spacing * Vec2(i - around, j - around); }
 
   /// A point of the grid: its cell, and how far in it, 0 … 1 along each axis (place, place, depth).
@@ -69,6 +70,7 @@ struct SolvedPresses {
   PressGrid grid;
   std::vector<SolvedPress> knots;
   std::vector<SolvedPress> middles;
+  std::vector<double> at_rest{};  ///< N/m, the stiffness at first touch above each cell's middle; 0: off the body
 };
 
 /// What long work says: a line without an end. Null: nobody listens.

@@ -30,24 +30,12 @@ struct Quintic {
     const double x3 = x2 * x;
     const double x4 = x3 * x;
     const double x5 = x4 * x;
-    value = {1 - 10 * x3 + 15 * x4 - 6 * x5,
-             x - 6 * x3 + 8 * x4 - 3 * x5,
-             0.5 * x2 - 1.5 * x3 + 1.5 * x4 - 0.5 * x5,
-             10 * x3 - 15 * x4 + 6 * x5,
-             -4 * x3 + 7 * x4 - 3 * x5,
-             0.5 * x3 - x4 + 0.5 * x5};
-    first = {-30 * x2 + 60 * x3 - 30 * x4,
-             1 - 18 * x2 + 32 * x3 - 15 * x4,
-             x - 4.5 * x2 + 6 * x3 - 2.5 * x4,
-             30 * x2 - 60 * x3 + 30 * x4,
-             -12 * x2 + 28 * x3 - 15 * x4,
-             1.5 * x2 - 4 * x3 + 2.5 * x4};
-    second = {-60 * x + 180 * x2 - 120 * x3,
-              -36 * x + 96 * x2 - 60 * x3,
-              1 - 9 * x + 18 * x2 - 10 * x3,
-              60 * x - 180 * x2 + 120 * x3,
-              -24 * x + 84 * x2 - 60 * x3,
-              3 * x - 12 * x2 + 10 * x3};
+    value = {1 - 10 * x3 + 15 * x4 - 6 * x5, x - 6 * x3 + 8 * x4 - 3 * x5, 0.5 * x2 - 1.5 * x3 + 1.5 * x4 - 0.5 * x5,
+             10 * x3 - 15 * x4 + 6 * x5,     -4 * x3 + 7 * x4 - 3 * x5,    0.5 * x3 - x4 + 0.5 * x5};
+    first = {-30 * x2 + 60 * x3 - 30 * x4, 1 - 18 * x2 + 32 * x3 - 15 * x4, x - 4.5 * x2 + 6 * x3 - 2.5 * x4,
+             30 * x2 - 60 * x3 + 30 * x4,  -12 * x2 + 28 * x3 - 15 * x4,    1.5 * x2 - 4 * x3 + 2.5 * x4};
+    second = {-60 * x + 180 * x2 - 120 * x3, -36 * x + 96 * x2 - 60 * x3, 1 - 9 * x + 18 * x2 - 10 * x3,
+              60 * x - 180 * x2 + 120 * x3,  -24 * x + 84 * x2 - 60 * x3, 3 * x - 12 * x2 + 10 * x3};
   }
   std::array<double, 6> value{};
   std::array<double, 6> first{};
@@ -149,6 +137,10 @@ TabulatedAnswers tabulate(const SolvedPresses& presses) {
         if (!truth.good) continue;
         const auto point = grid.find(grid.place(i + 0.5, j + 0.5), (level + 0.5) * grid.step);
         in_middles[cell] = std::abs(energy_at(table, *point).force / truth.reaction.force - 1);
+        if (level > 0) continue;
+        const auto rest = grid.find(grid.place(i + 0.5, j + 0.5), 0);
+        const double stiffness = energy_at(table, *rest).stiffness;
+        in_middles[cell] = std::max(in_middles[cell], std::abs(stiffness / presses.at_rest[at(grid.column(i, j))] - 1));
       }
     }
   }
@@ -168,8 +160,8 @@ TabulatedEnergy energy_at(const TabulatedAnswers& table, const PressGrid::Point&
     const std::size_t cx = corner / 4;
     const std::size_t cy = corner / 2 % 2;
     const std::size_t cz = corner % 2;
-    const int knot = grid.knot(point.i + static_cast<int>(cx), point.j + static_cast<int>(cy),
-                               point.level + static_cast<int>(cz));
+    const int knot =
+        grid.knot(point.i + static_cast<int>(cx), point.j + static_cast<int>(cy), point.level + static_cast<int>(cz));
     const double* const numbers = table.numbers.data() + at(knot) * TabulatedAnswers::kNumbers;
     for (std::size_t field = 0; field < 3; ++field) {
       const std::size_t in_z = 3 * cz + field;

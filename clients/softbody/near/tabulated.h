@@ -32,11 +32,11 @@ TabulatedAnswers tabulate(const SolvedPresses& presses);
 
 /// E and its derivatives at a point of the grid, in SI units.
 struct TabulatedEnergy {
-  double energy = 0;          ///< J
-  double force = 0;           ///< N, ∂E/∂δ
-  double stiffness = 0;       ///< N/m
-  Vec2 across{0, 0};          ///< N, ∂E/∂c
-  Vec2 mixed{0, 0};           ///< N/m, ∂²E/∂δ∂c
+  double energy = 0;           ///< J
+  double force = 0;            ///< N, ∂E/∂δ
+  double stiffness = 0;        ///< N/m
+  Vec2 across{0, 0};           ///< N, ∂E/∂c
+  Vec2 mixed{0, 0};            ///< N/m, ∂²E/∂δ∂c
   Mat2 curves = Mat2::Zero();  ///< N/m, ∂²E/∂c²
 };
 TabulatedEnergy energy_at(const TabulatedAnswers& table, const PressGrid::Point& point);
