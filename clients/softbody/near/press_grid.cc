@@ -52,7 +52,10 @@ class Presser {
     SolvedPress solved;
     if (!patch) return solved;
     const VectorXd load = solid_.to_free(patch_load(solid_, normal, *patch));
-    solved.reaction.stiffness = 1 / load.dot(VectorXd(model_.factor().solve(load)));
+    VectorXd shape = VectorXd::Zero(solid_.size());
+    solid_.add_free(VectorXd(model_.factor().solve(load)), shape);
+    solved.reaction.stiffness = 1 / depth_below(*patch, normal, shape);
+    solved.reaction.glide.tilting = solved.reaction.stiffness * slope_below(*patch, normal, shape);
     solved.good = true;
     return solved;
   }

@@ -61,7 +61,7 @@ struct SolvedPress {
   bool good = false;  ///< the patch is on the body, and Newton's method converged
   double energy = 0;  ///< J
   Reaction reaction;
-  VectorXd shape;  ///< m, free displacements; empty at rest, where `reaction` has the stiffness
+  VectorXd shape;  ///< m, free displacements; empty at rest: stiffness and tilting are known there
 };
 
 /// The answers at every knot and in the middle of every cell; these have no shape, and what was learned from the knots

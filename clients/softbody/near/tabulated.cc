@@ -111,12 +111,18 @@ TabulatedAnswers tabulate(const SolvedPresses& presses) {
     knots.at_knot(i, j, level, number(1, kAlongX)) = mixed.x();
     knots.at_knot(i, j, level, number(1, kAlongY)) = mixed.y();
     knots.at_knot(i, j, level, number(2, kValue)) = grid.step * grid.step * r.stiffness;
+    if (level > 0) return;
+    // At rest k = 1/(w·K⁻¹w), and its slope −2 k t.
+    const Vec2 steeper = -2 * grid.spacing * grid.step * grid.step * r.stiffness * r.glide.tilting;
+    knots.at_knot(i, j, level, number(2, kAlongX)) = steeper.x();
+    knots.at_knot(i, j, level, number(2, kAlongY)) = steeper.y();
   });
   // What one solution does not tell: third derivatives.
   for_each_knot([&](int i, int j, int level, std::size_t knot) {
     if (!known[knot]) return;
     knots.at_knot(i, j, level, number(1, kTwisted)) =
         (knots.slope(i, j, level, number(1, kAlongX), false) + knots.slope(i, j, level, number(1, kAlongY), true)) / 2;
+    if (level == 0) return;
     knots.at_knot(i, j, level, number(2, kAlongX)) = knots.slope(i, j, level, number(2, kValue), true);
     knots.at_knot(i, j, level, number(2, kAlongY)) = knots.slope(i, j, level, number(2, kValue), false);
   });
@@ -134,8 +140,10 @@ TabulatedAnswers tabulate(const SolvedPresses& presses) {
       for (int level = 0; level < PressGrid::kLevels; ++level) {
         const std::size_t cell = at(grid.cell(i, j, level));
         const SolvedPress& truth = presses.middles[cell];
-        if (!truth.good) continue;
         const auto point = grid.find(grid.place(i + 0.5, j + 0.5), (level + 0.5) * grid.step);
+        const auto corners = grid.corners(*point);
+        const bool all = std::ranges::all_of(corners, [&](const auto& corner) { return known[at(corner.knot)]; });
+        if (!truth.good || !all) continue;
         in_middles[cell] = std::abs(energy_at(table, *point).force / truth.reaction.force - 1);
         if (level > 0) continue;
         const auto rest = grid.find(grid.place(i + 0.5, j + 0.5), 0);

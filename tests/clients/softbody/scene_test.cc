@@ -208,7 +208,7 @@ TEST(SoftbodyScene, WhatABodyIsToLearnArrivesAndWantsItsReach) {
   EXPECT_EQ(refusal(near("learn = true", "")),
             "s.toml: touch.reach_mm: expected a number above 0 and at most 30, found nothing");
   EXPECT_EQ(refusal(near("tabulate = true", "reach_mm = 31")),
-            "s.toml:14: touch.reach_mm: expected a number above 0 and at most 30");
+            "s.toml:13: touch.reach_mm: expected a number above 0 and at most 30");
   EXPECT_EQ(refusal(near("learned_in = \"kept\"", "reach_mm = 10")),
             "s.toml:10: model.learned_in: unknown key; expected one of error_percent, kind, law, learn, "
             "max_iterations, tabulate");

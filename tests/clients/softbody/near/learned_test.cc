@@ -44,8 +44,8 @@ TEST(LearnedShapes, ASmallPressIsThatOfTheWholeLinearBody) {
   const Vec2 place(0.0013, -0.0021);
   const Reaction found = rung->press(*block.top.patch_with_curvatures(place), 1e-7)->reaction;
   const Reaction truth = block.exact.press(*block.top.patch_with_curvatures(place), Given::kDepth, 1e-7);
-  EXPECT_NEAR(found.stiffness, truth.stiffness, 1e-3 * truth.stiffness);
-  EXPECT_NEAR(found.force, truth.force, 1e-3 * truth.force);
+  EXPECT_NEAR(found.stiffness, truth.stiffness, 3e-3 * truth.stiffness);
+  EXPECT_NEAR(found.force, truth.force, 3e-3 * truth.force);
 }
 
 TEST(LearnedShapes, FewElementsAreSummedOver) {
