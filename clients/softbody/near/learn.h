@@ -25,7 +25,7 @@ struct LearnConfig {
   bool answers = false;
   Vec2 middle = Vec2::Zero();  ///< m, across
   double reach = 0;            ///< m, how far from there a hand goes along each axis
-  /// What was learned is read from here and kept here. Each file is named by what it was made of: the body, its law, the
+  /// Where files are read that were kept before, and kept. Each file is named by what it was made of: the body, its law, the
   /// side that is touched, the patch, where it is pressed, and a version. Empty: nothing is kept.
   std::filesystem::path folder{};
 };

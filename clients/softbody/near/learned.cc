@@ -12,6 +12,7 @@
 #include <string>
 #include <utility>
 
+#include "clients/softbody/fem/products.h"
 #include "clients/softbody/near/least_squares.h"
 
 namespace tendon::softbody {
@@ -376,23 +377,25 @@ LearnedBody::LearnedBody(const Solid& solid, const TouchSurface& surface, const 
     : grid_(learned.grid),
       kernel_(
           apart(solid, solid.law(), learned.elements, Corners(solid.mesh(), learned.elements).own, learned.weights)),
-      shapes_(learned.shapes),
+      shapes_(MatrixXd::Zero((learned.shapes.rows() + 3) / 4 * 4, learned.shapes.cols())),
       depths_(learned.depths),
       column_of_(solid.mesh().nodes.size(), -1),
       linear_(learned.linear),
       knots_(learned.knots),
       inverses_(learned.inverses) {
+  shapes_.topRows(learned.shapes.rows()) = learned.shapes;
   for (std::size_t i = 0; i < surface.nodes().size(); ++i) column_of_[at(surface.nodes()[i])] = static_cast<int>(i);
 }
 
 double LearnedBody::energy(const VectorXd& q, VectorXd& slope) const {
-  const VectorXd u = shapes_ * q;
+  VectorXd u;
+  times(shapes_, q, u);
   VectorXd force = VectorXd::Zero(u.size());
   const double of_law = kernel_.add_forces(u, force);
-  slope.noalias() = linear_ * q;
-  const double energy = of_law + q.dot(slope) / 2;
-  slope.noalias() += shapes_.transpose() * force;
-  return energy;
+  times_transposed(shapes_, force, slope);
+  const VectorXd linear = linear_ * q;
+  slope += linear;
+  return of_law + q.dot(linear) / 2;
 }
 
 MatrixXd LearnedBody::depths_below(const Patch& patch) const {

@@ -18,7 +18,7 @@ namespace {
 constexpr double kPlaceApart = 0.25;
 constexpr double kDepthApart = 0.07;
 
-/// What is learned from must be better than what is asked for.
+/// Solutions are better than the answers that are learned from them.
 constexpr double kSolvedTo = 1e-6;
 constexpr double kGoodEnough = 1e-4;
 constexpr int kMostIterations = 200;

@@ -59,7 +59,7 @@ TEST(Ladder, AGivenForceIsAnsweredByTheNearField) {
   EXPECT_EQ(ladder->steps()[0].answers + ladder->steps()[1].answers, 0);
 }
 
-TEST(Ladder, WhereAnotherRungTakesOverNothingJumpsAndTheErrorCoversWhatIsWrong) {
+TEST(Ladder, WhereAnotherRungTakesOverNothingJumps) {
   for (const Law law : kBothLaws) {
     PressedBefore& block = small_block(law);
     const auto ladder = ladder_with(block, true, 0.02);

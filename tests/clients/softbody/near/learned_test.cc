@@ -18,7 +18,7 @@ using testing::small_block;
 
 constexpr Law kBothLaws[] = {Law::kNeoHookean, Law::kCorotational};
 
-TEST(LearnedShapes, PressesBetweenThoseThatWereLearnedAreWithinTheErrorSaidAndTwoPercent) {
+TEST(LearnedShapes, PressesBetweenAreWithinTheErrorSaidAndTwoPercent) {
   for (const Law law : kBothLaws) {
     PressedBefore& block = small_block(law);
     const auto rung = block.learned(0.02);
@@ -104,7 +104,7 @@ TEST(LearnedShapes, TowardsTheRimOfWhatWasLearnedTheirShareFallsToNothing) {
   }
 }
 
-TEST(LearnedShapes, WhereASolutionWasNotGoodNothingIsLearnedAndNothingAnswered) {
+TEST(LearnedShapes, WhereASolutionWasNotGoodNothingIsAnswered) {
   PressedBefore& block = small_block(Law::kNeoHookean);
   SolvedPresses presses = block.presses;
   SolvedPress& bad = presses.knots[static_cast<std::size_t>(presses.grid.knot(2, 2, 3))];
