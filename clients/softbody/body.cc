@@ -171,6 +171,7 @@ struct Made {
   QuasiStaticModel* newton = nullptr;  ///< for rigid tools
   StiffeningModel* stiffening = nullptr;
   NearModel* near = nullptr;
+  const Ladder* ladder = nullptr;
 };
 
 Patch middle_patch(const TouchSurface& surface, const Vec3& middle) {
@@ -256,6 +257,28 @@ int near_modes(const BodyConfig& config) {
   return config.exact_interface ? std::numeric_limits<int>::max() : NearModel::Config{}.modes;
 }
 
+Learned learn_of(const BodyConfig& config, const Solid& solid, const TouchSurface& surface, const Tell& tell) {
+  return learn(solid, surface,
+               {.shapes = config.learn,
+                .answers = config.tabulate,
+                .middle = surface.across(config.middle),
+                .reach = *config.reach,
+                .folder = config.learned_in},
+               tell);
+}
+
+/// The highest first.
+std::vector<std::unique_ptr<Rung>> rungs_of(const BodyConfig& config, const Solid& solid, const TouchSurface& surface) {
+  std::vector<std::unique_ptr<Rung>> rungs;
+  if (!config.learn && !config.tabulate) return rungs;
+  const Learned learned = config.learned ? *config.learned : learn_of(config, solid, surface, {});
+  if (config.tabulate) rungs.push_back(std::make_unique<TabulatedRung>(learned.answers.value(), config.tolerance));
+  if (config.learn) {
+    rungs.push_back(std::make_unique<LearnedRung>(solid, surface, learned.shapes.value(), config.tolerance));
+  }
+  return rungs;
+}
+
 Made model_of(const BodyConfig& config, const Solid& solid, const TouchSurface& surface, const SolverOf& solver) {
   Made made;
   if (solver) {
@@ -271,7 +294,14 @@ Made model_of(const BodyConfig& config, const Solid& solid, const TouchSurface& 
     auto near = std::make_unique<NearModel>(solid, surface, middle_patch(surface, config.middle),
                                             NearModel::Config{.newton = newton, .modes = near_modes(config)});
     made.near = near.get();
-    made.model = std::move(near);
+    std::vector<std::unique_ptr<Rung>> rungs = rungs_of(config, solid, surface);
+    if (rungs.empty()) {
+      made.model = std::move(near);
+    } else {
+      auto ladder = std::make_unique<Ladder>(std::move(rungs), std::move(near));
+      made.ladder = ladder.get();
+      made.model = std::move(ladder);
+    }
   } else {
     made.model = plain_model_of(config, solid, surface);
     if (is_rigid_on_nonlinear(config)) made.newton = static_cast<QuasiStaticModel*>(made.model.get());
@@ -305,6 +335,13 @@ const BodyConfig& checked(const BodyConfig& config) {
   }
   if (config.model == ModelKind::kNear && config.law == Law::kLinear) {
     throw std::invalid_argument("the law of the model \"near\" cannot be linear");
+  }
+  if (config.learn || config.tabulate) {
+    if (config.model != ModelKind::kNear) {
+      throw std::invalid_argument("only the model \"near\" learns, or tabulates answers");
+    }
+    expect(config.reach && *config.reach > 0 && *config.reach <= BodyConfig::kFarthestLearned * config.patch_radius,
+           "reach", config.reach.value_or(0), "above 0 and at most 1.5 patch radii, where the body learns");
   }
   if (config.tool != BodyConfig::Tool::kPatch) {
     const std::string tool = config.tool == BodyConfig::Tool::kSphere    ? "a sphere"
@@ -669,6 +706,12 @@ SurfaceTable condense(const BodyConfig& config, const SolverOf& solver_of) {
           .compliance = model.table()};
 }
 
+Learned learn(const BodyConfig& config, const Tell& tell) {
+  if (!config.learn && !config.tabulate) return {};
+  const Solid solid = solid_of(checked(config));
+  return learn_of(config, solid, TouchSurface(solid.mesh(), config.towards_tool, config.patch_radius), tell);
+}
+
 double Body::linear_up_to() const {
   if (parts_->knows_turns) return std::numeric_limits<double>::infinity();
   if (parts_->made.linear_up_to) return *parts_->made.linear_up_to;
@@ -697,6 +740,10 @@ Body::Size Body::size() const {
 
 std::optional<NearModel::Size> Body::near_field() const {
   return parts_->made.near == nullptr ? std::nullopt : std::optional(parts_->made.near->size());
+}
+
+std::vector<Ladder::Step> Body::ladder() const {
+  return parts_->made.ladder == nullptr ? std::vector<Ladder::Step>() : parts_->made.ladder->steps();
 }
 
 Body::Size Body::size_of(const BodyConfig& config, int& under_patch) {

@@ -24,6 +24,8 @@
 #include "clients/softbody/models/quasi_static.h"
 #include "clients/softbody/models/stiffening.h"
 #include "clients/softbody/models/surface_table.h"
+#include "clients/softbody/near/ladder.h"
+#include "clients/softbody/near/learn.h"
 #include "clients/softbody/near/near_model.h"
 #include "clients/softbody/touch/contact.h"
 #include "clients/softbody/touch/rigid_shape.h"
@@ -133,6 +135,14 @@ struct BodyConfig {
   ModelKind model = ModelKind::kCondensed;
   Law law = Law::kCorotational;  ///< kNear: of the near elements; not kLinear
   bool exact_interface = false;  ///< kNear: all unknowns of the boundary in place of modes; slow, to compare with
+  /// kNear: learns shapes, or makes a table of answers, for presses within `reach` of `middle` along each axis, and
+  /// answers these by them where they are wrong by `tolerance` at most. `reach` is wanted then, at most
+  /// kFarthestLearned patch radii.
+  bool learn = false;
+  bool tabulate = false;
+  std::filesystem::path learned_in{};  ///< where that is kept; empty: nowhere
+  std::optional<Learned> learned{};    ///< by learn() of this body; empty: Body learns it
+  static constexpr double kFarthestLearned = 1.5;
   std::optional<std::filesystem::path>
       table_file{};  ///< kCondensed: where condense() has put its table; else it is made
   int max_iterations = QuasiStaticModel::Config{}.max_iterations;  ///< for models that iterate until they converge
@@ -194,6 +204,11 @@ EffectSet effects_of(const BodyConfig& config);
 /// The table of a kCondensed body, to be kept in a file. `solver` says how the body is solved: on this machine
 /// (with_factor), or on many (mpi/spread_solver.h). Throws what Body throws, and what the solver throws.
 SurfaceTable condense(const BodyConfig& config, const SolverOf& solver = with_factor);
+
+/// What a kNear body with `learn` or `tabulate` is to know, for BodyConfig::learned; for others nothing. It can take
+/// minutes, says so to `tell`, and is read where it was kept. Throws what Body throws, and std::runtime_error when
+/// something cannot be kept.
+Learned learn(const BodyConfig& config, const Tell& tell);
 
 /// Mesh, model and contact of one body, built from a BodyConfig. Thread-safe: no. Realtime-safe: no.
 class Body {
@@ -258,8 +273,9 @@ class Body {
     std::size_t bytes;      ///< kept by the model, effects included
   };
   Size size() const;
-  /// The near field, of a kNear body.
+  /// The near field, of a kNear body; and what answers before it, where something was learned.
   std::optional<NearModel::Size> near_field() const;
+  std::vector<Ladder::Step> ladder() const;
   /// The size of the body that `config` describes, without its model: `bytes` is 0. `under_patch`: the nodes of the
   /// patch around the middle. Throws as the constructor does.
   static Size size_of(const BodyConfig& config, int& under_patch);

@@ -50,6 +50,7 @@ BodyConfig without(BodyConfig body, EffectKind effect) {
       break;
     case EffectKind::kMaterialNonlinearity:
       body.law = Law::kCorotational;
+      body.learned = learn(body, {});  // what was learned is of the other law
       break;
     case EffectKind::kContact:
     case EffectKind::kGeometricNonlinearity:
@@ -131,10 +132,11 @@ double off_the_exact_interface(const BodyConfig& config) {
   if (config.model != ModelKind::kNear) {
     throw std::invalid_argument("only the model \"near\" has an interface, and can be compared with the exact one");
   }
-  BodyConfig every = config;
-  every.exact_interface = true;
-  Body modes(config);
-  Body exact(every);
+  BodyConfig alone = config;  // of the near field, which answers everywhere then
+  alone.learn = alone.tabulate = false;
+  Body modes(alone);
+  alone.exact_interface = true;
+  Body exact(alone);
   double most = 0;
   for (const double share : {0.01, 0.1, 0.2}) {
     const double depth = share * config.patch_radius;
@@ -145,13 +147,15 @@ double off_the_exact_interface(const BodyConfig& config) {
 }
 
 Explanation explain(const Scene& scene, const std::function<double()>& processor_time) {
+  BodyConfig config = scene.body;
+  if (!config.learned) config.learned = learn(config, {});
   std::optional<Explanation::Tool> tool;
   if (scene.body.tool == BodyConfig::Tool::kMesh) {
     const double start = processor_time();
     const RigidShape shape = shape_of_tool(scene.body);
     tool = {*shape.mesh_facts(), processor_time() - start};
   }
-  Body body(scene.body);
+  Body body(config);
   // The push is so small that the answer is linear. It is a force because the weight moves the surface away from the
   // mesh's.
   const double push = 1e-3 * scene.body.material.young * scene.body.patch_radius * scene.body.patch_radius;
@@ -161,20 +165,29 @@ Explanation explain(const Scene& scene, const std::function<double()>& processor
                   .near = body.near_field(),
                   .tool = tool,
                   .off_exact = {},
-                  .beside = fields_beside(scene.body, to_device(scene).transpose(), processor_time),
+                  .beside = fields_beside(config, to_device(scene).transpose(), processor_time),
+                  .learned = {},
                   .step = body.step(),
                   .stiffness = body.settle(Given::kForce, push).stiffness,
                   .linear_up_to = body.linear_up_to()};
 
-  std::vector<BodyConfig> bodies{scene.body, scene.body};  // the second shows how far the first can be trusted
+  std::vector<BodyConfig> bodies{config, config};  // the second shows how far the first can be trusted
   const EffectSet simulated = effects_of(scene.body);
   const EffectSet always = info(scene.body.model).always;
   for (const EffectInfo& effect : effects()) {
     out.parts.push_back({effect.kind, simulated.has(effect.kind), {}});
     if (!simulated.has(effect.kind) || always.has(effect.kind)) continue;
     out.parts.back().adds = Explanation::Cost{};
-    bodies.push_back(without(scene.body, effect.kind));
+    bodies.push_back(without(config, effect.kind));
   }
+  // Each rung where it is the first.
+  const std::size_t first_rung = bodies.size();
+  for (const Ladder::Step& step : body.ladder()) {
+    out.learned.push_back({.size = step.size});
+    bodies.push_back(config);
+    (config.tabulate ? config.tabulate : config.learn) = false;
+  }
+  if (!out.learned.empty()) bodies.push_back(config);
   std::vector<Explanation::Cost> least(bodies.size(), {std::numeric_limits<double>::infinity(), 0});
   const Mat3 turn = to_device(scene).transpose();
   const Vec3 lowest = lowest_of_tool(scene.body, turn);
@@ -193,6 +206,8 @@ Explanation explain(const Scene& scene, const std::function<double()>& processor
     const Explanation::Cost& less = least[next++];
     part.adds = {out.all.answer_s - less.answer_s, out.all.bytes - less.bytes};
   }
+  for (std::size_t i = 0; i < out.learned.size(); ++i) out.learned[i].answer_s = least[first_rung + i].answer_s;
+  if (!out.learned.empty()) out.near_answer_s = least.back().answer_s;
   return out;
 }
 
@@ -230,6 +245,16 @@ std::string in_words(const Scene& scene, const Explanation& explanation) {
          << 1e3 * facts.size.z() << " mm; " << facts.points << " distances on a grid with cells of " << 1e3 * facts.cell
          << " mm, " << static_cast<double>(facts.bytes) / 1e6 << " MB, made in " << milliseconds(made_s, 0)
          << " of processor time; its surface is right to " << 1e3 * facts.error << " mm\n";
+  }
+  for (const auto& [rung, answer_s] : explanation.learned) {
+    text << "answers where it is good enough: " << rung.name << ", within "
+         << milliseconds(answer_s, explanation.resolution_s) << "; in " << rung.cells << " of " << rung.of_cells
+         << " cells, wrong by " << std::setprecision(2) << 100 * rung.error << std::setprecision(6) << " % at most; ";
+    if (rung.shapes > 0) text << rung.shapes << " shapes, summed over " << rung.elements << " elements; ";
+    text << static_cast<double>(rung.bytes) / 1e6 << " MB\n";
+  }
+  if (!explanation.learned.empty()) {
+    text << "answers elsewhere: the near field, within " << milliseconds(explanation.near_answer_s, 0) << '\n';
   }
   if (explanation.near && explanation.near->radius > 0) {
     const NearModel::Size& near = *explanation.near;
@@ -306,6 +331,17 @@ std::string in_json(const Scene& scene, const Explanation& explanation) {
                     {"bytes", tool->facts.bytes},   {"error_m", tool->facts.error},
                     {"made_s", tool->made_s}};
   }
+  for (const auto& [rung, answer_s] : explanation.learned) {
+    json["learned"].push_back({{"name", rung.name},
+                               {"answer_s", answer_s},
+                               {"cells", rung.cells},
+                               {"of_cells", rung.of_cells},
+                               {"error", rung.error},
+                               {"shapes", rung.shapes},
+                               {"elements", rung.elements},
+                               {"bytes", rung.bytes}});
+  }
+  if (!explanation.learned.empty()) json["near"]["answer_s"] = explanation.near_answer_s;
   return json.dump(-1, ' ', false, Json::error_handler_t::replace) + '\n';
 }
 

@@ -46,9 +46,16 @@ struct Explanation {
     std::size_t bytes = 0;  ///< that it keeps
   };
   std::optional<Beside> beside;
-  double step = 0;          ///< s, the time step of an answer; 0: the body is at rest at every instant
-  double stiffness = 0;     ///< N/m, at first touch
-  double linear_up_to = 0;  ///< m; see Body
+  /// What answers before the near field, the first one first; and what an answer costs where it is the first.
+  struct Learned {
+    Rung::Size size;
+    double answer_s = 0;  ///< s of processor time
+  };
+  std::vector<Learned> learned;
+  double near_answer_s = 0;  ///< s, of the near field, where something answers before it
+  double step = 0;           ///< s, the time step of an answer; 0: the body is at rest at every instant
+  double stiffness = 0;      ///< N/m, at first touch
+  double linear_up_to = 0;   ///< m; see Body
 };
 
 /// By how much of the force 60 modes answer otherwise than the exact interface of near and far, at the most of three

@@ -24,7 +24,8 @@ namespace {
 constexpr std::uintmax_t kMaxSceneBytes = 16'384;
 constexpr double kMaxLength = 1e3;  // m: a larger value is a mistaken unit
 constexpr std::int64_t kMaxCells = 200;
-constexpr double kMaxError = 10;  // %: more is felt
+constexpr double kMaxError = 10;          // %: more is felt
+constexpr double kErrorOfLearned = 0.02;  // of the force, where a scene that learns asks for nothing else
 
 template <class Infos>
 std::string names(const Infos& infos) {
@@ -272,7 +273,11 @@ void read_touch(Table table, const std::filesystem::path& directory, Scene& scen
   body.middle = table.vector("middle_mm", 1e3 * kMaxLength, 1e3, Vec3(Vec3::Zero()));
   body.patch_radius = table.length("patch_radius_mm");
   body.tool_radius = table.number("tool_radius_mm", 0, true, 1e3 * kMaxLength, 1e3, 0);
-  if (table.find("reach_mm") != nullptr) body.reach = table.length("reach_mm");
+  if (body.learn || body.tabulate) {
+    body.reach = table.number("reach_mm", 0, false, 1e3 * BodyConfig::kFarthestLearned * body.patch_radius, 1e3);
+  } else if (table.find("reach_mm") != nullptr) {
+    body.reach = table.length("reach_mm");
+  }
   if (table.find("tool") != nullptr) {
     body.tool = table.choice("tool", "patch, sphere, capsule, box, mesh", [](std::string_view name) {
       if (name == "patch") return std::optional(BodyConfig::Tool::kPatch);
@@ -471,6 +476,14 @@ Scene parse_scene(std::string_view text, const std::string& name, const std::fil
       if (model.find("law") != nullptr) scene.body.law = model.choice("law", std::string(kLaws), law_named);
       check_law(root, scene.body.law, listed);
       scene.body.max_iterations = model.count("max_iterations", 1000, scene.body.max_iterations);
+      scene.body.learn = model.flag("learn");
+      scene.body.tabulate = model.flag("tabulate");
+      if (scene.body.learn || scene.body.tabulate) {
+        scene.body.tolerance = kErrorOfLearned;
+        if (model.find("learned_in") != nullptr) {
+          scene.body.learned_in = directory / model.text("learned_in", "a folder in which what is learned is kept");
+        }
+      }
       scene.body.tolerance = model.number("error_percent", 0, false, kMaxError, 100, scene.body.tolerance);
       break;
     case ModelKind::kLinear:
@@ -582,6 +595,14 @@ std::string scene_reference() {
       << 100 * defaults.tolerance
       << "   of the force, of the same: an answer ends when it may be wrong by so much, and says by how much;\n"
          "                         near adds what the linear far field may leave out\n"
+         "learn = false            of near: presses within reach_mm of the middle, up and down and to and fro, are "
+         "solved\n"
+         "                         at the start; few shapes of these answer all between. error_percent = "
+      << 100 * kErrorOfLearned
+      << " then: where\n"
+         "                         they are wrong by more, the near field answers\n"
+         "tabulate = false         of near: the same presses make a table of the energy; it answers before the shapes\n"
+         "learned_in               a folder: what is learned is kept there, and read at the next start\n"
          "iterations = "
       << defaults.iterations << "          of every answer: xpbd, projective\nswings = " << defaults.swings
       << "              of modal\n"
@@ -590,7 +611,10 @@ std::string scene_reference() {
          "patch_radius_mm          the tool presses on a patch of this size\n"
          "from = [0, 0, 1]         the way to the tool, in the body's frame\n"
          "middle_mm = [0, 0, 0]    of the side that is touched; its place across `from` counts\n"
-         "reach_mm                 for condensed, modal: touched only so far from the middle. Without: anywhere\n"
+         "reach_mm                 for condensed, modal: touched only so far from the middle. Without: anywhere; for "
+         "near\n"
+         "                         with learn or tabulate: they answer so far along each axis, at most 1.5 patch "
+         "radii\n"
          "tool = \"patch\"           or sphere, capsule: rigid, its contact grows as it is pressed in; of condensed\n"
          "                         (without friction), corotational, stvk, neo-hookean; or box, mesh: of the last "
          "three\n"

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // tendon-softbody: the reference physics engine, a guest like any other.
+#include <unistd.h>
+
 #include <algorithm>
 #include <ctime>
 #include <exception>
@@ -48,6 +50,17 @@ int test(const softbody::Scene& scene, const Options& options) {
       script);
   std::cout << (options.json ? result.json() : result.text());
   return result.passed() ? 0 : 1;
+}
+
+/// What a body learns before it is touched.
+void learn(softbody::BodyConfig& body) {
+  const bool tells = isatty(STDERR_FILENO) != 0;
+  body.learned = softbody::learn(body, [&](std::string_view what) {
+    if (tells) std::cerr << "\r\033[K" << what << std::flush;
+  });
+  if (tells) std::cerr << "\r\033[K";
+  for (const std::string& warning : body.learned->warnings)
+    std::cerr << "tendon-softbody: warning: " << warning << '\n';
 }
 
 /// `tendon-softbody condense SCENE FILE`.
@@ -154,7 +167,8 @@ int main(int argc, char** argv) {
   if (const auto exit_code = line.parse(argc - skip, argv + skip)) return *exit_code;
 
   try {
-    const softbody::Scene scene = softbody::read_scene(file);
+    softbody::Scene scene = softbody::read_scene(file);
+    if (scene.body.learn || scene.body.tabulate) learn(scene.body);
     if (explains) {
       softbody::Explanation explanation = softbody::explain(
           scene, [] { return static_cast<double>(std::clock()) / static_cast<double>(CLOCKS_PER_SEC); });

@@ -200,6 +200,7 @@ std::optional<Patch> TouchSurface::patch_around(const Vec2& middle, double least
   if (!(total[0] >= least_covered)) return std::nullopt;
   Patch patch;
   patch.covered = std::min(1.0, total[0]);
+  patch.middle = middle;
   patch.weights.resize(count);
   patch.slopes.resize(2, count);
   if constexpr (kCurved) patch.curvatures.resize(3, count);

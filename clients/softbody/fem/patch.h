@@ -26,6 +26,7 @@ struct Patch {
   Eigen::Matrix<double, 2, Eigen::Dynamic> slopes;      ///< 1/m, how the weights change as the middle moves
   Eigen::Matrix<double, 3, Eigen::Dynamic> curvatures;  ///< 1/m², ∂²weights: xx, xy, yy; empty unless asked for
   double covered = 0;                                   ///< the fraction of the patch that lies on the body, 0 … 1
+  Vec2 middle = Vec2::Zero();                           ///< m, across
 };
 
 /// The side of a body that a tool can touch, seen along one direction: the facets that face it, as a height field over

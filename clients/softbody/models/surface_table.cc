@@ -1,18 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "clients/softbody/models/surface_table.h"
 
-#include <xxhash.h>
-
 #include <Eigen/Cholesky>
-#include <bit>
 #include <cmath>
-#include <cstring>
 #include <fstream>
 #include <span>
 #include <stdexcept>
 #include <string>
 #include <string_view>
 
+#include "clients/softbody/fem/file_bytes.h"
 #include "clients/softbody/fem/file_text.h"
 
 namespace tendon::softbody {
@@ -25,39 +22,13 @@ constexpr std::size_t kHeader = 64;
 /// Of the largest diagonal: rounding may leave an eigenvalue so far below zero.
 constexpr double kRounding = 1e-10;
 
-static_assert(std::endian::native == std::endian::little, "the file's bytes are those of memory");
-
-template <class Value>
-void put(std::string& bytes, const Value& value) {
-  const auto raw = std::bit_cast<std::array<char, sizeof(Value)>>(value);
-  bytes.append(raw.data(), raw.size());
-}
-
-/// Takes values from the front of what is left.
-class Reader {
- public:
-  explicit Reader(std::string_view bytes) : left_(bytes) {}
-
-  template <class Value>
-  Value take() {
-    if (left_.size() < sizeof(Value)) throw std::invalid_argument("it breaks off");
-    Value value;
-    std::memcpy(&value, left_.data(), sizeof value);
-    left_.remove_prefix(sizeof value);
-    return value;
-  }
-
- private:
-  std::string_view left_;
-};
-
 std::size_t bytes_of(std::size_t nodes) {
   return kHeader + 4 * nodes + 4 * (nodes % 2) + 4 * nodes * (nodes + 1) + sizeof(std::uint64_t);
 }
 
 SurfaceTable table_of(std::string_view bytes) {
   if (!bytes.starts_with(kMagic)) throw std::invalid_argument("it does not begin as a table");
-  Reader reader(bytes.substr(kMagic.size()));
+  ByteReader reader(bytes.substr(kMagic.size()));
   const auto version = reader.take<std::uint32_t>();
   if (version != kVersion) {
     throw std::invalid_argument("its version is " + std::to_string(version) + ", expected " + std::to_string(kVersion));
@@ -68,7 +39,7 @@ SurfaceTable table_of(std::string_view bytes) {
                                 std::to_string(bytes_of(nodes)) + " for its " + std::to_string(nodes) + " nodes");
   }
   const std::string_view body = bytes.substr(0, bytes.size() - sizeof(std::uint64_t));
-  if (Reader(bytes.substr(body.size())).take<std::uint64_t>() != XXH3_64bits(body.data(), body.size())) {
+  if (ByteReader(bytes.substr(body.size())).take<std::uint64_t>() != checksum(body)) {
     throw std::invalid_argument("its checksum is another one: bytes have changed");
   }
   SurfaceTable table;
@@ -115,7 +86,7 @@ std::uint64_t digest_of(const Solid& solid, const Vec3& normal) {
     put(bytes, each.poisson);
   }
   for (const double x : normal) put(bytes, x);
-  return XXH3_64bits(bytes.data(), bytes.size());
+  return checksum(bytes);
 }
 
 void write_table(const std::filesystem::path& file, const SurfaceTable& table) {
@@ -137,14 +108,11 @@ void write_table(const std::filesystem::path& file, const SurfaceTable& table) {
   for (Eigen::Index i = 0; i < table.compliance.rows(); ++i) {
     for (Eigen::Index j = 0; j <= i; ++j) put(bytes, table.compliance(i, j));
   }
-  put(bytes, std::uint64_t{XXH3_64bits(bytes.data(), bytes.size())});
+  put(bytes, checksum(bytes));
   // Whole, or not at all.
   std::filesystem::path draft = file;
   draft += ".new";
-  std::ofstream out(draft, std::ios::binary);
-  out.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
-  out.close();
-  if (!out) throw std::runtime_error("cannot write " + draft.string() + ": is the disk full?");
+  write_draft(draft, bytes);
   std::filesystem::rename(draft, file);
 }
 

@@ -130,6 +130,56 @@ void path(benchmark::State& state, ModelKind model, Law law, bool with_thread) {
   state.counters["model_mb"] = static_cast<double>(body.size().bytes) / 1e6;
 }
 
+/// What was learned of B1 within 12 mm of (10, 0) mm: 5 mm deep, 20 mm aside and back, by 0.2 mm with each answer, asked for
+/// to 2 percent. Beside it the true error at every millimetre, against Newton's method on the whole mesh to 1e-9.
+void learned(benchmark::State& state, Law law, bool tabulate) {
+  BodyConfig config = testing::pressed_body(ModelKind::kNear, Element::kHex8Sri, static_cast<int>(state.range(0)));
+  config.law = law;
+  config.tolerance = 0.02;
+  config.middle = Vec3(0.01, 0, 0);
+  config.reach = 0.012;
+  (tabulate ? config.tabulate : config.learn) = true;
+  const double start = processor_time();
+  config.learned = learn(config, {});
+  const double set_up = processor_time() - start;
+  Body body(config);
+  BodyConfig exact = config;
+  exact.model = law == Law::kNeoHookean ? ModelKind::kNeoHookean : ModelKind::kCorotational;
+  exact.learn = exact.tabulate = false;
+  exact.learned.reset();
+  exact.tolerance = 1e-9;
+  exact.max_iterations = 200;
+  Body truth(exact);
+  constexpr int kAside = 100;
+  constexpr double kStep = 2e-4;
+  std::vector<double> times;
+  double said = 0;
+  double wrong = 0;
+  for (auto _ : state) {
+    for (int i = 0; i <= 2 * kAside; ++i) {
+      const Vec3 tool(kStep * std::min(i, 2 * kAside - i), 0, 0.045);
+      const double before = processor_time();
+      const Feel feel = body.touch(tool);
+      times.push_back(processor_time() - before);
+      said = std::max(said, feel.error / feel.force.z());
+      if (i > kAside || i % 5 != 0) continue;
+      wrong = std::max(wrong, std::abs(feel.force.z() / truth.touch(tool).force.z() - 1));
+    }
+  }
+  const Ladder::Step step = body.ladder().front();
+  std::ranges::sort(times);
+  state.counters["answers"] = static_cast<double>(times.size());
+  state.counters["by_it"] = step.answers;
+  state.counters["p50_ms"] = times[times.size() / 2];
+  state.counters["p99_ms"] = times[times.size() * 99 / 100];
+  state.counters["wrong_percent"] = 100 * wrong;
+  state.counters["said_percent"] = 100 * said;
+  state.counters["set_up_s"] = 1e-3 * set_up;
+  state.counters["shapes"] = step.size.shapes;
+  state.counters["elements"] = static_cast<double>(step.size.elements);
+  state.counters["mb"] = static_cast<double>(step.size.bytes) / 1e6;
+}
+
 /// A rigid tool of 20 mm: its contact grows and shrinks as it moves.
 void rigid(benchmark::State& state, BodyConfig::Tool tool) {
   BodyConfig config = testing::pressed_body(ModelKind::kCondensed, Element::kHex8Sri, static_cast<int>(state.range(0)));
@@ -229,6 +279,10 @@ BENCHMARK_CAPTURE(path, whole_neo_hookean, ModelKind::kNeoHookean, Law::kNeoHook
 BENCHMARK_CAPTURE(path, whole_corotational, ModelKind::kCorotational, Law::kCorotational, false)
     ->ArgsProduct({{8, 12, 16}, {1000, 100}})
     ->Iterations(2);
+BENCHMARK_CAPTURE(learned, shapes_neo_hookean, Law::kNeoHookean, false)->Arg(8)->Arg(12)->Arg(16)->Iterations(2);
+BENCHMARK_CAPTURE(learned, shapes_corotational, Law::kCorotational, false)->Arg(8)->Arg(12)->Arg(16)->Iterations(2);
+BENCHMARK_CAPTURE(learned, table_neo_hookean, Law::kNeoHookean, true)->Arg(8)->Arg(12)->Arg(16)->Iterations(2);
+BENCHMARK_CAPTURE(learned, table_corotational, Law::kCorotational, true)->Arg(8)->Arg(12)->Arg(16)->Iterations(2);
 BENCHMARK_CAPTURE(still, mass_spring, ModelKind::kMassSpring, Element::kTet4)->Arg(8);
 BENCHMARK_CAPTURE(still, projective, ModelKind::kProjective, Element::kTet4)->Arg(4)->Arg(8);
 BENCHMARK_CAPTURE(still, modal, ModelKind::kModal, Element::kTet4)->Arg(8);

@@ -57,6 +57,27 @@ TEST(SoftbodyExplain, EveryEffectIsNamedWhereItIsListedAndWhereItIsNot) {
   }
 }
 
+TEST(SoftbodyExplain, SaysWhatWasLearnedAndWhatAnswersCost) {
+  Scene scene{.body = pressed_body(ModelKind::kNear, Element::kHex8Sri, 6)};
+  scene.body.learn = true;
+  scene.body.tabulate = true;
+  scene.body.reach = 0.005;
+  scene.body.tolerance = 0.02;
+  const Explanation explanation = explain(scene, saying({0, 1e6}));
+  ASSERT_EQ(explanation.learned.size(), 2U);
+  const std::string text = in_words(scene, explanation);
+  EXPECT_NE(text.find("answers where it is good enough: tabulated, within "), std::string::npos) << text;
+  EXPECT_NE(text.find("answers where it is good enough: learned, within "), std::string::npos) << text;
+  EXPECT_NE(text.find(" in 80 of 80 cells, wrong by "), std::string::npos) << text;
+  EXPECT_NE(text.find("answers elsewhere: the near field, within "), std::string::npos) << text;
+  const auto json = nlohmann::json::parse(in_json(scene, explanation));
+  EXPECT_EQ(json["learned"][0]["name"], "tabulated");
+  EXPECT_EQ(json["learned"][1]["name"], "learned");
+  EXPECT_EQ(json["learned"][1]["shapes"], 45);
+  EXPECT_LE(json["learned"][1]["error"], 0.02);
+  EXPECT_TRUE(json["near"].contains("answer_s"));
+}
+
 TEST(SoftbodyExplain, SaysHowMuchOfABodyIsNearTheTool) {
   Scene scene{.body = pressed_body(ModelKind::kNear, Element::kHex8Sri, 8)};
   const Explanation explanation = explain(scene, saying({0, 1e6}));

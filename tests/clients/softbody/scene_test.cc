@@ -189,6 +189,34 @@ TEST(SoftbodyScene, ALawOfTheElementsNearTheToolArrivesAndFitsTheEffects) {
             "s.toml:10: model.law: unknown key; expected one of error_percent, kind, max_iterations");
 }
 
+TEST(SoftbodyScene, WhatABodyIsToLearnArrivesAndWantsItsReach) {
+  const auto near = [](const std::string& more, const std::string& reach) {
+    std::string text = listing("near\"\n" + more + " #", "[\"contact\", \"geometric-nonlinearity\"]", "");
+    return text.replace(text.find("patch_radius_mm = 20"), 20, "patch_radius_mm = 20\n" + reach);
+  };
+  const std::string all = "learn = true\ntabulate = true\nlearned_in = \"kept\"";
+  const BodyConfig body = parse_scene(near(all, "reach_mm = 10"), "s.toml", "/scenes").body;
+  EXPECT_TRUE(body.learn);
+  EXPECT_TRUE(body.tabulate);
+  EXPECT_EQ(body.learned_in, "/scenes/kept");
+  EXPECT_EQ(body.reach, 0.01);
+  EXPECT_EQ(body.tolerance, 0.02);
+  EXPECT_EQ(parse_scene(near("learn = true\nerror_percent = 1", "reach_mm = 10"), "s.toml", ".").body.tolerance, 0.01);
+  const BodyConfig nothing = parse_scene(near("", ""), "s.toml", ".").body;
+  EXPECT_FALSE(nothing.learn || nothing.tabulate);
+  EXPECT_EQ(nothing.tolerance, BodyConfig().tolerance);
+  EXPECT_EQ(refusal(near("learn = true", "")),
+            "s.toml: touch.reach_mm: expected a number above 0 and at most 30, found nothing");
+  EXPECT_EQ(refusal(near("tabulate = true", "reach_mm = 31")),
+            "s.toml:13: touch.reach_mm: expected a number above 0 and at most 30");
+  EXPECT_EQ(refusal(near("learned_in = \"kept\"", "reach_mm = 10")),
+            "s.toml:10: model.learned_in: unknown key; expected one of error_percent, kind, law, learn, "
+            "max_iterations, tabulate");
+  EXPECT_EQ(refusal(near("learn = 1", "reach_mm = 10")), "s.toml:10: model.learn: expected true or false");
+  EXPECT_EQ(refusal(listing("condensed\"\nlearn = true #", "[\"contact\"]", "")),
+            "s.toml:10: model.learn: unknown key; expected one of kind, table");
+}
+
 TEST(SoftbodyScene, AYieldArrivesAndWhatIsWrongWithItIsNamed) {
   const std::string effects = "[\"contact\", \"geometric-nonlinearity\",\n\"plasticity\"]";
   const std::string table = "[plasticity]\nyield_pa = 500\nhardening_pa = 2000\n";

@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <filesystem>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+
+namespace tendon::softbody {
+
+static_assert(std::endian::native == std::endian::little, "the bytes of files are those of memory");
+
+/// Appends a number as its bytes, little-endian.
+template <class Value>
+void put(std::string& bytes, const Value& value) {
+  const auto raw = std::bit_cast<std::array<char, sizeof(Value)>>(value);
+  bytes.append(raw.data(), raw.size());
+}
+
+/// Takes numbers from the front of what is left.
+class ByteReader {
+ public:
+  explicit ByteReader(std::string_view bytes) : left_(bytes) {}
+
+  /// Throws std::invalid_argument when too little is left.
+  template <class Value>
+  Value take() {
+    if (left_.size() < sizeof(Value)) throw std::invalid_argument("it breaks off");
+    Value value;
+    std::memcpy(&value, left_.data(), sizeof value);
+    left_.remove_prefix(sizeof value);
+    return value;
+  }
+  std::size_t left() const noexcept { return left_.size(); }
+
+ private:
+  std::string_view left_;
+};
+
+/// XXH3, 64 bits.
+std::uint64_t checksum(std::string_view bytes);
+
+/// Writes a file that is given its name by the caller, when it is whole. Throws std::runtime_error.
+void write_draft(const std::filesystem::path& draft, std::string_view bytes);
+
+}  // namespace tendon::softbody

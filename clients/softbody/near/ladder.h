@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "clients/softbody/near/near_model.h"
+#include "clients/softbody/near/rung.h"
+
+namespace tendon::softbody {
+
+/// A body that answers from the highest rung that is good enough for a press, and by NearModel where none is. Where the
+/// share of a rung falls from 1 to 0 with the place of the hand, the next one takes over, blended as two near fields are:
+/// the difference of the two is said as an error. Given forces are answered by NearModel.
+///
+/// While a rung answers, NearModel is not asked and makes no field: a hand that comes to where it takes over after a far
+/// way has the whole of a new near field made in that answer.
+class Ladder : public Model {
+ public:
+  /// The highest rung first.
+  Ladder(std::vector<std::unique_ptr<Rung>> rungs, std::unique_ptr<NearModel> near);
+
+  Reaction press(const Patch& patch, Given given, double value) override;
+  bool glides() const noexcept override { return true; }
+  std::size_t bytes() const noexcept override;
+
+  struct Step {
+    Rung::Size size;
+    int answers = 0;  ///< to which it had something to say
+  };
+  std::vector<Step> steps() const;  ///< the highest first, without NearModel
+  const NearModel& near() const noexcept { return *near_; }
+
+ private:
+  Reaction press_from(std::size_t rung, const Patch& patch, Given given, double depth);
+
+  std::vector<std::unique_ptr<Rung>> rungs_;
+  std::vector<int> answers_;
+  std::unique_ptr<NearModel> near_;
+};
+
+}  // namespace tendon::softbody
