@@ -10,7 +10,8 @@ namespace tendon {
 LateLibrary::LateLibrary(const std::string& file) {
   // As if linked: its symbols are for all, and all that it needs is looked up now and not by a thread that must not wait.
   if (dlopen(file.c_str(), RTLD_NOW | RTLD_GLOBAL) != nullptr) return;
-  throw std::runtime_error(dlerror());  // NOLINT(concurrency-mt-unsafe): the C library has one for each thread
+  const char* const why = dlerror();  // NOLINT(concurrency-mt-unsafe): the C library has one for each thread
+  throw std::runtime_error(std::string(why) + "; expected it to be installed");
 }
 
 LateLibrary::Function LateLibrary::operator[](const char* name) const {

@@ -35,7 +35,8 @@ class LateLibrary {
   };
 
   /// `file`: its name with its version of the interface, as in "libusb-1.0.so.0". Throws std::runtime_error when there
-  /// is none: "libusb-1.0.so.0: cannot open shared object file: No such file or directory".
+  /// is none: "libusb-1.0.so.0: cannot open shared object file: No such file or directory; expected it to be
+  /// installed".
   explicit LateLibrary(const std::string& file);
 
   /// Throws std::runtime_error when the library exports nothing by this name.

@@ -7,6 +7,15 @@
 #include "core/base/expect.h"
 
 namespace tendon {
+namespace {
+
+/// Of each coordinate the travel that a count cannot hide.
+template <int N>
+Vec<N> beyond(double count, const Vec<N>& travel) noexcept {
+  return (travel.array().abs() - count).max(0.0).matrix();
+}
+
+}  // namespace
 
 template <int N>
 RobustLedger<N>::RobustLedger(const Config& config)
@@ -19,7 +28,7 @@ RobustLedger<N>::RobustLedger(const Config& config)
 
 template <int N>
 double RobustLedger<N>::travel_beyond_count(const Vec<N>& travel) const noexcept {
-  return (travel.array().abs() - config_.encoder_step).max(0.0).matrix().norm();
+  return beyond<N>(config_.encoder_step, travel).norm();
 }
 
 template <int N>
@@ -49,7 +58,7 @@ void RobustLedger<N>::observe(const Interval<N>& interval) noexcept {
     energy_ += least_coulomb_ * (travel - credited_);
     credited_ = travel;
     to_peak_ = from_turn_;
-  } else if (const Vec<N> back = from_turn_ - to_peak_; travel_beyond_count(back) > 0) {
+  } else if (const Vec<N> back = from_turn_ - to_peak_; beyond<N>(config_.encoder_step, back).squaredNorm() > 0) {
     // The hand has turned back by more than a count can hide: a new path begins at the peak.
     from_turn_ = back;
     to_peak_ = back;

@@ -226,6 +226,7 @@ pb::Frame ToyServer::in_columns(const pb::DeviceState& state) const {
   columns.add_permitted_force_n(0);
   columns.add_mode(state.mode());
   if (state.force_sequence() > 0) columns.add_force_sequence(state.force_sequence());
+  if (state.buttons() > 0) columns.add_buttons(state.buttons());
   return frame;
 }
 

@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "devices/late_library.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <stdexcept>
+#include <string>
+
+namespace tendon {
+namespace {
+
+std::string complaint(auto use) {
+  try {
+    use();
+  } catch (const std::runtime_error& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST(LateLibrary, GivesItsFunctionsByName) {
+  const LateLibrary mathematics("libm.so.6");
+  const decltype(&::acosh) found = mathematics["acosh"];
+  EXPECT_EQ(found(1.0), 0.0);
+}
+
+TEST(LateLibrary, ThatIsMissingIsNamedWithWhatIsExpected) {
+  const std::string text = complaint([] { LateLibrary("libtendon-none.so.7"); });
+  EXPECT_NE(text.find("libtendon-none.so.7"), std::string::npos) << text;
+  EXPECT_NE(text.find("; expected it to be installed"), std::string::npos) << text;
+}
+
+TEST(LateLibrary, WithoutAFunctionSaysWhich) {
+  const LateLibrary mathematics("libm.so.6");
+  const std::string text = complaint([&] { static_cast<void>(mathematics["tendon_none"]); });
+  EXPECT_NE(text.find("tendon_none"), std::string::npos) << text;
+}
+
+}  // namespace
+}  // namespace tendon
