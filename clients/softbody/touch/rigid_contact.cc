@@ -399,7 +399,7 @@ Feel RigidContact::feel(const Local& local, std::size_t tool) {
 /// m, that a tool may go before the body must follow.
 double RigidContact::longest_step() const {
   double most = layer_.least_facet() / 2;
-  for (const HeldTool& tool : tools_) most = std::min(most, tool.shape.thinnest() / 4);
+  for (const HeldTool& tool : tools_) most = std::min(most, tool.shape.thinnest() / 8);
   return most;
 }
 

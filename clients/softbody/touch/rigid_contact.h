@@ -30,7 +30,7 @@ namespace tendon::softbody {
 /// rest of the body follows by one solution. A line search makes Π fall. K comes by conjugate gradients with the same
 /// inverse, and differences of the forces, to 0.2 %.
 ///
-/// Between two answers the tools go in steps of at most half a facet, and a quarter of what the thinnest tool is thick,
+/// Between two answers the tools go in steps of at most half a facet, and an eighth of what the thinnest tool is thick,
 /// so that a fast one does not come out on the other side. One that jumps by more than kMostSteps of these is put down
 /// anew: it comes back from where the model's surface is touched from.
 ///

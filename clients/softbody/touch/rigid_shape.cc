@@ -16,8 +16,9 @@
 namespace tendon::softbody {
 namespace {
 
-/// Cells, of the thinnest part of a surface.
-constexpr double kThinnestInCells = 2;
+/// Cells, of the thinnest part of a surface: at the least, and looked for at the most.
+constexpr int kThinnestInCells = 2;
+constexpr int kThickInCells = 6;
 
 Triangles in_metres(const Triangles& surface, double scale) {
   Triangles made = surface;
@@ -28,9 +29,10 @@ Triangles in_metres(const Triangles& surface, double scale) {
 /// Of the rounding: what is not farther from the core lies inside it.
 constexpr double kCoreShare = 1e-9;
 
-/// m, in whole cells: how thick the surface is behind the middles of its facets, where it is thinnest.
+/// m, in whole cells up to kThickInCells: how thick the surface is behind the middles of its facets, where it is
+/// thinnest.
 double thickness_of(const Triangles& surface, const SurfaceDistance& distance, double cell, std::string_view name) {
-  double least = std::numeric_limits<double>::infinity();
+  int least = kThickInCells;
   for (std::size_t f = 0; f < surface.facets.size(); ++f) {
     const auto& facet = surface.facets[f];
     const Vec3& a = surface.points[at(facet[0])];
@@ -38,17 +40,20 @@ double thickness_of(const Triangles& surface, const SurfaceDistance& distance, d
     const Vec3& c = surface.points[at(facet[2])];
     const Vec3 middle = (a + b + c) / 3;
     const Vec3 normal = (b - a).cross(c - a).normalized();
-    double behind = 0;
-    while (behind < least && distance.at(middle - (behind + cell) * normal) < 0) behind += cell;
-    least = std::min(least, behind);
-    if (behind > (kThinnestInCells - 0.5) * cell) continue;
+    int behind = 0;
+    for (; behind < least; ++behind) {
+      const double depth = (behind + 1) * cell;
+      if (!(distance.at(middle - depth * normal, depth) < 0)) break;
+    }
+    least = behind;
+    if (behind >= kThinnestInCells) continue;
     std::ostringstream text;
     text << name << ": facet " << f + 1 << " at (" << 1e3 * middle.x() << ", " << 1e3 * middle.y() << ", "
          << 1e3 * middle.z() << ") mm: the surface is thinner there than " << kThinnestInCells << " cells of "
          << 1e3 * cell << " mm: smaller cells";
     throw std::invalid_argument(text.str());
   }
-  return least;
+  return least * cell;
 }
 
 }  // namespace

@@ -46,7 +46,7 @@ class RigidShape {
   /// m, from the middle to the point of the surface that is farthest from it.
   double reach() const noexcept { return reach_; }
 
-  /// m, how thick the tool is where it is thinnest, or less: a point that goes a quarter as far cannot come through it
+  /// m, how thick the tool is where it is thinnest, or less: a point that goes an eighth as far cannot come through it
   /// unseen.
   double thinnest() const noexcept { return thinnest_; }
 

@@ -21,7 +21,7 @@ double ball_distance(const Vec3& x) { return x.norm() - kRadius; }
 
 DistanceGrid ball_grid(double cell) { return {ball_distance, Vec3::Constant(-0.014), Vec3::Constant(0.014), cell}; }
 
-TEST(DistanceGrid, ASmoothDistanceIsMetToTheFourthOrderAndItsDerivativesToTheThirdAndSecond) {
+TEST(DistanceGrid, MeetsASmoothDistanceToTheFourthOrder) {
   const auto errors = [](double cell) {
     const DistanceGrid grid = ball_grid(cell);
     Dice dice(11);
@@ -50,7 +50,7 @@ double plate_distance(const Vec3& x) {
   return beyond.cwiseMax(0.0).norm() + std::min(0.0, beyond.maxCoeff());
 }
 
-TEST(DistanceGrid, ItsDerivativesAreThoseOfItsValueEvenOverAKinkAndNoneOfThemJumps) {
+TEST(DistanceGrid, ItsDerivativesAreThoseOfItsValueAndNoneJumps) {
   constexpr double kStep = 1e-6;  // m
   constexpr double kCell = 0.0005;
   const DistanceGrid grid(plate_distance, Vec3::Constant(-0.008), Vec3::Constant(0.008), kCell);

@@ -41,7 +41,7 @@ TEST(HardTool, OnACornerAndBesideTheHeldRimTheStiffnessIsTheForcesOwnSlope) {
   }
 }
 
-TEST(HardTool, CorotationalEightMillimetresDeepIsTheSameAtOnceInStepsAndFromAbove) {
+TEST(HardTool, EightMillimetresDeepIsTheSameAtOnceAndInSteps) {
   const Vec3 deep(0, 0, 0.05 + 0.02 - 0.008);
   PressedByTools at_once(Law::kCorotational, one(RigidShape::sphere(0.02)), 0, 1e-9);
   const Feel first = at_once.at(deep);

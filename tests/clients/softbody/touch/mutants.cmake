@@ -27,9 +27,9 @@ endfunction()
 
 # Friction pushes the hand on.
 rigid_tool_mutant(friction-pushes-on SOURCE layer.cc
-  REPLACE "drag = c * stretched" "drag = -c * stretched"
+  REPLACE "slope += drag" "slope -= drag"
   TEST RigidContact.FrictionDragsTheShapeAndEveryPointLosesEnergy)
-# What bounds friction is the pressure of the answer before.
+# The pressure of the answer before bounds friction.
 rigid_tool_mutant(pressure-of-the-last-answer SOURCE rigid_contact.cc
   REPLACE "if (layer_.rubs() && round > 0)" "if (layer_.rubs() && round > 1000)"
   TEST RigidContact.FrictionIsBoundedByThePressureOfItsOwnAnswer)
@@ -47,7 +47,7 @@ rigid_tool_mutant(no-onset SOURCE layer.cc
   TEST Layer.PressesWithYoungsModulusAndBeginsWithoutAStepInForceOrStiffness)
 # A fast tool is followed in steps as long as those of a thick one.
 rigid_tool_mutant(steps-too-long SOURCE rigid_contact.cc
-  REPLACE "tool.shape.thinnest() / 4" "tool.shape.thinnest() * 4"
+  REPLACE "tool.shape.thinnest() / 8" "tool.shape.thinnest() * 4"
   TEST MeshTool.AThinPlateThatComesFastDoesNotComeOutOnTheOtherSide)
 # At a corner the side is that of whichever facet was looked at first.
 rigid_tool_mutant(side-of-one-facet SOURCE surface_distance.cc
@@ -56,4 +56,4 @@ rigid_tool_mutant(side-of-one-facet SOURCE surface_distance.cc
 # The samples themselves are the weights of the splines.
 rigid_tool_mutant(samples-for-weights SOURCE distance_grid.cc
   REPLACE "(8 * values[first + step] - values[first] - values[first + 2 * step]) / 6" "values[first + step]"
-  TEST DistanceGrid.ASmoothDistanceIsMetToTheFourthOrderAndItsDerivativesToTheThirdAndSecond)
+  TEST DistanceGrid.MeetsASmoothDistanceToTheFourthOrder)
