@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "clients/softbody/near/ladder.h"
 
+#include <cmath>
 #include <utility>
 
 namespace tendon::softbody {
@@ -34,6 +35,30 @@ std::size_t Ladder::bytes() const noexcept {
   std::size_t sum = near_->bytes();
   for (const auto& rung : rungs_) sum += rung->size().bytes;
   return sum;
+}
+
+Reaction blended(const Reaction& from, const Reaction& to, double share) {
+  const auto mix = [&](const auto& a, const auto& b) { return ((1 - share) * a + share * b); };
+  Reaction all;
+  all.force = mix(from.force, to.force);
+  all.depth = mix(from.depth, to.depth);
+  all.stiffness = mix(from.stiffness, to.stiffness);
+  all.error = mix(from.error, to.error) + std::abs(from.force - to.force);
+  if (!(std::abs(all.force) > 0)) return all;
+  all.slope = mix(Vec2(from.force * from.slope), Vec2(to.force * to.slope)) / all.force;
+  all.knows_glide = from.knows_glide && to.knows_glide;
+  if (!all.knows_glide) return all;
+  // PatchContact's K in parts: k along the normal, k s + F t beside it, and across k s sᵀ + F (s tᵀ + t sᵀ − M − F D).
+  // The surface at rest adds the same to both. `giving` stays 0, and `curving` has both.
+  const auto beside = [](const Reaction& r) { return Vec2(r.stiffness * r.slope + r.force * r.glide.tilting); };
+  const auto across = [](const Reaction& r) {
+    const Mat2 turned = r.slope * r.glide.tilting.transpose();
+    return Mat2(r.stiffness * r.slope * r.slope.transpose() +
+                r.force * (turned + turned.transpose() - r.glide.curving - r.force * r.glide.giving));
+  };
+  all.glide.tilting = (mix(beside(from), beside(to)) - all.stiffness * all.slope) / all.force;
+  all.glide.curving = (across(all) - mix(across(from), across(to))) / all.force;
+  return all;
 }
 
 }  // namespace tendon::softbody

@@ -10,8 +10,8 @@
 namespace tendon::softbody {
 
 /// A body that answers from the highest rung that is good enough for a press, and by NearModel where none is. Where the
-/// share of a rung falls from 1 to 0 with the place of the hand, the next one takes over, blended as two near fields are:
-/// the difference of the two is said as an error. Given forces are answered by NearModel.
+/// share of a rung falls from 1 to 0 with the place of the hand, the next one takes over, see blended(). Given forces are
+/// answered by NearModel.
 ///
 /// While a rung answers, NearModel is not asked and makes no field: a hand that comes to where it takes over after a far
 /// way has the whole of a new near field made in that answer.
@@ -38,5 +38,9 @@ class Ladder : public Model {
   std::vector<int> answers_;
   std::unique_ptr<NearModel> near_;
 };
+
+/// The reaction whose force, and whose stiffness however a surface lies, are so far between those of two as `share`
+/// (0 … 1) says. `error` adds how far they are apart.
+Reaction blended(const Reaction& from, const Reaction& to, double share);
 
 }  // namespace tendon::softbody
