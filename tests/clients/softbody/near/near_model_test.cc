@@ -7,12 +7,12 @@
 #include <cmath>
 #include <limits>
 #include <memory>
-#include <utility>
 
 #include "clients/softbody/body.h"
 #include "clients/softbody/touch/contact.h"
 #include "tests/clients/softbody/drawn_answers.h"
 #include "tests/clients/softbody/pressed_block.h"
+#include "tests/clients/softbody/same_answer.h"
 
 namespace tendon::softbody {
 namespace {
@@ -257,18 +257,6 @@ TEST(Near, TheStiffnessSentIsTheForcesOwnSlope) {
   }
 }
 
-/// A body that always answers the same.
-class Same : public Model {
- public:
-  explicit Same(Reaction reaction) : reaction_(std::move(reaction)) {}
-  Reaction press(const Patch&, Given, double) override { return reaction_; }
-  bool glides() const noexcept override { return true; }
-  std::size_t bytes() const noexcept override { return 0; }
-
- private:
-  Reaction reaction_;
-};
-
 TEST(Near, WhereAFieldTakesOverForceAndStiffnessGoOnAndFadeTogether) {
   const Solid solid = pressed_block(Element::kHex8Sri, 8, 0.45);
   const TouchSurface slanting(solid.mesh(), Vec3(0.3, -0.2, 1).normalized(), kB1PatchRadius);
@@ -286,7 +274,7 @@ TEST(Near, WhereAFieldTakesOverForceAndStiffnessGoOnAndFadeTogether) {
   before.force = 2.1;
   const Handover met = handover(before, one, one.depth);
   const auto felt = [&](const Reaction& reaction) {
-    Same model(reaction);
+    testing::SameAnswer model(reaction);
     return PatchContact(model, slanting, 0, PatchContact::Side::kUnilateral).at(Vec3(0.001, 0.002, 0.046));
   };
   for (const double share : {0.0, 0.3, 1.0}) {
