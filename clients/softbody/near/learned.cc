@@ -326,7 +326,8 @@ LearnedShapes learn_shapes(const Solid& solid, const TouchSurface& surface, cons
   const LearnedBody nothing_known(solid, surface, learned);
   Eigen::Index next = 0;
   for (int i = 0; i < grid.places(); ++i) {
-    const auto patch = surface.patch(grid.place(i / grid.side(), i % grid.side()));
+    const int along = i / grid.side();
+    const auto patch = surface.patch(grid.place(along, i % grid.side()));
     for (int level = 0; level <= PressGrid::kLevels; ++level) {
       const int knot = i * (PressGrid::kLevels + 1) + level;
       auto inverse = learned.inverses.middleCols(count * knot, count);

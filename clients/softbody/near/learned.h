@@ -14,7 +14,7 @@ namespace tendon::softbody {
 ///
 ///     E(q) = ½ qᵀq + Σ_e ω_e [W_e(Φ_e q) − ½ (Φ_e q)ᵀ K₀ₑ (Φ_e q)],     Φᵀ K₀ Φ = 1
 ///
-/// Its linear part is that of all elements, and only what the law adds to it is summed over few (an, Kim & James 2008;
+/// Its linear part is that of all elements, and only what the law adds to it is summed over few (An, Kim & James 2008;
 /// Farhat, Chapman & Avery 2015, for all of the force).
 struct LearnedShapes {
   PressGrid grid;
