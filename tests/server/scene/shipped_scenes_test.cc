@@ -65,6 +65,12 @@ TEST(ShippedScenes, MinimalIsAcceptedAsItIs) {
   EXPECT_EQ(read_scene(std::filesystem::path(TENDON_SCENES) / "minimal.toml").simulated().name, "falcon");
 }
 
+TEST(ShippedScenes, AFleetIsFourBanksOfDevices) {
+  const std::vector<Scene> devices = each_device({read_scene(std::filesystem::path(TENDON_SCENES) / "fleet.toml")});
+  ASSERT_EQ(devices.size(), 64U);
+  EXPECT_EQ(devices.back().name, "finger-63");
+}
+
 TEST(ShippedScenes, RecordedHandFollowsTheRecordingBesideIt) {
   const ScratchFolder folder;
   std::filesystem::copy(std::filesystem::path(TENDON_SCENES) / "recorded-hand.toml", folder.path() / "scene.toml");
