@@ -5,6 +5,8 @@
 #include <utility>
 
 #include "clients/softbody/models/model.h"
+#include "clients/softbody/touch/contact.h"
+#include "tests/clients/softbody/pressed_block.h"
 
 namespace tendon::softbody::testing {
 
@@ -19,5 +21,28 @@ class SameAnswer : public Model {
  private:
   Reaction reaction_;
 };
+
+/// An answer all parts of whose stiffness are there: 2 N, 4 mm deep.
+inline Reaction whole_answer() {
+  Reaction answer;
+  answer.force = 2;
+  answer.depth = 4e-3;
+  answer.stiffness = 400;
+  answer.slope = Vec2(0.1, -0.2);
+  answer.error = 0.01;
+  answer.knows_glide = true;
+  answer.glide.tilting = Vec2(3, 5);
+  answer.glide.curving << 7, 1, 1, -4;
+  answer.glide.giving << 20, 3, 3, 30;
+  return answer;
+}
+
+/// What is sent of an answer where the surface slants.
+inline Feel felt(const Reaction& answer) {
+  const Solid solid = pressed_block(Element::kHex8Sri, 8, 0.45);
+  const TouchSurface slanting(solid.mesh(), Vec3(0.3, -0.2, 1).normalized(), kB1PatchRadius);
+  SameAnswer model(answer);
+  return PatchContact(model, slanting, 0, PatchContact::Side::kUnilateral).at(Vec3(0.001, 0.002, 0.046));
+}
 
 }  // namespace tendon::softbody::testing

@@ -258,25 +258,11 @@ TEST(Near, TheStiffnessSentIsTheForcesOwnSlope) {
 }
 
 TEST(Near, WhereAFieldTakesOverForceAndStiffnessGoOnAndFadeTogether) {
-  const Solid solid = pressed_block(Element::kHex8Sri, 8, 0.45);
-  const TouchSurface slanting(solid.mesh(), Vec3(0.3, -0.2, 1).normalized(), kB1PatchRadius);
-  Reaction one;
-  one.force = 2;
-  one.depth = 4e-3;
-  one.stiffness = 400;
-  one.slope = Vec2(0.1, -0.2);
-  one.error = 0.01;
-  one.knows_glide = true;
-  one.glide.tilting = Vec2(3, 5);
-  one.glide.curving << 7, 1, 1, -4;
-  one.glide.giving << 20, 3, 3, 30;
+  const Reaction one = testing::whole_answer();
   Reaction before = one;
   before.force = 2.1;
   const Handover met = handover(before, one, one.depth);
-  const auto felt = [&](const Reaction& reaction) {
-    testing::SameAnswer model(reaction);
-    return PatchContact(model, slanting, 0, PatchContact::Side::kUnilateral).at(Vec3(0.001, 0.002, 0.046));
-  };
+  using testing::felt;
   for (const double share : {0.0, 0.3, 1.0}) {
     const Reaction both = kept(met, share, one);
     const double times = 1 + share * 0.05;

@@ -6,29 +6,6 @@ use std::os::raw::{c_int, c_uchar, c_ulonglong};
 
 use crate::noise::Key;
 
-type Encrypt = unsafe extern "C" fn(
-    out: *mut c_uchar,
-    out_size: *mut c_ulonglong,
-    text: *const c_uchar,
-    size: c_ulonglong,
-    associated: *const c_uchar,
-    associated_size: c_ulonglong,
-    secret_nonce: *const c_uchar,
-    nonce: *const c_uchar,
-    key: *const c_uchar,
-) -> c_int;
-type Decrypt = unsafe extern "C" fn(
-    out: *mut c_uchar,
-    out_size: *mut c_ulonglong,
-    secret_nonce: *mut c_uchar,
-    sealed: *const c_uchar,
-    size: c_ulonglong,
-    associated: *const c_uchar,
-    associated_size: c_ulonglong,
-    nonce: *const c_uchar,
-    key: *const c_uchar,
-) -> c_int;
-
 macro_rules! of_libsodium {
     ($encrypt:ident, $decrypt:ident) => {
         extern "C" {
@@ -75,13 +52,6 @@ pub enum Cipher {
 }
 
 impl Cipher {
-    fn functions(self) -> (Encrypt, Decrypt) {
-        match self {
-            Cipher::ChaChaPoly => (crypto_aead_chacha20poly1305_ietf_encrypt, crypto_aead_chacha20poly1305_ietf_decrypt),
-            Cipher::AesGcm => (crypto_aead_aes256gcm_encrypt, crypto_aead_aes256gcm_decrypt),
-        }
-    }
-
     fn nonce(self, number: u64) -> [u8; 12] {
         let mut bytes = [0; 12];
         bytes[4..].copy_from_slice(&match self {
@@ -93,7 +63,10 @@ impl Cipher {
 
     pub fn seal(self, key: &Key, nonce: &[u8; 12], associated: &[u8], text: &[u8]) -> Vec<u8> {
         let mut out = vec![0; text.len() + 16];
-        let (encrypt, _) = self.functions();
+        let encrypt = match self {
+            Cipher::ChaChaPoly => crypto_aead_chacha20poly1305_ietf_encrypt,
+            Cipher::AesGcm => crypto_aead_aes256gcm_encrypt,
+        };
         unsafe {
             encrypt(
                 out.as_mut_ptr(),
@@ -113,7 +86,10 @@ impl Cipher {
     /// Nothing when it is not authentic.
     pub fn open(self, key: &Key, nonce: &[u8; 12], associated: &[u8], sealed: &[u8]) -> Option<Vec<u8>> {
         let mut out = vec![0; sealed.len().checked_sub(16)?];
-        let (_, decrypt) = self.functions();
+        let decrypt = match self {
+            Cipher::ChaChaPoly => crypto_aead_chacha20poly1305_ietf_decrypt,
+            Cipher::AesGcm => crypto_aead_aes256gcm_decrypt,
+        };
         let failed = unsafe {
             decrypt(
                 out.as_mut_ptr(),
