@@ -14,7 +14,7 @@
 namespace tendon::softbody {
 namespace {
 
-constexpr int kAtOnce = static_cast<int>(kLanes);
+constexpr int kLanesAtOnce = static_cast<int>(kLanes);
 
 struct View {
   int points;
@@ -30,8 +30,8 @@ template <Law kLaw, int kNodes>
   const int* nodes = all.nodes;
   const double* gradient = all.gradients;
   const double* modulus = all.moduli;
-  for (int first = 0; first < all.elements; first += kAtOnce) {
-    const int full = std::min(kAtOnce, all.elements - first);
+  for (int first = 0; first < all.elements; first += kLanesAtOnce) {
+    const int full = std::min(kLanesAtOnce, all.elements - first);
     Lanes local[3 * kNodes] = {};
     Lanes force[3 * kNodes] = {};
     for (int k = 0; k < full; ++k) {
@@ -59,8 +59,8 @@ template <Law kLaw, int kNodes>
           force[3 * i + r] += p[r] * g[3 * i] + p[r + 3] * g[3 * i + 1] + p[r + 6] * g[3 * i + 2];
         }
       }
-      gradient += 3 * kNodes * kAtOnce;
-      modulus += 2 * kAtOnce;
+      gradient += 3 * kNodes * kLanesAtOnce;
+      modulus += 2 * kLanesAtOnce;
     }
     for (int k = 0; k < full; ++k) {
       for (int i = 0; i < kNodes; ++i) {
@@ -95,13 +95,13 @@ Kernel::Kernel(Law law, int nodes, int points) : law_(law), per_element_(nodes),
 
 void Kernel::add_element(std::span<const int> nodes) {
   nodes_.insert(nodes_.end(), nodes.begin(), nodes.end());
-  const int groups = (++elements_ + kAtOnce - 1) / kAtOnce * points_;
+  const int groups = (++elements_ + kLanesAtOnce - 1) / kLanesAtOnce * points_;
   gradients_.resize(at(groups * 3 * per_element_) * kLanes);
   moduli_.resize(at(groups) * 2 * kLanes);
 }
 
 void Kernel::set_point(int element, int point, const Nodal& gradient, double mu, double lambda) {
-  const std::size_t lane = at(element % kAtOnce);
+  const std::size_t lane = at(element % kLanesAtOnce);
   const std::size_t first = group(element, point);
   const auto numbers = static_cast<std::size_t>(gradient.size());
   for (std::size_t i = 0; i < numbers; ++i) gradients_[(first * numbers + i) * kLanes + lane] = gradient.data()[i];
@@ -110,7 +110,7 @@ void Kernel::set_point(int element, int point, const Nodal& gradient, double mu,
 }
 
 Kernel::Gradient Kernel::gradient(int element, int point) const {
-  return {gradients_.data() + group(element, point) * at(3 * per_element_) * kLanes + at(element % kAtOnce), 3,
+  return {gradients_.data() + group(element, point) * at(3 * per_element_) * kLanes + at(element % kLanesAtOnce), 3,
           per_element_};
 }
 

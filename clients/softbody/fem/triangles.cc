@@ -47,10 +47,10 @@ Vec3 twice_area(const Triangles& surface, const std::array<int, 3>& facet) {
   return (surface.points[at(facet[1])] - a).cross(surface.points[at(facet[2])] - a);
 }
 
-/// Words of a text, line by line.
-class Words {
+/// SurfaceWords of a text, line by line.
+class SurfaceWords {
  public:
-  Words(std::string_view text, std::string_view name) : rest_(text), name_(name) {}
+  SurfaceWords(std::string_view text, std::string_view name) : rest_(text), name_(name) {}
 
   /// The words of the next line that has some; empty at the end. Anything after '#' is left out.
   const std::vector<std::string_view>& next() {
@@ -141,7 +141,7 @@ Triangles read_stl(std::string_view text, std::string_view name) {
     if (text.size() == kStlHead + std::uint64_t{kStlFacet} * count) return read_binary_stl(text, name);
   }
   Triangles surface;
-  Words words(text, name);
+  SurfaceWords words(text, name);
   if (const auto& first = words.next(); first.empty() || first[0] != "solid") {
     refuse(name, "expected an STL file: text that begins with \"solid\", or 84 bytes and 50 for each facet");
   }
@@ -160,7 +160,7 @@ Triangles read_stl(std::string_view text, std::string_view name) {
 
 Triangles read_obj(std::string_view text, std::string_view name) {
   Triangles surface;
-  Words words(text, name);
+  SurfaceWords words(text, name);
   std::vector<int> corners;
   for (const auto* line = &words.next(); !line->empty(); line = &words.next()) {
     if ((*line)[0] == "v") surface.points.push_back(words.point(1));
@@ -182,7 +182,7 @@ Triangles read_obj(std::string_view text, std::string_view name) {
 
 Triangles read_off(std::string_view text, std::string_view name) {
   Triangles surface;
-  Words words(text, name);
+  SurfaceWords words(text, name);
   const auto* line = &words.next();
   if (line->empty() || (*line)[0] != "OFF") refuse(name, "expected an OFF file, which begins with \"OFF\"");
   if (line->size() == 1) line = &words.next();

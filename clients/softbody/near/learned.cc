@@ -19,7 +19,7 @@ namespace tendon::softbody {
 namespace {
 
 /// At most so many shapes, fewer where these leave so small a share of the energies' square root.
-constexpr int kMostShapes = 45;
+constexpr int kMostLearned = 45;
 constexpr double kShapesLeft = 3e-4;
 
 /// What the few elements may miss of what the law adds, and how many there may be.
@@ -115,7 +115,7 @@ Basis basis_of(const std::vector<const SolvedPress*>& presses, const SymmetricMa
   for (Eigen::Index s = 0; s < count; ++s) gram.col(s) = all.transpose() * at_rest.times(all.col(s));
   const Eigen::SelfAdjointEigenSolver<MatrixXd> parts((gram + gram.transpose()) / 2);
   const VectorXd& energies = parts.eigenvalues();  // ascending
-  Eigen::Index kept = std::min<Eigen::Index>(count, kMostShapes);
+  Eigen::Index kept = std::min<Eigen::Index>(count, kMostLearned);
   const double sum = energies.sum();
   const auto left = [&](Eigen::Index of) { return energies.head(count - of).cwiseMax(0.0).sum(); };
   while (kept > 1 && left(kept - 1) <= kShapesLeft * kShapesLeft * sum) --kept;

@@ -54,7 +54,7 @@ constexpr double kShape = 1e-3;
 constexpr int kShapePresses = 6;
 
 /// A field whose middle is so many times as far from the hand as it serves is not made to its end.
-constexpr double kLeft = 3;
+constexpr double kLeftBehind = 3;
 
 /// The way of the hand in an answer is a mean over about so many.
 constexpr double kAnswersInMean = 16;
@@ -362,7 +362,7 @@ std::unique_ptr<NearModel::Field> NearModel::Oracle::make(const Vec3& ahead, con
   while (work.next()) {
     if (const Hand* const newer = hand.take()) making.hand = *newer;
     const double away = (making.hand.place - making.middle).norm();
-    if (left || away > kLeft * kReach * surface.radius() / 2) return std::make_unique<Field>();
+    if (left || away > kLeftBehind * kReach * surface.radius() / 2) return std::make_unique<Field>();
   }
   return std::move(making.field);
 }

@@ -25,7 +25,7 @@ constexpr double kMargin = 0.25;
 /// energy. Near the least energy a step that is right changes it by less than its rounding.
 constexpr double kToolDecrease = 1e-4;
 constexpr double kToolShortest = 1.0 / 64;
-constexpr double kRounding = 1e-13;
+constexpr double kContactRounding = 1e-13;
 
 /// Of the whole body: a factor is made anew after so many steps without an answer that is good enough.
 constexpr int kToolPatience = 16;
@@ -204,7 +204,7 @@ VectorXd RigidContact::meet(const Local& local, const VectorXd& free, double eno
       const VectorXd pull_there = local.stiffness * (there - free);
       const Layer::Press press = layer_.press(local.near, placed_, local.moved(there), Layer::Order::kCurve);
       const double energy_there = press.energy + (there - free).dot(pull_there) / 2;
-      fell = energy_there - energy <= -kToolDecrease * share * drop + kRounding * std::abs(energy);
+      fell = energy_there - energy <= -kToolDecrease * share * drop + kContactRounding * std::abs(energy);
       if (!fell) continue;
       by = there;
       pull = pull_there;
@@ -243,7 +243,7 @@ bool RigidContact::go(const VectorXd& step, double slope, Local& local) {
     const double layer =
         layer_.press(local.near, placed_, layer_.places(local.near, body_.displacements()), Layer::Order::kEnergy)
             .energy;
-    if (there.energy + layer - before <= kToolDecrease * share * slope + kRounding * std::abs(before)) {
+    if (there.energy + layer - before <= kToolDecrease * share * slope + kContactRounding * std::abs(before)) {
       local.now = std::move(there);
       return true;
     }

@@ -65,7 +65,7 @@ RigidShape::RigidShape(const Vec3& core, double rounding, const Mat3& turn)
       reach_(core.norm() + rounding),
       thinnest_(2 * (rounding + core.minCoeff())) {}
 
-RigidShape::RigidShape(std::shared_ptr<const Mesh> mesh)
+RigidShape::RigidShape(Mesh mesh)
     : mesh_(std::move(mesh)),
       reach_(std::ranges::max(mesh_->points, {}, &Vec3::squaredNorm).norm()),
       thinnest_(mesh_->thinnest) {}
@@ -131,7 +131,7 @@ RigidShape RigidShape::mesh(const Triangles& surface, double scale, double cell,
       }
       judge(middle);
     }
-    return RigidShape(std::make_shared<const Mesh>(Mesh{made.points, grid, facts, thinnest}));
+    return RigidShape(Mesh{made.points, grid, facts, thinnest});
   } catch (const std::invalid_argument& refused) {
     throw std::invalid_argument(std::string(name) + ": " + refused.what());
   }

@@ -2,7 +2,7 @@
 #pragma once
 
 #include <cstddef>
-#include <memory>
+#include <optional>
 #include <string_view>
 #include <vector>
 
@@ -60,7 +60,7 @@ class RigidShape {
     Vec3 size;           ///< m, of the box around the surface
     double cell;         ///< m
     std::size_t points;  ///< of the grid
-    std::size_t bytes;   ///< kept, once for all copies of the shape
+    std::size_t bytes;   ///< kept, by each copy of the shape
     double error;  ///< m, the largest |φ| at corners and in the middles of edges and facets, where φ should be 0
   };
   const MeshFacts* mesh_facts() const noexcept { return mesh_ ? &mesh_->facts : nullptr; }  ///< of mesh(), or null
@@ -73,12 +73,12 @@ class RigidShape {
     MeshFacts facts;
     double thinnest;  ///< m
   };
-  explicit RigidShape(std::shared_ptr<const Mesh> mesh);
+  explicit RigidShape(Mesh mesh);
 
   Vec3 core_ = Vec3::Zero();  ///< half of the core's size, m
   double rounding_ = 0;
-  Mat3 turn_ = Mat3::Identity();      ///< the core's axes, as columns, in the tool's frame
-  std::shared_ptr<const Mesh> mesh_;  ///< in place of these
+  Mat3 turn_ = Mat3::Identity();  ///< the core's axes, as columns, in the tool's frame
+  std::optional<Mesh> mesh_;      ///< in place of these
   double reach_;
   double thinnest_;
 };
