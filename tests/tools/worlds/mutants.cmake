@@ -24,6 +24,7 @@ function(tendon_mutant name)
   set_target_properties(tendon-worlds-${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/tests)
   target_include_directories(tendon-worlds-${name} PRIVATE $<TARGET_PROPERTY:${ARG_LIBRARY},INCLUDE_DIRECTORIES>)
   target_link_libraries(tendon-worlds-${name} PRIVATE tendon_worlds_main)
+  target_precompile_headers(tendon-worlds-${name} REUSE_FROM tendon_core)
   add_test(NAME Worlds.Find.${name} COMMAND tendon-worlds-${name} run --count 2000 --jobs 1)
   set_tests_properties(Worlds.Find.${name} PROPERTIES LABELS world TIMEOUT 600
     PASS_REGULAR_EXPRESSION "breaks \"(${ARG_ORACLES})\"")
