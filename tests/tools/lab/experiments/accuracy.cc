@@ -73,6 +73,8 @@ BodyConfig body_of(const PressedBlock& block, const Candidate& candidate) {
   config.reach = kReach * block.patch_radius;
   config.middle = block.touch_point();
   config.static_modes = kStaticModes;
+  config.learn = candidate.by == Candidate::By::kLearned;
+  config.tabulate = candidate.by == Candidate::By::kTable;
   if (info(candidate.model).has_time()) {
     // Slowed enough to be at rest soon. Explicit steps as long as they may be, with something to spare for a body that
     // is pressed together, and none longer than a period of the device.
@@ -152,7 +154,7 @@ void split_error(AccuracyPoint& point, Truth& truth, OnMesh& on_mesh) {
     if (!limit) continue;
     Accuracy& error = point.at_load[load];
     const double right = truth.stiffness(load).secant;
-    if (point.candidate.elsewhere) {
+    if (point.candidate.elsewhere()) {
       error.model = limit->secant / right - 1;
       error.discretisation = error.total - error.model - error.solver;
       continue;
@@ -216,7 +218,7 @@ void follow_script(PressedEngine& engine, const std::vector<Touched>& script, co
     const Meter::Reading took = meter->read() - before;
     if (feel.touching) {
       times.push_back(std::max(0.0, engine.took(took) - floor));
-      if (took.instructions && !point.candidate.elsewhere)
+      if (took.instructions && !point.candidate.elsewhere())
         instructions.push_back(static_cast<double>(*took.instructions));
       // Twice as long is no accident of a busy machine.
       if (times.size() == kFirstUpdates && 1e3 * quantile(times, 0.5) > 2 * slowest_ms) {
@@ -326,19 +328,35 @@ std::vector<Candidate> families(const AccuracyOptions& options) {
     for (const Element element : elements_of(options)) {
       if (info(model).tetrahedra && element != Element::kTet4) continue;
       all.push_back({model, element, 0});
+      if (!options.learned || model != ModelKind::kNear) continue;
+      all.push_back({model, element, 0, Candidate::By::kLearned});
+      all.push_back({model, element, 0, Candidate::By::kTable});
     }
   }
   if (!options.worker.empty()) {
-    for (const Element element : elements_of(options)) all.push_back({ModelKind::kLinear, element, 0, true});
+    for (const Element element : elements_of(options))
+      all.push_back({ModelKind::kLinear, element, 0, Candidate::By::kWorker});
   }
   return all;
 }
 
 }  // namespace
 
-std::string Candidate::name() const {
-  return (elsewhere ? "worker" : std::string(info(model).name)) + "-" + std::string(info(element).name);
+std::string Candidate::way() const {
+  switch (by) {
+    case By::kLearned:
+      return std::string(info(model).name) + "-learned";
+    case By::kTable:
+      return std::string(info(model).name) + "-table";
+    case By::kWorker:
+      return "worker";
+    case By::kModel:
+      break;
+  }
+  return std::string(info(model).name);
 }
+
+std::string Candidate::name() const { return way() + "-" + std::string(info(element).name); }
 
 namespace {
 
@@ -356,7 +374,7 @@ Trial tried(const Candidate& candidate, Truth& truth, const Meter* meter, double
   const Meter::Reading before = meter != nullptr ? meter->read() : Meter::Reading{};
   const BodyConfig config = body_of(block, candidate);
   Trial trial{.point = {.candidate = candidate, .timed = meter != nullptr},
-              .engine = candidate.elsewhere ? worker_engine(config, worker) : own_engine(config)};
+              .engine = candidate.elsewhere() ? worker_engine(config, worker) : own_engine(config)};
   AccuracyPoint& point = trial.point;
   PressedEngine& engine = *trial.engine;
   if (meter != nullptr) point.setup_s = engine.took(meter->read() - before);
@@ -365,8 +383,8 @@ Trial tried(const Candidate& candidate, Truth& truth, const Meter* meter, double
   follow_script(engine, truth.script(), meter, slowest_ms, point);
   for (std::size_t load = 0; load < point.at_load.size(); ++load) {
     const Reaction reaction = engine.under(block.loads[load]);
-    point.at_load[load] =
-        accuracy_of(reaction, truth.stiffness(load), candidate.elsewhere ? reaction.error / reaction.force : kNoNumber);
+    point.at_load[load] = accuracy_of(reaction, truth.stiffness(load),
+                                      candidate.elsewhere() ? reaction.error / reaction.force : kNoNumber);
   }
   return trial;
 }
@@ -522,6 +540,10 @@ void check(const AccuracyOptions& options) {
     throw std::invalid_argument("--out: there is no figure with --budget-ms, which measures no more than it must");
   }
   options.block.check();
+  if (options.learned && options.budget_ms) throw std::invalid_argument("--learned: not with --budget-ms");
+  if (options.learned && std::ranges::count(models_of(options), ModelKind::kNear) == 0) {
+    throw std::invalid_argument("--learned: expected near among --models, whose bodies learn");
+  }
   if (options.errors_only && (options.network || options.budget_ms)) {
     throw std::invalid_argument(
         "--errors-only, --units and --from: not with --network or --budget-ms, whose answers "

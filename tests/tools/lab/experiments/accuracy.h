@@ -22,12 +22,18 @@ namespace tendon::lab {
 
 /// A model on a mesh: `n` cells along x, and as many to a length along y and z.
 struct Candidate {
+  /// Who answers: the model; of a body of the model `near` what it has learned, or its table of answers; or
+  /// AccuracyOptions::worker, and no body of this process.
+  enum class By : std::uint8_t { kModel, kLearned, kTable, kWorker };
+
   softbody::ModelKind model;
   softbody::Element element;
   int n;
-  bool elsewhere = false;  ///< AccuracyOptions::worker answers, and no body of this process
+  By by = By::kModel;
 
-  std::string name() const;  ///< "linear-hex8-sri", "worker-hex8-sri"
+  bool elsewhere() const noexcept { return by == By::kWorker; }
+  std::string way() const;   ///< "linear", "near-learned", "near-table", "worker"
+  std::string name() const;  ///< way and element: "linear-hex8-sri"
 };
 
 /// How a model answers one load. Shares, of the true stiffness: total = model + discretisation + solver. The parts are
@@ -115,6 +121,8 @@ struct AccuracyOptions {
   /// The command of a worker that answers for the linear block as well, without its scene; empty: none. Not with
   /// errors_only: its last bits depend on how many ranks it has.
   std::string worker{};
+  /// Bodies of the model `near` that have learned shapes, and that have a table of answers, as well. Not with a budget.
+  bool learned = false;
   Truth::Config truth;
   double slowest_ms = 200;                  ///< a refinement ladder ends where an update would take longer …
   std::optional<double> longest_setup_s{};  ///< … or the set-up; none: 30, with a budget 5

@@ -30,11 +30,12 @@ const char* colour_of(std::size_t i) {
   return kColours.at(i % kColours.size());
 }
 
-/// A line for a model, the same in all panels; broken for those that are there for comparison …
-Curve curve_of(ModelKind kind) {
-  return {.name = std::string(info(kind).name),
-          .colour = colour_of(static_cast<std::size_t>(kind)),
-          .style = for_comparison(kind) ? Curve::Style::kDashed : Curve::Style::kLine};
+/// A line for a way of answering, the same in all panels; broken for models that are there for comparison …
+Curve curve_of(const Candidate& candidate) {
+  const auto number = static_cast<std::size_t>(candidate.model) + 3 * static_cast<std::size_t>(candidate.by);
+  return {.name = candidate.way(),
+          .colour = colour_of(number),
+          .style = for_comparison(candidate.model) ? Curve::Style::kDashed : Curve::Style::kLine};
 }
 
 /// … whose points are rings.
@@ -53,26 +54,37 @@ void add_with_points(Panel& panel, Curve curve) {
   panel.curves.push_back(std::move(points));
 }
 
-std::vector<ModelKind> kinds_in(const Ladders& ladders) {
-  std::vector<ModelKind> kinds;
-  for (const auto& ladder : ladders) {
-    if (kinds.empty() || kinds.back() != ladder.front().candidate.model)
-      kinds.push_back(ladder.front().candidate.model);
-  }
-  return kinds;
+bool same_way(const std::vector<AccuracyPoint>& ladder, const Candidate& candidate) {
+  return ladder.front().candidate.way() == candidate.way();
 }
 
-/// All of a model, or of all of them.
-std::vector<AccuracyPoint> points_of(const Ladders& ladders, std::optional<ModelKind> kind) {
+/// The first of each way of answering.
+std::vector<Candidate> ways_in(const Ladders& ladders) {
+  std::vector<Candidate> ways;
+  for (const auto& ladder : ladders) {
+    if (std::ranges::none_of(ways, [&](const Candidate& way) { return same_way(ladder, way); })) {
+      ways.push_back(ladder.front().candidate);
+    }
+  }
+  return ways;
+}
+
+/// All of one way, or of all of them.
+std::vector<AccuracyPoint> points_of(const Ladders& ladders, const std::optional<Candidate>& way) {
   std::vector<AccuracyPoint> points;
   for (const auto& ladder : ladders) {
-    if (!kind || ladder.front().candidate.model == *kind) points.insert(points.end(), ladder.begin(), ladder.end());
+    if (!way || same_way(ladder, *way)) points.insert(points.end(), ladder.begin(), ladder.end());
   }
   return points;
 }
 
-/// |error| over time: a point for everything, a line for each model through those that nothing else of the same model
-/// is both quicker and closer than.
+/// "condensed hex27-sri 8"
+std::string label_of(const Candidate& candidate) {
+  return candidate.way() + " " + std::string(info(candidate.element).name) + " " + std::to_string(candidate.n);
+}
+
+/// |error| over time: a point for everything, a line for each way of answering through those that nothing else of the
+/// same way is both quicker and closer than; and the front of all of them, by name.
 Panel error_over_time(const std::string& title, const Ladders& ladders, double extra_ms, std::size_t load) {
   Panel panel{.title = title, .x_label = "ms", .log_x = true, .log_y = true};
   const auto place = [&](const AccuracyPoint& p) {
@@ -89,14 +101,17 @@ Panel error_over_time(const std::string& title, const Ladders& ladders, double e
                           .points = {{panel.x_range->first, kJustNoticeable}, {panel.x_range->second, kJustNoticeable}},
                           .style = Curve::Style::kBelow});
   Curve front{.name = "best", .colour = kInk, .style = Curve::Style::kBold};
-  for (const AccuracyPoint& p : pareto_front(all, load)) front.points.push_back(place(p));
+  for (const AccuracyPoint& p : pareto_front(all, load)) {
+    front.points.push_back(place(p));
+    front.labels.push_back(label_of(p.candidate));
+  }
   panel.curves.push_back(front);
-  for (const ModelKind kind : kinds_in(ladders)) {
-    Curve line = curve_of(kind);
+  for (const Candidate& way : ways_in(ladders)) {
+    Curve line = curve_of(way);
     Curve points{.name = "", .colour = line.colour, .style = points_on(line)};
-    for (const AccuracyPoint& p : points_of(ladders, kind)) points.points.push_back(place(p));
+    for (const AccuracyPoint& p : points_of(ladders, way)) points.points.push_back(place(p));
     // A model that collapses on a fine mesh has no parts, and no such points: its name still goes with its colour.
-    for (const AccuracyPoint& p : pareto_front(points_of(ladders, kind), load)) line.points.push_back(place(p));
+    for (const AccuracyPoint& p : pareto_front(points_of(ladders, way), load)) line.points.push_back(place(p));
     if (line.points.size() < 2) points.name = std::move(line.name);
     if (line.points.size() >= 2) panel.curves.push_back(std::move(line));
     panel.curves.push_back(std::move(points));
@@ -104,16 +119,15 @@ Panel error_over_time(const std::string& title, const Ladders& ladders, double e
   return panel;
 }
 
-/// |error| of each element over n, for the first model: what refining brings.
+/// |error| of each element over n, for the first way: what refining brings.
 Panel error_over_n(const Ladders& ladders) {
-  const ModelKind kind = ladders.front().front().candidate.model;
+  const Candidate& first = ladders.front().front().candidate;
   std::pair range{std::numeric_limits<double>::infinity(), 0.0};
-  Panel panel{.title = "|error| of K, %, over cells along x, an element each: " + std::string(info(kind).name),
-              .x_label = "n",
-              .log_y = true};
+  Panel panel{
+      .title = "|error| of K, %, over cells along x, an element each: " + first.way(), .x_label = "n", .log_y = true};
   std::size_t colour = 0;
   for (const auto& ladder : ladders) {
-    if (ladder.front().candidate.model != kind) continue;
+    if (!same_way(ladder, first)) continue;
     range = {std::min<double>(range.first, ladder.front().candidate.n),
              std::max<double>(range.second, ladder.back().candidate.n)};
     Curve curve{.name = std::string(info(ladder.front().candidate.element).name), .colour = colour_of(colour++)};
@@ -126,7 +140,7 @@ Panel error_over_n(const Ladders& ladders) {
   return panel;
 }
 
-/// Of all elements of a model the ladder with the point that is felt best.
+/// Of all elements of a way of answering the ladder with the point that is felt best.
 std::vector<const std::vector<AccuracyPoint>*> felt_best(const Ladders& ladders) {
   std::vector<const std::vector<AccuracyPoint>*> best;
   const auto least = [](const std::vector<AccuracyPoint>& ladder) {
@@ -135,8 +149,8 @@ std::vector<const std::vector<AccuracyPoint>*> felt_best(const Ladders& ladders)
     return error;
   };
   for (const auto& ladder : ladders) {
-    const auto same = std::ranges::find_if(
-        best, [&](const auto* known) { return known->front().candidate.model == ladder.front().candidate.model; });
+    const auto same =
+        std::ranges::find_if(best, [&](const auto* known) { return same_way(*known, ladder.front().candidate); });
     if (same == best.end()) {
       best.push_back(&ladder);
     } else if (least(ladder) < least(**same)) {
@@ -152,7 +166,7 @@ Panel felt_over(const std::string& title, const std::string& label, const Ladder
   Panel panel{.title = title, .x_label = label, .log_x = log_x, .log_y = true};
   std::pair<double, double> range{std::numeric_limits<double>::infinity(), 0};
   for (const auto* ladder : felt_best(ladders)) {
-    Curve curve = curve_of(ladder->front().candidate.model);
+    Curve curve = curve_of(ladder->front().candidate);
     for (const AccuracyPoint& p : *ladder) {
       range = {std::min<double>(range.first, x(p)), std::max<double>(range.second, x(p))};
       curve.points.emplace_back(x(p), 100 * p.felt->force_error);

@@ -114,6 +114,29 @@ TEST(Accuracy, TheScriptSeesTheErrorOfTheStiffnessAndNoPushAside) {
   EXPECT_GT(measure({ModelKind::kCondensed, Element::kTet4, 5}, truth(), meter).lateral, 10 * point.lateral);
 }
 
+TEST(Accuracy, WhatNearHasLearnedAndItsTableAnswerAsNearDoesToTheirTolerance) {
+  const Meter meter;
+  Candidate candidate{ModelKind::kNear, Element::kHex8Sri, 6};
+  const AccuracyPoint near = measure(candidate, truth(), meter);
+  for (const Candidate::By by : {Candidate::By::kLearned, Candidate::By::kTable}) {
+    candidate.by = by;
+    const AccuracyPoint point = measure(candidate, truth(), meter);
+    EXPECT_EQ(point.candidate.name(), by == Candidate::By::kTable ? "near-table-hex8-sri" : "near-learned-hex8-sri");
+    for (std::size_t load = 0; load < 2; ++load) {
+      EXPECT_NE(point.at_load[load].total, near.at_load[load].total) << "near has answered";
+      EXPECT_NEAR(point.at_load[load].total, near.at_load[load].total, 0.02);
+    }
+  }
+}
+
+TEST(Accuracy, RefusesWhatWasLearnedWithoutABodyThatLearns) {
+  AccuracyOptions options;
+  options.models = {ModelKind::kLinear};
+  options.learned = true;
+  std::ostringstream out;
+  EXPECT_THROW(accuracy(options, out), std::invalid_argument);
+}
+
 TEST(Accuracy, AWorkersRowIsThatOfTheSameBodyHereWithinTheErrorThatItSends) {
   const std::string worker = TENDON_FEM_WORKER;
   if (worker.empty()) GTEST_SKIP() << "tendon-fem-worker is not built here: it needs PETSc and MPI";
@@ -124,7 +147,7 @@ TEST(Accuracy, AWorkersRowIsThatOfTheSameBodyHereWithinTheErrorThatItSends) {
   const Network near{.name = "base=0.05ms"};
   Candidate candidate{ModelKind::kLinear, Element::kHex27Sri, 4};
   const AccuracyPoint here = measure(candidate, truth(), meter, near);
-  candidate.elsewhere = true;
+  candidate.by = Candidate::By::kWorker;
   const AccuracyPoint there = measure(candidate, truth(), meter, near, {}, worker + " --way multigrid");
   EXPECT_EQ(there.candidate.name(), "worker-hex27-sri");
   EXPECT_EQ(there.size.free, here.size.free);
@@ -146,7 +169,8 @@ TEST(Accuracy, AWorkersRowIsThatOfTheSameBodyHereWithinTheErrorThatItSends) {
 TEST(Accuracy, AWorkerThatDoesNotStartIsOneSentence) {
   const Meter meter;
   try {
-    measure({ModelKind::kLinear, Element::kHex8Sri, 4, true}, truth(), meter, {}, {}, "no-such-worker");
+    measure({ModelKind::kLinear, Element::kHex8Sri, 4, Candidate::By::kWorker}, truth(), meter, {}, {},
+            "no-such-worker");
     FAIL();
   } catch (const std::runtime_error& error) {
     EXPECT_NE(std::string(error.what()).find("no-such-worker"), std::string::npos) << error.what();

@@ -111,6 +111,13 @@ std::string panels_script(const std::filesystem::path& path, const std::string& 
         if (std::isfinite(x) && std::isfinite(y)) out << x << " " << y << "\n";
       }
       out << "EOD\n";
+      if (panels[p].curves[c].labels.empty()) continue;
+      out << "$l" << p << "_" << c << " << EOD\n";
+      for (std::size_t i = 0; i < panels[p].curves[c].labels.size(); ++i) {
+        const auto& [x, y] = panels[p].curves[c].points.at(i);
+        out << x << " " << y << " \"" << panels[p].curves[c].labels[i] << "\"\n";
+      }
+      out << "EOD\n";
     }
   }
   const auto up = [height](double pixels_from_top) { return 1 - pixels_from_top / height; };
@@ -143,6 +150,9 @@ std::string panels_script(const std::filesystem::path& path, const std::string& 
       out << separator << "$d" << p << "_" << c << " " << words(curve.style) << "'" << curve.colour << "' "
           << (curve.name.empty() ? "notitle" : "title " + literal(curve.name));
       separator = ", ";
+      if (curve.labels.empty()) continue;
+      out << ", $l" << p << "_" << c << " using 1:2:3 with labels left offset 0.7,0.5 font ',9' noenhanced tc rgb '"
+          << kInk << "' notitle";
     }
     out << "\nunset label\n";
   }

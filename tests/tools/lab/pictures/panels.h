@@ -24,6 +24,7 @@ struct Curve {
   const char* colour;  ///< one of gnuplot.h
   std::vector<std::pair<double, double>> points = {};
   Style style = Style::kLine;
+  std::vector<std::string> labels = {};  ///< one beside each point, or none
 };
 
 struct Panel {

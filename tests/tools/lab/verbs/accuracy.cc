@@ -95,6 +95,8 @@ void add(CLI::App& verb, int& /*exit*/) {
       ->delimiter(',');
   verb.add_option("--worker", options.worker, "command of a worker that answers for the linear block, too")
       ->type_name("COMMAND");
+  verb.add_flag("--learned", options.learned,
+                "bodies of the model near that have learned shapes, and that have a table of answers, as well");
   CLI::Option* const slowest =
       verb.add_option("--slowest-ms", options.slowest_ms, "a model is refined no further than this for an update")
           ->check(CLI::PositiveNumber)
@@ -132,6 +134,8 @@ void add(CLI::App& verb, int& /*exit*/) {
       "what to take\n  tendon-lab accuracy --budget-ms 5 --network wifi-good --json\n"
       "\nExample: a body on two ranks beside the same one in this process\n"
       "  tendon-lab accuracy --models linear --elements hex27-sri --worker \"mpirun -n 2 tendon-fem-worker\"\n"
+      "\nExample: what learned answers are worth beside the model that they stand for\n"
+      "  tendon-lab accuracy --models near --elements hex8-sri --n 6,8 --learned\n"
       "\nExample: errors of the finest meshes, by many machines\n"
       "  tendon-sweep plan a --units 0:24 --per-shard 1 -- tendon-lab accuracy --models condensed --n 8,12,16,20\n"
       "\nTimes are those of this machine, now. Exit: 0 done; 1 cannot write, or gnuplot failed; 2 wrong usage.");
