@@ -67,6 +67,7 @@ Doublings doublings(double x) noexcept {
 /// As written, each division waits for the one before: 100 ns, half of a haptic step with a knee. So the sums are
 /// guessed with r / n, whose divisions do not wait, and each is then compared with its definition, which nothing waits
 /// for. In one series of 15 a guess is wrong by its last bit; from there on the sums are taken as they are defined.
+/// Unrolled, for n as a constant: 5 ns and 120 instructions of a step.
 template <std::size_t kFirst, std::size_t kLast>
 double taylor(double r) noexcept {
   std::array<double, kLast + 1> sums;  // [n]: from n + 1 on
@@ -74,7 +75,10 @@ double taylor(double r) noexcept {
 #pragma GCC unroll 16
   for (std::size_t n = kLast; n >= kFirst; --n) sums[n - 1] = 1 + sums[n] * (r / static_cast<double>(n));
   std::size_t n = kLast;
-  while (n >= kFirst && sums[n - 1] == 1 + sums[n] * r / static_cast<double>(n)) --n;
+#pragma GCC unroll 16
+  for (; n >= kFirst; --n) {
+    if (sums[n - 1] != 1 + sums[n] * r / static_cast<double>(n)) break;
+  }
   double sum = sums[n];
   for (; n >= kFirst; --n) sum = 1 + sum * r / static_cast<double>(n);
   return sum;
