@@ -68,7 +68,7 @@ double defined(double x, bool less_one) {
   return less_one ? scale * (r * sum) + (scale - 1) : sum * scale;
 }
 
-TEST(PortableMath, TheExponentialsAreTheirSeriesToTheLastBitHoweverTheyAreGuessed) {
+TEST(PortableMath, TheExponentialsAreTheirSeriesToTheLastBit) {
   const auto same = [](double x) {
     ASSERT_EQ(exp(x), defined(x, false)) << x;
     if (std::abs(x) >= 40) return;
