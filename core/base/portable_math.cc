@@ -64,7 +64,7 @@ Doublings doublings(double x) noexcept {
 
 /// 1 + r/first (1 + r/(first + 1) (… (1 + r/last))), from its small end: each sum is 1 + sum * r / n of the one before.
 ///
-/// As written, each division waits for the one before: 100 ns, half of a haptic step with a knee. So the sums are
+/// As written, each division waits for the one before: 100 ns, two fifths of a haptic step with a knee. So the sums are
 /// guessed with r / n, whose divisions do not wait, and each is then compared with its definition, which nothing waits
 /// for. In one series of 15 a guess is wrong by its last bit; from there on the sums are taken as they are defined.
 /// Unrolled, for n as a constant: 5 ns and 120 instructions of a step.
