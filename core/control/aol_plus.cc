@@ -302,7 +302,11 @@ void AolPlus<Blocks, Size>::cap(const Vec<kSize>& wanted) noexcept {
     contact_ = 0;
     travel_.setZero();
   } else {
-    contact_ = std::min({contact_, most(), parts_.energy_cap->most_contact});
+    contact_ = std::min(contact_, parts_.energy_cap->most_contact);
+    // A branch, not a minimum: as a rule C is below C_b, and then the step need not wait for the wanted force here.
+    if (const double bound = most(); bound < contact_) [[unlikely]] {
+      contact_ = bound;
+    }
   }
   last_wanted_ = wanted;
   double kept = parts_.energy_cap->energy + contact_;

@@ -39,40 +39,32 @@ Vec<N> VelocityEstimatorOf<N>::observe(LocalTime at, const Vec<N>& position) noe
   }
   count_ = std::min(count_ + 1, kWindow + 1);
 
-  // Divisions are nearly all that this would cost: one for each sample that is looked at serves all axes.
+  // Divisions are dear: one for each sample that is looked at serves all axes.
   std::array<double, kWindow + 1> rate;  // 1/s
   std::size_t known = 1;                 // of the first samples before the newest
-  const auto know = [&](std::size_t i) {
-    for (; known <= i; ++known) rate[known] = 1e9 / static_cast<double>((at - now[known].at).count());
-  };
+  const auto rate_to = [&](const Sample& past) { return 1e9 / static_cast<double>((at - past.at).count()); };
 
   for (Eigen::Index axis = 0; axis < N; ++axis) {
+    // The slopes to samples at the same position are 0, and the last of them, whose r(i) is the least, allows least.
+    const std::size_t first = std::max<std::size_t>(same_[static_cast<std::size_t>(axis)], 1);
+    if (first < count_) {
+      for (; known < first; ++known) rate[known] = rate_to(now[known]);
+    }
     // A line of slope v through the newest sample passes within `resolution` of sample i just when v lies within
     // resolution · r(i) of the slope to it: keep the intersection.
+    const double x = position[axis];
+    const double resolution = resolution_;
     double lowest = -std::numeric_limits<double>::infinity();
     double highest = std::numeric_limits<double>::infinity();
     double velocity = 0;
-    const auto narrow = [&](std::size_t i) {
-      const double slope = (position[axis] - now[i].position[axis]) * rate[i];
-      if (slope < lowest || slope > highest) return false;
+    for (std::size_t i = first; i < count_; ++i) {
+      if (i == known) rate[known++] = rate_to(now[i]);
+      const double slope = (x - now[i].position[axis]) * rate[i];
+      if (slope < lowest || slope > highest) break;
       velocity = slope;
-      const double margin = resolution_ * rate[i];
+      const double margin = resolution * rate[i];
       lowest = std::max(lowest, slope - margin);
       highest = std::min(highest, slope + margin);
-      return true;
-    };
-    // The slopes to samples at the same position are 0, and the last of them, whose r(i) is the least, allows least.
-    std::size_t i = same_[static_cast<std::size_t>(axis)];
-    if (i > 0 && i + 1 < count_) {
-      know(i);
-      highest = resolution_ * rate[i];
-      lowest = -highest;
-    }
-    bool fits = true;
-    for (++i; fits && i < std::min(known, count_); ++i) fits = narrow(i);
-    for (; fits && i < count_; ++i) {
-      know(i);
-      fits = narrow(i);
     }
     velocity_[axis] = velocity;
   }

@@ -57,6 +57,35 @@ TEST(PortableMath, Expm1AndTanhKeepTheirPrecisionNearZero) {
   EXPECT_TRUE(std::isnan(tanh(kNan)));
 }
 
+/// eˣ or eˣ − 1, each sum after the one before; that far they are defined by what they compute.
+double defined(double x, bool less_one) {
+  const std::int64_t k = round(x / std::numbers::ln2);
+  const auto whole = static_cast<double>(k);
+  const double r = (x - whole * 0x1.62e42fee00000p-1) - whole * 0x1.a39ef35793c76p-33;
+  double sum = 1;
+  for (double n = less_one ? 15 : 14; n > (less_one ? 1 : 0); --n) sum = 1 + sum * r / n;
+  const double scale = std::bit_cast<double>(static_cast<std::uint64_t>(k + 1023) << 52);
+  return less_one ? scale * (r * sum) + (scale - 1) : sum * scale;
+}
+
+TEST(PortableMath, TheExponentialsAreTheirSeriesToTheLastBit) {
+  const auto same = [](double x) {
+    ASSERT_EQ(exp(x), defined(x, false)) << x;
+    if (std::abs(x) >= 40) return;
+    ASSERT_EQ(expm1(x), defined(x, true)) << x;
+  };
+  for (double x = -40; x < 40; x += 0.00137) same(x);
+  for (double x = 1e-300; x < 1; x *= 1.01) {
+    same(x);
+    same(-x);
+  }
+  for (int k = -1000; k < 1000; ++k) {  // halfway between two powers of two
+    double x = (k + 0.5) * std::numbers::ln2;
+    for (int i = 0; i < 4; ++i) x = std::nextafter(x, -kInfinity);
+    for (int i = 0; i < 9; ++i, x = std::nextafter(x, kInfinity)) same(x);
+  }
+}
+
 TEST(PortableMath, SineAndCosineAgreeWithLibmUpToAYearOfSeconds) {
   for (double x = 1e-12; x < 1e9; x *= 1.0011) {
     for (const double y : {x, -x}) {

@@ -371,6 +371,20 @@ TEST(AolPlus, WhatAHandPutIntoASoftSpringPaysForItsReleaseInSpiteOfTheCap) {
   }
 }
 
+TEST(AolPlus, AContactThatSoftensKeepsNoMoreThanItsForceCanGiveBack) {
+  auto config = one_axis();
+  config.parts.energy_cap.emplace();
+  AolPlus<1> law(config);
+  double applied = 0;
+  for (int n = 0; n < 1000; ++n) {  // the first step begins the contact
+    law.observe({.applied = Vec<1>(applied), .dx = Vec<1>(1e-5), .held = kPeriod});
+    law.limit({.force = Vec<1>(-5)});
+    applied = -5;
+  }
+  // 0.05 J were put in; 1 N over 9.99 mm gives back 9.99 mJ.
+  EXPECT_NEAR(law.limit({.force = Vec<1>(-1)}).permitted, 0.02 + 2 * std::sqrt(0.26 * (0.005 + 9.99e-3) / 1e-3), 1e-9);
+}
+
 TEST(AolPlus, ASpringThatIsHeldForAMinuteIsStillPaidFor) {
   auto config = one_axis();
   config.parts.energy_cap.emplace();

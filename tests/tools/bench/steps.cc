@@ -147,20 +147,22 @@ void measure_steps(Run& run) {
                        },
                        square_root_and_divide),
                    "EnergyLedger + OutputBound, 3 DOF", root);
-  row.target = Row::Target{"≤ 15 ns, ≤ 4 × the floor", row.p50 <= 15 && *row.ratio <= 4};
+  row.target = Row::Target{"≤ 12 ns", row.p50 <= 12};
   run.add(row);
 
   VelocityEstimator estimator(30e-6);
   LocalTime now{};
-  run.add(row_of(in_turns(
-                     blocks, kCalls,
-                     [&](std::size_t) {
-                       now += milliseconds(1);
-                       Vec3 v = estimator.observe(now, places[++at % places.size()].position);
-                       keep(v);
-                     },
-                     square_root_and_divide),
-                 "VelocityEstimator::observe, 3 DOF", root));
+  row = row_of(in_turns(
+                   blocks, kCalls,
+                   [&](std::size_t) {
+                     now += milliseconds(1);
+                     Vec3 v = estimator.observe(now, places[++at % places.size()].position);
+                     keep(v);
+                   },
+                   square_root_and_divide),
+               "VelocityEstimator::observe, 3 DOF", root);
+  row.target = Row::Target{"≤ 40 ns", row.p50 <= 40};
+  run.add(row);
 
   const AolPlus<1, 3>::Parts parts = lab::default_parts(lab::kPaperEncoder);
   const auto controller = [&](const char* what, const HapticController::Config& config) {
@@ -172,7 +174,7 @@ void measure_steps(Run& run) {
   };
   run.add(controller("HapticController::step, AOL", controller_config(Law::kAol, {})));
   row = controller("HapticController::step, AOL+ with its default parts", controller_config(Law::kAolPlus, parts));
-  row.target = Row::Target{"≤ 300 ns", row.p50 <= 300};
+  row.target = Row::Target{"≤ 150 ns", row.p50 <= 150};
   run.add(row);
 
   Heart handle(controller_config(Law::kAolPlus, parts), true);
