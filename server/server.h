@@ -97,7 +97,6 @@ class Server {
     HapticLoop haptic;
     std::atomic<bool> not_realtime{false};  ///< the kernel refused its haptic thread something
     std::uint64_t steps_seen = 0;           ///< by turning()
-    HealthMeter meter;                      ///< the log thread's
 
     // What run_log has told the operator already.
     HapticLoop::Stats told;
@@ -112,6 +111,7 @@ class Server {
   /// Steps devices of one period, on one processor.
   struct HapticThread {
     std::vector<DeviceRuntime*> devices;
+    Duration phase{};  ///< its steps are due so long after whole periods
     std::string name() const;  ///< of its first device
     std::thread thread{};
   };
@@ -123,7 +123,7 @@ class Server {
   /// "left: ", where there is more than one.
   std::string prefix(const DeviceRuntime& runtime) const;
   void end_threads();  ///< those that run: the haptic ones first, with zero force
-  void run_haptic(const std::vector<DeviceRuntime*>& devices);
+  void run_haptic(const std::vector<DeviceRuntime*>& devices, Duration phase);
   void run_network();
   LocalTime watch_until(LocalTime due);
   void tell_notices();
