@@ -200,12 +200,6 @@ std::size_t devices_of_a_thread(Duration period) {
   return fit < limits::kMaxDevices ? fit : fit - fit % limits::kMaxDevices;
 }
 
-/// The first instant from `now` on that is `phase` after a whole number of periods.
-LocalTime next_in_phase(LocalTime now, Duration period, Duration phase) {
-  const Duration since = (now.time_since_epoch() + period - phase) % period;
-  return since == Duration::zero() ? now : now + (period - since);
-}
-
 /// Throws std::runtime_error, a sentence for the operator, when the system refuses the thread.
 template <class Run>
 std::thread thread_of(const std::string& name, Run run) {
@@ -264,9 +258,6 @@ std::vector<Server::HapticThread> Server::haptic_threads_of(const DeviceRuntimes
     auto place = std::ranges::find_if(threads, has_room);
     if (place == threads.end()) place = threads.emplace(threads.end());
     place->devices.push_back(runtime.get());
-  }
-  for (std::size_t i = 0; i < threads.size(); ++i) {
-    threads[i].phase = threads[i].devices.front()->scene.loop.period * i / threads.size();
   }
   return threads;
 }
@@ -363,7 +354,7 @@ void Server::start(std::optional<Duration> run_for) {
     for (HapticThread& haptic : haptic_threads_) {
       haptic.thread = thread_of(haptic.name(), [this, &haptic] {
         name_thread(haptic.name());
-        run_haptic(haptic.devices, haptic.phase);
+        run_haptic(haptic.devices);
       });
     }
   } catch (...) {
@@ -415,7 +406,7 @@ bool Server::turning() {
   return all;
 }
 
-void Server::run_haptic(const std::vector<DeviceRuntime*>& devices, Duration phase) {
+void Server::run_haptic(const std::vector<DeviceRuntime*>& devices) {
   DeviceRuntime& first = *devices.front();
   for (const std::string& refused : enter_realtime(kHapticPriority)) {
     if (&first == devices_.front().get()) log::warn(refused);  // to all of them alike
@@ -424,8 +415,7 @@ void Server::run_haptic(const std::vector<DeviceRuntime*>& devices, Duration pha
   if (first.scene.cpu) {
     if (const auto refused = stay_on(*first.scene.cpu)) log::warn(prefix(first) + *refused);
   }
-  LocalTime due = next_in_phase(clock::now(), first.scene.loop.period, phase);
-  clock::sleep_until(due);
+  LocalTime due = clock::now();
   const LocalTime end = run_for_ ? due + *run_for_ : LocalTime::max();
   while (!stop_haptic_.load(std::memory_order_acquire) && due < end) {
     // With one instant for all, and one period, all are due together again: one wake-up, however late.

@@ -39,7 +39,7 @@ namespace tendon {
 /// |---------|------------------------------|-----------------------------------------|-------------------------|
 /// | haptic… | HapticLoops, Devices         | the absolute time of their next step    | nothing but compute     |
 /// | network | NetworkLoop, UdpLink         | a datagram, a haptic step, a timer      | allocate, log rarely    |
-/// | log     | PartRecorder, meters          | 20 ms                                   | allocate, write, log    |
+/// | log     | PartRecorder                  | 20 ms                                   | allocate, write, log    |
 /// | announce| Announcer, if a scene has one | D-Bus                                   | allocate, log           |
 ///
 /// They share the Mailboxes of each device, and nothing else.
@@ -111,7 +111,6 @@ class Server {
   /// Steps devices of one period, on one processor.
   struct HapticThread {
     std::vector<DeviceRuntime*> devices;
-    Duration phase{};  ///< its steps are due so long after whole periods
     std::string name() const;  ///< of its first device
     std::thread thread{};
   };
@@ -123,7 +122,7 @@ class Server {
   /// "left: ", where there is more than one.
   std::string prefix(const DeviceRuntime& runtime) const;
   void end_threads();  ///< those that run: the haptic ones first, with zero force
-  void run_haptic(const std::vector<DeviceRuntime*>& devices, Duration phase);
+  void run_haptic(const std::vector<DeviceRuntime*>& devices);
   void run_network();
   LocalTime watch_until(LocalTime due);
   void tell_notices();

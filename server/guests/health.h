@@ -34,7 +34,7 @@ struct Health {
   bool not_realtime = false;  ///< the kernel refused the haptic thread something, see enter_realtime
   bool recording_ended = false;
   std::uint64_t steps_lost = 0;  ///< not recorded: the log thread came too late
-  std::uint64_t unsent = 0;  ///< datagrams that the system did not take; of the whole server
+  std::uint64_t unsent = 0;      ///< datagrams that the system did not take; of the whole server
 };
 
 /// Counts what a loop's steps tell of it, in the order in which they were taken.
