@@ -156,7 +156,7 @@ TEST(HapticLoop, JointsAreInTheRecordAndTheStateAndChangeNothingElse) {
   EXPECT_EQ(other.mail->state.take()->joints, std::nullopt);
 }
 
-TEST(HapticLoop, OfALoopThatDoesNotRecordNoStepWaitsForTheLogThreadAndAllAreCounted) {
+TEST(HapticLoop, WithoutARecordingNoStepWaitsForTheLogAndAllAreCounted) {
   Handle handle;
   HapticLoop::Config config = Pushed::config();
   config.record = false;
