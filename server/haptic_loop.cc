@@ -69,8 +69,8 @@ HapticLoop::HapticLoop(const Config& config, Device& device, Mailboxes& mail)
       velocity_(device.info().position_resolution),
       force_rounding_squared_(device.info().force_resolution * device.info().force_resolution),
       has_more_motors_(device.info().max_torque > 0 || (device.info().gripper && device.info().gripper->max_force > 0)),
-      has_outputs_(!device.info().outputs.empty()) {
-  if (config.period <= Duration::zero()) throw std::invalid_argument("period must be above zero");
+      has_outputs_(!device.info().outputs.empty()),
+      meter_(config.period) {
   if (config.control.channels.size() > limits::kMaxChannels) throw std::invalid_argument("too many channels");
   if (!device.info().position_only()) rest_.emplace(device.info());
 }
@@ -256,7 +256,7 @@ void HapticLoop::publish(const StepRecord& record) noexcept {
   put_state(mail_.state.back(), config_.device, record);
   if (rest_) put_handle(mail_.state.back(), record, device_.info());
   mail_.state.put();
-  if (!mail_.steps.try_push(record)) mail_.steps_lost.fetch_add(1, std::memory_order_relaxed);
+  if (config_.record && !mail_.steps.try_push(record)) mail_.steps_lost.fetch_add(1, std::memory_order_relaxed);
   mail_.flight.record(record);
 
   const auto fault = controller_.fault();
@@ -264,10 +264,8 @@ void HapticLoop::publish(const StepRecord& record) noexcept {
   const std::uint32_t device_faults = device_.faults();
   if (device_faults != std::exchange(device_faults_, device_faults)) mail_.flight.freeze();
   fault_.store(fault, std::memory_order_relaxed);
-  steps_.set(record.tick);
+  meter_.observe(record);
   force_.store(record.applied.norm(), std::memory_order_relaxed);
-  if (record.reasons.has(Reason::kOverrun)) overruns_.add();
-  if (record.reasons.has(Reason::kUnseen)) unseen_.add();
   if (record.held.count() > longest_interval_ns_.load(std::memory_order_relaxed)) {
     longest_interval_ns_.store(record.held.count(), std::memory_order_relaxed);
   }
@@ -308,9 +306,10 @@ void HapticLoop::stop() noexcept {
 }
 
 HapticLoop::Stats HapticLoop::stats() const noexcept {
-  return {steps_.value(),
-          overruns_.value(),
-          unseen_.value(),
+  const Health counted = health();
+  return {counted.steps,
+          counted.overruns,
+          counted.unseen,
           Duration(longest_interval_ns_.load(std::memory_order_relaxed)),
           fault_.load(std::memory_order_relaxed),
           device_.state(),

@@ -7,9 +7,9 @@
 #include <optional>
 
 #include "core/estimation/velocity_estimator.h"
-#include "core/exchange/counter.h"
 #include "core/haptic_controller.h"
 #include "devices/device.h"
+#include "server/guests/health.h"
 #include "server/mailboxes.h"
 
 namespace tendon {
@@ -18,7 +18,7 @@ namespace tendon {
 ///
 /// One thread calls `step` when it is due, and does nothing else but wait and read the clock.
 ///
-/// Thread-safe: `stats` from any thread; the rest from the haptic thread only.
+/// Thread-safe: `stats` and `health` from any thread; the rest from the haptic thread only.
 /// Realtime-safe: yes. No heap, no lock, no log, no socket (see tests/realtime).
 class HapticLoop {
  public:
@@ -26,6 +26,7 @@ class HapticLoop {
     std::uint32_t device = 0;  ///< its number
     Duration period = std::chrono::milliseconds(1);
     HapticController::Config control;
+    bool record = true;  ///< false: no step goes to the log thread
   };
 
   struct Stats {
@@ -49,6 +50,8 @@ class HapticLoop {
   void stop() noexcept;
 
   Stats stats() const noexcept;
+  /// What its steps tell of it.
+  Health health() const noexcept { return meter_.counted(); }
 
  private:
   /// What is estimated of a device that tells more than a position.
@@ -97,9 +100,7 @@ class HapticLoop {
   std::uint32_t buttons_ = 0;  ///< as the device last said
   std::uint32_t device_faults_ = 0;
 
-  Counter steps_;
-  Counter overruns_;
-  Counter unseen_;
+  HealthMeter meter_;
   std::atomic<std::int64_t> longest_interval_ns_{0};
   std::atomic<double> force_{0};
   std::atomic<HapticController::Fault> fault_{HapticController::Fault::kNone};

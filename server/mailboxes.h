@@ -59,7 +59,7 @@ struct ArrivedPort {
 ///     network ──port in─▶ haptic     a box for each coupling: the peer's port; newest wins
 ///     haptic  ──state──▶ network     newest wins
 ///     haptic  ──port out▶ network    a box for each coupling: this port; newest wins
-///     haptic  ──steps──▶ log         all of them; what does not fit is counted
+///     haptic  ──steps──▶ log         all of them, of a server that records; what does not fit is counted
 ///     haptic  ──ports──▶ log         of a coupling: all of them; what does not fit is counted
 ///     haptic  ──flight─▶ log         the steps before a fault, frozen by it
 ///     log     ──health─▶ network     newest wins: what it counts is since the start
@@ -71,7 +71,7 @@ struct Mailboxes {
   /// In values; powers of two. The default is that of a server which records: some 19 MB.
   struct Capacities {
     std::size_t steps = 16384;  ///< 16 s at 1 kHz: the log thread may wait that long for a slow disk
-    std::size_t ports = 1;      ///< of a device with a coupling as many as steps, for each of its couplings
+    std::size_t ports = 1;      ///< of a device with a coupling so many for each of its couplings
     std::size_t flight = 2048;  ///< the last 2 s at 1 kHz
     std::size_t datagrams = 4096;
     bool flight_handles = true;  ///< the device has more than a position
@@ -82,14 +82,15 @@ struct Mailboxes {
       constexpr Capacities kOfFew;
       const std::size_t share =
           kOfFew.steps * limits::kMaxDevices / std::max<std::size_t>(devices, limits::kMaxDevices);
-      return {.steps = std::bit_floor(share)};
+      return {.steps = std::bit_floor(share), .ports = std::bit_floor(share)};
     }
 
-    /// Of a loop with this period in a server that does not record: nobody waits for a disk, the log thread counts the
-    /// steps and comes every 20 ms. A ring of at least 125 ms; 0.9 MB in all for a device that has a position only.
+    /// Of a loop with this period in a server that does not record: nobody takes steps, and the log thread, which waits
+    /// for no disk, comes for the ports every 20 ms. A ring of at least 125 ms of these; 0.8 MB in all for a device that
+    /// has a position only.
     static Capacities unrecorded(Duration period) {
-      const auto steps = static_cast<std::size_t>(std::max<Duration::rep>(std::chrono::milliseconds(125) / period, 1));
-      return {.steps = std::bit_ceil(steps), .datagrams = 1};
+      const auto ports = static_cast<std::size_t>(std::max<Duration::rep>(std::chrono::milliseconds(125) / period, 1));
+      return {.steps = 1, .ports = std::bit_ceil(ports), .datagrams = 1};
     }
   };
 

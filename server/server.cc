@@ -9,6 +9,7 @@
 #include <climits>
 #include <cmath>
 #include <filesystem>
+#include <limits>
 #include <span>
 #include <stdexcept>
 #include <system_error>
@@ -217,8 +218,7 @@ Server::DeviceRuntime::DeviceRuntime(const Scene& the_scene, const Mailboxes::Ca
       device(make_device(scene, guardian)),
       safe(scene.safety ? std::make_unique<SafeDevice>(*scene.safety, *device) : nullptr),
       mail(for_device(capacities, device->info())),
-      haptic(scene.loop, safe ? *safe : *device, mail),
-      meter(scene.loop.period) {
+      haptic(scene.loop, safe ? *safe : *device, mail) {
   told_phase.fill(PortPhase::kAlone);
 }
 
@@ -230,12 +230,13 @@ Server::DeviceRuntimes Server::runtimes_of(const std::vector<Scene>& scenes, Gua
       coupling->spring.epoch =
           static_cast<std::uint64_t>((clock::now().time_since_epoch() + clock::unix_offset()).count());
     }
-    Mailboxes::Capacities capacities = scenes.front().recording ? Mailboxes::Capacities::recorded(scenes.size())
-                                                                : Mailboxes::Capacities::unrecorded(scene.loop.period);
+    scene.loop.record = scenes.front().recording.has_value();
+    Mailboxes::Capacities capacities = scene.loop.record ? Mailboxes::Capacities::recorded(scenes.size())
+                                                         : Mailboxes::Capacities::unrecorded(scene.loop.period);
     if (!devices.empty()) capacities.datagrams = 1;  // all go to the first
     // A power of two.
     const std::size_t couplings = std::max<std::size_t>(scene.loop.control.leaders.size(), 1);
-    capacities.ports = scene.teleoperation ? std::bit_ceil(couplings) * capacities.steps : 1;
+    capacities.ports = scene.teleoperation ? std::bit_ceil(couplings) * capacities.ports : 1;
     devices.push_back(std::make_unique<DeviceRuntime>(scene, capacities, guardian));
   }
   return devices;
@@ -491,16 +492,18 @@ void Server::drain_to_recorder(LocalTime now) {
   std::uint64_t steps_lost = 0;
   for (std::size_t device = 0; device < devices_.size(); ++device) {
     DeviceRuntime& runtime = *devices_[device];
-    while (const StepRecord* step = runtime.mail.steps.front()) {
-      runtime.meter.observe(*step);
-      // The haptic thread pushes what the coupling did before the step.
-      for (const PortRecord* port = runtime.mail.ports.front(); port != nullptr && port->tick <= step->tick;
+    const auto take_ports = [&](std::uint64_t until) {
+      for (const PortRecord* port = runtime.mail.ports.front(); port != nullptr && port->tick <= until;
            port = runtime.mail.ports.front()) {
         report_phase(runtime, *port);
         if (recorder_) recorder_->record(*port, device);
         runtime.mail.ports.pop();
       }
-      if (recorder_) recorder_->record(*step, device);
+    };
+    if (!recorder_) take_ports(std::numeric_limits<std::uint64_t>::max());
+    while (const StepRecord* step = runtime.mail.steps.front()) {
+      take_ports(step->tick);  // the haptic thread pushes what the coupling did before the step
+      recorder_->record(*step, device);
       runtime.mail.steps.pop();
     }
     steps_lost += news(runtime.mail.steps_lost, runtime.told_steps_lost);
@@ -514,8 +517,7 @@ void Server::drain_to_recorder(LocalTime now) {
   const std::uint64_t datagrams_lost = news(first.datagrams_lost, told_datagrams_lost_);
   if (steps_lost > 0 || datagrams_lost > 0) {
     log::warn("the log thread could not follow: " + std::to_string(steps_lost) + " steps and " +
-              std::to_string(datagrams_lost) + " datagrams are missing" +
-              (recorder_ ? "" : " in the counts of health"));
+              std::to_string(datagrams_lost) + " datagrams are missing");
     if (recorder_) recorder_->lost({.at = now, .steps = steps_lost, .datagrams = datagrams_lost});
   }
   if (!recorder_) return;
@@ -544,8 +546,9 @@ void Server::tell_of_recording() {
 
 /// Hands the device's health to the network thread, for observers that ask.
 void Server::report_health(LocalTime now, DeviceRuntime& runtime) {
-  Health health = runtime.meter.counted();
+  Health health = runtime.haptic.health();
   health.at = now;
+  health.steps_lost = runtime.told_steps_lost + runtime.told_ports_lost;
   const HapticLoop::Stats haptic = runtime.haptic.stats();
   if (haptic.fault != HapticController::Fault::kNone) health.fault = describe(haptic.fault);
   if (runtime.safe) {

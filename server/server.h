@@ -39,7 +39,7 @@ namespace tendon {
 /// |---------|------------------------------|-----------------------------------------|-------------------------|
 /// | haptic… | HapticLoops, Devices         | the absolute time of their next step    | nothing but compute     |
 /// | network | NetworkLoop, UdpLink         | a datagram, a haptic step, a timer      | allocate, log rarely    |
-/// | log     | PartRecorder, meters          | 20 ms                                   | allocate, write, log    |
+/// | log     | PartRecorder                  | 20 ms                                   | allocate, write, log    |
 /// | announce| Announcer, if a scene has one | D-Bus                                   | allocate, log           |
 ///
 /// They share the Mailboxes of each device, and nothing else.
@@ -97,7 +97,6 @@ class Server {
     HapticLoop haptic;
     std::atomic<bool> not_realtime{false};  ///< the kernel refused its haptic thread something
     std::uint64_t steps_seen = 0;           ///< by turning()
-    HealthMeter meter;                      ///< the log thread's
 
     // What run_log has told the operator already.
     HapticLoop::Stats told;

@@ -13,17 +13,24 @@ HealthMeter::HealthMeter(Duration period) : period_(period) {
 }
 
 void HealthMeter::observe(const StepRecord& step) noexcept {
-  if (before_) {
-    const std::int64_t periods = (step.scheduled - before_->scheduled) / period_;
-    const auto steps = static_cast<std::int64_t>(step.tick - before_->tick);
-    if (periods > steps) counted_.missed += static_cast<std::uint64_t>(periods - steps);
-  }
-  before_ = {step.tick, step.scheduled};
-  counted_.steps = step.tick;
-  counted_.overruns += step.reasons.has(Reason::kOverrun) ? 1 : 0;
-  counted_.unseen += step.reasons.has(Reason::kUnseen) ? 1 : 0;
-  counted_.broken_assumptions += step.reasons.has(Reason::kAcceleration) ? 1 : 0;
-  ++counted_.lateness[lateness_bucket(step.hand.at - step.scheduled)];
+  const Duration since = before_ ? step.scheduled - *before_ : period_;
+  if (since >= 2 * period_) missed_.set(missed_.value() + static_cast<std::uint64_t>(since / period_ - 1));
+  before_ = step.scheduled;
+  if (step.reasons.has(Reason::kOverrun)) overruns_.add();
+  if (step.reasons.has(Reason::kUnseen)) unseen_.add();
+  if (step.reasons.has(Reason::kAcceleration)) broken_assumptions_.add();
+  lateness_[lateness_bucket(step.hand.at - step.scheduled)].add();
+}
+
+Health HealthMeter::counted() const noexcept {
+  Health health;
+  for (std::size_t i = 0; i < lateness_.size(); ++i) health.lateness[i] = lateness_[i].value();
+  health.steps = std::accumulate(health.lateness.begin(), health.lateness.end(), std::uint64_t{0});
+  health.missed = missed_.value();
+  health.overruns = overruns_.value();
+  health.unseen = unseen_.value();
+  health.broken_assumptions = broken_assumptions_.value();
+  return health;
 }
 
 DeviceReport report(const Health& before, const Health& now) {
@@ -41,10 +48,9 @@ DeviceReport report(const Health& before, const Health& now) {
   const auto say = [&](bool true_now, std::string_view words) {
     if (true_now) report.degraded += (report.degraded.empty() ? "" : "; ") + std::string(words);
   };
-  const auto counted = std::accumulate(report.lateness.begin(), report.lateness.end(), std::uint64_t{0});
   // Short, so that the sentences fit (limits::kMaxDetail).
   say(now.not_realtime, "no real time");
-  say(counted < report.steps, "the log thread does not follow");
+  say(now.steps_lost > before.steps_lost, "the log thread does not follow");
   say(now.recording_ended, "recording has stopped");
   say(now.unsent > before.unsent, "unsent datagrams");
   // The hand accelerated more than limiter.bounded_acceleration allows.

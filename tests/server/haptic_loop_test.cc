@@ -156,6 +156,21 @@ TEST(HapticLoop, JointsAreInTheRecordAndTheStateAndChangeNothingElse) {
   EXPECT_EQ(other.mail->state.take()->joints, std::nullopt);
 }
 
+TEST(HapticLoop, WithoutARecordingNoStepWaitsForTheLogAndAllAreCounted) {
+  Handle handle;
+  HapticLoop::Config config = Pushed::config();
+  config.record = false;
+  const auto mail = std::make_unique<Mailboxes>(Mailboxes::Capacities::unrecorded(config.period));
+  HapticLoop loop(config, handle, *mail);
+  LocalTime now{milliseconds(1)};
+  for (int i = 0; i < 100; ++i) now = loop.step(now);
+  EXPECT_EQ(mail->steps.front(), nullptr);
+  EXPECT_EQ(mail->steps_lost, 0U);
+  EXPECT_EQ(loop.health().steps, 100U);
+  mail->flight.freeze();
+  EXPECT_EQ(mail->flight.size(), 100U) << "the steps before a fault are kept all the same";
+}
+
 TEST(HapticLoop, EachNewSettingOfAnOutputIsCarriedOutOnce) {
   SimulatedDevice::Config config = circling(false);
   config.outputs = {{.name = "ring", .kind = OutputKind::kLamp}, {.name = "tip", .kind = OutputKind::kVibration}};
