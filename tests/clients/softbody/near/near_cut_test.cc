@@ -3,11 +3,16 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
+#include <future>
 #include <memory>
+#include <string>
+#include <thread>
 #include <utility>
 #include <vector>
 
+#include "clients/softbody/background.h"
 #include "clients/softbody/body.h"
 #include "clients/softbody/effects/cutting.h"
 #include "clients/softbody/near/near_model.h"
@@ -208,6 +213,33 @@ TEST(NearCut, AModelThatIsCutInPlaceTakesNoFieldOfTheBodyBefore) {
   thread.given[1]();
   EXPECT_GE(press().error, std::abs(linear.force - truth));
   EXPECT_EQ(model.size().made, made + 1);
+}
+
+TEST(NearCut, AThreadOfItsOwnCutsWhileAnswersGoOn) {
+  if (!factors_may_work_at_once()) GTEST_SKIP() << "this OpenBLAS is built for one thread";
+  const std::vector<Cut> cuts{slit(0.025, 0.0375)};
+  Body body(cut_body(Law::kNeoHookean, cuts));
+  BackgroundThread thread;
+  body.prepare_by([&](std::packaged_task<void()> work) { thread.give(std::move(work)); });
+  Truth truth(Law::kNeoHookean, cuts);
+  const auto place = [](int i) { return Vec3(1e-4 * (i % 80 < 40 ? i % 80 : 80 - i % 80), 0, 0.046); };
+  body.touch(place(0));  // a refresh has begun when the cut is asked for
+  body.tick(1);
+  int cut_at = 0;
+  int made = 0;
+  // Until a field of the cut body has taken over; each answer has a time of its own, so that the other thread comes to
+  // its turn.
+  for (int i = 1; i < 20'000 && (cut_at == 0 || body.near_field()->made == made); ++i) {
+    const Feel feel = body.touch(place(i));
+    EXPECT_GE(feel.error, std::abs(feel.force.z() - truth.at(place(i)))) << i;
+    if (feel.topology_changed) {
+      cut_at = i;
+      made = body.near_field()->made;
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(2));
+  }
+  EXPECT_GT(cut_at, 0);
+  EXPECT_GT(body.near_field()->made, made);
 }
 
 TEST(NearCut, ABodyThatIsAllNearIsCutAsTheWholeModel) {
