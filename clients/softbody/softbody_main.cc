@@ -47,8 +47,10 @@ int test(const softbody::Scene& scene, const Options& options) {
         hands.front() = hand;
         return body.answer(hands).front();
       },
-      script);
-  std::cout << (options.json ? result.json() : result.text());
+      script,
+      [&](const SelfTest::Finding& finding) {  // of a rigid tool all of them take a minute
+        std::cout << (options.json ? finding.json() : finding.text()) << std::flush;
+      });
   return result.passed() ? 0 : 1;
 }
 
