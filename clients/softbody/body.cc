@@ -111,7 +111,7 @@ constexpr std::array kModels{
               "for comparison: a few swings of the body, too stiff where it is touched", kSmall, kOfTables, false},
     ModelInfo{ModelKind::kNear, Law::kCorotational, "near",
               "large rotations, or strains, near the tool, and a linear body elsewhere", kLargeRotations,
-              kOfTables | kMaterialNonlinearity, false},
+              kOfTables | kCutting | kMaterialNonlinearity, false},
 };
 
 Mesh mesh_of(const BodyConfig& config) {
@@ -270,16 +270,27 @@ Learned learn_of(const BodyConfig& config, const Solid& solid, const TouchSurfac
 /// The highest first.
 std::vector<std::unique_ptr<Rung>> rungs_of(const BodyConfig& config, const Solid& solid, const TouchSurface& surface) {
   std::vector<std::unique_ptr<Rung>> rungs;
-  if (!config.learn && !config.tabulate) return rungs;
   const Learned learned = config.learned ? *config.learned : learn_of(config, solid, surface, {});
-  if (config.tabulate) rungs.push_back(std::make_unique<TabulatedRung>(learned.answers.value(), config.tolerance));
-  if (config.learn) {
-    rungs.push_back(std::make_unique<LearnedRung>(solid, surface, learned.shapes.value(), config.tolerance));
+  if (config.tabulate && learned.answers) {
+    rungs.push_back(std::make_unique<TabulatedRung>(*learned.answers, config.tolerance));
+  }
+  if (config.learn && learned.shapes) {
+    rungs.push_back(std::make_unique<LearnedRung>(solid, surface, *learned.shapes, config.tolerance));
   }
   return rungs;
 }
 
-Made model_of(const BodyConfig& config, const Solid& solid, const TouchSurface& surface, const SolverOf& solver) {
+/// With `fields` the model "near" begins without a field, and they make it.
+std::unique_ptr<NearModel> near_model_of(const BodyConfig& config, const Solid& solid, const TouchSurface& surface,
+                                         Background fields) {
+  const NearModel::Config made{.newton = {.max_iterations = config.max_iterations, .tolerance = config.tolerance},
+                               .modes = near_modes(config)};
+  if (fields) return std::make_unique<NearModel>(solid, surface, made, std::move(fields));
+  return std::make_unique<NearModel>(solid, surface, middle_patch(surface, config.middle), made);
+}
+
+Made model_of(const BodyConfig& config, const Solid& solid, const TouchSurface& surface, const SolverOf& solver,
+              Background fields) {
   Made made;
   if (solver) {
     made.model = solved_model_of(config, solid, surface, solver);
@@ -290,17 +301,14 @@ Made model_of(const BodyConfig& config, const Solid& solid, const TouchSurface& 
     made.condensed = condensed.get();
     made.model = std::move(condensed);
   } else if (config.model == ModelKind::kNear) {
-    const QuasiStaticModel::Config newton{.max_iterations = config.max_iterations, .tolerance = config.tolerance};
-    auto near = std::make_unique<NearModel>(solid, surface, middle_patch(surface, config.middle),
-                                            NearModel::Config{.newton = newton, .modes = near_modes(config)});
+    auto near = near_model_of(config, solid, surface, std::move(fields));
     made.near = near.get();
-    std::vector<std::unique_ptr<Rung>> rungs = rungs_of(config, solid, surface);
-    if (rungs.empty()) {
-      made.model = std::move(near);
-    } else {
-      auto ladder = std::make_unique<Ladder>(std::move(rungs), std::move(near));
+    if (config.learn || config.tabulate) {
+      auto ladder = std::make_unique<Ladder>(rungs_of(config, solid, surface), std::move(near));
       made.ladder = ladder.get();
       made.model = std::move(ladder);
+    } else {
+      made.model = std::move(near);
     }
   } else {
     made.model = plain_model_of(config, solid, surface);
@@ -488,11 +496,11 @@ struct Body::Parts {
   Parts(const BodyConfig& config, const SolverOf& solver) : Parts(config, solver, solid_of(checked(config))) {
     if (!config.cuts.empty()) cutting = std::make_unique<Planned>(config, solid.mesh(), solid.fixed(), surface);
   }
-  /// With no cut planned.
-  Parts(const BodyConfig& config, const SolverOf& solver, Solid of)
+  /// With no cut planned. With `fields` a near field is made by these, and not here.
+  Parts(const BodyConfig& config, const SolverOf& solver, Solid of, Background fields = {})
       : solid(std::move(of)),
         surface(solid.mesh(), config.towards_tool, config.patch_radius),
-        made(model_of(config, solid, surface, solver)),
+        made(model_of(config, solid, surface, solver, std::move(fields))),
         model(*made.model),
         contact(model, surface, config.tool_radius, config.side, friction_of(config)),
         patch(middle_patch(surface, config.middle)),
@@ -548,6 +556,7 @@ struct Body::Parts {
 Body::Parts::Planned::Planned(const BodyConfig& config, const Mesh& mesh, const Fixed& fixed,
                               const TouchSurface& surface)
     : cuts(config.cuts), described(config) {
+  described.learned.emplace();  // nothing is known of the body after a cut
   Division body{.mesh = mesh, .fixed = fixed, .node_before = {}};
   for (Cutting trial = cuts; trial.left() > 0;) {
     const std::span<const Cut> done = trial.make_next();
@@ -592,19 +601,21 @@ void Body::Parts::cut(PlannedCut::When when, double value) {
 }
 
 void Body::Parts::prepare() {
+  if (made.near != nullptr) made.near->make_no_more_fields();
   std::promise<std::unique_ptr<Parts>> done;
   cutting->next = done.get_future();
-  cutting->background(std::packaged_task<void()>([config = cutting->described, before = solid,
-                                                  cuts = cutting->cuts.with_next(), done = std::move(done)]() mutable {
-    try {
-      Division division = divide(before.mesh(), before.fixed(), cuts);
-      auto parts = std::make_unique<Parts>(config, SolverOf(), divided(before, division));
-      parts->node_before = std::move(division.node_before);
-      done.set_value(std::move(parts));
-    } catch (...) {
-      done.set_exception(std::current_exception());
-    }
-  }));
+  cutting->background(
+      std::packaged_task<void()>([config = cutting->described, before = solid, cuts = cutting->cuts.with_next(),
+                                  fields = cutting->background, done = std::move(done)]() mutable {
+        try {
+          Division division = divide(before.mesh(), before.fixed(), cuts);
+          auto parts = std::make_unique<Parts>(config, SolverOf(), divided(before, division), std::move(fields));
+          parts->node_before = std::move(division.node_before);
+          done.set_value(std::move(parts));
+        } catch (...) {
+          done.set_exception(std::current_exception());
+        }
+      }));
 }
 
 void Body::Parts::go_on_from(Parts& before) {

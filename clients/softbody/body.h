@@ -141,7 +141,7 @@ struct BodyConfig {
   bool learn = false;
   bool tabulate = false;
   std::filesystem::path learned_in{};  ///< where that is kept; empty: nowhere
-  std::optional<Learned> learned{};    ///< by learn() of this body; empty: Body learns it
+  std::optional<Learned> learned{};    ///< by learn() of this body before it is cut; empty: Body learns it
   static constexpr double kFarthestLearned = 1.5;
   std::optional<std::filesystem::path>
       table_file{};  ///< kCondensed: where condense() has put its table; else it is made

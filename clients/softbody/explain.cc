@@ -75,7 +75,7 @@ Explanation::Cost press_and_come_back(const BodyConfig& config, const Mat3& turn
 /// The same way, with the other thread's work done in between, and measured.
 std::optional<Explanation::Beside> fields_beside(const BodyConfig& config, const Mat3& turn,
                                                  const std::function<double()>& processor_time) {
-  Body body(config);
+  Body body(without(config, EffectKind::kCutting));  // a cut is made there as well
   if (!body.near_field() || body.near_field()->radius == 0 || !factors_may_work_at_once()) return std::nullopt;
   double spent = 0;
   int made = 0;

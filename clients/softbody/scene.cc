@@ -600,7 +600,7 @@ std::string scene_reference() {
          "                         at the start; few shapes of these answer all between. error_percent = "
       << 100 * kErrorOfLearned
       << " then: where\n"
-         "                         they are wrong by more, the near field answers\n"
+         "                         they are wrong by more, the near field answers; it does after a cut, too\n"
          "tabulate = false         of near: the same presses make a table of the energy; it answers before the shapes\n"
          "learned_in               a folder: what is learned is kept there, and read at the next start\n"
          "iterations = "

@@ -47,8 +47,10 @@ int test(const softbody::Scene& scene, const Options& options) {
         hands.front() = hand;
         return body.answer(hands).front();
       },
-      script);
-  std::cout << (options.json ? result.json() : result.text());
+      script,
+      [&](const SelfTest::Finding& finding) {  // of a rigid tool all of them take a minute
+        std::cout << (options.json ? finding.json() : finding.text()) << std::flush;
+      });
   return result.passed() ? 0 : 1;
 }
 
@@ -95,14 +97,17 @@ int condense(int argc, char** argv) {
 void prepare_beside(const softbody::Scene& scene, std::optional<softbody::BackgroundThread>& thread,
                     softbody::PlacedBody& body) {
   const bool cuts = !scene.body.cuts.empty();
-  if (!cuts && scene.body.model != softbody::ModelKind::kNear) return;
+  const bool near = scene.body.model == softbody::ModelKind::kNear;
+  if (!cuts && !near) return;
   if (softbody::factors_may_work_at_once()) {
     thread.emplace();
     body.prepare_by([&](std::packaged_task<void()> work) { thread->give(std::move(work)); });
     return;
   }
   std::cerr << "tendon-softbody: warning: "
-            << (cuts ? "an answer waits for each cut" : "answers make the near fields themselves")
+            << (!near   ? "an answer waits for each cut"
+                : !cuts ? "answers make the near fields themselves"
+                        : "answers wait for cuts, and make the near fields themselves")
             << ", because this OpenBLAS is built for one thread; with libopenblas0-pthread they go on\n";
 }
 

@@ -7,6 +7,7 @@
 #include <chrono>
 #include <cmath>
 #include <exception>
+#include <functional>
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <numbers>
@@ -154,7 +155,8 @@ Work around(Hand& hand, std::vector<Vec3> corners, double speed) {
 
 class Tester {
  public:
-  Tester(const Physics& engine, const SelfTestScript& script) : script_(script), hand_(engine, script) {
+  Tester(const Physics& engine, const SelfTestScript& script, const std::function<void(const Finding&)>& tell)
+      : script_(script), tell_(tell), hand_(engine, script) {
     into_ = script.into.normalized();
     aside_[0] = into_.unitOrthogonal();
     aside_[1] = into_.cross(aside_[0]);
@@ -184,6 +186,7 @@ class Tester {
  private:
   void add(Verdict verdict, std::string what, std::string why, double value = 0, double bound = 0) {
     result_.findings.push_back({verdict, std::move(what), std::move(why), value, bound});
+    if (tell_) tell_(result_.findings.back());
   }
 
   void walk(const std::string& way, std::vector<Vec3> corners, double speed) {
@@ -286,6 +289,7 @@ class Tester {
   }
 
   const SelfTestScript& script_;
+  const std::function<void(const Finding&)>& tell_;
   Hand hand_;
   Vec3 into_;
   std::array<Vec3, 2> aside_;
@@ -299,35 +303,34 @@ bool SelfTest::passed() const {
   return std::none_of(findings.begin(), findings.end(), [](const Finding& f) { return f.verdict == Verdict::kFailed; });
 }
 
+std::string SelfTest::Finding::text() const {
+  const std::string first = verdict == Verdict::kPassed   ? "passed   "
+                            : verdict == Verdict::kFailed ? "FAILED   "
+                                                          : "unknown  ";
+  return first + what + ": " + why + '\n';
+}
+
+std::string SelfTest::Finding::json() const {
+  const char* const first = verdict == Verdict::kPassed ? "passed" : verdict == Verdict::kFailed ? "failed" : "unknown";
+  const nlohmann::ordered_json line = {
+      {"finding", {{"verdict", first}, {"what", what}, {"why", why}, {"value", value}, {"bound", bound}}}};
+  return line.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + '\n';
+}
+
 std::string SelfTest::text() const {
   std::string text;
-  for (const Finding& finding : findings) {
-    const std::string verdict = finding.verdict == Verdict::kPassed   ? "passed   "
-                                : finding.verdict == Verdict::kFailed ? "FAILED   "
-                                                                      : "unknown  ";
-    text += verdict + finding.what + ": " + finding.why + '\n';
-  }
+  for (const Finding& finding : findings) text += finding.text();
   return text;
 }
 
 std::string SelfTest::json() const {
   std::string text;
-  for (const Finding& finding : findings) {
-    const char* const verdict = finding.verdict == Verdict::kPassed   ? "passed"
-                                : finding.verdict == Verdict::kFailed ? "failed"
-                                                                      : "unknown";
-    const nlohmann::ordered_json line = {{"finding",
-                                          {{"verdict", verdict},
-                                           {"what", finding.what},
-                                           {"why", finding.why},
-                                           {"value", finding.value},
-                                           {"bound", finding.bound}}}};
-    text += line.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + '\n';
-  }
+  for (const Finding& finding : findings) text += finding.json();
   return text;
 }
 
-SelfTest self_test(const Physics& engine, const SelfTestScript& script) {
+SelfTest self_test(const Physics& engine, const SelfTestScript& script,
+                   const std::function<void(const SelfTest::Finding&)>& tell) {
   expect_finite(script.start, "start");
   expect_above_zero(script.into.norm(), "into (its length)");
   expect_above_zero(script.depth, "depth");
@@ -340,7 +343,7 @@ SelfTest self_test(const Physics& engine, const SelfTestScript& script) {
   if (!script.state.save != !script.state.restore) {
     throw std::invalid_argument("state: expected both save and restore, or neither");
   }
-  return Tester(engine, script).run();
+  return Tester(engine, script, tell).run();
 }
 
 }  // namespace tendon

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -22,6 +23,9 @@ struct SelfTest {
     std::string why;   ///< with its numbers
     double value = 0;  ///< measured, in the unit that `why` names; 0 where there is none
     double bound = 0;  ///< allowed, in the same unit; 0 where there is none
+
+    std::string text() const;  ///< its line of SelfTest::text()
+    std::string json() const;  ///< its line of SelfTest::json()
   };
   std::vector<Finding> findings;
 
@@ -66,7 +70,8 @@ struct SelfTestScript {
 /// Every state is a tick and 1/rate_hz s after the previous one, except where a claim says otherwise. The hand ends at
 /// `start`. Half a minute of the hand's time passes; the engine's own pace decides how long that takes. Throws
 /// std::invalid_argument "FIELD = VALUE: expected …" when a value of `script` is impossible; nothing that `engine`
-/// throws.
-SelfTest self_test(const Physics& engine, const SelfTestScript& script = {});
+/// throws. `tell` is given each finding as soon as it is one, for an engine whose answers take long.
+SelfTest self_test(const Physics& engine, const SelfTestScript& script = {},
+                   const std::function<void(const SelfTest::Finding&)>& tell = {});
 
 }  // namespace tendon

@@ -25,6 +25,16 @@ Reaction Ladder::press_from(std::size_t rung, const Patch& patch, Given given, d
   return near_->press(patch, given, depth);
 }
 
+void Ladder::cut(const Division& division, const EffectsConfig& effects) {
+  rungs_.clear();
+  answers_.clear();
+  near_->cut(division, effects);
+}
+
+void Ladder::go_on_from(const Model& before, std::span<const int> node_before) {
+  near_->go_on_from(*static_cast<const Ladder&>(before).near_, node_before);  // of the same kind
+}
+
 std::vector<Ladder::Step> Ladder::steps() const {
   std::vector<Step> all;
   for (std::size_t i = 0; i < rungs_.size(); ++i) all.push_back({rungs_[i]->size(), answers_[i]});

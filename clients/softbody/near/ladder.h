@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "clients/softbody/near/near_model.h"
@@ -21,6 +22,10 @@ class Ladder : public Model {
   Ladder(std::vector<std::unique_ptr<Rung>> rungs, std::unique_ptr<NearModel> near);
 
   Reaction press(const Patch& patch, Given given, double value) override;
+  /// Rungs know the whole body alone: they are dropped.
+  void cut(const Division& division, const EffectsConfig& effects) override;
+  /// With the rungs that this one has of the cut body.
+  void go_on_from(const Model& before, std::span<const int> node_before) override;
   bool glides() const noexcept override { return true; }
   std::size_t bytes() const noexcept override;
 

@@ -12,7 +12,7 @@
 
 namespace tendon::softbody {
 
-/// What is learned of a body at set-up, as plain values.
+/// What is learned of a body at set-up, as plain values; without either, nothing is known of it.
 struct Learned {
   std::optional<LearnedShapes> shapes{};
   std::optional<TabulatedAnswers> answers{};

@@ -41,6 +41,7 @@ constexpr int kFactorAt = 1;
 constexpr double kFarSafety = 3;
 constexpr double kModesSafety = 3;
 constexpr double kLinearSafety = 6;
+constexpr double kPartedSafety = 3;
 
 /// A field has every patch whose place is so many patch's radii at most from its middle.
 constexpr double kReach = 0.45;
@@ -58,6 +59,9 @@ constexpr double kLeftBehind = 3;
 
 /// The way of the hand in an answer is a mean over about so many.
 constexpr double kAnswersInMean = 16;
+
+/// m: farther from the middle of a field a patch wants a new one.
+double serves_to(const TouchSurface& surface) { return kReach * surface.radius() / 2; }
 
 Vec3 place_of(const Mesh& mesh, const Patch& patch) {
   Vec3 place = Vec3::Zero();
@@ -100,7 +104,7 @@ struct NearModel::Field {
   Vec3 middle = Vec3::Zero();
   double radius = 0;
   double depth = 0;                                   ///< m, of the tool, for which it was made
-  double serves = 0;                                  ///< m: farther from the middle a patch wants a new field
+  double serves = 0;                                  ///< m, serves_to()
   std::unique_ptr<NearBody> body = nullptr;           ///< null: all of the body is near
   std::unique_ptr<QuasiStaticModel> model = nullptr;  ///< null: it was given up
   double missed = 0;                                  ///< share of the force, by too few modes and by a rough u*
@@ -200,14 +204,49 @@ NearModel::NearModel(const Solid& solid, const TouchSurface& surface, const Patc
   go_on(first, last_.place, 0);
 }
 
-NearModel::~NearModel() {
-  if (oracle_) oracle_->left = true;
+NearModel::NearModel(const Solid& solid, const TouchSurface& surface, const Config& config, Background background)
+    : solid_(solid), surface_(surface), config_(config), at_rest_(factor_at_rest(solid)), by_linear_(true) {
+  make_fields_by(std::move(background));
 }
 
+NearModel::~NearModel() { make_no_more_fields(); }
+
 void NearModel::make_fields_by(Background background) {
+  make_no_more_fields();
   making_.reset();
+  asked_ = false;
   background_ = std::move(background);
   oracle_ = std::make_shared<Oracle>(solid_, surface_, config_);
+}
+
+void NearModel::make_no_more_fields() {
+  if (oracle_) oracle_->left = true;
+  background_ = nullptr;
+}
+
+void NearModel::begin_cut() {
+  making_.reset();
+  field_.reset();
+  last_.patch = {};
+  by_linear_ = true;
+  parted_ = true;
+}
+
+void NearModel::cut(const Division&, const EffectsConfig&) {
+  begin_cut();
+  handover_ = {};
+  at_rest_ = factor_at_rest(solid_);
+  if (background_) make_fields_by(std::move(background_));
+}
+
+void NearModel::go_on_from(const Model& before, std::span<const int>) {
+  const auto& same = static_cast<const NearModel&>(before);  // of the same kind
+  handover_ = same.beyond_linear();
+  last_ = same.last_;
+  begin_cut();
+  size_ = same.size_;
+  last_took_ = same.last_took_;
+  per_answer_ = same.per_answer_;
 }
 
 void NearModel::begin(const Patch& patch, double depth) {
@@ -252,7 +291,7 @@ void NearModel::take_over(std::unique_ptr<Field> field) {
   faded_ = 0;
   by_linear_ = false;
   std::swap(field_, field);
-  if (!oracle_) return;
+  if (!oracle_ || !field) return;
   field->behind = std::move(spent_);
   spent_ = std::move(field);
 }
@@ -264,7 +303,7 @@ Pieces NearModel::Making::pieces() {
   field.reset(new Field{.middle = middle,
                         .radius = std::max(least * a, a + kElementsBeyond * element),
                         .depth = depth,
-                        .serves = kReach * a / 2,
+                        .serves = serves_to(surface),
                         .missed = unsure});
   const Vec2 across = surface.across(middle);
   {
@@ -362,17 +401,18 @@ std::unique_ptr<NearModel::Field> NearModel::Oracle::make(const Vec3& ahead, con
   while (work.next()) {
     if (const Hand* const newer = hand.take()) making.hand = *newer;
     const double away = (making.hand.place - making.middle).norm();
-    if (left || away > kLeftBehind * kReach * surface.radius() / 2) return std::make_unique<Field>();
+    if (left || away > kLeftBehind * serves_to(surface)) return std::make_unique<Field>();
   }
   return std::move(making.field);
 }
 
 void NearModel::ask() {
+  if (field_ && field_->body == nullptr) return;
   const Vec3 way = last_took_ * per_answer_;
   const double most = kReach * surface_.radius();
   const Vec3 ahead = last_.place + way * std::min(1.0, most / std::max(way.norm(), most * 1e-9));
-  const bool gone = (ahead - field_->middle).norm() > field_->serves;
-  if (!gone && std::abs(std::max(0.0, last_.felt.depth) - field_->depth) <= kDeeper * surface_.radius()) return;
+  const bool serves = field_ && (ahead - field_->middle).norm() <= field_->serves;
+  if (serves && std::abs(std::max(0.0, last_.felt.depth) - field_->depth) <= kDeeper * surface_.radius()) return;
   asked_ = true;
   since_asked_ = 0;
   background_(std::packaged_task<void()>(
@@ -396,7 +436,8 @@ void NearModel::take_made(const Patch& patch, const Vec3& place, double depth) {
   asked_ = false;
   last_took_ = since_asked_;
   if (made->failed) std::rethrow_exception(made->failed);
-  const bool nearer = !field_->holds(patch, place, 2) || made->away(place, depth) < field_->away(place, depth);
+  const bool nearer =
+      !field_ || !field_->holds(patch, place, 2) || made->away(place, depth) < field_->away(place, depth);
   if (made->model != nullptr && made->holds(patch, place, 2) && nearer) return take_over(std::move(made));
   ++size_.late;
   made->behind = std::move(spent_);
@@ -415,14 +456,31 @@ Reaction NearModel::linear_press(const Patch& patch, Given given, double value) 
   reaction.depth = depth_below(patch, surface_.normal(), u);
   reaction.slope = slope_below(patch, surface_.normal(), u);
   // The work of this shape by the body's law, for each metre.
-  const double work = per_newton.dot(solid_.to_free(solid_.forces(u).force)) / compliance;
+  const VectorXd by_law = solid_.to_free(solid_.forces(u).force);
+  const double work = per_newton.dot(by_law) / compliance;
   reaction.error = kLinearSafety * std::abs(work - reaction.force);
+  if (parted_) {
+    // Sides of a cut turn freely, so that the shape is wrong where its work may be right: twice the energy that is lost
+    // on the way to the body's own shape, for each metre.
+    const VectorXd unbalanced = by_law - reaction.force * load;
+    const VectorXd way = at_rest_.solve(unbalanced);
+    const double deeper = load.dot(way);
+    const double energy = unbalanced.dot(way) - deeper * deeper / compliance;
+    reaction.error += kPartedSafety * energy / std::abs(reaction.depth);
+  }
   if (!std::isfinite(reaction.error)) reaction.error = std::abs(reaction.force);
   return reaction;
 }
 
+Handover NearModel::beyond_linear() const {
+  if (by_linear_) return handover_;
+  if (!(last_.felt.depth > 0)) return {};
+  const Reaction there = linear_press(last_.patch, Given::kDepth, last_.felt.depth);
+  return handover(last_.felt, there, last_.felt.depth);
+}
+
 Reaction NearModel::press_by_field_or_linear(const Patch& patch, const Vec3& place, Given given, double value) {
-  if (field_->holds(patch, place, 2)) {
+  if (field_ && field_->holds(patch, place, 2)) {
     Reaction reaction = field_->press(patch, given, value);
     if (by_linear_) {  // the hand has come back
       handover_ = handover(kept(handover_, 1, linear_press(patch, given, value)), reaction, reaction.depth);
@@ -432,20 +490,13 @@ Reaction NearModel::press_by_field_or_linear(const Patch& patch, const Vec3& pla
     return kept(handover_, std::max(0.0, 1 - faded_ / fading_over_), reaction);
   }
   ++size_.linear;
-  if (!by_linear_) {
-    by_linear_ = true;
-    handover_ = {};
-    if (last_.felt.depth > 0) {
-      const Reaction there = linear_press(last_.patch, Given::kDepth, last_.felt.depth);
-      handover_ = handover(last_.felt, there, last_.felt.depth);
-    }
-  }
+  handover_ = beyond_linear();
+  by_linear_ = true;
   return kept(handover_, 1, linear_press(patch, given, value));
 }
 
 Reaction NearModel::press(const Patch& patch, Given given, double value) {
   if (patch.nodes.empty()) return {};
-  if (field_->body == nullptr) return field_->press(patch, given, value);
   const Vec3 place = place_of(solid_.mesh(), patch);
   const double depth = given == Given::kForce ? last_.felt.depth : value;
   const Vec3 way = place - last_.place;
@@ -453,13 +504,13 @@ Reaction NearModel::press(const Patch& patch, Given given, double value) {
   Reaction reaction;
   if (oracle_) {
     per_answer_ += (way - per_answer_) / kAnswersInMean;
-    if (way.norm() > field_->serves) per_answer_.setZero();
+    if (way.norm() > serves_to(surface_)) per_answer_.setZero();
     take_made(patch, place, depth);
     reaction = press_by_field_or_linear(patch, place, given, value);
   } else {
     // Where the hand has gone elsewhere meanwhile.
-    if (making_ && (making_->middle - place).norm() > field_->serves) making_.reset();
-    if (!making_ && !field_->holds(patch, place, 1)) begin(patch, depth);
+    if (making_ && (making_->middle - place).norm() > serves_to(surface_)) making_.reset();
+    if (!making_ && !(field_ && field_->holds(patch, place, 1))) begin(patch, depth);
     if (making_) go_on(patch, place, depth);
     reaction = field_->press(patch, given, value);
     reaction = kept(handover_, std::max(0.0, 1 - faded_ / fading_over_), reaction);
@@ -469,7 +520,7 @@ Reaction NearModel::press(const Patch& patch, Given given, double value) {
   last_.patch.slopes = patch.slopes;
   last_.place = place;
   last_.felt = reaction;
-  if (oracle_ && !asked_) ask();
+  if (background_ && !asked_) ask();
   if (asked_) oracle_->hand.put(last_);
   return reaction;
 }
@@ -477,6 +528,7 @@ Reaction NearModel::press(const Patch& patch, Given given, double value) {
 NearModel::Size NearModel::size() const {
   Size size = size_;
   size.elsewhere = oracle_ ? oracle_->bytes : 0;
+  if (!field_) return size;
   if (field_->body == nullptr) {
     size.elements = static_cast<std::size_t>(solid_.mesh().element_count());
     size.unknowns = solid_.free_count();
@@ -492,7 +544,8 @@ NearModel::Size NearModel::size() const {
 }
 
 std::size_t NearModel::bytes() const noexcept {
-  return at_rest_.bytes() + field_->bytes() + (spent_ ? spent_->bytes() : 0) + (oracle_ ? oracle_->bytes : 0);
+  return at_rest_.bytes() + (field_ ? field_->bytes() : 0) + (spent_ ? spent_->bytes() : 0) +
+         (oracle_ ? oracle_->bytes : 0);
 }
 
 Handover handover(const Reaction& before, const Reaction& after, double depth) {

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <memory>
+#include <span>
 
 #include "clients/softbody/background.h"
 #include "clients/softbody/models/quasi_static.h"
@@ -43,6 +44,10 @@ Reaction kept(const Handover& before, double share, const Reaction& reaction);
 /// lock and never waits. A field that the hand has left before it is whole is thrown away. While no field has the patch,
 /// answers are those of the linear body, with an error that says so.
 ///
+/// A cut ends all that was made of the body before it. A field that is still being made about that body is thrown away,
+/// wherever it is. The next answer makes one of the cut body; with another thread that is asked for one, and answers are
+/// those of the cut linear body until it comes.
+///
 /// Where a field takes over, the force goes on from what was felt: the ratio of both forces fades over a way of the hand
 /// of a/4, however long that takes, and so does the difference of the slopes. Within one near field the force is the
 /// slope of one energy. While a ratio fades it is not: by going on and back over different ways a hand may gain the
@@ -59,19 +64,27 @@ class NearModel : public Model {
   };
   /// Makes the near field of `first`. Solid and surface must outlive this. Throws what QuasiStaticModel throws.
   NearModel(const Solid& solid, const TouchSurface& surface, const Patch& first, const Config& config);
+  /// Makes no field: `background` makes them all, see make_fields_by(), and is asked with the first answer.
+  NearModel(const Solid& solid, const TouchSurface& surface, const Config& config, Background background);
   ~NearModel() override;
 
   /// From now on the next fields are made by `background`, one at a time, by work that has a body of its own. Where the
   /// work throws, the next press() throws that.
   void make_fields_by(Background background);
+  /// Gives up the field that the other thread makes, and asks for no more: the body is about to be cut.
+  void make_no_more_fields();
 
   Reaction press(const Patch& patch, Given given, double value) override;
+  void cut(const Division& division, const EffectsConfig& effects) override;
+  /// The first answers are the linear ones of this body, times what the law made of the last force before the cut.
+  void go_on_from(const Model& before, std::span<const int> node_before) override;
   bool glides() const noexcept override { return true; }
   /// With all that the other thread keeps. Without what is being made: two numbers for each unknown of the whole body and
   /// each of the 2 modes + 1 loads, for a while.
   std::size_t bytes() const noexcept override;
 
-  /// The present near field, and what was done since construction.
+  /// The present near field, all zero while a cut body has none; and what was done since construction, before cuts
+  /// included.
   struct Size {
     double radius = 0;         ///< ρ, m; 0: the whole body is near
     std::size_t elements = 0;  ///< near ones
@@ -102,6 +115,8 @@ class NearModel : public Model {
   /// Does a piece of what is being made, or all of them where the present field cannot wait.
   void go_on(const Patch& patch, const Vec3& place, double depth);
   void take_over(std::unique_ptr<Field> field);
+  /// Forgets the fields, and where the last patch was on the body before the cut.
+  void begin_cut();
 
   // With another thread.
   void take_made(const Patch& patch, const Vec3& place, double depth);
@@ -109,6 +124,8 @@ class NearModel : public Model {
   /// By the present field; where it does not have the patch, by the linear body.
   Reaction press_by_field_or_linear(const Patch& patch, const Vec3& place, Given given, double value);
   Reaction linear_press(const Patch& patch, Given given, double value) const;
+  /// How what was felt last differs from the linear body.
+  Handover beyond_linear() const;
 
   const Solid& solid_;
   const TouchSurface& surface_;
@@ -116,7 +133,7 @@ class NearModel : public Model {
   Factor at_rest_;  ///< of the whole body
   Size size_;
   std::unique_ptr<Making> making_;  ///< the next field, or null
-  std::unique_ptr<Field> field_;
+  std::unique_ptr<Field> field_;    ///< null: a cut body has none yet
   Hand last_;
   Handover handover_;
   double fading_over_ = 0;  ///< m
@@ -127,6 +144,7 @@ class NearModel : public Model {
   std::unique_ptr<Field> spent_;  ///< to be freed there, one behind the other
   bool asked_ = false;
   bool by_linear_ = false;          ///< the last answer was
+  bool parted_ = false;             ///< the body has been cut
   int since_asked_ = 0;             ///< answers
   int last_took_ = 0;               ///< answers, from asking to taking
   Vec3 per_answer_ = Vec3::Zero();  ///< m, how far the hand goes

@@ -7,6 +7,8 @@
 #include <cmath>
 #include <limits>
 #include <stdexcept>
+#include <string>
+#include <vector>
 
 namespace tendon {
 namespace {
@@ -34,6 +36,28 @@ int count(const SelfTest& result, SelfTest::Verdict verdict, const std::string& 
 constexpr auto kPassed = SelfTest::Verdict::kPassed;
 constexpr auto kFailed = SelfTest::Verdict::kFailed;
 constexpr auto kNotJudged = SelfTest::Verdict::kNotJudged;
+
+TEST(SelfTest, TellsEachFindingAsSoonAsItIsOne) {
+  std::string told;
+  std::string told_json;
+  int answers = 0;
+  std::vector<int> answers_before;
+  const SelfTest result = self_test(
+      [&](const DeviceState& hand) {
+        ++answers;
+        return wall(hand);
+      },
+      {},
+      [&](const SelfTest::Finding& finding) {
+        told += finding.text();
+        told_json += finding.json();
+        answers_before.push_back(answers);
+      });
+  EXPECT_EQ(told, result.text());
+  EXPECT_EQ(told_json, result.json());
+  ASSERT_EQ(answers_before.size(), result.findings.size());
+  EXPECT_LT(answers_before.front(), answers / 5);
+}
 
 TEST(SelfTest, IsPassedByAKelvinVoigtWallInEveryClaim) {
   const SelfTest result = self_test(wall);

@@ -15,26 +15,17 @@
 #include "clients/softbody/body.h"
 #include "clients/softbody/near/near_model.h"
 #include "tests/clients/softbody/drawn_answers.h"
+#include "tests/clients/softbody/elsewhere.h"
 #include "tests/clients/softbody/pressed_block.h"
 
 namespace tendon::softbody {
 namespace {
 
 using testing::AskedAndExact;
+using testing::Elsewhere;
 using testing::kB1PatchRadius;
 using testing::pressed_block;
 using testing::pressed_body;
-
-/// What is given to the other thread; it does it when it is told to.
-struct Elsewhere {
-  Background background() {
-    return [this](std::packaged_task<void()> work) { given.push_back(std::move(work)); };
-  }
-  void work() {
-    for (std::packaged_task<void()>& each : std::exchange(given, {})) each();
-  }
-  std::vector<std::packaged_task<void()>> given;
-};
 
 /// B1 with a near field in its middle, and another thread.
 struct NearBeside : AskedAndExact {
