@@ -2,7 +2,6 @@
 #include "clients/softbody/fem/kernel.h"
 
 #include <algorithm>
-#include <cstring>
 #include <stdexcept>
 
 #include "clients/softbody/fem/laws.h"
@@ -13,6 +12,8 @@
 
 namespace tendon::softbody {
 namespace {
+
+using kernel::lanes_at;
 
 constexpr int kLanesAtOnce = static_cast<int>(kLanes);
 
@@ -41,22 +42,24 @@ template <Law kLaw, int kNodes>
       }
     }
     for (int q = 0; q < all.points; ++q) {
-      Lanes g[3 * kNodes];
-      std::memcpy(g, gradient, sizeof g);
       Lanes f[9] = {};
       for (int i = 0; i < 9; i += 4) f[i] += 1.0;
       for (int i = 0; i < kNodes; ++i) {
+#pragma GCC unroll 3
         for (int c = 0; c < 3; ++c) {
-          for (int r = 0; r < 3; ++r) f[r + 3 * c] += local[3 * i + r] * g[3 * i + c];
+          const Lanes g = lanes_at(gradient + (3 * i + c) * kLanesAtOnce);
+#pragma GCC unroll 3
+          for (int r = 0; r < 3; ++r) f[r + 3 * c] += local[3 * i + r] * g;
         }
       }
       Lanes p[9];
-      Lanes moduli[2];
-      std::memcpy(moduli, modulus, sizeof moduli);
-      kernel::respond<kLaw, Lanes>(f, moduli[0], moduli[1], energy, p);
+      kernel::respond<kLaw, Lanes>(f, lanes_at(modulus), lanes_at(modulus + kLanesAtOnce), energy, p);
       for (int i = 0; i < kNodes; ++i) {
+        const double* g = gradient + 3 * i * kLanesAtOnce;
+#pragma GCC unroll 3
         for (int r = 0; r < 3; ++r) {
-          force[3 * i + r] += p[r] * g[3 * i] + p[r + 3] * g[3 * i + 1] + p[r + 6] * g[3 * i + 2];
+          force[3 * i + r] +=
+              p[r] * lanes_at(g) + p[r + 3] * lanes_at(g + kLanesAtOnce) + p[r + 6] * lanes_at(g + 2 * kLanesAtOnce);
         }
       }
       gradient += 3 * kNodes * kLanesAtOnce;

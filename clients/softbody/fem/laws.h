@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstring>
 
 #include "clients/softbody/fem/kernel.h"
 #include "clients/softbody/fem/material.h"
@@ -23,6 +24,14 @@ namespace kernel {
 [[gnu::always_inline]] inline double lane(const Lanes& number, std::size_t index) { return number[index]; }
 [[gnu::always_inline]] inline void set_lane(double& number, std::size_t, double value) { number = value; }
 [[gnu::always_inline]] inline void set_lane(Lanes& number, std::size_t index, double value) { number[index] = value; }
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wpsabi"  // as in kernel.cc: it is always inlined
+[[gnu::always_inline]] inline Lanes lanes_at(const double* numbers) {
+  Lanes lanes;
+  std::memcpy(&lanes, numbers, sizeof lanes);
+  return lanes;
+}
+#pragma GCC diagnostic pop
 template <class Number>
 inline constexpr std::size_t kLanesOf = sizeof(Number) / sizeof(double);
 

@@ -5,13 +5,15 @@
 #include <cstring>
 #include <stdexcept>
 
-#include "clients/softbody/fem/kernel.h"
+#include "clients/softbody/fem/laws.h"
 
 // Lanes are passed only to what is inlined: see kernel.cc.
 #pragma GCC diagnostic ignored "-Wpsabi"
 
 namespace tendon::softbody {
 namespace {
+
+using kernel::lanes_at;
 
 /// Columns that are read side by side: each number of `x` or `to` then serves so often.
 constexpr std::ptrdiff_t kColumns = 4;
@@ -21,12 +23,6 @@ struct Tall {
   std::ptrdiff_t rows;
   std::ptrdiff_t columns;
 };
-
-[[gnu::always_inline]] inline Lanes lanes_at(const double* numbers) {
-  Lanes lanes;
-  std::memcpy(&lanes, numbers, sizeof lanes);
-  return lanes;
-}
 
 template <std::ptrdiff_t kAtOnce>
 [[gnu::always_inline]] inline void add_columns(const double* first, std::ptrdiff_t rows, const double* x, double* to) {

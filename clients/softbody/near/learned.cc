@@ -5,6 +5,7 @@
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <memory>
 #include <numeric>
@@ -282,6 +283,36 @@ bool solve_knot(const LearnedBody& body, const VectorXd& load, double depth, Vec
   return false;
 }
 
+/// Of four knots in a row along each axis, around a point's cell or next to the rim, and what each counts for there: cubic
+/// (Lagrange), where PressGrid::corners() is linear.
+std::array<PressGrid::Corner, 64> knots_around(const PressGrid& grid, const PressGrid::Point& point) {
+  struct Row {
+    /// Along an axis with the knots 0 … last, at `in` of `cell`.
+    Row(int cell, double in, int last) : first(std::clamp(cell - 1, 0, last - 3)) {
+      const double x = cell - first + in;
+      for (int k = 0; k < 4; ++k) {
+        for (int other = 0; other < 4; ++other) {
+          if (other != k) shares[at(k)] *= (x - other) / (k - other);
+        }
+      }
+    }
+    int first;
+    std::array<double, 4> shares{1, 1, 1, 1};
+  };
+  const Row x(point.i, point.in[0], 2 * grid.around);
+  const Row y(point.j, point.in[1], 2 * grid.around);
+  const Row z(point.level, point.in[2], PressGrid::kLevels);
+  std::array<PressGrid::Corner, 64> all{};
+  for (int c = 0; c < 64; ++c) {
+    const int i = c / 16;
+    const int j = c / 4 % 4;
+    const int k = c % 4;
+    all[at(c)] = {grid.knot(x.first + i, y.first + j, z.first + k),
+                  x.shares[at(i)] * y.shares[at(j)] * z.shares[at(k)]};
+  }
+  return all;
+}
+
 double share_of(double found, double truth) { return std::abs(found / truth - 1); }
 
 }  // namespace
@@ -415,11 +446,9 @@ std::optional<Reaction> LearnedBody::press(const Patch& patch, double depth, con
   const VectorXd load = below * patch.weights;
   const Eigen::Index size = shapes();
   VectorXd q = VectorXd::Zero(size);
+  for (const auto& [knot, share] : knots_around(grid_, point)) q += share * knots_.col(knot);
   MatrixXd inverse = MatrixXd::Zero(size, size);
-  for (const auto& [knot, share] : grid_.corners(point)) {
-    q += share * knots_.col(knot);
-    inverse += share * inverses_.middleCols(size * knot, size);
-  }
+  for (const auto& [knot, share] : grid_.corners(point)) inverse += share * inverses_.middleCols(size * knot, size);
   VectorXd by_tool = inverse * load;
   double compliance = load.dot(by_tool);
   q += (depth - load.dot(q)) / compliance * by_tool;

@@ -33,9 +33,9 @@ struct LearnedShapes {
 LearnedShapes learn_shapes(const Solid& solid, const TouchSurface& surface, const SolvedPresses& presses,
                            const Tell& tell);
 
-/// The body as these shapes have it: Newton's method on E, with the depth held. It begins between the shapes at the knots
-/// around, with the inverse of the stiffness between theirs, which steps improve (BFGS), and a line search makes the energy
-/// fall in every step. The stiffness is exact to the second order of what is wrong in that inverse.
+/// The body as these shapes have it: Newton's method on E, with the depth held. It begins at the cubic between the shapes at
+/// the knots around, with the inverse of the stiffness between theirs, which steps improve (BFGS), and a line search makes
+/// the energy fall in every step. The stiffness is exact to the second order of what is wrong in that inverse.
 ///
 /// Thread-safe: yes, once built. Realtime-safe: no.
 class LearnedBody {

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -35,6 +36,23 @@ TEST(LearnedShapes, PressesBetweenAreWithinTheErrorSaidAndTwoPercent) {
       EXPECT_LE(found->reaction.error, 0.02 * truth * 1.02) << i;
       EXPECT_NEAR(found->reaction.depth, depth, 1e-12);
     }
+  }
+}
+
+TEST(LearnedShapes, AnAnswerBeginsNextToItsShape) {
+  for (const Law law : kBothLaws) {
+    PressedBefore& block = small_block(law);
+    const LearnedBody body(block.solid, block.top, block.shapes);
+    const PressGrid& grid = block.presses.grid;
+    double most = 0;
+    for (int level = 0; level < PressGrid::kLevels - 1; ++level) {
+      const Vec2 place = grid.place(1.5, 2.5);
+      const double depth = (level + 0.5) * grid.step;
+      const auto begun = body.press(*block.top.patch(place), depth, *grid.find(place, depth), 1);  // no step is due
+      ASSERT_TRUE(begun);
+      most = std::max(most, begun->error / begun->force);
+    }
+    EXPECT_LT(most, 0.01);
   }
 }
 
