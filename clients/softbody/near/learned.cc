@@ -19,9 +19,11 @@
 namespace tendon::softbody {
 namespace {
 
-/// At most so many shapes, fewer where these leave so small a share of the energies' square root.
-constexpr int kMostLearned = 45;
+/// At most so many shapes, fewer where these leave so small a share of the energies' square root …
+constexpr std::array<int, 2> kMostLearned{45, 60};
 constexpr double kShapesLeft = 3e-4;
+/// … the more of them only where an answer by the fewer may be wrong by more than this share of the force.
+constexpr double kGoodEnough = 0.015;
 
 /// What the few elements may miss of what the law adds, and how many there may be.
 constexpr double kElementsLeft = 5e-3;
@@ -103,20 +105,21 @@ struct Basis {
   MatrixXd q;       ///< a column for each press
 };
 
-Basis basis_of(const std::vector<const SolvedPress*>& presses, const SymmetricMatrix& at_rest) {
+Basis basis_of(const std::vector<const SolvedPress*>& presses, const SymmetricMatrix& at_rest, int most) {
   const auto count = static_cast<Eigen::Index>(presses.size());
   MatrixXd all(at_rest.size, count);
   VectorXd sizes(count);
   for (Eigen::Index s = 0; s < count; ++s) {
     const VectorXd& shape = presses[static_cast<std::size_t>(s)]->shape;
-    sizes[s] = shape.norm();
+    // Between equal weights of all presses and equal errors in metres: deep presses bring shapes that others lack.
+    sizes[s] = std::sqrt(shape.norm());
     all.col(s) = shape / sizes[s];
   }
   MatrixXd gram(count, count);
   for (Eigen::Index s = 0; s < count; ++s) gram.col(s) = all.transpose() * at_rest.times(all.col(s));
   const Eigen::SelfAdjointEigenSolver<MatrixXd> parts((gram + gram.transpose()) / 2);
   const VectorXd& energies = parts.eigenvalues();  // ascending
-  Eigen::Index kept = std::min<Eigen::Index>(count, kMostLearned);
+  Eigen::Index kept = std::min<Eigen::Index>(count, most);
   const double sum = energies.sum();
   const auto left = [&](Eigen::Index of) { return energies.head(count - of).cwiseMax(0.0).sum(); };
   while (kept > 1 && left(kept - 1) <= kShapesLeft * kShapesLeft * sum) --kept;
@@ -317,8 +320,10 @@ double share_of(double found, double truth) { return std::abs(found / truth - 1)
 
 }  // namespace
 
-LearnedShapes learn_shapes(const Solid& solid, const TouchSurface& surface, const SolvedPresses& presses,
-                           const Tell& tell) {
+namespace {
+
+LearnedShapes learn_shapes_of(const Solid& solid, const TouchSurface& surface, const SolvedPresses& presses, int most,
+                              const Tell& tell) {
   const PressGrid& grid = presses.grid;
   std::vector<const SolvedPress*> good;
   for (const SolvedPress& press : presses.knots) {
@@ -326,7 +331,7 @@ LearnedShapes learn_shapes(const Solid& solid, const TouchSurface& surface, cons
   }
   SymmetricMatrix at_rest = solid.pattern();
   solid.stiffness(VectorXd::Zero(solid.size()), Elastic::Curvature::kExact, at_rest);
-  const Basis basis = basis_of(good, at_rest);
+  const Basis basis = basis_of(good, at_rest, most);
   if (tell) tell("learning: " + std::to_string(basis.shapes.cols()) + " shapes of " + std::to_string(good.size()));
   LearnedShapes learned{.grid = grid};
   choose_elements(solid, basis, learned);
@@ -402,6 +407,20 @@ LearnedShapes learn_shapes(const Solid& solid, const TouchSurface& surface, cons
     }
   }
   learned.errors = Trust(grid, at_knots, in_middles).errors();
+  return learned;
+}
+
+}  // namespace
+
+LearnedShapes learn_shapes(const Solid& solid, const TouchSurface& surface, const SolvedPresses& presses,
+                           const Tell& tell) {
+  LearnedShapes learned;
+  for (const int most : kMostLearned) {
+    learned = learn_shapes_of(solid, surface, presses, most, tell);
+    const bool good =
+        std::ranges::all_of(learned.errors, [](double error) { return !std::isfinite(error) || error <= kGoodEnough; });
+    if (good || learned.linear.rows() < most) break;
+  }
   return learned;
 }
 
