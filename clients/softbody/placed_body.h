@@ -46,6 +46,7 @@ class PlacedBody {
   void prepare_by(Background background) { body_.prepare_by(std::move(background)); }
 
   std::optional<NearModel::Size> near_field() const { return body_.near_field(); }  ///< see Body
+  std::vector<Ladder::Step> ladder() const { return body_.ladder(); }               ///< see Body
   double linear_up_to() const { return body_.linear_up_to(); }                      ///< see Body
   double deepest() const noexcept { return deepest_; }  ///< m, the greatest depth of the tool so far
 

@@ -189,6 +189,9 @@ int main(int argc, char** argv) {
     softbody::PlacedBody body(scene);
     prepare_beside(scene, thread, body);
     const int exit_code = answer(scene, options, body);
+    for (const softbody::Ladder::Step& step : body.ladder()) {
+      std::cerr << "tendon-softbody: " << step.answers << " answers were " << step.size.name << "\n";
+    }
     if (const auto fields = body.near_field(); fields && thread) {
       std::cerr << "tendon-softbody: the other thread made " << fields->made - 1 + fields->late << " near fields, "
                 << fields->late << " of them too late; " << fields->linear
