@@ -143,6 +143,7 @@ struct BodyConfig {
   std::filesystem::path learned_in{};  ///< where that is kept; empty: nowhere
   std::optional<Learned> learned{};    ///< by learn() of this body before it is cut; empty: Body learns it
   static constexpr double kFarthestLearned = 1.5;
+  static constexpr double kErrorOfLearned = 0.02;  ///< `tolerance` of scenes that learn, unless they say another
   std::optional<std::filesystem::path>
       table_file{};  ///< kCondensed: where condense() has put its table; else it is made
   int max_iterations = QuasiStaticModel::Config{}.max_iterations;  ///< for models that iterate until they converge

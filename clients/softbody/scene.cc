@@ -24,8 +24,7 @@ namespace {
 constexpr std::uintmax_t kMaxSceneBytes = 16'384;
 constexpr double kMaxLength = 1e3;  // m: a larger value is a mistaken unit
 constexpr std::int64_t kMaxCells = 200;
-constexpr double kMaxError = 10;          // %: more is felt
-constexpr double kErrorOfLearned = 0.02;  // of the force, where a scene that learns asks for nothing else
+constexpr double kMaxError = 10;  // %: more is felt
 
 template <class Infos>
 std::string names(const Infos& infos) {
@@ -479,7 +478,7 @@ Scene parse_scene(std::string_view text, const std::string& name, const std::fil
       scene.body.learn = model.flag("learn");
       scene.body.tabulate = model.flag("tabulate");
       if (scene.body.learn || scene.body.tabulate) {
-        scene.body.tolerance = kErrorOfLearned;
+        scene.body.tolerance = BodyConfig::kErrorOfLearned;
         if (model.find("learned_in") != nullptr) {
           scene.body.learned_in = directory / model.text("learned_in", "a folder in which what is learned is kept");
         }
@@ -598,7 +597,7 @@ std::string scene_reference() {
          "learn = false            of near: presses within reach_mm of the middle, up and down and to and fro, are "
          "solved\n"
          "                         at the start; few shapes of these answer all between. error_percent = "
-      << 100 * kErrorOfLearned
+      << 100 * BodyConfig::kErrorOfLearned
       << " then: where\n"
          "                         they are wrong by more, the near field answers; it does after a cut, too\n"
          "tabulate = false         of near: the same presses make a table of the energy; it answers before the shapes\n"

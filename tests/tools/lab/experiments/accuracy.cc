@@ -75,6 +75,7 @@ BodyConfig body_of(const PressedBlock& block, const Candidate& candidate) {
   config.static_modes = kStaticModes;
   config.learn = candidate.by == Candidate::By::kLearned;
   config.tabulate = candidate.by == Candidate::By::kTable;
+  if (config.learn || config.tabulate) config.tolerance = BodyConfig::kErrorOfLearned;
   if (info(candidate.model).has_time()) {
     // Slowed enough to be at rest soon. Explicit steps as long as they may be, with something to spare for a body that
     // is pressed together, and none longer than a period of the device.
