@@ -18,12 +18,15 @@ namespace tendon::lab {
 
 using namespace softbody;
 
-bool for_comparison(ModelKind kind) { return kind == ModelKind::kStVenantKirchhoff || kind >= ModelKind::kMassSpring; }
+bool for_comparison(ModelKind kind) {
+  return kind == ModelKind::kStVenantKirchhoff || (kind >= ModelKind::kMassSpring && kind != ModelKind::kNear);
+}
 
 namespace {
 
 /// Of the stiffness of a surface that a bare finger pad feels: Bergmann Tiest & Kappers 2009.
 constexpr double kJustNoticeable = 15;  // %
+constexpr double kApart = 0.8;          // of the error of another, whose name would lie on this one's
 
 const char* colour_of(std::size_t i) {
   constexpr std::array kColours{kBlue, kVermilion, kGreen, kPurple, kOrange, kSky, kPale};
@@ -102,6 +105,8 @@ Panel error_over_time(const std::string& title, const Ladders& ladders, double e
                           .style = Curve::Style::kBelow});
   Curve front{.name = "best", .colour = kInk, .style = Curve::Style::kBold};
   for (const AccuracyPoint& p : pareto_front(all, load)) {
+    // Of two that are hardly apart the closer one is named.
+    if (!front.points.empty() && place(p).second > kApart * front.points.back().second) front.labels.back().clear();
     front.points.push_back(place(p));
     front.labels.push_back(label_of(p.candidate));
   }
