@@ -17,7 +17,7 @@
 namespace tendon::softbody {
 namespace {
 
-constexpr std::uint64_t kLearnedVersion = 1;
+constexpr std::uint64_t kLearnedVersion = 2;
 constexpr std::uintmax_t kMostLearnedBytes = std::uintmax_t{1} << 30;
 
 /// The kinds of what is learned: how a file of it begins, what its name begins with, and its fields.
