@@ -60,14 +60,17 @@ class Graph:
     """What ninja knows: which sources are in which object, and which objects are in which executable."""
 
     def __init__(self):
-        self.source = {}  # object -> its source
+        self.sources = {}  # object -> its sources: several where they are compiled as one
         for entry in json.loads((BUILD / "compile_commands.json").read_text()):
             found = re.search(r" -o (\S+\.o) ", entry["command"])
             if found:
-                self.source[found[1]] = inside(entry["file"])
+                together = "/Unity/unity_" in entry["file"] and pathlib.Path(entry["file"]).read_text()
+                files = re.findall(r'^#include "([^"]+)"', together, re.MULTILINE) if together else [entry["file"]]
+                self.sources[found[1]] = [inside(path) for path in files]
         self.users = collections.defaultdict(set)  # file -> objects that are compiled from it
-        for name, source in self.source.items():
-            self.users[source].add(name)
+        for name, sources in self.sources.items():
+            for source in sources:
+                self.users[source].add(name)
         name = ""
         for line in output("ninja", "-C", str(BUILD), "-t", "deps").splitlines():
             if line.startswith(" "):
@@ -92,7 +95,7 @@ class Graph:
             self.linked[name] = set().union(*(archives.get(part, {part}) for part in parts))
 
     def folders(self, executable):
-        return {os.path.dirname(self.source[name]) for name in self.own[executable] if name in self.source}
+        return {os.path.dirname(source) for name in self.own[executable] for source in self.sources.get(name, [])}
 
 
 def inside(path):
@@ -178,7 +181,7 @@ def choose(changed, graph, tests):
             room = "tests/" + room_of(path)
             header = re.sub(r"\.cc$", ".h", path)
             for name in of_cases:
-                sources = {graph.source[o] for o in graph.own[name] if graph.source.get(o, "").startswith(room + "/")}
+                sources = {path for o in graph.own[name] for path in graph.sources.get(o, []) if path.startswith(room + "/")}
                 if sources and ("property" in labels[name] or any(includes(source, header) for source in sources)):
                     near.add(name)
             executables |= near
