@@ -65,14 +65,18 @@ ClosedWay go_around(PatchContact& contact, const std::vector<Vec3>& corners, dou
   return way;
 }
 
-/// Knows the whole body as far as 15 mm from its middle and to a depth of 4 mm, and hands over as a grid does.
+/// Knows the whole body as far as 15 mm from its middle and to a depth of 4 mm, and hands over as a grid does. It may say
+/// that the body is `times` as stiff.
 class Knows : public Rung {
  public:
-  explicit Knows(AskedAndExact& block) : block_(block) {}
+  Knows(AskedAndExact& block, double times) : block_(block), times_(times) {}
   std::optional<Answer> press(const Patch& patch, double depth) const override {
     const double share = 1 + cells_left(patch.middle, depth);
     if (!(share > 0)) return std::nullopt;
-    return Answer{block_.exact.press(patch, Given::kDepth, depth), std::min(1.0, share)};
+    Answer answer{block_.exact.press(patch, Given::kDepth, depth), std::min(1.0, share)};
+    answer.reaction.force *= times_;
+    answer.reaction.stiffness *= times_;
+    return answer;
   }
   double room(const Vec2& middle, double depth) const override {
     return std::clamp(cells_left(middle, depth), 0.0, 1.0);
@@ -86,16 +90,17 @@ class Knows : public Rung {
     return std::min(aside, (0.004 - depth) / (0.07 * kB1PatchRadius));
   }
   AskedAndExact& block_;
+  double times_;
 };
 
 /// B1, so fine that it is larger than its near field, under such a rung.
 struct KnownBlock : AskedAndExact {
-  explicit KnownBlock(Law law) : AskedAndExact(pressed_block(Element::kHex8Sri, 8, 0.45, law)) {
+  explicit KnownBlock(Law law, double times = 1) : AskedAndExact(pressed_block(Element::kHex8Sri, 8, 0.45, law)) {
     auto made = std::make_unique<NearModel>(solid, top, *top.patch(Vec2::Zero()),
                                             NearModel::Config{.newton = {.max_iterations = 100, .tolerance = 5e-3}});
     near = made.get();
     std::vector<std::unique_ptr<Rung>> rungs;
-    rungs.push_back(std::make_unique<Knows>(*this));
+    rungs.push_back(std::make_unique<Knows>(*this, times));
     ladder = std::make_unique<Ladder>(std::move(rungs), std::move(made));
   }
   Reaction press(const Vec2& place, double depth) {
@@ -284,6 +289,16 @@ TEST(Ladder, WhereAPressLeavesTheRungBelowTheFieldOfThatPlaceIsThere) {
       last = found.force;
     }
   }
+}
+
+TEST(Ladder, OfAFieldThatTookOverUnderARungNothingIsOfThatRung) {
+  KnownBlock block(Law::kNeoHookean, 1.1);
+  const Vec2 place(0.0095, 0);
+  Reaction found;
+  for (int i = 10; i <= 55; ++i) found = block.press(place, 1e-4 * i);
+  EXPECT_EQ(block.near->size().made, 2);
+  const double truth = block.truth(place, 5.5e-3);
+  EXPECT_NEAR(found.force, truth, 0.02 * truth);
 }
 
 TEST(Ladder, AHandThatRestsUnderARungHasOneFieldMade) {
