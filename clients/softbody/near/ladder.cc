@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <ranges>
 #include <utility>
 
 namespace tendon::softbody {
@@ -25,8 +24,8 @@ Reaction Ladder::press(const Patch& patch, Given given, double value) {
   }
   Reaction felt;
   if (!whole) felt = near_->press(patch, given, value);
-  for (const auto& [reaction, share] : std::views::reverse(answers)) {
-    felt = share >= 1 ? reaction : blended(felt, reaction, share);
+  for (auto answer = answers.rbegin(); answer != answers.rend(); ++answer) {
+    felt = answer->share >= 1 ? answer->reaction : blended(felt, answer->reaction, answer->share);
   }
   if (whole) near_->follow(patch, felt, room(patch, value));
   return felt;
