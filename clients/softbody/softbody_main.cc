@@ -18,6 +18,7 @@
 
 #include "clients/cpp/engine/self_test.h"
 #include "clients/cpp/options.h"
+#include "clients/softbody/answered.h"
 #include "clients/softbody/background.h"
 #include "clients/softbody/explain.h"
 #include "clients/softbody/placed_body.h"
@@ -189,13 +190,11 @@ int main(int argc, char** argv) {
     softbody::PlacedBody body(scene);
     prepare_beside(scene, thread, body);
     const int exit_code = answer(scene, options, body);
-    for (const softbody::Ladder::Step& step : body.ladder()) {
-      std::cerr << "tendon-softbody: " << step.answers << " answers were " << step.size.name << "\n";
-    }
-    if (const auto fields = body.near_field(); fields && thread) {
-      std::cerr << "tendon-softbody: the other thread made " << fields->made - 1 + fields->late << " near fields, "
-                << fields->late << " of them too late; " << fields->linear
-                << " answers were those of the linear body\n";
+    const softbody::Answered answered{body.ladder(), thread ? body.near_field() : std::nullopt};
+    if (options.json) {
+      std::cout << in_json(answered);
+    } else if (const std::string words = in_words(answered); !words.empty()) {
+      std::cerr << "tendon-softbody: " << words;
     }
     return exit_code;
   } catch (const std::exception& error) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "clients/softbody/near/ladder.h"
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -10,19 +11,30 @@ Ladder::Ladder(std::vector<std::unique_ptr<Rung>> rungs, std::unique_ptr<NearMod
     : rungs_(std::move(rungs)), answers_(rungs_.size()), near_(std::move(near)) {}
 
 Reaction Ladder::press(const Patch& patch, Given given, double value) {
-  return press_from(given == Given::kForce || patch.nodes.empty() ? rungs_.size() : 0, patch, given, value);
-}
-
-Reaction Ladder::press_from(std::size_t rung, const Patch& patch, Given given, double depth) {
-  for (; rung < rungs_.size(); ++rung) {
-    const auto answer = rungs_[rung]->press(patch, depth);
+  if (given == Given::kForce || patch.nodes.empty()) return near_->press(patch, given, value);
+  std::vector<Rung::Answer> answers;
+  bool whole = false;
+  for (std::size_t i = 0; i < rungs_.size() && !whole; ++i) {
+    const auto answer = rungs_[i]->press(patch, value);
     // A rung holds the depth, and pulls where it has to.
     if (!answer || (given == Given::kLeastDepth && answer->reaction.force < 0)) continue;
-    ++answers_[rung];
-    if (answer->share >= 1) return answer->reaction;
-    return blended(press_from(rung + 1, patch, given, depth), answer->reaction, answer->share);
+    ++answers_[i];
+    answers.push_back(*answer);
+    whole = answer->share >= 1;
   }
-  return near_->press(patch, given, depth);
+  Reaction felt;
+  if (!whole) felt = near_->press(patch, given, value);
+  for (auto answer = answers.rbegin(); answer != answers.rend(); ++answer) {
+    felt = answer->share >= 1 ? answer->reaction : blended(felt, answer->reaction, answer->share);
+  }
+  if (whole) near_->follow(patch, felt, room(patch, value));
+  return felt;
+}
+
+double Ladder::room(const Patch& patch, double depth) const {
+  double most = 0;
+  for (const auto& rung : rungs_) most = std::max(most, rung->room(patch.middle, depth));
+  return most;
 }
 
 void Ladder::cut(const Division& division, const EffectsConfig& effects) {

@@ -14,8 +14,8 @@ namespace tendon::softbody {
 /// share of a rung falls from 1 to 0 with the place of the hand, the next one takes over, see blended(). Given forces are
 /// answered by NearModel.
 ///
-/// While a rung answers, NearModel is not asked and makes no field: a hand that comes to where it takes over after a far
-/// way has the whole of a new near field made in that answer.
+/// While rungs answer alone, NearModel follows the hand (NearModel::follow), so that its field is there where it takes
+/// over. Without another thread that makes an answer slower only where Rung::room() is below 1.
 class Ladder : public Model {
  public:
   /// The highest rung first.
@@ -37,7 +37,7 @@ class Ladder : public Model {
   const NearModel& near() const noexcept { return *near_; }
 
  private:
-  Reaction press_from(std::size_t rung, const Patch& patch, Given given, double depth);
+  double room(const Patch& patch, double depth) const;
 
   std::vector<std::unique_ptr<Rung>> rungs_;
   std::vector<int> answers_;

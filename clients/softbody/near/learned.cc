@@ -552,6 +552,11 @@ std::optional<Rung::Answer> LearnedRung::press(const Patch& patch, double depth)
   return Answer{*reaction, share};
 }
 
+double LearnedRung::room(const Vec2& middle, double depth) const {
+  const auto point = trust_.grid().find(middle, depth);
+  return point ? allowed_.room(*point) : 0;
+}
+
 Rung::Size LearnedRung::size() const {
   Size size{.name = "learned",
             .shapes = body_.shapes(),

@@ -75,6 +75,7 @@ class LearnedRung : public Rung {
   LearnedRung(const Solid& solid, const TouchSurface& surface, const LearnedShapes& shapes, double tolerance);
 
   std::optional<Answer> press(const Patch& patch, double depth) const override;
+  double room(const Vec2& middle, double depth) const override;
   Size size() const override;
 
  private:

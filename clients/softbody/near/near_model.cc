@@ -32,6 +32,9 @@ constexpr double kFadesOver = 0.25;
 constexpr double kWaits = 1.7;
 constexpr double kPiecesOnTheWay = 30;
 
+/// A field that nobody needs yet is whole when so much of the room is left: the hand is still near its middle then.
+constexpr double kRoomLeft = 0.3;
+
 /// Iterations of Newton's method in a piece; so many pieces press the new field, and the factor is made in one of them.
 constexpr int kIterationsAtOnce = 6;
 constexpr int kPresses = 4;
@@ -201,7 +204,7 @@ NearModel::NearModel(const Solid& solid, const TouchSurface& surface, const Patc
     : solid_(solid), surface_(surface), config_(config), at_rest_(factor_at_rest(solid)) {
   last_.place = place_of(solid.mesh(), first);
   begin(first, 0);
-  go_on(first, last_.place, 0);
+  go_on(first, last_.place, 0, 0);
 }
 
 NearModel::NearModel(const Solid& solid, const TouchSurface& surface, const Config& config, Background background)
@@ -260,27 +263,29 @@ void NearModel::begin(const Patch& patch, double depth) {
   making_->work = making_->pieces();
 }
 
-void NearModel::go_on(const Patch& patch, const Vec3& place, double depth) {
+void NearModel::go_on(const Patch& patch, const Vec3& place, double depth, double room) {
   const bool waits = field_ && field_->holds(patch, place, kWaits);
+  const bool needed = !waits && !(room > 0);
   std::unique_ptr<Making> making = std::move(making_);
   making->hand = last_;
   making->depth = depth;
   bool more = true;
   const auto due = [&] {  // pieces
+    if (!waits) return kPiecesOnTheWay * (1 - room) / (1 - kRoomLeft);
     return kPiecesOnTheWay * ((place - field_->middle).norm() / field_->serves - 1) / (kWaits - 1);
   };
   do {
     more = making->work->next();
     ++making->done;
     ++size_.pieces;
-  } while (more && (!waits || making->done < due()));
+  } while (more && (needed || making->done < due()));
   if (more) {
     making_ = std::move(making);
   } else if (making->field->holds(patch, place, 1)) {
     take_over(std::move(making->field));
-  } else if (!waits) {
+  } else if (needed) {
     begin(patch, depth);
-    go_on(patch, place, depth);
+    go_on(patch, place, depth, room);
   }
 }
 
@@ -499,30 +504,50 @@ Reaction NearModel::press(const Patch& patch, Given given, double value) {
   if (patch.nodes.empty()) return {};
   const Vec3 place = place_of(solid_.mesh(), patch);
   const double depth = given == Given::kForce ? last_.felt.depth : value;
-  const Vec3 way = place - last_.place;
-  faded_ += std::hypot(way.norm(), depth - last_.felt.depth);
+  faded_ += std::hypot((place - last_.place).norm(), depth - last_.felt.depth);
+  make_or_take(patch, place, depth, 0);
   Reaction reaction;
   if (oracle_) {
-    per_answer_ += (way - per_answer_) / kAnswersInMean;
-    if (way.norm() > serves_to(surface_)) per_answer_.setZero();
-    take_made(patch, place, depth);
     reaction = press_by_field_or_linear(patch, place, given, value);
   } else {
-    // Where the hand has gone elsewhere meanwhile.
-    if (making_ && (making_->middle - place).norm() > serves_to(surface_)) making_.reset();
-    if (!making_ && !(field_ && field_->holds(patch, place, 1))) begin(patch, depth);
-    if (making_) go_on(patch, place, depth);
     reaction = field_->press(patch, given, value);
     reaction = kept(handover_, std::max(0.0, 1 - faded_ / fading_over_), reaction);
   }
+  keep(patch, place, reaction);
+  return reaction;
+}
+
+void NearModel::follow(const Patch& patch, const Reaction& felt, double room) {
+  const Vec3 place = place_of(solid_.mesh(), patch);
+  make_or_take(patch, place, felt.depth, room);
+  handover_ = {};
+  by_linear_ = false;
+  keep(patch, place, felt);
+}
+
+void NearModel::make_or_take(const Patch& patch, const Vec3& place, double depth, double room) {
+  if (oracle_) {
+    const Vec3 way = place - last_.place;
+    per_answer_ += (way - per_answer_) / kAnswersInMean;
+    if (way.norm() > serves_to(surface_)) per_answer_.setZero();
+    take_made(patch, place, depth);
+    return;
+  }
+  if (room >= 1) return;
+  // Where the hand has gone elsewhere meanwhile.
+  if (making_ && (making_->middle - place).norm() > serves_to(surface_)) making_.reset();
+  if (!making_ && !(field_ && field_->holds(patch, place, 1))) begin(patch, depth);
+  if (making_) go_on(patch, place, depth, room);
+}
+
+void NearModel::keep(const Patch& patch, const Vec3& place, const Reaction& felt) {
   last_.patch.nodes = patch.nodes;
   last_.patch.weights = patch.weights;
   last_.patch.slopes = patch.slopes;
   last_.place = place;
-  last_.felt = reaction;
+  last_.felt = felt;
   if (background_ && !asked_) ask();
   if (asked_) oracle_->hand.put(last_);
-  return reaction;
 }
 
 NearModel::Size NearModel::size() const {

@@ -75,6 +75,11 @@ class NearModel : public Model {
   void make_no_more_fields();
 
   Reaction press(const Patch& patch, Given given, double value) override;
+  /// Something else has answered, and will until `room` is 0; a hand far from there has a room of 1. The next field is made
+  /// for that hand, as above, by the other thread. Without one nothing is made where the room is 1; below, an answer makes
+  /// a piece of a field that the present one does not serve, and more where the room falls fast, so that it takes over
+  /// before the room is 0. What is felt meanwhile is not of a field: where one takes over, nothing fades.
+  void follow(const Patch& patch, const Reaction& felt, double room);
   void cut(const Division& division, const EffectsConfig& effects) override;
   /// The first answers are the linear ones of this body, times what the law made of the last force before the cut.
   void go_on_from(const Model& before, std::span<const int> node_before) override;
@@ -112,8 +117,11 @@ class NearModel : public Model {
 
   /// A field around the patch, in place of what is being made.
   void begin(const Patch& patch, double depth);
-  /// Does a piece of what is being made, or all of them where the present field cannot wait.
-  void go_on(const Patch& patch, const Vec3& place, double depth);
+  /// Does a piece of what is being made, or as many as are due where the present field cannot wait: with no room all.
+  void go_on(const Patch& patch, const Vec3& place, double depth, double room);
+  /// Comes nearer to a field for this patch, or takes it.
+  void make_or_take(const Patch& patch, const Vec3& place, double depth, double room);
+  void keep(const Patch& patch, const Vec3& place, const Reaction& felt);
   void take_over(std::unique_ptr<Field> field);
   /// Forgets the fields, and where the last patch was on the body before the cut.
   void begin_cut();

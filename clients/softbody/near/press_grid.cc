@@ -228,12 +228,27 @@ Trust::Allowed::Allowed(const Trust& trust, double tolerance)
       }
     }
   }
+  amid_ = at_knots_;
+  for (int i = 1; i < last; ++i) {  // those of the rim are none already
+    for (int j = 1; j < last; ++j) {
+      for (int level = 0; level < PressGrid::kLevels; ++level) {
+        for (int c = 0; c < 27; ++c) {
+          const int z = level + c % 3 - 1;
+          if (z < 0 || at_knots_[at(grid_.knot(i + c / 9 - 1, j + c / 3 % 3 - 1, z))]) continue;
+          amid_[at(grid_.knot(i, j, level))] = false;
+        }
+      }
+    }
+  }
 }
 
-double Trust::Allowed::share(const PressGrid::Point& point) const {
+double Trust::Allowed::share_of(const std::vector<bool>& knots, const PressGrid::Point& point) const {
   double share = 1;  // exactly, among good ones
-  for (const auto& [knot, counts] : grid_.corners(point)) share -= at_knots_[at(knot)] ? 0 : counts;
+  for (const auto& [knot, counts] : grid_.corners(point)) share -= knots[at(knot)] ? 0 : counts;
   return std::max(0.0, share);
 }
+
+double Trust::Allowed::share(const PressGrid::Point& point) const { return share_of(at_knots_, point); }
+double Trust::Allowed::room(const PressGrid::Point& point) const { return share_of(amid_, point); }
 
 }  // namespace tendon::softbody

@@ -82,7 +82,7 @@ SolvedPresses solve_presses(const Solid& solid, const TouchSurface& surface, con
 
 /// How wrong a way of answering is, cell by cell of a grid, and so where it may answer.
 ///
-/// Thread-safe: yes, once built. Realtime-safe: error() and share() are.
+/// Thread-safe: yes, once built. Realtime-safe: Allowed::share() and room() are.
 class Trust {
  public:
   /// `at_knots` and `in_middles`: by how large a share of the force an answer was wrong there; negative: it was none.
@@ -100,11 +100,16 @@ class Trust {
    public:
     Allowed(const Trust& trust, double tolerance);
     double share(const PressGrid::Point& point) const;
+    /// 0 where share() begins to fall, 1 a cell away from there and farther, and evenly between.
+    double room(const PressGrid::Point& point) const;
     int cells() const noexcept { return cells_; }  ///< that are good
 
    private:
+    double share_of(const std::vector<bool>& knots, const PressGrid::Point& point) const;
+
     PressGrid grid_;
     std::vector<bool> at_knots_;
+    std::vector<bool> amid_;  ///< knots that have such knots alone around them
     int cells_ = 0;
   };
 

@@ -25,6 +25,10 @@ class Rung {
   /// The answer to a patch at a held depth, m. Empty where this rung knows too little of it.
   virtual std::optional<Answer> press(const Patch& patch, double depth) const = 0;
 
+  /// How much room a press has until a share is below 1: 0 there, 1 far from it, and evenly between. A rung says so
+  /// without an answer.
+  virtual double room(const Vec2& middle, double depth) const = 0;
+
   struct Size {
     std::string_view name;
     int shapes = 0;            ///< unknowns

@@ -233,6 +233,11 @@ std::optional<Rung::Answer> TabulatedRung::press(const Patch& patch, double dept
   return Answer{reaction, share};
 }
 
+double TabulatedRung::room(const Vec2& middle, double depth) const {
+  const auto point = table_.grid.find(middle, depth);
+  return point ? allowed_.room(*point) : 0;
+}
+
 Rung::Size TabulatedRung::size() const {
   Size size{.name = "tabulated",
             .bytes = (table_.numbers.size() + table_.errors.size()) * sizeof(double),

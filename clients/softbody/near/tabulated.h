@@ -48,6 +48,7 @@ class TabulatedRung : public Rung {
   TabulatedRung(TabulatedAnswers table, double tolerance);
 
   std::optional<Answer> press(const Patch& patch, double depth) const override;
+  double room(const Vec2& middle, double depth) const override;
   Size size() const override;
 
  private:

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "clients/softbody/touch/contact.h"
+#include "tests/clients/softbody/elsewhere.h"
 #include "tests/clients/softbody/near/pressed_before.h"
 #include "tests/clients/softbody/pressed_block.h"
 #include "tests/clients/softbody/same_answer.h"
@@ -18,6 +19,9 @@ namespace tendon::softbody {
 namespace {
 
 using testing::AskedAndExact;
+using testing::Elsewhere;
+using testing::kB1PatchRadius;
+using testing::pressed_block;
 using testing::PressedBefore;
 using testing::small_block;
 
@@ -33,6 +37,79 @@ std::unique_ptr<Ladder> ladder_with(const PressedBefore& block, bool tabulated, 
 Reaction press(const PressedBefore& block, Model& model, const Vec2& place, double depth) {
   return model.press(*block.top.patch_with_curvatures(place), Given::kLeastDepth, depth);
 }
+
+/// What a hand on a closed way gives and has back, J.
+struct ClosedWay {
+  double work = 0;   ///< that it has gained
+  double given = 0;  ///< the most that it has given
+};
+
+/// From corner to corner in steps of `step` (m) at most. `answered` is called after each answer.
+template <class Answered>
+ClosedWay go_around(PatchContact& contact, const std::vector<Vec3>& corners, double step, const Answered& answered) {
+  ClosedWay way;
+  Vec3 last = corners.front();
+  Vec3 force = contact.at(last).force;
+  for (std::size_t k = 1; k < corners.size(); ++k) {
+    const int steps = static_cast<int>(std::ceil((corners[k] - corners[k - 1]).norm() / step));
+    for (int i = 1; i <= steps; ++i) {
+      const Vec3 there = corners[k - 1] + (corners[k] - corners[k - 1]) * i / steps;
+      const Vec3 next = contact.at(there).force;
+      answered();
+      way.work += (force + next).dot(there - last) / 2;
+      way.given = std::max(way.given, -way.work);
+      last = there;
+      force = next;
+    }
+  }
+  return way;
+}
+
+/// Knows the whole body as far as 15 mm from its middle and to a depth of 4 mm, and hands over as a grid does. It may say
+/// that the body is `times` as stiff.
+class Knows : public Rung {
+ public:
+  Knows(AskedAndExact& block, double times) : block_(block), times_(times) {}
+  std::optional<Answer> press(const Patch& patch, double depth) const override {
+    const double share = 1 + cells_left(patch.middle, depth);
+    if (!(share > 0)) return std::nullopt;
+    Answer answer{block_.exact.press(patch, Given::kDepth, depth), std::min(1.0, share)};
+    answer.reaction.force *= times_;
+    answer.reaction.stiffness *= times_;
+    return answer;
+  }
+  double room(const Vec2& middle, double depth) const override {
+    return std::clamp(cells_left(middle, depth), 0.0, 1.0);
+  }
+  Size size() const override { return {.name = "knows"}; }
+  static constexpr double kReach = 0.015;
+
+ private:
+  static double cells_left(const Vec2& middle, double depth) {
+    const double aside = (kReach - middle.lpNorm<Eigen::Infinity>()) / (kB1PatchRadius / 4);
+    return std::min(aside, (0.004 - depth) / (0.07 * kB1PatchRadius));
+  }
+  AskedAndExact& block_;
+  double times_;
+};
+
+/// B1, so fine that it is larger than its near field, under such a rung.
+struct KnownBlock : AskedAndExact {
+  explicit KnownBlock(Law law, double times = 1) : AskedAndExact(pressed_block(Element::kHex8Sri, 8, 0.45, law)) {
+    auto made = std::make_unique<NearModel>(solid, top, *top.patch(Vec2::Zero()),
+                                            NearModel::Config{.newton = {.max_iterations = 100, .tolerance = 5e-3}});
+    near = made.get();
+    std::vector<std::unique_ptr<Rung>> rungs;
+    rungs.push_back(std::make_unique<Knows>(*this, times));
+    ladder = std::make_unique<Ladder>(std::move(rungs), std::move(made));
+  }
+  Reaction press(const Vec2& place, double depth) {
+    return ladder->press(*top.patch_with_curvatures(place), Given::kLeastDepth, depth);
+  }
+  double truth(const Vec2& place, double depth) { return exact.press(*top.patch(place), Given::kDepth, depth).force; }
+  std::unique_ptr<Ladder> ladder;
+  NearModel* near = nullptr;
+};
 
 TEST(Ladder, TheFirstRungThatIsGoodEnoughAnswers) {
   PressedBefore& block = small_block(Law::kNeoHookean);
@@ -124,26 +201,202 @@ TEST(Ladder, ClosedWaysAcrossRungsGiveNoMoreThanAHundredthOfWhatTheyTook) {
                                   Vec3(0.012, -aside, 0.0475), Vec3(0, 0, 0.0475), Vec3(-0.003, 0.009, 0.0425),
                                   Vec3(0, 0, 0.0505)};
         if (back) std::ranges::reverse(corners);
-        double work = 0;
-        double given = 0;
-        Vec3 last = corners.front();
-        Vec3 force = contact.at(last).force;
-        for (std::size_t k = 1; k < corners.size(); ++k) {
-          const int steps = static_cast<int>(std::ceil((corners[k] - corners[k - 1]).norm() / 1e-4));
-          for (int i = 1; i <= steps; ++i) {
-            const Vec3 there = corners[k - 1] + (corners[k] - corners[k - 1]) * i / steps;
-            const Vec3 next = contact.at(there).force;
-            work += (force + next).dot(there - last) / 2;
-            given = std::max(given, -work);
-            last = there;
-            force = next;
-          }
-        }
-        EXPECT_LT(work, 0.01 * given) << aside << back;
-        EXPECT_GT(given, 1e-3);
+        const ClosedWay way = go_around(contact, corners, 1e-4, [] {});
+        EXPECT_LT(way.work, 0.01 * way.given) << aside << back;
+        EXPECT_GT(way.given, 1e-3);
       }
     }
     EXPECT_GT(ladder->steps()[0].answers, 100);
+  }
+}
+
+TEST(Ladder, ClosedWaysOnWhichFieldsTakeOverUnderARungGiveNoMoreEither) {
+  for (const Law law : kBothLaws) {
+    for (const bool beside : {false, true}) {
+      KnownBlock block(law);
+      Elsewhere thread;
+      if (beside) block.near->make_fields_by(thread.background());
+      PatchContact contact(*block.ladder, block.top, 0, PatchContact::Side::kUnilateral);
+      // Out of what the rung knows at one depth and back at another, and out below.
+      const std::vector<Vec3> corners{Vec3(0, 0, 0.0505),         Vec3(0, 0, 0.047),  Vec3(0.019, 0.004, 0.0465),
+                                      Vec3(0.021, 0, 0.0478),     Vec3(0, 0, 0.0478), Vec3(-0.004, 0.01, 0.0475),
+                                      Vec3(-0.004, 0.01, 0.0455), Vec3(0, 0, 0.0505)};
+      int answers = 0;
+      const ClosedWay way = go_around(contact, corners, 2e-4, [&] {
+        if (++answers % 10 == 0) thread.work();
+      });
+      EXPECT_LT(way.work, 0.01 * way.given) << beside;
+      EXPECT_GT(way.given, 1e-3);
+      EXPECT_GE(block.near->size().made, 3) << beside;
+      EXPECT_EQ(block.near->size().linear, 0);
+      const int by_rung = block.ladder->steps()[0].answers;
+      EXPECT_GT(by_rung, 100);
+    }
+  }
+}
+
+/// Under the rung all the way, and out of what it knows.
+TEST(Ladder, WhereTheNearFieldTakesOverAfterAFarWayNoAnswerMakesAWholeField) {
+  for (const Law law : kBothLaws) {
+    for (const auto& [step, most] : {std::pair(1e-4, 1), std::pair(2e-4, 2), std::pair(5e-4, 5)}) {  // m in an answer
+      KnownBlock block(law);
+      ASSERT_GT(block.near->size().radius, 0);
+      const int pieces_at_start = block.near->size().pieces;
+      double last = 0;
+      int taken_over = 0;
+      for (int i = 0; step * i < 0.025; ++i) {
+        const Vec2 place(step * i, 0);
+        const NearModel::Size before = block.near->size();
+        const Reaction found = block.press(place, 2e-3);
+        const NearModel::Size after = block.near->size();
+        EXPECT_LE(after.pieces - before.pieces, most) << step << ' ' << i;
+        if (place.x() < 0.0099) {
+          EXPECT_EQ(after.pieces, pieces_at_start) << "nothing is made far from where it takes over";
+        } else if (place.x() > Knows::kReach && ++taken_over == 1) {
+          EXPECT_EQ(after.made, 2) << "the field is there " << step;
+        }
+        if (i > 0) {
+          EXPECT_NEAR(found.force, last, 3e-3 * last * std::max(1.0, step / 1e-4)) << step << ' ' << i;
+        }
+        EXPECT_GE(found.error, std::abs(found.force - block.truth(place, 2e-3))) << step << ' ' << i;
+        last = found.force;
+      }
+      EXPECT_GT(taken_over, 0);
+    }
+  }
+}
+
+TEST(Ladder, WhereAPressLeavesTheRungBelowTheFieldOfThatPlaceIsThere) {
+  for (const double aside : {0.0, 0.0095}) {  // the field of the start has it, or not
+    KnownBlock block(Law::kNeoHookean);
+    const Vec2 place(aside, 0);
+    const int made = aside > 0 ? 2 : 1;
+    const int pieces_at_start = block.near->size().pieces;
+    double last = block.press(place, 1e-3).force;
+    for (int i = 11; i <= 50; ++i) {
+      const double depth = 1e-4 * i;
+      const NearModel::Size before = block.near->size();
+      const Reaction found = block.press(place, depth);
+      const NearModel::Size after = block.near->size();
+      EXPECT_LE(after.pieces - before.pieces, made == 1 ? 0 : 4) << i;
+      if (i <= 25) {
+        EXPECT_EQ(after.pieces, pieces_at_start) << i;
+      } else if (i >= 40) {
+        EXPECT_EQ(after.made, made) << i;
+      }
+      EXPECT_NEAR((found.force - last) / 1e-4, found.stiffness, 0.05 * found.stiffness) << i;
+      EXPECT_GE(found.error, std::abs(found.force - block.truth(place, depth))) << i;
+      last = found.force;
+    }
+  }
+}
+
+TEST(Ladder, OfAFieldThatTookOverUnderARungNothingIsOfThatRung) {
+  KnownBlock block(Law::kNeoHookean, 1.1);
+  const Vec2 place(0.0095, 0);
+  Reaction found;
+  for (int i = 10; i <= 55; ++i) found = block.press(place, 1e-4 * i);
+  EXPECT_EQ(block.near->size().made, 2);
+  const double truth = block.truth(place, 5.5e-3);
+  EXPECT_NEAR(found.force, truth, 0.02 * truth);
+}
+
+TEST(Ladder, AHandThatRestsUnderARungHasOneFieldMade) {
+  KnownBlock block(Law::kNeoHookean);
+  const int pieces = block.near->size().pieces;
+  for (int i = 0; i <= 140; ++i) block.press(Vec2(1e-4 * i, 0), 2e-3);
+  for (int i = 0; i < 100; ++i) block.press(Vec2(0.014, 0), 2e-3);
+  EXPECT_EQ(block.near->size().made, 2);
+  EXPECT_LE(block.near->size().pieces - pieces, 31);
+}
+
+TEST(Ladder, AnotherThreadMakesTheFieldsForAHandUnderARung) {
+  for (const Law law : kBothLaws) {
+    KnownBlock block(law);
+    Elsewhere thread;
+    block.near->make_fields_by(thread.background());
+    const int pieces = block.near->size().pieces;
+    double last = 0;
+    int taken_over = 0;
+    for (int i = 0; i < 250; ++i) {
+      const Vec2 place(1e-4 * i, 0);
+      const int made = block.near->size().made;
+      const Reaction found = block.press(place, 3e-3);
+      if (place.x() > Knows::kReach && ++taken_over == 1) {
+        EXPECT_GE(made, 3) << "made under the rung";
+      }
+      EXPECT_LE(thread.given.size(), 1U) << i;
+      if (i > 0) {
+        EXPECT_NEAR(found.force, last, 3e-3 * last) << i;
+      }
+      EXPECT_GE(found.error, std::abs(found.force - block.truth(place, 3e-3))) << i;
+      last = found.force;
+      if (i % 15 == 14) thread.work();
+    }
+    EXPECT_EQ(block.near->size().pieces, pieces);
+    EXPECT_EQ(block.near->size().linear, 0);
+  }
+}
+
+TEST(Ladder, WhereNoFieldIsThereYetTheLinearBodyGoesOnFromTheForceOfTheRung) {
+  KnownBlock block(Law::kCorotational);
+  Elsewhere thread;  // it has stopped
+  block.near->make_fields_by(thread.background());
+  const auto press = [&](const Vec2& place, double depth) {
+    const double truth = block.truth(place, depth);
+    const Reaction found = block.press(place, depth);
+    EXPECT_NEAR(found.force, truth, 0.02 * truth) << place.transpose() << ' ' << depth;
+    EXPECT_GE(found.error, std::abs(found.force - truth)) << place.transpose() << ' ' << depth;
+  };
+  for (int i = 0; i < 110; ++i) press(Vec2(2e-4 * i, 0), 1e-3);
+  EXPECT_GE(block.near->size().linear, 30);
+  for (int i = 110; i-- > 0;) press(Vec2(2e-4 * i, 0), i > 60 ? 1e-3 : 3e-3);
+  for (int i = 0; i < 110; ++i) press(Vec2(0, 2e-4 * i), 3e-3);
+  // And a field that the hand comes back to knows nothing of the linear body.
+  for (const double depth : {3e-3, 3.9e-3, 5.2e-3}) press(Vec2::Zero(), depth);
+}
+
+TEST(Ladder, WithoutAnotherThreadTheSameWayHasTheSameAnswersBitByBit) {
+  KnownBlock one(Law::kNeoHookean);
+  KnownBlock other(Law::kNeoHookean);
+  for (int i = 0; i < 100; ++i) {
+    const Vec2 place(2.5e-4 * i, 1e-4 * i);
+    const Reaction expected = one.press(place, 3e-3);
+    const Reaction found = other.press(place, 3e-3);
+    EXPECT_EQ(found.force, expected.force) << i;
+    EXPECT_EQ(found.stiffness, expected.stiffness) << i;
+    EXPECT_EQ(found.error, expected.error) << i;
+  }
+  EXPECT_GE(one.near->size().made, 3);
+}
+
+TEST(Ladder, ARungHasRoomAmongGoodCellsAndNoneWhereItsShareFalls) {
+  PressedBefore& block = small_block(Law::kNeoHookean);
+  for (const auto& rung : {block.learned(0.02), block.tabulated(0.02)}) {
+    const double deepest = block.presses.grid.deepest();
+    const double step = block.presses.grid.step;
+    double before = 1;
+    for (int i = 0; i <= 100; ++i) {  // down in the middle, whose neighbours are all good
+      const double depth = deepest * i / 100;
+      const double room = rung->room(Vec2::Zero(), depth);
+      const auto answer = rung->press(*block.top.patch(Vec2::Zero()), depth);
+      EXPECT_EQ(room > 0, depth < deepest - step - 1e-9) << depth;
+      if (room > 0) {
+        EXPECT_EQ(answer->share, 1) << depth;
+      }
+      if (depth <= deepest - 2 * step) {
+        EXPECT_EQ(room, 1) << depth;
+      }
+      EXPECT_NEAR(room, before, 0.06) << depth;
+      before = room;
+    }
+    for (int i = 0; i <= 100; ++i) {
+      const Vec2 place(1e-4 * i, 5e-5 * i);
+      EXPECT_NEAR(rung->room(place, step), std::max(0.0, 1 - place.x() / 5e-3) * std::max(0.0, 1 - place.y() / 5e-3),
+                  1e-9);
+    }
+    EXPECT_EQ(rung->room(Vec2(0.5, 0), step), 0);
+    EXPECT_EQ(rung->room(Vec2::Zero(), 2 * deepest), 0);
   }
 }
 

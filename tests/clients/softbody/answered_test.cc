@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "clients/softbody/answered.h"
+
+#include <gtest/gtest.h>
+
+namespace tendon::softbody {
+namespace {
+
+constexpr NearModel::Size kNear{.made = 5, .late = 1, .linear = 3};
+
+TEST(Answered, SaysTheSameCountsInWordsAndInJson) {
+  const Answered both{{{.size = {.name = "tabulated"}, .answers = 812}, {.size = {.name = "learned"}, .answers = 97}},
+                      kNear};
+  EXPECT_EQ(in_json(both), R"({"answers":{"tabulated":812,"learned":97,"linear":3,"fields":5,"fields_late":1}})"
+                           "\n");
+  EXPECT_EQ(
+      in_words(both),
+      "812 answers were tabulated, 97 answers were learned, 3 answers were those of the linear body, 5 near fields "
+      "were made by the other thread, 1 of them came too late\n");
+}
+
+TEST(Answered, WithoutAnotherThreadThereAreRungsAlone) {
+  const Answered rungs{{{.size = {.name = "learned"}, .answers = 0}}, {}};
+  EXPECT_EQ(in_json(rungs), "{\"answers\":{\"learned\":0}}\n");
+  EXPECT_EQ(in_words(rungs), "0 answers were learned\n");
+}
+
+TEST(Answered, ABodyWithoutEitherHasNothingToSay) {
+  EXPECT_EQ(in_json({}), "");
+  EXPECT_EQ(in_words({}), "");
+}
+
+}  // namespace
+}  // namespace tendon::softbody
