@@ -395,6 +395,9 @@ std::unique_ptr<Friction> friction_of(const BodyConfig& config) {
   return std::make_unique<Friction>(*config.friction, sideways_stiffness(config.material, config.patch_radius));
 }
 
+/// A tool that is thinner beside the points of the layer slips off them (layer.h).
+constexpr double kPointsAcrossTool = 4;
+
 RigidContact rigid_contact_of(const BodyConfig& config, QuasiStaticModel& body, const Solid& solid,
                               const TouchSurface& surface) {
   const RigidShape shape = shape_of_tool(config);
@@ -403,7 +406,7 @@ RigidContact rigid_contact_of(const BodyConfig& config, QuasiStaticModel& body, 
                 .young = config.material.young,
                 .friction = config.friction.value_or(0),
                 .shear = config.material.mu(),
-                .piece = std::min(shape.reach() / 10, shape.thinnest())};
+                .piece = std::min(shape.reach() / 10, shape.thinnest() / kPointsAcrossTool)};
   made.tolerance = config.tolerance;
   made.max_iterations = config.max_iterations;
   made.turns = turns_the_hand(config);
@@ -490,6 +493,11 @@ EffectSet effects_of(const BodyConfig& config) {
   if (config.plasticity) set.add(kPlasticity);
   if (config.self_collision) set.add(kSelfCollision);
   return set;
+}
+
+bool is_elastic(const BodyConfig& config) {
+  const EffectSet lossless{kContact, kGeometricNonlinearity, kMaterialNonlinearity, kGravity, kSelfCollision};
+  return config.model != ModelKind::kProjective && effects_of(config).within(lossless);
 }
 
 struct Body::Parts {

@@ -202,6 +202,10 @@ Vec3 lowest_of_tool(const BodyConfig& config, const Mat3& turn);
 /// The effects that `config` simulates, including those of its model.
 EffectSet effects_of(const BodyConfig& config);
 
+/// Whether nothing takes energy on a closed way of the tool: a body at rest at every instant, solved until it is, with
+/// no effect that loses or changes anything.
+bool is_elastic(const BodyConfig& config);
+
 /// The table of a kCondensed body, to be kept in a file. `solver` says how the body is solved: on this machine
 /// (with_factor), or on many (mpi/spread_solver.h). Throws what Body throws, and what the solver throws.
 SurfaceTable condense(const BodyConfig& config, const SolverOf& solver = with_factor);

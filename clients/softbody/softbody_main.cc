@@ -39,6 +39,7 @@ int test(const softbody::Scene& scene, const Options& options) {
   script.into = -scene.towards_hand;
   script.depth = 2 * kWay;
   script.slide = kWay;
+  script.elastic = softbody::is_elastic(scene.body);
   if (options.client.rate_hz > 0) script.rate_hz = options.client.rate_hz;
   // Of several hands the first one moves, and the others are nowhere.
   std::vector<std::optional<DeviceState>> hands(scene.hands.size());

@@ -190,8 +190,10 @@ class Tester {
   }
 
   void walk(const std::string& way, std::vector<Vec3> corners, double speed) {
-    std::ostringstream claim;
-    claim << "gives out no more than it was given: " << way << ", " << speed << " m/s";
+    std::ostringstream name;
+    name << way << ", " << speed << " m/s";
+    const std::string route = name.str();
+    const std::string claim = "gives out no more than it was given: " + route;
     try {
       const Work work = around(hand_, std::move(corners), speed);
       felt_ = felt_ || work.largest_n > 0;
@@ -201,11 +203,20 @@ class Tester {
       std::ostringstream why;
       why << work.most << " J at most, " << work.given << " J at the end, of " << work.put_in << " J put in; up to "
           << bound << " J are allowed";
-      add(work.most <= bound ? Verdict::kPassed : Verdict::kFailed, claim.str(), why.str(), work.most, bound);
+      add(work.most <= bound ? Verdict::kPassed : Verdict::kFailed, claim, why.str(), work.most, bound);
+      if (script_.elastic) judge_loss(route, work, bound);
     } catch (const Unusable& error) {
-      add(Verdict::kFailed, claim.str(), error.what());
+      add(Verdict::kFailed, claim, error.what());
       hand_back();
     }
+  }
+
+  void judge_loss(const std::string& route, const Work& work, double bound) {
+    const double lost = -work.given;
+    std::ostringstream why;
+    why << lost << " J of " << work.put_in << " J put in did not come back; up to " << bound << " J are allowed";
+    add(lost <= bound ? Verdict::kPassed : Verdict::kFailed, "gives back what it took: " + route, why.str(), lost,
+        bound);
   }
 
   /// To where the next claim begins, whatever is answered.

@@ -41,13 +41,15 @@ struct SelfTest {
 /// How the hand moves in a self-test: from `start`, which is outside all bodies (where the engine holds no energy), by
 /// `depth` in the direction `into`.
 struct SelfTestScript {
-  Vec3 start = Vec3(-0.005, 0, 0);    ///< m
-  Vec3 into = Vec3::UnitX();          ///< its length is not used
-  double depth = 0.015;               ///< m, > 0, from `start`
-  double slide = 0.01;                ///< m, > 0, aside at that depth, both ways
-  double speed = 0.1;                 ///< m/s, > 0, the fastest; each way is gone at a quarter of it too
-  double rate_hz = 1000;              ///< > 0, states per second
-  double work_tolerance = 0.01;       ///< of the work that the hand has put in, ≥ 0
+  Vec3 start = Vec3(-0.005, 0, 0);  ///< m
+  Vec3 into = Vec3::UnitX();        ///< its length is not used
+  double depth = 0.015;             ///< m, > 0, from `start`
+  double slide = 0.01;              ///< m, > 0, aside at that depth, both ways
+  double speed = 0.1;               ///< m/s, > 0, the fastest; each way is gone at a quarter of it too
+  double rate_hz = 1000;            ///< > 0, states per second
+  double work_tolerance = 0.01;     ///< of the work that the hand has put in, ≥ 0
+  /// Nothing that the engine simulates takes energy: what a closed way has cost, the hand gets back.
+  bool elastic = false;
   double stiffness_step = 1e-5;       ///< m, > 0: fd_stiffness's
   double stiffness_tolerance = 0.05;  ///< of ‖K‖, ≥ 0: half of what the server's model could tell
   /// For an engine that goes on in time: without it its stiffness is not judged.
@@ -62,6 +64,9 @@ struct SelfTestScript {
 ///   done on the hand never exceeds `work_tolerance` of the work that the way costs the hand, plus the difference that
 ///   using every second state alone would make, which is three times the error of the trapezoids. A force that lags,
 ///   grows with the speed, or has a curl does not pass. The limiter would contain it, and the body would feel soft.
+/// * **It gives back what it took**, when the script says that it is `elastic`: what is missing at the end of each of
+///   these ways has the same bound. A shape that snaps from one place of rest to another loses more, and so does a
+///   solver that stops too early.
 /// * **Its stiffness is −∂F/∂x**, by fd_stiffness at rest at four depths, where no surface is within a step.
 /// * **Odd states do it no harm.** A hand at NaN, at infinity, 1 km away, at a denormal; the same tick twice; a pause
 ///   of a second; a jump. The engine throws nothing, its answers to finite states are finite (at most

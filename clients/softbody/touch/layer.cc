@@ -13,7 +13,8 @@ namespace {
 
 constexpr double kOnset = 0.1;  // of the layer: where its stiffness begins
 constexpr int kLeastPieces = 4;
-constexpr int kMostPieces = 8;
+constexpr int kMostPieces = 32;
+constexpr int kBunch = 4;  // points along each side of a bunch
 
 /// A facet may have grown by so much.
 constexpr double kGrown = 1.5;
@@ -27,6 +28,11 @@ Eigen::Matrix3Xd places_of(const Mesh& mesh, const std::vector<int>& nodes, cons
     all.col(i) = mesh.nodes[at(node)] + u.segment<3>(3 * node);
   }
   return all;
+}
+
+/// m, how far nodes are from their mean at most.
+double reach_of(const Eigen::Matrix3Xd& nodes) {
+  return (nodes.colwise() - nodes.rowwise().mean()).colwise().norm().maxCoeff();
 }
 
 }  // namespace
@@ -47,13 +53,13 @@ Layer::Layer(const Elastic& elastic, const Config& config) : elastic_(elastic), 
   const Mesh& mesh = elastic.mesh();
   least_facet_ = std::numeric_limits<double>::infinity();
   for (const Facet& facet : surface(mesh)) {
-    FacetOfPoints made{.nodes = nodes_on(mesh, facet), .size = 0, .reach = 0, .first = points_.size(), .count = 0};
+    FacetOfPoints made{.nodes = nodes_on(mesh, facet), .size = 0, .reach = 0, .first = bunches_.size(), .count = 0};
     const bool moves = std::ranges::any_of(made.nodes, [&](int node) {
       return elastic.free_of(3 * node) >= 0 || elastic.free_of(3 * node + 1) >= 0 || elastic.free_of(3 * node + 2) >= 0;
     });
     if (!moves) continue;
     const Eigen::Matrix3Xd at_rest = corners(made, VectorXd::Zero(elastic.size()));
-    made.reach = (at_rest.colwise() - at_rest.rowwise().mean()).colwise().norm().maxCoeff();
+    made.reach = reach_of(at_rest);
     const Face& face = faces(mesh.shape)[at(facet.face)];
     const auto element = mesh.element(facet.element);
     double area = 0;
@@ -74,22 +80,38 @@ Layer::Layer(const Elastic& elastic, const Config& config) : elastic_(elastic), 
     const int cuts =
         std::clamp(static_cast<int>(std::ceil(1.4 * made.reach / config.piece)), kLeastPieces, kMostPieces);
     const double step = (triangle ? 1.0 : 2.0) / cuts;
-    for (int i = 0; i < cuts; ++i) {
-      for (int j = 0; j < (triangle ? cuts - i : cuts); ++j) {
-        if (!triangle) {
-          add((i + 0.5) * step - 1, (j + 0.5) * step - 1, step * step);
-          continue;
+    const auto add_cell = [&](int i, int j) {
+      if (!triangle) return add((i + 0.5) * step - 1, (j + 0.5) * step - 1, step * step);
+      if (i + j < cuts) add((i + 1 / 3.0) * step, (j + 1 / 3.0) * step, 0.5 * step * step);
+      if (i + j + 1 < cuts) add((i + 2 / 3.0) * step, (j + 2 / 3.0) * step, 0.5 * step * step);
+    };
+    for (int i = 0; i < cuts; i += kBunch) {
+      for (int j = 0; j < cuts; j += kBunch) {
+        const std::size_t first = points_.size();
+        for (int k = i; k < std::min(i + kBunch, cuts); ++k) {
+          for (int l = j; l < std::min(j + kBunch, cuts); ++l) add_cell(k, l);
         }
-        add((i + 1 / 3.0) * step, (j + 1 / 3.0) * step, 0.5 * step * step);
-        if (i + j + 1 < cuts) add((i + 2 / 3.0) * step, (j + 2 / 3.0) * step, 0.5 * step * step);
+        add_bunch(made, first);
       }
     }
-    made.count = points_.size() - made.first;
     made.size = std::sqrt(area);
     least_facet_ = std::min(least_facet_, made.size);
     facets_.push_back(std::move(made));
   }
   if (rubs()) ties_.assign(config.tools, std::vector<Tie>(points_.size()));
+}
+
+/// Of the points from `first` on, if there are any.
+void Layer::add_bunch(FacetOfPoints& facet, std::size_t first) {
+  if (first == points_.size()) return;
+  Bunch bunch{.first = first, .count = points_.size() - first, .middle = points_[first].shares, .spread = 0};
+  for (std::size_t p = first + 1; p < points_.size(); ++p) bunch.middle += points_[p].shares;
+  bunch.middle /= static_cast<double>(bunch.count);
+  for (std::size_t p = first; p < points_.size(); ++p) {
+    bunch.spread = std::max(bunch.spread, (points_[p].shares - bunch.middle).lpNorm<1>());
+  }
+  bunches_.push_back(std::move(bunch));
+  ++facet.count;
 }
 
 Eigen::Matrix3Xd Layer::corners(const FacetOfPoints& facet, const VectorXd& u) const {
@@ -128,9 +150,15 @@ Layer::Near Layer::near(std::span<const Placed> tools, const VectorXd& u, double
       const double far = tool.shape.reach() + kGrown * facet.reach + apart;
       if ((middle - tool.middle(*tools[t].handle)).squaredNorm() > far * far) continue;
       if (tool.value(*tools[t].handle, middle) > apart + kGrown * facet.reach) continue;
+      const double reach = reach_of(places);
       bool close = false;
-      for (std::size_t p = facet.first; p < facet.first + facet.count && !close; ++p) {
-        close = tool.value(*tools[t].handle, places * points_[p].shares.transpose()) < apart;
+      for (std::size_t b = facet.first; b < facet.first + facet.count && !close; ++b) {
+        const Bunch& bunch = bunches_[b];
+        const double wide = bunch.spread * reach;
+        if (tool.value(*tools[t].handle, places * bunch.middle.transpose()) >= apart + wide) continue;
+        for (std::size_t p = bunch.first; p < bunch.first + bunch.count && !close; ++p) {
+          close = tool.value(*tools[t].handle, places * points_[p].shares.transpose()) < apart;
+        }
       }
       if (!close) continue;
       found.sites.push_back({t, static_cast<int>(f), {}});
@@ -153,17 +181,28 @@ Eigen::Matrix3Xd Layer::places(const Near& near, const VectorXd& u) const {
   return places_of(elastic_.mesh(), near.nodes, u);
 }
 
-/// visit(site, point, x).
+bool Layer::tied(const Bunch& bunch, std::size_t tool) const {
+  return std::ranges::any_of(std::span(ties_[tool]).subspan(bunch.first, bunch.count), &Tie::tied);
+}
+
+/// visit(site, point, x), of all points that are in the layer or tied, and others near them.
 template <class Visit>
-void Layer::each_point(const Near& near, const Eigen::Matrix3Xd& places, const Visit& visit) const {
+void Layer::each_point(const Near& near, std::span<const Placed> tools, const Eigen::Matrix3Xd& places,
+                       const Visit& visit) const {
+  Eigen::Matrix3Xd nodes;
   for (const Near::Site& site : near.sites) {
     const FacetOfPoints& facet = facets_[at(site.facet)];
-    for (std::size_t p = facet.first; p < facet.first + facet.count; ++p) {
-      Vec3 x = Vec3::Zero();
-      for (std::size_t i = 0; i < site.nodes.size(); ++i) {
-        x += points_[p].shares[static_cast<Eigen::Index>(i)] * places.col(site.nodes[i]);
+    const Placed& placed = tools[site.tool];
+    nodes = places(Eigen::all, site.nodes);
+    const double reach = reach_of(nodes);
+    for (std::size_t b = facet.first; b < facet.first + facet.count; ++b) {
+      const Bunch& bunch = bunches_[b];
+      const double outside = config_.thickness + bunch.spread * reach;
+      const bool far = placed.tool->value(*placed.handle, nodes * bunch.middle.transpose()) >= outside;
+      if (far && !(rubs() && tied(bunch, site.tool))) continue;
+      for (std::size_t p = bunch.first; p < bunch.first + bunch.count; ++p) {
+        visit(site, p, nodes * points_[p].shares.transpose());
       }
-      visit(site, p, x);
     }
   }
 }
@@ -184,7 +223,7 @@ Layer::Press Layer::press(const Near& near, std::span<const Placed> tools, const
     for (Felt& felt : all.felt) felt.mixed = MatrixXd::Zero(size, 6);
   }
   std::vector<std::vector<Vec3>> pressed(tools.size());
-  each_point(near, places, [&](const Near::Site& site, std::size_t p, const Vec3& x) {
+  each_point(near, tools, places, [&](const Near::Site& site, std::size_t p, const Vec3& x) {
     const Placed& placed = tools[site.tool];
     const PointOfFacet& point = points_[p];
     const Tie* tie = rubs() && ties_[site.tool][p].most > 0 ? &ties_[site.tool][p] : nullptr;
@@ -263,7 +302,7 @@ Layer::Press Layer::press(const Near& near, std::span<const Placed> tools, const
 }
 
 void Layer::hold(const Near& near, std::span<const Placed> tools, const Eigen::Matrix3Xd& places) {
-  each_point(near, places, [&](const Near::Site& site, std::size_t p, const Vec3& x) {
+  each_point(near, tools, places, [&](const Near::Site& site, std::size_t p, const Vec3& x) {
     Tie& tie = ties_[site.tool][p];
     if (!tie.tied) return;
     const Distance d = tools[site.tool].tool->distance(*tools[site.tool].handle, x);
@@ -279,7 +318,7 @@ Layer::Dissipated Layer::advance(const Near& near, std::span<const Placed> tools
   std::vector<std::vector<bool>> pressed(ties_.size(), std::vector<bool>(points_.size()));
   hold(near, tools, places);
   const double c = config_.shear / config_.thickness;
-  each_point(near, places, [&](const Near::Site& site, std::size_t p, const Vec3& x) {
+  each_point(near, tools, places, [&](const Near::Site& site, std::size_t p, const Vec3& x) {
     const Pose& handle = *tools[site.tool].handle;
     Tie& tie = ties_[site.tool][p];
     if (tools[site.tool].tool->value(handle, x) >= config_.thickness) return;
@@ -319,12 +358,18 @@ Layer::Gap Layer::gap(const Placed& placed, const VectorXd& u) const {
   for (const FacetOfPoints& facet : facets_) {
     const Eigen::Matrix3Xd places = corners(facet, u);
     if (placed.tool->value(*placed.handle, places.rowwise().mean()) > least.value + kGrown * facet.reach) continue;
-    for (std::size_t p = facet.first; p < facet.first + facet.count; ++p) {
-      const Vec3 x = places * points_[p].shares.transpose();
-      const double value = placed.tool->value(*placed.handle, x);
-      if (!(value < least.value)) continue;
-      least.value = value;
-      nearest = x;
+    const double reach = reach_of(places);
+    for (std::size_t b = facet.first; b < facet.first + facet.count; ++b) {
+      const Bunch& bunch = bunches_[b];
+      const double wide = bunch.spread * reach;
+      if (placed.tool->value(*placed.handle, places * bunch.middle.transpose()) > least.value + wide) continue;
+      for (std::size_t p = bunch.first; p < bunch.first + bunch.count; ++p) {
+        const Vec3 x = places * points_[p].shares.transpose();
+        const double value = placed.tool->value(*placed.handle, x);
+        if (!(value < least.value)) continue;
+        least.value = value;
+        nearest = x;
+      }
     }
   }
   if (std::isfinite(least.value)) least.normal = -placed.tool->distance(*placed.handle, nearest).gradient.normalized();
@@ -332,7 +377,7 @@ Layer::Gap Layer::gap(const Placed& placed, const VectorXd& u) const {
 }
 
 std::size_t Layer::bytes() const noexcept {
-  std::size_t sum = sizeof *this + points_.size() * sizeof(PointOfFacet);
+  std::size_t sum = sizeof *this + points_.size() * sizeof(PointOfFacet) + bunches_.size() * sizeof(Bunch);
   for (const FacetOfPoints& facet : facets_) sum += sizeof facet + facet.nodes.size() * sizeof(int);
   for (const auto& ties : ties_) sum += ties.size() * sizeof(Tie);
   return sum;

@@ -78,6 +78,34 @@ TEST(SelfTest, MeasuresWhatAPressCosts) {
   EXPECT_TRUE(result.passed()) << result.text();
 }
 
+TEST(SelfTest, OfAnElasticBodyWantsBackWhatAWayHasCost) {
+  SelfTestScript script;
+  script.elastic = true;
+  const SelfTest spring = self_test(
+      [](const DeviceState& hand) -> Touch { return Vec3(-kK * std::max(hand.position.x(), 0.0), 0, 0); }, script);
+  EXPECT_TRUE(spring.passed()) << spring.text();
+  EXPECT_EQ(count(spring, kPassed, "gives back what it took"), 14) << spring.text();
+  // The damper of the wall takes energy: passive, and not elastic.
+  const SelfTest damped = self_test(wall, script);
+  EXPECT_EQ(count(damped, kFailed, "gives out"), 0) << damped.text();
+  EXPECT_EQ(count(damped, kFailed, "gives back what it took"), 14) << damped.text();
+  EXPECT_FALSE(damped.passed());
+  const auto& press = damped.findings.at(1);
+  EXPECT_EQ(press.what, "gives back what it took: press and release, 0.025 m/s");
+  EXPECT_GT(press.value, press.bound);
+  // Where the body snaps from one place of rest to another at the end of the slide, the way across alone fails.
+  const SelfTest snaps = self_test(
+      [snapped = false](const DeviceState& hand) mutable -> Touch {
+        const double depth = std::max(hand.position.x(), 0.0);
+        if (depth == 0) snapped = false;
+        if (hand.position.y() > 0.005) snapped = true;
+        return Vec3(snapped ? -kK / 2 * depth : -kK * depth, 0, 0);
+      },
+      script);
+  EXPECT_GT(count(snaps, kFailed, "gives back what it took: press, slide, release"), 0) << snaps.text();
+  EXPECT_EQ(count(snaps, kFailed, "gives back what it took: press and release"), 0) << snaps.text();
+}
+
 TEST(SelfTest, AllowsForWhatFewStatesASecondMakeOfAForceThatBends) {
   // A ball of springs that stiffen, at 50 Hz and up to 2 mm from one state to the next: conservative all the same.
   SelfTestScript script;

@@ -64,6 +64,35 @@ TEST(Layer, PressesWithYoungsModulusAndBeginsWithoutAStepInForceOrStiffness) {
   }
 }
 
+/// The layer's energy, and every point's force, by a sum over all points of the top, for a ball on it.
+TEST(Layer, PressesEachPointThatAToolTouchesAndNoOther) {
+  const Solid solid = testing::pressed_block(Element::kHex8Sri, 4, 0.45);
+  constexpr double kFacet = 0.025;  // m
+  constexpr double kRadius = 0.003;
+  for (const int cuts : {5, 8, 30}) {
+    Layer::Config config = Covered::config();
+    config.piece = 1.4 * kFacet / std::sqrt(2.0) / (cuts - 0.5);
+    const Layer layer(solid, config);
+    const HeldTool ball{RigidShape::sphere(kRadius)};
+    for (const Vec2& at : {Vec2(0.001, 0.0123), Vec2(0.0101, 0.0042), Vec2(0.0249, 0.0)}) {
+      const Vec3 middle(at.x(), at.y(), 0.05 + kRadius - 0.0005);
+      const std::vector<Layer::Placed> placed{{&ball, Pose{.position = middle}}};
+      const VectorXd rest = VectorXd::Zero(solid.size());
+      const Layer::Near near = layer.near(placed, rest, 0.25);
+      const double found = layer.press(near, placed, layer.places(near, rest), Layer::Order::kFelt).felt[0].area;
+      const double step = kFacet / cuts;
+      double expected = 0;
+      for (double x = -0.05 + step / 2; x < 0.05; x += step) {
+        for (double y = -0.05 + step / 2; y < 0.05; y += step) {
+          const double away = (Vec3(x, y, 0.05) - middle).norm() - kRadius;
+          if (away < kThickness) expected += step * step;
+        }
+      }
+      EXPECT_NEAR(found, expected, 1e-9 * kFacet * kFacet) << cuts << ' ' << at.transpose();
+    }
+  }
+}
+
 TEST(Layer, RefusesWhatIsNoLayer) {
   const Solid solid = testing::pressed_block(Element::kHex8Sri, 2, 0.3);
   const auto refused = [&](auto change) {

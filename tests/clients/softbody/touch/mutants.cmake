@@ -51,6 +51,14 @@ rigid_tool_mutant(no-onset SOURCE layer.cc
 rigid_tool_mutant(steps-too-long SOURCE rigid_contact.cc
   REPLACE "tool.shape.thinnest() / 8" "tool.shape.thinnest() * 4"
   TEST MeshTool.AThinPlateThatComesFastDoesNotComeOutOnTheOtherSide)
+# A facet has too few points for a thin tool.
+rigid_tool_mutant(points-too-far-apart SOURCE layer.cc
+  REPLACE "kMostPieces = 32" "kMostPieces = 8"
+  TEST RigidContact.AThinToolSlidesAlongEitherAxisAndGivesBackWhatItTook)
+# Of points that lie together only those count whose middle is pressed.
+rigid_tool_mutant(bunches-that-are-points SOURCE layer.cc
+  REPLACE "config_.thickness + bunch.spread * reach" "config_.thickness"
+  TEST Layer.PressesEachPointThatAToolTouchesAndNoOther)
 # At a corner the side is that of whichever facet was looked at first.
 rigid_tool_mutant(side-of-one-facet SOURCE surface_distance.cc
   REPLACE "facet.of_corners[0])" "facet.normal)"

@@ -136,6 +136,72 @@ TEST(RigidContact, AClosedWayOfPlacesAndTurnsGivesBackExactlyWhatItTook) {
   EXPECT_LT(std::abs(way.work), 2e-3 * way.most);
 }
 
+/// What a press of 3 mm, a slide of 3 mm along an axis and the release cost, as a share of what went in.
+double lost_by_sliding(const BodyConfig& config, int axis, bool to_and_fro) {
+  Body body(config);
+  const Vec3 outside = body.touch_point() - lowest_of_tool(config, Mat3::Identity()) + Vec3(0, 0, 2e-4);
+  const Vec3 deep = outside - Vec3(0, 0, 3.2e-3);
+  const Vec3 aside = 3e-3 * Vec3::Unit(axis);
+  std::vector<Vec3> corners{deep, deep + aside, outside + aside};
+  if (to_and_fro) corners = {deep, deep + aside, deep, outside};
+  Vec3 place = outside;
+  Vec3 force = body.touch(place).force;
+  double put_in = 0;
+  double work = 0;
+  for (const Vec3& corner : corners) {
+    const Vec3 from = place;
+    constexpr int kSteps = 16;
+    for (int i = 1; i <= kSteps; ++i) {
+      const Vec3 there = from + i * (corner - from) / kSteps;
+      const Vec3 felt = body.touch(there).force;
+      const double part = -(force + felt).dot(there - place) / 2;
+      work += part;
+      put_in += std::max(part, 0.0);
+      place = there;
+      force = felt;
+    }
+  }
+  EXPECT_GT(put_in, 1e-4);
+  return work / put_in;
+}
+
+TEST(RigidContact, AThinToolSlidesAlongEitherAxisAndGivesBackWhatItTook) {
+  BodyConfig blade = testing::pressed_body(ModelKind::kNeoHookean, Element::kHex8Sri, 6);
+  blade.tolerance = 1e-3;
+  blade.tool = BodyConfig::Tool::kBox;
+  blade.tool_size = Vec3(0.0026, 0.007, 0.03);  // thin along x
+  blade.tool_edge = 0.0013;
+  BodyConfig capsule = blade;
+  capsule.tool = BodyConfig::Tool::kCapsule;
+  capsule.tool_radius = 0.0013;
+  capsule.tool_half_length = 0.003;
+  capsule.tool_axis = Vec3::UnitY();
+  BodyConfig sphere = blade;
+  sphere.tool = BodyConfig::Tool::kSphere;
+  sphere.tool_radius = 0.008;
+  for (const BodyConfig& config : {blade, capsule, sphere}) {
+    for (const int axis : {0, 1}) {
+      for (const bool to_and_fro : {false, true}) {
+        EXPECT_LT(std::abs(lost_by_sliding(config, axis, to_and_fro)), 0.01)
+            << static_cast<int>(config.tool) << ' ' << axis << ' ' << to_and_fro;
+      }
+    }
+  }
+}
+
+TEST(RigidContact, OnlyABodyInWhichNothingTakesEnergyIsElastic) {
+  const BodyConfig plain = testing::pressed_body(ModelKind::kNeoHookean, Element::kHex8Sri, 4);
+  EXPECT_TRUE(is_elastic(plain));
+  BodyConfig heavy = plain;
+  heavy.effects.gravity = Vec3(0, 0, -9.81);
+  EXPECT_TRUE(is_elastic(heavy));
+  BodyConfig rough = plain;
+  rough.friction = 0.1;
+  EXPECT_FALSE(is_elastic(rough));
+  EXPECT_FALSE(is_elastic(testing::pressed_body(ModelKind::kProjective, Element::kHex8Sri, 4)));
+  EXPECT_FALSE(is_elastic(testing::pressed_body(ModelKind::kTled, Element::kHex8Sri, 4)));
+}
+
 TEST(RigidContact, AFastToolDoesNotComeOutOnTheOtherSide) {
   const Vec3 deep(0.002, 0, 0.058);
   PressedByTools slow(Law::kNeoHookean, one(RigidShape::sphere(0.015)));
