@@ -20,7 +20,7 @@ constexpr double kDepthApart = 0.07;
 
 /// Solutions are better than the answers that are learned from them.
 constexpr double kSolvedTo = 1e-6;
-constexpr double kGoodEnough = 1e-4;
+constexpr double kSolvedWellEnough = 1e-4;
 constexpr int kMostIterations = 200;
 
 /// So much more than what was seen in the middle of cells and at their corners may an answer between be wrong.
@@ -73,7 +73,7 @@ class Presser {
   void take(const Patch& patch, double depth, SolvedPress& solved) {
     solved.reaction = model_.press(patch, Given::kDepth, depth);
     solved.energy = model_.forces().energy;
-    solved.good = solved.reaction.force > 0 && solved.reaction.error <= kGoodEnough * solved.reaction.force &&
+    solved.good = solved.reaction.force > 0 && solved.reaction.error <= kSolvedWellEnough * solved.reaction.force &&
                   solved.reaction.knows_glide && std::isfinite(solved.energy);
   }
 

@@ -7,8 +7,7 @@
 function(coupling_mutant name from to promise)
   set(original ${PROJECT_SOURCE_DIR}/core/teleoperation/coupling.cc)
   set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${original})
-  # An object of its own in the library, for the linker to leave out.
-  set_source_files_properties(${original} TARGET_DIRECTORY tendon_core PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
+  tendon_apart(tendon_core ${original})
   file(READ ${original} text)
   string(FIND "${text}" "${from}" at)
   if(at EQUAL -1)
