@@ -2,10 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Prints the sources that clang-tidy is to look at for a change.
 
-    tidied.py COMMANDS.json <changed-files
+    git diff --name-only HEAD~3 | deploy/tidied.py build/tidy/compile_commands.json
 
-Of the sources that COMMANDS.json compiles: those that changed, and for each header that changed its own source, or the nearest one
-that includes it. Not the tests: GoogleTest's macros cost a clang-tidy run more time than everything it could find.
+Of the sources that this file compiles: those that changed, and for each header that changed its own source, or the
+nearest one that includes it. Not the tests: GoogleTest's macros cost a clang-tidy run more time than everything that it
+could find.
 """
 import collections
 import json
@@ -17,6 +18,9 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent
 
 
 def main():
+    if sys.argv[1:] in (["--help"], ["-h"]):
+        print(__doc__)
+        return
     if len(sys.argv) != 2:
         sys.exit(__doc__)
     compiled = {entry["file"].removeprefix(f"{ROOT}/") for entry in json.loads(pathlib.Path(sys.argv[1]).read_text())}
