@@ -201,8 +201,8 @@ def run(name, *command, environment=None):
 
 
 def main():
-    if not (BUILD / "build.ninja").exists():
-        run("configure release", "cmake", "--preset", "release", "-DTENDON_TESTS=ON")
+    # Even where there is a build: that of deploy/demo has no tests.
+    run("configure release", "cmake", "--preset", "release", "-DTENDON_TESTS=ON")
     changed, since = changed_files(sys.argv[1] if len(sys.argv) > 1 else "")
     say(f"changed {since}: {len(changed)} {'file' if len(changed) == 1 else 'files'}")
     subprocess.run(["ninja", "-C", str(BUILD), "--quiet", "build.ninja"], stdout=subprocess.DEVNULL, check=True)
