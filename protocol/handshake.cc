@@ -141,13 +141,33 @@ std::size_t ClientHandshake::next_datagram(LocalTime now, std::span<std::byte, k
 
 // ---- Doorman ----
 
+namespace {
+
+Seed ephemerals_of(const Doorman::Config& config) {
+  const Bytes32 first = crypto::hmac_sha256(config.secret, {text("tendon-ephemerals")});
+  if (config.number == 0) return Seed(first);
+  return Seed(crypto::hmac_sha256(first, {little_endian(std::uint64_t{config.number})}));
+}
+
+}  // namespace
+
+Doorman::Stats& Doorman::Stats::operator+=(const Stats& more) noexcept {
+  retries += more.retries;
+  malformed += more.malformed;
+  plain += more.plain;
+  limited += more.limited;
+  unknown_key += more.unknown_key;
+  forged += more.forged;
+  return *this;
+}
+
 Doorman::Doorman(const Config& config)
     : version_min_(config.version_min),
       version_max_(config.version_max),
       suites_(config.suites),
       key_lifetime_(config.key_lifetime),
       cookie_secret_(crypto::hmac_sha256(config.secret, {text("tendon-cookies")})),
-      ephemerals_(Seed(crypto::hmac_sha256(config.secret, {text("tendon-ephemerals")}))),
+      ephemerals_(ephemerals_of(config)),
       limit_(first_of<16>(crypto::hmac_sha256(config.secret, {text("tendon-hello-limit")}))) {
   if (config.key_lifetime <= Duration::zero()) throw std::invalid_argument("doorman: key_lifetime must be positive");
   if (config.version_min < 1 || config.version_min > config.version_max) {

@@ -104,6 +104,9 @@ class Doorman {
     std::uint32_t version_max = kProtocolVersion;
     /// Longer than any client takes to return with its cookie; short enough that a stolen cookie is of little use.
     Duration key_lifetime = std::chrono::seconds(120);
+    /// Doormen of one server have one secret and different numbers: each takes the cookies of all, and no two draw the
+    /// same ephemeral keys.
+    std::uint32_t number = 0;
   };
   /// A Hello whose sender has proved to own its address and, in suite 1, its key.
   struct Guest {
@@ -130,6 +133,8 @@ class Doorman {
     std::uint64_t limited = 0;      ///< too many from one source
     std::uint64_t unknown_key = 0;  ///< no client has a key with that id
     std::uint64_t forged = 0;       ///< not sealed with the key that it names
+
+    Stats& operator+=(const Stats& more) noexcept;
   };
 
   /// Throws std::invalid_argument when `key_lifetime` is not positive, the version range is empty, two clients have one

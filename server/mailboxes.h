@@ -50,6 +50,13 @@ struct ArrivedPort {
   std::uint32_t peer = 0;  ///< the number of that end among all that the coupling has had
 };
 
+/// A Hello that the first network thread has received for a device of another one.
+struct HandedHello {
+  Address from{};
+  std::uint32_t size = 0;
+  std::array<std::byte, kMaxDatagram> bytes;
+};
+
 /// All that passes between the haptic thread of one device and the other threads of the server. There is nothing else
 /// they share, and no lock.
 ///

@@ -340,8 +340,7 @@ void set_falcon(std::vector<Scene>& scenes, const OptionalPath& firmware, bool a
 
 /// Of the one scene that dials.
 void dial_instead(std::vector<Scene>& scenes, const Address& server) {
-  const auto dials = [](const Scene& scene) { return scene.teleoperation && scene.teleoperation->dial; };
-  const auto found = std::find_if(scenes.begin(), scenes.end(), dials);
+  const auto found = std::ranges::find_if(scenes, &Scene::dials);
   if (found == scenes.end()) throw std::invalid_argument("--dial: expected a scene with [teleoperation] dial");
   found->teleoperation->dial = server;
 }

@@ -18,6 +18,7 @@ namespace {
 using enum DatagramSieve::Sender;
 
 constexpr std::size_t kMaxNotices = 64;
+constexpr std::size_t kMaxForeign = 64;
 /// Between two times that an observer is told of both ends of a coupling: people look at them.
 constexpr Duration kShowPortsEvery = std::chrono::milliseconds(20);
 
@@ -25,17 +26,20 @@ bool contains(const std::vector<std::string>& features, std::string_view feature
   return std::find(features.begin(), features.end(), feature) != features.end();
 }
 
-void add(NetworkLoop::Dropped& sum, const LinkStats& link) {
-  sum.duplicated += link.duplicated;
-  sum.malformed += link.malformed;
-  sum.forged += link.forged;
-  sum.old_key += link.old_key;
-  sum.invalid += link.invalid;
-  sum.stale += link.stale;
-  sum.forces.not_finite += link.refused_forces.not_finite;
-  sum.forces.out_of_bounds += link.refused_forces.out_of_bounds;
-  sum.forces.old_sequence += link.refused_forces.old_sequence;
+template <class Counts>
+void add_dropped(NetworkLoop::Dropped& sum, const Counts& more, const RefusedForces& forces) {
+  sum.duplicated += more.duplicated;
+  sum.malformed += more.malformed;
+  sum.forged += more.forged;
+  sum.old_key += more.old_key;
+  sum.invalid += more.invalid;
+  sum.stale += more.stale;
+  sum.forces.not_finite += forces.not_finite;
+  sum.forces.out_of_bounds += forces.out_of_bounds;
+  sum.forces.old_sequence += forces.old_sequence;
 }
+
+void add(NetworkLoop::Dropped& sum, const LinkStats& link) { add_dropped(sum, link, link.refused_forces); }
 
 /// As the present controller, or the last one.
 void remember(NetworkLoop::Stats& stats, const Guest& guest) {
@@ -46,24 +50,57 @@ void remember(NetworkLoop::Stats& stats, const Guest& guest) {
 
 }  // namespace
 
+NetworkLoop::Stats& NetworkLoop::Stats::operator+=(const Stats& more) {
+  welcomed += more.welcomed;
+  refused += more.refused;
+  timed_out += more.timed_out;
+  replaced += more.replaced;
+  roamed += more.roamed;
+  half_open_forgotten += more.half_open_forgotten;
+  malformed += more.malformed;
+  unknown_connection += more.unknown_connection;
+  hellos += more.hellos;
+  forces += more.forces;
+  denied += more.denied;
+  unanswerable += more.unanswerable;
+  late_ours += more.late_ours;
+  late_network += more.late_network;
+  late_engine += more.late_engine;
+  late_unknown += more.late_unknown;
+  foretold += more.foretold;
+  hopeless += more.hopeless;
+  add_dropped(dropped, more.dropped, more.dropped.forces);
+  channels.insert(channels.end(), more.channels.begin(), more.channels.end());
+  if (controller.datagrams_received == 0) {
+    controller = more.controller;
+    controller_clock = more.controller_clock;
+  }
+  return *this;
+}
+
 NetworkLoop::NetworkLoop(const Config& config, Link& link, const std::vector<Mailboxes*>& mail)
     : config_(config),
       link_(link),
       sieve_(config.recorded),
-      devices_(served_devices(config.devices, config.handles, mail)),
-      doorman_({.secret = config.secret, .keys = config.keys, .suites = config.suites}),
+      devices_(served_devices(config.devices, config.handles, mail, config.shard)),
+      first_device_(config.shard.first_device(config.devices.size())),
+      doorman_({.secret = config.secret, .keys = config.keys, .suites = config.suites, .number = config.shard.number}),
       admission_(
           {.keys = config.keys.size(), .needs_no_key = config.needs_no_key, .max_observers = config.max_observers}),
-      next_connection_id_(config.first_connection_id) {
+      next_connection_id_(config.first_connection_id / config.shard.of * config.shard.of + config.shard.number) {
   half_open_.reserve(config.max_half_open);
-  for (std::size_t i = 0; i < std::min(config.couplings.size(), devices_.size()); ++i) {
-    devices_[i].coupling = config.couplings[i];
-    if (config.couplings[i]) coupled_.push_back(static_cast<std::uint32_t>(i));
+  for (std::size_t i = 0; i < devices_.size(); ++i) {
+    ServedDevice& device = devices_[i];
+    states_.push_back({&device.mail->state});
+    const std::size_t place = first_device_ + i;
+    if (place < config.leaders.size()) device.leaders = config.leaders[place];
+    if (place < config.couplings.size()) device.coupling = config.couplings[place];
+    if (device.coupling) coupled_.push_back(static_cast<std::uint32_t>(i));
   }
-  for (Mailboxes* const each : mail) states_.push_back({&each->state});
-  for (std::size_t i = 0; i < std::min(config.leaders.size(), devices_.size()); ++i) {
-    devices_[i].leaders = config.leaders[i];
-  }
+  const auto is_others = [&](const Config::Dial& dial) {
+    return dial.device < first_device_ || dial.device >= first_device_ + devices_.size();
+  };
+  std::erase_if(config_.dials, is_others);
   config_.secret = {};  // the doorman has taken what it needs
 }
 
@@ -73,7 +110,8 @@ LocalTime NetworkLoop::turn(LocalTime now) {
       const auto out = [this](LocalTime at, const Address& to, std::span<const std::byte> datagram) {
         send(at, kGuest, to, datagram);
       };
-      dialled_.push_back({dial.device, std::make_unique<Peer>(dial.peer, out, now)});
+      dialled_.push_back(
+          {static_cast<std::uint32_t>(dial.device - first_device_), std::make_unique<Peer>(dial.peer, out, now)});
       dial.peer.seed = {};
     }
   }
@@ -160,8 +198,14 @@ void NetworkLoop::greet(LocalTime now, const Address& from, std::span<const std:
   const Doorman::Reply reply = doorman_.receive(now, from, datagram, answer);
   const DatagramSieve::Sender sender = reply.guest ? sender_of(*reply.guest, from) : kStranger;
   tap(now, DatagramRecord::Direction::kIn, sender, from, datagram, datagram.size());
-  if (reply.guest) return admit(now, from, *reply.guest);
+  if (reply.guest) return admit(now, from, *reply.guest, datagram);
   if (reply.size > 0) send(now, sender, from, std::span(answer).first(reply.size));
+}
+
+void NetworkLoop::receive_foreign(LocalTime now, const Address& from, std::span<const std::byte> hello) {
+  std::array<std::byte, kMaxDatagram> answer;
+  const Doorman::Reply reply = doorman_.receive(now, from, hello, answer);
+  if (reply.guest) admit(now, from, *reply.guest, hello);  // else its cookie is too old by now: it asks again
 }
 
 /// With keys configured, a guest without a key is a stranger, unless it needs none.
@@ -193,7 +237,14 @@ void NetworkLoop::refuse(LocalTime now, const Address& from, const Doorman::Gues
   send(now, sender_of(guest, from), from, std::span(answer).first(size));
 }
 
-void NetworkLoop::admit(LocalTime now, const Address& from, const Doorman::Guest& guest) {
+/// 0 means none, and is never one.
+std::uint32_t NetworkLoop::take_connection_id() {
+  if (next_connection_id_ == 0) next_connection_id_ = config_.shard.of;
+  return std::exchange(next_connection_id_, next_connection_id_ + config_.shard.of);
+}
+
+void NetworkLoop::admit(LocalTime now, const Address& from, const Doorman::Guest& guest,
+                        std::span<const std::byte> hello) {
   if (answer_again(now, from, guest)) return;
   if (guest.version == 0) return refuse(now, from, guest, {Code::kUnsupported, "no protocol version in common"});
   if (!guest.suite) {
@@ -201,17 +252,22 @@ void NetworkLoop::admit(LocalTime now, const Address& from, const Doorman::Guest
         now, from, guest,
         {Code::kUnsupported, "this server seals by " + names_of(config_.suites) + " only, and you do not offer it"});
   }
-  auto claimed = Admission::seats_of(guest.hello, devices_);
+  auto claimed = Admission::seats_of(guest.hello, config_.devices);
   if (auto* const cannot_be = std::get_if<Refusal>(&claimed)) return refuse(now, from, guest, std::move(*cannot_be));
   auto& seats = std::get<std::vector<Seat>>(claimed);
+  const std::uint32_t owner = config_.shard.owner_of(seats.front().device, config_.devices.size());
+  if (owner != config_.shard.number) {
+    if (foreign_.size() < kMaxForeign) foreign_.push_back({owner, from, {hello.begin(), hello.end()}});
+    return;
+  }
+  for (Seat& seat : seats) seat.device -= static_cast<std::uint32_t>(first_device_);
   if (auto refusal = admission_.reason_to_refuse(from, guest.key, seats, devices_, guests_)) {
     return refuse(now, from, guest, std::move(*refusal));
   }
 
   const Role role = guest.hello.role;
   Session::Config session;
-  session.connection_id = next_connection_id_++;
-  if (next_connection_id_ == 0) next_connection_id_ = 1;  // 0 means none
+  session.connection_id = take_connection_id();
   session.timeout = role == Role::kController ? config_.controller_timeout : config_.observer_timeout;
   session.rekey = config_.rekey;
   session.life = config_.session_life;
@@ -762,5 +818,7 @@ void NetworkLoop::notice(bool warning, std::string text, std::optional<SessionCh
 }
 
 std::vector<NetworkLoop::Notice> NetworkLoop::take_notices() { return std::exchange(notices_, {}); }
+
+std::vector<NetworkLoop::Foreign> NetworkLoop::take_foreign() { return std::exchange(foreign_, {}); }
 
 }  // namespace tendon

@@ -36,6 +36,10 @@ namespace tendon {
 /// second how the devices' loops and the engines do. Each turn drains the link, so that nothing new waits behind
 /// something old. Of forces the newest wins; every request is answered.
 ///
+/// Several loops may share the devices of a large server (Shard), each with a thread and a link of its own. They share
+/// nothing else. One of them gets a Hello; when it is for devices of another one, the owner of both carries it there
+/// (take_foreign, receive_foreign).
+///
 /// Without keys, guests speak in the clear, from this machine only. With keys all is sealed, by `suites`, except through
 /// a Unix socket, where the permission to write to its file is the key. A guest is half-open until its first authentic
 /// Data, and until then nothing changes for anybody else. Its address is the one its newest authentic datagram came
@@ -49,12 +53,13 @@ namespace tendon {
 class NetworkLoop {
  public:
   struct Config {
-    Bytes32 secret{};                          ///< of cookies and ephemeral keys; random at start
-    std::vector<ClientKey> keys{};             ///< who may come in; empty: anybody on this machine, in the clear
+    Bytes32 secret{};               ///< of cookies and ephemeral keys; random at start; of all shards the same
+    std::vector<ClientKey> keys{};  ///< who may come in; empty: anybody on this machine, in the clear
     Suites suites = suites_of_this_machine();  ///< by which the sessions of those may be sealed
     /// Whether the system has made sure who speaks from an address (UnixSocket::is_peer): a guest there needs no key.
     /// Null: none.
     bool (*needs_no_key)(const Address& from) noexcept = nullptr;
+    Shard shard{};                          ///< the lists of devices below are of all shards
     std::uint32_t first_connection_id = 1;  ///< random at start, so that a restarted server does not know old guests
     std::string server_name = "tendond";
     /// What guests are told of each device, by its place (kMostDevices at the most); number and `holder` do not count.
@@ -72,8 +77,8 @@ class NetworkLoop {
     std::vector<Dial> dials{};
     /// Clients that need not wait for the end of a lease: the names of their keys, without keys their own.
     std::vector<std::string> takeover{};
-    /// Each costs a state datagram of some 250 bytes per haptic step. Where there are several keys, one key has at most
-    /// half of these places, rounded up.
+    /// Each costs this loop's thread a state datagram of some 250 bytes per haptic step. Where there are several keys,
+    /// one key has at most half of these places, rounded up.
     std::size_t max_observers = 8;
     Duration controller_timeout = std::chrono::seconds(2);
     Duration observer_timeout = std::chrono::seconds(10);
@@ -135,6 +140,10 @@ class NetworkLoop {
     std::vector<Channel> channels;
     LinkStats controller;  ///< the link of the present controller, or of the last one
     std::optional<ClockOffsetEstimator::Estimate> controller_clock;  ///< … and its clock, by ours
+
+    /// Of several shards together: counts add up, channels stand one after the other, and the controller is the first
+    /// one's that has any.
+    Stats& operator+=(const Stats& more);
   };
 
   /// A guest has come or gone: the same for programs that follow sessions.
@@ -156,8 +165,15 @@ class NetworkLoop {
     std::optional<SessionChange> session{};
   };
 
-  /// One of `mail` for each device; datagrams are recorded in the first. They and `link` must outlive the loop. Throws
-  /// what served_devices() does.
+  /// A Hello for devices of another shard.
+  struct Foreign {
+    std::uint32_t shard = 0;  ///< its number
+    Address from{};
+    std::vector<std::byte> hello{};
+  };
+
+  /// One of `mail` for each device of all shards; datagrams are recorded in the first of its own. They and `link` must
+  /// outlive the loop. Throws what served_devices() does.
   NetworkLoop(const Config& config, Link& link, const std::vector<Mailboxes*>& mail);
   NetworkLoop(const NetworkLoop&) = delete;  // its leases look at its devices
   NetworkLoop& operator=(const NetworkLoop&) = delete;
@@ -168,6 +184,12 @@ class NetworkLoop {
   /// Says goodbye to every guest. The last thing the network thread does.
   void close(LocalTime now);
 
+  /// The Hellos of others' guests since the last call; at most 64 are kept. A client repeats one that got lost.
+  std::vector<Foreign> take_foreign();
+
+  /// Takes a Hello that another shard has found to be for this one. That one has recorded it.
+  void receive_foreign(LocalTime now, const Address& from, std::span<const std::byte> hello);
+
   Stats stats() const;
 
   /// What happened since the last call, for the log; at most 64 are kept.
@@ -177,7 +199,8 @@ class NetworkLoop {
   bool drain(LocalTime& now);  ///< `now` grows with each datagram taken
   void receive(LocalTime now, const Address& from, std::span<const std::byte> datagram);
   void greet(LocalTime now, const Address& from, std::span<const std::byte> datagram);
-  void admit(LocalTime now, const Address& from, const Doorman::Guest& guest);
+  void admit(LocalTime now, const Address& from, const Doorman::Guest& guest, std::span<const std::byte> hello);
+  std::uint32_t take_connection_id();
   bool answer_again(LocalTime now, const Address& from, const Doorman::Guest& guest);
   void refuse(LocalTime now, const Address& from, const Doorman::Guest& guest, Refusal refusal);
   void open(LocalTime now, Guest guest);
@@ -226,7 +249,8 @@ class NetworkLoop {
   Config config_;
   Link& link_;
   DatagramSieve sieve_;
-  std::vector<ServedDevice> devices_;
+  std::vector<ServedDevice> devices_;   ///< of this shard
+  std::size_t first_device_;            ///< the place of the first of them among those of all shards; in here it is 0
   std::vector<NewestState> states_;     ///< by place, as the devices
   std::vector<std::uint32_t> coupled_;  ///< places of the devices that may be coupled
   Doorman doorman_;
@@ -242,6 +266,7 @@ class NetworkLoop {
 
   Stats stats_;
   std::vector<Notice> notices_;
+  std::vector<Foreign> foreign_;
 };
 
 }  // namespace tendon

@@ -189,6 +189,19 @@ const std::vector<Scene>& checked(const std::vector<Scene>& scenes) {
   return scenes;
 }
 
+/// So many devices keep a network thread at work for a third of the time or more (tests/tools/bench).
+constexpr std::size_t kDevicesOfANetworkThread = 128;
+
+/// How many share the devices: a power of two.
+std::uint32_t network_threads_for(const std::vector<Scene>& scenes) {
+  const Scene::Network& network = scenes.front().network;
+  if (network.threads) return *network.threads;
+  if (!needs_one_network_thread(scenes).empty()) return 1;
+  const auto processors = static_cast<std::size_t>(processors_allowed());
+  return static_cast<std::uint32_t>(std::bit_floor(
+      std::clamp<std::size_t>(scenes.size() / kDevicesOfANetworkThread, 1, std::max<std::size_t>(processors, 1))));
+}
+
 Mailboxes::Capacities for_device(Mailboxes::Capacities capacities, const DeviceInfo& device) {
   capacities.flight_handles = !device.position_only();
   return capacities;
@@ -223,6 +236,7 @@ Server::DeviceRuntime::DeviceRuntime(const Scene& the_scene, const Mailboxes::Ca
 }
 
 Server::DeviceRuntimes Server::runtimes_of(const std::vector<Scene>& scenes, Guardian* guardian) {
+  Shard shard{.of = network_threads_for(scenes)};
   DeviceRuntimes devices;
   for (Scene scene : scenes) {
     // Above the epoch of every run before, as long as the time of day does not go back (Purse).
@@ -233,7 +247,8 @@ Server::DeviceRuntimes Server::runtimes_of(const std::vector<Scene>& scenes, Gua
     scene.loop.record = scenes.front().recording.has_value();
     Mailboxes::Capacities capacities = scene.loop.record ? Mailboxes::Capacities::recorded(scenes.size())
                                                          : Mailboxes::Capacities::unrecorded(scene.loop.period);
-    if (!devices.empty()) capacities.datagrams = 1;  // all go to the first
+    shard.number = shard.owner_of(devices.size(), scenes.size());
+    if (devices.size() != shard.first_device(scenes.size())) capacities.datagrams = 1;  // all go to its first
     // A power of two.
     const std::size_t couplings = std::max<std::size_t>(scene.loop.control.leaders.size(), 1);
     capacities.ports = scene.teleoperation ? std::bit_ceil(couplings) * capacities.ports : 1;
@@ -246,7 +261,9 @@ std::string Server::HapticThread::name() const {
   return "haptic-" + std::to_string(devices.front()->scene.loop.device);
 }
 
-std::vector<Server::HapticThread> Server::haptic_threads_of(const DeviceRuntimes& devices) {
+std::vector<Server::HapticThread> Server::haptic_threads_of(const DeviceRuntimes& devices,
+                                                            const NetworkThreads& networks) {
+  const Shard shard{.of = static_cast<std::uint32_t>(networks.size())};
   std::vector<HapticThread> threads;
   for (const auto& runtime : devices) {
     const Scene& scene = runtime->scene;
@@ -258,14 +275,45 @@ std::vector<Server::HapticThread> Server::haptic_threads_of(const DeviceRuntimes
     auto place = std::ranges::find_if(threads, has_room);
     if (place == threads.end()) place = threads.emplace(threads.end());
     place->devices.push_back(runtime.get());
+    Doorbell* const bell = &networks[shard.owner_of(scene.loop.device, devices.size())]->bell;
+    if (place->stepped.empty() || place->stepped.back() != bell) place->stepped.push_back(bell);
   }
   return threads;
 }
 
-std::vector<Mailboxes*> Server::mail_of(const DeviceRuntimes& devices) {
+Server::NetworkThread::NetworkThread(const NetworkLoop::Config& config, bool never_sleeps,
+                                     std::unique_ptr<UdpLink> its_link, const std::vector<Mailboxes*>& mail)
+    : first_device(config.shard.first_device(mail.size())),
+      recorded(*mail[first_device]),
+      busy(never_sleeps),
+      link(std::move(its_link)),
+      loop(config, never_sleeps ? static_cast<Link&>(busy_link) : *link, mail) {}
+
+std::string Server::name_of(const NetworkThread& network) const {
+  return networks_.size() == 1 ? "network" : "network-" + std::to_string(network.first_device);
+}
+
+Server::NetworkThreads Server::network_threads_of(const std::vector<Scene>& scenes, const DeviceRuntimes& devices) {
+  const Scene::Network& network = scenes.front().network;
+  const Reach reach = network.keys ? Reach::kAnywhere : Reach::kThisMachine;
+  const std::uint32_t count = network_threads_for(scenes);
+  std::vector<std::unique_ptr<UdpLink>> links;
+  if (count == 1) {
+    links.push_back(std::make_unique<UdpLink>(network.listen, reach, network.unix_path));
+  } else {
+    links = UdpLink::several(network.listen, reach, count);
+  }
+  NetworkLoop::Config config = network_config(devices);
+  config.recorded.bytes_per_s /= count;
+  config.shard.of = count;
   std::vector<Mailboxes*> mail;
   for (const auto& runtime : devices) mail.push_back(&runtime->mail);
-  return mail;
+  NetworkThreads threads;
+  for (auto& link : links) {
+    config.shard.number = static_cast<std::uint32_t>(threads.size());
+    threads.push_back(std::make_unique<NetworkThread>(config, network.busy, std::move(link), mail));
+  }
+  return threads;
 }
 
 NetworkLoop::Config Server::network_config(const DeviceRuntimes& devices) {
@@ -319,13 +367,10 @@ Server::Server(const std::vector<Scene>& scenes)
     : started_(clock::now()),
       guardian_(make_guardian(checked(scenes))),
       devices_(runtimes_of(scenes, guardian_.get())),
-      link_(scenes.front().network.listen, scenes.front().network.keys ? Reach::kAnywhere : Reach::kThisMachine,
-            scenes.front().network.unix_path),
-      network_(network_config(devices_), scenes.front().network.busy ? static_cast<Link&>(busy_link_) : link_,
-               mail_of(devices_)),
+      networks_(network_threads_of(scenes, devices_)),
       tell_next_(started_ + kTellPeriod),
-      haptic_threads_(haptic_threads_of(devices_)) {
-  announcer_ = announcer_of(scenes, link_.local_address());
+      haptic_threads_(haptic_threads_of(devices_, networks_)) {
+  announcer_ = announcer_of(scenes, address());
   recorder_ = recorder_of(scenes, started_);  // last, so that a refusal before it leaves no file behind
 }
 
@@ -350,11 +395,13 @@ void Server::start(std::optional<Duration> run_for) {
         announcer_->run();
       });
     }
-    network_thread_ = thread_of("network", [this] { run_network(); });
+    for (const auto& network : networks_) {
+      network->thread = thread_of(name_of(*network), [this, &network] { run_network(*network); });
+    }
     for (HapticThread& haptic : haptic_threads_) {
       haptic.thread = thread_of(haptic.name(), [this, &haptic] {
         name_thread(haptic.name());
-        run_haptic(haptic.devices);
+        run_haptic(haptic);
       });
     }
   } catch (...) {
@@ -371,8 +418,10 @@ void Server::end_threads() {
   stop_haptic_.store(true, std::memory_order_release);
   for (HapticThread& haptic : haptic_threads_) join(haptic.thread);
   stop_network_.store(true, std::memory_order_release);
-  stepped_.ring();
-  join(network_thread_);
+  for (const auto& network : networks_) {
+    network->bell.ring();
+    join(network->thread);
+  }
   join(announce_thread_);
   stop_log_.store(true, std::memory_order_release);
   join(log_thread_);
@@ -391,7 +440,7 @@ Server::Summary Server::stop() {
     if (runtime->safe) device.safety = runtime->safe->status();
     if (!runtime->scene.driver().ids.empty()) device.counts = runtime->device->counts();
   }
-  summary.network = network_.stats();
+  for (const auto& network : networks_) summary.network += network->loop.stats();
   if (recorder_) summary.recording = recorder_->status();
   summary.uptime = clock::now() - started_;
   return summary;
@@ -406,7 +455,8 @@ bool Server::turning() {
   return all;
 }
 
-void Server::run_haptic(const std::vector<DeviceRuntime*>& devices) {
+void Server::run_haptic(const HapticThread& thread) {
+  const std::vector<DeviceRuntime*>& devices = thread.devices;
   DeviceRuntime& first = *devices.front();
   for (const std::string& refused : enter_realtime(kHapticPriority)) {
     if (&first == devices_.front().get()) log::warn(refused);  // to all of them alike
@@ -421,47 +471,72 @@ void Server::run_haptic(const std::vector<DeviceRuntime*>& devices) {
     // With one instant for all, and one period, all are due together again: one wake-up, however late.
     const LocalTime now = clock::now();
     for (DeviceRuntime* runtime : devices) due = runtime->haptic.step(now);
-    stepped_.ring();
+    for (Doorbell* const stepped : thread.stepped) stepped->ring();
     clock::sleep_until(due);
   }
   for (DeviceRuntime* runtime : devices) runtime->haptic.stop();
 }
 
-void Server::run_network() {
-  name_thread("network");
+void Server::run_network(NetworkThread& network) {
+  name_thread(name_of(network));
   enter_punctual();
-  const bool busy = devices_.front()->scene.network.busy;
   LocalTime now = clock::now();
   LocalTime due = now;
   while (!stop_network_.load(std::memory_order_acquire)) {
-    if (busy) {
-      now = watch_until(due);
+    if (network.busy) {
+      now = watch_until(network, due);
     } else {
-      if (due > now) link_.wait(std::min<Duration>(due - now, std::chrono::seconds(1)), &stepped_);
+      if (due > now) network.link->wait(std::min<Duration>(due - now, std::chrono::seconds(1)), &network.bell);
       now = clock::now();
     }
-    due = network_.turn(now);
-    tell_notices();
-    if (!busy) now = clock::now();  // the turn has taken its time
+    take_hellos(now, network);
+    due = network.loop.turn(now);
+    hand_on_hellos(network);
+    tell_notices(network);
+    if (!network.busy) now = clock::now();  // the turn has taken its time
   }
-  network_.close(clock::now());
-  tell_notices();
+  network.loop.close(clock::now());
+  tell_notices(network);
+}
+
+/// Those that another network thread has received for this one.
+void Server::take_hellos(LocalTime now, NetworkThread& network) {
+  while (const HandedHello* const hello = network.hellos.front()) {
+    network.loop.receive_foreign(now, hello->from, std::span(hello->bytes).first(hello->size));
+    network.hellos.pop();
+  }
+}
+
+/// Only the first network thread receives Hellos (UdpLink::several). The owner takes one in its next turn, which a
+/// haptic step begins. One that finds no room is lost: its client says it again.
+void Server::hand_on_hellos(NetworkThread& network) {
+  for (const NetworkLoop::Foreign& foreign : network.loop.take_foreign()) {
+    NetworkThread& owner = *networks_[foreign.shard];
+    HandedHello* const hello = owner.hellos.back();
+    if (hello == nullptr) continue;
+    hello->from = foreign.from;
+    hello->size = static_cast<std::uint32_t>(foreign.hello.size());
+    std::copy(foreign.hello.begin(), foreign.hello.end(), hello->bytes.begin());
+    owner.hellos.push();
+  }
 }
 
 /// Until a datagram can be received, the doorbell rings, or it is `due`; without a sleep. The present time.
-LocalTime Server::watch_until(LocalTime due) {
+LocalTime Server::watch_until(NetworkThread& network, LocalTime due) {
   LocalTime now = clock::now();
-  while (now < due && !stepped_.rung() && !busy_link_.look(now)) {
+  while (now < due && !network.bell.rung() && !network.busy_link.look(now)) {
   }
-  if (!stepped_.rung()) return now;
-  stepped_.answer();
+  if (!network.bell.rung()) return now;
+  network.bell.answer();
   return clock::now();  // not before the step that has rung
 }
 
-void Server::tell_notices() {
-  for (const auto& [warning, text, session] : network_.take_notices()) {
+void Server::tell_notices(NetworkThread& network) {
+  for (const auto& [warning, text, session] : network.loop.take_notices()) {
     warning ? log::warn(text) : log::info(text);
-    if (session && tell_session_) tell_session_(*session);
+    if (!session || !tell_session_) continue;
+    const std::lock_guard lock(telling_);
+    tell_session_(*session);
   }
 }
 
@@ -509,12 +584,15 @@ void Server::drain_to_recorder(LocalTime now) {
     steps_lost += news(runtime.mail.steps_lost, runtime.told_steps_lost);
     steps_lost += news(runtime.mail.ports_lost, runtime.told_ports_lost);  // such a step cannot be replayed
   }
-  Mailboxes& first = devices_.front()->mail;
-  while (const DatagramRecord* datagram = first.datagrams.front()) {
-    if (recorder_) recorder_->record(*datagram);
-    first.datagrams.pop();
+  std::uint64_t datagrams_lost = 0;
+  for (const auto& network : networks_) {
+    Mailboxes& mail = network->recorded;
+    while (const DatagramRecord* datagram = mail.datagrams.front()) {
+      if (recorder_) recorder_->record(*datagram);
+      mail.datagrams.pop();
+    }
+    datagrams_lost += news(mail.datagrams_lost, network->told_datagrams_lost);
   }
-  const std::uint64_t datagrams_lost = news(first.datagrams_lost, told_datagrams_lost_);
   if (steps_lost > 0 || datagrams_lost > 0) {
     log::warn("the log thread could not follow: " + std::to_string(steps_lost) + " steps and " +
               std::to_string(datagrams_lost) + " datagrams are missing");
@@ -525,14 +603,17 @@ void Server::drain_to_recorder(LocalTime now) {
   tell_of_recording();
 }
 
-/// Records how much the network thread has left out of the recording since the last call.
+/// Records how much the network threads have left out of the recording since the last call.
 void Server::record_left_out(LocalTime now) {
   if (!recorder_) return;
-  Mailboxes& mail = devices_.front()->mail;
-  if (const std::uint64_t strangers = news(mail.strangers_left_out, told_strangers_); strangers > 0) {
-    recorder_->lost({.at = now, .cause = LossRecord::Cause::kSample, .strangers = strangers});
+  std::uint64_t strangers = 0;
+  std::uint64_t datagrams = 0;
+  for (const auto& network : networks_) {
+    strangers += news(network->recorded.strangers_left_out, network->told_strangers);
+    datagrams += news(network->recorded.datagrams_over_budget, network->told_over_budget);
   }
-  if (const std::uint64_t datagrams = news(mail.datagrams_over_budget, told_over_budget_); datagrams > 0) {
+  if (strangers > 0) recorder_->lost({.at = now, .cause = LossRecord::Cause::kSample, .strangers = strangers});
+  if (datagrams > 0) {
     log::warn(std::to_string(datagrams) + " datagrams are not recorded: more bytes came in a second than [recording] " +
               "datagrams_kb_per_s");
     recorder_->lost({.at = now, .datagrams = datagrams, .cause = LossRecord::Cause::kByteBudget});
@@ -562,7 +643,8 @@ void Server::report_health(LocalTime now, DeviceRuntime& runtime) {
   health.device = runtime.device->counts();
   health.not_realtime = runtime.not_realtime.load(std::memory_order_relaxed);
   health.recording_ended = recording_stopped_;
-  health.unsent = link_.send_failures();
+  health.unsent = 0;
+  for (const auto& network : networks_) health.unsent += network->link->send_failures();
   runtime.mail.health.put(health);
 }
 

@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <functional>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <string>
 #include <thread>
@@ -38,11 +39,12 @@ namespace tendon {
 /// | thread  | owns                         | waits for                               | may                     |
 /// |---------|------------------------------|-----------------------------------------|-------------------------|
 /// | haptic… | HapticLoops, Devices         | the absolute time of their next step    | nothing but compute     |
-/// | network | NetworkLoop, UdpLink         | a datagram, a haptic step, a timer      | allocate, log rarely    |
+/// | network… | NetworkLoop, UdpLink        | a datagram, a haptic step, a timer      | allocate, log rarely    |
 /// | log     | PartRecorder                  | 20 ms                                   | allocate, write, log    |
 /// | announce| Announcer, if a scene has one | D-Bus                                   | allocate, log           |
 ///
-/// They share the Mailboxes of each device, and nothing else.
+/// They share the Mailboxes of each device, and nothing else. A large server has several network threads, which share
+/// its devices by whole banks (Shard).
 class Server {
  public:
   struct DeviceSummary {
@@ -70,8 +72,8 @@ class Server {
   /// its first step: it takes run_for / period steps, or fewer when some came too late.
   void start(std::optional<Duration> run_for = std::nullopt);
 
-  /// Called by the network thread for each guest that comes or goes, those that the end of the server sends away too.
-  /// Before `start` only. It may block no longer than a line of the log does.
+  /// Called by a network thread for each guest that comes or goes, those that the end of the server sends away too; by
+  /// one at a time. Before `start` only. It may block no longer than a line of the log does.
   void tell_sessions(std::function<void(const NetworkLoop::SessionChange&)> tell) { tell_session_ = std::move(tell); }
 
   /// Zero force first; then goodbye to the guests; then the end of the recording.
@@ -80,7 +82,7 @@ class Server {
   /// Whether every haptic loop has taken a step since the last call.
   bool turning();
 
-  Address address() const { return link_.local_address(); }
+  Address address() const { return networks_.front()->link->local_address(); }
 
   /// The file that it records to, which is not the scene's when that exists. Empty when it records nothing. Before
   /// `start` only.
@@ -108,24 +110,49 @@ class Server {
   };
   using DeviceRuntimes = std::vector<std::unique_ptr<DeviceRuntime>>;
 
+  /// Serves the guests of some banks.
+  struct NetworkThread {
+    NetworkThread(const NetworkLoop::Config& config, bool never_sleeps, std::unique_ptr<UdpLink> its_link,
+                  const std::vector<Mailboxes*>& mail);
+    std::size_t first_device;
+    Mailboxes& recorded;  ///< that of its first device, for the datagrams that are recorded
+    bool busy;            ///< it never sleeps
+    std::unique_ptr<UdpLink> link;
+    BusyLink busy_link{*link};         ///< used where it is busy
+    Doorbell bell;                     ///< a device of it has made a step
+    SpscRing<HandedHello> hellos{16};  ///< from the first network thread
+    NetworkLoop loop;
+    std::thread thread{};
+
+    // What run_log has told the operator already.
+    std::uint64_t told_datagrams_lost = 0;
+    std::uint64_t told_strangers = 0;
+    std::uint64_t told_over_budget = 0;
+  };
+  using NetworkThreads = std::vector<std::unique_ptr<NetworkThread>>;
+
   /// Steps devices of one period, on one processor.
   struct HapticThread {
     std::vector<DeviceRuntime*> devices;
-    std::string name() const;  ///< of its first device
+    std::vector<Doorbell*> stepped{};  ///< of the network threads of its devices
+    std::string name() const;          ///< of its first device
     std::thread thread{};
   };
 
   static DeviceRuntimes runtimes_of(const std::vector<Scene>& scenes, Guardian* guardian);
-  static std::vector<HapticThread> haptic_threads_of(const DeviceRuntimes& devices);
+  static NetworkThreads network_threads_of(const std::vector<Scene>& scenes, const DeviceRuntimes& devices);
+  static std::vector<HapticThread> haptic_threads_of(const DeviceRuntimes& devices, const NetworkThreads& networks);
   static NetworkLoop::Config network_config(const DeviceRuntimes& devices);
-  static std::vector<Mailboxes*> mail_of(const DeviceRuntimes& devices);
   /// "left: ", where there is more than one.
   std::string prefix(const DeviceRuntime& runtime) const;
   void end_threads();  ///< those that run: the haptic ones first, with zero force
-  void run_haptic(const std::vector<DeviceRuntime*>& devices);
-  void run_network();
-  LocalTime watch_until(LocalTime due);
-  void tell_notices();
+  std::string name_of(const NetworkThread& network) const;
+  void run_haptic(const HapticThread& thread);
+  void run_network(NetworkThread& network);
+  static LocalTime watch_until(NetworkThread& network, LocalTime due);
+  static void take_hellos(LocalTime now, NetworkThread& network);
+  void hand_on_hellos(NetworkThread& network);
+  void tell_notices(NetworkThread& network);
   void run_log();
   void drain_to_recorder(LocalTime now);
   void record_left_out(LocalTime now);
@@ -141,28 +168,21 @@ class Server {
   LocalTime started_;
   std::unique_ptr<Guardian> guardian_;  ///< of real devices; null when there are none
   DeviceRuntimes devices_;
-  UdpLink link_;
-  BusyLink busy_link_{link_};  ///< used where the scene says `busy`
-  Doorbell stepped_;
-  NetworkLoop network_;
+  NetworkThreads networks_;                 ///< in the order of their devices
   std::unique_ptr<Announcer> announcer_;    ///< null when no scene is announced
   std::unique_ptr<PartRecorder> recorder_;  ///< null when the scene records nothing
 
-  // What run_log has told the operator already.
-  std::uint64_t told_datagrams_lost_ = 0;
-  std::uint64_t told_strangers_ = 0;
-  std::uint64_t told_over_budget_ = 0;
   bool recording_stopped_ = false;
   LocalTime tell_next_{};
 
   std::optional<Duration> run_for_;  ///< set before the threads start, as the next is
+  std::mutex telling_;               ///< of network threads that have something for tell_session_
   std::function<void(const NetworkLoop::SessionChange&)> tell_session_;
   std::atomic<bool> stop_haptic_{false};
   std::atomic<bool> stop_network_{false};
   std::atomic<bool> stop_log_{false};
   std::optional<WakefulProcessors> wakeful_;  ///< while the threads run
   std::vector<HapticThread> haptic_threads_;
-  std::thread network_thread_;
   std::thread log_thread_;
   std::thread announce_thread_;  ///< where there is an announcer
 };

@@ -15,18 +15,18 @@ constexpr std::byte kMagic{0x54};  // 'T'
 std::array<std::byte, kHeaderSize> encode_header(const Header& header) noexcept {
   std::array<std::byte, kHeaderSize> bytes;
   bytes[0] = kMagic;
-  bytes[1] = static_cast<std::byte>(kProtocolVersion << 4 | static_cast<std::uint32_t>(header.type));
+  bytes[kTypeByte] = static_cast<std::byte>(kProtocolVersion << 4 | static_cast<std::uint32_t>(header.type));
   bytes[2] = static_cast<std::byte>(header.epoch);
   bytes[3] = static_cast<std::byte>(header.suite);
-  put_little_endian(header.connection_id, bytes.data() + 4);
+  put_little_endian(header.connection_id, bytes.data() + kConnectionIdByte);
   put_little_endian(header.packet_number, bytes.data() + 8);
   return bytes;
 }
 
 std::optional<Header> decode_header(std::span<const std::byte> datagram) noexcept {
   if (datagram.size() < kHeaderSize || datagram.size() > kMaxDatagram) return {};
-  const auto version = std::to_integer<std::uint32_t>(datagram[1] >> 4);
-  const auto type = std::to_integer<std::uint8_t>(datagram[1] & std::byte{0x0F});
+  const auto version = std::to_integer<std::uint32_t>(datagram[kTypeByte] >> 4);
+  const auto type = std::to_integer<std::uint8_t>(datagram[kTypeByte] & std::byte{0x0F});
   if (datagram[0] != kMagic || version != kProtocolVersion) return {};
   if (type < 1 || type > static_cast<std::uint8_t>(DatagramType::kAnswer)) return {};
   const auto epoch = std::to_integer<std::uint8_t>(datagram[2]);

@@ -40,6 +40,10 @@ struct Header {
 };
 inline constexpr std::size_t kHeaderSize = 16;
 
+// For a filter in the kernel, which reads single bytes:
+inline constexpr std::uint32_t kTypeByte = 1;          ///< its lower four bits: the type
+inline constexpr std::uint32_t kConnectionIdByte = 4;  ///< the lowest eight bits of the connection id
+
 std::array<std::byte, kHeaderSize> encode_header(const Header& header) noexcept;
 
 /// Empty when the datagram is too short, too long, of another protocol or version, of an unknown type or

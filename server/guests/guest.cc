@@ -2,7 +2,9 @@
 #include "server/guests/guest.h"
 
 #include <algorithm>
+#include <bit>
 #include <stdexcept>
+#include <string>
 #include <string_view>
 #include <unordered_set>
 #include <utility>
@@ -70,14 +72,19 @@ std::optional<std::uint32_t> coupling_by(const ServedDevice& device, std::uint32
 
 std::vector<ServedDevice> served_devices(const std::vector<DeviceDescription>& about,
                                          const std::vector<HandleDescription>& handles,
-                                         const std::vector<Mailboxes*>& mail) {
+                                         const std::vector<Mailboxes*>& mail, const Shard& shard) {
   check_names(about, kMostDevices, "device");
   if (mail.size() != about.size()) throw std::invalid_argument("expected mailboxes for each device");
+  for (const DeviceDescription& device : about) check_names(device.channels, limits::kMaxChannels, "channel");
+  const std::size_t banks = (about.size() + limits::kMaxDevices - 1) / limits::kMaxDevices;
+  if (!std::has_single_bit(shard.of) || shard.of > banks || shard.number >= shard.of) {
+    throw std::invalid_argument("there is no shard " + std::to_string(shard.number) + " of " +
+                                std::to_string(shard.of) + " for " + std::to_string(about.size()) + " devices");
+  }
   std::vector<ServedDevice> devices;
-  for (std::size_t i = 0; i < mail.size(); ++i) {
+  for (std::size_t i = shard.first_device(about.size()); i < shard.end_device(about.size()); ++i) {
     ServedDevice& device = devices.emplace_back(ServedDevice{
         .about = about[i], .handle = i < handles.size() ? handles[i] : HandleDescription{}, .mail = mail[i]});
-    check_names(device.about.channels, limits::kMaxChannels, "channel");
     device.about.device = device.handle.device = number_of(static_cast<std::uint32_t>(i));
     device.channels.resize(device.about.channels.size());
   }

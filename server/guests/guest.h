@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -28,6 +30,32 @@ namespace tendon {
 inline constexpr std::size_t kMostDevices = 1024;
 constexpr std::uint32_t bank_of(std::uint32_t device) { return device / limits::kMaxDevices; }
 constexpr std::uint32_t number_of(std::uint32_t device) { return device % limits::kMaxDevices; }
+
+/// One of the network loops that share the devices of a server, each with its own thread, socket and sessions.
+///
+/// Its devices are whole banks, one after the other: of B banks those from ⌊B · number / of⌋ up to, and not with,
+/// ⌊B · (number + 1) / of⌋. The connection ids of its sessions are `number` modulo `of`.
+struct Shard {
+  std::uint32_t number = 0;
+  std::uint32_t of = 1;  ///< a power of two, no more than banks
+
+  /// The place of its first device among all of so many; that of the next shard's first one is where it ends.
+  std::size_t first_device(std::size_t devices) const noexcept { return start_of(number, devices); }
+  std::size_t end_device(std::size_t devices) const noexcept { return start_of(number + 1, devices); }
+
+  /// The number of the shard that has this one of so many devices.
+  std::uint32_t owner_of(std::size_t device, std::size_t devices) const noexcept {
+    std::uint32_t owner = 0;
+    while (device >= start_of(owner + 1, devices)) ++owner;
+    return owner;
+  }
+
+ private:
+  std::size_t start_of(std::uint32_t shard, std::size_t devices) const noexcept {
+    const std::size_t banks = (devices + limits::kMaxDevices - 1) / limits::kMaxDevices;
+    return std::min(banks * shard / of * limits::kMaxDevices, devices);
+  }
+};
 
 /// A place that a guest has claimed.
 struct Seat {
@@ -143,11 +171,12 @@ std::optional<std::uint32_t> coupling_by(const ServedDevice& device, std::uint32
 /// order.
 bool renew_peer(ServedDevice& device, std::uint32_t coupling);
 
-/// The devices, one for each of `mail`. Throws std::invalid_argument when the number of devices or channels is out of
-/// range, two of them share a name, or there are not as many mailboxes as devices.
+/// The devices of the shard; `about` and `mail` are of all devices of the server. Throws std::invalid_argument when the
+/// number of devices or channels is out of range, two of them share a name, there are not as many mailboxes as devices,
+/// or the shard is none.
 /// `handles` may be fewer: nothing is known of the handles of the others.
 std::vector<ServedDevice> served_devices(const std::vector<DeviceDescription>& about,
                                          const std::vector<HandleDescription>& handles,
-                                         const std::vector<Mailboxes*>& mail);
+                                         const std::vector<Mailboxes*>& mail, const Shard& shard = {});
 
 }  // namespace tendon

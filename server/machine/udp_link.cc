@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "server/machine/udp_link.h"
 
+#include <linux/filter.h>
 #include <poll.h>
 #include <sys/socket.h>
 #include <unistd.h>
@@ -15,6 +16,7 @@
 #include <stdexcept>
 #include <system_error>
 
+#include "protocol/wire/header.h"
 #include "server/machine/clock.h"
 
 namespace tendon {
@@ -43,6 +45,49 @@ Address to_address(const udp::endpoint& endpoint) {
   return {v6.to_bytes(), endpoint.port()};
 }
 
+template <class Value>
+void set(int fd, int option, const Value& value) {
+  if (::setsockopt(fd, SOL_SOCKET, option, &value, sizeof value) != 0) {
+    throw std::system_error(errno, std::generic_category());
+  }
+}
+
+/// From now on further sockets of this user may have the same address.
+void share_address(int fd) { set(fd, SO_REUSEPORT, int{1}); }
+
+/// For all sockets that share the address; as UdpLink::several says. A datagram that is too short to be read goes to the
+/// first one, as the kernel ends the filter with 0.
+void steer_by_connection(int fd, std::uint32_t count) {
+  constexpr auto kTypeBits = 0x0FU;
+  std::array<sock_filter, 7> program = {{
+      BPF_STMT(BPF_LD | BPF_B | BPF_ABS, kTypeByte),
+      BPF_STMT(BPF_ALU | BPF_AND | BPF_K, kTypeBits),
+      BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, static_cast<std::uint32_t>(DatagramType::kData), 0, 3),
+      BPF_STMT(BPF_LD | BPF_B | BPF_ABS, kConnectionIdByte),
+      BPF_STMT(BPF_ALU | BPF_AND | BPF_K, count - 1),
+      BPF_STMT(BPF_RET | BPF_A, 0),
+      BPF_STMT(BPF_RET | BPF_K, 0),
+  }};
+  set(fd, SO_ATTACH_REUSEPORT_CBPF, sock_fprog{static_cast<unsigned short>(program.size()), program.data()});
+}
+
+/// Asio watches its sockets with an epoll, which each datagram would wake, and nobody waits for: the descriptor is let
+/// go. Throws std::system_error.
+int socket_on(const udp::endpoint& endpoint, bool shares_address) {
+  asio::io_context context;
+  udp::socket socket(context, endpoint.protocol());
+  if (endpoint.protocol() == udp::v6()) socket.set_option(asio::ip::v6_only(true));
+  socket.set_option(asio::socket_base::receive_buffer_size(kReceiveBufferBytes));
+  socket.non_blocking(true);
+  if (shares_address) share_address(socket.native_handle());
+  socket.bind(endpoint);
+  return socket.release();
+}
+
+std::runtime_error cannot_listen(const Address& listen, const std::system_error& error) {
+  return std::runtime_error("cannot listen on " + to_string(listen) + ": " + error.code().message());
+}
+
 }  // namespace
 
 UdpLink::UdpLink(const Address& listen, Reach reach, const std::optional<std::filesystem::path>& file) {
@@ -53,19 +98,27 @@ UdpLink::UdpLink(const Address& listen, Reach reach, const std::optional<std::fi
                                 "`keys` in the scene's [network])");
   }
   if (file) unix_.emplace(*file);
-  const udp::endpoint endpoint = to_endpoint(listen);
   try {
-    asio::io_context context;
-    udp::socket socket(context, endpoint.protocol());
-    if (endpoint.protocol() == udp::v6()) socket.set_option(asio::ip::v6_only(true));
-    socket.set_option(asio::socket_base::receive_buffer_size(kReceiveBufferBytes));
-    socket.non_blocking(true);
-    socket.bind(endpoint);
-    // Asio watches its sockets with an epoll, which each datagram would wake, and nobody waits for.
-    fd_ = socket.release();
+    fd_ = socket_on(to_endpoint(listen), false);
   } catch (const std::system_error& error) {
-    throw std::runtime_error("cannot listen on " + to_string(listen) + ": " + error.code().message());
+    throw cannot_listen(listen, error);
   }
+}
+
+UdpLink::UdpLink(const UdpLink& first, Further) : fd_(socket_on(to_endpoint(first.local_address()), true)) {}
+
+std::vector<std::unique_ptr<UdpLink>> UdpLink::several(const Address& listen, Reach reach, std::uint32_t count) {
+  std::vector<std::unique_ptr<UdpLink>> links;
+  links.push_back(std::make_unique<UdpLink>(listen, reach));  // by itself: another server's address is refused
+  if (count == 1) return links;
+  try {
+    share_address(links.front()->fd_);
+    while (links.size() < count) links.push_back(std::unique_ptr<UdpLink>(new UdpLink(*links.front(), Further{})));
+    steer_by_connection(links.front()->fd_, count);
+  } catch (const std::system_error& error) {
+    throw cannot_listen(listen, error);
+  }
+  return links;
 }
 
 UdpLink::~UdpLink() { ::close(fd_); }

@@ -3,7 +3,9 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <optional>
+#include <vector>
 
 #include "core/base/time.h"
 #include "core/exchange/counter.h"
@@ -36,6 +38,12 @@ class UdpLink : public Link {
   /// `file`: of the Unix socket; throws as UnixSocket does.
   explicit UdpLink(const Address& listen, Reach reach = Reach::kThisMachine,
                    const std::optional<std::filesystem::path>& file = std::nullopt);
+
+  /// Links with one address, each for a thread of its own; `count` is a power of two. Of several the kernel gives Data
+  /// to the one whose place is the datagram's connection id modulo `count`, and anything else to the first (SO_REUSEPORT
+  /// and a filter, socket(7)). Replies may leave through each of them. Throws as the constructor does.
+  static std::vector<std::unique_ptr<UdpLink>> several(const Address& listen, Reach reach, std::uint32_t count);
+
   ~UdpLink() override;
   UdpLink(const UdpLink&) = delete;
   UdpLink& operator=(const UdpLink&) = delete;
@@ -67,6 +75,8 @@ class UdpLink : public Link {
   int fd() const noexcept { return fd_; }
 
  private:
+  struct Further {};
+  UdpLink(const UdpLink& first, Further);
   std::size_t receive_from_network(Address& from, std::span<std::byte> buffer);
 
   int fd_ = -1;

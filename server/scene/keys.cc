@@ -310,6 +310,7 @@ constexpr Count kProcessor{1023};
 constexpr Number kTimeout{.least = 1, .most = limits::kMaxTimeout / std::chrono::milliseconds(1)};
 /// Each costs 250 bytes per haptic step: 1000 are 2 Gbit/s at 1 kHz.
 constexpr Count kObservers{1000};
+constexpr Count kNetworkThreads{kMostDevices / limits::kMaxDevices, 1};
 
 }  // namespace
 
@@ -427,7 +428,8 @@ void declare_scene(Table& scene, Draft& draft) {
     keys.key("suites", network.suites, ListOf<Names<Suite>>{suite_names()},
              "by which those with a key may seal their sessions; the fastest that both ends and their processors have "
              "is taken. Leave one out to forbid it");
-    keys.key("max_observers", network.max_observers, kObservers, "guests besides the controller");
+    keys.key("max_observers", network.max_observers, kObservers,
+             "guests besides the controller, of each network thread");
     keys.key("controller_timeout_ms", network.controller_timeout, kTimeout, "a controller silent for so long has left");
     keys.key("observer_timeout_ms", network.observer_timeout, kTimeout, "an observer silent for so long has left");
     keys.key("adapt_state_rate", network.adapt_state_rate, YesNo{},
@@ -437,6 +439,9 @@ void declare_scene(Table& scene, Draft& draft) {
     keys.key("busy", network.busy, YesNo{},
              "its thread never sleeps: a datagram is read some 10 to 50 µs sooner, and a whole processor is taken all "
              "the time. Refused on a machine of one");
+    keys.key("threads", network.threads, kNetworkThreads,
+             "that share the devices by banks of 16: a power of two, and 1 with busy, with unix or where a scene dials",
+             Absent{.text = "one for each 128 devices, where there are processors"});
   });
 
   scene.part("discovery", draft.scene.discovery, [](Table& keys, Scene::Discovery& discovery) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <toml++/toml.h>
 
+#include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <fstream>
@@ -124,6 +125,26 @@ Scene read_scene(const std::filesystem::path& file) {
   return parse_scene(text, file.string(), file.parent_path());
 }
 
+namespace {
+
+void check_network_threads(const std::vector<Scene>& scenes, const std::string& file) {
+  const auto& threads = scenes.front().network.threads;
+  if (!threads) return;
+  const auto refuse = [&](const std::string& expected) {
+    throw SceneError(file + ": network.threads: expected " + expected + ", found " + std::to_string(*threads));
+  };
+  const std::size_t devices = scenes.back().loop.device + scenes.back().count;
+  const std::size_t banks = (devices + limits::kMaxDevices - 1) / limits::kMaxDevices;
+  if (!std::has_single_bit(*threads) || *threads > banks) {
+    refuse("a power of two, at most the number of banks of " + std::to_string(limits::kMaxDevices) + " devices, " +
+           std::to_string(banks));
+  }
+  const std::string_view key = needs_one_network_thread(scenes);
+  if (*threads > 1 && !key.empty()) refuse("1 with " + std::string(key));
+}
+
+}  // namespace
+
 std::vector<Scene> read_scenes(const std::vector<std::filesystem::path>& files, const Overrides& overrides) {
   std::vector<Scene> scenes;
   std::unordered_set<std::string> names;
@@ -156,6 +177,7 @@ std::vector<Scene> read_scenes(const std::vector<std::filesystem::path>& files, 
     }
     scenes.push_back(std::move(scene));
   }
+  if (!scenes.empty()) check_network_threads(scenes, files.front().string());
   return scenes;
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "server/scene/scene.h"
 
+#include <algorithm>
 #include <cstddef>
 #include <utility>
 
@@ -41,6 +42,13 @@ std::vector<Scene> each_device(const std::vector<Scene>& scenes) {
     }
   }
   return each;
+}
+
+std::string_view needs_one_network_thread(const std::vector<Scene>& scenes) {
+  if (scenes.front().network.busy) return "network.busy";
+  if (scenes.front().network.unix_path) return "network.unix";
+  if (std::ranges::any_of(scenes, &Scene::dials)) return "teleoperation.dial";
+  return {};
 }
 
 const std::vector<const Driver*>& drivers() {

@@ -41,8 +41,9 @@ struct Scene {
     Duration controller_timeout = NetworkLoop::Config{}.controller_timeout;
     Duration observer_timeout = NetworkLoop::Config{}.observer_timeout;
     bool adapt_state_rate = NetworkLoop::Config{}.adapt_state_rate;
-    std::vector<std::string> takeover{};  ///< see NetworkLoop
-    bool busy = false;                    ///< its thread never sleeps (BusyLink)
+    std::vector<std::string> takeover{};     ///< see NetworkLoop
+    bool busy = false;                       ///< its thread never sleeps (BusyLink)
+    std::optional<std::uint32_t> threads{};  ///< see Shard; empty: as the server finds right
   };
   struct Channel {
     std::string name = "main";
@@ -108,9 +109,16 @@ struct Scene {
   const Driver& driver() const;
   /// Its device has no plug, so that it computes and never waits: one haptic thread may step several of them.
   bool shares_thread() const { return driver().ids.empty(); }
+  /// It is the server that looks for the other end of its coupling.
+  bool dials() const { return teleoperation && teleoperation->dial; }
   /// The simulated device itself; for any other, the simulation that stands in where the cost of a step is measured.
   SimulatedDevice::Config simulated() const;
 };
+
+/// The key for which a server of these scenes has one network thread only; empty: it may have several. A thread that
+/// never sleeps takes a processor. Datagrams through a Unix socket, and those of a server that we have dialled, are not
+/// told apart by the kernel (UdpLink::several).
+std::string_view needs_one_network_thread(const std::vector<Scene>& scenes);
 
 /// The rows of all kinds of devices, in the order of Scene::AnyDevice.
 const std::vector<const Driver*>& drivers();

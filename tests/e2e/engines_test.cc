@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <nlohmann/json.hpp>
+#include <set>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -61,12 +62,16 @@ TEST(Engines, ALeaseIsTakenFromAnEngineThatHangs) {
   EXPECT_EQ(count_in(end, "welcomed"), 3U);
 }
 
-TEST(Engines, OfManyCountedDevicesEachIsFoundByItsName) {
+class NetworkThreads : public ::testing::TestWithParam<int> {};
+
+TEST_P(NetworkThreads, OfManyCountedDevicesEachIsFoundByItsName) {
   const ScratchFolder folder;
   const auto scene = folder.path() / "finger.toml";
+  const auto file = folder.path() / "run.mcap";
   std::string text(kPressingHand);
-  write(scene, text.insert(text.find("profile"), "count = 40\n"));
-  Server server(folder.path(), scene);
+  text.insert(text.find("profile"), "count = 40\n");
+  write(scene, text + "[network]\nthreads = " + std::to_string(GetParam()) + "\n");
+  Server server(folder.path(), scene, {"--record", file.string()});
   Client first("virtual_wall", server.address(), folder.path(), {"--device", "finger-5"});
   Client second("virtual_wall", server.address(), folder.path(), {"--device", "finger-37"});
   Client echo("echo_motion", server.address(), folder.path(), {"--json", "--device", "finger-37"});
@@ -81,7 +86,16 @@ TEST(Engines, OfManyCountedDevicesEachIsFoundByItsName) {
     EXPECT_EQ(forces > 0, name == "finger-5" || name == "finger-37") << name;
   }
   EXPECT_EQ(end.at("denied"), 0);
+  EXPECT_EQ(end.at("welcomed"), 3);
+  EXPECT_EQ(end.at("refused"), 1);
+  std::set<std::uint16_t> recorded;
+  const Recording recording = read_recording(file);
+  EXPECT_EQ(recording.losses, 0U);
+  for (const DatagramRecord& datagram : recording.arrived) recorded.insert(datagram.peer.port);
+  EXPECT_GE(recorded.size(), 4U) << "of every guest, whichever thread it is served by";
 }
+
+INSTANTIATE_TEST_SUITE_P(Are, NetworkThreads, ::testing::Values(1, 2));
 
 TEST(Engines, TwoDevicesEachHaveTheirOwnHandAndEngine) {
   const ScratchFolder folder;

@@ -63,6 +63,18 @@ TEST(Threads, EachStepsWholeBanksOfCountedDevices) {
   EXPECT_EQ(threads_when(expected, server), expected);
 }
 
+TEST(Threads, OfTheNetworkShareTheBanks) {
+  const testing::ScratchFolder folder;
+  const std::string scene = write(folder.path() / "finger.toml",
+                                  "[device]\nkind = \"simulated\"\nprofile = \"falcon\"\ncount = 60\n"
+                                  "[network]\nthreads = 4\n");
+  Server server(folder.path(), scene);
+  server.process().wait_for_line("listens on");
+  const std::set<std::string> expected = {"haptic-0",   "haptic-48",  "log",        "network-0",
+                                          "network-16", "network-32", "network-48", "tendond"};
+  EXPECT_EQ(threads_when(expected, server), expected);
+}
+
 TEST(Threads, OfAServerAreThoseOfThePage) {
   const testing::ScratchFolder folder;
   Server server(folder.path(), demo_scene().parent_path() / "left.toml",

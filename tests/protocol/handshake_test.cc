@@ -135,6 +135,14 @@ TEST_F(Handshake, ACookieIsWorthNothingAtAnotherServer) {
   EXPECT_FALSE(other.receive(now_, from_, good, answer_).guest.has_value());
 }
 
+TEST_F(Handshake, ACookieIsGoodAtEachDoorOfOneServer) {
+  const Bytes good = hello_with_cookie();
+  Doorman::Config config = door_config();
+  config.number = 1;
+  Doorman other(config);
+  EXPECT_TRUE(other.receive(now_, from_, good, answer_).guest.has_value());
+}
+
 TEST_F(Handshake, ACookieLivesOneKeyLifetimeAndNoLongerThanTwo) {
   for (const auto start : {seconds(-10), seconds(960), seconds(1000), seconds(1079)}) {
     now_ = LocalTime{start};

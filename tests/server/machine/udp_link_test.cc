@@ -7,13 +7,17 @@
 #include <cerrno>
 #include <filesystem>
 #include <iterator>
+#include <memory>
 #include <stdexcept>
 #include <string>
 #include <vector>
 
+#include "protocol/wire/header.h"
+
 namespace tendon {
 namespace {
 
+using Bytes = std::vector<std::byte>;
 using namespace std::chrono_literals;
 
 /// Longer than any wait that a right link makes here: reached only by a test that fails.
@@ -122,6 +126,71 @@ TEST_P(UdpLinkTest, APortInUseIsRefusedByNameAndReason) {
   const Address taken = first.local_address();
   EXPECT_EQ(complaint_about<std::runtime_error>(taken),
             "cannot listen on " + to_string(taken) + ": Address already in use");
+}
+
+Bytes of_connection(std::uint32_t id, DatagramType type = DatagramType::kData) {
+  const auto header = encode_header({.type = type, .connection_id = id});
+  return {header.begin(), header.end()};
+}
+
+TEST_P(UdpLinkTest, SeveralOnOneAddressEachGetTheDataOfTheirConnections) {
+  const auto links = UdpLink::several(GetParam(), Reach::kThisMachine, 4);
+  ASSERT_EQ(links.size(), 4U);
+  for (const auto& link : links) EXPECT_EQ(link->local_address(), links[0]->local_address());
+  // The kernel would spread them by their senders: all must come from many to the right one.
+  std::vector<std::unique_ptr<UdpLink>> guests;
+  for (int i = 0; i < 8; ++i) guests.push_back(std::make_unique<UdpLink>(GetParam()));
+  for (const std::uint32_t id : {4U, 5U, 6U, 7U, 0x12345602U, 0xFFFFFFFFU}) {
+    for (const auto& guest : guests) {
+      guest->send(links[0]->local_address(), of_connection(id));
+      for (std::size_t place = 0; place < links.size(); ++place) {
+        Bytes buffer(kMaxDatagram);
+        Address from;
+        EXPECT_EQ(links[place]->receive(from, buffer), place == id % 4 ? kHeaderSize : 0U) << id << " at " << place;
+        if (place == id % 4) {
+          EXPECT_EQ(from, guest->local_address());
+        }
+      }
+    }
+  }
+}
+
+TEST_P(UdpLinkTest, OfSeveralTheFirstGetsAllElse) {
+  const auto links = UdpLink::several(GetParam(), Reach::kThisMachine, 2);
+  UdpLink guest(GetParam());
+  const std::vector<Bytes> others = {of_connection(3, DatagramType::kHello), of_connection(1, DatagramType::kAnswer),
+                                     bytes(1, 7), bytes(3, 1), Bytes(kMaxDatagram, std::byte{0xFF})};
+  for (const Bytes& other : others) {
+    guest.send(links[0]->local_address(), other);
+    Bytes buffer(kMaxDatagram);
+    Address from;
+    EXPECT_EQ(links[1]->receive(from, buffer), 0U);
+    EXPECT_EQ(links[0]->receive(from, buffer), other.size());
+  }
+}
+
+TEST_P(UdpLinkTest, SeveralRefuseAnAddressOfOthersAndKeepOthersOutOfTheirs) {
+  const auto links = UdpLink::several(GetParam(), Reach::kThisMachine, 2);
+  const Address taken = links[0]->local_address();
+  const std::string refusal = "cannot listen on " + to_string(taken) + ": Address already in use";
+  EXPECT_EQ(complaint_about<std::runtime_error>(taken), refusal);
+  try {
+    UdpLink::several(taken, Reach::kThisMachine, 2);
+    ADD_FAILURE() << "a second server would take the first one's guests";
+  } catch (const std::runtime_error& refused) {
+    EXPECT_EQ(refused.what(), refusal);
+  }
+}
+
+TEST_P(UdpLinkTest, OfSeveralEachAnswersFromTheirAddress) {
+  const auto links = UdpLink::several(GetParam(), Reach::kThisMachine, 2);
+  UdpLink guest(GetParam());
+  links[1]->send(guest.local_address(), bytes(2, 1));
+  Bytes buffer(kMaxDatagram);
+  Address from;
+  guest.wait(kForever);
+  EXPECT_EQ(guest.receive(from, buffer), 2U);
+  EXPECT_EQ(from, links[0]->local_address());
 }
 
 INSTANTIATE_TEST_SUITE_P(Ipv4AndIpv6, UdpLinkTest, testing::Values(kAnyPort4, kAnyPort6),

@@ -230,6 +230,31 @@ TEST(Scene, TheDevicesOfAllCountsHaveNamesOfTheirOwnAndAreNotTooMany) {
             ": device.count: expected at most 1024 devices of all scenes, found 1025");
 }
 
+TEST(Scene, NetworkThreadsAreAPowerOfTwoThatTheBanksAndTheSocketsAllow) {
+  const testing::ScratchFolder folder;
+  const std::string file = (folder.path() / "a.toml").string();
+  const auto error_of = [&](int devices, const std::string& network) -> std::string {
+    write(file, std::string(kMinimal) + "count = " + std::to_string(devices) + "\n[network]\n" + network);
+    try {
+      read_scenes({file});
+    } catch (const SceneError& error) {
+      return std::string(error.what()).substr(file.size());
+    }
+    return "none";
+  };
+  const std::string expected =
+      ": network.threads: expected a power of two, at most the number of banks of 16 devices, ";
+  EXPECT_EQ(error_of(16, "threads = 1\n"), "none");
+  EXPECT_EQ(error_of(16, "threads = 2\n"), expected + "1, found 2");
+  EXPECT_EQ(error_of(17, "threads = 2\n"), "none");
+  EXPECT_EQ(error_of(64, "threads = 4\n"), "none");
+  EXPECT_EQ(error_of(64, "threads = 3\n"), expected + "4, found 3");
+  EXPECT_EQ(error_of(64, "threads = 8\n"), expected + "4, found 8");
+  EXPECT_EQ(error_of(64, "threads = 4\nbusy = true\n"), ": network.threads: expected 1 with network.busy, found 4");
+  EXPECT_EQ(error_of(64, "threads = 2\nunix = \"x\"\n"), ": network.threads: expected 1 with network.unix, found 2");
+  EXPECT_EQ(error_of(64, "threads = 1\nunix = \"x\"\n"), "none");
+}
+
 TEST(Scene, ADeviceWithAPlugIsAmongTheFirst) {
   const testing::ScratchFolder folder;
   const std::filesystem::path falcon = std::filesystem::path(TENDON_SCENES) / "falcon.toml";

@@ -154,7 +154,7 @@ TEST(SceneError, ReportsTheFirstMistakeInTheFile) {
   EXPECT_EQ(error_of_minimal_and("[network]\nzzzzzz = 1\n[loop]\naaaaaa = 1\n"),
             "s.toml:5: network.zzzzzz: unknown key; known here: listen, unix, keys, suites, max_observers, "
             "controller_timeout_ms, "
-            "observer_timeout_ms, adapt_state_rate, takeover, busy");
+            "observer_timeout_ms, adapt_state_rate, takeover, busy, threads");
   EXPECT_EQ(error_of_minimal_and("[loop]\nperiod_us = \"x\"\n[force]\nhold_us = 1\n"),
             "s.toml:5: loop.period_us: expected a number from 100 to 4000 µs, found \"x\"");
 }
@@ -196,6 +196,7 @@ TEST(SceneError, TellsWhatWasExpectedAndWhatWasFound) {
        "s.toml:5: network.max_observers: expected a whole number from 0 to 1000, found 2.5"},
       {"[network]\nunix = \"" + std::string(108, 'x') + "\"\n",
        "s.toml:5: network.unix: expected a path of at most 107 bytes, found 108"},
+      {"[network]\nthreads = 0\n", "s.toml:5: network.threads: expected a whole number from 1 to 64, found 0"},
       {"[network]\nmax_observers = -1\n",
        "s.toml:5: network.max_observers: expected a whole number from 0 to 1000, found -1"},
       {"[[loop]]\n", "s.toml:4: loop: expected a table, found an array of 1"},

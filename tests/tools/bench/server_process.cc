@@ -107,7 +107,7 @@ ServerProcess::Spent ServerProcess::spent() const {
     std::ifstream stat(task / "schedstat");
     Duration::rep ns = 0;
     stat >> ns;
-    Duration& part = is_haptic(name) ? sum.haptic : name == "network" ? sum.network : sum.rest;
+    Duration& part = is_haptic(name) ? sum.haptic : name.starts_with("network") ? sum.network : sum.rest;
     part += Duration(ns);
   });
   return sum;
