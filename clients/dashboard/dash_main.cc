@@ -47,6 +47,7 @@ struct Options {
   ServerName server = "127.0.0.1:47100";
   WebServer::Config web;  ///< its `server` is what the name is looked up to
   Routes::Config routes;
+  std::string device;
   std::string key_file;
   std::string arm_channel;
   std::string recordings;
@@ -93,6 +94,11 @@ std::optional<int> parse(int argc, char** argv, Options& options) {
       ->type_name("HOST:PORT")
       ->capture_default_str()
       ->check(name);
+  app.add_option(
+         "--device", options.device,
+         "The page shows the devices of this one's bank: a server of more than 16 devices has banks of 16. Left "
+         "out: the first bank")
+      ->type_name("NAME");
   app.add_option(
          "--key", options.key_file,
          "Key file (see `tendond keygen --observer`); needed unless the server is on this machine and has no keys")
@@ -182,8 +188,10 @@ int run(const Options& options) {
       board, {.name = "tendon-dash of " + abilities.server,
               .unix_offset = std::chrono::system_clock::now().time_since_epoch() - read_clock().time_since_epoch()});
   WebServer web(web_config, routes, feed, foxglove, counts, bridge, read_clock);
-  Observer observer(web.link(), web_config.server,
-                    {.key = key ? std::optional(key->key) : std::nullopt, .seed = seed_from_system()}, board, start);
+  Observer observer(
+      web.link(), web_config.server,
+      {.device = options.device, .key = key ? std::optional(key->key) : std::nullopt, .seed = seed_from_system()},
+      board, start);
 
   const std::string at = to_string(web.address());
   const std::string operator_url = arms ? "http://" + at + "/#/operator/" + pass : std::string();

@@ -53,6 +53,8 @@ void Observer::greet(LocalTime now) {
   claims_ = counted_ && names_.size() > 1;
   if (claims_) {
     for (const auto& [number, name] : names_) hello.claims.push_back({name, "", Role::kObserver});
+  } else if (!config_.device.empty()) {
+    hello.claims.push_back({config_.device, "", Role::kObserver});
   }
   connection_.greet(now, hello);
 }

@@ -15,7 +15,8 @@
 
 namespace tendon::dash {
 
-/// Watches every device of a Tendon server in one session and writes all news on a Board. It is an observer and never
+/// Watches every device of a Tendon server, or of one bank of a large server, in one session and writes all news on a
+/// Board. It is an observer and never
 /// sends a force. It has no socket, clock or thread.
 ///
 ///     Observer observer(link, server, config, board, now);
@@ -34,8 +35,11 @@ class Observer {
  public:
   struct Config {
     std::string name = "tendon-dash";  ///< for the server's log; at most limits::kMaxName bytes
-    std::optional<Key> key{};          ///< as ForceClient::Config::key; an observer's will do
-    Seed seed{};                       ///< 32 bytes from the system at each start
+    /// One of those to watch. A session has 16 devices, those of one bank; empty: the first bank. A server that has no
+    /// such device refuses us, and says which it has.
+    std::string device{};
+    std::optional<Key> key{};  ///< as ForceClient::Config::key; an observer's will do
+    Seed seed{};               ///< 32 bytes from the system at each start
     Duration patience = std::chrono::seconds(2);
     Duration retry_min = std::chrono::milliseconds(100);
     Duration retry_max = std::chrono::seconds(2);

@@ -56,12 +56,20 @@ class ObserverTest : public testing::Test {
         if (port_) mail_[i]->port_out[0].put(*port_);
       }
       if (loop_) loop_->turn(now_);
-      observer_.turn(now_);
+      observer_->turn(now_);
       for (; !wire_.empty(); wire_.pop_front()) {
         Datagram& datagram = wire_.front();
         (datagram.to == server_.self ? server_ : own_).inbox.push_back(std::move(datagram));
       }
     }
+  }
+  static std::vector<std::string> many(int devices) {
+    std::vector<std::string> names;
+    for (int i = 0; i < devices; ++i) names.push_back("d-" + std::to_string(i));
+    return names;
+  }
+  void watch(const std::string& device) {
+    observer_.emplace(own_, server_.self, Observer::Config{.device = device, .seed = 1}, board_, now_);
   }
   std::vector<std::string> names() const {
     std::vector<std::string> names;
@@ -80,7 +88,7 @@ class ObserverTest : public testing::Test {
   std::uint64_t tick_ = 0;
   std::optional<PortState> port_;  ///< of every device
   Board board_;
-  Observer observer_{own_, server_.self, {.seed = 1}, board_, now_};
+  std::optional<Observer> observer_{std::in_place, own_, server_.self, Observer::Config{.seed = 1}, board_, now_};
 };
 
 TEST_F(ObserverTest, WatchesTheOnlyDeviceOfAServer) {
@@ -100,6 +108,34 @@ TEST_F(ObserverTest, ComesBackForAllTheDevicesOfAServerWithSeveral) {
   EXPECT_EQ(board_.sessions(), 2U);
   for (std::uint32_t device : {0U, 1U, 2U}) EXPECT_GT(board_.devices().at(device).states, 1800U) << device;
   EXPECT_EQ(loop_->stats().timed_out, 0U) << "the first session was ended by a Bye";
+}
+
+TEST_F(ObserverTest, OfALargeServerItWatchesTheBankOfTheDeviceThatItIsTold) {
+  const Names all = many(40);
+  serve(all);
+  watch("d-20");
+  run(seconds(2));
+  EXPECT_EQ(names(), Names(all.begin() + 16, all.begin() + 32));
+  EXPECT_EQ(board_.sessions(), 2U);
+  for (std::uint32_t number = 0; number < 16; ++number) EXPECT_GT(board_.devices().at(number).states, 1800U) << number;
+}
+
+TEST_F(ObserverTest, OfABankWithOneDeviceOneSessionIsEnough) {
+  serve(many(17));
+  watch("d-16");
+  run(seconds(2));
+  EXPECT_EQ(names(), Names{"d-16"});
+  EXPECT_EQ(board_.sessions(), 1U);
+  EXPECT_GT(board_.devices().at(0).states, 1900U);
+}
+
+TEST_F(ObserverTest, SaysWhichDevicesThereAreWhereItsOwnIsNot) {
+  serve(many(40));
+  watch("d-40");
+  run(seconds(1));
+  EXPECT_EQ(board_.contact(), Contact::kRefused);
+  EXPECT_NE(board_.words().find("there is no device \"d-40\", only \"d-0\" to \"d-39\""), std::string::npos)
+      << board_.words();
 }
 
 TEST_F(ObserverTest, IsToldWhatTheEnginesWant) {
@@ -135,14 +171,14 @@ TEST_F(ObserverTest, IsToldWhatTheHandlesAre) {
 
 TEST_F(ObserverTest, AsksForFewStatesWhileNobodyLooks) {
   serve({"left", "right"});
-  observer_.set_watched(false);
+  observer_->set_watched(false);
   run(seconds(1));
   const auto states = [&](std::uint32_t device) { return board_.devices().at(device).states; };
   const auto [left, right] = std::pair(states(0), states(1));
   run(seconds(10));
   EXPECT_NEAR(static_cast<double>(states(0) - left), 10.0 * Observer::kIdleStateHz, 5);
   EXPECT_NEAR(static_cast<double>(states(1) - right), 10.0 * Observer::kIdleStateHz, 5);
-  observer_.set_watched(true);
+  observer_->set_watched(true);
   const auto before = states(1);
   run(seconds(1));
   EXPECT_GT(states(1) - before, 900U);
@@ -206,10 +242,10 @@ TEST_F(ObserverTest, IsToldTheEndsOfACoupling) {
 TEST_F(ObserverTest, SaysByeWhenItStops) {
   serve({"left"});
   run(seconds(1));
-  observer_.stop(now_);
+  observer_->stop(now_);
   run(seconds(1));
   EXPECT_EQ(loop_->stats().timed_out, 0U);
-  EXPECT_EQ(observer_.turn(now_), LocalTime::max());
+  EXPECT_EQ(observer_->turn(now_), LocalTime::max());
   const auto states = board_.devices().at(0).states;
   run(seconds(1));
   EXPECT_EQ(board_.devices().at(0).states, states);
