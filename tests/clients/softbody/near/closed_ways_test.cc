@@ -158,20 +158,26 @@ enum class Fields : std::uint8_t {
   kThread,   ///< another thread, about the shape there; until it has, the linear body answers
 };
 
-/// Bodies of both laws. No way gives more than `most` of what it may.
-Account expect_nothing_given(Fields fields, int ways, double most) {
+/// The most that may be found, in what one way may give.
+struct Most {
+  double given = 1;  ///< by one way
+  double together = kMostTogether;
+};
+
+/// Bodies of both laws.
+Account expect_nothing_given(Fields fields, int ways, const Most& most) {
   Account both;
   for (const Law law : {Law::kNeoHookean, Law::kCorotational}) {
     const PressedBefore& block = fields == Fields::kNone ? smallest_block(law) : small_block(law);
     Climbed body(block, fields == Fields::kThread);
     const Account all = drawn_ways(body, ways, 1);
     std::cout << all << std::endl;  // of the long form, as soon as it is known
-    EXPECT_LE(all.most_given, most);
-    EXPECT_LE(all.given_together(), kMostTogether);
+    EXPECT_LE(all.most_given, most.given);
+    EXPECT_LE(all.given_together(), most.together);
     // Where the hand has come down the linear body answers until the field is there. What its force differs by fades as
     // the hand goes on, and not the same on the way back: the body may keep that.
     if (fields != Fields::kThread) {
-      EXPECT_LE(all.most_kept, most);
+      EXPECT_LE(all.most_kept, most.given);
     }
     // All that can answer has answered, and all that can change has changed.
     for (const Ladder::Step& step : body.ladder->steps()) EXPECT_GT(step.answers, 10 * ways) << step.size.name;
@@ -187,20 +193,22 @@ Account expect_nothing_given(Fields fields, int ways, double most) {
 }
 
 /// The first ways of the seed stay far below what is allowed, so that less than a break of the rule is seen.
-constexpr double kUsual = 0.25;
+constexpr Most kUsual{.given = 0.25};
 
 TEST(ClosedWays, OfABodyThatIsAllNearGiveNothing) { expect_nothing_given(Fields::kNone, 60, kUsual); }
 
 TEST(ClosedWays, OnWhichAnswersMakeNearFieldsGiveNothing) { expect_nothing_given(Fields::kAnswers, 20, kUsual); }
 
-TEST(ClosedWays, OnWhichAnotherThreadRefreshesNearFieldsGiveNothing) { expect_nothing_given(Fields::kThread, 20, 1); }
+TEST(ClosedWays, OnWhichAnotherThreadRefreshesNearFieldsGiveNothing) { expect_nothing_given(Fields::kThread, 20, {}); }
 
-/// Twenty minutes: softbody_test --gtest_also_run_disabled_tests --gtest_filter=ClosedWays.*TenThousand*
-TEST(ClosedWays, DISABLED_TenThousandGiveNothing) {
-  Account all;
-  for (const Fields fields : {Fields::kNone, Fields::kAnswers, Fields::kThread}) {
-    all += expect_nothing_given(fields, 1667, 1);
-  }
+/// Twenty minutes of a processor: softbody_test --gtest_also_run_disabled_tests --gtest_filter=ClosedWays.*TenThousand*
+///
+/// With another thread single ways, and the neo-Hookean body by itself, give more than they may (clients/softbody/README.md
+/// says why): not more than that.
+TEST(ClosedWays, DISABLED_TenThousandTogetherGiveNothing) {
+  Account all = expect_nothing_given(Fields::kNone, 1667, {});
+  all += expect_nothing_given(Fields::kAnswers, 1667, {});
+  all += expect_nothing_given(Fields::kThread, 1667, {.given = 2, .together = 50});
   std::cout << all << '\n';
   EXPECT_LE(all.given_together(), kMostTogether);
 }
