@@ -335,6 +335,14 @@ double QuasiStaticModel::newton(const VectorXd& load, const Patch* patch, Given 
   const bool at_rest = error <= kAtRest * std::abs(reaction.force);
   if (step_ == 0 && patch != nullptr)
     find_tangent(load, at_rest ? patch : nullptr, {step.by_tool, now, among_sides}, reaction);
+  if (patch != nullptr) {
+    // The force is that of the step which was not taken any more, and so is the tilt: else a hand that hardly moves would
+    // feel a force aside that stands still.
+    VectorXd there = u_;
+    if (at_rest) elastic_.add_free(step.by_itself + reaction.force * step.by_tool, there);
+    reaction.depth = depth_below(*patch, normal_, there);
+    reaction.slope = slope_below(*patch, normal_, there);
+  }
   return error;
 }
 
@@ -363,8 +371,6 @@ Reaction QuasiStaticModel::press(const Patch& patch, Given given, double value) 
   reaction.error = newton(load, &patch, given, value, reaction);
   if (self_collision_) reaction.error = part_sides(load, &patch, given, value, reaction);
   for (const auto& effect : effects_) effect->advance(elastic_.to_free(u_));
-  reaction.depth = depth_below(patch, normal_, u_);
-  reaction.slope = slope_below(patch, normal_, u_);
   if (step_ > 0) reaction.stiffness = secant(reaction, depth_below(patch, normal_, rest_));
   return reaction;
 }

@@ -26,7 +26,9 @@ class QuasiStaticModel : public Model {
  public:
   struct Config {
     int max_iterations = 30;  ///< for an answer; the rest is in Reaction::error, and the next answer goes on
-    double tolerance = 1e-6;  ///< of the force, relative: an answer ends when its error is at most so large
+    /// Of the force, relative: an answer ends when its error is at most so large. Force, depth and tilt are then those of
+    /// the step that it does not take any more.
+    double tolerance = 1e-6;
     std::optional<double> self_collision = {};  ///< Pa/m: the bed c of SelfCollision
     bool glides = true;                         ///< an answer at rest has its Glide
   };

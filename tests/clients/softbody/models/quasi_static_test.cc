@@ -9,6 +9,7 @@
 #include <stdexcept>
 
 #include "clients/softbody/models/linear.h"
+#include "clients/softbody/touch/contact.h"
 #include "tests/clients/softbody/drawn_answers.h"
 #include "tests/clients/softbody/pressed_block.h"
 
@@ -122,6 +123,33 @@ TEST(QuasiStatic, HalfAPercentIsWorthFewStepsAndNoFactorOnAHardPath) {
     }
     EXPECT_LE(steps, 2 * answers) << static_cast<int>(law);
     EXPECT_EQ(asked.factors(), 0) << static_cast<int>(law);
+  }
+}
+
+/// A hand that hardly moves is answered without a step of Newton's method. The force is then one of the place asked for,
+/// along the normal as well as aside.
+TEST(QuasiStatic, AnswersWithoutAStepHaveTheStiffnessSentAsTheirSlope) {
+  for (const Law law : {Law::kNeoHookean, Law::kCorotational}) {
+    const Solid solid = pressed_block(Element::kHex8Sri, 8, 0.45, law);
+    const TouchSurface top(solid.mesh(), Vec3::UnitZ(), kB1PatchRadius);
+    QuasiStaticModel model(solid, top, {.max_iterations = 100, .tolerance = 5e-3});
+    PatchContact contact(model, top, 0, PatchContact::Side::kUnilateral);
+    const Vec3 tool(0.02, -0.015, 0.0455);
+    for (double above = 4.5e-3; above > 0; above -= 2.5e-4) contact.at(tool + above * Vec3::UnitZ());
+    Feel feel = contact.at(tool);
+    while (model.iterations() > 0) feel = contact.at(tool);
+    Mat3 measured;
+    constexpr double kStep = 1e-6;
+    for (int axis = 0; axis < 3; ++axis) {
+      const auto force_at = [&](double way) {
+        const Vec3 force = contact.at(tool + way * Vec3::Unit(axis)).force;
+        EXPECT_EQ(model.iterations(), 0);
+        return force;
+      };
+      measured.col(axis) = (force_at(-kStep) - force_at(kStep)) / (2 * kStep);
+    }
+    EXPECT_LT((measured - feel.stiffness).norm(), 0.05 * feel.stiffness.norm()) << feel.stiffness << "\n" << measured;
+    EXPECT_LT((measured - measured.transpose()).norm(), 0.01 * feel.stiffness.norm()) << measured;
   }
 }
 

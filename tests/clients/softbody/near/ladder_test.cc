@@ -167,6 +167,25 @@ TEST(Ladder, WhereAnotherRungTakesOverNothingJumps) {
   }
 }
 
+/// A rung that says a tenth more than the body has: a hand feels it go by the place, to and fro alike.
+TEST(Ladder, FromARungThatIsStifferTheForceGoesOverByThePlace) {
+  KnownBlock block(Law::kNeoHookean, 1.1);
+  constexpr double kStep = 1e-4;
+  std::vector<double> out;
+  for (int i = 0; i < 150; ++i) {
+    out.push_back(block.press(Vec2(0.009 + kStep * i, 0), 2e-3).force);
+    if (i > 0) {
+      EXPECT_NEAR(out[static_cast<std::size_t>(i)], out[static_cast<std::size_t>(i) - 1], 4e-3 * out.back()) << i;
+    }
+  }
+  EXPECT_NEAR(out.front() / block.truth(Vec2(0.009, 0), 2e-3), 1.1, 1e-3);
+  EXPECT_NEAR(out.back() / block.truth(Vec2(0.0239, 0), 2e-3), 1, 0.02);
+  for (int i = 149; i >= 0; --i) {
+    const double back = block.press(Vec2(0.009 + kStep * i, 0), 2e-3).force;
+    EXPECT_NEAR(back, out[static_cast<std::size_t>(i)], 2e-3 * back) << i;
+  }
+}
+
 TEST(Ladder, TheStiffnessSentIsTheForcesOwnSlope) {
   for (const bool tabulated : {false, true}) {
     for (const Law law : kBothLaws) {

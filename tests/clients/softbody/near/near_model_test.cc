@@ -169,6 +169,18 @@ TEST(Near, AFieldIsMadeOnWhileTheHandIsStill) {
   EXPECT_EQ(near.model.size().pieces - pieces, answers);
 }
 
+/// What differs fades over the way of the hand, and neither at once nor with time.
+TEST(Near, WhileAHandIsStillItsForceIsToo) {
+  for (const Law law : kLaws) {
+    Near near(8, 0.45, law, 5e-3);
+    for (int i = 0; i <= 40; ++i) near.press(Vec2(0.00012 * i, 0), 5e-5 * i);
+    const double force = near.press(Vec2(0.0048, 0), 2e-3).force;
+    ASSERT_EQ(near.model.size().made, 1);
+    for (int i = 0; i < 80; ++i) EXPECT_NEAR(near.press(Vec2(0.0048, 0), 2e-3).force, force, 1e-6 * force) << i;
+    EXPECT_EQ(near.model.size().made, 2);
+  }
+}
+
 TEST(Near, AFieldThatTheHandHasLeftBeforeItIsWholeIsNotMadeToItsEnd) {
   Near near(8, 0.45, Law::kNeoHookean, 5e-3);
   near.press(Vec2(0.005, 0), 3e-3);

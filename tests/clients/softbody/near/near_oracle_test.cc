@@ -107,6 +107,19 @@ TEST(NearOracle, OnItsWayAsideNoForceJumpsAndErrorsAreSaid) {
   }
 }
 
+TEST(NearOracle, WhileAHandIsStillItsForceIsTooThroughEachRefresh) {
+  for (const Law law : kLaws) {
+    NearBeside near(8, law);
+    for (int i = 1; i <= 40; ++i) near.press(Vec2(2e-4 * i, 0), 1e-4 * i);
+    const double force = near.press(Vec2(0.008, 0), 4e-3).force;
+    for (int i = 0; i < 20; ++i) {
+      if (i % 5 == 0) near.thread.work();
+      EXPECT_NEAR(near.press(Vec2(0.008, 0), 4e-3).force, force, 1e-6 * force) << static_cast<int>(law) << ' ' << i;
+    }
+    EXPECT_GE(near.model.size().made, 2);
+  }
+}
+
 /// As far as the field of the start has the patch, and to a depth of a/4, it is within 2 %.
 TEST(NearOracle, AThreadThatHasStoppedLeavesTheFieldAndTheLinearBody) {
   for (const int n : {8, 12}) {
