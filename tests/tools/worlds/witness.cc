@@ -285,6 +285,7 @@ void Witness::see_recovered() {
 void Witness::see_served() {
   std::size_t controllers = 0;
   std::size_t open_controllers = 0;
+  std::string others;  // why they are not served
   for (std::size_t i = 0; i < marks_.size(); ++i) {
     if (!world_.alive(i)) continue;
     const DrawnClient& drawn = drawn_.clients[i];
@@ -294,6 +295,8 @@ void Witness::see_served() {
     if (stats.phase != ForceClient::Phase::kOpen) {
       if (!controller) {
         report(Oracle::kRecovery, "observer " + drawn.config.name + " has no session: " + stats.reason);
+      } else {
+        others += "; " + drawn.config.name + ": " + stats.reason;
       }
       continue;
     }
@@ -311,7 +314,7 @@ void Witness::see_served() {
   }
   if (controllers > 0 && open_controllers != 1) {
     report(Oracle::kRecovery, std::to_string(controllers) + " controllers live, " + std::to_string(open_controllers) +
-                                  " of them are served");
+                                  " of them are served" + others);
   }
   if (open_controllers == 1 && world_.haptic().stats().fault != HapticController::Fault::kNone) {
     report(Oracle::kRecovery, "the fault is still there, though a controller has asked to clear it");
