@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <map>
 #include <memory>
@@ -30,7 +31,6 @@ class Shards : public testing::Test {
   struct Client {
     std::unique_ptr<End> end;
     std::unique_ptr<ForceClient> client;
-    std::vector<double> seen{};  ///< x of the states' positions: the device's place
   };
 
   Shards() {
@@ -57,17 +57,16 @@ class Shards : public testing::Test {
   Client come(std::size_t key, const std::string& device, std::uint16_t port, Role role = Role::kController) {
     Client client{std::make_unique<End>(wire_, parse_address("198.51.100.1:" + std::to_string(port))), nullptr};
     const ForceClient::Config config{.name = "guest", .device = device, .key = config_.keys[key].key, .seed = port};
-    const std::uint32_t place = port;
     if (role == Role::kObserver) {
       client.client = std::make_unique<ForceClient>(
           *client.end, server_, config,
-          [this, place](const DeviceState& state, const LinkStats&) { seen_[place].push_back(state.position.x()); },
+          [this, port](const DeviceState& state, const LinkStats&) { seen_[port].push_back(state.position.x()); },
           now_);
     } else {
       client.client = std::make_unique<ForceClient>(
           *client.end, server_, config,
-          [this, place](const DeviceState& state) {
-            seen_[place].push_back(state.position.x());
+          [this, port](const DeviceState& state) {
+            seen_[port].push_back(state.position.x());
             return Touch(Vec3(state.position.x(), 0, 0));
           },
           now_);
@@ -124,7 +123,7 @@ class Shards : public testing::Test {
   std::vector<Mailboxes*> mail_;
   NetworkLoop::Config config_;
   std::array<std::unique_ptr<NetworkLoop>, 2> loops_;
-  std::map<std::uint32_t, std::vector<double>> seen_;  ///< by the client's port
+  std::map<std::uint32_t, std::vector<double>> seen_;  ///< by the client's port: x of the states, the device's place
   std::uint64_t tick_ = 0;
   int handed_on_ = 0;
 };
