@@ -99,7 +99,13 @@ Outcome run(const DrawnWorld& drawn, const Extras& extras) {
                         add(world, client, began,
                             [&witness, i](const DeviceState& state, const LinkStats&) { witness.see_state(i, state); });
                       }});
-    if (client.killed) events.push_back({*client.killed, [&world, i] { world.kill(i); }});
+    if (client.killed) {
+      events.push_back({*client.killed, [&world, &witness, i] {
+                          world.kill(i);
+                          // In fair weather too, the others wait until the server has missed it.
+                          if (witness.recovered_by()) witness.weather_clears(world.network().latest_arrival());
+                        }});
+    }
     if (client.restarted) {
       events.push_back({*client.restarted, [&world, &client, i] {
                           ForceClient::Config again = client.config;

@@ -163,7 +163,8 @@ void Network::launch(Way& way, Tag tag, const injector::Decision& decision, std:
   flight_.launch(decision, datagram, tag, way.history.get());
   const std::size_t launched = flight_.size() - before;
   const bool dropped = decision.verdict == injector::Verdict::kDrop;
-  if (!dropped) latest_arrival_ = std::max(latest_arrival_, decision.release);
+  LocalTime& latest = dropped ? latest_of_lost_ : latest_arrival_;
+  latest = std::max(latest, decision.release);
   if (decision.duplicate) latest_arrival_ = std::max(latest_arrival_, *decision.duplicate);
   if (decision.stale) latest_arrival_ = std::max(latest_arrival_, decision.stale->release);
   ++counts_.sent;

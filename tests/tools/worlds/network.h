@@ -69,8 +69,13 @@ class Network {
   /// When the next datagram arrives; empty when none is on its way.
   std::optional<LocalTime> next_arrival() const { return flight_.next_wake(); }
 
-  /// When the last of those that were ever sent has come at the latest.
-  LocalTime latest_arrival() const noexcept { return latest_arrival_; }
+  /// When the last of those that were ever sent has come at the latest. One that is lost counts if it would have come
+  /// later than that by kLongWait: where the order is kept, those sent after it wait for its turn all the same. A shorter
+  /// wait is within the 600 ms of recovery_promise().
+  LocalTime latest_arrival() const noexcept {
+    constexpr Duration kLongWait = std::chrono::milliseconds(300);
+    return latest_of_lost_ > latest_arrival_ + kLongWait ? latest_of_lost_ : latest_arrival_;
+  }
 
   /// Since the last call, something has arrived at the server, or at the client of this link.
   bool take_news_of_server();
@@ -127,6 +132,7 @@ class Network {
   std::vector<std::unique_ptr<Client>> clients_;
   injector::Flight<Tag> flight_;
   LocalTime latest_arrival_{};
+  LocalTime latest_of_lost_{};  ///< would have come
   Counts counts_;
 };
 

@@ -49,8 +49,8 @@ struct Breach {
   std::string what;
 };
 
-/// After the weather has cleared, and the last datagram of the bad weather has arrived, everybody who lives is served
-/// again within
+/// After the weather has cleared, the last datagram of the bad weather has arrived and the last client has died, everybody
+/// who lives is served again within
 ///
 ///     2 s          a session that only one end believes in ends by the timeout of the other (Session::Config::timeout)
 ///   + retry_max    the wait that a client may then be in (ForceClient::Config)
@@ -71,7 +71,7 @@ class Witness {
   void see(const World::Turn& turn);
   /// Client `handle`, an observer, is shown a state.
   void see_state(std::size_t handle, const DeviceState& state) { seen_[handle] |= state.buttons; }
-  /// The weather has just cleared: what was lost before is over.
+  /// The weather has just cleared: what was lost before is over. Or a client has died in clear weather.
   void weather_clears(LocalTime last_arrival_of_bad_weather);
   /// From when on everybody must be served; empty before the weather clears.
   std::optional<LocalTime> recovered_by() const { return recovered_by_; }
