@@ -6,7 +6,7 @@
 #include <cmath>
 #include <limits>
 
-namespace tendon {
+namespace tendon::haptic_controller_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -550,4 +550,4 @@ TEST(HapticController, WhereFrictionIsLessTheFirstForceIsLessAtOnce) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::haptic_controller_test

@@ -14,7 +14,7 @@
 
 #include "core/haptic_controller.h"
 
-namespace tendon {
+namespace tendon::ladder_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -163,4 +163,4 @@ TEST_F(Walk, TheForceFollowsItsModelUntilItFadesAndComesBackOnARamp) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::ladder_test

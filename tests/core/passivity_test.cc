@@ -19,7 +19,7 @@
 #include "tests/support/any_contact.h"
 #include "tests/support/dice.h"
 
-namespace tendon {
+namespace tendon::passivity_test {
 
 void PrintTo(Law law, std::ostream* out) { *out << info(law).name; }
 
@@ -276,4 +276,4 @@ std::string name_for_test(const testing::TestParamInfo<Law>& law) {
 INSTANTIATE_TEST_SUITE_P(Laws, Passivity, testing::ValuesIn(passive_laws()), name_for_test);
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::passivity_test

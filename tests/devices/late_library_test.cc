@@ -7,7 +7,7 @@
 #include <stdexcept>
 #include <string>
 
-namespace tendon {
+namespace tendon::late_library_test {
 namespace {
 
 std::string complaint(auto use) {
@@ -38,4 +38,4 @@ TEST(LateLibrary, WithoutAFunctionSaysWhich) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::late_library_test

@@ -13,7 +13,7 @@
 #include "tests/e2e/stage/stage.h"
 #include "tests/server/scratch_folder.h"
 
-namespace tendon::e2e {
+namespace tendon::e2e::bad_input_test {
 namespace {
 
 using testing::ScratchFolder;
@@ -191,4 +191,4 @@ TEST(Help, OfEveryProgramHasAnExample) {
 }
 
 }  // namespace
-}  // namespace tendon::e2e
+}  // namespace tendon::e2e::bad_input_test

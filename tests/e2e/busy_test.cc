@@ -10,7 +10,7 @@
 #include "tests/e2e/stage/threads.h"
 #include "tests/server/scratch_folder.h"
 
-namespace tendon::e2e {
+namespace tendon::e2e::busy_test {
 namespace {
 
 using testing::ScratchFolder;
@@ -46,4 +46,4 @@ TEST(Busy, IsRefusedWhereThereIsOneProcessor) {
 }
 
 }  // namespace
-}  // namespace tendon::e2e
+}  // namespace tendon::e2e::busy_test

@@ -19,7 +19,7 @@
 #include "tests/e2e/stage/stage.h"
 #include "tests/server/scratch_folder.h"
 
-namespace tendon::e2e {
+namespace tendon::e2e::diagnostics_test {
 namespace {
 
 using testing::ScratchFolder;
@@ -181,4 +181,4 @@ max_m_per_s = 0.05
 }
 
 }  // namespace
-}  // namespace tendon::e2e
+}  // namespace tendon::e2e::diagnostics_test

@@ -16,7 +16,7 @@
 #include "tests/server/scratch_folder.h"
 #include "tests/support/fake_avahi.h"
 
-namespace tendon::e2e {
+namespace tendon::e2e::discovery_test {
 namespace {
 
 using testing::FakeAvahi;
@@ -138,4 +138,4 @@ TEST_F(Discovery, OnlyASceneThatListsItHasItsThread) {
 }
 
 }  // namespace
-}  // namespace tendon::e2e
+}  // namespace tendon::e2e::discovery_test

@@ -6,7 +6,7 @@
 #include "tests/e2e/stage/stage.h"
 #include "tests/server/scratch_folder.h"
 
-namespace tendon::e2e {
+namespace tendon::e2e::doctor_test {
 namespace {
 
 TEST(Doctor, MeasuresThisMachineAndSaysSoForPeopleAndForPrograms) {
@@ -30,4 +30,4 @@ TEST(Doctor, MeasuresThisMachineAndSaysSoForPeopleAndForPrograms) {
 }
 
 }  // namespace
-}  // namespace tendon::e2e
+}  // namespace tendon::e2e::doctor_test

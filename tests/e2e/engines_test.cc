@@ -13,7 +13,7 @@
 #include "tests/e2e/stage/stage.h"
 #include "tests/server/scratch_folder.h"
 
-namespace tendon::e2e {
+namespace tendon::e2e::engines_test {
 namespace {
 
 using testing::ScratchFolder;
@@ -166,4 +166,4 @@ TEST(Engines, EachSessionIsToldByOneNameFromItsBeginningToItsEnd) {
 }
 
 }  // namespace
-}  // namespace tendon::e2e
+}  // namespace tendon::e2e::engines_test

@@ -17,7 +17,7 @@
 #include "tests/e2e/stage/falcon_stage.h"
 #include "tests/e2e/stage/threads.h"
 
-namespace tendon::e2e {
+namespace tendon::e2e::falcon_server_test {
 namespace {
 
 constexpr std::uint8_t kOut = 0x02;  // the endpoint
@@ -161,4 +161,4 @@ TEST(FalconServer, WhatItsDriverCountsIsInTheLogAndInTheLastReport) {
 }
 
 }  // namespace
-}  // namespace tendon::e2e
+}  // namespace tendon::e2e::falcon_server_test

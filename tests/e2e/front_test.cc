@@ -16,7 +16,7 @@
 #include "tests/e2e/stage/stage.h"
 #include "tests/server/scratch_folder.h"
 
-namespace tendon::e2e {
+namespace tendon::e2e::front_test {
 namespace {
 
 using testing::ScratchFolder;
@@ -215,4 +215,4 @@ TEST(Front, ExplainsABodyWithoutAServer) {
 }
 
 }  // namespace
-}  // namespace tendon::e2e
+}  // namespace tendon::e2e::front_test

@@ -14,7 +14,7 @@
 #include "tests/e2e/stage/stage.h"
 #include "tests/server/scratch_folder.h"
 
-namespace tendon::e2e {
+namespace tendon::e2e::full_disk_test {
 namespace {
 
 using testing::ScratchFolder;
@@ -85,4 +85,4 @@ TEST(FullDisk, FromTheFirstByteIsToldAtOnce) {
 }
 
 }  // namespace
-}  // namespace tendon::e2e
+}  // namespace tendon::e2e::full_disk_test

@@ -54,7 +54,7 @@ extern "C" int ioctl(int fd, unsigned long request, ...) noexcept {
   return write(fd, bytes.data(), transfer->len + 1) < 0 ? -1 : static_cast<int>(transfer->len);
 }
 
-namespace tendon {
+namespace tendon::guardian_test {
 namespace {
 
 using Clock = std::chrono::steady_clock;
@@ -377,4 +377,4 @@ TEST(Guardian, AFalconWithoutOneGoesOnPushing) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::guardian_test

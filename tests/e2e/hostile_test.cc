@@ -20,7 +20,7 @@
 #include "tests/e2e/stage/stage.h"
 #include "tests/server/scratch_folder.h"
 
-namespace tendon::e2e {
+namespace tendon::e2e::hostile_test {
 namespace {
 
 using testing::ScratchFolder;
@@ -128,4 +128,4 @@ TEST(HostileDatagrams, AreCountedAndChangeNothing) {
 }
 
 }  // namespace
-}  // namespace tendon::e2e
+}  // namespace tendon::e2e::hostile_test

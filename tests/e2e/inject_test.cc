@@ -13,7 +13,7 @@
 #include "tests/tools/injector/proxy/udp_batch.h"
 #include "tests/tools/injector/traces/trace.h"
 
-namespace tendon::e2e {
+namespace tendon::e2e::inject_test {
 namespace {
 
 using injector::Direction;
@@ -152,4 +152,4 @@ TEST(Inject, ADryRunPrintsOneObjectPerPacket) {
 }
 
 }  // namespace
-}  // namespace tendon::e2e
+}  // namespace tendon::e2e::inject_test

@@ -14,7 +14,7 @@
 #include "tests/e2e/stage/stage.h"
 #include "tests/server/scratch_folder.h"
 
-namespace tendon::e2e {
+namespace tendon::e2e::main_job_test {
 namespace {
 
 using testing::ScratchFolder;
@@ -184,4 +184,4 @@ TEST(MainJob, ADurationIsThatOfTheHapticStepsToAPeriod) {
 }
 
 }  // namespace
-}  // namespace tendon::e2e
+}  // namespace tendon::e2e::main_job_test

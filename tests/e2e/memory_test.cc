@@ -18,7 +18,7 @@
 #include "tests/e2e/stage/stage.h"
 #include "tests/server/scratch_folder.h"
 
-namespace tendon::e2e {
+namespace tendon::e2e::memory_test {
 namespace {
 
 constexpr std::int64_t kMegabyte = 1 << 20;
@@ -149,4 +149,4 @@ TEST(Memory, OfAStepIsInPlaceBeforeItIsUsed) {
 }
 
 }  // namespace
-}  // namespace tendon::e2e
+}  // namespace tendon::e2e::memory_test

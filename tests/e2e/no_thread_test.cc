@@ -9,7 +9,7 @@
 #include "tests/e2e/stage/process.h"
 #include "tests/server/scratch_folder.h"
 
-namespace tendon::e2e {
+namespace tendon::e2e::no_thread_test {
 namespace {
 
 class NoThread : public ::testing::TestWithParam<const char*> {};
@@ -34,4 +34,4 @@ INSTANTIATE_TEST_SUITE_P(Of, NoThread, ::testing::Values("log", "network", "hapt
 });
 
 }  // namespace
-}  // namespace tendon::e2e
+}  // namespace tendon::e2e::no_thread_test

@@ -7,7 +7,7 @@
 #include "tests/e2e/stage/stage.h"
 #include "tests/server/scratch_folder.h"
 
-namespace tendon::e2e {
+namespace tendon::e2e::pipe_test {
 namespace {
 
 // bash keeps the other end of the filter's input open: an answer can come only if no row waits for the next.
@@ -26,4 +26,4 @@ TEST(TendonLabFilter, AnswersEachRowOfALivePipeBeforeTheNextComes) {
 }
 
 }  // namespace
-}  // namespace tendon::e2e
+}  // namespace tendon::e2e::pipe_test

@@ -20,7 +20,7 @@
 #include "tests/e2e/stage/stage.h"
 #include "tests/server/scratch_folder.h"
 
-namespace tendon::e2e {
+namespace tendon::e2e::recording_test {
 namespace {
 
 using testing::ScratchFolder;
@@ -134,4 +134,4 @@ TEST(Recordings, AFloodOfHellosIsASampleAndACountAndCostsNoStep) {
 }
 
 }  // namespace
-}  // namespace tendon::e2e
+}  // namespace tendon::e2e::recording_test

@@ -5,7 +5,7 @@
 #include "tests/e2e/stage/stage.h"
 #include "tests/server/scratch_folder.h"
 
-namespace tendon::e2e {
+namespace tendon::e2e::replay_test {
 namespace {
 
 // Late wake-ups, paused machines and real datagrams included: whatever a server has lived through is in its recording.
@@ -27,4 +27,4 @@ TEST(TendonReplay, TakesEveryStepOfARealServerAgainBitForBit) {
 }
 
 }  // namespace
-}  // namespace tendon::e2e
+}  // namespace tendon::e2e::replay_test

@@ -9,7 +9,7 @@
 #include "tests/e2e/stage/stage.h"
 #include "tests/server/scratch_folder.h"
 
-namespace tendon::e2e {
+namespace tendon::e2e::safety_test {
 namespace {
 
 using testing::ScratchFolder;
@@ -77,4 +77,4 @@ TEST(Safety, OneThatArmsAtTheStartOrByItsButtonDoes) {
 }
 
 }  // namespace
-}  // namespace tendon::e2e
+}  // namespace tendon::e2e::safety_test

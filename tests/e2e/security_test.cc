@@ -12,7 +12,7 @@
 
 // Real programs and suite 1: making keys, who gets in, who does not.
 
-namespace tendon::e2e {
+namespace tendon::e2e::security_test {
 namespace {
 
 using testing::ScratchFolder;
@@ -159,4 +159,4 @@ TEST(Security, KeygenRefusesANameThatIsNoneAndAFileThatIsThere) {
 }
 
 }  // namespace
-}  // namespace tendon::e2e
+}  // namespace tendon::e2e::security_test

@@ -18,7 +18,7 @@
 #include "tests/e2e/stage/stage.h"
 #include "tests/server/scratch_folder.h"
 
-namespace tendon::e2e {
+namespace tendon::e2e::service_test {
 namespace {
 
 class Manager {
@@ -91,4 +91,4 @@ TEST(Service, WithoutAWatchdogNothingIsSaidBetweenTheBeginningAndTheEnd) {
 }
 
 }  // namespace
-}  // namespace tendon::e2e
+}  // namespace tendon::e2e::service_test

@@ -13,7 +13,7 @@
 #include "tests/e2e/stage/stage.h"
 #include "tests/server/scratch_folder.h"
 
-namespace tendon::e2e {
+namespace tendon::e2e::softbody_test {
 namespace {
 
 using testing::ScratchFolder;
@@ -123,4 +123,4 @@ TEST(Softbody, ExplainsASceneWithoutAServerAndNamesTheLineOfAMistake) {
 }
 
 }  // namespace
-}  // namespace tendon::e2e
+}  // namespace tendon::e2e::softbody_test

@@ -16,7 +16,7 @@
 
 // A hand that leads the device of another server, in real processes.
 
-namespace tendon::e2e {
+namespace tendon::e2e::teleoperation_test {
 namespace {
 
 std::filesystem::path scene(const std::string& name) { return demo_scene().parent_path() / name; }
@@ -209,4 +209,4 @@ TEST(Teleoperation, AFollowerThatWasKilledIsCoupledAgainAndEngagedByNobody) {
 }
 
 }  // namespace
-}  // namespace tendon::e2e
+}  // namespace tendon::e2e::teleoperation_test

@@ -13,7 +13,7 @@
 #include "tests/e2e/stage/stage.h"
 #include "tests/server/scratch_folder.h"
 
-namespace tendon::e2e {
+namespace tendon::e2e::threads_test {
 namespace {
 
 /// … as soon as they are the expected ones.
@@ -90,4 +90,4 @@ TEST(Threads, OfAServerAreThoseOfThePage) {
 }
 
 }  // namespace
-}  // namespace tendon::e2e
+}  // namespace tendon::e2e::threads_test

@@ -15,7 +15,7 @@
 #include "tests/e2e/stage/stage.h"
 #include "tests/server/scratch_folder.h"
 
-namespace tendon::e2e {
+namespace tendon::e2e::tools_test {
 namespace {
 
 using testing::ScratchFolder;
@@ -90,4 +90,4 @@ TEST(Tools, TheBenchEndsWhenItsReaderGoes) {
 }
 
 }  // namespace
-}  // namespace tendon::e2e
+}  // namespace tendon::e2e::tools_test

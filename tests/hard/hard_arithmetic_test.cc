@@ -29,7 +29,7 @@
 #include "tests/hard/row.h"
 #include "tests/tools/worlds/world.h"
 
-namespace tendon {
+namespace tendon::hard_arithmetic_test {
 namespace {
 
 using hard::report;
@@ -336,4 +336,4 @@ TEST(HardArithmetic, NaNIsCountedAndLeavesServerAndEngineAsTheyWere) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::hard_arithmetic_test

@@ -14,7 +14,7 @@
 #include "tests/support/dice.h"
 #include "tests/tools/worlds/adversary.h"
 
-namespace tendon::hard {
+namespace tendon::hard::hard_device_test {
 namespace {
 
 /// Along the normal: 12 mm into the wall, and from `since` on out and in, and at rest again `then` later.
@@ -379,4 +379,4 @@ TEST(HardLoop, AnHourOfDissipationPaysForNoBurst) {
 }
 
 }  // namespace
-}  // namespace tendon::hard
+}  // namespace tendon::hard::hard_device_test

@@ -13,7 +13,7 @@
 #include "tests/hard/loop_case.h"
 #include "tests/hard/row.h"
 
-namespace tendon::hard {
+namespace tendon::hard::hard_loop_test {
 namespace {
 
 Observed rate_collapse(std::uint64_t seed, bool limiter) {
@@ -228,4 +228,4 @@ TEST(HardLoop, PullingThroughAThinPlateThatSticksStaysPassive) {
 }
 
 }  // namespace
-}  // namespace tendon::hard
+}  // namespace tendon::hard::hard_loop_test

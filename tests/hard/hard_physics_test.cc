@@ -31,7 +31,7 @@
 #include "tests/hard/row.h"
 #include "tests/support/dice.h"
 
-namespace tendon::softbody {
+namespace tendon::softbody::hard_physics_test {
 namespace {
 
 using hard::report;
@@ -544,4 +544,4 @@ TEST(HardPhysics, AToolThatJumps20MillimetresDeepMeetsAFiniteForce) {
 }
 
 }  // namespace
-}  // namespace tendon::softbody
+}  // namespace tendon::softbody::hard_physics_test

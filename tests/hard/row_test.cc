@@ -5,7 +5,7 @@
 #include <set>
 #include <string>
 
-namespace tendon::hard {
+namespace tendon::hard::row_test {
 namespace {
 
 TEST(HardTable, HasALineForTheseTestsAndForNoOther) {
@@ -27,4 +27,4 @@ TEST(HardTable, HasALineForTheseTestsAndForNoOther) {
 }
 
 }  // namespace
-}  // namespace tendon::hard
+}  // namespace tendon::hard::row_test

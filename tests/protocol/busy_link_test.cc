@@ -8,7 +8,7 @@
 #include <deque>
 #include <vector>
 
-namespace tendon {
+namespace tendon::busy_link_test {
 namespace {
 
 using std::chrono::microseconds;
@@ -135,4 +135,4 @@ TEST(BusyLink, SendsAtOnceAndReceivesWithoutALook) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::busy_link_test

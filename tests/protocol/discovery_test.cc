@@ -9,7 +9,7 @@
 #include <string_view>
 #include <vector>
 
-namespace tendon::dns_sd {
+namespace tendon::dns_sd::discovery_test {
 namespace {
 
 std::string refusal(const std::string& text) {
@@ -135,4 +135,4 @@ TEST(Discovery, TheDataOfATextRecordAreStringsWithTheirLengths) {
 }
 
 }  // namespace
-}  // namespace tendon::dns_sd
+}  // namespace tendon::dns_sd::discovery_test

@@ -5,7 +5,7 @@
 
 #include "tests/protocol/examples.h"
 
-namespace tendon {
+namespace tendon::handshake_test {
 namespace {
 
 using examples::Bytes;
@@ -297,4 +297,4 @@ TEST_F(Handshake, ImpossibleSettingsAreRefusedAtOnce) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::handshake_test

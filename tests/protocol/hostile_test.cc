@@ -10,7 +10,7 @@
 
 // Bytes that nobody of ours would send: never a crash, always counted, never a value out of bounds.
 
-namespace tendon {
+namespace tendon::hostile_test {
 namespace {
 
 using examples::Bytes;
@@ -148,4 +148,4 @@ TEST(HostileBytes, ADatagramFullOfEmptyFramesIsMalformed) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::hostile_test

@@ -5,7 +5,7 @@
 
 #include <stdexcept>
 
-namespace tendon {
+namespace tendon::link_test {
 namespace {
 
 TEST(Address, ReadsBackWhatItWrites) {
@@ -67,4 +67,4 @@ TEST(Address, KnowsWhatStaysOnThisMachine) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::link_test

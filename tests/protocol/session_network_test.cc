@@ -5,7 +5,7 @@
 #include "tests/protocol/examples.h"
 #include "tests/protocol/world.h"
 
-namespace tendon {
+namespace tendon::session_network_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -196,4 +196,4 @@ TEST(SessionOverABadNetwork, OneSeedIsOneWorld) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::session_network_test

@@ -9,7 +9,7 @@
 #include "tests/protocol/examples.h"
 #include "tests/protocol/wire/raw_protobuf.h"
 
-namespace tendon {
+namespace tendon::session_test {
 namespace {
 
 using examples::Bytes;
@@ -762,4 +762,4 @@ TEST(Session, ImpossibleSettingsAreRefusedAtOnce) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::session_test

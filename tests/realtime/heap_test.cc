@@ -14,7 +14,7 @@
 #include "server/haptic_loop.h"
 #include "tests/realtime/heap_guard.h"
 
-namespace tendon {
+namespace tendon::heap_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -238,4 +238,4 @@ TEST(HapticController, NoLawAndNoPartMakesAHeapCallInTheLoop) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::heap_test

@@ -8,7 +8,7 @@
 #include "devices/safety/safe_device.h"
 #include "devices/simulated/simulated_device.h"
 
-namespace tendon {
+namespace tendon::haptic_loop_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -292,4 +292,4 @@ TEST(HapticLoop, AForceThatComesWithTheReleaseOfItsSourceIsNotFresh) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::haptic_loop_test

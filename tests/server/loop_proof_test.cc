@@ -9,7 +9,7 @@
 #include "tests/support/callgrind.h"
 #include "tests/support/instruction_test.h"
 
-namespace tendon {
+namespace tendon::loop_proof_test {
 namespace {
 
 constexpr double kSteps = 3000 - 1000;  // between the two run lengths of loop-proof
@@ -38,4 +38,4 @@ TEST_F(LoopProof, APointsStepIsNoSlowerAndAWholeHandleCostsTwoAndAHalf) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::loop_proof_test

@@ -11,7 +11,7 @@
 #include "tests/support/callgrind.h"
 #include "tests/support/instruction_test.h"
 
-namespace tendon {
+namespace tendon::turn_proof_test {
 namespace {
 
 constexpr std::uint64_t kTurns = 600;       // of the longer run of turn-proof
@@ -44,4 +44,4 @@ TEST_F(TurnProof, AStateAndItsForceTakeTwoDatagramsAndFewInstructions) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::turn_proof_test

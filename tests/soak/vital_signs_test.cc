@@ -8,7 +8,7 @@
 #include <atomic>
 #include <thread>
 
-namespace tendon::soak {
+namespace tendon::soak::vital_signs_test {
 namespace {
 
 constexpr VitalSigns kGrowth{.resident = 1000};
@@ -68,4 +68,4 @@ TEST(VitalSigns, ThatWereLookedAtTooRarelySayNothing) {
 }
 
 }  // namespace
-}  // namespace tendon::soak
+}  // namespace tendon::soak::vital_signs_test

@@ -9,7 +9,7 @@
 #include <functional>
 #include <string>
 
-namespace tendon {
+namespace tendon::files_test {
 namespace {
 
 /// A folder of its own, gone at the end.
@@ -55,4 +55,4 @@ TEST_F(Files, AnOutputReplacesOnlyWhatTheToolWrites) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::files_test

@@ -8,7 +8,7 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
-namespace tendon {
+namespace tendon::json_line_test {
 namespace {
 
 TEST(JsonLine, MembersComeInTheOrderInWhichTheyWereAdded) {
@@ -52,4 +52,4 @@ TEST(JsonLine, NumbersAreReadBackTheSame) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::json_line_test

@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-namespace tendon {
+namespace tendon::units_test {
 namespace {
 
 std::string outcome(std::uint64_t unit) { return "unit " + std::to_string(unit * unit); }
@@ -159,4 +159,4 @@ TEST(Shards, ThatLackAUnitHaveOneTwiceOrAnotherOutcomeAreRefused) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::units_test

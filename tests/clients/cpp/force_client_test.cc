@@ -14,7 +14,7 @@
 #include "protocol/limits.h"
 #include "tests/clients/cpp/a_and_z.h"
 
-namespace tendon {
+namespace tendon::force_client_test {
 namespace {
 
 using a_and_z::Server;
@@ -728,4 +728,4 @@ TEST(ForceClient, ASlowEngineIsNoDelayOfTheNetwork) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::force_client_test

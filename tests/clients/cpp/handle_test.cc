@@ -4,7 +4,7 @@
 #include "clients/cpp/force_client.h"
 #include "tests/clients/cpp/a_and_z.h"
 
-namespace tendon {
+namespace tendon::handle_test {
 namespace {
 
 using a_and_z::Weather;
@@ -73,4 +73,4 @@ TEST(ForceClientHandle, SaysWhatItCannotSendAndSendsTheForce) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::handle_test

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-namespace tendon {
+namespace tendon::options_test {
 namespace {
 
 struct Parsed {
@@ -133,4 +133,4 @@ TEST(CommandLine, AKeyThatIsAPipeOrAFolderIsRefusedAtOnce) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::options_test

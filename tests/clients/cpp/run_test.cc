@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-namespace tendon {
+namespace tendon::run_test {
 namespace {
 
 TEST(Run, EndsWithOneAndNamesTheHostThatIsNotThere) {
@@ -89,4 +89,4 @@ TEST(Run, WithHandsTogetherEachHasItsDeviceAndItsServer) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::run_test

@@ -8,7 +8,7 @@
 
 #include "clients/cpp/udp_transport.h"
 
-namespace tendon {
+namespace tendon::server_name_test {
 namespace {
 
 TEST(ServerName, OfASocketsFileIsItsPath) {
@@ -83,4 +83,4 @@ TEST(ServerName, TellsTheAddressThatANameHas) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::server_name_test

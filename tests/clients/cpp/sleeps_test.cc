@@ -16,7 +16,7 @@
 #include "server/machine/udp_link.h"
 #include "tests/clients/cpp/a_and_z.h"
 
-namespace tendon {
+namespace tendon::sleeps_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -121,4 +121,4 @@ TEST(Sleeps, TheThreadHasItsTimerSlackBackAfterwards) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::sleeps_test

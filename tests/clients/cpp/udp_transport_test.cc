@@ -14,7 +14,7 @@
 #include <string>
 #include <vector>
 
-namespace tendon {
+namespace tendon::udp_transport_test {
 namespace {
 
 /// A plain socket on loopback. Datagrams to loopback have arrived when send() returns.
@@ -188,4 +188,4 @@ TEST(UdpTransport, HearsNobodyButItsServer) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::udp_transport_test

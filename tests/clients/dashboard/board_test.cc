@@ -8,7 +8,7 @@
 #include "core/base/reason.h"
 #include "tests/clients/dashboard/full_board.h"
 
-namespace tendon::dash {
+namespace tendon::dash::board_test {
 namespace {
 
 DeviceState state(std::uint64_t tick, std::uint32_t device = 0) {
@@ -182,4 +182,4 @@ TEST(PairAccount, IsNotSaidWhereItIsNotKnown) {
 }
 
 }  // namespace
-}  // namespace tendon::dash
+}  // namespace tendon::dash::board_test

@@ -9,7 +9,7 @@
 
 #include "protocol/wire/header.h"
 
-namespace tendon::dash {
+namespace tendon::dash::bridge_gate_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -80,4 +80,4 @@ TEST_F(BridgeGateTest, KeepsNoMoreThanItsBytesForAPageThatDoesNotRead) {
 }
 
 }  // namespace
-}  // namespace tendon::dash
+}  // namespace tendon::dash::bridge_gate_test

@@ -9,7 +9,7 @@
 
 #include "tests/clients/dashboard/full_board.h"
 
-namespace tendon::dash {
+namespace tendon::dash::feed_test {
 namespace {
 
 using nlohmann::json;
@@ -182,4 +182,4 @@ TEST_F(FeedTest, SendsAwayWhoSpeaksTooFast) {
 }
 
 }  // namespace
-}  // namespace tendon::dash
+}  // namespace tendon::dash::feed_test

@@ -10,7 +10,7 @@
 #include "foxglove.pb.h"
 #include "recording.pb.h"
 
-namespace tendon::dash {
+namespace tendon::dash::foxglove_feed_test {
 namespace {
 
 using nlohmann::json;
@@ -272,4 +272,4 @@ TEST_F(FoxgloveFeedTest, ObjectsInSentencesAndClosesWhoDoesNotStop) {
 }
 
 }  // namespace
-}  // namespace tendon::dash
+}  // namespace tendon::dash::foxglove_feed_test

@@ -14,7 +14,7 @@
 #include "recording.pb.h"
 #include "tendon.pb.h"
 
-namespace tendon::dash {
+namespace tendon::dash::foxglove_message_test {
 namespace {
 
 constexpr std::array kKinds = {FoxgloveKind::kStep, FoxgloveKind::kDevice, FoxgloveKind::kPeer,
@@ -225,4 +225,4 @@ TEST(FoxgloveMessage, AStylusLiesBehindItsTipAndABallHasNoDirection) {
 }
 
 }  // namespace
-}  // namespace tendon::dash
+}  // namespace tendon::dash::foxglove_message_test

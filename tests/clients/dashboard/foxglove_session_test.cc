@@ -7,7 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-namespace tendon::dash {
+namespace tendon::dash::foxglove_session_test {
 namespace {
 
 using nlohmann::json;
@@ -132,4 +132,4 @@ TEST(FoxgloveSession, TextsComeFirstInTheirOrderAndOnlyTheNewestOfTheServer) {
 }
 
 }  // namespace
-}  // namespace tendon::dash
+}  // namespace tendon::dash::foxglove_session_test

@@ -10,7 +10,7 @@
 #include <string_view>
 #include <variant>
 
-namespace tendon::dash {
+namespace tendon::dash::foxglove_text_test {
 namespace {
 
 using nlohmann::json;
@@ -113,4 +113,4 @@ TEST(FoxgloveText, NoBytesMakeTheReaderThrow) {
 }
 
 }  // namespace
-}  // namespace tendon::dash
+}  // namespace tendon::dash::foxglove_text_test

@@ -10,7 +10,7 @@
 
 #include "tests/clients/dashboard/full_board.h"
 
-namespace tendon::dash {
+namespace tendon::dash::metrics_test {
 namespace {
 
 bool has_line(const std::string& text, const std::string& line) {
@@ -107,4 +107,4 @@ TEST(DashMetrics, EscapeTheNamesOfStrangers) {
 }
 
 }  // namespace
-}  // namespace tendon::dash
+}  // namespace tendon::dash::metrics_test

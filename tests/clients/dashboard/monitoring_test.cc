@@ -19,7 +19,7 @@
 
 // deploy/monitoring asks for nothing that is not there.
 
-namespace tendon::dash {
+namespace tendon::dash::monitoring_test {
 namespace {
 
 std::string read(const std::string& name) {
@@ -180,4 +180,4 @@ TEST(Monitoring, TheFoxgloveLayoutPlotsStepsLiveAndRecorded) {
 }
 
 }  // namespace
-}  // namespace tendon::dash
+}  // namespace tendon::dash::monitoring_test

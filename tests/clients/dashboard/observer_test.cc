@@ -15,7 +15,7 @@
 
 // The observer against the server's own network half, on virtual time, over a perfect network.
 
-namespace tendon::dash {
+namespace tendon::dash::observer_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -252,4 +252,4 @@ TEST_F(ObserverTest, SaysByeWhenItStops) {
 }
 
 }  // namespace
-}  // namespace tendon::dash
+}  // namespace tendon::dash::observer_test

@@ -18,7 +18,7 @@
 // The operator beside the observer and an engine, against the server's own two halves and its safety layer, on virtual
 // time.
 
-namespace tendon::dash {
+namespace tendon::dash::operator_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -375,4 +375,4 @@ TEST_F(OperatorTest, DisengagingEndsAnEngagingAndADisarmingBoth) {
 }
 
 }  // namespace
-}  // namespace tendon::dash
+}  // namespace tendon::dash::operator_test

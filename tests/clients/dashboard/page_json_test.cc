@@ -11,7 +11,7 @@
 #include "core/base/reason.h"
 #include "tests/clients/dashboard/full_board.h"
 
-namespace tendon::dash {
+namespace tendon::dash::page_json_test {
 namespace {
 
 using nlohmann::json;
@@ -263,4 +263,4 @@ TEST(PageJson, ListsRecordings) {
 }
 
 }  // namespace
-}  // namespace tendon::dash
+}  // namespace tendon::dash::page_json_test

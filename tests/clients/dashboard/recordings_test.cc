@@ -11,7 +11,7 @@
 
 #include "tests/server/scratch_folder.h"
 
-namespace tendon::dash {
+namespace tendon::dash::recordings_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -92,4 +92,4 @@ TEST(ByteRange, IsReadAsRfc9110Says) {
 }
 
 }  // namespace
-}  // namespace tendon::dash
+}  // namespace tendon::dash::recordings_test

@@ -12,7 +12,7 @@
 
 #include "tests/server/scratch_folder.h"
 
-namespace tendon::dash {
+namespace tendon::dash::routes_test {
 namespace {
 
 constexpr std::array<PageFile, 2> kPage = {
@@ -341,4 +341,4 @@ TEST_F(RoutesTest, ViewersComeFromThisPageOrFromAnOriginThatIsNamed) {
 }
 
 }  // namespace
-}  // namespace tendon::dash
+}  // namespace tendon::dash::routes_test

@@ -12,7 +12,7 @@
 
 #include "clients/cpp/machine.h"
 
-namespace tendon::plug {
+namespace tendon::plug::desk_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -77,4 +77,4 @@ TEST(Desk, WakesForAProgramThatHasSomethingToSay) {
 }
 
 }  // namespace
-}  // namespace tendon::plug
+}  // namespace tendon::plug::desk_test

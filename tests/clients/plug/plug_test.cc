@@ -9,7 +9,7 @@
 
 #include "tests/clients/plug/world.h"
 
-namespace tendon::plug {
+namespace tendon::plug::plug_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -250,4 +250,4 @@ TEST(Plug, SaysByeToTheServerAndIsSilentAfterwards) {
 }
 
 }  // namespace
-}  // namespace tendon::plug
+}  // namespace tendon::plug::plug_test

@@ -16,7 +16,7 @@
 
 #include "tests/support/dice.h"
 
-namespace tendon::plug {
+namespace tendon::plug::view_test {
 namespace {
 
 /// All 24 ways in which a device can lie before the operator with its axes along the operator's.
@@ -118,4 +118,4 @@ TEST(View, TurnsTheStylusAboutTheProgramsOwnAxis) {
 }
 
 }  // namespace
-}  // namespace tendon::plug
+}  // namespace tendon::plug::view_test

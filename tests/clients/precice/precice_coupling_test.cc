@@ -11,7 +11,7 @@
 
 #include "clients/precice/precice_engine.h"
 
-namespace tendon::precice_worker {
+namespace tendon::precice_worker::precice_coupling_test {
 namespace {
 
 /// What spring_body_main.cc is made of, N/m.
@@ -55,4 +55,4 @@ TEST(PreciceCoupling, EachForceAnswersTheStateOfItsOwnWindow) {
 }
 
 }  // namespace
-}  // namespace tendon::precice_worker
+}  // namespace tendon::precice_worker::precice_coupling_test

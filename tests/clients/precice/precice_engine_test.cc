@@ -7,7 +7,7 @@
 #include <stdexcept>
 #include <string>
 
-namespace tendon::precice_worker {
+namespace tendon::precice_worker::precice_engine_test {
 namespace {
 
 class PreciceEngineWithAPartner : public testing::Test {
@@ -72,4 +72,4 @@ TEST_F(PreciceEngineWithAPartner, NamesAreThoseOfItsConfiguration) {
 }
 
 }  // namespace
-}  // namespace tendon::precice_worker
+}  // namespace tendon::precice_worker::precice_engine_test

@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-namespace tendon::precice_worker {
+namespace tendon::precice_worker::touched_patch_test {
 namespace {
 
 DeviceState at(double x, double y = 0, double z = 0) {
@@ -135,4 +135,4 @@ TEST(TouchedPatch, AnImpossibleOneIsRefusedWithItsFieldAndValue) {
 }
 
 }  // namespace
-}  // namespace tendon::precice_worker
+}  // namespace tendon::precice_worker::touched_patch_test

@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-namespace tendon::softbody {
+namespace tendon::softbody::answered_test {
 namespace {
 
 constexpr NearModel::Size kNear{.made = 5, .late = 1, .linear = 3};
@@ -31,4 +31,4 @@ TEST(Answered, ABodyWithoutEitherHasNothingToSay) {
 }
 
 }  // namespace
-}  // namespace tendon::softbody
+}  // namespace tendon::softbody::answered_test

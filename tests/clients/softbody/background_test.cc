@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-namespace tendon::softbody {
+namespace tendon::softbody::background_test {
 namespace {
 
 TEST(BackgroundThread, DoesWhatItIsGivenInItsOrder) {
@@ -57,4 +57,4 @@ TEST(BackgroundThread, WorkThatThrowsIsNotItsLast) {
 }
 
 }  // namespace
-}  // namespace tendon::softbody
+}  // namespace tendon::softbody::background_test

@@ -17,7 +17,7 @@
 #include "tests/clients/softbody/pressed_block.h"
 #include "tests/clients/softbody/scene_text.h"
 
-namespace tendon::softbody {
+namespace tendon::softbody::explain_test {
 namespace {
 
 using testing::kCut;
@@ -178,4 +178,4 @@ TEST(SoftbodyExplain, WhatAnEffectAddsIsTheDifferenceToTheBodyWithoutIt) {
 }
 
 }  // namespace
-}  // namespace tendon::softbody
+}  // namespace tendon::softbody::explain_test

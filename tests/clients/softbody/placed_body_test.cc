@@ -18,7 +18,7 @@
 #include "core/remote/answer.h"
 #include "tests/clients/softbody/scene_text.h"
 
-namespace tendon::softbody {
+namespace tendon::softbody::placed_body_test {
 namespace {
 
 using testing::kGood;
@@ -344,4 +344,4 @@ TEST(PlacedBody, ALiverOfALinearMaterialPassesTheSelfTestAtEveryPoint) {
 }
 
 }  // namespace
-}  // namespace tendon::softbody
+}  // namespace tendon::softbody::placed_body_test

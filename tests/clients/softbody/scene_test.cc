@@ -12,7 +12,7 @@
 #include "clients/softbody/fem/gmsh.h"
 #include "tests/clients/softbody/scene_text.h"
 
-namespace tendon::softbody {
+namespace tendon::softbody::scene_test {
 namespace {
 
 using testing::kCut;
@@ -317,4 +317,4 @@ TEST(SoftbodyScene, APipeOrAFolderIsNoSceneAndNoMesh) {
 }
 
 }  // namespace
-}  // namespace tendon::softbody
+}  // namespace tendon::softbody::scene_test

@@ -7,7 +7,7 @@
 #include <cstddef>
 #include <cstdint>
 
-namespace tendon {
+namespace tendon::bytes_test {
 namespace {
 
 TEST(Bytes, TheLowestByteIsFirst) {
@@ -35,4 +35,4 @@ TEST(Bytes, NeighboursAreLeftAlone) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::bytes_test

@@ -16,7 +16,7 @@
 
 #include "tests/support/dice.h"
 
-namespace tendon {
+namespace tendon::frames_test {
 namespace {
 
 /// All 48 ways to lay three axes along x, y and z: 24 of them right-handed.
@@ -178,4 +178,4 @@ TEST(Frames, AYawToTheLeftTurnsNegativeAboutUnitysUp) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::frames_test

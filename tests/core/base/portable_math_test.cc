@@ -10,7 +10,7 @@
 #include <limits>
 #include <numbers>
 
-namespace tendon::portable {
+namespace tendon::portable::portable_math_test {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
@@ -134,4 +134,4 @@ TEST(PortableMath, TheBitsAreThoseOfEveryOtherMachine) {
 }
 
 }  // namespace
-}  // namespace tendon::portable
+}  // namespace tendon::portable::portable_math_test

@@ -15,7 +15,7 @@
 #include "core/base/portable_math.h"
 #include "tests/support/dice.h"
 
-namespace tendon {
+namespace tendon::rotation_test {
 namespace {
 
 class Rotations : public testing::Test {
@@ -149,4 +149,4 @@ TEST_F(Rotations, NoWayRoundASpringMakesEnergy) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::rotation_test

@@ -5,7 +5,7 @@
 
 #include <concepts>
 
-namespace tendon {
+namespace tendon::time_test {
 namespace {
 
 template <typename A, typename B>
@@ -42,4 +42,4 @@ TEST(Time, SecondsAreRoundedDownBelowZeroToo) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::time_test

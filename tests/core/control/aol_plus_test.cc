@@ -16,7 +16,7 @@
 #include "core/control/aol.h"
 #include "tests/support/dice.h"
 
-namespace tendon {
+namespace tendon::aol_plus_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -614,4 +614,4 @@ TEST(AolPlus, SaysWhichFieldOfWhichPartCannotBe) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::aol_plus_test

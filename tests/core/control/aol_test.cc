@@ -9,7 +9,7 @@
 
 #include "tests/support/dice.h"
 
-namespace tendon {
+namespace tendon::aol_test {
 namespace {
 
 constexpr Duration kPeriod = std::chrono::milliseconds(1);
@@ -69,4 +69,4 @@ TEST(Aol, ThePaperFormLosesALateralForceThatTheJointFormKeeps) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::aol_test

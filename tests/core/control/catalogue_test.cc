@@ -12,7 +12,7 @@
 #include "core/control/aol_parts.h"
 #include "core/control/limiter.h"
 
-namespace tendon {
+namespace tendon::catalogue_test {
 namespace {
 
 std::string readme() {
@@ -53,4 +53,4 @@ TEST(Catalogue, EachPartOfAolPlusIsListedOnce) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::catalogue_test

@@ -4,7 +4,7 @@
 #include "tests/core/control/adversary.h"
 #include "tests/core/control/press.h"
 
-namespace tendon {
+namespace tendon::energy_bounding_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -132,4 +132,4 @@ TEST(EnergyBounding, RefusesSlopesThatContradictEachOther) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::energy_bounding_test

@@ -11,7 +11,7 @@
 #include "core/control/aol_plus.h"
 #include "core/control/preset.h"
 
-namespace tendon {
+namespace tendon::feel_parts_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -249,4 +249,4 @@ TEST(Preset, IsNeverSofterThanTheFrictionAlone) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::feel_parts_test

@@ -4,7 +4,7 @@
 #include "tests/core/control/adversary.h"
 #include "tests/core/control/press.h"
 
-namespace tendon {
+namespace tendon::force_bounding_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -189,4 +189,4 @@ TEST(ForceBounding, RefusesADeviceWithoutViscousFrictionAndAHoldOfNoLength) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::force_bounding_test

@@ -5,7 +5,7 @@
 
 #include <limits>
 
-namespace tendon {
+namespace tendon::force_limits_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -47,4 +47,4 @@ TEST(Reasons, AreReadable) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::force_limits_test

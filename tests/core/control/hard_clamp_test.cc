@@ -4,7 +4,7 @@
 #include "tests/core/control/adversary.h"
 #include "tests/core/control/press.h"
 
-namespace tendon {
+namespace tendon::hard_clamp_test {
 namespace {
 
 static_assert(StabilityController<HardClamp<1>, 1>);
@@ -41,4 +41,4 @@ TEST(HardClamp, RefusesALimitThatIsNone) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::hard_clamp_test

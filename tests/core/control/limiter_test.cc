@@ -9,7 +9,7 @@
 
 #include "tests/support/dice.h"
 
-namespace tendon {
+namespace tendon::limiter_test {
 namespace {
 
 using std::chrono::microseconds;
@@ -98,4 +98,4 @@ TEST(Limiter, ForcesUnderWayAreReservedForTheLongerHold) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::limiter_test

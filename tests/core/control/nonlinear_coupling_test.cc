@@ -4,7 +4,7 @@
 #include "tests/core/control/adversary.h"
 #include "tests/core/control/press.h"
 
-namespace tendon {
+namespace tendon::nonlinear_coupling_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -142,4 +142,4 @@ TEST(NonlinearCoupling, RefusesASlopeThatFrictionDoesNotAfford) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::nonlinear_coupling_test

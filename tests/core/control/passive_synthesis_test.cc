@@ -6,7 +6,7 @@
 #include "tests/core/control/adversary.h"
 #include "tests/core/control/press.h"
 
-namespace tendon {
+namespace tendon::passive_synthesis_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -119,4 +119,4 @@ TEST(PassiveSynthesis, RefusesNegativeDelayAndStiffness) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::passive_synthesis_test

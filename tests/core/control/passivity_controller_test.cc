@@ -6,7 +6,7 @@
 #include "tests/core/control/adversary.h"
 #include "tests/core/control/press.h"
 
-namespace tendon {
+namespace tendon::passivity_controller_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -193,4 +193,4 @@ TEST(PassivityController, RefusesADamperThatIsNone) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::passivity_controller_test

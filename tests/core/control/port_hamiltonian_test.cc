@@ -8,7 +8,7 @@
 #include "tests/core/control/adversary.h"
 #include "tests/core/control/press.h"
 
-namespace tendon {
+namespace tendon::port_hamiltonian_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -154,4 +154,4 @@ TEST(PortHamiltonian, RefusesASpringThatIsNone) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::port_hamiltonian_test

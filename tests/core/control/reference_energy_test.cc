@@ -6,7 +6,7 @@
 #include "tests/core/control/adversary.h"
 #include "tests/core/control/press.h"
 
-namespace tendon {
+namespace tendon::reference_energy_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -65,4 +65,4 @@ TEST(ReferenceEnergyController, RefusesAReferenceWithoutStiffness) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::reference_energy_test

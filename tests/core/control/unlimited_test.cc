@@ -4,7 +4,7 @@
 #include "tests/core/control/adversary.h"
 #include "tests/core/control/press.h"
 
-namespace tendon {
+namespace tendon::unlimited_test {
 namespace {
 
 static_assert(StabilityController<Unlimited<1>, 1>);
@@ -40,4 +40,4 @@ TEST(Unlimited, ShowsASoftWallAsItIsAndIsThrownOffAStiffOne) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::unlimited_test

@@ -7,7 +7,7 @@
 #include "tests/core/control/adversary.h"
 #include "tests/core/control/press.h"
 
-namespace tendon {
+namespace tendon::virtual_coupling_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -171,4 +171,4 @@ TEST(VirtualCoupling, RefusesACouplingThatIsNone) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::virtual_coupling_test

@@ -11,7 +11,7 @@
 
 #include "tests/support/dice.h"
 
-namespace tendon {
+namespace tendon::clock_offset_estimator_test {
 namespace {
 
 using std::chrono::hours;
@@ -165,4 +165,4 @@ TEST(ClockOffsetEstimator, IgnoresExchangesThatCannotHaveBeen) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::clock_offset_estimator_test

@@ -13,7 +13,7 @@
 #include "tests/core/estimation/regressors.h"
 #include "tests/support/dice.h"
 
-namespace tendon {
+namespace tendon::recursive_least_squares_test {
 namespace {
 
 /// The recursion of the textbooks: what the library does not do, to show why.
@@ -252,4 +252,4 @@ TEST(RecursiveLeastSquares, RefusesAConfigThatCannotBeMeant) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::recursive_least_squares_test

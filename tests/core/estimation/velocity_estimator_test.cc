@@ -11,7 +11,7 @@
 #include <random>
 #include <vector>
 
-namespace tendon {
+namespace tendon::velocity_estimator_test {
 namespace {
 
 using std::chrono::microseconds;
@@ -148,4 +148,4 @@ TEST(VelocityEstimator, RefusesANegativeResolution) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::velocity_estimator_test

@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-namespace tendon {
+namespace tendon::flight_recorder_test {
 namespace {
 
 TEST(FlightRecorder, KeepsTheLastValuesOldestFirst) {
@@ -30,4 +30,4 @@ TEST(FlightRecorder, AFaultFreezesWhatLedToIt) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::flight_recorder_test

@@ -7,7 +7,7 @@
 #include <cstdint>
 #include <thread>
 
-namespace tendon {
+namespace tendon::latest_test {
 namespace {
 
 TEST(Latest, IsEmptyUntilSomethingIsPutAndAgainOnceTaken) {
@@ -55,4 +55,4 @@ TEST(Latest, BetweenThreadsNoValueIsTornAndNoneComesBefore) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::latest_test

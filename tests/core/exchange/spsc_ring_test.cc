@@ -7,7 +7,7 @@
 #include <stdexcept>
 #include <thread>
 
-namespace tendon {
+namespace tendon::spsc_ring_test {
 namespace {
 
 TEST(SpscRing, GivesBackEverythingInOrder) {
@@ -70,4 +70,4 @@ TEST(SpscRing, BetweenThreadsNothingIsLostTornOrReordered) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::spsc_ring_test

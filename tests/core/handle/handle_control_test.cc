@@ -10,7 +10,7 @@
 #include "core/remote/answer.h"
 #include "tests/support/dice.h"
 
-namespace tendon {
+namespace tendon::handle_control_test {
 namespace {
 
 constexpr double kInf = std::numeric_limits<double>::infinity();
@@ -272,4 +272,4 @@ TEST(HandleControl, ALateHoldRaisesTheBoundOfAWrenchToo) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::handle_control_test

@@ -15,7 +15,7 @@
 #include "core/haptic_controller.h"
 #include "tests/support/dice.h"
 
-namespace tendon {
+namespace tendon::handle_passivity_test {
 namespace {
 
 constexpr double kInf = std::numeric_limits<double>::infinity();
@@ -197,4 +197,4 @@ TEST(HandlePassivity, ABoundOnePercentHigherCanBeBroken) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::handle_passivity_test

@@ -20,7 +20,7 @@
 #include "tests/core/teleoperation/link.h"
 #include "tests/support/dice.h"
 
-namespace tendon {
+namespace tendon::handle_purse_test {
 namespace {
 
 constexpr double kUnlimited = std::numeric_limits<double>::infinity();
@@ -325,4 +325,4 @@ TEST(HandlePurseScene, AWrenchAndAGripShareWhereThePointDoes) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::handle_purse_test

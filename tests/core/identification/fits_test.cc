@@ -10,7 +10,7 @@
 #include "core/identification/kelly_fit.h"
 #include "tests/core/identification/exact_ramp.h"
 
-namespace tendon {
+namespace tendon::fits_test {
 namespace {
 
 using testing::ExactRamp;
@@ -123,4 +123,4 @@ TEST(IntegralFit, RefusesAMassThatIsNone) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::fits_test

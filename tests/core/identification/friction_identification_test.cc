@@ -9,7 +9,7 @@
 
 #include "tests/core/identification/exact_ramp.h"
 
-namespace tendon {
+namespace tendon::friction_identification_test {
 namespace {
 
 using testing::ExactRamp;
@@ -137,4 +137,4 @@ TEST(Identification, NamesTheRunThatItCannotUse) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::friction_identification_test

@@ -10,7 +10,7 @@
 
 #include "tests/core/identification/exact_ramp.h"
 
-namespace tendon {
+namespace tendon::ramp_run_test {
 namespace {
 
 using testing::ExactRamp;
@@ -119,4 +119,4 @@ TEST(Ramp, RefusesAForceThatIsNone) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::ramp_run_test

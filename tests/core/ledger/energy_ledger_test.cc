@@ -5,7 +5,7 @@
 
 #include <limits>
 
-namespace tendon {
+namespace tendon::energy_ledger_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -86,4 +86,4 @@ TEST(EnergyLedger, RefusesImpossibleFriction) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::energy_ledger_test

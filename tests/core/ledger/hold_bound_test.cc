@@ -6,7 +6,7 @@
 #include <cmath>
 #include <limits>
 
-namespace tendon {
+namespace tendon::hold_bound_test {
 namespace {
 
 using std::chrono::microseconds;
@@ -61,4 +61,4 @@ TEST(HoldBound, RefusesImpossibleValues) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::hold_bound_test

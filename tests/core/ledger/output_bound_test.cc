@@ -12,7 +12,7 @@
 #include "core/ledger/energy_ledger.h"
 #include "tests/support/dice.h"
 
-namespace tendon {
+namespace tendon::output_bound_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -239,4 +239,4 @@ TEST(OutputBound, AlmostNoBudgetPermitsFrictionAndNoMoreThanEachPartAlone) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::output_bound_test

@@ -10,7 +10,7 @@
 
 #include "tests/support/dice.h"
 
-namespace tendon {
+namespace tendon::adaptive_local_model_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -155,4 +155,4 @@ TEST(AdaptiveLocalModel, RefusesAConfigThatCannotBeMeant) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::adaptive_local_model_test

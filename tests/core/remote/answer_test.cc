@@ -9,7 +9,7 @@
 
 #include "tests/support/dice.h"
 
-namespace tendon {
+namespace tendon::answer_test {
 namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
@@ -223,4 +223,4 @@ TEST(Answer, IsSoundOnlyWithEveryNumberInItsRange) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::answer_test

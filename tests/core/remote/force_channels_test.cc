@@ -8,7 +8,7 @@
 
 #include "core/haptic_controller.h"
 
-namespace tendon {
+namespace tendon::force_channels_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -146,4 +146,4 @@ TEST(ForceChannels, NoEngineAndNoHandoverOverdrawsTheLedgerOrJumps) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::force_channels_test

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <limits>
 
-namespace tendon {
+namespace tendon::held_force_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -276,4 +276,4 @@ TEST(HeldForce, RefusesWhatCannotBeMeant) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::held_force_test

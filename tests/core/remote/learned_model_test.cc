@@ -15,7 +15,7 @@
 #include "core/remote/held_force.h"
 #include "tests/support/dice.h"
 
-namespace tendon {
+namespace tendon::learned_model_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -226,4 +226,4 @@ TEST(HeldForce, ALearnedModelLeavesAnAnswerThatBringsItsOwnModelToThat) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::learned_model_test

@@ -12,7 +12,7 @@
 
 #include "tests/support/dice.h"
 
-namespace tendon {
+namespace tendon::output_estimator_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -297,4 +297,4 @@ TEST(OutputEstimator, RefusesAConfigThatCannotBeMeant) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::output_estimator_test

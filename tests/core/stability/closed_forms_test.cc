@@ -13,7 +13,7 @@
 
 /// The closed forms against each other and against the numbers of control.md 6, which another program computed.
 
-namespace tendon {
+namespace tendon::closed_forms_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -256,4 +256,4 @@ TEST(StabilityLaws, RefuseWhatTheyKnowNothingOf) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::closed_forms_test

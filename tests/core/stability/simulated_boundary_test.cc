@@ -12,7 +12,7 @@
 
 /// The simulated device must have the boundaries of the closed forms: stable below, unstable above.
 
-namespace tendon {
+namespace tendon::simulated_boundary_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -123,4 +123,4 @@ TEST(PassiveStiffness, IsWhatRemainsStableForAHandOfAnyMass) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::simulated_boundary_test

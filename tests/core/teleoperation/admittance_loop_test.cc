@@ -15,7 +15,7 @@
 #include "devices/simulated/profiles.h"
 #include "tests/support/dice.h"
 
-namespace tendon {
+namespace tendon::admittance_loop_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -363,4 +363,4 @@ TEST(AdmittanceLoop, LendingOnTheKineticEnergyIsNotPassive) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::admittance_loop_test

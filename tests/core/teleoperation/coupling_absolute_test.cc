@@ -10,7 +10,7 @@
 #include "tests/core/teleoperation/expect_ports.h"
 #include "tests/core/teleoperation/ports.h"
 
-namespace tendon {
+namespace tendon::coupling_absolute_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -173,4 +173,4 @@ TEST(CouplingAbsolute, RefusesAClutchAndMethodsWithoutPlaces) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::coupling_absolute_test

@@ -11,7 +11,7 @@
 #include "core/base/rotation.h"
 #include "tests/core/teleoperation/ports.h"
 
-namespace tendon {
+namespace tendon::coupling_force_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -427,4 +427,4 @@ TEST(CouplingForce, TheForceOfALawIsNeverAboveItsMost) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::coupling_force_test

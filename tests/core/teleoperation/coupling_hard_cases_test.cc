@@ -13,7 +13,7 @@
 #include "tests/core/teleoperation/ports.h"
 #include "tests/core/teleoperation/pressing.h"
 
-namespace tendon {
+namespace tendon::coupling_hard_cases_test {
 namespace {
 
 struct HardCase {
@@ -179,4 +179,4 @@ TEST(CouplingHardCases, AFollowerForgetsThemToo) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::coupling_hard_cases_test

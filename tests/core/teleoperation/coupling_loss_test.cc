@@ -12,7 +12,7 @@
 #include "tests/core/teleoperation/expect_ports.h"
 #include "tests/core/teleoperation/ports.h"
 
-namespace tendon {
+namespace tendon::coupling_loss_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -301,4 +301,4 @@ TEST(Coupling, AnActThatWasMadeForAFormerFollowerDoesNotEngageTheNewOne) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::coupling_loss_test

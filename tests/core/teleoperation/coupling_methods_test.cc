@@ -20,7 +20,7 @@
 #include "tests/core/teleoperation/pressing.h"
 #include "tests/core/teleoperation/recorded_rig.h"
 
-namespace tendon {
+namespace tendon::coupling_methods_test {
 namespace {
 
 double median(std::vector<double> of) {
@@ -257,4 +257,4 @@ TEST(CouplingMethods, ALineNeedsAnImpedance) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::coupling_methods_test

@@ -16,7 +16,7 @@
 #include "tests/core/teleoperation/ports.h"
 #include "tests/core/teleoperation/pressing.h"
 
-namespace tendon {
+namespace tendon::coupling_more_methods_test {
 namespace {
 
 constexpr double kFriction = 0.02;  // N, Coulomb, of each port here
@@ -494,4 +494,4 @@ TEST(CouplingMaxDelay, AWayThatHasBecomeShortAgainCouplesAndWaitsForAnAct) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::coupling_more_methods_test

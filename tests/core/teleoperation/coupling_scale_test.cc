@@ -11,7 +11,7 @@
 #include "tests/core/teleoperation/ports.h"
 #include "tests/support/dice.h"
 
-namespace tendon {
+namespace tendon::coupling_scale_test {
 namespace {
 
 constexpr double kTurn = 6.283185307179586;
@@ -183,4 +183,4 @@ TEST(CouplingScale, NoChangeOfScaleMakesEnergyInAHundredDrawnPairs) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::coupling_scale_test

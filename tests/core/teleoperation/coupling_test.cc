@@ -15,7 +15,7 @@
 #include "tests/core/teleoperation/expect_ports.h"
 #include "tests/core/teleoperation/ports.h"
 
-namespace tendon {
+namespace tendon::coupling_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -407,4 +407,4 @@ TEST(Coupling, RefusesImpossibleConfigurations) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::coupling_test

@@ -17,7 +17,7 @@
 #include "tests/core/teleoperation/ports.h"
 #include "tests/support/dice.h"
 
-namespace tendon {
+namespace tendon::coupling_world_test {
 namespace {
 
 /// Says which promise a world breaks first; empty: none.
@@ -275,4 +275,4 @@ TEST(CouplingWorlds, NoAccountNoPairAndNoForceWithoutAnAct) { expect_worlds_keep
 TEST(CouplingWorlds, DISABLED_Thousands) { expect_worlds_keep_their_promises(5000, 3000); }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::coupling_world_test

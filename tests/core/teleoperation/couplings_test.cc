@@ -16,7 +16,7 @@
 
 #include "tests/core/teleoperation/star.h"
 
-namespace tendon {
+namespace tendon::couplings_test {
 namespace {
 
 constexpr double kCoulomb = 0.02;  // N, of each device
@@ -458,4 +458,4 @@ TEST(Couplings, NoWorldWithTwoToFourLeadersGivesOutEnergy) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::couplings_test

@@ -11,7 +11,7 @@
 
 #include "tests/core/teleoperation/whole_ports.h"
 
-namespace tendon {
+namespace tendon::grip_coupling_test {
 namespace {
 
 constexpr double kNanojoule = 1e-9;
@@ -233,4 +233,4 @@ TEST(GripCoupling, AStateThatTheGripsPurseRefusesChangesNothing) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::grip_coupling_test

@@ -17,7 +17,7 @@
 #include "tests/core/teleoperation/pair.h"
 #include "tests/core/teleoperation/wave_pair.h"
 
-namespace tendon {
+namespace tendon::hard_cases_test {
 namespace {
 
 constexpr double kLeast = -1e-9;  // J
@@ -241,4 +241,4 @@ INSTANTIATE_TEST_SUITE_P(All, HardCases, testing::ValuesIn(kHardCases), name_of)
 INSTANTIATE_TEST_SUITE_P(All, HardCasesOfWaves, testing::ValuesIn(of_waves()), name_of);
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::hard_cases_test

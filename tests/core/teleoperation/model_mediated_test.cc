@@ -14,7 +14,7 @@
 #include "core/ledger/energy_ledger.h"
 #include "tests/support/dice.h"
 
-namespace tendon {
+namespace tendon::model_mediated_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -287,4 +287,4 @@ TEST(ModelMediated, SaysWhatIsWrongWithItsConfiguration) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::model_mediated_test

@@ -15,7 +15,7 @@
 #include <iostream>
 #include <numbers>
 
-namespace tendon {
+namespace tendon::pair_test {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
@@ -373,4 +373,4 @@ TEST(Pair, TheHandFeelsTheImpedanceThatLawrenceGives) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::pair_test

@@ -12,7 +12,7 @@
 #include "core/ledger/output_bound.h"
 #include "tests/support/dice.h"
 
-namespace tendon {
+namespace tendon::passive_set_position_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -264,4 +264,4 @@ TEST(PassiveSetPosition, AsksForASpringThatFrictionCanHold) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::passive_set_position_test

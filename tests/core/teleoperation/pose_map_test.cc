@@ -11,7 +11,7 @@
 #include "tests/core/control/adversary.h"
 #include "tests/support/dice.h"
 
-namespace tendon {
+namespace tendon::pose_map_test {
 namespace {
 
 PoseMap::Config drawn(Dice& dice) {
@@ -92,4 +92,4 @@ TEST(PoseMap, RefusesImpossibleConfigurations) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::pose_map_test

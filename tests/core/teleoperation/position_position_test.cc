@@ -12,7 +12,7 @@
 
 #include "tests/core/control/adversary.h"
 
-namespace tendon {
+namespace tendon::position_position_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -195,4 +195,4 @@ TEST(PositionPosition, RefusesImpossibleConfigurations) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::position_position_test

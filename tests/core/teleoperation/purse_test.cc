@@ -14,7 +14,7 @@
 #include "tests/core/control/adversary.h"
 #include "tests/support/dice.h"
 
-namespace tendon {
+namespace tendon::purse_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -361,4 +361,4 @@ TEST(SharedAccount, WhatAolPlusNeedsCountsItsPartsIn) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::purse_test

@@ -19,7 +19,7 @@
 #include "tests/core/teleoperation/link.h"
 #include "tests/support/dice.h"
 
-namespace tendon {
+namespace tendon::purse_world_test {
 namespace {
 
 constexpr double kInf = std::numeric_limits<double>::infinity();
@@ -308,4 +308,4 @@ TEST(PurseWorlds, GivingAfterTheLimiterIsFound) { EXPECT_GT(found(Sabotage::kGiv
 TEST(PurseWorlds, AnEpochThatIsIgnoredIsFound) { EXPECT_GT(found(Sabotage::kEpochIgnored), 0); }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::purse_world_test

@@ -8,7 +8,7 @@
 #include <stdexcept>
 #include <vector>
 
-namespace tendon {
+namespace tendon::shares_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -67,4 +67,4 @@ TEST(Shares, TakeNothingThatIsNoShare) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::shares_test

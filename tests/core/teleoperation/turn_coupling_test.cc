@@ -15,7 +15,7 @@
 #include "tests/core/teleoperation/whole_ports.h"
 #include "tests/support/dice.h"
 
-namespace tendon {
+namespace tendon::turn_coupling_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -435,4 +435,4 @@ TEST(WholeHandles, APeriodThatLacksWhatIsCoupledGivesNothing) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::turn_coupling_test

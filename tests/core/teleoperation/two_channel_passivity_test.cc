@@ -12,7 +12,7 @@
 
 #include "tests/core/teleoperation/link.h"
 
-namespace tendon {
+namespace tendon::two_channel_passivity_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -206,4 +206,4 @@ TEST(TwoChannelPassivity, SaysWhatIsWrongWithItsConfiguration) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::two_channel_passivity_test

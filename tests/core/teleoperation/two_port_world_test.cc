@@ -22,7 +22,7 @@
 #include "tests/core/teleoperation/pair.h"
 #include "tests/support/dice.h"
 
-namespace tendon {
+namespace tendon::two_port_world_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -561,4 +561,4 @@ TEST(TwoPortWorld, TwoDevicesOnWavesOf10At200MsFeelAQuarterAndAreQuiet) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::two_port_world_test

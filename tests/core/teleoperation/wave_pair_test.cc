@@ -10,7 +10,7 @@
 
 #include "tests/core/teleoperation/wave_pair.h"
 
-namespace tendon {
+namespace tendon::wave_pair_test {
 namespace {
 
 constexpr double kHand = 400;
@@ -153,4 +153,4 @@ TEST(WavePair, ASilentPeerIsADamperAfterTheSmoothing) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::wave_pair_test

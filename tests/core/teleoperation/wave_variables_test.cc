@@ -11,7 +11,7 @@
 
 #include "tests/core/teleoperation/link.h"
 
-namespace tendon {
+namespace tendon::wave_variables_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -298,4 +298,4 @@ TEST(PlayoutClock, FollowsALongerAndAShorterWayWithoutAJumpBack) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::wave_variables_test

@@ -13,7 +13,7 @@
 #include "tests/devices/falcon/fake_firmware.h"
 #include "tests/devices/falcon/memory_pipe.h"
 
-namespace tendon {
+namespace tendon::falcon_device_test {
 namespace {
 
 using State = Device::State;
@@ -492,4 +492,4 @@ TEST(FalconDevice, UnpluggedAtAnyStateItIsAbsentAtOnce) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::falcon_device_test

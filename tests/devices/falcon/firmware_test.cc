@@ -11,7 +11,7 @@
 #include "tests/devices/falcon/fake_firmware.h"
 #include "tests/devices/falcon/memory_pipe.h"
 
-namespace tendon::falcon {
+namespace tendon::falcon::firmware_test {
 namespace {
 
 std::string refusal(std::vector<std::uint8_t> bytes, UnknownFirmware unknown) {
@@ -150,4 +150,4 @@ TEST(FalconFirmware, AnEchoThatDiffersEndsTheLoadWhereverItHappens) {
 }
 
 }  // namespace
-}  // namespace tendon::falcon
+}  // namespace tendon::falcon::firmware_test

@@ -11,7 +11,7 @@
 #include "tests/devices/falcon/published_geometry.h"
 #include "tests/support/dice.h"
 
-namespace tendon::falcon {
+namespace tendon::falcon::kinematics_test {
 namespace {
 
 /// Evenly in a ball around the centre.
@@ -194,4 +194,4 @@ TEST(FalconKinematics, AForceThatIsNoneGivesNone) {
 }
 
 }  // namespace
-}  // namespace tendon::falcon
+}  // namespace tendon::falcon::kinematics_test

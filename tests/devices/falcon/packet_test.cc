@@ -10,7 +10,7 @@
 
 #include "tests/support/dice.h"
 
-namespace tendon::falcon {
+namespace tendon::falcon::packet_test {
 namespace {
 
 std::vector<std::uint8_t> bytes_of(std::string_view text) { return {text.begin(), text.end()}; }
@@ -144,4 +144,4 @@ TEST(FalconPacket, WhatIsTakenAndWhatIsLeftOutIsAllThatCame) {
 }
 
 }  // namespace
-}  // namespace tendon::falcon
+}  // namespace tendon::falcon::packet_test

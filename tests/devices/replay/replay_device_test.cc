@@ -9,7 +9,7 @@
 
 #include "tests/support/dice.h"
 
-namespace tendon {
+namespace tendon::replay_device_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -199,4 +199,4 @@ TEST(ReplayDevice, RefusesWhatIsNoMotion) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::replay_device_test

@@ -5,7 +5,7 @@
 
 #include "tests/devices/safety/safety_rig.h"
 
-namespace tendon {
+namespace tendon::dead_man_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -94,4 +94,4 @@ TEST(DeadMan, AfterADisarmTheButtonArmsOnlyOnceArmedAndPressedAnew) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::dead_man_test

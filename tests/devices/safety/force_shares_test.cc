@@ -11,7 +11,7 @@
 
 #include "tests/support/dice.h"
 
-namespace tendon {
+namespace tendon::force_shares_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -233,4 +233,4 @@ TEST(ForceShares, RefuseImpossibleValuesNamingTheField) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::force_shares_test

@@ -13,7 +13,7 @@
 #include "tests/devices/safety/safety_rig.h"
 #include "tests/support/dice.h"
 
-namespace tendon {
+namespace tendon::safe_device_states_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -335,4 +335,4 @@ TEST(SafeDevice, NoForceIsEverRaisedOrTurnedAndNoneIsOutsideArmed) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::safe_device_states_test

@@ -9,7 +9,7 @@
 #include "tests/devices/safety/safety_rig.h"
 #include "tests/support/dice.h"
 
-namespace tendon {
+namespace tendon::safe_device_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -319,4 +319,4 @@ TEST(SafeDevice, RefusesImpossibleValuesNamingTheField) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::safe_device_test

@@ -13,7 +13,7 @@
 #include "tests/devices/safety/safety_rig.h"
 #include "tests/support/dice.h"
 
-namespace tendon {
+namespace tendon::safe_wrench_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -242,4 +242,4 @@ TEST(SafeWrench, RefusesImpossibleValuesNamingTheField) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::safe_wrench_test

@@ -6,7 +6,7 @@
 #include <limits>
 #include <stdexcept>
 
-namespace tendon {
+namespace tendon::trips_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -68,4 +68,4 @@ TEST(Trips, RefuseImpossibleValues) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::trips_test

@@ -10,7 +10,7 @@
 #include "tests/support/callgrind.h"
 #include "tests/support/instruction_test.h"
 
-namespace tendon {
+namespace tendon::effects_proof_test {
 namespace {
 
 constexpr double kSteps = 1000 - 500;  // between the two run lengths of device-proof
@@ -41,4 +41,4 @@ TEST_F(DeviceEffectsProof, WhatIsListedCostsSome) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::effects_proof_test

@@ -15,7 +15,7 @@
 #include "devices/simulated/simulated_device.h"
 #include "tests/devices/device_bench.h"
 
-namespace tendon {
+namespace tendon::joint_friction_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -263,4 +263,4 @@ TEST(JointFriction, RefusesWhatIsNoFriction) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::joint_friction_test

@@ -14,7 +14,7 @@
 #include "devices/falcon/kinematics.h"
 #include "tests/devices/device_bench.h"
 
-namespace tendon {
+namespace tendon::mechanism_test {
 namespace {
 
 constexpr Mechanism::Arm kPhantom{.upper_arm = 0.14, .forearm = 0.14};
@@ -133,4 +133,4 @@ TEST(Mechanism, RefusesArmsThatAreNoHapticDevices) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::mechanism_test

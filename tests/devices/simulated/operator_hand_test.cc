@@ -11,7 +11,7 @@
 #include "devices/simulated/simulated_device.h"
 #include "tests/devices/device_bench.h"
 
-namespace tendon {
+namespace tendon::operator_hand_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -108,4 +108,4 @@ TEST(OperatorHand, AHeldForceBendsItBySoManyMillimetres) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::operator_hand_test

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <string>
 
-namespace tendon {
+namespace tendon::profiles_test {
 namespace {
 
 TEST(DeviceProfiles, AreFoundByTheirNames) {
@@ -80,4 +80,4 @@ TEST(OperatorProfiles, PrintEveryNumberWithHowItIsKnown) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::profiles_test

@@ -13,7 +13,7 @@
 #include "devices/simulated/simulated_device.h"
 #include "tests/devices/device_bench.h"
 
-namespace tendon {
+namespace tendon::recorded_motion_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -120,4 +120,4 @@ TEST(RecordedMotion, AHumanHandOnAFoamDrivesTheDevice) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::recorded_motion_test

@@ -12,7 +12,7 @@
 #include <utility>
 #include <vector>
 
-namespace tendon {
+namespace tendon::scripted_motion_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -184,4 +184,4 @@ TEST(ScriptedMotion, RefusesImpossibleScriptsAndNamesTheField) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::scripted_motion_test

@@ -7,7 +7,7 @@
 #include "devices/simulated/simulated_device.h"
 #include "tests/devices/device_bench.h"
 
-namespace tendon {
+namespace tendon::simulated_device_energy_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -170,4 +170,4 @@ TEST(SimulatedDeviceEnergy, UniformSlidingIsTheCaseWhereTheBoundIsReached) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::simulated_device_energy_test

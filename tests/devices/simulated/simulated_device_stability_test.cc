@@ -13,7 +13,7 @@
 /// Known boundaries of what a real device does under a sampled spring. If the simulated one kept
 /// other ones, every experiment on a limiter would be about the simulator.
 
-namespace tendon {
+namespace tendon::simulated_device_stability_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -149,4 +149,4 @@ TEST(SampledSpring, BeyondTheViscousBoundOnlySlowMotionIsStable) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::simulated_device_stability_test

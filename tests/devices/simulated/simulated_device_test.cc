@@ -14,7 +14,7 @@
 
 #include "tests/devices/device_bench.h"
 
-namespace tendon {
+namespace tendon::simulated_device_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -616,4 +616,4 @@ TEST(SimulatedDevice, RefusesImpossibleValuesAndNamesTheField) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::simulated_device_test

@@ -13,7 +13,7 @@
 
 #include "tests/devices/device_bench.h"
 
-namespace tendon {
+namespace tendon::simulated_environment_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -159,4 +159,4 @@ TEST(SimulatedEnvironment, WhatIsWrongWithItIsNamed) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::simulated_environment_test

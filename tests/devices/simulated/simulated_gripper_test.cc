@@ -10,7 +10,7 @@
 
 #include "tests/devices/device_bench.h"
 
-namespace tendon {
+namespace tendon::simulated_gripper_test {
 namespace {
 
 constexpr double kSubstep = 50e-6;
@@ -187,4 +187,4 @@ TEST(SimulatedGripper, RefusesImpossibleValuesNamingTheField) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::simulated_gripper_test

@@ -9,7 +9,7 @@
 
 #include "devices/simulated/simulated_device.h"
 
-namespace tendon {
+namespace tendon::simulated_outputs_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -53,4 +53,4 @@ TEST(SimulatedOutputs, NineAreTooMany) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::simulated_outputs_test

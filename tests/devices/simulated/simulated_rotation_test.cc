@@ -11,7 +11,7 @@
 
 #include "tests/devices/device_bench.h"
 
-namespace tendon {
+namespace tendon::simulated_rotation_test {
 namespace {
 
 constexpr double kSubstep = 50e-6;
@@ -282,4 +282,4 @@ TEST(SimulatedRotation, RefusesImpossibleValuesNamingTheField) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::simulated_rotation_test

@@ -13,7 +13,7 @@
 #include "devices/simulated/simulated_device.h"
 #include "tests/devices/device_bench.h"
 
-namespace tendon {
+namespace tendon::structural_mode_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -268,4 +268,4 @@ TEST(StructuralMode, RefusesWhatIsNoMode) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::structural_mode_test

@@ -11,7 +11,7 @@
 #include "devices/simulated/simulated_device.h"
 #include "tests/devices/device_bench.h"
 
-namespace tendon {
+namespace tendon::transport_delay_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -213,4 +213,4 @@ TEST(TransportDelay, RefusesADelayThatIsNone) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::transport_delay_test

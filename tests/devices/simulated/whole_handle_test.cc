@@ -10,7 +10,7 @@
 #include "devices/simulated/simulated_device.h"
 #include "tests/devices/device_bench.h"
 
-namespace tendon {
+namespace tendon::whole_handle_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -200,4 +200,4 @@ TEST(WholeHandle, RefusesAPressThatCannotBe) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::whole_handle_test

@@ -8,7 +8,7 @@
 
 #include "tests/support/dice.h"
 
-namespace tendon::spacemouse {
+namespace tendon::spacemouse::report_test {
 namespace {
 
 using Bytes = std::vector<std::uint8_t>;
@@ -107,4 +107,4 @@ TEST(SpaceMouseReport, OfBytesThatNobodyPlannedNothingElseIsTaken) {
 }
 
 }  // namespace
-}  // namespace tendon::spacemouse
+}  // namespace tendon::spacemouse::report_test

@@ -13,7 +13,7 @@
 #include "tests/devices/spacemouse/fake_spacemouse.h"
 #include "tests/support/dice.h"
 
-namespace tendon {
+namespace tendon::spacemouse_device_test {
 namespace {
 
 using State = Device::State;
@@ -269,4 +269,4 @@ TEST(SpaceMouseDevice, RefusesWhatIsNoRateControl) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::spacemouse_device_test

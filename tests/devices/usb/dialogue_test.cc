@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-namespace tendon::usb {
+namespace tendon::usb::dialogue_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -190,4 +190,4 @@ TEST(DeviceCounters, HaveNamesOfTheirOwnAndWordsThatFitIntoAReport) {
 }
 
 }  // namespace
-}  // namespace tendon::usb
+}  // namespace tendon::usb::dialogue_test

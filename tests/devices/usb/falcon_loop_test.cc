@@ -16,7 +16,7 @@
 #include "tests/devices/usb/usbfs_shim.h"
 #include "tests/realtime/heap_guard.h"
 
-namespace tendon {
+namespace tendon::falcon_loop_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -97,4 +97,4 @@ TEST(FalconLoop, AWallIsFeltThroughTheRealLibraryWithoutAHeapCallInTheLoop) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::falcon_loop_test

@@ -22,7 +22,7 @@
 #include "tests/devices/usb/falcon_driver.h"
 #include "tests/devices/usb/usbfs_shim.h"
 
-namespace tendon {
+namespace tendon::libusb_pipe_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -273,4 +273,4 @@ TEST(LibusbPipe, KeepsUpWithAKilohertz) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::libusb_pipe_test

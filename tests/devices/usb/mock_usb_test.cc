@@ -22,7 +22,7 @@
 #include "tests/devices/usb/falcon_driver.h"
 #include "tests/devices/usb/mock_usb.h"
 
-namespace tendon {
+namespace tendon::mock_usb_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -193,4 +193,4 @@ TEST_F(MockUsbTest, ASpaceMouseIsReadThroughTheRealLibraryAndSurvivesAReplug) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::mock_usb_test

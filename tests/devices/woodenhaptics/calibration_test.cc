@@ -5,7 +5,7 @@
 
 #include "tests/devices/woodenhaptics/woodenhaptics_bench.h"
 
-namespace tendon {
+namespace tendon::calibration_test {
 namespace {
 
 using State = Device::State;
@@ -110,4 +110,4 @@ TEST(WoodenHapticsDevice, ABoardThatWasCalibratedBeforeIsNotBelievedToBe) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::calibration_test

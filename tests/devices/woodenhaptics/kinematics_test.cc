@@ -13,7 +13,7 @@
 #include "tests/devices/woodenhaptics/published_arm.h"
 #include "tests/support/dice.h"
 
-namespace tendon::woodenhaptics {
+namespace tendon::woodenhaptics::kinematics_test {
 namespace {
 
 using published_arm::Arm;
@@ -277,4 +277,4 @@ TEST(WoodenHapticsKinematics, AForceThatIsNoneGivesNone) {
 }
 
 }  // namespace
-}  // namespace tendon::woodenhaptics
+}  // namespace tendon::woodenhaptics::kinematics_test

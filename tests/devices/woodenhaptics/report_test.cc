@@ -7,7 +7,7 @@
 
 #include "tests/support/dice.h"
 
-namespace tendon::woodenhaptics {
+namespace tendon::woodenhaptics::report_test {
 namespace {
 
 using Bytes = std::vector<std::uint8_t>;
@@ -72,4 +72,4 @@ TEST(WoodenHapticsReport, OfBytesThatNobodyPlannedNothingElseIsTaken) {
 }
 
 }  // namespace
-}  // namespace tendon::woodenhaptics
+}  // namespace tendon::woodenhaptics::report_test

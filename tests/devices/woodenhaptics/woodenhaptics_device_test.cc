@@ -13,7 +13,7 @@
 #include "devices/safety/safe_device.h"
 #include "tests/devices/woodenhaptics/woodenhaptics_bench.h"
 
-namespace tendon {
+namespace tendon::woodenhaptics_device_test {
 namespace {
 
 using State = Device::State;
@@ -353,4 +353,4 @@ TEST(WoodenHapticsDevice, ASafeDeviceIsHomedAndArmedAgainAfterAReplug) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::woodenhaptics_device_test

@@ -8,7 +8,7 @@
 
 #include "tests/devices/woodenhaptics/woodenhaptics_bench.h"
 
-namespace tendon {
+namespace tendon::woodenhaptics_faults_test {
 namespace {
 
 using State = Device::State;
@@ -132,4 +132,4 @@ TEST(WoodenHapticsDevice, AForceThatIsNoNumberIsNoneAtEveryState) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::woodenhaptics_faults_test

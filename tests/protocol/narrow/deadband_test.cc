@@ -7,7 +7,7 @@
 #include <numbers>
 #include <stdexcept>
 
-namespace tendon {
+namespace tendon::deadband_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -195,4 +195,4 @@ TEST(StateDeadband, GrantsWhatIsWithinItsBoundsAndSaysWhatIsNot) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::deadband_test

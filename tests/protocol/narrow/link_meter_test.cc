@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-namespace tendon {
+namespace tendon::link_meter_test {
 namespace {
 
 using std::chrono::microseconds;
@@ -75,4 +75,4 @@ TEST(LinkMeter, AFloodIsThinnedEvenlyAndItsQuantilesHold) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::link_meter_test

@@ -11,7 +11,7 @@
 
 #include "tests/support/dice.h"
 
-namespace tendon {
+namespace tendon::rate_adaptation_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -130,4 +130,4 @@ TEST(RateAdaptation, RefusesWhatIsImpossible) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::rate_adaptation_test

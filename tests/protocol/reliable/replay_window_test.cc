@@ -8,7 +8,7 @@
 #include <set>
 #include <vector>
 
-namespace tendon {
+namespace tendon::replay_window_test {
 namespace {
 
 TEST(ReplayWindow, LetsEachNumberInOnce) {
@@ -83,4 +83,4 @@ RC_GTEST_PROP(ReplayWindow, DecidesAsASetWithAHorizonDoes, ()) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::replay_window_test

@@ -5,7 +5,7 @@
 
 #include <chrono>
 
-namespace tendon {
+namespace tendon::requests_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -45,4 +45,4 @@ TEST(IncomingRequests, AnAnswerThatIsDueStaysDueWhenItsRequestComesAgain) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::requests_test

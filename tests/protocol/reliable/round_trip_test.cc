@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-namespace tendon {
+namespace tendon::round_trip_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -30,4 +30,4 @@ TEST(RoundTrip, WaitsAHandshakesWhileBeforeTheFirstSample) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::round_trip_test

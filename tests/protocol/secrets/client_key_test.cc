@@ -5,7 +5,7 @@
 
 #include <stdexcept>
 
-namespace tendon {
+namespace tendon::client_key_test {
 namespace {
 
 ClientKey some_key(std::uint64_t seed) {
@@ -81,4 +81,4 @@ TEST(ClientKey, ItsIdIsNotTheKeyAndDiffersFromKeyToKey) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::client_key_test

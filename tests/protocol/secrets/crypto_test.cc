@@ -7,7 +7,7 @@
 
 // The known answers are in vectors_test.cc.
 
-namespace tendon {
+namespace tendon::crypto_test {
 namespace {
 
 TEST(Ratchet, GivesTheSameSecretsForTheSameSeedAndNoneTwice) {
@@ -45,4 +45,4 @@ TEST(Crypto, ARenewedKeyIsAnother) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::crypto_test

@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-namespace tendon {
+namespace tendon::hello_limit_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -43,4 +43,4 @@ TEST(HelloLimit, TakesAnIpv6NetworkForOneSource) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::hello_limit_test

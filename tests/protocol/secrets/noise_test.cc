@@ -9,7 +9,7 @@
 
 // The known answer of cacophony is in vectors_test.cc.
 
-namespace tendon {
+namespace tendon::noise_test {
 namespace {
 
 using examples::Bytes;
@@ -101,4 +101,4 @@ TEST_F(Noise, OneWhoKnowsTheKeyButNotTheEphemeralOnesCannotReadTheAnswer) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::noise_test

@@ -7,7 +7,7 @@
 #include "protocol/secrets/suites.h"
 #include "tests/protocol/examples.h"
 
-namespace tendon {
+namespace tendon::seal_test {
 namespace {
 
 using examples::Bytes;
@@ -149,4 +149,4 @@ TEST_P(SealWithRekeys, TwoEpochsAheadIsNotOpened) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::seal_test

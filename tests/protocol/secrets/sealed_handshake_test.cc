@@ -12,7 +12,7 @@
 
 // The door in suite 1: who gets in, who hears nothing, and what it costs us.
 
-namespace tendon {
+namespace tendon::sealed_handshake_test {
 namespace {
 
 using examples::Bytes;
@@ -412,4 +412,4 @@ TEST_F(SealedHandshake, TwoClientsWithOneKeyAreAMistakeThatIsToldAtOnce) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::sealed_handshake_test

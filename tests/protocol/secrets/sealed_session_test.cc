@@ -7,7 +7,7 @@
 
 // A conversation in suite 1: what is believed, what is dropped, and how it ends.
 
-namespace tendon {
+namespace tendon::sealed_session_test {
 namespace {
 
 using examples::Bytes;
@@ -209,4 +209,4 @@ TEST(SealedWorld, ManyRekeysOverABadNetworkLoseNothingThatWasPromised) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::sealed_session_test

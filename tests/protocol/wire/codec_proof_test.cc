@@ -11,7 +11,7 @@
 #include "tests/support/callgrind.h"
 #include "tests/support/instruction_test.h"
 
-namespace tendon {
+namespace tendon::codec_proof_test {
 namespace {
 
 constexpr double kTimes = 1100 - 100;  // between the two run lengths of codec-proof
@@ -43,4 +43,4 @@ TEST_F(CodecProof, StatesAndForcesCostFarLessThanByProtobuf) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::codec_proof_test

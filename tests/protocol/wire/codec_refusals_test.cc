@@ -12,7 +12,7 @@
 #include "tests/protocol/examples.h"
 #include "tests/protocol/wire/read_back.h"
 
-namespace tendon {
+namespace tendon::codec_refusals_test {
 namespace {
 
 using examples::data;
@@ -564,4 +564,4 @@ TEST(Codec, AForceIsValidForWholeMicrosecondsRoundedUp) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::codec_refusals_test

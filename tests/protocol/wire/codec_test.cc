@@ -14,7 +14,7 @@
 #include "tests/protocol/examples.h"
 #include "tests/protocol/wire/read_back.h"
 
-namespace tendon {
+namespace tendon::codec_test {
 namespace {
 
 using examples::data;
@@ -671,4 +671,4 @@ TEST(Codec, AFrameThatDoesNotFitLeavesTheDatagramAsItWas) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::codec_test

@@ -26,7 +26,7 @@
 #include "tests/protocol/wire/told.h"
 #include "tests/support/dice.h"
 
-namespace tendon {
+namespace tendon::hand_codec_test {
 namespace {
 
 using Bytes = std::vector<std::byte>;
@@ -544,4 +544,4 @@ TEST(HandCodec, FillsADatagramToTheSameLastByteAsProtobuf) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::hand_codec_test

@@ -16,7 +16,7 @@
 #include "tests/protocol/examples.h"
 #include "tests/protocol/wire/read_back.h"
 
-namespace tendon {
+namespace tendon::handshake_codec_test {
 namespace {
 
 using examples::Bytes;
@@ -362,4 +362,4 @@ TEST(Codec, AWelcomeThatMakesNoSenseIsRefused) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::handshake_codec_test

@@ -5,7 +5,7 @@
 
 #include <string>
 
-namespace tendon {
+namespace tendon::text_test {
 namespace {
 
 TEST(Text, CharactersHaveOneToFourBytes) {
@@ -40,4 +40,4 @@ TEST(Text, ClipEndsBeforeACharacterThatDoesNotFitOrIsBroken) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::text_test

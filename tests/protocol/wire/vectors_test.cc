@@ -20,7 +20,7 @@
 
 // protocol/vectors/ is what other languages check themselves against: it is true, and it is what we do.
 
-namespace tendon {
+namespace tendon::vectors_test {
 namespace {
 
 using examples::Bytes;
@@ -284,4 +284,4 @@ TEST(Vectors, TheReplayScriptsAreDecidedAsASetWouldDecide) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::vectors_test

@@ -13,7 +13,7 @@
 
 // WIRE.md is the specification that other languages are written from: its golden datagrams are these bytes.
 
-namespace tendon {
+namespace tendon::wire_md_test {
 namespace {
 
 using examples::Bytes;
@@ -99,4 +99,4 @@ TEST(WireMd, ShowsBytesThatTheCodeReads) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::wire_md_test

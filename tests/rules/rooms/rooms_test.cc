@@ -10,7 +10,7 @@
 
 #include "tests/rules/rooms/room_rules.h"
 
-namespace tendon::rooms {
+namespace tendon::rooms::rooms_test {
 namespace {
 
 const std::string kLicence = "// SPDX-License-Identifier: Apache-2.0\n";
@@ -228,4 +228,4 @@ TEST(Rooms, EveryFileOfThisTreeKeepsTheRules) {
 }
 
 }  // namespace
-}  // namespace tendon::rooms
+}  // namespace tendon::rooms::rooms_test

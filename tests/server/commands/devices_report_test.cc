@@ -17,7 +17,7 @@
 #include "devices/driver.h"
 #include "server/scene/scene.h"
 
-namespace tendon {
+namespace tendon::devices_report_test {
 namespace {
 
 usb::PluggedIn falcon(bool may_open) {
@@ -137,4 +137,4 @@ TEST(DevicesReport, EveryDriverWithMotorsHasALastWordAndAWayHome) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::devices_report_test

@@ -13,7 +13,7 @@
 
 #include "tests/server/scratch_folder.h"
 
-namespace tendon {
+namespace tendon::doctor_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -170,4 +170,4 @@ TEST(Doctor, JsonAndWordsSayTheSame) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::doctor_test

@@ -13,7 +13,7 @@
 #include <string>
 #include <vector>
 
-namespace tendon {
+namespace tendon::explain_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -199,4 +199,4 @@ TEST(Explain, JsonAndWordsSayTheSame) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::explain_test

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-namespace tendon {
+namespace tendon::admission_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -291,4 +291,4 @@ TEST_F(SealedServer, ASessionThatHasReachedItsAgeIsBegunAgainByItsClient) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::admission_test

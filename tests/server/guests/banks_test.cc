@@ -8,7 +8,7 @@
 
 #include "tests/server/guests/sealed_server.h"
 
-namespace tendon {
+namespace tendon::banks_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -204,4 +204,4 @@ TEST_F(TwoBanks, MoreDevicesThanAServerMayHaveAreRefused) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::banks_test

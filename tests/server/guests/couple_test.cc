@@ -22,7 +22,7 @@
 
 // Two servers whose devices are coupled, each with its haptic loop, on virtual time; and clients that ask for it.
 
-namespace tendon {
+namespace tendon::couple_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -507,4 +507,4 @@ TEST(FirstDifference, NamesEachKeyThatTwoEndsMustHaveAlike) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::couple_test

@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-namespace tendon {
+namespace tendon::diagnostics_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -287,4 +287,4 @@ TEST_F(SealedServer, SaysThatAnEnginesWayIsFullAndThatItsForcesAreNotTaken) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::diagnostics_test

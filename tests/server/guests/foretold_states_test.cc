@@ -4,7 +4,7 @@
 #include <deque>
 #include <utility>
 
-namespace tendon {
+namespace tendon::foretold_states_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -78,4 +78,4 @@ TEST_F(SealedServer, TakesForcesThatAnswerAForetoldStepWhichItWasTooLateToSee) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::foretold_states_test

@@ -10,7 +10,7 @@
 #include "protocol/wire/codec.h"
 #include "tests/server/guests/sealed_server.h"
 
-namespace tendon {
+namespace tendon::handle_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -224,4 +224,4 @@ TEST_F(Handle, JointsAreToldToThoseThatNamedTheFeature) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::handle_test

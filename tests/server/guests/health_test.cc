@@ -11,7 +11,7 @@
 #include "devices/simulated/simulated_device.h"
 #include "server/haptic_loop.h"
 
-namespace tendon {
+namespace tendon::health_test {
 namespace {
 
 using std::chrono::microseconds;
@@ -191,4 +191,4 @@ TEST(Health, OfSeveralCountersOfADriverTheWorstIsTold) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::health_test

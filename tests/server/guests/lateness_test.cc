@@ -5,7 +5,7 @@
 
 #include "protocol/limits.h"
 
-namespace tendon {
+namespace tendon::lateness_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -205,4 +205,4 @@ TEST(Lateness, OneLateForceDoesNotChangeWhatIsUsual) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::lateness_test

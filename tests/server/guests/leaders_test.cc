@@ -15,7 +15,7 @@
 #include "tests/server/guests/place.h"
 #include "tests/support/wire.h"
 
-namespace tendon {
+namespace tendon::leaders_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -274,4 +274,4 @@ TEST_F(TwoLeaders, AGuestThatIsNoLeaderEndsBothAndALeaderItself) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::leaders_test

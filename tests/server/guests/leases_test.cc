@@ -3,7 +3,7 @@
 
 #include <string>
 
-namespace tendon {
+namespace tendon::leases_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -172,4 +172,4 @@ TEST_F(TwoDevices, AChannelWithoutALeaseIsNotTakenFromItsHolder) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::leases_test

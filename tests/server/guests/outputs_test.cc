@@ -7,7 +7,7 @@
 
 #include "tests/server/guests/sealed_server.h"
 
-namespace tendon {
+namespace tendon::outputs_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -160,4 +160,4 @@ TEST_F(OutputsOfADevice, ASettingOutOfBoundsIsNotSent) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::outputs_test

@@ -3,7 +3,7 @@
 
 #include <cstddef>
 
-namespace tendon {
+namespace tendon::recorded_datagrams_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -76,4 +76,4 @@ TEST_F(SealedServer, AGuestThatSendsMoreThanTheBudgetIsCountedAndNotRecorded) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::recorded_datagrams_test

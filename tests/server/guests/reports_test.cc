@@ -6,7 +6,7 @@
 #include <string>
 #include <utility>
 
-namespace tendon {
+namespace tendon::reports_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -180,4 +180,4 @@ TEST_F(SealedServer, AControllerThatHasSentNoForceIsToldNothingAboutItsForces) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::reports_test

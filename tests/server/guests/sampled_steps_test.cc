@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-namespace tendon {
+namespace tendon::sampled_steps_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -49,4 +49,4 @@ TEST(SampledSteps, FillsNothingAcrossAGapThatItCannotRemember) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::sampled_steps_test

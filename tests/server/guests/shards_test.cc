@@ -17,7 +17,7 @@
 #include "tests/server/guests/sealed_server.h"
 #include "tests/support/wire.h"
 
-namespace tendon {
+namespace tendon::shards_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -284,4 +284,4 @@ TEST(Shard, ShareTheBanksOfAServerWithoutAGap) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::shards_test

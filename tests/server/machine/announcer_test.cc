@@ -16,7 +16,7 @@
 #include "tests/server/scratch_folder.h"
 #include "tests/support/fake_avahi.h"
 
-namespace tendon {
+namespace tendon::announcer_test {
 namespace {
 
 using testing::FakeAvahi;
@@ -154,4 +154,4 @@ TEST_F(Announcing, AServerOfThisMachineAloneIsNotAnnounced) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::announcer_test

@@ -13,7 +13,7 @@
 
 #include "tests/server/scratch_folder.h"
 
-namespace tendon {
+namespace tendon::realtime_test {
 namespace {
 
 using testing::ScratchFolder;
@@ -116,4 +116,4 @@ TEST(WakefulProcessors, SayWhatItWouldTakeWhenRefused) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::realtime_test

@@ -11,7 +11,7 @@
 
 #include "tests/server/scratch_folder.h"
 
-namespace tendon {
+namespace tendon::regular_file_test {
 namespace {
 
 using testing::ScratchFolder;
@@ -49,4 +49,4 @@ TEST(RegularFile, SaysWhatItWasToBeAndWhyItCannotBeOpened) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::regular_file_test

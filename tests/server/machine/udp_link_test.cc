@@ -14,7 +14,7 @@
 
 #include "protocol/wire/header.h"
 
-namespace tendon {
+namespace tendon::udp_link_test {
 namespace {
 
 using Bytes = std::vector<std::byte>;
@@ -264,4 +264,4 @@ TEST(Doorbell, KeepsErrnoForTheCodeThatASignalInterrupted) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::udp_link_test

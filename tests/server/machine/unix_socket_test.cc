@@ -21,7 +21,7 @@
 #include "server/machine/udp_link.h"
 #include "tests/server/scratch_folder.h"
 
-namespace tendon {
+namespace tendon::unix_socket_test {
 namespace {
 
 using testing::ScratchFolder;
@@ -219,4 +219,4 @@ TEST(UnixSocket, LetsInItsUserAndGroupOnly) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::unix_socket_test

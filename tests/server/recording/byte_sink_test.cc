@@ -20,7 +20,7 @@
 #include "tests/server/recording/recording_samples.h"
 #include "tests/server/scratch_folder.h"
 
-namespace tendon {
+namespace tendon::byte_sink_test {
 namespace {
 
 using testing::ScratchFolder;
@@ -137,4 +137,4 @@ TEST(FileSink, CutsOffAPieceThatDidNotFit) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::byte_sink_test

@@ -8,7 +8,7 @@
 
 #include "tests/server/recording/recording_samples.h"
 
-namespace tendon {
+namespace tendon::datagram_sieve_test {
 namespace {
 
 using testing::ms;
@@ -56,4 +56,4 @@ TEST(DatagramSieve, ADatagramLargerThanTheWholeBudgetIsLeftOut) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::datagram_sieve_test

@@ -11,7 +11,7 @@
 #include "tests/server/recording/recording_samples.h"
 #include "tests/server/scratch_folder.h"
 
-namespace tendon {
+namespace tendon::flight_file_test {
 namespace {
 
 using testing::ScratchFolder;
@@ -65,4 +65,4 @@ TEST(FlightFile, ThatDoesNotTakeItAllIsAnErrorWithTheReason) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::flight_file_test

@@ -13,7 +13,7 @@
 #include "server/recording/byte_sink.h"
 #include "server/recording/mcap_writer.h"
 
-namespace tendon {
+namespace tendon::mcap_reader_test {
 namespace {
 
 /// Two chunks of three messages each: "0", "1" … "5" at their number in ns.
@@ -128,4 +128,4 @@ TEST(McapReader, RefusesBytesAfterTheEnd) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::mcap_reader_test

@@ -10,7 +10,7 @@
 
 #include "server/recording/byte_sink.h"
 
-namespace tendon {
+namespace tendon::mcap_writer_test {
 namespace {
 
 /// Hexadecimal digits; spaces are for the eye.
@@ -142,4 +142,4 @@ TEST(McapWriter, NeverCallsASinkAgainThatHasFailed) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::mcap_writer_test

@@ -19,7 +19,7 @@
 #include "tests/server/recording/recording_samples.h"
 #include "tests/server/scratch_folder.h"
 
-namespace tendon {
+namespace tendon::part_recorder_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -342,4 +342,4 @@ TEST(PartRecorder, HoldsNoMoreMemoryAfterADayThanAfterTwoHours) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::part_recorder_test

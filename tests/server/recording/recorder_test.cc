@@ -13,7 +13,7 @@
 #include "server/recording/byte_sink.h"
 #include "tests/server/recording/recording_samples.h"
 
-namespace tendon {
+namespace tendon::recorder_test {
 namespace {
 
 using testing::Contents;
@@ -189,4 +189,4 @@ TEST(Recorder, ReportsADeviceWithoutSpaceAndGoesOnCounting) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::recorder_test

@@ -21,7 +21,7 @@
 #include "server/recording/recording_reader.h"
 #include "tests/server/recording/recording_samples.h"
 
-namespace tendon {
+namespace tendon::recording_codec_test {
 namespace {
 
 namespace pb = tendon::recording::v1;
@@ -204,4 +204,4 @@ TEST(RecordingCodec, APortIsInTheFileBeforeItsStepAndOnlyOfACoupledDevice) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::recording_codec_test

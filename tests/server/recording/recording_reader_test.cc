@@ -20,7 +20,7 @@
 #include "tests/server/recording/recording_samples.h"
 #include "tests/server/scratch_folder.h"
 
-namespace tendon {
+namespace tendon::recording_reader_test {
 namespace {
 
 using testing::Contents;
@@ -222,4 +222,4 @@ TEST(RecordingReader, RefusesRecordsBeforeTheScene) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::recording_reader_test

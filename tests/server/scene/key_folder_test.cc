@@ -13,7 +13,7 @@
 
 #include "tests/server/scratch_folder.h"
 
-namespace tendon {
+namespace tendon::key_folder_test {
 namespace {
 
 using testing::ScratchFolder;
@@ -120,4 +120,4 @@ TEST(KeyFolder, SaysWhichFileIsWrongAndWhy) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::key_folder_test

@@ -14,7 +14,7 @@
 #include "tests/server/scene/scene_text.h"
 #include "tests/server/scratch_folder.h"
 
-namespace tendon {
+namespace tendon::scene_control_test {
 namespace {
 
 TEST(Scene, PerAxisTheProfilesCoulombFrictionIsSharedByTheAxes) {
@@ -274,4 +274,4 @@ TEST(Scene, ADeviceWithAPlugIsAmongTheFirst) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::scene_control_test

@@ -20,7 +20,7 @@
 #include "tests/server/scene/scene_text.h"
 #include "tests/server/scratch_folder.h"
 
-namespace tendon {
+namespace tendon::scene_device_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -348,4 +348,4 @@ stiffness_n_per_m = 500
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::scene_device_test

@@ -12,7 +12,7 @@
 #include "tests/server/scene/scene_text.h"
 #include "tests/server/scratch_folder.h"
 
-namespace tendon {
+namespace tendon::scene_error_test {
 namespace {
 
 using testing::ScratchFolder;
@@ -474,4 +474,4 @@ TEST(SceneError, OfAChannelHasItsLine) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::scene_error_test

@@ -13,7 +13,7 @@
 #include "tests/server/scene/scene_text.h"
 #include "tests/server/scratch_folder.h"
 
-namespace tendon {
+namespace tendon::scene_handle_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -294,4 +294,4 @@ TEST(SceneHandle, AnotherLawKeepsTheBoundsOfTheWholeHandle) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::scene_handle_test

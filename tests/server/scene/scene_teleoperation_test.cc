@@ -9,7 +9,7 @@
 #include "server/scene/scene.h"
 #include "tests/server/scene/scene_text.h"
 
-namespace tendon {
+namespace tendon::scene_teleoperation_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -368,4 +368,4 @@ TEST(SceneTeleoperation, RefusesHandlesThatCannotBeCoupled) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::scene_teleoperation_test

@@ -12,7 +12,7 @@
 #include "tests/server/scene/scene_text.h"
 #include "tests/server/scratch_folder.h"
 
-namespace tendon {
+namespace tendon::scene_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -449,4 +449,4 @@ TEST(Scene, WithoutAProfileOnlyTheListedEffectsExist) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::scene_test

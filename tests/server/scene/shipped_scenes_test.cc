@@ -13,7 +13,7 @@
 #include "tests/server/scene/scene_text.h"
 #include "tests/server/scratch_folder.h"
 
-namespace tendon {
+namespace tendon::shipped_scenes_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -142,4 +142,4 @@ TEST(SceneReference, ListsEveryKeyWithUnitMeaningAndDefault) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::shipped_scenes_test

@@ -12,7 +12,7 @@
 #include "tests/tools/conformance/golden.h"
 #include "tests/tools/conformance/report.h"
 
-namespace tendon::conformance {
+namespace tendon::conformance::documents_test {
 namespace {
 
 /// "WIRE.md" or "stream.h", whose text is that of its comments.
@@ -87,4 +87,4 @@ TEST(ConformanceDocuments, TheKitsOwnHandshakeDatagramsAreTheGoldenOnes) {
 }
 
 }  // namespace
-}  // namespace tendon::conformance
+}  // namespace tendon::conformance::documents_test

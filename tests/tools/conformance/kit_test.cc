@@ -16,7 +16,7 @@
 #include "tests/tools/conformance/toy/server.h"
 #include "tests/tools/conformance/toy/wire.h"
 
-namespace tendon::conformance {
+namespace tendon::conformance::kit_test {
 namespace {
 
 struct Broken {
@@ -305,4 +305,4 @@ INSTANTIATE_TEST_SUITE_P(Observer, BrokenToy,
                          name_of);
 
 }  // namespace
-}  // namespace tendon::conformance
+}  // namespace tendon::conformance::kit_test

@@ -12,7 +12,7 @@
 #include "tests/tools/conformance/toy/worker.h"
 #include "tests/tools/conformance/worker_checks.h"
 
-namespace tendon::conformance {
+namespace tendon::conformance::worker_kit_test {
 namespace {
 
 Report report_of(WorkerFault fault) {
@@ -90,4 +90,4 @@ TEST(ConformanceKit, SaysOverWhichRoadAWorkerFails) {
 }
 
 }  // namespace
-}  // namespace tendon::conformance
+}  // namespace tendon::conformance::worker_kit_test

@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-namespace tendon::injector {
+namespace tendon::injector::injector_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -449,4 +449,4 @@ TEST(Injector, RefusesAnImpossibleProfile) {
 }
 
 }  // namespace
-}  // namespace tendon::injector
+}  // namespace tendon::injector::injector_test

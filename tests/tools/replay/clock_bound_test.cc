@@ -9,7 +9,7 @@
 
 #include "tests/support/dice.h"
 
-namespace tendon::replay {
+namespace tendon::replay::clock_bound_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -100,4 +100,4 @@ TEST(ClockBound, ThereIsNoneWithoutMessagesBothWays) {
 }
 
 }  // namespace
-}  // namespace tendon::replay
+}  // namespace tendon::replay::clock_bound_test

@@ -14,7 +14,7 @@
 #include "tests/tools/replay/rerun.h"
 #include "tests/tools/replay/tapping.h"
 
-namespace tendon::replay {
+namespace tendon::replay::leaders_replay_test {
 namespace {
 
 const std::string kCoupling =
@@ -112,4 +112,4 @@ TEST(LeadersReplay, AFollowerOfTwoDecidesTheSameAgainToTheLastBit) {
 }
 
 }  // namespace
-}  // namespace tendon::replay
+}  // namespace tendon::replay::leaders_replay_test

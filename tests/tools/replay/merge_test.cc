@@ -16,7 +16,7 @@
 #include "server/recording/recorder.h"
 #include "tests/server/scratch_folder.h"
 
-namespace tendon::replay {
+namespace tendon::replay::merge_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -155,4 +155,4 @@ TEST_F(Merge, OverwritesNothingAndRefusesWhatIsNoPair) {
 }
 
 }  // namespace
-}  // namespace tendon::replay
+}  // namespace tendon::replay::merge_test

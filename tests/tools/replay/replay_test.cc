@@ -18,7 +18,7 @@
 #include "tests/tools/replay/tapping.h"
 #include "tests/tools/worlds/world.h"
 
-namespace tendon::replay {
+namespace tendon::replay::replay_test {
 namespace {
 
 using tendon::testing::ScratchFolder;
@@ -211,4 +211,4 @@ TEST(Replay, ASceneThatCannotBeRunIsSaidToBeTheRecordedOne) {
 }
 
 }  // namespace
-}  // namespace tendon::replay
+}  // namespace tendon::replay::replay_test

@@ -19,7 +19,7 @@
 #include "tests/tools/replay/tapping.h"
 #include "tests/tools/worlds/world.h"
 
-namespace tendon::replay {
+namespace tendon::replay::rerun_test {
 namespace {
 
 Scene scene_with(const std::vector<std::string>& settings) {
@@ -230,4 +230,4 @@ TEST(Rerun, WithItsOwnForcesAPassiveLawKeepsItsOwnAccountPassive) {
 }
 
 }  // namespace
-}  // namespace tendon::replay
+}  // namespace tendon::replay::rerun_test

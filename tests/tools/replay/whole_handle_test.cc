@@ -14,7 +14,7 @@
 #include "tests/tools/replay/rerun.h"
 #include "tests/tools/worlds/world.h"
 
-namespace tendon::replay {
+namespace tendon::replay::whole_handle_test {
 namespace {
 
 const std::string kStylus = R"([device]
@@ -186,4 +186,4 @@ TEST(WholeHandle, ItsEngineSeesWhatTheHandDoes) {
 }
 
 }  // namespace
-}  // namespace tendon::replay
+}  // namespace tendon::replay::whole_handle_test

@@ -18,7 +18,7 @@
 #include "tests/tools/sweep/results.h"
 #include "tests/tools/sweep/submit.h"
 
-namespace tendon::sweep {
+namespace tendon::sweep::sweep_test {
 namespace {
 
 std::string contents(const std::filesystem::path& file) {
@@ -364,4 +364,4 @@ TEST_F(Sweep, AJobForKubernetesIsIndexedAndForgivesADrainedNode) {
 }
 
 }  // namespace
-}  // namespace tendon::sweep
+}  // namespace tendon::sweep::sweep_test

@@ -5,7 +5,7 @@
 
 #include <gtest/gtest.h>
 
-namespace tendon::simulation {
+namespace tendon::simulation::day_test {
 namespace {
 
 DayConfig short_day(std::uint64_t seed) {
@@ -44,4 +44,4 @@ TEST(Day, TheSameSeedIsTheSameDay) {
 }
 
 }  // namespace
-}  // namespace tendon::simulation
+}  // namespace tendon::simulation::day_test

@@ -14,7 +14,7 @@
 #include "tests/tools/worlds/runner.h"
 #include "tests/tools/worlds/shrink_world.h"
 
-namespace tendon::simulation {
+namespace tendon::simulation::explore_test {
 namespace {
 
 TEST(Worlds, SameSeedSameWorld) {
@@ -148,4 +148,4 @@ TEST(Worlds, AWorldThatKeepsItsPromisesIsNotShrunk) {
 }
 
 }  // namespace
-}  // namespace tendon::simulation
+}  // namespace tendon::simulation::explore_test

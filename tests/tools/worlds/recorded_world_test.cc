@@ -21,7 +21,7 @@
 #include "server/recording/byte_sink.h"
 #include "tests/tools/worlds/world.h"
 
-namespace tendon::simulation {
+namespace tendon::simulation::recorded_world_test {
 namespace {
 
 struct Outcome {
@@ -114,4 +114,4 @@ INSTANTIATE_TEST_SUITE_P(Hands, RecordedWorld,
                          [](const auto& hand) { return std::string(hand.param.recording); });
 
 }  // namespace
-}  // namespace tendon::simulation
+}  // namespace tendon::simulation::recorded_world_test

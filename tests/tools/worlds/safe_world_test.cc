@@ -12,7 +12,7 @@
 #include "tests/tools/worlds/watched_device.h"
 #include "tests/tools/worlds/world.h"
 
-namespace tendon::simulation {
+namespace tendon::simulation::safe_world_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -170,4 +170,4 @@ TEST(SafeWorld, WhatItsEngineHasDisarmedInMidForceGivesNoneUntilItRearms) {
 }
 
 }  // namespace
-}  // namespace tendon::simulation
+}  // namespace tendon::simulation::safe_world_test

@@ -20,7 +20,7 @@
 #include "tests/tools/worlds/adversary.h"
 #include "tests/tools/worlds/watched_device.h"
 
-namespace tendon::simulation {
+namespace tendon::simulation::world_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -486,4 +486,4 @@ TEST(World, TheServerKnowsTheClockOfTheEngineWithinTheBoundItStates) {
 }
 
 }  // namespace
-}  // namespace tendon::simulation
+}  // namespace tendon::simulation::world_test

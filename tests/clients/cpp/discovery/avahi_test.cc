@@ -14,7 +14,7 @@
 #include "tests/server/scratch_folder.h"
 #include "tests/support/fake_avahi.h"
 
-namespace tendon {
+namespace tendon::avahi_test {
 namespace {
 
 using testing::FakeAvahi;
@@ -117,4 +117,4 @@ TEST_F(AvahiDiscovery, OfAThousandAllAreListedAndTheFirstDescribed) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::avahi_test

@@ -10,7 +10,7 @@
 
 // Records of name servers, from one on loopback that says right things and wrong ones.
 
-namespace tendon::dns_sd {
+namespace tendon::dns_sd::unicast_test {
 namespace {
 
 using testing::FakeDns;
@@ -142,4 +142,4 @@ TEST(UnicastDiscovery, AnAnswerThatEndsTooSoonIsRefused) {
 }
 
 }  // namespace
-}  // namespace tendon::dns_sd
+}  // namespace tendon::dns_sd::unicast_test

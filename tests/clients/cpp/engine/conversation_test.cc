@@ -10,7 +10,7 @@
 #include <stdexcept>
 #include <vector>
 
-namespace tendon {
+namespace tendon::conversation_test {
 namespace {
 
 /// A state of which no number is round.
@@ -206,4 +206,4 @@ TEST(Conversation, ThatIsNoneIsRefusedWithItsLine) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::conversation_test

@@ -6,7 +6,7 @@
 #include <limits>
 #include <stdexcept>
 
-namespace tendon {
+namespace tendon::fd_stiffness_test {
 namespace {
 
 const Mat3 kSpring = (Mat3() << 500, 20, -30, 20, 800, 10, -30, 10, 300).finished();
@@ -94,4 +94,4 @@ TEST(FdStiffness, RefusesWhatIsNoStepAndHalfAState) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::fd_stiffness_test

@@ -8,7 +8,7 @@
 
 #include "clients/cpp/engine/fd_stiffness.h"
 
-namespace tendon {
+namespace tendon::penalty_contact_test {
 namespace {
 
 SurfacePoint ball(const Vec3& position, double radius) {
@@ -60,4 +60,4 @@ TEST(PenaltyContact, MakesNoForceOfWhatIsNoSurface) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::penalty_contact_test

@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-namespace tendon {
+namespace tendon::self_test_test {
 namespace {
 
 constexpr double kK = 1000;  // N/m
@@ -294,4 +294,4 @@ TEST(SelfTest, RefusesAnImpossibleScript) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::self_test_test

@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <limits>
 
-namespace tendon {
+namespace tendon::tool_coupling_test {
 namespace {
 
 /// A rigid body before a wall at x = 0, which some engine integrates by semi-implicit Euler.
@@ -93,4 +93,4 @@ TEST(ToolCoupling, RefusesTheImpossible) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::tool_coupling_test

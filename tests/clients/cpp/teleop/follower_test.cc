@@ -11,7 +11,7 @@
 #include <stdexcept>
 #include <string>
 
-namespace tendon {
+namespace tendon::follower_test {
 namespace {
 
 using Json = nlohmann::json;
@@ -181,4 +181,4 @@ TEST(Follower, EngagingBeforeTheFirstStateIsRefused) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::follower_test

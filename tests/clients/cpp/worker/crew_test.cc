@@ -17,7 +17,7 @@
 #include <stdexcept>
 #include <string>
 
-namespace tendon::worker {
+namespace tendon::worker::crew_test {
 namespace {
 
 const std::string kSecret(kSecretDigits, '5');
@@ -203,4 +203,4 @@ TEST(Crew, TheSocketIsInAFolderOfThisUserAlone) {
 }
 
 }  // namespace
-}  // namespace tendon::worker
+}  // namespace tendon::worker::crew_test

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-namespace tendon::worker {
+namespace tendon::worker::front_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -315,4 +315,4 @@ TEST(Front, RefusesTimesThatAreNone) {
 }
 
 }  // namespace
-}  // namespace tendon::worker
+}  // namespace tendon::worker::front_test

@@ -8,7 +8,7 @@
 #include <stdexcept>
 #include <string>
 
-namespace tendon::worker {
+namespace tendon::worker::stream_test {
 namespace {
 
 DeviceState full_state() {
@@ -149,4 +149,4 @@ TEST(WorkerStream, TheBytesAreThoseOfItsDescription) {
 }
 
 }  // namespace
-}  // namespace tendon::worker
+}  // namespace tendon::worker::stream_test

@@ -18,7 +18,7 @@
 #include "tests/e2e/stage/stage.h"
 #include "tests/server/scratch_folder.h"
 
-namespace tendon::e2e {
+namespace tendon::e2e::chai3d_e2e_test {
 namespace {
 
 using testing::ScratchFolder;
@@ -268,4 +268,4 @@ TEST(Chai3d, AWall20MsAwayGivesOutMoreThanAJouleWithoutTheLimiter) {
 }
 
 }  // namespace
-}  // namespace tendon::e2e
+}  // namespace tendon::e2e::chai3d_e2e_test

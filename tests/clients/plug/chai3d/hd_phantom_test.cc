@@ -18,7 +18,7 @@
 #include "clients/cpp/machine.h"
 #include "clients/plug/chai3d/shared_hand.h"
 
-namespace tendon::plug::chai3d {
+namespace tendon::plug::chai3d::hd_phantom_test {
 namespace {
 
 /// The library waits this long for a state, at most.
@@ -134,4 +134,4 @@ TEST(HdPhantom, AThreadThatPushesTwoDevicesInTurnWaitsOnceATurn) {
 }
 
 }  // namespace
-}  // namespace tendon::plug::chai3d
+}  // namespace tendon::plug::chai3d::hd_phantom_test

@@ -10,7 +10,7 @@
 
 #include "tests/clients/plug/world.h"
 
-namespace tendon::plug::chai3d {
+namespace tendon::plug::chai3d::host_test {
 namespace {
 
 /// The plug, the shared memory, and a program that does its turns in the world's time.
@@ -163,4 +163,4 @@ TEST(Chai3dHost, TellsTheAgeOfTheLastPlaceWhenTheServerHasGone) {
 }
 
 }  // namespace
-}  // namespace tendon::plug::chai3d
+}  // namespace tendon::plug::chai3d::host_test

@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-namespace tendon::plug::chai3d {
+namespace tendon::plug::chai3d::needed_test {
 namespace {
 
 std::vector<std::byte> bytes_of(const std::string& path) {
@@ -59,4 +59,4 @@ TEST(NeededLibraries, OfADamagedFileAreReadWithinItsBytes) {
 }
 
 }  // namespace
-}  // namespace tendon::plug::chai3d
+}  // namespace tendon::plug::chai3d::needed_test

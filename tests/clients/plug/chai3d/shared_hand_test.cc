@@ -8,7 +8,7 @@
 #include <thread>
 #include <vector>
 
-namespace tendon::plug::chai3d {
+namespace tendon::plug::chai3d::shared_hand_test {
 namespace {
 
 TEST(Box, IsEmptyUntilSomethingWasPut) {
@@ -66,4 +66,4 @@ TEST(Box, AWriterThatDiedWhileItWroteBlocksNoReader) {
 }
 
 }  // namespace
-}  // namespace tendon::plug::chai3d
+}  // namespace tendon::plug::chai3d::shared_hand_test

@@ -13,7 +13,7 @@
 #include "clients/plug/inverse/origin.h"
 #include "clients/plug/view.h"
 
-namespace tendon::plug {
+namespace tendon::plug::inverse_json_test {
 namespace {
 
 using nlohmann::json;
@@ -231,4 +231,4 @@ TEST(InverseOrigin, PagesOfThisMachineAndAllowedOnesComeIn) {
 }
 
 }  // namespace
-}  // namespace tendon::plug
+}  // namespace tendon::plug::inverse_json_test

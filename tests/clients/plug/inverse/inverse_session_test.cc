@@ -14,7 +14,7 @@
 
 #include "tests/clients/plug/world.h"
 
-namespace tendon::plug {
+namespace tendon::plug::inverse_session_test {
 namespace {
 
 using nlohmann::json;
@@ -399,4 +399,4 @@ TEST(InverseSession, DevicesOfOneNameHaveIdsOfTheirOwn) {
 }
 
 }  // namespace
-}  // namespace tendon::plug
+}  // namespace tendon::plug::inverse_session_test

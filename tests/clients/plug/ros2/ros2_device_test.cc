@@ -11,7 +11,7 @@
 
 #include "tests/clients/plug/world.h"
 
-namespace tendon::plug {
+namespace tendon::plug::ros2_device_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -354,4 +354,4 @@ TEST(RosDevice, AStallOf200MillisecondsFadesTheForceAndIsOverAfterIt) {
 }
 
 }  // namespace
-}  // namespace tendon::plug
+}  // namespace tendon::plug::ros2_device_test

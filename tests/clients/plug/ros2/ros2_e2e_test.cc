@@ -24,7 +24,7 @@
 #include "tests/e2e/stage/stage.h"
 #include "tests/server/scratch_folder.h"
 
-namespace tendon::e2e {
+namespace tendon::e2e::ros2_e2e_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -469,4 +469,4 @@ TEST(Ros2, WhatTheCommandLineCannotMeanIsSaid) {
 }
 
 }  // namespace
-}  // namespace tendon::e2e
+}  // namespace tendon::e2e::ros2_e2e_test

@@ -14,7 +14,7 @@
 #include "clients/plug/ros2/ros2_servo.h"
 #include "core/base/rotation.h"
 
-namespace tendon::plug {
+namespace tendon::plug::ros2_messages_test {
 namespace {
 
 constexpr double kQuarter = std::numbers::pi / 2;
@@ -189,4 +189,4 @@ TEST(RosServo, ALostSessionEndsTheHoldSoThatNothingJumps) {
 }
 
 }  // namespace
-}  // namespace tendon::plug
+}  // namespace tendon::plug::ros2_messages_test

@@ -6,7 +6,7 @@
 #include <chrono>
 #include <limits>
 
-namespace tendon::plug::vrpn {
+namespace tendon::plug::vrpn::vrpn_force_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -175,4 +175,4 @@ TEST(VrpnFreshness, OnePauseIsForgivenAndAProgramOfRareChangesIsNoStream) {
 }
 
 }  // namespace
-}  // namespace tendon::plug::vrpn
+}  // namespace tendon::plug::vrpn::vrpn_force_test

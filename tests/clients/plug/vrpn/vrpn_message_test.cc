@@ -15,7 +15,7 @@
 
 #include "tests/clients/plug/vrpn/program.h"
 
-namespace tendon::plug::vrpn {
+namespace tendon::plug::vrpn::vrpn_message_test {
 namespace {
 
 constexpr Stamp kStamp{1'700'000'000, 250'000};
@@ -186,4 +186,4 @@ TEST(VrpnMessage, ATextThatIsLongerThanItsMessageIsNoName) {
 }
 
 }  // namespace
-}  // namespace tendon::plug::vrpn
+}  // namespace tendon::plug::vrpn::vrpn_message_test

@@ -15,7 +15,7 @@
 
 #include "tests/clients/plug/vrpn/program.h"
 
-namespace tendon::plug::vrpn {
+namespace tendon::plug::vrpn::vrpn_peer_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -431,4 +431,4 @@ TEST(VrpnCaptures, WhatRealProgramsSentIsUnderstood) {
 }
 
 }  // namespace
-}  // namespace tendon::plug::vrpn
+}  // namespace tendon::plug::vrpn::vrpn_peer_test

@@ -11,7 +11,7 @@
 #include "tests/e2e/stage/stage.h"
 #include "tests/server/scratch_folder.h"
 
-namespace tendon::e2e {
+namespace tendon::e2e::vrpn_recording_test {
 namespace {
 
 using testing::ScratchFolder;
@@ -83,4 +83,4 @@ TEST(VrpnRecording, AProgramThatIsKilledWithForceOnFadesWithoutAJump) { expect_t
 TEST(VrpnRecording, AProgramThatIsFrozenWithForceOnFadesWithoutAJump) { expect_that_it_fades(SIGSTOP); }
 
 }  // namespace
-}  // namespace tendon::e2e
+}  // namespace tendon::e2e::vrpn_recording_test

@@ -12,7 +12,7 @@
 #include "tests/clients/plug/vrpn/program.h"
 #include "tests/clients/plug/world.h"
 
-namespace tendon::plug::vrpn {
+namespace tendon::plug::vrpn::vrpn_world_test {
 namespace {
 
 /// A program at one station.
@@ -323,4 +323,4 @@ TEST(VrpnWorld, AWall20MsAwayGivesOutNothingWithTheLimiterAndOver1JWithout) {
 }
 
 }  // namespace
-}  // namespace tendon::plug::vrpn
+}  // namespace tendon::plug::vrpn::vrpn_world_test

@@ -15,7 +15,7 @@
 #include "tests/clients/softbody/elsewhere.h"
 #include "tests/clients/softbody/pressed_block.h"
 
-namespace tendon::softbody {
+namespace tendon::softbody::cutting_test {
 namespace {
 
 using testing::kB1PatchRadius;
@@ -452,4 +452,4 @@ TEST(Cutting, APlanThatGoesWrongIsRefusedBeforeAnythingIsTouched) {
 }
 
 }  // namespace
-}  // namespace tendon::softbody
+}  // namespace tendon::softbody::cutting_test

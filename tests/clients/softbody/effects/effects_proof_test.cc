@@ -17,7 +17,7 @@
 #include "tests/support/callgrind.h"
 #include "tests/support/instruction_test.h"
 
-namespace tendon::softbody {
+namespace tendon::softbody::effects_proof_test {
 namespace {
 
 constexpr int kSteps = 6 - 2;  // between the two run lengths of softbody-proof
@@ -120,4 +120,4 @@ TEST_F(EffectsProof, WhatIsListedCostsSome) {
 }
 
 }  // namespace
-}  // namespace tendon::softbody
+}  // namespace tendon::softbody::effects_proof_test

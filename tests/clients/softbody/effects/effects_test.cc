@@ -18,7 +18,7 @@
 #include "tests/clients/softbody/pressed_block.h"
 #include "tests/support/dice.h"
 
-namespace tendon::softbody {
+namespace tendon::softbody::effects_test {
 namespace {
 
 using testing::kB1PatchRadius;
@@ -275,4 +275,4 @@ TEST(Friction, IsBoundedByTheForceAlongTheNormalWhereverTheToolGoes) {
 }
 
 }  // namespace
-}  // namespace tendon::softbody
+}  // namespace tendon::softbody::effects_test

@@ -17,7 +17,7 @@
 #include "tests/clients/softbody/pressed_block.h"
 #include "tests/support/dice.h"
 
-namespace tendon::softbody {
+namespace tendon::softbody::self_collision_test {
 namespace {
 
 using testing::pressed_body;
@@ -366,4 +366,4 @@ TEST(SelfCollision, NonsenseIsRefusedByName) {
 }
 
 }  // namespace
-}  // namespace tendon::softbody
+}  // namespace tendon::softbody::self_collision_test

@@ -13,7 +13,7 @@
 
 #pragma GCC diagnostic ignored "-Wpsabi"
 
-namespace tendon::softbody {
+namespace tendon::softbody::kernel_test {
 namespace {
 
 constexpr std::array kLaws{Law::kLinear, Law::kCorotational, Law::kStVenantKirchhoff, Law::kNeoHookean};
@@ -97,4 +97,4 @@ TEST(Kernel, ForcesOfASolidAreTheSumOverThePointsOfItsElements) {
 }
 
 }  // namespace
-}  // namespace tendon::softbody
+}  // namespace tendon::softbody::kernel_test

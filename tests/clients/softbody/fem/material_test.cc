@@ -10,7 +10,7 @@
 
 #include "tests/support/dice.h"
 
-namespace tendon::softbody {
+namespace tendon::softbody::material_test {
 namespace {
 
 constexpr Law kLaws[] = {Law::kLinear, Law::kCorotational, Law::kStVenantKirchhoff, Law::kNeoHookean};
@@ -105,4 +105,4 @@ TEST(Materials, AnImpossibleMaterialIsRefused) {
 }
 
 }  // namespace
-}  // namespace tendon::softbody
+}  // namespace tendon::softbody::material_test

@@ -11,7 +11,7 @@
 
 #include "clients/softbody/fem/gmsh.h"
 
-namespace tendon::softbody {
+namespace tendon::softbody::mesh_test {
 namespace {
 
 constexpr Shape kShapes[] = {Shape::kTet4, Shape::kHex8, Shape::kHex20, Shape::kHex27};
@@ -164,4 +164,4 @@ TEST(Gmsh, RefusesWhatIsNotAMesh) {
 }
 
 }  // namespace
-}  // namespace tendon::softbody
+}  // namespace tendon::softbody::mesh_test

@@ -5,7 +5,7 @@
 
 #include <stdexcept>
 
-namespace tendon::softbody {
+namespace tendon::softbody::products_test {
 namespace {
 
 TEST(Products, AreThoseOfAMatrixAndOfItsTranspose) {
@@ -28,4 +28,4 @@ TEST(Products, RowsThatAreNoMultipleOfFourAreRefused) {
 }
 
 }  // namespace
-}  // namespace tendon::softbody
+}  // namespace tendon::softbody::products_test

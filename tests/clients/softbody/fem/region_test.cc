@@ -14,7 +14,7 @@
 #include "tests/clients/softbody/pressed_block.h"
 #include "tests/clients/softbody/scene_text.h"
 
-namespace tendon::softbody {
+namespace tendon::softbody::region_test {
 namespace {
 
 using testing::pressed_body;
@@ -180,4 +180,4 @@ TEST(SoftbodyScene, RegionsArriveAndWhatIsWrongWithThemIsNamed) {
 }
 
 }  // namespace
-}  // namespace tendon::softbody
+}  // namespace tendon::softbody::region_test

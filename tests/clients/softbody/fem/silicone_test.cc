@@ -17,7 +17,7 @@
 #include "clients/softbody/fem/solid.h"
 #include "clients/softbody/models/quasi_static.h"
 
-namespace tendon::softbody {
+namespace tendon::softbody::silicone_test {
 namespace {
 
 constexpr double kRadius = 0.025;  // m
@@ -138,4 +138,4 @@ TEST(Silicone, MeasuredCylindersAreThePublishedYeohLawAndNotTheNeoHookeanOne) {
 }
 
 }  // namespace
-}  // namespace tendon::softbody
+}  // namespace tendon::softbody::silicone_test

@@ -11,7 +11,7 @@
 
 #include "tests/clients/softbody/pressed_block.h"
 
-namespace tendon::softbody {
+namespace tendon::softbody::solid_test {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
@@ -160,4 +160,4 @@ TEST(Solid, WhatCannotBeIsRefused) {
 }
 
 }  // namespace
-}  // namespace tendon::softbody
+}  // namespace tendon::softbody::solid_test

@@ -18,7 +18,7 @@
 #include "clients/softbody/mesher/volume.h"
 #include "tests/server/scratch_folder.h"
 
-namespace tendon::softbody {
+namespace tendon::softbody::mesher_test {
 namespace {
 
 /// A block of 100 × 100 × 50 mm, its middle above the origin, in mm.
@@ -326,4 +326,4 @@ TEST_F(Meshing, TheSameSurfaceGivesTheSameMesh) {
 }
 
 }  // namespace
-}  // namespace tendon::softbody
+}  // namespace tendon::softbody::mesher_test

@@ -12,7 +12,7 @@
 #include "clients/softbody/touch/contact.h"
 #include "tests/clients/softbody/pressed_block.h"
 
-namespace tendon::softbody {
+namespace tendon::softbody::hard_presses_test {
 namespace {
 
 constexpr double kPatch = testing::kB1PatchRadius;
@@ -137,4 +137,4 @@ TEST(HardPress, NearlyIncompressibleAtOnceIsTheSameAsInSteps) {
 }
 
 }  // namespace
-}  // namespace tendon::softbody
+}  // namespace tendon::softbody::hard_presses_test

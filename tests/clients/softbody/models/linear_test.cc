@@ -11,7 +11,7 @@
 #include "tests/clients/softbody/pressed_block.h"
 #include "tests/clients/softbody/touch/half_space.h"
 
-namespace tendon::softbody {
+namespace tendon::softbody::linear_test {
 namespace {
 
 using testing::kB1;
@@ -135,4 +135,4 @@ TEST(Patches, ThereIsNoneWhereHalfOfItWouldHangOverTheEdge) {
 }
 
 }  // namespace
-}  // namespace tendon::softbody
+}  // namespace tendon::softbody::linear_test

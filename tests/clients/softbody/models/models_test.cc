@@ -17,7 +17,7 @@
 #include "clients/softbody/models/projective.h"
 #include "tests/clients/softbody/pressed_block.h"
 
-namespace tendon::softbody {
+namespace tendon::softbody::models_test {
 namespace {
 
 using testing::kB1;
@@ -208,4 +208,4 @@ TEST(Models, EachRefusesWhatItDoesNotSimulate) {
 }
 
 }  // namespace
-}  // namespace tendon::softbody
+}  // namespace tendon::softbody::models_test

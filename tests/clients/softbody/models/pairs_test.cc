@@ -9,7 +9,7 @@
 
 #include "tests/support/dice.h"
 
-namespace tendon::softbody {
+namespace tendon::softbody::pairs_test {
 namespace {
 
 constexpr int kSize = 20;
@@ -75,4 +75,4 @@ TEST(Pairs, AStepWithoutStiffnessTeachesNothing) {
 }
 
 }  // namespace
-}  // namespace tendon::softbody
+}  // namespace tendon::softbody::pairs_test

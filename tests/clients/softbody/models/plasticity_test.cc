@@ -13,7 +13,7 @@
 #include "tests/clients/softbody/pressed_block.h"
 #include "tests/support/dice.h"
 
-namespace tendon::softbody {
+namespace tendon::softbody::plasticity_test {
 namespace {
 
 using testing::kB1PatchRadius;
@@ -309,4 +309,4 @@ TEST(Plasticity, NonsenseIsRefusedByName) {
 }
 
 }  // namespace
-}  // namespace tendon::softbody
+}  // namespace tendon::softbody::plasticity_test

@@ -13,7 +13,7 @@
 #include "tests/clients/softbody/drawn_answers.h"
 #include "tests/clients/softbody/pressed_block.h"
 
-namespace tendon::softbody {
+namespace tendon::softbody::quasi_static_test {
 namespace {
 
 using testing::kB1PatchRadius;
@@ -176,4 +176,4 @@ TEST(QuasiStatic, WhatCannotBeIsRefused) {
 }
 
 }  // namespace
-}  // namespace tendon::softbody
+}  // namespace tendon::softbody::quasi_static_test

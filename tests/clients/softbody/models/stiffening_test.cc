@@ -9,7 +9,7 @@
 
 #include "tests/clients/softbody/pressed_block.h"
 
-namespace tendon::softbody {
+namespace tendon::softbody::stiffening_test {
 namespace {
 
 using testing::pressed_body;
@@ -106,4 +106,4 @@ TEST(Stiffening, NonsenseIsRefusedByName) {
 }
 
 }  // namespace
-}  // namespace tendon::softbody
+}  // namespace tendon::softbody::stiffening_test

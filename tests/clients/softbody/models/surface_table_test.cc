@@ -15,7 +15,7 @@
 #include "tests/clients/softbody/pressed_block.h"
 #include "tests/server/scratch_folder.h"
 
-namespace tendon::softbody {
+namespace tendon::softbody::surface_table_test {
 namespace {
 
 using testing::pressed_body;
@@ -151,4 +151,4 @@ TEST_F(SurfaceTableFile, IsForTheModelCondensedAndForPatchesAndSpheres) {
 }
 
 }  // namespace
-}  // namespace tendon::softbody
+}  // namespace tendon::softbody::surface_table_test

@@ -21,7 +21,7 @@
 #include "tests/clients/softbody/mpi/live_worker.h"
 #include "tests/server/scratch_folder.h"
 
-namespace tendon::softbody {
+namespace tendon::softbody::fem_test {
 namespace {
 
 std::string contents(const std::filesystem::path& file) {
@@ -220,4 +220,4 @@ TEST_F(Fem, WithoutAFrontAWorkerSaysWhatItMisses) {
 }
 
 }  // namespace
-}  // namespace tendon::softbody
+}  // namespace tendon::softbody::fem_test

@@ -20,7 +20,7 @@
 #include "tests/clients/softbody/near/pressed_before.h"
 #include "tests/support/dice.h"
 
-namespace tendon::softbody {
+namespace tendon::softbody::closed_ways_test {
 namespace {
 
 using testing::Elsewhere;
@@ -214,4 +214,4 @@ TEST(ClosedWays, DISABLED_TenThousandTogetherGiveNothing) {
 }
 
 }  // namespace
-}  // namespace tendon::softbody
+}  // namespace tendon::softbody::closed_ways_test

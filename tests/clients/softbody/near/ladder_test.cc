@@ -15,7 +15,7 @@
 #include "tests/clients/softbody/pressed_block.h"
 #include "tests/clients/softbody/same_answer.h"
 
-namespace tendon::softbody {
+namespace tendon::softbody::ladder_test {
 namespace {
 
 using testing::AskedAndExact;
@@ -479,4 +479,4 @@ TEST(Ladder, WhatCannotBeLearnedIsRefused) {
 }
 
 }  // namespace
-}  // namespace tendon::softbody
+}  // namespace tendon::softbody::ladder_test

@@ -11,7 +11,7 @@
 #include "tests/clients/softbody/pressed_block.h"
 #include "tests/server/scratch_folder.h"
 
-namespace tendon::softbody {
+namespace tendon::softbody::learn_test {
 namespace {
 
 using testing::kB1PatchRadius;
@@ -128,4 +128,4 @@ TEST_F(Learn, AFileOfAnotherBodyUnderThisNameIsRefused) {
 }
 
 }  // namespace
-}  // namespace tendon::softbody
+}  // namespace tendon::softbody::learn_test

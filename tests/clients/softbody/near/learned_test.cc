@@ -11,7 +11,7 @@
 #include "tests/clients/softbody/near/pressed_before.h"
 #include "tests/support/dice.h"
 
-namespace tendon::softbody {
+namespace tendon::softbody::learned_test {
 namespace {
 
 using testing::PressedBefore;
@@ -156,4 +156,4 @@ TEST(LearnedShapes, ASmallerErrorIsAskedForInFewerCells) {
 }
 
 }  // namespace
-}  // namespace tendon::softbody
+}  // namespace tendon::softbody::learned_test

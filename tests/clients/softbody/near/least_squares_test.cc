@@ -5,7 +5,7 @@
 
 #include "tests/support/dice.h"
 
-namespace tendon::softbody {
+namespace tendon::softbody::least_squares_test {
 namespace {
 
 struct Problem {
@@ -66,4 +66,4 @@ TEST(LeastSquares, WhereEveryEntryWouldHurtAllAreZero) {
 }
 
 }  // namespace
-}  // namespace tendon::softbody
+}  // namespace tendon::softbody::least_squares_test

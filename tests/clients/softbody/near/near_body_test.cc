@@ -14,7 +14,7 @@
 #include "clients/softbody/models/quasi_static.h"
 #include "tests/clients/softbody/pressed_block.h"
 
-namespace tendon::softbody {
+namespace tendon::softbody::near_body_test {
 namespace {
 
 using testing::kB1PatchRadius;
@@ -223,4 +223,4 @@ TEST(Pieces, OneThatThrowsIsTheLast) {
 }
 
 }  // namespace
-}  // namespace tendon::softbody
+}  // namespace tendon::softbody::near_body_test

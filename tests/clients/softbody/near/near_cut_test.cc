@@ -20,7 +20,7 @@
 #include "tests/clients/softbody/elsewhere.h"
 #include "tests/clients/softbody/pressed_block.h"
 
-namespace tendon::softbody {
+namespace tendon::softbody::near_cut_test {
 namespace {
 
 using testing::AskedAndExact;
@@ -360,4 +360,4 @@ TEST(NearCut, TheErrorSaidCoversTheTrueOneOfTwoHundredDrawnAnswersAroundACut) {
 }
 
 }  // namespace
-}  // namespace tendon::softbody
+}  // namespace tendon::softbody::near_cut_test

@@ -14,7 +14,7 @@
 #include "tests/clients/softbody/pressed_block.h"
 #include "tests/clients/softbody/same_answer.h"
 
-namespace tendon::softbody {
+namespace tendon::softbody::near_model_test {
 namespace {
 
 using testing::AskedAndExact;
@@ -299,4 +299,4 @@ TEST(Near, WhereAFieldTakesOverForceAndStiffnessGoOnAndFadeTogether) {
 }
 
 }  // namespace
-}  // namespace tendon::softbody
+}  // namespace tendon::softbody::near_model_test

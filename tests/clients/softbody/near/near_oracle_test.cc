@@ -18,7 +18,7 @@
 #include "tests/clients/softbody/elsewhere.h"
 #include "tests/clients/softbody/pressed_block.h"
 
-namespace tendon::softbody {
+namespace tendon::softbody::near_oracle_test {
 namespace {
 
 using testing::AskedAndExact;
@@ -348,4 +348,4 @@ TEST(NearOracle, AThreadOfItsOwnKeepsAnswersRight) {
 }
 
 }  // namespace
-}  // namespace tendon::softbody
+}  // namespace tendon::softbody::near_oracle_test

@@ -9,7 +9,7 @@
 #include "tests/clients/softbody/near/pressed_before.h"
 #include "tests/support/dice.h"
 
-namespace tendon::softbody {
+namespace tendon::softbody::tabulated_test {
 namespace {
 
 using testing::PressedBefore;
@@ -123,4 +123,4 @@ TEST(TabulatedAnswers, AKnotThatWasNotSolvedIsNotTabulated) {
 }
 
 }  // namespace
-}  // namespace tendon::softbody
+}  // namespace tendon::softbody::tabulated_test

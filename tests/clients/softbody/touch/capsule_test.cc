@@ -15,7 +15,7 @@
 #include "clients/softbody/touch/sphere.h"
 #include "tests/clients/softbody/touch/contact_integral.h"
 
-namespace tendon::softbody {
+namespace tendon::softbody::capsule_test {
 namespace {
 
 using testing::ContactIntegral;
@@ -236,4 +236,4 @@ TEST(Capsule, ADeepPressPushesDownWhatIsAboveItsAxis) {
 }
 
 }  // namespace
-}  // namespace tendon::softbody
+}  // namespace tendon::softbody::capsule_test

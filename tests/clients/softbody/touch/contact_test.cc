@@ -16,7 +16,7 @@
 #include "tests/clients/softbody/pressed_block.h"
 #include "tests/support/dice.h"
 
-namespace tendon::softbody {
+namespace tendon::softbody::contact_test {
 namespace {
 
 using testing::kB1PatchRadius;
@@ -227,4 +227,4 @@ TEST_F(Contacts, OffTheBodyOrNowhereNothingIsFelt) {
 }
 
 }  // namespace
-}  // namespace tendon::softbody
+}  // namespace tendon::softbody::contact_test

@@ -12,7 +12,7 @@
 
 #include "tests/support/dice.h"
 
-namespace tendon::softbody {
+namespace tendon::softbody::distance_grid_test {
 namespace {
 
 constexpr double kRadius = 0.01;  // m
@@ -126,4 +126,4 @@ TEST(DistanceGrid, RefusesWhatIsNoDistanceOrTooLarge) {
 }
 
 }  // namespace
-}  // namespace tendon::softbody
+}  // namespace tendon::softbody::distance_grid_test

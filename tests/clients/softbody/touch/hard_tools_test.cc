@@ -9,7 +9,7 @@
 #include "clients/softbody/fem/region.h"
 #include "tests/clients/softbody/touch/pressed_by_tools.h"
 
-namespace tendon::softbody {
+namespace tendon::softbody::hard_tools_test {
 namespace {
 
 using testing::kExact;
@@ -53,4 +53,4 @@ TEST(HardTool, EightMillimetresDeepIsTheSameAtOnceAndInSteps) {
 }
 
 }  // namespace
-}  // namespace tendon::softbody
+}  // namespace tendon::softbody::hard_tools_test

@@ -11,7 +11,7 @@
 
 #include "tests/clients/softbody/pressed_block.h"
 
-namespace tendon::softbody {
+namespace tendon::softbody::layer_test {
 namespace {
 
 constexpr double kThickness = 2e-4;  // m
@@ -114,4 +114,4 @@ TEST(Layer, RefusesWhatIsNoLayer) {
 }
 
 }  // namespace
-}  // namespace tendon::softbody
+}  // namespace tendon::softbody::layer_test

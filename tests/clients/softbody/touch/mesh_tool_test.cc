@@ -12,7 +12,7 @@
 #include "tests/clients/softbody/touch/pressed_by_tools.h"
 #include "tests/clients/softbody/touch/surfaces.h"
 
-namespace tendon::softbody {
+namespace tendon::softbody::mesh_tool_test {
 namespace {
 
 using testing::kExact;
@@ -134,4 +134,4 @@ TEST(MeshTool, InItsSceneTheBackOfTheBowlMeetsTheBody) {
 }
 
 }  // namespace
-}  // namespace tendon::softbody
+}  // namespace tendon::softbody::mesh_tool_test

@@ -28,7 +28,7 @@
 #include "tests/clients/softbody/touch/half_space.h"
 #include "tests/clients/softbody/touch/pressed_by_tools.h"
 
-namespace tendon::softbody {
+namespace tendon::softbody::rigid_contact_test {
 namespace {
 
 using testing::config_of;
@@ -520,4 +520,4 @@ TEST(RigidScene, APatchThatPressesFarIsToldOfRigidTools) {
 }
 
 }  // namespace
-}  // namespace tendon::softbody
+}  // namespace tendon::softbody::rigid_contact_test

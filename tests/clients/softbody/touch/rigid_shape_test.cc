@@ -16,7 +16,7 @@
 #include "tests/clients/softbody/touch/surfaces.h"
 #include "tests/support/dice.h"
 
-namespace tendon::softbody {
+namespace tendon::softbody::rigid_shape_test {
 namespace {
 
 struct Named {
@@ -200,4 +200,4 @@ TEST(RigidShape, RefusesWhatIsNoShape) {
 }
 
 }  // namespace
-}  // namespace tendon::softbody
+}  // namespace tendon::softbody::rigid_shape_test

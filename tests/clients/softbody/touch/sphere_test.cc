@@ -15,7 +15,7 @@
 #include "tests/clients/softbody/scene_text.h"
 #include "tests/clients/softbody/touch/half_space.h"
 
-namespace tendon::softbody {
+namespace tendon::softbody::sphere_test {
 namespace {
 
 constexpr double kRadius = 0.01;            // m
@@ -151,4 +151,4 @@ TEST(CapsuleScene, ItsKeysAreItsOwnAndItRefusesWhatItCannotDo) {
 }
 
 }  // namespace
-}  // namespace tendon::softbody
+}  // namespace tendon::softbody::sphere_test

@@ -11,7 +11,7 @@
 #include "tests/clients/softbody/touch/surfaces.h"
 #include "tests/support/dice.h"
 
-namespace tendon::softbody {
+namespace tendon::softbody::surface_distance_test {
 namespace {
 
 TEST(SurfaceDistance, OfABoxItIsThatOnPaperAlsoAtEdgesAndCorners) {
@@ -57,4 +57,4 @@ TEST(SurfaceDistance, AtASharpCornerTheSideIsRightWhereSingleFacetsAreWrong) {
 }
 
 }  // namespace
-}  // namespace tendon::softbody
+}  // namespace tendon::softbody::surface_distance_test

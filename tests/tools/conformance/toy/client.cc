@@ -10,12 +10,6 @@ namespace tendon::conformance {
 using std::chrono::milliseconds;
 using std::chrono::seconds;
 
-namespace {
-
-Key key_from(std::uint8_t first) { return Key(Bytes32{std::byte{first}, std::byte{0x5A}}); }
-
-}  // namespace
-
 ToyClient::ToyClient(const std::optional<Key>& key, pb::Role role, bool asks, Fault fault)
     : key_(key), role_(role), asks_(asks), fault_(fault) {}
 

@@ -12,8 +12,6 @@ using std::chrono::seconds;
 
 namespace {
 
-std::int64_t ns(LocalTime time) { return time.time_since_epoch().count(); }
-
 /// A toy has one device with one channel.
 constexpr std::string_view kDevice = "arm";
 constexpr std::string_view kChannel = "wall";
@@ -39,8 +37,6 @@ std::string difference(const pb::Couple& theirs) {
   if (theirs.stiffness_npm() != 1000) return "coupling.stiffness_n_per_m: mine 1000";
   return theirs.purse() ? "" : "purse: mine true";
 }
-
-Key key_from(std::uint8_t first) { return Key(Bytes32{std::byte{first}, std::byte{0x5A}}); }
 
 }  // namespace
 

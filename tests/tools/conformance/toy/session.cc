@@ -16,8 +16,6 @@ namespace {
 
 constexpr std::uint64_t kRemembered = 1984;
 
-std::int64_t ns(LocalTime time) { return time.time_since_epoch().count(); }
-
 bool within_bounds(const pb::DeviceState& state) {
   return !far(state.position_m()) && !far(state.velocity_mps()) && !far(state.force_applied_n()) &&
          !far(state.energy_j()) && state.permitted_force_n() >= 0 && state.mode() >= 1 && state.mode() <= 6;

@@ -11,6 +11,10 @@
 
 namespace tendon::conformance {
 
+inline std::int64_t ns(LocalTime time) { return time.time_since_epoch().count(); }
+/// A key that says whose it is.
+inline Key key_from(std::uint8_t first) { return Key(Bytes32{std::byte{first}, std::byte{0x5A}}); }
+
 /// Either end of a toy's open conversation.
 class ToySession {
  public:

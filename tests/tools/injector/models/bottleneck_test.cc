@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-namespace tendon::injector {
+namespace tendon::injector::bottleneck_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -123,4 +123,4 @@ TEST(Bottleneck, WhatIsInTheQueueIsAheadOfWhatComesAfterAChange) {
 }
 
 }  // namespace
-}  // namespace tendon::injector
+}  // namespace tendon::injector::bottleneck_test

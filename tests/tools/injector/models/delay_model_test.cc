@@ -14,7 +14,7 @@
 
 #include "tests/tools/injector/models/draws.h"
 
-namespace tendon::injector {
+namespace tendon::injector::delay_model_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -265,4 +265,4 @@ TEST(DelayTable, DrawsFollowEachMeasured5gHistogram) {
 }
 
 }  // namespace
-}  // namespace tendon::injector
+}  // namespace tendon::injector::delay_model_test

@@ -7,7 +7,7 @@
 #include <cstdint>
 #include <set>
 
-namespace tendon::injector {
+namespace tendon::injector::draws_test {
 namespace {
 
 using Words = std::array<std::uint32_t, 4>;
@@ -58,4 +58,4 @@ TEST(OneOf, DividesTheDrawsEvenly) {
 }
 
 }  // namespace
-}  // namespace tendon::injector
+}  // namespace tendon::injector::draws_test

@@ -8,7 +8,7 @@
 #include <cstdint>
 #include <cstring>
 
-namespace tendon::injector::exact {
+namespace tendon::injector::exact::exact_math_test {
 namespace {
 
 TEST(ExactMath, NormalTailAgreesWithErfcAndIsTheInverseOfTheQuantile) {
@@ -65,4 +65,4 @@ TEST(ExactMath, GivesTheSameBitsEverywhere) {
 }
 
 }  // namespace
-}  // namespace tendon::injector::exact
+}  // namespace tendon::injector::exact::exact_math_test

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-namespace tendon::injector {
+namespace tendon::injector::loss_model_test {
 namespace {
 
 constexpr std::uint64_t kMany = 400'000;
@@ -126,4 +126,4 @@ TEST(LossModel, AnotherModelOfTheSameKindGoesOnFromTheState) {
 }
 
 }  // namespace
-}  // namespace tendon::injector
+}  // namespace tendon::injector::loss_model_test

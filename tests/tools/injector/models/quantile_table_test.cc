@@ -10,7 +10,7 @@
 
 #include "tests/tools/injector/models/exact_math.h"
 
-namespace tendon::injector {
+namespace tendon::injector::quantile_table_test {
 namespace {
 
 constexpr std::uint64_t kLast = ~std::uint64_t{0};
@@ -94,4 +94,4 @@ TEST(QuantileTable, HashTellsTablesApart) {
 }
 
 }  // namespace
-}  // namespace tendon::injector
+}  // namespace tendon::injector::quantile_table_test

@@ -14,7 +14,7 @@
 
 #include "tests/tools/injector/models/delay_model.h"
 
-namespace tendon::injector {
+namespace tendon::injector::named_profiles_test {
 namespace {
 
 TEST(NamedProfiles, EachReadsBackAndHasOneWord) {
@@ -95,4 +95,4 @@ TEST(NamedProfiles, The5gOnesHaveTheMeanAndTheDeviationOfTheirMeasurements) {
 }
 
 }  // namespace
-}  // namespace tendon::injector
+}  // namespace tendon::injector::named_profiles_test

@@ -14,7 +14,7 @@
 #include <utility>
 #include <vector>
 
-namespace tendon::injector {
+namespace tendon::injector::profile_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -390,4 +390,4 @@ TEST(ProfileFiles, ANamedPipeIsRefusedAndNotWaitedFor) {
 }
 
 }  // namespace
-}  // namespace tendon::injector
+}  // namespace tendon::injector::profile_test

@@ -14,7 +14,7 @@
 #include "tests/tools/injector/injector.h"
 #include "tests/tools/injector/profile/named_profiles.h"
 
-namespace tendon::injector {
+namespace tendon::injector::scenario_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -258,4 +258,4 @@ TEST(Command, NoBytesWhateverDoMoreThanAnError) {
 }
 
 }  // namespace
-}  // namespace tendon::injector
+}  // namespace tendon::injector::scenario_test

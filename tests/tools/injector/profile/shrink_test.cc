@@ -15,7 +15,7 @@
 #include "tests/tools/injector/traces/trace.h"
 #include "tests/tools/injector/traces/trace_player.h"
 
-namespace tendon::injector {
+namespace tendon::injector::shrink_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -162,4 +162,4 @@ TEST(Shrink, AShrunkTraceCanBeShrunkAgain) {
 }
 
 }  // namespace
-}  // namespace tendon::injector
+}  // namespace tendon::injector::shrink_test

@@ -14,7 +14,7 @@
 
 #include "tests/server/scratch_folder.h"
 
-namespace tendon::injector {
+namespace tendon::injector::control_socket_test {
 namespace {
 
 using testing::ScratchFolder;
@@ -90,4 +90,4 @@ TEST(ControlSocket, ReplacesASocketOfTheDeadAndNothingElse) {
 }
 
 }  // namespace
-}  // namespace tendon::injector
+}  // namespace tendon::injector::control_socket_test

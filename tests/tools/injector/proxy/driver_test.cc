@@ -13,7 +13,7 @@
 
 #include "tests/tools/injector/profile/profile.h"
 
-namespace tendon::injector {
+namespace tendon::injector::driver_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -201,4 +201,4 @@ TEST(Driver, MeasuresTheMachinesTimerWhileItRuns) {
 }
 
 }  // namespace
-}  // namespace tendon::injector
+}  // namespace tendon::injector::driver_test

@@ -9,7 +9,7 @@
 
 #include "tests/tools/injector/traces/trace.h"
 
-namespace tendon::injector {
+namespace tendon::injector::dry_run_test {
 namespace {
 
 std::string printed(const NetworkOptions& network, const DryRun& options) {
@@ -82,4 +82,4 @@ TEST(Prepare, NamesTheOptionThatIsWrong) {
 }
 
 }  // namespace
-}  // namespace tendon::injector
+}  // namespace tendon::injector::dry_run_test

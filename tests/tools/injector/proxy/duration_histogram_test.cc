@@ -7,7 +7,7 @@
 #include <random>
 #include <vector>
 
-namespace tendon::injector {
+namespace tendon::injector::duration_histogram_test {
 namespace {
 
 TEST(DurationHistogram, IsZeroBeforeAnythingWasObserved) {
@@ -62,4 +62,4 @@ TEST(DurationHistogram, SinceAnEarlierCopyIsWhatCameAfterIt) {
 }
 
 }  // namespace
-}  // namespace tendon::injector
+}  // namespace tendon::injector::duration_histogram_test

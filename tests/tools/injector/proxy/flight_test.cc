@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-namespace tendon::injector {
+namespace tendon::injector::flight_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -202,4 +202,4 @@ TEST(Flight, TheBytesOfADepartureStayUntilTheNextLaunch) {
 }
 
 }  // namespace
-}  // namespace tendon::injector
+}  // namespace tendon::injector::flight_test

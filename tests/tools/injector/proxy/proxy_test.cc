@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-namespace tendon::injector {
+namespace tendon::injector::proxy_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -353,4 +353,4 @@ TEST(Proxy, ARecordSaysWhatWasPlannedAndWhatHappenedSinceTheFirstDatagram) {
 }
 
 }  // namespace
-}  // namespace tendon::injector
+}  // namespace tendon::injector::proxy_test

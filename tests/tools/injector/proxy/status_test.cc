@@ -9,7 +9,7 @@
 
 #include "tests/tools/injector/proxy/terminal_view.h"
 
-namespace tendon::injector {
+namespace tendon::injector::status_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -83,4 +83,4 @@ TEST(TerminalView, ShowsWhatIsNewSinceBeforeAndFitsTheTerminal) {
 }
 
 }  // namespace
-}  // namespace tendon::injector
+}  // namespace tendon::injector::status_test

@@ -10,7 +10,7 @@
 #include "tests/support/dice.h"
 #include "tests/tools/injector/selftest/statistics.h"
 
-namespace tendon::injector {
+namespace tendon::injector::loss_chain_test {
 namespace {
 
 /// The chain played with dice: what the closed forms must agree with.
@@ -113,4 +113,4 @@ TEST(LossChain, AnotherMeanBurstIsSeen) {
 }
 
 }  // namespace
-}  // namespace tendon::injector
+}  // namespace tendon::injector::loss_chain_test

@@ -20,7 +20,7 @@
 #include "tests/tools/injector/injector.h"
 #include "tests/tools/injector/profile/named_profiles.h"
 
-namespace tendon::injector {
+namespace tendon::injector::selftest_test {
 namespace {
 
 constexpr double kMs = 1e6;  // ns
@@ -149,4 +149,4 @@ INSTANTIATE_TEST_SUITE_P(
                     Fit{"5g-midband", Direction::kDown, "5G-midband-Downlink_PD-Wireless-5G-2a.csv", 0.072}));
 
 }  // namespace
-}  // namespace tendon::injector
+}  // namespace tendon::injector::selftest_test

@@ -10,7 +10,7 @@
 
 #include "tests/support/dice.h"
 
-namespace tendon::injector {
+namespace tendon::injector::statistics_test {
 namespace {
 
 double unit_uniform(double x) { return std::clamp(x, 0.0, 1.0); }
@@ -151,4 +151,4 @@ TEST(Statistics, RunLengthsLeaveOutRunsThatMayHaveBeenLonger) {
 }
 
 }  // namespace
-}  // namespace tendon::injector
+}  // namespace tendon::injector::statistics_test

@@ -16,7 +16,7 @@
 
 #include "tests/tools/injector/traces/trace_player.h"
 
-namespace tendon::injector {
+namespace tendon::injector::import_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -308,4 +308,4 @@ TEST(ImportPing, TheRealPingsHaveThePacketsAndDelaysThatTheirLinesSay) {
 }
 
 }  // namespace
-}  // namespace tendon::injector
+}  // namespace tendon::injector::import_test

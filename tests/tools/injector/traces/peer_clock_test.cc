@@ -7,7 +7,7 @@
 #include <random>
 #include <stdexcept>
 
-namespace tendon::injector {
+namespace tendon::injector::peer_clock_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -66,4 +66,4 @@ TEST(DriftingClock, WhatIsBeyondItsLimitsIsRefused) {
 }
 
 }  // namespace
-}  // namespace tendon::injector
+}  // namespace tendon::injector::peer_clock_test

@@ -15,7 +15,7 @@
 #include "tests/tools/injector/profile/profile.h"
 #include "tests/tools/injector/traces/trace.h"
 
-namespace tendon::injector {
+namespace tendon::injector::trace_player_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -227,4 +227,4 @@ TEST(TracePlayer, ADirectionThatWasNotRecordedPassesWithoutDelay) {
 }
 
 }  // namespace
-}  // namespace tendon::injector
+}  // namespace tendon::injector::trace_player_test

@@ -14,7 +14,7 @@
 
 #include "tests/tools/injector/injector.h"
 
-namespace tendon::injector {
+namespace tendon::injector::trace_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -274,4 +274,4 @@ TEST(Trace, PayloadsAreHashedWithXxh64) {
 }
 
 }  // namespace
-}  // namespace tendon::injector
+}  // namespace tendon::injector::trace_test

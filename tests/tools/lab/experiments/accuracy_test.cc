@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-namespace tendon::lab {
+namespace tendon::lab::accuracy_test {
 namespace {
 
 using softbody::Element;
@@ -315,4 +315,4 @@ TEST(Accuracy, RefusesWhatMakesNoBlock) {
 }
 
 }  // namespace
-}  // namespace tendon::lab
+}  // namespace tendon::lab::accuracy_test

@@ -5,7 +5,7 @@
 
 #include "core/stability/stability_boundary.h"
 
-namespace tendon::lab {
+namespace tendon::lab::boundary_test {
 namespace {
 
 TEST(Boundary, SimulationAndEigenvaluesAgreeWithAndWithoutDelay) {
@@ -18,4 +18,4 @@ TEST(Boundary, SimulationAndEigenvaluesAgreeWithAndWithoutDelay) {
 }
 
 }  // namespace
-}  // namespace tendon::lab
+}  // namespace tendon::lab::boundary_test

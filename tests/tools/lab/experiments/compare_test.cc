@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-namespace tendon::lab {
+namespace tendon::lab::compare_test {
 namespace {
 
 TEST(Compare, TheGridHasAtLeastTwoThousandCellsForEachLaw) { EXPECT_GE(comparison_grid().size(), 2000U); }
@@ -81,4 +81,4 @@ TEST(Compare, AnswersWhichOneToUse) {
 }
 
 }  // namespace
-}  // namespace tendon::lab
+}  // namespace tendon::lab::compare_test

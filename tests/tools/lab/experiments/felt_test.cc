@@ -11,7 +11,7 @@
 #include "tests/tools/injector/profile/named_profiles.h"
 #include "tests/tools/lab/experiments/accuracy.h"
 
-namespace tendon::lab {
+namespace tendon::lab::felt_test {
 namespace {
 
 using softbody::BodyConfig;
@@ -146,4 +146,4 @@ TEST(Felt, TheBestAtTheHandIsQuickEnoughAndQuiet) {
 }
 
 }  // namespace
-}  // namespace tendon::lab
+}  // namespace tendon::lab::felt_test

@@ -12,7 +12,7 @@
 #include "tests/tools/lab/experiments/paper.h"
 #include "tests/tools/lab/experiments/situations.h"
 
-namespace tendon::lab {
+namespace tendon::lab::floor_test {
 namespace {
 
 constexpr Friction kDamped{.coulomb = 0.02, .viscous = 0.26};
@@ -100,4 +100,4 @@ TEST(Floor, RefusesWhatHasNone) {
 }
 
 }  // namespace
-}  // namespace tendon::lab
+}  // namespace tendon::lab::floor_test

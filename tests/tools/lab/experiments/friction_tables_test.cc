@@ -5,7 +5,7 @@
 
 #include <vector>
 
-namespace tendon::lab {
+namespace tendon::lab::friction_tables_test {
 namespace {
 
 TEST(FrictionTables, OnAShortTravelKellyIsOffTenfoldAndTheIntegralTrusted) {
@@ -23,4 +23,4 @@ TEST(FrictionTables, OnAShortTravelKellyIsOffTenfoldAndTheIntegralTrusted) {
 }
 
 }  // namespace
-}  // namespace tendon::lab
+}  // namespace tendon::lab::friction_tables_test

@@ -9,7 +9,7 @@
 #include <stdexcept>
 #include <vector>
 
-namespace tendon::lab {
+namespace tendon::lab::netem_test {
 namespace {
 
 TEST(Netem, UncorrelatedNumbersAreUniformAndCorrelatedOnesAreTooNarrow) {
@@ -43,4 +43,4 @@ TEST(Netem, TheInjectorLosesWhatItIsAskedForAndNetemDoesNot) {
 }
 
 }  // namespace
-}  // namespace tendon::lab
+}  // namespace tendon::lab::netem_test

@@ -7,7 +7,7 @@
 #include <numbers>
 #include <string>
 
-namespace tendon::lab {
+namespace tendon::lab::paper_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -174,4 +174,4 @@ TEST(AolPlus, NeverClipsASoftSpring) {
 }
 
 }  // namespace
-}  // namespace tendon::lab
+}  // namespace tendon::lab::paper_test

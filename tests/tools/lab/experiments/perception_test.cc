@@ -9,9 +9,7 @@
 
 #include "tests/tools/lab/experiments/experiment.h"
 
-using namespace tendon;
-using namespace tendon::lab;
-
+namespace tendon::lab::perception_test {
 namespace {
 
 constexpr Duration kPeriod = std::chrono::milliseconds(1);
@@ -30,8 +28,6 @@ std::vector<Vec3> sine(double frequency, double speed) {
 double just_felt(double frequency) {
   return detection_threshold(frequency) * 2 * std::numbers::pi * frequency / std::numbers::sqrt2;
 }
-
-}  // namespace
 
 TEST(DetectionThreshold, IsFlatTo40HzAndFalls12DecibelAnOctaveTo250Hz) {
   EXPECT_DOUBLE_EQ(detection_threshold(10), detection_threshold(40));
@@ -96,3 +92,6 @@ TEST(NoticedShare, IsThatOfTheMomentsWhichAreJudged) {
   }
   EXPECT_DOUBLE_EQ(outcome(record, kPeriod).noticed_share, 0.2);
 }
+
+}  // namespace
+}  // namespace tendon::lab::perception_test

@@ -7,7 +7,7 @@
 
 #include "tests/tools/lab/experiments/experiment.h"
 
-namespace tendon::lab {
+namespace tendon::lab::reconstruction_test {
 namespace {
 
 /// A hand that goes in and out of a sphere's contact (force as depth to the 3/2, a little more on the way in) with two
@@ -81,4 +81,4 @@ TEST(Reconstruction, At30HzAnd20MsLateTheTableBringsItWithin3Percent) {
 }
 
 }  // namespace
-}  // namespace tendon::lab
+}  // namespace tendon::lab::reconstruction_test

@@ -9,7 +9,7 @@
 
 #include "tests/tools/lab/experiments/compare_kinds.h"
 
-namespace tendon::lab {
+namespace tendon::lab::situations_test {
 namespace {
 
 const Contender kFeel{.name = "feel", .preset = Preset::kFeel, .promises = true};
@@ -137,4 +137,4 @@ TEST(CompareKinds, TheSeedOfTheWorstSituationShowsItAgainByItself) {
 }
 
 }  // namespace
-}  // namespace tendon::lab
+}  // namespace tendon::lab::situations_test

@@ -8,7 +8,7 @@
 #include <sstream>
 #include <string>
 
-namespace tendon::lab {
+namespace tendon::lab::teleop_test {
 namespace {
 
 /// tests/golden/teleop.csv: the figures of three hands from seed 1, at 20 and 200 ms.
@@ -39,4 +39,4 @@ TEST(Teleop, EachMethodIsFeltAsTheCommittedTableSays) {
 }
 
 }  // namespace
-}  // namespace tendon::lab
+}  // namespace tendon::lab::teleop_test

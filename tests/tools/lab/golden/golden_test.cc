@@ -16,7 +16,7 @@
 
 #include "core/control/limiter.h"
 
-namespace tendon::lab {
+namespace tendon::lab::golden_test {
 namespace {
 
 TEST(Golden, EveryLawDoesWhatTheCommittedTableSays) {
@@ -103,4 +103,4 @@ TEST(Golden, NoFigureDependsOnTheProcessorsFusedMultiplyAdd) {
 }
 
 }  // namespace
-}  // namespace tendon::lab
+}  // namespace tendon::lab::golden_test

@@ -10,7 +10,7 @@
 #include "core/control/preset.h"
 #include "tests/support/instruction_test.h"
 
-namespace tendon::lab {
+namespace tendon::lab::law_cost_test {
 namespace {
 
 constexpr const char* kTable = TENDON_GOLDEN "/cost.csv";
@@ -61,4 +61,4 @@ TEST(LawCostTable, IsNotComparedWithThatOfAnotherCompiler) {
 }
 
 }  // namespace
-}  // namespace tendon::lab
+}  // namespace tendon::lab::law_cost_test

@@ -15,7 +15,7 @@
 #include "tests/devices/falcon/memory_pipe.h"
 #include "tests/tools/lab/identify/simulated_ramps.h"
 
-namespace tendon::lab {
+namespace tendon::lab::falcon_ramps_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -97,4 +97,4 @@ TEST(FalconIdentification, FindsTheModelsFrictionWithinTheBoundsItStates) {
 }
 
 }  // namespace
-}  // namespace tendon::lab
+}  // namespace tendon::lab::falcon_ramps_test

@@ -15,7 +15,7 @@
 #include "tests/support/dice.h"
 #include "tests/tools/lab/identify/simulated_ramps.h"
 
-namespace tendon::lab {
+namespace tendon::lab::identify_test {
 namespace {
 
 class Identify : public ::testing::Test {
@@ -194,4 +194,4 @@ TEST_F(Identify, RefusesOptionsThatMakeNoSense) {
 }
 
 }  // namespace
-}  // namespace tendon::lab
+}  // namespace tendon::lab::identify_test

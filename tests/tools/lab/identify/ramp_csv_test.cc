@@ -7,7 +7,7 @@
 #include <stdexcept>
 #include <string>
 
-namespace tendon::lab {
+namespace tendon::lab::ramp_csv_test {
 namespace {
 
 RampRun read(const std::string& text) {
@@ -53,4 +53,4 @@ TEST(RampCsv, SaysThatAFileIsNotThere) {
 }
 
 }  // namespace
-}  // namespace tendon::lab
+}  // namespace tendon::lab::ramp_csv_test

@@ -10,7 +10,7 @@
 
 /// The identification against a device with an encoder of 30 µm and 5 mN of force noise.
 
-namespace tendon::lab {
+namespace tendon::lab::simulated_ramps_test {
 namespace {
 
 RampExperiment experiment_with(double viscous, double coulomb = 0.05) {
@@ -101,4 +101,4 @@ TEST(IntegralFit, StatesItsErrorAsItIs) {
 }
 
 }  // namespace
-}  // namespace tendon::lab
+}  // namespace tendon::lab::simulated_ramps_test

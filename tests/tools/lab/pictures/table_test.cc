@@ -11,7 +11,7 @@
 
 #include "tests/tools/lab/experiments/steps.h"
 
-namespace tendon::lab {
+namespace tendon::lab::table_test {
 namespace {
 
 Run run_of(Law limiter, const std::string& label) {
@@ -96,4 +96,4 @@ TEST(Json, IsOneObjectWithTheUnitInEachKeyAndNullForWhatIsNotKnown) {
 }
 
 }  // namespace
-}  // namespace tendon::lab
+}  // namespace tendon::lab::table_test

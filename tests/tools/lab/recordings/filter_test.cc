@@ -7,7 +7,7 @@
 
 #include "server/scene/scene.h"
 
-namespace tendon::lab {
+namespace tendon::lab::filter_test {
 namespace {
 
 FilterOptions aol() {
@@ -104,4 +104,4 @@ TEST(Filter, NamesTheSettingThatIsWrong) {
 }
 
 }  // namespace
-}  // namespace tendon::lab
+}  // namespace tendon::lab::filter_test

@@ -18,7 +18,7 @@
 #include "tests/server/scratch_folder.h"
 #include "tests/tools/lab/experiments/steps.h"
 
-namespace tendon::lab {
+namespace tendon::lab::pair_report_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -157,4 +157,4 @@ TEST_F(PairReport, DrawsBothEndsAndThePair) {
 }
 
 }  // namespace
-}  // namespace tendon::lab
+}  // namespace tendon::lab::pair_report_test

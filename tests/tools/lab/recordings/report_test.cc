@@ -15,7 +15,7 @@
 #include "tests/tools/lab/experiments/steps.h"
 #include "tests/tools/lab/pictures/plot.h"
 
-namespace tendon::lab {
+namespace tendon::lab::report_test {
 namespace {
 
 using testing::record;
@@ -164,4 +164,4 @@ TEST(Plot, SaysWhenEnergiesAreDrawnToScalesOfTheirOwn) {
 }
 
 }  // namespace
-}  // namespace tendon::lab
+}  // namespace tendon::lab::report_test

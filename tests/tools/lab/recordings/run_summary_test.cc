@@ -13,7 +13,7 @@
 #include "protocol/wire/codec.h"
 #include "tests/tools/lab/experiments/steps.h"
 
-namespace tendon::lab {
+namespace tendon::lab::run_summary_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -332,4 +332,4 @@ TEST(Thinned, KeepsAllThatFitsAndThenEvenlySpacedOnes) {
 }
 
 }  // namespace
-}  // namespace tendon::lab
+}  // namespace tendon::lab::run_summary_test

@@ -9,7 +9,7 @@
 
 #include "tests/tools/lab/experiments/steps.h"
 
-namespace tendon::lab {
+namespace tendon::lab::trace_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -108,4 +108,4 @@ TEST(Trace, RefusesToBeNothingWide) {
 }
 
 }  // namespace
-}  // namespace tendon::lab
+}  // namespace tendon::lab::trace_test
