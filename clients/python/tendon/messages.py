@@ -788,6 +788,9 @@ class Touch:
     torque: Sequence[float] | None = None  # N·m on the hand, base frame axes, about the handle's position
     angular_stiffness: Stiffness | None = None  # N·m/rad, −∂torque/∂θ at the state's orientation, in the same forms
     grip_force: float | None = None  # N, on the fingers of the gripper; > 0 opens them
+    # Which of `Config.ways` has answered, from 1 on; 0: not said. Left out where there is none of that number
+    # (`stats.left_out`), and of a server that does not know FEATURE_WAYS.
+    way: int = 0
 
 
 @dataclass(slots=True)
