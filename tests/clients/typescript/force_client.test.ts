@@ -383,7 +383,7 @@ describe("the callback", () => {
     }
   });
 
-  it("says of each force which of its engine's ways it was, to a server that knows the feature", () => {
+  it("says which of its ways a force was, to a server that knows them", () => {
     const cases = [[2, true, 2], [undefined, true, undefined], [2, false, undefined], [3, true, undefined], [-1, true, undefined],
       [0.5, true, undefined]] as const;
     for (const [way, agreed, sent] of cases) {
