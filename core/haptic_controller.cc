@@ -146,6 +146,7 @@ void HapticController::step_into(Step& fresh, const Motion& hand, const Vec3& ap
     fresh.force_sequence = newest->sequence;
     fresh.loop_age = hand.at - newest->answers;
     fresh.force_error = newest->error;
+    fresh.force_way = newest->way;
   }
 }
 

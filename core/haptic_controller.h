@@ -60,6 +60,7 @@ struct PositionStep {
   Duration longest_hold{};    ///< T that `permitted` counts on: `force` may be held for so long and E stays ≥ 0
   Reasons reasons;            ///< why `force` is not `wanted`
   Mode mode = Mode::kIdle;
+  std::uint8_t force_way = 0;           ///< the way by which its engine made the remote force in use; 0: not said
   std::uint32_t channel = 0;            ///< `mode`, `force_sequence` and the ages are of this channel's force
   std::uint64_t force_sequence = 0;     ///< the remote force in use; 0 = none
   Duration force_age{};                 ///< since it arrived

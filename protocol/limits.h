@@ -52,6 +52,8 @@ inline constexpr std::size_t kMaxLabel = 24;
 inline constexpr std::size_t kMaxButtons = 16;
 inline constexpr std::size_t kMaxJoints = 8;
 inline constexpr std::size_t kMaxOutputs = kMostOutputs;
+/// Ways of answering that an engine names: its rungs are five, and a Hello has no room for sixteen (below).
+inline constexpr std::size_t kMaxWays = 8;
 
 /// The longest pulse of a vibration: nobody feels a longer one, and it cannot be left on.
 inline constexpr Duration kMaxVibration = std::chrono::seconds(10);
@@ -59,9 +61,9 @@ inline constexpr Duration kMaxVibration = std::chrono::seconds(10);
 inline constexpr double kMinVibrationHz = 20;
 inline constexpr double kMaxVibrationHz = 1000;
 
-/// Bytes of UTF-8. With these the largest Hello without claims (674 bytes before padding) and the largest Welcome
-/// (874) stay below the 1200 bytes of a datagram, with room to grow. Sixteen claims with the longest names (896) and
-/// sixteen of the longest features (544) do not fit together: ClientHandshake refuses such a Hello.
+/// Bytes of UTF-8. With these the largest Hello without claims (882 bytes before padding, 208 of them ways) and the
+/// largest Welcome (874) stay below the 944 bytes that a datagram has for them. Sixteen claims with the longest names
+/// (896) and sixteen of the longest features (544) do not fit together: ClientHandshake refuses such a Hello.
 inline constexpr std::size_t kMaxName = 64;
 inline constexpr std::size_t kMaxFeature = 32;
 inline constexpr int kMaxFeatures = 16;

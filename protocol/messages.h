@@ -99,6 +99,9 @@ struct ForceCommand {
   std::optional<double> error{};  ///< N, what the engine thinks that `force` may be wrong by
   std::optional<RemoteTorque> torque{};  ///< only to a server that has agreed to kFeatureHandle; so is the next
   std::optional<double> grip_force{};    ///< N, on the fingers; > 0 opens them
+  /// Which of Hello::ways has answered, from 1 on, at most limits::kMaxWays; 0: not said. Only to a server that has
+  /// agreed to kFeatureWays.
+  std::uint32_t way = 0;
 };
 
 /// Two quantiles of a delay; below zero only where two clocks had to be compared.
@@ -206,6 +209,9 @@ struct PeerReport {
   std::uint32_t state_one_in = 1;  ///< of the states that it wants, it is sent one in so many: its way is full
   bool forces_refused = false;     ///< its forces are not taken: its way loses too much
   LinkReport link{};               ///< `number`: 1, 2, 3 … of the channel; the forces are the channel's
+  // Of the force of that time that is least sure, by its ForceCommand::error; the newest where none says an error.
+  std::optional<double> error{};  ///< N; empty: none says it
+  std::string way{};  ///< of Hello::ways, the one by which it was answered; empty: not said. At most 24 bytes
 };
 
 /// Client → server, reliable: how many states of a device per second this client wants. The server sends
@@ -399,6 +405,10 @@ inline constexpr std::string_view kFeatureTeleoperation = "teleoperation";
 /// positions in single precision. For a client with more devices than seven, whose whole states fit one datagram.
 inline constexpr std::string_view kFeatureStateColumns = "state-columns";
 
+/// A feature: an engine names the ways in which it answers, and says of each force which one it was. A server that does
+/// not know it is sent the forces without that.
+inline constexpr std::string_view kFeatureWays = "ways";
+
 /// A feature: an observer is told what the engines ask for, and how the loops and the engines do (DeviceReport,
 /// PeerReport). A controller that names it is not granted it.
 inline constexpr std::string_view kFeatureDiagnostics = "diagnostics";
@@ -426,6 +436,8 @@ struct Hello {
   std::vector<std::string> features;  ///< offered; the intersection is used. At most 16 of at most 32 bytes
   /// Each once; at most 16. Empty: device 0, its channel 0, and `role`. Otherwise `role` is the highest among them.
   std::vector<Claim> claims{};
+  /// With kFeatureWays: how this engine may answer. At most limits::kMaxWays, each of at most 24 bytes.
+  std::vector<std::string> ways{};
 };
 
 /// The server's yes.

@@ -20,6 +20,7 @@
 #include "server/guests/outputs.h"
 #include "server/recording/records.h"
 #include "server/recording/step_flight.h"
+#include "server/recording/ways.h"
 
 namespace tendon {
 
@@ -70,6 +71,7 @@ struct HandedHello {
 ///     haptic  ──ports──▶ log         of a coupling: all of them; what does not fit is counted
 ///     haptic  ──flight─▶ log         the steps before a fault, frozen by it
 ///     log     ──health─▶ network     newest wins: what it counts is since the start
+///     network ──ways───▶ log         the names of the numbers that forces bring, each written before its first force
 ///     network ─datagrams▶ log        of all devices, those that DatagramSieve lets through; what it leaves out, and what
 ///                                    does not fit, is counted
 ///
@@ -123,6 +125,7 @@ struct Mailboxes {
   std::atomic<std::uint64_t> ports_lost{0};
   StepFlight flight;
   Latest<Health> health;
+  Ways ways;  ///< of RemoteForce::way and Step::force_way
   SpscRing<DatagramRecord> datagrams;
   std::atomic<std::uint64_t> datagrams_lost{0};         ///< did not fit
   std::atomic<std::uint64_t> strangers_left_out{0};     ///< datagrams from or to strangers beyond the sample

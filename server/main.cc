@@ -164,7 +164,10 @@ Json by_device(const Server::Summary& summary) {
       device["channels"].push_back({{"name", channel.channel},
                                     {"forces", channel.forces},
                                     {"late", channel.late},
-                                    {"handovers", channel.handovers}});
+                                    {"handovers", channel.handovers},
+                                    {"worst_error_n", channel.worst_error ? Json(*channel.worst_error) : Json()},
+                                    {"ways", Json::object()}});
+      for (const auto& [way, forces] : channel.ways) device["channels"].back()["ways"][way] = forces;
     }
     devices.push_back(std::move(device));
   }

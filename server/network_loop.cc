@@ -295,6 +295,7 @@ void NetworkLoop::admit(LocalTime now, const Address& from, const Doorman::Guest
                 contains(welcome.features, kFeatureTeleoperation) && role == Role::kObserver,
                 contains(welcome.features, kFeatureOutputs),
                 session.states_in_columns,
+                contains(welcome.features, kFeatureWays) ? guest.hello.ways : std::vector<std::string>(),
                 std::move(seats),
                 std::move(views),
                 {bytes.begin(), bytes.end()},
@@ -526,6 +527,20 @@ void NetworkLoop::send_all(LocalTime now, Guest& guest) {
   }
 }
 
+/// What the engine says of how good the force is, and the number of the way by which it was made.
+std::uint8_t NetworkLoop::note(const ForceCommand& command, const Guest& guest, ServedDevice& device) {
+  ServedChannel& channel = device.channels[command.channel];
+  const bool named = command.way > 0 && command.way <= guest.ways.size();
+  const std::uint8_t way = named ? device.mail->ways.number_of(guest.ways[command.way - 1]) : std::uint8_t{0};
+  channel.doubt.observe(command.error, way);
+  channel.worst_error = std::max(channel.worst_error, command.error);
+  if (way > 0) {
+    channel.by_way.resize(std::max<std::size_t>(channel.by_way.size(), way + 1U));
+    ++channel.by_way[way];
+  }
+  return way;
+}
+
 void NetworkLoop::take_force(LocalTime now, Guest& guest, const ForceCommand& command) {
   const std::uint32_t place = guest.device_of(command.device);
   const bool there = place < devices_.size() && command.channel < devices_[place].channels.size();
@@ -568,6 +583,7 @@ void NetworkLoop::take_force(LocalTime now, Guest& guest, const ForceCommand& co
   force.source = channel.holder;
   force.topology_changed = command.topology_changed;
   force.error = command.error;
+  force.way = note(command, guest, device);
   force.torque = command.torque;
   force.grip_force = command.grip_force;
   device.mail->forces[command.channel].put();
@@ -746,6 +762,18 @@ void NetworkLoop::close(LocalTime now) {
   half_open_.clear();
 }
 
+namespace {
+
+std::vector<std::pair<std::string, std::uint64_t>> counts_of(const ServedChannel& channel, const Ways& ways) {
+  std::vector<std::pair<std::string, std::uint64_t>> counts;
+  for (std::size_t way = 1; way < channel.by_way.size(); ++way) {
+    if (channel.by_way[way] > 0) counts.emplace_back(ways.name_of(static_cast<std::uint8_t>(way)), channel.by_way[way]);
+  }
+  return counts;
+}
+
+}  // namespace
+
 NetworkLoop::Stats NetworkLoop::stats() const {
   Stats stats = stats_;
   stats.hellos = doorman_.stats();
@@ -758,7 +786,9 @@ NetworkLoop::Stats NetworkLoop::stats() const {
                                 .holder = holder != nullptr ? holder->name : std::string(),
                                 .forces = channel.forces,
                                 .handovers = channel.handovers,
-                                .late = channel.late});
+                                .late = channel.late,
+                                .worst_error = channel.worst_error,
+                                .ways = counts_of(channel, device.mail->ways)});
     }
   }
   for (const Guest& guest : guests_) {

@@ -8,6 +8,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <utility>
 #include <variant>
 #include <vector>
 
@@ -132,10 +133,12 @@ class NetworkLoop {
     struct Channel {
       std::string device;
       std::string channel;
-      std::string holder;           ///< its name; empty: nobody
-      std::uint64_t forces = 0;     ///< handed on
-      std::uint64_t handovers = 0;  ///< from one holder to another who wanted it
-      std::uint64_t late = 0;       ///< as above
+      std::string holder;                   ///< its name; empty: nobody
+      std::uint64_t forces = 0;             ///< handed on
+      std::uint64_t handovers = 0;          ///< from one holder to another who wanted it
+      std::uint64_t late = 0;               ///< as above
+      std::optional<double> worst_error{};  ///< N, the largest that an engine has said of its force; empty: none has
+      std::vector<std::pair<std::string, std::uint64_t>> ways{};  ///< forces by each way of answering that was named
     };
     std::vector<Channel> channels;
     LinkStats controller;  ///< the link of the present controller, or of the last one
@@ -206,6 +209,7 @@ class NetworkLoop {
   void open(LocalTime now, Guest guest);
   void take_events(LocalTime now, Guest& guest);
   void take_force(LocalTime now, Guest& guest, const ForceCommand& command);
+  std::uint8_t note(const ForceCommand& command, const Guest& guest, ServedDevice& device);
   struct Dialled {
     std::uint32_t device;
     std::unique_ptr<Peer> peer;

@@ -578,7 +578,7 @@ void Server::drain_to_recorder(LocalTime now) {
     if (!recorder_) take_ports(std::numeric_limits<std::uint64_t>::max());
     while (const StepRecord* step = runtime.mail.steps.front()) {
       take_ports(step->tick);  // the haptic thread pushes what the coupling did before the step
-      recorder_->record(*step, device);
+      recorder_->record(*step, device, runtime.mail.ways.name_of(step->force_way));
       runtime.mail.steps.pop();
     }
     steps_lost += news(runtime.mail.steps_lost, runtime.told_steps_lost);
@@ -721,7 +721,8 @@ void Server::save_flight(DeviceRuntime& runtime) {
     const auto& recording = devices_.front()->scene.recording;
     const auto sink = open_flight(recording ? std::optional(recording->path) : std::nullopt,
                                   devices_.size() == 1 ? "" : runtime.scene.name);
-    write_flight(runtime.mail.flight, {.scene = scene_record(runtime.scene), .started = started_}, *sink);
+    write_flight(runtime.mail.flight, {.scene = scene_record(runtime.scene), .started = started_}, runtime.mail.ways,
+                 *sink);
     log::error("the steps before the fault are in " + sink->path().string());
   } catch (const std::exception& problem) {
     log::error(std::string("the steps before the fault are lost: ") + problem.what());

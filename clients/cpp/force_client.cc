@@ -35,6 +35,15 @@ const ForceClient::Config& checked(const ForceClient::Config& config) {
   expect_at_most(limits::kMaxName, config.name, "name");
   expect_at_most(limits::kMaxLabel, config.device, "device");
   expect_at_most(limits::kMaxLabel, config.channel, "channel");
+  expect(config.ways.size() <= limits::kMaxWays, "ways.size", static_cast<double>(config.ways.size()),
+         "at most 8 names");
+  for (auto way = config.ways.begin(); way != config.ways.end(); ++way) {
+    const std::string field = "ways[" + std::to_string(way - config.ways.begin()) + "]";
+    expect(!way->empty(), field + ".size", 0, "at least 1 byte");
+    expect_at_most(limits::kMaxLabel, *way, field);
+    if (std::find(config.ways.begin(), way, *way) != way)
+      throw std::invalid_argument(field + " = \"" + *way + "\": expected no name twice");
+  }
   expect(
       config.rate_hz == 0 || (config.rate_hz >= ForceClient::kMinRateHz && config.rate_hz <= ForceClient::kMaxRateHz),
       "rate_hz", config.rate_hz, "0, or 0.001 to 100000");
@@ -183,6 +192,8 @@ void ForceClient::greet(LocalTime now) {
   if (config_.diagnostics) hello.features.emplace_back(kFeatureDiagnostics);
   if (config_.joints) hello.features.emplace_back(kFeatureJoints);
   if (config_.outputs) hello.features.emplace_back(kFeatureOutputs);
+  if (!config_.ways.empty()) hello.features.emplace_back(kFeatureWays);
+  hello.ways = config_.ways;
   if (claims()) hello.claims = {{.device = config_.device, .channel = config_.channel, .role = role_}};
   connection_.greet(now, hello);
   stats_.phase = Phase::kGreeting;
@@ -359,6 +370,8 @@ bool ForceClient::answer(LocalTime now, const Reply& reply) {
 /// Takes from a command what this server or its device does not know.
 void ForceClient::leave_out(const Touch& touch, const DeviceState& answered, ForceCommand& command) {
   if (command.model && !agreed_to(kFeatureLocalModel)) command.model.reset();
+  if (command.way > config_.ways.size()) stats_.left_out = "the way of answering: Config::ways has none of its number";
+  if (command.way > config_.ways.size() || (command.way > 0 && !agreed_to(kFeatureWays))) command.way = 0;
   if (!touch.torque && !touch.angular_stiffness && !touch.grip_force) return;
   if (!agreed_to(kFeatureHandle)) {
     stats_.left_out = "torque and grip force: the server does not know them";

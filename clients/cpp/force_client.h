@@ -108,6 +108,10 @@ class ForceClient {
     bool joints = false;
     /// Ask for the outputs of the device (HandleDescription::outputs), to set them with `set_output`.
     bool outputs = false;
+    /// Names of the ways in which this engine answers, which Touch::way counts from 1: observers are told, and a
+    /// recording holds, by which a force was made. At most limits::kMaxWays, each of 1 to limits::kMaxLabel bytes, no two
+    /// alike.
+    std::vector<std::string> ways{};
     /// With a Watch: be a controller that sends no force. It may rearm, disarm and hold a
     /// channel.
     bool operates = false;

@@ -9,6 +9,7 @@ ForceCommand to_command(const Touch& touch, const DeviceState& hand) {
   command.force = touch.force;
   command.topology_changed = touch.topology_changed;
   command.error = touch.error;
+  command.way = touch.way;
   if (touch.stiffness || touch.contact) {
     command.model = LocalModel{.at = hand.position,
                                .stiffness = touch.stiffness.value_or(Mat3(Mat3::Zero())),
@@ -29,6 +30,7 @@ Touch to_touch(const ForceCommand& command) {
   Touch touch = command.force;
   touch.topology_changed = command.topology_changed;
   touch.error = command.error;
+  touch.way = command.way;
   if (command.model) {
     touch.stiffness = command.model->stiffness;
     touch.valid_radius = command.model->valid_radius;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
 #include <limits>
 #include <optional>
 
@@ -23,6 +24,9 @@ struct Touch {
   /// The body has been cut or torn since the previous answer: the server then uses neither answer's stiffness or table.
   bool topology_changed = false;
   std::optional<double> error{};  ///< N, the engine's own estimate of the error of `force`; recorded with it
+  /// Which of Config::ways has answered, from 1 on; 0: not said. It is left out where there is none of that number
+  /// (Stats::left_out), and of a server that does not know `kFeatureWays`.
+  std::uint32_t way = 0;
   // For a device whose handle has more motors than those of its position (ForceClient::handle()), of a server that
   // knows `kFeatureHandle`; another one is sent `force` without these (Stats::left_out).
   std::optional<Vec3> torque{};  ///< N·m, on the hand, base frame axes, about the handle's position

@@ -138,6 +138,8 @@ Json engine_json(const std::string& channel, const PeerReport& peer) {
           {"duplicated", link.duplicated},
           {"state_one_in", peer.state_one_in},
           {"forces_refused", peer.forces_refused},
+          {"error_n", peer.error ? Json(*peer.error) : Json()},
+          {"way", peer.way},
           {"words", link.words}};
 }
 

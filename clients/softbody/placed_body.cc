@@ -83,6 +83,7 @@ Touch PlacedBody::touch_of(const Feel& feel, const DeviceState& hand) {
   touch.stiffness = feel.stiffness;
   touch.valid_radius = feel.valid_radius;
   touch.error = feel.error;
+  touch.way = static_cast<std::uint32_t>(feel.way);
   touch.topology_changed = feel.topology_changed;
   if (only_pushes_ && std::isfinite(feel.gap)) {
     touch.contact =

@@ -190,6 +190,9 @@ int main(int argc, char** argv) {
     std::optional<softbody::BackgroundThread> thread;
     softbody::PlacedBody body(scene);
     prepare_beside(scene, thread, body);
+    if (scene.body.model == softbody::ModelKind::kNear) {
+      options.client.ways.assign(softbody::kWayNames.begin(), softbody::kWayNames.end());
+    }
     const int exit_code = answer(scene, options, body);
     const softbody::Answered answered{body.ladder(), thread ? body.near_field() : std::nullopt};
     if (options.json) {

@@ -80,6 +80,7 @@ struct RemoteForce {
   std::uint32_t source = 0;  ///< who sent it: the forces of another engine are ramped in
   /// The body has been cut or torn since the answer before this one: neither answer's model can be relied on.
   bool topology_changed = false;
+  std::uint8_t way = 0;           ///< number of the way by which the engine made it; 0: not said. No law looks at it
   std::optional<double> error{};  ///< N, ≥ 0: what the engine itself thinks `force` may be wrong by
   std::optional<RemoteTorque> torque{};
   std::optional<double> grip_force{};  ///< N, on the fingers of the gripper; > 0 opens them

@@ -62,7 +62,7 @@ bool in_bounds(const ForceCommand& command) noexcept {
 bool is_receivable(const ForceCommand& command) noexcept {
   return command.sequence > 0 && in_bounds(command) && command.valid_for > Duration::zero() &&
          command.valid_for <= limits::kMaxValidFor && command.device < limits::kMaxDevices &&
-         command.channel < limits::kMaxChannels;
+         command.channel < limits::kMaxChannels && command.way <= limits::kMaxWays;
 }
 
 bool in_bounds(const DeviceState& state) noexcept {

@@ -253,6 +253,7 @@ bool read(const pb::ForceCommand& from, ForceCommand& to) noexcept {
   read(from.force_n(), to.force);
   to.device = from.device();
   to.channel = from.channel();
+  to.way = from.way();
   return is_receivable(to);
 }
 
@@ -274,6 +275,7 @@ void write(const ForceCommand& from, pb::ForceCommand& to) {
   write_torque(from.torque, to);
   to.clear_gripper_force_n();
   if (from.grip_force) to.set_gripper_force_n(*from.grip_force);
+  to.set_way(from.way);
 }
 
 namespace {
@@ -680,7 +682,8 @@ bool read(const pb::PeerReport& from, PeerReport& to) {
   to.forces_refused = from.forces_refused();
   return read_device(from.device(), to.device) && read_channel(from.channel(), to.channel) &&
          read(from.name(), limits::kMaxName, to.name) && to.state_one_in >= 1 && to.state_one_in <= limits::kMaxOneIn &&
-         from.has_link() && read(from.link(), to.link);
+         from.has_link() && read(from.link(), to.link) && read(from.has_error_n(), from.error_n(), to.error) &&
+         (!to.error || *to.error >= 0) && read(from.way(), limits::kMaxLabel, to.way);
 }
 
 void write(const PeerReport& from, pb::PeerReport& to) {
@@ -690,6 +693,9 @@ void write(const PeerReport& from, pb::PeerReport& to) {
   to.set_state_one_in(from.state_one_in);
   to.set_forces_refused(from.forces_refused);
   write(from.link, *to.mutable_link());
+  to.clear_error_n();
+  if (from.error) to.set_error_n(*from.error);
+  to.set_way(clip(from.way, limits::kMaxLabel));
 }
 
 bool read(const pb::Bye& from, Bye& to) {

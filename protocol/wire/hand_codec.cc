@@ -445,13 +445,15 @@ void force_fields(Way& way, Command& command) noexcept {
   way.template part<9, kFixed64>(command.error, [&](auto& error) { way.template present<9>(error); });
   way.template part<10, kLength>(command.torque, [&](auto& torque) { way.template vector<10>(torque.torque); });
   way.template part<11, kFixed64>(command.grip_force, [&](auto& force) { way.template present<11>(force); });
-  if (!command.torque) return;  // of a model alone protobuf makes a torque of 0
-  way.template part<14, kLength>(command.torque->model, [&](auto& model) {
-    inner<14>(way, [&](auto& in) {
-      in.template rotation<1>(model.at);
-      in.template matrix<2>(model.stiffness);
+  if (command.torque) {  // of a model alone protobuf makes a torque of 0
+    way.template part<14, kLength>(command.torque->model, [&](auto& model) {
+      inner<14>(way, [&](auto& in) {
+        in.template rotation<1>(model.at);
+        in.template matrix<2>(model.stiffness);
+      });
     });
-  });
+  }
+  way.template count<15>(command.way);
 }
 
 template <class Way, class Echo>

@@ -40,7 +40,7 @@ bool read(const pb::Hello& from, Hello& to) {
   to.version_max = from.version_max();
   return read_claims(from.claims(), to.claims) && to.version_min >= 1 && to.version_min <= to.version_max &&
          read(from.role(), to.role) && read(from.name(), limits::kMaxName, to.name) &&
-         wire::read_features(from.features(), to.features);
+         wire::read_features(from.features(), to.features) && wire::read_labels(from.ways(), limits::kMaxWays, to.ways);
 }
 
 void write(const Hello& from, pb::Hello& to) {
@@ -56,6 +56,7 @@ void write(const Hello& from, pb::Hello& to) {
     out.set_channel(clip(claim.channel, limits::kMaxLabel));
     out.set_role(static_cast<pb::Role>(claim.role));
   }
+  wire::write_labels(from.ways, limits::kMaxWays, *to.mutable_ways());
 }
 
 bool read(const pb::Welcome& from, Welcome& to) {

@@ -10,8 +10,9 @@ namespace tendon {
 namespace {
 
 /// The features that this server supports beyond the version's minimum.
-constexpr std::array kFeatures = {kFeatureLocalModel, kFeatureChannels,      kFeatureDiagnostics, kFeatureHandle,
-                                  kFeatureJoints,     kFeatureTeleoperation, kFeatureOutputs,     kFeatureStateColumns};
+constexpr std::array kFeatures = {kFeatureLocalModel, kFeatureChannels,     kFeatureDiagnostics,
+                                  kFeatureHandle,     kFeatureJoints,       kFeatureTeleoperation,
+                                  kFeatureOutputs,    kFeatureStateColumns, kFeatureWays};
 
 std::vector<std::string> in_common(const std::vector<std::string>& offered, Role role) {
   std::vector<std::string> both;

@@ -95,6 +95,7 @@ struct Guest {
   bool sees_ports;                ///< … and kFeatureTeleoperation, as an observer
   bool sees_outputs;              ///< … and kFeatureOutputs
   bool sees_columns;              ///< … and kFeatureStateColumns
+  std::vector<std::string> ways;  ///< in which it answers, of its Hello; empty: it has not asked for kFeatureWays
   std::vector<Seat> seats;        ///< `role` is what its Welcome says
   std::vector<View> views;        ///< at least one; all of one bank
   std::vector<std::byte> answer;  ///< to its Hello, for when it was lost
@@ -144,6 +145,19 @@ struct ServedChannel {
   Lateness lateness;
   Lateness::Report newest;    ///< of it
   std::uint64_t reports = 0;  ///< of its engine, to observers
+  /// What its engines say of how good their forces are.
+  struct Doubt {
+    std::optional<double> error{};  ///< N; empty: none has said any
+    std::uint8_t way = 0;           ///< by Mailboxes::ways, of the force with that error, or else of the newest
+    void observe(const std::optional<double>& said, std::uint8_t by) noexcept {
+      if (!said ? error.has_value() : error && *said < *error) return;
+      error = said;
+      way = by;
+    }
+  };
+  Doubt doubt{};                        ///< of the present holder, since the newest report
+  std::optional<double> worst_error{};  ///< N, of all; empty: none has said any
+  std::vector<std::uint64_t> by_way{};  ///< forces by the number of their way; shorter: of the others there are none
 };
 
 /// A device, as guests meet it.

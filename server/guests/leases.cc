@@ -8,6 +8,7 @@ void Leases::hold(LocalTime now, std::uint32_t device, std::uint32_t channel, co
   held.holder = guest.id();
   held.renewed = now;
   held.lateness.begin(now, is_loopback(guest.address));
+  held.doubt = {};
 }
 
 void Leases::give(std::uint32_t device, std::uint32_t channel, std::uint32_t guest) {

@@ -92,6 +92,9 @@ void Reports::tell_of_engine(LocalTime now, const Guest& engine, const LinkMeter
     report.forces_refused = engine.adaptation && engine.adaptation->hopeless();
     report.link = link_report(now, engine, link, channel.newest);
     report.link.number = ++channel.reports;
+    const ServedChannel::Doubt doubt = std::exchange(channel.doubt, {});
+    report.error = doubt.error;
+    report.way = devices[seat.device].mail->ways.name_of(doubt.way);
     tell_observers(seat.device, report, guests);
   }
 }

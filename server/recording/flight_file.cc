@@ -25,9 +25,12 @@ std::unique_ptr<FileSink> open_flight(const std::optional<std::filesystem::path>
   }
 }
 
-void write_flight(const StepFlight& flight, const Recorder::Config& config, ByteSink& sink) {
+void write_flight(const StepFlight& flight, const Recorder::Config& config, const Ways& ways, ByteSink& sink) {
   Recorder recorder(config, sink);
-  for (std::size_t i = 0; i < flight.size(); ++i) recorder.record(flight[i]);
+  for (std::size_t i = 0; i < flight.size(); ++i) {
+    const StepRecord& step = flight[i];
+    recorder.record(step, 0, ways.name_of(step.force_way));
+  }
   recorder.close();
   if (const std::string error = recorder.status().error; !error.empty()) throw std::runtime_error(error);
 }

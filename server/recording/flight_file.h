@@ -27,6 +27,6 @@ std::unique_ptr<FileSink> open_flight(const std::optional<std::filesystem::path>
 ///
 /// `flight` must be frozen, and is left so. Throws std::runtime_error with the sink's reason when not all of them could
 /// be written. Log thread only.
-void write_flight(const StepFlight& flight, const Recorder::Config& config, ByteSink& sink);
+void write_flight(const StepFlight& flight, const Recorder::Config& config, const Ways& ways, ByteSink& sink);
 
 }  // namespace tendon

@@ -35,13 +35,13 @@ PartRecorder::PartRecorder(const Config& config) : config_(config) {
   open_part(config_.run.started);
 }
 
-void PartRecorder::record(const StepRecord& step, std::size_t device) {
+void PartRecorder::record(const StepRecord& step, std::size_t device, std::string_view force_way) {
   see_faults(step, device);
   if (!recorder_) {
     ++missing_.steps;
     return;
   }
-  recorder_->record(step, device);
+  recorder_->record(step, device, force_way);
   look_after(step.hand.at);
 }
 

@@ -7,6 +7,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "core/base/time.h"
@@ -75,7 +76,7 @@ class PartRecorder {
   PartRecorder& operator=(const PartRecorder&) = delete;
 
   /// As those of Recorder.
-  void record(const StepRecord& step, std::size_t device = 0);
+  void record(const StepRecord& step, std::size_t device = 0, std::string_view force_way = {});
   void record(const PortRecord& port, std::size_t device = 0);
   void record(const DatagramRecord& datagram);
   void lost(const LossRecord& loss);

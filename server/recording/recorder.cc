@@ -35,13 +35,13 @@ Recorder::Recorder(const Config& config, ByteSink& sink)
   settle(writer_.flush_chunk());
 }
 
-void Recorder::record(const StepRecord& step, std::size_t device) {
+void Recorder::record(const StepRecord& step, std::size_t device, std::string_view force_way) {
   if (!recording()) {
     ++lost_.steps;
     return;
   }
   ++pending_.steps;
-  write(step_channels_[device], step.hand.at, recording::encode(step));
+  write(step_channels_[device], step.hand.at, recording::encode(step, force_way));
 }
 
 void Recorder::record(const PortRecord& port, std::size_t device) {

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "core/base/time.h"
@@ -59,8 +60,8 @@ class Recorder {
   Recorder(const Recorder&) = delete;
   Recorder& operator=(const Recorder&) = delete;
 
-  /// `device` by number: 0 is the first, and those of `more_devices` follow.
-  void record(const StepRecord& step, std::size_t device = 0);
+  /// `device` by number: 0 is the first, and those of `more_devices` follow. `force_way`: the name of its force_way.
+  void record(const StepRecord& step, std::size_t device = 0, std::string_view force_way = {});
   /// Of a device with `ports`; before the step with the same tick.
   void record(const PortRecord& port, std::size_t device = 0);
   void record(const DatagramRecord& datagram);

@@ -228,7 +228,7 @@ std::string encode(const SceneRecord& scene) {
   return out.SerializeAsString();
 }
 
-std::string encode(const StepRecord& step) {
+std::string encode(const StepRecord& step, std::string_view force_way) {
   pb::Step out;
   out.set_tick(step.tick);
   out.set_late_ns((step.hand.at - step.scheduled).count());
@@ -252,6 +252,7 @@ std::string encode(const StepRecord& step) {
   out.set_channel(step.channel);
   if (step.hand_force) put(out.mutable_hand_force_n(), *step.hand_force);
   if (step.force_error) out.set_force_error_n(*step.force_error);
+  out.set_force_way(force_way.data(), force_way.size());
   out.set_rearmed(step.rearmed);
   out.set_disarmed(step.disarmed);
   out.set_longest_hold_ns(step.longest_hold.count());
@@ -333,7 +334,7 @@ SceneRecord decode_scene(std::string_view message) {
           .budget_bytes = in.budget_bytes()};
 }
 
-StepRecord decode_step(std::string_view message, LocalTime at) {
+StepRecord decode_step(std::string_view message, LocalTime at, Ways& ways) {
   const auto in = parse<pb::Step>(message);
   if (in.mode() == pb::MODE_UNSPECIFIED || !pb::Mode_IsValid(in.mode()))
     throw std::invalid_argument("step " + std::to_string(in.tick()) + " has the unknown mode " +
@@ -357,6 +358,7 @@ StepRecord decode_step(std::string_view message, LocalTime at) {
   out.channel = in.channel();
   if (in.has_hand_force_n()) out.hand_force = vec3(in.hand_force_n());
   if (in.has_force_error_n()) out.force_error = in.force_error_n();
+  out.force_way = ways.number_of(in.force_way());
   out.rearmed = in.rearmed();
   out.disarmed = in.disarmed();
   out.longest_hold = Duration(in.longest_hold_ns());

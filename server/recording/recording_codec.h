@@ -7,6 +7,7 @@
 
 #include "core/base/time.h"
 #include "server/recording/records.h"
+#include "server/recording/ways.h"
 
 // Records as the messages of recording.proto, and back. The only place in the server that knows protobuf.
 
@@ -65,7 +66,8 @@ std::string schema_data();
 
 /// The same record gives the same bytes.
 std::string encode(const SceneRecord& scene);
-std::string encode(const StepRecord& step);
+/// `force_way`: the name of Step::force_way, which is a number of this run only.
+std::string encode(const StepRecord& step, std::string_view force_way = {});
 std::string encode(const PortRecord& port);
 std::string encode(const ClockRecord& clock);
 std::string encode(const DatagramRecord& datagram);
@@ -74,7 +76,8 @@ std::string encode(const LossRecord& loss);
 // A message back as a record; `at` is the message's time on the local clock. Every double comes back with all its
 // bits, NaN included. Throws std::invalid_argument with what is wrong when the bytes are not such a message.
 SceneRecord decode_scene(std::string_view message);
-StepRecord decode_step(std::string_view message, LocalTime at);
+/// Numbers the name of Step::force_way in `ways`.
+StepRecord decode_step(std::string_view message, LocalTime at, Ways& ways);
 PortRecord decode_port(std::string_view message, LocalTime at);
 DatagramRecord decode_datagram(std::string_view message, LocalTime at);
 LossRecord decode_loss(std::string_view message, LocalTime at);

@@ -41,7 +41,7 @@ std::optional<RecordingReader::Record> RecordingReader::next() {
       if (!step && !port && !datagram && !loss) continue;
       if (!unix_offset_) throw std::invalid_argument("a record comes before the scene");
       const LocalTime at = recording::local_time(message->log_time, *unix_offset_);
-      if (step) return recording::decode_step(message->data, at);
+      if (step) return recording::decode_step(message->data, at, ways_);
       if (port) return recording::decode_port(message->data, at);
       if (datagram) return recording::decode_datagram(message->data, at);
       return recording::decode_loss(message->data, at);

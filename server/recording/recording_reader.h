@@ -11,6 +11,7 @@
 #include "server/recording/mcap_reader.h"
 #include "server/recording/recording_codec.h"
 #include "server/recording/records.h"
+#include "server/recording/ways.h"
 
 namespace tendon {
 
@@ -39,12 +40,16 @@ class RecordingReader {
   /// has returned empty.
   bool truncated() const noexcept { return mcap_.truncated(); }
 
+  /// The names of Step::force_way in the steps that it has given.
+  const Ways& ways() const noexcept { return ways_; }
+
  private:
   void check_ours() const;
 
   std::string name_;
   McapReader mcap_;
   std::optional<Duration> unix_offset_;  ///< from the scene
+  Ways ways_;
 };
 
 }  // namespace tendon

@@ -128,6 +128,7 @@ void print(Line& line, const ForceCommand& force) {
     if (const auto& model = force.torque->model) line << "model" << model->at << model->stiffness;
   }
   if (force.grip_force) line << "grip-force" << *force.grip_force;
+  if (force.way > 0) line << "way" << force.way;
 }
 
 void print(Line& line, const Control& control) {
@@ -218,6 +219,8 @@ void print(Line& line, const PeerReport& report) {
   line << "peer" << report.device << report.channel;
   line.put_text(report.name) << report.state_one_in << std::uint32_t{report.forces_refused};
   print(line, report.link);
+  if (report.error) line << "error" << *report.error;
+  line.put_text(report.way);
 }
 
 void print(Line& line, const PortFrame& port) {

@@ -16,12 +16,16 @@ using namespace tendon;
 
 namespace {
 
-void require_same_again(const RecordingReader::Record& record) {
+/// `ways`: of the reader.
+void require_same_again(const RecordingReader::Record& record, const Ways& ways) {
   if (const auto* scene = std::get_if<SceneRecord>(&record)) {
     fuzz::require(recording::decode_scene(recording::encode(*scene)) == *scene);
   } else if (const auto* step = std::get_if<StepRecord>(&record)) {
-    const auto bytes = recording::encode(*step);  // compared as bytes: a NaN is not equal to itself
-    fuzz::require(recording::encode(recording::decode_step(bytes, step->hand.at)) == bytes);
+    // Compared as bytes: a NaN is not equal to itself.
+    const auto bytes = recording::encode(*step, ways.name_of(step->force_way));
+    Ways own;
+    const StepRecord again = recording::decode_step(bytes, step->hand.at, own);
+    fuzz::require(recording::encode(again, own.name_of(again.force_way)) == bytes);
   } else if (const auto* datagram = std::get_if<DatagramRecord>(&record)) {
     const auto bytes = recording::encode(*datagram);
     fuzz::require(recording::encode(recording::decode_datagram(bytes, datagram->at)) == bytes);
@@ -36,7 +40,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   fuzz::InputBuffer bytes(std::as_bytes(std::span(data, size)));
   try {
     RecordingReader reader(std::make_unique<std::istream>(&bytes), "r");
-    while (const auto record = reader.next()) require_same_again(*record);
+    while (const auto record = reader.next()) require_same_again(*record, reader.ways());
   } catch (const std::runtime_error& refused) {
     fuzz::require(std::string_view(refused.what()).starts_with("r: "));
   }

@@ -68,6 +68,16 @@ inline ForceCommand force_with_all() {
   return all;
 }
 
+/// By the second way that its Hello names.
+inline ForceCommand force_with_way() {
+  ForceCommand command = force();
+  command.sequence = 102;
+  command.model.reset();
+  command.error = 0.125;
+  command.way = 2;
+  return command;
+}
+
 inline Control state_deadband() {
   return {.id = 9,
           .request = SetStateDeadband{.share = 0.1, .floor = 0.001, .max_silence = std::chrono::milliseconds(20)}};
@@ -129,6 +139,14 @@ inline PeerReport peer_report() {
   return {.device = 1, .channel = 1, .name = "wall", .state_one_in = 4, .forces_refused = true, .link = report()};
 }
 
+/// As above, of an engine that says how good its forces are.
+inline PeerReport peer_report_with_way() {
+  PeerReport told = peer_report();
+  told.error = 0.125;
+  told.way = "near";
+  return told;
+}
+
 inline Hello hello() {
   return {.version_min = 1, .version_max = 1, .role = Role::kController, .name = "wall", .features = {"local-model"}};
 }
@@ -153,6 +171,14 @@ inline Hello hello_with_claims() {
   hello.features.emplace_back(kFeatureChannels);
   hello.claims = {{.device = {}, .channel = {}, .role = Role::kObserver},
                   {.device = "right", .channel = "tissue", .role = Role::kController}};
+  return hello;
+}
+
+/// An engine that answers in two ways, and says of each force which one it was.
+inline Hello hello_with_ways() {
+  Hello hello = examples::hello();
+  hello.features.emplace_back(kFeatureWays);
+  hello.ways = {"tabulated", "near"};
   return hello;
 }
 
@@ -507,6 +533,9 @@ inline std::vector<Named> datagrams() {
       {"control-set-scale", data(93, {}, Control{.id = 21, .request = set_scale()})},
       {"control-set-share", data(94, {}, Control{.id = 22, .request = set_share()})},
       {"state-columns", data_in_columns(95, states_in_columns())},
+      {"hello-ways", hello_datagram(hello_with_ways())},
+      {"force-way", data(96, {}, force_with_way())},
+      {"peer-report-way", data(97, {}, peer_report_with_way())},
   };
 }
 

@@ -92,6 +92,8 @@ struct Pushed {
       force.received = force.answers = now;
       force.force = Vec3(-2, 0, 0);
       force.valid_for = milliseconds(20);
+      force.error = error;
+      force.way = way;
       mail->forces[0].put(force);
       now = loop.step(now);
       while (const StepRecord* step = mail->steps.front()) {
@@ -107,9 +109,26 @@ struct Pushed {
   HapticLoop loop;
   LocalTime now{milliseconds(1)};
   std::uint64_t sequence = 0;
+  std::optional<double> error{};  ///< that the engine says, and so is `way`
+  std::uint8_t way = 0;
 };
 
 using Kind = HapticOrder::Kind;
+
+TEST(HapticLoop, TheRecordHasTheErrorAndTheWayOfTheForceInUse) {
+  Handle handle;
+  Pushed pushed(handle);
+  pushed.error = 0.25;
+  pushed.way = 3;
+  const StepRecord said = pushed.steps(3);
+  EXPECT_EQ(said.force_error, 0.25);
+  EXPECT_EQ(said.force_way, 3);
+  pushed.error.reset();
+  pushed.way = 0;
+  const StepRecord unsaid = pushed.steps(2);
+  EXPECT_FALSE(unsaid.force_error.has_value());
+  EXPECT_EQ(unsaid.force_way, 0);
+}
 
 TEST(HapticLoop, TheButtonsAreInTheRecordAndTheStateOfTheirStep) {
   Handle handle;

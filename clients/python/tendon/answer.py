@@ -37,6 +37,7 @@ class Answer:
     torque: Vec3 | None = None
     angular_stiffness: Mat3 | None = None
     grip_force: float | None = None
+    way: int = 0
 
     def objection(self) -> str:
         """Why this answer cannot be used; empty when it can."""
@@ -92,6 +93,7 @@ def read_touch(touch: Touch) -> Answer:
         torque=None if touch.torque is None else _vector(touch.torque, "a torque of three numbers"),
         angular_stiffness=None if touch.angular_stiffness is None else _matrix(touch.angular_stiffness),
         grip_force=None if touch.grip_force is None else float(touch.grip_force),
+        way=touch.way,
     )
 
 

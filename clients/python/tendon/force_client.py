@@ -26,6 +26,7 @@ from .messages import (
     FEATURE_JOINTS,
     FEATURE_LOCAL_MODEL,
     FEATURE_OUTPUTS,
+    FEATURE_WAYS,
     NEVER,
     Claim,
     Code,
@@ -127,6 +128,9 @@ class Config:
     outputs: bool = False
     """Ask for the outputs of the device (`HandleDescription.outputs`: lamps, vibration), to set them with
     `set_output`."""
+    ways: tuple[str, ...] = ()
+    """Names of the ways in which this engine answers, which `Touch.way` counts from 1: observers are told, and a
+    recording holds, by which a force was made. At most 8, each of 1 to 24 bytes, no two alike."""
     patience_s: float = 2.0
     """How long one attempt waits for an answer to its Hellos."""
     retry_min_s: float = 0.1
@@ -142,6 +146,11 @@ class Config:
         expect_at_most(limits.MAX_NAME, self.name, "name")
         expect_at_most(limits.MAX_LABEL, self.device, "device")
         expect_at_most(limits.MAX_LABEL, self.channel, "channel")
+        expect(len(self.ways) <= limits.MAX_WAYS, "ways.size", len(self.ways), f"at most {limits.MAX_WAYS} names")
+        for i, way in enumerate(self.ways):
+            expect(way != "", f"ways[{i}].size", 0, "at least 1 byte")
+            expect_at_most(limits.MAX_LABEL, way, f"ways[{i}]")
+            expect(way not in self.ways[:i], f"ways[{i}]", way, "no name twice")
         if self.key is not None:
             expect(len(self.key) == KEY_SIZE, "key.size", len(self.key), f"{KEY_SIZE} bytes")
         usable = bool(self.suites) and set(self.suites) <= set(usable_suites())
@@ -323,9 +332,16 @@ class ForceClient:
                 error=answer.error,
                 torque=torque,
                 grip_force=grip_force,
+                way=self._way(answer),
             )
         )
         self._stats.forces += 1
+
+    def _way(self, answer: Answer) -> int:
+        if not 0 <= answer.way <= len(self.config.ways):
+            self._stats.left_out = "the way of answering: Config.ways has none of its number"
+            return 0
+        return answer.way if self.welcome and FEATURE_WAYS in self.welcome.features else 0
 
     def rearm(self) -> bool:
         """Asks the server to clear a latched fault, and to take a disarm back. False when there is no session,
@@ -490,7 +506,9 @@ class ForceClient:
             features += (FEATURE_OUTPUTS,)
         if self.config.diagnostics:
             features += (FEATURE_DIAGNOSTICS,)
-        hello = Hello(self.config.role, self.config.name, features, claims=self._claims())
+        if self.config.ways:
+            features += (FEATURE_WAYS,)
+        hello = Hello(self.config.role, self.config.name, features, claims=self._claims(), ways=self.config.ways)
         key = self.config.key
         ephemeral = b"" if key is None else self._random(KEY_SIZE)
         self._handshake = ClientHandshake(

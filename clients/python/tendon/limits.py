@@ -36,6 +36,8 @@ MAX_VIBRATION_HZ = 1000.0
 MAX_DEVICES = 16
 MAX_CHANNELS = 8
 MAX_CLAIMS = 16
+MAX_WAYS = 8
+"""Ways of answering that an engine names."""
 MAX_DOF = 6
 MAX_FEATURE = 32
 MAX_FEATURES = 16

@@ -43,6 +43,9 @@ FEATURE_OUTPUTS = "outputs"
 FEATURE_TELEOPERATION = "teleoperation"
 """The client may be the other end of a coupling: it says Couple, and PortStates go both ways."""
 
+FEATURE_WAYS = "ways"
+"""An engine names the ways in which it answers, and says of each force which one it was."""
+
 FEATURE_DIAGNOSTICS = "diagnostics"
 """An observer is told the forces asked for, and the state of loops and engines (DeviceReport, PeerReport)."""
 
@@ -212,6 +215,7 @@ class ForceCommand:
     error: float | None = None  # N, the engine's estimate of the error of `force`
     torque: Torque | None = None  # only to a server that has agreed to FEATURE_HANDLE; so is the next
     grip_force: float | None = None  # N, on the fingers of the gripper; > 0 opens them
+    way: int = 0  # which of `Hello.ways` has answered, from 1 on; 0: not said. Only to a server that agreed to FEATURE_WAYS
 
 
 @dataclass(frozen=True, slots=True)
@@ -695,6 +699,9 @@ class PeerReport:
     state_one_in: int  # it is sent one in so many of the states it wants, because its link is full
     forces_refused: bool  # its forces are not used, because its link loses too much
     link: LinkReport  # number: 1, 2, 3 … of the channel; the forces are the channel's
+    # Of the force of that time that is least sure, by its `ForceCommand.error`; the newest where none says an error:
+    error: float | None = None  # N; None: none says it
+    way: str = ""  # of `Hello.ways`, the one by which it was answered; empty: not said
 
 
 Frame = Union[DeviceState, ForceCommand, Control, ControlAck, Bye, LinkReport, DeviceReport, PeerReport, PortState]
@@ -728,6 +735,7 @@ class Hello:
     version_min: int = PROTOCOL_VERSION
     version_max: int = PROTOCOL_VERSION
     claims: Sequence[Claim] = ()  # none: device 0, its channel 0, and `role`, which is the highest of the claims'
+    ways: Sequence[str] = ()  # with FEATURE_WAYS: how this engine may answer
 
 
 @dataclass(frozen=True, slots=True)
@@ -780,6 +788,9 @@ class Touch:
     torque: Sequence[float] | None = None  # N·m on the hand, base frame axes, about the handle's position
     angular_stiffness: Stiffness | None = None  # N·m/rad, −∂torque/∂θ at the state's orientation, in the same forms
     grip_force: float | None = None  # N, on the fingers of the gripper; > 0 opens them
+    # Which of `Config.ways` has answered, from 1 on; 0: not said. Left out where there is none of that number
+    # (`stats.left_out`), and of a server that does not know FEATURE_WAYS.
+    way: int = 0
 
 
 @dataclass(slots=True)

@@ -409,7 +409,7 @@ class Engage(_message.Message):
     def __init__(self, device: _Optional[int] = ...) -> None: ...
 
 class ForceCommand(_message.Message):
-    __slots__ = ["based_on_tick", "channel", "device", "error_n", "force_n", "gripper_force_n", "model", "rotation_model", "sequence", "topology_changed", "torque_nm", "valid_for_us"]
+    __slots__ = ["based_on_tick", "channel", "device", "error_n", "force_n", "gripper_force_n", "model", "rotation_model", "sequence", "topology_changed", "torque_nm", "valid_for_us", "way"]
     BASED_ON_TICK_FIELD_NUMBER: _ClassVar[int]
     CHANNEL_FIELD_NUMBER: _ClassVar[int]
     DEVICE_FIELD_NUMBER: _ClassVar[int]
@@ -422,6 +422,7 @@ class ForceCommand(_message.Message):
     TOPOLOGY_CHANGED_FIELD_NUMBER: _ClassVar[int]
     TORQUE_NM_FIELD_NUMBER: _ClassVar[int]
     VALID_FOR_US_FIELD_NUMBER: _ClassVar[int]
+    WAY_FIELD_NUMBER: _ClassVar[int]
     based_on_tick: int
     channel: int
     device: int
@@ -434,7 +435,8 @@ class ForceCommand(_message.Message):
     topology_changed: bool
     torque_nm: Vec3
     valid_for_us: int
-    def __init__(self, sequence: _Optional[int] = ..., based_on_tick: _Optional[int] = ..., force_n: _Optional[_Union[Vec3, _Mapping]] = ..., model: _Optional[_Union[LocalModel, _Mapping]] = ..., valid_for_us: _Optional[int] = ..., device: _Optional[int] = ..., channel: _Optional[int] = ..., topology_changed: bool = ..., error_n: _Optional[float] = ..., torque_nm: _Optional[_Union[Vec3, _Mapping]] = ..., gripper_force_n: _Optional[float] = ..., rotation_model: _Optional[_Union[RotationModel, _Mapping]] = ...) -> None: ...
+    way: int
+    def __init__(self, sequence: _Optional[int] = ..., based_on_tick: _Optional[int] = ..., force_n: _Optional[_Union[Vec3, _Mapping]] = ..., model: _Optional[_Union[LocalModel, _Mapping]] = ..., valid_for_us: _Optional[int] = ..., device: _Optional[int] = ..., channel: _Optional[int] = ..., topology_changed: bool = ..., error_n: _Optional[float] = ..., torque_nm: _Optional[_Union[Vec3, _Mapping]] = ..., gripper_force_n: _Optional[float] = ..., rotation_model: _Optional[_Union[RotationModel, _Mapping]] = ..., way: _Optional[int] = ...) -> None: ...
 
 class ForceTable(_message.Message):
     __slots__ = ["first_depth_m", "force_n", "step_m"]
@@ -515,20 +517,22 @@ class HandleDescription(_message.Message):
     def __init__(self, device: _Optional[int] = ..., operator_from_device: _Optional[_Union[Quat, _Mapping]] = ..., buttons: _Optional[_Iterable[str]] = ..., orientation_measured: bool = ..., max_torque_nm: _Optional[float] = ..., gripper_open_rad: _Optional[float] = ..., max_gripper_force_n: _Optional[float] = ..., group: _Optional[str] = ..., hand: _Optional[_Union[Hand, str]] = ..., joints: _Optional[_Iterable[str]] = ..., outputs: _Optional[_Iterable[_Union[OutputDescription, _Mapping]]] = ...) -> None: ...
 
 class Hello(_message.Message):
-    __slots__ = ["claims", "features", "name", "role", "version_max", "version_min"]
+    __slots__ = ["claims", "features", "name", "role", "version_max", "version_min", "ways"]
     CLAIMS_FIELD_NUMBER: _ClassVar[int]
     FEATURES_FIELD_NUMBER: _ClassVar[int]
     NAME_FIELD_NUMBER: _ClassVar[int]
     ROLE_FIELD_NUMBER: _ClassVar[int]
     VERSION_MAX_FIELD_NUMBER: _ClassVar[int]
     VERSION_MIN_FIELD_NUMBER: _ClassVar[int]
+    WAYS_FIELD_NUMBER: _ClassVar[int]
     claims: _containers.RepeatedCompositeFieldContainer[Claim]
     features: _containers.RepeatedScalarFieldContainer[str]
     name: str
     role: Role
     version_max: int
     version_min: int
-    def __init__(self, version_min: _Optional[int] = ..., version_max: _Optional[int] = ..., role: _Optional[_Union[Role, str]] = ..., name: _Optional[str] = ..., features: _Optional[_Iterable[str]] = ..., claims: _Optional[_Iterable[_Union[Claim, _Mapping]]] = ...) -> None: ...
+    ways: _containers.RepeatedScalarFieldContainer[str]
+    def __init__(self, version_min: _Optional[int] = ..., version_max: _Optional[int] = ..., role: _Optional[_Union[Role, str]] = ..., name: _Optional[str] = ..., features: _Optional[_Iterable[str]] = ..., claims: _Optional[_Iterable[_Union[Claim, _Mapping]]] = ..., ways: _Optional[_Iterable[str]] = ...) -> None: ...
 
 class LeaseLost(_message.Message):
     __slots__ = ["channel", "device", "to"]
@@ -615,20 +619,24 @@ class OutputDescription(_message.Message):
     def __init__(self, name: _Optional[str] = ..., kind: _Optional[_Union[OutputKind, str]] = ...) -> None: ...
 
 class PeerReport(_message.Message):
-    __slots__ = ["channel", "device", "forces_refused", "link", "name", "state_one_in"]
+    __slots__ = ["channel", "device", "error_n", "forces_refused", "link", "name", "state_one_in", "way"]
     CHANNEL_FIELD_NUMBER: _ClassVar[int]
     DEVICE_FIELD_NUMBER: _ClassVar[int]
+    ERROR_N_FIELD_NUMBER: _ClassVar[int]
     FORCES_REFUSED_FIELD_NUMBER: _ClassVar[int]
     LINK_FIELD_NUMBER: _ClassVar[int]
     NAME_FIELD_NUMBER: _ClassVar[int]
     STATE_ONE_IN_FIELD_NUMBER: _ClassVar[int]
+    WAY_FIELD_NUMBER: _ClassVar[int]
     channel: int
     device: int
+    error_n: float
     forces_refused: bool
     link: LinkReport
     name: str
     state_one_in: int
-    def __init__(self, device: _Optional[int] = ..., channel: _Optional[int] = ..., name: _Optional[str] = ..., state_one_in: _Optional[int] = ..., forces_refused: bool = ..., link: _Optional[_Union[LinkReport, _Mapping]] = ...) -> None: ...
+    way: str
+    def __init__(self, device: _Optional[int] = ..., channel: _Optional[int] = ..., name: _Optional[str] = ..., state_one_in: _Optional[int] = ..., forces_refused: bool = ..., link: _Optional[_Union[LinkReport, _Mapping]] = ..., error_n: _Optional[float] = ..., way: _Optional[str] = ...) -> None: ...
 
 class PortGrip(_message.Message):
     __slots__ = ["account_j", "force_n", "given_j", "need_j", "opening_m", "taken_j", "velocity_mps"]

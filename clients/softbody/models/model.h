@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <string_view>
 
 #include "clients/softbody/fem/patch.h"
 
@@ -18,6 +20,22 @@ enum class Given : std::uint8_t {
   kLeastDepth,  ///< m, the least mean depth: the tool pushes but does not pull
   kForce,       ///< N, on the body
 };
+
+/// How a body of the model "near" has answered (near/). What it tells the server is these numbers, and kWayNames.
+enum class Way : std::uint8_t {
+  kOnly = 0,   ///< the model has one way, or nothing was asked of it
+  kTabulated,  ///< by the table of answers
+  kLearned,    ///< by learned shapes
+  kNear,       ///< by a near field
+  kWhole,      ///< likewise, of a body all of which is near
+  kLinear,     ///< by the linear body, where no near field is ready
+};
+
+/// By Way, from 1 on.
+inline constexpr std::array<std::string_view, 5> kWayNames = {"tabulated", "learned", "near", "whole", "linear"};
+constexpr std::string_view name_of(Way way) {
+  return way == Way::kOnly ? "" : kWayNames.at(static_cast<std::size_t>(way) - 1);
+}
 
 /// A body's answer to a patch that presses into it, against the surface's normal.
 struct Reaction {
@@ -37,6 +55,7 @@ struct Reaction {
   Glide glide;
   bool knows_glide = false;  ///< else `glide` is zero; see Model::glides()
   double error = 0;          ///< N, the distance that may remain to the mesh's exact answer; not the mesh's own error
+  Way way = Way::kOnly;      ///< of two that are mixed, the one that has the greater share
 };
 
 /// The force (N) with which a tool reaches the given depth or force, when the depth without it is `untouched` (m) and

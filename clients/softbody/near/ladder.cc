@@ -66,6 +66,7 @@ Reaction blended(const Reaction& from, const Reaction& to, double share) {
   all.depth = mix(from.depth, to.depth);
   all.stiffness = mix(from.stiffness, to.stiffness);
   all.error = mix(from.error, to.error) + std::abs(from.force - to.force);
+  all.way = share < 0.5 ? from.way : to.way;
   if (!(std::abs(all.force) > 0)) return all;
   all.slope = mix(Vec2(from.force * from.slope), Vec2(to.force * to.slope)) / all.force;
   all.knows_glide = from.knows_glide && to.knows_glide;

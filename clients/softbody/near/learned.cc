@@ -474,6 +474,7 @@ std::optional<Reaction> LearnedBody::press(const Patch& patch, double depth, con
   VectorXd slope(size);
   double energy = this->energy(q, slope);
   Reaction reaction;
+  reaction.way = Way::kLearned;
   for (int step = 0;; ++step) {
     reaction.force = by_tool.dot(slope) / compliance;
     const VectorXd move = reaction.force * by_tool - inverse * slope;
@@ -558,7 +559,7 @@ double LearnedRung::room(const Vec2& middle, double depth) const {
 }
 
 Rung::Size LearnedRung::size() const {
-  Size size{.name = "learned",
+  Size size{.name = name_of(Way::kLearned),
             .shapes = body_.shapes(),
             .elements = body_.elements(),
             .bytes = body_.bytes(),

@@ -131,7 +131,11 @@ struct NearModel::Field {
   }
 
   Reaction press(const Patch& patch, Given given, double value) {
-    if (body == nullptr) return model->press(patch, given, value);
+    if (body == nullptr) {
+      Reaction reaction = model->press(patch, given, value);
+      reaction.way = Way::kWhole;
+      return reaction;
+    }
     const Patch here = own(patch);
     Reaction reaction = model->press(here, given, value);
     if (reaction.error > std::abs(reaction.force)) {  // lost on the way from the last shape
@@ -140,6 +144,7 @@ struct NearModel::Field {
     }
     const double far = body->left_out(model->displacements(), std::abs(reaction.depth));
     reaction.error += kFarSafety * std::abs(far) + missed * std::abs(reaction.force);
+    reaction.way = Way::kNear;
     return reaction;
   }
 
@@ -455,6 +460,7 @@ Reaction NearModel::linear_press(const Patch& patch, Given given, double value) 
   const double compliance = load.dot(per_newton);
   VectorXd u = VectorXd::Zero(solid_.size());
   Reaction reaction;
+  reaction.way = Way::kLinear;
   reaction.stiffness = 1 / compliance;
   reaction.force = constrained_force(given, value, 0, compliance);
   solid_.add_free(reaction.force * per_newton, u);

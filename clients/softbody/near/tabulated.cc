@@ -215,6 +215,7 @@ std::optional<Rung::Answer> TabulatedRung::press(const Patch& patch, double dept
   if (!(share > 0)) return std::nullopt;
   const TabulatedEnergy e = energy_at(table_, *point);
   Reaction reaction;
+  reaction.way = Way::kTabulated;
   reaction.force = e.force;
   reaction.depth = depth;
   reaction.stiffness = e.stiffness;
@@ -239,7 +240,7 @@ double TabulatedRung::room(const Vec2& middle, double depth) const {
 }
 
 Rung::Size TabulatedRung::size() const {
-  Size size{.name = "tabulated",
+  Size size{.name = name_of(Way::kTabulated),
             .bytes = (table_.numbers.size() + table_.errors.size()) * sizeof(double),
             .cells = allowed_.cells(),
             .of_cells = static_cast<int>(table_.errors.size())};

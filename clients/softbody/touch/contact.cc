@@ -77,6 +77,7 @@ Feel PatchContact::at(const Vec3& tool) {
     feel.stiffness = reaction.stiffness * steepest * steepest.transpose();
   }
   feel.error = reaction.error;
+  feel.way = reaction.way;
   feel.valid_radius = surface_.radius() / 4;  // further away, across, the patch has other nodes
   if (friction_) rub(place, reaction.force, feel);
   return feel;

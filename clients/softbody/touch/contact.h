@@ -39,6 +39,7 @@ struct Feel {
   /// surface on the way: see `gap`.
   double valid_radius = 0;
   double error = 0;  ///< N, the solver's estimate of its own error
+  Way way = Way::kOnly;
   bool touching = false;
   std::optional<Vec3> normal{};   ///< where the tool is from the body, a unit vector; empty: towards the scene's tool
   bool topology_changed = false;  ///< this is the first answer since the body was cut; earlier ones no longer hold

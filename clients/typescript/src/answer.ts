@@ -36,6 +36,11 @@ export interface Touch {
   readonly angularStiffness?: Stiffness | undefined;
   /** N on the fingers of the gripper; > 0 opens them. */
   readonly gripForce?: number | undefined;
+  /**
+   * Which of the config's `ways` has answered, from 1 on; absent: not said. Left out where there is none of that number
+   * (ClientStats.leftOut), and of a server that does not know kFeatureWays.
+   */
+  readonly way?: number | undefined;
 }
 
 const objectionTo = (what: string, { x, y, z }: Vec3, unit: string): string =>

@@ -123,18 +123,22 @@ export const encodeHelloMessage = (hello: Hello): Uint8Array =>
     features: writeFeatures(hello.features),
     claims: (hello.claims ?? []).slice(0, limits.kMaxClaims).map(({ device, channel, role }) =>
       create(pb.ClaimSchema, { device: clip(device, limits.kMaxLabel), channel: clip(channel, limits.kMaxLabel), role })),
+    ways: (hello.ways ?? []).slice(0, limits.kMaxWays).map((way) => clip(way, limits.kMaxLabel)),
   }));
 
 export function decodeHelloMessage(bytes: Uint8Array): Hello | undefined {
   const hello = parse(pb.HelloSchema, bytes);
   if (!hello) return undefined;
-  const { versionMin, versionMax, role, name, features } = hello;
+  const { versionMin, versionMax, role, name, features, ways } = hello;
   const claims = hello.claims.map(({ device, channel, role }): Claim => ({ device, channel, role }));
   const good = versionMin >= 1 && versionMin <= versionMax && isEnum(role, pb.RoleSchema) &&
     isText(name, limits.kMaxName) && areFeatures(features) && claims.length <= limits.kMaxClaims &&
     claims.every(({ device, channel, role }) =>
-      isText(device, limits.kMaxLabel) && isText(channel, limits.kMaxLabel) && isEnum(role, pb.RoleSchema));
-  return good ? { versionMin, versionMax, role, name, features, ...(claims.length && { claims }) } : undefined;
+      isText(device, limits.kMaxLabel) && isText(channel, limits.kMaxLabel) && isEnum(role, pb.RoleSchema)) &&
+    ways.length <= limits.kMaxWays && ways.every((way) => isText(way, limits.kMaxLabel));
+  return good
+    ? { versionMin, versionMax, role, name, features, ...(claims.length && { claims }), ...(ways.length && { ways }) }
+    : undefined;
 }
 
 export function encodeAnswerMessage(answer: Welcome | Refused): Uint8Array {
@@ -400,11 +404,12 @@ function readForce(from: pb.ForceCommand): ForceCommand | undefined {
     ...(from.errorN !== undefined && { error: from.errorN }),
     ...(torque && { torque }),
     ...(from.gripperForceN !== undefined && { gripForce: from.gripperForceN }),
+    ...(from.way > 0 && { way: from.way }),
   };
   const good = isDevice(command.device) && isChannel(command.channel) && command.sequence > 0n && isVec3(command.force) && command.validForUs >= 1 &&
     command.validForUs <= limits.kMaxValidForMs * 1000 && (!model || isModel(model)) && isError(command.error) &&
     (!torque || (isVec3(torque.torque) && (!torque.model || isRotationModel(torque.model)))) &&
-    (command.gripForce === undefined || isBounded(command.gripForce));
+    (command.gripForce === undefined || isBounded(command.gripForce)) && from.way <= limits.kMaxWays;
   return good ? command : undefined;
 }
 
@@ -421,6 +426,7 @@ const writeForce = (from: ForceCommand): pb.ForceCommand =>
     ...(from.error !== undefined && { errorN: from.error }),
     ...(from.torque && writeTorque(from.torque)),
     ...(from.gripForce !== undefined && { gripperForceN: from.gripForce }),
+    way: from.way ?? 0,
   });
 
 /** readRequest() itself looks at the bounds of these. */

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The reports of a server to protobuf and back, for the codec only.
 import { create } from "@bufbuild/protobuf";
-import { isBounded, isChannel, isDevice, isLength, isTime } from "./bounds.js";
+import { isBounded, isChannel, isDevice, isError, isLength, isTime } from "./bounds.js";
 import { clip, isEnum, isText } from "./fields.js";
 import * as pb from "./gen/tendon_pb.js";
 import * as limits from "./limits.js";
@@ -52,13 +52,19 @@ export function writeDeviceReport({ lateness, fault, degraded, ...rest }: Device
 }
 
 export function readPeerReport(from: pb.PeerReport): PeerReport | undefined {
-  const { device, channel, name, stateOneIn, forcesRefused } = from;
+  const { device, channel, name, stateOneIn, forcesRefused, errorN: error, way } = from;
   const link = from.link && readReport(from.link);
   const good = isDevice(device) && isChannel(channel) && isText(name, limits.kMaxName) && stateOneIn >= 1 &&
-    stateOneIn <= limits.kMaxOneIn;
-  return good && link ? { device, channel, name, stateOneIn, forcesRefused, link } : undefined;
+    stateOneIn <= limits.kMaxOneIn && isError(error) && isText(way, limits.kMaxLabel);
+  if (!good || !link) return undefined;
+  return {
+    device, channel, name, stateOneIn, forcesRefused, link, ...(error !== undefined && { error }), ...(way && { way }),
+  };
 }
 
-export function writePeerReport({ link, name, ...rest }: PeerReport): pb.PeerReport {
-  return create(pb.PeerReportSchema, { ...rest, name: clip(name, limits.kMaxName), link: writeReport(link) });
+export function writePeerReport({ link, name, error, way, ...rest }: PeerReport): pb.PeerReport {
+  return create(pb.PeerReportSchema, {
+    ...rest, name: clip(name, limits.kMaxName), link: writeReport(link), ...(error !== undefined && { errorN: error }),
+    way: clip(way ?? "", limits.kMaxLabel),
+  });
 }

@@ -7,9 +7,10 @@ import { checkForceDeadband, checkStateDeadband, Deadband, foretell, type ForceD
 import type { CipherSuite } from "./datagram.js";
 import { expect } from "./expect.js";
 import { ClientHandshake } from "./handshake.js";
-import { kMaxLabel, kMaxLoopHz, kMaxName, kMaxValidForMs } from "./limits.js";
+import { kMaxLabel, kMaxLoopHz, kMaxName, kMaxValidForMs, kMaxWays } from "./limits.js";
 import {
-  Code, kFeatureChannels, kFeatureDiagnostics, kFeatureHandle, kFeatureJoints, kFeatureLocalModel, kFeatureOutputs, kProtocolVersion, Role,
+  Code, kFeatureChannels, kFeatureDiagnostics, kFeatureHandle, kFeatureJoints, kFeatureLocalModel, kFeatureOutputs, kFeatureWays,
+  kProtocolVersion, Role,
   type DeviceDescription, type DeviceReport, type DeviceState, type Grant, type HandleDescription, type Hello, type LampColour,
   type LinkReport, type PeerReport, type Request, type StateDeadband, type Vec3, type Vibration, type Welcome,
 } from "./messages.js";
@@ -67,6 +68,11 @@ export interface ClientConfig {
   readonly joints?: boolean;
   /** Ask for the outputs of the device (HandleDescription.outputs: lamps, vibration), to set them with setOutput(). */
   readonly outputs?: boolean;
+  /**
+   * Names of the ways in which this engine answers, which Touch.way counts from 1: observers are told, and a recording
+   * holds, by which a force was made. At most 8, each of 1 to 24 bytes, no two alike.
+   */
+  readonly ways?: readonly string[];
   /** The Hellos of one attempt go unanswered for so long before it is given up. */
   readonly patienceMs?: number;
   /** First wait before the next attempt. */
@@ -123,7 +129,7 @@ const kAskLeaseAgain = fromMilliseconds(50);
 
 const kDefaults: Required<Omit<ClientConfig, "key" | "deadband" | "stateDeadband">> = {
   name: "guest", device: "", channel: "", takeLease: false, rateHz: 0, stateHz: 0, validForMs: 0, diagnostics: false,
-  joints: false, outputs: false, patienceMs: 2000, retryMinMs: 100, retryMaxMs: 2000, random: randomBytes,
+  joints: false, outputs: false, ways: [], patienceMs: 2000, retryMinMs: 100, retryMaxMs: 2000, random: randomBytes,
   suites: kUsableSuites,
 };
 
@@ -143,6 +149,12 @@ function checked(config: ClientConfig): Required<ClientConfig> {
   expectAtMost(kMaxName, full.name, "name");
   expectAtMost(kMaxLabel, full.device, "device");
   expectAtMost(kMaxLabel, full.channel, "channel");
+  expect(full.ways.length <= kMaxWays, "ways.size", full.ways.length, `at most ${kMaxWays} names`);
+  for (const [i, way] of full.ways.entries()) {
+    expect(way !== "", `ways[${i}].size`, 0, "at least 1 byte");
+    expectAtMost(kMaxLabel, way, `ways[${i}]`);
+    expect(full.ways.indexOf(way) === i, `ways[${i}]`, way, "no name twice");
+  }
   expect(!key || key.length === kKeySize, "key.size", key?.length, `${kKeySize} bytes`);
   const usable = full.suites.length > 0 && full.suites.every((suite) => kUsableSuites.includes(suite));
   expect(usable, "suites", `[${full.suites.join(", ")}]`, `numbers of some of ${namesOf(kUsableSuites)}`);
@@ -395,7 +407,7 @@ export class ForceClient {
   }
 
   #greet(now: Nanoseconds): void {
-    const { name, device, channel, diagnostics, joints, outputs } = this.#config;
+    const { name, device, channel, diagnostics, joints, outputs, ways } = this.#config;
     const hello: Hello = {
       versionMin: kProtocolVersion,
       versionMax: kProtocolVersion,
@@ -405,7 +417,9 @@ export class ForceClient {
         kFeatureLocalModel, kFeatureChannels, kFeatureHandle, ...(joints ? [kFeatureJoints] : []),
         ...(outputs ? [kFeatureOutputs] : []),
         ...(diagnostics ? [kFeatureDiagnostics] : []),
+        ...(ways.length > 0 ? [kFeatureWays] : []),
       ],
+      ways,
       claims: this.#claims ? [{ device, channel, role: this.#role }] : [],
     };
     const { key, random, suites } = this.#config;
@@ -611,9 +625,18 @@ export class ForceClient {
       channel: this.#place.channel,
       topologyChanged,
       error,
+      way: this.#way(touch),
     });
     this.#answeredTick = hand.tick;
     ++this.#stats.forces;
+  }
+
+  #way({ way = 0 }: Touch): number | undefined {
+    if (Number.isInteger(way) && way >= 0 && way <= this.#config.ways.length) {
+      return way > 0 && this.#welcome!.features.includes(kFeatureWays) ? way : undefined;
+    }
+    this.#stats.leftOut = "the way of answering: the config's ways have none of its number";
+    return undefined;
   }
 
   #validForMs(tick: bigint, loopHz: number): number {

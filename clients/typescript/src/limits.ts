@@ -35,6 +35,8 @@ export const kMaxVibrationHz = 1000;
 export const kMaxDevices = 16;
 export const kMaxChannels = 8;
 export const kMaxClaims = 16;
+/** Ways of answering that an engine names. */
+export const kMaxWays = 8;
 /** Axes of a device. */
 export const kMaxDof = 6;
 export const kMaxFeatures = 16;

@@ -28,6 +28,9 @@ export const kFeatureOutputs = "outputs";
 /** A feature: the client may be the other end of a coupling: it says Couple, and PortStates go both ways. */
 export const kFeatureTeleoperation = "teleoperation";
 
+/** A feature: an engine names the ways in which it answers, and says of each force which one it was. */
+export const kFeatureWays = "ways";
+
 /** A feature: an observer wants to be told what the engines ask for, how the loop does, and how each engine does. */
 export const kFeatureDiagnostics = "diagnostics";
 
@@ -185,6 +188,8 @@ export interface ForceCommand {
   readonly torque?: Torque | undefined;
   /** N on the fingers of the gripper; > 0 opens them. */
   readonly gripForce?: number | undefined;
+  /** Which of Hello.ways has answered, from 1 on; absent: not said. Only to a server that has agreed to kFeatureWays. */
+  readonly way?: number | undefined;
 }
 
 /**
@@ -562,6 +567,10 @@ export interface PeerReport {
   readonly forcesRefused: boolean;
   /** Its number counts those of the channel, and the forces are the channel's. */
   readonly link: LinkReport;
+  /** N, the largest ForceCommand.error of its forces of that time; absent: none says it. */
+  readonly error?: number | undefined;
+  /** Of Hello.ways, the one by which that force was answered, or the newest where none says an error; absent: not said. */
+  readonly way?: string | undefined;
 }
 
 /** What a client wants: a device by name, and as a controller a channel by name; empty = number 0. */
@@ -586,6 +595,8 @@ export interface Hello {
   readonly features: readonly string[];
   /** None: device 0, its channel 0, and `role`, which is the highest of the claims'. */
   readonly claims?: readonly Claim[] | undefined;
+  /** With kFeatureWays: how this engine may answer. */
+  readonly ways?: readonly string[] | undefined;
 }
 
 /** The server's yes. */

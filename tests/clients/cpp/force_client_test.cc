@@ -273,6 +273,47 @@ TEST(ForceClient, AllThatTheEngineKnowsTravels) {
   EXPECT_EQ(command.error, 0.02);
 }
 
+TEST(ForceClient, TheWaysAreNamedOnceAndEachForceSaysWhichOneItWas) {
+  World world(11);
+  world.connect({.rate_hz = 100, .ways = {"tabulated", "near"}}, [](const DeviceState& hand) {
+    Touch touch = answer(hand);
+    touch.way = 2;
+    return touch;
+  });
+  world.run(kSecond);
+  ASSERT_FALSE(world.z->forces.empty());
+  EXPECT_EQ(world.z->hellos.at(0).ways, (std::vector<std::string>{"tabulated", "near"}));
+  EXPECT_EQ(std::ranges::count(world.z->hellos.at(0).features, kFeatureWays), 1);
+  EXPECT_EQ(world.z->forces.back().second.way, 2U);
+  EXPECT_EQ(world.a->stats().left_out, "");
+}
+
+TEST(ForceClient, SaysNoWayToAServerThatDoesNotKnowThem) {
+  World world(11);
+  world.z->features = false;
+  world.connect({.rate_hz = 100, .ways = {"near"}}, [](const DeviceState& hand) {
+    Touch touch = answer(hand);
+    touch.way = 1;
+    return touch;
+  });
+  world.run(kSecond);
+  ASSERT_FALSE(world.z->forces.empty());
+  for (const auto& [at, command] : world.z->forces) EXPECT_EQ(command.way, 0U);
+}
+
+TEST(ForceClient, AWayWithoutANameIsLeftOutAndTheForceIsSent) {
+  World world(11);
+  world.connect({.rate_hz = 100, .ways = {"near"}}, [](const DeviceState& hand) {
+    Touch touch = answer(hand);
+    touch.way = 2;
+    return touch;
+  });
+  world.run(kSecond);
+  ASSERT_FALSE(world.z->forces.empty());
+  for (const auto& [at, command] : world.z->forces) EXPECT_EQ(command.way, 0U);
+  EXPECT_EQ(world.a->stats().left_out, "the way of answering: Config::ways has none of its number");
+}
+
 TEST(ForceClient, SendsNoStiffnessToAServerWithoutLocalModels) {
   World world(11);
   world.z->features = false;
@@ -636,6 +677,10 @@ TEST(ForceClient, RefusesAnImpossibleConfigurationByFieldValueAndExpectation) {
   EXPECT_EQ(complaint({}), "");
   EXPECT_EQ(complaint({.name = std::string(65, 'x')}), "name.size = 65: expected at most 64 bytes");
   EXPECT_EQ(complaint({.device = std::string(25, 'x')}), "device.size = 25: expected at most 24 bytes");
+  EXPECT_EQ(complaint({.ways = std::vector<std::string>(9, "x")}), "ways.size = 9: expected at most 8 names");
+  EXPECT_EQ(complaint({.ways = {"near", ""}}), "ways[1].size = 0: expected at least 1 byte");
+  EXPECT_EQ(complaint({.ways = {std::string(25, 'x')}}), "ways[0].size = 25: expected at most 24 bytes");
+  EXPECT_EQ(complaint({.ways = {"near", "linear", "near"}}), "ways[2] = \"near\": expected no name twice");
   EXPECT_EQ(complaint({.rate_hz = -1}), "rate_hz = -1: expected 0, or 0.001 to 100000");
   EXPECT_EQ(complaint({.rate_hz = 1e-300}), "rate_hz = 1e-300: expected 0, or 0.001 to 100000");
   EXPECT_EQ(complaint({.rate_hz = std::nan("")}), "rate_hz = nan: expected 0, or 0.001 to 100000");

@@ -228,6 +228,14 @@ TEST(PageJson, TellsHowTheLoopAndTheEnginesDo) {
   EXPECT_EQ(text["engines"][0]["round_trip_ms"], (json{{"median", 40.0}, {"p99", 130.0}}));
   EXPECT_TRUE(text["engines"][0]["to_server_ms"].is_null());
   EXPECT_EQ(text["engines"][0]["lost"], 12);
+  EXPECT_TRUE(text["engines"][0]["error_n"].is_null()) << "it does not say";
+  EXPECT_EQ(text["engines"][0]["way"], "");
+  peer.error = 0.25;
+  peer.way = "near";
+  board.observe(peer);
+  text = json::parse(reports_json(0, board));
+  EXPECT_EQ(text["engines"][0]["error_n"], 0.25);
+  EXPECT_EQ(text["engines"][0]["way"], "near");
   EXPECT_TRUE(json::parse(reports_json(9, board))["loop"].is_null()) << "no such device";
 }
 

@@ -134,6 +134,8 @@ def _frame(frame: Frame) -> list[object]:
             words += [] if model is None else ["model", *map(_double, model.at), *_matrix(model.stiffness)]
         if frame.grip_force is not None:
             words += ["grip-force", _double(frame.grip_force)]
+        if frame.way:
+            words += ["way", frame.way]
         return words
     if isinstance(frame, Control):
         if frame.request is None:
@@ -200,6 +202,8 @@ def _frame(frame: Frame) -> list[object]:
         return [
             *("peer", frame.device, frame.channel, _text(frame.name), frame.state_one_in, int(frame.forces_refused)),
             *_report(frame.link),
+            *([] if frame.error is None else ["error", _double(frame.error)]),
+            _text(frame.way),
         ]
     if isinstance(frame, PortState):
         return [

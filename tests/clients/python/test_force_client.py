@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from math import inf, nan
 
@@ -305,6 +306,41 @@ def test_all_that_the_engine_knows_travels():
     nothing = (0.0, 0.0, 0.0)
     assert force.model == LocalModel((1e-3, 0.0, 0.0), (nothing, nothing, nothing), 3e-3, contact)
     assert (force.topology_changed, force.error) == (True, 0.02)
+
+
+@pytest.mark.parametrize(
+    ("way", "agreed", "sent", "left_out"),
+    [
+        (2, True, 2, ""),
+        (0, True, 0, ""),
+        (2, False, 0, ""),
+        (3, True, 0, "the way of answering: Config.ways has none of its number"),
+        (-1, True, 0, "the way of answering: Config.ways has none of its number"),
+    ],
+)
+def test_a_force_says_which_of_its_engines_ways_it_was(way, agreed, sent, left_out):
+    stage = Stage(Config(ways=("tabulated", "near")))
+    stage.server.features = ("local-model", "ways") if agreed else ("local-model",)
+    stage.touch = lambda hand: Touch((0, 0, 1), way=way)
+    stage.run(200 * MS)
+    assert stage.server.hellos[0].ways == ("tabulated", "near")
+    assert "ways" in stage.server.hellos[0].features
+    assert {force.way for force in stage.forces} == {sent}
+    assert stage.client.stats.left_out == left_out
+
+
+@pytest.mark.parametrize(
+    ("ways", "words"),
+    [
+        (9 * ("x",), "ways.size = 9: expected at most 8 names"),
+        (("near", ""), "ways[1].size = 0: expected at least 1 byte"),
+        ((25 * "x",), "ways[0].size = 25: expected at most 24 bytes"),
+        (("near", "near"), "ways[1] = near: expected no name twice"),
+    ],
+)
+def test_impossible_names_of_ways_are_refused(ways, words):
+    with pytest.raises(ValueError, match=re.escape(words)):
+        Config(ways=ways)
 
 
 def test_without_the_servers_consent_no_local_model_is_sent():

@@ -264,6 +264,8 @@ FRAMES = {
     "control-ack-handle": (66, None, [ControlAck(14, Code.OK, handle=HANDLE)]),
     "device-report": (61, None, [DEVICE_REPORT]),
     "peer-report": (62, None, [PEER_REPORT]),
+    "peer-report-way": (97, None, [replace(PEER_REPORT, error=0.125, way="near")]),
+    "force-way": (96, None, [replace(FORCE, sequence=102, model=None, error=0.125, way=2)]),
     "state-deadband": (58, None, [Control(9, SetStateDeadband(0.1, 0.001, 20_000))]),
 }
 
@@ -405,6 +407,7 @@ def out_of_bounds():
     yield "table without a step", with_all(contact=Contact((1.0, 0.0, 0.0), 0.0, ForceTable(0.0, 0.0, (1.0, 2.0))))
     yield "table NaN", with_all(contact=Contact((1.0, 0.0, 0.0), 0.0, ForceTable(0.0, 1.0, (1.0, nan))))
     yield "error", force(error=-0.1)
+    yield "a ninth way", force(way=9)
     yield "device report 0", replace(DEVICE_REPORT, number=0)
     yield "its time", replace(DEVICE_REPORT, until_ns=2**60 + 1)
     yield "its span", replace(DEVICE_REPORT, span_ns=2**60 + 1)
@@ -420,6 +423,8 @@ def out_of_bounds():
     yield "one in none", replace(PEER_REPORT, state_one_in=0)
     yield "one in 1001", replace(PEER_REPORT, state_one_in=1001)
     yield "peer report 0", replace(PEER_REPORT, link=replace(REPORT, number=0))
+    yield "error of an engine", replace(PEER_REPORT, error=-0.1)
+    yield "error of an engine NaN", replace(PEER_REPORT, error=nan)
     yield "port of device 16", replace(PORT, device=16)
     yield "port of channel 8", replace(PORT, channel=8)
     yield "epoch 0", replace(PORT, epoch=0)

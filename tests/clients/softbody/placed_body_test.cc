@@ -38,6 +38,7 @@ TEST(PlacedBody, PushesTheHandBackAlongTheWayItCame) {
   EXPECT_EQ(touch.stiffness, feel.stiffness);
   EXPECT_EQ(touch.valid_radius, feel.valid_radius);
   EXPECT_EQ(touch.error, feel.error);
+  EXPECT_EQ(touch.way, 0U) << "this body has one way of answering";
   ASSERT_TRUE(touch.contact);
   EXPECT_NEAR((touch.contact->normal - -Vec3::UnitX()).norm(), 0, 1e-12);
   EXPECT_NEAR(touch.contact->gap, -0.002, 1e-9);
@@ -241,6 +242,18 @@ TEST(PlacedBody, AnswersForEveryModelThatASceneCanName) {
       EXPECT_NEAR(stiffness, 470, 3) << model.name;
     }
   }
+}
+
+TEST(PlacedBody, ABodyOfSeveralWaysSaysWhichOneItWas) {
+  PlacedBody body(parse_scene(scene_of(info(ModelKind::kNear)), "s.toml", "."));
+  DeviceState hand;
+  hand.position = Vec3(0.012, 0, 0);
+  const std::uint32_t way = body.answer(hand).way;
+  ASSERT_GT(way, 0U);
+  const std::string_view name = kWayNames.at(way - 1);
+  EXPECT_TRUE(name == "near" || name == "whole") << name;
+  hand.position = Vec3(0.009, 0, 0);
+  EXPECT_EQ(body.answer(hand).way, 0U) << "nothing touches the body";
 }
 
 /// On its closed ways the hand goes far enough aside to leave the near field, and comes back.

@@ -383,6 +383,19 @@ describe("the callback", () => {
     }
   });
 
+  it("says which of its ways a force was, to a server that knows them", () => {
+    const cases = [[2, true, 2], [undefined, true, undefined], [2, false, undefined], [3, true, undefined], [-1, true, undefined],
+      [0.5, true, undefined]] as const;
+    for (const [way, agreed, sent] of cases) {
+      const world = new World(1, kFair, { ways: ["tabulated", "near"] }, { physics: () => ({ force: kPush, way }) },
+        { features: agreed ? ["ways"] : [] });
+      world.runMs(100);
+      assert.equal(world.server.forces.at(-1)!.command.way, sent);
+      const hasName = way === undefined || way === 2;
+      assert.equal(world.client.stats().leftOut, hasName ? "" : "the way of answering: the config's ways have none of its number");
+    }
+  });
+
   it("sends all that the engine knows, except numbers out of bounds", () => {
     const kContact = { normal: { x: 0, y: 0, z: 1 }, gap: -1e-3, table: { first: -1e-3, step: 1e-3, force: [0, 1, 3] } };
     const kAll = { force: kPush, validRadius: 3e-3, contact: kContact, topologyChanged: true, error: 0.02 };
@@ -434,6 +447,10 @@ describe("an impossible configuration", () => {
       [{ name: "ä".repeat(33) }, /^RangeError: name.size = 66: expected at most 64 bytes$/],
       [{ device: "ä".repeat(13) }, /^RangeError: device.size = 26: expected at most 24 bytes$/],
       [{ channel: "c".repeat(25) }, /^RangeError: channel.size = 25: expected at most 24 bytes$/],
+      [{ ways: new Array<string>(9).fill("x") }, /^RangeError: ways.size = 9: expected at most 8 names$/],
+      [{ ways: ["near", ""] }, /^RangeError: ways\[1\].size = 0: expected at least 1 byte$/],
+      [{ ways: ["x".repeat(25)] }, /^RangeError: ways\[0\].size = 25: expected at most 24 bytes$/],
+      [{ ways: ["near", "near"] }, /^RangeError: ways\[1\] = near: expected no name twice$/],
       [{ key: new Uint8Array(31) }, /^RangeError: key.size = 31: expected 32 bytes$/],
       [{ suites: [0] }, /^RangeError: suites = \[0\]: expected numbers of some of /],
       [{ suites: [] }, /^RangeError: suites = \[\]: expected/],

@@ -224,6 +224,17 @@ describe("WIRE.md", () => {
     assert.deepEqual(link, report.value);
   });
 
+  it("an engine that says its ways is read as the page has it", () => {
+    const hello = decodeHelloMessage(decodeHello(golden("hello-ways"))!.content);
+    assert.deepEqual([hello?.features, hello?.ways], [["local-model", "ways"], ["tabulated", "near"]]);
+    const [force] = contentOf("force-way").frames;
+    assert.ok(force?.kind === "force");
+    assert.deepEqual([force.value.error, force.value.way], [0.125, 2]);
+    const [report] = contentOf("peer-report-way").frames;
+    assert.ok(report?.kind === "peerReport");
+    assert.deepEqual([report.value.error, report.value.way], [0.125, "near"]);
+  });
+
   it("a report out of bounds is left out and counted", () => {
     const link = peerReport().link;
     const devices: Partial<DeviceReport>[] = [
@@ -232,6 +243,7 @@ describe("WIRE.md", () => {
     ];
     const peers: Partial<PeerReport>[] = [
       { device: 16 }, { channel: 8 }, { stateOneIn: 0 }, { stateOneIn: 1001 }, { link: { ...link, number: 0n } },
+      { error: -0.1 }, { error: NaN },
     ];
     const frames = [
       ...devices.map((change) => encodeFrame({ kind: "deviceReport", value: { ...kDeviceReport, ...change } })),

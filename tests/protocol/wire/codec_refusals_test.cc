@@ -92,6 +92,8 @@ TEST(Codec, AForceOutOfBoundsIsLeftOutAndCountedAndTheRestIsRead) {
       {"a table of one", [](ForceCommand& f) { f.model->contact->table->size = 1; }},
       {"negative error", [](ForceCommand& f) { f.error = -0.1; }},
       {"NaN error", [](ForceCommand& f) { f.error = kNan; }},
+      {"a ninth way", [](ForceCommand& f) { f.way = limits::kMaxWays + 1; }},
+      {"no way at all", [](ForceCommand& f) { f.way = ~0U; }},
       {"NaN torque", [](ForceCommand& f) { f.torque->torque.y() = kNan; }},
       {"infinite torque", [](ForceCommand& f) { f.torque->torque.z() = kInf; }},
       {"NaN orientation", [](ForceCommand& f) { f.torque->model->at.w = kNan; }},
@@ -438,6 +440,9 @@ TEST(Codec, AReportOnAnEngineOutOfBoundsIsLeftOutAndCountedAndTheRestIsRead) {
       {"one state in 1001", [](PeerReport& r) { r.state_one_in = limits::kMaxOneIn + 1; }},
       {"a link out of bounds", [](PeerReport& r) { r.link.number = 0; }},
       {"NaN drift", [](PeerReport& r) { r.link.clock_drift_ppm = kNan; }},
+      {"negative error", [](PeerReport& r) { r.error = -0.1; }},
+      {"NaN error", [](PeerReport& r) { r.error = kNan; }},
+      {"a huge error", [](PeerReport& r) { r.error = 1.001e12; }},
   };
   for (const BadPeerReport& bad : cases) {
     PeerReport report = examples::peer_report();
@@ -447,6 +452,8 @@ TEST(Codec, AReportOnAnEngineOutOfBoundsIsLeftOutAndCountedAndTheRestIsRead) {
   const auto good = [] { return RawProtobuf().varint(4, 1).message(6, RawProtobuf().varint(1, 1)); };
   EXPECT_EQ(read_raw(8, good()), 1U);
   EXPECT_EQ(read_raw(8, good().text(3, std::string(limits::kMaxName + 1, 'n'))), 0U);
+  EXPECT_EQ(read_raw(8, good().text(8, std::string(limits::kMaxLabel, 'w'))), 1U);
+  EXPECT_EQ(read_raw(8, good().text(8, std::string(limits::kMaxLabel + 1, 'w'))), 0U);
   EXPECT_EQ(read_raw(8, RawProtobuf().varint(4, 1)), 0U) << "no link";
 }
 

@@ -147,6 +147,7 @@ RC_GTEST_PROP(Codec, AForceComesOutAsItWentIn, ()) {
     if (torque_form == 4) model.stiffness << any_vector(), any_vector(), any_vector();
   }
   if (*rc::gen::arbitrary<bool>()) in.grip_force = any_value();
+  in.way = *rc::gen::inRange<std::uint32_t>(0, limits::kMaxWays + 1);
 
   DataReader reader;
   const DataContent* content = read(reader, data(1, {}, in));
@@ -181,6 +182,7 @@ RC_GTEST_PROP(Codec, AForceComesOutAsItWentIn, ()) {
   RC_ASSERT(out.topology_changed == in.topology_changed);
   RC_ASSERT(out.error == in.error);
   RC_ASSERT(out.grip_force == in.grip_force);
+  RC_ASSERT(out.way == in.way);
   RC_ASSERT(out.torque.has_value() == in.torque.has_value());
   if (!in.torque) return;
   RC_ASSERT(out.torque->torque == in.torque->torque);
@@ -589,7 +591,7 @@ TEST(Codec, AWriterUsedAgainRemembersNothingOfTheLastReports) {
   writer.begin(buffer, {.connection_id = 1}, LocalTime{}, {});
   writer.add(examples::state_with_wanted());
   writer.add(examples::device_report());
-  writer.add(examples::peer_report());
+  writer.add(examples::peer_report_with_way());
   writer.begin(buffer, {.connection_id = 1, .packet_number = 1}, LocalTime{}, {});
   writer.add(examples::state());
   writer.add(DeviceReport{.number = 8});
@@ -606,7 +608,8 @@ TEST(Codec, AWriterUsedAgainRemembersNothingOfTheLastReports) {
   const auto& peer = std::get<PeerReport>(content->frames[2]);
   EXPECT_FALSE(peer.forces_refused);
   EXPECT_FALSE(peer.link.round_trip.has_value());
-  EXPECT_EQ(peer.name + peer.link.words, "");
+  EXPECT_EQ(peer.name + peer.link.words + peer.way, "");
+  EXPECT_FALSE(peer.error.has_value());
 }
 
 TEST(Codec, TheLargestReportsFitIntoASealedDatagramOfTheirOwn) {
@@ -627,7 +630,9 @@ TEST(Codec, TheLargestReportsFitIntoASealedDatagramOfTheirOwn) {
                         .name = std::string(limits::kMaxName, 'n'),
                         .state_one_in = limits::kMaxOneIn,
                         .forces_refused = true,
-                        .link = link};
+                        .link = link,
+                        .error = limits::kMaxValue,
+                        .way = std::string(limits::kMaxLabel, 'y')};
   DeviceReport device{.number = kMost,
                       .until = PeerTime{limits::kMaxTime},
                       .span = limits::kMaxTime,

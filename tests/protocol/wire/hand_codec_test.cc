@@ -109,6 +109,7 @@ ForceCommand a_force(Dice& dice) {
     if (dice.chance(0.5)) command.torque->model = RotationModel{a_rotation(dice), a_stiffness(dice)};
   }
   if (dice.chance(0.3)) command.grip_force = a_number(dice);
+  if (dice.chance(0.3)) command.way = static_cast<std::uint32_t>(dice.bits() % (limits::kMaxWays + 1));
   return command;
 }
 

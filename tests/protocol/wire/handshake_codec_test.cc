@@ -47,14 +47,21 @@ TEST(Codec, ADatagramOfTheHandshakeIsNeverOfSuite2) {
 TEST(Codec, TheFullestHelloAndWelcomeFit) {
   const std::vector<std::string> features(limits::kMaxFeatures + 1, std::string(limits::kMaxFeature + 1, 'f'));
   const std::string name(limits::kMaxName + 1, 'n');
-  const Hello hello{
-      .version_min = ~0U, .version_max = ~0U, .role = Role::kController, .name = name, .features = features};
+  const std::vector<std::string> ways(limits::kMaxWays + 1, std::string(limits::kMaxLabel + 1, 'w'));
+  const Hello hello{.version_min = ~0U,
+                    .version_max = ~0U,
+                    .role = Role::kController,
+                    .name = name,
+                    .features = features,
+                    .ways = ways};
+  EXPECT_LE(write_body(hello).size(), 882U);  // as limits.h says
   const std::size_t suite_1 = sizeof(KeyId) + kNoiseOverhead;
   EXPECT_LE(write_body(hello).size() + suite_1, kMaxHandshakeBody);
   const auto out = read_hello(write_body(hello));
   ASSERT_TRUE(out.has_value());
   EXPECT_EQ(out->name.size(), limits::kMaxName);
   EXPECT_EQ(out->features.size(), static_cast<std::size_t>(limits::kMaxFeatures));
+  EXPECT_EQ(out->ways, std::vector<std::string>(limits::kMaxWays, std::string(limits::kMaxLabel, 'w')));
 
   const Welcome welcome{.version = ~0U,
                         .features = features,
@@ -70,6 +77,32 @@ TEST(Codec, TheFullestHelloAndWelcomeFit) {
   EXPECT_LE(bytes.size(), 874U);  // as limits.h says
   EXPECT_LE(write_body(welcome).size() + suite_1, kMaxHandshakeBody);
   EXPECT_TRUE(read_answer(decode_answer(bytes)->body).has_value());
+}
+
+TEST(Codec, WaysAreReadInTheirOrderAndRefusedWhenTheyAreTooManyOrTooLong) {
+  const auto hello = read_hello(write_body(examples::hello_with_ways()));
+  ASSERT_TRUE(hello.has_value());
+  EXPECT_EQ(hello->ways, (std::vector<std::string>{"tabulated", "near"}));
+  const auto reads = [](std::size_t count, std::size_t length) {
+    RawProtobuf raw = RawProtobuf().varint(1, 1).varint(2, 1).varint(3, 2);
+    for (std::size_t i = 0; i < count; ++i) raw.text(7, std::string(length, 'w'));
+    return read_hello(raw.bytes()).has_value();
+  };
+  EXPECT_TRUE(reads(limits::kMaxWays, limits::kMaxLabel));
+  EXPECT_FALSE(reads(limits::kMaxWays + 1, 1));
+  EXPECT_FALSE(reads(1, limits::kMaxLabel + 1));
+}
+
+TEST(Codec, AnEngineThatNamesNoWaySendsTheBytesThatItAlwaysSent) {
+  Hello hello = examples::hello();
+  const Bytes before = write_body(hello);
+  hello.ways = {"near"};
+  const Bytes named = write_body(hello);
+  EXPECT_EQ(named.size(), before.size() + 2 + 4) << "a tag, a length and four letters";
+  ForceCommand force = examples::force_with_way();
+  const Bytes said = examples::data(1, {}, force);
+  force.way = 0;
+  EXPECT_EQ(said.size(), examples::data(1, {}, force).size() + 2);
 }
 
 TEST(Codec, ClaimsAndGrantsComeOutAsTheyWentIn) {

@@ -181,6 +181,8 @@ std::vector<Shown> shown(std::uint64_t far) {
       {"couple a device with all there is", true, 291, 0, request(291, 20, examples::couple_with_all())},
       {"set the scales of a coupling", true, 292, 0, request(292, 21, examples::set_scale())},
       {"set the share of a leader", true, 293, 0, request(293, 22, examples::set_share())},
+      {"force with the way of its answer", true, 294, 0, at(294, examples::force_with_way())},
+      {"report on an engine that says its way", false, 282, 0, at(282, examples::peer_report_with_way())},
       {"force far away", true, far, 0, at(far, examples::force())},
       {"bye", false, 259, 0, at(259, bye)},
   };

@@ -286,5 +286,123 @@ TEST_F(SealedServer, SaysThatAnEnginesWayIsFullAndThatItsForcesAreNotTaken) {
   EXPECT_TRUE(b.client->peer_reports().front().forces_refused);
 }
 
+/// An engine that says how it answers; `touch` is its answer.
+class EngineWithWays : public SealedServer {
+ protected:
+  Client engine(std::vector<std::string> ways) {
+    Client client{std::make_unique<End>(wire_, parse_address("192.0.2.1:4000")), nullptr};
+    ForceClient::Config config = config_of(wall_, ++seed_);
+    config.ways = std::move(ways);
+    client.client = std::make_unique<ForceClient>(
+        *client.end, server_.self, config, [this](const DeviceState&) { return touch(); }, now_);
+    return client;
+  }
+  Touch touch() {
+    ++answers_;
+    Touch touch = Vec3(1, 0, 0);
+    touch.error = 0.01;
+    touch.way = 1;
+    if (unsure_ && answers_ % 100 == 50) {
+      touch.error = 0.5;
+      touch.way = 2;
+    }
+    return touch;
+  }
+
+  int answers_ = 0;
+  bool unsure_ = true;
+};
+
+TEST_F(EngineWithWays, AnObserverIsToldHowSureTheLeastSureForceWasAndItsWay) {
+  Client a = engine({"tabulated", "near"});
+  Client b = diagnosing(screen_, "192.0.2.2:4000");
+  run(milliseconds(1500), {&a, &b});
+  ASSERT_EQ(b.client->peer_reports().size(), 1U);
+  EXPECT_EQ(b.client->peer_reports()[0].error, 0.5);
+  EXPECT_EQ(b.client->peer_reports()[0].way, "near");
+  unsure_ = false;
+  run(seconds(2), {&a, &b});
+  EXPECT_EQ(b.client->peer_reports()[0].error, 0.01) << "of that second";
+  EXPECT_EQ(b.client->peer_reports()[0].way, "tabulated");
+  EXPECT_EQ(b.client->stats().link.invalid, 0U);
+}
+
+TEST_F(EngineWithWays, TheStepAndTheCountsOfTheServerSayTheWay) {
+  Client a = engine({"near", "linear"});
+  run(seconds(1), {&a});
+  const RemoteForce* const force = mail_->forces[0].take();
+  ASSERT_NE(force, nullptr);
+  EXPECT_EQ(mail_->ways.name_of(force->way), "near");
+  const auto channel = loop_->stats().channels[0];
+  EXPECT_EQ(channel.worst_error, 0.5);
+  ASSERT_EQ(channel.ways.size(), 2U);
+  EXPECT_EQ(channel.ways[0].first, "near");
+  EXPECT_EQ(channel.ways[1].first, "linear");
+  EXPECT_EQ(channel.ways[0].second + channel.ways[1].second, channel.forces);
+  EXPECT_NEAR(static_cast<double>(channel.ways[1].second), static_cast<double>(channel.forces) / 100, 1);
+}
+
+TEST_F(EngineWithWays, TheNextEngineIsNotBlamedForTheDoubtsOfTheOneBefore) {
+  Client a = engine({"tabulated", "near"});
+  Client b = diagnosing(screen_, "192.0.2.2:4000");
+  run(milliseconds(1990), {&a, &b});  // a report is due at 2 s
+  a.client->stop(now_);
+  Client c = controller(other_, "192.0.2.3:4000");
+  run(milliseconds(400), {&a, &b, &c});
+  ASSERT_EQ(b.client->peer_reports().size(), 1U);
+  EXPECT_EQ(b.client->peer_reports()[0].name, "other");
+  EXPECT_FALSE(b.client->peer_reports()[0].error.has_value());
+  EXPECT_EQ(b.client->peer_reports()[0].way, "");
+}
+
+TEST_F(EngineWithWays, AnEngineThatSaysNoErrorIsShownByItsNewestWay) {
+  ServedChannel::Doubt doubt;
+  doubt.observe({}, 1);
+  doubt.observe({}, 2);
+  EXPECT_FALSE(doubt.error.has_value());
+  EXPECT_EQ(doubt.way, 2);
+  doubt.observe(0.0, 3);
+  EXPECT_EQ(doubt.error, 0.0);
+  doubt.observe({}, 4);
+  doubt.observe(0.0, 5);
+  EXPECT_EQ(doubt.way, 5) << "of those as unsure the newest";
+  doubt.observe(-0.0, 6);
+  doubt.observe(0.5, 7);
+  doubt.observe(0.25, 8);
+  EXPECT_EQ(doubt.error, 0.5);
+  EXPECT_EQ(doubt.way, 7);
+}
+
+/// The force of a client of another make is taken, and `way` counts for nothing.
+void expect_unsaid(const NetworkLoop& loop, Mailboxes& mail, const char* what) {
+  const RemoteForce* const force = mail.forces[0].take();
+  ASSERT_NE(force, nullptr) << what;
+  EXPECT_EQ(force->way, 0) << what;
+  EXPECT_TRUE(loop.stats().channels[0].ways.empty()) << what;
+}
+
+TEST_F(EngineWithWays, AWayThatWasNotNamedCountsForNothingAndTheForceIsTaken) {
+  const auto says = [this](std::uint32_t way) {
+    restart({});
+    run_foreign(milliseconds(300), [way](ForceCommand& force) { force.way = way; });
+  };
+  says(1);
+  expect_unsaid(*loop_, *mail_, "it has not named the feature");
+  foreign_.ways = {"near"};
+  says(1);
+  expect_unsaid(*loop_, *mail_, "names without the feature");
+  foreign_.features = {std::string(kFeatureWays)};
+  says(2);
+  expect_unsaid(*loop_, *mail_, "the second of one");
+  foreign_.ways = {""};
+  says(1);
+  expect_unsaid(*loop_, *mail_, "an empty name");
+  foreign_.ways = {"near"};
+  says(1);
+  const RemoteForce* const force = mail_->forces[0].take();
+  ASSERT_NE(force, nullptr);
+  EXPECT_EQ(force->way, 1);
+}
+
 }  // namespace
 }  // namespace tendon::diagnostics_test

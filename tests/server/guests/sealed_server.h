@@ -129,7 +129,7 @@ class SealedServer : public testing::Test {
   template <class Spoil, class Sleeps>
   std::optional<LinkReport> run_foreign(Duration length, Spoil spoil, Sleeps sleeps) {
     End end(wire_, parse_address("127.0.0.1:4000"));
-    ClientHandshake handshake({.hello = {.role = Role::kController, .name = "foreign", .features = {}}}, now_);
+    ClientHandshake handshake({.hello = foreign_}, now_);
     std::optional<Session> session;
     std::optional<LinkReport> report;
     std::uint64_t sequence = 0;
@@ -208,6 +208,7 @@ class SealedServer : public testing::Test {
   bool measured_ = false;           ///< the log thread tells how the loops do
   Health health_;
   std::uint64_t seed_ = 10;
+  Hello foreign_{.role = Role::kController, .name = "foreign", .features = {}};  ///< of run_foreign()
 };
 
 using Phase = ForceClient::Phase;

@@ -43,25 +43,34 @@ TEST(FlightFile, OfAnEarlierRunStays) {
   for (int fault = 1; fault <= 3; ++fault) {
     const auto sink = open_flight(recording, "");
     EXPECT_EQ(sink->path(), flight_path(recording, "", fault));
-    write_flight(StepFlight(2), testing::sample_config(), *sink);
+    write_flight(StepFlight(2), testing::sample_config(), Ways(), *sink);
   }
   EXPECT_EQ(open_flight(recording, "left")->path(), flight_path(recording, "left", 1));
 }
 
 TEST(FlightFile, ThatDoesNotTakeItAllIsAnErrorWithTheReason) {
   StepFlight flight(128);
-  for (std::uint64_t tick = 0; tick < 100; ++tick) flight.record(testing::sample_step(tick));
+  Ways ways;
+  ways.number_of("linear");
+  for (std::uint64_t tick = 0; tick < 100; ++tick) {
+    StepRecord step = testing::sample_step(tick);
+    step.force_way = ways.number_of("near");
+    flight.record(step);
+  }
   flight.freeze();
   FileSink full("/dev/full");
   try {
-    write_flight(flight, testing::sample_config(), full);
+    write_flight(flight, testing::sample_config(), Ways(), full);
     FAIL();
   } catch (const std::runtime_error& error) {
     EXPECT_STREQ(error.what(), "cannot write recording /dev/full: No space left on device");
   }
   MemorySink memory;
-  write_flight(flight, testing::sample_config(), memory);
-  EXPECT_EQ(testing::read_all(memory.bytes()).steps.size(), 100U);
+  write_flight(flight, testing::sample_config(), ways, memory);
+  RecordingReader reader(testing::stream(memory.bytes()), "a.mcap");
+  const testing::Contents contents = testing::read_all(reader);
+  ASSERT_EQ(contents.steps.size(), 100U);
+  for (const StepRecord& step : contents.steps) EXPECT_EQ(reader.ways().name_of(step.force_way), "near");
 }
 
 }  // namespace

@@ -217,7 +217,7 @@ TEST(PartRecorder, ABudgetDeletesItsOwnOldestPartsAndNothingElse) {
     const auto fault = open_flight(path, "");
     StepFlight flight(8);
     for (std::uint64_t tick = 0; tick < 5; ++tick) flight.record(sample_step(tick));
-    write_flight(flight, config_at(path).run, *fault);
+    write_flight(flight, config_at(path).run, Ways(), *fault);
   }
   std::ofstream(folder.path() / "run-notes.mcap") << "somebody's";
   PartRecorder::Config config = config_at(path);

@@ -105,6 +105,32 @@ RC_GTEST_PROP(Recording, GivesBackEveryBitOfEveryRecord, ()) {
   for (std::size_t i = 0; i < datagrams.size(); ++i) RC_ASSERT(same(contents.datagrams[i], datagrams[i]));
 }
 
+TEST(RecordingReader, GivesTheNameOfTheWayInWhichEachForceWasMade) {
+  MemorySink sink;
+  Recorder recorder(sample_config(), sink);
+  recorder.record(sample_step(0));
+  recorder.record(sample_step(1), 0, "near");
+  recorder.record(sample_step(2), 0, "tabulated");
+  recorder.record(sample_step(3), 0, "near");
+  recorder.close();
+  RecordingReader reader(testing::stream(sink.bytes()), "a.mcap");
+  const Contents contents = read_all(reader);
+  ASSERT_EQ(contents.steps.size(), 4U);
+  const std::string_view expected[] = {"", "near", "tabulated", "near"};
+  for (std::size_t i = 0; i < 4; ++i) EXPECT_EQ(reader.ways().name_of(contents.steps[i].force_way), expected[i]) << i;
+}
+
+TEST(RecordingReader, AWayWhoseNameIsTooLongForOneIsReadAsNone) {
+  Ways ways;
+  const std::string bytes = recording::encode(sample_step(1), std::string(limits::kMaxLabel + 1, 'w'));
+  EXPECT_EQ(recording::decode_step(bytes, LocalTime{}, ways).force_way, 0);
+}
+
+TEST(Recording, AStepOfAnEngineThatSaysNoWayTakesTheBytesThatItAlwaysTook) {
+  EXPECT_EQ(recording::encode(sample_step(1), "near").size(), recording::encode(sample_step(1)).size() + 2 + 1 + 4)
+      << "a tag of two bytes, a length, and the name";
+}
+
 TEST(RecordingReader, GivesTheWholeChunksOfARecordingCutAnywhere) {
   Recorder::Config config = sample_config();
   config.flush_after = std::chrono::milliseconds(5);

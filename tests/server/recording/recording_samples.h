@@ -145,7 +145,7 @@ inline bool same(const StepRecord& a, const StepRecord& b) {
          a.longest_hold == b.longest_hold && same(a.handle, b.handle) && a.force_sequence == b.force_sequence &&
          a.force_age == b.force_age && a.loop_age == b.loop_age && a.channel == b.channel &&
          a.force_error.has_value() == b.force_error.has_value() &&
-         same(a.force_error.value_or(0), b.force_error.value_or(0)) &&
+         same(a.force_error.value_or(0), b.force_error.value_or(0)) && a.force_way == b.force_way &&
          std::equal(a.stiffness.reshaped().begin(), a.stiffness.reshaped().end(), b.stiffness.reshaped().begin());
 }
 inline bool same(const DatagramRecord& a, const DatagramRecord& b) {

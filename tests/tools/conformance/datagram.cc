@@ -119,7 +119,8 @@ bool within_bounds(const pb::LocalModel& model) {
 
 bool within_bounds(const pb::ForceCommand& force) {
   return !far(force.force_n()) && force.valid_for_us() >= 1 && force.valid_for_us() <= 10'000'000 &&
-         (!force.has_model() || within_bounds(force.model())) && !far(force.error_n()) && force.error_n() >= 0;
+         (!force.has_model() || within_bounds(force.model())) && !far(force.error_n()) && force.error_n() >= 0 &&
+         force.way() <= 8;
 }
 
 std::string hex(Span bytes, std::size_t most) {

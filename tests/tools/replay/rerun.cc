@@ -108,6 +108,7 @@ StepRecord Rerun::step(const StepRecord& recorded) {
   again.force_sequence = recorded.force_sequence;
   again.loop_age = recorded.loop_age;
   again.force_error = recorded.force_error;
+  again.force_way = recorded.force_way;
   own_ = {.force = again.force};
   if (TurnStep* const turn = again.turn()) {
     own_.torque = turn->torque;

@@ -152,7 +152,7 @@ void World::step_haptic() {
 void World::drain_steps() {
   while (const StepRecord* step = mail_->steps.front()) {
     if (watch_steps_) watch_steps_(*step);
-    if (recorder_) recorder_->record(*step);
+    if (recorder_) recorder_->record(*step, 0, mail_->ways.name_of(step->force_way));
     mail_->steps.pop();
   }
 }

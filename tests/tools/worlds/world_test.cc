@@ -226,7 +226,7 @@ TEST(World, ADeviceFaultZeroesTheForceSavesStepsAndOnlyRearmLeavesIt) {
 
   ASSERT_TRUE(world.mail().flight.frozen());
   MemorySink sink;
-  write_flight(world.mail().flight, world.recorder_config(), sink);
+  write_flight(world.mail().flight, world.recorder_config(), world.mail().ways, sink);
   RecordingReader reader(std::make_unique<std::istringstream>(
                              std::string(reinterpret_cast<const char*>(sink.bytes().data()), sink.bytes().size())),
                          "flight");

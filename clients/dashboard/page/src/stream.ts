@@ -111,6 +111,10 @@ export interface EngineReport {
   readonly lost: number;
   readonly state_one_in: number;
   readonly forces_refused: boolean;
+  /** Newtons that the least sure of its forces may be wrong by, as it says itself; null: it does not say. */
+  readonly error_n: number | null;
+  /** How it answered that one; empty: it does not say. */
+  readonly way: string;
   readonly words: string;
 }
 export interface ReportsMessage {

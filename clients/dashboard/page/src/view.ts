@@ -192,7 +192,9 @@ function card(engine: EngineReport): HTMLElement {
       row("to the server", ms(engine.to_server_ms), p99(engine.to_server_ms)),
       row("to the engine", ms(engine.to_client_ms), p99(engine.to_client_ms)),
       row("lost", `${digits(100 * lost, 2)} %`, `${engine.lost} of ${engine.lost + engine.received}`),
-      row("forces", `${Math.round(rate)} /s`, late > 0 ? `${late} late: ${why}` : "none late")),
+      row("forces", `${Math.round(rate)} /s`, late > 0 ? `${late} late: ${why}` : "none late"),
+      (engine.error_n !== null || engine.way !== "") && row("least sure", engine.error_n !== null ? `± ${digits(engine.error_n)} N` : "–",
+        engine.way !== "" ? `by its own estimate; answered by “${engine.way}”` : "by its own estimate")),
     engine.state_one_in > 1 && h("p", { class: "note", text: `Its network path is full: the server sends it one state in ${engine.state_one_in}.` }),
     engine.forces_refused && h("p", { class: "note", text: "Its forces are not used: its network path loses too many datagrams." }),
     engine.words !== "" && h("p", { class: "note", text: `${engine.words[0]!.toUpperCase()}${engine.words.slice(1)}.` }));

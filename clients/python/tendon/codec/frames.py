@@ -240,6 +240,7 @@ def _read_force(message: pb.ForceCommand) -> ForceCommand:
         error=fields.magnitude(message.error_n) if message.HasField("error_n") else None,
         torque=_read_torque(message),
         grip_force=fields.number(message.gripper_force_n) if message.HasField("gripper_force_n") else None,
+        way=fields.whole(message.way, 0, limits.MAX_WAYS),
     )
 
 
@@ -529,6 +530,8 @@ def _read_peer_report(message: pb.PeerReport) -> PeerReport:
         state_one_in=fields.whole(message.state_one_in, 1, limits.MAX_ONE_IN),
         forces_refused=message.forces_refused,
         link=_read_report(message.link),
+        error=fields.magnitude(message.error_n) if message.HasField("error_n") else None,
+        way=fields.text(message.way, limits.MAX_LABEL),
     )
 
 
@@ -540,6 +543,8 @@ def _write_peer_report(report: PeerReport) -> pb.PeerReport:
         state_one_in=report.state_one_in,
         forces_refused=report.forces_refused,
         link=_write_report(report.link),
+        error_n=report.error,
+        way=fields.clip(report.way, limits.MAX_LABEL),
     )
 
 
@@ -627,6 +632,8 @@ def _write_force(message: pb.ForceCommand, frame: ForceCommand) -> None:
             message.rotation_model.CopyFrom(_write_rotation_model(frame.torque.model))
     if frame.grip_force is not None:
         message.gripper_force_n = frame.grip_force
+    if frame.way:
+        message.way = frame.way
 
 
 def _write(frame: Frame) -> pb.Frame:

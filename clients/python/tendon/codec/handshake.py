@@ -118,6 +118,7 @@ def write_hello(hello: Hello) -> bytes:
             )
             for claim in hello.claims[: limits.MAX_CLAIMS]
         ],
+        ways=[fields.clip(way, limits.MAX_LABEL) for way in hello.ways[: limits.MAX_WAYS]],
     )
     return bytes(message.SerializeToString())
 
@@ -159,6 +160,7 @@ def read_hello(body: bytes) -> Hello | None:
             version_min=fields.whole(message.version_min, 1, message.version_max),
             version_max=message.version_max,
             claims=_read_claims(message),
+            ways=_read_ways(message),
         )
     except (DecodeError, fields.OutOfBounds):
         return None
@@ -184,6 +186,11 @@ def _read_claims(message: pb.Hello) -> tuple[Claim, ...]:
         Claim(fields.enum(fields.ROLES, claim.role), fields.text(claim.device, label), fields.text(claim.channel, label))
         for claim in message.claims
     )
+
+
+def _read_ways(message: pb.Hello) -> tuple[str, ...]:
+    fields.whole(len(message.ways), 0, limits.MAX_WAYS)
+    return tuple(fields.text(way, limits.MAX_LABEL) for way in message.ways)
 
 
 def _read_grants(message: pb.Welcome) -> tuple[Grant, ...]:

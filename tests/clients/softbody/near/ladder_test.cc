@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "clients/softbody/touch/contact.h"
+#include "protocol/limits.h"
 #include "tests/clients/softbody/elsewhere.h"
 #include "tests/clients/softbody/near/pressed_before.h"
 #include "tests/clients/softbody/pressed_block.h"
@@ -114,19 +115,21 @@ struct KnownBlock : AskedAndExact {
 TEST(Ladder, TheFirstRungThatIsGoodEnoughAnswers) {
   PressedBefore& block = small_block(Law::kNeoHookean);
   const auto both = ladder_with(block, true, 0.02);
-  press(block, *both, Vec2::Zero(), 0.003);
+  EXPECT_EQ(press(block, *both, Vec2::Zero(), 0.003).way, Way::kTabulated);
   EXPECT_EQ(both->steps()[0].answers, 1);
   EXPECT_EQ(both->steps()[1].answers, 0);
   EXPECT_EQ(both->steps()[0].size.name, "tabulated");
   // Between what the table is wrong by there and what the shapes are.
   const auto exact = ladder_with(block, true, 1e-3);
-  press(block, *exact, Vec2(0.001, 0.002), 0.003);
+  EXPECT_EQ(press(block, *exact, Vec2(0.001, 0.002), 0.003).way, Way::kLearned);
   EXPECT_EQ(exact->steps()[0].answers, 0);
   EXPECT_EQ(exact->steps()[1].answers, 1);
   const auto none = ladder_with(block, true, 1e-6);
   NearModel near(block.solid, block.top, *block.top.patch(Vec2::Zero()),
                  {.newton = {.max_iterations = 100, .tolerance = 1e-6}});
-  EXPECT_EQ(press(block, *none, Vec2::Zero(), 0.003).force, press(block, near, Vec2::Zero(), 0.003).force);
+  const Reaction by_field = press(block, *none, Vec2::Zero(), 0.003);
+  EXPECT_EQ(by_field.force, press(block, near, Vec2::Zero(), 0.003).force);
+  EXPECT_TRUE(by_field.way == Way::kNear || by_field.way == Way::kWhole);
   EXPECT_EQ(none->steps()[0].answers + none->steps()[1].answers, 0);
 }
 
@@ -449,6 +452,25 @@ TEST(Ladder, BlendedAnswersAreBetweenTheTwoInForceAndInStiffness) {
     EXPECT_LT((found.stiffness - (1 - share) * felt(one).stiffness - share * felt(other).stiffness).norm(), 1e-9);
     EXPECT_NEAR(both.error, 0.01 + 0.1, 1e-12);
   }
+}
+
+TEST(Ladder, ABlendedAnswerSaysTheWayThatHasTheGreaterShare) {
+  Reaction one = testing::whole_answer();
+  Reaction other = one;
+  one.way = Way::kNear;
+  other.way = Way::kTabulated;
+  EXPECT_EQ(blended(one, other, 0.49).way, Way::kNear);
+  EXPECT_EQ(blended(one, other, 0.51).way, Way::kTabulated);
+  one.force = other.force = 0;
+  EXPECT_EQ(blended(one, other, 0.51).way, Way::kTabulated) << "of no force, too";
+}
+
+TEST(Ladder, EachWayHasANameThatTheWireTakes) {
+  EXPECT_EQ(name_of(Way::kOnly), "");
+  EXPECT_EQ(name_of(Way::kTabulated), "tabulated");
+  EXPECT_EQ(name_of(Way::kLinear), "linear");
+  EXPECT_LE(kWayNames.size(), limits::kMaxWays);
+  for (const std::string_view name : kWayNames) EXPECT_LE(name.size(), limits::kMaxLabel);
 }
 
 TEST(Ladder, ABodyThatListsNothingHasNoLadder) {

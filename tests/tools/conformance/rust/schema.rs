@@ -108,6 +108,7 @@ pub static FORCE: Schema = message(&[
     Field(10, Sub(&VECTOR), Optional, Any),
     Field(11, Real, Optional, SIGNED),
     Field(14, Sub(&ROTATION_MODEL), Optional, Any),
+    Field(15, Unsigned32, One, Whole(0, 8)),
 ]);
 
 static STATE_RATE: Schema = message(&[Field(1, Unsigned32, One, Any), Field(2, Unsigned32, One, DEVICE)]);
@@ -310,6 +311,8 @@ pub static PEER_REPORT: Schema = message(&[
     Field(4, Unsigned32, One, Whole(1, 1000)),
     Field(5, Bool, One, Any),
     Field(6, Sub(&LINK_REPORT), Required, Any),
+    Field(7, Real, Optional, POSITIVE),
+    Field(8, Text, One, Bytes(24)),
 ]);
 
 static PORT_SURFACE: Schema = Schema {

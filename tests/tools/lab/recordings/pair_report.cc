@@ -56,6 +56,7 @@ std::vector<double> ledger(const Steps& steps, const Ports& ports) {
 PairRun read_pair(const std::filesystem::path& path) {
   McapReader reader(std::make_unique<std::ifstream>(open_regular_file(path, "recording")), path.string());
   PairObserver observer;
+  Ways ways;
   bool merged = false;
   while (const auto message = reader.next()) {
     std::string topic = message->channel.topic;
@@ -67,7 +68,7 @@ PairRun read_pair(const std::filesystem::path& path) {
         merged = true;
       } else if (leads || topic.starts_with("/follower/")) {
         topic.erase(0, topic.find('/', 1));
-        if (topic == recording::kStep.topic) observer.observe(which, recording::decode_step(message->data, at));
+        if (topic == recording::kStep.topic) observer.observe(which, recording::decode_step(message->data, at, ways));
         if (topic == recording::kPort.topic) observer.observe(which, recording::decode_port(message->data, at));
       }
     } catch (const std::invalid_argument& error) {
