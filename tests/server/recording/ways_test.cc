@@ -5,7 +5,7 @@
 
 #include <string>
 
-namespace tendon {
+namespace tendon::ways_test {
 namespace {
 
 TEST(Ways, TheSameNameHasTheSameNumberAndANewOneTheNext) {
@@ -40,4 +40,4 @@ TEST(Ways, WhatIsNoNameOrHasNoRoomHasNoNumber) {
 }
 
 }  // namespace
-}  // namespace tendon
+}  // namespace tendon::ways_test
