@@ -150,6 +150,54 @@ TEST(NearOracle, AThreadThatHasStoppedLeavesTheFieldAndTheLinearBody) {
   }
 }
 
+/// B1 without any field: the other thread never comes.
+struct NoField : AskedAndExact {
+  NoField(int n, Law law, double poisson)
+      : AskedAndExact(pressed_block(Element::kHex8Sri, n, poisson, law)),
+        model(solid, top, {.newton = {.max_iterations = 100, .tolerance = 1e-6}}, [](auto) {}) {}
+  Reaction press(const Vec2& place, double depth) { return model.press(*top.patch(place), Given::kDepth, depth); }
+  double truth(const Vec2& place, double depth) { return exact.press(*top.patch(place), Given::kDepth, depth).force; }
+  NearModel model;
+};
+
+/// The linear body is 8 % off at 3 mm, and 15 % at a/4 (corotational).
+TEST(NearOracle, WithoutAFieldAnswersAreNearTheLawsToAQuarterOfTheRadius) {
+  for (const Law law : kLaws) {
+    NoField near(8, law, 0.45);
+    for (const Vec2& place : {Vec2(0, 0), Vec2(0.004, 0.011), Vec2(-0.03, 0.02)}) {
+      for (const auto& [depth, share] : {std::pair(1e-3, 1e-3), std::pair(3e-3, 2e-3), std::pair(5e-3, 1e-2)}) {
+        const Reaction truth = near.exact.press(*near.top.patch(place), Given::kDepth, depth);
+        const Reaction found = near.press(place, depth);
+        EXPECT_NEAR(found.force, truth.force, share * truth.force) << static_cast<int>(law) << ' ' << depth;
+        EXPECT_NEAR(found.stiffness, truth.stiffness, 0.1 * truth.stiffness) << static_cast<int>(law) << ' ' << depth;
+        EXPECT_LT((found.slope - truth.slope).norm(), 3e-3) << static_cast<int>(law) << ' ' << depth;
+        EXPECT_NEAR(found.depth, depth, 1e-12);
+        EXPECT_GE(found.error, std::abs(found.force - truth.force)) << static_cast<int>(law) << ' ' << depth;
+        EXPECT_LT(found.error, 0.3 * truth.force) << static_cast<int>(law) << ' ' << depth;
+      }
+    }
+  }
+}
+
+/// Nearly incompressible: from a depth of a/15 on.
+TEST(NearOracle, WithoutAFieldAStepThatLeadsNowhereIsLeftOutLittleByLittle) {
+  for (const Law law : kLaws) {
+    NoField near(8, law, 0.499);
+    const double linear = near.press(Vec2::Zero(), 1e-6).stiffness;
+    double last = 0;
+    for (int i = 1; i <= 100; ++i) {
+      const double depth = 5e-5 * i;
+      const double truth = near.truth(Vec2::Zero(), depth);
+      const Reaction found = near.press(Vec2::Zero(), depth);
+      EXPECT_GE(found.error, std::abs(found.force - truth)) << static_cast<int>(law) << ' ' << depth;
+      EXPECT_NEAR(found.force, linear * depth, 0.06 * linear * depth) << static_cast<int>(law) << ' ' << depth;
+      EXPECT_NEAR(found.force - last, 5e-5 * linear, 0.5 * 5e-5 * linear) << "no jump " << static_cast<int>(law) << i;
+      last = found.force;
+    }
+    EXPECT_NEAR(last, linear * 5e-3, 1e-4 * last) << "the linear body";
+  }
+}
+
 TEST(NearOracle, AHandThatJumpsFarIsAnsweredByTheLinearBodyAndSoonByAField) {
   for (const Law law : kLaws) {
     NearBeside near(12, law);
