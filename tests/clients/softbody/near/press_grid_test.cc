@@ -29,7 +29,7 @@ TEST(SolvedPresses, AFactorServesForManyAndEachBeginsNextToItsShape) {
     const int wanted = presses.grid.places() * PressGrid::kLevels + presses.grid.cells();
     EXPECT_EQ(presses.work.presses, wanted);
     EXPECT_LE(presses.work.factors, wanted / 20);
-    EXPECT_LE(presses.work.steps, 3.5 * wanted);
+    EXPECT_LE(presses.work.steps, 3.1 * wanted);
   }
 }
 
