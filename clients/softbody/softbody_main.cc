@@ -3,6 +3,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <chrono>
 #include <ctime>
 #include <exception>
 #include <filesystem>
@@ -30,6 +31,9 @@ namespace {
 /// A self-test presses 3 mm deep and slides 3 mm sideways, so that it stays on the surface of a scene.
 constexpr double kWay = 0.003;
 
+/// How often a log is told of long work.
+constexpr std::chrono::seconds kBetweenLines{10};
+
 int test(const softbody::Scene& scene, const Options& options) {
   softbody::PlacedBody body(scene);
   SelfTestScript script;
@@ -56,13 +60,20 @@ int test(const softbody::Scene& scene, const Options& options) {
   return result.passed() ? 0 : 1;
 }
 
-/// What a body learns before it is touched.
+/// What a body learns before it is touched. A terminal shows in one line what is being done; elsewhere a line says so now
+/// and then.
 void learn(softbody::BodyConfig& body) {
-  const bool tells = isatty(STDERR_FILENO) != 0;
+  const bool terminal = isatty(STDERR_FILENO) != 0;
+  auto told = std::chrono::steady_clock::now();
   body.learned = softbody::learn(body, [&](std::string_view what) {
-    if (tells) std::cerr << "\r\033[K" << what << std::flush;
+    if (terminal) {
+      std::cerr << "\r\033[K" << what << std::flush;
+    } else if (const auto now = std::chrono::steady_clock::now(); now - told >= kBetweenLines) {
+      told = now;
+      std::cerr << "tendon-softbody: " << what << std::endl;
+    }
   });
-  if (tells) std::cerr << "\r\033[K";
+  if (terminal) std::cerr << "\r\033[K";
   for (const std::string& warning : body.learned->warnings)
     std::cerr << "tendon-softbody: warning: " << warning << '\n';
 }

@@ -25,11 +25,10 @@ constexpr int kPatience = 16;
 constexpr double kSlow = 1.0 / 16;
 
 /// What H says of the stiffness is wrong by the first order of H's error, and the energy of the shape by the second. Where
-/// the two differ by at most this share, and H finds no more than this that another shape would take off, that is taken
-/// off and serves. The two alone may agree by accident, as near an edge.
-constexpr double kTangentAlike = 0.02;
-/// How a body gives way to a gliding patch is right to this share.
-constexpr double kGlidePrecision = 1e-2;
+/// the two differ by at most Config::tangent, and H finds no more than this that another shape would take off, that is
+/// taken off and serves. The two alone may agree by accident, as near an edge. How a body gives way to a gliding patch is
+/// right to this part of Config::tangent.
+constexpr double kOfTangentForGlide = 0.5;
 constexpr int kTangentRounds = 5;
 
 /// A shape whose force may be wrong by a larger share is none of rest: how it would glide means nothing.
@@ -68,6 +67,7 @@ QuasiStaticModel::QuasiStaticModel(const Elastic& elastic, const TouchSurface& s
       effects_(effects_at_rest(effects, elastic)) {
   expect(config.max_iterations >= 1, "max_iterations", config.max_iterations, "1 or more");
   expect_above_zero(config.tolerance, "tolerance");
+  expect_above_zero(config.tangent, "tangent");
   if (config.self_collision) self_collision_ = std::make_unique<SelfCollision>(elastic, *config.self_collision, u_);
   stiffness(Elastic::Curvature::kExact);
   stale_ = !factor_.factorize(stiffness_);
@@ -217,7 +217,7 @@ void QuasiStaticModel::find_shapes(const VectorXd& load, const MatrixXd& slopes,
     const MatrixXd left = slopes - by_shapes;
     const MatrixXd more = solved(left);
     const Mat2 missing = left.transpose() * more;
-    if (round == kTangentRounds || missing.norm() <= kGlidePrecision * found.giving.norm()) {
+    if (round == kTangentRounds || missing.norm() <= kOfTangentForGlide * config_.tangent * found.giving.norm()) {
       found.shapes += more;
       found.giving += missing;
       break;
@@ -249,7 +249,7 @@ void QuasiStaticModel::find_tangent(const VectorXd& load, const Patch* patch, co
     const double less = back.dot(by_shape);
     reaction.stiffness = stiffness - less;
     const double apart = std::max(std::abs(less), std::abs(guess - stiffness));
-    if (apart <= kTangentAlike * std::abs(stiffness) || round == kTangentRounds) break;
+    if (apart <= config_.tangent * std::abs(stiffness) || round == kTangentRounds) break;
     const VectorXd by_back = needed(back, tangent.now);
     const double share = less / back.dot(by_back);
     shape -= share * back;

@@ -31,6 +31,9 @@ class QuasiStaticModel : public Model {
     double tolerance = 1e-6;
     std::optional<double> self_collision = {};  ///< Pa/m: the bed c of SelfCollision
     bool glides = true;                         ///< an answer at rest has its Glide
+    /// By how large a share of itself the stiffness of an answer may be doubtful, and its glide by half of this. The answer
+    /// is then mostly right to the square of it. A smaller share costs solutions with the factor.
+    double tangent = 0.02;
   };
   /// `elastic` must outlive this. It begins at rest, under its weight if it has any.
   QuasiStaticModel(const Elastic& elastic, const TouchSurface& surface, const Config& config,

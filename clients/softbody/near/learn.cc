@@ -17,7 +17,7 @@
 namespace tendon::softbody {
 namespace {
 
-constexpr std::uint64_t kLearnedVersion = 2;
+constexpr std::uint64_t kLearnedVersion = 3;
 constexpr std::uintmax_t kMostLearnedBytes = std::uintmax_t{1} << 30;
 
 /// The kinds of what is learned: how a file of it begins, what its name begins with, and its fields.
@@ -209,7 +209,7 @@ Learned learn(const Solid& solid, const TouchSurface& surface, const LearnConfig
   const bool wants_shapes = config.shapes && !learned.shapes;
   const bool wants_answers = config.answers && !learned.answers;
   if (!wants_shapes && !wants_answers) return learned;
-  const SolvedPresses presses = solve_presses(solid, surface, grid, tell);
+  const SolvedPresses presses = solve_presses(solid, surface, grid, wants_answers, tell);
   if (wants_shapes) {
     learned.shapes = learn_shapes(solid, surface, presses, tell);
     if (keeps) keep(shapes, bytes_of<OfShapes>(*learned.shapes, digest));

@@ -35,7 +35,7 @@ struct LearnConfig {
 ///
 /// A file, little-endian, lengths in bytes:
 ///
-///     8   "TENDONSH" or "TENDONAN"                  4   version, 2; then 4 zeros
+///     8   "TENDONSH" or "TENDONAN"                  4   version, 3; then 4 zeros
 ///     8   digest of all that it was made of         n   the fields of LearnedShapes or TabulatedAnswers but the grid, in
 ///                                                       their order: numbers of 8, each list and matrix behind its size
 ///     8   XXH3 (64 bits) of everything before

@@ -135,7 +135,7 @@ class Added {
       : basis_(basis), elements_(static_cast<std::size_t>(solid.mesh().element_count())) {
     std::iota(elements_.begin(), elements_.end(), 0);
     corners_ = std::make_unique<Corners>(solid.mesh(), elements_);
-    rows_ = rows_of(solid, basis.shapes, corners_->nodes);
+    rows_ = rows_of(solid, basis.shapes, corners_->nodes).transpose();
     std::vector<int> single(corners_->own.size());
     std::iota(single.begin(), single.end(), 0);
     const VectorXd ones = VectorXd::Ones(static_cast<Eigen::Index>(elements_.size()));
@@ -146,7 +146,7 @@ class Added {
 
   /// A column for each element, in press s.
   MatrixXd at_press(Eigen::Index s) const {
-    const VectorXd u = rows_ * basis_.q.col(s);
+    const VectorXd u = rows_.transpose() * basis_.q.col(s);
     const auto size = 3 * static_cast<Eigen::Index>(corners_->own.size());
     VectorXd single(size);
     for (Eigen::Index i = 0; i < size; ++i) single[i] = u[row(i)];
@@ -155,9 +155,9 @@ class Added {
     VectorXd linear = VectorXd::Zero(size);
     linear_->add_forces(single, linear);
     force -= linear;
-    MatrixXd all = MatrixXd::Zero(rows_.cols(), static_cast<Eigen::Index>(elements_.size()));
+    MatrixXd all = MatrixXd::Zero(rows_.rows(), static_cast<Eigen::Index>(elements_.size()));
     const Eigen::Index per_element = 3 * per_element_;
-    for (Eigen::Index i = 0; i < size; ++i) all.col(i / per_element) += force[i] * rows_.row(row(i)).transpose();
+    for (Eigen::Index i = 0; i < size; ++i) all.col(i / per_element) += force[i] * rows_.col(row(i));
     return all;
   }
 
@@ -167,7 +167,7 @@ class Added {
   const Basis& basis_;
   std::vector<int> elements_;
   std::unique_ptr<Corners> corners_;
-  MatrixXd rows_;
+  MatrixXd rows_;  ///< of the shapes, as columns: they are read one after the other
   std::unique_ptr<Kernel> law_;
   std::unique_ptr<Kernel> linear_;
   int per_element_ = 0;
@@ -284,36 +284,6 @@ bool solve_knot(const LearnedBody& body, const VectorXd& load, double depth, Vec
     if (!(slope.dot(step) < 0) || !go(body, step, energy, q, slope)) return false;
   }
   return false;
-}
-
-/// Of four knots in a row along each axis, around a point's cell or next to the rim, and what each counts for there: cubic
-/// (Lagrange), where PressGrid::corners() is linear.
-std::array<PressGrid::Corner, 64> knots_around(const PressGrid& grid, const PressGrid::Point& point) {
-  struct Row {
-    /// Along an axis with the knots 0 … last, at `in` of `cell`.
-    Row(int cell, double in, int last) : first(std::clamp(cell - 1, 0, last - 3)) {
-      const double x = cell - first + in;
-      for (int k = 0; k < 4; ++k) {
-        for (int other = 0; other < 4; ++other) {
-          if (other != k) shares[at(k)] *= (x - other) / (k - other);
-        }
-      }
-    }
-    int first;
-    std::array<double, 4> shares{1, 1, 1, 1};
-  };
-  const Row x(point.i, point.in[0], 2 * grid.around);
-  const Row y(point.j, point.in[1], 2 * grid.around);
-  const Row z(point.level, point.in[2], PressGrid::kLevels);
-  std::array<PressGrid::Corner, 64> all{};
-  for (int c = 0; c < 64; ++c) {
-    const int i = c / 16;
-    const int j = c / 4 % 4;
-    const int k = c % 4;
-    all[at(c)] = {grid.knot(x.first + i, y.first + j, z.first + k),
-                  x.shares[at(i)] * y.shares[at(j)] * z.shares[at(k)]};
-  }
-  return all;
 }
 
 double share_of(double found, double truth) { return std::abs(found / truth - 1); }
@@ -465,7 +435,7 @@ std::optional<Reaction> LearnedBody::press(const Patch& patch, double depth, con
   const VectorXd load = below * patch.weights;
   const Eigen::Index size = shapes();
   VectorXd q = VectorXd::Zero(size);
-  for (const auto& [knot, share] : knots_around(grid_, point)) q += share * knots_.col(knot);
+  for (const auto& [knot, share] : grid_.around_point(point)) q += share * knots_.col(knot);
   MatrixXd inverse = MatrixXd::Zero(size, size);
   for (const auto& [knot, share] : grid_.corners(point)) inverse += share * inverses_.middleCols(size * knot, size);
   VectorXd by_tool = inverse * load;

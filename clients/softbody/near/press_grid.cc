@@ -18,67 +18,187 @@ namespace {
 constexpr double kPlaceApart = 0.25;
 constexpr double kDepthApart = 0.07;
 
-/// Solutions are better than the answers that are learned from them.
-constexpr double kSolvedTo = 1e-6;
+/// Solutions are better than the answers that are learned from them. A force is then right to 2e-6, because it is that of
+/// the step which is not taken any more; stiffness and glide are right to about the square of kTangentTo.
+constexpr double kSolvedTo = 1e-5;
+constexpr double kTangentTo = 1e-3;
 constexpr double kSolvedWellEnough = 1e-4;
-constexpr int kMostIterations = 200;
+constexpr int kMostIterations = 60;
+
+/// A press that does not converge is tried once more, in so many steps down from the one above.
+constexpr int kSmallSteps = 4;
+
+/// A factor costs as much as so many steps.
+constexpr int kStepsOfFactor = 30;
+
+/// From one depth to the next a force grows by the mean of both stiffnesses, to this share of it; else the body has come to
+/// another shape.
+constexpr double kGoesOn = 0.05;
 
 /// So much more than what was seen in the middle of cells and at their corners may an answer between be wrong.
 constexpr double kUnseenBetween = 2;
 
 constexpr double kInfinite = std::numeric_limits<double>::infinity();
 
-/// Presses one body again and again, from shape to shape.
+/// Presses one body again and again.
 class Presser {
  public:
   Presser(const Solid& solid, const TouchSurface& surface)
-      : solid_(solid), model_(solid, surface, {.max_iterations = kMostIterations, .tolerance = kSolvedTo}) {}
+      : solid_(solid),
+        model_(solid, surface, {.max_iterations = kMostIterations, .tolerance = kSolvedTo, .tangent = kTangentTo}) {}
 
-  SolvedPress press(const std::optional<Patch>& patch, double depth, double step) {
-    SolvedPress solved;
-    if (!patch) return solved;
-    take(*patch, depth, solved);
-    if (!solved.good) {  // from rest, in small steps
-      model_.set_displacements(VectorXd::Zero(solid_.size()));
-      const int steps = static_cast<int>(std::ceil(2 * depth / step));
-      for (int i = 1; i <= steps; ++i) take(*patch, depth * i / steps, solved);
-    }
-    if (!solved.good) model_.set_displacements(VectorXd::Zero(solid_.size()));
-    return solved;
-  }
-
-  /// At rest, before the first press.
-  SolvedPress touch(const std::optional<Patch>& patch, const Vec3& normal) const {
+  /// At rest, before the first press. `shape` becomes that of unit depth.
+  SolvedPress touch(const std::optional<Patch>& patch, const Vec3& normal, VectorXd& shape) const {
     SolvedPress solved;
     if (!patch) return solved;
     const VectorXd load = solid_.to_free(patch_load(solid_, normal, *patch));
-    VectorXd shape = VectorXd::Zero(solid_.size());
-    solid_.add_free(VectorXd(model_.factor().solve(load)), shape);
-    solved.reaction.stiffness = 1 / depth_below(*patch, normal, shape);
-    solved.reaction.glide.tilting = solved.reaction.stiffness * slope_below(*patch, normal, shape);
+    shape = model_.factor().solve(load);
+    const VectorXd all = displaced(shape);
+    solved.reaction.stiffness = 1 / depth_below(*patch, normal, all);
+    solved.reaction.glide.tilting = solved.reaction.stiffness * slope_below(*patch, normal, all);
+    shape *= solved.reaction.stiffness;
     solved.good = true;
     return solved;
   }
 
-  /// The same press with a factor of its shape: stiffness and glide are then exact.
-  void sharpen(const Patch& patch, double depth, SolvedPress& solved) {
-    model_.renew_factor();
-    model_.forget_forces();
-    take(patch, depth, solved);
-  }
-
-  VectorXd shape() const { return solid_.to_free(model_.displacements()); }
-
- private:
-  void take(const Patch& patch, double depth, SolvedPress& solved) {
+  /// From the shape `start`. With a patch that has its curvatures the answer has its glide.
+  SolvedPress press(const Patch& patch, double depth, const VectorXd& start) {
+    const int factors = model_.factors();
+    if (lost_) {
+      model_.set_displacements(displaced(start));
+    } else {
+      model_.move(start - shape());
+      if (wasted_ >= kStepsOfFactor) model_.renew_factor();
+    }
+    SolvedPress solved;
     solved.reaction = model_.press(patch, Given::kDepth, depth);
     solved.energy = model_.forces().energy;
     solved.good = solved.reaction.force > 0 && solved.reaction.error <= kSolvedWellEnough * solved.reaction.force &&
-                  solved.reaction.knows_glide && std::isfinite(solved.energy);
+                  (solved.reaction.knows_glide || patch.curvatures.size() == 0) && std::isfinite(solved.energy);
+    lost_ = !solved.good;
+    const int steps = model_.iterations();
+    const bool fresh = model_.factors() > factors;
+    least_ = fresh ? steps : std::min(least_, steps);
+    wasted_ = fresh ? 0 : wasted_ + steps - least_;
+    ++work_.presses;
+    work_.steps += steps;
+    work_.factors = model_.factors();
+    return solved;
+  }
+
+  /// The next press does not begin with what this one knows of the body.
+  void leave() { lost_ = true; }
+
+  VectorXd shape() const { return solid_.to_free(model_.displacements()); }
+  Eigen::Index size() const { return solid_.free_count(); }
+  const SolvedPresses::Work& work() const noexcept { return work_; }
+
+ private:
+  VectorXd displaced(const VectorXd& free) const {
+    VectorXd all = VectorXd::Zero(solid_.size());
+    solid_.add_free(free, all);
+    return all;
   }
 
   const Solid& solid_;
   QuasiStaticModel model_;
+  SolvedPresses::Work work_{};
+  bool lost_ = false;            ///< the body lies as no press should find it
+  int least_ = kMostIterations;  ///< steps of a press, since the factor was made
+  int wasted_ = 0;               ///< steps since then, beyond so many for each press
+};
+
+/// Presses the knots of a grid, each when those above it and its neighbours before it were.
+class KnotPresses {
+ public:
+  KnotPresses(const TouchSurface& surface, const PressGrid& grid, Presser& presser, std::vector<SolvedPress>& all)
+      : surface_(surface), grid_(grid), presser_(presser), all_(all), first_(at(grid.places())) {
+    for (int i = 0; i < grid.side(); ++i) {
+      for (int j = 0; j < grid.side(); ++j) {
+        VectorXd& first = first_[at(place(i, j))];
+        of(i, j, 0) = presser.touch(surface.patch(grid.place(i, j)), surface.normal(), first);
+        first *= grid.step;
+      }
+    }
+  }
+
+  void press(int i, int j, int level, bool glides) {
+    const SolvedPress& above = of(i, j, level - 1);
+    const SolvedPress* const beside = j > 0 ? &of(i, j - 1, level) : nullptr;
+    const SolvedPress* const behind = i > 0 ? &of(i - 1, j, level) : nullptr;
+    const bool among_bad = beside != nullptr && behind != nullptr && !beside->good && !behind->good;
+    if (!above.good || among_bad) return;
+    VectorXd start = foreseen(i, j, level);
+    if (beside != nullptr && beside->good) {
+      start += beside->shape - foreseen(i, j - 1, level);
+    } else if (behind != nullptr && behind->good) {
+      start += behind->shape - foreseen(i - 1, j, level);
+    }
+    const Vec2 middle = grid_.place(i, j);
+    const auto patch = glides ? surface_.patch_with_curvatures(middle) : surface_.patch(middle);
+    SolvedPress solved = presser_.press(*patch, level * grid_.step, start);
+    if (!solved.good) {
+      VectorXd from = level > 1 ? above.shape : VectorXd::Zero(start.size());
+      for (int small = 1; small <= kSmallSteps; ++small) {
+        solved = presser_.press(*patch, (level - 1 + small / double{kSmallSteps}) * grid_.step, from);
+        if (!solved.good) return;
+        from = presser_.shape();
+      }
+    }
+    solved.good = goes_on(above.reaction, solved.reaction);
+    if (!solved.good) {
+      presser_.leave();
+      return;
+    }
+    solved.shape = presser_.shape();
+    of(i, j, level) = std::move(solved);
+  }
+
+  /// The shape at a point of the grid, as those of the knots around have it; empty where a corner of its cell has none.
+  VectorXd between(const PressGrid::Point& point) const {
+    const auto good = [&](const auto& corners) {
+      return std::ranges::all_of(corners, [&](const PressGrid::Corner& corner) { return all_[at(corner.knot)].good; });
+    };
+    const auto sum = [&](const auto& corners) {
+      VectorXd shape = VectorXd::Zero(presser_.size());
+      for (const auto& [knot, share] : corners) {
+        if (all_[at(knot)].shape.size() > 0) shape += share * all_[at(knot)].shape;
+      }
+      return shape;
+    };
+    const auto near = grid_.corners(point);
+    if (!good(near)) return {};
+    const auto around = grid_.around_point(point);
+    return good(around) ? sum(around) : sum(near);
+  }
+
+ private:
+  int place(int i, int j) const { return i * grid_.side() + j; }
+  SolvedPress& of(int i, int j, int level) { return all_[at(grid_.knot(i, j, level))]; }
+
+  /// Where the shapes above a knot go on to: with the slope t at rest u(l) = l t + l² v(l), and v is the polynomial through
+  /// all of them.
+  VectorXd foreseen(int i, int j, int level) {
+    const VectorXd& first = first_[at(place(i, j))];
+    VectorXd shape = level * first;
+    double weight = level % 2 == 0 ? 1 : -1;
+    for (int k = 1; k < level; ++k) {
+      shape += weight * level * level / (k * k) * (of(i, j, k).shape - k * first);
+      weight *= -double(level - k) / k;
+    }
+    return shape;
+  }
+
+  bool goes_on(const Reaction& above, const Reaction& here) const {
+    const double grown = grid_.step * (above.stiffness + here.stiffness) / 2;
+    return std::abs(above.force + grown - here.force) <= kGoesOn * here.force;
+  }
+
+  const TouchSurface& surface_;
+  const PressGrid& grid_;
+  Presser& presser_;
+  std::vector<SolvedPress>& all_;
+  std::vector<VectorXd> first_;  ///< of each place, m: at the first depth, if the body were linear
 };
 
 }  // namespace
@@ -118,64 +238,78 @@ std::array<PressGrid::Corner, 8> PressGrid::corners(const Point& point) const {
   return all;
 }
 
-SolvedPresses solve_presses(const Solid& solid, const TouchSurface& surface, const PressGrid& grid, const Tell& tell) {
+std::array<PressGrid::Corner, 64> PressGrid::around_point(const Point& point) const {
+  struct Row {
+    /// Along an axis with the knots 0 … last, at `in` of `cell`.
+    Row(int cell, double in, int last) : first(std::clamp(cell - 1, 0, last - 3)) {
+      const double x = cell - first + in;
+      for (int k = 0; k < 4; ++k) {
+        for (int other = 0; other < 4; ++other) {
+          if (other != k) shares[at(k)] *= (x - other) / (k - other);
+        }
+      }
+    }
+    int first;
+    std::array<double, 4> shares{1, 1, 1, 1};
+  };
+  const Row x(point.i, point.in[0], 2 * around);
+  const Row y(point.j, point.in[1], 2 * around);
+  const Row z(point.level, point.in[2], kLevels);
+  std::array<Corner, 64> all{};
+  for (int c = 0; c < 64; ++c) {
+    const int i = c / 16;
+    const int j = c / 4 % 4;
+    const int k = c % 4;
+    all[at(c)] = {knot(x.first + i, y.first + j, z.first + k), x.shares[at(i)] * y.shares[at(j)] * z.shares[at(k)]};
+  }
+  return all;
+}
+
+SolvedPresses solve_presses(const Solid& solid, const TouchSurface& surface, const PressGrid& grid, bool glides,
+                            const Tell& tell) {
   SolvedPresses all{.grid = grid, .knots = {}, .middles = {}, .at_rest = {}};
   all.knots.resize(at(grid.knots()));
   all.middles.resize(at(grid.cells()));
   const int side = grid.side();
-  const int columns = grid.places() + (side - 1) * (side - 1);
+  const int presses = grid.places() * PressGrid::kLevels + grid.cells();
   int done = 0;
   const auto told = [&] {
-    if (tell) {
-      tell("pressing the body: " + std::to_string(++done) + " of " + std::to_string(columns) + " places");
-    }
+    if (tell) tell("pressing the body: " + std::to_string(++done) + " of " + std::to_string(presses) + " presses");
   };
-  // To and fro, down and up: each press is next to the one before.
+  // At rest first, by the factor of rest.
   Presser presser(solid, surface);
-  for (int i = 0; i < side; ++i) {
-    for (int j = 0; j < side; ++j) {
-      all.knots[at(grid.knot(i, j, 0))] = presser.touch(surface.patch(grid.place(i, j)), surface.normal());
-    }
-  }
+  KnotPresses knots(surface, grid, presser, all.knots);
   for (int i = 0; i + 1 < side; ++i) {
     for (int j = 0; j + 1 < side; ++j) {
       const auto patch = surface.patch(grid.place(i + 0.5, j + 0.5));
-      all.at_rest.push_back(presser.touch(patch, surface.normal()).reaction.stiffness);
+      VectorXd shape;
+      all.at_rest.push_back(presser.touch(patch, surface.normal(), shape).reaction.stiffness);
     }
   }
-  bool down = true;
-  int good = 0;
-  const auto order = [](int i, int k, int count) { return i % 2 == 0 ? k : count - 1 - k; };
-  for (int i = 0; i < side; ++i) {
-    for (int k = 0; k < side; ++k) {
-      const int j = order(i, k, side);
-      const auto patch = surface.patch_with_curvatures(grid.place(i, j));
-      for (int step = 0; step < PressGrid::kLevels; ++step) {
-        const int level = down ? step + 1 : PressGrid::kLevels - step;
-        SolvedPress& solved = all.knots[at(grid.knot(i, j, level))];
-        solved = presser.press(patch, level * grid.step, grid.step);
-        if (solved.good) presser.sharpen(*patch, level * grid.step, solved);
-        if (!solved.good) continue;
-        solved.shape = presser.shape();
-        ++good;
+  for (int level = 1; level <= PressGrid::kLevels; ++level) {
+    for (int i = 0; i < side; ++i) {
+      for (int j = 0; j < side; ++j) {
+        knots.press(i, j, level, glides);
+        told();
       }
-      down = !down;
-      told();
     }
   }
-  if (good == 0) throw std::invalid_argument("of all places to learn from none is on the body");
-  for (int i = 0; i + 1 < side; ++i) {
-    for (int k = 0; k + 1 < side; ++k) {
-      const int j = order(i, k, side - 1);
-      const auto patch = surface.patch_with_curvatures(grid.place(i + 0.5, j + 0.5));
-      for (int step = 0; step < PressGrid::kLevels; ++step) {
-        const int level = down ? step : PressGrid::kLevels - 1 - step;
-        all.middles[at(grid.cell(i, j, level))] = presser.press(patch, (level + 0.5) * grid.step, grid.step);
+  if (std::ranges::none_of(all.knots, [](const SolvedPress& press) { return press.shape.size() > 0; })) {
+    throw std::invalid_argument("of all places to learn from none is on the body");
+  }
+  for (int level = PressGrid::kLevels; level-- > 0;) {  // beginning next to where the knots ended
+    for (int i = 0; i + 1 < side; ++i) {
+      for (int j = 0; j + 1 < side; ++j) {
+        const Vec2 place = grid.place(i + 0.5, j + 0.5);
+        const double depth = (level + 0.5) * grid.step;
+        const auto patch = surface.patch(place);
+        const VectorXd start = knots.between(*grid.find(place, depth));
+        if (patch && start.size() > 0) all.middles[at(grid.cell(i, j, level))] = presser.press(*patch, depth, start);
+        told();
       }
-      down = !down;
-      told();
     }
   }
+  all.work = presser.work();
   return all;
 }
 

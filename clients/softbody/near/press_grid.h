@@ -54,31 +54,49 @@ struct PressGrid {
     double share;
   };
   std::array<Corner, 8> corners(const Point& point) const;
+  /// Four knots in a row along each axis, around the point's cell or next to the rim, and what each counts for (cubic,
+  /// Lagrange).
+  std::array<Corner, 64> around_point(const Point& point) const;
 };
 
 /// The whole body's answer to one press.
 struct SolvedPress {
-  bool good = false;  ///< the patch is on the body, and Newton's method converged
+  bool good = false;  ///< the patch is on the body, and Newton's method found the shape that goes on from those above
   double energy = 0;  ///< J
   Reaction reaction;
   VectorXd shape;  ///< m, free displacements; empty at rest: stiffness and tilting are known there
 };
 
-/// The answers at every knot and in the middle of every cell; these have no shape, and what was learned from the knots
-/// is judged by them.
+/// The answers at every knot and in the middle of every cell; these have neither shape nor glide, and what was learned from
+/// the knots is judged by them.
 struct SolvedPresses {
   PressGrid grid;
   std::vector<SolvedPress> knots;
   std::vector<SolvedPress> middles;
   std::vector<double> at_rest{};  ///< N/m, the stiffness at first touch above each cell's middle; 0: off the body
+  /// What they took, in counts that are the same everywhere.
+  struct Work {
+    int presses = 0;
+    int steps = 0;    ///< of Newton's method, each a solution with a factor
+    int factors = 0;  ///< each as much work as many steps, and the more the finer the mesh
+  };
+  Work work{};
 };
 
 /// What long work says: a line without an end. Null: nobody listens.
 using Tell = std::function<void(std::string_view)>;
 
-/// By Newton's method on the whole body, each press from the shape of the one before. Throws std::invalid_argument when
-/// no place of the grid is on the body, and what QuasiStaticModel throws.
-SolvedPresses solve_presses(const Solid& solid, const TouchSurface& surface, const PressGrid& grid, const Tell& tell);
+/// By Newton's method on the whole body, depth after depth. A press begins where the shapes above it go on to, as far as its
+/// neighbour's did, and in a cell's middle at the cubic between the knots: so it ends next to them where a body has more
+/// shapes of rest than one. One factor serves until the steps that it costs more than a new one would are as much work as
+/// that. A press whose force does not go on from the one above, as the stiffness of both says, is not good: the body has come
+/// to another shape. Below it nothing is pressed, nor in a middle between such knots, nor where two neighbours failed.
+///
+/// `glides`: the answers at the knots have their glide, which tabulate() needs. It takes as many solutions as the rest.
+///
+/// Throws std::invalid_argument when no place of the grid is on the body, and what QuasiStaticModel throws.
+SolvedPresses solve_presses(const Solid& solid, const TouchSurface& surface, const PressGrid& grid, bool glides,
+                            const Tell& tell);
 
 /// How wrong a way of answering is, cell by cell of a grid, and so where it may answer.
 ///

@@ -95,8 +95,8 @@ TabulatedAnswers tabulate(const SolvedPresses& presses) {
   };
   for_each_knot([&](int i, int j, int level, std::size_t knot) {
     const SolvedPress& press = presses.knots[knot];
-    known[knot] = press.good;
-    if (!press.good) return;
+    known[knot] = press.good && (level == 0 || press.reaction.knows_glide);
+    if (!known[knot]) return;
     const Reaction& r = press.reaction;
     const double twisted = r.stiffness * r.slope.x() * r.slope.y() +
                            r.force * (r.slope.x() * r.glide.tilting.y() + r.slope.y() * r.glide.tilting.x() -

@@ -27,7 +27,7 @@ struct TabulatedAnswers {
   std::vector<double> errors{};  ///< Trust::errors()
 };
 
-/// Answers in the middles of cells, which were solved too, tell how wrong it is.
+/// Answers in the middles of cells, which were solved too, tell how wrong it is. Nothing is known at a knot without its glide.
 TabulatedAnswers tabulate(const SolvedPresses& presses);
 
 /// E and its derivatives at a point of the grid, in SI units.

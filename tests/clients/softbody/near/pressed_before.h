@@ -16,7 +16,7 @@ namespace tendon::softbody::testing {
 struct PressedBefore : AskedAndExact {
   PressedBefore(int n, double poisson, Law law, double reach)
       : AskedAndExact(pressed_block(Element::kHex8Sri, n, poisson, law)),
-        presses(solve_presses(solid, top, PressGrid::over(Vec2::Zero(), reach, kB1PatchRadius), {})),
+        presses(solve_presses(solid, top, PressGrid::over(Vec2::Zero(), reach, kB1PatchRadius), true, {})),
         shapes(learn_shapes(solid, top, presses, {})),
         answers(tabulate(presses)) {}
 
