@@ -9,7 +9,7 @@
 
 #include "tests/clients/softbody/near/pressed_before.h"
 
-namespace tendon::softbody {
+namespace tendon::softbody::press_grid_test {
 namespace {
 
 using testing::kB1PatchRadius;
@@ -116,4 +116,4 @@ TEST(SolvedPresses, EachPressIsToldOfAndHowManyThereWillBe) {
 }
 
 }  // namespace
-}  // namespace tendon::softbody
+}  // namespace tendon::softbody::press_grid_test
