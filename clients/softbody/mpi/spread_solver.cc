@@ -88,13 +88,13 @@ StiffnessOfElement stiffness_of_element(const Solid& solid, int element) {
 
 class SpreadSolver : public Solver {
  public:
-  SpreadSolver(const Solid& solid, Way way)
+  SpreadSolver(const Solid& solid, Method method)
       : comm_(PETSC_COMM_WORLD),
         size_(solid.free_count()),
         first_(first_row(rank_of(comm_))),
         rows_(first_row(rank_of(comm_) + 1) - first_),
-        iterates_(way == Way::kMultigrid ||
-                  (way == Way::kChosen && size_ >= kMostForFactor && solid.largest_poisson() <= kMostPoisson)) {
+        iterates_(method == Method::kMultigrid ||
+                  (method == Method::kChosen && size_ >= kMostForFactor && solid.largest_poisson() <= kMostPoisson)) {
     if (size_ % 3 != 0) throw std::invalid_argument("on many ranks a node is held whole, or not at all");
     assemble(solid);
     check(KSPCreate(comm_, krylov_.address()));
@@ -414,7 +414,9 @@ Ranks::~Ranks() {
 int Ranks::rank() const noexcept { return rank_of(PETSC_COMM_WORLD); }
 int Ranks::count() const noexcept { return count_of(PETSC_COMM_WORLD); }
 
-std::unique_ptr<Solver> on_ranks(const Solid& solid, Way way) { return std::make_unique<SpreadSolver>(solid, way); }
+std::unique_ptr<Solver> on_ranks(const Solid& solid, Method method) {
+  return std::make_unique<SpreadSolver>(solid, method);
+}
 
 void share_out(std::vector<std::byte>& bytes) {
   auto size = static_cast<std::uint64_t>(bytes.size());

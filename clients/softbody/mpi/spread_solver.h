@@ -24,7 +24,7 @@ class Ranks {
 };
 
 /// How K u = f is solved.
-enum class Way : std::uint8_t {
+enum class Method : std::uint8_t {
   kChosen,     ///< a factor below kMostForFactor unknowns and above kMostPoisson, multigrid else
   kFactor,     ///< MUMPS' Cholesky factor
   kMultigrid,  ///< conjugate gradients; geometric multigrid where the nodes fill a grid (grid_levels.h), PETSc's GAMG else
@@ -49,7 +49,7 @@ inline constexpr double kMostPoisson = 0.49;
 ///
 /// Throws std::runtime_error with PETSc's sentence when something fails, and when a solver does not converge. The
 /// solid's law counts as linear. Nothing of the solid is kept.
-std::unique_ptr<Solver> on_ranks(const Solid& solid, Way way = Way::kChosen);
+std::unique_ptr<Solver> on_ranks(const Solid& solid, Method method = Method::kChosen);
 inline constexpr double kRough = 1e-3;
 
 /// Shares bytes out from rank 0 to all.

@@ -36,7 +36,7 @@ void expect_right_answers() {
   block.patch_radius = 0.02;
   block.reach = 0.005;
   const SurfaceTable ours = condense(block);
-  const SurfaceTable theirs = condense(block, [](const Solid& solid) { return on_ranks(solid, Way::kFactor); });
+  const SurfaceTable theirs = condense(block, [](const Solid& solid) { return on_ranks(solid, Method::kFactor); });
   const double off = (theirs.compliance - ours.compliance).cwiseAbs().maxCoeff() / ours.compliance.maxCoeff();
   if (!(off < 1e-7)) {
     throw std::runtime_error("PETSc's answers about a small block are off by " + std::to_string(off) +
@@ -47,14 +47,14 @@ void expect_right_answers() {
 struct Arguments {
   std::string scene;
   std::string file;
-  Way way = Way::kChosen;
+  Method method = Method::kChosen;
   bool json = false;
 };
 
 /// On all ranks, and says on a terminal how far it is.
 class Told : public Solver {
  public:
-  Told(const Solid& solid, Way way) : solver_(on_ranks(solid, way)) {}
+  Told(const Solid& solid, Method method) : solver_(on_ranks(solid, method)) {}
   Eigen::MatrixXd solve(const Eigen::MatrixXd& loads) const override {
     Eigen::MatrixXd solution = solver_->solve(loads);
     columns_ += loads.cols();
@@ -71,10 +71,10 @@ int condense_scene(const Arguments& arguments, const Ranks& ranks) {
   expect_right_answers();
   const Scene scene = read_scene(arguments.scene);
   const bool tells = ranks.rank() == 0 && isatty(STDERR_FILENO) != 0;
-  const Way way = arguments.way;
-  const SurfaceTable table = condense(scene.body, [tells, way](const Solid& solid) -> std::unique_ptr<Solver> {
-    if (tells) return std::make_unique<Told>(solid, way);
-    return on_ranks(solid, way);
+  const Method method = arguments.method;
+  const SurfaceTable table = condense(scene.body, [tells, method](const Solid& solid) -> std::unique_ptr<Solver> {
+    if (tells) return std::make_unique<Told>(solid, method);
+    return on_ranks(solid, method);
   });
   if (tells) std::cerr << "\n";
   if (ranks.rank() != 0) return 0;
@@ -95,17 +95,17 @@ int condense_scene(const Arguments& arguments, const Ranks& ranks) {
 }
 
 /// The body that answers: condensed is linear, by a table that is not made here.
-Body live_body(BodyConfig config, Way way) {
+Body live_body(BodyConfig config, Method method) {
   if (config.model == ModelKind::kCondensed) config.model = ModelKind::kLinear;
   config.table_file.reset();
-  return Body(config, [way](const Solid& solid) { return on_ranks(solid, way); });
+  return Body(config, [method](const Solid& solid) { return on_ranks(solid, method); });
 }
 
 /// Answers the front until it ends the stream. Rank 0 has the stream; every rank answers every state.
 int answer(const Arguments& arguments, const Ranks& ranks) {
   expect_right_answers();
   const Scene scene = read_scene(arguments.scene);
-  PlacedBody body(scene, live_body(scene.body, arguments.way));
+  PlacedBody body(scene, live_body(scene.body, arguments.method));
   std::unique_ptr<tendon::worker::WorkerStream> stream;
   if (ranks.rank() == 0) {
     try {
@@ -145,9 +145,9 @@ int main(int argc, char** argv) {
   Arguments arguments;
   const auto add_common = [&](CLI::App& to) {
     to.add_option("SCENE", arguments.scene, "Scene file, with the model linear or condensed");
-    to.add_option("--way", arguments.way, "How the body is solved")
-        ->transform(CLI::CheckedTransformer(std::map<std::string, Way>{
-            {"chosen", Way::kChosen}, {"factor", Way::kFactor}, {"multigrid", Way::kMultigrid}}))
+    to.add_option("--way", arguments.method, "How the body is solved")
+        ->transform(CLI::CheckedTransformer(std::map<std::string, Method>{
+            {"chosen", Method::kChosen}, {"factor", Method::kFactor}, {"multigrid", Method::kMultigrid}}))
         ->default_str("chosen");
   };
   add_common(app);
