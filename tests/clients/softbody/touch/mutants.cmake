@@ -2,6 +2,12 @@
 # Can the tests of rigid tools fail? Each mutant is these tests with one planted bug: a copy of one source file in which
 # one text was replaced by another, linked ahead of the library.
 
+# These tests are objects of their own, which the mutants take.
+set_source_files_properties(
+  touch/distance_grid_test.cc touch/layer_test.cc touch/mesh_tool_test.cc touch/rigid_contact_test.cc
+  touch/rigid_shape_test.cc touch/surface_distance_test.cc
+  PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
+
 # rigid_tool_mutant(name SOURCE layer.cc REPLACE "text" "by" TEST Suite.Name): that test finds it. Without semicolons.
 function(rigid_tool_mutant name)
   cmake_parse_arguments(ARG "" "SOURCE;TEST" "REPLACE" ${ARGN})
