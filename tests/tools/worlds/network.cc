@@ -49,7 +49,7 @@ class Network::End final : public Link {
   std::size_t unread() const noexcept { return count_ - next_; }
   void forget() noexcept { next_ = count_ = 0; }
   bool take_news() noexcept { return std::exchange(news_, false); }
-  std::uint64_t arrived() const noexcept { return arrived_; }
+  std::uint64_t arrivals() const noexcept { return arrived_; }
 
  private:
   /// Keeps its memory for the next one.
@@ -200,8 +200,8 @@ bool Network::take_news_of_server() { return server_->take_news(); }
 bool Network::take_news_of(std::uint32_t link) { return clients_[link]->end.take_news(); }
 std::size_t Network::unread_by_server() const { return server_->unread(); }
 std::size_t Network::unread_by(std::uint32_t link) const { return clients_[link]->end.unread(); }
-std::uint64_t Network::arrived_at_server() const { return server_->arrived(); }
-std::uint64_t Network::arrived_at(std::uint32_t link) const { return clients_[link]->end.arrived(); }
+std::uint64_t Network::arrived_at_server() const { return server_->arrivals(); }
+std::uint64_t Network::arrived_at(std::uint32_t link) const { return clients_[link]->end.arrivals(); }
 std::size_t Network::on_their_way_up(std::uint32_t link) const { return clients_[link]->on_their_way_up; }
 Address Network::outside(std::uint32_t link) const { return clients_[link]->outside; }
 
