@@ -36,7 +36,7 @@ const ForceClient::Config& checked(const ForceClient::Config& config) {
   expect_at_most(limits::kMaxLabel, config.device, "device");
   expect_at_most(limits::kMaxLabel, config.channel, "channel");
   expect(config.ways.size() <= limits::kMaxWays, "ways.size", static_cast<double>(config.ways.size()),
-         "at most 8 names");
+         "at most " + std::to_string(limits::kMaxWays) + " names");
   for (auto way = config.ways.begin(); way != config.ways.end(); ++way) {
     const std::string field = "ways[" + std::to_string(way - config.ways.begin()) + "]";
     expect(!way->empty(), field + ".size", 0, "at least 1 byte");
