@@ -421,9 +421,11 @@ void ClientJudge::check_forces(const Session& session, const std::set<std::uint6
     tick = std::max(tick, force.based_on_tick());
     report_.judge("force-bounds", within_bounds(force), force.ShortDebugString(),
                   "values within bounds, valid_for_us 1 … 10 000 000");
+    report_.judge("force-granted", force.way() == 0 && !force.has_torque_nm() && !force.has_gripper_force_n(),
+                  force.ShortDebugString(), "no way, torque or gripper force: ways and handle were not granted");
   });
   if (observer) {
-    for (const std::string_view check : {"forces", "force-answers", "force-bounds"}) {
+    for (const std::string_view check : {"forces", "force-answers", "force-bounds", "force-granted"}) {
       report_.not_applicable(check, "this client is an observer");
     }
     report_.judge("observer-sends-none", count == 0, std::to_string(count) + " forces", "none");

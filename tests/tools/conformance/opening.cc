@@ -20,6 +20,10 @@ std::string out_of_bounds(const pb::Hello& hello) {
   if (features.size() > 16 || std::ranges::any_of(features, [](const auto& name) { return name.size() > 32; })) {
     return "the features";
   }
+  const auto& ways = hello.ways();
+  if (ways.size() > 8 || std::ranges::any_of(ways, [](const auto& name) { return name.size() > 24; })) {
+    return "the ways";
+  }
   return {};
 }
 

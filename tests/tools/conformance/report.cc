@@ -141,6 +141,7 @@ constexpr std::array kChecks = {
     Check{"forces", kClient, kWire, kData, "1, 2, 3 … per session, device and channel"},
     Check{"force-bounds", kClient, kWire, kData, "µs from arrival during which it is fresh"},
     Check{"force-answers", kClient, kWire, kData, "tick of the state it was computed from"},
+    Check{"force-granted", kClient, kSession, "Older peers", "a force is sent without way"},
     Check{"observer-sends-none", kClient, kWire, kHello,
           "ROLE_OBSERVER sees states, ROLE_CONTROLLER also sends forces"},
     // Requests.

@@ -25,6 +25,7 @@ void ToyClient::begin() {
   hello.set_version_min(1);
   hello.set_version_max(1);
   if (!is(Fault::kNoRole)) hello.set_role(role_);
+  for (int i = 0; i < 9 && is(Fault::kNineWays); ++i) hello.add_ways("way");
   hello.set_name("toy");
   if (key_ && !is(Fault::kKnowsNoAes)) hello.add_features(std::string(kAesGcm));
   const Sixteen random{std::byte{0xAA}, is(Fault::kRandomStays) ? std::byte{1} : std::byte{attempts_}};
@@ -128,6 +129,8 @@ void ToyClient::tick(LocalTime now) {
     force.set_sequence(is(Fault::kSequenceStays) ? 1 : ++sequence_);
     force.set_based_on_tick(*tick_);
     force.set_valid_for_us(is(Fault::kValidForAnHour) ? 3'600'000'000U : 20'000);
+    if (is(Fault::kSaysWaysUnasked)) force.set_way(1);
+    if (is(Fault::kTurnsUnasked)) force.mutable_torque_nm()->set_z(0.01);
     if (is(Fault::kAnswersNoState) && sequence_ == 3) {
       frames.push_back(frames.back());
       frames.back().mutable_force()->set_sequence(++sequence_);
