@@ -232,6 +232,12 @@ void add_engines(Exposition& out, const Board& board) {
     out.add(with(labels, "cause", "unknown_tick"), engine.refused.unknown_tick);
     out.add(with(labels, "cause", "old_sequence"), engine.refused.old_sequence);
   });
+  out.begin("tendon_engine_error_newtons", MetricType::Gauge,
+            "What its engine says of the least sure force of the last second, and how it was answered.");
+  engines([&](const Labels& labels, const Engine& engine) {
+    const PeerReport& report = engine.newest;
+    if (report.error) out.add(with(labels, "answered_by", report.way.c_str()), *report.error);
+  });
   out.begin("tendon_engine_datagrams_received", MetricType::Gauge, "Datagrams of the engine's present session.");
   engines([&](const Labels& labels, const Engine& engine) { out.add(labels, engine.newest.link.received); });
   out.begin("tendon_engine_datagrams_lost", MetricType::Gauge, "… and those of it that never came.");

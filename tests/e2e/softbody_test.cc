@@ -86,12 +86,19 @@ towards_hand = [-1, 0, 0]
     EXPECT_EQ(body.wait(), 0) << body.err();
     EXPECT_GT(count_in(body.out(), "forces"), 50U);
     EXPECT_EQ(count_in(body.out(), "forces_unusable"), 0U);
-    server.stop();
+    const std::string end = server.stop();
     if (body.err().find("this OpenBLAS is built for one thread") != std::string::npos) continue;
     if (scene.ends_with("near.toml")) {
       EXPECT_NE(body.out().find(R"({"answers":{"linear":)"), std::string::npos) << body.out();
+      // The server tells by which of them the forces were answered, and how wrong the least sure one may be.
+      EXPECT_GT(number_in(end, "worst_error_n"), 0) << end;
+      const auto answered_by = [&](const std::string& way) {
+        return end.find(R"("ways":{")" + way) != std::string::npos;
+      };
+      EXPECT_TRUE(answered_by("near") || answered_by("linear")) << end;
     } else {
       EXPECT_EQ(body.out().find("answers"), std::string::npos) << body.out();
+      EXPECT_NE(end.find(R"("ways":{})"), std::string::npos) << end;
     }
   }
 }

@@ -69,6 +69,8 @@ inline Board full_board() {
   peer.link.to_client = peer.link.round_trip;
   peer.link.received = 3000;
   peer.link.lost = 12;
+  peer.error = 0.25;
+  peer.way = "near";
   board.observe(peer);
   board.observe(both_ends().own);
   board.observe(*both_ends().peer);

@@ -40,6 +40,7 @@ TEST(DashMetrics, ExportWhatIsOnTheBoard) {
           R"(tendon_device_steps_missed_total{device="left"} 3)",
           R"(tendon_engine_delay_seconds{device="left",channel="main",engine="wall",way="round_trip",quantile="0.99"} 0.125)",
           R"(tendon_engine_forces_late_total{device="left",channel="main",engine="wall",cause="network"} 4)",
+          R"(tendon_engine_error_newtons{device="left",channel="main",engine="wall",answered_by="near"} 0.25)",
           R"(tendon_engine_datagrams_lost{device="left",channel="main",engine="wall"} 12)",
           R"(tendon_port_phase{device="left",end="own",phase="engaged"} 1)",
           R"(tendon_port_phase{device="left",end="peer",phase="lost"} 0)",
