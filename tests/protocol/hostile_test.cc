@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
 
+#include <bit>
 #include <random>
 
 #include "protocol/handshake.h"
@@ -96,11 +97,15 @@ TEST(HostileBytes, EveryTruncationOfEveryDatagramIsCounted) {
   }
 }
 
+// Where sanitizers make each case slow: the eight that change one bit, and the one that changes all.
+constexpr bool kEveryValue = TENDON_PROPERTY_CASES >= 10'000;
+
 TEST(HostileBytes, EveryCorruptionOfOneByteIsCounted) {
   for (const auto& [name, bytes] : examples::datagrams()) {
     const bool padded = bytes.size() == kMaxDatagram;
     for (std::size_t at = 0; at < (padded ? 100 : bytes.size()); ++at) {
       for (unsigned flip = 1; flip < 256; ++flip) {
+        if (!kEveryValue && !std::has_single_bit(flip) && flip != 0xFF) continue;
         Bytes bad = bytes;
         bad[at] ^= static_cast<std::byte>(flip);
         EXPECT_TRUE(Target().take(bad)) << name << " byte " << at << " xor " << flip;

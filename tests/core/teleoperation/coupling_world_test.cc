@@ -269,7 +269,9 @@ void expect_worlds_keep_their_promises(std::uint64_t worlds, int ticks) {
   EXPECT_GT(losses, static_cast<long>(worlds) / 10);
 }
 
-TEST(CouplingWorlds, NoAccountNoPairAndNoForceWithoutAnAct) { expect_worlds_keep_their_promises(400, 3000); }
+TEST(CouplingWorlds, NoAccountNoPairAndNoForceWithoutAnAct) {
+  expect_worlds_keep_their_promises(TENDON_PROPERTY_CASES / 25, 3000);
+}
 
 // By hand: --gtest_also_run_disabled_tests --gtest_filter='*Thousands*'
 TEST(CouplingWorlds, DISABLED_Thousands) { expect_worlds_keep_their_promises(5000, 3000); }

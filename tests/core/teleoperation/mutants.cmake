@@ -29,6 +29,7 @@ if(NOT TENDON_TESTS OR TENDON_SANITIZE)
   return()
 endif()
 add_library(core_coupling_worlds OBJECT coupling_world_test.cc)
+target_compile_definitions(core_coupling_worlds PRIVATE TENDON_PROPERTY_CASES=${TENDON_PROPERTY_CASES})
 target_link_libraries(core_coupling_worlds PRIVATE tendon_core tendon_warnings GTest::gtest)
 target_precompile_headers(core_coupling_worlds REUSE_FROM tendon_test_pch)
 
