@@ -36,7 +36,7 @@ void keep(const T& value) {
   asm volatile("" : : "g"(&value) : "memory");
 }
 
-struct Line {
+struct Costed {
   std::string kind;  ///< floor, law, part, estimator, least squares
   std::string name;
   double nanoseconds = 0;
@@ -50,7 +50,7 @@ class Bench {
   explicit Bench(int batches) : batches_(batches) {}
 
   template <class Step>
-  Line measure(std::string kind, std::string name, Step step) const {
+  Costed measure(std::string kind, std::string name, Step step) const {
     std::vector<double> times;
     std::vector<double> instructions;
     for (int b = 0; b < batches_ + 1; ++b) {
@@ -63,7 +63,7 @@ class Bench {
         instructions.push_back(static_cast<double>(*took.instructions) / static_cast<double>(kBatch));
       }
     }
-    Line line{.kind = std::move(kind), .name = std::move(name), .nanoseconds = median(times)};
+    Costed line{.kind = std::move(kind), .name = std::move(name), .nanoseconds = median(times)};
     if (!instructions.empty()) line.instructions = median(instructions);
     return line;
   }
@@ -91,9 +91,9 @@ Experiment pressing(const LimiterConfig& config, double stiffness = kStiffness) 
 
 double force_error(const Experiment& set) { return outcome(run(set), set.period).force_error; }
 
-Line law_line(const Bench& bench, const std::string& kind, const std::string& name, const LimiterConfig& config) {
+Costed law_line(const Bench& bench, const std::string& kind, const std::string& name, const LimiterConfig& config) {
   LawSteps law(config);
-  Line line = bench.measure(kind, name, [&](std::size_t i) { keep(law.step(i)); });
+  Costed line = bench.measure(kind, name, [&](std::size_t i) { keep(law.step(i)); });
   line.force_error = force_error(pressing(config));
   return line;
 }
@@ -106,14 +106,14 @@ double estimated(const std::optional<OutputEstimator::Config>& estimator) {
   return force_error(set);
 }
 
-Line estimator_line(const Bench& bench, const std::string& name, OutputEstimator::Model model) {
+Costed estimator_line(const Bench& bench, const std::string& name, OutputEstimator::Model model) {
   OutputEstimator::Config config;
   config.model = model;
   config.resolution = kPaperEncoder;
   OutputEstimator estimator(config);
   const PrescribedMotion motion = paper_motion(kFriction, 0);
   std::int64_t step = 0;
-  Line line = bench.measure("estimator", name, [&](std::size_t) {
+  Costed line = bench.measure("estimator", name, [&](std::size_t) {
     const LocalTime at{std::chrono::milliseconds(step)};
     const Motion hand{.at = at, .position = motion.position(static_cast<double>(step) * 1e-3)};
     estimator.observe(hand);
@@ -126,7 +126,7 @@ Line estimator_line(const Bench& bench, const std::string& name, OutputEstimator
 }
 
 template <class Fit, int M, class Scalar>
-Line fit_line(const Bench& bench, const std::string& name) {
+Costed fit_line(const Bench& bench, const std::string& name) {
   Fit fit;
   std::size_t n = 0;
   return bench.measure("least squares", name, [&](std::size_t) {
@@ -140,7 +140,7 @@ Line fit_line(const Bench& bench, const std::string& name) {
 }
 
 template <int M>
-void fit_lines(const Bench& bench, std::vector<Line>& lines) {
+void fit_lines(const Bench& bench, std::vector<Costed>& lines) {
   const std::string order = ", order " + std::to_string(M) + ", ";
   lines.push_back(fit_line<UdLeastSquares<M, double>, M, double>(bench, "UD" + order + "float64"));
   lines.push_back(fit_line<UdLeastSquares<M, float>, M, float>(bench, "UD" + order + "float32"));
@@ -148,8 +148,8 @@ void fit_lines(const Bench& bench, std::vector<Line>& lines) {
   lines.push_back(fit_line<QrLeastSquares<M, float>, M, float>(bench, "QR" + order + "float32"));
 }
 
-std::vector<Line> measure(const Bench& bench) {
-  std::vector<Line> lines;
+std::vector<Costed> measure(const Bench& bench) {
+  std::vector<Costed> lines;
   lines.push_back(bench.measure("floor", "nothing", [](std::size_t i) { keep(i); }));
   for (const LawInfo& law : laws()) {
     lines.push_back(law_line(bench, "law", std::string(law.name), measured_limiter(law.law)));
@@ -186,13 +186,13 @@ std::vector<Line> measure(const Bench& bench) {
 
 void cost(const CostOptions& options, std::ostream& out) {
   const Bench bench(options.batches);
-  const std::vector<Line> lines = measure(bench);
+  const std::vector<Costed> lines = measure(bench);
   if (!options.json) {
     out << "One step of each, median of " << options.batches << " batches of " << kBatch << "; commit " << kCommit
         << (bench.counts() ? "" : "\nInstructions: this kernel does not let us count them.") << "\n\n"
         << "                                             ns  instructions  force error N\n";
   }
-  for (const Line& line : lines) {
+  for (const Costed& line : lines) {
     if (options.json) {
       out << JsonLine()
                  .add("kind", line.kind)
@@ -233,7 +233,7 @@ void cost(const CostOptions& options, std::ostream& out) {
           .log_y = true};
       for (std::size_t i = 0; i < kinds.size(); ++i) {
         Curve curve{.name = kinds[i], .colour = i == 0 ? kBlue : kGreen, .style = Curve::Style::kPoints};
-        for (const Line& line : lines) {
+        for (const Costed& line : lines) {
           if (line.kind == kinds[i] && line.force_error) curve.points.emplace_back(line.nanoseconds, *line.force_error);
         }
         panel.curves.push_back(curve);

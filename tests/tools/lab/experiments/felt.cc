@@ -14,7 +14,7 @@
 namespace tendon::lab {
 namespace {
 
-constexpr Duration kLength = std::chrono::seconds(3);
+constexpr Duration kTrialLength = std::chrono::seconds(3);
 constexpr Friction kDevice{.coulomb = 0.02, .viscous = 0.26};
 
 /// An engine's answers: force and stiffness of each are asked for one after the other. A body with time goes on between
@@ -117,7 +117,7 @@ Felt felt(PressedEngine& engine, Truth& truth, const Route& route, std::uint64_t
   set.environment.route = route;
   set.limiter = {.law = Law::kAolPlus, .friction = kDevice, .parts = default_parts(kPaperEncoder)};
   set.max_force = kPaperMaxForce;
-  set.length = kLength;
+  set.length = kTrialLength;
   set.seed = seed;
   set.hand = PrescribedMotion{
       .position = [&](double t) { return Vec3(surface - Vec3(0, 0, depth_at(t, deepest))); },

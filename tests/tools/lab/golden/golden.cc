@@ -25,7 +25,7 @@ namespace tendon::lab {
 namespace {
 
 constexpr std::size_t kEvery = 209;
-constexpr std::uint64_t kSeed = 1;
+constexpr std::uint64_t kFirstSeed = 1;
 constexpr std::array kPaperLaws = {Law::kNone, Law::kAol, Law::kAolPlus};
 
 struct Figure {
@@ -79,13 +79,13 @@ GoldenTable golden_laws() {
   const std::vector<Situation> grid = comparison_grid();
   for (const LawInfo& law : laws()) {
     for (std::size_t i = 0; i < grid.size(); i += kEvery) {
-      table.rows.push_back(row_of(law.name, name_of(grid[i]), compare_cell(grid[i], law.law, kSeed + i).outcome));
+      table.rows.push_back(row_of(law.name, name_of(grid[i]), compare_cell(grid[i], law.law, kFirstSeed + i).outcome));
     }
   }
   for (const PresetInfo& preset : presets()) {
     for (std::size_t i = 0; i < grid.size(); i += kEvery) {
       table.rows.push_back(
-          row_of(preset.name, name_of(grid[i]), compare_cell(grid[i], preset.preset, kSeed + i).outcome));
+          row_of(preset.name, name_of(grid[i]), compare_cell(grid[i], preset.preset, kFirstSeed + i).outcome));
     }
   }
   for (const PaperExperiment& experiment : paper_experiments()) {

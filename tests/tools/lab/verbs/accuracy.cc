@@ -17,7 +17,7 @@
 #include "tests/tools/lab/experiments/accuracy.h"
 #include "tests/tools/lab/verbs/verb.h"
 
-namespace tendon::lab {
+namespace tendon::lab::accuracy_verb {
 namespace {
 
 struct AccuracyArguments {
@@ -159,4 +159,4 @@ void add(CLI::App& verb, int& /*exit*/) {
 const Verb kVerb("accuracy", "What the accuracy of a soft body costs in time", add);
 
 }  // namespace
-}  // namespace tendon::lab
+}  // namespace tendon::lab::accuracy_verb

@@ -10,7 +10,7 @@
 #include "tests/tools/bench/bench.h"
 #include "tests/tools/lab/verbs/verb.h"
 
-namespace tendon::lab {
+namespace tendon::lab::bench_verb {
 namespace {
 
 void add(CLI::App& verb, int& /*exit*/) {
@@ -45,4 +45,4 @@ void add(CLI::App& verb, int& /*exit*/) {
 const Verb kVerb("bench", "What things cost, each beside the machine's own floor", add);
 
 }  // namespace
-}  // namespace tendon::lab
+}  // namespace tendon::lab::bench_verb

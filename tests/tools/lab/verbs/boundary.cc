@@ -7,7 +7,7 @@
 #include "tests/tools/lab/experiments/boundary.h"
 #include "tests/tools/lab/verbs/verb.h"
 
-namespace tendon::lab {
+namespace tendon::lab::boundary_verb {
 namespace {
 
 void add(CLI::App& verb, int& /*exit*/) {
@@ -26,4 +26,4 @@ void add(CLI::App& verb, int& /*exit*/) {
 const Verb kVerb("boundary", "How stiff a spring may be over delay and rate: simulated, and as theory says", add);
 
 }  // namespace
-}  // namespace tendon::lab
+}  // namespace tendon::lab::boundary_verb

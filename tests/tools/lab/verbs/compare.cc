@@ -10,7 +10,7 @@
 #include "tests/tools/lab/experiments/situations.h"
 #include "tests/tools/lab/verbs/verb.h"
 
-namespace tendon::lab {
+namespace tendon::lab::compare_verb {
 namespace {
 
 void add(CLI::App& verb, int& /*exit*/) {
@@ -51,4 +51,4 @@ void add(CLI::App& verb, int& /*exit*/) {
 const Verb kVerb("compare", "Runs every stability controller in every situation: which one to use", add);
 
 }  // namespace
-}  // namespace tendon::lab
+}  // namespace tendon::lab::compare_verb

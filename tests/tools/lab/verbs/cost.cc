@@ -6,7 +6,7 @@
 #include "tests/tools/lab/experiments/cost.h"
 #include "tests/tools/lab/verbs/verb.h"
 
-namespace tendon::lab {
+namespace tendon::lab::cost_verb {
 namespace {
 
 void add(CLI::App& verb, int& /*exit*/) {
@@ -25,4 +25,4 @@ void add(CLI::App& verb, int& /*exit*/) {
 const Verb kVerb("cost", "What accuracy costs in time inside the loop", add);
 
 }  // namespace
-}  // namespace tendon::lab
+}  // namespace tendon::lab::cost_verb

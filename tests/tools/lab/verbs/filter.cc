@@ -10,7 +10,7 @@
 #include "server/scene/scene.h"
 #include "tests/tools/lab/verbs/verb.h"
 
-namespace tendon::lab {
+namespace tendon::lab::filter_verb {
 namespace {
 
 struct FilterArguments {
@@ -52,4 +52,4 @@ void add(CLI::App& verb, int& exit) {
 const Verb kVerb("filter", "Runs any stability controller on your own recording, on a pipe", add);
 
 }  // namespace
-}  // namespace tendon::lab
+}  // namespace tendon::lab::filter_verb

@@ -6,7 +6,7 @@
 #include "tests/tools/lab/experiments/floor.h"
 #include "tests/tools/lab/verbs/verb.h"
 
-namespace tendon::lab {
+namespace tendon::lab::floor_verb {
 namespace {
 
 void add(CLI::App& verb, int& /*exit*/) {
@@ -22,4 +22,4 @@ void add(CLI::App& verb, int& /*exit*/) {
 const Verb kVerb("floor", "The least force error that any passive law can have, by a convex programme", add);
 
 }  // namespace
-}  // namespace tendon::lab
+}  // namespace tendon::lab::floor_verb

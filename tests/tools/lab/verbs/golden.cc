@@ -7,7 +7,7 @@
 
 #include "tests/tools/lab/verbs/verb.h"
 
-namespace tendon::lab {
+namespace tendon::lab::golden_verb {
 namespace {
 
 void add(CLI::App& verb, int& exit) {
@@ -33,4 +33,4 @@ void add(CLI::App& verb, int& exit) {
 const Verb kVerb("golden", "Compares what every law does with the committed table, bit for bit", add);
 
 }  // namespace
-}  // namespace tendon::lab
+}  // namespace tendon::lab::golden_verb

@@ -6,7 +6,7 @@
 #include "tests/tools/lab/experiments/netem.h"
 #include "tests/tools/lab/verbs/verb.h"
 
-namespace tendon::lab {
+namespace tendon::lab::netem_verb {
 namespace {
 
 void add(CLI::App& verb, int& /*exit*/) {
@@ -25,4 +25,4 @@ const Verb kVerb("netem", "What is left of loss and delay asked for with a corre
                  add);
 
 }  // namespace
-}  // namespace tendon::lab
+}  // namespace tendon::lab::netem_verb

@@ -7,7 +7,7 @@
 #include "tests/tools/lab/experiments/paper.h"
 #include "tests/tools/lab/verbs/verb.h"
 
-namespace tendon::lab {
+namespace tendon::lab::paper_verb {
 namespace {
 
 void add(CLI::App& verb, int& /*exit*/) {
@@ -25,4 +25,4 @@ void add(CLI::App& verb, int& /*exit*/) {
 const Verb kVerb("paper", "The experiments of Lee & Lee 2009 without control, with AOL and with AOL+", add);
 
 }  // namespace
-}  // namespace tendon::lab
+}  // namespace tendon::lab::paper_verb

@@ -7,7 +7,7 @@
 #include "tests/tools/lab/experiments/teleop.h"
 #include "tests/tools/lab/verbs/verb.h"
 
-namespace tendon::lab {
+namespace tendon::lab::teleop_verb {
 namespace {
 
 void add(CLI::App& verb, int& /*exit*/) {
@@ -26,4 +26,4 @@ void add(CLI::App& verb, int& /*exit*/) {
 const Verb kVerb("teleop", "How a wall behind a network is felt by each method of coupling, over the round trip", add);
 
 }  // namespace
-}  // namespace tendon::lab
+}  // namespace tendon::lab::teleop_verb
