@@ -26,7 +26,7 @@ namespace {
 
 /// Of the stiffness of a surface that a bare finger pad feels: Bergmann Tiest & Kappers 2009.
 constexpr double kJustNoticeable = 15;  // %
-constexpr double kApart = 0.8;          // of the error of another, whose name would lie on this one's
+constexpr double kApart = 0.65;         // of the error of another, whose name would lie on this one's
 
 const char* colour_of(std::size_t i) {
   constexpr std::array kColours{kBlue, kVermilion, kGreen, kPurple, kOrange, kSky, kPale};

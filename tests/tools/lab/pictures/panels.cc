@@ -77,6 +77,23 @@ void ticks(std::ostream& out, const Panel& panel) {
   out << ")\n";
 }
 
+/// Of a curve with labels: those at the right end of their panel, which go below their points and to the left, and the
+/// others.
+std::vector<std::size_t> labels_at(const Panel& panel, const Curve& curve, bool right_end) {
+  constexpr double kRightEnd = 0.7;  // of the panel's width: a name takes up to 0.3
+  const auto along = [&](double x) { return panel.log_x ? std::log(x) : x; };
+  std::vector<std::size_t> found;
+  for (std::size_t i = 0; i < curve.labels.size(); ++i) {
+    double share = 0;
+    if (panel.x_range) {
+      const auto [least, most] = *panel.x_range;
+      share = (along(curve.points.at(i).first) - along(least)) / (along(most) - along(least));
+    }
+    if (!curve.labels[i].empty() && (share > kRightEnd) == right_end) found.push_back(i);
+  }
+  return found;
+}
+
 }  // namespace
 
 std::vector<std::pair<double, double>> thinned(const std::vector<std::pair<double, double>>& points) {
@@ -111,13 +128,16 @@ std::string panels_script(const std::filesystem::path& path, const std::string& 
         if (std::isfinite(x) && std::isfinite(y)) out << x << " " << y << "\n";
       }
       out << "EOD\n";
-      if (panels[p].curves[c].labels.empty()) continue;
-      out << "$l" << p << "_" << c << " << EOD\n";
-      for (std::size_t i = 0; i < panels[p].curves[c].labels.size(); ++i) {
-        const auto& [x, y] = panels[p].curves[c].points.at(i);
-        out << x << " " << y << " \"" << panels[p].curves[c].labels[i] << "\"\n";
+      for (const bool right_end : {false, true}) {
+        const auto labels = labels_at(panels[p], panels[p].curves[c], right_end);
+        if (labels.empty()) continue;
+        out << (right_end ? "$r" : "$l") << p << "_" << c << " << EOD\n";
+        for (const std::size_t i : labels) {
+          const auto& [x, y] = panels[p].curves[c].points.at(i);
+          out << x << " " << y << " \"" << panels[p].curves[c].labels[i] << "\"\n";
+        }
+        out << "EOD\n";
       }
-      out << "EOD\n";
     }
   }
   const auto up = [height](double pixels_from_top) { return 1 - pixels_from_top / height; };
@@ -150,9 +170,12 @@ std::string panels_script(const std::filesystem::path& path, const std::string& 
       out << separator << "$d" << p << "_" << c << " " << words(curve.style) << "'" << curve.colour << "' "
           << (curve.name.empty() ? "notitle" : "title " + literal(curve.name));
       separator = ", ";
-      if (curve.labels.empty()) continue;
-      out << ", $l" << p << "_" << c << " using 1:2:3 with labels left offset 0.7,0.5 font ',9' noenhanced tc rgb '"
-          << kInk << "' notitle";
+      for (const bool right_end : {false, true}) {
+        if (labels_at(panel, curve, right_end).empty()) continue;
+        out << (right_end ? ", $r" : ", $l") << p << "_" << c << " using 1:2:3 with labels "
+            << (right_end ? "right offset 0.5,-0.8" : "left offset 0.7,0.5") << " font ',9' noenhanced tc rgb '" << kInk
+            << "' notitle";
+      }
     }
     out << "\nunset label\n";
   }
