@@ -27,10 +27,11 @@ int main(int argc, char** argv) {
       ->allow_extra_args(false);
   app.add_flag("--pairs", pairs, "the recordings are of two coupled ends each, as `tendon-replay --merge` writes them");
   app.add_flag("--json", options.json, "one JSON object for each recording on stdout instead of the table");
+  app.add_flag("--check", options.check, "fails where a ledger, or that of a pair, has fallen below -1 nJ");
   app.footer(
       "\nExample: the same motion without and with the limiter\n"
       "  tendon-report off.mcap on.mcap --label \"limiter off\" --label \"limiter on\" --out runs.svg\n"
-      "\nExit: 0 done; 1 a recording is corrupt or gnuplot failed; 2 wrong usage.");
+      "\nExit: 0 done; 1 a recording is corrupt, gnuplot failed or a --check; 2 wrong usage.");
 
   return tendon::run_tool(app, argc, argv, [&] {
     options.recordings.assign(recordings.begin(), recordings.end());

@@ -16,6 +16,7 @@
 #include "tests/tools/lab/pictures/gnuplot.h"
 #include "tests/tools/lab/pictures/panels.h"
 #include "tests/tools/lab/pictures/table.h"
+#include "tests/tools/lab/recordings/run_summary.h"
 #include "tests/tools/lab/recordings/trace.h"
 
 namespace tendon::lab {
@@ -84,7 +85,7 @@ PairRun read_pair(const std::filesystem::path& path) {
 }
 
 std::string sentence(const PairRun& run) {
-  if (run.least_pair < -1e-9) {
+  if (run.least_pair < -kPromise) {
     return run.label + ": the pair gave out " + with_unit(-run.least_pair, "J") + " that nobody had put in.";
   }
   return run.label + ": the pair gave out nothing that nobody had put in; its least value is " +
@@ -200,7 +201,7 @@ std::vector<Panel> panels_of(const std::vector<PairRun>& runs) {
                  .x_label = kTime,
                  .curves = {curve("account of the leader", kBlue, run.leader.account, per_si),
                             curve("of the follower", kOrange, run.follower.account, per_si),
-                            curve("the pair", run.least_pair < -1e-9 ? kVermilion : kGreen, run.pair, per_si,
+                            curve("the pair", run.least_pair < -kPromise ? kVermilion : kGreen, run.pair, per_si,
                                   Curve::Style::kBold)}};
   });
   for (const std::size_t shared : {0U, 1U}) share_range(std::span(panels).subspan(shared * runs.size(), runs.size()));
@@ -288,12 +289,17 @@ void report_pairs(const ReportOptions& options, std::ostream& out) {
     write_table(runs, out);
   }
   if (!out.flush()) throw std::runtime_error("cannot write the report: is the disk full?");
-  if (!options.picture) return;
-  std::string figures;
-  for (const PairRun& run : runs) figures += (figures.empty() ? "" : "  ") + sentence(run);
-  run_gnuplot(panels_script(*options.picture, "Two coupled ends in one clock", figures, panels_of(runs)),
-              *options.picture);
-  if (!options.json) out << "\npicture: " << options.picture->string() << "\n";
+  if (options.picture) {
+    std::string figures;
+    for (const PairRun& run : runs) figures += (figures.empty() ? "" : "  ") + sentence(run);
+    run_gnuplot(panels_script(*options.picture, "Two coupled ends in one clock", figures, panels_of(runs)),
+                *options.picture);
+    if (!options.json) out << "\npicture: " << options.picture->string() << "\n";
+  }
+  if (!options.check) return;
+  for (const PairRun& run : runs) {
+    if (run.least_pair < -kPromise) throw broken_promise(run.recording, "the pair", run.least_pair);
+  }
 }
 
 }  // namespace tendon::lab

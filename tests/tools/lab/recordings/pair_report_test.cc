@@ -131,6 +131,17 @@ TEST_F(PairReport, JsonIsOneLineForEachPair) {
   EXPECT_EQ(std::ranges::count(out_.str(), '\n'), 1);
 }
 
+TEST_F(PairReport, CheckFailsByThePairThatGaveOutWhatNobodyHadPutIn) {
+  const auto on = merged("on.mcap", 0.25);
+  EXPECT_NO_THROW(report_pairs({.recordings = {on}, .check = true}, out_));
+  try {
+    report_pairs({.recordings = {on, merged("off.mcap", -0.25)}, .check = true}, out_);
+    FAIL() << "expected a refusal";
+  } catch (const std::runtime_error& error) {
+    EXPECT_STREQ(error.what(), "off.mcap: the pair fell to −500 mJ, expected −1.00 nJ or more");
+  }
+}
+
 TEST_F(PairReport, RefusesWhatIsNoMerge) {
   const auto single = folder_.path() / "single.mcap";
   testing::record(single, testing::toy_run(Law::kAol, 100));

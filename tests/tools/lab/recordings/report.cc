@@ -56,6 +56,11 @@ void check(const ReportOptions& options) {
                                 " for " + std::to_string(options.recordings.size()));
 }
 
+std::runtime_error broken_promise(const std::string& recording, const std::string& account, double least) {
+  return std::runtime_error(recording + ": " + account + " fell to " + with_unit(least, "J") + ", expected " +
+                            with_unit(-kPromise, "J") + " or more");
+}
+
 void report(const ReportOptions& options, std::ostream& out) {
   check(options);
   if (options.picture) check_picture(*options.picture, options.recordings.size());
@@ -72,14 +77,19 @@ void report(const ReportOptions& options, std::ostream& out) {
   }
   if (!out.flush()) throw std::runtime_error("cannot write the report: is the disk full?");
 
-  if (!options.picture) return;
-  std::vector<Drawing> drawings;
-  for (std::size_t i = 0; i < runs.size(); ++i) {
-    drawings.push_back({runs[i].label, runs[i].summary,
-                        read_trace(options.recordings[i], runs[i].summary, trace_columns(runs.size()))});
+  if (options.picture) {
+    std::vector<Drawing> drawings;
+    for (std::size_t i = 0; i < runs.size(); ++i) {
+      drawings.push_back({runs[i].label, runs[i].summary,
+                          read_trace(options.recordings[i], runs[i].summary, trace_columns(runs.size()))});
+    }
+    draw(*options.picture, drawings);
+    if (!options.json) out << "\npicture: " << options.picture->string() << "\n";
   }
-  draw(*options.picture, drawings);
-  if (!options.json) out << "\npicture: " << options.picture->string() << "\n";
+  if (!options.check) return;
+  for (const Run& run : runs) {
+    if (!run.summary.kept_its_promise()) throw broken_promise(run.recording, "the ledger", run.summary.least_energy);
+  }
 }
 
 }  // namespace tendon::lab

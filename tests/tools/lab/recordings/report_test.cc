@@ -79,6 +79,16 @@ TEST_F(Report, JsonIsOneLineForEachRecordingAndNothingElse) {
   EXPECT_FALSE(std::getline(lines, line));
 }
 
+TEST_F(Report, CheckFailsByTheRecordingThatBreaksThePromiseAfterTheTable) {
+  EXPECT_EQ(error_of({.recordings = {off_, on_}}), "") << "without it, a run without a limiter is as good as any";
+  EXPECT_EQ(error_of({.recordings = {on_, on_}, .check = true}), "");
+  out_.str("");
+  const std::string error = error_of({.recordings = {on_, off_}, .check = true});
+  EXPECT_TRUE(error.starts_with("off.mcap: the ledger fell to −")) << error;
+  EXPECT_TRUE(error.ends_with(" J, expected −1.00 nJ or more")) << error;
+  EXPECT_NE(out_.str().find("limiter off"), std::string::npos);
+}
+
 TEST_F(Report, ReadsWhatAKilledServerLeftAndSaysSo) {
   std::filesystem::remove(on_);
   record(on_, toy_run(Law::kAol, 3000), false);
