@@ -31,7 +31,7 @@ int main(int argc, char** argv) {
   app.footer(
       "\nExample: the same motion without and with the limiter\n"
       "  tendon-report off.mcap on.mcap --label \"limiter off\" --label \"limiter on\" --out runs.svg\n"
-      "\nExit: 0 done; 1 a recording is corrupt, gnuplot failed or a --check; 2 wrong usage.");
+      "\nExit: 0 done; 1 a recording is corrupt, gnuplot or --check failed; 2 wrong usage.");
 
   return tendon::run_tool(app, argc, argv, [&] {
     options.recordings.assign(recordings.begin(), recordings.end());
