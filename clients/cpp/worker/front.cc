@@ -21,6 +21,10 @@ const Front::Config& checked(const Front::Config& config) {
   return config;
 }
 
+bool has_force(const Touch& touch) {
+  return !touch.force.isZero(0) || (touch.torque && !touch.torque->isZero(0)) || touch.grip_force.value_or(0) != 0;
+}
+
 }  // namespace
 
 Front::Front(const Config& config, LocalTime now) : config_(checked(config)), due_(now), wait_(config.retry_min) {}
@@ -38,7 +42,7 @@ void Front::answered(LocalTime now, const Touch& touch) {
   if (worker_ != Worker::kBusy) return;
   const Duration took = now - asked_;
   const bool late = took > deadline();
-  times_[count_++ % kTimes] = took;
+  if (has_force(touch)) times_[count_++ % kTimes] = took;
   worker_ = Worker::kIdle;
   if (!first_answer_) first_answer_ = now;
   if (now - *first_answer_ > wait_) wait_ = config_.retry_min;

@@ -17,7 +17,8 @@ namespace tendon::worker {
 /// socket, no process, no clock.
 ///
 /// * **Newest wins.** A worker has one state at a time. When it has answered, it gets the newest; no queue is worked off.
-/// * **Late answers are not sent.** An answer that took longer than the deadline is counted. The worker stays.
+/// * **Late answers are not sent.** An answer that took longer than the deadline is counted. The worker stays. What is
+///   usual is told by the answers with a force: in free space an answer takes next to nothing, and a hand is there often.
 /// * **A dead worker is replaced.** Without an answer for `dead` it is given up, and so it is when its stream ends. The
 ///   next one starts `retry_min` later, twice as long after each failure, at most `retry_max`; a worker that answered
 ///   for longer than that wait sets it back.
@@ -28,7 +29,7 @@ namespace tendon::worker {
 class Front {
  public:
   struct Config {
-    Duration deadline{};  ///< 0: three times the median of the newest answers, at least kMinDeadline
+    Duration deadline{};  ///< 0: three times the median of the newest answers with a force, at least kMinDeadline
     Duration dead = std::chrono::milliseconds(500);  ///< > 0
     Duration start = std::chrono::minutes(2);        ///< from its launch to its opening; > 0
     Duration retry_min = std::chrono::milliseconds(500);
@@ -57,7 +58,7 @@ class Front {
     double fallback_difference = 0;  ///< N, its last distance to an answer of the worker
     std::uint64_t given_up = 0;      ///< workers
     std::string why_given_up{};      ///< the last of them
-    Duration median{};               ///< of the newest answers, late ones too
+    Duration median{};               ///< of the newest answers with a force, late ones too
   };
 
   /// Throws std::invalid_argument "FIELD = VALUE: expected …". The first worker is due at once.
@@ -114,7 +115,7 @@ class Front {
   std::optional<Reply> answer_;
   std::optional<std::string> to_give_up_;
   std::array<Duration, kTimes> times_{};
-  std::size_t count_ = 0;  ///< of all answers
+  std::size_t count_ = 0;  ///< of answers with a force
   Stats stats_;
 };
 

@@ -77,7 +77,8 @@ int serve(int argc, char** argv) {
   line.add("--fallback", fallback, "FILE", "A table (tendon-fem condense) that answers while no worker can");
   line.add("--listen", config.crew.listen, "HOST:PORT",
            "TCP, in the clear, for workers of other machines; else a Unix socket");
-  line.add("--deadline-ms", deadline_ms, "Later answers are not sent; 0 = three times the median, at least 50 ms");
+  line.add("--deadline-ms", deadline_ms,
+           "Later answers are not sent; 0 = three times the median with a force, at least 50 ms");
   line.add("--dead-ms", dead_ms, "Without an answer for so long a worker is replaced", 1);
   line.add("--start-s", start_s, "A worker that is not ready after so long is replaced", 0.1);
   if (const auto exit_code = line.parse(argc, argv)) return *exit_code;
@@ -100,8 +101,8 @@ int serve(int argc, char** argv) {
     std::cout << nlohmann::ordered_json{{"workers", to_json(stats)}} << std::endl;
   } else {
     std::cerr << "tendon-fem: " << stats.launches << " workers, " << stats.asked << " states, " << stats.answers
-              << " answers in time (median " << milliseconds(stats.median) << " ms), " << stats.late << " late, "
-              << stats.refused << " refused, " << stats.fallback << " by the fallback\n";
+              << " answers in time (median with a force " << milliseconds(stats.median) << " ms), " << stats.late
+              << " late, " << stats.refused << " refused, " << stats.fallback << " by the fallback\n";
   }
   return code;
 }

@@ -118,6 +118,27 @@ TEST(Front, TheDeadlineIsThreeTimesTheMedian) {
   EXPECT_EQ(played.front.stats().median, milliseconds(40));
 }
 
+/// In free space an answer takes next to nothing. A hand that taps a body whose answers take 100 ms feels every tap.
+TEST(Front, QuickAnswersWithoutAForceDoNotMakeSlowOnesLate) {
+  Played played;
+  played.open();
+  std::uint64_t tick = 0;
+  for (int tap = 0; tap < 5; ++tap) {
+    for (int free = 0; free < 100; ++free) {
+      played.see(++tick);
+      played.after(milliseconds(1));
+      played.answer(0);
+    }
+    for (int touch = 0; touch < 4; ++touch) {
+      played.see(++tick);
+      played.after(milliseconds(100));
+      played.answer();
+    }
+  }
+  EXPECT_EQ(played.front.stats().late, 1U) << "the first of all, before anything is known of a touch";
+  EXPECT_EQ(played.front.stats().median, milliseconds(100));
+}
+
 TEST(Front, AWorkerThatDoesNotAnswerIsReplaced) {
   Played played;
   played.open();
