@@ -33,9 +33,8 @@ namespace tendon::simulation {
 ///                  X's link within kPatience; when its session has ended meanwhile, at most once
 ///     receipts     each end believes each genuine datagram once, as SESSION.md says (Receipts): no window refuses one
 ///     clock        what A says of Z's clock is within the bound that it publishes
-///     memory       the heap of the second half of the day is no larger than that of the first by more than kGrowth:
-///     the
-///                  buffers of the simulated network are in it, which fit its worst burst so far
+///     memory       the heap of the second half of the day is no larger than that of the first by more than kGrowth; it
+///                  holds the buffers of the simulated network, which fit its worst burst so far
 struct DayConfig {
   std::uint64_t seed = 1;
   Duration length = std::chrono::hours(25);  ///< longer than a session's life

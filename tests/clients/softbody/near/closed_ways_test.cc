@@ -215,7 +215,7 @@ TEST(ClosedWays, OnWhichTheHandIsFasterThanTheOtherThreadGiveNothing) {
   }
 }
 
-/// Twenty minutes of a processor: softbody_test --gtest_also_run_disabled_tests --gtest_filter=ClosedWays.*TenThousand*
+/// Ten minutes of a processor: softbody_test --gtest_also_run_disabled_tests --gtest_filter=ClosedWays.*TenThousand*
 TEST(ClosedWays, DISABLED_TenThousandTogetherGiveNothing) {
   Account all;
   for (const Fields fields : {Fields::kNone, Fields::kAnswers, Fields::kThread}) {
