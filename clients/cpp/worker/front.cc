@@ -14,7 +14,7 @@ const Front::Config& checked(const Front::Config& config) {
     expect(value > Duration::zero(), name, seconds(value), "a time > 0");
   };
   expect(config.deadline >= Duration::zero(), "deadline", seconds(config.deadline), "a time >= 0");
-  positive("dead", config.dead);
+  expect(config.dead >= Duration::zero(), "dead", seconds(config.dead), "a time >= 0");
   positive("start", config.start);
   positive("retry_min", config.retry_min);
   expect(config.retry_max >= config.retry_min, "retry_max", seconds(config.retry_max), "at least retry_min");
@@ -82,8 +82,8 @@ void Front::give_up(LocalTime now, const std::string& why) {
 }
 
 std::optional<Front::Order> Front::turn(LocalTime now) {
-  if (worker_ == Worker::kBusy && now - asked_ > config_.dead) {
-    give_up(now, "it has not answered for " + std::to_string(config_.dead / std::chrono::milliseconds(1)) + " ms");
+  if (worker_ == Worker::kBusy && now - asked_ > dead()) {
+    give_up(now, "it has not answered for " + std::to_string(dead() / std::chrono::milliseconds(1)) + " ms");
   }
   if (worker_ == Worker::kStarting && now >= due_) {
     give_up(now, "it has not opened its stream within " + std::to_string(config_.start / std::chrono::seconds(1)) +
@@ -129,12 +129,17 @@ LocalTime Front::next_turn() const {
     case Worker::kBusy:
       break;
   }
-  const LocalTime dead = asked_ + config_.dead + Duration(1);
-  return config_.fallback && newest_ && !newest_answered_ ? std::min(dead, asked_ + deadline() + Duration(1)) : dead;
+  const LocalTime end = asked_ + dead() + Duration(1);
+  return config_.fallback && newest_ && !newest_answered_ ? std::min(end, asked_ + deadline() + Duration(1)) : end;
 }
 
 Duration Front::deadline() const {
   return config_.deadline > Duration::zero() ? config_.deadline : std::max(3 * median(), kMinDeadline);
+}
+
+Duration Front::dead() const {
+  if (config_.dead > Duration::zero()) return config_.dead;
+  return count_ == 0 ? kDeadAtFirst : std::max(10 * median(), kMinDead);
 }
 
 Duration Front::median() const {

@@ -17,8 +17,9 @@ namespace tendon::worker {
 /// socket, no process, no clock.
 ///
 /// * **Newest wins.** A worker has one state at a time. When it has answered, it gets the newest; no queue is worked off.
-/// * **Late answers are not sent.** An answer that took longer than the deadline is counted. The worker stays. What is
-///   usual is told by the answers with a force: in free space an answer takes next to nothing, and a hand is there often.
+/// * **Late answers are not sent.** An answer that took longer than the deadline is counted. The worker stays.
+/// * **The answers with a force tell what is usual.** In free space an answer takes next to nothing, and a hand is there
+///   often. The first answer with a force may take long: a solver that remembers has nothing to remember yet.
 /// * **A dead worker is replaced.** Without an answer for `dead` it is given up, and so it is when its stream ends. The
 ///   next one starts `retry_min` later, twice as long after each failure, at most `retry_max`; a worker that answered
 ///   for longer than that wait sets it back.
@@ -30,13 +31,16 @@ class Front {
  public:
   struct Config {
     Duration deadline{};  ///< 0: three times the median of the newest answers with a force, at least kMinDeadline
-    Duration dead = std::chrono::milliseconds(500);  ///< > 0
-    Duration start = std::chrono::minutes(2);        ///< from its launch to its opening; > 0
+    /// 0: ten times that median, at least kMinDead; kDeadAtFirst before there is an answer with a force.
+    Duration dead{};
+    Duration start = std::chrono::minutes(2);  ///< from its launch to its opening; > 0
     Duration retry_min = std::chrono::milliseconds(500);
     Duration retry_max = std::chrono::seconds(30);
     Physics fallback{};
   };
   static constexpr Duration kMinDeadline = std::chrono::milliseconds(50);
+  static constexpr Duration kMinDead = std::chrono::milliseconds(500);
+  static constexpr Duration kDeadAtFirst = std::chrono::seconds(10);
 
   enum class Worker : std::uint8_t {
     kAbsent = 1,    ///< the next one is not due yet
@@ -97,6 +101,7 @@ class Front {
   static constexpr std::size_t kTimes = 63;
 
   Duration deadline() const;
+  Duration dead() const;
   Duration median() const;
   bool overdue(LocalTime now) const { return worker_ == Worker::kBusy && now - asked_ > deadline(); }
   std::optional<Order> fall_back(LocalTime now);
