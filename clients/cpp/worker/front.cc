@@ -60,6 +60,7 @@ void Front::answered(LocalTime now, const Touch& touch) {
     if (!guess.unknown) stats_.fallback_difference = (guess.force - touch.force).norm();
   }
   answer_ = Reply{.to = question_, .touch = touch};
+  if (const Duration usual = 3 * median(); usual > kMinDeadline) answer_->touch.valid_for = usual;
 }
 
 void Front::refused(std::string_view why) {

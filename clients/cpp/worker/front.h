@@ -20,6 +20,8 @@ namespace tendon::worker {
 /// * **Late answers are not sent.** An answer that took longer than the deadline is counted. The worker stays.
 /// * **The answers with a force tell what is usual.** In free space an answer takes next to nothing, and a hand is there
 ///   often. The first answer with a force may take long: a solver that remembers has nothing to remember yet.
+/// * **A slow body's answer holds until the next one is late.** Where three times their median is above kMinDeadline, it
+///   is the time for which an answer is valid: a client would take the quick answers before a touch for usual.
 /// * **A dead worker is replaced.** Without an answer for `dead` it is given up, and so it is when its stream ends. The
 ///   next one starts `retry_min` later, twice as long after each failure, at most `retry_max`; a worker that answered
 ///   for longer than that wait sets it back.

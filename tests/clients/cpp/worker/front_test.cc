@@ -139,6 +139,35 @@ TEST(Front, QuickAnswersWithoutAForceDoNotMakeSlowOnesLate) {
   EXPECT_EQ(played.front.stats().median, milliseconds(100));
 }
 
+/// A client takes for usual how far the last two answers lie apart: nothing in free space, where a slow answer is next.
+TEST(Front, AnAnswerOfASlowBodyHoldsUntilTheNextIsLate) {
+  Played played;
+  played.open();
+  for (std::uint64_t tick = 1; tick < 4; ++tick) {
+    played.see(tick);
+    played.after(milliseconds(100));
+    played.answer();
+  }
+  played.see(4);
+  played.answer(0);
+  played.see(5);
+  played.after(milliseconds(100));
+  played.answer();
+  EXPECT_EQ(played.sent.back().touch.valid_for, milliseconds(300));
+  EXPECT_EQ(played.sent[played.sent.size() - 2].touch.valid_for, milliseconds(300)) << "the one without a force";
+}
+
+TEST(Front, AnAnswerOfAQuickBodyHoldsAsLongAsTheClientSays) {
+  Played played;
+  played.open();
+  for (std::uint64_t tick = 1; tick < 9; ++tick) {
+    played.see(tick);
+    played.after(milliseconds(16));
+    played.answer();
+    EXPECT_EQ(played.sent.back().touch.valid_for, std::nullopt);
+  }
+}
+
 /// 180 000 unknowns on two ranks: the first touch takes .8 s, those that remember it .2 s.
 TEST(Front, ASlowFirstTouchIsWaitedForAndTenTimesTheMedianAfterIt) {
   Played played;
