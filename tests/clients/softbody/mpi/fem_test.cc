@@ -128,9 +128,12 @@ TEST_F(Fem, RefusesASceneOfAnotherModelInOneSentence) {
   EXPECT_EQ(text.find("tendon-fem-worker:", at + 1), std::string::npos) << "said once";
 }
 
+/// A rank that is killed while it starts may hold a lock in memory that it shares with mpirun, which then never ends
+/// (seen here once, PMIx 4.2; openpmix #1233). Without that memory there is no such lock.
 TEST_F(Fem, ARankThatIsKilledLeavesNoTable) {
   const std::string file = scene("hex27", 12, 0.45);
-  const std::string command = mpirun(2) + " condense " + file + " " + path("killed.table") + " > /dev/null 2>&1 & " +
+  const std::string command = "PMIX_MCA_gds=hash " + mpirun(2) + " condense " + file + " " + path("killed.table") +
+                              " > /dev/null 2>&1 & " +
                               "for i in $(seq 100); do pid=$(pgrep -n -f \"^" TENDON_FEM_WORKER " condense " + file +
                               "\") && [ $(pgrep -c -f \"^" TENDON_FEM_WORKER " condense " + file +
                               "\") = 2 ] && kill -9 $pid && break; sleep 0.05; done; wait $!";
