@@ -79,8 +79,9 @@ int serve(int argc, char** argv) {
            "TCP, in the clear, for workers of other machines; else a Unix socket");
   line.add("--deadline-ms", deadline_ms,
            "Later answers are not sent; 0 = three times the median with a force, at least 50 ms");
-  line.add("--dead-ms", dead_ms,
-           "Without an answer for so long a worker is replaced; 0 = ten times that median, at least 500 ms");
+  line.add(
+      "--dead-ms", dead_ms,
+      "Without an answer for so long a worker is replaced; 0 = ten times that median, at least 500 ms; 10 s at first");
   line.add("--start-s", start_s, "A worker that is not ready after so long is replaced", 0.1);
   if (const auto exit_code = line.parse(argc, argv)) return *exit_code;
 
