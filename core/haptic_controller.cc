@@ -240,7 +240,8 @@ void HapticController::take(Step& step, const Motion& hand, const Vec3& applied,
     limit_wrench(wanted.loop_age, applied, step);
   } else {
     limit_force(wanted, applied, step);
-    if (wanted.handle && !wanted.handle->torque.isZero(0)) step.reasons |= Reason::kMaxForce;  // no motor turns it
+    // No motor turns it. A device that does not even measure its orientation was never asked for a torque.
+    if (step.turn() && !step.turn()->wanted.isZero(0)) step.reasons |= Reason::kMaxForce;
   }
   if (grip_) limit_grip(step);
   if (disarmed_) {

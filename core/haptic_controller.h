@@ -143,7 +143,9 @@ class HapticController {
     std::vector<CoupledLeader> leaders{};
     Duration watchdog{};   ///< the device's own; 0 = it has none
     double max_force = 0;  ///< N; > 0
-    double max_slew = 0;   ///< N/s; > 0, may be infinite
+    /// N/s; > 0, may be infinite. The default is 1 N per step at 1 kHz. The hand cannot distinguish such a ramp from a
+    /// step, and a force that changes its sign with each datagram becomes smoother.
+    double max_slew = 1000;
     HeldForce::Config hold;
     /// The rules of the channels by which remote forces come in; each channel has a HeldForce of its own.
     std::vector<ChannelRule> channels = {ChannelRule::kSum};

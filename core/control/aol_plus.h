@@ -106,6 +106,8 @@ class AolPlus {
   /// A reserve for more than 16 periods would leave no force worth rendering.
   static constexpr int kMostHolds = 16;
 
+  /// The default of an array is for the movement of a handle, which is the first group of coordinates. The other groups
+  /// have no default.
   struct EnergyCap {
     double energy = 0.005;       ///< E_cap, J: with it a 20 kN/m wall after 10 s of waving is quiet (control.md 8.1)
     double most_contact = 0.13;  ///< J, the most C may be: F_max · 30 mm / 2 for 8.5 N
@@ -121,18 +123,20 @@ class AolPlus {
     int holds = 1;  ///< 1 to kMostHolds
   };
   struct BoundedAcceleration {
-    std::array<double, Blocks> most{};  ///< a, m/s² or rad/s²; must cover (F_hand + F_motor)/m at their largest
+    /// a, m/s² or rad/s²; must cover (F_hand + F_motor)/m at their largest. 8.5 N on a handle of 75 g that nobody holds
+    /// are 113 m/s²; a tap is some 200 (control.md 8.7).
+    std::array<double, Blocks> most{300};
   };
   struct Shaping {
-    std::array<double, Blocks> stiffness{};  ///< K_s, N/m or N·m/rad, > 0; below 2b/T_max that is in force
+    std::array<double, Blocks> stiffness{1000};  ///< K_s, N/m or N·m/rad, > 0; below 2b/T_max that is in force
   };
   struct Thrift {
     double share = 0.5;     ///< σ, in (0, 1]
     double energy = 0.004;  ///< E_s, J
   };
   struct Damper {
-    std::array<double, Blocks> viscous{};                  ///< B, N·s/m or N·m·s/rad; 0: that group is not damped
-    std::array<double, Blocks> contact{};                  ///< f_s, N or N·m, > 0: where a contact begins
+    std::array<double, Blocks> viscous{24};                ///< B, N·s/m or N·m·s/rad; 0: that group is not damped
+    std::array<double, Blocks> contact{0.1};               ///< f_s, N or N·m, > 0; a larger force counts as a contact
     Duration smoothing = std::chrono::microseconds(2200);  ///< τ_v, of the velocity
     Duration slow = std::chrono::milliseconds(20);         ///< τ_h: what is slower is not vibration
     double dead_zone = 0.7;                                ///< z, ≥ 0; Δ is the robust ledger's

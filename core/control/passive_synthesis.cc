@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "core/control/passive_synthesis.h"
 
-#include <limits>
-
 #include "core/control/law_support.h"
 
 namespace tendon {
@@ -31,7 +29,6 @@ void PassiveSynthesis<N>::observe_unseen(const Vec<N>& applied, Duration at_most
 
 template <int N>
 LimitedForce<N> PassiveSynthesis<N>::limit(const Demand<N>& demand) noexcept {
-  constexpr double kNoBound = std::numeric_limits<double>::infinity();
   if (!law_support::finite(demand)) return law_support::refused<N>(kNoBound);
   steepest_ = std::max(steepest_, law_support::spectral_norm<N>(demand.stiffness));
   if (demand.force == Vec<N>::Zero()) return {demand.force, kNoBound, {}};

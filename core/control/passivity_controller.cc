@@ -1,15 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "core/control/passivity_controller.h"
 
-#include <limits>
-
 #include "core/control/law_support.h"
 
 namespace tendon {
 
 namespace {
-
-constexpr double kNoBound = std::numeric_limits<double>::infinity();
 
 template <int N>
 Interval<N> nothing_seen() noexcept {

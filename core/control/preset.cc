@@ -17,12 +17,8 @@ constexpr std::array kPresets = {
                "the same without an assumption about the hand, for devices with 0.1 N·s/m of friction and more"},
 };
 
-constexpr double kMostAcceleration = 300;  // m/s²: 8.5 N on a handle of 75 g are 113, a tap is some 200
-constexpr double kStiffness = 1500;        // N/m
-constexpr double kDamping = 24;            // N·s/m
-constexpr double kContact = 0.1;           // N
-constexpr double kUsualCount = 30e-6;      // m, for which the smoothing was chosen
-constexpr double kSmoothing = 2.2e-3;      // s, of the damper at that count
+constexpr double kStiffness = 1500;    // N/m
+constexpr double kUsualCount = 30e-6;  // m: the default smoothing of the damper is for this count
 
 }  // namespace
 
@@ -37,15 +33,14 @@ PresetParts preset_parts(Preset preset, const PresetDevice& device) noexcept {
   parts.fading_contact.emplace();
   if (device.encoder_step > 0) parts.robust_ledger.emplace().encoder_step = {device.encoder_step};
   parts.knee.emplace().start = 0.7;
-  if (preset == Preset::kFeel) parts.bounded_acceleration.emplace().most = {kMostAcceleration};
+  if (preset == Preset::kFeel) parts.bounded_acceleration.emplace();
   // Never softer than the friction alone allows.
   const double by_friction = 2 * device.friction.viscous / seconds(device.longest_hold);
   parts.shaping.emplace().stiffness = {std::max(kStiffness, by_friction)};
   parts.thrift.emplace();
   auto& damper = parts.damper.emplace();
-  damper.viscous = {kDamping};
-  damper.contact = {kContact};
-  damper.smoothing = from_seconds(kSmoothing * std::clamp(std::sqrt(device.encoder_step / kUsualCount), 0.6, 2.0));
+  damper.smoothing =
+      from_seconds(seconds(damper.smoothing) * std::clamp(std::sqrt(device.encoder_step / kUsualCount), 0.6, 2.0));
   chosen.learned_model.emplace();
   return chosen;
 }

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "core/control/reference_energy.h"
 
-#include <limits>
-
 #include "core/control/law_support.h"
 
 namespace tendon {
@@ -50,7 +48,6 @@ double ReferenceEnergyController<N>::reference(const Demand<N>& demand) const no
 
 template <int N>
 LimitedForce<N> ReferenceEnergyController<N>::limit(const Demand<N>& demand) noexcept {
-  constexpr double kNoBound = std::numeric_limits<double>::infinity();
   if (!law_support::finite(demand)) return law_support::refused<N>(kNoBound);
   const double missing = reference(demand) - (observed_ - demand.force.dot(dx_));
   const double damping = series_damping(missing, dx_.squaredNorm(), held_, config_.min_speed, config_.max_damping);

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <limits>
-
 #include "core/control/stability_controller.h"
 #include "core/ledger/energy_ledger.h"
 
@@ -24,7 +22,6 @@ class Unlimited {
     ledger_.observe_unseen(applied.norm(), at_most);
   }
   LimitedForce<N> limit(const Demand<N>& wanted) noexcept {
-    constexpr double kNoBound = std::numeric_limits<double>::infinity();
     if (!wanted.force.allFinite()) return {Vec<N>::Zero(), kNoBound, Reason::kNotFinite};
     return {wanted.force, kNoBound, {}};
   }

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "core/control/virtual_coupling.h"
 
-#include <limits>
-
 #include "core/control/law_support.h"
 
 namespace tendon {
@@ -29,7 +27,6 @@ void VirtualCoupling<N>::observe_unseen(const Vec<N>& applied, Duration at_most)
 
 template <int N>
 LimitedForce<N> VirtualCoupling<N>::limit(const Demand<N>& demand) noexcept {
-  constexpr double kNoBound = std::numeric_limits<double>::infinity();
   if (!law_support::finite(demand)) {
     stretch_.setZero();
     return law_support::refused<N>(kNoBound);

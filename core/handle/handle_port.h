@@ -94,14 +94,14 @@ using GripPort = HandlePort<1>;
 /// The configuration of a wrench for the law, friction of movement, holds, parts and shared account of `point`, and these
 /// of rotation.
 struct RotationLimits {
-  Friction friction{};                                        ///< τ_c, N·m, and b_r, N·m·s/rad: lower bounds
-  double max_torque = 0;                                      ///< N·m, > 0
-  double max_slew = std::numeric_limits<double>::infinity();  ///< N·m/s, > 0
-  double encoder_step = 0;                                    ///< rad, of robust_ledger; 0: exact
-  std::optional<double> most_acceleration{};                  ///< rad/s², of bounded_acceleration
-  std::optional<double> shaping_stiffness{};                  ///< N·m/rad, of shaping
-  double damping = 0;                                         ///< N·m·s/rad, of damper; 0: turning is not damped
-  double contact = 0.005;                                     ///< N·m, of damper: where a contact begins
+  Friction friction{};                        ///< τ_c, N·m, and b_r, N·m·s/rad: lower bounds
+  double max_torque = 0;                      ///< N·m, > 0
+  double max_slew = 50;                       ///< N·m/s, > 0: HapticController::Config::max_slew at a lever of 5 cm
+  double encoder_step = 0;                    ///< rad, of robust_ledger; 0: exact
+  std::optional<double> most_acceleration{};  ///< rad/s², of bounded_acceleration
+  std::optional<double> shaping_stiffness{};  ///< N·m/rad, of shaping
+  double damping = 0;                         ///< N·m·s/rad, of damper; 0: turning is not damped
+  double contact = 0.005;                     ///< N·m; the damper takes a larger torque for a contact
 };
 /// Throws std::invalid_argument when the point lists a part that lacks its value for rotation.
 WrenchPort::Config wrench_config(const LimiterConfig& point, const RotationLimits& rotation);

@@ -147,7 +147,7 @@ void judge(Identification& result) {
     result.trust = Trust::kNeither;
     result.reason = "Kelly's validity test passed, yet the two differ" + at(*apart) +
                     ": b = " + number(apart->kelly.viscous) + " and " + number(apart->integral.viscous) +
-                    ". Is the mass right? Published is the lesser of both";
+                    ". Is the mass right? Neither is a bound";
   } else {
     result.trust = Trust::kBoth;
     result.reason = "Kelly's validity test passed and the integral agrees. Published is the lesser of both";

@@ -41,7 +41,7 @@ struct PlaceEstimate {
 enum class Trust {
   kIntegral,  ///< Kelly's validity test failed
   kBoth,      ///< it passed, and the two agree: the lesser of the two is published
-  kNeither,   ///< it passed, and they do not agree: the mass may be wrong; the lesser is published
+  kNeither,   ///< the test passed, but the two do not agree; the mass may be wrong, and neither is a bound
 };
 
 /// "integral", "both" or "neither".

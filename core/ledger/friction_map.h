@@ -22,7 +22,7 @@ class FrictionMap {
   };
   struct Config {
     std::vector<Place> places;  ///< 1 to kMostPlaces
-    double reach = 0;           ///< m, ≥ 0: about the distance of neighbouring places
+    double reach = 0.05;        ///< m, ≥ 0: about the distance of neighbouring places
   };
   /// 4 to each edge of a cube: some 0.2 µs per haptic step.
   static constexpr std::size_t kMostPlaces = 64;

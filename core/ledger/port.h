@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <limits>
 
 #include "core/base/reason.h"
 #include "core/base/time.h"
@@ -34,11 +35,14 @@ struct Demand {
   Duration age{};                     ///< of the motion that `force` answers
 };
 
+/// This value of `permitted` means that the law does not bound the force.
+inline constexpr double kNoBound = std::numeric_limits<double>::infinity();
+
 /// A force, and why it is not the one that was wanted.
 template <int N>
 struct LimitedForce {
   Vec<N> force;      ///< N, on the hand
-  double permitted;  ///< N, the bound on ‖force‖ at this step; ∞ for a law that has none
+  double permitted;  ///< N, the bound on ‖force‖ at this step, or kNoBound
   Reasons reasons;
 };
 

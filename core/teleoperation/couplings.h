@@ -59,7 +59,7 @@ class Couplings {
   explicit Couplings(const Coupling::Config& config, std::span<const CoupledLeader> leaders = {});
 
   std::size_t size() const noexcept { return all_.size(); }
-  /// To hear its peer (receive), to act (engage, disengage), and to tell its peer (message).
+  /// Returns a coupling. Callers use receive, engage, disengage, conclude, and message.
   Coupling& operator[](std::size_t which) noexcept { return all_[which]; }
   const Coupling& operator[](std::size_t which) const noexcept { return all_[which]; }
 

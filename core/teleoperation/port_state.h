@@ -67,9 +67,20 @@ constexpr bool has_places(CouplingMethod method) noexcept {
          method == CouplingMethod::kSurface || method == CouplingMethod::kSetPosition;
 }
 
-/// Whether its scales are those of the scenes for good, because its totals are sums in one scale.
+/// Returns true if the scales cannot be changed, because the totals of the method depend on them.
 constexpr bool keeps_scales(CouplingMethod method) noexcept {
   return method == CouplingMethod::kWaves || method == CouplingMethod::kPassivity;
+}
+
+/// Returns true if a follower can have several leaders.
+constexpr bool can_be_shared(CouplingMethod method) noexcept {
+  return method == CouplingMethod::kPositionPosition || method == CouplingMethod::kPositionForce;
+}
+
+/// Returns true if a follower with a limiter can only move when the leader pays for it (Purse).
+constexpr bool needs_purse(CouplingMethod method) noexcept {
+  return method == CouplingMethod::kPositionPosition || method == CouplingMethod::kPassivity ||
+         method == CouplingMethod::kSetPosition;
 }
 
 /// How a handle has turned since its offset was taken.

@@ -6,10 +6,10 @@
 
 #include "core/base/motion.h"
 #include "core/teleoperation/coupling_period.h"
+#include "core/teleoperation/methods/quiet_stiffness.h"
 #include "core/teleoperation/port_state.h"
 #include "core/teleoperation/pose_map.h"
 #include "core/teleoperation/purse.h"
-#include "core/teleoperation/quiet_stiffness.h"
 
 namespace tendon {
 

@@ -7,7 +7,7 @@
 #include <limits>
 
 #include "core/control/stability_controller.h"
-#include "core/teleoperation/playout_clock.h"
+#include "core/teleoperation/methods/playout_clock.h"
 
 namespace tendon {
 

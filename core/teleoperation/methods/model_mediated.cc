@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "core/teleoperation/model_mediated.h"
+#include "core/teleoperation/methods/model_mediated.h"
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "core/teleoperation/playout_clock.h"
+#include "core/teleoperation/methods/playout_clock.h"
 
 #include <algorithm>
 

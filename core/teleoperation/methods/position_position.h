@@ -2,11 +2,12 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <limits>
 
 #include "core/control/stability_controller.h"
-#include "core/teleoperation/quiet_stiffness.h"
+#include "core/teleoperation/methods/quiet_stiffness.h"
 
 namespace tendon {
 
@@ -22,6 +23,15 @@ struct PortMotion {
   Vec<N> position = Vec<N>::Zero();  ///< m
   Vec<N> velocity = Vec<N>::Zero();  ///< m/s
 };
+
+/// As much of a spring's stretch y − x (m) as an account pays for: the nearest to it with ½ K ‖stretch‖² ≤ energy (J,
+/// +∞ is allowed). K in N/m, > 0. Thread-safe: yes. Realtime-safe: yes.
+template <int N>
+Vec<N> paid_stretch(const Vec<N>& stretch, double stiffness, double energy) noexcept {
+  const double farthest = std::sqrt(2 * std::max(energy, 0.0) / stiffness);
+  const double distance = stretch.norm();
+  return distance > farthest ? Vec<N>(stretch * (farthest / distance)) : stretch;
+}
 
 /// Ties two handles with a spring and a damper, each end by itself: the same class at both.
 ///

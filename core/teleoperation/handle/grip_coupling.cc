@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "core/teleoperation/grip_coupling.h"
+#include "core/teleoperation/handle/grip_coupling.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "core/teleoperation/wave_variables.h"
+#include "core/teleoperation/methods/wave_variables.h"
 
 #include <algorithm>
 #include <cmath>

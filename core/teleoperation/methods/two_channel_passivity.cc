@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "core/teleoperation/two_channel_passivity.h"
+#include "core/teleoperation/methods/two_channel_passivity.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "core/teleoperation/turn_coupling.h"
+#include "core/teleoperation/handle/turn_coupling.h"
 
 #include "core/base/expect.h"
 #include "core/base/rotation.h"

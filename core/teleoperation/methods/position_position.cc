@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "core/teleoperation/position_position.h"
+#include "core/teleoperation/methods/position_position.h"
 
 #include <algorithm>
 #include <cmath>
@@ -7,7 +7,6 @@
 #include <utility>
 
 #include "core/base/expect.h"
-#include "core/teleoperation/passive_set_position.h"
 
 namespace tendon {
 
@@ -17,7 +16,7 @@ namespace {
 constexpr double kFloorRise = 2e-3;
 
 /// 36 years: no difference of two such times overflows.
-constexpr Duration kMostTime = std::chrono::nanoseconds(std::int64_t{1} << 60);
+constexpr Duration kMostMotionTime = std::chrono::nanoseconds(std::int64_t{1} << 60);
 
 }  // namespace
 
@@ -60,7 +59,7 @@ template <int N>
 void PositionPosition<N>::receive(const PortMotion<N>& message) noexcept {
   const bool answered = message.answers_epoch == config_.epoch;
   if (!message.position.allFinite() || !message.velocity.allFinite() || message.epoch == 0 || message.sequence == 0 ||
-      message.time < -kMostTime || message.time > kMostTime || message.round_trip < Duration::zero() ||
+      message.time < -kMostMotionTime || message.time > kMostMotionTime || message.round_trip < Duration::zero() ||
       (answered && message.answers > sequence_)) {
     ++refused_;
     return;

@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "core/teleoperation/coupling_config.h"
+
+#include <array>
+
+namespace tendon {
+
+namespace {
+
+std::string in_quotation(CouplingMethod method) { return "\"" + std::string(to_string(method)) + "\""; }
+
+struct CouplingRule {
+  std::string_view key;
+  bool (*broken)(const CouplingConfig&);
+  std::string (*sentence)(const CouplingConfig&);
+};
+
+bool leads(const CouplingConfig& config) { return config.role == PortRole::kLeader; }
+
+constexpr std::array kCouplingRules = {
+    CouplingRule{"clutch", [](const CouplingConfig& c) { return !leads(c) && c.clutch.has_value(); },
+                 [](const CouplingConfig&) { return std::string("expected none: the leader clutches"); }},
+    CouplingRule{"holds_place", [](const CouplingConfig& c) { return leads(c) && c.holds_place; },
+                 [](const CouplingConfig&) { return std::string("expected \"release\": a hand holds the leader"); }},
+    CouplingRule{"engage_by", [](const CouplingConfig& c) { return !leads(c) && c.engage_by.has_value(); },
+                 [](const CouplingConfig&) { return std::string("expected \"request\": the leader engages"); }},
+    CouplingRule{"clutch", [](const CouplingConfig& c) { return c.absolute && c.clutch.has_value(); },
+                 [](const CouplingConfig&) {
+                   return std::string("expected none with map.absolute: a clutch changes an offset, and there is none");
+                 }},
+    CouplingRule{"absolute", [](const CouplingConfig& c) { return c.absolute && !has_places(c.method); },
+                 [](const CouplingConfig&) {
+                   return std::string(
+                       "expected the method position-position, position-force, surface or set-position: the others "
+                       "have no absolute places");
+                 }},
+    CouplingRule{"share", [](const CouplingConfig& c) { return leads(c) && c.share.has_value(); },
+                 [](const CouplingConfig&) { return std::string("expected none: only a follower has one"); }},
+    CouplingRule{"method", [](const CouplingConfig& c) { return c.share && !can_be_shared(c.method); },
+                 [](const CouplingConfig& c) {
+                   return "expected \"position-position\" or \"position-force\" with several leaders, found " +
+                          in_quotation(c.method);
+                 }},
+    CouplingRule{"rate", [](const CouplingConfig& c) { return c.method == CouplingMethod::kRate && !c.rate; },
+                 [](const CouplingConfig& c) {
+                   return "missing, expected this table with method " + in_quotation(c.method) +
+                          ": how fast the follower moves";
+                 }},
+    CouplingRule{"rate", [](const CouplingConfig& c) { return c.method != CouplingMethod::kRate && c.rate; },
+                 [](const CouplingConfig& c) {
+                   return "expected none with method " + in_quotation(c.method) + ": only \"rate\" has a speed";
+                 }},
+    CouplingRule{
+        "centring", [](const CouplingConfig& c) { return !leads(c) && c.centring > 0; },
+        [](const CouplingConfig&) { return std::string("expected none or 0: the leader's handle is centred"); }},
+    CouplingRule{
+        "own_damping",
+        [](const CouplingConfig& c) { return c.method == CouplingMethod::kPassivity && !(c.spring.own_damping > 0); },
+        [](const CouplingConfig&) {
+          return std::string(
+              "expected a number above 0: nothing else takes energy up, so that nothing could begin to move");
+        }},
+    CouplingRule{
+        "own_damping",
+        [](const CouplingConfig& c) { return c.method == CouplingMethod::kWaves && !(c.spring.own_damping > 0); },
+        [](const CouplingConfig&) {
+          return std::string("expected a number above 0: it is the impedance of the waves");
+        }}};
+
+}  // namespace
+
+std::vector<CouplingReason> check(const CouplingConfig& config) {
+  std::vector<CouplingReason> reasons;
+  for (const CouplingRule& rule : kCouplingRules) {
+    if (rule.broken(config)) reasons.push_back({rule.key, rule.sentence(config)});
+  }
+  return reasons;
+}
+
+}  // namespace tendon

@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "core/teleoperation/methods/coupling_law.h"
+
+namespace tendon {
+
+/// The method `waves`: both ends use a WavePort. The impedance is B at the leader and B/(s_f s_x) at the follower. K and D
+/// are only used for the position of a robot.
+///
+/// The account of the limiter pays for the energy that the line sends, and receives the energy of the peer. The pair is
+/// therefore passive even if a limiter reduces the force. The line uses the force that remains after the limiter and the
+/// motors, and sends the difference later (WavePort::SharedAccount). The ramp does not count as such a difference, so the
+/// two positions do not drift. If the leader is clutched, its end of the line does not move, and the follower stays at
+/// its position. An end that is not engaged receives waves and does not send any.
+class WaveLaw : public CouplingLaw {
+ public:
+  /// The delay of the line without the network and the playout: W/2 and the periods.
+  static constexpr Duration kLineWaits = std::chrono::milliseconds(11);
+  static constexpr bool kHoldsSilent = false;
+
+  WaveLaw(const CouplingConfig& config, const MappedEnd& frame);
+
+  void receive(const PortState& peer, const PortState& before, bool anew, const MappedEnd& frame) noexcept;
+  void forget() noexcept { joined_ = false; }
+  void begin_act(const Vec3& /*u*/) noexcept { port_.forgive(); }
+  std::optional<Purse::Settlement> observe(const LawInterval& ended) noexcept;
+  Demand<3> command(const LawPeriod& period, const Vec3& speed, const Demand<3>& spring) noexcept;
+  void skip(const LawPeriod& period, Duration elapsed) noexcept;
+  LawPart part() const noexcept { return {.wave = sent_}; }
+  /// Returns B/d. The delay of one direction is half of the round trip.
+  double stiffness(const LawPeriod& period, double share, Duration round_trip) const noexcept;
+
+ private:
+  double damping_;  ///< The damping B of the leader in N·s/m.
+  double max_force_;
+  WavePort<3> port_;
+  WaveMessage<3> sent_;
+  Vec3 force_ = Vec3::Zero();  ///< The force of the line in this period in N.
+  bool moves_ = false;         ///< The line moves with the handle.
+  bool joined_ = false;        ///< The port has joined the epoch of the peer.
+};
+
+}  // namespace tendon

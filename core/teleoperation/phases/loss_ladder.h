@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <utility>
+
+#include "core/base/time.h"
+
+namespace tendon {
+
+/// Computes from the age of the newest state whether the link to the peer still works. The limit v is the maximum of 3
+/// periods of the peer, 20 ms, and twice the longest gap between two states in the last 5 to 10 s:
+///
+///     age ≤ v            fresh
+///     age > v + 20 ms    silent
+///     age > v + 250 ms   gone
+///
+/// If `late` is true, the result is silent and gone for every age.
+///
+/// Thread-safe: no. Realtime-safe: yes.
+class LossLadder {
+ public:
+  static constexpr Duration kStale =
+      std::chrono::milliseconds(20);  ///< The minimum of v, and the time from v to silent.
+  static constexpr Duration kLostAfter = std::chrono::milliseconds(250);
+  static constexpr Duration kMostGap = std::chrono::milliseconds(100);  ///< The maximum value of a gap.
+  static constexpr Duration kGapsKept = std::chrono::seconds(5);
+
+  struct Rung {
+    bool fresh = false;
+    bool silent = false;
+    bool gone = false;
+  };
+
+  explicit LossLadder(Duration peer_period) : peer_period_(peer_period) {}
+
+  /// Records the arrival of a state. If `counts` is false, the gap to the previous state is ignored.
+  void receive(LocalTime now, bool counts) noexcept {
+    if (counts) {
+      if (now - stretch_began_ >= kGapsKept) {
+        stretch_began_ = now;
+        before_ = std::exchange(gap_, Duration::zero());
+      }
+      gap_ = std::max(gap_, std::min(now - arrived_, kMostGap));
+    }
+    arrived_ = now;
+  }
+
+  /// Resets the gaps.
+  void forget(LocalTime now) noexcept {
+    gap_ = before_ = Duration::zero();
+    stretch_began_ = now;
+  }
+
+  /// Returns the state of the link. `heard` is false if no state was received.
+  Rung at(LocalTime now, bool heard, bool late) const noexcept {
+    const Duration age = heard ? now - arrived_ : Duration::max();
+    return {.fresh = !late && age <= patience(),
+            .silent = late || age > patience() + kStale,
+            .gone = late || age > patience() + kLostAfter};
+  }
+
+  /// Returns the limit v.
+  Duration patience() const noexcept { return std::max({kStale, 3 * peer_period_, 2 * std::max(gap_, before_)}); }
+
+ private:
+  Duration peer_period_;
+  LocalTime arrived_{};
+  Duration gap_{};     ///< The longest gap in the current interval.
+  Duration before_{};  ///< The longest gap in the previous interval.
+  LocalTime stretch_began_{};
+};
+
+}  // namespace tendon
