@@ -11,9 +11,6 @@
 namespace tendon {
 namespace {
 
-/// RFC 4291, 2.5.5.2: ::ffff:a.b.c.d
-constexpr std::array<std::uint8_t, 12> kMappedPrefix = {0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0xff, 0xff};
-
 std::optional<std::uint16_t> parse_port(std::string_view text) {
   std::uint16_t port = 0;
   const char* const end = text.data() + text.size();
@@ -37,8 +34,8 @@ std::optional<Address> parse(std::string_view text) {
     return address;
   }
   if (host == "localhost") host = "127.0.0.1";
-  std::copy(kMappedPrefix.begin(), kMappedPrefix.end(), address.ip.begin());
-  if (inet_pton(AF_INET, host.c_str(), address.ip.data() + kMappedPrefix.size()) != 1) return std::nullopt;
+  std::copy(kMappedIpv4.begin(), kMappedIpv4.end(), address.ip.begin());
+  if (inet_pton(AF_INET, host.c_str(), address.ip.data() + kMappedIpv4.size()) != 1) return std::nullopt;
   return address;
 }
 
@@ -48,7 +45,7 @@ std::string to_string(const Address& address) {
   std::array<char, INET6_ADDRSTRLEN> text{};
   const std::string port = ":" + std::to_string(address.port);
   if (is_ipv4(address)) {
-    inet_ntop(AF_INET, address.ip.data() + kMappedPrefix.size(), text.data(), text.size());
+    inet_ntop(AF_INET, address.ip.data() + kMappedIpv4.size(), text.data(), text.size());
     return text.data() + port;
   }
   inet_ntop(AF_INET6, address.ip.data(), text.data(), text.size());
@@ -59,17 +56,18 @@ Address parse_address(std::string_view text) {
   // A host with a NUL inside would be read only up to it.
   const std::optional<Address> address = text.find('\0') == std::string_view::npos ? parse(text) : std::nullopt;
   if (!address) {
-    throw std::invalid_argument("expected HOST:PORT like 127.0.0.1:47100, got \"" + std::string(text) + "\"");
+    throw std::invalid_argument("expected HOST:PORT like 127.0.0.1:47100 or [::1]:47100, got \"" + std::string(text) +
+                                "\"");
   }
   return *address;
 }
 
 bool is_ipv4(const Address& address) noexcept {
-  return std::equal(kMappedPrefix.begin(), kMappedPrefix.end(), address.ip.begin());
+  return std::equal(kMappedIpv4.begin(), kMappedIpv4.end(), address.ip.begin());
 }
 
 bool is_loopback(const Address& address) noexcept {
-  if (is_ipv4(address)) return address.ip[kMappedPrefix.size()] == 127;
+  if (is_ipv4(address)) return address.ip[kMappedIpv4.size()] == 127;
   constexpr std::array<std::uint8_t, 16> kLoopback6 = {0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1};
   return address.ip == kLoopback6;
 }

@@ -29,8 +29,11 @@ std::string to_string(const Address& address);
 
 /// The address that "HOST:PORT" names. HOST is a numeric IPv4 address, a numeric IPv6 address in
 /// brackets, or `localhost` (127.0.0.1); there is no name lookup, so nothing here waits. PORT is
-/// 0…65535. Anything else throws std::invalid_argument: `expected HOST:PORT like 127.0.0.1:47100, got "…"`.
+/// 0…65535. Throws std::invalid_argument with `text` and the expected format.
 Address parse_address(std::string_view text);
+
+/// The first bytes of an IPv4-mapped address, ::ffff:a.b.c.d (RFC 4291, 2.5.5.2).
+inline constexpr std::array<std::uint8_t, 12> kMappedIpv4 = {0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0xff, 0xff};
 
 /// True for an IPv4-mapped address.
 bool is_ipv4(const Address& address) noexcept;

@@ -18,9 +18,9 @@
 namespace tendon {
 namespace {
 
-/// Of each stream, a device's states and reports or a channel's, the newest value, by itself or as an event `Told`.
-/// Takes memory at a stream's first value only (and for a report's text); their number is bounded by the codec:
-/// kMaxDevices, and kMaxDevices · kMaxChannels.
+/// Keeps the newest value of each stream: the states and reports of a device, or of a channel. `Told` is the event that
+/// wraps a value, or void. Allocates only for the first value of a stream and for the text of a report. The codec bounds
+/// the number of streams: kMaxDevices, and kMaxDevices · kMaxChannels.
 template <class Value, class Told = void>
 class Newest {
  public:
@@ -28,13 +28,12 @@ class Newest {
 
   /// Replaces what was not taken.
   void put(const Value& value) { put(stream(value), value); }
-  /// As `put`; false, and nothing is changed, when `number` is not higher than any before of the highest epoch of its
-  /// stream.
-  bool put_if_newer(const Value& value, std::uint64_t number, std::uint64_t epoch = 0) {
+  /// Does the same if the value is newer than all earlier ones of its stream. Else returns false and changes nothing.
+  bool put_if_newer(const Value& value) {
     Stream& mine = stream(value);
-    const std::pair both(epoch, number);
-    if (mine.number && both <= *mine.number) return false;
-    mine.number = both;
+    const auto order = order_of(value);
+    if (mine.order && order <= *mine.order) return false;
+    mine.order = order;
     put(mine, value);
     return true;
   }
@@ -66,11 +65,18 @@ class Newest {
   }
 
  private:
+  using Order = std::pair<std::uint64_t, std::uint64_t>;  ///< epoch, number
   struct Stream {
     Kept value;
     bool waiting = false;
-    std::optional<std::pair<std::uint64_t, std::uint64_t>> number;  ///< epoch first
+    std::optional<Order> order{};  ///< of the newest value
   };
+
+  static Order order_of(const DeviceState& state) noexcept { return {0, state.tick}; }
+  static Order order_of(const ForceCommand& force) noexcept { return {0, force.sequence}; }
+  static Order order_of(const PortFrame& port) noexcept { return {port.epoch, port.sequence}; }
+  static Order order_of(const PeerReport& report) noexcept { return {0, report.link.number}; }
+  static Order order_of(const auto& report) noexcept { return {0, report.number}; }
 
   static const Value& in(const Value& kept) noexcept { return kept; }
   static const Value& in(const Session::Event& kept) noexcept {
@@ -87,6 +93,7 @@ class Newest {
     }
     mine.waiting = true;
   }
+  static bool same(const LinkReport&, const LinkReport&) noexcept { return true; }
   static bool same(const DeviceState& a, const DeviceState& b) noexcept { return a.device == b.device; }
   static bool same(const DeviceReport& a, const DeviceReport& b) noexcept { return a.device == b.device; }
   static bool same(const PortFrame& a, const PortFrame& b) noexcept {
@@ -101,15 +108,33 @@ class Newest {
         std::find_if(streams_.begin(), streams_.end(), [&](const Stream& s) { return same(in(s.value), value); });
     if (found != streams_.end()) return *found;
     if constexpr (std::is_void_v<Told>) {
-      return streams_.emplace_back(Stream{.value = value, .waiting = false, .number = {}});
+      return streams_.emplace_back(Stream{.value = value});
     } else {
-      return streams_.emplace_back(Stream{.value = Told{value}, .waiting = false, .number = {}});
+      return streams_.emplace_back(Stream{.value = Told{value}});
     }
   }
 
   std::vector<Stream> streams_;
   std::size_t waiting_ = 0;
 };
+
+/// The streams of several kinds of value.
+template <class... Newests>
+struct Streams : Newests... {
+  bool empty() const noexcept { return (Newests::empty() && ...); }
+  /// Takes the next value, of the first kind that has one. Null when there is none.
+  const auto* take() noexcept {
+    const std::common_type_t<typename Newests::Kept...>* taken = nullptr;
+    ((!taken && !Newests::empty() ? void(taken = Newests::take()) : void()), ...);
+    return taken;
+  }
+};
+
+/// The streams of one kind: of<DeviceState>(streams).
+template <class Value, class Told>
+Newest<Value, Told>& of(Newest<Value, Told>& streams) noexcept {
+  return streams;
+}
 
 }  // namespace
 
@@ -138,12 +163,9 @@ struct Session::State {
   DataWriter writer;
   std::uint64_t next_packet = 0;
   std::optional<LocalTime> last_sent;
-  Newest<DeviceState> states_to_send;
-  Newest<ForceCommand> forces_to_send;
-  std::optional<LinkReport> report_to_send;
-  Newest<DeviceReport> device_reports_to_send;
-  Newest<PeerReport> peer_reports_to_send;
-  Newest<PortFrame> ports_to_send;
+  Streams<Newest<DeviceState>, Newest<ForceCommand>, Newest<PortFrame>, Newest<LinkReport>, Newest<DeviceReport>,
+          Newest<PeerReport>>
+      to_send;
   OutgoingRequests asked;
   Bye bye;
   int byes_left = 0;
@@ -154,20 +176,17 @@ struct Session::State {
   LocalTime last_heard;
   ReplayWindow seen;
   std::optional<OutgoingEcho> echo;
-  std::uint64_t newest_report = 0;
   std::optional<std::uint64_t> newest_echoed;  ///< newest packet of ours that the peer has told of
   IncomingRequests answering;
   RoundTrip round_trip;
   std::optional<ClockExchange> exchange;
   ClockOffsetEstimator peer_clock;
 
-  // To tell.
-  Newest<DeviceState, StateArrived> states_arrived;
-  Newest<ForceCommand, ForceArrived> forces_arrived;
-  std::optional<LinkReport> report_arrived;
-  Newest<DeviceReport, DeviceReportArrived> device_reports_arrived;
-  Newest<PeerReport, PeerReportArrived> peer_reports_arrived;
-  Newest<PortFrame, PortArrived> ports_arrived;
+  // Events that wait, in the order in which they are returned.
+  Streams<Newest<ForceCommand, ForceArrived>, Newest<PortFrame, PortArrived>, Newest<LinkReport, ReportArrived>,
+          Newest<DeviceReport, DeviceReportArrived>, Newest<PeerReport, PeerReportArrived>,
+          Newest<DeviceState, StateArrived>>
+      arrived;
   std::optional<Closed> closed;
   bool untold = false;  ///< something of these, of `asked` or of `answering` may wait
   Event rare;           ///< the newest one of the others that was told
@@ -179,23 +198,12 @@ struct Session::State {
   void count_lost_outgoing(const IncomingEcho& told);
 
   // A frame of a datagram that is the newest so far, or is not.
-  void take(const DeviceState& state, bool /*newest*/) {
-    stats.stale += states_arrived.put_if_newer(state, state.tick) ? 0 : 1;
-  }
-  void take(const ForceCommand& force, bool newest) {
-    if (forces_arrived.put_if_newer(force, force.sequence)) return;
+  template <class Value>
+  void take(const Value& value, bool newest) {
+    if (of<Value>(arrived).put_if_newer(value)) return;
     ++stats.stale;
-    stats.refused_forces.old_sequence += newest ? 1 : 0;  // in an older datagram it is the network's doing
-  }
-  void take(const LinkReport& report, bool newest);
-  void take(const DeviceReport& report, bool /*newest*/) {
-    stats.stale += device_reports_arrived.put_if_newer(report, report.number) ? 0 : 1;
-  }
-  void take(const PeerReport& report, bool /*newest*/) {
-    stats.stale += peer_reports_arrived.put_if_newer(report, report.link.number) ? 0 : 1;
-  }
-  void take(const PortFrame& port, bool /*newest*/) {
-    stats.stale += ports_arrived.put_if_newer(port, port.sequence, port.epoch) ? 0 : 1;
+    // In a datagram that is not the newest, the network has caused it.
+    if constexpr (std::is_same_v<Value, ForceCommand>) stats.refused_forces.old_sequence += newest ? 1 : 0;
   }
   void take(const Control& control, bool /*newest*/) { stats.invalid += news().answering.take(control) ? 0 : 1; }
   void take(const ControlAck& ack, bool /*newest*/) { stats.invalid += news().asked.acknowledge(ack) ? 0 : 1; }
@@ -209,11 +217,7 @@ struct Session::State {
   }
   bool something_to_say(LocalTime now) noexcept {
     if (now < silent_until) return false;
-    if (!states_to_send.empty() || !forces_to_send.empty() || report_to_send || !device_reports_to_send.empty() ||
-        !peer_reports_to_send.empty() || !ports_to_send.empty() || answering.next_due() || asked.next_due(now) ||
-        silent_too_long(now)) {
-      return true;
-    }
+    if (!to_send.empty() || answering.next_due() || asked.next_due(now) || silent_too_long(now)) return true;
     silent_until = std::min(*last_sent + config.keep_alive, asked.next_due_time());
     return false;
   }
@@ -221,12 +225,18 @@ struct Session::State {
     return sealer &&
            (now - opened >= config.life || next_packet >= config.max_datagrams || stats.forged >= config.max_forged);
   }
+  template <class Value>
+  void send(const Value& value) {
+    of<Value>(news().to_send).put(value);
+  }
   const Event* tell();
   void close(Code code, std::string reason);
   std::size_t say(LocalTime now, std::span<std::byte, kMaxDatagram> buffer);
   Header begin(LocalTime now, std::span<std::byte, kMaxDatagram> buffer);
   std::size_t sent(LocalTime now, const Header& header, std::span<std::byte, kMaxDatagram> buffer) noexcept;
   void fill(LocalTime now);
+  template <class... Value>
+  void fill_with();
   void fill_columns();
 };
 
@@ -349,31 +359,17 @@ void Session::State::count_lost_outgoing(const IncomingEcho& told) {
   newest_echoed = told.packet_number;
 }
 
-void Session::State::take(const LinkReport& report, bool /*newest*/) {
-  if (report.number <= newest_report) {
-    ++stats.stale;
-    return;
-  }
-  newest_report = report.number;
-  report_arrived = report;
-}
-
 void Session::State::take(const Bye& said, bool /*newest*/) {
   open = false;
   closed = Closed{.code = said.code, .reason = said.reason};
 }
 
-void Session::send(const DeviceState& state) { state_->news().states_to_send.put(state); }
-
-void Session::send(const ForceCommand& command) { state_->news().forces_to_send.put(command); }
-
-void Session::send(const LinkReport& report) { state_->news().report_to_send = report; }
-
-void Session::send(const DeviceReport& report) { state_->news().device_reports_to_send.put(report); }
-
-void Session::send(const PeerReport& report) { state_->news().peer_reports_to_send.put(report); }
-
-void Session::send(const PortFrame& port) { state_->news().ports_to_send.put(port); }
+void Session::send(const DeviceState& state) { state_->send(state); }
+void Session::send(const ForceCommand& command) { state_->send(command); }
+void Session::send(const LinkReport& report) { state_->send(report); }
+void Session::send(const DeviceReport& report) { state_->send(report); }
+void Session::send(const PeerReport& report) { state_->send(report); }
+void Session::send(const PortFrame& port) { state_->send(port); }
 
 std::optional<std::uint32_t> Session::request(const Request& request) { return state_->news().asked.add(request); }
 
@@ -443,7 +439,7 @@ void Session::State::fill_columns() {
   for (;;) {
     std::array<const DeviceState*, limits::kMaxDevices> together{};
     const DeviceState* first = nullptr;
-    states_to_send.for_each_waiting([&](const DeviceState& state) {
+    of<DeviceState>(to_send).for_each_waiting([&](const DeviceState& state) {
       if (!fits_columns(state) || state.device >= together.size()) return;
       if (first == nullptr) first = &state;
       if (state.tick == first->tick && state.sampled == first->sampled) together[state.device] = &state;
@@ -452,17 +448,24 @@ void Session::State::fill_columns() {
     const std::span states(together.begin(), std::remove(together.begin(), together.end(), nullptr));
     const std::size_t taken = writer.add(states);
     if (taken == 0) return;
-    for (const DeviceState* state : states.first(taken)) states_to_send.take(state);
+    for (const DeviceState* state : states.first(taken)) of<DeviceState>(to_send).take(state);
   }
 }
 
-/// As much as fits, what ages fastest first. The rest stays due and goes into the next datagram; a state
-/// and a force always fit together.
+/// Adds what waits of these kinds, as far as it fits.
+template <class... Value>
+void Session::State::fill_with() {
+  const auto add = [this](auto& waiting) {
+    while (waiting.first() && writer.add(*waiting.first())) waiting.take();
+  };
+  (add(of<Value>(to_send)), ...);
+}
+
+/// Adds as much as fits; what ages fastest comes first. The rest stays due for the next datagram. A state and a force
+/// always fit together.
 void Session::State::fill(LocalTime now) {
   if (config.states_in_columns) fill_columns();
-  while (states_to_send.first() && writer.add(*states_to_send.first())) states_to_send.take();
-  while (ports_to_send.first() && writer.add(*ports_to_send.first())) ports_to_send.take();
-  while (forces_to_send.first() && writer.add(*forces_to_send.first())) forces_to_send.take();
+  fill_with<DeviceState, PortFrame, ForceCommand>();
   for (const ControlAck* ack = answering.next_due(); ack && writer.add(*ack); ack = answering.next_due()) {
     answering.sent(ack->id);
   }
@@ -470,9 +473,7 @@ void Session::State::fill(LocalTime now) {
   for (const Control* due = asked.next_due(now); due && writer.add(*due); due = asked.next_due(now)) {
     asked.sent(due->id, now, timeout);
   }
-  if (report_to_send && writer.add(*report_to_send)) report_to_send.reset();
-  while (device_reports_to_send.first() && writer.add(*device_reports_to_send.first())) device_reports_to_send.take();
-  while (peer_reports_to_send.first() && writer.add(*peer_reports_to_send.first())) peer_reports_to_send.take();
+  fill_with<LinkReport, DeviceReport, PeerReport>();
 }
 
 std::size_t Session::next_datagram(LocalTime now, std::span<std::byte, kMaxDatagram> buffer) {
@@ -509,7 +510,7 @@ const Session::Event* Session::State::tell() {
     return &rare;
   };
   if (answering.has_next()) {
-    const Control* const control = news().answering.next();  // which answers one that it does not know
+    const Control* const control = news().answering.next();  // this also answers unknown and invalid requests
     if (control != nullptr) return keep(RequestArrived{.id = control->id, .request = *control->request});
   }
   if (asked.has_answer()) {
@@ -521,12 +522,7 @@ const Session::Event* Session::State::tell() {
                                 .device = std::move(ack.device),
                                 .handle = std::move(ack.handle)});
   }
-  if (!forces_arrived.empty()) return forces_arrived.take();
-  if (!ports_arrived.empty()) return ports_arrived.take();
-  if (report_arrived) return keep(ReportArrived{.report = *std::exchange(report_arrived, std::nullopt)});
-  if (!device_reports_arrived.empty()) return device_reports_arrived.take();
-  if (!peer_reports_arrived.empty()) return peer_reports_arrived.take();
-  if (!states_arrived.empty()) return states_arrived.take();
+  if (const Event* const event = arrived.take()) return event;
   if (closed) return keep(*std::exchange(closed, std::nullopt));
   return nullptr;
 }

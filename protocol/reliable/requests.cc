@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <limits>
+#include <string>
+#include <string_view>
 #include <utility>
 
 namespace tendon {
@@ -71,7 +73,12 @@ const Control* IncomingRequests::next() {
     Slot& mine = slot(next_++);
     mine.stage = Slot::Stage::kTaken;
     if (mine.control.request) return &mine.control;
-    answer({mine.control.id, Code::kUnsupported, "this version does not know that request"});
+    const std::string_view field = mine.control.invalid;
+    if (field.empty()) {
+      answer({mine.control.id, Code::kUnsupported, "this version does not know that request"});
+    } else {
+      answer({mine.control.id, Code::kInvalid, std::string(field) + " is out of bounds"});
+    }
   }
   return nullptr;
 }

@@ -65,8 +65,8 @@ class IncomingRequests {
   /// Takes a request, in any order. The answer to one that was answered before is sent again. False when a correct peer
   /// cannot use that id yet.
   bool take(const Control& control);
-  /// The next request, null when there is none: each exactly once, in order. It stays until the next `take`. Requests
-  /// that this version does not know are answered here.
+  /// Returns each request exactly once, in order, or null if there is none. The request is valid until the next call of
+  /// `take`. This also answers requests that are unknown or invalid.
   const Control* next();
   bool has_next() const noexcept { return slots_[next_ % limits::kRequestWindow].stage == Slot::Stage::kArrived; }
   /// Answers a request that `next` returned; any other id is ignored.

@@ -7,6 +7,8 @@
 #include <utility>
 #include <vector>
 
+#include "protocol/byte_order_mark.h"
+
 namespace tendon {
 namespace {
 
@@ -39,6 +41,7 @@ std::vector<std::string_view> words_of(std::string_view line) {
 /// The words of the only line that is not a comment.
 std::vector<std::string_view> only_line(std::string_view text) {
   std::vector<std::string_view> found;
+  text = without_byte_order_mark(text);
   while (!text.empty()) {
     const std::size_t end = std::min(text.find('\n'), text.size());
     std::vector<std::string_view> words = words_of(text.substr(0, end));

@@ -2,14 +2,16 @@
 #include "protocol/wire/bounds.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <limits>
-#include <variant>
 
-#include "core/base/arithmetic.h"
 #include "core/base/rotation.h"
 #include "protocol/limits.h"
+#include "protocol/wire/generated/request_fields.h"
+#include "protocol/wire/ways/reader.h"
+#include "protocol/wire/ways/writer.h"
 
 namespace tendon {
 namespace {
@@ -23,8 +25,7 @@ bool in_bounds(const ForceTable& table) noexcept {
 }
 
 bool in_bounds(const Contact& contact) noexcept {
-  return std::abs(contact.normal.norm() - 1) <= Contact::kUnitTolerance && bounded(contact.gap) &&
-         (!contact.table || in_bounds(*contact.table));
+  return wire::is_unit(contact.normal) && bounded(contact.gap) && (!contact.table || in_bounds(*contact.table));
 }
 
 bool in_bounds(const LocalModel& model) noexcept {
@@ -38,17 +39,25 @@ bool in_bounds(const RemoteTorque& torque) noexcept {
          (!torque.model || (is_rotation(torque.model->at) && all_bounded(torque.model->stiffness)));
 }
 
-bool in_bounds(const Joints& joints) noexcept {
-  return joints.count <= Joints::kMost && std::ranges::all_of(joints.angle, bounded) &&
-         std::ranges::all_of(joints.velocity, bounded);
-}
-
 bool is_finite(const RemoteTorque& torque) noexcept {
   if (!torque.torque.allFinite()) return false;
   if (!torque.model) return true;
   const Quat& at = torque.model->at;
   return torque.model->stiffness.allFinite() && std::isfinite(at.w) && std::isfinite(at.x) && std::isfinite(at.y) &&
          std::isfinite(at.z);
+}
+
+/// Encodes a request and returns the name of the field that a receiver refuses.
+template <class Wanted, class List>
+std::string_view refused(Wanted& wanted, List list) noexcept {
+  wanted.device = 0;
+  std::array<wire::Byte, 128> bytes;
+  wire::Writer out(bytes.data());
+  list(out, wanted);
+  wire::Reader in(bytes.data(), out.at());
+  Wanted received;
+  list(in, received);
+  return in.refused() == nullptr ? std::string_view() : in.refused();
 }
 
 }  // namespace
@@ -59,45 +68,9 @@ bool in_bounds(const ForceCommand& command) noexcept {
          (!command.torque || in_bounds(*command.torque)) && (!command.grip_force || bounded(*command.grip_force));
 }
 
-bool is_receivable(const ForceCommand& command) noexcept {
-  return command.sequence > 0 && in_bounds(command) && command.valid_for > Duration::zero() &&
-         command.valid_for <= limits::kMaxValidFor && command.device < limits::kMaxDevices &&
-         command.channel < limits::kMaxChannels && command.way <= limits::kMaxWays;
-}
-
-bool in_bounds(const DeviceState& state) noexcept {
-  const auto is_time = [](Duration since) { return since >= -limits::kMaxTime && since <= limits::kMaxTime; };
-  const auto fits = [](const auto& vector) { return !vector || all_bounded(*vector); };
-  const bool unlimited = state.permitted_force == std::numeric_limits<double>::infinity();
-  return is_time(state.sampled.time_since_epoch()) && all_bounded(state.position) && all_bounded(state.velocity) &&
-         all_bounded(state.force_applied) && bounded(state.energy) && (unlimited || bounded(state.permitted_force)) &&
-         state.permitted_force >= 0 && is_time(state.force_age) && state.force_age >= Duration::zero() &&
-         state.mode >= Mode::kIdle && state.mode <= Mode::kFault && state.device < limits::kMaxDevices &&
-         state.channel < limits::kMaxChannels && fits(state.force_wanted) && fits(state.stiffness_wanted) &&
-         (!state.turning ||
-          (is_rotation(state.turning->orientation) && all_bounded(state.turning->angular_velocity))) &&
-         fits(state.torque_applied) &&
-         (!state.grip || (bounded(state.grip->opening) && bounded(state.grip->velocity))) &&
-         (!state.grip_applied || bounded(*state.grip_applied)) && fits(state.hand_force) &&
-         (!state.joints || in_bounds(*state.joints));
-}
-
-bool in_bounds(const SetOutput& wanted) noexcept {
-  if (wanted.output >= limits::kMaxOutputs) return false;
-  if (const auto* const lamp = std::get_if<LampColour>(&wanted.setting)) return lamp->rgb <= 0xFFFFFF;
-  const Vibration& pulse = std::get<Vibration>(wanted.setting);
-  const bool own = pulse.frequency == 0;
-  return pulse.amplitude >= 0 && pulse.amplitude <= 1 && pulse.duration >= Duration::zero() &&
-         pulse.duration <= limits::kMaxVibration &&
-         (own || (pulse.frequency >= limits::kMinVibrationHz && pulse.frequency <= limits::kMaxVibrationHz));
-}
-
-bool in_bounds(const SetScale& wanted) noexcept {
-  const auto possible = [](double scale) { return scale >= 0.01 && scale <= 100; };
-  return possible(wanted.position_scale) && possible(wanted.force_scale);
-}
-
-bool in_bounds(const SetShare& wanted) noexcept { return wanted.share >= 0 && wanted.share <= 1; }
+std::string_view refused_field(SetOutput wanted) noexcept { return refused(wanted, wire::kSetOutputFields); }
+std::string_view refused_field(SetScale wanted) noexcept { return refused(wanted, wire::kSetScaleFields); }
+std::string_view refused_field(SetShare wanted) noexcept { return refused(wanted, wire::kSetShareFields); }
 
 bool is_finite(const ForceCommand& command) noexcept {
   const auto contact_is_finite = [](const Contact& contact) {

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <string_view>
 
+#include "core/base/arithmetic.h"
 #include "protocol/limits.h"
 #include "protocol/messages.h"
 
@@ -19,18 +20,12 @@ inline bool bounded(double value) noexcept { return std::abs(value) <= limits::k
 /// Whether a receiver accepts what `command` says of the force: `force`, `model` and `error` are within their bounds
 /// (WIRE.md).
 bool in_bounds(const ForceCommand& command) noexcept;
-/// … and all else of it: it has a sequence, a validity, and numbers of a device and a channel.
-bool is_receivable(const ForceCommand& command) noexcept;
 
-/// Whether a receiver accepts that state.
-bool in_bounds(const DeviceState& state) noexcept;
-
-/// Whether a receiver accepts that setting; the number of the device is another matter.
-bool in_bounds(const SetOutput& wanted) noexcept;
-
-/// Whether a receiver accepts those scales, and that share; the numbers of device and channel are another matter.
-bool in_bounds(const SetScale& wanted) noexcept;
-bool in_bounds(const SetShare& wanted) noexcept;
+/// Returns the name of the first field that is out of bounds, or an empty string. The name is in static storage. This
+/// does not check the device and the channel.
+std::string_view refused_field(SetOutput wanted) noexcept;
+std::string_view refused_field(SetScale wanted) noexcept;
+std::string_view refused_field(SetShare wanted) noexcept;
 
 /// Whether `command` holds no NaN, and no infinity except as a model's `valid_radius`.
 bool is_finite(const ForceCommand& command) noexcept;

@@ -1,78 +1,176 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "protocol/wire/codec.h"
 
-#include <google/protobuf/arena.h>
-#include <google/protobuf/stubs/common.h>
-
 #include <algorithm>
 #include <array>
+#include <cstring>
 #include <type_traits>
-#include <utility>
-#include <variant>
 
 #include "protocol/limits.h"
 #include "protocol/wire/bounds.h"
-#include "protocol/wire/fields.h"
-#include "protocol/wire/frame_codec.h"
-#include "protocol/wire/hand_codec.h"
+#include "protocol/wire/columns.h"
+#include "protocol/wire/generated/frame_fields.h"
+#include "protocol/wire/generated/request_fields.h"
+#include "protocol/wire/generated/schema.h"
+#include "protocol/wire/ways/reader.h"
+#include "protocol/wire/ways/writer.h"
 
 namespace tendon {
 namespace {
 
-namespace pb = tendon::v1;
+using wire::Byte;
+using wire::Reader;
+using wire::Writer;
 
-bool read_echo(const pb::Echo& from, IncomingEcho& to) noexcept {
-  to.packet_number = from.peer_packet_number();
-  to.received_mask = from.received_mask();
-  return wire::read(from.peer_tx_time_ns(), to.sent) && wire::read(from.rx_time_ns(), to.received);
+/// The largest size of a head, of a frame that is sent at every step, and of any frame.
+constexpr std::size_t kMostHead = 48;
+constexpr std::size_t kMostOfAStep = 640;
+constexpr std::size_t kMostFrame = 2048;
+
+/// Writes a frame with two tags, two lengths and the fields of `value`, and returns its size. The fields come first,
+/// after `kUsualFront` bytes, and are moved if the tags and lengths take another number of bytes.
+template <unsigned kBody, std::size_t kUsualFront, class Value, class List>
+std::size_t write_frame(Byte* to, const Value& value, List list) noexcept {
+  Writer body(to + kUsualFront);
+  list(body, value);
+  const auto size = static_cast<std::size_t>(body.at() - to) - kUsualFront;
+  const std::size_t frame = wire::size_of_field(size);
+  const std::size_t front = wire::size_of_field(frame) - size;
+  if (front != kUsualFront) std::memmove(to + front, to + kUsualFront, size);
+  Writer out(to);
+  out.tag<3, wire::kLength>();
+  out.varint(frame);
+  out.tag<kBody, wire::kLength>();
+  out.varint(size);
+  return front + size;
 }
 
-/// Appends the frame to `content`, or counts it.
-template <class Value, class Message>
-void take(const Message& from, DataContent& content) {
-  Frame& frame = content.frames.emplace_back(std::in_place_type<Value>);
-  if (wire::read(from, std::get<Value>(frame))) return;
+/// Appends what `make` returns to `frames`. The value is constructed in place, because moving it costs time.
+template <class Make>
+auto& append(std::vector<Frame>& frames, Make make) {
+  using Value = decltype(make());
+  struct Made {
+    Make make;
+    operator Value() const noexcept { return make(); }
+  };
+  return std::get<Value>(frames.emplace_back(std::in_place_type<Value>, Made{make}));
+}
+
+/// Counts a value with a field out of bounds, and returns false if it must be dropped. A request or an answer stays,
+/// unless its id is 0. If it was dropped, the later ones would never be delivered.
+template <class Value>
+bool keep_refused(Value& value, wire::Name field, DataContent& content) {
+  ++content.invalid;
   if constexpr (std::is_same_v<Value, ForceCommand>) {
-    ++(is_finite(std::get<Value>(frame)) ? content.forces_out_of_bounds : content.forces_not_finite);
+    ++(is_finite(value) ? content.forces_out_of_bounds : content.forces_not_finite);
+  } else if constexpr (std::is_same_v<Value, Control>) {
+    value = {.id = value.id, .request = {}, .invalid = field};
+    return value.id > 0;
+  } else if constexpr (std::is_same_v<Value, ControlAck>) {
+    value = {.id = value.id, .code = Code::kInvalid, .detail = "a field of the answer is out of bounds"};
+    return value.id > 0;
   }
-  content.frames.pop_back();
-  ++content.invalid;
+  return false;
 }
 
-/// Appends each state, or counts the frame: where one is out of bounds, none is taken.
-void take_columns(const pb::DeviceStates& from, DataContent& content) {
+/// Reads one arm of a frame. Returns false if its fields are not in order. Each arm has its own function, so that its
+/// list has enough registers.
+template <class List, class Make>
+[[gnu::noinline]] bool read_arm(const Reader& arm, DataContent& content, List list, Make make) {
+  Reader in = arm;
+  auto& value = append(content.frames, make);
+  list(in, value);
+  if (in.refused() != nullptr && !keep_refused(value, in.refused(), content)) content.frames.pop_back();
+  return in.done();
+}
+
+/// Reads this arm if it is present, and returns whether it is.
+template <unsigned kBody, class List, class Make>
+bool take(Reader& frame, DataContent& content, bool& good, List list, Make make) {
+  Reader in(nullptr, nullptr);
+  if (!frame.enter<kBody>(in)) return false;
+  good = read_arm(in, content, list, make);
+  return true;
+}
+
+/// Does the same for states in columns. If one of them is out of bounds, it drops all.
+bool take_columns(Reader& frame, DataContent& content, bool& good) {
+  Reader in(nullptr, nullptr);
+  if (!frame.enter<10>(in)) return false;
   const std::size_t before = content.frames.size();
-  const auto next = [&]() -> DeviceState& { return std::get<DeviceState>(content.frames.emplace_back(DeviceState{})); };
-  if (wire::read(from, next)) return;
-  content.frames.resize(before);
-  ++content.invalid;
+  wire::read_columns(in, [&](std::uint64_t tick) -> DeviceState& {
+    return append(content.frames, [tick] { return DeviceState{.tick = tick}; });
+  });
+  good = in.done();
+  if (in.refused() != nullptr) {
+    content.frames.erase(content.frames.begin() + static_cast<std::ptrdiff_t>(before), content.frames.end());
+    ++content.invalid;
+  }
+  return true;
 }
 
-pb::Datagram& new_datagram(google::protobuf::Arena& arena) {
-#if GOOGLE_PROTOBUF_VERSION < 5026000
-  return *google::protobuf::Arena::CreateMessage<pb::Datagram>(&arena);
-#else  // which deprecates CreateMessage, and whose Create gives a message to the arena with all that is in it
-  return *google::protobuf::Arena::Create<pb::Datagram>(&arena);
-#endif
+/// Reads a frame. Returns false if its fields are not in order.
+bool read_frame(const Reader& bytes, DataContent& content) {
+  Reader frame = bytes;
+  bool good = true;
+  // Without the name of a member, all bytes of an aggregate would be set to 0 first.
+  const bool known =
+      take<1>(frame, content, good, wire::kDeviceStateFields, [] { return DeviceState{.tick = 0}; }) ||
+      take<2>(frame, content, good, wire::kForceCommandFields, [] { return ForceCommand{.sequence = 0}; }) ||
+      take_columns(frame, content, good) ||
+      take<9>(frame, content, good, wire::kPortStateFields, [] { return PortFrame{}; }) ||
+      take<3>(frame, content, good, wire::kControlFields, [] { return Control{}; }) ||
+      take<4>(frame, content, good, wire::kControlAckFields, [] { return ControlAck{}; }) ||
+      take<5>(frame, content, good, wire::kByeFields, [] { return Bye{}; }) ||
+      take<6>(frame, content, good, wire::kLinkReportFields, [] { return LinkReport{}; }) ||
+      take<7>(frame, content, good, wire::kDeviceReportFields, [] { return DeviceReport{}; }) ||
+      take<8>(frame, content, good, wire::kPeerReportFields, [] { return PeerReport{}; });
+  static_cast<void>(known);  // AnyOrder has made a frame of a newer peer empty
+  return good && frame.done();
 }
+
+/// Removes everything, but keeps the memory of the frames.
+void empty(DataContent& content) noexcept {
+  content.sent = {};
+  content.echo.reset();
+  content.frames.clear();
+  content.invalid = content.forces_not_finite = content.forces_out_of_bounds = 0;
+}
+
+/// Reads a body. Returns false if its fields are not in order, if it has too many frames, or if it has no usable
+/// tx_time. `content` is not usable then.
+bool read_in_order(std::span<const std::byte> body, DataContent& content) {
+  empty(content);
+  Reader in(body);
+  in.time(wire::field<1>, "tx_time_ns", content.sent);
+  if (in.refused() != nullptr) return false;
+  Reader echo(nullptr, nullptr);
+  if (in.enter<2>(echo)) {
+    wire::kEchoFields(echo, content.echo.emplace());
+    if (!echo.done()) return false;
+    if (echo.refused() != nullptr) {
+      content.echo.reset();
+      ++content.invalid;
+    }
+  }
+  Reader frame(nullptr, nullptr);
+  for (int frames = 0; in.next_is<3, wire::kLength>(); ++frames) {
+    if (frames == limits::kMaxFrames || !in.enter<3>(frame) || !read_frame(frame, content)) return false;
+  }
+  return in.done();
+}
+
+template <class Value, class List>
+std::string text_of(const Value& value, List list) {
+  std::array<Byte, kMostFrame> bytes;
+  Writer out(bytes.data());
+  list(out, value);
+  return {bytes.data(), out.at()};
+}
+
+Byte* as_bytes(std::byte* p) noexcept { return reinterpret_cast<Byte*>(p); }
 
 }  // namespace
-
-/// One small Datagram for each kind of frame. Protobuf defines the concatenation of two messages as their merge, so a
-/// datagram with several frames is written piece by piece, and each piece keeps its objects for the next datagram.
-struct DataWriter::Pieces {
-  pb::Datagram state, states, force, control, ack, bye, report, device_report, peer_report, port;
-  pb::Frame& state_frame = *state.add_frames();
-  pb::Frame& states_frame = *states.add_frames();
-  pb::Frame& force_frame = *force.add_frames();
-  pb::Frame& control_frame = *control.add_frames();
-  pb::Frame& ack_frame = *ack.add_frames();
-  pb::Frame& bye_frame = *bye.add_frames();
-  pb::Frame& report_frame = *report.add_frames();
-  pb::Frame& device_report_frame = *device_report.add_frames();
-  pb::Frame& peer_report_frame = *peer_report.add_frames();
-  pb::Frame& port_frame = *port.add_frames();
-};
 
 void round_to_columns(DeviceState& state) noexcept {
   // GCC 12 vectorizes two neighbours, and then takes double → float → double for no change at all.
@@ -88,18 +186,22 @@ void round_to_columns(DeviceState& state) noexcept {
   state.permitted_force = in_single(state.permitted_force);
 }
 
-DataWriter::DataWriter() : pieces_(std::make_unique<Pieces>()) {}
-DataWriter::~DataWriter() = default;
-DataWriter::DataWriter(DataWriter&&) noexcept = default;
-DataWriter& DataWriter::operator=(DataWriter&&) noexcept = default;
-
-/// Each piece has one frame.
-template <class Piece>
-bool DataWriter::append(const Piece& piece) {
-  const std::size_t size = piece.ByteSizeLong();
-  if (size > buffer_.size() - size_ || frames_ == limits::kMaxFrames) return false;
-  piece.SerializeWithCachedSizesToArray(wire::as_bytes(buffer_.data() + size_));
-  return count(size);
+/// Writes directly into the datagram if there is room for the largest frame of this kind. Otherwise writes to a buffer
+/// first, to find out whether the frame fits.
+template <unsigned kBody, std::size_t kUsualFront, class Value, class List>
+bool DataWriter::add_frame(const Value& value, std::size_t most, List list) noexcept {
+  if (frames_ == limits::kMaxFrames) return false;
+  const auto rest = buffer_.subspan(size_);
+  std::array<Byte, kMostFrame> apart;
+  const bool fits = rest.size() >= most;
+  const std::size_t size = write_frame<kBody, kUsualFront>(fits ? as_bytes(rest.data()) : apart.data(), value, list);
+  if (!fits) {
+    if (size > rest.size()) return false;
+    std::copy_n(apart.begin(), size, as_bytes(rest.data()));
+  }
+  size_ += size;
+  ++frames_;
+  return true;
 }
 
 void DataWriter::begin(std::span<std::byte> buffer, const Header& header, LocalTime sent,
@@ -109,149 +211,53 @@ void DataWriter::begin(std::span<std::byte> buffer, const Header& header, LocalT
   size_ = kHeaderSize;
   frames_ = 0;
 
-  std::array<std::uint8_t, wire::kMostHead> head;
-  const std::size_t size = wire::write_head(head.data(), sent, echo);
+  std::array<Byte, kMostHead> head;
+  Writer out(head.data());
+  out.time(wire::field<1>, "tx_time_ns", sent);
+  if (echo) out.small<2>([&] { wire::kEchoFields(out, *echo); });
+  const auto size = static_cast<std::size_t>(out.at() - head.data());
   if (size > buffer_.size() - size_) return;
-  std::copy_n(head.begin(), size, wire::as_bytes(buffer_.data() + size_));
+  std::copy_n(head.begin(), size, as_bytes(buffer_.data() + size_));
   size_ += size;
 }
 
-/// By hand where there is room for any frame; protobuf knows whether this one fits.
-template <class Value>
-std::size_t DataWriter::write_by_hand(const Value& value) noexcept {
-  if (buffer_.size() - size_ < wire::kMostFrame || frames_ == limits::kMaxFrames) return 0;
-  return wire::write_frame(wire::as_bytes(buffer_.data() + size_), value);
-}
-
 bool DataWriter::add(const DeviceState& state) {
-  if (const std::size_t size = write_by_hand(state); size > 0) return count(size);
-  return add_by_protobuf(state);
+  return add_frame<1, 6>(state, kMostOfAStep, wire::kDeviceStateFields);
 }
 bool DataWriter::add(const ForceCommand& command) {
-  if (const std::size_t size = write_by_hand(command); size > 0) return count(size);
-  return add_by_protobuf(command);
+  return add_frame<2, 4>(command, kMostOfAStep, wire::kForceCommandFields);
 }
-bool DataWriter::add_by_protobuf(const DeviceState& state) {
-  wire::write(state, *pieces_->state_frame.mutable_state());
-  return append(pieces_->state);
+bool DataWriter::add(const PortFrame& port) { return add_frame<9, 6>(port, kMostOfAStep, wire::kPortStateFields); }
+bool DataWriter::add(const Control& control) { return add_frame<3, 4>(control, kMostFrame, wire::kControlFields); }
+bool DataWriter::add(const ControlAck& ack) { return add_frame<4, 4>(ack, kMostFrame, wire::kControlAckFields); }
+bool DataWriter::add(const Bye& bye) { return add_frame<5, 4>(bye, kMostFrame, wire::kByeFields); }
+bool DataWriter::add(const LinkReport& report) { return add_frame<6, 6>(report, kMostFrame, wire::kLinkReportFields); }
+bool DataWriter::add(const DeviceReport& report) {
+  return add_frame<7, 6>(report, kMostFrame, wire::kDeviceReportFields);
 }
+bool DataWriter::add(const PeerReport& report) { return add_frame<8, 6>(report, kMostFrame, wire::kPeerReportFields); }
+
 std::size_t DataWriter::add(std::span<const DeviceState* const> states) {
   if (frames_ == limits::kMaxFrames) return 0;
-  const auto room = buffer_.size() - size_;
-  const auto written = wire::write_columns(wire::as_bytes(buffer_.data() + size_), room, states);
-  if (!written) return add_by_protobuf(states);
-  if (written->states > 0) count(written->bytes);
-  return written->states;
-}
-std::size_t DataWriter::add_by_protobuf(std::span<const DeviceState* const> states) {
-  for (std::size_t fit = states.size(); fit > 0; --fit) {
-    wire::write(states.first(fit), *pieces_->states_frame.mutable_states());
-    if (append(pieces_->states)) return fit;
-  }
-  return 0;
-}
-bool DataWriter::add_by_protobuf(const ForceCommand& command) {
-  wire::write(command, *pieces_->force_frame.mutable_force());
-  return append(pieces_->force);
-}
-bool DataWriter::add(const Control& control) {
-  wire::write(control, *pieces_->control_frame.mutable_control());
-  return append(pieces_->control);
-}
-bool DataWriter::add(const ControlAck& ack) {
-  wire::write(ack, *pieces_->ack_frame.mutable_control_ack());
-  return append(pieces_->ack);
-}
-bool DataWriter::add(const Bye& bye) {
-  wire::write(bye, *pieces_->bye_frame.mutable_bye());
-  return append(pieces_->bye);
-}
-bool DataWriter::add(const LinkReport& report) {
-  wire::write(report, *pieces_->report_frame.mutable_report());
-  return append(pieces_->report);
-}
-bool DataWriter::add(const DeviceReport& report) {
-  wire::write(report, *pieces_->device_report_frame.mutable_device_report());
-  return append(pieces_->device_report);
-}
-bool DataWriter::add(const PeerReport& report) {
-  wire::write(report, *pieces_->peer_report_frame.mutable_peer_report());
-  return append(pieces_->peer_report);
+  Writer out(as_bytes(buffer_.data() + size_));
+  const std::size_t taken = wire::write_columns(out, buffer_.size() - size_, states);
+  if (taken == 0) return 0;
+  size_ = static_cast<std::size_t>(out.at() - as_bytes(buffer_.data()));
+  ++frames_;
+  return taken;
 }
 
-bool DataWriter::add(const PortFrame& port) {
-  wire::write(port, *pieces_->port_frame.mutable_port_state());
-  return append(pieces_->port);
-}
-
-/// Parsed objects live in an arena whose first block is ours, so a state or a force needs no heap. One `Reset` frees
-/// all objects that the 1200 bytes of a hostile datagram can create.
-struct DataReader::Memory {
-  alignas(16) std::array<char, 8192> block;
-  google::protobuf::Arena arena{block.data(), block.size()};
-  DataContent content;
-};
-
-DataReader::DataReader() : memory_(std::make_unique<Memory>()) {}
-DataReader::~DataReader() = default;
-DataReader::DataReader(DataReader&&) noexcept = default;
-DataReader& DataReader::operator=(DataReader&&) noexcept = default;
+std::string message_of(const DeviceReport& report) { return text_of(report, wire::kDeviceReportFields); }
+std::string message_of(const PeerReport& report) { return text_of(report, wire::kPeerReportFields); }
 
 const DataContent* DataReader::read(std::span<const std::byte> body) {
-  return wire::read_by_hand(body, memory_->content) ? &memory_->content : read_by_protobuf(body);
+  if (body.size() > kMaxDatagram) return nullptr;
+  return read_in_order(body, content_) ? &content_ : read_in_any_order(body);
 }
 
-const DataContent* DataReader::read_by_protobuf(std::span<const std::byte> body) {
-  memory_->arena.Reset();
-  auto& datagram = new_datagram(memory_->arena);
-  DataContent& content = memory_->content;
-  if (body.size() > kMaxDatagram || !wire::parse(body, datagram) || datagram.frames_size() > limits::kMaxFrames) {
-    return nullptr;
-  }
-  wire::empty(content);
-  if (!wire::read(datagram.tx_time_ns(), content.sent)) return nullptr;
-
-  if (datagram.has_echo() && !read_echo(datagram.echo(), content.echo.emplace())) {
-    content.echo.reset();
-    ++content.invalid;
-  }
-  for (const pb::Frame& frame : datagram.frames()) {
-    switch (frame.body_case()) {
-      case pb::Frame::kState:
-        take<DeviceState>(frame.state(), content);
-        break;
-      case pb::Frame::kForce:
-        take<ForceCommand>(frame.force(), content);
-        break;
-      case pb::Frame::kControl:
-        take<Control>(frame.control(), content);
-        break;
-      case pb::Frame::kControlAck:
-        take<ControlAck>(frame.control_ack(), content);
-        break;
-      case pb::Frame::kBye:
-        take<Bye>(frame.bye(), content);
-        break;
-      case pb::Frame::kReport:
-        take<LinkReport>(frame.report(), content);
-        break;
-      case pb::Frame::kDeviceReport:
-        take<DeviceReport>(frame.device_report(), content);
-        break;
-      case pb::Frame::kPeerReport:
-        take<PeerReport>(frame.peer_report(), content);
-        break;
-      case pb::Frame::kPortState:
-        take<PortFrame>(frame.port_state(), content);
-        break;
-      case pb::Frame::kStates:
-        take_columns(frame.states(), content);
-        break;
-      case pb::Frame::BODY_NOT_SET:
-        break;  // a frame of a newer peer
-    }
-  }
-  return &content;
+const DataContent* DataReader::read_in_any_order(std::span<const std::byte> body) {
+  const auto in_order = any_order_.in_order(wire::schema::kDatagram, body);
+  return in_order && read_in_order(*in_order, content_) ? &content_ : nullptr;
 }
 
 }  // namespace tendon

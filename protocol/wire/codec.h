@@ -3,14 +3,15 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <memory>
 #include <optional>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "core/base/time.h"
 #include "protocol/link.h"
 #include "protocol/messages.h"
+#include "protocol/wire/any_order.h"
 #include "protocol/wire/frame.h"
 #include "protocol/wire/header.h"
 
@@ -30,19 +31,13 @@ inline bool fits_columns(const DeviceState& state) noexcept {
 /// As it is when it has come in columns: all but its position rounded to single precision.
 void round_to_columns(DeviceState& state) noexcept;
 
-/// Writes one Data datagram after the other, in the clear. States and forces are written by hand (hand_codec.h), all
-/// else by protobuf, which keeps its objects: a state or a force costs no heap call (a request, or a long text, does).
+/// Writes one Data datagram after the other, in the clear. It never allocates memory.
 ///
 /// Use: `begin`, `add` until it is false or nothing is left, then send `size()` bytes.
 ///
 /// Thread-safe: no.
 class DataWriter {
  public:
-  DataWriter();
-  ~DataWriter();
-  DataWriter(DataWriter&&) noexcept;
-  DataWriter& operator=(DataWriter&&) noexcept;
-
   /// `buffer` must live until the last `add`; what is written stays within it.
   void begin(std::span<std::byte> buffer, const Header& header, LocalTime sent,
              const std::optional<OutgoingEcho>& echo);
@@ -64,38 +59,29 @@ class DataWriter {
   /// fits_columns(), and there are at most kMaxDevices of them.
   std::size_t add(std::span<const DeviceState* const> states);
 
-  /// The same by protobuf alone: what `add` does with the rare parts of these two frames, and on a machine that holds
-  /// numbers the other way round. It writes the same bytes.
-  bool add_by_protobuf(const DeviceState& state);
-  std::size_t add_by_protobuf(std::span<const DeviceState* const> states);
-  bool add_by_protobuf(const ForceCommand& command);
-
   std::size_t size() const noexcept { return size_; }
 
  private:
-  struct Pieces;
-  template <class Value>
-  std::size_t write_by_hand(const Value& value) noexcept;
-  template <class Piece>
-  bool append(const Piece& piece);
-  bool count(std::size_t size) noexcept {
-    size_ += size;
-    ++frames_;
-    return true;
-  }
+  template <unsigned kBody, std::size_t kUsualFront, class Value, class List>
+  bool add_frame(const Value& value, std::size_t most, List list) noexcept;
 
-  std::unique_ptr<Pieces> pieces_;
   std::span<std::byte> buffer_;
   std::size_t size_ = 0;
   int frames_ = 0;
 };
+
+/// Encodes the message alone, without the frame and the datagram around it.
+std::string message_of(const DeviceReport& report);
+std::string message_of(const PeerReport& report);
 
 /// What a Data datagram holds.
 struct DataContent {
   PeerTime sent{};
   std::optional<IncomingEcho> echo;
   std::vector<Frame> frames;  ///< in the order of the datagram, every value within bounds; of columns each state
-  std::uint32_t invalid = 0;  ///< frames (and echoes) left out because a value was out of bounds
+  /// The number of frames and echoes with a value out of bounds. They are left out, except for requests
+  /// (see Control::invalid) and answers (see Code::kInvalid) with a valid id.
+  std::uint32_t invalid = 0;
   // Of these, the forces:
   std::uint32_t forces_not_finite = 0;
   std::uint32_t forces_out_of_bounds = 0;
@@ -106,20 +92,15 @@ struct DataContent {
 /// Thread-safe: no.
 class DataReader {
  public:
-  DataReader();
-  ~DataReader();
-  DataReader(DataReader&&) noexcept;
-  DataReader& operator=(DataReader&&) noexcept;
-
   /// `body` is what follows the header. Null when it is malformed: not protobuf, too many frames, or
   /// without a usable tx_time. The content lives until the next call.
   const DataContent* read(std::span<const std::byte> body);
-  /// The same by protobuf alone: what `read` does with all but usual states and forces. It gives the same content.
-  const DataContent* read_by_protobuf(std::span<const std::byte> body);
+  /// Does the same, but always through AnyOrder. Tests compare the two.
+  const DataContent* read_in_any_order(std::span<const std::byte> body);
 
  private:
-  struct Memory;
-  std::unique_ptr<Memory> memory_;
+  wire::AnyOrder any_order_;
+  DataContent content_;
 };
 
 }  // namespace tendon

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <variant>
 
 #include "core/base/time.h"
@@ -27,7 +28,8 @@ using IncomingEcho = BasicEcho<LocalTime, PeerTime>;
 
 struct Control {
   std::uint32_t id = 0;
-  std::optional<Request> request;  ///< empty: a request this build does not know
+  std::optional<Request> request{};  ///< empty if this build does not know the request, or if it is invalid
+  std::string_view invalid{};        ///< name of the field that is out of bounds (static storage), or empty
 };
 struct ControlAck {
   std::uint32_t id = 0;

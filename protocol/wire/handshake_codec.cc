@@ -2,118 +2,41 @@
 #include "protocol/wire/handshake_codec.h"
 
 #include <algorithm>
-#include <chrono>
-#include <string>
+#include <array>
+#include <span>
 
 #include "core/base/bytes.h"
-#include "protocol/limits.h"
-#include "protocol/wire/bounds.h"
-#include "protocol/wire/fields.h"
-#include "protocol/wire/text.h"
+#include "protocol/wire/generated/handshake_fields.h"
+#include "protocol/wire/generated/schema.h"
+#include "protocol/wire/ways/reader.h"
+#include "protocol/wire/ways/writer.h"
 
 namespace tendon {
 namespace {
 
-namespace pb = tendon::v1;
-using wire::read;
+/// The largest size of a Hello or an Answer, with all texts and lists cut to their bounds.
+constexpr std::size_t kMostBody = 2048;
 
-bool read(const pb::Claim& from, Claim& to) {
-  return read(from.device(), limits::kMaxLabel, to.device) && read(from.channel(), limits::kMaxLabel, to.channel) &&
-         read(from.role(), to.role);
-}
-bool read(const pb::Grant& from, Grant& to) noexcept {
-  return wire::read_device(from.device(), to.device) && wire::read_channel(from.channel(), to.channel) &&
-         read(from.role(), to.role);
-}
-
-/// Claims, or grants.
-template <class Messages, class Value>
-bool read_claims(const Messages& from, std::vector<Value>& to) {
-  if (from.size() > limits::kMaxClaims) return false;
-  to.resize(static_cast<std::size_t>(from.size()));
-  return std::equal(from.begin(), from.end(), to.begin(),
-                    [](const auto& one, Value& value) { return read(one, value); });
+template <class Value, class List>
+std::vector<std::byte> bytes_of(const Value& value, List list) {
+  std::array<wire::Byte, kMostBody> bytes;
+  wire::Writer out(bytes.data());
+  list(out, value);
+  const auto written = std::as_bytes(std::span(bytes)).first(static_cast<std::size_t>(out.at() - bytes.data()));
+  return {written.begin(), written.end()};
 }
 
-bool read(const pb::Hello& from, Hello& to) {
-  to.version_min = from.version_min();
-  to.version_max = from.version_max();
-  return read_claims(from.claims(), to.claims) && to.version_min >= 1 && to.version_min <= to.version_max &&
-         read(from.role(), to.role) && read(from.name(), limits::kMaxName, to.name) &&
-         wire::read_features(from.features(), to.features) && wire::read_labels(from.ways(), limits::kMaxWays, to.ways);
-}
-
-void write(const Hello& from, pb::Hello& to) {
-  to.set_version_min(from.version_min);
-  to.set_version_max(from.version_max);
-  to.set_role(static_cast<pb::Role>(from.role));
-  to.set_name(clip(from.name, limits::kMaxName));
-  wire::write_features(from.features, *to.mutable_features());
-  for (const Claim& claim : from.claims) {
-    if (to.claims_size() == limits::kMaxClaims) break;
-    pb::Claim& out = *to.add_claims();
-    out.set_device(clip(claim.device, limits::kMaxLabel));
-    out.set_channel(clip(claim.channel, limits::kMaxLabel));
-    out.set_role(static_cast<pb::Role>(claim.role));
-  }
-  wire::write_labels(from.ways, limits::kMaxWays, *to.mutable_ways());
-}
-
-bool read(const pb::Welcome& from, Welcome& to) {
-  to.version = from.version();
-  to.max_force = from.max_force_n();
-  to.position_resolution = from.position_resolution_m();
-  to.loop_hz = from.loop_hz();
-  to.timeout = std::chrono::milliseconds(from.timeout_ms());
-  return to.version >= 1 && read_claims(from.grants(), to.grants) &&
-         wire::read_features(from.features(), to.features) && read(from.role(), to.role) &&
-         read(from.device_name(), limits::kMaxName, to.device_name) && bounded(to.max_force) && to.max_force >= 0 &&
-         bounded(to.position_resolution) && to.position_resolution >= 0 && to.loop_hz >= 1 &&
-         to.loop_hz <= limits::kMaxLoopHz && to.timeout > Duration::zero() && to.timeout <= limits::kMaxTimeout &&
-         read(from.server(), limits::kMaxName, to.server);
-}
-
-void write(const Welcome& from, pb::Welcome& to) {
-  to.set_version(from.version);
-  wire::write_features(from.features, *to.mutable_features());
-  to.set_role(static_cast<pb::Role>(from.role));
-  to.set_device_name(clip(from.device_name, limits::kMaxName));
-  to.set_max_force_n(from.max_force);
-  to.set_position_resolution_m(from.position_resolution);
-  to.set_loop_hz(from.loop_hz);
-  to.set_timeout_ms(
-      static_cast<std::uint32_t>(std::chrono::duration_cast<std::chrono::milliseconds>(from.timeout).count()));
-  to.set_server(clip(from.server, limits::kMaxName));
-  for (const Grant& grant : from.grants) {
-    if (to.grants_size() == limits::kMaxClaims) break;
-    pb::Grant& out = *to.add_grants();
-    out.set_device(grant.device);
-    out.set_channel(grant.channel);
-    out.set_role(static_cast<pb::Role>(grant.role));
-  }
-}
-
-bool read(const pb::Refused& from, Refused& to) {
-  to.version_min = from.version_min();
-  to.version_max = from.version_max();
-  return read(from.code(), to.code) && read(from.detail(), limits::kMaxDetail, to.detail);
-}
-
-void write(const Refused& from, pb::Refused& to) {
-  to.set_code(static_cast<pb::Code>(from.code));
-  to.set_detail(clip(from.detail, limits::kMaxDetail));
-  to.set_version_min(from.version_min);
-  to.set_version_max(from.version_max);
-}
-
-void write_answer(const Welcome& from, pb::Answer& to) { write(from, *to.mutable_welcome()); }
-void write_answer(const Refused& from, pb::Answer& to) { write(from, *to.mutable_refused()); }
-
-template <class Message>
-std::vector<std::byte> serialized(const Message& message) {
-  std::vector<std::byte> out(message.ByteSizeLong());
-  message.SerializeWithCachedSizesToArray(wire::as_bytes(out.data()));
-  return out;
+/// Reads a message, whatever the order of its fields.
+template <class Value, class List>
+std::optional<Value> read_message(std::span<const std::byte> body, const wire::Schema& schema, List list) {
+  wire::AnyOrder any_order;
+  const auto in_order = any_order.in_order(schema, body);
+  if (!in_order) return {};
+  std::optional<Value> value(std::in_place);
+  wire::Reader in(*in_order);
+  list(in, *value);
+  if (!in.done() || in.refused() != nullptr) value.reset();
+  return value;
 }
 
 // Bytes of the handshake datagrams, after the header.
@@ -201,40 +124,15 @@ std::optional<AnswerDatagram> decode_answer(std::span<const std::byte> datagram)
                         .body = datagram.subspan(kAnswerAt)};
 }
 
-std::vector<std::byte> write_body(const Hello& hello) {
-  pb::Hello message;
-  write(hello, message);
-  return serialized(message);
-}
-
-std::vector<std::byte> write_body(const Answer& answer) {
-  pb::Answer message;
-  std::visit([&](const auto& body) { write_answer(body, message); }, answer);
-  return serialized(message);
-}
+std::vector<std::byte> write_body(const Hello& hello) { return bytes_of(hello, wire::kHelloFields); }
+std::vector<std::byte> write_body(const Answer& answer) { return bytes_of(answer, wire::kAnswerFields); }
 
 std::optional<Hello> read_hello(std::span<const std::byte> body) {
-  pb::Hello message;
-  Hello hello;
-  if (!wire::parse(body, message) || !read(message, hello)) return {};
-  return hello;
+  return read_message<Hello>(body, wire::schema::kHello, wire::kHelloFields);
 }
 
 std::optional<Answer> read_answer(std::span<const std::byte> body) {
-  pb::Answer message;
-  if (!wire::parse(body, message)) return {};
-  Answer answer;
-  switch (message.body_case()) {
-    case pb::Answer::kWelcome:
-      if (!read(message.welcome(), std::get<Welcome>(answer))) return {};
-      return answer;
-    case pb::Answer::kRefused:
-      if (!read(message.refused(), answer.emplace<Refused>())) return {};
-      return answer;
-    case pb::Answer::BODY_NOT_SET:
-      return {};
-  }
-  return {};
+  return read_message<Answer>(body, wire::schema::kAnswer, wire::kAnswerFields);
 }
 
 }  // namespace tendon

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "protocol/wire/text.h"
 
+#include <algorithm>
+
 namespace tendon {
 
 std::size_t utf8_character(std::string_view text) noexcept {
@@ -25,14 +27,36 @@ std::size_t utf8_character(std::string_view text) noexcept {
   return 0;
 }
 
-std::string clip(std::string_view text, std::size_t limit) {
+std::string visible(std::string_view text) {
+  constexpr std::string_view kDigits = "0123456789abcdef";
+  std::string out;
+  while (!text.empty()) {
+    const std::size_t size = utf8_character(text);
+    const auto first = static_cast<unsigned char>(text.front());
+    const bool c1 = size == 2 && first == 0xC2 && static_cast<unsigned char>(text[1]) < 0xA0;
+    if (size > 0 && !c1 && first >= ' ' && first != 0x7F) {
+      out += text.substr(0, size);
+    } else if (first == '\n' || first == '\t') {
+      out += first == '\n' ? "\\n" : "\\t";
+    } else {
+      const auto code = c1 ? static_cast<unsigned char>(text[1]) : first;
+      out += {'\\', 'x', kDigits[code >> 4U], kDigits[code & 0xFU]};
+    }
+    text.remove_prefix(std::max<std::size_t>(size, 1));
+  }
+  return out;
+}
+
+std::string_view clipped(std::string_view text, std::size_t limit) noexcept {
   std::size_t size = 0;
   while (size < text.size()) {
     const std::size_t next = utf8_character(text.substr(size));
     if (next == 0 || size + next > limit) break;
     size += next;
   }
-  return std::string(text.substr(0, size));
+  return text.substr(0, size);
 }
+
+std::string clip(std::string_view text, std::size_t limit) { return std::string(clipped(text, limit)); }
 
 }  // namespace tendon

@@ -1,0 +1,15 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string_view>
+
+namespace tendon {
+
+/// Removes the UTF-8 byte order mark from the start of a text. Spreadsheets and editors on Windows write this mark, and
+/// users cannot see it. All code that reads a text file from a user calls this function.
+constexpr std::string_view without_byte_order_mark(std::string_view text) noexcept {
+  constexpr std::string_view kMark = "\xef\xbb\xbf";
+  return text.starts_with(kMark) ? text.substr(kMark.size()) : text;
+}
+
+}  // namespace tendon

@@ -1,0 +1,14 @@
+# SPDX-License-Identifier: Apache-2.0
+"""All files that the generator writes."""
+
+import cpp
+import python
+import typescript
+from model import Wire
+
+BACKENDS = (cpp, python, typescript)
+
+
+def made(wire: Wire) -> dict[str, str]:
+    """Returns the text of each file, by its path in the repository."""
+    return {path: text for backend in BACKENDS for path, text in backend.files(wire).items()}

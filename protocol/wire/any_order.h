@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+// Protobuf allows more than our Writer makes. Fields may come in any order and several times, there may be unknown
+// fields, a list may be split into its numbers, and a varint may be longer than necessary. AnyOrder rewrites such a
+// message in the form of our Writer, so that the Reader needs to know this form only.
+
+namespace tendon::wire {
+
+/// How a field is encoded.
+enum class Shape : std::uint8_t {
+  kFlag,     ///< a varint: 0 or not
+  kCount32,  ///< a varint, cut to 32 bits; enums, too
+  kCount64,  ///< a varint
+  kBits32,   ///< 4 bytes
+  kBits64,   ///< 8 bytes
+  kText,
+  kMessage,
+  // Repeated:
+  kCount32s,
+  kCount64s,
+  kBits32s,
+  kBits64s,
+  kTexts,
+  kMessages,
+};
+
+struct Schema;
+struct FieldShape {
+  std::uint32_t number;
+  Shape shape;
+  const Schema* inside = nullptr;  ///< of a message
+  bool arm = false;                ///< of the oneof: no message has two
+};
+/// The fields of a message, by number (wire/generated/schema.h).
+struct Schema {
+  std::span<const FieldShape> fields;
+};
+
+/// Rewrites messages. It reuses its memory.
+///
+/// Thread-safe: no.
+class AnyOrder {
+ public:
+  /// Returns the message as libprotobuf understands it (tests/protocol/wire/protobuf_test.cc). If a number, a text or
+  /// an arm of a oneof appears several times, the last one wins. Messages are merged, lists are joined, and unknown fields
+  /// are dropped. Returns nothing if the message is malformed: if it is truncated, if a text is not UTF-8, or if groups
+  /// do not match or are nested more than 100 deep. The result is valid until the next call.
+  std::optional<std::span<const std::byte>> in_order(const Schema& schema, std::span<const std::byte> message);
+
+ private:
+  struct Piece {
+    const std::uint8_t* at;
+    const std::uint8_t* end;
+  };
+  /// One occurrence of a field in the message.
+  struct Found {
+    std::size_t field = 0;  ///< index in the schema
+    unsigned type = 0;      ///< wire type
+    bool replaced = false;  ///< a later arm of the oneof replaces it
+    std::uint64_t number = 0;
+    Piece piece{};
+  };
+
+  bool collect(const Schema& schema, Piece piece, int depth);
+  static bool take(Piece& from, std::uint32_t field, int depth, Found& found);
+  static bool skip_group(Piece& from, std::uint32_t field, int depth);
+  bool write_merged(const Schema& schema, std::size_t from, std::size_t to, const Found& like, int depth);
+  bool write_all(const Schema& schema, std::size_t from, std::size_t to, int depth);
+  bool write(const FieldShape& field, std::size_t place, std::size_t from, std::size_t to, int depth);
+  bool write_list(const FieldShape& field, std::size_t place, std::size_t from, std::size_t to);
+  bool write_message(const FieldShape& field, std::size_t from, std::size_t to, const Found& like, int depth);
+  bool write_text(const FieldShape& field, const Found& found);
+  void put_tag(const FieldShape& field, unsigned type);
+  void put_varint(std::uint64_t value);
+  void put_length(std::size_t begin);
+
+  std::vector<Found> found_;
+  std::vector<std::uint8_t> out_;
+};
+
+}  // namespace tendon::wire
