@@ -29,6 +29,7 @@ struct Driver {
   std::string_view axes{};    ///< "right=x up=y user=z", see core/base/frames.h; empty: not known
   std::vector<std::string_view> buttons{};  ///< names, by their bit in PositionSample::buttons; empty: not known
   std::string_view buttons_in_words{};      ///< "one of a Falcon's, 0 to 3"; empty when it has none of its own
+  Duration watchdog{};                      ///< how long the force is kept without a command; 0: no watchdog
   std::string_view homing{};                ///< what the operator has to do in kUnhomed: "homed: pull the grip …"
 
   // With a plug. X then has `std::string port`.

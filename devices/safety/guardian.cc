@@ -5,9 +5,11 @@
 #include <linux/usbdevice_fs.h>
 #include <poll.h>
 #include <sys/ioctl.h>
+#include <sys/mman.h>
 #include <sys/prctl.h>
 #include <sys/signalfd.h>
 #include <sys/socket.h>
+#include <sys/timerfd.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -16,11 +18,13 @@
 #include <csignal>
 #include <cstring>
 #include <future>
+#include <new>
 #include <optional>
 #include <stdexcept>
 #include <string>
 #include <system_error>
 #include <type_traits>
+#include <utility>
 
 namespace tendon {
 
@@ -54,10 +58,16 @@ bool send_order(int socket, const Order& order, int fd) noexcept {
   return sendmsg(socket, &message, MSG_NOSIGNAL) == static_cast<ssize_t>(sizeof(order));
 }
 
+/// The period at which the guardian reads the heartbeats.
+constexpr Duration kLook = std::chrono::milliseconds(2);
+constexpr std::uint64_t kStillLooks = Heartbeat::kStill / kLook;
+
 /// A device as the guardian knows it.
 struct Charge {
   int fd = -1;
   std::optional<ZeroPacket> zero;
+  Heartbeat::Beat beat{};
+  std::uint64_t looks = 0;  ///< number of reads since `beat` changed
 };
 
 /// Takes the next order; waits for it unless `flags` has MSG_DONTWAIT. False when there is none: without the flag, this
@@ -84,7 +94,7 @@ bool take_order(int socket, std::array<Charge, Guardian::kDevices>& charges, int
   const auto* order = reinterpret_cast<const Order*>(bytes.data());
   Charge& charge = charges[order->device];
   if (charge.fd >= 0) close(charge.fd);
-  charge = {fd, order->zero};
+  charge = {.fd = fd, .zero = order->zero};
   return true;
 }
 
@@ -92,6 +102,32 @@ void end_forces(const std::array<Charge, Guardian::kDevices>& charges) noexcept 
   for (const Charge& charge : charges) {
     if (charge.fd >= 0) charge.zero->send(charge.fd);
   }
+}
+
+/// Sends the zero packet to each device whose heartbeat has stopped. `looks` is the number of timer ticks since the last
+/// call.
+void watch_hearts(const Heartbeat* hearts, std::array<Charge, Guardian::kDevices>& charges,
+                  std::uint64_t looks) noexcept {
+  for (std::size_t i = 0; i < charges.size(); ++i) {
+    Charge& charge = charges[i];
+    if (charge.fd < 0) continue;
+    const Heartbeat::Beat beat = hearts[i].last();
+    if (beat != std::exchange(charge.beat, beat)) {
+      charge.looks = 0;
+      continue;
+    }
+    const std::uint64_t before = std::exchange(charge.looks, charge.looks + looks);
+    const auto passes = [&](std::uint64_t limit) { return before < limit && charge.looks >= limit; };
+    if (beat.holds_force && (passes(kStillLooks) || passes(2 * kStillLooks))) charge.zero->send(charge.fd);
+  }
+}
+
+/// Starts the timer if any device is guarded, and stops it otherwise.
+void set_timer(int timer, const std::array<Charge, Guardian::kDevices>& charges) noexcept {
+  const bool any = std::ranges::any_of(charges, [](const Charge& charge) { return charge.fd >= 0; });
+  const timespec period{.tv_sec = 0, .tv_nsec = any ? kLook.count() : 0};
+  const itimerspec times{.it_interval = period, .it_value = period};
+  timerfd_settime(timer, 0, &times, nullptr);
 }
 
 /// While it exists, blocks all signals of the calling thread. Threads and processes started meanwhile inherit this and
@@ -117,7 +153,7 @@ constexpr int kParentDied = SIGUSR1;
 constexpr char kStandsGuard = 'g';
 
 // The caller has blocked all signals.
-[[noreturn]] void stand_guard(int socket) noexcept {
+[[noreturn]] void stand_guard(int socket, const Heartbeat* hearts) noexcept {
   setsid();
   prctl(PR_SET_PDEATHSIG, kParentDied);
   prctl(PR_SET_NAME, "tendon-guardian", 0UL, 0UL, 0UL);
@@ -133,10 +169,11 @@ constexpr char kStandsGuard = 'g';
   sigaddset(&death, kParentDied);
   pollfd order{.fd = socket, .events = POLLIN, .revents = 0};
   pollfd parent{.fd = signalfd(-1, &death, SFD_CLOEXEC), .events = POLLIN, .revents = 0};
+  pollfd look{.fd = timerfd_create(CLOCK_MONOTONIC, TFD_CLOEXEC), .events = POLLIN, .revents = 0};
   std::array<Charge, Guardian::kDevices> charges;
   bool server_lives = send(socket, &kStandsGuard, 1, MSG_NOSIGNAL) == 1;
   while (server_lives) {
-    std::array<pollfd, 2> told = {order, parent};
+    std::array<pollfd, 3> told = {order, parent, look};
     poll(told.data(), told.size(), -1);
     if (signalfd_siginfo info{}; told[1].revents != 0 && read(parent.fd, &info, sizeof info) > 0) {
       while (take_order(socket, charges, MSG_DONTWAIT)) {
@@ -146,6 +183,9 @@ constexpr char kStandsGuard = 'g';
       end_forces(charges);
     } else if (told[0].revents != 0) {
       server_lives = take_order(socket, charges);
+      set_timer(look.fd, charges);
+    } else if (std::uint64_t looks = 0; told[2].revents != 0 && read(look.fd, &looks, sizeof looks) > 0) {
+      watch_hearts(hearts, charges, looks);
     }
   }
   end_forces(charges);
@@ -187,18 +227,30 @@ Guardian::Guardian(const std::function<void()>& on_start) {
   if (socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0, ends.data()) != 0) {
     throw std::system_error(errno, std::generic_category(), "no socket for the guardian");
   }
+  void* const shared =
+      mmap(nullptr, kDevices * sizeof(Heartbeat), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+  if (shared == MAP_FAILED) {
+    const int error = errno;
+    for (const int end : ends) close(end);
+    throw std::system_error(error, std::generic_category(), "no memory for the guardian");
+  }
+  hearts_ = new (shared) Heartbeat[kDevices];
   std::promise<pid_t> forked;
-  const auto watch = [&on_start, &forked, ends] {
+  const auto watch = [this, &on_start, &forked, ends] {
     if (on_start) on_start();
     const pid_t guardian = fork();
     if (guardian == 0) {
       close(ends[0]);
-      stand_guard(ends[1]);
+      stand_guard(ends[1], hearts_);
     }
     const int error = errno;
     close(ends[1]);
     forked.set_value(guardian > 0 ? guardian : -error);  // the constructor's variables may be gone after this line
-    while (guardian > 0 && waitpid(guardian, nullptr, 0) < 0 && errno == EINTR) {
+    while (guardian > 0) {
+      int status = 0;
+      if (waitpid(guardian, &status, WUNTRACED | WCONTINUED) < 0 && errno == EINTR) continue;
+      stands_ = WIFCONTINUED(status);
+      if (!WIFCONTINUED(status) && !WIFSTOPPED(status)) return;
     }
   };
   {
@@ -211,6 +263,7 @@ Guardian::Guardian(const std::function<void()>& on_start) {
   if (!stands) {
     close(ends[0]);
     parent_.join();
+    munmap(hearts_, kDevices * sizeof(Heartbeat));
     throw std::system_error(pid_ < 0 ? -pid_ : ECHILD, std::generic_category(), "no process for the guardian");
   }
   socket_ = ends[0];
@@ -219,6 +272,7 @@ Guardian::Guardian(const std::function<void()>& on_start) {
 Guardian::~Guardian() {
   close(socket_);
   parent_.join();
+  munmap(hearts_, kDevices * sizeof(Heartbeat));
 }
 
 bool Guardian::guard(std::size_t device, int fd, const ZeroPacket& zero) noexcept {

@@ -8,6 +8,7 @@
 
 #include "core/base/expect.h"
 #include "core/base/rotation.h"
+#include "devices/finite.h"
 
 namespace tendon {
 
@@ -33,10 +34,6 @@ DeviceInfo limited_info(DeviceInfo info, const std::optional<ForceLimit>& force,
   if (torque) info.max_torque = std::min(info.max_torque, torque->max());
   if (grip && info.gripper) info.gripper->max_force = std::min(info.gripper->max_force, grip->max());
   return info;
-}
-
-bool is_finite(const Effort& effort) noexcept {
-  return effort.force.allFinite() && effort.torque.allFinite() && std::isfinite(effort.grip);
 }
 
 /// The grip as a vector, for the parts that are made for forces.
@@ -86,12 +83,15 @@ std::string_view to_string(SafetyFault fault) noexcept {
       return "the device measured an orientation that is no rotation";
     case SafetyFault::kTurnsTooFast:
       return "the handle turned faster than a hand that holds it";
+    case SafetyFault::kGuardianLost:
+      return "the guardian process was killed or stopped; if it was killed, start the server again";
   }
   return "unknown";
 }
 
 SafeDevice::SafeDevice(const Config& config, Device& device)
     : arming_(config.arming),
+      guardian_(config.guardian),
       device_(device),
       growth_limit_(made<GrowthLimit>(config.growth_limit)),
       force_limit_(made<ForceLimit>(config.force_limit)),
@@ -209,6 +209,10 @@ void SafeDevice::watch_button(std::uint32_t buttons) noexcept {
 
 void SafeDevice::watch_silence() noexcept {
   if (stage_ != Stage::kArmed) return;
+  if (guardian_ != nullptr) {
+    if (applied_ != Effort{} && *now_ - applied_at_ >= Heartbeat::kStill) trip(SafetyFault::kCommandSilent);
+    if (!*guardian_) trip(SafetyFault::kGuardianLost);
+  }
   if (command_watchdog_ && command_watchdog_->tripped(*now_ - applied_at_)) {
     trip(SafetyFault::kCommandSilent, command_watchdog_->ramp());
   }
@@ -241,7 +245,8 @@ bool SafeDevice::may_be_armed(const Effort& asked) const noexcept {
   return now_ && *now_ <= request_until_ && device_.state() == State::kHomed && rest_ &&
          last_->at - rest_->at >= kRest && asked.force.norm() <= arming_.rest_force &&
          asked.torque.norm() <= arming_.rest_torque && std::abs(asked.grip) <= arming_.rest_force &&
-         (!dead_man_ || button_held_) && !(link_watchdog_ && link_watchdog_->tripped(*now_ - heard_at_));
+         (!dead_man_ || button_held_) && (guardian_ == nullptr || *guardian_) &&
+         !(link_watchdog_ && link_watchdog_->tripped(*now_ - heard_at_));
 }
 
 Effort SafeDevice::limited(const Effort& asked) const noexcept {

@@ -8,6 +8,7 @@
 
 #include "devices/device.h"
 #include "devices/safety/force_shares.h"
+#include "devices/safety/heartbeat.h"
 #include "devices/safety/trips.h"
 
 namespace tendon {
@@ -36,6 +37,7 @@ enum class SafetyFault : std::uint8_t {
   kDeviceLost,         ///< it is not homed any more: unplugged, or lost its origin
   kNoRotation,         ///< the device measured an orientation that is not a rotation
   kTurnsTooFast,       ///< TurnTrip
+  kGuardianLost,       ///< the guardian is dead or stopped (Guardian::stands)
 };
 /// A sentence for people: "the handle was faster than a hand".
 std::string_view to_string(SafetyFault fault) noexcept;
@@ -73,8 +75,10 @@ std::string_view to_string(SafetyFault fault) noexcept;
 /// the dead man's button, which has to be pressed anew after `arm`. A fault stays a fault; a ramp of a watchdog becomes
 /// one at once.
 ///
-/// This layer cannot act while nobody calls it. When the whole process hangs or dies, the device's own watchdog ends
-/// the force, or the guardian does (guardian.h).
+/// If the process hangs or dies, the guardian (guardian.h) or the watchdog of the device ends the force. If the device has
+/// a guardian, there are two more faults. If `apply` is not called for Heartbeat::kStill, the guardian ends the force, and
+/// the next `read` sets kCommandSilent. If the guardian is killed or stopped, `read` sets kGuardianLost, and the device
+/// cannot be armed.
 ///
 /// A sample whose position or opening is not a number, whose orientation is no rotation, or that jumped (StepBound), is
 /// passed on as no sample.
@@ -107,6 +111,7 @@ class SafeDevice final : public Device {
     std::optional<Watchdog::Config> command_watchdog;  ///< between two calls of `apply`
     std::optional<Watchdog::Config> link_watchdog;     ///< since the newest position was sampled
     std::optional<DeadManSwitch::Config> dead_man;
+    const std::atomic<bool>* guardian = nullptr;             ///< Guardian::stands; null if there is no guardian
     std::optional<ForceLimit::Config> torque_limit;          ///< N·m
     std::optional<GrowthLimit::Config> torque_growth_limit;  ///< N·m/s
     std::optional<TurnTrip::Config> turn_trip;
@@ -141,6 +146,12 @@ class SafeDevice final : public Device {
 
   Status status() const noexcept;
 
+  /// Sets the fault to kCommandSilent if the device is armed. This is called before the haptic thread is suspended.
+  void stand_still() noexcept {
+    if (now_) trip(SafetyFault::kCommandSilent);
+    publish();
+  }
+
  private:
   enum class Stage : std::uint8_t { kWaiting, kArmed, kFault };
 
@@ -162,6 +173,7 @@ class SafeDevice final : public Device {
   void publish() noexcept;
 
   Arming arming_;
+  const std::atomic<bool>* guardian_;
   Device& device_;
   DeviceInfo info_;
   std::optional<GrowthLimit> growth_limit_;

@@ -19,10 +19,10 @@ namespace tendon {
 class OperatorHand {
  public:
   struct Config {
-    double stiffness;  ///< k, N/m, > 0
-    double damping;    ///< c, N·s/m, ≥ 0
-    double mass;       ///< kg, ≥ 0
-    ScriptedMotion motion;
+    double stiffness = 0;  ///< k, N/m, > 0
+    double damping = 0;    ///< c, N·s/m, ≥ 0
+    double mass = 0;       ///< kg, ≥ 0
+    ScriptedMotion motion{ScriptedMotion::Sine{}};
   };
 
   /// Throws std::invalid_argument naming the field, its value and what was expected.

@@ -12,6 +12,7 @@
 
 #include "core/base/expect.h"
 #include "core/base/portable_math.h"
+#include "devices/finite.h"
 
 namespace tendon {
 namespace {
@@ -38,10 +39,6 @@ double share_within(const Vec3& vector, double limit) {
   const double largest = vector.lpNorm<Eigen::Infinity>();
   if (!(largest > 0)) return 1;
   return std::min(1.0, limit / (vector / largest).norm() / largest);
-}
-
-bool is_finite(const Effort& effort) {
-  return effort.force.allFinite() && effort.torque.allFinite() && std::isfinite(effort.grip);
 }
 
 void check(const SimulatedDevice::Config::Press& press) {

@@ -248,6 +248,7 @@ const Driver& driver(const Config& /*config*/) {
                   .axes = "right=-y up=z user=-x",
                   .buttons = {"tip"},
                   .buttons_in_words = "0, the switch at its tip",
+                  .watchdog = WoodenHapticsDevice::kWatchdog,
                   .homing =
                       "calibrated: hold the arm in its calibration pose (devices/woodenhaptics) and press the "
                       "board's button",

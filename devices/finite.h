@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cmath>
+
+#include "core/base/motion.h"
+
+namespace tendon {
+
+/// Returns false if any component of `effort` is NaN or infinite.
+///
+/// Realtime-safe.
+inline bool is_finite(const Effort& effort) noexcept {
+  return effort.force.allFinite() && effort.torque.allFinite() && std::isfinite(effort.grip);
+}
+
+}  // namespace tendon
