@@ -50,21 +50,19 @@ void put_state(DeviceState& state, std::uint32_t device, const StepRecord& recor
   state.hand_force = record.hand_force;
 }
 
-void carry_out(const HapticOrder& order, Couplings& couplings) noexcept {
-  if (order.coupling >= couplings.size()) return;
-  if (order.kind == HapticOrder::Kind::kEngage) couplings[order.coupling].engage();
-  if (order.kind == HapticOrder::Kind::kDisengage) couplings[order.coupling].disengage();
-  if (order.kind == HapticOrder::Kind::kSetScale) couplings[order.coupling].set_scale(order.scales[0], order.scales[1]);
-  if (order.kind == HapticOrder::Kind::kRenew) couplings[order.coupling].renew();
-  if (order.kind == HapticOrder::Kind::kShare) couplings.set_share(order.coupling, order.share);
+/// Returns null if the device has no such coupling.
+Coupling* coupling_of(HapticController& controller, std::uint32_t number) noexcept {
+  Couplings* const couplings = controller.couplings();
+  return couplings != nullptr && number < couplings->size() ? &(*couplings)[number] : nullptr;
 }
 
 }  // namespace
 
-HapticLoop::HapticLoop(const Config& config, Device& device, Mailboxes& mail)
+HapticLoop::HapticLoop(const Config& config, Device& device, Mailboxes& mail, Heartbeat* heart)
     : config_(config),
       device_(device),
       mail_(mail),
+      heart_(heart),
       controller_(config.control),
       velocity_(device.info().position_resolution),
       force_rounding_squared_(device.info().force_resolution * device.info().force_resolution),
@@ -92,6 +90,7 @@ void HapticLoop::take_mail(LocalTime now) noexcept {
   for (std::size_t i = 0; i < Mailboxes::kOrders; ++i) {
     const HapticOrder* const order = mail_.orders.front();
     if (order == nullptr) break;
+    Coupling* const coupling = coupling_of(controller_, order->coupling);
     switch (order->kind) {
       case HapticOrder::Kind::kRelease:
         controller_.release(now, order->source, order->channel);
@@ -108,12 +107,20 @@ void HapticLoop::take_mail(LocalTime now) noexcept {
         device_.arm();
         break;
       case HapticOrder::Kind::kEngage:
+        if (coupling != nullptr) coupling->engage();
+        break;
       case HapticOrder::Kind::kDisengage:
-      case HapticOrder::Kind::kShare:
+        if (coupling != nullptr) coupling->disengage();
+        break;
       case HapticOrder::Kind::kSetScale:
+        if (coupling != nullptr) coupling->set_scale(order->scales[0], order->scales[1]);
+        break;
       case HapticOrder::Kind::kRenew:
-        if (Couplings* const couplings = controller_.couplings()) carry_out(*order, *couplings);
-        if (order->kind == HapticOrder::Kind::kRenew) peer_numbers_.at(order->coupling) = order->source;
+        if (coupling != nullptr) coupling->renew();
+        peer_numbers_.at(order->coupling) = order->source;
+        break;
+      case HapticOrder::Kind::kShare:
+        if (coupling != nullptr) controller_.couplings()->set_share(order->coupling, order->share);
         break;
     }
     mail_.orders.pop();
@@ -204,6 +211,10 @@ void HapticLoop::command(StepRecord& record) noexcept {
   record.applied = applied_.force;
 }
 
+void HapticLoop::beat() noexcept {
+  if (heart_ != nullptr) heart_->beat(applied_ != Effort{});
+}
+
 void HapticLoop::command_all(StepRecord& record) noexcept {
   TurnStep* const turn = record.turn();
   GripStep* const grip = record.grip();
@@ -224,6 +235,7 @@ LocalTime HapticLoop::step(LocalTime now) noexcept {
   StepRecord record;
   take_step(now, record);
   command(record);
+  beat();
   record.tick = ++tick_;
   record.scheduled = due_;
   record.rearmed = std::exchange(rearmed_, false);
@@ -277,6 +289,7 @@ void HapticLoop::publish_ports(const StepRecord& record) noexcept {
   const auto& leaders = config_.control.leaders;
   for (std::size_t i = 0; i < couplings.size(); ++i) {
     Coupling& coupling = couplings[i];
+    coupling.conclude(record.applied, record.hand_force, applied_.torque, applied_.grip);
     PortRecord port{
         .tick = record.tick,
         .channel = leaders.empty() ? 0 : leaders[i].channel,
@@ -285,7 +298,7 @@ void HapticLoop::publish_ports(const StepRecord& record) noexcept {
         .grip_settled = controller_.grip_settled(),
         .stiffness = coupling.stiffness(),
         .round_trip = coupling.round_trip(),
-        .sent = coupling.message(record.applied, record.hand_force, applied_.torque, applied_.grip),
+        .sent = coupling.message(),
     };
     if (peers_[i]) {
       port.peer = peers_[i]->state;
@@ -302,6 +315,7 @@ void HapticLoop::stop() noexcept {
   } else {
     applied_.force = device_.apply(Vec3::Zero());
   }
+  beat();
   force_.store(applied_.force.norm(), std::memory_order_relaxed);
 }
 

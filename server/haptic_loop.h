@@ -9,6 +9,7 @@
 #include "core/estimation/velocity_estimator.h"
 #include "core/haptic_controller.h"
 #include "devices/device.h"
+#include "devices/safety/heartbeat.h"
 #include "server/guests/health.h"
 #include "server/mailboxes.h"
 
@@ -39,14 +40,15 @@ class HapticLoop {
     double force = 0;  ///< N, norm of what the device holds
   };
 
-  /// `device` and `mail` must outlive the loop. Throws std::invalid_argument when a value is impossible.
-  HapticLoop(const Config& config, Device& device, Mailboxes& mail);
+  /// `device`, `mail` and `heart` must outlive the loop. Each step beats `heart`, which is null if no guardian watches the
+  /// device. Throws std::invalid_argument if a value is impossible.
+  HapticLoop(const Config& config, Device& device, Mailboxes& mail, Heartbeat* heart = nullptr);
 
   /// One haptic step. Returns when the next one is due: one period after this one was, or, when this one
   /// was late by a period or more, one period from now: steps that were missed are not made up for.
   LocalTime step(LocalTime now) noexcept;
 
-  /// Zero force, now. The last thing the haptic thread does.
+  /// Sets the force to zero. This is called before the haptic thread ends or is suspended.
   void stop() noexcept;
 
   Stats stats() const noexcept;
@@ -73,6 +75,7 @@ class HapticLoop {
   void take_step(LocalTime now, StepRecord& record) noexcept;
   void command(StepRecord& record) noexcept;
   void command_all(StepRecord& record) noexcept;
+  void beat() noexcept;
   void watch_device() noexcept;
   void rearm() noexcept;
   void publish(const StepRecord& record) noexcept;
@@ -81,6 +84,7 @@ class HapticLoop {
   Config config_;
   Device& device_;
   Mailboxes& mail_;
+  Heartbeat* heart_;
   HapticController controller_;
   VelocityEstimator velocity_;
   double force_rounding_squared_;  ///< N²: what the device rounds away is no clamp

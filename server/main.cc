@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <unistd.h>
+
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <array>
@@ -13,14 +15,18 @@
 #include <fstream>
 #include <iostream>
 #include <mutex>
+#include <new>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <span>
+#include <stdexcept>
 #include <string>
 #include <utility>
 #include <variant>
 #include <vector>
 
+#include "clients/cpp/usage.h"
+#include "core/base/nearest_word.h"
 #include "devices/falcon/firmware.h"
 #include "devices/simulated/profiles.h"
 #include "devices/usb/usb.h"
@@ -31,6 +37,7 @@
 #include "server/commands/explain.h"
 #include "server/machine/clock.h"
 #include "server/machine/log.h"
+#include "server/machine/output.h"
 #include "server/machine/randomness.h"
 #include "server/machine/realtime.h"
 #include "server/machine/regular_file.h"
@@ -94,19 +101,41 @@ Json in_json(const NetworkLoop::SessionChange& change, std::span<const std::byte
   return line;
 }
 
+// Exit codes besides 0.
+constexpr int kFailed = 1;
+constexpr int kWrongUsage = 2;
+
 /// A year. Longer is a typo.
 constexpr double kLongestRun_s = 365.0 * 86400;
 
-sigset_t signals_to_end() {
+/// Includes SIGTSTP, which is sent by Ctrl-Z.
+sigset_t signals_to_wait_for() {
   sigset_t set;
   sigemptyset(&set);
-  for (const int signal : {SIGINT, SIGTERM, SIGHUP, SIGQUIT}) sigaddset(&set, signal);
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGTSTP}) sigaddset(&set, signal);
   return set;
+}
+
+/// Sets the forces to zero and then stops the process, unless SIGCONT is already pending.
+void stop_this_process(Server& server, UnblockedOutput& output) {
+  sigset_t going_on;
+  sigemptyset(&going_on);
+  sigaddset(&going_on, SIGCONT);
+  constexpr timespec kNow{};
+  server.suspend();
+  log::warn("stopped by SIGTSTP: no force until it goes on (SIGCONT, `fg` or `bg`) and the device is armed again");
+  output.flush();
+  if (sigtimedwait(&going_on, nullptr, &kNow) < 0) {
+    ::kill(::getpid(), SIGSTOP);
+    sigtimedwait(&going_on, nullptr, &kNow);
+  }
+  server.resume();
+  log::info("it goes on");
 }
 
 // Waits for a signal to end, or for `duration_s` seconds when it is above zero, and tells a service manager meanwhile
 // that the haptic loops turn. Returns why it ended.
-std::string wait_for_the_end(const sigset_t& signals, double duration_s, Server& server) {
+std::string wait_for_the_end(const sigset_t& signals, double duration_s, Server& server, UnblockedOutput& output) {
   constexpr Duration kLongestWait = std::chrono::hours(1);
   const std::optional<Duration> watched = service::watch_period();
   const Duration period = watched.value_or(kLongestWait);
@@ -118,6 +147,10 @@ std::string wait_for_the_end(const sigset_t& signals, double duration_s, Server&
     const auto whole = std::chrono::floor<std::chrono::seconds>(wait);
     const timespec timeout{.tv_sec = whole.count(), .tv_nsec = (wait - whole).count()};
     const int signal = sigtimedwait(&signals, nullptr, &timeout);
+    if (signal == SIGTSTP) {
+      stop_this_process(server, output);
+      continue;
+    }
     if (signal > 0) return "signal " + std::to_string(signal);
     if (errno == EINTR) continue;  // stopped and continued
     if (left && (*left -= wait) <= Duration::zero()) return "its duration is over";
@@ -248,13 +281,19 @@ std::string what_is_missing(const PartRecorder::Status& recording) {
 
 int run(const std::vector<Scene>& scenes, double duration_s, bool json) {
   // Every thread inherits this mask, so that signals come to sigwait only.
-  const sigset_t signals = signals_to_end();
-  pthread_sigmask(SIG_BLOCK, &signals, nullptr);
+  const sigset_t signals = signals_to_wait_for();
+  sigset_t blocked = signals;
+  sigaddset(&blocked, SIGCONT);
+  pthread_sigmask(SIG_BLOCK, &blocked, nullptr);
+  // If these signals are not ignored, a background process is stopped when it writes to a terminal with `stty tostop`.
+  std::signal(SIGTTOU, SIG_IGN);
+  std::signal(SIGTTIN, SIG_IGN);
   // A signal that ends a recording or closes a log must not end the device loop.
   std::signal(SIGXFSZ, SIG_IGN);
   std::signal(SIGPIPE, SIG_IGN);
 
   use_small_stacks();
+  UnblockedOutput output;
   // Before the server, whose threads use them.
   Lines lines;
   std::array<std::byte, 12> name_of_run;
@@ -279,7 +318,7 @@ int run(const std::vector<Scene>& scenes, double duration_s, bool json) {
     lines.begin(listening);
   }
   service::ready();
-  const std::string why = wait_for_the_end(signals, duration_s, server);
+  const std::string why = wait_for_the_end(signals, duration_s, server, output);
   service::stopping();
   const Server::Summary summary = server.stop();
   const HapticLoop::Stats haptic = total(summary.devices);
@@ -292,7 +331,7 @@ int run(const std::vector<Scene>& scenes, double duration_s, bool json) {
   if (json) lines.add(in_json(summary));
   if (!summary.recording || summary.recording->complete()) return 0;
   log::error("the recording is not whole: " + what_is_missing(*summary.recording));
-  return 1;
+  return kFailed;
 }
 
 int explain_each(const std::vector<std::filesystem::path>& files, bool json) {
@@ -324,7 +363,7 @@ int list_devices(const OptionalPath& firmware, bool accept_unknown_firmware, boo
     return 0;
   } catch (const std::runtime_error& no_usb) {
     log::error(no_usb.what());
-    return 1;
+    return kFailed;
   }
 }
 
@@ -338,7 +377,7 @@ void set_falcon(std::vector<Scene>& scenes, const OptionalPath& firmware, bool a
     if (firmware) falcon->firmware = firmware;
     if (accept_unknown_firmware) falcon->accept_unknown_firmware = true;
   }
-  if (firmware && !any) throw std::runtime_error("--falcon-firmware: no scene has [device] kind = \"falcon\"");
+  if (firmware && !any) throw std::invalid_argument("--falcon-firmware: no scene has [device] kind = \"falcon\"");
 }
 
 /// Of the one scene that dials.
@@ -352,14 +391,20 @@ void dial_instead(std::vector<Scene>& scenes, const Address& server) {
 /// quiet: no limiter has an account for its purse.
 std::vector<std::string> without_limiter_settings(const Scene& scene) {
   if (scene.driver().moves_a_hand) {
-    throw std::runtime_error("--without-limiter: expected simulated devices only, found " + scene.name + ", a " +
-                             std::string(scene.driver().name));
+    throw std::invalid_argument("--without-limiter: expected simulated devices only, found " + scene.name + ", a " +
+                                std::string(scene.driver().name));
   }
   std::vector<std::string> settings = limiter_settings("none", scene.loop.control);
   if (scene.teleoperation) {
     settings.insert(settings.end(), {"teleoperation.purse=", "teleoperation.coupling.adapt_to_delay=false"});
   }
   return settings;
+}
+
+/// Why a scene file cannot be one: it is no file, and nearly the name of a command.
+std::string meant_command(const std::string& file) {
+  const std::string meant = did_you_mean(file, "keygen, explain, devices, doctor");
+  return meant.empty() || std::filesystem::exists(file) ? "" : "there is no file \"" + file + '"' + meant;
 }
 
 /// The name becomes a file's name and a word in the log.
@@ -376,12 +421,17 @@ int make_key(const std::string& name, const std::string& file, bool observer) {
     fill_random(key.key.bytes());
     write_key_file(file, key);
     std::cerr << "Wrote " << file << ", a key for " << (observer ? "an observer" : "a controller")
-              << ". A copy goes into the server's folder of keys, one to the client (--key FILE), over a way that you "
-                 "trust.\n";
+              << ". The server and the client each need a copy, over a way that you trust.\n"
+                 "  on the server, in the folder of its scene:  mkdir -p -m 700 keys && cp "
+              << file << " keys/\n"
+              << "  in its scene:                               [network]\n"
+                 "                                              keys = \"keys\"\n"
+                 "  the client:                                 "
+              << (observer ? "tendon-dash" : "virtual_wall") << " --key " << file << " --server HOST:47100\n";
     return 0;
   } catch (const std::exception& problem) {
     log::error(problem.what());
-    return 1;
+    return kFailed;
   }
 }
 
@@ -389,12 +439,25 @@ int make_key(const std::string& name, const std::string& file, bool observer) {
 
 int main(int argc, char** argv) {
   CLI::App app(
-      "tendond: the haptics server. Runs the device loop and the output limiter beside the device, and lets\n"
-      "remote physics engines send forces over UDP.\n\n"
-      "Example:  tendond deploy/scenes/demo.toml --record run.mcap\n\n"
-      "Several devices: a scene for each; [network] and [recording] are in the first one only.\n"
-      "Example:  tendond deploy/scenes/left.toml deploy/scenes/right.toml\n"
-      "Many simulated ones: [device] count = 512 in one scene.\n");
+      "The haptics server. Runs the device loop and the output limiter beside the device, and lets remote physics\n"
+      "engines send forces over UDP.\n",
+      "tendond");
+  usage::dress(app);
+  app.footer(
+      "Examples:\n"
+      "  tendond deploy/scenes/demo.toml --record run.mcap\n"
+      "  tendond deploy/scenes/left.toml deploy/scenes/right.toml\n"
+      "\n"
+      "The second one has two devices. [network] and [recording] are in the first scene only. [device] count = 512 in "
+      "a\n"
+      "scene makes many simulated devices.\n"
+      "\n"
+      "Files:\n"
+      "  /etc/tendon/scene.toml     the scene of the service tendond\n"
+      "  /usr/share/tendon/scenes   scenes to start from\n"
+      "\n"
+      "Exit: 0 done; 1 a file, a port or a device cannot be used, or the recording is not whole;\n"
+      "2 wrong usage, or a mistake in a scene.");
   std::vector<std::filesystem::path> scene_files;
   std::string record;
   std::string listen;
@@ -403,63 +466,83 @@ int main(int argc, char** argv) {
   bool without_limiter = false;
   bool json = false;
   bool profiles = false;
-  bool scene_help = false;
-  auto* scene_option = app.add_option("scene", scene_files, "Scene files (TOML), one for each device");
-  scene_option->expected(1, static_cast<int>(limits::kMaxDevices));
+  std::string table;
+  auto* scene_option = app.add_option("SCENE", scene_files, "Scene files (TOML), one for each device");
+  scene_option->expected(1, static_cast<int>(limits::kMaxDevices))->check(CLI::Validator(meant_command, ""));
   app.add_option("--record", record,
                  "Record to this MCAP file, whatever the scene's [recording] says. A file that is there is never "
-                 "overwritten: run.mcap goes on as run-2.mcap");
-  app.add_option("--listen", listen, "HOST:PORT to listen on, whatever the scene says; port 0 lets the system choose");
-  app.add_option("--dial", dial, "HOST:PORT of the server to couple with, instead of that of [teleoperation]");
+                 "overwritten: run.mcap goes on as run-2.mcap")
+      ->type_name("FILE.mcap");
+  app.add_option("--listen", listen, "Where to listen, whatever the scene says; port 0 lets the system choose")
+      ->type_name("HOST:PORT");
+  app.add_option("--dial", dial, "The server to couple with, instead of that of [teleoperation]")
+      ->type_name("HOST:PORT");
   app.add_option("--duration-s", duration_s,
-                 "Stop so many seconds after the first haptic step; 0 = at SIGINT or SIGTERM");
+                 "Stop so many seconds after the first haptic step; 0 = at SIGINT or SIGTERM")
+      ->capture_default_str();
   app.add_flag(
       "--without-limiter", without_limiter,
-      "Switch the output limiter off, and a coupling's purse and its heed of the delay. Simulated devices only");
+      "Turn off the output limiter, and in a coupling the energy sharing and the delay-dependent stiffness. Simulated "
+      "devices only");
   std::string firmware;
   bool accept_unknown_firmware = false;
+  constexpr const char* kFalcon = "A Novint Falcon";
+  constexpr const char* kAbout = "Print and exit";
   const auto add_firmware = [&](CLI::App& to) {
-    to.add_option("--falcon-firmware", firmware, "File with a Novint Falcon's firmware, whatever the scene says");
-    to.add_flag("--accept-unknown-firmware", accept_unknown_firmware, "… also one that is none of the known files");
+    to.add_option("--falcon-firmware", firmware, "File with a Novint Falcon's firmware, whatever the scene says")
+        ->type_name("FILE")
+        ->group(kFalcon);
+    to.add_flag("--accept-unknown-firmware", accept_unknown_firmware, "Take a firmware that is none of the known files")
+        ->group(kFalcon);
   };
   add_firmware(app);
   app.add_flag("--json", json,
                "One JSON object per line on stdout: listening; welcomed and left, for each session; stopped");
-  app.add_flag("--profiles", profiles,
-               "Print the profiles of devices and operators, and how each of their numbers is known");
-  app.add_flag("--scene-help", scene_help, "Print every key that a scene may have");
+  app.add_flag("--profiles", profiles, "The profiles of devices and operators, and how each of their numbers is known")
+      ->group(kAbout);
+  auto* scene_help = app.add_option("--scene-help", table, "The tables of a scene; of one TABLE, or of all, every key")
+                         ->type_name("[TABLE]")
+                         ->expected(0, 1)
+                         ->group(kAbout);
   std::string key_name;
   std::string key_file;
   bool observer = false;
   auto* keygen = app.add_subcommand(
       "keygen", "Make a key for one client: `tendond keygen wall` writes wall.key, which only you may read");
-  keygen->add_option("name", key_name, "The client's name on this server")->required();
-  keygen->add_option("--out", key_file, "Write to this file instead of NAME.key");
+  keygen->footer(
+      "\nExample: tendond keygen wall\n\nExit: 0 done; 1 the file is there or cannot be written; 2 wrong usage.");
+  keygen->add_option("NAME", key_name, "The client's name on this server")->required();
+  keygen->add_option("--out", key_file, "Write to this file instead of NAME.key")->type_name("FILE");
   keygen->add_flag("--observer", observer, "A key whose owner may watch, but send no forces");
   auto* explainer = app.add_subcommand(
       "explain",
       "What a scene runs and leaves out, and what each part adds to a haptic step: `tendond explain demo.toml`");
-  explainer->add_option("scene", scene_files, "Scene files")->required();
+  explainer->footer(
+      "\nExample: tendond explain deploy/scenes/demo.toml\n\nExit: 0 done; 2 wrong usage or a wrong scene.");
+  explainer->add_option("SCENE", scene_files, "Scene files")->required();
   explainer->add_flag("--json", json, "One JSON object per scene on stdout");
   auto* devices = app.add_subcommand(
       "devices", "What is plugged in, what it lacks, and how to mend that: `tendond devices --falcon-firmware FILE`");
+  devices->footer("\nExample: tendond devices\n\nExit: 0 done; 1 USB cannot be read; 2 wrong usage.");
   add_firmware(*devices);
   devices->add_flag("--json", json, "One JSON object per device on stdout");
   auto* doctor = app.add_subcommand(
       "doctor",
       "How late a haptic thread would wake on this machine, and what to change for it. Takes two seconds and changes "
       "nothing: `tendond doctor`");
+  doctor->footer("\nExample: tendond doctor\n\nExit: 0 done; 2 wrong usage.");
   doctor->add_flag("--json", json, "One JSON object on stdout");
-  app.set_version_flag("--version", version_text());
+  app.set_help_flag("-h,--help", "This text")->group(kAbout);
+  app.set_version_flag("--version", version_text(), "The version and the commit")->group(kAbout);
   try {
-    app.parse(argc, argv);
+    usage::parse(app, argc, argv);
     if (profiles) {
       for (const DeviceProfile& profile : device_profiles()) std::cout << provenance_table(profile) << '\n';
       for (const OperatorProfile& profile : operator_profiles()) std::cout << provenance_table(profile) << '\n';
       return 0;
     }
-    if (scene_help) {
-      std::cout << scene_reference();
+    if (*scene_help) {
+      std::cout << (table.empty() ? scene_tables() : table == "all" ? scene_reference() : scene_reference(table));
       return 0;
     }
     if (!(duration_s >= 0 && duration_s <= kLongestRun_s)) {  // NaN is neither
@@ -469,9 +552,12 @@ int main(int argc, char** argv) {
       check_key_name(key_name);
       return make_key(key_name, key_file.empty() ? key_name + ".key" : key_file, observer);
     }
-    if (!*explainer && !*devices && !*doctor && scene_option->count() == 0) throw CLI::RequiredError("scene");
+    if (!*explainer && !*devices && !*doctor && scene_option->count() == 0) throw CLI::RequiredError("SCENE");
   } catch (const CLI::ParseError& problem) {
-    return app.exit(problem) == 0 ? 0 : 2;
+    return usage::exit_code(app, problem);
+  } catch (const std::invalid_argument& problem) {
+    log::error(problem.what());
+    return kWrongUsage;
   }
 
   try {
@@ -489,8 +575,20 @@ int main(int argc, char** argv) {
     if (!dial.empty()) dial_instead(scenes, parse_address(dial));
     set_falcon(scenes, firmware_file, accept_unknown_firmware);
     return run(each_device(scenes), duration_s, json);
+  } catch (const SceneFileError& problem) {
+    log::error(problem.what());
+    return kFailed;
+  } catch (const SceneError& problem) {
+    log::error(problem.what());
+    return kWrongUsage;
+  } catch (const std::invalid_argument& problem) {
+    log::error(problem.what());
+    return kWrongUsage;
+  } catch (const std::bad_alloc&) {
+    log::error("there is too little memory; does `ulimit -v` limit it?");
+    return kFailed;
   } catch (const std::exception& problem) {
     log::error(problem.what());
-    return 2;
+    return kFailed;
   }
 }

@@ -3,13 +3,13 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <limits>
 #include <utility>
 
-#include "protocol/wire/codec.h"
 #include "protocol/wire/header.h"
 #include "server/guests/requests.h"
+#include "server/guests/states.h"
+#include "server/guests/unknown_keys.h"
 
 namespace tendon {
 
@@ -19,102 +19,50 @@ using enum DatagramSieve::Sender;
 
 constexpr std::size_t kMaxNotices = 64;
 constexpr std::size_t kMaxForeign = 64;
-/// Between two times that an observer is told of both ends of a coupling: people look at them.
-constexpr Duration kShowPortsEvery = std::chrono::milliseconds(20);
 
-bool contains(const std::vector<std::string>& features, std::string_view feature) {
-  return std::find(features.begin(), features.end(), feature) != features.end();
+/// There is only one notice per turn, so that a flood of Hellos cannot crowd out other notices.
+void note_unknown_key(std::vector<NetworkLoop::Notice>& notices, const Address& from) {
+  const auto is_one = [](const NetworkLoop::Notice& one) { return UnknownKeys::is_notice(one.text); };
+  const auto noted = std::ranges::find_if(notices, is_one);
+  if (noted != notices.end()) {
+    noted->text = UnknownKeys::notice(from);
+  } else if (notices.size() < kMaxNotices) {
+    notices.push_back({true, UnknownKeys::notice(from)});
+  }
 }
 
-template <class Counts>
-void add_dropped(NetworkLoop::Dropped& sum, const Counts& more, const RefusedForces& forces) {
-  sum.duplicated += more.duplicated;
-  sum.malformed += more.malformed;
-  sum.forged += more.forged;
-  sum.old_key += more.old_key;
-  sum.invalid += more.invalid;
-  sum.stale += more.stale;
-  sum.forces.not_finite += forces.not_finite;
-  sum.forces.out_of_bounds += forces.out_of_bounds;
-  sum.forces.old_sequence += forces.old_sequence;
-}
-
-void add(NetworkLoop::Dropped& sum, const LinkStats& link) { add_dropped(sum, link, link.refused_forces); }
-
-/// As the present controller, or the last one.
-void remember(NetworkLoop::Stats& stats, const Guest& guest) {
-  if (guest.role != Role::kController) return;
-  stats.controller = guest.session.stats();
-  stats.controller_clock = guest.session.peer_clock();
+/// Returns the clock exchange of the current datagram, or null if it contains no echo.
+const ClockExchange* exchange_of(LocalTime now, const Guest& guest) {
+  const auto& exchange = guest.session.newest_exchange();
+  return exchange && exchange->answered_at == now ? &*exchange : nullptr;
 }
 
 }  // namespace
 
-NetworkLoop::Stats& NetworkLoop::Stats::operator+=(const Stats& more) {
-  welcomed += more.welcomed;
-  refused += more.refused;
-  timed_out += more.timed_out;
-  replaced += more.replaced;
-  roamed += more.roamed;
-  half_open_forgotten += more.half_open_forgotten;
-  malformed += more.malformed;
-  unknown_connection += more.unknown_connection;
-  hellos += more.hellos;
-  forces += more.forces;
-  denied += more.denied;
-  unanswerable += more.unanswerable;
-  late_ours += more.late_ours;
-  late_network += more.late_network;
-  late_engine += more.late_engine;
-  late_unknown += more.late_unknown;
-  foretold += more.foretold;
-  hopeless += more.hopeless;
-  add_dropped(dropped, more.dropped, more.dropped.forces);
-  channels.insert(channels.end(), more.channels.begin(), more.channels.end());
-  if (controller.datagrams_received == 0) {
-    controller = more.controller;
-    controller_clock = more.controller_clock;
-  }
-  return *this;
-}
-
-NetworkLoop::NetworkLoop(const Config& config, Link& link, const std::vector<Mailboxes*>& mail)
+NetworkLoop::NetworkLoop(const Config& config, Link& link, LocalTime now)
     : config_(config),
       link_(link),
       sieve_(config.recorded),
-      devices_(served_devices(config.devices, config.handles, mail, config.shard)),
+      devices_(served_devices(config.devices, config.shard)),
       first_device_(config.shard.first_device(config.devices.size())),
       doorman_({.secret = config.secret, .keys = config.keys, .suites = config.suites, .number = config.shard.number}),
       admission_(
           {.keys = config.keys.size(), .needs_no_key = config.needs_no_key, .max_observers = config.max_observers}),
       next_connection_id_(config.first_connection_id / config.shard.of * config.shard.of + config.shard.number) {
   half_open_.reserve(config.max_half_open);
-  for (std::size_t i = 0; i < devices_.size(); ++i) {
-    ServedDevice& device = devices_[i];
-    states_.push_back({&device.mail->state});
-    const std::size_t place = first_device_ + i;
-    if (place < config.leaders.size()) device.leaders = config.leaders[place];
-    if (place < config.couplings.size()) device.coupling = config.couplings[place];
-    if (device.coupling) coupled_.push_back(static_cast<std::uint32_t>(i));
-  }
-  const auto is_others = [&](const Config::Dial& dial) {
-    return dial.device < first_device_ || dial.device >= first_device_ + devices_.size();
+  const auto out = [this](LocalTime at, const Address& to, std::span<const std::byte> datagram) {
+    send(at, kGuest, to, datagram);
   };
-  std::erase_if(config_.dials, is_others);
-  config_.secret = {};  // the doorman has taken what it needs
+  for (std::uint32_t i = 0; i < devices_.size(); ++i) {
+    states_.push_back({&devices_[i].mail->state});
+    if (const auto& server = config.devices[first_device_ + i].dial) ports_.dial(now, i, *server, out);
+  }
+  // The loop does not need these secrets again.
+  for (ServedDevice::Config& device : config_.devices) device.dial.reset();
+  config_.secret = {};
 }
 
 LocalTime NetworkLoop::turn(LocalTime now) {
-  if (!std::exchange(dials_, true)) {
-    for (Config::Dial& dial : config_.dials) {
-      const auto out = [this](LocalTime at, const Address& to, std::span<const std::byte> datagram) {
-        send(at, kGuest, to, datagram);
-      };
-      dialled_.push_back(
-          {static_cast<std::uint32_t>(dial.device - first_device_), std::make_unique<Peer>(dial.peer, out, now)});
-      dial.peer.seed = {};
-    }
-  }
   // The newest states leave first: a state waits for no system call.
   publish(now);
   const bool more = drain(now);
@@ -129,7 +77,8 @@ LocalTime NetworkLoop::turn(LocalTime now) {
   stats_.half_open_forgotten +=
       std::erase_if(half_open_, [&](const Guest& guest) { return now - guest.arrived >= config_.half_open_timeout; });
 
-  LocalTime next = turn_peers(now);
+  LocalTime next = ports_.turn(now);
+  for (Peer::Notice& said : ports_.take_notices()) notice(said.warning, std::move(said.text));
   if (more) return now;
   for (const Guest& guest : guests_) next = std::min(next, guest.session.next_tick());
   return next;
@@ -159,7 +108,7 @@ void NetworkLoop::receive(LocalTime now, const Address& from, std::span<const st
   };
   const auto header = decode_header(datagram);
   if (header && header->type == DatagramType::kHello) return greet(now, from, datagram);
-  if (receive_of_peer(now, from, datagram)) return tap_from(kGuest);
+  if (ports_.receive(now, from, datagram)) return tap_from(kGuest);
   if (!header || header->type != DatagramType::kData) {
     ++stats_.malformed;
     return tap_from(kStranger);
@@ -195,7 +144,9 @@ void NetworkLoop::receive(LocalTime now, const Address& from, std::span<const st
 
 void NetworkLoop::greet(LocalTime now, const Address& from, std::span<const std::byte> datagram) {
   std::array<std::byte, kMaxDatagram> answer;
+  const std::uint64_t unknown_keys = doorman_.stats().unknown_key;
   const Doorman::Reply reply = doorman_.receive(now, from, datagram, answer);
+  if (doorman_.stats().unknown_key > unknown_keys) note_unknown_key(notices_, from);
   const DatagramSieve::Sender sender = reply.guest ? sender_of(*reply.guest, from) : kStranger;
   tap(now, DatagramRecord::Direction::kIn, sender, from, datagram, datagram.size());
   if (reply.guest) return admit(now, from, *reply.guest, datagram);
@@ -272,7 +223,8 @@ void NetworkLoop::admit(LocalTime now, const Address& from, const Doorman::Guest
   session.rekey = config_.rekey;
   session.life = config_.session_life;
   Welcome welcome = Admission::welcome_for(guest, from, seats, devices_, guests_);
-  session.states_in_columns = contains(welcome.features, kFeatureStateColumns);
+  const Features features(welcome.features);
+  session.states_in_columns = features.has<kFeatureStateColumns>();
   welcome.timeout = session.timeout;
   welcome.server = config_.server_name;
   std::array<std::byte, kMaxDatagram> answer;
@@ -281,23 +233,15 @@ void NetworkLoop::admit(LocalTime now, const Address& from, const Doorman::Guest
   const auto bytes = std::span(answer).first(answered.size);
   send(now, sender_of(guest, from), from, bytes);
 
-  std::vector<View> views = Admission::views_of(seats);
   Guest arrived{from,
                 guest.random,
                 guest.key,
                 guest.hello.name,
                 role,
-                contains(welcome.features, kFeatureChannels),
-                contains(welcome.features, kFeatureDiagnostics),
-                contains(welcome.features, kFeatureHandle),
-                contains(welcome.features, kFeatureJoints),
-                contains(welcome.features, kFeatureTeleoperation) && role == Role::kController,
-                contains(welcome.features, kFeatureTeleoperation) && role == Role::kObserver,
-                contains(welcome.features, kFeatureOutputs),
-                session.states_in_columns,
-                contains(welcome.features, kFeatureWays) ? guest.hello.ways : std::vector<std::string>(),
-                std::move(seats),
-                std::move(views),
+                features,
+                features.has<kFeatureWays>() ? guest.hello.ways : std::vector<std::string>(),
+                seats,
+                Admission::views_of(seats),
                 {bytes.begin(), bytes.end()},
                 answered.keys ? Session(session, *answered.keys, now) : Session(session, now),
                 now};
@@ -346,7 +290,7 @@ void NetworkLoop::open(LocalTime now, Guest guest) {
     const Guest* const holder = guest_of(guests_, leases_.holder(seat.device, seat.channel));
     if (holder == nullptr) {
       leases_.hold(now, seat.device, seat.channel, arrived);
-    } else if (arrived.can_lose) {  // needed only when somebody has come while it was half-open
+    } else if (arrived.has<kFeatureChannels>()) {  // Another guest took the channel in the meantime.
       arrived.session.request(LeaseLost{.device = number_of(seat.device), .channel = seat.channel, .to = holder->name});
     }
   }
@@ -364,7 +308,7 @@ void NetworkLoop::dispossess(LocalTime now, Guest& loser, const Guest& winner, c
                     loser.name + "\"");
   loser.uncouple(lost.device, lost.channel);
   const LeaseLost news{.device = number_of(lost.device), .channel = lost.channel, .to = winner.name};
-  if (loser.can_lose && loser.session.request(news)) return;
+  if (loser.has<kFeatureChannels>() && loser.session.request(news)) return;
   // The guest does not know the request, or does not answer.
   loser.session.close(Code::kReplaced, "\"" + winner.name + "\" has taken this place");
   send_all(now, loser);
@@ -388,16 +332,6 @@ void NetworkLoop::adapt(LocalTime now, Guest& guest) {
                (guest.hopeless ? "\" loses too much to be of use: its forces are not taken" : "\" is of use again"));
   }
 }
-
-namespace {
-
-/// The exchange that the datagram of this instant has ended; null when it had no echo.
-const ClockExchange* exchange_of(LocalTime now, const Guest& guest) {
-  const auto& exchange = guest.session.newest_exchange();
-  return exchange && exchange->answered_at == now ? &*exchange : nullptr;
-}
-
-}  // namespace
 
 /// What the forces of the newest datagram are judged by.
 void NetworkLoop::hear(LocalTime now, Guest& guest) {
@@ -427,82 +361,22 @@ void NetworkLoop::report(LocalTime now) {
   for (std::string& warning : told.warnings) notice(true, std::move(warning));
 }
 
-namespace {
-
-/// Engines ask for bounded forces, but their combination in the device's loop may exceed what a frame can carry; and a
-/// sensor may measure anything.
-void leave_out_what_no_frame_carries(DeviceState& state) {
-  for (auto* const vector : {&state.force_wanted, &state.hand_force}) {
-    if (*vector && !((*vector)->array().abs() <= limits::kMaxValue).all()) vector->reset();
-  }
-  std::optional<Mat3>& stiffness = state.stiffness_wanted;
-  const bool tells =
-      state.force_wanted && stiffness && !stiffness->isZero(0) && (stiffness->array().abs() <= limits::kMaxValue).all();
-  if (!tells) stiffness.reset();
-  const auto fits = [](double value) { return std::abs(value) <= limits::kMaxValue; };
-  if (state.joints &&
-      !(std::ranges::all_of(state.joints->angle, fits) && std::ranges::all_of(state.joints->velocity, fits)))
-    state.joints.reset();
-}
-
-/// An observer has seen no Couple: the leader's end tells it the scales.
-void tell_scales(PortState& leader, const Couple& coupling) {
-  if (leader.position_scale == 0) leader.position_scale = coupling.position_scale;
-  if (leader.force_scale == 0) leader.force_scale = coupling.force_scale;
-}
-
-/// But for the buttons.
-void leave_out_handle(DeviceState& state) {
-  state.turning.reset();
-  state.torque_applied.reset();
-  state.grip.reset();
-  state.grip_applied.reset();
-  state.hand_force.reset();
-}
-
-}  // namespace
-
 /// The states of a guest leave before those of the next one are looked at.
 void NetworkLoop::publish(LocalTime now) {
-  for (const std::uint32_t place : coupled_) publish_ports(now, place);
+  ports_.publish(now);
   for (std::size_t place = 0; place < states_.size(); ++place) {
     const DeviceState* const fresh = states_[place].fresh = states_[place].box->take();
     if (fresh == nullptr) continue;
     devices_[place].sampled.observe(fresh->tick, LocalTime(fresh->sampled.time_since_epoch()), now);
+    for (ServedChannel& channel : devices_[place].channels) channel.lateness.took_state(now);
   }
   for (Guest& guest : guests_) {
     for (View& view : guest.views) {
-      if (const DeviceState* const state = states_[view.device].fresh) tell_state(guest, view, *state);
+      const DeviceState* const state = states_[view.device].fresh;
+      if (state != nullptr && tell_state(guest, view, *state)) ++stats_.foretold;
     }
     send_all(now, guest);
   }
-}
-
-void NetworkLoop::tell_state(Guest& guest, View& view, const DeviceState& state) {
-  if (guest.coupled && guest.coupled->device == view.device) return;
-  if (guest.sees_handle) view.pressed |= state.buttons;
-  const std::uint64_t one_in = guest.adaptation ? guest.adaptation->one_in() : 1;
-  if (state.tick - view.last_state < std::max(view.state_every, one_in)) return;
-  DeviceState told = state;
-  told.device = number_of(view.device);
-  leave_out_what_no_frame_carries(told);
-  if (!guest.diagnoses) {
-    told.force_wanted.reset();
-    told.stiffness_wanted.reset();
-  }
-  if (!guest.sees_handle) leave_out_handle(told);
-  if (!guest.sees_joints) told.joints.reset();
-  told.buttons = view.pressed;
-  // The guest foretells from the rounded values that it is sent.
-  if (guest.sees_columns && fits_columns(told)) round_to_columns(told);
-  if (view.deadband && !view.deadband->passes(told)) {
-    ++stats_.foretold;
-    view.pressed = 0;  // it believes just these to be held: a release that comes next is news
-    return;
-  }
-  view.last_state = state.tick;
-  view.pressed = 0;
-  guest.session.send(told);
 }
 
 void NetworkLoop::take_events(LocalTime now, Guest& guest) {
@@ -510,12 +384,15 @@ void NetworkLoop::take_events(LocalTime now, Guest& guest) {
     if (const auto* force = std::get_if<Session::ForceArrived>(event)) {
       take_force(now, guest, force->command);
     } else if (const auto* port = std::get_if<Session::PortArrived>(event)) {
-      take_port(now, guest, port->port);
+      if (!ports_.take(now, guest, port->port)) ++stats_.denied;
     } else if (const auto* asked = std::get_if<Session::RequestArrived>(event)) {
       answer(now, guest, asked->id, asked->request);
     } else if (const auto* closed = std::get_if<Session::Closed>(event)) {
       if (closed->code == Code::kTimedOut) ++stats_.timed_out;
+      const bool is_polite = closed->code == Code::kOk;
+      const std::size_t before = notices_.size();
       leave(guest, closed->reason);
+      if (is_polite && notices_.size() > before) notices_.back().warning = false;
     }  // a server receives no states and no answers
   }
 }
@@ -579,125 +456,23 @@ void NetworkLoop::take_force(LocalTime now, Guest& guest, const ForceCommand& co
   force.received = now;
   force.force = command.force;
   force.model = command.model;
+  if (force.model && force.model->contact && force.model->contact->table) {
+    // The haptic loop reads a denormal number as 0, and would not render a table with such a step.
+    double& step = force.model->contact->table->step;
+    step = std::max(step, std::numeric_limits<double>::min());
+  }
   force.valid_for = command.valid_for;
   force.source = channel.holder;
   force.topology_changed = command.topology_changed;
   force.error = command.error;
   force.way = note(command, guest, device);
-  force.torque = command.torque;
-  force.grip_force = command.grip_force;
+  // Without the feature a client does not know what the handle is, nor is it told what became of them.
+  if (!guest.has<kFeatureHandle>() && (command.torque || command.grip_force)) ++stats_.denied;
+  force.torque = guest.has<kFeatureHandle>() ? command.torque : std::nullopt;
+  force.grip_force = guest.has<kFeatureHandle>() ? command.grip_force : std::nullopt;
   device.mail->forces[command.channel].put();
   ++channel.forces;
   ++stats_.forces;
-}
-
-/// The other end of a device, while its client holds the channel.
-void NetworkLoop::take_port(LocalTime now, Guest& guest, const PortFrame& port) {
-  const std::uint32_t place = guest.device_of(port.device);
-  const bool coupled = guest.coupled && guest.coupled->device == place && guest.coupled->channel == port.channel;
-  if (!coupled || leases_.holder(place, port.channel) != guest.id()) {
-    ++stats_.denied;
-    return;
-  }
-  leases_.renew(now, place, port.channel);
-  const auto coupling = coupling_by(devices_[place], port.channel);
-  if (coupling) arrived(now, place, *coupling, port.channel, port);
-}
-
-/// For the haptic thread; and for observers, when they are told next.
-void NetworkLoop::arrived(LocalTime now, std::uint32_t place, std::uint32_t coupling, std::uint32_t channel,
-                          const PortState& port) {
-  ServedDevice& device = devices_[place];
-  device.mail->port_in[coupling].put({port, now, device.peers[coupling]});
-  const auto waits = [&](Guest& guest) {
-    View* const view = guest.sees_ports ? view_of(guest, place) : nullptr;
-    if (view != nullptr) view->ports[coupling].peer_waits = true;
-    return view != nullptr;
-  };
-  if (std::count_if(guests_.begin(), guests_.end(), waits) == 0) return;
-  PortFrame& frame = device.peer_ports[coupling];
-  static_cast<PortState&>(frame) = port;
-  frame.device = number_of(place);
-  frame.channel = channel;
-  frame.of_peer = true;
-}
-
-void NetworkLoop::publish_ports(LocalTime now, std::uint32_t device) {
-  for (std::uint32_t coupling = 0; coupling < Shares::kMost; ++coupling) {
-    const PortState* const port = devices_[device].mail->port_out[coupling].take();
-    if (port != nullptr) publish_port(now, device, coupling, *port);
-  }
-}
-
-/// Our end of a coupling goes to whoever has the other one.
-void NetworkLoop::publish_port(LocalTime now, std::uint32_t device, std::uint32_t coupling, const PortState& port) {
-  devices_[device].phase = port.phase;
-  for (const Dialled& dialled : dialled_) {
-    if (dialled.device == device) dialled.peer->send(now, port);
-  }
-  PortFrame frame;
-  static_cast<PortState&>(frame) = port;
-  frame.device = number_of(device);
-  const auto& leaders = devices_[device].leaders;
-  if (coupling < leaders.size()) frame.channel = leaders[coupling];
-  for (Guest& guest : guests_) {
-    if (guest.gone || !guest.coupled || guest.coupled->device != device) continue;
-    if (coupling_by(devices_[device], guest.coupled->channel) != coupling) continue;
-    frame.channel = guest.coupled->channel;
-    guest.session.send(frame);
-  }
-  show_ports(now, device, coupling, frame);
-}
-
-/// Both ends of a coupling go to the observers that want them, as often as they want states and at most 50 times a
-/// second. `mine` is our end, with the channel of the other one.
-void NetworkLoop::show_ports(LocalTime now, std::uint32_t place, std::uint32_t coupling, PortFrame mine) {
-  ServedDevice& device = devices_[place];
-  PortFrame& theirs = device.peer_ports[coupling];
-  tell_scales(device.coupling->role == PortRole::kLeader ? mine : theirs, *device.coupling);
-  for (Guest& guest : guests_) {
-    View* const view = guest.sees_ports && !guest.gone ? view_of(guest, place) : nullptr;
-    if (view == nullptr || now < view->ports[coupling].due) continue;
-    const std::uint64_t every =
-        std::max<std::uint64_t>(view->state_every, guest.adaptation ? guest.adaptation->one_in() : 1);
-    const Duration period =
-        static_cast<std::int64_t>(every) * Duration(std::chrono::seconds(1)) / std::max(device.about.loop_hz, 1U);
-    view->ports[coupling].due = now + std::max(kShowPortsEvery, period);
-    guest.session.send(mine);
-    if (std::exchange(view->ports[coupling].peer_waits, false)) guest.session.send(theirs);
-  }
-}
-
-/// Whether the datagram is of a server that this one has dialled.
-bool NetworkLoop::receive_of_peer(LocalTime now, const Address& from, std::span<const std::byte> datagram) {
-  for (Dialled& dialled : dialled_) {
-    if (!dialled.peer->is_from_server(from, datagram)) continue;
-    dialled.peer->receive(now, from, datagram);
-    look_at(dialled);
-    const auto port = dialled.peer->take();
-    if (port && dialled.coupled) arrived(now, dialled.device, 0, 0, *port);
-    return true;
-  }
-  return false;
-}
-
-/// Each time that it couples the device's loop forgets whom it was coupled with before.
-void NetworkLoop::look_at(Dialled& dialled) {
-  if (!dialled.peer->coupled()) {
-    dialled.coupled = false;
-  } else if (!dialled.coupled) {
-    dialled.coupled = renew_peer(devices_[dialled.device], 0);
-  }
-}
-
-LocalTime NetworkLoop::turn_peers(LocalTime now) {
-  LocalTime next = LocalTime::max();
-  for (Dialled& dialled : dialled_) {
-    next = std::min(next, dialled.peer->turn(now));
-    look_at(dialled);
-    for (Peer::Notice& said : dialled.peer->take_notices()) notice(said.warning, std::move(said.text));
-  }
-  return next;
 }
 
 /// Notices the forces that the session has refused. A refused force names no channel, so it counts for every channel
@@ -741,60 +516,30 @@ void NetworkLoop::answer(LocalTime now, Guest& guest, std::uint32_t id, Request 
 
 void NetworkLoop::leave(Guest& guest, const std::string& how) {
   guest.gone = true;
-  add(stats_.dropped, guest.session.stats());
   notice(guest.role == Role::kController, "\"" + guest.name + "\" at " + to_string(guest.address) + " has left: " + how,
          change_of(guest, false, how));
   leases_.give_all(guest.id());
-  remember(stats_, guest);
+  stats_.add(guest);
 }
 
 void NetworkLoop::close(LocalTime now) {
-  for (Dialled& dialled : dialled_) dialled.peer->close(now);
+  ports_.close(now);
   const std::string why = "the server is going down";
   for (Guest& guest : guests_) {
     guest.session.close(Code::kShutdown, why);
     send_all(now, guest);
-    add(stats_.dropped, guest.session.stats());
-    remember(stats_, guest);
+    stats_.add(guest);
     notice(false, "\"" + guest.name + "\" is sent away: " + why, change_of(guest, false, why));
   }
   guests_.clear();
   half_open_.clear();
 }
 
-namespace {
-
-std::vector<std::pair<std::string, std::uint64_t>> counts_of(const ServedChannel& channel, const Ways& ways) {
-  std::vector<std::pair<std::string, std::uint64_t>> counts;
-  for (std::size_t way = 1; way < channel.by_way.size(); ++way) {
-    if (channel.by_way[way] > 0) counts.emplace_back(ways.name_of(static_cast<std::uint8_t>(way)), channel.by_way[way]);
-  }
-  return counts;
-}
-
-}  // namespace
-
-NetworkLoop::Stats NetworkLoop::stats() const {
-  Stats stats = stats_;
+NetworkStats NetworkLoop::stats() const {
+  NetworkStats stats = stats_;
   stats.hellos = doorman_.stats();
-  for (const ServedDevice& device : devices_) {
-    for (std::size_t i = 0; i < device.channels.size(); ++i) {
-      const ServedChannel& channel = device.channels[i];
-      const Guest* const holder = guest_of(guests_, channel.holder);
-      stats.channels.push_back({.device = device.about.name,
-                                .channel = device.about.channels[i].name,
-                                .holder = holder != nullptr ? holder->name : std::string(),
-                                .forces = channel.forces,
-                                .handovers = channel.handovers,
-                                .late = channel.late,
-                                .worst_error = channel.worst_error,
-                                .ways = counts_of(channel, device.mail->ways)});
-    }
-  }
-  for (const Guest& guest : guests_) {
-    add(stats.dropped, guest.session.stats());
-    remember(stats, guest);
-  }
+  for (const ServedDevice& device : devices_) stats.add(device, guests_);
+  for (const Guest& guest : guests_) stats.add(guest);
   return stats;
 }
 

@@ -19,9 +19,10 @@
 #include "server/guests/admission.h"
 #include "server/guests/guest.h"
 #include "server/guests/leases.h"
-#include "server/guests/peer.h"
+#include "server/guests/port_exchange.h"
 #include "server/guests/reports.h"
 #include "server/mailboxes.h"
+#include "server/network_stats.h"
 #include "server/recording/datagram_sieve.h"
 
 namespace tendon {
@@ -60,22 +61,10 @@ class NetworkLoop {
     /// Whether the system has made sure who speaks from an address (UnixSocket::is_peer): a guest there needs no key.
     /// Null: none.
     bool (*needs_no_key)(const Address& from) noexcept = nullptr;
-    Shard shard{};                          ///< the lists of devices below are of all shards
+    Shard shard{};                          ///< `devices` contains the devices of all shards
     std::uint32_t first_connection_id = 1;  ///< random at start, so that a restarted server does not know old guests
     std::string server_name = "tendond";
-    /// What guests are told of each device, by its place (kMostDevices at the most); number and `holder` do not count.
-    std::vector<DeviceDescription> devices{};
-    std::vector<HandleDescription> handles{};  ///< likewise; fewer: of the others nothing is known
-    /// Likewise; empty: that device is not to be coupled.
-    std::vector<std::optional<Couple>> couplings{};
-    /// Likewise, of a follower with several leaders: the channels by which they come; empty: one, by any channel.
-    std::vector<std::vector<std::uint32_t>> leaders{};
-    /// The servers that this one dials.
-    struct Dial {
-      std::uint32_t device = 0;  ///< ours
-      Peer::Config peer;
-    };
-    std::vector<Dial> dials{};
+    std::vector<ServedDevice::Config> devices{};  ///< at most kMostDevices
     /// Clients that need not wait for the end of a lease: the names of their keys, without keys their own.
     std::vector<std::string> takeover{};
     /// Each costs this loop's thread a state datagram of some 250 bytes per haptic step. Where there are several keys,
@@ -98,56 +87,7 @@ class NetworkLoop {
     DatagramSieve::Config recorded{};  ///< of the datagrams in and out
   };
 
-  /// What was dropped of all guests' datagrams since the server's start; see LinkStats.
-  struct Dropped {
-    std::uint64_t duplicated = 0;
-    std::uint64_t malformed = 0;
-    std::uint64_t forged = 0;
-    std::uint64_t old_key = 0;
-    std::uint64_t invalid = 0;
-    std::uint64_t stale = 0;
-    RefusedForces forces{};  ///< of `invalid` and `stale`; unknown_tick is Stats::unanswerable
-  };
-
-  struct Stats {
-    std::uint64_t welcomed = 0;  ///< sessions that were opened
-    std::uint64_t refused = 0;
-    std::uint64_t timed_out = 0;
-    std::uint64_t replaced = 0;  ///< by a guest with the same key
-    std::uint64_t roamed = 0;    ///< changes of a guest's address
-    std::uint64_t half_open_forgotten = 0;
-    std::uint64_t malformed = 0;           ///< datagrams too long, or not of this protocol
-    std::uint64_t unknown_connection = 0;  ///< Data that belongs to nobody, or comes from the wrong address
-    Doorman::Stats hellos;                 ///< Hellos that did not lead to an Answer
-    std::uint64_t forces = 0;              ///< handed to the haptic loop
-    std::uint64_t denied = 0;              ///< forces and requests that only the holder of a channel may send
-    std::uint64_t unanswerable = 0;        ///< forces that answer a tick which never was, or was long ago
-    // Forces that came when the one before had outlived its validity, by the part to blame; see Lateness:
-    std::uint64_t late_ours = 0;
-    std::uint64_t late_network = 0;
-    std::uint64_t late_engine = 0;
-    std::uint64_t late_unknown = 0;
-    std::uint64_t foretold = 0;  ///< states left out because their client can foretell them
-    std::uint64_t hopeless = 0;  ///< forces not handed on, because their link loses too much
-    Dropped dropped;
-    struct Channel {
-      std::string device;
-      std::string channel;
-      std::string holder;                   ///< its name; empty: nobody
-      std::uint64_t forces = 0;             ///< handed on
-      std::uint64_t handovers = 0;          ///< from one holder to another who wanted it
-      std::uint64_t late = 0;               ///< as above
-      std::optional<double> worst_error{};  ///< N, the largest that an engine has said of its force; empty: none has
-      std::vector<std::pair<std::string, std::uint64_t>> ways{};  ///< forces by each way of answering that was named
-    };
-    std::vector<Channel> channels;
-    LinkStats controller;  ///< the link of the present controller, or of the last one
-    std::optional<ClockOffsetEstimator::Estimate> controller_clock;  ///< … and its clock, by ours
-
-    /// Of several shards together: counts add up, channels stand one after the other, and the controller is the first
-    /// one's that has any.
-    Stats& operator+=(const Stats& more);
-  };
+  using Stats = NetworkStats;
 
   /// A guest has come or gone: the same for programs that follow sessions.
   struct SessionChange {
@@ -175,9 +115,9 @@ class NetworkLoop {
     std::vector<std::byte> hello{};
   };
 
-  /// One of `mail` for each device of all shards; datagrams are recorded in the first of its own. They and `link` must
-  /// outlive the loop. Throws what served_devices() does.
-  NetworkLoop(const Config& config, Link& link, const std::vector<Mailboxes*>& mail);
+  /// The mailboxes of the first device of the shard take the datagrams for the recording. `link` must outlive the loop.
+  /// Throws the errors of served_devices().
+  NetworkLoop(const Config& config, Link& link, LocalTime now);
   NetworkLoop(const NetworkLoop&) = delete;  // its leases look at its devices
   NetworkLoop& operator=(const NetworkLoop&) = delete;
 
@@ -210,20 +150,6 @@ class NetworkLoop {
   void take_events(LocalTime now, Guest& guest);
   void take_force(LocalTime now, Guest& guest, const ForceCommand& command);
   std::uint8_t note(const ForceCommand& command, const Guest& guest, ServedDevice& device);
-  struct Dialled {
-    std::uint32_t device;
-    std::unique_ptr<Peer> peer;
-    bool coupled = false;  ///< and the device's loop knows
-  };
-  void look_at(Dialled& dialled);
-  void take_port(LocalTime now, Guest& guest, const PortFrame& port);
-  bool receive_of_peer(LocalTime now, const Address& from, std::span<const std::byte> datagram);
-  LocalTime turn_peers(LocalTime now);
-  void publish_ports(LocalTime now, std::uint32_t device);
-  void publish_port(LocalTime now, std::uint32_t device, std::uint32_t coupling, const PortState& port);
-  void show_ports(LocalTime now, std::uint32_t place, std::uint32_t coupling, PortFrame mine);
-  void arrived(LocalTime now, std::uint32_t place, std::uint32_t coupling, std::uint32_t channel,
-               const PortState& port);
   void take_refused(Guest& guest);
   void blame(const Guest& guest, Lateness::Cause cause, std::uint64_t count);
   void answer(LocalTime now, Guest& guest, std::uint32_t id, Request request);
@@ -232,7 +158,6 @@ class NetworkLoop {
   void leave(Guest& guest, const std::string& how);
   void send_all(LocalTime now, Guest& guest);
   void publish(LocalTime now);
-  void tell_state(Guest& guest, View& view, const DeviceState& state);
   void hear(LocalTime now, Guest& guest);
   void measure(LocalTime now, Guest& guest);
   void adapt(LocalTime now, Guest& guest);
@@ -253,19 +178,16 @@ class NetworkLoop {
   Config config_;
   Link& link_;
   DatagramSieve sieve_;
-  std::vector<ServedDevice> devices_;   ///< of this shard
-  std::size_t first_device_;            ///< the place of the first of them among those of all shards; in here it is 0
-  std::vector<NewestState> states_;     ///< by place, as the devices
-  std::vector<std::uint32_t> coupled_;  ///< places of the devices that may be coupled
+  std::vector<ServedDevice> devices_;  ///< of this shard
+  std::size_t first_device_;           ///< the index of the first device of this shard
+  std::vector<NewestState> states_;    ///< by place, as the devices
   Doorman doorman_;
   Admission admission_;
   Leases leases_{devices_};
   Reports reports_;
   std::vector<Guest> guests_;
+  PortExchange ports_{devices_, guests_, leases_};
   std::vector<Guest> half_open_;  ///< oldest first
-  /// A server that this one dials, and for which of its devices.
-  std::vector<Dialled> dialled_;
-  bool dials_ = false;
   std::uint32_t next_connection_id_;
 
   Stats stats_;

@@ -12,7 +12,6 @@
 #include <utility>
 #include <variant>
 
-#include "core/control/aol_parts.h"
 #include "core/control/preset.h"
 #include "devices/simulated/simulated_device.h"
 
@@ -21,127 +20,6 @@ namespace {
 
 constexpr int kSteps = 200;     ///< steps in one round
 constexpr int kSamples = 2000;  ///< recorded samples that stand in for the device
-
-/// A part that a scene may list.
-struct Listable {
-  std::string key;
-  std::string_view what;
-  std::function<bool(Scene&)> drop;  ///< takes it out of the scene; true if it was there
-};
-
-template <class T>
-bool drop(std::optional<T>& part) {
-  const bool there = part.has_value();
-  part.reset();
-  return there;
-}
-
-/// A test compares this list with the scenes' reference and fails when a part declared there is missing here.
-std::vector<Listable> make_listables() {
-  std::vector<Listable> list;
-  const auto add = [&list](std::string key, std::string_view what, std::function<bool(Scene&)> drop_it) {
-    list.push_back({std::move(key), what, std::move(drop_it)});
-  };
-  const auto effect = [&add](const char* key, std::string_view what, auto SimulatedDevice::Config::*part) {
-    add(std::string("device.effects.") + key, what,
-        [part](Scene& scene) { return drop(std::get<SimulatedDevice::Config>(scene.device).*part); });
-  };
-  const auto guard = [&add](const char* key, std::string_view what, auto SafeDevice::Config::*part) {
-    add(std::string("safety.") + key, what, [part](Scene& scene) { return scene.safety && drop(*scene.safety.*part); });
-  };
-  const auto control = [&add](const char* key, std::string_view what, auto HapticController::Config::*part) {
-    add(key, what, [part](Scene& scene) { return drop(scene.loop.control.*part); });
-  };
-  const auto between = [&add](const char* key, std::string_view what, auto HeldForce::Config::*part) {
-    add(std::string("force.") + key, what, [part](Scene& scene) { return drop(scene.loop.control.hold.*part); });
-  };
-  using Device = SimulatedDevice::Config;
-  add("device.hand", "the operator: a spring, a damper and a mass",
-      [](Scene& scene) { return drop(std::get<SimulatedDevice::Config>(scene.device).hand); });
-  add("device.environment", "walls and a medium that the handle runs into",
-      [](Scene& scene) { return drop(std::get<SimulatedDevice::Config>(scene.device).environment); });
-  add("device.rotation", "the handle turns, in the operator's hand", [](Scene& scene) {
-    scene.loop.control.rotation.reset();
-    if (auto& coupling = scene.loop.control.coupling) coupling->turn.reset();
-    return drop(std::get<SimulatedDevice::Config>(scene.device).rotation);
-  });
-  add("device.gripper", "two fingers that open and close", [](Scene& scene) {
-    scene.loop.control.grip.reset();
-    if (auto& coupling = scene.loop.control.coupling) coupling->grip.reset();
-    return drop(std::get<SimulatedDevice::Config>(scene.device).gripper);
-  });
-  effect("viscous_friction_n_s_per_m", "true viscous friction", &Device::viscous_friction);
-  effect("coulomb_friction_n", "true Coulomb friction", &Device::coulomb_friction);
-  effect("joint_friction", "friction of each joint, by the pose", &Device::joint_friction);
-  effect("structural_mode", "the handle on a spring", &Device::structural_mode);
-  effect("sample_delay_ms", "positions come late", &Device::sample_delay);
-  effect("force_delay_ms", "forces reach the motors late", &Device::force_delay);
-  effect("encoder_step_um", "positions in counts", &Device::encoder_step);
-  effect("max_force_n", "the device's own saturation", &Device::max_force);
-  effect("amplifier_bandwidth_hz", "motors that lag behind the command", &Device::amplifier_bandwidth);
-  effect("force_sensor", "measures the hand's force; admittance needs it", &Device::force_sensor);
-  effect("watchdog_ms", "lets go when no command comes", &Device::watchdog);
-  control("loop.max_speed_m_per_s", "a position that no hand can reach is a fault",
-          &HapticController::Config::max_speed);
-  add("safety", "no force unless armed, and none after a fault", [](Scene& scene) { return drop(scene.safety); });
-  using Safety = SafeDevice::Config;
-  guard("force_limit", "no force is longer", &Safety::force_limit);
-  guard("growth_limit", "no force grows faster", &Safety::growth_limit);
-  guard("ramp_in", "forces begin slowly after arming", &Safety::ramp_in);
-  guard("heat_limit", "motors do not burn", &Safety::heat_limit);
-  guard("workspace", "nothing pushes the hand out of it", &Safety::workspace);
-  guard("speed_trip", "a handle that flies gets no force", &Safety::speed_trip);
-  guard("step_bound", "encoders that wrap or lose count disarm it", &Safety::step_bound);
-  guard("command_watchdog", "a loop that stood still gets no force", &Safety::command_watchdog);
-  guard("link_watchdog", "a device that was silent gets no force", &Safety::link_watchdog);
-  guard("dead_man", "no force unless the button is held", &Safety::dead_man);
-  guard("torque_limit", "no torque is longer", &Safety::torque_limit);
-  guard("torque_growth_limit", "no torque grows faster", &Safety::torque_growth_limit);
-  guard("turn_trip", "a handle that spins gets no force", &Safety::turn_trip);
-  guard("grip_limit", "no grip is larger", &Safety::grip_limit);
-  guard("grip_growth_limit", "no grip grows faster", &Safety::grip_growth_limit);
-  add("limiter", "keeps the device from giving out energy", [](Scene& scene) {
-    LimiterConfig& limiter = scene.loop.control.limiter;
-    limiter.shared_account = false;  // ports without a limiter have none
-    if (scene.loop.control.coupling) scene.loop.control.coupling->purse.reset();
-    return std::exchange(limiter.law, Law::kNone) != Law::kNone;
-  });
-  for_each_aol_part([&add](const auto& part) {
-    add("limiter." + std::string(part.name), part.what, [config = part.config](Scene& scene) {
-      HapticController::Config& loop = scene.loop.control;
-      const bool there = drop(loop.limiter.parts.*config);
-      if (!loop.limiter.parts.adaptive_friction) loop.friction_map.reset();
-      if (!loop.limiter.parts.shaping) loop.limiter.parts.bounded_acceleration.reset();  // which needs it
-      if (!loop.limiter.parts.energy_cap) loop.limiter.parts.fading_contact.reset();
-      return there;
-    });
-  });
-  add("teleoperation.turn", "ties the orientations", [](Scene& scene) {
-    auto& coupling = scene.loop.control.coupling;
-    return coupling && drop(coupling->turn);
-  });
-  add("teleoperation.grip", "ties the grippers", [](Scene& scene) {
-    auto& coupling = scene.loop.control.coupling;
-    return coupling && drop(coupling->grip);
-  });
-  add("teleoperation", "ties the handle to one of another server", [](Scene& scene) {
-    scene.loop.control.limiter.shared_account = false;
-    scene.teleoperation.reset();
-    scene.loop.control.leaders.clear();
-    return drop(scene.loop.control.coupling);
-  });
-  control("admittance", "the handle follows a tool of another mass", &HapticController::Config::admittance);
-  between("adaptive_local_model", "models of the engine are blended and capped",
-          &HeldForce::Config::adaptive_local_model);
-  between("output_estimator", "the environment is learnt from its answers", &HeldForce::Config::output_estimator);
-  between("learned_model", "an answer is led to where the hand is now", &HeldForce::Config::learned_model);
-  return list;
-}
-
-const std::vector<Listable>& listables() {
-  static const std::vector<Listable> kList = make_listables();
-  return kList;
-}
 
 /// Records the samples that another device gives.
 class Tape final : public Device {
@@ -269,17 +147,6 @@ class Least {
   double there_ = std::numeric_limits<double>::infinity();
 };
 
-std::string rounded(double ns, double resolution) {
-  std::ostringstream text;
-  if (std::abs(ns) < resolution) {
-    text << "< " << std::llround(std::ceil(resolution));
-  } else {
-    text << std::llround(ns);
-  }
-  text << " ns";
-  return text.str();
-}
-
 }  // namespace
 
 Explanation explain(const Scene& listed, const std::function<Duration()>& processor_time, int rounds) {
@@ -294,10 +161,10 @@ Explanation explain(const Scene& listed, const std::function<Duration()>& proces
   trials.push_back(std::make_unique<Trial>(scene, playback_of(scene)));
   constexpr std::size_t kWithoutDevice = 2;
   std::vector<std::size_t> part_of(trials.size());
-  for (const Listable& each : listables()) {
+  for (const ScenePart& each : scene_parts()) {
     out.parts.push_back({each.key, each.what, {}});
     Scene less = scene;
-    if (!each.drop(less)) continue;
+    if (!take_out(less, each.key)) continue;
     trials.push_back(std::make_unique<Trial>(less));
     part_of.push_back(out.parts.size() - 1);
   }
@@ -349,7 +216,7 @@ void put_coupling(const Coupling::Config& coupling, const LimiterConfig& limiter
   for (const int ms : {2, 10, 50, 200, 600}) {
     const double loop = ms * 1e-3;
     if (waves) {
-      const double way = loop / 2 + seconds(Coupling::kLineWaits);
+      const double way = loop / 2 + seconds(WaveLaw::kLineWaits);
       text << std::setw(9) << ms << " ms" << std::setw(11) << std::llround(spring.own_damping / way) << " N/m"
            << std::setw(11) << std::setprecision(3) << spring.own_damping * way << " kg\n";
       continue;
@@ -370,6 +237,14 @@ std::string spoken_here(const Suites& wanted) {
   return names_of(here) + (lacks_one ? " (this processor has no AES instructions)" : "");
 }
 
+std::string when_frozen(const Driver& driver) {
+  if (!driver.moves_a_hand) return "";
+  const std::string device = "frozen with its guardian (docker pause): the " + std::string(driver.name);
+  if (driver.watchdog == Duration::zero()) return device + " keeps its last force";
+  return device + " lets go after " + std::to_string(driver.watchdog / std::chrono::milliseconds(1)) +
+         " ms by its own watchdog";
+}
+
 }  // namespace
 
 std::string in_words(const Scene& scene, const Explanation& explanation) {
@@ -378,18 +253,26 @@ std::string in_words(const Scene& scene, const Explanation& explanation) {
   for (const auto& part : parts) width = std::max(width, part.key.size());
   std::ostringstream text;
   text << scene.name << ": a haptic step each " << seconds(scene.loop.period) * 1e6 << " µs, limiter "
-       << info(scene.loop.control.limiter.law).name << "\nruns, and adds to a step:\n";
-  for (const auto& part : parts) {
-    if (!part.cost_ns) continue;
-    text << "  " << std::left << std::setw(static_cast<int>(width)) << part.key << std::right << std::setw(10)
-         << rounded(*part.cost_ns, resolution_ns) << "   " << part.what << '\n';
-  }
-  text << "is not listed, and does not exist:\n";
-  for (const auto& part : parts) {
-    if (!part.cost_ns)
-      text << "  " << std::left << std::setw(static_cast<int>(width)) << part.key << "             " << part.what
-           << '\n';
-  }
+       << info(scene.loop.control.limiter.law).name << '\n';
+  const auto put = [&](const std::string& heading, const auto& belongs, bool with_cost) {
+    if (std::ranges::none_of(explanation.parts, belongs)) return;
+    text << heading << ":\n";
+    for (const auto& part : explanation.parts) {
+      if (!belongs(part)) continue;
+      text << "  " << std::left << std::setw(static_cast<int>(width)) << part.key << std::right << std::setw(10)
+           << (with_cost ? std::to_string(std::llround(*part.cost_ns)) + " ns" : "") << "   " << part.what << '\n';
+    }
+  };
+  using Part = Explanation::Part;
+  const auto shows = [least = resolution_ns](double ns) { return std::abs(ns) >= least; };
+  put(
+      "runs, and adds to a step", [&](const Part& part) { return part.cost_ns && shows(*part.cost_ns); }, true);
+  put(
+      "runs, and adds less than the " + std::to_string(std::llround(std::ceil(resolution_ns))) +
+          " ns that can be measured here",
+      [&](const Part& part) { return part.cost_ns && !shows(*part.cost_ns); }, false);
+  put(
+      "off in this scene", [](const Part& part) { return !part.cost_ns; }, false);
   text << "a whole step: " << std::llround(step_ns) << " ns of processor time, of which " << std::llround(device_ns)
        << " ns are the simulated device"
        << (!std::holds_alternative<SimulatedDevice::Config>(scene.device) ? ", which stands in for the real one" : "")
@@ -408,6 +291,7 @@ std::string in_words(const Scene& scene, const Explanation& explanation) {
   text << "its haptic thread: "
        << (scene.shares_thread() ? "one with all devices without a plug that have this period and processor\n"
                                  : "its own, so that no other device waits for its plug\n");
+  if (const std::string frozen = when_frozen(scene.driver()); !frozen.empty()) text << frozen << '\n';
   text << "in other threads: " << scene.channels.size() << (scene.channels.size() == 1 ? " channel" : " channels")
        << " for engines" << (scene.network.keys ? ", sealed by " + spoken_here(scene.network.suites) : "") << ", "
        << (scene.recording ? "a recording" : "no recording")

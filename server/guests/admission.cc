@@ -5,18 +5,15 @@
 #include <array>
 #include <string_view>
 
+#include "core/base/nearest_word.h"
+
 namespace tendon {
 
 namespace {
 
-/// The features that this server supports beyond the version's minimum.
-constexpr std::array kFeatures = {kFeatureLocalModel, kFeatureChannels,     kFeatureDiagnostics,
-                                  kFeatureHandle,     kFeatureJoints,       kFeatureTeleoperation,
-                                  kFeatureOutputs,    kFeatureStateColumns, kFeatureWays};
-
 std::vector<std::string> in_common(const std::vector<std::string>& offered, Role role) {
   std::vector<std::string> both;
-  for (const std::string_view feature : kFeatures) {
+  for (const std::string_view feature : Features::kSupported) {
     const bool not_for_it = feature == kFeatureDiagnostics && role != Role::kObserver;
     const bool is_offered = std::find(offered.begin(), offered.end(), feature) != offered.end();
     if (is_offered && !not_for_it) both.emplace_back(feature);
@@ -29,11 +26,14 @@ bool may(const ClientKey* key, Role role) {
   return key == nullptr || key->role == Role::kController || role == Role::kObserver;
 }
 
+const std::string& name_of(const ServedDevice::Config& device) { return device.about.name; }
+const std::string& name_of(const ChannelDescription& channel) { return channel.name; }
+
 /// The index of the entry with that name; the first entry when the name is empty.
 template <class Named>
 std::optional<std::uint32_t> place_of(const std::vector<Named>& all, const std::string& name) {
   if (name.empty()) return 0;
-  const auto found = std::find_if(all.begin(), all.end(), [&](const Named& one) { return one.name == name; });
+  const auto found = std::find_if(all.begin(), all.end(), [&](const Named& one) { return name_of(one) == name; });
   if (found == all.end()) return std::nullopt;
   return static_cast<std::uint32_t>(found - all.begin());
 }
@@ -42,11 +42,15 @@ template <class Named>
 Refusal not_there(const std::string& what, const std::string& name, const std::vector<Named>& all) {
   std::string reason = "there is no " + what + " \"" + name + "\", only";
   if (all.size() > limits::kMaxDevices) {
-    reason += " \"" + all.front().name + "\" to \"" + all.back().name + "\"";
+    reason += " \"" + name_of(all.front()) + "\" to \"" + name_of(all.back()) + "\"";
     return {Code::kInvalid, reason};
   }
-  for (const Named& one : all) reason += (&one == &all.front() ? " \"" : ", \"") + one.name + "\"";
-  return {Code::kInvalid, reason};
+  std::vector<std::string_view> names;
+  for (const Named& one : all) {
+    reason += (names.empty() ? " \"" : ", \"") + name_of(one) + "\"";
+    names.push_back(name_of(one));
+  }
+  return {Code::kInvalid, reason + did_you_mean(name, names)};
 }
 
 bool is_controller(const Seat& seat) { return seat.role == Role::kController; }
@@ -54,7 +58,7 @@ bool is_controller(const Seat& seat) { return seat.role == Role::kController; }
 }  // namespace
 
 std::variant<std::vector<Seat>, Refusal> Admission::seats_of(const Hello& hello,
-                                                             const std::vector<DeviceDescription>& devices) {
+                                                             const std::vector<ServedDevice::Config>& devices) {
   if (hello.claims.empty()) return std::vector<Seat>{{.device = 0, .channel = 0, .role = hello.role}};
   std::vector<Seat> seats;
   Role highest = Role::kObserver;
@@ -62,13 +66,13 @@ std::variant<std::vector<Seat>, Refusal> Admission::seats_of(const Hello& hello,
     const auto device = place_of(devices, claim.device);
     if (!device) return not_there("device", claim.device, devices);
     if (!seats.empty() && bank_of(*device) != bank_of(seats.front().device)) {
-      const auto name = [&](std::size_t place) { return "\"" + devices[place].name + "\""; };
+      const auto name = [&](std::size_t place) { return "\"" + name_of(devices[place]) + "\""; };
       const std::size_t first = seats.front().device - number_of(seats.front().device);
       const std::size_t last = std::min<std::size_t>(first + limits::kMaxDevices, devices.size()) - 1;
       return Refusal{Code::kInvalid, "a session has devices of one bank: " + name(first) + " to " + name(last) +
                                          ", and not " + name(*device)};
     }
-    const auto& channels = devices[*device].channels;
+    const auto& channels = devices[*device].about.channels;
     const auto channel = claim.role == Role::kController ? place_of(channels, claim.channel) : 0;
     if (!channel) return not_there("channel", claim.channel, channels);
     const bool twice = std::any_of(seats.begin(), seats.end(), [&](const Seat& seat) {

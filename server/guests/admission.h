@@ -34,7 +34,7 @@ class Admission {
   /// The seats that a Hello claims; refused when it claims what is not there, the same twice, devices of two banks, or a
   /// role that is not the highest among its claims.
   static std::variant<std::vector<Seat>, Refusal> seats_of(const Hello& hello,
-                                                           const std::vector<DeviceDescription>& devices);
+                                                           const std::vector<ServedDevice::Config>& devices);
 
   /// Why a guest at `from` with `key` (null: none) may not take these seats now; empty: it may.
   std::optional<Refusal> reason_to_refuse(const Address& from, const ClientKey* key, const std::vector<Seat>& seats,

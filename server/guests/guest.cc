@@ -70,21 +70,27 @@ std::optional<std::uint32_t> coupling_by(const ServedDevice& device, std::uint32
   return static_cast<std::uint32_t>(leader - device.leaders.begin());
 }
 
-std::vector<ServedDevice> served_devices(const std::vector<DeviceDescription>& about,
-                                         const std::vector<HandleDescription>& handles,
-                                         const std::vector<Mailboxes*>& mail, const Shard& shard) {
+std::vector<ServedDevice> served_devices(const std::vector<ServedDevice::Config>& all, const Shard& shard) {
+  std::vector<DeviceDescription> about;
+  for (const ServedDevice::Config& device : all) {
+    about.push_back(device.about);
+    check_names(device.about.channels, limits::kMaxChannels, "channel");
+    if (device.mail == nullptr) throw std::invalid_argument("expected mailboxes for each device");
+  }
   check_names(about, kMostDevices, "device");
-  if (mail.size() != about.size()) throw std::invalid_argument("expected mailboxes for each device");
-  for (const DeviceDescription& device : about) check_names(device.channels, limits::kMaxChannels, "channel");
-  const std::size_t banks = (about.size() + limits::kMaxDevices - 1) / limits::kMaxDevices;
+  const std::size_t banks = (all.size() + limits::kMaxDevices - 1) / limits::kMaxDevices;
   if (!std::has_single_bit(shard.of) || shard.of > banks || shard.number >= shard.of) {
     throw std::invalid_argument("there is no shard " + std::to_string(shard.number) + " of " +
-                                std::to_string(shard.of) + " for " + std::to_string(about.size()) + " devices");
+                                std::to_string(shard.of) + " for " + std::to_string(all.size()) + " devices");
   }
   std::vector<ServedDevice> devices;
-  for (std::size_t i = shard.first_device(about.size()); i < shard.end_device(about.size()); ++i) {
-    ServedDevice& device = devices.emplace_back(ServedDevice{
-        .about = about[i], .handle = i < handles.size() ? handles[i] : HandleDescription{}, .mail = mail[i]});
+  for (std::size_t i = shard.first_device(all.size()); i < shard.end_device(all.size()); ++i) {
+    const ServedDevice::Config& config = all[i];
+    ServedDevice& device = devices.emplace_back(ServedDevice{.about = config.about,
+                                                             .handle = config.handle,
+                                                             .mail = config.mail,
+                                                             .coupling = config.coupling,
+                                                             .leaders = config.leaders});
     device.about.device = device.handle.device = number_of(static_cast<std::uint32_t>(i));
     device.channels.resize(device.about.channels.size());
   }

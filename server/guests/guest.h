@@ -15,8 +15,10 @@
 #include "protocol/narrow/link_meter.h"
 #include "protocol/narrow/rate_adaptation.h"
 #include "protocol/session.h"
+#include "server/guests/features.h"
 #include "server/guests/health.h"
 #include "server/guests/lateness.h"
+#include "server/guests/peer.h"
 #include "server/guests/sampled_steps.h"
 #include "server/mailboxes.h"
 
@@ -87,14 +89,7 @@ struct Guest {
   const ClientKey* key;  ///< null in suite 0
   std::string name;
   Role role;
-  bool can_lose;                  ///< it can be told that it has lost a lease
-  bool diagnoses;                 ///< it has asked for what only kFeatureDiagnostics brings
-  bool sees_handle;               ///< … and kFeatureHandle
-  bool sees_joints;               ///< … and kFeatureJoints
-  bool may_couple;                ///< … and kFeatureTeleoperation, as a controller
-  bool sees_ports;                ///< … and kFeatureTeleoperation, as an observer
-  bool sees_outputs;              ///< … and kFeatureOutputs
-  bool sees_columns;              ///< … and kFeatureStateColumns
+  Features features;
   std::vector<std::string> ways;  ///< in which it answers, of its Hello; empty: it has not asked for kFeatureWays
   std::vector<Seat> seats;        ///< `role` is what its Welcome says
   std::vector<View> views;        ///< at least one; all of one bank
@@ -112,6 +107,14 @@ struct Guest {
   bool gone = false;                 ///< it has left, and is forgotten at the end of the turn
 
   std::uint32_t id() const noexcept { return session.connection_id(); }
+  template <const std::string_view& feature>
+  bool has() const noexcept {
+    return features.has<feature>();
+  }
+  /// True if the guest can be the other end of a coupling.
+  bool may_couple() const noexcept { return has<kFeatureTeleoperation>() && role == Role::kController; }
+  /// True if the guest observes both ends of a coupling.
+  bool sees_ports() const noexcept { return has<kFeatureTeleoperation>() && role == Role::kObserver; }
   /// The device that its session calls by this number; of a last bank that is not full it may not exist.
   std::uint32_t device_of(std::uint32_t number) const noexcept {
     return bank_of(views.front().device) * limits::kMaxDevices + number;
@@ -162,6 +165,16 @@ struct ServedChannel {
 
 /// A device, as guests meet it.
 struct ServedDevice {
+  struct Config {
+    DeviceDescription about;  ///< its number and the `holder` of its channels are ignored
+    HandleDescription handle{};
+    std::optional<Couple> coupling{};  ///< empty if the device cannot be coupled
+    /// If a follower has several leaders, each of them uses one of these channels. Empty: one leader on any channel.
+    std::vector<std::uint32_t> leaders{};
+    std::optional<Peer::Config> dial{};  ///< the server of the other end, if this server connects to it
+    Mailboxes* mail = nullptr;           ///< must outlive the loop
+  };
+
   DeviceDescription about;  ///< with its number in a session, as `handle`
   HandleDescription handle;
   Mailboxes* mail;
@@ -185,12 +198,8 @@ std::optional<std::uint32_t> coupling_by(const ServedDevice& device, std::uint32
 /// order.
 bool renew_peer(ServedDevice& device, std::uint32_t coupling);
 
-/// The devices of the shard; `about` and `mail` are of all devices of the server. Throws std::invalid_argument when the
-/// number of devices or channels is out of range, two of them share a name, there are not as many mailboxes as devices,
-/// or the shard is none.
-/// `handles` may be fewer: nothing is known of the handles of the others.
-std::vector<ServedDevice> served_devices(const std::vector<DeviceDescription>& about,
-                                         const std::vector<HandleDescription>& handles,
-                                         const std::vector<Mailboxes*>& mail, const Shard& shard = {});
+/// Returns the devices of one shard. Throws std::invalid_argument if the number of devices or
+/// channels is out of range, two of them share a name, a device has no mailboxes, or there is no such shard.
+std::vector<ServedDevice> served_devices(const std::vector<ServedDevice::Config>& all, const Shard& shard = {});
 
 }  // namespace tendon

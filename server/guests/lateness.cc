@@ -54,6 +54,8 @@ std::string describe(const Lateness::Report& report) {
   switch (report.cause) {
     case Lateness::Cause::kStateWaited:
       return text + "the server's threads (a state waited " + part(report.ours, report.usual_ours);
+    case Lateness::Cause::kServerStood:
+      return text + "the server (its threads stood still for " + milliseconds_text(report.stood_still) + ")";
     case Lateness::Cause::kRoundTrip:
       return text + "the network (round trip " + part(report.network, report.usual_network);
     case Lateness::Cause::kLost:
@@ -95,13 +97,16 @@ void Lateness::begin(LocalTime now, bool same_machine) noexcept {
   sent_.reset();
   lost_ = 0;
   valid_until_ = LocalTime::max();  // before the first force nothing is late
+  took_state_.reset();
   stood_still_ = {};
+  paused_ = {};
   refused_for_ = Cause::kNone;
 }
 
 Lateness::Part Lateness::part(Cause cause) noexcept {
   switch (cause) {
     case Cause::kStateWaited:
+    case Cause::kServerStood:
       return Part::kOurs;
     case Cause::kRoundTrip:
     case Cause::kLost:
@@ -131,6 +136,20 @@ void Lateness::heard(LocalTime now, std::optional<PeerTime> sent, std::uint64_t 
   sent_ = sent;
 }
 
+void Lateness::took_state(LocalTime now) noexcept {
+  paused_ = paused(now);
+  took_state_ = now;
+}
+
+/// The longest time without a state since the newest force, up to now.
+Duration Lateness::paused(LocalTime now) const noexcept {
+  return took_state_ ? std::max(paused_, now - *took_state_) : paused_;
+}
+
+bool Lateness::is_our_pause(LocalTime now, Duration late_by) const noexcept {
+  return paused(now) > kPause && 2 * paused(now) >= late_by;
+}
+
 void Lateness::refused(Cause cause, std::uint64_t count) noexcept {
   report_.refused += count;
   report_.refused_for = refused_for_ = cause;
@@ -147,10 +166,11 @@ void Lateness::blame(Duration late_by, Cause cause, const Parts& parts) noexcept
   report_.ours = parts.ours;
   report_.network = parts.network;
   report_.engine = parts.engine;
-  report_.stood_still = stood_still_;
+  report_.stood_still = cause == Cause::kServerStood ? paused_ : stood_still_;
 }
 
 Lateness::Cause Lateness::cause_of(const Way& way, const Parts& parts, Duration late_by) const noexcept {
+  if (is_our_pause(way.received, late_by)) return Cause::kServerStood;
   if (refused_for_ != Cause::kNone) return refused_for_;
   if (2 * stood_still_ >= late_by && stood_still_ > kStandsStill) return Cause::kEngineStood;
   const Duration ours = parts.ours - usual_.ours;
@@ -163,6 +183,7 @@ Lateness::Cause Lateness::cause_of(const Way& way, const Parts& parts, Duration 
 
 void Lateness::observe(const Way& way) noexcept {
   ++report_.forces;
+  paused_ = paused(way.received);
   Parts parts;
   parts.ours = std::max(way.sent - way.sampled, Duration::zero());
   parts.network = std::max(way.round_trip, Duration::zero());
@@ -182,6 +203,7 @@ void Lateness::observe(const Way& way) noexcept {
   heard_ = std::max(heard_, way.received);
   valid_until_ = way.received + way.valid_for;
   stood_still_ = {};
+  paused_ = {};
   refused_for_ = Cause::kNone;
 }
 
@@ -205,7 +227,9 @@ Lateness::Report Lateness::report(LocalTime now) {
     const bool silent = now - heard_ > kSilent;
     const Cause unheard = same_machine_ ? Cause::kEngineSilent : Cause::kUnheard;
     const Cause heard = refused_for_ != Cause::kNone ? refused_for_ : Cause::kEngineMissing;
-    blame(now - valid_until_, silent ? unheard : heard, {});
+    paused_ = paused(now);
+    const bool ours = is_our_pause(now, now - valid_until_);
+    blame(now - valid_until_, ours ? Cause::kServerStood : silent ? unheard : heard, {});
   }
   Report report = std::exchange(report_, {});
   report.usual_ours = usual_.ours;

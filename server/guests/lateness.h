@@ -20,23 +20,28 @@ namespace tendon {
 /// The round trip is that of the datagram which brought the force: the echo in it tells how long the peer had held
 /// ours. A force is late when the one before had outlived its validity. These are asked in this order:
 ///
-/// 1. Were forces refused since the one before, and for what? Then the engine is to blame.
-/// 2. Did the engine's program stand still? It did when two of its datagrams with successive numbers carry time stamps
-///    further apart than kStandsStill: a peer sends something every 50 ms (SESSION.md), and nothing was lost in between.
-///    Then the engine is to blame, when that explains half of the time that was missing. The round trip proves
-///    nothing then: what a program does not read waits in its socket, and looks like a slow network.
-/// 3. Which part of the way exceeds its usual length (the median of the forces that were in time) by most? That part is
+/// 1. If no state of the device was taken for kPause and for half of the missing time, the server is to blame: the loop
+///    of the device or the network thread has stopped. The datagrams that wait in the socket meanwhile look like a slow
+///    network or a silent engine.
+/// 2. If forces were refused since the last one, the engine is to blame.
+/// 3. If two datagrams with successive numbers carry time stamps further apart than kStandsStill, the engine's program
+///    has stopped, because a peer sends something every 50 ms (SESSION.md). The engine is to blame if this explains half
+///    of the missing time. The round trip is no evidence then, because the datagrams that a program does not read wait
+///    in its socket, and look like a slow network.
+/// 4. Which part of the way exceeds its usual length (the median of the forces that were in time) by most? That part is
 ///    to blame, when it exceeds it by half the time that was missing.
-/// 4. Otherwise this force was quick, and one before it is missing. The network is to blame when datagrams were lost
+/// 5. Otherwise this force was quick, and one before it is missing. The network is to blame when datagrams were lost
 ///    meanwhile, else the engine has sent none.
 ///
-/// A force that is still missing is the engine's fault while the engine is heard. After 250 ms of silence nobody can
-/// know whether a remote engine stands still or the network is down: the cause is unknown until it is heard again. On
-/// this machine it is the engine.
+/// A force that is still missing is our fault when states are missing, too (1), else the engine's while the engine is
+/// heard. After 250 ms of silence nobody can know whether a remote engine stands still or the network is down: the
+/// cause is unknown until it is heard again. On this machine it is the engine.
 ///
 /// Thread-safe: no. Realtime-safe: yes, except report().
 class Lateness {
  public:
+  /// Ten steps of a device at 1 kHz.
+  static constexpr Duration kPause = std::chrono::milliseconds(10);
   /// Two keep-alives of a peer.
   static constexpr Duration kStandsStill = std::chrono::milliseconds(100);
   /// Five keep-alives.
@@ -46,6 +51,7 @@ class Lateness {
   enum class Cause : std::uint8_t {
     kNone,
     kStateWaited,    ///< ours
+    kServerStood,    ///< ours: the device's loop or the network thread stood still
     kRoundTrip,      ///< the network: was longer than usual
     kLost,           ///< the network: datagrams were lost
     kUnheard,        ///< unknown: nothing is heard of the engine's machine
@@ -84,7 +90,7 @@ class Lateness {
     Duration ours{};             ///< its parts, and what is usual
     Duration network{};
     Duration engine{};
-    Duration stood_still{};  ///< the engine's program, at most
+    Duration stood_still{};  ///< the engine's program or our threads, at most
     Duration usual_ours{};
     Duration usual_network{};
     Duration usual_engine{};
@@ -106,6 +112,8 @@ class Lateness {
   /// A datagram of the engine that is authentic and the newest so far. `sent`: when, by the engine's clock, when known;
   /// `lost`: how many of the engine's datagrams have not come so far.
   void heard(LocalTime now, std::optional<PeerTime> sent, std::uint64_t lost) noexcept;
+  /// The network thread has taken a newer state of the device.
+  void took_state(LocalTime now) noexcept;
   void observe(const Way& way) noexcept;
   /// The newest force is above the device's bound.
   void cut() noexcept { ++report_.cut; }
@@ -121,6 +129,8 @@ class Lateness {
     Duration network{};
     Duration engine{};
   };
+  Duration paused(LocalTime now) const noexcept;
+  bool is_our_pause(LocalTime now, Duration late_by) const noexcept;
   Cause cause_of(const Way& way, const Parts& parts, Duration late_by) const noexcept;
   void blame(Duration late_by, Cause cause, const Parts& parts) noexcept;
 
@@ -132,8 +142,10 @@ class Lateness {
   std::uint64_t lost_ = 0;        ///< of its datagrams
   LocalTime valid_until_{};
   Parts usual_;
+  std::optional<LocalTime> took_state_;
   // Since the newest force:
   Duration stood_still_{};
+  Duration paused_{};  ///< the longest time between two states
   Cause refused_for_ = Cause::kNone;
   Report report_;
 };

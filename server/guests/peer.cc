@@ -28,7 +28,8 @@ std::size_t Peer::Line::receive(Address& sender, std::span<std::byte> buffer) {
 Peer::Peer(const Config& config, Send send, LocalTime now)
     : config_(config),
       line_(std::move(send)),
-      connection_(line_, config.server, {.key = config.key, .seed = config.seed}) {
+      connection_(line_, config.server, {.key = config.key, .seed = config.seed}),
+      lease_(kAskAgain, true) {
   config_.seed = {};
   line_.now = now;
   greet(now);
@@ -53,9 +54,14 @@ LocalTime Peer::turn(LocalTime now) {
   line_.now = now;
   connection_.begin_turn();
   while (const auto event = connection_.next(now)) take(now, *event);
-  if (connection_.session() != nullptr && !asked_ && now >= ask_again_) ask(now);
+  if (connection_.session() != nullptr && now >= next_request()) ask(now);
   connection_.flush(now);
-  return std::min(connection_.next_turn(), asked_ ? LocalTime::max() : ask_again_);
+  return std::min(connection_.next_turn(), next_request());
+}
+
+LocalTime Peer::next_request() const noexcept {
+  if (!lease_.holds()) return lease_.due();
+  return coupled_ || asked_to_couple_ ? LocalTime::max() : couple_at_;
 }
 
 void Peer::greet(LocalTime now) {
@@ -74,12 +80,11 @@ void Peer::take(LocalTime now, const Connection::Event& event) {
     take(now, **of_session);
   } else if (const auto* opened = std::get_if<Connection::Opened>(&event)) {
     open(opened->welcome);
-    if (connection_.session() != nullptr) ask_again_ = now;
   } else if (const auto* ended = std::get_if<Connection::Ended>(&event)) {
-    coupled_ = holds_ = false;
-    asked_.reset();
+    lease_.close();
+    coupled_ = false;
+    asked_to_couple_.reset();
     newest_.reset();
-    ask_again_ = LocalTime::max();
     say(true, ended->reason);
   } else {
     greet(now);
@@ -87,8 +92,9 @@ void Peer::take(LocalTime now, const Connection::Event& event) {
 }
 
 void Peer::open(const Welcome& welcome) {
-  place_ = welcome.grants.empty() ? Grant{.device = 0, .channel = 0, .role = welcome.role} : welcome.grants.front();
-  holds_ = place_.role == Role::kController;
+  lease_.open(welcome.grants.empty() ? Grant{.device = 0, .channel = 0, .role = welcome.role} : welcome.grants.front(),
+              line_.now);
+  couple_at_ = line_.now;
   const auto& features = welcome.features;
   if (std::find(features.begin(), features.end(), kFeatureTeleoperation) == features.end()) {
     say(true, "that server does not know how to couple two devices");
@@ -96,32 +102,29 @@ void Peer::open(const Welcome& welcome) {
   }
 }
 
-/// The channel first, then the coupling.
 void Peer::ask(LocalTime now) {
-  ask_again_ = LocalTime::max();
   Session& session = *connection_.session();
-  if (!holds_) {
-    asked_ = session.request(TakeLease{.device = place_.device, .channel = place_.channel});
-  } else if (!coupled_) {
-    Couple couple = config_.couple;
-    couple.device = place_.device;
-    couple.channel = place_.channel;
-    asked_ = session.request(couple);
-  } else {
+  if (!lease_.holds()) {
+    if (!lease_.ask(session)) lease_.ask_at(now + kAskAgain);
     return;
   }
-  if (!asked_) ask_again_ = now + kAskAgain;
+  Couple couple = config_.couple;
+  couple.device = lease_.place().device;
+  couple.channel = lease_.place().channel;
+  asked_to_couple_ = session.request(couple);
+  if (!asked_to_couple_) couple_at_ = now + kAskAgain;
 }
 
 void Peer::answered(LocalTime now, const Session::RequestAnswered& answer) {
-  if (answer.id != asked_) return;
-  asked_.reset();
+  const bool of_lease = lease_.take(answer, now);
+  if (!of_lease && answer.id != asked_to_couple_) return;
+  if (!of_lease) asked_to_couple_.reset();
   if (answer.code != Code::kOk) {
     say(true, answer.detail.empty() ? "refused" : answer.detail);
-    ask_again_ = now + (answer.code == Code::kBusy ? std::max(answer.wait, kAskAgain) : kCompareAgain);
-  } else if (!holds_) {
-    holds_ = true;
-    ask_again_ = now;
+    const LocalTime again = now + (answer.code == Code::kBusy ? std::max(answer.wait, kAskAgain) : kCompareAgain);
+    of_lease ? lease_.ask_at(again) : void(couple_at_ = again);
+  } else if (of_lease) {
+    couple_at_ = now;
   } else {
     coupled_ = true;
     say(false, "coupled");
@@ -130,7 +133,8 @@ void Peer::answered(LocalTime now, const Session::RequestAnswered& answer) {
 
 void Peer::take(LocalTime now, const Session::Event& event) {
   if (const auto* arrived = std::get_if<Session::PortArrived>(&event)) {
-    if (arrived->port.device == place_.device && arrived->port.channel == place_.channel) newest_ = arrived->port;
+    const Grant& place = lease_.place();
+    if (arrived->port.device == place.device && arrived->port.channel == place.channel) newest_ = arrived->port;
   } else if (const auto* answer = std::get_if<Session::RequestAnswered>(&event)) {
     answered(now, *answer);
   } else if (const auto* asked = std::get_if<Session::RequestArrived>(&event)) {
@@ -138,9 +142,10 @@ void Peer::take(LocalTime now, const Session::Event& event) {
     Session& session = *connection_.session();
     if (lost == nullptr) return session.answer(asked->id, Code::kUnsupported, "that is a guest's to ask");
     session.answer(asked->id, Code::kOk, {});
-    holds_ = coupled_ = false;
+    if (!lease_.take(*lost, session, now)) return;
+    coupled_ = false;
+    asked_to_couple_.reset();  // its answer can arrive later although it is older
     say(true, "\"" + lost->to + "\" has taken the channel");
-    if (!asked_) ask_again_ = now + kAskAgain;
   }
 }
 
@@ -148,8 +153,8 @@ void Peer::send(LocalTime now, const PortState& port) {
   if (!coupled_) return;
   PortFrame frame;
   static_cast<PortState&>(frame) = port;
-  frame.device = place_.device;
-  frame.channel = place_.channel;
+  frame.device = lease_.place().device;
+  frame.channel = lease_.place().channel;
   connection_.session()->send(frame);
   line_.now = now;
   connection_.flush(now);

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "protocol/connection.h"
+#include "protocol/lease_request.h"
 #include "protocol/link.h"
 #include "protocol/messages.h"
 
@@ -81,6 +82,8 @@ class Peer {
   void take(LocalTime now, const Connection::Event& event);
   void take(LocalTime now, const Session::Event& event);
   void open(const Welcome& welcome);
+  /// When the next request is due: the lease first, then the coupling.
+  LocalTime next_request() const noexcept;
   void ask(LocalTime now);
   void answered(LocalTime now, const Session::RequestAnswered& answer);
   void say(bool warning, std::string text);
@@ -88,11 +91,10 @@ class Peer {
   Config config_;
   Line line_;
   Connection connection_;
-  Grant place_{};
-  bool holds_ = false;  ///< the channel takes what we send
+  LeaseRequest lease_;  ///< of the channel, and the numbers of device and channel
   bool coupled_ = false;
-  std::optional<std::uint32_t> asked_;  ///< the request that waits for its answer
-  LocalTime ask_again_ = LocalTime::max();
+  std::optional<std::uint32_t> asked_to_couple_;  ///< the Couple that waits for its answer
+  LocalTime couple_at_ = LocalTime::max();        ///< when the next one is due
   std::optional<PortState> newest_;
   std::string said_;  ///< what was said last
   std::vector<Notice> notices_;

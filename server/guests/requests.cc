@@ -61,8 +61,8 @@ Outcome describe(LocalTime /*now*/, const Asker& asker, const Describe& wanted) 
   const ServedDevice& device = asker.devices[wanted.device];
   if (wanted.handle) {
     HandleDescription handle = device.handle;
-    if (!asker.guest.sees_joints) handle.joints.clear();
-    if (!asker.guest.sees_outputs) handle.outputs.clear();
+    if (!asker.guest.has<kFeatureJoints>()) handle.joints.clear();
+    if (!asker.guest.has<kFeatureOutputs>()) handle.outputs.clear();
     return {.handle = std::move(handle)};
   }
   DeviceDescription about = device.about;
@@ -93,7 +93,7 @@ Outcome lease_lost(LocalTime /*now*/, const Asker& /*asker*/, const LeaseLost& /
 
 /// A coupling has one other end: the client that was first, as long as it holds its channel.
 Outcome couple(LocalTime /*now*/, const Asker& asker, const Couple& theirs) {
-  if (!asker.guest.may_couple) {
+  if (!asker.guest.may_couple()) {
     return {.code = Code::kUnsupported, .detail = "the Hello did not name the feature teleoperation"};
   }
   ServedDevice& device = asker.devices[theirs.device];
@@ -184,7 +184,7 @@ Outcome set_share(LocalTime /*now*/, const Asker& asker, const SetShare& wanted)
 
 /// Nobody sets the lamps of a device whose forces are another's.
 Outcome set_output(LocalTime /*now*/, const Asker& asker, const SetOutput& wanted) {
-  if (!asker.guest.sees_outputs) {
+  if (!asker.guest.has<kFeatureOutputs>()) {
     return {.code = Code::kUnsupported, .detail = "the Hello did not name the feature outputs"};
   }
   ServedDevice& device = asker.devices[wanted.device];

@@ -32,6 +32,7 @@ constexpr const char* kAvahi = "org.freedesktop.Avahi";
 constexpr const char* kServer = "org.freedesktop.Avahi.Server";
 constexpr const char* kEntryGroup = "org.freedesktop.Avahi.EntryGroup";
 constexpr int kAnyInterface = -1;
+constexpr int kAnyProtocol = -1;
 constexpr int kIpv4 = 0;
 constexpr int kIpv6 = 1;
 
@@ -113,15 +114,18 @@ int interface_of(const Address& address) {
   return kAnyInterface;
 }
 
+/// [::] receives IPv4 too (server/machine/udp_link.h).
+int protocol_of(const Address& address) {
+  if (is_ipv4(address)) return kIpv4;
+  return address.ip == decltype(address.ip){} ? kAnyProtocol : kIpv6;
+}
+
 }  // namespace
 
 class Announcer::Avahi {
  public:
   Avahi(std::vector<Device> devices, const Address& listen, Say say)
-      : port_(listen.port),
-        interface_(interface_of(listen)),
-        protocol_(is_ipv4(listen) ? kIpv4 : kIpv6),
-        say_(std::move(say)) {
+      : port_(listen.port), interface_(interface_of(listen)), protocol_(protocol_of(listen)), say_(std::move(say)) {
     for (Device& device : devices) entries_.push_back({.avahi = this, .device = std::move(device)});
     sd_event* loop = nullptr;
     if (sd().event_new(&loop) < 0) throw std::runtime_error("[discovery] announce: the system gives no event loop");

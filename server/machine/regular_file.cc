@@ -4,7 +4,6 @@
 #include <sys/stat.h>
 
 #include <cerrno>
-#include <stdexcept>
 #include <system_error>
 
 namespace tendon {
@@ -20,8 +19,8 @@ std::optional<std::string> why_not_regular(mode_t mode) {
 
 std::ifstream open_regular_file(const std::filesystem::path& file, std::string_view kind) {
   const auto refuse = [&](const std::string& reason) {
-    throw std::runtime_error("cannot read " + std::string(kind) + (kind.empty() ? "" : " ") + file.string() + ": " +
-                             reason);
+    throw UnreadableFile("cannot read " + std::string(kind) + (kind.empty() ? "" : " ") + file.string() + ": " +
+                         reason);
   };
   struct stat status {};
   if (::stat(file.c_str(), &status) != 0) refuse(std::generic_category().message(errno));

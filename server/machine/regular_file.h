@@ -6,15 +6,22 @@
 #include <filesystem>
 #include <fstream>
 #include <optional>
+#include <stdexcept>
 #include <string>
 #include <string_view>
 
 namespace tendon {
 
+/// A file cannot be read. The message is "cannot read WHAT: REASON".
+class UnreadableFile : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
 /// Opens `file` for reading, in binary, when it is a regular file or a link to one. Anything else is refused before it
 /// is opened: opening a named pipe waits for a writer, for ever; a device may never end; a directory has no bytes.
 ///
-/// Throws std::runtime_error "cannot read WHAT: REASON", where WHAT is `file`, with `kind` and a space before it when
+/// Throws UnreadableFile, where WHAT is `file`, with `kind` and a space before it when
 /// `kind` is not empty: "cannot read recording run.mcap: it is a named pipe, expected a regular file".
 ///
 /// Thread-safe: yes. Realtime-safe: no.

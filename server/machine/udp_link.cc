@@ -18,6 +18,7 @@
 
 #include "protocol/wire/header.h"
 #include "server/machine/clock.h"
+#include "server/machine/local_address.h"
 
 namespace tendon {
 namespace {
@@ -46,11 +47,54 @@ Address to_address(const udp::endpoint& endpoint) {
 }
 
 template <class Value>
-void set(int fd, int option, const Value& value) {
-  if (::setsockopt(fd, SOL_SOCKET, option, &value, sizeof value) != 0) {
+void set(int fd, int option, const Value& value, int level = SOL_SOCKET) {
+  if (::setsockopt(fd, level, option, &value, sizeof value) != 0) {
     throw std::system_error(errno, std::generic_category());
   }
 }
+
+/// A datagram for recvmsg(2) or sendmsg(2), with its local address.
+struct Message {
+  Message(std::span<const std::byte> datagram, udp::endpoint& peer, std::size_t peer_size)
+      : piece_{const_cast<std::byte*>(datagram.data()), datagram.size()} {  // sendmsg does not write there
+    header.msg_name = peer.data();
+    header.msg_namelen = static_cast<socklen_t>(peer_size);
+    header.msg_iov = &piece_;
+    header.msg_iovlen = 1;
+  }
+  Message(const Message&) = delete;
+  Message& operator=(const Message&) = delete;
+
+  void ask_for_local() noexcept {
+    header.msg_control = control_.data();
+    header.msg_controllen = control_.size();
+  }
+
+  std::optional<AskedAt::Ip> local() noexcept {
+    AskedAt::Ip ip{};
+    for (cmsghdr* said = CMSG_FIRSTHDR(&header); said != nullptr; said = CMSG_NXTHDR(&header, said)) {
+      if (local_address::read(*said, ip)) return ip;
+    }
+    return std::nullopt;
+  }
+
+  void leave_from(const AskedAt::Ip& local) noexcept {
+    ask_for_local();
+    local_address::write(local, header);
+  }
+
+  /// Lets the kernel choose the source address.
+  void leave_from_any() noexcept {
+    header.msg_control = nullptr;
+    header.msg_controllen = 0;
+  }
+
+  msghdr header{};
+
+ private:
+  iovec piece_;
+  alignas(cmsghdr) std::array<char, local_address::kControlBytes> control_{};
+};
 
 /// From now on further sockets of this user may have the same address.
 void share_address(int fd) { set(fd, SO_REUSEPORT, int{1}); }
@@ -76,7 +120,11 @@ void steer_by_connection(int fd, std::uint32_t count) {
 int socket_on(const udp::endpoint& endpoint, bool shares_address) {
   asio::io_context context;
   udp::socket socket(context, endpoint.protocol());
-  if (endpoint.protocol() == udp::v6()) socket.set_option(asio::ip::v6_only(true));
+  const bool all = endpoint.address().is_unspecified();
+  if (endpoint.protocol() == udp::v6()) socket.set_option(asio::ip::v6_only(!all));
+  if (all && !local_address::ask(socket.native_handle(), endpoint.protocol().family())) {
+    throw std::system_error(errno, std::generic_category());
+  }
   socket.set_option(asio::socket_base::receive_buffer_size(kReceiveBufferBytes));
   socket.non_blocking(true);
   if (shares_address) share_address(socket.native_handle());
@@ -85,7 +133,9 @@ int socket_on(const udp::endpoint& endpoint, bool shares_address) {
 }
 
 std::runtime_error cannot_listen(const Address& listen, const std::system_error& error) {
-  return std::runtime_error("cannot listen on " + to_string(listen) + ": " + error.code().message());
+  const bool taken = error.code().value() == EADDRINUSE;
+  return std::runtime_error("cannot listen on " + to_string(listen) + ": " + error.code().message() +
+                            (taken ? "; `ss -lunp` says by which program" : ""));
 }
 
 }  // namespace
@@ -98,6 +148,8 @@ UdpLink::UdpLink(const Address& listen, Reach reach, const std::optional<std::fi
                                 "`keys` in the scene's [network])");
   }
   if (file) unix_.emplace(*file);
+  if (to_endpoint(listen).address().is_unspecified()) own_asked_at_ = std::make_unique<AskedAt>();
+  asked_at_ = own_asked_at_.get();
   try {
     fd_ = socket_on(to_endpoint(listen), false);
   } catch (const std::system_error& error) {
@@ -105,7 +157,8 @@ UdpLink::UdpLink(const Address& listen, Reach reach, const std::optional<std::fi
   }
 }
 
-UdpLink::UdpLink(const UdpLink& first, Further) : fd_(socket_on(to_endpoint(first.local_address()), true)) {}
+UdpLink::UdpLink(const UdpLink& first, Further)
+    : fd_(socket_on(to_endpoint(first.local_address()), true)), asked_at_(first.asked_at_) {}
 
 std::vector<std::unique_ptr<UdpLink>> UdpLink::several(const Address& listen, Reach reach, std::uint32_t count) {
   std::vector<std::unique_ptr<UdpLink>> links;
@@ -128,10 +181,23 @@ void UdpLink::send(const Address& to, std::span<const std::byte> datagram) {
     if (!unix_->send(to, datagram)) send_failures_.add();
     return;
   }
-  const udp::endpoint endpoint = to_endpoint(to);
-  const ssize_t sent = ::sendto(fd_, datagram.data(), datagram.size(), MSG_NOSIGNAL, endpoint.data(),
-                                static_cast<socklen_t>(endpoint.size()));
-  if (sent < 0) send_failures_.add();
+  if (!send_to_network(to, datagram)) send_failures_.add();
+}
+
+bool UdpLink::send_to_network(const Address& to, std::span<const std::byte> datagram) const {
+  udp::endpoint endpoint = to_endpoint(to);
+  const auto local = asked_at_ ? asked_at_->find(to) : std::nullopt;
+  if (!local) {
+    return ::sendto(fd_, datagram.data(), datagram.size(), MSG_NOSIGNAL, endpoint.data(),
+                    static_cast<socklen_t>(endpoint.size())) >= 0;
+  }
+  Message message(datagram, endpoint, endpoint.size());
+  message.leave_from(*local);
+  if (::sendmsg(fd_, &message.header, MSG_NOSIGNAL) >= 0) return true;
+  // The machine may have lost this address, or it may be a multicast address.
+  if (errno != EINVAL && errno != EADDRNOTAVAIL && errno != ENETUNREACH) return false;
+  message.leave_from_any();
+  return ::sendmsg(fd_, &message.header, MSG_NOSIGNAL) >= 0;
 }
 
 std::size_t UdpLink::receive(Address& from, std::span<std::byte> buffer) {
@@ -145,14 +211,17 @@ std::size_t UdpLink::receive(Address& from, std::span<std::byte> buffer) {
 std::size_t UdpLink::receive_from_network(Address& from, std::span<std::byte> buffer) {
   udp::endpoint endpoint;
   for (int i = 0; i < kMaxEmptyDatagrams; ++i) {
-    auto length = static_cast<socklen_t>(endpoint.capacity());
-    const ssize_t size =
-        ::recvfrom(fd_, buffer.data(), buffer.size(), MSG_TRUNC | MSG_DONTWAIT, endpoint.data(), &length);
+    Message message(buffer, endpoint, endpoint.capacity());
+    if (asked_at_) message.ask_for_local();
+    const ssize_t size = ::recvmsg(fd_, &message.header, MSG_TRUNC | MSG_DONTWAIT);
     if (size == 0 || (size < 0 && errno == EINTR)) continue;
     if (size < 0) return 0;
-    endpoint.resize(length);
+    endpoint.resize(message.header.msg_namelen);
     from = to_address(endpoint);
     if (UnixSocket::is_peer(from)) continue;  // no port is 0, unless somebody makes it up
+    if (asked_at_) {
+      if (const auto local = message.local()) asked_at_->put(from, *local);
+    }
     return static_cast<std::size_t>(size);
   }
   return 0;

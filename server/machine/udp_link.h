@@ -10,6 +10,7 @@
 #include "core/base/time.h"
 #include "core/exchange/counter.h"
 #include "protocol/link.h"
+#include "server/machine/asked_at.h"
 #include "server/machine/doorbell.h"
 #include "server/machine/unix_socket.h"
 
@@ -21,8 +22,9 @@ enum class Reach : std::uint8_t {
   kAnywhere,     ///< only for servers that require a key
 };
 
-/// The real link: one UDP socket on one address of this machine, IPv4 or IPv6; and, on demand, a Unix socket for
-/// engines on the same machine.
+/// The real link: one UDP socket on an IPv4 or IPv6 address of this machine, or on all of its addresses. 0.0.0.0 means
+/// all IPv4 addresses, and [::] means all addresses of both families. The answer to a peer is then sent from the address
+/// that the peer has used. A Unix socket for engines on the same machine is optional.
 ///
 /// send() and receive() never wait; wait() is the only place where the network thread sleeps.
 /// Anybody may send anything; nothing here looks inside the datagrams.
@@ -78,8 +80,11 @@ class UdpLink : public Link {
   struct Further {};
   UdpLink(const UdpLink& first, Further);
   std::size_t receive_from_network(Address& from, std::span<std::byte> buffer);
+  bool send_to_network(const Address& to, std::span<const std::byte> datagram) const;
 
   int fd_ = -1;
+  std::unique_ptr<AskedAt> own_asked_at_;
+  AskedAt* asked_at_ = nullptr;  ///< that of the first link of the address; null if bound to a single address
   std::optional<UnixSocket> unix_;
   bool unix_first_ = false;  ///< a flood through the one must not close the other
   Counter send_failures_;

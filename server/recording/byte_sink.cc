@@ -89,7 +89,18 @@ bool FileSink::append(std::span<const std::byte> bytes) {
     return false;
   }
   size_ += done;
-  return true;
+  return is_there();
+}
+
+/// Returns false if the file has been deleted or truncated.
+bool FileSink::is_there() {
+  struct stat status {};
+  if (!is_file_ || ::fstat(descriptor_, &status) != 0) return true;
+  const bool cut = static_cast<std::uint64_t>(status.st_size) < size_;
+  if (status.st_nlink > 0 && !cut) return true;
+  gone_ = true;
+  error_ = "cannot write recording " + path_.string() + ": it was " + (cut ? "cut off" : "deleted") + " meanwhile";
+  return false;
 }
 
 }  // namespace tendon

@@ -37,8 +37,9 @@ class MemorySink final : public ByteSink {
   std::vector<std::byte> bytes_;
 };
 
-/// A new file. Never touches a byte that was there before it. Each piece is handed to the kernel at once: a killed
-/// process loses none of them (a power cut may). A piece that does not fit on the disk is cut off again.
+/// A new file. Existing files are not changed. Each piece is handed to the kernel at once: a killed
+/// process loses none of them (a power cut may). A piece that does not fit on the disk is cut off again. `append` fails
+/// if the file has been deleted or truncated.
 ///
 /// It also writes to devices that keep nothing (/dev/null, /dev/full), which any number of sinks may share. A pipe, a
 /// socket, a block device and a folder are refused: a recording is a file, and a pipe that nobody reads would hang.
@@ -61,6 +62,8 @@ class FileSink final : public ByteSink {
   std::uint64_t size() const noexcept { return size_; }
   /// It is a file on a disk, and not a device.
   bool is_file() const noexcept { return is_file_; }
+  /// Returns true if `append` has failed because the file has been deleted or truncated.
+  bool gone() const noexcept { return gone_; }
 
  private:
   struct Opened {
@@ -69,10 +72,12 @@ class FileSink final : public ByteSink {
   };
   FileSink(const std::filesystem::path& path, const Opened& opened);
   static Opened open(const std::filesystem::path& path);
+  bool is_there();
 
   std::filesystem::path path_;
   int descriptor_ = -1;
   bool is_file_ = false;
+  bool gone_ = false;
   std::uint64_t size_ = 0;
   std::string error_;
 };

@@ -7,74 +7,112 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
-#include "server/recording/mcap_format.h"
+#include "server/recording/mcap_file.h"
 
 namespace tendon {
 
 /// Reads the messages of an MCAP file from start to end, in the order of the file (https://mcap.dev/spec).
 ///
-/// * A file that was cut off anywhere gives every message of its whole records; then `truncated()` is true.
-/// * Every CRC in the file is checked. Corruption throws std::runtime_error that names the file, the byte offset of
-///   the record, and what is wrong with it; the messages before it have been given.
-/// * Compressed chunks are refused in the same way: Tendon writes none.
+/// * If the file is truncated, all messages in complete chunks are returned, and then `truncated()` is true. This also
+///   applies to a file that ends with zeros, for example because of a power failure.
+/// * All CRCs and lengths are checked. If a chunk is damaged, it is skipped, and `damage()` contains an error message.
+///   If the record of a channel is damaged, the summary at the end of the file is used instead.
+/// * The sequence numbers of each channel are used to count the messages that are missing. McapWriter starts at 0.
 ///
-/// Memory: one record. Thread-safe: no. Realtime-safe: no.
+/// Compressed chunks and messages that are not in a chunk are not supported, because Tendon does not write them.
+///
+/// The reader needs memory for one record, and for the summary if the file is damaged. This class is not thread-safe.
 class McapReader {
  public:
   struct Channel {
     std::string topic;
     std::string message_encoding;
     std::string schema_name;
+
+    bool operator==(const Channel&) const = default;
   };
   struct Message {
     const Channel& channel;
     std::uint32_t sequence;
-    std::uint64_t log_time;  ///< ns
-    std::string_view data;   ///< valid until the next `next`
-    std::uint64_t offset;    ///< byte offset in the file of the record that it is in
+    std::uint64_t log_time;     ///< ns
+    std::string_view data;      ///< valid until the next `next`
+    std::uint64_t offset;       ///< byte offset in the file of the record that it is in
+    std::uint64_t missing = 0;  ///< the number of missing messages of this channel before this one
   };
-
-  /// No record may be larger: what a flipped bit in a length can make us allocate. Our chunks are 256 KiB.
-  static constexpr std::uint64_t kMaxRecord = std::uint64_t{64} << 20;
 
   /// `name` is what messages call the file. Throws std::runtime_error when it is not an MCAP file.
   McapReader(std::unique_ptr<std::istream> input, std::string name);
 
-  /// The next message; empty at the end of the data.
+  /// Returns the next message, or nothing at the end of the data. Throws std::runtime_error if a chunk is compressed or
+  /// if the file cannot be read.
   std::optional<Message> next();
 
   /// True when the file ended before its own end mark. Known once `next` has returned empty.
   bool truncated() const noexcept { return truncated_; }
 
+  /// Returns an error message for each damaged region that was found so far. It contains the position in the file, the
+  /// reason, and the time of the previous and next message. The time is relative to the first message.
+  std::vector<std::string> damage() const;
+
+  /// Returns the number of messages that are missing at the end of the file, according to the summary. Returns 0 if
+  /// there is no summary. This must only be called after `next` has returned nothing.
+  std::uint64_t missing_at_end(std::string_view topic);
+
+  /// Replaces the channels with the ones from the summary at the end of the file. This also changes the channel of
+  /// messages that have been returned. Returns false if this is not possible or has already been done.
+  bool use_summary();
+
+  /// The size of the file in bytes.
+  std::uint64_t size() const noexcept { return file_.size(); }
+
   /// Channels met so far.
   const std::map<std::uint16_t, Channel>& channels() const noexcept { return channels_; }
 
-  /// Throws "NAME: byte OFFSET: what": for callers that find a message's content wrong.
+  /// Adds an error message to `damage()`. This is used by callers if the content of a message is not valid.
+  void note(std::uint64_t offset, const std::string& what) { note(offset, offset, what); }
+  /// Throws std::runtime_error with the message "NAME: byte OFFSET: what".
   [[noreturn]] void corrupt(std::uint64_t offset, const std::string& what) const;
 
  private:
-  class Fields;
+  struct Damage {
+    std::uint64_t from;  ///< position in the file
+    std::uint64_t to;
+    std::string what;
+    std::optional<std::uint64_t> after;   ///< log time of the previous message
+    std::optional<std::uint64_t> before;  ///< log time of the next message
+  };
+  struct Count {
+    std::uint64_t next = 0;  ///< the next sequence number
+    std::size_t damage = 0;  ///< the size of `damage_` after the last message
+  };
 
   bool next_record();
-  std::optional<Message> take(mcap::Opcode opcode, std::span<const std::byte> content);
-  void open_chunk();
+  void accept_record();
+  bool skip_damage(const std::string& what);
+  bool finish(bool truncated);
   void check_end();
+  void open_chunk();
+  std::optional<Message> take(mcap::Opcode opcode, std::span<const std::byte> content);
+  std::optional<Message> take_message(mcap::Fields fields);
+  void take_channel(mcap::Fields fields);
+  void take_statistics(mcap::Fields fields);
+  std::vector<std::byte> whole_summary();
+  void note(std::uint64_t from, std::uint64_t to, std::string what);
 
-  std::unique_ptr<std::istream> input_;
-  std::string name_;
-  std::uint64_t size_ = 0;
+  mcap::File file_;
   bool ends_with_magic_ = false;
 
-  std::uint64_t position_ = 0;       ///< of the next record
-  std::uint64_t record_offset_ = 0;  ///< of the record in `content_`
-  mcap::Opcode opcode_{};
+  std::uint64_t position_ = 0;  ///< of the next record
+  std::uint64_t sure_ = 0;      ///< the end of the last valid chunk
+  mcap::File::Record record_;   ///< the record in `content_`
   std::vector<std::byte> content_;
-  std::span<const std::byte> chunk_;  ///< records of the open chunk that are still to be taken
+  std::span<const std::byte> chunk_;  ///< the remaining records of the current chunk
 
   std::uint32_t crc_ = 0;          ///< of the file before `position_`
   std::uint32_t summary_crc_ = 0;  ///< of the summary before `position_`
@@ -82,6 +120,15 @@ class McapReader {
 
   std::map<std::uint16_t, std::string> schemas_;
   std::map<std::uint16_t, Channel> channels_;
+  std::set<std::uint16_t> doubtful_;              ///< channels that have been defined more than once
+  std::map<std::uint16_t, Count> taken_;          ///< by channel
+  std::map<std::uint16_t, std::uint64_t> total_;  ///< the number of messages of each channel, according to the summary
+  bool summary_tried_ = false;
+  bool summary_used_ = false;
+
+  std::vector<Damage> damage_;
+  std::optional<std::uint64_t> first_time_;
+  std::optional<std::uint64_t> last_time_;
   bool finished_ = false;
   bool truncated_ = false;
 };

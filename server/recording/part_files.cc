@@ -83,16 +83,28 @@ bool looks_like_a_recording(const fs::path& path) {
                     [](char a, std::byte b) { return static_cast<std::byte>(a) == b; });
 }
 
-/// Whether the file's Scene says that the file may be deleted to keep a budget.
-bool has_a_budget(const fs::path& path) {
+/// Reads the Scene of the recording `part`. Empty if that fails.
+std::optional<SceneRecord> scene_of(const fs::path& part) {
   try {
-    RecordingReader reader(path);
-    const auto first = reader.next();
-    const auto* scene = first ? std::get_if<SceneRecord>(&*first) : nullptr;
-    return scene != nullptr && scene->budget_bytes > 0;
+    RecordingReader reader(part);
+    auto first = reader.next();
+    auto* scene = first ? std::get_if<SceneRecord>(&*first) : nullptr;
+    return scene != nullptr ? std::optional(std::move(*scene)) : std::nullopt;
   } catch (const std::runtime_error&) {
-    return false;
+    return std::nullopt;
   }
+}
+
+/// True if the Scene of `part` allows its deletion to keep the budget of the recording `path`.
+bool may_be_deleted(const fs::path& part, const fs::path& path) {
+  const auto scene = scene_of(part);
+  return scene && scene->budget_bytes > 0 && scene->first_part == path.filename();
+}
+
+/// True if the Scene of `part` names a first part other than `path`.
+bool is_of_another(const fs::path& part, const fs::path& path) {
+  const auto scene = scene_of(part);
+  return scene && !scene->first_part.empty() && scene->first_part != path.filename();
 }
 
 /// Whether a server still writes to the file.
@@ -108,7 +120,9 @@ bool is_in_use(const fs::path& path) {
 
 std::unique_ptr<FileSink> open_next_part(const fs::path& path) {
   std::uint64_t highest = 1;
-  for (const Part& part : parts_of(path)) highest = std::max(highest, part.number);
+  for (const Part& part : parts_of(path)) {
+    if (part.number > highest && !is_of_another(part.path, path)) highest = part.number;
+  }
   if (highest == 1) {
     if (auto sink = FileSink::open_new(path)) return sink;
   }
@@ -123,7 +137,7 @@ std::unique_ptr<FileSink> open_next_part(const fs::path& path) {
 
 std::vector<fs::path> delete_oldest_parts(const fs::path& path, std::uint64_t most_bytes) {
   std::vector<Part> parts = parts_of(path);
-  std::erase_if(parts, [](const Part& part) { return !has_a_budget(part.path) || is_in_use(part.path); });
+  std::erase_if(parts, [&](const Part& part) { return !may_be_deleted(part.path, path) || is_in_use(part.path); });
   std::sort(parts.begin(), parts.end(), [](const Part& a, const Part& b) {
     return std::pair(a.written, a.number) < std::pair(b.written, b.number);
   });

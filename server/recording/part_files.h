@@ -24,8 +24,8 @@ std::unique_ptr<FileSink> open_next_part(const std::filesystem::path& path);
 
 /// Deletes the oldest parts of `path` until all of them have at most `most_bytes`; returns what it has deleted.
 ///
-/// It deletes only recordings whose own Scene has a budget. Those of runs without a budget, of faults,
-/// and parts that another server still writes to, stay and do not count. What cannot be deleted stays.
+/// A file is only deleted if its Scene has a budget and `path` is its first part. All other files are not counted. Files
+/// that a server is still writing to are not deleted.
 std::vector<std::filesystem::path> delete_oldest_parts(const std::filesystem::path& path, std::uint64_t most_bytes);
 
 /// Whether the disk under `path` has 16 MiB to spare, half a minute of a usual run: with less, a recording that has

@@ -28,6 +28,7 @@ PartRecorder::PartRecorder(const Config& config) : config_(config) {
   if (config_.budget_bytes > 0) {
     config_.rotate_bytes = std::min(config_.rotate_bytes, part_of_budget(config_.budget_bytes));
     config_.run.scene.budget_bytes = config_.budget_bytes;
+    config_.run.scene.first_part = config_.path.filename().string();
   }
   if (config_.keep == Keep::kFaults) config_.rotate_after = std::min(config_.rotate_after, kBeforeAFault);
   faulty_.resize(1 + config_.run.more_devices.size());
@@ -147,11 +148,16 @@ void PartRecorder::look_after(LocalTime now) {
 /// Adds the open part's counts to the totals, even when the part has failed.
 void PartRecorder::finish_part(LocalTime now) {
   const Recorder::Status part = recorder_->status();
-  closed_.bytes += part.bytes;
-  closed_.steps += part.steps;
-  closed_.datagrams += part.datagrams;
   missing_.steps += part.lost_steps - told_.steps;
   missing_.datagrams += part.lost_datagrams - told_.datagrams;
+  if (sink_->gone()) {
+    missing_.steps += part.steps;
+    missing_.datagrams += part.datagrams;
+  } else {
+    closed_.bytes += part.bytes;
+    closed_.steps += part.steps;
+    closed_.datagrams += part.datagrams;
+  }
   recorder_.reset();
   // Not even the scene could be written: the file is removed.
   const bool empty = sink_->is_file() && sink_->size() == 0;
@@ -189,7 +195,8 @@ void PartRecorder::stop(LocalTime now, std::string why) {
   if (recorder_) finish_part(now);
   try_again_ = now + config_.retry_after;
   if (closed_.error.empty()) {
-    notices_.push_back({true, "recording has stopped, the device runs on: " + why + "; it goes on when there is room"});
+    notices_.push_back({true, "recording has stopped, the device runs on: " + why +
+                                  "; it goes on as soon as it can be written again"});
   }
   closed_.error = std::move(why);
 }

@@ -22,14 +22,14 @@ namespace tendon {
 ///
 /// * when the part has reached `rotate_bytes`, or is `rotate_after` old;
 /// * when its index has 65 536 chunks, some 10 MB: the memory of a run does not grow with its length;
-/// * when the part before could not be written to (a full disk), as soon as there is room again. It begins with what is
-///   missing, as a Lost record.
+/// * if the previous part could not be written because the disk was full or the file was deleted. The new part starts
+///   as soon as this is possible. It starts with a Lost record that contains the number of missing steps.
 ///
 /// With a budget the oldest parts are deleted before a new one begins, so that all of them together stay within it.
 ///
-/// With Keep::kFaults a part takes a minute at the most, and stays only when a fault began in it, in the minute after it
-/// or in the 10 s before it, or when its number says so. It is deleted as soon as neither can be: the last ones when the run ends without a
-/// fault. A run that is killed leaves those that were not decided yet.
+/// With Keep::kFaults a part takes a minute at the most, and stays only when a fault began in it, in the minute after
+/// it or in the 10 s before it, or when its number says so. It is deleted as soon as neither can be: the last ones when
+/// the run ends without a fault. A run that is killed leaves those that were not decided yet.
 ///
 /// Records come in the order of Recorder. Thread-safe: no; the log thread owns it. Realtime-safe: no.
 class PartRecorder {

@@ -225,6 +225,7 @@ std::string encode(const SceneRecord& scene) {
   out.set_unix_offset_ns(scene.unix_offset.count());
   out.set_part(scene.part);
   out.set_budget_bytes(scene.budget_bytes);
+  out.set_first_part(scene.first_part);
   return out.SerializeAsString();
 }
 
@@ -331,7 +332,8 @@ SceneRecord decode_scene(std::string_view message) {
           .commit = in.commit(),
           .unix_offset = Duration(in.unix_offset_ns()),
           .part = in.part(),
-          .budget_bytes = in.budget_bytes()};
+          .budget_bytes = in.budget_bytes(),
+          .first_part = in.first_part()};
 }
 
 StepRecord decode_step(std::string_view message, LocalTime at, Ways& ways) {

@@ -23,6 +23,9 @@ struct SceneRecord {
   std::uint32_t part = 0;  ///< of its run, from 1; 0: a recording that has only this one
   /// The recording may be deleted to keep all that have its name within so many bytes; 0: it is kept.
   std::uint64_t budget_bytes = 0;
+  /// The file name of part 1. This is only set if `budget_bytes` is set. It is needed because `subject-2.mcap` can also
+  /// be the first part of a different recording.
+  std::string first_part = {};
 
   bool operator==(const SceneRecord&) const = default;
 };
@@ -31,7 +34,7 @@ struct SceneRecord {
 struct LossRecord {
   enum class Cause : std::uint8_t {
     kLogThread = 0,   ///< it could not follow
-    kDisk = 1,        ///< it was full, or failed
+    kDisk = 1,        ///< it was full, or an error occurred, or the file is damaged
     kByteBudget = 2,  ///< guests' datagrams beyond the bytes of a second, see DatagramSieve
     kSample = 3,      ///< strangers' datagrams beyond the sample of a second, likewise
   };

@@ -12,55 +12,107 @@
 namespace tendon {
 namespace {
 
+constexpr std::array kKinds = {&recording::kScene, &recording::kStep, &recording::kPort, &recording::kDatagram,
+                               &recording::kLoss};
+
+bool has_form(const McapReader::Channel& channel, const recording::Channel& kind) {
+  return channel.schema_name == kind.schema && channel.message_encoding == recording::kEncoding;
+}
+
 bool is(const McapReader::Channel& channel, const recording::Channel& kind) {
-  return channel.topic == kind.topic && channel.schema_name == kind.schema &&
-         channel.message_encoding == recording::kEncoding;
+  return channel.topic == kind.topic && has_form(channel, kind);
 }
 
 }  // namespace
 
-RecordingReader::RecordingReader(const std::filesystem::path& path)
-    : RecordingReader(std::make_unique<std::ifstream>(open_regular_file(path, "recording")), path.string()) {}
+RecordingReader::RecordingReader(const std::filesystem::path& path, Devices devices)
+    : RecordingReader(std::make_unique<std::ifstream>(open_regular_file(path, "recording")), path.string(), devices) {}
 
-RecordingReader::RecordingReader(std::unique_ptr<std::istream> input, std::string name)
-    : name_(name), mcap_(std::move(input), std::move(name)) {}
+RecordingReader::RecordingReader(std::unique_ptr<std::istream> input, std::string name, Devices devices)
+    : name_(name), mcap_(std::move(input), std::move(name)), wanted_(devices) {}
 
-std::optional<RecordingReader::Record> RecordingReader::next() {
-  while (const auto message = mcap_.next()) {
-    const McapReader::Channel& channel = message->channel;
-    try {
-      if (is(channel, recording::kScene)) {
-        auto scene = recording::decode_scene(message->data);
-        unix_offset_ = scene.unix_offset;
-        return scene;
-      }
-      const bool step = is(channel, recording::kStep);
-      const bool port = is(channel, recording::kPort);
-      const bool datagram = is(channel, recording::kDatagram);
-      const bool loss = is(channel, recording::kLoss);
-      if (!step && !port && !datagram && !loss) continue;
-      if (!unix_offset_) throw std::invalid_argument("a record comes before the scene");
-      const LocalTime at = recording::local_time(message->log_time, *unix_offset_);
-      if (step) return recording::decode_step(message->data, at, ways_);
-      if (port) return recording::decode_port(message->data, at);
-      if (datagram) return recording::decode_datagram(message->data, at);
-      return recording::decode_loss(message->data, at);
-    } catch (const std::invalid_argument& error) {
-      mcap_.corrupt(message->offset, error.what());
-    }
+/// Whether it is the channel of that kind of a device that is asked for; which becomes `device_`.
+bool RecordingReader::belongs(const McapReader::Channel& channel, const recording::Channel& kind) {
+  if (is(channel, kind)) {
+    device_ = 0;
+    return true;
   }
-  check_ours();
-  return std::nullopt;
+  if (wanted_ == Devices::kFirst || !has_form(channel, kind) || !channel.topic.ends_with(kind.topic)) return false;
+  const std::string name = channel.topic.substr(1, channel.topic.size() - kind.topic.size() - 1);
+  const auto known = std::ranges::find(devices_, name);
+  device_ = static_cast<std::size_t>(known - devices_.begin());
+  if (known == devices_.end()) devices_.push_back(name);
+  return true;
 }
 
-/// At the end: a file that has channels, or is complete, must be a recording of Tendon.
-void RecordingReader::check_ours() const {
+std::optional<RecordingReader::Record> RecordingReader::next() {
+  if (auto record = std::exchange(held_back_, std::nullopt)) return record;
+  while (const auto message = mcap_.next()) {
+    std::optional<Record> record;
+    try {
+      record = decode(*message);
+    } catch (const std::invalid_argument& error) {
+      mcap_.note(message->offset, std::string(error.what()) + "; it is left out");
+    }
+    const bool step = belongs(message->channel, recording::kStep);
+    const bool datagram = is(message->channel, recording::kDatagram);
+    if (message->missing == 0 || (!step && !datagram)) {
+      if (record) return record;
+      continue;
+    }
+    held_back_ = std::move(record);
+    return LossRecord{.at = newest_,
+                      .steps = step ? message->missing : 0,
+                      .datagrams = datagram ? message->missing : 0,
+                      .cause = LossRecord::Cause::kDisk};
+  }
+  return end();
+}
+
+/// Returns nothing if the channel is unknown.
+std::optional<RecordingReader::Record> RecordingReader::decode(const McapReader::Message& message) {
+  const McapReader::Channel& channel = message.channel;
+  const auto known = [&] {
+    return std::ranges::any_of(kKinds, [&](const auto* kind) { return belongs(channel, *kind); });
+  };
+  // The name of the channel may be damaged.
+  if (!known() && !(mcap_.use_summary() && known())) return std::nullopt;
+  if (belongs(channel, recording::kScene)) {
+    auto scene = recording::decode_scene(message.data);
+    if (device_ == 0) unix_offset_ = scene.unix_offset;  // that of all times in the file
+    return scene;
+  }
+  if (!unix_offset_) {
+    mcap_.note(message.offset, "a record comes before the scene, which is missing");
+    unix_offset_ = Duration::zero();
+  }
+  newest_ = recording::local_time(message.log_time, *unix_offset_);
+  if (belongs(channel, recording::kStep)) return recording::decode_step(message.data, newest_, ways_);
+  if (belongs(channel, recording::kPort)) return recording::decode_port(message.data, newest_);
+  if (is(channel, recording::kDatagram)) return recording::decode_datagram(message.data, newest_);
+  return recording::decode_loss(message.data, newest_);
+}
+
+std::string RecordingReader::without_steps() const {
+  if (mcap_.size() == 0) return name_ + ": is empty";
+  return name_ + (mcap_.truncated() ? ": is cut off before its first haptic step" : ": holds no haptic step");
+}
+
+/// Returns a LossRecord if records are missing at the end. Throws std::runtime_error if this is not a Tendon recording.
+std::optional<RecordingReader::Record> RecordingReader::end() {
+  if (std::exchange(ended_, true)) return std::nullopt;
   const auto& channels = mcap_.channels();
-  if (channels.empty() && mcap_.truncated()) return;
-  const bool ours =
-      std::ranges::any_of(channels, [](const auto& entry) { return is(entry.second, recording::kScene); });
-  if (!ours)
+  const bool ours = std::ranges::any_of(channels, [](const auto& entry) {
+    return std::ranges::any_of(kKinds, [&](const auto* kind) { return is(entry.second, *kind); });
+  });
+  if (!ours && !(channels.empty() && mcap_.truncated()))
     throw std::runtime_error(name_ + ": is an MCAP file, but not a Tendon recording: it has no channel /scene");
+  const LossRecord lost{.at = newest_,
+                        .steps = mcap_.missing_at_end(recording::kStep.topic),
+                        .datagrams = mcap_.missing_at_end(recording::kDatagram.topic),
+                        .cause = LossRecord::Cause::kDisk};
+  if (lost.steps == 0 && lost.datagrams == 0) return std::nullopt;
+  return lost;
 }
 
 }  // namespace tendon

@@ -14,6 +14,7 @@
 #include "core/base/frames.h"
 #include "devices/simulated/profiles.h"
 #include "server/scene/keys.h"
+#include "server/scene/parts.h"
 #include "server/scene/reader.h"
 #include "server/scene/reference.h"
 #include "server/scene/values.h"
@@ -199,29 +200,35 @@ void declare_effects(Table& effects, Draft& draft) {
   constexpr Absent kProfiles{.text = "the profile's; without a profile there is no such effect"};
   effects.key("mass_kg", device.mass, kAboveZero, "apparent mass at the handle",
               Absent{.required = profile == nullptr, .text = "the profile's; required without a profile"});
-  effects.key("viscous_friction_n_s_per_m", device.viscous_friction, kEffect, "true viscous friction", kProfiles);
-  effects.key("coulomb_friction_n", device.coulomb_friction, kEffect, "true Coulomb friction", kProfiles);
-  effects.key("encoder_step_um", device.encoder_step, kEffect, "one encoder count, on each axis", kProfiles);
-  effects.key("max_force_n", device.max_force, kEffect, "the device clamps the force vector to this length", kProfiles);
-  effects.key("amplifier_bandwidth_hz", device.amplifier_bandwidth, kEffect,
+  effects.key({"viscous_friction_n_s_per_m", "true viscous friction"}, device.viscous_friction, kEffect,
+              "true viscous friction", kProfiles);
+  effects.key({"coulomb_friction_n", "true Coulomb friction"}, device.coulomb_friction, kEffect,
+              "true Coulomb friction", kProfiles);
+  effects.key({"encoder_step_um", "positions in counts"}, device.encoder_step, kEffect,
+              "one encoder count, on each axis", kProfiles);
+  effects.key({"max_force_n", "the device's own saturation"}, device.max_force, kEffect,
+              "the device clamps the force vector to this length", kProfiles);
+  effects.key({"amplifier_bandwidth_hz", "motors that lag behind the command"}, device.amplifier_bandwidth, kEffect,
               "the motors follow the command with this bandwidth (-3 dB, first order)", kProfiles);
-  effects.key("force_sensor", device.force_sensor, Sensor{},
+  effects.key({"force_sensor", "measures the hand's force; admittance needs it"}, device.force_sensor, Sensor{},
               "measures the force of the hand: what a device of admittance type has", kProfiles);
-  effects.key("watchdog_ms", device.watchdog, kEffect,
+  effects.key({"watchdog_ms", "lets go when no command comes"}, device.watchdog, kEffect,
               "the device drops the force when it gets no command for this long", kProfiles);
-  effects.key("sample_delay_ms", device.sample_delay, kDelay,
+  effects.key({"sample_delay_ms", "positions come late"}, device.sample_delay, kDelay,
               "positions arrive this much later, with the time at which they were taken");
-  effects.key("force_delay_ms", device.force_delay, kDelay, "forces reach the motors this much later");
-  effects.part("joint_friction", device.joint_friction, [&draft](Table& friction, JointFriction::Config& config) {
-    declare_joint_friction(friction, draft, config);
-  });
+  effects.key({"force_delay_ms", "forces reach the motors late"}, device.force_delay, kDelay,
+              "forces reach the motors this much later");
   effects.part(
-      "structural_mode", device.structural_mode, [](Table& keys, SimulatedDevice::Config::StructuralMode& mode) {
-        keys.key("handle_mass_kg", mode.handle_mass, kAboveZero, "the part of mass_kg on the hand's side of the spring",
-                 kRequired);
-        keys.key("stiffness_n_per_m", mode.stiffness, kAboveZero, "of the spring between motors and handle", kRequired);
-        keys.key("damping_n_s_per_m", mode.damping, kZeroOrMore, "of the damper beside the spring");
-      });
+      {"joint_friction", "friction of each joint, by the pose"}, device.joint_friction,
+      [&draft](Table& friction, JointFriction::Config& config) { declare_joint_friction(friction, draft, config); });
+  effects.part({"structural_mode", "the handle on a spring"}, device.structural_mode,
+               [](Table& keys, SimulatedDevice::Config::StructuralMode& mode) {
+                 keys.key("handle_mass_kg", mode.handle_mass, kAboveZero,
+                          "the part of mass_kg on the hand's side of the spring", kRequired);
+                 keys.key("stiffness_n_per_m", mode.stiffness, kAboveZero, "of the spring between motors and handle",
+                          kRequired);
+                 keys.key("damping_n_s_per_m", mode.damping, kZeroOrMore, "of the damper beside the spring");
+               });
   effects.tables("output", device.outputs, kMostOutputs, [](Table& outputs, OutputDescription& output) {
     outputs.key("name", output.name, Label{}, "for people", kRequired);
     outputs.key("kind", output.kind,
@@ -250,7 +257,7 @@ void declare_environment(Table& keys, SimulatedEnvironment::Config& environment)
 template <class Point = Vector, class Table>
 void declare_csv(Table& keys, RecordedMotionFile& file, const MotionNames& names = kInMm) {
   keys.key("file", file.path, Path{}, "CSV file, relative to the scene file", kRequired);
-  keys.key("time_column", file.time, Column{}, "time in s");
+  keys.key("time_column", file.time, Column{}, "time in s, unless its name says another unit: t_ms");
   keys.key("position_column", file.position, Column{}, "position along a line, or turn about an axis", kRequired);
   keys.key(names.scale, file.scale, kAnyNumber, "how much one unit of the position is; negative turns it round",
            Absent{.text = "1 m or 1 rad"});
@@ -343,6 +350,31 @@ void declare_gripper(Table& keys, Draft& draft, SimulatedGripper::Config& config
   });
 }
 
+/// The operator's hand.
+template <class Table>
+void declare_hand(Table& keys, Draft& draft, OperatorHand::Config& hand) {
+  keys.key("profile", draft.operator_profile, operator_names(),
+           "what holds the handle, with the middle of the published numbers; each key below overrides one");
+  const OperatorProfile* const profile = draft.operator_profile;
+  if (profile != nullptr) hand = profile->hand(std::move(hand.motion));
+  constexpr Absent kProfiles{.text = "the profile's; 0 without a profile"};
+  keys.key("stiffness_n_per_m", hand.stiffness, kAboveZero, "of the grip",
+           Absent{.required = profile == nullptr, .text = "the profile's; required without a profile"});
+  keys.key("damping_n_s_per_m", hand.damping, kZeroOrMore, "of the grip", kProfiles);
+  keys.key("mass_kg", hand.mass, kZeroOrMore, "moves with the handle", kProfiles);
+  keys.key("lets_go_after_ms", draft.simulated.lets_go_after, kZeroOrMore,
+           "after this time it lets go of the handle, for good", Absent{.text = "never"});
+  keys.key("button_after_ms", draft.simulated.button_after, kZeroOrMore,
+           "after this time it presses button 0, and holds it", Absent{.text = "never"});
+  keys.tables("press", draft.simulated.presses, kMostPresses,
+              [](Table& presses, SimulatedDevice::Config::Press& press) {
+                presses.key("button", press.button, Count{31}, "which button it presses");
+                presses.key("from_ms", press.from, kZeroOrMore, "when it presses it", kRequired);
+                presses.key("for_ms", press.length, kAboveZero, "how long it holds it", kRequired);
+              });
+  keys.table("motion", [&draft](Table& motion) { declare_motion(motion, draft.motion); });
+}
+
 template <class Table>
 void declare_port(Table& keys, std::string& port) {
   keys.key("port", port, UsbPort{}, "where it is plugged in, when there are several",
@@ -362,33 +394,13 @@ void declare(Table& keys, SimulatedDevice::Config& /*device*/, Draft& draft) {
   keys.key("start_position_mm", config.start_position, Vector{}, "of the handle",
            Absent{.text = "where the hand starts, or the origin"});
   keys.table("effects", [&draft](Table& effects) { declare_effects(effects, draft); });
-  draft.has_hand = keys.optional_table("hand", [&draft](Table& hand) {
-    hand.key("profile", draft.operator_profile, operator_names(),
-             "what holds the handle, with the middle of the published numbers; each key below overrides one");
-    const OperatorProfile* const profile = draft.operator_profile;
-    if (profile != nullptr) draft.hand = profile->hand(std::move(draft.hand.motion));
-    constexpr Absent kProfiles{.text = "the profile's; 0 without a profile"};
-    hand.key("stiffness_n_per_m", draft.hand.stiffness, kAboveZero, "of the grip",
-             Absent{.required = profile == nullptr, .text = "the profile's; required without a profile"});
-    hand.key("damping_n_s_per_m", draft.hand.damping, kZeroOrMore, "of the grip", kProfiles);
-    hand.key("mass_kg", draft.hand.mass, kZeroOrMore, "moves with the handle", kProfiles);
-    hand.key("lets_go_after_ms", draft.simulated.lets_go_after, kZeroOrMore,
-             "after this time it lets go of the handle, for good", Absent{.text = "never"});
-    hand.key("button_after_ms", draft.simulated.button_after, kZeroOrMore,
-             "after this time it presses button 0, and holds it", Absent{.text = "never"});
-    hand.tables("press", draft.simulated.presses, kMostPresses,
-                [](Table& presses, SimulatedDevice::Config::Press& press) {
-                  presses.key("button", press.button, Count{31}, "which button it presses");
-                  presses.key("from_ms", press.from, kZeroOrMore, "when it presses it", kRequired);
-                  presses.key("for_ms", press.length, kAboveZero, "how long it holds it", kRequired);
-                });
-    hand.table("motion", [&draft](Table& motion) { declare_motion(motion, draft.motion); });
-  });
-  keys.part("environment", config.environment,
+  keys.part({"hand", "the operator: a spring, a damper and a mass"}, config.hand,
+            [&draft](Table& hand, OperatorHand::Config& part) { declare_hand(hand, draft, part); });
+  keys.part({"environment", "walls and a medium that the handle runs into"}, config.environment,
             [](Table& environment, SimulatedEnvironment::Config& part) { declare_environment(environment, part); });
-  keys.part("rotation", config.rotation,
+  keys.part({"rotation", "the handle turns, in the operator's hand"}, config.rotation,
             [&draft](Table& rotation, SimulatedRotation::Config& part) { declare_rotation(rotation, draft, part); });
-  keys.part("gripper", config.gripper,
+  keys.part({"gripper", "two fingers that open and close"}, config.gripper,
             [&draft](Table& gripper, SimulatedGripper::Config& part) { declare_gripper(gripper, draft, part); });
 }
 
@@ -448,7 +460,7 @@ template <class Table>
 void declare_device(Table& device, Draft& draft) {
   Names<std::size_t> kinds;
   for (const Driver* driver : drivers()) kinds.all.emplace_back(driver->kind, kinds.all.size());
-  device.kind(kinds, [&draft](Table& keys, std::size_t kind) {
+  const auto common = [&draft](Table& keys) {
     keys.key("name", draft.scene.name, Label{}, "the name by which clients ask for this device, of several",
              Absent{.text = "the name of the scene file"});
     keys.key("count", draft.scene.count, Count{kMostDevices, 1},
@@ -462,11 +474,13 @@ void declare_device(Table& device, Draft& draft) {
     keys.key("held_by", draft.scene.hand,
              Names<Hand>{{{"any", Hand::kAny}, {"left", Hand::kLeft}, {"right", Hand::kRight}}},
              "the hand of the operator that holds it");
-    declare_kind(kind, keys, draft);
-  });
+  };
+  device.kind(
+      kinds, [&draft](Table& keys, std::size_t kind) { declare_kind(kind, keys, draft); }, common);
 }
 
 template void declare_device(Reader&, Draft&);
 template void declare_device(Reference&, Draft&);
+template void declare_device(Parts&, Draft&);
 
 }  // namespace tendon::scene_file

@@ -10,7 +10,9 @@
 #include <string_view>
 #include <utility>
 
+#include "core/control/aol_parts.h"
 #include "protocol/limits.h"
+#include "server/scene/parts.h"
 #include "server/scene/reader.h"
 #include "server/scene/reference.h"
 #include "server/scene/values.h"
@@ -90,60 +92,61 @@ void declare_safety(Table& safety, SafeDevice::Config& config) {
              "the device is armed only while no larger torque than this is asked for");
   safety.key("patience_ms", config.arming.patience, kAboveZero,
              "a request to arm that is not granted within this time is forgotten");
-  safety.part("force_limit", config.force_limit, [](Table& keys, ForceLimit::Config& part) {
+  safety.part({"force_limit", "no force is longer"}, config.force_limit, [](Table& keys, auto& part) {
     keys.key("max_n", part.max, kAboveZero, "a longer force is shortened to this; its direction is kept", kRequired);
   });
-  safety.part("growth_limit", config.growth_limit, [](Table& keys, GrowthLimit::Config& part) {
+  safety.part({"growth_limit", "no force grows faster"}, config.growth_limit, [](Table& keys, auto& part) {
     keys.key("rate_n_per_s", part.rate, kAboveZero, "a force grows no faster than this; it may fall at once",
              kRequired);
   });
-  safety.part("ramp_in", config.ramp_in, [](Table& keys, RampIn::Config& part) {
+  safety.part({"ramp_in", "forces begin slowly after arming"}, config.ramp_in, [](Table& keys, auto& part) {
     keys.key("time_ms", part.time, kAboveZero, "time from arming to the whole force, which rises from zero", kRequired);
   });
-  safety.part("heat_limit", config.heat_limit, [](Table& keys, HeatLimit::Config& part) {
+  safety.part({"heat_limit", "motors do not burn"}, config.heat_limit, [](Table& keys, auto& part) {
     keys.key("peak_n", part.peak, kAboveZero, "the largest force while the motors are cool", kRequired);
     keys.key("continuous_n", part.continuous, kAboveZero, "the force that the motors bear for ever. Not above peak_n",
              kRequired);
     keys.key("time_constant_ms", part.time_constant, kAboveZero, "time constant with which the motors heat up",
              kRequired);
   });
-  safety.part("workspace", config.workspace,
-              [](Table& keys, Workspace::Config& part) { declare_workspace(keys, part); });
-  safety.part("speed_trip", config.speed_trip, [](Table& keys, SpeedTrip::Config& part) {
+  safety.part({"workspace", "nothing pushes the hand out of it"}, config.workspace,
+              [](Table& keys, auto& part) { declare_workspace(keys, part); });
+  safety.part({"speed_trip", "a handle that flies gets no force"}, config.speed_trip, [](Table& keys, auto& part) {
     keys.key("max_m_per_s", part.max, kAboveZero,
              "a handle faster than this is a fault: no force until the device is armed again", kRequired);
   });
-  safety.part("step_bound", config.step_bound, [](Table& keys, StepBound::Config& part) {
-    keys.key("max_speed_m_per_s", part.max_speed, kAboveZero,
-             "a position further away than a hand can move at this speed is a fault", kRequired);
-  });
-  safety.part("command_watchdog", config.command_watchdog, [](Table& keys, Watchdog::Config& part) {
-    declare_watchdog(keys, part, "no force was commanded for longer than this");
-  });
-  safety.part("link_watchdog", config.link_watchdog, [](Table& keys, Watchdog::Config& part) {
-    declare_watchdog(keys, part, "the newest position is older than this");
-  });
-  safety.part("dead_man", config.dead_man, [](Table& keys, DeadManSwitch::Config& part) {
+  safety.part({"step_bound", "encoders that wrap or lose count disarm it"}, config.step_bound,
+              [](Table& keys, auto& part) {
+                keys.key("max_speed_m_per_s", part.max_speed, kAboveZero,
+                         "a position further away than a hand can move at this speed is a fault", kRequired);
+              });
+  safety.part(
+      {"command_watchdog", "a loop that stood still gets no force"}, config.command_watchdog,
+      [](Table& keys, auto& part) { declare_watchdog(keys, part, "no force was commanded for longer than this"); });
+  safety.part({"link_watchdog", "a device that was silent gets no force"}, config.link_watchdog,
+              [](Table& keys, auto& part) { declare_watchdog(keys, part, "the newest position is older than this"); });
+  safety.part({"dead_man", "no force unless the button is held"}, config.dead_man, [](Table& keys, auto& part) {
     keys.key("button", part.button, Count{31}, "no force unless this button is held", kRequired);
   });
-  safety.part("torque_limit", config.torque_limit, [](Table& keys, ForceLimit::Config& part) {
+  safety.part({"torque_limit", "no torque is longer"}, config.torque_limit, [](Table& keys, auto& part) {
     keys.key("max_nm", part.max, kAboveZero,
              "a longer torque is shortened to this, and the force by the same share: a wrench keeps its direction",
              kRequired);
   });
-  safety.part("torque_growth_limit", config.torque_growth_limit, [](Table& keys, GrowthLimit::Config& part) {
-    keys.key("rate_nm_per_s", part.rate, kAboveZero,
-             "a torque grows no faster than this, and its force no faster in proportion; it may fall at once",
-             kRequired);
-  });
-  safety.part("turn_trip", config.turn_trip, [](Table& keys, TurnTrip::Config& part) {
+  safety.part(
+      {"torque_growth_limit", "no torque grows faster"}, config.torque_growth_limit, [](Table& keys, auto& part) {
+        keys.key("rate_nm_per_s", part.rate, kAboveZero,
+                 "a torque grows no faster than this, and its force no faster in proportion; it may fall at once",
+                 kRequired);
+      });
+  safety.part({"turn_trip", "a handle that spins gets no force"}, config.turn_trip, [](Table& keys, auto& part) {
     keys.key("max_deg_per_s", part.max, kAboveZero,
              "a handle that turns faster than this is a fault: no force until the device is armed again", kRequired);
   });
-  safety.part("grip_limit", config.grip_limit, [](Table& keys, ForceLimit::Config& part) {
+  safety.part({"grip_limit", "no grip is larger"}, config.grip_limit, [](Table& keys, auto& part) {
     keys.key("max_n", part.max, kAboveZero, "a larger force on the fingers is reduced to this", kRequired);
   });
-  safety.part("grip_growth_limit", config.grip_growth_limit, [](Table& keys, GrowthLimit::Config& part) {
+  safety.part({"grip_growth_limit", "no grip grows faster"}, config.grip_growth_limit, [](Table& keys, auto& part) {
     keys.key("rate_n_per_s", part.rate, kAboveZero,
              "a force on the fingers grows no faster than this; it may fall at once", kRequired);
   });
@@ -152,33 +155,36 @@ void declare_safety(Table& safety, SafeDevice::Config& config) {
 /// The parts of AOL+. Each exists when its table does.
 template <class Table>
 void declare_parts(Table& limiter, Draft& draft) {
-  using Plus = AolPlus<1, 3>;
-  Plus::Parts& parts = draft.scene.loop.control.limiter.parts;
-  limiter.part("energy_cap", parts.energy_cap, [](Table& keys, Plus::EnergyCap& cap) {
+  using Plus = PointAolPlus;
+  const auto declare = [&]<class Config>(std::optional<Config> Plus::Parts::*config, const auto& keys) {
+    const auto& row = std::get<AolPart<Config>>(kAolParts);
+    limiter.part({row.name, row.what}, draft.scene.loop.control.limiter.parts.*config, keys);
+  };
+  declare(&Plus::Parts::energy_cap, [](Table& keys, Plus::EnergyCap& cap) {
     keys.key("energy_mj", cap.energy, kZeroOrMore, "the most credit that outlasts the contact in which it was earned");
     keys.key("most_contact_mj", cap.most_contact, kZeroOrMore, "the most credit that one contact may add");
   });
-  limiter.part("robust_ledger", parts.robust_ledger, [&draft](Table& keys, Plus::Robust& robust) {
+  declare(&Plus::Parts::robust_ledger, [&draft](Table& keys, Plus::Robust& robust) {
     keys.key("encoder_step_um", draft.ledger_step, kZeroOrMore, "one encoder count: its rounding never earns credit",
              Absent{.text = "the device's; required when the device has none"});
     keys.key("window", robust.window, Count{1000, 1}, "haptic periods for each credit of viscous friction");
   });
-  limiter.part("knee", parts.knee, [](Table& keys, Plus::Knee& knee) {
+  declare(&Plus::Parts::knee, [](Table& keys, Plus::Knee& knee) {
     keys.key("start", knee.start, Number{.least = 0.01, .most = 0.99},
              "share of the bound from which on forces are compressed instead of clipped");
   });
-  limiter.part("latency_reserve", parts.latency_reserve, [](Table& keys, Plus::LatencyReserve& reserve) {
+  declare(&Plus::Parts::latency_reserve, [](Table& keys, Plus::LatencyReserve& reserve) {
     keys.key("holds", reserve.holds, Count{Plus::kMostHolds, 1},
              "periods from when a force is chosen to when the device begins to hold it. Not with bounded_acceleration");
   });
-  limiter.part("bounded_acceleration", parts.bounded_acceleration, [&draft](Table& keys, Plus::BoundedAcceleration&) {
-    keys.key("most_m_per_s2", draft.most_acceleration, kAboveZero,
+  declare(&Plus::Parts::bounded_acceleration, [](Table& keys, Plus::BoundedAcceleration& bounded) {
+    keys.key("most_m_per_s2", bounded.most[0], kAboveZero,
              "the handle never accelerates harder: the largest forces of hand and motors, over the apparent mass");
   });
-  limiter.part("shaping", parts.shaping, [&draft](Table& keys, Plus::Shaping&) {
-    keys.key("stiffness_n_per_m", draft.shaping_stiffness, kAboveZero, "no object is shown stiffer than this");
+  declare(&Plus::Parts::shaping, [](Table& keys, Plus::Shaping& shaping) {
+    keys.key("stiffness_n_per_m", shaping.stiffness[0], kAboveZero, "no object is shown stiffer than this");
   });
-  limiter.part("adaptive_friction", parts.adaptive_friction, [&draft](Table& keys, Plus::AdaptiveFriction& adaptive) {
+  declare(&Plus::Parts::adaptive_friction, [&draft](Table& keys, Plus::AdaptiveFriction& adaptive) {
     keys.key("rise_ms", adaptive.rise, kAboveZero, "time constant with which the bounds may rise; they fall at once");
     keys.key("places_mm", draft.places, ListOf<Vector>{}, "where the friction was identified", kRequired);
     keys.key("coulomb_friction_n", draft.place_coulomb, ListOf<Number>{kZeroOrMore},
@@ -186,22 +192,23 @@ void declare_parts(Table& limiter, Draft& draft) {
     keys.key("viscous_friction_n_s_per_m", draft.place_viscous, ListOf<Number>{kZeroOrMore},
              "lower bound of the viscous friction at each of the places", kRequired);
     keys.key(
-        "reach_mm", draft.reach, kZeroOrMore,
+        "reach_mm", draft.friction_map.reach, kZeroOrMore,
         "the limiter uses the least bound of the nearest place and of all places within this distance of the hand");
   });
-  limiter.part("thrift", parts.thrift, [](Table& keys, Plus::Thrift& thrift) {
+  declare(&Plus::Parts::thrift, [](Table& keys, Plus::Thrift& thrift) {
     keys.key("share", thrift.share, Number{.least = 0.01, .most = 1},
              "the most of a force that is kept back while the hand is let out");
     keys.key("energy_mj", thrift.energy, kAboveZero, "with more credit than this nothing is kept back");
   });
-  limiter.part("damper", parts.damper, [&draft](Table& keys, Plus::Damper& damper) {
-    keys.key("damping_n_s_per_m", draft.damping, kAboveZero, "what a vibration of the hand in contact is damped with");
+  declare(&Plus::Parts::damper, [](Table& keys, Plus::Damper& damper) {
+    keys.key("damping_n_s_per_m", damper.viscous[0], kAboveZero,
+             "what a vibration of the hand in contact is damped with");
     keys.key("smoothing_ms", damper.smoothing, kAboveZero, "time constant of the velocity's two filters");
     keys.key("slow_ms", damper.slow, kAboveZero, "motion slower than this is not vibration");
     keys.key("dead_zone", damper.dead_zone, kZeroOrMore,
              "in pulses that one encoder count makes: a smaller motion is not damped");
   });
-  limiter.part("fading_contact", parts.fading_contact, [](Table& keys, Plus::FadingContact& fading) {
+  declare(&Plus::Parts::fading_contact, [](Table& keys, Plus::FadingContact& fading) {
     keys.key("memory_ms", fading.memory, kAboveZero,
              "for energy_cap: time constant with which the credit of a contact that has ended fades");
   });
@@ -215,12 +222,14 @@ Names<OutputEstimator::Model> estimator_models() {
 /// How the force follows the hand between two arrivals. At most one table.
 template <class Table>
 void declare_between(Table& force, HeldForce::Config& hold) {
-  force.part("adaptive_local_model", hold.adaptive_local_model, [](Table& keys, AdaptiveLocalModel::Config& config) {
+  const Name model{"adaptive_local_model", "models of the engine are blended and capped"};
+  force.part(model, hold.adaptive_local_model, [](Table& keys, AdaptiveLocalModel::Config& config) {
     keys.key("share", config.share, Number{.least = 0.01, .most = 1},
              "share of the engine's stiffness that is followed; below 1 when the engine only estimates it");
     keys.key("max_blend_ms", config.max_blend, kAboveZero, "a new model is blended in for one engine period, or this");
   });
-  force.part("output_estimator", hold.output_estimator, [](Table& keys, OutputEstimator::Config& config) {
+  const Name estimator{"output_estimator", "the environment is learnt from its answers"};
+  force.part(estimator, hold.output_estimator, [](Table& keys, OutputEstimator::Config& config) {
     keys.key("model", config.model, estimator_models(), "the model of the environment, on each axis");
     keys.key("origin_mm", config.origin, Vector{}, "where the environment is at rest");
     keys.key("scale_mm", config.scale, kAboveZero, "about how far the hand moves within the environment");
@@ -234,7 +243,8 @@ void declare_between(Table& force, HeldForce::Config& hold) {
     keys.key("largest_n", config.max_force, kAboveZero, "the largest estimate of the force, on each axis");
     keys.key("resolution_um", config.resolution, kZeroOrMore, "one encoder count: motion below it teaches nothing");
   });
-  force.part("learned_model", hold.learned_model, [](Table& keys, LearnedModel::Config& config) {
+  const Name learned{"learned_model", "an answer is led to where the hand is now"};
+  force.part(learned, hold.learned_model, [](Table& keys, LearnedModel::Config& config) {
     keys.key("least_travel_um", config.least_travel, kAboveZero, "a hand that has moved less teaches nothing");
     keys.key("gain", config.gain, Number{.least = 0.01, .most = 1}, "share of an error that one lesson corrects");
     keys.key("forgetting", config.forgetting, Number{.least = 0.5, .most = 0.999},
@@ -253,13 +263,13 @@ void declare_handle_bounds(Table& limiter, Draft& draft) {
              "lower bound of the Coulomb friction of the device's rotation", kMotors);
     keys.key("viscous_friction_nm_s_per_rad", draft.rotation_bounds.viscous, kZeroOrMore,
              "lower bound of the viscous friction of the device's rotation", kMotors);
-    keys.key("most_rad_per_s2", draft.most_angular_acceleration, kAboveZero,
+    keys.key("most_rad_per_s2", draft.rotation.most_acceleration, kAboveZero,
              "for bounded_acceleration: the largest angular acceleration of the handle",
              Absent{.text = "required with bounded_acceleration"});
-    keys.key("shaping_stiffness_nm_per_rad", draft.angular_shaping_stiffness, kAboveZero,
+    keys.key("shaping_stiffness_nm_per_rad", draft.rotation.shaping_stiffness, kAboveZero,
              "for shaping: no object is shown stiffer than this to a hand that turns",
              Absent{.text = "required with shaping"});
-    keys.key("damping_nm_s_per_rad", draft.angular_damping, kZeroOrMore,
+    keys.key("damping_nm_s_per_rad", draft.rotation.damping, kZeroOrMore,
              "for damper: what a vibration of the turning is damped with; 0: it is not");
   });
   limiter.table("gripper", [&draft](Table& keys) {
@@ -332,20 +342,21 @@ void declare_scene(Table& scene, Draft& draft) {
     loop.key("hold_most", draft.follow_holds.most, Number{.least = 1, .most = 1000},
              "the longest hold that it counts on, as a multiple of longest_hold_us");
     loop.key(
-        "max_speed_m_per_s", draft.scene.loop.control.max_speed, kAboveZero,
+        {"max_speed_m_per_s", "a position that no hand can reach is a fault"}, draft.scene.loop.control.max_speed,
+        kAboveZero,
         "a position further away than a hand can move at this speed is a fault: the encoder has wrapped or lost count",
         Absent{.text = "every position is believed"});
     loop.key("cpu", draft.scene.cpu, kProcessor, "the processor on which the haptic thread stays: an isolated one",
              Absent{.text = "wherever the kernel puts it"});
   });
 
-  scene.part("safety", draft.scene.safety,
+  scene.part({"safety", "no force unless armed, and none after a fault"}, draft.scene.safety,
              [](Table& safety, SafeDevice::Config& config) { declare_safety(safety, config); });
 
   scene.table("limiter", [&draft](Table& limiter) {
     LimiterConfig& config = draft.scene.loop.control.limiter;
     constexpr Absent kProfiles{.text = "the profile's; required without a profile, unless kind is \"none\""};
-    limiter.key("kind", config.law, law_names(),
+    limiter.key({"kind", "keeps the device from giving out energy"}, config.law, law_names(),
                 "keeps the device from giving out energy. \"none\" is for simulated devices only");
     limiter.key("coulomb_friction_n", draft.coulomb_bound, kZeroOrMore,
                 "lower bound of the device's Coulomb friction (aol-per-axis, aol-box: of each axis by itself)",
@@ -361,7 +372,8 @@ void declare_scene(Table& scene, Draft& draft) {
     declare_law(limiter, draft);
   });
 
-  scene.part("admittance", draft.scene.loop.control.admittance, [](Table& keys, AdmittanceLoop<3>::Config& tool) {
+  const Name admittance{"admittance", "the handle follows a tool of another mass"};
+  scene.part(admittance, draft.scene.loop.control.admittance, [](Table& keys, AdmittanceLoop<3>::Config& tool) {
     // The tool is the same in every direction.
     const auto each = [&keys](const char* name, Vec3& target, const Number& rule, const char* meaning, Absent absent) {
       double value = target.x();
@@ -381,11 +393,13 @@ void declare_scene(Table& scene, Draft& draft) {
   scene.table("force", [&draft](Table& force) {
     HapticController::Config& control = draft.scene.loop.control;
     force.key("max_force_n", draft.max_force, kAboveZero, "no force is longer than this",
-              Absent{.text = "the device's; required when the device has none, 10 N when it exerts no forces"});
+              Absent{.text = "the device's; required when the device has none, " + digits(kUnfelt) +
+                             " N when it exerts no forces"});
     force.key("max_slew_n_per_s", control.max_slew, kAboveZeroOrInf, "no force changes faster than this");
     force.key("max_torque_nm", draft.max_torque, kAboveZero,
               "no torque is longer than this; a wrench keeps its direction", Absent{.text = "the device's"});
-    force.key("max_torque_slew_nm_per_s", draft.max_torque_slew, kAboveZeroOrInf, "no torque changes faster than this");
+    force.key("max_torque_slew_nm_per_s", draft.rotation.max_slew, kAboveZeroOrInf,
+              "no torque changes faster than this");
     force.key("max_angular_stiffness_nm_per_rad", control.hold.max_angular_stiffness, kAboveZero,
               "the stiffest model of rotation that is followed between two answers");
     force.key("max_grip_n", draft.max_grip, kAboveZero, "no force on the gripper's fingers is larger than this",
@@ -482,5 +496,6 @@ void declare_scene(Table& scene, Draft& draft) {
 
 template void declare_scene(Reader&, Draft&);
 template void declare_scene(Reference&, Draft&);
+template void declare_scene(Parts&, Draft&);
 
 }  // namespace tendon::scene_file

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <concepts>
 #include <cstdint>
 #include <filesystem>
 #include <optional>
@@ -9,12 +10,12 @@
 
 #include "core/control/preset.h"
 #include "devices/simulated/profiles.h"
-#include "devices/simulated/recorded_motion.h"
 #include "server/scene/scene.h"
+#include "server/tables/recorded_motion.h"
 
-// Which keys a scene may have. Each is declared once, by a line that a Table walks over: Reader fills a Draft from a
-// file (reader.h), Reference prints the same line (reference.h). A new key is one line in keys.cc or device_keys.cc.
-// Internal to server/scene.
+// Declares the keys of a scene. A class Table reads the declarations: Reader fills a Draft from a file (reader.h),
+// Reference prints each key (reference.h), and Parts lists the parts of a scene (parts.h). The default of a key is the
+// initializer of its target. A new key is one line in keys.cc or device_keys.cc. Internal to server/scene.
 
 namespace tendon::scene_file {
 
@@ -26,21 +27,12 @@ struct DraftMotion {
 
 /// A scene while it is read. Values that depend on several keys are still open: resolver.h settles them.
 struct Draft {
-  Draft() {
-    // 1 N per step at 1 kHz: a hand cannot tell the ramp from a step, and a force that flips its sign at every
-    // datagram loses its edge.
-    scene.loop.control.max_slew = 1000;
-  }
-
   Scene scene;
   SimulatedDevice::Config simulated;  ///< the device, or what stands in for a real one
   const DeviceProfile* profile = nullptr;
   const OperatorProfile* operator_profile = nullptr;
   std::optional<Vec3> joint_coulomb;
-  OperatorHand::Config hand{0, 0, 0,
-                            ScriptedMotion(ScriptedMotion::Sine{})};  // 0: what the scene does not list does not exist
-  bool has_hand = false;
-  DraftMotion motion;
+  DraftMotion motion;                             ///< of [device.hand]
   DraftMotion turning;                            ///< of [device.rotation.hand]
   DraftMotion gripping;                           ///< of [device.gripper.hand]
   std::optional<RecordedMotionFile> csv;          ///< what a replay plays
@@ -55,20 +47,12 @@ struct Draft {
     std::optional<double> coulomb;
     std::optional<double> viscous;
   };
-  FrictionBounds rotation_bounds;  ///< N·m, N·m·s/rad
-  FrictionBounds grip_bounds;      ///< N, N·s/m
-  std::optional<double> most_angular_acceleration;
-  std::optional<double> angular_shaping_stiffness;
-  double angular_damping = 0;
+  FrictionBounds rotation_bounds;    ///< N·m, N·m·s/rad
+  FrictionBounds grip_bounds;        ///< N, N·s/m
+  RotationLimits rotation;           ///< for a device with motors that turn its handle
   std::optional<double> max_torque;  ///< N·m
-  double max_torque_slew = 50;       ///< N·m/s: 1 N per step, as for the force, at a lever of 5 cm
   std::optional<double> max_grip;    ///< N
   std::optional<double> ledger_step;
-  /// 8.5 N on a handle of 75 g that nobody holds are 113 m/s²; a tap is some 200 (control.md 8.7).
-  double most_acceleration = 300;
-  double shaping_stiffness = 1000;  ///< N/m
-  double damping = 24;              ///< N·s/m
-  double damper_contact = 0.1;      ///< N
   std::optional<Preset> preset;
   Coupling::Config coupling;             ///< of [teleoperation], when there is one
   Vec3 map_rotation = Vec3::Zero();      ///< rad, rotation vector
@@ -79,10 +63,29 @@ struct Draft {
   std::optional<double> drift_rate;    ///< 1/s
   bool engages_by_button = false;
   std::optional<std::uint32_t> engage_button;
+  FrictionMap::Config friction_map;  ///< without its places
   std::vector<Vec3> places;
   std::vector<double> place_coulomb;
   std::vector<double> place_viscous;
-  double reach = 0.05;
+};
+
+/// N. The maximum force for a device that exerts no forces. It is large enough that recordings contain the forces of the
+/// engines unchanged.
+inline constexpr double kUnfelt = 10;
+
+/// The name of a key or a table. If it is a part that can be removed from a scene, `part` is its line in the output of
+/// `tendond explain`.
+struct Name {
+  std::string_view name;
+  std::string_view part;
+
+  template <std::convertible_to<std::string_view> Text>
+  Name(const Text& text, std::string_view what = {}) : name(text), part(what) {}
+};
+
+/// Declares no keys.
+struct NoKeys {
+  void operator()(const auto& /*table*/) const {}
 };
 
 /// What a missing key means, where it is not simply the default of the target.
@@ -92,15 +95,15 @@ struct Absent {
 };
 inline constexpr Absent kRequired = {.required = true};
 
-/// All of a scene. Defined for Reader and Reference.
+/// All of a scene. Defined for Reader, Reference and Parts.
 template <class Table>
 void declare_scene(Table& scene, Draft& draft);
 
-/// [teleoperation]. Defined for Reader and Reference.
+/// [teleoperation]. Defined for Reader, Reference and Parts.
 template <class Table>
 void declare_teleoperation(Table& scene, Draft& draft);
 
-/// [device]. Defined for Reader and Reference.
+/// [device]. Defined for Reader, Reference and Parts.
 template <class Table>
 void declare_device(Table& device, Draft& draft);
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <toml++/toml.h>
 
+#include <algorithm>
 #include <bit>
 #include <cstddef>
 #include <cstdint>
@@ -9,9 +10,10 @@
 #include <stdexcept>
 #include <string>
 #include <string_view>
-#include <unordered_set>
+#include <unordered_map>
 #include <utility>
 
+#include "core/base/nearest_word.h"
 #include "protocol/limits.h"
 #include "server/guests/guest.h"
 #include "server/machine/regular_file.h"
@@ -24,12 +26,22 @@
 namespace tendon {
 namespace {
 
+/// Returns the value after the = in a line if it begins like a number. The first line is 1.
+std::string_view bare_value(std::string_view text, std::size_t line) {
+  for (; line > 1; --line) text.remove_prefix(std::min(text.find('\n'), text.size() - 1) + 1);
+  text = text.substr(0, text.find_first_of("\n#"));
+  text.remove_prefix(std::min(text.find('='), text.size() - 1) + 1);
+  text.remove_prefix(std::min(text.find_first_not_of(" \t"), text.size()));
+  return text.find_first_of("+-.0123456789") == 0 ? text : std::string_view();
+}
+
 toml::table parse_toml(std::string_view text, const std::string& name) {
   try {
     return toml::parse(text);
   } catch (const toml::parse_error& error) {
-    throw SceneError(name + ':' + std::to_string(error.source().begin.line) +
-                     ": not TOML: " + std::string(error.description()));
+    const std::size_t line = error.source().begin.line;
+    throw SceneError(name + ':' + std::to_string(line) + ": not TOML: " + std::string(error.description()) +
+                     std::string(decimal_point_hint(bare_value(text, line))));
   }
 }
 
@@ -119,8 +131,8 @@ Scene read_scene(const std::filesystem::path& file) {
     std::ifstream stream = open_regular_file(file);
     stream.read(text.data(), static_cast<std::streamsize>(text.size()));
     text.resize(static_cast<std::size_t>(stream.gcount()));
-  } catch (const std::runtime_error& refused) {
-    throw SceneError(refused.what());
+  } catch (const UnreadableFile& refused) {
+    throw SceneFileError(refused.what());
   }
   return parse_scene(text, file.string(), file.parent_path());
 }
@@ -147,7 +159,7 @@ void check_network_threads(const std::vector<Scene>& scenes, const std::string& 
 
 std::vector<Scene> read_scenes(const std::vector<std::filesystem::path>& files, const Overrides& overrides) {
   std::vector<Scene> scenes;
-  std::unordered_set<std::string> names;
+  std::unordered_map<std::string, std::filesystem::path> names;
   std::uint32_t place = 0;
   for (const std::filesystem::path& file : files) {
     Scene scene = read_scene(file);
@@ -166,9 +178,10 @@ std::vector<Scene> read_scenes(const std::vector<std::filesystem::path>& files, 
                        " before it: name its scene before theirs");
     }
     for (std::uint32_t index = 0; index < scene.count; ++index) {
-      if (names.insert(scene.name_of(index)).second) continue;
+      const auto [first, is_new] = names.emplace(scene.name_of(index), file);
+      if (is_new) continue;
       throw SceneError(file.string() + ": device.name: expected a name of its own, found " +
-                       scene_file::in_quotes(scene.name_of(index)) + " again");
+                       scene_file::in_quotes(first->first) + " again, which is in " + first->second.string());
     }
     for (const auto& [name, there] :
          {std::pair("network", scene.has_network), std::pair("recording", scene.recording.has_value())}) {

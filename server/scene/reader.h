@@ -13,6 +13,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/base/nearest_word.h"
 #include "server/scene/keys.h"
 #include "server/scene/values.h"
 
@@ -23,7 +24,7 @@ namespace tendon::scene_file {
 /// "a.b" for the table `path` and the key `name`; `name` alone at the top of the file.
 std::string joined(std::string_view path, std::string_view name);
 
-/// Advice to the writer of an unknown key: the key that was probably meant, or all that are known.
+/// Returns "; " and the closest known key, or all known keys. This is added to the error message for an unknown key.
 std::string advice(std::string_view unknown, const std::vector<std::string_view>& known);
 
 /// A place in the file that an error can name; line 0 is none.
@@ -77,8 +78,8 @@ class Reader {
       : problems_(problems), table_(table), path_(std::move(path)), place_(place) {}
 
   template <class T, class Rule>
-  bool key(std::string_view name, T& target, const Rule& rule, std::string_view /*meaning*/,
-           const Absent& absent = {}) {
+  bool key(const Name& named, T& target, const Rule& rule, std::string_view /*meaning*/, const Absent& absent = {}) {
+    const std::string_view name = named.name;
     const Unit& unit = unit_of(name);
     const toml::node* node = look_up(name);
     if (node == nullptr) {
@@ -89,17 +90,23 @@ class Reader {
     }
     const Verdict refusal = rule.take(*node, unit, target);
     if (!refusal) return true;
+    // If a setting is not valid TOML, its value is a text, for example --set device.effects.mass_kg=0,05
+    const bool number = refusal->expected.starts_with("a number") && refusal->found->is_string();
+    const std::string found = found_in(*refusal->found);
     problems_.wrong(place_of(*refusal->found), joined(path_, name),
-                    "expected " + refusal->expected + ", found " + found_in(*refusal->found));
+                    "expected " + refusal->expected + ", found " + found + refusal->hint +
+                        std::string(number ? decimal_point_hint(found) : ""));
     return false;
   }
 
-  /// A required key that decides which others there are.
-  template <class T, class Declare>
-  void kind(const Names<T>& names, const Declare& declare) {
+  /// Reads the required key `kind`, then the keys that all kinds have in common and those of that kind.
+  template <class T, class Declare, class Common = NoKeys>
+  void kind(const Names<T>& names, const Declare& declare, const Common& common = {}) {
     T value{};
     kind_known_ = key("kind", value, names, "", kRequired);
-    if (kind_known_) declare(*this, value);
+    if (!kind_known_) return;
+    common(*this);
+    declare(*this, value);
   }
 
   template <class Declare>
@@ -115,17 +122,11 @@ class Reader {
     inner.refuse_unknown();
   }
 
-  template <class Declare>
-  bool optional_table(std::string_view name, const Declare& declare) {
-    const bool there = look_up(name) != nullptr;
-    if (there) table(name, declare);
-    return there;
-  }
-
   /// A part that exists when its table does.
   template <class T, class Declare>
-  void part(std::string_view name, std::optional<T>& target, const Declare& declare) {
-    optional_table(name, [&](Reader& keys) {
+  void part(const Name& named, std::optional<T>& target, const Declare& declare) {
+    if (look_up(named.name) == nullptr) return;
+    table(named.name, [&](Reader& keys) {
       // clang 14 rejects optional<T>::emplace() when T was incomplete where the optional was declared; pass a value.
       if constexpr (std::is_default_constructible_v<T>) {
         declare(keys, target.emplace());
@@ -159,7 +160,7 @@ class Reader {
     for (const auto& [name, node] : *table_) {
       if (std::find(known_.begin(), known_.end(), name.str()) != known_.end()) continue;
       problems_.wrong(place_of(node), joined(path_, name.str()),
-                      (node.is_table() ? "unknown table; " : "unknown key; ") + advice(name.str(), known_));
+                      (node.is_table() ? "unknown table" : "unknown key") + advice(name.str(), known_));
     }
   }
 

@@ -4,8 +4,8 @@
 #include <stdexcept>
 #include <string>
 
-#include "devices/simulated/recorded_motion.h"
 #include "server/recording/recording_reader.h"
+#include "server/tables/recorded_motion.h"
 
 namespace tendon {
 

@@ -24,9 +24,8 @@ class Reference {
   explicit Reference(std::string& text, std::string path = {}) : text_(text), path_(std::move(path)) {}
 
   template <class T, class Rule>
-  bool key(std::string_view name, const T& target, const Rule& rule, std::string_view meaning,
-           const Absent& absent = {}) {
-    const Unit& unit = unit_of(name);
+  bool key(const Name& named, const T& target, const Rule& rule, std::string_view meaning, const Absent& absent = {}) {
+    const Unit& unit = unit_of(named.name);
     std::string without = "Default: ";
     if (!absent.text.empty()) {
       without += absent.text;
@@ -35,14 +34,15 @@ class Reference {
     } else {
       without += rule.shown(unit, target);
     }
-    text_.append(indent_).append(name).append("\n");
+    text_.append(indent_).append(named.name).append("\n");
     text_.append(indent_).append("    ").append(meaning).append(".\n");
     text_.append(indent_).append("    ").append(rule.expected(unit)).append(". ").append(without).append(".\n");
     return false;
   }
 
-  template <class T, class Declare>
-  void kind(const Names<T>& names, const Declare& declare) {
+  template <class T, class Declare, class Common = NoKeys>
+  void kind(const Names<T>& names, const Declare& declare, const Common& common = {}) {
+    common(*this);
     std::string tables;
     for (const auto& [name, value] : names.all) {
       text_.append("  kind = ").append(in_quotes(name)).append("\n");
@@ -68,15 +68,9 @@ class Reference {
     declare(inner);
   }
 
-  template <class Declare>
-  bool optional_table(std::string_view name, const Declare& declare) {
-    table(name, declare);
-    return true;
-  }
-
   template <class T, class Declare>
-  void part(std::string_view name, std::optional<T>&, const Declare& declare) {
-    table(name, [&](Reference& keys) {
+  void part(const Name& named, std::optional<T>&, const Declare& declare) {
+    table(named.name, [&](Reference& keys) {
       T defaults;
       declare(keys, defaults);
     });

@@ -2,7 +2,6 @@
 #include "server/scene/resolver.h"
 
 #include <algorithm>
-#include <array>
 #include <chrono>
 #include <cmath>
 #include <cstddef>
@@ -10,7 +9,6 @@
 #include <fstream>
 #include <initializer_list>
 #include <iterator>
-#include <numbers>
 #include <optional>
 #include <stdexcept>
 #include <string_view>
@@ -19,29 +17,25 @@
 #include <vector>
 
 #include "core/base/rotation.h"
-#include "core/control/aol_parts.h"
-#include "core/control/preset.h"
-#include "core/handle/turn_friction.h"
-#include "devices/simulated/recorded_motion.h"
+#include "core/handle/handle_bounds.h"
 #include "server/machine/regular_file.h"
 #include "server/machine/unix_socket.h"
 #include "server/scene/reader.h"
 #include "server/scene/recorded_hand.h"
 #include "server/scene/values.h"
+#include "server/tables/recorded_motion.h"
 
 namespace tendon::scene_file {
 namespace {
 
-/// N. Bounds engines' forces on a device that renders none; large enough that recordings hold them unchanged.
-constexpr double kUnfelt = 10;
 /// Silence of a device for this long is a fault; libfranka allows the same.
 constexpr Duration kMostMissed = std::chrono::milliseconds(20);
 
 /// Turns a draft into a scene: settles the values that depend on several keys.
-class SceneResolver {
+class SceneResolver : SceneErrors {
  public:
   SceneResolver(Draft draft, const toml::table& file, const std::string& name)
-      : draft_(std::move(draft)), file_(file), name_(name) {}
+      : SceneErrors(file, name), draft_(std::move(draft)) {}
 
   Scene scene(const std::filesystem::path& directory) {
     if (!std::holds_alternative<SimulatedDevice::Config>(draft_.scene.device))
@@ -62,7 +56,6 @@ class SceneResolver {
     // The constructors check rules that the keys do not.
     Scene& scene = draft_.scene;
     SimulatedDevice::Config& simulated = draft_.simulated;
-    if (draft_.has_hand) simulated.hand = draft_.hand;
     build("device", [&simulated] { SimulatedDevice{simulated}; });
     if (auto* device = std::get_if<SimulatedDevice::Config>(&scene.device)) *device = simulated;
     build("force", [&scene] { HeldForce{scene.loop.control.hold}; });
@@ -73,28 +66,11 @@ class SceneResolver {
   }
 
  private:
-  /// Throws. The message names the line of the first of `places` that the file has; without one, the line of the
-  /// innermost table around the key.
-  [[noreturn]] void blame(std::string_view key, std::initializer_list<std::string_view> places,
-                          const std::string& sentence) const {
-    Place place;
-    const auto look = [&](std::string_view path) {
-      if (const auto node = file_.at_path(path); node && place.line == 0) place = place_of(*node.node());
-    };
-    for (const std::string_view path : places) look(path);
-    for (std::string_view path = key;; path = path.substr(0, path.rfind('.'))) {
-      look(path);
-      if (path.find('.') == std::string_view::npos) break;
-    }
-    fail(name_, place, std::string(key), sentence);
-  }
-
-  template <class Build>
-  void build(std::string_view table, const Build& attempt) const {
+  [[noreturn]] void blame_file(std::string_view key, const UnreadableFile& refused) const {
     try {
-      attempt();
-    } catch (const std::invalid_argument& refused) {
-      blame(table, {}, refused.what());
+      blame(key, {}, refused.what());
+    } catch (const SceneError& error) {
+      throw SceneFileError(error.what());
     }
   }
 
@@ -111,17 +87,49 @@ class SceneResolver {
       if (draft.recorded) {
         try {
           draft.script = read_motion(*draft.recorded, directory);
+        } catch (const UnreadableFile& refused) {
+          blame_file(table + ".motion.file", refused);
         } catch (const std::runtime_error& refused) {
           blame(table + ".motion.file", {}, refused.what());
         }
       }
-      motion.emplace(std::move(draft.script));
+      motion.emplace(draft.script);
     });
+    const HandleBounds& bounds = table == "device.hand" ? kMovementBounds : kRotationBounds;
+    const Unit& unit = unit_of(table == "device.hand" ? "_mm" : "_deg");
+    if (const double found = length_of(draft.script); found > bounds.travel) {
+      const std::string key = table + ".motion.";
+      blame(table + ".motion",
+            {key + "amplitude_mm", key + "amplitude_deg", key + "to_mm", key + "to_deg", key + "points_mm",
+             key + "points_deg", key + "file"},
+            "expected a motion of at most " + with_symbol(digits(std::round(bounds.travel * unit.per_si)), unit) +
+                " from end to end, which no handle exceeds, found " +
+                with_symbol(digits(std::round(found * unit.per_si)), unit));
+    }
     return *std::move(motion);
   }
 
+  /// Returns the size of a motion along its longest axis, in m or rad.
+  static double length_of(const ScriptedMotion::Script& script) {
+    if (const auto* sine = std::get_if<ScriptedMotion::Sine>(&script)) return 2 * sine->amplitude;
+    if (const auto* recorded = std::get_if<ScriptedMotion::Recorded>(&script)) {
+      const auto [least, most] = std::ranges::minmax(recorded->samples, {}, &ScriptedMotion::Recorded::Sample::x);
+      return most.x - least.x;
+    }
+    std::vector<Vec3> points;
+    if (const auto* ramp = std::get_if<ScriptedMotion::RampHold>(&script)) points = {ramp->from, ramp->to};
+    if (const auto* reach = std::get_if<ScriptedMotion::MinimumJerk>(&script)) points = reach->points;
+    Vec3 least = points.front();
+    Vec3 most = points.front();
+    for (const Vec3& point : points) {
+      least = least.cwiseMin(point);
+      most = most.cwiseMax(point);
+    }
+    return (most - least).maxCoeff();
+  }
+
   void resolve_motion(const std::filesystem::path& directory) {
-    if (draft_.has_hand) draft_.hand.motion = motion_of(draft_.motion, "device.hand", directory);
+    if (auto& hand = draft_.simulated.hand) hand->motion = motion_of(draft_.motion, "device.hand", directory);
     if (auto& rotation = draft_.simulated.rotation) {
       if (rotation->hand) rotation->hand->motion = motion_of(draft_.turning, "device.rotation.hand", directory);
       build("device.rotation", [&rotation] { SimulatedRotation{*rotation}; });
@@ -174,6 +182,8 @@ class SceneResolver {
       try {
         replay.samples = csv ? ReplayDevice::samples_of(read_motion(*csv, directory))
                              : read_recorded_hand(directory / *draft_.replayed);
+      } catch (const UnreadableFile& refused) {
+        blame_file(source, refused);
       } catch (const std::runtime_error& refused) {
         blame(source, {}, refused.what());
       }
@@ -341,22 +351,7 @@ class SceneResolver {
     }
     control.max_force = draft_.max_force ? *draft_.max_force : *most;
 
-    // Friction that is isotropic as a vector is less on each axis by itself: Σ f |dx_i| ≤ √3 f ‖dx‖ (control.md 1.6
-    // (a)).
-    const bool per_axis = control.limiter.law == Law::kAolPerAxis || control.limiter.law == Law::kAolBox;
-    const DeviceProfile* profile = draft_.profile;
-    const Friction truth = least_friction(device);
-    control.limiter.friction.coulomb =
-        friction_bound("coulomb_friction_n", draft_.coulomb_bound, profile ? &profile->coulomb_bound : nullptr,
-                       truth.coulomb, per_axis ? 1 / std::numbers::sqrt3 : 1);
-    control.limiter.friction.viscous = friction_bound("viscous_friction_n_s_per_m", draft_.viscous_bound,
-                                                      profile ? &profile->viscous_bound : nullptr, truth.viscous, 1);
-    resolve_parts(control.limiter);
-    resolve_preset(control);
-    resolve_places(control);
-    resolve_rotation(control);
-    resolve_grip(control);
-    if (control.rotation || control.grip) build("limiter", [&control] { HapticController{control}; });
+    resolve_limiter(draft_, *this);
   }
 
   /// The coupling as the loop runs it. What both ends must have alike is compared when they meet.
@@ -383,10 +378,6 @@ class SceneResolver {
     }
     resolve_coupled_turn(control);
     resolve_coupled_grip(control);
-    if (!leads && coupling.clutch) blame("teleoperation.clutch", {}, "expected none: the leader clutches");
-    if (leads && coupling.holds_place) {
-      blame("teleoperation.on_loss", {}, "expected \"release\": a hand holds the leader");
-    }
     if (draft_.engages_by_button != draft_.engage_button.has_value() || (!leads && draft_.engages_by_button)) {
       blame("teleoperation.engage.by", {"teleoperation.engage.button"},
             leads ? "expected \"button\" together with button, or \"request\" without"
@@ -400,9 +391,8 @@ class SceneResolver {
     const Law law = control.limiter.law;
     resolve_leaders(coupling);
     resolve_method(coupling);
-    const bool pays = coupling.method == CouplingMethod::kPositionPosition ||
-                      coupling.method == CouplingMethod::kPassivity || coupling.method == CouplingMethod::kSetPosition;
-    if (pays && law != Law::kNone && !coupling.purse) {
+    blame_rules(coupling);
+    if (needs_purse(coupling.method) && law != Law::kNone && !coupling.purse) {
       blame("teleoperation.purse", {"teleoperation"},
             "missing, expected this table: behind a limiter of its own a follower cannot move unless the leader pays");
     }
@@ -416,10 +406,6 @@ class SceneResolver {
     if (shares && control.limiter.parts.latency_reserve) {
       blame("limiter.latency_reserve", {},
             "expected none with " + what + ": the reserve is not proved for an account that ports share");
-    }
-    if (waves && !(coupling.spring.own_damping > 0)) {
-      blame("teleoperation.coupling.damping_n_s_per_m", {"teleoperation.method"},
-            "expected a number above 0: it is the impedance of the waves");
     }
     control.limiter.shared_account = shares;
     build("teleoperation", [&coupling] { Coupling{coupling}; });
@@ -440,16 +426,6 @@ class SceneResolver {
       blame("teleoperation.engage.align_energy_mj", {},
             "expected 0 but of a leader with map.absolute and a purse, whose account it is paid into");
     }
-    if (draft_.absolute_map && coupling.clutch) {
-      blame("teleoperation.clutch", {},
-            "expected none with map.absolute: a clutch changes an offset, and there is none");
-    }
-    if (draft_.absolute_map && !has_places(coupling.method)) {
-      blame(
-          "teleoperation.map.absolute", {},
-          "expected the method position-position, position-force, surface or set-position: the others have no absolute "
-          "places");
-    }
   }
 
   /// Several leaders of a follower.
@@ -466,11 +442,9 @@ class SceneResolver {
             "expected none with [[teleoperation.leader]]: several leaders dial their follower");
     }
     if (peer.leaders.size() < 2) blame(table, {}, "expected 2 to 4 tables, or none for one leader by any channel");
-    if (coupling.method != CouplingMethod::kPositionPosition && coupling.method != CouplingMethod::kPositionForce) {
-      blame("teleoperation.method", {},
-            "expected \"position-position\" or \"position-force\" with several leaders, found " +
-                in_quotes(to_string(coupling.method)));
-    }
+    Coupling::Config one = coupling;
+    one.share = peer.leaders.front().share;
+    blame_rules(one);
     if (coupling.turn || coupling.grip) {
       blame(coupling.turn ? "teleoperation.turn" : "teleoperation.grip", {},
             "expected none with several leaders, who share positions only");
@@ -499,16 +473,6 @@ class SceneResolver {
   /// What some methods need, and the others have no use for.
   void resolve_method(Coupling::Config& coupling) const {
     const std::string named = "\"" + std::string(to_string(coupling.method)) + "\"";
-    if (coupling.method == CouplingMethod::kRate && !coupling.rate) {
-      blame("teleoperation.rate", {"teleoperation.method"},
-            "missing, expected this table with method " + named + ": how fast the follower moves");
-    }
-    if (coupling.method != CouplingMethod::kRate && coupling.rate) {
-      blame("teleoperation.rate", {}, "expected none with method " + named + ": only \"rate\" has a speed");
-    }
-    if (coupling.centring > 0 && coupling.role == PortRole::kFollower) {
-      blame("teleoperation.rate.centring_n_per_m", {}, "expected none or 0: the leader's handle is centred");
-    }
     if (draft_.drift_rate && coupling.method != CouplingMethod::kPassivity) {
       blame("teleoperation.coupling.drift_rate_per_s", {},
             "expected none with method " + named + ": only \"passivity\" corrects drift");
@@ -518,9 +482,28 @@ class SceneResolver {
       blame("teleoperation.coupling.mutual_damping_n_s_per_m", {},
             "expected none or 0 with method " + named + ": it uses no velocity of the other end");
     }
-    if (coupling.method == CouplingMethod::kPassivity && !(coupling.spring.own_damping > 0)) {
-      blame("teleoperation.coupling.damping_n_s_per_m", {"teleoperation.method"},
-            "expected a number above 0: nothing else takes energy up, so that nothing could begin to move");
+  }
+
+  /// Blames the first rule of the coupling that is broken, where the scene says that field.
+  void blame_rules(const Coupling::Config& coupling) const {
+    struct Row {
+      std::string_view field;
+      std::string_view key;
+      std::string_view place;
+    };
+    static constexpr Row kRows[] = {
+        {"clutch", "teleoperation.clutch", "teleoperation.clutch"},
+        {"holds_place", "teleoperation.on_loss", "teleoperation.on_loss"},
+        {"engage_by", "teleoperation.engage.by", "teleoperation.engage.button"},
+        {"absolute", "teleoperation.map.absolute", "teleoperation.map.absolute"},
+        {"method", "teleoperation.method", "teleoperation.method"},
+        {"rate", "teleoperation.rate", "teleoperation.rate"},
+        {"centring", "teleoperation.rate.centring_n_per_m", "teleoperation.rate.centring_n_per_m"},
+        {"own_damping", "teleoperation.coupling.damping_n_s_per_m", "teleoperation.method"}};
+    for (const auto& [field, sentence] : Coupling::check(coupling)) {
+      const auto* row = std::ranges::find(kRows, field, &Row::field);
+      if (row == std::end(kRows)) blame("teleoperation", {}, std::string(field) + ": " + sentence);
+      blame(row->key, {row->place, "teleoperation.method"}, sentence);
     }
   }
 
@@ -566,197 +549,30 @@ class SceneResolver {
     }
   }
 
-  /// Motors that turn the handle, and the motor of its gripper, have bounds of their own. A scene has to have them when
-  /// its device has the motors: a torque is never given without a limiter that knows it.
-  void resolve_rotation(HapticController::Config& control) const {
-    const auto& device = draft_.simulated.rotation;
-    const bool motors = device && device->max_torque;
-    const Friction friction = handle_friction(
-        motors, draft_.rotation_bounds,
-        {"limiter.rotation.coulomb_friction_nm", "limiter.rotation.viscous_friction_nm_s_per_rad"},
-        device ? Friction{device->coulomb_friction.value_or(0), device->viscous_friction.value_or(0)} : Friction{},
-        "motors that turn its handle", kTurnFrictionShare);
-    if (!motors) return;
-    control.rotation = RotationLimits{.friction = friction,
-                                      .max_torque = draft_.max_torque.value_or(*device->max_torque),
-                                      .max_slew = draft_.max_torque_slew,
-                                      .encoder_step = device->encoder_step.value_or(0),
-                                      .most_acceleration = draft_.most_angular_acceleration,
-                                      .shaping_stiffness = draft_.angular_shaping_stiffness,
-                                      .damping = draft_.angular_damping};
-  }
-
-  void resolve_grip(HapticController::Config& control) const {
-    const auto& device = draft_.simulated.gripper;
-    const bool motor = device && device->max_force;
-    const Friction friction = handle_friction(
-        motor, draft_.grip_bounds, {"limiter.gripper.coulomb_friction_n", "limiter.gripper.viscous_friction_n_s_per_m"},
-        device ? Friction{device->coulomb_friction.value_or(0), device->viscous_friction.value_or(0)} : Friction{},
-        "a motor that closes its gripper");
-    if (!motor) return;
-    control.grip =
-        GripLimits{.friction = friction, .arm = device->arm, .max_force = draft_.max_grip.value_or(*device->max_force)};
-  }
-
-  /// The friction that the limiter may count on there. `truth`: the simulated device's; of its viscous part it may
-  /// count on `share`.
-  Friction handle_friction(bool has_motor, const Draft::FrictionBounds& given, const std::array<std::string, 2>& keys,
-                           const Friction& truth, const std::string& motor, double share = 1) const {
-    const Law law = draft_.scene.loop.control.limiter.law;
-    if (has_motor && law != Law::kAolPlus && law != Law::kAol && law != Law::kNone) {
-      blame("limiter.kind", {},
-            "expected \"aol+\", \"aol\" or \"none\": the other laws know the force on a point only, and this device "
-            "has " +
-                motor);
-    }
-    const auto bound = [&](const std::optional<double>& value, const std::string& key, double true_size, double of_it) {
-      const double most = of_it * true_size;
-      if (!has_motor && value) blame(key, {}, "expected a device with " + motor + ", because this bound is about it");
-      if (has_motor && !value && law != Law::kNone) {
-        blame(key, {}, "missing, expected " + kZeroOrMore.expected(unit_of(key)) + ", because the device has " + motor);
-      }
-      if (value && *value > most) {
-        blame(key, {},
-              "expected at most " + with_symbol(digits(most), unit_of(key)) + (of_it < 1 ? ", 98 % of" : ",") +
-                  " the true friction of the simulated device, because a higher bound voids the limiter's proof, "
-                  "found " +
-                  digits(*value));
-      }
-      return value.value_or(0);
-    };
-    return {.coulomb = bound(given.coulomb, keys[0], truth.coulomb, 1),
-            .viscous = bound(given.viscous, keys[1], truth.viscous, share)};
-  }
-
-  /// The bounds by place must not exceed the true friction either.
-  void resolve_places(HapticController::Config& control) const {
-    if (!control.limiter.parts.adaptive_friction) return;
-    const std::string table = "limiter.adaptive_friction";
-    const std::size_t count = draft_.places.size();
-    if (draft_.place_coulomb.size() != count || draft_.place_viscous.size() != count) {
-      blame(table + ".places_mm", {}, "expected as many places as friction bounds of each kind");
-    }
-    const SimulatedDevice::Config& device = draft_.simulated;
-    const auto check = [&](const char* key, const std::vector<double>& bounds, double Friction::*kind) {
-      for (std::size_t i = 0; i < count; ++i) {
-        const double most = least_friction_at(device, draft_.places[i]).*kind;
-        if (bounds[i] <= most) continue;
-        blame(table + "." + key, {},
-              "expected at most " + with_symbol(digits(most), unit_of(key)) +
-                  ", the true friction of the simulated device" + (device.joint_friction ? " there" : "") + ", found " +
-                  digits(bounds[i]));
-      }
-    };
-    if (!draft_.scene.driver().moves_a_hand &&
-        draft_.scene.driver().exerts_force) {  // its true friction is not known here
-      check("coulomb_friction_n", draft_.place_coulomb, &Friction::coulomb);
-      check("viscous_friction_n_s_per_m", draft_.place_viscous, &Friction::viscous);
-    }
-    auto& map = control.friction_map.emplace();
-    map.reach = draft_.reach;
-    for (std::size_t i = 0; i < count; ++i) {
-      map.places.push_back(
-          {draft_.places[i], {.coulomb = draft_.place_coulomb[i], .viscous = draft_.place_viscous[i]}});
-    }
-  }
-
-  /// What a preset lists and the scene does not.
-  void resolve_preset(HapticController::Config& control) const {
-    if (!draft_.preset) return;
-    LimiterConfig& limiter = control.limiter;
-    if (limiter.law != Law::kAolPlus) {
-      blame("limiter.preset", {"limiter.preset", "limiter.kind"},
-            "expected kind \"aol+\", whose parts a preset lists, found " + in_quotes(info(limiter.law).name));
-    }
-    const std::optional<double> step = draft_.ledger_step ? draft_.ledger_step : draft_.simulated.encoder_step;
-    if (!step && draft_.scene.driver().moves_a_hand) {
-      blame("limiter.robust_ledger.encoder_step_um", {"limiter.preset"},
-            "missing, expected " + kZeroOrMore.expected(unit_of("_um")) +
-                ", because the preset has to know the device's counts");
-    }
-    const PresetParts chosen = preset_parts(
-        *draft_.preset,
-        {.friction = limiter.friction, .longest_hold = limiter.longest_hold, .encoder_step = step.value_or(0)});
-    if (limiter.parts.latency_reserve && chosen.parts.bounded_acceleration) {
-      blame("limiter.latency_reserve", {"limiter.latency_reserve", "limiter.preset"},
-            "expected none with a preset that lists bounded_acceleration, which is not proved for forces that are held "
-            "late: take \"" +
-                std::string(info(Preset::kFeelUnconditional).name) + "\"");
-    }
-    for_each_aol_part([&](const auto& part) {
-      auto& listed = limiter.parts.*part.config;
-      if (!listed) listed = chosen.parts.*part.config;
-    });
-    HeldForce::Config& hold = control.hold;
-    if (!hold.adaptive_local_model && !hold.output_estimator && !hold.learned_model) {
-      hold.learned_model = chosen.learned_model;
-    }
-  }
-
-  void resolve_parts(LimiterConfig& limiter) const {
-    if (limiter.parts.bounded_acceleration && !limiter.parts.shaping && !draft_.preset) {
-      blame("limiter.shaping", {"limiter.bounded_acceleration"},
-            "missing, expected this table with bounded_acceleration: nothing else limits how hard a wall may be");
-    }
-    if (limiter.parts.fading_contact && !limiter.parts.energy_cap && !draft_.preset) {
-      blame("limiter.energy_cap", {"limiter.fading_contact"},
-            "missing, expected this table with fading_contact: without it no contact has a credit of its own");
-    }
-    if (limiter.parts.robust_ledger) {
-      const std::optional<double> step = draft_.ledger_step ? draft_.ledger_step : draft_.simulated.encoder_step;
-      if (!step) {
-        blame("limiter.robust_ledger.encoder_step_um", {},
-              "missing, expected " + kZeroOrMore.expected(unit_of("_um")) +
-                  ", because the device has no encoder_step_um");
-      }
-      limiter.parts.robust_ledger->encoder_step = {*step};
-    }
-    if (limiter.parts.bounded_acceleration) {
-      limiter.parts.bounded_acceleration->most = {draft_.most_acceleration};
-    }
-    if (limiter.parts.shaping) limiter.parts.shaping->stiffness = {draft_.shaping_stiffness};
-    if (limiter.parts.damper) {
-      limiter.parts.damper->viscous = {draft_.damping};
-      limiter.parts.damper->contact = {draft_.damper_contact};
-    }
-  }
-
   static std::string at_least(Duration least, const std::string& what, Duration found, std::string_view suffix) {
     const Unit& unit = unit_of(suffix);
     return "expected " + what + " of " + with_symbol(Number::shown(unit, least), unit) + " or more, found " +
            Number::shown(unit, found);
   }
 
-  /// The friction that the limiter may count on. `axis_share`: the share of it that each axis has by itself.
-  double friction_bound(const std::string& key, std::optional<double> given, const KnownNumber* profiles, double truth,
-                        double axis_share) const {
-    const std::string full = "limiter." + key;
-    const Unit& unit = unit_of(key);
-    if (!given && profiles == nullptr) {
-      if (draft_.scene.loop.control.limiter.law == Law::kNone || !draft_.scene.driver().exerts_force) return 0;
-      blame(full, {},
-            "missing, expected " + kZeroOrMore.expected(unit) +
-                (draft_.scene.driver().moves_a_hand ? ": what tendon-identify finds of this very device, or 0"
-                                                    : ", because there is no profile"));
-    }
-    const double bound = given ? *given : profiles->value * axis_share;
-    const double most = truth * axis_share;
-    if (bound > most && !draft_.scene.driver().moves_a_hand && draft_.scene.driver().exerts_force) {
-      blame(full, {full, "device.effects." + key},
-            "expected at most " + with_symbol(digits(most), unit) + ", the true friction of the simulated device" +
-                (axis_share < 1 ? " (an axis by itself has 1/√3 of it)" : "") +
-                ", because a higher bound voids the limiter's proof, found " + digits(bound) +
-                (given ? "" : " (the profile's)"));
-    }
-    return bound;
-  }
-
   Draft draft_;
-  const toml::table& file_;
-  const std::string& name_;
 };
 
 }  // namespace
+
+void SceneErrors::blame(std::string_view key, std::initializer_list<std::string_view> places,
+                        const std::string& sentence) const {
+  Place place;
+  const auto look = [&](std::string_view path) {
+    if (const auto node = file_.at_path(path); node && place.line == 0) place = place_of(*node.node());
+  };
+  for (const std::string_view path : places) look(path);
+  for (std::string_view path = key;; path = path.substr(0, path.rfind('.'))) {
+    look(path);
+    if (path.find('.') == std::string_view::npos) break;
+  }
+  fail(name_, place, std::string(key), sentence);
+}
 
 Scene resolve(Draft draft, const toml::table& file, const std::string& name, const std::filesystem::path& directory) {
   return SceneResolver(std::move(draft), file, name).scene(directory);

@@ -130,13 +130,19 @@ class SceneError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
+/// A scene file, or a file that is used by a scene, cannot be read. This is not an error in the scene.
+class SceneFileError : public SceneError {
+ public:
+  using SceneError::SceneError;
+};
+
 /// No scene that a person writes comes near this size, and a wrong path may lead to any file. Every second byte can
 /// nest one table deeper, and toml++ recurses: a file of 4 times this size overflows a stack of 8 MiB.
 inline constexpr std::size_t kMaxSceneBytes = 16'384;
 
-/// Reads a scene file, and the recorded motion that it names. `scene_reference()` lists its keys. Throws SceneError:
-/// "cannot read FILE: No such file or directory" when there is no such file, likewise for a directory, a named pipe or
-/// a device.
+/// Reads a scene file, and the recorded motion that it names. `scene_reference()` lists its keys. Throws SceneError,
+/// and SceneFileError: "cannot read FILE: No such file or directory" when there is no such file, likewise for a
+/// directory, a named pipe or a device.
 ///
 /// Of several mistakes, the first in the file is reported. A missing key is reported only when every key in the file is
 /// right, because a misspelt key is both unknown and missing.
@@ -165,7 +171,27 @@ Scene parse_scene(std::string_view text, const std::string& name, const std::fil
 /// stay: they are the device's.
 std::vector<std::string> limiter_settings(std::string_view law, const HapticController::Config& control);
 
+/// A removable part of a scene.
+struct ScenePart {
+  std::string key;
+  std::string_view what;  ///< the purpose in one line
+};
+
+/// Returns all parts in the order of scene_reference().
+const std::vector<ScenePart>& scene_parts();
+
+/// Removes a part from a scene of a simulated device, together with everything that depends on it. Returns false if the
+/// scene does not have the part.
+bool take_out(Scene& scene, std::string_view key);
+
 /// Every key that a scene may have: meaning, what is accepted in which unit, and what holds without it.
 std::string scene_reference();
+
+/// Describes the keys of one table, such as "limiter" or "device.hand", and of the tables inside it. Throws
+/// std::invalid_argument if there is no such table, and suggests the closest name.
+std::string scene_reference(std::string_view table);
+
+/// Lists the tables of a scene, with the number of keys in each table.
+std::string scene_tables();
 
 }  // namespace tendon

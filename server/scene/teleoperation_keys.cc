@@ -3,6 +3,7 @@
 #include <string_view>
 
 #include "server/scene/keys.h"
+#include "server/scene/parts.h"
 #include "server/scene/reader.h"
 #include "server/scene/reference.h"
 #include "server/scene/values.h"
@@ -77,7 +78,7 @@ void declare_coupling(Table& keys, Draft& draft) {
            Absent{.text = "force.max_force_n"});
   keys.key("drift_rate_per_s", draft.drift_rate, kZeroOrMore,
            "of passivity: the follower's place is brought to the leader's at this rate, with what energy there is",
-           Absent{.text = "100"});
+           Absent{.text = digits(draft.coupling.drift_rate)});
 }
 
 template <class Table>
@@ -101,7 +102,8 @@ Names<CouplingMethod> method_names() {
 
 template <class Table>
 void declare_teleoperation(Table& scene, Draft& draft) {
-  scene.part("teleoperation", draft.scene.teleoperation, [&draft](Table& keys, Scene::Teleoperation& peer) {
+  const Name coupled{"teleoperation", "ties the handle to one of another server"};
+  scene.part(coupled, draft.scene.teleoperation, [&draft](Table& keys, Scene::Teleoperation& peer) {
     Coupling::Config& coupling = draft.coupling;
     keys.key("role", coupling.role, Names<PortRole>{{{"leader", PortRole::kLeader}, {"follower", PortRole::kFollower}}},
              "the leader engages and clutches; the follower goes where the leader goes", kRequired);
@@ -135,13 +137,13 @@ void declare_teleoperation(Table& scene, Draft& draft) {
       purse.key("max_power_w", config.max_power, kAboveZero,
                 "the peer's energy is believed up to this power, once max_account_mj has been used up");
     });
-    keys.part("turn", coupling.turn, [](Table& turn, TurnCoupling::Config& config) {
+    keys.part({"turn", "ties the orientations"}, coupling.turn, [](Table& turn, TurnCoupling::Config& config) {
       turn.key("stiffness_nm_per_rad", config.stiffness, kAboveZero,
                "of the spring that couples the orientations, as the leader feels it", kRequired);
       turn.key("damping_nm_s_per_rad", config.damping, kZeroOrMore,
                "rendered at each handle by itself, as the leader feels it. Above 0 with adapt_to_delay");
     });
-    keys.part("grip", coupling.grip, [](Table& grip, GripCoupling::Config& config) {
+    keys.part({"grip", "ties the grippers"}, coupling.grip, [](Table& grip, GripCoupling::Config& config) {
       grip.key("stiffness_n_per_m", config.stiffness, kAboveZero,
                "of the spring that couples the grippers, at the fingers, as the leader feels it", kRequired);
       grip.key("damping_n_s_per_m", config.damping, kZeroOrMore,
@@ -162,11 +164,11 @@ void declare_teleoperation(Table& scene, Draft& draft) {
       engage.key("ramp_ms", coupling.ramp, kAboveZero, "the force rises from zero for this long");
       engage.key("within_mm", draft.align_within, kAboveZero,
                  "of a leader with map.absolute: so near to the follower's place it engages, once it was for 0.2 s",
-                 Absent{.text = "20"});
-      engage.key(
-          "align_energy_mj", draft.align_energy, Number{.least = 0, .most = 1e6},
-          "of a leader with map.absolute: what its motor may put in by itself at each act, to draw the handle there; "
-          "the port gives out so much at most. 0: the hand brings it there");
+                 Absent{.text = Number::shown(unit_of("_mm"), Coupling::Absolute{}.within)});
+      engage.key("align_energy_mj", draft.align_energy, Number{.least = 0, .most = 1e6},
+                 "of a leader with map.absolute: what its motor may put in by itself at each act, to draw the "
+                 "handle there; "
+                 "the port gives out so much at most. 0: the hand brings it there");
     });
     keys.tables("leader", peer.leaders, Couplings::kMost, [](Table& leader, Scene::Teleoperation::Leader& one) {
       leader.key("channel", one.channel, Label{}, "of this device, a [[channel]]: the one that this leader takes",
@@ -182,5 +184,6 @@ void declare_teleoperation(Table& scene, Draft& draft) {
 
 template void declare_teleoperation(Reader&, Draft&);
 template void declare_teleoperation(Reference&, Draft&);
+template void declare_teleoperation(Parts&, Draft&);
 
 }  // namespace tendon::scene_file

@@ -19,6 +19,7 @@
 #include <vector>
 
 #include "core/base/motion.h"
+#include "core/base/nearest_word.h"
 #include "core/base/time.h"
 #include "protocol/discovery.h"
 #include "protocol/limits.h"
@@ -62,6 +63,7 @@ std::optional<double> number_in(const toml::node& node);
 struct Refusal {
   const toml::node* found;
   std::string expected;
+  std::string hint{};  ///< what was probably meant: "; did you mean aol+?"
 };
 using Verdict = std::optional<Refusal>;
 
@@ -362,7 +364,9 @@ struct Names {
       to = value;
       return {};
     }
-    return Refusal{&node, expected(unit)};
+    std::vector<std::string_view> names;
+    for (const auto& [name, value] : all) names.push_back(name);
+    return Refusal{&node, expected(unit), did_you_mean(**text, names)};
   }
 
   std::string shown(const Unit&, const T& wanted) const {

@@ -1,0 +1,150 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/guests/port_exchange.h"
+
+#include <algorithm>
+#include <iterator>
+#include <optional>
+#include <utility>
+
+namespace tendon {
+namespace {
+
+/// The minimum time between two updates for an observer.
+constexpr Duration kShowEvery = std::chrono::milliseconds(20);
+
+/// Adds the scales to the port of the leader, because observers do not receive the Couple message.
+void tell_scales(PortState& leader, const Couple& coupling) {
+  if (leader.position_scale == 0) leader.position_scale = coupling.position_scale;
+  if (leader.force_scale == 0) leader.force_scale = coupling.force_scale;
+}
+
+}  // namespace
+
+PortExchange::PortExchange(std::vector<ServedDevice>& devices, std::vector<Guest>& guests, Leases& leases)
+    : devices_(devices), guests_(guests), leases_(leases) {
+  for (std::uint32_t place = 0; place < devices.size(); ++place) {
+    if (devices[place].coupling) coupled_.push_back(place);
+  }
+}
+
+void PortExchange::dial(LocalTime now, std::uint32_t device, const Peer::Config& server, Peer::Send send) {
+  dialled_.push_back({device, std::make_unique<Peer>(server, std::move(send), now)});
+}
+
+void PortExchange::publish(LocalTime now) {
+  for (const std::uint32_t device : coupled_) {
+    for (std::uint32_t coupling = 0; coupling < Shares::kMost; ++coupling) {
+      const PortState* const port = devices_[device].mail->port_out[coupling].take();
+      if (port != nullptr) publish(now, device, coupling, *port);
+    }
+  }
+}
+
+/// Sends our end of a coupling to the other end.
+void PortExchange::publish(LocalTime now, std::uint32_t device, std::uint32_t coupling, const PortState& port) {
+  devices_[device].phase = port.phase;
+  for (const Dialled& dialled : dialled_) {
+    if (dialled.device == device) dialled.peer->send(now, port);
+  }
+  PortFrame frame;
+  static_cast<PortState&>(frame) = port;
+  frame.device = number_of(device);
+  const auto& leaders = devices_[device].leaders;
+  if (coupling < leaders.size()) frame.channel = leaders[coupling];
+  for (Guest& guest : guests_) {
+    if (guest.gone || !guest.coupled || guest.coupled->device != device) continue;
+    if (coupling_by(devices_[device], guest.coupled->channel) != coupling) continue;
+    frame.channel = guest.coupled->channel;
+    guest.session.send(frame);
+  }
+  show(now, device, coupling, frame);
+}
+
+/// Sends both ends of a coupling to the observers of the device, at the rate of their states. `mine` is our end and has
+/// the channel of the other end.
+void PortExchange::show(LocalTime now, std::uint32_t place, std::uint32_t coupling, PortFrame mine) {
+  ServedDevice& device = devices_[place];
+  PortFrame& theirs = device.peer_ports[coupling];
+  tell_scales(device.coupling->role == PortRole::kLeader ? mine : theirs, *device.coupling);
+  for (Guest& guest : guests_) {
+    View* const view = guest.sees_ports() && !guest.gone ? view_of(guest, place) : nullptr;
+    if (view == nullptr || now < view->ports[coupling].due) continue;
+    const std::uint64_t every =
+        std::max<std::uint64_t>(view->state_every, guest.adaptation ? guest.adaptation->one_in() : 1);
+    const Duration period =
+        static_cast<std::int64_t>(every) * Duration(std::chrono::seconds(1)) / std::max(device.about.loop_hz, 1U);
+    view->ports[coupling].due = now + std::max(kShowEvery, period);
+    guest.session.send(mine);
+    if (std::exchange(view->ports[coupling].peer_waits, false)) guest.session.send(theirs);
+  }
+}
+
+bool PortExchange::take(LocalTime now, const Guest& guest, const PortFrame& port) {
+  const std::uint32_t place = guest.device_of(port.device);
+  const bool coupled = guest.coupled && guest.coupled->device == place && guest.coupled->channel == port.channel;
+  if (!coupled || leases_.holder(place, port.channel) != guest.id()) return false;
+  leases_.renew(now, place, port.channel);
+  const auto coupling = coupling_by(devices_[place], port.channel);
+  if (coupling) arrived(now, place, *coupling, port.channel, port);
+  return true;
+}
+
+/// Puts a port into the mailbox of the haptic loop and stores it for the observers.
+void PortExchange::arrived(LocalTime now, std::uint32_t place, std::uint32_t coupling, std::uint32_t channel,
+                           const PortState& port) {
+  ServedDevice& device = devices_[place];
+  device.mail->port_in[coupling].put({port, now, device.peers[coupling]});
+  const auto waits = [&](Guest& guest) {
+    View* const view = guest.sees_ports() ? view_of(guest, place) : nullptr;
+    if (view != nullptr) view->ports[coupling].peer_waits = true;
+    return view != nullptr;
+  };
+  if (std::count_if(guests_.begin(), guests_.end(), waits) == 0) return;
+  PortFrame& frame = device.peer_ports[coupling];
+  static_cast<PortState&>(frame) = port;
+  frame.device = number_of(place);
+  frame.channel = channel;
+  frame.of_peer = true;
+}
+
+bool PortExchange::receive(LocalTime now, const Address& from, std::span<const std::byte> datagram) {
+  for (Dialled& dialled : dialled_) {
+    if (!dialled.peer->is_from_server(from, datagram)) continue;
+    dialled.peer->receive(now, from, datagram);
+    renew(dialled);
+    const auto port = dialled.peer->take();
+    if (port && dialled.coupled) arrived(now, dialled.device, 0, 0, *port);
+    return true;
+  }
+  return false;
+}
+
+/// Tells the device's loop if the other end has changed.
+void PortExchange::renew(Dialled& dialled) {
+  if (!dialled.peer->coupled()) {
+    dialled.coupled = false;
+  } else if (!dialled.coupled) {
+    dialled.coupled = renew_peer(devices_[dialled.device], 0);
+  }
+}
+
+LocalTime PortExchange::turn(LocalTime now) {
+  LocalTime next = LocalTime::max();
+  for (Dialled& dialled : dialled_) {
+    next = std::min(next, dialled.peer->turn(now));
+    renew(dialled);
+  }
+  return next;
+}
+
+std::vector<Peer::Notice> PortExchange::take_notices() {
+  std::vector<Peer::Notice> all;
+  for (Dialled& dialled : dialled_) std::ranges::move(dialled.peer->take_notices(), std::back_inserter(all));
+  return all;
+}
+
+void PortExchange::close(LocalTime now) {
+  for (Dialled& dialled : dialled_) dialled.peer->close(now);
+}
+
+}  // namespace tendon

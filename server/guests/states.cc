@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/guests/states.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <optional>
+
+#include "protocol/limits.h"
+#include "protocol/wire/codec.h"
+
+namespace tendon {
+namespace {
+
+/// Removes values that do not fit into a frame. The forces of engines are bounded, but their sum and the values of a
+/// sensor are not.
+void leave_out_what_no_frame_carries(DeviceState& state) {
+  for (auto* const vector : {&state.force_wanted, &state.hand_force}) {
+    if (*vector && !((*vector)->array().abs() <= limits::kMaxValue).all()) vector->reset();
+  }
+  std::optional<Mat3>& stiffness = state.stiffness_wanted;
+  const bool tells =
+      state.force_wanted && stiffness && !stiffness->isZero(0) && (stiffness->array().abs() <= limits::kMaxValue).all();
+  if (!tells) stiffness.reset();
+  const auto fits = [](double value) { return std::abs(value) <= limits::kMaxValue; };
+  if (state.joints &&
+      !(std::ranges::all_of(state.joints->angle, fits) && std::ranges::all_of(state.joints->velocity, fits)))
+    state.joints.reset();
+}
+
+/// Keeps the buttons.
+void leave_out_handle(DeviceState& state) {
+  state.turning.reset();
+  state.torque_applied.reset();
+  state.grip.reset();
+  state.grip_applied.reset();
+  state.hand_force.reset();
+}
+
+}  // namespace
+
+bool tell_state(Guest& guest, View& view, const DeviceState& state) {
+  if (guest.coupled && guest.coupled->device == view.device) return false;
+  if (guest.has<kFeatureHandle>()) view.pressed |= state.buttons;
+  const std::uint64_t one_in = guest.adaptation ? guest.adaptation->one_in() : 1;
+  if (state.tick - view.last_state < std::max(view.state_every, one_in)) return false;
+  DeviceState told = state;
+  told.device = number_of(view.device);
+  leave_out_what_no_frame_carries(told);
+  if (!guest.has<kFeatureDiagnostics>()) {
+    told.force_wanted.reset();
+    told.stiffness_wanted.reset();
+  }
+  if (!guest.has<kFeatureHandle>()) leave_out_handle(told);
+  if (!guest.has<kFeatureJoints>()) told.joints.reset();
+  told.buttons = view.pressed;
+  // The guest predicts the next state from these rounded values.
+  if (guest.has<kFeatureStateColumns>() && fits_columns(told)) round_to_columns(told);
+  if (view.deadband && !view.deadband->passes(told)) {
+    view.pressed = 0;  // The guest must hear about the next release.
+    return true;
+  }
+  view.last_state = state.tick;
+  view.pressed = 0;
+  guest.session.send(told);
+  return false;
+}
+
+}  // namespace tendon

@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <utility>
+
+#include "core/base/time.h"
+#include "protocol/link.h"
+
+namespace tendon {
+
+/// Logs the number of Hellos with an unknown key, and the address of the newest one. The server does not answer these
+/// Hellos, so the log is the only place where the operator can see them. The first line is logged immediately, followed
+/// by at most one line per minute.
+class UnknownKeys {
+ public:
+  static constexpr Duration kPeriod = std::chrono::minutes(1);
+
+  /// The notice of the network loop for such a Hello.
+  static std::string notice(const Address& from) { return std::string(kNotice) + to_string(from); }
+  static bool is_notice(std::string_view text) noexcept { return text.starts_with(kNotice); }
+
+  /// Returns false if the notice is not about an unknown key.
+  bool take(std::string_view notice) {
+    if (!is_notice(notice)) return false;
+    newest_ = notice.substr(kNotice.size());
+    return true;
+  }
+
+  /// Returns true if a line has to be logged.
+  bool due(LocalTime now) const noexcept { return !newest_.empty() && now >= next_; }
+
+  /// Returns the line to log. `total` is the number of such Hellos since the start of the server.
+  std::string line(LocalTime now, std::uint64_t total) {
+    const std::uint64_t count = total - std::exchange(told_, total);
+    next_ = now + kPeriod;
+    return std::to_string(count) + (count == 1 ? " Hello" : " Hellos") +
+           " with a key that is not in the folder `keys` of [network], the newest from " + std::exchange(newest_, {}) +
+           ": that client gets no answer";
+  }
+
+ private:
+  static constexpr std::string_view kNotice = "a Hello with an unknown key from ";
+
+  std::string newest_;  ///< address of the newest one, or empty if it was logged
+  std::uint64_t told_ = 0;
+  LocalTime next_ = LocalTime::min();
+};
+
+}  // namespace tendon

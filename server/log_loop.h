@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "devices/counts.h"
+#include "devices/safety/safe_device.h"
+#include "server/haptic_loop.h"
+#include "server/mailboxes.h"
+#include "server/recording/part_recorder.h"
+#include "server/scene/scene.h"
+#include "server/trouble_sum.h"
+
+namespace tendon {
+
+/// The server has three loops: HapticLoop, NetworkLoop and this one. It records the steps, ports and datagrams from the
+/// mailboxes, passes the health of each device to the network loops (Mailboxes::health), and collects messages for the
+/// log.
+///
+/// One thread calls `turn` every kPeriod while the other loops run, and `close` after they have ended.
+///
+/// Thread-safe: no. Realtime-safe: no.
+class LogLoop {
+ public:
+  static constexpr Duration kPeriod = std::chrono::milliseconds(20);
+  /// Trouble is reported at most this often.
+  static constexpr Duration kTroublePeriod = std::chrono::seconds(1);
+
+  /// A device. Another thread steps its loop. The references must outlive the LogLoop.
+  struct Watched {
+    const Scene& scene;
+    const Device& device;
+    const SafeDevice* safe;  ///< null if the scene has no safety layer
+    const HapticLoop& haptic;
+    Mailboxes& mail;
+    const std::atomic<bool>& not_realtime;  ///< true if the haptic thread did not get its priority
+    std::size_t thread = 0;                 ///< the number of the haptic thread
+  };
+
+  /// A message for the log.
+  struct Notice {
+    enum class Level { kInfo, kWarning, kError };
+    Level level = Level::kInfo;
+    std::string text;
+  };
+
+  /// With kTaken, the loop takes the steps, ports, datagrams and flights from the mailboxes and records them. With kLeft,
+  /// it leaves them in the mailboxes and does not record anything.
+  enum class Records : std::uint8_t { kTaken, kLeft };
+
+  /// The scene of the first device determines whether and where the run is recorded. `recorded` contains the mailboxes
+  /// that the datagrams of each network loop are in. Throws the errors of PartRecorder.
+  LogLoop(const std::vector<Watched>& devices, const std::vector<Mailboxes*>& recorded, LocalTime started,
+          Records records = Records::kTaken);
+
+  /// `unsent` is the number of datagrams that the system has refused to send. Returns when the next call is due.
+  LocalTime turn(LocalTime now, std::uint64_t unsent);
+
+  /// Records everything that is left and closes the recording.
+  void close(LocalTime now, std::uint64_t unsent);
+
+  /// Returns the messages since the last call, oldest first.
+  std::vector<Notice> take_notices();
+
+  /// Empty if the scene records nothing.
+  std::optional<PartRecorder::Status> recording() const;
+
+ private:
+  /// The values that were last reported to the operator.
+  struct Told {
+    HapticLoop::Stats haptic{};
+    SafeDevice::Status safety{};
+    DeviceCounts counts{};
+    std::uint64_t steps_lost = 0;
+    std::uint64_t ports_lost = 0;
+    std::array<PortPhase, limits::kMaxChannels> phase{};  ///< by channel
+  };
+  struct DeviceLog {
+    Watched of;
+    Told told{};
+  };
+  struct NetworkLog {
+    Mailboxes* mail;
+    std::uint64_t datagrams_lost = 0;
+    std::uint64_t strangers = 0;
+    std::uint64_t over_budget = 0;
+  };
+  struct ThreadLog {
+    std::vector<const DeviceLog*> devices{};
+    TroubleSum overruns{};
+  };
+
+  void round(LocalTime now, std::uint64_t unsent, bool last);
+  void say(Notice::Level level, const DeviceLog& device, const std::string& text);
+  void say(Notice::Level level, std::string text) { notices_.push_back({level, std::move(text)}); }
+  std::uint64_t record_steps(std::size_t number);
+  void record_all(LocalTime now);
+  void record_left_out(LocalTime now);
+  void take_notices_of_recorder();
+  void report_health(LocalTime now, std::uint64_t unsent, DeviceLog& device);
+  void report_overruns(LocalTime now, ThreadLog& thread);
+  void report_trouble(DeviceLog& device);
+  void report_safety(DeviceLog& device);
+  void report_counts(DeviceLog& device);
+  void report_phase(DeviceLog& device, const PortRecord& port);
+  void save_flight(DeviceLog& device);
+
+  LocalTime started_;
+  LocalTime trouble_due_;
+  bool takes_records_;
+  std::vector<DeviceLog> devices_;
+  std::vector<ThreadLog> threads_;
+  std::vector<NetworkLog> networks_;
+  std::unique_ptr<PartRecorder> recorder_;  ///< null: the scene records nothing
+  bool recording_ended_ = false;
+  std::vector<Notice> notices_;
+};
+
+}  // namespace tendon

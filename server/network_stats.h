@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "core/estimation/clock_offset_estimator.h"
+#include "protocol/handshake.h"
+#include "protocol/session.h"
+#include "server/guests/guest.h"
+
+namespace tendon {
+
+/// The counters of a network loop. They start at 0 when the server starts.
+struct NetworkStats {
+  /// Datagrams of guests that were dropped (LinkStats).
+  struct Dropped {
+    std::uint64_t duplicated = 0;
+    std::uint64_t malformed = 0;
+    std::uint64_t forged = 0;
+    std::uint64_t old_key = 0;
+    std::uint64_t invalid = 0;
+    std::uint64_t stale = 0;
+    RefusedForces forces{};  ///< included in `invalid` and `stale`, except for unknown_tick
+  };
+  struct Channel {
+    std::string device;
+    std::string channel;
+    std::string holder;                   ///< the client's name; empty if the channel is free
+    std::uint64_t forces = 0;             ///< passed to the haptic loop
+    std::uint64_t handovers = 0;          ///< the channel moved from one client to another
+    std::uint64_t late = 0;               ///< the sum of the four causes below, for this channel
+    std::optional<double> worst_error{};  ///< N; the largest error that an engine has reported; empty if none has
+    std::vector<std::pair<std::string, std::uint64_t>> ways{};  ///< the number of forces for each solver path
+  };
+
+  std::uint64_t welcomed = 0;  ///< sessions that were opened
+  std::uint64_t refused = 0;
+  std::uint64_t timed_out = 0;
+  std::uint64_t replaced = 0;  ///< by a guest with the same key
+  std::uint64_t roamed = 0;    ///< a guest changed its address
+  std::uint64_t half_open_forgotten = 0;
+  std::uint64_t malformed = 0;           ///< the size or the header is invalid
+  std::uint64_t unknown_connection = 0;  ///< Data with an unknown connection id or the wrong address
+  Doorman::Stats hellos;                 ///< Hellos that were not answered with a Welcome or a Refused
+  std::uint64_t forces = 0;              ///< passed to the haptic loop
+  /// Forces and requests that need a channel, from clients that do not hold it. Torques and grip forces from clients
+  /// without the feature `handle` are counted here, too.
+  std::uint64_t denied = 0;
+  std::uint64_t unanswerable = 0;  ///< the force answers an unknown or very old tick
+  // Forces that arrived after the previous force had expired, for each cause (Lateness):
+  std::uint64_t late_ours = 0;
+  std::uint64_t late_network = 0;
+  std::uint64_t late_engine = 0;
+  std::uint64_t late_unknown = 0;
+  std::uint64_t foretold = 0;  ///< states that were not sent because the client can predict them
+  std::uint64_t hopeless = 0;  ///< forces that were not used because the link loses too many datagrams
+  Dropped dropped;
+  std::vector<Channel> channels;
+  LinkStats controller;                                            ///< the link of the newest controller
+  std::optional<ClockOffsetEstimator::Estimate> controller_clock;  ///< the offset of its clock
+
+  /// Adds the counters of another shard and appends its channels. The controller of the first shard that has one is
+  /// kept.
+  NetworkStats& operator+=(const NetworkStats& more);
+
+  /// Adds what the session of a guest has dropped. If the guest is a controller, its link becomes `controller`.
+  void add(const Guest& guest);
+  /// Appends the channels of a device.
+  void add(const ServedDevice& device, const std::vector<Guest>& guests);
+};
+
+}  // namespace tendon

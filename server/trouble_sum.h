@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <optional>
+#include <utility>
+
+#include "core/base/time.h"
+
+namespace tendon {
+
+/// Limits how often a recurring problem is logged. The first occurrence is logged immediately, and after that the number
+/// of occurrences is logged once per minute.
+class TroubleSum {
+ public:
+  static constexpr Duration kPeriod = std::chrono::minutes(1);
+
+  struct Due {
+    std::uint64_t count;
+    bool of_a_minute;  ///< if false, `count` only covers the time since the last call
+  };
+
+  /// Adds the number of occurrences since the last call. Returns the number that should be logged now, if any.
+  std::optional<Due> add(LocalTime now, std::uint64_t more) {
+    const bool of_a_minute = sum_ > 0;
+    sum_ += more;
+    if (sum_ == 0 || (told_ && now - *told_ < kPeriod)) return std::nullopt;
+    told_ = now;
+    return Due{std::exchange(sum_, 0), of_a_minute};
+  }
+
+ private:
+  std::uint64_t sum_ = 0;  ///< the number of occurrences that have not been logged
+  std::optional<LocalTime> told_;
+};
+
+}  // namespace tendon
