@@ -89,6 +89,7 @@ ForceClient::ForceClient(Link& link, const Address& server, const Config& config
                    .retry_min = config.retry_min,
                    .retry_max = config.retry_max,
                    .max_datagrams = config.max_datagrams}),
+      lease_(kAskLeaseAgain, config.take_lease && role == Role::kController),
       next_call_(now) {
   config_.seed = {};  // from it, whoever reads our memory later could find every key again
   greet(now);
@@ -117,45 +118,37 @@ bool ForceClient::give_order(const Request& order) {
   return true;
 }
 
-bool ForceClient::rearm() { return give_order(Rearm{.device = place_.device}); }
+bool ForceClient::rearm() { return give_order(Rearm{.device = lease_.place().device}); }
 
-bool ForceClient::disarm() { return give_order(Disarm{.device = place_.device}); }
+bool ForceClient::disarm() { return give_order(Disarm{.device = lease_.place().device}); }
 
-bool ForceClient::engage() { return give_order(Engage{.device = place_.device}); }
+bool ForceClient::engage() { return give_order(Engage{.device = lease_.place().device}); }
 
-bool ForceClient::disengage() { return give_order(Disengage{.device = place_.device}); }
+bool ForceClient::disengage() { return give_order(Disengage{.device = lease_.place().device}); }
 
 bool ForceClient::set_scale(double position_scale, double force_scale) {
-  const SetScale wanted{.device = place_.device, .position_scale = position_scale, .force_scale = force_scale};
-  return in_bounds(wanted) && give_order(wanted);
+  const SetScale wanted{.device = lease_.place().device, .position_scale = position_scale, .force_scale = force_scale};
+  return refused_field(wanted).empty() && give_order(wanted);
 }
 
 bool ForceClient::set_share(std::uint32_t channel, double share) {
-  const SetShare wanted{.device = place_.device, .channel = channel, .share = share};
-  return channel < limits::kMaxChannels && in_bounds(wanted) && give_order(wanted);
+  const SetShare wanted{.device = lease_.place().device, .channel = channel, .share = share};
+  return channel < limits::kMaxChannels && refused_field(wanted).empty() && give_order(wanted);
 }
 
 bool ForceClient::set_output(std::uint32_t output, const OutputSetting& setting) {
-  const SetOutput wanted{.device = place_.device, .output = output, .setting = setting};
-  return welcome_ && agreed_to(kFeatureOutputs) && in_bounds(wanted) && give_order(wanted);
+  const SetOutput wanted{.device = lease_.place().device, .output = output, .setting = setting};
+  return welcome_ && agreed_to(kFeatureOutputs) && refused_field(wanted).empty() && give_order(wanted);
 }
 
 bool ForceClient::take_lease() {
   Session* const session = connection_.session();
-  if (session == nullptr) return false;
-  asked_lease_ = session->request(TakeLease{.device = place_.device, .channel = place_.channel});
-  return asked_lease_.has_value();
+  return session != nullptr && lease_.ask(*session);
 }
 
 bool ForceClient::give_lease() {
-  ask_lease_ = LocalTime::max();
   Session* const session = connection_.session();
-  if (session == nullptr || !session->request(GiveLease{.device = place_.device, .channel = place_.channel})) {
-    return false;
-  }
-  asked_lease_.reset();  // what is answered to that is older than this
-  holds_ = false;
-  return true;
+  return session != nullptr && lease_.give(*session);
 }
 
 LocalTime ForceClient::turn(LocalTime now) {
@@ -164,9 +157,7 @@ LocalTime ForceClient::turn(LocalTime now) {
   connection_.begin_turn();
   const LocalTime begun = now;  // what is read moves `now` on to when it was read
   while (const auto event = connection_.next(now)) take(now, *event);
-  if (connection_.session() != nullptr && now >= ask_lease_ && !asked_lease_ && !take_lease()) {
-    ask_lease_ = now + kAskLeaseAgain;
-  }
+  if (connection_.session() != nullptr && now >= lease_.due() && !take_lease()) lease_.ask_at(now + kAskLeaseAgain);
   connection_.flush(now);  // nothing that is due waits for the engine
   if (call(now)) connection_.flush(link_.present(now));
   return connection_.more() ? begun : next_turn();
@@ -207,26 +198,23 @@ void ForceClient::open(LocalTime now, const Welcome& welcome) {
     return end(Phase::kRefused, Code::kUnsupported, "that server has one device, with one channel: name none");
   }
   welcome_ = welcome;
-  place_ = grants.empty() ? Grant{.device = 0, .channel = 0, .role = welcome.role} : grants.front();
-  holds_ = place_.role == Role::kController;
-  asked_lease_.reset();
+  lease_.open(grants.empty() ? Grant{.device = 0, .channel = 0, .role = welcome.role} : grants.front(), now);
   description_.reset();
   handle_.reset();
   order_.reset();
   order_answer_.reset();
   stats_.lease_lost_to.clear();
   stats_.left_out = {};
-  ask_lease_ = config_.take_lease && role_ == Role::kController && !holds_ ? now : LocalTime::max();
   Session& session = *connection_.session();
-  if (claims() || agreed_to(kFeatureHandle)) session.request(Describe{.device = place_.device});
-  if (agreed_to(kFeatureHandle)) session.request(Describe{.device = place_.device, .handle = true});
+  if (claims() || agreed_to(kFeatureHandle)) session.request(Describe{.device = lease_.place().device});
+  if (agreed_to(kFeatureHandle)) session.request(Describe{.device = lease_.place().device, .handle = true});
   deadband_request_ = config_.state_deadband ? session.request(*config_.state_deadband) : std::nullopt;
   foretell_ = false;
   seen_tick_ = 0;
   report_.reset();
   device_report_.reset();
   peer_reports_.clear();
-  if (config_.state_hz > 0) session.request(SetStateRate{.hz = config_.state_hz, .device = place_.device});
+  if (config_.state_hz > 0) session.request(SetStateRate{.hz = config_.state_hz, .device = lease_.place().device});
   sequence_ = 0;
   answered_tick_ = 0;
   if (config_.deadband)
@@ -239,7 +227,7 @@ void ForceClient::end(Phase phase, Code code, std::string reason) {
   stats_.phase = phase;
   stats_.code = code;
   stats_.reason = std::move(reason);
-  holds_ = false;
+  lease_.close();
   unseen_ = false;
   newest_.reset();
   pressed_ = 0;
@@ -274,7 +262,7 @@ void ForceClient::take_event(LocalTime now, const Session::Event& event) {
     if (unseen_) ++stats_.states_skipped;
     newest_ = arrived->state;
     unseen_ = true;
-    if (physics_ && !holds_) pressed_ = 0;  // a press of that time was another engine's
+    if (physics_ && !lease_.holds()) pressed_ = 0;  // a press of that time was another engine's
     pressed_ |= arrived->state.buttons;
     newest_arrived_ = now;
   } else if (const auto* report = std::get_if<Session::ReportArrived>(&event)) {
@@ -298,15 +286,7 @@ void ForceClient::take_answer(LocalTime now, const Session::RequestAnswered& ans
     foretell_ = answered.code == Code::kOk && period_ > Duration::zero() &&
                 config_.state_deadband->max_silence > Duration::zero();
   }
-  if (answered.id != asked_lease_) return;
-  asked_lease_.reset();
-  ask_lease_ = LocalTime::max();
-  if (answered.code != Code::kUnsupported) holds_ = answered.code == Code::kOk;  // else it knows no leases
-  if (holds_) {
-    stats_.lease_lost_to.clear();
-  } else if (config_.take_lease && answered.code == Code::kBusy) {
-    ask_lease_ = now + std::max(answered.wait, kAskLeaseAgain);
-  }
+  if (lease_.take(answered, now) && lease_.holds()) stats_.lease_lost_to.clear();
 }
 
 void ForceClient::take_request(LocalTime now, const Session::RequestArrived& arrived) {
@@ -314,12 +294,7 @@ void ForceClient::take_request(LocalTime now, const Session::RequestArrived& arr
   Session& session = *connection_.session();
   if (lost == nullptr) return session.answer(arrived.id, Code::kUnsupported, "that is a client's to ask");
   session.answer(arrived.id, Code::kOk, {});
-  if (lost->device != place_.device || lost->channel != place_.channel) return;
-  holds_ = false;
-  stats_.lease_lost_to = lost->to;
-  // A request still in flight may cross this message. One sent now is answered after it.
-  if (asked_lease_ && take_lease()) return;
-  if (config_.take_lease) ask_lease_ = now + kAskLeaseAgain;
+  if (lease_.take(*lost, session, now)) stats_.lease_lost_to = lost->to;
 }
 
 /// The state that the callback is due to see; empty when there is nothing new.
@@ -335,7 +310,7 @@ std::optional<DeviceState> ForceClient::due_state(LocalTime now) {
 
 /// True when the engine has answered: a force may wait to be sent.
 bool ForceClient::call(LocalTime now) {
-  if (now < next_call_ || (physics_ && !holds_)) return false;
+  if (now < next_call_ || (physics_ && !lease_.holds())) return false;
   std::optional<DeviceState> due = due_state(now);
   if (!due) return false;
   DeviceState& state = *due;
@@ -360,7 +335,7 @@ bool ForceClient::call(LocalTime now) {
 
 bool ForceClient::answer(LocalTime now, const Reply& reply) {
   if (connection_.session() == nullptr || stats_.phase != Phase::kOpen || reply.to.session != stats_.sessions ||
-      !holds_ || reply.to.hand.tick < answered_tick_ || reply.touch.unknown) {
+      !lease_.holds() || reply.to.hand.tick < answered_tick_ || reply.touch.unknown) {
     return false;
   }
   send(now, reply.touch, reply.to.hand);
@@ -384,8 +359,8 @@ void ForceClient::leave_out(const Touch& touch, const DeviceState& answered, For
 
 void ForceClient::send(LocalTime now, const Touch& touch, const DeviceState& answered) {
   ForceCommand command = to_command(touch, answered);
-  command.device = place_.device;
-  command.channel = place_.channel;
+  command.device = lease_.place().device;
+  command.channel = lease_.place().channel;
   leave_out(touch, answered, command);
   if (!in_bounds(command)) {
     ++stats_.forces_unusable;
@@ -433,8 +408,8 @@ LocalTime ForceClient::next_call() const {
 LocalTime ForceClient::next_turn() const {
   LocalTime next = connection_.next_turn();
   if (connection_.session() == nullptr) return next;
-  if (!physics_ || holds_) next = std::min(next, next_call());
-  return asked_lease_ ? next : std::min(next, ask_lease_);
+  if (!physics_ || lease_.holds()) next = std::min(next, next_call());
+  return std::min(next, lease_.due());
 }
 
 }  // namespace tendon

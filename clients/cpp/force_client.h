@@ -14,6 +14,7 @@
 
 #include "clients/cpp/touch.h"
 #include "protocol/connection.h"
+#include "protocol/lease_request.h"
 #include "protocol/link.h"
 #include "protocol/messages.h"
 #include "protocol/narrow/deadband.h"
@@ -210,7 +211,7 @@ class ForceClient {
   const std::optional<Session::RequestAnswered>& order_answer() const noexcept { return order_answer_; }
 
   /// Whether the channel takes our forces; while it does not, the callback is not called.
-  bool holds() const noexcept { return holds_; }
+  bool holds() const noexcept { return lease_.holds(); }
   /// Asks for the channel's lease, once more when it is lost before the answer; or gives it up. False as for rearm().
   bool take_lease();
   bool give_lease();
@@ -286,10 +287,7 @@ class ForceClient {
   std::optional<HandleDescription> handle_;
   std::optional<std::uint32_t> order_;  ///< the newest order, but for leases: number of the request
   std::optional<Session::RequestAnswered> order_answer_;
-  Grant place_;  ///< the numbers of our device and channel
-  bool holds_ = false;
-  std::optional<std::uint32_t> asked_lease_;  ///< the request that waits for its answer
-  LocalTime ask_lease_ = LocalTime::max();    ///< when to ask (again)
+  LeaseRequest lease_;  ///< of our channel, and the numbers of device and channel
 
   std::optional<DeviceState> newest_;
   bool unseen_ = false;        ///< the callback has not seen it

@@ -3,36 +3,19 @@
 
 #include <CLI/CLI.hpp>
 #include <charconv>
+#include <iostream>
 #include <limits>
 #include <sstream>
-#include <stdexcept>
 #include <utility>
 
 #include "clients/cpp/discovery/list.h"
 #include "clients/cpp/key_file.h"
+#include "clients/cpp/usage.h"
 
 namespace tendon {
 namespace {
 
 constexpr double kMaxDurationS = 1e9;  // 31 years, and far from where Duration ends (292)
-
-std::string check_server(const std::string& text) {
-  try {
-    ServerName{text};
-    return {};
-  } catch (const std::invalid_argument& error) {
-    return error.what();
-  }
-}
-
-std::string check_key(const std::string& file) {
-  try {
-    read_client_key(file);
-    return {};
-  } catch (const std::runtime_error& error) {
-    return error.what();
-  }
-}
 
 /// Empty unless the whole text is a number.
 std::optional<double> to_number(const std::string& text) {
@@ -77,13 +60,14 @@ struct CommandLine::Parser {
 
   void set_example(const std::string& argument) {
     app.footer("Example: " + options.client.name + argument + " --server " + options.server.text() +
-               " --duration-s 10");
+               " --duration-s 10\nExit: 0 done; 1 it failed or was never connected; 2 wrong usage.");
   }
 };
 
 CommandLine::CommandLine(std::string purpose, Options& options)
     : parser_(new Parser{CLI::App(std::move(purpose), options.client.name), options}) {
   CLI::App& app = parser_->app;
+  usage::dress(app);
   parser_->set_example("");
   app.set_help_flag("-h,--help", "Print this text and exit");
   app.set_version_flag("--version", TENDON_VERSION);
@@ -93,12 +77,11 @@ CommandLine::CommandLine(std::string purpose, Options& options)
          "lists the names")
       ->type_name("HOST:PORT")
       ->default_str(options.server.text())
-      ->check(CLI::Validator(check_server, ""));
+      ->check(usage::accepted_by([](const std::string& text) { ServerName{text}; }));
   app.add_option_function<std::string>(
          "--key", [&](const std::string& file) { options.client.key = read_client_key(file).key; },
          "Key file (see `tendond keygen`); needed unless the server is on this machine and has no keys")
-      ->type_name("FILE")
-      ->check(CLI::Validator(check_key, ""));
+      ->type_name("FILE");
   app.add_option("--device", options.client.device, "The device's name, for a server that has several")
       ->type_name("NAME");
   app.add_option("--channel", options.client.channel, "Name of the device's channel that takes the forces")
@@ -125,7 +108,7 @@ void CommandLine::add_argument(const std::string& name, std::string& value, cons
 
 void CommandLine::add_argument(const std::string& name, std::string& value, const std::vector<std::string>& choices,
                                const std::string& meaning) {
-  parser_->app.add_option(name, value, meaning)->required()->check(CLI::IsMember(choices));
+  parser_->app.add_option(name, value, meaning)->required()->check(usage::one_of(choices));
   parser_->set_example(" " + choices.at(0));
 }
 
@@ -144,10 +127,13 @@ void CommandLine::add(const std::string& name, bool& value, const std::string& m
 
 std::optional<int> CommandLine::parse(int argc, const char* const* argv) {
   try {
-    parser_->app.parse(argc, argv);
+    usage::parse(parser_->app, argc, argv);
     return list_servers(parser_->options.server, parser_->options.json);
   } catch (const CLI::ParseError& error) {
-    return parser_->app.exit(error) == 0 ? 0 : 2;  // prints the help, or what is wrong
+    return usage::exit_code(parser_->app, error);
+  } catch (const std::runtime_error& error) {  // a key that cannot be read
+    std::cerr << parser_->app.get_name() << ": " << error.what() << '\n';
+    return 1;
   }
 }
 

@@ -2,6 +2,7 @@
 #include "clients/cpp/run.h"
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cstdio>
 #include <deque>
@@ -17,6 +18,8 @@
 #include "clients/cpp/stop_signals.h"
 #include "clients/cpp/udp_transport.h"
 #include "protocol/busy_link.h"
+#include "protocol/wire/text.h"
+#include "server/machine/output.h"
 
 namespace tendon {
 namespace {
@@ -67,7 +70,7 @@ class Guest {
  private:
   ForceClient::Config config(const Options& options, const std::string& device) const;
   std::string sentence() const;
-  void say(const std::string& text) const { std::cerr << who_ << ": " << text << '\n'; }
+  void say(const std::string& text) const { std::cerr << who_ + ": " + visible(text) + "\n"; }
   void look_up_again();
   Json to_json(const LinkReport& report) const;
   /// In front of what stdout is told of the session.
@@ -208,14 +211,16 @@ bool Guest::end(LocalTime now, Duration duration) {
                         {"round_trip_variation_ms", milliseconds(link.round_trip_variation)}});
     say_json({{"summary", std::move(summary)}});
   } else if (stats.sessions == 0) {
-    std::fprintf(stderr, "%s: was not connected\n", who_.c_str());
+    say("was not connected");
   } else {
-    std::fprintf(stderr,
-                 "%s: %.1f s, %llu states came in (%llu skipped for a newer one), %llu forces went out (%llu more were "
-                 "unusable), lost on the way: %llu in, %llu out, round trip %.2f ± %.2f ms\n",
-                 who_.c_str(), seconds(duration), ull{stats.states}, ull{stats.states_skipped}, ull{stats.forces},
-                 ull{stats.forces_unusable}, ull{link.lost}, ull{link.lost_outgoing},
-                 milliseconds(link.smoothed_round_trip), milliseconds(link.round_trip_variation));
+    std::array<char, 400> text{};
+    std::snprintf(text.data(), text.size(),
+                  "%.1f s, %llu states came in (%llu skipped for a newer one), %llu forces went out (%llu more were "
+                  "unusable), lost on the way: %llu in, %llu out, round trip %.2f ± %.2f ms",
+                  seconds(duration), ull{stats.states}, ull{stats.states_skipped}, ull{stats.forces},
+                  ull{stats.forces_unusable}, ull{link.lost}, ull{link.lost_outgoing},
+                  milliseconds(link.smoothed_round_trip), milliseconds(link.round_trip_variation));
+    say(text.data());
   }
   return stats.sessions > 0;
 }
@@ -288,6 +293,7 @@ struct Seat {
 template <typename Callback>
 int run_with(const Options& options, const std::vector<Seat<Callback>>& seats, const Beside& beside = {}) {
   try {
+    const UnblockedOutput output;
     const StopSignals signals;
     const Punctual punctual;
     if (options.busy && has_one_processor()) {

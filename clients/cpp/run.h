@@ -62,9 +62,9 @@ struct HandAt {
 using Together = std::function<std::vector<Touch>(std::span<const std::optional<DeviceState>> hands)>;
 
 /// The same for an engine with one solution for all hands, at devices of one server or of several, which share
-/// `options.client.key`. It is called when a hand has a state that it has not seen, and all answers leave in one turn,
-/// each stamped with the state of its own hand: a hand that stands still is answered anew when another one moves. At
-/// least one hand; what the engine throws ends the run after a Bye to each server.
+/// `options.client.key`. It is called when a hand has a new state. It then sends a force to every hand, tagged with
+/// the state of this hand. There must be at least one hand. An exception of the engine ends the run after a Bye to each
+/// server.
 int run(const Options& options, const std::vector<HandAt>& hands, const Together& engine);
 
 /// An engine that computes elsewhere: in another process, or on many machines. run() never waits for it.

@@ -20,8 +20,7 @@ namespace tendon {
 ///     dns-sd:  dns-sd:.example.org          all of the local network, of that domain: list_servers() prints them
 class ServerName {
  public:
-  /// Looks nothing up. Throws std::invalid_argument when `text` is none of these:
-  /// `expected HOST:PORT like 127.0.0.1:47100, got "…"`.
+  /// Looks nothing up. Throws std::invalid_argument if `text` has another format.
   ServerName(std::string text);                                    // NOLINT(google-explicit-constructor)
   ServerName(const char* text) : ServerName(std::string(text)) {}  // NOLINT(google-explicit-constructor)
   ServerName(const Address& address);                              // NOLINT(google-explicit-constructor)

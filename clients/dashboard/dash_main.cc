@@ -2,6 +2,7 @@
 // tendon-dash: a web page that shows what a Tendon server does, live and recorded. It only looks on, unless it may arm.
 #include <CLI/CLI.hpp>
 #include <chrono>
+#include <cstddef>
 #include <exception>
 #include <iostream>
 #include <memory>
@@ -11,12 +12,14 @@
 #include <stdexcept>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "clients/cpp/key_file.h"
 #include "clients/cpp/machine.h"
 #include "clients/cpp/server_name.h"
 #include "clients/cpp/udp_transport.h"
+#include "clients/cpp/usage.h"
 #include "clients/dashboard/board.h"
 #include "clients/dashboard/feed.h"
 #include "clients/dashboard/foxglove_feed.h"
@@ -27,9 +30,32 @@
 #include "clients/dashboard/recordings.h"
 #include "clients/dashboard/routes.h"
 #include "clients/dashboard/web_server.h"
+#include "protocol/wire/text.h"
+#include "server/machine/output.h"
 
 namespace tendon::dash {
 namespace {
+
+/// The link of the operator. It is separate from the link of the observer, because the server identifies a guest by its
+/// address. Sending to another address connects the socket to that address.
+class OperatorLink : public Link {
+ public:
+  explicit OperatorLink(const Address& server) : transport_(std::make_unique<UdpTransport>(server)) {}
+
+  void send(const Address& to, std::span<const std::byte> datagram) override {
+    try {
+      if (to != transport_->server()) transport_ = std::make_unique<UdpTransport>(to);
+    } catch (const std::runtime_error&) {
+      return;  // the datagram is lost
+    }
+    transport_->send(to, datagram);
+  }
+  std::size_t receive(Address& from, std::span<std::byte> buffer) override { return transport_->receive(from, buffer); }
+  LocalTime present(LocalTime now) const override { return transport_->present(now); }
+
+ private:
+  std::unique_ptr<UdpTransport> transport_;
+};
 
 /// A new pass of 128 bits, for one run.
 std::string new_pass() {
@@ -59,38 +85,22 @@ struct Options {
 std::optional<int> parse(int argc, char** argv, Options& options) {
   CLI::App app(
       "A web page that shows what a Tendon server does, live and recorded; /metrics for Prometheus, and /bridge for "
-      "engines in "
-      "browsers.",
+      "engines in browsers.",
       "tendon-dash");
+  usage::dress(app);
   app.footer(
       "Example: tendon-dash --server 127.0.0.1:47100 --recordings . --listen 127.0.0.1:8080\n"
-      "then open http://127.0.0.1:8080 in a browser, or ws://127.0.0.1:8080/foxglove in Foxglove or Lichtblick.");
+      "then open http://127.0.0.1:8080 in a browser, or ws://127.0.0.1:8080/foxglove in Foxglove or Lichtblick.\n\n"
+      "Exit: 0 done; 1 something failed, or no server has answered; 2 wrong usage.");
   app.set_help_flag("-h,--help", "Print this text and exit");
   app.set_version_flag("--version", TENDON_VERSION);
   std::string server = options.server.text();
   std::string listen = to_string(options.web.listen);
-  const auto address = CLI::Validator(
-      [](const std::string& text) -> std::string {
-        try {
-          parse_address(text);
-          return {};
-        } catch (const std::invalid_argument& error) {
-          return error.what();
-        }
-      },
-      "");
-  const auto name = CLI::Validator(
-      [](const std::string& text) -> std::string {
-        try {
-          ServerName{text};
-          return {};
-        } catch (const std::invalid_argument& error) {
-          return error.what();
-        }
-      },
-      "");
+  const auto address = usage::accepted_by([](const std::string& text) { parse_address(text); });
+  const auto name = usage::accepted_by([](const std::string& text) { ServerName{text}; });
   app.add_option("--server", server,
-                 "Where tendond listens: an address, or a host name or dns-sd:NAME, which is looked up once")
+                 "Where tendond listens: an address, or a host name or dns-sd:NAME, which is looked up "
+                 "once; of several addresses each is tried")
       ->type_name("HOST:PORT")
       ->capture_default_str()
       ->check(name);
@@ -103,12 +113,9 @@ std::optional<int> parse(int argc, char** argv, Options& options) {
          "--key", options.key_file,
          "Key file (see `tendond keygen --observer`); needed unless the server is on this machine and has no keys")
       ->type_name("FILE");
-  app.add_option(
-         "--arm", options.arm_channel,
-         "Whoever opens the address that is then said, in a browser on this machine, may arm and disarm, by this "
-         "channel of the device, best one of the operator's own. Needs --key: a controller's, best one of its own, "
-         "too. The channel is claimed for that moment; no force is sent, and nothing taken from an engine that holds "
-         "it")
+  app.add_option("--arm", options.arm_channel,
+                 "Anyone who opens the printed address, in a browser on this machine, may arm and disarm through this "
+                 "channel. Give the operator a channel and a controller's key (--key) of their own")
       ->type_name("CHANNEL");
   app.add_option("--listen", listen,
                  "Where the page is; port 0 lets the system choose. Beyond this machine only with --host")
@@ -128,9 +135,9 @@ std::optional<int> parse(int argc, char** argv, Options& options) {
       ->check(CLI::Range(0.0, 1e9));
   app.add_flag("--json", options.json, "One JSON object per line on stdout: listening, stopped");
   try {
-    app.parse(argc, argv);
+    usage::parse(app, argc, argv);
   } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : 2;  // prints the help or the error
+    return usage::exit_code(app, error);
   }
   options.server = server;
   options.web.listen = parse_address(listen);
@@ -147,21 +154,22 @@ std::optional<int> parse(int argc, char** argv, Options& options) {
 }
 
 int run(const Options& options) {
+  const UnblockedOutput output;
   std::optional<ClientKey> key;
   if (!options.key_file.empty()) key = read_client_key(options.key_file);
   const bool arms = !options.arm_channel.empty();
   std::optional<Recordings> recordings;
   if (!options.recordings.empty()) recordings.emplace(options.recordings);
 
-  const std::vector<Address> addresses = options.server.look_up(key.has_value()).addresses;
+  std::vector<Address> addresses = options.server.look_up(key.has_value()).addresses;
   WebServer::Config web_config = options.web;
   web_config.server = addresses.front();
+  addresses.erase(addresses.begin());
   const LocalTime start = read_clock();
   Board board;
   WebCounts counts;
   BridgeCounts bridge;
-  // The operator needs an address of its own, because to the server one address is one guest.
-  std::optional<UdpTransport> operator_link;
+  std::optional<OperatorLink> operator_link;
   std::optional<Operator> operates;
   Abilities abilities{.server = options.server.text(), .recordings = recordings.has_value()};
   std::function<std::string(std::uint32_t, Order)> press;
@@ -188,10 +196,12 @@ int run(const Options& options) {
       board, {.name = "tendon-dash of " + abilities.server,
               .unix_offset = std::chrono::system_clock::now().time_since_epoch() - read_clock().time_since_epoch()});
   WebServer web(web_config, routes, feed, foxglove, counts, bridge, read_clock);
-  Observer observer(
-      web.link(), web_config.server,
-      {.device = options.device, .key = key ? std::optional(key->key) : std::nullopt, .seed = seed_from_system()},
-      board, start);
+  Observer observer(web.link(), web_config.server,
+                    {.device = options.device,
+                     .further = std::move(addresses),
+                     .key = key ? std::optional(key->key) : std::nullopt,
+                     .seed = seed_from_system()},
+                    board, start);
 
   const std::string at = to_string(web.address());
   const std::string operator_url = arms ? "http://" + at + "/#/operator/" + pass : std::string();
@@ -209,12 +219,14 @@ int run(const Options& options) {
     observer.set_watched(feed.pages() > 0 || foxglove.wants_states());
     const LocalTime next = observer.turn(now);
     if (board.contact() != Contact::kGreeting && board.words() != said) {
-      std::cerr << "tendon-dash: " << (said = board.words()) << '\n';
+      std::cerr << "tendon-dash: " << visible(said = board.words()) << '\n';
     }
     return next;
   };
   web.run(from_seconds(options.duration_s), turn, [&](LocalTime now) {
-    if (operates) operates->turn(now);
+    if (!operates) return;
+    operates->move_to(observer.server());
+    operates->turn(now);
   });
   if (operates) operates->stop(read_clock());
   observer.stop(read_clock());

@@ -10,8 +10,9 @@
 
 #include "foxglove.pb.h"
 #include "protocol/rotation.h"
-#include "protocol/wire/frame_codec.h"
+#include "protocol/wire/codec.h"
 #include "recording.pb.h"
+#include "tendon.pb.h"
 
 namespace tendon::dash {
 namespace {
@@ -202,17 +203,8 @@ std::string step_payload(const DeviceState& state) {
   return out.SerializeAsString();
 }
 
-std::string report_payload(const DeviceReport& report) {
-  tendon::v1::DeviceReport out;
-  wire::write(report, out);
-  return out.SerializeAsString();
-}
-
-std::string report_payload(const PeerReport& report) {
-  tendon::v1::PeerReport out;
-  wire::write(report, out);
-  return out.SerializeAsString();
-}
+std::string report_payload(const DeviceReport& report) { return message_of(report); }
+std::string report_payload(const PeerReport& report) { return message_of(report); }
 
 std::string transforms_payload(std::span<const Drawn> devices) {
   foxglove::FrameTransforms out;

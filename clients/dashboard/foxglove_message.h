@@ -43,7 +43,7 @@ struct Drawn {
   UnixTime at = 0;
 };
 
-/// m. How two devices stand to each other nobody tells; this keeps them apart. Device 1 is to the right of device 0.
+/// m. The server does not know how devices are placed relative to each other. Device 1 is drawn to the right of device 0.
 inline constexpr double kPlaceWidth = 0.5;
 /// m for each newton of an arrow.
 inline constexpr double kArrowLength = 0.01;

@@ -77,6 +77,10 @@ void Observer::end(const Connection::Ended& ended) {
   const std::string server = to_string(connection_.server());
   switch (ended.cause) {
     case Connection::Cause::kUnanswered:
+      if (!config_.further.empty()) {
+        std::rotate(config_.further.begin(), config_.further.begin() + 1, config_.further.end());
+        connection_.move_to(std::exchange(config_.further.back(), connection_.server()));
+      }
       return board_.tell(Contact::kUnanswered, ended.reason + ": is tendond running there" +
                                                    (config_.key ? ", and does it have this key?" : "?"));
     case Connection::Cause::kRefused:

@@ -6,6 +6,7 @@
 #include <optional>
 #include <set>
 #include <string>
+#include <vector>
 
 #include "clients/dashboard/board.h"
 #include "protocol/connection.h"
@@ -38,6 +39,8 @@ class Observer {
     /// One of those to watch. A session has 16 devices, those of one bank; empty: the first bank. A server that has no
     /// such device refuses us, and says which it has.
     std::string device{};
+    /// Additional addresses of the server. If there is no answer, the next address is tried.
+    std::vector<Address> further{};
     std::optional<Key> key{};  ///< as ForceClient::Config::key; an observer's will do
     Seed seed{};               ///< 32 bytes from the system at each start
     Duration patience = std::chrono::seconds(2);
@@ -58,6 +61,9 @@ class Observer {
 
   /// Says whether somebody looks at the states, which then come at the loop's own rate.
   void set_watched(bool watched) noexcept { watched_ = watched; }
+
+  /// The address that is currently used.
+  const Address& server() const noexcept { return connection_.server(); }
 
   /// Says Bye. Any further turn does nothing.
   void stop(LocalTime now);

@@ -57,6 +57,9 @@ class Operator {
   /// Does everything due at `now`; call it about sixty times a second.
   void turn(LocalTime now);
 
+  /// Sets the address of the server for the next press.
+  void move_to(const Address& server) { server_ = server; }
+
   /// Leaves.
   void stop(LocalTime now);
 

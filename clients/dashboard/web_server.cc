@@ -27,25 +27,21 @@
 #include <variant>
 #include <vector>
 
+#include "clients/dashboard/server_socket.h"
+
 namespace tendon::dash {
 namespace {
 
-namespace asio = boost::asio;
 namespace beast = boost::beast;
 namespace http = beast::http;
 namespace websocket = beast::websocket;
 using asio::ip::tcp;
-using asio::ip::udp;
-using boost::system::error_code;
-using Bytes = std::span<const std::byte>;
 
 /// Datagrams from the server are taken in batches. Otherwise tendon-dash would wake a thousand times a second, on the
 /// processors of the haptic loop. Its own measured round trip is longer by this time; nothing is computed from it.
 constexpr Duration kGather = std::chrono::milliseconds(3);
 /// Datagrams taken from a socket of the bridge before other sockets have their turn.
 constexpr int kMaxDrained = 64;
-/// Times that one receive skips an empty datagram or an error report (ICMP "port unreachable").
-constexpr int kMaxSkips = 64;
 /// Bytes of a file in one write.
 constexpr std::size_t kPiece = 64 * 1024;
 /// The most connections that are being refused at one time; a further one is closed without an answer.
@@ -60,19 +56,6 @@ constexpr std::size_t kMaxLine = 64;
 constexpr std::size_t kMaxOrder = 16 * 1024;
 /// What the system may hold for a viewer that does not read, beside FoxgloveSession::kMaxBytes. Linux takes twice that.
 constexpr int kViewerSendBuffer = 128 * 1024;
-
-asio::ip::address ip_of(const Address& address) {
-  const asio::ip::address_v6 v6(address.ip);
-  if (v6.is_v4_mapped()) return asio::ip::make_address_v4(asio::ip::v4_mapped, v6);
-  return v6;
-}
-
-template <class Endpoint>
-Address address_of(const Endpoint& endpoint) {
-  const asio::ip::address ip = endpoint.address();
-  const auto v6 = ip.is_v4() ? asio::ip::make_address_v6(asio::ip::v4_mapped, ip.to_v4()) : ip.to_v6();
-  return {v6.to_bytes(), endpoint.port()};
-}
 
 /// The addresses that count as one. One machine can easily have many addresses of an IPv6 network, so all of them are
 /// one.
@@ -91,48 +74,6 @@ Bytes bytes_of(const beast::flat_buffer& buffer) {
   return {static_cast<const std::byte*>(buffer.data().data()), buffer.data().size()};
 }
 
-/// A UDP socket that talks to the server and to nobody else.
-class ServerSocket : public Link {
- public:
-  ServerSocket(asio::io_context& context, const Address& server, WebServer::Clock clock)
-      : server_(server), clock_(clock), socket_(context) {
-    error_code error;
-    socket_.connect(udp::endpoint(ip_of(server), server.port), error);
-    if (!error) socket_.non_blocking(true, error);
-    if (error) throw std::runtime_error("cannot reach " + to_string(server) + ": " + error.message());
-  }
-
-  void send(const Address& to, Bytes datagram) override {
-    error_code lost;
-    if (to == server_) socket_.send(asio::buffer(datagram.data(), datagram.size()), 0, lost);
-  }
-  void send(Bytes datagram) { send(server_, datagram); }
-
-  std::size_t receive(Address& from, std::span<std::byte> buffer) override {
-    from = server_;
-    for (int i = 0; i < kMaxSkips; ++i) {
-      error_code error;
-      // MSG_TRUNC: the size is that of the datagram, even when the buffer is smaller.
-      const std::size_t size = socket_.receive(asio::buffer(buffer.data(), buffer.size()), MSG_TRUNC, error);
-      if (!error && size > 0) return size;
-      if (error == asio::error::would_block) return 0;
-    }
-    return 0;
-  }
-
-  LocalTime present(LocalTime now) const override { return std::max(now, clock_()); }
-
-  template <class Handler>
-  void when_readable(Handler handler) {
-    socket_.async_wait(udp::socket::wait_read, std::move(handler));
-  }
-
- private:
-  Address server_;
-  WebServer::Clock clock_;
-  udp::socket socket_;
-};
-
 class Connection;
 
 /// The things that all connections share.
@@ -146,6 +87,7 @@ struct Shared {
   WebServer::Clock clock;
   asio::io_context context{1};
   std::list<std::unique_ptr<Connection>> connections;
+  const ServerSocket* link = nullptr;  ///< the link of the Observer
 };
 
 /// One connection of a browser, from its first request until it is closed: requests, or a WebSocket.
@@ -372,7 +314,7 @@ class Connection {
     }
     if (side == Side::kBridge) {
       try {
-        server_ = std::make_unique<ServerSocket>(shared_.context, shared_.config.server, shared_.clock);
+        server_ = std::make_unique<ServerSocket>(shared_.context, shared_.link->server(), shared_.clock);
       } catch (const std::runtime_error&) {
         return close();
       }
@@ -472,6 +414,7 @@ struct WebServer::State {
                .clock = clock,
                .connections = {}},
         link(shared.context, config.server, clock) {
+    shared.link = &link;
     const tcp::endpoint at(ip_of(config.listen), config.listen.port);
     error_code error;
     acceptor.open(at.protocol(), error);

@@ -32,7 +32,7 @@ class WebServer {
  public:
   struct Config {
     Address listen = parse_address("127.0.0.1:8080");     ///< port 0 lets the system choose
-    Address server = parse_address("127.0.0.1:47100");    ///< tendond
+    Address server = parse_address("127.0.0.1:47100");    ///< tendond; link() can change it
     std::size_t max_connections = 256;                    ///< of all kinds
     std::size_t max_per_address = 64;                     ///< all pages and bridges of one machine, and their requests
     std::size_t max_pages = 16;                           ///< pages that look on: each costs 150 kB/s of JSON

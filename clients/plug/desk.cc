@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "clients/cpp/machine.h"
+#include "protocol/wire/text.h"
 
 namespace tendon::plug {
 namespace {
@@ -38,7 +39,7 @@ Desk::Desk(DeskConfig config, LocalTime now) : config_(std::move(config)), next_
   for (const std::string& device : config_.devices) places_.emplace_back(config_, device, now);
 }
 
-void Desk::say(const std::string& sentence) const { std::cerr << "tendon-plug: " << sentence << '\n'; }
+void Desk::say(const std::string& sentence) const { std::cerr << "tendon-plug: " + visible(sentence) + "\n"; }
 
 /// The server may have another address by now. Where nobody answered at one, the next one is tried.
 void Desk::look_up_again(Place& place) {
@@ -109,8 +110,15 @@ void Desk::wait(std::span<pollfd> others, LocalTime now, LocalTime until) {
   std::copy_n(polled_.begin(), others.size(), others.begin());
 }
 
-void Desk::stop(LocalTime now) {
-  for (Place& place : places_) place.plug.stop(now);
+int Desk::stop(LocalTime now) {
+  int exit_code = 0;
+  for (Place& place : places_) {
+    place.plug.stop(now);
+    if (place.plug.states() > 0) continue;
+    say(place.name + ": no state has come from " + config_.server.text());
+    exit_code = 1;
+  }
+  return exit_code;
 }
 
 }  // namespace tendon::plug

@@ -14,6 +14,7 @@
 #include "clients/cpp/server_name.h"
 #include "clients/cpp/udp_transport.h"
 #include "clients/plug/plug.h"
+#include "server/machine/output.h"
 
 namespace tendon::plug {
 
@@ -66,8 +67,8 @@ class Desk {
   /// The sockets towards the server, for a loop that sleeps otherwise. They are others after a look-up: ask each time.
   std::vector<int> descriptors() const;
 
-  /// Says Bye for each.
-  void stop(LocalTime now);
+  /// Says Bye for each. Returns the exit code: 1 if a device has never sent a state, which is then said.
+  int stop(LocalTime now);
 
  private:
   struct Place {
@@ -82,6 +83,7 @@ class Desk {
   void look_up_again(Place& place);
   void write_line(std::span<const Count> counts);
 
+  UnblockedOutput output_;
   DeskConfig config_;
   std::deque<Place> places_;
   std::vector<pollfd> polled_;

@@ -208,6 +208,9 @@ void Plug::note(std::string& said, std::string words) {
 }
 
 void Plug::note_changes() {
+  if (controller_ && !controller_->stats().unusable.empty()) {
+    note(said_of_unusable_, "is not sent a force: " + std::string(controller_->stats().unusable));
+  }
   const Shown shown{.watcher = watcher_ ? watcher_->phase() : Phase::kStopped,
                     .controller = controller_ ? controller_->phase() : Phase::kStopped,
                     .pushes = pushes()};

@@ -96,8 +96,8 @@ class Plug {
   std::optional<LinkReport> report() const { return controller_ ? controller_->report() : std::nullopt; }
   std::optional<DeviceReport> device_report() const { return watcher_ ? watcher_->device_report() : std::nullopt; }
 
-  /// Each change in a sentence, once: connected, lost, refused, no answer, axes unknown, controls, controls no more. The
-  /// newest 16 that nobody has taken. Empty: nothing new.
+  /// Each change in a sentence, once: connected, lost, refused, no answer, axes unknown, controls, controls no more, a
+  /// force not sent. The newest 16 that nobody has taken. Empty: nothing new.
   std::optional<std::string> next_sentence();
 
   /// Of the session that the states come by; kStopped after stop().
@@ -158,6 +158,7 @@ class Plug {
   std::string said_;                   ///< the newest sentence about the connection
   std::string said_of_axes_;           ///< … about how the device lies
   std::string said_of_force_;          ///< likewise, about the channel
+  std::string said_of_unusable_;       ///< likewise, about a force that was not sent
   bool stopped_ = false;
 };
 

@@ -2,33 +2,14 @@
 // tendon-plug: programs that exist already use a Tendon device without new code. One subcommand for each way in.
 #include <CLI/CLI.hpp>
 #include <exception>
-#include <functional>
 #include <iostream>
 #include <string>
-#include <utility>
 
 #include "clients/cpp/key_file.h"
+#include "clients/cpp/usage.h"
 #include "clients/plug/subcommands.h"
 
 namespace tendon::plug {
-namespace {
-
-/// "" when `check` accepts the text, else what it throws.
-CLI::Validator accepted_by(std::function<void(const std::string&)> check) {
-  return CLI::Validator(
-      [check = std::move(check)](const std::string& text) -> std::string {
-        try {
-          check(text);
-          return {};
-        } catch (const std::exception& error) {
-          return error.what();
-        }
-      },
-      "");
-}
-
-}  // namespace
-
 void add_common(CLI::App& app, DeskConfig& desk) {
   desk.client.name = "tendon-plug " + app.get_name();
   app.add_option_function<std::string>(
@@ -36,12 +17,11 @@ void add_common(CLI::App& app, DeskConfig& desk) {
          "Where tendond listens: a host name or an address; or dns-sd:NAME, which --key has to go with")
       ->type_name("HOST:PORT")
       ->default_str(desk.server.text())
-      ->check(accepted_by([](const std::string& text) { ServerName{text}; }));
+      ->check(usage::accepted_by([](const std::string& text) { ServerName{text}; }));
   app.add_option_function<std::string>(
          "--key", [&](const std::string& file) { desk.client.key = read_client_key(file).key; },
          "Key file (see `tendond keygen`); needed unless the server is on this machine and has no keys")
-      ->type_name("FILE")
-      ->check(accepted_by([](const std::string& file) { read_client_key(file); }));
+      ->type_name("FILE");
   app.add_option("--device", desk.devices, "A device's name; several times for several. None: the server's first one")
       ->allow_extra_args(false)
       ->type_name("NAME");
@@ -54,12 +34,19 @@ void add_common(CLI::App& app, DeskConfig& desk) {
 
 namespace {
 
+constexpr const char* kExitCodes =
+    "\n\nExit: 0 done; 1 something failed, or with --duration-s no server has answered; 2 wrong usage.\n"
+    "chai3d exits with the code of its program.";
+
 int run(int argc, char** argv) {
   CLI::App app(
       "Programs that exist already use a Tendon device without new code. tendon-plug runs beside the old program; "
       "Tendon's sealed and limited wire crosses the network.",
       "tendon-plug");
-  app.footer("Example: tendon-plug vrpn --server lab:47100 --name Phantom0=right");
+  usage::dress(app);
+  app.footer(std::string("Example: tendon-plug vrpn --server lab:47100 --name Phantom0=right\n\n"
+                         "tendon-plug COMMAND --help tells more.") +
+             kExitCodes);
   app.set_help_flag("-h,--help", "Print this text and exit");
   app.set_version_flag("--version", TENDON_VERSION);
   app.require_subcommand(1);
@@ -68,10 +55,13 @@ int run(int argc, char** argv) {
   add_inverse(app, chosen);
   add_ros2(app, chosen);
   add_vrpn(app, chosen);
+  for (CLI::App* const command : app.get_subcommands([](CLI::App*) { return true; })) {
+    command->footer(command->get_footer() + kExitCodes);
+  }
   try {
-    app.parse(argc, argv);
+    usage::parse(app, argc, argv);
   } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : 2;
+    return usage::exit_code(app, error);
   }
   return chosen();
 }

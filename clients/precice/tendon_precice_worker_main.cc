@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "clients/cpp/usage.h"
 #include "clients/cpp/worker/worker.h"
 #include "clients/precice/precice_engine.h"
 
@@ -18,9 +19,10 @@ int run(int argc, char** argv) {
       "A worker that hands each state to a solver coupled by preCICE: participant Hand, whose mesh is a round patch of "
       "the body's surface. It writes the displacement of the patch and reads the force that holds it there.",
       "tendon-precice-worker");
+  tendon::usage::dress(app);
   app.footer(
       "Example: tendon-fem serve SCENE --worker \"tendon-precice-worker --config precice-config.xml\"\n"
-      "Exit status: 0 the front has ended the stream, 1 failed, 2 wrong usage.");
+      "Exit: 0 the front has ended the stream; 1 failed; 2 wrong usage.");
   app.set_version_flag("--version", TENDON_VERSION);
   PreciceEngine::Config config;
   std::string scene;
@@ -40,9 +42,9 @@ int run(int argc, char** argv) {
   app.add_option("--radius-mm", radius_mm, "Of the patch")->capture_default_str();
   app.add_option("--rings", config.patch.rings, "Of nodes around its middle")->capture_default_str();
   try {
-    app.parse(argc, argv);
+    tendon::usage::parse(app, argc, argv);
   } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : 2;
+    return tendon::usage::exit_code(app, error);
   }
   config.patch.middle = 1e-3 * tendon::Vec3(middle_mm[0], middle_mm[1], middle_mm[2]);
   config.patch.normal = tendon::Vec3(normal[0], normal[1], normal[2]);

@@ -3,7 +3,6 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
-#include <array>
 #include <chrono>
 #include <cmath>
 #include <exception>
@@ -14,12 +13,7 @@
 #include <utility>
 
 #include "clients/softbody/fem/gmsh.h"
-#include "clients/softbody/models/explicit.h"
 #include "clients/softbody/models/linear.h"
-#include "clients/softbody/models/mass_spring.h"
-#include "clients/softbody/models/modal.h"
-#include "clients/softbody/models/projective.h"
-#include "clients/softbody/models/xpbd.h"
 #include "clients/softbody/touch/capsule.h"
 #include "clients/softbody/touch/friction.h"
 #include "clients/softbody/touch/rigid_contact.h"
@@ -31,106 +25,26 @@ namespace {
 
 using enum EffectKind;
 
-constexpr std::array kEffects{
-    EffectInfo{kContact, "contact", "the tool can touch the body", {}},
-    EffectInfo{kGeometricNonlinearity, "geometric-nonlinearity", "large rotations", {}},
-    EffectInfo{kMaterialNonlinearity, "material-nonlinearity", "large strains", {}},
-    EffectInfo{kGravity, "gravity", "the body sags under its weight", {}},
-    EffectInfo{kInertia, "inertia", "it swings: every answer is a step of time", {}},
-    EffectInfo{kDamping, "damping", "a bath slows every particle", {}},
-    EffectInfo{kViscosity, "viscosity", "the material resists being deformed quickly", {}},
-    EffectInfo{kFriction, "friction", "the tool drags on the surface", {}},
-    EffectInfo{kCutting,
-               "cutting",
-               "the body comes apart along planned cuts, at a time or under a force",
-               {kInertia, kDamping, kViscosity}},
-    EffectInfo{kStiffening, "stiffening", "Young's modulus changes over time", {kGravity, kInertia, kDamping}},
-    EffectInfo{kPlasticity,
-               "plasticity",
-               "pressed hard, the body keeps a dent",
-               {kInertia, kDamping, kViscosity, kCutting, kStiffening}},
-    EffectInfo{kSelfCollision, "self-collision", "the body's own sides cannot go through each other", {}},
-};
-
-constexpr EffectSet operator|(EffectSet set, EffectKind kind) {
-  set.add(kind);
-  return set;
-}
-
-constexpr EffectSet kSmall{kContact};
-constexpr EffectSet kLargeRotations{kContact, kGeometricNonlinearity};
-constexpr EffectSet kLargeStrains{kContact, kGeometricNonlinearity, kMaterialNonlinearity};
-constexpr EffectSet kAllOfSolids{kGravity, kInertia, kDamping, kViscosity, kFriction, kCutting, kStiffening};
-constexpr EffectSet kAllOfSprings{kGravity, kInertia, kDamping, kViscosity, kFriction, kStiffening};
-constexpr EffectSet kAllOfRounds{kGravity, kInertia, kDamping, kFriction, kStiffening};
-constexpr EffectSet kOfTables{kFriction, kStiffening};
-constexpr EffectSet kOfSteps{kGravity, kDamping, kFriction};
-
-constexpr std::array kModels{
-    ModelInfo{ModelKind::kLinear, Law::kLinear, "linear", "small strains; one solution with a kept factor", kSmall,
-              kAllOfSolids | kPlasticity, false},
-    ModelInfo{ModelKind::kCondensed, Law::kLinear, "condensed",
-              "the same answers from a table of the surface: the fastest", kSmall, kOfTables, false},
-    ModelInfo{ModelKind::kCorotational, Law::kCorotational, "corotational",
-              "large rotations, small strains; Newton at every answer", kLargeRotations,
-              kAllOfSolids | kPlasticity | kSelfCollision, false},
-    ModelInfo{ModelKind::kStVenantKirchhoff, Law::kStVenantKirchhoff, "stvk",
-              "large rotations; for comparison only: it collapses under a hard press", kLargeRotations,
-              kAllOfSolids | kSelfCollision, false},
-    ModelInfo{ModelKind::kNeoHookean, Law::kNeoHookean, "neo-hookean",
-              "large rotations and strains; no element stays inside out", kLargeStrains, kAllOfSolids | kSelfCollision,
-              false},
-    ModelInfo{ModelKind::kMassSpring, Law::kLinear, "mass-spring",
-              "for comparison: springs along the edges, which know no Poisson ratio", kLargeRotations, kAllOfSprings,
-              true},
-    ModelInfo{ModelKind::kTensorMass,
-              Law::kLinear,
-              "tensor-mass",
-              "for comparison: small strains in explicit steps",
-              {kContact, kInertia},
-              kOfSteps,
-              false},
-    ModelInfo{ModelKind::kTled,
-              Law::kStVenantKirchhoff,
-              "tled",
-              "for comparison: stvk in explicit steps",
-              {kContact, kGeometricNonlinearity, kInertia},
-              kOfSteps,
-              false},
-    ModelInfo{ModelKind::kXpbd,
-              Law::kNeoHookean,
-              "xpbd",
-              "for comparison: as stiff as its step and its iterations make it",
-              {kContact, kGeometricNonlinearity, kMaterialNonlinearity, kInertia},
-              kOfSteps,
-              true},
-    ModelInfo{ModelKind::kProjective, Law::kCorotational, "projective",
-              "for comparison: elements as rigid as possible, a few rounds for each answer", kLargeRotations,
-              kAllOfRounds, false},
-    ModelInfo{ModelKind::kModal, Law::kLinear, "modal",
-              "for comparison: a few swings of the body, too stiff where it is touched", kSmall, kOfTables, false},
-    ModelInfo{ModelKind::kNear, Law::kCorotational, "near",
-              "large rotations, or strains, near the tool, and a linear body elsewhere", kLargeRotations,
-              kOfTables | kCutting | kMaterialNonlinearity, false},
-};
-
-Mesh mesh_of(const BodyConfig& config) {
+/// If the mesh is not read from a file, `numbers` and `parts` are empty.
+FileMesh mesh_of(const BodyConfig& config) {
   const Shape shape = info(config.element).shape;
-  if (const auto* b = std::get_if<BlockShape>(&config.shape)) return block(shape, b->size, b->cells);
+  if (const auto* b = std::get_if<BlockShape>(&config.shape)) return {.mesh = block(shape, b->size, b->cells)};
   if (const auto* c = std::get_if<CylinderShape>(&config.shape)) {
-    return cylinder(shape, c->radius, c->height, c->across, c->up);
+    return {.mesh = cylinder(shape, c->radius, c->height, c->across, c->up)};
   }
   const auto& file = std::get<FileShape>(config.shape);
-  return read_gmsh(file.file, file.scale);
+  return read_gmsh(file.file, file.scale, file.slits);
 }
 
 Solid solid_of(const BodyConfig& config) {
-  Mesh mesh = mesh_of(config);
+  FileMesh read = mesh_of(config);
+  Mesh& mesh = read.mesh;
   double lowest = std::numeric_limits<double>::infinity();
   for (const Vec3& node : mesh.nodes) lowest = std::min(lowest, node.z());
   const double held = lowest + std::max(config.clamped_below, 1e-9);
   const Fixed fixed = fix_where(mesh, [&](const Vec3& node) { return node.z() <= held; });
-  const Law law = config.model == ModelKind::kNear ? config.law : info(config.model).law;
+  if (const auto* file = std::get_if<FileShape>(&config.shape)) expect_held(read, fixed, file->file.string());
+  const Law law = config.model == ModelKind::kNear ? config.near.law : info(config.model).law;
   std::vector<Material> of_elements = materials_of(mesh, config.material, config.regions);
   return {std::move(mesh), config.element, config.material, law, fixed, std::move(of_elements)};
 }
@@ -139,29 +53,6 @@ Solid solid_of(const BodyConfig& config) {
 bool wants_glide(const BodyConfig& config, const TouchSurface& surface) {
   return config.whole_stiffness || surface.curved();
 }
-
-ModalModel::Config modal_config(const BodyConfig& config, const TouchSurface& surface) {
-  ModalModel::Config modal{.swings = config.swings, .patches = {}, .glides = wants_glide(config, surface)};
-  const double reach = config.reach.value_or(config.patch_radius);
-  const int count = config.static_modes;
-  const auto along = [&](int i) { return count > 1 ? reach * (2.0 * i / (count - 1) - 1) : 0; };
-  for (int i = 0; i < count; ++i) {
-    for (int j = 0; j < count; ++j)
-      modal.patches.emplace_back(surface.across(config.middle) + Vec2(along(i), along(j)));
-  }
-  return modal;
-}
-
-template <class Info, std::size_t kCount>
-constexpr bool each_is_at_its_kind(const std::array<Info, kCount>& rows) {
-  for (std::size_t i = 0; i < kCount; ++i) {
-    if (static_cast<std::size_t>(rows[i].kind) != i) return false;
-  }
-  return true;
-}
-// info() uses the kind as the index.
-static_assert(each_is_at_its_kind(kEffects) && kEffects.back().kind == kSelfCollision);
-static_assert(each_is_at_its_kind(kModels) && kModels.back().kind == ModelKind::kNear);
 
 /// A model, and typed pointers to it for kinds that offer more than Model.
 struct Made {
@@ -197,28 +88,10 @@ std::unique_ptr<Model> plain_model_of(const BodyConfig& config, const Solid& sol
   if (config.self_collision) newton.self_collision = config.material.young / *config.self_collision;
   const EffectsConfig& effects = config.effects;
   if (config.plasticity) return std::make_unique<PlasticModel>(solid, surface, newton, effects, *config.plasticity);
-  switch (config.model) {
-    case ModelKind::kLinear:
-      return std::make_unique<LinearModel>(solid, surface, effects, wants_glide(config, surface));
-    case ModelKind::kCorotational:
-    case ModelKind::kStVenantKirchhoff:
-    case ModelKind::kNeoHookean:
-      return std::make_unique<QuasiStaticModel>(solid, surface, newton, effects);
-    case ModelKind::kMassSpring:
-      return std::make_unique<MassSpringModel>(solid, surface, newton, effects);
-    case ModelKind::kTensorMass:
-    case ModelKind::kTled:
-      return std::make_unique<ExplicitModel>(solid, surface, effects);
-    case ModelKind::kXpbd:
-      return std::make_unique<XpbdModel>(solid, surface, config.iterations, effects);
-    case ModelKind::kProjective:
-      return std::make_unique<ProjectiveModel>(solid, surface, config.iterations, effects);
-    case ModelKind::kCondensed:  // made below, as is kNear
-    case ModelKind::kNear:
-    case ModelKind::kModal:
-      break;
+  if (config.model == ModelKind::kLinear) {
+    return std::make_unique<LinearModel>(solid, surface, effects, wants_glide(config, surface));
   }
-  return std::make_unique<ModalModel>(solid, surface, modal_config(config, surface));
+  return std::make_unique<QuasiStaticModel>(solid, surface, newton, effects);
 }
 
 std::vector<int> touchable(const BodyConfig& config, const TouchSurface& surface) {
@@ -254,27 +127,27 @@ std::unique_ptr<CondensedModel> condensed_from(const BodyConfig& config, const S
 }
 
 int near_modes(const BodyConfig& config) {
-  return config.exact_interface ? std::numeric_limits<int>::max() : NearModel::Config{}.modes;
+  return config.near.exact_interface ? std::numeric_limits<int>::max() : NearModel::Config{}.modes;
 }
 
 Learned learn_of(const BodyConfig& config, const Solid& solid, const TouchSurface& surface, const Tell& tell) {
   return learn(solid, surface,
-               {.shapes = config.learn,
-                .answers = config.tabulate,
+               {.shapes = config.near.learn,
+                .answers = config.near.tabulate,
                 .middle = surface.across(config.middle),
                 .reach = *config.reach,
-                .folder = config.learned_in},
+                .folder = config.near.learned_in},
                tell);
 }
 
 /// The highest first.
 std::vector<std::unique_ptr<Rung>> rungs_of(const BodyConfig& config, const Solid& solid, const TouchSurface& surface) {
   std::vector<std::unique_ptr<Rung>> rungs;
-  const Learned learned = config.learned ? *config.learned : learn_of(config, solid, surface, {});
-  if (config.tabulate && learned.answers) {
+  const Learned learned = config.near.learned ? *config.near.learned : learn_of(config, solid, surface, {});
+  if (config.near.tabulate && learned.answers) {
     rungs.push_back(std::make_unique<TabulatedRung>(*learned.answers, config.tolerance));
   }
-  if (config.learn && learned.shapes) {
+  if (config.near.learn && learned.shapes) {
     rungs.push_back(std::make_unique<LearnedRung>(solid, surface, *learned.shapes, config.tolerance));
   }
   return rungs;
@@ -303,7 +176,7 @@ Made model_of(const BodyConfig& config, const Solid& solid, const TouchSurface& 
   } else if (config.model == ModelKind::kNear) {
     auto near = near_model_of(config, solid, surface, std::move(fields));
     made.near = near.get();
-    if (config.learn || config.tabulate) {
+    if (config.near.learns()) {
       auto ladder = std::make_unique<Ladder>(rungs_of(config, solid, surface), std::move(near));
       made.ladder = ladder.get();
       made.model = std::move(ladder);
@@ -326,47 +199,41 @@ Made model_of(const BodyConfig& config, const Solid& solid, const TouchSurface& 
 const BodyConfig& checked(const BodyConfig& config) {
   const ModelInfo& model = info(config.model);
   const EffectSet simulated = effects_of(config);
-  for (const EffectInfo& effect : kEffects) {
+  for (const EffectInfo& effect : effects()) {
     if (simulated.has(effect.kind) && !model.always.has(effect.kind) && !model.may.has(effect.kind)) {
       throw std::invalid_argument("the model \"" + std::string(model.name) + "\" does not simulate " +
                                   std::string(effect.name));
     }
-    for (const EffectInfo& other : kEffects) {
+    for (const EffectInfo& other : effects()) {
       if (simulated.has(effect.kind) && simulated.has(other.kind) && effect.not_with.has(other.kind)) {
         throw std::invalid_argument(std::string(effect.name) + " is not simulated together with " +
                                     std::string(other.name));
       }
     }
   }
-  if (model.tetrahedra && config.element != Element::kTet4) {
-    throw std::invalid_argument("the model \"" + std::string(model.name) + "\" wants the element tet4");
-  }
-  if (config.model == ModelKind::kNear && config.law == Law::kLinear) {
+  if (config.model == ModelKind::kNear && config.near.law == Law::kLinear) {
     throw std::invalid_argument("the law of the model \"near\" cannot be linear");
   }
-  if (config.learn || config.tabulate) {
+  if (config.near.learns()) {
     if (config.model != ModelKind::kNear) {
       throw std::invalid_argument("only the model \"near\" learns, or tabulates answers");
     }
-    expect(config.reach && *config.reach > 0 && *config.reach <= BodyConfig::kFarthestLearned * config.patch_radius,
-           "reach", config.reach.value_or(0), "above 0 and at most 1.5 patch radii, where the body learns");
+    expect(config.reach && *config.reach > 0 && *config.reach <= NearConfig::kFarthest * config.patch_radius, "reach",
+           config.reach.value_or(0), "above 0 and at most 1.5 patch radii, where the body learns");
   }
-  if (config.tool != BodyConfig::Tool::kPatch) {
-    const std::string tool = config.tool == BodyConfig::Tool::kSphere    ? "a sphere"
-                             : config.tool == BodyConfig::Tool::kCapsule ? "a capsule"
-                             : config.tool == BodyConfig::Tool::kBox     ? "a box"
-                                                                         : "a tool of a file";
+  const auto* capsule = std::get_if<CapsuleTool>(&config.tool);
+  if (!is_patch(config.tool)) {
+    const std::string tool(name_of(config.tool));
     if (is_rigid_on_nonlinear(config)) {
       for (const EffectKind effect : {kInertia, kDamping, kViscosity, kCutting, kPlasticity, kSelfCollision}) {
         if (simulated.has(effect)) {
           throw std::invalid_argument(tool + " presses no body with " + std::string(info(effect).name));
         }
       }
-    } else if (config.tool == BodyConfig::Tool::kBox || config.tool == BodyConfig::Tool::kMesh) {
-      throw std::invalid_argument(tool + " wants the model \"corotational\", \"stvk\" or \"neo-hookean\"");
+    } else if (!is_sphere(config.tool) && capsule == nullptr) {
+      throw std::invalid_argument(tool + " wants the model \"corotational\" or \"neo-hookean\"");
     } else if (config.model != ModelKind::kCondensed) {
-      throw std::invalid_argument(tool +
-                                  " wants the model \"condensed\", \"corotational\", \"stvk\" or \"neo-hookean\"");
+      throw std::invalid_argument(tool + " wants the model \"condensed\", \"corotational\" or \"neo-hookean\"");
     } else if (config.friction) {
       throw std::invalid_argument(tool + " has no friction on the model \"condensed\"");
     }
@@ -374,18 +241,17 @@ const BodyConfig& checked(const BodyConfig& config) {
     if (config.side == PatchContact::Side::kBilateral) throw std::invalid_argument(tool + " does not stick");
   }
   if (config.hands != 1 && !is_rigid_on_nonlinear(config)) {
-    throw std::invalid_argument(
-        "several hands want a rigid tool and the model \"corotational\", \"stvk\" or \"neo-hookean\"");
+    throw std::invalid_argument("several hands want a rigid tool and the model \"corotational\" or \"neo-hookean\"");
   }
   if (config.table_file) {
     if (config.model != ModelKind::kCondensed) {
       throw std::invalid_argument("a table in a file is for the model \"condensed\"");
     }
-    if (config.tool == BodyConfig::Tool::kCapsule) {
-      throw std::invalid_argument("a capsule wants more than a table in a file has");
-    }
+    if (capsule != nullptr) throw std::invalid_argument("a capsule wants more than a table in a file has");
   }
-  expect(std::abs(config.tool_axis.norm() - 1) < 1e-9, "norm of tool_axis", config.tool_axis.norm(), "1");
+  if (capsule != nullptr) {
+    expect(std::abs(capsule->axis.norm() - 1) < 1e-9, "norm of tool_axis", capsule->axis.norm(), "1");
+  }
   expect(config.tool_offset.allFinite(), "tool_offset", config.tool_offset.norm(), "finite numbers");
   return config;
 }
@@ -400,7 +266,7 @@ constexpr double kPointsAcrossTool = 4;
 
 RigidContact rigid_contact_of(const BodyConfig& config, QuasiStaticModel& body, const Solid& solid,
                               const TouchSurface& surface) {
-  const RigidShape shape = shape_of_tool(config);
+  const RigidShape shape = shape_of(config.tool, config.layer);
   RigidContact::Config made;
   made.layer = {.thickness = config.layer,
                 .young = config.material.young,
@@ -425,64 +291,21 @@ double linear_limit(const Solid& solid, const TouchSurface& surface, const Patch
 
 }  // namespace
 
-std::span<const EffectInfo> effects() noexcept { return kEffects; }
-
-const EffectInfo& info(EffectKind kind) noexcept { return kEffects[static_cast<std::size_t>(kind)]; }
-
-std::span<const ModelInfo> models() noexcept { return kModels; }
-
-const ModelInfo& info(ModelKind kind) noexcept { return kModels[static_cast<std::size_t>(kind)]; }
-
-std::optional<ModelKind> model_named(std::string_view name) noexcept {
-  const auto* const found = std::ranges::find(kModels, name, &ModelInfo::name);
-  return found == kModels.end() ? std::nullopt : std::optional(found->kind);
-}
-
 bool is_rigid_on_nonlinear(const BodyConfig& config) {
-  return config.tool != BodyConfig::Tool::kPatch &&
-         (config.model == ModelKind::kCorotational || config.model == ModelKind::kStVenantKirchhoff ||
-          config.model == ModelKind::kNeoHookean);
+  return !is_patch(config.tool) && (config.model == ModelKind::kCorotational || config.model == ModelKind::kNeoHookean);
 }
 
 bool turns_the_hand(const BodyConfig& config) {
-  const bool round = config.tool == BodyConfig::Tool::kPatch || config.tool == BodyConfig::Tool::kSphere;
-  return !round || config.tool_offset != Vec3::Zero();
-}
-
-RigidShape shape_of_tool(const BodyConfig& config) {
-  switch (config.tool) {
-    case BodyConfig::Tool::kCapsule:
-      return RigidShape::capsule(config.tool_radius, config.tool_half_length, config.tool_axis);
-    case BodyConfig::Tool::kBox:
-      return RigidShape::box(config.tool_size, config.tool_edge);
-    case BodyConfig::Tool::kMesh: {
-      if (!config.tool_file) throw std::invalid_argument("a tool of a file wants the file");
-      const ToolFile& of = *config.tool_file;
-      return RigidShape::mesh(read_surface(of.file), of.scale, of.cell, config.layer, of.file.string());
-    }
-    case BodyConfig::Tool::kPatch:
-    case BodyConfig::Tool::kSphere:
-      break;
-  }
-  return RigidShape::sphere(config.tool_radius);
+  return !(is_patch(config.tool) || is_sphere(config.tool)) || config.tool_offset != Vec3::Zero();
 }
 
 Vec3 lowest_of_tool(const BodyConfig& config, const Mat3& turn) {
-  if (config.tool == BodyConfig::Tool::kBox || config.tool == BodyConfig::Tool::kMesh) {
-    return turn * (config.tool_offset + shape_of_tool(config).farthest(turn.transpose() * -config.towards_tool));
-  }
-  Vec3 lowest = turn * config.tool_offset - config.tool_radius * config.towards_tool;
-  if (config.tool == BodyConfig::Tool::kCapsule) {
-    const Vec3 half = turn * (config.tool_half_length * config.tool_axis);
-    const double up = half.dot(config.towards_tool);
-    if (std::abs(up) > 1e-9 * config.tool_half_length) lowest -= std::copysign(1.0, up) * half;
-  }
-  return lowest;
+  return turn * config.tool_offset + lowest_of(config.tool, config.layer, turn, config.towards_tool);
 }
 
 EffectSet effects_of(const BodyConfig& config) {
   EffectSet set = info(config.model).always;
-  if (config.model == ModelKind::kNear && config.law == Law::kNeoHookean) set.add(kMaterialNonlinearity);
+  if (config.model == ModelKind::kNear && config.near.law == Law::kNeoHookean) set.add(kMaterialNonlinearity);
   if (config.effects.gravity) set.add(kGravity);
   if (config.effects.inertia) set.add(kInertia);
   if (config.effects.damping) set.add(kDamping);
@@ -497,7 +320,7 @@ EffectSet effects_of(const BodyConfig& config) {
 
 bool is_elastic(const BodyConfig& config) {
   const EffectSet lossless{kContact, kGeometricNonlinearity, kMaterialNonlinearity, kGravity, kSelfCollision};
-  return config.model != ModelKind::kProjective && effects_of(config).within(lossless);
+  return effects_of(config).within(lossless);
 }
 
 struct Body::Parts {
@@ -510,21 +333,21 @@ struct Body::Parts {
         surface(solid.mesh(), config.towards_tool, config.patch_radius),
         made(model_of(config, solid, surface, solver, std::move(fields))),
         model(*made.model),
-        contact(model, surface, config.tool_radius, config.side, friction_of(config)),
+        contact(model, surface, radius_of(config.tool), config.side, friction_of(config)),
         patch(middle_patch(surface, config.middle)),
         knows_turns(info(config.model).always.has(kGeometricNonlinearity)),
         turns(turns_the_hand(config)),
-        offset(config.tool_offset),
-        axis(config.tool_axis) {
+        offset(config.tool_offset) {
     // checked() has made sure that the model of any other sphere or capsule is condensed.
     if (made.newton != nullptr) {
       rigid.emplace(rigid_contact_of(config, *made.newton, solid, surface));
       hands.resize(config.hands);
       return;
     }
-    if (config.tool == BodyConfig::Tool::kSphere) sphere.emplace(*made.condensed, surface, config.tool_radius);
-    if (config.tool == BodyConfig::Tool::kCapsule) {
-      capsule.emplace(solid, surface, touchable(config, surface), config.tool_radius, config.tool_half_length);
+    if (is_sphere(config.tool)) sphere.emplace(*made.condensed, surface, radius_of(config.tool));
+    if (const auto* tool = std::get_if<CapsuleTool>(&config.tool)) {
+      axis = tool->axis;
+      capsule.emplace(solid, surface, touchable(config, surface), tool->radius, tool->half_length);
     }
   }
 
@@ -555,7 +378,7 @@ struct Body::Parts {
   bool knows_turns;  ///< simulates large rotations
   bool turns;        ///< turns_the_hand()
   Vec3 offset;
-  Vec3 axis;
+  Vec3 axis = Vec3::UnitZ();  ///< of `capsule`
   std::unique_ptr<Planned> cutting;
   std::vector<int> node_before{};  ///< of a body that was prepared: each node's number before the cut
 };
@@ -564,7 +387,7 @@ struct Body::Parts {
 Body::Parts::Planned::Planned(const BodyConfig& config, const Mesh& mesh, const Fixed& fixed,
                               const TouchSurface& surface)
     : cuts(config.cuts), described(config) {
-  described.learned.emplace();  // nothing is known of the body after a cut
+  described.near.learned.emplace();  // nothing is known of the body after a cut
   Division body{.mesh = mesh, .fixed = fixed, .node_before = {}};
   for (Cutting trial = cuts; trial.left() > 0;) {
     const std::span<const Cut> done = trial.make_next();
@@ -709,7 +532,7 @@ SurfaceTable condense(const BodyConfig& config, const SolverOf& solver_of) {
   if (config.model != ModelKind::kCondensed) throw std::invalid_argument("only the model \"condensed\" has a table");
   BodyConfig anew = config;
   anew.table_file.reset();
-  anew.tool = BodyConfig::Tool::kPatch;
+  anew.tool = PatchTool{.radius = radius_of(config.tool)};
   const Solid solid = solid_of(checked(anew));
   const TouchSurface surface(solid.mesh(), anew.towards_tool, anew.patch_radius);
   const Patch patch = middle_patch(surface, anew.middle);
@@ -726,7 +549,7 @@ SurfaceTable condense(const BodyConfig& config, const SolverOf& solver_of) {
 }
 
 Learned learn(const BodyConfig& config, const Tell& tell) {
-  if (!config.learn && !config.tabulate) return {};
+  if (!config.near.learns()) return {};
   const Solid solid = solid_of(checked(config));
   return learn_of(config, solid, TouchSurface(solid.mesh(), config.towards_tool, config.patch_radius), tell);
 }

@@ -27,8 +27,8 @@
 #include "clients/softbody/near/ladder.h"
 #include "clients/softbody/near/learn.h"
 #include "clients/softbody/near/near_model.h"
+#include "clients/softbody/tool.h"
 #include "clients/softbody/touch/contact.h"
-#include "clients/softbody/touch/rigid_shape.h"
 
 namespace tendon::softbody {
 
@@ -73,37 +73,28 @@ std::span<const EffectInfo> effects() noexcept;  ///< in the order of their kind
 const EffectInfo& info(EffectKind kind) noexcept;
 
 /// The models that a scene can choose; folder models/ has a file for each family, near/ the last.
-enum class ModelKind : std::uint8_t {
-  kLinear,
-  kCondensed,
-  kCorotational,
-  kStVenantKirchhoff,
-  kNeoHookean,
-  kMassSpring,
-  kTensorMass,
-  kTled,
-  kXpbd,
-  kProjective,
-  kModal,
-  kNear
-};
+enum class ModelKind : std::uint8_t { kLinear, kCondensed, kCorotational, kNeoHookean, kNear };
 
 struct ModelInfo {
   ModelKind kind;
-  Law law;                ///< of kNear the usual one: see BodyConfig::law
+  Law law;                ///< of kNear the usual one: see NearConfig::law
   std::string_view name;  ///< in scenes, tables and command lines
   std::string_view what;  ///< one line
   EffectSet always;       ///< always simulated
   EffectSet may;          ///< simulated when they are listed
-  bool tetrahedra;        ///< needs a mesh of tet4
-
-  bool has_time() const noexcept { return always.has(EffectKind::kInertia); }  ///< even when no effect is listed
 };
 
 /// Every model, in the order in which tables list them.
 std::span<const ModelInfo> models() noexcept;
 const ModelInfo& info(ModelKind kind) noexcept;
 std::optional<ModelKind> model_named(std::string_view name) noexcept;
+
+/// A possible law of the elements near the tool of a kNear body.
+struct NearLaw {
+  Law law;
+  std::string_view name;  ///< in scenes
+};
+std::span<const NearLaw> near_laws() noexcept;
 
 struct BlockShape {
   Vec3 size;  ///< m
@@ -117,13 +108,26 @@ struct CylinderShape {
 };
 struct FileShape {
   std::filesystem::path file;
-  double scale;  ///< from the file's units to m
+  double scale;        ///< from the file's units to m
+  bool slits = false;  ///< do not merge nodes at the same place; see joined()
 };
-/// A rigid tool that a file describes: RigidShape::mesh().
-struct ToolFile {
-  std::filesystem::path file;  ///< a closed surface, as read_surface() reads it; its axes are the handle's
-  double scale;                ///< from the file's units to m
-  double cell;                 ///< m, of the grid of distances
+/// The settings that only the model kNear uses.
+struct NearConfig {
+  Law law = Law::kCorotational;  ///< The law of the elements near the tool. It cannot be kLinear.
+  /// Keeps all unknowns of the boundary instead of modes. This is slow and serves comparisons.
+  bool exact_interface = false;
+  /// The body learns shapes, or tabulates answers, for presses within BodyConfig::reach of `middle` along each axis. It
+  /// uses them where their error is at most BodyConfig::tolerance. `reach` is then required, and is at most kFarthest
+  /// patch radii.
+  bool learn = false;
+  bool tabulate = false;
+  std::filesystem::path learned_in{};  ///< The folder that keeps the results. If it is empty, they are not kept.
+  std::optional<Learned> learned{};    ///< The result of learn() for the uncut body. If it is empty, Body learns.
+
+  bool learns() const noexcept { return learn || tabulate; }
+
+  static constexpr double kFarthest = 1.5;
+  static constexpr double kErrorOfLearned = 0.02;  ///< The default tolerance of a body that learns.
 };
 
 /// The description of a soft body that a tool touches, as plain values. Blocks and cylinders stand on z = 0.
@@ -133,26 +137,13 @@ struct BodyConfig {
   Material material;
   std::vector<Region> regions{};  ///< parts of another material; where two overlap, the later one counts
   ModelKind model = ModelKind::kCondensed;
-  Law law = Law::kCorotational;  ///< kNear: of the near elements; not kLinear
-  bool exact_interface = false;  ///< kNear: all unknowns of the boundary in place of modes; slow, to compare with
-  /// kNear: learns shapes, or makes a table of answers, for presses within `reach` of `middle` along each axis, and
-  /// answers these by them where they are wrong by `tolerance` at most. `reach` is wanted then, at most
-  /// kFarthestLearned patch radii.
-  bool learn = false;
-  bool tabulate = false;
-  std::filesystem::path learned_in{};  ///< where that is kept; empty: nowhere
-  std::optional<Learned> learned{};    ///< by learn() of this body before it is cut; empty: Body learns it
-  static constexpr double kFarthestLearned = 1.5;
-  static constexpr double kErrorOfLearned = 0.02;  ///< `tolerance` of scenes that learn, unless they say another
-  std::optional<std::filesystem::path>
-      table_file{};  ///< kCondensed: where condense() has put its table; else it is made
+  NearConfig near{};
+  /// For kCondensed: the table that condense() has made. If it is empty, Body makes one.
+  std::optional<std::filesystem::path> table_file{};
   int max_iterations = QuasiStaticModel::Config{}.max_iterations;  ///< for models that iterate until they converge
   /// Of the force, for the same models: an answer ends when it may be wrong by so much, and says so (Feel::error).
   double tolerance = QuasiStaticModel::Config{}.tolerance;
-  int iterations = 10;    ///< for models with a fixed number of iterations
-  int swings = 30;        ///< kModal: vibration modes
-  int static_modes = 0;   ///< kModal: patches along each axis of a square of 2 `reach`; 1: only the one in the middle
-  EffectsConfig effects;  ///< effects that act on the whole body
+  EffectsConfig effects;           ///< effects that act on the whole body
   std::optional<double> friction;  ///< coefficient
   std::vector<PlannedCut> cuts;    ///< in the order in which they are made
   std::optional<StiffnessOverTime> stiffening;
@@ -162,24 +153,12 @@ struct BodyConfig {
 
   Vec3 towards_tool = Vec3::UnitZ();  ///< unit vector, body frame
   double patch_radius = 0;            ///< m
-  /// m, how far from `middle` the body can be touched (kCondensed, kModal). Empty: anywhere; static modes then reach no
-  /// further than a patch.
-  std::optional<double> reach;
-  Vec3 middle = Vec3::Zero();  ///< m; only its position across `towards_tool` counts
-  double tool_radius = 0;      ///< m; 0: a point
-  /// The tool presses a patch of fixed size, or is rigid and its contact grows: a sphere of `tool_radius`, a capsule of
-  /// it, a box, or the inside of a surface. kCondensed has sphere and capsule, without friction; kCorotational,
-  /// kStVenantKirchhoff and kNeoHookean have all (touch/rigid_contact.h).
-  enum class Tool : std::uint8_t { kPatch, kSphere, kCapsule, kBox, kMesh };
-  Tool tool = Tool::kPatch;
-  double tool_half_length = 0;          ///< kCapsule: m, from its middle to the centre of each end
-  Vec3 tool_axis = Vec3::UnitZ();       ///< kCapsule: unit vector, handle frame, from end to end
-  Vec3 tool_size = Vec3::Zero();        ///< kBox: m, along the handle's axes
-  double tool_edge = 0;                 ///< kBox: m, the radius of its edges and corners
-  std::optional<ToolFile> tool_file{};  ///< kMesh
-  double layer = 1e-4;                  ///< m, rigid tools on nonlinear bodies: Layer::Config::thickness
-  std::size_t hands = 1;                ///< rigid tools on nonlinear bodies: how many hands hold one each
-  Vec3 tool_offset = Vec3::Zero();      ///< m, handle frame, from the handle's position to the tool's middle
+  std::optional<double> reach;        ///< m, kCondensed: largest distance of a touch from `middle`; empty: no limit
+  Vec3 middle = Vec3::Zero();         ///< m; only its position across `towards_tool` counts
+  Tool tool;
+  double layer = 1e-4;              ///< m, rigid tools on nonlinear bodies: Layer::Config::thickness
+  std::size_t hands = 1;            ///< rigid tools on nonlinear bodies: how many hands hold one each
+  Vec3 tool_offset = Vec3::Zero();  ///< m, handle frame, from the handle's position to the tool's middle
   PatchContact::Side side = PatchContact::Side::kUnilateral;
   /// The stiffness of linear models, and with plasticity, is the whole second derivative of the energy on a flat
   /// surface too. On a curved one, and of other models at rest, it always is.
@@ -191,10 +170,6 @@ bool is_rigid_on_nonlinear(const BodyConfig& config);
 
 /// Whether contact gives a torque: the tool is neither a patch nor a sphere, or its middle is not where the handle is.
 bool turns_the_hand(const BodyConfig& config);
-
-/// The shape of a rigid tool. Makes the grid of one that a file describes: that takes some tenths of a second. Throws
-/// std::invalid_argument when the file or its surface is refused.
-RigidShape shape_of_tool(const BodyConfig& config);
 
 /// From the handle to the tool's point that is farthest in the body, m, body frame, with the handle turned by `turn`.
 Vec3 lowest_of_tool(const BodyConfig& config, const Mat3& turn);
@@ -210,7 +185,7 @@ bool is_elastic(const BodyConfig& config);
 /// (with_factor), or on many (mpi/spread_solver.h). Throws what Body throws, and what the solver throws.
 SurfaceTable condense(const BodyConfig& config, const SolverOf& solver = with_factor);
 
-/// What a kNear body with `learn` or `tabulate` is to know, for BodyConfig::learned; for others nothing. It can take
+/// What a kNear body that learns is to know, for NearConfig::learned; for others nothing. It can take
 /// minutes, says so to `tell`, and is read where it was kept. Throws what Body throws, and std::runtime_error when
 /// something cannot be kept.
 Learned learn(const BodyConfig& config, const Tell& tell);

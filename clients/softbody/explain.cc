@@ -49,8 +49,8 @@ BodyConfig without(BodyConfig body, EffectKind effect) {
       body.self_collision.reset();
       break;
     case EffectKind::kMaterialNonlinearity:
-      body.law = Law::kCorotational;
-      body.learned = learn(body, {});  // what was learned is of the other law
+      body.near.law = Law::kCorotational;
+      body.near.learned = learn(body, {});  // what was learned is of the other law
       break;
     case EffectKind::kContact:
     case EffectKind::kGeometricNonlinearity:
@@ -94,24 +94,17 @@ std::optional<Explanation::Beside> fields_beside(const BodyConfig& config, const
 
 std::string touched_by(const BodyConfig& body) {
   std::ostringstream text;
-  switch (body.tool) {
-    case BodyConfig::Tool::kPatch:
-      text << ", on a patch of " << 1e3 * body.patch_radius << " mm";
-      break;
-    case BodyConfig::Tool::kSphere:
-      text << ", a sphere of " << 1e3 * body.tool_radius << " mm";
-      break;
-    case BodyConfig::Tool::kCapsule:
-      text << ", a capsule of " << 1e3 * body.tool_radius << " mm, " << 2e3 * body.tool_half_length
-           << " mm between the centres of its ends";
-      break;
-    case BodyConfig::Tool::kBox:
-      text << ", a box of " << (1e3 * body.tool_size).transpose() << " mm with edges of " << 1e3 * body.tool_edge
-           << " mm";
-      break;
-    case BodyConfig::Tool::kMesh:
-      text << ", a tool whose surface is " << body.tool_file->file.string();
-      break;
+  if (const auto* sphere = std::get_if<SphereTool>(&body.tool)) {
+    text << ", a sphere of " << 1e3 * sphere->radius << " mm";
+  } else if (const auto* capsule = std::get_if<CapsuleTool>(&body.tool)) {
+    text << ", a capsule of " << 1e3 * capsule->radius << " mm, " << 2e3 * capsule->half_length
+         << " mm between the centres of its ends";
+  } else if (const auto* box = std::get_if<BoxTool>(&body.tool)) {
+    text << ", a box of " << (1e3 * box->size).transpose() << " mm with edges of " << 1e3 * box->edge << " mm";
+  } else if (const auto* mesh = std::get_if<MeshTool>(&body.tool)) {
+    text << ", a tool whose surface is " << mesh->file.string();
+  } else {
+    text << ", on a patch of " << 1e3 * body.patch_radius << " mm";
   }
   if (body.tool_offset != Vec3::Zero()) text << ", " << 1e3 * body.tool_offset.norm() << " mm from the handle";
   if (turns_the_hand(body)) text << "; with a torque";
@@ -133,9 +126,9 @@ double off_the_exact_interface(const BodyConfig& config) {
     throw std::invalid_argument("only the model \"near\" has an interface, and can be compared with the exact one");
   }
   BodyConfig alone = config;  // of the near field, which answers everywhere then
-  alone.learn = alone.tabulate = false;
+  alone.near.learn = alone.near.tabulate = false;
   Body modes(alone);
-  alone.exact_interface = true;
+  alone.near.exact_interface = true;
   Body exact(alone);
   double most = 0;
   for (const double share : {0.01, 0.1, 0.2}) {
@@ -148,11 +141,11 @@ double off_the_exact_interface(const BodyConfig& config) {
 
 Explanation explain(const Scene& scene, const std::function<double()>& processor_time) {
   BodyConfig config = scene.body;
-  if (!config.learned) config.learned = learn(config, {});
+  if (!config.near.learned) config.near.learned = learn(config, {});
   std::optional<Explanation::Tool> tool;
-  if (scene.body.tool == BodyConfig::Tool::kMesh) {
+  if (std::holds_alternative<MeshTool>(scene.body.tool)) {
     const double start = processor_time();
-    const RigidShape shape = shape_of_tool(scene.body);
+    const RigidShape shape = shape_of(scene.body.tool, scene.body.layer);
     tool = {*shape.mesh_facts(), processor_time() - start};
   }
   Body body(config);
@@ -185,7 +178,7 @@ Explanation explain(const Scene& scene, const std::function<double()>& processor
   for (const Ladder::Step& step : body.ladder()) {
     out.learned.push_back({.size = step.size});
     bodies.push_back(config);
-    (config.tabulate ? config.tabulate : config.learn) = false;
+    (config.near.tabulate ? config.near.tabulate : config.near.learn) = false;
   }
   if (!out.learned.empty()) bodies.push_back(config);
   std::vector<Explanation::Cost> least(bodies.size(), {std::numeric_limits<double>::infinity(), 0});
@@ -258,7 +251,7 @@ std::string in_words(const Scene& scene, const Explanation& explanation) {
   }
   if (explanation.near && explanation.near->radius > 0) {
     const NearModel::Size& near = *explanation.near;
-    const std::string_view law = std::ranges::find(models(), body.law, &ModelInfo::law)->name;
+    const std::string_view law = std::ranges::find(near_laws(), body.near.law, &NearLaw::law)->name;
     text << "near the tool: " << law << ", " << near.elements << " of " << size.elements << " elements, within "
          << 1e3 * near.radius << " mm or where the tool goes next; " << near.unknowns << " unknowns, of them "
          << near.modes << " modes in place of the " << near.interface << " that near and far have in common\n";

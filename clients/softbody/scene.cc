@@ -7,8 +7,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <iomanip>
-#include <limits>
 #include <optional>
 #include <set>
 #include <sstream>
@@ -16,6 +14,7 @@
 #include <vector>
 
 #include "clients/softbody/fem/file_text.h"
+#include "core/base/nearest_word.h"
 
 namespace tendon::softbody {
 namespace {
@@ -112,7 +111,9 @@ class Table {
   auto choice(std::string_view key, const std::string& all, Named named) {
     const std::string name = text(key, "one of " + all);
     const auto found = named(name);
-    if (!found) fail(*table_.get(key), key, "expected one of " + all + ", found \"" + name + '"');
+    if (!found) {
+      fail(*table_.get(key), key, "expected one of " + all + ", found \"" + name + '"' + did_you_mean(name, all));
+    }
     return *found;
   }
 
@@ -183,7 +184,9 @@ class Table {
   void check_unknown() const {
     for (const auto& [key, node] : table_) {
       if (!known_.contains(key.str())) {
-        fail(node, key.str(), "unknown key; expected one of " + join(known_));
+        const std::string all = join(known_);
+        const std::string meant = did_you_mean(key.str(), all);
+        fail(node, key.str(), "unknown key" + (meant.empty() ? "; expected one of " + all : meant));
       }
     }
   }
@@ -238,7 +241,7 @@ void read_body(Table table, const std::filesystem::path& directory, BodyConfig& 
                                table.count("cells_across", kMaxCells), table.count("cells_up", kMaxCells)};
   } else {
     body.shape = FileShape{directory / table.text("file", "the path of a gmsh file"),
-                           1 / table.number("units_per_m", 0, false, 1e9, 1)};
+                           1 / table.number("units_per_m", 0, false, 1e9, 1), table.flag("slits")};
   }
   body.clamped_below = table.number("clamped_below_mm", 0, true, 1e3 * kMaxLength, 1e3, 0);
   const bool has_mass = body.effects.gravity || body.effects.inertia || body.effects.damping;
@@ -266,41 +269,46 @@ std::vector<Region> read_regions(Table& root) {
   return regions;
 }
 
+Tool read_tool(Table& table, const std::filesystem::path& directory, double radius) {
+  std::string kind = "patch";
+  if (table.find("tool") != nullptr) {
+    kind = table.choice("tool", "patch, sphere, capsule, box, mesh", [](std::string_view name) {
+      constexpr std::array kKinds = {"patch", "sphere", "capsule", "box", "mesh"};
+      return std::ranges::count(kKinds, name) > 0 ? std::optional(std::string(name)) : std::nullopt;
+    });
+  }
+  if (kind == "sphere") return SphereTool{radius};
+  if (kind == "capsule") {
+    const double length = table.number("tool_length_mm", 0, true, 1e3 * kMaxLength, 1e3);
+    return CapsuleTool{
+        .radius = radius, .half_length = length / 2, .axis = table.direction("tool_axis", Vec3::UnitZ())};
+  }
+  if (kind == "box") {
+    const Vec3 size = table.vector("tool_size_mm", 1e3 * kMaxLength, 1e3);
+    if (!(size.array() > 0).all()) table.fail(*table.find("tool_size_mm"), "tool_size_mm", "expected lengths above 0");
+    return BoxTool{.size = size, .edge = table.number("tool_edge_mm", 0, false, 1e3 * size.minCoeff() / 2, 1e3)};
+  }
+  if (kind == "mesh") {
+    std::filesystem::path file = directory / table.text("tool_file", "the path of a surface: .stl, .obj or .off");
+    const double scale = 1 / table.number("tool_units_per_m", 0, false, 1e9, 1);
+    return MeshTool{.file = std::move(file), .scale = scale, .cell = table.length("tool_cell_mm")};
+  }
+  return PatchTool{radius};
+}
+
 void read_touch(Table table, const std::filesystem::path& directory, Scene& scene) {
   BodyConfig& body = scene.body;
   body.towards_tool = table.direction("from", Vec3::UnitZ());
   body.middle = table.vector("middle_mm", 1e3 * kMaxLength, 1e3, Vec3(Vec3::Zero()));
   body.patch_radius = table.length("patch_radius_mm");
-  body.tool_radius = table.number("tool_radius_mm", 0, true, 1e3 * kMaxLength, 1e3, 0);
-  if (body.learn || body.tabulate) {
-    body.reach = table.number("reach_mm", 0, false, 1e3 * BodyConfig::kFarthestLearned * body.patch_radius, 1e3);
+  const double tool_radius = table.number("tool_radius_mm", 0, true, 1e3 * kMaxLength, 1e3, 0);
+  if (body.near.learns()) {
+    body.reach = table.number("reach_mm", 0, false, 1e3 * NearConfig::kFarthest * body.patch_radius, 1e3);
   } else if (table.find("reach_mm") != nullptr) {
     body.reach = table.length("reach_mm");
   }
-  if (table.find("tool") != nullptr) {
-    body.tool = table.choice("tool", "patch, sphere, capsule, box, mesh", [](std::string_view name) {
-      if (name == "patch") return std::optional(BodyConfig::Tool::kPatch);
-      if (name == "sphere") return std::optional(BodyConfig::Tool::kSphere);
-      if (name == "box") return std::optional(BodyConfig::Tool::kBox);
-      if (name == "mesh") return std::optional(BodyConfig::Tool::kMesh);
-      return name == "capsule" ? std::optional(BodyConfig::Tool::kCapsule) : std::nullopt;
-    });
-  }
+  body.tool = read_tool(table, directory, tool_radius);
   body.tool_offset = table.vector("tool_offset_mm", 1e3 * kMaxLength, 1e3, Vec3(Vec3::Zero()));
-  if (body.tool == BodyConfig::Tool::kCapsule) {
-    body.tool_half_length = table.number("tool_length_mm", 0, true, 1e3 * kMaxLength, 1e3) / 2;
-    body.tool_axis = table.direction("tool_axis", Vec3::UnitZ());
-  }
-  if (body.tool == BodyConfig::Tool::kBox) {
-    body.tool_size = table.vector("tool_size_mm", 1e3 * kMaxLength, 1e3);
-    const toml::node& size = *table.find("tool_size_mm");
-    if (!(body.tool_size.array() > 0).all()) table.fail(size, "tool_size_mm", "expected lengths above 0");
-    body.tool_edge = table.number("tool_edge_mm", 0, false, 1e3 * body.tool_size.minCoeff() / 2, 1e3);
-  }
-  if (body.tool == BodyConfig::Tool::kMesh) {
-    body.tool_file = ToolFile{directory / table.text("tool_file", "the path of a surface: .stl, .obj or .off"),
-                              1 / table.number("tool_units_per_m", 0, false, 1e9, 1), table.length("tool_cell_mm")};
-  }
   if (is_rigid_on_nonlinear(body)) body.layer = table.number("layer_mm", 0, false, 1e3 * kMaxLength, 1e3, body.layer);
   if (table.find("side") != nullptr) {
     body.side = table.choice("side", "unilateral, bilateral", [](std::string_view name) {
@@ -310,8 +318,8 @@ void read_touch(Table table, const std::filesystem::path& directory, Scene& scen
   }
   const EffectSet simulated = effects_of(body);
   const bool can_leave_out = info(body.model).law == Law::kLinear || simulated.has(EffectKind::kPlasticity);
-  const bool patch = body.tool == BodyConfig::Tool::kPatch;
-  if (can_leave_out && patch && !info(body.model).tetrahedra && !body.effects.has_time()) {
+  const bool patch = std::holds_alternative<PatchTool>(body.tool);
+  if (can_leave_out && patch && !body.effects.has_time()) {
     body.whole_stiffness = table.flag("whole_stiffness");
   }
   if (const toml::node* asked = table.find("table_mm")) {
@@ -365,12 +373,23 @@ double read_self_collision(Table table) {
   return layer;
 }
 
-constexpr std::string_view kLaws = "corotational, stvk, neo-hookean";
+/// Former models of scenes. They are now in tests/tools/lab/models.
+constexpr std::array<std::string_view, 7> kOfTheLab = {"stvk",        "mass-spring", "projective", "modal",
+                                                       "tensor-mass", "tled",        "xpbd"};
+
+ModelKind read_model(Table& model) {
+  const std::string all = names(models());
+  const std::string name = model.text("kind", "one of " + all);
+  if (std::ranges::count(kOfTheLab, name) > 0) {
+    model.fail(*model.find("kind"), "kind",
+               '"' + name + "\" is a model of the accuracy experiment now (tests/tools/lab/models); expected " + all);
+  }
+  return model.choice("kind", all, model_named);
+}
 
 std::optional<Law> law_named(std::string_view name) {
-  if (name == "corotational") return Law::kCorotational;
-  if (name == "stvk") return Law::kStVenantKirchhoff;
-  return name == "neo-hookean" ? std::optional(Law::kNeoHookean) : std::nullopt;
+  const auto found = std::ranges::find(near_laws(), name, &NearLaw::name);
+  return found == near_laws().end() ? std::nullopt : std::optional(found->law);
 }
 
 /// Large strains are an effect of one law of the model "near".
@@ -413,7 +432,9 @@ EffectSet read_effects(Table& root, const ModelInfo& model, BodyConfig& body) {
     if (name == nullptr) root.fail(each, "effects", "expected names in quotes");
     const auto found = std::ranges::find(effects(), std::string_view(**name), &EffectInfo::name);
     if (found == effects().end()) {
-      root.fail(each, "effects", "unknown effect \"" + **name + "\"; expected one of " + names(effects()));
+      const std::string all = names(effects());
+      root.fail(each, "effects",
+                "unknown effect \"" + **name + "\"; expected one of " + all + did_you_mean(**name, all));
     }
     if (listed.has(found->kind)) root.fail(each, "effects", "\"" + **name + "\" is listed twice");
     listed.add(found->kind);
@@ -467,20 +488,21 @@ Scene parse_scene(std::string_view text, const std::string& name, const std::fil
   Table root(parsed, "", name);
   Scene scene;
   Table model = root.table("model");
-  scene.body.model = model.choice("kind", names(models()), model_named);
+  scene.body.model = read_model(model);
   const ModelInfo& chosen = info(scene.body.model);
   const EffectSet listed = read_effects(root, chosen, scene.body);
   switch (chosen.kind) {
     case ModelKind::kNear:
-      if (model.find("law") != nullptr) scene.body.law = model.choice("law", std::string(kLaws), law_named);
-      check_law(root, scene.body.law, listed);
+      if (model.find("law") != nullptr) scene.body.near.law = model.choice("law", names(near_laws()), law_named);
+      check_law(root, scene.body.near.law, listed);
       scene.body.max_iterations = model.count("max_iterations", 1000, scene.body.max_iterations);
-      scene.body.learn = model.flag("learn");
-      scene.body.tabulate = model.flag("tabulate");
-      if (scene.body.learn || scene.body.tabulate) {
-        scene.body.tolerance = BodyConfig::kErrorOfLearned;
+      scene.body.near.learn = model.flag("learn");
+      scene.body.near.tabulate = model.flag("tabulate");
+      if (scene.body.near.learns()) {
+        scene.body.tolerance = NearConfig::kErrorOfLearned;
         if (model.find("learned_in") != nullptr) {
-          scene.body.learned_in = directory / model.text("learned_in", "a folder in which what is learned is kept");
+          scene.body.near.learned_in =
+              directory / model.text("learned_in", "a folder in which what is learned is kept");
         }
       }
       scene.body.tolerance = model.number("error_percent", 0, false, kMaxError, 100, scene.body.tolerance);
@@ -489,26 +511,14 @@ Scene parse_scene(std::string_view text, const std::string& name, const std::fil
       if (!scene.body.plasticity) break;
       [[fallthrough]];
     case ModelKind::kCorotational:
-    case ModelKind::kStVenantKirchhoff:
     case ModelKind::kNeoHookean:
-    case ModelKind::kMassSpring:
       scene.body.max_iterations = model.count("max_iterations", 1000, scene.body.max_iterations);
       scene.body.tolerance = model.number("error_percent", 0, false, kMaxError, 100, scene.body.tolerance);
-      break;
-    case ModelKind::kXpbd:
-    case ModelKind::kProjective:
-      scene.body.iterations = model.count("iterations", 1000, scene.body.iterations);
       break;
     case ModelKind::kCondensed:
       if (model.find("table") != nullptr) {
         scene.body.table_file = directory / model.text("table", "the path of a table of tendon-softbody condense");
       }
-      break;
-    case ModelKind::kModal:
-      scene.body.swings = model.count("swings", 10'000, scene.body.swings);
-      if (model.find("static_modes") != nullptr) scene.body.static_modes = model.count("static_modes", 20);
-      break;
-    default:
       break;
   }
   model.check_unknown();
@@ -535,155 +545,11 @@ Scene read_scene(const std::filesystem::path& file) {
   try {
     text = read_file(file, kMaxSceneBytes);
   } catch (const std::invalid_argument& refused) {
-    throw SceneError(refused.what());
+    throw std::runtime_error(refused.what());
   }
   return parse_scene(text, file.string(), file.parent_path());
 }
 
-Mat3 to_device(const Scene& scene) {
-  return Eigen::Quaterniond::FromTwoVectors(scene.body.towards_tool, scene.towards_hand).toRotationMatrix();
-}
-
-std::string scene_reference() {
-  std::ostringstream text;
-  text << "effects = [...]          what is simulated; nothing else is\n";
-  for (const auto& each : effects()) text << "    " << each.name << ": " << each.what << '\n';
-  text << "gravity_m_per_s2 = [0, 0, -9.81]     in the body's frame; this and the next only with their effect\n"
-          "damping_per_s, viscosity_ms (the stress is that of the strain and so long of its rate), friction (a "
-          "coefficient)\n"
-          "step_ms                  how long an answer lasts, with inertia, damping or viscosity\n"
-          "[[cutting]]              a cut, a table for each, made in their order; it runs along the faces of elements\n"
-          "corner_mm, along_mm, deep_mm     a parallelogram: one corner and two sides, in the body's frame at rest\n"
-          "at_s                     made so long after the first answer; or in place of it\n"
-          "above_n                  made after an answer of more newtons along the normal\n"
-          "[stiffening]             Young's modulus, of which the material says how much it is at a factor of 1\n"
-          "at_s, factor             [times after the first answer], [factors]; straight in between\n"
-          "[plasticity]             with what stress of a bar the material yields, and what each strain adds to it\n"
-          "yield_pa, hardening_pa   the bar then gives way with E H/(E + H)\n"
-          "[self-collision]         of corotational, stvk, neo-hookean\n"
-          "layer_mm                 so deep are two sides in each other where they press with Young's modulus\n"
-          "[body]\n"
-          "shape                    block, cylinder or file\n"
-          "element                  how it is cut:\n";
-  for (const auto& each : elements()) text << "    " << each.name << ": " << each.what << '\n';
-  text << "size_mm, cells           of a block: [x, y, z]\n"
-          "radius_mm, height_mm, cells_across, cells_up     of a cylinder\n"
-          "file, units_per_m        a mesh of gmsh; 1000 when it is in mm\n"
-          "clamped_below_mm = 0     nodes up to so far above the lowest are held\n"
-          "[body.material]\n"
-          "young_pa, poisson        0 to 0.4999\n"
-          "density_kg_per_m3        with gravity, inertia or damping\n"
-          "[[region]]               a part of another material, a table for each; where two overlap, the later one "
-          "counts\n"
-          "middle_mm                in the body's frame at rest; it has the elements whose middle lies in it\n"
-          "radius_mm, or size_mm    of a ball; of a box, [x, y, z]\n"
-          "material                 young_pa, poisson; the density is the body's\n"
-          "[model]\n"
-          "kind                     how it is computed:\n";
-  for (const auto& each : models()) text << "    " << each.name << ": " << each.what << '\n';
-  const BodyConfig defaults;
-  text << "table                    of condensed: a file of `tendon-softbody condense SCENE FILE`; without it the "
-          "table is made "
-          "at the start\n";
-  text << "law = \"corotational\"     of near: how the elements near the tool respond, one of " << kLaws
-       << ";\n                         elsewhere the body is linear. The last wants the effect material-nonlinearity\n";
-  text
-      << "max_iterations = " << defaults.max_iterations
-      << "      of one answer: corotational, stvk, neo-hookean, near, mass-spring, and linear with plasticity\n"
-         "error_percent = "
-      << 100 * defaults.tolerance
-      << "   of the force, of the same: an answer ends when it may be wrong by so much, and says by how much;\n"
-         "                         near adds what the linear far field may leave out\n"
-         "learn = false            of near: presses within reach_mm of the middle, up and down and to and fro, are "
-         "solved\n"
-         "                         at the start; few shapes of these answer all between. error_percent = "
-      << 100 * BodyConfig::kErrorOfLearned
-      << " then: where\n"
-         "                         they are wrong by more, the near field answers; it does after a cut, too\n"
-         "tabulate = false         of near: the same presses make a table of the energy; it answers before the shapes\n"
-         "learned_in               a folder: what is learned is kept there, and read at the next start\n"
-         "iterations = "
-      << defaults.iterations << "          of every answer: xpbd, projective\nswings = " << defaults.swings
-      << "              of modal\n"
-         "static_modes = 0         of modal: so many patches along each side of what is touched, at most 20\n"
-         "[touch]\n"
-         "patch_radius_mm          the tool presses on a patch of this size\n"
-         "from = [0, 0, 1]         the way to the tool, in the body's frame\n"
-         "middle_mm = [0, 0, 0]    of the side that is touched; its place across `from` counts\n"
-         "reach_mm                 for condensed, modal: touched only so far from the middle. Without: anywhere; for "
-         "near\n"
-         "                         with learn or tabulate: they answer so far along each axis, at most 1.5 patch "
-         "radii\n"
-         "tool = \"patch\"           or sphere, capsule: rigid, its contact grows as it is pressed in; of condensed\n"
-         "                         (without friction), corotational, stvk, neo-hookean; or box, mesh: of the last "
-         "three\n"
-         "tool_radius_mm = 0       how much earlier a patch touches; the sphere's, the capsule's\n"
-         "tool_length_mm           of a capsule: between the centres of its ends\n"
-         "tool_axis = [0, 0, 1]    of a capsule: from end to end, in the handle's frame\n"
-         "tool_size_mm, tool_edge_mm     of a box: [x, y, z] along the handle's axes, and how round its edges are\n"
-         "tool_file, tool_units_per_m    of a mesh: a closed surface (.stl, .obj, .off), along the handle's axes "
-         "around "
-         "the\n"
-         "                         tool's middle; 1000 when it is in mm\n"
-         "tool_cell_mm             of a mesh: its distances are kept on a grid of so much; at most half of its "
-         "thinnest "
-         "part\n"
-         "layer_mm = 0.1           of rigid tools on corotational, stvk, neo-hookean: the layer that they press, how\n"
-         "                         thick\n"
-         "tool_offset_mm = [0, 0, 0]     from the handle to the tool's middle, in the handle's frame. A tool at an "
-         "offset,\n"
-         "                         a capsule, a box and a mesh, give a torque about the handle\n"
-         "side = \"unilateral\"      or bilateral: once it has touched, the tool sticks, and pulls\n"
-         "whole_stiffness = false  of linear, condensed, modal, plasticity, at rest: the stiffness of a flat surface "
-         "is\n"
-         "                         whole, too, as that of a curved one and of Newton's method always is\n"
-         "table_mm                 answers bring the force at 16 depths over so much, for a slow network: 17 answers'\n"
-         "                         time. Of condensed, unilateral, without friction\n"
-         "[[hands]]                two or more that hold the body at once, a table for each; of rigid tools on\n"
-         "                         corotational, stvk, neo-hookean\n"
-         "device, server           the name of the hand's device; HOST:PORT of its server, where it is another one\n"
-         "at_mm                    in place of that of [place], in the frame of this device\n"
-         "[place]\n"
-         "at_mm = [0, 0, 0]        where in the device's frame the middle of the touched side is\n"
-         "towards_hand = [0, 0, 1] the way from there to the hand, in the device's frame\n";
-  return text.str();
-}
-
-double patch_up_to(const BodyConfig& body) {
-  const bool nonlinear = info(body.model).always.has(EffectKind::kGeometricNonlinearity);
-  constexpr double kDeepest = 0.3;  // of the radius: beyond, the pressure of fixed profile nears its limit load
-  return nonlinear && body.tool == BodyConfig::Tool::kPatch ? kDeepest * body.patch_radius
-                                                            : std::numeric_limits<double>::infinity();
-}
-
-std::string beyond_the_patch(const BodyConfig& body) {
-  std::ostringstream text;
-  text << std::setprecision(2) << "pressed deeper than " << 1e3 * patch_up_to(body)
-       << " mm, 0.3 of the patch's radius: the body gives way under a patch of fixed size as under no tool; "
-          "tool = \"sphere\", \"capsule\" or \"box\" is rigid and can be pressed in far";
-  return text.str();
-}
-
-std::string turned_too_far(double linear_up_to) {
-  std::ostringstream text;
-  text << std::setprecision(2) << "pressed deeper than " << 1e3 * linear_up_to
-       << " mm, part of the body turns by more than " << Body::kLargestTurn
-       << " rad, which makes forces that are not there; corotational and neo-hookean know large rotations";
-  return text.str();
-}
-
-std::vector<std::string> warnings(const BodyConfig& body) {
-  std::vector<std::string> all;
-  const ElementInfo& element = info(body.element);
-  double poisson = body.material.poisson;
-  for (const Region& region : body.regions) poisson = std::max(poisson, region.material.poisson);
-  if (poisson > element.locks_above) {
-    std::ostringstream text;
-    text << element.name << " locks above a Poisson ratio of " << element.locks_above << " (here " << poisson
-         << "): forces come out far too large; use hex8-sri or hex27-sri";
-    all.push_back(text.str());
-  }
-  return all;
-}
+Mat3 to_device(const Scene& scene) { return shortest_rotation(scene.body.towards_tool, scene.towards_hand); }
 
 }  // namespace tendon::softbody

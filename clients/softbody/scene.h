@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <iosfwd>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -37,7 +38,7 @@ class SceneError : public std::runtime_error {
 
 /// Reads a scene file (TOML); `scene_reference()` lists its keys. Only the effects listed in `effects` are simulated. A
 /// listed effect that the model does not simulate is an error, and so is an effect that the model always simulates when
-/// it is not listed. Throws SceneError.
+/// it is not listed. Throws SceneError, or std::runtime_error if the file cannot be read.
 Scene read_scene(const std::filesystem::path& file);
 
 /// The same for text in memory. Errors call it `name`; the path of a mesh is relative to `directory`.
@@ -46,8 +47,11 @@ Scene parse_scene(std::string_view text, const std::string& name, const std::fil
 /// Every key that a scene may have, and every name that a value may have.
 std::string scene_reference();
 
-/// Warnings to read before trusting this body.
+/// Warnings about this body, including the repairs in its mesh file and its tool file. Reads both files. Throws
+/// std::invalid_argument if a file cannot be read.
 std::vector<std::string> warnings(const BodyConfig& body);
+/// Writes each warning as a line "PROGRAM: warning: …".
+void warn(std::ostream& to, std::string_view program, const BodyConfig& body);
 
 /// m, how deep a patch may press a nonlinear body before its fixed size makes a force that a rigid tool would not have;
 /// ∞ for other models and tools. And the warning for one that is deeper.

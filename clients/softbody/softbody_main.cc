@@ -23,6 +23,7 @@
 #include "clients/softbody/background.h"
 #include "clients/softbody/explain.h"
 #include "clients/softbody/placed_body.h"
+#include "server/machine/output.h"
 
 using namespace tendon;
 
@@ -60,12 +61,12 @@ int test(const softbody::Scene& scene, const Options& options) {
   return result.passed() ? 0 : 1;
 }
 
-/// What a body learns before it is touched. A terminal shows in one line what is being done; elsewhere a line says so now
-/// and then.
+/// What a body learns before it is touched. A terminal shows in one line what is being done; elsewhere a line says so
+/// now and then.
 void learn(softbody::BodyConfig& body) {
   const bool terminal = isatty(STDERR_FILENO) != 0;
   auto told = std::chrono::steady_clock::now();
-  body.learned = softbody::learn(body, [&](std::string_view what) {
+  body.near.learned = softbody::learn(body, [&](std::string_view what) {
     if (terminal) {
       std::cerr << "\r\033[K" << what << std::flush;
     } else if (const auto now = std::chrono::steady_clock::now(); now - told >= kBetweenLines) {
@@ -74,7 +75,7 @@ void learn(softbody::BodyConfig& body) {
     }
   });
   if (terminal) std::cerr << "\r\033[K";
-  for (const std::string& warning : body.learned->warnings)
+  for (const std::string& warning : body.near.learned->warnings)
     std::cerr << "tendon-softbody: warning: " << warning << '\n';
 }
 
@@ -89,6 +90,7 @@ int condense(int argc, char** argv) {
   line.add_argument("FILE", table_file, "The table; a scene names it under [model] table");
   if (const auto exit_code = line.parse(argc, argv)) return *exit_code;
   const softbody::Scene scene = softbody::read_scene(scene_file);
+  softbody::warn(std::cerr, "tendon-softbody", scene.body);
   const softbody::SurfaceTable table = softbody::condense(scene.body);
   softbody::write_table(table_file, table);
   const auto bytes = std::filesystem::file_size(table_file);
@@ -159,6 +161,9 @@ int main(int argc, char** argv) {
   if (first == "condense") {
     try {
       return condense(argc - 1, argv + 1);
+    } catch (const softbody::SceneError& error) {
+      std::cerr << "tendon-softbody: " << error.what() << '\n';
+      return 2;
     } catch (const std::exception& error) {
       std::cerr << "tendon-softbody: " << error.what() << '\n';
       return 1;
@@ -186,7 +191,7 @@ int main(int argc, char** argv) {
 
   try {
     softbody::Scene scene = softbody::read_scene(file);
-    if (scene.body.learn || scene.body.tabulate) learn(scene.body);
+    if (scene.body.near.learns()) learn(scene.body);
     if (explains) {
       softbody::Explanation explanation = softbody::explain(
           scene, [] { return static_cast<double>(std::clock()) / static_cast<double>(CLOCKS_PER_SEC); });
@@ -194,10 +199,9 @@ int main(int argc, char** argv) {
       std::cout << (options.json ? in_json(scene, explanation) : in_words(scene, explanation));
       return 0;
     }
-    for (const std::string& warning : softbody::warnings(scene.body)) {
-      std::cerr << "tendon-softbody: warning: " << warning << '\n';
-    }
+    softbody::warn(std::cerr, "tendon-softbody", scene.body);
     if (tests) return test(scene, options);
+    const UnblockedOutput output;
     std::optional<softbody::BackgroundThread> thread;
     softbody::PlacedBody body(scene);
     prepare_beside(scene, thread, body);
@@ -212,6 +216,9 @@ int main(int argc, char** argv) {
       std::cerr << "tendon-softbody: " << words;
     }
     return exit_code;
+  } catch (const softbody::SceneError& error) {
+    std::cerr << "tendon-softbody: " << error.what() << '\n';
+    return 2;
   } catch (const std::exception& error) {
     std::cerr << "tendon-softbody: " << error.what() << '\n';
     return 1;

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "clients/cpp/discovery/discovery.h"
+#include "protocol/wire/text.h"
 
 namespace tendon {
 namespace {
@@ -50,7 +51,7 @@ std::optional<int> list_servers(const ServerName& server, bool json) {
     for (const dns_sd::Found& found : all) {
       const std::string words = in_words(found);
       std::string line = json ? in_json(found, name(found)) : name(found);
-      if (!json && !words.empty()) line += std::string(width + 2 - line.size(), ' ') + words;
+      if (!json && !words.empty()) line += std::string(width + 2 - line.size(), ' ') + visible(words);
       std::cout << line << '\n';
     }
     std::cout.flush();

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Prints where the hand is, what it feels, and how far away it is. It only looks on.
+#include <array>
 #include <cstdio>
+#include <iostream>
 
 #include "clients/cpp/options.h"
 
@@ -17,8 +19,9 @@ int main(int argc, char** argv) {
 
   return run(options, [&](const DeviceState& hand, const LinkStats& link) {
     const Vec3 &x = hand.position, &f = hand.force_applied;
-    std::printf(options.json ? kJson : kText, std::uintmax_t{hand.tick}, x.x(), x.y(), x.z(), f.x(), f.y(), f.z(),
-                1e3 * seconds(link.smoothed_round_trip));
-    std::fflush(stdout);
+    std::array<char, 200> text{};
+    std::snprintf(text.data(), text.size(), options.json ? kJson : kText, std::uintmax_t{hand.tick}, x.x(), x.y(),
+                  x.z(), f.x(), f.y(), f.z(), 1e3 * seconds(link.smoothed_round_trip));
+    std::cout << text.data() << std::flush;
   });
 }

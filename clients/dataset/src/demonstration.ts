@@ -40,25 +40,33 @@ function momentOf(line: Record<string, unknown>): Moment {
   };
 }
 
-/** Throws an Error that names file and line when it is not such a file. A last line that was cut off is left out. */
+/**
+ * Throws an Error with the file and line if this is not a demonstration. It ignores an incomplete last line, blank lines
+ * and a byte order mark.
+ */
 export async function readDemonstration(file: string): Promise<Moment[]> {
   const moments: Moment[] = [];
   let number = 0;
+  let begun = false;
   let broken: Error | undefined;
   for await (const text of createInterface({ input: createReadStream(file) })) {
     if (broken) throw broken;
     ++number;
+    const json = text.trim();  // this also removes a byte order mark
+    if (json === "") continue;
     try {
-      const line = JSON.parse(text) as Record<string, unknown>;
-      if (number > 1) moments.push(momentOf(line));
-      else if (line?.["kind"] !== kKind || line["version"] !== kVersion) {
+      const line = JSON.parse(json) as Record<string, unknown>;
+      if (!begun && (line?.["kind"] !== kKind || line["version"] !== kVersion)) {
         throw new Error(`expected {"kind":"${kKind}","version":${kVersion}}`);
       }
+      if (begun && line?.["kind"] === kKind) throw new Error("expected one demonstration in a file, found a second");
+      if (begun) moments.push(momentOf(line));
+      begun = true;
     } catch (error) {
       broken = new Error(`${file}, line ${number}: ${error instanceof Error ? error.message : String(error)}`);
-      if (!(error instanceof SyntaxError) || number === 1) throw broken;
+      if (!(error instanceof SyntaxError) || !begun) throw broken;
     }
   }
-  if (number === 0) throw new Error(`${file}: expected a demonstration, and it is empty`);
+  if (!begun) throw new Error(`${file}: expected a demonstration, and it is empty`);
   return moments;
 }

@@ -100,8 +100,9 @@ function followed(moments: readonly Moment[]): Moment[][] {
 }
 
 /**
- * The same of a robot that is a guest. Its velocity is the difference from one frame to the next, 0 in the first; its
- * wish stands still while it holds its place.
+ * Returns the same for a robot that is a guest. The velocity is the difference between two samples divided by the time
+ * between them. It is zero in the first frame. If a frame has no new sample, the velocity is the same as in the previous
+ * frame. The action does not change while the robot is not following.
  */
 export function episodesOfRobot(moments: readonly Moment[], fps: number): Episode[] {
   const episodes: Episode[] = [];
@@ -109,16 +110,18 @@ export function episodesOfRobot(moments: readonly Moment[], fps: number): Episod
     const robot = new Latest<Moment>(act);
     const [from, to] = [act[0]!.t + kRounding, act.at(-1)!.t + kRounding];
     const frames: Frame[] = [];
-    let last = act[0]!.position;
-    let wish = act[0]!.target ?? last;
+    let last = act[0]!;
+    let velocity = [0, 0, 0];
+    let wish = last.target ?? last.position;
     let at = 0;
     for (let k = 0; from + k / fps <= to; ++k) {
       const moment = robot.at(from + k / fps)!;
       for (; act[at] !== moment; ++at) wish = act[at]!.target ?? wish;
       wish = moment.target ?? wish;
-      const velocity = less(moment.position, last).map((d) => d * fps);
+      const elapsed = moment.t - last.t;
+      if (elapsed > 0) velocity = less(moment.position, last.position).map((d) => d / elapsed);
       frames.push({ state: [...moment.position, ...velocity], contact: moment.contact, action: wish });
-      last = moment.position;
+      last = moment;
     }
     if (frames.length > 1) episodes.push({ frames });
   }

@@ -96,6 +96,7 @@ export async function readCoupling(file: string): Promise<Coupling> {
   let scene: string | undefined;
   let began: bigint | undefined;
   const reader = new McapStreamReader();
+  let ended = false;
   const take = (topic: string, message: DescMessage, logTime: bigint, data: Uint8Array): void => {
     const [, end = "", kind = ""] = /^\/(leader|follower)(\/.*)$/.exec(topic) ?? [];
     const place = ends[end];
@@ -127,6 +128,8 @@ export async function readCoupling(file: string): Promise<Coupling> {
           const { registry, name } = registries.get(record.schemaId) ?? {};
           const message = name === undefined ? undefined : registry?.getMessage(name);
           if (message) types.set(record.id, { topic: record.topic, message });
+        } else if (record.type === "DataEnd") {
+          ended = true;
         } else if (record.type === "Message") {
           const type = types.get(record.channelId);
           if (type) take(type.topic, type.message, record.logTime, record.data);
@@ -134,11 +137,15 @@ export async function readCoupling(file: string): Promise<Coupling> {
       }
     }
   } catch (error) {
-    throw new Error(`${file}: ${error instanceof Error ? error.message : String(error)}`);
+    const { code, message } = error as { code?: string; message: string };
+    if (code === "ENOENT") throw new Error(`cannot read ${file}: there is no such file`);
+    if (code !== undefined) throw new Error(`cannot read ${file}: ${message}`);
+    throw new Error(`${file}: ${message}; tendon-replay ${file} --repair whole.mcap writes what can be read`);
   }
   const { leader, follower } = ends as { leader: End; follower: End };
   if (scene === undefined || leader.ports.length === 0 || follower.ports.length === 0) {
-    throw new Error(`${file}: expected both ends of a coupling: tendon-replay LEADER.mcap --merge FOLLOWER.mcap --into ${file}`);
+    if (!ended) throw new Error(`${file}: is cut off before both ends of a coupling are in it`);
+    throw new Error(`${file}: expected both ends of a coupling: tendon-replay LEADER.mcap --merge FOLLOWER.mcap --into pair.mcap`);
   }
   return { leader, follower, map: mapOf(scene) };
 }

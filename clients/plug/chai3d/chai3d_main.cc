@@ -30,6 +30,7 @@
 
 #include "clients/cpp/machine.h"
 #include "clients/cpp/stop_signals.h"
+#include "clients/cpp/usage.h"
 #include "clients/plug/chai3d/host.h"
 #include "clients/plug/chai3d/needed.h"
 #include "clients/plug/subcommands.h"
@@ -237,7 +238,7 @@ void add_chai3d(CLI::App& app, Chosen& chosen) {
       .add_option("--pace", options.pace,
                   "on: each force that the program sets waits for the next state, at most 2 ms; off: for programs that "
                   "sleep by themselves")
-      ->check(CLI::IsMember({"on", "off"}))
+      ->check(usage::one_of({"on", "off"}))
       ->capture_default_str();
   command.add_option("PROGRAM", options.program, "The program and its arguments, after --")->required();
   command.positionals_at_end();

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "clients/cpp/machine.h"
+#include "clients/cpp/usage.h"
 #include "clients/plug/subcommands.h"
 #ifndef TENDON_MISSING
 #include "clients/plug/inverse/inverse_server.h"
@@ -60,8 +61,7 @@ int run_inverse(const InverseOptions& options) {
     desk.say("clients find the device at ws://" + at);
   }
   server.run(from_seconds(options.duration_s));
-  desk.stop(read_clock());
-  return 0;
+  return desk.stop(read_clock());
 }
 
 }  // namespace
@@ -78,16 +78,7 @@ void add_inverse(CLI::App& app, Chosen& chosen) {
                    "Where clients find it; port 0 lets the system choose. Beyond this machine only with --anybody")
       ->type_name("HOST:PORT")
       ->capture_default_str()
-      ->check(CLI::Validator(
-          [](const std::string& text) -> std::string {
-            try {
-              parse_address(text);
-              return {};
-            } catch (const std::invalid_argument& error) {
-              return error.what();
-            }
-          },
-          ""));
+      ->check(usage::accepted_by([](const std::string& text) { parse_address(text); }));
   command
       ->add_option("--origin", options.server.origins,
                    "Pages from there may come in, beside those of this machine: https://lab.example")

@@ -17,6 +17,7 @@
 
 #include "clients/cpp/machine.h"
 #include "clients/cpp/stop_signals.h"
+#include "clients/cpp/usage.h"
 #include "clients/plug/ros2/ros2_device.h"
 #include "clients/plug/ros2/ros2_node.h"
 #include "clients/plug/subcommands.h"
@@ -104,8 +105,7 @@ class Ros2Bridge {
       desk_.wait(std::span(bell).first(listens ? 1 : 0), now, listens ? next : std::min(next, next_take));
       rings = bell[0].revents != 0;
     }
-    desk_.stop(read_clock());
-    return 0;
+    return desk_.stop(read_clock());
   }
 
  private:
@@ -195,6 +195,9 @@ class Ros2Bridge {
 void add_ros2(CLI::App& app, Chosen& chosen) {
   static Ros2Options o;  // lives until the chosen subcommand has run
   CLI::App& ros2 = *app.add_subcommand("ros2", "A device as topics of ROS 2, by plain DDS: /tendon/NAME/pose, …");
+  ros2.footer(
+      "Example: tendon-plug ros2 --server lab:47100 --device right\n"
+      "Example: tendon-plug ros2 --server lab:47100 --device right --servo twist --clutch 0");
   o.desk.client.joints = true;
   o.desk.client.diagnostics = true;
   add_common(ros2, o.desk);
@@ -217,8 +220,7 @@ void add_ros2(CLI::App& app, Chosen& chosen) {
   const std::map<std::string, RosServo::Kind> kinds = {{"twist", RosServo::Kind::kTwist},
                                                        {"pose", RosServo::Kind::kPose}};
   ros2.add_option("--servo", o.servo, "Send the hand's motion to a robot arm too, while the clutch is held")
-      ->type_name("twist|pose")
-      ->transform(CLI::CheckedTransformer(kinds, CLI::ignore_case))
+      ->transform(usage::one_of(kinds))
       ->needs(ros2.add_option("--clutch", o.clutch, "The button that is the clutch: its name or number")
                   ->type_name("BUTTON"));
   ros2.add_option("--servo-scale", o.servo_scale, "The robot's motion over the hand's")

@@ -105,8 +105,7 @@ int run_vrpn(VrpnOptions& options) {
     desk.wait(server.polled(), now, std::min(next, end));
     now = read_clock();
   }
-  desk.stop(now);
-  return 0;
+  return desk.stop(now);
 }
 
 }  // namespace
@@ -114,6 +113,7 @@ int run_vrpn(VrpnOptions& options) {
 void add_vrpn(CLI::App& app, Chosen& chosen) {
   CLI::App* vrpn = app.add_subcommand("vrpn", "A VRPN server: programs find NAME@localhost");
   static VrpnOptions options;  // the command line is parsed into it, after this function
+  vrpn->footer("Example: tendon-plug vrpn --server lab:47100 --name Phantom0=right");
   add_common(*vrpn, options.desk);
   vrpn->add_option(
           "--name", options.names,

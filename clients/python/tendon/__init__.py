@@ -11,10 +11,28 @@ clock, for a loop of your own. `tendon.worker.run(answer)` is all of a program t
 frame; a force is what the device exerts **on the hand**.
 """
 
+import sys as _sys
+from pathlib import Path as _Path
+
+try:
+    import google.protobuf as _protobuf
+    import nacl.bindings as _nacl
+except ImportError as _missing:
+    raise ImportError(
+        f"tendon needs the packages protobuf and PyNaCl, and this Python ({_sys.executable}) does not have them: "
+        f"{_missing}. "
+        "Either use Debian's: `apt install python3-protobuf python3-nacl`, and run your program with /usr/bin/python3. "
+        "Or install them for the Python of a virtual environment: "
+        f"`python3 -m venv venv && venv/bin/pip install {_Path(__file__).resolve().parents[1]}`, "
+        "and run your program with venv/bin/python3."
+    ) from None
+del _protobuf, _nacl
+
 from . import aio, cli, worker
 from .client import Client
+from .config import Config, Phase, Stats
 from .deadband import ForceDeadband
-from .force_client import Config, ForceClient, Phase, Stats
+from .force_client import ForceClient
 from .guest import RefusedForGood
 from .keys import read_key
 from .messages import (

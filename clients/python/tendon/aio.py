@@ -10,7 +10,7 @@ from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
 from types import TracebackType
 from typing import Union
 
-from .force_client import Config
+from .config import Config
 from .guest import AnyClient
 from .messages import NEVER, DeviceState, Instant, Touch
 
@@ -59,8 +59,7 @@ class Client(AnyClient):
     async def drive(self, physics: Physics, duration_s: float | None = None) -> None:
         """Answers every state with the result of `physics`. Raises RefusedForGood, and whatever `physics` raises."""
         async for hand in self.states(duration_s):
-            if (touch := await physics(hand)) is not None:
-                self.send(hand, touch)
+            self.answer(hand, await physics(hand))
 
     async def __aenter__(self) -> Client:
         asyncio.get_running_loop().add_reader(self._guest.socket, self._turn)

@@ -12,10 +12,11 @@ import signal
 import time
 from collections.abc import Callable, Mapping
 from contextlib import AsyncExitStack
+from functools import partial
 
 from . import aio
 from .client import Client, Physics
-from .force_client import MAX_RATE_HZ, MIN_RATE_HZ, Config, Stats
+from .config import MAX_RATE_HZ, MIN_RATE_HZ, Config, Stats
 from .guest import RefusedForGood, log, parse_address, unix_path
 from .keys import read_key
 from .messages import Delays, DeviceReport, DeviceState, LinkReport, LinkStats, PeerReport, Role
@@ -65,11 +66,12 @@ def _address(text: str) -> str:
     return text
 
 
-def _key(text: str) -> bytes:
+def _key(program: str, text: str) -> bytes:
     try:
         return read_key(text)
     except (OSError, ValueError) as error:
-        raise argparse.ArgumentTypeError(str(error)) from None
+        # argparse would leave with 2, as for wrong words.
+        raise SystemExit(f"{program}: {error}") from None
 
 
 def parser(name: str, purpose: str | None, rate_hz: float = 0) -> argparse.ArgumentParser:
@@ -85,7 +87,7 @@ def parser(name: str, purpose: str | None, rate_hz: float = 0) -> argparse.Argum
         help="Where tendond listens: a host name or an address, or unix:PATH on this machine [%(default)s]",
     )
     line.add_argument(
-        "--key", type=_key, metavar="FILE", help="The client's key; without one only a server on this machine can be reached"
+        "--key", type=partial(_key, name), metavar="FILE", help="The client's key; without one only a server on this machine can be reached"
     )
     line.add_argument("--device", default="", metavar="NAME", help="The device's name, for a server that has several")
     line.add_argument(
@@ -154,8 +156,7 @@ def run(
                     if options.json:
                         _print_diagnoses(client.device_report, client.peer_reports, told)
                     if physics is not None:
-                        if (touch := physics(hand)) is not None:
-                            client.send(hand, touch)
+                        client.answer(hand, physics(hand))
                     elif watch is not None:
                         watch(hand, client.stats.link)
             except KeyboardInterrupt:
@@ -205,8 +206,7 @@ async def _touch_several(options: argparse.Namespace, physics: Mapping[str, Phys
             if options.json and client.report is not reported:
                 reported = client.report
                 _print_report(reported, device)
-            if (touch := physics[device](hand)) is not None:
-                client.send(hand, touch)
+            client.answer(hand, physics[device](hand))
 
     async with AsyncExitStack() as stack:
         clients: dict[str, aio.Client] = {}

@@ -77,8 +77,7 @@ class Client(AnyClient):
         """Answers every state with the result of `physics`; the rest as for states(). Raises RefusedForGood, and
         whatever `physics` raises."""
         for hand in self.states(duration_s, on_silence, silence_s):
-            if (touch := physics(hand)) is not None:
-                self.send(hand, touch)
+            self.answer(hand, physics(hand))
 
     def close(self) -> None:
         """Says Bye, so that the server need not wait for a timeout."""

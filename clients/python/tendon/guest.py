@@ -6,6 +6,7 @@ from __future__ import annotations
 import logging
 import ipaddress
 import os
+import re
 import socket
 import threading
 import time
@@ -13,7 +14,8 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from . import limits
-from .force_client import Config, ForceClient, Phase, Stats
+from .config import Config, Phase, Stats
+from .force_client import ForceClient
 from .messages import (
     Code,
     DeviceDescription,
@@ -30,6 +32,21 @@ from .messages import (
 
 log = logging.getLogger("tendon")
 
+
+def visible(text: str) -> str:
+    """Escapes the words of a peer for a log or a terminal, so that they cannot start a line or move the cursor: control
+    characters (C0, DEL, C1) become \\n, \\t or \\xNN."""
+    known = {"\n": "\\n", "\t": "\\t"}
+    return re.sub(r"[\x00-\x1f\x7f-\x9f]", lambda c: known.get(c[0], f"\\x{ord(c[0]):02x}"), text)
+
+
+def _make_visible(record: logging.LogRecord) -> bool:
+    record.msg, record.args = visible(record.getMessage()), None
+    return True
+
+
+log.addFilter(_make_visible)
+
 MAX_DATAGRAMS = 256
 """Most datagrams taken from the socket in one turn: a flood must not keep us from sending. A 1 kHz server sends this
 many in a quarter of a second, the longest silence before it stops the device."""
@@ -44,7 +61,7 @@ class RefusedForGood(ConnectionError):
     """The server refuses, and another attempt would not change that."""
 
     def __init__(self, sentence: str, code: Code) -> None:
-        super().__init__(sentence)
+        super().__init__(visible(sentence))
         self.code = code
 
 
@@ -235,11 +252,26 @@ class AnyClient:
         """`server`: HOST:PORT, HOST a name or an address. Raises ValueError or OSError, with the host's name, when
         there is no such host; nobody need listen there yet."""
         self._guest = Guest(server, config, time.monotonic_ns())
+        self._first_none_ns: int | None = None  # on the server's clock
+        self._may_lack_return = True  # until a force has come, or the log has said so
 
     def send(self, hand: DeviceState, touch: Touch | Sequence[float]) -> None:
         """Sends the answer to a state at once: a force in N on the hand, or a Touch with the stiffness too."""
         self._guest.send(hand, touch)
         self._guest.flush(time.monotonic_ns())
+
+    def answer(self, hand: DeviceState, touch: Touch | Sequence[float] | None) -> None:
+        """Sends the force that an engine returned for this state. If it returned None, nothing is sent. If it only returned
+        None for a second, a warning is logged once, because its `return` statement may be missing."""
+        if touch is not None:
+            self._may_lack_return = False
+            self.send(hand, touch)
+        elif self._may_lack_return:
+            if self._first_none_ns is None:
+                self._first_none_ns = hand.sampled_ns
+            if hand.sampled_ns - self._first_none_ns >= 1_000_000_000:
+                self._may_lack_return = False
+                log.warning("the engine has returned None for 1 s, so no force is sent: is its `return` missing?")
 
     def rearm(self) -> bool:
         """Asks the server to clear a latched fault of its device. False when there is no session to ask in."""

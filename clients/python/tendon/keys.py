@@ -21,7 +21,7 @@ def read_key(file: Path | str) -> bytes:
     """
     if not stat.S_ISREG(os.stat(file).st_mode):  # before it is opened: a pipe would wait for ever
         raise OSError(f"{file}: cannot read this key: it is not a regular file")
-    with open(file, encoding="utf-8") as text:
+    with open(file, encoding="utf-8-sig") as text:
         if os.name == "posix" and os.fstat(text.fileno()).st_mode & (stat.S_IRWXG | stat.S_IRWXO):
             raise PermissionError(f"{file}: others may read this key; chmod 600 {file}")
         lines = [line.split() for line in text if line.strip() and not line.lstrip().startswith("#")]

@@ -96,13 +96,16 @@ class IncomingRequests:
         return True
 
     def next(self) -> Control | None:
-        """The next request, exactly once and in order. Those that this version does not know are answered here."""
+        """The next request, exactly once and in order. This also answers requests that are unknown or invalid."""
         while (control := self._arrived.pop(self._next, None)) is not None:
             self._next += 1
             self._taken.add(control.id)
             if control.request is not None:
                 return control
-            self.answer(ControlAck(control.id, Code.UNSUPPORTED, "this version does not know that request"))
+            if control.invalid:
+                self.answer(ControlAck(control.id, Code.INVALID, f"{control.invalid} is out of bounds"))
+            else:
+                self.answer(ControlAck(control.id, Code.UNSUPPORTED, "this version does not know that request"))
         return None
 
     def answer(self, ack: ControlAck) -> None:

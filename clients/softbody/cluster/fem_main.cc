@@ -17,9 +17,11 @@
 
 #include "clients/cpp/machine.h"
 #include "clients/cpp/options.h"
+#include "clients/cpp/usage.h"
 #include "clients/cpp/worker/front_engine.h"
 #include "clients/softbody/cluster/estimate.h"
 #include "clients/softbody/placed_body.h"
+#include "server/machine/output.h"
 
 using namespace tendon;
 
@@ -96,6 +98,7 @@ int serve(int argc, char** argv) {
     table.emplace(from_table(scene, fallback));
     config.front.fallback = [&](const DeviceState& hand) { return table->answer(hand); };
   }
+  const UnblockedOutput output;
   worker::FrontEngine engine(config, read_clock(), std::cerr);
   const int code = run(options, engine);
   const worker::Front::Stats stats = engine.stats();
@@ -129,7 +132,9 @@ int condense(const Arguments& arguments) {
 
 int explain(const Arguments& arguments) {
   int under_patch = 0;
-  const auto size = softbody::Body::size_of(softbody::read_scene(arguments.scene).body, under_patch);
+  const softbody::BodyConfig body = softbody::read_scene(arguments.scene).body;
+  softbody::warn(std::cerr, "tendon-fem", body);
+  const auto size = softbody::Body::size_of(body, under_patch);
   const softbody::Estimate estimate = softbody::estimate(size, under_patch, arguments.ranks);
   std::cout << (arguments.json ? softbody::in_json(estimate) : softbody::in_words(estimate));
   return 0;
@@ -140,6 +145,7 @@ int run_command(int argc, char** argv) {
       "A soft body whose answers many machines compute. `tendon-fem serve SCENE` answers the hand by workers "
       "(`tendon-fem serve --help`); the others prepare that.",
       "tendon-fem");
+  usage::dress(app);
   app.require_subcommand(1);
   app.set_version_flag("--version", TENDON_VERSION);
   Arguments arguments;
@@ -156,7 +162,7 @@ int run_command(int argc, char** argv) {
       ->type_name("COMMAND");
   condenses->add_option("--way", arguments.way, "How the body is solved")
       ->capture_default_str()
-      ->check(CLI::IsMember({"chosen", "factor", "multigrid"}));
+      ->check(usage::one_of({"chosen", "factor", "multigrid"}));
   explains->add_option("--ranks", arguments.ranks, "Numbers of ranks to predict for")
       ->delimiter(',')
       ->capture_default_str()
@@ -164,11 +170,12 @@ int run_command(int argc, char** argv) {
   condenses->footer("\nExample:\n  tendon-fem condense liver.toml liver.table --launch \"mpirun -n 64\"");
   explains->footer("\nExample:\n  tendon-fem explain liver.toml --ranks 1,64,1024");
   app.footer(
-      "\nExample:\n  tendon-fem serve liver.toml --launch \"mpirun -n 64\" --server haptics.lab:47100 --key fem.key");
+      "\nExample:\n  tendon-fem serve liver.toml --launch \"mpirun -n 64\" --server haptics.lab:47100 --key fem.key\n"
+      "\nExit: 0 done; 1 something failed; 2 wrong usage.");
   try {
-    app.parse(argc, argv);
+    usage::parse(app, argc, argv);
   } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : 2;
+    return usage::exit_code(app, error);
   }
   return condenses->parsed() ? condense(arguments) : explain(arguments);
 }
@@ -180,6 +187,9 @@ int main(int argc, char** argv) {
     // `serve` has the command line that all guests share.
     if (argc > 1 && std::string_view(argv[1]) == "serve") return serve(argc - 1, argv + 1);
     return run_command(argc, argv);
+  } catch (const softbody::SceneError& error) {
+    std::cerr << "tendon-fem: " << error.what() << '\n';
+    return 2;
   } catch (const std::exception& error) {
     std::cerr << "tendon-fem: " << error.what() << '\n';
     return 1;

@@ -7,10 +7,12 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
-#include <optional>
 #include <stdexcept>
 #include <string>
 #include <utility>
+
+#include "clients/softbody/fem/groups.h"
+#include "clients/softbody/fem/hold.h"
 
 namespace tendon::softbody {
 namespace {
@@ -18,24 +20,6 @@ namespace {
 /// A share of the distance between two elements' middles. A middle this close to the plane counts as on its far side,
 /// whichever way it was rounded.
 constexpr double kOnPlane = 1e-6;
-
-/// Groups of connected things, by their numbers (union-find).
-class Groups {
- public:
-  explicit Groups(std::size_t size) : of_(size) { std::iota(of_.begin(), of_.end(), 0); }
-  int find(int item) {
-    while (of_[at(item)] != item) item = of_[at(item)] = of_[at(of_[at(item)])];
-    return item;
-  }
-  void unite(int a, int b) {
-    a = find(a);
-    b = find(b);
-    of_[at(std::max(a, b))] = std::min(a, b);  // the lowest number stands for all
-  }
-
- private:
-  std::vector<int> of_;
-};
 
 bool between(const Cut& cut, const Vec3& from, const Vec3& to) {
   const Vec3 normal = cut.along.cross(cut.deep);
@@ -103,31 +87,17 @@ void drop_loose(Division& to) {
   for (int e = 0; e < mesh.element_count(); ++e) {
     for (const int node : mesh.element(e)) pieces.unite(mesh.element(e).front(), node);
   }
-  struct Hold {
-    std::optional<Vec3> first;
-    std::optional<Vec3> second;
-    bool fast = false;
-  };
   std::vector<Hold> holds(mesh.nodes.size());
   for (int node = 0; node < static_cast<int>(mesh.nodes.size()); ++node) {
     if (!to.fixed[at(3 * node)] || !to.fixed[at(3 * node + 1)] || !to.fixed[at(3 * node + 2)]) continue;
-    Hold& hold = holds[at(pieces.find(node))];
-    const Vec3& place = mesh.nodes[at(node)];
-    if (!hold.first) {
-      hold.first = place;
-    } else if (!hold.second && place != *hold.first) {
-      hold.second = place;
-    } else if (hold.second) {
-      const Vec3 line = *hold.second - *hold.first;
-      hold.fast = hold.fast || line.cross(place - *hold.first).norm() > kOnPlane * line.squaredNorm();
-    }
+    holds[at(pieces.find(node))].add(mesh.nodes[at(node)]);
   }
   std::vector<int> kept;
   std::vector<int> kept_before;
   std::vector<bool> used(mesh.nodes.size());
   for (int e = 0; e < mesh.element_count(); ++e) {
     const auto nodes = mesh.element(e);
-    if (!holds[at(pieces.find(nodes.front()))].fast) {
+    if (!holds[at(pieces.find(nodes.front()))].fast()) {
       ++to.lost;
       continue;
     }

@@ -2,7 +2,6 @@
 #include "clients/softbody/effects/effects.h"
 
 #include <cmath>
-#include <stdexcept>
 #include <string>
 
 #include "protocol/expect.h"
@@ -80,12 +79,6 @@ void check(const EffectsConfig& config) {
   if (config.damping) expect_above_zero(*config.damping, "damping");
   if (config.viscosity) expect_above_zero(*config.viscosity, "viscosity");
   if (config.gravity) expect_finite(*config.gravity, "gravity");
-}
-
-void check_only_with_inertia(const EffectsConfig& config) {
-  check(config);
-  if (!config.inertia) throw std::invalid_argument("this model is made of steps of time: it wants inertia");
-  if (config.viscosity) throw std::invalid_argument("this model does not simulate viscosity");
 }
 
 void add_forces(const Effects& effects, const Elastic& elastic, const VectorXd& u, Elastic::Forces& to) {

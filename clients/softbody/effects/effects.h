@@ -111,9 +111,6 @@ struct EffectsConfig {
 /// Throws std::invalid_argument that names the field.
 void check(const EffectsConfig& config);
 
-/// For models that consist of time steps: throws std::invalid_argument without inertia, or with viscosity.
-void check_only_with_inertia(const EffectsConfig& config);
-
 using Effects = std::vector<std::unique_ptr<Effect>>;
 
 /// The effects that act even on a body at rest; and those that act only on a moving body, which starts from rest at u

@@ -4,6 +4,8 @@
 #include <xxhash.h>
 
 #include <fstream>
+#include <stdexcept>
+#include <system_error>
 
 namespace tendon::softbody {
 
@@ -13,7 +15,10 @@ void write_draft(const std::filesystem::path& draft, std::string_view bytes) {
   std::ofstream out(draft, std::ios::binary);
   out.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
   out.close();
-  if (!out) throw std::runtime_error("cannot write " + draft.string() + ": is the disk full?");
+  if (out) return;
+  std::error_code ignored;
+  std::filesystem::remove(draft, ignored);
+  throw std::runtime_error("cannot write " + draft.string() + ": is the disk full?");
 }
 
 }  // namespace tendon::softbody

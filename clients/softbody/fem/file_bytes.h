@@ -45,7 +45,8 @@ class ByteReader {
 /// XXH3, 64 bits.
 std::uint64_t checksum(std::string_view bytes);
 
-/// Writes a file that is given its name by the caller, when it is whole. Throws std::runtime_error.
+/// Writes a file that is given its name by the caller, when it is whole. Throws std::runtime_error if
+/// the file cannot be written. In this case the file is removed.
 void write_draft(const std::filesystem::path& draft, std::string_view bytes);
 
 }  // namespace tendon::softbody

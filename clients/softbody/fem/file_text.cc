@@ -26,4 +26,14 @@ std::string read_file(const std::filesystem::path& file, std::uintmax_t most) {
   return text;
 }
 
+void refuse_file(std::string_view name, const std::string& what) {
+  throw std::invalid_argument(std::string(name) + ": " + what);
+}
+
+std::string_view without_mark(std::string_view text, std::string_view name) {
+  if (text.starts_with("\xFF\xFE") || text.starts_with("\xFE\xFF")) refuse_file(name, "is UTF-16; save it as UTF-8");
+  if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);
+  return text;
+}
+
 }  // namespace tendon::softbody

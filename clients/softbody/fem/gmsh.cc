@@ -11,6 +11,7 @@
 #include <stdexcept>
 #include <string>
 #include <unordered_map>
+#include <utility>
 #include <vector>
 
 #include "clients/softbody/fem/file_text.h"
@@ -23,7 +24,21 @@ constexpr int kMaxCount = 10'000'000;
 /// The words of a text, each with its line.
 class Words {
  public:
-  Words(std::string_view text, std::string_view name) : rest_(text), name_(name) {}
+  Words(std::string_view text, std::string_view name) : rest_(without_mark(text, name)), name_(name) {}
+
+  /// The next word, or an empty string at the end of the file.
+  std::string_view next() {
+    std::size_t begin = 0;
+    while (begin < rest_.size() &&
+           (rest_[begin] == ' ' || rest_[begin] == '\t' || rest_[begin] == '\r' || rest_[begin] == '\n')) {
+      line_ += rest_[begin] == '\n' ? 1 : 0;
+      ++begin;
+    }
+    const std::size_t end = std::min(rest_.find_first_of(" \t\r\n", begin), rest_.size());
+    const std::string_view found = rest_.substr(begin, end - begin);
+    rest_.remove_prefix(end);
+    return found;
+  }
 
   std::string_view word(std::string_view expected) {
     const std::string_view found = next();
@@ -58,19 +73,6 @@ class Words {
   }
 
  private:
-  std::string_view next() {
-    std::size_t begin = 0;
-    while (begin < rest_.size() &&
-           (rest_[begin] == ' ' || rest_[begin] == '\t' || rest_[begin] == '\r' || rest_[begin] == '\n')) {
-      line_ += rest_[begin] == '\n' ? 1 : 0;
-      ++begin;
-    }
-    const std::size_t end = std::min(rest_.find_first_of(" \t\r\n", begin), rest_.size());
-    const std::string_view found = rest_.substr(begin, end - begin);
-    rest_.remove_prefix(end);
-    return found;
-  }
-
   template <class T>
   T value(std::string_view what) {
     const std::string_view found = word(what);
@@ -139,12 +141,22 @@ class Reader {
     } else {
       words_.fail("expected $MeshFormat or $NOD: this is not a mesh file of gmsh");
     }
+    expect_no_other_mesh();
     return std::move(content_);
   }
 
  private:
   void seek(std::string_view keyword) {
     if (!words_.seek(keyword)) words_.fail("there is no " + std::string(keyword));
+  }
+
+  /// Only the first mesh is read, so a second one in the same file is an error.
+  void expect_no_other_mesh() {
+    for (std::string_view word = words_.next(); !word.empty(); word = words_.next()) {
+      if (word == "$Nodes" || word == "$Elements" || word == "$NOD" || word == "$ELM") {
+        words_.fail("a second " + std::string(word) + ": expected one mesh in a file");
+      }
+    }
   }
 
   void add_node(std::int64_t number) {
@@ -258,24 +270,27 @@ void check_each(const Mesh& mesh, const std::vector<FileElement>& named, std::st
 
 }  // namespace
 
-Mesh parse_gmsh(std::string_view text, std::string_view name, double scale) {
+FileMesh parse_gmsh(std::string_view text, std::string_view name, double scale, bool slits) {
   const Content content = Reader(text, name).read();
-  if (!content.shape) throw std::invalid_argument(std::string(name) + ": no volume element: this is a surface");
-  Mesh mesh{.shape = *content.shape, .nodes = {}, .elements = {}};
+  if (!content.shape) refuse_file(name, "no volume element: this is a surface");
+  FileMesh made{.mesh = {.shape = *content.shape, .nodes = {}, .elements = {}}, .numbers = {}};
   std::unordered_map<std::int64_t, int> index;
   for (const FileElement& element : content.elements) {
+    made.numbers.push_back(element.number);
     for (const auto node : element.nodes) {
-      const auto [found, is_new] = index.try_emplace(node, static_cast<int>(mesh.nodes.size()));
-      if (is_new) mesh.nodes.emplace_back(scale * content.nodes.at(node));
-      mesh.elements.push_back(found->second);
+      const auto [found, is_new] = index.try_emplace(node, static_cast<int>(made.mesh.nodes.size()));
+      if (is_new) made.mesh.nodes.push_back(content.nodes.at(node));
+      made.mesh.elements.push_back(found->second);
     }
   }
-  check_each(mesh, content.elements, name);
-  return mesh;
+  check_each(made.mesh, content.elements, name);
+  made = joined(std::move(made), slits, name);
+  for (Vec3& node : made.mesh.nodes) node *= scale;
+  return made;
 }
 
-Mesh read_gmsh(const std::filesystem::path& file, double scale) {
-  return parse_gmsh(read_file(file, kMaxMeshBytes), file.string(), scale);
+FileMesh read_gmsh(const std::filesystem::path& file, double scale, bool slits) {
+  return parse_gmsh(read_file(file, kMaxMeshBytes), file.string(), scale, slits);
 }
 
 }  // namespace tendon::softbody

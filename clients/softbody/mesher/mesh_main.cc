@@ -13,8 +13,10 @@
 #include <system_error>
 #include <vector>
 
+#include "clients/cpp/usage.h"
 #include "clients/softbody/fem/gmsh.h"
 #include "clients/softbody/mesher/volume.h"
+#include "clients/softbody/surface/shells.h"
 
 using namespace tendon::softbody;
 
@@ -88,7 +90,9 @@ void make(Arguments& arguments) {
   }
   tell("");
   const std::string text = to_gmsh(mesh);
-  const MeshReport report = report_on(parse_gmsh(text, "gmsh's mesh", 1), surface);  // as tendon-softbody will read it
+  MeshReport report = report_on(parse_gmsh(text, "gmsh's mesh", 1).mesh, surface);  // as tendon-softbody will read it
+  const std::vector<std::string> notes = notes_on(surface);
+  report.warnings.insert(report.warnings.begin(), notes.begin(), notes.end());
   std::ofstream out(arguments.out);
   out << text;
   if (!out.flush()) throw std::runtime_error("cannot write " + arguments.out.string());
@@ -99,6 +103,7 @@ void make(Arguments& arguments) {
 
 int main(int argc, char** argv) {
   CLI::App app("Makes a volume of a surface, for [body] shape = \"file\" of tendon-softbody", "tendon-mesh");
+  tendon::usage::dress(app);
   app.set_version_flag("--version", TENDON_VERSION);
   Arguments arguments;
   app.add_option("SURFACE", arguments.surface, "A closed surface of facets: .stl, .obj or .off")->required();
@@ -119,19 +124,21 @@ int main(int argc, char** argv) {
       ->check(CLI::Range(1.0, 100.0))
       ->capture_default_str()
       ->needs(touched);
-  app.add_flag("--tetrahedra", arguments.tetrahedra,
-               "Leave the tetrahedra as they are; else each becomes four hexahedra, which are far less too stiff");
+  app.add_flag(
+      "--tetrahedra", arguments.tetrahedra,
+      "Leave the tetrahedra as they are; else each becomes four hexahedra, which overestimate stiffness far less");
   app.add_flag("--json", arguments.json, "One JSON object on stdout");
   app.footer(
       "\nExample: elements of 8 mm below the place that is touched, of 24 mm elsewhere\n"
       "  tendon-mesh liver.stl --size 8 --at 0,0,60 --reach 40 --out liver.msh\n"
-      "\nIt refuses a surface that is not closed, cuts itself or is turned inside out, and names the facet. Needs gmsh "
+      "\nIt refuses a surface that is not closed, cuts or touches itself, or is turned inside out, also in a part of "
+      "it, and "
+      "names the facet. What it repairs is a warning. Needs gmsh "
       "(package gmsh), which it runs.\nExit: 0 made; 1 it could not be, with a sentence; 2 wrong usage.");
   try {
-    app.parse(argc, argv);
+    tendon::usage::parse(app, argc, argv);
   } catch (const CLI::ParseError& error) {
-    const int code = app.exit(error);
-    return code == 0 ? 0 : 2;
+    return tendon::usage::exit_code(app, error);
   }
   try {
     make(arguments);

@@ -23,6 +23,7 @@
 
 #include "clients/softbody/fem/file_text.h"
 #include "clients/softbody/fem/gmsh.h"
+#include "clients/softbody/surface/shells.h"
 #include "protocol/expect.h"
 
 namespace tendon::softbody {
@@ -172,17 +173,18 @@ Mesh read_made(const std::string& text) {
   return mesh;
 }
 
-Mesh made_by_gmsh(const Triangles& surface, const VolumeConfig& config, std::string& words) {
+Mesh made_by_gmsh(const Triangles& body, const VolumeConfig& config, std::string& words) {
   const Scratch scratch;
-  write_stl(scratch.path() / "surface.stl", surface);
+  write_stl(scratch.path() / "surface.stl", body);
   std::ofstream(scratch.path() / "script.geo") << script_of(config);
   run_gmsh(scratch.path());
   constexpr std::uintmax_t kMostWords = 16U << 20U;
-  const std::filesystem::path said = scratch.path() / "words";
-  words = std::filesystem::exists(said) ? read_file(said, kMostWords) : "";
+  const std::filesystem::path file = scratch.path() / "words";
+  const std::string said = std::filesystem::exists(file) ? read_file(file, kMostWords) : "";
+  words += said;
   const std::filesystem::path made = scratch.path() / "out.msh";
-  if (!std::filesystem::exists(made) || words.find("Error ") != std::string::npos) {
-    throw std::runtime_error("gmsh could not fill the surface");
+  if (!std::filesystem::exists(made) || said.find("Error ") != std::string::npos) {
+    throw std::runtime_error("gmsh could not fill the surface that begins with " + body.place(0));
   }
   return read_made(read_file(made, kMaxMeshBytes));
 }
@@ -301,7 +303,13 @@ Mesh volume_of(const Triangles& surface, const VolumeConfig& config, std::string
   expect(config.coarsest >= 1 && std::isfinite(config.coarsest), "coarsest", config.coarsest, "a number of at least 1");
   if (config.touched) expect_above_zero(config.reach, "reach");
   expect(config.sharp > 0 && config.sharp < std::numbers::pi, "sharp", config.sharp, "an angle above 0 and below π");
-  const Mesh tetrahedra = made_by_gmsh(surface, config, words);
+  Mesh tetrahedra{.shape = Shape::kTet4, .nodes = {}, .elements = {}};
+  for (const Triangles& body : bodies(surface)) {
+    const Mesh made = made_by_gmsh(body, config, words);
+    const int before = static_cast<int>(tetrahedra.nodes.size());
+    tetrahedra.nodes.insert(tetrahedra.nodes.end(), made.nodes.begin(), made.nodes.end());
+    for (const int node : made.elements) tetrahedra.elements.push_back(before + node);
+  }
   if (!config.hexahedra) return tetrahedra;
   std::vector<Vec3> places;
   Mesh mesh = in_hexahedra(tetrahedra, surface, places);

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "clients/softbody/fem/mesh.h"
-#include "clients/softbody/fem/triangles.h"
+#include "clients/softbody/surface/triangles.h"
 
 namespace tendon::softbody {
 
@@ -25,12 +25,12 @@ struct VolumeConfig {
   bool hexahedra = true;
 };
 
-/// Runs gmsh (4.8 or later) on the surface, which must have passed check(). gmsh's own words are in `words`, also when it
-/// fails.
+/// Runs gmsh (4.8 or later) for each body of the surface (bodies()). The surface must have passed check(). The output
+/// of gmsh is added to `words`, even if gmsh fails.
 ///
-/// gmsh makes tetrahedra. Each becomes four hexahedra, with new nodes in the middles of its edges, of its faces and of
-/// itself. Those on the boundary are moved to the nearest point of the surface, each as far as its elements stay well
-/// shaped: all the way some would be turned inside out, and not at all the body would be too small.
+/// gmsh makes tetrahedra. Each becomes four hexahedra, with new nodes in the middles of its edges, of its faces and
+/// of itself. Those on the boundary are moved to the nearest point of the surface, each as far as its elements stay
+/// well shaped: all the way some would be turned inside out, and not at all the body would be too small.
 ///
 /// Throws std::invalid_argument naming a field of `config` that is impossible, std::runtime_error when gmsh is not
 /// installed or makes no volume.

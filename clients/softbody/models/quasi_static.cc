@@ -415,11 +415,4 @@ std::size_t QuasiStaticModel::bytes() const noexcept {
          static_cast<std::size_t>(u_.size() + rest_.size()) * sizeof(double);
 }
 
-VectorXd shape_at_rest(const Elastic& elastic, const TouchSurface& surface, EffectsConfig loads) {
-  loads.inertia = false;
-  loads.damping.reset();
-  loads.viscosity.reset();
-  return QuasiStaticModel(elastic, surface, {}, loads).displacements();
-}
-
 }  // namespace tendon::softbody

@@ -137,8 +137,4 @@ class QuasiStaticModel : public Model {
   bool stale_ = true;  ///< the factor no longer serves
 };
 
-/// The displacements at rest of a body that nothing touches, m, all nodes. The loads in `loads` count; its effects with
-/// time do not.
-VectorXd shape_at_rest(const Elastic& elastic, const TouchSurface& surface, EffectsConfig loads);
-
 }  // namespace tendon::softbody

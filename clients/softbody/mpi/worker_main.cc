@@ -17,6 +17,7 @@
 #include <utility>
 #include <vector>
 
+#include "clients/cpp/usage.h"
 #include "clients/cpp/worker/worker.h"
 #include "clients/softbody/mpi/spread_solver.h"
 #include "clients/softbody/placed_body.h"
@@ -70,6 +71,7 @@ class Told : public Solver {
 int condense_scene(const Arguments& arguments, const Ranks& ranks) {
   expect_right_answers();
   const Scene scene = read_scene(arguments.scene);
+  if (ranks.rank() == 0) warn(std::cerr, "tendon-fem-worker", scene.body);
   const bool tells = ranks.rank() == 0 && isatty(STDERR_FILENO) != 0;
   const Method method = arguments.method;
   const SurfaceTable table = condense(scene.body, [tells, method](const Solid& solid) -> std::unique_ptr<Solver> {
@@ -105,6 +107,7 @@ Body live_body(BodyConfig config, Method method) {
 int answer(const Arguments& arguments, const Ranks& ranks) {
   expect_right_answers();
   const Scene scene = read_scene(arguments.scene);
+  if (ranks.rank() == 0) warn(std::cerr, "tendon-fem-worker", scene.body);
   PlacedBody body(scene, live_body(scene.body, arguments.method));
   std::unique_ptr<tendon::worker::WorkerStream> stream;
   if (ranks.rank() == 0) {
@@ -141,12 +144,13 @@ int main(int argc, char** argv) {
       "A soft body on as many ranks as MPI is started on, as tendon-fem starts them: with SCENE alone it answers the "
       "front that the environment names.",
       "tendon-fem-worker");
+  tendon::usage::dress(app);
   app.set_version_flag("--version", TENDON_VERSION);
   Arguments arguments;
   const auto add_common = [&](CLI::App& to) {
     to.add_option("SCENE", arguments.scene, "Scene file, with the model linear or condensed");
     to.add_option("--way", arguments.method, "How the body is solved")
-        ->transform(CLI::CheckedTransformer(std::map<std::string, Method>{
+        ->transform(tendon::usage::one_of(std::map<std::string, Method>{
             {"chosen", Method::kChosen}, {"factor", Method::kFactor}, {"multigrid", Method::kMultigrid}}))
         ->default_str("chosen");
   };
@@ -162,17 +166,19 @@ int main(int argc, char** argv) {
       "PETSC_OPTIONS chooses another solver: \"-ksp_type cg -pc_type gamg -ksp_rtol 1e-10\".\n"
       "Exit: 0 done; 1 it failed, with a sentence; 2 wrong usage.");
   try {
-    app.parse(argc, argv);
+    tendon::usage::parse(app, argc, argv);
     if (arguments.scene.empty()) throw CLI::RequiredError("SCENE");
   } catch (const CLI::ParseError& error) {
-    const int code = app.exit(error);
-    return code == 0 ? 0 : 2;
+    return tendon::usage::exit_code(app, error);
   }
   int none = 1;  // PETSc's options come by the environment
   try {
     const Ranks ranks(none, argv);
     try {
       return verb->parsed() ? condense_scene(arguments, ranks) : answer(arguments, ranks);
+    } catch (const SceneError& error) {
+      if (ranks.rank() == 0) std::cerr << "tendon-fem-worker: " << error.what() << '\n';
+      return 2;
     } catch (const std::exception& error) {
       // All ranks fail alike but for what only rank 0 does: others must not wait for it.
       if (ranks.rank() == 0) std::cerr << "tendon-fem-worker: " << error.what() << '\n';

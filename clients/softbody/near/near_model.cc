@@ -43,18 +43,6 @@ constexpr int kFactorAt = 1;
 /// By how much more the true error may be than what is seen of it.
 constexpr double kFarSafety = 3;
 constexpr double kModesSafety = 3;
-constexpr double kLinearSafety = 6;
-constexpr double kStepSafety = 2;
-constexpr double kPartedSafety = 3;
-
-/// While no field has the patch, the step from the linear shape counts in full where it strays by at most the first, and
-/// not at all from the second on. It strays by the share of the energy's slope along it that is left at its end, and so
-/// many times the share of the energy that it is about to lose. (B1: 0.3 at a/4 where ν = 0.45, and 0.9 beside a cut; the
-/// step is good. 0.6 at a/20 and 2.6 at a/10 where ν = 0.499: there it is not. The slope alone is small again at 0.17 a, by
-/// accident.)
-constexpr double kStrays = 1;
-constexpr double kStraysTooFar = 1.5;
-constexpr double kByEnergy = 5;
 
 /// A field has every patch whose place is so many patch's radii at most from its middle.
 constexpr double kReach = 0.45;
@@ -464,58 +452,6 @@ void NearModel::take_made(const Patch& patch, const Vec3& place, double depth) {
   spent_ = std::move(made);
 }
 
-Reaction NearModel::linear_press(const Patch& patch, Given given, double value) const {
-  const VectorXd load = solid_.to_free(patch_load(solid_, surface_.normal(), patch));
-  const VectorXd per_newton = at_rest_.solve(load);
-  const double compliance = load.dot(per_newton);
-  const double linear = constrained_force(given, value, 0, compliance);
-  const VectorXd shape = linear * per_newton;
-  VectorXd u = VectorXd::Zero(solid_.size());
-  solid_.add_free(shape, u);
-  VectorXd by_law = solid_.to_free(solid_.forces(u).force);
-  const double work = per_newton.dot(by_law) / compliance;
-  VectorXd step = -at_rest_.solve(by_law - work * load);
-  step -= load.dot(step) / compliance * per_newton;
-  const double slope = by_law.dot(step);
-  solid_.add_free(step, u);
-  by_law = solid_.to_free(solid_.forces(u).force);
-  const double left = by_law.dot(step) / slope;
-  const double strays = std::abs(left) + kByEnergy * std::abs(slope) / load.dot(shape) / linear;
-  const bool leads = strays < kStraysTooFar;  // not where there is no step
-  const double share = leads ? std::min(1.0, (kStraysTooFar - strays) / (kStraysTooFar - kStrays)) : 0;
-  u.setZero();
-  solid_.add_free(shape, u);
-  Reaction reaction;
-  reaction.way = Way::kLinear;
-  reaction.force = linear;
-  if (leads) {
-    const double length = 1 / (1 - left);
-    reaction.force += share * (work - linear + length * (per_newton.dot(by_law) / compliance - work));
-    solid_.add_free(share * length * step, u);
-  }
-  reaction.error =
-      kStepSafety * std::abs(work - reaction.force) + (1 - share) * kLinearSafety * std::abs(work - linear);
-  // What the law adds to the linear force grows with the square of the depth.
-  reaction.stiffness = (linear != 0 ? 2 * reaction.force / linear - 1 : 1) / compliance;
-  if (given == Given::kForce) {
-    solid_.add_free((value - reaction.force) * per_newton, u);
-    reaction.force = value;
-  }
-  reaction.depth = depth_below(patch, surface_.normal(), u);
-  reaction.slope = slope_below(patch, surface_.normal(), u);
-  // Sides of a cut turn freely: the energy that is lost on the way to the body's own shape, for each metre.
-  if (parted_) reaction.error += kPartedSafety * std::abs(slope / reaction.depth);
-  if (!std::isfinite(reaction.error)) reaction.error = std::abs(reaction.force);
-  return reaction;
-}
-
-Handover NearModel::beyond_linear() const {
-  if (by_linear_) return handover_;
-  if (!(last_.felt.depth > 0)) return {};
-  const Reaction there = linear_press(last_.patch, Given::kDepth, last_.felt.depth);
-  return handover(last_.felt, there, last_.felt.depth);
-}
-
 Reaction NearModel::press_by_field_or_linear(const Patch& patch, const Vec3& place, Given given, double value) {
   if (field_ && field_->holds(patch, place, 2)) {
     Reaction reaction = field_->press(patch, given, value);
@@ -603,26 +539,6 @@ NearModel::Size NearModel::size() const {
 std::size_t NearModel::bytes() const noexcept {
   return at_rest_.bytes() + (field_ ? field_->bytes() : 0) + (spent_ ? spent_->bytes() : 0) +
          (oracle_ ? oracle_->bytes : 0);
-}
-
-Handover handover(const Reaction& before, const Reaction& after, double depth) {
-  const double ratio = before.force / after.force;
-  if (!(before.force > 0 && after.force > 0 && std::isfinite(ratio))) return {};
-  return {ratio, before.slope - after.slope, depth};
-}
-
-Reaction kept(const Handover& before, double share, const Reaction& reaction) {
-  if (!(share > 0 && before.depth > 0)) return reaction;
-  const double left = share * std::min(1.0, before.depth / std::abs(reaction.depth));
-  const double times = 1 + left * (before.ratio - 1);
-  Reaction all = reaction;
-  all.force *= times;
-  all.stiffness *= times;
-  all.slope += left * before.slope;
-  all.glide.giving /= times;
-  const double force = std::max(std::abs(reaction.force), std::abs(all.force));
-  all.error = std::max(1.0, times) * reaction.error + force * std::hypot(times - 1, left * before.slope.norm());
-  return all;
 }
 
 }  // namespace tendon::softbody

@@ -48,7 +48,7 @@ double thickness_of(const Triangles& surface, const SurfaceDistance& distance, d
     least = behind;
     if (behind >= kThinnestInCells) continue;
     std::ostringstream text;
-    text << name << ": facet " << f + 1 << " at (" << 1e3 * middle.x() << ", " << 1e3 * middle.y() << ", "
+    text << name << ": facet " << surface.number(f) << " at (" << 1e3 * middle.x() << ", " << 1e3 * middle.y() << ", "
          << 1e3 * middle.z() << ") mm: the surface is thinner there than " << kThinnestInCells << " cells of "
          << 1e3 * cell << " mm: smaller cells";
     throw std::invalid_argument(text.str());
@@ -70,6 +70,20 @@ RigidShape::RigidShape(Mesh mesh)
       reach_(std::ranges::max(mesh_->points, {}, &Vec3::squaredNorm).norm()),
       thinnest_(mesh_->thinnest) {}
 
+Mat3 shortest_rotation(const Vec3& from, const Vec3& to) {
+  const Vec3 a = from.normalized();
+  const Vec3 b = to.normalized();
+  const double cosine = a.dot(b);
+  if (cosine < -1 + 1e-12) {
+    const Vec3 near = std::abs(a.z()) < std::sqrt(0.5) ? Vec3(0, 0, 1) : Vec3(1, 0, 0);
+    const Vec3 axis = (near - near.dot(a) * a).normalized();
+    return Eigen::Quaterniond(0, axis.x(), axis.y(), axis.z()).toRotationMatrix();
+  }
+  const double twice = std::sqrt((1 + cosine) * 2);  // the cosine of half the angle
+  const Vec3 axis = a.cross(b) / twice;
+  return Eigen::Quaterniond(twice / 2, axis.x(), axis.y(), axis.z()).toRotationMatrix();
+}
+
 RigidShape RigidShape::sphere(double radius) {
   expect_above_zero(radius, "radius");
   return {Vec3::Zero(), radius, Mat3::Identity()};
@@ -79,7 +93,7 @@ RigidShape RigidShape::capsule(double radius, double half_length, const Vec3& ax
   expect_above_zero(radius, "radius");
   expect_not_negative(half_length, "half_length");
   expect(std::abs(axis.norm() - 1) < 1e-9, "norm of axis", axis.norm(), "1");
-  return {Vec3(0, 0, half_length), radius, Eigen::Quaterniond::FromTwoVectors(Vec3::UnitZ(), axis).toRotationMatrix()};
+  return {Vec3(0, 0, half_length), radius, shortest_rotation(Vec3::UnitZ(), axis)};
 }
 
 RigidShape RigidShape::box(const Vec3& size, double edge) {

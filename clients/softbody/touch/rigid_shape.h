@@ -6,10 +6,14 @@
 #include <string_view>
 #include <vector>
 
-#include "clients/softbody/fem/triangles.h"
+#include "clients/softbody/surface/triangles.h"
 #include "clients/softbody/touch/distance_grid.h"
 
 namespace tendon::softbody {
+
+/// The shortest rotation that takes the direction of `from` to that of `to`; neither is zero. Between opposite directions
+/// it is half a turn about the axis across `from` that is nearest to z, or to x where `from` is nearer to z.
+Mat3 shortest_rotation(const Vec3& from, const Vec3& to);
 
 /// The shape of a rigid tool, around its own middle, as a signed distance: all points within `rounding` of a box, the
 /// core. A core without size makes a sphere, one of a single length a capsule, and any other a box with round edges.

@@ -5,7 +5,7 @@
 #include <limits>
 #include <vector>
 
-#include "clients/softbody/fem/triangles.h"
+#include "clients/softbody/surface/triangles.h"
 
 namespace tendon::softbody {
 

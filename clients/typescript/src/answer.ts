@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // What a haptic function returns, why it cannot be sent, and what of it a server takes.
-import { isBounded, isContact, isError, isRadius, isStiffness, isVec3 } from "./bounds.js";
+import { isBounded, isError, isRadius, isStiffness, isVec3 } from "./bounds.js";
+import { isContact } from "./codec.js";
 import { kMaxValue } from "./limits.js";
 import {
   kFeatureHandle, kFeatureLocalModel, type Contact, type DeviceState, type ForceCommand, type Stiffness, type Vec3,

@@ -1,35 +1,53 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which values a peer accepts (protocol/WIRE.md).
-import * as limits from "./limits.js";
-import type { Contact, LocalModel, Quat, RotationModel, Stiffness, Vec3 } from "./messages.js";
+// Checks of single values against the bounds of protocol/WIRE.md. gen/codec.ts calls them.
+import type { Quat, Stiffness, Vec3 } from "./messages.js";
+import { kMaxValue, kUnitTolerance } from "./limits.js";
 
-export const isBounded = (value: number): boolean => Math.abs(value) <= limits.kMaxValue; // false for NaN
-export const isMagnitude = (value: number): boolean => value >= 0 && value <= limits.kMaxValue;
-export const isTime = (ns: bigint): boolean => ns >= -limits.kMaxTime && ns <= limits.kMaxTime;
-export const isLength = (ns: bigint): boolean => ns <= limits.kMaxTime; // of time; it has no sign on the wire
-export const isDevice = (number: number): boolean => number < limits.kMaxDevices;
-export const isChannel = (number: number): boolean => number < limits.kMaxChannels;
+/** Returns false for NaN, too. */
+export const isWithin = (value: number, least: number, most: number): boolean => value >= least && value <= most;
+export const isWhole = (value: number, least: number, most: number): boolean =>
+  Number.isInteger(value) && value >= least && value <= most;
+export const isBounded = (value: number): boolean => isWithin(value, -kMaxValue, kMaxValue);
 export const isVec3 = (v: Vec3): boolean => isBounded(v.x) && isBounded(v.y) && isBounded(v.z);
-/** Of length 1. */
-export const isRotation = ({ w, x, y, z }: Quat): boolean =>
-  Math.abs(Math.hypot(w, x, y, z) - 1) <= limits.kUnitTolerance;
 
-/** 1 entry, 3 or 9, all of them within bounds. */
+const isUnit = (length: number): boolean => Math.abs(length - 1) <= kUnitTolerance;
+export const isRotation = ({ w, x, y, z }: Quat): boolean => isUnit(Math.hypot(w, x, y, z));
+/** Returns true if the vector has length 1. */
+export const isNormal = (v: Vec3 | undefined): boolean =>
+  v !== undefined && isVec3(v) && isUnit(Math.hypot(v.x, v.y, v.z));
+
+/** Returns true if both corners are there and min ≤ max, or if neither is there. */
+export const isBox = (min: Vec3 | undefined, max: Vec3 | undefined): boolean =>
+  min && max ? min.x <= max.x && min.y <= max.y && min.z <= max.z : !min && !max;
+
+/** Returns true if there are 1, 3 or 9 entries, and all are within bounds. */
 export const isStiffness = (stiffness: Stiffness): boolean =>
   (stiffness.length === 1 || stiffness.length === 3 || stiffness.length === 9) && stiffness.every(isBounded);
-/** Every number of it is within its bounds. */
-export function isContact({ normal, gap, table }: Contact): boolean {
-  const isTable = !table || (table.step > 0 && isBounded(table.step) && isBounded(table.first) &&
-    table.force.length >= limits.kMinTable && table.force.length <= limits.kMaxTable && table.force.every(isBounded));
-  return isVec3(normal) && Math.abs(Math.hypot(normal.x, normal.y, normal.z) - 1) <= limits.kUnitTolerance &&
-    isBounded(gap) && isTable;
-}
-/** Infinity means the same as absent. */
+
+export const areNumbers = (
+  values: readonly number[], fewest: number, most: number, least: number, largest: number,
+): boolean => isWithin(values.length, fewest, most) && values.every((value) => isWithin(value, least, largest));
+export const areCounts = (values: readonly bigint[], fewest: number, most: number): boolean =>
+  isWithin(values.length, fewest, most);
+export const sum = (values: readonly bigint[]): bigint => values.reduce((total, value) => total + value, 0n);
+
+/** `refused` returns the name of the first field of a message that is out of bounds. */
+export const areMessages = <Message>(
+  messages: readonly Message[], fewest: number, most: number, refused: (message: Message) => string | undefined,
+): boolean => isWithin(messages.length, fewest, most) && messages.every((message) => refused(message) === undefined);
+
+/** Returns false for number 0 and for numbers that this version does not know. */
+export const isEnum = (value: number, schema: { readonly value: Record<number, unknown> }): boolean =>
+  value !== 0 && schema.value[value] !== undefined;
+
+const kEncoder = new TextEncoder();
+/** Returns true if the text has at most `bytes` bytes of UTF-8. */
+export const isText = (text: string, bytes: number): boolean => kEncoder.encode(text).length <= bytes;
+export const areTexts = (texts: readonly string[], fewest: number, most: number, bytes: number): boolean =>
+  isWithin(texts.length, fewest, most) && texts.every((text) => isText(text, bytes));
+
+// The next two check the answer of an engine. An infinite radius means the same as an absent one.
 export const isRadius = (metres: number | undefined): boolean =>
-  metres === undefined || metres === Infinity || isMagnitude(metres);
-export const isError = (newtons: number | undefined): boolean => newtons === undefined || isMagnitude(newtons);
-
-export const isModel = ({ at, stiffness, validRadius, contact }: LocalModel): boolean =>
-  isVec3(at) && isStiffness(stiffness) && isRadius(validRadius) && (!contact || isContact(contact));
-
-export const isRotationModel = ({ at, stiffness }: RotationModel): boolean => isRotation(at) && isStiffness(stiffness);
+  metres === undefined || metres === Infinity || isWithin(metres, 0, kMaxValue);
+export const isError = (newtons: number | undefined): boolean =>
+  newtons === undefined || isWithin(newtons, 0, kMaxValue);

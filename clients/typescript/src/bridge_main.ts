@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 import { parseArgs } from "node:util";
 import { Bridge, kBridgeDefaults, type BridgeConfig } from "./bridge.js";
+import { parseAddress, parseServer } from "./udp.js";
 
 const kHelp = `tendon-bridge: lets pages in browsers talk to tendond. One WebSocket message is one datagram; it has no key.
 
@@ -26,6 +27,14 @@ function whole(option: string, text: string): number {
   throw new RangeError(`--${option}: expected a whole number from 1 to 1000000, got "${text}"`);
 }
 
+function address(option: string, text: string, read: (text: string) => unknown): void {
+  try {
+    read(text);
+  } catch (error) {
+    throw new RangeError(`--${option}: ${(error as Error).message}`);
+  }
+}
+
 function origin(text: string): string {
   if (URL.canParse(text) && new URL(text).origin === text) return text;
   throw new RangeError(`--origin: expected an origin like https://lab.example, got "${text}"`);
@@ -48,6 +57,8 @@ function parse(): { readonly config: BridgeConfig; readonly json: boolean } {
     process.exit(0);
   }
   const { listen, to, json } = values;
+  address("listen", listen, parseAddress);
+  address("to", to, parseServer);
   return {
     config: {
       listen, to, origins: values.origin.map(origin), maxPeers: whole("max-peers", values["max-peers"]),
@@ -57,8 +68,18 @@ function parse(): { readonly config: BridgeConfig; readonly json: boolean } {
   };
 }
 
+/** Exits with 0 after --help and with 2 if the command line is not valid. */
+function commandLine(): { readonly config: BridgeConfig; readonly json: boolean } {
+  try {
+    return parse();
+  } catch (error) {
+    process.stderr.write(`tendon-bridge: ${(error as Error).message}\nRun with --help for more information.\n`);
+    process.exit(2);
+  }
+}
+
 async function main(): Promise<void> {
-  const { config, json } = parse();
+  const { config, json } = commandLine();
   const bridge = await Bridge.open(config);
   if (json) console.log(JSON.stringify({ event: "listening", address: bridge.address }));
   else console.error(`tendon-bridge: ws://${bridge.address} to ${config.to}`);
@@ -74,5 +95,5 @@ async function main(): Promise<void> {
 
 main().catch((error: Error) => {
   process.stderr.write(`tendon-bridge: ${error.message}\n`);
-  process.exitCode = 2;
+  process.exitCode = 1;
 });

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-import { ForceClient, type ClientConfig, type ClientStats, type Phase, type Physics, type Watch } from "./force_client.js";
+import type { ClientConfig, ClientStats, Phase } from "./config.js";
+import { ForceClient, type Physics, type Watch } from "./force_client.js";
 import type {
   DeviceDescription, DeviceReport, HandleDescription, LampColour, LinkReport, PeerReport, Vibration, Welcome,
 } from "./messages.js";

@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Works in every runtime. "tendon-client/node" adds UDP and the command line.
 export { connect, type ConnectConfig, type Guest, type OpenTransport, type Transport } from "./connect.js";
-export {
-  ForceClient, type ClientConfig, type ClientStats, type Phase, type Physics, type Watch,
-} from "./force_client.js";
+export type { ClientConfig, ClientStats, Phase } from "./config.js";
+export { ForceClient, type Physics, type Watch } from "./force_client.js";
 export type { Touch } from "./answer.js";
 export { Follower, type FollowerConfig, type Following, type Pose, type ToolContact } from "./follower.js";
 export type { ForceDeadband } from "./deadband.js";

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 import { parseArgs, type ParseArgsConfig } from "node:util";
 import { readClientKey } from "./client_key.js";
-import type { ClientConfig } from "./force_client.js";
+import type { ClientConfig } from "./config.js";
 import { kMaxLabel } from "./limits.js";
 import { parseServer } from "./udp.js";
 
@@ -40,8 +40,8 @@ function label(option: string, text: string): string {
 
 /**
  * The command line that all guests share, --server, --key, --device, --channel, --take-lease, --rate-hz, --duration-s, --json
- * and --help, and what a program adds to it: `{ "stiffness-n-per-m": [2000, "How hard the wall is"] }`. After --help and after a
- * wrong usage, which stderr is told, the process ends, with 0 and 2.
+ * and --help, and what a program adds to it: `{ "stiffness-n-per-m": [2000, "How hard the wall is"] }`. It exits with 0
+ * after --help, with 1 if the key cannot be read, and with 2 if the command line is not valid.
  */
 export function commandLine<Extras extends Record<string, Extra> = Record<never, never>>(
   purpose: string,
@@ -70,15 +70,12 @@ export function commandLine<Extras extends Record<string, Extra> = Record<never,
     }
     const text = (name: string): string => String(values[name]);
     const server = text("server");
-    const of = <Value>(option: string, read: () => Value): Value => {
-      try {
-        return read();
-      } catch (error) {
-        throw new RangeError(`--${option}: ${(error as Error).message}`);
-      }
-    };
-    of("server", () => parseServer(server));
-    const key = typeof values.key === "string" ? of("key", () => readClientKey(text("key")).key) : undefined;
+    try {
+      parseServer(server);
+    } catch (error) {
+      throw new RangeError(`--server: ${(error as Error).message}`);
+    }
+    const key = typeof values.key === "string" ? readKey(defaults.name, values.key) : undefined;
     const options: Options = {
       name: defaults.name,
       server,
@@ -96,6 +93,15 @@ export function commandLine<Extras extends Record<string, Extra> = Record<never,
   } catch (error) {
     process.stderr.write(`${(error as Error).message}\nRun with --help for more information.\n`);
     process.exit(2);
+  }
+}
+
+function readKey(program: string, file: string): Uint8Array {
+  try {
+    return readClientKey(file).key;
+  } catch (error) {
+    process.stderr.write(`${program}: --key: ${(error as Error).message}\n`);
+    process.exit(1);
   }
 }
 

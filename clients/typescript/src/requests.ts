@@ -94,14 +94,16 @@ export class IncomingRequests {
     return true;
   }
 
-  /** The next request, exactly once and in order. Those that this version does not know are answered here. */
+  /** The next request, exactly once and in order. This also answers requests that are unknown or invalid. */
   next(): { id: number; request: Request } | undefined {
     for (let mine = this.#slot(this.#next); mine?.stage === "arrived"; mine = this.#slot(this.#next)) {
       ++this.#next;
       mine.stage = "taken";
-      const { id, request } = mine.control;
+      const { id, request, invalid } = mine.control;
       if (request) return { id, request };
-      this.answer({ id, code: Code.UNSUPPORTED, detail: "this version does not know that request" });
+      this.answer(invalid === undefined
+        ? { id, code: Code.UNSUPPORTED, detail: "this version does not know that request" }
+        : { id, code: Code.INVALID, detail: `${invalid} is out of bounds` });
     }
     return undefined;
   }

@@ -1,9 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 import { connect, type Guest } from "./connect.js";
-import type { ClientStats, Physics, Watch } from "./force_client.js";
+import type { ClientStats } from "./config.js";
+import type { Physics, Watch } from "./force_client.js";
 import { Code, type LinkReport } from "./messages.js";
 import type { Options } from "./options.js";
 import { NoSuchHost, udp } from "./udp.js";
+
+/** One line on stderr. A server's words cannot start another line or move the cursor: control characters are escaped. */
+function say(program: string | undefined, sentence: string): void {
+  const escaped = sentence.replace(/[\x00-\x1f\x7f-\x9f]/g, (c) =>
+    c === "\n" ? "\\n" : c === "\t" ? "\\t" : `\\x${c.charCodeAt(0).toString(16).padStart(2, "0")}`);
+  process.stderr.write(`${program ?? "tendon"}: ${escaped}\n`);
+}
 
 /** Refusals that another attempt does not change. */
 const isFinal = (code: Code): boolean => code !== Code.BUSY && code !== Code.SHUTDOWN;
@@ -39,10 +47,10 @@ function printSummary(stats: ClientStats, seconds: number, { name, json }: Optio
     };
     console.log(JSON.stringify({ summary }));
   } else if (!link) {
-    console.error(`${name}: was not connected`);
+    say(name, "was not connected");
   } else {
-    console.error(
-      `${name}: ${seconds.toFixed(1)} s, ${states} states came in (${statesSkipped} skipped for a newer one), ` +
+    say(name,
+      `${seconds.toFixed(1)} s, ${states} states came in (${statesSkipped} skipped for a newer one), ` +
       `${forces} forces went out (${forcesUnusable} more were unusable), lost on the way: ${link.lost} in, ` +
       `${link.lostOutgoing} out, round trip ${link.smoothedRoundTripMs.toFixed(2)} ± ` +
       `${link.roundTripVariationMs.toFixed(2)} ms`);
@@ -52,7 +60,7 @@ function printSummary(stats: ClientStats, seconds: number, { name, json }: Optio
 /** Prints each of the server's reports on our forces. */
 function printReport(report: LinkReport, { name, json }: Options): void {
   if (!json) {
-    if (report.words) console.error(`${name}: the server says: ${report.words}`);
+    if (report.words) say(name, `the server says: ${report.words}`);
     return;
   }
   const ms = (ns: bigint): number => Number(ns) / 1e6;
@@ -93,13 +101,13 @@ export async function run(
     ...options,
     onPhase(changed) {
       const text = sentence(changed, options);
-      if (text && text !== said) console.error(`${name}: ${(said = text)}`);
+      if (text && text !== said) say(name, (said = text));
       if (changed.phase !== "refused" || !isFinal(changed.stats().code)) return;
       refused = true;
       changed.stop();
     },
     onReport: (report) => printReport(report, options),
-    onUnusable: (why) => console.error(`${name}: a force is not sent: ${why}`),
+    onUnusable: (why) => say(name, `a force is not sent: ${why}`),
   }, callback);
 
   const stop = (): void => guest.stop();
@@ -112,7 +120,8 @@ export async function run(
     printSummary(stats, (performance.now() - start) / 1000, options);
     return stats.sessions > 0 ? 0 : 1;
   } catch (error) {
-    console.error(`${name}:`, error instanceof NoSuchHost ? error.message : error);
+    if (error instanceof NoSuchHost) say(name, error.message);
+    else console.error(`${name}:`, error);
     return 1;
   } finally {
     clearTimeout(timer);

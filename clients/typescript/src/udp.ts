@@ -18,7 +18,7 @@ export function parseAddress(text: string): Address {
   const host = plain === "localhost" ? "127.0.0.1" : (plain ?? bracketed ?? "");
   const port = Number(digits);
   if ((plain === undefined ? !isIPv6(host) : !isIPv4(host)) || !(port <= 0xffff)) {
-    throw new RangeError(`expected HOST:PORT like 127.0.0.1:47100, got "${text}"`);
+    throw new RangeError(`expected HOST:PORT like 127.0.0.1:47100 or [::1]:47100, got "${text}"`);
   }
   return { host, port };
 }

@@ -30,6 +30,8 @@ export interface ChartSpec<C extends string = Column> {
   readonly least: number;
   /** Lines that may leave the axis: values far beyond the others would flatten them. */
   readonly mayLeave?: C;
+  /** The chart keeps its own axis if a shared axis would make it ten times smaller. */
+  readonly ownScale?: boolean;
 }
 
 /** The requests of a user who drags or scrolls a chart. */
@@ -50,6 +52,7 @@ export class Chart<C extends string = Column> {
   #plot: uPlot;
   readonly #box: HTMLElement;
   readonly #values: HTMLElement[];
+  readonly #finer: HTMLElement;
   readonly #shown: boolean[];
   #width = 0;
   #shared: [number, number] | undefined;
@@ -74,8 +77,9 @@ export class Chart<C extends string = Column> {
     });
     const legend = h("div", { class: "legend" }, ...keys, ...toggles);
     this.#box = h("div", { class: "plot" });
+    this.#finer = h("span", { class: "unit" });
     this.element = h("figure", { class: "chart", "data-chart": spec.id },
-      h("figcaption", {}, h("span", { class: "title" }, spec.title, h("span", { class: "unit", text: spec.unit })), legend), this.#box);
+      h("figcaption", {}, h("span", { class: "title" }, spec.title, h("span", { class: "unit", text: spec.unit }), this.#finer), legend), this.#box);
 
     const font = "11px system-ui, sans-serif";
     const grid = { stroke: () => theme("grid"), width: 1 };
@@ -127,6 +131,7 @@ export class Chart<C extends string = Column> {
     }
     const lines = this.spec.lines.filter((_, k) => this.#shown[k]);
     const [times, ...values] = thin(track, lines.map((line) => line.column), from, to, Math.max(width - 60, 50), this.spec.scale);
+    say(this.#finer, ""); // until it shares an axis
     const data = [times, ...this.#shown.map((shown) => (shown ? values.shift()! : []))];
     this.#plot.batch(() => {
       this.#plot.setData(data as uPlot.AlignedData, false);
@@ -154,10 +159,15 @@ export class Chart<C extends string = Column> {
     return from > to ? [0, 0] : [from, to];
   }
 
-  /** Draws with the axis of another chart: two runs side by side are compared by eye. */
+  /** Sets the axis to a range that several runs share. */
   share([from, to]: readonly [number, number]): void {
-    this.#shared = [from, to];
-    this.#plot.setScale("y", { min: from, max: to });
+    const [ownFrom, ownTo] = this.extent();
+    const finer = (Math.max(to, 0) - Math.min(from, 0)) / Math.max(Math.max(ownTo, 0) - Math.min(ownFrom, 0), this.spec.least);
+    const own = this.spec.ownScale === true && finer >= 10;
+    say(this.#finer, own ? `(scale ${digits(finer, 2)} × finer)` : "");
+    this.#shared = own ? undefined : [from, to];
+    const [min, max] = own ? this.#range() : [from, to];
+    this.#plot.setScale("y", { min, max });
     this.#shared = undefined;
   }
 

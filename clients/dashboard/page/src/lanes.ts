@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 import { h, say, theme } from "./dom.js";
-import { shares, type Track } from "./track.js";
-import { kReasons, percent, type ReasonWords } from "./words.js";
+import { shares, type Shares, type Track } from "./track.js";
+import { digits, kReasons, percent, type ReasonWords } from "./words.js";
 
 const kLimiting = kReasons.reduce((bits, reason) => (reason.limits ? bits | (1 << reason.bit) : bits), 0);
 const kHeight = 8;
@@ -25,8 +25,9 @@ export class Lanes {
   }
 
   draw(track: Track, from: number, to: number): void {
-    const { share, any, n } = shares(track, from, to, kLimiting);
-    say(this.#sentence, n === 0 ? "No states in this time." : sentence(share, any, to - from));
+    const found = shares(track, from, to, kLimiting);
+    const { share } = found;
+    say(this.#sentence, found.n === 0 ? "No states in this time." : sentence(found, to - from));
     // A lane stays once it has been shown: rows that come and go cannot be read.
     const now = kReasons.filter((reason) => share.has(reason.bit) || this.#seen.includes(reason));
     if (now.length !== this.#seen.length) {
@@ -78,9 +79,11 @@ export class Lanes {
   }
 }
 
-function sentence(share: Map<number, number>, any: number, span: number): string {
+function sentence({ share, any, apart, served }: Shares, span: number): string {
   const time = span >= 1 ? `${Number(span.toPrecision(3))} s` : `${Number((1e3 * span).toPrecision(3))} ms`;
+  if (!served) return `In these ${time} no fresh force came.`;
   if (any === 0) return `In these ${time} the hand felt what the engines asked for.`;
   const most = kReasons.filter((r) => r.limits && share.has(r.bit)).sort((a, b) => share.get(b.bit)! - share.get(a.bit)!)[0]!;
-  return `For ${percent(any)} of these ${time} the hand did not feel what the engines asked for. The main reason: ${most.meaning}.`;
+  const by = Number.isNaN(apart[0]) ? "" : `: it differed by ${digits(apart[0], 2)} N (median), ${digits(apart[1], 2)} N (95th percentile)`;
+  return `For ${percent(any)} of the time with forces, in these ${time}, the hand did not feel what the engines asked for${by}. The main reason: ${most.meaning}.`;
 }

@@ -2,7 +2,8 @@
 import { fromBinary, type Message } from "@bufbuild/protobuf";
 import { FileDescriptorSetSchema, type DescriptorProto, type FileDescriptorSet } from "@bufbuild/protobuf/wkt";
 import { BinaryReader } from "@bufbuild/protobuf/wire";
-import { McapIndexedReader, McapStreamReader, type McapTypes } from "@mcap/core";
+import { McapIndexedReader, type McapTypes } from "@mcap/core";
+import { Salvage, type Readable } from "./salvage.js";
 import { contactOf, frameOfScene, type Quat } from "./space/figure.js";
 import { Track, noHandle, type HandleColumn, type HandleSample, type Sample } from "./track.js";
 import { moment } from "./words.js";
@@ -41,20 +42,23 @@ export interface Recording {
  */
 export async function readRecording(url: string, name: string, from: number, progress: (steps: number) => void): Promise<Recording> {
   const file = await openFile(url);
-  const collected = new Collector(name, from);
-  let indexed = false;
+  return (await readIndexed(file, new Collector(name, from), progress)) ?? readAll(file, new Collector(name, from), progress);
+}
+
+/** Uses the index at the end of the file. Returns undefined if there is no index, or if the file is damaged. */
+async function readIndexed(file: Readable, collected: Collector, progress: (steps: number) => void): Promise<Recording | undefined> {
   try {
     const reader = await McapIndexedReader.Initialize({ readable: file });
     const topics = [...reader.channelsById.values()].map((c) => c.topic).filter((t) => kStepTopic.test(t) || kSceneTopic.test(t));
     for (const channel of reader.channelsById.values()) collected.channel(channel, reader.schemasById.get(channel.schemaId));
-    if (from > 0) {
+    if (collected.from > 0) {
       // The scene, and when it all began.
       for await (const message of reader.readMessages({ topics })) {
         collected.message(message);
         if (collected.began !== undefined) break;
       }
     }
-    const startTime = collected.began === undefined ? undefined : collected.began + BigInt(Math.floor(1e9 * from));
+    const startTime = collected.began === undefined ? undefined : collected.began + BigInt(Math.floor(1e9 * collected.from));
     for await (const message of reader.readMessages({ topics, ...(startTime !== undefined && { startTime }) })) {
       if (!collected.message(message)) break;
       if (collected.steps % 5000 === 0) {
@@ -62,30 +66,33 @@ export async function readRecording(url: string, name: string, from: number, pro
         await new Promise((resolve) => setTimeout(resolve));
       }
     }
-    indexed = true;
-  } catch (error) {
-    if (collected.began !== undefined) return collected.recording("The file can be read up to this point: " + String(error));
+  } catch {
+    return undefined;
   }
-  if (indexed) return collected.recording();
-  // Without an index: the server was killed, or still records.
-  const reader = new McapStreamReader();
-  const size = await file.size();
-  try {
-    for (let at = 0n; at < size; ) {
-      const bytes = await file.read(at, size - at < 1_048_576n ? size - at : 1_048_576n);
-      at += BigInt(bytes.byteLength);
-      reader.append(bytes);
-      for (let record = reader.nextRecord(); record; record = reader.nextRecord()) {
-        if (record.type === "Schema") collected.schema(record);
-        else if (record.type === "Channel") collected.channel(record, collected.schemas.get(record.schemaId));
-        else if (record.type === "Message" && !collected.message(record)) return collected.recording();
-      }
+  return collected.recording();
+}
+
+/** Reads the complete file without the index. This is needed if the server was killed or is still running, or if the file is damaged. */
+async function readAll(file: Readable, collected: Collector, progress: (steps: number) => void): Promise<Recording> {
+  const salvage = new Salvage(file);
+  for await (const record of salvage.records()) {
+    if (record.type === "Schema") collected.schema(record);
+    else if (record.type === "Channel") collected.channel(record, collected.schemas.get(record.schemaId));
+    else if (!collected.message(record)) return collected.recording(...damageOf(salvage));
+    if (record.type === "Message" && collected.steps % 5000 === 0) {
       progress(collected.steps);
+      await new Promise((resolve) => setTimeout(resolve));
     }
-  } catch (error) {
-    if (collected.began === undefined) throw new Error(`${name} is no recording: ${String(error)}`);
   }
-  return collected.recording("The recording has no end: the server was killed, or is still recording. Everything up to its last whole chunk is shown.");
+  if (collected.began === undefined) throw new Error(`${collected.name} is no recording: no haptic step can be read in it.`);
+  const end = "The recording has no end: the server was killed, or is still recording. Everything up to its last whole chunk is shown.";
+  return collected.recording(...(salvage.ended ? [] : [end]), ...damageOf(salvage));
+}
+
+function damageOf({ damaged }: Salvage): string[] {
+  if (damaged === 0) return [];
+  const places = damaged === 1 ? "one place" : `${damaged} places`;
+  return [`The recording is damaged in ${places}: steps are missing. tendon-report says where, and tendon-replay --repair writes a whole file.`];
 }
 
 /** The NAME of /NAME/haptic/step; empty: the first device. */
@@ -149,10 +156,10 @@ class Collector {
     return this.from > 0 && this.began !== undefined ? `${this.name} ends before ${moment(this.from)}.` : `There is no haptic step in ${this.name}.`;
   }
 
-  recording(remark = ""): Recording {
+  recording(...remarks: string[]): Recording {
     const devices = [...this.#tracks.values()].filter((d) => d.track.length > 0).map(({ name, track }) => ({ name, track, frame: this.#frames.get(name) }));
     if (devices.length === 0) throw new Error(this.#none());
-    return { name: this.name, devices, scene: this.#scene, began: this.began ?? 0n, remarks: remark ? [remark] : [], from: this.from, next: this.#next };
+    return { name: this.name, devices, scene: this.#scene, began: this.began ?? 0n, remarks, from: this.from, next: this.#next };
   }
 }
 
@@ -287,11 +294,6 @@ function decodeScene(data: Uint8Array, fields: Map<string, number>): NonNullable
     else reader.skip(type, number);
   }
   return scene;
-}
-
-interface Readable {
-  size(): Promise<bigint>;
-  read(offset: bigint, size: bigint): Promise<Uint8Array>;
 }
 
 /** A file of the server: whole where it is small, else in the ranges that are asked for. */

@@ -6,7 +6,7 @@ import type { Shown } from "./space/stage.js";
 import type { HandleInfo } from "./stream.js";
 import { quantiles, type Track } from "./track.js";
 import { View, type Facts } from "./view.js";
-import { bytes, count, duration, moment, percent } from "./words.js";
+import { bytes, count, dateTime, duration, moment, percent } from "./words.js";
 
 interface Entry {
   readonly name: string;
@@ -153,7 +153,7 @@ class Run {
       ? h("div", { class: "alert part" }, `This recording is shown in parts. This part: ${moment(this.track.first)} to ${moment(this.track.last)}.`,
         from > 0 && h("a", { href: address }, "From the beginning"), next !== undefined && h("a", { href: `${address}?from=${next}` }, `Go on from ${moment(next)}`))
       : undefined;
-    const facts = [recording.began > 10n ** 17n ? when.toLocaleString() : "simulated", duration(this.track.last - this.track.first), `${count(this.track.length)} steps`, recording.scene?.version].filter(Boolean).join(" · ");
+    const facts = [recording.began > 10n ** 17n ? dateTime(when) : "simulated", duration(this.track.last - this.track.first), `${count(this.track.length)} steps`, recording.scene?.version].filter(Boolean).join(" · ");
     this.element = h("section", { class: "run", "data-run": recording.name },
       h("div", { class: "head" }, h("h2", { text: recording.name }), h("span", { class: "quiet", text: facts }), device),
       part,
@@ -235,7 +235,7 @@ function list(entries: readonly Entry[]): HTMLElement {
       compare.textContent = chosen.size === 1 ? "Choose one more to compare" : "Compare two";
     } });
     return h("tr", {}, h("td", {}, box), h("td", {}, h("a", { href: addressOf([entry.name]) }, entry.name)),
-      h("td", { text: bytes(entry.size_bytes) }), h("td", { class: "date", text: new Date(entry.modified_unix_s * 1e3).toLocaleString() }));
+      h("td", { text: bytes(entry.size_bytes) }), h("td", { class: "date", text: dateTime(new Date(entry.modified_unix_s * 1e3)) }));
   });
   return h("div", {}, h("div", { class: "bar" }, h("span", { class: "quiet", text: `${count(entries.length)} ${entries.length === 1 ? "recording" : "recordings. Open one, or choose two to see them side by side"}.` }), h("span", { class: "space" }), compare),
     h("div", { class: "list" }, h("table", {},

@@ -215,21 +215,47 @@ export function usualStep(track: Pick<Plotted<string>, "t" | "begin" | "length">
   return n < 2 ? 0.001 : (track.t[track.begin + n - 1]! - track.t[track.begin]!) / (n - 1);
 }
 
-/** The share of the steps in [from, to] that have each reason bit, and of those with any that limits the force. */
-export function shares(track: Track, from: number, to: number, limiting: number): { share: Map<number, number>; any: number; n: number } {
-  const [first, last] = [track.at(from), track.after(to)];
+/** The mode of a step with a fresh force (core/base/mode.h). */
+const kActive = 2;
+
+/** Of some steps. */
+export interface Shares {
+  /** Of them that have each reason bit. */ readonly share: Map<number, number>;
+  /** Of them with any that limits the force. */ readonly any: number;
+  /** N, median and 95th percentile: how much the force differed from the one asked for, in steps with any. */ readonly apart: readonly [number, number];
+  readonly n: number;
+  /** They reach from the first one with a fresh force to the last; else there was none, and they are all. */ readonly served: boolean;
+}
+
+/** Of the steps in [from, to], from the first one with a fresh force to the last: what comes before and after limits nothing. */
+export function shares(track: Track, from: number, to: number, limiting: number): Shares {
+  let [first, last] = [track.at(from), track.after(to)];
+  const all = [first, last] as const;
+  while (first < last && track.mode[first] !== kActive) ++first;
+  while (first < last && track.mode[last - 1] !== kActive) --last;
+  const served = first < last;
+  if (!served) [first, last] = all;
   const counts = new Uint32Array(32);
+  const [wx, wy, wz, ax, ay, az] = (["wx", "wy", "wz", "ax", "ay", "az"] as const).map((name) => track.column(name)) as [
+    Float32Array, Float32Array, Float32Array, Float32Array, Float32Array, Float32Array];
+  const apart: number[] = [];
   let any = 0;
   for (let i = first; i < last; ++i) {
     const bits = track.reasons[i]!;
     if (bits === 0) continue;
-    if ((bits & limiting) !== 0) ++any;
+    if ((bits & limiting) !== 0) {
+      ++any;
+      const by = Math.hypot(wx[i]! - ax[i]!, wy[i]! - ay[i]!, wz[i]! - az[i]!);
+      if (Number.isFinite(by)) apart.push(by);
+    }
     for (let b = 0; b < 16; ++b) counts[b]! += (bits >>> b) & 1;
   }
   const n = last - first;
   const share = new Map<number, number>();
   counts.forEach((c, bit) => c > 0 && share.set(bit, c / n));
-  return { share, any: n > 0 ? any / n : 0, n };
+  const sorted = Float64Array.from(apart).sort();
+  const at = (q: number): number => (sorted.length === 0 ? NaN : sorted[Math.min(sorted.length - 1, Math.floor(q * sorted.length))]!);
+  return { share, any: n > 0 ? any / n : 0, apart: [at(0.5), at(0.95)], n, served };
 }
 
 /** Quantiles of one column over the steps in [from, to]; NaN where no step has a number. */

@@ -34,7 +34,7 @@ export const kCharts: readonly ChartSpec[] = [
     ],
   },
   {
-    id: "energy", title: "Energy put in and not given back", unit: "mJ", scale: 1e3, positive: true, least: 1,
+    id: "energy", title: "Energy put in and not given back", unit: "mJ", scale: 1e3, positive: true, ownScale: true, least: 1,
     lines: [{ column: "energy", name: "energy", colour: "energy", width: 2, fill: "energy-fill" }],
   },
 ];

@@ -88,6 +88,11 @@ export const count = (value: number): string => Math.round(value).toLocaleString
 export const percent = (share: number): string =>
   !Number.isFinite(share) ? "–" : share > 0 && share < 0.001 ? "< 0.1 %" : `${digits(100 * share, share < 0.1 ? 2 : 3)} %`;
 
+/** "2026-11-23 14:05:09 UTC+1": in the time zone of the browser. Sweden writes the date as ISO 8601 does. */
+export const dateTime = (when: Date): string => when.toLocaleString("sv-SE", {
+  year: "numeric", month: "2-digit", day: "2-digit", hour: "2-digit", minute: "2-digit", second: "2-digit", timeZoneName: "short",
+});
+
 /** "64 µs", "1.02 ms", "2.1 s". */
 export function duration(seconds: number): string {
   if (!Number.isFinite(seconds)) return "–";

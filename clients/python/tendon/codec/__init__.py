@@ -5,11 +5,11 @@ Encoding trusts its input, except that texts and lists are cut to their bounds. 
 None for input that it refuses.
 """
 
-from .data import DataContent, Echo, read_data, write_data_head, write_frame
-from .frames import is_contact, is_radius
+from ..generated import Answer, Echo
+from .data import DataContent, read_data, write_data_head, write_frame
+from .frames import is_contact, is_radius, is_request
 from .handshake import (
     NO_COOKIE,
-    Answer,
     AnswerDatagram,
     HelloDatagram,
     RetryDatagram,
@@ -48,6 +48,7 @@ __all__ = [
     "encode_retry",
     "is_contact",
     "is_radius",
+    "is_request",
     "read_answer",
     "read_data",
     "read_hello",

@@ -9,18 +9,10 @@ from google.protobuf.message import DecodeError
 
 from .. import limits
 from .. import tendon_pb2 as pb
+from ..generated import Echo
 from ..messages import Frame
-from . import fields, frames
-
-
-@dataclass(frozen=True, slots=True)
-class Echo:
-    """The newest datagram that one end has received, reported back to its sender."""
-
-    sent_ns: int  # T1: when it was sent, on its sender's clock
-    received_ns: int  # T2: when it arrived, on its receiver's clock
-    packet_number: int
-    received_mask: int = 0  # bit i: packet (packet_number − 1 − i) has arrived too
+from . import frames, generated
+from .fields import OutOfBounds, parsed
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,7 +22,9 @@ class DataContent:
     sent_ns: int
     echo: Echo | None
     frames: list[Frame]  # in the order of the datagram, every value within bounds; of columns each state
-    invalid: int  # frames (and echoes) left out because a value was out of bounds
+    # The number of frames and echoes with a value out of bounds. They are left out, except for requests
+    # (see Control.invalid) and answers (see Code.INVALID) with a valid id.
+    invalid: int
 
 
 def write_data_head(sent_ns: int, echo: Echo | None) -> bytes:
@@ -40,11 +34,7 @@ def write_data_head(sent_ns: int, echo: Echo | None) -> bytes:
     """
     head = pb.Datagram(tx_time_ns=sent_ns)
     if echo is not None:
-        told = head.echo
-        told.peer_tx_time_ns = echo.sent_ns
-        told.rx_time_ns = echo.received_ns
-        told.peer_packet_number = echo.packet_number
-        told.received_mask = echo.received_mask
+        generated.write_echo(head.echo, echo)
     return bytes(head.SerializeToString())
 
 
@@ -54,30 +44,21 @@ def write_frame(frame: Frame) -> bytes:
     return bytes(message.SerializeToString())
 
 
-def _read_echo(message: pb.Echo) -> Echo:
-    return Echo(
-        sent_ns=fields.time(message.peer_tx_time_ns),
-        received_ns=fields.time(message.rx_time_ns),
-        packet_number=message.peer_packet_number,
-        received_mask=message.received_mask,
-    )
-
-
 def read_data(body: bytes) -> DataContent | None:
     """None when the body is malformed: not protobuf, too many frames, or without a usable tx_time."""
     try:
-        message = fields.parsed(pb.Datagram(), body)
-        sent_ns = fields.time(message.tx_time_ns)
-    except (DecodeError, fields.OutOfBounds):
+        message = parsed(pb.Datagram(), body)
+    except DecodeError:
         return None
-    if len(message.frames) > limits.MAX_FRAMES:
+    sent_ns = message.tx_time_ns
+    if not -limits.MAX_TIME_NS <= sent_ns <= limits.MAX_TIME_NS or len(message.frames) > limits.MAX_FRAMES:
         return None
     invalid = 0
     echo = None
     if message.HasField("echo"):
         try:
-            echo = _read_echo(message.echo)
-        except fields.OutOfBounds:
+            echo = generated.read_echo(message.echo)
+        except OutOfBounds:
             invalid += 1
     content: list[Frame] = []
     for piece in message.frames:
@@ -86,9 +67,12 @@ def read_data(body: bytes) -> DataContent | None:
                 content += frames.read_states(piece.states)
                 continue
             frame = frames.read(piece)
-        except fields.OutOfBounds:
+        except frames.Refused as refused:
             invalid += 1
-        else:
-            if frame is not None:
-                content.append(frame)
+            frame = refused.frame
+        except OutOfBounds:
+            invalid += 1
+            continue
+        if frame is not None:
+            content.append(frame)
     return DataContent(sent_ns, echo, content, invalid)

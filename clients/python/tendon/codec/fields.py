@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Single values of protobuf messages: each is checked against its bound. Out of bounds raises OutOfBounds."""
+"""Converts single fields of protobuf messages, for `generated`. Each function checks the bound of the field. If the
+value is out of bounds, it raises OutOfBounds with the name of the field."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from enum import IntEnum
+from collections.abc import Callable, Iterable, Sequence
 from math import hypot
 from typing import TypeVar
 
@@ -12,65 +12,107 @@ from google.protobuf.message import DecodeError
 
 from .. import limits
 from .. import tendon_pb2 as pb
-from ..messages import ChannelRule, Code, Hand, LampColour, Mat3, Mode, OutputKind, Quat, Role, Safety, Vec3, Vibration
+from ..generated import Mat3, Quat, Vec3
 
 
 class OutOfBounds(Exception):
-    """A value that no correct peer sends."""
+    """A value that is out of bounds."""
+
+    def __init__(self, field: str) -> None:
+        super().__init__(field)
+        self.field = field
 
 
-def number(value: float) -> float:
-    if not -limits.MAX_VALUE <= value <= limits.MAX_VALUE:  # nor is NaN
-        raise OutOfBounds
-    return value
+_Value = TypeVar("_Value")
+_Inner = TypeVar("_Inner")
 
 
-def magnitude(value: float) -> float:
-    if not 0 <= value <= limits.MAX_VALUE:
-        raise OutOfBounds
-    return value
+def read_inner(name: str, read: Callable[[_Inner], _Value], message: _Inner) -> _Value:
+    """Reads a message inside another one. An exception gets the name of its field as a prefix."""
+    try:
+        return read(message)
+    except OutOfBounds as error:
+        raise OutOfBounds(f"{name}.{error.field}") from None
 
 
-def vector(message: pb.Vec3) -> Vec3:
+def read_each(
+    name: str, messages: Sequence[_Inner], fewest: int, most: int, read: Callable[[_Inner], _Value]
+) -> tuple[_Value, ...]:
+    if not fewest <= len(messages) <= most:
+        raise OutOfBounds(name)
+    return tuple(read_inner(name, read, message) for message in messages)
+
+
+def read_vector(name: str, message: pb.Vec3) -> Vec3:
     x, y, z = message.x, message.y, message.z
-    most = limits.MAX_VALUE
-    if not (-most <= x <= most and -most <= y <= most and -most <= z <= most):
-        raise OutOfBounds
+    if not (-1e12 <= x <= 1e12 and -1e12 <= y <= 1e12 and -1e12 <= z <= 1e12):  # nor is NaN
+        raise OutOfBounds(name)
     return (x, y, z)
 
 
-def quaternion(message: pb.Quat) -> Quat:
+def write_vector(message: pb.Vec3, vector: Sequence[float]) -> None:
+    message.x, message.y, message.z = vector
+    message.SetInParent()  # the message is there even if all of it is zero
+
+
+def read_normal(name: str, message: pb.Vec3) -> Vec3:
+    """Reads a vector of length 1."""
+    normal = read_vector(name, message)
+    if not abs(hypot(*normal) - 1) <= limits.UNIT_TOLERANCE:
+        raise OutOfBounds(name)
+    return normal
+
+
+def read_box(name: str, low: Vec3 | None, high: Vec3 | None) -> tuple[Vec3, Vec3] | None:
+    """Returns both corners, or None if neither is there. Each coordinate of `low` is at most that of `high`."""
+    if low is None and high is None:
+        return None
+    if low is None or high is None or any(a > b for a, b in zip(low, high)):
+        raise OutOfBounds(name)
+    return (low, high)
+
+
+def read_rotation(name: str, message: pb.Quat) -> Quat:
     q = (message.w, message.x, message.y, message.z)
-    if not is_rotation(q):
-        raise OutOfBounds
+    if not abs(hypot(*q) - 1) <= limits.UNIT_TOLERANCE:  # nor is NaN
+        raise OutOfBounds(name)
     return q
 
 
-def is_rotation(q: Quat) -> bool:
-    return abs(hypot(*q) - 1) <= limits.UNIT_TOLERANCE  # nor is NaN
+def write_rotation(message: pb.Quat, q: Quat) -> None:
+    message.w, message.x, message.y, message.z = q
+    message.SetInParent()
 
 
-def is_setting(setting: LampColour | Vibration) -> bool:
-    """Whether a receiver accepts it."""
-    if isinstance(setting, LampColour):
-        return 0 <= setting.rgb <= 0xFFFFFF
-    return (
-        0 <= setting.amplitude <= 1
-        and 0 <= setting.duration_ms <= limits.MAX_VIBRATION_MS
-        and (setting.frequency == 0 or limits.MIN_VIBRATION_HZ <= setting.frequency <= limits.MAX_VIBRATION_HZ)
-    )
+def read_numbers(
+    name: str, entries: Sequence[float], fewest: int, most: int, least: float, largest: float
+) -> tuple[float, ...]:
+    if not fewest <= len(entries) <= most or not all(least <= entry <= largest for entry in entries):
+        raise OutOfBounds(name)
+    return tuple(entries)
 
 
-def matrix(entries: Sequence[float]) -> Mat3:
-    """A stiffness from 1, 3 or 9 entries."""
-    k = [number(entry) for entry in entries]
+def read_counts(name: str, entries: Sequence[int], fewest: int, most: int) -> tuple[int, ...]:
+    if not fewest <= len(entries) <= most:
+        raise OutOfBounds(name)
+    return tuple(entries)
+
+
+def read_padded(entries: tuple[float, ...], length: int) -> tuple[float, ...]:
+    """Returns `length` entries. Missing ones are 0."""
+    return entries[:length] + (0.0,) * (length - len(entries))
+
+
+def read_matrix(name: str, entries: Sequence[float]) -> Mat3:
+    """Reads a matrix from 1, 3 or 9 entries."""
+    k = read_numbers(name, entries, 1, 9, -1e12, 1e12)
     if len(k) == 1:
         return ((k[0], 0.0, 0.0), (0.0, k[0], 0.0), (0.0, 0.0, k[0]))
     if len(k) == 3:
         return ((k[0], 0.0, 0.0), (0.0, k[1], 0.0), (0.0, 0.0, k[2]))
     if len(k) == 9:
         return ((k[0], k[1], k[2]), (k[3], k[4], k[5]), (k[6], k[7], k[8]))
-    raise OutOfBounds
+    raise OutOfBounds(name)
 
 
 def entries(matrix: Mat3) -> list[float]:
@@ -81,58 +123,17 @@ def entries(matrix: Mat3) -> list[float]:
     return [a] if a == e == i else [a, e, i]
 
 
-def whole(value: int, least: int, most: int) -> int:
-    if not least <= value <= most:
-        raise OutOfBounds
-    return value
-
-
-def time(ns: int) -> int:
-    if not -limits.MAX_TIME_NS <= ns <= limits.MAX_TIME_NS:
-        raise OutOfBounds
-    return ns
-
-
-def length(ns: int) -> int:
-    """A length of time in ns, which is never below zero."""
-    return whole(ns, 0, limits.MAX_TIME_NS)
-
-
-def device(number: int) -> int:
-    return whole(number, 0, limits.MAX_DEVICES - 1)
-
-
-def channel(number: int) -> int:
-    return whole(number, 0, limits.MAX_CHANNELS - 1)
-
-
-def text(text: str, limit: int) -> str:
-    if len(text) > limit or len(text.encode()) > limit:
-        raise OutOfBounds
+def read_text(name: str, text: str, most: int) -> str:
+    if len(text) > most or len(text.encode()) > most:
+        raise OutOfBounds(name)
     return text
 
 
-def features(features: Sequence[str]) -> tuple[str, ...]:
-    if len(features) > limits.MAX_FEATURES:
-        raise OutOfBounds
-    return tuple(text(feature, limits.MAX_FEATURE) for feature in features)
-
-
-_Number = TypeVar("_Number", bound=IntEnum)
-MODES: dict[int, Mode] = {int(mode): mode for mode in Mode}
-CODES: dict[int, Code] = {int(code): code for code in Code}
-ROLES: dict[int, Role] = {int(role): role for role in Role}
-SAFETY: dict[int, Safety] = {int(safety): safety for safety in Safety}
-HANDS: dict[int, Hand] = {int(hand): hand for hand in Hand}
-OUTPUT_KINDS: dict[int, OutputKind] = {int(kind): kind for kind in OutputKind}
-RULES: dict[int, ChannelRule] = {int(rule): rule for rule in ChannelRule}
-
-
-def enum(known: dict[int, _Number], number: int) -> _Number:
-    value = known.get(number)
-    if value is None:
-        raise OutOfBounds
-    return value
+def read_texts(name: str, texts: Iterable[str], fewest: int, most: int, bytes: int) -> tuple[str, ...]:
+    read = tuple(read_text(name, text, bytes) for text in texts)
+    if not fewest <= len(read) <= most:
+        raise OutOfBounds(name)
+    return read
 
 
 def clip(text: str, limit: int) -> str:

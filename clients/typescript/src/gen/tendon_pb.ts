@@ -280,7 +280,7 @@ export type DeviceState = Message<"tendon.v1.DeviceState"> & {
   tick: bigint;
 
   /**
-   * [-2^60, 2^60]: when the position was sampled
+   * [-2^60, 2^60]: when the position was sampled; integrate with its differences
    *
    * @generated from field: sfixed64 sampled_ns = 2;
    */
@@ -297,7 +297,7 @@ export type DeviceState = Message<"tendon.v1.DeviceState"> & {
   velocityMps?: Vec3 | undefined;
 
   /**
-   * what the device really gives out from this step on
+   * on the hand, as the device really exerts it from this step on
    *
    * @generated from field: tendon.v1.Vec3 force_applied_n = 5;
    */
@@ -1163,7 +1163,7 @@ export type Couple = Message<"tendon.v1.Couple"> & {
   absolute: boolean;
 
   /**
-   * As the leader feels them; a stiffness of 0: that part of the handle is not coupled.
+   * As the leader feels them; a stiffness of 0: that part of the handle is not coupled:
    *
    * [0, 1e12]: of the orientations
    *
@@ -1574,6 +1574,8 @@ export const LeaseLostSchema: GenMessage<LeaseLost> = /*@__PURE__*/
   messageDesc(file_tendon, 28);
 
 /**
+ * The answer to a Control.
+ *
  * @generated from message tendon.v1.ControlAck
  */
 export type ControlAck = Message<"tendon.v1.ControlAck"> & {
@@ -1822,6 +1824,8 @@ export const HandleDescriptionSchema: GenMessage<HandleDescription> = /*@__PURE_
   messageDesc(file_tendon, 31);
 
 /**
+ * An output of a device, beside its forces.
+ *
  * @generated from message tendon.v1.OutputDescription
  */
 export type OutputDescription = Message<"tendon.v1.OutputDescription"> & {
@@ -1982,6 +1986,8 @@ export type LinkReport = Message<"tendon.v1.LinkReport"> & {
   longestGapNs: bigint;
 
   /**
+   * absent: not measured; the same for the next two
+   *
    * @generated from field: tendon.v1.Delays round_trip = 10;
    */
   roundTrip?: Delays | undefined;
@@ -2094,6 +2100,8 @@ export const LinkReportSchema: GenMessage<LinkReport> = /*@__PURE__*/
   messageDesc(file_tendon, 35);
 
 /**
+ * Two quantiles of a delay. They can be below zero if two clocks had to be compared.
+ *
  * @generated from message tendon.v1.Delays
  */
 export type Delays = Message<"tendon.v1.Delays"> & {
@@ -2619,7 +2627,7 @@ export type PeerReport = Message<"tendon.v1.PeerReport"> & {
   link?: LinkReport | undefined;
 
   /**
-   * Of the force of that time that is least sure, by its ForceCommand.error_n; the newest where none says an error
+   * Of the force of that time that is least sure, by its ForceCommand.error_n; the newest where none says an error:
    *
    * [0, 1e12]: absent: none says it
    *
@@ -2643,6 +2651,8 @@ export const PeerReportSchema: GenMessage<PeerReport> = /*@__PURE__*/
   messageDesc(file_tendon, 42);
 
 /**
+ * The first words of a client.
+ *
  * @generated from message tendon.v1.Hello
  */
 export type Hello = Message<"tendon.v1.Hello"> & {
@@ -2702,7 +2712,7 @@ export const HelloSchema: GenMessage<Hello> = /*@__PURE__*/
   messageDesc(file_tendon, 43);
 
 /**
- * With claims, `role` of the Hello is the highest among them.
+ * What a client wants. With claims, `role` of the Hello is the highest among them.
  *
  * @generated from message tendon.v1.Claim
  */
@@ -2764,6 +2774,8 @@ export const AnswerSchema: GenMessage<Answer> = /*@__PURE__*/
   messageDesc(file_tendon, 45);
 
 /**
+ * The server's yes.
+ *
  * @generated from message tendon.v1.Welcome
  */
 export type Welcome = Message<"tendon.v1.Welcome"> & {
@@ -2844,6 +2856,8 @@ export const WelcomeSchema: GenMessage<Welcome> = /*@__PURE__*/
   messageDesc(file_tendon, 46);
 
 /**
+ * The numbers of a device and a channel that were claimed by name.
+ *
  * @generated from message tendon.v1.Grant
  */
 export type Grant = Message<"tendon.v1.Grant"> & {
@@ -2877,6 +2891,8 @@ export const GrantSchema: GenMessage<Grant> = /*@__PURE__*/
   messageDesc(file_tendon, 47);
 
 /**
+ * The server's no.
+ *
  * @generated from message tendon.v1.Refused
  */
 export type Refused = Message<"tendon.v1.Refused"> & {
@@ -2913,6 +2929,8 @@ export const RefusedSchema: GenMessage<Refused> = /*@__PURE__*/
   messageDesc(file_tendon, 48);
 
 /**
+ * How the device renders the remote force.
+ *
  * @generated from enum tendon.v1.Mode
  */
 export enum Mode {
@@ -2973,6 +2991,8 @@ export const ModeSchema: GenEnum<Mode> = /*@__PURE__*/
   enumDesc(file_tendon, 0);
 
 /**
+ * Which end of a coupling.
+ *
  * @generated from enum tendon.v1.PortRole
  */
 export enum PortRole {
@@ -3001,6 +3021,8 @@ export const PortRoleSchema: GenEnum<PortRole> = /*@__PURE__*/
   enumDesc(file_tendon, 1);
 
 /**
+ * How two handles are coupled.
+ *
  * @generated from enum tendon.v1.CouplingMethod
  */
 export enum CouplingMethod {
@@ -3012,36 +3034,50 @@ export enum CouplingMethod {
   UNSPECIFIED = 0,
 
   /**
+   * a spring and a damper at both ends
+   *
    * @generated from enum value: COUPLING_METHOD_POSITION_POSITION = 1;
    */
   POSITION_POSITION = 1,
 
   /**
+   * the follower's spring; the leader feels the contact that the follower measures
+   *
    * @generated from enum value: COUPLING_METHOD_POSITION_FORCE = 2;
    */
   POSITION_FORCE = 2,
 
   /**
+   * wave variables, played out
+   *
    * @generated from enum value: COUPLING_METHOD_WAVES = 3;
    */
   WAVES = 3,
 
   /**
+   * the leader feels a model of the surface that the follower found
+   *
    * @generated from enum value: COUPLING_METHOD_SURFACE = 4;
    */
   SURFACE = 4,
 
   /**
+   * velocity there and force back, each paid from what the other took in
+   *
    * @generated from enum value: COUPLING_METHOD_PASSIVITY = 5;
    */
   PASSIVITY = 5,
 
   /**
+   * springs to late positions, stretched only as far as the account pays
+   *
    * @generated from enum value: COUPLING_METHOD_SET_POSITION = 6;
    */
   SET_POSITION = 6,
 
   /**
+   * the position of the leader is the speed of the follower
+   *
    * @generated from enum value: COUPLING_METHOD_RATE = 7;
    */
   RATE = 7,
@@ -3054,6 +3090,8 @@ export const CouplingMethodSchema: GenEnum<CouplingMethod> = /*@__PURE__*/
   enumDesc(file_tendon, 2);
 
 /**
+ * The kind of an output.
+ *
  * @generated from enum tendon.v1.OutputKind
  */
 export enum OutputKind {
@@ -3292,6 +3330,8 @@ export const SafetySchema: GenEnum<Safety> = /*@__PURE__*/
   enumDesc(file_tendon, 7);
 
 /**
+ * The reason for a refusal or an end.
+ *
  * @generated from enum tendon.v1.Code
  */
 export enum Code {

@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "clients/softbody/fem/elastic.h"
+#include "clients/softbody/fem/mesh.h"
+
+namespace tendon::softbody {
+
+/// A mesh read from a file. Messages use the element numbers of the file.
+struct FileMesh {
+  Mesh mesh;
+  std::vector<std::int64_t> numbers{};  ///< the number of each element in the file
+  std::vector<int> parts{};             ///< the part of each element, numbered from 0
+  std::vector<std::string> notes{};     ///< a sentence for each repair or warning
+};
+
+/// Joins the elements of a file into one body. Each repair is added to `notes`.
+///
+/// - If several elements have the same nodes, in any order, only the first is used. Format 2.2 of gmsh writes an
+///   element once for each physical group.
+/// - Nodes at the same place (kSamePlace) are merged. If `slits` is true, they are not merged, because the mesh may
+///   contain a slit or a crack. The note gives the number of places in both cases.
+///
+/// Elements that are connected by faces form a part. More than one part is not an error: see expect_held().
+///
+/// Throws std::invalid_argument "`name`: …" with the element numbers of the file if an element has two nodes at the
+/// same place, or if elements overlap: more than two share a face, or two are on the same side of a shared face.
+FileMesh joined(FileMesh file, bool slits, std::string_view name);
+
+/// Throws std::invalid_argument with the number and the place of an element if a part can move as a rigid body. To be
+/// held, a part needs three nodes that are not collinear. Each must be fixed or belong to a part that is held. A mesh
+/// with only one part is not checked.
+void expect_held(const FileMesh& file, const Fixed& fixed, std::string_view name);
+
+}  // namespace tendon::softbody
