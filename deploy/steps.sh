@@ -1,102 +1,146 @@
 # SPDX-License-Identifier: Apache-2.0
-# What deploy's scripts share: steps that say what they do, their place, how long they took and what is left. To be
-# sourced.
+# Steps for deploy's scripts. Each prints its place, its duration and an estimate of the remaining time. Source this file.
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 logs=$root/build/log
 jobs=$(nproc)
-# ccache recognises what another clone of this repository has compiled: paths below the root do not count, and a
-# precompiled header is as good as what it was made from.
-export CCACHE_BASEDIR=$root CCACHE_NOHASHDIR=1 CCACHE_SLOPPINESS=pch_defines,time_macros
 mkdir -p "$logs"
 cd "$root"
 
 say() { printf '[%4d s] %s\n' "$SECONDS" "$*"; }
 
-# plan NAME, with a line "seconds step" for each step on standard input: the steps in their order, and how long each
-# usually takes. The lengths of the last run that ended, which build/log remembers, are better: they are this
-# machine's. Without a plan a step does not know its place.
-plan_names=() plan_lengths=() plan_lasted=() plan_file=
-plan() {
-  local seconds name usual
-  plan_file=$logs/lengths-$1
-  while read -r usual name; do
-    seconds=$(awk -F '\t' -v name="$name" '$2 == name { print $1 }' "$plan_file" 2>/dev/null || true)
-    plan_names+=("$name")
-    plan_lengths+=("${seconds:-$usual}")
-  done
+log_of() { echo "$logs/${1//[^a-zA-Z0-9]/-}.log"; }
+
+# skip REASON: ends the current step as skipped.
+skip() {
+  echo "skipped: $*"
+  exit 77
 }
 
-# place_of STEP: its index in the plan, and nothing where there is none.
-place_of() {
-  local i
-  for i in "${!plan_names[@]}"; do
-    if [ "${plan_names[i]}" = "$1" ]; then echo "$i"; fi
-  done
+# configure PRESET [-B FOLDER] OPTION…: by CMake, which would forget the options where another compiler than the preset's
+# has configured the folder.
+configure() {
+  local folder=build/$1 wanted had fresh=()
+  if [ "${2-}" = -B ]; then folder=$3; fi
+  wanted=$(cmake -N --preset "$1" | sed -nE 's/^ *CMAKE_CXX_COMPILER="(.*)"/\1/p')
+  had=$(sed -nE 's/^CMAKE_CXX_COMPILER:[^=]*=(.*\/)?//p' "$folder/CMakeCache.txt" 2>/dev/null || true)
+  if [ "$had" != "$wanted" ]; then fresh=(--fresh); fi
+  cmake "${fresh[@]}" --preset "$@"
 }
 
-# seconds_left [INDEX [RUNNING]]: an estimate for the steps of the plan that have not ended, of which INDEX has run
-# for RUNNING seconds. The planned lengths, scaled by what the steps before took; one minute as planned is assumed
-# beside them, so that a short first step decides nothing.
+# The plan: step I is names[I], runs commands[I] (quoted words, after them whether it is loud), usually takes
+# lengths[I] and has taken lasted[I] seconds. results[I] is for the table.
+names=() commands=() lengths=() lasted=() results=()
+plan_file=/dev/null current=
+
+# plan NAME: from here on `add` makes a plan. What a step took the last time, which build/log remembers, is a better
+# estimate than what `add` says.
+plan() { plan_file=$logs/lengths-$1; }
+
+# add [--loud] SECONDS STEP COMMAND…: one more step, which takes SECONDS on two processors from nothing.
+add() {
+  local run=step seconds
+  if [ "$1" = --loud ]; then run=loud_step && shift; fi
+  seconds=$(awk -F '\t' -v name="$2" '$2 == name { print $1 }' "$plan_file" 2>/dev/null || true)
+  lengths+=("${seconds:-$1}")
+  names+=("$2")
+  commands+=("$(printf '%q ' $run "${@:2}")")
+}
+
+# add_packages SECONDS LIST…: the first step.
+add_packages() {
+  add "$1" packages
+  commands=("install_packages ${*:2}")
+}
+
+# run_steps: all of the plan. After the last step, or the one that fails, `finish` runs with 0 or 1.
+run_steps() {
+  for current in "${!names[@]}"; do eval "${commands[current]}"; done
+  current=
+  finish 0
+}
+finish() { return "$1"; }
+
+# seconds_left [RUNNING [DONE TOTAL]]: estimates the remaining time. The current step has run for RUNNING seconds, and
+# ninja or ctest has finished DONE of TOTAL items. A slow step lengthens the estimates of the others. A fast one changes
+# nothing, because it may have had little to do.
 seconds_left() {
-  local i planned=60 lasted=60 current=0 others=0
-  for i in "${!plan_names[@]}"; do
-    if [ -n "${plan_lasted[i]-}" ]; then
-      planned=$((planned + plan_lengths[i]))
-      lasted=$((lasted + plan_lasted[i]))
-    elif [ "$i" = "${1-}" ]; then
-      current=${plan_lengths[i]}
+  local i running=${1-0} counted=${2-0} total=${3-0} planned=60 took=60 step=0 others=0
+  for i in "${!names[@]}"; do
+    if [ -n "${lasted[i]-}" ]; then
+      if [[ ${names[i]} != packages ]]; then planned=$((planned + lengths[i])) took=$((took + lasted[i])); fi
+    elif [ "$i" = "$current" ]; then
+      step=${lengths[i]}
     else
-      others=$((others + plan_lengths[i]))
+      others=$((others + lengths[i]))
     fi
   done
-  current=$((current * lasted / planned - ${2-0}))
-  if [ $current -lt 0 ]; then current=0; fi
-  echo $((current + others * lasted / planned))
+  if [ $took -lt $planned ]; then took=$planned; fi
+  step=$((step * took / planned - running))
+  if [ $step -lt 0 ]; then step=0; fi
+  # The more is counted, the less the plan counts.
+  if [ "$counted" -gt 0 ]; then
+    step=$(((step * (total - counted) + running * (total - counted) / counted * counted) / total))
+  fi
+  echo $((step + others * took / planned))
 }
 
-# time_left [INDEX [RUNNING]]: the same in words.
+# time_left …: prints seconds_left in words, or nothing without a plan.
 time_left() {
-  local seconds
+  local seconds word=about
   seconds=$(seconds_left "$@")
+  if [ -n "$current" ] && [ $# = 1 ] && [ "$1" -gt "${lengths[current]}" ]; then word="at least"; fi
   if [ "$seconds" -ge 100 ]; then
-    echo "about $(((seconds + 59) / 60)) min left"
+    echo "$word $(((seconds + 59) / 60)) min left"
   elif [ "$seconds" -gt 0 ]; then
-    echo "about $seconds s left"
+    echo "$word $seconds s left"
+  elif [ "$word" != about ]; then
+    echo "longer than usual"
   fi
 }
 
 # begin STEP: prints the time, its place and its name, without an end of line.
 begin() {
-  local place
-  place=$(place_of "$1")
-  if [ -n "$place" ]; then
-    printf '[%4d s] %2d of %d  %-24s ' "$SECONDS" $((place + 1)) ${#plan_names[@]} "$1"
-  else
-    printf '[%4d s] %-24s ' "$SECONDS" "$1"
-  fi
+  local place=
+  if [ -n "$current" ]; then place=$(printf '%2d/%d ' $((current + 1)) ${#names[@]}); fi
+  printf '[%4d s] %s%-24s ' "$SECONDS" "$place" "$1"
 }
 
-# ended STEP SECONDS: for the estimate of this run and, after the plan's last step, of the next.
-ended() {
-  local place i
-  place=$(place_of "$1")
-  if [ -z "$place" ]; then return; fi
-  plan_lasted[place]=$2
-  if [ $((place + 1)) = ${#plan_names[@]} ]; then
-    for i in "${!plan_names[@]}"; do printf '%d\t%s\n' "${plan_lasted[i]-${plan_lengths[i]}}" "${plan_names[i]}"; done >"$plan_file"
+# end STEP SECONDS RESULT: its line, and what the table and the next estimate want to know.
+end() {
+  local i text
+  if [ -z "$current" ]; then
+    printf '%4d s  %s\n' "$2" "$3"
+    return
   fi
+  results[current]=$3
+  lasted[current]=$2
+  if [[ $3 = FAILED ]]; then
+    printf '%4d s  FAILED\n' "$2"
+    return
+  elif [[ $3 = skipped:* ]]; then
+    lengths[current]=0
+  else
+    for i in "${!names[@]}"; do
+      printf '%d\t%s\n' "${lasted[i]-${lengths[i]}}" "${names[i]}"
+    done >"$plan_file.new"
+    mv "$plan_file.new" "$plan_file"
+  fi
+  text=$(time_left)
+  printf '%4d s  %s%s\n' "$2" "$3" "${text:+; $text}"
 }
 
 # follow STEP LOG: on a terminal, until it is killed: each second the step's line with what ninja or ctest has
 # counted, and the time left.
 follow() {
-  local started=$SECONDS place counted
-  place=$(place_of "$1")
-  while sleep 1; do
+  local started=$SECONDS counted columns line
+  { columns=$(stty size <&3 2>/dev/null | cut -d ' ' -f 2); } 3>&1
+  while sleep 1 && kill -0 $$ 2>/dev/null; do
     counted=$(tail -c 2000 "$2" 2>/dev/null |
-      sed -nE 's/^\[([0-9]+)\/([0-9]+)\].*/\1 of \2/p; s/^ *([0-9]+)\/([0-9]+) Test .*/\1 of \2/p' | tail -n 1)
-    printf '\r\033[K%s%4d s  %s  %s' "$(SECONDS=$started begin "$1")" $((SECONDS - started)) "$counted" \
-      "$(time_left "$place" $((SECONDS - started)))"
+      sed -nE 's/^\[([0-9]+)\/([0-9]+)\].*/\1 \2/p; s/^ *([0-9]+)\/([0-9]+) Test .*/\1 \2/p' | tail -n 1)
+    # shellcheck disable=SC2086
+    line=$(SECONDS=$started begin "$1")$(printf '%4d s  %s%s' $((SECONDS - started)) "${counted:+${counted/ / of }  }" \
+      "$(time_left $((SECONDS - started)) $counted)")
+    printf '\r\033[K%s' "${line:0:$((${columns:-80} - 1))}"
   done
 }
 
@@ -104,7 +148,7 @@ follow() {
 # too. COMMAND stops at its first error: bash would overlook `set -e` in a condition, so it does not run in one.
 step() {
   local name=$1 started=$SECONDS log status follower=
-  log=$logs/${name//[^a-zA-Z0-9]/-}.log
+  log=$(log_of "$name")
   shift
   begin "$name"
   if [ -t 1 ]; then
@@ -121,15 +165,17 @@ step() {
     wait $follower 2>/dev/null || true
     printf '\r\033[K%s' "$(SECONDS=$started begin "$name")"
   fi
-  if [ $status = 0 ]; then
-    ended "$name" $((SECONDS - started))
-    printf '%4d s  %s\n' $((SECONDS - started)) "$(time_left)"
-  else
-    printf 'FAILED after %d s\n' $((SECONDS - started))
-    tail -n 60 "$log"
-    echo "$name failed; all of its output is in ${log#"$root/"}"
-    exit 1
-  fi
+  case $status in
+    0) end "$name" $((SECONDS - started)) "$(result_of "$log")" ;;
+    77) end "$name" $((SECONDS - started)) "$(grep '^skipped: ' "$log" | tail -n 1)" ;;
+    *)
+      end "$name" $((SECONDS - started)) FAILED
+      sed -E '/^ +Start +[0-9]+: |^ *[0-9]+\/[0-9]+ Test .*( Passed|\*\*\*Skipped) /d' "$log" | tail -n 100
+      echo "$name failed; all of its output is in ${log#"$root/"}"
+      finish 1 || true
+      exit 1
+      ;;
+  esac
 }
 
 # loud_step NAME COMMAND…: the same for one that prints for itself.
@@ -139,13 +185,85 @@ loud_step() {
   begin "$name"
   time_left
   "$@"
-  ended "$name" $((SECONDS - started))
+  if [ -n "$current" ]; then lasted[current]=$((SECONDS - started)); fi
 }
 
-# install_packages demo|test: also points this shell at build/sysroot, should the packages have had to go there.
+# result_of LOG: in a word, or in ctest's numbers. What ctest has skipped goes to LOG.skipped: its own log is gone after
+# the next run.
+result_of() {
+  local skipped=
+  skipped_tests "$1" >"$1.skipped"
+  if [ -s "$1.skipped" ]; then skipped=$(awk '{ n += $1 } END { print ", " n " of them skipped" }' "$1.skipped"); fi
+  awk -v skipped="$skipped" '
+    !result && /^[0-9]+% tests passed, .* out of [0-9]+$/ { result = ": " $NF " tests" skipped }
+    /^The following tests FAILED:/ { failed = 1; next }
+    failed && $2 == "-" { alone = alone " " $3; next }
+    { failed = 0 }
+    END { print "passed" result (alone ? "; only alone:" alone : "") }' "$1"
+}
+
+# skipped_tests LOG: prints "number reason" for the tests that ctest skipped. The reasons come from ctest's own log.
+skipped_tests() {
+  local folder last
+  folder=$(sed -n 's/^Test project //p' "$1" | tail -n 1)
+  [ -n "$folder" ] || return 0
+  last=$folder/Testing/Temporary/LastTest.first
+  [ -f "$last" ] || last=${last%first}log
+  awk '
+    FNR == 1 { file++ }
+    file == 1 && /^The following tests did not run:/ { inside = 1; next }
+    file == 1 && inside && match($0, /^[ \t]*[0-9]+ - /) {
+      why = / \(Disabled\)$/ ? "disabled: another test runs it, or a person" : "without a reason"
+      name = substr($0, RLENGTH + 1); sub(/ \([A-Za-z ]+\)$/, "", name); reason[name] = why; next
+    }
+    file == 1 { inside = 0; next }
+    match($0, /^[0-9]+\/[0-9]+ Testing: /) { name = substr($0, RLENGTH + 1); next }
+    !(name in reason) { next }
+    sub(/^skipped: /, "") { reason[name] = $0 }
+    after_skipped { reason[name] = $0; after_skipped = 0 }
+    /: Skipped$/ { after_skipped = 1 }
+    END { for (name in reason) number[reason[name]]++; for (r in number) print number[r], r }
+  ' "$1" "$last" | sort -rn
+}
+
+# table: prints each step with its seconds and its result, and the reason for each skipped part, drill and test.
+table() {
+  local i name log line shown=
+  printf '\n%-24s %7s  %s\n' step seconds result
+  for i in "${!names[@]}"; do
+    name=${names[i]}
+    printf '%-24s %7s  %s\n' "$name" "${lasted[i]--}" "${results[i]-not run}"
+    if [[ ${results[i]-skipped} = skipped* ]]; then continue; fi
+    log=$(log_of "$name")
+    while read -r line; do
+      if [[ $shown != *"|$line|"* ]]; then printf '%35s%s\n' '' "$line"; fi
+      shown+="|$line|"
+    done < <(sed -nE 's/^.*[Ll]eft out: (.*)/left out: \1/p' "$log")
+    if [[ ${results[i]} = *,* ]]; then sed -E "s/^([0-9]+) /$(printf '%35s' '')\\1 × /" "$log.skipped"; fi
+  done
+  printf '%-24s %7d\n' total "$SECONDS"
+}
+
+# ctest_summaries: prints ctest's closing lines for each test step, without the names of skipped tests. If the
+# failed tests were run again, only the lines of the second run are printed.
+ctest_summaries() {
+  local i
+  for i in "${!names[@]}"; do
+    if [[ ${names[i]} != test\ * || ${results[i]-skipped} = skipped* ]]; then continue; fi
+    printf '\n%s:\n' "${names[i]}"
+    awk '/^once more, alone:/ { inside = 0; text = "" }
+      /^[0-9]+% tests passed/ { inside = 1 } /^The following tests did not run:/ { inside = 0 }
+      /^The following tests FAILED:/ { inside = 1 } inside { text = text $0 "\n" }
+      END { printf "%s", text }' "$(log_of "${names[i]}")"
+  done
+}
+
+# install_packages LIST…: also points this shell at build/sysroot, should the packages have had to go there. sudo asks
+# for its password before the step has a line.
 install_packages() {
-  loud_step "packages" deploy/setup "$1"
-  if [ -f build/sysroot/env ]; then
-    . build/sysroot/env
+  if [ "$(id -u)" != 0 ] && [ -t 0 ] && command -v sudo >/dev/null && ! deploy/setup --check "$@" >/dev/null; then
+    sudo -v || true
   fi
+  step "packages" deploy/setup "$@"
+  if [ -f build/sysroot/env ]; then . build/sysroot/env; fi
 }

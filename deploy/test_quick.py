@@ -21,7 +21,7 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent
 BUILD = ROOT / "build/release"
 PROPERTY_CASES = 500
 # Whole processes, worlds and long measurements: only when one of their own files has changed.
-SLOW = {"bench-smoke", "conformance", "e2e", "hard", "world"}
+SLOW = {"bench-smoke", "conformance", "e2e", "extended", "hard", "world"}
 STARTED = time.monotonic()
 
 
@@ -240,7 +240,7 @@ def main():
     built = set().union(*(graph.linked[target] for target in targets)) if targets else set()
     not_linked = [name for name in graph.linked if graph.linked[name] & touched and name not in targets]
     say(f"passed: {len(chosen)} of {len(tests)} tests")
-    print(f"  Not run: the other {left} tests, clang-tidy, the sanitizers, the READMEs' commands, the Debian packages"
+    print(f"  Not run: the other {left} tests, the READMEs' commands, what deploy/test --all adds"
           + (f"; properties had {PROPERTY_CASES} cases" if fewer else "") + ".")
     if missing:
         print(f"  Not run: the commands in documents, because {len(missing)} programs are not built.")

@@ -23,7 +23,7 @@ if(TARGET tendon-dash)
 endif()
 # By its installed name, as its manual page has it.
 set(ship ${CMAKE_RUNTIME_OUTPUT_DIRECTORY}/tendon-ship)
-configure_file(deploy/recordings/ship ${ship} COPYONLY)
+configure_file(deploy/recordings/ship ${ship} @ONLY)
 install(PROGRAMS ${ship} DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT programs)
 if(TARGET tendon-fem-worker)
   install(TARGETS tendon-fem-worker COMPONENT worker)
@@ -39,18 +39,15 @@ install(FILES deploy/systemd/tendond.service deploy/recordings/tendon-ship.servi
         DESTINATION lib/systemd/system COMPONENT machine EXCLUDE_FROM_ALL)
 install(FILES deploy/scenes/demo.toml DESTINATION /etc/tendon RENAME scene.toml COMPONENT machine EXCLUDE_FROM_ALL)
 
-# Every program has a manual page, which is what --help says, and completion: one file completes all, and bash-completion looks
+# Every program has a manual page, which is what --help says (manual), and completion: one file completes all, and bash-completion looks
 # for one by the name of each.
-find_program(HELP2MAN help2man)
-if(NOT HELP2MAN)
-  message(STATUS "No help2man: no manual pages")
-endif()
+tendon_needs(has_help2man "manual pages" help2man)
 set(completions ${CMAKE_INSTALL_DATADIR}/bash-completion/completions)
 set(pages)
 # describe_program(NAME COMPONENT [FILE]): FILE where it is no target.
 function(describe_program program component)
   install(FILES deploy/packaging/completion.bash DESTINATION ${completions} RENAME ${program} COMPONENT ${component})
-  if(NOT HELP2MAN)
+  if(NOT has_help2man)
     return()
   endif()
   set(file ${ARGN})
@@ -61,11 +58,10 @@ function(describe_program program component)
   endif()
   set(page ${CMAKE_CURRENT_BINARY_DIR}/man/${program}.1)
   add_custom_command(OUTPUT ${page}.gz
-    COMMAND ${HELP2MAN} --no-info --no-discard-stderr --section 1 --version-string ${PROJECT_VERSION}
-            --name "$<IF:$<STREQUAL:${program},tendond>,networked haptics server,part of the Tendon haptics server>"
-            --output ${page} ${file}
+    COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/deploy/packaging/manual ${TENDON_HELP2MAN} ${PROJECT_VERSION}
+            "$<IF:$<STREQUAL:${program},tendond>,networked haptics server,part of the Tendon haptics server>" ${file} ${page}
     COMMAND gzip -9nf ${page}
-    DEPENDS ${depends} VERBATIM)
+    DEPENDS ${depends} ${CMAKE_CURRENT_SOURCE_DIR}/deploy/packaging/manual VERBATIM)
   install(FILES ${page}.gz DESTINATION ${CMAKE_INSTALL_MANDIR}/man1 COMPONENT ${component})
   set(pages ${pages} ${page}.gz PARENT_SCOPE)
 endfunction()
@@ -80,7 +76,7 @@ endif()
 add_custom_target(man ALL DEPENDS ${pages})
 
 # The client's library. Headers keep the names that they have here: #include "clients/cpp/run.h".
-set(libraries tendon_client tendon_server_name tendon_protocol tendon_address tendon_proto tendon_core tendon_core_design)
+set(libraries tendon_client tendon_output tendon_server_name tendon_usage tendon_protocol tendon_address tendon_proto tendon_core tendon_core_design)
 foreach(library ${libraries})
   string(REPLACE tendon_ "" name ${library})
   set_target_properties(${library} PROPERTIES EXPORT_NAME ${name})
@@ -130,7 +126,7 @@ set(CPACK_DEBIAN_RUN_PACKAGE_SECTION science)
 set(CPACK_DEBIAN_RUN_PACKAGE_SHLIBDEPS ON)
 # What tendond loads for a scene that lists it, which no tool sees in the program.
 set(CPACK_DEBIAN_RUN_PACKAGE_DEPENDS "libsystemd0")
-if(TARGET PkgConfig::libusb)
+if(TARGET tendon::libusb)
   string(APPEND CPACK_DEBIAN_RUN_PACKAGE_DEPENDS ", libusb-1.0-0")
 endif()
 set(CPACK_DEBIAN_RUN_PACKAGE_RECOMMENDS "gnuplot-nox, libopenblas0-pthread")
