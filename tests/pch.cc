@@ -1,2 +1,2 @@
 // SPDX-License-Identifier: Apache-2.0
-// Only there to carry the precompiled headers of the tests (tests/CMakeLists.txt).
+// This file is used to compile the precompiled headers for the optimized tests (see tests/CMakeLists.txt).

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <limits>
 
+#include "tests/support/refusal.h"
+
 namespace tendon::haptic_controller_test {
 namespace {
 
@@ -408,6 +410,16 @@ TEST(HapticController, StaysWithinTheDevicesForceAndSaysSo) {
   EXPECT_FALSE(step.reasons.has(Reason::kEnergy));
 }
 
+TEST(HapticController, ATorqueForADeviceWithoutAnOrientationChangesNothing) {
+  HapticController controller(config());
+  RemoteForce remote;
+  remote.sequence = 1;
+  remote.valid_for = milliseconds(500);
+  remote.torque.emplace().torque = Vec3(0, 0, 0.01);
+  controller.observe(remote);
+  EXPECT_TRUE(controller.step({LocalTime(milliseconds(1)), Vec3::Zero(), Vec3::Zero()}, Vec3::Zero()).reasons.empty());
+}
+
 TEST(HapticController, NamesTheBoundThatDecidedAndNotTheLooserOnes) {
   HapticController::Config c = config();
   c.max_force = 2;
@@ -467,18 +479,13 @@ TEST(HapticController, ReportsTheAgeOfTheWholeLoop) {
 }
 
 TEST(HapticController, RefusesImpossibleLimits) {
-  HapticController::Config c = config();
-  c.max_force = 0;
-  EXPECT_THROW(HapticController{c}, std::invalid_argument);
-  c = config();
-  c.max_slew = -1;
-  EXPECT_THROW(HapticController{c}, std::invalid_argument);
-  c = config();
-  c.limiter.longest_hold = Duration::zero();
-  EXPECT_THROW(HapticController{c}, std::invalid_argument);
-  c = config();
-  c.limiter.friction.viscous = -1;
-  EXPECT_THROW(HapticController{c}, std::invalid_argument);
+  expect_refusals(config(), Makes<HapticController>(),
+                  {
+                      {"max_force = 0", [](auto& c) { c.max_force = 0; }},
+                      {"max_slew = -1", [](auto& c) { c.max_slew = -1; }},
+                      {"longest_hold = 0", [](auto& c) { c.limiter.longest_hold = Duration::zero(); }},
+                      {"viscous = -1", [](auto& c) { c.limiter.friction.viscous = -1; }},
+                  });
 }
 
 HapticController::Config tool_config() {

@@ -72,7 +72,7 @@ TEST(Ladder, TheTimesOfThePageAreThoseOfTheCode) {
 }
 
 /// A hand that creeps into a wall whose engine falls silent and comes back.
-class Walk : public testing::Test {
+class Walk : public ::testing::Test {
  protected:
   static constexpr Duration kValid = milliseconds(60);
   static constexpr double kSlew = 200;  // N/s: 0.2 N in a step of 1 ms

@@ -129,7 +129,7 @@ Outcome run(std::uint64_t seed, Law limiter, bool late = false) {
   return outcome;
 }
 
-class Passivity : public testing::TestWithParam<Law> {};
+class Passivity : public ::testing::TestWithParam<Law> {};
 
 TEST_P(Passivity, NoHandNoForceAndNoTimingMakesTheLedgerNegative) {
   const auto limiter = GetParam();
@@ -267,13 +267,13 @@ std::vector<Law> passive_laws() {
   return passive;
 }
 
-std::string name_for_test(const testing::TestParamInfo<Law>& law) {
+std::string name_for_test(const ::testing::TestParamInfo<Law>& law) {
   std::string name;  // GoogleTest takes letters and digits only
   for (const char c : info(law.param).name) name += c == '-' ? "_" : c == '+' ? "Plus" : std::string(1, c);
   return name;
 }
 
-INSTANTIATE_TEST_SUITE_P(Laws, Passivity, testing::ValuesIn(passive_laws()), name_for_test);
+INSTANTIATE_TEST_SUITE_P(Laws, Passivity, ::testing::ValuesIn(passive_laws()), name_for_test);
 
 }  // namespace
 }  // namespace tendon::passivity_test

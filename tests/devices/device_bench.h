@@ -2,9 +2,9 @@
 #pragma once
 
 #include <cstdint>
-#include <random>
 
 #include "devices/simulated/simulated_device.h"
+#include "tests/support/dice.h"
 
 namespace tendon {
 
@@ -33,19 +33,9 @@ class Bench {
   SimulatedDevice device_;
 };
 
-/// Numbers from one seed, the same with every standard library.
-class Dice {
- public:
-  explicit Dice(std::uint64_t seed) : engine_(seed) {}
-
-  double uniform(double low, double high) {
-    return low + (high - low) * static_cast<double>(engine_() >> 11) * 0x1.0p-53;
-  }
-  Vec3 vector(double size) { return {uniform(-size, size), uniform(-size, size), uniform(-size, size)}; }
-  bool chance(double p) { return uniform(0, 1) < p; }
-
- private:
-  std::mt19937_64 engine_;
-};
+/// Returns a vector with components from −`size` to `size`.
+inline Vec3 random_vector(Dice& dice, double size) {
+  return {dice.within(-size, size), dice.within(-size, size), dice.within(-size, size)};
+}
 
 }  // namespace tendon

@@ -1,10 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <gtest/gtest.h>
+
 #include <algorithm>
+#include <chrono>
 #include <optional>
 
 #include "devices/device.h"
+#include "devices/safety/safe_device.h"
 
 namespace tendon {
 
@@ -49,5 +53,43 @@ struct DriverBench {
  private:
   Bench& bench() { return static_cast<Bench&>(*this); }
 };
+
+/// Checks that a device behind the safety layer is only driven while it is armed, and that it can be homed and armed
+/// again after it was unplugged. `home` is called to home the device, and `advance` to step the model to `now`.
+template <class Bench, class Model, class Home, class Advance>
+void expect_homing_and_arming_after_a_replug(Bench& bench, Model& model, Home home, Advance advance) {
+  using std::chrono::milliseconds;
+  const Vec3 force(1, -2, 2);
+  SafeDevice safe({}, bench.device);
+  const auto run = [&](Duration time, const Vec3& asked) {
+    for (const LocalTime end = bench.now + time; bench.now < end;) {
+      advance(bench.now += milliseconds(1));
+      safe.read(bench.now);
+      safe.apply(asked);
+      ASSERT_TRUE(!model.pushes() || safe.status().state == SafetyState::kArmed);
+    }
+  };
+  for (int plugged = 0; plugged < 2; ++plugged) {
+    run(milliseconds(2000), Vec3::Zero());
+    ASSERT_EQ(safe.state(), Device::State::kUnhomed);
+    safe.arm();
+    run(milliseconds(200), Vec3::Zero());
+    EXPECT_NE(safe.status().state, SafetyState::kArmed) << "not homed";
+    home();
+    run(milliseconds(2000), force);
+    EXPECT_EQ(safe.state(), Device::State::kHomed);
+    EXPECT_FALSE(model.pushes()) << "homed, and not armed";
+    safe.arm();
+    run(milliseconds(200), Vec3::Zero());
+    ASSERT_EQ(safe.status().state, SafetyState::kArmed);
+    run(milliseconds(200), force);
+    EXPECT_TRUE(model.pushes());
+    model.unplug();
+    model.plug();
+    run(milliseconds(1), force);
+    EXPECT_EQ(safe.status().state, SafetyState::kFault);
+    EXPECT_EQ(safe.status().last_fault, SafetyFault::kDeviceLost);
+  }
+}
 
 }  // namespace tendon

@@ -7,17 +7,10 @@
 #include <stdexcept>
 #include <string>
 
+#include "tests/support/refusal.h"
+
 namespace tendon::late_library_test {
 namespace {
-
-std::string complaint(auto use) {
-  try {
-    use();
-  } catch (const std::runtime_error& error) {
-    return error.what();
-  }
-  return "";
-}
 
 TEST(LateLibrary, GivesItsFunctionsByName) {
   const LateLibrary mathematics("libm.so.6");
@@ -26,14 +19,14 @@ TEST(LateLibrary, GivesItsFunctionsByName) {
 }
 
 TEST(LateLibrary, ThatIsMissingIsNamedWithWhatIsExpected) {
-  const std::string text = complaint([] { LateLibrary("libtendon-none.so.7"); });
+  const std::string text = thrown_by<std::runtime_error>([] { LateLibrary("libtendon-none.so.7"); });
   EXPECT_NE(text.find("libtendon-none.so.7"), std::string::npos) << text;
   EXPECT_NE(text.find("; expected it to be installed"), std::string::npos) << text;
 }
 
 TEST(LateLibrary, WithoutAFunctionSaysWhich) {
   const LateLibrary mathematics("libm.so.6");
-  const std::string text = complaint([&] { static_cast<void>(mathematics["tendon_none"]); });
+  const std::string text = thrown_by<std::runtime_error>([&] { static_cast<void>(mathematics["tendon_none"]); });
   EXPECT_NE(text.find("tendon_none"), std::string::npos) << text;
 }
 

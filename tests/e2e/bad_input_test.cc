@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Bad input of an operator is answered by a sentence that says what to do, on stderr, and exit code 2.
+// If the input is not valid, the program prints an error message to stderr. The exit code is 2 if the command line or
+// the scene is wrong, and 1 if a file or a port cannot be used.
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 
@@ -23,13 +24,14 @@ struct BadInput {
   std::string program;
   std::vector<std::string> arguments;
   std::vector<std::string> says;
+  int exit_code = 2;
 };
 
 void expect_refusals(const std::filesystem::path& folder, const std::vector<BadInput>& inputs) {
   for (const BadInput& input : inputs) {
     SCOPED_TRACE(input.program + ": " + input.what);
     Process process(program(input.program), input.arguments, folder);
-    EXPECT_EQ(process.wait(), 2);
+    EXPECT_EQ(process.wait(), input.exit_code);
     EXPECT_EQ(process.out(), "");
     for (const std::string& words : input.says) {
       EXPECT_NE(process.err().find(words), std::string::npos) << "not \"" << words << "\" in: " << process.err();
@@ -39,7 +41,7 @@ void expect_refusals(const std::filesystem::path& folder, const std::vector<BadI
 
 constexpr std::string_view kFalcon = "[device]\nkind = \"simulated\"\nprofile = \"falcon\"\n";
 
-TEST(BadInput, OfTendondIsAnsweredWithWhatIsWrongAndExitCode2) {
+TEST(BadInput, OfTendondIsAnsweredWithWhatIsWrong) {
   const ScratchFolder folder;
   const auto path = [&](const std::string& name) { return (folder.path() / name).string(); };
   const std::string demo = demo_scene().string();
@@ -53,10 +55,10 @@ TEST(BadInput, OfTendondIsAnsweredWithWhatIsWrongAndExitCode2) {
   expect_refusals(
       folder.path(),
       {
-          {"no scene named", "tendond", {}, {"scene", "required"}},
-          {"missing scene file", "tendond", {path("none.toml")}, {"cannot read", "none.toml", "No such file"}},
-          {"a named pipe as scene", "tendond", {pipe}, {"cannot read", "named pipe, expected a regular file"}},
-          {"a folder as scene", "tendond", {path("")}, {"cannot read", "Is a directory"}},
+          {"no scene named", "tendond", {}, {"SCENE", "required"}},
+          {"missing scene file", "tendond", {path("none.toml")}, {"cannot read", "none.toml", "No such file"}, 1},
+          {"a named pipe as scene", "tendond", {pipe}, {"cannot read", "named pipe, expected a regular file"}, 1},
+          {"a folder as scene", "tendond", {path("")}, {"cannot read", "Is a directory"}, 1},
           {"not TOML", "tendond", {syntax}, {syntax + ":1"}},
           {"key in the wrong unit", "tendond", {unit}, {unit + ":5: loop.period_ms: unknown key", "period_us"}},
           {"unknown key", "tendond", {unknown}, {unknown + ":5: loop.colour: unknown key"}},
@@ -64,18 +66,26 @@ TEST(BadInput, OfTendondIsAnsweredWithWhatIsWrongAndExitCode2) {
           {"recording into a missing folder",
            "tendond",
            {demo, "--listen", "127.0.0.1:0", "--record", path("none/run.mcap")},
-           {"cannot write recording " + path("none/run.mcap"), "No such file or directory"}},
+           {"cannot write recording " + path("none/run.mcap"), "No such file or directory"},
+           1},
           {"recording over a folder",
            "tendond",
            {demo, "--listen", "127.0.0.1:0", "--record", path("")},
-           {"cannot write recording", "Is a directory"}},
+           {"cannot write recording", "Is a directory"},
+           1},
           {"unknown option", "tendond", {demo, "--recrod", "run.mcap"}, {"--recrod"}},
           {"no address", "tendond", {demo, "--listen", "here"}, {"expected HOST:PORT like 127.0.0.1:47100", "here"}},
           {"negative duration", "tendond", {demo, "--duration-s", "-1"}, {"--duration-s", "-1"}},
+          {"empty duration",
+           "tendond",
+           {demo, "--listen", "127.0.0.1:0", "--duration-s", ""},
+           {"--duration-s: expected a value, got an empty text"}},
+          {"decimal comma", "tendond", {demo, "--duration-s", "1,5"}, {"--duration-s", "1,5", "(a decimal point?)"}},
+          {"IPv6 without brackets", "tendond", {demo, "--listen", "::1:47100"}, {"or [::1]:47100"}},
       });
 }
 
-TEST(BadInput, OfTheInjectorIsAnsweredWithWhatIsWrongAndExitCode2) {
+TEST(BadInput, OfTheInjectorIsAnsweredWithWhatIsWrong) {
   const ScratchFolder folder;
   const std::vector<std::string> ends = {"--listen", "127.0.0.1:0", "--to", "127.0.0.1:47100"};
   const auto with = [&](const std::string& option, const std::string& value) {
@@ -91,7 +101,7 @@ TEST(BadInput, OfTheInjectorIsAnsweredWithWhatIsWrongAndExitCode2) {
           {"loss of 150 %", "tendon-inject", with("--profile", "loss=150%"), {"--profile: loss", "150%"}},
           {"negative delay", "tendon-inject", with("--up", "delay=-5ms"), {"--up: delay", "-5ms"}},
           {"delay that is no number", "tendon-inject", with("--down", "delay=some"), {"--down: delay", "some"}},
-          {"no such histogram", "tendon-inject", with("--profile", "delay=histogram(none.csv)"), {"none.csv"}},
+          {"no such histogram", "tendon-inject", with("--profile", "delay=histogram(none.csv)"), {"none.csv"}, 1},
           {"no such name", "tendon-inject", with("--profile", "wifi-ugly"), {"wifi-ugly", "wifi-bad"}},
           {"a network that is said twice",
            "tendon-inject",
@@ -101,12 +111,13 @@ TEST(BadInput, OfTheInjectorIsAnsweredWithWhatIsWrongAndExitCode2) {
              return arguments;
            }(),
            {"--replay", "--profile"}},
-          {"no such trace", "tendon-inject", with("--replay", "none.csv"), {"none.csv"}},
-          {"no such scenario", "tendon-inject", with("--scenario", "none.toml"), {"none.toml"}},
+          {"no such trace", "tendon-inject", with("--replay", "none.csv"), {"none.csv"}, 1},
+          {"no such scenario", "tendon-inject", with("--scenario", "none.toml"), {"none.toml"}, 1},
           {"recording into a missing folder",
            "tendon-inject",
            with("--record", "none/run.csv"),
-           {"none/run.csv", "No such file or directory"}},
+           {"none/run.csv", "there is no folder none"},
+           1},
           {"a server without a port",
            "tendon-inject",
            {"--listen", "127.0.0.1:0", "--to", "127.0.0.1:0"},
@@ -124,7 +135,7 @@ TEST(BadInput, OfTheInjectorIsAnsweredWithWhatIsWrongAndExitCode2) {
       });
 }
 
-TEST(BadInput, OfAClientIsAnsweredWithWhatIsWrongAndExitCode2) {
+TEST(BadInput, OfAClientIsAnsweredWithWhatIsWrong) {
   const ScratchFolder folder;
   std::vector<BadInput> inputs;
   for (const std::string client : {"virtual_wall", "echo_motion"}) {
@@ -132,6 +143,8 @@ TEST(BadInput, OfAClientIsAnsweredWithWhatIsWrongAndExitCode2) {
     inputs.push_back({"bad name", client, {"--server", "dns-sd:a."}, {"--server", "expected NAME", "a domain"}});
     inputs.push_back({"port too high", client, {"--server", "127.0.0.1:70000"}, {"--server", "127.0.0.1:70000"}});
     inputs.push_back({"negative rate", client, {"--rate-hz", "-1"}, {"--rate-hz", "-1"}});
+    inputs.push_back({"empty rate", client, {"--rate-hz", ""}, {"--rate-hz: ", "\"\""}});
+    inputs.push_back({"decimal comma", client, {"--rate-hz", "1,5"}, {"--rate-hz", "(a decimal point?)"}});
     inputs.push_back({"unknown option", client, {"--sevrer", "127.0.0.1:47100"}, {"--sevrer"}});
   }
   inputs.push_back({"not a number", "virtual_wall", {"--stiffness-n-per-m", "nan"}, {"--stiffness-n-per-m", "nan"}});
@@ -145,11 +158,13 @@ TEST(BadInput, ASecondServerOnAUsedPortSaysSoAndTouchesNoRecording) {
   expect_refusals(folder.path(), {{"port in use",
                                    "tendond",
                                    {demo_scene().string(), "--listen", server.address(), "--record", file.string()},
-                                   {"cannot listen on " + server.address() + ": Address already in use"}}});
+                                   {"cannot listen on " + server.address() + ": Address already in use"},
+                                   1}});
   expect_refusals(folder.path(), {{"port in use",
                                    "tendon-inject",
                                    {"--listen", server.address(), "--to", "127.0.0.1:9"},
-                                   {"cannot listen on " + server.address() + ": Address already in use"}}});
+                                   {"cannot listen on " + server.address() + ": Address already in use"},
+                                   1}});
   const std::string end = server.stop();
   EXPECT_EQ(read_recording(file).steps.size(), count_in(end, "steps"));
 }

@@ -121,7 +121,7 @@ TEST_F(Discovery, ANameLeadsToItsOwnDeviceOfSeveral) {
   carry();
   Process wall(program("virtual_wall"), to_the_name({"--key", "keys/wall.key"}), folder.path(), environment);
   wall.wait_for_line("connected to falcon");
-  std::this_thread::sleep_for(std::chrono::seconds(1));  // forces go out meanwhile
+  std::this_thread::sleep_for(std::chrono::milliseconds(300));  // forces go out meanwhile
   wall.signal(SIGTERM);
   EXPECT_EQ(wall.wait(), 0);
   const std::string end = both.stop();

@@ -97,25 +97,6 @@ TEST_P(NetworkThreads, OfManyCountedDevicesEachIsFoundByItsName) {
 
 INSTANTIATE_TEST_SUITE_P(Are, NetworkThreads, ::testing::Values(1, 2));
 
-TEST(Engines, TwoDevicesEachHaveTheirOwnHandAndEngine) {
-  const ScratchFolder folder;
-  const auto left = folder.path() / "left.toml";
-  const auto right = folder.path() / "right.toml";
-  write(left, kPressingHand);
-  write(right, kPressingHand);
-  Server server(folder.path(), left, {right.string()});
-  Client left_echo("echo_motion", server.address(), folder.path(), {"--json"});
-  Client right_echo("echo_motion", server.address(), folder.path(), {"--json", "--device", "right"});
-  Client wall("virtual_wall", server.address(), folder.path(), {"--device", "right"});
-  wait_until_felt(right_echo, 0.5);
-  Client other("virtual_wall", server.address(), folder.path());  // the first device
-  wait_until_felt(left_echo, 0.5);
-  const std::string end = server.stop();
-  EXPECT_NE(end.find(R"({"name":"left","steps":)"), std::string::npos) << end;
-  EXPECT_NE(end.find(R"({"name":"right","steps":)"), std::string::npos) << end;
-  EXPECT_EQ(end.find(R"("forces":0)"), std::string::npos) << "both devices had forces: " << end;
-}
-
 /// The lines of `tendond --json` that tell of sessions.
 std::vector<nlohmann::json> session_lines(const std::string& output) {
   std::vector<nlohmann::json> found;

@@ -11,6 +11,8 @@
 #include <thread>
 #include <vector>
 
+#include "clients/cpp/usage.h"
+#include "server/build_info.h"
 #include "server/machine/clock.h"
 #include "server/machine/realtime.h"
 #include "tests/e2e/stage/falcon_stage.h"
@@ -188,7 +190,11 @@ int main(int argc, char** argv) {
       "scene deploy/scenes/falcon.toml, sealed sessions and virtual_wall as its engine; and beside it a thread that "
       "only\n"
       "sleeps. How late are its steps, what is felt, and how long does a force outlive the server?\n\n"
-      "Example:  falcon-server --duration-s 60 --kills 15 --json\n");
+      "Example:  falcon-server --duration-s 60 --kills 15 --json\n",
+      "falcon-server");
+  usage::dress(app);
+  app.set_version_flag("--version", version_text());
+  app.footer("\nExit: 0 all was as it should be; 1 it was not; 2 wrong usage.");
   double duration_s = 60;
   int kills = 15;
   bool json = false;
@@ -200,9 +206,9 @@ int main(int argc, char** argv) {
       ->capture_default_str();
   app.add_flag("--json", json, "One JSON object per line on stdout: run, kills");
   try {
-    app.parse(argc, argv);
+    tendon::usage::parse(app, argc, argv);
   } catch (const CLI::ParseError& problem) {
-    return app.exit(problem) == 0 ? 0 : 2;
+    return usage::exit_code(app, problem);
   }
   try {
     bool good = duration_s == 0 || run(duration_s, json);

@@ -7,10 +7,12 @@
 #include <algorithm>
 #include <csignal>
 #include <filesystem>
+#include <fstream>
 #include <iostream>
 #include <set>
 #include <stdexcept>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "devices/falcon/packet.h"
@@ -104,6 +106,78 @@ TEST(FalconServer, KilledInMidForceItLeavesNoTorque) {
   }
   std::ranges::sort(ms);
   std::cout << "SIGKILL of tendond to no torque at the Falcon: median " << ms[1] << " ms, n = 3\n";
+}
+
+TEST(FalconServer, StoppedInMidForceItLetsGoAndPushesAgainOnlyAfterArming) {
+  for (const int signal : {SIGSTOP, SIGTSTP}) {
+    on_a_stage({}, [signal](FalconStage& stage) {
+      stage.arm_and_press();
+      const double ms = stage.released_after(signal);
+      std::cout << (signal == SIGSTOP ? "SIGSTOP" : "SIGTSTP") << " of tendond to no torque at the Falcon: " << ms
+                << " ms\n";
+      while (state_of(stage.server().process().pid()) != 'T') std::this_thread::sleep_for(std::chrono::milliseconds(1));
+      stage.go_to(0.004);
+      EXPECT_FALSE(stage.falcon().with([](const FakeFalcon& falcon) { return falcon.pushes(); }))
+          << "while it is stopped";
+      const auto pushes_begun = stage.falcon().seen().pushes_begun;
+      stage.server().process().signal(SIGCONT);
+      stage.server().process().wait_for_line("no force any more: ");
+      stage.wait_for_commands(300);
+      EXPECT_EQ(stage.falcon().seen().pushes_begun, pushes_begun) << "before it was armed\n"
+                                                                  << stage.server().process().err();
+      stage.arm();
+      // This may take more than one press, because the ledger assumes that the force was held during the whole pause.
+      const auto pushed = [&stage] {
+        stage.go_to(-0.015);
+        stage.go_to(0.004);
+        stage.wait_for_commands(50);
+        return stage.falcon().with(FalconStage::pushed_out);
+      };
+      int presses = 1;
+      while (!pushed() && presses < 20) ++presses;
+      EXPECT_LT(presses, 20);
+      EXPECT_EQ(number_in(stage.server().stop(), "force_n"), 0);
+    });
+  }
+}
+
+/// Returns the guardian of a server, its only child.
+pid_t guardian_of(pid_t server) {
+  for (const auto& thread : std::filesystem::directory_iterator("/proc/" + std::to_string(server) + "/task")) {
+    std::ifstream children(thread.path() / "children");
+    if (pid_t child = 0; children >> child) return child;
+  }
+  throw std::runtime_error("the server has no guardian");
+}
+
+TEST(FalconServer, WithoutItsGuardianItLetsGoAndIsNotArmed) {
+  for (const int signal : {SIGKILL, SIGSTOP}) {
+    on_a_stage({}, [signal](FalconStage& stage) {
+      stage.arm_and_press();
+      const pid_t guardian = guardian_of(stage.server().process().pid());
+      const double ms = stage.released_after(signal, guardian);
+      std::cout << (signal == SIGSTOP ? "SIGSTOP" : "SIGKILL") << " of the guardian to no torque at the Falcon: " << ms
+                << " ms\n";
+      stage.server().process().wait_for_line("no force any more: the guardian process was killed or stopped");
+      const auto pushes_begun = stage.falcon().seen().pushes_begun;
+      stage.go_to(-0.015);
+      stage.go_to(0.004);
+      stage.wait_for_commands(300);
+      EXPECT_EQ(stage.falcon().seen().pushes_begun, pushes_begun);
+      if (signal == SIGSTOP) ::kill(guardian, SIGCONT);
+      EXPECT_EQ(number_in(stage.server().stop(), "force_n"), 0);
+    });
+  }
+}
+
+TEST(FalconServer, IgnoresTheSignalsOfATerminalThatWantsNoOutput) {
+  on_a_stage({}, [](FalconStage& stage) {
+    stage.arm_and_press();
+    for (const int signal : {SIGTTOU, SIGTTIN}) stage.server().process().signal(signal);
+    stage.wait_for_commands(300);
+    EXPECT_TRUE(stage.falcon().with(FalconStage::pushed_out));
+    expect_no_fault(stage, stage.server().stop());
+  });
 }
 
 TEST(FalconServer, EndedBySigtermInMidForceItsLastWordIsNoTorque) {

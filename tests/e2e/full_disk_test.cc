@@ -31,7 +31,7 @@ void expect_the_device_to_run_on(Server& server, Process& echo, std::uint64_t af
 
 TEST(FullDisk, StopsTheRecordingAndNotTheRunAndTheFileStillReads) {
   const ScratchFolder folder;
-  const SmallDisk disk(folder.path() / "disk", "1m");
+  const SmallDisk disk(folder.path() / "disk", "512k");
   if (disk.error() != 0) GTEST_SKIP() << disk.why_not();
   const auto file = disk.path() / "run.mcap";
   Server server(folder.path(), demo_scene(), {"--record", file.string()});
@@ -54,7 +54,7 @@ TEST(FullDisk, ThatHasRoomAgainIsRecordedToAgainAndSaysWhatIsMissing) {
   const SmallDisk disk(folder.path() / "disk", "24m");
   if (disk.error() != 0) GTEST_SKIP() << disk.why_not();
   const auto ballast = disk.path() / "ballast";
-  std::ofstream(ballast) << std::string(std::size_t{23} << 20, 'x');
+  std::ofstream(ballast) << std::string(std::size_t{47} << 19, 'x');
   Server server(folder.path(), demo_scene(), {"--record", (disk.path() / "run.mcap").string()});
   Client wall("virtual_wall", server.address(), folder.path());
   server.process().wait_for_line("recording has stopped, the device runs on");

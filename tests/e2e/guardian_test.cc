@@ -216,6 +216,89 @@ TEST(Guardian, WritesZeroWhenItsParentDiesAndAgainWhenTheFilesClose) {
   EXPECT_EQ(device.last(), kZero) << "when they are not";
 }
 
+[[noreturn]] void step_and_hang(Guardian& guardian, int fd, int steps, bool holds_force) {
+  for (int i = 0; i < steps; ++i) {
+    if (write(fd, kForce.data(), kForce.size()) < 0) _exit(1);
+    guardian.heartbeat(0).beat(holds_force);
+    usleep(1000);
+  }
+  for (;;) pause();
+}
+
+/// Returns all packets except forces. Stops when no packet has arrived for `ms` milliseconds.
+std::vector<std::string> heard_within(Heard& device, int ms) {
+  std::vector<std::string> heard;
+  pollfd packet{.fd = device.end_of_the_device(), .events = POLLIN, .revents = 0};
+  while (poll(&packet, 1, ms) == 1) {
+    if (const std::string next = device.next(); next != kForce) heard.push_back(next);
+  }
+  return heard;
+}
+
+TEST(Guardian, EndsTheForceOfADriverThatLivesAndTakesNoStepAndOnceMore) {
+  Heard device;
+  const pid_t pid = driver([&] {
+    Guardian guardian;
+    guardian.guard(0, device.end_of_the_driver(), written(kZero));
+    step_and_hang(guardian, device.end_of_the_driver(), 50, true);
+  });
+  EXPECT_EQ(heard_within(device, 300), std::vector(2, kZero));
+  kill(pid, SIGKILL);
+  ended_by(pid);
+}
+
+TEST(Guardian, SaysWhenItDoesNotStand) {
+  Guardian guardian;
+  const auto becomes = [&guardian](bool stands) {
+    for (int ms = 0; ms < 5000 && guardian.stands() != stands; ++ms) usleep(1000);
+    return guardian.stands() == stands;
+  };
+  EXPECT_TRUE(guardian.stands());
+  kill(guardian.pid(), SIGSTOP);
+  EXPECT_TRUE(becomes(false)) << "stopped";
+  kill(guardian.pid(), SIGCONT);
+  EXPECT_TRUE(becomes(true)) << "continued";
+  kill(guardian.pid(), SIGKILL);
+  EXPECT_TRUE(becomes(false)) << "killed";
+}
+
+TEST(Guardian, WritesNothingWhileThereIsNoForceOrStepsCome) {
+  Heard device;
+  const pid_t pid = driver([&] {
+    Guardian guardian;
+    guardian.guard(0, device.end_of_the_driver(), written(kZero));
+    step_and_hang(guardian, device.end_of_the_driver(), 50, false);
+  });
+  EXPECT_EQ(heard_within(device, 300), std::vector<std::string>());
+  kill(pid, SIGKILL);
+  ended_by(pid);
+}
+
+// No claim about time, because virtual machines pause.
+TEST(Guardian, SaysHowLongTheForceOutlivesADriverThatIsStopped) {
+  std::vector<double> ms;
+  for (int i = 0; i < 20; ++i) {
+    Heard device;
+    const pid_t pid = driver([&] {
+      Guardian guardian;
+      guardian.guard(0, device.end_of_the_driver(), written(kZero));
+      step_and_hang(guardian, device.end_of_the_driver(), 1'000'000, true);
+    });
+    for (int packet = 0; packet < 20; ++packet) device.next();
+    const auto stopped = Clock::now();
+    kill(pid, SIGSTOP);
+    std::string heard = device.next();
+    while (heard == kForce) heard = device.next();
+    ms.push_back(std::chrono::duration<double, std::milli>(Clock::now() - stopped).count());
+    EXPECT_EQ(heard, kZero);
+    kill(pid, SIGKILL);
+    ended_by(pid);
+  }
+  std::sort(ms.begin(), ms.end());
+  std::cout << "SIGSTOP of the driver to zero at the device: p50 " << ms[10] << " ms, most " << ms[19]
+            << " ms, n = 20\n";
+}
+
 TEST(Guardian, HasThePriorityThatItsParentHasAskedFor) {
   constexpr int kNice = 7;
   Guardian guardian([] { setpriority(PRIO_PROCESS, static_cast<id_t>(gettid()), kNice); });

@@ -14,6 +14,7 @@
 #include <thread>
 #include <vector>
 
+#include "clients/cpp/run.h"
 #include "protocol/wire/header.h"
 #include "server/machine/udp_link.h"
 #include "tests/e2e/stage/relay.h"
@@ -125,6 +126,22 @@ TEST(HostileDatagrams, AreCountedAndChangeNothing) {
                                   [&](const StepRecord& step) { return step.hand.at >= last_stranger->at; });
   ASSERT_NE(after, recording.steps.end());
   EXPECT_GT(newest, after->force_sequence + 100);
+}
+
+TEST(HostileName, ForgesNoLineOfALogAndReachesNoTerminal) {
+  const ScratchFolder folder;
+  Server server(folder.path(), demo_scene());
+  Options options{.client = {.name = "\x1b[2Jwall\n07:00:00.000 info the device is armed"}};
+  options.server = server.address();
+  options.duration = std::chrono::seconds(5);
+  const std::jthread hostile([&] { run(options, [](const DeviceState&) { return Touch{}; }); });
+  const std::string welcomed = server.process().wait_for_line("welcomed controller");
+  Client wall("virtual_wall", server.address(), folder.path());
+  const std::string refused = wall.wait_for_line("refuses");
+  for (const std::string& line : {welcomed, refused}) {
+    EXPECT_NE(line.find(R"(\x1b[2Jwall\n07:00:00.000 info the device is armed)"), std::string::npos) << line;
+    EXPECT_EQ(line.find('\x1b'), std::string::npos) << line;
+  }
 }
 
 }  // namespace

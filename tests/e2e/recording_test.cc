@@ -78,7 +78,7 @@ TEST(Recordings, WhatIsNoRecordingIsRefusedBeforeAnythingRuns) {
   const auto refused = [&](const std::filesystem::path& file, const std::string& why) {
     Process server(program("tendond"), {scene.string(), "--record", file.string(), "--duration-s", "60", "--json"},
                    folder.path());
-    EXPECT_EQ(server.wait(), 2);
+    EXPECT_EQ(server.wait(), 1);
     EXPECT_EQ(server.out(), "");
     EXPECT_NE(server.err().find("cannot write recording " + file.string() + ": " + why), std::string::npos)
         << server.err();

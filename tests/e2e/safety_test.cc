@@ -29,7 +29,7 @@ button_after_ms = 300
 [device.hand.motion]
 kind = "minimum-jerk"
 points_mm = [[-10, 0, 0], [-10, 0, 0], [15, 0, 0]]
-durations_ms = [3000, 300]
+durations_ms = [1500, 300]
 back_and_forth = false
 )" + safety;
 }
@@ -56,7 +56,7 @@ TEST(Safety, ADeviceThatNobodyHasArmedGivesNoForce) {
   for (bool in_the_wall = false; !in_the_wall;) {
     const std::string state = echo.wait_for_line(R"("tick")");
     EXPECT_EQ(number_in(state, "force_n"), 0);
-    in_the_wall = count_in(state, "tick") > 3600;
+    in_the_wall = count_in(state, "tick") > 2100;
   }
   const std::string end = server.stop();
   EXPECT_EQ(text_in(end, "state"), "homed");

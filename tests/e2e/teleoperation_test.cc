@@ -3,10 +3,7 @@
 #include <signal.h>
 
 #include <algorithm>
-#include <cmath>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <string>
 #include <thread>
 
@@ -14,7 +11,8 @@
 #include "tests/e2e/stage/stage.h"
 #include "tests/server/scratch_folder.h"
 
-// A hand that leads the device of another server, in real processes.
+// A hand that leads the device of another server, in real processes. Each method, whole handles and several leaders, in
+// virtual time: tests/server/guests/couple_test.cc and leaders_test.cc.
 
 namespace tendon::e2e::teleoperation_test {
 namespace {
@@ -65,105 +63,6 @@ TEST(Teleoperation, AHandLeadsTheDeviceOfAnotherServerThroughABadNetwork) {
   // The wall behind it is 8 mm away. How far it gets to the other side depends on where the hand was at the act, and
   // on how soft a machine that pauses has made the spring.
   EXPECT_GT(spread(tool), 0.004) << "it follows";
-}
-
-/// A copy in `folder` of the shipped scene of that role, with that method.
-std::filesystem::path scene_by(const std::string& method, const std::string& role,
-                               const std::filesystem::path& folder) {
-  std::ifstream shipped(scene(role + ".toml"));
-  std::string text{std::istreambuf_iterator<char>(shipped), {}};
-  const std::string line = "role = \"" + role + "\"\n";
-  text.insert(text.find(line) + line.size(), "method = \"" + method + "\"\n");
-  std::ofstream(folder / (role + ".toml")) << text;
-  return folder / (role + ".toml");
-}
-
-/// By waves and by the surface that the follower finds, in one clock afterwards.
-TEST(Teleoperation, OtherMethodsLeadToo) {
-  for (const std::string method : {"waves", "surface"}) {
-    const testing::ScratchFolder folder;
-    const auto followed = folder.path() / "follower.mcap";
-    const auto led = folder.path() / "leader.mcap";
-    Server follower(folder.path(), scene_by(method, "follower", folder.path()), {"--record", followed.string()});
-    Server leader(folder.path(), scene_by(method, "leader", folder.path()),
-                  {"--record", led.string(), "--dial", follower.address()});
-    leader.process().wait_for_line("teleoperation: engaged");
-    std::this_thread::sleep_for(std::chrono::seconds(4));
-    leader.stop();
-    follower.stop();
-    expect_sound(led, folder.path());
-    expect_sound(followed, folder.path());
-    double farthest = 0;
-    double pressed = 0;
-    for (const StepRecord& step : read_recording(followed).steps) {
-      farthest = std::max(farthest, step.hand.position.x());
-      if (step.hand_force) pressed = std::max(pressed, -step.hand_force->x());
-    }
-    EXPECT_GT(farthest, 0.007) << method << ": it follows to the wall";
-    EXPECT_GT(pressed, 0.3) << method;
-
-    const auto both = folder.path() / "both.mcap";
-    Process merged(program("tendon-replay"),
-                   {led.string(), "--merge", followed.string(), "--into", both.string(), "--json"}, folder.path());
-    ASSERT_EQ(merged.wait(), 0) << merged.err();
-    // On one machine the two clocks are one.
-    EXPECT_LT(number_in(merged.out(), "error_p99_s"), 0.5e-3) << merged.out();
-    EXPECT_LE(std::abs(number_in(merged.out(), "offset_s")), number_in(merged.out(), "error_p99_s") + 50e-6)
-        << merged.out();
-  }
-}
-
-/// Orientation and gripper go with the position, and each step of the three accounts is the same when it is taken again.
-TEST(Teleoperation, AStylusTurnsAndGripsTheOneOfAnotherServer) {
-  const testing::ScratchFolder folder;
-  const auto followed = folder.path() / "follower.mcap";
-  const auto led = folder.path() / "leader.mcap";
-  Server follower(folder.path(), scene("stylus_follower.toml"), {"--record", followed.string()});
-  Server leader(folder.path(), scene("stylus_leader.toml"), {"--record", led.string(), "--dial", follower.address()});
-  leader.process().wait_for_line("teleoperation: engaged");
-  std::this_thread::sleep_for(std::chrono::seconds(4));
-  leader.stop();
-  follower.stop();
-  expect_sound(led, folder.path());
-  expect_sound(followed, folder.path());
-  const Recording tool = read_recording(followed);
-  double farthest = 1;  // |w| of the turn since the start: 1 is none
-  double opened = 0;
-  const StepRecord& first = tool.steps.front();
-  ASSERT_TRUE(first.turn() != nullptr && first.grip() != nullptr);
-  for (const StepRecord& step : tool.steps) {
-    if (step.turn() == nullptr || step.grip() == nullptr) continue;
-    const Quat& a = first.turn()->hand.orientation;
-    const Quat& b = step.turn()->hand.orientation;
-    farthest = std::min(farthest, std::abs(a.w * b.w + a.x * b.x + a.y * b.y + a.z * b.z));
-    opened = std::max(opened, std::abs(step.grip()->hand.opening - first.grip()->hand.opening));
-  }
-  EXPECT_GT(2 * std::acos(std::min(farthest, 1.0)), 0.03) << "rad";
-  EXPECT_GT(opened, 0.02) << "rad";
-}
-
-/// Each by its own act; the recordings of the three replay.
-TEST(Teleoperation, TwoHandsLeadOneDevice) {
-  const testing::ScratchFolder folder;
-  const auto file = [&](const std::string& name) { return folder.path() / (name + ".mcap"); };
-  Server follower(folder.path(), scene("shared_follower.toml"), {"--record", file("follower").string()});
-  Server trainer(folder.path(), scene("trainer.toml"),
-                 {"--record", file("trainer").string(), "--dial", follower.address()});
-  Server trainee(folder.path(), scene("trainee.toml"),
-                 {"--record", file("trainee").string(), "--dial", follower.address()});
-  trainer.process().wait_for_line("teleoperation: engaged");
-  trainee.process().wait_for_line("teleoperation: engaged");
-  std::this_thread::sleep_for(std::chrono::seconds(2));
-  trainee.stop();
-  trainer.stop();
-  follower.stop();
-  for (const char* const name : {"follower", "trainer", "trainee"}) expect_sound(file(name), folder.path());
-  double farthest = 0;
-  const Recording tool = read_recording(file("follower"));
-  for (const StepRecord& step : tool.steps) {
-    farthest = std::max(farthest, (step.hand.position - tool.steps.front().hand.position).norm());
-  }
-  EXPECT_GT(farthest, 2e-3) << "it is led";
 }
 
 /// What the two must not do with limiters: it shows that the demonstration demonstrates something.

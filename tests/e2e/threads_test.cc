@@ -36,7 +36,7 @@ TEST(Threads, DevicesOfOneRateAndProcessorShareAHapticThread) {
       folder.path(), alone,
       {scene("b", "period_us = 2000"), scene("c", ""), scene("d", "cpu = 0"), scene("e", "period_us = 2000")});
   server.process().wait_for_line("listens on");
-  const std::set<std::string> expected = {"haptic-0", "haptic-1", "haptic-3", "log", "network", "tendond"};
+  const std::set<std::string> expected = {"haptic-0", "haptic-1", "haptic-3", "log", "network", "output", "tendond"};
   EXPECT_EQ(threads_when(expected, server), expected);
 }
 
@@ -49,7 +49,7 @@ TEST(Threads, AreMoreWhereAPeriodHasNoRoomForAllDevices) {
   }
   Server server(folder.path(), scenes.front(), {scenes.begin() + 1, scenes.end()});
   server.process().wait_for_line("listens on");
-  const std::set<std::string> expected = {"haptic-0", "haptic-5", "log", "network", "tendond"};
+  const std::set<std::string> expected = {"haptic-0", "haptic-5", "log", "network", "output", "tendond"};
   EXPECT_EQ(threads_when(expected, server), expected);
 }
 
@@ -59,7 +59,7 @@ TEST(Threads, EachStepsWholeBanksOfCountedDevices) {
       write(folder.path() / "finger.toml", "[device]\nkind = \"simulated\"\nprofile = \"falcon\"\ncount = 60\n");
   Server server(folder.path(), scene);
   server.process().wait_for_line("listens on");
-  const std::set<std::string> expected = {"haptic-0", "haptic-48", "log", "network", "tendond"};
+  const std::set<std::string> expected = {"haptic-0", "haptic-48", "log", "network", "output", "tendond"};
   EXPECT_EQ(threads_when(expected, server), expected);
 }
 
@@ -70,8 +70,8 @@ TEST(Threads, OfTheNetworkShareTheBanks) {
                                   "[network]\nthreads = 4\n");
   Server server(folder.path(), scene);
   server.process().wait_for_line("listens on");
-  const std::set<std::string> expected = {"haptic-0",   "haptic-48",  "log",        "network-0",
-                                          "network-16", "network-32", "network-48", "tendond"};
+  const std::set<std::string> expected = {"haptic-0",   "haptic-48",  "log",    "network-0", "network-16",
+                                          "network-32", "network-48", "output", "tendond"};
   EXPECT_EQ(threads_when(expected, server), expected);
 }
 
@@ -83,7 +83,7 @@ TEST(Threads, OfAServerAreThoseOfThePage) {
   const std::set<std::string> page = threads_of_the_page();
   ASSERT_TRUE(page.contains("haptic-N"));
   // It listens before its threads have begun.
-  const std::set<std::string> expected = {"haptic-0", "log", "network", "tendond"};
+  const std::set<std::string> expected = {"haptic-0", "log", "network", "output", "tendond"};
   const std::set<std::string> threads = threads_when(expected, server);
   EXPECT_EQ(threads, expected);
   for (const std::string& thread : threads) EXPECT_TRUE(page.contains(general_name(thread))) << thread;

@@ -3,13 +3,18 @@
 // The tools that ship, with files and readers that fail them.
 #include <gtest/gtest.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <string>
+#include <tuple>
 #include <utility>
 #include <vector>
 
+#include "server/recording/byte_sink.h"
+#include "server/recording/recorder.h"
 #include "tests/e2e/stage/process.h"
 #include "tests/e2e/stage/small_disk.h"
 #include "tests/e2e/stage/stage.h"
@@ -38,6 +43,73 @@ TEST(Tools, ANamedPipeIsNoInputAndIsNotWaitedFor) {
     SCOPED_TRACE(tool + " " + arguments.front());
     EXPECT_NE(process.wait(), 0);
     EXPECT_NE(process.err().find("it is a named pipe, expected a regular file"), std::string::npos) << process.err();
+  }
+}
+
+/// Every program of this build that people start.
+std::vector<std::filesystem::path> programs() {
+  std::vector<std::filesystem::path> found;
+  const auto shown = program("tendond").parent_path();
+  for (const auto& file : std::filesystem::directory_iterator(shown)) {
+    if (file.is_regular_file() && access(file.path().c_str(), X_OK) == 0) found.push_back(file.path());
+  }
+  for (const std::string name : {"definiteness_soak", "falcon-server", "golden_decisions", "tendon-soak"}) {
+    const auto file = shown.parent_path() / "tests" / name;
+    if (std::filesystem::exists(file)) found.push_back(file);
+  }
+  std::ranges::sort(found);
+  return found;
+}
+
+bool has(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
+
+TEST(Tools, EachHasHelpWithAnExampleAndAVersionAndWritesNothing) {
+  const ScratchFolder folder;
+  ASSERT_GT(programs().size(), 5U);
+  for (const auto& tool : programs()) {
+    SCOPED_TRACE(tool);
+    Process help(tool, {"--help"}, folder.path());
+    EXPECT_EQ(help.wait(), 0) << help.err();
+    EXPECT_TRUE(has(help.out(), "Example")) << help.out();
+    EXPECT_TRUE(has(help.out(), "Exit: 0 ")) << help.out();
+    for (const char* const leftover : {"FLOAT", "TEXT:", " in [", ":{", "(1x)", " x 3"}) {
+      EXPECT_FALSE(has(help.out(), leftover)) << leftover << '\n' << help.out();
+    }
+    Process version(tool, {"--version"}, folder.path());
+    EXPECT_EQ(version.wait(), 0) << version.err();
+    EXPECT_TRUE(version.out().starts_with("0.") && version.out().size() < 40) << version.out();
+    EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
+  }
+}
+
+TEST(Tools, EachRefusesAnUnknownOptionWithTwoAndWritesNothing) {
+  const ScratchFolder folder;
+  for (const auto& tool : programs()) {
+    SCOPED_TRACE(tool);
+    Process process(tool, {"--no-such-option"}, folder.path());
+    EXPECT_EQ(process.wait(), 2) << process.out();
+    EXPECT_TRUE(has(process.err(), "--no-such-option")) << process.err();
+    EXPECT_EQ(process.out(), "");
+    EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
+  }
+}
+
+TEST(Tools, AMisspeltWordIsAnsweredWithTheOneThatWasMeant) {
+  const ScratchFolder folder;
+  for (const auto& [tool, arguments, meant] :
+       std::vector<std::tuple<std::string, std::vector<std::string>, std::string>>{
+           {"tendond", {"explian", "demo.toml"}, "did you mean explain?"},
+           {"tendond", {demo_scene().string(), "--duraton-s", "1"}, "did you mean --duration-s?"},
+           {"tendond", {"--scene-help", "limitr"}, "did you mean limiter?"},
+           {"tendon-lab", {"comparee", "--out", "x"}, "did you mean compare?"},
+           {"tendon-inject", {"import", "pign", "a", "--out", "b"}, "did you mean ping?"},
+           {"tendon-inject", {"--dry-run", "--profile", "wifi-baad"}, "did you mean wifi-bad?"},
+           {"tendon-worlds", {"rnu"}, "did you mean run?"},
+           {"tendon-replay", {"--merg", "b"}, "did you mean --merge?"},
+           {"virtual_wall", {"--stifness-n-per-m", "1"}, "did you mean --stiffness-n-per-m?"}}) {
+    Process process(program(tool), arguments, folder.path());
+    EXPECT_EQ(process.wait(), 2) << tool;
+    EXPECT_TRUE(has(process.err(), meant)) << process.err();
   }
 }
 
@@ -87,6 +159,183 @@ TEST(Tools, TheBenchEndsWhenItsReaderGoes) {
       folder.path());
   EXPECT_EQ(bash.wait(), 0) << bash.err();
   EXPECT_NE(bash.out().find("exit 1\n"), std::string::npos) << bash.out() << bash.err();
+}
+
+/// A mistake, and the command lines that contain it.
+struct Mistake {
+  std::string what;
+  int exit_code;
+  std::vector<std::vector<std::string>> made_by;
+};
+
+TEST(ExitCodes, OfTheSameMistakeAreTheSameInEveryProgram) {
+  const ScratchFolder folder;
+  const std::string run = recording_in(folder.path());
+  const std::string demo = demo_scene().string();
+  const std::string soft = demo_scene().replace_filename("softbody.toml").string();
+  const std::string wrong = write(folder.path() / "wrong.toml", "[devise]\n");
+  const std::string there = "a.file";
+  write(folder.path() / there, "a letter to a friend\n");
+  Server server(folder.path(), demo_scene());
+  const std::string& port = server.address();
+  const std::vector<Mistake> mistakes = {
+      {"a file is missing",
+       1,
+       {{"tendond", "none.toml"},
+        {"tendond", "explain", "none.toml"},
+        {"tendon-report", "none.mcap"},
+        {"tendon-report", "--pairs", "none.mcap"},
+        {"tendon-replay", "none.mcap"},
+        {"tendon-replay", run, "none.mcap"},
+        {"tendon-replay", "none.mcap", "--repair", "whole.mcap"},
+        {"tendon-replay", run, "--merge", "none.mcap", "--into", "pair.mcap"},
+        {"tendon-identify", "none.csv"},
+        {"tendon-identify", "--simulate", "touch", "--from", "none.json"},
+        {"tendon-lab", "boundary", "--from", "none.json"},
+        {"tendon-worlds", "run", "--seeds", "none.txt"},
+        {"tendon-worlds", "replay", "none.toml", "--trace", "none.csv"},
+        {"tendon-worlds", "replay", demo, "--trace", "none.csv"},
+        {"tendon-inject", "--dry-run", "--replay", "none.csv"},
+        {"tendon-inject", "--dry-run", "--scenario", "none.toml"},
+        {"tendon-inject", "--dry-run", "--profile", "delay=histogram(none.csv)"},
+        {"tendon-inject", "import", "ping", "none.txt", "--out", "run.csv"},
+        {"tendon-inject", "export", "none.csv"},
+        {"tendon-softbody", "none.toml"},
+        {"tendon-softbody", "explain", "none.toml"},
+        {"tendon-softbody", "condense", "none.toml", "x.table"},
+        {"tendon-fem", "explain", "none.toml"},
+        {"tendon-mesh", "none.stl", "--size", "5", "--out", "x.msh"},
+        {"tendon-sweep", "here", "none"},
+        {"tendon-sweep", "plan", "plan", "--units", "1:5", "--per-shard", "1", "--", "no-such-program"},
+        {"tendon-dash", "--key", "none.key"},
+        {"tendon-plug", "vrpn", "--key", "none.key"},
+        {"virtual_wall", "--key", "none.key"},
+        {"tendon-conformance", "server", "127.0.0.1:9", "--key", "none.key"}}},
+      {"a folder is missing",
+       1,
+       {{"tendond", demo, "--listen", "127.0.0.1:0", "--record", "none/run.mcap"},
+        {"tendond", "keygen", "wall", "--out", "none/wall.key"},
+        {"tendon-report", run, "--out", "none/x.svg"},
+        {"tendon-replay", run, "--csv", "none/x.csv"},
+        {"tendon-replay", run, "--repair", "none/x.mcap"},
+        {"tendon-inject", "--dry-run", "--record", "none/x.csv"},
+        {"tendon-inject", "--listen", "127.0.0.1:0", "--to", "127.0.0.1:9", "--record", "none/x.csv"},
+        {"tendon-dash", "--listen", "127.0.0.1:0", "--recordings", "none"}}},
+      {"a file of another kind is there",
+       1,
+       {{"tendond", demo, "--listen", "127.0.0.1:0", "--record", there},
+        {"tendon-replay", run, "--csv", there},
+        {"tendon-replay", run, "--repair", there},
+        {"tendon-inject", "--dry-run", "--record", there}}},
+      {"a port is in use",
+       1,
+       {{"tendond", demo, "--listen", port},
+        {"tendon-inject", "--listen", port, "--to", "127.0.0.1:9"},
+        {"tendon-conformance", "client", "--listen", port, "--", "/bin/true"}}},
+      {"an option is unknown",
+       2,
+       {{"tendond", demo, "--colour"},
+        {"tendon-report", run, "--colour"},
+        {"tendon-replay", run, "--colour"},
+        {"tendon-identify", "--colour"},
+        {"tendon-lab", "boundary", "--colour"},
+        {"tendon-worlds", "run", "--colour"},
+        {"tendon-inject", "--colour"},
+        {"tendon-softbody", soft, "--colour"},
+        {"tendon-fem", "explain", soft, "--colour"},
+        {"tendon-mesh", "a.stl", "--colour"},
+        {"tendon-sweep", "here", "plan", "--colour"},
+        {"tendon-dash", "--colour"},
+        {"tendon-plug", "vrpn", "--colour"},
+        {"virtual_wall", "--colour"},
+        {"tendon-conformance", "server", "127.0.0.1:9", "--colour"}}},
+      {"a scene has a word that means nothing",
+       2,
+       {{"tendond", wrong},
+        {"tendond", "explain", wrong},
+        {"tendon-worlds", "replay", wrong, "--trace", "none.csv"},
+        {"tendon-softbody", wrong},
+        {"tendon-softbody", "explain", wrong},
+        {"tendon-softbody", "condense", wrong, "x.table"},
+        {"tendon-fem", "explain", wrong}}},
+      {"an address is none",
+       2,
+       {{"tendond", demo, "--listen", "here"},
+        {"tendon-inject", "--listen", "here", "--to", "127.0.0.1:9"},
+        {"tendon-dash", "--listen", "here"},
+        {"tendon-plug", "vrpn", "--server", "here"},
+        {"virtual_wall", "--server", "here"},
+        {"tendon-conformance", "server", "here"}}},
+  };
+  for (const Mistake& mistake : mistakes) {
+    for (std::vector<std::string> words : mistake.made_by) {
+      const auto path = program(words.front());
+      if (!std::filesystem::exists(path)) continue;  // this program has not been built
+      std::string line;
+      for (const std::string& word : words) line += word + " ";
+      SCOPED_TRACE(mistake.what + ": " + line);
+      words.erase(words.begin());
+      Process process(path, words, folder.path());
+      EXPECT_EQ(process.wait(), mistake.exit_code) << process.err();
+      EXPECT_EQ(process.out(), "");
+      EXPECT_NE(process.err(), "");
+      EXPECT_EQ(process.err().find("terminate called"), std::string::npos) << process.err();
+    }
+  }
+}
+
+TEST(ExitCodes, OfARecordingWhoseSceneIsWrongIsNotThatOfWrongUsage) {
+  const ScratchFolder folder;
+  FileSink sink(folder.path() / "run.mcap");
+  Recorder recorder({.scene = {.text = "[devise]\n", .version = "1", .commit = "c"}}, sink);
+  StepRecord step;
+  step.tick = 1;
+  recorder.record(step);
+  recorder.close();
+  Process replay(program("tendon-replay"), {"run.mcap"}, folder.path());
+  EXPECT_EQ(replay.wait(), 1);
+  EXPECT_NE(replay.err().find("run.mcap: the recorded scene:1: "), std::string::npos) << replay.err();
+  EXPECT_EQ(replay.err().find("--help"), std::string::npos) << replay.err();
+}
+
+TEST(ExitCodes, TooLittleMemoryIsSaidInASentence) {
+  const ScratchFolder folder;
+  const std::string run = recording_in(folder.path());
+  bool said = false;
+  for (const auto& [name, arguments] : std::vector<std::pair<std::string, std::string>>{
+           {"tendond", demo_scene().string() + " --listen 127.0.0.1:0 --record none.mcap --duration-s 0.1"},
+           {"tendon-report", run},
+           {"tendon-replay", run}}) {
+    for (const int limit_mb : {10, 15, 20, 25, 30, 40, 60}) {
+      SCOPED_TRACE(name + " with " + std::to_string(limit_mb) + " MB");
+      std::filesystem::remove(folder.path() / "none.mcap");
+      Process process(
+          "/bin/bash",
+          {"-c", "ulimit -v " + std::to_string(1000 * limit_mb) + "; exec \"$0\" " + arguments, program(name)},
+          folder.path());
+      const int exit_code = process.wait();
+      if (exit_code == 127) continue;  // the libraries cannot be loaded
+      EXPECT_TRUE(exit_code == 0 || exit_code == 1) << exit_code << ": " << process.err();
+      EXPECT_EQ(process.err().find("bad_alloc"), std::string::npos) << process.err();
+      said = said || process.err().find("there is too little memory") != std::string::npos;
+    }
+  }
+  EXPECT_TRUE(said) << "no limit was between too little and enough";
+}
+
+TEST(Tools, ARecordingOfAFolderThatVanishesIsSaidAndTheExitCodeIsOne) {
+  const ScratchFolder folder;
+  const auto runs = folder.path() / "runs";
+  std::filesystem::create_directory(runs);
+  Server server(folder.path(), demo_scene(), {"--record", (runs / "run.mcap").string()});
+  Client echo("echo_motion", server.address(), folder.path(), {"--json"});
+  echo.wait_for_line(R"("tick")");
+  std::filesystem::remove_all(runs);
+  const std::string told = server.process().wait_for_line("recording has stopped, the device runs on");
+  EXPECT_NE(told.find("runs/run.mcap: it was deleted meanwhile"), std::string::npos) << told;
+  const std::string end = server.stop(SIGTERM, 1);
+  EXPECT_EQ(count_in(end, "recorded_steps") + count_in(end, "lost_steps"), count_in(end, "steps"));
+  EXPECT_NE(server.process().err().find("the recording is not whole: "), std::string::npos) << server.process().err();
 }
 
 }  // namespace

@@ -133,7 +133,9 @@ void print(Line& line, const ForceCommand& force) {
 
 void print(Line& line, const Control& control) {
   line << "control" << control.id;
-  if (!control.request) {
+  if (!control.invalid.empty()) {
+    line << "refused" << control.invalid;
+  } else if (!control.request) {
     line << "unknown";
   } else if (const auto* rate = std::get_if<SetStateRate>(&*control.request)) {
     line << "rate" << rate->hz;

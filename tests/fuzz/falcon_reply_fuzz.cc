@@ -12,7 +12,7 @@ using namespace tendon::falcon;
 
 namespace {
 
-bool same(const Reply& a, const Reply& b) {
+bool same(const falcon::Reply& a, const falcon::Reply& b) {
   return a.encoders == b.encoders && a.buttons == b.buttons && a.homed == b.homed;
 }
 
@@ -23,7 +23,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const std::size_t piece = 1 + data[0] % 62U;
   const std::span<const std::uint8_t> stream(data + 1, size - 1);
 
-  std::vector<Reply> expected;
+  std::vector<falcon::Reply> expected;
   for (std::size_t at = 0; at + kPacketBytes <= stream.size();) {
     const auto reply = decode(stream.subspan(at).first<kPacketBytes>());
     if (reply) expected.push_back(*reply);

@@ -23,17 +23,23 @@
 
 #include "clients/softbody/effects/cutting.h"
 #include "clients/softbody/fem/gmsh.h"
-#include "clients/softbody/models/explicit.h"
 #include "clients/softbody/models/linear.h"
 #include "clients/softbody/models/quasi_static.h"
 #include "clients/softbody/scene.h"
 #include "tests/clients/softbody/pressed_block.h"
 #include "tests/hard/row.h"
 #include "tests/support/dice.h"
+#include "tests/support/refusal.h"
+#include "tests/tools/lab/models/explicit.h"
+#include "tests/tools/lab/models/pressed_b1.h"
 
 namespace tendon::softbody::hard_physics_test {
 namespace {
 
+using compared::ExplicitModel;
+using compared::largest_step;
+using compared::testing::pressed_b1;
+using compared::testing::soon_at_rest;
 using hard::report;
 using testing::kB1NearlyIncompressible;
 using testing::kB1PatchRadius;
@@ -47,17 +53,6 @@ std::string text(double value, int digits = 3) {
   out.precision(digits);
   out << value;
   return out.str();
-}
-
-/// The message with which `make` is refused; empty when it is accepted.
-template <class Make>
-std::string refusal(Make make) {
-  try {
-    make();
-  } catch (const std::exception& error) {
-    return error.what();
-  }
-  return "";
 }
 
 Fixed held_below(const Mesh& mesh) {
@@ -185,12 +180,13 @@ TEST(HardPhysics, AnElementWithoutVolumeIsNamedAndASliverStepRefused) {
     return gmsh_of({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0.25, 0.25, -1}, {0.25, 0.25, height}},
                    "11 4 2 0 0 1 3 2 4\n17 4 2 0 0 1 2 3 5\n", 2);
   };
-  const std::string flat = refusal([&] { parse_gmsh(mesh(0), "flat.msh", 0.01); });
+  const std::string flat = thrown_by<std::exception>([&] { parse_gmsh(mesh(0), "flat.msh", 0.01); });
   EXPECT_EQ(flat, "flat.msh: element 17 has no volume");
-  EXPECT_EQ(refusal([&] { parse_gmsh(mesh(-0.1), "out.msh", 0.01); }), "out.msh: element 17 is turned inside out");
+  EXPECT_EQ(thrown_by<std::exception>([&] { parse_gmsh(mesh(-0.1), "out.msh", 0.01); }),
+            "out.msh: element 17 is turned inside out");
 
   const auto solid = [&](double height) {
-    Mesh read = parse_gmsh(mesh(height), "sliver.msh", 0.01);
+    Mesh read = parse_gmsh(mesh(height), "sliver.msh", 0.01).mesh;
     const Fixed fixed = fix_where(read, [](const Vec3& node) { return node.z() < -0.005; });
     return Solid(std::move(read), Element::kTet4, {.young = 1e4, .poisson = 0.45}, Law::kLinear, fixed);
   };
@@ -203,10 +199,10 @@ TEST(HardPhysics, AnElementWithoutVolumeIsNamedAndASliverStepRefused) {
   const auto engine = [&](double step) {
     return ExplicitModel(sliver, top, {.density = 1000, .step = step, .inertia = true});
   };
-  const std::string refused = refusal([&] { engine(1e-4); });
+  const std::string refused = thrown_by<std::exception>([&] { engine(1e-4); });
   EXPECT_NE(refused.find("0.1 ms is not stable"), std::string::npos) << refused;
   EXPECT_NE(refused.find("at most " + text(1e3 * limit, 6)), std::string::npos) << refused;
-  EXPECT_EQ(refusal([&] { engine(0.95 * limit); }), "");
+  EXPECT_EQ(thrown_by<std::exception>([&] { engine(0.95 * limit); }), "");
   report({.hard = "a tetrahedron of no volume gives infinite gradients; a sliver a step of nanoseconds",
           .oracle =
               "no volume: refused, the element named by the file's own number; sliver of 3.6e-6: an explicit step "
@@ -352,10 +348,8 @@ TEST(HardPhysics, MassesAMillionTimesApartStayBoundedAndOnlyLoseEnergy) {
 // Oracle: the static solution. The effect of the step size is gone when the body is at rest.
 TEST(HardPhysics, TheRestOfABodyDoesNotDependOnTheStep) {
   double worst = 0;
-  for (const ModelKind kind :
-       {ModelKind::kLinear, ModelKind::kCorotational, ModelKind::kNeoHookean, ModelKind::kMassSpring}) {
-    const Element element = info(kind).tetrahedra ? Element::kTet4 : Element::kHex8Sri;
-    BodyConfig config = pressed_body(kind, element, 4);
+  for (const ModelKind kind : {ModelKind::kLinear, ModelKind::kCorotational, ModelKind::kNeoHookean}) {
+    BodyConfig config = pressed_body(kind, Element::kHex8Sri, 4);
     const Reaction still = Body(config).press(Given::kForce, 0.3);
     for (const double step : {1e-3, 1e-2, 0.2}) {
       config.effects = {.density = 1000, .step = step, .inertia = true, .damping = 40};
@@ -367,10 +361,10 @@ TEST(HardPhysics, TheRestOfABodyDoesNotDependOnTheStep) {
   }
   std::array<double, 2> xpbd{};  // m, with steps of 1 and 10 ms
   for (const std::size_t i : {0U, 1U}) {
-    BodyConfig config = pressed_body(ModelKind::kXpbd, Element::kTet4, 4);
+    compared::Config config = soon_at_rest(compared::Kind::kXpbd);
     config.iterations = 1;
     config.effects.step = i == 0 ? 1e-3 : 1e-2;
-    xpbd[i] = Body(config).settle(Given::kForce, 0.3).depth;
+    xpbd[i] = pressed_b1(compared::Kind::kXpbd, Element::kTet4, 4, config).settle(Given::kForce, 0.3).depth;
   }
   report(
       {.hard =
@@ -391,17 +385,15 @@ TEST(HardPhysics, AnExplicitStepIsStableBelowItsLimitAndRefusedAboveIt) {
   EXPECT_LT(below, 100);
   EXPECT_FALSE(above < 1e100);  // or not a number any more
 
-  const auto config = [&](double step) {
-    BodyConfig body = pressed_body(ModelKind::kTensorMass, Element::kTet4, 4);
-    body.effects.step = step;
-    return body;
+  const auto tensor_mass = [&](double step) {
+    compared::Config config;
+    config.effects = {.density = 1000, .step = step, .inertia = true};
+    return pressed_b1(compared::Kind::kTensorMass, Element::kTet4, 4, config);
   };
   // 0.95 of it is stable with a tool too, without any damping.
-  BodyConfig undamped = config(0.95 * limit);
-  undamped.effects.damping.reset();
-  Body body(undamped);
+  compared::PressedBody body = tensor_mass(0.95 * limit);
   for (int i = 0; i < 3000; ++i) EXPECT_LT(std::abs(body.press(Given::kForce, 0.3).depth), 1e-3);
-  const std::string refused = refusal([&] { Body(config(1.05 * limit)); });
+  const std::string refused = thrown_by<std::exception>([&] { tensor_mass(1.05 * limit); });
   EXPECT_NE(refused.find("step of " + text(1e3 * 1.05 * limit, 6)), std::string::npos) << refused;
   EXPECT_NE(refused.find("at most " + text(1e3 * limit, 6)), std::string::npos) << refused;
   report({.hard = "an explicit step above 2/ω grows without bound; ω is a matter of the worst element",
@@ -497,8 +489,7 @@ TEST(HardPhysics, ARigidTurnMakesGhostForcesOnlyInTheLinearLaw) {
 
   // Pressing so deep that the linear law would rotate material gives a warning that names the depth.
   for (const ModelInfo& model : models()) {
-    const Element element = model.tetrahedra ? Element::kTet4 : Element::kHex8Sri;
-    const Body body(pressed_body(model.kind, element, 4));
+    const Body body(pressed_body(model.kind, Element::kHex8Sri, 4));
     if (model.always.has(EffectKind::kGeometricNonlinearity)) {
       EXPECT_EQ(body.linear_up_to(), std::numeric_limits<double>::infinity()) << model.name;
     } else {

@@ -24,7 +24,7 @@ Address address(std::uint8_t host, std::uint16_t port) {
 }
 
 /// A is a client that wants in, Z the door it stands before.
-class Handshake : public testing::Test {
+class Handshake : public ::testing::Test {
  protected:
   static ClientHandshake::Config client_config() {
     ClientHandshake::Config config;

@@ -51,7 +51,8 @@ TEST(Address, RefusesEverythingElseWithOneSentence) {
       parse_address(text);
       ADD_FAILURE() << "accepted " << text;
     } catch (const std::invalid_argument& error) {
-      const std::string expected = "expected HOST:PORT like 127.0.0.1:47100, got \"" + std::string(text) + "\"";
+      const std::string expected =
+          "expected HOST:PORT like 127.0.0.1:47100 or [::1]:47100, got \"" + std::string(text) + "\"";
       EXPECT_STREQ(error.what(), expected.c_str());
     }
   }

@@ -113,9 +113,11 @@ class Pair {
   std::uint64_t forces = 0;  ///< that answered the state of their turn
 
  private:
-  static NetworkLoop::Config server_config() {
+  static NetworkLoop::Config server_config(Mailboxes& mail) {
     NetworkLoop::Config config;
-    config.devices = {{.name = "proof", .model = "proof", .max_force = 200, .loop_hz = 1000, .channels = {{}}}};
+    config.devices = {
+        {.about = {.name = "proof", .model = "proof", .max_force = 200, .loop_hz = 1000, .channels = {{}}},
+         .mail = &mail}};
     return config;
   }
   static ForceClient::Config client_config() {
@@ -134,7 +136,7 @@ class Pair {
   BusyLink server_busy_{server_link_};
   BusyLink client_busy_{client_link_};
   std::unique_ptr<Mailboxes> mail_ = std::make_unique<Mailboxes>();
-  NetworkLoop network_{server_config(), server_busy_, std::vector<Mailboxes*>{mail_.get()}};
+  NetworkLoop network_{server_config(*mail_), server_busy_, clock_.now};
   ForceClient client_{
       client_busy_, server_, client_config(),
       [](const DeviceState& hand) -> Touch { return Vec3(-2000 * std::max(0.0, hand.position.x()), 0, 0); },

@@ -6,6 +6,8 @@
 #include <iomanip>
 #include <iostream>
 
+#include "clients/cpp/usage.h"
+#include "server/build_info.h"
 #include "tests/soak/soak.h"
 
 int main(int argc, char** argv) {
@@ -14,7 +16,10 @@ int main(int argc, char** argv) {
       "clocks\n"
       "that are set, a disk that is full, processors that others use. Are its memory, files and threads flat, and its\n"
       "promises kept? See tests/soak/README.md.\n\n"
-      "Example:  tendon-soak --duration-s 60 --reconnects 10000 --folder /tmp/soak\n");
+      "Example:  tendon-soak --duration-s 60 --reconnects 10000 --folder /tmp/soak\n",
+      "tendon-soak");
+  tendon::usage::dress(app);
+  app.set_version_flag("--version", tendon::version_text());
   tendon::soak::Config config{.folder = "soak"};
   double duration_s = 3600;
   bool json = false;
@@ -28,9 +33,9 @@ int main(int argc, char** argv) {
   app.add_flag("--json", json, "One JSON object on stdout");
   app.footer("\nExit: 0 all was as it should be; 1 it was not; 2 wrong usage.");
   try {
-    app.parse(argc, argv);
+    tendon::usage::parse(app, argc, argv);
   } catch (const CLI::ParseError& problem) {
-    return app.exit(problem) == 0 ? 0 : 2;
+    return tendon::usage::exit_code(app, problem);
   }
   try {
     config.duration = tendon::from_seconds(duration_s);

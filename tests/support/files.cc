@@ -33,6 +33,10 @@ std::string kind_of(fs::file_type type) {
 void expect_replaceable(const fs::path& file, std::initializer_list<std::string_view> beginnings) {
   std::error_code none;
   const fs::file_type type = fs::status(file, none).type();
+  const fs::path folder = file.has_parent_path() ? file.parent_path() : fs::path(".");
+  if (!fs::is_directory(folder, none)) {
+    throw std::runtime_error("cannot write " + file.string() + ": there is no folder " + folder.string());
+  }
   if (type == fs::file_type::not_found || type == fs::file_type::none) return;
   if (file == "/dev/null" || file == "/dev/stdout") return;
   if (type != fs::file_type::regular) {

@@ -7,9 +7,9 @@
 
 namespace tendon {
 
-/// What a tool asks before it writes `file`. Throws std::runtime_error, naming the file, when something is there that
-/// is not what the tool writes: no regular file, or one that is not empty and begins with none of `beginnings`.
-/// /dev/null and /dev/stdout are let through.
+/// Checks that `file` can be written. Throws std::runtime_error with the name of the file if the folder does not exist,
+/// or if there is a file that was not written by this tool: it is not a regular file, or it is not empty and does not
+/// start with one of the `beginnings`. The files /dev/null and /dev/stdout are always allowed.
 void expect_replaceable(const std::filesystem::path& file, std::initializer_list<std::string_view> beginnings);
 
 }  // namespace tendon

@@ -43,6 +43,13 @@ class Files : public ::testing::Test {
   std::filesystem::path folder_;
 };
 
+TEST_F(Files, AnOutputIntoAFolderThatIsNotThereIsRefusedBeforeTheWork) {
+  EXPECT_EQ(
+      refused([&] { expect_replaceable(folder_ / "none" / "x.png", {"t_s,"}); }),
+      "cannot write " + (folder_ / "none" / "x.png").string() + ": there is no folder " + (folder_ / "none").string());
+  EXPECT_EQ(refused([&] { expect_replaceable("x.png", {"t_s,"}); }), "");
+}
+
 TEST_F(Files, AnOutputReplacesOnlyWhatTheToolWrites) {
   EXPECT_EQ(refused([&] { expect_replaceable(folder_ / "new.csv", {"t_s,"}); }), "");
   EXPECT_EQ(refused([&] { expect_replaceable(file("empty.csv", ""), {"t_s,"}); }), "");

@@ -10,8 +10,8 @@
 
 namespace tendon {
 
-/// `--units` and `--from` of a program or verb that can be swept. `units`: says to people which units there are, "0 to 17:
-/// the rows of the table".
+/// `--units` and `--from` of a program or verb that can be swept. `units`: says to people which units there are, "0 to
+/// 17: the rows of the table".
 inline void add_part_options(CLI::App& verb, Part& part, const std::string& units) {
   part.progress = isatty(STDERR_FILENO) != 0;
   CLI::Option* const these = verb.add_option_function<std::string>(
@@ -22,7 +22,6 @@ inline void add_part_options(CLI::App& verb, Part& part, const std::string& unit
           "--from", [&part](const std::string& file) { part.from = file; },
           "runs nothing: says what the shards of a sweep came to (tendon-sweep merge)")
       ->type_name("FILE")
-      ->check(CLI::ExistingFile.description(""))
       ->excludes(these);
 }
 

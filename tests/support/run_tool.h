@@ -4,8 +4,10 @@
 #include <CLI/CLI.hpp>
 #include <exception>
 #include <iostream>
+#include <new>
 #include <stdexcept>
 
+#include "clients/cpp/usage.h"
 #include "server/scene/scene.h"
 
 namespace tendon {
@@ -13,7 +15,7 @@ namespace tendon {
 /// How each tool ends: 0 done; 1 something failed; 2 wrong usage.
 ///
 /// Parses the command line and calls `body`, which returns the exit code. A complaint is one line on stderr that begins
-/// with the tool's name. A value or a scene that cannot be is wrong usage.
+/// with the tool's name. The exit code is 2 if a value or a scene is not valid, and 1 if a file cannot be read.
 template <class Body>
 int run_tool(CLI::App& app, int argc, char** argv, const Body& body) {
   constexpr int kFailed = 1;
@@ -23,16 +25,18 @@ int run_tool(CLI::App& app, int argc, char** argv, const Body& body) {
     return code;
   };
   try {
-    app.parse(argc, argv);
+    usage::parse(app, argc, argv);
     return body();
-  } catch (const CLI::Success& help) {
-    return app.exit(help);
   } catch (const CLI::ParseError& error) {
-    return complain(error, kWrongUsage);
+    return usage::exit_code(app, error);
   } catch (const std::invalid_argument& error) {
     return complain(error, kWrongUsage);
+  } catch (const SceneFileError& error) {
+    return complain(error, kFailed);
   } catch (const SceneError& error) {
     return complain(error, kWrongUsage);
+  } catch (const std::bad_alloc&) {
+    return complain(std::runtime_error("there is too little memory; does `ulimit -v` limit it?"), kFailed);
   } catch (const std::exception& error) {
     return complain(error, kFailed);
   }

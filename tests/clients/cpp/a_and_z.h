@@ -31,6 +31,10 @@ struct Weather {
   Duration delay = std::chrono::milliseconds(5);
   Duration jitter = std::chrono::milliseconds(2);  ///< uniform, added to delay
 };
+inline constexpr Weather kFineWeather{.loss = 0, .delay = std::chrono::milliseconds(5), .jitter = Duration::zero()};
+
+/// A force that identifies the state that it answers.
+inline Vec3 answer(const DeviceState& hand) { return -100 * hand.position; }
 
 class Network {
  public:

@@ -7,9 +7,8 @@
 namespace tendon::handle_test {
 namespace {
 
-using a_and_z::Weather;
+using a_and_z::kFineWeather;
 using a_and_z::World;
-constexpr Weather kFineWeather{.loss = 0, .delay = std::chrono::milliseconds(5), .jitter = Duration::zero()};
 constexpr Duration kSecond = std::chrono::seconds(1);
 
 /// An answer with all that a handle can be made to feel.

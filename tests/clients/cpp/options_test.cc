@@ -76,7 +76,7 @@ TEST(CommandLine, TakesOneOfTheChoicesAndNumbersFromTheLeastOn) {
   EXPECT_EQ(shape, "plane");
   EXPECT_EQ(reach, 1);
   EXPECT_EQ(parse_shape({"circle"}, shape, reach, err), 2);
-  EXPECT_NE(err.find("{line,plane}"), std::string::npos) << err;
+  EXPECT_NE(err.find("expected line or plane, got \"circle\""), std::string::npos) << err;
   EXPECT_EQ(parse_shape({}, shape, reach, err), 2);
   for (const char* const wrong : {"0", "0.9", "-1", "inf", "nan", "1x"}) {
     EXPECT_EQ(parse_shape({"line", "--reach-mm", wrong}, shape, reach, err), 2) << wrong;
@@ -114,8 +114,13 @@ TEST(CommandLine, WrongUsageLeavesWithTwoAndASentence) {
   EXPECT_NE(parse({"--server", "nowhere"}).err.find("expected HOST:PORT"), std::string::npos);
 }
 
+TEST(CommandLine, AMisspeltOptionIsNamedWithTheOneThatWasMeant) {
+  EXPECT_EQ(parse({"--duraton-s", "1"}).err,
+            "virtual_wall: unknown option --duraton-s; did you mean --duration-s? (see --help)\n");
+}
+
 TEST(CommandLine, AKeyThatIsAPipeOrAFolderIsRefusedAtOnce) {
-  const std::string folder = testing::TempDir() + "tendon_key_" + std::to_string(::getpid());
+  const std::string folder = ::testing::TempDir() + "tendon_key_" + std::to_string(::getpid());
   ASSERT_EQ(::mkdir(folder.c_str(), 0700), 0);
   const std::string pipe = folder + "/pipe";
   ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
@@ -124,11 +129,11 @@ TEST(CommandLine, AKeyThatIsAPipeOrAFolderIsRefusedAtOnce) {
   const Parsed of_nothing = parse({"--key", "/nowhere/at/all.key"});
   ::unlink(pipe.c_str());
   ::rmdir(folder.c_str());
-  EXPECT_EQ(of_pipe.exit_code, 2);
+  EXPECT_EQ(of_pipe.exit_code, 1);
   EXPECT_NE(of_pipe.err.find(pipe + ": cannot read this key: it is not a regular file"), std::string::npos);
-  EXPECT_EQ(of_folder.exit_code, 2);
+  EXPECT_EQ(of_folder.exit_code, 1);
   EXPECT_NE(of_folder.err.find(folder + ": cannot read this key: it is a folder"), std::string::npos);
-  EXPECT_EQ(of_nothing.exit_code, 2);
+  EXPECT_EQ(of_nothing.exit_code, 1);
   EXPECT_NE(of_nothing.err.find("No such file or directory"), std::string::npos);
 }
 

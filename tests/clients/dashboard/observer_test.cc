@@ -27,19 +27,19 @@ class ObserverTest : public testing::Test {
     NetworkLoop::Config config;
     config.secret.fill(static_cast<std::byte>(first_id));
     config.first_connection_id = first_id;
-    std::vector<Mailboxes*> mail;
     mail_.clear();
     for (const std::string& name : names) {
-      config.devices.push_back(
-          {.name = name, .model = "model of " + name, .max_force = 8, .loop_hz = 1000, .channels = {{.name = "main"}}});
-      config.devices.back().device = static_cast<std::uint32_t>(config.devices.size() - 1);
-      if (port_) config.couplings.emplace_back(Couple{.role = PortRole::kLeader});
-      config.handles.push_back({.buttons = {"button " + std::to_string(config.handles.size())}});
       mail_.push_back(std::make_unique<Mailboxes>(Mailboxes::Capacities{.steps = 16, .flight = 16, .datagrams = 1}));
-      mail.push_back(mail_.back().get());
+      const std::string number = std::to_string(config.devices.size());
+      ServedDevice::Config& device = config.devices.emplace_back();
+      device.about = {
+          .name = name, .model = "model of " + name, .max_force = 8, .loop_hz = 1000, .channels = {{.name = "main"}}};
+      device.handle.buttons = {"button " + number};
+      if (port_) device.coupling = Couple{.role = PortRole::kLeader};
+      device.mail = mail_.back().get();
     }
     server_.inbox.clear();
-    loop_ = std::make_unique<NetworkLoop>(config, server_, mail);
+    loop_ = std::make_unique<NetworkLoop>(config, server_, now_);
   }
   /// 1 ms at a time; each device makes a step in each.
   void run(Duration length) {
@@ -90,6 +90,26 @@ class ObserverTest : public testing::Test {
   Board board_;
   std::optional<Observer> observer_{std::in_place, own_, server_.self, Observer::Config{.seed = 1}, board_, now_};
 };
+
+TEST_F(ObserverTest, TriesEveryAddressOfTheServerAndStaysWhereItIsAnswered) {
+  serve({"left"});
+  const Address first = parse_address("[::1]:47100");
+  const Address second = parse_address("192.0.2.1:47100");
+  observer_.emplace(own_, first, Observer::Config{.further = {second, server_.self}, .seed = 1}, board_, now_);
+  run(milliseconds(2500));
+  EXPECT_EQ(observer_->server(), second);
+  EXPECT_EQ(board_.words(), "no answer from [::1]:47100: is tendond running there?");
+  run(seconds(3));
+  EXPECT_EQ(board_.contact(), Contact::kOpen);
+  EXPECT_EQ(observer_->server(), server_.self);
+  loop_.reset();
+  run(seconds(5));
+  EXPECT_EQ(board_.contact(), Contact::kUnanswered);
+  serve({"left"}, 2);
+  run(seconds(15));
+  EXPECT_EQ(board_.contact(), Contact::kOpen);
+  EXPECT_EQ(observer_->server(), server_.self);
+}
 
 TEST_F(ObserverTest, WatchesTheOnlyDeviceOfAServer) {
   serve({"left"});
@@ -214,8 +234,9 @@ TEST_F(ObserverTest, SaysWhyItIsRefused) {
   loop_.reset();
   NetworkLoop::Config config;
   config.max_observers = 0;
-  config.devices = {{.name = "left", .model = "model", .loop_hz = 1000, .channels = {{.name = "main"}}}};
-  loop_ = std::make_unique<NetworkLoop>(config, server_, std::vector<Mailboxes*>{mail_[0].get()});
+  config.devices = {{.about = {.name = "left", .model = "model", .loop_hz = 1000, .channels = {{.name = "main"}}},
+                     .mail = mail_[0].get()}};
+  loop_ = std::make_unique<NetworkLoop>(config, server_, now_);
   run(seconds(1));
   EXPECT_EQ(board_.contact(), Contact::kRefused);
   EXPECT_EQ(board_.words(), "127.0.0.1:47100 refuses: there are 0 observers already");

@@ -11,12 +11,10 @@
 
 #include "clients/dashboard/observer.h"
 #include "devices/safety/safe_device.h"
-#include "server/haptic_loop.h"
-#include "server/network_loop.h"
+#include "server/assembly.h"
 #include "tests/support/wire.h"
 
-// The operator beside the observer and an engine, against the server's own two halves and its safety layer, on virtual
-// time.
+// The operator beside the observer and an engine, against the server's own loops and its safety layer, on virtual time.
 
 namespace tendon::dash::operator_test {
 namespace {
@@ -48,26 +46,27 @@ class OperatorTest : public testing::Test {
   OperatorTest() { serve(true); }
 
   void serve(bool guarded, std::vector<std::string> takeover = {}) {
-    NetworkLoop::Config config;
-    config.secret.fill(std::byte{7});
-    config.keys = {engine_key_, operator_key_};
-    config.takeover = std::move(takeover);
-    config.devices = {{.name = "left",
-                       .model = "handle",
-                       .max_force = 8,
-                       .loop_hz = 1000,
-                       .channels = {{.name = "main", .lease = milliseconds(500), .holder = {}}, {.name = "operator"}}}};
-    HapticLoop::Config haptic;
-    haptic.control.limiter.law = Law::kNone;
-    haptic.control.limiter.longest_hold = milliseconds(2);
-    haptic.control.max_force = 8;
-    haptic.control.max_slew = 1e6;
-    haptic.control.channels = {ChannelRule::kSum, ChannelRule::kSum};
+    Scene scene;
+    scene.name = "left";
+    scene.channels = {{.name = "main", .lease = milliseconds(500)}, {.name = "operator"}};
+    scene.network.takeover = std::move(takeover);
+    HapticController::Config& control = scene.loop.control;
+    control.limiter.law = Law::kNone;
+    control.limiter.longest_hold = milliseconds(2);
+    control.max_force = 8;
+    control.max_slew = 1e6;
+    control.channels = {ChannelRule::kSum, ChannelRule::kSum};
+    if (port_) {
+      scene.teleoperation = Scene::Teleoperation{};
+      control.coupling = Coupling::Config{.spring = {.stiffness = 100, .own_damping = 1, .period = milliseconds(1)}};
+    }
+    Assembly::Config config{.now = now_, .watched = Mailboxes::Capacities{.steps = 16, .flight = 16, .datagrams = 1}};
+    config.network.secret.fill(std::byte{7});
+    config.network.keys = {engine_key_, operator_key_};
+    loops_.reset();
     safe_ = guarded ? std::make_unique<SafeDevice>(SafeDevice::Config{}, handle_) : nullptr;
-    haptic_ = std::make_unique<HapticLoop>(haptic, safe_ ? static_cast<Device&>(*safe_) : static_cast<Device&>(handle_),
-                                           *mail_);
-    if (port_) config.couplings = {Couple{.role = PortRole::kLeader}};
-    network_ = std::make_unique<NetworkLoop>(config, server_, std::vector<Mailboxes*>{mail_.get()});
+    loops_.emplace(std::vector<Assembly::Part>{{.scene = scene, .device = handle_, .safe = safe_.get()}}, config,
+                   std::vector<Link*>{&server_});
   }
 
   ForceClient::Config engine_config(const ClientKey& key, const std::string& channel) const {
@@ -92,18 +91,13 @@ class OperatorTest : public testing::Test {
   void run(Duration length) {
     for (const LocalTime end = now_ + length; now_ < end; now_ += milliseconds(1)) {
       if (shaking_) handle_.position.x() += 1e-3 * ((++steps_ / 20) % 2 == 0 ? 1 : -1);
-      if (port_) couple();
-      haptic_->step(now_);
-      while (mail_->steps.front() != nullptr) mail_->steps.pop();
-      ++health_.steps;
-      health_.at = now_;
-      // In the order of the wire's numbers, as the server maps them.
-      health_.safety = safe_ ? (safe_->status().state == SafetyState::kArmed   ? Safety::kArmed
-                                : safe_->status().state == SafetyState::kHomed ? Safety::kHomed
-                                                                               : Safety::kFault)
-                             : Safety::kUnguarded;
-      mail_->health.put(health_);
-      network_->turn(now_);
+      Mailboxes& mail = loops_->devices().front().mail;
+      if (port_) obey(mail.orders.front());
+      loops_->haptic_groups().front().turn(now_);
+      while (mail.steps.front() != nullptr) mail.steps.pop();
+      if (port_) mail.port_out[0].put(*port_);
+      loops_->log().turn(now_, 0);
+      loops_->turn_network(0, now_);
       observer_.turn(now_);
       if (operator_) operator_->turn(now_);
       if (engine_) engine_->turn(now_);
@@ -115,13 +109,11 @@ class OperatorTest : public testing::Test {
       }
     }
   }
-  /// In place of a haptic thread with a coupling.
-  void couple() {
-    const HapticOrder* const order = mail_->orders.front();
+  /// In place of a coupling, which has no other end.
+  void obey(const HapticOrder* order) {
     if (order != nullptr && obeys_ && order->kind == HapticOrder::Kind::kEngage) port_->phase = PortPhase::kEngaged;
     if (order != nullptr && obeys_ && order->kind == HapticOrder::Kind::kDisengage) port_->phase = PortPhase::kCoupled;
     ++port_->sequence;
-    mail_->port_out[0].put(*port_);
   }
   void serve_leader() {
     port_.emplace();
@@ -135,7 +127,7 @@ class OperatorTest : public testing::Test {
     return *board_.press();
   }
   Vec3 applied() const { return board_.devices().at(0).newest->force_applied; }
-  std::string holder(std::size_t channel) const { return network_->stats().channels.at(channel).holder; }
+  std::string holder(std::size_t channel) { return loops_->network().stats().channels.at(channel).holder; }
 
   ClientKey engine_key_ = key_of("wall", 1);
   ClientKey operator_key_ = key_of("operator", 2);
@@ -147,11 +139,7 @@ class OperatorTest : public testing::Test {
   End engine_end_{wire_, parse_address("192.0.2.3:5000")};
   Handle handle_;
   std::unique_ptr<SafeDevice> safe_;
-  std::unique_ptr<Mailboxes> mail_ =
-      std::make_unique<Mailboxes>(Mailboxes::Capacities{.steps = 16, .flight = 16, .datagrams = 1});
-  std::unique_ptr<HapticLoop> haptic_;
-  std::unique_ptr<NetworkLoop> network_;
-  Health health_;
+  std::optional<Assembly> loops_;
   int steps_ = 0;
   bool shaking_ = false;
   std::optional<PortState> port_;  ///< of a coupling
@@ -177,7 +165,7 @@ TEST_F(OperatorTest, ArmsAndDisarmsBesideAnEngineAndLeaves) {
   EXPECT_EQ(applied(), Vec3(-2, 0, 0));
   EXPECT_EQ(holder(1), "");
 
-  const std::uint64_t forces = network_->stats().channels.at(1).forces;
+  const std::uint64_t forces = loops_->network().stats().channels.at(1).forces;
   ASSERT_EQ(person.press(now_, 0, Order::kDisarm), "");
   EXPECT_EQ(settle().state, State::kDone) << board_.press()->words;
   EXPECT_EQ(safe_->status().state, SafetyState::kHomed);
@@ -187,8 +175,8 @@ TEST_F(OperatorTest, ArmsAndDisarmsBesideAnEngineAndLeaves) {
   EXPECT_EQ(holder(0), "wall");
   EXPECT_EQ(holder(1), "");
   EXPECT_EQ(engine_->stats().sessions, 1U) << "the engine was not disturbed";
-  EXPECT_EQ(network_->stats().channels.at(1).forces, forces) << "an operator sends no force";
-  EXPECT_EQ(network_->stats().timed_out, 0U) << "it has said Bye";
+  EXPECT_EQ(loops_->network().stats().channels.at(1).forces, forces) << "an operator sends no force";
+  EXPECT_EQ(loops_->network().stats().timed_out, 0U) << "it has said Bye";
   EXPECT_EQ(board_.sessions(), 1U) << "the observer was not taken for it";
 }
 
@@ -197,14 +185,14 @@ TEST_F(OperatorTest, TakesNothingFromTheHolderAndSaysWhoThatIs) {
   Operator& person = with(operator_key_, "main");
   start_engine(engine_key_, "main");
   run(seconds(3));
-  const std::uint64_t welcomed = network_->stats().welcomed;
+  const std::uint64_t welcomed = loops_->network().stats().welcomed;
   const std::string words =
       "\"wall\" holds the channel \"main\", and for 500 ms after its last force. Nothing is taken from it.";
   EXPECT_EQ(person.objection(0), words);
   EXPECT_EQ(person.press(now_, 0, Order::kDisarm), words);
   EXPECT_FALSE(board_.press());
   run(seconds(1));
-  EXPECT_EQ(network_->stats().welcomed, welcomed) << "nothing was sent";
+  EXPECT_EQ(loops_->network().stats().welcomed, welcomed) << "nothing was sent";
   EXPECT_EQ(holder(0), "wall");
 }
 

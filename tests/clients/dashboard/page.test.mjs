@@ -21,7 +21,7 @@ it("shows the server live, pauses when told to, and goes on", async (test) => {
   await says(page, ".engine", "virtual_wall");
   await says(page, ".lateness .words", "99\u00a0% within");
   assert.match(await page.locator("[data-tile=delay] .value").textContent(), /^[\d.]+\s[mµ]s$/);
-  assert.match(await page.locator(".why").textContent(), /^(For|In these) /);
+  assert.match(await page.locator(".why").textContent(), /^(For .* N \(median\)|In these .*felt)/);
   for (const chart of ["force", "position", "energy"]) assert.ok((await painted(page, `[data-chart=${chart}] canvas`)) > 2000, chart);
 
   await page.click("#pause");

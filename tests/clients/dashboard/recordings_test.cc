@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "tests/server/scratch_folder.h"
+#include "tests/support/refusal.h"
 
 namespace tendon::dash::recordings_test {
 namespace {
@@ -63,12 +64,8 @@ TEST_F(RecordingsTest, OpensByNameAndByNothingElse) {
 }
 
 TEST(Recordings, SaysWhichFolderIsNone) {
-  try {
-    const Recordings none("/nowhere/at/all");
-    FAIL();
-  } catch (const std::runtime_error& error) {
-    EXPECT_STREQ(error.what(), "/nowhere/at/all: not a folder");
-  }
+  EXPECT_EQ(thrown_by<std::runtime_error>([&] { const Recordings none("/nowhere/at/all"); }),
+            "/nowhere/at/all: not a folder");
 }
 
 TEST(ByteRange, IsReadAsRfc9110Says) {

@@ -5,10 +5,67 @@ import assert from "node:assert/strict";
 import { closeSync, copyFileSync, openSync, readFileSync, statSync, truncateSync, writeFileSync, writeSync } from "node:fs";
 import { join } from "node:path";
 import { it } from "node:test";
+import { pathToFileURL } from "node:url";
 import { painted, picture, says, visit } from "./browser.mjs";
-import { packageOf, Program, scratch, startDash, startServer, until } from "./support.mjs";
+import { kRoot, packageOf, Program, scratch, startDash, startServer, until } from "./support.mjs";
 
 const { McapStreamReader, McapWriter } = packageOf("clients/dashboard/page", "@mcap/core");
+
+/** Returns the module of the page that reads damaged recordings. */
+async function salvageModule(test) {
+  const ts = packageOf("clients/dashboard/page", "typescript");
+  const folder = scratch(test);
+  const compilerOptions = { target: ts.ScriptTarget.ES2022, module: ts.ModuleKind.ESNext, verbatimModuleSyntax: true };
+  const text = readFileSync(join(kRoot, "clients/dashboard/page/src/salvage.ts"), "utf8");
+  const mcap = pathToFileURL(join(kRoot, "clients/dashboard/page/node_modules/@mcap/core/dist/esm/index.js")).href;
+  writeFileSync(join(folder, "package.json"), '{"type":"module"}');
+  writeFileSync(join(folder, "salvage.js"), ts.transpileModule(text, { compilerOptions }).outputText.replace('"@mcap/core"', JSON.stringify(mcap)));
+  return import(join(folder, "salvage.js"));
+}
+
+/** Returns a position in an MCAP file. */
+function middleOfThirdChunk(bytes) {
+  const kChunk = 6;
+  const lengthAt = (at) => Number(bytes.readBigUInt64LE(at + 1));
+  let chunks = 0;
+  for (let at = 8; ; at += 9 + lengthAt(at)) {
+    if (bytes[at] === kChunk && ++chunks === 3) return at + Math.floor(lengthAt(at) / 2);
+  }
+}
+
+it("reads all chunks of a damaged recording that are whole", async (test) => {
+  const { Salvage } = await salvageModule(test);
+  const folder = scratch(test);
+  const server = await startServer(test, folder, ["demo"], "--record", "run.mcap", "--duration-s", "1");
+  await server.program.ended;
+  const whole = readFileSync(join(folder, "run.mcap"));
+  const read = async (bytes) => {
+    const file = { size: async () => BigInt(bytes.length), read: async (at, size) => bytes.subarray(Number(at), Number(at + size)) };
+    const salvage = new Salvage(file);
+    const messages = [];
+    for await (const record of salvage.records()) if (record.type === "Message") messages.push(`${record.channelId} ${record.sequence} ${record.logTime}`);
+    return { messages, damaged: salvage.damaged, ended: salvage.ended };
+  };
+  const before = await read(whole);
+  assert.ok(before.messages.length > 900);
+  assert.deepEqual([before.damaged, before.ended], [0, true]);
+  const middle = middleOfThirdChunk(whole);
+  const flipped = Buffer.from(whole);
+  flipped[middle] ^= 0x40;
+  const zeroed = Buffer.from(whole);
+  zeroed.fill(0, middle, middle + 4096);
+  const tail = Buffer.from(whole);
+  tail.fill(0, middle);
+  const gone = Buffer.concat([whole.subarray(0, middle), whole.subarray(middle + 5000)]);
+  for (const [what, bytes, damaged, ended] of [["a flipped bit", flipped, 1, true], ["a lost sector", zeroed, 1, true],
+    ["an end of zeros", tail, 0, false], ["a piece that is gone", gone, 1, true]]) {
+    const after = await read(bytes);
+    assert.deepEqual([after.damaged > 0 ? 1 : 0, after.ended], [damaged, ended], what);
+    const known = new Set(before.messages);
+    for (const message of after.messages) assert.ok(known.has(message), what);
+    assert.ok(after.messages.length >= before.messages.length * (ended ? 0.4 : 0.2), `${what}: ${after.messages.length} of ${before.messages.length}`);
+  }
+});
 
 it("opens recordings, scrubs them, and shows two side by side", async (test) => {
   const folder = scratch(test);
@@ -31,7 +88,7 @@ it("opens recordings, scrubs them, and shows two side by side", async (test) => 
 
   await page.click("a:has-text('one.mcap')");
   await page.locator(".run h2", { hasText: "one.mcap" }).waitFor();
-  assert.match(await page.locator(".run .head .quiet").textContent(), /· \d+(\.\d+)?\ss · [\d\u202f]+ steps · /);
+  assert.match(await page.locator(".run .head .quiet").textContent(), /^\d{4}-\d\d-\d\d \d\d:\d\d:\d\d UTC.* · \d+(\.\d+)?\ss · [\d\u202f]+ steps · /);
   assert.ok((await painted(page, "[data-chart=position] canvas")) > 2000);
   await says(page, ".lateness .words", "99\u00a0% within");
   const whole = await picture(page, "[data-chart=position] canvas");

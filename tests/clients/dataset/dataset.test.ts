@@ -153,6 +153,20 @@ describe("episodesOfRobot", () => {
     near(columns.get("timestamp")!.values[124] as number, 2.48);
   });
 
+  it("gives the velocity of a robot whose loop has another rate", () => {
+    for (const hz of [31, 40, 50, 60, 100, 1000]) {
+      const moments = Array.from({ length: 3 * hz }, (_, k): Moment => {
+        const position: Vec3 = [(0.06 * k) / hz, 0, 0.1];
+        return { t: Math.round((k * 1e9) / hz) / 1e9, phase: "engaged", position, target: position };
+      });
+      const { frames } = episodesOfRobot(moments, 60)[0]!;
+      assert.equal(frames[0]!.state[3], 0);
+      const first = frames.findIndex(({ state }) => state[3] !== 0);
+      assert.ok(first === 1 || hz < 60, `${hz} Hz`);
+      for (const { state } of frames.slice(first)) assert.ok(Math.abs(state[3]! - 0.06) < 1e-6, `${hz} Hz: ${state[3]}`);
+    }
+  });
+
   it("ends an episode where the robot stands or hears nothing", () => {
     const moment = (t: number, phase: string): Moment => ({ t, phase, position: [t, 0, 0], target: [t, 0, 0] });
     const parts = (moments: Moment[]): number[] => episodesOfRobot(moments, 10).map(({ frames }) => frames.length);
@@ -179,11 +193,17 @@ describe("readDemonstration", () => {
     ]);
   });
 
+  it("skips a byte order mark and blank lines", async (test) => {
+    const text = `\uFEFF${kHead}\r\n${kLine}\n\n`;
+    assert.equal((await readDemonstration(file(test, text))).length, 1);
+  });
+
   it("names file and line of what it does not understand", async (test) => {
     const refuses = (text: string, why: RegExp) => assert.rejects(readDemonstration(file(test, text)), why);
     await refuses("", /press\.jsonl: expected a demonstration, and it is empty/);
     await refuses(kLine, /line 1: expected \{"kind":"tendon demonstration","version":1\}/);
     await refuses(`${kHead}${kLine.replace("[1,0,0]", "[1,0]")}`, /line 2: position_m: expected three numbers/);
     await refuses(`${kHead}{"tick":\n${kLine}`, /line 2: /);
+    await refuses(`${kHead}${kLine}${kHead}`, /line 3: expected one demonstration in a file, found a second/);
   });
 });

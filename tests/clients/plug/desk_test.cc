@@ -39,18 +39,22 @@ TEST(Desk, HasAPlugForEachNameAndOneWithoutNames) {
 }
 
 TEST(Desk, SaysOnceThatNobodyAnswersHoweverOftenItTries) {
-  Desk desk({.server = "127.0.0.1:9", .devices = {"right"}}, kStart);
   testing::internal::CaptureStderr();
-  for (LocalTime now = kStart; now < kStart + seconds(20); now += milliseconds(10)) desk.turn(now);
+  {
+    Desk desk({.server = "127.0.0.1:9", .devices = {"right"}}, kStart);
+    for (LocalTime now = kStart; now < kStart + seconds(20); now += milliseconds(10)) desk.turn(now);
+  }
   EXPECT_EQ(testing::internal::GetCapturedStderr(),
             "tendon-plug: right: no answer from 127.0.0.1:9; is tendond running there? Trying on\n");
 }
 
 TEST(Desk, WritesALineForEachDeviceOnceASecondWithTheBridgesCounts) {
-  Desk desk({.server = "127.0.0.1:9", .devices = {"left", "right"}, .json = true}, kStart);
   const std::array counts = {Desk::Count{"clients", 3}};
   testing::internal::CaptureStdout();
-  for (LocalTime now = kStart; now <= kStart + seconds(1); now += milliseconds(100)) desk.turn(now, counts);
+  {
+    Desk desk({.server = "127.0.0.1:9", .devices = {"left", "right"}, .json = true}, kStart);
+    for (LocalTime now = kStart; now <= kStart + seconds(1); now += milliseconds(100)) desk.turn(now, counts);
+  }
   EXPECT_EQ(testing::internal::GetCapturedStdout(),
             R"({"device":"left","states":0,"forces":0,"dropped":0,"unusable":0,"owner":0,"pushes":false,)"
             R"("round_trip_ms":0.0,"clients":3})"

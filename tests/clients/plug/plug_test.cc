@@ -170,6 +170,18 @@ TEST(Plug, GivesTheChannelBackWhenNoProgramAsksForASecond) {
   EXPECT_LT(world.step.applied.y(), 0);
 }
 
+TEST(Plug, SaysOnceWhyAForceIsNotSent) {
+  World world("demo_parts.toml");
+  Plug& plug = world.add_plug();
+  world.run(100);
+  const auto push = [&] { plug.push(kOld, world.now, world.now + milliseconds(100), Vec3(0, 1e13, 0)); };
+  world.run(200, push);
+  EXPECT_GT(plug.forces_unusable(), 1U);
+  EXPECT_TRUE(one_has(sentences_of(plug), "the force is beyond 1e12 N"));
+  world.run(200, push);
+  EXPECT_FALSE(one_has(sentences_of(plug), "the force is beyond 1e12 N"));
+}
+
 TEST(Plug, ThatObservesSendsNothing) {
   World world("demo_parts.toml");
   Plug& plug = world.add_plug({.observe = true});

@@ -13,15 +13,13 @@
 
 #include "clients/plug/plug.h"
 #include "devices/simulated/simulated_device.h"
-#include "server/haptic_loop.h"
-#include "server/network_loop.h"
-#include "server/scene/scene.h"
+#include "server/assembly.h"
 #include "tests/support/wire.h"
 
 namespace tendon::plug {
 
-/// The server's loops with a shipped scene, and plugs that reach it, on virtual time: one haptic step each millisecond,
-/// and `delay` each way. Nothing is random but the simulated device.
+/// A server with a shipped scene, and plugs that reach it, on virtual time: one haptic step each millisecond, and
+/// `delay` each way. Nothing is random but the simulated device.
 class World {
  public:
   explicit World(const std::string& scene_file, const std::vector<std::string>& settings = {}, int delay_ms = 0)
@@ -52,7 +50,7 @@ class World {
     for (int i = 0; i < milliseconds; ++i) {
       now += std::chrono::milliseconds(1);
       turn_server();
-      if (haptic_) haptic_->step(now);
+      if (assembly_) assembly_->haptic_groups().front().turn(now);
       turn_server();
       turn_plugs();
       if (each) {
@@ -64,27 +62,18 @@ class World {
   }
 
   /// The server dies without a word; it may come back, and knows nothing of before.
-  void kill_server() {
-    network_.reset();
-    haptic_.reset();
-  }
+  void kill_server() { assembly_.reset(); }
   void open_server() {
     ++epoch_;
+    assembly_.reset();
     device_ = std::make_unique<SimulatedDevice>(scene_.simulated());
-    mail_ = std::make_unique<Mailboxes>(Mailboxes::Capacities{.steps = 16, .ports = 1, .flight = 2, .datagrams = 1});
-    haptic_ = std::make_unique<HapticLoop>(scene_.loop, *device_, *mail_);
-    NetworkLoop::Config config;
-    config.secret.fill(std::byte{7});
-    config.first_connection_id = 1000 * epoch_;
-    DeviceDescription about{.name = "device", .model = "simulated falcon", .loop_hz = 1000};
-    for (const Scene::Channel& channel : scene_.channels) {
-      about.channels.push_back({.name = channel.name, .lease = channel.lease});
-    }
-    if (about.channels.empty()) about.channels.push_back({.name = "main"});
-    config.devices = {about};
-    config.handles = {handle};
-    network_ = std::make_unique<NetworkLoop>(config, server_, std::vector<Mailboxes*>{mail_.get()});
-    network_->turn(now);
+    Assembly::Config config{.now = now, .watched = Mailboxes::Capacities{.steps = 16, .flight = 2, .datagrams = 1}};
+    config.network.secret.fill(std::byte{7});
+    config.network.first_connection_id = 1000 * epoch_;
+    assembly_ =
+        std::make_unique<Assembly>(std::vector<Assembly::Part>{{.scene = scene_, .device = *device_, .handle = handle}},
+                                   config, std::vector<Link*>{&server_});
+    assembly_->turn_network(0, now);
   }
 
   /// Datagrams that have come to the plugs and that nobody has read.
@@ -119,12 +108,13 @@ class World {
   }
 
   void turn_server() {
-    if (!network_) return;
-    network_->turn(now);
-    while (const StepRecord* record = mail_->steps.front()) {
+    if (!assembly_) return;
+    assembly_->turn_network(0, now);
+    Mailboxes& mail = assembly_->devices().front().mail;
+    while (const StepRecord* record = mail.steps.front()) {
       step = *record;
       least_energy = std::min(least_energy, record->energy);
-      mail_->steps.pop();
+      mail.steps.pop();
     }
   }
   void turn_plugs() {
@@ -160,9 +150,7 @@ class World {
   End server_{wire_, kServer};
   std::deque<UnderWay> under_way_;
   std::unique_ptr<SimulatedDevice> device_;
-  std::unique_ptr<Mailboxes> mail_;
-  std::unique_ptr<HapticLoop> haptic_;
-  std::unique_ptr<NetworkLoop> network_;
+  std::unique_ptr<Assembly> assembly_;
   std::deque<Guest> guests_;
 };
 

@@ -5,7 +5,8 @@
 
 #include <precice/precice.hpp>
 #include <stdexcept>
-#include <string>
+
+#include "tests/support/refusal.h"
 
 namespace tendon::precice_worker::precice_engine_test {
 namespace {
@@ -43,13 +44,8 @@ TEST_F(PreciceEngineWithAPartner, TheEndOfTheCouplingIsAnErrorThatNamesTheFile) 
   PreciceEngine engine(config);
   engine.answer(at(0.001));
   engine.answer(at(0.002));
-  try {
-    engine.answer(at(0.003));
-    FAIL();
-  } catch (const std::runtime_error& error) {
-    EXPECT_EQ(std::string(error.what()),
-              "the coupling has come to its end: max-time or max-time-windows of coupling.xml");
-  }
+  EXPECT_EQ(thrown_by<std::runtime_error>([&] { engine.answer(at(0.003)); }),
+            "the coupling has come to its end: max-time or max-time-windows of coupling.xml");
 }
 
 TEST_F(PreciceEngineWithAPartner, AMeshOfTwoDimensionsIsRefused) {

@@ -10,6 +10,8 @@
 #include <string>
 #include <vector>
 
+#include "tests/support/refusal.h"
+
 namespace tendon::precice_worker::touched_patch_test {
 namespace {
 
@@ -117,12 +119,7 @@ TEST(TouchedPatch, WhatIsNoNumberGoesOnAndIsForgotten) {
 }
 
 std::string refused(const TouchedPatch::Config& config) {
-  try {
-    const TouchedPatch patch(config);
-    return "";
-  } catch (const std::invalid_argument& error) {
-    return error.what();
-  }
+  return thrown_by([&] { const TouchedPatch patch(config); });
 }
 
 TEST(TouchedPatch, AnImpossibleOneIsRefusedWithItsFieldAndValue) {

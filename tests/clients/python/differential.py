@@ -139,7 +139,7 @@ def _frame(frame: Frame) -> list[object]:
         return words
     if isinstance(frame, Control):
         if frame.request is None:
-            return ["control", frame.id, "unknown"]
+            return ["control", frame.id, *(["refused", frame.invalid] if frame.invalid else ["unknown"])]
         if isinstance(frame.request, SetStateRate):
             return ["control", frame.id, "rate", frame.request.hz]
         if isinstance(frame.request, SetStateDeadband):

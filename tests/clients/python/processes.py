@@ -3,8 +3,11 @@
 
 from __future__ import annotations
 
+import contextlib
+import io
 import json
 import os
+import runpy
 import signal
 import subprocess
 import sys
@@ -124,6 +127,19 @@ class Server(Process):
 
 def example(folder: Path, name: str, *arguments: str | Path) -> Process:
     return Process(folder, [sys.executable, EXAMPLES / f"{name}.py", *arguments])
+
+
+def said_by_example(name: str, *arguments: str) -> tuple[int, str, str]:
+    """Exit code, stdout and stderr of an example that ends at once. It runs in this process, because
+    a new process needs a third of a second to import the package."""
+    out, err, before = io.StringIO(), io.StringIO(), sys.argv
+    sys.argv = [str(EXAMPLES / f"{name}.py"), *arguments]
+    try:
+        with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err), pytest.raises(SystemExit) as end:
+            runpy.run_path(sys.argv[0], run_name="__main__")
+    finally:
+        sys.argv = before
+    return end.value.code, out.getvalue(), err.getvalue()
 
 
 def summary_of(process: Process, mark: str = '"summary"') -> dict[str, Any]:

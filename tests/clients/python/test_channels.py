@@ -150,7 +150,7 @@ def test_the_description_of_a_named_device_is_that_of_the_session():
     assert stage.client.description == DESCRIPTION
     stage.grant = Code.UNSUPPORTED
     stage.server.session.close(Code.SHUTDOWN, "")
-    stage.run(1 * SECOND)
+    stage.run(400 * MS)
     assert stage.client.phase is Phase.OPEN
     assert stage.client.description is None
 
@@ -165,16 +165,16 @@ def test_the_handle_is_described_where_the_server_knows_that_feature():
         assert stage.client.description is None
         stage.grant = Code.UNSUPPORTED
         stage.server.session.close(Code.SHUTDOWN, "")
-        stage.run(1 * SECOND)
+        stage.run(400 * MS)
         assert (stage.client.phase, stage.client.handle) == (Phase.OPEN, None)
 
 
 def test_no_state_is_handed_out_while_another_holds_the_channel():
     stage = named(ANOTHERS)
-    stage.run(1 * SECOND)
+    stage.run(400 * MS)
     stats = stage.client.stats
     assert (stage.seen, stage.forces, leases(stage)) == ([], [], [])
-    assert stats.phase is Phase.OPEN and stats.states > 900
+    assert stats.phase is Phase.OPEN and stats.states > 350
     assert not stage.client.holds and stage.client.next_state_due() == inf
     assert stage.client.take_lease()
     stage.run(100 * MS)
@@ -218,11 +218,11 @@ def test_a_lease_is_asked_for_once_unless_the_config_says_otherwise():
     once.grant = Code.BUSY
     once.run(100 * MS)
     once.client.take_lease()
-    once.run(1 * SECOND)
+    once.run(400 * MS)
     assert len(leases(once)) == 1
     denied = named(ANOTHERS, take_lease=True)
     denied.grant = Code.DENIED
-    denied.run(1 * SECOND)
+    denied.run(400 * MS)
     assert len(leases(denied)) == 1
 
 
@@ -250,7 +250,7 @@ def test_who_has_lost_the_lease_is_told_to_whom_and_sends_nothing_more():
     assert [answer.code for answer in stage.answers] == [Code.OK]
     seen, forces = list(stage.seen), list(stage.forces)
     stage.client.send(seen[-1], Touch((1, 0, 0)))  # of an engine that was still computing
-    stage.run(1 * SECOND)
+    stage.run(400 * MS)
     assert (stage.seen, stage.forces) == (seen, forces)
     assert stage.client.phase is Phase.OPEN
     assert leases(stage) == []
@@ -294,7 +294,7 @@ def test_a_lease_given_up_does_not_come_back_by_an_older_answer():
     assert stage.client.take_lease(), "ours already: the server says OK"
     assert stage.client.give_lease()
     seen = list(stage.seen)
-    stage.run(1 * SECOND)
+    stage.run(400 * MS)
     assert not stage.client.holds
     assert stage.seen == seen
     assert len(leases(stage)) == 1
@@ -306,7 +306,7 @@ def test_a_lease_won_and_lost_before_either_is_heard_is_lost(once_more):
     stage.run(100 * MS)
     stage.lease_answers, stage.snatches = [Code.OK, once_more], 1
     assert stage.client.take_lease()
-    stage.run(1 * SECOND)
+    stage.run(400 * MS)
     ours = once_more is Code.OK
     assert (stage.client.holds, stage.client.stats.lease_lost_to) == (ours, "" if ours else "another")
     assert len(leases(stage)) == 2, "it has asked again, once"
@@ -317,8 +317,8 @@ def test_a_server_that_knows_no_leases_leaves_it_the_channel_that_it_has():
     stage.run(100 * MS)
     stage.grant = Code.UNSUPPORTED
     assert stage.client.take_lease()
-    stage.run(1 * SECOND)
-    assert stage.client.holds and len(stage.forces) > 900
+    stage.run(400 * MS)
+    assert stage.client.holds and len(stage.forces) > 450
 
 
 def test_who_waits_for_a_lease_and_gives_it_up_asks_no_more():
@@ -327,7 +327,7 @@ def test_who_waits_for_a_lease_and_gives_it_up_asks_no_more():
     stage.run(200 * MS)
     asked = len(leases(stage))
     assert stage.client.give_lease()
-    stage.run(1 * SECOND)
+    stage.run(400 * MS)
     assert len(leases(stage)) == asked
 
 
@@ -348,7 +348,7 @@ def test_a_lease_unanswered_in_one_session_is_asked_for_in_the_next():
     stage.client.take_lease()
     stage.server.session.close(Code.SHUTDOWN, "")
     stage.grant = Code.OK
-    stage.run(1 * SECOND)
+    stage.run(400 * MS)
     assert stage.client.holds
     assert stage.client.stats.sessions == 2
 
@@ -362,11 +362,11 @@ def test_a_new_session_has_its_own_place_and_nothing_of_the_old_one():
     assert not stage.client.holds
     stage.server.grants = (Grant(Role.CONTROLLER, 0, 1),)
     stage.server.session.close(Code.SHUTDOWN, "")
-    stage.run(1 * SECOND)
+    stage.run(400 * MS)
     assert (stage.client.holds, stage.client.stats.lease_lost_to) == (True, "")
     assert (stage.forces[-1].device, stage.forces[-1].channel) == (0, 1)
     asked = len(stage.requests)
-    stage.run(1 * SECOND)
+    stage.run(400 * MS)
     assert len(stage.requests) == asked
 
 

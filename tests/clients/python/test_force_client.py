@@ -41,11 +41,11 @@ from tendon.messages import Disarm, Hello, LocalModel, Rearm, Refused, SetStateR
 
 
 @pytest.mark.parametrize("key", [None, KEY], ids=["plain", "noise"])
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", range(2))
 def test_a_wall_is_felt_over_a_bad_network_in_either_suite(seed, key):
     weather = Weather(5 * MS, 10 * MS, loss=0.2, duplicate=0.2)
     stage = Stage(Config(name="wall", key=key, rate_hz=100), StandIn(key), weather, seed)
-    stage.run(3 * SECOND)
+    stage.run(1500 * MS)
     assert stage.client.phase is Phase.OPEN
     assert stage.client.welcome.device_name == "stand-in"
     assert len(stage.forces) > 100
@@ -57,7 +57,7 @@ def test_a_wall_is_felt_over_a_bad_network_in_either_suite(seed, key):
 
 def test_with_a_key_nothing_but_the_hellos_frame_is_readable():
     stage = Stage(Config(name="a name that must not show", key=KEY), StandIn(KEY))
-    stage.run(1 * SECOND)
+    stage.run(200 * MS)
     sent = stage.world.there.delivered
     assert len(sent) > 100
     assert all(b"must not show" not in datagram for datagram in sent)
@@ -75,7 +75,7 @@ OLD, BOTH, AES_ONLY = (Suite.NOISE,), (Suite.AES_GCM, Suite.NOISE), (Suite.AES_G
 )
 def test_the_suite_is_the_fastest_that_both_have(ours, theirs, agreed):
     stage = Stage(Config(key=KEY, suites=ours), StandIn(KEY, theirs))
-    stage.run(1 * SECOND)
+    stage.run(200 * MS)
     assert stage.client.phase is Phase.OPEN
     assert len(stage.forces) > 100
     headers = [decode_header(datagram) for datagram in stage.world.there.delivered]
@@ -86,7 +86,7 @@ def test_the_suite_is_the_fastest_that_both_have(ours, theirs, agreed):
 @pytest.mark.skipif(not aes.AVAILABLE, reason="python3-cryptography is missing")
 def test_a_server_that_has_none_of_our_suites_is_one_that_refuses():
     stage = Stage(Config(key=KEY, suites=AES_ONLY), StandIn(KEY, OLD))
-    stage.run(1 * SECOND)
+    stage.run(200 * MS)
     assert stage.client.phase is Phase.REFUSED
     assert stage.client.stats.code is Code.UNSUPPORTED
     assert stage.client.stats.reason == "the server seals by chacha20-poly1305, this client by aes-256-gcm only"
@@ -96,7 +96,7 @@ def test_a_suite_that_was_not_offered_is_not_taken():
     server = StandIn(KEY, OLD)
     server.features = ("aes-256-gcm", *server.features)
     stage = Stage(Config(key=KEY, suites=OLD), server)
-    stage.run(1 * SECOND)
+    stage.run(200 * MS)
     assert stage.client.phase is Phase.OPEN
     assert len(stage.forces) > 100
 
@@ -157,12 +157,12 @@ def test_attempts_are_given_up_after_2_s_and_wait_twice_as_long_each_time():
 
 def test_a_restarted_server_is_found_and_the_sequence_begins_anew():
     stage = Stage(Config(rate_hz=100))
-    stage.run(1 * SECOND)
+    stage.run(200 * MS)
     stage.server.session.close(Code.SHUTDOWN, "SIGTERM")
     stage.run(50 * MS)
     assert (stage.client.phase, stage.client.stats.reason) == (Phase.LOST, "SIGTERM")
     stage.forces.clear()
-    stage.run(1 * SECOND)
+    stage.run(300 * MS)
     assert stage.client.phase is Phase.OPEN
     assert stage.client.stats.sessions == 2
     assert stage.forces[0].sequence == 1
@@ -170,7 +170,7 @@ def test_a_restarted_server_is_found_and_the_sequence_begins_anew():
 
 def test_whose_place_another_program_has_taken_does_not_come_back():
     stage = Stage(Config())
-    stage.run(1 * SECOND)
+    stage.run(200 * MS)
     stage.server.session.close(Code.REPLACED, "taken over")
     stage.run(10 * SECOND)
     stats = stage.client.stats
@@ -178,11 +178,11 @@ def test_whose_place_another_program_has_taken_does_not_come_back():
 
 
 def test_a_sealed_session_of_a_day_says_bye_and_shakes_hands_again(monkeypatch):
-    monkeypatch.setattr("tendon.limits.LIFE_NS", 3 * SECOND)
+    monkeypatch.setattr("tendon.limits.LIFE_NS", 1 * SECOND)
     stage = Stage(Config(key=KEY), StandIn(KEY))
-    stage.run(1 * SECOND)
+    stage.run(300 * MS)
     first = stage.server.session
-    stage.run(2500 * MS)
+    stage.run(900 * MS)
     assert not first.open
     assert stage.client.phase is Phase.OPEN
     assert stage.client.stats.sessions == 2
@@ -190,23 +190,23 @@ def test_a_sealed_session_of_a_day_says_bye_and_shakes_hands_again(monkeypatch):
 
 def test_silence_of_the_server_ends_the_session_and_a_new_attempt_follows():
     stage = Stage(Config())
-    stage.run(1 * SECOND)
+    stage.run(200 * MS)
     stage.server.deaf = True
     stage.run(2050 * MS)
     assert (stage.client.phase, stage.client.stats.code) == (Phase.LOST, Code.TIMED_OUT)
     stage.server.deaf = False
-    stage.run(1 * SECOND)
+    stage.run(500 * MS)
     assert stage.client.phase is Phase.OPEN
 
 
 def test_a_refused_guest_asks_again_and_tells_the_servers_words():
     stage = Stage(Config())
     stage.server.refusal = Refused(Code.BUSY, "one controller")
-    stage.run(500 * MS)
+    stage.run(250 * MS)
     stats = stage.client.stats
     assert (stats.phase, stats.code, stats.reason) == (Phase.REFUSED, Code.BUSY, "one controller")
     stage.server.refusal = None
-    stage.run(3 * SECOND)
+    stage.run(1 * SECOND)
     assert stage.client.phase is Phase.OPEN
 
 
@@ -219,7 +219,7 @@ def test_an_answer_with_a_version_that_was_not_offered_is_ignored():
 
 def test_states_are_handed_out_on_the_grid_of_the_rate():
     stage = Stage(Config(rate_hz=100))
-    stage.run(2 * SECOND)
+    stage.run(500 * MS)
     stats = stage.client.stats
     ticks = [hand.tick for hand in stage.seen[1:]]  # the first one comes when it comes
     assert {later - earlier for earlier, later in zip(ticks, ticks[1:])} == {10}
@@ -229,16 +229,16 @@ def test_states_are_handed_out_on_the_grid_of_the_rate():
 def test_a_press_in_a_state_that_is_skipped_is_in_the_next_one_that_is_not():
     stage = Stage(Config(rate_hz=20))
     stage.press_every = 100
-    stage.run(4 * SECOND)
-    assert len(stage.seen) > 75
-    assert sum(hand.buttons == 2 for hand in stage.seen) == pytest.approx(40, abs=1)  # once each, of 1 ms in 100 ms
+    stage.run(2 * SECOND)
+    assert len(stage.seen) > 35
+    assert sum(hand.buttons == 2 for hand in stage.seen) == pytest.approx(20, abs=1)
 
 
 def test_after_a_pause_the_grid_starts_anew_and_nothing_is_caught_up():
     stage = Stage(Config(rate_hz=100))
-    stage.run(500 * MS)
+    stage.run(300 * MS)
     stage._next_state += 55 * MS  # the device pauses
-    stage.run(500 * MS)
+    stage.run(300 * MS)
     apart = [later - earlier for earlier, later in zip(stage.seen_at[1:], stage.seen_at[2:])]
     assert len([pause for pause in apart if pause > 40 * MS]) == 1
     assert set(apart) == {10 * MS, max(apart)}
@@ -246,9 +246,9 @@ def test_after_a_pause_the_grid_starts_anew_and_nothing_is_caught_up():
 
 def test_with_rate_0_every_state_is_handed_out_once():
     stage = Stage(Config())
-    stage.run(1 * SECOND)
+    stage.run(500 * MS)
     ticks = [hand.tick for hand in stage.seen]
-    assert ticks == list(range(ticks[0], ticks[0] + len(ticks))) and len(ticks) > 900
+    assert ticks == list(range(ticks[0], ticks[0] + len(ticks))) and len(ticks) > 450
 
 
 @pytest.mark.parametrize(
@@ -263,13 +263,13 @@ def test_with_rate_0_every_state_is_handed_out_once():
 )
 def test_a_force_is_valid_for_three_periods_and_at_least_20_ms(config, valid_for_us):
     stage = Stage(config)
-    stage.run(1 * SECOND)
+    stage.run(300 * MS)
     assert {force.valid_for_us for force in stage.forces} == {valid_for_us}
 
 
 def test_a_force_names_the_tick_it_answers():
     stage = Stage(Config(rate_hz=50))
-    stage.run(1 * SECOND)
+    stage.run(300 * MS)
     assert [force.based_on_tick for force in stage.forces] == [hand.tick for hand in stage.seen][: len(stage.forces)]
 
 
@@ -370,16 +370,16 @@ UNUSABLE = [
 def test_a_force_that_is_not_usable_is_counted_and_not_sent(touch):
     stage = Stage(Config(rate_hz=100))
     stage.touch = lambda hand: touch
-    stage.run(1 * SECOND)
+    stage.run(300 * MS)
     assert stage.forces == []
-    assert stage.client.stats.forces_unusable == len(stage.seen) > 50
+    assert stage.client.stats.forces_unusable == len(stage.seen) > 15
     finite = all(abs(component) < inf for component in touch.force)  # NaN is not
     assert ("the force is not finite" in stage.client.stats.unusable) is not finite
 
 
 def test_an_answer_to_a_state_that_did_not_come_is_not_sent():
     stage = Stage(Config(rate_hz=100))
-    stage.run(SECOND // 2)
+    stage.run(200 * MS)
     sent = len(stage.forces)
     hand = replace(stage.seen[-1], tick=stage.seen[-1].tick + 1000)
     stage.client.send(hand, Touch((1, 0, 0)))
@@ -417,7 +417,7 @@ def test_diagnostics_are_the_newest_reports_of_the_session():
     assert stage.client.peer_reports[1].link.number == 4
     assert stage.client.stats.link.stale == 1
     stage.server.session.close(Code.SHUTDOWN, "")
-    stage.run(1 * SECOND)
+    stage.run(300 * MS)
     assert stage.client.phase is Phase.OPEN
     assert stage.client.device_report is None
     assert stage.client.peer_reports == {}
@@ -441,17 +441,17 @@ def test_an_observer_sees_states_and_cannot_send():
 def test_a_wanted_state_rate_and_rearm_arrive_as_requests():
     stage = Stage(Config(state_hz=250))
     assert not stage.client.rearm(), "there is no session yet"
-    stage.run(500 * MS)
+    stage.run(100 * MS)
     assert stage.client.rearm()
-    stage.run(500 * MS)
+    stage.run(100 * MS)
     assert stage.client.disarm()
-    stage.run(500 * MS)
+    stage.run(100 * MS)
     assert [control.request for control in stage.requests] == [SetStateRate(250), Rearm(), Disarm()]
 
 
 def test_stop_says_bye_and_is_for_good():
     stage = Stage(Config(name="wall"))
-    stage.run(1 * SECOND)
+    stage.run(200 * MS)
     stage.client.stop(stage.world.now)
     stage.run(5 * SECOND)
     assert stage.client.phase is Phase.STOPPED
@@ -523,8 +523,8 @@ def test_nothing_is_foretold_beyond_the_longest_silence():
 def test_no_state_is_predicted_for_a_server_without_deadbands():
     stage = Stage(Config(rate_hz=500, state_deadband=KEPT))
     stage.grant = Code.UNSUPPORTED
-    stage.run(1 * SECOND)
-    assert stage.client.stats.states > 900
+    stage.run(500 * MS)
+    assert stage.client.stats.states > 450
     assert stage.client.stats.states_foretold == 0
 
 
@@ -564,6 +564,6 @@ def test_the_report_on_our_forces_is_that_of_the_session():
     stage.run(100 * MS)
     assert stage.client.report == REPORT
     stage.server.session.close(Code.SHUTDOWN, "")
-    stage.run(1 * SECOND)
+    stage.run(300 * MS)
     assert stage.client.phase is Phase.OPEN
     assert stage.client.report is None

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import contextlib
 import json
-import re
 import sys
 
 import pytest
@@ -33,19 +32,20 @@ def test_two_hands_hold_one_liver_and_are_answered_together(tmp_path, servers):
             addresses = [server.address for server in each]
             grasp = grasp.replace('device = "right"', f'device = "right"\nserver = "{addresses[1]}"')
         (tmp_path / "grasp.toml").write_text(grasp, encoding="utf-8")
-        command = [program, "grasp.toml", "--server", addresses[0], "--rate-hz", "20", "--duration-s", "6", "--json"]
+        command = [program, "grasp.toml", "--server", addresses[0], "--rate-hz", "50", "--duration-s", "60", "--json"]
         with Process(tmp_path, command) as engine:
             for _ in range(2):
                 engine.wait_for_line("connected to")
-            watch = [*ECHO, "--server", addresses[1], "--device", "right", "--duration-s", "3"]
-            with Process(tmp_path, watch) as look:
-                assert look.wait() == 0, look.said
-            assert engine.wait() == 0, engine.said
+            # It squeezes, and both are answered for a second; or a line with such a force is waited for in vain.
+            with Process(tmp_path, [*ECHO, "--server", addresses[1], "--device", "right", "--duration-s", "30"]) as look:
+                first, last, squeezed = None, 0, False
+                while not squeezed or last - first < 1000:
+                    line = json.loads(look.wait_for_line('{"tick"'))
+                    first, last = first or line["tick"], line["tick"]
+                    squeezed = squeezed or bool(line["force_wanted_n"]) and abs(line["force_wanted_n"][1]) > 0.3
+            assert engine.stop() == 0, engine.said
     said = [json.loads(line)["summary"] for line in engine.said if line.startswith('{"summary"')]
     forces = {summary["device"]: summary["forces"] for summary in said}
-    assert forces["left"] > 10 and all(summary["forces_unusable"] == 0 for summary in said), said
+    assert forces["left"] > 0 and all(summary["forces_unusable"] == 0 for summary in said), said
     # Both in one turn: only those before the other was there are of one hand alone.
     assert abs(forces["left"] - forces["right"]) <= 10, forces
-    lines = [json.loads(line) for line in look.said if re.match(r'\{"tick"', line)]
-    wanted = [line["force_wanted_n"] for line in lines if line["force_wanted_n"]]
-    assert min(force[1] for force in wanted) < -0.3 or max(force[1] for force in wanted) > 0.3, wanted[-1:]

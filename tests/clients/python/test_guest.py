@@ -9,8 +9,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from tendon import Client, Config, Phase, aio
-from tendon.guest import Guest, parse_address
+from tendon import Client, Code, Config, Phase, aio
+from tendon.guest import Guest, RefusedForGood, log, parse_address
 
 
 @pytest.mark.parametrize(
@@ -191,6 +191,30 @@ def test_an_address_is_never_looked_up_again(monkeypatch):
     it.socket.close()
 
 
+def answered(client, answers):
+    """Gives the client's answers to states that are 10 ms apart."""
+    for i, touch in enumerate(answers):
+        client.answer(SimpleNamespace(sampled_ns=5_000_000_000 + 10_000_000 * i), touch)
+
+
+def test_an_engine_that_only_returns_none_is_told_so_once(caplog):
+    with Client("127.0.0.1:9") as client:
+        answered(client, [None] * 100)
+        assert caplog.messages == []
+        answered(client, [None] * 300)
+    assert caplog.messages == [
+        "the engine has returned None for 1 s, so no force is sent: is its `return` missing?"
+    ]
+
+
+def test_an_engine_that_has_once_returned_a_force_may_return_none(caplog, monkeypatch):
+    with Client("127.0.0.1:9") as client:
+        sent = []
+        monkeypatch.setattr(client, "send", lambda hand, touch: sent.append(touch))
+        answered(client, [None] * 50 + [(1, 0, 0)] + [None] * 500)
+    assert caplog.messages == [] and sent == [(1, 0, 0)]
+
+
 def test_the_event_loop_watches_the_socket_of_the_new_address():
     async def move():
         async with aio.Client("127.0.0.1:9") as client:
@@ -202,3 +226,10 @@ def test_the_event_loop_watches_the_socket_of_the_new_address():
             loop.add_reader(guest_.socket, client._turn)
 
     asyncio.run(move())
+
+
+def test_the_words_of_a_peer_cannot_forge_a_line_or_move_the_cursor(caplog):
+    log.warning("the server says: %s", "fine\n12:00 tendond: no limits\x1b[2J\x7f\x9b1A")
+    assert caplog.messages == ["the server says: fine\\n12:00 tendond: no limits\\x1b[2J\\x7f\\x9b1A"]
+    refused = RefusedForGood("127.0.0.1:47100 refuses: \x1b]0;owned\x07\tä", Code.UNSUPPORTED)
+    assert str(refused) == "127.0.0.1:47100 refuses: \\x1b]0;owned\\x07\\tä"

@@ -23,6 +23,10 @@ def test_a_key_file_is_read(tmp_path):
     assert read_key(key_file(tmp_path, f"# made today\n\ncontroller {DIGITS}\n")) == KEY
 
 
+def test_a_byte_order_mark_is_no_part_of_a_key(tmp_path):
+    assert read_key(key_file(tmp_path, f"\ufeffcontroller {DIGITS}\r\n")) == KEY
+
+
 def test_a_refused_key_is_not_repeated_in_the_sentence(tmp_path):
     with pytest.raises(ValueError, match="expected one line") as told:
         read_key(key_file(tmp_path, f"king {DIGITS}"))

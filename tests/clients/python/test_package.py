@@ -11,6 +11,7 @@ from importlib.util import find_spec
 
 import pytest
 from conftest import ROOT
+from processes import said_by_example
 from google.protobuf.descriptor_pb2 import FileDescriptorSet
 
 from tendon import tendon_pb2
@@ -49,11 +50,32 @@ def test_the_enums_are_those_of_tendon_proto(ours, theirs):
     assert {value.name: value.value for value in ours} == expected
 
 
+@pytest.mark.parametrize("example", EXAMPLES, ids=lambda file: file.name)
+def test_an_example_is_a_program(example):
+    assert os.access(example, os.X_OK)
+    assert example.read_text(encoding="utf-8").startswith("#!/usr/bin/env python3\n")
+
+
+def test_a_python_without_the_packages_is_told_both_remedies(tmp_path):
+    """As with conda, pyenv or uv: the first python3 of the path does not have Debian's packages."""
+    run(sys.executable, "-m", "venv", "--without-pip", tmp_path / "venv")
+    other = tmp_path / "venv" / "bin"
+    environment = os.environ | {"PATH": f"{other}:{os.environ['PATH']}", "PYTHONPATH": str(PACKAGE)}
+    example = PACKAGE / "examples" / "virtual_wall.py"
+    done = subprocess.run([str(example)], env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    said = done.stderr.splitlines()[-1]
+    assert said.startswith(f"ImportError: tendon needs the packages protobuf and PyNaCl, and this Python ({other}/python3)")
+    assert "apt install python3-protobuf python3-nacl" in said and "/usr/bin/python3" in said
+    assert f"venv/bin/pip install {PACKAGE}" in said
+
+
 def test_the_types_are_right():
     mypy = shutil.which("mypy")
     if mypy is None:
         pytest.skip("no mypy: apt-get install mypy")
-    run(mypy, "--no-incremental", cwd=PACKAGE)
+    built = os.environ.get("TENDON_TEST_PROGRAMS")  # the folder of mypy's cache
+    run(mypy, *([f"--cache-dir={built}/mypy"] if built else ["--no-incremental"]), cwd=PACKAGE)
 
 
 def test_a_wheel_holds_the_package_with_its_types(tmp_path):
@@ -84,8 +106,8 @@ def test_an_example_has_at_most_30_lines_and_explains_itself(file):
     for word in (*common, f"Example: {file.stem}"):
         assert word in help_text
     for wrong in (["--server", "nowhere"], ["--rate-hz", "nan"], ["--duration-s", "-1"]):
-        done = subprocess.run([sys.executable, file, *wrong], env={"PYTHONPATH": str(PACKAGE)}, capture_output=True)
-        assert done.returncode == 2 and b"expected" in done.stderr
+        code, _, err = said_by_example(file.stem, *wrong)
+        assert code == 2 and "expected" in err
 
 
 @pytest.mark.parametrize("file", WORKERS, ids=lambda file: file.stem)

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import runpy
 import sys
 from collections.abc import Callable, Iterable
@@ -10,7 +11,7 @@ from math import cos, hypot, pi, sin
 from typing import Any
 
 import pytest
-from processes import EXAMPLES, Server, example, summary_of
+from processes import EXAMPLES, Server, example, scene, summary_of
 from tendon import DeviceState, Mode, Touch, cli
 
 Physics = Callable[[DeviceState], Touch]
@@ -190,11 +191,15 @@ def test_the_rods_stiffness_is_its_forces_slope(physics_of):
 
 
 def test_a_hand_feels_each_example_through_a_server(tmp_path):
-    with Server(tmp_path) as server:
-        for name in RENDERING:
-            if name == "two_hands":
-                continue  # it wants two devices: test_examples_in_cpp.py
+    """All examples run at the same time. Each has its own device."""
+    names = [name for name in RENDERING if name != "two_hands"]  # which wants two devices: test_examples_in_cpp.py
+    with contextlib.ExitStack() as stack:
+        server = stack.enter_context(Server(tmp_path, scenes={name: scene("right") for name in names}))
+        engines = {}
+        for name in names:
             shape = ["line"] if name == "virtual_fixture" else []
-            with example(tmp_path, name, *shape, "--server", server.address, "--duration-s", "1", "--json") as engine:
-                engine.wait_for_line('"summary"')
+            where = ["--server", server.address, "--device", name, "--rate-hz", "100"]
+            engines[name] = stack.enter_context(example(tmp_path, name, *shape, *where, "--duration-s", "1", "--json"))
+        for name, engine in engines.items():
+            engine.wait_for_line('"summary"')
             assert summary_of(engine)["summary"]["forces"] > 20, name

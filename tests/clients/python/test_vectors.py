@@ -15,7 +15,7 @@ from tendon import tendon_pb2 as pb
 from tendon.cipher import SUITE_NAMES, Forged, Sealed
 from tendon.codec import DatagramType, Header, Suite
 from tendon.handshake import Accepted, ClientHandshake, key_id, prologue
-from tendon.messages import Refused
+from tendon.messages import Code, Control, Refused
 from tendon.replay_window import ReplayWindow
 from tendon.session import Session
 
@@ -205,6 +205,28 @@ def test_bounds_are_those_of_the_proto_file():
     vectors = load("bounds")["bounds"]
     wrong = [(vector["field"], vector["value"]) for vector in vectors if is_taken(vector) != vector["accepted"]]
     assert len(vectors) > 300 and not wrong
+
+
+def test_a_request_out_of_bounds_names_its_field_and_an_answer_is_refused():
+    frames = {}
+    for vector in load("bounds")["bounds"]:
+        is_frame = vector["message"] == "Datagram" and not vector["field"].startswith("Datagram.")
+        content = codec.read_data(bytes.fromhex(vector["body"])) if is_frame else None
+        if content is not None and content.invalid and content.frames:
+            frames.setdefault(vector["field"], []).extend(content.frames)
+    controls = {field: found for field, found in frames.items() if isinstance(found[0], Control)}
+    assert {field.partition(".")[0] for field in controls} == {
+        *("SetStateRate", "Rearm", "Describe", "TakeLease", "GiveLease", "SetStateDeadband", "Disarm", "SetOutput"),
+        *("Couple", "Engage", "Disengage", "SetScale", "SetShare", "LeaseLost"),
+    }
+    for field, found in controls.items():
+        name = field.partition(".")[2]
+        expected = "rotation" if name.startswith("rotation") else name
+        assert {(control.request, control.invalid) for control in found} == {(None, expected)}, field
+    answers = {field: found for field, found in frames.items() if field not in controls}
+    assert {field.partition(".")[0] for field in answers} == {"ControlAck", "ChannelDescription", "OutputDescription"}
+    for field, found in answers.items():
+        assert any((ack.code, ack.device, ack.handle) == (Code.INVALID, None, None) for ack in found), field
 
 
 @pytest.mark.parametrize("file", SEALED_FILES)

@@ -498,7 +498,15 @@ def out_of_bounds():
 @pytest.mark.parametrize("frame", [pytest.param(frame, id=what) for what, frame in out_of_bounds()])
 def test_a_value_out_of_bounds_drops_its_frame_and_no_other(frame):
     body = codec.write_data_head(1, None) + codec.write_frame(frame) + codec.write_frame(Bye(Code.OK))
-    assert codec.read_data(body) == codec.DataContent(1, None, [Bye(Code.OK)], invalid=1)
+    content = codec.read_data(body)
+    assert (content.invalid, content.frames[-1]) == (1, Bye(Code.OK))
+    if not isinstance(frame, (Control, ControlAck)) or frame.id == 0:
+        assert content.frames[:-1] == []
+    elif isinstance(frame, Control):  # which has to be answered
+        [control] = content.frames[:-1]
+        assert (control.id, control.request, control.invalid != "") == (frame.id, None, True)
+    else:
+        assert [(ack.id, ack.code, ack.handle) for ack in content.frames[:-1]] == [(frame.id, Code.INVALID, None)]
 
 
 def test_no_bound_on_the_force_is_infinity():

@@ -8,7 +8,8 @@ import os
 import subprocess
 import sys
 import threading
-from contextlib import AbstractContextManager
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import replace
 from math import inf, isnan
 from pathlib import Path
@@ -319,21 +320,48 @@ def test_two_ranks_of_mpi_end_with_the_stream(front, tmp_path):
 # ---- tendon-conformance: real programs that it must pass, and that it must not ----
 
 
-def judged(tmp_path: Path, *command: str | Path) -> dict[str, str]:
-    """The result of each check."""
+BROKEN = "import os, sys, time\nimport tendon\nrun = tendon.worker.run\n"
+
+
+@contextmanager
+def judging(folder: Path, *command: str | Path) -> Iterator[Callable[[], dict[str, str]]]:
+    """The kit at work; the function gives the result of each check."""
     kit = PROGRAMS / "tendon-conformance"
     if not kit.exists():
         pytest.skip(f"{kit} is not built; TENDON_PROGRAMS names another folder")
     environment = {**os.environ, "PYTHONPATH": str(ROOT / "clients" / "python")}
-    words = [kit, "worker", "--json", "--log", tmp_path / "log", "--", *command]
-    done = subprocess.run(words, env=environment, stdout=subprocess.PIPE, text=True, timeout=4 * PATIENCE_S)
-    verdicts = {line["check"]: line["result"] for line in map(json.loads, done.stdout.splitlines())}
-    assert (done.returncode == 0) == (set(verdicts.values()) <= {"pass", "not applicable"})
-    return verdicts
+    words = [kit, "worker", "--json", "--log", folder / "log", "--", *command]
+
+    def verdicts() -> dict[str, str]:
+        said, _ = process.communicate(timeout=4 * PATIENCE_S)
+        results = {line["check"]: line["result"] for line in map(json.loads, said.splitlines())}
+        assert (process.returncode == 0) == (set(results.values()) <= {"pass", "not applicable"})
+        return results
+
+    with subprocess.Popen(words, env=environment, stdout=subprocess.PIPE, text=True) as process:
+        try:
+            yield verdicts
+        finally:
+            process.terminate()
 
 
-def test_the_kit_passes_the_example(tmp_path):
-    assert set(judged(tmp_path, sys.executable, EXAMPLES / "spring_worker.py").values()) == {"pass"}
+def failed_checks(verdicts: dict[str, str]) -> list[str]:
+    return [check for check, result in verdicts.items() if result == "fail"]
+
+
+@pytest.fixture(scope="module")
+def of_an_endless_worker(tmp_path_factory):
+    """This worker hangs when its second stream ends. The kit's patience of 10 s passes while others are judged."""
+    folder = tmp_path_factory.mktemp("endless")
+    program = "run(lambda hand: None)\nif os.environ['TENDON_WORKER_ADDRESS'].startswith('tcp:'): time.sleep(100)\n"
+    (folder / "broken.py").write_text(BROKEN + program, encoding="utf-8")
+    with judging(folder, sys.executable, folder / "broken.py") as verdicts:
+        yield verdicts
+
+
+def test_the_kit_passes_the_example(tmp_path, of_an_endless_worker):
+    with judging(tmp_path, sys.executable, EXAMPLES / "spring_worker.py") as verdicts:
+        assert set(verdicts().values()) == {"pass"}
 
 
 @pytest.mark.parametrize(
@@ -344,11 +372,14 @@ def test_the_kit_passes_the_example(tmp_path):
         ("run(lambda hand: (float('nan'), 0, 0))", "answer-bounds"),
         ("run(lambda hand: 1 / 0)", "answer-comes"),
         ("run(lambda hand: (0, 0, 0) if hand.buttons == 0 else sys.exit())", "state-of-a-handle"),
-        ("run(lambda hand: None); time.sleep(100)", "stream-ends"),
     ],
 )
 def test_the_kit_fails_a_program_that(tmp_path, program, failed):
     script = tmp_path / "broken.py"
-    script.write_text(f"import sys, time\nimport tendon\nrun = tendon.worker.run\n{program}\n", encoding="utf-8")
-    verdicts = judged(tmp_path, sys.executable, script)
-    assert [check for check, result in verdicts.items() if result == "fail"] == [failed]
+    script.write_text(f"{BROKEN}{program}\n", encoding="utf-8")
+    with judging(tmp_path, sys.executable, script) as verdicts:
+        assert failed_checks(verdicts()) == [failed]
+
+
+def test_the_kit_fails_a_program_that_does_not_end_with_its_stream(of_an_endless_worker):
+    assert failed_checks(of_an_endless_worker()) == ["stream-ends"]

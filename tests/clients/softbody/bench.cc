@@ -18,12 +18,14 @@
 #include "clients/softbody/body.h"
 #include "clients/softbody/models/linear.h"
 #include "tests/clients/softbody/pressed_block.h"
+#include "tests/support/plain_usage.h"
+#include "tests/tools/lab/models/pressed_b1.h"
 
 namespace tendon::softbody {
 namespace {
 
-void answer(benchmark::State& state, const BodyConfig& config) {
-  Body body(config);
+template <class AnyBody>
+void answer_with(benchmark::State& state, AnyBody& body) {
   const Reaction rest = body.settle(Given::kForce, 0.3);
   const int steps = body.step() > 0 ? static_cast<int>(std::lround(0.01 / body.step())) : 1;
   double time = 0;
@@ -37,6 +39,11 @@ void answer(benchmark::State& state, const BodyConfig& config) {
   state.counters["error_percent"] = 100 * (rest.force / rest.depth / testing::kB1 - 1);
   state.counters["free"] = static_cast<double>(body.size().free);
   state.counters["model_mb"] = static_cast<double>(body.size().bytes) / 1e6;
+}
+
+void answer(benchmark::State& state, const BodyConfig& config) {
+  Body body(config);
+  answer_with(state, body);
 }
 
 void still(benchmark::State& state, ModelKind model, Element element) {
@@ -82,7 +89,7 @@ struct Beside {
 /// `with_thread` another thread makes the fields.
 void path(benchmark::State& state, ModelKind model, Law law, bool with_thread) {
   BodyConfig config = testing::pressed_body(model, Element::kHex8Sri, static_cast<int>(state.range(0)));
-  config.law = law;
+  config.near.law = law;
   config.tolerance = 5e-3;
   Body body(config);
   std::optional<Beside> beside;
@@ -135,20 +142,19 @@ void path(benchmark::State& state, ModelKind model, Law law, bool with_thread) {
 /// against Newton's method on the whole mesh to 1e-9.
 void learned(benchmark::State& state, Law law, bool tabulate) {
   BodyConfig config = testing::pressed_body(ModelKind::kNear, Element::kHex8Sri, static_cast<int>(state.range(0)));
-  config.law = law;
+  config.near.law = law;
   config.tolerance = 0.02;
   config.middle = Vec3(0.01, 0, 0);
   config.reach = 0.012;
-  (tabulate ? config.tabulate : config.learn) = true;
+  (tabulate ? config.near.tabulate : config.near.learn) = true;
   const double start = processor_time();
-  config.learned = learn(config, {});
+  config.near.learned = learn(config, {});
   const double set_up = processor_time() - start;
   Body body(config);
   Beside beside(body);
   BodyConfig exact = config;
   exact.model = law == Law::kNeoHookean ? ModelKind::kNeoHookean : ModelKind::kCorotational;
-  exact.learn = exact.tabulate = false;
-  exact.learned.reset();
+  exact.near = {};
   exact.tolerance = 1e-9;
   exact.max_iterations = 200;
   Body truth(exact);
@@ -184,12 +190,9 @@ void learned(benchmark::State& state, Law law, bool tabulate) {
 }
 
 /// A rigid tool of 20 mm: its contact grows and shrinks as it moves.
-void rigid(benchmark::State& state, BodyConfig::Tool tool) {
+void rigid(benchmark::State& state, const Tool& tool) {
   BodyConfig config = testing::pressed_body(ModelKind::kCondensed, Element::kHex8Sri, static_cast<int>(state.range(0)));
   config.tool = tool;
-  config.tool_radius = 0.02;
-  config.tool_half_length = 0.015;
-  config.tool_axis = Vec3(0.96, 0, 0.28);
   Body body(config);
   const Vec3 up = -lowest_of_tool(config, Mat3::Identity());
   double time = 0;
@@ -201,12 +204,16 @@ void rigid(benchmark::State& state, BodyConfig::Tool tool) {
   state.counters["model_mb"] = static_cast<double>(body.size().bytes) / 1e6;
 }
 
-/// Steps of state.range(1) µs, with `iterations` rounds each.
-void in_steps(benchmark::State& state, ModelKind model, int iterations) {
-  BodyConfig config = testing::pressed_body(model, Element::kTet4, static_cast<int>(state.range(0)));
-  config.effects.step = 1e-6 * static_cast<double>(state.range(1));
-  config.iterations = iterations;
-  answer(state, config);
+/// Measures models that are only compared. Models with time take steps of state.range(1) µs, with one iteration each.
+void compared_with(benchmark::State& state, compared::Kind kind) {
+  compared::Config config = compared::testing::soon_at_rest(kind);
+  if (compared::info(kind).has_time) {
+    config.effects.step = 1e-6 * static_cast<double>(state.range(1));
+    config.iterations = 1;
+  }
+  compared::PressedBody body =
+      compared::testing::pressed_b1(kind, Element::kTet4, static_cast<int>(state.range(0)), config);
+  answer_with(state, body);
 }
 
 /// What a cut through half of the width and state.range(1) mm deep costs the model: with the system that it had, and
@@ -255,8 +262,8 @@ BENCHMARK_CAPTURE(cut_linear, anew, true)->ArgsProduct({{8, 16}, {12, 25}});
 BENCHMARK_CAPTURE(cut_neo_hookean, kept, false)->ArgsProduct({{8}, {12, 25}});
 BENCHMARK_CAPTURE(cut_neo_hookean, anew, true)->ArgsProduct({{8}, {12, 25}});
 BENCHMARK_CAPTURE(still, condensed_hex8_sri, ModelKind::kCondensed, Element::kHex8Sri)->Arg(8)->Arg(16);
-BENCHMARK_CAPTURE(rigid, sphere, BodyConfig::Tool::kSphere)->Arg(16)->Arg(24);
-BENCHMARK_CAPTURE(rigid, capsule, BodyConfig::Tool::kCapsule)->Arg(16)->Arg(24);
+BENCHMARK_CAPTURE(rigid, sphere, SphereTool{0.02})->Arg(16)->Arg(24);
+BENCHMARK_CAPTURE(rigid, capsule, CapsuleTool{0.02, 0.015, Vec3(0.96, 0, 0.28)})->Arg(16)->Arg(24);
 BENCHMARK_CAPTURE(still, condensed_hex27, ModelKind::kCondensed, Element::kHex27)->Arg(4)->Arg(8)->Arg(10);
 BENCHMARK_CAPTURE(still, linear_hex8_sri, ModelKind::kLinear, Element::kHex8Sri)->Arg(8)->Arg(16);
 BENCHMARK_CAPTURE(still, corotational_tet4, ModelKind::kCorotational, Element::kTet4)->Arg(4)->Arg(8);
@@ -286,14 +293,28 @@ BENCHMARK_CAPTURE(learned, shapes_neo_hookean, Law::kNeoHookean, false)->Arg(8)-
 BENCHMARK_CAPTURE(learned, shapes_corotational, Law::kCorotational, false)->Arg(8)->Arg(12)->Arg(16)->Iterations(2);
 BENCHMARK_CAPTURE(learned, table_neo_hookean, Law::kNeoHookean, true)->Arg(8)->Arg(12)->Arg(16)->Iterations(2);
 BENCHMARK_CAPTURE(learned, table_corotational, Law::kCorotational, true)->Arg(8)->Arg(12)->Arg(16)->Iterations(2);
-BENCHMARK_CAPTURE(still, mass_spring, ModelKind::kMassSpring, Element::kTet4)->Arg(8);
-BENCHMARK_CAPTURE(still, projective, ModelKind::kProjective, Element::kTet4)->Arg(4)->Arg(8);
-BENCHMARK_CAPTURE(still, modal, ModelKind::kModal, Element::kTet4)->Arg(8);
-BENCHMARK_CAPTURE(in_steps, tensor_mass, ModelKind::kTensorMass, 1)->Args({8, 1000})->Args({16, 500});
-BENCHMARK_CAPTURE(in_steps, tled, ModelKind::kTled, 1)->Args({8, 1000});
-BENCHMARK_CAPTURE(in_steps, xpbd, ModelKind::kXpbd, 1)->Args({8, 10'000})->Args({8, 1000})->Args({8, 200});
+BENCHMARK_CAPTURE(compared_with, mass_spring, compared::Kind::kMassSpring)->Arg(8);
+BENCHMARK_CAPTURE(compared_with, projective, compared::Kind::kProjective)->Arg(4)->Arg(8);
+BENCHMARK_CAPTURE(compared_with, modal, compared::Kind::kModal)->Arg(8);
+BENCHMARK_CAPTURE(compared_with, tensor_mass, compared::Kind::kTensorMass)->Args({8, 1000})->Args({16, 500});
+BENCHMARK_CAPTURE(compared_with, tled, compared::Kind::kTled)->Args({8, 1000});
+BENCHMARK_CAPTURE(compared_with, xpbd, compared::Kind::kXpbd)->Args({8, 10'000})->Args({8, 1000})->Args({8, 200});
 
 }  // namespace
 }  // namespace tendon::softbody
 
-BENCHMARK_MAIN();
+int main(int argc, char** argv) {
+  const tendon::PlainUsage usage{.help =
+                                     "Usage: tendon-bench-softbody [--benchmark_…]\n\n"
+                                     "Measures what an answer of each model costs. The options are those of Google's\n"
+                                     "benchmark library.\n\n"
+                                     "Example: tendon-bench-softbody --benchmark_filter=path/\n"
+                                     "Exit: 0 done; 2 wrong usage.\n",
+                                 .options = {"--benchmark_", "--v="}};
+  if (const auto code = tendon::answer(usage, argc, argv)) return *code;
+  benchmark::Initialize(&argc, argv);
+  if (benchmark::ReportUnrecognizedArguments(argc, argv)) return 2;
+  benchmark::RunSpecifiedBenchmarks();
+  benchmark::Shutdown();
+  return 0;
+}

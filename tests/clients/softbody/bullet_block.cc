@@ -17,6 +17,7 @@
 #include "clients/softbody/fem/material.h"
 #include "clients/softbody/fem/patch.h"
 #include "tests/clients/softbody/pressed_block.h"
+#include "tests/support/plain_usage.h"
 
 namespace tendon::softbody {
 namespace {
@@ -126,8 +127,14 @@ void press(Law law, int n, double newtons) {
 }  // namespace
 }  // namespace tendon::softbody
 
-int main() {
+int main(int argc, char** argv) {
   using namespace tendon::softbody;
+  const tendon::PlainUsage usage{.help =
+                                     "Usage: tendon-bench-bullet\n\n"
+                                     "Presses the block B1 as a deformable body of Bullet.\n\n"
+                                     "Example: tendon-bench-bullet\n"
+                                     "Exit: 0 done; 2 wrong usage.\n"};
+  if (const auto code = tendon::answer(usage, argc, argv)) return *code;
   for (const Law law : {Law::kLinear, Law::kNeoHookean}) {
     for (const int n : {4, 6, 8, 12}) {
       for (const double newtons : {0.3, 1.0}) press(law, n, newtons);

@@ -6,13 +6,16 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <cstdlib>
 #include <memory>
+#include <string>
 #include <utility>
 #include <vector>
 
 #include "clients/softbody/models/quasi_static.h"
 #include "tests/clients/softbody/pressed_block.h"
 #include "tests/support/dice.h"
+#include "tests/support/property_cases.h"
 
 namespace tendon::softbody::testing {
 
@@ -35,10 +38,12 @@ struct ErrorsSaid {
   double median() const { return times.empty() ? 0 : times[times.size() / 2]; }
 };
 
-/// Ten answers on each of `paths`: presses and strokes as they come, in steps of 0.1 to 10 mm at most, down to `deepest`
-/// (m). `block_of(path, tolerance)` makes the block of a path, which is asked for 0.3 to 30 %. Seed 1.
+/// Asks for ten answers on each path: random presses and strokes, with steps of at most 0.1 to 10 mm, down to `deepest` (m).
+/// `block_of(path, tolerance)` returns the block of a path; the tolerance is 0.3 to 30 %. There are four paths, one of each
+/// kind, or twenty with ten thousand property cases. Seed 1.
 template <class BlockOf>
-ErrorsSaid errors_said(int paths, double deepest, const BlockOf& block_of) {
+ErrorsSaid errors_said(double deepest, const BlockOf& block_of) {
+  const int paths = property_cases() >= 10'000 ? 20 : 4;
   constexpr int kAnswers = 10;
   Dice dice(1);
   ErrorsSaid said;
@@ -68,10 +73,10 @@ ErrorsSaid errors_said(int paths, double deepest, const BlockOf& block_of) {
 
 /// The error said is at least the true one of 99 in 100 answers, and not more than 20 times as large.
 inline void expect_covered(const ErrorsSaid& said) {
-  EXPECT_EQ(said.answers, 200);
+  EXPECT_GE(said.answers, 40);
   EXPECT_GE(said.covered, said.answers * 99 / 100);
-  ASSERT_FALSE(said.times.empty());
   EXPECT_LE(said.median(), 20) << said.times.size();
+  EXPECT_TRUE(said.answers < 200 || !said.times.empty());
   ::testing::Test::RecordProperty("covered", said.covered);
   ::testing::Test::RecordProperty("above_half_a_percent", static_cast<int>(said.times.size()));
   ::testing::Test::RecordProperty("median_of_said_over_true", static_cast<int>(said.median()));

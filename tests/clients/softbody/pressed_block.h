@@ -22,7 +22,7 @@ inline Solid pressed_block(Element element, int n, double poisson, Law law = Law
   return {std::move(mesh), element, {.young = 1e4, .poisson = poisson}, law, fixed};
 }
 
-/// The same as values, for every model. Those with time are slowed enough to be at rest soon.
+/// The configuration of the same block with any model.
 inline BodyConfig pressed_body(ModelKind model, Element element, int n) {
   BodyConfig config;
   config.shape = BlockShape{Vec3(0.1, 0.1, 0.05), {n, n, n / 2}};
@@ -30,7 +30,6 @@ inline BodyConfig pressed_body(ModelKind model, Element element, int n) {
   config.material = {.young = 1e4, .poisson = 0.45};
   config.model = model;
   config.patch_radius = kB1PatchRadius;
-  if (info(model).has_time()) config.effects = {.density = 1000, .step = 1e-3, .inertia = true, .damping = 40};
   return config;
 }
 

@@ -8,9 +8,11 @@
 #include <exception>
 #include <string>
 #include <utility>
+#include <variant>
 
 #include "clients/softbody/fem/gmsh.h"
 #include "tests/clients/softbody/scene_text.h"
+#include "tests/support/refusal.h"
 
 namespace tendon::softbody::scene_test {
 namespace {
@@ -21,12 +23,7 @@ using testing::listing;
 using testing::with;
 
 std::string refusal(const std::string& text) {
-  try {
-    parse_scene(text, "s.toml", ".");
-  } catch (const SceneError& error) {
-    return error.what();
-  }
-  return "";
+  return thrown_by<SceneError>([&] { parse_scene(text, "s.toml", "."); });
 }
 
 TEST(SoftbodyScene, ATableInAFileIsForTheModelCondensedAndBesideTheScene) {
@@ -63,6 +60,7 @@ TEST(SoftbodyScene, AnUnknownEffectIsAnErrorWithItsLine) {
             "s.toml:3: effects: unknown effect \"gravitation\"; expected one of contact, geometric-nonlinearity, "
             "material-nonlinearity, gravity, inertia, damping, viscosity, friction, cutting, stiffening, plasticity, "
             "self-collision");
+  EXPECT_TRUE(refusal(with("[\"contact\"]", "[\"contcat\"]")).ends_with("self-collision; did you mean contact?"));
 }
 
 TEST(SoftbodyScene, WhatIsListedIsWhatTheModelSimulatesNoMoreAndNoFewer) {
@@ -122,10 +120,8 @@ TEST(SoftbodyScene, CutsAndAModulusOverTimeArrive) {
 TEST(SoftbodyScene, WhatIsWrongWithACutIsNamed) {
   const std::string cut(kCut);
   const std::string effects = "[\"contact\",\n\"cutting\"]";
-  for (const std::string model : {"condensed", "modal"}) {
-    EXPECT_EQ(refusal(listing(model, effects, cut + "at_s = 1\n")),
-              "s.toml:2: effects: the model \"" + model + "\" does not simulate \"cutting\", which is listed");
-  }
+  EXPECT_EQ(refusal(listing("condensed", effects, cut + "at_s = 1\n")),
+            "s.toml:2: effects: the model \"condensed\" does not simulate \"cutting\", which is listed");
   EXPECT_EQ(refusal(listing("linear", "[\"contact\", \"cutting\",\n\"viscosity\"]", cut + "at_s = 1\n")),
             "s.toml:2: effects: \"viscosity\" is not simulated together with \"cutting\"");
   EXPECT_EQ(refusal(listing("linear", "[\"contact\", \"gravity\",\n\"stiffening\"]", "")),
@@ -174,10 +170,10 @@ TEST(SoftbodyScene, ALawOfTheElementsNearTheToolArrivesAndFitsTheEffects) {
   };
   const BodyConfig body = parse_scene(near("law = \"neo-hookean\"\nerror_percent = 2", strains), "s.toml", ".").body;
   EXPECT_EQ(body.model, ModelKind::kNear);
-  EXPECT_EQ(body.law, Law::kNeoHookean);
+  EXPECT_EQ(body.near.law, Law::kNeoHookean);
   EXPECT_NEAR(body.tolerance, 0.02, 1e-15);
-  EXPECT_EQ(parse_scene(near("law = \"stvk\"", rotations), "s.toml", ".").body.law, Law::kStVenantKirchhoff);
-  EXPECT_EQ(parse_scene(near("", rotations), "s.toml", ".").body.law, Law::kCorotational);
+  EXPECT_EQ(parse_scene(near("law = \"stvk\"", rotations), "s.toml", ".").body.near.law, Law::kStVenantKirchhoff);
+  EXPECT_EQ(parse_scene(near("", rotations), "s.toml", ".").body.near.law, Law::kCorotational);
   EXPECT_EQ(refusal(near("law = \"linear\"", rotations)),
             "s.toml:10: model.law: expected one of corotational, stvk, neo-hookean, found \"linear\"");
   EXPECT_EQ(refusal(near("law = \"neo-hookean\"", rotations)),
@@ -196,14 +192,14 @@ TEST(SoftbodyScene, WhatABodyIsToLearnArrivesAndWantsItsReach) {
   };
   const std::string all = "learn = true\ntabulate = true\nlearned_in = \"kept\"";
   const BodyConfig body = parse_scene(near(all, "reach_mm = 10"), "s.toml", "/scenes").body;
-  EXPECT_TRUE(body.learn);
-  EXPECT_TRUE(body.tabulate);
-  EXPECT_EQ(body.learned_in, "/scenes/kept");
+  EXPECT_TRUE(body.near.learn);
+  EXPECT_TRUE(body.near.tabulate);
+  EXPECT_EQ(body.near.learned_in, "/scenes/kept");
   EXPECT_EQ(body.reach, 0.01);
   EXPECT_EQ(body.tolerance, 0.02);
   EXPECT_EQ(parse_scene(near("learn = true\nerror_percent = 1", "reach_mm = 10"), "s.toml", ".").body.tolerance, 0.01);
   const BodyConfig nothing = parse_scene(near("", ""), "s.toml", ".").body;
-  EXPECT_FALSE(nothing.learn || nothing.tabulate);
+  EXPECT_FALSE(nothing.near.learns());
   EXPECT_EQ(nothing.tolerance, BodyConfig().tolerance);
   EXPECT_EQ(refusal(near("learn = true", "")),
             "s.toml: touch.reach_mm: expected a number above 0 and at most 30, found nothing");
@@ -237,7 +233,7 @@ TEST(SoftbodyScene, AYieldArrivesAndWhatIsWrongWithItIsNamed) {
             "s.toml:19: plasticity.creep: unknown key; expected one of hardening_pa, yield_pa");
   EXPECT_EQ(refusal(listing("linear", "[\"contact\"]", table)),
             "s.toml:15: plasticity: unknown key; expected one of body, effects, hands, model, place, region, touch");
-  for (const std::string model : {"condensed", "modal", "neo-hookean", "stvk", "mass-spring", "tled"}) {
+  for (const std::string model : {"condensed", "neo-hookean", "near"}) {
     EXPECT_EQ(refusal(listing(model, "[\"contact\",\n\"plasticity\"]", table)),
               "s.toml:2: effects: the model \"" + model + "\" does not simulate \"plasticity\", which is listed");
   }
@@ -274,7 +270,8 @@ TEST(SoftbodyScene, MistakesAreNamedWithLineKeyAndWhatWasExpected) {
   EXPECT_EQ(refusal(with("cells = [4, 4, 2]", "cells = [4, 4]")),
             "s.toml:5: body.cells: expected three whole numbers from 1 to 200");
   EXPECT_EQ(refusal(with("hex8-sri", "hex9")),
-            "s.toml:6: body.element: expected one of tet4, hex8, hex8-sri, hex20, hex27, hex27-sri, found \"hex9\"");
+            "s.toml:6: body.element: expected one of tet4, hex8, hex8-sri, hex20, hex27, hex27-sri, found \"hex9\"; "
+            "did you mean hex8?");
   EXPECT_EQ(refusal(with("poisson = 0.45", "poisson = 0.5")),
             "s.toml:7: body.material.poisson: expected a number of at least 0 and at most 0.4999");
   EXPECT_EQ(refusal(with("young_pa = 10000", "young_pa = nan")),
@@ -290,7 +287,33 @@ TEST(SoftbodyScene, MistakesAreNamedWithLineKeyAndWhatWasExpected) {
   EXPECT_EQ(refusal(with("[-1, 0, 0]", "[0, 0, 0]")),
             "s.toml:14: place.towards_hand: expected a direction, not [0, 0, 0]");
   EXPECT_EQ(refusal("x = "), "s.toml:1: Error while parsing key-value pair: encountered end-of-file");
-  EXPECT_THROW(read_scene("/nowhere/s.toml"), SceneError);
+  EXPECT_THROW(read_scene("/nowhere/s.toml"), std::runtime_error);
+}
+
+TEST(SoftbodyScene, AModelThatTheLabHasTakenIsAnErrorThatSaysWhereItIs) {
+  for (const std::string model : {"stvk", "mass-spring", "projective", "modal", "tensor-mass", "tled", "xpbd"}) {
+    EXPECT_EQ(refusal(listing(model, "[\"contact\"]", "")),
+              "s.toml:9: model.kind: \"" + model +
+                  "\" is a model of the accuracy experiment now (tests/tools/lab/models); expected linear, condensed, "
+                  "corotational, neo-hookean, near");
+  }
+  EXPECT_EQ(
+      refusal(listing("modul", "[\"contact\"]", "")),
+      "s.toml:9: model.kind: expected one of linear, condensed, corotational, neo-hookean, near, found \"modul\"");
+}
+
+TEST(SoftbodyScene, SlitsAreAKeyOfAMeshFile) {
+  const std::string file = "shape = \"file\"\nfile = \"b.msh\"\nunits_per_m = 1000\n";
+  const auto scene = [&](const std::string& more) {
+    std::string text = with("shape = \"block\"\nsize_mm = [100, 100, 50]\ncells = [4, 4, 2]\n", file + more);
+    return std::get<FileShape>(parse_scene(text, "s.toml", "/scenes").body.shape);
+  };
+  EXPECT_FALSE(scene("").slits);
+  EXPECT_TRUE(scene("slits = true\n").slits);
+  EXPECT_EQ(scene("").file, "/scenes/b.msh");
+  EXPECT_NE(refusal(with("shape = \"block\"", "shape = \"block\"\nslits = true")).find("body.slits: unknown key"),
+            std::string::npos);
+  EXPECT_NE(scene_reference().find("\nslits = false "), std::string::npos);
 }
 
 TEST(SoftbodyScene, APipeOrAFolderIsNoSceneAndNoMesh) {
@@ -298,19 +321,11 @@ TEST(SoftbodyScene, APipeOrAFolderIsNoSceneAndNoMesh) {
   ASSERT_EQ(::mkdir(folder.c_str(), 0700), 0);
   const std::string pipe = folder + "/pipe";
   ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
-  const auto refusal = [](const auto& read) -> std::string {
-    try {
-      read();
-    } catch (const std::exception& error) {
-      return error.what();
-    }
-    return "none";
-  };
   for (const auto& [file, why] : {std::pair(pipe, "it is not a regular file"), std::pair(folder, "it is a folder"),
                                   std::pair(folder + "/none", "there is no such file")}) {
     const std::string expected = "cannot read " + file + ": " + why;
-    EXPECT_EQ(refusal([&, &path = file] { read_scene(path); }), expected);
-    EXPECT_EQ(refusal([&, &path = file] { read_gmsh(path, 1); }), expected);
+    EXPECT_EQ(thrown_by<std::exception>([&, &path = file] { read_scene(path); }), expected);
+    EXPECT_EQ(thrown_by<std::exception>([&, &path = file] { read_gmsh(path, 1); }), expected);
   }
   ::unlink(pipe.c_str());
   ::rmdir(folder.c_str());

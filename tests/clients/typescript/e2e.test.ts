@@ -6,7 +6,7 @@ import { execFileSync } from "node:child_process";
 import { createSocket } from "node:dgram";
 import { chmodSync, existsSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";
-import { join } from "node:path";
+import { dirname, join } from "node:path";
 import { describe, it, type TestContext } from "node:test";
 import { WebSocket } from "ws";
 import { Bridge } from "../../../clients/typescript/src/bridge.js";
@@ -165,6 +165,21 @@ describe("a guest", () => {
     await until("open again", () => here.phase === "open" && here.stats().sessions === 2);
   });
 
+  it("prints a server's words so that they cannot forge a line", async (test) => {
+    const server = createSocket("udp4");
+    await new Promise<void>((resolve) => server.bind(0, "127.0.0.1", resolve));
+    test.after(() => server.close());
+    server.on("message", (datagram, from) => {
+      const hello = decodeHello(datagram);
+      if (!hello) return;
+      const deviceName = "arm\n12:00 tendond: no limits\x1b[2J\x9b1A";
+      const content = encodeAnswerMessage({ ...kWelcome, deviceName, features: [], role: Role.OBSERVER });
+      server.send(encodeAnswer({ suite: 0, connectionId: 1, random: hello.random, content }), from.port);
+    });
+    const there = startNode(test, "examples/echo_motion", "--server", `127.0.0.1:${server.address().port}`);
+    await there.line((line) => line.includes("connected to arm\\n12:00 tendond: no limits\\x1b[2J\\x9b1A at"));
+  });
+
   it("after slow physics it sees the newest state, not the oldest that waits", async (test) => {
     const server = createSocket("udp4");
     await new Promise<void>((resolve) => server.bind(0, "127.0.0.1", resolve));
@@ -209,7 +224,7 @@ describe("the programs", () => {
     }
   });
 
-  it("answer a wrong command line with what is wrong, and exit code 2", async (test) => {
+  it("end with 2 for wrong usage and with 1 for a bad key, and say why", async (test) => {
     const folder = mkdtempSync(join(tmpdir(), "tendon-"));
     test.after(() => rmSync(folder, { recursive: true }));
     const open = join(folder, "open.key");
@@ -231,9 +246,11 @@ describe("the programs", () => {
       ["bridge_main", ["--origin", "lab.example/page"], /--origin: expected an origin/],
       ["bridge_main", ["--max-peers", "0"], /--max-peers: expected a whole number/],
     ];
+    const fails = /--key|cannot listen/;
     for (const [name, args, says] of wrong) {
       const program = startNode(test, name, ...args);
-      assert.equal(await program.end(), 2, `${name} ${args.join(" ")}: ${program.lines.join("\n")}`);
+      const code = fails.test(says.source) ? 1 : 2;
+      assert.equal(await program.end(), code, `${name} ${args.join(" ")}: ${program.lines.join("\n")}`);
       assert.match(program.lines.join("\n"), says);
     }
   });
@@ -255,7 +272,7 @@ describe("what is published", () => {
       seen.add(file);
       const text = readFileSync(join(client, "dist", file), "utf8");
       assert.doesNotMatch(text, /from "(node:|ws")/, file);
-      for (const [, next] of text.matchAll(/from "\.\/(.*?)"/g)) check(next!.replace(/^\.\//, ""));
+      for (const [, next] of text.matchAll(/from "(\.\.?\/.*?)"/g)) check(join(dirname(file), next!));
     };
     check("index.js");
     assert.ok(seen.size > 10);

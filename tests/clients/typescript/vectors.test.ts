@@ -14,7 +14,7 @@ import {
 import * as pb from "../../../clients/typescript/src/gen/tendon_pb.js";
 import { ClientHandshake } from "../../../clients/typescript/src/handshake.js";
 import { parseKeyFile } from "../../../clients/typescript/src/key_file.js";
-import { kFeatureLocalModel, Role } from "../../../clients/typescript/src/messages.js";
+import { Code, kFeatureLocalModel, Role } from "../../../clients/typescript/src/messages.js";
 import { keyId, keyOfSuite2, rekey } from "../../../clients/typescript/src/noise.js";
 import { ReplayWindow } from "../../../clients/typescript/src/replay_window.js";
 import { NoiseSeal, PlainSeal, type Seal } from "../../../clients/typescript/src/seal.js";
@@ -208,5 +208,24 @@ describe("bounds.json", () => {
     assert.ok(bounds.length > 300);
     const wrong = bounds.filter((vector: any) => isTaken(vector) !== vector.accepted);
     assert.deepEqual(wrong.map((vector: any) => `${vector.field} ${vector.value}`), []);
+  });
+
+  it("a request out of bounds names its field, and an answer is refused", () => {
+    const requests = new Set<string>();
+    for (const { message, field, body } of readVectors("bounds.json").bounds) {
+      const isFrame = message === "Datagram" && !field.startsWith("Datagram.");
+      const content = isFrame ? decodeData(fromHex(body)) : undefined;
+      const [frame] = content?.invalid ? content.frames : [];
+      if (frame?.kind === "control") {
+        const [of, ...rest] = field.split(".");
+        requests.add(of);
+        assert.equal(frame.value.invalid, rest[0] === "rotation" ? "rotation" : rest.join("."), field);
+        assert.equal(frame.value.request, undefined, field);
+      } else if (frame) {
+        assert.equal(frame.kind, "controlAck", field);
+        assert.deepEqual([frame.value.code, frame.value.device, frame.value.handle], [Code.INVALID, undefined, undefined], field);
+      }
+    }
+    assert.equal(requests.size, 14);
   });
 });

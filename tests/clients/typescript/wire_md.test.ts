@@ -357,14 +357,24 @@ describe("WIRE.md", () => {
     const frames = [
       ...ports.map((change) => encodeFrame({ kind: "port", value: { ...kPort, ...change } })),
       ...couples.map((change) =>
-        encodeFrame({ kind: "control", value: { id: 1, request: { kind: "couple", ...kCouple, ...change } } })),
-      ...requests.map((request) => encodeFrame({ kind: "control", value: { id: 1, request } })),
+        encodeFrame({ kind: "control", value: { id: 0, request: { kind: "couple", ...kCouple, ...change } } })),
+      ...requests.map((request) => encodeFrame({ kind: "control", value: { id: 0, request } })),
     ];
+    const good = encodeFrame({ kind: "port", value: kPort });
     for (const [i, frame] of frames.entries()) {
-      const good = encodeFrame({ kind: "port", value: kPort });
       const content = decodeData(concat(encodeHead(1n, undefined), frame, good));
       assert.equal(content?.invalid, 1, `frame ${i}`);
       assert.deepEqual(content?.frames, [{ kind: "port", value: kPort }], `frame ${i}`);
+    }
+    // With an id it has to be answered.
+    for (const request of [...couples.map((change): Request => ({ kind: "couple", ...kCouple, ...change })), ...requests]) {
+      const frame = encodeFrame({ kind: "control", value: { id: 7, request } });
+      const content = decodeData(concat(encodeHead(1n, undefined), frame, good));
+      const [control] = content?.frames ?? [];
+      assert.ok(control?.kind === "control");
+      assert.deepEqual([content?.invalid, content?.frames.length, control.value.id], [1, 2, 7]);
+      assert.equal(control.value.request, undefined);
+      assert.ok(control.value.invalid, JSON.stringify(request, (_, value) => (typeof value === "bigint" ? `${value}` : value)));
     }
   });
 

@@ -10,11 +10,11 @@
 #include <numbers>
 #include <set>
 #include <sstream>
-#include <stdexcept>
 #include <string>
 #include <vector>
 
 #include "tests/support/dice.h"
+#include "tests/support/refusal.h"
 
 namespace tendon::frames_test {
 namespace {
@@ -45,12 +45,7 @@ std::string words_of(const Mat3& m) {
 }
 
 std::string refusal(const std::string& axes) {
-  try {
-    operator_from_device(axes);
-  } catch (const std::invalid_argument& error) {
-    return error.what();
-  }
-  return {};
+  return thrown_by([&] { operator_from_device(axes); });
 }
 
 bool ends_with(const std::string& text, const std::string& end) { return text.ends_with(end); }

@@ -18,7 +18,7 @@
 namespace tendon::rotation_test {
 namespace {
 
-class Rotations : public testing::Test {
+class Rotations : public ::testing::Test {
  protected:
   Vec3 vector(double longest) { return dice_.direction() * dice_.within(0, longest); }
   Quat rotation() { return rotation_by(vector(std::numbers::pi)); }

@@ -9,8 +9,6 @@
 #include <deque>
 #include <functional>
 #include <limits>
-#include <stdexcept>
-#include <string>
 #include <utility>
 
 #include "core/control/stability_controller.h"
@@ -272,17 +270,6 @@ void expect_the_common_promises(Law law, const Friction& friction) {
     law.observe({force, dx, held});
     EXPECT_TRUE(law.limit({Vec<N>::Constant(size), Mat<N>::Identity() * 1e3}).force.allFinite()) << size;
   }
-}
-
-/// The message of the std::invalid_argument that `make` throws, or empty.
-template <class Make>
-std::string complaint(Make make) {
-  try {
-    make();
-  } catch (const std::invalid_argument& e) {
-    return e.what();
-  }
-  return {};
 }
 
 }  // namespace tendon

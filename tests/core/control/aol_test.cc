@@ -7,6 +7,7 @@
 #include <Eigen/QR>
 #include <cmath>
 
+#include "core/control/aol_plus.h"
 #include "tests/support/dice.h"
 
 namespace tendon::aol_test {
@@ -66,6 +67,36 @@ TEST(Aol, ThePaperFormLosesALateralForceThatTheJointFormKeeps) {
   EXPECT_NEAR(lateral(0, true), 1, 1e-9);
   EXPECT_NEAR(lateral(eighth_turn, true), 1, 1e-9);
   EXPECT_LT(std::abs(lateral(eighth_turn, false)), 0.2);
+}
+
+TEST(AolPlus, WithoutPartsItIsTheAdjustingOutputLimiterBitForBit) {
+  for (std::uint64_t seed = 1; seed <= 50; ++seed) {
+    Dice dice(seed);
+    const Friction friction{dice.decades(-3, -0.3), dice.decades(-2.5, 0.3)};
+    AolPlus<1, 3> plus({.friction = {friction}, .longest_hold = kPeriod});
+    Aol<1, 3> plain({.friction = {friction}, .longest_hold = kPeriod});
+    EnergyLedger ledger(friction);
+    const OutputBound bound = OutputBound::of(friction, kPeriod);
+    Vec3 applied = Vec3::Zero();
+    for (int n = 0; n < 300; ++n) {
+      const Vec3 dx = dice.direction() * dice.decades(-6, -2);
+      const Duration held = dice.milliseconds(0.2, 1);
+      const Interval<3> interval{.applied = applied, .dx = dx, .held = held};
+      plus.observe(interval);
+      plain.observe(interval);
+      ledger.observe(applied, dx, held);
+      const Vec3 wanted = dice.direction() * dice.decades(-2, 2);
+      const auto from_plus = plus.limit({.force = wanted});
+      const auto from_plain = plain.limit({.force = wanted});
+      const auto from_bound = bound.limit<3>(wanted, ledger.energy());
+      ASSERT_EQ(from_plus.force, from_plain.force);
+      ASSERT_EQ(from_plus.permitted, from_plain.permitted);
+      ASSERT_EQ(from_plus.reasons, from_plain.reasons);
+      ASSERT_EQ(from_plain.force, from_bound.force);
+      ASSERT_EQ(plus.energy(), ledger.energy());
+      applied = from_plus.force;
+    }
+  }
 }
 
 }  // namespace

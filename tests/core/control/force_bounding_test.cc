@@ -2,30 +2,13 @@
 #include "core/control/force_bounding.h"
 
 #include "tests/core/control/adversary.h"
-#include "tests/core/control/press.h"
 
 namespace tendon::force_bounding_test {
 namespace {
 
 using std::chrono::milliseconds;
 
-static_assert(StabilityController<ForceBounding<1>, 1>);
-static_assert(StabilityController<ForceBounding<3>, 3>);
-static_assert(StabilityController<ForceBounding<6>, 6>);
-static_assert(StabilityController<MemorylessForceBounding<1>, 1>);
-static_assert(StabilityController<MemorylessForceBounding<3>, 3>);
-static_assert(StabilityController<MemorylessForceBounding<6>, 6>);
-
 constexpr Friction kFriction{0.05, 0.26};
-
-TEST(ForceBounding, KeepsTheCommonPromises) {
-  expect_the_common_promises<1>(ForceBounding<1>({kFriction, milliseconds(1)}), kFriction);
-  expect_the_common_promises<3>(ForceBounding<3>({kFriction, milliseconds(1)}), kFriction);
-  expect_the_common_promises<6>(ForceBounding<6>({kFriction, milliseconds(1)}), kFriction);
-  expect_the_common_promises<1>(MemorylessForceBounding<1>({kFriction, milliseconds(1)}), kFriction);
-  expect_the_common_promises<3>(MemorylessForceBounding<3>({kFriction, milliseconds(1)}), kFriction);
-  expect_the_common_promises<6>(MemorylessForceBounding<6>({kFriction, milliseconds(1)}), kFriction);
-}
 
 // Lee & Lee 2009 eq. (8) with f_c = 0, written out.
 TEST(ForceBounding, WithoutCoulombFrictionItIsTheAdjustingOutputLimiter) {
@@ -114,33 +97,6 @@ TEST(MemorylessForceBounding, AForceDoesNotAppearWhileTheHandIsAtRest) {
   }
 }
 
-TEST(ForceBounding, NoAdversaryDrawsEnergy) {
-  EXPECT_EQ(broken_by_hostile_worlds<1>([](Friction f, Duration t) { return ForceBounding<1>({f, t}); }, 400), 0);
-  EXPECT_EQ(broken_by_hostile_worlds<3>([](Friction f, Duration t) { return ForceBounding<3>({f, t}); }, 400), 0);
-  EXPECT_EQ(broken_by_hostile_worlds<6>([](Friction f, Duration t) { return ForceBounding<6>({f, t}); }, 100), 0);
-}
-
-TEST(MemorylessForceBounding, NoAdversaryDrawsEnergy) {
-  EXPECT_EQ(broken_by_hostile_worlds<1>(
-                [](Friction f, Duration t) {
-                  return MemorylessForceBounding<1>({f, t});
-                },
-                400),
-            0);
-  EXPECT_EQ(broken_by_hostile_worlds<3>(
-                [](Friction f, Duration t) {
-                  return MemorylessForceBounding<3>({f, t});
-                },
-                400),
-            0);
-  EXPECT_EQ(broken_by_hostile_worlds<6>(
-                [](Friction f, Duration t) {
-                  return MemorylessForceBounding<6>({f, t});
-                },
-                100),
-            0);
-}
-
 // f_c = 0, or the unclaimed Coulomb friction would hide it.
 template <class Law>
 double least_energy(double overclaim) {
@@ -154,38 +110,11 @@ double least_energy(double overclaim) {
   return least;
 }
 
-TEST(ForceBounding, ABoundOnePercentTooHighIsBroken) {
+TEST(ForceBounding, ABoundOnePercentTooHighIsBrokenWithMemoryAndWithout) {
   EXPECT_GE(least_energy<ForceBounding<3>>(1.0), -1e-12);
   EXPECT_LT(least_energy<ForceBounding<3>>(1.01), -1e-8);
-}
-
-TEST(MemorylessForceBounding, ABoundOnePercentTooHighIsBroken) {
   EXPECT_GE(least_energy<MemorylessForceBounding<3>>(1.0), -1e-12);
   EXPECT_LT(least_energy<MemorylessForceBounding<3>>(1.01), -1e-8);
-}
-
-TEST(MemorylessForceBounding, ShowsEveryStiffWallAsTwoBOverT) {
-  for (const double wall : {800.0, 3000.0, 20000.0}) {
-    const Press result = press(MemorylessForceBounding<1>({kPressFriction, milliseconds(1)}), wall);
-    EXPECT_NEAR(result.stiffness, 521, 52) << wall;
-    EXPECT_LT(result.unrest, 2e-3) << wall;
-    EXPECT_GE(result.least_work, -1e-12);
-  }
-}
-
-TEST(ForceBounding, ShowsAStiffWallAsTwoBOverTAndQuietly) {
-  const Press result = press(ForceBounding<1>({kPressFriction, milliseconds(1)}), 20000);
-  EXPECT_NEAR(result.stiffness, 521, 52);
-  EXPECT_LT(result.unrest, 2e-3);
-}
-
-TEST(ForceBounding, RefusesADeviceWithoutViscousFrictionAndAHoldOfNoLength) {
-  const std::string why = complaint([] { ForceBounding<1>({{0.05, 0}, milliseconds(1)}); });
-  EXPECT_NE(why.find("friction.viscous = 0: expected a finite number above 0"), std::string::npos) << why;
-  EXPECT_NE(complaint([] {
-              MemorylessForceBounding<3>({kFriction, Duration::zero()});
-            }).find("longest_hold"),
-            std::string::npos);
 }
 
 }  // namespace

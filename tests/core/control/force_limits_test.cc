@@ -43,7 +43,7 @@ TEST(Reasons, AreReadable) {
   Reasons reasons = Reason::kEnergy;
   reasons |= Reason::kSlew;
   EXPECT_EQ(to_string(reasons), "energy, slew");
-  EXPECT_EQ(to_string({}), "");
+  EXPECT_EQ(to_string(Reasons{}), "");
 }
 
 }  // namespace

@@ -2,30 +2,13 @@
 #include "core/control/nonlinear_coupling.h"
 
 #include "tests/core/control/adversary.h"
-#include "tests/core/control/press.h"
 
 namespace tendon::nonlinear_coupling_test {
 namespace {
 
 using std::chrono::milliseconds;
 
-static_assert(StabilityController<NonlinearCoupling<1>, 1>);
-static_assert(StabilityController<NonlinearCoupling<3>, 3>);
-static_assert(StabilityController<NonlinearCoupling<6>, 6>);
-
 constexpr Friction kFriction{0.05, 0.26};
-
-TEST(NonlinearCoupling, KeepsTheCommonPromises) {
-  expect_the_common_promises<1>(NonlinearCoupling<1>({kFriction, milliseconds(1)}), kFriction);
-  expect_the_common_promises<3>(NonlinearCoupling<3>({kFriction, milliseconds(1)}), kFriction);
-  expect_the_common_promises<6>(NonlinearCoupling<6>({kFriction, milliseconds(1)}), kFriction);
-}
-
-TEST(NonlinearCoupling, NoAdversaryDrawsEnergy) {
-  EXPECT_EQ(broken_by_hostile_worlds<1>([](Friction f, Duration t) { return NonlinearCoupling<1>({f, t}); }, 400), 0);
-  EXPECT_EQ(broken_by_hostile_worlds<3>([](Friction f, Duration t) { return NonlinearCoupling<3>({f, t}); }, 400), 0);
-  EXPECT_EQ(broken_by_hostile_worlds<6>([](Friction f, Duration t) { return NonlinearCoupling<6>({f, t}); }, 100), 0);
-}
 
 // The invariant of the proof.
 TEST(NonlinearCoupling, TheLedgerCoversTheSpringAndTheProxysAccount) {
@@ -123,22 +106,6 @@ double energy_of_shaking(double overclaim) {
 TEST(NonlinearCoupling, ASlopeFivePercentTooHighGivesOutEnergy) {
   EXPECT_GE(energy_of_shaking(1.0), -1e-12);
   EXPECT_LT(energy_of_shaking(1.05), -1e-6);
-}
-
-TEST(NonlinearCoupling, ShowsEveryStiffWallAsTwoBOverT) {
-  for (const double wall : {800.0, 3000.0, 20000.0}) {
-    const Press result = press(NonlinearCoupling<1>({kPressFriction, milliseconds(1)}), wall);
-    EXPECT_NEAR(result.stiffness, 521, 52) << wall;
-    EXPECT_LT(result.unrest, 2e-3) << wall;
-    EXPECT_GE(result.least_work, -1e-12);
-  }
-}
-
-TEST(NonlinearCoupling, RefusesASlopeThatFrictionDoesNotAfford) {
-  const std::string why = complaint([] { NonlinearCoupling<1>({kFriction, milliseconds(1), 521}); });
-  EXPECT_NE(why.find("expected a number above 0 and at most 2b/T = 520"), std::string::npos) << why;
-  EXPECT_THROW(NonlinearCoupling<1>({{0.05, 0}, milliseconds(1)}), std::invalid_argument);
-  EXPECT_THROW(NonlinearCoupling<1>({kFriction, Duration::zero()}), std::invalid_argument);
 }
 
 }  // namespace

@@ -4,24 +4,13 @@
 #include <numbers>
 
 #include "tests/core/control/adversary.h"
-#include "tests/core/control/press.h"
 
 namespace tendon::passive_synthesis_test {
 namespace {
 
 using std::chrono::milliseconds;
 
-static_assert(StabilityController<PassiveSynthesis<1>, 1>);
-static_assert(StabilityController<PassiveSynthesis<3>, 3>);
-static_assert(StabilityController<PassiveSynthesis<6>, 6>);
-
 constexpr Friction kFriction{0.05, 0.26};
-
-TEST(PassiveSynthesis, KeepsTheCommonPromises) {
-  expect_the_common_promises<1>(PassiveSynthesis<1>({kFriction, milliseconds(1)}), kFriction);
-  expect_the_common_promises<3>(PassiveSynthesis<3>({kFriction, milliseconds(1)}), kFriction);
-  expect_the_common_promises<6>(PassiveSynthesis<6>({kFriction, milliseconds(1)}), kFriction);
-}
 
 TEST(PassiveSynthesis, ScalesByWhatFrictionAffords) {
   PassiveSynthesis<3> law({kFriction, milliseconds(1), milliseconds(2)});  // 0.26 / 2.5 ms = 104 N/m
@@ -98,24 +87,6 @@ TEST(PassiveSynthesis, FivePercentTooStiffGivesOutEnergy) {
     EXPECT_GT(energy_of_slow_waving(late, 1.0), -1e-9) << late;
     EXPECT_LT(energy_of_slow_waving(late, 1.05), -1e-6) << late;
   }
-}
-
-TEST(PassiveSynthesis, ShowsEveryStiffWallAsTwoBOverT) {
-  for (const double wall : {3000.0, 20000.0}) {
-    const Press result = press(PassiveSynthesis<1>({kPressFriction, milliseconds(1), {}, wall}), wall);
-    EXPECT_NEAR(result.stiffness, 520, 10) << wall;
-    EXPECT_LT(result.unrest, 2e-3) << wall;
-  }
-}
-
-TEST(PassiveSynthesis, RefusesNegativeDelayAndStiffness) {
-  EXPECT_NE(complaint([] {
-              PassiveSynthesis<1>({kFriction, milliseconds(1), milliseconds(-1)});
-            }).find("delay = -"),
-            std::string::npos);
-  EXPECT_THROW(PassiveSynthesis<1>({kFriction, milliseconds(1), {}, -1}), std::invalid_argument);
-  EXPECT_THROW(PassiveSynthesis<1>({{0.05, 0}, milliseconds(1)}), std::invalid_argument);
-  EXPECT_THROW(PassiveSynthesis<1>({kFriction, Duration::zero()}), std::invalid_argument);
 }
 
 }  // namespace

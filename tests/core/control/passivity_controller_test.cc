@@ -12,26 +12,8 @@ namespace {
 using std::chrono::milliseconds;
 using enum PassivityObserver;
 
-static_assert(StabilityController<PassivityController<1>, 1>);
-static_assert(StabilityController<PassivityController<3>, 3>);
-static_assert(StabilityController<PassivityController<6>, 6>);
-static_assert(StabilityController<ParallelPassivityController<1>, 1>);
-static_assert(StabilityController<ParallelPassivityController<3>, 3>);
-static_assert(StabilityController<ParallelPassivityController<6>, 6>);
-
 constexpr double kInf = std::numeric_limits<double>::infinity();
 constexpr Friction kFriction{0.05, 0.26};
-
-TEST(PassivityController, KeepsTheCommonPromises) {
-  for (const auto observer : {kSameSample, kZohExact}) {
-    expect_the_common_promises<1>(PassivityController<1>({kFriction, observer, 20}), kFriction);
-    expect_the_common_promises<3>(PassivityController<3>({kFriction, observer, 20}), kFriction);
-    expect_the_common_promises<6>(PassivityController<6>({kFriction, observer, kInf}), kFriction);
-    expect_the_common_promises<1>(ParallelPassivityController<1>({kFriction, observer, 0.1}), kFriction);
-    expect_the_common_promises<3>(ParallelPassivityController<3>({kFriction, observer, 0.1}), kFriction);
-    expect_the_common_promises<6>(ParallelPassivityController<6>({kFriction, observer, kInf}), kFriction);
-  }
-}
 
 // The energy that a law observes of a plain spring on random motion, and the energy that the ledger shows.
 struct Seen {
@@ -111,24 +93,11 @@ TEST(PassivityController, AsPublishedAStiffWallStillThrowsTheHandOff) {
   EXPECT_LT(published.least_work, -0.1);
 }
 
-TEST(PassivityController, ZohExactWithAModestDamperItShowsStiffWallsTruly) {
-  for (const double wall : {800.0, 3000.0, 20000.0}) {
-    const Press result = press(PassivityController<1>({kPressFriction, kZohExact, 100}), wall);
-    EXPECT_NEAR(result.stiffness / wall, 1, 0.01) << wall;
-    EXPECT_LT(result.unrest, 2e-3) << wall;
-  }
-}
-
 // 2m/T = 250 N·s/m for device and hand.
 TEST(PassivityController, ADamperWithoutLimitGivesBurstsUpToMaxForce) {
   const Press result = press(PassivityController<1>({kPressFriction, kZohExact, kInf}), 20000);
   EXPECT_GT(result.peak_force, 50);
   EXPECT_GT(result.unrest, 0.02);
-}
-
-TEST(PassivityController, ActsOneIntervalLateSoAnAdversaryDrawsEnergy) {
-  const auto make = [](Friction friction, Duration) { return PassivityController<3>({friction, kZohExact, kInf}); };
-  EXPECT_GT(broken_by_hostile_worlds<3>(make, 50), 25);
 }
 
 TEST(ParallelPassivityController, TheEnvironmentIsLeftBehindByWhatIsMissing) {
@@ -179,17 +148,6 @@ TEST(ParallelPassivityController, WithoutAStiffnessItChangesNothing) {
   ParallelPassivityController<3> law({kFriction, kZohExact, kInf});
   law.observe({Vec3(5, 0, 0), Vec3(1e-3, 0, 0), milliseconds(1)});
   EXPECT_EQ(law.limit({Vec3(5, 1, 0)}).force, Vec3(5, 1, 0));
-}
-
-TEST(PassivityController, RefusesADamperThatIsNone) {
-  const std::string why = complaint([] { PassivityController<1>({kFriction, kZohExact, 0}); });
-  EXPECT_NE(why.find("expected a number above 0 N·s/m"), std::string::npos) << why;
-  EXPECT_THROW(PassivityController<1>({kFriction, kZohExact, 5, -1}), std::invalid_argument);
-  EXPECT_NE(complaint([] {
-              ParallelPassivityController<1>({kFriction, kZohExact, -1});
-            }).find("max_mobility"),
-            std::string::npos);
-  EXPECT_THROW(ParallelPassivityController<1>({kFriction, kZohExact, 1, kInf}), std::invalid_argument);
 }
 
 }  // namespace

@@ -13,17 +13,7 @@ namespace {
 
 using std::chrono::milliseconds;
 
-static_assert(StabilityController<PortHamiltonian<1>, 1>);
-static_assert(StabilityController<PortHamiltonian<3>, 3>);
-static_assert(StabilityController<PortHamiltonian<6>, 6>);
-
 constexpr Friction kFriction{0.05, 0.26};
-
-TEST(PortHamiltonian, KeepsTheCommonPromises) {
-  expect_the_common_promises<1>(PortHamiltonian<1>({kFriction, 500}), kFriction);
-  expect_the_common_promises<3>(PortHamiltonian<3>({kFriction, 500}), kFriction);
-  expect_the_common_promises<6>(PortHamiltonian<6>({kFriction, 500}), kFriction);
-}
 
 // A hand that presses and lets go, with a tremor: depth in a wall at 0.
 double depth(int step) {
@@ -146,11 +136,6 @@ TEST(PortHamiltonian, ShowsWallsSofterThanTheyAreAndCreepsInVeryStiffOnes) {
   EXPECT_LT(stiffest.stiffness, 2000);
   EXPECT_LT(stiffest.unrest, 0.15);
   EXPECT_GT(stiffest.least_work, -1e-3);
-}
-
-TEST(PortHamiltonian, RefusesASpringThatIsNone) {
-  const std::string why = complaint([] { PortHamiltonian<1>({kFriction, 0}); });
-  EXPECT_NE(why.find("expected a finite number above 0 N/m"), std::string::npos) << why;
 }
 
 }  // namespace

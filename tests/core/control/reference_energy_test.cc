@@ -4,24 +4,13 @@
 #include <Eigen/LU>
 
 #include "tests/core/control/adversary.h"
-#include "tests/core/control/press.h"
 
 namespace tendon::reference_energy_test {
 namespace {
 
 using std::chrono::milliseconds;
 
-static_assert(StabilityController<ReferenceEnergyController<1>, 1>);
-static_assert(StabilityController<ReferenceEnergyController<3>, 3>);
-static_assert(StabilityController<ReferenceEnergyController<6>, 6>);
-
 constexpr Friction kFriction{0.05, 0.26};
-
-TEST(ReferenceEnergyController, KeepsTheCommonPromises) {
-  expect_the_common_promises<1>(ReferenceEnergyController<1>({kFriction, 500, 20}), kFriction);
-  expect_the_common_promises<3>(ReferenceEnergyController<3>({kFriction, 500, 20}), kFriction);
-  expect_the_common_promises<6>(ReferenceEnergyController<6>({kFriction, 500, 20}), kFriction);
-}
 
 TEST(ReferenceEnergyController, TheReferenceIsWhatASpringHoldsAtThatForce) {
   const ReferenceEnergyController<3> law({kFriction, 500, 20});
@@ -42,26 +31,6 @@ TEST(ReferenceEnergyController, DampsUpToTheReferenceAndNotOnlyUpToZero) {
   const LimitedForce<1> limited = law.limit({Vec<1>(-1.0)});
   EXPECT_NEAR(law.observed() - limited.force[0] * -0.7e-3, 0.5e-3, 1e-15);
   EXPECT_TRUE(limited.reasons.has(Reason::kEnergy));
-}
-
-TEST(ReferenceEnergyController, ShowsStiffWallsAsTheyAreAndQuietly) {
-  for (const double wall : {800.0, 3000.0, 20000.0}) {
-    const Press result = press(ReferenceEnergyController<1>({kPressFriction, wall, 20}), wall);
-    EXPECT_NEAR(result.stiffness / wall, 1, 0.05) << wall;
-    EXPECT_LT(result.unrest, 2e-3) << wall;
-  }
-}
-
-TEST(ReferenceEnergyController, ActsOneIntervalLateSoAnAdversaryDrawsEnergy) {
-  const auto make = [](Friction friction, Duration) { return ReferenceEnergyController<3>({friction, 500, 1e9}); };
-  EXPECT_GT(broken_by_hostile_worlds<3>(make, 50), 25);
-}
-
-TEST(ReferenceEnergyController, RefusesAReferenceWithoutStiffness) {
-  const std::string why = complaint([] { ReferenceEnergyController<1>({kFriction, 0, 20}); });
-  EXPECT_NE(why.find("expected a finite number above 0 N/m"), std::string::npos) << why;
-  EXPECT_THROW(ReferenceEnergyController<1>({kFriction, 500, 0}), std::invalid_argument);
-  EXPECT_THROW(ReferenceEnergyController<1>({kFriction, 500, 20, -1}), std::invalid_argument);
 }
 
 }  // namespace

@@ -5,24 +5,13 @@
 #include <numbers>
 
 #include "tests/core/control/adversary.h"
-#include "tests/core/control/press.h"
 
 namespace tendon::virtual_coupling_test {
 namespace {
 
 using std::chrono::milliseconds;
 
-static_assert(StabilityController<VirtualCoupling<1>, 1>);
-static_assert(StabilityController<VirtualCoupling<3>, 3>);
-static_assert(StabilityController<VirtualCoupling<6>, 6>);
-
 constexpr Friction kFriction{0.05, 0.26};
-
-TEST(VirtualCoupling, KeepsTheCommonPromises) {
-  expect_the_common_promises<1>(VirtualCoupling<1>({kFriction, milliseconds(1), 400, 0.05}), kFriction);
-  expect_the_common_promises<3>(VirtualCoupling<3>({kFriction, milliseconds(1), 400, 0.05}), kFriction);
-  expect_the_common_promises<6>(VirtualCoupling<6>({kFriction, milliseconds(1), 400, 0.05}), kFriction);
-}
 
 TEST(VirtualCoupling, AtRestTheHandFeelsBothSpringsInSeries) {
   VirtualCoupling<3> law({kFriction, milliseconds(1), 400, 0.05});
@@ -112,17 +101,6 @@ TEST(VirtualCoupling, FivePercentAboveColgatesRuleShakingAWallDrawsEnergy) {
   }
 }
 
-TEST(VirtualCoupling, ShowsEveryStiffWallAsItself) {
-  const double stiffness = 0.9 * colgate_coupling(0.26, milliseconds(1), 0);
-  for (const double wall : {3000.0, 20000.0}) {
-    const Press result = press(VirtualCoupling<1>({kPressFriction, milliseconds(1), stiffness}), wall);
-    const double series = stiffness * wall / (stiffness + wall);
-    EXPECT_NEAR(result.stiffness / series, 1, 0.02) << wall;
-    EXPECT_LT(result.unrest, 2e-3) << wall;
-  }
-  EXPECT_NEAR(press(VirtualCoupling<1>({kPressFriction, milliseconds(1), stiffness}), 1e7).stiffness, 468, 10);
-}
-
 TEST(CouplingDesign, ColgatesRule) {
   EXPECT_DOUBLE_EQ(colgate_coupling(0.26, milliseconds(1), 0), 520);
   EXPECT_DOUBLE_EQ(colgate_coupling(0.26, milliseconds(2), -0.06), 200);
@@ -161,13 +139,6 @@ TEST(CouplingDesign, TheTwoPortRuleIsLlewellynsOnTheEdgeWhateverTheMass) {
   EXPECT_EQ(two_port_coupling(0.26, milliseconds(1), 3), 0);
   EXPECT_EQ(two_port_coupling(0, milliseconds(1), 0), 0);
   EXPECT_THROW(two_port_coupling(0.26, milliseconds(1), -0.1), std::invalid_argument);
-}
-
-TEST(VirtualCoupling, RefusesACouplingThatIsNone) {
-  const std::string why = complaint([] { VirtualCoupling<1>({kFriction, milliseconds(1), 0}); });
-  EXPECT_NE(why.find("expected a finite number above 0 N/m"), std::string::npos) << why;
-  EXPECT_THROW(VirtualCoupling<1>({kFriction, milliseconds(1), 400, -0.1}), std::invalid_argument);
-  EXPECT_THROW(VirtualCoupling<1>({kFriction, Duration::zero(), 400, 0}), std::invalid_argument);
 }
 
 }  // namespace

@@ -11,6 +11,7 @@
 
 #include "core/estimation/recursive_least_squares.h"
 #include "tests/core/estimation/regressors.h"
+#include "tests/support/plain_usage.h"
 
 namespace {
 
@@ -57,6 +58,16 @@ bool soak(const char* form, const char* scalar, const Options& options) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  const tendon::PlainUsage usage{
+      .help =
+          "Usage: definiteness_soak [STEPS] [--json]\n\n"
+          "Feeds STEPS (default 100000000) nearly collinear samples to each form of recursive least\n"
+          "squares and says whether its covariance stayed positive definite.\n\n"
+          "Example: definiteness_soak 1000000 --json\n"
+          "Exit: 0 each stayed definite; 1 one did not; 2 wrong usage.\n",
+      .most_arguments = 1,
+      .options = {"--json"}};
+  if (const auto code = tendon::answer(usage, argc, argv)) return *code;
   Options options;
   for (int i = 1; i < argc; ++i) {
     const std::string_view argument = argv[i];
@@ -67,12 +78,8 @@ int main(int argc, char** argv) {
     const char* const end = argument.data() + argument.size();
     const auto [rest, error] = std::from_chars(argument.data(), end, options.steps);
     if (error != std::errc() || rest != end || options.steps == 0) {
-      std::fprintf(stderr,
-                   "usage: definiteness_soak [STEPS] [--json]\n\n"
-                   "Feeds STEPS (default 100000000) nearly collinear samples to each form of recursive least\n"
-                   "squares and says whether its covariance stayed positive definite. Exit code 1 when not.\n"
-                   "For example: definiteness_soak 1000000 --json\n");
-      return argument == "--help" ? 0 : 2;
+      std::fprintf(stderr, "STEPS: expected a whole number above 0, got %s\n\n%s", argv[i], usage.help);
+      return 2;
     }
   }
   using tendon::QrLeastSquares;

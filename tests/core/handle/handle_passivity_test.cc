@@ -155,7 +155,7 @@ Outcome run(std::uint64_t seed, Law law) {
   return outcome;
 }
 
-class HandlePassivity : public testing::TestWithParam<Law> {};
+class HandlePassivity : public ::testing::TestWithParam<Law> {};
 
 TEST_P(HandlePassivity, NoHandAndNoEngineMakesItsAccountsNegative) {
   const auto law = GetParam();
@@ -168,7 +168,7 @@ TEST_P(HandlePassivity, NoHandAndNoEngineMakesItsAccountsNegative) {
   }));
 }
 
-INSTANTIATE_TEST_SUITE_P(Laws, HandlePassivity, testing::Values(Law::kAol, Law::kAolPlus),
+INSTANTIATE_TEST_SUITE_P(Laws, HandlePassivity, ::testing::Values(Law::kAol, Law::kAolPlus),
                          [](const auto& test) { return test.param == Law::kAol ? "Aol" : "AolPlus"; });
 
 /// A hand that fills the account, then follows a wrench `scale` times as large as is permitted. The least energy, J.

@@ -17,7 +17,7 @@
 #include "core/control/stability_controller.h"
 #include "core/handle/handle_port.h"
 #include "core/teleoperation/purse.h"
-#include "tests/core/teleoperation/link.h"
+#include "tests/core/teleoperation/one_way.h"
 #include "tests/support/dice.h"
 
 namespace tendon::handle_purse_test {
@@ -222,13 +222,13 @@ class HandlePair {
   bool loops_;
   double duplicates_ = 0;
   std::array<End, 2> ends_;
-  std::vector<Link<PurseMessage>> links_;
+  std::vector<OneWay<PurseMessage>> links_;
   int now_ = 0;
   Balance balance_;
 };
 
 template <class Limits>
-class HandlePurse : public testing::Test {};
+class HandlePurse : public ::testing::Test {};
 using HandlePorts = testing::Types<WrenchPort, GripPort>;
 TYPED_TEST_SUITE(HandlePurse, HandlePorts);
 

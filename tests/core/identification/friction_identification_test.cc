@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "tests/core/identification/exact_ramp.h"
+#include "tests/support/refusal.h"
 
 namespace tendon::friction_identification_test {
 namespace {
@@ -127,12 +128,8 @@ TEST(Identification, NeverPublishesNegativeFriction) {
 TEST(Identification, NamesTheRunThatItCannotUse) {
   std::vector<RampRun> runs = experiment({});
   runs.at(2).samples.resize(10);
-  try {
-    identify_friction(runs, kConfig);
-    FAIL();
-  } catch (const std::invalid_argument& error) {
-    EXPECT_STREQ(error.what(), "run 3: expected a run of 50 samples or more, found 10");
-  }
+  EXPECT_EQ(thrown_by([&] { identify_friction(runs, kConfig); }),
+            "run 3: expected a run of 50 samples or more, found 10");
   EXPECT_THROW(identify_friction({}, kConfig), std::invalid_argument);
 }
 

@@ -123,8 +123,10 @@ TEST(ForceChannels, NoEngineAndNoHandoverOverdrawsTheLedgerOrJumps) {
     const Motion hand{LocalTime(milliseconds(t)), Vec3(0.02 * std::sin(phase), 0, 0), Vec3::Zero()};
     const double x = hand.position.x();
     controller.observe(force_at(milliseconds(t), Vec3(-4000 * (x - 0.005), 0, 0), 1), 0);
-    // The second pushes the other way, changes hands in mid-contact every 400 ms, and sends nothing for a while.
-    if (t % 2000 < 1500) controller.observe(force_at(milliseconds(t), Vec3(3000 * x, 1, 0), 2 + t / 400), 1);
+    // The second engine pushes in the opposite direction. It is replaced every 400 ms during contact, and does not send
+    // anything for a while.
+    if (t % 2000 < 1500)
+      controller.observe(force_at(milliseconds(t), Vec3(3000 * x, 1, 0), 2 + static_cast<std::uint32_t>(t) / 400), 1);
     if (t % 3 == 0) {
       const double nan = std::numeric_limits<double>::quiet_NaN();
       EXPECT_FALSE(controller.observe(force_at(milliseconds(t), Vec3(nan, 0, 0), 9), 2));

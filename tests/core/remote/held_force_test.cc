@@ -6,6 +6,8 @@
 #include <cmath>
 #include <limits>
 
+#include "tests/support/refusal.h"
+
 namespace tendon::held_force_test {
 namespace {
 
@@ -228,13 +230,6 @@ TEST(HeldForce, TheEstimatorFollowsASlowEnginesSpringAtTheLoopsRate) {
   EXPECT_LT(error(true), 0.02);
 }
 
-TEST(HeldForce, RefusesTwoWaysAtOnceToFollowTheHand) {
-  HeldForce::Config config;
-  config.adaptive_local_model.emplace();
-  config.output_estimator.emplace();
-  EXPECT_THROW(HeldForce{config}, std::invalid_argument);
-}
-
 TEST(HeldForce, RefusesWhatIsNotSoundAndAgesTheForceBefore) {
   HeldForce held(without_ramp());
   held.observe(force_at(Duration::zero(), Vec3(2, 0, 0)));
@@ -264,15 +259,17 @@ TEST(HeldForce, ReleaseEndsValidityAtOnce) {
 }
 
 TEST(HeldForce, RefusesWhatCannotBeMeant) {
-  HeldForce::Config config;
-  config.safe_stop = milliseconds(10);
-  EXPECT_THROW(HeldForce{config}, std::invalid_argument);
-  config = {};
-  config.decay = Duration::zero();
-  EXPECT_THROW(HeldForce{config}, std::invalid_argument);
-  config = {};
-  config.max_stiffness = 0;
-  EXPECT_THROW(HeldForce{config}, std::invalid_argument);
+  expect_refusals(HeldForce::Config(), Makes<HeldForce>(),
+                  {
+                      {"safe_stop = 0.01", [](auto& c) { c.safe_stop = milliseconds(10); }},
+                      {"decay = 0", [](auto& c) { c.decay = Duration::zero(); }},
+                      {"max_stiffness = 0", [](auto& c) { c.max_stiffness = 0; }},
+                      {"adaptive_local_model",
+                       [](auto& c) {
+                         c.adaptive_local_model.emplace();
+                         c.output_estimator.emplace();
+                       }},
+                  });
 }
 
 }  // namespace

@@ -59,7 +59,7 @@ struct Loop {
   double damping;
   int delay;
 };
-class SampledSpringSimulated : public testing::TestWithParam<Loop> {};
+class SampledSpringSimulated : public ::testing::TestWithParam<Loop> {};
 
 TEST_P(SampledSpringSimulated, Dies1PercentBelowTheBoundaryGrows1PercentAbove) {
   SampledSpring spring{
@@ -74,10 +74,10 @@ TEST_P(SampledSpringSimulated, Dies1PercentBelowTheBoundaryGrows1PercentAbove) {
 }
 
 INSTANTIATE_TEST_SUITE_P(WithAndWithoutDelay, SampledSpringSimulated,
-                         testing::Values(Loop{0, 0}, Loop{0, 1}, Loop{0, 5}, Loop{0, 20}, Loop{2, 0}, Loop{2, 2},
-                                         Loop{5, 20}));
+                         ::testing::Values(Loop{0, 0}, Loop{0, 1}, Loop{0, 5}, Loop{0, 20}, Loop{2, 0}, Loop{2, 2},
+                                           Loop{5, 20}));
 
-class SwingingWithCoulombFriction : public testing::TestWithParam<int> {};
+class SwingingWithCoulombFriction : public ::testing::TestWithParam<int> {};
 
 TEST_P(SwingingWithCoulombFriction, DiesOutBelowTheSpeedLimitAndGrowsAboveIt) {
   const SampledSpring spring{
@@ -90,7 +90,7 @@ TEST_P(SwingingWithCoulombFriction, DiesOutBelowTheSpeedLimitAndGrowsAboveIt) {
   EXPECT_GT(fast.late, 1.1 * fast.early);
 }
 
-INSTANTIATE_TEST_SUITE_P(WithAndWithoutDelay, SwingingWithCoulombFriction, testing::Values(0, 1));
+INSTANTIATE_TEST_SUITE_P(WithAndWithoutDelay, SwingingWithCoulombFriction, ::testing::Values(0, 1));
 
 TEST(DiolaitiSimulated, EachRegionDoesWhatItsNameSays) {
   SampledSpring spring{

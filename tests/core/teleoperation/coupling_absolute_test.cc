@@ -4,11 +4,11 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <string>
 
 #include "core/base/rotation.h"
 #include "tests/core/teleoperation/expect_ports.h"
 #include "tests/core/teleoperation/ports.h"
+#include "tests/support/refusal.h"
 
 namespace tendon::coupling_absolute_test {
 namespace {
@@ -62,7 +62,7 @@ TEST(CouplingAbsolute, TheHandBringsTheHandleThereAndOnlyThenItEngages) {
   ASSERT_GT(engaged_at, 0);
   EXPECT_NEAR(engaged_at - near_at, 200, 3);
   EXPECT_GT(most, 0.5);
-  EXPECT_LE(most, Coupling::kAlignForce * (1 + 1e-12));
+  EXPECT_LE(most, Alignment::kForce * (1 + 1e-12));
   EXPECT_TRUE(ports.leader.coupling->live());
   EXPECT_TRUE(ports.follower.coupling->live());
   const Vec3 led = ports.leader.x();
@@ -102,7 +102,7 @@ TEST(CouplingAbsolute, AMotorWithEnergyOfItsOwnDrawsItThereAndGivesNoMore) {
     least = std::min(least, ports.leader.truth.energy());
   });
   EXPECT_TRUE(ports.leader.coupling->live()) << ports.leader.x().transpose();
-  EXPECT_LT(fastest, 1.4 * Coupling::kAlignSpeed) << "it swings on its spring";
+  EXPECT_LT(fastest, 1.4 * Alignment::kSpeed) << "it swings on its spring";
   EXPECT_GE(least, -kEnergy + kRounding);
   EXPECT_GE(ports.least_account(), kRounding);
 
@@ -149,27 +149,13 @@ TEST(CouplingAbsolute, AligningEndsWithThePeerAFaultOrTheOperator) {
 }
 
 TEST(CouplingAbsolute, RefusesAClutchAndMethodsWithoutPlaces) {
-  const auto refusal = [](const Coupling::Config& config) -> std::string {
-    try {
-      Coupling coupling(config);
-    } catch (const std::invalid_argument& error) {
-      return error.what();
-    }
-    return "";
-  };
-  Coupling::Config config = end_of(PortRole::kLeader).coupling;
-  EXPECT_EQ(refusal(config), "");
-  config.clutch = Coupling::Button{.bit = 1};
-  EXPECT_NE(refusal(config).find("clutch"), std::string::npos);
-  config.clutch.reset();
-  config.method = CouplingMethod::kWaves;
-  EXPECT_NE(refusal(config).find("absolute"), std::string::npos);
-  config.method = CouplingMethod::kSurface;
-  config.absolute->within = 0;
-  EXPECT_NE(refusal(config).find("within"), std::string::npos);
-  config.absolute->within = 0.01;
-  config.absolute->energy = -1;
-  EXPECT_NE(refusal(config).find("energy"), std::string::npos);
+  expect_refusals(end_of(PortRole::kLeader).coupling, Makes<Coupling>(),
+                  {
+                      {"clutch", [](auto& c) { c.clutch = Coupling::Button{.bit = 1}; }},
+                      {"absolute", [](auto& c) { c.method = CouplingMethod::kWaves; }},
+                      {"within", [](auto& c) { c.absolute->within = 0; }},
+                      {"energy", [](auto& c) { c.absolute->energy = -1; }},
+                  });
 }
 
 }  // namespace

@@ -11,7 +11,6 @@
 #include <iomanip>
 #include <iostream>
 #include <numbers>
-#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -221,6 +220,22 @@ TEST(CouplingMethods, AWallThatIsGoneIsGoneForTheLeaderOnceTheToolPassed) {
   EXPECT_LT(-ports.leader.applied.x(), 0.1);
 }
 
+TEST(CouplingMethods, AWallThatComesNearerIsWhereItIsOnTheNextPress) {
+  for (const int one_way : {0, 25, 100, 300}) {
+    const Pressing with{.method = CouplingMethod::kSurface, .stiffness = 1000, .one_way = one_way};
+    const Ports made = press(with);
+    PortSetup follower = made.follower.setup;
+    follower.around[0].reference = [](double t) { return kPressingWallAt - 0.02 * std::clamp(t - 6, 0.0, 0.4); };
+    Ports ports(made.leader.setup, follower, bad_way(one_way, 1), bad_way(one_way, 1001));
+    ports.run(1200);
+    ASSERT_TRUE(ports.engage());
+    ports.run(3000 + 3 * kPressMs - 100 - ports.now);  // to the end of the second press
+    const double nearer = 1.4 * rigid(with);           // by 8 of 20 mm
+    EXPECT_NEAR(-ports.leader.applied.x(), nearer, 0.1 * nearer) << one_way;
+    EXPECT_GE(ports.least_account(), kRounding) << one_way;
+  }
+}
+
 TEST(CouplingMethods, APeerThatLiesAboutItsWavesGivesNoMoreThanTheyMayBe) {
   auto config = coupling_of(PortRole::kLeader);
   config.method = CouplingMethod::kWaves;
@@ -246,14 +261,6 @@ TEST(CouplingMethods, APeerThatLiesAboutItsWavesGivesNoMoreThanTheyMayBe) {
   const double most = 5.0 * 5.0 / 4;  // max_force²/B, W
   EXPECT_LE(credited, 2 * most * (1 + 1e-9));
   EXPECT_GT(credited, most);
-}
-
-TEST(CouplingMethods, ALineNeedsAnImpedance) {
-  auto config = coupling_of(PortRole::kFollower);
-  config.method = CouplingMethod::kWaves;
-  config.spring.own_damping = 0;
-  config.spring.adapt_to_delay = false;
-  EXPECT_THROW(Coupling{config}, std::invalid_argument);
 }
 
 }  // namespace

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Two couplings in drawn worlds: devices, maps, networks, hands; acts, clutches, losses, restarts, faults, replays. No
-// account and no pair gives out energy, and nothing happens without an act. mutants.cmake plants faults in coupling.cc,
-// each of which these worlds must name.
+// These tests run two couplings in random worlds. The devices, maps, networks, and hands are random, as well as all
+// acts, clutches, losses, restarts, faults, and replays. It is an error if an account or a pair generates energy, or if
+// something happens without an act. The bugs in tests/mutants/coupling must be found by these tests.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -16,6 +16,7 @@
 #include "core/base/rotation.h"
 #include "tests/core/teleoperation/ports.h"
 #include "tests/support/dice.h"
+#include "tests/support/property_cases.h"
 
 namespace tendon::coupling_world_test {
 namespace {
@@ -270,7 +271,7 @@ void expect_worlds_keep_their_promises(std::uint64_t worlds, int ticks) {
 }
 
 TEST(CouplingWorlds, NoAccountNoPairAndNoForceWithoutAnAct) {
-  expect_worlds_keep_their_promises(TENDON_PROPERTY_CASES / 25, 3000);
+  expect_worlds_keep_their_promises(static_cast<std::uint64_t>(property_cases()) / 25, 3000);
 }
 
 // By hand: --gtest_also_run_disabled_tests --gtest_filter='*Thousands*'

@@ -80,8 +80,10 @@ TEST(Couplings, OfOneLeaderAreThatCouplingBitForBit) {
     const auto paid_b = one.settle(0.02, 0.001, std::chrono::milliseconds(1));
     ASSERT_EQ(paid_a.credit, paid_b.credit);
     ASSERT_EQ(paid_a.withdraw, paid_b.withdraw);
-    told_alone = alone.message(a.force, std::nullopt);
-    told_one = one[0].message(b.force, std::nullopt);
+    alone.conclude(a.force, std::nullopt);
+    told_alone = alone.message();
+    one[0].conclude(b.force, std::nullopt);
+    told_one = one[0].message();
     ASSERT_EQ(told_alone.account, told_one.account);
     ASSERT_EQ(told_alone.given, told_one.given);
     ASSERT_FALSE(told_one.share);

@@ -2,7 +2,7 @@
 //
 // Grippers that are coupled: the follower's fingers go to the leader's without a jump, what they squeeze is felt, and
 // nothing is dropped or crushed while the link is dead.
-#include "core/teleoperation/grip_coupling.h"
+#include "core/teleoperation/handle/grip_coupling.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "core/teleoperation/model_mediated.h"
+#include "core/teleoperation/methods/model_mediated.h"
 
 #include <gtest/gtest.h>
 
@@ -9,10 +9,10 @@
 #include <iostream>
 #include <limits>
 #include <numbers>
-#include <stdexcept>
 
 #include "core/ledger/energy_ledger.h"
 #include "tests/support/dice.h"
+#include "tests/support/refusal.h"
 
 namespace tendon::model_mediated_test {
 namespace {
@@ -272,18 +272,13 @@ TEST(ModelMediated, ASurfaceStaysWhileTheToolIsNoDeeperThanTheNoise) {
 }
 
 TEST(ModelMediated, SaysWhatIsWrongWithItsConfiguration) {
-  auto bad = kEstimator;
-  bad.max_stiffness = 100;
-  EXPECT_THROW(SurfaceEstimator<3>{bad}, std::invalid_argument);
-  bad = kEstimator;
-  bad.contact_force = 0;
-  EXPECT_THROW(SurfaceEstimator<3>{bad}, std::invalid_argument);
-  bad = kEstimator;
-  bad.least_spread = 0;
-  EXPECT_THROW(SurfaceEstimator<3>{bad}, std::invalid_argument);
-  bad = kEstimator;
-  bad.position_noise = -1;
-  EXPECT_THROW(SurfaceEstimator<3>{bad}, std::invalid_argument);
+  expect_refusals(kEstimator, Makes<SurfaceEstimator<3>>(),
+                  {
+                      {"max_stiffness = 100", [](auto& c) { c.max_stiffness = 100; }},
+                      {"contact_force = 0", [](auto& c) { c.contact_force = 0; }},
+                      {"least_spread = 0", [](auto& c) { c.least_spread = 0; }},
+                      {"position_noise = -1", [](auto& c) { c.position_noise = -1; }},
+                  });
 }
 
 }  // namespace

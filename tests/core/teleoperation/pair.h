@@ -10,9 +10,9 @@
 
 #include "core/control/limiter.h"
 #include "core/ledger/energy_ledger.h"
-#include "core/teleoperation/position_position.h"
+#include "core/teleoperation/methods/position_position.h"
 #include "core/teleoperation/purse.h"
-#include "tests/core/teleoperation/link.h"
+#include "tests/core/teleoperation/one_way.h"
 
 namespace tendon {
 
@@ -174,7 +174,7 @@ class Pair {
     return purse;
   }
 
-  void step(End& end, Link<Message>& in, Link<Message>& out, double scale) {
+  void step(End& end, OneWay<Message>& in, OneWay<Message>& out, double scale) {
     const double length = end.config.period * 1e-4;
     const Duration held = end.config.period * std::chrono::microseconds(100);
     if (end.periods > 0) {
@@ -226,8 +226,8 @@ class Pair {
   double least_sum = 0;                                            ///< J, W_l + (s_f/s_x) W_f
 
  private:
-  Link<Message> there_;
-  Link<Message> back_;
+  OneWay<Message> there_;
+  OneWay<Message> back_;
   int now_ = 0;
 };
 

@@ -15,7 +15,7 @@
 #include "core/control/limiter.h"
 #include "core/ledger/energy_ledger.h"
 #include "core/teleoperation/coupling.h"
-#include "tests/core/teleoperation/link.h"
+#include "tests/core/teleoperation/one_way.h"
 #include "tests/core/teleoperation/pair.h"
 
 namespace tendon {
@@ -124,7 +124,8 @@ class Port {
     if (applied.norm() > setup.motor) applied *= setup.motor / applied.norm();
     cut = !limited.reasons.empty();
     least_account = std::min(least_account, limiter->payable());
-    return coupling->message(applied, setup.measures_contact ? std::optional<Vec3>(outside()) : std::nullopt);
+    coupling->conclude(applied, setup.measures_contact ? std::optional<Vec3>(outside()) : std::nullopt);
+    return coupling->message();
   }
 
   PortSetup setup;
@@ -183,8 +184,8 @@ class Ports {
 
   Port leader;
   Port follower;
-  Link<PortState> there;  ///< leader → follower
-  Link<PortState> back;
+  OneWay<PortState> there;  ///< leader → follower
+  OneWay<PortState> back;
   bool cut_there = false;
   bool cut_back = false;
   PortState told_there{};  ///< newest sent
@@ -195,7 +196,7 @@ class Ports {
   double least_sum = 0;  ///< J, W_l + (s_f/s_x) W_f
 
  private:
-  void turn(Port& port, Link<PortState>& in, Link<PortState>& out, bool cut, PortState& told) {
+  void turn(Port& port, OneWay<PortState>& in, OneWay<PortState>& out, bool cut, PortState& told) {
     in.deliver(now, [&](const PortState& state) { port.coupling->receive(state, Port::at(now)); });
     told = port.step(now);
     for (int i = 0; i < copies && !cut && now % sent_each == 0; ++i) out.send(now, told);
@@ -238,7 +239,8 @@ class Played {
   void hear(const PortState& peer) { port.receive(peer, Port::at(now)); }
   Demand<3> step(const Vec3& x = Vec3::Zero(), std::uint32_t buttons = 0, bool ready = true) {
     const Demand<3> demand = port.command({Port::at(now), x, Vec3::Zero()}, buttons, ready);
-    told = port.message(Vec3::Zero(), std::nullopt);
+    port.conclude(Vec3::Zero(), std::nullopt);
+    told = port.message();
     ++now;
     return demand;
   }

@@ -5,11 +5,11 @@
 
 #include <cmath>
 #include <limits>
-#include <string>
 
 #include "core/base/rotation.h"
 #include "tests/core/control/adversary.h"
 #include "tests/support/dice.h"
+#include "tests/support/refusal.h"
 
 namespace tendon::pose_map_test {
 namespace {
@@ -77,18 +77,17 @@ TEST(PoseMap, ARotationOfAlmostLengthOneIsStillARotation) {
 }
 
 TEST(PoseMap, RefusesImpossibleConfigurations) {
-  const auto says = [](auto change) {
-    PoseMap::Config config;
-    change(config);
-    return complaint([&] { PoseMap map(config); });
-  };
-  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_NE(says([](auto& c) { c.position_scale = 0.009; }).find("position_scale = 0.009"), std::string::npos);
-  EXPECT_NE(says([](auto& c) { c.position_scale = kNan; }).find("position_scale"), std::string::npos);
-  EXPECT_NE(says([](auto& c) { c.force_scale = 101; }).find("force_scale = 101"), std::string::npos);
-  EXPECT_NE(says([](auto& c) { c.rotation.w = 2; }).find("rotation"), std::string::npos);
-  EXPECT_NE(says([](auto& c) { c.axes = {false, false, false}; }).find("axes"), std::string::npos);
-  EXPECT_EQ(says([](auto&) {}), "");
+  expect_refusals(PoseMap::Config(), Makes<PoseMap>(),
+                  {
+                      {"position_scale = 0.009", [](auto& c) { c.position_scale = 0.009; }},
+                      {"position_scale", [](auto& c) { c.position_scale = std::numeric_limits<double>::quiet_NaN(); }},
+                      {"force_scale = 101", [](auto& c) { c.force_scale = 101; }},
+                      {"rotation", [](auto& c) { c.rotation.w = 2; }},
+                      {"axes",
+                       [](auto& c) {
+                         c.axes = {false, false, false};
+                       }},
+                  });
 }
 
 }  // namespace

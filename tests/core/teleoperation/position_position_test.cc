@@ -2,15 +2,15 @@
 //
 // One end of a position–position coupling: its force, the round trip that it counts, and what it refuses. pair_test.cc
 // has two of them between devices.
-#include "core/teleoperation/position_position.h"
+#include "core/teleoperation/methods/position_position.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <limits>
-#include <string>
 
 #include "tests/core/control/adversary.h"
+#include "tests/support/refusal.h"
 
 namespace tendon::position_position_test {
 namespace {
@@ -33,6 +33,13 @@ TEST(PositionPosition, TheForceIsASpringAndTwoDampers) {
   const Vec3 expected = 400 * (Vec3(0.01, 0, -0.02) - x) + 1 * (Vec3(0.1, 0.2, 0) - v) - 4 * v;
   EXPECT_LT((demand.force - expected).norm(), 1e-12);
   EXPECT_EQ(demand.stiffness, (400 * Mat<3>::Identity()).eval());
+}
+
+TEST(PositionPosition, IsStretchedAsFarAsTheAccountPays) {
+  EXPECT_EQ(paid_stretch<3>(Vec3(0.03, 0, 0.04), 400, 0.5), Vec3(0.03, 0, 0.04)) << "½ K x² is 0.5 J";
+  const Vec3 paid = paid_stretch<3>(Vec3(0.03, 0, 0.04), 400, 0.125);
+  EXPECT_LT((paid - Vec3(0.015, 0, 0.02)).norm(), 1e-15);
+  EXPECT_EQ(paid_stretch<3>(Vec3(1, 0, 0), 400, -1), Vec3(Vec3::Zero()));
 }
 
 TEST(PositionPosition, BeforeTheFirstMessageThereIsOnlyDamping) {
@@ -178,20 +185,19 @@ TEST(PositionPosition, WhatIsWrongOrOldIsPassedOver) {
 }
 
 TEST(PositionPosition, RefusesImpossibleConfigurations) {
-  const auto says = [](auto change) {
-    auto config = config_of();
-    change(config);
-    return complaint([&] { PositionPosition<3> end(config); });
-  };
-  EXPECT_NE(says([](auto& c) { c.stiffness = 0; }).find("stiffness"), std::string::npos);
-  EXPECT_NE(says([](auto& c) { c.damping = -1; }).find("damping"), std::string::npos);
-  EXPECT_NE(says([](auto& c) { c.own_damping = kNan; }).find("own_damping"), std::string::npos);
-  EXPECT_EQ(says([](auto& c) { c.own_damping = 0; }),
-            "own_damping = 0: expected a number above 0 N·s/m, because adapt_to_delay lowers the stiffness to 2 B over "
-            "the round trip");
-  EXPECT_NE(says([](auto& c) { c.period = {}; }).find("period"), std::string::npos);
-  EXPECT_NE(says([](auto& c) { c.recovery = {}; }).find("recovery"), std::string::npos);
-  EXPECT_NE(says([](auto& c) { c.max_force = 0; }).find("max_force"), std::string::npos);
+  expect_refusals(config_of(), Makes<PositionPosition<3>>(),
+                  {
+                      {"stiffness", [](auto& c) { c.stiffness = 0; }},
+                      {"damping", [](auto& c) { c.damping = -1; }},
+                      {"own_damping", [](auto& c) { c.own_damping = kNan; }},
+                      {"own_damping = 0: expected a number above 0 N·s/m, because adapt_to_delay lowers the stiffness "
+                       "to 2 B over the "
+                       "round trip",
+                       [](auto& c) { c.own_damping = 0; }},
+                      {"period", [](auto& c) { c.period = {}; }},
+                      {"recovery", [](auto& c) { c.recovery = {}; }},
+                      {"max_force", [](auto& c) { c.max_force = 0; }},
+                  });
 }
 
 }  // namespace

@@ -13,6 +13,7 @@
 #include "core/ledger/energy_ledger.h"
 #include "tests/core/control/adversary.h"
 #include "tests/support/dice.h"
+#include "tests/support/refusal.h"
 
 namespace tendon::purse_test {
 namespace {
@@ -290,14 +291,16 @@ TEST(Purse, APeriodThatIsNoNumberMovesNothing) {
 }
 
 TEST(Purse, RefusesImpossibleConfigurations) {
-  const auto says = [](const Purse::Config& config) { return complaint([&] { Purse purse(config); }); };
-  EXPECT_EQ(says({.peers = 4}), "peers = 4: expected 1 to 3");
-  EXPECT_EQ(says({.peers = 0}), "peers = 0: expected 1 to 3");
-  EXPECT_EQ(says({.joule = {0}}), "joule = 0: expected 1e-6 to 1e6");
-  EXPECT_EQ(says({.max_account = 2e3}), "max_account = 2000: expected above 0 J, at most 1000 J");
-  EXPECT_EQ(says({.epoch = 0}), "epoch = 0: expected a number above 0");
-  EXPECT_NE(says({.start = 0}).find("start"), std::string::npos);
-  EXPECT_NE(says({.max_power = kNan}).find("max_power"), std::string::npos);
+  expect_refusals(Purse::Config(), Makes<Purse>(),
+                  {
+                      {"peers = 4: expected 1 to 3", [](auto& c) { c.peers = 4; }},
+                      {"peers = 0: expected 1 to 3", [](auto& c) { c.peers = 0; }},
+                      {"joule = 0: expected 1e-6 to 1e6", [](auto& c) { c.joule[0] = 0; }},
+                      {"max_account = 2000: expected above 0 J, at most 1000 J", [](auto& c) { c.max_account = 2e3; }},
+                      {"epoch = 0: expected a number above 0", [](auto& c) { c.epoch = 0; }},
+                      {"start", [](auto& c) { c.start = 0; }},
+                      {"max_power", [](auto& c) { c.max_power = kNan; }},
+                  });
 }
 
 TEST(SharedAccount, OnlyTheAolFamilyHasOne) {
@@ -308,7 +311,7 @@ TEST(SharedAccount, OnlyTheAolFamilyHasOne) {
                                .max_force = 5,
                                .environment_stiffness = 500,
                                .shared_account = true};
-    const std::string why = complaint([&] { Limiter limiter(config); });
+    const std::string why = thrown_by([&] { Limiter limiter(config); });
     const bool shares = law.law == Law::kAol || law.law == Law::kAolBox || law.law == Law::kAolPlus;
     if (shares) {
       EXPECT_EQ(why, "") << law.name;

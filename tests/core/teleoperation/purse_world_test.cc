@@ -16,8 +16,9 @@
 #include "core/control/limiter.h"
 #include "core/ledger/energy_ledger.h"
 #include "core/teleoperation/purse.h"
-#include "tests/core/teleoperation/link.h"
+#include "tests/core/teleoperation/one_way.h"
 #include "tests/support/dice.h"
+#include "tests/support/property_cases.h"
 
 namespace tendon::purse_world_test {
 namespace {
@@ -243,7 +244,7 @@ class World {
   double silence_ = 0;
   double scale_ = 1;
   std::vector<Port> ports_;
-  std::vector<Link<PurseMessage>> links_;
+  std::vector<OneWay<PurseMessage>> links_;
   int now_ = 0;
   Outcome outcome_;
 };
@@ -279,7 +280,7 @@ int found(Sabotage sabotage) {
 }
 
 TEST(PurseWorlds, NoAccountAndNoSumOfLedgersIsEverNegative) {
-  expect_no_world_gains(15 * TENDON_PROPERTY_CASES / 100, 2000);
+  expect_no_world_gains(15 * static_cast<std::uint64_t>(property_cases()) / 100, 2000);
 }
 
 // By hand: --gtest_also_run_disabled_tests --gtest_filter='*TenThousand*'

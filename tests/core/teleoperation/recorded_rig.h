@@ -5,8 +5,8 @@
 #include <fstream>
 #include <functional>
 
-#include "devices/simulated/recorded_motion.h"
 #include "devices/simulated/scripted_motion.h"
+#include "server/tables/recorded_motion.h"
 
 namespace tendon {
 

@@ -11,7 +11,7 @@
 
 #include "core/haptic_controller.h"
 #include "core/ledger/energy_ledger.h"
-#include "tests/core/teleoperation/link.h"
+#include "tests/core/teleoperation/one_way.h"
 #include "tests/core/teleoperation/ports.h"
 
 namespace tendon {
@@ -70,7 +70,9 @@ class Node {
   /// After the step: what one of its couplings sends.
   PortState message(std::size_t which) {
     const auto contact = setup.measures_contact ? std::optional<Vec3>(outside()) : std::nullopt;
-    return (*controller->couplings())[which].message(applied, contact);
+    Coupling& coupling = (*controller->couplings())[which];
+    coupling.conclude(applied, contact);
+    return coupling.message();
   }
   Coupling& coupling(std::size_t which = 0) { return (*controller->couplings())[which]; }
   const Purse::Settlement& settled(std::size_t which) { return controller->couplings()->settled(which); }
@@ -163,8 +165,8 @@ class Star {
     return shares;
   }
 
-  std::deque<Link<PortState>> there_;
-  std::deque<Link<PortState>> back_;
+  std::deque<OneWay<PortState>> there_;
+  std::deque<OneWay<PortState>> back_;
 };
 
 }  // namespace tendon

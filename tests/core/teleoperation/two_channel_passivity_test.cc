@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "core/teleoperation/two_channel_passivity.h"
+#include "core/teleoperation/methods/two_channel_passivity.h"
 
 #include <gtest/gtest.h>
 
@@ -10,7 +10,7 @@
 #include <numbers>
 #include <stdexcept>
 
-#include "tests/core/teleoperation/link.h"
+#include "tests/core/teleoperation/one_way.h"
 
 namespace tendon::two_channel_passivity_test {
 namespace {
@@ -30,10 +30,10 @@ Channel run(bool on, const Network& network, double drift_rate) {
   constexpr int kPeriods = 22000;
   PassivityLeader<1> leader({.max_damping = 1e9, .period = kPeriod});
   PassivityFollower<1> follower({.drift_rate = drift_rate, .period = kPeriod});
-  Link<LeaderMessage<1>> there(network);
+  OneWay<LeaderMessage<1>> there(network);
   Network other = network;
   other.seed += 1000;
-  Link<FollowerMessage<1>> back(other);
+  OneWay<FollowerMessage<1>> back(other);
   Vec<1> raw_velocity(0);
   Vec<1> raw_force(0);
   Channel channel;
@@ -103,8 +103,8 @@ TEST(TwoChannelPassivity, IsPassiveForEveryMotionAndEveryForce) {
     PassivityLeader<6> leader({.max_damping = 1e9, .period = kPeriod});
     PassivityFollower<6> follower({.drift_rate = dice.within(0, 10), .period = kPeriod});
     const Network bad{.delay = 10, .jitter = 20, .loss = 0.1, .seed = seed};
-    Link<LeaderMessage<6>> there(bad);
-    Link<FollowerMessage<6>> back(bad);
+    OneWay<LeaderMessage<6>> there(bad);
+    OneWay<FollowerMessage<6>> back(bad);
     const auto random = [&](double size) {
       Vec<6> v;
       for (double& component : v) component = dice.within(-size, size);
@@ -132,8 +132,8 @@ double least_with_a_spring(double booked_stiffness, double drift_rate) {
   constexpr double kStiffness = 1000;
   PassivityLeader<1> leader({.max_damping = 1e9, .period = kPeriod});
   PassivityFollower<1> follower({.drift_rate = drift_rate, .period = kPeriod, .stiffness = booked_stiffness});
-  Link<LeaderMessage<1>> there({.delay = 20, .jitter = 20, .loss = 0.7, .seed = 1});
-  Link<FollowerMessage<1>> back({.delay = 20, .jitter = 20, .loss = 0.7, .seed = 2});
+  OneWay<LeaderMessage<1>> there({.delay = 20, .jitter = 20, .loss = 0.7, .seed = 1});
+  OneWay<FollowerMessage<1>> back({.delay = 20, .jitter = 20, .loss = 0.7, .seed = 2});
   double energy = 0;
   double least = 0;
   double x = 0;

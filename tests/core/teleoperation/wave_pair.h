@@ -7,8 +7,8 @@
 #include <functional>
 #include <utility>
 
-#include "core/teleoperation/wave_variables.h"
-#include "tests/core/teleoperation/link.h"
+#include "core/teleoperation/methods/wave_variables.h"
+#include "tests/core/teleoperation/one_way.h"
 #include "tests/core/teleoperation/pair.h"
 
 namespace tendon {
@@ -89,8 +89,8 @@ class WavePair {
   double least_sum = 0;  ///< J, that the ports together have taken in
 
  private:
-  Link<WaveMessage<1>> there_;
-  Link<WaveMessage<1>> back_;
+  OneWay<WaveMessage<1>> there_;
+  OneWay<WaveMessage<1>> back_;
   int now_ = 0;
 };
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "core/teleoperation/wave_variables.h"
+#include "core/teleoperation/methods/wave_variables.h"
 
 #include <gtest/gtest.h>
 
@@ -9,7 +9,7 @@
 #include <numbers>
 #include <stdexcept>
 
-#include "tests/core/teleoperation/link.h"
+#include "tests/core/teleoperation/one_way.h"
 
 namespace tendon::wave_variables_test {
 namespace {
@@ -29,10 +29,10 @@ template <int N>
 Channel run(double impedance, const Network& network, Duration smoothing, bool clipped) {
   WavePort<N> leader({.impedance = impedance, .period = kPeriod, .smoothing = smoothing});
   WavePort<N> follower({.impedance = impedance, .period = kPeriod, .smoothing = smoothing});
-  Link<WaveMessage<N>> there(network);
+  OneWay<WaveMessage<N>> there(network);
   Network other = network;
   other.seed += 1000;
-  Link<WaveMessage<N>> back(other);
+  OneWay<WaveMessage<N>> back(other);
   Dice dice(network.seed + 77);
   Channel channel;
   double energy = 0;

@@ -10,7 +10,7 @@
 
 #include "core/base/rotation.h"
 #include "core/haptic_controller.h"
-#include "tests/core/teleoperation/link.h"
+#include "tests/core/teleoperation/one_way.h"
 #include "tests/core/teleoperation/pair.h"
 
 namespace tendon {
@@ -92,7 +92,7 @@ class WholePort {
     HapticController::Config config;
     config.limiter = setup.limiter;
     config.limiter.shared_account = setup.coupling.purse || setup.coupling.method == CouplingMethod::kWaves;
-    config.rotation = {.friction = kTurnFriction, .max_torque = 1};
+    config.rotation = {.friction = kTurnFriction, .max_torque = 1, .max_slew = std::numeric_limits<double>::infinity()};
     config.grip = {.friction = kGripFriction, .arm = kFingerArm, .max_force = 20};
     config.max_force = 20;
     config.max_slew = std::numeric_limits<double>::infinity();
@@ -124,7 +124,8 @@ class WholePort {
     torque = last.turn()->torque;
     grip_force = last.grip()->force;
     least_account = std::min({least_account, last.energy, last.grip()->energy});
-    return coupling().message(force, std::nullopt, torque, grip_force);
+    coupling().conclude(force, std::nullopt, torque, grip_force);
+    return coupling().message();
   }
 
   WholeSetup setup;
@@ -218,14 +219,14 @@ class WholePorts {
 
   WholePort leader;
   WholePort follower;
-  Link<PortState> there;  ///< leader → follower
-  Link<PortState> back;
+  OneWay<PortState> there;  ///< leader → follower
+  OneWay<PortState> back;
   bool cut = false;  ///< both ways
   int now = 0;
   double least_sum = 0;  ///< J, of wrenches or of grippers, in joules of the leader
 
  private:
-  void turn(WholePort& port, Link<PortState>& in, Link<PortState>& out) {
+  void turn(WholePort& port, OneWay<PortState>& in, OneWay<PortState>& out) {
     in.deliver(now, [&](const PortState& state) { port.coupling().receive(state, WholePort::at(now)); });
     const PortState told = port.step(now);
     if (!cut) out.send(now, told);

@@ -10,17 +10,13 @@
 
 #include "tests/devices/falcon/fake_firmware.h"
 #include "tests/devices/falcon/memory_pipe.h"
+#include "tests/support/refusal.h"
 
 namespace tendon::falcon::firmware_test {
 namespace {
 
 std::string refusal(std::vector<std::uint8_t> bytes, UnknownFirmware unknown) {
-  try {
-    check_firmware(std::move(bytes), "a.bin", unknown);
-    return "";
-  } catch (const std::runtime_error& refused) {
-    return refused.what();
-  }
+  return thrown_by<std::runtime_error>([&] { check_firmware(std::move(bytes), "a.bin", unknown); });
 }
 
 TEST(FalconFirmware, AFileOfTheWrongSizeIsNone) {

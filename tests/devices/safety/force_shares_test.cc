@@ -7,9 +7,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <stdexcept>
 
 #include "tests/support/dice.h"
+#include "tests/support/refusal.h"
 
 namespace tendon::force_shares_test {
 namespace {
@@ -209,12 +209,8 @@ TEST(Workspace, HasNoStepsAnywhere) {
 
 TEST(ForceShares, RefuseImpossibleValuesNamingTheField) {
   const auto refused = [](const char* field, const auto& make) {
-    try {
-      make();
-      ADD_FAILURE() << field << " was taken";
-    } catch (const std::invalid_argument& problem) {
-      EXPECT_NE(std::string(problem.what()).find(field), std::string::npos) << problem.what();
-    }
+    const std::string message = thrown_by(make);
+    EXPECT_NE(message.find(field), std::string::npos) << message << "\nexpected: " << field;
   };
   for (const double bad : {0.0, -1.0, kNaN, std::numeric_limits<double>::infinity()}) {
     refused("force_limit.max", [bad] { ForceLimit({.max = bad}); });

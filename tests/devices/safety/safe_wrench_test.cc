@@ -5,13 +5,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <stdexcept>
-#include <string>
 
 #include "core/base/rotation.h"
 #include "devices/safety/safe_device.h"
 #include "tests/devices/safety/safety_rig.h"
 #include "tests/support/dice.h"
+#include "tests/support/refusal.h"
 
 namespace tendon::safe_wrench_test {
 namespace {
@@ -222,23 +221,17 @@ TEST(SafeWrench, SaysItsLimitsAsItsOwnWhereThereIsAMotor) {
 }
 
 TEST(SafeWrench, RefusesImpossibleValuesNamingTheField) {
-  const auto refused = [](const std::string& field, const auto& change) {
-    SafeDevice::Config config;
-    change(config);
-    Puppet puppet;
-    try {
-      const SafeDevice device(config, puppet);
-      ADD_FAILURE() << field << " was taken";
-    } catch (const std::invalid_argument& problem) {
-      EXPECT_EQ(std::string(problem.what()).rfind(field, 0), 0U) << problem.what();
-    }
-  };
-  refused("arming.rest_torque", [](auto& config) { config.arming.rest_torque = 0; });
-  refused("torque_limit.max", [](auto& config) { config.torque_limit.emplace(); });
-  refused("torque_growth_limit.rate", [](auto& config) { config.torque_growth_limit.emplace(); });
-  refused("turn_trip.max", [](auto& config) { config.turn_trip.emplace(); });
-  refused("grip_limit.max", [](auto& config) { config.grip_limit.emplace(); });
-  refused("grip_growth_limit.rate", [](auto& config) { config.grip_growth_limit.emplace(); });
+  Puppet puppet;
+  const auto make = [&puppet](const SafeDevice::Config& config) { const SafeDevice device(config, puppet); };
+  expect_refusals(SafeDevice::Config(), make,
+                  {
+                      {"arming.rest_torque", [](auto& c) { c.arming.rest_torque = 0; }},
+                      {"torque_limit.max", [](auto& c) { c.torque_limit.emplace(); }},
+                      {"torque_growth_limit.rate", [](auto& c) { c.torque_growth_limit.emplace(); }},
+                      {"turn_trip.max", [](auto& c) { c.turn_trip.emplace(); }},
+                      {"grip_limit.max", [](auto& c) { c.grip_limit.emplace(); }},
+                      {"grip_growth_limit.rate", [](auto& c) { c.grip_growth_limit.emplace(); }},
+                  });
 }
 
 }  // namespace

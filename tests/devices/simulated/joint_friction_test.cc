@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <string>
 #include <vector>
 
 #include <Eigen/Geometry>
@@ -14,6 +13,7 @@
 
 #include "devices/simulated/simulated_device.h"
 #include "tests/devices/device_bench.h"
+#include "tests/support/refusal.h"
 
 namespace tendon::joint_friction_test {
 namespace {
@@ -149,14 +149,14 @@ TEST(JointFriction, ItsLawHoldsExactlyWithTheMeanVelocityOfEachSubstep) {
     Dice dice(5);
     int stood = 0;
     for (int i = 0; i < 5000; ++i) {
-      const Vec3 coulomb = (dice.vector(0.05) + Vec3::Constant(0.05)).cwiseAbs();
+      const Vec3 coulomb = (random_vector(dice, 0.05) + Vec3::Constant(0.05)).cwiseAbs();
       const JointFriction friction({.mechanism = kind, .coulomb = coulomb});
       const double h = 50e-6;
-      const double mass = dice.uniform(0.02, 0.5);
-      const Vec3 at = dice.vector(0.025);
-      const Vec3 v0 = dice.vector(dice.chance(0.5) ? 1e-4 : 0.1);
-      const Vec3 push = dice.vector(dice.chance(0.5) ? 0.5 : 5);
-      const JointFriction::Impetus impetus{mass * v0 + h / 2 * push, mass * dice.uniform(1, 1.1), mass, push};
+      const double mass = dice.within(0.02, 0.5);
+      const Vec3 at = random_vector(dice, 0.025);
+      const Vec3 v0 = random_vector(dice, dice.chance(0.5) ? 1e-4 : 0.1);
+      const Vec3 push = random_vector(dice, dice.chance(0.5) ? 0.5 : 5);
+      const JointFriction::Impetus impetus{mass * v0 + h / 2 * push, mass * dice.within(1, 1.1), mass, push};
       const auto slide = friction.step(at, v0, impetus, h);
       const Mat3 jacobian = Mechanism(kind).jacobian(at);
       const Vec3 lost = impetus.momentum - impetus.resistance * slide.mean;
@@ -189,9 +189,10 @@ TEST(JointFriction, IsNowhereAndInNoDirectionLessThanItsLowerBound) {
     double closest = std::numeric_limits<double>::infinity();
     Dice dice(6);
     for (int i = 0; i < 20'000; ++i) {
-      const Vec3 at = dice.vector(1.2 * mechanism.reach());
+      const Vec3 at = random_vector(dice, 1.2 * mechanism.reach());
       const Mat3 jacobian = mechanism.jacobian(at);
-      const Vec3 v = i % 4 == 3 ? dice.vector(1).normalized() : Vec3(jacobian.inverse().col(i % 4).normalized());
+      const Vec3 v =
+          i % 4 == 3 ? random_vector(dice, 1).normalized() : Vec3(jacobian.inverse().col(i % 4).normalized());
       const Vec3 turning = jacobian * v;
       const double coulomb = config.coulomb.dot(turning.cwiseAbs());
       const double viscous = config.viscous.dot(turning.cwiseAbs2());
@@ -245,21 +246,19 @@ TEST(JointFriction, OfADeviceTheLeastFrictionAddsUp) {
 }
 
 TEST(JointFriction, RefusesWhatIsNoFriction) {
-  const double nan = std::numeric_limits<double>::quiet_NaN();
-  const auto refuses = [](const JointFriction::Config& config, const std::string& says) {
-    try {
-      const JointFriction friction(config);
-      ADD_FAILURE() << "accepted; should have said: " << says;
-    } catch (const std::invalid_argument& error) {
-      EXPECT_EQ(std::string(error.what()).rfind(says, 0), 0U) << error.what();
-    }
-  };
-  refuses({.mechanism = kPhantom}, "joint_friction.coulomb = 0: expected friction in one of the joints");
-  refuses({.mechanism = kPhantom, .coulomb = Vec3(1, -1, 1)}, "joint_friction.coulomb[1] = -1: expected");
-  refuses({.mechanism = kPhantom, .viscous = Vec3(1, 1, nan)}, "joint_friction.viscous[2] = nan: expected");
-  refuses({.mechanism = kPhantom, .centre = Vec3(0, nan, 0), .coulomb = Vec3(1, 1, 1)},
-          "joint_friction.centre.y = nan");
-  refuses({.mechanism = Mechanism::Arm{0.1, 0}, .coulomb = Vec3(1, 1, 1)}, "forearm = 0: expected 0.01 to 10 m");
+  expect_refusals(JointFriction::Config{.mechanism = kPhantom, .coulomb = Vec3(1, 1, 1), .viscous = Vec3(1, 1, 1)},
+                  Makes<JointFriction>(),
+                  {
+                      {"joint_friction.coulomb = 0: expected friction in one of the joints",
+                       [](auto& c) { c = {.mechanism = kPhantom}; }},
+                      {"joint_friction.coulomb[1] = -1: expected", [](auto& c) { c.coulomb[1] = -1; }},
+                      {"joint_friction.viscous[2] = nan: expected", [](auto& c) { c.viscous[2] = NAN; }},
+                      {"joint_friction.centre.y = nan", [](auto& c) { c.centre.y() = NAN; }},
+                      {"forearm = 0: expected 0.01 to 10 m",
+                       [](auto& c) {
+                         c.mechanism = Mechanism::Arm{0.1, 0};
+                       }},
+                  });
 }
 
 }  // namespace

@@ -23,8 +23,8 @@ constexpr Mechanism::Arm kUneven{.upper_arm = 0.215, .forearm = 0.17};
 std::vector<Mechanism::Kind> all_kinds() { return {Mechanism::Falcon{}, kPhantom, kUneven}; }
 
 Vec3 anywhere(Dice& dice, double reach) {
-  Vec3 x = dice.vector(1);
-  while (x.norm() > 1) x = dice.vector(1);
+  Vec3 x = random_vector(dice, 1);
+  while (x.norm() > 1) x = random_vector(dice, 1);
   return reach * x;
 }
 
@@ -41,7 +41,7 @@ TEST(Mechanism, AnArmsJacobianInvertsTheDerivativeOfItsHandle) {
     Dice dice(1);
     int within = 0;
     for (int i = 0; i < 4000; ++i) {
-      const Vec3 q = dice.vector(0.5);
+      const Vec3 q = random_vector(dice, 0.5);
       const Vec3 x = handle_of(arm, q);
       if (x.norm() > mechanism.reach()) continue;
       ++within;
@@ -63,7 +63,7 @@ TEST(Mechanism, AnArmsAnglesAreThoseThatCarryItsHandle) {
     Dice dice(5);
     int within = 0;
     for (int i = 0; i < 4000; ++i) {
-      const Vec3 q = dice.vector(0.5);
+      const Vec3 q = random_vector(dice, 0.5);
       const Vec3 x = handle_of(arm, q);
       if (x.norm() > mechanism.reach()) continue;
       ++within;
@@ -79,7 +79,7 @@ TEST(Mechanism, TheFalconsAnglesAreThoseOfItsKinematics) {
   const Mechanism mechanism(Mechanism::Falcon{});
   Dice dice(6);
   for (int i = 0; i < 100; ++i) {
-    const Vec3 x = dice.vector(0.025);
+    const Vec3 x = random_vector(dice, 0.025);
     ASSERT_EQ(mechanism.angles(x), falcon::pose_at(falcon::kCentre + x)->angles);
   }
 }

@@ -35,33 +35,33 @@ struct World {
   bool pushes_along = false;  ///< the adversary: always in the direction of the motion
 
   explicit World(Dice& dice) {
-    config.mass = dice.uniform(0.02, 0.5);
-    config.start_velocity = dice.vector(0.3);
-    if (dice.chance(0.7)) config.viscous_friction = std::pow(10.0, dice.uniform(-3, 0.5));
-    if (dice.chance(0.7)) config.coulomb_friction = std::pow(10.0, dice.uniform(-3, 0));
-    if (dice.chance(0.5)) config.max_force = dice.uniform(0.5, 10);
+    config.mass = dice.within(0.02, 0.5);
+    config.start_velocity = random_vector(dice, 0.3);
+    if (dice.chance(0.7)) config.viscous_friction = std::pow(10.0, dice.within(-3, 0.5));
+    if (dice.chance(0.7)) config.coulomb_friction = std::pow(10.0, dice.within(-3, 0));
+    if (dice.chance(0.5)) config.max_force = dice.within(0.5, 10);
     if (dice.chance(0.7)) {
-      ScriptedMotion::Script script = ScriptedMotion::Sine{.amplitude = dice.uniform(0, 0.05),
-                                                           .frequency = dice.uniform(0.1, 10),
-                                                           .centre = dice.vector(0.02),
-                                                           .direction = dice.vector(1)};
+      ScriptedMotion::Script script = ScriptedMotion::Sine{.amplitude = dice.within(0, 0.05),
+                                                           .frequency = dice.within(0.1, 10),
+                                                           .centre = random_vector(dice, 0.02),
+                                                           .direction = random_vector(dice, 1)};
       if (dice.chance(0.5)) {
-        script = ScriptedMotion::RampHold{.from = dice.vector(0.05),
-                                          .to = dice.vector(0.05),
-                                          .ramp = from_seconds(dice.uniform(0.01, 0.2)),
-                                          .hold = from_seconds(dice.uniform(0, 0.1))};
+        script = ScriptedMotion::RampHold{.from = random_vector(dice, 0.05),
+                                          .to = random_vector(dice, 0.05),
+                                          .ramp = from_seconds(dice.within(0.01, 0.2)),
+                                          .hold = from_seconds(dice.within(0, 0.1))};
       }
-      config.hand = OperatorHand::Config{.stiffness = std::pow(10.0, dice.uniform(1, 6)),
-                                         .damping = dice.chance(0.2) ? 0 : std::pow(10.0, dice.uniform(-1, 2)),
-                                         .mass = dice.chance(0.2) ? 0 : dice.uniform(0.001, 2),
+      config.hand = OperatorHand::Config{.stiffness = std::pow(10.0, dice.within(1, 6)),
+                                         .damping = dice.chance(0.2) ? 0 : std::pow(10.0, dice.within(-1, 2)),
+                                         .mass = dice.chance(0.2) ? 0 : dice.within(0.001, 2),
                                          .motion = ScriptedMotion(script)};
     }
     pushes_along = dice.chance(0.3);
     if (dice.chance(0.1)) put_in_joints(dice);  // ten times as dear as the others
     if (dice.chance(0.3)) {
-      config.structural_mode = {.handle_mass = config.mass * dice.uniform(0.05, 0.95),
-                                .stiffness = std::pow(10.0, dice.uniform(2, 5)),
-                                .damping = dice.chance(0.2) ? 0 : std::pow(10.0, dice.uniform(-2, 1))};
+      config.structural_mode = {.handle_mass = config.mass * dice.within(0.05, 0.95),
+                                .stiffness = std::pow(10.0, dice.within(2, 5)),
+                                .damping = dice.chance(0.2) ? 0 : std::pow(10.0, dice.within(-2, 1))};
     } else if (dice.chance(0.5)) {
       put_among_walls(dice);
     }
@@ -69,26 +69,26 @@ struct World {
 
   void put_among_walls(Dice& dice) {
     auto& environment = config.environment.emplace();
-    if (dice.chance(0.5)) environment.damping = dice.uniform(0, 5);
-    if (dice.chance(0.5)) environment.friction = dice.uniform(0, 1);
+    if (dice.chance(0.5)) environment.damping = dice.within(0, 5);
+    if (dice.chance(0.5)) environment.friction = dice.within(0, 1);
     for (int i = 0; i < 3; ++i) {
-      environment.walls.push_back({.point = dice.vector(0.02),
-                                   .normal = dice.vector(1),
-                                   .stiffness = std::pow(10.0, dice.uniform(1, 4)),
-                                   .damping = dice.uniform(0, 5),
-                                   .friction = dice.uniform(0, 1),
-                                   .speed = dice.uniform(-0.1, 0.1),
-                                   .from = from_seconds(dice.uniform(0, 0.1)),
-                                   .until = from_seconds(dice.uniform(0.1, 0.3))});
+      environment.walls.push_back({.point = random_vector(dice, 0.02),
+                                   .normal = random_vector(dice, 1),
+                                   .stiffness = std::pow(10.0, dice.within(1, 4)),
+                                   .damping = dice.within(0, 5),
+                                   .friction = dice.within(0, 1),
+                                   .speed = dice.within(-0.1, 0.1),
+                                   .from = from_seconds(dice.within(0, 0.1)),
+                                   .until = from_seconds(dice.within(0.1, 0.3))});
     }
   }
 
   void put_in_joints(Dice& dice) {
-    JointFriction::Config joints{.mechanism = Mechanism::Falcon{}, .centre = dice.vector(0.02)};
+    JointFriction::Config joints{.mechanism = Mechanism::Falcon{}, .centre = random_vector(dice, 0.02)};
     if (dice.chance(0.5)) {
-      joints.mechanism = Mechanism::Arm{.upper_arm = dice.uniform(0.05, 0.3), .forearm = dice.uniform(0.05, 0.3)};
+      joints.mechanism = Mechanism::Arm{.upper_arm = dice.within(0.05, 0.3), .forearm = dice.within(0.05, 0.3)};
     }
-    const auto each = [&dice] { return std::pow(10.0, dice.uniform(-5, -1)); };
+    const auto each = [&dice] { return std::pow(10.0, dice.within(-5, -1)); };
     joints.coulomb = {each(), each(), each()};
     if (dice.chance(0.5)) joints.viscous = {each() / 10, each() / 10, each() / 10};
     config.joint_friction = joints;
@@ -109,10 +109,10 @@ TEST(SimulatedDeviceEnergy, HandAndWallsNeverDoLessWorkThanEquation5Demands) {
     double turnover = 1;
     for (int step = 0; step < 100; ++step) {
       const Vec3 wish =
-          world.pushes_along ? Vec3(bench.truth().velocity.normalized() * dice.uniform(0, 5)) : dice.vector(5);
+          world.pushes_along ? Vec3(bench.truth().velocity.normalized() * dice.within(0, 5)) : random_vector(dice, 5);
       const Vec3 applied = bench.device().apply(wish);
       const Vec3 before = motor_side(bench.truth());
-      const Duration interval(static_cast<Duration::rep>(dice.uniform(1e4, 2e6)));
+      const Duration interval(static_cast<Duration::rep>(dice.within(1e4, 2e6)));
       bench.wait(interval);
       const Vec3 dx = motor_side(bench.truth()) - before;
       equation.add(applied, dx, interval);
@@ -143,7 +143,7 @@ TEST(SimulatedDeviceEnergy, NothingIsLostWhereNothingRubs) {
   double given_out = 0;
   for (int i = 0; i < 2000; ++i) {
     const Vec3 before = bench.truth().position;
-    const Vec3 applied = bench.device().apply(dice.vector(5));
+    const Vec3 applied = bench.device().apply(random_vector(dice, 5));
     bench.wait(1ms);
     given_out += applied.dot(bench.truth().position - before);
     ASSERT_NEAR(bench.truth().hand_work + given_out + at_start, bench.truth().kinetic_energy, 1e-12);

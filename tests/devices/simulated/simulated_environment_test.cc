@@ -6,12 +6,11 @@
 #include <chrono>
 #include <cmath>
 #include <numbers>
-#include <stdexcept>
-#include <string>
 #include <utility>
 #include <vector>
 
 #include "tests/devices/device_bench.h"
+#include "tests/support/refusal.h"
 
 namespace tendon::simulated_environment_test {
 namespace {
@@ -131,31 +130,22 @@ TEST(SimulatedEnvironment, NothingIsThereBeforeItsTimeOrBesideItsSurface) {
 }
 
 TEST(SimulatedEnvironment, WhatIsWrongWithItIsNamed) {
-  const auto says = [](void (*spoil)(SimulatedDevice::Config&)) {
-    auto config = among({kFloor});
-    spoil(config);
-    try {
-      const SimulatedDevice device(config);
-    } catch (const std::invalid_argument& error) {
-      return std::string(error.what()).substr(0, std::string(error.what()).find(" ="));
-    }
-    return std::string("nothing");
-  };
-  using Config = SimulatedDevice::Config;
-  EXPECT_EQ(says([](Config& /*config*/) {}), "nothing");
-  EXPECT_EQ(says([](Config& c) { c.environment->damping = -1; }), "environment.damping");
-  EXPECT_EQ(says([](Config& c) { c.environment->friction = NAN; }), "environment.friction");
-  EXPECT_EQ(says([](Config& c) { c.environment->walls.resize(17, kFloor); }), "environment.walls");
-  EXPECT_EQ(says([](Config& c) { c.environment->walls[0].point.y() = NAN; }), "environment.wall.point.y");
-  EXPECT_EQ(says([](Config& c) { c.environment->walls[0].normal.setZero(); }), "environment.wall.normal");
-  EXPECT_EQ(says([](Config& c) { c.environment->walls[0].stiffness = 0; }), "environment.wall.stiffness");
-  EXPECT_EQ(says([](Config& c) { c.environment->walls[0].damping = -1; }), "environment.wall.damping");
-  EXPECT_EQ(says([](Config& c) { c.environment->walls[0].friction = -1; }), "environment.wall.friction");
-  EXPECT_EQ(says([](Config& c) { c.environment->walls[0].speed = NAN; }), "environment.wall.speed");
-  EXPECT_EQ(says([](Config& c) { c.environment->walls[0].from = -1ms; }), "environment.wall.from");
-  EXPECT_EQ(says([](Config& c) { c.environment->walls[0].until = 0ms; }), "environment.wall.until");
-  EXPECT_EQ(says([](Config& c) { c.structural_mode = {.handle_mass = 0.05, .stiffness = 100}; }),
-            "structural_mode.handle_mass");
+  expect_refusals(among({kFloor}), Makes<SimulatedDevice>(),
+                  {
+                      {"environment.damping = ", [](auto& c) { c.environment->damping = -1; }},
+                      {"environment.friction = ", [](auto& c) { c.environment->friction = NAN; }},
+                      {"environment.walls = ", [](auto& c) { c.environment->walls.resize(17, kFloor); }},
+                      {"environment.wall.point.y = ", [](auto& c) { c.environment->walls[0].point.y() = NAN; }},
+                      {"environment.wall.normal = ", [](auto& c) { c.environment->walls[0].normal.setZero(); }},
+                      {"environment.wall.stiffness = ", [](auto& c) { c.environment->walls[0].stiffness = 0; }},
+                      {"environment.wall.damping = ", [](auto& c) { c.environment->walls[0].damping = -1; }},
+                      {"environment.wall.friction = ", [](auto& c) { c.environment->walls[0].friction = -1; }},
+                      {"environment.wall.speed = ", [](auto& c) { c.environment->walls[0].speed = NAN; }},
+                      {"environment.wall.from = ", [](auto& c) { c.environment->walls[0].from = -1ms; }},
+                      {"environment.wall.until = ", [](auto& c) { c.environment->walls[0].until = 0ms; }},
+                      {"structural_mode.handle_mass = ",
+                       [](auto& c) { c.structural_mode = {.handle_mass = 0.05, .stiffness = 100}; }},
+                  });
 }
 
 }  // namespace

@@ -6,10 +6,9 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <stdexcept>
-#include <string>
 
 #include "tests/devices/device_bench.h"
+#include "tests/support/refusal.h"
 
 namespace tendon::simulated_rotation_test {
 namespace {
@@ -113,9 +112,9 @@ TEST(SimulatedRotation, AHandSwingsItAsASpringDoesAtAnyAngle) {
 TEST(SimulatedRotation, AHandBringsItWhereItWantsFromAnySide) {
   Dice dice(3);
   for (int i = 0; i < 50; ++i) {
-    const Vec3 wanted = dice.vector(1.8);
+    const Vec3 wanted = random_vector(dice, 1.8);
     auto config = held_handle(wanted, 3e-3);
-    config.start = dice.vector(1.8);
+    config.start = random_vector(dice, 1.8);
     Spindle spindle(config);
     spindle.turn(Vec3::Zero(), 20'000);
     EXPECT_LT(turn_to(spindle.truth(), wanted).norm(), 1e-6) << i;
@@ -155,24 +154,24 @@ struct World {
   bool pushes_along = false;  ///< the adversary: always in the direction of the turn
 
   explicit World(Dice& dice) {
-    config.inertia = std::pow(10.0, dice.uniform(-6, -3));
-    config.start = dice.vector(2);
-    config.start_angular_velocity = dice.vector(10);
-    if (dice.chance(0.7)) config.viscous_friction = std::pow(10.0, dice.uniform(-6, -2));
-    if (dice.chance(0.7)) config.coulomb_friction = std::pow(10.0, dice.uniform(-5, -2));
+    config.inertia = std::pow(10.0, dice.within(-6, -3));
+    config.start = random_vector(dice, 2);
+    config.start_angular_velocity = random_vector(dice, 10);
+    if (dice.chance(0.7)) config.viscous_friction = std::pow(10.0, dice.within(-6, -2));
+    if (dice.chance(0.7)) config.coulomb_friction = std::pow(10.0, dice.within(-5, -2));
     if (dice.chance(0.7)) {
-      ScriptedMotion::Script script = ScriptedMotion::Sine{.amplitude = dice.uniform(0, 1.5),
-                                                           .frequency = dice.uniform(0.1, 10),
-                                                           .centre = dice.vector(0.5),
-                                                           .direction = dice.vector(1)};
+      ScriptedMotion::Script script = ScriptedMotion::Sine{.amplitude = dice.within(0, 1.5),
+                                                           .frequency = dice.within(0.1, 10),
+                                                           .centre = random_vector(dice, 0.5),
+                                                           .direction = random_vector(dice, 1)};
       if (dice.chance(0.5)) {
-        script = ScriptedMotion::RampHold{.from = dice.vector(1.5),
-                                          .to = dice.vector(1.5),
-                                          .ramp = from_seconds(dice.uniform(0.01, 0.2)),
-                                          .hold = from_seconds(dice.uniform(0, 0.1))};
+        script = ScriptedMotion::RampHold{.from = random_vector(dice, 1.5),
+                                          .to = random_vector(dice, 1.5),
+                                          .ramp = from_seconds(dice.within(0.01, 0.2)),
+                                          .hold = from_seconds(dice.within(0, 0.1))};
       }
-      config.hand = Hand{.stiffness = std::pow(10.0, dice.uniform(-2, 3)),
-                         .damping = dice.chance(0.2) ? 0 : std::pow(10.0, dice.uniform(-4, -1)),
+      config.hand = Hand{.stiffness = std::pow(10.0, dice.within(-2, 3)),
+                         .damping = dice.chance(0.2) ? 0 : std::pow(10.0, dice.within(-4, -1)),
                          .motion = ScriptedMotion(script)};
     }
     pushes_along = dice.chance(0.3);
@@ -191,10 +190,10 @@ TEST(SimulatedRotation, WorkOfTheHandIsNeverLessThanTheLedgerDemands) {
     double turnover = 0;
     Vec3 torque = Vec3::Zero();
     for (int step = 0; step < 300; ++step) {
-      if (step % 10 == 0) torque = dice.vector(0.2);
+      if (step % 10 == 0) torque = random_vector(dice, 0.2);
       if (world.pushes_along) torque = spindle.truth().angular_velocity.normalized() * 0.1;
       const Quat before = spindle.truth().orientation;
-      const double h = dice.uniform(20e-6, 50e-6);
+      const double h = dice.within(20e-6, 50e-6);
       spindle.turn(torque, 1, h);
       const Vec3 turned = turn_between(before, spindle.truth().orientation);
       ledger += -torque.dot(turned) + world.config.coulomb_friction.value_or(0) * turned.norm() +
@@ -260,25 +259,18 @@ TEST(SimulatedRotation, StartsWhereTheHandIsOrWhereItIsTold) {
 }
 
 TEST(SimulatedRotation, RefusesImpossibleValuesNamingTheField) {
-  const auto refused = [](const std::string& says, const auto& change) {
-    auto config = held_handle(Vec3::Zero());
-    change(config);
-    try {
-      const SimulatedRotation rotation(config);
-      ADD_FAILURE() << "accepted; should have said: " << says;
-    } catch (const std::invalid_argument& error) {
-      EXPECT_EQ(std::string(error.what()).rfind(says, 0), 0U) << error.what();
-    }
-  };
-  refused("rotation.inertia = 0", [](auto& config) { config.inertia = 0; });
-  refused("rotation.start", [](auto& config) { config.start = Vec3(0, NAN, 0); });
-  refused("rotation.start_angular_velocity", [](auto& config) { config.start_angular_velocity.z() = INFINITY; });
-  refused("rotation.viscous_friction = 0", [](auto& config) { config.viscous_friction = 0; });
-  refused("rotation.coulomb_friction = -1", [](auto& config) { config.coulomb_friction = -1; });
-  refused("rotation.max_torque = 0", [](auto& config) { config.max_torque = 0; });
-  refused("rotation.encoder_step = 0", [](auto& config) { config.encoder_step = 0; });
-  refused("rotation.hand.stiffness = 0", [](auto& config) { config.hand->stiffness = 0; });
-  refused("rotation.hand.damping = -1", [](auto& config) { config.hand->damping = -1; });
+  expect_refusals(held_handle(Vec3::Zero()), Makes<SimulatedRotation>(),
+                  {
+                      {"rotation.inertia = 0", [](auto& c) { c.inertia = 0; }},
+                      {"rotation.start", [](auto& c) { c.start = Vec3(0, NAN, 0); }},
+                      {"rotation.start_angular_velocity", [](auto& c) { c.start_angular_velocity.z() = INFINITY; }},
+                      {"rotation.viscous_friction = 0", [](auto& c) { c.viscous_friction = 0; }},
+                      {"rotation.coulomb_friction = -1", [](auto& c) { c.coulomb_friction = -1; }},
+                      {"rotation.max_torque = 0", [](auto& c) { c.max_torque = 0; }},
+                      {"rotation.encoder_step = 0", [](auto& c) { c.encoder_step = 0; }},
+                      {"rotation.hand.stiffness = 0", [](auto& c) { c.hand->stiffness = 0; }},
+                      {"rotation.hand.damping = -1", [](auto& c) { c.hand->damping = -1; }},
+                  });
 }
 
 }  // namespace

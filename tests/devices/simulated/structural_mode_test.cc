@@ -4,14 +4,13 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
-#include <limits>
 #include <numbers>
-#include <string>
 
 #include <Eigen/Eigenvalues>
 
 #include "devices/simulated/simulated_device.h"
 #include "tests/devices/device_bench.h"
+#include "tests/support/refusal.h"
 
 namespace tendon::structural_mode_test {
 namespace {
@@ -146,7 +145,7 @@ TEST(StructuralMode, StoresWhatItHasTakenIn) {
   double most = 0;
   for (int i = 0; i < 500; ++i) {
     const Vec3 before = bench.truth().position + bench.truth().deflection;
-    const Vec3 force = bench.device().apply(dice.vector(5));
+    const Vec3 force = bench.device().apply(random_vector(dice, 5));
     bench.wait(1ms);
     given += force.dot(bench.truth().position + bench.truth().deflection - before);
     ASSERT_NEAR(bench.truth().kinetic_energy + bench.truth().spring_energy, given, 1e-12);
@@ -248,23 +247,19 @@ TEST(StructuralMode, TheStiffestSampledSpringIsThatOfTheEigenvalues) {
 }
 
 TEST(StructuralMode, RefusesWhatIsNoMode) {
-  const auto refuses = [](double handle, double stiffness, double damping, const std::string& says) {
-    SimulatedDevice::Config config;
-    config.mass = 0.1;
-    config.structural_mode = {.handle_mass = handle, .stiffness = stiffness, .damping = damping};
-    try {
-      const SimulatedDevice device(config);
-      ADD_FAILURE() << "accepted; should have said: " << says;
-    } catch (const std::invalid_argument& error) {
-      EXPECT_EQ(std::string(error.what()).rfind(says, 0), 0U) << error.what();
-    }
-  };
-  const double nan = std::numeric_limits<double>::quiet_NaN();
-  refuses(0.1, 1, 0, "structural_mode.handle_mass = 0.1: expected above 0 kg and below the mass of 0.1 kg");
-  refuses(0, 1, 0, "structural_mode.handle_mass = 0: expected");
-  refuses(nan, 1, 0, "structural_mode.handle_mass = nan: expected");
-  refuses(0.05, 0, 0, "structural_mode.stiffness = 0: expected");
-  refuses(0.05, 1, -1, "structural_mode.damping = -1: expected");
+  SimulatedDevice::Config good;
+  good.mass = 0.1;
+  good.structural_mode = {.handle_mass = 0.05, .stiffness = 1, .damping = 0};
+  expect_refusals(
+      good, Makes<SimulatedDevice>(),
+      {
+          {"structural_mode.handle_mass = 0.1: expected above 0 kg and below the mass of 0.1 kg",
+           [](auto& c) { c.structural_mode->handle_mass = 0.1; }},
+          {"structural_mode.handle_mass = 0: expected", [](auto& c) { c.structural_mode->handle_mass = 0; }},
+          {"structural_mode.handle_mass = nan: expected", [](auto& c) { c.structural_mode->handle_mass = NAN; }},
+          {"structural_mode.stiffness = 0: expected", [](auto& c) { c.structural_mode->stiffness = 0; }},
+          {"structural_mode.damping = -1: expected", [](auto& c) { c.structural_mode->damping = -1; }},
+      });
 }
 
 }  // namespace

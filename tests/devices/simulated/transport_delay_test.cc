@@ -4,12 +4,12 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <string>
 #include <vector>
 
 #include "core/stability/stability_boundary.h"
 #include "devices/simulated/simulated_device.h"
 #include "tests/devices/device_bench.h"
+#include "tests/support/refusal.h"
 
 namespace tendon::transport_delay_test {
 namespace {
@@ -98,7 +98,7 @@ TEST(TransportDelay, WithoutAForceNothingIsDifferentToTheLastBitButTheStamps) {
   Bench z(late);
   Dice dice(5);
   for (int i = 0; i < 1000; ++i) {
-    const Duration interval(static_cast<Duration::rep>(dice.uniform(0.3e6, 2e6)));
+    const Duration interval(static_cast<Duration::rep>(dice.within(0.3e6, 2e6)));
     ASSERT_EQ(a.wait(interval), z.wait(interval));
     ASSERT_EQ(a.truth().hand_work, z.truth().hand_work);
   }
@@ -199,17 +199,13 @@ TEST(TransportDelay, OfALoopThatIsFasterThanThatTheNewestForceStillArrives) {
 }
 
 TEST(TransportDelay, RefusesADelayThatIsNone) {
-  const auto refuses = [](const SimulatedDevice::Config& config, const std::string& says) {
-    try {
-      const SimulatedDevice device(config);
-      ADD_FAILURE() << "accepted; should have said: " << says;
-    } catch (const std::invalid_argument& error) {
-      EXPECT_EQ(std::string(error.what()).rfind(says, 0), 0U) << error.what();
-    }
-  };
-  refuses(free_mass(0ms, std::nullopt), "sample_delay = 0: expected above 0 s, and 0.1 s at most");
-  refuses(free_mass(-1ms, std::nullopt), "sample_delay = -0.001: expected");
-  refuses(free_mass(std::nullopt, 101ms), "force_delay = 0.101: expected");
+  expect_refusals(
+      free_mass(1ms, 1ms), Makes<SimulatedDevice>(),
+      {
+          {"sample_delay = 0: expected above 0 s, and 0.1 s at most", [](auto& c) { c.sample_delay = 0ms; }},
+          {"sample_delay = -0.001: expected", [](auto& c) { c.sample_delay = -1ms; }},
+          {"force_delay = 0.101: expected", [](auto& c) { c.force_delay = 101ms; }},
+      });
 }
 
 }  // namespace

@@ -90,10 +90,10 @@ TEST(WholeHandle, ThePositionLivesAsWithoutThePartsToTheLastBit) {
   Bench z(more);
   Dice dice(7);
   for (int i = 0; i < 500; ++i) {
-    const Vec3 force = dice.vector(5);
+    const Vec3 force = random_vector(dice, 5);
     a.device().apply(force);
-    z.device().apply_all({.force = force, .torque = dice.vector(0.01), .grip = dice.uniform(-1, 1)});
-    const Duration interval(static_cast<Duration::rep>(dice.uniform(0.3e6, 2e6)));
+    z.device().apply_all({.force = force, .torque = random_vector(dice, 0.01), .grip = dice.within(-1, 1)});
+    const Duration interval(static_cast<Duration::rep>(dice.within(0.3e6, 2e6)));
     ASSERT_EQ(a.wait(interval), z.wait(interval));
     ASSERT_EQ(a.truth().hand_work, z.truth().hand_work);
   }
@@ -104,7 +104,7 @@ TEST(WholeHandle, AWrenchTooLargeIsShortenedAndKeepsItsDirection) {
   Dice dice(1);
   int shortened = 0;
   for (int i = 0; i < 2000; ++i) {
-    const Effort asked{.force = dice.vector(8), .torque = dice.vector(0.4), .grip = dice.uniform(-6, 6)};
+    const Effort asked{.force = random_vector(dice, 8), .torque = random_vector(dice, 0.4), .grip = dice.within(-6, 6)};
     const Effort given = device.apply_all(asked);
     ASSERT_LE(given.force.norm(), 4 * (1 + 1e-15));
     ASSERT_LE(given.torque.norm(), 0.2 * (1 + 1e-15));

@@ -48,11 +48,11 @@ LocalTime now() {
   return LocalTime(std::chrono::duration_cast<Duration>(std::chrono::steady_clock::now().time_since_epoch()));
 }
 
-struct Header {
+struct UsbipHeader {
   std::array<std::uint32_t, 10> numbers{};
   std::array<std::uint8_t, 8> setup{};
 };
-static_assert(sizeof(Header) == 48);
+static_assert(sizeof(UsbipHeader) == 48);
 
 bool receive(int end, void* to, std::size_t size) {
   return recv(end, to, size, MSG_WAITALL) == static_cast<ssize_t>(size);
@@ -136,7 +136,7 @@ void UsbIpCable::run() {
 }
 
 bool UsbIpCable::take_order() {
-  Header header;
+  UsbipHeader header;
   if (!receive(end_, &header, sizeof header)) return false;
   std::ranges::transform(header.numbers, header.numbers.begin(), ntohl);
   const auto& numbers = header.numbers;
@@ -205,7 +205,7 @@ void UsbIpCable::let_in(LocalTime at) {
 }
 
 void UsbIpCable::answer(std::uint32_t number, int status, std::size_t size, std::span<const std::uint8_t> bytes) {
-  Header header;
+  UsbipHeader header;
   header.numbers = {kSubmitted, number, 0, 0, 0, static_cast<std::uint32_t>(status), static_cast<std::uint32_t>(size)};
   std::ranges::transform(header.numbers, header.numbers.begin(), htonl);
   std::vector<std::uint8_t> message(sizeof header + bytes.size());
@@ -216,7 +216,7 @@ void UsbIpCable::answer(std::uint32_t number, int status, std::size_t size, std:
 
 void UsbIpCable::answer_unlink(std::uint32_t number, std::uint32_t unlinked) {
   const auto erased = std::erase_if(waiting_, [&](const Waiting& one) { return one.number == unlinked; });
-  Header header;
+  UsbipHeader header;
   header.numbers = {kUnlinked, number, 0, 0, 0, static_cast<std::uint32_t>(erased > 0 ? -ECONNRESET : 0)};
   std::ranges::transform(header.numbers, header.numbers.begin(), htonl);
   std::array<std::uint8_t, sizeof header> message{};

@@ -4,13 +4,11 @@
 #include <gtest/gtest.h>
 
 #include <array>
-#include <limits>
 #include <memory>
 #include <numbers>
 #include <stdexcept>
 #include <vector>
 
-#include "devices/safety/safe_device.h"
 #include "tests/devices/woodenhaptics/woodenhaptics_bench.h"
 
 namespace tendon::woodenhaptics_device_test {
@@ -193,20 +191,6 @@ TEST(WoodenHapticsDevice, WhatIsReturnedIsWhatTheMotorsGive) {
   }
 }
 
-TEST(WoodenHapticsDevice, AForceThatIsNoNumberIsNoneAtEveryPlace) {
-  Bench bench;
-  bench.run(30ms, Vec3::Constant(kNan));
-  ASSERT_TRUE(bench.reaches(State::kHomed, 1s, Vec3::Constant(kNan)));
-  EXPECT_EQ(bench.most_lawless, 0);
-  for (const double bad : {kNan, std::numeric_limits<double>::infinity()}) {
-    bench.run(10ms, kForce);
-    ASSERT_TRUE(bench.arm.pushes());
-    bench.run(3ms, Vec3(bad, 0, 0));
-    EXPECT_FALSE(bench.arm.pushes());
-    EXPECT_EQ(bench.written, Vec3::Zero());
-  }
-}
-
 TEST(WoodenHapticsDevice, ZeroDoesNotWaitForAnAnswer) {
   Bench bench;
   ASSERT_TRUE(bench.reaches(State::kHomed, 1s));
@@ -232,6 +216,18 @@ TEST(WoodenHapticsDevice, WhenTheHostIsDeadTheFirmwareLetsGoHalfASecondLater) {
   EXPECT_GE(bench.now - dead, 497ms) << "nothing else ended it";
   EXPECT_LE(bench.now - dead, 501ms);
   EXPECT_FALSE(bench.arm.amplifiers_on());
+}
+
+/// The guardian writes this packet if the server is killed, stops, or hangs (devices/safety/guardian.h).
+TEST(WoodenHapticsDevice, ThePacketOfTheGuardianEndsTheForceAtOnce) {
+  Bench bench;
+  bench.home(kForce);
+  bench.run(10ms, kForce);
+  ASSERT_TRUE(bench.arm.pushes());
+  ASSERT_TRUE(bench.arm.write(bench.now, woodenhaptics::driver({}).zero_packet));
+  bench.now += 3ms;  // The driver does nothing.
+  bench.arm.advance(bench.now);
+  EXPECT_FALSE(bench.arm.pushes());
 }
 
 TEST(WoodenHapticsDevice, WithTheCableOutASelfPoweredBoardLetsGo) {
@@ -319,37 +315,11 @@ TEST(WoodenHapticsDevice, AMomentaryEncoderJumpCostsOnlySamples) {
 
 TEST(WoodenHapticsDevice, ASafeDeviceIsHomedAndArmedAgainAfterAReplug) {
   Bench bench;
-  SafeDevice safe({}, bench.device);
-  const auto run = [&](Duration time, const Vec3& force) {
-    for (const LocalTime end = bench.now + time; bench.now < end;) {
-      bench.arm.advance(bench.now += 1ms);
-      safe.read(bench.now);
-      safe.apply(force);
-      ASSERT_TRUE(!bench.arm.pushes() || safe.status().state == SafetyState::kArmed);
-    }
-  };
-  for (int plugged = 0; plugged < 2; ++plugged) {
-    run(200ms, Vec3::Zero());
-    ASSERT_EQ(safe.state(), State::kUnhomed);
-    safe.arm();
-    run(200ms, Vec3::Zero());
-    EXPECT_NE(safe.status().state, SafetyState::kArmed) << "not homed";
+  const auto home = [&] {
     bench.arm.turn_to(bench.arm.arm().calibration().cwiseProduct(bench.arm.arm().per_count()));
     bench.arm.press_calibrate();
-    run(2s, kForce);
-    EXPECT_EQ(safe.state(), State::kHomed);
-    EXPECT_FALSE(bench.arm.pushes()) << "homed, and not armed";
-    safe.arm();
-    run(200ms, Vec3::Zero());
-    ASSERT_EQ(safe.status().state, SafetyState::kArmed);
-    run(200ms, kForce);
-    EXPECT_TRUE(bench.arm.pushes());
-    bench.arm.unplug();
-    bench.arm.plug();
-    run(1ms, kForce);
-    EXPECT_EQ(safe.status().state, SafetyState::kFault);
-    EXPECT_EQ(safe.status().last_fault, SafetyFault::kDeviceLost);
-  }
+  };
+  expect_homing_and_arming_after_a_replug(bench, bench.arm, home, [&](LocalTime now) { bench.arm.advance(now); });
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <cmath>
 #include <string>
 
 #include "tests/devices/woodenhaptics/woodenhaptics_bench.h"
@@ -122,12 +123,14 @@ TEST(WoodenHapticsDevice, UnpluggedItIsAbsentAtOnceAndNanChangesNothing) {
 
 TEST(WoodenHapticsDevice, AForceThatIsNoNumberIsNoneAtEveryState) {
   for (const Place place : kPlaces) {
-    SCOPED_TRACE(static_cast<int>(place));
-    Bench bench(options_for(place));
-    go_to(bench, place);
-    bench.run(3ms, Vec3(0, kNan, 0));
-    EXPECT_FALSE(bench.arm.pushes());
-    EXPECT_EQ(bench.written, Vec3::Zero());
+    for (const double bad : {kNan, HUGE_VAL}) {
+      SCOPED_TRACE(static_cast<int>(place));
+      Bench bench(options_for(place));
+      go_to(bench, place);
+      bench.run(3ms, Vec3(0, bad, 0));
+      EXPECT_FALSE(bench.arm.pushes());
+      EXPECT_EQ(bench.written, Vec3::Zero());
+    }
   }
 }
 

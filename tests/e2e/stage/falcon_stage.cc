@@ -135,6 +135,14 @@ FalconStage::Killed FalconStage::kill_server() {
   return result;
 }
 
+double FalconStage::released_after(int signal, std::optional<pid_t> process) {
+  const LocalTime sent = clock::now();
+  ::kill(process.value_or(server_->process().pid()), signal);
+  wait_until([](const FakeFalcon& falcon) { return !falcon.pushes(); }, "no force");
+  const FarFalcon::Seen seen = falcon_.seen();
+  return seen.let_go && *seen.let_go > sent ? seconds(*seen.let_go - sent) * 1e3 : 0;
+}
+
 bool FalconStage::machine_stood_still() {
   return falcon_.seen().longest_gap > 10ms ||
          server_->process().err().find(" overruns in the last") != std::string::npos;

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <sys/types.h>
+
 #include <atomic>
 #include <cstdint>
 #include <filesystem>
@@ -69,6 +71,9 @@ class FalconStage {
     std::uint64_t by_guardian = 0;     ///< packets that came by the node itself
   };
   Killed kill_server();
+
+  /// Sends `signal` to the server, or to `process`, and waits until the force is zero. Returns the time in ms.
+  double released_after(int signal, std::optional<pid_t> process = {});
 
   /// True when a thread (ours or the server's) waited so long that watchdogs may have tripped.
   bool machine_stood_still();

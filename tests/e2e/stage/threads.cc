@@ -17,6 +17,14 @@ std::set<std::string> threads_of(pid_t process) {
   return names;
 }
 
+char state_of(pid_t process) {
+  std::ifstream file("/proc/" + std::to_string(process) + "/stat");
+  std::string text;
+  std::getline(file, text);
+  const auto end = text.rfind(')');
+  return end == std::string::npos ? ' ' : text.at(end + 2);
+}
+
 std::uint64_t sleeps_of(pid_t process, const std::string& thread) {
   for (const auto& task : std::filesystem::directory_iterator("/proc/" + std::to_string(process) + "/task")) {
     std::string name;

@@ -12,6 +12,9 @@ namespace tendon::e2e {
 /// The names of a process's threads at this moment, as `top -H` shows them.
 std::set<std::string> threads_of(pid_t process);
 
+/// Returns the state of a process from /proc. 'T' means stopped.
+char state_of(pid_t process);
+
 /// How often the thread of that name has gone to sleep, not counting when it lost its processor to another one. Throws
 /// std::runtime_error when there is no such thread.
 std::uint64_t sleeps_of(pid_t process, const std::string& thread);

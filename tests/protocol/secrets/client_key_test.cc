@@ -40,6 +40,11 @@ TEST(ClientKey, IsRefusedWhenAnybodyButItsOwnerMayReadOrWriteIt) {
   for (const unsigned mode : {0600U, 0400U, 0700U}) EXPECT_EQ(refusal(text, 0100000U | mode), "") << std::oct << mode;
 }
 
+TEST(ClientKey, AByteOrderMarkIsNoPartOfIt) {
+  const std::string text = key_file_text(some_key(1));
+  EXPECT_EQ(refusal("\xef\xbb\xbf" + text), "");
+}
+
 TEST(ClientKey, ARefusalSaysWhatIsWrongAndNeverTheKey) {
   const std::string good = key_file_text(some_key(1));
   const std::string digits = good.substr(good.size() - 65, 64);

@@ -15,7 +15,7 @@ namespace {
 using examples::Bytes;
 
 /// A and Z, who know the same key.
-class Noise : public testing::Test {
+class Noise : public ::testing::Test {
  protected:
   static Bytes text(std::string_view text) {
     const auto raw = std::as_bytes(std::span(text));

@@ -17,7 +17,7 @@ using std::chrono::seconds;
 constexpr LocalTime kOpened{seconds(100)};
 
 /// One direction, from the one who seals to the one who opens.
-class Seal : public testing::TestWithParam<Suite> {
+class Seal : public ::testing::TestWithParam<Suite> {
  protected:
   explicit Seal(const Rekey& rekey = {}) : rekey_(rekey) {}
   void SetUp() override {
@@ -53,11 +53,11 @@ class SealWithRekeys : public Seal {
   SealWithRekeys() : Seal({.datagrams = 10, .age = seconds(5), .overlap = seconds(2)}) {}
 };
 
-std::string name_of(const testing::TestParamInfo<Suite>& suite) {
+std::string name_of(const ::testing::TestParamInfo<Suite>& suite) {
   return "Suite" + std::to_string(static_cast<int>(suite.param));
 }
-INSTANTIATE_TEST_SUITE_P(Of, Seal, testing::Values(Suite::kNoise, Suite::kAesGcm), name_of);
-INSTANTIATE_TEST_SUITE_P(Of, SealWithRekeys, testing::Values(Suite::kNoise, Suite::kAesGcm), name_of);
+INSTANTIATE_TEST_SUITE_P(Of, Seal, ::testing::Values(Suite::kNoise, Suite::kAesGcm), name_of);
+INSTANTIATE_TEST_SUITE_P(Of, SealWithRekeys, ::testing::Values(Suite::kNoise, Suite::kAesGcm), name_of);
 
 TEST_P(Seal, WhatWasSealedOpensAndIsNotReadableBefore) {
   const Bytes plain = examples::data(7, {}, examples::state());

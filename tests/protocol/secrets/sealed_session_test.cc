@@ -23,7 +23,7 @@ SessionKeys some_keys() {
 }
 SessionKeys turned(const SessionKeys& keys) { return {.send = keys.receive, .receive = keys.send}; }
 
-class SealedSession : public testing::Test {
+class SealedSession : public ::testing::Test {
  protected:
   explicit SealedSession(const Session::Config& config = {.connection_id = examples::kConnection})
       : a_(config, some_keys(), kOpened), z_(config, turned(some_keys()), kOpened) {}

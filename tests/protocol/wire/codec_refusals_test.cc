@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 #include <string>
+#include <string_view>
 
 #include "protocol/limits.h"
 #include "protocol/wire/bounds.h"
@@ -159,6 +160,20 @@ TEST(Codec, AReportOutOfBoundsIsLeftOutAndCountedAndTheRestIsRead) {
   EXPECT_EQ(reader.read(datagram_with(RawProtobuf().message(6, report)))->invalid, 1U);
 }
 
+/// Expects that the request is counted as invalid because of `field`, and that the state after it is read.
+void expect_refused(const Request& request, std::string_view field, const std::string& what) {
+  DataReader reader;
+  const auto* content = read(reader, data(1, {}, Control{.id = 7, .request = request}, examples::state()));
+  ASSERT_NE(content, nullptr) << what;
+  EXPECT_EQ(content->invalid, 1U) << what;
+  ASSERT_EQ(content->frames.size(), 2U) << what;
+  const auto& control = std::get<Control>(content->frames[0]);
+  EXPECT_EQ(control.id, 7U) << what;
+  EXPECT_FALSE(control.request.has_value()) << what;
+  EXPECT_EQ(control.invalid, field) << what;
+  EXPECT_TRUE(std::holds_alternative<DeviceState>(content->frames[1])) << what;
+}
+
 /// `report` is left out and counted, and the state beside it is read.
 void expect_left_out(const auto& report, const std::string& what) {
   DataReader reader;
@@ -286,75 +301,79 @@ TEST(Codec, APortOutOfBoundsIsLeftOutAndCountedAndTheRestIsRead) {
   }
 }
 
-TEST(Codec, ACoupleOutOfBoundsIsLeftOutAndCountedAndTheRestIsRead) {
+TEST(Codec, ACoupleOutOfBoundsIsCountedAndNamesItsField) {
   struct BadCouple {
     const char* what;
+    const char* field;
     void (*spoil)(Couple&);
   };
   const BadCouple cases[] = {
-      {"device 16", [](Couple& c) { c.device = limits::kMaxDevices; }},
-      {"channel 8", [](Couple& c) { c.channel = limits::kMaxChannels; }},
-      {"NaN scale", [](Couple& c) { c.position_scale = kNan; }},
-      {"a hundredth is the least scale", [](Couple& c) { c.position_scale = 0.0099; }},
-      {"a hundred is the largest", [](Couple& c) { c.force_scale = 100.1; }},
-      {"no force", [](Couple& c) { c.force_scale = 0; }},
-      {"a rotation that is none", [](Couple& c) { c.rotation.w = 0.602; }},
-      {"NaN rotation", [](Couple& c) { c.rotation.x = kNan; }},
-      {"no axis", [](Couple& c) { c.axes = 0; }},
-      {"a fourth axis", [](Couple& c) { c.axes = 8; }},
-      {"stiffness below zero", [](Couple& c) { c.stiffness = -1; }},
-      {"infinite stiffness", [](Couple& c) { c.stiffness = kInf; }},
-      {"NaN damping", [](Couple& c) { c.damping = kNan; }},
-      {"damping below zero", [](Couple& c) { c.damping = -1; }},
-      {"mutual damping below zero", [](Couple& c) { c.mutual_damping = -1; }},
-      {"no period", [](Couple& c) { c.period = Duration{}; }},
-      {"a period of more than 10 s", [](Couple& c) { c.period = std::chrono::seconds(10) + Duration{1}; }},
-      {"method 8", [](Couple& c) { c.method = CouplingMethod{8}; }},
-      {"a turn's stiffness below zero", [](Couple& c) { c.turn_stiffness = -1e-9; }},
-      {"infinite damping of a turn", [](Couple& c) { c.turn_damping = kInf; }},
-      {"NaN stiffness of the grip", [](Couple& c) { c.grip_stiffness = kNan; }},
-      {"damping of the grip below zero", [](Couple& c) { c.grip_damping = -1e-9; }},
-      {"a huge drift rate", [](Couple& c) { c.drift_rate = 1.001e12; }},
-      {"a dead zone below zero", [](Couple& c) { c.rate->dead_zone = -1e-9; }},
-      {"NaN dead zone", [](Couple& c) { c.rate->dead_zone = kNan; }},
-      {"no gain", [](Couple& c) { c.rate->gain = 0; }},
-      {"infinite gain", [](Couple& c) { c.rate->gain = kInf; }},
-      {"no speed", [](Couple& c) { c.rate->max_speed = 0; }},
-      {"a huge speed", [](Couple& c) { c.rate->max_speed = 1.001e12; }},
+      {"device 16", "device", [](Couple& c) { c.device = limits::kMaxDevices; }},
+      {"channel 8", "channel", [](Couple& c) { c.channel = limits::kMaxChannels; }},
+      {"NaN scale", "position_scale", [](Couple& c) { c.position_scale = kNan; }},
+      {"a hundredth is the least scale", "position_scale", [](Couple& c) { c.position_scale = 0.0099; }},
+      {"a hundred is the largest", "force_scale", [](Couple& c) { c.force_scale = 100.1; }},
+      {"no force", "force_scale", [](Couple& c) { c.force_scale = 0; }},
+      {"a rotation that is none", "rotation", [](Couple& c) { c.rotation.w = 0.602; }},
+      {"NaN rotation", "rotation", [](Couple& c) { c.rotation.x = kNan; }},
+      {"no axis", "axes", [](Couple& c) { c.axes = 0; }},
+      {"a fourth axis", "axes", [](Couple& c) { c.axes = 8; }},
+      {"stiffness below zero", "stiffness_npm", [](Couple& c) { c.stiffness = -1; }},
+      {"infinite stiffness", "stiffness_npm", [](Couple& c) { c.stiffness = kInf; }},
+      {"NaN damping", "damping_nspm", [](Couple& c) { c.damping = kNan; }},
+      {"damping below zero", "damping_nspm", [](Couple& c) { c.damping = -1; }},
+      {"mutual damping below zero", "mutual_damping_nspm", [](Couple& c) { c.mutual_damping = -1; }},
+      {"no period", "period_us", [](Couple& c) { c.period = Duration{}; }},
+      {"a period of more than 10 s", "period_us", [](Couple& c) { c.period = std::chrono::seconds(10) + Duration{1}; }},
+      {"method 8", "method", [](Couple& c) { c.method = CouplingMethod{8}; }},
+      {"a turn's stiffness below zero", "turn_stiffness_nmprad", [](Couple& c) { c.turn_stiffness = -1e-9; }},
+      {"infinite damping of a turn", "turn_damping_nmsprad", [](Couple& c) { c.turn_damping = kInf; }},
+      {"NaN stiffness of the grip", "grip_stiffness_npm", [](Couple& c) { c.grip_stiffness = kNan; }},
+      {"damping of the grip below zero", "grip_damping_nspm", [](Couple& c) { c.grip_damping = -1e-9; }},
+      {"a huge drift rate", "drift_rate_per_s", [](Couple& c) { c.drift_rate = 1.001e12; }},
+      {"a dead zone below zero", "rate.dead_zone_m", [](Couple& c) { c.rate->dead_zone = -1e-9; }},
+      {"NaN dead zone", "rate.dead_zone_m", [](Couple& c) { c.rate->dead_zone = kNan; }},
+      {"no gain", "rate.gain_per_s", [](Couple& c) { c.rate->gain = 0; }},
+      {"infinite gain", "rate.gain_per_s", [](Couple& c) { c.rate->gain = kInf; }},
+      {"no speed", "rate.max_speed_mps", [](Couple& c) { c.rate->max_speed = 0; }},
+      {"a huge speed", "rate.max_speed_mps", [](Couple& c) { c.rate->max_speed = 1.001e12; }},
   };
   for (const BadCouple& bad : cases) {
     Couple couple = examples::couple_with_all();
     bad.spoil(couple);
-    expect_left_out(Control{.id = 1, .request = couple}, bad.what);
+    expect_refused(couple, bad.field, bad.what);
   }
 }
 
-TEST(Codec, AScaleOrAShareOutOfBoundsIsLeftOutAndCountedAndTheRestIsRead) {
+TEST(Codec, AScaleOrAShareOutOfBoundsIsCountedAndNamesItsField) {
   struct Bad {
     const char* what;
+    const char* field;
     Request request;
   };
   const Bad cases[] = {
-      {"scales of device 16", SetScale{.device = limits::kMaxDevices}},
-      {"a hundredth is the least scale", SetScale{.position_scale = 0.0099}},
-      {"a hundred is the largest", SetScale{.position_scale = 100.1}},
-      {"NaN scale", SetScale{.position_scale = kNan}},
-      {"no force", SetScale{.force_scale = 0}},
-      {"a huge force", SetScale{.force_scale = kInf}},
-      {"a share on device 16", SetShare{.device = limits::kMaxDevices}},
-      {"a share on channel 8", SetShare{.channel = limits::kMaxChannels}},
-      {"a share below zero", SetShare{.share = -1e-9}},
-      {"more than the whole", SetShare{.share = 1.001}},
-      {"NaN share", SetShare{.share = kNan}},
+      {"scales of device 16", "device", SetScale{.device = limits::kMaxDevices}},
+      {"a hundredth is the least scale", "position_scale", SetScale{.position_scale = 0.0099}},
+      {"a hundred is the largest", "position_scale", SetScale{.position_scale = 100.1}},
+      {"NaN scale", "position_scale", SetScale{.position_scale = kNan}},
+      {"no force", "force_scale", SetScale{.force_scale = 0}},
+      {"a huge force", "force_scale", SetScale{.force_scale = kInf}},
+      {"a share on device 16", "device", SetShare{.device = limits::kMaxDevices}},
+      {"a share on channel 8", "channel", SetShare{.channel = limits::kMaxChannels}},
+      {"a share below zero", "share", SetShare{.share = -1e-9}},
+      {"more than the whole", "share", SetShare{.share = 1.001}},
+      {"NaN share", "share", SetShare{.share = kNan}},
   };
-  for (const Bad& bad : cases) expect_left_out(Control{.id = 1, .request = bad.request}, bad.what);
-  EXPECT_TRUE(in_bounds(SetScale{.position_scale = 0.01, .force_scale = 100}));
-  EXPECT_TRUE(in_bounds(SetShare{.share = 0}) && in_bounds(SetShare{.share = 1}));
+  for (const Bad& bad : cases) expect_refused(bad.request, bad.field, bad.what);
+  EXPECT_EQ(refused_field(SetScale{.position_scale = 0.01, .force_scale = 100}), "");
+  EXPECT_EQ(refused_field(SetShare{.share = 0}), "");
+  EXPECT_EQ(refused_field(SetShare{.share = 1}), "");
 }
 
-TEST(Codec, ASettingOutOfBoundsIsLeftOutAndCountedAndTheRestIsRead) {
+TEST(Codec, ASettingOutOfBoundsIsCountedAndNamesItsField) {
   struct BadSetting {
     const char* what;
+    const char* field;
     std::uint32_t output;
     OutputSetting setting;
   };
@@ -363,45 +382,53 @@ TEST(Codec, ASettingOutOfBoundsIsLeftOutAndCountedAndTheRestIsRead) {
   };
   using namespace std::chrono_literals;
   const BadSetting cases[] = {
-      {"output 8", limits::kMaxOutputs, LampColour{1}},
-      {"a colour of more than three bytes", 0, LampColour{0x1000000}},
-      {"amplitude above 1", 1, pulse(1.01, 0, 1ms)},
-      {"amplitude below 0", 1, pulse(-0.01, 0, 1ms)},
-      {"NaN amplitude", 1, pulse(kNan, 0, 1ms)},
-      {"a frequency below 20 Hz", 1, pulse(1, 19.9, 1ms)},
-      {"a frequency above 1000 Hz", 1, pulse(1, 1001, 1ms)},
-      {"NaN frequency", 1, pulse(1, kNan, 1ms)},
-      {"a pulse of more than 10 s", 1, pulse(1, 0, 10s + 1ns)},
-      {"a pulse of less than nothing", 1, pulse(1, 0, -1ms)},
+      {"output 8", "output", limits::kMaxOutputs, LampColour{1}},
+      {"a colour of more than three bytes", "rgb", 0, LampColour{0x1000000}},
+      {"amplitude above 1", "vibration.amplitude", 1, pulse(1.01, 0, 1ms)},
+      {"amplitude below 0", "vibration.amplitude", 1, pulse(-0.01, 0, 1ms)},
+      {"NaN amplitude", "vibration.amplitude", 1, pulse(kNan, 0, 1ms)},
+      {"a frequency below 20 Hz", "vibration.frequency_hz", 1, pulse(1, 19.9, 1ms)},
+      {"a frequency above 1000 Hz", "vibration.frequency_hz", 1, pulse(1, 1001, 1ms)},
+      {"NaN frequency", "vibration.frequency_hz", 1, pulse(1, kNan, 1ms)},
+      {"a pulse of more than 10 s", "vibration.duration_ms", 1, pulse(1, 0, 10s + 1ns)},
+      {"a pulse of less than nothing", "vibration.duration_ms", 1, pulse(1, 0, -1ms)},
   };
   for (const BadSetting& bad : cases) {
     const SetOutput wanted{.device = 1, .output = bad.output, .setting = bad.setting};
-    EXPECT_FALSE(in_bounds(wanted)) << bad.what;
+    EXPECT_EQ(refused_field(wanted), bad.field) << bad.what;
+    expect_refused(wanted, bad.field, bad.what);
+  }
+}
+
+TEST(Codec, ARequestWithoutAnIdIsLeftOutWhateverItHolds) {
+  for (const std::uint32_t device : {0U, limits::kMaxDevices}) {
     DataReader reader;
-    const auto* content = read(reader, data(1, {}, Control{.id = 1, .request = wanted}, examples::force()));
-    ASSERT_NE(content, nullptr) << bad.what;
-    EXPECT_EQ(content->invalid, 1U) << bad.what;
-    ASSERT_EQ(content->frames.size(), 1U) << bad.what;
+    const auto* content = read(reader, data(1, {}, Control{.id = 0, .request = Disarm{.device = device}}));
+    EXPECT_EQ(content->invalid, 1U) << device;
+    EXPECT_TRUE(content->frames.empty()) << device;
   }
 }
 
 TEST(Codec, ACoupleWithoutARoleAMethodOrARotationIsRefused) {
-  const auto couple = [](std::uint64_t role, std::uint64_t method, bool rotation) {
+  const auto refused = [](std::uint64_t role, std::uint64_t method, bool rotation) {
     constexpr std::uint64_t kOne = 0x3ff0'0000'0000'0000;  // 1.0
     RawProtobuf raw;
     raw.varint(3, role).varint(4, method).fixed64(5, kOne).fixed64(6, kOne).varint(8, 7).varint(14, 1000);
     if (rotation) raw.message(7, RawProtobuf().fixed64(1, kOne));
-    return read_raw(3, RawProtobuf().varint(1, 1).message(11, raw));
+    DataReader reader;
+    const auto* content =
+        reader.read(datagram_with(RawProtobuf().message(3, RawProtobuf().varint(1, 1).message(11, raw))));
+    return std::string(std::get<Control>(content->frames.at(0)).invalid);
   };
-  EXPECT_EQ(couple(1, 1, true), 1U);
-  EXPECT_EQ(couple(2, 2, true), 1U);
-  EXPECT_EQ(couple(0, 1, true), 0U);
-  EXPECT_EQ(couple(3, 1, true), 0U);
-  EXPECT_EQ(couple(1, 0, true), 0U);
-  EXPECT_EQ(couple(1, 4, true), 1U);
-  EXPECT_EQ(couple(1, 7, true), 1U);
-  EXPECT_EQ(couple(1, 8, true), 0U);
-  EXPECT_EQ(couple(1, 1, false), 0U);
+  EXPECT_EQ(refused(1, 1, true), "");
+  EXPECT_EQ(refused(2, 2, true), "");
+  EXPECT_EQ(refused(0, 1, true), "role");
+  EXPECT_EQ(refused(3, 1, true), "role");
+  EXPECT_EQ(refused(1, 0, true), "method");
+  EXPECT_EQ(refused(1, 4, true), "");
+  EXPECT_EQ(refused(1, 7, true), "");
+  EXPECT_EQ(refused(1, 8, true), "method");
+  EXPECT_EQ(refused(1, 1, false), "rotation");
 }
 
 TEST(Codec, ZerosAtTheEndOfAHistogramDoNotTravel) {
@@ -457,15 +484,14 @@ TEST(Codec, AReportOnAnEngineOutOfBoundsIsLeftOutAndCountedAndTheRestIsRead) {
   EXPECT_EQ(read_raw(8, RawProtobuf().varint(4, 1)), 0U) << "no link";
 }
 
-TEST(Codec, ADeadbandOfNaNIsLeftOutAndASenselessOneIsForTheServer) {
+TEST(Codec, ADeadbandOfNaNIsRefusedAndASenselessOneIsForTheServer) {
   const auto read_back = [](const SetStateDeadband& asked) -> std::optional<SetStateDeadband> {
     DataReader reader;
     const auto* content = read(reader, data(1, {}, Control{.id = 1, .request = asked}));
-    if (content->frames.empty()) return {};
     return std::get<SetStateDeadband>(*std::get<Control>(content->frames[0]).request);
   };
-  EXPECT_FALSE(read_back({.share = kNan}).has_value());
-  EXPECT_FALSE(read_back({.floor = kInf}).has_value());
+  expect_refused(SetStateDeadband{.share = kNan}, "share", "NaN share");
+  expect_refused(SetStateDeadband{.floor = kInf}, "floor_mps", "infinite floor");
   const auto silly = read_back({.share = -7, .floor = 9, .max_silence = std::chrono::milliseconds(20)});
   EXPECT_EQ(silly->share, -7);
   EXPECT_EQ(silly->floor, 9);

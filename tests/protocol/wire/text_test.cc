@@ -31,6 +31,19 @@ TEST(Text, OverlongFormsSurrogatesAndBeyondUnicodeAreNone) {
   }
 }
 
+TEST(Text, NothingVisibleMovesACursorOrBeginsALine) {
+  EXPECT_EQ(visible("hand \xC3\xA4\xE2\x82\xAC~"), "hand \xC3\xA4\xE2\x82\xAC~");
+  EXPECT_EQ(visible("wall\"\n07:00:00.000 info armed\t"), "wall\"\\n07:00:00.000 info armed\\t");
+  EXPECT_EQ(visible("\x1B[2J\r\x7F"), "\\x1b[2J\\x0d\\x7f");
+  EXPECT_EQ(visible(std::string(1, '\0')), "\\x00");
+  EXPECT_EQ(visible("\xC2\x9B"
+                    "31m"),
+            "\\x9b31m")
+      << "CSI of C1";
+  EXPECT_EQ(visible("\xC2\xA0"), "\xC2\xA0") << "the first character after C1";
+  EXPECT_EQ(visible("ok\xFF\xC3"), "ok\\xff\\xc3") << "what is not UTF-8";
+}
+
 TEST(Text, ClipEndsBeforeACharacterThatDoesNotFitOrIsBroken) {
   EXPECT_EQ(clip("hand", 64), "hand");
   EXPECT_EQ(clip("hand", 3), "han");

@@ -26,8 +26,8 @@ inline std::string told(const DataContent* content) {
   for (const Frame& frame : content->frames) {
     text += " frame " + std::to_string(frame.index()) + " ";
     writer.begin(buffer, {}, LocalTime{}, {});
-    if (const auto* state = std::get_if<DeviceState>(&frame)) writer.add_by_protobuf(*state);
-    if (const auto* force = std::get_if<ForceCommand>(&frame)) writer.add_by_protobuf(*force);
+    std::visit([&](const auto& value) { writer.add(value); }, frame);
+    if (const auto* control = std::get_if<Control>(&frame)) text += control->invalid;
     text.append(reinterpret_cast<const char*>(buffer.data()) + kHeaderSize, writer.size() - kHeaderSize);
   }
   return text;

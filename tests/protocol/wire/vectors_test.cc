@@ -189,8 +189,44 @@ TEST(Vectors, BoundsOfTheProtoFileAreThoseOfTheCodec) {
   EXPECT_GT(file.at("bounds").size(), 300U);
 }
 
-/// A client and a session as the file describes them: nothing here is computed from the code that wrote it.
-class SealedVectors : public testing::TestWithParam<std::string> {
+/// The session has to answer these requests, and it has to accept these answers.
+TEST(Vectors, ARequestOrAnswerOutOfBoundsIsReadAsOneThatIsRefused) {
+  const std::set<std::string> requests = {
+      "SetStateRate", "Rearm",  "Describe", "TakeLease", "GiveLease", "LeaseLost", "SetStateDeadband",
+      "Disarm",       "Couple", "Engage",   "Disengage", "SetOutput", "SetScale",  "SetShare"};
+  const std::set<std::string> answers = {"ControlAck", "ChannelDescription", "OutputDescription"};
+  std::set<std::string> seen;
+  const Json file = read("bounds.json");
+  for (const Json& vector : file.at("bounds")) {
+    const std::string name = text(vector, "field");
+    const std::string message = name.substr(0, name.find('.'));
+    const std::string field = name.substr(name.find('.') + 1);
+    if (vector.at("accepted").get<bool>() || field == "id" ||
+        !(requests.contains(message) || answers.contains(message)))
+      continue;
+    DataReader reader;
+    const DataContent* const content = reader.read(bytes(vector, "body"));
+    ASSERT_NE(content, nullptr) << name;
+    EXPECT_EQ(content->invalid, 1U) << name;
+    ASSERT_FALSE(content->frames.empty()) << name << ' ' << vector.at("value");
+    if (requests.contains(message)) {
+      const auto& control = std::get<Control>(content->frames[0]);
+      EXPECT_EQ(control.invalid, field.starts_with("rotation") ? "rotation" : field) << name << vector.at("value");
+      EXPECT_FALSE(control.request.has_value()) << name;
+      seen.insert(message);
+    } else {
+      const bool refused = std::ranges::any_of(content->frames, [](const Frame& frame) {
+        const auto* const ack = std::get_if<ControlAck>(&frame);
+        return ack != nullptr && ack->code == Code::kInvalid && !ack->device && !ack->handle;
+      });
+      EXPECT_TRUE(refused) << name << ' ' << vector.at("value");
+    }
+  }
+  EXPECT_EQ(seen, requests);
+}
+
+/// The client and the session in this test only use values from the file.
+class SealedVectors : public ::testing::TestWithParam<std::string> {
  protected:
   void SetUp() override {
     if (suite_ == Suite::kAesGcm && !crypto::has_aes()) GTEST_SKIP() << "this processor has no AES";
@@ -219,7 +255,7 @@ class SealedVectors : public testing::TestWithParam<std::string> {
   Json file_ = read(GetParam());
   Suite suite_ = file_.at("suite") == 2 ? Suite::kAesGcm : Suite::kNoise;
 };
-INSTANTIATE_TEST_SUITE_P(Of, SealedVectors, testing::Values("sealed.json", "sealed_aes.json"),
+INSTANTIATE_TEST_SUITE_P(Of, SealedVectors, ::testing::Values("sealed.json", "sealed_aes.json"),
                          [](const auto& file) { return file.param == "sealed.json" ? "Suite1" : "Suite2"; });
 
 TEST_P(SealedVectors, AClientSaysAndUnderstandsThem) {

@@ -1,25 +1,34 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Every command that a document shows is one that the programs take.
+"""Checks that the programs accept every command that is shown in a document.
 
-Blocks marked `sh` are run as they stand, by deploy/test and by the tests of the clients. What is held here against the built
-programs is every other command line of ours, in blocks and in the running text: the program is there, has that subcommand, and its
---help names each option; a file of this tree that is named exists.
+The commands in blocks marked `sh` are run by deploy/test and by the client tests. This test checks all other command
+lines, both in code blocks and in the text. The program must exist, the subcommand must exist, and --help must list each
+option. If a command names a file in this repository, the file must exist. `program verb --help` must succeed and leave no
+file behind. A Python program of the repository must start as printed in a shell whose python3 is not Debian's and lacks
+Debian's packages. Programs and subcommands are skipped if the build left them out because of a missing package.
 
     documents_test.py ROOT PROGRAMS…      PROGRAMS: folders with built programs
 """
+import atexit
 import functools
+import os
 import pathlib
 import re
 import shlex
+import shutil
 import subprocess
 import sys
+import tempfile
 
 # Commands that another machine, or a reader's own choice, decides on.
 PLACEHOLDER = re.compile(r"[A-Z]{2,}|…|\.\.\.|<.*>|\*")
 EXAMPLE = r"echo_motion|friction_surface|magnet|maze|texture|two_hands|virtual_fixture|virtual_wall|viscous_field"
 PROGRAM = re.compile(rf"^(tendond|tendon-[a-z-]+|{EXAMPLE}|falcon-server)$")
 SCRIPT = re.compile(r"^(deploy/[a-z-]+|tests/[a-z/]+/[a-z]+\.sh)$")
+PYTHON = re.compile(r"^(\S*/)?python3?$")
+# A program in a code span, and the next span, which is a verb of it: `tendon-lab`: `compare` (...).
+VERB_AFTER = re.compile(r"`(tendon[a-z-]*)`: `([a-z]+)`")
 
 
 def commands(text):
@@ -33,6 +42,8 @@ def commands(text):
         if fence is None and not line.startswith("    "):
             for span in re.findall(r"`([^`]+)`", line):
                 yield number, span
+            for program, verb in VERB_AFTER.findall(line):
+                yield number, f"{program} {verb}"
         elif fence in ("", "sh") or fence is None:
             for part in re.split(r"&&|\||;|(?<!&)&(?!&)", line.split("  #")[0]):
                 yield number, part.strip()
@@ -53,8 +64,59 @@ def words(command):
 
 @functools.lru_cache(maxsize=None)
 def help_of(program, subcommand):
+    """Returns the output of --help. Raises a ValueError if the program fails or writes a file."""
     line = [str(program)] + ([subcommand] if subcommand else []) + ["--help"]
-    return subprocess.run(line, capture_output=True, text=True, timeout=60, check=False).stdout
+    with tempfile.TemporaryDirectory() as folder:
+        done = subprocess.run(line, capture_output=True, text=True, timeout=60, check=False, cwd=folder)
+        if done.returncode != 0:
+            raise ValueError(f"--help ends with {done.returncode}: {done.stderr.strip()}")
+        if os.listdir(folder):
+            raise ValueError(f"--help writes {os.listdir(folder)}")
+    return done.stdout
+
+
+WHOSE = "whose Python? Name /usr/bin/python3, or that of a virtual environment"
+
+
+@functools.lru_cache(maxsize=None)
+def foreign_shell(root):
+    """Returns the environment of a shell in which python3 is not Debian's. It sets PYTHONPATH as described in the pages."""
+    folder = tempfile.mkdtemp()
+    atexit.register(shutil.rmtree, folder)
+    subprocess.run([sys.executable, "-m", "venv", "--without-pip", folder], check=True, capture_output=True)
+    return os.environ | {"PATH": f"{folder}/bin:{os.environ['PATH']}", "PYTHONPATH": str(root / "clients" / "python")}
+
+
+@functools.lru_cache(maxsize=None)
+def debian_has_the_packages():
+    check = [sys.executable, "-c", "import google.protobuf, nacl.bindings"]
+    there = subprocess.run(check, capture_output=True, check=False).returncode == 0
+    if not there:
+        print("skipped: the Python examples, because python3-protobuf or python3-nacl is missing")
+    return there
+
+
+@functools.lru_cache(maxsize=None)
+def wrong_python(line, root):
+    """Returns what is wrong with a command that starts a Python program, or an empty string."""
+    named = [word for word in line if re.match(r"^(clients|tests|deploy)/.*\.py$", word)]
+    if not named:
+        return WHOSE if len(line) > 1 and line[0] in ("python", "python3", "pip") and "venv" not in line else ""
+    script = root / named[0]
+    if not script.is_file():
+        return f"there is no {named[0]}"
+    is_example = "clients/python/examples" in named[0]
+    is_command = is_example or len(line) > 1  # other names of files are only mentioned
+    if is_command and line[0] == named[0] and not os.access(script, os.X_OK):
+        return f"{named[0]} is not executable"
+    if not is_example or "worker.run(" in script.read_text(encoding="utf-8"):
+        return "" if line[0] in (named[0], "/usr/bin/python3") else WHOSE
+    # A virtual environment only exists after the reader has made it.
+    if "venv" in line[0] or not debian_has_the_packages():
+        return ""
+    shell = {"env": foreign_shell(root), "cwd": root, "capture_output": True, "text": True}
+    done = subprocess.run([*line, "--help"], **shell, timeout=60, check=False)
+    return "" if done.returncode == 0 else f"it ends with {done.returncode}: {done.stderr.strip().splitlines()[-1:]}"
 
 
 def built(name, folders):
@@ -62,6 +124,13 @@ def built(name, folders):
         if (folder / name).is_file():
             return folder / name
     return None
+
+
+@functools.lru_cache(maxsize=None)
+def left_out(build):
+    """Returns the parts that are not in this build, such as "tendon-dash" and "tendon-plug inverse"."""
+    listed = build / "left_out.txt"
+    return {line.split(" (")[0] for line in listed.read_text(encoding="utf-8").splitlines()} if listed.exists() else set()
 
 
 def wrong(command, root, folders):
@@ -75,17 +144,31 @@ def wrong(command, root, folders):
             return f"there is no {name}"
         usage = "" if len(found) == 1 else (root / name).read_text(encoding="utf-8")
         return next((f"{name} has no {w}" for w in found[1:] if w.startswith("--") and w not in usage), "")
+    if PYTHON.match(name) or name.endswith(".py") or name == "pip":
+        return wrong_python(tuple(found), root)
     name = pathlib.PurePath(name).name
     if not PROGRAM.match(name) or len(found) == 1:
+        return ""
+    if re.search(r"(?<![/\w])python3 (clients|tests)/", command):
+        return WHOSE
+    if {name, f"{name} {found[1]}"} & left_out(folders[0].parent):
         return ""
     program = built(name, folders)
     if program is None:
         return f"there is no program {name}"
-    usage = help_of(program, "")
+    try:
+        usage = help_of(program, "")
+    except ValueError as error:
+        return f"{name} {error}"
     named = re.findall(r"^  ([a-z][a-z0-9-]+) {2,}", usage[usage.find("Subcommands:") :], re.M) if "Subcommands:" in usage else []
     subcommand = next((w for w in found[1:] if w in named), "")
+    if re.search(r"^Usage:.* SUBCOMMAND$", usage, re.M) and re.match(r"^[a-z][a-z0-9]+$", found[1]) and not subcommand:
+        return f"{name} has no command {found[1]}"
     if subcommand:
-        usage += help_of(program, subcommand)
+        try:
+            usage += help_of(program, subcommand)
+        except ValueError as error:
+            return f"{name} {subcommand} {error}"
     for word in found[1:]:
         option = word.split("=")[0]
         if re.match(r"^--[a-z]", option) and not re.search(re.escape(option) + r"(?![a-z-])", usage):
@@ -94,6 +177,12 @@ def wrong(command, root, folders):
             if not (root / word).exists():
                 return f"there is no {word}"
     return ""
+
+
+def ours(word):
+    name = pathlib.PurePath(word).name
+    is_python = PYTHON.match(word) or word == "pip" or re.match(r"^(clients|tests)/.*\.py$", word)
+    return PROGRAM.match(name) or SCRIPT.match(word) or is_python
 
 
 def main():
@@ -107,7 +196,7 @@ def main():
             continue
         for number, command in commands((root / document).read_text(encoding="utf-8")):
             found = words(command)
-            if not found or not (PROGRAM.match(pathlib.PurePath(found[0]).name) or SCRIPT.match(found[0])):
+            if not found or not ours(found[0]):
                 continue
             checked += len(found) > 1
             why = wrong(command, root, folders)

@@ -92,20 +92,20 @@ TEST(Rooms, EveryLibraryHasOneFrontDoor) {
     std::string header;
     std::string door;
   };
-  for (const auto& [header, door] : std::vector<Case>{{"asio/ip/udp.hpp", "server/machine/udp_link.cc"},
-                                                      {"asio.hpp", "clients/cpp/udp_transport.cc"},
-                                                      {"CLI/CLI.hpp", "server/main.cc"},
-                                                      {"CLI/CLI.hpp", "clients/softbody/softbody_main.cc"},
-                                                      {"google/protobuf/arena.h", "protocol/wire/codec.cc"},
-                                                      {"tendon.pb.h", "protocol/wire/codec.cc"},
-                                                      {"recording.pb.h", "server/recording/recording_codec.cc"},
-                                                      {"libusb.h", "devices/usb/with_libusb.cc"},
-                                                      {"nlohmann/json.hpp", "clients/cpp/run.cc"},
-                                                      {"sodium.h", "protocol/secrets/crypto.cc"},
-                                                      {"sodium.h", "devices/falcon/firmware.cc"},
-                                                      {"spdlog/spdlog.h", "server/machine/log.cc"},
-                                                      {"toml++/toml.h", "server/scene/read.cc"},
-                                                      {"zlib.h", "server/recording/mcap_format.cc"}}) {
+  for (const auto& [header, door] :
+       std::vector<Case>{{"asio/ip/udp.hpp", "server/machine/udp_link.cc"},
+                         {"asio.hpp", "clients/cpp/udp_transport.cc"},
+                         {"CLI/CLI.hpp", "server/main.cc"},
+                         {"CLI/CLI.hpp", "clients/softbody/softbody_main.cc"},
+                         {"google/protobuf/arena.h", "clients/dashboard/foxglove_message.cc"},
+                         {"tendon.pb.h", "clients/dashboard/foxglove_message.cc"},
+                         {"recording.pb.h", "server/recording/recording_codec.cc"},
+                         {"libusb.h", "devices/usb/with_libusb.cc"},
+                         {"nlohmann/json.hpp", "clients/cpp/run.cc"},
+                         {"sodium.h", "protocol/secrets/crypto.cc"},
+                         {"sodium.h", "devices/falcon/firmware.cc"},
+                         {"toml++/toml.h", "server/scene/read.cc"},
+                         {"zlib.h", "server/recording/mcap_format.cc"}}) {
     const auto text = kLicence + "#include <" + header + ">\n";
     EXPECT_EQ(places(door, text), Places{}) << header;
     for (const std::string path : {"core/a.cc", "protocol/a.cc", "devices/a.cc", "server/a.cc", "clients/cpp/a.cc"}) {
@@ -159,6 +159,20 @@ TEST(Rooms, NobodyDrawsFromADistributionOfTheStandardLibrary) {
 TEST(Rooms, NobodySharesOwnership) {
   EXPECT_EQ(places("server/a.h", kHeader + "std::shared_ptr<int> a;\nauto z = std::make_shared<int>();\n"),
             (Places{"server/a.h:3", "server/a.h:4"}));
+}
+
+TEST(Rooms, OneFileParsesCommandLines) {
+  EXPECT_EQ(places("server/a.cc", kLicence + "app.parse(argc, argv);\n"), Places{"server/a.cc:2"});
+  EXPECT_EQ(places("clients/cpp/a.cc", kLicence + "usage::parse(parser_->app, argc, argv);\n"), Places{});
+}
+
+TEST(Rooms, APeersWordsArePrintedThroughVisible) {
+  for (const std::string words : {"hello.name", "guest->name", "welcome_.name", "stats.reason", "report->words"}) {
+    EXPECT_EQ(places("server/a.cc", kLicence + "std::cerr << \"it said \" << " + words + ";\n"),
+              Places{"server/a.cc:2"});
+    EXPECT_EQ(places("server/a.cc", kLicence + "std::cerr << visible(" + words + ");\n"), Places{});
+  }
+  EXPECT_EQ(places("server/a.cc", kLicence + "std::cerr << options.client.name;\n"), Places{});
 }
 
 TEST(Rooms, AHeaderOpensNoNamespaceForOthers) {

@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "server/guests/unknown_keys.h"
+
 namespace tendon::admission_test {
 namespace {
 
@@ -27,6 +29,9 @@ TEST_F(SealedServer, IsSilentForAKeyItDoesNotHave) {
   EXPECT_NE(phase(a), Phase::kOpen);
   EXPECT_EQ(a.client->stats().sessions, 0U);
   EXPECT_GT(loop_->stats().hellos.unknown_key, 10U);
+  const auto notices = loop_->take_notices();  // nobody has taken any meanwhile
+  ASSERT_EQ(notices.size(), 1U);
+  EXPECT_EQ(notices[0].text, UnknownKeys::notice(parse_address("192.0.2.1:4000")));
   for (const Datagram& datagram : wire_) {
     EXPECT_TRUE(datagram.from != server_.self || datagram.bytes.size() == 48);  // Retries
   }
@@ -189,6 +194,27 @@ TEST_F(SealedServer, DatagramsOfAGuestThatHasLeftAreNobodysAtOnce) {
   a.client->stop(now_);  // three Byes, in one turn of the server
   run(milliseconds(2), {&a});
   EXPECT_EQ(loop_->stats().unknown_connection, 2U);
+}
+
+TEST_F(SealedServer, AControllersByeIsNoWarningAndItsSilenceIsOne) {
+  restart({});
+  const auto leavings = [&] {
+    std::vector<bool> warnings;
+    for (const auto& [warning, text, session] : loop_->take_notices()) {
+      if (text.find("has left") != std::string::npos) warnings.push_back(warning);
+    }
+    return warnings;
+  };
+  Client polite = controller(std::nullopt, "127.0.0.1:4000");
+  run(milliseconds(500), {&polite});
+  polite.client->stop(now_);
+  run(milliseconds(10), {&polite});
+  EXPECT_EQ(leavings(), std::vector<bool>{false});
+  Client silent = controller(std::nullopt, "127.0.0.1:4001");
+  run(milliseconds(500), {&silent});
+  ASSERT_EQ(phase(silent), Phase::kOpen);
+  run(seconds(20), {});
+  EXPECT_EQ(leavings(), std::vector<bool>{true});
 }
 
 TEST_F(SealedServer, AHalfOpenSessionIsToldNothingTakesNothingAndIsForgotten) {

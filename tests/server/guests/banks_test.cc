@@ -14,20 +14,20 @@ namespace {
 using std::chrono::milliseconds;
 
 /// A server with 20 devices in the clear, "d-0" to "d-19": a bank of 16, and one of 4.
-class TwoBanks : public testing::Test {
+class TwoBanks : public ::testing::Test {
  protected:
   static constexpr std::uint32_t kDevices = 20;
 
   TwoBanks() {
     NetworkLoop::Config config;
     config.secret.fill(std::byte{7});
-    std::vector<Mailboxes*> mail;
     for (std::uint32_t i = 0; i < kDevices; ++i) {
-      config.devices.push_back({.name = name(i), .model = "device", .loop_hz = 1000, .channels = {{.name = "main"}}});
       boxes_.push_back(std::make_unique<Mailboxes>(Mailboxes::Capacities{.steps = 2, .flight = 2, .datagrams = 1}));
-      mail.push_back(boxes_.back().get());
+      config.devices.push_back(
+          {.about = {.name = name(i), .model = "device", .loop_hz = 1000, .channels = {{.name = "main"}}},
+           .mail = boxes_.back().get()});
     }
-    loop_ = std::make_unique<NetworkLoop>(config, server_, mail);
+    loop_ = std::make_unique<NetworkLoop>(config, server_, now_);
   }
 
   static std::string name(std::uint32_t device) { return "d-" + std::to_string(device); }
@@ -198,9 +198,10 @@ TEST_F(TwoBanks, WhoseFirstWordIsByeHasLeft) {
 
 TEST_F(TwoBanks, MoreDevicesThanAServerMayHaveAreRefused) {
   NetworkLoop::Config config;
-  std::vector<Mailboxes*> mail(kMostDevices + 1, boxes_[0].get());
-  for (std::size_t i = 0; i < mail.size(); ++i) config.devices.push_back({.name = name(static_cast<std::uint32_t>(i))});
-  EXPECT_THROW(NetworkLoop(config, server_, mail), std::invalid_argument);
+  for (std::uint32_t i = 0; i <= kMostDevices; ++i) {
+    config.devices.push_back({.about = {.name = name(i)}, .mail = boxes_[0].get()});
+  }
+  EXPECT_THROW(NetworkLoop(config, server_, now_), std::invalid_argument);
 }
 
 }  // namespace

@@ -77,7 +77,7 @@ class Viewer {
   ClientHandshake handshake_;
 };
 
-class Coupled : public testing::Test {
+class Coupled : public ::testing::Test {
  protected:
   void place(const std::vector<std::string>& leader = {}, const std::vector<std::string>& follower = {},
              const std::string& handles = "") {
@@ -159,25 +159,11 @@ TEST_F(Coupled, AFollowerGoesWhereTheHandOfAnotherServerGoes) {
   EXPECT_GT((before - rest).norm(), 1e-3);
 }
 
-TEST_F(Coupled, NeitherAccountFallsBelowZeroOnABadNetwork) {
-  delay_ = milliseconds(20);
-  jitter_ms_ = 10;
-  loss_ = 0.05;
-  place();
-  run(seconds(6));
-  EXPECT_EQ(leader_->phase(), PortPhase::kEngaged);
-  EXPECT_GE(leader_->least_energy, -1e-9);
-  EXPECT_GE(follower_->least_energy, -1e-9);
-  EXPECT_GT(leader_->newest().sent.given, 0);
-  EXPECT_LT(leader_->newest().stiffness, 1000) << "2 B over the round trip";
-}
-
 TEST_F(Coupled, EachMethodMovesTheFollowerAndNoAccountFallsBelowZero) {
   delay_ = milliseconds(10);
   jitter_ms_ = 5;
   loss_ = 0.05;
-  for (const CouplingMethod method :
-       {CouplingMethod::kPassivity, CouplingMethod::kSetPosition, CouplingMethod::kRate}) {
+  for (const CouplingMethod method : kCouplingMethods) {
     const std::string name(to_string(method));
     std::vector<std::string> settings = {"teleoperation.method=" + name, "teleoperation.max_delay_ms=500"};
     if (method == CouplingMethod::kRate) {
@@ -214,7 +200,7 @@ TEST_F(Coupled, ACutNetworkIsLostAndOnlyAnActCouplesAgain) {
   run(seconds(3));
   EXPECT_EQ(leader_->phase(), PortPhase::kCoupled) << "nobody has pressed";
   EXPECT_EQ(follower_->phase(), PortPhase::kCoupled);
-  leader_->mail->orders.try_push({HapticOrder::Kind::kEngage});
+  leader_->mail().orders.try_push({HapticOrder::Kind::kEngage});
   run(milliseconds(100));
   EXPECT_EQ(follower_->phase(), PortPhase::kEngaged);
   EXPECT_GE(leader_->least_energy, -1e-9);
@@ -226,12 +212,12 @@ TEST_F(Coupled, BothEndsTakeNewScalesWhileTheClutchIsHeld) {
   run(seconds(2));
   ASSERT_EQ(follower_->phase(), PortPhase::kEngaged);
   const HapticOrder order{.kind = HapticOrder::Kind::kSetScale, .scales = {0.25, 2}};
-  leader_->mail->orders.try_push(order);
+  leader_->mail().orders.try_push(order);
   run(milliseconds(50));
   EXPECT_EQ(follower_->newest().sent.position_scale, 0) << "it is engaged: nothing changes";
   run(milliseconds(4200));  // its hand holds the clutch from 6 s on
   ASSERT_EQ(leader_->phase(), PortPhase::kClutched);
-  leader_->mail->orders.try_push(order);
+  leader_->mail().orders.try_push(order);
   run(milliseconds(10));
   EXPECT_EQ(follower_->newest().sent.position_scale, 0.25);
   EXPECT_EQ(follower_->newest().sent.force_scale, 2);
@@ -274,7 +260,7 @@ TEST_F(Coupled, AnEndWhoseAddressChangesStaysEngaged) {
   run(seconds(2), [&] { left = left || follower_->phase() != PortPhase::kEngaged; });
   EXPECT_FALSE(left);
   EXPECT_EQ(leader_->phase(), PortPhase::kEngaged);
-  EXPECT_EQ(follower_->network->stats().roamed, 1U);
+  EXPECT_EQ(follower_->server->network().stats().roamed, 1U);
   const Vec3 from = follower_->position;
   run(milliseconds(500));
   EXPECT_GT((follower_->position - from).norm(), 2e-3) << "it goes on following";
@@ -352,12 +338,12 @@ TEST_F(Coupled, AStateOfTheEndBeforeIsNotTakenForOneOfTheNew) {
   state.sequence = 1;
   const auto taken = [&](std::uint32_t peer) {
     ++state.sequence;
-    follower.mail->port_in[0].put({state, now_, peer});
+    follower.mail().port_in[0].put({state, now_, peer});
     follower.step(now_ += milliseconds(1));
     return follower.newest().peer.has_value();
   };
   EXPECT_TRUE(taken(0));
-  follower.mail->orders.try_push({.kind = HapticOrder::Kind::kRenew, .source = 1});
+  follower.mail().orders.try_push({.kind = HapticOrder::Kind::kRenew, .source = 1});
   EXPECT_FALSE(taken(0));
   EXPECT_TRUE(taken(1));
 }

@@ -21,9 +21,9 @@ class Handle : public SealedServer {
   Handle() {
     NetworkLoop::Config config;
     config.keys = {wall_, screen_};
-    config.devices = {{.name = "left", .model = "device", .loop_hz = 1000, .channels = {{.name = "main"}}}};
-    config.handles = {{.operator_from_device = Quat{.w = 0.5, .x = -0.5, .y = 0.5, .z = 0.5},
-                       .buttons = {"right", "forward", "centre", "left"}}};
+    config.devices = {{.about = {.name = "left", .model = "device", .loop_hz = 1000, .channels = {{.name = "main"}}},
+                       .handle = {.operator_from_device = Quat{.w = 0.5, .x = -0.5, .y = 0.5, .z = 0.5},
+                                  .buttons = {"right", "forward", "centre", "left"}}}};
     restart(config);
   }
 
@@ -148,6 +148,23 @@ TEST_F(Handle, TorqueAndGripForceReachTheLoopOfTheDevice) {
   EXPECT_EQ(force->grip_force, -1.5);
 }
 
+TEST_F(Handle, TorqueAndGripOfAClientWithoutTheFeatureAreIgnoredAndCounted) {
+  for (const bool names : {false, true}) {
+    restart({});
+    if (names) foreign_.features.emplace_back(kFeatureHandle);
+    run_foreign(milliseconds(500), [](ForceCommand& force) {
+      force.torque.emplace().torque = Vec3(0, 0, 0.05);
+      force.grip_force = 0.5;
+    });
+    const RemoteForce* const force = mail_->forces[0].take();
+    ASSERT_NE(force, nullptr);
+    EXPECT_EQ(force->force, Vec3(1, 0, 0)) << "the rest of it is rendered";
+    EXPECT_EQ(force->torque.has_value(), names);
+    EXPECT_EQ(force->grip_force.has_value(), names);
+    EXPECT_EQ(loop_->stats().denied > 100, !names);
+  }
+}
+
 /// A client of another make names the features that it knows: none, or this one.
 TEST_F(Handle, IsSeenOnlyByThoseThatNamedTheFeature) {
   for (const bool names : {false, true}) {
@@ -199,8 +216,8 @@ TEST_F(Handle, JointsAreToldToThoseThatNamedTheFeature) {
   for (const bool asks : {false, true}) {
     NetworkLoop::Config config;
     config.keys = {wall_, screen_};
-    config.devices = {{.name = "left", .model = "device", .loop_hz = 1000, .channels = {{.name = "main"}}}};
-    config.handles = {{.buttons = {"right"}, .joints = {"upper", "lower"}}};
+    config.devices = {{.about = {.name = "left", .model = "device", .loop_hz = 1000, .channels = {{.name = "main"}}},
+                       .handle = {.buttons = {"right"}, .joints = {"upper", "lower"}}}};
     restart(config);
     look_.joints = Joints{.count = 2, .angle = {0.5, -0.25}, .velocity = {0.125, 2}};
     DeviceState seen;
@@ -213,7 +230,7 @@ TEST_F(Handle, JointsAreToldToThoseThatNamedTheFeature) {
     EXPECT_GT(seen.tick, 100U);
     EXPECT_EQ(seen.joints, asks ? look_.joints : std::nullopt);
     ASSERT_TRUE(b.client->handle().has_value());
-    EXPECT_EQ(b.client->handle()->joints, asks ? config.handles[0].joints : std::vector<std::string>{});
+    EXPECT_EQ(b.client->handle()->joints, asks ? config.devices[0].handle.joints : std::vector<std::string>{});
 
     const std::uint64_t before = seen.tick;
     look_.joints->velocity[1] = std::numeric_limits<double>::infinity();  // in a singular pose

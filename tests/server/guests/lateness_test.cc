@@ -132,6 +132,54 @@ TEST(Lateness, AStandstillThatExplainsLittleOfTheDelayIsNotBlamed) {
   EXPECT_EQ(after_silence(milliseconds(150), 0).late_network, 1U);
 }
 
+/// Forces in time and a state each ms; then nothing of ours runs for `pause`.
+Engine stopped(Duration pause, bool same_machine) {
+  Engine engine(same_machine);
+  for (int i = 0; i < 200; ++i) {
+    engine.answer();
+    for (int ms = 9; ms >= 0; --ms) engine.lateness.took_state(engine.now() - milliseconds(ms));
+  }
+  engine.pause(pause);
+  return engine;
+}
+
+TEST(Lateness, APauseOfTheServerIsItsOwnWhateverTheRoundTripSays) {
+  for (const bool same_machine : {false, true}) {
+    Engine engine = stopped(milliseconds(190), same_machine);
+    engine.lateness.heard(engine.now(), PeerTime(seconds(7)), 0);
+    engine.answer({}, milliseconds(190));  // it has waited in our socket
+    const auto report = engine.lateness.report(engine.now());
+    EXPECT_EQ(report.late_ours, 1U);
+    EXPECT_EQ(report.late(), 1U);
+    EXPECT_EQ(report.text.substr(report.text.find(": ")), ": the server (its threads stood still for 390 ms)");
+  }
+}
+
+TEST(Lateness, APauseOfTheDevicesLoopAloneIsTheServersToo) {
+  Engine engine = stopped(milliseconds(190), true);
+  engine.lateness.took_state(engine.now());  // the first state after it, and its answer comes quickly
+  engine.answer();
+  const auto report = engine.lateness.report(engine.now());
+  EXPECT_EQ(report.late_ours, 1U);
+  EXPECT_EQ(report.text, "forces were late once, by up to 170 ms: the server (its threads stood still for 190 ms)");
+}
+
+TEST(Lateness, AForceThatIsMissingWhileStatesAreIsTheServersFault) {
+  for (const bool same_machine : {false, true}) {
+    Engine engine = stopped(seconds(2), same_machine);
+    const auto report = engine.lateness.report(engine.now());
+    EXPECT_EQ(report.late_ours, 1U);
+    EXPECT_EQ(report.late(), 1U);
+  }
+}
+
+TEST(Lateness, APauseThatExplainsLittleOfTheDelayIsNotBlamed) {
+  Engine engine = stopped(milliseconds(40), false);
+  for (int ms = 0; ms < 160; ++ms) engine.lateness.took_state(engine.now() + milliseconds(ms));
+  engine.answer({}, milliseconds(160));
+  EXPECT_EQ(engine.lateness.report(engine.now()).late_network, 1U);
+}
+
 TEST(Lateness, RefusedForcesAreNamedEvenWhenNoneEverCame) {
   Engine engine;
   engine.lateness.refused(Lateness::Cause::kNotFinite, 3);

@@ -59,7 +59,7 @@ class Desk {
   std::optional<Request> wanted_;
 };
 
-class TwoLeaders : public testing::Test {
+class TwoLeaders : public ::testing::Test {
  protected:
   void place(const std::vector<std::string>& settings = {}, const std::vector<std::string>& follower = {}) {
     follower_ = std::make_unique<Place>(wire_, scene_of("shared_follower.toml", follower), 1, now_);
@@ -149,7 +149,7 @@ TEST_F(TwoLeaders, WhoTakesAChannelOverIsHeardAndEngagesByAnActOfItsOwn) {
   EXPECT_EQ(trainee_->phase(), PortPhase::kCoupled);
   EXPECT_EQ(follower_->phase(kTrainer), PortPhase::kCoupled) << "engaged by nobody";
   cut_.reset();
-  trainee_->mail->orders.try_push({HapticOrder::Kind::kEngage});
+  trainee_->mail().orders.try_push({HapticOrder::Kind::kEngage});
   run(milliseconds(600));
   EXPECT_EQ(trainee_->phase(), PortPhase::kEngaged);
   EXPECT_EQ(follower_->phase(kTrainer), PortPhase::kEngaged);
@@ -202,7 +202,7 @@ TEST_F(TwoLeaders, ASentenceSaysWhyAShareIsNotMoved) {
     return answer.detail;
   };
   EXPECT_EQ(detail({.device = 0, .channel = 0, .share = 0.5}), "no leader comes by this channel");
-  follower_->network = nullptr;
+  follower_.reset();
   follower_ = std::make_unique<Place>(wire_, scene_of("shared_follower.toml", {"teleoperation.leader="}), 9, now_);
   desk_ = std::make_unique<Desk>(wire_, "127.0.0.1:50002", follower_->end.self, "desk", now_);
   run(milliseconds(300));
@@ -252,7 +252,7 @@ TEST_F(TwoLeaders, OfWhomOneFallsSilentTheOtherGoesOn) {
   cut_.reset();
   run(seconds(5), [this] { EXPECT_EQ(follower_->phase(kTrainer), PortPhase::kEngaged); });
   EXPECT_EQ(follower_->phase(kTrainee), PortPhase::kCoupled) << "nobody has pressed";
-  trainee_->mail->orders.try_push({HapticOrder::Kind::kEngage});
+  trainee_->mail().orders.try_push({HapticOrder::Kind::kEngage});
   run(milliseconds(100));
   EXPECT_EQ(follower_->phase(kTrainee), PortPhase::kEngaged);
   expect_sound();
@@ -264,10 +264,10 @@ TEST_F(TwoLeaders, AGuestThatIsNoLeaderEndsBothAndALeaderItself) {
   ASSERT_EQ(asked(Disengage{.device = 0}).code, Code::kOk);
   EXPECT_EQ(follower_->phase(kTrainer), PortPhase::kCoupled);
   EXPECT_EQ(follower_->phase(kTrainee), PortPhase::kCoupled);
-  for (Place* one : {trainer_.get(), trainee_.get()}) one->mail->orders.try_push({HapticOrder::Kind::kEngage});
+  for (Place* one : {trainer_.get(), trainee_.get()}) one->mail().orders.try_push({HapticOrder::Kind::kEngage});
   run(milliseconds(100));
   ASSERT_EQ(follower_->phase(kTrainee), PortPhase::kEngaged);
-  trainee_->mail->orders.try_push({HapticOrder::Kind::kDisengage});
+  trainee_->mail().orders.try_push({HapticOrder::Kind::kDisengage});
   run(milliseconds(100));
   EXPECT_EQ(follower_->phase(kTrainee), PortPhase::kCoupled);
   EXPECT_EQ(follower_->phase(kTrainer), PortPhase::kEngaged);

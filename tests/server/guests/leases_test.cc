@@ -37,6 +37,9 @@ TEST_F(TwoDevices, RefusesWhatIsNotThereAndSaysWhatIs) {
   Client b = controller_of(wall_, "192.0.2.2:4000", "right", "bone");
   run(milliseconds(50), {&b});
   EXPECT_EQ(b.client->stats().reason, "there is no channel \"bone\", only \"guidance\", \"tissue\"");
+  Client c = controller_of(wall_, "192.0.2.3:4000", "rihgt", "");
+  run(milliseconds(50), {&c});
+  EXPECT_EQ(c.client->stats().reason, "there is no device \"rihgt\", only \"left\", \"right\"; did you mean right?");
 }
 
 TEST_F(TwoDevices, ALeaseIsTakenFromAHolderThatHasFallenSilentAndNotBefore) {

@@ -21,12 +21,12 @@ class OutputsOfADevice : public TwoDevices {
   OutputsOfADevice() {
     NetworkLoop::Config config;
     config.keys = {wall_, other_, screen_};
-    config.devices = {{.name = "left", .model = "device", .loop_hz = 1000, .channels = {{.name = "main"}}},
-                      {.name = "right",
-                       .model = "device",
-                       .loop_hz = 1000,
-                       .channels = {{.name = "guidance", .lease = seconds(1)}, {.name = "tissue"}}}};
-    config.handles = {{}, {.outputs = outputs_}};
+    config.devices = {{.about = {.name = "left", .model = "device", .loop_hz = 1000, .channels = {{.name = "main"}}}},
+                      {.about = {.name = "right",
+                                 .model = "device",
+                                 .loop_hz = 1000,
+                                 .channels = {{.name = "guidance", .lease = seconds(1)}, {.name = "tissue"}}},
+                       .handle = {.outputs = outputs_}}};
     restart(config);
   }
 

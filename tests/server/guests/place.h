@@ -6,16 +6,13 @@
 #include <fstream>
 #include <iterator>
 #include <map>
-#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "devices/simulated/simulated_device.h"
+#include "server/assembly.h"
 #include "server/guests/couple.h"
-#include "server/haptic_loop.h"
-#include "server/network_loop.h"
-#include "server/scene/scene.h"
 #include "tests/support/wire.h"
 
 namespace tendon {
@@ -35,55 +32,39 @@ struct Place {
   Place(Wire& wire, const Scene& the_scene, std::uint64_t epoch, LocalTime now, bool is_coupled = true,
         const std::optional<Key>& key = {})
       : scene(the_scene), end(wire, scene.network.listen), device(scene.simulated()) {
-    const Coupling::Config& coupling = *scene.loop.control.coupling;
-    scene.loop.control.coupling->spring.epoch = epoch;
-    haptic = std::make_unique<HapticLoop>(scene.loop, device, *mail);
-    NetworkLoop::Config config;
-    config.secret.fill(std::byte{7});
-    config.first_connection_id = static_cast<std::uint32_t>(1000 * epoch);
-    DeviceDescription about{.name = scene.name, .model = "device", .loop_hz = 1000};
-    for (const Scene::Channel& channel : scene.channels) {
-      about.channels.push_back({.name = channel.name, .lease = channel.lease});
+    if (!is_coupled) scene.teleoperation.reset();
+    Assembly::Config config{.now = now,
+                            .epoch = epoch,
+                            .watched = Mailboxes::Capacities{.steps = 16, .ports = 32, .flight = 2, .datagrams = 1}};
+    config.network.secret.fill(std::byte{7});
+    config.network.first_connection_id = static_cast<std::uint32_t>(1000 * epoch);
+    if (key && !scene.dials()) {
+      config.network.keys = {{.name = "leader", .role = Role::kController, .key = *key}};
     }
-    config.devices = {about};
-    if (is_coupled) {
-      config.couplings = {couple_of(coupling)};
-      auto& leaders = config.leaders.emplace_back();
-      for (const CoupledLeader& leader : scene.loop.control.leaders) leaders.push_back(leader.channel);
-    }
-    if (is_coupled && scene.teleoperation->dial) {
-      config.dials.push_back({0,
-                              {.server = *scene.teleoperation->dial,
-                               .name = scene.name,
-                               .key = key,
-                               .seed = epoch,
-                               .channel = scene.teleoperation->channel,
-                               .couple = *config.couplings[0]}});
-    } else if (key) {
-      config.keys = {{.name = "leader", .role = Role::kController, .key = *key}};
-    }
-    network = std::make_unique<NetworkLoop>(config, end, std::vector<Mailboxes*>{mail.get()});
-    network->turn(now);
+    server.emplace(std::vector<Assembly::Part>{{.scene = scene, .device = device, .dial_key = key, .dial_seed = epoch}},
+                   config, std::vector<Link*>{&end});
+    server->turn_network(0, now);
   }
 
   void step(LocalTime now) {
-    haptic->step(now);
-    network->turn(now);
-    for (const PortRecord* port = mail->ports.front(); port != nullptr; port = mail->ports.front()) {
+    server->haptic_groups().front().turn(now);
+    server->turn_network(0, now);
+    for (const PortRecord* port = mail().ports.front(); port != nullptr; port = mail().ports.front()) {
       ports_[port->channel] = *port;
-      mail->ports.pop();
+      mail().ports.pop();
     }
-    while (const StepRecord* record = mail->steps.front()) {
+    while (const StepRecord* record = mail().steps.front()) {
       least_energy = std::min(least_energy, record->energy);
       if (record->grip() != nullptr) least_energy = std::min(least_energy, record->grip()->energy);
       if (record->handle) handle = *record->handle;
       position = record->hand.position;
       force = record->applied;
-      mail->steps.pop();
+      mail().steps.pop();
     }
-    for (const auto& said : network->take_notices()) notices.push_back(said.text);
+    for (const auto& said : server->network().take_notices()) notices.push_back(said.text);
   }
 
+  Mailboxes& mail() { return server->devices().front().mail; }
   /// Of the coupling by that channel, in the newest step; of a device with one coupling channel 0.
   const PortRecord& newest(std::uint32_t channel = 0) { return ports_[channel]; }
   PortPhase phase(std::uint32_t channel = 0) { return newest(channel).sent.phase; }
@@ -95,10 +76,7 @@ struct Place {
   Scene scene;
   End end;
   SimulatedDevice device;
-  std::unique_ptr<Mailboxes> mail =
-      std::make_unique<Mailboxes>(Mailboxes::Capacities{.steps = 16, .ports = 32, .flight = 2, .datagrams = 1});
-  std::unique_ptr<HapticLoop> haptic;
-  std::unique_ptr<NetworkLoop> network;
+  std::optional<Assembly> server;
   double least_energy = 0;  ///< J, of all accounts of the device
   Vec3 position = Vec3::Zero();
   Vec3 force = Vec3::Zero();

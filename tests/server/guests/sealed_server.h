@@ -24,7 +24,7 @@ inline ClientKey key_of(const std::string& name, Role role, std::uint64_t seed) 
 }
 
 /// Z, the server, and whoever a test lets come.
-class SealedServer : public testing::Test {
+class SealedServer : public ::testing::Test {
  protected:
   struct Client {
     std::unique_ptr<End> end;
@@ -40,14 +40,15 @@ class SealedServer : public testing::Test {
   void restart(NetworkLoop::Config config) {
     config.secret.fill(std::byte{7});
     if (config.devices.empty()) {
-      config.devices = {{.name = "left", .model = "device", .loop_hz = 1000, .channels = {{.name = "main"}}}};
+      config.devices = {
+          {.about = {.name = "left", .model = "device", .loop_hz = 1000, .channels = {{.name = "main"}}}}};
     }
-    std::vector<Mailboxes*> mail = {mail_.get()};
+    config.devices[0].mail = mail_.get();
     if (config.devices.size() > 1) {
       second_ = std::make_unique<Mailboxes>(Mailboxes::Capacities{.datagrams = 1});
-      mail.push_back(second_.get());
+      config.devices[1].mail = second_.get();
     }
-    loop_ = std::make_unique<NetworkLoop>(config, server_, mail);
+    loop_ = std::make_unique<NetworkLoop>(config, server_, now_);
   }
 
   static ForceClient::Config config_of(const std::optional<ClientKey>& key, std::uint64_t seed) {
@@ -220,15 +221,15 @@ class TwoDevices : public SealedServer {
     NetworkLoop::Config config;
     config.keys = {wall_, other_, screen_};
     config.takeover = {"other"};
-    config.devices = {{.name = "left", .model = "device", .loop_hz = 1000, .channels = {{.name = "main"}}},
-                      {.name = "right",
-                       .model = "device",
-                       .loop_hz = 1000,
-                       .channels = {{.name = "guidance"},
-                                    {.name = "tissue",
-                                     .rule = ChannelRule::kPriority,
-                                     .lease = std::chrono::milliseconds(500),
-                                     .holder = {}}}}};
+    config.devices = {{.about = {.name = "left", .model = "device", .loop_hz = 1000, .channels = {{.name = "main"}}}},
+                      {.about = {.name = "right",
+                                 .model = "device",
+                                 .loop_hz = 1000,
+                                 .channels = {{.name = "guidance"},
+                                              {.name = "tissue",
+                                               .rule = ChannelRule::kPriority,
+                                               .lease = std::chrono::milliseconds(500),
+                                               .holder = {}}}}}};
     restart(config);
   }
 

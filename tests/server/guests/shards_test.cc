@@ -22,9 +22,10 @@ namespace {
 
 using std::chrono::milliseconds;
 
-/// A sealed server with 40 devices, "d-0" to "d-39", in two shards: the first has one bank, the second one two. Data
-/// come to the shard of their connection, all else to the first, as through UdpLink::several.
-class Shards : public testing::Test {
+/// This fixture runs a sealed server with two shards and 40 devices, "d-0" to "d-39". There is one bank in the first
+/// shard, and there are two in the second. As in UdpLink::several, data is delivered to the shard that owns the
+/// connection. All other datagrams are delivered to the first shard.
+class Shards : public ::testing::Test {
  protected:
   static constexpr std::uint32_t kDevices = 40;
 
@@ -35,9 +36,10 @@ class Shards : public testing::Test {
 
   Shards() {
     for (std::uint32_t i = 0; i < kDevices; ++i) {
-      config_.devices.push_back({.name = name(i), .model = "device", .loop_hz = 1000, .channels = {{.name = "main"}}});
       boxes_.push_back(std::make_unique<Mailboxes>(Mailboxes::Capacities{.steps = 2, .flight = 2, .datagrams = 1024}));
-      mail_.push_back(boxes_.back().get());
+      config_.devices.push_back(
+          {.about = {.name = name(i), .model = "device", .loop_hz = 1000, .channels = {{.name = "main"}}},
+           .mail = boxes_.back().get()});
     }
     config_.secret.fill(std::byte{7});
     config_.keys = {key_of("a", Role::kController, 1), key_of("b", Role::kController, 2)};
@@ -50,7 +52,7 @@ class Shards : public testing::Test {
   void restart() {
     for (std::uint32_t i = 0; i < 2; ++i) {
       config_.shard.number = i;
-      loops_[i] = std::make_unique<NetworkLoop>(config_, ends_[i], mail_);
+      loops_[i] = std::make_unique<NetworkLoop>(config_, ends_[i], now_);
     }
   }
 
@@ -120,7 +122,6 @@ class Shards : public testing::Test {
   Wire wire_;
   std::array<End, 2> ends_ = {End(wire_, server_), End(wire_, server_)};
   std::vector<std::unique_ptr<Mailboxes>> boxes_;
-  std::vector<Mailboxes*> mail_;
   NetworkLoop::Config config_;
   std::array<std::unique_ptr<NetworkLoop>, 2> loops_;
   std::map<std::uint32_t, std::vector<double>> seen_;  ///< by the client's port: x of the states, the device's place
@@ -249,7 +250,7 @@ TEST_F(Shards, TogetherTheirCountsAreThoseOfTheServer) {
 }
 
 TEST_F(Shards, AServerThatDialsHasItsPeerWhereTheDeviceIs) {
-  config_.dials = {{.device = 20, .peer = {.server = parse_address("198.51.100.7:1"), .name = "peer"}}};
+  config_.devices[20].dial = Peer::Config{.server = parse_address("198.51.100.7:1"), .name = "peer"};
   restart();
   for (std::uint32_t i = 0; i < 2; ++i) {
     loops_.at(i)->turn(now_);
@@ -261,7 +262,7 @@ TEST_F(Shards, AServerThatDialsHasItsPeerWhereTheDeviceIs) {
 TEST_F(Shards, AShardThatCannotBeIsRefused) {
   for (const Shard shard : {Shard{0, 4}, Shard{0, 3}, Shard{2, 2}, Shard{0, 0}}) {
     config_.shard = shard;
-    EXPECT_THROW(NetworkLoop(config_, ends_[0], mail_), std::invalid_argument) << shard.number << " of " << shard.of;
+    EXPECT_THROW(NetworkLoop(config_, ends_[0], now_), std::invalid_argument) << shard.number << " of " << shard.of;
   }
 }
 

@@ -15,6 +15,7 @@
 
 #include "tests/server/scratch_folder.h"
 #include "tests/support/fake_avahi.h"
+#include "tests/support/refusal.h"
 
 namespace tendon::announcer_test {
 namespace {
@@ -140,16 +141,20 @@ TEST_F(Announcing, OneAddressIsToldToItsOwnInterface) {
   EXPECT_EQ(avahi.announced().front().interface, -1);
 }
 
+TEST_F(Announcing, AllAddressesOfBothFamiliesAreToldByBothProtocols) {
+  Running running({{"falcon", kFalcon}}, "[::]:5");
+  ASSERT_TRUE(soon([&] { return avahi.announced().size() == 1; }));
+  EXPECT_EQ(avahi.announced().front().protocol, -1);
+}
+
 TEST_F(Announcing, AServerOfThisMachineAloneIsNotAnnounced) {
   for (const std::string listen : {"127.0.0.1:47100", "[::1]:47100"}) {
-    try {
-      Running running({{"falcon", kFalcon}}, listen);
-      FAIL() << listen;
-    } catch (const std::runtime_error& error) {
-      EXPECT_EQ(error.what(), "[discovery] announce: the server listens on " + listen +
-                                  ", which no other machine reaches; expected [network] with listen = "
-                                  "\"0.0.0.0:47100\", or another address of this machine, and keys");
-    }
+    EXPECT_EQ(thrown_by<std::runtime_error>([&] {
+                Running running({{"falcon", kFalcon}}, listen);
+              }),
+              "[discovery] announce: the server listens on " + listen +
+                  ", which no other machine reaches; expected [network] with listen = "
+                  "\"0.0.0.0:47100\", or another address of this machine, and keys");
   }
 }
 

@@ -10,6 +10,7 @@
 #include <string>
 
 #include "tests/server/scratch_folder.h"
+#include "tests/support/refusal.h"
 
 namespace tendon::regular_file_test {
 namespace {
@@ -17,12 +18,7 @@ namespace {
 using testing::ScratchFolder;
 
 std::string refusal(const std::filesystem::path& file, std::string_view kind = {}) {
-  try {
-    open_regular_file(file, kind);
-  } catch (const std::runtime_error& refused) {
-    return refused.what();
-  }
-  return "none";
+  return thrown_by<std::runtime_error>([&] { open_regular_file(file, kind); });
 }
 
 TEST(RegularFile, IsReadAlsoThroughALink) {

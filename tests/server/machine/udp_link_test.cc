@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "protocol/wire/header.h"
+#include "tests/support/refusal.h"
 
 namespace tendon::udp_link_test {
 namespace {
@@ -34,12 +35,7 @@ std::vector<std::byte> bytes(std::size_t size, int first) {
 
 template <typename Error>
 std::string complaint_about(const Address& listen) {
-  try {
-    const UdpLink link(listen);
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "";
+  return thrown_by<Error>([&] { const UdpLink link(listen); });
 }
 
 bool is_readable(int fd) {
@@ -52,7 +48,7 @@ std::ptrdiff_t open_files() {
   return std::distance(std::filesystem::directory_iterator("/proc/self/fd"), std::filesystem::directory_iterator());
 }
 
-class UdpLinkTest : public testing::TestWithParam<Address> {};
+class UdpLinkTest : public ::testing::TestWithParam<Address> {};
 
 // An epoll that watched it would cost each datagram a wake-up for nobody.
 TEST_P(UdpLinkTest, HasASocketAndNoOtherFile) {
@@ -125,7 +121,73 @@ TEST_P(UdpLinkTest, APortInUseIsRefusedByNameAndReason) {
   const UdpLink first(GetParam());
   const Address taken = first.local_address();
   EXPECT_EQ(complaint_about<std::runtime_error>(taken),
-            "cannot listen on " + to_string(taken) + ": Address already in use");
+            "cannot listen on " + to_string(taken) + ": Address already in use; `ss -lunp` says by which program");
+}
+
+/// Sends a datagram from `client` to `asked_at` and returns the source address of the answer.
+Address answered_from(UdpLink& client, const Address& asked_at, UdpLink& hears, UdpLink& answers) {
+  client.send(asked_at, bytes(5, 1));
+  Bytes buffer(kMaxDatagram);
+  Address from;
+  hears.wait(kForever);
+  if (hears.receive(from, buffer) != 5) return {};
+  EXPECT_EQ(from, client.local_address());
+  answers.send(from, bytes(6, 1));
+  client.wait(kForever);
+  if (client.receive(from, buffer) != 6) return {};
+  return from;
+}
+
+// A client with a connected socket drops an answer from any other address.
+TEST(UdpLink, OnAllAddressesItAnswersFromTheOneThatWasAsked) {
+  for (const char* all : {"0.0.0.0:0", "[::]:0"}) {
+    UdpLink link(parse_address(all), Reach::kAnywhere);
+    const std::string port = ":" + std::to_string(link.local_address().port);
+    for (const char* const own : {"127.0.0.1:0", "127.0.0.9:0"}) {
+      UdpLink client(parse_address(own));
+      for (const char* const host : {"127.0.0.1", "127.0.0.2", "127.0.0.3", "127.0.0.2"}) {
+        const Address asked = parse_address(host + port);
+        EXPECT_EQ(to_string(answered_from(client, asked, link, link)), to_string(asked)) << all << ' ' << own;
+      }
+    }
+    EXPECT_EQ(link.send_failures(), 0U);
+  }
+}
+
+TEST(UdpLink, OnAllAddressesOfIpv6ItHearsBothFamilies) {
+  UdpLink link(parse_address("[::]:0"), Reach::kAnywhere);
+  const std::string port = ":" + std::to_string(link.local_address().port);
+  UdpLink six(kAnyPort6);
+  UdpLink four(kAnyPort4);
+  EXPECT_EQ(to_string(answered_from(six, parse_address("[::1]" + port), link, link)), "[::1]" + port);
+  EXPECT_EQ(to_string(answered_from(four, parse_address("127.0.0.2" + port), link, link)), "127.0.0.2" + port);
+}
+
+// The first link receives each Hello, but the answer can be sent by another link.
+TEST(UdpLink, SeveralOnAllAddressesKnowWhereAPeerHasAskedOneOfThem) {
+  for (const char* all : {"0.0.0.0:0", "[::]:0"}) {
+    const auto links = UdpLink::several(parse_address(all), Reach::kAnywhere, 2);
+    const Address asked = parse_address("127.0.0.2:" + std::to_string(links[0]->local_address().port));
+    UdpLink client(kAnyPort4);
+    EXPECT_EQ(to_string(answered_from(client, asked, *links[0], *links[1])), to_string(asked));
+  }
+}
+
+TEST(UdpLink, AnswersWhoHasLostItsPlaceAmongThousands) {
+  UdpLink link(parse_address("0.0.0.0:0"), Reach::kAnywhere);
+  const Address asked = parse_address("127.0.0.1:" + std::to_string(link.local_address().port));
+  UdpLink first(kAnyPort4);
+  EXPECT_EQ(answered_from(first, asked, link, link), asked);
+  AskedAt crowd;
+  Address peer = first.local_address();
+  crowd.put(peer, asked.ip);
+  EXPECT_EQ(crowd.find(peer), asked.ip);
+  for (int i = 0; i < 100'000; ++i) {
+    ++peer.port;
+    peer.ip[15] = static_cast<std::uint8_t>(i >> 16);
+    crowd.put(peer, kAnyPort6.ip);
+    EXPECT_EQ(crowd.find(peer), kAnyPort6.ip);
+  }
 }
 
 Bytes of_connection(std::uint32_t id, DatagramType type = DatagramType::kData) {
@@ -172,14 +234,10 @@ TEST_P(UdpLinkTest, OfSeveralTheFirstGetsAllElse) {
 TEST_P(UdpLinkTest, SeveralRefuseAnAddressOfOthersAndKeepOthersOutOfTheirs) {
   const auto links = UdpLink::several(GetParam(), Reach::kThisMachine, 2);
   const Address taken = links[0]->local_address();
-  const std::string refusal = "cannot listen on " + to_string(taken) + ": Address already in use";
+  const std::string refusal =
+      "cannot listen on " + to_string(taken) + ": Address already in use; `ss -lunp` says by which program";
   EXPECT_EQ(complaint_about<std::runtime_error>(taken), refusal);
-  try {
-    UdpLink::several(taken, Reach::kThisMachine, 2);
-    ADD_FAILURE() << "a second server would take the first one's guests";
-  } catch (const std::runtime_error& refused) {
-    EXPECT_EQ(refused.what(), refusal);
-  }
+  EXPECT_EQ(thrown_by<std::runtime_error>([&] { UdpLink::several(taken, Reach::kThisMachine, 2); }), refusal);
 }
 
 TEST_P(UdpLinkTest, OfSeveralEachAnswersFromTheirAddress) {
@@ -193,7 +251,7 @@ TEST_P(UdpLinkTest, OfSeveralEachAnswersFromTheirAddress) {
   EXPECT_EQ(from, links[0]->local_address());
 }
 
-INSTANTIATE_TEST_SUITE_P(Ipv4AndIpv6, UdpLinkTest, testing::Values(kAnyPort4, kAnyPort6),
+INSTANTIATE_TEST_SUITE_P(Ipv4AndIpv6, UdpLinkTest, ::testing::Values(kAnyPort4, kAnyPort6),
                          [](const auto& test) { return test.param == kAnyPort4 ? "Ipv4" : "Ipv6"; });
 
 TEST(UdpLink, RefusesAnAddressThatOthersCanReachAndSaysWhy) {

@@ -20,6 +20,7 @@
 
 #include "server/machine/udp_link.h"
 #include "tests/server/scratch_folder.h"
+#include "tests/support/refusal.h"
 
 namespace tendon::unix_socket_test {
 namespace {
@@ -66,12 +67,7 @@ class Peer {
 };
 
 std::string complaint_about(const std::filesystem::path& file) {
-  try {
-    const UnixSocket socket(file);
-  } catch (const std::runtime_error& error) {
-    return error.what();
-  }
-  return "";
+  return thrown_by<std::runtime_error>([&] { const UnixSocket socket(file); });
 }
 
 TEST(UnixSocket, BringsDatagramsThereAndBackByTheirSender) {

@@ -19,6 +19,7 @@
 
 #include "tests/server/recording/recording_samples.h"
 #include "tests/server/scratch_folder.h"
+#include "tests/support/refusal.h"
 
 namespace tendon::byte_sink_test {
 namespace {
@@ -49,12 +50,8 @@ TEST(FileSink, SharesWhatHasNothingToLose) {
 }
 
 TEST(FileSink, NamesPathAndReasonWhenItCannotOpen) {
-  try {
-    FileSink sink("/nowhere/at/all/run.mcap");
-    FAIL();
-  } catch (const std::runtime_error& error) {
-    EXPECT_STREQ(error.what(), "cannot write recording /nowhere/at/all/run.mcap: No such file or directory");
-  }
+  EXPECT_EQ(thrown_by<std::runtime_error>([&] { FileSink sink("/nowhere/at/all/run.mcap"); }),
+            "cannot write recording /nowhere/at/all/run.mcap: No such file or directory");
 }
 
 TEST(FileSink, ReportsAFullDisk) {
@@ -69,12 +66,8 @@ TEST(FileSink, NeverTouchesWhatWasThere) {
   const auto path = folder.path() / "run.mcap";
   { ASSERT_TRUE(FileSink(path).append(bytes("old and long"))); }
   EXPECT_EQ(FileSink::open_new(path), nullptr);
-  try {
-    FileSink sink(path);
-    FAIL();
-  } catch (const std::runtime_error& error) {
-    EXPECT_EQ(error.what(), "cannot write recording " + path.string() + ": there is a file of that name already");
-  }
+  EXPECT_EQ(thrown_by<std::runtime_error>([&] { FileSink sink(path); }),
+            "cannot write recording " + path.string() + ": there is a file of that name already");
   EXPECT_EQ(std::filesystem::file_size(path), 12U);
 }
 
@@ -97,12 +90,7 @@ TEST(FileSink, RefusesWhatIsNoFileAndDoesNotHang) {
   const auto pipe = folder.path() / "pipe.mcap";
   ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
   const auto refusal = [](const std::filesystem::path& path) {
-    try {
-      FileSink::open_new(path);
-    } catch (const std::runtime_error& error) {
-      return std::string(error.what());
-    }
-    return std::string();
+    return thrown_by<std::runtime_error>([&] { FileSink::open_new(path); });
   };
   const std::string cannot = "cannot write recording ";
   EXPECT_EQ(refusal(pipe), cannot + pipe.string() + ": it is a named pipe, expected a regular file");
@@ -113,6 +101,32 @@ TEST(FileSink, RefusesWhatIsNoFileAndDoesNotHang) {
 }
 
 /// A disk with room for part of the piece only: the kernel's limit on the size of a file plays it.
+TEST(FileSink, NoticesThatItsFileWasDeletedOrCutOff) {
+  const ScratchFolder folder;
+  const auto path = folder.path() / "run.mcap";
+  const auto outcome = [&](auto harm) {
+    FileSink sink(path);
+    EXPECT_TRUE(sink.append(bytes("0123")));
+    harm();
+    EXPECT_FALSE(sink.append(bytes("4567")));
+    EXPECT_TRUE(sink.gone());
+    std::filesystem::remove(path);
+    return sink.error();
+  };
+  const std::string begin = "cannot write recording " + path.string() + ": it was ";
+  EXPECT_EQ(outcome([&] { std::filesystem::remove(path); }), begin + "deleted meanwhile");
+  EXPECT_EQ(outcome([&] { std::filesystem::resize_file(path, 0); }), begin + "cut off meanwhile");
+}
+
+TEST(FileSink, WritesOnInAFileThatWasMovedAway) {
+  const ScratchFolder folder;
+  FileSink sink(folder.path() / "run.mcap");
+  EXPECT_TRUE(sink.append(bytes("0123")));
+  std::filesystem::rename(folder.path() / "run.mcap", folder.path() / "kept.mcap");
+  EXPECT_TRUE(sink.append(bytes("4567"))) << sink.error();
+  EXPECT_EQ(std::filesystem::file_size(folder.path() / "kept.mcap"), 8U);
+}
+
 TEST(FileSink, CutsOffAPieceThatDidNotFit) {
   const ScratchFolder folder;
   const auto path = folder.path() / "run.mcap";

@@ -10,6 +10,7 @@
 
 #include "tests/server/recording/recording_samples.h"
 #include "tests/server/scratch_folder.h"
+#include "tests/support/refusal.h"
 
 namespace tendon::flight_file_test {
 namespace {
@@ -59,12 +60,8 @@ TEST(FlightFile, ThatDoesNotTakeItAllIsAnErrorWithTheReason) {
   }
   flight.freeze();
   FileSink full("/dev/full");
-  try {
-    write_flight(flight, testing::sample_config(), Ways(), full);
-    FAIL();
-  } catch (const std::runtime_error& error) {
-    EXPECT_STREQ(error.what(), "cannot write recording /dev/full: No space left on device");
-  }
+  EXPECT_EQ(thrown_by<std::runtime_error>([&] { write_flight(flight, testing::sample_config(), Ways(), full); }),
+            "cannot write recording /dev/full: No space left on device");
   MemorySink memory;
   write_flight(flight, testing::sample_config(), ways, memory);
   RecordingReader reader(testing::stream(memory.bytes()), "a.mcap");

@@ -9,6 +9,7 @@
 #include <sstream>
 #include <stdexcept>
 #include <string>
+#include <vector>
 
 #include "server/recording/byte_sink.h"
 #include "server/recording/mcap_writer.h"
@@ -32,6 +33,8 @@ std::string sample_file() {
 struct Outcome {
   std::string messages;
   std::string error;
+  std::vector<std::string> damage;
+  std::uint64_t missing = 0;
   bool truncated = false;
 };
 
@@ -41,7 +44,10 @@ Outcome read(const std::string& file) {
     McapReader reader(std::make_unique<std::istringstream>(file), "a.mcap");
     while (const auto message = reader.next()) {
       outcome.messages += message->data;
+      outcome.missing += message->missing;
     }
+    outcome.missing += reader.missing_at_end("/t");
+    outcome.damage = reader.damage();
     outcome.truncated = reader.truncated();
   } catch (const std::runtime_error& error) {
     outcome.error = error.what();
@@ -86,28 +92,138 @@ TEST(McapReader, GivesTheWholeChunksOfAFileCutAnywhere) {
   EXPECT_EQ(seen, 6U);
 }
 
-TEST(McapReader, NoticesEveryFlippedBit) {
+/// The positions of the chunks in `sample_file`, see McapWriter.WritesTheBytesOfTheSpecification. A chunk has three
+/// messages of 32 bytes. Its index has three entries of 16 bytes.
+constexpr std::size_t kFirstChunk = 8 + 20 + 26 + 28;
+constexpr std::size_t kChunk = 9 + 40 + 3 * 32;
+constexpr std::size_t kSecondChunk = kFirstChunk + kChunk + 9 + 6 + 3 * 16;
+
+/// Returns the messages of the chunks that do not overlap with the range [from, to).
+std::string outside_of(std::size_t from, std::size_t to) {
+  const auto whole = [&](std::size_t chunk) { return to <= chunk || from >= chunk + kChunk; };
+  return std::string(whole(kFirstChunk) ? "012" : "") + (whole(kSecondChunk) ? "345" : "");
+}
+
+/// Checks that `outcome` contains at least the messages in `least`, and only complete chunks.
+void expect_at_least(const Outcome& outcome, const std::string& least) {
+  EXPECT_EQ(outcome.error, "");
+  for (const std::string& chunk : {std::string("012"), std::string("345")}) {
+    if (least.find(chunk) != std::string::npos) EXPECT_NE(outcome.messages.find(chunk), std::string::npos);
+  }
+  EXPECT_TRUE(outcome.messages.empty() || outcome.messages == "012" || outcome.messages == "345" ||
+              outcome.messages == "012345")
+      << outcome.messages;
+}
+
+TEST(McapReader, NoticesEveryFlippedBitAndLosesNoOtherChunk) {
   const std::string file = sample_file();
   for (std::size_t at = 0; at < file.size(); ++at) {
     for (int bit = 0; bit < 8; ++bit) {
+      SCOPED_TRACE("byte " + std::to_string(at) + " bit " + std::to_string(bit));
       std::string flipped = file;
       flipped[at] = static_cast<char>(static_cast<unsigned char>(flipped[at]) ^ (1U << bit));
       const Outcome outcome = read(flipped);
-      EXPECT_NE(outcome.error, "") << "byte " << at << " bit " << bit;
+      EXPECT_FALSE(outcome.damage.empty());
+      EXPECT_FALSE(outcome.truncated);
+      expect_at_least(outcome, outside_of(at, at + 1));
+      EXPECT_EQ(outcome.missing, 6 - outcome.messages.size());
     }
   }
 }
 
-TEST(McapReader, NamesFileAndByteOfCorruption) {
+TEST(McapReader, LosesOnlyTheChunksThatZerosCover) {
+  const std::string file = sample_file();
+  for (const std::size_t length : {1U, 4U, 8U, 16U, 40U, 64U, 200U}) {
+    for (std::size_t at = 8; at + length <= file.size(); ++at) {
+      SCOPED_TRACE(std::to_string(length) + " zeros at " + std::to_string(at));
+      std::string damaged = file;
+      damaged.replace(at, length, length, '\0');
+      expect_at_least(read(damaged), outside_of(at, at + length));
+    }
+  }
+}
+
+TEST(McapReader, TakesZerosAtTheEndAsTheEnd) {
+  const std::string file = sample_file();
+  for (std::size_t size = 0; size < file.size(); ++size) {
+    const Outcome cut = read(file.substr(0, size));
+    for (const std::size_t zeros : {1U, 100U, 5000U}) {
+      SCOPED_TRACE("cut at " + std::to_string(size) + ", then " + std::to_string(zeros) + " zeros");
+      const Outcome outcome = read(file.substr(0, size) + std::string(zeros, '\0'));
+      EXPECT_EQ(outcome.error, "");
+      EXPECT_EQ(outcome.messages.substr(0, cut.messages.size()), cut.messages);
+      EXPECT_TRUE(outcome.truncated);
+      EXPECT_TRUE(outcome.damage.empty()) << outcome.damage.front();
+    }
+  }
+}
+
+TEST(McapReader, TakesZerosBehindAWholeFileAsNothing) {
+  const Outcome outcome = read(sample_file() + std::string(5000, '\0'));
+  EXPECT_EQ(outcome.messages, "012345");
+  EXPECT_FALSE(outcome.truncated);
+  EXPECT_TRUE(outcome.damage.empty());
+}
+
+TEST(McapReader, FindsTheNextChunkBehindBytesThatAreGone) {
+  const std::string file = sample_file();
+  for (const std::size_t length : {1U, 7U, 50U, 145U, 208U}) {
+    for (std::size_t at = 8; at + length <= file.size(); ++at) {
+      SCOPED_TRACE(std::to_string(length) + " bytes gone at " + std::to_string(at));
+      std::string damaged = file;
+      damaged.erase(at, length);
+      const Outcome outcome = read(damaged);
+      expect_at_least(outcome, outside_of(at, at + length));
+    }
+  }
+}
+
+TEST(McapReader, SaysThatAWholeChunkIsGone) {
   std::string file = sample_file();
-  // Magic, header, schema and channel as in McapWriter.WritesTheBytesOfTheSpecification; a chunk of three messages of
-  // 32 bytes, its index of three entries of 16 bytes; and then the second chunk.
-  const std::size_t second_chunk = 8 + 20 + 26 + 28 + (9 + 40 + 3 * 32) + (9 + 6 + 3 * 16);
-  ASSERT_EQ(file[second_chunk], '\x06');
-  file[second_chunk + 9 + 40 + 31] = 'x';  // the first message's data
+  file.erase(kFirstChunk, kSecondChunk - kFirstChunk);
   const Outcome outcome = read(file);
-  EXPECT_EQ(outcome.messages, "012") << "what comes before the corruption is given";
-  EXPECT_EQ(outcome.error, "a.mcap: byte " + std::to_string(second_chunk) + ": the CRC of a chunk does not match");
+  EXPECT_EQ(outcome.messages, "345");
+  EXPECT_EQ(outcome.missing, 3U);
+  ASSERT_EQ(outcome.damage.size(), 1U);
+  EXPECT_EQ(outcome.damage[0], "a.mcap: byte " + std::to_string(kFirstChunk) +
+                                   ": messages before it are missing: a part of the file is gone, before 0.000 s");
+}
+
+TEST(McapReader, NamesFileBytesAndTimesOfDamage) {
+  std::string file = sample_file();
+  ASSERT_EQ(file[kSecondChunk], '\x06');
+  file[kSecondChunk + 9 + 40 + 31] = 'x';  // the data of the first message
+  const Outcome outcome = read(file);
+  EXPECT_EQ(outcome.messages, "012");
+  ASSERT_EQ(outcome.damage.size(), 1U);
+  EXPECT_EQ(outcome.damage[0], "a.mcap: byte " + std::to_string(kSecondChunk) +
+                                   ": the CRC of a chunk does not match; 145 bytes are left out, after 0.000 s");
+}
+
+// A client could send a datagram that contains a chunk. It must not be used if the length of the outer chunk is
+// damaged.
+TEST(McapReader, ReadsNoChunkWithinAChunkWhoseLengthIsDamaged) {
+  const std::string whole = sample_file();
+  MemorySink sink;
+  McapWriter writer("lib", sink);
+  const auto channel = writer.add_channel(writer.add_schema("S", "e", "d"), "/t", "e");
+  writer.write(channel, 0, whole.substr(kFirstChunk, kSecondChunk - kFirstChunk) + "  ");
+  writer.flush_chunk();
+  writer.write(channel, 1, "z");
+  writer.close();
+  const std::string file(reinterpret_cast<const char*>(sink.bytes().data()), sink.bytes().size());
+  for (const std::size_t length_at : {1U, 9U + 16U, 9U + 32U}) {
+    for (const bool crc_too : {false, true}) {
+      std::string damaged = file;
+      damaged[kFirstChunk + length_at] ^= 4;
+      if (crc_too) damaged[kFirstChunk + 9 + 24] ^= 1;
+      const Outcome outcome = read(damaged);
+      EXPECT_EQ(outcome.error, "");
+      EXPECT_EQ(outcome.messages.find("012"), std::string::npos);
+      EXPECT_EQ(outcome.messages.back(), 'z');
+      EXPECT_EQ(outcome.missing, crc_too ? 1U : 0U);
+    }
+  }
 }
 
 TEST(McapReader, RefusesWhatIsNotMcap) {
@@ -121,10 +237,14 @@ TEST(McapReader, CallsAnEmptyFileTruncated) {
   EXPECT_EQ(outcome.error, "");
 }
 
-TEST(McapReader, RefusesBytesAfterTheEnd) {
+TEST(McapReader, SaysThatBytesFollowTheEnd) {
   const std::string file = sample_file();
-  EXPECT_NE(read(file + "x").error.find("the file does not end after its footer"), std::string::npos);
-  EXPECT_NE(read(file + file).error.find("the file does not end after its footer"), std::string::npos);
+  for (const std::string& more : {std::string("x"), file}) {
+    const Outcome outcome = read(file + more);
+    EXPECT_EQ(outcome.messages, "012345");
+    ASSERT_EQ(outcome.damage.size(), 1U);
+    EXPECT_NE(outcome.damage[0].find("the file does not end after its footer"), std::string::npos);
+  }
 }
 
 }  // namespace

@@ -18,6 +18,7 @@
 #include "server/recording/flight_file.h"
 #include "tests/server/recording/recording_samples.h"
 #include "tests/server/scratch_folder.h"
+#include "tests/support/refusal.h"
 
 namespace tendon::part_recorder_test {
 namespace {
@@ -84,13 +85,9 @@ TEST(PartFiles, AFileThatIsNoRecordingIsRefusedAndLeftAsItIs) {
   const auto path = folder.path() / "scene.toml";
   std::ofstream(path) << "[device]\nkind = \"simulated\"\n";
   const auto size = fs::file_size(path);
-  try {
-    PartRecorder recorder(config_at(path));
-    FAIL();
-  } catch (const std::runtime_error& error) {
-    EXPECT_EQ(error.what(), "cannot write recording " + path.string() +
-                                ": there is a file of that name, which is no recording; it is left as it is");
-  }
+  EXPECT_EQ(thrown_by<std::runtime_error>([&] { PartRecorder recorder(config_at(path)); }),
+            "cannot write recording " + path.string() +
+                ": there is a file of that name, which is no recording; it is left as it is");
   EXPECT_EQ(fs::file_size(path), size);
   EXPECT_EQ(names_in(folder.path()).size(), 1U);
 }
@@ -126,6 +123,48 @@ TEST(PartRecorder, EachPartIsAWholeRecordingAndNoStepIsMissing) {
     for (const StepRecord& step : contents.steps) ASSERT_EQ(step.tick, tick++);
   }
   EXPECT_EQ(tick, 3500U);
+}
+
+TEST(PartRecorder, CountsTheStepsOfADeletedFileAsMissingAndGoesOnInItsFolder) {
+  const ScratchFolder folder;
+  const auto path = folder.path() / "runs" / "run.mcap";
+  fs::create_directory(path.parent_path());
+  PartRecorder recorder(config_at(path));
+  record_run(recorder, 0, 1000);
+  fs::remove_all(path.parent_path());
+  record_run(recorder, 1000, 1000);
+  const auto missing = recorder.status();
+  EXPECT_EQ(missing.steps, 0U);
+  EXPECT_EQ(missing.lost_steps, 2000U);
+  EXPECT_FALSE(missing.complete());
+  const auto notices = recorder.take_notices();
+  ASSERT_EQ(notices.size(), 1U) << "not one each second";
+  EXPECT_TRUE(notices[0].warning);
+  EXPECT_NE(notices[0].text.find(path.string() + ": it was deleted meanwhile"), std::string::npos) << notices[0].text;
+
+  fs::create_directory(path.parent_path());
+  record_run(recorder, 2000, 2000);
+  recorder.close(ms(4000));
+  const auto status = recorder.status();
+  EXPECT_EQ(status.steps + status.lost_steps, 4000U);
+  EXPECT_GE(status.steps, 900U);
+  EXPECT_FALSE(status.complete());
+  EXPECT_EQ(status.error, "");
+  const Contents again = read_file(path);
+  EXPECT_EQ(again.steps.size(), status.steps);
+  ASSERT_EQ(again.losses.size(), 1U);
+  EXPECT_EQ(again.losses[0].steps, status.lost_steps);
+}
+
+TEST(PartRecorder, AFileThatIsDeletedAsItClosesIsMissing) {
+  const ScratchFolder folder;
+  const auto path = folder.path() / "run.mcap";
+  PartRecorder recorder(config_at(path));
+  record_run(recorder, 0, 100);
+  fs::remove(path);
+  recorder.close(ms(100));
+  EXPECT_EQ(recorder.status().lost_steps, 100U);
+  EXPECT_FALSE(recorder.status().complete());
 }
 
 /// Ten steps in a second, of which those from `first_fault` to `last_fault` (s) are in a fault.
@@ -220,6 +259,14 @@ TEST(PartRecorder, ABudgetDeletesItsOwnOldestPartsAndNothingElse) {
     write_flight(flight, config_at(path).run, Ways(), *fault);
   }
   std::ofstream(folder.path() / "run-notes.mcap") << "somebody's";
+  const auto other = folder.path() / "run-7.mcap";  // not a part of run.mcap
+  {
+    PartRecorder::Config config = config_at(other);
+    config.budget_bytes = 100'000'000;
+    PartRecorder recorder(config);
+    record_run(recorder, 0, 500);
+    recorder.close(ms(500));
+  }
   PartRecorder::Config config = config_at(path);
   config.budget_bytes = 4'000'000;
   for (int run = 0; run < 2; ++run) {  // the parts of an earlier run count too
@@ -230,7 +277,8 @@ TEST(PartRecorder, ABudgetDeletesItsOwnOldestPartsAndNothingElse) {
       recorder.tick(ms(static_cast<std::int64_t>(tick)));
       std::uint64_t bytes = 0;
       for (const auto& entry : fs::directory_iterator(folder.path())) {
-        if (entry.path().filename().string().starts_with("run-")) bytes += entry.file_size();
+        const std::string name = entry.path().filename().string();
+        if (name.starts_with("run-") && name != "run-7.mcap") bytes += entry.file_size();
       }
       ASSERT_LE(bytes, config.budget_bytes);
     }
@@ -245,6 +293,7 @@ TEST(PartRecorder, ABudgetDeletesItsOwnOldestPartsAndNothingElse) {
   EXPECT_EQ(read_file(path).steps.size(), 3000U);
   EXPECT_EQ(read_file(folder.path() / "run.fault-1.mcap").steps.size(), 5U);
   EXPECT_TRUE(fs::exists(folder.path() / "run-notes.mcap"));
+  EXPECT_EQ(read_file(other).steps.size(), 500U);
   EXPECT_FALSE(fs::exists(folder.path() / "run-2.mcap"));
 }
 

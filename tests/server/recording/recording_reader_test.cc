@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <fstream>
 #include <limits>
+#include <set>
 #include <span>
 #include <stdexcept>
 #include <string>
@@ -19,6 +20,7 @@
 #include "server/recording/recorder.h"
 #include "tests/server/recording/recording_samples.h"
 #include "tests/server/scratch_folder.h"
+#include "tests/support/refusal.h"
 
 namespace tendon::recording_reader_test {
 namespace {
@@ -120,6 +122,35 @@ TEST(RecordingReader, GivesTheNameOfTheWayInWhichEachForceWasMade) {
   for (std::size_t i = 0; i < 4; ++i) EXPECT_EQ(reader.ways().name_of(contents.steps[i].force_way), expected[i]) << i;
 }
 
+TEST(RecordingReader, GivesTheRecordsOfEveryDeviceWhenAllAreAskedFor) {
+  MemorySink sink;
+  Recorder::Config config = sample_config();
+  config.more_devices = {{.name = "left", .scene = config.scene, .ports = true}, {.name = "up", .scene = config.scene}};
+  config.more_devices[0].scene.unix_offset = std::chrono::hours(1);  // times are all by the offset of the first
+  Recorder recorder(config, sink);
+  recorder.record(sample_step(1), 2);
+  recorder.record(sample_step(2), 0);
+  recorder.record(PortRecord{.tick = 3, .at = testing::ms(3)}, 1);
+  recorder.record(sample_step(3), 1);
+  recorder.close();
+  RecordingReader reader(testing::stream(sink.bytes()), "a.mcap", RecordingReader::Devices::kAll);
+  std::vector<std::size_t> of;
+  while (const auto record = reader.next()) {
+    of.push_back(reader.device());
+    if (const auto* step = std::get_if<StepRecord>(&*record)) {
+      EXPECT_TRUE(same(*step, sample_step(step->tick)));
+    }
+  }
+  EXPECT_EQ(of, (std::vector<std::size_t>{0, 1, 2, 2, 0, 1, 1}));
+  EXPECT_EQ(reader.devices(), (std::vector<std::string>{"", "left", "up"}));
+
+  RecordingReader first(testing::stream(sink.bytes()), "a.mcap");
+  std::size_t records = 0;
+  while (first.next()) ++records;
+  EXPECT_EQ(records, 2U);
+  EXPECT_EQ(first.devices().size(), 1U);
+}
+
 TEST(RecordingReader, AWayWhoseNameIsTooLongForOneIsReadAsNone) {
   Ways ways;
   const std::string bytes = recording::encode(sample_step(1), std::string(limits::kMaxLabel + 1, 'w'));
@@ -150,6 +181,21 @@ TEST(RecordingReader, GivesTheWholeChunksOfARecordingCutAnywhere) {
     seen = contents.records();
   }
   EXPECT_EQ(seen, 1U + 20U + 4U);
+}
+
+TEST(RecordingReader, SaysWhyItHasNoStep) {
+  MemorySink sink;
+  Recorder recorder(sample_config(), sink);
+  recorder.close();
+  const auto said = [](std::span<const std::byte> bytes) {
+    RecordingReader reader(testing::stream(bytes), "a.mcap");
+    read_all(reader);
+    return reader.without_steps();
+  };
+  const std::span<const std::byte> file = sink.bytes();
+  EXPECT_EQ(said(file.first(0)), "a.mcap: is empty");
+  EXPECT_EQ(said(file.first(20)), "a.mcap: is cut off before its first haptic step");
+  EXPECT_EQ(said(file), "a.mcap: holds no haptic step");
 }
 
 TEST(RecordingReader, ReadsAFile) {
@@ -185,13 +231,8 @@ TEST(RecordingReader, PutsWallClockTimeInTheFileAndLocalTimeInTheRecords) {
 
 TEST(RecordingReader, NamesThePathThatCannotBeRead) {
   const ScratchFolder folder;
-  const auto what = [](const std::filesystem::path& path) -> std::string {
-    try {
-      RecordingReader reader(path);
-      return "";
-    } catch (const std::runtime_error& error) {
-      return error.what();
-    }
+  const auto what = [](const std::filesystem::path& path) {
+    return thrown_by<std::runtime_error>([&] { RecordingReader reader(path); });
   };
   const auto missing = folder.path() / "none.mcap";
   EXPECT_EQ(what(missing), "cannot read recording " + missing.string() + ": No such file or directory");
@@ -225,10 +266,15 @@ TEST(RecordingReader, SaysWhatIsWrongWithAMessageAndWhere) {
     const auto offset = std::to_string(writer.bytes_written());
     writer.write(other, 0, message);
     writer.close();
-    const std::string error = read_all(sink.bytes()).error;
+    const Contents contents = read_all(sink.bytes());
+    EXPECT_EQ(contents.error, "");
+    EXPECT_EQ(contents.records(), 1U) << "the scene";
+    const std::string damage = contents.damage.empty() ? "" : contents.damage.front();
     const std::string where = "a.mcap: byte " + offset + ": ";
-    EXPECT_TRUE(error.starts_with(where)) << error;
-    return error.substr(std::min(error.size(), where.size()));
+    const std::string end = "; it is left out, after 0.000 s";
+    EXPECT_TRUE(damage.starts_with(where) && damage.ends_with(end)) << damage;
+    if (damage.size() < where.size() + end.size()) return damage;
+    return damage.substr(where.size(), damage.size() - where.size() - end.size());
   };
   EXPECT_EQ(error_of(recording::kStep, "\xff\xff"), "the bytes are not a tendon.recording.v1.Step");
   EXPECT_EQ(error_of(recording::kStep, ""), "step 0 has the unknown mode 0");
@@ -238,13 +284,100 @@ TEST(RecordingReader, SaysWhatIsWrongWithAMessageAndWhere) {
   EXPECT_EQ(error_of(recording::kDatagram, ""), "a datagram has the unknown direction 0");
 }
 
-TEST(RecordingReader, RefusesRecordsBeforeTheScene) {
+TEST(RecordingReader, ReadsARecordingWithoutItsSceneAndSaysSo) {
   MemorySink sink;
   McapWriter writer("other", sink);
   const auto schema = writer.add_schema(recording::kStep.schema, "protobuf", "");
   writer.write(writer.add_channel(schema, recording::kStep.topic, "protobuf"), 0, recording::encode(sample_step(0)));
   writer.close();
-  EXPECT_NE(read_all(sink.bytes()).error.find("a record comes before the scene"), std::string::npos);
+  const Contents contents = read_all(sink.bytes());
+  EXPECT_EQ(contents.error, "");
+  EXPECT_EQ(contents.steps.size(), 1U);
+  ASSERT_EQ(contents.damage.size(), 1U);
+  EXPECT_NE(contents.damage[0].find("a record comes before the scene, which is missing"), std::string::npos);
+}
+
+/// A recording of 40 steps, and the positions of its chunks.
+struct Chunked {
+  struct Chunk {
+    std::size_t from;
+    std::size_t to;
+    std::vector<std::uint64_t> ticks;
+  };
+  std::string bytes;
+  std::vector<Chunk> chunks;  ///< except the first one, which contains the scene
+};
+
+Chunked chunked() {
+  Recorder::Config config = sample_config();
+  config.flush_after = std::chrono::milliseconds(8);
+  MemorySink sink;
+  Recorder recorder(config, sink);
+  record_samples(recorder, 40);
+  recorder.close();
+  Chunked file{.bytes = {reinterpret_cast<const char*>(sink.bytes().data()), sink.bytes().size()}, .chunks = {}};
+  RecordingReader reader(testing::stream(sink.bytes()), "a.mcap");
+  McapReader raw(testing::stream(sink.bytes()), "a.mcap");
+  while (const auto message = raw.next()) {
+    if (message->channel.topic == recording::kScene.topic) continue;
+    if (file.chunks.empty() || file.chunks.back().from != message->offset) {
+      const auto length = static_cast<std::size_t>(static_cast<unsigned char>(file.bytes[message->offset + 1])) |
+                          static_cast<std::size_t>(static_cast<unsigned char>(file.bytes[message->offset + 2])) << 8U |
+                          static_cast<std::size_t>(static_cast<unsigned char>(file.bytes[message->offset + 3])) << 16U;
+      file.chunks.push_back({message->offset, message->offset + 9 + length, {}});
+    }
+    if (message->channel.topic == recording::kStep.topic) {
+      Ways ways;
+      file.chunks.back().ticks.push_back(recording::decode_step(message->data, LocalTime{}, ways).tick);
+    }
+  }
+  return file;
+}
+
+// The file has a flipped bit, a sector of zeros, a sector of random bytes, or some bytes are missing.
+RC_GTEST_PROP(RecordingReader, DamageLosesOnlyTheStepsOfTheChunksThatItMeets, ()) {
+  static const Chunked file = chunked();
+  RC_PRE(file.chunks.size() >= 4U);
+  std::string damaged = file.bytes;
+  const std::size_t from = *rc::gen::inRange<std::size_t>(8, damaged.size());
+  std::size_t to = std::min(damaged.size(), from + *rc::gen::element<std::size_t>(1, 8, 64, 512, 4096));
+  switch (*rc::gen::inRange(0, 4)) {
+    case 0:
+      to = from + 1;
+      damaged[from] = static_cast<char>(damaged[from] ^ (1 << *rc::gen::inRange(0, 8)));
+      break;
+    case 1:
+      for (std::size_t i = from; i < to; ++i) damaged[i] = 0;
+      break;
+    case 2:
+      for (std::size_t i = from; i < to; ++i) damaged[i] = static_cast<char>(*rc::gen::arbitrary<std::uint8_t>());
+      break;
+    default:
+      damaged.erase(from, to - from);
+  }
+  // If the server was killed, the file ends before a chunk and does not have a summary.
+  const auto& last = file.chunks.back();
+  const bool killed = from >= file.chunks.front().from && to <= last.from && *rc::gen::arbitrary<bool>();
+  if (killed) damaged.resize(last.from - (file.bytes.size() - damaged.size()));
+
+  const Contents contents = read_all(std::as_bytes(std::span(damaged)));
+  RC_ASSERT(contents.error.empty());
+  std::set<std::uint64_t> given;
+  for (const StepRecord& step : contents.steps) {
+    RC_ASSERT(step.tick < 40U);
+    RC_ASSERT(same(step, sample_step(step.tick)));
+    RC_ASSERT(given.insert(step.tick).second);
+  }
+  for (const auto& chunk : file.chunks) {
+    const bool damaged_too = to > chunk.from && from < chunk.to;
+    if (damaged_too || (killed && chunk.from == last.from)) continue;
+    for (const std::uint64_t tick : chunk.ticks) RC_ASSERT(given.contains(tick));
+  }
+  std::uint64_t lost = 0;
+  for (const LossRecord& loss : contents.losses) lost += loss.steps;
+  RC_ASSERT(lost <= 40U - given.size());
+  // The number of steps that are missing at the end is in the summary.
+  if (!killed && to <= last.to) RC_ASSERT(lost == 40U - given.size());
 }
 
 }  // namespace

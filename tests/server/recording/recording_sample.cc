@@ -21,12 +21,12 @@ int main(int argc, char** argv) {
   try {
     const std::filesystem::path folder = argv[1];
     std::filesystem::create_directories(folder);
-    Recorder::Config config = testing::sample_config();
+    Recorder::Config config = tendon::testing::sample_config();
     config.scene.unix_offset = std::chrono::seconds(1'700'000'000);
     MemorySink sink;
     Recorder recorder(config, sink);
-    testing::record_samples(recorder, 2000);
-    recorder.lost({.at = testing::ms(2000), .steps = 3, .datagrams = 1});
+    tendon::testing::record_samples(recorder, 2000);
+    recorder.lost({.at = tendon::testing::ms(2000), .steps = 3, .datagrams = 1});
     recorder.close();
 
     const std::span<const std::byte> bytes = sink.bytes();

@@ -163,6 +163,7 @@ struct Contents {
   std::vector<DatagramRecord> datagrams;
   std::vector<LossRecord> losses;
   bool truncated = false;
+  std::vector<std::string> damage;
   std::string error;  ///< what the reader threw
 
   std::size_t records() const { return scenes.size() + steps.size() + datagrams.size() + losses.size(); }
@@ -185,6 +186,7 @@ inline Contents read_all(RecordingReader& reader) {
     contents.error = error.what();
   }
   contents.truncated = reader.truncated();
+  contents.damage = reader.damage();
   return contents;
 }
 

@@ -12,6 +12,7 @@
 #include <string>
 
 #include "tests/server/scratch_folder.h"
+#include "tests/support/refusal.h"
 
 namespace tendon::key_folder_test {
 namespace {
@@ -23,12 +24,7 @@ ClientKey some_key(const std::string& name, std::uint64_t seed, Role role = Role
 }
 
 std::string complaint_about(const std::filesystem::path& folder) {
-  try {
-    read_key_folder(folder);
-  } catch (const std::runtime_error& error) {
-    return error.what();
-  }
-  return "no error";
+  return thrown_by<std::runtime_error>([&] { read_key_folder(folder); });
 }
 
 TEST(KeyFolder, GivesBackTheKeysThatWereWrittenByName) {

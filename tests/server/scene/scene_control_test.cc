@@ -13,6 +13,7 @@
 #include "devices/simulated/profiles.h"
 #include "tests/server/scene/scene_text.h"
 #include "tests/server/scratch_folder.h"
+#include "tests/support/refusal.h"
 
 namespace tendon::scene_control_test {
 namespace {
@@ -177,15 +178,12 @@ TEST(Scene, SeveralMakeOneServerWhoseNetworkIsTheFirstOnes) {
   EXPECT_EQ(scenes[0].name, "left");
   EXPECT_EQ(scenes[1].name, "right");
   EXPECT_EQ(scenes[1].loop.device, 1U);
-  const auto error_of_both = [&](const std::filesystem::path& second) -> std::string {
-    try {
-      read_scenes({shipped / "left.toml", second});
-    } catch (const SceneError& error) {
-      return error.what();
-    }
-    return {};
+  const auto error_of_both = [&](const std::filesystem::path& second) {
+    return thrown_by<SceneError>([&] { read_scenes({shipped / "left.toml", second}); });
   };
-  EXPECT_TRUE(error_of_both(shipped / "left.toml").ends_with("expected a name of its own, found \"left\" again"));
+  EXPECT_TRUE(error_of_both(shipped / "left.toml")
+                  .ends_with("expected a name of its own, found \"left\" again, which is in " +
+                             (shipped / "left.toml").string()));
   EXPECT_NE(error_of_both(shipped / "demo.toml").find("recording: expected in the first scene only"),
             std::string::npos);
 }
@@ -223,7 +221,8 @@ TEST(Scene, TheDevicesOfAllCountsHaveNamesOfTheirOwnAndAreNotTooMany) {
     return "none";
   };
   EXPECT_EQ(error_of("count = 2\n", "name = \"a-1\"\n"),
-            ": device.name: expected a name of its own, found \"a-1\" again");
+            ": device.name: expected a name of its own, found \"a-1\" again, which is in " +
+                (folder.path() / "a.toml").string());
   EXPECT_EQ(error_of("count = 2\n", "name = \"a-2\"\n"), "none");
   EXPECT_EQ(error_of("count = 1000\n", "count = 24\n"), "none");
   EXPECT_EQ(error_of("count = 1000\n", "count = 25\n"),
@@ -260,15 +259,12 @@ TEST(Scene, ADeviceWithAPlugIsAmongTheFirst) {
   const std::filesystem::path falcon = std::filesystem::path(TENDON_SCENES) / "falcon.toml";
   const std::string fingers = (folder.path() / "finger.toml").string();
   write(fingers, std::string(kMinimal) + "count = 16\n");
-  try {
-    read_scenes({fingers, falcon});
-    ADD_FAILURE() << "no error";
-  } catch (const SceneError& error) {
-    EXPECT_EQ(std::string(error.what()),
-              falcon.string() +
-                  ": device.kind: expected devices with a plug among the first 16, found 16 before it: "
-                  "name its scene before theirs");
-  }
+  EXPECT_EQ(thrown_by<SceneError>([&] {
+              read_scenes({fingers, falcon});
+            }),
+            falcon.string() +
+                ": device.kind: expected devices with a plug among the first 16, found 16 before it: "
+                "name its scene before theirs");
   write(fingers, std::string(kMinimal) + "count = 15\n");
   EXPECT_EQ(read_scenes({fingers, falcon}).back().loop.device, 15U);
 }

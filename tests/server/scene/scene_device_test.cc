@@ -19,6 +19,7 @@
 #include "server/recording/recorder.h"
 #include "tests/server/scene/scene_text.h"
 #include "tests/server/scratch_folder.h"
+#include "tests/support/refusal.h"
 
 namespace tendon::scene_device_test {
 namespace {
@@ -47,12 +48,8 @@ TEST(Scene, TheAxesOfEachKindOfDeviceAreKnownOrASceneSaysThem) {
 
 TEST(Scene, AxesThatMakeNoRotationAreRefusedWithTheReason) {
   const auto refusal = [](const std::string& axes) {
-    try {
-      parse("[device]\naxes = " + axes + std::string(kFalcon.substr(kFalcon.find('\n'))), "/scenes");
-    } catch (const SceneError& error) {
-      return std::string(error.what());
-    }
-    return std::string();
+    return thrown_by<SceneError>(
+        [&] { parse("[device]\naxes = " + axes + std::string(kFalcon.substr(kFalcon.find('\n'))), "/scenes"); });
   };
   const std::string expected =
       "s.toml:2: device.axes: expected the axes that point to the operator's right, up and towards the user, like "
@@ -71,14 +68,7 @@ TEST(Scene, ADeviceSaysItsGroupAndTheHandThatHoldsIt) {
   EXPECT_EQ(scene_of("group = \"surgeon\"").group, "surgeon");
   EXPECT_EQ(scene_of("held_by = \"left\"").hand, Hand::kLeft);
   EXPECT_EQ(scene_of("held_by = \"right\"").hand, Hand::kRight);
-  const auto refusal = [&](const std::string& keys) {
-    try {
-      scene_of(keys);
-    } catch (const SceneError& error) {
-      return std::string(error.what());
-    }
-    return std::string();
-  };
+  const auto refusal = [&](const std::string& keys) { return thrown_by<SceneError>([&] { scene_of(keys); }); };
   EXPECT_EQ(refusal("held_by = \"both\""),
             "s.toml:2: device.held_by: expected one of \"any\", \"left\", \"right\", found \"both\"");
   EXPECT_EQ(refusal("held_by = 1"), "s.toml:2: device.held_by: expected one of \"any\", \"left\", \"right\", found 1");
@@ -182,13 +172,8 @@ TEST(Scene, AReplayedRecordingIsTheHandThatWasSeenBitForBit) {
 
 TEST(Scene, AReplayNamesItsSourceAndWhatIsWrongWithIt) {
   const ScratchFolder folder;
-  const auto error = [&folder](const std::string& more) -> std::string {
-    try {
-      parse(std::string(kReplay) + more, folder.path());
-    } catch (const SceneError& problem) {
-      return problem.what();
-    }
-    return "none";
+  const auto error = [&folder](const std::string& more) {
+    return thrown_by<SceneError>([&] { parse(std::string(kReplay) + more, folder.path()); });
   };
   const std::string csv = "[device.csv]\nfile = \"hand.csv\"\nposition_column = \"x\"\n";
   EXPECT_EQ(error(""), "s.toml:1: device: expected either recording or a table csv, found neither");
@@ -201,7 +186,7 @@ TEST(Scene, AReplayNamesItsSourceAndWhatIsWrongWithIt) {
             "s.toml:4: device.csv.file: expected samples no further apart than 19 ms, because a device that is silent "
             "for longer is a fault, found 40 ms at 0.01 s");
   write(folder.path() / "hand.csv", "t_s,x\n0,0\n0.01,1\n");
-  EXPECT_EQ(error(csv), "none");
+  EXPECT_EQ(error(csv), "");
   EXPECT_NE(error(csv + "direction = [0, 0, 0]\n").find("replay.direction (its length)"), std::string::npos);
 }
 

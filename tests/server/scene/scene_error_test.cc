@@ -11,6 +11,7 @@
 
 #include "tests/server/scene/scene_text.h"
 #include "tests/server/scratch_folder.h"
+#include "tests/support/refusal.h"
 
 namespace tendon::scene_error_test {
 namespace {
@@ -19,14 +20,7 @@ using testing::ScratchFolder;
 
 TEST(SceneError, NamesTheFileThatCannotBeRead) {
   const ScratchFolder folder;
-  const auto error = [](const std::filesystem::path& file) -> std::string {
-    try {
-      read_scene(file);
-    } catch (const SceneError& problem) {
-      return problem.what();
-    }
-    return "no error";
-  };
+  const auto error = [](const std::filesystem::path& file) { return thrown_by<SceneError>([&] { read_scene(file); }); };
   const std::string missing = (folder.path() / "missing.toml").string();
   EXPECT_EQ(error(missing), "cannot read " + missing + ": No such file or directory");
   EXPECT_EQ(error(folder.path()), "cannot read " + folder.path().string() + ": Is a directory");
@@ -53,6 +47,51 @@ TEST(SceneError, NamesTheLineOfASyntaxError) {
       {"\nkind = \"simulated\"\n",
        "s.toml:5: not TOML: Error while parsing key-value pair: cannot redefine existing string 'kind'"},
   });
+}
+
+TEST(SceneError, ADecimalCommaIsNamed) {
+  const std::string error = error_of_minimal_and("[device.effects]\nmass_kg = 0,05\n");
+  EXPECT_TRUE(error.starts_with("s.toml:5: not TOML: ") && error.ends_with(" (a decimal point?)")) << error;
+  expect_errors({
+      {"[device.effects]\nmass_kg = \"0,05\"\n",
+       "s.toml:5: device.effects.mass_kg: expected a number above 0 kg, found \"0,05\" (a decimal point?)"},
+  });
+  EXPECT_EQ(error_of("[device]\nkind = [1,2\n").find("decimal"), std::string::npos);
+}
+
+TEST(SceneError, AMotionThatNoHandleHasIsRefused) {
+  const std::string hand(kHand);
+  const auto refused = [](const std::string& line, const std::string& found) {
+    return "s.toml:" + line +
+           ": device.hand.motion: expected a motion of at most 3000 mm from end to end, which no handle exceeds, "
+           "found " +
+           found + " mm";
+  };
+  EXPECT_EQ(error_of(hand + "kind = \"sine\"\namplitude_mm = 15000\nfrequency_hz = 1\n"), refused("11", "30000"));
+  EXPECT_EQ(error_of(hand + "kind = \"sine\"\namplitude_mm = 1500\nfrequency_hz = 1\n"), "no error");
+  EXPECT_EQ(error_of(hand + "kind = \"ramp-hold\"\nfrom_mm = [0, 0, 0]\nto_mm = [0, -4000, 0]\nramp_ms = 1\n"),
+            refused("12", "4000"));
+  EXPECT_EQ(error_of(hand + "kind = \"minimum-jerk\"\npoints_mm = [[0, 0, 0], [1, 0, 3100]]\ndurations_ms = [1]\n"),
+            refused("11", "3100"));
+  const ScratchFolder folder;
+  write(folder.path() / "hand.csv", "t_s,x_mm\n0,-10\n1,30\n");
+  const std::string recorded = hand + "kind = \"recorded\"\nfile = \"hand.csv\"\nposition_column = \"x_mm\"\n";
+  EXPECT_EQ(error_of(recorded, folder.path()), refused("11", "40000"));
+  EXPECT_EQ(error_of(recorded + "scale_m = 0.001\n", folder.path()), "no error");
+}
+
+TEST(SceneError, AFrictionThatNoHandleHasIsRefusedOfARealDevice) {
+  const auto falcon = [](const std::string& coulomb, const std::string& viscous) {
+    return error_of("[device]\nkind = \"falcon\"\n[limiter]\ncoulomb_friction_n = " + coulomb +
+                    "\nviscous_friction_n_s_per_m = " + viscous + "\n");
+  };
+  const std::string why = ", because no handle has more friction and a higher bound voids the limiter's proof, found ";
+  const std::string question = ": were all columns in the units that tendon-identify expects (s, m, N)?";
+  EXPECT_EQ(falcon("0.1", "476.3"),
+            "s.toml:5: limiter.viscous_friction_n_s_per_m: expected at most 50 N·s/m" + why + "476.3" + question);
+  EXPECT_EQ(falcon("100", "0.4"),
+            "s.toml:4: limiter.coulomb_friction_n: expected at most 20 N" + why + "100" + question);
+  EXPECT_EQ(falcon("0.1", "0.476"), "no error");
 }
 
 TEST(SceneError, OfACountSaysWhatMayBeCounted) {
@@ -159,6 +198,20 @@ TEST(SceneError, ReportsTheFirstMistakeInTheFile) {
             "s.toml:5: loop.period_us: expected a number from 100 to 4000 µs, found \"x\"");
 }
 
+TEST(SceneError, NamesTheValueThatWasMeant) {
+  expect_errors({
+      {"[safety]\narm = \"at strat\"\n",
+       "s.toml:5: safety.arm: expected one of \"by request\", \"at start\", \"by dead man\", found \"at strat\"; did "
+       "you "
+       "mean at start?"},
+  });
+  EXPECT_EQ(error_of("[device]\nkind = \"simulated\"\nprofile = \"falcoon\"\n"),
+            "s.toml:3: device.profile: expected one of \"phantom-premium\", \"touch\", \"falcon\", found \"falcoon\"; "
+            "did you "
+            "mean falcon?");
+  EXPECT_TRUE(error_of_minimal_and("[limiter]\nkind = \"aoll+\"\n").ends_with("found \"aoll+\"; did you mean aol+?"));
+}
+
 TEST(SceneError, AMisspeltRequiredKeyIsNotCalledMissing) {
   EXPECT_EQ(error_of("[device]\nkind = \"simulated\"\n[device.effects]\nmas_kg = 0.2\n"),
             "s.toml:4: device.effects.mas_kg: unknown key; did you mean mass_kg?");
@@ -241,7 +294,7 @@ TEST(SceneError, NamesTheKindsAndProfilesThatThereAre) {
             "s.toml:3: device.profile: expected one of \"phantom-premium\", \"touch\", \"falcon\", found \"hawk\"");
   EXPECT_EQ(error_of(std::string(kHand) + "kind = \"cosine\"\n"),
             "s.toml:10: device.hand.motion.kind: expected one of \"sine\", \"ramp-hold\", \"minimum-jerk\", "
-            "\"recorded\", found \"cosine\"");
+            "\"recorded\", found \"cosine\"; did you mean sine?");
   std::string names;
   for (const LawInfo& law : laws()) names += (names.empty() ? "\"" : ", \"") + std::string(law.name) + '"';
   EXPECT_EQ(error_of_minimal_and("[limiter]\nkind = \"off\"\n"),
@@ -423,11 +476,11 @@ TEST(SceneError, PassesOnWhatIsWrongWithARecordedMotion) {
   EXPECT_EQ(error_of(scene, folder.path()), where + csv + ": it is a named pipe, expected a regular file");
   std::filesystem::remove(csv);
   write(csv, "t_s,y\n0,0\n1,1\n");
-  EXPECT_EQ(error_of(scene, folder.path()),
-            "s.toml:11: device.hand.motion.file: " + csv + ":1: expected a column 'x', found 't_s,y'");
-  write(csv, "t_s,x\n0,0\n1,nan\n");
   EXPECT_EQ(error_of(scene, folder.path()), "s.toml:11: device.hand.motion.file: " + csv +
-                                                ":3: expected a finite number in column 1 (from 0), found 'nan'");
+                                                ":1: expected a header line with a column 'x', found 't_s,y'");
+  write(csv, "t_s,x\n0,0\n1,nan\n");
+  EXPECT_EQ(error_of(scene, folder.path()),
+            "s.toml:11: device.hand.motion.file: " + csv + ":3: expected a finite number as x, found 'nan'");
   EXPECT_EQ(error_of(scene + "time_column = -1\n", folder.path()),
             "s.toml:13: device.hand.motion.time_column: expected a column's name in quotes or its number, from 0, "
             "found -1");

@@ -242,12 +242,12 @@ TEST(Scene, LooksForARecordedMotionBesideTheSceneFile) {
 
 TEST(Scene, ReadsARecordedMotionByColumnNumbersAndRepeatsIt) {
   const ScratchFolder folder;
-  write(folder.path() / "hand.csv", "0,0\n1,2\n2,4\n");
+  write(folder.path() / "hand.csv", "0,0\n1,1\n2,2\n");
   const Scene scene = parse(std::string(kHand) +
                                 "kind = \"recorded\"\nfile = \"hand.csv\"\ntime_column = 0\nposition_column = 1\n"
                                 "at_end = \"repeat\"\n",
                             folder.path());
-  EXPECT_EQ(target(scene, 3).position, Vec3(2, 0, 0));
+  EXPECT_EQ(target(scene, 3).position, Vec3(1, 0, 0));
 }
 
 TEST(Scene, ConvertsUnitsWithoutAnErrorInTheLastDigit) {

@@ -90,7 +90,7 @@ class RunningProxy {
  public:
   RunningProxy(const Address& server, const std::string& profile, Duration spin)
       : driver_({.listen = loopback(),
-                 .server = server,
+                 .servers = {server},
                  .proxy = {.networks = {Injector(parse_profile(profile), 7, 0, Direction::kUp),
                                         Injector(parse_profile(profile), 7, 0, Direction::kDown)}},
                  .spin = spin},

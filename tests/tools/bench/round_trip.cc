@@ -249,12 +249,13 @@ class RoundTrip {
   RoundTrip(const Options& options, Wait wait, Way way, std::optional<Suite> suite)
       : options_(options), wait_(wait), way_(way), suite_(suite), key_(Ratchet(3).next()) {
     NetworkLoop::Config config;
-    config.devices = {{.name = "bench", .model = "bench", .max_force = 10, .loop_hz = 1000, .channels = {{}}}};
+    config.devices = {{.about = {.name = "bench", .model = "bench", .max_force = 10, .loop_hz = 1000, .channels = {{}}},
+                       .mail = &mail_}};
     if (suite) {
       config.keys = {{.name = "wall", .role = Role::kController, .key = key_}};
       config.suites = {*suite};
     }
-    network_.emplace(config, watched_, std::vector{&mail_});
+    network_.emplace(config, watched_, clock::now());
     void* const shared = ::mmap(nullptr, sizeof(Orders), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
     if (shared == MAP_FAILED) fail("mmap");
     orders_ = new (shared) Orders;

@@ -36,12 +36,11 @@
 #include "clients/cpp/udp_transport.h"
 #include "devices/simulated/profiles.h"
 #include "devices/simulated/simulated_device.h"
-#include "server/haptic_loop.h"
+#include "server/assembly.h"
 #include "server/machine/clock.h"
 #include "server/machine/doorbell.h"
 #include "server/machine/realtime.h"
 #include "server/machine/udp_link.h"
-#include "server/network_loop.h"
 #include "server/recording/byte_sink.h"
 #include "server/recording/recorder.h"
 #include "tests/e2e/stage/process.h"
@@ -277,21 +276,8 @@ class WakeUps {
       : options_(options),
         device_(device_config()),
         guests_(link_.local_address(), options.observers),
-        haptic_(loop_config(device_), device_, mail_),
-        network_(
-            [&] {
-              NetworkLoop::Config config;
-              config.max_observers = options.observers + 1;
-              DeviceDescription about;
-              about.name = "device";
-              about.model = device_.info().name;
-              about.max_force = device_.info().max_force;
-              about.loop_hz = 1000;
-              about.channels = {{.name = "main"}};
-              config.devices = {about};
-              return config;
-            }(),
-            link_, {&mail_}) {}
+        server_({{.scene = scene_of(device_, options), .device = device_}},
+                {.now = clock::now(), .watched = Mailboxes::Capacities{}}, {&link_}) {}
 
   void run() {
     std::thread network([this] { run_network(); });
@@ -315,12 +301,12 @@ class WakeUps {
         };
         look(kSettle, nullptr);
         Figures& figures = of[static_cast<std::size_t>(kind)];
-        const std::uint64_t overruns = haptic_.stats().overruns;
+        const std::uint64_t overruns = haptic_overruns();
         const std::uint64_t sent = datagrams_;
         const Duration network_before = read(network_clock);
         const Duration guests_before = read(guests_clock);
         look(milliseconds(options_.block_ms), &figures);
-        figures.overruns += haptic_.stats().overruns - overruns;
+        figures.overruns += haptic_overruns() - overruns;
         figures.datagrams += datagrams_ - sent;
         figures.network_thread += read(network_clock) - network_before;
         figures.guests += read(guests_clock) - guests_before;
@@ -335,17 +321,22 @@ class WakeUps {
   Figures asleep;
   std::array<Figures, 4> of;  ///< Kind
   bool realtime = true;
-  std::uint64_t welcomed() const { return network_.stats().welcomed; }
+  std::uint64_t welcomed() { return server_.network().stats().welcomed; }
 
  private:
-  static HapticLoop::Config loop_config(const SimulatedDevice& device) {
-    HapticLoop::Config config;
-    config.control.limiter.friction = {0.3, 0.8};
-    config.control.limiter.longest_hold = milliseconds(2);
-    config.control.max_force = device.info().max_force;
-    config.control.max_slew = 1000;
-    return config;
+  static Scene scene_of(const SimulatedDevice& device, const Options& options) {
+    Scene scene;
+    scene.name = "device";
+    HapticController::Config& control = scene.loop.control;
+    control.limiter.friction = {0.3, 0.8};
+    control.limiter.longest_hold = milliseconds(2);
+    control.max_force = device.info().max_force;
+    control.max_slew = 1000;
+    scene.network.max_observers = options.observers + 1;
+    return scene;
   }
+
+  std::uint64_t haptic_overruns() { return server_.devices().front().haptic.stats().overruns; }
 
   void run_haptic() {
     realtime = enter_realtime(kHapticPriority).empty();
@@ -356,11 +347,11 @@ class WakeUps {
         due = clock::now();
         continue;
       }
-      due = haptic_.step(clock::now());
+      due = server_.haptic_groups().front().turn(clock::now());
       stepped_.ring();
       clock::sleep_until(due);
     }
-    haptic_.stop();
+    server_.haptic_groups().front().stop();
   }
 
   void run_network() {
@@ -369,9 +360,9 @@ class WakeUps {
     while (!stop_) {
       const LocalTime before = clock::now();
       if (due > before) link_.wait(std::min<Duration>(due - before, std::chrono::seconds(1)), &stepped_);
-      due = network_.turn(clock::now());
+      due = server_.turn_network(0, clock::now());
     }
-    network_.close(clock::now());
+    server_.network().close(clock::now());
   }
 
   /// A thread like the haptic one that does nothing else, while that one rests.
@@ -408,16 +399,17 @@ class WakeUps {
 
   /// The log thread: takes records out, and keeps how late the steps were.
   void watch(Duration lasts, Recorder* recorder, Dashboard* dashboard, Figures* into) {
+    Mailboxes& mail = server_.devices().front().mail;
     for (const LocalTime end = clock::now() + lasts; clock::now() < end;) {
-      while (const StepRecord* step = mail_.steps.front()) {
+      while (const StepRecord* step = mail.steps.front()) {
         if (into != nullptr) into->late.push_back(1e6 * seconds(step->hand.at - step->scheduled));
         if (recorder != nullptr) recorder->record(*step, 0);
-        mail_.steps.pop();
+        mail.steps.pop();
       }
-      while (const DatagramRecord* record = mail_.datagrams.front()) {
+      while (const DatagramRecord* record = mail.datagrams.front()) {
         datagrams_ += record->direction == DatagramRecord::Direction::kOut ? 1 : 0;
         if (recorder != nullptr) recorder->record(*record);
-        mail_.datagrams.pop();
+        mail.datagrams.pop();
       }
       const std::size_t page_bytes = dashboard != nullptr ? dashboard->read() : 0;
       if (into != nullptr) into->page_bytes += page_bytes;
@@ -429,12 +421,10 @@ class WakeUps {
   Options options_;
   std::optional<std::filesystem::path> dash_ = dashboard_program();
   SimulatedDevice device_;
-  Mailboxes mail_;
   UdpLink link_{parse_address("127.0.0.1:0")};
   Guests guests_;  // forks before there are threads
   Doorbell stepped_;
-  HapticLoop haptic_;
-  NetworkLoop network_;
+  Assembly server_;
   std::atomic<bool> stop_{false};
   std::atomic<bool> resting_{false};  ///< the haptic thread takes no steps
   std::uint64_t datagrams_ = 0;

@@ -347,9 +347,14 @@ void ClientJudge::check_conversation(Session& session) {
   check_newest_wins(talk, states);
   check_window(talk, states);
   check_requests(talk);
+  if (std::ranges::count(session.hello.features(), "channels") > 0) {
+    check_bad_requests(talk, 1);
+  } else {
+    report_.not_applicable("request-invalid", "this client names no feature that has requests of a server");
+  }
   check_keep_alive(talk);
   check_old_key(talk, rekeyed);
-  check_rekey_sent(talk, options_.long_checks);
+  check_rekey_sent(talk, options_);
   const std::size_t before = talk.heard().size();
   guest_.ask_to_end();
   check_byes(talk, before);

@@ -2,6 +2,7 @@
 #include "tests/tools/conformance/conversation.h"
 
 #include <algorithm>
+#include <iterator>
 #include <limits>
 #include <utility>
 
@@ -167,7 +168,8 @@ void Conversation::hear(const Wire::Arrival& arrival) {
                     .suite = setup_.suite,
                     .connection_id = setup_.connection_id,
                     .number = head->number};
-  report_.judge("data-header", *head == wanted, hex(Span(arrival.datagram).first(kHeadSize)), hex(write(wanted)));
+  report_.judge("data-header", *head == wanted,
+                [&] { return std::pair(hex(Span(arrival.datagram).first(kHeadSize)), hex(write(wanted))); });
   report_.judge("data-size", arrival.datagram.size() <= kLargest, std::to_string(arrival.datagram.size()) + " bytes",
                 "at most 1200 bytes");
 
@@ -180,9 +182,11 @@ void Conversation::hear(const Wire::Arrival& arrival) {
     const bool opened =
         (is_next || head->epoch == receive_epoch_) && body.size() >= crypto::kTagSize &&
         sealing(setup_.suite, key).open(head->number, all.first(kHeadSize), all.subspan(kHeadSize), text);
-    report_.judge("data-opens", opened,
-                  packet(head->number) + " of epoch " + std::to_string(head->epoch) + ": " + hex(all),
-                  "opens with this direction's key of epoch " + std::to_string(receive_epoch_) + " or the next one");
+    report_.judge("data-opens", opened, [&] {
+      return std::pair(
+          packet(head->number) + " of epoch " + std::to_string(head->epoch) + ": " + hex(all),
+          "opens with this direction's key of epoch " + std::to_string(receive_epoch_) + " or the next one");
+    });
     if (!opened) return;
     if (is_next) {
       receive_key_ = key;
@@ -198,7 +202,8 @@ void Conversation::hear(const Wire::Arrival& arrival) {
 
   pb::Datagram content;
   const bool is_message = read(body, content) && content.frames_size() <= 64;
-  report_.judge("data-body", is_message, hex(body), "a message Datagram with at most 64 frames");
+  report_.judge("data-body", is_message,
+                [&] { return std::pair(hex(body), std::string("a message Datagram with at most 64 frames")); });
   if (!is_message) return;
   const std::int64_t sent = content.tx_time_ns();
   const bool goes_on = numbers_.empty() || sent >= heard_[numbers_.rbegin()->second].body.tx_time_ns();
@@ -223,44 +228,70 @@ void Conversation::judge_echo(std::uint64_t number, const pb::Datagram& body) {
   const auto said = said_.find(told);
   report_.judge("echo-newest", said != said_.end(), "an echo of " + packet(told), "that of a packet which was said");
   if (said == said_.end()) return;
-  report_.judge("echo-newest", !echoed_ || told >= newest_echo_,
-                packet(number) + " echoes " + packet(told) + " after one echoed " + packet(newest_echo_),
-                "the highest packet number");
+  report_.judge("echo-newest", !echoed_ || told >= newest_echo_, [&] {
+    return std::pair(packet(number) + " echoes " + packet(told) + " after one echoed " + packet(newest_echo_),
+                     std::string("the highest packet number"));
+  });
   newest_echo_ = std::max(newest_echo_, told);
   echoed_ = true;
 
-  const std::string times = "packet " + std::to_string(told) + ": T1 " + std::to_string(echo.peer_tx_time_ns()) +
-                            ", T2 " + std::to_string(echo.rx_time_ns()) + ", T3 " + std::to_string(body.tx_time_ns());
-  report_.judge("echo-times", echo.peer_tx_time_ns() == said->second.sent_ns, times,
-                "T1 " + std::to_string(said->second.sent_ns));
-  report_.judge("echo-times", echo.rx_time_ns() <= body.tx_time_ns(), times, "T2 ≤ T3");
+  const auto times = [&](std::string expected) {
+    return [&, expected = std::move(expected)] {
+      return std::pair("packet " + std::to_string(told) + ": T1 " + std::to_string(echo.peer_tx_time_ns()) + ", T2 " +
+                           std::to_string(echo.rx_time_ns()) + ", T3 " + std::to_string(body.tx_time_ns()),
+                       expected);
+    };
+  };
+  report_.judge("echo-times", echo.peer_tx_time_ns() == said->second.sent_ns,
+                times("T1 " + std::to_string(said->second.sent_ns)));
+  report_.judge("echo-times", echo.rx_time_ns() <= body.tx_time_ns(), times("T2 ≤ T3"));
   if (!report_.failed("tx-time")) {
-    report_.judge("echo-times", echo.rx_time_ns() >= said->second.heard_before_ns, times,
-                  "T2 ≥ " + std::to_string(said->second.heard_before_ns) + ", which that packet answered");
+    report_.judge("echo-times", echo.rx_time_ns() >= said->second.heard_before_ns,
+                  times("T2 ≥ " + std::to_string(said->second.heard_before_ns) + ", which that packet answered"));
   }
   const auto [first, is_first] = arrivals_.try_emplace(told, echo.rx_time_ns());
   if (!repeated_.contains(told) || !report_.failed("echo-times")) {
-    report_.judge(repeated_.contains(told) ? "replay" : "echo-times", first->second == echo.rx_time_ns(), times,
-                  "T2 " + std::to_string(first->second) + ", as it was told before");
+    report_.judge(repeated_.contains(told) ? "replay" : "echo-times", first->second == echo.rx_time_ns(),
+                  times("T2 " + std::to_string(first->second) + ", as it was told before"));
   }
 
+  auto known = said;  // the oldest packet that we sent at or after `other`
   for (std::uint64_t i = 0; i < 32 && i < told; ++i) {
     const std::uint64_t other = told - 1 - i;
+    if (known != said_.begin() && std::prev(known)->first == other) --known;
+    const bool was_said = known->first == other;
     const bool has = (echo.received_mask() >> i & 1U) != 0;
-    const std::string mask = "echo of " + packet(told) + ", mask " + std::to_string(echo.received_mask());
+    const auto mask = [&] { return "echo of " + packet(told) + ", mask " + std::to_string(echo.received_mask()); };
     if (const auto bad = bad_.find(other); bad != bad_.end()) {
-      report_.judge(bad->second.check, !has, mask + ": " + packet(other) + " has arrived",
+      report_.judge(bad->second.check, !has, mask() + ": " + packet(other) + " has arrived",
                     must_drop(bad->second.wrong));
       continue;
     }
-    const auto known = said_.find(other);
-    report_.judge("echo-mask", !has || known != said_.end(), mask, "bit " + std::to_string(i) + " clear: never said");
-    const bool must = known != said_.end() && known->second.order < said->second.order;
+    report_.judge("echo-mask", !has || was_said,
+                  [&] { return std::pair(mask(), "bit " + std::to_string(i) + " clear: never said"); });
+    const bool must = was_said && known->second.order < said->second.order;
     const auto owner = owners_.find(other);
     if (owner != owners_.end() && report_.failed("echo-mask")) continue;
-    report_.judge(owner == owners_.end() ? "echo-mask" : owner->second, has || !must, mask,
-                  "bit " + std::to_string(i) + " set: said before");
+    report_.judge(owner == owners_.end() ? "echo-mask" : owner->second, has || !must,
+                  [&] { return std::pair(mask(), "bit " + std::to_string(i) + " set: said before"); });
   }
+}
+
+std::optional<pb::ControlAck> Conversation::ask(const pb::Control& control) {
+  const std::size_t before = heard_.size();
+  std::optional<pb::ControlAck> found;
+  pb::Datagram body;
+  *body.add_frames()->mutable_control() = control;
+  for (const LocalTime end = now() + kPatience; !found && now() < end;) {
+    say(body);
+    listen_until(kRepeat, [&] {
+      for_each_frame(before, [&](const pb::Frame& frame) {
+        if (frame.has_control_ack() && frame.control_ack().id() == control.id()) found = frame.control_ack();
+      });
+      return found.has_value();
+    });
+  }
+  return found;
 }
 
 }  // namespace tendon::conformance

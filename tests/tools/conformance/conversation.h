@@ -20,6 +20,9 @@ namespace tendon::conformance {
 /// So much later than asked the kit still believes that a peer meant to do it at once: virtual machines pause.
 inline constexpr Duration kPatience = std::chrono::seconds(3);
 
+/// A correct peer repeats a Hello or a request at this interval.
+inline constexpr Duration kRepeat = std::chrono::milliseconds(100);
+
 /// The kit's end of an open conversation: a correct peer that keeps a record of every datagram it said and heard, and
 /// can on request say what no correct peer says.
 ///
@@ -90,6 +93,8 @@ class Conversation {
   }
   /// Until the peer has told that it has `number`; says keep-alives meanwhile.
   bool confirmed(std::uint64_t number, Duration patience = kPatience);
+  /// Repeats a request until there is an answer, for at most kPatience.
+  std::optional<pb::ControlAck> ask(const pb::Control& control);
   /// What the newest echo tells of `number`; empty when it does not reach that far.
   std::optional<bool> told_of(std::uint64_t number) const;
 

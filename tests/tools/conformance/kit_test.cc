@@ -4,6 +4,8 @@
 // no other.
 #include <gtest/gtest.h>
 
+#include <fstream>
+#include <regex>
 #include <set>
 #include <string>
 #include <string_view>
@@ -11,6 +13,7 @@
 
 #include "protocol/secrets/suites.h"
 #include "tests/tools/conformance/client_checks.h"
+#include "tests/tools/conformance/request_bounds.h"
 #include "tests/tools/conformance/server_checks.h"
 #include "tests/tools/conformance/toy/client.h"
 #include "tests/tools/conformance/toy/server.h"
@@ -50,11 +53,12 @@ std::set<std::string_view> failed(const Report& report) {
   return out;
 }
 
-Report server_report(int suite, Fault fault) {
+Report server_report(int suite, Fault fault, bool long_checks = false) {
   crypto::start();
   const Options options{.key = key_of(suite),
                         .aes = suite == 2,
-                        .long_checks = fault == Fault::kNeverRenews,
+                        .long_checks = long_checks || fault == Fault::kNeverRenews,
+                        .key_age = ToySession::kKeyAge,
                         .follower = fault != Fault::kKnowsNoCoupling};
   ToyServer server(options.key, fault);
   ToyWire wire(server, true);
@@ -63,9 +67,12 @@ Report server_report(int suite, Fault fault) {
   return report;
 }
 
-Report client_report(int suite, Fault fault, pb::Role role = pb::ROLE_CONTROLLER) {
+Report client_report(int suite, Fault fault, pb::Role role = pb::ROLE_CONTROLLER, bool long_checks = false) {
   crypto::start();
-  const Options options{.key = key_of(suite), .aes = suite == 2, .long_checks = fault == Fault::kNeverRenews};
+  const Options options{.key = key_of(suite),
+                        .aes = suite == 2,
+                        .long_checks = long_checks || fault == Fault::kNeverRenews,
+                        .key_age = ToySession::kKeyAge};
   const bool asks = role == pb::ROLE_CONTROLLER;
   ToyClient client(options.key, role, asks, fault);
   ToyWire wire(client, false);
@@ -101,6 +108,7 @@ const std::vector<Broken>& of_either_end() {
       {Fault::kTalksAfterBye, "bye-silence"},
       {Fault::kNoTimeout, "timeout"},
       {Fault::kAnythingIsALifeSign, "timeout"},
+      {Fault::kSilentToBadRequests, "request-invalid"},
   };
   return kAll;
 }
@@ -150,6 +158,13 @@ TEST(ConformanceKit, AServerThatKeepsAllRulesPasses) {
   }
 }
 
+TEST(ConformanceKit, APeerThatRenewsItsKeyInTimePassesTheLongCheck) {
+  const Report server = server_report(1, Fault::kNone, true);
+  EXPECT_TRUE(server.passed()) << told(server);
+  const Report client = client_report(1, Fault::kNone, pb::ROLE_CONTROLLER, true);
+  EXPECT_TRUE(client.passed()) << told(client);
+}
+
 TEST(ConformanceKit, AServerThatKnowsNoChannelsPassesAndIsNotJudgedByThem) {
   for (int suite = 0; suite < suites_here(); ++suite) {
     const Report all = server_report(suite, Fault::kNone);
@@ -196,6 +211,33 @@ TEST(ConformanceKit, TellsANonceWithTheWrongEndInFront) {
   if (suites_here() < 3) GTEST_SKIP() << "this processor has no AES";
   EXPECT_TRUE(failed(server_report(2, Fault::kLittleEndianNonce)).contains("data-opens"));
   EXPECT_TRUE(failed(client_report(2, Fault::kLittleEndianNonce)).contains("data-opens"));
+}
+
+/// The vectors are generated from tendon.proto.
+TEST(ConformanceKit, ItsBoundsOfRequestsAreThoseOfTheVectors) {
+  std::ifstream file(std::string(TENDON_SOURCE) + "/protocol/vectors/bounds.json");
+  static const std::regex kVector(R"re(.*"field": "(\w+)\.([^"]*)".*"accepted": (true|false), "body": "(\w*)".*)re");
+  int refused = 0;
+  std::set<std::string> fields;
+  for (std::string line; std::getline(file, line);) {
+    std::smatch found;
+    pb::Datagram body;
+    if (!std::regex_match(line, found, kVector) || !read(from_hex(found[4].str()), body)) continue;
+    if (body.frames_size() != 1 || !body.frames(0).has_control() || body.frames(0).control().id() == 0) continue;
+    const std::string field = found[2].str().starts_with("rotation") ? "rotation" : found[2].str();
+    EXPECT_EQ(field_out_of_bounds(body.frames(0).control()), found[3] == "true" ? "" : field) << line;
+    if (found[3] == "false") fields.insert(found[1].str() + "." + field);
+    refused += found[3] == "false" ? 1 : 0;
+  }
+  EXPECT_GT(refused, 150);
+  std::set<std::string> said;
+  for (const BadRequest& bad : requests_out_of_bounds()) {
+    EXPECT_EQ(field_out_of_bounds(bad.control), bad.field) << bad.control.ShortDebugString();
+    const auto& op = *bad.control.GetReflection()->GetOneofFieldDescriptor(
+        bad.control, bad.control.GetDescriptor()->FindOneofByName("op"));
+    said.insert(op.message_type()->name() + "." + bad.field);
+  }
+  for (const std::string& field : fields) EXPECT_TRUE(said.contains(field)) << "no bad request has a bad " << field;
 }
 
 INSTANTIATE_TEST_SUITE_P(ServerData, BrokenToy, testing::ValuesIn(cases(Toy::kServer, of_either_end())), name_of);

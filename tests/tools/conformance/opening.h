@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <chrono>
 #include <optional>
 #include <string_view>
 #include <vector>
@@ -16,11 +17,12 @@ namespace tendon::conformance {
 
 /// How a peer is judged.
 struct Options {
-  std::optional<Key> key{};  ///< suite 1 when set
-  bool aes = false;          ///< with a key: suite 2 is offered, and chosen, so that Data are of it
-  bool loopback = true;      ///< the peer is on this machine
-  bool long_checks = false;  ///< also those that take ten minutes
-  bool follower = false;     ///< a server's device 0 is a follower that fits the kit (server_coupling_checks.h)
+  std::optional<Key> key{};           ///< suite 1 when set
+  bool aes = false;                   ///< with a key: suite 2 is offered, and chosen, so that Data are of it
+  bool loopback = true;               ///< the peer is on this machine
+  bool long_checks = false;           ///< includes the check that waits until the peer renews its key
+  std::chrono::seconds key_age{600};  ///< the peer renews its key at this age at the latest
+  bool follower = false;  ///< a server's device 0 is a follower that fits the kit (server_coupling_checks.h)
   std::uint8_t suite() const noexcept { return key ? 1 : 0; }  ///< of the handshake
 };
 

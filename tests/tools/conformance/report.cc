@@ -152,6 +152,10 @@ constexpr std::array kChecks = {
     Check{"answer-kept", kServer, kSession, kRequests, "When a request comes again, its answer is sent again."},
     Check{"request-unknown", kServer, kSession, kRequests,
           "The session itself answers CODE_UNSUPPORTED to a request that this version does not know."},
+    Check{
+        "request-invalid", kBoth, kSession, kRequests,
+        "The session itself answers CODE_INVALID, with the name of the field in detail, to a request whose number can "
+        "be read and that has a field out of bounds"},
     Check{"request-bounds", kServer, kWire, kData, "> 0, at most 16 unanswered"},
     Check{"request-numbers", kClient, kSession, kRequests,
           "The requester numbers its requests 1, 2, 3 …, has at most 16 open"},

@@ -5,6 +5,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 namespace tendon::conformance {
@@ -49,6 +50,13 @@ class Report {
   /// One observation of the rule `name`. The first that fails stays. `name` must be one of the checks of this side, or
   /// std::logic_error is thrown.
   void judge(std::string_view name, bool kept, std::string seen, std::string expected);
+  /// Calls `words` for the two texts, and only on failure. Use it for rules that every datagram is checked against.
+  template <class Words>
+  void judge(std::string_view name, bool kept, const Words& words) {
+    if (kept) return judge(name, true, {}, {});
+    auto [seen, expected] = words();
+    judge(name, false, std::move(seen), std::move(expected));
+  }
   void not_applicable(std::string_view name, std::string why);
 
   std::span<const Verdict> verdicts() const noexcept { return verdicts_; }

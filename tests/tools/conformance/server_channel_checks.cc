@@ -93,14 +93,14 @@ void ChannelChecks::check_from_outside(Conversation& observer, std::uint32_t id)
   pb::Control take;
   take.set_id(id);
   take.mutable_take_lease();
-  const auto denied = guest_.request(observer, take);
+  const auto denied = observer.ask(take);
   guest_.report.judge("lease-denied", denied && denied->code() == pb::CODE_DENIED,
                       denied ? denied->ShortDebugString() : "nothing", "CODE_DENIED to an observer");
 
   pb::Control describe;
   describe.set_id(id + 1);
   describe.mutable_describe();
-  const auto described = guest_.request(observer, describe);
+  const auto described = observer.ask(describe);
   guest_.report.judge("describe", described && described->code() == pb::CODE_OK && described->has_device(),
                       described ? described->ShortDebugString() : "nothing",
                       "CODE_OK with a description of device 0, to an observer too");
@@ -129,7 +129,7 @@ void ChannelChecks::check_description(Conversation& talk, const pb::Welcome& wel
     pb::Control control;
     control.set_id(++id);
     control.mutable_describe()->set_device(device);
-    return guest_.request(talk, control).value_or(pb::ControlAck());
+    return talk.ask(control).value_or(pb::ControlAck());
   };
   const pb::ControlAck first = describe(0);
   const pb::DeviceDescription& device = first.device();
@@ -159,7 +159,7 @@ void ChannelChecks::check_lease(Conversation& talk, std::uint32_t& id) {
     } else {
       control.mutable_give_lease();
     }
-    const auto ack = guest_.request(talk, control);
+    const auto ack = talk.ask(control);
     guest_.report.judge("lease-kept", ack && ack->code() == pb::CODE_OK, ack ? ack->ShortDebugString() : "nothing",
                         "CODE_OK to " + to);
   };
@@ -167,7 +167,7 @@ void ChannelChecks::check_lease(Conversation& talk, std::uint32_t& id) {
     pb::Control control;
     control.set_id(++id);
     control.mutable_describe();
-    const auto ack = guest_.request(talk, control);
+    const auto ack = talk.ask(control);
     if (!ack || ack->device().channels().empty()) return;  // "describe" has failed
     const std::string& told = ack->device().channels(0).holder();
     guest_.report.judge("lease-kept", told == name, "held by \"" + told + "\" " + after, "held by \"" + name + "\"");
@@ -192,7 +192,7 @@ void ChannelChecks::check_deadband(Conversation& talk, const pb::Welcome& welcom
     band.set_share(share);
     band.set_floor_mps(floor);
     band.set_max_silence_us(silence_us);
-    return guest_.request(talk, control).value_or(pb::ControlAck());
+    return talk.ask(control).value_or(pb::ControlAck());
   };
   const std::vector<std::pair<std::string, pb::ControlAck>> refused = {
       {"a share of 0.51", set(0.51, kFloor, 20'000)},

@@ -149,13 +149,13 @@ void check_observer(ServerGuest& guest, ChannelChecks& channels, Conversation& c
   pb::Control rearm;
   rearm.set_id(1);
   rearm.mutable_rearm();
-  const auto ack = guest.request(talk, rearm);
+  const auto ack = talk.ask(rearm);
   guest.report.judge("rearm-by-controller", ack && ack->code() == pb::CODE_DENIED,
                      ack ? ack->ShortDebugString() : "nothing", "CODE_DENIED to an observer");
   pb::Control disarm;
   disarm.set_id(2);
   disarm.mutable_disarm();
-  const auto refused = guest.request(talk, disarm);
+  const auto refused = talk.ask(disarm);
   // A server may be older than this request.
   const bool not_done = refused && (refused->code() == pb::CODE_DENIED || refused->code() == pb::CODE_UNSUPPORTED);
   guest.report.judge("disarm-by-controller", not_done, refused ? refused->ShortDebugString() : "nothing",
@@ -309,7 +309,7 @@ void check_conversation(ServerGuest& guest, ChannelChecks& channels, ServerGuest
   check_observer(guest, channels, talk);
   check_roaming(guest, talk);
   check_old_key(talk, rekeyed);
-  check_rekey_sent(talk, guest.options.long_checks);
+  check_rekey_sent(talk, guest.options);
   if (session.welcome.timeout_ms() > 10'000) {
     guest.report.not_applicable("timeout",
                                 "this server waits for " + std::to_string(session.welcome.timeout_ms()) + " ms");
@@ -357,6 +357,10 @@ void judge_server(Wire& wire, const Options& options, Report& report) {
   check_half_open(guest);
   check_stray_data(guest);
   channels.check_claims();
+  if (auto session = guest.enter(pb::ROLE_OBSERVER)) {
+    check_bad_requests(session->talk, 1);
+    say_bye(session->talk);
+  }
   if (auto session = guest.enter(pb::ROLE_CONTROLLER)) check_conversation(guest, channels, *session);
   check_end(guest, channels);
   check_hello_limit(guest);

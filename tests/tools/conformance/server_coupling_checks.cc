@@ -32,7 +32,7 @@ pb::Couple fitting() {
 /// One controller, who numbers his requests.
 class Asker {
  public:
-  Asker(ServerGuest& guest, Conversation& talk, std::uint32_t first) : guest_(guest), talk_(talk), next_(first) {}
+  Asker(Conversation& talk, std::uint32_t first) : talk_(talk), next_(first) {}
 
   pb::ControlAck couple(const pb::Couple& wanted) {
     return ask([&](pb::Control& control) { *control.mutable_couple() = wanted; });
@@ -47,11 +47,10 @@ class Asker {
     pb::Control control;
     control.set_id(next_++);
     fill(control);
-    return guest_.request(talk_, control).value_or(pb::ControlAck());
+    return talk_.ask(control).value_or(pb::ControlAck());
   }
 
  private:
-  ServerGuest& guest_;
   Conversation& talk_;
   std::uint32_t next_;
 };
@@ -149,7 +148,7 @@ void check_couple(ServerGuest& guest, Asker& asker, Conversation& talk) {
 }  // namespace
 
 void check_unasked(ServerGuest& guest, Conversation& controller, std::uint32_t id) {
-  Asker asker(guest, controller, id);
+  Asker asker(controller, id);
   expect_code(guest.report, "couple-unasked", asker.couple(fitting()), pb::CODE_UNSUPPORTED,
               "a client that did not name \"teleoperation\"");
   expect_code(guest.report, "output-unasked", asker.set_output(0), pb::CODE_UNSUPPORTED,
@@ -162,7 +161,7 @@ pb::Hello with_coupling(pb::Hello hello) {
 }
 
 void check_coupling(ServerGuest& guest, ServerGuest::Session& controller, std::uint32_t id) {
-  Asker asker(guest, controller.talk, id);
+  Asker asker(controller.talk, id);
   check_outputs(guest, asker, controller.welcome);
   if (guest.options.follower) {
     check_differences(guest, asker);

@@ -140,21 +140,4 @@ void ServerGuest::expect_silence(std::string_view check, int port, const std::st
   report.judge(check, heard.empty(), heard.empty() ? "" : hex(heard.front()), "silence after " + after);
 }
 
-std::optional<pb::ControlAck> ServerGuest::request(Conversation& talk, const pb::Control& control) {
-  const std::size_t before = talk.heard().size();
-  std::optional<pb::ControlAck> found;
-  pb::Datagram body;
-  *body.add_frames()->mutable_control() = control;
-  for (const LocalTime end = talk.now() + kPatience; !found && talk.now() < end;) {
-    talk.say(body);
-    talk.listen_until(kRepeat, [&] {
-      talk.for_each_frame(before, [&](const pb::Frame& frame) {
-        if (frame.has_control_ack() && frame.control_ack().id() == control.id()) found = frame.control_ack();
-      });
-      return found.has_value();
-    });
-  }
-  return found;
-}
-
 }  // namespace tendon::conformance

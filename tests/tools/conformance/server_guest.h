@@ -15,8 +15,6 @@ namespace tendon::conformance {
 
 /// Whoever is silent for so long has nothing to say.
 inline constexpr Duration kSilence = std::chrono::milliseconds(250);
-/// A correct client repeats a Hello or a request as often.
-inline constexpr Duration kRepeat = std::chrono::milliseconds(100);
 
 /// A correct client of the server under test. Each check talks through it, on ports of its own choice.
 struct ServerGuest {
@@ -46,8 +44,6 @@ struct ServerGuest {
   std::optional<Session> enter(const pb::Hello& words);
   Conversation::Setup setup(int port, const Answered& answered) const;
   void expect_silence(std::string_view check, int port, const std::string& after);
-  /// Repeats a request until it is answered, or patience runs out.
-  std::optional<pb::ControlAck> request(Conversation& talk, const pb::Control& control);
 };
 
 }  // namespace tendon::conformance

@@ -41,15 +41,15 @@ void check_requests(ServerGuest& guest, Conversation& talk) {
   talk.listen(milliseconds(120));
   guest.report.judge("request-order", acks(before, 2) == 0, "request 2 was answered before request 1 had come",
                      "no answer to 2 before 1");
-  const auto first = guest.request(talk, rate(1, 500));
-  const bool second = acks(before, 2) > 0 || guest.request(talk, rate(2, 50)).has_value();
+  const auto first = talk.ask(rate(1, 500));
+  const bool second = acks(before, 2) > 0 || talk.ask(rate(2, 50)).has_value();
   guest.report.judge("request-order", first && second, "no answer", "answers to 1 and 2");
   guest.report.judge("request-order", states_in(kWindow) < kBetween,
                      "more than " + std::to_string(kBetween) + " states in 600 ms",
                      "about 30: request 2, 50 per second, was delivered last");
 
   // 1 again: an old answer, and nothing else.
-  const auto again = guest.request(talk, rate(1, 500));
+  const auto again = talk.ask(rate(1, 500));
   guest.report.judge("answer-kept",
                      again && first && again->code() == first->code() && again->detail() == first->detail(),
                      again ? again->ShortDebugString() : "nothing", first ? first->ShortDebugString() : "an answer");
@@ -64,7 +64,7 @@ void check_requests(ServerGuest& guest, Conversation& talk) {
   pb::Control unknown;
   unknown.set_id(3);
   unknown.GetReflection()->MutableUnknownFields(&unknown)->AddLengthDelimited(1000, "");
-  const auto refused = guest.request(talk, unknown);
+  const auto refused = talk.ask(unknown);
   guest.report.judge("request-unknown", refused && refused->code() == pb::CODE_UNSUPPORTED,
                      refused ? refused->ShortDebugString() : "nothing", "CODE_UNSUPPORTED");
 
@@ -104,9 +104,9 @@ void check_requests(ServerGuest& guest, Conversation& talk) {
                      "dropped: 0 is no id, and 36 is more than 16 after 19, the last answered");
 
   // Nothing to say but once a second.
-  guest.report.judge("request-order", guest.request(talk, rate(20, 1)).has_value(), "no answer to 20", "an answer");
+  guest.report.judge("request-order", talk.ask(rate(20, 1)).has_value(), "no answer to 20", "an answer");
   check_keep_alive(talk);
-  guest.request(talk, rate(21, 1'000'000));
+  talk.ask(rate(21, 1'000'000));
 }
 
 }  // namespace tendon::conformance

@@ -3,8 +3,10 @@
 
 #include <cstdint>
 #include <functional>
+#include <vector>
 
 #include "tests/tools/conformance/conversation.h"
+#include "tests/tools/conformance/opening.h"
 
 // What both ends owe to each other once a conversation is open. Each function judges the checks it is named after.
 
@@ -29,6 +31,9 @@ void check_unknown(Conversation& talk, Evidence& evidence);
 /// `bad` are frames with a value out of bounds, of numbers that must never show.
 void check_out_of_bounds(Conversation& talk, Evidence& evidence,
                          const std::vector<std::function<void(pb::Frame&)>>& damages);
+/// Sends each request with each field out of bounds, and expects an answer to each of them. `id` is the id of the first
+/// request.
+void check_bad_requests(Conversation& talk, std::uint32_t id);
 void check_newest_wins(Conversation& talk, Evidence& evidence);
 /// In suite 1 we move on to the next key; the old one is good for a little longer.
 void check_rekey(Conversation& talk);
@@ -42,7 +47,7 @@ void check_timeout(Conversation& talk, Duration timeout);
 void check_bye_silence(Conversation& talk);
 /// The peer has said Bye in what was heard from index `since` on, or is about to.
 void check_byes(Conversation& talk, std::size_t since);
-/// The peer renews its key by itself. Takes more than 600 s, and so is done only if `long_checks`.
-void check_rekey_sent(Conversation& talk, bool long_checks);
+/// Checks that the peer renews its key. This takes `options.key_age`, so it runs only with `options.long_checks`.
+void check_rekey_sent(Conversation& talk, const Options& options);
 
 }  // namespace tendon::conformance

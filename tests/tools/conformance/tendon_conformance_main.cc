@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "clients/cpp/key_file.h"
+#include "clients/cpp/usage.h"
 #include "protocol/secrets/suites.h"
 #include "server/build_info.h"
 #include "tests/tools/conformance/client_checks.h"
@@ -117,11 +118,12 @@ int run(int argc, char** argv) {
       "does "
       "(clients/cpp/worker/stream.h).",
       "tendon-conformance");
+  usage::dress(app);
   app.footer(
       "Examples: tendon-conformance server 127.0.0.1:47100\n"
       "          tendon-conformance client --key wall.key -- python3 my_client.py --server {} --key wall.key\n"
       "          tendon-conformance worker -- mpirun -n 2 ./my_worker\n"
-      "Exit status: 0 all checks that apply passed, 1 one failed or was not reached, 2 wrong usage.");
+      "Exit: 0 all checks that apply passed; 1 one failed or was not reached; 2 wrong usage.");
   app.set_version_flag("--version", version_text());
   Line line;
   bool list_only = false;
@@ -133,7 +135,7 @@ int run(int argc, char** argv) {
         command->add_option("--key", line.key, "Sealed, with this key file (of a controller); without one suite 0")
             ->type_name("FILE");
     command->add_option("--suite", line.suite, "With a key, of Data: 2 offers and chooses suite 2, and judges by it")
-        ->check(CLI::IsMember({1, 2}))
+        ->check(usage::one_of({"1", "2"}))
         ->needs(key)
         ->capture_default_str();
     command->add_flag("--long", line.long_checks, "Also the check that takes 610 s: the peer renews its key");
@@ -160,9 +162,9 @@ int run(int argc, char** argv) {
   worker->add_option("COMMAND", line.command, "The worker; its environment has the address and the secret")->required();
   worker->add_flag("--json", line.json, "One JSON object per check on stdout");
   try {
-    app.parse(argc, argv);
+    usage::parse(app, argc, argv);
   } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : 2;
+    return usage::exit_code(app, error);
   }
   if (list_only) return list(line.json);
   if (*server) return judge_server(line);
@@ -178,8 +180,11 @@ int run(int argc, char** argv) {
 int main(int argc, char** argv) {
   try {
     return tendon::conformance::run(argc, argv);
-  } catch (const std::exception& error) {
+  } catch (const std::invalid_argument& error) {
     std::fprintf(stderr, "tendon-conformance: %s\n", error.what());
     return 2;
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "tendon-conformance: %s\n", error.what());
+    return 1;
   }
 }

@@ -7,6 +7,7 @@
 #include <system_error>
 #include <type_traits>
 
+#include "clients/cpp/usage.h"
 #include "server/build_info.h"
 #include "tests/tools/injector/profile/named_profiles.h"
 
@@ -117,7 +118,7 @@ Subcommands add_subcommands(CLI::App& app, Said& said) {
       ->add_option("FORMAT", said.import.format,
                    "ping, irtt (its JSON), csv (delays in ms), or mahimahi (mm-link's log)")
       ->required()
-      ->check(CLI::IsMember({"ping", "irtt", "csv", "mahimahi"}).description(""));
+      ->check(usage::one_of({"ping", "irtt", "csv", "mahimahi"}));
   verbs.import->add_option("FILE", said.import.from, "the measurement")->required();
   verbs.import->add_option("--out", said.import.to, "the trace")->type_name("TRACE")->required();
   verbs.import
@@ -125,8 +126,7 @@ Subcommands add_subcommands(CLI::App& app, Said& said) {
           "--share", said.share,
           "whose delay it is: halves (of a round trip, for each direction), up, down, both, or measured (irtt with "
           "clocks in step)")
-      ->type_name("SHARE")
-      ->check(CLI::IsMember({"halves", "up", "down", "both", "measured"}).description(""));
+      ->check(usage::one_of({"halves", "up", "down", "both", "measured"}));
   verbs.import
       ->add_option("--interval-ms", said.interval_ms, "from one measurement to the next, where the file does not say")
       ->type_name("MS")
@@ -134,7 +134,18 @@ Subcommands add_subcommands(CLI::App& app, Said& said) {
       ->capture_default_str();
 
   verbs.import->footer(
-      "Example\n  ping -D -c 1000 -i 0.2 example.org >ping.txt\n  tendon-inject import ping ping.txt --out run.csv");
+      "A csv has one row for each datagram, and a first line with the names of its columns; others are ignored:\n"
+      "  t_ms      when it was sent; must not fall. Without this column, each is --interval-ms after the one before\n"
+      "  delay_ms  how long it took; empty: it was lost\n"
+      "  dir       up or down, in place of --share\n"
+      "Without a first line it has one column, the delays in ms, and a blank line is a lost datagram. Other units are\n"
+      "converted (t_s, delay_us, \"delay [s]\"). Commas, semicolons or tabs separate; between semicolons or tabs, "
+      "numbers\n"
+      "may have decimal commas. A profile takes the same file: delay=samples(FILE).\n\n"
+      "Examples\n"
+      "  ping -D -c 1000 -i 0.2 example.org >ping.txt\n  tendon-inject import ping ping.txt --out run.csv\n"
+      "  printf 't_ms,delay_ms\\n0,20.1\\n10,\\n20,21\\n' >delays.csv\n"
+      "  tendon-inject import csv delays.csv --share both --out run.csv");
 
   verbs.export_delays = app.add_subcommand("export", "print the true one-way delays of a trace as CSV");
   verbs.export_delays->add_option("TRACE", said.trace, "a recorded or imported trace")->required();
@@ -203,8 +214,7 @@ void add_options(CLI::App& app, Said& said) {
       ->excludes("--profile", "--up", "--down", "--seed", "--scenario");
   app.add_option("--by", said.replay_by,
                  "which recorded fate a datagram meets: that of the datagram of the same index, or of the same time")
-      ->type_name("index|time")
-      ->check(CLI::IsMember({"index", "time"}).description(""))
+      ->check(usage::one_of({"index", "time"}))
       ->needs("--replay")
       ->group(network);
   app.add_flag("--profiles", said.profiles, "list the named networks")->group(network);
@@ -290,20 +300,21 @@ LiveTask live_task(Said said) {
 Task parse_command_line(int argc, const char* const* argv) {
   Said said;
   CLI::App app(kAbout, "tendon-inject");
+  usage::dress(app);
   app.footer(kExamples);
   app.set_version_flag("--version", version_text());
   add_options(app, said);
   app.require_subcommand(0, 1);
   const Subcommands verbs = add_subcommands(app, said);
   try {
-    app.parse(argc, argv);
+    tendon::usage::parse(app, argc, argv);
   } catch (const CLI::CallForHelp&) {
     const auto chosen = app.get_subcommands();
     return HelpTask{chosen.empty() ? app.help() : chosen.front()->help()};
   } catch (const CLI::CallForVersion& version) {
     return HelpTask{std::string(version.what()) + "\n"};
   } catch (const CLI::ParseError& error) {
-    throw std::invalid_argument(error.what());
+    throw std::invalid_argument(usage::problem(app, error) + " (see --help)");
   }
   if (verbs.control->parsed()) {
     std::string line;

@@ -19,13 +19,13 @@ if [ "$program" = --with ]; then
   program=$scratch/golden_decisions
   cd "$source"
   tool=tests/tools/injector
-  for file in core/base/portable_math server/machine/regular_file \
+  for file in core/base/nearest_word core/base/portable_math server/machine/regular_file server/tables/table_reader \
     $tool/models/bottleneck $tool/models/delay_model $tool/models/draws $tool/models/exact_math \
     $tool/models/loss_model $tool/models/quantile_table $tool/golden_decisions_main $tool/injector \
     $tool/profile/limits $tool/profile/named_profiles $tool/profile/profile $tool/profile/profile_text \
     $tool/profile/tables $tool/profile/timeline $tool/profile/units $tool/profile/words; do
     object=$scratch/$(basename "$file").o
-    "$compiler" -std=c++20 -O2 -ffp-contract=off -I. -c "$file.cc" -o "$object"
+    "$compiler" -std=c++20 -O2 -ffp-contract=off -DTENDON_VERSION='"of another compiler"' -I. -c "$file.cc" -o "$object"
     set -- "$@" "$object"
   done
   shift 4

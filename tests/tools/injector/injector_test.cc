@@ -12,13 +12,13 @@
 #include <string>
 #include <vector>
 
+// How often each thing happens, and by which law, is the business of selftest_test.cc.
 namespace tendon::injector::injector_test {
 namespace {
 
 using namespace std::chrono_literals;
 
 constexpr LocalTime kStart = LocalTime(5s);
-constexpr int kMany = 100'000;
 
 /// The decisions on `count` datagrams of 100 bytes, one each `period`, the first at kStart.
 std::vector<Decision> decisions(const std::string& profile, int count, Duration period, std::uint64_t seed = 7) {
@@ -83,17 +83,6 @@ TEST(Injector, FifoHoldsEvenForAClockThatGoesBack) {
   Injector injector(parse_profile("delay=10ms"), 1, 0, Direction::kUp);
   EXPECT_EQ(injector.decide({.arrival = kStart}).release, kStart + 10ms);
   EXPECT_EQ(injector.decide({.arrival = kStart - 1ms}).release, kStart + 10ms);
-}
-
-TEST(Injector, LosesAndDuplicatesAsOftenAsTheProfileSays) {
-  for (const double p : {0.001, 0.02, 0.3, 0.5, 0.97}) {
-    const std::string share = std::to_string(p);
-    const auto all = decisions("loss=" + share + " duplicate=" + share, kMany, 1ms, 11);
-    const double gone = count_if(all, lost);
-    EXPECT_NEAR(gone, kMany * p, four_sigma(kMany, p)) << p;
-    const double twice = count_if(all, [](const Decision& d) { return d.duplicate.has_value(); });
-    EXPECT_NEAR(twice, (kMany - gone) * p, four_sigma(kMany - gone, p)) << p;
-  }
 }
 
 TEST(Injector, LosingMoreDatagramsLosesTheSameDatagramsAndMore) {
@@ -224,26 +213,6 @@ TEST(Injector, AnOutageLosesAllThatArriveInItAndNoOther) {
   EXPECT_EQ(fates, "++++--++--");
 }
 
-TEST(Injector, AHandoverLosesAGapAndThePathIsAnotherAfterwards) {
-  const auto all = decisions("base=20ms handover(every=10s,for=1s,5ms)", 400, 500ms);
-  std::vector<Duration> paths;
-  for (const Decision& d : all) {
-    const auto since = d.arrival - kStart;
-    EXPECT_EQ(lost(d), since >= 10s && since % 10s < 1s) << since.count();
-    EXPECT_EQ(d.cause == Cause::kHandover, lost(d));
-    const auto number = static_cast<std::size_t>(since / 10s);
-    if (paths.size() <= number) paths.push_back(delay(d));
-    EXPECT_EQ(delay(d), paths[number]);
-  }
-  EXPECT_EQ(paths.front(), 20ms);
-  ASSERT_EQ(paths.size(), 20U);
-  const auto [least, most] = std::ranges::minmax(paths);
-  EXPECT_GE(least, 15ms);
-  EXPECT_LE(most, 25ms);
-  EXPECT_LT(least, 17ms);
-  EXPECT_GT(most, 23ms);
-}
-
 TEST(Injector, ADropRuleMeetsOnlyTheDatagramsOfItsType) {
   Injector injector(parse_profile("drop(byte=1,mask=0xf,value=3,50%) drop(byte=3,value=0xff)"), 7, 0, Direction::kUp);
   int threes = 0;
@@ -281,37 +250,6 @@ TEST(Injector, TheLossOfTheProfileGoesOnUnderTheLossOfARegime) {
   for (std::size_t i = 0; i < plain.size(); ++i) {
     ASSERT_TRUE(regimes[i].cause == Cause::kRegime || lost(regimes[i]) == lost(plain[i])) << i;
   }
-}
-
-TEST(Injector, EachOfThreeRegimesFollowsEachOtherEquallyOftenAndAddsItsDelay) {
-  const auto all = delays_ms(
-      "base=1ms regime(a,dwell=50ms) regime(b,dwell=50ms,delay=2ms) regime(c,dwell=50ms,delay=4ms) order=free", 400'000,
-      1ms);
-  std::array<std::array<int, 5>, 5> from_to{};
-  for (std::size_t i = 1; i < all.size(); ++i) {
-    ++from_to.at(static_cast<std::size_t>(all[i - 1]) - 1).at(static_cast<std::size_t>(all[i]) - 1);
-  }
-  for (const std::size_t from : {0U, 2U, 4U}) {
-    for (const std::size_t to : {0U, 2U, 4U}) {
-      if (from == to) continue;
-      EXPECT_NEAR(from_to.at(from).at(to), 400'000 / 50 / 6, 4 * std::sqrt(400'000 / 50 / 6.0)) << from << to;
-    }
-  }
-}
-
-TEST(Injector, FreeOrderReleasesEachWhenItsOwnDelayIsOver) {
-  const auto fifo = decisions("delay=uniform(0ms,10ms)", 1000, 1ms);
-  const auto free = decisions("delay=uniform(0ms,10ms) order=free", 1000, 1ms);
-  int overtaken = 0;
-  LocalTime last{};
-  for (std::size_t i = 0; i < free.size(); ++i) {
-    EXPECT_LE(delay(free[i]), 10ms);
-    EXPECT_LE(free[i].release, fifo[i].release);
-    last = std::max(last, free[i].release);
-    EXPECT_EQ(last, fifo[i].release);
-    overtaken += i > 0 && free[i].release < free[i - 1].release ? 1 : 0;
-  }
-  EXPECT_GT(overtaken, 300);
 }
 
 TEST(Injector, AJumpOvertakesAsManyDatagramsAsItSaysAndMovesNoOther) {
@@ -352,20 +290,7 @@ TEST(Injector, AStaleReplayBringsBackOneOfTheLastDatagrams) {
   for (std::size_t age = 1; age <= 16; ++age) EXPECT_NEAR(ages.at(age), 250, 4 * std::sqrt(250.0)) << age;
 }
 
-TEST(Injector, DamageHitsWithinThePayloadAndAsOftenAsAsked) {
-  const auto all = decisions("flip=10% truncate=20%", 20'000, 1ms);
-  std::vector<int> bits(800);
-  std::vector<int> sizes(100);
-  for (const Decision& d : all) {
-    if (d.flipped_bit) ++bits.at(*d.flipped_bit);
-    if (d.truncated_to) ++sizes.at(*d.truncated_to);
-  }
-  EXPECT_NEAR(count_if(all, [](const Decision& d) { return d.flipped_bit.has_value(); }), 2000,
-              four_sigma(20'000, 0.1));
-  EXPECT_NEAR(count_if(all, [](const Decision& d) { return d.truncated_to.has_value(); }), 4000,
-              four_sigma(20'000, 0.2));
-  EXPECT_GT(std::ranges::count_if(bits, [](int n) { return n > 0; }), 700);
-  EXPECT_EQ(std::ranges::count(sizes, 0), 0);
+TEST(Injector, WhereNoPayloadIsNoneIsDamaged) {
   Injector empty(parse_profile("flip=100% truncate=100%"), 7, 0, Direction::kUp);
   const Decision d = empty.decide({.arrival = kStart});
   EXPECT_FALSE(d.flipped_bit || d.truncated_to);

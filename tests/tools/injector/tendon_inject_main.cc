@@ -56,7 +56,7 @@ struct Runner {
     if (!task.record.empty()) {
       expect_replaceable(task.record, {kTraceBegins});
       file.open(task.record, std::ios::binary);
-      if (!file) throw std::invalid_argument("--record: cannot write " + task.record.string());
+      if (!file) throw std::runtime_error("--record: cannot write " + task.record.string());
       trace.emplace(file, network.header());
     }
     if (!task.run.json) std::cout << "seed " << network.seed << "\n";
@@ -78,8 +78,9 @@ struct Runner {
     write_trace(to, trace);
     to.flush();
     if (!to) throw std::runtime_error("cannot write " + task.to.string());
-    std::cerr << "tendon-inject: " << trace.records.size() << " datagrams; replay them with --replay "
-              << task.to.string() << " --by time\n";
+    std::cerr << import_summary(trace);
+    if (task.options.share == Share::kHalves) std::cerr << "each delay is half of a round trip\n";
+    std::cerr << "tendon-inject: replay them with --replay " << task.to.string() << " --by time\n";
     return 0;
   }
 

@@ -2,12 +2,14 @@
 // tendon-lab: experiments with recorded and simulated runs. Each verb is a file in verbs/.
 #include <CLI/CLI.hpp>
 
+#include "clients/cpp/usage.h"
 #include "server/build_info.h"
 #include "tests/support/run_tool.h"
 #include "tests/tools/lab/verbs/verb.h"
 
 int main(int argc, char** argv) {
   CLI::App app("Experiments with Tendon.", "tendon-lab");
+  tendon::usage::dress(app);
   app.set_version_flag("--version", tendon::version_text());
   app.require_subcommand(1);
   app.footer(

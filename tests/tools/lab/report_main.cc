@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "clients/cpp/usage.h"
 #include "server/build_info.h"
 #include "tests/support/run_tool.h"
 #include "tests/tools/lab/recordings/pair_report.h"
@@ -16,22 +17,26 @@ int main(int argc, char** argv) {
   std::string picture;
   bool pairs = false;
   CLI::App app("Sums up recorded runs as a table and a picture.", "tendon-report");
+  tendon::usage::dress(app);
   app.set_version_flag("--version", tendon::version_text());
-  app.add_option("RECORDING", recordings, "recordings of tendond, one column each")
+  app.add_option("RECORDING", recordings, "recordings of tendond, a column for each device in them")
       ->type_name("FILE.mcap")
-      ->required()
-      ->check(CLI::ExistingFile.description(""));
+      ->required();
   app.add_option("--out", picture, "draw the runs side by side (needs gnuplot)")->type_name("FILE.svg|FILE.png");
   app.add_option("--label", options.labels, "what a run is called; once for each recording, in order")
       ->type_name("TEXT")
       ->allow_extra_args(false);
+  app.add_option("--device", options.devices, "columns for this device only; once for each")
+      ->type_name("NAME")
+      ->allow_extra_args(false);
   app.add_flag("--pairs", pairs, "the recordings are of two coupled ends each, as `tendon-replay --merge` writes them");
-  app.add_flag("--json", options.json, "one JSON object for each recording on stdout instead of the table");
-  app.add_flag("--check", options.check, "fails where a ledger, or that of a pair, has fallen below -1 nJ");
+  app.add_flag("--json", options.json,
+               "one JSON object for each device of each recording on stdout instead of the table");
+  app.add_flag("--check", options.check, "fails where the ledger of any device, or of a pair, has fallen below -1 nJ");
   app.footer(
       "\nExample: the same motion without and with the limiter\n"
       "  tendon-report off.mcap on.mcap --label \"limiter off\" --label \"limiter on\" --out runs.svg\n"
-      "\nExit: 0 done; 1 a recording is corrupt, gnuplot or --check failed; 2 wrong usage.");
+      "\nExit: 0 done; 1 a recording cannot be read, gnuplot or --check failed; 2 wrong usage.");
 
   return tendon::run_tool(app, argc, argv, [&] {
     options.recordings.assign(recordings.begin(), recordings.end());

@@ -43,8 +43,9 @@ struct Recorded {
 
 /// A hand holds the follower, and two others lead it; the second joins later, and takes over.
 Recorded recorded() {
-  const std::string leading = testing::kTapping + "[teleoperation]\nrole = \"leader\"\n[teleoperation.coupling]\n";
-  Running follower(testing::kTapping +
+  const std::string leading =
+      std::string(testing::kTapping) + "[teleoperation]\nrole = \"leader\"\n[teleoperation.coupling]\n";
+  Running follower(std::string(testing::kTapping) +
                        "[[channel]]\nname = \"desk\"\n[[channel]]\nname = \"one\"\n[[channel]]\nname = \"two\"\n"
                        "[teleoperation]\nrole = \"follower\"\n"
                        "[[teleoperation.leader]]\nchannel = \"one\"\nshare = 0.6\n"

@@ -2,9 +2,7 @@
 #include "tests/tools/replay/merge.h"
 
 #include <algorithm>
-#include <fstream>
 #include <map>
-#include <memory>
 #include <set>
 #include <stdexcept>
 #include <string>
@@ -12,20 +10,16 @@
 #include <vector>
 
 #include "server/build_info.h"
-#include "server/machine/regular_file.h"
 #include "server/recording/byte_sink.h"
 #include "server/recording/mcap_reader.h"
 #include "server/recording/mcap_writer.h"
 #include "server/recording/recording_codec.h"
 #include "tests/support/json_line.h"
 #include "tests/tools/replay/clock_bound.h"
+#include "tests/tools/replay/copy.h"
 
 namespace tendon::replay {
 namespace {
-
-McapReader open(const std::filesystem::path& path) {
-  return {std::make_unique<std::ifstream>(open_regular_file(path, "recording")), path.string()};
-}
 
 /// What one end recorded of the coupling; times are those of the recording.
 struct End {
@@ -40,7 +34,7 @@ struct End {
 
 End read_end(const std::filesystem::path& path) {
   End end;
-  McapReader reader = open(path);
+  McapReader reader = open_mcap(path);
   while (const auto message = reader.next()) {
     if (message->channel.topic != recording::kPort.topic) continue;
     try {
@@ -94,20 +88,16 @@ std::set<std::uint32_t> channels_of(const End& leader, const End& follower) {
 class Copy {
  public:
   Copy(const std::filesystem::path& path, std::string prefix, std::set<std::uint32_t> channels)
-      : reader_(open(path)), prefix_(std::move(prefix)), ports_by_(std::move(channels)) {
+      : reader_(open_mcap(path)), prefix_(std::move(prefix)), ports_by_(std::move(channels)) {
     next();
   }
 
   bool done() const { return !message_; }
+  std::vector<std::string> damage() const { return reader_.damage(); }
   LocalTime at() const { return LocalTime(Duration(static_cast<Duration::rep>(message_->log_time))); }
   void write(McapWriter& writer, LocalTime at) {
-    const McapReader::Channel& from = message_->channel;
-    auto [channel, anew] = channels_.try_emplace(from.topic, std::uint16_t{0});
-    if (anew) {
-      const auto schema = writer.add_schema(from.schema_name, recording::kEncoding, recording::schema_data());
-      channel->second = writer.add_channel(schema, prefix_ + from.topic, from.message_encoding);
-    }
-    writer.write(channel->second, static_cast<std::uint64_t>(at.time_since_epoch().count()), message_->data);
+    const auto channel = channels_.in(writer, message_->channel, prefix_);
+    writer.write(channel, static_cast<std::uint64_t>(at.time_since_epoch().count()), message_->data);
     next();
   }
 
@@ -126,16 +116,13 @@ class Copy {
   McapReader reader_;
   std::string prefix_;
   std::set<std::uint32_t> ports_by_;
-  std::map<std::string, std::uint16_t> channels_;
+  CopiedChannels channels_;
   std::optional<McapReader::Message> message_;
 };
 
-void check(bool written, const FileSink& sink) {
-  if (!written) throw std::runtime_error(sink.path().string() + ": " + sink.error());
-}
-
-void write(const MergeOptions& options, const std::vector<ClockBound>& bounds,
-           const std::set<std::uint32_t>& channels) {
+/// Returns the error messages for the damaged regions of both recordings.
+std::vector<std::string> write(const MergeOptions& options, const std::vector<ClockBound>& bounds,
+                               const std::set<std::uint32_t>& channels) {
   FileSink sink(options.out);
   McapWriter writer("tendon " + std::string(version_text()), sink);
   const auto schema = writer.add_schema(recording::kClock.schema, recording::kEncoding, recording::schema_data());
@@ -154,9 +141,12 @@ void write(const MergeOptions& options, const std::vector<ClockBound>& bounds,
     } else {
       follower.write(writer, next);
     }
-    if (writer.chunk_size() > std::size_t{256} * 1024) check(writer.flush_chunk(), sink);
+    if (writer.chunk_size() > std::size_t{256} * 1024) check_written(writer.flush_chunk(), sink);
   }
-  check(writer.close(), sink);
+  check_written(writer.close(), sink);
+  std::vector<std::string> damage = leader.damage();
+  for (std::string& sentence : follower.damage()) damage.push_back(std::move(sentence));
+  return damage;
 }
 
 }  // namespace
@@ -168,7 +158,7 @@ void merge(const MergeOptions& options, std::ostream& out) {
   const End leader = read_end(options.leader);
   const End follower = read_end(options.follower);
   const auto bounds = bounds_between(leader, follower, options);
-  write(options, bounds, channels_of(leader, follower));
+  const auto damage = write(options, bounds, channels_of(leader, follower));
   std::vector<Duration> errors;
   for (const ClockBound& bound : bounds) errors.push_back(bound.error);
   std::ranges::sort(errors);
@@ -182,12 +172,14 @@ void merge(const MergeOptions& options, std::ostream& out) {
                .add("offset_s", offset)
                .add("error_p50_s", middle)
                .add("error_p99_s", p99)
+               .add("damage", damage)
                .str()
         << '\n';
   } else {
     out << options.out.string() << ": the follower's clock is " << offset * 1e3
         << " ms ahead of the leader's, proved to ± " << middle * 1e3 << " ms (p50), " << p99 * 1e3 << " ms (p99), over "
         << bounds.size() << " s\n";
+    for (const std::string& sentence : damage) out << sentence << '\n';
   }
 }
 

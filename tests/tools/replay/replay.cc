@@ -5,12 +5,15 @@
 #include <array>
 #include <charconv>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
+#include <deque>
 #include <fstream>
 #include <iostream>
 #include <stdexcept>
 #include <utility>
 #include <variant>
+#include <vector>
 
 #include "core/control/limiter.h"
 #include "server/recording/recording_reader.h"
@@ -19,6 +22,8 @@
 #include "tests/support/json_line.h"
 #include "tests/tools/lab/pictures/plot.h"
 #include "tests/tools/lab/pictures/table.h"
+#include "tests/tools/lab/recordings/devices.h"
+#include "tests/tools/lab/recordings/report.h"
 #include "tests/tools/lab/recordings/run_summary.h"
 #include "tests/tools/lab/recordings/trace.h"
 #include "tests/tools/replay/rerun.h"
@@ -27,44 +32,98 @@ namespace tendon::replay {
 
 namespace {
 
+constexpr std::size_t kMostDrawn = lab::kMostDrawings / 2;  // devices in a picture
+
 /// What may stand in the way of reading a recording as one run.
 struct Gaps {
   std::uint64_t lost_steps = 0;
   std::uint64_t lost_datagrams = 0;
   bool truncated = false;
+  std::vector<std::string> damage = {};
+  std::string without_steps = {};  ///< the error message if there are no steps
 };
 
 HapticController::Config control_of(const SceneRecord& scene, const Options& options) {
   const auto parse = [&](const std::vector<std::string>& settings) {
     return parse_scene(scene.text, "the recorded scene", options.files, settings).loop.control;
   };
-  const HapticController::Config recorded = parse({});
+  HapticController::Config recorded;
+  try {
+    recorded = parse({});
+  } catch (const SceneError& error) {  // The file is wrong, and not the command line.
+    throw std::runtime_error(options.recording.string() + ": " + error.what());
+  }
   std::vector<std::string> settings;
   if (options.law) settings = limiter_settings(*options.law, recorded);
   settings.insert(settings.end(), options.settings.begin(), options.settings.end());
   return settings.empty() ? recorded : parse(settings);
 }
 
-/// Reads the parts of the recording once; `visit` has every step, as it was and as it is again. The first record of
-/// each part is the scene; that of the first part is run.
+/// The selected devices, by their number in the recording.
+struct Chosen {
+  std::vector<std::string> names;  ///< of all
+  std::vector<bool> is_chosen;
+
+  std::size_t count() const { return static_cast<std::size_t>(std::ranges::count(is_chosen, true)); }
+  bool several() const { return names.size() > 1; }
+  std::string list() const {
+    std::string text;
+    for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
+    return text;
+  }
+};
+
+Chosen choose(const Options& options) {
+  Chosen chosen{.names = lab::device_names(options.recording), .is_chosen = {}};
+  for (const std::string& name : chosen.names) chosen.is_chosen.push_back(!options.device || name == *options.device);
+  if (chosen.count() == 0) {
+    throw std::runtime_error(options.recording.string() + ": has no device " + *options.device + ", but " +
+                             chosen.list());
+  }
+  const auto expect_at_most = [&chosen](std::size_t most, bool asked, const char* what) {
+    if (asked && chosen.count() > most) {
+      throw std::invalid_argument(std::string(what) + " has room for " + std::to_string(most) +
+                                  (most == 1 ? " device" : " devices") + ": choose one by --device, of " +
+                                  chosen.list());
+    }
+  };
+  expect_at_most(1, options.csv.has_value(), "--csv");
+  expect_at_most(kMostDrawn, options.picture.has_value(), "--out");
+  return chosen;
+}
+
+/// Reads the parts of the recording. Calls `visit` with the number of the device, the recorded step and the replayed step
+/// for each selected device. Each part starts with the scenes. The scenes of the first part are used.
 template <class Visit, class VisitDatagram>
-Gaps read_run(const Options& options, Rerun::Held held, const Visit& visit, const VisitDatagram& visit_datagram) {
+Gaps read_run(const Options& options, const Chosen& chosen, Rerun::Held held, const Visit& visit,
+              const VisitDatagram& visit_datagram) {
   Gaps gaps;
-  std::optional<Rerun> rerun;
+  std::vector<std::optional<Rerun>> reruns(chosen.names.size());
   const auto read_part = [&](const std::filesystem::path& file) {
-    RecordingReader reader(file);
+    RecordingReader reader(file, RecordingReader::Devices::kAll);
     while (const auto record = reader.next()) {
-      const auto* scene = std::get_if<SceneRecord>(&*record);
-      if (scene != nullptr && !rerun) rerun.emplace(control_of(*scene, options), held);
       if (const auto* loss = std::get_if<LossRecord>(&*record)) {
         gaps.lost_steps += loss->steps;
         gaps.lost_datagrams += loss->datagrams;
       }
       if (const auto* datagram = std::get_if<DatagramRecord>(&*record)) visit_datagram(*datagram);
-      if (const auto* port = std::get_if<PortRecord>(&*record)) rerun->settled(*port);
-      if (const auto* step = std::get_if<StepRecord>(&*record)) visit(*step, rerun->step(*step));
+      const std::size_t device = reader.device();
+      if (device >= reruns.size())
+        throw std::runtime_error(file.string() + ": is no part of " + options.recording.string());
+      if (!chosen.is_chosen[device]) continue;
+      std::optional<Rerun>& rerun = reruns[device];
+      const auto* scene = std::get_if<SceneRecord>(&*record);
+      const auto* port = std::get_if<PortRecord>(&*record);
+      const auto* step = std::get_if<StepRecord>(&*record);
+      if (scene != nullptr && !rerun) rerun.emplace(control_of(*scene, options), held);
+      if ((port != nullptr || step != nullptr) && !rerun)
+        throw std::runtime_error(file.string() + ": the scene is lost, so the law that was run is not known");
+      if (port != nullptr) rerun->settled(*port);
+      if (step != nullptr) visit(device, *step, rerun->step(*step));
     }
     gaps.truncated = gaps.truncated || reader.truncated();
+    if (gaps.without_steps.empty()) gaps.without_steps = reader.without_steps();
+    for (std::string& sentence : reader.damage()) gaps.damage.push_back(std::move(sentence));
   };
   read_part(options.recording);
   for (const std::filesystem::path& part : options.more_parts) read_part(part);
@@ -103,9 +162,10 @@ struct Comparison {
     }
     return text + "\n";
   }
-  std::string json() const {
-    return JsonLine()
-        .add("steps", steps)
+  std::string json(const std::optional<std::string>& device) const {
+    JsonLine line;
+    if (device) line.add("device", *device);
+    return line.add("steps", steps)
         .add("same", same)
         .add("gap_before_step", gap_before)
         .add("differs_at_step", differs_at)
@@ -194,85 +254,159 @@ class Progress {
   bool shown_ = false;
 };
 
+/// The recorded run and the replayed run of a device.
+struct Both {
+  explicit Both(bool of_several) : recorded(of_several), again(of_several) {}
+
+  lab::RunObserver recorded;
+  lab::RunObserver again;
+  Comparison comparison;
+  std::array<lab::Run, 2> runs;  ///< known at the end
+};
+
 lab::Run run_of(const std::string& label, const Options& options, const lab::RunObserver& observer, const Gaps& gaps) {
   return {.label = label,
           .recording = options.recording.filename().string(),
+          .device = {},
           .summary = observer.summary(),
           .truncated = gaps.truncated,
           .lost_steps = gaps.lost_steps,
-          .lost_datagrams = gaps.lost_datagrams};
+          .lost_datagrams = gaps.lost_datagrams,
+          .damage = gaps.damage};
 }
 
 /// A second look at the recording: what is drawn depends on what it comes down to.
-void draw_both(const Options& options, Rerun::Held held, const std::array<lab::Run, 2>& runs) {
+void draw_all(const Options& options, const Chosen& chosen, Rerun::Held held, const std::deque<Both>& devices) {
   std::vector<lab::Drawing> drawings;
-  for (const lab::Run& run : runs) {
-    drawings.push_back({run.label, run.summary,
-                        lab::Trace({.start = run.summary.start,
-                                    .span = std::max(run.summary.span, Duration(1)),
-                                    .columns = lab::trace_columns(runs.size()),
-                                    .axis = run.summary.axis})});
+  std::vector<std::size_t> first(devices.size());  // drawing of each device
+  for (std::size_t device = 0; device < devices.size(); ++device) {
+    first[device] = drawings.size();
+    if (!chosen.is_chosen[device]) continue;
+    for (const lab::Run& run : devices[device].runs) {
+      drawings.push_back({run.device.empty() ? run.label : run.label + ", " + run.device, run.summary,
+                          lab::Trace({.start = run.summary.start,
+                                      .span = std::max(run.summary.span, Duration(1)),
+                                      .columns = lab::trace_columns(2 * chosen.count()),
+                                      .axis = run.summary.axis})});
+    }
   }
   read_run(
-      options, held,
-      [&](const StepRecord& recorded, const StepRecord& again) {
-        drawings[0].trace.observe(recorded);
-        drawings[1].trace.observe(again);
+      options, chosen, held,
+      [&](std::size_t device, const StepRecord& recorded, const StepRecord& again) {
+        drawings[first[device]].trace.observe(recorded);
+        drawings[first[device] + 1].trace.observe(again);
       },
       [](const DatagramRecord&) {});
   lab::draw(*options.picture, drawings);
+}
+
+/// Selects up to `most` devices in their order. Devices that differ are preferred.
+std::vector<std::size_t> with_columns(const std::deque<Both>& devices, const std::vector<std::size_t>& examined) {
+  std::vector<std::size_t> shown;
+  for (const bool held : {false, true}) {
+    for (const std::size_t device : examined) {
+      if (devices[device].comparison.held() == held && shown.size() < lab::kMostColumns / 2) shown.push_back(device);
+    }
+  }
+  std::ranges::sort(shown);
+  return shown;
+}
+
+/// Describes each device if there are only a few. Otherwise describes the devices that differ and counts the others.
+std::string comparisons(const std::deque<Both>& devices, const Chosen& chosen,
+                        const std::vector<std::size_t>& examined) {
+  const bool each = examined.size() <= lab::kMostColumns / 2;
+  std::string text;
+  std::size_t same_devices = 0;
+  Comparison same;
+  for (const std::size_t device : examined) {
+    const Comparison& one = devices[device].comparison;
+    if (each || !one.held() || one.gap_before) {
+      text += (chosen.several() ? chosen.names[device] + ": " : "") + one.text();
+    } else {
+      ++same_devices;
+      same.steps += one.steps;
+      same.same += one.same;
+    }
+  }
+  if (same_devices > 0) text = std::to_string(same_devices) + " devices: " + same.text() + text;
+  return text;
 }
 
 }  // namespace
 
 bool replay(const Options& options, std::ostream& out) {
   if (options.picture) lab::check_picture(*options.picture, 2);
+  const Chosen chosen = choose(options);
   const bool same_law = !options.law && options.settings.empty();
   const auto held = same_law ? Rerun::Held::kRecorded : Rerun::Held::kOwn;
 
-  Comparison comparison;
-  lab::RunObserver recorded_run;
-  lab::RunObserver again_run;
+  std::deque<Both> devices;
+  for (std::size_t device = 0; device < chosen.names.size(); ++device) devices.emplace_back(chosen.several());
   std::optional<Csv> csv;
   if (options.csv) csv.emplace(*options.csv);
   Gaps gaps;
   {
     Progress progress(options.progress);
     std::uint64_t steps = 0;
-    const auto visit = [&](const StepRecord& recorded, const StepRecord& again) {
+    const auto visit = [&](std::size_t device, const StepRecord& recorded, const StepRecord& again) {
       progress.observe(++steps);
-      recorded_run.observe(recorded);
-      again_run.observe(again);
-      if (same_law) comparison.observe(recorded, again);
+      devices[device].recorded.observe(recorded);
+      devices[device].again.observe(again);
+      if (same_law) devices[device].comparison.observe(recorded, again);
       if (csv) csv->observe(recorded, again);
     };
-    gaps = read_run(options, held, visit, [&](const DatagramRecord& datagram) {  // both had the same network
-      recorded_run.observe(datagram);
-      again_run.observe(datagram);
+    gaps = read_run(options, chosen, held, visit, [&](const DatagramRecord& datagram) {  // both had the same network
+      for (Both& device : devices) {
+        device.recorded.observe(datagram);
+        device.again.observe(datagram);
+      }
     });
   }
   if (csv) csv->close();
 
-  const std::array<lab::Run, 2> runs = {
-      run_of("recorded", options, recorded_run, gaps),
-      run_of(same_law ? "again" : options.law.value_or("with settings"), options, again_run, gaps)};
-  if (runs[0].summary.steps == 0) throw std::runtime_error(options.recording.string() + ": holds no haptic step");
+  std::vector<std::size_t> examined;
+  std::string not_examined;
+  for (std::size_t device = 0; device < devices.size(); ++device) {
+    Both& both = devices[device];
+    both.runs = {run_of("recorded", options, both.recorded, gaps),
+                 run_of(same_law ? "again" : options.law.value_or("with settings"), options, both.again, gaps)};
+    if (chosen.several()) both.runs[0].device = both.runs[1].device = chosen.names[device];
+    if (both.runs[0].summary.steps > 0) {
+      examined.push_back(device);
+    } else if (chosen.several()) {
+      not_examined += chosen.names[device] + (chosen.is_chosen[device] ? ": has no haptic step" : ": not asked for") +
+                      ", not examined\n";
+    }
+  }
+  if (examined.empty()) throw std::runtime_error(gaps.without_steps);
   if (options.json) {
-    if (same_law) out << comparison.json() << "\n";
-    for (const lab::Run& run : runs) out << lab::to_json(run) << "\n";
+    for (const std::size_t device : examined) {
+      const Both& both = devices[device];
+      const std::string& name = both.runs[0].device;
+      if (same_law) out << both.comparison.json(name.empty() ? std::nullopt : std::optional(name)) << "\n";
+      for (const lab::Run& run : both.runs) out << lab::to_json(run) << "\n";
+    }
   } else {
-    out << lab::to_table(runs);
-    out << "\n"
-        << (same_law ? comparison.text()
-                     : "the hand moved as it was recorded; with other forces it would have moved otherwise\n");
+    std::vector<lab::Run> columns;
+    const std::vector<std::size_t> shown = with_columns(devices, examined);
+    for (const std::size_t device : shown)
+      columns.insert(columns.end(), devices[device].runs.begin(), devices[device].runs.end());
+    out << lab::to_table(columns) << "\n";
+    if (shown.size() < examined.size())
+      out << "columns for " << shown.size() << " of " << examined.size() << " devices (--device NAME for another)\n";
+    out << (same_law ? comparisons(devices, chosen, examined)
+                     : "the hand moved as it was recorded; with other forces it would have moved otherwise\n")
+        << not_examined;
   }
   if (!out.flush()) throw std::runtime_error("cannot write the report: is the disk full?");
 
   if (options.picture) {
-    draw_both(options, held, runs);
+    draw_all(options, chosen, held, devices);
     if (!options.json) out << "\npicture: " << options.picture->string() << "\n";
   }
-  return !same_law || comparison.held();
+  return !same_law ||
+         std::ranges::all_of(examined, [&](std::size_t device) { return devices[device].comparison.held(); });
 }
 
 }  // namespace tendon::replay

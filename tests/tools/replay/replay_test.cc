@@ -6,7 +6,9 @@
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <sstream>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -23,7 +25,7 @@ namespace {
 
 using tendon::testing::ScratchFolder;
 
-const std::string kScene = testing::kTapping + R"([limiter]
+const std::string kScene = std::string(testing::kTapping) + R"([limiter]
 kind = "aol+"
 [limiter.energy_cap]
 )";
@@ -56,6 +58,27 @@ std::filesystem::path write(const std::filesystem::path& file, const std::vector
   for (const StepRecord& step : steps) {
     recorder.record(step);
     recorder.tick(step.hand.at);
+  }
+  recorder.close();
+  return file;
+}
+
+/// The same run of each of so many devices; step `wrong` of the last one has another force.
+std::filesystem::path write_fleet(const std::filesystem::path& file, std::size_t devices, std::size_t wrong) {
+  const std::vector<StepRecord> steps = tapping();
+  FileSink sink(file);
+  Recorder::Config config;
+  config.scene.text = kScene;
+  config.started = steps.front().hand.at;
+  for (std::size_t device = 1; device < devices; ++device)
+    config.more_devices.push_back({.name = "fleet-" + std::to_string(device), .scene = config.scene});
+  Recorder recorder(config, sink);
+  for (std::size_t n = 0; n < steps.size(); ++n) {
+    for (std::size_t device = 0; device < devices; ++device) {
+      StepRecord step = steps[n];
+      if (n == wrong && device + 1 == devices) step.force.x() += 1;
+      recorder.record(step, device);
+    }
   }
   recorder.close();
   return file;
@@ -105,6 +128,43 @@ TEST(Replay, NamesTheFirstStepThatDiffersAndFails) {
                        "1233 of 2000 steps are the same bit for bit\n"
                        "the first that differs is step 1234: permitted_n: recorded "))
       << outcome.said;
+}
+
+TEST(Replay, TakesEveryDeviceAgainAndFailsByAnyOfThem) {
+  const ScratchFolder folder;
+  const Outcome good = run({.recording = write_fleet(folder.path() / "good.mcap", 2, kSteps)});
+  EXPECT_TRUE(good.held);
+  for (const char* said : {"fleet-1: 2000 of 2000 steps are the same bit for bit", "first: 2000 of 2000 steps"})
+    EXPECT_TRUE(contains(good.said, said)) << good.said;
+
+  const auto file = write_fleet(folder.path() / "bad.mcap", 2, 700);
+  const Outcome bad = run({.recording = file});
+  EXPECT_FALSE(bad.held);
+  EXPECT_TRUE(contains(bad.said, "fleet-1: 700 of 2000 steps are the same bit for bit")) << bad.said;
+  EXPECT_TRUE(contains(bad.said, "first: 2000 of 2000")) << bad.said;
+
+  const Outcome one = run({.recording = file, .device = "first"});
+  EXPECT_TRUE(one.held);
+  EXPECT_TRUE(contains(one.said, "fleet-1: not asked for, not examined")) << one.said;
+}
+
+TEST(Replay, OfAFleetThoseThatDifferAreNamedAndTheOthersCounted) {
+  const ScratchFolder folder;
+  const Outcome fleet = run({.recording = write_fleet(folder.path() / "fleet.mcap", 8, 700)});
+  EXPECT_FALSE(fleet.held);
+  for (const char* said :
+       {"7 devices: 14000 of 14000 steps are the same", "fleet-7: 700 of 2000", "columns for 3 of 8"})
+    EXPECT_TRUE(contains(fleet.said, said)) << said << fleet.said;
+}
+
+TEST(Replay, ATableOfStepsIsOfOneDevice) {
+  const ScratchFolder folder;
+  const auto file = write_fleet(folder.path() / "two.mcap", 2, kSteps);
+  const auto csv = folder.path() / "steps.csv";
+  EXPECT_THROW(run({.recording = file, .csv = csv}), std::invalid_argument);
+  EXPECT_THROW(run({.recording = file, .device = "left"}), std::runtime_error);
+  EXPECT_TRUE(run({.recording = file, .device = "fleet-1", .csv = csv}).held);
+  EXPECT_EQ(lines_of(csv).size(), kSteps + 1);
 }
 
 TEST(Replay, AfterAGapItComparesNothingAndSaysSo) {
@@ -205,8 +265,40 @@ TEST(Replay, ASceneThatCannotBeRunIsSaidToBeTheRecordedOne) {
   try {
     run({.recording = write(folder.path() / "run.mcap", tapping(), "[device]\nkind = 7\n")});
     FAIL();
-  } catch (const SceneError& error) {
-    EXPECT_TRUE(contains(error.what(), "the recorded scene:2: device.kind")) << error.what();
+  } catch (const SceneError&) {
+    FAIL() << "nobody has typed it";
+  } catch (const std::runtime_error& error) {
+    EXPECT_TRUE(contains(error.what(), "run.mcap: the recorded scene:2: device.kind")) << error.what();
+  }
+}
+
+TEST(Replay, ComparesADamagedRecordingUpToTheDamageAndSaysWhereThatIs) {
+  const ScratchFolder folder;
+  const auto file = write(folder.path() / "run.mcap", tapping());
+  const auto size = std::filesystem::file_size(file);
+  std::fstream bytes(file, std::ios::in | std::ios::out | std::ios::binary);
+  bytes.seekp(static_cast<std::streamoff>(size / 2 + 10'000));
+  bytes << std::string(100, '\0');
+  bytes.close();
+  const Outcome outcome = run({.recording = file});
+  EXPECT_TRUE(outcome.held);
+  EXPECT_TRUE(contains(outcome.said, "there is a gap before step ")) << outcome.said;
+  EXPECT_TRUE(contains(outcome.said, "run.mcap: byte ")) << outcome.said;
+  EXPECT_FALSE(contains(outcome.said, "2000 of 2000")) << outcome.said;
+}
+
+TEST(Replay, OfARecordingWhoseSceneIsLostIsRefused) {
+  const ScratchFolder folder;
+  const auto file = write(folder.path() / "run.mcap", tapping());
+  std::ifstream in(file, std::ios::binary);
+  std::string bytes{std::istreambuf_iterator<char>(in), {}};
+  bytes[bytes.find("kind = \"aol+\"")] = 'K';
+  std::ofstream(file, std::ios::binary) << bytes;
+  try {
+    run({.recording = file});
+    FAIL();
+  } catch (const std::runtime_error& error) {
+    EXPECT_TRUE(contains(error.what(), "run.mcap: the scene is lost")) << error.what();
   }
 }
 

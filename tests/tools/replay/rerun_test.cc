@@ -23,7 +23,7 @@ namespace tendon::replay::rerun_test {
 namespace {
 
 Scene scene_with(const std::vector<std::string>& settings) {
-  return parse_scene(testing::kTapping, "scene", ".", settings);
+  return parse_scene(std::string(testing::kTapping), "scene", ".", settings);
 }
 
 /// What a server recorded while a remote wall of 2000 N/m answered over a bad network.

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <string>
+#include <string_view>
 
 namespace tendon::replay::testing {
 
 /// A scene whose hand taps through x = 0 twice a second. What it says of a limiter comes after it.
-inline const std::string kTapping = R"([device]
+inline constexpr std::string_view kTapping = R"([device]
 kind = "simulated"
 profile = "falcon"
 [device.hand]

@@ -14,8 +14,9 @@ struct SlurmOptions {
   std::string time = "01:00:00";  ///< of a task
   std::uint64_t most = 1000;      ///< tasks in an array: a site's MaxArraySize less 1
 };
-/// A job array for sbatch that runs what is missing. Its tasks take every so-manieth shard where there are more than
-/// `most`. Throws std::invalid_argument when nothing is missing.
+/// Returns a job array for sbatch that runs the missing shards. If there are more than `most` shards, its tasks take
+/// every Nth shard. Throws std::invalid_argument if every
+/// shard has a result.
 std::string slurm_job(const std::filesystem::path& folder, const Plan& plan, const std::filesystem::path& self,
                       const SlurmOptions& options);
 

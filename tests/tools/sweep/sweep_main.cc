@@ -10,6 +10,7 @@
 #include <optional>
 #include <thread>
 
+#include "clients/cpp/usage.h"
 #include "server/build_info.h"
 #include "tests/support/json_line.h"
 #include "tests/support/run_tool.h"
@@ -55,7 +56,7 @@ std::filesystem::path found(const std::string& program) {
     const auto file = std::filesystem::path(folder) / program;
     if (access(file.c_str(), X_OK) == 0) return std::filesystem::canonical(file);
   }
-  throw std::invalid_argument(program + ": found neither beside tendon-sweep nor in PATH");
+  throw std::runtime_error(program + ": found neither beside tendon-sweep nor in PATH");
 }
 
 int plan(const Arguments& arguments) {
@@ -166,6 +167,7 @@ CLI::App* add_verb(CLI::App& app, Arguments& arguments, const std::string& name,
 int main_of(int argc, char** argv) {
   CLI::App app("A long computation in shards: on this machine, by Slurm or by Kubernetes, with one result",
                "tendon-sweep");
+  usage::dress(app);
   app.set_version_flag("--version", version_text());
   app.require_subcommand(1);
   app.footer(
@@ -188,13 +190,13 @@ int main_of(int argc, char** argv) {
   plan_verb
       ->add_option("--arithmetic", arguments.arithmetic,
                    "portable: the same bytes on any x86-64 node; native: for nodes of one kind")
-      ->type_name("portable|native")
+      ->check(usage::one_of({"portable", "native"}))
       ->capture_default_str();
   plan_verb->add_option("COMMAND", arguments.command, "after --: a program with --units, and its other arguments")
       ->required();
   plan_verb->footer("\nExample:\n  tendon-sweep plan w --units 1:1000000 --per-shard 5000 -- tendon-worlds run\n");
 
-  CLI::App* const run_verb = add_verb(app, arguments, "run", "Runs one shard, or every so-manieth");
+  CLI::App* const run_verb = add_verb(app, arguments, "run", "Runs one shard, or every Tth");
   CLI::Option* const shard =
       run_verb->add_option("--shard", arguments.shard, "this one, even if it is done")->type_name("N");
   run_verb
@@ -215,10 +217,7 @@ int main_of(int argc, char** argv) {
 
   CLI::App* const submit_verb =
       add_verb(app, arguments, "submit", "Writes the job that runs what is missing on a cluster, and says the command");
-  submit_verb->add_option("--to", arguments.to, "where")
-      ->type_name("slurm|kubernetes")
-      ->check(CLI::IsMember({"slurm", "kubernetes"}).description(""))
-      ->required();
+  submit_verb->add_option("--to", arguments.to, "where")->check(usage::one_of({"slurm", "kubernetes"}))->required();
   submit_verb->add_flag("--go", arguments.go, "slurm: also carries it out");
   submit_verb->add_option("--partition", arguments.slurm.partition, "slurm: of the site's")->type_name("NAME");
   submit_verb->add_option("--time", arguments.slurm.time, "slurm: the most that a task may take")

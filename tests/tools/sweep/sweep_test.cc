@@ -187,7 +187,7 @@ TEST_F(Sweep, AnotherPlanAnotherProgramOrNoneIsRefused) {
   EXPECT_EQ(other.status, 1);
   EXPECT_NE(other.errors.find("plan.json is another plan"), std::string::npos) << other.errors;
   EXPECT_EQ(sweep({"plan", faults() + "/b", "--units", "1:0", "--per-shard", "1", "--", TENDON_TOY}).status, 2);
-  EXPECT_EQ(sweep({"plan", faults() + "/b", "--units", "1:5", "--per-shard", "1", "--", "no-such-program"}).status, 2);
+  EXPECT_EQ(sweep({"plan", faults() + "/b", "--units", "1:5", "--per-shard", "1", "--", "no-such-program"}).status, 1);
   EXPECT_EQ(sweep({"here", faults() + "/b"}).status, 1);
   EXPECT_EQ(sweep({"run", folder(), "--shard", "2"}).status, 2);
   EXPECT_EQ(sweep({"run", folder(), "--task", "2", "--of", "2"}).status, 2);

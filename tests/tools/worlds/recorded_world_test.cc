@@ -16,9 +16,9 @@
 #include <ostream>
 
 #include "devices/simulated/profiles.h"
-#include "devices/simulated/recorded_motion.h"
 #include "devices/simulated/simulated_device.h"
 #include "server/recording/byte_sink.h"
+#include "server/tables/recorded_motion.h"
 #include "tests/tools/worlds/world.h"
 
 namespace tendon::simulation::recorded_world_test {

@@ -5,6 +5,7 @@
 #include <memory>
 #include <stdexcept>
 
+#include "core/base/nearest_word.h"
 #include "server/scene/scene.h"
 #include "tests/tools/injector/traces/trace.h"
 #include "tests/tools/injector/traces/trace_player.h"
@@ -20,7 +21,12 @@ std::vector<Law> asked_laws(const std::vector<std::string>& names) {
   std::vector<Law> asked;
   for (const std::string& name : names) {
     const auto law = law_named(name);
-    if (!law) throw std::invalid_argument("--law: expected one of tendon-lab's, got \"" + name + "\"");
+    if (!law) {
+      std::string known;
+      for (const LawInfo& each : laws()) known += (known.empty() ? "" : ", ") + std::string(each.name);
+      throw std::invalid_argument("--law: expected one of " + known + ", got \"" + name + '"' +
+                                  did_you_mean(name, known));
+    }
     asked.push_back(*law);
   }
   if (!asked.empty()) return asked;

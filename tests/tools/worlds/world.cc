@@ -11,13 +11,24 @@ namespace tendon::simulation {
 
 namespace {
 
-/// The log thread's period.
-constexpr Duration kRecordPeriod = std::chrono::milliseconds(20);
+Scene scene_of(const World::Config& config) {
+  Scene scene;
+  scene.name = "device";
+  scene.loop = config.loop;
+  scene.network.max_observers = config.max_observers;
+  scene.network.adapt_state_rate = config.adapt_state_rate;
+  return scene;
+}
 
-Mailboxes::Capacities capacities(const World::Config& config) {
-  Mailboxes::Capacities mail = config.mail;
-  if (config.record) mail.datagrams = Mailboxes::Capacities{}.datagrams;
-  return mail;
+Assembly::Config assembly_config(const World::Config& config, LocalTime now, std::mt19937_64& random) {
+  Assembly::Config assembly{.now = now, .watched = config.mail};
+  for (std::byte& b : assembly.network.secret) b = static_cast<std::byte>(random());
+  assembly.network.keys = config.keys;
+  assembly.network.suites = config.suites;
+  assembly.network.rekey = config.rekey;
+  assembly.network.session_life = config.session_life;
+  if (config.record) assembly.watched->datagrams = Mailboxes::Capacities{}.datagrams;
+  return assembly;
 }
 
 Address address_of(std::uint16_t port) {
@@ -45,32 +56,12 @@ World::World(const Config& config, Device& device)
       random_(config.seed),
       server_address_(address_of(47100)),
       network_(config.seed, config.weather, server_address_, config.players),
-      mail_(std::make_unique<Mailboxes>(capacities(config))),
-      haptic_(config.loop, device, *mail_),
-      network_loop_(
-          [&] {
-            NetworkLoop::Config network;
-            for (std::byte& b : network.secret) b = static_cast<std::byte>(random_());
-            DeviceDescription about;
-            about.name = "device";
-            about.model = device.info().name;
-            about.max_force = config.loop.control.max_force;
-            about.position_resolution = device.info().position_resolution;
-            about.loop_hz = static_cast<std::uint32_t>(std::lround(1 / seconds(config.loop.period)));
-            about.channels = {{.name = "main"}};
-            network.devices = {about};
-            network.max_observers = config.max_observers;
-            network.adapt_state_rate = config.adapt_state_rate;
-            network.keys = config.keys;
-            network.suites = config.suites;
-            network.rekey = config.rekey;
-            network.session_life = config.session_life;
-            return network;
-          }(),
-          network_.server(), {mail_.get()}),
+      // An empty description keeps the sizes of all datagrams, and so the digests of README.md.
+      assembly_({{.scene = scene_of(config), .device = device, .handle = HandleDescription{}}},
+                assembly_config(config, now_, random_), {&network_.server()}),
       haptic_due_(now_),
       network_due_(now_),
-      record_due_(config.record ? now_ : LocalTime::max()) {
+      log_due_(now_) {
   recorder_config_.scene.text = config.scene_text;
   recorder_config_.scene.seed = config.seed;
   recorder_config_.started = now_;
@@ -140,7 +131,7 @@ void World::stop(std::size_t handle) {
 }
 
 void World::step_haptic() {
-  haptic_due_ = haptic_.step(now_);
+  haptic_due_ = assembly_.haptic_groups().front().turn(now_);
   if (config_.latest_wake > Duration::zero()) {
     haptic_due_ += Duration(static_cast<Duration::rep>(uniform() * static_cast<double>(config_.latest_wake.count())));
   }
@@ -150,25 +141,31 @@ void World::step_haptic() {
 }
 
 void World::drain_steps() {
-  while (const StepRecord* step = mail_->steps.front()) {
+  while (const StepRecord* step = mail().steps.front()) {
     if (watch_steps_) watch_steps_(*step);
-    if (recorder_) recorder_->record(*step, 0, mail_->ways.name_of(step->force_way));
-    mail_->steps.pop();
+    if (recorder_) recorder_->record(*step, 0, mail().ways.name_of(step->force_way));
+    mail().steps.pop();
   }
 }
 
 void World::drain_datagrams() {
-  while (const DatagramRecord* datagram = mail_->datagrams.front()) {
+  while (const DatagramRecord* datagram = mail().datagrams.front()) {
     recorder_->record(*datagram);
-    mail_->datagrams.pop();
+    mail().datagrams.pop();
   }
 }
 
 void World::turn_server() {
-  const LocalTime due = network_loop_.turn(now_);
+  const LocalTime due = assembly_.turn_network(0, now_);
   network_due_ = std::max(due, now_ + Duration(1));
   if (recorder_) drain_datagrams();
   if (watch_turns_) watch_turns_({std::nullopt, due <= now_});
+}
+
+void World::turn_log() {
+  log_due_ = assembly_.log().turn(now_, 0);
+  assembly_.log().take_notices();
+  if (recorder_) recorder_->tick(now_);
 }
 
 void World::turn_client(std::size_t handle) {
@@ -185,7 +182,7 @@ void World::run_for(Duration duration) {
   LocalTime since = now_;
   int wakes = 0;
   for (;;) {
-    LocalTime next = std::min({haptic_due_, network_due_, record_due_});
+    LocalTime next = std::min(haptic_due_, network_due_);
     if (const auto arrival = network_.next_arrival()) next = std::min(next, *arrival);
     for (const Client& client : clients_) next = std::min(next, client.due);
     if (next > end) break;
@@ -204,10 +201,8 @@ void World::run_for(Duration duration) {
       const bool news = network_.take_news_of(static_cast<std::uint32_t>(i));
       if ((clients_[i].client || clients_[i].guest) && (news || clients_[i].due <= now_)) turn_client(i);
     }
-    if (record_due_ <= now_) {
-      recorder_->tick(now_);
-      record_due_ = now_ + kRecordPeriod;
-    }
+    // The log loop does not add wake-ups, because a wake-up delivers forged datagrams to the server.
+    if (log_due_ <= now_) turn_log();
   }
   now_ = end;
 }

@@ -13,9 +13,7 @@
 #include "clients/cpp/force_client.h"
 #include "devices/device.h"
 #include "protocol/link.h"
-#include "server/haptic_loop.h"
-#include "server/mailboxes.h"
-#include "server/network_loop.h"
+#include "server/assembly.h"
 #include "server/recording/byte_sink.h"
 #include "server/recording/recorder.h"
 #include "tests/tools/injector/profile/profile.h"
@@ -35,9 +33,8 @@ class Guest {
   virtual LocalTime turn(LocalTime now) = 0;
 };
 
-/// The whole server and its clients in one thread on a virtual clock: the same HapticLoop, NetworkLoop,
-/// Session, Recorder and ForceClient as in production, called in the order of their next wake-up. Nothing
-/// sleeps; one seed is one world.
+/// The whole server and its clients in one thread on a virtual clock: the same Assembly, Session, Recorder and
+/// ForceClient as in production, called in the order of their next wake-up. Nothing sleeps; one seed is one world.
 ///
 /// The server is A, its clients are Z, Y, X …; the network is bad by default.
 class World {
@@ -109,9 +106,9 @@ class World {
   LocalTime now() const { return now_; }
   Network& network() { return network_; }
   const Address& server_address() const { return server_address_; }
-  HapticLoop& haptic() { return haptic_; }
-  NetworkLoop& server() { return network_loop_; }
-  Mailboxes& mail() { return *mail_; }
+  HapticLoop& haptic() { return assembly_.devices().front().haptic; }
+  NetworkLoop& server() { return assembly_.network(); }
+  Mailboxes& mail() { return assembly_.devices().front().mail; }
   const Recorder::Config& recorder_config() const { return recorder_config_; }
 
   /// Ends the recording and returns its bytes. Only with Config::record.
@@ -132,6 +129,7 @@ class World {
   void turn_client(std::size_t handle);
   void step_haptic();
   void turn_server();
+  void turn_log();
   void drain_steps();
   void drain_datagrams();
   double uniform();
@@ -141,12 +139,10 @@ class World {
   std::mt19937_64 random_;
   Address server_address_;
   Network network_;
-  std::unique_ptr<Mailboxes> mail_;
-  HapticLoop haptic_;
-  NetworkLoop network_loop_;
+  Assembly assembly_;
   LocalTime haptic_due_;
   LocalTime network_due_;
-  LocalTime record_due_;  ///< never, when nobody records
+  LocalTime log_due_;
   std::vector<Client> clients_;
   std::function<void(const StepRecord&)> watch_steps_;
   std::function<void(const Turn&)> watch_turns_;

@@ -16,7 +16,9 @@
 #include <variant>
 #include <vector>
 
+#include "clients/cpp/usage.h"
 #include "server/build_info.h"
+#include "server/scene/scene.h"
 #include "tests/support/json_line.h"
 #include "tests/tools/worlds/day.h"
 #include "tests/tools/worlds/runner.h"
@@ -77,8 +79,7 @@ void add_run(CLI::App& app, RunArguments& arguments) {
       ->default_str("one for each core");
   verb->add_option("--seeds", arguments.seeds_file,
                    "seeds to run before all others: a number at the beginning of a line")
-      ->type_name("FILE")
-      ->check(CLI::ExistingFile.description(""));
+      ->type_name("FILE");
   auto* const seed = verb->add_option("--seed", arguments.seed, "this world and no other")->type_name("N");
   verb->add_option("--units", arguments.units,
                    "these seeds, all of them, as a shard of a sweep: lines of JSON that depend on nothing else")
@@ -86,7 +87,6 @@ void add_run(CLI::App& app, RunArguments& arguments) {
       ->excludes(seed, count);
   verb->add_option("--from", arguments.from, "runs nothing; judges what shards of a sweep came to (tendon-sweep merge)")
       ->type_name("FILE")
-      ->check(CLI::ExistingFile.description(""))
       ->excludes(seed, count);
   verb->add_flag("--verbose", arguments.verbose, "say what the world is like, and what happened")->needs(seed);
   verb->add_flag("--json", arguments.options.json, "one JSON object for each broken world, and one at the end");
@@ -186,12 +186,10 @@ void add_replay(CLI::App& app, SecondLookOptions& options) {
   verb->add_option("SCENE", options.scene,
                    "scene file: the device, the hand, the loop; its law is one of those compared")
       ->type_name("SCENE.toml")
-      ->required()
-      ->check(CLI::ExistingFile.description(""));
+      ->required();
   verb->add_option("--trace", options.trace, "network recorded by tendon-inject --record")
       ->type_name("FILE")
-      ->required()
-      ->check(CLI::ExistingFile.description(""));
+      ->required();
   verb->add_option("--law", options.laws, "law to try; any number of times (default: those that promise passivity)")
       ->type_name("NAME")
       ->allow_extra_args(false);
@@ -208,8 +206,13 @@ void add_replay(CLI::App& app, SecondLookOptions& options) {
 int main_of(int argc, char** argv) {
   CLI::App app("Simulated worlds: the whole server, its clients, the network, the device and the hand, from one seed",
                "tendon-worlds");
+  usage::dress(app);
   app.set_version_flag("--version", version_text());
   app.require_subcommand(1);
+  app.footer(
+      "\nExample: ten minutes of worlds\n  tendon-worlds run --for-s 600\n"
+      "\ntendon-worlds COMMAND --help tells more.\n\n"
+      "Exit: 0 every promise was kept; 1 one was broken, or something failed; 2 wrong usage.");
   RunArguments run_arguments;
   run_arguments.options.jobs = std::max(1U, std::thread::hardware_concurrency());
   ShrinkArguments shrink_arguments;
@@ -220,10 +223,9 @@ int main_of(int argc, char** argv) {
   add_day(app, day_arguments);
   add_replay(app, replay_options);
   try {
-    app.parse(argc, argv);
+    usage::parse(app, argc, argv);
   } catch (const CLI::ParseError& error) {
-    const int code = app.exit(error);
-    return code == 0 ? kDone : kWrongUsage;
+    return usage::exit_code(app, error);
   }
   try {
     if (app.got_subcommand("run")) return run(run_arguments);
@@ -234,6 +236,12 @@ int main_of(int argc, char** argv) {
     second_look(replay_options, std::cout);
     return kDone;
   } catch (const std::invalid_argument& error) {
+    std::cerr << "tendon-worlds: " << error.what() << " (see --help)\n";
+    return kWrongUsage;
+  } catch (const SceneFileError& error) {
+    std::cerr << "tendon-worlds: " << error.what() << '\n';
+    return kFailed;
+  } catch (const SceneError& error) {
     std::cerr << "tendon-worlds: " << error.what() << " (see --help)\n";
     return kWrongUsage;
   } catch (const std::exception& error) {

@@ -13,6 +13,7 @@
 #include "clients/cpp/server_name.h"
 #include "tests/server/scratch_folder.h"
 #include "tests/support/fake_avahi.h"
+#include "tests/support/refusal.h"
 
 namespace tendon::avahi_test {
 namespace {
@@ -27,12 +28,7 @@ class AvahiDiscovery : public ::testing::Test {
   ~AvahiDiscovery() override { ::unsetenv(kBus); }
 
   static std::string problem_with(const std::string& server, bool has_key = true) {
-    try {
-      ServerName(server).look_up(has_key);
-    } catch (const std::runtime_error& error) {
-      return error.what();
-    }
-    return "";
+    return thrown_by<std::runtime_error>([&] { ServerName(server).look_up(has_key); });
   }
 
   testing::ScratchFolder folder;

@@ -7,6 +7,7 @@
 
 #include "clients/cpp/discovery/discovery.h"
 #include "tests/clients/cpp/discovery/fake_dns.h"
+#include "tests/support/refusal.h"
 
 // Records of name servers, from one on loopback that says right things and wrong ones.
 
@@ -31,12 +32,7 @@ std::string sound(const Question& question, bool /*tcp*/) {
 
 std::string problem_with(FakeDns::Answer answers) {
   const FakeDns server(std::move(answers));
-  try {
-    resolve_by_dns(kFalcon, server.address());
-  } catch (const std::runtime_error& error) {
-    return error.what();
-  }
-  return "";
+  return thrown_by<std::runtime_error>([&] { resolve_by_dns(kFalcon, server.address()); });
 }
 
 TEST(UnicastDiscovery, FindsHostPortAndText) {

@@ -10,6 +10,8 @@
 #include <stdexcept>
 #include <vector>
 
+#include "tests/support/refusal.h"
+
 namespace tendon::conversation_test {
 namespace {
 
@@ -181,13 +183,8 @@ TEST(Conversation, GoesOnWhenTheFileTakesNoMore) {
 
 TEST(Conversation, ThatIsNoneIsRefusedWithItsLine) {
   const std::string good = conversation(engine(500), 3);
-  const auto says = [&](const std::string& text) -> std::string {
-    try {
-      replayed(text, engine(500));
-    } catch (const std::runtime_error& error) {
-      return error.what();
-    }
-    return {};
+  const auto says = [&](const std::string& text) {
+    return thrown_by<std::runtime_error>([&] { replayed(text, engine(500)); });
   };
   EXPECT_EQ(says(good), "");
   EXPECT_EQ(says(""), "line 1: expected \"tendon conversation 1\", got \"\"");

@@ -79,7 +79,7 @@ TEST(Front, AWorkerHasOneStateAtATimeAndThenTheNewest) {
   EXPECT_EQ(played.news(), "") << "nobody is there yet";
   played.open();
   EXPECT_EQ(played.news(), "ask 1");
-  for (const std::uint64_t tick : {2, 3, 4}) played.see(tick);
+  for (const std::uint64_t tick : {2U, 3U, 4U}) played.see(tick);
   EXPECT_EQ(played.news(), "");
   played.answer();
   EXPECT_EQ(played.news(), "send 1, ask 4");

@@ -71,7 +71,7 @@ double processor_time(pid_t pid) {
 TEST(Chai3d, AProgramFindsTheDeviceAndMovesWithItOneTurnAStep) {
   const ScratchFolder folder;
   Server server(folder.path(), demo_scene());
-  Process old = plug(server.address(), folder, {"--seconds", "4"});
+  Process old = plug(server.address(), folder, {"--seconds", "2.5"});
   const std::string devices = old.wait_for_line(R"("event":"devices")");
   EXPECT_EQ(number_in(devices, "count"), 1);
   EXPECT_LT(number_in(devices, "took_s"), 0.4);
@@ -80,6 +80,7 @@ TEST(Chai3d, AProgramFindsTheDeviceAndMovesWithItOneTurnAStep) {
   const double before = processor_time(old.pid());
   const std::string end = old.wait_for_line(R"("event":"end")");
   const double used = processor_time(old.pid()) - before;
+  const double took = number_in(end, "took_s");
   EXPECT_EQ(old.wait(), 0);
   EXPECT_EQ(number_in(end, "failed"), 0);
   // One turn a haptic step; on a machine that pauses some last 2 ms. Where the hand turns back, it stays within one
@@ -99,10 +100,10 @@ TEST(Chai3d, AProgramFindsTheDeviceAndMovesWithItOneTurnAStep) {
   }
   EXPECT_LT(least, -0.010);
   EXPECT_GT(most, 0.010);
-  std::printf("%.1f %% of a core, %.0f turns in %.3f s, getter p99 %.2f us\n", 100 * used / 4, number_in(end, "turns"),
-              number_in(end, "took_s"), number_in(end, "getter_p99_us"));
+  std::printf("%.1f %% of a core, %.0f turns in %.3f s, getter p99 %.2f us\n", 100 * used / took,
+              number_in(end, "turns"), took, number_in(end, "getter_p99_us"));
   // 8 % of a core on a quiet machine (README.md); this gate only finds a loop that does not sleep.
-  EXPECT_LT(used / 4, 0.25) << "of a core";
+  EXPECT_LT(used / took, 0.25) << "of a core";
 }
 
 TEST(Chai3d, WithoutAServerTheProgramFindsNoDeviceAndGoesOn) {
@@ -152,9 +153,9 @@ TEST(Chai3d, AnotherProcessOfTheProgramCannotTakeAnOpenDevice) {
 TEST(Chai3d, ASecondPlugIsToldThatTheChannelIsTaken) {
   const ScratchFolder folder;
   Server server(folder.path(), demo_scene());
-  Process first = plug(server.address(), folder, {"--seconds", "3"});
+  Process first = plug(server.address(), folder, {"--seconds", "2"});
   first.wait_for_line("takes the forces of a program");
-  Process second = plug(server.address(), folder, {"--seconds", "1"});
+  Process second = plug(server.address(), folder, {"--seconds", "0.5"});
   second.wait_for_line("takes no forces: ");
   EXPECT_EQ(number_in(second.wait_for_line(R"("event":"end")"), "failed"), 0) << "it looks on";
   EXPECT_EQ(second.wait(), 0);
@@ -236,7 +237,7 @@ Recording wall_far_away(const ScratchFolder& folder, const std::vector<std::stri
   Server server(folder.path(), demo_scene(), options);
   Service network("tendon-inject", {"--to", server.address(), "--profile", "delay=20ms", "--seed", "7"}, folder.path(),
                   "start", "listen");
-  Process old = plug(network.address(), folder, {"--wall", "1000", "--seconds", "7"});
+  Process old = plug(network.address(), folder, {"--wall", "1000", "--seconds", "3.2"});
   EXPECT_EQ(old.wait(), 0) << old.err();
   server.stop();
   return read_recording(folder.path() / "run.mcap");

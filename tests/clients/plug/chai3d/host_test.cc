@@ -145,7 +145,7 @@ TEST(Chai3dHost, IsReadyWhenEveryDeviceHasToldWhereItIs) {
   EXPECT_EQ(theatre.hands->ready, 0U);
   theatre.run(100);
   EXPECT_EQ(theatre.hands->ready, 1U);
-  EXPECT_EQ(std::string(theatre.hands->device[0].model.data()), "simulated falcon");
+  EXPECT_EQ(std::string(theatre.hands->device[0].model.data()), "falcon");
   EXPECT_EQ(theatre.hands->device[0].workspace_radius, Host::kWorkspaceRadius) << "the server describes no box";
 }
 

@@ -12,6 +12,7 @@ import struct
 import subprocess
 import sys
 import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -116,7 +117,7 @@ def test_an_update_rate_is_this_clients_own(stage):
         slow.wait("vrpn_Analog Channel")
         slow.wait("vrpn_Analog Channel")
         counts = [0, 0]
-        end = time.monotonic() + 1
+        end = time.monotonic() + 0.5
         while time.monotonic() < end:
             for i, client in enumerate((slow, fast)):
                 client.read(0.001)
@@ -128,7 +129,7 @@ def test_an_update_rate_is_this_clients_own(stage):
 def test_nothing_is_dialled_that_the_hello_names(stage):
     """The text says 127.0.0.2, the datagram comes from 127.0.0.1."""
     other = socket.create_server(("127.0.0.2", 0))
-    other.settimeout(1)
+    other.settimeout(0.2)  # ours has been dialled by now, and so would this one
     ours = socket.create_server(("127.0.0.1", other.getsockname()[1]))
     ours.settimeout(30)
     lob = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
@@ -199,7 +200,15 @@ def test_the_seventeenth_program_finds_no_place_until_one_leaves(stage):
             pass
 
 
-def test_a_program_that_never_reads_is_dropped_and_nobody_notices(stage):
+@pytest.fixture(scope="module")
+def silent(stage):
+    """A connection that says nothing. The plug's patience of 3 s passes while the next test waits, too."""
+    host, _, port = stage.address.rpartition(":")
+    with socket.create_connection((host, int(port)), timeout=30) as connection:
+        yield connection
+
+
+def test_a_program_that_never_reads_is_dropped_and_nobody_notices(stage, silent):
     with Client(stage.address, by_hello=False) as deaf, Client(stage.address) as client:
         end = time.monotonic() + 30
         while "it does not read what it is sent" not in stage.plug.err.read_text():
@@ -210,19 +219,17 @@ def test_a_program_that_never_reads_is_dropped_and_nobody_notices(stage):
         client.wait(POSE)
 
 
+def test_who_says_nothing_is_dropped(stage, silent):
+    while silent.recv(100):
+        pass
+    stage.plug.wait_for("does not say that it speaks VRPN")
+
+
 def test_a_length_of_two_to_the_31_ends_the_connection(stage):
     with Client(stage.address, by_hello=False) as client:
         client.send_bytes(struct.pack(">I", 1 << 31) + bytes(20))
         assert client.wait_closed()
     stage.plug.wait_for("a message of an impossible length")
-
-
-def test_who_says_nothing_is_dropped(stage):
-    host, _, port = stage.address.rpartition(":")
-    with socket.create_connection((host, int(port)), timeout=30) as silent:
-        while silent.recv(100):
-            pass
-    stage.plug.wait_for("does not say that it speaks VRPN")
 
 
 def processor_time_s(program: Program) -> float:
@@ -234,15 +241,14 @@ def test_every_state_is_one_report_and_nobody_waits_busily(stage):
     with Client(stage.address) as client:
         client.wait(POSE)
         before = stage.plug.counts()
-        busy = processor_time_s(stage.plug)
-        time.sleep(2)
-        busy = processor_time_s(stage.plug) - busy
-        after = stage.plug.counts()
-    assert busy < 2 * 0.3  # measured 0.03; a loop that does not sleep has 1
+        start, busy = time.monotonic(), processor_time_s(stage.plug)
+        after = stage.plug.counts()  # a second later
+        taken, busy = time.monotonic() - start, processor_time_s(stage.plug) - busy
+    assert taken > 0.5 and busy < 0.3 * taken  # measured 0.03; a loop that does not sleep has 1
     reports = after["reports"] - before["reports"]
     # Each line is written between the two.
     assert abs(reports - (after["states"] - before["states"])) <= 2
-    assert reports > 1000
+    assert reports > 500
 
 
 @pytest.mark.parametrize("udp", [True, False], ids=["datagrams", "stream"])
@@ -250,15 +256,16 @@ def test_a_program_without_a_pause_is_felt_by_its_newest_field(stage, udp):
     with Client(stage.address, udp=udp) as client:
         client.wait(POSE)
         before = stage.plug.counts()
-        end = time.monotonic() + 3
+        size, end = stage.plug.size(), time.monotonic() + 30
         n = 0
-        while time.monotonic() < end:
+        while stage.plug.size() <= size:  # until the next counts, which are thus of nothing else
+            assert time.monotonic() < end
             for _ in range(20):
                 n += 1
                 client.force_field(force=(0, 0.1 + 1e-7 * n, 0))
             client.read(0)
             client.inbox.clear()
-        after = stage.plug.counts()
+        after = stage.plug.last_counts()
         last = 0.1 + 1e-7 * n
         while True:  # it goes on, because a datagram may be lost
             client.force_field(force=(0, last, 0))
@@ -310,10 +317,10 @@ def test_beyond_this_machine_it_listens_only_when_that_is_meant(tmp_path):
 
 
 def given_out(folder: Path, *more: str) -> dict:
-    """What tendon-report says of 6 s of a wall of 1000 N/m that a program of old draws 20 ms away."""
+    """What tendon-report says of 2.5 s of a wall of 1000 N/m that a program of old draws 20 ms away."""
     scene = (ROOT / "deploy" / "scenes" / "demo.toml").read_text()
     folder.mkdir()
-    with server(folder, scene, "--record", "run.mcap", *more, duration_s=6) as device:
+    with server(folder, scene, "--record", "run.mcap", *more, duration_s=2.5) as device:
         inject = ["--listen", "127.0.0.1:0", "--to", device.address(), "--seed", "7", "--profile", "delay=20ms"]
         with Program(folder, "tendon-inject", *inject, "--max-release-error-us", "1e9", "--json") as network:
             with plug(folder, network.address("listen")) as between:
@@ -331,10 +338,12 @@ def given_out(folder: Path, *more: str) -> dict:
 
 @pytest.mark.skipif(not (PROGRAMS / "tendon-report").exists(), reason="tendon-report is not built")
 def test_a_wall_20_ms_away_is_passive_with_the_limiter_only(tmp_path):
-    limited = given_out(tmp_path / "limited")
+    with ThreadPoolExecutor() as at_once:
+        with_it = at_once.submit(given_out, tmp_path / "limited")
+        without = at_once.submit(given_out, tmp_path / "free", "--without-limiter")
+    limited, free = with_it.result(), without.result()
     assert limited["energy_given_out_j"] <= 1e-9 or limited["overruns"] > 0, limited
     assert limited["peak_force_n"] > 1, limited
-    free = given_out(tmp_path / "free", "--without-limiter")
     assert free["energy_given_out_j"] > 1, free
 
 

@@ -35,13 +35,9 @@ kind = "none"
 
 BUTTON = (
     STILL
-    + """
-[[device.hand.press]]
-button = 0
-from_ms = 3000
-for_ms = 500
-"""
+    + "".join(f"\n[[device.hand.press]]\nbutton = 0\nfrom_ms = {at}\nfor_ms = 200\n" for at in range(500, 6000, 500))
 )
+"""Presses the button for 200 ms every 0.5 s."""
 
 
 class Program:
@@ -75,7 +71,15 @@ class Program:
         while self.out.read_text().count("\n") <= lines:
             assert time.monotonic() < end and self.process.poll() is None, self.err.read_text()
             time.sleep(0.02)
-        return dict(json.loads(self.out.read_text().splitlines()[-1]))
+        return self.last_counts()
+
+    def last_counts(self) -> dict:
+        """The last JSON line that is whole."""
+        return dict(json.loads(self.out.read_text().rpartition("\n")[0].splitlines()[-1]))
+
+    def size(self) -> int:
+        """The size of the JSON output so far, in bytes."""
+        return self.out.stat().st_size
 
     def stop(self) -> None:
         self.process.send_signal(signal.SIGTERM)

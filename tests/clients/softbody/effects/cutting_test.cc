@@ -6,7 +6,6 @@
 #include <cmath>
 #include <future>
 #include <stdexcept>
-#include <string>
 #include <utility>
 #include <vector>
 
@@ -14,6 +13,7 @@
 #include "clients/softbody/models/quasi_static.h"
 #include "tests/clients/softbody/elsewhere.h"
 #include "tests/clients/softbody/pressed_block.h"
+#include "tests/support/refusal.h"
 
 namespace tendon::softbody::cutting_test {
 namespace {
@@ -428,12 +428,7 @@ TEST(Cutting, APlanThatGoesWrongIsRefusedBeforeAnythingIsTouched) {
   const auto refusal = [](const Cut& cut, double value = 1) {
     BodyConfig config = pressed_body(ModelKind::kLinear, Element::kHex8Sri, 4);
     config.cuts = {{across(0.025, 0.02), PlannedCut::When::kTime, 0}, {cut, PlannedCut::When::kForce, value}};
-    try {
-      Body body(config);
-    } catch (const std::invalid_argument& error) {
-      return std::string(error.what());
-    }
-    return std::string();
+    return thrown_by([&] { Body body(config); });
   };
   EXPECT_EQ(refusal(across(0, 0.02)), "");
   EXPECT_EQ(refusal(across(0, 0.02), 0), "cutting: cut 2 wants a force above 0");

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <iomanip>
@@ -12,6 +13,7 @@
 #include <map>
 #include <sstream>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "tests/support/callgrind.h"
@@ -35,21 +37,32 @@ struct Body {
   Cost cost;
 };
 
-/// The least of three runs: within CHOLMOD some hundred instructions are there in one run and not in the next.
-std::vector<Body> count(const std::string& program, const std::string& which) {
-  std::vector<Body> bodies;
-  for (int run = 0; run < 3; ++run) {
+/// Keeps the minimum of several runs, because CHOLMOD executes some hundred instructions only in some of them.
+class Counted {
+ public:
+  Counted(std::string program, std::string which) : program_(std::move(program)), which_(std::move(which)) { again(); }
+  const std::vector<Body>& bodies() const { return bodies_; }
+  void again() {
     std::size_t next = 0;
-    for (const auto& [line, instructions] : testing::count_instructions(program, which, "touch_in_turn")) {
+    for (const auto& [line, instructions] : tendon::testing::count_instructions(program_, which_, "touch_in_turn")) {
       Body body;
       std::istringstream(line) >> body.model >> body.effect >> body.cost.heap >> body.cost.bytes;
       body.cost.instructions = instructions / kSteps;
-      if (next == bodies.size()) bodies.push_back(body);
-      double& least = bodies[next++].cost.instructions;
+      if (next == bodies_.size()) bodies_.push_back(body);
+      double& least = bodies_[next++].cost.instructions;
       least = std::min(least, body.cost.instructions);
     }
   }
-  return bodies;
+
+ private:
+  std::string program_;
+  std::string which_;
+  std::vector<Body> bodies_;
+};
+constexpr int kRuns = 3;
+
+bool cost_the_same(const Body& a, const Body& b) {
+  return std::abs(a.cost.instructions - b.cost.instructions) <= 1e-3 * b.cost.instructions + kCopies;
 }
 
 /// The README's table.
@@ -82,25 +95,49 @@ std::string table(const std::vector<Body>& bodies) {
   return text.str();
 }
 
-using EffectsProof = testing::InstructionTest;
+using EffectsProof = tendon::testing::InstructionTest;
 
 TEST_F(EffectsProof, WhatIsNotListedCostsNoInstructionAndNoByte) {
-  const std::vector<Body> whole = count(TENDON_PROOF_WHOLE, "none");
-  const std::vector<Body> bare = count(TENDON_PROOF_BARE, "none");
-  ASSERT_GE(bare.size(), 11U);
+  Counted with(TENDON_PROOF_WHOLE, "none");
+  Counted without(TENDON_PROOF_BARE, "none");
+  const std::vector<Body>& whole = with.bodies();
+  const std::vector<Body>& bare = without.bodies();
   ASSERT_EQ(whole.size(), bare.size());
+  for (int run = 1; run < kRuns && !std::ranges::equal(whole, bare, cost_the_same); ++run) {
+    with.again();
+    without.again();
+  }
+  ASSERT_GE(bare.size(), 5U);
   for (std::size_t i = 0; i < bare.size(); ++i) {
     ASSERT_EQ(whole[i].model, bare[i].model);
     EXPECT_GT(bare[i].cost.instructions, 1000) << bare[i].model;
-    EXPECT_NEAR(whole[i].cost.instructions, bare[i].cost.instructions, 1e-3 * bare[i].cost.instructions + kCopies)
-        << bare[i].model;
+    EXPECT_TRUE(cost_the_same(whole[i], bare[i]))
+        << bare[i].model << ' ' << whole[i].cost.instructions << ' ' << bare[i].cost.instructions;
     EXPECT_EQ(whole[i].cost.heap, bare[i].cost.heap) << bare[i].model;
     EXPECT_EQ(whole[i].cost.bytes, bare[i].cost.bytes) << bare[i].model;
   }
 }
 
+/// The names of the bodies whose effect costs no visible instruction. It skips effects that are too cheap to measure: the
+/// shape changes the work of Newton's method by 0.01 %, and the place of a block on the heap changes the cost of a copy by
+/// about a hundred instructions.
+std::string free_of_charge(const std::vector<Body>& bodies) {
+  std::string found;
+  std::map<std::string, Cost> none;
+  for (const Body& body : bodies) {
+    if (body.effect == "none") none[body.model] = body.cost;
+    const bool little = body.effect == "friction" || body.effect == "cutting" || body.effect == "stiffening";
+    if (body.effect == "none" || body.model == "neo-hookean" || (little && body.model != "condensed")) continue;
+    if (body.cost.instructions <= none.at(body.model).instructions) found += body.model + ' ' + body.effect + '\n';
+  }
+  return found;
+}
+
 TEST_F(EffectsProof, WhatIsListedCostsSome) {
-  const std::vector<Body> bodies = count(TENDON_PROOF_WHOLE, "each");
+  Counted each(TENDON_PROOF_WHOLE, "each");
+  const std::vector<Body>& bodies = each.bodies();
+  for (int run = 1; run < kRuns && !free_of_charge(bodies).empty(); ++run) each.again();
+  EXPECT_EQ(free_of_charge(bodies), "");
   std::map<std::string, Cost> none;
   std::size_t listed = 0;
   for (const Body& body : bodies) {
@@ -108,14 +145,8 @@ TEST_F(EffectsProof, WhatIsListedCostsSome) {
     if (body.effect == "none") continue;
     ++listed;
     EXPECT_GE(body.cost.bytes, none.at(body.model).bytes) << body.model << ' ' << body.effect;
-    // The work of Newton's method is another for another shape, by a few in ten thousand; and where copying many
-    // numbers takes a hundred instructions more or fewer, by where on the heap they are, those of an effect that does
-    // little are not to be seen.
-    const bool little = body.effect == "friction" || body.effect == "cutting" || body.effect == "stiffening";
-    if (body.model == "neo-hookean" || (little && body.model != "condensed")) continue;
-    EXPECT_GT(body.cost.instructions, none.at(body.model).instructions) << body.model << ' ' << body.effect;
   }
-  EXPECT_EQ(listed, 8U + 2 + 8 + 3);
+  EXPECT_EQ(listed, 8U + 2 + 8);
   std::cout << table(bodies) << '\n';
 }
 

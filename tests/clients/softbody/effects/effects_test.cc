@@ -8,15 +8,14 @@
 #include <limits>
 #include <numeric>
 #include <stdexcept>
-#include <string>
 #include <utility>
 #include <vector>
 
-#include "clients/softbody/models/explicit.h"
 #include "clients/softbody/models/linear.h"
 #include "clients/softbody/models/quasi_static.h"
 #include "tests/clients/softbody/pressed_block.h"
 #include "tests/support/dice.h"
+#include "tests/support/refusal.h"
 
 namespace tendon::softbody::effects_test {
 namespace {
@@ -25,8 +24,7 @@ using testing::kB1PatchRadius;
 using testing::pressed_block;
 using testing::pressed_body;
 
-constexpr ModelKind kImplicit[] = {ModelKind::kLinear, ModelKind::kCorotational, ModelKind::kNeoHookean,
-                                   ModelKind::kMassSpring};
+constexpr ModelKind kImplicit[] = {ModelKind::kLinear, ModelKind::kCorotational, ModelKind::kNeoHookean};
 
 TEST(Effects, MassesAreThoseOfTheVolumeWhateverTheElement) {
   for (const Shape shape : {Shape::kTet4, Shape::kHex8, Shape::kHex20, Shape::kHex27}) {
@@ -41,7 +39,6 @@ TEST(Effects, MassesAreThoseOfTheVolumeWhateverTheElement) {
 TEST(Gravity, AColumnSagsUnderItsOwnWeightAsMuchAsItShould) {
   // Free to become thicker or not, with ν = 0 it does not: u(top) = ρ g h²/2E.
   for (const ModelKind model : kImplicit) {
-    if (model == ModelKind::kMassSpring) continue;  // it has no ν
     BodyConfig config = pressed_body(model, Element::kHex8, 4);
     config.material.poisson = 0;
     config.effects.density = 1000;
@@ -53,8 +50,7 @@ TEST(Gravity, AColumnSagsUnderItsOwnWeightAsMuchAsItShould) {
 }
 
 TEST(Gravity, TheToolMeetsTheSurfaceWhereItHasSunkTo) {
-  for (const ModelKind model : {ModelKind::kLinear, ModelKind::kNeoHookean, ModelKind::kMassSpring,
-                                ModelKind::kTensorMass, ModelKind::kProjective}) {
+  for (const ModelKind model : {ModelKind::kLinear, ModelKind::kNeoHookean}) {
     BodyConfig config = pressed_body(model, Element::kTet4, 4);
     config.effects.density = 1000;
     config.effects.gravity = Vec3(0, 0, -9.81);
@@ -65,7 +61,7 @@ TEST(Gravity, TheToolMeetsTheSurfaceWhereItHasSunkTo) {
     EXPECT_FALSE(above.touching) << static_cast<int>(model);
     EXPECT_NEAR(above.gap, 0.1 * sunk, 0.02 * sunk) << static_cast<int>(model);
     Feel below;
-    for (int i = 0; i < (body.step() > 0 ? 1000 : 50); ++i) below = body.touch(Vec3(0, 0, 0.05 - sunk - 1e-4));
+    for (int i = 0; i < 50; ++i) below = body.touch(Vec3(0, 0, 0.05 - sunk - 1e-4));
     EXPECT_TRUE(below.touching);
     EXPECT_NEAR(below.force.z() / 1e-4 / below.stiffness(2, 2), 1, 0.03) << static_cast<int>(model);
   }
@@ -110,19 +106,6 @@ TEST(Inertia, OneMassSwingsDampedAndViscousAndUnderItsWeightAsOnPaper) {
     EXPECT_NEAR(linear.press(patch, Given::kForce, force).depth, now, 1e-9);
     EXPECT_NEAR(newton.press(patch, Given::kForce, force).depth, now, 1e-9);
   }
-
-  EffectsConfig some = all;
-  some.viscosity.reset();
-  ExplicitModel model(solid, top, some);
-  double depth = weight / kSpring;
-  double velocity = 0;
-  for (int i = 0; i < 500; ++i) {
-    const double force = i < 200 ? 2 : 0;
-    velocity = (velocity + dt * (weight + force - kSpring * depth) / kMass) / (1 + damping * dt);
-    depth += dt * velocity;
-    EXPECT_NEAR(model.press(patch, Given::kForce, force).depth, depth, 1e-9);
-  }
-  EXPECT_NEAR(largest_step(solid, 1000), 2 / std::sqrt(kSpring / kMass), 1e-6);
 }
 
 TEST(Inertia, AFastPushMeetsTheMassFirst) {
@@ -134,7 +117,7 @@ TEST(Inertia, AFastPushMeetsTheMassFirst) {
 }
 
 TEST(Damping, TakesTheEnergyThatASwingHas) {
-  for (const ModelKind model : {ModelKind::kLinear, ModelKind::kTensorMass, ModelKind::kProjective}) {
+  for (const ModelKind model : {ModelKind::kLinear, ModelKind::kNeoHookean}) {
     double left[2];
     for (const bool damped : {false, true}) {
       BodyConfig config = pressed_body(model, Element::kTet4, 4);
@@ -199,14 +182,7 @@ TEST(Effects, WhatIsNotListedKeepsNothing) {
 }
 
 TEST(Effects, NonsenseIsRefusedByName) {
-  const auto refusal = [](const EffectsConfig& effects) {
-    try {
-      check(effects);
-    } catch (const std::invalid_argument& error) {
-      return std::string(error.what());
-    }
-    return std::string();
-  };
+  const auto refusal = [](const EffectsConfig& effects) { return thrown_by([&] { check(effects); }); };
   EXPECT_EQ(refusal({.step = 1e-3, .inertia = true}), "density = 0: expected a finite number above 0");
   EXPECT_EQ(refusal({.density = 1000, .inertia = true}), "step = 0: expected a finite number above 0");
   EXPECT_EQ(refusal({.step = 1e-3, .viscosity = -1}), "viscosity = -1: expected a finite number above 0");

@@ -19,7 +19,6 @@ namespace {
 }  // namespace
 
 void check(const EffectsConfig&) {}
-void check_only_with_inertia(const EffectsConfig&) {}
 Effects effects_at_rest(const EffectsConfig&, const Elastic&) { return {}; }
 void add_effects_of_time(Effects&, const EffectsConfig&, const Elastic&, const VectorXd&) {}
 std::size_t bytes(const Effects&) noexcept { return 0; }

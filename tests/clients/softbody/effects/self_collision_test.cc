@@ -9,13 +9,13 @@
 #include <limits>
 #include <optional>
 #include <stdexcept>
-#include <string>
 #include <utility>
 #include <vector>
 
 #include "clients/softbody/effects/cutting.h"
 #include "tests/clients/softbody/pressed_block.h"
 #include "tests/support/dice.h"
+#include "tests/support/refusal.h"
 
 namespace tendon::softbody::self_collision_test {
 namespace {
@@ -357,12 +357,7 @@ TEST(SelfCollision, NonsenseIsRefusedByName) {
   EXPECT_THROW(SelfCollision(solid, std::nan(""), at_rest), std::invalid_argument);
   BodyConfig config = pressed_body(ModelKind::kLinear, Element::kHex8Sri, 4);
   config.self_collision = 1e-4;
-  try {
-    Body{config};
-    FAIL();
-  } catch (const std::invalid_argument& error) {
-    EXPECT_EQ(std::string(error.what()), "the model \"linear\" does not simulate self-collision");
-  }
+  EXPECT_EQ(thrown_by([&] { Body{config}; }), "the model \"linear\" does not simulate self-collision");
 }
 
 }  // namespace

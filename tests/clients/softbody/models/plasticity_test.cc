@@ -6,12 +6,12 @@
 
 #include <cmath>
 #include <stdexcept>
-#include <string>
 #include <utility>
 
 #include "clients/softbody/models/linear.h"
 #include "tests/clients/softbody/pressed_block.h"
 #include "tests/support/dice.h"
+#include "tests/support/refusal.h"
 
 namespace tendon::softbody::plasticity_test {
 namespace {
@@ -285,14 +285,7 @@ TEST(Plasticity, UnderItsOwnWeightABodyYieldsBeforeItIsTouched) {
 }
 
 TEST(Plasticity, NonsenseIsRefusedByName) {
-  const auto refusal = [](const BodyConfig& config) {
-    try {
-      Body{config};
-    } catch (const std::invalid_argument& error) {
-      return std::string(error.what());
-    }
-    return std::string();
-  };
+  const auto refusal = [](const BodyConfig& config) { return thrown_by([&] { Body{config}; }); };
   BodyConfig config = soft_body(ModelKind::kLinear);
   EXPECT_EQ(refusal(config), "");
   config.plasticity = Yield{.stress = -1, .hardening = 1};

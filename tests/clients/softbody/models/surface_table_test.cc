@@ -2,10 +2,11 @@
 #include "clients/softbody/models/surface_table.h"
 
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 
+#include <csignal>
 #include <filesystem>
 #include <fstream>
-#include <functional>
 #include <iterator>
 #include <stdexcept>
 #include <string>
@@ -14,6 +15,7 @@
 #include "clients/softbody/scene.h"
 #include "tests/clients/softbody/pressed_block.h"
 #include "tests/server/scratch_folder.h"
+#include "tests/support/refusal.h"
 
 namespace tendon::softbody::surface_table_test {
 namespace {
@@ -28,16 +30,8 @@ class SurfaceTableFile : public ::testing::Test {
     return {std::istreambuf_iterator<char>(in), {}};
   }
   void put(const std::string& bytes) const { std::ofstream(file(), std::ios::binary) << bytes; }
-  static std::string refusal(const std::function<void()>& attempt) {
-    try {
-      attempt();
-    } catch (const std::invalid_argument& error) {
-      return error.what();
-    }
-    return "nothing was refused";
-  }
   std::string reading() const {
-    return refusal([&] { read_table(file()); });
+    return thrown_by([&] { read_table(file()); });
   }
   /// A block of n cells, of which the middle can be touched.
   static BodyConfig block(int n) {
@@ -83,18 +77,33 @@ TEST_F(SurfaceTableFile, ComesBackBitForBitAndMayBeMadeAnew) {
   EXPECT_EQ(bytes(), "a letter to a friend\n");
 }
 
+TEST_F(SurfaceTableFile, LeavesNoDraftIfTheDiskIsFull) {
+  const SurfaceTable table = condense(block(4));
+  rlimit before{};
+  ASSERT_EQ(::getrlimit(RLIMIT_FSIZE, &before), 0);
+  const auto handler = std::signal(SIGXFSZ, SIG_IGN);
+  rlimit small = before;
+  small.rlim_cur = 100;
+  ASSERT_EQ(::setrlimit(RLIMIT_FSIZE, &small), 0);
+  EXPECT_THROW(write_table(file(), table), std::runtime_error);
+  ASSERT_EQ(::setrlimit(RLIMIT_FSIZE, &before), 0);
+  std::signal(SIGXFSZ, handler);
+  EXPECT_TRUE(std::filesystem::is_empty(file().parent_path()));
+}
+
 TEST_F(SurfaceTableFile, OfAnotherBodyIsRefused) {
   write_table(file(), condense(block(8)));
-  EXPECT_NE(refusal([&] { Body{from_file(4)}; }).find("is the table of another body"), std::string::npos);
-  BodyConfig lumpy = from_file(8);
-  lumpy.regions = {{.where = Region::Ball{.middle = Vec3(0, 0, 0.03), .radius = 0.02}, .material = {1e5, 0.4}}};
-  EXPECT_NE(refusal([&] { Body{lumpy}; }).find("is the table of another body"), std::string::npos);
-  BodyConfig harder = from_file(8);
-  harder.material.young *= 1.0000001;
-  EXPECT_NE(refusal([&] { Body{harder}; }).find("is the table of another body"), std::string::npos);
-  BodyConfig farther = from_file(8);
-  farther.reach = 0.03;
-  EXPECT_NE(refusal([&] { Body{farther}; }).find("does not reach as far as reach_mm"), std::string::npos);
+  EXPECT_NE(thrown_by([&] { Body{from_file(4)}; }).find("is the table of another body"), std::string::npos);
+  expect_refusals(
+      from_file(8), Makes<Body>(),
+      {
+          {"is the table of another body",
+           [](auto& c) {
+             c.regions = {{.where = Region::Ball{.middle = Vec3(0, 0, 0.03), .radius = 0.02}, .material = {1e5, 0.4}}};
+           }},
+          {"is the table of another body", [](auto& c) { c.material.young *= 1.0000001; }},
+          {"does not reach as far as reach_mm", [](auto& c) { c.reach = 0.03; }},
+      });
   BodyConfig nearer = from_file(8);
   nearer.reach = 0.005;
   EXPECT_NO_THROW(Body{nearer}) << "a smaller part of it is there";
@@ -127,7 +136,7 @@ TEST_F(SurfaceTableFile, ThatWouldGiveOutEnergyOrAnswersOtherwiseIsRefused) {
   SurfaceTable softer = table;
   softer.compliance *= 1.001;
   write_table(file(), softer);
-  EXPECT_NE(refusal([&] { Body{from_file(4)}; }).find("does not answer as it did"), std::string::npos);
+  EXPECT_NE(thrown_by([&] { Body{from_file(4)}; }).find("does not answer as it did"), std::string::npos);
   SurfaceTable infinite = table;
   infinite.compliance(0, 0) = std::numeric_limits<double>::infinity();
   write_table(file(), infinite);
@@ -138,15 +147,13 @@ TEST_F(SurfaceTableFile, IsForTheModelCondensedAndForPatchesAndSpheres) {
   write_table(file(), condense(block(4)));
   BodyConfig linear = from_file(4);
   linear.model = ModelKind::kLinear;
-  EXPECT_EQ(refusal([&] { Body{linear}; }), "a table in a file is for the model \"condensed\"");
-  EXPECT_EQ(refusal([&] { condense(linear); }), "only the model \"condensed\" has a table");
+  EXPECT_EQ(thrown_by([&] { Body{linear}; }), "a table in a file is for the model \"condensed\"");
+  EXPECT_EQ(thrown_by([&] { condense(linear); }), "only the model \"condensed\" has a table");
   BodyConfig capsule = from_file(4);
-  capsule.tool = BodyConfig::Tool::kCapsule;
-  capsule.tool_radius = 0.02;
-  EXPECT_EQ(refusal([&] { Body{capsule}; }), "a capsule wants more than a table in a file has");
+  capsule.tool = CapsuleTool{.radius = 0.02, .half_length = 0};
+  EXPECT_EQ(thrown_by([&] { Body{capsule}; }), "a capsule wants more than a table in a file has");
   BodyConfig sphere = from_file(4);
-  sphere.tool = BodyConfig::Tool::kSphere;
-  sphere.tool_radius = 0.02;
+  sphere.tool = SphereTool{0.02};
   EXPECT_NO_THROW(Body{sphere});
 }
 

@@ -19,6 +19,7 @@
 #include "clients/softbody/placed_body.h"
 #include "clients/softbody/scene.h"
 #include "tests/clients/softbody/mpi/live_worker.h"
+#include "tests/clients/softbody/scene_text.h"
 #include "tests/server/scratch_folder.h"
 
 namespace tendon::softbody::fem_test {
@@ -209,7 +210,8 @@ TEST_F(Fem, TheErrorSentCoversTheTrueOne) {
 }
 
 TEST_F(Fem, ASceneThatManyMachinesCannotAnswerIsRefused) {
-  const std::string file = scene("hex8-sri", 4, 0.45, "modal");
+  const std::string file = path("scene.toml");
+  std::ofstream(file) << testing::listing("corotational", "[\"contact\", \"geometric-nonlinearity\"]", "");
   const std::string command = mpirun(1) + " " + file + " > " + path("said") + " 2>&1";
   EXPECT_NE(std::system(command.c_str()), 0);  // NOLINT(concurrency-mt-unsafe): one thread
   EXPECT_NE(said().find("on many machines a body has the model \"linear\""), std::string::npos) << said();

@@ -12,7 +12,9 @@
 #include <string>
 #include <vector>
 
+#include "clients/cpp/usage.h"
 #include "clients/softbody/scene.h"
+#include "server/build_info.h"
 #include "tests/clients/softbody/mpi/live_worker.h"
 
 using namespace tendon;
@@ -68,6 +70,8 @@ int measure(const std::string& scene_file, const std::string& command, int answe
 
 int main(int argc, char** argv) {
   CLI::App app("Asks a worker for answers about a scene, and prints how long they took", "tendon-bench-fem");
+  tendon::usage::dress(app);
+  app.set_version_flag("--version", tendon::version_text());
   std::string scene;
   std::string command;
   int answers = 100;
@@ -78,8 +82,13 @@ int main(int argc, char** argv) {
   app.add_option("--patience-s", patience_s, "For the worker to be ready, and for an answer")->capture_default_str();
   app.footer(
       "\nExample:\n  tendon-bench-fem b1.toml \"mpirun -n 2 tendon-fem-worker --way multigrid\"\n\nPrints one JSON "
-      "object.");
-  CLI11_PARSE(app, argc, argv);
+      "object.\n"
+      "Exit: 0 done; 1 the worker failed; 2 wrong usage.");
+  try {
+    usage::parse(app, argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return tendon::usage::exit_code(app, error);
+  }
   try {
     return measure(scene, command + " " + scene, answers, patience_s);
   } catch (const std::exception& error) {

@@ -19,6 +19,7 @@
 #include "tests/clients/softbody/elsewhere.h"
 #include "tests/clients/softbody/near/pressed_before.h"
 #include "tests/support/dice.h"
+#include "tests/support/property_cases.h"
 
 namespace tendon::softbody::closed_ways_test {
 namespace {
@@ -27,12 +28,7 @@ using testing::Elsewhere;
 using testing::PressedBefore;
 using testing::small_block;
 
-/// n = 4, no larger than its near field.
-PressedBefore& smallest_block(Law law) {
-  static PressedBefore neo_hookean(4, 0.45, Law::kNeoHookean, 0.005);
-  static PressedBefore corotational(4, 0.45, Law::kCorotational, 0.005);
-  return law == Law::kNeoHookean ? neo_hookean : corotational;
-}
+constexpr auto smallest_block = testing::block_of<4>;
 
 /// Of the work that a way has cost the hand: SelfTestScript::work_tolerance.
 constexpr double kAllowed = 0.01;
@@ -194,24 +190,31 @@ Account expect_nothing_given(Fields fields, int ways, const Most& most) {
 /// The first ways of the seed stay far below what is allowed, so that less than a break of the rule is seen.
 constexpr Most kUsual{.given = 0.25};
 
-TEST(ClosedWays, OfABodyThatIsAllNearGiveNothing) { expect_nothing_given(Fields::kNone, 60, kUsual); }
+/// `ways` with ten thousand property cases, and in proportion fewer.
+int ways_of(int ways) { return std::max(ways / 4, ways * property_cases() / 10'000); }
 
-TEST(ClosedWays, OnWhichAnswersMakeNearFieldsGiveNothing) { expect_nothing_given(Fields::kAnswers, 20, kUsual); }
+TEST(ClosedWays, OfABodyThatIsAllNearGiveNothing) { expect_nothing_given(Fields::kNone, ways_of(60), kUsual); }
 
-TEST(ClosedWays, OnWhichAnotherThreadRefreshesNearFieldsGiveNothing) { expect_nothing_given(Fields::kThread, 20, {}); }
+TEST(ClosedWays, OnWhichAnswersMakeNearFieldsGiveNothing) {
+  expect_nothing_given(Fields::kAnswers, ways_of(20), kUsual);
+}
+
+TEST(ClosedWays, OnWhichAnotherThreadRefreshesNearFieldsGiveNothing) {
+  expect_nothing_given(Fields::kThread, ways_of(20), {});
+}
 
 /// Half of the answers and more are those without a field: where the hand comes down, on its way, and where it leaves.
 TEST(ClosedWays, OnWhichTheHandIsFasterThanTheOtherThreadGiveNothing) {
-  constexpr int kWays = 12;
+  const int ways = std::max(6, ways_of(12));
   for (const Law law : {Law::kNeoHookean, Law::kCorotational}) {
     Climbed body(small_block(law), true, false);
-    const Account all = drawn_ways(body, kWays, 1, 40, 80);
+    const Account all = drawn_ways(body, ways, 1, 40, 80);
     std::cout << all << std::endl;
     EXPECT_LE(all.most_given, 1);
     EXPECT_LE(all.most_kept, 1);
     EXPECT_LE(all.given_together(), kMostTogether);
     EXPECT_GT(2 * body.near->size().linear, all.answers);
-    EXPECT_GT(body.near->size().made, kWays / 2);
+    EXPECT_GT(body.near->size().made, ways / 2);
   }
 }
 

@@ -422,18 +422,18 @@ TEST(Ladder, ARungHasRoomAmongGoodCellsAndNoneWhereItsShareFalls) {
   }
 }
 
-TEST(Ladder, TheErrorSaidCoversTheTrueOneOfTwoHundredDrawnAnswers) {
+TEST(Ladder, TheErrorSaidCoversTheTrueOneOfDrawnAnswers) {
   static PressedBefore* const blocks[] = {new PressedBefore(6, 0.45, Law::kNeoHookean, 0.01),
                                           new PressedBefore(6, 0.45, Law::kCorotational, 0.01),
                                           new PressedBefore(6, 0.499, Law::kCorotational, 0.01)};
-  const testing::ErrorsSaid said = testing::errors_said(20, 5e-3, [&](int path, double tolerance) {
+  const testing::ErrorsSaid said = testing::errors_said(5e-3, [&](int path, double tolerance) {
     const PressedBefore& block = *blocks[path % 4 == 3 ? 2 : path % 2];
     auto asked = std::make_unique<AskedAndExact>(block.solid);
     asked->asked = ladder_with(block, path % 3 != 0, tolerance);
     return asked;
   });
-  EXPECT_EQ(said.answers, 200);
-  EXPECT_GE(said.covered, 198);
+  EXPECT_GE(said.answers, 40);
+  EXPECT_GE(said.covered, said.answers * 99 / 100);
   ::testing::Test::RecordProperty("covered", said.covered);
 }
 
@@ -476,7 +476,7 @@ TEST(Ladder, EachWayHasANameThatTheWireTakes) {
 TEST(Ladder, ABodyThatListsNothingHasNoLadder) {
   BodyConfig config = testing::pressed_body(ModelKind::kNear, Element::kHex8Sri, 6);
   EXPECT_TRUE(Body(config).ladder().empty());
-  config.learn = true;
+  config.near.learn = true;
   config.reach = 0.005;
   config.tolerance = 0.02;
   const Body learned(config);
@@ -487,7 +487,7 @@ TEST(Ladder, ABodyThatListsNothingHasNoLadder) {
 
 TEST(Ladder, WhatCannotBeLearnedIsRefused) {
   BodyConfig config = testing::pressed_body(ModelKind::kNear, Element::kHex8Sri, 6);
-  config.tabulate = true;
+  config.near.tabulate = true;
   EXPECT_THROW(Body{config}, std::invalid_argument);  // no reach
   config.reach = 0.031;
   EXPECT_THROW(Body{config}, std::invalid_argument);
@@ -495,7 +495,7 @@ TEST(Ladder, WhatCannotBeLearnedIsRefused) {
   config.middle = Vec3(0.2, 0, 0);
   EXPECT_THROW(Body{config}, std::invalid_argument);
   config = testing::pressed_body(ModelKind::kNeoHookean, Element::kHex8Sri, 6);
-  config.learn = true;
+  config.near.learn = true;
   config.reach = 0.005;
   EXPECT_THROW(Body{config}, std::invalid_argument);
 }

@@ -298,7 +298,7 @@ TEST(NearOracle, APoseThatIsNoPlaceLeavesTheStateBitByBit) {
   EXPECT_EQ(one.near_field()->made, other.near_field()->made);
 }
 
-TEST(NearOracle, TheErrorSaidCoversTheTrueOneOfTwoHundredDrawnAnswers) {
+TEST(NearOracle, TheErrorSaidCoversTheTrueOneOfDrawnAnswers) {
   struct Beside : AskedAndExact {
     using AskedAndExact::AskedAndExact;
     Elsewhere thread;
@@ -323,7 +323,7 @@ TEST(NearOracle, TheErrorSaidCoversTheTrueOneOfTwoHundredDrawnAnswers) {
     int slow_;
     int answers_ = 0;
   };
-  const testing::ErrorsSaid said = testing::errors_said(20, 5e-3, [](int path, double tolerance) {
+  const testing::ErrorsSaid said = testing::errors_said(5e-3, [](int path, double tolerance) {
     auto block =
         std::make_unique<Beside>(pressed_block(Element::kHex8Sri, 8, path % 4 == 3 ? 0.499 : 0.45, kLaws[path % 2]));
     block->asked = std::make_unique<Slow>(

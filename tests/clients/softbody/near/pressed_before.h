@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <map>
 #include <memory>
 #include <utility>
 #include <vector>
@@ -37,11 +38,12 @@ struct PressedBefore : AskedAndExact {
   TabulatedAnswers answers;
 };
 
-/// n = 6, answered as far as 5 mm from the middle, one for each law; made once.
-inline PressedBefore& small_block(Law law) {
-  static PressedBefore neo_hookean(6, 0.45, Law::kNeoHookean, 0.005);
-  static PressedBefore corotational(6, 0.45, Law::kCorotational, 0.005);
-  return law == Law::kNeoHookean ? neo_hookean : corotational;
+/// B1 with `n` cells that knows the presses within 5 mm of its middle. It is made at the first use of each law.
+template <int n>
+PressedBefore& block_of(Law law) {
+  static std::map<Law, PressedBefore> made;
+  return made.try_emplace(law, n, 0.45, law, 0.005).first->second;
 }
+inline PressedBefore& small_block(Law law) { return block_of<6>(law); }
 
 }  // namespace tendon::softbody::testing

@@ -154,7 +154,7 @@ std::vector<BodyConfig> linear_ones(BodyConfig config) {
   std::vector<BodyConfig> all;
   config.max_iterations = 100;
   config.tolerance = 1e-9;
-  for (const ModelKind kind : {ModelKind::kLinear, ModelKind::kCondensed, ModelKind::kModal}) {
+  for (const ModelKind kind : {ModelKind::kLinear, ModelKind::kCondensed}) {
     config.model = kind;
     all.push_back(config);
   }

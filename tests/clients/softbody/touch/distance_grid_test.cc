@@ -7,10 +7,10 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <stdexcept>
 #include <string>
 
 #include "tests/support/dice.h"
+#include "tests/support/refusal.h"
 
 namespace tendon::softbody::distance_grid_test {
 namespace {
@@ -108,12 +108,7 @@ TEST(DistanceGrid, APlaceThatIsNotFiniteHasNoDistance) {
 
 TEST(DistanceGrid, RefusesWhatIsNoDistanceOrTooLarge) {
   const auto refusal = [](const auto& distance, double cell) {
-    try {
-      DistanceGrid(distance, Vec3::Constant(-0.014), Vec3::Constant(0.014), cell);
-    } catch (const std::invalid_argument& refused) {
-      return std::string(refused.what());
-    }
-    return std::string();
+    return thrown_by([&] { DistanceGrid(distance, Vec3::Constant(-0.014), Vec3::Constant(0.014), cell); });
   };
   for (const double bad : {0.0, -1.0, std::numeric_limits<double>::quiet_NaN()}) {
     EXPECT_NE(refusal(ball_distance, bad), "") << bad;

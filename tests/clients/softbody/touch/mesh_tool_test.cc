@@ -7,8 +7,8 @@
 #include <limits>
 #include <numbers>
 
-#include "clients/softbody/fem/triangles.h"
 #include "clients/softbody/scene.h"
+#include "clients/softbody/surface/triangles.h"
 #include "tests/clients/softbody/touch/pressed_by_tools.h"
 #include "tests/clients/softbody/touch/surfaces.h"
 

@@ -14,6 +14,7 @@
 #include "tests/clients/softbody/pressed_block.h"
 #include "tests/clients/softbody/scene_text.h"
 #include "tests/clients/softbody/touch/half_space.h"
+#include "tests/support/refusal.h"
 
 namespace tendon::softbody::sphere_test {
 namespace {
@@ -125,9 +126,10 @@ TEST(CapsuleScene, ItsKeysAreItsOwnAndItRefusesWhatItCannotDo) {
   const std::string capsule = "tool = \"capsule\"\ntool_radius_mm = 15\n";
   const BodyConfig config =
       scene(capsule + "tool_length_mm = 30\ntool_axis = [0, 3, 4]\ntool_offset_mm = [1, 2, 3]").body;
-  EXPECT_EQ(config.tool, BodyConfig::Tool::kCapsule);
-  EXPECT_DOUBLE_EQ(config.tool_half_length, 0.015);
-  EXPECT_LT((config.tool_axis - Vec3(0, 0.6, 0.8)).norm(), 1e-15);
+  const CapsuleTool tool = std::get<CapsuleTool>(config.tool);
+  EXPECT_DOUBLE_EQ(tool.radius, 0.015);
+  EXPECT_DOUBLE_EQ(tool.half_length, 0.015);
+  EXPECT_LT((tool.axis - Vec3(0, 0.6, 0.8)).norm(), 1e-15);
   EXPECT_LT((config.tool_offset - Vec3(0.001, 0.002, 0.003)).norm(), 1e-15);
   EXPECT_TRUE(turns_the_hand(config));
   EXPECT_FALSE(turns_the_hand(scene("tool = \"sphere\"\ntool_radius_mm = 15").body));
@@ -136,18 +138,13 @@ TEST(CapsuleScene, ItsKeysAreItsOwnAndItRefusesWhatItCannotDo) {
         std::string("tool_length_mm = 30"), std::string("tool_axis = [1, 0, 0]"), std::string("tool_offset_mm = 3")}) {
     EXPECT_THROW(scene(wrong), SceneError) << wrong;
   }
-  BodyConfig other = config;
-  other.model = ModelKind::kLinear;
-  EXPECT_THROW(Body{other}, std::invalid_argument);
-  other = config;
-  other.friction = 0.3;
-  EXPECT_THROW(Body{other}, std::invalid_argument);
-  other = config;
-  other.tool_axis = Vec3(0, 0, 2);
-  EXPECT_THROW(Body{other}, std::invalid_argument);
-  other = config;
-  other.tool_radius = 0;
-  EXPECT_THROW(Body{other}, std::invalid_argument);
+  expect_refusals(config, Makes<Body>(),
+                  {
+                      {"a capsule wants the model", [](auto& c) { c.model = ModelKind::kLinear; }},
+                      {"a capsule has no friction on the model", [](auto& c) { c.friction = 0.3; }},
+                      {"norm of tool_axis = 2", [](auto& c) { std::get<CapsuleTool>(c.tool).axis = Vec3(0, 0, 2); }},
+                      {"radius", [](auto& c) { std::get<CapsuleTool>(c.tool).radius = 0; }},
+                  });
 }
 
 }  // namespace

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "clients/softbody/fem/triangles.h"
+#include "clients/softbody/surface/triangles.h"
 
 namespace tendon::softbody::testing {
 

@@ -5,7 +5,8 @@ import { decodeHelloMessage, encodeAnswerMessage, type ControlAck } from "../../
 import {
   CipherSuite, concat, decodeHello, encodeAnswer, encodeRetry, equal, helloHeader, type HelloDatagram,
 } from "../../../../clients/typescript/src/datagram.js";
-import { ForceClient, type ClientConfig } from "../../../../clients/typescript/src/force_client.js";
+import type { ClientConfig } from "../../../../clients/typescript/src/config.js";
+import { ForceClient } from "../../../../clients/typescript/src/force_client.js";
 import {
   Code, Mode, type DeviceState, type ForceCommand, type Grant, type Hello, type Refused, type Request, type Welcome,
 } from "../../../../clients/typescript/src/messages.js";

@@ -65,10 +65,6 @@ final class Bounds {
     return goodCode(bye.getCodeValue()) && goodText(bye.getReason(), 128);
   }
 
-  static boolean good(Tendon.ControlAck ack) {
-    return ack.getId() != 0 && goodCode(ack.getCodeValue()) && goodText(ack.getDetail(), 128);
-  }
-
   static boolean good(Tendon.Refused refused) {
     return goodCode(refused.getCodeValue()) && goodText(refused.getDetail(), 128);
   }

@@ -162,7 +162,7 @@ final class Session {
       if (newestTick != null && Long.compareUnsigned(tick, newestTick) <= 0) return;
       newestTick = tick;
       unanswered = frame.getState();
-    } else if (frame.hasControlAck() && Bounds.good(frame.getControlAck())) {
+    } else if (frame.hasControlAck()) {
       if (frame.getControlAck().getId() == 1) asked = false;
     } else if (frame.hasBye() && Bounds.good(frame.getBye())) {
       endCode = frame.getBye().getCodeValue();

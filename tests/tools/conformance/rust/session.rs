@@ -6,9 +6,10 @@ use std::collections::{BTreeMap, VecDeque};
 use crate::aead::Sealing;
 use crate::opening::{header, Welcome, ANSWER_TYPE, DATA, RETRY};
 use crate::protobuf::{decode, fits, Node, Writer};
-use crate::schema::{usable_time, DATAGRAM, ECHO, FORCE, FRAME};
+use crate::schema::{usable_time, CONTROL_ACK, DATAGRAM, ECHO, FORCE, FRAME};
 
 pub const CODE_OK: i128 = 1;
+const CODE_INVALID: i128 = 2;
 const CODE_UNSUPPORTED: i128 = 3;
 const CODE_TIMED_OUT: i128 = 7;
 pub const CODE_EXPIRED: i128 = 8;
@@ -21,6 +22,15 @@ const SESSION_AGE_NS: i64 = 86_400_000 * MS;
 const NUMBERS: u64 = 1 << 60;
 const OPEN_REQUESTS: u32 = 16;
 const ROOM: usize = 1200 - 16 - 16 - 64; // for frames: without header, tag, time and echo
+
+/// What stands for an answer that is out of bounds.
+fn invalid_answer(id: i128) -> Node {
+    let mut answer = Writer::default();
+    answer.whole(1, id as u64);
+    answer.whole(2, CODE_INVALID as u64);
+    answer.text(3, "a field of the answer is out of bounds");
+    decode(&CONTROL_ACK, &answer.0).unwrap_or_default()
+}
 
 /// The 1984 newest packet numbers, in a ring of 2048 bits.
 pub struct Window {
@@ -333,6 +343,12 @@ impl Session {
         let body = frame.sub(kind).unwrap();
         if kind == 2 || !fits(&FRAME, frame) {
             self.counters.invalid += 1;
+            // A request or an answer with a number counts all the same: later ones wait for it.
+            match kind {
+                3 if body.whole(1) > 0 => self.take_request(body),
+                4 if body.whole(1) > 0 => self.take_answer(&invalid_answer(body.whole(1))),
+                _ => {}
+            }
             return;
         }
         match kind {

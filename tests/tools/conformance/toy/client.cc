@@ -5,6 +5,8 @@
 #include <limits>
 #include <utility>
 
+#include "tests/tools/conformance/request_bounds.h"
+
 namespace tendon::conformance {
 
 using std::chrono::milliseconds;
@@ -27,6 +29,7 @@ void ToyClient::begin() {
   if (!is(Fault::kNoRole)) hello.set_role(role_);
   for (int i = 0; i < 9 && is(Fault::kNineWays); ++i) hello.add_ways("way");
   hello.set_name("toy");
+  hello.add_features("channels");
   if (key_ && !is(Fault::kKnowsNoAes)) hello.add_features(std::string(kAesGcm));
   const Sixteen random{std::byte{0xAA}, is(Fault::kRandomStays) ? std::byte{1} : std::byte{attempts_}};
   const Key ephemeral = key_from(is(Fault::kRandomStays) ? 100 : static_cast<std::uint8_t>(100 + attempts_));
@@ -42,6 +45,8 @@ void ToyClient::begin() {
   sequence_ = 0;
   answered_ = false;
   asked_ = 0;
+  answers_.clear();
+  due_.clear();
 }
 
 void ToyClient::say_hello() {
@@ -83,6 +88,19 @@ void ToyClient::settle(LocalTime now, Span datagram) {
                    answered->server_to_client, fault_, now);
 }
 
+/// The kit never has more than one open request.
+void ToyClient::take(const pb::Control& control) {
+  const std::string field = field_out_of_bounds(control);
+  if (control.id() == 0 || (is(Fault::kSilentToBadRequests) && !field.empty())) return;
+  if (control.id() == answers_.size() + 1) {
+    pb::ControlAck& ack = answers_.emplace_back();
+    ack.set_id(control.id());
+    ack.set_code(field.empty() ? pb::CODE_UNSUPPORTED : pb::CODE_INVALID);
+    ack.set_detail(field);
+  }
+  if (control.id() <= answers_.size()) due_.push_back(answers_[control.id() - 1]);
+}
+
 void ToyClient::receive(LocalTime now, int, Span datagram) {
   if (!running_) return;
   const auto head = read_head(datagram);
@@ -104,6 +122,7 @@ void ToyClient::receive(LocalTime now, int, Span datagram) {
       tick_is_new_ = true;
     }
     if (frame.has_control_ack()) answered_ = true;
+    if (frame.has_control()) take(frame.control());
   }
 }
 
@@ -123,6 +142,7 @@ void ToyClient::tick(LocalTime now) {
     return;
   }
   std::vector<pb::Frame> frames;
+  for (const pb::ControlAck& ack : std::exchange(due_, {})) *frames.emplace_back().mutable_control_ack() = ack;
   if (std::exchange(tick_is_new_, false) && (role_ == pb::ROLE_CONTROLLER || is(Fault::kObserverPushes))) {
     frames.emplace_back();
     pb::ForceCommand& force = *frames.back().mutable_force();

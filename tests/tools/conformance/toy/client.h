@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <vector>
 
 #include "tests/tools/conformance/toy/session.h"
 
@@ -23,6 +24,7 @@ class ToyClient : public ToyPeer, public Guest {
   void begin();
   void settle(LocalTime now, Span datagram);
   void say_hello();
+  void take(const pb::Control& control);
 
   std::optional<Key> key_;
   pb::Role role_;
@@ -43,6 +45,8 @@ class ToyClient : public ToyPeer, public Guest {
   bool answered_ = false;
   int asked_ = 0;
   LocalTime ask_at_{};
+  std::vector<pb::ControlAck> answers_;  ///< to the requests of the server
+  std::vector<pb::ControlAck> due_;
 };
 
 }  // namespace tendon::conformance

@@ -44,6 +44,7 @@ enum class Fault : std::uint8_t {
   kNoTimeout,
   kAnythingIsALifeSign,
   kBodyIsNoMessage,
+  kSilentToBadRequests,
   kKnowsNoAes,
   kLittleEndianNonce,  ///< in suite 2
   // A server's.

@@ -5,6 +5,8 @@
 #include <limits>
 #include <utility>
 
+#include "tests/tools/conformance/request_bounds.h"
+
 namespace tendon::conformance {
 
 using std::chrono::milliseconds;
@@ -282,9 +284,11 @@ void ToyServer::take(Member& member, const pb::Frame& frame) {
   if (!frame.has_control()) return;
   const pb::Control& control = frame.control();
   const std::uint32_t id = control.id();
+  if (is(Fault::kSilentToBadRequests) && !field_out_of_bounds(control).empty()) return;
   if (is(Fault::kTakesAnyRequestId) && (id == 0 || id >= member.next_request + 16)) return execute(member, control);
-  const std::uint32_t window = is(Fault::kRequestsAsTheyCome) ? 32 : 16;  // it never counts on
-  if (id == 0 || id >= member.next_request + window) return;
+  std::uint32_t next = member.next_request;
+  if (is(Fault::kRequestsAsTheyCome) && !member.answered.empty()) next = member.answered.rbegin()->first + 1;
+  if (id == 0 || id >= next + 16) return;
   if (id < member.next_request) {
     if (is(Fault::kRequestsAgain)) execute(member, control);
     if (is(Fault::kForgetsAnswers)) return;
@@ -306,7 +310,10 @@ void ToyServer::execute(Member& member, const pb::Control& control) {
   pb::ControlAck ack;
   ack.set_id(control.id());
   ack.set_code(pb::CODE_OK);
-  if (control.has_set_state_rate()) {
+  if (const std::string field = field_out_of_bounds(control); !field.empty()) {
+    ack.set_code(pb::CODE_INVALID);
+    ack.set_detail(field);
+  } else if (control.has_set_state_rate()) {
     member.every = std::max(1U, 1000 / std::max(1U, std::min(1000U, control.set_state_rate().hz())));
   } else if (control.has_rearm()) {
     if (member.role != pb::ROLE_CONTROLLER && !is(Fault::kObserversRearm)) ack.set_code(pb::CODE_DENIED);

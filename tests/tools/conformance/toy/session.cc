@@ -2,6 +2,7 @@
 #include "tests/tools/conformance/toy/session.h"
 
 #include <algorithm>
+#include <iterator>
 #include <limits>
 #include <utility>
 
@@ -139,13 +140,13 @@ Bytes ToySession::say(LocalTime now, const std::vector<pb::Frame>& frames) {
     echo.set_rx_time_ns(is(Fault::kEchoTimeIsNow) ? ns(now) : ns(echo_at_));
     echo.set_peer_packet_number(echo_number_);
     std::uint32_t mask = 0;
-    for (std::uint64_t i = 0; i < 32 && i < echo_number_; ++i) {
-      if (seen_.contains(echo_number_ - 1 - i)) mask |= 1U << i;
+    for (auto seen = seen_.lower_bound(echo_number_); seen != seen_.begin() && *std::prev(seen) + 32 >= echo_number_;) {
+      mask |= 1U << (echo_number_ - 1 - *--seen);
     }
     echo.set_received_mask(is(Fault::kEmptyMask) ? 0 : mask);
   }
   for (const pb::Frame& frame : frames) *body.add_frames() = frame;
-  if (suite_ != 0 && !is(Fault::kNeverRenews) && now - renewed_ >= seconds(600)) {
+  if (suite_ != 0 && !is(Fault::kNeverRenews) && now - renewed_ >= kKeyAge) {
     send_ = renewed(send_);
     ++send_epoch_;
     renewed_ = now;

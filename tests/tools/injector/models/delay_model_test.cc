@@ -5,8 +5,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
-#include <filesystem>
 #include <functional>
 #include <set>
 #include <string>
@@ -118,86 +116,6 @@ TEST(DelayTable, SamplesGiveTheseValuesAndNoOthersInTheirShares) {
   EXPECT_EQ(seen[1] + seen[2] + seen[20], 800);
 }
 
-/// The Kolmogorov-Smirnov distance of delays (in ns) from a cdf (of ms).
-double distance(std::vector<std::int64_t> delays, const std::function<double(double)>& cdf) {
-  std::ranges::sort(delays);
-  const auto n = static_cast<double>(delays.size());
-  double worst = 0;
-  for (std::size_t i = 0; i < delays.size(); ++i) {
-    const double expected = cdf(static_cast<double>(delays[i]) * 1e-6);
-    const auto rank = static_cast<double>(i);
-    worst = std::max({worst, expected - rank / n, (rank + 1) / n - expected});
-  }
-  return worst;
-}
-
-double correlation(const std::vector<double>& x) {
-  double mean = 0;
-  for (const double v : x) mean += v / static_cast<double>(x.size());
-  double square = 0;
-  double product = 0;
-  for (std::size_t i = 1; i < x.size(); ++i) {
-    square += (x[i] - mean) * (x[i] - mean);
-    product += (x[i] - mean) * (x[i - 1] - mean);
-  }
-  return product / square;
-}
-
-/// What netem does instead: a moving average of the uniforms themselves.
-class NetemCorrelation {
- public:
-  explicit NetemCorrelation(double rho) : rho_(rho) {}
-  double next(double u) { return last_ = (1 - rho_) * u + rho_ * last_; }
-
- private:
-  double rho_;
-  double last_ = 0.5;
-};
-
-TEST(Copula, TheDistributionOfDelaysIsExactWhateverTheCorrelation) {
-  const QuantileTable table = table_of("exponential(5ms,8ms)");
-  const auto cdf = [](double x) { return x < 5 ? 0 : 1 - std::exp(-(x - 5) / 3); };
-  const Draws draws(3, 0, Direction::kUp);
-  constexpr int kDraws = 200'000;
-  for (const double rho : {0.1, 0.5, 0.9, 0.99}) {
-    Copula copula(rho, {});
-    NetemCorrelation netem(rho);
-    std::vector<std::int64_t> delays;
-    std::vector<std::int64_t> of_netem;
-    for (std::uint64_t i = 0; i < kDraws; ++i) {
-      const std::uint64_t u = draws(Purpose::kDelay, i);
-      delays.push_back(table(copula.next(u, {})));
-      of_netem.push_back(
-          table(static_cast<std::uint64_t>(netem.next(static_cast<double>(u >> 11) * 0x1p-53) * 0x1p64)));
-    }
-    // Correlated draws are worth n(1 − ρ)/(1 + ρ) independent ones; 2/√n is exceeded by one seed in 1500.
-    const double allowed = 2 / std::sqrt(kDraws * (1 - rho) / (1 + rho));
-    EXPECT_LT(distance(delays, cdf), allowed) << rho;
-    EXPECT_GT(distance(of_netem, cdf), 0.02) << rho;
-  }
-}
-
-/// z of a draw, from the copula's own result: Φ⁻¹ by bisection would do; a normal table is that.
-std::vector<double> deviates(Copula copula, Duration gap) {
-  const QuantileTable normal = table_of("normal(30s,1s)");
-  const Draws draws(5, 0, Direction::kUp);
-  std::vector<double> z;
-  for (std::uint64_t i = 0; i < 200'000; ++i) {
-    const std::uint64_t u = copula.next(draws(Purpose::kDelay, i), LocalTime(gap * i));
-    z.push_back(static_cast<double>(normal(u)) * 1e-9 - 30);
-  }
-  return z;
-}
-
-TEST(Copula, ConsecutiveDeviatesAreCorrelatedAsAskedByPacketAndByTime) {
-  // The standard deviation of an estimated correlation is at most √(1 − ρ²)/√n < 0.0023.
-  for (const double rho : {0.0, 0.3, 0.9}) EXPECT_NEAR(correlation(deviates(Copula(rho, {}), 1ms)), rho, 0.009) << rho;
-  for (const Duration gap : {1ms, 7ms, 40ms}) {
-    const double rho = std::exp(-static_cast<double>(gap / 1ms) / 20);
-    EXPECT_NEAR(correlation(deviates(Copula(0, 20ms), gap)), rho, 0.009) << gap.count();
-  }
-}
-
 TEST(Copula, OneTimeHasOneDeviateAndLongAfterNothingIsLeft) {
   Copula copula(0, 20ms);
   const std::uint64_t first = copula.next(123, LocalTime(1s));
@@ -211,57 +129,6 @@ TEST(Copula, WithoutCorrelationIsTrivial) {
   EXPECT_TRUE(Copula(0, {}).trivial());
   EXPECT_FALSE(Copula(0.5, {}).trivial());
   EXPECT_FALSE(Copula(0, 1us).trivial());
-}
-
-/// The share of the histogram's weight below x ms, straight within a bin: the CDF as a person would write it down, to
-/// check the integer inverse of it.
-double cdf(const std::vector<Weighted>& bins, double x) {
-  double below = 0;
-  double total = 0;
-  for (std::size_t i = 0; i < bins.size(); ++i) {
-    const std::size_t edge = std::min(i, bins.size() - 2);
-    const double width = seconds(bins[edge + 1].value - bins[edge].value) * 1e3;
-    total += bins[i].weight;
-    below += bins[i].weight * std::clamp((x - seconds(bins[i].value) * 1e3) / width, 0.0, 1.0);
-  }
-  return below / total;
-}
-
-/// The same, for the sorted values of many draws: as fine as a 64th of a bin.
-TEST(DelayTable, DrawsFollowEachMeasured5gHistogram) {
-  const char* const data = std::getenv("TENDON_DATA");  // NOLINT(concurrency-mt-unsafe): one thread
-  const std::filesystem::path folder = std::filesystem::path(data != nullptr ? data : "") / "d6g-tsn-5g/hist";
-  if (data == nullptr) GTEST_SKIP() << "TENDON_DATA is not set: the measured histograms are not checked";
-  if (!std::filesystem::is_directory(folder)) GTEST_SKIP() << folder << " is not there";
-  constexpr std::uint64_t kDraws = 1'000'000;
-  int files = 0;
-  for (const auto& entry : std::filesystem::directory_iterator(folder)) {
-    const Delay delay = parse_profile("delay=histogram(" + entry.path().string() + ")").delay;
-    const auto& bins = std::get<HistogramDelay>(delay).bins;
-    EXPECT_GE(bins.size(), 100U) << entry.path();
-    const QuantileTable table = delay_table(delay);
-    const Draws draws(1, 0, Direction::kUp);
-    // Counted in 64ths of a bin, all of which are equally wide in these files.
-    const Duration width = (bins.back().value - bins.front().value) / static_cast<std::int64_t>(bins.size() - 1) / 64;
-    std::vector<int> counts((bins.size() + 1) * 64 + 1);
-    for (std::uint64_t i = 0; i < kDraws; ++i) {
-      const Duration d = Duration(table(draws(Purpose::kDelay, i))) - bins.front().value;
-      ASSERT_GE(d, 0ns);
-      ++counts.at(static_cast<std::size_t>(d / width));
-    }
-    double worst = 0;
-    double below = 0;
-    for (std::size_t i = 0; i < counts.size(); ++i) {
-      const double x = seconds(bins.front().value + width * static_cast<std::int64_t>(i)) * 1e3;
-      worst = std::max(worst, std::abs(below / kDraws - cdf(bins, x)));
-      below += counts[i];
-    }
-    // 1.628/√n is exceeded by one right table in a hundred.
-    EXPECT_LT(worst, 1.628 / std::sqrt(static_cast<double>(kDraws))) << entry.path();
-    RecordProperty(entry.path().stem().string(), std::to_string(worst));
-    ++files;
-  }
-  EXPECT_EQ(files, 6);
 }
 
 }  // namespace

@@ -5,6 +5,8 @@
 #include <array>
 #include <stdexcept>
 
+#include "core/base/nearest_word.h"
+
 namespace tendon::injector {
 namespace {
 
@@ -94,7 +96,8 @@ Profile resolve_profile(std::string_view text, Direction direction) {
   if (named == kProfiles.end()) {
     if (!word.empty() && word.find_first_of("=(") == std::string_view::npos) {
       throw std::invalid_argument("the profile begins with \"" + std::string(word) + "\", expected one of the names " +
-                                  names_of_profiles() + ", or a line like \"delay=20ms loss=2%\"");
+                                  names_of_profiles() + ", or a line like \"delay=20ms loss=2%\"" +
+                                  did_you_mean(word, names_of_profiles()));
     }
     return parse_profile(text);
   }

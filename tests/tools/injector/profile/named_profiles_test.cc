@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "tests/support/refusal.h"
 #include "tests/tools/injector/models/delay_model.h"
 
 namespace tendon::injector::named_profiles_test {
@@ -52,6 +53,8 @@ TEST(NamedProfiles, AnUnknownNameIsAnsweredWithThoseThatThereAre) {
     EXPECT_NE(std::string(error.what()).find("\"wifi-ugly\""), std::string::npos) << error.what();
     EXPECT_NE(std::string(error.what()).find("wifi-good, wifi-bad"), std::string::npos) << error.what();
   }
+  EXPECT_TRUE(
+      thrown_by([&] { resolve_profile("wifi-baad loss=1%", Direction::kUp); }).ends_with("; did you mean wifi-bad?"));
 }
 
 struct Moments {

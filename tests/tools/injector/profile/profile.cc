@@ -75,7 +75,7 @@ std::vector<Weighted> table(const Call& c) {
   if (auto values = inline_table(c); values && !values->empty()) return *values;
   c.expect(1, "VALUE:WEIGHT like " + std::string(c.name) + "(0.56ms:72,0.59ms:5058), or a file");
   const std::filesystem::path file(c.arguments[0]);
-  return c.name == "samples" ? merged(table_from_csv(file, true)) : table_from_csv(file, false);
+  return c.name == "samples" ? samples_from_csv(file) : histogram_from_csv(file);
 }
 
 /// netem(FILE.dist,MEAN,SD).

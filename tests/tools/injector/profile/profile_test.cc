@@ -14,28 +14,19 @@
 #include <utility>
 #include <vector>
 
+#include "tests/support/refusal.h"
+
 namespace tendon::injector::profile_test {
 namespace {
 
 using namespace std::chrono_literals;
 
-/// What `call` complains about; "" when it does not.
-template <typename Call>
-std::string complaint_of(Call call) {
-  try {
-    call();
-  } catch (const std::invalid_argument& error) {
-    return error.what();
-  }
-  return "";
-}
-
 std::string complaint_about(const Profile& profile) {
-  return complaint_of([&] { check(profile); });
+  return thrown_by<std::exception>([&] { check(profile); });
 }
 
 std::string complaint_about(const std::string& line) {
-  return complaint_of([&] { parse_profile(line); });
+  return thrown_by<std::exception>([&] { parse_profile(line); });
 }
 
 /// A file that is gone at the end of the test.
@@ -336,15 +327,38 @@ TEST(Profile, RefusesALineItDoesNotUnderstandAndSaysWhere) {
 // ---- Files ----------------------------------------------------------------------------------------------------------
 
 TEST(ProfileFiles, AHistogramMayHaveTabsCommasSemicolonsBlanksAndComments) {
-  const TemporaryFile file("# edge in ms, count\n0.560000\t0.000720\n0.5877, 5\r\n\n1 ; 7 # a comment\n  2.5   8  \n");
-  EXPECT_EQ(parse_profile("delay=histogram(" + file.path().string() + ")").delay,
-            Delay(HistogramDelay{{{560us, 0.00072}, {587'700ns, 5}, {1ms, 7}, {2500us, 8}}}));
+  const std::string begin = "# edge in ms, count\n";
+  for (const std::string& text : std::vector<std::string>{
+           begin + "0.560000\t0.000720\n0.5877\t5\r\n\n1\t7 # a comment\n", begin + "0.56, 0.00072\n0.5877,5\n1,7\n",
+           "edge;count\n" + begin + "0,56;0,00072\n0,5877 ;5\n1;7\n", " 0.56   0.00072\n0.5877 5\n  1   7  \n",
+           "\xef\xbb\xbf"
+           "edge_us,count\n560,0.00072\n587.7,5\n1000,7\n"}) {
+    const TemporaryFile file(text);
+    EXPECT_EQ(parse_profile("delay=histogram(" + file.path().string() + ")").delay,
+              Delay(HistogramDelay{{{560us, 0.00072}, {587'700ns, 5}, {1ms, 7}}}))
+        << text;
+  }
 }
 
 TEST(ProfileFiles, SamplesComeInAnyOrderAndAreCounted) {
-  const TemporaryFile file("3\n1\n3\n2,5\n");
-  EXPECT_EQ(parse_profile("delay=samples(" + file.path().string() + ")").delay,
-            Delay(SampledDelay{{{1ms, 1}, {2ms, 5}, {3ms, 2}}}));
+  for (const char* text :
+       {"3\n1\n3\n2\n2\n", "delay_ms,weight\n3,2\n1,1\n2,2\n", "Delay [s];weight\n0,003;2\n0,001;1\n0,002;2\n"}) {
+    const TemporaryFile file(text);
+    EXPECT_EQ(parse_profile("delay=samples(" + file.path().string() + ")").delay,
+              Delay(SampledDelay{{{1ms, 1}, {2ms, 2}, {3ms, 2}}}))
+        << text;
+  }
+}
+
+TEST(ProfileFiles, SamplesAreWhatImportCsvReads) {
+  for (const char* text :
+       {"t_ms,delay_ms\n0,3\n10,1\n20,\n30,3\n", "3\n1\n\n3\n",
+        "dir,link,index,t_ms,delay_ms,actual_delay_ms\nup,0,0,0,3,\nup,0,1,1,,\ndown,0,0,0,1,\nup,0,2,2,3,\n"}) {
+    const TemporaryFile file(text);
+    EXPECT_EQ(parse_profile("delay=samples(" + file.path().string() + ")").delay,
+              Delay(SampledDelay{{{1ms, 1}, {3ms, 2}}}))
+        << text;
+  }
 }
 
 TEST(ProfileFiles, ATableOfNetemIsInUnitsOfTheDeviationOver8192) {
@@ -366,13 +380,17 @@ TEST(ProfileFiles, WhatCannotBeReadIsNamedByFileAndLine) {
     EXPECT_TRUE(said.starts_with(path)) << said;
     return said.substr(std::min(path.size(), said.size()));
   };
-  EXPECT_EQ(complaint_in("1,2\nedge,count\n"), ":2: expected LOWER_EDGE_MS,COUNT like 0.56,72, got \"edge,count\"");
-  EXPECT_EQ(complaint_in("1\n"), ":1: expected LOWER_EDGE_MS,COUNT like 0.56,72, got \"1\"");
-  EXPECT_EQ(complaint_in("1,2,3\n"), ":1: expected LOWER_EDGE_MS,COUNT like 0.56,72, got \"1,2,3\"");
+  EXPECT_EQ(complaint_in("1,2\nedge,count\n"), ":2: expected a finite number in column 0 (from 0), found 'edge'");
+  EXPECT_EQ(complaint_in("1\n"), ":1: expected LOWER_EDGE_MS,COUNT like 0.56,72, found 1 column");
+  EXPECT_EQ(complaint_in("1,2,3\n"), ":1: expected LOWER_EDGE_MS,COUNT like 0.56,72, found 3 columns");
   EXPECT_EQ(complaint_in("1,2\n\n1,2\n"), ":3: value is 1ms, expected more than 1ms of the one before it");
   EXPECT_EQ(complaint_in("1,-2\n"), ":1: weight is -2, expected a number that is zero or more");
   EXPECT_EQ(complaint_in("1e300,2\n"), ":1: value is 1e+300ms, expected 0ms to 60s");
-  EXPECT_EQ(complaint_in("x\n", "samples("), ":1: expected VALUE_MS or VALUE_MS,COUNT like 0.56,72, got \"x\"");
+  EXPECT_EQ(complaint_in("x\n", "samples("),
+            ":1: expected numbers, or names of columns with delay_ms among them, found \"x\"");
+  EXPECT_EQ(complaint_in("20,1\n", "samples("),
+            ":1: expected one delay in ms in each line, or a first line with the names of the columns, like "
+            "t_ms;delay_ms, found 2 numbers in \"20,1\": are these decimal commas, or are they time and delay?");
   EXPECT_EQ(complaint_in(""), " is empty, expected one value in ms and its weight in each line");
   EXPECT_EQ(complaint_about("delay=histogram(no/such.csv)"),
             "cannot read no/such.csv: No such file or directory, expected one value in ms and its weight in each line");

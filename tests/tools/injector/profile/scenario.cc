@@ -9,6 +9,7 @@
 #include <iterator>
 #include <stdexcept>
 
+#include "core/base/nearest_word.h"
 #include "server/machine/regular_file.h"
 #include "tests/tools/injector/profile/named_profiles.h"
 #include "tests/tools/injector/profile/units.h"
@@ -42,9 +43,11 @@ class Keys {
   void refuse_others_than(std::initializer_list<std::string_view> known) const {
     for (const auto& [key, node] : table_) {
       if (std::ranges::find(known, key.str()) != known.end()) continue;
-      std::string all;
-      for (const std::string_view name : known) all.append(all.empty() ? "" : ", ").append(name);
-      fail(node, key.str(), (node.is_table() ? "unknown table; known here: " : "unknown key; known here: ") + all);
+      std::string all = did_you_mean(key.str(), known);
+      if (all.empty()) {
+        for (const std::string_view name : known) all.append(all.empty() ? "; known here: " : ", ").append(name);
+      }
+      fail(node, key.str(), (node.is_table() ? "unknown table" : "unknown key") + all);
     }
   }
 

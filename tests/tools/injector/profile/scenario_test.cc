@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "tests/support/refusal.h"
 #include "tests/tools/injector/injector.h"
 #include "tests/tools/injector/profile/named_profiles.h"
 
@@ -22,21 +23,11 @@ using namespace std::chrono_literals;
 LocalTime at(Duration since_zero) { return LocalTime(since_zero); }
 
 std::string refusal(const std::string& toml) {
-  try {
-    parse_scenario(toml, "storm.toml");
-    return "";
-  } catch (const std::runtime_error& error) {
-    return error.what();
-  }
+  return thrown_by<std::runtime_error>([&] { parse_scenario(toml, "storm.toml"); });
 }
 
 std::string refusal_of_command(const std::string& line) {
-  try {
-    parse_command(line);
-    return "";
-  } catch (const std::invalid_argument& error) {
-    return error.what();
-  }
+  return thrown_by([&] { parse_command(line); });
 }
 
 constexpr const char* kStorm = R"toml(
@@ -98,7 +89,7 @@ TEST(Scenario, AnEmptyFileIsAPerfectNetwork) {
 }
 
 TEST(Scenario, WhatIsWrongIsNamedWithFileLineAndKey) {
-  EXPECT_EQ(refusal("sed = 7"), "storm.toml:1: sed: unknown key; known here: seed, up, down, both, at, clock");
+  EXPECT_EQ(refusal("sed = 7"), "storm.toml:1: sed: unknown key; did you mean seed?");
   EXPECT_EQ(refusal("seed = -1"), "storm.toml:1: seed: expected a whole number from 0 to 9223372036854775807");
   EXPECT_EQ(refusal("\nboth = 20"), "storm.toml:2: both: expected text in quotes");
   EXPECT_EQ(refusal("both = \"lan\"\nup = \"lan\""), "storm.toml:2: up: expected either both, or up and down");
@@ -112,10 +103,8 @@ TEST(Scenario, WhatIsWrongIsNamedWithFileLineAndKey) {
             "storm.toml:5: at.t_s: is earlier than the one before, expected the order of time");
   EXPECT_EQ(refusal("[[at]]\nt_s = 1\nlink = 2"), "storm.toml:3: at.link: expected up, down or both with it");
   EXPECT_EQ(refusal("[at]\nt_s = 1"), "storm.toml:1: at: expected tables [[at]]");
-  EXPECT_EQ(refusal("[[at]]\nt_s = 1\nbooth = \"lan\""),
-            "storm.toml:3: at.booth: unknown key; known here: t_s, up, down, both, link, note");
-  EXPECT_EQ(refusal("[clock]\nsteps = 1"),
-            "storm.toml:2: clock.steps: unknown key; known here: offset_ms, drift_ppm, step");
+  EXPECT_EQ(refusal("[[at]]\nt_s = 1\nbooth = \"lan\""), "storm.toml:3: at.booth: unknown key; did you mean both?");
+  EXPECT_EQ(refusal("[clock]\nsteps = 1"), "storm.toml:2: clock.steps: unknown key; did you mean step?");
   EXPECT_EQ(refusal("[clock]\ndrift_ppm = 1e6"), "storm.toml:1: clock: a clock's drift is beyond 100000 ppm");
   EXPECT_EQ(refusal("[[clock.step]]\nt_s = 1"), "storm.toml:1: clock.step: expected t_s and step_ms");
   EXPECT_EQ(refusal("seed = 7\n= 8").substr(0, 22), "storm.toml:2: not TOML");

@@ -30,6 +30,9 @@ constexpr Duration kPublishPeriod = std::chrono::milliseconds(200);
 /// … for which there should be time before the next release.
 constexpr Duration kPublishRoom = std::chrono::microseconds(100);
 
+/// The time until the next address is tried. A client repeats its Hello every 100 ms.
+constexpr Duration kServerPatience = std::chrono::milliseconds(500);
+
 /// Whether one system call can send both.
 bool by_the_same_socket(const TraceRecord& a, const TraceRecord& b) {
   if (a.direction != b.direction) return false;
@@ -55,7 +58,7 @@ Driver::Driver(const Config& config, TraceRecorder* recorder)
       // A timer of its own: the timeouts of poll and epoll are rounded up by 0.1 % of their length.
       timer_(checked(::timerfd_create(CLOCK_MONOTONIC, TFD_NONBLOCK | TFD_CLOEXEC), "timerfd_create")),
       bell_(checked(::eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC), "eventfd")) {
-  UdpBatch::connected(config.server);  // or throws now and not when the first client comes
+  for (const Address& server : config.servers) UdpBatch::connected(server);  // or throws now, and not for a client
   watch(listener_.fd(), kListener, EPOLLIN);
   watch(timer_, kTimer, EPOLLIN | EPOLLET);
   watch(bell_, kBell, EPOLLIN);
@@ -113,6 +116,7 @@ void Driver::run() {
     }
     if (recorder_ != nullptr) recorder_->put(proxy_.records());
     if (now >= next_publish_ && publish(now)) next_publish_ = now + kPublishPeriod;
+    seek_server(now);
     wait(now);
   }
   if (recorder_ != nullptr) recorder_->put(proxy_.records());
@@ -171,10 +175,7 @@ void Driver::wait(LocalTime now) {
 
 void Driver::receive(std::uint64_t source) {
   if (source == kListener) {
-    for (const UdpBatch::Arrival& arrival : listener_.receive(inbox_)) {
-      const auto client = proxy_.receive_from_client(arrival.from, arrival.datagram, arrival.at);
-      if (client && !upstreams_.contains(*client)) open_upstream(*client);
-    }
+    for (const UdpBatch::Arrival& arrival : listener_.receive(inbox_)) take_from_client(arrival);
   } else {
     const auto client = static_cast<ClientIndex>(source);
     const auto upstream = upstreams_.find(client);
@@ -187,9 +188,47 @@ void Driver::receive(std::uint64_t source) {
   send_due(monotonic_now());
 }
 
-void Driver::open_upstream(ClientIndex client) {
-  const auto opened = upstreams_.try_emplace(client, Upstream{UdpBatch::connected(config_.server)}).first;
-  watch(opened->second.socket.fd(), client, EPOLLIN);
+void Driver::take_from_client(const UdpBatch::Arrival& arrival) {
+  const bool is_new = proxy_.is_new(arrival.from);
+  std::optional<UdpBatch> socket = is_new ? new_socket() : std::nullopt;
+  const auto client = proxy_.receive_from_client(arrival.from, arrival.datagram, arrival.at, !is_new || socket);
+  if (!client) return;
+  if (socket) {
+    watch(socket->fd(), *client, EPOLLIN);
+    upstreams_.emplace(*client, Upstream{.socket = *std::move(socket)});
+  }
+  upstreams_.at(*client).asked_at = arrival.asked_at;
+}
+
+/// Returns nothing if the system refuses, for example because there are too many open files.
+std::optional<UdpBatch> Driver::new_socket() {
+  try {
+    return UdpBatch::connected(config_.servers[server_]);
+  } catch (const std::runtime_error& error) {
+    if (no_socket_.empty()) no_socket_ = error.what();
+    return std::nullopt;
+  }
+}
+
+void Driver::replace_socket(ClientIndex client, Upstream& upstream, UdpBatch socket) {
+  closed_overflowed_ += upstream.socket.overflowed();
+  upstream.socket = std::move(socket);
+  watch(upstream.socket.fd(), client, EPOLLIN);
+}
+
+/// Tries the next address if the server has not answered.
+void Driver::seek_server(LocalTime now) {
+  if (config_.servers.size() == 1 || proxy_.measurements(Direction::kDown).counters.received > 0) return;
+  const ProxyCounters& up = proxy_.measurements(Direction::kUp).counters;
+  const std::uint64_t asked = up.forwarded + up.unsent;
+  if (asked == asked_before_) next_server_ = now + kServerPatience;  // starts with the first datagram
+  if (now < next_server_) return;
+  server_ = (server_ + 1) % config_.servers.size();
+  asked_before_ = asked;
+  next_server_ = now + kServerPatience;
+  for (auto& [client, upstream] : upstreams_) {
+    if (auto socket = new_socket()) replace_socket(client, upstream, *std::move(socket));
+  }
 }
 
 LocalTime Driver::send_due(LocalTime now) {
@@ -218,7 +257,7 @@ std::bitset<kUdpBatch> Driver::send_with(std::size_t first, const std::bitset<kU
   std::bitset<kUdpBatch> now_sent;
   for (std::size_t i = first; i < due_.size(); ++i) {
     if (sent.test(i) || !by_the_same_socket(due_[i].record, due_[first].record)) continue;
-    batch[count] = {due_[i].to, due_[i].datagram};
+    batch[count] = {due_[i].to, due_[i].datagram, asked_at(due_[i])};
     places[count++] = i;
     now_sent.set(i);
   }
@@ -239,11 +278,20 @@ UdpBatch& Driver::socket_for(const Proxy::Departure& departure) {
   if (departure.record.direction == Direction::kDown) return listener_;
   Upstream& upstream = upstreams_.at(departure.record.link);
   if (departure.record.rebinds > upstream.rebinds) {
-    closed_overflowed_ += upstream.socket.overflowed();
-    upstream = {UdpBatch::connected(config_.server), departure.record.rebinds};
-    watch(upstream.socket.fd(), departure.record.link, EPOLLIN);
+    if (auto socket = new_socket()) {
+      replace_socket(departure.record.link, upstream, *std::move(socket));
+      upstream.rebinds = departure.record.rebinds;
+    } else {
+      ++late_rebinds_;
+    }
   }
   return upstream.socket;
+}
+
+/// Returns zeros if the listener is bound to a single address.
+Address Driver::asked_at(const Proxy::Departure& departure) const {
+  if (departure.record.direction == Direction::kUp) return {};
+  return upstreams_.at(departure.record.link).asked_at;
 }
 
 void Driver::take_changes(LocalTime now) {
@@ -272,6 +320,9 @@ Status Driver::measure(LocalTime now) const {
   status.scenario_steps = config_.proxy.timeline.size();
   status.scenario_done = proxy_.steps_done();
   status.last_change = proxy_.last_change();
+  status.server = config_.servers[server_];
+  status.no_socket = no_socket_;
+  status.late_rebinds = late_rebinds_;
   return status;
 }
 

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <mutex>
 #include <optional>
+#include <string>
 #include <unordered_map>
 #include <vector>
 
@@ -25,7 +26,9 @@ class Driver {
  public:
   struct Config {
     Address listen;
-    Address server;
+    /// The addresses of the server, in order of preference. They are tried in turn, for half a second each, until the
+    /// server answers.
+    std::vector<Address> servers;
     Proxy::Config proxy;
 
     /// Awake for this long before each release instead of asleep: exact, at the price of the processor. Zero: asleep.
@@ -65,16 +68,21 @@ class Driver {
   struct Upstream {
     UdpBatch socket;
     std::uint32_t rebinds = 0;
+    Address asked_at{};  ///< the local address that the client uses, if the listener is bound to all addresses
   };
   /// Why the timer is set.
   enum class Wake : std::uint8_t { kOther, kRelease, kProbe };
 
   void wait(LocalTime now);
   void receive(std::uint64_t source);
+  void take_from_client(const UdpBatch::Arrival& arrival);
+  void seek_server(LocalTime now);
   LocalTime send_due(LocalTime now);
   std::bitset<kUdpBatch> send_with(std::size_t first, const std::bitset<kUdpBatch>& sent);
   UdpBatch& socket_for(const Proxy::Departure& departure);
-  void open_upstream(ClientIndex client);
+  Address asked_at(const Proxy::Departure& departure) const;
+  std::optional<UdpBatch> new_socket();
+  void replace_socket(ClientIndex client, Upstream& upstream, UdpBatch socket);
   void watch(int fd, std::uint64_t source, std::uint32_t events) const;
   void take_changes(LocalTime now);
   bool publish(LocalTime now);
@@ -87,6 +95,11 @@ class Driver {
   UdpBatch::Inbox inbox_;
   std::unordered_map<ClientIndex, Upstream> upstreams_;
   std::uint64_t closed_overflowed_ = 0;  // of upstream sockets that are no more
+  std::size_t server_ = 0;               // in use, of config_.servers
+  std::uint64_t asked_before_ = 0;       // the number of datagrams sent to the server at the last change of the address
+  LocalTime next_server_{};              // the time of the next change, if there is no answer
+  std::string no_socket_;                // the first error from the system
+  std::uint64_t late_rebinds_ = 0;
   int epoll_ = -1;
   int timer_ = -1;
   int bell_ = -1;  // rung by stop() and change()

@@ -3,7 +3,10 @@
 
 #include <gtest/gtest.h>
 #include <poll.h>
+#include <sys/resource.h>
+#include <unistd.h>
 
+#include <algorithm>
 #include <chrono>
 #include <optional>
 #include <set>
@@ -74,8 +77,11 @@ class Running {
  public:
   Running(const Address& server, const std::string& up, const std::string& down = "",
           const std::string& listen = "127.0.0.1:0")
+      : Running(std::vector{server}, up, down, listen) {}
+  Running(const std::vector<Address>& servers, const std::string& up, const std::string& down,
+          const std::string& listen = "127.0.0.1:0")
       : driver_({.listen = parse_address(listen),
-                 .server = server,
+                 .servers = servers,
                  .proxy = {.networks = {Injector(parse_profile(up), 7, 0, Direction::kUp),
                                         Injector(parse_profile(down), 7, 0, Direction::kDown)}}},
                 nullptr),
@@ -189,6 +195,114 @@ TEST(Driver, AServerThatIsNotThereYetStopsNothing) {
   Peer late(UdpBatch::listening(nobody));
   client.send("now");
   EXPECT_EQ(late.text(), "now");
+}
+
+TEST(Driver, ListeningOnAllAddressesItAnswersFromTheOneThatWasAsked) {
+  for (const char* const all : {"0.0.0.0:0", "[::]:0"}) {
+    Peer server_end = server();
+    Running proxy(server_end.address(), "", "", all);
+    const std::string port = ":" + std::to_string(proxy.driver().local_address().port);
+    std::vector<std::string> hosts = {"127.0.0.1", "127.0.0.2", "127.0.0.3"};
+    if (std::string(all) == "[::]:0") hosts.emplace_back("[::1]");
+    for (const std::string& host : hosts) {
+      // The socket is connected, so the kernel drops datagrams from any other address.
+      Peer client(UdpBatch::connected(parse_address(host + port)));
+      client.send("ping");
+      const auto got = server_end.receive();
+      ASSERT_TRUE(got) << all << ' ' << host;
+      server_end.send("pong", got->from);
+      EXPECT_EQ(client.text(), "pong") << all << ' ' << host;
+    }
+  }
+}
+
+TEST(Driver, GoesOnToTheNextAddressOfAServerThatDoesNotAnswer) {
+  Peer silent = server();  // never answers
+  Address nobody;
+  { nobody = server("[::1]:0").address(); }
+  Peer server_end = server();
+  Running proxy({nobody, silent.address(), server_end.address()}, "", "");
+  Peer client = proxy.client();
+  EXPECT_TRUE(eventually([&] {
+    client.send("anyone?");
+    return proxy.driver().status().server == server_end.address();
+  }));
+  client.send("you?");
+  const auto got = server_end.receive();
+  ASSERT_TRUE(got);
+  server_end.send("I am", got->from);
+  EXPECT_EQ(client.text(), "I am");
+  // The proxy does not leave this address, even if the server is silent for longer.
+  for (int i = 0; i < 120; ++i) {
+    client.send("still there?");
+    ::poll(nullptr, 0, 10);
+  }
+  const Status end = proxy.stop();
+  EXPECT_EQ(end.server, server_end.address());
+  EXPECT_FALSE(is_unanswered(end));
+}
+
+/// Uses up the file descriptors of this process.
+class NoMoreFiles {
+ public:
+  NoMoreFiles() {
+    ::getrlimit(RLIMIT_NOFILE, &before_);
+    rlimit few = before_;
+    few.rlim_cur = std::min<rlim_t>(few.rlim_cur, 256);
+    ::setrlimit(RLIMIT_NOFILE, &few);
+    for (int fd = ::dup(0); fd >= 0; fd = ::dup(0)) held_.push_back(fd);
+  }
+  ~NoMoreFiles() {
+    for (const int fd : held_) ::close(fd);
+    ::setrlimit(RLIMIT_NOFILE, &before_);
+  }
+  NoMoreFiles(const NoMoreFiles&) = delete;
+  NoMoreFiles& operator=(const NoMoreFiles&) = delete;
+
+ private:
+  rlimit before_{};
+  std::vector<int> held_;
+};
+
+TEST(Driver, RefusesTheClientForWhichThereIsNoDescriptorAndServesTheOthers) {
+  Peer server_end = server();
+  Running proxy(server_end.address(), "");
+  Peer first = proxy.client();
+  Peer second = proxy.client();
+  first.send("first");
+  EXPECT_EQ(server_end.text(), "first");
+  const auto refused = [&] { return proxy.driver().status().of(Direction::kUp).counters.refused_clients; };
+  {
+    const NoMoreFiles none;
+    second.send("second");
+    ASSERT_TRUE(eventually([&] { return refused() > 0; }));
+    EXPECT_NE(proxy.driver().status().no_socket.find("Too many open files"), std::string::npos)
+        << proxy.driver().status().no_socket;
+    first.send("first again");
+    EXPECT_EQ(server_end.text(), "first again");
+  }
+  second.send("second again");
+  EXPECT_EQ(server_end.text(), "second again");
+  EXPECT_EQ(proxy.stop().clients.size(), 2U);
+}
+
+TEST(Driver, ARebindForWhichThereIsNoDescriptorComesLaterAndIsTold) {
+  Peer server_end = server();
+  Running proxy(server_end.address(), "rebind(every=1ms)");
+  Peer client = proxy.client();
+  client.send("before");
+  EXPECT_EQ(server_end.text(), "before");
+  {
+    const NoMoreFiles none;
+    for (int i = 0; i < 20; ++i) {
+      ::poll(nullptr, 0, 2);
+      client.send("none");
+      ASSERT_EQ(server_end.text(), "none");
+    }
+  }
+  const Status end = proxy.stop();
+  EXPECT_GT(end.late_rebinds, 0U);
+  EXPECT_FALSE(why_invalid(end, 1h).empty());
 }
 
 TEST(Driver, MeasuresTheMachinesTimerWhileItRuns) {

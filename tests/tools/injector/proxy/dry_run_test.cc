@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "tests/support/refusal.h"
 #include "tests/tools/injector/traces/trace.h"
 
 namespace tendon::injector::dry_run_test {
@@ -68,13 +69,8 @@ TEST(DryRun, RecordsATraceWhoseReplayIsTheSame) {
 }
 
 TEST(Prepare, NamesTheOptionThatIsWrong) {
-  const auto refusal = [](const NetworkOptions& network) -> std::string {
-    try {
-      prepare(network);
-    } catch (const std::invalid_argument& error) {
-      return error.what();
-    }
-    return "was accepted";
+  const auto refusal = [](const NetworkOptions& network) {
+    return thrown_by<std::exception>([&] { prepare(network); });
   };
   EXPECT_TRUE(refusal({.profile = "loss=2"}).starts_with("--profile: ")) << refusal({.profile = "loss=2"});
   EXPECT_TRUE(refusal({.profile = "lan", .down = "loss=2"}).starts_with("--down: "));

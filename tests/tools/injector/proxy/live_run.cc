@@ -19,6 +19,7 @@
 #include <utility>
 #include <vector>
 
+#include "server/machine/output.h"
 #include "tests/tools/injector/proxy/control_socket.h"
 #include "tests/tools/injector/proxy/driver.h"
 #include "tests/tools/injector/proxy/real_time.h"
@@ -33,6 +34,7 @@ namespace {
 /// As often as the driver has something new to say.
 constexpr Duration kRedrawPeriod = std::chrono::milliseconds(200);
 constexpr Duration kReportPeriod = std::chrono::seconds(1);
+constexpr Duration kRefusedPeriod = std::chrono::seconds(10);
 
 std::atomic<Driver*> driver_to_stop = nullptr;
 
@@ -103,12 +105,13 @@ class DriverThread {
   std::thread thread_;
 };
 
-/// The first address of the server's name that this machine can send to.
-Address address_of(const LiveRun& options) {
+/// Returns the addresses of the server that this machine can send to.
+std::vector<Address> addresses_of(const LiveRun& options) {
   const std::vector<Address> addresses = options.server.look_up().addresses;
   if (addresses.front().port == 0) {
     throw std::invalid_argument("--to: expected a port other than 0, got " + options.server.text());
   }
+  std::vector<Address> reachable;
   std::string problem;
   for (const Address& address : addresses) {
     if (address == options.listen) {
@@ -117,17 +120,19 @@ Address address_of(const LiveRun& options) {
     }
     try {
       UdpBatch::connected(address);
-      return address;
+      reachable.push_back(address);
     } catch (const std::runtime_error& error) {
       if (problem.empty()) problem = error.what();
     }
   }
-  throw std::invalid_argument(problem);
+  if (reachable.empty()) throw std::runtime_error(problem);
+  return reachable;
 }
 
-Driver::Config driver_config(const PreparedNetwork& network, const LiveRun& options, const Address& server) {
+Driver::Config driver_config(const PreparedNetwork& network, const LiveRun& options,
+                             const std::vector<Address>& servers) {
   return {.listen = options.listen,
-          .server = server,
+          .servers = servers,
           .proxy = {.networks = network.networks,
                     .timeline = network.timeline,
                     .replay = network.replay.get(),
@@ -144,7 +149,7 @@ class Conversation {
  public:
   Conversation(const PreparedNetwork& network, const LiveRun& options, const Address& server, Driver& driver,
                TraceRecorder* recorder)
-      : network_(network), options_(options), driver_(driver), recorder_(recorder) {
+      : network_(network), options_(options), driver_(driver), recorder_(recorder), server_(server) {
     heading_ = {to_string(driver.local_address()), options.server.at(server), network.seed, network.text,
                 options.max_release_error};
     if (!options.control.empty()) control_.emplace(options.control);
@@ -191,8 +196,8 @@ class Conversation {
   /// Returns the verdict.
   bool end() {
     const Status last = driver_.status();
-    tell_of_clients(last);
-    note_changes(last);
+    tell(last);
+    const bool tells = !terminal_ && is_unanswered(last);
     if (terminal_) {
       draw(last);
       terminal_.reset();
@@ -202,6 +207,7 @@ class Conversation {
     } else {
       std::cout << end_text(heading_, last) << std::flush;
     }
+    if (tells) std::cerr << "tendon-inject: nothing came back from " << heading_.server << ": is a server there?\n";
     return why_invalid(last, options_.max_release_error).empty();
   }
 
@@ -214,8 +220,7 @@ class Conversation {
 
   void report() {
     Status status = driver_.status();
-    tell_of_clients(status);
-    note_changes(status);
+    tell(status);
     if (terminal_) {
       draw(status);
     } else if (options_.json) {
@@ -235,8 +240,35 @@ class Conversation {
     terminal_->draw(terminal_view(heading_, status, said_.front(), typed, terminal_->columns()));
   }
 
+  void tell(const Status& status) {
+    note_changes(status);
+    if (status.server != server_) {
+      const std::string silent = std::exchange(heading_.server, options_.server.at(status.server));
+      server_ = status.server;
+      if (!terminal_) std::cerr << "tendon-inject: no answer from " << silent << ", trying " << heading_.server << "\n";
+    }
+    if (terminal_) return;  // it shows the rest
+    tell_of_clients(status);
+    tell_of_refused(status);
+  }
+
+  /// Reports the first one immediately, and the others every few seconds.
+  void tell_of_refused(const Status& status) {
+    const std::uint64_t refused = status.of(Direction::kUp).counters.refused_clients;
+    const LocalTime now = monotonic_now();
+    if (refused == told_refused_ || now < tell_refused_) return;
+    std::cerr << "tendon-inject: " << refused - std::exchange(told_refused_, refused)
+              << " datagrams of further clients are refused: ";
+    if (status.no_socket.empty()) {
+      std::cerr << options_.max_clients << " is the most at one time (--max-clients), and one is forgotten after "
+                << seconds(Proxy::kIdleTimeout) << " s of silence\n";
+    } else {
+      std::cerr << status.no_socket << "\n";
+    }
+    tell_refused_ = now + kRefusedPeriod;
+  }
+
   void tell_of_clients(const Status& status) {
-    if (terminal_) return;  // it shows them
     for (const Proxy::ClientSummary& client : status.clients) {
       if (client.index < known_clients_) continue;
       known_clients_ = client.index + 1;
@@ -278,7 +310,10 @@ class Conversation {
   std::unique_ptr<Terminal> terminal_;
   std::deque<Status> said_;
   std::string said_to_user_;
+  Address server_;  // in the last status
   ClientIndex known_clients_ = 0;
+  std::uint64_t told_refused_ = 0;
+  LocalTime tell_refused_{};
   std::size_t noted_ = 0;  // steps of the timeline
 };
 
@@ -310,18 +345,13 @@ std::string Conversation::execute(std::string_view line) {
 }  // namespace
 
 int live_run(const PreparedNetwork& network, const LiveRun& options) {
-  const Address server = address_of(options);
+  const std::vector<Address> servers = addresses_of(options);
   std::optional<TraceRecorder> recorder;
   std::optional<Driver> driver;
-  std::optional<Conversation> made;
-  try {
-    if (!options.record.empty()) recorder.emplace(options.record, network.header());
-    driver.emplace(driver_config(network, options, server), recorder ? &*recorder : nullptr);
-    made.emplace(network, options, server, *driver, recorder ? &*recorder : nullptr);
-  } catch (const std::runtime_error& error) {  // addresses and files that cannot be used
-    throw std::invalid_argument(error.what());
-  }
-  Conversation& conversation = *made;
+  if (!options.record.empty()) recorder.emplace(options.record, network.header());
+  driver.emplace(driver_config(network, options, servers), recorder ? &*recorder : nullptr);
+  Conversation conversation(network, options, servers.front(), *driver, recorder ? &*recorder : nullptr);
+  const UnblockedOutput output;
   const Signals signals(*driver);
   conversation.begin();
   DriverThread thread(*driver);

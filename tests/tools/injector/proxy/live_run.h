@@ -21,7 +21,7 @@ inline constexpr Duration kSpin = std::chrono::microseconds(50);
 /// The proxy between real programs.
 struct LiveRun {
   Address listen;
-  ServerName server = Address{};  ///< the first of its addresses that this machine can send to
+  ServerName server = Address{};  ///< its addresses are tried in turn until the server answers
   std::optional<Duration> duration;
   std::size_t max_clients = 64;
   Duration max_release_error = kMaxReleaseError;

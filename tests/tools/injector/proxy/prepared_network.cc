@@ -5,6 +5,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "server/machine/regular_file.h"
 #include "tests/tools/injector/profile/named_profiles.h"
 
 namespace tendon::injector {
@@ -66,7 +67,9 @@ Proxy::PreparedChange prepare(const Change& change, std::uint64_t seed) {
 PreparedNetwork prepare(const NetworkOptions& options) {
   try {
     return prepare_or_throw(options);
-  } catch (const std::runtime_error& error) {  // files that cannot be read or say what they should not
+  } catch (const UnreadableFile&) {
+    throw;
+  } catch (const std::runtime_error& error) {  // the content of a file is not valid
     throw std::invalid_argument(error.what());
   }
 }

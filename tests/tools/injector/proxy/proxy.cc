@@ -54,13 +54,17 @@ Proxy::Client& Proxy::add_client(const Address& address) {
   return added;
 }
 
+bool Proxy::is_new(const Address& client) const {
+  return clients_.size() < config_.max_clients && !by_address_.contains(client);
+}
+
 std::optional<ClientIndex> Proxy::receive_from_client(const Address& address, std::span<const std::byte> datagram,
-                                                      LocalTime arrival) {
+                                                      LocalTime arrival, bool may_add) {
   if (!start_) start_ = arrival;
   ++count(Direction::kUp).received;
   follow_timeline(arrival);
   const auto found = by_address_.find(address);
-  if (found == by_address_.end() && clients_.size() >= config_.max_clients) {
+  if (found == by_address_.end() && (!may_add || clients_.size() >= config_.max_clients)) {
     ++count(Direction::kUp).refused_clients;
     return std::nullopt;
   }

@@ -32,7 +32,7 @@ inline constexpr std::size_t kCauses = static_cast<std::size_t>(Cause::kReplay) 
 /// was not taken by the kernel, or is still on its way.
 struct ProxyCounters {
   std::uint64_t received = 0;                    ///< all that came in
-  std::uint64_t refused_clients = 0;             ///< … from clients beyond Config::max_clients, or forgotten
+  std::uint64_t refused_clients = 0;             ///< … from clients that could not be added, or were forgotten
   std::uint64_t refused_full = 0;                ///< … beyond Config::max_bytes_in_flight
   std::array<std::uint64_t, kCauses> dropped{};  ///< … that the network made vanish, by Cause
   std::uint64_t forwarded = 0;                   ///< first copies that left
@@ -74,6 +74,8 @@ class Proxy {
     PreparedChange change;
   };
 
+  static constexpr Duration kIdleTimeout = std::chrono::seconds(30);
+
   struct Config {
     /// By Direction: every client gets the same network, with draws of its own (Injector::for_link).
     std::array<Injector, 2> networks;
@@ -91,9 +93,9 @@ class Proxy {
     /// Clients at one time; datagrams of further ones are refused. Each costs the driver a socket.
     std::size_t max_clients = 64;
 
-    /// A client that says nothing for this long is forgotten, once nothing is on its way any more. NATs keep a UDP
-    /// mapping for 30 s and more (RFC 4787 asks for 120 s): who is silent for longer must be ready for a new one.
-    Duration idle_timeout = std::chrono::seconds(30);
+    /// The proxy forgets a client that has been silent for this long, once none of its datagrams are in flight. NATs keep
+    /// a UDP mapping for 30 s or more (RFC 4787 recommends 120 s), so a client has to expect this.
+    Duration idle_timeout = kIdleTimeout;
 
     /// What may be on its way at one time, payload and bookkeeping; datagrams beyond are refused.
     std::size_t max_bytes_in_flight = Flight<int>::kDefaultMaxBytes;
@@ -102,10 +104,13 @@ class Proxy {
   /// Throws std::invalid_argument as TracePlayer does.
   explicit Proxy(Config config);
 
-  /// A datagram from a client to the server. The client's index, so that the driver can open a socket for a new one;
-  /// empty when the datagram was refused because there are too many clients.
+  /// Returns true if a datagram from this address would add a client.
+  bool is_new(const Address& client) const;
+
+  /// Takes a datagram from a client to the server. Returns the index of the client, or nothing if the datagram was refused
+  /// because there are too many clients or `may_add` is false.
   std::optional<ClientIndex> receive_from_client(const Address& client, std::span<const std::byte> datagram,
-                                                 LocalTime arrival);
+                                                 LocalTime arrival, bool may_add = true);
 
   /// A datagram that came in on the socket of `client`.
   void receive_from_server(ClientIndex client, std::span<const std::byte> datagram, LocalTime arrival);

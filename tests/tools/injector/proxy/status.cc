@@ -53,6 +53,10 @@ JsonLine direction_json(const ProxyMeasurements& measured) {
 
 }  // namespace
 
+bool is_unanswered(const Status& status) noexcept {
+  return status.of(Direction::kUp).counters.forwarded > 0 && status.of(Direction::kDown).counters.received == 0;
+}
+
 std::vector<std::string> why_invalid(const Status& status, Duration max_release_error) {
   std::vector<std::string> why;
   const auto add_count = [&](std::uint64_t count, const std::string& what) {
@@ -74,6 +78,11 @@ std::vector<std::string> why_invalid(const Status& status, Duration max_release_
   add_count(status.overflowed, "were thrown away by the kernel because the proxy did not read them in time");
   add_count(full, "did not fit into the proxy's memory");
   add_count(unsent, "were not taken by the kernel when they were due");
+  add_count(status.late_rebinds, "left by the old port, because the system gave no socket for the new one");
+  if (is_unanswered(status)) {
+    why.push_back("nothing came back from " + to_string(status.server) + ", for which " +
+                  std::to_string(status.of(Direction::kUp).counters.forwarded) + " datagrams left");
+  }
   add_count(status.unrecorded, "are missing in the trace because the disk was too slow");
   return why;
 }
@@ -93,6 +102,7 @@ JsonLine in_json(const Status& status, Duration max_release_error) {
     scenario.add("steps", status.scenario_steps).add("done", status.scenario_done);
     json.add("scenario", scenario);
   }
+  if (!status.no_socket.empty()) json.add("no_socket", status.no_socket);
   if (!status.last_change.empty()) json.add("last_change", status.last_change);
   json.add("up", direction_json(status.of(Direction::kUp))).add("down", direction_json(status.of(Direction::kDown)));
   return json;

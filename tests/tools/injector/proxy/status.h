@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/base/time.h"
+#include "protocol/link.h"
 #include "tests/support/json_line.h"
 #include "tests/tools/injector/proxy/duration_histogram.h"
 #include "tests/tools/injector/proxy/proxy.h"
@@ -30,10 +31,16 @@ struct Status {
   std::size_t scenario_steps = 0;  ///< of the timeline
   std::size_t scenario_done = 0;   ///< … that are behind us
   std::string last_change;         ///< of the network, by the timeline or by a command
+  Address server{};                ///< in use
+  std::string no_socket;           ///< the first error when a socket for a client was opened, or empty
+  std::uint64_t late_rebinds = 0;  ///< datagrams sent from the old port, because the new one could not be opened
 
   /// Of one direction. Because of the quantiles, up to 3 % too high.
   const ProxyMeasurements& of(Direction direction) const { return directions[static_cast<std::size_t>(direction)]; }
 };
+
+/// Returns true if datagrams were sent to the server, but nothing was received.
+bool is_unanswered(const Status& status) noexcept;
 
 /// At a haptic period of 1 ms, a datagram that leaves this late slips into the next step of whoever waits for it: then
 /// the run was not one of the network that was asked for.

@@ -25,6 +25,7 @@ Status status(int late) {
     up.delay.observe(20ms);
     up.release_error.observe(i < late ? 2ms : 40us);
   }
+  s.directions[1].counters.received = 1;  // an answer
   s.timer_floor.observe(35us);
   return s;
 }
@@ -51,6 +52,16 @@ TEST(Verdict, IsInvalidWhenAnythingWasLostThatTheNetworkDidNotLose) {
   EXPECT_EQ(why_invalid(s, 1ms).size(), 3U);
   s.unrecorded = 1;
   EXPECT_EQ(why_invalid(s, 1ms).size(), 4U);
+}
+
+TEST(Verdict, IsInvalidWhenNothingCameBack) {
+  Status s = status(0);
+  s.server = parse_address("127.0.0.1:47441");
+  s.directions[1].counters.received = 0;
+  ASSERT_EQ(why_invalid(s, 1ms).size(), 1U);
+  EXPECT_EQ(why_invalid(s, 1ms)[0], "nothing came back from 127.0.0.1:47441, for which 1000 datagrams left");
+  s.directions[0].counters.forwarded = 0;
+  EXPECT_TRUE(why_invalid(s, 1ms).empty()) << "nobody has asked it anything";
 }
 
 TEST(Status, AsJsonSaysWhyARunIsInvalid) {

@@ -6,7 +6,7 @@
 
 #include <algorithm>
 #include <array>
-#include <cstdio>
+#include <iostream>
 #include <utility>
 #include <vector>
 
@@ -41,8 +41,7 @@ std::unique_ptr<Terminal> Terminal::take() {
 
 Terminal::~Terminal() {
   ::tcsetattr(STDIN_FILENO, TCSANOW, &before_);
-  if (drawn_ > 0) std::fputs("\n", stdout);
-  std::fflush(stdout);
+  if (drawn_ > 0) std::cout << std::endl;
 }
 
 std::size_t Terminal::columns() const { return size_of_terminal().ws_col; }
@@ -69,8 +68,7 @@ void Terminal::draw(std::string_view lines) {
   }
   text += "\033[J";
   drawn_ = all.size();
-  std::fputs(text.c_str(), stdout);
-  std::fflush(stdout);
+  std::cout << text << std::flush;
 }
 
 int Terminal::fd() { return STDIN_FILENO; }

@@ -16,6 +16,7 @@
 #include <utility>
 #include <vector>
 
+#include "server/machine/local_address.h"
 #include "tests/tools/injector/proxy/real_time.h"
 
 namespace tendon::injector {
@@ -31,25 +32,19 @@ constexpr std::size_t kLargestDatagram = 65'536;
 /// Buffers at multiples of 64 kB would all compete for the same few lines of every cache.
 constexpr std::size_t kStride = kLargestDatagram + 5 * 64;
 
-/// SCM_TIMESTAMPNS and SO_RXQ_OVFL.
-constexpr std::size_t kControlBytes = CMSG_SPACE(sizeof(timespec)) + CMSG_SPACE(sizeof(std::uint32_t));
+/// SCM_TIMESTAMPNS, SO_RXQ_OVFL, and the local address.
+constexpr std::size_t kControlBytes =
+    CMSG_SPACE(sizeof(timespec)) + CMSG_SPACE(sizeof(std::uint32_t)) + local_address::kControlBytes;
 
 /// Older than this, a time of arrival says that the calendar's clock was set.
 constexpr Duration kOldestArrival = std::chrono::seconds(1);
 
-/// RFC 4291, 2.5.5.2: ::ffff:a.b.c.d
-constexpr std::array<std::uint8_t, 12> kMappedPrefix = {0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0xff, 0xff};
-
-bool is_mapped_ipv4(const Address& address) noexcept {
-  return std::equal(kMappedPrefix.begin(), kMappedPrefix.end(), address.ip.begin());
-}
-
 socklen_t to_system(const Address& address, sockaddr_storage& storage) noexcept {
-  if (is_mapped_ipv4(address)) {
+  if (is_ipv4(address)) {
     sockaddr_in v4{};
     v4.sin_family = AF_INET;
     v4.sin_port = htons(address.port);
-    std::memcpy(&v4.sin_addr, address.ip.data() + kMappedPrefix.size(), sizeof v4.sin_addr);
+    std::memcpy(&v4.sin_addr, address.ip.data() + kMappedIpv4.size(), sizeof v4.sin_addr);
     std::memcpy(&storage, &v4, sizeof v4);
     return sizeof v4;
   }
@@ -66,8 +61,8 @@ Address from_system(const sockaddr_storage& storage) noexcept {
   if (storage.ss_family == AF_INET) {
     sockaddr_in v4{};
     std::memcpy(&v4, &storage, sizeof v4);
-    std::copy(kMappedPrefix.begin(), kMappedPrefix.end(), address.ip.begin());
-    std::memcpy(address.ip.data() + kMappedPrefix.size(), &v4.sin_addr, sizeof v4.sin_addr);
+    std::copy(kMappedIpv4.begin(), kMappedIpv4.end(), address.ip.begin());
+    std::memcpy(address.ip.data() + kMappedIpv4.size(), &v4.sin_addr, sizeof v4.sin_addr);
     address.port = ntohs(v4.sin_port);
     return address;
   }
@@ -79,6 +74,11 @@ Address from_system(const sockaddr_storage& storage) noexcept {
 }
 
 void set_option(int fd, int level, int name, int value) noexcept { setsockopt(fd, level, name, &value, sizeof value); }
+
+bool is_unspecified(const Address& address) noexcept {
+  const auto begin = address.ip.begin() + (is_ipv4(address) ? kMappedIpv4.size() : 0);
+  return std::all_of(begin, address.ip.end(), [](std::uint8_t byte) { return byte == 0; });
+}
 
 }  // namespace
 
@@ -109,8 +109,9 @@ UdpBatch UdpBatch::listening(const Address& address) { return {address, &address
 UdpBatch UdpBatch::connected(const Address& server) { return {server, nullptr, &server}; }
 
 UdpBatch::UdpBatch(const Address& family, const Address* bind_to, const Address* connect_to)
-    : fd_(::socket(is_mapped_ipv4(family) ? AF_INET : AF_INET6, SOCK_DGRAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0)),
-      connected_(connect_to != nullptr) {
+    : fd_(::socket(is_ipv4(family) ? AF_INET : AF_INET6, SOCK_DGRAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0)),
+      connected_(connect_to != nullptr),
+      on_all_addresses_(bind_to != nullptr && is_unspecified(*bind_to)) {
   if (fd_ >= 0) {
     // Beyond the system's limit where we may (CAP_NET_ADMIN), otherwise up to net.core.rmem_max.
     const int wanted = kReceiveBufferBytes;
@@ -119,11 +120,12 @@ UdpBatch::UdpBatch(const Address& family, const Address* bind_to, const Address*
     }
     set_option(fd_, SOL_SOCKET, SO_TIMESTAMPNS, 1);
     set_option(fd_, SOL_SOCKET, SO_RXQ_OVFL, 1);
-    if (!is_mapped_ipv4(family)) set_option(fd_, IPPROTO_IPV6, IPV6_V6ONLY, 1);
+    if (!is_ipv4(family)) set_option(fd_, IPPROTO_IPV6, IPV6_V6ONLY, on_all_addresses_ ? 0 : 1);
     sockaddr_storage storage{};
     const socklen_t size = to_system(family, storage);
     const auto* const name = reinterpret_cast<const sockaddr*>(&storage);
-    if ((bind_to != nullptr && ::bind(fd_, name, size) == 0) ||
+    const bool asks = !on_all_addresses_ || local_address::ask(fd_, is_ipv4(family) ? AF_INET : AF_INET6);
+    if ((bind_to != nullptr && asks && ::bind(fd_, name, size) == 0) ||
         (connect_to != nullptr && ::connect(fd_, name, size) == 0)) {
       return;
     }
@@ -135,11 +137,15 @@ UdpBatch::UdpBatch(const Address& family, const Address* bind_to, const Address*
 }
 
 UdpBatch::UdpBatch(UdpBatch&& other) noexcept
-    : fd_(std::exchange(other.fd_, -1)), connected_(other.connected_), overflowed_(other.overflowed_) {}
+    : fd_(std::exchange(other.fd_, -1)),
+      connected_(other.connected_),
+      on_all_addresses_(other.on_all_addresses_),
+      overflowed_(other.overflowed_) {}
 
 UdpBatch& UdpBatch::operator=(UdpBatch&& other) noexcept {
   std::swap(fd_, other.fd_);
   connected_ = other.connected_;
+  on_all_addresses_ = other.on_all_addresses_;
   overflowed_ = other.overflowed_;
   return *this;
 }
@@ -170,9 +176,11 @@ std::span<const UdpBatch::Arrival> UdpBatch::receive(Inbox& inbox) {
     msghdr& header = m.messages[i].msg_hdr;
     Arrival& arrival = m.arrivals[i];
     if (!connected_) arrival.from = from_system(m.from[i]);
+    arrival.asked_at = {};
     arrival.at = now;
     arrival.datagram = {m.bytes.data() + i * kStride, m.messages[i].msg_len};
     for (cmsghdr* control = CMSG_FIRSTHDR(&header); control != nullptr; control = CMSG_NXTHDR(&header, control)) {
+      if (on_all_addresses_ && local_address::read(*control, arrival.asked_at.ip)) continue;
       if (control->cmsg_level != SOL_SOCKET) continue;
       if (control->cmsg_type == SCM_TIMESTAMPNS) {
         timespec stamp{};
@@ -191,6 +199,10 @@ std::bitset<kUdpBatch> UdpBatch::send(std::span<const Outgoing> batch) {
   std::array<mmsghdr, kUdpBatch> messages;
   std::array<iovec, kUdpBatch> pieces;
   std::array<sockaddr_storage, kUdpBatch> to;
+  struct Control {
+    alignas(cmsghdr) std::array<char, local_address::kControlBytes> bytes;
+  };
+  std::array<Control, kUdpBatch> control;  // written where it is used
   const std::size_t count = std::min(batch.size(), kUdpBatch);
   for (std::size_t i = 0; i < count; ++i) {
     // sendmmsg does not write through the pointer.
@@ -201,6 +213,10 @@ std::bitset<kUdpBatch> UdpBatch::send(std::span<const Outgoing> batch) {
     if (connected_) continue;
     messages[i].msg_hdr.msg_namelen = to_system(batch[i].to, to[i]);
     messages[i].msg_hdr.msg_name = &to[i];
+    if (!on_all_addresses_ || is_unspecified(batch[i].from)) continue;
+    messages[i].msg_hdr.msg_control = control[i].bytes.data();
+    messages[i].msg_hdr.msg_controllen = local_address::kControlBytes;
+    local_address::write(batch[i].from.ip, messages[i].msg_hdr);
   }
   std::bitset<kUdpBatch> refused;
   bool told = false;

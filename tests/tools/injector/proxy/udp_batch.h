@@ -22,8 +22,9 @@ inline constexpr std::size_t kUdpBatch = 64;
 /// Thread-safe: no.
 class UdpBatch {
  public:
-  /// Bound to `address`, any of this machine's; port 0 lets the system choose one. Throws std::runtime_error when the
-  /// system refuses: "cannot listen on 127.0.0.1:47100: Address already in use".
+  /// Binds to `address`. 0.0.0.0 means all IPv4 addresses, and [::] means all addresses of both families. If the port is
+  /// 0, the system chooses one. Throws std::runtime_error when the system refuses: "cannot listen on
+  /// 127.0.0.1:47100: Address already in use".
   static UdpBatch listening(const Address& address);
 
   /// From any free port to `server` only: what others send to that port, the kernel throws away. Throws
@@ -35,8 +36,9 @@ class UdpBatch {
   ~UdpBatch();
 
   struct Arrival {
-    Address from;  ///< only of a listening socket
-    LocalTime at;  ///< when the kernel got it (SO_TIMESTAMPNS), which may be long before we read it
+    Address from;      ///< only of a listening socket
+    Address asked_at;  ///< the local address, without a port; only if bound to all addresses
+    LocalTime at;      ///< when the kernel got it (SO_TIMESTAMPNS), which may be long before we read it
     std::span<const std::byte> datagram;
   };
   /// Memory for one batch of arrivals of any size; several sockets can share one, one after the other.
@@ -49,6 +51,7 @@ class UdpBatch {
   struct Outgoing {
     Address to;  ///< only for a listening socket
     std::span<const std::byte> datagram;
+    Address from = {};  ///< the local address to send from, or zeros to let the kernel choose
   };
   /// Gives up to kUdpBatch datagrams to the kernel, in order. Says which of them it did not take (full buffer, no
   /// route, larger than the path allows): they are passed over.
@@ -68,6 +71,7 @@ class UdpBatch {
 
   int fd_ = -1;
   bool connected_ = false;
+  bool on_all_addresses_ = false;
   std::uint32_t overflowed_ = 0;
 };
 

@@ -53,6 +53,8 @@ TEST(SelfTest, AgreesWithTheRightLaw) {
   EXPECT_EQ(failures(check_delays("delay=normal(20ms,4ms) rho=0.9 order=free", normal_law(20, 4), 0.9, true, kSome)),
             "");
   EXPECT_EQ(failures(check_losses("loss=burst(5%,4)", LossChain::burst(0.05, 4), kSome)), "");
+  EXPECT_EQ(failures(check_losses("loss=burst(20%,1.25)", LossChain::bernoulli(0.2), kSome)), "");
+  EXPECT_EQ(failures(check_losses("loss=fourstate(0%,0%,0%,0%,5%)", LossChain::gilbert(0.05, 1, 1, 0), kSome)), "");
 }
 
 TEST(SelfTest, SeesADeviationThatIsFivePercentOff) {

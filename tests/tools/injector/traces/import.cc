@@ -13,6 +13,9 @@
 #include <utility>
 #include <vector>
 
+#include "protocol/byte_order_mark.h"
+#include "server/tables/table_reader.h"
+#include "tests/tools/injector/profile/tables.h"
 #include "tests/tools/injector/profile/units.h"
 #include "tests/tools/injector/profile/words.h"
 
@@ -118,7 +121,7 @@ void each_line(std::istream& from, const std::string& name, const Take& take) {
   for (std::size_t number = 1; std::getline(from, line); ++number) {
     if (line.size() > kMaxTraceLine) refuse(name, number, "the line is too long");
     if (line.ends_with('\r')) line.pop_back();
-    take(std::string_view(line), number);
+    take(number == 1 ? without_byte_order_mark(line) : std::string_view(line), number);
   }
   if (from.bad()) throw std::runtime_error(name + ": cannot be read");
 }
@@ -128,24 +131,98 @@ constexpr std::uint64_t kMostLost = 65'536;
 
 // ---- ping -----------------------------------------------------------------------------------------------------------
 
-/// The number after the last `label` in the line: "time=" in "… icmp_seq=3 ttl=64 time=26.3 ms".
-std::optional<std::string_view> number_after(std::string_view line, std::string_view label) {
+/// The whole number after the last `label` in the line: "icmp_seq=" in "… icmp_seq=3 ttl=64 time=26.3 ms".
+std::optional<std::uint64_t> whole_after(std::string_view line, std::string_view label) {
   const std::size_t at = line.rfind(label);
   if (at == std::string_view::npos) return std::nullopt;
   const std::string_view rest = line.substr(at + label.size());
-  return rest.substr(0, rest.find_first_not_of("0123456789."));
+  return parse_whole(rest.substr(0, rest.find_first_not_of("0123456789")));
 }
 
-std::optional<std::uint64_t> whole_after(std::string_view line, std::string_view label) {
-  const auto text = number_after(line, label);
-  return text ? parse_whole(*text) : std::nullopt;
-}
+/// Reads the times of answers, for example "time=0.481 ms". The format depends on the program and the language.
+class PingTimes {
+ public:
+  explicit PingTimes(const std::string& name) : name_(name) {}
+
+  /// Returns the time in this line. It reads a single comma as a decimal comma, and check() confirms this later.
+  Duration in(std::string_view line, std::size_t number) {
+    const std::size_t at = line.rfind("time=");
+    const std::string_view text = line.substr(std::min(at, line.size()));
+    const std::string_view digits = at == std::string_view::npos ? text : text.substr(5);
+    const std::string_view written = digits.substr(0, digits.find_first_not_of("0123456789.,"));
+    const auto value = number_of(written, number);
+    std::string_view unit = trimmed(digits.substr(written.size()));
+    unit = unit.substr(0, unit.find_first_of(" \t("));
+    struct Unit {
+      std::string_view name;
+      double ns;
+    };
+    constexpr std::array kUnits = {Unit{"ms", 1e6},   Unit{"us", 1e3},   Unit{"µs", 1e3}, Unit{"μs", 1e3},
+                                   Unit{"usec", 1e3}, Unit{"msec", 1e6}, Unit{"s", 1e9},  Unit{"sec", 1e9}};
+    const auto* const found = std::ranges::find(kUnits, unit, &Unit::name);
+    const auto time = value && found != kUnits.end() ? to_duration(*value, found->ns) : std::nullopt;
+    if (!time) refuse(name_, number, "expected time=… ms, us or s in " + start_of(line));
+    return *time;
+  }
+
+  /// Throws if the log does not show whether commas are decimal commas or thousands separators.
+  void check() const {
+    const bool thousands = point_ != 0 || whole_ != 0;
+    if (comma_ != 0 && point_ != 0) {
+      refuse(name_, std::max(comma_, point_),
+             "expected the decimal sign of line " + std::to_string(std::min(comma_, point_)) + ", found another");
+    }
+    if (comma_ != 0 || either_ == 0 || !thousands) return;
+    refuse(
+        name_, either_,
+        "expected a decimal point, found time=" + either_text_ + ": is the comma a decimal one, or between thousands?");
+  }
+
+ private:
+  static bool groups(std::string_view text, char between) {
+    const std::size_t first = text.find(between);
+    if (first == 0 || first > 3 || text.front() == '0') return false;
+    for (std::size_t at = first; at < text.size(); at += 4) {
+      if (text[at] != between || text.size() - at < 4 || text.substr(at + 1, 3).find(between) < 3) return false;
+    }
+    return true;
+  }
+
+  std::optional<double> number_of(std::string_view text, std::size_t line) {
+    const std::size_t sign = text.find_last_of(".,");
+    if (sign == std::string_view::npos) {
+      first(whole_, line);
+      return parse_number(text);
+    }
+    const std::string_view before = text.substr(0, sign);
+    const char other = text[sign] == ',' ? '.' : ',';
+    std::string digits(before);
+    if (before.find_first_of(".,") != std::string_view::npos) {
+      if (before.find(text[sign]) != std::string_view::npos || !groups(before, other)) return std::nullopt;
+      std::erase(digits, other);
+    } else if (text[sign] == ',' && groups(text, ',')) {
+      if (either_ == 0) either_text_ = text;
+      first(either_, line);
+      return parse_number(digits + "." + std::string(text.substr(sign + 1)));
+    }
+    first(text[sign] == ',' ? comma_ : point_, line);
+    return parse_number(digits + "." + std::string(text.substr(sign + 1)));
+  }
+
+  static void first(std::size_t& where, std::size_t line) { where = where == 0 ? line : where; }
+
+  const std::string& name_;
+  // The number of the first line with each kind of number, or 0.
+  std::size_t whole_ = 0, point_ = 0, comma_ = 0;
+  std::size_t either_ = 0;  ///< "1,012"
+  std::string either_text_;
+};
 
 /// The "[1699459200.123456] " of ping -D, as time since 1970.
 std::optional<Duration> time_stamp(std::string_view line) {
   if (!line.starts_with('[')) return std::nullopt;
   const std::string_view text = line.substr(1, line.find(']') - 1);
-  const std::size_t point = std::min(text.find('.'), text.size());
+  const std::size_t point = std::min(text.find_first_of(".,"), text.size());
   const auto whole = parse_whole(text.substr(0, point));
   const auto micros = parse_whole(text.substr(std::min(point + 1, text.size())));
   if (!whole || !micros || text.size() - point != 7 || *whole > 4'000'000'000U) return std::nullopt;
@@ -167,6 +244,7 @@ PingLog read_ping(std::istream& from, const std::string& name) {
   PingLog log;
   std::optional<std::uint64_t> transmitted;
   std::optional<std::int64_t> newest, oldest, latest;
+  PingTimes times(name);
   each_line(from, name, [&](std::string_view line, std::size_t number) {
     if (const std::size_t at = line.find(" packets transmitted"); at != std::string_view::npos) {
       transmitted = parse_whole(line.substr(0, at));
@@ -192,18 +270,18 @@ PingLog read_ping(std::istream& from, const std::string& name) {
     oldest = std::min(oldest.value_or(index), index);
     latest = std::max(latest.value_or(index), index);
     if (!answer) return;
-    const auto text = number_after(line, "time=");
-    const auto ms = text ? parse_number(*text) : std::nullopt;
-    const auto round_trip = ms ? to_duration(*ms, 1e6) : std::nullopt;
-    if (!round_trip) refuse(name, number, "expected time=… ms in " + start_of(line));
     // Of a duplicate the first one counts.
-    log.answers.try_emplace(index, PingLog::Answer{*round_trip, time_stamp(line)});
+    log.answers.try_emplace(index, PingLog::Answer{times.in(line, number), time_stamp(line)});
     const std::string_view counted =
         line.starts_with('[') ? line.substr(std::min(line.find("] "), line.size() - 2) + 2) : line;
     log.size = static_cast<std::uint32_t>(
         std::min<std::uint64_t>(parse_whole(counted.substr(0, counted.find(' '))).value_or(0), 0xffff));
   });
-  if (log.answers.empty()) throw std::runtime_error(name + ": no answer in it, expected what ping prints");
+  if (log.answers.empty()) {
+    throw std::runtime_error(
+        name + ": no answer in it, expected what ping of Linux or macOS prints in English: LC_ALL=C ping");
+  }
+  times.check();
   log.first = *oldest;
   log.last = *latest;
   // iputils counts from 1, busybox from 0. What the summary has besides was lost at the beginning or the end.
@@ -303,40 +381,6 @@ Json parse_json(std::istream& from, const std::string& name) {
   }
 }
 
-// ---- Lists ----------------------------------------------------------------------------------------------------------
-
-std::vector<std::string_view> fields_of(std::string_view line) {
-  std::vector<std::string_view> fields;
-  for (;;) {
-    const std::size_t end = std::min(line.find_first_of(",;\t"), line.size());
-    std::string_view field = line.substr(0, end);
-    field.remove_prefix(std::min(field.find_first_not_of(' '), field.size()));
-    field.remove_suffix(field.size() - std::min(field.find_last_not_of(' ') + 1, field.size()));
-    fields.push_back(field);
-    if (end == line.size()) return fields;
-    line.remove_prefix(end + 1);
-  }
-}
-
-/// Which column holds what.
-struct Columns {
-  std::optional<std::size_t> t, delay, dir;
-};
-
-std::optional<Columns> named_columns(const std::vector<std::string_view>& fields, const std::string& name,
-                                     std::size_t line) {
-  const auto column = [&fields](std::string_view wanted) -> std::optional<std::size_t> {
-    const auto found = std::ranges::find(fields, wanted);
-    if (found == fields.end()) return std::nullopt;
-    return static_cast<std::size_t>(found - fields.begin());
-  };
-  const bool values = std::ranges::all_of(fields, [](auto field) { return field.empty() || parse_number(field); });
-  if (values) return std::nullopt;
-  const Columns columns{column("t_ms"), column("delay_ms"), column("dir")};
-  if (!columns.delay) refuse(name, line, "expected numbers, or names of columns with delay_ms among them");
-  return columns;
-}
-
 }  // namespace
 
 Trace import_ping(std::istream& from, const std::string& name, const ImportOptions& options) {
@@ -406,50 +450,44 @@ Trace import_csv(std::istream& from, const std::string& name, const ImportOption
   need_shared(name, options);
   constexpr double kDayMs = 86.4e6;
   Building building(name);
-  std::optional<Columns> columns;
+  DelayList list = open_delays(from, name);
+  TableReader& table = list.table;
+  if (list.weight) table.fail("expected one row for each datagram, found a column weight, which is for samples(FILE)");
   std::optional<Duration> zero;
   std::array<Duration, 2> before = {Duration::min(), Duration::min()};  // by direction, where there are some
   std::int64_t count = 0;
-  each_line(from, name, [&](std::string_view line, std::size_t number) {
-    if (line.starts_with('#') || (line.empty() && !columns)) return;
-    const auto fields = fields_of(line);
-    if (!columns) {
-      columns = named_columns(fields, name, number);
-      if (columns) return;
-      columns = fields.size() == 1 ? Columns{.t = {}, .delay = 0, .dir = {}} : Columns{.t = 0, .delay = 1, .dir = {}};
+  const auto duration = [&table](const TableReader::Column& column, double most_ms) -> std::optional<Duration> {
+    const auto ms = table.number(column);
+    if (!ms) return std::nullopt;
+    if (std::abs(*ms) > most_ms) {
+      table.fail("expected at most " + std::to_string(std::llround(most_ms / kDayMs)) + " days, found " +
+                 start_of(table.text(column.index)));
     }
-    const auto milliseconds = [&](std::size_t column, double most) -> std::optional<Duration> {
-      if (column >= fields.size()) refuse(name, number, "expected " + std::to_string(column + 1) + " fields or more");
-      if (fields[column].empty()) return std::nullopt;
-      const auto value = parse_number(fields[column]);
-      if (!value || std::abs(*value) > most) {
-        refuse(name, number, "expected milliseconds, found " + start_of(fields[column]));
-      }
-      return Duration(std::llround(*value * 1e6));
-    };
-    const auto delay = milliseconds(*columns->delay, kDayMs);
-    if (delay && *delay < Duration::zero()) refuse(name, number, "a delay below zero");
+    return Duration(std::llround(*ms * 1e6));
+  };
+  while (table.next_row()) {
+    const auto delay = duration(list.delay, kDayMs);
+    if (delay && *delay < Duration::zero()) table.fail("a delay below zero");
     Duration at = evenly(count, options.interval);
-    if (columns->t) {
-      const auto t = milliseconds(*columns->t, 10'000 * kDayMs);
-      if (!t) refuse(name, number, "expected a time");
+    if (list.t) {
+      const auto t = duration(*list.t, 10'000 * kDayMs);
+      if (!t) table.fail("expected a time");
       at = *t;
     }
     Share share = options.share;
-    if (columns->dir) {
-      if (*columns->dir >= fields.size()) refuse(name, number, "expected a direction");
-      const std::string_view dir = fields[*columns->dir];
-      if (dir != "up" && dir != "down") refuse(name, number, "dir is " + start_of(dir) + ", expected up or down");
+    if (list.dir) {
+      const std::string_view dir = table.text(*list.dir);
+      if (dir != "up" && dir != "down") table.fail("dir is " + start_of(dir) + ", expected up or down");
       share = dir == "up" ? Share::kUp : Share::kDown;
     }
-    Duration& newest = before[columns->dir && share == Share::kDown ? 1 : 0];
-    if (at < newest) refuse(name, number, "the time is earlier than the one before");
+    Duration& newest = before[list.dir && share == Share::kDown ? 1 : 0];
+    if (at < newest) table.fail("the time is earlier than the one before");
     newest = at;
     // With directions the times are those of a trace, and both begin together.
-    if (!zero) zero = columns->dir ? Duration::zero() : at;
+    if (!zero) zero = list.dir ? Duration::zero() : at;
     ++count;
     building.add(at - *zero, share, shared(share, delay));
-  });
+  }
   if (count == 0) throw std::runtime_error(name + ": no delay in it");
   return std::move(building).trace();
 }
@@ -476,8 +514,8 @@ Trace import_mahimahi_log(std::istream& from, const std::string& name, const Imp
     }
     const auto ms = parse_whole(words[0]);
     const auto amount = parse_whole(words[2]);
-    constexpr std::uint64_t kMost = std::uint64_t{1} << 40;
-    if (!ms || *ms > kMost || !amount || words[1].size() != 1 ||
+    constexpr std::uint64_t kLatestMs = std::uint64_t{1} << 40;
+    if (!ms || *ms > kLatestMs || !amount || words[1].size() != 1 ||
         std::string_view("+-#d").find(words[1][0]) == std::string_view::npos) {
       refuse(name, number, "expected a line of a log of mm-link, like \"512 - 1504 20\"");
     }
@@ -500,6 +538,37 @@ Trace import_mahimahi_log(std::istream& from, const std::string& name, const Imp
                  packet.size);
   }
   return std::move(building).trace();
+}
+
+std::string import_summary(const Trace& trace) {
+  std::string text;
+  for (const Direction direction : {Direction::kUp, Direction::kDown}) {
+    std::vector<Duration> delays;
+    std::optional<Duration> first;
+    Duration last{};
+    std::size_t lost = 0;
+    for (const TraceRecord& record : trace.records) {
+      if (record.direction != direction) continue;
+      last = record.arrival - LocalTime{};
+      if (!first) first = last;
+      if (record.verdict == Verdict::kDrop) {
+        ++lost;
+      } else {
+        delays.push_back(record.release - record.arrival);
+      }
+    }
+    if (!first) continue;
+    text += (direction == Direction::kUp ? "up: " : "down: ") + std::to_string(lost + delays.size()) +
+            " datagrams from " + duration_text(*first) + " to " + duration_text(last) + ", " + std::to_string(lost) +
+            " lost";
+    if (!delays.empty()) {
+      std::ranges::sort(delays);
+      text += "; delay " + duration_text(delays.front()) + " to " + duration_text(delays.back()) + ", median " +
+              duration_text(delays[(delays.size() - 1) / 2]);
+    }
+    text += '\n';
+  }
+  return text;
 }
 
 }  // namespace tendon::injector

@@ -43,7 +43,9 @@ struct ImportOptions {
 /// as the summary's "time 1024857ms" says, or else options.interval. Second answers (DUP!) are left out. Ping cannot
 /// tell which way a packet was lost: with kHalves it is the way up, so that loss is not counted twice.
 ///
-/// Throws when there is no answer in it at all, and for Share::kMeasured.
+/// The unit of a time can be ms, us or s. A time can have a decimal point or a decimal comma, and a thousands separator if
+/// it has both signs. The function throws if the meaning of a comma is not clear, if the log contains no answer, and for
+/// Share::kMeasured.
 Trace import_ping(std::istream& from, const std::string& name, const ImportOptions& options);
 
 /// The JSON file of `irtt client -o FILE.json` (not gzipped). kMeasured takes delay.send and delay.receive, which are
@@ -52,12 +54,14 @@ Trace import_ping(std::istream& from, const std::string& name, const ImportOptio
 /// "true_up", down what is "true_down"; of "true" nobody knows, and it counts as up.
 Trace import_irtt(std::istream& from, const std::string& name, const ImportOptions& options);
 
-/// A list of delays: one line per datagram, fields separated by commas, semicolons or tabs; # begins a comment. With a
-/// line of names first: columns t_ms and delay_ms (others are ignored, except for dir, as in a file of write_delays(),
-/// where it replaces the share). Without: delay, or t and delay. All in milliseconds; an empty delay is a loss. Where
-/// there is no time it is the line's number times options.interval. Times must not fall; without
-/// directions they are moved so that they begin at 0.
+/// Reads a list of delays with open_delays(). The column t_ms is the time when a datagram was sent. Times must not
+/// decrease. Without this column, the interval between datagrams is options.interval. The column dir replaces the share,
+/// as in a file from write_delays(). Without this column, the times are shifted to begin at 0.
 Trace import_csv(std::istream& from, const std::string& name, const ImportOptions& options);
+
+/// Returns a summary of an imported trace, with one line for each direction. The line contains the number of datagrams
+/// and losses, the first and last time, and the minimum, median and maximum delay.
+std::string import_summary(const Trace& trace);
 
 /// The log that mm-link writes with --uplink-log or --downlink-log (of mahimahi 0.98 on): each departure
 /// ("MS - BYTES DELAY_MS") is a datagram, each drop ("MS d PACKETS BYTES") that many lost ones. In whole milliseconds.

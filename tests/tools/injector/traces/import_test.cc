@@ -14,6 +14,7 @@
 #include <string>
 #include <vector>
 
+#include "tests/support/refusal.h"
 #include "tests/tools/injector/traces/trace_player.h"
 
 namespace tendon::injector::import_test {
@@ -29,12 +30,7 @@ Trace import(Import reader, const std::string& text, const ImportOptions& option
 }
 
 std::string refusal(Import reader, const std::string& text, const ImportOptions& options = {}) {
-  try {
-    import(reader, text, options);
-    return "";
-  } catch (const std::runtime_error& error) {
-    return error.what();
-  }
+  return thrown_by<std::runtime_error>([&] { import(reader, text, options); });
 }
 
 /// "index:t_in:delay" of one direction in ms, "lost" instead of a delay; for short expectations.
@@ -107,6 +103,43 @@ TEST(ImportPing, WhatBusyboxPrintsIsUnderstoodToo) {
             "0:0:5.332 1:200:lost 2:400:5.5 ");
 }
 
+std::string ping_of(const std::vector<std::string>& times) {
+  std::string text;
+  for (const std::string& time : times) {
+    text += "64 bytes from 192.0.2.7: icmp_seq=" + std::to_string(std::ranges::count(text, '\n')) +
+            " ttl=64 time=" + time + "\n";
+  }
+  return text;
+}
+
+TEST(ImportPing, UnderstandsTimesHoweverTheyAreWritten) {
+  const auto delays = [](const std::vector<std::string>& times) {
+    std::string text;
+    for (const TraceRecord& record : import(import_ping, ping_of(times), {.share = Share::kUp}).records) {
+      text += std::to_string((record.release - record.arrival).count()) + ' ';
+    }
+    return text;
+  };
+  EXPECT_EQ(delays({"0.481 ms", "20.497 ms"}), "481000 20497000 ");
+  EXPECT_EQ(delays({"0,481 ms", "20,497 ms"}), "481000 20497000 ");
+  EXPECT_EQ(delays({"20,497 ms", "21,003 ms"}), "20497000 21003000 ");
+  EXPECT_EQ(delays({"381 us", "381 µs", "1.5 s", "2 ms (DUP!)"}), "381000 381000 1500000000 2000000 ");
+  EXPECT_EQ(delays({"1,012.5 ms", "998 ms"}), "1012500000 998000000 ");
+  EXPECT_EQ(delays({"1.012,5 ms", "998,25 ms"}), "1012500000 998250000 ");
+}
+
+TEST(ImportPing, ACommaThatMayBeEitherIsRefused) {
+  EXPECT_EQ(refusal(import_ping, ping_of({"998 ms", "1,012 ms"})),
+            "file:2: expected a decimal point, found time=1,012: is the comma a decimal one, or between thousands?");
+  EXPECT_EQ(refusal(import_ping, ping_of({"99.5 ms", "1,012 ms"})),
+            "file:2: expected a decimal point, found time=1,012: is the comma a decimal one, or between thousands?");
+  EXPECT_EQ(refusal(import_ping, ping_of({"99.5 ms", "1,5 ms"})),
+            "file:2: expected the decimal sign of line 1, found another");
+  for (const char* time : {"1,01,2.5 ms", "1.2.3 ms", "5 parsecs", "5", ", ms"}) {
+    EXPECT_EQ(refusal(import_ping, ping_of({time})).substr(0, 37), "file:1: expected time=… ms, us or s") << time;
+  }
+}
+
 TEST(ImportPing, SequenceNumbersGoOnBeyond16Bits) {
   std::string text;
   for (int i = 65'534; i < 65'540; ++i) {
@@ -116,9 +149,10 @@ TEST(ImportPing, SequenceNumbersGoOnBeyond16Bits) {
 }
 
 TEST(ImportPing, WhatIsNotPingIsRefused) {
-  EXPECT_EQ(refusal(import_ping, "hello\n"), "file: no answer in it, expected what ping prints");
-  EXPECT_EQ(refusal(import_ping, "\n64 bytes from 10.0.0.1: icmp_seq=1 ttl=64 time=fast\n").substr(0, 28),
-            "file:2: expected time=… ms");
+  EXPECT_EQ(refusal(import_ping, "hello\n"),
+            "file: no answer in it, expected what ping of Linux or macOS prints in English: LC_ALL=C ping");
+  EXPECT_EQ(refusal(import_ping, "\n64 bytes from 10.0.0.1: icmp_seq=1 ttl=64 time=fast\n").substr(0, 37),
+            "file:2: expected time=… ms, us or s");
   EXPECT_EQ(refusal(import_ping, "64 bytes from 10.0.0.1: icmp_seq=70000 ttl=64 time=1 ms\n").substr(0, 37),
             "file:1: expected icmp_seq=0 to 65535 ");
   EXPECT_EQ(refusal(import_ping, kPing, {.share = Share::kMeasured}),
@@ -182,18 +216,52 @@ TEST(ImportCsv, AListOfDelaysIsOnePacketPerLine) {
 }
 
 TEST(ImportCsv, TimesAreTakenFromTheFileAndBeginAtZero) {
-  EXPECT_EQ(up(import(import_csv, "# a comment\n1000;20\r\n1010;\r\n1025;30\r\n", {.share = Share::kUp})),
-            "0:0:20 1:10:lost 2:25:30 ");
+  EXPECT_EQ(
+      up(import(import_csv, "# a comment\nt_ms;delay_ms\n1000;20\r\n1010;\r\n1025;30\r\n", {.share = Share::kUp})),
+      "0:0:20 1:10:lost 2:25:30 ");
   EXPECT_EQ(up(import(import_csv, "what\tdelay_ms\tt_ms\nx\t5\t7\ny\t6\t9\n", {.share = Share::kUp})), "0:0:5 1:2:6 ");
 }
 
 TEST(ImportCsv, WhatIsWrongIsNamedWithItsLine) {
   EXPECT_EQ(refusal(import_csv, ""), "file: no delay in it");
-  EXPECT_EQ(refusal(import_csv, "a,b\n"), "file:1: expected numbers, or names of columns with delay_ms among them");
-  EXPECT_EQ(refusal(import_csv, "1,2\n3,four\n"), "file:2: expected milliseconds, found \"four\"");
-  EXPECT_EQ(refusal(import_csv, "1,2\n3\n"), "file:2: expected 2 fields or more");
-  EXPECT_EQ(refusal(import_csv, "5,2\n3,2\n"), "file:2: the time is earlier than the one before");
-  EXPECT_EQ(refusal(import_csv, "1,-2\n"), "file:1: a delay below zero");
+  EXPECT_EQ(refusal(import_csv, "a,b\n"),
+            "file:1: expected numbers, or names of columns with delay_ms among them, found \"a,b\"");
+  const std::string named = "t_ms,delay_ms\n";
+  EXPECT_EQ(refusal(import_csv, named + "3,four\n"), "file:2: expected a finite number as delay_ms, found 'four'");
+  EXPECT_EQ(refusal(import_csv, named + "3\n"), "file:2: expected 2 cells as in the first row, found 1");
+  EXPECT_EQ(refusal(import_csv, named + "5,2\n3,2\n"), "file:3: the time is earlier than the one before");
+  EXPECT_EQ(refusal(import_csv, named + "1,-2\n"), "file:2: a delay below zero");
+  EXPECT_EQ(refusal(import_csv, named + "1,86400001\n"), "file:2: expected at most 1 days, found \"86400001\"");
+}
+
+TEST(ImportCsv, TwoColumnsWithoutNamesAreRefusedAndBothReadingsNamed) {
+  EXPECT_EQ(refusal(import_csv, "20,1\n35,5\n41,0\n"),
+            "file:1: expected one delay in ms in each line, or a first line with the names of the columns, like "
+            "t_ms;delay_ms, found 2 numbers in \"20,1\": are these decimal commas, or are they time and delay?");
+  EXPECT_EQ(refusal(import_csv, "20;1\n35;5\n"),
+            "file:1: expected one delay in ms in each line, or a first line with the names of the columns, like "
+            "t_ms;delay_ms, found 2 numbers in \"20;1\"");
+}
+
+TEST(ImportCsv, ReadsWhatSpreadsheetsWriteOrRefusesIt) {
+  const ImportOptions up_only{.share = Share::kUp};
+  EXPECT_EQ(up(import(import_csv, "\xef\xbb\xbft_ms,delay_ms\n0,20.1\n10,35.5\n", up_only)), "0:0:20.1 1:10:35.5 ");
+  EXPECT_EQ(up(import(import_csv, "t_ms;delay_ms\n0;20,1\n10;35,5\n", up_only)), "0:0:20.1 1:10:35.5 ");
+  EXPECT_EQ(up(import(import_csv, "Time [s]\tDelay [us]\n0\t20100\n0,5\t35500\n", up_only)), "0:0:20.1 1:500:35.5 ");
+  EXPECT_EQ(up(import(import_csv, "t_ms,note,delay_ms\n0,\"a, b\",5\n", up_only)), "0:0:5 ");
+  const std::string ragged =
+      " as in the first row, found 2; are these decimal commas? Write points, or separate cells by semicolons";
+  EXPECT_EQ(refusal(import_csv, "delay_ms\n20,1\n"), "file:2: expected 1 cell" + ragged);
+  EXPECT_EQ(refusal(import_csv, "20\n20,1\n"), "file:2: expected 1 cell" + ragged);
+}
+
+TEST(ImportCsv, ASummarySaysHowManyWhenAndHowLong) {
+  const Trace trace = import(import_csv, "t_ms,delay_ms\n0,20.1\n10,35.5\n20,\n30,21\n", {.share = Share::kUp});
+  EXPECT_EQ(import_summary(trace), "up: 4 datagrams from 0ms to 30ms, 1 lost; delay 20.1ms to 35.5ms, median 21ms\n");
+  const Trace both = import(import_csv, "5\n", {.share = Share::kBoth});
+  EXPECT_EQ(import_summary(both),
+            "up: 1 datagrams from 0ms to 0ms, 0 lost; delay 5ms to 5ms, median 5ms\n"
+            "down: 1 datagrams from 0ms to 0ms, 0 lost; delay 5ms to 5ms, median 5ms\n");
 }
 
 // Export and import of delays: the fates stay, to the nanosecond.

@@ -14,6 +14,7 @@
 #include <tuple>
 #include <utility>
 
+#include "protocol/byte_order_mark.h"
 #include "server/machine/regular_file.h"
 
 namespace tendon::injector {
@@ -128,6 +129,7 @@ class Reader {
     std::getline(from_, line_);
     if (from_.bad()) fail("cannot be read");
     if (from_.eof()) fail("the last line is not complete; remove it to use the trace without it");
+    if (number_ == 1) line_ = without_byte_order_mark(line_);
     if (line_.size() > kMaxTraceLine) fail("the line is longer than " + std::to_string(kMaxTraceLine) + " bytes");
     if (line_.find('\r') != std::string::npos) fail("there is a carriage return, expected lines that end with \\n");
     return true;

@@ -12,6 +12,7 @@
 #include <string>
 #include <string_view>
 
+#include "tests/support/refusal.h"
 #include "tests/tools/injector/injector.h"
 
 namespace tendon::injector::trace_test {
@@ -72,12 +73,7 @@ Trace read(const std::string& text) {
 }
 
 std::string refusal(const std::string& text) {
-  try {
-    read(text);
-    return "";
-  } catch (const std::runtime_error& error) {
-    return error.what();
-  }
+  return thrown_by<std::runtime_error>([&] { read(text); });
 }
 
 constexpr std::string_view kColumns =

@@ -11,12 +11,9 @@
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 #include <tuple>
-#include <type_traits>
 #include <utility>
 
-#include "clients/softbody/fem/mesh.h"
 #include "clients/softbody/fem/solid.h"
-#include "clients/softbody/models/explicit.h"
 #include "clients/softbody/models/linear.h"
 #include "clients/softbody/models/quasi_static.h"
 #include "core/base/expect.h"
@@ -37,65 +34,12 @@ constexpr std::size_t kManyUpdates = 400;  // timed; fewer if …
 constexpr double kSettled = 0.03;          // two times through the script have so nearly the same median, or after …
 constexpr double kLongestTiming = 4;       // s
 constexpr std::size_t kFirstUpdates = 10;  // show whether it is far too slow
-constexpr double kReach = 0.3;             // patch radii, that a table of the surface holds
-constexpr int kStaticModes = 3;            // along each axis of that, of a modal body
-constexpr double kUnfeltMs = 0.1;          // a tenth of a period of the device: nobody feels who is quicker by less
-
-std::array<int, 3> cells_of(const PressedBlock& block, int n) {
-  const auto along = [&](int axis) {
-    return std::max(1, static_cast<int>(std::lround(n * block.size[axis] / block.size.x())));
-  };
-  return {n, along(1), along(2)};
-}
-
-/// The block of water's density, cut up and held.
-constexpr double kDensity = 1000;  // kg/m³
-
-Solid solid_of(const PressedBlock& block, const Candidate& candidate, softbody::Law law, const Material& material) {
-  Mesh mesh = softbody::block(info(candidate.element).shape, block.size, cells_of(block, candidate.n));
-  const Fixed fixed = fix_where(mesh, [](const Vec3& node) { return node.z() < 1e-9; });
-  return {std::move(mesh), candidate.element, material, law, fixed};
-}
-
-/// `near` may have several laws: here it has that of the truth.
-softbody::Law law_of(ModelKind model) {
-  return model == ModelKind::kNear ? softbody::Law::kNeoHookean : info(model).law;
-}
-
-BodyConfig body_of(const PressedBlock& block, const Candidate& candidate) {
-  BodyConfig config;
-  config.shape = BlockShape{block.size, cells_of(block, candidate.n)};
-  config.element = candidate.element;
-  config.material = block.material;
-  config.model = candidate.model;
-  config.law = law_of(candidate.model);
-  config.patch_radius = block.patch_radius;
-  config.reach = kReach * block.patch_radius;
-  config.middle = block.touch_point();
-  config.static_modes = kStaticModes;
-  config.learn = candidate.by == Candidate::By::kLearned;
-  config.tabulate = candidate.by == Candidate::By::kTable;
-  if (config.learn || config.tabulate) config.tolerance = BodyConfig::kErrorOfLearned;
-  if (info(candidate.model).has_time()) {
-    // Slowed enough to be at rest soon. Explicit steps as long as they may be, with something to spare for a body that
-    // is pressed together, and none longer than a period of the device.
-    const double step = std::min(
-        1e-3, 0.7 * largest_step(solid_of(block, candidate, law_of(candidate.model), block.material), kDensity));
-    config.effects = {.density = kDensity, .step = step, .inertia = true, .damping = 40};
-  }
-  return config;
-}
 
 /// What a model becomes on a fine mesh: see Accuracy.
-Material material_of(const PressedBlock& block, ModelKind model) {
-  switch (model) {
-    case ModelKind::kProjective:
-      return {.young = 2 * block.material.mu(), .poisson = 0};
-    case ModelKind::kMassSpring:
-      return {.young = block.material.young, .poisson = 0.25};
-    default:
-      return block.material;
-  }
+Material material_of(const PressedBlock& block, const AnyModel& model) {
+  if (model == AnyModel(compared::Kind::kProjective)) return {.young = 2 * block.material.mu(), .poisson = 0};
+  if (model == AnyModel(compared::Kind::kMassSpring)) return {.young = block.material.young, .poisson = 0.25};
+  return block.material;
 }
 
 /// What the law of a model makes of its mesh, solved until rounding is all that is left. Models with a law in common
@@ -148,7 +92,7 @@ Accuracy accuracy_of(const Reaction& reaction, const Stiffness& right, double so
 }
 
 void split_error(AccuracyPoint& point, Truth& truth, OnMesh& on_mesh) {
-  const ModelKind model = point.candidate.model;
+  const AnyModel& model = point.candidate.model;
   const Material material = material_of(truth.block(), model);
   for (std::size_t load = 0; load < point.at_load.size(); ++load) {
     const auto limit = truth.limit(law_of(model), material, load);
@@ -161,7 +105,7 @@ void split_error(AccuracyPoint& point, Truth& truth, OnMesh& on_mesh) {
       continue;
     }
     const double mesh = on_mesh.of(point.candidate)[load].secant;
-    if (model == ModelKind::kMassSpring) {
+    if (model == AnyModel(compared::Kind::kMassSpring)) {
       // They have settled, on a mesh whose error is that of the body with ν = 1/4.
       error.model = limit->secant * error.k / mesh / right - 1;
       error.discretisation = error.total - error.model;
@@ -306,13 +250,11 @@ std::vector<AccuracyPoint> ladder(Candidate candidate, const AccuracyOptions& op
   return points;
 }
 
-std::vector<ModelKind> models_of(const AccuracyOptions& options) {
+std::vector<AnyModel> models_of(const AccuracyOptions& options) {
   if (!options.models.empty()) return options.models;
   // The quickest first: it is what the others have to beat.
   if (options.budget_ms) return {ModelKind::kCondensed, ModelKind::kCorotational, ModelKind::kNeoHookean};
-  std::vector<ModelKind> all;
-  for (const ModelInfo& model : models()) all.push_back(model.kind);
-  return all;
+  return all_models();
 }
 
 std::vector<Element> elements_of(const AccuracyOptions& options) {
@@ -325,11 +267,11 @@ std::vector<Element> elements_of(const AccuracyOptions& options) {
 /// Each model on each element, on no mesh yet; a worker answers after the others.
 std::vector<Candidate> families(const AccuracyOptions& options) {
   std::vector<Candidate> all;
-  for (const ModelKind model : models_of(options)) {
+  for (const AnyModel& model : models_of(options)) {
     for (const Element element : elements_of(options)) {
-      if (info(model).tetrahedra && element != Element::kTet4) continue;
+      if (wants_tetrahedra(model) && element != Element::kTet4) continue;
       all.push_back({model, element, 0});
-      if (!options.learned || model != ModelKind::kNear) continue;
+      if (!options.learned || model != AnyModel(ModelKind::kNear)) continue;
       all.push_back({model, element, 0, Candidate::By::kLearned});
       all.push_back({model, element, 0, Candidate::By::kTable});
     }
@@ -340,26 +282,6 @@ std::vector<Candidate> families(const AccuracyOptions& options) {
   }
   return all;
 }
-
-}  // namespace
-
-std::string Candidate::way() const {
-  switch (by) {
-    case By::kLearned:
-      return std::string(info(model).name) + "-learned";
-    case By::kTable:
-      return std::string(info(model).name) + "-table";
-    case By::kWorker:
-      return "worker";
-    case By::kModel:
-      break;
-  }
-  return std::string(info(model).name);
-}
-
-std::string Candidate::name() const { return way() + "-" + std::string(info(element).name); }
-
-namespace {
 
 /// A candidate on its way to a point: what has been measured of it, and the body for what has not.
 struct Trial {
@@ -373,9 +295,8 @@ Trial tried(const Candidate& candidate, Truth& truth, const Meter* meter, double
             const std::string& worker = {}) {
   const PressedBlock& block = truth.block();
   const Meter::Reading before = meter != nullptr ? meter->read() : Meter::Reading{};
-  const BodyConfig config = body_of(block, candidate);
   Trial trial{.point = {.candidate = candidate, .timed = meter != nullptr},
-              .engine = candidate.elsewhere() ? worker_engine(config, worker) : own_engine(config)};
+              .engine = engine_of(block, candidate, worker)};
   AccuracyPoint& point = trial.point;
   PressedEngine& engine = *trial.engine;
   if (meter != nullptr) point.setup_s = engine.took(meter->read() - before);
@@ -409,67 +330,12 @@ AccuracyPoint measure(const Candidate& candidate, Truth& truth, OnMesh& on_mesh,
   return trial.point;
 }
 
-double at_the_hand_ms(const AccuracyPoint& p) { return std::max({p.update_ms_p50, p.step_ms, kUnfeltMs}); }
-
 }  // namespace
 
 AccuracyPoint measure(const Candidate& candidate, Truth& truth, const Meter& meter,
                       const std::optional<Network>& network, const Patience& patience, const std::string& worker) {
   OnMesh on_mesh(truth.block());
   return measure(candidate, truth, on_mesh, meter, network, patience, worker);
-}
-
-bool may_be_best(const AccuracyPoint& point, const std::vector<AccuracyPoint>& others) {
-  for (std::size_t load = 0; load < point.at_load.size(); ++load) {
-    const Accuracy& own = point.at_load[load];
-    const double error = std::isfinite(own.without_luck()) ? own.without_luck() : std::abs(own.total);
-    const bool beaten = std::ranges::any_of(others, [&](const AccuracyPoint& other) {
-      // The same mesh by another way is not closer.
-      return at_the_hand_ms(other) <= at_the_hand_ms(point) && 0.999 * other.at_load[load].without_luck() <= error;
-    });
-    if (!beaten && std::isfinite(error)) return true;
-  }
-  return false;
-}
-
-std::vector<AccuracyPoint> pareto_front(std::vector<AccuracyPoint> points, std::size_t load) {
-  const auto error = [load](const AccuracyPoint& p) { return p.at_load.at(load).without_luck(); };
-  std::erase_if(points, [&](const AccuracyPoint& p) { return !std::isfinite(error(p)); });
-  std::ranges::sort(points, {}, &AccuracyPoint::update_ms_p50);
-  double best = std::numeric_limits<double>::infinity();
-  std::erase_if(points, [&](const AccuracyPoint& p) {
-    if (error(p) > 0.999 * best) return true;  // the same mesh by another way is not closer
-    best = error(p);
-    return false;
-  });
-  return points;
-}
-
-double cost_exponent(const std::vector<AccuracyPoint>& ladder) {
-  const auto count = static_cast<double>(ladder.size());
-  double x = 0;
-  double y = 0;
-  double xx = 0;
-  double xy = 0;
-  for (const AccuracyPoint& p : ladder) {
-    const double unknowns = std::log(static_cast<double>(p.size.free));
-    const double cost = std::log(p.update_ms_p50);
-    x += unknowns;
-    y += cost;
-    xx += unknowns * unknowns;
-    xy += unknowns * cost;
-  }
-  const double spread = count * xx - x * x;
-  return spread > 1e-9 * count * xx ? (count * xy - x * y) / spread : kNoNumber;
-}
-
-const AccuracyPoint* closest_at_the_hand(const std::vector<AccuracyPoint>& points, double budget_ms) {
-  const AccuracyPoint* best = nullptr;
-  for (const AccuracyPoint& p : points) {
-    if (!p.felt || !(p.update_ms_p50 <= budget_ms) || !(p.felt->vibration <= kMostVibration)) continue;
-    if (best == nullptr || p.felt->force_error < best->felt->force_error) best = &p;
-  }
-  return best;
 }
 
 namespace {
@@ -527,10 +393,6 @@ double round_trip_ms(const Network& network) {
   return quantile(ms, 0.5);
 }
 
-}  // namespace
-
-namespace {
-
 void check(const AccuracyOptions& options) {
   if (options.resolutions.empty() || options.resolutions.front() < 1 ||
       !std::ranges::is_sorted(options.resolutions, std::less_equal<>())) {
@@ -542,7 +404,7 @@ void check(const AccuracyOptions& options) {
   }
   options.block.check();
   if (options.learned && options.budget_ms) throw std::invalid_argument("--learned: not with --budget-ms");
-  if (options.learned && std::ranges::count(models_of(options), ModelKind::kNear) == 0) {
+  if (options.learned && std::ranges::count(models_of(options), AnyModel(ModelKind::kNear)) == 0) {
     throw std::invalid_argument("--learned: expected near among --models, whose bodies learn");
   }
   if (options.errors_only && (options.network || options.budget_ms)) {
@@ -570,42 +432,6 @@ std::vector<Candidate> candidates(const AccuracyOptions& options) {
   return all;
 }
 
-/// What a mesh comes to without a clock.
-struct MeshErrors {
-  AccuracyPoint point;
-  TruthFigures truth{};
-  std::string left_out{};  ///< why there is no point
-};
-
-/// Of a point's numbers those that are there without a clock, with their names: to write them and to read them.
-template <class Errors, class Visit>
-void visit_numbers(Errors& errors, Visit visit) {
-  auto& p = errors.point;
-  for (std::size_t load = 0; load < p.at_load.size(); ++load) {
-    const std::string which = load == 0 ? "small_" : "hard_";
-    auto& at = p.at_load[load];
-    visit(which + "k_n_per_m", at.k);
-    visit(which + "error", at.total);
-    visit(which + "model", at.model);
-    visit(which + "discretisation", at.discretisation);
-    visit(which + "solver", at.solver);
-    visit(which + "tangent", at.tangent);
-  }
-  visit("lateral", p.lateral);
-  visit("script_rms_error_n", p.force_error);
-  visit("script_largest_error_n", p.force_most);
-  visit("script_rms_error", p.force_relative);
-  visit("step_ms", p.step_ms);
-  visit("nodes", p.size.nodes);
-  visit("elements", p.size.elements);
-  visit("free", p.size.free);
-  visit("bytes", p.size.bytes);
-  visit("truth_linear_k_n_per_m", errors.truth.linear);
-  visit("truth_k_n_per_m", errors.truth.small);
-  visit("truth_hard_k_n_per_m", errors.truth.hard);
-  visit("truth_uncertainty", errors.truth.uncertainty);
-}
-
 /// What the meshes of a process have in common, from the first one on.
 struct Bench {
   explicit Bench(const AccuracyOptions& options) : truth(options.block, options.truth), on_mesh(truth.block()) {
@@ -629,27 +455,6 @@ MeshErrors errors_of(const Candidate& candidate, Bench& bench) {
   return errors;
 }
 
-JsonLine line_of(const MeshErrors& errors) {
-  JsonLine line;
-  line.add("model", errors.point.candidate.name()).add("n", errors.point.candidate.n);
-  line.add("left_out", errors.left_out);
-  visit_numbers(errors, [&](const std::string& name, const auto& value) { line.add(name, value); });
-  line.add("commit", kCommit);
-  return line;
-}
-
-MeshErrors errors_of(const Candidate& candidate, const nlohmann::json& line) {
-  MeshErrors errors{.point = {.candidate = candidate, .timed = false}, .left_out = line.at("left_out")};
-  visit_numbers(errors, [&](const std::string& name, auto& value) {
-    if constexpr (std::is_same_v<std::remove_cvref_t<decltype(value)>, double>) {
-      value = number_of(line, name);
-    } else {
-      line.at(name).get_to(value);
-    }
-  });
-  return errors;
-}
-
 void errors_only(const AccuracyOptions& options, std::ostream& out) {
   const std::vector<Candidate> meshes = candidates(options);
   if (meshes.empty()) throw std::invalid_argument("--models, --elements: no such model has such an element");
@@ -669,7 +474,7 @@ void errors_only(const AccuracyOptions& options, std::ostream& out) {
             return lines;
           },
       .read = [&](std::uint64_t unit,
-                  const std::vector<nlohmann::json>& lines) { return errors_of(meshes.at(unit), lines.at(0)); },
+                  const std::vector<nlohmann::json>& lines) { return read_errors(meshes.at(unit), lines.at(0)); },
       .count =
           [](const MeshErrors& errors, ShardEnd& end) {
             end.count("meshes", 1);

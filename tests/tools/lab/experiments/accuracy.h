@@ -14,27 +14,12 @@
 
 #include "clients/softbody/body.h"
 #include "tests/support/swept_work.h"
+#include "tests/tools/lab/experiments/candidate.h"
 #include "tests/tools/lab/experiments/felt.h"
 #include "tests/tools/lab/experiments/meter.h"
 #include "tests/tools/lab/experiments/pressed_block.h"
 
 namespace tendon::lab {
-
-/// A model on a mesh: `n` cells along x, and as many to a length along y and z.
-struct Candidate {
-  /// Who answers: the model; of a body of the model `near` what it has learned, or its table of answers; or
-  /// AccuracyOptions::worker, and no body of this process.
-  enum class By : std::uint8_t { kModel, kLearned, kTable, kWorker };
-
-  softbody::ModelKind model;
-  softbody::Element element;
-  int n;
-  By by = By::kModel;
-
-  bool elsewhere() const noexcept { return by == By::kWorker; }
-  std::string way() const;   ///< "linear", "near-learned", "near-table", "worker"
-  std::string name() const;  ///< way and element: "linear-hex8-sri"
-};
 
 /// How a model answers one load. Shares, of the true stiffness: total = model + discretisation + solver. The parts are
 /// NaN where on an endlessly fine mesh the model does not stand the load. A worker's `solver` is the bound of its error
@@ -114,8 +99,8 @@ const AccuracyPoint* closest_at_the_hand(const std::vector<AccuracyPoint>& point
 
 struct AccuracyOptions {
   PressedBlock block;
-  /// None: all; with a budget those that are not there for comparison, without linear, which is condensed, later.
-  std::vector<softbody::ModelKind> models;
+  /// Empty: all models. With a budget, empty means condensed, corotational and neo-hookean.
+  std::vector<AnyModel> models;
   std::vector<softbody::Element> elements;  ///< none: all
   std::vector<int> resolutions{4, 6, 8, 10, 12, 16};
   /// The command of a worker that answers for the linear block as well, without its scene; empty: none. Not with

@@ -18,10 +18,6 @@ namespace tendon::lab {
 
 using namespace softbody;
 
-bool for_comparison(ModelKind kind) {
-  return kind == ModelKind::kStVenantKirchhoff || (kind >= ModelKind::kMassSpring && kind != ModelKind::kNear);
-}
-
 namespace {
 
 /// Of the stiffness of a surface that a bare finger pad feels: Bergmann Tiest & Kappers 2009.
@@ -35,7 +31,9 @@ const char* colour_of(std::size_t i) {
 
 /// A line for a way of answering, the same in all panels; broken for models that are there for comparison …
 Curve curve_of(const Candidate& candidate) {
-  const auto number = static_cast<std::size_t>(candidate.model) + 3 * static_cast<std::size_t>(candidate.by);
+  const std::vector<AnyModel> models = all_models();
+  const auto number = static_cast<std::size_t>(std::ranges::find(models, candidate.model) - models.begin()) +
+                      3 * static_cast<std::size_t>(candidate.by);
   return {.name = candidate.way(),
           .colour = colour_of(number),
           .style = for_comparison(candidate.model) ? Curve::Style::kDashed : Curve::Style::kLine};

@@ -9,8 +9,10 @@
 #include <cstdio>
 #include <fstream>
 #include <limits>
+#include <nlohmann/json.hpp>
 #include <stdexcept>
 #include <string_view>
+#include <type_traits>
 #include <utility>
 #include <variant>
 #include <vector>
@@ -22,8 +24,6 @@
 
 namespace tendon::lab {
 namespace {
-
-constexpr double kNoNumber = std::numeric_limits<double>::quiet_NaN();
 
 /// All that is known of a point, in the order of the columns of the CSV and the members of the JSON.
 using Figure = std::variant<std::int64_t, double>;
@@ -61,7 +61,7 @@ Figures figures(const AccuracyPoint& p, const TruthFigures& truth, const Pressed
               {"update_ms_p99", p.update_ms_p99},
               {"hz", 1e3 / p.update_ms_p50},
               {"step_ms", p.step_ms},
-              {"instructions", p.instructions.value_or(kNoNumber)},
+              {"instructions", p.instructions.value_or(std::numeric_limits<double>::quiet_NaN())},
               {"elements", count(p.size.elements)},
               {"free", count(p.size.free)},
               {"truth_k_n_per_m", truth.small},
@@ -91,6 +91,39 @@ std::string with_tenths(double value) {
   std::array<char, 32> text{};
   std::snprintf(text.data(), text.size(), "%.1f", value);
   return text.data();
+}
+
+constexpr double kUnfeltMs = 0.1;  // a tenth of a period of the device: nobody feels who is quicker by less
+
+double at_the_hand_ms(const AccuracyPoint& p) { return std::max({p.update_ms_p50, p.step_ms, kUnfeltMs}); }
+
+/// Of a point's numbers those that are there without a clock, with their names: to write them and to read them.
+template <class Errors, class Visit>
+void visit_numbers(Errors& errors, Visit visit) {
+  auto& p = errors.point;
+  for (std::size_t load = 0; load < p.at_load.size(); ++load) {
+    const std::string which = load == 0 ? "small_" : "hard_";
+    auto& at = p.at_load[load];
+    visit(which + "k_n_per_m", at.k);
+    visit(which + "error", at.total);
+    visit(which + "model", at.model);
+    visit(which + "discretisation", at.discretisation);
+    visit(which + "solver", at.solver);
+    visit(which + "tangent", at.tangent);
+  }
+  visit("lateral", p.lateral);
+  visit("script_rms_error_n", p.force_error);
+  visit("script_largest_error_n", p.force_most);
+  visit("script_rms_error", p.force_relative);
+  visit("step_ms", p.step_ms);
+  visit("nodes", p.size.nodes);
+  visit("elements", p.size.elements);
+  visit("free", p.size.free);
+  visit("bytes", p.size.bytes);
+  visit("truth_linear_k_n_per_m", errors.truth.linear);
+  visit("truth_k_n_per_m", errors.truth.small);
+  visit("truth_hard_k_n_per_m", errors.truth.hard);
+  visit("truth_uncertainty", errors.truth.uncertainty);
 }
 
 }  // namespace
@@ -219,6 +252,80 @@ void write_answer(std::ostream& out, const AccuracyOptions& options, const std::
         << with_tenths(100 * best->felt->force_error) << " % off where its own error is "
         << with_tenths(100 * best->at_load[0].total) << " %.\n";
   }
+}
+
+JsonLine line_of(const MeshErrors& errors) {
+  JsonLine line;
+  line.add("model", errors.point.candidate.name()).add("n", errors.point.candidate.n);
+  line.add("left_out", errors.left_out);
+  visit_numbers(errors, [&](const std::string& name, const auto& value) { line.add(name, value); });
+  line.add("commit", kCommit);
+  return line;
+}
+
+MeshErrors read_errors(const Candidate& candidate, const nlohmann::json& line) {
+  MeshErrors errors{.point = {.candidate = candidate, .timed = false}, .left_out = line.at("left_out")};
+  visit_numbers(errors, [&](const std::string& name, auto& value) {
+    if constexpr (std::is_same_v<std::remove_cvref_t<decltype(value)>, double>) {
+      value = number_of(line, name);
+    } else {
+      line.at(name).get_to(value);
+    }
+  });
+  return errors;
+}
+
+bool may_be_best(const AccuracyPoint& point, const std::vector<AccuracyPoint>& others) {
+  for (std::size_t load = 0; load < point.at_load.size(); ++load) {
+    const Accuracy& own = point.at_load[load];
+    const double error = std::isfinite(own.without_luck()) ? own.without_luck() : std::abs(own.total);
+    const bool beaten = std::ranges::any_of(others, [&](const AccuracyPoint& other) {
+      // The same mesh by another way is not closer.
+      return at_the_hand_ms(other) <= at_the_hand_ms(point) && 0.999 * other.at_load[load].without_luck() <= error;
+    });
+    if (!beaten && std::isfinite(error)) return true;
+  }
+  return false;
+}
+
+std::vector<AccuracyPoint> pareto_front(std::vector<AccuracyPoint> points, std::size_t load) {
+  const auto error = [load](const AccuracyPoint& p) { return p.at_load.at(load).without_luck(); };
+  std::erase_if(points, [&](const AccuracyPoint& p) { return !std::isfinite(error(p)); });
+  std::ranges::sort(points, {}, &AccuracyPoint::update_ms_p50);
+  double best = std::numeric_limits<double>::infinity();
+  std::erase_if(points, [&](const AccuracyPoint& p) {
+    if (error(p) > 0.999 * best) return true;  // the same mesh by another way is not closer
+    best = error(p);
+    return false;
+  });
+  return points;
+}
+
+double cost_exponent(const std::vector<AccuracyPoint>& ladder) {
+  const auto count = static_cast<double>(ladder.size());
+  double x = 0;
+  double y = 0;
+  double xx = 0;
+  double xy = 0;
+  for (const AccuracyPoint& p : ladder) {
+    const double unknowns = std::log(static_cast<double>(p.size.free));
+    const double cost = std::log(p.update_ms_p50);
+    x += unknowns;
+    y += cost;
+    xx += unknowns * unknowns;
+    xy += unknowns * cost;
+  }
+  const double spread = count * xx - x * x;
+  return spread > 1e-9 * count * xx ? (count * xy - x * y) / spread : std::numeric_limits<double>::quiet_NaN();
+}
+
+const AccuracyPoint* closest_at_the_hand(const std::vector<AccuracyPoint>& points, double budget_ms) {
+  const AccuracyPoint* best = nullptr;
+  for (const AccuracyPoint& p : points) {
+    if (!p.felt || !(p.update_ms_p50 <= budget_ms) || !(p.felt->vibration <= kMostVibration)) continue;
+    if (best == nullptr || p.felt->force_error < best->felt->force_error) best = &p;
+  }
+  return best;
 }
 
 }  // namespace tendon::lab

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "tests/support/json_line.h"
 #include "tests/tools/lab/experiments/accuracy.h"
 
 namespace tendon::lab {
@@ -24,6 +25,16 @@ struct TruthFigures {
   double uncertainty = 0;
 };
 TruthFigures figures_of(Truth& truth);
+
+/// What a mesh comes to without a clock.
+struct MeshErrors {
+  AccuracyPoint point;
+  TruthFigures truth{};
+  std::string left_out{};  ///< why there is no point
+};
+/// As a line of JSON with all numbers that are there without a clock, and read again.
+JsonLine line_of(const MeshErrors& errors);
+MeshErrors read_errors(const Candidate& candidate, const nlohmann::json& line);
 
 std::string heading(bool timed);
 void write_row(std::ostream& out, const AccuracyPoint& p);

@@ -65,7 +65,7 @@ struct Verdict {
 Verdict verdict(const std::vector<Cell>& cells, std::uint64_t seed, std::size_t every);
 
 struct CompareOptions {
-  std::size_t every = 1;  ///< take every so-manieth situation of the grid
+  std::size_t every = 1;  ///< take every Nth situation of the grid
   std::uint64_t seed = 1;
   std::optional<std::filesystem::path> out{};  ///< folder for compare.csv and the figures
   bool json = false;

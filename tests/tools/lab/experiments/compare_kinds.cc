@@ -13,6 +13,7 @@
 #include <thread>
 
 #include "core/base/expect.h"
+#include "core/base/nearest_word.h"
 #include "server/build_info.h"
 #include "tests/support/files.h"
 #include "tests/support/json_line.h"
@@ -100,7 +101,7 @@ std::vector<Contender> chosen(const std::vector<std::string>& names) {
     if (found == all.end()) {
       std::string known;
       for (const Contender& one : all) known += (known.empty() ? "" : ", ") + std::string(one.name);
-      throw std::invalid_argument("law \"" + name + "\": expected one of " + known);
+      throw std::invalid_argument("law \"" + name + "\": expected one of " + known + did_you_mean(name, known));
     }
     some.push_back(*found);
   }

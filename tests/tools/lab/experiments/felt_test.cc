@@ -70,14 +70,12 @@ TEST(Felt, AStiffnessThatIsSentAlongMakesUpForMostOfTheWait) {
 // takes half of that away; but it is where the hand is.
 TEST(Felt, ABodyOfManyShortStepsKeepsUpWithTheHand) {
   const PressedBlock& block = truth().block();
-  BodyConfig config;
-  config.shape = softbody::BlockShape{block.size, {4, 4, 2}};
-  config.element = softbody::Element::kHex8Sri;
-  config.material = block.material;
-  config.patch_radius = block.patch_radius;
-  config.model = softbody::ModelKind::kTensorMass;
+  constexpr auto kModel = softbody::compared::Kind::kTensorMass;
+  const Candidate candidate{kModel, softbody::Element::kHex8Sri, 4};
+  softbody::compared::Config config;
   config.effects = {.density = 1000, .step = 2e-4, .inertia = true, .damping = 40};
-  const auto body = own_engine(config);
+  const auto body = compared_engine(kModel, solid_of(block, candidate, law_of(kModel), block.material),
+                                    block.patch_radius, block.touch_point(), config);
   const Felt quick = felt(*body, truth(), route("base=0.05ms", 0.2), 1);
   EXPECT_GT(quick.displayed, 0.4);
   EXPECT_LT(quick.latency, 0.006);

@@ -220,10 +220,10 @@ FloorProblem on_perfect_spring(double stiffness, const Friction& friction, bool 
 }
 
 void floors(const FloorOptions& options, std::ostream& out) {
-  constexpr std::array kDevices = {Friction{.coulomb = 0.02, .viscous = 0.26},
-                                   Friction{.coulomb = 0.04, .viscous = 0.05},
-                                   Friction{.coulomb = 0.04, .viscous = 0.005}};
-  constexpr std::array kStiffnesses = {100.0, 300.0, 500.0, 1000.0, 2000.0, 8000.0};
+  constexpr std::array kFrictions = {Friction{.coulomb = 0.02, .viscous = 0.26},
+                                     Friction{.coulomb = 0.04, .viscous = 0.05},
+                                     Friction{.coulomb = 0.04, .viscous = 0.005}};
+  constexpr std::array kSprings = {100.0, 300.0, 500.0, 1000.0, 2000.0, 8000.0};
   constexpr std::array kSenses = {std::pair{Passive::kOnThisMotion, "on this motion"},
                                   std::pair{Passive::kWhateverComes, "whatever comes"},
                                   std::pair{Passive::kAccelerating, "below 300 m/s2"}};
@@ -238,7 +238,7 @@ void floors(const FloorOptions& options, std::ostream& out) {
     out << "The least error that any law can have, % of the true force, loose / firm hand on the perfect spring, 2 s; "
            "commit "
         << kCommit << "\n\npassive          b N s/m";
-    for (const double stiffness : kStiffnesses) {
+    for (const double stiffness : kSprings) {
       std::array<char, 32> text{};
       std::snprintf(text.data(), text.size(), "%8.0f N/m", stiffness);
       out << text.data();
@@ -246,11 +246,11 @@ void floors(const FloorOptions& options, std::ostream& out) {
     out << "\n";
   }
   for (const auto& [sense, name] : kSenses) {
-    for (const Friction& friction : kDevices) {
+    for (const Friction& friction : kFrictions) {
       std::array<char, 64> text{};
       std::snprintf(text.data(), text.size(), "%-16s %7g", name, friction.viscous);
       if (!options.json) out << text.data();
-      for (const double stiffness : kStiffnesses) {
+      for (const double stiffness : kSprings) {
         std::array<double, 2> percent{};
         for (const bool firm : {false, true}) {
           const Floor floor = floor_of(on_perfect_spring(stiffness, friction, firm), sense);

@@ -9,6 +9,7 @@
 #include "core/base/portable_math.h"
 #include "core/ledger/energy_ledger.h"
 #include "core/ledger/output_bound.h"
+#include "tests/support/refusal.h"
 #include "tests/tools/lab/experiments/paper.h"
 #include "tests/tools/lab/experiments/situations.h"
 
@@ -84,13 +85,8 @@ TEST(Floor, NoLawIsBelowTheFloorOfItsOwnMotion) {
 }
 
 TEST(Floor, RefusesWhatHasNone) {
-  const auto complaint = [](const FloorProblem& problem) -> std::string {
-    try {
-      floor_of(problem, Passive::kOnThisMotion);
-    } catch (const std::invalid_argument& refused) {
-      return refused.what();
-    }
-    return "none";
+  const auto complaint = [](const FloorProblem& problem) {
+    return thrown_by([&] { floor_of(problem, Passive::kOnThisMotion); });
   };
   FloorProblem problem = spring(500);
   problem.truth.pop_back();

@@ -20,7 +20,7 @@ using namespace softbody;
 
 constexpr double kGrowth = 1.5;   // of cells outside the patch, each to the one before
 constexpr double kCoarser = 1.5;  // times as wide, to see what the mesh still changes
-constexpr double kReach = 0.25;   // patch radii, of the slide
+constexpr double kSlide = 0.25;   // patch radii
 constexpr int kSamples = 100;     // of the script
 
 /// How far the ends of cells are from a place: `fine` wide up to `around`, then growing, the last one at `length`.
@@ -48,7 +48,7 @@ std::vector<double> layers(double low, double high, double middle, double around
 }
 
 /// The block with a mesh that is made for this patch.
-Solid graded(const PressedBlock& block, Law law, double cells) {
+Solid graded(const PressedBlock& block, softbody::Law law, double cells) {
   // Selective integration costs a little accuracy where it is not needed.
   const Element element =
       block.material.poisson > info(Element::kHex27).locks_above ? Element::kHex27Sri : Element::kHex27;
@@ -70,7 +70,7 @@ Patch patch_of(const TouchSurface& top, const PressedBlock& block) {
 }
 
 double linear_stiffness(const PressedBlock& block, double cells) {
-  const Solid solid = graded(block, Law::kLinear, cells);
+  const Solid solid = graded(block, softbody::Law::kLinear, cells);
   const TouchSurface top(solid.mesh(), Vec3::UnitZ(), block.patch_radius);
   return LinearModel(solid, top).press(patch_of(top, block), Given::kForce, block.loads[0]).stiffness;
 }
@@ -94,9 +94,9 @@ void PressedBlock::check() const {
 /// The linear body on the finest mesh, condensed to where tools go.
 struct Truth::Fine {
   Fine(const PressedBlock& block, double cells)
-      : solid(graded(block, Law::kLinear, cells)),
+      : solid(graded(block, softbody::Law::kLinear, cells)),
         top(solid.mesh(), Vec3::UnitZ(), block.patch_radius),
-        model(solid, top, top.nodes_of_patches(top.across(block.touch_point()), 1.01 * kReach * block.patch_radius)),
+        model(solid, top, top.nodes_of_patches(top.across(block.touch_point()), 1.01 * kSlide * block.patch_radius)),
         contact(model, top, 0, PatchContact::Side::kUnilateral) {}
 
   Solid solid;
@@ -117,7 +117,7 @@ Truth::Truth(const PressedBlock& block, const Config& config) : block_(block), c
 }
 
 Stiffness Truth::stiffness(std::size_t load) {
-  const auto found = limit(Law::kNeoHookean, load);
+  const auto found = limit(softbody::Law::kNeoHookean, load);
   if (!found) throw std::invalid_argument("--loads-n: the block collapses under so large a force");
   return *found;
 }
@@ -125,7 +125,7 @@ Stiffness Truth::stiffness(std::size_t load) {
 double Truth::uncertainty() {
   if (!uncertainty_) {
     uncertainty_ = std::abs(linear_stiffness(block_, config_.cells / kCoarser) / linear_ - 1);
-    const auto coarse = ratios(Law::kNeoHookean, block_.material, config_.cells_for_large / kCoarser)[1];
+    const auto coarse = ratios(softbody::Law::kNeoHookean, block_.material, config_.cells_for_large / kCoarser)[1];
     if (coarse) *uncertainty_ += std::abs(coarse->secant * linear_ / stiffness(1).secant - 1);
   }
   return *uncertainty_;
@@ -152,14 +152,14 @@ const std::vector<Touched>& Truth::script() {
   for (int i = 0; i < kSamples; ++i) {
     const double phase = 3.0 * (i + 0.5) / kSamples;  // press, slide, release
     const auto ease = [](double x) { return 0.5 - 0.5 * std::cos(std::numbers::pi * std::clamp(x, 0.0, 1.0)); };
-    const Vec3 tool = block_.touch_point() + Vec3(ease(phase - 1) * kReach * block_.patch_radius, 0,
+    const Vec3 tool = block_.touch_point() + Vec3(ease(phase - 1) * kSlide * block_.patch_radius, 0,
                                                   -depth * (1.2 * (ease(phase) - ease(phase - 2)) - 0.2));
     script_.push_back({tool, force(tool)});
   }
   return script_;
 }
 
-Truth::AtLoads Truth::ratios(Law law, const Material& material, double cells) const {
+Truth::AtLoads Truth::ratios(softbody::Law law, const Material& material, double cells) const {
   PressedBlock block = block_;
   block.material = material;
   const double linear = linear_stiffness(block, cells);
@@ -175,15 +175,15 @@ Truth::AtLoads Truth::ratios(Law law, const Material& material, double cells) co
   return result;
 }
 
-std::optional<Stiffness> Truth::limit(Law law, const Material& material, std::size_t load) {
+std::optional<Stiffness> Truth::limit(softbody::Law law, const Material& material, std::size_t load) {
   const auto [found, is_new] = limits_.try_emplace({law, material.young, material.poisson});
   if (is_new) {
     PressedBlock other = block_;
     other.material = material;
     const bool same = material.young == block_.material.young && material.poisson == block_.material.poisson;
     const double linear = same ? linear_ : linear_stiffness(other, config_.cells);
-    found->second = law == Law::kLinear ? AtLoads{Stiffness{1, 1}, Stiffness{1, 1}}
-                                        : ratios(law, material, config_.cells_for_large);
+    found->second = law == softbody::Law::kLinear ? AtLoads{Stiffness{1, 1}, Stiffness{1, 1}}
+                                                  : ratios(law, material, config_.cells_for_large);
     for (auto& at : found->second) {
       if (at) at = Stiffness{at->secant * linear, at->tangent * linear};
     }

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <fstream>
 #include <stdexcept>
+#include <utility>
 #include <variant>
 
 #include "clients/softbody/scene.h"
@@ -20,22 +21,24 @@ constexpr int kMostPresses = 10;  // of Newton's method, for an answer under a l
 constexpr int kPatienceS = 600;
 constexpr double kFirstDepth = 1e-4;  // m, to see how stiff it is
 
+/// Repeats the press until Newton's method converges. If the body collapses, the method never converges.
+template <class AnyBody>
+Reaction pressed(AnyBody& body, double load) {
+  Reaction reaction;
+  for (int i = 0; i < kMostPresses && !(i > 0 && reaction.error <= 1e-4 * load); ++i) {
+    reaction = body.press(Given::kForce, load);
+  }
+  return reaction;
+}
+
 class OwnEngine final : public PressedEngine {
  public:
-  explicit OwnEngine(const BodyConfig& config)
-      : model_(config.model), learned_(config.learn || config.tabulate), body_(config) {}
+  explicit OwnEngine(const BodyConfig& config) : learned_(config.near.learns()), body_(config) {}
 
   Feel touch(const Vec3& tool) override { return body_.touch(tool); }
-  /// A body with time waits until it is at rest, and rounds until they change nothing. Newton's method is there at once;
-  /// or never, where the body collapses.
   Reaction under(double load) override {
-    if (body_.step() > 0 || model_ == ModelKind::kProjective) return body_.settle(Given::kForce, load);
-    if (learned_) return learned_under(load);
-    Reaction reaction;
-    for (int i = 0; i < kMostPresses && !(i > 0 && reaction.error <= 1e-4 * load); ++i) {
-      reaction = body_.press(Given::kForce, load);
-    }
-    return reaction;
+    if (body_.step() > 0) return body_.settle(Given::kForce, load);
+    return learned_ ? learned_under(load) : pressed(body_, load);
   }
   double step() const override { return body_.step(); }
   Body::Size size() const override { return body_.size(); }
@@ -51,9 +54,29 @@ class OwnEngine final : public PressedEngine {
     return reaction;
   }
 
-  ModelKind model_;
   bool learned_;
   Body body_;
+};
+
+class ComparedEngine final : public PressedEngine {
+ public:
+  ComparedEngine(compared::Kind kind, Solid solid, double patch_radius, const Vec3& middle,
+                 const compared::Config& config)
+      : kind_(kind), body_(kind, std::move(solid), patch_radius, middle, config) {}
+
+  Feel touch(const Vec3& tool) override { return body_.touch(tool); }
+  /// Models with time steps or with a fixed number of iterations need several presses to come to rest.
+  Reaction under(double load) override {
+    const bool settles = body_.step() > 0 || kind_ == compared::Kind::kProjective;
+    return settles ? body_.settle(Given::kForce, load) : pressed(body_, load);
+  }
+  double step() const override { return body_.step(); }
+  Body::Size size() const override { return body_.size(); }
+  double took(const Meter::Reading& cost) const override { return cost.processor; }
+
+ private:
+  compared::Kind kind_;
+  compared::PressedBody body_;
 };
 
 std::string in_mm(const Vec3& metres) {
@@ -129,6 +152,11 @@ class WorkerEngine final : public PressedEngine {
 }  // namespace
 
 std::unique_ptr<PressedEngine> own_engine(const BodyConfig& config) { return std::make_unique<OwnEngine>(config); }
+
+std::unique_ptr<PressedEngine> compared_engine(compared::Kind kind, Solid solid, double patch_radius,
+                                               const Vec3& middle, const compared::Config& config) {
+  return std::make_unique<ComparedEngine>(kind, std::move(solid), patch_radius, middle, config);
+}
 
 std::unique_ptr<PressedEngine> worker_engine(const BodyConfig& block, const std::string& command) {
   return std::make_unique<WorkerEngine>(block, command);

@@ -6,7 +6,9 @@
 #include <string>
 
 #include "clients/softbody/body.h"
+#include "clients/softbody/fem/solid.h"
 #include "tests/tools/lab/experiments/meter.h"
+#include "tests/tools/lab/models/compared.h"
 
 namespace tendon::lab {
 
@@ -32,6 +34,11 @@ class PressedEngine {
 
 /// The body that `config` describes, in this process. Throws what Body throws.
 std::unique_ptr<PressedEngine> own_engine(const softbody::BodyConfig& config);
+
+/// Creates an engine with a comparison model. See compared::PressedBody for the arguments and the exceptions.
+std::unique_ptr<PressedEngine> compared_engine(softbody::compared::Kind kind, softbody::Solid solid,
+                                               double patch_radius, const softbody::Vec3& middle,
+                                               const softbody::compared::Config& config);
 
 /// The same block, as the worker that `command` starts answers for it: the path of a scene with the model `linear` is
 /// appended to the command. Throws std::runtime_error when it does not start, or gives no answer for ten minutes.

@@ -13,8 +13,9 @@
 #include <stdexcept>
 
 #include "core/base/expect.h"
+#include "core/base/nearest_word.h"
 #include "core/base/portable_math.h"
-#include "devices/simulated/recorded_motion.h"
+#include "server/tables/recorded_motion.h"
 #include "tests/support/dice.h"
 #include "tests/tools/lab/experiments/paper.h"
 
@@ -238,23 +239,12 @@ void recorded(Draft& draft) {
   const std::filesystem::path file = folder / (foam ? "m2_question1d_foam.csv" : "m2_question1d_rigid.csv");
   std::ifstream csv(file);
   if (!csv) throw std::runtime_error(file.string() + ": cannot be read");
-  constexpr double kArm = 0.075;  // m for each rad
-  constexpr int kThin = 8;        // 2 kHz recorded: 250 Hz are more than a hand has
+  constexpr double kArm = 0.075;    // m for each rad
+  constexpr std::size_t kThin = 8;  // 2 kHz recorded: 250 Hz are more than a hand has
+  const auto all = load_recorded_motion(csv, {.path = file, .position = "master_pos_rad"}).samples;
   ScriptedMotion::Recorded motion;
-  std::string line;
-  std::getline(csv, line);
-  double start = 0;
-  double origin = 0;
-  for (int row = 0; std::getline(csv, line); ++row) {
-    if (row % kThin != 0) continue;
-    char* end = nullptr;
-    const double t = std::strtod(line.c_str(), &end);
-    const double angle = std::strtod(end + 1, nullptr);
-    if (motion.samples.empty()) {
-      start = t;
-      origin = angle;
-    }
-    motion.samples.push_back({t - start, kArm * (angle - origin)});
+  for (std::size_t i = 0; i < all.size(); i += kThin) {
+    motion.samples.push_back({all[i].t - all[0].t, kArm * (all[i].x - all[0].x)});
   }
   draft.hand.hand->motion = ScriptedMotion(motion);
   draft.frequency = 0;
@@ -304,7 +294,8 @@ std::span<const SituationKind> situation_kinds() noexcept { return kInfos; }
 std::optional<Trial> draw_situation(std::string_view kind, std::uint64_t seed) {
   const auto* const found = std::ranges::find(kKinds, kind, [](const Kind& one) { return one.info.name; });
   if (found == kKinds.end()) {
-    throw std::invalid_argument("kind \"" + std::string(kind) + "\": expected one of " + names_of_kinds());
+    throw std::invalid_argument("kind \"" + std::string(kind) + "\": expected one of " + names_of_kinds() +
+                                did_you_mean(kind, names_of_kinds()));
   }
   if (kind == "recorded" && data_folder() == nullptr) return std::nullopt;
   Dice dice(seed);
@@ -312,10 +303,10 @@ std::optional<Trial> draw_situation(std::string_view kind, std::uint64_t seed) {
   Trial& trial = draft.trial;
   Experiment& set = trial.experiment;
 
-  constexpr std::array kDevices = {Friction{.coulomb = 0.02, .viscous = 0.26},
-                                   Friction{.coulomb = 0.04, .viscous = 0.05},
-                                   Friction{.coulomb = 0.04, .viscous = 0.005}};
-  const Friction friction = kDevices[std::min<std::size_t>(static_cast<std::size_t>(dice.within(0, 3)), 2)];
+  constexpr std::array kFrictions = {Friction{.coulomb = 0.02, .viscous = 0.26},
+                                     Friction{.coulomb = 0.04, .viscous = 0.05},
+                                     Friction{.coulomb = 0.04, .viscous = 0.005}};
+  const Friction friction = kFrictions[std::min<std::size_t>(static_cast<std::size_t>(dice.within(0, 3)), 2)];
   draft.k = one_of(dice, std::array{100.0, 300.0, 500.0, 1000.0, 2000.0, 8000.0});
   const double delay = one_of(dice, std::array{0.0, 5.0, 20.0, 80.0});
   const double jitter = one_of(dice, std::array{0.0, 10.0});

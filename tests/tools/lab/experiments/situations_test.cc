@@ -7,6 +7,7 @@
 #include <sstream>
 #include <string>
 
+#include "tests/support/refusal.h"
 #include "tests/tools/lab/experiments/compare_kinds.h"
 
 namespace tendon::lab::situations_test {
@@ -92,7 +93,7 @@ TEST(Situations, AWallAfterWavingIsNoLouderThanWithThreeParts) {
     for (const Case& device :
          {Case{{.coulomb = 0.02, .viscous = 0.26}, false}, Case{{.coulomb = 0.04, .viscous = 0.05}, false},
           Case{{.coulomb = 0.04, .viscous = 0.005}, false}, Case{{.coulomb = 0.02, .viscous = 0.26}, true}}) {
-      for (const std::uint64_t seed : {1, 2, 3}) {
+      for (const std::uint64_t seed : {1U, 2U, 3U}) {
         const Trial trial = before_a_wall(kind, seed, device.friction, device.firm);
         const Outcome feel = outcome_of(kFeel, trial);
         const Outcome three = outcome_of({.name = "aol+", .promises = true}, trial);
@@ -106,14 +107,11 @@ TEST(Situations, AWallAfterWavingIsNoLouderThanWithThreeParts) {
 }
 
 TEST(CompareKinds, RefusesANameThatIsNoneAndSaysWhichThereAre) {
-  const auto complaint = [](const CompareKindsOptions& options) -> std::string {
-    try {
+  const auto complaint = [](const CompareKindsOptions& options) {
+    return thrown_by([&] {
       std::ostringstream out;
       compare_kinds(options, out);
-    } catch (const std::invalid_argument& refused) {
-      return refused.what();
-    }
-    return "none";
+    });
   };
   EXPECT_NE(complaint({.kinds = {"walls"}}).find("expected one of grid, counts"), std::string::npos);
   EXPECT_NE(complaint({.kinds = {"wall"}, .laws = {"feeel"}}).find("feel-unconditional"), std::string::npos);

@@ -2,12 +2,14 @@
 #pragma once
 
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <functional>
 #include <limits>
 #include <numbers>
 #include <stdexcept>
+#include <string>
 #include <vector>
 
 #include "core/haptic_controller.h"
@@ -100,18 +102,28 @@ inline std::vector<StepRecord> toy_run(Law law, std::uint64_t steps) {
   return run;
 }
 
-/// The run as a file. `whole` is false: as a killed server leaves it.
-inline void record(const std::filesystem::path& file, const std::vector<StepRecord>& run, bool whole = true) {
+/// Writes the runs of several devices to a file. `names` contains the names of all devices except the first. All runs except
+/// the first can be empty.
+inline void record_devices(const std::filesystem::path& file, const std::vector<std::vector<StepRecord>>& runs,
+                           const std::vector<std::string>& names, bool whole = true) {
   FileSink sink(file);
   Recorder::Config config;
-  config.started = run.front().hand.at;
+  config.started = runs.front().front().hand.at;
+  for (const std::string& name : names) config.more_devices.push_back({.name = name, .scene = {}});
   Recorder recorder(config, sink);
-  for (const StepRecord& step : run) {
-    recorder.record(step);
-    recorder.tick(step.hand.at);
+  for (std::size_t n = 0; n < runs.front().size(); ++n) {
+    for (std::size_t device = 0; device < runs.size(); ++device) {
+      if (n < runs[device].size()) recorder.record(runs[device][n], device);
+    }
+    recorder.tick(runs.front()[n].hand.at);
   }
   if (whole) recorder.close();
   if (!sink.error().empty()) throw std::runtime_error(sink.error());
+}
+
+/// The run as a file. `whole` is false: as a killed server leaves it.
+inline void record(const std::filesystem::path& file, const std::vector<StepRecord>& run, bool whole = true) {
+  record_devices(file, {run}, {}, whole);
 }
 
 }  // namespace tendon::lab::testing

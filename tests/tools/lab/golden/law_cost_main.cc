@@ -7,6 +7,7 @@
 #include <string_view>
 
 #include "core/control/preset.h"
+#include "tests/support/plain_usage.h"
 #include "tests/tools/lab/experiments/law_steps.h"
 #include "tests/tools/lab/experiments/paper.h"
 
@@ -31,7 +32,15 @@ void count(const LimiterConfig& config, std::string_view name) {
 
 }  // namespace
 
-int main() {
+int main(int argc, char** argv) {
+  const PlainUsage usage{
+      .help =
+          "Usage: law-cost\n\n"
+          "Steps every law of the limiter, so that callgrind can count the instructions, and prints\n"
+          "the laws' names.\n\n"
+          "Example: tendon-lab golden --cost\n"
+          "Exit: 0 done; 2 wrong usage.\n"};
+  if (const auto code = answer(usage, argc, argv)) return *code;
   for (const LawInfo& law : laws()) {
     LimiterConfig config = lab::measured_limiter(law.law);
     config.parts = lab::default_parts(lab::kPaperEncoder);

@@ -5,6 +5,7 @@
 #include <span>
 #include <string_view>
 
+#include "core/handle/handle_bounds.h"
 #include "core/handle/turn_friction.h"
 
 namespace tendon::lab {
@@ -29,16 +30,21 @@ struct FreedomInfo {
   std::string_view table;        ///< of a scene, where the bounds go
   std::string_view coulomb_key;  ///< there
   std::string_view viscous_key;
-  double share;  ///< a bound is so much of what was found
+  double share;                          ///< a bound is so much of what was found
+  HandleBounds bounds;                   ///< the limits of real handles
+  std::string_view wrong_position_unit;  ///< a common wrong unit for positions
+  std::string_view wrong_inertia_unit;
+  std::string_view wrong_step_unit;
 };
 
 inline constexpr FreedomInfo kFreedoms[] = {
     {Freedom::kMovement, "movement", "x_m", "force_n", "m", "N", "N·s/m", "kg", "limiter", "coulomb_friction_n",
-     "viscous_friction_n_s_per_m", 1},
+     "viscous_friction_n_s_per_m", 1, kMovementBounds, "mm", "g", "µm"},
     {Freedom::kRotation, "rotation", "angle_rad", "torque_nm", "rad", "N·m", "N·m·s/rad", "kg·m²", "limiter.rotation",
-     "coulomb_friction_nm", "viscous_friction_nm_s_per_rad", kTurnFrictionShare},
+     "coulomb_friction_nm", "viscous_friction_nm_s_per_rad", kTurnFrictionShare, kRotationBounds, "degrees", "g·cm²",
+     "mrad"},
     {Freedom::kGripper, "gripper", "x_m", "force_n", "m", "N", "N·s/m", "kg", "limiter.gripper", "coulomb_friction_n",
-     "viscous_friction_n_s_per_m", 1},
+     "viscous_friction_n_s_per_m", 1, kMovementBounds, "mm", "g", "µm"},
 };
 
 constexpr const FreedomInfo& info(Freedom freedom) noexcept { return kFreedoms[static_cast<std::size_t>(freedom)]; }

@@ -13,6 +13,8 @@
 #include <string_view>
 #include <utility>
 
+#include "core/base/expect.h"
+#include "core/base/nearest_word.h"
 #include "core/identification/friction_identification.h"
 #include "devices/simulated/profiles.h"
 #include "tests/support/json_line.h"
@@ -22,6 +24,7 @@
 namespace tendon::lab {
 namespace {
 
+constexpr double kMostInterval = 0.05;      // s; 20 Hz is too slow for this experiment
 constexpr double kEncoderStep = 3e-5;       // m
 constexpr double kAngularStep = 1e-4;       // rad
 constexpr double kSimulatedMass = 0.075;    // kg
@@ -37,6 +40,11 @@ struct Source {
   IdentificationConfig config{};
   std::function<RampRun(std::size_t)> run{};
 };
+
+std::string inertia_bounds(const FreedomInfo& freedom) {
+  return "expected " + shortest(freedom.bounds.least_inertia) + " to " + shortest(freedom.bounds.most_inertia) + " " +
+         std::string(freedom.inertia_unit) + ", as every handle has";
+}
 
 void check(const IdentifyOptions& options) {
   const int sources =
@@ -54,6 +62,17 @@ void check(const IdentifyOptions& options) {
   };
   check_positive(options.mass, "--mass");
   check_positive(options.encoder_step, "--encoder-step");
+  const FreedomInfo& freedom = info(options.freedom);
+  const HandleBounds& bounds = freedom.bounds;
+  if (options.mass && (*options.mass < bounds.least_inertia || *options.mass > bounds.most_inertia)) {
+    throw std::invalid_argument("--mass " + shortest(*options.mass) + ": " + inertia_bounds(freedom) + "; is it in " +
+                                std::string(freedom.wrong_inertia_unit) + "?");
+  }
+  if (options.encoder_step && *options.encoder_step > bounds.encoder_step) {
+    throw std::invalid_argument("--encoder-step " + shortest(*options.encoder_step) + ": expected at most " +
+                                shortest(bounds.encoder_step) + " " + std::string(freedom.position_unit) +
+                                "; is it in " + std::string(freedom.wrong_step_unit) + "?");
+  }
   if (options.profile && options.freedom != Freedom::kMovement) {
     throw std::invalid_argument("--simulate " + *options.profile + ": expected --of movement: no profile has motors " +
                                 "that turn or grip; --simulate-friction simulates them");
@@ -66,7 +85,8 @@ SimulatedDevice::Config device_of(const IdentifyOptions& options) {
     if (profile == nullptr) {
       std::string known;
       for (const DeviceProfile& each : device_profiles()) known += (known.empty() ? "" : ", ") + std::string(each.name);
-      throw std::invalid_argument("--simulate " + *options.profile + ": expected one of " + known);
+      throw std::invalid_argument("--simulate " + *options.profile + ": expected one of " + known +
+                                  did_you_mean(*options.profile, known));
     }
     SimulatedDevice::Config device = profile->device();
     device.amplifier_bandwidth.reset();  // the experiment takes seconds: a lag of a millisecond is none
@@ -142,15 +162,64 @@ Source recorded(const IdentifyOptions& options) {
   return source;
 }
 
+/// Returns an error message if no handle can do this run, and an empty text otherwise.
+std::string impossible(const FreedomInfo& freedom, const RampRun& run) {
+  if (run.samples.size() < 2) return "";
+  const auto count = static_cast<double>(run.samples.size() - 1);
+  const double interval = (run.samples.back().t - run.samples.front().t) / count;
+  if (interval > kMostInterval) {
+    return "the samples are " + rounded(interval, 4) + " s apart, expected at most " + shortest(kMostInterval) +
+           " s; are the times in ms?";
+  }
+  const auto [least, most] = std::ranges::minmax(run.samples, {}, &RampSample::position);
+  const double travel = most.position - least.position;
+  if (travel <= freedom.bounds.travel) return "";
+  const std::string unit(freedom.position_unit);
+  return "the travel is " + rounded(travel, 4) + " " + unit + ", expected at most " +
+         rounded(freedom.bounds.travel, 4) + " " + unit + ", which no handle exceeds; are the positions in " +
+         std::string(freedom.wrong_position_unit) + "?";
+}
+
 /// Throws std::runtime_error, naming the run, when it cannot be used.
 RunEstimate fit_of(const Source& source, std::size_t i) {
   RampRun run = source.run(i);
   if (!source.places.empty()) run.place = source.places.at(i);
+  if (const std::string why = impossible(source.freedom, run); !why.empty()) {
+    throw std::runtime_error(source.names.at(i) + ": " + why);
+  }
   try {
     return fit_run(run, source.config);
   } catch (const std::invalid_argument& error) {
     throw std::runtime_error(source.names.at(i) + ": " + error.what());
   }
+}
+
+/// Throws std::runtime_error if no real handle can have these results.
+void refuse_impossible(const Source& source, const Identification& result) {
+  const FreedomInfo& freedom = source.freedom;
+  const HandleBounds& bounds = freedom.bounds;
+  const std::string position(freedom.position_unit);
+  const std::string effort(freedom.effort_unit);
+  if (!(result.mass >= bounds.least_inertia)) {
+    throw std::runtime_error("the runs fit an inertia of " + rounded(result.mass, 4) + " " +
+                             std::string(freedom.inertia_unit) + ", " + inertia_bounds(freedom) +
+                             "; are the positions in " + std::string(freedom.wrong_position_unit) +
+                             ", or the times in µs?");
+  }
+  if (!(result.mass <= bounds.most_inertia)) {
+    throw std::runtime_error("the runs fit an inertia of " + rounded(result.mass, 4) + " " +
+                             std::string(freedom.inertia_unit) + ", " + inertia_bounds(freedom) +
+                             "; are the times in ms, or the efforts in m" + effort + "?");
+  }
+  const auto check_friction = [&](double found, double most, std::string_view unit) {
+    if (std::abs(found) <= most) return;
+    throw std::runtime_error("the runs fit a friction of " + rounded(found, 4) + " " + std::string(unit) +
+                             ", expected at most " + shortest(most) + " " + std::string(unit) +
+                             ", which no handle exceeds; are all columns in s, " + position + " and " + effort +
+                             ", and the mass in " + std::string(freedom.inertia_unit) + "?");
+  };
+  check_friction(result.estimate.viscous, bounds.friction.viscous, freedom.viscous_unit);
+  check_friction(result.estimate.coulomb, bounds.friction.coulomb, freedom.effort_unit);
 }
 
 Friction bound_of(const Source& source, const Identification& result) {
@@ -214,6 +283,7 @@ void write_table(const Source& source, const Identification& result, std::ostrea
                    result.force_noise, std::string(freedom.effort_unit).c_str())
       << "Trusted: " << to_string(result.trust) << ". " << result.reason << ".\n";
   for (const std::string& warning : result.warnings) out << "Warning: " << warning << ".\n";
+  if (result.trust == Trust::kNeither) return;
   const Friction bound = bound_of(source, result);
   out << "\n# Lower bounds (3 standard deviations" << (freedom.share < 1 ? ", and 2 % for turns about moving axes" : "")
       << ") for a scene:\n[" << freedom.table << "]\n"
@@ -246,7 +316,7 @@ void write_json(const Source& source, const Identification& result, std::ostream
   JsonLine line;
   line.add("result", to_string(result.trust)).add("of", source.freedom.name).add("reason", result.reason);
   add(line, "estimate_", result.estimate, turns);
-  add(line, "lower_bound_", bound_of(source, result), turns);
+  if (result.trust != Trust::kNeither) add(line, "lower_bound_", bound_of(source, result), turns);
   line.add(turns ? "inertia_kg_m2" : "mass_kg", result.mass)
       .add(turns ? "torque_noise_nm" : "force_noise_n", result.force_noise)
       .add("warnings", result.warnings);
@@ -328,7 +398,10 @@ void identify(const IdentifyOptions& options, std::ostream& out) {
   check(options);
   const Source source = options.files.empty() ? simulated(options) : recorded(options);
   const auto fits = outcomes(work_of(source), options.part, out);
-  if (fits) (options.json ? write_json : write_table)(source, identify_friction(*fits), out);
+  if (!fits) return;
+  const Identification result = identify_friction(*fits);
+  refuse_impossible(source, result);
+  (options.json ? write_json : write_table)(source, result, out);
 }
 
 }  // namespace tendon::lab

@@ -31,12 +31,14 @@ struct IdentifyOptions {
   Part part{};  ///< its units are the runs, in their order: the files, or 30 that are simulated
 };
 
-/// Identifies the friction and writes to `out` a table, which method is trusted and why, and a fragment of a scene with
-/// the lower bounds; or one line of JSON for each run and a last one for the result.
+/// Identifies the friction and writes the result to `out`. The result is a table, the trusted method and the reason, and
+/// a fragment of a scene with the lower bounds. If neither method is trusted, there is no fragment. With `json`, the
+/// result is one line for each run and one more line.
 ///
-/// But for a shard of a sweep nothing is written before all is known. Throws std::invalid_argument when the options make
-/// no sense, before anything is read; std::runtime_error when a file cannot be read or a run cannot be used, naming the
-/// file.
+/// Outside a sweep, it writes nothing before the whole result is known. It throws std::invalid_argument if the options
+/// are wrong, before it reads a file. It throws std::runtime_error with the name of the file if it cannot read or use a
+/// run. It also throws if the travel, the mass or the friction is beyond the limits in HandleBounds, and the message names
+/// the unit that the user probably meant.
 void identify(const IdentifyOptions& options, std::ostream& out);
 
 }  // namespace tendon::lab

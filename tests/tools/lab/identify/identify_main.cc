@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "clients/cpp/usage.h"
 #include "server/build_info.h"
 #include "tests/support/part_options.h"
 #include "tests/support/run_tool.h"
@@ -16,6 +17,7 @@ namespace {
 
 int main(int argc, char** argv) {
   CLI::App app("Viscous and Coulomb friction of a haptic device, as lower bounds for the limiter.", "tendon-identify");
+  usage::dress(app);
   app.footer(
       "\nA run: one axis free, the others held, gravity compensated, nobody touches the handle; the force rises from 0 "
       "at\n"
@@ -41,9 +43,7 @@ int main(int argc, char** argv) {
   for (const FreedomInfo& each : kFreedoms) freedoms.emplace(each.name, each.freedom);
   double mass = 0;
   double encoder_step = 0;
-  app.add_option("--of", options.freedom, "what the runs move")
-      ->transform(CLI::CheckedTransformer(freedoms, CLI::ignore_case).description(""))
-      ->type_name("movement|rotation|gripper");
+  app.add_option("--of", options.freedom, "what the runs move")->transform(usage::one_of(freedoms));
   app.add_option("RUN", files, "runs, one file each")->type_name("FILE.csv");
   app.add_option("--axis", options.places, "axis and pose of a run; once for each file, in order")
       ->type_name("TEXT")

@@ -20,8 +20,14 @@ namespace {
 
 class Identify : public ::testing::Test {
  protected:
+  /// The numbers of each column are multiplied by these factors.
+  struct Mistake {
+    double time = 1, position = 1, force = 1;
+  };
+
   /// Runs of a device with b = 0.005 N·s/m and f_c = 0.05 N, as files.
-  std::vector<std::filesystem::path> recorded_runs() {
+  std::vector<std::filesystem::path> recorded_runs() { return recorded_runs(Mistake()); }
+  std::vector<std::filesystem::path> recorded_runs(const Mistake& by) {
     RampExperiment experiment;
     experiment.device.mass = 0.075;
     experiment.device.viscous_friction = 0.005;
@@ -35,7 +41,7 @@ class Identify : public ::testing::Test {
       file.precision(12);
       file << "t_s,x_m,force_n\n";
       for (const RampSample& sample : run.samples) {
-        file << sample.t << ',' << sample.position << ',' << sample.force << '\n';
+        file << by.time * sample.t << ',' << by.position * sample.position << ',' << by.force * sample.force << '\n';
       }
     }
     return files;
@@ -173,6 +179,33 @@ TEST_F(Identify, NamesTheFileAndTheLineThatIsBad) {
   EXPECT_EQ(error_of({.files = files}), files[3].string() + ":3: expected a finite number as x_m, found 'oops'");
 }
 
+// With times in ms, the tool trusted a friction that was 1000 times too high.
+TEST_F(Identify, RefusesWhatNoHandleHasAndNamesTheUnitThatWasMeant) {
+  const auto ms = recorded_runs({.time = 1000});
+  EXPECT_EQ(error_of({.files = ms}),
+            ms[0].string() + ": the samples are 1 s apart, expected at most 0.05 s; are the times in ms?");
+  const std::string mm = error_of({.files = recorded_runs({.position = 1000})});
+  EXPECT_TRUE(holds(mm, "0.csv: the travel is ")) << mm;
+  EXPECT_TRUE(holds(mm, " m, expected at most 3 m, which no handle exceeds; are the positions in mm?")) << mm;
+  const std::string mn = error_of({.files = recorded_runs({.force = 1000})});
+  EXPECT_TRUE(holds(mn, "the runs fit an inertia of 7")) << mn;
+  EXPECT_TRUE(holds(mn, "kg, expected 0.001 to 20 kg, as every handle has; are the times in ms, or the efforts in mN?"))
+      << mn;
+  const auto runs = recorded_runs();
+  EXPECT_EQ(error_of({.files = runs, .mass = 75}),
+            "--mass 75: expected 0.001 to 20 kg, as every handle has; is it in g?");
+  EXPECT_EQ(error_of({.files = runs, .encoder_step = 30}), "--encoder-step 30: expected at most 0.001 m; is it in µm?");
+}
+
+TEST_F(Identify, GivesNoBoundsWhereNothingIsTrusted) {
+  IdentifyOptions options{.simulated_friction = Friction{.coulomb = 0.05, .viscous = 0.26}, .mass = 0.0375};
+  const std::string text = output_of(options);
+  EXPECT_TRUE(holds(text, "Trusted: neither.")) << text;
+  EXPECT_FALSE(holds(text, "ower bound")) << text;
+  options.json = true;
+  EXPECT_FALSE(holds(output_of(options), "lower_bound"));
+}
+
 TEST_F(Identify, NamesTheFileWhoseRunCannotBeUsed) {
   auto files = recorded_runs();
   {
@@ -187,7 +220,8 @@ TEST_F(Identify, RefusesOptionsThatMakeNoSense) {
   EXPECT_TRUE(holds(error_of({}), "expected a CSV file"));
   EXPECT_TRUE(holds(error_of({.files = {"a.csv"}, .profile = "touch"}), "more than one"));
   EXPECT_TRUE(holds(error_of({.files = {"a.csv"}, .places = {"x", "y"}}), "--axis once for each of 1 files, found 2"));
-  EXPECT_EQ(error_of({.profile = "tuch"}), "--simulate tuch: expected one of phantom-premium, touch, falcon");
+  EXPECT_EQ(error_of({.profile = "tuch"}),
+            "--simulate tuch: expected one of phantom-premium, touch, falcon; did you mean touch?");
   EXPECT_TRUE(holds(error_of({.profile = "touch", .mass = -1}), "--mass -1"));
   EXPECT_TRUE(holds(error_of({.profile = "touch", .encoder_step = 0}), "--encoder-step 0"));
   EXPECT_TRUE(holds(error_of({.simulated_friction = Friction{.coulomb = -1, .viscous = 0.1}}), "coulomb_friction"));

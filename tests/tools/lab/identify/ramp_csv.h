@@ -10,13 +10,12 @@
 
 namespace tendon::lab {
 
-/// One run of the friction experiment from a CSV file: a header line that names the columns `t_s` and the two of
-/// `freedom` (`x_m` and `force_n`, or `angle_rad` and `torque_nm`; in any order, others are ignored), then one sample
-/// per line; commas, `.` as decimal point, no quotes.
+/// Reads one run of the friction experiment with TableReader. The header names the column `t_s` and the two columns of
+/// `freedom` (`x_m` and `force_n`, or `angle_rad` and `torque_nm`). Their order is free, other columns are ignored, and
+/// other units are converted.
 ///
-/// Throws std::runtime_error "file:line: what was expected, what was found": no header, a column missing or twice, a
-/// row with too few cells or one that is not a finite number, time that does not increase, more than 4 million rows.
-/// Blank lines are skipped.
+/// It throws std::runtime_error with file and line if TableReader refuses the file, if a column is missing, if the time
+/// does not increase, or if there are more than 4 million rows.
 RampRun read_ramp_csv(std::istream& in, const std::string& name, Freedom freedom = Freedom::kMovement);
 
 /// The same from a file; throws std::runtime_error when it cannot be opened.

@@ -7,6 +7,8 @@
 #include <stdexcept>
 #include <string>
 
+#include "tests/support/refusal.h"
+
 namespace tendon::lab::ramp_csv_test {
 namespace {
 
@@ -16,12 +18,7 @@ RampRun read(const std::string& text) {
 }
 
 std::string error_of(const std::string& text) {
-  try {
-    read(text);
-  } catch (const std::runtime_error& error) {
-    return error.what();
-  }
-  return "no error";
+  return thrown_by<std::runtime_error>([&] { read(text); });
 }
 
 TEST(RampCsv, ReadsItsColumnsInAnyOrderAmongOthers) {
@@ -35,16 +32,24 @@ TEST(RampCsv, ReadsItsColumnsInAnyOrderAmongOthers) {
 }
 
 TEST(RampCsv, SaysInWhichLineWhatIsWrong) {
-  EXPECT_EQ(error_of(""), "run.csv:0: expected a header line with t_s, x_m and force_n, found nothing");
+  EXPECT_EQ(error_of(""), "run.csv:1: expected a header line with a column 't_s', found an empty file");
   EXPECT_EQ(error_of("0,0,0\n"), "run.csv:1: expected a header line with a column 't_s', found '0,0,0'");
   EXPECT_EQ(error_of("t_s,x_m\n"), "run.csv:1: expected a header line with a column 'force_n', found 't_s,x_m'");
   EXPECT_EQ(error_of("t_s,x_m,x_m,force_n\n"), "run.csv:1: expected one column 'x_m', found two");
   const std::string good = "t_s,x_m,force_n\n0,0,0\n";
-  EXPECT_EQ(error_of(good + "\n1,2\n"), "run.csv:4: expected a finite number as force_n, found the end of the line");
+  EXPECT_EQ(error_of(good + "\n1,2\n"), "run.csv:4: expected 3 cells as in the first row, found 2");
   EXPECT_EQ(error_of(good + "1,2 m,3\n"), "run.csv:3: expected a finite number as x_m, found '2 m'");
   EXPECT_EQ(error_of(good + "1,nan,3\n"), "run.csv:3: expected a finite number as x_m, found 'nan'");
   EXPECT_EQ(error_of(good + "1,,3\n"), "run.csv:3: expected a finite number as x_m, found ''");
   EXPECT_EQ(error_of(good + "0,1,1\n"), "run.csv:3: expected a time after that of the row before, found '0'");
+}
+
+TEST(RampCsv, ConvertsTheUnitsThatItsColumnsName) {
+  const RampRun run = read("t_ms;x_mm;Force [mN]\n0;1,5;500\n2;-2;600\n");
+  ASSERT_EQ(run.samples.size(), 2U);
+  EXPECT_EQ(run.samples[1].t, 0.002);
+  EXPECT_EQ(run.samples[0].position, 0.0015);
+  EXPECT_EQ(run.samples[1].force, 0.6);
 }
 
 TEST(RampCsv, SaysThatAFileIsNotThere) {

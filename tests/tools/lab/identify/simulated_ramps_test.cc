@@ -4,9 +4,9 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <stdexcept>
 
 #include "core/identification/friction_identification.h"
+#include "tests/support/refusal.h"
 
 /// The identification against a device with an encoder of 30 µm and 5 mN of force noise.
 
@@ -39,15 +39,15 @@ TEST(SimulatedRamps, TheSameSeedGivesTheSameRunsAndAnotherOneOthers) {
 }
 
 TEST(SimulatedRamps, RefusesAnExperimentThatIsNone) {
-  RampExperiment experiment = experiment_with(0.05);
-  experiment.rates = {0.1, 0};
-  EXPECT_THROW(simulated_ramps(experiment), std::invalid_argument);
-  experiment = experiment_with(0.05);
-  experiment.travel = -1;
-  EXPECT_THROW(simulated_ramps(experiment), std::invalid_argument);
-  experiment = experiment_with(0.05);
-  experiment.period = Duration::zero();
-  EXPECT_THROW(simulated_ramps(experiment), std::invalid_argument);
+  expect_refusals(experiment_with(0.05), simulated_ramps,
+                  {
+                      {"rate",
+                       [](auto& e) {
+                         e.rates = {0.1, 0};
+                       }},
+                      {"travel", [](auto& e) { e.travel = -1; }},
+                      {"period", [](auto& e) { e.period = Duration::zero(); }},
+                  });
 }
 
 TEST(SimulatedIdentification, FindsLittleFrictionAndSaysThatKellyIsOff) {

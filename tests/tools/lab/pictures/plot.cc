@@ -216,14 +216,17 @@ class Script {
     }
     label(left(i), kFigures, verdict) << "tc rgb '" << (run.kept_its_promise() ? kGreen : kVermilion) << "'\n";
 
-    std::string figures =
-        "peak force " + with_unit(run.peak_force, "N") + ", peak speed " + with_unit(run.peak_speed, "m/s");
+    std::string figures = "peak " + with_unit(run.peak_force, "N") + ", " + with_unit(run.peak_speed, "m/s");
     if (!run.stable) {
       figures += ", not stable";
     } else if (run.operational_stiffness) {
-      figures += ", felt stiffness " + with_unit(*run.operational_stiffness, "N/m");
+      figures += ", felt " + with_unit(*run.operational_stiffness, "N/m");
     }
     if (run.overruns > 0) figures += ", overruns " + std::to_string(run.overruns);
+    if (run.share_careful > 0) {
+      const double percent = 100 * run.share_careful;
+      figures += ", limiter more careful " + (percent < 1 ? "< 1" : std::to_string(std::lround(percent))) + " %";
+    }
     label(left(i), kMoreFigures, figures) << "tc rgb '" << kPale << "'\n";
   }
 

@@ -75,8 +75,18 @@ std::string kept(const Run& run) {
 
 std::string felt(const RunSummary& run) {
   if (!run.stable) return "not stable";
-  if (!run.operational_stiffness) return "no contact";
+  if (!run.pushed) return "no contact";
+  if (!run.operational_stiffness) return "not measurable";
   return digits(*run.operational_stiffness, "%.0f N/m");
+}
+
+std::string apart(const RunSummary& run) {
+  if (!run.difference) return "0 N";
+  return digits(run.difference->p50, "%.2f") + " / " + digits(run.difference->p95, "%.2f N");
+}
+
+std::string limited(const RunSummary& run) {
+  return run.served_steps == 0 ? "no force came" : percent(run.share_limited());
 }
 
 /// Columns on a terminal: the text has no combining and no wide characters.
@@ -108,13 +118,27 @@ std::vector<Row> rows(std::span<const Run> runs) {
       {"  stiffness that was felt", [](const Run& run) { return felt(run.summary); }},
       {"  peak speed", [](const Run& run) { return digits(run.summary.peak_speed, "%.2f m/s"); }},
       {"  peak force", [](const Run& run) { return digits(run.summary.peak_force, "%.2f N"); }},
-      {"Force is not the one asked for in", [](const Run& run) { return percent(run.summary.share_limited()); }},
+      {"Force is not the one asked for in", [](const Run& run) { return limited(run.summary); }},
+      {"  there it differs by, p50 / p95", [](const Run& run) { return apart(run.summary); }},
   };
   if (std::ranges::any_of(runs, [](const Run& run) { return run.summary.torque_work.has_value(); })) {
     const auto work = [](const Run& run) {
       return run.summary.torque_work ? with_unit(*run.summary.torque_work, "J") : "does not turn";
     };
     rows.insert(rows.begin() + 3, {"  work of torques on the hand, at most", work});
+  }
+  if (std::ranges::any_of(runs, [](const Run& run) { return run.summary.grip_energy_given_out.has_value(); })) {
+    const auto given_out = [](const Run& run) {
+      return run.summary.grip_energy_given_out ? with_unit(*run.summary.grip_energy_given_out, "J") : "no gripper";
+    };
+    rows.insert(rows.begin() + 3, {"  … by the gripper, which has its own account", given_out});
+  }
+  if (std::ranges::any_of(runs, [](const Run& run) { return run.summary.share_careful > 0; })) {
+    rows.insert(rows.begin() + 1, {"limiter more careful, after overruns, for",
+                                   [](const Run& run) { return percent(run.summary.share_careful); }});
+  }
+  if (std::ranges::any_of(runs, [](const Run& run) { return !run.device.empty(); })) {
+    rows.insert(rows.begin() + 1, {"device", [](const Run& run) { return run.device.empty() ? "-" : run.device; }});
   }
   for (const ReasonName& name : kReasonNames) {
     const auto occurs = [&](const Run& run) { return run.summary.share_limited(name.reason) > 0; };
@@ -127,7 +151,10 @@ std::vector<Row> rows(std::span<const Run> runs) {
       {
           {"Network", {}},
           {"  hand to force, p50 / p99", [](const Run& run) { return spread(run.summary.loop_age); }},
-          {"  round trip, p50 / p99", [](const Run& run) { return spread(run.summary.round_trip); }},
+          {"  round trip, p50 / p99",
+           [](const Run& run) {
+             return run.summary.sealed && !run.summary.round_trip ? "sealed" : spread(run.summary.round_trip);
+           }},
           {"  forces used per second",
            [](const Run& run) {
              return run.summary.forces_per_s ? digits(*run.summary.forces_per_s, "%.1f") : "none";
@@ -149,8 +176,18 @@ std::string notes(std::span<const Run> runs) {
     note("not stable: the device gave out energy and the hand was shaken (most of its motion was faster than 3 Hz),");
     note("            so a stiffness would mean nothing.");
   }
+  if (some([](const Run& run) {
+        return run.summary.stable && run.summary.pushed && !run.summary.operational_stiffness;
+      })) {
+    note("not measurable: the forces do not depend on the place alone, or where they begin is not known well enough");
+    note("            to tell a stiffness within 5 %.");
+  }
   if (some([](const Run& run) { return run.summary.overruns > 0; })) {
     note("overrun: the computer paused the haptic loop for longer than the scene's longest_hold.");
+  }
+  if (some([](const Run& run) { return run.summary.share_careful > 0; })) {
+    note("more careful: after an overrun the limiter allows for another one as long, and permits less force.");
+    note("            To compare what was felt, repeat the run on a machine that has less to do.");
   }
   if (some([](const Run& run) { return run.summary.holds_beyond_bound > 0; })) {
     note(
@@ -159,12 +196,17 @@ std::string notes(std::span<const Run> runs) {
     note("         A longer hold can give out (T_act − T)(‖F‖ − f_c)²/(4b); it is in the energy given out.");
   }
   for (const Run& run : runs) {
+    if (&run != &*std::ranges::find(runs, run.recording, &Run::recording)) continue;  // of its devices once
     if (run.truncated)
       note(run.recording +
            ": has no end mark (the server was killed, or the disk was full). All that is there was read.");
     if (run.lost_steps + run.lost_datagrams > 0)
       note(run.recording + ": lacks " + count(run.lost_steps) + " steps and " + count(run.lost_datagrams) +
-           " datagrams that were not written in time.");
+           " datagrams, which were not written in time or are damaged.");
+    constexpr std::size_t kMostSentences = 5;
+    for (std::size_t i = 0; i < std::min(run.damage.size(), kMostSentences); ++i) note(run.damage[i]);
+    if (run.damage.size() > kMostSentences)
+      note(run.recording + ": " + count(run.damage.size() - kMostSentences) + " more places are damaged (--json)");
   }
   return text;
 }
@@ -233,12 +275,15 @@ std::string to_json(const Run& run) {
   JsonLine json;
   json.add("recording", run.recording)
       .add("label", run.label)
+      .add("device", run.device.empty() ? std::nullopt : std::optional(run.device))
       .add("truncated", run.truncated)
       .add("lost_steps", run.lost_steps)
       .add("lost_datagrams", run.lost_datagrams)
+      .add("damage", run.damage)
       .add("limiter_on", s.limiter_on)
       .add("energy_given_out_j", s.energy_given_out)
       .add("least_energy_j", s.least_energy)
+      .add("grip_energy_given_out_j", s.grip_energy_given_out)
       .add("torque_work_j", s.torque_work)
       .add("passive", s.passive())
       .add("kept_its_promise", s.kept_its_promise())
@@ -247,6 +292,10 @@ std::string to_json(const Run& run) {
       .add("peak_force_n", s.peak_force)
       .add("limited_percent", s.share_limited() * 100)
       .add("limited_percent_by_reason", reasons)
+      .add("served_steps", s.served_steps)
+      .add("differs_p50_n", s.difference ? std::optional(s.difference->p50) : std::nullopt)
+      .add("differs_p95_n", s.difference ? std::optional(s.difference->p95) : std::nullopt)
+      .add("careful_percent", s.share_careful * 100)
       .add("stable", s.stable)
       .add("operational_stiffness_n_per_m", s.stable ? s.operational_stiffness : std::nullopt)
       .add("loop_age_p50_ms", p50_ms(s.loop_age))

@@ -6,6 +6,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "tests/tools/lab/recordings/run_summary.h"
 
@@ -15,10 +16,12 @@ namespace tendon::lab {
 struct Run {
   std::string label;      ///< heads its column
   std::string recording;  ///< the file
+  std::string device;     ///< its name; empty: the recording has one only
   RunSummary summary;
   bool truncated = false;  ///< the recording ended before its end mark
   std::uint64_t lost_steps = 0;
   std::uint64_t lost_datagrams = 0;
+  std::vector<std::string> damage = {};  ///< error messages, see RecordingReader::damage()
 };
 
 /// "12.3 mJ": three significant digits and a prefix from n to G; a true minus sign, "0 J", "∞ N".

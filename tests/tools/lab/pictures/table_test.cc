@@ -73,6 +73,35 @@ TEST(Table, ColumnsAreAlignedThoughSomeLettersHaveSeveralBytes) {
     }
 }
 
+TEST(Table, SaysAtTheTopThatOverrunsMadeTheLimiterMoreCareful) {
+  lab::Run run = run_of(Law::kAol, "on");
+  EXPECT_EQ(to_table(std::vector{run}).find("more careful"), std::string::npos);
+  run.summary.share_careful = 0.413;
+  const std::string table = to_table(std::vector{run});
+  const std::size_t row = table.find("limiter more careful, after overruns, for");
+  ASSERT_NE(row, std::string::npos) << table;
+  EXPECT_LT(row, table.find("\nEnergy"));
+  EXPECT_LT(table.find("41.3 %", row), table.find('\n', row));
+  EXPECT_NE(to_json(run).find(R"("careful_percent":41.3)"), std::string::npos);
+}
+
+TEST(Table, SaysByHowMuchTheForceDiffersBesideTheShare) {
+  lab::Run run = run_of(Law::kAol, "on");
+  run.summary.difference = Difference{0.031, 1.9};
+  const std::string table = to_table(std::vector{run});
+  const std::size_t row = table.find("  there it differs by, p50 / p95");
+  ASSERT_NE(row, std::string::npos) << table;
+  EXPECT_LT(table.find("0.03 / 1.90 N", row), table.find('\n', row)) << table;
+}
+
+TEST(Table, ForcesThatNoOneStiffnessDescribesAreNotMeasurable) {
+  lab::Run run = run_of(Law::kAol, "on");
+  run.summary.operational_stiffness.reset();
+  EXPECT_NE(to_table(std::vector{run}).find("not measurable"), std::string::npos);
+  run.summary.pushed = false;
+  EXPECT_NE(to_table(std::vector{run}).find("no contact"), std::string::npos);
+}
+
 TEST(Table, SaysWhatIsMissingFromARecording) {
   lab::Run run = run_of(Law::kAol, "on");
   run.truncated = true;

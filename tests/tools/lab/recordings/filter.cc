@@ -3,8 +3,8 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cmath>
+#include <exception>
 #include <optional>
 #include <span>
 #include <stdexcept>
@@ -14,6 +14,7 @@
 
 #include "core/base/expect.h"
 #include "server/scene/scene.h"
+#include "server/tables/table_reader.h"
 #include "tests/support/json_line.h"
 
 namespace tendon::lab {
@@ -34,25 +35,6 @@ struct Row {
   Vec3 position = Vec3::Zero();
   Vec3 wanted = Vec3::Zero();
 };
-
-/// Everything between the commas as finite numbers; or what is wrong.
-std::optional<std::string> parse(std::string_view line, std::span<double> cells) {
-  std::size_t n = 0;
-  for (;;) {
-    const std::size_t comma = line.find(',');
-    const std::string_view cell = line.substr(0, comma);
-    if (n < cells.size()) {
-      const auto [end, error] = std::from_chars(cell.data(), cell.data() + cell.size(), cells[n]);
-      if (error != std::errc() || end != cell.data() + cell.size() || !std::isfinite(cells[n]))
-        return "cell " + std::to_string(n + 1) + ": expected a finite number, got \"" + std::string(cell) + "\"";
-    }
-    ++n;
-    if (comma == std::string_view::npos) break;
-    line.remove_prefix(comma + 1);
-  }
-  if (n == cells.size()) return std::nullopt;
-  return "expected " + std::to_string(cells.size()) + " cells, got " + std::to_string(n);
-}
 
 Row row_of(std::span<const double> cells, std::size_t axes) {
   Row row;
@@ -82,12 +64,30 @@ std::vector<std::string_view> names(std::string_view header) {
   }
 }
 
-/// The next line. Before it waits for one, `out` is flushed: someone may be waiting at the other end of the pipe.
-bool read_line(std::istream& in, std::ostream& out, std::string& line) {
+/// Returns the columns of a format in its own order, or nothing if the table does not have exactly these columns.
+std::vector<TableReader::Column> columns_of(const TableReader& table, const Format& format) {
+  std::vector<TableReader::Column> columns;
+  for (const std::string_view name : names(format.header)) {
+    const auto column = table.find(name);
+    if (!column) return {};
+    columns.push_back(*column);
+  }
+  if (columns.size() != table.width()) columns.clear();
+  return columns;
+}
+
+/// Returns the text of a number in the current row, with a decimal point and in the unit of the format.
+std::string cell_of(const TableReader& table, const TableReader::Column& column, double value) {
+  if (column.multiply != 1 || column.divide != 1) return shortest(value);
+  std::string text(table.text(column.index));
+  std::ranges::replace(text, ',', '.');
+  return text;
+}
+
+/// Reads the next row. It flushes `out` before it waits, because another program can be waiting for the output.
+bool next_row(TableReader& table, std::istream& in, std::ostream& out) {
   if (in.rdbuf()->in_avail() <= 0) out.flush();
-  if (!std::getline(in, line)) return false;
-  if (!line.empty() && line.back() == '\r') line.pop_back();
-  return true;
+  return table.next_row();
 }
 
 }  // namespace
@@ -107,16 +107,17 @@ LimiterConfig limiter_of(const FilterLaw& law) {
 }
 
 int filter(const FilterOptions& options, std::istream& in, std::ostream& out, std::ostream& errors) {
-  std::string line;
+  TableReader table(in, "stdin");
   const Format* format = nullptr;
-  if (read_line(in, out, line)) {
-    for (const Format& known : kFormats) {
-      if (line == known.header) format = &known;
-    }
+  std::vector<TableReader::Column> columns;
+  for (const Format& known : kFormats) {
+    if (format != nullptr) break;
+    columns = columns_of(table, known);
+    if (!columns.empty()) format = &known;
   }
   if (format == nullptr) {
-    throw std::runtime_error("line 1: expected the header " + std::string(kFormats[0].header) + " or " +
-                             std::string(kFormats[1].header) + ", got \"" + line + "\"");
+    table.fail("expected the header " + std::string(kFormats[0].header) + " or " + std::string(kFormats[1].header) +
+               ", got \"" + table.first_line() + "\"");
   }
   if (!options.json) out << format->header << "," << format->applied << ",permitted_n,energy_j,reason\n";
 
@@ -128,12 +129,16 @@ int filter(const FilterOptions& options, std::istream& in, std::ostream& out, st
   std::optional<Row> before;
   Vec3 applied = Vec3::Zero();
   int bad = 0;
-  for (std::size_t number_of_line = 2; read_line(in, out, line); ++number_of_line) {
-    auto wrong = parse(line, cells);
-    const Row row = row_of(cells, static_cast<std::size_t>(format->axes));
-    if (!wrong && before && row.t <= before->t) wrong = "time does not go on";
-    if (wrong) {
-      errors << "line " << number_of_line << ": " << *wrong << "\n";
+  for (;;) {
+    Row row;
+    try {
+      if (!next_row(table, in, out)) break;
+      for (std::size_t i = 0; i < columns.size(); ++i) cells[i] = table.needed_number(columns[i]);
+      row = row_of(cells, static_cast<std::size_t>(format->axes));
+      if (before && row.t <= before->t) table.fail("time does not go on");
+    } catch (const std::runtime_error& wrong) {
+      if (in.fail()) throw;  // the rest of the input cannot be read
+      errors << wrong.what() << "\n";
       ++bad;
       continue;
     }
@@ -158,7 +163,8 @@ int filter(const FilterOptions& options, std::istream& in, std::ostream& out, st
       json.add("permitted_n", limited.permitted).add("energy_j", energy).add("reason", reasons_cell(reasons));
       out << json.str() << "\n";
     } else {
-      out << line;
+      for (std::size_t i = 0; i < columns.size(); ++i)
+        out << (i > 0 ? "," : "") << cell_of(table, columns[i], cells[i]);
       for (int i = 0; i < format->axes; ++i) out << "," << shortest(applied[i]);
       out << "," << shortest(limited.permitted) << "," << shortest(energy) << "," << reasons_cell(reasons) << "\n";
     }

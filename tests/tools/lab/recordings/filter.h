@@ -32,16 +32,17 @@ struct FilterOptions {
 
 /// `tendon-lab filter`: any law of the catalogue on anyone's own recording, row by row, so that it works on a pipe.
 ///
-/// In, CSV with a header: `t_s,x_m,wanted_n` or `t_s,x_m,y_m,z_m,wanted_x_n,wanted_y_n,wanted_z_n`; forces are those on
-/// the hand, a wall that resists motion along +x wants −x. Out: the same and `applied_n` (or `applied_x_n` …),
-/// `permitted_n` (the bound on the size of the force; `inf` when there is none), `energy_j` (the law's account after
-/// the interval that has just ended) and `reason` (empty: applied is what was wanted).
+/// The input is a table for TableReader with the columns `t_s,x_m,wanted_n` or
+/// `t_s,x_m,y_m,z_m,wanted_x_n,wanted_y_n,wanted_z_n`. The forces act on the hand, so a wall that resists motion along +x
+/// has a force along −x. The output is CSV with the same columns and these: `applied_n` (or `applied_x_n` …),
+/// `permitted_n` (the limit of the force, or `inf`), `energy_j` (the account of the law after the last interval) and
+/// `reason` (empty if the applied force is the wanted force).
 ///
 /// The motion is what was recorded: it does not answer to the force applied. Each row's force is held until the next.
 ///
-/// A bad row (wrong number of cells, not a finite number, time that does not go on) is named on `errors` with its line
-/// number, and nothing is written for it; the force before it is booked as held on. Returns how many there were. Throws
-/// std::runtime_error when the header is not one of the two, or when `out` cannot be written.
+/// If a row is bad, it writes the file and line to `errors` and nothing to `out`, and the previous force is held. A row is
+/// bad if TableReader refuses it or if the time does not increase. It returns the number of bad rows. It throws
+/// std::runtime_error if the header is not one of the two, or if it cannot write to `out`.
 int filter(const FilterOptions& options, std::istream& in, std::ostream& out, std::ostream& errors);
 
 }  // namespace tendon::lab

@@ -76,6 +76,9 @@ PairRun read_pair(const std::filesystem::path& path) {
       reader.corrupt(message->offset, error.what());
     }
   }
+  if (const auto damage = reader.damage(); !damage.empty()) {
+    throw std::runtime_error(damage.front() + "; the ledger of a pair needs every record");
+  }
   if (!merged) {
     throw std::runtime_error(path.string() + ": expected a file that `tendon-replay --merge` has written");
   }

@@ -16,6 +16,7 @@
 #include "server/recording/mcap_writer.h"
 #include "server/recording/recording_codec.h"
 #include "tests/server/scratch_folder.h"
+#include "tests/support/refusal.h"
 #include "tests/tools/lab/experiments/steps.h"
 
 namespace tendon::lab::pair_report_test {
@@ -134,23 +135,19 @@ TEST_F(PairReport, JsonIsOneLineForEachPair) {
 TEST_F(PairReport, CheckFailsByThePairThatGaveOutWhatNobodyHadPutIn) {
   const auto on = merged("on.mcap", 0.25);
   EXPECT_NO_THROW(report_pairs({.recordings = {on}, .check = true}, out_));
-  try {
-    report_pairs({.recordings = {on, merged("off.mcap", -0.25)}, .check = true}, out_);
-    FAIL() << "expected a refusal";
-  } catch (const std::runtime_error& error) {
-    EXPECT_STREQ(error.what(), "off.mcap: the pair fell to −500 mJ, expected −1.00 nJ or more");
-  }
+  EXPECT_EQ(thrown_by<std::runtime_error>([&] {
+              report_pairs({.recordings = {on, merged("off.mcap", -0.25)}, .check = true}, out_);
+            }),
+            "off.mcap: the pair fell to −500 mJ, expected −1.00 nJ or more");
 }
 
 TEST_F(PairReport, RefusesWhatIsNoMerge) {
   const auto single = folder_.path() / "single.mcap";
   testing::record(single, testing::toy_run(Law::kAol, 100));
-  try {
-    report_pairs({.recordings = {single}}, out_);
-    FAIL() << "expected a refusal";
-  } catch (const std::runtime_error& error) {
-    EXPECT_NE(std::string(error.what()).find("tendon-replay --merge"), std::string::npos) << error.what();
-  }
+  EXPECT_NE(thrown_by<std::runtime_error>([&] {
+              report_pairs({.recordings = {single}}, out_);
+            }).find("tendon-replay --merge"),
+            std::string::npos);
   const auto pair = merged("on.mcap", 0);
   EXPECT_THROW(report_pairs({.recordings = {pair, pair, pair}, .picture = "x.svg"}, out_), std::invalid_argument);
   EXPECT_THROW(report_pairs({.recordings = {pair}, .labels = {"a", "b"}}, out_), std::invalid_argument);

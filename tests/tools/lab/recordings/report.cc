@@ -3,48 +3,134 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <deque>
 #include <stdexcept>
+#include <string>
 #include <utility>
 #include <variant>
+#include <vector>
 
 #include "server/recording/recording_reader.h"
 #include "tests/tools/lab/pictures/plot.h"
 #include "tests/tools/lab/pictures/table.h"
+#include "tests/tools/lab/recordings/devices.h"
 #include "tests/tools/lab/recordings/run_summary.h"
 #include "tests/tools/lab/recordings/trace.h"
 
 namespace tendon::lab {
 namespace {
 
-Run read_run(const std::filesystem::path& recording) {
+/// A run and its recording.
+struct Source {
   Run run;
-  run.recording = recording.filename().string();
-  RunObserver observer;
-  RecordingReader reader(recording);
+  std::filesystem::path recording;
+  std::size_t device = 0;
+};
+
+/// Reads all devices of a recording that have steps.
+std::vector<Source> read_runs(const std::filesystem::path& recording, std::string& not_examined) {
+  const std::vector<std::string> names = device_names(recording);
+  const bool several = names.size() > 1;
+  std::deque<RunObserver> observers;
+  for (std::size_t device = 0; device < names.size(); ++device) observers.emplace_back(several);
+  Run common;
+  common.recording = recording.filename().string();
+  RecordingReader reader(recording, RecordingReader::Devices::kAll);
   while (const auto record = reader.next()) {
-    if (const auto* step = std::get_if<StepRecord>(&*record)) observer.observe(*step);
-    if (const auto* datagram = std::get_if<DatagramRecord>(&*record)) observer.observe(*datagram);
+    if (const auto* step = std::get_if<StepRecord>(&*record)) observers.at(reader.device()).observe(*step);
+    if (const auto* datagram = std::get_if<DatagramRecord>(&*record)) {
+      for (RunObserver& observer : observers) observer.observe(*datagram);
+    }
     if (const auto* loss = std::get_if<LossRecord>(&*record)) {
-      run.lost_steps += loss->steps;
-      run.lost_datagrams += loss->datagrams;
+      common.lost_steps += loss->steps;
+      common.lost_datagrams += loss->datagrams;
     }
   }
-  run.truncated = reader.truncated();
-  run.summary = observer.summary();
-  if (run.summary.steps == 0) throw std::runtime_error(recording.string() + ": holds no haptic step");
-  run.label = run.summary.limiter_on ? "limiter on" : "limiter off";
-  return run;
+  common.truncated = reader.truncated();
+  common.damage = reader.damage();
+  std::vector<Source> sources;
+  for (std::size_t device = 0; device < names.size(); ++device) {
+    Run run = common;
+    run.summary = observers[device].summary();
+    if (several) run.device = names[device];
+    if (run.summary.steps == 0) {
+      if (several) not_examined += run.recording + ": device " + names[device] + " has no haptic step: not examined\n";
+      continue;
+    }
+    run.label = run.summary.limiter_on ? "limiter on" : "limiter off";
+    sources.push_back({std::move(run), recording, device});
+  }
+  if (sources.empty()) throw std::runtime_error(reader.without_steps());
+  return sources;
 }
 
 /// A second look at the recording: what is drawn depends on what it comes down to.
-Trace read_trace(const std::filesystem::path& recording, const RunSummary& summary, std::size_t columns) {
+Trace read_trace(const Source& source, std::size_t columns) {
+  const RunSummary& summary = source.run.summary;
   Trace trace(
       {.start = summary.start, .span = std::max(summary.span, Duration(1)), .columns = columns, .axis = summary.axis});
-  RecordingReader reader(recording);
+  RecordingReader reader(source.recording, RecordingReader::Devices::kAll);
   while (const auto record = reader.next()) {
-    if (const auto* step = std::get_if<StepRecord>(&*record)) trace.observe(*step);
+    const auto* step = std::get_if<StepRecord>(&*record);
+    if (step != nullptr && reader.device() == source.device) trace.observe(*step);
   }
   return trace;
+}
+
+std::string list(const std::vector<std::string>& names) {
+  std::string text;
+  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
+  return text;
+}
+
+/// Checks that each device is in one of the recordings.
+void check_devices(const ReportOptions& options) {
+  std::vector<std::string> known;
+  if (options.devices.empty()) return;
+  for (const auto& recording : options.recordings) {
+    for (const std::string& name : device_names(recording)) {
+      if (std::ranges::find(known, name) == known.end()) known.push_back(name);
+    }
+  }
+  for (const std::string& name : options.devices) {
+    if (std::ranges::find(known, name) == known.end())
+      throw std::runtime_error("no device is called " + name + ": the recordings have " + list(known));
+  }
+}
+
+/// Selects up to `most` runs in their order. Runs that broke the promise are preferred.
+std::vector<const Source*> choose(const std::vector<Source>& sources, const ReportOptions& options, std::size_t most) {
+  std::vector<const Source*> chosen;
+  for (const bool kept : {false, true}) {
+    for (const Source& source : sources) {
+      const bool asked = options.devices.empty() || source.run.device.empty() ||
+                         std::ranges::find(options.devices, source.run.device) != options.devices.end();
+      if (asked && source.run.summary.kept_its_promise() == kept && chosen.size() < most) chosen.push_back(&source);
+    }
+  }
+  std::ranges::sort(chosen);
+  return chosen;
+}
+
+std::string name_of(const Run& run) { return run.recording + (run.device.empty() ? "" : " " + run.device); }
+
+/// Describes the runs without a column. Lists the runs that broke the promise, and counts the others.
+std::string others(const std::vector<Source>& sources, const std::vector<const Source*>& shown) {
+  std::string text;
+  std::size_t kept = 0;
+  for (const Source& source : sources) {
+    if (std::ranges::find(shown, &source) != shown.end()) continue;
+    const RunSummary& summary = source.run.summary;
+    if (summary.kept_its_promise()) {
+      ++kept;
+    } else {
+      text += name_of(source.run) + ": promise NOT kept, least energy " + with_unit(summary.least_energy, "J") + "\n";
+    }
+  }
+  if (shown.size() == sources.size()) return text;
+  return "Columns for " + std::to_string(shown.size()) + " of " + std::to_string(sources.size()) +
+         " devices (--device NAME for another, --json for all). " + std::to_string(kept) + " of the others kept the " +
+         "promise.\n" + text;
 }
 
 }  // namespace
@@ -64,31 +150,49 @@ std::runtime_error broken_promise(const std::string& recording, const std::strin
 void report(const ReportOptions& options, std::ostream& out) {
   check(options);
   if (options.picture) check_picture(*options.picture, options.recordings.size());
+  check_devices(options);
 
-  std::vector<Run> runs;
+  std::vector<Source> sources;
+  std::string not_examined;
   for (std::size_t i = 0; i < options.recordings.size(); ++i) {
-    runs.push_back(read_run(options.recordings[i]));
-    if (!options.labels.empty()) runs.back().label = options.labels[i];
+    for (Source& source : read_runs(options.recordings[i], not_examined)) {
+      if (!options.labels.empty()) source.run.label = options.labels[i];
+      sources.push_back(std::move(source));
+    }
   }
   if (options.json) {
-    for (const Run& run : runs) out << to_json(run) << "\n";
+    for (const Source* source : choose(sources, options, sources.size())) out << to_json(source->run) << "\n";
   } else {
+    const std::vector<const Source*> shown = choose(sources, options, kMostColumns);
+    std::vector<Run> runs;
+    for (const Source* source : shown) runs.push_back(source->run);
     out << to_table(runs);
+    if (const std::string more = others(sources, shown) + not_examined; !more.empty()) out << "\n" << more;
   }
   if (!out.flush()) throw std::runtime_error("cannot write the report: is the disk full?");
 
   if (options.picture) {
+    const std::vector<const Source*> shown = choose(sources, options, kMostDrawings);
     std::vector<Drawing> drawings;
-    for (std::size_t i = 0; i < runs.size(); ++i) {
-      drawings.push_back({runs[i].label, runs[i].summary,
-                          read_trace(options.recordings[i], runs[i].summary, trace_columns(runs.size()))});
+    for (const Source* source : shown) {
+      const Run& run = source->run;
+      drawings.push_back({run.device.empty() ? run.label : run.label + ", " + run.device, run.summary,
+                          read_trace(*source, trace_columns(shown.size()))});
     }
     draw(*options.picture, drawings);
-    if (!options.json) out << "\npicture: " << options.picture->string() << "\n";
+    if (!options.json) {
+      out << "\npicture: " << options.picture->string();
+      if (shown.size() < sources.size())
+        out << ", of " << shown.size() << " of " << sources.size() << " devices (--device NAME for others)";
+      out << "\n";
+    }
   }
   if (!options.check) return;
-  for (const Run& run : runs) {
-    if (!run.summary.kept_its_promise()) throw broken_promise(run.recording, "the ledger", run.summary.least_energy);
+  for (const Source& source : sources) {
+    const Run& run = source.run;
+    if (run.summary.kept_its_promise()) continue;
+    throw broken_promise(run.recording, run.device.empty() ? "the ledger" : "the ledger of " + run.device,
+                         run.summary.least_energy);
   }
 }
 

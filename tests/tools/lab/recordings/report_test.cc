@@ -10,8 +10,10 @@
 #include <sstream>
 #include <stdexcept>
 #include <string>
+#include <vector>
 
 #include "tests/server/scratch_folder.h"
+#include "tests/support/refusal.h"
 #include "tests/tools/lab/experiments/steps.h"
 #include "tests/tools/lab/pictures/plot.h"
 
@@ -47,12 +49,7 @@ class Report : public ::testing::Test {
   }
 
   std::string error_of(const ReportOptions& options) {
-    try {
-      report(options, out_);
-    } catch (const std::exception& error) {
-      return error.what();
-    }
-    return "";
+    return thrown_by<std::exception>([&] { report(options, out_); });
   }
 
   tendon::testing::ScratchFolder folder_;
@@ -89,6 +86,107 @@ TEST_F(Report, CheckFailsByTheRecordingThatBreaksThePromiseAfterTheTable) {
   EXPECT_NE(out_.str().find("limiter off"), std::string::npos);
 }
 
+class ReportOfSeveral : public Report {
+ protected:
+  /// A recording of the given devices; true: with the limiter.
+  std::filesystem::path several(const std::vector<bool>& limited) {
+    const auto on = toy_run(Law::kAol, 6000);
+    const auto off = toy_run(Law::kNone, 6000);
+    std::vector<std::vector<StepRecord>> runs;
+    std::vector<std::string> names;
+    for (const bool is_limited : limited) {
+      if (!runs.empty()) names.push_back("fleet-" + std::to_string(runs.size()));
+      runs.push_back(is_limited ? on : off);
+    }
+    std::filesystem::path file = folder_.path() / ("of" + std::to_string(limited.size()) + ".mcap");
+    std::filesystem::remove(file);
+    testing::record_devices(file, runs, names);
+    return file;
+  }
+};
+
+TEST_F(ReportOfSeveral, HasAColumnForEachDevice) {
+  report({.recordings = {several({true, false})}}, out_);
+  const std::string text = out_.str();
+  const std::string first_line = text.substr(0, text.find('\n'));
+  EXPECT_LT(first_line.find("limiter on"), first_line.find("limiter off"));
+  EXPECT_NE(first_line.find("limiter off"), std::string::npos);
+  const std::size_t row = text.find("\ndevice ");
+  ASSERT_NE(row, std::string::npos) << text;
+  EXPECT_LT(text.find("first", row), text.find("fleet-1", row));
+}
+
+TEST_F(ReportOfSeveral, CheckFailsByAnyDeviceAndNamesIt) {
+  EXPECT_EQ(error_of({.recordings = {several({true, true, true})}, .check = true}), "");
+  const std::string error = error_of({.recordings = {several({true, false})}, .check = true});
+  EXPECT_TRUE(error.starts_with("of2.mcap: the ledger of fleet-1 fell to −")) << error;
+  EXPECT_NE(error_of({.recordings = {several({true, false})}, .devices = {"first"}, .check = true}), "")
+      << "a device without a column is checked, too";
+}
+
+TEST_F(ReportOfSeveral, JsonIsALineForEachDevice) {
+  report({.recordings = {several({true, false, true})}, .json = true}, out_);
+  std::istringstream lines(out_.str());
+  std::string line;
+  for (const char* text : {R"("device":"first")", R"("device":"fleet-1")", R"("device":"fleet-2")"}) {
+    ASSERT_TRUE(std::getline(lines, line));
+    EXPECT_NE(line.find(text), std::string::npos) << line;
+    EXPECT_EQ(line.find(R"("passive":false)") != std::string::npos, std::string(text).ends_with("1\""));
+  }
+  EXPECT_FALSE(std::getline(lines, line));
+}
+
+TEST_F(ReportOfSeveral, OfAFleetThoseThatFailedAreShownAndTheOthersCounted) {
+  std::vector<bool> limited(16, true);
+  for (const std::size_t device : {3U, 9U, 10U, 11U, 12U, 13U, 14U, 15U}) limited[device] = false;
+  report({.recordings = {several(limited)}}, out_);
+  const std::string text = out_.str();
+  EXPECT_NE(text.find("Columns for 6 of 16 devices"), std::string::npos) << text;
+  EXPECT_NE(text.find("8 of the others kept the promise"), std::string::npos) << text;
+  EXPECT_NE(text.find("of16.mcap fleet-14: promise NOT kept, least energy −"), std::string::npos) << text;
+  EXPECT_NE(text.find("of16.mcap fleet-15: promise NOT kept"), std::string::npos) << text;
+  EXPECT_EQ(text.find("of16.mcap fleet-13:"), std::string::npos) << "it has a column";
+  EXPECT_EQ(text.find("first"), std::string::npos);
+}
+
+TEST_F(ReportOfSeveral, ADeviceThatIsAskedForHasTheOnlyColumn) {
+  const auto file = several({true, false, true});
+  report({.recordings = {file}, .devices = {"fleet-2"}}, out_);
+  EXPECT_NE(out_.str().find("fleet-2"), std::string::npos);
+  EXPECT_EQ(out_.str().find("first"), std::string::npos);
+  EXPECT_NE(out_.str().find("Columns for 1 of 3 devices"), std::string::npos) << out_.str();
+  EXPECT_NE(out_.str().find("of3.mcap fleet-1: promise NOT kept"), std::string::npos) << out_.str();
+  EXPECT_EQ(error_of({.recordings = {file}, .devices = {"left"}}),
+            "no device is called left: the recordings have first, fleet-1, fleet-2");
+}
+
+TEST_F(ReportOfSeveral, SaysWhichDeviceWasNotExamined) {
+  const std::filesystem::path file = folder_.path() / "absent.mcap";
+  testing::record_devices(file, {toy_run(Law::kAol, 2000), {}}, {"absent"});
+  report({.recordings = {file}}, out_);
+  EXPECT_NE(out_.str().find("absent.mcap: device absent has no haptic step: not examined"), std::string::npos)
+      << out_.str();
+}
+
+TEST_F(ReportOfSeveral, ANameInARecordingCannotForgeALine) {
+  const std::filesystem::path file = folder_.path() / "forged.mcap";
+  testing::record_devices(file, {toy_run(Law::kAol, 2000), {}}, {"left\npromise kept\x1b[2J"});
+  report({.recordings = {file}}, out_);
+  EXPECT_NE(out_.str().find("device left\\npromise kept\\x1b[2J has no haptic step"), std::string::npos) << out_.str();
+}
+
+TEST_F(ReportOfSeveral, DrawsEachDevice) {
+  if (!gnuplot_is_there()) GTEST_SKIP() << "gnuplot is not installed (package gnuplot-nox)";
+  const std::filesystem::path picture = folder_.path() / "both.svg";
+  report({.recordings = {several({true, false})}, .picture = picture}, out_);
+  const std::string svg = contents(picture);
+  for (const char* text : {"limiter on, first", "limiter off, fleet-1"})
+    EXPECT_NE(svg.find(text), std::string::npos) << text;
+  report({.recordings = {several({true, true, true, true, false})}, .picture = picture}, out_);
+  EXPECT_NE(contents(picture).find("limiter off, fleet-4"), std::string::npos) << "who failed is drawn";
+  EXPECT_NE(out_.str().find(", of 4 of 5 devices"), std::string::npos) << out_.str();
+}
+
 TEST_F(Report, ReadsWhatAKilledServerLeftAndSaysSo) {
   std::filesystem::remove(on_);
   record(on_, toy_run(Law::kAol, 3000), false);
@@ -96,13 +194,17 @@ TEST_F(Report, ReadsWhatAKilledServerLeftAndSaysSo) {
   EXPECT_NE(out_.str().find("on.mcap: has no end mark"), std::string::npos);
 }
 
-TEST_F(Report, AFlippedBitIsReportedByFileAndPlaceAndNothingIsPrinted) {
+TEST_F(Report, AFlippedBitIsNamedByFileAndPlaceAndTheRestIsRead) {
   std::string bytes = contents(on_);
   bytes[bytes.size() / 2] = static_cast<char>(bytes[bytes.size() / 2] ^ 1);
   std::ofstream(on_, std::ios::binary) << bytes;
-  const std::string error = error_of({.recordings = {off_, on_}});
-  EXPECT_NE(error.find("on.mcap: byte "), std::string::npos) << error;
-  EXPECT_EQ(out_.str(), "");
+  report({.recordings = {off_, on_}}, out_);
+  EXPECT_NE(out_.str().find("on.mcap: byte "), std::string::npos) << out_.str();
+  EXPECT_NE(out_.str().find("on.mcap: lacks "), std::string::npos) << out_.str();
+  std::ostringstream json;
+  report({.recordings = {on_}, .json = true}, json);
+  EXPECT_NE(json.str().find(R"("damage":[")"), std::string::npos) << json.str();
+  EXPECT_EQ(json.str().find(R"("lost_steps":0)"), std::string::npos) << json.str();
 }
 
 TEST_F(Report, ARecordingWithoutAStepIsNoRun) {
@@ -139,10 +241,10 @@ TEST_F(Report, DrawsAPictureThatTellsTheRunsApart) {
   EXPECT_NE(out_.str().find("picture: " + picture.string()), std::string::npos);
 }
 
-TEST_F(Report, SaysWhenThePictureCannotBeDrawn) {
+TEST_F(Report, SaysThatThereIsNoFolderForThePicture) {
   if (!gnuplot_is_there()) GTEST_SKIP() << "gnuplot is not installed (package gnuplot-nox)";
   const std::string error = error_of({.recordings = {on_}, .picture = folder_.path() / "no-such-folder" / "a.svg"});
-  EXPECT_NE(error.find("gnuplot failed"), std::string::npos) << error;
+  EXPECT_NE(error.find("there is no folder"), std::string::npos) << error;
 }
 
 TEST(Plot, WithoutGnuplotItNamesThePackage) {

@@ -26,54 +26,10 @@ constexpr std::uint32_t kLimits =
     ~(static_cast<std::uint32_t>(Reason::kOverrun) |  //
       static_cast<std::uint32_t>(Reason::kWatchdog) | static_cast<std::uint32_t>(Reason::kAcceleration));
 
+constexpr double kMoves = 1e-4;  // m, standard deviation along an axis: several encoder counts
+
 bool any(Reasons reasons, std::initializer_list<Reason> of) {
   return std::ranges::any_of(of, [reasons](Reason reason) { return reasons.has(reason); });
-}
-
-/// What the environment does at a place: `outward` (N) pushes towards smaller x.
-struct Asked {
-  double x;
-  double outward;
-};
-
-struct Edge {
-  double first;  ///< the outermost place with a force
-  double at;     ///< where the force begins
-  double sum;    ///< N, of all forces
-};
-
-/// A force that a model leads to the hand may pull for a moment where a contact ends: as much less than the contact's
-/// other forces is no contact of its own.
-constexpr double kOnlyLed = 0.1;
-
-/// Where a contact that lies towards larger x begins. A force counts when it is above `least`.
-std::optional<Edge> find_edge(const std::vector<Asked>& asked, double least) {
-  constexpr double kFar = std::numeric_limits<double>::infinity();
-  double first = kFar;
-  double n = 0;
-  double sum_x = 0;
-  double sum_f = 0;
-  for (const Asked& a : asked) {
-    if (a.outward <= least) continue;
-    first = std::min(first, a.x);
-    ++n;
-    sum_x += a.x;
-    sum_f += a.outward;
-  }
-  if (n == 0) return std::nullopt;
-  double last_without = -kFar;
-  double squares = 0;
-  double products = 0;
-  for (const Asked& a : asked) {
-    if (a.outward <= least) {
-      if (a.x < first) last_without = std::max(last_without, a.x);
-      continue;
-    }
-    squares += (a.x - sum_x / n) * (a.x - sum_x / n);
-    products += (a.x - sum_x / n) * (a.outward - sum_f / n);
-  }
-  const double begins = products > 0 ? (sum_x - sum_f * squares / products) / n : first;
-  return Edge{first, std::clamp(begins, last_without, first), sum_f};
 }
 
 std::optional<Spread> spread(const Thinned<Duration>& times) {
@@ -83,26 +39,14 @@ std::optional<Spread> spread(const Thinned<Duration>& times) {
 
 }  // namespace
 
-double Contact::depth(double x) const noexcept {
-  if (above && x > *above) return x - *above;
-  if (below && x < *below) return *below - x;
-  return 0;
-}
-
-double Contact::outward(double x, double force) const noexcept {
-  if (above && x > *above) return -force;
-  if (below && x < *below) return force;
-  return 0;
-}
-
 double RunSummary::share_limited() const noexcept {
-  return steps == 0 ? 0 : static_cast<double>(limited_steps) / static_cast<double>(steps);
+  return served_steps == 0 ? 0 : static_cast<double>(limited_steps) / static_cast<double>(served_steps);
 }
 
 double RunSummary::share_limited(Reason why) const noexcept {
-  if (steps == 0 || why == Reason::kNone) return 0;
+  if (served_steps == 0 || why == Reason::kNone) return 0;
   const auto bit = static_cast<std::size_t>(std::countr_zero(static_cast<std::uint32_t>(why)));
-  return static_cast<double>(reason_steps[bit]) / static_cast<double>(steps);
+  return static_cast<double>(reason_steps[bit]) / static_cast<double>(served_steps);
 }
 
 void RunObserver::observe(const StepRecord& step) {
@@ -112,32 +56,65 @@ void RunObserver::observe(const StepRecord& step) {
   so_far_.longest_interval = std::max(so_far_.longest_interval, step.held);
   so_far_.overruns += step.reasons.has(Reason::kOverrun) ? 1 : 0;
   so_far_.watchdogs += step.reasons.has(Reason::kWatchdog) ? 1 : 0;
-  so_far_.limited_steps += (step.reasons.bits() & kLimits) != 0 ? 1 : 0;
-  for (std::uint32_t bits = step.reasons.bits(); bits != 0; bits &= bits - 1)
-    ++so_far_.reason_steps[static_cast<std::size_t>(std::countr_zero(bits))];
   so_far_.limiter_on |= std::isfinite(step.permitted);
   so_far_.peak_force = std::max(so_far_.peak_force, step.applied.norm());
 
   observe_energy(step);
+  observe_limits(step);
   observe_torque(step);
   if (!step.reasons.has(Reason::kUnseen)) observe_motion(step);
   observe_force(step);
 }
 
+void RunObserver::Ledger::observe(double energy_now, bool beyond_bound) noexcept {
+  const double before = std::min(std::exchange(energy, energy_now), 0.0);
+  given_out = std::max(given_out, -energy);
+  if (energy >= 0) overdrawn = 0;
+  if (beyond_bound) {
+    overdrawn += std::min(std::min(energy, 0.0) - before, 0.0);
+  } else {
+    least = std::min(least, energy - overdrawn);
+  }
+}
+
 void RunObserver::observe_energy(const StepRecord& step) {
-  const double before = std::min(energy_, 0.0);
-  energy_ = step.energy;
-  so_far_.energy_given_out = std::max(so_far_.energy_given_out, -energy_);
-  if (energy_ >= 0) overdrawn_ = 0;
   // Recordings made before a step knew its bound have 0 there: the scene's bound, which flags overruns, was in force.
   const Duration bound = std::exchange(bound_, step.longest_hold);
   const bool beyond = bound > Duration::zero() ? step.held > bound : step.reasons.has(Reason::kOverrun);
-  if (beyond) {
-    ++so_far_.holds_beyond_bound;
-    overdrawn_ += std::min(std::min(energy_, 0.0) - before, 0.0);
-  } else {
-    so_far_.least_energy = std::min(so_far_.least_energy, energy_ - overdrawn_);
+  so_far_.holds_beyond_bound += beyond ? 1 : 0;
+  handle_.observe(step.energy, beyond);
+  if (const GripStep* const grip = step.grip()) {
+    has_grip_ = true;
+    grip_.observe(grip->energy, beyond);
   }
+  // The initial bound is the value from the scene, which is also the minimum.
+  if (step.longest_hold > Duration::zero()) least_bound_ = std::min(least_bound_, step.longest_hold);
+  careful_ += step.longest_hold > least_bound_ ? 1 : 0;
+}
+
+void RunObserver::Limits::observe(Reasons why) noexcept {
+  ++steps;
+  limited += (why.bits() & kLimits) != 0 ? 1 : 0;
+  for (std::uint32_t bits = why.bits(); bits != 0; bits &= bits - 1)
+    ++reasons[static_cast<std::size_t>(std::countr_zero(bits))];
+}
+
+void RunObserver::Limits::add(const Limits& other) noexcept {
+  steps += other.steps;
+  limited += other.limited;
+  for (std::size_t bit = 0; bit < reasons.size(); ++bit) reasons[bit] += other.reasons[bit];
+}
+
+/// Counts from the first fresh force to the last one.
+void RunObserver::observe_limits(const StepRecord& step) {
+  const bool fresh = step.mode == Mode::kActive;
+  if (!fresh && last_fresh_ == 0) return;
+  since_.observe(step.reasons);
+  const double by = (step.wanted - step.applied).norm();
+  if ((step.reasons.bits() & kLimits) != 0 && std::isfinite(by)) apart_.observe({so_far_.steps, by});
+  if (!fresh) return;
+  served_.add(std::exchange(since_, {}));
+  last_fresh_ = so_far_.steps;
 }
 
 /// A turn that was not seen is booked as one about a single axis, with the torque held last.
@@ -170,44 +147,104 @@ void RunObserver::observe_motion(const StepRecord& step) {
   history_.push_back({step.hand.at, position});
   if (history_.size() > kMostHistory) history_.pop_front();
   const bool fresh = step.mode == Mode::kActive || step.mode == Mode::kHolding;
-  if (fresh && !step.reasons.has(Reason::kRampIn)) felt_.observe({position, step.applied});
+  if (!fresh || step.reasons.has(Reason::kRampIn)) return;
+  const FeltStep felt{position, step.applied};
+  if (step.force_sequence == 0) {
+    felt_.observe(felt);  // of a coupling
+  } else if (felt_since_.size() < kMostHeld) {
+    felt_since_.push_back(felt);
+  }
 }
 
 void RunObserver::observe_force(const StepRecord& step) {
-  if (step.force_sequence == 0 || step.force_sequence == force_in_use_) return;
-  force_in_use_ = step.force_sequence;
-  if (so_far_.forces == 0) first_force_ = step.hand.at;
-  last_force_ = step.hand.at;
-  ++so_far_.forces;
-  loop_ages_.observe(step.loop_age);
-
-  if (!step.wanted.allFinite()) return;
+  if (step.force_sequence == 0) return;
+  if (step.force_sequence != force_in_use_) {
+    if (newest_) asked_.observe(*std::exchange(newest_, std::nullopt));
+    // The steps of the last force are not used, because it does not change after the engine has left.
+    for (const FeltStep& felt : felt_since_) felt_.observe(felt);
+    felt_since_.clear();
+    force_in_use_ = step.force_sequence;
+    if (so_far_.forces == 0) first_force_ = step.hand.at;
+    last_force_ = step.hand.at;
+    ++so_far_.forces;
+    loop_ages_.observe(step.loop_age);
+    if (of_several_) bring(step.force_sequence, step.hand.at - step.force_age, std::nullopt);
+  }
+  if (!step.wanted.allFinite() || !step.stiffness.allFinite() || step.reasons.has(Reason::kUnseen)) return;
   if (any(step.reasons, {Reason::kRampIn, Reason::kDecaying, Reason::kSafeStop, Reason::kNotFinite})) return;
   const auto later = std::ranges::upper_bound(history_, step.hand.at - step.loop_age, {}, &Seen::at);
-  if (later != history_.begin()) asked_.observe({std::prev(later)->position, step.wanted});
+  if (later == history_.begin()) return;
+  const Vec3& place = std::prev(later)->position;
+  const Vec3& used = step.hand.position;
+  newest_ = Push{.place = place, .used = used, .force = step.wanted + step.stiffness * (used - place)};
+}
+
+void RunObserver::bring(std::uint64_t sequence, LocalTime received, std::optional<Duration> round_trip) {
+  constexpr Duration kNear = std::chrono::milliseconds(2);  // the age is 0 if it arrives within a step
+  const auto other = std::ranges::find_if(brought_, [&](const Brought& one) {
+    return one.sequence == sequence && one.round_trip.has_value() != round_trip.has_value() &&
+           std::chrono::abs(one.received - received) <= kNear;
+  });
+  if (other == brought_.end()) {
+    brought_.push_back({sequence, received, round_trip});
+    if (brought_.size() > kMostBrought) brought_.pop_front();
+    return;
+  }
+  round_trips_.observe(round_trip ? *round_trip : *other->round_trip);
+  brought_.erase(other);
+}
+
+void RunObserver::note_sent(const Header& header, LocalTime at) {
+  if (sent_.size() >= kMostConnections && !sent_.contains(header.connection_id)) return;
+  Sent& sent = sent_.try_emplace(header.connection_id, Sent{at, 0}).first->second;
+  if (header.type == DatagramType::kData) sent.highest_number = std::max(sent.highest_number, header.packet_number);
+}
+
+/// Uses the same rule as the session (SESSION.md). If the recording starts in a session, earlier datagrams are unknown.
+bool RunObserver::believable(const Header& header, const DataContent& content, LocalTime at) const {
+  const auto sent = sent_.find(header.connection_id);
+  return sent != sent_.end() && content.echo->packet_number <= sent->second.highest_number &&
+         content.echo->sent >= sent->second.first && content.echo->sent <= at && content.sent >= content.echo->received;
 }
 
 void RunObserver::observe(const DatagramRecord& datagram) {
-  if (datagram.direction != DatagramRecord::Direction::kIn || datagram.size > datagram.bytes.size()) return;
+  if (datagram.size > datagram.bytes.size()) return;
   const std::span<const std::byte> bytes = std::span(datagram.bytes).first(datagram.size);
   const auto header = decode_header(bytes);
-  // What is sealed stays sealed: the keys are not in the recording.
-  if (!header || header->type != DatagramType::kData || header->suite != Suite::kPlain) return;
-  const DataContent* content = reader_.read(bytes.subspan(kHeaderSize));
-  if (content == nullptr || !content->echo) return;
-  if (std::ranges::none_of(content->frames,
-                           [](const Frame& frame) { return std::holds_alternative<ForceCommand>(frame); }))
+  if (!header) return;
+  if (datagram.direction == DatagramRecord::Direction::kOut) {
+    note_sent(*header, datagram.at);
     return;
+  }
+  if (header->type != DatagramType::kData) return;
+  // What is sealed stays sealed: the keys are not in the recording.
+  if (header->suite != Suite::kPlain) {
+    so_far_.sealed = true;
+    return;
+  }
+  const DataContent* content = reader_.read(bytes.subspan(kHeaderSize));
+  if (content == nullptr || !content->echo || !believable(*header, *content, datagram.at)) return;
   const Duration sample = (datagram.at - content->echo->sent) - (content->sent - content->echo->received);
-  if (sample >= Duration::zero()) round_trips_.observe(sample);
+  if (sample < Duration::zero()) return;
+  for (const Frame& frame : content->frames) {
+    const auto* const force = std::get_if<ForceCommand>(&frame);
+    if (force == nullptr) continue;
+    if (!of_several_) return round_trips_.observe(sample);
+    bring(force->sequence, datagram.at, sample);
+  }
 }
 
-Vec3 RunObserver::main_axis() const {
-  if (positions_ == 0) return Vec3::UnitX();
+Mat3 RunObserver::covariance() const {
+  if (positions_ == 0) return Mat3::Zero();
   const Vec3 mean = sum_ / positions_;
-  const Mat3 covariance = sum_of_squares_ / positions_ - mean * mean.transpose();
-  if (!(covariance.trace() > 0)) return Vec3::UnitX();
-  const Eigen::SelfAdjointEigenSolver<Mat3> solver(covariance);
+  return sum_of_squares_ / positions_ - mean * mean.transpose();
+}
+
+Vec3 RunObserver::main_axis(std::span<const Push> pushes) const {
+  const Mat3 motion = covariance();
+  if (const auto axis = common_direction(pushes); axis && axis->dot(motion * *axis) > kMoves * kMoves) return *axis;
+  if (!(motion.trace() > 0)) return Vec3::UnitX();
+  const Eigen::SelfAdjointEigenSolver<Mat3> solver(motion);
   Vec3 axis = solver.eigenvectors().col(2);  // eigenvalues come in increasing order
   Eigen::Index largest = 0;
   axis.cwiseAbs().maxCoeff(&largest);
@@ -215,55 +252,30 @@ Vec3 RunObserver::main_axis() const {
   return axis[largest] < 0 ? Vec3(-axis) : axis;
 }
 
-std::optional<Contact> RunObserver::contact(const Vec3& axis) const {
-  std::vector<Asked> up;
-  std::vector<Asked> down;
-  double largest = 0;
-  for (const Push& push : asked_.kept()) {
-    const double x = push.position.dot(axis);
-    const double force = push.force.dot(axis);
-    up.push_back({.x = x, .outward = -force});
-    down.push_back({.x = -x, .outward = force});
-    largest = std::max(largest, std::abs(force));
-  }
-  std::optional<Edge> above = find_edge(up, 0.01 * largest);
-  std::optional<Edge> below = find_edge(down, 0.01 * largest);
-  if (!above && !below) return std::nullopt;
-  if (above && below && -below->first > above->first) {
-    if (below->sum < kOnlyLed * above->sum) {
-      below.reset();
-    } else if (above->sum < kOnlyLed * below->sum) {
-      above.reset();
-    }
-  }
-  if (above && below && -below->first > above->first) return std::nullopt;
-  Contact contact;
-  if (above) contact.above = above->at;
-  if (below) contact.below = -below->at;
-  return contact;
-}
-
-std::optional<double> RunObserver::stiffness(const Vec3& axis, const Contact& contact) const {
-  double deepest = 0;
-  for (const Push& push : felt_.kept()) deepest = std::max(deepest, contact.depth(push.position.dot(axis)));
-  double sum = 0;
-  double count = 0;
-  for (const Push& push : felt_.kept()) {
-    const double x = push.position.dot(axis);
-    const double depth = contact.depth(x);
-    if (depth <= 0.1 * deepest) continue;
-    sum += contact.outward(x, push.force.dot(axis)) / depth;
-    ++count;
-  }
-  if (count == 0) return std::nullopt;
-  return sum / count;
-}
-
 RunSummary RunObserver::summary() const {
   RunSummary summary = so_far_;
-  summary.axis = main_axis();
-  summary.contact = contact(summary.axis);
-  if (summary.contact) summary.operational_stiffness = stiffness(summary.axis, *summary.contact);
+  summary.energy_given_out = handle_.given_out;
+  summary.least_energy = handle_.least;
+  if (has_grip_) {
+    summary.grip_energy_given_out = grip_.given_out;
+    summary.least_energy = std::min(summary.least_energy, grip_.least);
+  }
+  if (summary.steps > 0) summary.share_careful = static_cast<double>(careful_) / static_cast<double>(summary.steps);
+  summary.served_steps = served_.steps;
+  summary.limited_steps = served_.limited;
+  summary.reason_steps = served_.reasons;
+  std::vector<double> apart;
+  for (const Apart& one : apart_.kept()) {
+    if (one.step <= last_fresh_) apart.push_back(one.by);
+  }
+  if (!apart.empty()) summary.difference = Difference{*percentile(apart, 0.50), *percentile(apart, 0.95)};
+
+  std::vector<Push> pushes = asked_.kept();
+  if (newest_) pushes.push_back(*newest_);
+  summary.axis = main_axis(pushes);
+  summary.pushed = std::ranges::any_of(pushes, [](const Push& push) { return !push.force.isZero(0); });
+  summary.contact = find_contact(pushes, summary.axis);
+  if (summary.contact) summary.operational_stiffness = felt_stiffness(felt_.kept(), summary.axis, *summary.contact);
   summary.stable = summary.passive() || fast_ <= slow_;
   summary.loop_age = spread(loop_ages_);
   summary.round_trip = spread(round_trips_);

@@ -6,7 +6,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "core/base/rotation.h"
@@ -129,6 +131,59 @@ TEST(RunSummary, SharesAreOfAllStepsAndFactsAboutAStepAreNoLimits) {
   EXPECT_EQ(run.watchdogs, 1U);
 }
 
+TEST(RunSummary, SharesAreOfTheTimeFromTheFirstFreshForceToTheLast) {
+  auto steps = with_energies(std::vector<double>(10, 0.0));
+  for (const std::size_t n : {0U, 1U, 2U, 8U, 9U}) {
+    steps[n].mode = n < 3 ? Mode::kIdle : Mode::kSafeStop;
+    steps[n].reasons = Reason::kSafeStop;
+  }
+  steps[4].mode = Mode::kSafeStop;  // the engine paused
+  steps[4].reasons = Reason::kSafeStop;
+  for (const std::size_t n : {4U, 5U, 9U}) steps[n].wanted = Vec3(3, 0, 4);
+  steps[5].applied = Vec3(3, 0, 2);
+  steps[5].reasons = Reason::kDamped;
+  const RunSummary run = summarise(steps);
+  EXPECT_EQ(run.served_steps, 5U);
+  EXPECT_DOUBLE_EQ(run.share_limited(), 0.4);
+  EXPECT_DOUBLE_EQ(run.share_limited(Reason::kSafeStop), 0.2);
+  ASSERT_TRUE(run.difference);
+  EXPECT_DOUBLE_EQ(run.difference->p50, 2);
+  EXPECT_DOUBLE_EQ(run.difference->p95, 5);
+}
+
+TEST(RunSummary, ARunWithoutAFreshForceHasNoShare) {
+  auto steps = with_energies(std::vector<double>(10, 0.0));
+  for (StepRecord& step : steps) {
+    step.mode = Mode::kSafeStop;
+    step.reasons = Reason::kSafeStop;
+  }
+  const RunSummary run = summarise(steps);
+  EXPECT_EQ(run.served_steps, 0U);
+  EXPECT_EQ(run.share_limited(), 0);
+  EXPECT_FALSE(run.difference);
+}
+
+TEST(RunSummary, SaysForHowLongOverrunsMadeTheLimiterMoreCareful) {
+  auto steps = with_energies(std::vector<double>(10, 0.0));
+  for (std::size_t n = 0; n < steps.size(); ++n)
+    steps[n].longest_hold = std::chrono::microseconds(n < 3 ? 2000 : n < 7 ? 8000 - static_cast<int>(n) : 2000);
+  EXPECT_DOUBLE_EQ(summarise(steps).share_careful, 0.4);
+  for (StepRecord& step : steps) step.longest_hold = {};  // recorded before there was one
+  EXPECT_EQ(summarise(steps).share_careful, 0);
+}
+
+TEST(RunSummary, TheGripperHasAnAccountOfItsOwn) {
+  auto steps = with_energies({0, 0.2, 0.3});
+  EXPECT_FALSE(summarise(steps).grip_energy_given_out);
+  for (StepRecord& step : steps) step.handle.emplace().grip.emplace();
+  steps[1].grip()->energy = -0.25;
+  const RunSummary run = summarise(steps);
+  EXPECT_DOUBLE_EQ(run.grip_energy_given_out.value_or(0), 0.25);
+  EXPECT_EQ(run.energy_given_out, 0);
+  EXPECT_FALSE(run.passive());
+  EXPECT_FALSE(run.kept_its_promise());
+}
+
 TEST(RunSummary, ASpringIsFeltAsStiffAsItIs) {
   const RunSummary run = summarise(spring_run(2000, 700, 0.002, 0));
   ASSERT_TRUE(run.contact && run.contact->above);
@@ -170,7 +225,10 @@ TEST(RunSummary, AWallThatPushesUpTheAxisIsFeltTheSame) {
 
 TEST(RunSummary, ASpringToACentrePushesOnBothSidesOfIt) {
   auto steps = spring_run(2000, 700, -1, 0);
-  for (StepRecord& step : steps) step.wanted.x() = step.applied.x() = -700 * step.hand.position.x();
+  for (StepRecord& step : steps) {
+    step.wanted.x() = step.applied.x() = -700 * step.hand.position.x();
+    step.stiffness(0, 0) = 700;
+  }
   EXPECT_NEAR(summarise(steps).operational_stiffness.value_or(0), 700, 0.03 * 700);
 }
 
@@ -244,32 +302,73 @@ TEST(RunSummary, ARunWithoutForcesHasNoLoopAgeAndNoRate) {
   EXPECT_FALSE(run.round_trip);
 }
 
-TEST(RunSummary, TheRoundTripIsWhatTheEchoesOfTheControllerSay) {
-  // Our state leaves at 100 ms; the peer has it at 7000.0 ms of its clock, answers at 7002.5, and that is here at 145.
+/// A Data datagram of ours that leaves at `at`.
+DatagramRecord sent_at(LocalTime at, std::uint64_t number) {
+  DatagramRecord datagram;
+  datagram.at = at;
+  datagram.direction = DatagramRecord::Direction::kOut;
+  DataWriter writer;
+  writer.begin(datagram.bytes, {.connection_id = 1, .packet_number = number}, at, std::nullopt);
+  datagram.size = static_cast<std::uint32_t>(writer.size());
+  return datagram;
+}
+
+/// A force that comes at 145 ms: the peer had our datagram of `sent` at 7000.0 ms of its clock and answers at 7002.5.
+DatagramRecord force_of(std::uint64_t sequence, PeerTime sent, std::uint64_t number = 0) {
   DatagramRecord datagram;
   datagram.at = testing::at_ms(145);
   DataWriter writer;
   // Written by the peer, to whom its own clock is local.
-  writer.begin(
-      datagram.bytes, {.connection_id = 1}, LocalTime(7002500us),
-      OutgoingEcho{.sent = PeerTime(100ms), .received = LocalTime(7000ms), .packet_number = 0, .received_mask = 0});
-  ASSERT_TRUE(writer.add(
-      ForceCommand{.sequence = 1, .based_on_tick = 1, .force = Vec3(1, 0, 0), .model = {}, .valid_for = 50ms}));
+  writer.begin(datagram.bytes, {.connection_id = 1}, LocalTime(7002500us),
+               OutgoingEcho{.sent = sent, .received = LocalTime(7000ms), .packet_number = number, .received_mask = 0});
+  EXPECT_TRUE(writer.add(
+      ForceCommand{.sequence = sequence, .based_on_tick = 1, .force = Vec3(1, 0, 0), .model = {}, .valid_for = 50ms}));
   datagram.size = static_cast<std::uint32_t>(writer.size());
+  return datagram;
+}
 
+TEST(RunSummary, TheRoundTripIsWhatTheEchoesOfTheControllerSay) {
+  const DatagramRecord datagram = force_of(1, PeerTime(100ms));
   RunObserver observer;
+  observer.observe(sent_at(testing::at_ms(100), 0));
   observer.observe(datagram);
   DatagramRecord garbage = datagram;
   garbage.bytes.fill(std::byte{0x54});
   observer.observe(garbage);
-  DatagramRecord out = datagram;
-  out.direction = DatagramRecord::Direction::kOut;
-  out.at += 1s;
-  observer.observe(out);
   const auto round_trip = observer.summary().round_trip;
   ASSERT_TRUE(round_trip);
   EXPECT_EQ(round_trip->p50, 42500us);
   EXPECT_EQ(round_trip->p99, 42500us);
+}
+
+TEST(RunSummary, AnEchoThatTheServerRefusedIsNoRoundTrip) {
+  RunObserver observer;
+  observer.observe(sent_at(testing::at_ms(100), 0));
+  observer.observe(force_of(1, PeerTime(-66'965'755'690ms)));  // before the session began
+  observer.observe(force_of(2, PeerTime(146ms)));              // of the future
+  observer.observe(force_of(3, PeerTime(100ms), 7));           // of a datagram that was not sent yet
+  EXPECT_FALSE(observer.summary().round_trip);
+}
+
+TEST(RunSummary, OfSeveralDevicesTheRoundTripIsThatOfTheOwnForces) {
+  for (const bool step_first : {false, true}) {
+    RunObserver mine(true);
+    RunObserver other(true);
+    StepRecord step = step_at(0);
+    step.hand.at = testing::at_ms(146);
+    step.force_sequence = 5;
+    step.force_age = 1ms;
+    StepRecord other_step = step;
+    other_step.force_sequence = 6;
+    for (auto [observer, used] : {std::pair(&mine, &step), std::pair(&other, &other_step)}) {
+      if (step_first) observer->observe(*used);
+      observer->observe(sent_at(testing::at_ms(100), 0));
+      observer->observe(force_of(5, PeerTime(100ms)));
+      if (!step_first) observer->observe(*used);
+    }
+    EXPECT_TRUE(mine.summary().round_trip);
+    EXPECT_FALSE(other.summary().round_trip);
+  }
 }
 
 TEST(RunSummary, AStepWithoutAPositionSaysNothingAboutMotion) {

@@ -13,6 +13,7 @@
 
 #include "tests/tools/injector/profile/named_profiles.h"
 
+#include "core/base/nearest_word.h"
 #include "tests/support/part_options.h"
 #include "tests/tools/lab/experiments/accuracy.h"
 #include "tests/tools/lab/verbs/verb.h"
@@ -58,7 +59,7 @@ auto named(const std::vector<std::string>& names, Find find, const std::string& 
   std::vector<std::remove_cvref_t<decltype(*find(std::string_view()))>> found;
   for (const std::string& name : names) {
     const auto one = find(name);
-    if (!one) throw std::invalid_argument(name + ": expected " + all);
+    if (!one) throw std::invalid_argument(name + ": expected " + all + did_you_mean(name, all));
     found.push_back(*one);
   }
   return found;
@@ -67,7 +68,7 @@ auto named(const std::vector<std::string>& names, Find find, const std::string& 
 void add(CLI::App& verb, int& /*exit*/) {
   static AccuracyArguments arguments;
   AccuracyOptions& options = arguments.options;
-  const std::string models = names_of(softbody::models());
+  const std::string models = names_of_models();
   const std::string elements = names_of(softbody::elements());
   verb.add_option("--block-mm", arguments.block_mm, "lengths of a block that is clamped below")
       ->type_name("XxYxZ")
@@ -143,7 +144,7 @@ void add(CLI::App& verb, int& /*exit*/) {
     if ((options.part.units || options.part.from) && (*slowest || *setup || *point)) {
       throw std::invalid_argument("--units, --from: not with a limit of time, since they look at no clock");
     }
-    options.models = named(arguments.models, softbody::model_named, models);
+    options.models = named(arguments.models, any_model_named, models);
     options.elements = named(arguments.elements, softbody::element_named, elements);
     options.block = {.size = lengths(arguments.block_mm),
                      .material = {.young = arguments.young_pa, .poisson = arguments.poisson},

@@ -26,7 +26,7 @@ void add(CLI::App& verb, int& /*exit*/) {
       ->delimiter(',')
       ->type_name("NAME,…");
   verb.add_flag("--held-out", drawn.held_out, "with --kinds: seeds on which no law was tuned");
-  verb.add_option("--every", options.every, "take every so-manieth situation of the grid")->capture_default_str();
+  verb.add_option("--every", options.every, "take every Nth situation of the grid")->capture_default_str();
   verb.add_option("--seed", options.seed, "of the network; the same for all laws")->capture_default_str();
   add_part_options(verb, options.part, "0 to 2303, the situations of the grid (with --every, those that are taken)");
   verb.add_option("--out", options.out, "write compare.csv and a figure there, SVG and PNG (needs gnuplot)")

@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <limits>
+#include <map>
+#include <vector>
+
+#include "tests/support/dice.h"
+
+namespace tendon {
+
+/// What one direction of a bad network does, in whole periods of the loop.
+struct Network {
+  int delay = 0;
+  int jitter = 0;   ///< 0 … jitter is added to the delay of each message by itself: they overtake each other
+  double loss = 0;  ///< probability
+  std::uint64_t seed = 1;
+  double repeated = 0;  ///< probability that a message comes once more, up to 1000 periods later
+  /// From this period on the delay is so much longer.
+  int longer_from = std::numeric_limits<int>::max();
+  int longer_by = 0;
+  /// Messages that are sent from this period on, and before the other, are lost.
+  int cut_from = std::numeric_limits<int>::max();
+  int cut_until = 0;
+};
+
+/// One direction of a bad network between two loops that run in step. Virtual time: the number of the period.
+template <class Message>
+class OneWay {
+ public:
+  explicit OneWay(const Network& network) : network_(network), dice_(network.seed) {}
+
+  void send(int now, const Message& message) {
+    const bool lost = dice_.chance(network_.loss);
+    const int extra = static_cast<int>(dice_.within(0, network_.jitter + 1));
+    if (lost || (now >= network_.cut_from && now < network_.cut_until)) return;
+    const int at = now + network_.delay + extra + (now >= network_.longer_from ? network_.longer_by : 0);
+    under_way_.emplace(at, Parcel{sent_++, message});
+    if (network_.repeated > 0 && dice_.chance(network_.repeated)) {
+      under_way_.emplace(at + static_cast<int>(dice_.within(0, 1000)), Parcel{sent_++, message});
+    }
+  }
+
+  /// Calls `receive` with every message that arrives in period `now`, in the order in which they were sent.
+  template <class Receive>
+  void deliver(int now, Receive receive) {
+    const auto last = under_way_.upper_bound(now);
+    std::vector<const Parcel*> arrived;
+    for (auto parcel = under_way_.begin(); parcel != last; ++parcel) arrived.push_back(&parcel->second);
+    std::ranges::sort(arrived, {}, &Parcel::number);
+    for (const Parcel* const parcel : arrived) receive(parcel->message);
+    under_way_.erase(under_way_.begin(), last);
+  }
+
+ private:
+  struct Parcel {
+    std::uint64_t number;
+    Message message;
+  };
+  Network network_;
+  Dice dice_;
+  std::multimap<int, Parcel> under_way_;  ///< by the period in which it arrives
+  std::uint64_t sent_ = 0;
+};
+
+}  // namespace tendon

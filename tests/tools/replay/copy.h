@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <string>
+
+#include "server/recording/byte_sink.h"
+#include "server/recording/mcap_reader.h"
+#include "server/recording/mcap_writer.h"
+
+// Functions to copy the messages of a recording.
+
+namespace tendon::replay {
+
+/// Opens a recording. Throws std::runtime_error if it cannot be read.
+McapReader open_mcap(const std::filesystem::path& path);
+
+/// Creates the channels in the new file. The messages must be defined in recording.proto.
+class CopiedChannels {
+ public:
+  /// Returns the id of the channel in `writer`. Creates the channel if it does not exist. The `prefix` is added to the
+  /// topic.
+  std::uint16_t in(McapWriter& writer, const McapReader::Channel& from, const std::string& prefix = {});
+
+ private:
+  std::map<std::string, std::uint16_t> ids_;  ///< by topic
+};
+
+/// Throws std::runtime_error with the error message of `sink` if `written` is false.
+void check_written(bool written, const FileSink& sink);
+
+}  // namespace tendon::replay

@@ -1,0 +1,60 @@
+# SPDX-License-Identifier: Apache-2.0
+# Precompiled headers for tests that are not optimized.
+#
+# With clang the inline functions of these headers are compiled once, optimized, into an object that each program links,
+# and not again in each source (https://clang.llvm.org/docs/UsersManual.html, "Building a PCH with object file").
+#
+# This is for tests alone. The linker keeps one copy of an inline function, and a program that ships must not get one that
+# was not optimized.
+
+# A failed test names its line. For a debugger there is the preset `dev`.
+set(tests_debug_information $<$<CONFIG:RelWithDebInfo>:-g0>)
+
+# tendon_headers(name LIBS … HEADERS …): declares a set of headers.
+function(tendon_headers name)
+  cmake_parse_arguments(PARSE_ARGV 1 ARG "" "" "LIBS;HEADERS")
+  file(WRITE ${CMAKE_CURRENT_BINARY_DIR}/${name}.cc "// Carries the precompiled headers.\n")
+  add_library(${name} OBJECT ${CMAKE_CURRENT_BINARY_DIR}/${name}.cc)
+  set_target_properties(${name} PROPERTIES UNITY_BUILD OFF)
+  target_compile_options(${name} PRIVATE -O0 ${tests_debug_information})
+  target_link_libraries(${name} PRIVATE ${ARG_LIBS} tendon_warnings)
+  target_precompile_headers(${name} PRIVATE ${ARG_HEADERS})
+  if(CMAKE_CXX_COMPILER_ID MATCHES Clang)
+    target_compile_options(${name} PRIVATE -Xclang -fmodules-codegen -fpch-instantiate-templates)
+    set(functions ${CMAKE_CURRENT_BINARY_DIR}/${name}_functions.o)
+    get_directory_property(options COMPILE_OPTIONS)
+    list(FILTER options INCLUDE REGEX sanitize|frame-pointer)
+    add_custom_command(
+      OUTPUT ${functions}
+      COMMAND ${CMAKE_CXX_COMPILER} ${options} -O2 -ffunction-sections
+              -c CMakeFiles/${name}.dir/cmake_pch.hxx.pch -o ${functions}
+      DEPENDS $<TARGET_OBJECTS:${name}>
+      VERBATIM)
+    add_custom_target(${name}_functions DEPENDS ${functions})
+    set_target_properties(${name}_functions PROPERTIES FUNCTIONS ${functions})
+  endif()
+endfunction()
+
+# tendon_links_headers(program name): for a program that links objects compiled with the headers `name`.
+function(tendon_links_headers program name)
+  if(TARGET ${name}_functions)
+    set(scope PRIVATE)
+    get_target_property(type ${program} TYPE)
+    if(NOT type STREQUAL EXECUTABLE)
+      set(scope INTERFACE)
+    endif()
+    get_target_property(functions ${name}_functions FUNCTIONS)
+    # As a source it comes before the libraries: no member of an archive is linked for an inline function that it has
+    # too. Some of these functions call others that no library defines. The linker drops them because nobody calls them.
+    target_sources(${program} ${scope} ${functions})
+    target_link_libraries(${program} ${scope} -Wl,--gc-sections)
+    add_dependencies(${program} ${name}_functions)
+  endif()
+endfunction()
+
+# tendon_unoptimized(target name): compiles the target's sources with the headers `name`, and without optimization.
+function(tendon_unoptimized target name)
+  target_compile_options(${target} PRIVATE -O0 ${tests_debug_information})
+  target_precompile_headers(${target} REUSE_FROM ${name})
+  tendon_links_headers(${target} ${name})
+endfunction()
