@@ -2,11 +2,12 @@
 """All files that the generator writes."""
 
 import cpp
+import page
 import python
 import typescript
 from model import Wire
 
-BACKENDS = (cpp, python, typescript)
+BACKENDS = (cpp, python, typescript, page)
 
 
 def made(wire: Wire) -> dict[str, str]:

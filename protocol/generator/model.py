@@ -404,8 +404,9 @@ def load(proto: Path = PROTO, values: Path = VALUES) -> Wire:
         first = one.value[0].name
         prefix = first[: first.rindex("_") + 1]
         known = [
-            EnumValue(value.name, value.number, value.name.removeprefix(prefix), _joined(around(5, index, 2, k)[1]))
+            EnumValue(value.name, value.number, value.name.removeprefix(prefix), _joined([*above, *behind]))
             for k, value in enumerate(one.value)
+            for above, behind in [around(5, index, 2, k)]
         ]
         enums[one.name] = Enum(one.name, _joined(around(5, index)[0]), tuple(known))
 
@@ -414,11 +415,12 @@ def load(proto: Path = PROTO, values: Path = VALUES) -> Wire:
         fields = []
         for k, each in enumerate(one.field):
             above, behind = around(4, index, 2, k)
-            # A line that ends in a colon is about those that follow; the rest belongs to the field.
+            # The lines up to one that ends in a colon are about those fields that follow; the rest is about this field.
             heading = ""
-            if above and (above[-1].endswith(":") or above[-1] in ("client → server", "server → client")):
-                heading = _joined(above)
-                above = []
+            for at, line in enumerate(above):
+                if line.endswith(":"):
+                    heading, above = _joined(above[: at + 1]), above[at + 1 :]
+                    break
             bound, doc = split_comment(_joined(behind))
             doc = _joined([*above, doc])
             if each.type == _MESSAGE:

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What protocol/generator makes of tendon.proto."""
 
-import re
 import shutil
 import sys
 
@@ -12,6 +11,7 @@ pytest.importorskip("tomllib", reason="the generator needs Python 3.11")
 sys.path.insert(0, str(ROOT / "protocol" / "generator"))
 import files  # noqa: E402
 import model  # noqa: E402
+import page  # noqa: E402
 
 pytestmark = pytest.mark.skipif(shutil.which("protoc") is None, reason="no protoc: apt-get install protobuf-compiler")
 
@@ -26,12 +26,45 @@ def test_the_committed_files_are_what_tendon_proto_says(wire):
     assert not stale, "run protocol/generate"
 
 
-def test_the_page_names_every_field(wire):
-    page = (ROOT / "protocol" / "WIRE.md").read_text(encoding="utf-8")
-    named = {word for code in re.findall(r"`([^`\n]+)`", page) for word in re.findall(r"\w+", code)}
-    fields = {field.name for message in wire.messages.values() for field in message.fields}
-    choices = {field.name for field in (*wire.frames(), *wire.messages["Answer"].fields)}
-    assert fields - choices - set("wxyz") <= named
+def test_a_message_or_enum_without_a_table_on_the_page_is_an_error(wire):
+    text = (ROOT / page.PATH).read_text(encoding="utf-8")
+    assert page.rewritten(text, wire) == text
+    marker = "<!-- generated from tendon.proto: {} -->\n"
+    for name in ("Echo", "Mode"):
+        assert marker.format(name) in text
+        with pytest.raises(ValueError, match=f"0 tables of {name}"):
+            page.rewritten(text.replace(marker.format(name), ""), wire)
+    with pytest.raises(ValueError, match="2 tables of Echo"):
+        page.rewritten(f"{text}{marker.format('Echo')}<!-- end -->\n", wire)
+    with pytest.raises(ValueError, match="Ecko, which is not in tendon.proto"):
+        page.rewritten(f"{text}{marker.format('Ecko')}<!-- end -->\n", wire)
+
+
+def test_the_bounds_of_a_table_are_those_of_the_fields(wire):
+    text = page.rewritten((ROOT / page.PATH).read_text(encoding="utf-8"), wire)
+
+    def row(message, field):
+        table = text.partition(f"tendon.proto: {message} -->")[2].partition("<!-- end -->")[0]
+        (found,) = [line for line in table.splitlines() if f"| `{field}` |" in line]
+        return found
+
+    for message, field, bounds in (
+        ("DeviceState", "position_m", "± 10¹² m each"),
+        ("DeviceState", "permitted_force_n", "0 … 10¹² N or +infinity"),
+        ("DeviceState", "orientation", "norm 1 ± 0.001"),
+        ("DeviceState", "mode", "1 … 6"),
+        ("ForceCommand", "valid_for_us", "1 … 10 000 000 µs"),
+        ("Contact", "normal", "length 1 ± 0.001"),
+        ("LocalModel", "stiffness_npm", "1, 3 or 9 entries, ± 10¹² N/m"),
+        ("ForceTable", "step_m", "> 0, ≤ 10¹² m"),
+        ("PortState", "position_scale", "0.01 … 100 or 0"),
+        ("PeerReport", "link", "present"),
+        ("DeviceReport", "lateness_us_log2", "≤ 24 entries, sum of `lateness_us_log2` ≤ `steps`"),
+        ("SetOutput", "rgb", "0 … 0xFFFFFF"),
+        ("Hello", "features", "≤ 16 entries, each ≤ 32 bytes"),
+        ("Datagram", "tx_time_ns", "± 2⁶⁰ ns"),
+    ):
+        assert row(message, field).endswith(f"| {bounds} |"), field
 
 
 def test_a_bound_is_read_from_the_front_of_a_comment():
@@ -78,6 +111,11 @@ def test_a_new_field_needs_no_other_file(tmp_path):
     assert "    if not -1e3 <= grip_energy_j <= 1e3:\n" in codec
     assert "    if ramp_ms > 5000:\n" in codec
     assert '    hints = read_texts("hints", m.hints, 0, 4, 24)\n' in codec
+    table = made["protocol/WIRE.md"]
+    assert "| 99 | `grip_energy_j` | double | of the gripper | ± 10³ J |\n" in table
+    assert "| 99 | `bias_n` | `Vec3` | absent: none | ± 10¹² N each |\n" in table
+    assert "| 99 | `ramp_ms` | uint32 | | 0 … 5000 ms |\n" in table
+    assert "| 99 | `hints` | repeated string | | ≤ 4 entries, each ≤ 24 bytes |\n" in table
     values, codec = (made[f"clients/typescript/src/gen/{name}.ts"] for name in ("messages", "codec"))
     assert "  readonly gripEnergy?: number | undefined;\n" in values
     assert "  readonly hints?: readonly string[] | undefined;\n" in values

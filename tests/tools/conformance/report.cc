@@ -98,10 +98,11 @@ constexpr std::array kChecks = {
     Check{"packet-numbers", kBoth, kWire, kHeader, "Data: 0, 1, 2 … per direction, never twice; 0 in all others"},
     Check{"tx-time", kBoth, kWire, "Ground rules",
           "Times are nanoseconds of the sender's monotonic clock, |t| ≤ 2⁶⁰, never of the wall clock."},
-    Check{
-        "echo-newest", kBoth, kWire, kData,
-        "about the newest datagram accepted, that is the one with the highest packet number; absent before the first"},
-    Check{"echo-times", kBoth, kWire, kData, "when it arrived, on the clock of the one who echoes; T2 ≤ T3"},
+    Check{"echo-newest", kBoth, kWire, kData,
+          "about the newest accepted datagram of the peer, which is the one with the highest packet number; absent "
+          "before the first"},
+    Check{"echo-times", kBoth, kWire, kData,
+          "when that datagram arrived, on the clock of the sender of the echo; T2 ≤ T3"},
     Check{"echo-mask", kBoth, kWire, kData, "bit i: packet (peer_packet_number − 1 − i) has arrived too"},
     Check{"keep-alive", kBoth, kSession, kSent, "an empty datagram after 50 ms of our silence"},
     // What must be dropped, and what must not.
@@ -119,7 +120,7 @@ constexpr std::array kChecks = {
     Check{"out-of-bounds", kBoth, kWire, "Ground rules", "A frame with a value out of bounds is dropped and counted."},
     Check{"newest-wins", kBoth, kSession, kNewest,
           "One that arrives is accepted only with a higher tick, sequence or number than all before it (else stale)"},
-    Check{"golden-frame", kBoth, kWire, "Golden datagrams", "Bytes in hex, then what they say."},
+    Check{"golden-frame", kBoth, kWire, "Golden datagrams", "Each line has the bytes in hex, then their meaning."},
     Check{"rekey-followed", kBoth, kWire, kSuite1,
           "the next one, to which it moves on once such a datagram has opened"},
     Check{"old-key-overlap", kBoth, kWire, kSuite1, "the previous one for 2 s after moving on"},
@@ -134,16 +135,19 @@ constexpr std::array kChecks = {
           "A client's address is the source of its authentic datagram with the highest packet number; in suite 0 it "
           "never changes, and a server's never does."},
     Check{"observer-only-looks", kServer, kWire, kHello,
-          "ROLE_OBSERVER sees states, ROLE_CONTROLLER also sends forces"},
+          "An observer receives states; a controller also sends forces."},
     Check{"rearm-by-controller", kServer, kWire, kData,
-          "client → server: clears a latched fault; from a controller of the device only"},
-    Check{"disarm-by-controller", kServer, kWire, kData, "client → server: no force until a rearm"},
+          "Clears a latched fault and revokes a Disarm; only from a controller of the device."},
+    Check{
+        "disarm-by-controller", kServer, kWire, kData,
+        "Sets the force to zero from the next haptic step on, without a ramp, until a Rearm; only from a controller of "
+        "the device"},
     Check{"forces", kClient, kWire, kData, "1, 2, 3 … per session, device and channel"},
-    Check{"force-bounds", kClient, kWire, kData, "µs from arrival during which it is fresh"},
-    Check{"force-answers", kClient, kWire, kData, "tick of the state it was computed from"},
+    Check{"force-bounds", kClient, kWire, kData, "time from its arrival during which the force is fresh"},
+    Check{"force-answers", kClient, kWire, kData, "DeviceState.tick of the state that the force was computed from"},
     Check{"force-granted", kClient, kSession, "Older peers", "a force is sent without way"},
     Check{"observer-sends-none", kClient, kWire, kHello,
-          "ROLE_OBSERVER sees states, ROLE_CONTROLLER also sends forces"},
+          "An observer receives states; a controller also sends forces."},
     // Requests.
     Check{"request-order", kServer, kSession, kRequests,
           "The answerer delivers each request once and in the order of the numbers, whatever order they arrive in."},
@@ -156,7 +160,7 @@ constexpr std::array kChecks = {
         "request-invalid", kBoth, kSession, kRequests,
         "The session itself answers CODE_INVALID, with the name of the field in detail, to a request whose number can "
         "be read and that has a field out of bounds"},
-    Check{"request-bounds", kServer, kWire, kData, "> 0, at most 16 unanswered"},
+    Check{"request-bounds", kServer, kWire, kData, "1, 2, 3 … per session and direction; at most 16 unanswered"},
     Check{"request-numbers", kClient, kSession, kRequests,
           "The requester numbers its requests 1, 2, 3 …, has at most 16 open"},
     Check{"request-repeated", kClient, kSession, kRequests, "repeats each until its answer arrives"},
@@ -170,7 +174,7 @@ constexpr std::array kChecks = {
           "CODE_INVALID for a name that does not exist (the sentence lists those that do), for a claim made twice, and "
           "for "
           "a role that is not the highest of the claims' roles."},
-    Check{"describe", kServer, kWire, kData, "the kind of device: device_name of a Welcome"},
+    Check{"describe", kServer, kWire, kData, "the kind of device, as Welcome.device_name"},
     Check{"describe-unknown", kServer, kWire, kData, "answered CODE_INVALID beyond the server's last"},
     Check{"lease-denied", kServer, kSession, kChannels, "not claimed by the asker as a controller | – | CODE_DENIED"},
     Check{"lease-kept", kServer, kSession, kChannels, "free, or the asker's own | takes it | CODE_OK"},
@@ -184,11 +188,9 @@ constexpr std::array kChecks = {
           "Only an observer that named the feature diagnostics is told these"},
     Check{"handle-unasked", kServer, kSession, "Report",
           "Only a client that named the feature handle is told which buttons are held."},
-    Check{"columns-unasked", kServer, kWire, kData,
-          "server → client, with the feature state-columns only: states of several devices at one haptic step, in "
-          "columns"},
+    Check{"columns-unasked", kServer, kWire, kData, "server → client, unreliable, with the feature state-columns only"},
     Check{"columns", kServer, kWire, kData,
-          "A position loses nothing, all else of it is within 6 · 10⁻⁸ of its value."},
+          "Positions are exact, and all other values are accurate to 6 · 10⁻⁸ of their magnitude."},
     Check{"couple-unasked", kServer, kSession, kTeleoperation,
           "that device is not to be coupled, or the feature was not granted"},
     Check{"couple-differs", kServer, kSession, kTeleoperation,

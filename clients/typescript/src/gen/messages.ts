@@ -10,313 +10,345 @@ export { ChannelRule, Code, CouplingMethod, Hand, Mode, PortPhase, PortRole, Rol
 /** The kind of an output. */
 export enum OutputKind {
   LAMP = 1,
-  /** Not by the motors of the position */
+  /** A separate vibrator, not the motors of the axes */
   VIBRATION = 2,
 }
 
 /**
- * The newest datagram received from the other side. With T3 = txTimeNs of the datagram that carries it and T4 = its
- * arrival, the round trip is (T4 − T1) − (T3 − T2).
+ * Acknowledges a datagram of the peer and measures the round trip: with T3 = txTimeNs of the datagram that carries the
+ * echo and T4 = the time at which that datagram arrives, the round trip is (T4 − T1) − (T3 − T2).
  */
 export interface Echo {
-  /** T1, its txTimeNs: the RECEIVER's clock */
+  /** T1, txTimeNs of that datagram, on the peer's clock */
   readonly sent: Nanoseconds;
-  /** T2, when it arrived */
+  /** T2, when that datagram arrived, on the clock of the sender of the echo; T2 ≤ T3 */
   readonly received: Nanoseconds;
+  /** Packet number of that datagram */
   readonly packetNumber: bigint;
-  /** Bit i: packet (packetNumber − 1 − i) has arrived too */
+  /**
+   * Bit i: packet (packetNumber − 1 − i) has arrived too. A malformed packet counts as arrived in suites 1 and 2 only
+   */
   readonly receivedMask: number;
 }
 
 /** How the handle is turned. */
 export interface Turning {
-  /** Turns the handle frame into the base frame */
+  /**
+   * Rotation from the handle frame to the device base frame. In the handle frame, when the handle is in its middle
+   * position, the stylus or finger points along −z, y is up, and x is to the right
+   */
   readonly orientation: Quat;
-  /** rad/s, only with an orientation */
+  /** rad/s, angular velocity in base frame axes; ignored without an orientation */
   readonly angularVelocity: Vec3;
 }
 
 /** How far the gripper of the handle is open. */
 export interface Grip {
-  /** rad, opening, 0 = closed */
+  /** rad, opening of the gripper, 0 when it is closed */
   readonly opening: number;
-  /** rad/s, only with an opening */
+  /** rad/s, velocity of the opening; ignored without grip.opening */
   readonly velocity: number;
 }
 
 /** The joints that carry the handle, in the order of HandleDescription.joints. */
 export interface Joints {
-  /**
-   * rad. Only to a client that named the feature "joints", in the order of HandleDescription.joints. None: the device
-   * tells none. A velocity that is absent is 0, one without an angle says nothing.
-   */
+  /** rad, angles of the joints that carry the handle, in the order of HandleDescription.joints. */
   readonly angles: readonly number[];
-  /** rad/s */
+  /** rad/s, velocities of the same joints; a missing entry is 0, and an entry without an angle is ignored */
   readonly velocities: readonly number[];
 }
 
-/** A device at one haptic step. Server → client, unreliable, of each device the newest tick wins. */
+/** The state of a device at one haptic step. Server → client, unreliable; for each device the highest tick wins. */
 export interface DeviceState {
   /** Number of the haptic step */
   readonly tick: bigint;
-  /** When the position was sampled; integrate with its differences */
+  /** When the position was sampled, on the server's clock */
   readonly sampledNs: Nanoseconds;
   /** m */
   readonly position: Vec3;
   /** m/s */
   readonly velocity: Vec3;
-  /** N, on the hand, as the device really exerts it from this step on */
+  /** N, actual force on the hand, from this step on */
   readonly forceApplied: Vec3;
-  /** J, the energy ledger: what the device may still give out */
+  /** J, energy that the device may still give out (the energy ledger) */
   readonly energy: number;
-  /** N, the limiter's bound on the norm; +infinity: no bound */
+  /** N, the limiter's bound on the norm of the force; +infinity if there is none */
   readonly permittedForce: number;
-  /** Bits of core/base/reason.h: why the force is not what was asked for */
+  /** Why the actual force differs from the requested one (bits of core/base/reason.h) */
   readonly reasons: number;
-  /** ForceCommand rendered now; 0 = none */
+  /** Sequence of the ForceCommand that is rendered; 0 if there is none */
   readonly forceSequence: bigint;
-  /** Its age since it arrived */
+  /** Time since that ForceCommand arrived */
   readonly forceAgeNs: Nanoseconds;
   readonly mode: Mode;
   readonly device: number;
-  /** Of the force that forceSequence, forceAgeNs and mode are about */
-  readonly channel: number;
   /**
-   * N. What the engines ask for at this step, held, faded or led on by their local models, before any limit. Absent:
-   * not told; only to an observer that named the feature "diagnostics"
+   * Channel of the force that forceSequence, forceAgeNs and mode describe: the freshest one, or the one with the lowest
+   * channel if several are equally fresh
+   */
+  readonly channel: number;
+  // With the feature "diagnostics" only:
+  /**
+   * N, force on the hand that the engines request at this step (held, faded, or extrapolated by their models), before
+   * any limit; absent: not reported
    */
   readonly forceWanted?: Vec3 | undefined;
+  // With the feature "diagnostics" only:
   /**
-   * N/m, −∂forceWanted/∂position, N/m, as the engines' models say it at this step; its entries as those of
-   * LocalModel.stiffness. Absent: no model. To whom forceWanted is told
+   * N/m, −∂forceWanted/∂position of the engines' models at this step; entries as in LocalModel.stiffness. Absent: no
+   * model
    */
   readonly stiffnessWanted?: Stiffness | undefined;
-  /** Bit i: button i is held; a press between two states of a client is in the next one */
+  /** Bit i: button i is held. A press between two states is reported in the later one */
   readonly buttons: number;
   /** Absent: not measured */
   readonly turning?: Turning | undefined;
-  /** N·m, about position, from this step on; absent: no motors that turn */
+  /**
+   * N·m, actual torque on the hand about position, in base frame axes, from this step on; absent: no motors that turn
+   */
   readonly torqueApplied?: Vec3 | undefined;
   /** Absent: no gripper */
   readonly grip?: Grip | undefined;
-  /** N, on the fingers, > 0 opens them; absent: no motor */
+  /** N, actual force on the fingers, > 0 opens them, from this step on; absent: the gripper has no motor */
   readonly gripApplied?: number | undefined;
-  /** N, of the hand ON THE HANDLE; absent: no force sensor */
+  /** N, of the hand ON THE HANDLE, measured by a force sensor; absent: no force sensor */
   readonly handForce?: Vec3 | undefined;
-  /** Absent: the device tells none */
+  /** Absent: the device reports none */
   readonly joints?: Joints | undefined;
 }
 
 /** On the hand, base frame axes, about the handle's position. */
 export interface Torque {
-  /** N·m, on the hand, about the handle's position */
+  /** N·m, torque on the hand about the handle's position, in base frame axes */
   readonly torque: Vec3;
+  /** How the torque changes as the handle turns. It does not need a `model`, and an absent torque.torque is 0 in it */
   readonly model?: RotationModel | undefined;
 }
 
 /**
- * The force that the physics engine wants. Client → server, unreliable, of each device and channel the newest sequence
- * wins.
+ * The force that a physics engine requests, as the answer to one state. Client → server, unreliable; for each device
+ * and channel the highest sequence wins.
  */
 export interface ForceCommand {
   /** 1, 2, 3 … per session, device and channel */
   readonly sequence: bigint;
-  /** DeviceState.tick of that device it was computed from: the loop's true age needs no clock */
+  /** DeviceState.tick of the state that the force was computed from */
   readonly basedOnTick: bigint;
-  /** N, on the hand: a wall that resists motion along +x sends −x */
+  /** N, force on the hand: a wall that resists motion along +x sends −x */
   readonly force: Vec3;
+  /** How the force changes as the hand moves; absent: the force is constant */
   readonly model?: LocalModel | undefined;
-  /** Counted from arrival */
+  /** Time from its arrival during which the force is fresh */
   readonly validForUs: number;
   readonly device: number;
   readonly channel: number;
-  /** Cut or torn since the answer before this one: neither's model is relied on */
+  /** The body has been cut or torn since the previous answer: neither this model nor the previous one is used */
   readonly topologyChanged?: boolean | undefined;
-  /** N, how wrong the engine thinks force may be; absent: not said */
+  /** N, the engine's estimate of the error of force; absent: not known */
   readonly error?: number | undefined;
-  /** Absent: none is asked for */
+  /** Absent: none is requested */
   readonly torque?: Torque | undefined;
-  /** N, on the fingers, > 0 opens them; absent: none is asked for */
+  /** N, force on the fingers, > 0 opens them; absent: none is requested */
   readonly gripForce?: number | undefined;
-  /** Only to a server that granted the feature "ways": which of Hello.ways has answered, from 1 on; 0: not said */
+  // With the feature "ways" only:
+  /**
+   * Index, from 1, in Hello.ways: the way in which the engine computed this force; 0 if it is not stated. A server
+   * treats an index beyond the last entry as 0
+   */
   readonly way?: number | undefined;
 }
 
 /**
- * The torque near one orientation, so that the device loop can follow the hand's turns. With p = (w, v) = the rotation
- * from at to the handle's orientation, q · at⁻¹, and K = stiffness:
- * τ(q) = torque − 2 (w K v + v × K v)        −K θ for a small turn θ
+ * A local model of the torque. The device loop evaluates it at the handle's orientation q. With p = (w, v) = q · at⁻¹,
+ * the rotation from at to q, and K = stiffness, it is
+ * τ(q) = torque − 2 (w K v + v × K v)        which is torque − K θ for a small rotation vector θ
  */
 export interface RotationModel {
-  /** Absent is refused */
+  /** Orientation that torque was computed for; absent is refused */
   readonly at: Quat;
-  /** N·m/rad, −∂τ/∂θ, base frame axes; its entries as those of stiffness. */
+  /** N·m/rad, −∂τ/∂θ in base frame axes; a spring is positive; entries as in LocalModel.stiffness */
   readonly stiffness: Stiffness;
 }
 
 /**
- * The remote environment near one position, so that the device loop can follow the hand:
+ * A local model of the force. The device loop evaluates it at the hand's position x:
  * F(x) = force − stiffness · (x − at)
- * What else it can say WIRE.md describes. A server that does not know the rest follows the stiffness.
+ * With a radius or a contact see WIRE.md, "The force between two answers". A server that does not know them uses this
+ * equation.
  */
 export interface LocalModel {
-  /** m */
+  /** M, position that force was computed for */
   readonly at: Vec3;
   /**
-   * N/m, −∂F/∂x; a spring is positive. 1 entry k: k·I. 3 entries: the diagonal. 9: the matrix, row by row. Any other
-   * number is refused.
+   * N/m, −∂F/∂x; a spring is positive. 1 entry k is k·I, 3 are the diagonal, 9 are the matrix row by row. An engine
+   * that does not know the stiffness sends a single 0
    */
   readonly stiffness: Stiffness;
-  /** M, how far from at it holds; absent: not said */
+  /** M, radius around at in which the model is valid; absent: not known */
   readonly validRadius?: number | undefined;
+  /** Surface that the tool touches or is about to touch */
   readonly contact?: Contact | undefined;
 }
 
-/** A surface that the tool touches or is about to. It only pushes, unless a table says otherwise. */
+/** A surface that the tool touches or is about to touch. It pushes and does not pull, unless it has a table. */
 export interface Contact {
-  /** Out of the body, to the hand; of length 1 ± 0.001 */
+  /** Direction out of the body, towards the hand: a force along +normal pushes the hand away */
   readonly normal: Vec3;
-  /** M, from the surface to the tool along the normal; below 0: so deep is it pressed in */
+  /** M, distance from the surface to the tool along the normal, negative if the tool is pressed in */
   readonly gap: number;
+  /** Forces along the normal at other depths */
   readonly table?: ForceTable | undefined;
 }
 
-/** The force along the normal, at the depths first + i · step below at: at − depth · normal. */
+/** Forces along the normal. Entry i is for the tool at at − (first + i · step) · normal. */
 export interface ForceTable {
-  /** M, below 0: nearer to the hand */
+  /** M, depth of entry 0, negative if it is farther out than at */
   readonly first: number;
   /** m */
   readonly step: number;
-  /** N, along +normal */
+  /** N, forces along +normal */
   readonly force: readonly number[];
 }
 
-/** How many states of a device per second the client wants. */
+/**
+ * Sets how many states of a device the client is sent per second. Before the first such request it is sent every state,
+ * loopHz per second. After it, the client is sent every k-th state, where k = loopHz / hz, rounded, at least 1: with
+ * loopHz 1000, 300 Hz become 333 and 2000 Hz become 1000.
+ */
 export interface SetStateRate {
+  /** At least 1; 0 is answered with Code.INVALID */
   readonly hz: number;
   readonly device: number;
 }
 
 /**
- * Leave out the states that this client can foretell: after a state with velocity v the next one that is sent is the
- * first whose velocity differs from v by more than max(share · ‖v‖, floor), whose mode or buttons differ, or which
- * comes maxSilenceUs later. In between the client goes on along the line: x + v · (t − sampledNs).
+ * Suppresses the states that the client can predict. After a state with velocity v, the server sends the first state
+ * whose velocity differs from v by more than max(share · ‖v‖, floor), whose mode or buttons differ, or that is
+ * maxSilenceUs newer. Between two states the client extrapolates: x + v · (t − sampledNs).
  */
 export interface StateDeadband {
-  /** Weber's; a server grants 0 … 0.5 */
+  /** Fraction of the speed (Weber fraction); answered Code.INVALID beyond 0 … 0.5 */
   readonly share: number;
-  /** m/s, a server grants 0 … 0.1 */
+  /** m/s, smallest difference of the velocity; answered Code.INVALID beyond 0 … 0.1 */
   readonly floor: number;
-  /** A server grants 1000 … 20 000; 0 = every state is sent, as before this was asked */
+  /** Longest time without a state; 0: every state is sent again. Answered Code.INVALID beyond 0 and 1000 … 20 000 */
   readonly maxSilenceUs: number;
 }
 
 /**
- * Clears a latched fault, and takes a Disarm back. With a safety layer it is the operator's request to arm. Only from a
- * controller of the device.
+ * Clears a latched fault and revokes a Disarm; only from a controller of the device. If the device has a safety layer,
+ * this is the operator's request to arm.
  */
 export interface Rearm {
   readonly device: number;
 }
 
 /**
- * No force from the next haptic step on, without a ramp, whatever engines ask for, until a Rearm: neither a new force
- * nor a new session ends it, nor the dead man's button by itself. Safety goes from armed to homed, and a pending
- * request to arm is withdrawn. It is no fault, and clears none. Asking twice is asking once. Only from a controller of
- * the device, whether it holds the channel or not. Code.OK: the device's loop has the order before its next step.
+ * Sets the force to zero from the next haptic step on, without a ramp, until a Rearm; only from a controller of the
+ * device, whether or not it holds the channel. A new force, a new session or the dead man's button alone does not end
+ * it. The device's Safety changes from armed to homed, and a pending request to arm is withdrawn. Disarm is not a fault
+ * and clears no fault. Repeating it has no effect. Code.OK: the device's loop receives the order before its next step.
  */
 export interface Disarm {
   readonly device: number;
 }
 
 /**
- * My device is the other end of this one: what my end is like. From whoever has claimed the channel as a controller, to
- * a server that granted "teleoperation". Code.OK: they fit; the client is sent no states any more but PortStates, and
- * sends them. Code.INVALID: the first thing that differs, in words. Code.UNSUPPORTED: that device is not to be coupled.
- * Code.BUSY: that channel is coupled with another client; a follower with several leaders has one for each channel.
+ * Offers the sender's device as the other end of a coupling with this device, and describes that end; only from the
+ * client that has claimed the channel as a controller, with the feature "teleoperation". Code.OK: the two ends fit;
+ * both peers then send PortState frames, and the server sends no states. Code.INVALID: they do not fit, and the detail
+ * names the first difference. Code.UNSUPPORTED: that device cannot be coupled. Code.BUSY: that channel is coupled with
+ * another client; a follower has one channel for each of its leaders.
  */
 export interface Couple {
+  /** Device of the server */
   readonly device: number;
+  /** Channel of the server */
   readonly channel: number;
-  /** Of the sender: the other end has the other one */
+  /** Role of the sender; the server's device has the other role */
   readonly role: PortRole;
   readonly method: CouplingMethod;
-  /** Follower over leader */
+  /** The follower's motion divided by the leader's */
   readonly positionScale: number;
-  /** Leader over follower */
+  /** The leader's force divided by the follower's */
   readonly forceScale: number;
   /** Turns the leader's base frame into the follower's; absent is refused */
   readonly rotation: Quat;
   /** Bits 1, 2, 4: x, y, z of the leader's frame are coupled */
   readonly axes: number;
-  /** N/m, these as the leader feels them */
+  /** N/m, stiffness between the handles, as felt by the leader */
   readonly stiffness: number;
-  /** N·s/m */
+  /** N·s/m, damping between the handles, as felt by the leader */
   readonly mutualDamping: number;
-  /** N·s/m */
+  /** N·s/m, damping of each handle, as felt by the leader */
   readonly damping: number;
+  /** The stiffness decreases as the round trip increases */
   readonly adaptToDelay: boolean;
-  /** It pays and is paid */
+  /** The ends exchange energy (core/teleoperation/purse.h) */
   readonly purse: boolean;
-  /** Between two PortStates */
+  /** Time between two PortState frames of the sender */
   readonly periodUs: number;
-  /** A place of the leader is a place of the follower: offsets are zero, and the two align first */
+  /** Positions map to positions: the offsets are zero, and the ends align before they engage */
   readonly absolute?: boolean | undefined;
-  // As the leader feels them; a stiffness of 0: that part of the handle is not coupled:
-  /** N·m/rad, of the orientations */
+  // As felt by the leader. With a stiffness of 0 the part is not coupled:
+  /** N·m/rad, stiffness between the orientations */
   readonly turnStiffness?: number | undefined;
-  /** N·m·s/rad */
+  /** N·m·s/rad, damping between the orientations */
   readonly turnDamping?: number | undefined;
-  /** N/m, of the grippers, at the fingers */
+  /** N/m, stiffness between the grippers, at the leader's fingers */
   readonly gripStiffness?: number | undefined;
-  /** N·s/m */
+  /** N·s/m, damping between the grippers */
   readonly gripDamping?: number | undefined;
-  /** 1/s. CouplingMethod.PASSIVITY */
+  // For one method only:
+  /** 1/s. CouplingMethod.PASSIVITY: rate at which the follower corrects its drift */
   readonly driftRate?: number | undefined;
-  /** CouplingMethod.RATE; absent with the others */
+  /** CouplingMethod.RATE; absent with the other methods */
   readonly rate?: RateControl | undefined;
 }
 
-/** The leader's handle, pulled back to its centre, says how fast the follower moves. */
+/**
+ * How the displacement of the leader's handle, which a spring pulls back to its center, commands the speed of the
+ * follower. All values are in the leader's scale.
+ */
 export interface RateControl {
-  /** M, the follower stands while the leader is nearer than this to its centre */
+  /** M, distance of the leader from its center within which the follower stands still */
   readonly deadZone: number;
-  /** 1/s, speed of the follower, in the leader's scale, for each metre beyond that */
+  /** 1/s, speed of the follower per meter beyond the dead zone */
   readonly gain: number;
-  /** m/s, of the follower, in the leader's scale */
+  /** m/s, maximum speed of the follower */
   readonly maxSpeed: number;
 }
 
 /**
- * The operator's act: couples the handles, at the leader's server. Only from a controller of the device. Code.OK: the
- * device's loop has the order. Code.UNSUPPORTED: that device has no coupling, or is the follower.
+ * Couples the handles, on the operator's command. Only the leader's server accepts it, from a controller of the device.
+ * Code.OK: the device's loop has the order. Code.UNSUPPORTED: that device has no coupling, or is the follower.
  */
 export interface Engage {
   readonly device: number;
 }
 
-/** Ends that, at either end. Only from a controller of the device. */
+/** Ends the engagement. Either end's server accepts it, only from a controller of the device. */
 export interface Disengage {
   readonly device: number;
 }
 
 /**
- * The scales of the coupling from now on, at the leader's server. Only from a controller of the device, while the
- * leader is not engaged or holds its clutch: else Code.BUSY. Code.OK: the device's loop has the order.
- * Code.UNSUPPORTED: that device has no coupling, or is the follower.
+ * Sets the scales of the coupling. Only the leader's server accepts it, from a controller of the device. Code.OK: the
+ * device's loop has the order. Code.BUSY: the leader is engaged and does not hold its clutch. Code.UNSUPPORTED: that
+ * device has no coupling, or is the follower.
  */
 export interface SetScale {
   readonly device: number;
-  /** Follower over leader */
+  /** As in Couple */
   readonly positionScale: number;
-  /** Leader over follower */
+  /** As in Couple */
   readonly forceScale: number;
 }
 
 /**
- * How much the leader of that channel counts among the leaders of a follower, at the follower's server. It gets there
- * within 0.5 s, and the others share what is left as they did. Only from a controller of the device. Code.UNSUPPORTED:
- * that device has no coupling, or one leader only, or is a leader.
+ * Sets the weight of one channel's leader among the leaders of a follower. Only the follower's server accepts it, from
+ * a controller of the device. The weight reaches the value within 0.5 s; the other leaders share the rest in the same
+ * proportion as before. Code.UNSUPPORTED: that device has no coupling, has one leader only, or is a leader.
  */
 export interface SetShare {
   readonly device: number;
@@ -326,436 +358,464 @@ export interface SetShare {
 
 /** The colour of a lamp. */
 export interface LampColour {
-  /** Of a lamp, 0xRRGGBB; 0 = off: it shows what the device itself shows */
+  /** Color of a lamp, 0xRRGGBB; 0 is off: the lamp then shows the state of the device */
   readonly rgb: number;
 }
 
 /**
- * Sets a lamp of the device, or makes it vibrate: from a controller of the device that holds one of its channels. To a
- * server that granted the feature "outputs". An output is off again when the client that set it gives a channel of the
- * device up or loses it, and when the device is disarmed. Code.INVALID: the device has no such output, or not of that
- * kind.
+ * Sets a lamp of the device or starts a vibration pulse; only from a controller of the device that holds one of its
+ * channels, with the feature "outputs". An output is switched off when the client that set it gives up or loses a
+ * channel of the device, and when the device is disarmed. Code.INVALID: the device has no such output, or it is of the
+ * other kind, or neither `rgb` nor `vibration` is there.
  */
 export interface SetOutput {
   readonly device: number;
-  /** Number in HandleDescription.outputs */
+  /** Number in HandleDescription.outputs; answered Code.INVALID beyond the device's last */
   readonly output: number;
   readonly setting: LampColour | Vibration;
 }
 
-/** A pulse. It ends by itself; another one takes its place at once. */
+/** A vibration pulse. It stops after its duration, or when a new pulse replaces it. */
 export interface Vibration {
-  /** Of the strongest that the output can; 0 = off */
+  /** Fraction of the output's maximum; 0 is off */
   readonly amplitude: number;
-  /** At least 20, or 0: the output's own */
+  /** Hz, 0 or at least 20; 0 is the output's own frequency */
   readonly frequency: number;
   readonly durationMs: number;
 }
 
-/**
- * What a device is and can do: answered with a DeviceDescription. Of any device that the server has, claimed or not.
- */
+/** Requests the DeviceDescription of a device, whether the client has claimed the device or not. */
 export interface Describe {
+  /** Answered Code.INVALID beyond the server's last device */
   readonly device: number;
-  /** Answered with a HandleDescription instead */
+  /** With the feature "handle" only: requests the HandleDescription instead */
   readonly handle?: boolean | undefined;
 }
 
 /**
- * I want to be the one whose forces this channel takes. From whoever has claimed it as a controller. Code.OK: you are,
- * from now on. Code.BUSY: another one is; waitMs says for how much longer its lease lasts unless renewed.
+ * Asks that the channel take the client's forces; only from a client that has claimed the channel as a controller.
+ * Code.OK: the client holds the lease. Code.BUSY: another client does, and waitMs is the time until that lease ends
+ * unless it is renewed.
  */
 export interface TakeLease {
   readonly device: number;
   readonly channel: number;
 }
 
-/** I do not want to be it any more. */
+/** Releases the lease of a channel. */
 export interface GiveLease {
   readonly device: number;
   readonly channel: number;
 }
 
-/** You are not it any more. Only to a client that named the feature "channels". */
+/** Tells a client with the feature "channels" that the channel now takes the forces of another client. */
 export interface LeaseLost {
   readonly device: number;
   readonly channel: number;
-  /** Name of the one that is */
+  /** Name of the new lease holder */
   readonly to: string;
 }
 
 /** The answer to a Control. */
 export interface ControlAck {
-  /** Of the Control that is answered */
+  /** Id of the answered Control */
   readonly id: number;
   readonly code: Code;
+  /** Explanation for people */
   readonly detail: string;
-  /** With Code.BUSY of TakeLease: ms; 0 = nobody knows */
+  /** With Code.BUSY of TakeLease: time until the lease ends, unless its holder renews it; 0 if it is not known */
   readonly waitMs?: number | undefined;
   /** With Code.OK of Describe */
   readonly device?: DeviceDescription | undefined;
-  /** With Code.OK of Describe that asks for the handle */
+  /** With Code.OK of Describe, if it requested the handle */
   readonly handle?: HandleDescription | undefined;
 }
 
-/** What a device is and can do. */
+/** The properties of a device. */
 export interface DeviceDescription {
   readonly device: number;
-  /** As the server calls it */
+  /** The server's name for the device, which a claim uses */
   readonly name: string;
-  /** What it is */
+  /** The kind of device, as Welcome.deviceName */
   readonly model: string;
-  /** Axes that are measured … */
+  /** Number of measured axes */
   readonly positionDof: number;
-  /** … and those with a motor */
+  /** Number of axes with a motor */
   readonly forceDof: number;
   /** Absent: not known */
   readonly workspace: { readonly min: Vec3; readonly max: Vec3 } | undefined;
-  /** N, norm of the force the device can give out */
+  /** N, norm of the peak force; 0 if it is not known */
   readonly maxForce: number;
-  /** N, … for ever; 0 = not known */
+  /** N, norm of the force for any length of time; 0 if it is not known */
   readonly continuousForce: number;
-  /** N/m, what it can render stably; 0 = not known */
+  /** N/m, largest stiffness that the device renders stably; 0 if it is not known */
   readonly maxStiffness: number;
-  /** M, one encoder count at the handle; 0 = exact */
+  /** M, one encoder count at the handle; 0 if the position is exact */
   readonly positionResolution: number;
   /** Haptic steps per second */
   readonly loopHz: number;
-  /** By number */
+  /** Channels of the device, by number */
   readonly channels: readonly ChannelDescription[];
 }
 
-/** What the handle of a device is and can do. To a client of a server that granted the feature "handle". */
+/** The properties of a device's handle, with the feature "handle" only. */
 export interface HandleDescription {
   readonly device: number;
-  /** Turns the base frame into the operator's: x right, y up, z to the user; absent: not known */
+  /**
+   * Rotation from the device base frame to the operator's frame: x to the right, y up, z towards the user; absent: not
+   * known
+   */
   readonly operatorFromDevice?: Quat | undefined;
-  /** Names by bit of DeviceState.buttons */
+  /** Names by bit of DeviceState.buttons; a name may be empty */
   readonly buttons: readonly string[];
-  /** Else no state has an orientation */
+  /** True if every state has an orientation, false if none has */
   readonly orientationMeasured: boolean;
-  /** N·m, norm of the torque the device can give out; 0 = none */
+  /** N·m, norm of the torque that the device can exert; 0 if it has no such motors */
   readonly maxTorque: number;
-  /** rad, the opening of the open gripper; absent: no gripper */
+  /** rad, opening of the open gripper; absent: no gripper */
   readonly gripperOpen?: number | undefined;
-  /** N, on the fingers; 0 = it has no motor */
+  /** N, force on the fingers; 0 if the gripper has no motor */
   readonly maxGripperForce: number;
-  /** Devices of one body (two arms, five fingers) have the same; empty: by itself */
+  /** Name that the devices of one body share (two arms, five fingers); empty if the device is by itself */
   readonly group: string;
   readonly hand: Hand;
-  /**
-   * Only to a client that named the feature "joints": names of the joints, in the order of DeviceState.joints.angles
-   */
+  // With the feature "joints" only:
+  /** Names of the joints, in the order of DeviceState.joints.angles */
   readonly joints?: readonly string[] | undefined;
-  /** Only to a client that named the feature "outputs": what SetOutput can set, by number */
+  // With the feature "outputs" only:
+  /** Outputs that SetOutput can set, by number */
   readonly outputs?: readonly OutputDescription[] | undefined;
 }
 
-/** An output of a device, beside its forces. */
+/** An output of a device, in addition to its forces. */
 export interface OutputDescription {
   readonly name: string;
   readonly kind: OutputKind;
 }
 
+/** A channel of a device and its lease. */
 export interface ChannelDescription {
+  /** The name that a claim uses */
   readonly name: string;
   readonly rule: ChannelRule;
-  /** A holder that sends no force for so long may be followed by another; 0 = it stays until it leaves. ≤ 3 600 000 */
+  /** Time without a force after which another client may take the lease; 0 if the lease does not expire */
   readonly leaseMs: number;
-  /** Name of the client whose forces it takes, its first 24 bytes; empty = nobody's */
+  /** First 24 bytes of the lease holder's name; empty if there is none */
   readonly holder: string;
 }
 
-/** Either way, said three times. */
+/** The end of the session. Either way, sent three times. */
 export interface Bye {
+  /** Reason for the end */
   readonly code: Code;
+  /** Explanation for people */
   readonly reason: string;
 }
 
 /**
- * What became of a client's forces and datagrams, as the server saw it: why a force was late, and what the network did.
- * Times of one way hold as far as the clocks are known, ± clockErrorNs: they may be below zero. Server → client,
- * unreliable, newest number wins.
+ * Statistics of a client's forces and datagrams: why forces were late, and how the network performed. One-way delays
+ * depend on the estimated clock offset: they are accurate to ± clockErrorNs and can be negative. Server → client,
+ * unreliable; the highest number wins.
  */
 export interface LinkReport {
   /** 1, 2, 3 … per session */
   readonly number: bigint;
-  /** End of the time it tells of */
+  /** End of the reported interval, server clock */
   readonly untilNs: Nanoseconds;
-  /** … and its length */
+  /** Length of the interval */
   readonly spanNs: Nanoseconds;
-  // In that time:
-  /** That came */
+  // In the interval:
+  /** Forces that arrived */
   readonly forces: bigint;
-  /** Late ones, because the server sent a state late */
+  /** Forces that were late because the server sent a state late */
   readonly lateServer: bigint;
-  /** … because of the way there and back */
+  /** Forces that were late because of the network, in either direction */
   readonly lateNetwork: bigint;
-  /** … because the engine took longer than usual */
+  /** Forces that were late because the engine took longer than usual */
   readonly lateEngine: bigint;
   /** Longest time that the device was without a valid force */
   readonly worstLateNs: Nanoseconds;
-  /** Longest time that nothing was heard of the client */
+  /** Longest time without a datagram from the client */
   readonly longestGapNs: Nanoseconds;
-  /** Absent: not measured; the same for the next two */
+  /** Absent: not measured */
   readonly roundTrip: Delays | undefined;
+  /** One way; absent: not measured */
   readonly toServer: Delays | undefined;
+  /** One way; absent: not measured */
   readonly toClient: Delays | undefined;
-  /** The client's clock less the server's */
+  // Clocks:
+  /** The client's clock minus the server's */
   readonly clockOffsetNs: Nanoseconds;
-  /** How fast that grows */
+  /** Rate at which the offset grows */
   readonly clockDriftPpm: number;
-  /** |true offset − clockOffsetNs| is at most this */
+  /** Upper bound of |true offset − clockOffsetNs| */
   readonly clockErrorNs: Nanoseconds;
   // Datagrams of the client since the session opened:
   readonly received: bigint;
   readonly lost: bigint;
   readonly reordered: bigint;
   readonly duplicated: bigint;
-  /** Why forces were late or refused, for people; empty when none was */
+  // In the interval:
+  /** Explanation of late and refused forces, for people; empty if there are none */
   readonly words: string;
-  // In the time that it tells of:
-  /** Late forces whose cause is not known yet: nothing is heard of the client */
+  /** Forces that are late for an unknown reason, because nothing is received from the client */
   readonly lateUnknown: bigint;
-  // Forces of the client, on all its channels, that could not be used:
+  // Forces of the client, on all its channels, that could not be used in the interval:
   /** A number is NaN or infinite */
   readonly refusedNotFinite: bigint;
   /** A number is beyond its bound */
   readonly refusedOutOfBounds: bigint;
-  /** basedOnTick never was, or was more than 4096 ticks ago */
+  /** No step had the number basedOnTick, or it was more than 4096 ticks ago */
   readonly refusedUnknownTick: bigint;
-  /** Sequence has not grown, though the datagram is the newest */
+  /** Sequence has not grown, although the datagram is the newest */
   readonly refusedOldSequence: bigint;
 }
 
-/** Two quantiles of a delay. They can be below zero if two clocks had to be compared. */
+/** Two quantiles of a delay. A one-way delay can be negative, because it compares two clocks. */
 export interface Delays {
   readonly medianNs: Nanoseconds;
   readonly p99Ns: Nanoseconds;
 }
 
 /**
- * One end of a coupling of two devices, told to the other. Vectors are in the base frame and the scale of the SENDER's
- * device. How it is used core/teleoperation/coupling.h says. Only between peers that both named the feature
- * "teleoperation", either way, unreliable: of each device, channel and end the highest sequence of the highest epoch
- * wins. To an observer of the device, both ends of its coupling.
+ * The state of one end of a coupling, sent to the other end. Vectors are in the base frame and the scale of the
+ * SENDER's device. core/teleoperation/coupling.h describes their use. Either way, unreliable, with the feature
+ * "teleoperation" only; for each device, channel and end the highest sequence of the highest epoch wins. An observer of
+ * the device is sent both ends of its coupling.
  */
 export interface PortState {
-  /** Of the server of the session, whichever way this goes */
+  /** Device of the session's server, in both directions */
   readonly device: number;
+  /** Channel of the session's server, in both directions */
   readonly channel: number;
-  /** Of the sender; above every one before when it starts anew */
+  /** Epoch of the sender, which increases when the sender restarts */
   readonly epoch: bigint;
-  /** 1, 2, 3 … within an epoch: its haptic steps */
+  /** 1, 2, 3 … within an epoch: the sender's haptic steps */
   readonly sequence: bigint;
-  /** The receiver's epoch that the next one, given and taken belong to; 0: none yet */
+  /** Epoch of the receiver that `answers`, given and taken belong to; 0: none yet */
   readonly answersEpoch: bigint;
-  /** Sequence of the receiver's newest state in use; 0: none yet */
+  /** Sequence of the receiver's newest PortState in use; 0: none yet */
   readonly answers: bigint;
-  /** Of the sender's clock; only differences are used */
+  /** Time on the sender's clock; only differences are used */
   readonly timeNs: Nanoseconds;
-  /** That the sender has measured; 0: not yet */
+  /** Round trip measured by the sender; 0 before the first measurement */
   readonly roundTripNs: Nanoseconds;
   readonly phase: PortPhase;
-  /** Number of the leader's act that the phase belongs to; 0: none yet */
+  /** Number of the leader's engagement that the phase belongs to: 1, 2, 3 …; 0: none yet */
   readonly engagement: bigint;
   /** Bit i: button i is held */
   readonly buttons: number;
-  /** M, from the sender's offset */
+  /** M, displacement of the handle from the sender's offset */
   readonly position: Vec3;
-  /** m/s, zero while the position is frozen */
+  /** m/s, velocity of that displacement; zero while the displacement is frozen */
   readonly velocity: Vec3;
-  /** N, on whoever holds its handle, really applied */
+  /** N, actual force on the hand at the sender's handle */
   readonly force: Vec3;
-  /** N, of the surroundings on its tool; absent: not measured */
+  /** N, force of the environment on the sender's tool; absent: not measured */
   readonly contactForce?: Vec3 | undefined;
-  /** J, its account after giving */
+  /** J, energy that the sender may still give out, after its payments */
   readonly account: number;
-  /** J, what it needs for the force that it wants; 0: it has no purse */
+  /** J, energy that the sender needs for its desired force; 0: it has no purse */
   readonly need: number;
-  /** J, total given to the receiver; never falls within two epochs */
+  /** J, total paid to the receiver; it never decreases while both epochs last */
   readonly given: number;
-  /** J, the receiver's total that was heard of, in the receiver's joules */
+  /** J, the receiver's given, as last received, in joules of the receiver */
   readonly taken: number;
   /**
-   * CouplingMethod.WAVES: sums since the epoch began, so that no loss is permanent. Absent: nothing sent yet. √W·s: ∫
-   * wave dt; half the square of a wave is a power
+   * CouplingMethod.WAVES: √W·s, ∫ wave dt since the epoch began: a total, so a lost frame has no lasting effect; half
+   * the square of a wave is a power. Absent: nothing sent yet
    */
   readonly waveIntegral?: Vec3 | undefined;
-  /** J, ∫ ‖wave‖²/2 dt; never falls within an epoch */
+  /** J, ∫ ‖wave‖²/2 dt; it never decreases within an epoch */
   readonly waveEnergy?: number | undefined;
-  /** CouplingMethod.SURFACE, of a follower; absent: it has touched nothing yet */
+  /** CouplingMethod.SURFACE, from the follower; absent: no surface was touched yet */
   readonly surface?: PortSurface | undefined;
   /** Absent: the orientations are not coupled */
   readonly turn?: PortTurn | undefined;
   /** Absent: the grippers are not coupled */
   readonly grip?: PortGrip | undefined;
-  /** J. CouplingMethod.PASSIVITY: total that its port took in, in this epoch */
+  /** J. CouplingMethod.PASSIVITY: energy that the sender's port took in during this epoch */
   readonly energyIn?: number | undefined;
-  /** Of a follower: how much this leader counts; absent: it is the only one */
+  /** Weight of the receiver among the leaders of a follower; absent: the receiver is the only leader */
   readonly share?: number | undefined;
-  /** Of a leader, in use from this state on. 0: as in Couple. An observer has seen no Couple, and is told them. */
+  // From a leader, in use from this frame on; 0: as in Couple. An observer is always sent the values:
   readonly positionScale?: number | undefined;
   readonly forceScale?: number | undefined;
-  /** To an observer: of the other end of the device's coupling, as it came to the server */
+  // To an observer:
+  /** True if this is the other end of the device's coupling, as the server received it */
   readonly ofPeer?: boolean | undefined;
 }
 
-/** How a handle has turned since its offset was taken. */
+/** The rotation of a handle since its offset was taken. */
 export interface PortTurn {
-  /** In the axes of the sender's base frame; of length 1 ± 0.001 */
+  /** Rotation in the axes of the sender's base frame */
   readonly turn: Quat;
-  /** rad/s */
+  /** rad/s, angular velocity; zero while the rotation is frozen */
   readonly angularVelocity: Vec3;
-  /** N·m, on whoever holds the handle, really applied */
+  /** N·m, actual torque on the hand at the sender's handle */
   readonly torque: Vec3;
 }
 
-/** A gripper, measured at its fingers. It is a port of its own, with an account of its own. */
+/** State of a gripper, measured at its fingers. The gripper has its own energy account. */
 export interface PortGrip {
   /** m */
   readonly opening: number;
   /** m/s */
   readonly velocity: number;
-  /** N, on the fingers, > 0 opens them; really applied */
+  /** N, actual force on the fingers, > 0 opens them */
   readonly force: number;
-  /** J, these four as in PortState */
+  /** J, as in PortState */
   readonly account: number;
-  /** J */
+  /** J, as in PortState */
   readonly need: number;
-  /** J */
+  /** J, as in PortState */
   readonly given: number;
-  /** J */
+  /** J, as in PortState */
   readonly taken: number;
 }
 
-/** A flat, springy surface that the sender's tool touches, or touched last. It only pushes. */
+/** A flat elastic surface that the sender's tool touches, or was the last to touch. It pushes and does not pull. */
 export interface PortSurface {
-  /** Out of the surface; of length 1 ± 0.001 */
+  /** Direction out of the surface */
   readonly normal: Vec3;
-  /** M, the surface is where normal · position is this */
+  /** M, the surface is where normal · position = offset */
   readonly offset: number;
-  /** N/m, 0: there is none any more */
+  /** N/m, stiffness; 0 if the surface is gone */
   readonly stiffness: number;
 }
 
 /**
- * How a device's loop does. Numbers of things are of the time that the report tells of. Server → client, unreliable, of
- * each device the newest number wins.
+ * Performance of a device's loop. All counts are for the reported interval. Server → client, unreliable, to an observer
+ * with the feature "diagnostics" only; for each device the highest number wins.
  */
 export interface DeviceReport {
-  /** 1, 2, 3 … of the device */
+  /** 1, 2, 3 … per device */
   readonly number: bigint;
-  /** End of the time it tells of */
+  /** End of the reported interval, server clock */
   readonly untilNs: Nanoseconds;
-  /** … and its length */
+  /** Length of the interval */
   readonly spanNs: Nanoseconds;
   readonly device: number;
   /** Haptic steps */
   readonly steps: bigint;
-  /** Periods without a step, because the one before came so late */
+  /** Periods without a step, because the previous step was late */
   readonly missed: bigint;
-  /** Steps so long after the one before that it is a reason (REASON overrun) */
+  /** Steps that began too long after the previous one (reason overrun) */
   readonly overruns: bigint;
-  /** Steps in which the device gave no position */
+  /** Steps in which the device reported no position */
   readonly unseen: bigint;
   /**
-   * How late the loop woke: entry 0 counts steps at most 1 µs after they were due, entry i later than 2^(i−1) µs and at
-   * most 2^i µs, entry 23 all that were later than 2^22 µs. Zeros at the end are left out; together at most `steps`,
-   * and fewer only where the server lost count of some.
+   * How late the loop woke: entry 0 counts the steps that were at most 1 µs late, entry i those more than 2^(i−1) µs
+   * and at most 2^i µs late, entry 23 all those more than 2^22 µs late. Trailing zeros are omitted. The sum is less
+   * than `steps` only if the server failed to count some
    */
   readonly lateness: readonly bigint[];
   readonly safety: Safety;
-  /** Why it gives no force until it is armed or rearmed, for people; empty: no fault */
+  /** Why the device exerts no force until it is armed or rearmed, for people; empty if there is no fault */
   readonly fault: string;
-  /** What the server does less of at present, for people; empty: nothing */
+  /** Service that the server reduces at present, for people; empty if there is none */
   readonly degraded: string;
 }
 
 /**
- * How the engine does whose forces a channel takes. Server → client, unreliable, of each device and channel the newest
- * number wins.
+ * Performance of the engine that holds the lease of a channel. Server → client, unreliable, to an observer with the
+ * feature "diagnostics" only; for each device and channel the highest number of its link wins.
  */
 export interface PeerReport {
   readonly device: number;
   readonly channel: number;
-  /** Of the engine */
+  /** Name of the engine, as in its Hello */
   readonly name: string;
-  /** Of the states that it wants, it is sent one in so many: its way is full */
+  /** The engine is sent one in this many of its requested states, because its link is full */
   readonly stateOneIn: number;
-  /** Its forces are not taken: its way loses too much */
+  /** The server ignores its forces, because its link loses too many datagrams */
   readonly forcesRefused: boolean;
-  /** Number: 1, 2, 3 … of the channel; the forces are the channel's; absent is refused */
+  /** Report on the engine's link; number and the counts of forces are per channel; absent is refused */
   readonly link: LinkReport;
-  // Of the force of that time that is least sure, by its ForceCommand.error; the newest where none says an error:
-  /** N, absent: none says it */
+  // Of the force in the interval with the largest ForceCommand.error; if none states an error, of the newest:
+  /** N, estimated error of that force; absent: no force states an error */
   readonly error?: number | undefined;
-  /** Of Hello.ways, the one by which it was answered; empty: not said */
+  /** Entry of Hello.ways for that force; empty if it is not stated */
   readonly way?: string | undefined;
 }
 
-/** The first words of a client. */
+/** The first message of a client. */
 export interface Hello {
-  /** 1 ≤ versionMin ≤ versionMax; the highest common version is used */
+  /** Lowest version that the client speaks; the highest common version is used */
   readonly versionMin: number;
+  /** Highest version that the client speaks */
   readonly versionMax: number;
+  /** With claims, the highest role among them */
   readonly role: Role;
-  /** For logs */
+  /** Name for logs */
   readonly name: string;
-  /** Offered; the intersection is used */
+  /** Offered features; a feature is used if both peers name it */
   readonly features: readonly string[];
-  /** What is wanted, each once. None: device 0, its channel 0, and `role` */
+  /**
+   * Claimed devices and channels, each once. Without claims, the client is granted device 0 and its channel 0 with
+   * `role`
+   */
   readonly claims?: readonly Claim[] | undefined;
-  /** With the feature "ways": how this engine may answer, from the fastest on. ForceCommand.way is the place in it */
+  // With the feature "ways" only:
+  /** Names of the ways in which this engine computes forces, the fastest first; ForceCommand.way is an index in it */
   readonly ways?: readonly string[] | undefined;
 }
 
-/** What a client wants. With claims, `role` of the Hello is the highest among them. */
+/** A device or a channel that the client wants. */
 export interface Claim {
-  /** Its name; empty: device 0 */
+  /** Name of the device; empty: device 0 */
   readonly device: string;
-  /** Of a controller: its name; empty: channel 0 */
+  /** Name of the channel, from a controller; empty: channel 0 */
   readonly channel: string;
   readonly role: Role;
 }
 
-/** The server's yes. */
+/** The server accepts the client. */
 export interface Welcome {
-  /** Within the range of the Hello */
+  /** Version of the session, within the client's range */
   readonly version: number;
-  /** Those both ends know */
+  /** Features that both peers named */
   readonly features: readonly string[];
+  /** Granted role */
   readonly role: Role;
+  /** The kind of device */
   readonly deviceName: string;
-  /** N, norm of the force the device can give out */
+  /** N, norm of the force that the device can exert */
   readonly maxForce: number;
-  /** M, one encoder count at the handle; 0 = exact */
+  /** M, one encoder count at the handle; 0 if the position is exact */
   readonly positionResolution: number;
   /** Haptic steps per second */
   readonly loopHz: number;
   /** Silence after which the server forgets this client */
   readonly timeoutMs: number;
-  /** Name and version */
+  /** Name and version of the server */
   readonly server: string;
-  /** One for each Claim, in order; fields 4 … 7 are about the first */
+  /**
+   * One for each claim, in the claims' order; deviceName … loopHz are those of the first grant's device. A server that
+   * does not know claims sends none, and treats the Hello as one without claims
+   */
   readonly grants?: readonly Grant[] | undefined;
 }
 
 /** The numbers of a device and a channel that were claimed by name. */
 export interface Grant {
-  /** The numbers that stand for the names of the claim from now on */
+  /** Number of the device in all later messages */
   readonly device: number;
+  /** Number of the channel in all later messages */
   readonly channel: number;
-  /** Role.OBSERVER for a controller's claim: another one holds the lease, see TakeLease */
+  /** Granted role; Role.OBSERVER for a controller's claim if another client holds the lease (TakeLease) */
   readonly role: Role;
 }
 
-/** The server's no. */
+/** The server refuses the client. */
 export interface Refused {
+  /** why */
   readonly code: Code;
+  /** A sentence for people */
   readonly detail: string;
-  /** What the server speaks */
+  /** Lowest version that the server speaks */
   readonly versionMin: number;
+  /** Highest version that the server speaks */
   readonly versionMax: number;
 }
 

@@ -15,25 +15,28 @@ export const file_tendon: GenFile = /*@__PURE__*/
   fileDesc("Cgx0ZW5kb24ucHJvdG8SCXRlbmRvbi52MSJfCghEYXRhZ3JhbRISCgp0eF90aW1lX25zGAEgASgQEh0KBGVjaG8YAiABKAsyDy50ZW5kb24udjEuRWNobxIgCgZmcmFtZXMYAyADKAsyEC50ZW5kb24udjEuRnJhbWUiZgoERWNobxIXCg9wZWVyX3R4X3RpbWVfbnMYASABKBASEgoKcnhfdGltZV9ucxgCIAEoEBIaChJwZWVyX3BhY2tldF9udW1iZXIYAyABKAQSFQoNcmVjZWl2ZWRfbWFzaxgEIAEoByK2AwoFRnJhbWUSJwoFc3RhdGUYASABKAsyFi50ZW5kb24udjEuRGV2aWNlU3RhdGVIABIoCgVmb3JjZRgCIAEoCzIXLnRlbmRvbi52MS5Gb3JjZUNvbW1hbmRIABIlCgdjb250cm9sGAMgASgLMhIudGVuZG9uLnYxLkNvbnRyb2xIABIsCgtjb250cm9sX2FjaxgEIAEoCzIVLnRlbmRvbi52MS5Db250cm9sQWNrSAASHQoDYnllGAUgASgLMg4udGVuZG9uLnYxLkJ5ZUgAEicKBnJlcG9ydBgGIAEoCzIVLnRlbmRvbi52MS5MaW5rUmVwb3J0SAASMAoNZGV2aWNlX3JlcG9ydBgHIAEoCzIXLnRlbmRvbi52MS5EZXZpY2VSZXBvcnRIABIsCgtwZWVyX3JlcG9ydBgIIAEoCzIVLnRlbmRvbi52MS5QZWVyUmVwb3J0SAASKgoKcG9ydF9zdGF0ZRgJIAEoCzIULnRlbmRvbi52MS5Qb3J0U3RhdGVIABIpCgZzdGF0ZXMYCiABKAsyFy50ZW5kb24udjEuRGV2aWNlU3RhdGVzSABCBgoEYm9keSInCgRWZWMzEgkKAXgYASABKAESCQoBeRgCIAEoARIJCgF6GAMgASgBIjIKBFF1YXQSCQoBdxgBIAEoARIJCgF4GAIgASgBEgkKAXkYAyABKAESCQoBehgEIAEoASK8BgoLRGV2aWNlU3RhdGUSDAoEdGljaxgBIAEoBBISCgpzYW1wbGVkX25zGAIgASgQEiMKCnBvc2l0aW9uX20YAyABKAsyDy50ZW5kb24udjEuVmVjMxIlCgx2ZWxvY2l0eV9tcHMYBCABKAsyDy50ZW5kb24udjEuVmVjMxIoCg9mb3JjZV9hcHBsaWVkX24YBSABKAsyDy50ZW5kb24udjEuVmVjMxIQCghlbmVyZ3lfahgGIAEoARIZChFwZXJtaXR0ZWRfZm9yY2VfbhgHIAEoARIPCgdyZWFzb25zGAggASgHEhYKDmZvcmNlX3NlcXVlbmNlGAkgASgEEhQKDGZvcmNlX2FnZV9ucxgKIAEoBBIdCgRtb2RlGAsgASgOMg8udGVuZG9uLnYxLk1vZGUSDgoGZGV2aWNlGAwgASgNEg8KB2NoYW5uZWwYDSABKA0SJwoOZm9yY2Vfd2FudGVkX24YDiABKAsyDy50ZW5kb24udjEuVmVjMxIkCgtvcmllbnRhdGlvbhgPIAEoCzIPLnRlbmRvbi52MS5RdWF0Ei8KFmFuZ3VsYXJfdmVsb2NpdHlfcmFkcHMYECABKAsyDy50ZW5kb24udjEuVmVjMxIPCgdidXR0b25zGBEgASgHEioKEXRvcnF1ZV9hcHBsaWVkX25tGBIgASgLMg8udGVuZG9uLnYxLlZlYzMSGAoLZ3JpcHBlcl9yYWQYEyABKAFIAIgBARIjChZncmlwcGVyX3ZlbG9jaXR5X3JhZHBzGBQgASgBSAGIAQESJAoXZ3JpcHBlcl9mb3JjZV9hcHBsaWVkX24YFSABKAFIAogBARIlCgxoYW5kX2ZvcmNlX24YFiABKAsyDy50ZW5kb24udjEuVmVjMxIVCglqb2ludF9yYWQYFyADKAFCAhABEiAKFGpvaW50X3ZlbG9jaXR5X3JhZHBzGBggAygBQgIQARIgChRzdGlmZm5lc3Nfd2FudGVkX25wbRgZIAMoAUICEAFCDgoMX2dyaXBwZXJfcmFkQhkKF19ncmlwcGVyX3ZlbG9jaXR5X3JhZHBzQhoKGF9ncmlwcGVyX2ZvcmNlX2FwcGxpZWRfbiLdAgoMRGV2aWNlU3RhdGVzEgwKBHRpY2sYASABKAQSEgoKc2FtcGxlZF9ucxgCIAEoEBIPCgdkZXZpY2VzGAMgASgNEhYKCnBvc2l0aW9uX20YBCADKAFCAhABEhgKDHZlbG9jaXR5X21wcxgFIAMoAkICEAESGwoPZm9yY2VfYXBwbGllZF9uGAYgAygCQgIQARIUCghlbmVyZ3lfahgHIAMoAkICEAESHQoRcGVybWl0dGVkX2ZvcmNlX24YCCADKAJCAhABEiEKBG1vZGUYCSADKA4yDy50ZW5kb24udjEuTW9kZUICEAESEwoHcmVhc29ucxgKIAMoDUICEAESGgoOZm9yY2Vfc2VxdWVuY2UYCyADKARCAhABEhgKDGZvcmNlX2FnZV9ucxgMIAMoBEICEAESEwoHY2hhbm5lbBgNIAMoDUICEAESEwoHYnV0dG9ucxgOIAMoDUICEAEihwMKDEZvcmNlQ29tbWFuZBIQCghzZXF1ZW5jZRgBIAEoBBIVCg1iYXNlZF9vbl90aWNrGAIgASgEEiAKB2ZvcmNlX24YAyABKAsyDy50ZW5kb24udjEuVmVjMxIkCgVtb2RlbBgEIAEoCzIVLnRlbmRvbi52MS5Mb2NhbE1vZGVsEhQKDHZhbGlkX2Zvcl91cxgFIAEoDRIOCgZkZXZpY2UYBiABKA0SDwoHY2hhbm5lbBgHIAEoDRIYChB0b3BvbG9neV9jaGFuZ2VkGAggASgIEhQKB2Vycm9yX24YCSABKAFIAIgBARIiCgl0b3JxdWVfbm0YCiABKAsyDy50ZW5kb24udjEuVmVjMxIcCg9ncmlwcGVyX2ZvcmNlX24YCyABKAFIAYgBARIwCg5yb3RhdGlvbl9tb2RlbBgOIAEoCzIYLnRlbmRvbi52MS5Sb3RhdGlvbk1vZGVsEgsKA3dheRgPIAEoDUIKCghfZXJyb3JfbkISChBfZ3JpcHBlcl9mb3JjZV9uIl4KDVJvdGF0aW9uTW9kZWwSJwoOYXRfb3JpZW50YXRpb24YASABKAsyDy50ZW5kb24udjEuUXVhdBIkChhhbmd1bGFyX3N0aWZmbmVzc19ubXByYWQYAiADKAFCAhABIpsBCgpMb2NhbE1vZGVsEh0KBGF0X20YASABKAsyDy50ZW5kb24udjEuVmVjMxIZCg1zdGlmZm5lc3NfbnBtGAIgAygBQgIQARIbCg52YWxpZF9yYWRpdXNfbRgDIAEoAUgAiAEBEiMKB2NvbnRhY3QYBCABKAsyEi50ZW5kb24udjEuQ29udGFjdEIRCg9fdmFsaWRfcmFkaXVzX20iXwoHQ29udGFjdBIfCgZub3JtYWwYASABKAsyDy50ZW5kb24udjEuVmVjMxINCgVnYXBfbRgCIAEoARIkCgV0YWJsZRgDIAEoCzIVLnRlbmRvbi52MS5Gb3JjZVRhYmxlIkgKCkZvcmNlVGFibGUSFQoNZmlyc3RfZGVwdGhfbRgBIAEoARIOCgZzdGVwX20YAiABKAESEwoHZm9yY2VfbhgDIAMoAUICEAEi8wQKB0NvbnRyb2wSCgoCaWQYASABKA0SMQoOc2V0X3N0YXRlX3JhdGUYAiABKAsyFy50ZW5kb24udjEuU2V0U3RhdGVSYXRlSAASIQoFcmVhcm0YAyABKAsyEC50ZW5kb24udjEuUmVhcm1IABInCghkZXNjcmliZRgEIAEoCzITLnRlbmRvbi52MS5EZXNjcmliZUgAEioKCnRha2VfbGVhc2UYBSABKAsyFC50ZW5kb24udjEuVGFrZUxlYXNlSAASKgoKZ2l2ZV9sZWFzZRgGIAEoCzIULnRlbmRvbi52MS5HaXZlTGVhc2VIABI5ChJzZXRfc3RhdGVfZGVhZGJhbmQYCCABKAsyGy50ZW5kb24udjEuU2V0U3RhdGVEZWFkYmFuZEgAEiMKBmRpc2FybRgJIAEoCzIRLnRlbmRvbi52MS5EaXNhcm1IABIqCgpzZXRfb3V0cHV0GAogASgLMhQudGVuZG9uLnYxLlNldE91dHB1dEgAEiMKBmNvdXBsZRgLIAEoCzIRLnRlbmRvbi52MS5Db3VwbGVIABIjCgZlbmdhZ2UYDCABKAsyES50ZW5kb24udjEuRW5nYWdlSAASKQoJZGlzZW5nYWdlGA0gASgLMhQudGVuZG9uLnYxLkRpc2VuZ2FnZUgAEigKCXNldF9zY2FsZRgOIAEoCzITLnRlbmRvbi52MS5TZXRTY2FsZUgAEigKCXNldF9zaGFyZRgPIAEoCzITLnRlbmRvbi52MS5TZXRTaGFyZUgAEioKCmxlYXNlX2xvc3QYByABKAsyFC50ZW5kb24udjEuTGVhc2VMb3N0SABCBAoCb3AiKgoMU2V0U3RhdGVSYXRlEgoKAmh6GAEgASgNEg4KBmRldmljZRgCIAEoDSJMChBTZXRTdGF0ZURlYWRiYW5kEg0KBXNoYXJlGAEgASgBEhEKCWZsb29yX21wcxgCIAEoARIWCg5tYXhfc2lsZW5jZV91cxgDIAEoDSIXCgVSZWFybRIOCgZkZXZpY2UYASABKA0iGAoGRGlzYXJtEg4KBmRldmljZRgBIAEoDSKfBAoGQ291cGxlEg4KBmRldmljZRgBIAEoDRIPCgdjaGFubmVsGAIgASgNEiEKBHJvbGUYAyABKA4yEy50ZW5kb24udjEuUG9ydFJvbGUSKQoGbWV0aG9kGAQgASgOMhkudGVuZG9uLnYxLkNvdXBsaW5nTWV0aG9kEhYKDnBvc2l0aW9uX3NjYWxlGAUgASgBEhMKC2ZvcmNlX3NjYWxlGAYgASgBEiEKCHJvdGF0aW9uGAcgASgLMg8udGVuZG9uLnYxLlF1YXQSDAoEYXhlcxgIIAEoDRIVCg1zdGlmZm5lc3NfbnBtGAkgASgBEhsKE211dHVhbF9kYW1waW5nX25zcG0YCiABKAESFAoMZGFtcGluZ19uc3BtGAsgASgBEhYKDmFkYXB0X3RvX2RlbGF5GAwgASgIEg0KBXB1cnNlGA0gASgIEhEKCXBlcmlvZF91cxgOIAEoDRIQCghhYnNvbHV0ZRgPIAEoCBIdChV0dXJuX3N0aWZmbmVzc19ubXByYWQYECABKAESHAoUdHVybl9kYW1waW5nX25tc3ByYWQYESABKAESGgoSZ3JpcF9zdGlmZm5lc3NfbnBtGBIgASgBEhkKEWdyaXBfZGFtcGluZ19uc3BtGBMgASgBEhgKEGRyaWZ0X3JhdGVfcGVyX3MYFCABKAESJAoEcmF0ZRgVIAEoCzIWLnRlbmRvbi52MS5SYXRlQ29udHJvbCJNCgtSYXRlQ29udHJvbBITCgtkZWFkX3pvbmVfbRgBIAEoARISCgpnYWluX3Blcl9zGAIgASgBEhUKDW1heF9zcGVlZF9tcHMYAyABKAEiGAoGRW5nYWdlEg4KBmRldmljZRgBIAEoDSIbCglEaXNlbmdhZ2USDgoGZGV2aWNlGAEgASgNIkcKCFNldFNjYWxlEg4KBmRldmljZRgBIAEoDRIWCg5wb3NpdGlvbl9zY2FsZRgCIAEoARITCgtmb3JjZV9zY2FsZRgDIAEoASI6CghTZXRTaGFyZRIOCgZkZXZpY2UYASABKA0SDwoHY2hhbm5lbBgCIAEoDRINCgVzaGFyZRgDIAEoASJwCglTZXRPdXRwdXQSDgoGZGV2aWNlGAEgASgNEg4KBm91dHB1dBgCIAEoDRINCgNyZ2IYAyABKAdIABIpCgl2aWJyYXRpb24YBCABKAsyFC50ZW5kb24udjEuVmlicmF0aW9uSABCCQoHc2V0dGluZyJJCglWaWJyYXRpb24SEQoJYW1wbGl0dWRlGAEgASgBEhQKDGZyZXF1ZW5jeV9oehgCIAEoARITCgtkdXJhdGlvbl9tcxgDIAEoDSIqCghEZXNjcmliZRIOCgZkZXZpY2UYASABKA0SDgoGaGFuZGxlGAIgASgIIiwKCVRha2VMZWFzZRIOCgZkZXZpY2UYASABKA0SDwoHY2hhbm5lbBgCIAEoDSIsCglHaXZlTGVhc2USDgoGZGV2aWNlGAEgASgNEg8KB2NoYW5uZWwYAiABKA0iOAoJTGVhc2VMb3N0Eg4KBmRldmljZRgBIAEoDRIPCgdjaGFubmVsGAIgASgNEgoKAnRvGAMgASgJIrQBCgpDb250cm9sQWNrEgoKAmlkGAEgASgNEh0KBGNvZGUYAiABKA4yDy50ZW5kb24udjEuQ29kZRIOCgZkZXRhaWwYAyABKAkSDwoHd2FpdF9tcxgEIAEoDRIsCgZkZXZpY2UYBSABKAsyHC50ZW5kb24udjEuRGV2aWNlRGVzY3JpcHRpb24SLAoGaGFuZGxlGAYgASgLMhwudGVuZG9uLnYxLkhhbmRsZURlc2NyaXB0aW9uIuoCChFEZXZpY2VEZXNjcmlwdGlvbhIOCgZkZXZpY2UYASABKA0SDAoEbmFtZRgCIAEoCRINCgVtb2RlbBgDIAEoCRIUCgxwb3NpdGlvbl9kb2YYBCABKA0SEQoJZm9yY2VfZG9mGAUgASgNEigKD3dvcmtzcGFjZV9taW5fbRgGIAEoCzIPLnRlbmRvbi52MS5WZWMzEigKD3dvcmtzcGFjZV9tYXhfbRgHIAEoCzIPLnRlbmRvbi52MS5WZWMzEhMKC21heF9mb3JjZV9uGAggASgBEhoKEmNvbnRpbnVvdXNfZm9yY2VfbhgJIAEoARIZChFtYXhfc3RpZmZuZXNzX25wbRgKIAEoARIdChVwb3NpdGlvbl9yZXNvbHV0aW9uX20YCyABKAESDwoHbG9vcF9oehgMIAEoDRIvCghjaGFubmVscxgNIAMoCzIdLnRlbmRvbi52MS5DaGFubmVsRGVzY3JpcHRpb24i1gIKEUhhbmRsZURlc2NyaXB0aW9uEg4KBmRldmljZRgBIAEoDRItChRvcGVyYXRvcl9mcm9tX2RldmljZRgCIAEoCzIPLnRlbmRvbi52MS5RdWF0Eg8KB2J1dHRvbnMYAyADKAkSHAoUb3JpZW50YXRpb25fbWVhc3VyZWQYBCABKAgSFQoNbWF4X3RvcnF1ZV9ubRgFIAEoARIdChBncmlwcGVyX29wZW5fcmFkGAYgASgBSACIAQESGwoTbWF4X2dyaXBwZXJfZm9yY2VfbhgHIAEoARINCgVncm91cBgIIAEoCRIdCgRoYW5kGAkgASgOMg8udGVuZG9uLnYxLkhhbmQSDgoGam9pbnRzGAogAygJEi0KB291dHB1dHMYCyADKAsyHC50ZW5kb24udjEuT3V0cHV0RGVzY3JpcHRpb25CEwoRX2dyaXBwZXJfb3Blbl9yYWQiRgoRT3V0cHV0RGVzY3JpcHRpb24SDAoEbmFtZRgBIAEoCRIjCgRraW5kGAIgASgOMhUudGVuZG9uLnYxLk91dHB1dEtpbmQiagoSQ2hhbm5lbERlc2NyaXB0aW9uEgwKBG5hbWUYASABKAkSJAoEcnVsZRgCIAEoDjIWLnRlbmRvbi52MS5DaGFubmVsUnVsZRIQCghsZWFzZV9tcxgDIAEoDRIOCgZob2xkZXIYBCABKAkiNAoDQnllEh0KBGNvZGUYASABKA4yDy50ZW5kb24udjEuQ29kZRIOCgZyZWFzb24YAiABKAki3gQKCkxpbmtSZXBvcnQSDgoGbnVtYmVyGAEgASgEEhAKCHVudGlsX25zGAIgASgQEg8KB3NwYW5fbnMYAyABKAQSDgoGZm9yY2VzGAQgASgEEhMKC2xhdGVfc2VydmVyGAUgASgEEhQKDGxhdGVfbmV0d29yaxgGIAEoBBITCgtsYXRlX2VuZ2luZRgHIAEoBBIVCg13b3JzdF9sYXRlX25zGAggASgEEhYKDmxvbmdlc3RfZ2FwX25zGAkgASgEEiUKCnJvdW5kX3RyaXAYCiABKAsyES50ZW5kb24udjEuRGVsYXlzEiQKCXRvX3NlcnZlchgLIAEoCzIRLnRlbmRvbi52MS5EZWxheXMSJAoJdG9fY2xpZW50GAwgASgLMhEudGVuZG9uLnYxLkRlbGF5cxIXCg9jbG9ja19vZmZzZXRfbnMYDSABKBISFwoPY2xvY2tfZHJpZnRfcHBtGA4gASgBEhYKDmNsb2NrX2Vycm9yX25zGA8gASgEEhAKCHJlY2VpdmVkGBAgASgEEgwKBGxvc3QYESABKAQSEQoJcmVvcmRlcmVkGBIgASgEEhIKCmR1cGxpY2F0ZWQYEyABKAQSDQoFd29yZHMYFCABKAkSFAoMbGF0ZV91bmtub3duGBUgASgEEhoKEnJlZnVzZWRfbm90X2Zpbml0ZRgWIAEoBBIdChVyZWZ1c2VkX291dF9vZl9ib3VuZHMYFyABKAQSHAoUcmVmdXNlZF91bmtub3duX3RpY2sYGCABKAQSHAoUcmVmdXNlZF9vbGRfc2VxdWVuY2UYGSABKAQiKwoGRGVsYXlzEhEKCW1lZGlhbl9ucxgBIAEoEhIOCgZwOTlfbnMYAiABKBIi4wUKCVBvcnRTdGF0ZRIOCgZkZXZpY2UYASABKA0SDwoHY2hhbm5lbBgCIAEoDRINCgVlcG9jaBgDIAEoBBIQCghzZXF1ZW5jZRgEIAEoBBIVCg1hbnN3ZXJzX2Vwb2NoGAUgASgEEg8KB2Fuc3dlcnMYBiABKAQSDwoHdGltZV9ucxgHIAEoEBIVCg1yb3VuZF90cmlwX25zGAggASgEEiMKBXBoYXNlGAkgASgOMhQudGVuZG9uLnYxLlBvcnRQaGFzZRISCgplbmdhZ2VtZW50GAogASgEEg8KB2J1dHRvbnMYCyABKAcSIwoKcG9zaXRpb25fbRgMIAEoCzIPLnRlbmRvbi52MS5WZWMzEiUKDHZlbG9jaXR5X21wcxgNIAEoCzIPLnRlbmRvbi52MS5WZWMzEiAKB2ZvcmNlX24YDiABKAsyDy50ZW5kb24udjEuVmVjMxIoCg9jb250YWN0X2ZvcmNlX24YDyABKAsyDy50ZW5kb24udjEuVmVjMxIRCglhY2NvdW50X2oYECABKAESDgoGbmVlZF9qGBEgASgBEg8KB2dpdmVuX2oYEiABKAESDwoHdGFrZW5fahgTIAEoARImCg13YXZlX2ludGVncmFsGBQgASgLMg8udGVuZG9uLnYxLlZlYzMSFQoNd2F2ZV9lbmVyZ3lfahgVIAEoARInCgdzdXJmYWNlGBYgASgLMhYudGVuZG9uLnYxLlBvcnRTdXJmYWNlEiEKBHR1cm4YFyABKAsyEy50ZW5kb24udjEuUG9ydFR1cm4SIQoEZ3JpcBgYIAEoCzITLnRlbmRvbi52MS5Qb3J0R3JpcBITCgtlbmVyZ3lfaW5fahgZIAEoARISCgVzaGFyZRgaIAEoAUgAiAEBEhYKDnBvc2l0aW9uX3NjYWxlGBsgASgBEhMKC2ZvcmNlX3NjYWxlGBwgASgBEg8KB29mX3BlZXIYHSABKAhCCAoGX3NoYXJlIn4KCFBvcnRUdXJuEh0KBHR1cm4YASABKAsyDy50ZW5kb24udjEuUXVhdBIvChZhbmd1bGFyX3ZlbG9jaXR5X3JhZHBzGAIgASgLMg8udGVuZG9uLnYxLlZlYzMSIgoJdG9ycXVlX25tGAMgASgLMg8udGVuZG9uLnYxLlZlYzMiiQEKCFBvcnRHcmlwEhEKCW9wZW5pbmdfbRgBIAEoARIUCgx2ZWxvY2l0eV9tcHMYAiABKAESDwoHZm9yY2VfbhgDIAEoARIRCglhY2NvdW50X2oYBCABKAESDgoGbmVlZF9qGAUgASgBEg8KB2dpdmVuX2oYBiABKAESDwoHdGFrZW5fahgHIAEoASJXCgtQb3J0U3VyZmFjZRIfCgZub3JtYWwYASABKAsyDy50ZW5kb24udjEuVmVjMxIQCghvZmZzZXRfbRgCIAEoARIVCg1zdGlmZm5lc3NfbnBtGAMgASgBIvQBCgxEZXZpY2VSZXBvcnQSDgoGbnVtYmVyGAEgASgEEhAKCHVudGlsX25zGAIgASgQEg8KB3NwYW5fbnMYAyABKAQSDgoGZGV2aWNlGAQgASgNEg0KBXN0ZXBzGAUgASgEEg4KBm1pc3NlZBgGIAEoBBIQCghvdmVycnVucxgHIAEoBBIOCgZ1bnNlZW4YCCABKAQSHAoQbGF0ZW5lc3NfdXNfbG9nMhgJIAMoBEICEAESIQoGc2FmZXR5GAogASgOMhEudGVuZG9uLnYxLlNhZmV0eRINCgVmYXVsdBgLIAEoCRIQCghkZWdyYWRlZBgMIAEoCSK9AQoKUGVlclJlcG9ydBIOCgZkZXZpY2UYASABKA0SDwoHY2hhbm5lbBgCIAEoDRIMCgRuYW1lGAMgASgJEhQKDHN0YXRlX29uZV9pbhgEIAEoDRIWCg5mb3JjZXNfcmVmdXNlZBgFIAEoCBIjCgRsaW5rGAYgASgLMhUudGVuZG9uLnYxLkxpbmtSZXBvcnQSFAoHZXJyb3JfbhgHIAEoAUgAiAEBEgsKA3dheRgIIAEoCUIKCghfZXJyb3JfbiKgAQoFSGVsbG8SEwoLdmVyc2lvbl9taW4YASABKA0SEwoLdmVyc2lvbl9tYXgYAiABKA0SHQoEcm9sZRgDIAEoDjIPLnRlbmRvbi52MS5Sb2xlEgwKBG5hbWUYBCABKAkSEAoIZmVhdHVyZXMYBSADKAkSIAoGY2xhaW1zGAYgAygLMhAudGVuZG9uLnYxLkNsYWltEgwKBHdheXMYByADKAkiRwoFQ2xhaW0SDgoGZGV2aWNlGAEgASgJEg8KB2NoYW5uZWwYAiABKAkSHQoEcm9sZRgDIAEoDjIPLnRlbmRvbi52MS5Sb2xlIl4KBkFuc3dlchIlCgd3ZWxjb21lGAEgASgLMhIudGVuZG9uLnYxLldlbGNvbWVIABIlCgdyZWZ1c2VkGAIgASgLMhIudGVuZG9uLnYxLlJlZnVzZWRIAEIGCgRib2R5IusBCgdXZWxjb21lEg8KB3ZlcnNpb24YASABKA0SEAoIZmVhdHVyZXMYAiADKAkSHQoEcm9sZRgDIAEoDjIPLnRlbmRvbi52MS5Sb2xlEhMKC2RldmljZV9uYW1lGAQgASgJEhMKC21heF9mb3JjZV9uGAUgASgBEh0KFXBvc2l0aW9uX3Jlc29sdXRpb25fbRgGIAEoARIPCgdsb29wX2h6GAcgASgNEhIKCnRpbWVvdXRfbXMYCCABKA0SDgoGc2VydmVyGAkgASgJEiAKBmdyYW50cxgKIAMoCzIQLnRlbmRvbi52MS5HcmFudCJHCgVHcmFudBIOCgZkZXZpY2UYASABKA0SDwoHY2hhbm5lbBgCIAEoDRIdCgRyb2xlGAMgASgOMg8udGVuZG9uLnYxLlJvbGUiYgoHUmVmdXNlZBIdCgRjb2RlGAEgASgOMg8udGVuZG9uLnYxLkNvZGUSDgoGZGV0YWlsGAIgASgJEhMKC3ZlcnNpb25fbWluGAMgASgNEhMKC3ZlcnNpb25fbWF4GAQgASgNKoUBCgRNb2RlEhQKEE1PREVfVU5TUEVDSUZJRUQQABINCglNT0RFX0lETEUQARIPCgtNT0RFX0FDVElWRRACEhAKDE1PREVfSE9MRElORxADEhEKDU1PREVfREVDQVlJTkcQBBISCg5NT0RFX1NBRkVfU1RPUBAFEg4KCk1PREVfRkFVTFQQBipTCghQb3J0Um9sZRIZChVQT1JUX1JPTEVfVU5TUEVDSUZJRUQQABIUChBQT1JUX1JPTEVfTEVBREVSEAESFgoSUE9SVF9ST0xFX0ZPTExPV0VSEAIqjwIKDkNvdXBsaW5nTWV0aG9kEh8KG0NPVVBMSU5HX01FVEhPRF9VTlNQRUNJRklFRBAAEiUKIUNPVVBMSU5HX01FVEhPRF9QT1NJVElPTl9QT1NJVElPThABEiIKHkNPVVBMSU5HX01FVEhPRF9QT1NJVElPTl9GT1JDRRACEhkKFUNPVVBMSU5HX01FVEhPRF9XQVZFUxADEhsKF0NPVVBMSU5HX01FVEhPRF9TVVJGQUNFEAQSHQoZQ09VUExJTkdfTUVUSE9EX1BBU1NJVklUWRAFEiAKHENPVVBMSU5HX01FVEhPRF9TRVRfUE9TSVRJT04QBhIYChRDT1VQTElOR19NRVRIT0RfUkFURRAHKksKCk91dHB1dEtpbmQSFgoST1VUUFVUX1VOU1BFQ0lGSUVEEAASDwoLT1VUUFVUX0xBTVAQARIUChBPVVRQVVRfVklCUkFUSU9OEAIqMwoESGFuZBIMCghIQU5EX0FOWRAAEg0KCUhBTkRfTEVGVBABEg4KCkhBTkRfUklHSFQQAipcCgtDaGFubmVsUnVsZRIcChhDSEFOTkVMX1JVTEVfVU5TUEVDSUZJRUQQABIUChBDSEFOTkVMX1JVTEVfU1VNEAESGQoVQ0hBTk5FTF9SVUxFX1BSSU9SSVRZEAIqygEKCVBvcnRQaGFzZRIaChZQT1JUX1BIQVNFX1VOU1BFQ0lGSUVEEAASFAoQUE9SVF9QSEFTRV9BTE9ORRABEhYKElBPUlRfUEhBU0VfQ09VUExFRBACEhcKE1BPUlRfUEhBU0VfQUxJR05JTkcQAxIWChJQT1JUX1BIQVNFX0VOR0FHRUQQBBIXChNQT1JUX1BIQVNFX0NMVVRDSEVEEAUSEwoPUE9SVF9QSEFTRV9MT1NUEAYSFAoQUE9SVF9QSEFTRV9GQVVMVBAHKrwBCgZTYWZldHkSFgoSU0FGRVRZX1VOU1BFQ0lGSUVEEAASEQoNU0FGRVRZX0FCU0VOVBABEhIKDlNBRkVUWV9PUEVOSU5HEAISEwoPU0FGRVRZX0ZJUk1XQVJFEAMSEgoOU0FGRVRZX1VOSE9NRUQQBBIQCgxTQUZFVFlfSE9NRUQQBRIQCgxTQUZFVFlfQVJNRUQQBhIQCgxTQUZFVFlfRkFVTFQQBxIUChBTQUZFVFlfVU5HVUFSREVEEAgqvQEKBENvZGUSFAoQQ09ERV9VTlNQRUNJRklFRBAAEgsKB0NPREVfT0sQARIQCgxDT0RFX0lOVkFMSUQQAhIUChBDT0RFX1VOU1VQUE9SVEVEEAMSDQoJQ09ERV9CVVNZEAQSDwoLQ09ERV9ERU5JRUQQBRIRCg1DT0RFX1NIVVRET1dOEAYSEgoOQ09ERV9USU1FRF9PVVQQBxIQCgxDT0RFX0VYUElSRUQQCBIRCg1DT0RFX1JFUExBQ0VEEAkqRAoEUm9sZRIUChBST0xFX1VOU1BFQ0lGSUVEEAASEQoNUk9MRV9PQlNFUlZFUhABEhMKD1JPTEVfQ09OVFJPTExFUhACYgZwcm90bzM");
 
 /**
+ * The body of a Data datagram.
+ *
  * @generated from message tendon.v1.Datagram
  */
 export type Datagram = Message<"tendon.v1.Datagram"> & {
   /**
-   * [-2^60, 2^60]: when the datagram was written
+   * [-2^60, 2^60]: T3, the time at which the datagram was written
    *
    * @generated from field: sfixed64 tx_time_ns = 1;
    */
   txTimeNs: bigint;
 
   /**
-   * absent until a datagram of the other side has arrived
+   * about the newest accepted datagram of the peer, which is the one with the highest packet number; absent before the
+   * first
    *
    * @generated from field: tendon.v1.Echo echo = 2;
    */
   echo?: Echo | undefined;
 
   /**
-   * [0, 64] entries: none = keep-alive
+   * [0, 64] entries: a keep-alive has none; with more than 64, the datagram is malformed
    *
    * @generated from field: repeated tendon.v1.Frame frames = 3;
    */
@@ -48,33 +51,38 @@ export const DatagramSchema: GenMessage<Datagram> = /*@__PURE__*/
   messageDesc(file_tendon, 0);
 
 /**
- * The newest datagram received from the other side. With T3 = tx_time_ns of the datagram that carries it
- * and T4 = its arrival, the round trip is (T4 − T1) − (T3 − T2).
+ * Acknowledges a datagram of the peer and measures the round trip: with T3 = tx_time_ns of the datagram that carries
+ * the echo and T4 = the time at which that datagram arrives, the round trip is (T4 − T1) − (T3 − T2).
  *
  * @generated from message tendon.v1.Echo
  */
 export type Echo = Message<"tendon.v1.Echo"> & {
   /**
-   * [-2^60, 2^60]: T1, its tx_time_ns: the RECEIVER's clock
+   * [-2^60, 2^60]: T1, tx_time_ns of that datagram, on the peer's clock
    *
    * @generated from field: sfixed64 peer_tx_time_ns = 1;
    */
   peerTxTimeNs: bigint;
 
   /**
-   * [-2^60, 2^60]: T2, when it arrived
+   * T2, when that datagram arrived, on the clock of the sender of the echo; T2 ≤ T3
+   *
+   * [-2^60, 2^60]
    *
    * @generated from field: sfixed64 rx_time_ns = 2;
    */
   rxTimeNs: bigint;
 
   /**
+   * packet number of that datagram
+   *
    * @generated from field: uint64 peer_packet_number = 3;
    */
   peerPacketNumber: bigint;
 
   /**
-   * bit i: packet (peer_packet_number − 1 − i) has arrived too
+   * bit i: packet (peer_packet_number − 1 − i) has arrived too. A malformed packet counts as arrived in suites 1 and 2
+   * only
    *
    * @generated from field: fixed32 received_mask = 4;
    */
@@ -89,6 +97,9 @@ export const EchoSchema: GenMessage<Echo> = /*@__PURE__*/
   messageDesc(file_tendon, 1);
 
 /**
+ * One of these messages. `control` and `control_ack` are reliable (SESSION.md). All others but `bye` are sent once, and
+ * only the newest one counts.
+ *
  * @generated from message tendon.v1.Frame
  */
 export type Frame = Message<"tendon.v1.Frame"> & {
@@ -97,7 +108,7 @@ export type Frame = Message<"tendon.v1.Frame"> & {
    */
   body: {
     /**
-     * server → client, unreliable, of each device the newest tick wins
+     * server → client, unreliable; for each device the highest tick wins
      *
      * @generated from field: tendon.v1.DeviceState state = 1;
      */
@@ -105,7 +116,7 @@ export type Frame = Message<"tendon.v1.Frame"> & {
     case: "state";
   } | {
     /**
-     * client → server, unreliable, of each device and channel the newest sequence wins
+     * client → server, unreliable; for each device and channel the highest sequence wins
      *
      * @generated from field: tendon.v1.ForceCommand force = 2;
      */
@@ -129,7 +140,7 @@ export type Frame = Message<"tendon.v1.Frame"> & {
     case: "controlAck";
   } | {
     /**
-     * either way, said three times
+     * either way, sent three times
      *
      * @generated from field: tendon.v1.Bye bye = 5;
      */
@@ -137,7 +148,7 @@ export type Frame = Message<"tendon.v1.Frame"> & {
     case: "bye";
   } | {
     /**
-     * server → client, unreliable, newest number wins
+     * server → client, unreliable; the highest number wins
      *
      * @generated from field: tendon.v1.LinkReport report = 6;
      */
@@ -145,9 +156,8 @@ export type Frame = Message<"tendon.v1.Frame"> & {
     case: "report";
   } | {
     /**
-     * Only to an observer that named the feature "diagnostics":
-     *
-     * server → client, unreliable, of each device the newest number wins
+     * server → client, unreliable, to an observer with the feature "diagnostics" only; for each device the highest
+     * number wins
      *
      * @generated from field: tendon.v1.DeviceReport device_report = 7;
      */
@@ -155,7 +165,8 @@ export type Frame = Message<"tendon.v1.Frame"> & {
     case: "deviceReport";
   } | {
     /**
-     * server → client, unreliable, of each device and channel the newest number wins
+     * server → client, unreliable, to an observer with the feature "diagnostics" only; for each device and channel the
+     * highest number of its link wins
      *
      * @generated from field: tendon.v1.PeerReport peer_report = 8;
      */
@@ -163,8 +174,8 @@ export type Frame = Message<"tendon.v1.Frame"> & {
     case: "peerReport";
   } | {
     /**
-     * Only between peers that both named the feature "teleoperation", either way, unreliable: of each device, channel
-     * and end the highest sequence of the highest epoch wins. To an observer of the device, both ends of its coupling
+     * either way, unreliable, with the feature "teleoperation" only; for each device, channel and end the highest
+     * sequence of the highest epoch wins. An observer of the device is sent both ends of its coupling
      *
      * @generated from field: tendon.v1.PortState port_state = 9;
      */
@@ -172,9 +183,7 @@ export type Frame = Message<"tendon.v1.Frame"> & {
     case: "portState";
   } | {
     /**
-     * Only to a client that named the feature "state-columns"
-     *
-     * server → client, unreliable, of each device the newest tick wins
+     * server → client, unreliable, with the feature "state-columns" only; for each device the highest tick wins
      *
      * @generated from field: tendon.v1.DeviceStates states = 10;
      */
@@ -191,6 +200,8 @@ export const FrameSchema: GenMessage<Frame> = /*@__PURE__*/
   messageDesc(file_tendon, 2);
 
 /**
+ * A vector. Its unit is in the name of the field that has this type.
+ *
  * @generated from message tendon.v1.Vec3
  */
 export type Vec3 = Message<"tendon.v1.Vec3"> & {
@@ -224,8 +235,8 @@ export const Vec3Schema: GenMessage<Vec3> = /*@__PURE__*/
   messageDesc(file_tendon, 3);
 
 /**
- * A rotation as a unit quaternion, Hamilton's: w + x i + y j + z k. q and −q are the same rotation. Its norm is
- * 1 ± 0.001, or it is refused.
+ * A rotation as a unit quaternion, Hamilton's: w + x i + y j + z k. q and −q are the same rotation. It is refused
+ * unless its norm is 1 ± 0.001.
  *
  * @generated from message tendon.v1.Quat
  */
@@ -267,7 +278,7 @@ export const QuatSchema: GenMessage<Quat> = /*@__PURE__*/
   messageDesc(file_tendon, 4);
 
 /**
- * A device at one haptic step.
+ * The state of a device at one haptic step.
  *
  * @generated from message tendon.v1.DeviceState
  */
@@ -280,7 +291,7 @@ export type DeviceState = Message<"tendon.v1.DeviceState"> & {
   tick: bigint;
 
   /**
-   * [-2^60, 2^60]: when the position was sampled; integrate with its differences
+   * [-2^60, 2^60]: when the position was sampled, on the server's clock
    *
    * @generated from field: sfixed64 sampled_ns = 2;
    */
@@ -297,42 +308,44 @@ export type DeviceState = Message<"tendon.v1.DeviceState"> & {
   velocityMps?: Vec3 | undefined;
 
   /**
-   * on the hand, as the device really exerts it from this step on
+   * actual force on the hand, from this step on
    *
    * @generated from field: tendon.v1.Vec3 force_applied_n = 5;
    */
   forceAppliedN?: Vec3 | undefined;
 
   /**
-   * [-1e12, 1e12]: the energy ledger: what the device may still give out
+   * [-1e12, 1e12]: energy that the device may still give out (the energy ledger)
    *
    * @generated from field: double energy_j = 6;
    */
   energyJ: number;
 
   /**
-   * [0, 1e12] or +infinity: the limiter's bound on the norm; +infinity: no bound
+   * the limiter's bound on the norm of the force; +infinity if there is none
+   *
+   * [0, 1e12] or +infinity
    *
    * @generated from field: double permitted_force_n = 7;
    */
   permittedForceN: number;
 
   /**
-   * bits of core/base/reason.h: why the force is not what was asked for
+   * why the actual force differs from the requested one (bits of core/base/reason.h)
    *
    * @generated from field: fixed32 reasons = 8;
    */
   reasons: number;
 
   /**
-   * ForceCommand rendered now; 0 = none
+   * sequence of the ForceCommand that is rendered; 0 if there is none
    *
    * @generated from field: uint64 force_sequence = 9;
    */
   forceSequence: bigint;
 
   /**
-   * [0, 2^60]: its age since it arrived
+   * [0, 2^60]: time since that ForceCommand arrived
    *
    * @generated from field: uint64 force_age_ns = 10;
    */
@@ -351,81 +364,87 @@ export type DeviceState = Message<"tendon.v1.DeviceState"> & {
   device: number;
 
   /**
-   * [0, 7]: of the force that force_sequence, force_age_ns and mode are about
+   * channel of the force that force_sequence, force_age_ns and mode describe: the freshest one, or the one with the
+   * lowest channel if several are equally fresh
+   *
+   * [0, 7]
    *
    * @generated from field: uint32 channel = 13;
    */
   channel: number;
 
   /**
-   * What the engines ask for at this step, held, faded or led on by their local models, before any limit. Absent: not
-   * told; only to an observer that named the feature "diagnostics"
+   * With the feature "diagnostics" only:
+   * force on the hand that the engines request at this step (held, faded, or extrapolated by their models), before any
+   * limit; absent: not reported
    *
    * @generated from field: tendon.v1.Vec3 force_wanted_n = 14;
    */
   forceWantedN?: Vec3 | undefined;
 
   /**
-   * Only to a client that named the feature "handle", and each only of a device that has it:
-   *
-   * turns the handle frame into the base frame; absent: not measured
+   * With the feature "handle" only:
+   * rotation from the handle frame to the device base frame. In the handle frame, when the handle is in its middle
+   * position, the stylus or finger points along −z, y is up, and x is to the right; absent: not measured
    *
    * @generated from field: tendon.v1.Quat orientation = 15;
    */
   orientation?: Quat | undefined;
 
   /**
-   * only with an orientation
+   * angular velocity in base frame axes; ignored without an orientation
    *
    * @generated from field: tendon.v1.Vec3 angular_velocity_radps = 16;
    */
   angularVelocityRadps?: Vec3 | undefined;
 
   /**
-   * bit i: button i is held; a press between two states of a client is in the next one
+   * bit i: button i is held. A press between two states is reported in the later one
    *
    * @generated from field: fixed32 buttons = 17;
    */
   buttons: number;
 
   /**
-   * about position_m, from this step on; absent: no motors that turn
+   * actual torque on the hand about position_m, in base frame axes, from this step on; absent: no motors that turn
    *
    * @generated from field: tendon.v1.Vec3 torque_applied_nm = 18;
    */
   torqueAppliedNm?: Vec3 | undefined;
 
   /**
-   * [-1e12, 1e12]: opening, 0 = closed; absent: no gripper
+   * [-1e12, 1e12]: opening of the gripper, 0 when it is closed; absent: no gripper
    *
    * @generated from field: optional double gripper_rad = 19;
    */
   gripperRad?: number | undefined;
 
   /**
-   * [-1e12, 1e12]: only with an opening
+   * [-1e12, 1e12]: velocity of the opening; ignored without gripper_rad
    *
    * @generated from field: optional double gripper_velocity_radps = 20;
    */
   gripperVelocityRadps?: number | undefined;
 
   /**
-   * [-1e12, 1e12]: on the fingers, > 0 opens them; absent: no motor
+   * actual force on the fingers, > 0 opens them, from this step on; absent: the gripper has no motor
+   *
+   * [-1e12, 1e12]
    *
    * @generated from field: optional double gripper_force_applied_n = 21;
    */
   gripperForceAppliedN?: number | undefined;
 
   /**
-   * of the hand ON THE HANDLE; absent: no force sensor
+   * of the hand ON THE HANDLE, measured by a force sensor; absent: no force sensor
    *
    * @generated from field: tendon.v1.Vec3 hand_force_n = 22;
    */
   handForceN?: Vec3 | undefined;
 
   /**
-   * Only to a client that named the feature "joints", in the order of HandleDescription.joints. None: the device tells
-   * none. A velocity that is absent is 0, one without an angle says nothing.
+   * With the feature "joints" only:
+   * angles of the joints that carry the handle, in the order of HandleDescription.joints. None: the device reports none
    *
    * [-1e12, 1e12], [0, 8] entries
    *
@@ -434,6 +453,8 @@ export type DeviceState = Message<"tendon.v1.DeviceState"> & {
   jointRad: number[];
 
   /**
+   * velocities of the same joints; a missing entry is 0, and an entry without an angle is ignored
+   *
    * [-1e12, 1e12], [0, 8] entries
    *
    * @generated from field: repeated double joint_velocity_radps = 24 [packed = true];
@@ -441,8 +462,9 @@ export type DeviceState = Message<"tendon.v1.DeviceState"> & {
   jointVelocityRadps: number[];
 
   /**
-   * −∂force_wanted_n/∂position_m, N/m, as the engines' models say it at this step; its entries as those of
-   * LocalModel.stiffness_npm. None: no model. To whom force_wanted_n is told
+   * With the feature "diagnostics" only:
+   * −∂force_wanted_n/∂position_m of the engines' models at this step; entries as in LocalModel.stiffness_npm. None: no
+   * model
    *
    * [-1e12, 1e12], {0, 1, 3, 9} entries
    *
@@ -459,30 +481,31 @@ export const DeviceStateSchema: GenMessage<DeviceState> = /*@__PURE__*/
   messageDesc(file_tendon, 5);
 
 /**
- * States of several devices at one haptic step, in columns: half the bytes of as many DeviceState, as all but the
- * positions are rounded to single precision. Entry i of a column is of the i-th device in `devices`, in the order of
- * their numbers; of a vector it is three entries. A frame with a column of another length is refused, and one without
- * any device. All but the last five columns must be there.
+ * States of several devices at one haptic step, in columns. They take half the bytes of as many DeviceState messages,
+ * because everything except the positions has single precision. Entry k of a column belongs to the k-th device in
+ * `devices`, in the order of their numbers; a vector takes three entries (x, y, z). The last five columns may be empty:
+ * then all their values are 0. A frame with a column of any other length, without a device, or with one value out of
+ * bounds is dropped whole.
  *
  * @generated from message tendon.v1.DeviceStates
  */
 export type DeviceStates = Message<"tendon.v1.DeviceStates"> & {
   /**
-   * number of the haptic step, of all of them
+   * as in DeviceState, for all devices
    *
    * @generated from field: uint64 tick = 1;
    */
   tick: bigint;
 
   /**
-   * [-2^60, 2^60]: when the positions were sampled
+   * [-2^60, 2^60]: as in DeviceState, for all devices
    *
    * @generated from field: sfixed64 sampled_ns = 2;
    */
   sampledNs: bigint;
 
   /**
-   * bit i: device i is among them
+   * bit i: device i is included; 1 … 65 535
    *
    * @generated from field: uint32 devices = 3;
    */
@@ -529,7 +552,7 @@ export type DeviceStates = Message<"tendon.v1.DeviceStates"> & {
   mode: Mode[];
 
   /**
-   * None: 0, for each device.
+   * These columns may be empty:
    *
    * [0, …]
    *
@@ -574,7 +597,7 @@ export const DeviceStatesSchema: GenMessage<DeviceStates> = /*@__PURE__*/
   messageDesc(file_tendon, 6);
 
 /**
- * The force that the physics engine wants.
+ * The force that a physics engine requests, as the answer to one state.
  *
  * @generated from message tendon.v1.ForceCommand
  */
@@ -587,28 +610,28 @@ export type ForceCommand = Message<"tendon.v1.ForceCommand"> & {
   sequence: bigint;
 
   /**
-   * DeviceState.tick of that device it was computed from: the loop's true age needs no clock
+   * DeviceState.tick of the state that the force was computed from
    *
    * @generated from field: uint64 based_on_tick = 2;
    */
   basedOnTick: bigint;
 
   /**
-   * on the hand: a wall that resists motion along +x sends −x
+   * force on the hand: a wall that resists motion along +x sends −x
    *
    * @generated from field: tendon.v1.Vec3 force_n = 3;
    */
   forceN?: Vec3 | undefined;
 
   /**
-   * optional
+   * how the force changes as the hand moves; absent: the force is constant
    *
    * @generated from field: tendon.v1.LocalModel model = 4;
    */
   model?: LocalModel | undefined;
 
   /**
-   * [1, 10000000]: counted from arrival
+   * [1, 10000000]: time from its arrival during which the force is fresh
    *
    * @generated from field: uint32 valid_for_us = 5;
    */
@@ -629,44 +652,48 @@ export type ForceCommand = Message<"tendon.v1.ForceCommand"> & {
   channel: number;
 
   /**
-   * cut or torn since the answer before this one: neither's model is relied on
+   * the body has been cut or torn since the previous answer: neither this model nor the previous one is used
    *
    * @generated from field: bool topology_changed = 8;
    */
   topologyChanged: boolean;
 
   /**
-   * [0, 1e12]: how wrong the engine thinks force_n may be; absent: not said
+   * [0, 1e12]: the engine's estimate of the error of force_n; absent: not known
    *
    * @generated from field: optional double error_n = 9;
    */
   errorN?: number | undefined;
 
   /**
-   * Only to a server that granted the feature "handle":
+   * With the feature "handle" only:
    *
-   * on the hand, about the handle's position; absent: none is asked for
+   * torque on the hand about the handle's position, in base frame axes; absent: none is requested
    *
    * @generated from field: tendon.v1.Vec3 torque_nm = 10;
    */
   torqueNm?: Vec3 | undefined;
 
   /**
-   * [-1e12, 1e12]: on the fingers, > 0 opens them; absent: none is asked for
+   * force on the fingers, > 0 opens them; absent: none is requested
+   *
+   * [-1e12, 1e12]
    *
    * @generated from field: optional double gripper_force_n = 11;
    */
   gripperForceN?: number | undefined;
 
   /**
-   * optional
+   * how the torque changes as the handle turns. It does not need a `model`, and an absent torque_nm is 0 in it
    *
    * @generated from field: tendon.v1.RotationModel rotation_model = 14;
    */
   rotationModel?: RotationModel | undefined;
 
   /**
-   * Only to a server that granted the feature "ways": which of Hello.ways has answered, from 1 on; 0: not said
+   * With the feature "ways" only:
+   * index, from 1, in Hello.ways: the way in which the engine computed this force; 0 if it is not stated. A server
+   * treats an index beyond the last entry as 0
    *
    * [0, 8]
    *
@@ -683,22 +710,22 @@ export const ForceCommandSchema: GenMessage<ForceCommand> = /*@__PURE__*/
   messageDesc(file_tendon, 7);
 
 /**
- * The torque near one orientation, so that the device loop can follow the hand's turns. With p = (w, v) = the rotation
- * from at_orientation to the handle's orientation, q · at_orientation⁻¹, and K = angular_stiffness_nmprad:
- *     τ(q) = torque_nm − 2 (w K v + v × K v)        −K θ for a small turn θ
+ * A local model of the torque. The device loop evaluates it at the handle's orientation q. With
+ * p = (w, v) = q · at_orientation⁻¹, the rotation from at_orientation to q, and K = angular_stiffness_nmprad, it is
+ *     τ(q) = torque_nm − 2 (w K v + v × K v)        which is torque_nm − K θ for a small rotation vector θ
  *
  * @generated from message tendon.v1.RotationModel
  */
 export type RotationModel = Message<"tendon.v1.RotationModel"> & {
   /**
-   * absent is refused
+   * orientation that torque_nm was computed for; absent is refused
    *
    * @generated from field: tendon.v1.Quat at_orientation = 1;
    */
   atOrientation?: Quat | undefined;
 
   /**
-   * −∂τ/∂θ, base frame axes; its entries as those of stiffness_npm.
+   * −∂τ/∂θ in base frame axes; a spring is positive; entries as in LocalModel.stiffness_npm
    *
    * [-1e12, 1e12], {1, 3, 9} entries
    *
@@ -715,21 +742,24 @@ export const RotationModelSchema: GenMessage<RotationModel> = /*@__PURE__*/
   messageDesc(file_tendon, 8);
 
 /**
- * The remote environment near one position, so that the device loop can follow the hand:
+ * A local model of the force. The device loop evaluates it at the hand's position x:
  *     F(x) = force_n − stiffness_npm · (x − at_m)
- * What else it can say WIRE.md describes. A server that does not know the rest follows the stiffness.
+ * With a radius or a contact see WIRE.md, "The force between two answers". A server that does not know them uses this
+ * equation.
  *
  * @generated from message tendon.v1.LocalModel
  */
 export type LocalModel = Message<"tendon.v1.LocalModel"> & {
   /**
+   * position that force_n was computed for
+   *
    * @generated from field: tendon.v1.Vec3 at_m = 1;
    */
   atM?: Vec3 | undefined;
 
   /**
-   * −∂F/∂x; a spring is positive. 1 entry k: k·I. 3 entries: the diagonal. 9: the matrix, row by row.
-   * Any other number is refused.
+   * −∂F/∂x; a spring is positive. 1 entry k is k·I, 3 are the diagonal, 9 are the matrix row by row. An engine that
+   * does not know the stiffness sends a single 0
    *
    * [-1e12, 1e12], {1, 3, 9} entries
    *
@@ -738,14 +768,16 @@ export type LocalModel = Message<"tendon.v1.LocalModel"> & {
   stiffnessNpm: number[];
 
   /**
-   * [0, 1e12] or +infinity: how far from at_m it holds; absent: not said
+   * radius around at_m in which the model is valid; absent: not known
+   *
+   * [0, 1e12] or +infinity
    *
    * @generated from field: optional double valid_radius_m = 3;
    */
   validRadiusM?: number | undefined;
 
   /**
-   * optional
+   * surface that the tool touches or is about to touch
    *
    * @generated from field: tendon.v1.Contact contact = 4;
    */
@@ -760,27 +792,29 @@ export const LocalModelSchema: GenMessage<LocalModel> = /*@__PURE__*/
   messageDesc(file_tendon, 9);
 
 /**
- * A surface that the tool touches or is about to. It only pushes, unless a table says otherwise.
+ * A surface that the tool touches or is about to touch. It pushes and does not pull, unless it has a table.
  *
  * @generated from message tendon.v1.Contact
  */
 export type Contact = Message<"tendon.v1.Contact"> & {
   /**
-   * out of the body, to the hand; of length 1 ± 0.001
+   * direction out of the body, towards the hand: a force along +normal pushes the hand away
    *
    * @generated from field: tendon.v1.Vec3 normal = 1;
    */
   normal?: Vec3 | undefined;
 
   /**
-   * [-1e12, 1e12]: from the surface to the tool along the normal; below 0: so deep is it pressed in
+   * distance from the surface to the tool along the normal, negative if the tool is pressed in
+   *
+   * [-1e12, 1e12]
    *
    * @generated from field: double gap_m = 2;
    */
   gapM: number;
 
   /**
-   * optional
+   * forces along the normal at other depths
    *
    * @generated from field: tendon.v1.ForceTable table = 3;
    */
@@ -795,13 +829,13 @@ export const ContactSchema: GenMessage<Contact> = /*@__PURE__*/
   messageDesc(file_tendon, 10);
 
 /**
- * The force along the normal, at the depths first_depth_m + i · step_m below at_m: at_m − depth · normal.
+ * Forces along the normal. Entry i is for the tool at at_m − (first_depth_m + i · step_m) · normal.
  *
  * @generated from message tendon.v1.ForceTable
  */
 export type ForceTable = Message<"tendon.v1.ForceTable"> & {
   /**
-   * [-1e12, 1e12]: below 0: nearer to the hand
+   * [-1e12, 1e12]: depth of entry 0, negative if it is farther out than at_m
    *
    * @generated from field: double first_depth_m = 1;
    */
@@ -815,7 +849,7 @@ export type ForceTable = Message<"tendon.v1.ForceTable"> & {
   stepM: number;
 
   /**
-   * [-1e12, 1e12], [2, 16] entries: along +normal
+   * [-1e12, 1e12], [2, 16] entries: forces along +normal
    *
    * @generated from field: repeated double force_n = 3 [packed = true];
    */
@@ -830,6 +864,9 @@ export const ForceTableSchema: GenMessage<ForceTable> = /*@__PURE__*/
   messageDesc(file_tendon, 11);
 
 /**
+ * A request, and its number. `lease_lost` is from the server to the client, all others are from the client to the
+ * server.
+ *
  * @generated from message tendon.v1.Control
  */
 export type Control = Message<"tendon.v1.Control"> & {
@@ -841,14 +878,12 @@ export type Control = Message<"tendon.v1.Control"> & {
   id: number;
 
   /**
-   * none known: answered with CODE_UNSUPPORTED
+   * an unknown one is answered with CODE_UNSUPPORTED
    *
    * @generated from oneof tendon.v1.Control.op
    */
   op: {
     /**
-     * client → server
-     *
      * @generated from field: tendon.v1.SetStateRate set_state_rate = 2;
      */
     value: SetStateRate;
@@ -927,8 +962,6 @@ export type Control = Message<"tendon.v1.Control"> & {
     case: "setShare";
   } | {
     /**
-     * server → client
-     *
      * @generated from field: tendon.v1.LeaseLost lease_lost = 7;
      */
     value: LeaseLost;
@@ -944,12 +977,16 @@ export const ControlSchema: GenMessage<Control> = /*@__PURE__*/
   messageDesc(file_tendon, 12);
 
 /**
- * How many states of a device per second the client wants.
+ * Sets how many states of a device the client is sent per second. Before the first such request it is sent every state,
+ * loop_hz per second. After it, the client is sent every k-th state, where k = loop_hz / hz, rounded, at least 1: with
+ * loop_hz 1000, 300 Hz become 333 and 2000 Hz become 1000.
  *
  * @generated from message tendon.v1.SetStateRate
  */
 export type SetStateRate = Message<"tendon.v1.SetStateRate"> & {
   /**
+   * at least 1; 0 is answered with CODE_INVALID
+   *
    * @generated from field: uint32 hz = 1;
    */
   hz: number;
@@ -970,29 +1007,29 @@ export const SetStateRateSchema: GenMessage<SetStateRate> = /*@__PURE__*/
   messageDesc(file_tendon, 13);
 
 /**
- * Leave out the states that this client can foretell: after a state with velocity v the next one that is sent is the
- * first whose velocity differs from v by more than max(share · ‖v‖, floor_mps), whose mode or buttons differ, or which
- * comes max_silence_us later. In between the client goes on along the line: x + v · (t − sampled_ns).
+ * Suppresses the states that the client can predict. After a state with velocity v, the server sends the first state
+ * whose velocity differs from v by more than max(share · ‖v‖, floor_mps), whose mode or buttons differ, or that is
+ * max_silence_us newer. Between two states the client extrapolates: x + v · (t − sampled_ns).
  *
  * @generated from message tendon.v1.SetStateDeadband
  */
 export type SetStateDeadband = Message<"tendon.v1.SetStateDeadband"> & {
   /**
-   * [-1e12, 1e12]: Weber's; a server grants 0 … 0.5
+   * [-1e12, 1e12]: fraction of the speed (Weber fraction); answered CODE_INVALID beyond 0 … 0.5
    *
    * @generated from field: double share = 1;
    */
   share: number;
 
   /**
-   * [-1e12, 1e12]: a server grants 0 … 0.1
+   * [-1e12, 1e12]: smallest difference of the velocity; answered CODE_INVALID beyond 0 … 0.1
    *
    * @generated from field: double floor_mps = 2;
    */
   floorMps: number;
 
   /**
-   * a server grants 1000 … 20 000; 0 = every state is sent, as before this was asked
+   * longest time without a state; 0: every state is sent again. Answered CODE_INVALID beyond 0 and 1000 … 20 000
    *
    * @generated from field: uint32 max_silence_us = 3;
    */
@@ -1007,8 +1044,8 @@ export const SetStateDeadbandSchema: GenMessage<SetStateDeadband> = /*@__PURE__*
   messageDesc(file_tendon, 14);
 
 /**
- * Clears a latched fault, and takes a Disarm back. With a safety layer it is the operator's request to arm. Only from a
- * controller of the device.
+ * Clears a latched fault and revokes a Disarm; only from a controller of the device. If the device has a safety layer,
+ * this is the operator's request to arm.
  *
  * @generated from message tendon.v1.Rearm
  */
@@ -1029,10 +1066,10 @@ export const RearmSchema: GenMessage<Rearm> = /*@__PURE__*/
   messageDesc(file_tendon, 15);
 
 /**
- * No force from the next haptic step on, without a ramp, whatever engines ask for, until a Rearm: neither a new force
- * nor a new session ends it, nor the dead man's button by itself. Safety goes from armed to homed, and a pending
- * request to arm is withdrawn. It is no fault, and clears none. Asking twice is asking once. Only from a controller of
- * the device, whether it holds the channel or not. CODE_OK: the device's loop has the order before its next step.
+ * Sets the force to zero from the next haptic step on, without a ramp, until a Rearm; only from a controller of the
+ * device, whether or not it holds the channel. A new force, a new session or the dead man's button alone does not end
+ * it. The device's Safety changes from armed to homed, and a pending request to arm is withdrawn. Disarm is not a fault
+ * and clears no fault. Repeating it has no effect. CODE_OK: the device's loop receives the order before its next step.
  *
  * @generated from message tendon.v1.Disarm
  */
@@ -1053,30 +1090,31 @@ export const DisarmSchema: GenMessage<Disarm> = /*@__PURE__*/
   messageDesc(file_tendon, 16);
 
 /**
- * My device is the other end of this one: what my end is like. From whoever has claimed the channel as a controller, to
- * a server that granted "teleoperation". CODE_OK: they fit; the client is sent no states any more but PortStates, and
- * sends them. CODE_INVALID: the first thing that differs, in words. CODE_UNSUPPORTED: that device is not to be coupled.
- * CODE_BUSY: that channel is coupled with another client; a follower with several leaders has one for each channel.
+ * Offers the sender's device as the other end of a coupling with this device, and describes that end; only from the
+ * client that has claimed the channel as a controller, with the feature "teleoperation". CODE_OK: the two ends fit;
+ * both peers then send PortState frames, and the server sends no states. CODE_INVALID: they do not fit, and the detail
+ * names the first difference. CODE_UNSUPPORTED: that device cannot be coupled. CODE_BUSY: that channel is coupled with
+ * another client; a follower has one channel for each of its leaders.
  *
  * @generated from message tendon.v1.Couple
  */
 export type Couple = Message<"tendon.v1.Couple"> & {
   /**
-   * [0, 15]
+   * [0, 15]: device of the server
    *
    * @generated from field: uint32 device = 1;
    */
   device: number;
 
   /**
-   * [0, 7]
+   * [0, 7]: channel of the server
    *
    * @generated from field: uint32 channel = 2;
    */
   channel: number;
 
   /**
-   * of the sender: the other end has the other one
+   * role of the sender; the server's device has the other role
    *
    * @generated from field: tendon.v1.PortRole role = 3;
    */
@@ -1088,14 +1126,14 @@ export type Couple = Message<"tendon.v1.Couple"> & {
   method: CouplingMethod;
 
   /**
-   * [0.01, 100]: follower over leader
+   * [0.01, 100]: the follower's motion divided by the leader's
    *
    * @generated from field: double position_scale = 5;
    */
   positionScale: number;
 
   /**
-   * [0.01, 100]: leader over follower
+   * [0.01, 100]: the leader's force divided by the follower's
    *
    * @generated from field: double force_scale = 6;
    */
@@ -1116,91 +1154,95 @@ export type Couple = Message<"tendon.v1.Couple"> & {
   axes: number;
 
   /**
-   * [0, 1e12]: these as the leader feels them
+   * [0, 1e12]: stiffness between the handles, as felt by the leader
    *
    * @generated from field: double stiffness_npm = 9;
    */
   stiffnessNpm: number;
 
   /**
-   * [0, 1e12]
+   * [0, 1e12]: damping between the handles, as felt by the leader
    *
    * @generated from field: double mutual_damping_nspm = 10;
    */
   mutualDampingNspm: number;
 
   /**
-   * [0, 1e12]
+   * [0, 1e12]: damping of each handle, as felt by the leader
    *
    * @generated from field: double damping_nspm = 11;
    */
   dampingNspm: number;
 
   /**
+   * the stiffness decreases as the round trip increases
+   *
    * @generated from field: bool adapt_to_delay = 12;
    */
   adaptToDelay: boolean;
 
   /**
-   * it pays and is paid
+   * the ends exchange energy (core/teleoperation/purse.h)
    *
    * @generated from field: bool purse = 13;
    */
   purse: boolean;
 
   /**
-   * [1, 10000000]: between two PortStates
+   * [1, 10000000]: time between two PortState frames of the sender
    *
    * @generated from field: uint32 period_us = 14;
    */
   periodUs: number;
 
   /**
-   * a place of the leader is a place of the follower: offsets are zero, and the two align first
+   * positions map to positions: the offsets are zero, and the ends align before they engage
    *
    * @generated from field: bool absolute = 15;
    */
   absolute: boolean;
 
   /**
-   * As the leader feels them; a stiffness of 0: that part of the handle is not coupled:
+   * As felt by the leader. With a stiffness of 0 the part is not coupled:
    *
-   * [0, 1e12]: of the orientations
+   * [0, 1e12]: stiffness between the orientations
    *
    * @generated from field: double turn_stiffness_nmprad = 16;
    */
   turnStiffnessNmprad: number;
 
   /**
-   * [0, 1e12]
+   * [0, 1e12]: damping between the orientations
    *
    * @generated from field: double turn_damping_nmsprad = 17;
    */
   turnDampingNmsprad: number;
 
   /**
-   * [0, 1e12]: of the grippers, at the fingers
+   * [0, 1e12]: stiffness between the grippers, at the leader's fingers
    *
    * @generated from field: double grip_stiffness_npm = 18;
    */
   gripStiffnessNpm: number;
 
   /**
-   * [0, 1e12]
+   * [0, 1e12]: damping between the grippers
    *
    * @generated from field: double grip_damping_nspm = 19;
    */
   gripDampingNspm: number;
 
   /**
-   * [0, 1e12]: COUPLING_METHOD_PASSIVITY
+   * For one method only:
+   *
+   * [0, 1e12]: COUPLING_METHOD_PASSIVITY: rate at which the follower corrects its drift
    *
    * @generated from field: double drift_rate_per_s = 20;
    */
   driftRatePerS: number;
 
   /**
-   * COUPLING_METHOD_RATE; absent with the others
+   * COUPLING_METHOD_RATE; absent with the other methods
    *
    * @generated from field: tendon.v1.RateControl rate = 21;
    */
@@ -1215,27 +1257,28 @@ export const CoupleSchema: GenMessage<Couple> = /*@__PURE__*/
   messageDesc(file_tendon, 17);
 
 /**
- * The leader's handle, pulled back to its centre, says how fast the follower moves.
+ * How the displacement of the leader's handle, which a spring pulls back to its center, commands the speed of the
+ * follower. All values are in the leader's scale.
  *
  * @generated from message tendon.v1.RateControl
  */
 export type RateControl = Message<"tendon.v1.RateControl"> & {
   /**
-   * [0, 1e12]: the follower stands while the leader is nearer than this to its centre
+   * [0, 1e12]: distance of the leader from its center within which the follower stands still
    *
    * @generated from field: double dead_zone_m = 1;
    */
   deadZoneM: number;
 
   /**
-   * (0, 1e12]: speed of the follower, in the leader's scale, for each metre beyond that
+   * (0, 1e12]: speed of the follower per meter beyond the dead zone
    *
    * @generated from field: double gain_per_s = 2;
    */
   gainPerS: number;
 
   /**
-   * (0, 1e12]: of the follower, in the leader's scale
+   * (0, 1e12]: maximum speed of the follower
    *
    * @generated from field: double max_speed_mps = 3;
    */
@@ -1250,8 +1293,8 @@ export const RateControlSchema: GenMessage<RateControl> = /*@__PURE__*/
   messageDesc(file_tendon, 18);
 
 /**
- * The operator's act: couples the handles, at the leader's server. Only from a controller of the device. CODE_OK: the
- * device's loop has the order. CODE_UNSUPPORTED: that device has no coupling, or is the follower.
+ * Couples the handles, on the operator's command. Only the leader's server accepts it, from a controller of the device.
+ * CODE_OK: the device's loop has the order. CODE_UNSUPPORTED: that device has no coupling, or is the follower.
  *
  * @generated from message tendon.v1.Engage
  */
@@ -1272,7 +1315,7 @@ export const EngageSchema: GenMessage<Engage> = /*@__PURE__*/
   messageDesc(file_tendon, 19);
 
 /**
- * Ends that, at either end. Only from a controller of the device.
+ * Ends the engagement. Either end's server accepts it, only from a controller of the device.
  *
  * @generated from message tendon.v1.Disengage
  */
@@ -1293,9 +1336,9 @@ export const DisengageSchema: GenMessage<Disengage> = /*@__PURE__*/
   messageDesc(file_tendon, 20);
 
 /**
- * The scales of the coupling from now on, at the leader's server. Only from a controller of the device, while the
- * leader is not engaged or holds its clutch: else CODE_BUSY. CODE_OK: the device's loop has the order.
- * CODE_UNSUPPORTED: that device has no coupling, or is the follower.
+ * Sets the scales of the coupling. Only the leader's server accepts it, from a controller of the device. CODE_OK: the
+ * device's loop has the order. CODE_BUSY: the leader is engaged and does not hold its clutch. CODE_UNSUPPORTED: that
+ * device has no coupling, or is the follower.
  *
  * @generated from message tendon.v1.SetScale
  */
@@ -1308,14 +1351,14 @@ export type SetScale = Message<"tendon.v1.SetScale"> & {
   device: number;
 
   /**
-   * [0.01, 100]: follower over leader
+   * [0.01, 100]: as in Couple
    *
    * @generated from field: double position_scale = 2;
    */
   positionScale: number;
 
   /**
-   * [0.01, 100]: leader over follower
+   * [0.01, 100]: as in Couple
    *
    * @generated from field: double force_scale = 3;
    */
@@ -1330,9 +1373,9 @@ export const SetScaleSchema: GenMessage<SetScale> = /*@__PURE__*/
   messageDesc(file_tendon, 21);
 
 /**
- * How much the leader of that channel counts among the leaders of a follower, at the follower's server. It gets there
- * within 0.5 s, and the others share what is left as they did. Only from a controller of the device. CODE_UNSUPPORTED:
- * that device has no coupling, or one leader only, or is a leader.
+ * Sets the weight of one channel's leader among the leaders of a follower. Only the follower's server accepts it, from
+ * a controller of the device. The weight reaches the value within 0.5 s; the other leaders share the rest in the same
+ * proportion as before. CODE_UNSUPPORTED: that device has no coupling, has one leader only, or is a leader.
  *
  * @generated from message tendon.v1.SetShare
  */
@@ -1367,10 +1410,10 @@ export const SetShareSchema: GenMessage<SetShare> = /*@__PURE__*/
   messageDesc(file_tendon, 22);
 
 /**
- * Sets a lamp of the device, or makes it vibrate: from a controller of the device that holds one of its channels. To a
- * server that granted the feature "outputs". An output is off again when the client that set it gives a channel of the
- * device up or loses it, and when the device is disarmed. CODE_INVALID: the device has no such output, or not of that
- * kind.
+ * Sets a lamp of the device or starts a vibration pulse; only from a controller of the device that holds one of its
+ * channels, with the feature "outputs". An output is switched off when the client that set it gives up or loses a
+ * channel of the device, and when the device is disarmed. CODE_INVALID: the device has no such output, or it is of the
+ * other kind, or neither `rgb` nor `vibration` is there.
  *
  * @generated from message tendon.v1.SetOutput
  */
@@ -1383,20 +1426,20 @@ export type SetOutput = Message<"tendon.v1.SetOutput"> & {
   device: number;
 
   /**
-   * [0, 7]: number in HandleDescription.outputs
+   * [0, 7]: number in HandleDescription.outputs; answered CODE_INVALID beyond the device's last
    *
    * @generated from field: uint32 output = 2;
    */
   output: number;
 
   /**
-   * one of them, or it is refused
+   * exactly one is required
    *
    * @generated from oneof tendon.v1.SetOutput.setting
    */
   setting: {
     /**
-     * [0, 16777215]: of a lamp, 0xRRGGBB; 0 = off: it shows what the device itself shows
+     * [0, 16777215]: color of a lamp, 0xRRGGBB; 0 is off: the lamp then shows the state of the device
      *
      * @generated from field: fixed32 rgb = 3;
      */
@@ -1419,20 +1462,20 @@ export const SetOutputSchema: GenMessage<SetOutput> = /*@__PURE__*/
   messageDesc(file_tendon, 23);
 
 /**
- * A pulse. It ends by itself; another one takes its place at once.
+ * A vibration pulse. It stops after its duration, or when a new pulse replaces it.
  *
  * @generated from message tendon.v1.Vibration
  */
 export type Vibration = Message<"tendon.v1.Vibration"> & {
   /**
-   * [0, 1]: of the strongest that the output can; 0 = off
+   * [0, 1]: fraction of the output's maximum; 0 is off
    *
    * @generated from field: double amplitude = 1;
    */
   amplitude: number;
 
   /**
-   * [0, 1000]: at least 20, or 0: the output's own
+   * [0, 1000]: Hz, 0 or at least 20; 0 is the output's own frequency
    *
    * @generated from field: double frequency_hz = 2;
    */
@@ -1454,20 +1497,20 @@ export const VibrationSchema: GenMessage<Vibration> = /*@__PURE__*/
   messageDesc(file_tendon, 24);
 
 /**
- * What a device is and can do: answered with a DeviceDescription. Of any device that the server has, claimed or not.
+ * Requests the DeviceDescription of a device, whether the client has claimed the device or not.
  *
  * @generated from message tendon.v1.Describe
  */
 export type Describe = Message<"tendon.v1.Describe"> & {
   /**
-   * [0, 15]
+   * [0, 15]: answered CODE_INVALID beyond the server's last device
    *
    * @generated from field: uint32 device = 1;
    */
   device: number;
 
   /**
-   * answered with a HandleDescription instead
+   * with the feature "handle" only: requests the HandleDescription instead
    *
    * @generated from field: bool handle = 2;
    */
@@ -1482,8 +1525,9 @@ export const DescribeSchema: GenMessage<Describe> = /*@__PURE__*/
   messageDesc(file_tendon, 25);
 
 /**
- * I want to be the one whose forces this channel takes. From whoever has claimed it as a controller. CODE_OK: you are,
- * from now on. CODE_BUSY: another one is; wait_ms says for how much longer its lease lasts unless renewed.
+ * Asks that the channel take the client's forces; only from a client that has claimed the channel as a controller.
+ * CODE_OK: the client holds the lease. CODE_BUSY: another client does, and wait_ms is the time until that lease ends
+ * unless it is renewed.
  *
  * @generated from message tendon.v1.TakeLease
  */
@@ -1511,7 +1555,7 @@ export const TakeLeaseSchema: GenMessage<TakeLease> = /*@__PURE__*/
   messageDesc(file_tendon, 26);
 
 /**
- * I do not want to be it any more.
+ * Releases the lease of a channel.
  *
  * @generated from message tendon.v1.GiveLease
  */
@@ -1539,7 +1583,7 @@ export const GiveLeaseSchema: GenMessage<GiveLease> = /*@__PURE__*/
   messageDesc(file_tendon, 27);
 
 /**
- * You are not it any more. Only to a client that named the feature "channels".
+ * Tells a client with the feature "channels" that the channel now takes the forces of another client.
  *
  * @generated from message tendon.v1.LeaseLost
  */
@@ -1559,7 +1603,7 @@ export type LeaseLost = Message<"tendon.v1.LeaseLost"> & {
   channel: number;
 
   /**
-   * [0, 64] bytes: name of the one that is
+   * [0, 64] bytes: name of the new lease holder
    *
    * @generated from field: string to = 3;
    */
@@ -1580,7 +1624,7 @@ export const LeaseLostSchema: GenMessage<LeaseLost> = /*@__PURE__*/
  */
 export type ControlAck = Message<"tendon.v1.ControlAck"> & {
   /**
-   * [1, …]: of the Control that is answered
+   * [1, …]: id of the answered Control
    *
    * @generated from field: uint32 id = 1;
    */
@@ -1592,14 +1636,16 @@ export type ControlAck = Message<"tendon.v1.ControlAck"> & {
   code: Code;
 
   /**
-   * [0, 128] bytes
+   * [0, 128] bytes: explanation for people
    *
    * @generated from field: string detail = 3;
    */
   detail: string;
 
   /**
-   * [0, 3600000]: with CODE_BUSY of TakeLease: ms; 0 = nobody knows
+   * with CODE_BUSY of TakeLease: time until the lease ends, unless its holder renews it; 0 if it is not known
+   *
+   * [0, 3600000]
    *
    * @generated from field: uint32 wait_ms = 4;
    */
@@ -1613,7 +1659,7 @@ export type ControlAck = Message<"tendon.v1.ControlAck"> & {
   device?: DeviceDescription | undefined;
 
   /**
-   * with CODE_OK of Describe that asks for the handle
+   * with CODE_OK of Describe, if it requested the handle
    *
    * @generated from field: tendon.v1.HandleDescription handle = 6;
    */
@@ -1628,7 +1674,7 @@ export const ControlAckSchema: GenMessage<ControlAck> = /*@__PURE__*/
   messageDesc(file_tendon, 29);
 
 /**
- * What a device is and can do.
+ * The properties of a device.
  *
  * @generated from message tendon.v1.DeviceDescription
  */
@@ -1641,68 +1687,70 @@ export type DeviceDescription = Message<"tendon.v1.DeviceDescription"> & {
   device: number;
 
   /**
-   * [0, 24] bytes: as the server calls it
+   * [0, 24] bytes: the server's name for the device, which a claim uses
    *
    * @generated from field: string name = 2;
    */
   name: string;
 
   /**
-   * [0, 64] bytes: what it is
+   * [0, 64] bytes: the kind of device, as Welcome.device_name
    *
    * @generated from field: string model = 3;
    */
   model: string;
 
   /**
-   * [1, 6]: axes that are measured …
+   * [1, 6]: number of measured axes
    *
    * @generated from field: uint32 position_dof = 4;
    */
   positionDof: number;
 
   /**
-   * [1, 6]: … and those with a motor
+   * [1, 6]: number of axes with a motor
    *
    * @generated from field: uint32 force_dof = 5;
    */
   forceDof: number;
 
   /**
-   * a box that the handle stays in; both absent: not known
+   * corner of the box that the handle stays in, min ≤ max; both absent: not known
    *
    * @generated from field: tendon.v1.Vec3 workspace_min_m = 6;
    */
   workspaceMinM?: Vec3 | undefined;
 
   /**
+   * the opposite corner; both or neither, or it is refused
+   *
    * @generated from field: tendon.v1.Vec3 workspace_max_m = 7;
    */
   workspaceMaxM?: Vec3 | undefined;
 
   /**
-   * [0, 1e12]: norm of the force the device can give out
+   * [0, 1e12]: norm of the peak force; 0 if it is not known
    *
    * @generated from field: double max_force_n = 8;
    */
   maxForceN: number;
 
   /**
-   * [0, 1e12]: … for ever; 0 = not known
+   * [0, 1e12]: norm of the force for any length of time; 0 if it is not known
    *
    * @generated from field: double continuous_force_n = 9;
    */
   continuousForceN: number;
 
   /**
-   * [0, 1e12]: what it can render stably; 0 = not known
+   * [0, 1e12]: largest stiffness that the device renders stably; 0 if it is not known
    *
    * @generated from field: double max_stiffness_npm = 10;
    */
   maxStiffnessNpm: number;
 
   /**
-   * [0, 1e12]: one encoder count at the handle; 0 = exact
+   * [0, 1e12]: one encoder count at the handle; 0 if the position is exact
    *
    * @generated from field: double position_resolution_m = 11;
    */
@@ -1716,7 +1764,7 @@ export type DeviceDescription = Message<"tendon.v1.DeviceDescription"> & {
   loopHz: number;
 
   /**
-   * [1, 8] entries: by number
+   * [1, 8] entries: channels of the device, by number
    *
    * @generated from field: repeated tendon.v1.ChannelDescription channels = 13;
    */
@@ -1731,7 +1779,7 @@ export const DeviceDescriptionSchema: GenMessage<DeviceDescription> = /*@__PURE_
   messageDesc(file_tendon, 30);
 
 /**
- * What the handle of a device is and can do. To a client of a server that granted the feature "handle".
+ * The properties of a device's handle, with the feature "handle" only.
  *
  * @generated from message tendon.v1.HandleDescription
  */
@@ -1744,49 +1792,54 @@ export type HandleDescription = Message<"tendon.v1.HandleDescription"> & {
   device: number;
 
   /**
-   * Turns the base frame into the operator's: x right, y up, z to the user; absent: not known
+   * rotation from the device base frame to the operator's frame: x to the right, y up, z towards the user; absent: not
+   * known
    *
    * @generated from field: tendon.v1.Quat operator_from_device = 2;
    */
   operatorFromDevice?: Quat | undefined;
 
   /**
-   * [0, 16] entries of [0, 24] bytes: names by bit of DeviceState.buttons
+   * names by bit of DeviceState.buttons; a name may be empty
+   *
+   * [0, 16] entries of [0, 24] bytes
    *
    * @generated from field: repeated string buttons = 3;
    */
   buttons: string[];
 
   /**
-   * else no state has an orientation
+   * true if every state has an orientation, false if none has
    *
    * @generated from field: bool orientation_measured = 4;
    */
   orientationMeasured: boolean;
 
   /**
-   * [0, 1e12]: norm of the torque the device can give out; 0 = none
+   * [0, 1e12]: norm of the torque that the device can exert; 0 if it has no such motors
    *
    * @generated from field: double max_torque_nm = 5;
    */
   maxTorqueNm: number;
 
   /**
-   * [0, 1e12]: the opening of the open gripper; absent: no gripper
+   * [0, 1e12]: opening of the open gripper; absent: no gripper
    *
    * @generated from field: optional double gripper_open_rad = 6;
    */
   gripperOpenRad?: number | undefined;
 
   /**
-   * [0, 1e12]: on the fingers; 0 = it has no motor
+   * [0, 1e12]: force on the fingers; 0 if the gripper has no motor
    *
    * @generated from field: double max_gripper_force_n = 7;
    */
   maxGripperForceN: number;
 
   /**
-   * [0, 24] bytes: devices of one body (two arms, five fingers) have the same; empty: by itself
+   * name that the devices of one body share (two arms, five fingers); empty if the device is by itself
+   *
+   * [0, 24] bytes
    *
    * @generated from field: string group = 8;
    */
@@ -1798,7 +1851,8 @@ export type HandleDescription = Message<"tendon.v1.HandleDescription"> & {
   hand: Hand;
 
   /**
-   * Only to a client that named the feature "joints": names of the joints, in the order of DeviceState.joint_rad
+   * With the feature "joints" only:
+   * names of the joints, in the order of DeviceState.joint_rad
    *
    * [0, 8] entries of [0, 24] bytes
    *
@@ -1807,9 +1861,9 @@ export type HandleDescription = Message<"tendon.v1.HandleDescription"> & {
   joints: string[];
 
   /**
-   * Only to a client that named the feature "outputs": what SetOutput can set, by number
+   * With the feature "outputs" only:
    *
-   * [0, 8] entries
+   * [0, 8] entries: outputs that SetOutput can set, by number
    *
    * @generated from field: repeated tendon.v1.OutputDescription outputs = 11;
    */
@@ -1824,7 +1878,7 @@ export const HandleDescriptionSchema: GenMessage<HandleDescription> = /*@__PURE_
   messageDesc(file_tendon, 31);
 
 /**
- * An output of a device, beside its forces.
+ * An output of a device, in addition to its forces.
  *
  * @generated from message tendon.v1.OutputDescription
  */
@@ -1850,11 +1904,13 @@ export const OutputDescriptionSchema: GenMessage<OutputDescription> = /*@__PURE_
   messageDesc(file_tendon, 32);
 
 /**
+ * A channel of a device and its lease.
+ *
  * @generated from message tendon.v1.ChannelDescription
  */
 export type ChannelDescription = Message<"tendon.v1.ChannelDescription"> & {
   /**
-   * [0, 24] bytes
+   * [0, 24] bytes: the name that a claim uses
    *
    * @generated from field: string name = 1;
    */
@@ -1866,7 +1922,7 @@ export type ChannelDescription = Message<"tendon.v1.ChannelDescription"> & {
   rule: ChannelRule;
 
   /**
-   * A holder that sends no force for so long may be followed by another; 0 = it stays until it leaves. ≤ 3 600 000
+   * time without a force after which another client may take the lease; 0 if the lease does not expire
    *
    * [0, 3600000]
    *
@@ -1875,7 +1931,7 @@ export type ChannelDescription = Message<"tendon.v1.ChannelDescription"> & {
   leaseMs: number;
 
   /**
-   * [0, 24] bytes: name of the client whose forces it takes, its first 24 bytes; empty = nobody's
+   * [0, 24] bytes: first 24 bytes of the lease holder's name; empty if there is none
    *
    * @generated from field: string holder = 4;
    */
@@ -1890,16 +1946,20 @@ export const ChannelDescriptionSchema: GenMessage<ChannelDescription> = /*@__PUR
   messageDesc(file_tendon, 33);
 
 /**
+ * The end of the session.
+ *
  * @generated from message tendon.v1.Bye
  */
 export type Bye = Message<"tendon.v1.Bye"> & {
   /**
+   * reason for the end
+   *
    * @generated from field: tendon.v1.Code code = 1;
    */
   code: Code;
 
   /**
-   * [0, 128] bytes
+   * [0, 128] bytes: explanation for people
    *
    * @generated from field: string reason = 2;
    */
@@ -1914,8 +1974,8 @@ export const ByeSchema: GenMessage<Bye> = /*@__PURE__*/
   messageDesc(file_tendon, 34);
 
 /**
- * What became of a client's forces and datagrams, as the server saw it: why a force was late, and what the network
- * did. Times of one way hold as far as the clocks are known, ± clock_error_ns: they may be below zero.
+ * Statistics of a client's forces and datagrams: why forces were late, and how the network performed. One-way delays
+ * depend on the estimated clock offset: they are accurate to ± clock_error_ns and can be negative.
  *
  * @generated from message tendon.v1.LinkReport
  */
@@ -1928,44 +1988,44 @@ export type LinkReport = Message<"tendon.v1.LinkReport"> & {
   number: bigint;
 
   /**
-   * [-2^60, 2^60]: end of the time it tells of
+   * [-2^60, 2^60]: end of the reported interval, server clock
    *
    * @generated from field: sfixed64 until_ns = 2;
    */
   untilNs: bigint;
 
   /**
-   * [0, 2^60]: … and its length
+   * [0, 2^60]: length of the interval
    *
    * @generated from field: uint64 span_ns = 3;
    */
   spanNs: bigint;
 
   /**
-   * In that time:
+   * In the interval:
    *
-   * that came
+   * forces that arrived
    *
    * @generated from field: uint64 forces = 4;
    */
   forces: bigint;
 
   /**
-   * late ones, because the server sent a state late
+   * forces that were late because the server sent a state late
    *
    * @generated from field: uint64 late_server = 5;
    */
   lateServer: bigint;
 
   /**
-   * … because of the way there and back
+   * forces that were late because of the network, in either direction
    *
    * @generated from field: uint64 late_network = 6;
    */
   lateNetwork: bigint;
 
   /**
-   * … because the engine took longer than usual
+   * forces that were late because the engine took longer than usual
    *
    * @generated from field: uint64 late_engine = 7;
    */
@@ -1979,45 +2039,51 @@ export type LinkReport = Message<"tendon.v1.LinkReport"> & {
   worstLateNs: bigint;
 
   /**
-   * [0, 2^60]: longest time that nothing was heard of the client
+   * [0, 2^60]: longest time without a datagram from the client
    *
    * @generated from field: uint64 longest_gap_ns = 9;
    */
   longestGapNs: bigint;
 
   /**
-   * absent: not measured; the same for the next two
+   * absent: not measured
    *
    * @generated from field: tendon.v1.Delays round_trip = 10;
    */
   roundTrip?: Delays | undefined;
 
   /**
+   * one way; absent: not measured
+   *
    * @generated from field: tendon.v1.Delays to_server = 11;
    */
   toServer?: Delays | undefined;
 
   /**
+   * one way; absent: not measured
+   *
    * @generated from field: tendon.v1.Delays to_client = 12;
    */
   toClient?: Delays | undefined;
 
   /**
-   * [-2^60, 2^60]: the client's clock less the server's
+   * Clocks:
+   *
+   * [-2^60, 2^60]: the client's clock minus the server's
    *
    * @generated from field: sint64 clock_offset_ns = 13;
    */
   clockOffsetNs: bigint;
 
   /**
-   * [-1e12, 1e12]: how fast that grows
+   * [-1e12, 1e12]: rate at which the offset grows
    *
    * @generated from field: double clock_drift_ppm = 14;
    */
   clockDriftPpm: number;
 
   /**
-   * [0, 2^60]: |true offset − clock_offset_ns| is at most this
+   * [0, 2^60]: upper bound of |true offset − clock_offset_ns|
    *
    * @generated from field: uint64 clock_error_ns = 15;
    */
@@ -2046,23 +2112,23 @@ export type LinkReport = Message<"tendon.v1.LinkReport"> & {
   duplicated: bigint;
 
   /**
-   * [0, 128] bytes: why forces were late or refused, for people; empty when none was
+   * In the interval:
+   *
+   * [0, 128] bytes: explanation of late and refused forces, for people; empty if there are none
    *
    * @generated from field: string words = 20;
    */
   words: string;
 
   /**
-   * In the time that it tells of:
-   *
-   * late forces whose cause is not known yet: nothing is heard of the client
+   * forces that are late for an unknown reason, because nothing is received from the client
    *
    * @generated from field: uint64 late_unknown = 21;
    */
   lateUnknown: bigint;
 
   /**
-   * Forces of the client, on all its channels, that could not be used:
+   * Forces of the client, on all its channels, that could not be used in the interval:
    *
    * a number is NaN or infinite
    *
@@ -2078,14 +2144,14 @@ export type LinkReport = Message<"tendon.v1.LinkReport"> & {
   refusedOutOfBounds: bigint;
 
   /**
-   * based_on_tick never was, or was more than 4096 ticks ago
+   * no step had the number based_on_tick, or it was more than 4096 ticks ago
    *
    * @generated from field: uint64 refused_unknown_tick = 24;
    */
   refusedUnknownTick: bigint;
 
   /**
-   * sequence has not grown, though the datagram is the newest
+   * sequence has not grown, although the datagram is the newest
    *
    * @generated from field: uint64 refused_old_sequence = 25;
    */
@@ -2100,7 +2166,7 @@ export const LinkReportSchema: GenMessage<LinkReport> = /*@__PURE__*/
   messageDesc(file_tendon, 35);
 
 /**
- * Two quantiles of a delay. They can be below zero if two clocks had to be compared.
+ * Two quantiles of a delay. A one-way delay can be negative, because it compares two clocks.
  *
  * @generated from message tendon.v1.Delays
  */
@@ -2128,63 +2194,63 @@ export const DelaysSchema: GenMessage<Delays> = /*@__PURE__*/
   messageDesc(file_tendon, 36);
 
 /**
- * One end of a coupling of two devices, told to the other. Vectors are in the base frame and the scale of the SENDER's
- * device. How it is used core/teleoperation/coupling.h says.
+ * The state of one end of a coupling, sent to the other end. Vectors are in the base frame and the scale of the
+ * SENDER's device. core/teleoperation/coupling.h describes their use.
  *
  * @generated from message tendon.v1.PortState
  */
 export type PortState = Message<"tendon.v1.PortState"> & {
   /**
-   * [0, 15]: of the server of the session, whichever way this goes
+   * [0, 15]: device of the session's server, in both directions
    *
    * @generated from field: uint32 device = 1;
    */
   device: number;
 
   /**
-   * [0, 7]
+   * [0, 7]: channel of the session's server, in both directions
    *
    * @generated from field: uint32 channel = 2;
    */
   channel: number;
 
   /**
-   * [1, …]: of the sender; above every one before when it starts anew
+   * [1, …]: epoch of the sender, which increases when the sender restarts
    *
    * @generated from field: uint64 epoch = 3;
    */
   epoch: bigint;
 
   /**
-   * [1, …]: 1, 2, 3 … within an epoch: its haptic steps
+   * [1, …]: 1, 2, 3 … within an epoch: the sender's haptic steps
    *
    * @generated from field: uint64 sequence = 4;
    */
   sequence: bigint;
 
   /**
-   * the receiver's epoch that the next one, given_j and taken_j belong to; 0: none yet
+   * epoch of the receiver that `answers`, given_j and taken_j belong to; 0: none yet
    *
    * @generated from field: uint64 answers_epoch = 5;
    */
   answersEpoch: bigint;
 
   /**
-   * sequence of the receiver's newest state in use; 0: none yet
+   * sequence of the receiver's newest PortState in use; 0: none yet
    *
    * @generated from field: uint64 answers = 6;
    */
   answers: bigint;
 
   /**
-   * [-2^60, 2^60]: of the sender's clock; only differences are used
+   * [-2^60, 2^60]: time on the sender's clock; only differences are used
    *
    * @generated from field: sfixed64 time_ns = 7;
    */
   timeNs: bigint;
 
   /**
-   * [0, 10000000000]: that the sender has measured; 0: not yet
+   * [0, 10000000000]: round trip measured by the sender; 0 before the first measurement
    *
    * @generated from field: uint64 round_trip_ns = 8;
    */
@@ -2196,7 +2262,7 @@ export type PortState = Message<"tendon.v1.PortState"> & {
   phase: PortPhase;
 
   /**
-   * number of the leader's act that the phase belongs to; 0: none yet
+   * number of the leader's engagement that the phase belongs to: 1, 2, 3 …; 0: none yet
    *
    * @generated from field: uint64 engagement = 10;
    */
@@ -2210,79 +2276,78 @@ export type PortState = Message<"tendon.v1.PortState"> & {
   buttons: number;
 
   /**
-   * from the sender's offset
+   * displacement of the handle from the sender's offset
    *
    * @generated from field: tendon.v1.Vec3 position_m = 12;
    */
   positionM?: Vec3 | undefined;
 
   /**
-   * zero while the position is frozen
+   * velocity of that displacement; zero while the displacement is frozen
    *
    * @generated from field: tendon.v1.Vec3 velocity_mps = 13;
    */
   velocityMps?: Vec3 | undefined;
 
   /**
-   * on whoever holds its handle, really applied
+   * actual force on the hand at the sender's handle
    *
    * @generated from field: tendon.v1.Vec3 force_n = 14;
    */
   forceN?: Vec3 | undefined;
 
   /**
-   * of the surroundings on its tool; absent: not measured
+   * force of the environment on the sender's tool; absent: not measured
    *
    * @generated from field: tendon.v1.Vec3 contact_force_n = 15;
    */
   contactForceN?: Vec3 | undefined;
 
   /**
-   * [-1e3, 1e3]: its account after giving
+   * [-1e3, 1e3]: energy that the sender may still give out, after its payments
    *
    * @generated from field: double account_j = 16;
    */
   accountJ: number;
 
   /**
-   * [0, 1e3]: what it needs for the force that it wants; 0: it has no purse
+   * [0, 1e3]: energy that the sender needs for its desired force; 0: it has no purse
    *
    * @generated from field: double need_j = 17;
    */
   needJ: number;
 
   /**
-   * [0, 1e6]: total given to the receiver; never falls within two epochs
+   * [0, 1e6]: total paid to the receiver; it never decreases while both epochs last
    *
    * @generated from field: double given_j = 18;
    */
   givenJ: number;
 
   /**
-   * [0, 1e6]: the receiver's total that was heard of, in the receiver's joules
+   * [0, 1e6]: the receiver's given_j, as last received, in joules of the receiver
    *
    * @generated from field: double taken_j = 19;
    */
   takenJ: number;
 
   /**
-   * COUPLING_METHOD_WAVES: sums since the epoch began, so that no loss is permanent. Absent: nothing sent yet.
-   *
-   * √W·s: ∫ wave dt; half the square of a wave is a power
+   * COUPLING_METHOD_WAVES: √W·s, ∫ wave dt since the epoch began: a total, so a lost frame has no lasting effect; half
+   * the square of a wave is a power. Absent: nothing sent yet
    *
    * @generated from field: tendon.v1.Vec3 wave_integral = 20;
    */
   waveIntegral?: Vec3 | undefined;
 
   /**
-   * [0, 1e6]: ∫ ‖wave‖²/2 dt; never falls within an epoch
+   * [0, 1e6]: ∫ ‖wave‖²/2 dt; it never decreases within an epoch
    *
    * @generated from field: double wave_energy_j = 21;
    */
   waveEnergyJ: number;
 
   /**
-   * COUPLING_METHOD_SURFACE, of a follower; absent: it has touched nothing yet
+   * COUPLING_METHOD_SURFACE, from the follower; absent: no surface was touched yet
    *
    * @generated from field: tendon.v1.PortSurface surface = 22;
    */
@@ -2303,21 +2368,25 @@ export type PortState = Message<"tendon.v1.PortState"> & {
   grip?: PortGrip | undefined;
 
   /**
-   * [0, 1e6]: COUPLING_METHOD_PASSIVITY: total that its port took in, in this epoch
+   * COUPLING_METHOD_PASSIVITY: energy that the sender's port took in during this epoch
+   *
+   * [0, 1e6]
    *
    * @generated from field: double energy_in_j = 25;
    */
   energyInJ: number;
 
   /**
-   * [0, 1]: of a follower: how much this leader counts; absent: it is the only one
+   * weight of the receiver among the leaders of a follower; absent: the receiver is the only leader
+   *
+   * [0, 1]
    *
    * @generated from field: optional double share = 26;
    */
   share?: number | undefined;
 
   /**
-   * Of a leader, in use from this state on. 0: as in Couple. An observer has seen no Couple, and is told them.
+   * From a leader, in use from this frame on; 0: as in Couple. An observer is always sent the values:
    *
    * [0.01, 100] or 0
    *
@@ -2333,7 +2402,9 @@ export type PortState = Message<"tendon.v1.PortState"> & {
   forceScale: number;
 
   /**
-   * to an observer: of the other end of the device's coupling, as it came to the server
+   * To an observer:
+   *
+   * true if this is the other end of the device's coupling, as the server received it
    *
    * @generated from field: bool of_peer = 29;
    */
@@ -2348,25 +2419,27 @@ export const PortStateSchema: GenMessage<PortState> = /*@__PURE__*/
   messageDesc(file_tendon, 37);
 
 /**
- * How a handle has turned since its offset was taken.
+ * The rotation of a handle since its offset was taken.
  *
  * @generated from message tendon.v1.PortTurn
  */
 export type PortTurn = Message<"tendon.v1.PortTurn"> & {
   /**
-   * in the axes of the sender's base frame; of length 1 ± 0.001
+   * rotation in the axes of the sender's base frame
    *
    * @generated from field: tendon.v1.Quat turn = 1;
    */
   turn?: Quat | undefined;
 
   /**
+   * angular velocity; zero while the rotation is frozen
+   *
    * @generated from field: tendon.v1.Vec3 angular_velocity_radps = 2;
    */
   angularVelocityRadps?: Vec3 | undefined;
 
   /**
-   * on whoever holds the handle, really applied
+   * actual torque on the hand at the sender's handle
    *
    * @generated from field: tendon.v1.Vec3 torque_nm = 3;
    */
@@ -2381,7 +2454,7 @@ export const PortTurnSchema: GenMessage<PortTurn> = /*@__PURE__*/
   messageDesc(file_tendon, 38);
 
 /**
- * A gripper, measured at its fingers. It is a port of its own, with an account of its own.
+ * State of a gripper, measured at its fingers. The gripper has its own energy account.
  *
  * @generated from message tendon.v1.PortGrip
  */
@@ -2401,35 +2474,35 @@ export type PortGrip = Message<"tendon.v1.PortGrip"> & {
   velocityMps: number;
 
   /**
-   * [-1e12, 1e12]: on the fingers, > 0 opens them; really applied
+   * [-1e12, 1e12]: actual force on the fingers, > 0 opens them
    *
    * @generated from field: double force_n = 3;
    */
   forceN: number;
 
   /**
-   * [-1e3, 1e3]: these four as in PortState
+   * [-1e3, 1e3]: as in PortState
    *
    * @generated from field: double account_j = 4;
    */
   accountJ: number;
 
   /**
-   * [0, 1e3]
+   * [0, 1e3]: as in PortState
    *
    * @generated from field: double need_j = 5;
    */
   needJ: number;
 
   /**
-   * [0, 1e6]
+   * [0, 1e6]: as in PortState
    *
    * @generated from field: double given_j = 6;
    */
   givenJ: number;
 
   /**
-   * [0, 1e6]
+   * [0, 1e6]: as in PortState
    *
    * @generated from field: double taken_j = 7;
    */
@@ -2444,27 +2517,27 @@ export const PortGripSchema: GenMessage<PortGrip> = /*@__PURE__*/
   messageDesc(file_tendon, 39);
 
 /**
- * A flat, springy surface that the sender's tool touches, or touched last. It only pushes.
+ * A flat elastic surface that the sender's tool touches, or was the last to touch. It pushes and does not pull.
  *
  * @generated from message tendon.v1.PortSurface
  */
 export type PortSurface = Message<"tendon.v1.PortSurface"> & {
   /**
-   * out of the surface; of length 1 ± 0.001
+   * direction out of the surface
    *
    * @generated from field: tendon.v1.Vec3 normal = 1;
    */
   normal?: Vec3 | undefined;
 
   /**
-   * [-1e12, 1e12]: the surface is where normal · position_m is this
+   * [-1e12, 1e12]: the surface is where normal · position_m = offset_m
    *
    * @generated from field: double offset_m = 2;
    */
   offsetM: number;
 
   /**
-   * [0, 1e12]: 0: there is none any more
+   * [0, 1e12]: stiffness; 0 if the surface is gone
    *
    * @generated from field: double stiffness_npm = 3;
    */
@@ -2479,27 +2552,27 @@ export const PortSurfaceSchema: GenMessage<PortSurface> = /*@__PURE__*/
   messageDesc(file_tendon, 40);
 
 /**
- * How a device's loop does. Numbers of things are of the time that the report tells of.
+ * Performance of a device's loop. All counts are for the reported interval.
  *
  * @generated from message tendon.v1.DeviceReport
  */
 export type DeviceReport = Message<"tendon.v1.DeviceReport"> & {
   /**
-   * [1, …]: 1, 2, 3 … of the device
+   * [1, …]: 1, 2, 3 … per device
    *
    * @generated from field: uint64 number = 1;
    */
   number: bigint;
 
   /**
-   * [-2^60, 2^60]: end of the time it tells of
+   * [-2^60, 2^60]: end of the reported interval, server clock
    *
    * @generated from field: sfixed64 until_ns = 2;
    */
   untilNs: bigint;
 
   /**
-   * [0, 2^60]: … and its length
+   * [0, 2^60]: length of the interval
    *
    * @generated from field: uint64 span_ns = 3;
    */
@@ -2520,30 +2593,30 @@ export type DeviceReport = Message<"tendon.v1.DeviceReport"> & {
   steps: bigint;
 
   /**
-   * periods without a step, because the one before came so late
+   * periods without a step, because the previous step was late
    *
    * @generated from field: uint64 missed = 6;
    */
   missed: bigint;
 
   /**
-   * steps so long after the one before that it is a reason (REASON overrun)
+   * steps that began too long after the previous one (reason overrun)
    *
    * @generated from field: uint64 overruns = 7;
    */
   overruns: bigint;
 
   /**
-   * steps in which the device gave no position
+   * steps in which the device reported no position
    *
    * @generated from field: uint64 unseen = 8;
    */
   unseen: bigint;
 
   /**
-   * How late the loop woke: entry 0 counts steps at most 1 µs after they were due, entry i later than 2^(i−1) µs and at
-   * most 2^i µs, entry 23 all that were later than 2^22 µs. Zeros at the end are left out; together at most `steps`,
-   * and fewer only where the server lost count of some.
+   * how late the loop woke: entry 0 counts the steps that were at most 1 µs late, entry i those more than 2^(i−1) µs
+   * and at most 2^i µs late, entry 23 all those more than 2^22 µs late. Trailing zeros are omitted. The sum is less
+   * than `steps` only if the server failed to count some
    *
    * [0, 24] entries
    *
@@ -2557,14 +2630,18 @@ export type DeviceReport = Message<"tendon.v1.DeviceReport"> & {
   safety: Safety;
 
   /**
-   * [0, 128] bytes: why it gives no force until it is armed or rearmed, for people; empty: no fault
+   * why the device exerts no force until it is armed or rearmed, for people; empty if there is no fault
+   *
+   * [0, 128] bytes
    *
    * @generated from field: string fault = 11;
    */
   fault: string;
 
   /**
-   * [0, 128] bytes: what the server does less of at present, for people; empty: nothing
+   * service that the server reduces at present, for people; empty if there is none
+   *
+   * [0, 128] bytes
    *
    * @generated from field: string degraded = 12;
    */
@@ -2579,7 +2656,7 @@ export const DeviceReportSchema: GenMessage<DeviceReport> = /*@__PURE__*/
   messageDesc(file_tendon, 41);
 
 /**
- * How the engine does whose forces a channel takes.
+ * Performance of the engine that holds the lease of a channel.
  *
  * @generated from message tendon.v1.PeerReport
  */
@@ -2599,44 +2676,46 @@ export type PeerReport = Message<"tendon.v1.PeerReport"> & {
   channel: number;
 
   /**
-   * [0, 64] bytes: of the engine
+   * [0, 64] bytes: name of the engine, as in its Hello
    *
    * @generated from field: string name = 3;
    */
   name: string;
 
   /**
-   * [1, 1000]: of the states that it wants, it is sent one in so many: its way is full
+   * the engine is sent one in this many of its requested states, because its link is full
+   *
+   * [1, 1000]
    *
    * @generated from field: uint32 state_one_in = 4;
    */
   stateOneIn: number;
 
   /**
-   * its forces are not taken: its way loses too much
+   * the server ignores its forces, because its link loses too many datagrams
    *
    * @generated from field: bool forces_refused = 5;
    */
   forcesRefused: boolean;
 
   /**
-   * number: 1, 2, 3 … of the channel; the forces are the channel's; absent is refused
+   * report on the engine's link; number and the counts of forces are per channel; absent is refused
    *
    * @generated from field: tendon.v1.LinkReport link = 6;
    */
   link?: LinkReport | undefined;
 
   /**
-   * Of the force of that time that is least sure, by its ForceCommand.error_n; the newest where none says an error:
+   * Of the force in the interval with the largest ForceCommand.error_n; if none states an error, of the newest:
    *
-   * [0, 1e12]: absent: none says it
+   * [0, 1e12]: estimated error of that force; absent: no force states an error
    *
    * @generated from field: optional double error_n = 7;
    */
   errorN?: number | undefined;
 
   /**
-   * [0, 24] bytes: of Hello.ways, the one by which it was answered; empty: not said
+   * [0, 24] bytes: entry of Hello.ways for that force; empty if it is not stated
    *
    * @generated from field: string way = 8;
    */
@@ -2651,51 +2730,61 @@ export const PeerReportSchema: GenMessage<PeerReport> = /*@__PURE__*/
   messageDesc(file_tendon, 42);
 
 /**
- * The first words of a client.
+ * The first message of a client.
  *
  * @generated from message tendon.v1.Hello
  */
 export type Hello = Message<"tendon.v1.Hello"> & {
   /**
-   * [1, …]: 1 ≤ version_min ≤ version_max; the highest common version is used
+   * [1, …]: lowest version that the client speaks; the highest common version is used
    *
    * @generated from field: uint32 version_min = 1;
    */
   versionMin: number;
 
   /**
+   * highest version that the client speaks
+   *
    * @generated from field: uint32 version_max = 2;
    */
   versionMax: number;
 
   /**
+   * with claims, the highest role among them
+   *
    * @generated from field: tendon.v1.Role role = 3;
    */
   role: Role;
 
   /**
-   * [0, 64] bytes: for logs
+   * [0, 64] bytes: name for logs
    *
    * @generated from field: string name = 4;
    */
   name: string;
 
   /**
-   * [0, 16] entries of [0, 32] bytes: offered; the intersection is used
+   * offered features; a feature is used if both peers name it
+   *
+   * [0, 16] entries of [0, 32] bytes
    *
    * @generated from field: repeated string features = 5;
    */
   features: string[];
 
   /**
-   * [0, 16] entries: what is wanted, each once. None: device 0, its channel 0, and `role`
+   * claimed devices and channels, each once. Without claims, the client is granted device 0 and its channel 0 with
+   * `role`
+   *
+   * [0, 16] entries
    *
    * @generated from field: repeated tendon.v1.Claim claims = 6;
    */
   claims: Claim[];
 
   /**
-   * With the feature "ways": how this engine may answer, from the fastest on. ForceCommand.way is the place in it
+   * With the feature "ways" only:
+   * names of the ways in which this engine computes forces, the fastest first; ForceCommand.way is an index in it
    *
    * [0, 8] entries of [0, 24] bytes
    *
@@ -2712,20 +2801,20 @@ export const HelloSchema: GenMessage<Hello> = /*@__PURE__*/
   messageDesc(file_tendon, 43);
 
 /**
- * What a client wants. With claims, `role` of the Hello is the highest among them.
+ * A device or a channel that the client wants.
  *
  * @generated from message tendon.v1.Claim
  */
 export type Claim = Message<"tendon.v1.Claim"> & {
   /**
-   * [0, 24] bytes: its name; empty: device 0
+   * [0, 24] bytes: name of the device; empty: device 0
    *
    * @generated from field: string device = 1;
    */
   device: string;
 
   /**
-   * [0, 24] bytes: of a controller: its name; empty: channel 0
+   * [0, 24] bytes: name of the channel, from a controller; empty: channel 0
    *
    * @generated from field: string channel = 2;
    */
@@ -2745,6 +2834,8 @@ export const ClaimSchema: GenMessage<Claim> = /*@__PURE__*/
   messageDesc(file_tendon, 44);
 
 /**
+ * The server's answer to a Hello.
+ *
  * @generated from message tendon.v1.Answer
  */
 export type Answer = Message<"tendon.v1.Answer"> & {
@@ -2774,46 +2865,48 @@ export const AnswerSchema: GenMessage<Answer> = /*@__PURE__*/
   messageDesc(file_tendon, 45);
 
 /**
- * The server's yes.
+ * The server accepts the client.
  *
  * @generated from message tendon.v1.Welcome
  */
 export type Welcome = Message<"tendon.v1.Welcome"> & {
   /**
-   * [1, …]: within the range of the Hello
+   * [1, …]: version of the session, within the client's range
    *
    * @generated from field: uint32 version = 1;
    */
   version: number;
 
   /**
-   * [0, 16] entries of [0, 32] bytes: those both ends know
+   * [0, 16] entries of [0, 32] bytes: features that both peers named
    *
    * @generated from field: repeated string features = 2;
    */
   features: string[];
 
   /**
+   * granted role
+   *
    * @generated from field: tendon.v1.Role role = 3;
    */
   role: Role;
 
   /**
-   * [0, 64] bytes
+   * [0, 64] bytes: the kind of device
    *
    * @generated from field: string device_name = 4;
    */
   deviceName: string;
 
   /**
-   * [0, 1e12]: norm of the force the device can give out
+   * [0, 1e12]: norm of the force that the device can exert
    *
    * @generated from field: double max_force_n = 5;
    */
   maxForceN: number;
 
   /**
-   * [0, 1e12]: one encoder count at the handle; 0 = exact
+   * [0, 1e12]: one encoder count at the handle; 0 if the position is exact
    *
    * @generated from field: double position_resolution_m = 6;
    */
@@ -2834,14 +2927,17 @@ export type Welcome = Message<"tendon.v1.Welcome"> & {
   timeoutMs: number;
 
   /**
-   * [0, 64] bytes: name and version
+   * [0, 64] bytes: name and version of the server
    *
    * @generated from field: string server = 9;
    */
   server: string;
 
   /**
-   * [0, 16] entries: one for each Claim, in order; fields 4 … 7 are about the first
+   * one for each claim, in the claims' order; device_name … loop_hz are those of the first grant's device. A server
+   * that does not know claims sends none, and treats the Hello as one without claims
+   *
+   * [0, 16] entries
    *
    * @generated from field: repeated tendon.v1.Grant grants = 10;
    */
@@ -2862,21 +2958,21 @@ export const WelcomeSchema: GenMessage<Welcome> = /*@__PURE__*/
  */
 export type Grant = Message<"tendon.v1.Grant"> & {
   /**
-   * [0, 15]: the numbers that stand for the names of the claim from now on
+   * [0, 15]: number of the device in all later messages
    *
    * @generated from field: uint32 device = 1;
    */
   device: number;
 
   /**
-   * [0, 7]
+   * [0, 7]: number of the channel in all later messages
    *
    * @generated from field: uint32 channel = 2;
    */
   channel: number;
 
   /**
-   * ROLE_OBSERVER for a controller's claim: another one holds the lease, see TakeLease
+   * granted role; ROLE_OBSERVER for a controller's claim if another client holds the lease (TakeLease)
    *
    * @generated from field: tendon.v1.Role role = 3;
    */
@@ -2891,31 +2987,35 @@ export const GrantSchema: GenMessage<Grant> = /*@__PURE__*/
   messageDesc(file_tendon, 47);
 
 /**
- * The server's no.
+ * The server refuses the client.
  *
  * @generated from message tendon.v1.Refused
  */
 export type Refused = Message<"tendon.v1.Refused"> & {
   /**
+   * why
+   *
    * @generated from field: tendon.v1.Code code = 1;
    */
   code: Code;
 
   /**
-   * [0, 128] bytes
+   * [0, 128] bytes: a sentence for people
    *
    * @generated from field: string detail = 2;
    */
   detail: string;
 
   /**
-   * what the server speaks
+   * lowest version that the server speaks
    *
    * @generated from field: uint32 version_min = 3;
    */
   versionMin: number;
 
   /**
+   * highest version that the server speaks
+   *
    * @generated from field: uint32 version_max = 4;
    */
   versionMax: number;
@@ -2942,7 +3042,7 @@ export enum Mode {
   UNSPECIFIED = 0,
 
   /**
-   * no force has come yet, or none since the last safe stop
+   * no force has arrived yet, or none since the last safe stop
    *
    * @generated from enum value: MODE_IDLE = 1;
    */
@@ -2956,21 +3056,21 @@ export enum Mode {
   ACTIVE = 2,
 
   /**
-   * it has outlived its validity and is held a little longer
+   * the force is older than its validity and is still held
    *
    * @generated from enum value: MODE_HOLDING = 3;
    */
   HOLDING = 3,
 
   /**
-   * … and now fades
+   * the old force fades
    *
    * @generated from enum value: MODE_DECAYING = 4;
    */
   DECAYING = 4,
 
   /**
-   * … and is now zero; only a fresh force re-engages
+   * the force has faded to zero; only a fresh force ends this
    *
    * @generated from enum value: MODE_SAFE_STOP = 5;
    */
@@ -3034,49 +3134,49 @@ export enum CouplingMethod {
   UNSPECIFIED = 0,
 
   /**
-   * a spring and a damper at both ends
+   * a spring and a damper between the handles, at both ends
    *
    * @generated from enum value: COUPLING_METHOD_POSITION_POSITION = 1;
    */
   POSITION_POSITION = 1,
 
   /**
-   * the follower's spring; the leader feels the contact that the follower measures
+   * a spring pulls the follower; the leader feels the contact force that the follower measures
    *
    * @generated from enum value: COUPLING_METHOD_POSITION_FORCE = 2;
    */
   POSITION_FORCE = 2,
 
   /**
-   * wave variables, played out
+   * wave variables, through a playout buffer
    *
    * @generated from enum value: COUPLING_METHOD_WAVES = 3;
    */
   WAVES = 3,
 
   /**
-   * the leader feels a model of the surface that the follower found
+   * a spring pulls the follower; the leader feels a model of the surface that the follower found
    *
    * @generated from enum value: COUPLING_METHOD_SURFACE = 4;
    */
   SURFACE = 4,
 
   /**
-   * velocity there and force back, each paid from what the other took in
+   * velocity to the follower and force to the leader, each paid from the energy that the other end took in
    *
    * @generated from enum value: COUPLING_METHOD_PASSIVITY = 5;
    */
   PASSIVITY = 5,
 
   /**
-   * springs to late positions, stretched only as far as the account pays
+   * springs to delayed positions, stretched only as far as the energy account allows
    *
    * @generated from enum value: COUPLING_METHOD_SET_POSITION = 6;
    */
   SET_POSITION = 6,
 
   /**
-   * the position of the leader is the speed of the follower
+   * the position of the leader commands the velocity of the follower
    *
    * @generated from enum value: COUPLING_METHOD_RATE = 7;
    */
@@ -3108,7 +3208,7 @@ export enum OutputKind {
   OUTPUT_LAMP = 1,
 
   /**
-   * not by the motors of the position
+   * a separate vibrator, not the motors of the axes
    *
    * @generated from enum value: OUTPUT_VIBRATION = 2;
    */
@@ -3150,8 +3250,8 @@ export const HandSchema: GenEnum<Hand> = /*@__PURE__*/
   enumDesc(file_tendon, 4);
 
 /**
- * How a device makes one force of its channels': those of the sum, and the first fresh one of those with a priority,
- * in the order of their numbers.
+ * How a device combines the forces of its channels: it adds the forces of all sum channels and the first fresh force of
+ * the priority channels, in the order of their numbers.
  *
  * @generated from enum tendon.v1.ChannelRule
  */
@@ -3171,7 +3271,7 @@ export enum ChannelRule {
   SUM = 1,
 
   /**
-   * it silences the channels of this rule that come after it
+   * it silences the later channels of this rule
    *
    * @generated from enum value: CHANNEL_RULE_PRIORITY = 2;
    */
@@ -3185,7 +3285,7 @@ export const ChannelRuleSchema: GenEnum<ChannelRule> = /*@__PURE__*/
   enumDesc(file_tendon, 5);
 
 /**
- * Where an end of a coupling stands.
+ * Phase of one end of a coupling.
  *
  * @generated from enum tendon.v1.PortPhase
  */
@@ -3198,49 +3298,49 @@ export enum PortPhase {
   UNSPECIFIED = 0,
 
   /**
-   * it has no peer
+   * no peer
    *
    * @generated from enum value: PORT_PHASE_ALONE = 1;
    */
   ALONE = 1,
 
   /**
-   * it hears its peer, and waits for the operator's act; no force
+   * connected to the peer, and waiting for the operator's Engage; no force
    *
    * @generated from enum value: PORT_PHASE_COUPLED = 2;
    */
   COUPLED = 2,
 
   /**
-   * absolute maps: the leader is led to where the follower is
+   * absolute maps: the leader is moved to the position of the follower
    *
    * @generated from enum value: PORT_PHASE_ALIGNING = 3;
    */
   ALIGNING = 3,
 
   /**
-   * the law
+   * the handles are coupled
    *
    * @generated from enum value: PORT_PHASE_ENGAGED = 4;
    */
   ENGAGED = 4,
 
   /**
-   * the leader is free, the follower stays where it is
+   * the leader is free, the follower holds its position
    *
    * @generated from enum value: PORT_PHASE_CLUTCHED = 5;
    */
   CLUTCHED = 5,
 
   /**
-   * it was engaged, and its peer fell silent; engaged again only by another act
+   * the peer fell silent while engaged; only another Engage engages again
    *
    * @generated from enum value: PORT_PHASE_LOST = 6;
    */
   LOST = 6,
 
   /**
-   * its device gives no force
+   * the device exerts no force
    *
    * @generated from enum value: PORT_PHASE_FAULT = 7;
    */
@@ -3254,7 +3354,7 @@ export const PortPhaseSchema: GenEnum<PortPhase> = /*@__PURE__*/
   enumDesc(file_tendon, 6);
 
 /**
- * Where a device stands between the plug and the force.
+ * The state of a device between being plugged in and exerting forces.
  *
  * @generated from enum tendon.v1.Safety
  */
@@ -3281,42 +3381,42 @@ export enum Safety {
   OPENING = 2,
 
   /**
-   * has, or is being given, no firmware yet
+   * has no firmware yet, or is receiving it
    *
    * @generated from enum value: SAFETY_FIRMWARE = 3;
    */
   FIRMWARE = 3,
 
   /**
-   * does not know where it is yet
+   * does not know its position yet
    *
    * @generated from enum value: SAFETY_UNHOMED = 4;
    */
   UNHOMED = 4,
 
   /**
-   * ready, and waiting to be armed
+   * ready, and waits to be armed
    *
    * @generated from enum value: SAFETY_HOMED = 5;
    */
   HOMED = 5,
 
   /**
-   * gives forces
+   * exerts forces
    *
    * @generated from enum value: SAFETY_ARMED = 6;
    */
   ARMED = 6,
 
   /**
-   * was armed, and something happened: no force until it is armed again
+   * disarmed by a fault: no force until it is armed again
    *
    * @generated from enum value: SAFETY_FAULT = 7;
    */
   FAULT = 7,
 
   /**
-   * ready; its scene lists no safety layer, so that there is nothing to arm
+   * ready; its scene has no safety layer that could be armed
    *
    * @generated from enum value: SAFETY_UNGUARDED = 8;
    */
@@ -3330,7 +3430,7 @@ export const SafetySchema: GenEnum<Safety> = /*@__PURE__*/
   enumDesc(file_tendon, 7);
 
 /**
- * The reason for a refusal or an end.
+ * Why a request was refused, or why a session ended.
  *
  * @generated from enum tendon.v1.Code
  */
@@ -3348,21 +3448,21 @@ export enum Code {
   OK = 1,
 
   /**
-   * the value makes no sense
+   * a value is out of bounds or makes no sense
    *
    * @generated from enum value: CODE_INVALID = 2;
    */
   INVALID = 2,
 
   /**
-   * this peer does not know that request or version
+   * this peer does not know the request, or has no version in common
    *
    * @generated from enum value: CODE_UNSUPPORTED = 3;
    */
   UNSUPPORTED = 3,
 
   /**
-   * somebody else has it: a second controller
+   * another client has it, such as another controller
    *
    * @generated from enum value: CODE_BUSY = 4;
    */
@@ -3376,28 +3476,28 @@ export enum Code {
   DENIED = 5,
 
   /**
-   * the server is going down
+   * the server is shutting down
    *
    * @generated from enum value: CODE_SHUTDOWN = 6;
    */
   SHUTDOWN = 6,
 
   /**
-   * nothing was heard for too long
+   * nothing was received for too long
    *
    * @generated from enum value: CODE_TIMED_OUT = 7;
    */
   TIMED_OUT = 7,
 
   /**
-   * a session of suite 1 has reached its age: shake hands again
+   * the session of suite 1 or 2 is too old: repeat the handshake
    *
    * @generated from enum value: CODE_EXPIRED = 8;
    */
   EXPIRED = 8,
 
   /**
-   * another program with the same key has taken this place: do not come back unasked
+   * another program with the same key has taken over: do not reconnect without being asked to
    *
    * @generated from enum value: CODE_REPLACED = 9;
    */
@@ -3411,6 +3511,8 @@ export const CodeSchema: GenEnum<Code> = /*@__PURE__*/
   enumDesc(file_tendon, 8);
 
 /**
+ * An observer receives states; a controller also sends forces.
+ *
  * @generated from enum tendon.v1.Role
  */
 export enum Role {
@@ -3422,14 +3524,14 @@ export enum Role {
   UNSPECIFIED = 0,
 
   /**
-   * sees device states
+   * receives device states
    *
    * @generated from enum value: ROLE_OBSERVER = 1;
    */
   OBSERVER = 1,
 
   /**
-   * … and sends forces; one per channel
+   * also sends forces; one per channel
    *
    * @generated from enum value: ROLE_CONTROLLER = 2;
    */
