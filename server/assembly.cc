@@ -16,11 +16,11 @@ namespace tendon {
 
 namespace {
 
-/// The time that one thread has for each of its devices in a period. The dearest step that we ship takes half of it
-/// (`tendond explain deploy/scenes/mechanism.toml`: 9.8 µs).
+/// The time budget for one step of a device. The most expensive scene that is shipped uses half of it (`tendond explain
+/// deploy/scenes/mechanism.toml`: 9.8 µs).
 constexpr auto kStepBudget = std::chrono::microseconds(20);
 
-/// How many devices of that period one thread takes: whole banks, so that the states of a session leave together.
+/// Returns the number of devices per thread. These are whole banks, so that all states of a session are sent together.
 std::size_t devices_of_a_thread(Duration period) {
   const auto fit = static_cast<std::size_t>(period / kStepBudget);
   return fit < limits::kMaxDevices ? fit : fit - fit % limits::kMaxDevices;
@@ -113,7 +113,7 @@ Assembly::DeviceLoop::DeviceLoop(const Part& part, const Mailboxes::Capacities& 
       haptic(scene.loop, safe != nullptr ? *safe : device, mail, part.heart) {}
 
 LocalTime Assembly::HapticGroup::turn(LocalTime now) noexcept {
-  // With one instant for all, and one period, all are due together again: one wake-up, however late.
+  // All devices get the same `now` and have the same period, so they stay due at the same time.
   LocalTime due = now;
   for (DeviceLoop* const device : devices) due = device->haptic.step(now);
   return due;
@@ -133,7 +133,7 @@ void Assembly::HapticGroup::stand_still() noexcept {
 Assembly::Assembly(std::vector<Part> parts, const Config& config, const std::vector<Link*>& links) {
   add_devices(parts, config, links.size());
   add_networks(parts, config, links);
-  open_log(config);  // if an earlier step fails, there is no file yet
+  open_log(config);  // last, so that no file is created if something else fails
 }
 
 void Assembly::add_devices(std::vector<Part>& parts, const Config& config, std::size_t networks) {
@@ -147,9 +147,10 @@ void Assembly::add_devices(std::vector<Part>& parts, const Config& config, std::
                                        : records      ? Mailboxes::Capacities::recorded(parts.size())
                                                       : Mailboxes::Capacities::unrecorded(loop.period);
     shard.number = shard.owner_of(devices_.size(), parts.size());
-    if (devices_.size() != shard.first_device(parts.size())) capacities.datagrams = 1;  // all go to its first
+    // The datagrams of a shard are only stored in the mailboxes of the first device.
+    if (devices_.size() != shard.first_device(parts.size())) capacities.datagrams = 1;
     if (!config.watched) {
-      // A power of two.
+      // Ring sizes must be powers of two.
       const std::size_t couplings = std::max<std::size_t>(loop.control.leaders.size(), 1);
       capacities.ports = part.scene.teleoperation ? std::bit_ceil(couplings) * capacities.ports : 1;
     }
@@ -206,8 +207,9 @@ std::size_t Assembly::first_device(std::size_t network) const noexcept {
   return shard.first_device(devices_.size());
 }
 
-/// Only the first network loop receives Hellos (UdpLink::several). The owner takes one in its next turn, which a haptic
-/// step begins. One that finds no room is lost: its client says it again.
+/// Only the first network loop receives Hellos (UdpLink::several). The other loops process theirs in the next turn,
+/// which happens after the next haptic step at the latest. If the queue is full, the Hello is dropped, and the client
+/// repeats it.
 LocalTime Assembly::turn_network(std::size_t number, LocalTime now) {
   Network& network = networks_.at(number);
   while (const HandedHello* const hello = network.hellos.front()) {

@@ -22,12 +22,11 @@
 
 namespace tendon {
 
-/// Returns the rate of the scene's haptic loop in Hz.
 std::uint32_t loop_hz(const Scene& scene);
 
 /// Creates and connects the loops of a server: a HapticLoop for each device, one or more NetworkLoops, and a LogLoop.
-/// This class does not use threads, sockets or clocks. `Server` calls the loops from its threads, and simulated worlds
-/// and tests call them in virtual time.
+/// It uses no threads, sockets or clocks: `Server` calls the loops from its threads, and simulated worlds and tests
+/// call them in virtual time.
 ///
 /// Thread-safe: each haptic group, each network loop and the log loop can be used in a separate thread (THREADS.md).
 /// Realtime-safe: only HapticGroup.

@@ -6,11 +6,12 @@
 
 namespace tendon {
 
-/// What this program was built from; recordings and tables carry it. A new commit compiles one file anew, and links.
-extern const std::string_view kVersion;  ///< of CMakeLists.txt's project(): 0.1.0
-extern const std::string_view kCommit;   ///< twelve digits, or "unknown" where there was no git
+/// Version and commit of this build, stored in recordings and tables. They are defined in a separate file so that a new
+/// commit recompiles only that file.
+extern const std::string_view kVersion;  ///< project() version in CMakeLists.txt, e.g. 0.1.0
+extern const std::string_view kCommit;   ///< 12 hex digits, or "unknown" if built without git
 
-/// The answer to --version: "0.1.0 (f0e3f7af2b1c)".
+/// The output of --version, e.g. "0.1.0 (f0e3f7af2b1c)".
 inline std::string version_text() { return std::string(kVersion) + " (" + std::string(kCommit) + ")"; }
 
 }  // namespace tendon

@@ -19,10 +19,10 @@
 namespace tendon {
 namespace {
 
-/// Above the haptic thread, which waits for it.
+/// This must be higher than the priority of the haptic thread, which waits for the USB thread.
 constexpr int kUsbPriority = kHapticPriority + 5;
 
-/// Tells the guardian which device to guard when a device opens, and to forget it when the device closes.
+/// Returns a callback that notifies the guardian if the device has been opened or closed.
 std::function<void(int)> tell_guardian(Guardian& guardian, const Scene& scene, const Driver& driver) {
   static_assert(limits::kMaxDevices <= Guardian::kDevices);
   const ZeroPacket zero = ZeroPacket::usb(driver.out, std::as_bytes(std::span(driver.zero_packet)));
@@ -41,7 +41,7 @@ std::unique_ptr<usb::Pipe> open_pipe(const Scene& scene, const Driver& driver, c
                        .transfers = driver.transfers};
   pipe.on_start = [device = scene.loop.device] {
     name_thread("usb-" + std::to_string(device));
-    enter_realtime(kUsbPriority);  // the haptic thread says what is refused
+    enter_realtime(kUsbPriority);  // the haptic thread reports refusals
   };
   pipe.tell = [name = scene.name](const std::string& why) { log::warn(name + ": " + why); };
   if (driver.moves_a_hand) pipe.opened = tell_guardian(*guardian, scene, driver);
@@ -53,7 +53,7 @@ std::unique_ptr<usb::Pipe> open_pipe(const Scene& scene, const Driver& driver, c
 std::unique_ptr<Guardian> make_guardian(const std::vector<Scene>& scenes) {
   const auto on_start = [] {
     name_thread("guardian-parent");
-    enter_realtime(kHapticPriority);  // the haptic thread says what is refused
+    enter_realtime(kHapticPriority);  // the haptic thread reports refusals
   };
   const bool any = std::ranges::any_of(scenes, [](const Scene& scene) { return scene.driver().moves_a_hand; });
   return any ? std::make_unique<Guardian>(on_start) : nullptr;

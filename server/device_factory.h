@@ -10,12 +10,13 @@
 
 namespace tendon {
 
-/// The process that ends the force of the real devices when this one dies; null when no scene has a device with motors.
+/// Creates the guardian process, which sets the forces of real devices to zero if this process dies. Returns null if no
+/// scene has a device with motors.
 std::unique_ptr<Guardian> make_guardian(const std::vector<Scene>& scenes);
 
-/// The device of `scene`. One with a plug is opened by a thread of its own as soon as it is there, and `guardian` is
-/// told of it when it has motors. Throws std::runtime_error, a sentence for the operator, when a file that the scene
-/// names cannot be read, or this machine has no USB.
+/// Creates the device of `scene`. A USB device is opened by its own thread as soon as it is plugged in, and is
+/// registered with `guardian` if it has motors. Throws std::runtime_error with a message for the operator if a file
+/// that the scene names cannot be read or if this machine has no USB.
 std::unique_ptr<Device> make_device(const Scene& scene, Guardian* guardian);
 
 }  // namespace tendon

@@ -29,12 +29,11 @@ void put_handle(DeviceState& state, const StepRecord& record, const DeviceInfo& 
   if (const Joints* const joints = record.joints()) state.joints = *joints;
 }
 
-/// Writes every field of `state`.
 void put_state(DeviceState& state, std::uint32_t device, const StepRecord& record) noexcept {
   state.device = device;
   state.channel = record.channel;
   state.tick = record.tick;
-  state.sampled = PeerTime(record.hand.at.time_since_epoch());  // our clock is the client's peer's
+  state.sampled = PeerTime(record.hand.at.time_since_epoch());  // our clock is the peer clock of the client
   state.position = record.hand.position;
   state.velocity = record.hand.velocity;
   state.force_applied = record.applied;
@@ -50,7 +49,6 @@ void put_state(DeviceState& state, std::uint32_t device, const StepRecord& recor
   state.hand_force = record.hand_force;
 }
 
-/// Returns null if the device has no such coupling.
 Coupling* coupling_of(HapticController& controller, std::uint32_t number) noexcept {
   Couplings* const couplings = controller.couplings();
   return couplings != nullptr && number < couplings->size() ? &(*couplings)[number] : nullptr;
@@ -129,8 +127,8 @@ void HapticLoop::take_mail(LocalTime now) noexcept {
     if (const RemoteForce* force = mail_.forces[channel].take()) controller_.observe(*force, channel);
   }
   if (Couplings* const couplings = controller_.couplings()) take_ports(*couplings, now);
-  // The last force of a source that has gone may still lie in its box, and must not count as fresh. Releasing twice
-  // does no harm, because the number of a source is never used again.
+  // The last force of a released source may still have been in its mailbox and must not count as fresh. Releasing twice
+  // is harmless because source numbers are never reused.
   for (std::size_t i = 0; i < releases; ++i) controller_.release(now, released[i].source, released[i].channel);
 }
 
@@ -253,14 +251,14 @@ LocalTime HapticLoop::step(LocalTime now) noexcept {
 void HapticLoop::watch_device() noexcept {
   homed_once_ = homed_once_ || device_.state() == Device::State::kHomed;
   const std::uint32_t times_armed = device_.times_armed();
-  // A device that has never been homed is not silent: it is not ready.
+  // If the device has not been homed yet, it cannot provide positions. This is not a fault.
   if (!homed_once_ || times_armed != times_armed_) rearm();
   times_armed_ = times_armed;
 }
 
 void HapticLoop::rearm() noexcept {
   controller_.rearm();
-  if (disarmed_) controller_.disarm();  // the device disarmed it, not the operator
+  if (disarmed_) controller_.disarm();  // an automatic rearm must not override the operator's disarm
   rearmed_ = true;
 }
 
@@ -283,7 +281,6 @@ void HapticLoop::publish(const StepRecord& record) noexcept {
   }
 }
 
-/// The contact that a follower feels is what its force sensor measures of whatever moves its handle.
 void HapticLoop::publish_ports(const StepRecord& record) noexcept {
   Couplings& couplings = *controller_.couplings();
   const auto& leaders = config_.control.leaders;

@@ -15,61 +15,61 @@
 
 namespace tendon {
 
-/// One half of the world: reads the device, runs the control law, applies the force.
+/// Reads the device, runs the control law, and applies the force.
 ///
-/// One thread calls `step` when it is due, and does nothing else but wait and read the clock.
+/// The function `step` must be called by a single thread, which should only sleep and read the clock between calls.
 ///
-/// Thread-safe: `stats` and `health` from any thread; the rest from the haptic thread only.
-/// Realtime-safe: yes. No heap, no lock, no log, no socket (see tests/realtime).
+/// Thread-safe: `stats` and `health` can be called from any thread, everything else only from the haptic thread.
+/// Realtime-safe: yes. No heap allocation, lock, log output or socket (see tests/realtime).
 class HapticLoop {
  public:
   struct Config {
-    std::uint32_t device = 0;  ///< its number
+    std::uint32_t device = 0;
     Duration period = std::chrono::milliseconds(1);
     HapticController::Config control;
-    bool record = true;  ///< false: no step goes to the log thread
+    bool record = true;  ///< if false, steps are not passed to the log thread
   };
 
   struct Stats {
     std::uint64_t steps = 0;
-    std::uint64_t overruns = 0;  ///< intervals longer than the bound assumed
-    std::uint64_t unseen = 0;    ///< steps in which the device gave no position
+    std::uint64_t overruns = 0;  ///< intervals above the assumed maximum
+    std::uint64_t unseen = 0;    ///< steps without a position
     Duration longest_interval{};
     HapticController::Fault fault = HapticController::Fault::kNone;
     Device::State device = Device::State::kHomed;
-    double force = 0;  ///< N, norm of what the device holds
+    double force = 0;  ///< N, norm of the force that the device applies
   };
 
-  /// `device`, `mail` and `heart` must outlive the loop. Each step beats `heart`, which is null if no guardian watches the
-  /// device. Throws std::invalid_argument if a value is impossible.
+  /// `device`, `mail` and `heart` must outlive the loop. Each step beats `heart`, which is null if no guardian watches
+  /// the device. Throws std::invalid_argument if the configuration is invalid.
   HapticLoop(const Config& config, Device& device, Mailboxes& mail, Heartbeat* heart = nullptr);
 
-  /// One haptic step. Returns when the next one is due: one period after this one was, or, when this one
-  /// was late by a period or more, one period from now: steps that were missed are not made up for.
+  /// Performs one haptic step and returns the time of the next one: the scheduled time of this step plus one period. If
+  /// this step was late by a period or more, the next one is due at `now` + period. This function does not catch up on
+  /// missed steps.
   LocalTime step(LocalTime now) noexcept;
 
-  /// Sets the force to zero. This is called before the haptic thread ends or is suspended.
+  /// Sets the force to zero. Must be called before the haptic thread ends or is suspended.
   void stop() noexcept;
 
   Stats stats() const noexcept;
-  /// What its steps tell of it.
   Health health() const noexcept { return meter_.counted(); }
 
  private:
-  /// What is estimated of a device that tells more than a position.
+  /// The state of the estimators for rotation and gripper.
   struct Rest {
     explicit Rest(const DeviceInfo& info);
     bool turns_or_grips;
     bool has_joints;
     VelocityEstimator turning;
     VelocityEstimatorOf<1> opening;
-    Vec3 turned = Vec3::Zero();  ///< rad: the sum of all turns so far
+    Vec3 turned = Vec3::Zero();  ///< rad, since the first sample
     std::optional<Quat> last{};
   };
 
   void take_mail(LocalTime now) noexcept;
   void take_ports(Couplings& couplings, LocalTime now) noexcept;
-  [[gnu::noinline]] void set_outputs(LocalTime now) noexcept;  // a device without any pays a branch
+  [[gnu::noinline]] void set_outputs(LocalTime now) noexcept;  // not inlined because it is rare
   HandleSample handle_in(const PositionSample& sample) noexcept;
   void take_rest(const PositionSample& sample, const Motion& hand, StepRecord& record) noexcept;
   void take_step(LocalTime now, StepRecord& record) noexcept;
@@ -87,21 +87,21 @@ class HapticLoop {
   Heartbeat* heart_;
   HapticController controller_;
   VelocityEstimator velocity_;
-  double force_rounding_squared_;  ///< N²: what the device rounds away is no clamp
-  std::optional<Rest> rest_;       ///< empty: the device tells a position only
-  bool has_more_motors_;           ///< than those of its position
+  double force_rounding_squared_;  ///< N²; a smaller deviation is rounding, not clamping
+  std::optional<Rest> rest_;       ///< empty if the device only measures its position
+  bool has_more_motors_;           ///< the device has torque or gripper motors
   bool has_outputs_;
-  std::array<std::uint32_t, kMostOutputs> outputs_set_{};             ///< numbers of the settings that the device has
-  std::array<std::uint32_t, Couplings::kMost> peer_numbers_{};        ///< by coupling: of whom states are taken
-  std::array<std::optional<ArrivedPort>, Couplings::kMost> peers_{};  ///< by coupling: what came since the step before
+  std::array<std::uint32_t, kMostOutputs> outputs_set_{};  ///< OutputSettings::One::number of the settings in effect
+  std::array<std::uint32_t, Couplings::kMost> peer_numbers_{};        ///< the number of each current peer; see kRenew
+  std::array<std::optional<ArrivedPort>, Couplings::kMost> peers_{};  ///< received since the previous step
   Effort applied_;
   std::uint64_t tick_ = 0;
   LocalTime due_{};
   bool homed_once_ = false;
   std::uint32_t times_armed_ = 0;
-  bool rearmed_ = false;       ///< since the last record
-  bool disarmed_ = false;      ///< by an order, which only an order ends
-  std::uint32_t buttons_ = 0;  ///< as the device last said
+  bool rearmed_ = false;       ///< since the previous record
+  bool disarmed_ = false;      ///< until the next kRearm
+  std::uint32_t buttons_ = 0;  ///< from the newest sample
   std::uint32_t device_faults_ = 0;
 
   HealthMeter meter_;

@@ -32,7 +32,6 @@ const char* describe(HapticController::Fault fault) {
   return "unknown";
 }
 
-/// Returns the message for a new state of a real device.
 std::string describe(Device::State state, const Scene& scene) {
   switch (state) {
     case Device::State::kAbsent:
@@ -60,7 +59,7 @@ Safety on_the_wire(SafetyState state) noexcept {
   return static_cast<Safety>(static_cast<int>(state) + 1);
 }
 
-/// The increase of a counter since the last call.
+/// Returns the increase of a counter since the last call.
 std::uint64_t news(const std::atomic<std::uint64_t>& counter, std::uint64_t& told) {
   const std::uint64_t now = counter.load(std::memory_order_relaxed);
   return now - std::exchange(told, now);
@@ -143,7 +142,8 @@ void LogLoop::say(Level level, const DeviceLog& device, const std::string& text)
   say(level, devices_.size() == 1 ? text : device.of.scene.name + ": " + text);
 }
 
-/// Returns the number of steps that are missing since the last call. A step whose ports are missing cannot be replayed.
+/// Returns the number of steps lost since the last call. This includes steps with missing ports because they cannot be
+/// replayed.
 std::uint64_t LogLoop::record_steps(std::size_t number) {
   DeviceLog& device = devices_[number];
   Mailboxes& mail = device.of.mail;
@@ -186,7 +186,7 @@ void LogLoop::record_all(LocalTime now) {
   take_notices_of_recorder();
 }
 
-/// Records how much the network loops have left out of the recording since the last call.
+/// Records the number of datagrams that have been dropped since the last call.
 void LogLoop::record_left_out(LocalTime now) {
   if (!recorder_) return;
   std::uint64_t strangers = 0;
@@ -291,7 +291,6 @@ void LogLoop::report_counts(DeviceLog& device) {
   }
 }
 
-/// Reports the phase of this end of a coupling if it has changed.
 void LogLoop::report_phase(DeviceLog& device, const PortRecord& port) {
   const PortPhase phase = port.sent.phase;
   if (std::exchange(device.told.phase[port.channel], phase) == phase) return;

@@ -20,7 +20,7 @@
 
 namespace tendon {
 
-/// The server has three loops: HapticLoop, NetworkLoop and this one. It records the steps, ports and datagrams from the
+/// The third loop of the server, after HapticLoop and NetworkLoop. It records the steps, ports and datagrams from the
 /// mailboxes, passes the health of each device to the network loops (Mailboxes::health), and collects messages for the
 /// log.
 ///
@@ -30,10 +30,10 @@ namespace tendon {
 class LogLoop {
  public:
   static constexpr Duration kPeriod = std::chrono::milliseconds(20);
-  /// Trouble is reported at most this often.
+  /// The minimum time between reports of the same problem.
   static constexpr Duration kTroublePeriod = std::chrono::seconds(1);
 
-  /// A device. Another thread steps its loop. The references must outlive the LogLoop.
+  /// A device and its loop, which runs in another thread. The references must outlive the LogLoop.
   struct Watched {
     const Scene& scene;
     const Device& device;
@@ -44,36 +44,35 @@ class LogLoop {
     std::size_t thread = 0;                 ///< the number of the haptic thread
   };
 
-  /// A message for the log.
   struct Notice {
     enum class Level { kInfo, kWarning, kError };
     Level level = Level::kInfo;
     std::string text;
   };
 
-  /// With kTaken, the loop takes the steps, ports, datagrams and flights from the mailboxes and records them. With kLeft,
-  /// it leaves them in the mailboxes and does not record anything.
+  /// If this is kTaken, the steps, ports, datagrams and flights are removed from the mailboxes and recorded. If this is
+  /// kLeft, they are not removed.
   enum class Records : std::uint8_t { kTaken, kLeft };
 
-  /// The scene of the first device determines whether and where the run is recorded. `recorded` contains the mailboxes
-  /// that the datagrams of each network loop are in. Throws the errors of PartRecorder.
+  /// The recording is configured by the first scene. `recorded` lists the mailboxes with the datagrams of each network
+  /// loop. Throws the errors of PartRecorder.
   LogLoop(const std::vector<Watched>& devices, const std::vector<Mailboxes*>& recorded, LocalTime started,
           Records records = Records::kTaken);
 
-  /// `unsent` is the number of datagrams that the system has refused to send. Returns when the next call is due.
+  /// `unsent` is the number of datagrams that the system has refused to send. Returns the time of the next call.
   LocalTime turn(LocalTime now, std::uint64_t unsent);
 
-  /// Records everything that is left and closes the recording.
+  /// Records the remaining data and closes the recording.
   void close(LocalTime now, std::uint64_t unsent);
 
-  /// Returns the messages since the last call, oldest first.
+  /// Returns the messages since the last call, in order.
   std::vector<Notice> take_notices();
 
-  /// Empty if the scene records nothing.
+  /// Empty if nothing is recorded.
   std::optional<PartRecorder::Status> recording() const;
 
  private:
-  /// The values that were last reported to the operator.
+  /// The last values that were logged.
   struct Told {
     HapticLoop::Stats haptic{};
     SafeDevice::Status safety{};
@@ -118,7 +117,7 @@ class LogLoop {
   std::vector<DeviceLog> devices_;
   std::vector<ThreadLog> threads_;
   std::vector<NetworkLog> networks_;
-  std::unique_ptr<PartRecorder> recorder_;  ///< null: the scene records nothing
+  std::unique_ptr<PartRecorder> recorder_;  ///< null if nothing is recorded
   bool recording_ended_ = false;
   std::vector<Notice> notices_;
 };

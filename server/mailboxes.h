@@ -24,69 +24,70 @@
 
 namespace tendon {
 
-/// An order to the haptic thread.
 struct HapticOrder {
   enum class Kind : std::uint8_t {
-    kRelease,    ///< `source` no longer has `channel`: its force is no longer fresh
-    kRearm,      ///< clear the latched fault, and take kDisarm back
+    kRelease,    ///< `source` no longer holds `channel`
+    kRearm,      ///< clears the latched fault and ends kDisarm
     kDisarm,     ///< no force until kRearm
-    kEngage,     ///< the operator's act of `coupling`
-    kDisengage,  ///< … and its end
-    kSetScale,   ///< of `coupling`: `scales`
-    kRenew,      ///< the other end of `coupling` is another one: `source` is its number
-    kShare,      ///< the leader of `coupling` is to count `share`
+    kEngage,     ///< the operator engages `coupling`
+    kDisengage,  ///< ends the engagement of `coupling`
+    kSetScale,   ///< applies `scales` to `coupling`
+    kRenew,      ///< the peer of `coupling` has been replaced; `source` is the number of the new one
+    kShare,      ///< sets the weight of the leader of `coupling` to `share`
   };
   Kind kind = Kind::kRearm;
   std::uint32_t channel = 0;
   std::uint32_t source = 0;
-  std::array<double, 2> scales{};  ///< of positions and of forces
-  std::uint32_t coupling = 0;      ///< of the device: 0 where it has one
-  double share = 0;                ///< 0 … 1
+  std::array<double, 2> scales{};  ///< position scale, force scale
+  std::uint32_t coupling = 0;      ///< index; 0 if the device has only one
+  double share = 0;                ///< from 0 to 1
 };
 
-/// What the other end of a coupling has told.
+/// A state received from the peer of a coupling.
 struct ArrivedPort {
   PortState state;
-  LocalTime at{};          ///< by which it had come
-  std::uint32_t peer = 0;  ///< the number of that end among all that the coupling has had
+  LocalTime at{};          ///< time of arrival
+  std::uint32_t peer = 0;  ///< consecutive number of the peer, see HapticOrder::kRenew
 };
 
-/// A Hello that the first network thread has received for a device of another one.
+/// A Hello that was received by the first network thread and must be processed by another one.
 struct HandedHello {
   Address from{};
   std::uint32_t size = 0;
   std::array<std::byte, kMaxDatagram> bytes;
 };
 
-/// All that passes between the haptic thread of one device and the other threads of the server. There is nothing else
-/// they share, and no lock.
+/// The data that the haptic thread of one device exchanges with the other threads of the server. There is no other
+/// shared state, and no locks are used.
 ///
-///     network ──forces─▶ haptic      one box for each channel; newest wins: an older force is worth nothing
-///     network ──orders─▶ haptic      all of them, in order
-///     network ─outputs──▶ haptic     lamps and vibration; newest wins: it says all of them
-///     network ──port in─▶ haptic     a box for each coupling: the peer's port; newest wins
-///     haptic  ──state──▶ network     newest wins
-///     haptic  ──port out▶ network    a box for each coupling: this port; newest wins
-///     haptic  ──steps──▶ log         all of them, of a server that records; what does not fit is counted
-///     haptic  ──ports──▶ log         of a coupling: all of them; what does not fit is counted
-///     haptic  ──flight─▶ log         the steps before a fault, frozen by it
-///     log     ──health─▶ network     newest wins: what it counts is since the start
-///     network ──ways───▶ log         the names of the numbers that forces bring, each written before its first force
-///     network ─datagrams▶ log        of all devices, those that DatagramSieve lets through; what it leaves out, and what
-///                                    does not fit, is counted
+///     network ──forces─▶ haptic      one slot per channel; only the newest value is kept
+///     network ──orders─▶ haptic      queue; none is dropped
+///     network ─outputs──▶ haptic     lamps and vibration, complete settings; only the newest value is kept
+///     network ──port in─▶ haptic     one slot per coupling: the peer's port; only the newest value is kept
+///     haptic  ──state──▶ network     only the newest value is kept
+///     haptic  ──port out▶ network    one slot per coupling: our port; only the newest value is kept
+///     haptic  ──steps──▶ log         queue, if the server records; overflow is counted
+///     haptic  ──ports──▶ log         queue, if the device is coupled; overflow is counted
+///     haptic  ──flight─▶ log         the steps before a fault; the haptic thread freezes them at the fault
+///     log     ──health─▶ network     counts since the start; only the newest value is kept
+///     network ──ways───▶ log         names of solver paths; each is written before the first force with its number
+///     network ─datagrams▶ log        queue, for all devices of the network thread, after DatagramSieve; what the sieve
+///                                    leaves out and overflow are counted
 ///
-/// Takes its memory when it is made, before the loops run.
+/// All memory is allocated by the constructor, before the loops run.
 struct Mailboxes {
-  /// In values; powers of two. The default is that of a server which records: some 19 MB.
+  /// Numbers of elements, which must be powers of two. The default values are used if the server records, and require
+  /// about 19 MB.
   struct Capacities {
-    std::size_t steps = 16384;  ///< 16 s at 1 kHz: the log thread may wait that long for a slow disk
-    std::size_t ports = 1;      ///< of a device with a coupling so many for each of its couplings
-    std::size_t flight = 2048;  ///< the last 2 s at 1 kHz
+    std::size_t steps = 16384;  ///< 16 s at 1 kHz, for slow disks
+    std::size_t ports = 1;      ///< for each coupling
+    std::size_t flight = 2048;  ///< 2 s at 1 kHz
     std::size_t datagrams = 4096;
-    bool flight_handles = true;  ///< the device has more than a position
+    bool flight_handles = true;  ///< if false, only positions are stored
 
-    /// Of one of so many devices in a server that records. The steps of more than 16 have no more room than those of 16
-    /// together: 512 steps for each of 512 devices, half a second at 1 kHz.
+    /// The capacities for each device of a server that records. If there are more than 16 devices, the total size of
+    /// the step queues is the same as for 16 devices. For example, 512 devices have queues of 512 steps, which is half
+    /// a second at 1 kHz.
     static Capacities recorded(std::size_t devices) {
       constexpr Capacities kOfFew;
       const std::size_t share =
@@ -94,16 +95,16 @@ struct Mailboxes {
       return {.steps = std::bit_floor(share), .ports = std::bit_floor(share)};
     }
 
-    /// Of a loop with this period in a server that does not record: nobody takes steps, and the log thread, which waits
-    /// for no disk, comes for the ports every 20 ms. A ring of at least 125 ms of these; 0.8 MB in all for a device that
-    /// has a position only.
+    /// The capacities for each device of a server that does not record. The steps are not used. The size of the port
+    /// queue is at least 125 ms because the log thread only reads it every 20 ms. The total size is 0.8 MB if the
+    /// device only measures its position.
     static Capacities unrecorded(Duration period) {
       const auto ports = static_cast<std::size_t>(std::max<Duration::rep>(std::chrono::milliseconds(125) / period, 1));
       return {.steps = 1, .ports = std::bit_ceil(ports), .datagrams = 1};
     }
   };
 
-  /// Orders that can wait: more than guests come and go within a haptic step.
+  /// More orders than clients can cause within one haptic step.
   static constexpr std::size_t kOrders = 16;
 
   explicit Mailboxes(const Capacities& capacities)
@@ -117,7 +118,7 @@ struct Mailboxes {
   SpscRing<HapticOrder> orders{kOrders};
   Latest<DeviceState> state;
   Latest<OutputSettings> outputs;
-  std::array<Latest<ArrivedPort>, Shares::kMost> port_in;  ///< by coupling, as port_out
+  std::array<Latest<ArrivedPort>, Shares::kMost> port_in;  ///< by coupling
   std::array<Latest<PortState>, Shares::kMost> port_out;
   SpscRing<StepRecord> steps;
   std::atomic<std::uint64_t> steps_lost{0};
@@ -125,11 +126,11 @@ struct Mailboxes {
   std::atomic<std::uint64_t> ports_lost{0};
   StepFlight flight;
   Latest<Health> health;
-  Ways ways;  ///< of RemoteForce::way and Step::force_way
+  Ways ways;  ///< names of RemoteForce::way and Step::force_way
   SpscRing<DatagramRecord> datagrams;
-  std::atomic<std::uint64_t> datagrams_lost{0};         ///< did not fit
-  std::atomic<std::uint64_t> strangers_left_out{0};     ///< datagrams from or to strangers beyond the sample
-  std::atomic<std::uint64_t> datagrams_over_budget{0};  ///< beyond the bytes of a second
+  std::atomic<std::uint64_t> datagrams_lost{0};         ///< because the queue was full
+  std::atomic<std::uint64_t> strangers_left_out{0};     ///< of unauthenticated senders, beyond the sample
+  std::atomic<std::uint64_t> datagrams_over_budget{0};  ///< beyond the bytes per second
 };
 
 }  // namespace tendon

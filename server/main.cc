@@ -52,10 +52,10 @@ using namespace tendon;
 
 using Json = nlohmann::ordered_json;
 
-/// The lines of --json on stdout. Thread-safe.
+/// The lines on stdout with --json. Thread-safe.
 class Lines {
  public:
-  /// What was added before follows.
+  /// Writes the first line, then the lines that were added before.
   void begin(const Json& first) {
     const std::scoped_lock lock(mutex_);
     write(first);
@@ -77,8 +77,8 @@ class Lines {
   std::vector<Json> early_;
 };
 
-/// A session's name among those of all servers: 32 hexadecimal digits, as traces have them. `run` is random, of this run
-/// of the server; the last eight digits are the connection id, by which its datagrams are found in a recording.
+/// Returns the globally unique name of a session, with 32 hexadecimal digits like a trace id. `run` is a random id of
+/// this run. The last eight digits are the connection id, as found in recorded datagrams.
 std::string session_name(std::span<const std::byte> run, std::uint32_t connection) {
   std::string name;
   const auto add = [&name](unsigned byte) {
@@ -101,14 +101,13 @@ Json in_json(const NetworkLoop::SessionChange& change, std::span<const std::byte
   return line;
 }
 
-// Exit codes besides 0.
 constexpr int kFailed = 1;
 constexpr int kWrongUsage = 2;
 
-/// A year. Longer is a typo.
+/// One year.
 constexpr double kLongestRun_s = 365.0 * 86400;
 
-/// Includes SIGTSTP, which is sent by Ctrl-Z.
+/// Includes SIGTSTP (Ctrl-Z).
 sigset_t signals_to_wait_for() {
   sigset_t set;
   sigemptyset(&set);
@@ -116,7 +115,7 @@ sigset_t signals_to_wait_for() {
   return set;
 }
 
-/// Sets the forces to zero and then stops the process, unless SIGCONT is already pending.
+/// Sets the forces to zero, then stops the process unless SIGCONT is already pending.
 void stop_this_process(Server& server, UnblockedOutput& output) {
   sigset_t going_on;
   sigemptyset(&going_on);
@@ -133,8 +132,8 @@ void stop_this_process(Server& server, UnblockedOutput& output) {
   log::info("it goes on");
 }
 
-// Waits for a signal to end, or for `duration_s` seconds when it is above zero, and tells a service manager meanwhile
-// that the haptic loops turn. Returns why it ended.
+// Waits for a signal or, if `duration_s` is not zero, for this time. While waiting, it notifies the service manager if
+// the haptic loops are running. Returns the reason for the shutdown.
 std::string wait_for_the_end(const sigset_t& signals, double duration_s, Server& server, UnblockedOutput& output) {
   constexpr Duration kLongestWait = std::chrono::hours(1);
   const std::optional<Duration> watched = service::watch_period();
@@ -152,12 +151,11 @@ std::string wait_for_the_end(const sigset_t& signals, double duration_s, Server&
       continue;
     }
     if (signal > 0) return "signal " + std::to_string(signal);
-    if (errno == EINTR) continue;  // stopped and continued
+    if (errno == EINTR) continue;  // after SIGSTOP and SIGCONT
     if (left && (*left -= wait) <= Duration::zero()) return "its duration is over";
   }
 }
 
-/// The counts of all devices together.
 HapticLoop::Stats total(const std::vector<Server::DeviceSummary>& devices) {
   HapticLoop::Stats sum;
   for (const auto& [name, haptic, safety, counts] : devices) {
@@ -170,7 +168,6 @@ HapticLoop::Stats total(const std::vector<Server::DeviceSummary>& devices) {
   return sum;
 }
 
-/// The counts of each device, with its channels.
 Json by_device(const Server::Summary& summary) {
   Json devices = Json::array();
   for (const auto& [name, haptic, safety, counts] : summary.devices) {
@@ -237,7 +234,6 @@ Json in_json(const Server::Summary& summary) {
   add("replaced", network.replaced);
   add("roamed", network.roamed);
   add("half_open_forgotten", network.half_open_forgotten);
-  // The dropped datagrams, by cause.
   add("malformed", network.malformed + network.hellos.malformed + network.dropped.malformed);
   add("unknown_connection", network.unknown_connection);
   add("retries", network.hellos.retries);
@@ -280,21 +276,22 @@ std::string what_is_missing(const PartRecorder::Status& recording) {
 }
 
 int run(const std::vector<Scene>& scenes, double duration_s, bool json) {
-  // Every thread inherits this mask, so that signals come to sigwait only.
+  // All threads inherit this mask, so that only sigwait receives these signals.
   const sigset_t signals = signals_to_wait_for();
   sigset_t blocked = signals;
   sigaddset(&blocked, SIGCONT);
   pthread_sigmask(SIG_BLOCK, &blocked, nullptr);
-  // If these signals are not ignored, a background process is stopped when it writes to a terminal with `stty tostop`.
+  // If these signals were not ignored, a background process would be stopped when it writes to a terminal with `stty
+  // tostop`.
   std::signal(SIGTTOU, SIG_IGN);
   std::signal(SIGTTIN, SIG_IGN);
-  // A signal that ends a recording or closes a log must not end the device loop.
+  // A full recording or a closed log must not end the process.
   std::signal(SIGXFSZ, SIG_IGN);
   std::signal(SIGPIPE, SIG_IGN);
 
   use_small_stacks();
   UnblockedOutput output;
-  // Before the server, whose threads use them.
+  // This must outlive the server.
   Lines lines;
   std::array<std::byte, 12> name_of_run;
   fill_random(name_of_run);
@@ -367,7 +364,6 @@ int list_devices(const OptionalPath& firmware, bool accept_unknown_firmware, boo
   }
 }
 
-/// Applies the command line's Falcon options to each scene that has a Falcon.
 void set_falcon(std::vector<Scene>& scenes, const OptionalPath& firmware, bool accept_unknown_firmware) {
   bool any = false;
   for (Scene& scene : scenes) {
@@ -380,15 +376,14 @@ void set_falcon(std::vector<Scene>& scenes, const OptionalPath& firmware, bool a
   if (firmware && !any) throw std::invalid_argument("--falcon-firmware: no scene has [device] kind = \"falcon\"");
 }
 
-/// Of the one scene that dials.
 void dial_instead(std::vector<Scene>& scenes, const Address& server) {
   const auto found = std::ranges::find_if(scenes, &Scene::dials);
   if (found == scenes.end()) throw std::invalid_argument("--dial: expected a scene with [teleoperation] dial");
   found->teleoperation->dial = server;
 }
 
-/// As settings of the scene, so that the recording has them too. A coupling goes without what keeps the pair passive and
-/// quiet: no limiter has an account for its purse.
+/// Returns the changes as settings of the scene, so that they are recorded. Couplings also run without their energy
+/// accounts and delay adaptation, because these need a limiter.
 std::vector<std::string> without_limiter_settings(const Scene& scene) {
   if (scene.driver().moves_a_hand) {
     throw std::invalid_argument("--without-limiter: expected simulated devices only, found " + scene.name + ", a " +
@@ -401,13 +396,13 @@ std::vector<std::string> without_limiter_settings(const Scene& scene) {
   return settings;
 }
 
-/// Why a scene file cannot be one: it is no file, and nearly the name of a command.
+/// Returns an error message if the file does not exist and its name resembles a command.
 std::string meant_command(const std::string& file) {
   const std::string meant = did_you_mean(file, "keygen, explain, devices, doctor");
   return meant.empty() || std::filesystem::exists(file) ? "" : "there is no file \"" + file + '"' + meant;
 }
 
-/// The name becomes a file's name and a word in the log.
+/// The name is used as a file name and in the log.
 void check_key_name(const std::string& name) {
   const auto plain = [](unsigned char c) { return std::isalnum(c) != 0 || c == '-' || c == '_'; };
   if (name.empty() || name.size() > limits::kMaxName || !std::all_of(name.begin(), name.end(), plain)) {
@@ -545,7 +540,7 @@ int main(int argc, char** argv) {
       std::cout << (table.empty() ? scene_tables() : table == "all" ? scene_reference() : scene_reference(table));
       return 0;
     }
-    if (!(duration_s >= 0 && duration_s <= kLongestRun_s)) {  // NaN is neither
+    if (!(duration_s >= 0 && duration_s <= kLongestRun_s)) {  // also refuses NaN
       throw CLI::ValidationError("--duration-s", "expected 0 to 31536000 seconds, got " + std::to_string(duration_s));
     }
     if (*keygen) {

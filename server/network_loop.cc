@@ -20,7 +20,7 @@ using enum DatagramSieve::Sender;
 constexpr std::size_t kMaxNotices = 64;
 constexpr std::size_t kMaxForeign = 64;
 
-/// There is only one notice per turn, so that a flood of Hellos cannot crowd out other notices.
+/// Keeps at most one of these notices per turn, so that a flood of Hellos cannot displace other notices.
 void note_unknown_key(std::vector<NetworkLoop::Notice>& notices, const Address& from) {
   const auto is_one = [](const NetworkLoop::Notice& one) { return UnknownKeys::is_notice(one.text); };
   const auto noted = std::ranges::find_if(notices, is_one);
@@ -31,7 +31,7 @@ void note_unknown_key(std::vector<NetworkLoop::Notice>& notices, const Address& 
   }
 }
 
-/// Returns the clock exchange of the current datagram, or null if it contains no echo.
+/// Returns null if the current datagram contains no echo of ours.
 const ClockExchange* exchange_of(LocalTime now, const Guest& guest) {
   const auto& exchange = guest.session.newest_exchange();
   return exchange && exchange->answered_at == now ? &*exchange : nullptr;
@@ -57,18 +57,18 @@ NetworkLoop::NetworkLoop(const Config& config, Link& link, LocalTime now)
     states_.push_back({&devices_[i].mail->state});
     if (const auto& server = config.devices[first_device_ + i].dial) ports_.dial(now, i, *server, out);
   }
-  // The loop does not need these secrets again.
+  // These secrets are not needed again.
   for (ServedDevice::Config& device : config_.devices) device.dial.reset();
   config_.secret = {};
 }
 
 LocalTime NetworkLoop::turn(LocalTime now) {
-  // The newest states leave first: a state waits for no system call.
+  // Send the newest states before making any system call to receive.
   publish(now);
   const bool more = drain(now);
   report(now);
   for (Guest& guest : guests_) {
-    if (guest.session.open() && guest.session.next_tick() > now) continue;  // of many guests few have something to do
+    if (guest.session.open() && guest.session.next_tick() > now) continue;  // usually nothing is due
     if (!guest.gone) guest.session.tick(now);
     take_events(now, guest);
     send_all(now, guest);
@@ -126,7 +126,7 @@ void NetworkLoop::receive(LocalTime now, const Address& from, std::span<const st
     }
     if (newest) hear(now, *guest);
     take_refused(*guest);
-    take_events(now, *guest);  // a force waits for no further system call, and for nothing that is only told later
+    take_events(now, *guest);  // before `measure`, which can wait
     if (newest) measure(now, *guest);
   } else if (const auto waiting = std::find_if(half_open_.begin(), half_open_.end(), is_meant);
              waiting != half_open_.end()) {
@@ -156,17 +156,17 @@ void NetworkLoop::greet(LocalTime now, const Address& from, std::span<const std:
 void NetworkLoop::receive_foreign(LocalTime now, const Address& from, std::span<const std::byte> hello) {
   std::array<std::byte, kMaxDatagram> answer;
   const Doorman::Reply reply = doorman_.receive(now, from, hello, answer);
-  if (reply.guest) admit(now, from, *reply.guest, hello);  // else its cookie is too old by now: it asks again
+  if (reply.guest) admit(now, from, *reply.guest, hello);  // otherwise its cookie has expired
 }
 
-/// With keys configured, a guest without a key is a stranger, unless it needs none.
+/// If keys are configured, a client without a key counts as a stranger, unless it does not need one.
 DatagramSieve::Sender NetworkLoop::sender_of(const Doorman::Guest& guest, const Address& from) const {
   const bool let_in = config_.keys.empty() || (config_.needs_no_key != nullptr && config_.needs_no_key(from));
   return guest.key != nullptr || let_in ? kGuest : kStranger;
 }
 
-/// Sends the same answer again to a guest that asks again because the first one was lost. In suite 1 it may ask from
-/// anywhere: the answer is of use only to the holder of the ephemeral key.
+/// Repeats the answer if the first one was lost. In suite 1 the request may come from any address, because only the
+/// holder of the ephemeral key can use the answer.
 bool NetworkLoop::answer_again(LocalTime now, const Address& from, const Doorman::Guest& guest) {
   for (const auto* list : {&guests_, &half_open_}) {
     for (const Guest& present : *list) {
@@ -188,7 +188,7 @@ void NetworkLoop::refuse(LocalTime now, const Address& from, const Doorman::Gues
   send(now, sender_of(guest, from), from, std::span(answer).first(size));
 }
 
-/// 0 means none, and is never one.
+/// The value 0 is skipped because it is reserved.
 std::uint32_t NetworkLoop::take_connection_id() {
   if (next_connection_id_ == 0) next_connection_id_ = config_.shard.of;
   return std::exchange(next_connection_id_, next_connection_id_ + config_.shard.of);
@@ -252,9 +252,8 @@ void NetworkLoop::admit(LocalTime now, const Address& from, const Doorman::Guest
   half_open_.push_back(std::move(arrived));
 }
 
-/// From here on the guest counts as connected.
 void NetworkLoop::open(LocalTime now, Guest guest) {
-  // Somebody else may have come while it was half-open.
+  // The seats may have been taken by another client in the meantime.
   if (const auto refusal = admission_.reason_to_refuse(guest.address, guest.key, guest.seats, devices_, guests_)) {
     ++stats_.refused;
     notice(true, "refused \"" + guest.name + "\" at " + to_string(guest.address) + ": " + refusal->reason);
@@ -290,7 +289,7 @@ void NetworkLoop::open(LocalTime now, Guest guest) {
     const Guest* const holder = guest_of(guests_, leases_.holder(seat.device, seat.channel));
     if (holder == nullptr) {
       leases_.hold(now, seat.device, seat.channel, arrived);
-    } else if (arrived.has<kFeatureChannels>()) {  // Another guest took the channel in the meantime.
+    } else if (arrived.has<kFeatureChannels>()) {  // another client took the channel in the meantime
       arrived.session.request(LeaseLost{.device = number_of(seat.device), .channel = seat.channel, .to = holder->name});
     }
   }
@@ -301,7 +300,7 @@ bool NetworkLoop::may_take_over(const Guest& guest) const {
   return std::find(config_.takeover.begin(), config_.takeover.end(), name) != config_.takeover.end();
 }
 
-/// Tells the loser of a lease, or ends its session when it cannot be told.
+/// Tells the loser of a lease, or closes its session if that is not possible.
 void NetworkLoop::dispossess(LocalTime now, Guest& loser, const Guest& winner, const TakeLease& lost) {
   const DeviceDescription& about = devices_[lost.device].about;
   notice(false, "\"" + winner.name + "\" takes " + about.name + "/" + about.channels[lost.channel].name + " from \"" +
@@ -309,7 +308,7 @@ void NetworkLoop::dispossess(LocalTime now, Guest& loser, const Guest& winner, c
   loser.uncouple(lost.device, lost.channel);
   const LeaseLost news{.device = number_of(lost.device), .channel = lost.channel, .to = winner.name};
   if (loser.has<kFeatureChannels>() && loser.session.request(news)) return;
-  // The guest does not know the request, or does not answer.
+  // The client does not support LeaseLost, or has too many open requests.
   loser.session.close(Code::kReplaced, "\"" + winner.name + "\" has taken this place");
   send_all(now, loser);
   ++stats_.replaced;
@@ -333,7 +332,7 @@ void NetworkLoop::adapt(LocalTime now, Guest& guest) {
   }
 }
 
-/// What the forces of the newest datagram are judged by.
+/// Passes the timing of the datagram on before the forces in it are judged.
 void NetworkLoop::hear(LocalTime now, Guest& guest) {
   const ClockExchange* const exchange = exchange_of(now, guest);
   const auto sent = exchange != nullptr ? std::optional(exchange->answered) : std::nullopt;
@@ -361,7 +360,7 @@ void NetworkLoop::report(LocalTime now) {
   for (std::string& warning : told.warnings) notice(true, std::move(warning));
 }
 
-/// The states of a guest leave before those of the next one are looked at.
+/// The states are sent before the next client is processed to reduce the latency.
 void NetworkLoop::publish(LocalTime now) {
   ports_.publish(now);
   for (std::size_t place = 0; place < states_.size(); ++place) {
@@ -393,7 +392,7 @@ void NetworkLoop::take_events(LocalTime now, Guest& guest) {
       const std::size_t before = notices_.size();
       leave(guest, closed->reason);
       if (is_polite && notices_.size() > before) notices_.back().warning = false;
-    }  // a server receives no states and no answers
+    }  // a server does not receive states or answers
   }
 }
 
@@ -404,7 +403,7 @@ void NetworkLoop::send_all(LocalTime now, Guest& guest) {
   }
 }
 
-/// What the engine says of how good the force is, and the number of the way by which it was made.
+/// Stores the reported error and solver path of a force. Returns the number of the path.
 std::uint8_t NetworkLoop::note(const ForceCommand& command, const Guest& guest, ServedDevice& device) {
   ServedChannel& channel = device.channels[command.channel];
   const bool named = command.way > 0 && command.way <= guest.ways.size();
@@ -439,7 +438,7 @@ void NetworkLoop::take_force(LocalTime now, Guest& guest, const ForceCommand& co
     return;
   }
   leases_.renew(now, place, command.channel);
-  const double bound = device.about.max_force;  // N; 0: the device has not said it
+  const double bound = device.about.max_force;  // N; 0 if unknown
   if (bound > 0 && command.force.squaredNorm() > bound * bound) channel.lateness.cut();
   const LinkStats& link = guest.session.stats();
   const std::uint64_t lost = link.lost + link.lost_outgoing;
@@ -449,7 +448,7 @@ void NetworkLoop::take_force(LocalTime now, Guest& guest, const ForceCommand& co
                             .round_trip = link.round_trip,
                             .valid_for = command.valid_for,
                             .lost = lost > std::exchange(guest.lost, lost)});
-  RemoteForce& force = device.mail->forces[command.channel].back();  // an older one: each member is written
+  RemoteForce& force = device.mail->forces[command.channel].back();  // contains an old value
   force.sequence = command.sequence;
   force.answers_tick = command.based_on_tick;
   force.answers = answered->at;
@@ -457,7 +456,7 @@ void NetworkLoop::take_force(LocalTime now, Guest& guest, const ForceCommand& co
   force.force = command.force;
   force.model = command.model;
   if (force.model && force.model->contact && force.model->contact->table) {
-    // The haptic loop reads a denormal number as 0, and would not render a table with such a step.
+    // The haptic loop flushes denormal numbers to zero and would refuse a table with such a step.
     double& step = force.model->contact->table->step;
     step = std::max(step, std::numeric_limits<double>::min());
   }
@@ -466,7 +465,7 @@ void NetworkLoop::take_force(LocalTime now, Guest& guest, const ForceCommand& co
   force.topology_changed = command.topology_changed;
   force.error = command.error;
   force.way = note(command, guest, device);
-  // Without the feature a client does not know what the handle is, nor is it told what became of them.
+  // If the client does not support this feature, it does not know the limits of the handle.
   if (!guest.has<kFeatureHandle>() && (command.torque || command.grip_force)) ++stats_.denied;
   force.torque = guest.has<kFeatureHandle>() ? command.torque : std::nullopt;
   force.grip_force = guest.has<kFeatureHandle>() ? command.grip_force : std::nullopt;
@@ -475,8 +474,8 @@ void NetworkLoop::take_force(LocalTime now, Guest& guest, const ForceCommand& co
   ++stats_.forces;
 }
 
-/// Notices the forces that the session has refused. A refused force names no channel, so it counts for every channel
-/// that the guest holds.
+/// Counts the forces that the session has refused. The channel is not known, so the force is counted for all channels
+/// of the guest.
 void NetworkLoop::take_refused(Guest& guest) {
   const RefusedForces& all = guest.session.stats().refused_forces;
   const auto take = [&](std::uint64_t RefusedForces::*count, Lateness::Cause cause) {
@@ -549,7 +548,7 @@ void NetworkLoop::send(LocalTime now, DatagramSieve::Sender partner, const Addre
   tap(now, DatagramRecord::Direction::kOut, partner, to, datagram, datagram.size());
 }
 
-/// Puts the datagram into the recording unless the sieve leaves it out. `partner` is the other end's address.
+/// Adds the datagram to the recording if it is accepted by the sieve. `peer` is the address of the other end.
 void NetworkLoop::tap(LocalTime now, DatagramRecord::Direction direction, DatagramSieve::Sender partner,
                       const Address& peer, std::span<const std::byte> datagram, std::size_t size) {
   if (!config_.record) return;

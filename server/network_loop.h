@@ -27,81 +27,85 @@
 
 namespace tendon {
 
-/// One half of the server: lets guests in, hands their forces to the haptic loops, and the devices' states to the
-/// guests.
+/// Admits clients ("guests"), passes their forces to the haptic loops, and sends them the states of the devices.
 ///
-/// One thread calls `turn` when a datagram has come, when a haptic loop has made a step, or when the time that the last
-/// turn returned has come. That thread does nothing else, except wait and read the clock.
+/// The function `turn` should be called by a single thread if a datagram has arrived, if a haptic loop has made a step,
+/// or if the time returned by the previous call has been reached.
 ///
-/// Each channel takes the forces of one controller; with a lease, several controllers may share it in turn
-/// (SESSION.md). There are up to `max_observers` observers. Those that ask for it (kFeatureDiagnostics) are told once a
-/// second how the devices' loops and the engines do. Each turn drains the link, so that nothing new waits behind
-/// something old. Of forces the newest wins; every request is answered.
+/// Each channel accepts forces from one controller at a time. Controllers can share a channel with a lease
+/// (SESSION.md). Observers only receive states. If they have requested kFeatureDiagnostics, they also receive a report
+/// about the device loops and engines once per second. Each turn drains the link to avoid queueing delays. If there are
+/// several forces for a channel, only the newest one is used. All requests are answered.
 ///
-/// Several loops may share the devices of a large server (Shard), each with a thread and a link of its own. They share
-/// nothing else. One of them gets a Hello; when it is for devices of another one, the owner of both carries it there
-/// (take_foreign, receive_foreign).
+/// The devices of a large server can be split between several loops (Shard). Each loop has its own thread and its own
+/// link, and there is no other shared state. All Hellos are received by one of the loops. If a Hello is intended for
+/// another loop, it must be forwarded by the owner of the loops (take_foreign, receive_foreign).
 ///
-/// Without keys, guests speak in the clear, from this machine only. With keys all is sealed, by `suites`, except through
-/// a Unix socket, where the permission to write to its file is the key. A guest is half-open until its first authentic
-/// Data, and until then nothing changes for anybody else. Its address is the one its newest authentic datagram came
-/// from. A controller that comes again with its key takes its own place.
+/// Without keys, sessions are not encrypted, and only clients on this machine are admitted. With keys, all sessions are
+/// sealed with one of `suites`, except through a Unix socket, where file permissions control access. A session is
+/// half-open until the first authentic Data datagram has been received. It does not affect other clients until then.
+/// The address of a client is updated with each authentic datagram that is newer than all previous ones. If a
+/// controller connects again with the same key, the previous session is replaced.
 ///
-/// The files of guests/ decide: who comes in (admission.h), who holds which channel (leases.h), what a request does
-/// (requests.h), why a force is late (lateness.h), what is told once a second (reports.h). This class moves datagrams,
-/// and lets them act on its guests.
+/// The logic is implemented in separate files in guests/. See admission.h for new sessions, leases.h for the holders of
+/// channels, requests.h for the requests of clients, lateness.h for the causes of late forces, and reports.h for
+/// periodic reports. This class is only responsible for the datagrams.
 ///
 /// Thread-safe: no. Realtime-safe: no.
 class NetworkLoop {
  public:
   struct Config {
-    Bytes32 secret{};               ///< of cookies and ephemeral keys; random at start; of all shards the same
-    std::vector<ClientKey> keys{};  ///< who may come in; empty: anybody on this machine, in the clear
-    Suites suites = suites_of_this_machine();  ///< by which the sessions of those may be sealed
-    /// Whether the system has made sure who speaks from an address (UnixSocket::is_peer): a guest there needs no key.
-    /// Null: none.
+    Bytes32 secret{};  ///< for cookies and ephemeral keys; random at each start, equal for all shards
+    /// If this is empty, all clients on this machine are admitted, and sessions are not encrypted.
+    std::vector<ClientKey> keys{};
+    Suites suites = suites_of_this_machine();  ///< allowed for these sessions
+    /// Returns true if the operating system has checked the permissions of the sender (UnixSocket::is_peer), so that
+    /// the client needs no key. Can be null.
     bool (*needs_no_key)(const Address& from) noexcept = nullptr;
     Shard shard{};                          ///< `devices` contains the devices of all shards
-    std::uint32_t first_connection_id = 1;  ///< random at start, so that a restarted server does not know old guests
+    std::uint32_t first_connection_id = 1;  ///< should be random at each start
     std::string server_name = "tendond";
     std::vector<ServedDevice::Config> devices{};  ///< at most kMostDevices
-    /// Clients that need not wait for the end of a lease: the names of their keys, without keys their own.
+    /// The clients that can take a channel before its lease has expired. If keys are configured, these are the names of
+    /// keys. Otherwise, they are the names of clients.
     std::vector<std::string> takeover{};
-    /// Each costs this loop's thread a state datagram of some 250 bytes per haptic step. Where there are several keys,
-    /// one key has at most half of these places, rounded up.
+    /// Each observer costs this thread one state datagram of about 250 bytes per haptic step. If there are several
+    /// keys, one key can have at most half of the places, rounded up.
     std::size_t max_observers = 8;
     Duration controller_timeout = std::chrono::seconds(2);
     Duration observer_timeout = std::chrono::seconds(10);
-    /// Most handshakes answered and not yet confirmed by an authentic datagram: anybody can replay a Hello. 16 are more
-    /// than start within a round trip; the oldest gives way.
+    /// The maximum number of half-open sessions. If it is exceeded, the oldest one is removed. The limit is required
+    /// because an attacker can replay a Hello. It is larger than the number of clients that are expected to connect
+    /// within one round trip.
     std::size_t max_half_open = 16;
     Duration half_open_timeout = std::chrono::seconds(5);
-    Rekey rekey{};  ///< of sealed sessions, as their `life`
+    Rekey rekey{};  ///< when sealed sessions change their keys
     Duration session_life = Session::Config{}.life;
-    /// Sends fewer states to a guest whose link is full (RateAdaptation). Where even the lowest rate loses a tenth,
-    /// forces are not handed on, and the device comes to its safe stop.
+    /// Reduces the state rate of a client whose link is congested (RateAdaptation). If a tenth of the datagrams is lost
+    /// even at the lowest rate, the client's forces are not used, and the device makes a safe stop.
     bool adapt_state_rate = false;
-    /// Datagrams taken in one turn: a flood must not keep states from being sent. A 1 kHz engine sends one per turn.
+    /// Maximum number of datagrams in one turn, so that a flood does not delay the states. A 1 kHz engine sends one per
+    /// turn.
     std::size_t max_datagrams = 256;
-    bool record = true;                ///< false: no datagram goes to the log thread
-    DatagramSieve::Config recorded{};  ///< of the datagrams in and out
+    bool record = true;                ///< if false, datagrams are not passed to the log thread
+    DatagramSieve::Config recorded{};  ///< limits for recorded datagrams
   };
 
   using Stats = NetworkStats;
 
-  /// A guest has come or gone: the same for programs that follow sessions.
+  /// This describes a new or closed session.
   struct SessionChange {
-    std::uint32_t connection = 0;  ///< that of its datagrams
+    std::uint32_t connection = 0;  ///< connection id in its datagrams
     bool came = false;
-    std::string client{};  ///< the name it gave itself
+    std::string client{};  ///< the name in its Hello
     Role role = Role::kObserver;
     Address address{};
-    std::string device{};    ///< the first of those that it asked for
-    std::uint64_t tick = 0;  ///< that device's newest step then
-    std::string why{};       ///< it went
+    std::string device{};    ///< the first device
+    std::uint64_t tick = 0;  ///< newest step of that device
+    std::string why{};       ///< the reason for leaving
   };
 
-  /// What the operator should read in the log.
+  /// A message for the log.
   struct Notice {
     bool warning = false;
     std::string text;
@@ -110,36 +114,36 @@ class NetworkLoop {
 
   /// A Hello for devices of another shard.
   struct Foreign {
-    std::uint32_t shard = 0;  ///< its number
+    std::uint32_t shard = 0;
     Address from{};
     std::vector<std::byte> hello{};
   };
 
-  /// The mailboxes of the first device of the shard take the datagrams for the recording. `link` must outlive the loop.
+  /// Datagrams are recorded through the mailboxes of the first device of the shard. `link` must outlive the loop.
   /// Throws the errors of served_devices().
   NetworkLoop(const Config& config, Link& link, LocalTime now);
-  NetworkLoop(const NetworkLoop&) = delete;  // its leases look at its devices
+  NetworkLoop(const NetworkLoop&) = delete;  // leases_ refers to devices_
   NetworkLoop& operator=(const NetworkLoop&) = delete;
 
-  /// One round. Returns when the next one is due at the latest.
+  /// Processes everything that is due. Returns the latest time of the next call.
   LocalTime turn(LocalTime now);
 
-  /// Says goodbye to every guest. The last thing the network thread does.
+  /// Closes all sessions with a Bye. No other call may follow.
   void close(LocalTime now);
 
-  /// The Hellos of others' guests since the last call; at most 64 are kept. A client repeats one that got lost.
+  /// Returns the Hellos for other shards since the last call, at most 64. Clients repeat lost Hellos.
   std::vector<Foreign> take_foreign();
 
-  /// Takes a Hello that another shard has found to be for this one. That one has recorded it.
+  /// Processes a Hello that was received by another shard. It has already been recorded there.
   void receive_foreign(LocalTime now, const Address& from, std::span<const std::byte> hello);
 
   Stats stats() const;
 
-  /// What happened since the last call, for the log; at most 64 are kept.
+  /// Returns up to 64 messages since the last call.
   std::vector<Notice> take_notices();
 
  private:
-  bool drain(LocalTime& now);  ///< `now` grows with each datagram taken
+  bool drain(LocalTime& now);  ///< `now` is updated
   void receive(LocalTime now, const Address& from, std::span<const std::byte> datagram);
   void greet(LocalTime now, const Address& from, std::span<const std::byte> datagram);
   void admit(LocalTime now, const Address& from, const Doorman::Guest& guest, std::span<const std::byte> hello);
@@ -169,10 +173,10 @@ class NetworkLoop {
   SessionChange change_of(const Guest& guest, bool came, const std::string& why) const;
   void notice(bool warning, std::string text, std::optional<SessionChange> session = std::nullopt);
 
-  /// Of a device, apart from all else of it: each turn looks at every one of them.
+  /// This is stored in a separate array because it is used in every turn (cache locality).
   struct NewestState {
     Latest<DeviceState>* box;
-    const DeviceState* fresh = nullptr;  ///< came since the turn before; null: none
+    const DeviceState* fresh = nullptr;  ///< null if not updated
   };
 
   Config config_;
@@ -180,7 +184,7 @@ class NetworkLoop {
   DatagramSieve sieve_;
   std::vector<ServedDevice> devices_;  ///< of this shard
   std::size_t first_device_;           ///< the index of the first device of this shard
-  std::vector<NewestState> states_;    ///< by place, as the devices
+  std::vector<NewestState> states_;    ///< in the order of devices_
   Doorman doorman_;
   Admission admission_;
   Leases leases_{devices_};

@@ -14,9 +14,9 @@
 
 namespace tendon {
 
-/// The counters of a network loop. They start at 0 when the server starts.
+/// The counters of a network loop since the start of the server.
 struct NetworkStats {
-  /// Datagrams of guests that were dropped (LinkStats).
+  /// Dropped datagrams of clients (LinkStats).
   struct Dropped {
     std::uint64_t duplicated = 0;
     std::uint64_t malformed = 0;
@@ -29,12 +29,12 @@ struct NetworkStats {
   struct Channel {
     std::string device;
     std::string channel;
-    std::string holder;                   ///< the client's name; empty if the channel is free
-    std::uint64_t forces = 0;             ///< passed to the haptic loop
-    std::uint64_t handovers = 0;          ///< the channel moved from one client to another
-    std::uint64_t late = 0;               ///< the sum of the four causes below, for this channel
-    std::optional<double> worst_error{};  ///< N; the largest error that an engine has reported; empty if none has
-    std::vector<std::pair<std::string, std::uint64_t>> ways{};  ///< the number of forces for each solver path
+    std::string holder;                                         ///< name of the client; empty if the channel is free
+    std::uint64_t forces = 0;                                   ///< passed to the haptic loop
+    std::uint64_t handovers = 0;                                ///< from one client to another
+    std::uint64_t late = 0;                                     ///< the sum of the four causes below, for this channel
+    std::optional<double> worst_error{};                        ///< N, largest error reported by an engine
+    std::vector<std::pair<std::string, std::uint64_t>> ways{};  ///< number of forces by solver path
   };
 
   std::uint64_t welcomed = 0;  ///< sessions that were opened
@@ -47,11 +47,11 @@ struct NetworkStats {
   std::uint64_t unknown_connection = 0;  ///< Data with an unknown connection id or the wrong address
   Doorman::Stats hellos;                 ///< Hellos that were not answered with a Welcome or a Refused
   std::uint64_t forces = 0;              ///< passed to the haptic loop
-  /// Forces and requests that need a channel, from clients that do not hold it. Torques and grip forces from clients
-  /// without the feature `handle` are counted here, too.
+  /// Forces and requests that need a channel, from clients that do not hold it. Includes torques and grip forces from
+  /// clients without the feature `handle`.
   std::uint64_t denied = 0;
-  std::uint64_t unanswerable = 0;  ///< the force answers an unknown or very old tick
-  // Forces that arrived after the previous force had expired, for each cause (Lateness):
+  std::uint64_t unanswerable = 0;  ///< forces that answer an unknown or very old tick
+  // Forces that arrived after the previous one had expired, by cause (Lateness):
   std::uint64_t late_ours = 0;
   std::uint64_t late_network = 0;
   std::uint64_t late_engine = 0;
@@ -60,16 +60,14 @@ struct NetworkStats {
   std::uint64_t hopeless = 0;  ///< forces that were not used because the link loses too many datagrams
   Dropped dropped;
   std::vector<Channel> channels;
-  LinkStats controller;                                            ///< the link of the newest controller
-  std::optional<ClockOffsetEstimator::Estimate> controller_clock;  ///< the offset of its clock
+  LinkStats controller;
+  std::optional<ClockOffsetEstimator::Estimate> controller_clock;  ///< clock offset of the newest controller
 
-  /// Adds the counters of another shard and appends its channels. The controller of the first shard that has one is
-  /// kept.
+  /// Adds the counters of another shard and appends its channels. Keeps `controller` if it is set.
   NetworkStats& operator+=(const NetworkStats& more);
 
-  /// Adds what the session of a guest has dropped. If the guest is a controller, its link becomes `controller`.
+  /// Adds the drop counters of a session. If the guest is a controller, sets `controller` to its link.
   void add(const Guest& guest);
-  /// Appends the channels of a device.
   void add(const ServedDevice& device, const std::vector<Guest>& guests);
 };
 

@@ -34,7 +34,7 @@ std::string host_name() {
   return whole.substr(0, whole.find('.'));
 }
 
-/// Of the scenes that ask for it. Null: there is nothing to announce.
+/// Returns null if no scene is announced.
 std::unique_ptr<Announcer> announcer_of(const std::vector<Scene>& scenes, const Address& listen) {
   std::vector<Announcer::Device> devices;
   for (const Scene& scene : scenes) {
@@ -54,8 +54,7 @@ std::unique_ptr<Announcer> announcer_of(const std::vector<Scene>& scenes, const 
   });
 }
 
-/// Throws std::runtime_error, a sentence for the operator, when the machine has no processor for a thread that never
-/// sleeps.
+/// Throws std::runtime_error with a message for the operator if there is no processor for a busy network thread.
 const std::vector<Scene>& checked(const std::vector<Scene>& scenes) {
   if (scenes.front().network.busy && processors_allowed() == 1) {
     throw std::runtime_error(
@@ -65,10 +64,10 @@ const std::vector<Scene>& checked(const std::vector<Scene>& scenes) {
   return scenes;
 }
 
-/// So many devices keep a network thread at work for a third of the time or more (tests/tools/bench).
+/// With this number of devices, a network thread is busy for at least a third of the time (tests/tools/bench).
 constexpr std::size_t kDevicesOfANetworkThread = 128;
 
-/// How many share the devices: a power of two.
+/// Returns a power of two.
 std::uint32_t network_threads_for(const std::vector<Scene>& scenes) {
   const Scene::Network& network = scenes.front().network;
   if (network.threads) return *network.threads;
@@ -78,7 +77,7 @@ std::uint32_t network_threads_for(const std::vector<Scene>& scenes) {
       std::clamp<std::size_t>(scenes.size() / kDevicesOfANetworkThread, 1, std::max<std::size_t>(processors, 1))));
 }
 
-/// Throws std::runtime_error, a sentence for the operator, when the system refuses the thread.
+/// Throws std::runtime_error with a message for the operator if the system refuses to create the thread.
 template <class Run>
 std::thread thread_of(const std::string& name, Run run) {
   try {
@@ -88,7 +87,6 @@ std::thread thread_of(const std::string& name, Run run) {
   }
 }
 
-/// Returns null if the device is not guarded.
 Heartbeat* heart_of(const Scene& scene, Guardian* guardian) {
   if (guardian == nullptr || !scene.driver().moves_a_hand || scene.loop.device >= Guardian::kDevices) return nullptr;
   return &guardian->heartbeat(scene.loop.device);
@@ -101,17 +99,17 @@ std::unique_ptr<SafeDevice> safe_device(const Scene& scene, Device& device, cons
   return std::make_unique<SafeDevice>(config, device);
 }
 
-/// What is new in each run.
+/// Adds the values that are new in each run.
 Assembly::Config config_of(const Scene::Network& scene, LocalTime now) {
   Assembly::Config config{.now = now};
   NetworkLoop::Config& network = config.network;
   fill_random(network.secret);
   fill_random(std::as_writable_bytes(std::span(&network.first_connection_id, 1)));
-  network.first_connection_id |= 1;  // never 0
+  network.first_connection_id |= 1;  // must not be 0
   if (scene.keys) network.keys = read_key_folder(*scene.keys);
   if (scene.unix_path) network.needs_no_key = UnixSocket::is_peer;
   network.server_name = "tendond " + std::string(kVersion);
-  // Above the epoch of every run before, as long as the time of day does not go back (Purse).
+  // Nanoseconds of Unix time, so it exceeds the epoch of all earlier runs unless the clock is set back (Purse).
   config.epoch = static_cast<std::uint64_t>((now.time_since_epoch() + clock::unix_offset()).count());
   return config;
 }
@@ -299,7 +297,7 @@ void Server::run_haptic(const HapticThread& thread) {
   Assembly::HapticGroup& group = thread.group;
   const Scene& first = group.devices.front()->scene;
   for (const std::string& refused : enter_realtime(kHapticPriority)) {
-    if (&group == &assembly_.haptic_groups().front()) log::warn(refused);  // to all of them alike
+    if (&group == &assembly_.haptic_groups().front()) log::warn(refused);  // the same message applies to all threads
     group.not_realtime.store(true, std::memory_order_relaxed);
   }
   if (first.cpu) {
@@ -330,20 +328,21 @@ void Server::run_network(NetworkThread& network) {
     }
     due = assembly_.turn_network(network.number, now);
     tell_notices(network);
-    if (!network.busy) now = clock::now();  // the turn has taken its time
+    if (!network.busy) now = clock::now();  // the turn took time
   }
   assembly_.network(network.number).close(clock::now());
   tell_notices(network);
 }
 
-/// Until a datagram can be received, the doorbell rings, or it is `due`; without a sleep. The present time.
+/// Polls without sleeping until a datagram is available, the doorbell has rung, or `due` has been reached. Returns the
+/// current time.
 LocalTime Server::watch_until(NetworkThread& network, LocalTime due) {
   LocalTime now = clock::now();
   while (now < due && !network.bell.rung() && !network.busy_link.look(now)) {
   }
   if (!network.bell.rung()) return now;
   network.bell.answer();
-  return clock::now();  // not before the step that has rung
+  return clock::now();  // must not be earlier than the step that rang the bell
 }
 
 void Server::tell_notices(NetworkThread& network) {
@@ -367,11 +366,10 @@ void Server::run_log() {
     print_log();
     clock::sleep_until(due);
   }
-  assembly_.log().close(clock::now(), unsent());  // There are no other threads at this point.
+  assembly_.log().close(clock::now(), unsent());  // all other threads have ended
   print_log();
 }
 
-/// Returns the number of datagrams that the system has refused to send.
 std::uint64_t Server::unsent() const {
   std::uint64_t sum = 0;
   for (const auto& network : networks_) sum += network->link->send_failures();

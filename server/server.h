@@ -29,93 +29,92 @@
 
 namespace tendon {
 
-/// The threads and sockets of an Assembly. A device with a plug has a haptic thread of its own, so that none waits for
-/// it; of the others all with the same period and processor share one (Assembly::HapticGroup).
+/// The threads and sockets of an Assembly. Each USB device has its own haptic thread, so that other devices do not wait
+/// for it. All other devices with the same period and processor share one thread (Assembly::HapticGroup).
 ///
 /// | thread  | calls                         | waits for                               | may                     |
 /// |---------|-------------------------------|-----------------------------------------|-------------------------|
-/// | haptic… | HapticGroup::turn             | the absolute time of their next step    | nothing but compute     |
+/// | haptic… | HapticGroup::turn             | the absolute time of the next step      | nothing but compute     |
 /// | network… | turn_network, of its UdpLink | a datagram, a haptic step, a timer      | allocate, log rarely    |
 /// | log     | LogLoop::turn                 | 20 ms                                   | allocate, write, log    |
 /// | announce| Announcer, if a scene has one | D-Bus                                   | allocate, log           |
 ///
-/// They share the Mailboxes of each device, and nothing else. A large server has several network threads, which share
-/// its devices by whole banks (Shard).
+/// The threads only share the Mailboxes of each device. A large server has several network threads, each of which
+/// serves whole banks of devices (Shard).
 class Server {
  public:
   struct DeviceSummary {
     std::string name;
     HapticLoop::Stats haptic;
-    std::optional<SafeDevice::Status> safety;  ///< empty: its scene lists no safety layer
-    std::optional<DeviceCounts> counts;        ///< of its driver; empty: a device without a plug
+    std::optional<SafeDevice::Status> safety;  ///< empty if the scene has no safety layer
+    std::optional<DeviceCounts> counts;        ///< of the driver; empty if it is not a USB device
   };
   struct Summary {
     std::vector<DeviceSummary> devices;
     NetworkLoop::Stats network;
-    std::optional<PartRecorder::Status> recording;  ///< empty when the scene records nothing
+    std::optional<PartRecorder::Status> recording;  ///< empty if nothing is recorded
     Duration uptime{};
   };
 
-  /// Binds the port, opens the recording, makes the device. Throws what these throw: sentences for the operator.
-  /// Network and recording are those of the first scene.
+  /// Binds the port, opens the recording and creates the devices. The first scene determines the network and the
+  /// recording. Throws exceptions with messages for the operator.
   explicit Server(const std::vector<Scene>& scenes);
   ~Server();
   Server(const Server&) = delete;
   Server& operator=(const Server&) = delete;
 
-  /// Starts the threads. Throws std::runtime_error, a sentence for the operator, when the system refuses one; those
-  /// that had begun have ended then. With `run_for` each haptic thread ends by itself, with zero force, so long after
-  /// its first step: it takes run_for / period steps, or fewer when some came too late.
+  /// Starts the threads. If the system refuses one, stops the others and throws std::runtime_error with a message for
+  /// the operator. If `run_for` is set, each haptic thread ends after this time and sets the force to zero. The number
+  /// of steps is run_for / period, or less if there were delays.
   void start(std::optional<Duration> run_for = std::nullopt);
 
-  /// Called by a network thread for each guest that comes or goes, those that the end of the server sends away too; by
-  /// one at a time. Before `start` only. It may block no longer than a line of the log does.
+  /// Sets the function that is called if a session is opened or closed, even if it is closed by stop(). It is called
+  /// from the network threads, but never concurrently. It should not block. This must be called before `start`.
   void tell_sessions(std::function<void(const NetworkLoop::SessionChange&)> tell) { tell_session_ = std::move(tell); }
 
-  /// Sets all forces to zero and blocks the haptic threads until `resume` is called. Waits at most 100 ms for the threads.
-  /// Devices that have a safety layer must be armed again.
+  /// Sets all forces to zero and blocks the haptic threads until `resume` is called. Waits at most 100 ms for the
+  /// threads. Devices with a safety layer must be armed again.
   void suspend();
   void resume();
 
-  /// Zero force first; then goodbye to the guests; then the end of the recording.
+  /// Sets the forces to zero, then closes the sessions, then closes the recording.
   Summary stop();
 
-  /// Whether every haptic loop has taken a step since the last call.
+  /// Returns true if every haptic loop has made a step since the last call.
   bool turning();
 
   Address address() const { return networks_.front()->link->local_address(); }
 
-  /// The file that it records to, which is not the scene's when that exists. Empty when it records nothing. Before
-  /// `start` only.
+  /// Returns the path of the recording, which differs from the path in the scene if that file already exists. Empty if
+  /// nothing is recorded. Must be called before `start`.
   std::optional<std::filesystem::path> recording() const;
 
  private:
-  /// The device of a scene, and the safety layer around it.
   struct Hardware {
     Hardware(const Scene& scene, Guardian* guardian);
     std::unique_ptr<Device> device;
-    std::unique_ptr<SafeDevice> safe;  ///< null when the scene lists none
+    std::unique_ptr<SafeDevice> safe;  ///< null if the scene has no safety layer
   };
 
-  /// Serves the guests of some banks.
+  /// Serves the clients of some banks.
   struct NetworkThread {
     NetworkThread(std::size_t its_number, bool never_sleeps, std::unique_ptr<UdpLink> its_link);
-    std::size_t number;  ///< of its loop in the assembly
-    bool busy;           ///< it never sleeps
+    std::size_t number;  ///< index of its loop in assembly_
+    bool busy;           ///< polls instead of sleeping
     std::unique_ptr<UdpLink> link;
-    BusyLink busy_link{*link};  ///< used where it is busy
-    Doorbell bell;              ///< a device of it has made a step
+    BusyLink busy_link{*link};  ///< used if `busy`
+    Doorbell bell;              ///< rung by the haptic threads of its devices
     std::thread thread{};
 
-    UnknownKeys unknown_keys{};  ///< of its own thread
+    UnknownKeys unknown_keys{};  ///< only used by this thread
   };
   using NetworkThreads = std::vector<std::unique_ptr<NetworkThread>>;
 
-  /// Steps devices of one period, on one processor.
+  /// Steps devices with the same period and processor.
   struct HapticThread {
     Assembly::HapticGroup& group;
-    std::vector<Doorbell*> stepped{};  ///< of the network threads of its devices
-    std::string name() const;          ///< of its first device
+    std::vector<Doorbell*> stepped{};  ///< bells of the network threads of its devices
+    std::string name() const;          ///< after its first device
     std::thread thread{};
   };
 
@@ -124,9 +123,9 @@ class Server {
   std::vector<Assembly::Part> parts_of(const std::vector<Scene>& scenes);
   std::vector<Link*> links();
   std::vector<HapticThread> haptic_threads();
-  /// "left: ", where there is more than one.
+  /// Returns "NAME: " if there are several devices.
   std::string prefix(const Scene& scene) const;
-  void end_threads();  ///< those that run: the haptic ones first, with zero force
+  void end_threads();  ///< the haptic threads first, which set the forces to zero
   std::string name_of(const NetworkThread& network) const;
   void run_haptic(const HapticThread& thread);
   void stand_still(const HapticThread& thread);
@@ -138,15 +137,15 @@ class Server {
   void print_log();
 
   LocalTime started_;
-  std::unique_ptr<Guardian> guardian_;    ///< of real devices; null when there are none
+  std::unique_ptr<Guardian> guardian_;    ///< null if there is no real device with motors
   std::vector<Hardware> hardware_;        ///< by scene
   NetworkThreads networks_;               ///< in the order of their devices
-  std::unique_ptr<Announcer> announcer_;  ///< null when no scene is announced
+  std::unique_ptr<Announcer> announcer_;  ///< null if no scene is announced
   Assembly assembly_;
-  std::vector<std::uint64_t> steps_seen_;  ///< by device, by turning()
+  std::vector<std::uint64_t> steps_seen_;  ///< by device, at the last call of turning()
 
-  std::optional<Duration> run_for_;  ///< set before the threads start, as the next is
-  std::mutex telling_;               ///< of network threads that have something for tell_session_
+  std::optional<Duration> run_for_;  ///< set before the threads start
+  std::mutex telling_;               ///< serializes calls of tell_session_
   std::function<void(const NetworkLoop::SessionChange&)> tell_session_;
   std::atomic<bool> stop_haptic_{false};
   std::atomic<bool> suspend_{false};
@@ -156,7 +155,7 @@ class Server {
   std::optional<WakefulProcessors> wakeful_;  ///< while the threads run
   std::vector<HapticThread> haptic_threads_;
   std::thread log_thread_;
-  std::thread announce_thread_;  ///< where there is an announcer
+  std::thread announce_thread_;  ///< only if announcer_ is set
 };
 
 }  // namespace tendon

@@ -10,18 +10,18 @@
 
 namespace tendon {
 
-/// Limits how often a recurring problem is logged. The first occurrence is logged immediately, and after that the number
-/// of occurrences is logged once per minute.
+/// Limits how often a recurring problem is logged: the first occurrence immediately, then the number of occurrences
+/// once per minute.
 class TroubleSum {
  public:
   static constexpr Duration kPeriod = std::chrono::minutes(1);
 
   struct Due {
     std::uint64_t count;
-    bool of_a_minute;  ///< if false, `count` only covers the time since the last call
+    bool of_a_minute;  ///< otherwise since the last call
   };
 
-  /// Adds the number of occurrences since the last call. Returns the number that should be logged now, if any.
+  /// Adds the number of occurrences since the last call. Returns the count to log now, if any.
   std::optional<Due> add(LocalTime now, std::uint64_t more) {
     const bool of_a_minute = sum_ > 0;
     sum_ += more;
@@ -31,7 +31,7 @@ class TroubleSum {
   }
 
  private:
-  std::uint64_t sum_ = 0;  ///< the number of occurrences that have not been logged
+  std::uint64_t sum_ = 0;  ///< occurrences that have not been logged
   std::optional<LocalTime> told_;
 };
 
