@@ -21,7 +21,7 @@ std::string id_of(const usb::PluggedIn& plugged) {
   return text.str();
 }
 
-/// The driver of this USB device; null when Tendon has none.
+/// Returns null if this USB device is not supported.
 const Driver* driver_for(const usb::Id& id) {
   const auto found = std::ranges::find_if(
       drivers(), [&id](const Driver* driver) { return std::ranges::find(driver->ids, id) != driver->ids.end(); });

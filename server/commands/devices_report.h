@@ -10,24 +10,25 @@
 
 namespace tendon {
 
-/// A plugged-in device that Tendon has a driver for, and what keeps it from being used: `tendond devices`.
+/// Describes a connected device that is supported by Tendon, and the problems that prevent its use. This is used by
+/// `tendond devices`.
 struct PluggedDevice {
   struct Lack {
     std::string what;
-    std::string mend;  ///< what the user can do about it
+    std::string mend;  ///< instructions for the user
   };
   std::string name;
-  std::string kind;  ///< of a scene: [device] kind
+  std::string kind;  ///< [device] kind in a scene
   usb::PluggedIn plugged;
   std::vector<Lack> lacks;
 };
 
-/// `firmware_problem`: why the file given as a Falcon's firmware is not one; an empty text when it is; not set when no
-/// file was given.
+/// `firmware_problem` describes what is wrong with the given firmware file for a Falcon. It is an empty string if the
+/// file is valid. It is not set if there is no file.
 std::vector<PluggedDevice> report_devices(std::span<const usb::PluggedIn> plugged,
                                           const std::optional<std::string>& firmware_problem);
 
-/// The report for people; and one JSON object for each device, a line each.
+/// The report as text, or as one line with a JSON object for each device.
 std::string in_words(std::span<const PluggedDevice> devices);
 std::string in_json(std::span<const PluggedDevice> devices);
 

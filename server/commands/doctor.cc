@@ -29,7 +29,7 @@ namespace fs = std::filesystem;
 constexpr Duration kPeriod = std::chrono::milliseconds(1);
 constexpr std::size_t kWakeUps = 1000;
 
-/// The text of a small file without trailing white space; empty when the file is missing or cannot be read.
+/// Returns the content of a small file without trailing whitespace, or an empty string if it cannot be read.
 std::string text_of(const fs::path& file) {
   std::ifstream stream(file);
   std::string text(std::istreambuf_iterator<char>(stream), {});
@@ -44,7 +44,7 @@ std::optional<std::int64_t> number_of(const std::string& text) {
   return number;
 }
 
-/// The word that follows `start` on the first line that begins with it, in a "key value" or "key=value" file.
+/// Returns the value after `start` from a file with lines like "key value" or "key=value".
 std::string value_after(const std::string& text, std::string_view start) {
   std::istringstream lines(text);
   for (std::string line; std::getline(lines, line);) {
@@ -132,9 +132,9 @@ Finding isolation(const fs::path& root) {
   return {"isolated_cpus", isolated + (some ? ", without tick " + without_tick : ""), ""};
 }
 
-/// How long the processor takes to wake from its deepest sleep. A server may forbid that sleep while it runs.
+/// Checks the exit latency of the deepest sleep state. A running server may disable this state.
 Finding sleep(const fs::path& root) {
-  constexpr std::int64_t kNoticed = 20;  // µs: an ordinary kernel wakes a thread this late anyway
+  constexpr std::int64_t kNoticed = 20;  // µs; similar to the usual wake-up latency
   std::optional<std::int64_t> deepest;
   std::error_code none;
   for (const auto& state : fs::directory_iterator(root / "sys/devices/system/cpu/cpu0/cpuidle", none)) {
@@ -174,7 +174,7 @@ Finding machine(const fs::path& root) {
   return {"machine", "virtual", "not for a real device: the host may stop the whole machine for 20 ms and more"};
 }
 
-/// By what sessions are sealed here (protocol/secrets/suites.h).
+/// Checks the available cipher suites (protocol/secrets/suites.h).
 Finding aes(const fs::path& root) {
   const std::string cpus = text_of(root / "proc/cpuinfo");
   if (cpus.empty()) return {"aes", "unknown", ""};
@@ -189,7 +189,7 @@ Finding aes(const fs::path& root) {
           "sealing by AES costs half of that, and less: in a virtual machine, a CPU model that shows the host's AES"};
 }
 
-/// "0-3,5" has five.
+/// Returns 5 for "0-3,5".
 std::optional<std::int64_t> count_of(const std::string& list) {
   std::int64_t count = 0;
   std::istringstream ranges(list);
@@ -234,7 +234,7 @@ Diagnosis::WakeUps measure_wake_ups(const WakeUpClock& clock, Duration period, s
     clock.sleep_until(due);
     const LocalTime now = clock.now();
     one = now - due;
-    due = std::max(due, now - period);  // after a pause, do not catch up on the missed wake-ups
+    due = std::max(due, now - period);  // do not catch up after a pause
   }
   std::sort(late.begin(), late.end());
   return {count, late[count / 2], late[count * 99 / 100], late.back()};

@@ -11,11 +11,11 @@
 
 namespace tendon {
 
-/// How well this machine can run a haptic loop, and what to change to improve it: `tendond doctor`. It looks and
-/// measures, and changes nothing.
+/// The result of `tendond doctor`, which checks whether this machine is suitable for a haptic loop. It does not change
+/// any settings.
 struct Diagnosis {
-  /// How late a thread wakes when it sleeps until instants 1 ms apart, as cyclictest measures it. No haptic loop on
-  /// this machine can do better.
+  /// The wake-up latency of a thread that sleeps for a period of 1 ms, measured like in cyclictest. This is a lower
+  /// bound for the jitter of a haptic loop.
   struct WakeUps {
     std::size_t count = 0;
     Duration median{};
@@ -25,31 +25,31 @@ struct Diagnosis {
   struct Finding {
     std::string_view key;
     std::string found;
-    std::string advice;  ///< empty: nothing to change
+    std::string advice;  ///< empty if there is nothing to change
   };
 
-  WakeUps ordinary;                  ///< of an ordinary thread
-  WakeUps realtime;                  ///< of a thread with the settings of the haptic thread
-  std::vector<std::string> refused;  ///< the settings that it was refused (enter_realtime)
+  WakeUps ordinary;                  ///< for an ordinary thread
+  WakeUps realtime;                  ///< for a thread with the settings of a haptic thread
+  std::vector<std::string> refused;  ///< errors of enter_realtime
   std::vector<Finding> findings;
 };
 
-/// A clock to look at, and to sleep by.
 struct WakeUpClock {
   std::function<LocalTime()> now;
   std::function<void(LocalTime)> sleep_until;
 };
 
-/// Sleeps `count` times until one period after the instant before.
+/// Measures the latency of `count` wake-ups with this period.
 Diagnosis::WakeUps measure_wake_ups(const WakeUpClock& clock, Duration period, std::size_t count);
 
-/// The kernel's settings, read below `root` (proc, sys, boot). A missing file gives "unknown", without advice.
+/// Checks the settings of the kernel in proc, sys and boot below `root`. If a file is missing, the result is "unknown"
+/// without advice.
 std::vector<Diagnosis::Finding> look_around(const std::filesystem::path& root);
 
-/// The whole examination. Takes about two seconds, in threads of its own.
+/// Runs all checks. This takes about two seconds and uses additional threads.
 Diagnosis diagnose(const WakeUpClock& clock);
 
-/// The report for people; and a JSON object in one line.
+/// The report as text, or as one line with a JSON object.
 std::string in_words(const Diagnosis& diagnosis);
 std::string in_json(const Diagnosis& diagnosis);
 

@@ -18,10 +18,10 @@
 namespace tendon {
 namespace {
 
-constexpr int kSteps = 200;     ///< steps in one round
-constexpr int kSamples = 2000;  ///< recorded samples that stand in for the device
+constexpr int kSteps = 200;
+constexpr int kSamples = 2000;  ///< used instead of the device
 
-/// Records the samples that another device gives.
+/// Records the samples of another device.
 class Tape final : public Device {
  public:
   Tape(const SimulatedDevice::Config& config, std::vector<PositionSample>& samples)
@@ -41,7 +41,7 @@ class Tape final : public Device {
   std::vector<PositionSample>& samples_;
 };
 
-/// A device that costs next to nothing: plays recorded samples forwards and backwards for ever; takes every force.
+/// Plays recorded samples alternately forwards and backwards. Its cost is negligible.
 class Playback final : public Device {
  public:
   Playback(DeviceInfo info, std::vector<PositionSample> samples)
@@ -63,7 +63,7 @@ class Playback final : public Device {
   std::size_t next_ = 0;
 };
 
-/// A scene that runs, without a thread and without a network.
+/// Runs a scene without threads and without a network.
 class Trial {
  public:
   Trial(const Scene& scene, std::unique_ptr<Device> device)
@@ -73,7 +73,7 @@ class Trial {
         period_(scene.loop.period) {}
   explicit Trial(const Scene& scene) : Trial(scene, std::make_unique<SimulatedDevice>(scene.simulated())) {}
 
-  /// Duration of one step in ns, averaged over kSteps.
+  /// Returns the average duration of a step in ns.
   double steps(const std::function<Duration()>& processor_time) {
     const Duration before = processor_time();
     for (int i = 0; i < kSteps; ++i) {
@@ -90,7 +90,7 @@ class Trial {
 
   static double per_step(Duration total) { return static_cast<double>(total.count()) / kSteps; }
 
-  /// Arms the device as soon as it can, so that the parts are measured at work.
+  /// Arms the device as soon as possible because some parts are only active while it is armed.
   static std::unique_ptr<SafeDevice> made_safe(const Scene& scene, Device& device) {
     if (!scene.safety) return nullptr;
     SafeDevice::Config config = *scene.safety;
@@ -112,7 +112,7 @@ class Trial {
   }
 
   std::unique_ptr<Device> device_;
-  std::unique_ptr<SafeDevice> safe_;  ///< null when the scene lists none
+  std::unique_ptr<SafeDevice> safe_;  ///< null if there is no safety layer
   std::unique_ptr<Mailboxes> mail_ =
       std::make_unique<Mailboxes>(Mailboxes::Capacities{.steps = 2, .flight = 2, .datagrams = 1});
   HapticLoop loop_;
@@ -121,7 +121,7 @@ class Trial {
   std::uint64_t step_ = 0;
 };
 
-/// Plays back what the device of this scene gives in its first steps.
+/// Creates a device that plays the first samples of the device in this scene.
 std::unique_ptr<Device> playback_of(const Scene& scene) {
   std::vector<PositionSample> samples;
   samples.reserve(kSamples);
@@ -131,8 +131,8 @@ std::unique_ptr<Device> playback_of(const Scene& scene) {
   return std::make_unique<Playback>(SimulatedDevice(scene.simulated()).info(), std::move(samples));
 }
 
-/// The least of several measurements, and its uncertainty: the difference between the least of the odd measurements
-/// and the least of the even ones.
+/// Computes the minimum of several measurements. The uncertainty is the difference between the minimum of the odd
+/// measurements and the minimum of the even measurements.
 class Least {
  public:
   void add(double value) {
@@ -153,8 +153,8 @@ Explanation explain(const Scene& listed, const std::function<Duration()>& proces
   Explanation out;
   Scene scene = listed;
   scene.device = listed.simulated();
-  // The whole scene; the same scene again; the same with a device that costs nothing; then one scene for each listed
-  // part, without that part.
+  // The scenes are the original scene, a copy of it, the scene with a playback device, and one scene for each part, in
+  // which this part is removed.
   std::vector<std::unique_ptr<Trial>> trials;
   trials.push_back(std::make_unique<Trial>(scene));
   trials.push_back(std::make_unique<Trial>(scene));
@@ -184,12 +184,14 @@ Explanation explain(const Scene& listed, const std::function<Duration()>& proces
 
 namespace {
 
-/// N/m, the stiffest that a hand feels through this limiter: 2 b/T.
+/// N/m. Returns the highest stiffness that can be rendered with this limiter, 2 b/T (core/PROOFS.md, "Operational
+/// stiffness").
 double operational_stiffness(const LimiterConfig& limiter) {
   return 2 * limiter.friction.viscous / seconds(limiter.longest_hold);
 }
 
-/// Says how stiff and how heavy the coupling is at some round trips, if the other end is like this one.
+/// Prints the stiffness and the apparent mass of the coupling for some round-trip times. It assumes that both ends have
+/// the same configuration.
 void put_coupling(const Coupling::Config& coupling, const LimiterConfig& limiter, std::ostream& text) {
   const bool leads = coupling.role == PortRole::kLeader;
   const bool waves = coupling.method == CouplingMethod::kWaves;
@@ -228,7 +230,7 @@ void put_coupling(const Coupling::Config& coupling, const LimiterConfig& limiter
   }
 }
 
-/// Those of the scene's suites that are spoken here, by name.
+/// Returns the names of the requested cipher suites that are supported by this machine.
 std::string spoken_here(const Suites& wanted) {
   Suites here = suites_of_this_machine();
   std::erase_if(here, [&](Suite suite) { return !contains(wanted, suite); });

@@ -12,30 +12,32 @@
 
 namespace tendon {
 
-/// What a scene runs in its haptic thread, what it does not, and what each part costs there: `tendond explain SCENE`.
+/// The result of `tendond explain SCENE`. It lists the parts of a scene that run in the haptic thread, with their
+/// costs, and the parts that are not used.
 ///
-/// Costs are measured, here and now: processor time of HapticLoop::step with the scene's device, which feels a spring
-/// of 500 N/m that answers every tenth step. The cost of a part is the difference to the same scene without it. It is
-/// below 0 where other parts have more to do then. The cost of the device is the difference to the same scene with its
-/// first 2000 positions played back, so it is never more than the step. Each cost is the least of 80 rounds of 200
-/// steps, in which all take turns. `resolution_ns` is the most by which two measurements of the same thing differed;
-/// a smaller cost cannot be told from none.
+/// The costs are measured on this machine as processor time of HapticLoop::step. The scene's device is coupled to a
+/// spring of 500 N/m, which is updated in every tenth step. The cost of a part is the difference between the scene with
+/// and without this part. It can be negative if other parts have more work without it. The cost of the device is the
+/// difference between the scene and a playback of the first 2000 positions of the device. Therefore, it does not exceed
+/// the cost of the step. Each cost is the minimum over 80 rounds of 200 steps, and the variants of the scene are
+/// measured alternately. If a cost is smaller than `resolution_ns`, it is not significant.
 struct Explanation {
   struct Part {
-    std::string_view key;           ///< of the scene
+    std::string_view key;           ///< in the scene
     std::string_view what;          ///< one line
-    std::optional<double> cost_ns;  ///< of a step; empty when it is not listed: it does not exist then
+    std::optional<double> cost_ns;  ///< per step; empty if it is not part of the scene
   };
   std::vector<Part> parts;
   double step_ns = 0;    ///< a whole step
-  double device_ns = 0;  ///< the share of the simulated device with its hand in that, from 0 to step_ns
+  double device_ns = 0;  ///< from 0 to step_ns; the simulated device and its hand
   double resolution_ns = 0;
 };
 
-/// `processor_time` of the calling thread. The least of each `rounds` counts; 80 take a quarter of a second.
+/// `processor_time` returns the processor time of the calling thread. With 80 rounds, the measurement takes about 0.25
+/// s.
 Explanation explain(const Scene& scene, const std::function<Duration()>& processor_time, int rounds = 80);
 
-/// For people; and a JSON object in one line.
+/// The result as text, or as one line with a JSON object.
 std::string in_words(const Scene& scene, const Explanation& explanation);
 std::string in_json(const Scene& scene, const Explanation& explanation);
 

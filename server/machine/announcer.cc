@@ -36,19 +36,19 @@ constexpr int kAnyProtocol = -1;
 constexpr int kIpv4 = 0;
 constexpr int kIpv6 = 1;
 
-// What EntryGroup.StateChanged tells.
+// The states in EntryGroup.StateChanged.
 constexpr int kEstablished = 2;
 constexpr int kCollision = 3;
 constexpr int kFailure = 4;
-// What Server.StateChanged tells.
+// The states in Server.StateChanged.
 constexpr int kRunning = 2;
 
-/// µs until the next try to reach a D-Bus system bus; the bus itself tells when avahi-daemon comes and goes.
+/// µs. The delay before connecting to the D-Bus system bus again. No polling is required for avahi-daemon.
 constexpr std::uint64_t kTryAgain = 5'000'000;
-/// Names that are tried for one device: more hosts that take each of them are an attack.
+/// The maximum number of names that are tried for one device. If there are more collisions, this is probably an attack.
 constexpr int kMostNames = 100;
 
-/// What is used of libsystemd. It comes into the process with the first announcer.
+/// The functions of libsystemd, which is loaded when the first announcer is created.
 struct Systemd {
   LateLibrary file{"libsystemd.so.0"};
   decltype(&::sd_bus_attach_event) bus_attach_event = file["sd_bus_attach_event"];
@@ -103,7 +103,7 @@ bool same_ip(const sockaddr* address, const Address& ours) {
   return std::memcmp(&v6.sin6_addr, ours.ip.data(), ours.ip.size()) == 0;
 }
 
-/// The number of the interface that has this address; all when none has.
+/// Returns the index of the interface with this address, or kAnyInterface if there is none.
 int interface_of(const Address& address) {
   ifaddrs* all = nullptr;
   if (::getifaddrs(&all) != 0) return kAnyInterface;
@@ -114,7 +114,7 @@ int interface_of(const Address& address) {
   return kAnyInterface;
 }
 
-/// [::] receives IPv4 too (server/machine/udp_link.h).
+/// Note that [::] also accepts IPv4 (server/machine/udp_link.h).
 int protocol_of(const Address& address) {
   if (is_ipv4(address)) return kIpv4;
   return address.ip == decltype(address.ip){} ? kAnyProtocol : kIpv6;
@@ -143,14 +143,13 @@ class Announcer::Avahi {
   void stop() noexcept { end_.ring(); }
 
  private:
-  /// One device, and where Avahi has it.
   struct Entry {
     Avahi* avahi;
     Device device;
     std::string name{};   ///< announced or tried
-    std::string group{};  ///< D-Bus path of its entry group; empty: none yet
+    std::string group{};  ///< D-Bus path of its entry group, or empty
     int attempt = 1;
-    std::unique_ptr<sd_bus_slot, Release> question{};  ///< the answer to an earlier one does not matter any more
+    std::unique_ptr<sd_bus_slot, Release> question{};  ///< the pending call
   };
 
   static int on_end(sd_event_source* source, int, std::uint32_t, void*) noexcept {
@@ -170,7 +169,7 @@ class Announcer::Avahi {
   }
   static int on_server(sd_bus_message* signal, void* self, sd_bus_error*) noexcept {
     std::int32_t state = 0;
-    // Its host name may be another one now.
+    // The host name may have changed.
     if (sd().bus_message_read(signal, "i", &state) > 0 && state == kRunning) static_cast<Avahi*>(self)->announce();
     return 0;
   }
@@ -200,14 +199,14 @@ class Announcer::Avahi {
                   ". Expected a running avahi-daemon; clients find this server by " + "its address all the same");
   }
 
-  /// Tries again later: this may be a callback of the bus.
+  /// Schedules another attempt. This may be called from a callback of the bus.
   void no_bus(const std::string& why) {
     lost("there is no D-Bus system bus (" + why + ")");
     if (waits_) return;
     waits_ = sd().event_add_time_relative(loop_.get(), nullptr, CLOCK_MONOTONIC, kTryAgain, 0, on_time, this) >= 0;
   }
 
-  /// Avahi then takes back what we have announced.
+  /// Avahi removes the announcements when the connection is closed.
   void close() {
     for (Entry& entry : entries_) {
       entry.group.clear();
@@ -232,7 +231,6 @@ class Announcer::Avahi {
     announce();
   }
 
-  /// All devices, anew.
   void announce() {
     for (Entry& entry : entries_) {
       if (!entry.group.empty()) tell(entry, "Free");
@@ -267,7 +265,7 @@ class Announcer::Avahi {
       return no_bus("it is gone");
     }
     const std::unique_ptr<sd_bus_message, Release> message(made);
-    // An empty domain and host: those of avahi-daemon.
+    // If the domain and host are empty, Avahi uses its defaults.
     sd().bus_message_append(made, "iiussssq", interface_, protocol_, 0U, entry.name.c_str(), dns_sd::kService, "", "",
                             port_);
     sd().bus_message_open_container(made, 'a', "ay");
@@ -286,7 +284,6 @@ class Announcer::Avahi {
     tell(entry, "Commit");
   }
 
-  /// By another name, which the network may or may not have.
   void rename(Entry& entry) {
     if (++entry.attempt > kMostNames) return lost(std::to_string(kMostNames) + " names are taken on this network");
     entry.name = dns_sd::another_name(entry.device.name, entry.attempt);
@@ -332,12 +329,12 @@ class Announcer::Avahi {
   int interface_;
   int protocol_;
   Say say_;
-  std::string said_;  ///< the last warning, until something is announced
+  std::string said_;  ///< the last warning
   bool waits_ = false;
   Doorbell end_;
   std::unique_ptr<sd_event, Release> loop_;
   std::unique_ptr<sd_bus, Release> bus_;
-  std::deque<Entry> entries_;  // which stay where they are: answers come to them
+  std::deque<Entry> entries_;  // must have stable addresses for the callbacks
 };
 
 Announcer::Announcer(std::vector<Device> devices, const Address& listen, Say say) {

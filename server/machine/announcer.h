@@ -11,38 +11,38 @@
 
 namespace tendon {
 
-/// Announces devices on the local network by DNS-SD (protocol/discovery.h): it asks avahi-daemon, over D-Bus, and goes
-/// on asking. Where there is no D-Bus or no avahi-daemon it says so once, and tries again when one may be there. A name
-/// that another host has becomes "NAME #2". Only the interface of the address that the server listens on is told, all
-/// of them for 0.0.0.0 and [::].
+/// Announces devices on the local network by DNS-SD (protocol/discovery.h). It sends requests to avahi-daemon over
+/// D-Bus. If D-Bus or avahi-daemon is not available, this is reported once, and the requests are sent again when it
+/// becomes available. If a name is already used by another host, "#2" is appended. If the server listens on 0.0.0.0 or
+/// [::], the devices are announced on all interfaces. Otherwise, only the interface with the listen address is used.
 ///
-/// run() is for a thread of its own; nothing else of the server waits for it. What is announced is gone when run() has
-/// returned, and also when the process is killed: Avahi sees the connection end.
+/// The function run() should be called in a separate thread. The announcements are removed when run() returns. They are
+/// also removed if the process is killed because Avahi monitors the connection.
 ///
 /// Realtime-safe: no.
 class Announcer {
  public:
   struct Device {
-    std::string name;  ///< dns_sd::is_instance_name()
+    std::string name;  ///< see dns_sd::is_instance_name()
     dns_sd::About about;
   };
-  /// One sentence for the operator, from the thread of run().
+  /// Receives a message for the operator. It is called from the thread of run().
   using Say = std::function<void(bool warning, const std::string& sentence)>;
 
-  /// `listen` is where the server can be reached, with its real port. Throws std::runtime_error when that is this
-  /// machine alone ("[discovery] announce: …"), or when the system gives no event loop.
+  /// `listen` is the address of the server with the actual port. Throws std::runtime_error ("[discovery] announce: …")
+  /// if this is a loopback address, or if an event loop cannot be created.
   Announcer(std::vector<Device> devices, const Address& listen, Say say);
   ~Announcer();
   Announcer(const Announcer&) = delete;
   Announcer& operator=(const Announcer&) = delete;
 
-  /// Announces until stop().
+  /// Blocks until stop() is called.
   void run();
-  /// Thread-safe; also before run(), which then returns at once.
+  /// Thread-safe: yes. If stop() is called first, run() returns immediately.
   void stop() noexcept;
 
  private:
-  class Avahi;  // keeps libsystemd out of this header
+  class Avahi;  // hides libsystemd
   std::unique_ptr<Avahi> avahi_;
 };
 

@@ -12,7 +12,7 @@ namespace tendon {
 AskedAt::AskedAt() { fill_random(std::as_writable_bytes(std::span(&salt_, 1))); }
 
 std::size_t AskedAt::place_of(const Address& peer) const noexcept {
-  constexpr std::uint64_t kOdd = 0x9e3779b97f4a7c15U;  // the golden ratio: neighbours spread
+  constexpr std::uint64_t kOdd = 0x9e3779b97f4a7c15U;  // golden ratio, for Fibonacci hashing
   std::array<std::uint64_t, 2> ip;
   std::memcpy(ip.data(), peer.ip.data(), sizeof ip);
   std::uint64_t mixed = salt_;

@@ -11,12 +11,13 @@
 
 namespace tendon {
 
-/// Remembers which local address each peer has sent its newest datagram to. A socket that is bound to all addresses has
-/// to answer from this address. Otherwise, the kernel chooses the source address from the route, and the peer drops the
-/// answer because it comes from an unknown address.
+/// Stores the local address to which each peer has sent its newest datagram. If a socket is bound to all addresses, it
+/// has to reply from this address. Otherwise, the kernel chooses the source address based on the route, and the reply
+/// is dropped by the peer because it comes from an unknown address.
 ///
-/// The table has a fixed size. Two peers can have the same entry, but a peer cannot predict which one. If the entry of a
-/// peer was overwritten, the kernel chooses the address until the next datagram from this peer arrives.
+/// The size of the table is fixed. If two peers have the same entry, the older one is overwritten. For this peer, the
+/// kernel then chooses the address until the next datagram arrives. The hash is salted, so collisions cannot be
+/// predicted by a peer.
 ///
 /// Thread-safe: yes.
 class AskedAt {

@@ -5,21 +5,21 @@
 
 namespace tendon {
 
-/// The real clock, CLOCK_MONOTONIC: the only place in the server where time is taken. Each thread reads it
-/// once per turn and passes it on; UdpLink reads it for each datagram.
+/// The real clock, CLOCK_MONOTONIC. The server must not read the time anywhere else. Each thread calls now() once per
+/// turn and passes the result on. UdpLink also reads the clock for each datagram.
 ///
-/// Thread-safe, realtime-safe.
+/// Thread-safe: yes. Realtime-safe: yes.
 namespace clock {
 
 LocalTime now() noexcept;
 
-/// Sleeps until `deadline` on the absolute time line, so that errors do not add up.
+/// Sleeps until an absolute time to avoid the accumulation of errors.
 void sleep_until(LocalTime deadline) noexcept;
 
-/// Processor time of the calling thread since it began.
+/// Returns the processor time that has been used by the calling thread.
 Duration processor_time() noexcept;
 
-/// Unix time − local time, at this moment: for recordings, whose readers know calendars.
+/// Returns the difference between Unix time and local time. This is used to convert times in recordings to dates.
 Duration unix_offset() noexcept;
 
 }  // namespace clock

@@ -20,15 +20,15 @@ void Doorbell::ring() noexcept {
   const int saved = errno;
   rung_.store(true, std::memory_order_release);
   const std::uint64_t one = 1;
-  // Fails only when 2⁶⁴ − 2 rings are unanswered, and then the bell is ringing already.
+  // This can only fail if the counter has reached 2⁶⁴ − 2. The descriptor is readable in this case.
   [[maybe_unused]] const auto written = ::write(fd_, &one, sizeof one);
   errno = saved;
 }
 
 void Doorbell::answer() noexcept {
-  rung_.exchange(false, std::memory_order_acq_rel);  // what was done before a ring is seen; later ones count anew
+  rung_.exchange(false, std::memory_order_acq_rel);  // acquires the data of the ringing thread
   std::uint64_t rings = 0;
-  // Fails only when nobody has rung.
+  // This can only fail if there was no ring.
   [[maybe_unused]] const auto got = ::read(fd_, &rings, sizeof rings);
 }
 

@@ -5,32 +5,33 @@
 
 namespace tendon {
 
-/// Wakes the one thread that waits for it, from another thread or from a signal handler: the haptic
-/// thread rings it after each step, the network thread waits for it together with its socket.
-/// Unanswered rings count as one. (An eventfd.)
+/// Wakes a waiting thread from another thread or from a signal handler, using an eventfd. For example, the haptic
+/// thread calls `ring` after each step, and the network thread waits for this and for its socket. Multiple rings are
+/// counted as one until `answer` is called.
 class Doorbell {
  public:
-  /// Throws std::system_error when the process has no file descriptor left.
+  /// Throws std::system_error if there are no file descriptors left.
   Doorbell();
   ~Doorbell();
   Doorbell(const Doorbell&) = delete;
   Doorbell& operator=(const Doorbell&) = delete;
 
-  /// Thread-safe: yes. Async-signal-safe: yes (errno is kept). Realtime-safe: yes: one system call
-  /// that never waits, no heap, no lock of ours.
+  /// Thread-safe: yes. Async-signal-safe: yes, errno is preserved. Realtime-safe: yes, this makes one system call that
+  /// does not block.
   void ring() noexcept;
 
-  /// Whether it has rung since the last answer: for a thread that does not sleep. No system call.
+  /// Returns true if there is an unanswered ring. This is for threads that do not sleep. It does not make a system
+  /// call.
   bool rung() const noexcept { return rung_.load(std::memory_order_acquire); }
 
-  /// Answers the rings so far. A caller that waits on fd() itself calls this; UdpLink::wait does so by itself.
+  /// Resets the bell. This must be called if the caller waits for fd() itself. UdpLink::wait calls it automatically.
   void answer() noexcept;
 
-  /// Readable while a ring is unanswered: for poll() and UdpLink::wait.
+  /// This is readable while there is an unanswered ring, for use with poll().
   int fd() const noexcept { return fd_; }
 
  private:
-  static_assert(std::atomic<bool>::is_always_lock_free);  // signal handlers ring, too
+  static_assert(std::atomic<bool>::is_always_lock_free);  // used in signal handlers
   int fd_;
   std::atomic<bool> rung_{false};
 };

@@ -12,17 +12,17 @@
 
 #include "protocol/link.h"
 
-/// The local address of a datagram, as ip(7) and ipv6(7) put it into the control messages of recvmsg(2) and sendmsg(2).
-/// A socket that is bound to all addresses answers from the address that it was asked at. An `ip` is that of Address.
+/// Functions for the local address of a datagram, which is passed in the control messages of recvmsg(2) and sendmsg(2).
+/// See ip(7) and ipv6(7). If a socket is bound to all addresses, the reply must be sent from the address that received
+/// the request. The format of `ip` is the same as in Address.
 namespace tendon::local_address {
 
 using Ip = decltype(Address::ip);
 
-/// The size of msg_control for one address, in bytes.
 inline constexpr std::size_t kControlBytes = CMSG_SPACE(sizeof(in6_pktinfo));
 
-/// Enables the control message with the local address. `family` is AF_INET or AF_INET6, which includes IPv4. Returns false, with errno, if the system
-/// refuses.
+/// Enables the control message with the local address. `family` is AF_INET or AF_INET6, which also covers IPv4. Returns
+/// false and sets errno if this is refused.
 [[nodiscard]] inline bool ask(int fd, int family) noexcept {
   const bool v4 = family == AF_INET;
   const int on = 1;
@@ -47,7 +47,7 @@ inline bool read(const cmsghdr& control, Ip& ip) noexcept {
   return false;
 }
 
-/// Makes the datagram of `header` leave from `ip`. msg_control has to point to kControlBytes.
+/// Sets the source address of the datagram to `ip`. msg_control must point to a buffer of kControlBytes.
 inline void write(const Ip& ip, msghdr& header) noexcept {
   const auto put = [&header](int level, int type, const auto& info) {
     header.msg_controllen = CMSG_SPACE(sizeof info);

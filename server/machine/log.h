@@ -9,23 +9,23 @@
 
 namespace tendon::log {
 
-/// Writes one line with the time to std::cerr, for the operator. Control characters are escaped (`visible`,
-/// protocol/wire/text.h). Each kind of line has its own limit (Rate): lines that are the same up
-/// to their first quote, apart from digits, are of one kind. Never call it for each packet or from the haptic thread.
+/// Writes a line with the time to std::cerr. Control characters are escaped (`visible` in protocol/wire/text.h). The
+/// rate is limited separately for each kind of message (Rate). Two messages are of the same kind if they only differ in
+/// digits and in the text after the first quote. Do not call this for each packet or from the haptic thread.
 ///
 /// Thread-safe: yes. Realtime-safe: no.
 void info(std::string_view text);
 void warn(std::string_view text);
 void error(std::string_view text);
 
-/// Limits the number of lines of the same kind to kBurst, plus kLinesPerSecond.
+/// Limits the number of similar messages to kBurst, plus kLinesPerSecond.
 class Rate {
  public:
   static constexpr double kBurst = 100;
   static constexpr double kLinesPerSecond = 1;
 
-  /// Returns nothing if the line must not be written. Otherwise returns the number of lines that were refused since the
-  /// last admitted line.
+  /// Returns nothing if the message must be dropped. Otherwise, returns the number of messages that have been dropped
+  /// since the last one was written.
   std::optional<std::uint64_t> admit(LocalTime now);
 
  private:

@@ -29,12 +29,13 @@
 namespace tendon {
 namespace {
 
-/// If poll(2) reports that a pipe is writable, this number of bytes can be written without blocking (PIPE_BUF on Linux).
+/// The number of bytes that can be written to a pipe without blocking if poll(2) reports that it is writable. This is
+/// PIPE_BUF on Linux.
 constexpr std::size_t kWrite = 4096;
-/// The period at which the streams are polled if none of them is writable.
+/// The polling period if none of the streams is writable.
 constexpr int kLook_ms = 20;
 
-/// The text that has not been written yet. Thread-safe.
+/// The output that has not been written yet. Thread-safe.
 class Queue {
  public:
   explicit Queue(std::array<int, 2> files) : files_(files) {}
@@ -45,7 +46,6 @@ class Queue {
     changed_.notify_all();
   }
 
-  /// Writes the queue until `end` is called.
   void write() {
     std::unique_lock lock(mutex_);
     for (;;) {
@@ -58,7 +58,7 @@ class Queue {
       const auto next = std::ranges::find_if(waiting_, [&](const Chunk& chunk) { return ready[chunk.stream]; });
       if (next == waiting_.end()) continue;
       const std::size_t stream = next->stream;
-      // `push` must not append to this chunk.
+      // This chunk must not be changed by `push`.
       next->begun = true;
       const std::string part = next->text.substr(0, kWrite);
       lock.unlock();
@@ -71,7 +71,7 @@ class Queue {
     }
   }
 
-  /// Waits until the queue is empty. Returns false if nothing is written for `patience`.
+  /// Waits until the queue is empty. Returns false if no output is written for `patience`.
   bool finish(std::chrono::duration<double> patience) {
     std::unique_lock lock(mutex_);
     for (const std::size_t stream : {0U, 1U}) tell_of_dropped(stream);
@@ -104,7 +104,7 @@ class Queue {
     std::array<pollfd, 2> polled{};
     for (const std::size_t stream : {0U, 1U}) polled[stream] = {has[stream] ? files_[stream] : -1, POLLOUT, 0};
     ::poll(polled.data(), polled.size(), kLook_ms);
-    return {polled[0].revents != 0, polled[1].revents != 0};  // includes errors, which `write` reports
+    return {polled[0].revents != 0, polled[1].revents != 0};  // this includes errors, which are handled by `write`
   }
 
   void add_line(std::size_t stream, std::string_view text) {
@@ -137,7 +137,8 @@ class Queue {
     streams_[stream].bytes += text.size();
   }
 
-  /// If the text cannot be written, the chunk is dropped. For example, the pipe was closed or the disk is full.
+  /// Removes the bytes that have been written. If the output cannot be written, for example because the disk is full,
+  /// the chunk is dropped.
   void remove(std::size_t stream, std::optional<std::size_t> written) {
     const auto first = std::ranges::find_if(waiting_, [&](const Chunk& chunk) { return chunk.stream == stream; });
     const std::size_t bytes = written.value_or(first->text.size());
@@ -150,7 +151,7 @@ class Queue {
   struct Stream {
     std::size_t bytes = 0;
     std::uint64_t dropped = 0;
-    bool json = false;  ///< the last dropped line is a JSON object
+    bool json = false;  ///< the last dropped line was JSON
   };
 
   std::array<int, 2> files_;
@@ -162,7 +163,7 @@ class Queue {
   bool ended_ = false;
 };
 
-/// Holds the text of a stream until the line is complete.
+/// Buffers the text of a stream until the line is complete.
 class Lines : public std::streambuf {
  public:
   Lines(Queue& queue, std::size_t stream) : queue_(queue), stream_(stream) {}
@@ -187,7 +188,7 @@ class Lines : public std::streambuf {
   }
 
  private:
-  /// Adds the lines separately because dropped lines are counted.
+  /// Each line must be added separately because the dropped lines are counted.
   void take(std::size_t size) {
     std::string_view text(partial_.data(), size);
     while (!text.empty()) {
@@ -211,14 +212,15 @@ std::atomic<bool> exists{false};
 class UnblockedOutput::Redirection {
  public:
   Redirection() {
-    // The other threads of the program handle its signals. SIGPIPE is sent to the thread that writes.
+    // Signals are handled by the other threads of the program. SIGPIPE must not be blocked because it is sent to the
+    // thread that writes.
     sigset_t all;
     sigset_t before;
     sigfillset(&all);
     sigdelset(&all, SIGPIPE);
     pthread_sigmask(SIG_BLOCK, &all, &before);
     try {
-      // The thread shares the queue because a blocked write can outlive this object.
+      // The queue is shared because a blocked write can outlive this object.
       thread_ = std::thread([queue = queue_] {
         pthread_setname_np(pthread_self(), "output");
         queue->write();
@@ -228,7 +230,7 @@ class UnblockedOutput::Redirection {
       throw std::runtime_error("cannot start the thread output: " + error.code().message());
     }
     pthread_sigmask(SIG_SETMASK, &before, nullptr);
-    // By default, std::cerr flushes itself and std::cout after each operator<<.
+    // By default, std::cerr is flushed after each operator<<, and it is tied to std::cout.
     std::cerr.unsetf(std::ios::unitbuf);
     tied_ = std::cerr.tie(nullptr);
     out_before_ = std::cout.rdbuf(&out_);

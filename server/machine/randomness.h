@@ -6,8 +6,8 @@
 
 namespace tendon {
 
-/// Random bytes from the system, good enough for keys; at most 256 in one call. Throws std::system_error when
-/// it gives none.
+/// Fills the buffer, which must not exceed 256 bytes, with random bytes from the system. They can be used for keys.
+/// Throws std::system_error if this is not possible.
 void fill_random(std::span<std::byte> bytes);
 
 }  // namespace tendon

@@ -24,7 +24,7 @@ namespace tendon {
 
 namespace {
 
-// Touches the part of the stack that the loop will use, so that no step causes a page fault.
+// Touches the part of the stack that is used by the loop to avoid page faults.
 void touch_stack() {
   constexpr std::size_t kBytes = 128 * 1024;
   constexpr std::size_t kPage = 4096;
@@ -32,12 +32,11 @@ void touch_stack() {
   for (std::size_t i = 0; i < kBytes; i += kPage) stack[i] = std::byte{0};
 }
 
-/// A line of /proc/self/maps.
 struct Mapping {
   std::uintptr_t from = 0;
   std::uintptr_t to = 0;
   bool readable = false;
-  std::string of;  ///< a file, or "[heap]"; empty: memory without a name
+  std::string of;  ///< the file, "[heap]", or empty
 };
 
 std::vector<Mapping> mappings() {
@@ -56,8 +55,8 @@ std::vector<Mapping> mappings() {
   return found;
 }
 
-/// Whether a haptic step runs, reads or writes what is mapped from there: not the libraries of the network and of the
-/// log.
+/// Returns true if the memory may be used by a haptic step. This excludes the libraries that are only used by the
+/// network and log threads.
 bool is_of_a_step(const Mapping& mapping, const std::string& program) {
   if (mapping.of == program || mapping.of == "[heap]") return true;
   constexpr std::array<std::string_view, 2> kLibraries = {"libc.so", "libm.so"};
@@ -65,19 +64,22 @@ bool is_of_a_step(const Mapping& mapping, const std::string& program) {
   return std::ranges::any_of(kLibraries, [file](std::string_view library) { return file.starts_with(library); });
 }
 
-/// Locks each page from its first use on, and uses now what a step may use later. 0, or an errno.
+/// Locks all pages when they are first used, and loads those that may be used by a haptic step. Returns 0 or errno.
 int lock_memory() {
   if (mlockall(MCL_CURRENT | MCL_FUTURE | MCL_ONFAULT) != 0) return errno;
   const std::vector<Mapping> all = mappings();
-  if (all.empty()) return mlockall(MCL_CURRENT | MCL_FUTURE) == 0 ? 0 : errno;  // without /proc: everything
+  // If /proc is not available, load everything.
+  if (all.empty()) return mlockall(MCL_CURRENT | MCL_FUTURE) == 0 ? 0 : errno;
   const std::string& program = all.front().of;
-  bool before = false;  // the mapping just below is of a step: variables without a value lie behind their program
+  // This is true if the previous mapping was locked. The zero-initialized variables of a program are in the next
+  // mapping.
+  bool before = false;
   std::uintptr_t below = 0;
   for (const Mapping& mapping : all) {
     const bool goes_on = before && mapping.of.empty() && mapping.from == below;
     before = mapping.readable && (goes_on || is_of_a_step(mapping, program));
     below = mapping.to;
-    // The address is a number in that file.
+    // The address was parsed from the file.
     if (before && mlock(reinterpret_cast<const void*>(mapping.from), mapping.to - mapping.from) != 0) return errno;
   }
   return 0;
@@ -86,7 +88,8 @@ int lock_memory() {
 }  // namespace
 
 void use_small_stacks() {
-  // A haptic thread touches 136 kB beforehand; network and log, with sessions and a recording, have used 16.
+  // A haptic thread touches 136 kB. Network and log threads were measured to use 16 kB, including sessions and a
+  // recording.
   constexpr std::size_t kBytes = 256 * 1024;
   pthread_attr_t usual;
   if (pthread_getattr_default_np(&usual) != 0) return;
@@ -95,7 +98,7 @@ void use_small_stacks() {
     if (pthread_attr_setstacksize(&small, kBytes) == 0 && pthread_setattr_default_np(&small) == 0) {
       try {
         std::thread([] {}).join();
-      } catch (const std::system_error&) {  // all that is local to a thread lies on its stack, too
+      } catch (const std::system_error&) {  // thread-local data is also on the stack
         pthread_setattr_default_np(&usual);
       }
     }

@@ -9,33 +9,34 @@
 
 namespace tendon {
 
-/// Below the kernel's own watchdog and migration threads (99) and above ordinary IRQ threads (50).
+/// This is below the watchdog and migration threads of the kernel (99), and above ordinary IRQ threads (50).
 inline constexpr int kHapticPriority = 70;
 
-/// Gives each thread that the process starts from now on a stack of 256 kB. The system's 8 MB for each would count in
-/// full where locked memory is limited (RLIMIT_MEMLOCK). Stacks stay as they are where what is local to a thread does not
-/// fit, as with the thread sanitizer. Before the first thread.
+/// Sets the default stack size of new threads to 256 kB. The default of 8 MB would count against the limit of locked
+/// memory (RLIMIT_MEMLOCK). The size is not changed if thread-local data would not fit, for example with the thread
+/// sanitizer. This must be called before the first thread is started.
 void use_small_stacks();
 
-/// Asks the kernel to treat the calling thread as a haptic thread: SCHED_FIFO, no timer slack, memory locked, stack
-/// touched beforehand. Every page of the process is locked from its first use on. Those that a step may use are brought
-/// in now: the program, the C library and its mathematics, the heap; rings and mailboxes are written when they are
-/// made. Returns a plain sentence for each request that was refused, which says what would grant it. The thread then
-/// runs all the same, but may wake late.
+/// Configures the calling thread as a haptic thread. It uses SCHED_FIFO, disables timer slack, locks the memory, and
+/// touches the stack. Pages are locked when they are first used. The pages that a haptic step may need are loaded
+/// immediately, including the program, the C library, the math library and the heap. Rings and mailboxes are already
+/// initialized when they are created. If a request is refused, the thread still runs, but it may wake up late. Returns
+/// a message for each of these requests, with instructions for the operator.
 ///
-/// `priority`: 1…99.
+/// The `priority` must be from 1 to 99.
 std::vector<std::string> enter_realtime(int priority);
 
-/// Keeps the calling thread on processor `cpu` (from 0), where nothing else should run (`isolcpus`). Returns a plain
-/// sentence when the kernel refuses; the thread then runs where it did.
+/// Pins the calling thread to a processor, which should not be used by other threads (`isolcpus`). Returns an error
+/// message if this is refused by the kernel.
 std::optional<std::string> stay_on(std::uint32_t cpu);
 
-/// Processors that this process may run on, at least 1.
+/// Returns the number of processors that this process can use, which is at least 1.
 int processors_allowed();
 
-/// While it lives, keeps the processors out of sleep states that are slow to leave: it holds /dev/cpu_dma_latency open,
-/// with 0 µs written to it as 32 bits (Documentation/power/pm_qos_interface.rst). Costs power. A kernel without that
-/// file has no such states, or does not offer the choice: that does not count as a refusal.
+/// Prevents the processors from entering sleep states with a long exit latency while this object exists. To do this, it
+/// keeps /dev/cpu_dma_latency open after writing a 32-bit value of 0 µs (Documentation/power/pm_qos_interface.rst).
+/// This increases the power consumption. If the file does not exist, this is not treated as an error because such a
+/// kernel either has no deep sleep states or does not support this setting.
 ///
 /// Thread-safe: no.
 class WakefulProcessors {
@@ -46,7 +47,7 @@ class WakefulProcessors {
   WakefulProcessors& operator=(const WakefulProcessors&) = delete;
 
   bool held() const noexcept { return held_; }
-  /// When the kernel refused: a plain sentence that says what would grant it; else empty.
+  /// Returns an error message with instructions if the kernel has refused the request.
   const std::optional<std::string>& refused() const noexcept { return refused_; }
 
  private:
@@ -55,11 +56,11 @@ class WakefulProcessors {
   std::optional<std::string> refused_;
 };
 
-/// Names the calling thread for top -H, perf and gdb. At most 15 characters are kept. server/THREADS.md lists all
-/// threads and what each does.
+/// Sets the name of the calling thread for top -H, perf and gdb. It is truncated to 15 characters. See
+/// server/THREADS.md for a list of all threads.
 void name_thread(const std::string& name);
 
-/// For a network or log thread: only turns timer slack off.
+/// Disables timer slack. This is used for network and log threads.
 void enter_punctual();
 
 }  // namespace tendon

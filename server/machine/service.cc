@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The two protocols of sd_notify(3) and sd_watchdog_enabled(3): a datagram, and two variables. libsystemd would bring
-// seven libraries into the process for them.
+// Implements the protocols of sd_notify(3) and sd_watchdog_enabled(3). This avoids a dependency on libsystemd, which
+// would load seven libraries.
 #include "server/machine/service.h"
 
 #include <sys/socket.h>
@@ -19,13 +19,13 @@
 namespace tendon::service {
 namespace {
 
-/// Empty when it is not set.
+/// Returns an empty string if it is not set.
 std::string_view variable(const char* name) {
   const char* const value = std::getenv(name);  // NOLINT(concurrency-mt-unsafe): nobody sets it
   return value == nullptr ? std::string_view() : value;
 }
 
-/// Empty when it is no whole number above 0, or not set.
+/// Returns nothing if it is not set or if it is not a positive integer.
 std::optional<std::int64_t> number(const char* name) {
   const std::string_view text = variable(name);
   std::int64_t value = 0;
@@ -40,7 +40,7 @@ void tell(std::string_view state) {
   to.sun_family = AF_UNIX;
   if (manager.empty() || manager.size() > sizeof to.sun_path) return;
   std::copy(manager.begin(), manager.end(), to.sun_path);
-  if (to.sun_path[0] == '@') to.sun_path[0] = '\0';  // a name that is no file (unix(7))
+  if (to.sun_path[0] == '@') to.sun_path[0] = '\0';  // abstract socket address, see unix(7)
   const int from = ::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0);
   if (from < 0) return;
   ::sendto(from, state.data(), state.size(), MSG_NOSIGNAL, reinterpret_cast<const sockaddr*>(&to),
@@ -57,7 +57,7 @@ void stopping() { tell("STOPPING=1"); }
 std::optional<Duration> watch_period() {
   const auto microseconds = number("WATCHDOG_USEC");
   if (!microseconds) return {};
-  // Set, it names the process that is watched: not one that inherits the variables.
+  // This variable may have been inherited. In this case, it contains the id of another process.
   if (!variable("WATCHDOG_PID").empty() && number("WATCHDOG_PID") != ::getpid()) return {};
   return std::chrono::microseconds(*microseconds / 2);
 }

@@ -5,17 +5,15 @@
 
 #include "core/base/time.h"
 
-/// Tells the service manager that started this process (systemd, sd_notify(3)) how the process does. Without a service
-/// manager it does nothing.
+/// Sends status messages to the service manager that has started this process (systemd, see sd_notify(3)). If there is
+/// no service manager, these functions have no effect.
 namespace tendon::service {
 
-/// It serves.
 void ready();
-/// It has begun to end.
 void stopping();
 
-/// How often to call `alive`: half of WatchdogSec=, the silence after which the manager ends a process. Empty when the
-/// manager does not watch this one.
+/// Returns the period at which `alive` must be called. This is half of WatchdogSec=, after which the process would be
+/// killed. Returns nothing if the watchdog is not enabled for this process.
 std::optional<Duration> watch_period();
 void alive();
 

@@ -25,12 +25,13 @@ namespace {
 
 using asio::ip::udp;
 
-/// Size of the kernel's buffer for datagrams that nobody has read yet. The virtual machines we tested
-/// on pause for up to 36 ms; ten clients at 1 kHz send 360 datagrams in that time, and the kernel
-/// books up to 2.3 kB for each. The system grants at most net.core.rmem_max, without an error.
+/// The size of the receive buffer of the kernel. The virtual machines that were tested pause for up to 36 ms. In this
+/// time, 10 clients at 1 kHz send 360 datagrams, and each datagram requires up to 2.3 kB in the kernel. The size is
+/// silently limited to net.core.rmem_max.
 constexpr int kReceiveBufferBytes = 1 << 20;
 
-/// Empty datagrams skipped by one receive(): a flood of them must not keep us from sending.
+/// The maximum number of empty datagrams that are skipped in one call, so that a flood does not prevent us from
+/// sending.
 constexpr int kMaxEmptyDatagrams = 64;
 
 udp::endpoint to_endpoint(const Address& address) {
@@ -53,10 +54,9 @@ void set(int fd, int option, const Value& value, int level = SOL_SOCKET) {
   }
 }
 
-/// A datagram for recvmsg(2) or sendmsg(2), with its local address.
 struct Message {
   Message(std::span<const std::byte> datagram, udp::endpoint& peer, std::size_t peer_size)
-      : piece_{const_cast<std::byte*>(datagram.data()), datagram.size()} {  // sendmsg does not write there
+      : piece_{const_cast<std::byte*>(datagram.data()), datagram.size()} {  // not modified by sendmsg
     header.msg_name = peer.data();
     header.msg_namelen = static_cast<socklen_t>(peer_size);
     header.msg_iov = &piece_;
@@ -83,7 +83,6 @@ struct Message {
     local_address::write(local, header);
   }
 
-  /// Lets the kernel choose the source address.
   void leave_from_any() noexcept {
     header.msg_control = nullptr;
     header.msg_controllen = 0;
@@ -96,11 +95,11 @@ struct Message {
   alignas(cmsghdr) std::array<char, local_address::kControlBytes> control_{};
 };
 
-/// From now on further sockets of this user may have the same address.
+/// Allows other sockets of the same user to have the same address.
 void share_address(int fd) { set(fd, SO_REUSEPORT, int{1}); }
 
-/// For all sockets that share the address; as UdpLink::several says. A datagram that is too short to be read goes to the
-/// first one, as the kernel ends the filter with 0.
+/// Attaches the filter that is described at UdpLink::several. If a datagram is too short, the filter returns 0, which
+/// is the first socket.
 void steer_by_connection(int fd, std::uint32_t count) {
   constexpr auto kTypeBits = 0x0FU;
   std::array<sock_filter, 7> program = {{
@@ -115,8 +114,8 @@ void steer_by_connection(int fd, std::uint32_t count) {
   set(fd, SO_ATTACH_REUSEPORT_CBPF, sock_fprog{static_cast<unsigned short>(program.size()), program.data()});
 }
 
-/// Asio watches its sockets with an epoll, which each datagram would wake, and nobody waits for: the descriptor is let
-/// go. Throws std::system_error.
+/// Creates a socket and releases it from Asio. Otherwise, Asio would watch it with an epoll instance, which would be
+/// notified for each datagram. Throws std::system_error.
 int socket_on(const udp::endpoint& endpoint, bool shares_address) {
   asio::io_context context;
   udp::socket socket(context, endpoint.protocol());
@@ -162,7 +161,7 @@ UdpLink::UdpLink(const UdpLink& first, Further)
 
 std::vector<std::unique_ptr<UdpLink>> UdpLink::several(const Address& listen, Reach reach, std::uint32_t count) {
   std::vector<std::unique_ptr<UdpLink>> links;
-  links.push_back(std::make_unique<UdpLink>(listen, reach));  // by itself: another server's address is refused
+  links.push_back(std::make_unique<UdpLink>(listen, reach));  // fails if the address is in use
   if (count == 1) return links;
   try {
     share_address(links.front()->fd_);
@@ -194,7 +193,7 @@ bool UdpLink::send_to_network(const Address& to, std::span<const std::byte> data
   Message message(datagram, endpoint, endpoint.size());
   message.leave_from(*local);
   if (::sendmsg(fd_, &message.header, MSG_NOSIGNAL) >= 0) return true;
-  // The machine may have lost this address, or it may be a multicast address.
+  // This local address may have been removed, or it may be a multicast address.
   if (errno != EINVAL && errno != EADDRNOTAVAIL && errno != ENETUNREACH) return false;
   message.leave_from_any();
   return ::sendmsg(fd_, &message.header, MSG_NOSIGNAL) >= 0;
@@ -218,7 +217,7 @@ std::size_t UdpLink::receive_from_network(Address& from, std::span<std::byte> bu
     if (size < 0) return 0;
     endpoint.resize(message.header.msg_namelen);
     from = to_address(endpoint);
-    if (UnixSocket::is_peer(from)) continue;  // no port is 0, unless somebody makes it up
+    if (UnixSocket::is_peer(from)) continue;  // spoofed: port 0 is not valid
     if (asked_at_) {
       if (const auto local = message.local()) asked_at_->put(from, *local);
     }
@@ -230,7 +229,7 @@ std::size_t UdpLink::receive_from_network(Address& from, std::span<std::byte> bu
 LocalTime UdpLink::present(LocalTime now) const { return std::max(now, clock::now()); }
 
 void UdpLink::wait(Duration timeout, Doorbell* doorbell) {
-  // poll() ignores an entry with a negative descriptor.
+  // Entries with a negative descriptor are ignored by poll().
   std::array<pollfd, 3> fds = {pollfd{fd_, POLLIN, 0}, pollfd{doorbell != nullptr ? doorbell->fd() : -1, POLLIN, 0},
                                pollfd{unix_ ? unix_->fd() : -1, POLLIN, 0}};
   const Duration left = std::max(timeout, Duration::zero());

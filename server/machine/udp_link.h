@@ -16,64 +16,64 @@
 
 namespace tendon {
 
-/// Who may reach a socket.
+/// Determines who can connect to a socket.
 enum class Reach : std::uint8_t {
   kThisMachine,  ///< loopback only
-  kAnywhere,     ///< only for servers that require a key
+  kAnywhere,     ///< requires keys
 };
 
-/// The real link: one UDP socket on an IPv4 or IPv6 address of this machine, or on all of its addresses. 0.0.0.0 means
-/// all IPv4 addresses, and [::] means all addresses of both families. The answer to a peer is then sent from the address
-/// that the peer has used. A Unix socket for engines on the same machine is optional.
+/// A UDP socket on one or all of the IPv4 or IPv6 addresses of this machine. The address 0.0.0.0 means all IPv4
+/// addresses, and [::] means all addresses of both families. In this case, the reply to a peer is sent from the address
+/// that was used by the peer. Optionally, there is also a Unix socket for engines on the same machine.
 ///
-/// send() and receive() never wait; wait() is the only place where the network thread sleeps.
-/// Anybody may send anything; nothing here looks inside the datagrams.
+/// The functions send() and receive() do not block. The network thread only sleeps in wait(). The content of datagrams
+/// is not checked.
 ///
 /// Thread-safe: no. Realtime-safe: no (system calls).
 class UdpLink : public Link {
  public:
-  /// Opens and binds; port 0 lets the system choose one (see local_address()). Throws std::invalid_argument when
-  /// `listen` is not a loopback address and the caller has not allowed others: without keys anybody on the network
-  /// could command forces. Throws std::runtime_error when the system refuses: "cannot listen on 127.0.0.1:47100:
-  /// Address already in use".
+  /// Opens the socket. If the port is 0, it is chosen by the system (see local_address()). Throws std::invalid_argument
+  /// if `listen` is not a loopback address and `reach` does not allow this. Without keys, anybody on the network would
+  /// be able to command forces. Throws std::runtime_error if the system refuses, for example "cannot listen on
+  /// 127.0.0.1:47100: Address already in use".
   ///
-  /// `file`: of the Unix socket; throws as UnixSocket does.
+  /// If `file` is set, a Unix socket is created as well. Throws the errors of UnixSocket.
   explicit UdpLink(const Address& listen, Reach reach = Reach::kThisMachine,
                    const std::optional<std::filesystem::path>& file = std::nullopt);
 
-  /// Links with one address, each for a thread of its own; `count` is a power of two. Of several the kernel gives Data
-  /// to the one whose place is the datagram's connection id modulo `count`, and anything else to the first (SO_REUSEPORT
-  /// and a filter, socket(7)). Replies may leave through each of them. Throws as the constructor does.
+  /// Creates links that share an address. Each link should be used in a separate thread, and `count` must be a power of
+  /// two. The kernel distributes Data datagrams based on the connection id modulo `count`. All other datagrams are
+  /// received by the first link. This is implemented with SO_REUSEPORT and a filter (socket(7)). All links can be used
+  /// to send. Throws the same errors as the constructor.
   static std::vector<std::unique_ptr<UdpLink>> several(const Address& listen, Reach reach, std::uint32_t count);
 
   ~UdpLink() override;
   UdpLink(const UdpLink&) = delete;
   UdpLink& operator=(const UdpLink&) = delete;
 
-  /// A datagram that the system does not take at once (full buffer, no route, other address family)
-  /// is lost, and counted in send_failures().
+  /// If the datagram cannot be sent immediately, it is dropped and counted in send_failures(). For example, the buffer
+  /// is full, there is no route, or the address family is different.
   void send(const Address& to, std::span<const std::byte> datagram) override;
 
-  /// As Link says, of both sockets in turns. Empty datagrams are skipped: they say nothing, and 0 means that none is
-  /// waiting.
+  /// See Link. If there is a Unix socket, both sockets are read alternately. Empty datagrams are skipped because a size
+  /// of 0 means that there is no datagram.
   std::size_t receive(Address& from, std::span<std::byte> buffer) override;
 
-  /// The time by clock::now().
+  /// Returns clock::now().
   LocalTime present(LocalTime now) const override;
 
-  /// Waits until a datagram can be received, or the doorbell rings (it is then answered), or
-  /// `timeout` is over, whichever comes first; a signal handler may end it sooner. A timeout of zero
-  /// or less does not wait. The resolution is the kernel's: set the thread's timer slack to 1 ns if
-  /// 50 µs matter.
+  /// Waits until a datagram can be received, the doorbell rings, or `timeout` has elapsed. It may return early if a
+  /// signal handler is called. If the doorbell has rung, it is answered. This does not block if `timeout` is not
+  /// positive. The resolution is determined by the timer slack of the thread, which is 50 µs by default.
   void wait(Duration timeout, Doorbell* doorbell = nullptr);
 
-  /// Where peers can reach this socket; the port is the real one.
+  /// Returns the address of the socket with the actual port.
   Address local_address() const;
 
-  /// Datagrams that send() could not hand to the system. From any thread.
+  /// Returns the number of datagrams that have been dropped by send(). Thread-safe: yes.
   std::uint64_t send_failures() const noexcept { return send_failures_.value(); }
 
-  /// The UDP socket's file descriptor, for whoever polls several links at once.
+  /// Returns the file descriptor of the UDP socket, for polling several links.
   int fd() const noexcept { return fd_; }
 
  private:
@@ -84,9 +84,9 @@ class UdpLink : public Link {
 
   int fd_ = -1;
   std::unique_ptr<AskedAt> own_asked_at_;
-  AskedAt* asked_at_ = nullptr;  ///< that of the first link of the address; null if bound to a single address
+  AskedAt* asked_at_ = nullptr;  ///< owned by the first link; null if bound to a single address
   std::optional<UnixSocket> unix_;
-  bool unix_first_ = false;  ///< a flood through the one must not close the other
+  bool unix_first_ = false;  ///< which socket is read first, to prevent starvation
   Counter send_failures_;
 };
 

@@ -20,18 +20,18 @@
 namespace tendon {
 namespace {
 
-/// Of one receive(): a flood of datagrams that say nothing must not keep us from sending.
+/// The maximum number of datagrams that are skipped in one call, so that a flood does not prevent us from sending.
 constexpr int kMaxSkips = 64;
 
 constexpr std::size_t kNameStart = offsetof(sockaddr_un, sun_path);
-/// NUL and five hexadecimal digits, as the kernel makes them (net/unix/af_unix.c, unix_autobind).
+/// A null byte and 5 hexadecimal digits, see unix_autobind() in net/unix/af_unix.c.
 constexpr std::size_t kDigits = 5;
 constexpr std::size_t kNameBytes = kNameStart + 1 + kDigits;
 
-/// The first 12 bits of the addresses that stand for peers.
+/// The prefix of all addresses that represent peers. Only the first 12 bits of the IPv4 address are used.
 constexpr std::array<std::uint8_t, 14> kPeers = {0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0xff, 0xff, 127, 240};
 
-/// Empty when it is none that the kernel gives.
+/// Returns nothing if this is not a name that was assigned by the kernel.
 std::optional<Address> address_of(const sockaddr_un& name, socklen_t length) {
   if (length != kNameBytes || name.sun_path[0] != '\0') return std::nullopt;
   std::uint32_t number = 0;
@@ -104,10 +104,10 @@ void UnixSocket::bind_to_file() {
   if (::lstat(path_.c_str(), &found) == 0) {
     if (!S_ISSOCK(found.st_mode)) refuse(path_, "there is a file that is no socket; it stays as it is");
     if (::connect(fd_, as_address(name), sizeof name) == 0) refuse(path_, "another server listens there");
-    // Nobody listens: a server that died has left it.
+    // No process is listening, so the file was left behind by a server that was killed.
     if (errno != ECONNREFUSED || ::unlink(path_.c_str()) != 0) refuse(path_, reason());
   }
-  // Nobody else may write to it at any instant.
+  // Other users must not be able to write to the file, not even for a short time.
   const mode_t before = ::umask(S_IXUSR | S_IXGRP | S_IRWXO);
   const int bound = ::bind(fd_, as_address(name), sizeof name);
   const std::string why = bound == 0 ? "" : reason();

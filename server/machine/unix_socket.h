@@ -11,34 +11,36 @@
 
 namespace tendon {
 
-/// A datagram socket that engines on the same machine reach by a file: who may write to the file may come in.
+/// A datagram socket for engines on the same machine. Access is controlled by the permissions of its file.
 ///
-/// The file belongs to the user and group of this process, and only these two may use it (mode 0660). A peer is known
-/// by the name that the kernel has given its socket (unix(7), autobind: 20 bits), and stands for an Address that no
-/// datagram of a network can come from: 127.240.0.0 to 127.255.255.255, port 0. A peer in another network namespace (a
-/// container) has its name there, where no answer reaches it.
+/// The file is owned by the user and group of this process, and its mode is 0660. A peer is identified by the name that
+/// was assigned to its socket by the kernel (autobind, see unix(7)). This name has 20 bits. It is mapped to an address
+/// in the range 127.240.0.0 to 127.255.255.255 with port 0, which cannot be the source of a datagram from the network.
+/// If a peer is in another network namespace, for example in a container, it cannot receive replies because its name
+/// belongs to that namespace.
 ///
 /// Thread-safe: no. Realtime-safe: no (system calls).
 class UnixSocket {
  public:
-  static constexpr std::size_t kMostPath = 107;  ///< bytes; the system has room for no more
+  static constexpr std::size_t kMostPath = 107;  ///< bytes, limited by sockaddr_un
 
-  /// Makes the file. One that a server has left behind when it died is replaced. Throws std::runtime_error when there
-  /// is a server behind the file, when it is no socket (it stays as it is), when the path has more than 107 bytes, or
-  /// with the system's reason: "cannot listen on unix:/run/x: Permission denied".
+  /// Creates the file. If a previous server was killed and has left a file behind, it is replaced. Throws
+  /// std::runtime_error if another server uses the file, if it is not a socket, if the path is longer than kMostPath,
+  /// or if the system refuses, for example "cannot listen on unix:/run/x: Permission denied".
   explicit UnixSocket(std::filesystem::path path);
-  /// Takes the file away, unless it is another's by now.
+  /// Removes the file unless it was replaced by another process.
   ~UnixSocket();
   UnixSocket(const UnixSocket&) = delete;
   UnixSocket& operator=(const UnixSocket&) = delete;
 
-  /// Whether this address stands for a peer of such a socket.
+  /// Returns true if this address represents a peer of a Unix socket.
   static bool is_peer(const Address& address) noexcept;
 
-  /// False when the datagram is lost: nobody has that name, or ten datagrams wait there (net.unix.max_dgram_qlen).
+  /// Returns false if the datagram was dropped because the peer is gone or its queue is full. The default length of the
+  /// queue is 10 (net.unix.max_dgram_qlen).
   bool send(const Address& to, std::span<const std::byte> datagram) noexcept;
 
-  /// As Link says. A datagram that is empty, or whose sender has no name, is skipped.
+  /// See Link. Empty datagrams and datagrams from unnamed sockets are skipped.
   std::size_t receive(Address& from, std::span<std::byte> buffer) noexcept;
 
   int fd() const noexcept { return fd_; }
@@ -53,7 +55,7 @@ class UnixSocket {
   void bind_to_file();
 
   std::filesystem::path path_;
-  std::optional<Inode> inode_;  ///< of the file, when it has been made
+  std::optional<Inode> inode_;  ///< set if the file was created
   int fd_ = -1;
 };
 

@@ -11,27 +11,27 @@
 
 namespace tendon {
 
-/// A file with a recorded motion, and how to read it. The file is a table for `TableReader` with one sample in each row.
+/// Describes a file with a recorded motion. The file is a table for `TableReader` with one sample per row.
 struct RecordedMotionFile {
-  /// The name of a column in the header, or the number of a column, counted from 0.
+  /// The name or the index of a column.
   using Column = std::variant<std::string, std::size_t>;
 
-  std::filesystem::path path;        ///< where it is; errors begin with it
-  Column time = std::string("t_s");  ///< s, or the unit in its name; strictly increasing
-  Column position;                   ///< in the file's own unit
-  double scale = 1;                  ///< m per unit of `position`; not 0. Negative turns the motion round
-  Vec3 origin = Vec3::Zero();        ///< m, where position 0 lies
+  std::filesystem::path path;        ///< used in error messages
+  Column time = std::string("t_s");  ///< s, unless its name has another unit; must be strictly increasing
+  Column position;                   ///< in the unit of the file
+  double scale = 1;                  ///< m per unit of `position`; not 0; can be negative
+  Vec3 origin = Vec3::Zero();        ///< m, corresponds to position 0
   Vec3 direction = Vec3::UnitX();
   ScriptedMotion::Recorded::AtEnd at_end = ScriptedMotion::Recorded::AtEnd::kHold;
 };
 
-/// The most samples that a recording may have: 33 minutes at 2 kHz, 64 MB. The limit protects against a path to a file
-/// of another kind.
+/// The maximum number of samples, which is 33 minutes at 2 kHz or 64 MB. It protects against files of the wrong type.
 inline constexpr std::size_t kMaxRecordedSamples = 4'000'000;
 
-/// Reads a whole recorded motion from `csv`, the content of `file.path`, before the loop runs. It needs memory for the
-/// samples and one line. It throws std::runtime_error "PATH:LINE: expected …, found …" if `TableReader` refuses the file,
-/// if a column is missing, if the time does not increase, or if there are fewer than 2 samples or too many.
+/// Reads a recorded motion from `csv`, which must be the content of `file.path`. This requires memory for all samples,
+/// so it must be called before the loop runs. Throws std::runtime_error "PATH:LINE: expected …, found …" if the table
+/// is not valid, if a column is missing, if the time does not increase, or if the number of samples is less than 2 or
+/// too large.
 ScriptedMotion::Recorded load_recorded_motion(std::istream& csv, const RecordedMotionFile& file);
 
 }  // namespace tendon

@@ -32,13 +32,12 @@ std::string lower(std::string_view text) {
   return result;
 }
 
-/// Quotes and shortens a text for an error message.
+/// Quotes and truncates a text for an error message.
 std::string shown(std::string_view text) {
   constexpr std::size_t kShown = 60;
   return "'" + std::string(text.substr(0, kShown)) + (text.size() > kShown ? "…'" : "'");
 }
 
-/// Parses a finite number with a decimal point.
 std::optional<double> plain_number(std::string_view text) {
   if (text.starts_with('+')) text.remove_prefix(1);
   double value = 0;
@@ -47,7 +46,6 @@ std::optional<double> plain_number(std::string_view text) {
   return value;
 }
 
-/// Parses a finite number with a decimal comma.
 std::optional<double> number_with_comma(std::string_view text) {
   const auto comma = text.find(',');
   if (comma == std::string_view::npos || text.find_first_of(",.", comma + 1) != std::string_view::npos ||
@@ -59,7 +57,7 @@ std::optional<double> number_with_comma(std::string_view text) {
   return plain_number(with_point);
 }
 
-/// Returns true for a number like "1,012", where the comma could be a thousands separator.
+/// Returns true for a number like "1,012". Its comma could be a thousands separator.
 bool may_separate_thousands(std::string_view text) {
   if (text.starts_with('-') || text.starts_with('+')) text.remove_prefix(1);
   const auto comma = text.find(',');
@@ -67,7 +65,7 @@ bool may_separate_thousands(std::string_view text) {
          std::ranges::all_of(text.substr(0, comma), is_digit) && std::ranges::all_of(text.substr(comma + 1), is_digit);
 }
 
-/// Returns true if this cannot be the name of a column. Loggers also write nan and inf for numbers.
+/// Returns true if this cannot be the name of a column. This includes nan and inf, which are used by some loggers.
 bool is_numeric(std::string_view text) {
   const std::string small = lower(text);
   const std::string_view size =
@@ -88,7 +86,7 @@ bool is_plain_name(std::string_view text) {
 enum class Kind { kTime, kLength, kForce, kTorque, kAngle };
 
 struct Unit {
-  std::string_view symbol;  ///< in small letters
+  std::string_view symbol;  ///< in lowercase
   Kind kind;
   double per_si;
 };
@@ -127,7 +125,7 @@ struct Named {
   const Unit* unit = nullptr;
 };
 
-/// Splits "x_mm", "X [mm]", "x (mm)" and "x/mm" into the name x and the unit mm.
+/// Parses "x_mm", "X [mm]", "x (mm)" and "x/mm".
 Named named(std::string_view cell) {
   const std::string name = lower(trimmed(cell));
   const std::string_view all = name;
@@ -149,7 +147,7 @@ Named named(std::string_view cell) {
 TableReader::Column converted(std::size_t index, const Unit* from, const Unit* to) {
   TableReader::Column column{.index = index};
   if (from == nullptr || to == nullptr || from->kind != to->kind) return column;
-  // This rounds only once. Multiplying by 0.001 would round twice.
+  // This only rounds once. If the number was multiplied by 0.001, it would be rounded twice.
   if (to->per_si >= from->per_si) {
     column.multiply = to->per_si / from->per_si;
   } else {
@@ -166,7 +164,7 @@ TableReader::TableReader(std::istream& from, std::string name, const Options& op
 }
 
 void TableReader::fail(std::string sentence) const {
-  // The sentence may quote the file, which could contain control characters for the terminal.
+  // The message may contain text from the file, including control characters.
   std::ranges::replace_if(
       sentence, [](unsigned char c) { return std::iscntrl(c) != 0; }, '?');
   throw std::runtime_error(name_ + ':' + std::to_string(std::max<std::size_t>(line_number_, 1)) + ": " + sentence);
@@ -240,7 +238,7 @@ void TableReader::split(std::string_view line) {
 }
 
 void TableReader::read_first_row() {
-  unquoted_.reserve(kMaxLine);  // cells_ points into it, so it must not grow
+  unquoted_.reserve(kMaxLine);  // referenced by cells_, so it must not be reallocated
   std::optional<std::string_view> line;
   std::string_view row;
   do {
@@ -259,20 +257,20 @@ void TableReader::read_first_row() {
     };
     for (const char each : {';', '\t', ','}) {
       separator_ = each;
-      if (separates(text, each)) return;  // the last cell can be empty, so the line is not trimmed
+      if (separates(text, each)) return;  // not trimmed because the last cell can be empty
     }
     separator_ = ' ';
     split(text);
     const bool words = std::ranges::all_of(
         cells_, [](const Cell& cell) { return !cell.quoted && (is_numeric(cell.text) || is_plain_name(cell.text)); });
-    if (!words || cells_.size() == 1) separator_ = ',';  // one column: "Delay [ms]"
+    if (!words || cells_.size() == 1) separator_ = ',';  // a single column like "Delay [ms]"
   };
   const auto has_numbers = [this] {
     return std::ranges::any_of(cells_, [](const Cell& cell) { return is_numeric(cell.text); });
   };
   choose_separator(row);
   split(row);
-  if (!has_numbers()) {  // a name can contain a #
+  if (!has_numbers()) {  // names can contain a #
     row = *line;
     choose_separator(row);
     split(row);
@@ -292,7 +290,7 @@ bool TableReader::next_row() {
   while (const auto line = next_line()) {
     const std::string_view row = uncommented(*line);
     if (trimmed(row).empty()) {
-      // A line with only a comment is not a row.
+      // A line that only contains a comment is not a row.
       if (width_ != 1 || !options_.blank_lines_are_cells || !trimmed(*line).empty()) continue;
       cells_.assign(1, Cell{});
       return true;
@@ -338,7 +336,7 @@ std::optional<TableReader::Column> TableReader::find(std::string_view name) cons
 
 TableReader::Column TableReader::column(std::string_view name) const {
   if (const auto found = find(name)) return *found;
-  return {.index = index_of(name)};  // throws
+  return {.index = index_of(name)};  // always throws
 }
 
 TableReader::Column TableReader::column(std::size_t index, std::string_view unit) const {
