@@ -21,7 +21,6 @@ std::vector<std::string> in_common(const std::vector<std::string>& offered, Role
   return both;
 }
 
-/// Whether a key lets its holder have that role.
 bool may(const ClientKey* key, Role role) {
   return key == nullptr || key->role == Role::kController || role == Role::kObserver;
 }
@@ -29,7 +28,7 @@ bool may(const ClientKey* key, Role role) {
 const std::string& name_of(const ServedDevice::Config& device) { return device.about.name; }
 const std::string& name_of(const ChannelDescription& channel) { return channel.name; }
 
-/// The index of the entry with that name; the first entry when the name is empty.
+/// Returns the index of the entry with this name. If the name is empty, this is the first entry.
 template <class Named>
 std::optional<std::uint32_t> place_of(const std::vector<Named>& all, const std::string& name) {
   if (name.empty()) return 0;
@@ -127,14 +126,15 @@ std::optional<Refusal> Admission::reason_to_refuse(const Address& from, const Cl
   }
   if (!controls && key != nullptr && config_.keys > 1) {
     const std::size_t of_key = count([&](const Guest& guest) { return observes(guest) && guest.key == key; });
-    // One key gets at most half of the places (at least one), so that it cannot keep all the others out.
+    // The number of places is limited for each key, so that other clients can still connect.
     if (of_key >= std::max<std::size_t>((config_.max_observers + 1) / 2, 1)) {
       return Refusal{Code::kBusy, "the key \"" + key->name + "\" has " + std::to_string(of_key) + " observers already"};
     }
   }
   std::size_t channels = 0;
   for (const ServedDevice& device : devices) channels += device.channels.size();
-  // A controller that waits for a lease does not count as an observer, but it costs as many states as one.
+  // If a controller is waiting for a lease, it is not counted as an observer, but it requires the same number of
+  // states.
   const std::size_t all = count([](const Guest&) { return true; });
   if (all >= config_.max_observers + channels) {
     return Refusal{Code::kBusy, "there are " + std::to_string(all) + " guests already"};

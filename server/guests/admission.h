@@ -12,44 +12,46 @@
 
 namespace tendon {
 
-/// Why somebody does not come in.
+/// The reason why a client is not admitted.
 struct Refusal {
   Code code;
   std::string reason;
 };
 
-/// Decides who comes in, and which seats they get (SESSION.md, "Opening"). It changes nothing.
+/// Determines whether a client is admitted, and which seats it gets (SESSION.md, "Opening"). The functions do not
+/// modify any state.
 ///
 /// Thread-safe: no. Realtime-safe: no.
 class Admission {
  public:
   struct Config {
-    std::size_t keys = 0;  ///< of the server; 0: it lets in whoever comes, in the clear
+    std::size_t keys = 0;                                          ///< number of keys; if 0, all clients are admitted
     bool (*needs_no_key)(const Address& from) noexcept = nullptr;  ///< see NetworkLoop::Config
-    std::size_t max_observers = 8;  ///< where there are several keys, one key has at most half of them, rounded up
+    /// If there are several keys, a single key can use at most half of these places, rounded up.
+    std::size_t max_observers = 8;
   };
 
   explicit Admission(const Config& config) : config_(config) {}
 
-  /// The seats that a Hello claims; refused when it claims what is not there, the same twice, devices of two banks, or a
-  /// role that is not the highest among its claims.
+  /// Returns the seats that are claimed by a Hello. This is refused if a device or channel does not exist, if there are
+  /// duplicates, if the devices are in different banks, or if the role is not the highest role of the claims.
   static std::variant<std::vector<Seat>, Refusal> seats_of(const Hello& hello,
                                                            const std::vector<ServedDevice::Config>& devices);
 
-  /// Why a guest at `from` with `key` (null: none) may not take these seats now; empty: it may.
+  /// Returns the reason why a client with this address and key cannot have these seats, or nothing if it can. `key` is
+  /// null if there is none.
   std::optional<Refusal> reason_to_refuse(const Address& from, const ClientKey* key, const std::vector<Seat>& seats,
                                           const std::vector<ServedDevice>& devices,
                                           const std::vector<Guest>& guests) const;
 
-  /// Whether somebody at `from` with `key` is the same program as `present`, started again.
+  /// Returns true if the new client is considered to be a restart of `present`. This is the case if the address and the
+  /// key are the same, or if the key is the same and `present` is a controller of the same channel.
   static bool takes_the_place_of(const Guest& present, const Address& from, const ClientKey* key,
                                  const std::vector<Seat>& seats);
 
-  /// What a guest is told that may come in.
   static Welcome welcome_for(const Doorman::Guest& guest, const Address& from, const std::vector<Seat>& seats,
                              const std::vector<ServedDevice>& devices, const std::vector<Guest>& guests);
 
-  /// One view of each device among the seats.
   static std::vector<View> views_of(const std::vector<Seat>& seats);
 
  private:

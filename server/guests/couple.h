@@ -8,11 +8,12 @@
 
 namespace tendon {
 
-/// What this end of a coupling tells the other about itself. Device and channel are left for the caller.
+/// Returns the description of this end of a coupling. The device and the channel are not set.
 Couple couple_of(const Coupling::Config& config);
 
-/// The first thing in which two ends do not fit together, for people: "method: yours position-force, mine
-/// position-position". Numbers fit when they differ by less than 1e-9 of the larger. Empty: they fit.
+/// Returns a description of the first difference between the configurations of both ends, for example "method: yours
+/// position-force, mine position-position". The tolerance for numbers is 1e-9, relative to the larger one. Returns an
+/// empty string if the configurations are compatible.
 std::string first_difference(const Couple& theirs, const Couple& mine);
 
 }  // namespace tendon

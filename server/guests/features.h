@@ -13,16 +13,16 @@
 
 namespace tendon {
 
-/// A set of the features that a session uses (protocol/messages.h). It has one bit for each feature.
+/// A set of features that are used in a session (protocol/messages.h).
 class Features {
  public:
-  /// The optional features that this server supports. Their order determines the bits.
+  /// The optional features that are supported by this server. The order determines the bits.
   static constexpr std::array kSupported = {kFeatureLocalModel, kFeatureChannels,     kFeatureDiagnostics,
                                             kFeatureHandle,     kFeatureJoints,       kFeatureTeleoperation,
                                             kFeatureOutputs,    kFeatureStateColumns, kFeatureWays};
 
   Features() = default;
-  /// Ignores the names of unknown features.
+  /// Unknown features are ignored.
   explicit Features(const std::vector<std::string>& names) {
     for (std::size_t i = 0; i < kSupported.size(); ++i) {
       if (std::ranges::find(names, kSupported[i]) != names.end()) bits_ |= 1U << i;

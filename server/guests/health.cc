@@ -35,7 +35,7 @@ Health HealthMeter::counted() const noexcept {
 
 DeviceReport report(const Health& before, const Health& now) {
   DeviceReport report;
-  report.until = PeerTime(now.at.time_since_epoch());  // our clock is the client's peer's
+  report.until = PeerTime(now.at.time_since_epoch());  // our clock is the peer clock of the client
   report.span = now.at - before.at;
   report.steps = now.steps - before.steps;
   report.missed = now.missed - before.missed;
@@ -48,12 +48,11 @@ DeviceReport report(const Health& before, const Health& now) {
   const auto say = [&](bool true_now, std::string_view words) {
     if (true_now) report.degraded += (report.degraded.empty() ? "" : "; ") + std::string(words);
   };
-  // Short, so that the sentences fit (limits::kMaxDetail).
+  // These texts are short because of limits::kMaxDetail.
   say(now.not_realtime, "no real time");
   say(now.steps_lost > before.steps_lost, "the log thread does not follow");
   say(now.recording_ended, "recording has stopped");
   say(now.unsent > before.unsent, "unsent datagrams");
-  // The hand accelerated more than limiter.bounded_acceleration allows.
   say(now.broken_assumptions > before.broken_assumptions, "accelerates too hard");
   const auto worst = std::ranges::find_if(kDeviceCounters, [&](const DeviceCounter& row) {
     return !row.degraded.empty() && now.device[row.count] > before.device[row.count];

@@ -14,48 +14,49 @@
 
 namespace tendon {
 
-/// How one device's loop does: what the log thread gathers, and the network thread tells observers who ask. Numbers of
-/// things are since the server started, so that one that was not seen is in the next.
+/// The health of the loop of a device. It is collected by the log thread, and the network thread sends it to observers.
+/// All counters start at 0 when the server starts, so no events are missed if an update is lost.
 struct Health {
   LocalTime at{};
-  std::uint64_t steps = 0;     ///< haptic steps
-  std::uint64_t missed = 0;    ///< periods without a step, because the one before came so late
+  std::uint64_t steps = 0;
+  std::uint64_t missed = 0;    ///< periods without a step because a step was late
   std::uint64_t overruns = 0;  ///< steps with Reason::kOverrun
   std::uint64_t unseen = 0;    ///< steps with Reason::kUnseen
-  /// Intervals in which the hand accelerated by more than AOL+'s bounded_acceleration allows: the scene's bound is
-  /// wrong.
+  /// The number of intervals in which the acceleration exceeded bounded_acceleration of AOL+. This means that the value
+  /// in the scene is not correct (core/PROOFS.md, "Bounded acceleration").
   std::uint64_t broken_assumptions = 0;
-  DeviceCounts device{};  ///< what the device's driver has counted
+  DeviceCounts device{};  ///< the counters of the driver
   LatenessHistogram lateness{};
   Safety safety = Safety::kAbsent;
-  std::string_view fault{};  ///< of static storage; empty: none
+  std::string_view fault{};  ///< static string; empty if there is no fault
 
-  // What the server does less of:
-  bool not_realtime = false;  ///< the kernel refused the haptic thread something, see enter_realtime
+  // Degraded functions of the server:
+  bool not_realtime = false;  ///< see enter_realtime
   bool recording_ended = false;
-  std::uint64_t steps_lost = 0;  ///< not recorded: the log thread came too late
-  std::uint64_t unsent = 0;      ///< datagrams that the system did not take; of the whole server
+  std::uint64_t steps_lost = 0;  ///< the log thread was too slow
+  std::uint64_t unsent = 0;      ///< datagrams of the whole server that were refused by the system
 };
 
-/// Counts what a loop's steps tell of it, in the order in which they were taken.
+/// Counts the events in the steps of a loop. The steps must be passed in order.
 ///
-///     late   = hand.at − scheduled, when the loop woke less when it was to
-///     missed = ⌊(scheduled − scheduled before) / period⌋ − 1
+///     late   = hand.at − scheduled
+///     missed = ⌊(scheduled − previous scheduled) / period⌋ − 1
 ///
-/// Thread-safe: `counted` from any thread, `observe` from one. Realtime-safe: yes, but for the constructor.
+/// Thread-safe: `counted` can be called from any thread, `observe` must be called from a single thread.
+/// Realtime-safe: yes, except for the constructor.
 class HealthMeter {
  public:
-  /// `period` of the loop. Throws std::invalid_argument when it is not above zero.
+  /// Throws std::invalid_argument if the period is not positive.
   explicit HealthMeter(Duration period);
 
   void observe(const StepRecord& step) noexcept;
-  /// The numbers as they are now; `at` and what steps do not tell are for others to fill in. There are as many steps as
-  /// `lateness` holds.
+  /// Returns the current counters. The time and the counters that do not depend on steps are not set. The number of
+  /// steps is equal to the number of values in `lateness`.
   Health counted() const noexcept;
 
  private:
   Duration period_;
-  std::optional<LocalTime> before_;  ///< when the step before was due
+  std::optional<LocalTime> before_;  ///< the previous scheduled time
   Counter missed_;
   Counter overruns_;
   Counter unseen_;
@@ -63,7 +64,7 @@ class HealthMeter {
   std::array<Counter, limits::kLatenessBuckets> lateness_;
 };
 
-/// What there is to tell of the time between two of them: all but `number` and `device`.
+/// Returns the changes between two states. The number of the report and the device are not set.
 DeviceReport report(const Health& before, const Health& now);
 
 }  // namespace tendon

@@ -7,8 +7,8 @@
 namespace tendon {
 namespace {
 
-/// Moves the median towards each sample, by at most a sixteenth of itself. It settles in about a hundred forces, and
-/// unlike a mean it is not dragged by one outlier.
+/// Moves an estimate of the median towards each sample by at most 1/16 of its value. It converges after about 100
+/// forces, and it is not sensitive to outliers.
 void track_median(Duration& median, Duration sample) noexcept {
   const Duration step = std::max<Duration>(median / 16, std::chrono::microseconds(20));
   if (sample > median) median += std::min(step, sample - median);
@@ -17,12 +17,11 @@ void track_median(Duration& median, Duration sample) noexcept {
 
 std::string milliseconds_text(Duration d) {
   const std::int64_t tenths = d.count() / 100'000;
-  // Above 10 ms a tenth of a millisecond does not matter.
   if (tenths >= 100) return std::to_string(tenths / 10) + " ms";
   return std::to_string(tenths / 10) + "." + std::to_string(tenths % 10) + " ms";
 }
 
-/// Why forces are refused; null for the other causes.
+/// Returns null if forces are not refused for this cause.
 const char* refusal(Lateness::Cause cause) {
   switch (cause) {
     case Lateness::Cause::kNotFinite:
@@ -96,7 +95,7 @@ void Lateness::begin(LocalTime now, bool same_machine) noexcept {
   heard_ = now;
   sent_.reset();
   lost_ = 0;
-  valid_until_ = LocalTime::max();  // before the first force nothing is late
+  valid_until_ = LocalTime::max();  // the first force cannot be late
   took_state_.reset();
   stood_still_ = {};
   paused_ = {};
@@ -141,7 +140,7 @@ void Lateness::took_state(LocalTime now) noexcept {
   took_state_ = now;
 }
 
-/// The longest time without a state since the newest force, up to now.
+/// Returns the longest time without a state since the newest force.
 Duration Lateness::paused(LocalTime now) const noexcept {
   return took_state_ ? std::max(paused_, now - *took_state_) : paused_;
 }

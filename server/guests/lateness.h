@@ -9,118 +9,121 @@
 
 namespace tendon {
 
-/// Why forces come late: our own threads, the network, or the physics engine. Its clock is ours; of the engine's clock
-/// it uses only how far apart two of its time stamps are.
+/// Determines why forces are late. The cause can be our own threads, the network, or the physics engine. All times are
+/// measured with our clock. The clock of the engine is only used for the differences between its time stamps.
 ///
-/// The way of a force, from the sample it answers to its arrival, has three parts that add up:
+/// The delay between a sample and the arrival of the force that answers it has three parts:
 ///
-///     received − sampled  =  (state sent − sampled)  +  round trip  +  (what remains)
+///     received − sampled  =  (state sent − sampled)  +  round trip  +  (remaining time)
 ///                            ours                       network        engine: waiting for its period, and computing
 ///
-/// The round trip is that of the datagram which brought the force: the echo in it tells how long the peer had held
-/// ours. A force is late when the one before had outlived its validity. These are asked in this order:
+/// The round trip is measured with the datagram that contains the force. Its echo contains the time for which the peer
+/// has held our datagram. A force is late if the previous force is no longer valid. The cause is determined by the
+/// first of these rules that applies:
 ///
-/// 1. If no state of the device was taken for kPause and for half of the missing time, the server is to blame: the loop
-///    of the device or the network thread has stopped. The datagrams that wait in the socket meanwhile look like a slow
-///    network or a silent engine.
-/// 2. If forces were refused since the last one, the engine is to blame.
-/// 3. If two datagrams with successive numbers carry time stamps further apart than kStandsStill, the engine's program
-///    has stopped, because a peer sends something every 50 ms (SESSION.md). The engine is to blame if this explains half
-///    of the missing time. The round trip is no evidence then, because the datagrams that a program does not read wait
-///    in its socket, and look like a slow network.
-/// 4. Which part of the way exceeds its usual length (the median of the forces that were in time) by most? That part is
-///    to blame, when it exceeds it by half the time that was missing.
-/// 5. Otherwise this force was quick, and one before it is missing. The network is to blame when datagrams were lost
-///    meanwhile, else the engine has sent none.
+/// 1. If no state of the device was received for kPause and for half of the missing time, the cause is the server.
+///    Either the loop of the device or the network thread was blocked. This rule is the first because the datagrams
+///    that wait in the socket in the meantime would look like a slow network or an engine that does not respond.
+/// 2. If forces were refused since the last valid force, the cause is the engine.
+/// 3. If the time stamps of two consecutive datagrams differ by more than kStandsStill, the program of the engine was
+///    blocked, because a peer sends a datagram every 50 ms (SESSION.md). The cause is the engine if this explains half
+///    of the missing time. In this case, the round trip is not reliable because datagrams were waiting in the socket of
+///    the program.
+/// 4. The part with the largest increase over its usual duration is the cause if the increase is at least half of the
+///    missing time. The usual duration is the median over the forces that were not late.
+/// 5. Otherwise, the delay of this force is not unusual, so a previous force is missing. The cause is the network if
+///    datagrams were lost in the meantime. Otherwise, the engine has not sent a force.
 ///
-/// A force that is still missing is our fault when states are missing, too (1), else the engine's while the engine is
-/// heard. After 250 ms of silence nobody can know whether a remote engine stands still or the network is down: the
-/// cause is unknown until it is heard again. On this machine it is the engine.
+/// If the force is still missing when a report is created, the cause is the server if rule 1 applies. Otherwise, the
+/// cause is the engine as long as other datagrams from it arrive. After 250 ms without any datagram, it is not possible
+/// to distinguish between a remote engine that is blocked and a broken network, so the cause is unknown. If the engine
+/// is on this machine, the cause is the engine.
 ///
 /// Thread-safe: no. Realtime-safe: yes, except report().
 class Lateness {
  public:
-  /// Ten steps of a device at 1 kHz.
+  /// Ten steps at 1 kHz.
   static constexpr Duration kPause = std::chrono::milliseconds(10);
-  /// Two keep-alives of a peer.
+  /// Two keep-alive periods.
   static constexpr Duration kStandsStill = std::chrono::milliseconds(100);
-  /// Five keep-alives.
+  /// Five keep-alive periods.
   static constexpr Duration kSilent = std::chrono::milliseconds(250);
 
   enum class Part : std::uint8_t { kNone, kOurs, kNetwork, kEngine, kUnknown };
   enum class Cause : std::uint8_t {
     kNone,
-    kStateWaited,    ///< ours
-    kServerStood,    ///< ours: the device's loop or the network thread stood still
-    kRoundTrip,      ///< the network: was longer than usual
-    kLost,           ///< the network: datagrams were lost
-    kUnheard,        ///< unknown: nothing is heard of the engine's machine
-    kEngineTook,     ///< the engine: longer than usual
-    kEngineMissing,  ///< the engine: is heard, and nothing is lost, but no force comes that can be used
-    kEngineStood,    ///< the engine: its program stood still
-    kEngineSilent,   ///< the engine: its program is on this machine, and nothing is heard of it
-    kNotFinite,      ///< the engine: its forces are refused, see RefusedForces (messages.h)
-    kOutOfBounds,    ///< …
-    kUnknownTick,    ///< …
-    kOldSequence,    ///< …
+    kStateWaited,    ///< ours: a state was sent late
+    kServerStood,    ///< ours: the device loop or the network thread was blocked
+    kRoundTrip,      ///< network: longer than usual
+    kLost,           ///< network: datagrams were lost
+    kUnheard,        ///< remote engine: no datagrams
+    kEngineTook,     ///< engine: longer than usual
+    kEngineMissing,  ///< engine: no valid force
+    kEngineStood,    ///< engine: was blocked
+    kEngineSilent,   ///< engine on this machine: no datagrams
+    kNotFinite,      ///< engine: see RefusedForces (messages.h)
+    kOutOfBounds,
+    kUnknownTick,
+    kOldSequence,
   };
   static Part part(Cause cause) noexcept;
 
   struct Way {
-    LocalTime sampled;    ///< the state it answers
-    LocalTime sent;       ///< when that state left for the engine
-    LocalTime received;   ///< the force
-    Duration round_trip;  ///< of the datagram that brought it
-    Duration valid_for;   ///< as the engine says, from `received`
-    bool lost = false;    ///< datagrams were lost since the force before, in either direction
+    LocalTime sampled;    ///< time of the sample
+    LocalTime sent;       ///< when the state of this sample was sent
+    LocalTime received;   ///< when the force was received
+    Duration round_trip;  ///< measured by the same datagram
+    Duration valid_for;   ///< requested by the engine, starting at `received`
+    bool lost = false;    ///< datagrams were lost since the previous force
   };
 
-  /// What has happened since the last report.
+  /// The events since the last report.
   struct Report {
     std::uint64_t forces = 0;
-    std::uint64_t refused = 0;         ///< forces that could not be used
-    Cause refused_for = Cause::kNone;  ///< the newest of them
-    std::uint64_t late_ours = 0;       ///< by the part to blame
+    std::uint64_t refused = 0;
+    Cause refused_for = Cause::kNone;  ///< the cause of the newest one
+    std::uint64_t late_ours = 0;       ///< by cause
     std::uint64_t late_network = 0;
     std::uint64_t late_engine = 0;
     std::uint64_t late_unknown = 0;
-    std::uint64_t cut = 0;       ///< forces above the device's bound, which it cuts
-    Duration worst{};            ///< how long the device was without a valid force, at most
-    Cause cause = Cause::kNone;  ///< of the worst of them
-    Duration ours{};             ///< its parts, and what is usual
+    std::uint64_t cut = 0;       ///< forces that were limited to the maximum of the device
+    Duration worst{};            ///< the longest time without a valid force
+    Cause cause = Cause::kNone;  ///< the cause of `worst`
+    Duration ours{};             ///< at `worst`
     Duration network{};
     Duration engine{};
-    Duration stood_still{};  ///< the engine's program or our threads, at most
+    Duration stood_still{};  ///< the longest pause of the engine or of our threads
     Duration usual_ours{};
     Duration usual_network{};
     Duration usual_engine{};
     std::uint64_t late() const noexcept { return late_ours + late_network + late_engine + late_unknown; }
-    /// Of both together: the counts are added, the rest is that of the worse.
+    /// Adds the counters. The other values are taken from the report with the longer `worst`.
     void add(const Report& other);
-    /// For the operator: "forces were late 3 times, by up to 85 ms: the network (round trip
-    /// 131 ms, usually 41 ms)". Empty when all is well. At most 128 bytes.
+    /// A message for the operator, for example "forces were late 3 times, by up to 85 ms: the network (round trip 131
+    /// ms, usually 41 ms)". It is empty if there are no problems. The length is at most 128 bytes.
     std::string text;
-    /// For the engine's author: `text`, and how many forces the device cuts.
+    /// A message for the developer of the engine. In addition to `text`, it contains the number of limited forces.
     std::string advice;
   };
 
-  /// An engine has come: nobody is late before its first force. `same_machine`: it came from a loopback address.
+  /// Must be called if an engine becomes the holder of the channel. The first force cannot be late. `same_machine` must
+  /// be true if it has a loopback address.
   void begin(LocalTime now, bool same_machine) noexcept;
-  /// It has gone, and nobody is late.
+  /// Must be called if the engine no longer holds the channel.
   void end() noexcept { attending_ = false; }
 
-  /// A datagram of the engine that is authentic and the newest so far. `sent`: when, by the engine's clock, when known;
-  /// `lost`: how many of the engine's datagrams have not come so far.
+  /// Must be called for each authentic datagram that is newer than all previous ones. `sent` is the time stamp of the
+  /// engine, if available. `lost` is the total number of lost datagrams.
   void heard(LocalTime now, std::optional<PeerTime> sent, std::uint64_t lost) noexcept;
-  /// The network thread has taken a newer state of the device.
+  /// Must be called if the network thread has received a new state of the device.
   void took_state(LocalTime now) noexcept;
   void observe(const Way& way) noexcept;
-  /// The newest force is above the device's bound.
+  /// Must be called if the newest force exceeds the maximum force of the device.
   void cut() noexcept { ++report_.cut; }
-  /// `count` forces came that cannot be used, for one of the last four causes.
+  /// Must be called if forces were refused. `cause` must be one of the last four causes.
   void refused(Cause cause, std::uint64_t count) noexcept;
 
-  /// What happened since the last call. A force that is still missing counts as late, too.
+  /// Returns the events since the last call. A missing force is also counted as late.
   Report report(LocalTime now);
 
  private:
@@ -138,14 +141,14 @@ class Lateness {
   bool same_machine_ = false;
   bool usual_known_ = false;
   LocalTime heard_{};
-  std::optional<PeerTime> sent_;  ///< its newest time stamp
-  std::uint64_t lost_ = 0;        ///< of its datagrams
+  std::optional<PeerTime> sent_;  ///< the newest time stamp
+  std::uint64_t lost_ = 0;        ///< lost datagrams so far
   LocalTime valid_until_{};
   Parts usual_;
   std::optional<LocalTime> took_state_;
   // Since the newest force:
   Duration stood_still_{};
-  Duration paused_{};  ///< the longest time between two states
+  Duration paused_{};  ///< longest time between states
   Cause refused_for_ = Cause::kNone;
   Report report_;
 };

@@ -14,8 +14,7 @@ void Leases::hold(LocalTime now, std::uint32_t device, std::uint32_t channel, co
 void Leases::give(std::uint32_t device, std::uint32_t channel, std::uint32_t guest) {
   ServedChannel& held = devices_[device].channels[channel];
   if (held.holder != guest) return;
-  // A full ring means that 16 orders wait because the haptic thread stands still. The age of the force then has the
-  // same effect a little later.
+  // The queue can only be full if the haptic thread is blocked. In this case, the force expires because of its age.
   devices_[device].mail->orders.try_push({.kind = HapticOrder::Kind::kRelease, .channel = channel, .source = guest});
   held.holder = 0;
   if (devices_[device].outputs.turn_off_those_of(guest)) {

@@ -10,42 +10,44 @@
 
 namespace tendon {
 
-/// Who holds which channel: one guest at a time, for as long as the channel's lease says (SESSION.md, "Channels and
-/// leases"). It knows holders by their connection ids; who loses a channel is told so by others.
+/// Manages the holders of channels. A channel can only be held by one client at a time. It can be taken by another
+/// client if the lease has expired (SESSION.md, "Channels and leases"). Holders are identified by their connection ids.
+/// The caller must notify a client that loses a channel.
 ///
 /// Thread-safe: no. Realtime-safe: no.
 class Leases {
  public:
-  /// `devices` must outlive this.
+  /// `devices` must outlive this object.
   explicit Leases(std::vector<ServedDevice>& devices) : devices_(devices) {}
 
-  /// Connection id; 0 = nobody.
+  /// Returns the connection id of the holder, or 0 if the channel is free.
   std::uint32_t holder(std::uint32_t device, std::uint32_t channel) const {
     return devices_[device].channels[channel].holder;
   }
 
-  /// The channel is the guest's from now on. It was free.
+  /// Gives a free channel to the guest.
   void hold(LocalTime now, std::uint32_t device, std::uint32_t channel, const Guest& guest);
 
-  /// The holder has sent a force that the hand can feel.
+  /// Renews the lease. This is called for each valid force of the holder.
   void renew(LocalTime now, std::uint32_t device, std::uint32_t channel) {
     devices_[device].channels[channel].renewed = now;
   }
 
-  /// The channel is nobody's when it was the guest's, its force is fresh no longer, and the outputs of the device that
-  /// it has set are off.
+  /// Releases the channel if it is held by the guest. The force is no longer fresh, and the outputs that were set by
+  /// the guest are turned off.
   void give(std::uint32_t device, std::uint32_t channel, std::uint32_t guest);
-  /// … all channels of the guest.
+  /// Releases all channels of the guest.
   void give_all(std::uint32_t guest);
 
   struct Taken {
     bool granted = false;
-    std::uint32_t loser = 0;   ///< granted: who held it before; 0 = nobody else
-    std::uint32_t holder = 0;  ///< not granted: who holds it
-    Duration wait{};           ///< not granted: when the lease may be over; 0 = nobody knows
+    std::uint32_t loser = 0;   ///< the previous holder, or 0
+    std::uint32_t holder = 0;  ///< the current holder if the channel was not granted
+    Duration wait{};           ///< time until the lease can expire; 0 if unknown
   };
-  /// The guest wants the channel. It gets one that is free or its own already, and another one's when the lease is over
-  /// or, where there is a lease, `may_take_over`.
+  /// Requests a channel for the guest. It is granted if the channel is free or is already held by the guest. If it is
+  /// held by another guest, it is granted if the lease has expired. With `may_take_over`, the lease does not need to
+  /// have expired, but the channel must have one.
   Taken take(LocalTime now, std::uint32_t device, std::uint32_t channel, const Guest& guest, bool may_take_over);
 
  private:

@@ -9,26 +9,26 @@
 
 namespace tendon {
 
-/// What the outputs of a device are set to, for its loop: all of them, so that the newest of these values is enough.
+/// The settings of all outputs of a device. The haptic loop only needs the newest value.
 struct OutputSettings {
   struct One {
-    std::uint32_t number = 0;  ///< of the setting: another one is to be carried out, even when it is the same; 0: none
+    std::uint32_t number = 0;  ///< unique id of this setting, or 0
     OutputSetting setting{};
   };
   std::array<One, kMostOutputs> of{};
 };
 
-/// Who has set which output of a device, by connection id; 0 = nobody. An output is off again when that guest gives a
-/// channel of the device up or loses it, and when the device is disarmed.
+/// Stores which client has set each output of a device. An output is turned off if this client releases or loses a
+/// channel of the device, or if the device is disarmed.
 ///
 /// Thread-safe: no. Realtime-safe: yes.
 class Outputs {
  public:
-  /// `output` < kMostOutputs.
+  /// `output` must be less than kMostOutputs.
   void set(std::uint32_t guest, std::size_t output, const OutputSetting& setting) noexcept;
-  /// Turns off what that guest has set. False when it had set nothing.
+  /// Turns off the outputs that were set by this guest. Returns false if there are none.
   bool turn_off_those_of(std::uint32_t guest) noexcept;
-  /// Turns off what anybody has set. False when nobody had set anything.
+  /// Turns off all outputs. Returns false if all of them are already off.
   bool turn_off_all() noexcept;
 
   const OutputSettings& settings() const noexcept { return settings_; }

@@ -11,9 +11,9 @@
 namespace tendon {
 namespace {
 
-/// A channel or a device that somebody else has is asked for again after this.
+/// The delay before a busy channel or device is requested again.
 constexpr Duration kAskAgain = std::chrono::milliseconds(500);
-/// Scenes that do not fit together are compared again after this: one of the two may have been started anew.
+/// The delay before incompatible configurations are compared again, because one of the servers may have been restarted.
 constexpr Duration kCompareAgain = std::chrono::seconds(5);
 
 }  // namespace
@@ -144,7 +144,7 @@ void Peer::take(LocalTime now, const Session::Event& event) {
     session.answer(asked->id, Code::kOk, {});
     if (!lease_.take(*lost, session, now)) return;
     coupled_ = false;
-    asked_to_couple_.reset();  // its answer can arrive later although it is older
+    asked_to_couple_.reset();  // ignores a late reply
     say(true, "\"" + lost->to + "\" has taken the channel");
   }
 }
@@ -168,7 +168,7 @@ void Peer::close(LocalTime now) {
   coupled_ = false;
 }
 
-/// Once: an attempt that fails like the one before says nothing new.
+/// Does not repeat the previous message.
 void Peer::say(bool warning, std::string text) {
   if (text == said_) return;
   said_ = text;

@@ -16,55 +16,55 @@
 
 namespace tendon {
 
-/// The server that this one dials for a coupled device: there this one is an ordinary guest, with the same handshake,
-/// keys, leases and refusals. It claims a channel, takes its lease, says Couple, and from then on PortStates go both
-/// ways. It tries for ever (Connection); what stands in its way it says once.
+/// A connection to another server for a coupled device. This server acts as an ordinary client of the other server. It
+/// claims a channel, takes the lease, and sends a Couple request. Then, PortStates are exchanged in both directions. If
+/// the connection fails, it is established again (Connection), and each problem is only reported once.
 ///
-/// Its owner moves the datagrams: both servers have one socket each.
+/// The datagrams are sent and received by the owner of this object because each server only has one socket.
 ///
 /// Thread-safe: no. Realtime-safe: no.
 class Peer {
  public:
   struct Config {
     Address server;
-    std::string name;          ///< for its log
-    std::optional<Key> key{};  ///< empty: in the clear, on this machine only
-    Seed seed{};               ///< 32 bytes from the system
-    std::string device{};      ///< of it; empty: its first
-    std::string channel{};     ///< of that; empty: its first
-    Couple couple{};           ///< what our end is like
+    std::string name;          ///< used in its log
+    std::optional<Key> key{};  ///< if empty, the session is not encrypted, and the server must be on this machine
+    Seed seed{};               ///< must be random
+    std::string device{};      ///< of the server; if empty, the first one
+    std::string channel{};     ///< of the device; if empty, the first one
+    Couple couple{};           ///< the configuration of our end
   };
-  /// What the operator should read in the log.
+  /// A message for the log.
   struct Notice {
     bool warning = false;
     std::string text;
   };
   using Send = std::function<void(LocalTime now, const Address& to, std::span<const std::byte> datagram)>;
 
-  /// `send` is called with each datagram that is to leave.
+  /// `send` is called for each outgoing datagram.
   Peer(const Config& config, Send send, LocalTime now);
-  Peer(const Peer&) = delete;  // its connection holds a reference to its line
+  Peer(const Peer&) = delete;  // connection_ refers to line_
   Peer& operator=(const Peer&) = delete;
 
-  /// Whether the datagram may be its server's: then it is given to receive(), and to nobody else.
+  /// Returns true if the datagram may be from this server. In this case, it must be passed to receive().
   bool is_from_server(const Address& from, std::span<const std::byte> datagram) const;
   void receive(LocalTime now, const Address& from, std::span<const std::byte> datagram);
-  /// Does what is due; returns when the next turn is due at the latest.
+  /// Processes everything that is due. Returns the latest time of the next call.
   LocalTime turn(LocalTime now);
 
-  /// To the other end; dropped while the two are not coupled.
+  /// Sends our port to the peer. This has no effect if the devices are not coupled.
   void send(LocalTime now, const PortState& port);
-  /// The newest state of the other end, once.
+  /// Returns the newest port of the peer, or nothing if it has already been returned.
   std::optional<PortState> take();
 
-  /// Says goodbye.
+  /// Closes the session with a Bye.
   void close(LocalTime now);
 
   bool coupled() const noexcept { return coupled_; }
   std::vector<Notice> take_notices();
 
  private:
-  /// The one datagram that has come, and the way out.
+  /// Adapts the datagrams to the interface of Connection.
   class Line final : public Link {
    public:
     explicit Line(Send send) : send_(std::move(send)) {}
@@ -73,7 +73,7 @@ class Peer {
 
     LocalTime now{};
     Address from;
-    std::span<const std::byte> arrived;  ///< empty: none
+    std::span<const std::byte> arrived;  ///< empty if there is none
    private:
     Send send_;
   };
@@ -82,7 +82,7 @@ class Peer {
   void take(LocalTime now, const Connection::Event& event);
   void take(LocalTime now, const Session::Event& event);
   void open(const Welcome& welcome);
-  /// When the next request is due: the lease first, then the coupling.
+  /// Returns when to request the lease or, if it is held, the coupling.
   LocalTime next_request() const noexcept;
   void ask(LocalTime now);
   void answered(LocalTime now, const Session::RequestAnswered& answer);
@@ -91,12 +91,12 @@ class Peer {
   Config config_;
   Line line_;
   Connection connection_;
-  LeaseRequest lease_;  ///< of the channel, and the numbers of device and channel
+  LeaseRequest lease_;  ///< also stores the numbers of the device and of the channel
   bool coupled_ = false;
-  std::optional<std::uint32_t> asked_to_couple_;  ///< the Couple that waits for its answer
-  LocalTime couple_at_ = LocalTime::max();        ///< when the next one is due
+  std::optional<std::uint32_t> asked_to_couple_;  ///< the id of the pending request
+  LocalTime couple_at_ = LocalTime::max();        ///< the time of the next request
   std::optional<PortState> newest_;
-  std::string said_;  ///< what was said last
+  std::string said_;  ///< the last message
   std::vector<Notice> notices_;
 };
 

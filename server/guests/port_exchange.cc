@@ -9,10 +9,10 @@
 namespace tendon {
 namespace {
 
-/// The minimum time between two updates for an observer.
+/// The minimum period for updates to an observer.
 constexpr Duration kShowEvery = std::chrono::milliseconds(20);
 
-/// Adds the scales to the port of the leader, because observers do not receive the Couple message.
+/// Adds the scales to the port of the leader because observers do not receive the Couple message.
 void tell_scales(PortState& leader, const Couple& coupling) {
   if (leader.position_scale == 0) leader.position_scale = coupling.position_scale;
   if (leader.force_scale == 0) leader.force_scale = coupling.force_scale;
@@ -40,7 +40,6 @@ void PortExchange::publish(LocalTime now) {
   }
 }
 
-/// Sends our end of a coupling to the other end.
 void PortExchange::publish(LocalTime now, std::uint32_t device, std::uint32_t coupling, const PortState& port) {
   devices_[device].phase = port.phase;
   for (const Dialled& dialled : dialled_) {
@@ -60,8 +59,8 @@ void PortExchange::publish(LocalTime now, std::uint32_t device, std::uint32_t co
   show(now, device, coupling, frame);
 }
 
-/// Sends both ends of a coupling to the observers of the device, at the rate of their states. `mine` is our end and has
-/// the channel of the other end.
+/// Sends both ports of a coupling to the observers of the device at the rate of their states. `mine` is our port, with
+/// the channel of the peer.
 void PortExchange::show(LocalTime now, std::uint32_t place, std::uint32_t coupling, PortFrame mine) {
   ServedDevice& device = devices_[place];
   PortFrame& theirs = device.peer_ports[coupling];
@@ -89,7 +88,6 @@ bool PortExchange::take(LocalTime now, const Guest& guest, const PortFrame& port
   return true;
 }
 
-/// Puts a port into the mailbox of the haptic loop and stores it for the observers.
 void PortExchange::arrived(LocalTime now, std::uint32_t place, std::uint32_t coupling, std::uint32_t channel,
                            const PortState& port) {
   ServedDevice& device = devices_[place];
@@ -119,7 +117,7 @@ bool PortExchange::receive(LocalTime now, const Address& from, std::span<const s
   return false;
 }
 
-/// Tells the device's loop if the other end has changed.
+/// Notifies the haptic loop if the peer has changed.
 void PortExchange::renew(Dialled& dialled) {
   if (!dialled.peer->coupled()) {
     dialled.coupled = false;

@@ -15,39 +15,36 @@
 
 namespace tendon {
 
-/// Exchanges the ports of coupled devices with the other ends. The other end is either a client that holds a channel of
-/// the device, or a server that this server has dialled. Observers receive the ports of both ends.
+/// Exchanges the ports of coupled devices with their peers. The peer can be a client that holds a channel of the
+/// device, or a server that this server is connected to. Both ports are also sent to observers.
 ///
 /// Thread-safe: no. Realtime-safe: no.
 class PortExchange {
  public:
-  /// The arguments must outlive this object.
   PortExchange(std::vector<ServedDevice>& devices, std::vector<Guest>& guests, Leases& leases);
 
-  /// Connects to a server and couples the device with it. `send` is called with each datagram for this server.
+  /// Connects to a server and couples the device with it. `send` is called for each datagram to this server.
   void dial(LocalTime now, std::uint32_t device, const Peer::Config& server, Peer::Send send);
 
-  /// Takes the ports from the mailboxes of the devices and sends them.
   void publish(LocalTime now);
 
-  /// Passes a port to the haptic loop. Returns false, and does nothing, if the guest is not the other end.
+  /// Passes a port to the haptic loop. Returns false and has no effect if the guest is not the peer of a coupling.
   bool take(LocalTime now, const Guest& guest, const PortFrame& port);
 
-  /// Returns false if the datagram does not come from one of the servers that were dialled.
+  /// Returns false if the datagram is not from a server that this server is connected to.
   bool receive(LocalTime now, const Address& from, std::span<const std::byte> datagram);
 
-  /// Advances the connections to these servers. Returns when the next call is due.
+  /// Updates the connections to these servers. Returns the time of the next call.
   LocalTime turn(LocalTime now);
   std::vector<Peer::Notice> take_notices();
 
-  /// Closes these connections with a Bye.
   void close(LocalTime now);
 
  private:
   struct Dialled {
     std::uint32_t device;
     std::unique_ptr<Peer> peer;
-    bool coupled = false;  ///< the device's loop knows
+    bool coupled = false;  ///< known by the haptic loop
   };
 
   void renew(Dialled& dialled);
@@ -59,7 +56,7 @@ class PortExchange {
   std::vector<ServedDevice>& devices_;
   std::vector<Guest>& guests_;
   Leases& leases_;
-  std::vector<std::uint32_t> coupled_;  ///< places of the devices that may be coupled
+  std::vector<std::uint32_t> coupled_;  ///< indices of the devices that can be coupled
   std::vector<Dialled> dialled_;
 };
 

@@ -16,7 +16,6 @@ RefusedForces since(const RefusedForces& before, const RefusedForces& now) {
           .old_sequence = now.old_sequence - before.old_sequence};
 }
 
-/// `device`: its place.
 template <class Report>
 void tell_observers(std::uint32_t device, const Report& report, std::vector<Guest>& guests) {
   for (Guest& guest : guests) {
@@ -24,7 +23,7 @@ void tell_observers(std::uint32_t device, const Report& report, std::vector<Gues
   }
 }
 
-/// Skips a device whose health the log thread has not renewed.
+/// A device is skipped if there is no update from the log thread.
 void tell_of_devices(std::vector<ServedDevice>& devices, std::vector<Guest>& guests) {
   for (std::uint32_t place = 0; place < devices.size(); ++place) {
     ServedDevice& device = devices[place];
@@ -45,7 +44,7 @@ void tell_of_devices(std::vector<ServedDevice>& devices, std::vector<Guest>& gue
 Reports::Told Reports::turn(LocalTime now, std::vector<ServedDevice>& devices, std::vector<Guest>& guests) {
   Told sum;
   if (now - reported_ < kPeriod) return sum;
-  std::map<std::uint32_t, Lateness::Report> of_holder;  // all its channels together, by connection id
+  std::map<std::uint32_t, Lateness::Report> of_holder;  // combined for all channels, by connection id
   for (ServedDevice& device : devices) {
     for (std::size_t i = 0; i < device.channels.size(); ++i) {
       ServedChannel& channel = device.channels[i];

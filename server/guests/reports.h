@@ -10,25 +10,26 @@
 
 namespace tendon {
 
-/// Says once a second how things go (SESSION.md, "Report"): to each controller how its forces fare, to the operator
-/// what was late or refused, and to observers that ask for diagnostics how each device's loop and each engine do.
+/// Creates the reports that are sent once per second (SESSION.md, "Report"). Controllers receive a report about their
+/// forces. The operator is notified of late or refused forces. Observers that have requested diagnostics receive a
+/// report about each device loop and each engine.
 ///
 /// Thread-safe: no. Realtime-safe: no.
 class Reports {
  public:
-  /// Often enough to look at, and nothing beside 1000 states.
+  /// The cost is negligible compared to 1000 states.
   static constexpr Duration kPeriod = std::chrono::seconds(1);
 
-  /// What one round of reports adds to the server's counts, and what the operator should read.
   struct Told {
-    std::uint64_t late_ours = 0;  ///< forces that came too late, or are missing, by the part to blame
+    std::uint64_t late_ours = 0;  ///< late or missing forces by cause
     std::uint64_t late_network = 0;
     std::uint64_t late_engine = 0;
     std::uint64_t late_unknown = 0;
     std::vector<std::string> warnings;
   };
 
-  /// Gives the guests' sessions their reports when the last ones are a period old; otherwise does nothing.
+  /// Adds reports to the sessions of the guests if the last reports are at least one period old. Otherwise, this has no
+  /// effect.
   Told turn(LocalTime now, std::vector<ServedDevice>& devices, std::vector<Guest>& guests);
 
  private:

@@ -91,7 +91,7 @@ Outcome lease_lost(LocalTime /*now*/, const Asker& /*asker*/, const LeaseLost& /
   return {.code = Code::kUnsupported, .detail = "that is the server's to say"};
 }
 
-/// A coupling has one other end: the client that was first, as long as it holds its channel.
+/// A coupling can only have one peer. This is the first client that requests it, as long as it holds the channel.
 Outcome couple(LocalTime /*now*/, const Asker& asker, const Couple& theirs) {
   if (!asker.guest.may_couple()) {
     return {.code = Code::kUnsupported, .detail = "the Hello did not name the feature teleoperation"};
@@ -114,7 +114,7 @@ Outcome couple(LocalTime /*now*/, const Asker& asker, const Couple& theirs) {
   return {.warning = "coupled with \"" + asker.guest.name + "\""};
 }
 
-/// Why the device is not the leader of a coupling, which `does` what was asked for; empty when it is.
+/// Returns the reason why the device is not the leader of a coupling, or an empty string if it is.
 std::string no_leader(const ServedDevice& device, const char* does) {
   if (!device.coupling) return "this device has no [teleoperation]";
   if (device.coupling->role == PortRole::kLeader) return {};
@@ -127,7 +127,8 @@ Outcome engage(LocalTime /*now*/, const Asker& asker, const Engage& wanted) {
   return order(asker, wanted.device, {.kind = HapticOrder::Kind::kEngage}, "told to engage");
 }
 
-/// The other end of a coupling ends that one; anybody else ends all of the device.
+/// If the guest is the peer of a coupling, only this coupling is disengaged. Otherwise, all couplings of the device are
+/// disengaged.
 Outcome disengage(LocalTime /*now*/, const Asker& asker, const Disengage& wanted) {
   const ServedDevice& device = asker.devices[wanted.device];
   if (!device.coupling) return {.code = Code::kUnsupported, .detail = "this device has no [teleoperation]"};
@@ -142,7 +143,7 @@ Outcome disengage(LocalTime /*now*/, const Asker& asker, const Disengage& wanted
   return {.warning = "told to disengage by \"" + asker.guest.name + "\""};
 }
 
-/// A change of scale would move what is engaged.
+/// This is refused while the coupling is engaged because the follower would move.
 Outcome set_scale(LocalTime /*now*/, const Asker& asker, const SetScale& wanted) {
   const ServedDevice& device = asker.devices[wanted.device];
   std::string objection = no_leader(device, "sets the scales");
@@ -182,7 +183,7 @@ Outcome set_share(LocalTime /*now*/, const Asker& asker, const SetShare& wanted)
                      ", said by \"" + asker.guest.name + "\""};
 }
 
-/// Nobody sets the lamps of a device whose forces are another's.
+/// Only the holder of a channel can set the outputs of the device.
 Outcome set_output(LocalTime /*now*/, const Asker& asker, const SetOutput& wanted) {
   if (!asker.guest.has<kFeatureOutputs>()) {
     return {.code = Code::kUnsupported, .detail = "the Hello did not name the feature outputs"};
@@ -207,15 +208,15 @@ Outcome set_output(LocalTime /*now*/, const Asker& asker, const SetOutput& wante
   return {};
 }
 
-/// Who may ask.
+/// Determines which clients can send a request.
 enum class From : std::uint8_t {
   kAnybody,
-  kControllers,  ///< clients that have claimed a channel of the request's device, whoever holds it now
-  kClaimants,    ///< clients that have claimed the request's channel as controllers
+  kControllers,  ///< controllers of a channel of the device, even if it is held by another client
+  kClaimants,    ///< controllers of the channel in the request
 };
 
 struct Row {
-  std::size_t index;  ///< of the request's type in the variant
+  std::size_t index;  ///< of the request type in the variant
   std::string_view name;
   From from;
   bool (*may)(const Guest& guest, const Request& request);
@@ -253,7 +254,7 @@ constexpr Row row(std::string_view name) {
           }};
 }
 
-/// In the order of the variant. A new request is a row here, and its handler above.
+/// This must be in the order of the variant.
 constexpr std::array kRequests = {
     row<SetStateRate, From::kAnybody, set_state_rate>("set the state rate"),
     row<Rearm, From::kControllers, rearm>("rearm"),

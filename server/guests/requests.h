@@ -13,28 +13,27 @@
 
 namespace tendon {
 
-/// Who asks, and what may be changed for it.
+/// The client that has sent a request, and the state that may be modified.
 struct Asker {
   Guest& guest;
-  bool may_take_over = false;  ///< it need not wait for the end of a lease
+  bool may_take_over = false;  ///< it does not need to wait until the lease expires
   std::vector<ServedDevice>& devices;
   const std::vector<Guest>& guests;
   Leases& leases;
 };
 
-/// What becomes of a request.
 struct Outcome {
   Code code = Code::kOk;
   std::string detail{};
-  Duration wait{};                            ///< with kBusy of a TakeLease; 0 = nobody knows
-  std::optional<DeviceDescription> device{};  ///< with kOk of a Describe
-  std::optional<HandleDescription> handle{};  ///< … that asks for the handle
-  std::string warning{};                      ///< for the operator; empty: nothing to say
-  std::uint32_t loser = 0;                    ///< of a lease: its connection id; it has not been told yet
+  Duration wait{};                            ///< for kBusy and TakeLease; 0 if unknown
+  std::optional<DeviceDescription> device{};  ///< the result of Describe
+  std::optional<HandleDescription> handle{};  ///< the result of Describe for the handle
+  std::string warning{};                      ///< for the operator, may be empty
+  std::uint32_t loser = 0;                    ///< connection id of the previous holder, which must be notified
 };
 
-/// Carries out what a guest asks for, and says what it is to be told. The table kRequests (requests.cc) has one row for
-/// each request: its name, who may ask for it, and its handler.
+/// Processes a request and returns the reply. The table kRequests in requests.cc contains the name, the permissions and
+/// the handler of each request.
 ///
 /// Thread-safe: no. Realtime-safe: no.
 Outcome answer(LocalTime now, const Asker& asker, const Request& request);

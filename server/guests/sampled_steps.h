@@ -10,28 +10,30 @@
 
 namespace tendon {
 
-/// When a device's newest haptic steps were sampled, by tick: a force names the tick that it answers.
+/// Stores when the newest haptic steps of a device were sampled. It is used to find the time of the step that a force
+/// answers.
 ///
 /// Thread-safe: no. Realtime-safe: yes, except for the constructor.
 class SampledSteps {
  public:
-  static constexpr std::size_t kRemembered = 4096;  ///< 4 s at 1 kHz, longer than any loop worth rendering
+  static constexpr std::size_t kRemembered = 4096;  ///< 4 s at 1 kHz
 
   struct Step {
-    LocalTime at{};    ///< sampled
-    LocalTime sent{};  ///< its state left
+    LocalTime at{};    ///< time of the sample
+    LocalTime sent{};  ///< when its state was sent
   };
 
   SampledSteps() : steps_(kRemembered) {}
 
-  /// The state of `tick`, sampled at `at`, leaves at `sent`. A client may answer a predicted tick, even one whose state
-  /// the network thread never saw: the steps since the last state are taken to be evenly spaced.
+  /// Adds the state with number `tick`, which was sampled at `at` and sent at `sent`. If some ticks were skipped, their
+  /// times are interpolated, because a client can also answer a predicted tick that was never seen by the network
+  /// thread.
   void observe(std::uint64_t tick, LocalTime at, LocalTime sent);
 
-  /// Empty when there was no such step, or it was longer ago than kRemembered steps.
+  /// Returns nothing if there was no such step, or if it is older than kRemembered steps.
   std::optional<Step> find(std::uint64_t tick) const;
 
-  /// The newest tick that was observed; 0 before the first.
+  /// Returns the newest tick, or 0 if there is none.
   std::uint64_t newest() const noexcept { return newest_; }
 
  private:

@@ -12,8 +12,8 @@
 namespace tendon {
 namespace {
 
-/// Removes values that do not fit into a frame. The forces of engines are bounded, but their sum and the values of a
-/// sensor are not.
+/// Removes values that do not fit into a frame. The forces of individual engines are limited, but their sum and the
+/// values of a force sensor are not.
 void leave_out_what_no_frame_carries(DeviceState& state) {
   for (auto* const vector : {&state.force_wanted, &state.hand_force}) {
     if (*vector && !((*vector)->array().abs() <= limits::kMaxValue).all()) vector->reset();
@@ -28,7 +28,7 @@ void leave_out_what_no_frame_carries(DeviceState& state) {
     state.joints.reset();
 }
 
-/// Keeps the buttons.
+/// Removes all values of the handle except for the buttons.
 void leave_out_handle(DeviceState& state) {
   state.turning.reset();
   state.torque_applied.reset();
@@ -54,10 +54,10 @@ bool tell_state(Guest& guest, View& view, const DeviceState& state) {
   if (!guest.has<kFeatureHandle>()) leave_out_handle(told);
   if (!guest.has<kFeatureJoints>()) told.joints.reset();
   told.buttons = view.pressed;
-  // The guest predicts the next state from these rounded values.
+  // The guest uses these rounded values for its prediction.
   if (guest.has<kFeatureStateColumns>() && fits_columns(told)) round_to_columns(told);
   if (view.deadband && !view.deadband->passes(told)) {
-    view.pressed = 0;  // The guest must hear about the next release.
+    view.pressed = 0;  // do not hide the next release
     return true;
   }
   view.last_state = state.tick;

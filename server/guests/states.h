@@ -6,9 +6,9 @@
 
 namespace tendon {
 
-/// Sends a state of the device of `view` to the guest. It is not sent if the last state is too recent for the guest's
-/// rate, or if the guest is the other end of a coupling. The function removes the fields that the guest did not ask for
-/// and the fields that do not fit into a frame. Returns true if the guest can predict the state (StateDeadband).
+/// Sends a state of a device to the guest. The state is not sent if the previous state is too recent for the guest's
+/// rate, or if the guest is the peer of a coupling. All fields that were not requested by the guest or do not fit into
+/// a frame are removed. Returns true if the guest can predict the state, in which case it is not sent (StateDeadband).
 bool tell_state(Guest& guest, View& view, const DeviceState& state);
 
 }  // namespace tendon
