@@ -25,13 +25,13 @@ bool MemorySink::append(std::span<const std::byte> bytes) {
   return true;
 }
 
-/// Opens a file that is still empty. Returns a value below 0 when it has content or another sink writes to it.
+/// Opens an empty file. The descriptor is negative if the file is not empty or is used by another sink.
 FileSink::Opened FileSink::open(const std::filesystem::path& path) {
   const auto fail = [&path](const std::string& why) {
     throw std::runtime_error("cannot write recording " + path.string() + ": " + why);
   };
-  // O_APPEND: after a piece has been cut off, the next one starts where the file ends. O_NONBLOCK: a pipe that nobody
-  // reads must not hang us before it is refused; it changes nothing for a file.
+  // O_APPEND is required because an incomplete piece may be removed. O_NONBLOCK prevents us from waiting for the reader
+  // of a pipe, which is refused later. It has no effect on regular files.
   constexpr int kFlags = O_WRONLY | O_APPEND | O_CLOEXEC | O_NONBLOCK | O_NOCTTY;
   int descriptor = ::open(path.c_str(), kFlags | O_CREAT | O_EXCL, 0644);
   if (descriptor < 0 && errno == EEXIST) descriptor = ::open(path.c_str(), kFlags);
@@ -48,7 +48,7 @@ FileSink::Opened FileSink::open(const std::filesystem::path& path) {
   if (descriptor < 0) fail(reason(error));
   if (!known) give_up(reason(errno));
   if (S_ISCHR(status.st_mode)) return {descriptor, false};
-  // Checked again once the file is ours: another sink may have written to it meanwhile.
+  // This is checked again after locking because another sink may have written to it.
   const bool busy = ::flock(descriptor, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK;
   if (!busy && ::fstat(descriptor, &status) == 0 && status.st_size == 0) return {descriptor, true};
   ::close(descriptor);
@@ -92,7 +92,6 @@ bool FileSink::append(std::span<const std::byte> bytes) {
   return is_there();
 }
 
-/// Returns false if the file has been deleted or truncated.
 bool FileSink::is_there() {
   struct stat status {};
   if (!is_file_ || ::fstat(descriptor_, &status) != 0) return true;

@@ -11,22 +11,22 @@
 
 namespace tendon {
 
-/// Where the bytes of a recording go. Takes them in order, in whole pieces.
+/// The destination of a recording. Data is appended in complete pieces.
 ///
 /// Thread-safe: no. Realtime-safe: no.
 class ByteSink {
  public:
   virtual ~ByteSink() = default;
 
-  /// Adds all of `bytes` at the end and returns true; or returns false and leaves, as far as it can,
-  /// nothing of them, so that what is there ends with a whole piece.
+  /// Appends all bytes and returns true. If this is not possible, it returns false and removes the incomplete piece if
+  /// it can, so that the data ends with a complete piece.
   virtual bool append(std::span<const std::byte> bytes) = 0;
 
-  /// Why the last `append` failed, as a sentence for the operator. Empty when none has.
+  /// Returns the error message of the last failed `append`, or an empty string if there was no error.
   virtual std::string error() const = 0;
 };
 
-/// Bytes in memory: recordings of simulated worlds.
+/// Stores a recording in memory. This is used for simulated worlds.
 class MemorySink final : public ByteSink {
  public:
   bool append(std::span<const std::byte> bytes) override;
@@ -37,22 +37,22 @@ class MemorySink final : public ByteSink {
   std::vector<std::byte> bytes_;
 };
 
-/// A new file. Existing files are not changed. Each piece is handed to the kernel at once: a killed
-/// process loses none of them (a power cut may). A piece that does not fit on the disk is cut off again. `append` fails
-/// if the file has been deleted or truncated.
+/// Writes to a new file. Existing data is never modified. Each piece is written immediately, so no data is lost if the
+/// process is killed. However, it can be lost in a power failure. If there is not enough space for a piece, the
+/// incomplete piece is removed. `append` fails if the file has been deleted or truncated.
 ///
-/// It also writes to devices that keep nothing (/dev/null, /dev/full), which any number of sinks may share. A pipe, a
-/// socket, a block device and a folder are refused: a recording is a file, and a pipe that nobody reads would hang.
+/// Character devices like /dev/null and /dev/full can be used by several sinks at the same time. Pipes, sockets, block
+/// devices and directories are refused, because a recording must be a file, and writing to a pipe could block.
 class FileSink final : public ByteSink {
  public:
-  /// Makes the file; takes over an empty one that no other sink writes to. Throws std::runtime_error with path and
-  /// reason when there is something in it already, or it cannot be written to.
+  /// Creates the file. An empty file can be used if there is no other sink that writes to it. Throws std::runtime_error
+  /// if the file is not empty or is not writable.
   explicit FileSink(const std::filesystem::path& path);
   ~FileSink() override;
   FileSink(const FileSink&) = delete;
   FileSink& operator=(const FileSink&) = delete;
 
-  /// As the constructor; null when the file exists and has something in it, or is another sink's.
+  /// Like the constructor, but returns null if the file is not empty or is used by another sink.
   static std::unique_ptr<FileSink> open_new(const std::filesystem::path& path);
 
   bool append(std::span<const std::byte> bytes) override;
@@ -60,7 +60,7 @@ class FileSink final : public ByteSink {
 
   const std::filesystem::path& path() const noexcept { return path_; }
   std::uint64_t size() const noexcept { return size_; }
-  /// It is a file on a disk, and not a device.
+  /// Returns false for devices.
   bool is_file() const noexcept { return is_file_; }
   /// Returns true if `append` has failed because the file has been deleted or truncated.
   bool gone() const noexcept { return gone_; }

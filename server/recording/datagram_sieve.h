@@ -8,39 +8,41 @@
 
 namespace tendon {
 
-/// Chooses the datagrams that are recorded, so that nobody can fill the disk, or the way to it, with datagrams.
+/// Selects the datagrams that are recorded. The limits prevent an attacker from filling the disk or the queue of the
+/// log thread.
 ///
-/// * Strangers, senders that belong to no guest, are recorded as a sample: the first `strangers_per_s` of each second.
-///   Anybody can send those. The handshake of an honest client is four datagrams.
-/// * Guests are recorded whole, up to `bytes_per_s` in each second. The default is 10 times what an engine at 1 kHz and
-///   an observer need.
+/// * Datagrams that do not belong to a client ("strangers") can be sent by anybody. The first `strangers_per_s` of each
+///   second are recorded. A normal handshake consists of four datagrams.
+/// * All datagrams of clients are recorded, up to `bytes_per_s`. The default is 10 times the rate of a 1 kHz engine and
+///   an observer.
 ///
-/// The caller counts what is left out. A second begins with the first datagram after the last second.
+/// The caller must count the datagrams that are not recorded. A second starts with the first datagram after the end of
+/// the previous second.
 ///
 /// Thread-safe: no. Realtime-safe: yes.
 class DatagramSieve {
  public:
   struct Config {
     std::uint32_t strangers_per_s = 16;
-    std::uint64_t bytes_per_s = 4'000'000;  ///< on the wire, strangers included
+    std::uint64_t bytes_per_s = 4'000'000;  ///< on the wire, including strangers
   };
   enum class Sender : std::uint8_t { kGuest, kStranger };
   enum class Verdict : std::uint8_t {
     kRecord,
-    kStranger,    ///< left out: beyond the sample
-    kOverBudget,  ///< left out: beyond `bytes_per_s`
+    kStranger,    ///< the limit for strangers was exceeded
+    kOverBudget,  ///< `bytes_per_s` was exceeded
   };
 
   explicit DatagramSieve(const Config& config) noexcept : config_(config) {}
 
-  /// About a datagram of `size` bytes on the wire, from or to `sender`. `now` may stand still, but not go back.
+  /// Must be called for each datagram. `size` is the size on the wire in bytes. `now` must not decrease.
   Verdict judge(LocalTime now, Sender sender, std::size_t size) noexcept;
 
  private:
   Config config_;
   LocalTime second_ends_ = LocalTime::min();
   std::uint32_t strangers_ = 0;  ///< recorded in this second
-  std::uint64_t bytes_ = 0;      ///< likewise
+  std::uint64_t bytes_ = 0;      ///< recorded in this second
 };
 
 }  // namespace tendon

@@ -10,7 +10,8 @@ std::filesystem::path flight_path(const std::optional<std::filesystem::path>& re
                                   int number) {
   std::filesystem::path path = "tendon.mcap";
   if (recording) {
-    std::error_code unknown;  // not_found: the recording was a file, and somebody has moved it away
+    // If the file is not found, it was a regular file that has been moved.
+    std::error_code unknown;
     const auto kind = std::filesystem::status(*recording, unknown).type();
     if (kind == std::filesystem::file_type::regular || kind == std::filesystem::file_type::not_found) path = *recording;
   }

@@ -13,20 +13,21 @@
 
 namespace tendon {
 
-/// Where the steps before a device's `number`-th fault go: `run.fault-1.mcap` beside a recording `run.mcap`, and
-/// `tendon.fault-1.mcap` in the working directory where there is none, or none that has a place of its own (/dev/null,
-/// a pipe). `device` is its name, `run.left.fault-1.mcap`, or empty when it is the only one.
+/// Returns the path for the steps before a fault of a device. For a recording `run.mcap`, this is `run.fault-1.mcap` in
+/// the same directory. If there is no recording, or if it is a device or a pipe, this is `tendon.fault-1.mcap` in the
+/// working directory. If there are several devices, the name of the device is included, for example
+/// `run.left.fault-1.mcap`. Otherwise, `device` must be empty.
 std::filesystem::path flight_path(const std::optional<std::filesystem::path>& recording, const std::string& device,
                                   int number);
 
-/// A new file for a fault: the first of these paths, from number 1 on, at which there is none yet. The faults of all
-/// runs of a name thus stay. Throws std::runtime_error with path and reason. Log thread only.
+/// Creates the file for a fault. The number is the first one that does not exist yet, so the files of earlier runs are
+/// kept. Throws std::runtime_error if the file cannot be created. Log thread only.
 std::unique_ptr<FileSink> open_flight(const std::optional<std::filesystem::path>& recording, const std::string& device);
 
-/// Writes the steps that led to a fault as a recording of its own.
+/// Writes the steps before a fault to a new recording.
 ///
-/// `flight` must be frozen, and is left so. Throws std::runtime_error with the sink's reason when not all of them could
-/// be written. Log thread only.
+/// `flight` must be frozen. It is not modified. Throws std::runtime_error if an error occurs in the sink. Log thread
+/// only.
 void write_flight(const StepFlight& flight, const Recorder::Config& config, const Ways& ways, ByteSink& sink);
 
 }  // namespace tendon

@@ -5,10 +5,10 @@
 
 namespace tendon {
 
-/// Which parts of a recording stay; see PartRecorder.
+/// Determines which parts of a recording are kept (PartRecorder).
 enum class Keep : std::uint8_t {
   kAll,
-  kFaults,  ///< the parts around the beginning of a device's fault: from 60 s before it to 10 s after
+  kFaults,  ///< from 60 s before to 10 s after the start of a fault
 };
 
 }  // namespace tendon

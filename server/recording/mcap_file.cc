@@ -46,7 +46,7 @@ std::span<const std::byte> Fields::bytes(std::uint64_t size) {
 
 std::optional<ChunkHead> chunk_head(std::span<const std::byte> content) {
   Fields fields(content);
-  fields.bytes(2 * sizeof(std::uint64_t));  // first and last time
+  fields.bytes(2 * sizeof(std::uint64_t));  // start time and end time
   ChunkHead head;
   head.size = fields.u64();
   head.crc = fields.u32();
@@ -139,7 +139,7 @@ File::File(std::unique_ptr<std::istream> input, std::string name) : input_(std::
   if (!*input_ || end < 0) throw std::runtime_error(name_ + ": cannot be read");
   size_ = zeros_from_ = static_cast<std::uint64_t>(end);
   while (zeros_from_ > 0) {
-    // Most files do not end with a zero, so the first read is only one byte.
+    // The first read is only one byte because most files do not end with zeros.
     const std::uint64_t step = zeros_from_ == size_ ? 1 : std::min(zeros_from_, kBlock);
     const auto block = read(zeros_from_ - step, step);
     const auto last = std::find_if(block.rbegin(), block.rend(), [](std::byte b) { return b != std::byte{0}; });
@@ -149,7 +149,7 @@ File::File(std::unique_ptr<std::istream> input, std::string name) : input_(std::
 }
 
 void File::read(std::uint64_t at, std::span<std::byte> bytes) {
-  // Avoid seeking if possible, because it discards the buffer of the stream.
+  // This only seeks if necessary because seeking discards the buffer of the stream.
   if (cursor_ != at) input_->seekg(static_cast<std::streamoff>(at));
   input_->read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
   if (!*input_) throw std::runtime_error(name_ + ": byte " + std::to_string(at) + ": cannot be read");
@@ -209,7 +209,7 @@ std::optional<std::uint64_t> File::find(std::uint64_t from, std::uint64_t end, b
       const auto opcode = static_cast<Opcode>(block[i]);
       const std::uint64_t at = block_at + i;
       if (opcode == Opcode::kChunk) {
-        // Check the lengths first, because it is too slow to compute a CRC for every byte that could be an opcode.
+        // The lengths are checked first because computing a CRC for each possible opcode would be too slow.
         const auto chunk = chunk_at(at);
         const auto record = record_at(at);
         if (chunk && record && chunk->end == record->end && sound_at(at) && goes_on_at(record->end)) return at;

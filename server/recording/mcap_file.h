@@ -17,8 +17,8 @@ namespace tendon::mcap {
 
 std::string_view text_of(std::span<const std::byte> bytes);
 
-/// A cursor over the fields in the content of a record. If a field would extend past the end, `ok` becomes false and
-/// this field and all later fields are empty or zero.
+/// Reads the fields in the content of a record. If a field extends past the end, `ok` becomes false, and all subsequent
+/// fields are empty or zero.
 class Fields {
  public:
   explicit Fields(std::span<const std::byte> bytes) : rest_(bytes) {}
@@ -38,47 +38,48 @@ class Fields {
   bool ok_ = true;
 };
 
-/// The fields at the start of a chunk.
 struct ChunkHead {
-  static constexpr std::size_t kSize = 8 + 8 + 8 + 4 + 4 + 8;  ///< in bytes, if the chunk is not compressed
+  static constexpr std::size_t kSize = 8 + 8 + 8 + 4 + 4 + 8;  ///< in bytes, without compression
 
   std::uint64_t size = 0;  ///< of the uncompressed records, in bytes
-  std::uint32_t crc = 0;   ///< of the uncompressed records; 0 if it is not available
+  std::uint32_t crc = 0;   ///< of the uncompressed records, or 0
   std::string_view compression;
   std::span<const std::byte> records;  ///< may be compressed
 };
-/// Parses the content of a chunk. Returns nothing if the lengths do not match the size of `content`.
+/// Parses the content of a chunk. Returns nothing if the lengths are inconsistent with the size of `content`.
 std::optional<ChunkHead> chunk_head(std::span<const std::byte> content);
 
 /// Corrects the lengths in the content of a chunk. Returns false if the CRC of the records does not match.
 bool mend_chunk(std::span<std::byte> content);
 
-/// Returns true if `why_damaged` checks the content of this kind of record.
+/// Returns true if the content of this type of record is checked by `why_damaged`.
 bool is_checked(Opcode opcode);
 
-/// Returns an error message if `content` is not valid for this kind of record, for example "the CRC of a chunk does not
-/// match". Returns an empty string otherwise. This checks the lengths of the fields and the CRC of a chunk.
+/// Returns an error message if `content` is not valid for this type of record, for example "the CRC of a chunk does not
+/// match". Returns an empty string otherwise. This function checks the lengths of the fields and the CRC of a chunk.
 std::string why_damaged(Opcode opcode, std::span<const std::byte> content);
 
-/// Random access to an MCAP file that may be damaged. This class is not thread-safe.
+/// Provides random access to an MCAP file that may be damaged. Thread-safe: no.
 class File {
  public:
-  /// The maximum size of a record. This limits the memory that is allocated if a length is damaged. The chunks that we
-  /// write have 256 KiB.
+  /// The maximum size of a record. It limits the memory that is allocated if a length is damaged. Tendon writes chunks
+  /// of 256 KiB.
   static constexpr std::uint64_t kMaxRecord = std::uint64_t{64} << 20;
 
   struct Record {
     Opcode opcode{};
     std::uint64_t at = 0;
-    std::uint64_t end = 0;  ///< the position after its content
+    std::uint64_t end = 0;  ///< the position after the content
   };
 
-  /// The `name` is used in error messages. All functions that read throw std::runtime_error if the file cannot be read.
+  /// `name` is used in error messages. All functions that read from the file throw std::runtime_error if an error
+  /// occurs.
   File(std::unique_ptr<std::istream> input, std::string name);
 
   const std::string& name() const noexcept { return name_; }
   std::uint64_t size() const noexcept { return size_; }
-  /// Returns the position after the last nonzero byte. The file may end with zeros if the machine lost power.
+  /// Returns the position after the last nonzero byte. If the power has failed, there may be zeros at the end of the
+  /// file.
   std::uint64_t zeros_from() const noexcept { return zeros_from_; }
 
   void read(std::uint64_t at, std::span<std::byte> bytes);
@@ -87,13 +88,13 @@ class File {
 
   /// Returns the record at `at`. Returns nothing if the record is too large or extends past the end of the file.
   std::optional<Record> record_at(std::uint64_t at);
-  /// Returns the chunk at `at`, even if the opcode is wrong. A chunk contains its length three times. Returns nothing
-  /// if all three are different.
+  /// Returns the chunk at `at`, even if the opcode is not correct. The length of a chunk is stored in three places.
+  /// Returns nothing if all of them are different.
   std::optional<Record> chunk_at(std::uint64_t at);
-  /// Returns true if there is a valid record at `at`, or if the rest of the file is zero.
+  /// Returns true if there is a valid record at `at`, or if the remaining bytes are zero.
   bool goes_on_at(std::uint64_t at);
-  /// Returns the position of the first valid chunk, schema or channel in the range [from, end). The next record must be
-  /// valid as well, because schemas and channels do not have a CRC.
+  /// Returns the position of the first valid chunk, schema or channel in the range [from, end). The next record must
+  /// also be valid because there is no CRC for schemas and channels.
   std::optional<std::uint64_t> find_record(std::uint64_t from, std::uint64_t end) { return find(from, end, false); }
   std::optional<std::uint64_t> find_chunk(std::uint64_t from, std::uint64_t end) { return find(from, end, true); }
 

@@ -6,13 +6,13 @@
 #include <cstdint>
 #include <span>
 
-// The names and numbers of the MCAP container format, version 0, that the writer and the reader share.
+// Constants of the MCAP container format, version 0. They are used by the writer and by the reader.
 // Source: https://mcap.dev/spec
 //
 //   file   = magic, Header, data section, DataEnd, summary section, summary offset section, Footer, magic
 //   record = opcode (1 byte), length of content (8 bytes), content
 //
-// Integers are little-endian; strings, arrays and maps are preceded by their length in bytes (4 bytes).
+// Integers are little-endian. Strings, arrays and maps start with their length in bytes (4 bytes).
 
 namespace tendon::mcap {
 
@@ -33,11 +33,11 @@ enum class Opcode : std::uint8_t {
   kDataEnd = 0x0F,
 };
 
-/// Opcode and length, before the content of every record.
+/// The size of the opcode and the length at the start of a record.
 inline constexpr std::size_t kRecordHead = 1 + 8;
 
-/// Continues a CRC-32 (that of zlib, PNG and Ethernet) with `bytes`: `crc` is that of the bytes before; 0 when there
-/// are none.
+/// Updates a CRC-32 as used by zlib, PNG and Ethernet. `crc` is the value for the previous bytes, or 0 if there are
+/// none.
 std::uint32_t extend_crc(std::uint32_t crc, std::span<const std::byte> bytes);
 
 }  // namespace tendon::mcap

@@ -35,7 +35,7 @@ McapReader::McapReader(std::unique_ptr<std::istream> input, std::string name)
     : file_(std::move(input), std::move(name)) {
   const auto head = file_.read(0, std::min<std::uint64_t>(file_.size(), kMagic.size()));
   ends_with_magic_ = file_.size() > kMagic.size() && file_.magic_at(file_.size() - kMagic.size());
-  // This is less than the size of the head if the file is truncated or ends with zeros.
+  // If the file is truncated or ends with zeros, this is less than the size of the head.
   const auto written = static_cast<std::ptrdiff_t>(std::min<std::uint64_t>(file_.zeros_from(), kMagic.size()));
   if (!std::equal(head.begin(), head.begin() + written, kMagic.begin())) {
     const bool zeros = std::ranges::all_of(head, [](std::byte b) { return b == std::byte{0}; });
@@ -103,7 +103,7 @@ bool McapReader::next_record() {
   return false;
 }
 
-/// Moves to the end of `record_`, and checks the CRC of the data or of the summary if it ends here.
+/// Moves to the end of `record_`. If it is the end of the data or of the summary, its CRC is checked.
 void McapReader::accept_record() {
   position_ = record_.end;
   if (record_.opcode == Opcode::kChunk) sure_ = position_;
@@ -115,15 +115,15 @@ void McapReader::accept_record() {
   if (record_.opcode == Opcode::kDataEnd) {
     in_summary_ = true;
     const auto expected = Fields(content_).u32();
-    // The CRC cannot match if the file is damaged.
+    // If the file is damaged, the CRC cannot match.
     if (expected != 0 && expected != crc_ && damage_.empty() && record_.end <= file_.zeros_from())
       note(record_.at, record_.at, "the CRC of the data before it does not match");
   }
   crc_ = extend_crc(extend_crc(crc_, head), content_);
 }
 
-/// Skips the damaged record at `position_`. Returns true if only the opcode or a length of a chunk is wrong. In this
-/// case `record_` is the chunk.
+/// Skips the damaged record at `position_`. If only the opcode or a length of a chunk is damaged, it returns true, and
+/// `record_` is set to the chunk.
 bool McapReader::skip_damage(const std::string& what) {
   const std::uint64_t at = position_;
   const auto by_length = file_.record_at(at);
@@ -139,14 +139,14 @@ bool McapReader::skip_damage(const std::string& what) {
     }
   }
   use_summary();
-  // If some bytes are missing, the last record may include the start of the next chunk.
+  // If bytes are missing, the last record may contain the start of the next chunk.
   std::optional<std::uint64_t> next;
   if (!in_summary_) next = file_.find_chunk(sure_, at);
   for (const auto& record : {by_length, as_chunk}) {
     if (!next && record && record->end <= file_.zeros_from() && file_.goes_on_at(record->end)) next = record->end;
   }
   if (!next && !in_summary_) next = file_.find_record(at + 1, file_.size());
-  // The file is not damaged if it is truncated in this record.
+  // If the file ends in this record, it is truncated, but not damaged.
   const bool torn = !next && !ends_with_magic_ && (!by_length || by_length->end > file_.zeros_from());
   if (!torn) note(at, next.value_or(file_.zeros_from()), what);
   if (!next) return finish(!ends_with_magic_);
@@ -154,7 +154,6 @@ bool McapReader::skip_damage(const std::string& what) {
   return false;
 }
 
-/// Checks the end of a complete file.
 void McapReader::check_end() {
   const std::uint64_t end = position_ + kMagic.size();
   finish(file_.zeros_from() < end);
@@ -172,7 +171,7 @@ void McapReader::check_end() {
   }
 }
 
-/// Returns false.
+/// Always returns false.
 bool McapReader::finish(bool truncated) {
   finished_ = true;
   truncated_ = truncated;
@@ -186,7 +185,7 @@ void McapReader::open_chunk() {
   chunk_ = head->records;
 }
 
-/// Processes a record. Returns the message if the record is a message.
+/// Processes a record. If it is a message, the message is returned.
 std::optional<McapReader::Message> McapReader::take(Opcode opcode, std::span<const std::byte> content) {
   Fields fields(content);
   switch (opcode) {
@@ -206,7 +205,7 @@ std::optional<McapReader::Message> McapReader::take(Opcode opcode, std::span<con
 }
 
 void McapReader::take_statistics(Fields fields) {
-  // Skip the number of messages, schemas, channels, attachments, metadata and chunks, and the first and last time.
+  // Skip the number of messages, schemas, channels, attachments, metadata and chunks, and the start and end times.
   fields.bytes(8 + 2 + 4 + 4 + 4 + 4 + 8 + 8);
   Fields counts(fields.bytes(fields.u32()));
   while (!counts.rest().empty()) {
@@ -254,7 +253,7 @@ std::optional<McapReader::Message> McapReader::take_message(Fields fields) {
   return Message{channels_.at(id), sequence, log_time, mcap::text_of(fields.rest()), record_.at, missing};
 }
 
-/// Returns the records of the summary without the footer. Returns an empty vector if there is no valid summary.
+/// Returns the records of the summary without the footer, or an empty vector if there is no valid summary.
 std::vector<std::byte> McapReader::whole_summary() {
   if (!ends_with_magic_ || file_.size() < 2 * kMagic.size() + kFooter) return {};
   const std::uint64_t end = file_.size() - kMagic.size() - kFooter;
@@ -262,7 +261,7 @@ std::vector<std::byte> McapReader::whole_summary() {
   if (!record || record->opcode != Opcode::kFooter || record->end != end + kFooter) return {};
   const auto crc = get_little_endian<std::uint32_t>(file_.read(record->end - sizeof(std::uint32_t), 4).data());
   if (crc == 0) return {};
-  // The position in the footer is wrong if some bytes are missing, so search for the end of the data.
+  // Search for the end of the data section because the position in the footer is not correct if bytes are missing.
   const std::uint64_t from = std::max<std::uint64_t>(end, kLongestSummary) - kLongestSummary;
   const auto bytes = file_.read(from, record->end - sizeof crc - from);
   const std::string_view text = mcap::text_of(bytes);
@@ -287,7 +286,7 @@ bool McapReader::use_summary() {
   schemas_.clear();
   Fields records(summary);
   std::map<std::uint16_t, Channel> before;
-  // Messages have references to the elements of this map, so they must not be moved.
+  // The elements of this map must not be moved because there are references to them.
   before.swap(channels_);
   while (!records.rest().empty()) {
     const auto opcode = records.bytes(1);

@@ -17,17 +17,17 @@
 
 namespace tendon {
 
-/// Reads the messages of an MCAP file from start to end, in the order of the file (https://mcap.dev/spec).
+/// Reads the messages of an MCAP file in the order of the file (https://mcap.dev/spec).
 ///
-/// * If the file is truncated, all messages in complete chunks are returned, and then `truncated()` is true. This also
-///   applies to a file that ends with zeros, for example because of a power failure.
-/// * All CRCs and lengths are checked. If a chunk is damaged, it is skipped, and `damage()` contains an error message.
-///   If the record of a channel is damaged, the summary at the end of the file is used instead.
-/// * The sequence numbers of each channel are used to count the messages that are missing. McapWriter starts at 0.
+/// * If the file is truncated, all messages in complete chunks are returned, and then `truncated()` returns true. This
+///   also applies if the file ends with zeros because of a power failure.
+/// * All CRCs and lengths are checked. If a chunk is damaged, it is skipped, and an error message is added to
+///   `damage()`. If the record of a channel is damaged, the summary at the end of the file is used instead.
+/// * The sequence numbers of each channel are used to count missing messages. McapWriter starts at 0.
 ///
-/// Compressed chunks and messages that are not in a chunk are not supported, because Tendon does not write them.
+/// Compressed chunks and messages outside of chunks are not supported because Tendon does not write them.
 ///
-/// The reader needs memory for one record, and for the summary if the file is damaged. This class is not thread-safe.
+/// The reader requires memory for one record and, if the file is damaged, for the summary. Thread-safe: no.
 class McapReader {
  public:
   struct Channel {
@@ -41,40 +41,39 @@ class McapReader {
     const Channel& channel;
     std::uint32_t sequence;
     std::uint64_t log_time;     ///< ns
-    std::string_view data;      ///< valid until the next `next`
-    std::uint64_t offset;       ///< byte offset in the file of the record that it is in
-    std::uint64_t missing = 0;  ///< the number of missing messages of this channel before this one
+    std::string_view data;      ///< valid until the next call of `next`
+    std::uint64_t offset;       ///< position of the record in the file
+    std::uint64_t missing = 0;  ///< missing messages before this one
   };
 
-  /// `name` is what messages call the file. Throws std::runtime_error when it is not an MCAP file.
+  /// `name` is used in messages. Throws std::runtime_error if this is not an MCAP file.
   McapReader(std::unique_ptr<std::istream> input, std::string name);
 
-  /// Returns the next message, or nothing at the end of the data. Throws std::runtime_error if a chunk is compressed or
-  /// if the file cannot be read.
+  /// Returns the next message, or nothing if there are no more messages. Throws std::runtime_error if a chunk is
+  /// compressed or if the file cannot be read.
   std::optional<Message> next();
 
-  /// True when the file ended before its own end mark. Known once `next` has returned empty.
+  /// Returns true if the file is incomplete. This must only be called after `next` has returned nothing.
   bool truncated() const noexcept { return truncated_; }
 
-  /// Returns an error message for each damaged region that was found so far. It contains the position in the file, the
-  /// reason, and the time of the previous and next message. The time is relative to the first message.
+  /// Returns an error message for each damaged region that has been found. It contains the position in the file, the
+  /// reason, and the times of the previous and next message relative to the first message.
   std::vector<std::string> damage() const;
 
-  /// Returns the number of messages that are missing at the end of the file, according to the summary. Returns 0 if
+  /// Returns the number of messages that are missing at the end of the file according to the summary. Returns 0 if
   /// there is no summary. This must only be called after `next` has returned nothing.
   std::uint64_t missing_at_end(std::string_view topic);
 
-  /// Replaces the channels with the ones from the summary at the end of the file. This also changes the channel of
-  /// messages that have been returned. Returns false if this is not possible or has already been done.
+  /// Replaces the channels with those in the summary at the end of the file. This also affects the channels of messages
+  /// that have already been returned. Returns false if this is not possible or if it has already been done.
   bool use_summary();
 
-  /// The size of the file in bytes.
   std::uint64_t size() const noexcept { return file_.size(); }
 
-  /// Channels met so far.
+  /// Returns the channels that have been read so far.
   const std::map<std::uint16_t, Channel>& channels() const noexcept { return channels_; }
 
-  /// Adds an error message to `damage()`. This is used by callers if the content of a message is not valid.
+  /// Adds an error message to `damage()`. This can be used if the content of a message is not valid.
   void note(std::uint64_t offset, const std::string& what) { note(offset, offset, what); }
   /// Throws std::runtime_error with the message "NAME: byte OFFSET: what".
   [[noreturn]] void corrupt(std::uint64_t offset, const std::string& what) const;
@@ -89,7 +88,7 @@ class McapReader {
   };
   struct Count {
     std::uint64_t next = 0;  ///< the next sequence number
-    std::size_t damage = 0;  ///< the size of `damage_` after the last message
+    std::size_t damage = 0;  ///< size of `damage_` after the last message
   };
 
   bool next_record();
@@ -120,9 +119,9 @@ class McapReader {
 
   std::map<std::uint16_t, std::string> schemas_;
   std::map<std::uint16_t, Channel> channels_;
-  std::set<std::uint16_t> doubtful_;              ///< channels that have been defined more than once
+  std::set<std::uint16_t> doubtful_;              ///< channels with multiple definitions
   std::map<std::uint16_t, Count> taken_;          ///< by channel
-  std::map<std::uint16_t, std::uint64_t> total_;  ///< the number of messages of each channel, according to the summary
+  std::map<std::uint16_t, std::uint64_t> total_;  ///< number of messages by channel, from the summary
   bool summary_tried_ = false;
   bool summary_used_ = false;
 

@@ -39,7 +39,7 @@ void put_string(Buffer& out, std::string_view text) {
 
 void overwrite(Buffer& out, std::size_t at, std::uint64_t value) { put_little_endian(value, out.data() + at); }
 
-/// Adds a record whose content `fill` puts.
+/// Adds a record. The content is written by `fill`.
 template <class Fill>
 void put_record(Buffer& out, Opcode opcode, Fill fill) {
   put(out, opcode);
@@ -59,7 +59,7 @@ void McapWriter::TimeRange::include(std::uint64_t time) noexcept {
 McapWriter::McapWriter(std::string_view library, ByteSink& sink) : sink_(sink) {
   put_bytes(out_, mcap::kMagic);
   put_record(out_, Opcode::kHeader, [&] {
-    put_string(out_, "");  // no profile: none of the well-known ones is ours
+    put_string(out_, "");  // profile
     put_string(out_, library);
   });
 }
@@ -87,7 +87,7 @@ std::uint16_t McapWriter::add_channel(std::uint16_t schema_id, std::string_view 
     put(record, schema_id);
     put_string(record, topic);
     put_string(record, message_encoding);
-    put(record, std::uint32_t{0});  // no metadata
+    put(record, std::uint32_t{0});  // metadata
   });
   put_bytes(out_, record);
   return id;
@@ -102,7 +102,7 @@ void McapWriter::write(std::uint16_t channel_id, std::uint64_t log_time, std::st
     put(records_, channel_id);
     put(records_, static_cast<std::uint32_t>(channel.messages));
     put(records_, log_time);
-    put(records_, log_time);  // published when logged
+    put(records_, log_time);  // publish time
     put_bytes(records_, bytes_of(data));
   });
   chunk_time_.include(log_time);
@@ -137,7 +137,7 @@ void McapWriter::put_chunk() {
     put(out_, info.time.last);
     put(out_, std::uint64_t{records_.size()});
     put(out_, extend_crc(0, records_));
-    put_string(out_, "");  // not compressed
+    put_string(out_, "");  // compression
     put(out_, std::uint64_t{records_.size()});
     put_bytes(out_, records_);
   });
@@ -173,7 +173,7 @@ void McapWriter::put_chunk() {
 void McapWriter::put_summary() {
   put_record(out_, Opcode::kDataEnd, [&] { put(out_, crc_); });
 
-  const std::size_t begin = out_.size();  // of the summary, in this piece
+  const std::size_t begin = out_.size();  // of the summary
   const auto position = [&] { return written_ + out_.size(); };
   struct Group {
     Opcode opcode;
@@ -223,7 +223,7 @@ void McapWriter::put_summary() {
           put(out_, offset);
         }
         put(out_, chunk.index_length);
-        put_string(out_, "");  // not compressed
+        put_string(out_, "");  // compression
         put(out_, chunk.records_size);
         put(out_, chunk.records_size);
       });
@@ -241,7 +241,7 @@ void McapWriter::put_summary() {
   put_record(out_, Opcode::kFooter, [&] {
     put(out_, written_ + begin);
     put(out_, offsets_start);
-    // The CRC covers the summary up to here: the footer's opcode, its length (patched in later) and two fields.
+    // The CRC includes the opcode of the footer, its length, which is updated later, and its first two fields.
     const std::size_t length_at = out_.size() - 2 * sizeof(std::uint64_t) - sizeof(std::uint64_t);
     overwrite(out_, length_at, 2 * sizeof(std::uint64_t) + sizeof(std::uint32_t));
     put(out_, extend_crc(0, std::span(out_).subspan(begin)));

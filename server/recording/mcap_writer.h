@@ -15,46 +15,47 @@
 
 namespace tendon {
 
-/// Writes an indexed MCAP file (https://mcap.dev/spec): messages in uncompressed chunks with a CRC and a message
-/// index, and at the end a summary that lets a reader seek. It does not know what the messages mean.
+/// Writes an indexed MCAP file (https://mcap.dev/spec). The messages are stored in uncompressed chunks with a CRC and
+/// an index. The summary at the end of the file is used for seeking. The content of the messages is not interpreted.
 ///
-/// Bytes leave in whole pieces, one `ByteSink::append` each: the first `flush_chunk` takes the beginning of the file
-/// along, `close` writes the summary. So a file is readable at any time, up to its last chunk; without the summary a
-/// reader calls it truncated. The same calls give the same bytes.
+/// The output is written in complete pieces with one `ByteSink::append` each. The first call of `flush_chunk` also
+/// writes the start of the file, and `close` writes the summary. Therefore, the file can be read at any time up to the
+/// last chunk. Without the summary, it is reported as truncated. The output is deterministic.
 ///
-/// When the sink fails, this and every later piece is dropped, and `flush_chunk` and `close` say so.
+/// If the sink fails, this piece and all subsequent pieces are dropped, and `flush_chunk` and `close` return false.
 ///
 /// Thread-safe: no. Realtime-safe: no.
 class McapWriter {
  public:
-  /// `library` names the program that writes. `sink` must outlive the writer.
+  /// `library` is the name of the program. `sink` must outlive the writer.
   McapWriter(std::string_view library, ByteSink& sink);
   McapWriter(const McapWriter&) = delete;
   McapWriter& operator=(const McapWriter&) = delete;
 
-  /// Returns the schema's id. Call before the channels that use it.
+  /// Returns the id of the schema. This must be called before adding the channels that use it.
   std::uint16_t add_schema(std::string_view name, std::string_view encoding, std::string_view data);
 
-  /// Returns the channel's id. Throws std::invalid_argument for an unknown schema.
+  /// Returns the id of the channel. Throws std::invalid_argument if the schema does not exist.
   std::uint16_t add_channel(std::uint16_t schema_id, std::string_view topic, std::string_view message_encoding);
 
-  /// Adds a message to the open chunk. `log_time` in ns; need not be monotone. Throws std::invalid_argument for an
-  /// unknown channel and std::logic_error after `close`.
+  /// Adds a message to the current chunk. `log_time` is in ns and does not have to be monotonic. Throws
+  /// std::invalid_argument if the channel does not exist, and std::logic_error if it is called after `close`.
   void write(std::uint16_t channel_id, std::uint64_t log_time, std::string_view data);
 
-  /// Bytes of messages in the open chunk.
+  /// Returns the size of the messages in the current chunk.
   std::size_t chunk_size() const noexcept { return records_.size(); }
 
-  /// Closes the open chunk and hands it to the sink. Without messages there is no chunk. False: the sink has failed.
+  /// Writes the current chunk to the sink, unless it is empty. Returns false if the sink has failed.
   bool flush_chunk();
 
-  /// Flushes, and ends the file with summary and footer. False: the sink has failed. Later calls do nothing.
+  /// Writes the current chunk and the summary, and finishes the file. Returns false if the sink has failed. Subsequent
+  /// calls have no effect.
   bool close();
 
-  /// Chunks so far. The index of each stays in memory until `close`.
+  /// Returns the number of chunks. Their indexes are kept in memory until `close` is called.
   std::size_t chunks() const noexcept { return chunks_.size(); }
 
-  /// Bytes that the sink has taken.
+  /// Returns the number of bytes that have been written to the sink.
   std::uint64_t bytes_written() const noexcept { return written_; }
 
  private:
@@ -66,17 +67,17 @@ class McapWriter {
   };
   struct IndexEntry {
     std::uint64_t log_time;
-    std::uint64_t offset;  ///< in the chunk's records
+    std::uint64_t offset;  ///< in the records of the chunk
   };
   struct Channel {
     Buffer record;
-    std::uint64_t messages = 0;     ///< in the whole file
-    std::vector<IndexEntry> index;  ///< of the open chunk
+    std::uint64_t messages = 0;     ///< in the file
+    std::vector<IndexEntry> index;  ///< of the current chunk
   };
   struct ChunkInfo {
     TimeRange time;
-    std::uint64_t start;   ///< byte offset in the file
-    std::uint64_t length;  ///< of the chunk's record
+    std::uint64_t start;   ///< position in the file
+    std::uint64_t length;  ///< of the record
     std::vector<std::pair<std::uint16_t, std::uint64_t>> index_offsets;
     std::uint64_t index_length;
     std::uint64_t records_size;
@@ -88,7 +89,7 @@ class McapWriter {
 
   ByteSink& sink_;
   Buffer out_;      ///< the next piece
-  Buffer records_;  ///< messages of the open chunk
+  Buffer records_;  ///< messages of the current chunk
   TimeRange chunk_time_;
   std::vector<Buffer> schemas_;
   std::vector<Channel> channels_;

@@ -35,7 +35,7 @@ fs::path numbered(const fs::path& path, std::uint64_t number) {
   return part.replace_filename(path.stem().string() + "-" + std::to_string(number) + path.extension().string());
 }
 
-/// 1 for `path` itself, N for its part N, empty for any other file.
+/// Returns the number of a part, which is 1 for `path`, or nothing if the file is not a part.
 std::optional<std::uint64_t> number_of(const fs::path& path, const fs::path& file) {
   const std::string name = file.filename().string();
   if (name == path.filename()) return 1;
@@ -53,11 +53,11 @@ std::optional<std::uint64_t> number_of(const fs::path& path, const fs::path& fil
 struct Part {
   fs::path path;
   std::uint64_t number;
-  fs::file_time_type written;  ///< last
+  fs::file_time_type written;  ///< modification time
   std::uint64_t bytes;
 };
 
-/// The regular files that have the name of a part; none when the folder cannot be read.
+/// Returns all regular files with the name of a part, or none if the directory cannot be read.
 std::vector<Part> parts_of(const fs::path& path) {
   std::vector<Part> parts;
   std::error_code error;
@@ -72,7 +72,7 @@ std::vector<Part> parts_of(const fs::path& path) {
   return parts;
 }
 
-/// Whether an existing file is a recording or the beginning of one. An unreadable file counts as one.
+/// Returns true if the file is a recording, an incomplete one, or not readable.
 bool looks_like_a_recording(const fs::path& path) {
   std::ifstream file(path, std::ios::binary);
   if (!file) return true;
@@ -83,7 +83,7 @@ bool looks_like_a_recording(const fs::path& path) {
                     [](char a, std::byte b) { return static_cast<std::byte>(a) == b; });
 }
 
-/// Reads the Scene of the recording `part`. Empty if that fails.
+/// Returns the Scene of a part, or nothing if it cannot be read.
 std::optional<SceneRecord> scene_of(const fs::path& part) {
   try {
     RecordingReader reader(part);
@@ -95,19 +95,19 @@ std::optional<SceneRecord> scene_of(const fs::path& part) {
   }
 }
 
-/// True if the Scene of `part` allows its deletion to keep the budget of the recording `path`.
+/// Returns true if the Scene of `part` allows deleting it to meet the budget of the recording `path`.
 bool may_be_deleted(const fs::path& part, const fs::path& path) {
   const auto scene = scene_of(part);
   return scene && scene->budget_bytes > 0 && scene->first_part == path.filename();
 }
 
-/// True if the Scene of `part` names a first part other than `path`.
+/// Returns true if the Scene of `part` specifies a first part other than `path`.
 bool is_of_another(const fs::path& part, const fs::path& path) {
   const auto scene = scene_of(part);
   return scene && !scene->first_part.empty() && scene->first_part != path.filename();
 }
 
-/// Whether a server still writes to the file.
+/// Returns true if the file is still locked by a server.
 bool is_in_use(const fs::path& path) {
   const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
   if (descriptor < 0) return true;

@@ -8,28 +8,28 @@
 
 #include "server/recording/byte_sink.h"
 
-// The files of a recording that has several parts: run.mcap, run-2.mcap, run-3.mcap … Log thread only: all of these may
-// wait for a disk.
+// Functions for recordings with several parts: run.mcap, run-2.mcap, run-3.mcap, and so on. They should only be used by
+// the log thread because they may wait for a disk.
 
 namespace tendon {
 
-/// A new file for the next part: `path` when no part exists, or when that is empty and the only one; else the first free
-/// number after the highest.
-/// So any number of parts and runs share a name, and none overwrites another. A device such as /dev/null is opened as
-/// it is.
+/// Creates a file for a new part. If there are no parts, or if there is only an empty file `path`, then `path` is used.
+/// Otherwise, the number is the first one that is available after the highest existing number. Therefore, several runs
+/// can use the same name without overwriting each other. A device such as /dev/null is used directly.
 ///
-/// Throws std::runtime_error with path and reason when it cannot be made, and when `path` exists, is not empty and is
-/// no MCAP file: then it is somebody else's.
+/// Throws std::runtime_error if the file cannot be created. If `path` is not empty and is not an MCAP file, this is
+/// also an error because the file was not created by Tendon.
 std::unique_ptr<FileSink> open_next_part(const std::filesystem::path& path);
 
-/// Deletes the oldest parts of `path` until all of them have at most `most_bytes`; returns what it has deleted.
+/// Deletes the oldest parts of `path` until the total size does not exceed `most_bytes`. Returns the deleted files.
 ///
-/// A file is only deleted if its Scene has a budget and `path` is its first part. All other files are not counted. Files
-/// that a server is still writing to are not deleted.
+/// A file is only deleted if its Scene has a budget and `path` is its first part. All other files are not counted.
+/// Files that are still in use by a server are not deleted.
 std::vector<std::filesystem::path> delete_oldest_parts(const std::filesystem::path& path, std::uint64_t most_bytes);
 
-/// Whether the disk under `path` has 16 MiB to spare, half a minute of a usual run: with less, a recording that has
-/// stopped would go on for moments, in a new part each time. True when that cannot be told.
+/// Returns true if there are at least 16 MiB of free space on the disk with `path`, which is enough for 30 s of a
+/// typical run. If there is less space, restarting a recording would result in many short parts. Also returns true if
+/// the free space is unknown.
 bool has_room(const std::filesystem::path& path);
 
 }  // namespace tendon

@@ -15,7 +15,7 @@ constexpr std::size_t kMostChunks = 65'536;
 constexpr Duration kBeforeAFault = std::chrono::seconds(60);
 constexpr Duration kAfterAFault = std::chrono::seconds(10);
 
-/// A part exceeds its share by its last chunk and its index; some of the budget is kept for these.
+/// A part can exceed its limit by one chunk and its index, so some of the budget is reserved for these.
 std::uint64_t part_of_budget(std::uint64_t budget) { return budget / 4 - budget / 32; }
 
 std::string count_of(std::uint64_t steps, std::uint64_t datagrams) {
@@ -46,7 +46,7 @@ void PartRecorder::record(const StepRecord& step, std::size_t device, std::strin
   look_after(step.hand.at);
 }
 
-/// No look_after: it stays in the part of its step.
+/// This does not start a new part because the step with the same tick must be in the same part.
 void PartRecorder::record(const PortRecord& port, std::size_t device) {
   if (recorder_) recorder_->record(port, device);
 }
@@ -86,7 +86,7 @@ void PartRecorder::close(LocalTime now) {
   recorder_->close();
   if (recorder_->failed()) return stop(now, recorder_->status().error);
   finish_part(now);
-  decide(LocalTime::max());  // no fault comes any more
+  decide(LocalTime::max());  // there can be no more faults
 }
 
 PartRecorder::Status PartRecorder::status() const {
@@ -104,7 +104,7 @@ PartRecorder::Status PartRecorder::status() const {
 
 std::vector<PartRecorder::Notice> PartRecorder::take_notices() { return std::exchange(notices_, {}); }
 
-/// False: the file could not be written, and recording has stopped.
+/// Returns false if the file could not be written. Recording is stopped in this case.
 bool PartRecorder::open_part(LocalTime now) {
   if (config_.budget_bytes > 0) {
     for (const auto& gone : delete_oldest_parts(config_.path, config_.budget_bytes - config_.budget_bytes / 4)) {
@@ -129,7 +129,7 @@ bool PartRecorder::open_part(LocalTime now) {
   return true;
 }
 
-/// After each record: ends a part that is full, large or old.
+/// This must be called after each record to start a new part if necessary.
 void PartRecorder::look_after(LocalTime now) {
   if (recorder_->failed()) return stop(now, recorder_->status().error);
   const bool due = recorder_->bytes() + config_.run.flush_size >= config_.rotate_bytes ||
@@ -145,7 +145,7 @@ void PartRecorder::look_after(LocalTime now) {
   }
 }
 
-/// Adds the open part's counts to the totals, even when the part has failed.
+/// Adds the counters of the current part to the totals, even if it has failed.
 void PartRecorder::finish_part(LocalTime now) {
   const Recorder::Status part = recorder_->status();
   missing_.steps += part.lost_steps - told_.steps;
@@ -159,7 +159,7 @@ void PartRecorder::finish_part(LocalTime now) {
     closed_.datagrams += part.datagrams;
   }
   recorder_.reset();
-  // Not even the scene could be written: the file is removed.
+  // If even the scene could not be written, the file is removed.
   const bool empty = sink_->is_file() && sink_->size() == 0;
   std::error_code ignored;
   if (empty) std::filesystem::remove(sink_->path(), ignored);
@@ -181,7 +181,7 @@ void PartRecorder::see_faults(const StepRecord& step, std::size_t device) {
   undecided_.clear();
 }
 
-/// Deletes the parts that no fault after `now` keeps.
+/// Deletes the parts that cannot be affected by a fault after `now`.
 void PartRecorder::decide(LocalTime now) {
   const auto over = [now](const Undecided& part) { return part.ended < now - kBeforeAFault; };
   for (const Undecided& part : undecided_) {
@@ -202,7 +202,8 @@ void PartRecorder::stop(LocalTime now, std::string why) {
 }
 
 void PartRecorder::go_on(LocalTime now) {
-  if (closed_.error.empty() || now < try_again_) return;  // closed, or too early
+  // Recording was closed, or it is too early.
+  if (closed_.error.empty() || now < try_again_) return;
   try_again_ = now + config_.retry_after;
   if (!has_room(config_.path)) return;
   try {

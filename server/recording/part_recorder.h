@@ -17,21 +17,25 @@
 
 namespace tendon {
 
-/// Records a run into as many files as needed (part_files.h), each a complete recording that begins with the scenes. A
-/// new part begins
+/// Records a run in one or more files (part_files.h). Each of them is a complete recording that starts with the scenes.
+/// The conditions for a new part are:
 ///
-/// * when the part has reached `rotate_bytes`, or is `rotate_after` old;
-/// * when its index has 65 536 chunks, some 10 MB: the memory of a run does not grow with its length;
-/// * if the previous part could not be written because the disk was full or the file was deleted. The new part starts
-///   as soon as this is possible. It starts with a Lost record that contains the number of missing steps.
+/// * The current part has reached `rotate_bytes` or `rotate_after`.
+/// * The index has 65 536 chunks, which require about 10 MB. This limits the memory for long runs.
+/// * The previous part could not be written because the disk was full or the file was deleted. The new part is started
+///   as soon as possible. It begins with a Lost record that contains the number of missing steps.
 ///
-/// With a budget the oldest parts are deleted before a new one begins, so that all of them together stay within it.
+/// If there is a budget, the oldest parts are deleted before a new one is started, so that the total size does not
+/// exceed the budget.
 ///
-/// With Keep::kFaults a part takes a minute at the most, and stays only when a fault began in it, in the minute after
-/// it or in the 10 s before it, or when its number says so. It is deleted as soon as neither can be: the last ones when
-/// the run ends without a fault. A run that is killed leaves those that were not decided yet.
+/// With Keep::kFaults, the duration of a part is at most one minute. If a fault starts in a part, within 60 s after its
+/// end, or within 10 s before its start, the part is kept. In addition, parts can be kept because of their number
+/// (Config::one_in). All other parts are deleted as soon as this is certain, or at the end of the run. If the process
+/// is killed, the parts that have not been decided yet are kept.
 ///
-/// Records come in the order of Recorder. Thread-safe: no; the log thread owns it. Realtime-safe: no.
+/// The records must be passed in the same order as to Recorder.
+///
+/// Thread-safe: no, only used by the log thread. Realtime-safe: no.
 class PartRecorder {
  public:
   struct Config {
@@ -39,43 +43,44 @@ class PartRecorder {
     Recorder::Config run;
     std::uint64_t rotate_bytes = 4'000'000'000;
     Duration rotate_after = std::chrono::hours(4);
-    /// Bytes of all parts with this name, including those of earlier runs; 0: nothing is deleted. With a budget a part
-    /// has at most a quarter of it.
+    /// The maximum total size of all parts with this name, including parts of previous runs. If this is 0, no parts are
+    /// deleted. Otherwise, the size of a part is limited to a quarter of the budget.
     std::uint64_t budget_bytes = 0;
     Keep keep = Keep::kAll;
-    /// With Keep::kFaults, part 1 of this run, 1 + one_in, 1 + 2 one_in … stay, too; 0: no part stays for its number.
+    /// With Keep::kFaults, the parts 1, 1 + one_in, 1 + 2 one_in, and so on, are also kept. If this is 0, no parts are
+    /// kept because of their number.
     std::uint64_t one_in = 0;
-    /// The time between two looks for free space while recording has stopped.
+    /// The period for checking the free space while recording is stopped.
     Duration retry_after = std::chrono::seconds(1);
   };
   struct Status {
     std::filesystem::path path;  ///< of the newest part
     std::uint64_t parts = 0;
-    std::uint64_t parts_not_kept = 0;         ///< of these; deleted by Config::keep
+    std::uint64_t parts_not_kept = 0;         ///< deleted because of Config::keep
     std::uint64_t bytes = 0;                  ///< in all parts of this run
-    std::uint64_t steps = 0;                  ///< likewise, or in the open chunk
-    std::uint64_t datagrams = 0;              ///< likewise
-    std::uint64_t lost_steps = 0;             ///< not recorded: the disk was full, or the log thread could not follow
-    std::uint64_t lost_datagrams = 0;         ///< likewise
-    std::uint64_t strangers_left_out = 0;     ///< on purpose, see DatagramSieve
-    std::uint64_t datagrams_over_budget = 0;  ///< likewise
-    std::string error;                        ///< why nothing is recorded now; empty while it is
+    std::uint64_t steps = 0;                  ///< including the current chunk
+    std::uint64_t datagrams = 0;              ///< including the current chunk
+    std::uint64_t lost_steps = 0;             ///< because of a full disk or a slow log thread
+    std::uint64_t lost_datagrams = 0;         ///< for the same reasons
+    std::uint64_t strangers_left_out = 0;     ///< see DatagramSieve
+    std::uint64_t datagrams_over_budget = 0;  ///< see DatagramSieve
+    std::string error;                        ///< the reason why recording is stopped, or empty
 
-    /// True when nothing is missing except records left out on purpose.
+    /// Returns true if no records are missing, except for those that have been left out by DatagramSieve.
     bool complete() const noexcept { return lost_steps == 0 && lost_datagrams == 0 && error.empty(); }
   };
-  /// An event that the operator should read in the log.
+  /// A message for the log.
   struct Notice {
     bool warning = false;
     std::string text;
   };
 
-  /// Opens the first part. Throws std::runtime_error, see open_next_part. A disk that is full shows in `status()`.
+  /// Opens the first part. Throws the errors of open_next_part(). If the disk is full, this is reported by `status()`.
   explicit PartRecorder(const Config& config);
   PartRecorder(const PartRecorder&) = delete;
   PartRecorder& operator=(const PartRecorder&) = delete;
 
-  /// As those of Recorder.
+  /// See Recorder.
   void record(const StepRecord& step, std::size_t device = 0, std::string_view force_way = {});
   void record(const PortRecord& port, std::size_t device = 0);
   void record(const DatagramRecord& datagram);
@@ -84,7 +89,7 @@ class PartRecorder {
   void close(LocalTime now);
 
   Status status() const;
-  /// The events since the last call.
+  /// Returns the messages since the last call.
   std::vector<Notice> take_notices();
 
  private:
@@ -103,21 +108,22 @@ class PartRecorder {
 
   Config config_;
   std::unique_ptr<FileSink> sink_;
-  std::optional<Recorder> recorder_;  ///< of the open part; empty while recording has stopped, and after `close`
+  /// The current part. It is empty while recording is stopped, and after `close`.
+  std::optional<Recorder> recorder_;
   LocalTime part_began_{};
-  /// A closed part that stays when a fault comes soon enough.
+  /// A finished part that is kept if there is a fault.
   struct Undecided {
     std::filesystem::path path;
     LocalTime ended;
   };
   std::vector<Undecided> undecided_;
   std::vector<bool> faulty_;        ///< by device, in its newest step
-  std::optional<LocalTime> fault_;  ///< when the newest began
-  bool stays_ = false;              ///< the open part
-  Counts told_;                     ///< losses that the open part was told of
-  Counts missing_;                  ///< since recording stopped
+  std::optional<LocalTime> fault_;  ///< start of the newest fault
+  bool stays_ = false;              ///< the current part must be kept
+  Counts told_;                     ///< losses that were recorded in the current part
+  Counts missing_;                  ///< since recording was stopped
   LocalTime try_again_{};
-  Status closed_;  ///< of the parts before, and all losses that were told
+  Status closed_;  ///< previous parts, and all recorded losses
   std::vector<Notice> notices_;
 };
 

@@ -16,22 +16,24 @@
 
 namespace tendon {
 
-/// Records a run: the scene, every haptic step and every datagram, as one MCAP file with protobuf messages
-/// (recording.proto) that Foxglove and PlotJuggler open as it is.
+/// Records a run in an MCAP file. It contains the scene, all haptic steps and all datagrams as protobuf messages
+/// (recording.proto). The file can be opened by Foxglove and PlotJuggler.
 ///
-/// * A server killed at any instant leaves a readable file that lacks at most the last `flush_after` of its run.
-/// * The same calls give the same bytes: no clock is read and nothing depends on an address.
-/// * When the sink fails (a full disk), recording ends for good: later records are counted, nothing else happens, and
-///   what was written stays readable. `status().error` says why. PartRecorder goes on in another file.
+/// * If the server is killed, the file is still readable, but the last `flush_after` may be missing.
+/// * The output is deterministic. It does not depend on a clock or on addresses in memory.
+/// * If the sink fails, for example because the disk is full, no more data is written. Subsequent records are counted,
+///   the existing data is still readable, and the reason is available in `status().error`. PartRecorder then continues
+///   with another file.
 ///
-/// Steps come in the order of their time, and so do datagrams; how the two interleave does not matter.
+/// Steps must be passed in chronological order, and datagrams as well. The order between steps and datagrams is
+/// arbitrary.
 ///
-/// Thread-safe: no; the log thread owns it. Realtime-safe: no.
+/// Thread-safe: no, only used by the log thread. Realtime-safe: no.
 class Recorder {
  public:
-  /// A device besides the first.
+  /// An additional device.
   struct Device {
-    std::string name;  ///< its records are in channels /NAME/scene and /NAME/haptic/step
+    std::string name;  ///< used in the topics /NAME/scene and /NAME/haptic/step
     SceneRecord scene;
     bool ports = false;  ///< it has a coupling
   };
@@ -39,48 +41,49 @@ class Recorder {
     SceneRecord scene;
     bool ports = false;  ///< the first device has a coupling
     std::vector<Device> more_devices{};
-    LocalTime started{};  ///< time of the scene's message
-    /// The most recorded time that a kill can cost. Each flush costs one write(2) and some 300 bytes of chunk and
-    /// index.
+    LocalTime started{};  ///< log time of the scene
+    /// The maximum duration that can be lost if the process is killed. Each flush requires a write(2), and about 300
+    /// bytes for the chunk and its index.
     Duration flush_after = std::chrono::milliseconds(250);
-    /// Bytes of messages at which a chunk closes earlier. A reader seeks by chunks and holds a few in memory.
+    /// The size of the messages, in bytes, at which a chunk is closed. A reader seeks to chunks and keeps some of them
+    /// in memory.
     std::size_t flush_size = std::size_t{256} * 1024;
   };
   struct Status {
     std::uint64_t bytes = 0;           ///< in the file
-    std::uint64_t steps = 0;           ///< in the file, or in the open chunk
-    std::uint64_t datagrams = 0;       ///< likewise
-    std::uint64_t lost_steps = 0;      ///< not in the file: reported by `lost`, or given up by a failed sink
-    std::uint64_t lost_datagrams = 0;  ///< likewise
-    std::string error;                 ///< why recording has ended early; empty while it goes on
+    std::uint64_t steps = 0;           ///< including the current chunk
+    std::uint64_t datagrams = 0;       ///< including the current chunk
+    std::uint64_t lost_steps = 0;      ///< reported by `lost`, or not accepted by the sink
+    std::uint64_t lost_datagrams = 0;  ///< for the same reasons
+    std::string error;                 ///< the reason why recording has failed, or empty
   };
 
-  /// Writes the scene at once. `sink` must outlive the recorder; its failure shows in `status()`.
+  /// Writes the scene immediately. `sink` must outlive the recorder. If it fails, this is reported by `status()`.
   Recorder(const Config& config, ByteSink& sink);
   Recorder(const Recorder&) = delete;
   Recorder& operator=(const Recorder&) = delete;
 
-  /// `device` by number: 0 is the first, and those of `more_devices` follow. `force_way`: the name of its force_way.
+  /// `device` is 0 for the first device, followed by `more_devices`. `force_way` is the name of Step::force_way.
   void record(const StepRecord& step, std::size_t device = 0, std::string_view force_way = {});
-  /// Of a device with `ports`; before the step with the same tick.
+  /// The device must have `ports`. This must be called before recording the step with the same tick.
   void record(const PortRecord& port, std::size_t device = 0);
   void record(const DatagramRecord& datagram);
-  /// Notes that records were dropped before they came here, so that a reader knows of the gap.
+  /// Records that previous records were dropped by the caller.
   void lost(const LossRecord& loss);
 
-  /// Flushes records that are older than `flush_after`, even when no new ones come. Call it after each batch of
-  /// records.
+  /// Flushes records that are older than `flush_after`. This should be called after each batch of records.
   void tick(LocalTime now);
 
-  /// Ends the file with an index. Without it the file is readable, but counts as truncated, and opens slower.
-  /// Records that come later are lost, and counted.
+  /// Finishes the file with an index. Without the index, the file is readable, but it is considered truncated and takes
+  /// longer to open. Subsequent records are counted as lost.
   void close();
 
   Status status() const;
-  /// Parts of `status()`, without its cost.
+  /// Faster than `status()`.
   bool failed() const noexcept { return failed_; }
   std::uint64_t bytes() const noexcept { return writer_.bytes_written(); }
-  /// In the index, which is kept in memory until `close`: some 150 bytes each.
+  /// The number of chunks in the index. It is kept in memory until `close` is called, and requires about 150 bytes per
+  /// chunk.
   std::size_t chunks() const noexcept { return writer_.chunks(); }
 
  private:
@@ -98,12 +101,12 @@ class Recorder {
   McapWriter writer_;
   std::uint16_t scene_channel_;
   std::vector<std::uint16_t> step_channels_;  ///< by device
-  std::vector<std::uint16_t> port_channels_;  ///< by device; 0: it has no coupling
+  std::vector<std::uint16_t> port_channels_;  ///< by device; 0 if it has no coupling
   std::uint16_t datagram_channel_;
   std::uint16_t loss_channel_;
   std::optional<LocalTime> chunk_opened_;
-  Counts kept_;     ///< taken by the sink
-  Counts pending_;  ///< in the open chunk
+  Counts kept_;     ///< accepted by the sink
+  Counts pending_;  ///< in the current chunk
   Counts lost_;
   bool failed_ = false;
   bool closed_ = false;

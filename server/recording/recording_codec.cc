@@ -212,7 +212,7 @@ Joints joints_in(const pb::Step& in) {
 
 std::string schema_data() {
   google::protobuf::FileDescriptorSet set;
-  pb::Step::descriptor()->file()->CopyTo(set.add_file());  // imports nothing
+  pb::Step::descriptor()->file()->CopyTo(set.add_file());  // it has no imports
   return set.SerializeAsString();
 }
 
@@ -306,7 +306,7 @@ std::string encode(const DatagramRecord& datagram) {
   out.set_size_bytes(datagram.size);
   const auto payload = std::span(datagram.bytes).first(std::min<std::size_t>(datagram.size, datagram.bytes.size()));
   out.set_payload(payload.data(), payload.size());
-  if (payload.size() < datagram.size) return out.SerializeAsString();  // too large for this protocol
+  if (payload.size() < datagram.size) return out.SerializeAsString();  // larger than a datagram of this protocol
   if (const auto header = decode_header(payload)) {
     out.set_type(static_cast<pb::DatagramType>(header->type));
     out.set_connection_id(header->connection_id);
@@ -364,7 +364,7 @@ StepRecord decode_step(std::string_view message, LocalTime at, Ways& ways) {
   out.rearmed = in.rearmed();
   out.disarmed = in.disarmed();
   out.longest_hold = Duration(in.longest_hold_ns());
-  if (in.assumption_broken()) out.reasons |= Reason::kAcceleration;  // as recordings of before the reason say it
+  if (in.assumption_broken()) out.reasons |= Reason::kAcceleration;  // from old recordings
   out.buttons = in.buttons();
   if (in.has_turn() || in.has_grip() || in.joint_rad_size() > 0) out.handle.emplace();
   if (in.has_turn()) out.handle->turn = turn_step(in.turn());

@@ -9,50 +9,50 @@
 #include "server/recording/records.h"
 #include "server/recording/ways.h"
 
-// Records as the messages of recording.proto, and back. The only place in the server that knows protobuf.
+// Converts records to messages of recording.proto, and back. Protobuf must not be used anywhere else in the server.
 
 namespace tendon {
 
-/// The scene of a run: enough to run it again.
+/// The scene of a run. It contains all information that is required to run it again.
 struct SceneRecord {
-  std::string text;  ///< the scene file, whole; UTF-8
+  std::string text;  ///< the complete scene file in UTF-8
   std::uint64_t seed = 0;
-  std::string version;     ///< of the program that recorded
-  std::string commit;      ///< it was built from
-  Duration unix_offset{};  ///< log_time − local time; 0 in simulations
-  std::uint32_t part = 0;  ///< of its run, from 1; 0: a recording that has only this one
-  /// The recording may be deleted to keep all that have its name within so many bytes; 0: it is kept.
+  std::string version;     ///< of the program
+  std::string commit;      ///< of the program
+  Duration unix_offset{};  ///< log_time − local time
+  std::uint32_t part = 0;  ///< starting at 1; 0 if there are no other parts
+  /// The recording may be deleted to limit the total size of all parts to this value. It is kept if this is 0.
   std::uint64_t budget_bytes = 0;
-  /// The file name of part 1. This is only set if `budget_bytes` is set. It is needed because `subject-2.mcap` can also
-  /// be the first part of a different recording.
+  /// The file name of part 1. This is only set if `budget_bytes` is set. It is required because `subject-2.mcap` can
+  /// also be the first part of a different recording.
   std::string first_part = {};
 
   bool operator==(const SceneRecord&) const = default;
 };
 
-/// Records that are missing in the file, counted since the previous Lost record.
+/// The number of missing records since the previous LossRecord.
 struct LossRecord {
   enum class Cause : std::uint8_t {
-    kLogThread = 0,   ///< it could not follow
-    kDisk = 1,        ///< it was full, or an error occurred, or the file is damaged
-    kByteBudget = 2,  ///< guests' datagrams beyond the bytes of a second, see DatagramSieve
-    kSample = 3,      ///< strangers' datagrams beyond the sample of a second, likewise
+    kLogThread = 0,   ///< log thread too slow
+    kDisk = 1,        ///< disk full, write error, or damaged file
+    kByteBudget = 2,  ///< exceeded the bytes per second, see DatagramSieve
+    kSample = 3,      ///< exceeded the sample, see DatagramSieve
   };
-  LocalTime at{};  ///< when it was noticed
+  LocalTime at{};
   std::uint64_t steps = 0;
-  std::uint64_t datagrams = 0;  ///< from and to guests
+  std::uint64_t datagrams = 0;  ///< from and to clients
   Cause cause = Cause::kLogThread;
-  std::uint64_t strangers = 0;  ///< datagrams from and to strangers; only with kSample
+  std::uint64_t strangers = 0;  ///< from and to strangers; only for kSample
 
   bool operator==(const LossRecord&) const = default;
 };
 
 namespace recording {
 
-/// The channel of one kind of record in the MCAP file.
+/// The MCAP channel for one type of record.
 struct Channel {
   std::string_view topic;
-  std::string_view schema;  ///< full name of its protobuf message
+  std::string_view schema;  ///< full name of the protobuf message
 };
 inline constexpr Channel kScene = {"/scene", "tendon.recording.v1.Scene"};
 inline constexpr Channel kStep = {"/haptic/step", "tendon.recording.v1.Step"};
@@ -61,31 +61,31 @@ inline constexpr Channel kDatagram = {"/net/datagram", "tendon.recording.v1.Data
 inline constexpr Channel kClock = {"/merge/clock", "tendon.recording.v1.Clock"};
 inline constexpr Channel kLoss = {"/recording/lost", "tendon.recording.v1.Lost"};
 
-/// The MCAP name of both our schemas' and our messages' encoding.
+/// The name of the encoding of schemas and messages in MCAP.
 inline constexpr std::string_view kEncoding = "protobuf";
 
-/// A serialized FileDescriptorSet that holds every message of recording.proto.
+/// Returns a serialized FileDescriptorSet with all messages of recording.proto.
 std::string schema_data();
 
-/// The same record gives the same bytes.
+/// The output is deterministic.
 std::string encode(const SceneRecord& scene);
-/// `force_way`: the name of Step::force_way, which is a number of this run only.
+/// `force_way` is the name of Step::force_way. The number is only valid in this run.
 std::string encode(const StepRecord& step, std::string_view force_way = {});
 std::string encode(const PortRecord& port);
 std::string encode(const ClockRecord& clock);
 std::string encode(const DatagramRecord& datagram);
 std::string encode(const LossRecord& loss);
 
-// A message back as a record; `at` is the message's time on the local clock. Every double comes back with all its
-// bits, NaN included. Throws std::invalid_argument with what is wrong when the bytes are not such a message.
+// Decodes a message. `at` is the local time of the message. All floating-point values are preserved exactly, including
+// NaN. Throws std::invalid_argument if the message is not valid.
 SceneRecord decode_scene(std::string_view message);
-/// Numbers the name of Step::force_way in `ways`.
+/// The name of Step::force_way is added to `ways`.
 StepRecord decode_step(std::string_view message, LocalTime at, Ways& ways);
 PortRecord decode_port(std::string_view message, LocalTime at);
 DatagramRecord decode_datagram(std::string_view message, LocalTime at);
 LossRecord decode_loss(std::string_view message, LocalTime at);
 
-/// log_time = unix_offset + local time, in ns modulo 2⁶⁴; and its inverse.
+/// The log time is unix_offset + local time, in ns modulo 2⁶⁴. The second function is the inverse.
 constexpr std::uint64_t log_time(LocalTime at, Duration unix_offset) noexcept {
   return static_cast<std::uint64_t>(at.time_since_epoch().count()) + static_cast<std::uint64_t>(unix_offset.count());
 }

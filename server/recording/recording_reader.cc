@@ -31,7 +31,8 @@ RecordingReader::RecordingReader(const std::filesystem::path& path, Devices devi
 RecordingReader::RecordingReader(std::unique_ptr<std::istream> input, std::string name, Devices devices)
     : name_(name), mcap_(std::move(input), std::move(name)), wanted_(devices) {}
 
-/// Whether it is the channel of that kind of a device that is asked for; which becomes `device_`.
+/// Returns true if the channel has this type and belongs to one of the requested devices. Sets `device_` to this
+/// device.
 bool RecordingReader::belongs(const McapReader::Channel& channel, const recording::Channel& kind) {
   if (is(channel, kind)) {
     device_ = 0;
@@ -79,7 +80,7 @@ std::optional<RecordingReader::Record> RecordingReader::decode(const McapReader:
   if (!known() && !(mcap_.use_summary() && known())) return std::nullopt;
   if (belongs(channel, recording::kScene)) {
     auto scene = recording::decode_scene(message.data);
-    if (device_ == 0) unix_offset_ = scene.unix_offset;  // that of all times in the file
+    if (device_ == 0) unix_offset_ = scene.unix_offset;  // used for all times
     return scene;
   }
   if (!unix_offset_) {

@@ -18,16 +18,17 @@
 
 namespace tendon {
 
-/// Reads a recording back, record by record, with times on the clock of the run. Records of one kind come in the
-/// order in which they were recorded; kinds interleave as in the file. The scene is the first record.
+/// Reads a recording. All times are converted to the local clock of the run. The first record is the scene. Records of
+/// the same type are returned in the order in which they were recorded.
 ///
 /// If the recording is truncated, all records in complete chunks are returned. If it is damaged, all records in valid
-/// chunks are returned, and `damage()` contains the error messages. A LossRecord with Cause::kDisk is returned for each
+/// chunks are returned, and error messages are added to `damage()`. A LossRecord with Cause::kDisk is returned for each
 /// gap. It contains the number of missing steps and datagrams. If the scene is missing, the time of a record is the
 /// wall clock.
 ///
 /// Throws std::runtime_error with the name of the file if it is not an MCAP file or not a Tendon recording. Unknown
-/// channels are ignored, as are the scenes, steps and ports of all devices except the first, unless all are asked for.
+/// channels are ignored. By default, the scenes, steps and ports of all devices except for the first one are also
+/// ignored.
 ///
 /// Thread-safe: no. Realtime-safe: no.
 class RecordingReader {
@@ -35,22 +36,22 @@ class RecordingReader {
   using Record = std::variant<SceneRecord, StepRecord, DatagramRecord, LossRecord, PortRecord>;
   enum class Devices : std::uint8_t { kFirst, kAll };
 
-  /// Throws std::runtime_error with path and reason when the file cannot be read.
+  /// Throws std::runtime_error if the file cannot be read.
   explicit RecordingReader(const std::filesystem::path& path, Devices devices = Devices::kFirst);
-  /// From any stream that can seek; `name` is what errors call it.
+  /// The stream must support seeking. `name` is used in error messages.
   RecordingReader(std::unique_ptr<std::istream> input, std::string name, Devices devices = Devices::kFirst);
 
-  /// The next record; empty at the end.
+  /// Returns the next record, or nothing if there are no more records.
   std::optional<Record> next();
 
-  /// The names of the devices whose records it has given so far, in the order of their scenes. That of the first is
-  /// empty: its scene may tell it.
+  /// Returns the names of the devices, in the order of their scenes. The first name is empty because it may be
+  /// specified in the scene.
   const std::vector<std::string>& devices() const noexcept { return devices_; }
-  /// The number among them to which the scene, step or port belongs that `next` has just given.
+  /// Returns the index of the device in the last scene, step or port.
   std::size_t device() const noexcept { return device_; }
 
-  /// True when the recording ended before its end mark: the server was killed, or the disk was full. Known once `next`
-  /// has returned empty.
+  /// Returns true if the recording is incomplete because the server was killed or the disk was full. This must only be
+  /// called after `next` has returned nothing.
   bool truncated() const noexcept { return mcap_.truncated(); }
 
   /// Returns an error message for a recording that has no steps, for example "NAME: is empty".
@@ -59,7 +60,7 @@ class RecordingReader {
   /// See McapReader::damage().
   std::vector<std::string> damage() const { return mcap_.damage(); }
 
-  /// The names of Step::force_way in the steps that it has given.
+  /// Returns the names of Step::force_way in the recording.
   const Ways& ways() const noexcept { return ways_; }
 
  private:

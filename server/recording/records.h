@@ -11,47 +11,46 @@
 
 namespace tendon {
 
-/// What the loop knows of a step besides the controller.
+/// The part of a StepRecord that is not provided by the controller.
 struct LoopStep {
   std::uint64_t tick = 0;
   LocalTime scheduled{};        ///< when the step was due
-  Vec3 applied = Vec3::Zero();  ///< N, really given out by the device (`force` is what it was told)
-  bool rearmed = false;         ///< the controller was rearmed since the step before
-  bool disarmed = false;        ///< the operator had disarmed the device
-  std::uint32_t buttons = 0;    ///< bit i is set while button i of the handle was held
+  Vec3 applied = Vec3::Zero();  ///< N, actual force of the device; `force` is the command
+  bool rearmed = false;         ///< rearmed since the previous step
+  bool disarmed = false;        ///< disarmed by the operator
+  std::uint32_t buttons = 0;    ///< bit i: button i is pressed
 };
 
-/// One haptic step, as it is recorded: all inputs that are needed to repeat it, and what the device did.
+/// A recorded haptic step. It contains all inputs that are required to replay the step, and the output of the device.
 struct StepRecord : Step, LoopStep {};
 
-/// What a coupling did in one haptic step: with the StepRecord of the same tick, and the other couplings of that tick
-/// in their order, enough to repeat it.
+/// The state of a coupling in a haptic step. It can be replayed together with the StepRecord of the same tick and the
+/// other couplings of this tick.
 struct PortRecord {
   std::uint64_t tick = 0;
-  std::uint32_t channel = 0;         ///< of the device, by which the leader comes; 0 where there is one coupling
-  LocalTime at{};                    ///< of the step's position
-  Purse::Settlement settled{};       ///< J, what the limiter was credited with, and what was withdrawn
-  Purse::Settlement grip_settled{};  ///< J, likewise that of the gripper
-  double stiffness = 0;              ///< N/m, K in use
-  Duration round_trip{};             ///< in use; 0: not known
+  std::uint32_t channel = 0;         ///< used by the leader; 0 if there is one coupling
+  LocalTime at{};                    ///< time of the step's position
+  Purse::Settlement settled{};       ///< J, transfers to and from the account of the limiter
+  Purse::Settlement grip_settled{};  ///< J, for the gripper
+  double stiffness = 0;              ///< N/m, current value of K
+  Duration round_trip{};             ///< current value; 0 if unknown
   PortState sent{};                  ///< to the peer
-  std::optional<PortState> peer{};   ///< that came since the step before; the newest
-  LocalTime peer_arrived{};          ///< by which it had come; of use with `peer` only
+  std::optional<PortState> peer{};   ///< the newest since the previous step, if any
+  LocalTime peer_arrived{};          ///< time of arrival; only valid with `peer`
 };
 
-/// How far the follower's clock was ahead of the leader's.
+/// The offset of the follower's clock from the leader's clock.
 struct ClockRecord {
   Duration offset{};
-  Duration error{};  ///< the true offset lies within ± this
+  Duration error{};  ///< the true offset is in the range ± error
 };
 
-/// One datagram that went in or out.
 struct DatagramRecord {
   enum class Direction : std::uint8_t { kIn = 1, kOut = 2 };
   LocalTime at{};
   Direction direction = Direction::kIn;
   Address peer;
-  std::uint32_t size = 0;  ///< bytes on the wire; `bytes` holds at most kMaxDatagram of them
+  std::uint32_t size = 0;  ///< on the wire; `bytes` is truncated to kMaxDatagram
   std::array<std::byte, kMaxDatagram> bytes;
 };
 

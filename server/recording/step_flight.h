@@ -9,13 +9,13 @@
 
 namespace tendon {
 
-/// The last steps of a device, for when a fault comes: FlightRecorder, in which a device that has a position only pays
-/// for no handle. That is half of a StepRecord.
+/// Stores the last steps of a device, which are saved after a fault. This is a FlightRecorder that does not store the
+/// handle if the device only measures its position. This saves half of the memory of a StepRecord.
 ///
-/// Thread-safe and Realtime-safe: as FlightRecorder.
+/// Thread-safe, Realtime-safe: see FlightRecorder.
 class StepFlight {
  public:
-  /// Keeps the last `capacity` steps, a power of two. Without `handles` those of the steps are left out.
+  /// Stores `capacity` steps, which must be a power of two. The handles are only stored if `handles` is true.
   explicit StepFlight(std::size_t capacity, bool handles = true) : steps_(capacity) {
     if (handles) handles_.emplace(capacity);
   }
@@ -25,7 +25,7 @@ class StepFlight {
     if (handles_) handles_->record(step.handle);
   }
 
-  /// Both at once for the other thread, which looks at the one of the steps.
+  /// The order is important because the other thread only checks the recorder of the steps.
   void freeze() noexcept {
     if (handles_) handles_->freeze();
     steps_.freeze();

@@ -10,21 +10,22 @@
 
 namespace tendon {
 
-/// The names of the ways in which the engines of a device have answered (Hello::ways), numbered from 1 in the order in
-/// which they were first used: so a step, which the haptic thread may not let hold a text, holds a number. A number has
-/// the same name for as long as this object lives, whichever engine says it.
+/// The names of the solver paths that were used by the engines of a device (Hello::ways). They are numbered from 1 in
+/// the order of their first use, so that a step only needs to store a number instead of a string. The same name always
+/// has the same number during the lifetime of this object, even if it is used by different engines.
 ///
-/// Thread-safe: one thread numbers. Any other may ask for the name of a number that has come to it, as by the mailboxes,
-/// since that was given out: what is written once is not written again. Realtime-safe: yes.
+/// Thread-safe: only one thread may call `number_of`. Other threads may call `name_of` for a number that was passed to
+/// them with synchronization, for example through a mailbox, because names are never modified.
+/// Realtime-safe: yes.
 class Ways {
  public:
-  /// Engines have five or so; those of a hundred restarts have the same ones. 1.6 kB.
+  /// Typical engines have about five names, and they are the same after a restart. This requires 1.6 kB.
   static constexpr std::size_t kMost = 63;
 
-  /// 0, which is none: `name` is empty or longer than limits::kMaxLabel, or is new where there are kMost already.
+  /// Returns 0 if `name` is empty or longer than limits::kMaxLabel, or if it is new and there are already kMost names.
   std::uint8_t number_of(std::string_view name) noexcept;
 
-  /// Empty: of 0, and of a number that has not been given out.
+  /// Returns an empty string if the number is 0 or not in use.
   std::string_view name_of(std::uint8_t number) const noexcept;
 
  private:
