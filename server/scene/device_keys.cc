@@ -22,12 +22,12 @@
 namespace tendon::scene_file {
 namespace {
 
-/// Where a USB device is plugged in, in the kernel's words.
+/// The USB port of a device, as named by the kernel.
 struct UsbPort {
   static std::string expected(const Unit&) { return "a port as `tendond devices` names it, like \"1-2.3\""; }
 
   static Verdict take(const toml::node& node, const Unit& unit, std::string& to) {
-    constexpr std::size_t kLongestPort = 32;  // USB allows at most 7 tiers of hubs
+    constexpr std::size_t kLongestPort = 32;  // there are at most 7 tiers of hubs
     const auto* text = node.as_string();
     const auto in_a_port = [](char c) { return (c >= '0' && c <= '9') || c == '-' || c == '.'; };
     const bool good = text != nullptr && !(*text)->empty() && (*text)->size() <= kLongestPort &&
@@ -40,7 +40,7 @@ struct UsbPort {
   static std::string shown(const Unit&, const std::string& value) { return in_quotes(value); }
 };
 
-/// An arm by Haptikfabriken whose kinematics are published.
+/// A Haptikfabriken device with published kinematics.
 struct ArmModel {
   static std::string expected(const Unit&) {
     std::string text = "one of ";
@@ -65,7 +65,7 @@ struct ArmModel {
   }
 };
 
-/// A force sensor, with the size of one count; or none.
+/// The resolution of the force sensor, if there is one.
 struct Sensor {
   static std::string expected(const Unit&) {
     return "the size of one count in N, 0 for an exact one, or false for none";
@@ -105,7 +105,7 @@ struct Column {
   }
 };
 
-/// Where the axes of a device's base frame point, in words.
+/// A textual description of the axes of the base frame.
 struct Axes {
   static std::string expected(const Unit&) {
     return "the axes that point to the operator's right, up and towards the user, like \"right=x up=y user=z\"";
@@ -126,7 +126,7 @@ struct Axes {
   static std::string shown(const Unit&, const std::string& value) { return in_quotes(value); }
 };
 
-/// A number along a line, as the x of a point: the opening of a gripper.
+/// A scalar that is stored as the x coordinate of a point. This is used for the opening of a gripper.
 struct AlongX {
   static std::string expected(const Unit& unit) { return kAnyNumber.expected(unit); }
 
@@ -138,7 +138,7 @@ struct AlongX {
   static std::string shown(const Unit& unit, const Vec3& value) { return Number::shown(unit, value.x()); }
 };
 
-/// What the keys of a motion are called, by what moves.
+/// The names of the keys of a motion, which depend on the type of the motion.
 struct MotionNames {
   std::string_view amplitude, centre, from, to, points, scale, origin;
 };
@@ -267,7 +267,7 @@ void declare_csv(Table& keys, RecordedMotionFile& file, const MotionNames& names
   }
 }
 
-/// A motion of points in mm, of rotation vectors in degrees, or of one opening in degrees.
+/// Declares a motion of a point in mm, of a rotation vector in degrees, or of the opening of a gripper in degrees.
 template <class Point = Vector, class Table>
 void declare_motion(Table& motion, DraftMotion& draft, const MotionNames& names = kInMm) {
   motion.kind(motion_names(), [&draft, &names](Table& keys, MotionKind kind) {
@@ -310,7 +310,6 @@ void declare_motion(Table& motion, DraftMotion& draft, const MotionNames& names 
   });
 }
 
-/// How the handle turns.
 template <class Table>
 void declare_rotation(Table& keys, Draft& draft, SimulatedRotation::Config& config) {
   keys.key("inertia_kg_m2", config.inertia, kAboveZero, "of the handle, the same about every axis", kRequired);
@@ -329,7 +328,6 @@ void declare_rotation(Table& keys, Draft& draft, SimulatedRotation::Config& conf
   });
 }
 
-/// Two fingers that open by an angle.
 template <class Table>
 void declare_gripper(Table& keys, Draft& draft, SimulatedGripper::Config& config) {
   keys.key("open_deg", config.open, Number{.least = 0, .most = 180, .without_least = true}, "its largest opening",
@@ -350,7 +348,6 @@ void declare_gripper(Table& keys, Draft& draft, SimulatedGripper::Config& config
   });
 }
 
-/// The operator's hand.
 template <class Table>
 void declare_hand(Table& keys, Draft& draft, OperatorHand::Config& hand) {
   keys.key("profile", draft.operator_profile, operator_names(),
@@ -445,7 +442,7 @@ void declare(Table& keys, woodenhaptics::Config& device, Draft& /*draft*/) {
            "of each motor; at most the full scale of the amplifiers");
 }
 
-/// Makes the alternative of that number, and declares its keys.
+/// Creates the alternative with this index and declares its keys.
 template <std::size_t index = 0, class Table>
 void declare_kind(std::size_t kind, Table& keys, Draft& draft) {
   if constexpr (index < std::variant_size_v<Scene::AnyDevice>) {

@@ -21,7 +21,6 @@ namespace {
 
 std::string system_message() { return std::generic_category().message(errno); }
 
-/// Closes the descriptor at the end of its scope.
 struct Descriptor {
   explicit Descriptor(int descriptor) : fd(descriptor) {}
   ~Descriptor() {
@@ -32,7 +31,7 @@ struct Descriptor {
   int fd;
 };
 
-/// False, with errno, when not all of `text` could be written.
+/// Returns false and sets errno if the text could not be written completely.
 bool write_whole(int descriptor, std::string_view text) {
   while (!text.empty()) {
     const ssize_t written = ::write(descriptor, text.data(), text.size());
@@ -42,8 +41,8 @@ bool write_whole(int descriptor, std::string_view text) {
   return true;
 }
 
-/// Calls the file `from` by the name `to`; false, with errno, when that name exists. Not every file system can rename
-/// without overwriting (NFS), and not every one can link (FAT).
+/// Renames the file. Returns false and sets errno if there is already a file with the new name. Some file systems like
+/// NFS do not support renaming without overwriting, and some like FAT do not support links.
 bool give_name(const std::string& from, const std::filesystem::path& to) {
   if (::renameat2(AT_FDCWD, from.c_str(), AT_FDCWD, to.c_str(), RENAME_NOREPLACE) == 0) return true;
   if (errno != EINVAL || ::link(from.c_str(), to.c_str()) != 0) return false;
@@ -91,7 +90,7 @@ std::vector<ClientKey> read_key_folder(const std::filesystem::path& folder) {
 
 void write_key_file(const std::filesystem::path& path, const ClientKey& key) {
   std::string unfinished = path.string() + ".new-XXXXXX";
-  const Descriptor file(::mkostemp(unfinished.data(), O_CLOEXEC));  // for its owner only
+  const Descriptor file(::mkostemp(unfinished.data(), O_CLOEXEC));  // readable by the owner only
   const bool made =
       file.fd >= 0 && write_whole(file.fd, key_file_text(key)) && ::fsync(file.fd) == 0 && give_name(unfinished, path);
   if (made) return;

@@ -8,16 +8,16 @@
 
 namespace tendon {
 
-/// The keys of a folder, one for each file NAME.key, in the order of the names. Other files are ignored. Throws
-/// std::runtime_error, "FILE: what is wrong", when the folder cannot be read or has no key, and when one of its keys is
-/// readable by others, no regular file, no key file, or weak.
+/// Reads all keys of a directory. Each key is in a file NAME.key, and other files are ignored. The keys are sorted by
+/// name. Throws std::runtime_error "FILE: what is wrong" if the directory cannot be read or does not contain any keys,
+/// or if a key is weak, is readable by other users, or is not in a valid regular file.
 std::vector<ClientKey> read_key_folder(const std::filesystem::path& folder);
 
-/// The key of one file, with the name of the file as its own; throws likewise.
+/// Reads a single key. The name of the key is the name of the file. Throws the same errors.
 ClientKey read_key(const std::filesystem::path& file);
 
-/// Writes a new key file that only its owner may read. Throws std::runtime_error when it cannot, or when there is such
-/// a file already; nothing is left behind then: the key is written under another name first.
+/// Writes a new key file that can only be read by its owner. Throws std::runtime_error if this is not possible or if
+/// the file already exists. The key is written to a temporary file first, so no incomplete file is left behind.
 void write_key_file(const std::filesystem::path& file, const ClientKey& key);
 
 }  // namespace tendon

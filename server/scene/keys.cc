@@ -38,7 +38,7 @@ Names<Suite> suite_names() {
   return names;
 }
 
-/// For the reference: what each preset is for, and promises.
+/// Returns the descriptions of the presets for the reference.
 std::string preset_meanings() {
   std::string text;
   for (const PresetInfo& preset : presets()) {
@@ -75,7 +75,7 @@ void declare_watchdog(Table& keys, Watchdog::Config& dog, std::string_view meani
   keys.key("ramp_ms", dog.ramp, kZeroOrMore, "after that the force falls to zero within this time");
 }
 
-/// The safety layer. It exists when its table does, and so does each part of it.
+/// Declares the safety layer. The layer and each of its parts are enabled if the corresponding table is present.
 template <class Table>
 void declare_safety(Table& safety, SafeDevice::Config& config) {
   using By = SafeDevice::Arming::By;
@@ -152,7 +152,7 @@ void declare_safety(Table& safety, SafeDevice::Config& config) {
   });
 }
 
-/// The parts of AOL+. Each exists when its table does.
+/// Declares the parts of AOL+. Each part is enabled if its table is present.
 template <class Table>
 void declare_parts(Table& limiter, Draft& draft) {
   using Plus = PointAolPlus;
@@ -219,7 +219,7 @@ Names<OutputEstimator::Model> estimator_models() {
   return {{{"polynomial", kPolynomial}, {"spring-and-bias", kSpringAndBias}, {"output-error", kOutputError}}};
 }
 
-/// How the force follows the hand between two arrivals. At most one table.
+/// Declares how the force changes between two updates of the engine. There can be at most one of these tables.
 template <class Table>
 void declare_between(Table& force, HeldForce::Config& hold) {
   const Name model{"adaptive_local_model", "models of the engine are blended and capped"};
@@ -254,7 +254,7 @@ void declare_between(Table& force, HeldForce::Config& hold) {
   });
 }
 
-/// What the limiter counts on of a handle that turns and grips.
+/// Declares the friction bounds for rotation and gripper.
 template <class Table>
 void declare_handle_bounds(Table& limiter, Draft& draft) {
   limiter.table("rotation", [&draft](Table& keys) {
@@ -281,7 +281,7 @@ void declare_handle_bounds(Table& limiter, Draft& draft) {
   });
 }
 
-/// The keys that only some laws have.
+/// Declares the keys that are only used by some of the laws.
 template <class Table>
 void declare_law(Table& limiter, Draft& draft) {
   LimiterConfig& config = draft.scene.loop.control.limiter;
@@ -311,14 +311,14 @@ void declare_law(Table& limiter, Draft& draft) {
   if (used_by({Law::kAolPlus})) declare_parts(limiter, draft);
 }
 
-/// 250 Hz to 10 kHz. At 250 Hz the stiffest wall that felt clean was 0.325 N/mm (Choi and Tan, IROS 2004); 100 µs is
-/// about what an ordinary kernel wakes a thread too late.
+/// The period is from 100 µs to 4 ms. At 4 ms, the stiffest wall that felt clean was 0.325 N/mm (Choi and Tan, IROS
+/// 2004). The wake-up latency of an ordinary kernel is about 100 µs.
 constexpr Number kPeriod{.least = 100, .most = 4000};
-/// The CPU numbers that fit into the kernel's set.
+/// The maximum number in the cpu_set_t of the kernel.
 constexpr Count kProcessor{1023};
-/// The wire carries timeouts in whole ms.
+/// The timeouts in the protocol are in ms.
 constexpr Number kTimeout{.least = 1, .most = limits::kMaxTimeout / std::chrono::milliseconds(1)};
-/// Each costs 250 bytes per haptic step: 1000 are 2 Gbit/s at 1 kHz.
+/// Each observer requires 250 bytes per haptic step. For 1000 observers, this is 2 Gbit/s at 1 kHz.
 constexpr Count kObservers{1000};
 constexpr Count kNetworkThreads{kMostDevices / limits::kMaxDevices, 1};
 
@@ -374,7 +374,7 @@ void declare_scene(Table& scene, Draft& draft) {
 
   const Name admittance{"admittance", "the handle follows a tool of another mass"};
   scene.part(admittance, draft.scene.loop.control.admittance, [](Table& keys, AdmittanceLoop<3>::Config& tool) {
-    // The tool is the same in every direction.
+    // The values are the same for all axes.
     const auto each = [&keys](const char* name, Vec3& target, const Number& rule, const char* meaning, Absent absent) {
       double value = target.x();
       keys.key(name, value, rule, meaning, absent);

@@ -13,48 +13,49 @@
 #include "server/scene/scene.h"
 #include "server/tables/recorded_motion.h"
 
-// Declares the keys of a scene. A class Table reads the declarations: Reader fills a Draft from a file (reader.h),
-// Reference prints each key (reference.h), and Parts lists the parts of a scene (parts.h). The default of a key is the
-// initializer of its target. A new key is one line in keys.cc or device_keys.cc. Internal to server/scene.
+// Declares the keys of a scene. The declarations are used by classes with the interface of Table: Reader reads a file
+// into a Draft (reader.h), Reference prints the documentation of each key (reference.h), and Parts finds the optional
+// parts of a scene (parts.h). The default value of a key is the initializer of its target. To add a key, add one line
+// to keys.cc or device_keys.cc. Internal to server/scene.
 
 namespace tendon::scene_file {
 
-/// Where a hand wants to be: a script that the scene lists, or a recording that is still to be read.
+/// The motion of a hand. It is either specified in the scene or loaded from a recording.
 struct DraftMotion {
   ScriptedMotion::Script script = ScriptedMotion::Sine{};
   std::optional<RecordedMotionFile> recorded{};
 };
 
-/// A scene while it is read. Values that depend on several keys are still open: resolver.h settles them.
+/// A scene while it is being read. The values that depend on several keys are computed in resolver.h.
 struct Draft {
   Scene scene;
-  SimulatedDevice::Config simulated;  ///< the device, or what stands in for a real one
+  SimulatedDevice::Config simulated;  ///< the device, or the simulation of a real device
   const DeviceProfile* profile = nullptr;
   const OperatorProfile* operator_profile = nullptr;
   std::optional<Vec3> joint_coulomb;
-  DraftMotion motion;                             ///< of [device.hand]
-  DraftMotion turning;                            ///< of [device.rotation.hand]
-  DraftMotion gripping;                           ///< of [device.gripper.hand]
-  std::optional<RecordedMotionFile> csv;          ///< what a replay plays
-  std::optional<std::filesystem::path> replayed;  ///< a recording of tendond
+  DraftMotion motion;                             ///< [device.hand]
+  DraftMotion turning;                            ///< [device.rotation.hand]
+  DraftMotion gripping;                           ///< [device.gripper.hand]
+  std::optional<RecordedMotionFile> csv;          ///< for a replay from a table
+  std::optional<std::filesystem::path> replayed;  ///< for a replay of a recording
   std::optional<Duration> longest_hold;
-  HoldBound::Follow follow_holds;  ///< a memory of 0: none
+  HoldBound::Follow follow_holds;  ///< disabled if the memory is 0
   std::optional<double> coulomb_bound;
   std::optional<double> viscous_bound;
   std::optional<double> max_force;
-  /// Of [limiter.rotation] and [limiter.gripper].
+  /// For [limiter.rotation] and [limiter.gripper].
   struct FrictionBounds {
     std::optional<double> coulomb;
     std::optional<double> viscous;
   };
   FrictionBounds rotation_bounds;    ///< N·m, N·m·s/rad
   FrictionBounds grip_bounds;        ///< N, N·s/m
-  RotationLimits rotation;           ///< for a device with motors that turn its handle
+  RotationLimits rotation;           ///< only used if there are motors for the rotation
   std::optional<double> max_torque;  ///< N·m
   std::optional<double> max_grip;    ///< N
   std::optional<double> ledger_step;
   std::optional<Preset> preset;
-  Coupling::Config coupling;             ///< of [teleoperation], when there is one
+  Coupling::Config coupling;             ///< only used if there is a table [teleoperation]
   Vec3 map_rotation = Vec3::Zero();      ///< rad, rotation vector
   std::optional<double> coupling_force;  ///< N
   bool absolute_map = false;
@@ -63,17 +64,17 @@ struct Draft {
   std::optional<double> drift_rate;    ///< 1/s
   bool engages_by_button = false;
   std::optional<std::uint32_t> engage_button;
-  FrictionMap::Config friction_map;  ///< without its places
+  FrictionMap::Config friction_map;  ///< without the places
   std::vector<Vec3> places;
   std::vector<double> place_coulomb;
   std::vector<double> place_viscous;
 };
 
-/// N. The maximum force for a device that exerts no forces. It is large enough that recordings contain the forces of the
-/// engines unchanged.
+/// N. The maximum force if the device has no motors. This is large enough to record the forces of the engines without
+/// changes.
 inline constexpr double kUnfelt = 10;
 
-/// The name of a key or a table. If it is a part that can be removed from a scene, `part` is its line in the output of
+/// The name of a key or a table. If it is a part that can be removed from a scene, `part` is its description for
 /// `tendond explain`.
 struct Name {
   std::string_view name;
@@ -83,27 +84,26 @@ struct Name {
   Name(const Text& text, std::string_view what = {}) : name(text), part(what) {}
 };
 
-/// Declares no keys.
 struct NoKeys {
   void operator()(const auto& /*table*/) const {}
 };
 
-/// What a missing key means, where it is not simply the default of the target.
+/// Specifies the meaning of a missing key if it is not just the default value.
 struct Absent {
   bool required = false;
   std::string_view text = {};
 };
 inline constexpr Absent kRequired = {.required = true};
 
-/// All of a scene. Defined for Reader, Reference and Parts.
+/// Declares all keys. It is instantiated for Reader, Reference and Parts.
 template <class Table>
 void declare_scene(Table& scene, Draft& draft);
 
-/// [teleoperation]. Defined for Reader, Reference and Parts.
+/// Declares the keys of [teleoperation]. It is instantiated for Reader, Reference and Parts.
 template <class Table>
 void declare_teleoperation(Table& scene, Draft& draft);
 
-/// [device]. Defined for Reader, Reference and Parts.
+/// Declares the keys of [device]. It is instantiated for Reader, Reference and Parts.
 template <class Table>
 void declare_device(Table& device, Draft& draft);
 

@@ -17,7 +17,7 @@
 namespace tendon::scene_file {
 namespace {
 
-/// Sets the values of the limiter that depend on several keys.
+/// Computes the configuration of the limiter from several keys.
 class LimiterResolver : SceneErrors {
  public:
   LimiterResolver(Draft& draft, const SceneErrors& errors) : SceneErrors(errors), draft_(draft) {}
@@ -25,8 +25,8 @@ class LimiterResolver : SceneErrors {
   void resolve() const {
     HapticController::Config& control = draft_.scene.loop.control;
     const SimulatedDevice::Config& device = draft_.simulated;
-    // Friction that is isotropic as a vector is less on each axis by itself: Σ f |dx_i| ≤ √3 f ‖dx‖ (control.md 1.6
-    // (a)).
+    // Isotropic friction is smaller on a single axis because Σ f |dx_i| ≤ √3 f ‖dx‖ (core/PROOFS.md, "Several
+    // coordinates").
     const bool per_axis = control.limiter.law == Law::kAolPerAxis || control.limiter.law == Law::kAolBox;
     const DeviceProfile* profile = draft_.profile;
     const Friction truth = least_friction(device);
@@ -44,8 +44,8 @@ class LimiterResolver : SceneErrors {
   }
 
  private:
-  /// Reads the bounds of the torque and of the grip force. They are required if the device has these motors, because the
-  /// limiter must know every torque.
+  /// Computes the bounds of torque and grip force. They are required if the device has these motors because the limiter
+  /// must limit all torques.
   void resolve_rotation(HapticController::Config& control) const {
     const auto& device = draft_.simulated.rotation;
     const bool motors = device && device->max_torque;
@@ -73,8 +73,8 @@ class LimiterResolver : SceneErrors {
         GripLimits{.friction = friction, .arm = device->arm, .max_force = draft_.max_grip.value_or(*device->max_force)};
   }
 
-  /// Returns the friction that the limiter uses. `truth` is the friction of the simulated device. The limiter uses the
-  /// fraction `share` of the viscous friction.
+  /// Returns the friction that is assumed by the limiter. `truth` is the friction of the simulated device. Only the
+  /// fraction `share` of the viscous friction is used.
   Friction handle_friction(bool has_motor, const Draft::FrictionBounds& given, const std::array<std::string, 2>& keys,
                            const Friction& truth, const std::string& motor, double share = 1) const {
     const Law law = draft_.scene.loop.control.limiter.law;
@@ -103,7 +103,7 @@ class LimiterResolver : SceneErrors {
             .viscous = bound(given.viscous, keys[1], truth.viscous, share)};
   }
 
-  /// Checks that the friction map does not exceed the true friction.
+  /// Checks that the friction map does not exceed the actual friction.
   void resolve_places(HapticController::Config& control) const {
     if (!control.limiter.parts.adaptive_friction) return;
     const std::string table = "limiter.adaptive_friction";
@@ -122,7 +122,7 @@ class LimiterResolver : SceneErrors {
                   digits(bounds[i]));
       }
     };
-    if (!draft_.scene.driver().moves_a_hand && draft_.scene.driver().exerts_force) {  // the true friction is unknown
+    if (!draft_.scene.driver().moves_a_hand && draft_.scene.driver().exerts_force) {  // only known for simulations
       check("coulomb_friction_n", draft_.place_coulomb, &Friction::coulomb);
       check("viscous_friction_n_s_per_m", draft_.place_viscous, &Friction::viscous);
     }
@@ -138,7 +138,7 @@ class LimiterResolver : SceneErrors {
     }
   }
 
-  /// Refuses a friction bound of a real device if no real device has so much friction.
+  /// Refuses a friction bound for a real device if it is higher than the friction of any known device.
   void refuse_impossible(const std::string& key, double bound, double most) const {
     if (bound <= most || !draft_.scene.driver().moves_a_hand) return;
     const Unit& unit = unit_of(key);
@@ -148,7 +148,7 @@ class LimiterResolver : SceneErrors {
               digits(bound) + ": were all columns in the units that tendon-identify expects (s, m, N)?");
   }
 
-  /// Adds the parts of the preset that are not in the scene.
+  /// Enables the parts of the preset that are not in the scene.
   void resolve_preset(HapticController::Config& control) const {
     if (!draft_.preset) return;
     LimiterConfig& limiter = control.limiter;
@@ -201,7 +201,7 @@ class LimiterResolver : SceneErrors {
     }
   }
 
-  /// Returns the friction that the limiter uses. `axis_share` is the fraction of it on a single axis.
+  /// Returns the friction that is assumed by the limiter. `axis_share` is the fraction for a single axis.
   double friction_bound(const std::string& key, std::optional<double> given, const KnownNumber* profiles, double truth,
                         double axis_share) const {
     const std::string full = "limiter." + key;

@@ -12,19 +12,19 @@
 #include "server/scene/reader.h"
 #include "server/scene/values.h"
 
-// Finds the parts of a scene in the declarations of the keys (keys.h). Internal to server/scene.
+// Finds the optional parts of a scene in the declarations of its keys (keys.h). Internal to server/scene.
 
 namespace tendon::scene_file {
 
-/// Lists all parts, and removes one from the draft.
+/// Lists all parts, and can remove one of them from the draft.
 class Parts {
  public:
   static constexpr bool kDocuments = true;
 
-  /// Removes the part `key`. Sets `removed` to true if the draft has it.
+  /// Removes the part `key`. If it exists, `removed` is set to true.
   Parts(std::vector<ScenePart>& all, std::string_view key, bool& removed) : all_(all), key_(key), removed_(removed) {}
 
-  /// If a key `kind` is a part, its table has the name of the part.
+  /// If a key `kind` is a part, the name of the part is the name of its table.
   template <class T, class Rule>
   bool key(const Name& named, T& target, const Rule&, std::string_view /*meaning*/, const Absent& = {}) {
     if constexpr (requires { take_out(target); }) visit(named.name == "kind" ? path_ : path_of(named), named, target);

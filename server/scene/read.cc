@@ -26,7 +26,7 @@
 namespace tendon {
 namespace {
 
-/// Returns the value after the = in a line if it begins like a number. The first line is 1.
+/// Returns the value after the = in this line if it starts like a number. The first line is 1.
 std::string_view bare_value(std::string_view text, std::size_t line) {
   for (; line > 1; --line) text.remove_prefix(std::min(text.find('\n'), text.size() - 1) + 1);
   text = text.substr(0, text.find_first_of("\n#"));
@@ -45,7 +45,7 @@ toml::table parse_toml(std::string_view text, const std::string& name) {
   }
 }
 
-/// "TABLE.KEY=VALUE" sets the table's key to that value; "TABLE.KEY=" removes the key.
+/// "TABLE.KEY=VALUE" sets a key, and "TABLE.KEY=" removes it.
 void apply_setting(toml::table& file, const std::string& setting) {
   const auto refuse = [&setting](const std::string& why) {
     throw SceneError("setting " + scene_file::in_quotes(setting) + ": " + why);
@@ -78,7 +78,7 @@ void apply_setting(toml::table& file, const std::string& setting) {
   }
 }
 
-/// Writes each number with all its digits.
+/// Prints all numbers without loss of precision.
 std::string text_of(const toml::table& file) {
   std::ostringstream text;
   text << toml::toml_formatter(file, toml::toml_formatter::default_flags & ~toml::format_flags::indentation) << '\n';

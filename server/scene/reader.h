@@ -17,17 +17,18 @@
 #include "server/scene/keys.h"
 #include "server/scene/values.h"
 
-// Reads a scene file along the declarations of its keys (keys.h). Internal to server/scene.
+// Reads a scene file according to the declarations of its keys (keys.h). Internal to server/scene.
 
 namespace tendon::scene_file {
 
-/// "a.b" for the table `path` and the key `name`; `name` alone at the top of the file.
+/// Returns "path.name", or only `name` if the path is empty.
 std::string joined(std::string_view path, std::string_view name);
 
-/// Returns "; " and the closest known key, or all known keys. This is added to the error message for an unknown key.
+/// Returns a suffix for the error message about an unknown key. It starts with "; " and suggests the closest known key,
+/// or lists all known keys.
 std::string advice(std::string_view unknown, const std::vector<std::string_view>& known);
 
-/// A place in the file that an error can name; line 0 is none.
+/// A position in the file for error messages. If the line is 0, it is unknown.
 struct Place {
   std::uint32_t line = 0;
   std::uint32_t column = 0;
@@ -41,7 +42,8 @@ Place place_of(const toml::node& node);
 /// Throws SceneError "FILE:LINE: KEY: SENTENCE".
 [[noreturn]] void fail(const std::string& file, Place at, const std::string& key, const std::string& sentence);
 
-/// Collects what is wrong with a file, and reports the first: by line; a missing key only when nothing else is wrong.
+/// Collects the errors in a file, and reports the one with the lowest line. Missing keys are only reported if there are
+/// no other errors.
 class SceneProblems {
  public:
   void wrong(Place at, std::string key, std::string sentence) { add({false, at, std::move(key), std::move(sentence)}); }
@@ -69,7 +71,7 @@ class SceneProblems {
   std::optional<Problem> first_;
 };
 
-/// Fills the targets of one table's declarations from the file; `table` is null where the file has none.
+/// Reads the keys of a table from the file. `table` is null if it is not in the file.
 class Reader {
  public:
   static constexpr bool kDocuments = false;
@@ -90,7 +92,8 @@ class Reader {
     }
     const Verdict refusal = rule.take(*node, unit, target);
     if (!refusal) return true;
-    // If a setting is not valid TOML, its value is a text, for example --set device.effects.mass_kg=0,05
+    // If a setting is not valid TOML, it is read as a string. For example, this applies to --set
+    // device.effects.mass_kg=0,05
     const bool number = refusal->expected.starts_with("a number") && refusal->found->is_string();
     const std::string found = found_in(*refusal->found);
     problems_.wrong(place_of(*refusal->found), joined(path_, name),
@@ -99,7 +102,7 @@ class Reader {
     return false;
   }
 
-  /// Reads the required key `kind`, then the keys that all kinds have in common and those of that kind.
+  /// Reads the required key `kind`. Then, it reads the keys that are common to all kinds, and the keys of this kind.
   template <class T, class Declare, class Common = NoKeys>
   void kind(const Names<T>& names, const Declare& declare, const Common& common = {}) {
     T value{};
@@ -122,12 +125,12 @@ class Reader {
     inner.refuse_unknown();
   }
 
-  /// A part that exists when its table does.
+  /// Reads an optional part. It is enabled if its table is present.
   template <class T, class Declare>
   void part(const Name& named, std::optional<T>& target, const Declare& declare) {
     if (look_up(named.name) == nullptr) return;
     table(named.name, [&](Reader& keys) {
-      // clang 14 rejects optional<T>::emplace() when T was incomplete where the optional was declared; pass a value.
+      // clang 14 does not support optional<T>::emplace() without arguments if T was incomplete in the declaration.
       if constexpr (std::is_default_constructible_v<T>) {
         declare(keys, target.emplace());
       } else {
@@ -136,7 +139,7 @@ class Reader {
     });
   }
 
-  /// Tables written [[name]], one for each element of `target`; without any, `target` stays as it is.
+  /// Reads an array of tables [[name]] into `target`. If there are none, `target` is not modified.
   template <class T, class Declare>
   void tables(std::string_view name, std::vector<T>& target, std::size_t most, const Declare& declare) {
     const toml::node* node = look_up(name);
@@ -175,7 +178,7 @@ class Reader {
   std::string path_;
   Place place_;
   std::vector<std::string_view> known_;
-  bool kind_known_ = true;  ///< false: the table's keys are not known either
+  bool kind_known_ = true;  ///< if false, the valid keys are unknown
 };
 
 }  // namespace tendon::scene_file

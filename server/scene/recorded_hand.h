@@ -8,11 +8,11 @@
 
 namespace tendon {
 
-/// How the hand moved in a recording of tendond: what a ReplayDevice plays. Of several devices the first scene's. Steps
-/// in which the device gave no position leave a gap.
+/// Reads the motion of the hand from a recording of tendond for a ReplayDevice. If there are several devices, the first
+/// one is used. If a step does not have a position, there is a gap in the motion.
 ///
-/// Throws std::runtime_error with the file's name like `RecordingReader`, when there are fewer than 2 positions, and
-/// when there are more than `kMaxRecordedSamples`.
+/// Throws std::runtime_error for the errors of `RecordingReader`, if there are fewer than 2 positions, or if there are
+/// more than `kMaxRecordedSamples`.
 std::vector<ReplayDevice::Sample> read_recorded_hand(const std::filesystem::path& recording);
 
 }  // namespace tendon

@@ -12,10 +12,10 @@
 namespace tendon {
 namespace {
 
-/// The description of a table. If there are multiple kinds of a table, each kind has its own chapter.
+/// The documentation of a table. If there are several kinds of this table, each kind has its own chapter.
 struct Chapter {
   std::string table;
-  std::string text;  ///< with the heading
+  std::string text;  ///< including the heading
   std::size_t keys = 0;
 };
 
@@ -27,7 +27,7 @@ std::vector<Chapter> chapters() {
       const std::size_t begin = line.find_first_not_of('[');
       all.push_back({.table = line.substr(begin, line.find(']') - begin), .text = {}});
     }
-    // The name of a key is on a separate line, followed by indented sentences.
+    // Each key is on a separate line, followed by its indented description.
     const bool one_word = line.starts_with("  ") && line.find(' ', line.find_first_not_of(' ')) == std::string::npos;
     const bool is_key = one_word && !line.ends_with('.');
     if (is_key) ++all.back().keys;

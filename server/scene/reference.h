@@ -12,14 +12,14 @@
 #include "server/scene/reader.h"
 #include "server/scene/values.h"
 
-// Writes the declarations of a scene's keys (keys.h) down for people. Internal to server/scene.
+// Prints the documentation of the keys of a scene (keys.h). Internal to server/scene.
 
 namespace tendon::scene_file {
 
-/// Writes the declarations down for people.
+/// Prints the documentation of a table.
 class Reference {
  public:
-  static constexpr bool kDocuments = true;  ///< declare all there is, whatever depends on what
+  static constexpr bool kDocuments = true;  ///< declare all keys, including exclusive ones
 
   explicit Reference(std::string& text, std::string path = {}) : text_(text), path_(std::move(path)) {}
 
@@ -89,8 +89,9 @@ class Reference {
   std::string& text_;
   std::string path_;
   std::string indent_ = "  ";
-  std::string* tables_ = nullptr;  ///< of a kind: where its tables are written, which come after the keys of all kinds
-  std::string of_kind_;            ///< that kind, in the heading of such a table
+  /// For a kind: the output for its tables, which are printed after the keys of all kinds.
+  std::string* tables_ = nullptr;
+  std::string of_kind_;  ///< the kind, for the headings of its tables
 };
 
 }  // namespace tendon::scene_file

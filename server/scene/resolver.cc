@@ -28,10 +28,10 @@
 namespace tendon::scene_file {
 namespace {
 
-/// Silence of a device for this long is a fault; libfranka allows the same.
+/// If a device does not respond for this time, this is a fault. The same value is used in libfranka.
 constexpr Duration kMostMissed = std::chrono::milliseconds(20);
 
-/// Turns a draft into a scene: settles the values that depend on several keys.
+/// Converts a draft to a scene.
 class SceneResolver : SceneErrors {
  public:
   SceneResolver(Draft draft, const toml::table& file, const std::string& name)
@@ -53,7 +53,7 @@ class SceneResolver : SceneErrors {
     resolve_replay(directory);
     resolve_channels();
     resolve_count();
-    // The constructors check rules that the keys do not.
+    // Some rules are only checked by the constructors.
     Scene& scene = draft_.scene;
     SimulatedDevice::Config& simulated = draft_.simulated;
     build("device", [&simulated] { SimulatedDevice{simulated}; });
@@ -80,7 +80,7 @@ class SceneResolver : SceneErrors {
     return load_recorded_motion(csv, file);
   }
 
-  /// `table` is that of the hand.
+  /// `table` is the table of the hand.
   ScriptedMotion motion_of(DraftMotion& draft, const std::string& table, const std::filesystem::path& directory) {
     std::optional<ScriptedMotion> motion;
     build(table + ".motion", [&] {
@@ -109,7 +109,7 @@ class SceneResolver : SceneErrors {
     return *std::move(motion);
   }
 
-  /// Returns the size of a motion along its longest axis, in m or rad.
+  /// Returns the range of a motion along its longest axis, in m or rad.
   static double length_of(const ScriptedMotion::Script& script) {
     if (const auto* sine = std::get_if<ScriptedMotion::Sine>(&script)) return 2 * sine->amplitude;
     if (const auto* recorded = std::get_if<ScriptedMotion::Recorded>(&script)) {
@@ -189,7 +189,7 @@ class SceneResolver : SceneErrors {
       }
       ReplayDevice{replay};
     });
-    // Between samples the device gives no position.
+    // The device does not provide positions between samples.
     const HapticLoop::Config& loop = draft_.scene.loop;
     const Duration most = (loop.control.max_missed - 1) * loop.period;
     const auto gap = std::ranges::adjacent_find(
@@ -235,7 +235,8 @@ class SceneResolver : SceneErrors {
     blame("recording.one_in", {}, "expected keep = \"faults\" beside it, found keep = \"all\": every file stays");
   }
 
-  /// Friction is in the joints or at the handle. Profiles know only that at the handle.
+  /// The friction can be specified for the joints or for the handle. The profiles only contain the friction of the
+  /// handle.
   void resolve_joint_friction() {
     SimulatedDevice::Config& device = draft_.simulated;
     if (!device.joint_friction) return;
@@ -271,7 +272,8 @@ class SceneResolver : SceneErrors {
 
   void resolve_safety() {
     Scene& scene = draft_.scene;
-    // A device that moves a real hand always has to be armed, even when the scene lists no part of the safety layer.
+    // A device that moves a real hand must always be armed explicitly, even if no part of the safety layer is enabled
+    // in the scene.
     if (scene.driver().moves_a_hand && !scene.safety) scene.safety.emplace();
     if (!scene.safety) return;
     if (scene.safety->dead_man) {
@@ -309,7 +311,7 @@ class SceneResolver : SceneErrors {
     if (!network.keys && file_.at_path("network.suites")) {
       blame("network.suites", {}, "expected none without keys: nothing is sealed then");
     }
-    // UdpLink refuses these too, but cannot name the line.
+    // This is also checked by UdpLink, but the line is only known here.
     if (network.unix_path && network.unix_path->native().size() > UnixSocket::kMostPath) {
       blame("network.unix", {},
             "expected a path of at most " + std::to_string(UnixSocket::kMostPath) + " bytes, found " +
@@ -327,7 +329,8 @@ class SceneResolver : SceneErrors {
     HapticLoop::Config& loop = draft_.scene.loop;
     HapticController::Config& control = loop.control;
 
-    // A loop without real-time priority is late by up to a period now and then. Beyond longest_hold it is an overrun.
+    // Without real-time priority, a loop is occasionally delayed by up to one period. If a hold is longer than
+    // longest_hold, it is reported as an overrun.
     control.limiter.longest_hold = draft_.longest_hold.value_or(2 * loop.period);
     control.limiter.follow_holds.reset();
     if (draft_.follow_holds.memory > Duration::zero()) control.limiter.follow_holds = draft_.follow_holds;
@@ -354,7 +357,8 @@ class SceneResolver : SceneErrors {
     resolve_limiter(draft_, *this);
   }
 
-  /// The coupling as the loop runs it. What both ends must have alike is compared when they meet.
+  /// Computes the configuration of the coupling. It is compared with the configuration of the peer when the connection
+  /// is established.
   void resolve_teleoperation(const std::filesystem::path& directory) {
     auto& peer = draft_.scene.teleoperation;
     if (!peer) return;
@@ -428,7 +432,7 @@ class SceneResolver : SceneErrors {
     }
   }
 
-  /// Several leaders of a follower.
+  /// Handles a follower with several leaders.
   void resolve_leaders(const Coupling::Config& coupling) {
     const Scene::Teleoperation& peer = *draft_.scene.teleoperation;
     const std::vector<Scene::Channel>& channels = draft_.scene.channels;
@@ -470,7 +474,7 @@ class SceneResolver : SceneErrors {
     }
   }
 
-  /// What some methods need, and the others have no use for.
+  /// Checks the keys that are only used by some of the methods.
   void resolve_method(Coupling::Config& coupling) const {
     const std::string named = "\"" + std::string(to_string(coupling.method)) + "\"";
     if (draft_.drift_rate && coupling.method != CouplingMethod::kPassivity) {
@@ -484,7 +488,8 @@ class SceneResolver : SceneErrors {
     }
   }
 
-  /// Blames the first rule of the coupling that is broken, where the scene says that field.
+  /// Checks the rules of the coupling. If one of them is violated, the error refers to the line of the corresponding
+  /// key.
   void blame_rules(const Coupling::Config& coupling) const {
     struct Row {
       std::string_view field;
@@ -528,7 +533,8 @@ class SceneResolver : SceneErrors {
     }
   }
 
-  /// Both ends have a motor: one end pays out of what its gripper has taken in, the other needs it to move at all.
+  /// The grippers of both ends must have motors because energy is transferred between them. A gripper cannot move
+  /// without energy from the other end.
   void resolve_coupled_grip(const HapticController::Config& control) {
     Coupling::Config& coupling = draft_.coupling;
     if (!coupling.grip) return;

@@ -13,15 +13,15 @@
 
 namespace tendon::scene_file {
 
-/// Throws errors about values that contradict other keys of the file.
+/// Reports inconsistencies between several keys of a file.
 class SceneErrors {
  public:
-  /// Errors begin with `name`. Both arguments must outlive this object.
+  /// `name` is the start of error messages. Both arguments must outlive this object.
   SceneErrors(const toml::table& file, const std::string& name) : file_(file), name_(name) {}
 
  protected:
-  /// Throws a SceneError with the line of the first of `places` that is in the file. If there is none, the error has the
-  /// line of the innermost table around the key.
+  /// Throws a SceneError. The line is the first of `places` that exists in the file. If none of them exists, it is the
+  /// line of the innermost table that contains the key.
   [[noreturn]] void blame(std::string_view key, std::initializer_list<std::string_view> places,
                           const std::string& sentence) const;
 
@@ -38,12 +38,11 @@ class SceneErrors {
   const std::string& name_;
 };
 
-/// Computes the friction bounds and the parts of the limiter, and the limits for rotation and gripper.
+/// Computes the friction bounds, the parts of the limiter, and the limits for rotation and gripper.
 void resolve_limiter(Draft& draft, const SceneErrors& errors);
 
-/// Turns a draft without mistakes of its own into a scene: checks and computes what depends on several keys, and reads
-/// the files that it names, relative to `directory`. `file` and `name` say in errors where a key stands.
-/// Throws SceneError.
+/// Converts a valid draft to a scene. All values that depend on several keys are checked and computed. Files in the
+/// scene are read relative to `directory`. `file` and `name` are used in error messages. Throws SceneError.
 Scene resolve(Draft draft, const toml::table& file, const std::string& name, const std::filesystem::path& directory);
 
 }  // namespace tendon::scene_file

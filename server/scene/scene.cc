@@ -8,7 +8,7 @@
 namespace tendon {
 namespace {
 
-/// Calls the free function `driver`, which a member function of the same name would hide.
+/// Calls the free function, which would otherwise be hidden by the member function with the same name.
 template <class Device>
 const Driver& row_of(const Device& device) {
   return driver(device);

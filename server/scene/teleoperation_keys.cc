@@ -11,7 +11,7 @@
 namespace tendon::scene_file {
 namespace {
 
-/// Which axes of the leader's frame are coupled: "xyz", or some of these letters in this order.
+/// The axes in the frame of the leader that are coupled. The value is "xyz" or a subset of these letters in this order.
 struct CoupledAxes {
   static constexpr std::string_view kLetters = "xyz";
 
@@ -41,7 +41,7 @@ struct CoupledAxes {
   }
 };
 
-/// A displacement, a force or the share of one.
+/// The range for the scales of displacements and forces.
 constexpr Number kScale{.least = 0.01, .most = 100};
 constexpr Number kShare{.least = 0, .most = 1};
 

@@ -9,7 +9,7 @@
 namespace tendon::scene_file {
 namespace {
 
-/// Longest suffix first.
+/// Longer suffixes must be first.
 constexpr std::array kUnits = {
     Unit{"_nm_s_per_rad", "N·m·s/rad", 1},
     Unit{"_nm_per_rad", "N·m/rad", 1},

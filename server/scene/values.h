@@ -25,52 +25,55 @@
 #include "protocol/limits.h"
 #include "protocol/link.h"
 
-// How values are written in a scene file: units and rules. Internal to server/scene.
+// The representation of values in a scene file. Internal to server/scene.
 //
-// A rule says which values a key may have: `expected(unit)` in words, `take(node, unit, to)` converts one to SI and
-// stores it in `to`, or returns why not; `shown(unit, value)` is the way back, for the defaults in the reference.
+// A rule specifies which values are valid for a key. `expected(unit)` returns a description of these values.
+// `take(node, unit, to)` converts a value to SI units and stores it in `to`, or returns an error. `shown(unit, value)`
+// is the inverse conversion, which is used for the defaults in the reference.
 
 namespace tendon::scene_file {
 
-/// The end of a key's name tells its unit.
+/// The unit of a key, which is specified by the suffix of its name.
 struct Unit {
   std::string_view suffix;
   std::string_view symbol;
-  /// A whole number, but of angles and minutes: dividing by it rounds once, so 43 µm is the same double as 0.000043.
+  /// The factor is an integer except for angles and minutes. Dividing by it only rounds once, so that 43 µm is exactly
+  /// the same number as 0.000043.
   double per_si;
 };
 
 inline constexpr Unit kNoUnit = {"", "", 1};
 
-/// kNoUnit when `key` ends with no unit.
+/// Returns kNoUnit if the key has no suffix with a unit.
 const Unit& unit_of(std::string_view key);
 
-/// `text`, and the unit's symbol when it has one.
+/// Appends the symbol of the unit, if any.
 std::string with_symbol(std::string text, const Unit& unit);
 
-/// The shortest text that reads back as `value`; without an exponent where a person would use none.
+/// Returns the shortest text that is converted back to the same value. Exponents are only used for very large or small
+/// numbers.
 std::string digits(double value);
 
 std::string in_quotes(std::string_view text);
 
-/// The value in the file, in the words of an error.
+/// Returns a description of the value in the file for error messages.
 std::string found_in(const toml::node& node);
 
-/// An integer or a floating-point number.
+/// Returns nothing if this is not an integer or a floating-point number.
 std::optional<double> number_in(const toml::node& node);
 
-/// Why a value is not accepted; none when it is.
+/// The reason why a value is not valid.
 struct Refusal {
   const toml::node* found;
   std::string expected;
-  std::string hint{};  ///< what was probably meant: "; did you mean aol+?"
+  std::string hint{};  ///< a suggestion, for example "; did you mean aol+?"
 };
 using Verdict = std::optional<Refusal>;
 
-/// The longest time in a scene: nothing in a haptic loop is meant to last an hour, and sums of times stay small.
+/// The maximum time in a scene. Longer times are not useful in a haptic loop, and this prevents overflow of sums.
 inline constexpr Duration kLongest = limits::kMaxTimeout;
 
-/// A number in the key's unit.
+/// A number in the unit of the key.
 struct Number {
   double least = -limits::kMaxValue;
   double most = limits::kMaxValue;
@@ -129,7 +132,7 @@ struct Number {
  private:
   Verdict check(const toml::node& node, const Unit& unit, std::optional<double> number, double limit) const {
     if (number && or_infinite && *number == std::numeric_limits<double>::infinity()) return {};
-    const bool too_small = number && !(without_least ? *number > least : *number >= least);  // a NaN too
+    const bool too_small = number && !(without_least ? *number > least : *number >= least);  // also true for NaN
     if (!number || too_small) return Refusal{&node, expected(unit)};
     if (*number <= limit) return {};
     return Refusal{&node, limit < most || most >= limits::kMaxValue
@@ -143,7 +146,7 @@ inline constexpr Number kZeroOrMore{.least = 0};
 inline constexpr Number kAboveZero{.least = 0, .without_least = true};
 inline constexpr Number kAboveZeroOrInf{.least = 0, .without_least = true, .or_infinite = true};
 
-/// A number of one of the device's effects; `false`: there is no such effect.
+/// A parameter of a device effect, or `false` if there is no such effect.
 struct OrFalse {
   Number number;
 
@@ -196,7 +199,6 @@ struct Count {
   }
 };
 
-/// A point or a direction.
 struct Vector {
   static std::string expected(const Unit& unit) {
     return unit.symbol.empty() ? "[x, y, z]" : "[x, y, z] in " + std::string(unit.symbol);
@@ -251,13 +253,12 @@ struct ListOf {
   }
 };
 
-/// Whether a name of a device or a channel may have this character.
+/// Returns true if this character is allowed in the name of a device or a channel.
 bool in_a_label(char c);
 
-/// The nearest label to any text.
+/// Converts a text to a similar valid label.
 std::string label_of(std::string text);
 
-/// The name of a device or a channel.
 struct Label {
   static std::string expected(const Unit&) {
     return "a name of 1 to " + std::to_string(limits::kMaxLabel) + " letters, digits, - or _";
@@ -275,7 +276,7 @@ struct Label {
   static std::string shown(const Unit&, const std::string& value) { return in_quotes(value); }
 };
 
-/// A name by which DNS-SD finds a device.
+/// The DNS-SD instance name of a device.
 struct InstanceName {
   static std::string expected(const Unit&) {
     return "a name of 1 to " + std::to_string(dns_sd::kMaxName) + " bytes like \"falcon at bench 3\"";
@@ -322,7 +323,7 @@ struct Path {
   static std::string shown(const Unit&, const std::optional<std::filesystem::path>&) { return "none"; }
 };
 
-/// Where a server listens.
+/// The listen address of a server.
 struct NetworkAddress {
   static std::string expected(const Unit&) { return "an address like \"127.0.0.1:47100\" or \"[::1]:47100\""; }
 
@@ -345,7 +346,7 @@ struct NetworkAddress {
   static std::string shown(const Unit&, const std::optional<Address>&) { return "none"; }
 };
 
-/// One of a few names.
+/// One of several names.
 template <class T>
 struct Names {
   std::vector<std::pair<std::string_view, T>> all;
