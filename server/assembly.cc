@@ -150,7 +150,6 @@ void Assembly::add_devices(std::vector<Part>& parts, const Config& config, std::
     // The datagrams of a shard are only stored in the mailboxes of the first device.
     if (devices_.size() != shard.first_device(parts.size())) capacities.datagrams = 1;
     if (!config.watched) {
-      // Ring sizes must be powers of two.
       const std::size_t couplings = std::max<std::size_t>(loop.control.leaders.size(), 1);
       capacities.ports = part.scene.teleoperation ? std::bit_ceil(couplings) * capacities.ports : 1;
     }
@@ -207,9 +206,8 @@ std::size_t Assembly::first_device(std::size_t network) const noexcept {
   return shard.first_device(devices_.size());
 }
 
-/// Only the first network loop receives Hellos (UdpLink::several). The other loops process theirs in the next turn,
-/// which happens after the next haptic step at the latest. If the queue is full, the Hello is dropped, and the client
-/// repeats it.
+/// Only the first network loop receives Hellos (UdpLink::several). The others process theirs in the next turn, after
+/// the next haptic step at the latest. If the queue is full, the client must repeat the Hello.
 LocalTime Assembly::turn_network(std::size_t number, LocalTime now) {
   Network& network = networks_.at(number);
   while (const HandedHello* const hello = network.hellos.front()) {

@@ -24,9 +24,8 @@ namespace tendon {
 
 std::uint32_t loop_hz(const Scene& scene);
 
-/// Creates and connects the loops of a server: a HapticLoop for each device, one or more NetworkLoops, and a LogLoop.
-/// It uses no threads, sockets or clocks: `Server` calls the loops from its threads, and simulated worlds and tests
-/// call them in virtual time.
+/// Creates and connects the loops of a server. It uses no threads, sockets or clocks: `Server` calls the loops from its
+/// threads, and simulated worlds and tests call them in virtual time.
 ///
 /// Thread-safe: each haptic group, each network loop and the log loop can be used in a separate thread (THREADS.md).
 /// Realtime-safe: only HapticGroup.
@@ -36,10 +35,10 @@ class Assembly {
   struct Part {
     Scene scene;
     Device& device;
-    SafeDevice* safe = nullptr;                 ///< a layer around `device`; null if the scene has none
-    Heartbeat* heart = nullptr;                 ///< null if there is no guardian
-    std::optional<Key> dial_key{};              ///< for the server that the scene dials; empty: not encrypted
-    Seed dial_seed{};                           ///< for the same sessions
+    SafeDevice* safe = nullptr;  ///< a layer around `device`; null if the scene has none
+    Heartbeat* heart = nullptr;
+    std::optional<Key> dial_key{};  ///< for the server that the scene dials; empty: not encrypted
+    Seed dial_seed{};
     std::optional<HandleDescription> handle{};  ///< replaces the description of the handle
   };
 
@@ -54,7 +53,6 @@ class Assembly {
     std::optional<Mailboxes::Capacities> watched{};
   };
 
-  /// A device with its mailboxes and its loop.
   struct DeviceLoop {
     DeviceLoop(const Part& part, const Mailboxes::Capacities& capacities);
     Scene scene;
@@ -64,15 +62,14 @@ class Assembly {
     HapticLoop haptic;
   };
 
-  /// The devices of one haptic thread. All of them have the same period.
+  /// The devices of one haptic thread, which have the same period.
   struct HapticGroup {
     std::vector<DeviceLoop*> devices{};
-    std::vector<std::size_t> networks{};    ///< the numbers of their network loops
+    std::vector<std::size_t> networks{};
     std::atomic<bool> not_realtime{false};  ///< true if the thread did not get its priority
 
-    /// Makes one step with each device. Returns the time of the next call.
+    /// Steps each device. Returns the time of the next call.
     LocalTime turn(LocalTime now) noexcept;
-    /// Sets all forces to zero.
     void stop() noexcept;
     /// Sets all forces to zero. Devices that have a safety layer must be armed again.
     void stand_still() noexcept;
@@ -85,8 +82,7 @@ class Assembly {
   Assembly(const Assembly&) = delete;  // its loops refer to each other
   Assembly& operator=(const Assembly&) = delete;
 
-  /// Calls the turn of a network loop and exchanges Hellos with the other network loops. Returns the latest time of the
-  /// next call.
+  /// Calls a network loop and exchanges Hellos with the others. Returns the latest time of the next call.
   LocalTime turn_network(std::size_t number, LocalTime now);
 
   std::deque<DeviceLoop>& devices() noexcept { return devices_; }
@@ -96,7 +92,6 @@ class Assembly {
   LogLoop& log() noexcept { return *log_; }
   const LogLoop& log() const noexcept { return *log_; }
 
-  /// Returns the index of the first device of a network loop.
   std::size_t first_device(std::size_t network) const noexcept;
 
  private:

@@ -11,7 +11,6 @@ namespace tendon {
 extern const std::string_view kVersion;  ///< project() version in CMakeLists.txt, e.g. 0.1.0
 extern const std::string_view kCommit;   ///< 12 hex digits, or "unknown" if built without git
 
-/// The output of --version, e.g. "0.1.0 (f0e3f7af2b1c)".
 inline std::string version_text() { return std::string(kVersion) + " (" + std::string(kCommit) + ")"; }
 
 }  // namespace tendon

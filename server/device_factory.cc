@@ -22,7 +22,6 @@ namespace {
 /// This must be higher than the priority of the haptic thread, which waits for the USB thread.
 constexpr int kUsbPriority = kHapticPriority + 5;
 
-/// Returns a callback that notifies the guardian if the device has been opened or closed.
 std::function<void(int)> tell_guardian(Guardian& guardian, const Scene& scene, const Driver& driver) {
   static_assert(limits::kMaxDevices <= Guardian::kDevices);
   const ZeroPacket zero = ZeroPacket::usb(driver.out, std::as_bytes(std::span(driver.zero_packet)));
@@ -53,7 +52,7 @@ std::unique_ptr<usb::Pipe> open_pipe(const Scene& scene, const Driver& driver, c
 std::unique_ptr<Guardian> make_guardian(const std::vector<Scene>& scenes) {
   const auto on_start = [] {
     name_thread("guardian-parent");
-    enter_realtime(kHapticPriority);  // the haptic thread reports refusals
+    enter_realtime(kHapticPriority);
   };
   const bool any = std::ranges::any_of(scenes, [](const Scene& scene) { return scene.driver().moves_a_hand; });
   return any ? std::make_unique<Guardian>(on_start) : nullptr;

@@ -33,15 +33,15 @@ class HapticLoop {
   struct Stats {
     std::uint64_t steps = 0;
     std::uint64_t overruns = 0;  ///< intervals above the assumed maximum
-    std::uint64_t unseen = 0;    ///< steps without a position
+    std::uint64_t unseen = 0;
     Duration longest_interval{};
     HapticController::Fault fault = HapticController::Fault::kNone;
     Device::State device = Device::State::kHomed;
     double force = 0;  ///< N, norm of the force that the device applies
   };
 
-  /// `device`, `mail` and `heart` must outlive the loop. Each step beats `heart`, which is null if no guardian watches
-  /// the device. Throws std::invalid_argument if the configuration is invalid.
+  /// All references must outlive the loop. `heart` is null if there is no guardian. Throws std::invalid_argument if the
+  /// configuration is invalid.
   HapticLoop(const Config& config, Device& device, Mailboxes& mail, Heartbeat* heart = nullptr);
 
   /// Performs one haptic step and returns the time of the next one: the scheduled time of this step plus one period. If
@@ -56,7 +56,6 @@ class HapticLoop {
   Health health() const noexcept { return meter_.counted(); }
 
  private:
-  /// The state of the estimators for rotation and gripper.
   struct Rest {
     explicit Rest(const DeviceInfo& info);
     bool turns_or_grips;
@@ -92,16 +91,16 @@ class HapticLoop {
   bool has_more_motors_;           ///< the device has torque or gripper motors
   bool has_outputs_;
   std::array<std::uint32_t, kMostOutputs> outputs_set_{};  ///< OutputSettings::One::number of the settings in effect
-  std::array<std::uint32_t, Couplings::kMost> peer_numbers_{};        ///< the number of each current peer; see kRenew
-  std::array<std::optional<ArrivedPort>, Couplings::kMost> peers_{};  ///< received since the previous step
+  std::array<std::uint32_t, Couplings::kMost> peer_numbers_{};  ///< the number of each current peer; see kRenew
+  std::array<std::optional<ArrivedPort>, Couplings::kMost> peers_{};
   Effort applied_;
   std::uint64_t tick_ = 0;
   LocalTime due_{};
   bool homed_once_ = false;
   std::uint32_t times_armed_ = 0;
-  bool rearmed_ = false;       ///< since the previous record
-  bool disarmed_ = false;      ///< until the next kRearm
-  std::uint32_t buttons_ = 0;  ///< from the newest sample
+  bool rearmed_ = false;
+  bool disarmed_ = false;  ///< until the next kRearm
+  std::uint32_t buttons_ = 0;
   std::uint32_t device_faults_ = 0;
 
   HealthMeter meter_;

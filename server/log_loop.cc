@@ -59,7 +59,6 @@ Safety on_the_wire(SafetyState state) noexcept {
   return static_cast<Safety>(static_cast<int>(state) + 1);
 }
 
-/// Returns the increase of a counter since the last call.
 std::uint64_t news(const std::atomic<std::uint64_t>& counter, std::uint64_t& told) {
   const std::uint64_t now = counter.load(std::memory_order_relaxed);
   return now - std::exchange(told, now);
@@ -137,7 +136,6 @@ std::optional<PartRecorder::Status> LogLoop::recording() const {
   return recorder_ ? std::optional(recorder_->status()) : std::nullopt;
 }
 
-/// Names the device if there are several.
 void LogLoop::say(Level level, const DeviceLog& device, const std::string& text) {
   say(level, devices_.size() == 1 ? text : device.of.scene.name + ": " + text);
 }
@@ -186,7 +184,6 @@ void LogLoop::record_all(LocalTime now) {
   take_notices_of_recorder();
 }
 
-/// Records the number of datagrams that have been dropped since the last call.
 void LogLoop::record_left_out(LocalTime now) {
   if (!recorder_) return;
   std::uint64_t strangers = 0;
@@ -279,7 +276,6 @@ void LogLoop::report_safety(DeviceLog& device) {
   if (was_armed && now.state < SafetyState::kArmed) say(Level::kInfo, device, "the device is no longer armed");
 }
 
-/// Reports each trouble counter of the driver that has increased.
 void LogLoop::report_counts(DeviceLog& device) {
   const DeviceCounts now = device.of.device.counts();
   const DeviceCounts before = std::exchange(device.told.counts, now);

@@ -20,9 +20,8 @@
 
 namespace tendon {
 
-/// The third loop of the server, after HapticLoop and NetworkLoop. It records the steps, ports and datagrams from the
-/// mailboxes, passes the health of each device to the network loops (Mailboxes::health), and collects messages for the
-/// log.
+/// Records the steps, ports and datagrams from the mailboxes, passes the health of each device to the network loops
+/// (Mailboxes::health), and collects messages for the log.
 ///
 /// One thread calls `turn` every kPeriod while the other loops run, and `close` after they have ended.
 ///
@@ -37,11 +36,11 @@ class LogLoop {
   struct Watched {
     const Scene& scene;
     const Device& device;
-    const SafeDevice* safe;  ///< null if the scene has no safety layer
+    const SafeDevice* safe;
     const HapticLoop& haptic;
     Mailboxes& mail;
     const std::atomic<bool>& not_realtime;  ///< true if the haptic thread did not get its priority
-    std::size_t thread = 0;                 ///< the number of the haptic thread
+    std::size_t thread = 0;
   };
 
   struct Notice {
@@ -62,7 +61,6 @@ class LogLoop {
   /// `unsent` is the number of datagrams that the system has refused to send. Returns the time of the next call.
   LocalTime turn(LocalTime now, std::uint64_t unsent);
 
-  /// Records the remaining data and closes the recording.
   void close(LocalTime now, std::uint64_t unsent);
 
   /// Returns the messages since the last call, in order.
@@ -72,7 +70,6 @@ class LogLoop {
   std::optional<PartRecorder::Status> recording() const;
 
  private:
-  /// The last values that were logged.
   struct Told {
     HapticLoop::Stats haptic{};
     SafeDevice::Status safety{};
@@ -117,7 +114,7 @@ class LogLoop {
   std::vector<DeviceLog> devices_;
   std::vector<ThreadLog> threads_;
   std::vector<NetworkLog> networks_;
-  std::unique_ptr<PartRecorder> recorder_;  ///< null if nothing is recorded
+  std::unique_ptr<PartRecorder> recorder_;
   bool recording_ended_ = false;
   std::vector<Notice> notices_;
 };

@@ -26,14 +26,14 @@ namespace tendon {
 
 struct HapticOrder {
   enum class Kind : std::uint8_t {
-    kRelease,    ///< `source` no longer holds `channel`
-    kRearm,      ///< clears the latched fault and ends kDisarm
-    kDisarm,     ///< no force until kRearm
-    kEngage,     ///< the operator engages `coupling`
-    kDisengage,  ///< ends the engagement of `coupling`
-    kSetScale,   ///< applies `scales` to `coupling`
-    kRenew,      ///< the peer of `coupling` has been replaced; `source` is the number of the new one
-    kShare,      ///< sets the weight of the leader of `coupling` to `share`
+    kRelease,  ///< `source` no longer holds `channel`
+    kRearm,    ///< clears the latched fault and ends kDisarm
+    kDisarm,   ///< no force until kRearm
+    kEngage,
+    kDisengage,
+    kSetScale,  ///< applies `scales` to `coupling`
+    kRenew,     ///< the peer of `coupling` has been replaced; `source` is the number of the new one
+    kShare,     ///< sets the weight of the leader of `coupling` to `share`
   };
   Kind kind = Kind::kRearm;
   std::uint32_t channel = 0;
@@ -46,7 +46,7 @@ struct HapticOrder {
 /// A state received from the peer of a coupling.
 struct ArrivedPort {
   PortState state;
-  LocalTime at{};          ///< time of arrival
+  LocalTime at{};
   std::uint32_t peer = 0;  ///< consecutive number of the peer, see HapticOrder::kRenew
 };
 
@@ -118,7 +118,7 @@ struct Mailboxes {
   SpscRing<HapticOrder> orders{kOrders};
   Latest<DeviceState> state;
   Latest<OutputSettings> outputs;
-  std::array<Latest<ArrivedPort>, Shares::kMost> port_in;  ///< by coupling
+  std::array<Latest<ArrivedPort>, Shares::kMost> port_in;
   std::array<Latest<PortState>, Shares::kMost> port_out;
   SpscRing<StepRecord> steps;
   std::atomic<std::uint64_t> steps_lost{0};
@@ -126,7 +126,7 @@ struct Mailboxes {
   std::atomic<std::uint64_t> ports_lost{0};
   StepFlight flight;
   Latest<Health> health;
-  Ways ways;  ///< names of RemoteForce::way and Step::force_way
+  Ways ways;
   SpscRing<DatagramRecord> datagrams;
   std::atomic<std::uint64_t> datagrams_lost{0};         ///< because the queue was full
   std::atomic<std::uint64_t> strangers_left_out{0};     ///< of unauthenticated senders, beyond the sample

@@ -55,7 +55,6 @@ using Json = nlohmann::ordered_json;
 /// The lines on stdout with --json. Thread-safe.
 class Lines {
  public:
-  /// Writes the first line, then the lines that were added before.
   void begin(const Json& first) {
     const std::scoped_lock lock(mutex_);
     write(first);
@@ -104,7 +103,6 @@ Json in_json(const NetworkLoop::SessionChange& change, std::span<const std::byte
 constexpr int kFailed = 1;
 constexpr int kWrongUsage = 2;
 
-/// One year.
 constexpr double kLongestRun_s = 365.0 * 86400;
 
 /// Includes SIGTSTP (Ctrl-Z).
@@ -132,8 +130,8 @@ void stop_this_process(Server& server, UnblockedOutput& output) {
   log::info("it goes on");
 }
 
-// Waits for a signal or, if `duration_s` is not zero, for this time. While waiting, it notifies the service manager if
-// the haptic loops are running. Returns the reason for the shutdown.
+// Waits for a signal or, if `duration_s` is not zero, for this time, and notifies the watchdog of the service manager.
+// Returns the reason for the shutdown.
 std::string wait_for_the_end(const sigset_t& signals, double duration_s, Server& server, UnblockedOutput& output) {
   constexpr Duration kLongestWait = std::chrono::hours(1);
   const std::optional<Duration> watched = service::watch_period();
@@ -291,7 +289,6 @@ int run(const std::vector<Scene>& scenes, double duration_s, bool json) {
 
   use_small_stacks();
   UnblockedOutput output;
-  // This must outlive the server.
   Lines lines;
   std::array<std::byte, 12> name_of_run;
   fill_random(name_of_run);

@@ -57,7 +57,6 @@ NetworkLoop::NetworkLoop(const Config& config, Link& link, LocalTime now)
     states_.push_back({&devices_[i].mail->state});
     if (const auto& server = config.devices[first_device_ + i].dial) ports_.dial(now, i, *server, out);
   }
-  // These secrets are not needed again.
   for (ServedDevice::Config& device : config_.devices) device.dial.reset();
   config_.secret = {};
 }
@@ -188,7 +187,6 @@ void NetworkLoop::refuse(LocalTime now, const Address& from, const Doorman::Gues
   send(now, sender_of(guest, from), from, std::span(answer).first(size));
 }
 
-/// The value 0 is skipped because it is reserved.
 std::uint32_t NetworkLoop::take_connection_id() {
   if (next_connection_id_ == 0) next_connection_id_ = config_.shard.of;
   return std::exchange(next_connection_id_, next_connection_id_ + config_.shard.of);
@@ -253,7 +251,7 @@ void NetworkLoop::admit(LocalTime now, const Address& from, const Doorman::Guest
 }
 
 void NetworkLoop::open(LocalTime now, Guest guest) {
-  // The seats may have been taken by another client in the meantime.
+  // Another client may have taken the seats in the meantime.
   if (const auto refusal = admission_.reason_to_refuse(guest.address, guest.key, guest.seats, devices_, guests_)) {
     ++stats_.refused;
     notice(true, "refused \"" + guest.name + "\" at " + to_string(guest.address) + ": " + refusal->reason);
@@ -289,7 +287,7 @@ void NetworkLoop::open(LocalTime now, Guest guest) {
     const Guest* const holder = guest_of(guests_, leases_.holder(seat.device, seat.channel));
     if (holder == nullptr) {
       leases_.hold(now, seat.device, seat.channel, arrived);
-    } else if (arrived.has<kFeatureChannels>()) {  // another client took the channel in the meantime
+    } else if (arrived.has<kFeatureChannels>()) {
       arrived.session.request(LeaseLost{.device = number_of(seat.device), .channel = seat.channel, .to = holder->name});
     }
   }
@@ -300,7 +298,6 @@ bool NetworkLoop::may_take_over(const Guest& guest) const {
   return std::find(config_.takeover.begin(), config_.takeover.end(), name) != config_.takeover.end();
 }
 
-/// Tells the loser of a lease, or closes its session if that is not possible.
 void NetworkLoop::dispossess(LocalTime now, Guest& loser, const Guest& winner, const TakeLease& lost) {
   const DeviceDescription& about = devices_[lost.device].about;
   notice(false, "\"" + winner.name + "\" takes " + about.name + "/" + about.channels[lost.channel].name + " from \"" +
@@ -392,7 +389,7 @@ void NetworkLoop::take_events(LocalTime now, Guest& guest) {
       const std::size_t before = notices_.size();
       leave(guest, closed->reason);
       if (is_polite && notices_.size() > before) notices_.back().warning = false;
-    }  // a server does not receive states or answers
+    }
   }
 }
 
@@ -438,7 +435,7 @@ void NetworkLoop::take_force(LocalTime now, Guest& guest, const ForceCommand& co
     return;
   }
   leases_.renew(now, place, command.channel);
-  const double bound = device.about.max_force;  // N; 0 if unknown
+  const double bound = device.about.max_force;
   if (bound > 0 && command.force.squaredNorm() > bound * bound) channel.lateness.cut();
   const LinkStats& link = guest.session.stats();
   const std::uint64_t lost = link.lost + link.lost_outgoing;
@@ -448,7 +445,7 @@ void NetworkLoop::take_force(LocalTime now, Guest& guest, const ForceCommand& co
                             .round_trip = link.round_trip,
                             .valid_for = command.valid_for,
                             .lost = lost > std::exchange(guest.lost, lost)});
-  RemoteForce& force = device.mail->forces[command.channel].back();  // contains an old value
+  RemoteForce& force = device.mail->forces[command.channel].back();
   force.sequence = command.sequence;
   force.answers_tick = command.based_on_tick;
   force.answers = answered->at;

@@ -62,7 +62,7 @@ class NetworkLoop {
     /// Returns true if the operating system has checked the permissions of the sender (UnixSocket::is_peer), so that
     /// the client needs no key. Can be null.
     bool (*needs_no_key)(const Address& from) noexcept = nullptr;
-    Shard shard{};                          ///< `devices` contains the devices of all shards
+    Shard shard{};
     std::uint32_t first_connection_id = 1;  ///< should be random at each start
     std::string server_name = "tendond";
     std::vector<ServedDevice::Config> devices{};  ///< at most kMostDevices
@@ -84,23 +84,21 @@ class NetworkLoop {
     /// Reduces the state rate of a client whose link is congested (RateAdaptation). If a tenth of the datagrams is lost
     /// even at the lowest rate, the client's forces are not used, and the device makes a safe stop.
     bool adapt_state_rate = false;
-    /// Maximum number of datagrams in one turn, so that a flood does not delay the states. A 1 kHz engine sends one per
-    /// turn.
+    /// Limits the datagrams in one turn, so that a flood does not delay the states.
     std::size_t max_datagrams = 256;
-    bool record = true;                ///< if false, datagrams are not passed to the log thread
-    DatagramSieve::Config recorded{};  ///< limits for recorded datagrams
+    bool record = true;  ///< if false, datagrams are not passed to the log thread
+    DatagramSieve::Config recorded{};
   };
 
   using Stats = NetworkStats;
 
-  /// This describes a new or closed session.
   struct SessionChange {
-    std::uint32_t connection = 0;  ///< connection id in its datagrams
+    std::uint32_t connection = 0;
     bool came = false;
-    std::string client{};  ///< the name in its Hello
+    std::string client{};
     Role role = Role::kObserver;
     Address address{};
-    std::string device{};    ///< the first device
+    std::string device{};
     std::uint64_t tick = 0;  ///< newest step of that device
     std::string why{};       ///< the reason for leaving
   };
@@ -112,7 +110,6 @@ class NetworkLoop {
     std::optional<SessionChange> session{};
   };
 
-  /// A Hello for devices of another shard.
   struct Foreign {
     std::uint32_t shard = 0;
     Address from{};
@@ -134,12 +131,11 @@ class NetworkLoop {
   /// Returns the Hellos for other shards since the last call, at most 64. Clients repeat lost Hellos.
   std::vector<Foreign> take_foreign();
 
-  /// Processes a Hello that was received by another shard. It has already been recorded there.
+  /// Processes a Hello that was received, and recorded, by another shard.
   void receive_foreign(LocalTime now, const Address& from, std::span<const std::byte> hello);
 
   Stats stats() const;
 
-  /// Returns up to 64 messages since the last call.
   std::vector<Notice> take_notices();
 
  private:
@@ -182,9 +178,9 @@ class NetworkLoop {
   Config config_;
   Link& link_;
   DatagramSieve sieve_;
-  std::vector<ServedDevice> devices_;  ///< of this shard
-  std::size_t first_device_;           ///< the index of the first device of this shard
-  std::vector<NewestState> states_;    ///< in the order of devices_
+  std::vector<ServedDevice> devices_;
+  std::size_t first_device_;
+  std::vector<NewestState> states_;
   Doorman doorman_;
   Admission admission_;
   Leases leases_{devices_};

@@ -16,7 +16,6 @@ namespace tendon {
 
 /// The counters of a network loop since the start of the server.
 struct NetworkStats {
-  /// Dropped datagrams of clients (LinkStats).
   struct Dropped {
     std::uint64_t duplicated = 0;
     std::uint64_t malformed = 0;
@@ -29,7 +28,7 @@ struct NetworkStats {
   struct Channel {
     std::string device;
     std::string channel;
-    std::string holder;                                         ///< name of the client; empty if the channel is free
+    std::string holder;
     std::uint64_t forces = 0;                                   ///< passed to the haptic loop
     std::uint64_t handovers = 0;                                ///< from one client to another
     std::uint64_t late = 0;                                     ///< the sum of the four causes below, for this channel
@@ -37,7 +36,7 @@ struct NetworkStats {
     std::vector<std::pair<std::string, std::uint64_t>> ways{};  ///< number of forces by solver path
   };
 
-  std::uint64_t welcomed = 0;  ///< sessions that were opened
+  std::uint64_t welcomed = 0;
   std::uint64_t refused = 0;
   std::uint64_t timed_out = 0;
   std::uint64_t replaced = 0;  ///< by a guest with the same key
@@ -46,7 +45,7 @@ struct NetworkStats {
   std::uint64_t malformed = 0;           ///< the size or the header is invalid
   std::uint64_t unknown_connection = 0;  ///< Data with an unknown connection id or the wrong address
   Doorman::Stats hellos;                 ///< Hellos that were not answered with a Welcome or a Refused
-  std::uint64_t forces = 0;              ///< passed to the haptic loop
+  std::uint64_t forces = 0;
   /// Forces and requests that need a channel, from clients that do not hold it. Includes torques and grip forces from
   /// clients without the feature `handle`.
   std::uint64_t denied = 0;
@@ -61,9 +60,8 @@ struct NetworkStats {
   Dropped dropped;
   std::vector<Channel> channels;
   LinkStats controller;
-  std::optional<ClockOffsetEstimator::Estimate> controller_clock;  ///< clock offset of the newest controller
+  std::optional<ClockOffsetEstimator::Estimate> controller_clock;
 
-  /// Adds the counters of another shard and appends its channels. Keeps `controller` if it is set.
   NetworkStats& operator+=(const NetworkStats& more);
 
   /// Adds the drop counters of a session. If the guest is a controller, sets `controller` to its link.

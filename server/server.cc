@@ -34,7 +34,6 @@ std::string host_name() {
   return whole.substr(0, whole.find('.'));
 }
 
-/// Returns null if no scene is announced.
 std::unique_ptr<Announcer> announcer_of(const std::vector<Scene>& scenes, const Address& listen) {
   std::vector<Announcer::Device> devices;
   for (const Scene& scene : scenes) {
@@ -54,7 +53,7 @@ std::unique_ptr<Announcer> announcer_of(const std::vector<Scene>& scenes, const 
   });
 }
 
-/// Throws std::runtime_error with a message for the operator if there is no processor for a busy network thread.
+/// Throws std::runtime_error if there is no processor for a busy network thread.
 const std::vector<Scene>& checked(const std::vector<Scene>& scenes) {
   if (scenes.front().network.busy && processors_allowed() == 1) {
     throw std::runtime_error(
@@ -77,7 +76,7 @@ std::uint32_t network_threads_for(const std::vector<Scene>& scenes) {
       std::clamp<std::size_t>(scenes.size() / kDevicesOfANetworkThread, 1, std::max<std::size_t>(processors, 1))));
 }
 
-/// Throws std::runtime_error with a message for the operator if the system refuses to create the thread.
+/// Throws std::runtime_error with a message for the operator.
 template <class Run>
 std::thread thread_of(const std::string& name, Run run) {
   try {
@@ -99,7 +98,6 @@ std::unique_ptr<SafeDevice> safe_device(const Scene& scene, Device& device, cons
   return std::make_unique<SafeDevice>(config, device);
 }
 
-/// Adds the values that are new in each run.
 Assembly::Config config_of(const Scene::Network& scene, LocalTime now) {
   Assembly::Config config{.now = now};
   NetworkLoop::Config& network = config.network;
@@ -328,7 +326,7 @@ void Server::run_network(NetworkThread& network) {
     }
     due = assembly_.turn_network(network.number, now);
     tell_notices(network);
-    if (!network.busy) now = clock::now();  // the turn took time
+    if (!network.busy) now = clock::now();
   }
   assembly_.network(network.number).close(clock::now());
   tell_notices(network);
@@ -342,7 +340,7 @@ LocalTime Server::watch_until(NetworkThread& network, LocalTime due) {
   }
   if (!network.bell.rung()) return now;
   network.bell.answer();
-  return clock::now();  // must not be earlier than the step that rang the bell
+  return clock::now();
 }
 
 void Server::tell_notices(NetworkThread& network) {
@@ -366,7 +364,7 @@ void Server::run_log() {
     print_log();
     clock::sleep_until(due);
   }
-  assembly_.log().close(clock::now(), unsent());  // all other threads have ended
+  assembly_.log().close(clock::now(), unsent());
   print_log();
 }
 

@@ -47,7 +47,7 @@ class Server {
     std::string name;
     HapticLoop::Stats haptic;
     std::optional<SafeDevice::Status> safety;  ///< empty if the scene has no safety layer
-    std::optional<DeviceCounts> counts;        ///< of the driver; empty if it is not a USB device
+    std::optional<DeviceCounts> counts;
   };
   struct Summary {
     std::vector<DeviceSummary> devices;
@@ -93,7 +93,7 @@ class Server {
   struct Hardware {
     Hardware(const Scene& scene, Guardian* guardian);
     std::unique_ptr<Device> device;
-    std::unique_ptr<SafeDevice> safe;  ///< null if the scene has no safety layer
+    std::unique_ptr<SafeDevice> safe;
   };
 
   /// Serves the clients of some banks.
@@ -102,11 +102,11 @@ class Server {
     std::size_t number;  ///< index of its loop in assembly_
     bool busy;           ///< polls instead of sleeping
     std::unique_ptr<UdpLink> link;
-    BusyLink busy_link{*link};  ///< used if `busy`
-    Doorbell bell;              ///< rung by the haptic threads of its devices
+    BusyLink busy_link{*link};
+    Doorbell bell;  ///< rung by the haptic threads of its devices
     std::thread thread{};
 
-    UnknownKeys unknown_keys{};  ///< only used by this thread
+    UnknownKeys unknown_keys{};
   };
   using NetworkThreads = std::vector<std::unique_ptr<NetworkThread>>;
 
@@ -123,7 +123,6 @@ class Server {
   std::vector<Assembly::Part> parts_of(const std::vector<Scene>& scenes);
   std::vector<Link*> links();
   std::vector<HapticThread> haptic_threads();
-  /// Returns "NAME: " if there are several devices.
   std::string prefix(const Scene& scene) const;
   void end_threads();  ///< the haptic threads first, which set the forces to zero
   std::string name_of(const NetworkThread& network) const;
@@ -137,25 +136,25 @@ class Server {
   void print_log();
 
   LocalTime started_;
-  std::unique_ptr<Guardian> guardian_;    ///< null if there is no real device with motors
-  std::vector<Hardware> hardware_;        ///< by scene
-  NetworkThreads networks_;               ///< in the order of their devices
-  std::unique_ptr<Announcer> announcer_;  ///< null if no scene is announced
+  std::unique_ptr<Guardian> guardian_;
+  std::vector<Hardware> hardware_;
+  NetworkThreads networks_;  ///< in the order of their devices
+  std::unique_ptr<Announcer> announcer_;
   Assembly assembly_;
   std::vector<std::uint64_t> steps_seen_;  ///< by device, at the last call of turning()
 
-  std::optional<Duration> run_for_;  ///< set before the threads start
-  std::mutex telling_;               ///< serializes calls of tell_session_
+  std::optional<Duration> run_for_;
+  std::mutex telling_;  ///< serializes calls of tell_session_
   std::function<void(const NetworkLoop::SessionChange&)> tell_session_;
   std::atomic<bool> stop_haptic_{false};
   std::atomic<bool> suspend_{false};
-  std::atomic<std::size_t> suspended_{0};  ///< the number of suspended haptic threads
+  std::atomic<std::size_t> suspended_{0};
   std::atomic<bool> stop_network_{false};
   std::atomic<bool> stop_log_{false};
-  std::optional<WakefulProcessors> wakeful_;  ///< while the threads run
+  std::optional<WakefulProcessors> wakeful_;
   std::vector<HapticThread> haptic_threads_;
   std::thread log_thread_;
-  std::thread announce_thread_;  ///< only if announcer_ is set
+  std::thread announce_thread_;
 };
 
 }  // namespace tendon

@@ -31,7 +31,7 @@ class TroubleSum {
   }
 
  private:
-  std::uint64_t sum_ = 0;  ///< occurrences that have not been logged
+  std::uint64_t sum_ = 0;
   std::optional<LocalTime> told_;
 };
 

@@ -10,12 +10,11 @@
 
 namespace tendon {
 
-/// Describes a connected device that is supported by Tendon, and the problems that prevent its use. This is used by
-/// `tendond devices`.
+/// A connected device that is supported by Tendon, and the problems that prevent its use.
 struct PluggedDevice {
   struct Lack {
     std::string what;
-    std::string mend;  ///< instructions for the user
+    std::string mend;
   };
   std::string name;
   std::string kind;  ///< [device] kind in a scene
@@ -23,12 +22,11 @@ struct PluggedDevice {
   std::vector<Lack> lacks;
 };
 
-/// `firmware_problem` describes what is wrong with the given firmware file for a Falcon. It is an empty string if the
-/// file is valid. It is not set if there is no file.
+/// `firmware_problem` describes the firmware file for a Falcon. It is empty if the file is valid, and not set if there
+/// is no file.
 std::vector<PluggedDevice> report_devices(std::span<const usb::PluggedIn> plugged,
                                           const std::optional<std::string>& firmware_problem);
 
-/// The report as text, or as one line with a JSON object for each device.
 std::string in_words(std::span<const PluggedDevice> devices);
 std::string in_json(std::span<const PluggedDevice> devices);
 

@@ -29,7 +29,6 @@ namespace fs = std::filesystem;
 constexpr Duration kPeriod = std::chrono::milliseconds(1);
 constexpr std::size_t kWakeUps = 1000;
 
-/// Returns the content of a small file without trailing whitespace, or an empty string if it cannot be read.
 std::string text_of(const fs::path& file) {
   std::ifstream stream(file);
   std::string text(std::istreambuf_iterator<char>(stream), {});
@@ -44,7 +43,6 @@ std::optional<std::int64_t> number_of(const std::string& text) {
   return number;
 }
 
-/// Returns the value after `start` from a file with lines like "key value" or "key=value".
 std::string value_after(const std::string& text, std::string_view start) {
   std::istringstream lines(text);
   for (std::string line; std::getline(lines, line);) {
@@ -174,7 +172,6 @@ Finding machine(const fs::path& root) {
   return {"machine", "virtual", "not for a real device: the host may stop the whole machine for 20 ms and more"};
 }
 
-/// Checks the available cipher suites (protocol/secrets/suites.h).
 Finding aes(const fs::path& root) {
   const std::string cpus = text_of(root / "proc/cpuinfo");
   if (cpus.empty()) return {"aes", "unknown", ""};

@@ -25,12 +25,12 @@ struct Diagnosis {
   struct Finding {
     std::string_view key;
     std::string found;
-    std::string advice;  ///< empty if there is nothing to change
+    std::string advice;
   };
 
-  WakeUps ordinary;                  ///< for an ordinary thread
-  WakeUps realtime;                  ///< for a thread with the settings of a haptic thread
-  std::vector<std::string> refused;  ///< errors of enter_realtime
+  WakeUps ordinary;
+  WakeUps realtime;
+  std::vector<std::string> refused;
   std::vector<Finding> findings;
 };
 
@@ -39,17 +39,14 @@ struct WakeUpClock {
   std::function<void(LocalTime)> sleep_until;
 };
 
-/// Measures the latency of `count` wake-ups with this period.
 Diagnosis::WakeUps measure_wake_ups(const WakeUpClock& clock, Duration period, std::size_t count);
 
-/// Checks the settings of the kernel in proc, sys and boot below `root`. If a file is missing, the result is "unknown"
-/// without advice.
+/// Checks the kernel settings in proc, sys and boot below `root`. If a file is missing, the result is "unknown".
 std::vector<Diagnosis::Finding> look_around(const std::filesystem::path& root);
 
 /// Runs all checks. This takes about two seconds and uses additional threads.
 Diagnosis diagnose(const WakeUpClock& clock);
 
-/// The report as text, or as one line with a JSON object.
 std::string in_words(const Diagnosis& diagnosis);
 std::string in_json(const Diagnosis& diagnosis);
 

@@ -21,7 +21,6 @@ namespace {
 constexpr int kSteps = 200;
 constexpr int kSamples = 2000;  ///< used instead of the device
 
-/// Records the samples of another device.
 class Tape final : public Device {
  public:
   Tape(const SimulatedDevice::Config& config, std::vector<PositionSample>& samples)
@@ -63,7 +62,6 @@ class Playback final : public Device {
   std::size_t next_ = 0;
 };
 
-/// Runs a scene without threads and without a network.
 class Trial {
  public:
   Trial(const Scene& scene, std::unique_ptr<Device> device)
@@ -73,7 +71,6 @@ class Trial {
         period_(scene.loop.period) {}
   explicit Trial(const Scene& scene) : Trial(scene, std::make_unique<SimulatedDevice>(scene.simulated())) {}
 
-  /// Returns the average duration of a step in ns.
   double steps(const std::function<Duration()>& processor_time) {
     const Duration before = processor_time();
     for (int i = 0; i < kSteps; ++i) {
@@ -112,7 +109,7 @@ class Trial {
   }
 
   std::unique_ptr<Device> device_;
-  std::unique_ptr<SafeDevice> safe_;  ///< null if there is no safety layer
+  std::unique_ptr<SafeDevice> safe_;
   std::unique_ptr<Mailboxes> mail_ =
       std::make_unique<Mailboxes>(Mailboxes::Capacities{.steps = 2, .flight = 2, .datagrams = 1});
   HapticLoop loop_;
@@ -121,7 +118,6 @@ class Trial {
   std::uint64_t step_ = 0;
 };
 
-/// Creates a device that plays the first samples of the device in this scene.
 std::unique_ptr<Device> playback_of(const Scene& scene) {
   std::vector<PositionSample> samples;
   samples.reserve(kSamples);
@@ -131,8 +127,8 @@ std::unique_ptr<Device> playback_of(const Scene& scene) {
   return std::make_unique<Playback>(SimulatedDevice(scene.simulated()).info(), std::move(samples));
 }
 
-/// Computes the minimum of several measurements. The uncertainty is the difference between the minimum of the odd
-/// measurements and the minimum of the even measurements.
+/// The uncertainty is the difference between the minimum of the odd measurements and the minimum of the even
+/// measurements.
 class Least {
  public:
   void add(double value) {
@@ -153,8 +149,8 @@ Explanation explain(const Scene& listed, const std::function<Duration()>& proces
   Explanation out;
   Scene scene = listed;
   scene.device = listed.simulated();
-  // The scenes are the original scene, a copy of it, the scene with a playback device, and one scene for each part, in
-  // which this part is removed.
+  // These are the original scene, a copy of it, the scene with a playback device, and the scene without each of its
+  // parts.
   std::vector<std::unique_ptr<Trial>> trials;
   trials.push_back(std::make_unique<Trial>(scene));
   trials.push_back(std::make_unique<Trial>(scene));
@@ -184,14 +180,12 @@ Explanation explain(const Scene& listed, const std::function<Duration()>& proces
 
 namespace {
 
-/// N/m. Returns the highest stiffness that can be rendered with this limiter, 2 b/T (core/PROOFS.md, "Operational
-/// stiffness").
+/// N/m. The highest stiffness of this limiter, 2 b/T (core/PROOFS.md, "Operational stiffness").
 double operational_stiffness(const LimiterConfig& limiter) {
   return 2 * limiter.friction.viscous / seconds(limiter.longest_hold);
 }
 
-/// Prints the stiffness and the apparent mass of the coupling for some round-trip times. It assumes that both ends have
-/// the same configuration.
+/// Assumes that both ends have the same configuration.
 void put_coupling(const Coupling::Config& coupling, const LimiterConfig& limiter, std::ostream& text) {
   const bool leads = coupling.role == PortRole::kLeader;
   const bool waves = coupling.method == CouplingMethod::kWaves;
@@ -230,7 +224,6 @@ void put_coupling(const Coupling::Config& coupling, const LimiterConfig& limiter
   }
 }
 
-/// Returns the names of the requested cipher suites that are supported by this machine.
 std::string spoken_here(const Suites& wanted) {
   Suites here = suites_of_this_machine();
   std::erase_if(here, [&](Suite suite) { return !contains(wanted, suite); });

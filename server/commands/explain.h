@@ -12,32 +12,28 @@
 
 namespace tendon {
 
-/// The result of `tendond explain SCENE`. It lists the parts of a scene that run in the haptic thread, with their
-/// costs, and the parts that are not used.
+/// The costs of the parts of a scene in the haptic thread.
 ///
-/// The costs are measured on this machine as processor time of HapticLoop::step. The scene's device is coupled to a
-/// spring of 500 N/m, which is updated in every tenth step. The cost of a part is the difference between the scene with
-/// and without this part. It can be negative if other parts have more work without it. The cost of the device is the
-/// difference between the scene and a playback of the first 2000 positions of the device. Therefore, it does not exceed
-/// the cost of the step. Each cost is the minimum over 80 rounds of 200 steps, and the variants of the scene are
-/// measured alternately. If a cost is smaller than `resolution_ns`, it is not significant.
+/// The costs are measured as processor time of HapticLoop::step. The scene's device is coupled to a spring of 500 N/m,
+/// which is updated in every tenth step. The cost of a part is the difference between the scene with and without this
+/// part. It can be negative if other parts have more work without it. The cost of the device is the difference to a
+/// playback of its first 2000 positions, so it does not exceed the cost of the step. Each cost is the minimum over 80
+/// rounds of 200 steps. If it is smaller than `resolution_ns`, it is not significant.
 struct Explanation {
   struct Part {
-    std::string_view key;           ///< in the scene
-    std::string_view what;          ///< one line
+    std::string_view key;
+    std::string_view what;
     std::optional<double> cost_ns;  ///< per step; empty if it is not part of the scene
   };
   std::vector<Part> parts;
-  double step_ns = 0;    ///< a whole step
+  double step_ns = 0;
   double device_ns = 0;  ///< from 0 to step_ns; the simulated device and its hand
   double resolution_ns = 0;
 };
 
-/// `processor_time` returns the processor time of the calling thread. With 80 rounds, the measurement takes about 0.25
-/// s.
+/// `processor_time` returns the processor time of the calling thread. With 80 rounds, this takes about 0.25 s.
 Explanation explain(const Scene& scene, const std::function<Duration()>& processor_time, int rounds = 80);
 
-/// The result as text, or as one line with a JSON object.
 std::string in_words(const Scene& scene, const Explanation& explanation);
 std::string in_json(const Scene& scene, const Explanation& explanation);
 

@@ -28,7 +28,7 @@ bool may(const ClientKey* key, Role role) {
 const std::string& name_of(const ServedDevice::Config& device) { return device.about.name; }
 const std::string& name_of(const ChannelDescription& channel) { return channel.name; }
 
-/// Returns the index of the entry with this name. If the name is empty, this is the first entry.
+/// If the name is empty, this is the first entry.
 template <class Named>
 std::optional<std::uint32_t> place_of(const std::vector<Named>& all, const std::string& name) {
   if (name.empty()) return 0;
@@ -126,15 +126,13 @@ std::optional<Refusal> Admission::reason_to_refuse(const Address& from, const Cl
   }
   if (!controls && key != nullptr && config_.keys > 1) {
     const std::size_t of_key = count([&](const Guest& guest) { return observes(guest) && guest.key == key; });
-    // The number of places is limited for each key, so that other clients can still connect.
     if (of_key >= std::max<std::size_t>((config_.max_observers + 1) / 2, 1)) {
       return Refusal{Code::kBusy, "the key \"" + key->name + "\" has " + std::to_string(of_key) + " observers already"};
     }
   }
   std::size_t channels = 0;
   for (const ServedDevice& device : devices) channels += device.channels.size();
-  // If a controller is waiting for a lease, it is not counted as an observer, but it requires the same number of
-  // states.
+  // A controller that is waiting for a lease requires as many states as an observer.
   const std::size_t all = count([](const Guest&) { return true; });
   if (all >= config_.max_observers + channels) {
     return Refusal{Code::kBusy, "there are " + std::to_string(all) + " guests already"};

@@ -12,14 +12,12 @@
 
 namespace tendon {
 
-/// The reason why a client is not admitted.
 struct Refusal {
   Code code;
   std::string reason;
 };
 
-/// Determines whether a client is admitted, and which seats it gets (SESSION.md, "Opening"). The functions do not
-/// modify any state.
+/// Determines whether a client is admitted, and which seats it gets (SESSION.md, "Opening"). It does not modify any state.
 ///
 /// Thread-safe: no. Realtime-safe: no.
 class Admission {
@@ -38,8 +36,7 @@ class Admission {
   static std::variant<std::vector<Seat>, Refusal> seats_of(const Hello& hello,
                                                            const std::vector<ServedDevice::Config>& devices);
 
-  /// Returns the reason why a client with this address and key cannot have these seats, or nothing if it can. `key` is
-  /// null if there is none.
+  /// Returns nothing if a client with this address and key can have these seats. `key` is null if there is none.
   std::optional<Refusal> reason_to_refuse(const Address& from, const ClientKey* key, const std::vector<Seat>& seats,
                                           const std::vector<ServedDevice>& devices,
                                           const std::vector<Guest>& guests) const;

@@ -10,7 +10,6 @@
 namespace tendon {
 namespace {
 
-/// The relative tolerance for rounding errors in the scenes.
 constexpr double kAlike = 1e-9;
 
 bool alike(double a, double b) { return std::abs(a - b) <= kAlike * std::max(std::abs(a), std::abs(b)); }

@@ -8,12 +8,11 @@
 
 namespace tendon {
 
-/// Returns the description of this end of a coupling. The device and the channel are not set.
+/// Device and channel are not set.
 Couple couple_of(const Coupling::Config& config);
 
-/// Returns a description of the first difference between the configurations of both ends, for example "method: yours
-/// position-force, mine position-position". The tolerance for numbers is 1e-9, relative to the larger one. Returns an
-/// empty string if the configurations are compatible.
+/// Returns the first difference between the configurations of both ends, for example "method: yours position-force,
+/// mine position-position", or an empty string. The relative tolerance for numbers is 1e-9.
 std::string first_difference(const Couple& theirs, const Couple& mine);
 
 }  // namespace tendon

@@ -13,7 +13,6 @@
 
 namespace tendon {
 
-/// A set of features that are used in a session (protocol/messages.h).
 class Features {
  public:
   /// The optional features that are supported by this server. The order determines the bits.
@@ -29,7 +28,6 @@ class Features {
     }
   }
 
-  /// Realtime-safe: yes.
   template <const std::string_view& feature>
   bool has() const noexcept {
     constexpr auto kPlace = static_cast<std::size_t>(std::ranges::find(kSupported, feature) - kSupported.begin());

@@ -22,13 +22,10 @@
 #include "server/guests/sampled_steps.h"
 #include "server/mailboxes.h"
 
-// The state of clients and devices in the network thread. It is used by NetworkLoop, Admission, Leases and Reports.
-
 namespace tendon {
 
-/// The maximum number of devices of a server, which is 64 banks. In this file, a device is identified by its index in
-/// the list of devices. In a session, it is identified by its index in the bank because all devices of a session must
-/// be in the same bank (WIRE.md, "Devices and channels").
+/// The maximum number of devices of a server, which is 64 banks. The number of a device in a session is its index in
+/// the bank because all devices of a session must be in the same bank (WIRE.md, "Devices and channels").
 inline constexpr std::size_t kMostDevices = 1024;
 constexpr std::uint32_t bank_of(std::uint32_t device) { return device / limits::kMaxDevices; }
 constexpr std::uint32_t number_of(std::uint32_t device) { return device % limits::kMaxDevices; }
@@ -41,12 +38,9 @@ struct Shard {
   std::uint32_t number = 0;
   std::uint32_t of = 1;  ///< a power of two; at most the number of banks
 
-  /// Returns the index of the first device if there are `devices` devices in total. end_device() is the index after the
-  /// last device.
   std::size_t first_device(std::size_t devices) const noexcept { return start_of(number, devices); }
   std::size_t end_device(std::size_t devices) const noexcept { return start_of(number + 1, devices); }
 
-  /// Returns the number of the shard with this device.
   std::uint32_t owner_of(std::size_t device, std::size_t devices) const noexcept {
     std::uint32_t owner = 0;
     while (device >= start_of(owner + 1, devices)) ++owner;
@@ -60,7 +54,7 @@ struct Shard {
   }
 };
 
-/// A channel that was claimed by a client, or a device if the client is an observer.
+/// A channel that was claimed by a controller, or a device that was claimed by an observer.
 struct Seat {
   std::uint32_t device = 0;
   std::uint32_t channel = 0;
@@ -68,26 +62,23 @@ struct Seat {
   bool by_name = false;  ///< it can wait for the lease
 };
 
-/// A device whose states are sent to a client.
 struct View {
   std::uint32_t device = 0;
   std::uint64_t state_every = 1;  ///< in haptic steps
   std::uint64_t last_state = 0;   ///< tick
   std::optional<StateDeadband> deadband{};
   std::uint32_t pressed = 0;  ///< buttons that were pressed since the last state
-  /// The state for each coupling of the device.
   struct Ports {
-    LocalTime due{};          ///< the earliest time of the next update
-    bool peer_waits = false;  ///< there is a new port
+    LocalTime due{};
+    bool peer_waits = false;
   };
   std::array<Ports, Shares::kMost> ports{};
 };
 
-/// A client with a session.
 struct Guest {
   Address address;
-  ClientRandom random;   ///< from the Hello, to detect repeated Hellos
-  const ClientKey* key;  ///< null if the session is not encrypted
+  ClientRandom random;  ///< from the Hello, to detect repeated Hellos
+  const ClientKey* key;
   std::string name;
   Role role;
   Features features;
@@ -98,60 +89,51 @@ struct Guest {
   Session session;
   LocalTime arrived;
   std::optional<RateAdaptation> adaptation{};
-  std::optional<LinkMeter> meter{};  ///< only for controllers
-  std::uint64_t reports = 0;         ///< the number of reports
-  std::uint64_t lost = 0;            ///< lost datagrams in both directions at the newest force
-  RefusedForces refused{};           ///< since the session was opened
-  RefusedForces refused_told{};      ///< at the time of the last report
-  bool hopeless = false;             ///< as last logged
-  std::optional<Seat> coupled{};     ///< set if it is the peer of a coupling
-  bool gone = false;                 ///< removed at the end of the turn
+  std::optional<LinkMeter> meter{};
+  std::uint64_t reports = 0;
+  std::uint64_t lost = 0;        ///< lost datagrams in both directions at the newest force
+  RefusedForces refused{};       ///< since the session was opened
+  RefusedForces refused_told{};  ///< at the time of the last report
+  bool hopeless = false;         ///< as last logged
+  std::optional<Seat> coupled{};
+  bool gone = false;  ///< removed at the end of the turn
 
   std::uint32_t id() const noexcept { return session.connection_id(); }
   template <const std::string_view& feature>
   bool has() const noexcept {
     return features.has<feature>();
   }
-  /// Returns true if this client can be the peer of a coupling.
   bool may_couple() const noexcept { return has<kFeatureTeleoperation>() && role == Role::kController; }
-  /// Returns true if the client receives both ports of a coupling.
   bool sees_ports() const noexcept { return has<kFeatureTeleoperation>() && role == Role::kObserver; }
   /// Converts the number of a device in a session to an index. If the last bank is not full, the device may not exist.
   std::uint32_t device_of(std::uint32_t number) const noexcept {
     return bank_of(views.front().device) * limits::kMaxDevices + number;
   }
-  /// This is called if the client no longer holds the channel.
   void uncouple(std::uint32_t device, std::uint32_t channel) noexcept {
     if (coupled && coupled->device == device && coupled->channel == channel) coupled.reset();
   }
 };
 
-/// Returns true if the client has claimed the channel as a controller.
 bool sits_on(const Guest& guest, std::uint32_t device, std::uint32_t channel);
 
-/// Returns true if the client has claimed a channel of this device as a controller.
 bool controls(const Guest& guest, std::uint32_t device);
 
-/// Returns null if there is no view of this device.
 View* view_of(Guest& guest, std::uint32_t device);
 
-/// Returns null if no client has this connection id.
 Guest* guest_of(std::vector<Guest>& guests, std::uint32_t id);
 const Guest* guest_of(const std::vector<Guest>& guests, std::uint32_t id);
 
-/// A channel of a device, which receives the forces of one engine.
 struct ServedChannel {
-  std::uint32_t holder = 0;  ///< connection id, or 0 if the channel is free
+  std::uint32_t holder = 0;  ///< connection id; 0 if free
   LocalTime renewed{};       ///< by the newest force or when the holder was changed
   std::uint64_t forces = 0;
   std::uint64_t handovers = 0;
   std::uint64_t late = 0;
   Lateness lateness;
-  Lateness::Report newest;    ///< from `lateness`
-  std::uint64_t reports = 0;  ///< number of reports about the engine
-  /// The uncertainty of the forces that was reported by the engine.
+  Lateness::Report newest;
+  std::uint64_t reports = 0;
   struct Doubt {
-    std::optional<double> error{};  ///< N, if reported
+    std::optional<double> error{};  ///< N
     std::uint8_t way = 0;           ///< index in Mailboxes::ways
     void observe(const std::optional<double>& said, std::uint8_t by) noexcept {
       if (!said ? error.has_value() : error && *said < *error) return;
@@ -160,20 +142,19 @@ struct ServedChannel {
     }
   };
   Doubt doubt{};                        ///< since the last report or the last change of the holder
-  std::optional<double> worst_error{};  ///< N, over all forces, if reported
-  std::vector<std::uint64_t> by_way{};  ///< number of forces by index in Mailboxes::ways
+  std::optional<double> worst_error{};  ///< N
+  std::vector<std::uint64_t> by_way{};  ///< by index in Mailboxes::ways
 };
 
-/// The state of a device in the network thread.
 struct ServedDevice {
   struct Config {
     DeviceDescription about;  ///< device number and holders are ignored
     HandleDescription handle{};
-    std::optional<Couple> coupling{};  ///< empty if the device cannot be coupled
+    std::optional<Couple> coupling{};
     /// The channels of the leaders if a follower has more than one. If this is empty, the leader can use any channel.
     std::vector<std::uint32_t> leaders{};
-    std::optional<Peer::Config> dial{};  ///< the server to connect to, if any
-    Mailboxes* mail = nullptr;           ///< must outlive the loop
+    std::optional<Peer::Config> dial{};
+    Mailboxes* mail = nullptr;  ///< must outlive the loop
   };
 
   DeviceDescription about;  ///< `device` is the number in a session
@@ -181,18 +162,17 @@ struct ServedDevice {
   Mailboxes* mail;
   SampledSteps sampled{};
   std::vector<ServedChannel> channels{};
-  std::optional<Couple> coupling{};     ///< our configuration; empty if the device cannot be coupled
-  PortPhase phase = PortPhase::kAlone;  ///< the newest phase of any coupling
+  std::optional<Couple> coupling{};  ///< our configuration; empty if the device cannot be coupled
+  PortPhase phase = PortPhase::kAlone;
   /// By coupling: the channel of the leader. If this is empty, there is one coupling, and any channel can be used.
   std::vector<std::uint32_t> leaders{};
   std::array<std::uint32_t, Shares::kMost> peers{};   ///< by coupling: the number of peers so far
   std::array<PortFrame, Shares::kMost> peer_ports{};  ///< by coupling: the last port of the peer
   Outputs outputs{};
-  std::optional<Health> told{};  ///< the last report to observers, if any
-  std::uint64_t reports = 0;     ///< the number of reports
+  std::optional<Health> told{};
+  std::uint64_t reports = 0;
 };
 
-/// Returns the index of the coupling that uses this channel, or nothing if there is none.
 std::optional<std::uint32_t> coupling_by(const ServedDevice& device, std::uint32_t channel);
 
 /// Notifies the haptic loop that the peer of the coupling has been replaced. Returns false if the queue is full.

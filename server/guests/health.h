@@ -14,23 +14,21 @@
 
 namespace tendon {
 
-/// The health of the loop of a device. It is collected by the log thread, and the network thread sends it to observers.
 /// All counters start at 0 when the server starts, so no events are missed if an update is lost.
 struct Health {
   LocalTime at{};
   std::uint64_t steps = 0;
-  std::uint64_t missed = 0;    ///< periods without a step because a step was late
-  std::uint64_t overruns = 0;  ///< steps with Reason::kOverrun
-  std::uint64_t unseen = 0;    ///< steps with Reason::kUnseen
-  /// The number of intervals in which the acceleration exceeded bounded_acceleration of AOL+. This means that the value
-  /// in the scene is not correct (core/PROOFS.md, "Bounded acceleration").
+  std::uint64_t missed = 0;  ///< periods without a step because a step was late
+  std::uint64_t overruns = 0;
+  std::uint64_t unseen = 0;
+  /// The number of intervals in which bounded_acceleration of AOL+ was exceeded, so the value in the scene is not
+  /// correct (core/PROOFS.md, "Bounded acceleration").
   std::uint64_t broken_assumptions = 0;
-  DeviceCounts device{};  ///< the counters of the driver
+  DeviceCounts device{};
   LatenessHistogram lateness{};
   Safety safety = Safety::kAbsent;
   std::string_view fault{};  ///< static string; empty if there is no fault
 
-  // Degraded functions of the server:
   bool not_realtime = false;  ///< see enter_realtime
   bool recording_ended = false;
   std::uint64_t steps_lost = 0;  ///< the log thread was too slow
@@ -50,13 +48,12 @@ class HealthMeter {
   explicit HealthMeter(Duration period);
 
   void observe(const StepRecord& step) noexcept;
-  /// Returns the current counters. The time and the counters that do not depend on steps are not set. The number of
-  /// steps is equal to the number of values in `lateness`.
+  /// Returns the current counters. The time and the counters that do not depend on steps are not set.
   Health counted() const noexcept;
 
  private:
   Duration period_;
-  std::optional<LocalTime> before_;  ///< the previous scheduled time
+  std::optional<LocalTime> before_;
   Counter missed_;
   Counter overruns_;
   Counter unseen_;

@@ -21,7 +21,6 @@ std::string milliseconds_text(Duration d) {
   return std::to_string(tenths / 10) + "." + std::to_string(tenths % 10) + " ms";
 }
 
-/// Returns null if forces are not refused for this cause.
 const char* refusal(Lateness::Cause cause) {
   switch (cause) {
     case Lateness::Cause::kNotFinite:
@@ -140,7 +139,6 @@ void Lateness::took_state(LocalTime now) noexcept {
   took_state_ = now;
 }
 
-/// Returns the longest time without a state since the newest force.
 Duration Lateness::paused(LocalTime now) const noexcept {
   return took_state_ ? std::max(paused_, now - *took_state_) : paused_;
 }

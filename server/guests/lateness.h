@@ -17,9 +17,8 @@ namespace tendon {
 ///     received − sampled  =  (state sent − sampled)  +  round trip  +  (remaining time)
 ///                            ours                       network        engine: waiting for its period, and computing
 ///
-/// The round trip is measured with the datagram that contains the force. Its echo contains the time for which the peer
-/// has held our datagram. A force is late if the previous force is no longer valid. The cause is determined by the
-/// first of these rules that applies:
+/// The round trip is measured with the datagram that contains the force. A force is late if the previous force is no
+/// longer valid. The cause is determined by the first of these rules that applies:
 ///
 /// 1. If no state of the device was received for kPause and for half of the missing time, the cause is the server.
 ///    Either the loop of the device or the network thread was blocked. This rule is the first because the datagrams
@@ -69,27 +68,26 @@ class Lateness {
   static Part part(Cause cause) noexcept;
 
   struct Way {
-    LocalTime sampled;    ///< time of the sample
-    LocalTime sent;       ///< when the state of this sample was sent
-    LocalTime received;   ///< when the force was received
+    LocalTime sampled;
+    LocalTime sent;
+    LocalTime received;
     Duration round_trip;  ///< measured by the same datagram
     Duration valid_for;   ///< requested by the engine, starting at `received`
     bool lost = false;    ///< datagrams were lost since the previous force
   };
 
-  /// The events since the last report.
   struct Report {
     std::uint64_t forces = 0;
     std::uint64_t refused = 0;
     Cause refused_for = Cause::kNone;  ///< the cause of the newest one
-    std::uint64_t late_ours = 0;       ///< by cause
+    std::uint64_t late_ours = 0;
     std::uint64_t late_network = 0;
     std::uint64_t late_engine = 0;
     std::uint64_t late_unknown = 0;
-    std::uint64_t cut = 0;       ///< forces that were limited to the maximum of the device
-    Duration worst{};            ///< the longest time without a valid force
-    Cause cause = Cause::kNone;  ///< the cause of `worst`
-    Duration ours{};             ///< at `worst`
+    std::uint64_t cut = 0;  ///< forces that were limited to the maximum of the device
+    Duration worst{};       ///< the longest time without a valid force
+    Cause cause = Cause::kNone;
+    Duration ours{};
     Duration network{};
     Duration engine{};
     Duration stood_still{};  ///< the longest pause of the engine or of our threads
@@ -115,15 +113,12 @@ class Lateness {
   /// Must be called for each authentic datagram that is newer than all previous ones. `sent` is the time stamp of the
   /// engine, if available. `lost` is the total number of lost datagrams.
   void heard(LocalTime now, std::optional<PeerTime> sent, std::uint64_t lost) noexcept;
-  /// Must be called if the network thread has received a new state of the device.
   void took_state(LocalTime now) noexcept;
   void observe(const Way& way) noexcept;
-  /// Must be called if the newest force exceeds the maximum force of the device.
   void cut() noexcept { ++report_.cut; }
   /// Must be called if forces were refused. `cause` must be one of the last four causes.
   void refused(Cause cause, std::uint64_t count) noexcept;
 
-  /// Returns the events since the last call. A missing force is also counted as late.
   Report report(LocalTime now);
 
  private:
@@ -141,14 +136,14 @@ class Lateness {
   bool same_machine_ = false;
   bool usual_known_ = false;
   LocalTime heard_{};
-  std::optional<PeerTime> sent_;  ///< the newest time stamp
-  std::uint64_t lost_ = 0;        ///< lost datagrams so far
+  std::optional<PeerTime> sent_;
+  std::uint64_t lost_ = 0;
   LocalTime valid_until_{};
   Parts usual_;
   std::optional<LocalTime> took_state_;
   // Since the newest force:
   Duration stood_still_{};
-  Duration paused_{};  ///< longest time between states
+  Duration paused_{};
   Cause refused_for_ = Cause::kNone;
   Report report_;
 };

@@ -9,7 +9,6 @@
 
 namespace tendon {
 
-/// The settings of all outputs of a device. The haptic loop only needs the newest value.
 struct OutputSettings {
   struct One {
     std::uint32_t number = 0;  ///< unique id of this setting, or 0
@@ -24,11 +23,10 @@ struct OutputSettings {
 /// Thread-safe: no. Realtime-safe: yes.
 class Outputs {
  public:
-  /// `output` must be less than kMostOutputs.
   void set(std::uint32_t guest, std::size_t output, const OutputSetting& setting) noexcept;
-  /// Turns off the outputs that were set by this guest. Returns false if there are none.
+  /// Returns false if there are none.
   bool turn_off_those_of(std::uint32_t guest) noexcept;
-  /// Turns off all outputs. Returns false if all of them are already off.
+  /// Returns false if all outputs are already off.
   bool turn_off_all() noexcept;
 
   const OutputSettings& settings() const noexcept { return settings_; }

@@ -144,7 +144,7 @@ void Peer::take(LocalTime now, const Session::Event& event) {
     session.answer(asked->id, Code::kOk, {});
     if (!lease_.take(*lost, session, now)) return;
     coupled_ = false;
-    asked_to_couple_.reset();  // ignores a late reply
+    asked_to_couple_.reset();
     say(true, "\"" + lost->to + "\" has taken the channel");
   }
 }
@@ -168,7 +168,6 @@ void Peer::close(LocalTime now) {
   coupled_ = false;
 }
 
-/// Does not repeat the previous message.
 void Peer::say(bool warning, std::string text) {
   if (text == said_) return;
   said_ = text;

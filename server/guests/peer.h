@@ -16,9 +16,9 @@
 
 namespace tendon {
 
-/// A connection to another server for a coupled device. This server acts as an ordinary client of the other server. It
-/// claims a channel, takes the lease, and sends a Couple request. Then, PortStates are exchanged in both directions. If
-/// the connection fails, it is established again (Connection), and each problem is only reported once.
+/// A connection to another server for a coupled device. This server acts as an ordinary client: it claims a channel,
+/// takes the lease, and sends a Couple request. Then, PortStates are exchanged in both directions. If the connection
+/// fails, it is established again. Each problem is only reported once.
 ///
 /// The datagrams are sent and received by the owner of this object because each server only has one socket.
 ///
@@ -27,21 +27,19 @@ class Peer {
  public:
   struct Config {
     Address server;
-    std::string name;          ///< used in its log
+    std::string name;
     std::optional<Key> key{};  ///< if empty, the session is not encrypted, and the server must be on this machine
-    Seed seed{};               ///< must be random
-    std::string device{};      ///< of the server; if empty, the first one
-    std::string channel{};     ///< of the device; if empty, the first one
-    Couple couple{};           ///< the configuration of our end
+    Seed seed{};
+    std::string device{};   ///< of the server; if empty, the first one
+    std::string channel{};  ///< of the device; if empty, the first one
+    Couple couple{};
   };
-  /// A message for the log.
   struct Notice {
     bool warning = false;
     std::string text;
   };
   using Send = std::function<void(LocalTime now, const Address& to, std::span<const std::byte> datagram)>;
 
-  /// `send` is called for each outgoing datagram.
   Peer(const Config& config, Send send, LocalTime now);
   Peer(const Peer&) = delete;  // connection_ refers to line_
   Peer& operator=(const Peer&) = delete;
@@ -52,19 +50,16 @@ class Peer {
   /// Processes everything that is due. Returns the latest time of the next call.
   LocalTime turn(LocalTime now);
 
-  /// Sends our port to the peer. This has no effect if the devices are not coupled.
+  /// This has no effect if the devices are not coupled.
   void send(LocalTime now, const PortState& port);
-  /// Returns the newest port of the peer, or nothing if it has already been returned.
   std::optional<PortState> take();
 
-  /// Closes the session with a Bye.
   void close(LocalTime now);
 
   bool coupled() const noexcept { return coupled_; }
   std::vector<Notice> take_notices();
 
  private:
-  /// Adapts the datagrams to the interface of Connection.
   class Line final : public Link {
    public:
     explicit Line(Send send) : send_(std::move(send)) {}
@@ -73,7 +68,8 @@ class Peer {
 
     LocalTime now{};
     Address from;
-    std::span<const std::byte> arrived;  ///< empty if there is none
+    std::span<const std::byte> arrived;
+
    private:
     Send send_;
   };
@@ -93,10 +89,10 @@ class Peer {
   Connection connection_;
   LeaseRequest lease_;  ///< also stores the numbers of the device and of the channel
   bool coupled_ = false;
-  std::optional<std::uint32_t> asked_to_couple_;  ///< the id of the pending request
-  LocalTime couple_at_ = LocalTime::max();        ///< the time of the next request
+  std::optional<std::uint32_t> asked_to_couple_;
+  LocalTime couple_at_ = LocalTime::max();
   std::optional<PortState> newest_;
-  std::string said_;  ///< the last message
+  std::string said_;
   std::vector<Notice> notices_;
 };
 

@@ -9,7 +9,6 @@
 namespace tendon {
 namespace {
 
-/// The minimum period for updates to an observer.
 constexpr Duration kShowEvery = std::chrono::milliseconds(20);
 
 /// Adds the scales to the port of the leader because observers do not receive the Couple message.
@@ -117,7 +116,6 @@ bool PortExchange::receive(LocalTime now, const Address& from, std::span<const s
   return false;
 }
 
-/// Notifies the haptic loop if the peer has changed.
 void PortExchange::renew(Dialled& dialled) {
   if (!dialled.peer->coupled()) {
     dialled.coupled = false;

@@ -23,7 +23,7 @@ class PortExchange {
  public:
   PortExchange(std::vector<ServedDevice>& devices, std::vector<Guest>& guests, Leases& leases);
 
-  /// Connects to a server and couples the device with it. `send` is called for each datagram to this server.
+  /// `send` is called for each datagram to this server.
   void dial(LocalTime now, std::uint32_t device, const Peer::Config& server, Peer::Send send);
 
   void publish(LocalTime now);
@@ -31,10 +31,10 @@ class PortExchange {
   /// Passes a port to the haptic loop. Returns false and has no effect if the guest is not the peer of a coupling.
   bool take(LocalTime now, const Guest& guest, const PortFrame& port);
 
-  /// Returns false if the datagram is not from a server that this server is connected to.
+  /// Returns false if the datagram is not from a dialled server.
   bool receive(LocalTime now, const Address& from, std::span<const std::byte> datagram);
 
-  /// Updates the connections to these servers. Returns the time of the next call.
+  /// Returns the time of the next call.
   LocalTime turn(LocalTime now);
   std::vector<Peer::Notice> take_notices();
 
@@ -44,7 +44,7 @@ class PortExchange {
   struct Dialled {
     std::uint32_t device;
     std::unique_ptr<Peer> peer;
-    bool coupled = false;  ///< known by the haptic loop
+    bool coupled = false;
   };
 
   void renew(Dialled& dialled);
@@ -56,7 +56,7 @@ class PortExchange {
   std::vector<ServedDevice>& devices_;
   std::vector<Guest>& guests_;
   Leases& leases_;
-  std::vector<std::uint32_t> coupled_;  ///< indices of the devices that can be coupled
+  std::vector<std::uint32_t> coupled_;
   std::vector<Dialled> dialled_;
 };
 

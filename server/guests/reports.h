@@ -10,9 +10,9 @@
 
 namespace tendon {
 
-/// Creates the reports that are sent once per second (SESSION.md, "Report"). Controllers receive a report about their
-/// forces. The operator is notified of late or refused forces. Observers that have requested diagnostics receive a
-/// report about each device loop and each engine.
+/// Creates the reports that are sent once per second (SESSION.md, "Report"): to controllers about their forces, to the
+/// operator about late or refused forces, and to observers with kFeatureDiagnostics about each device loop and each
+/// engine.
 ///
 /// Thread-safe: no. Realtime-safe: no.
 class Reports {
@@ -28,8 +28,7 @@ class Reports {
     std::vector<std::string> warnings;
   };
 
-  /// Adds reports to the sessions of the guests if the last reports are at least one period old. Otherwise, this has no
-  /// effect.
+  /// Adds reports to the sessions of the guests if the last reports are at least one period old.
   Told turn(LocalTime now, std::vector<ServedDevice>& devices, std::vector<Guest>& guests);
 
  private:

@@ -114,7 +114,7 @@ Outcome couple(LocalTime /*now*/, const Asker& asker, const Couple& theirs) {
   return {.warning = "coupled with \"" + asker.guest.name + "\""};
 }
 
-/// Returns the reason why the device is not the leader of a coupling, or an empty string if it is.
+/// Returns an empty string if the device is the leader of a coupling.
 std::string no_leader(const ServedDevice& device, const char* does) {
   if (!device.coupling) return "this device has no [teleoperation]";
   if (device.coupling->role == PortRole::kLeader) return {};
@@ -208,7 +208,6 @@ Outcome set_output(LocalTime /*now*/, const Asker& asker, const SetOutput& wante
   return {};
 }
 
-/// Determines which clients can send a request.
 enum class From : std::uint8_t {
   kAnybody,
   kControllers,  ///< controllers of a channel of the device, even if it is held by another client
@@ -216,7 +215,7 @@ enum class From : std::uint8_t {
 };
 
 struct Row {
-  std::size_t index;  ///< of the request type in the variant
+  std::size_t index;
   std::string_view name;
   From from;
   bool (*may)(const Guest& guest, const Request& request);

@@ -13,7 +13,6 @@
 
 namespace tendon {
 
-/// The client that has sent a request, and the state that may be modified.
 struct Asker {
   Guest& guest;
   bool may_take_over = false;  ///< it does not need to wait until the lease expires
@@ -25,15 +24,14 @@ struct Asker {
 struct Outcome {
   Code code = Code::kOk;
   std::string detail{};
-  Duration wait{};                            ///< for kBusy and TakeLease; 0 if unknown
-  std::optional<DeviceDescription> device{};  ///< the result of Describe
-  std::optional<HandleDescription> handle{};  ///< the result of Describe for the handle
-  std::string warning{};                      ///< for the operator, may be empty
-  std::uint32_t loser = 0;                    ///< connection id of the previous holder, which must be notified
+  Duration wait{};  ///< for kBusy and TakeLease; 0 if unknown
+  std::optional<DeviceDescription> device{};
+  std::optional<HandleDescription> handle{};
+  std::string warning{};
+  std::uint32_t loser = 0;  ///< connection id of the previous holder, which must be notified
 };
 
-/// Processes a request and returns the reply. The table kRequests in requests.cc contains the name, the permissions and
-/// the handler of each request.
+/// Processes a request and returns the reply. See the table kRequests in requests.cc.
 ///
 /// Thread-safe: no. Realtime-safe: no.
 Outcome answer(LocalTime now, const Asker& asker, const Request& request);

@@ -10,8 +10,7 @@
 
 namespace tendon {
 
-/// Stores when the newest haptic steps of a device were sampled. It is used to find the time of the step that a force
-/// answers.
+/// Stores the times of the newest haptic steps of a device, to find the step that a force answers.
 ///
 /// Thread-safe: no. Realtime-safe: yes, except for the constructor.
 class SampledSteps {
@@ -19,21 +18,19 @@ class SampledSteps {
   static constexpr std::size_t kRemembered = 4096;  ///< 4 s at 1 kHz
 
   struct Step {
-    LocalTime at{};    ///< time of the sample
-    LocalTime sent{};  ///< when its state was sent
+    LocalTime at{};
+    LocalTime sent{};
   };
 
   SampledSteps() : steps_(kRemembered) {}
 
-  /// Adds the state with number `tick`, which was sampled at `at` and sent at `sent`. If some ticks were skipped, their
-  /// times are interpolated, because a client can also answer a predicted tick that was never seen by the network
-  /// thread.
+  /// If some ticks were skipped, their times are interpolated, because a client can also answer a predicted tick that
+  /// was never seen by the network thread.
   void observe(std::uint64_t tick, LocalTime at, LocalTime sent);
 
   /// Returns nothing if there was no such step, or if it is older than kRemembered steps.
   std::optional<Step> find(std::uint64_t tick) const;
 
-  /// Returns the newest tick, or 0 if there is none.
   std::uint64_t newest() const noexcept { return newest_; }
 
  private:

@@ -28,7 +28,7 @@ void leave_out_what_no_frame_carries(DeviceState& state) {
     state.joints.reset();
 }
 
-/// Removes all values of the handle except for the buttons.
+/// Keeps the buttons.
 void leave_out_handle(DeviceState& state) {
   state.turning.reset();
   state.torque_applied.reset();

@@ -6,9 +6,9 @@
 
 namespace tendon {
 
-/// Sends a state of a device to the guest. The state is not sent if the previous state is too recent for the guest's
-/// rate, or if the guest is the peer of a coupling. All fields that were not requested by the guest or do not fit into
-/// a frame are removed. Returns true if the guest can predict the state, in which case it is not sent (StateDeadband).
+/// Sends a state to the guest unless the previous state is too recent for its rate, or the guest is the peer of a
+/// coupling. Fields that were not requested or do not fit into a frame are removed. Returns true if the guest can
+/// predict the state, in which case it is not sent (StateDeadband).
 bool tell_state(Guest& guest, View& view, const DeviceState& state);
 
 }  // namespace tendon

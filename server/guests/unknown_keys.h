@@ -12,28 +12,24 @@
 
 namespace tendon {
 
-/// Logs the number of Hellos with an unknown key, and the address of the newest one. The server does not reply to these
-/// Hellos, so they can only be seen in the log. The first message is logged immediately, and then there is at most one
-/// message per minute.
+/// Logs the number of Hellos with an unknown key, and the newest address. The server does not reply to these Hellos, so
+/// they can only be seen in the log. After the first message, there is at most one message per minute.
 class UnknownKeys {
  public:
   static constexpr Duration kPeriod = std::chrono::minutes(1);
 
-  /// Returns the notice that is created by the network loop.
   static std::string notice(const Address& from) { return std::string(kNotice) + to_string(from); }
   static bool is_notice(std::string_view text) noexcept { return text.starts_with(kNotice); }
 
-  /// Returns false if the notice is not about an unknown key.
   bool take(std::string_view notice) {
     if (!is_notice(notice)) return false;
     newest_ = notice.substr(kNotice.size());
     return true;
   }
 
-  /// Returns true if a message should be logged.
   bool due(LocalTime now) const noexcept { return !newest_.empty() && now >= next_; }
 
-  /// Returns the message. `total` is the number of such Hellos since the start of the server.
+  /// `total` is the number of such Hellos since the start of the server.
   std::string line(LocalTime now, std::uint64_t total) {
     const std::uint64_t count = total - std::exchange(told_, total);
     next_ = now + kPeriod;
@@ -45,7 +41,7 @@ class UnknownKeys {
  private:
   static constexpr std::string_view kNotice = "a Hello with an unknown key from ";
 
-  std::string newest_;  ///< the newest address, or empty if it was logged
+  std::string newest_;
   std::uint64_t told_ = 0;
   LocalTime next_ = LocalTime::min();
 };

@@ -45,7 +45,7 @@ constexpr int kRunning = 2;
 
 /// µs. The delay before connecting to the D-Bus system bus again. No polling is required for avahi-daemon.
 constexpr std::uint64_t kTryAgain = 5'000'000;
-/// The maximum number of names that are tried for one device. If there are more collisions, this is probably an attack.
+/// More collisions are probably an attack.
 constexpr int kMostNames = 100;
 
 /// The functions of libsystemd, which is loaded when the first announcer is created.
@@ -103,7 +103,6 @@ bool same_ip(const sockaddr* address, const Address& ours) {
   return std::memcmp(&v6.sin6_addr, ours.ip.data(), ours.ip.size()) == 0;
 }
 
-/// Returns the index of the interface with this address, or kAnyInterface if there is none.
 int interface_of(const Address& address) {
   ifaddrs* all = nullptr;
   if (::getifaddrs(&all) != 0) return kAnyInterface;
@@ -146,10 +145,10 @@ class Announcer::Avahi {
   struct Entry {
     Avahi* avahi;
     Device device;
-    std::string name{};   ///< announced or tried
-    std::string group{};  ///< D-Bus path of its entry group, or empty
+    std::string name{};
+    std::string group{};
     int attempt = 1;
-    std::unique_ptr<sd_bus_slot, Release> question{};  ///< the pending call
+    std::unique_ptr<sd_bus_slot, Release> question{};
   };
 
   static int on_end(sd_event_source* source, int, std::uint32_t, void*) noexcept {
@@ -199,7 +198,6 @@ class Announcer::Avahi {
                   ". Expected a running avahi-daemon; clients find this server by " + "its address all the same");
   }
 
-  /// Schedules another attempt. This may be called from a callback of the bus.
   void no_bus(const std::string& why) {
     lost("there is no D-Bus system bus (" + why + ")");
     if (waits_) return;
@@ -265,7 +263,6 @@ class Announcer::Avahi {
       return no_bus("it is gone");
     }
     const std::unique_ptr<sd_bus_message, Release> message(made);
-    // If the domain and host are empty, Avahi uses its defaults.
     sd().bus_message_append(made, "iiussssq", interface_, protocol_, 0U, entry.name.c_str(), dns_sd::kService, "", "",
                             port_);
     sd().bus_message_open_container(made, 'a', "ay");
@@ -329,7 +326,7 @@ class Announcer::Avahi {
   int interface_;
   int protocol_;
   Say say_;
-  std::string said_;  ///< the last warning
+  std::string said_;
   bool waits_ = false;
   Doorbell end_;
   std::unique_ptr<sd_event, Release> loop_;

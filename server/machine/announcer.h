@@ -36,13 +36,12 @@ class Announcer {
   Announcer(const Announcer&) = delete;
   Announcer& operator=(const Announcer&) = delete;
 
-  /// Blocks until stop() is called.
   void run();
   /// Thread-safe: yes. If stop() is called first, run() returns immediately.
   void stop() noexcept;
 
  private:
-  class Avahi;  // hides libsystemd
+  class Avahi;
   std::unique_ptr<Avahi> avahi_;
 };
 

@@ -11,13 +11,12 @@
 
 namespace tendon {
 
-/// Stores the local address to which each peer has sent its newest datagram. If a socket is bound to all addresses, it
-/// has to reply from this address. Otherwise, the kernel chooses the source address based on the route, and the reply
-/// is dropped by the peer because it comes from an unknown address.
+/// Stores the local address to which each peer has sent its newest datagram. A socket that is bound to all addresses
+/// has to reply from this address. Otherwise, the kernel chooses the source address, and the peer drops the reply
+/// because the address is unknown.
 ///
-/// The size of the table is fixed. If two peers have the same entry, the older one is overwritten. For this peer, the
-/// kernel then chooses the address until the next datagram arrives. The hash is salted, so collisions cannot be
-/// predicted by a peer.
+/// The size of the table is fixed. A collision overwrites the older entry until the next datagram arrives. The hash is
+/// salted, so collisions cannot be predicted by a peer.
 ///
 /// Thread-safe: yes.
 class AskedAt {

@@ -16,10 +16,8 @@ LocalTime now() noexcept;
 /// Sleeps until an absolute time to avoid the accumulation of errors.
 void sleep_until(LocalTime deadline) noexcept;
 
-/// Returns the processor time that has been used by the calling thread.
 Duration processor_time() noexcept;
 
-/// Returns the difference between Unix time and local time. This is used to convert times in recordings to dates.
 Duration unix_offset() noexcept;
 
 }  // namespace clock

@@ -5,9 +5,8 @@
 
 namespace tendon {
 
-/// Wakes a waiting thread from another thread or from a signal handler, using an eventfd. For example, the haptic
-/// thread calls `ring` after each step, and the network thread waits for this and for its socket. Multiple rings are
-/// counted as one until `answer` is called.
+/// Wakes a waiting thread from another thread or from a signal handler, using an eventfd. Multiple rings are counted as
+/// one until `answer` is called.
 class Doorbell {
  public:
   /// Throws std::system_error if there are no file descriptors left.
@@ -20,18 +19,17 @@ class Doorbell {
   /// does not block.
   void ring() noexcept;
 
-  /// Returns true if there is an unanswered ring. This is for threads that do not sleep. It does not make a system
-  /// call.
+  /// Returns true if there is an unanswered ring, without a system call.
   bool rung() const noexcept { return rung_.load(std::memory_order_acquire); }
 
-  /// Resets the bell. This must be called if the caller waits for fd() itself. UdpLink::wait calls it automatically.
+  /// Resets the bell. UdpLink::wait calls this automatically.
   void answer() noexcept;
 
-  /// This is readable while there is an unanswered ring, for use with poll().
+  /// Readable while there is an unanswered ring.
   int fd() const noexcept { return fd_; }
 
  private:
-  static_assert(std::atomic<bool>::is_always_lock_free);  // used in signal handlers
+  static_assert(std::atomic<bool>::is_always_lock_free);
   int fd_;
   std::atomic<bool> rung_{false};
 };

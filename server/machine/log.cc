@@ -22,10 +22,9 @@ namespace {
 
 struct Level {
   std::string_view name;
-  std::string_view color;  ///< ANSI color code
+  std::string_view color;
 };
 
-/// Returns the local time of day, for example 07:00:00.123.
 std::string time_of_day(LocalTime now) {
   const Duration unix_time = now.time_since_epoch() + clock::unix_offset();
   const std::time_t second = std::chrono::floor<std::chrono::seconds>(unix_time).count();

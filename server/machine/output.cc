@@ -29,13 +29,11 @@
 namespace tendon {
 namespace {
 
-/// The number of bytes that can be written to a pipe without blocking if poll(2) reports that it is writable. This is
-/// PIPE_BUF on Linux.
+/// PIPE_BUF on Linux. poll(2) guarantees that this number of bytes can be written without blocking.
 constexpr std::size_t kWrite = 4096;
 /// The polling period if none of the streams is writable.
 constexpr int kLook_ms = 20;
 
-/// The output that has not been written yet. Thread-safe.
 class Queue {
  public:
   explicit Queue(std::array<int, 2> files) : files_(files) {}
@@ -58,7 +56,6 @@ class Queue {
       const auto next = std::ranges::find_if(waiting_, [&](const Chunk& chunk) { return ready[chunk.stream]; });
       if (next == waiting_.end()) continue;
       const std::size_t stream = next->stream;
-      // This chunk must not be changed by `push`.
       next->begun = true;
       const std::string part = next->text.substr(0, kWrite);
       lock.unlock();
@@ -71,7 +68,6 @@ class Queue {
     }
   }
 
-  /// Waits until the queue is empty. Returns false if no output is written for `patience`.
   bool finish(std::chrono::duration<double> patience) {
     std::unique_lock lock(mutex_);
     for (const std::size_t stream : {0U, 1U}) tell_of_dropped(stream);
@@ -104,7 +100,7 @@ class Queue {
     std::array<pollfd, 2> polled{};
     for (const std::size_t stream : {0U, 1U}) polled[stream] = {has[stream] ? files_[stream] : -1, POLLOUT, 0};
     ::poll(polled.data(), polled.size(), kLook_ms);
-    return {polled[0].revents != 0, polled[1].revents != 0};  // this includes errors, which are handled by `write`
+    return {polled[0].revents != 0, polled[1].revents != 0};
   }
 
   void add_line(std::size_t stream, std::string_view text) {
@@ -137,8 +133,7 @@ class Queue {
     streams_[stream].bytes += text.size();
   }
 
-  /// Removes the bytes that have been written. If the output cannot be written, for example because the disk is full,
-  /// the chunk is dropped.
+  /// If the output cannot be written, for example because the disk is full, the chunk is dropped.
   void remove(std::size_t stream, std::optional<std::size_t> written) {
     const auto first = std::ranges::find_if(waiting_, [&](const Chunk& chunk) { return chunk.stream == stream; });
     const std::size_t bytes = written.value_or(first->text.size());
@@ -151,7 +146,7 @@ class Queue {
   struct Stream {
     std::size_t bytes = 0;
     std::uint64_t dropped = 0;
-    bool json = false;  ///< the last dropped line was JSON
+    bool json = false;
   };
 
   std::array<int, 2> files_;
@@ -163,7 +158,6 @@ class Queue {
   bool ended_ = false;
 };
 
-/// Buffers the text of a stream until the line is complete.
 class Lines : public std::streambuf {
  public:
   Lines(Queue& queue, std::size_t stream) : queue_(queue), stream_(stream) {}
@@ -188,7 +182,6 @@ class Lines : public std::streambuf {
   }
 
  private:
-  /// Each line must be added separately because the dropped lines are counted.
   void take(std::size_t size) {
     std::string_view text(partial_.data(), size);
     while (!text.empty()) {

@@ -6,14 +6,12 @@
 
 namespace tendon {
 
-/// Allows a program to print without waiting for the reader of its output. Otherwise, the program would block if nobody
-/// reads from the pipe, or if the user has pressed Ctrl-S in the terminal.
+/// Allows a program to print even if nobody reads from the pipe, or if the user has pressed Ctrl-S in the terminal.
 ///
-/// While an object of this class exists, the output of std::cout and std::cerr is added to a queue, which is written by
-/// a separate thread. It is added if a line is complete or if the stream is flushed. The size of the queue is limited
-/// to kQueueBytes for each stream. If it is full, new lines are dropped until half of it has been written. Then, the
-/// number of dropped lines is written as "312 lines were dropped: nobody read them", or as
-/// {"event":"dropped","lines":312} if the last line was a JSON object.
+/// While an object of this class exists, the output of std::cout and std::cerr is written by a separate thread. It is
+/// added to a queue if a line is complete or if the stream is flushed. If the queue of a stream is full, new lines are
+/// dropped until half of it has been written. Then, the number of dropped lines is written as "312 lines were dropped:
+/// nobody read them", or as {"event":"dropped","lines":312} if the last line was a JSON object.
 ///
 /// The destructor waits until the queue is empty, or until nothing has been written for kPatience_s. If there is
 /// already an object of this class, another one has no effect. The constructor throws std::runtime_error if the thread
@@ -31,12 +29,11 @@ class UnblockedOutput {
   UnblockedOutput(const UnblockedOutput&) = delete;
   UnblockedOutput& operator=(const UnblockedOutput&) = delete;
 
-  /// Waits for the queue like the destructor.
   void flush();
 
  private:
   class Redirection;
-  std::unique_ptr<Redirection> redirection_;  ///< null if there is another object
+  std::unique_ptr<Redirection> redirection_;
 };
 
 }  // namespace tendon

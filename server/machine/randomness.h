@@ -6,8 +6,8 @@
 
 namespace tendon {
 
-/// Fills the buffer, which must not exceed 256 bytes, with random bytes from the system. They can be used for keys.
-/// Throws std::system_error if this is not possible.
+/// Fills up to 256 bytes with cryptographically secure random numbers. Throws std::system_error if this is not
+/// possible.
 void fill_random(std::span<std::byte> bytes);
 
 }  // namespace tendon

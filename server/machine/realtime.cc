@@ -24,7 +24,6 @@ namespace tendon {
 
 namespace {
 
-// Touches the part of the stack that is used by the loop to avoid page faults.
 void touch_stack() {
   constexpr std::size_t kBytes = 128 * 1024;
   constexpr std::size_t kPage = 4096;
@@ -36,7 +35,7 @@ struct Mapping {
   std::uintptr_t from = 0;
   std::uintptr_t to = 0;
   bool readable = false;
-  std::string of;  ///< the file, "[heap]", or empty
+  std::string of;
 };
 
 std::vector<Mapping> mappings() {
@@ -55,8 +54,7 @@ std::vector<Mapping> mappings() {
   return found;
 }
 
-/// Returns true if the memory may be used by a haptic step. This excludes the libraries that are only used by the
-/// network and log threads.
+/// Excludes the libraries that are only used by the network and log threads.
 bool is_of_a_step(const Mapping& mapping, const std::string& program) {
   if (mapping.of == program || mapping.of == "[heap]") return true;
   constexpr std::array<std::string_view, 2> kLibraries = {"libc.so", "libm.so"};
@@ -68,18 +66,15 @@ bool is_of_a_step(const Mapping& mapping, const std::string& program) {
 int lock_memory() {
   if (mlockall(MCL_CURRENT | MCL_FUTURE | MCL_ONFAULT) != 0) return errno;
   const std::vector<Mapping> all = mappings();
-  // If /proc is not available, load everything.
   if (all.empty()) return mlockall(MCL_CURRENT | MCL_FUTURE) == 0 ? 0 : errno;
   const std::string& program = all.front().of;
-  // This is true if the previous mapping was locked. The zero-initialized variables of a program are in the next
-  // mapping.
+  // The zero-initialized variables of a program are in the mapping after it.
   bool before = false;
   std::uintptr_t below = 0;
   for (const Mapping& mapping : all) {
     const bool goes_on = before && mapping.of.empty() && mapping.from == below;
     before = mapping.readable && (goes_on || is_of_a_step(mapping, program));
     below = mapping.to;
-    // The address was parsed from the file.
     if (before && mlock(reinterpret_cast<const void*>(mapping.from), mapping.to - mapping.from) != 0) return errno;
   }
   return 0;
@@ -88,8 +83,7 @@ int lock_memory() {
 }  // namespace
 
 void use_small_stacks() {
-  // A haptic thread touches 136 kB. Network and log threads were measured to use 16 kB, including sessions and a
-  // recording.
+  // A haptic thread touches 136 kB. Network and log threads have used 16 kB in a measurement.
   constexpr std::size_t kBytes = 256 * 1024;
   pthread_attr_t usual;
   if (pthread_getattr_default_np(&usual) != 0) return;
@@ -98,7 +92,7 @@ void use_small_stacks() {
     if (pthread_attr_setstacksize(&small, kBytes) == 0 && pthread_setattr_default_np(&small) == 0) {
       try {
         std::thread([] {}).join();
-      } catch (const std::system_error&) {  // thread-local data is also on the stack
+      } catch (const std::system_error&) {
         pthread_setattr_default_np(&usual);
       }
     }
@@ -154,7 +148,7 @@ std::optional<std::string> stay_on(std::uint32_t cpu) {
 WakefulProcessors::WakefulProcessors(const std::filesystem::path& file)
     : file_(open(file.c_str(), O_WRONLY | O_CLOEXEC)) {
   if (file_ < 0 && errno == ENOENT) return;
-  const std::int32_t none = 0;  // µs
+  const std::int32_t none = 0;
   held_ = file_ >= 0 && write(file_, &none, sizeof none) == static_cast<ssize_t>(sizeof none);
   if (held_) return;
   refused_ = "processors may sleep deep (" + file.string() + ": " + std::system_category().message(errno) +

@@ -12,22 +12,21 @@
 
 namespace tendon {
 
-/// Thrown if a file cannot be read. The message is "cannot read WHAT: REASON".
+/// The message is "cannot read WHAT: REASON".
 class UnreadableFile : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
 
-/// Opens a regular file, or a symbolic link to one, for reading in binary mode. All other files are refused before they
-/// are opened, because opening a named pipe would block until there is a writer, and a device may be infinite.
+/// Opens a regular file, or a symbolic link to one, for reading. All other files are refused before they are opened,
+/// because opening a named pipe would block, and a device may be infinite.
 ///
-/// Throws UnreadableFile. If `kind` is not empty, it is prepended to the name of the file, for example "cannot read
-/// recording run.mcap: it is a named pipe, expected a regular file".
+/// Throws UnreadableFile. `kind` is prepended to the name of the file, for example "cannot read recording run.mcap: it
+/// is a named pipe, expected a regular file".
 ///
 /// Thread-safe: yes. Realtime-safe: no.
 std::ifstream open_regular_file(const std::filesystem::path& file, std::string_view kind = {});
 
-/// Returns the reason why a file with this `st_mode` is refused, or nothing if it is a regular file.
 std::optional<std::string> why_not_regular(mode_t mode);
 
 }  // namespace tendon

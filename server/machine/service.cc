@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Implements the protocols of sd_notify(3) and sd_watchdog_enabled(3). This avoids a dependency on libsystemd, which
-// would load seven libraries.
+// Implements sd_notify(3) and sd_watchdog_enabled(3) without libsystemd, which would load seven libraries.
 #include "server/machine/service.h"
 
 #include <sys/socket.h>
@@ -19,13 +18,11 @@
 namespace tendon::service {
 namespace {
 
-/// Returns an empty string if it is not set.
 std::string_view variable(const char* name) {
   const char* const value = std::getenv(name);  // NOLINT(concurrency-mt-unsafe): nobody sets it
   return value == nullptr ? std::string_view() : value;
 }
 
-/// Returns nothing if it is not set or if it is not a positive integer.
 std::optional<std::int64_t> number(const char* name) {
   const std::string_view text = variable(name);
   std::int64_t value = 0;

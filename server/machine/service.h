@@ -12,8 +12,8 @@ namespace tendon::service {
 void ready();
 void stopping();
 
-/// Returns the period at which `alive` must be called. This is half of WatchdogSec=, after which the process would be
-/// killed. Returns nothing if the watchdog is not enabled for this process.
+/// Returns half of WatchdogSec=, or nothing if the watchdog is not enabled for this process. `alive` must be called at
+/// this period.
 std::optional<Duration> watch_period();
 void alive();
 

@@ -25,13 +25,11 @@ namespace {
 
 using asio::ip::udp;
 
-/// The size of the receive buffer of the kernel. The virtual machines that were tested pause for up to 36 ms. In this
-/// time, 10 clients at 1 kHz send 360 datagrams, and each datagram requires up to 2.3 kB in the kernel. The size is
-/// silently limited to net.core.rmem_max.
+/// Bytes. The virtual machines that were tested pause for up to 36 ms. In this time, 10 clients at 1 kHz send 360
+/// datagrams, which require up to 2.3 kB each in the kernel. The size is silently limited to net.core.rmem_max.
 constexpr int kReceiveBufferBytes = 1 << 20;
 
-/// The maximum number of empty datagrams that are skipped in one call, so that a flood does not prevent us from
-/// sending.
+/// Limits the time in receive() during a flood.
 constexpr int kMaxEmptyDatagrams = 64;
 
 udp::endpoint to_endpoint(const Address& address) {
@@ -56,7 +54,7 @@ void set(int fd, int option, const Value& value, int level = SOL_SOCKET) {
 
 struct Message {
   Message(std::span<const std::byte> datagram, udp::endpoint& peer, std::size_t peer_size)
-      : piece_{const_cast<std::byte*>(datagram.data()), datagram.size()} {  // not modified by sendmsg
+      : piece_{const_cast<std::byte*>(datagram.data()), datagram.size()} {
     header.msg_name = peer.data();
     header.msg_namelen = static_cast<socklen_t>(peer_size);
     header.msg_iov = &piece_;
@@ -95,7 +93,6 @@ struct Message {
   alignas(cmsghdr) std::array<char, local_address::kControlBytes> control_{};
 };
 
-/// Allows other sockets of the same user to have the same address.
 void share_address(int fd) { set(fd, SO_REUSEPORT, int{1}); }
 
 /// Attaches the filter that is described at UdpLink::several. If a datagram is too short, the filter returns 0, which
@@ -114,8 +111,8 @@ void steer_by_connection(int fd, std::uint32_t count) {
   set(fd, SO_ATTACH_REUSEPORT_CBPF, sock_fprog{static_cast<unsigned short>(program.size()), program.data()});
 }
 
-/// Creates a socket and releases it from Asio. Otherwise, Asio would watch it with an epoll instance, which would be
-/// notified for each datagram. Throws std::system_error.
+/// Otherwise, Asio would watch the socket with an epoll instance, which would be notified for each datagram. Throws
+/// std::system_error.
 int socket_on(const udp::endpoint& endpoint, bool shares_address) {
   asio::io_context context;
   udp::socket socket(context, endpoint.protocol());
@@ -229,7 +226,6 @@ std::size_t UdpLink::receive_from_network(Address& from, std::span<std::byte> bu
 LocalTime UdpLink::present(LocalTime now) const { return std::max(now, clock::now()); }
 
 void UdpLink::wait(Duration timeout, Doorbell* doorbell) {
-  // Entries with a negative descriptor are ignored by poll().
   std::array<pollfd, 3> fds = {pollfd{fd_, POLLIN, 0}, pollfd{doorbell != nullptr ? doorbell->fd() : -1, POLLIN, 0},
                                pollfd{unix_ ? unix_->fd() : -1, POLLIN, 0}};
   const Duration left = std::max(timeout, Duration::zero());

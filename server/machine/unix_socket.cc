@@ -20,7 +20,7 @@
 namespace tendon {
 namespace {
 
-/// The maximum number of datagrams that are skipped in one call, so that a flood does not prevent us from sending.
+/// Limits the time in receive() during a flood.
 constexpr int kMaxSkips = 64;
 
 constexpr std::size_t kNameStart = offsetof(sockaddr_un, sun_path);
@@ -31,7 +31,6 @@ constexpr std::size_t kNameBytes = kNameStart + 1 + kDigits;
 /// The prefix of all addresses that represent peers. Only the first 12 bits of the IPv4 address are used.
 constexpr std::array<std::uint8_t, 14> kPeers = {0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0xff, 0xff, 127, 240};
 
-/// Returns nothing if this is not a name that was assigned by the kernel.
 std::optional<Address> address_of(const sockaddr_un& name, socklen_t length) {
   if (length != kNameBytes || name.sun_path[0] != '\0') return std::nullopt;
   std::uint32_t number = 0;

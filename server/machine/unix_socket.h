@@ -13,27 +13,25 @@ namespace tendon {
 
 /// A datagram socket for engines on the same machine. Access is controlled by the permissions of its file.
 ///
-/// The file is owned by the user and group of this process, and its mode is 0660. A peer is identified by the name that
-/// was assigned to its socket by the kernel (autobind, see unix(7)). This name has 20 bits. It is mapped to an address
-/// in the range 127.240.0.0 to 127.255.255.255 with port 0, which cannot be the source of a datagram from the network.
-/// If a peer is in another network namespace, for example in a container, it cannot receive replies because its name
-/// belongs to that namespace.
+/// The file is owned by the user and group of this process, and its mode is 0660. A peer is identified by the 20-bit
+/// name that was assigned to its socket by the kernel (autobind, see unix(7)). The name is mapped to an address from
+/// 127.240.0.0 to 127.255.255.255 with port 0, which cannot be the source of a datagram from the network. Peers in
+/// other network namespaces, for example in a container, cannot receive replies.
 ///
 /// Thread-safe: no. Realtime-safe: no (system calls).
 class UnixSocket {
  public:
   static constexpr std::size_t kMostPath = 107;  ///< bytes, limited by sockaddr_un
 
-  /// Creates the file. If a previous server was killed and has left a file behind, it is replaced. Throws
-  /// std::runtime_error if another server uses the file, if it is not a socket, if the path is longer than kMostPath,
-  /// or if the system refuses, for example "cannot listen on unix:/run/x: Permission denied".
+  /// Creates the file, or replaces a file that was left behind by a server. Throws std::runtime_error if another server
+  /// uses the file, if it is not a socket, if the path is too long, or if the system refuses, for example "cannot
+  /// listen on unix:/run/x: Permission denied".
   explicit UnixSocket(std::filesystem::path path);
   /// Removes the file unless it was replaced by another process.
   ~UnixSocket();
   UnixSocket(const UnixSocket&) = delete;
   UnixSocket& operator=(const UnixSocket&) = delete;
 
-  /// Returns true if this address represents a peer of a Unix socket.
   static bool is_peer(const Address& address) noexcept;
 
   /// Returns false if the datagram was dropped because the peer is gone or its queue is full. The default length of the
@@ -55,7 +53,7 @@ class UnixSocket {
   void bind_to_file();
 
   std::filesystem::path path_;
-  std::optional<Inode> inode_;  ///< set if the file was created
+  std::optional<Inode> inode_;
   int fd_ = -1;
 };
 

@@ -11,9 +11,7 @@
 
 namespace tendon {
 
-/// Describes a file with a recorded motion. The file is a table for `TableReader` with one sample per row.
 struct RecordedMotionFile {
-  /// The name or the index of a column.
   using Column = std::variant<std::string, std::size_t>;
 
   std::filesystem::path path;        ///< used in error messages
@@ -28,10 +26,9 @@ struct RecordedMotionFile {
 /// The maximum number of samples, which is 33 minutes at 2 kHz or 64 MB. It protects against files of the wrong type.
 inline constexpr std::size_t kMaxRecordedSamples = 4'000'000;
 
-/// Reads a recorded motion from `csv`, which must be the content of `file.path`. This requires memory for all samples,
-/// so it must be called before the loop runs. Throws std::runtime_error "PATH:LINE: expected …, found …" if the table
-/// is not valid, if a column is missing, if the time does not increase, or if the number of samples is less than 2 or
-/// too large.
+/// Reads a recorded motion from `csv`, which must be the content of `file.path`. This requires memory for all samples.
+/// Throws std::runtime_error "PATH:LINE: expected …, found …" if the table is not valid, if a column is missing, if the
+/// time does not increase, or if the number of samples is less than 2 or too large.
 ScriptedMotion::Recorded load_recorded_motion(std::istream& csv, const RecordedMotionFile& file);
 
 }  // namespace tendon

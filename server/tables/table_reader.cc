@@ -32,7 +32,6 @@ std::string lower(std::string_view text) {
   return result;
 }
 
-/// Quotes and truncates a text for an error message.
 std::string shown(std::string_view text) {
   constexpr std::size_t kShown = 60;
   return "'" + std::string(text.substr(0, kShown)) + (text.size() > kShown ? "…'" : "'");
@@ -86,7 +85,7 @@ bool is_plain_name(std::string_view text) {
 enum class Kind { kTime, kLength, kForce, kTorque, kAngle };
 
 struct Unit {
-  std::string_view symbol;  ///< in lowercase
+  std::string_view symbol;
   Kind kind;
   double per_si;
 };
@@ -125,7 +124,6 @@ struct Named {
   const Unit* unit = nullptr;
 };
 
-/// Parses "x_mm", "X [mm]", "x (mm)" and "x/mm".
 Named named(std::string_view cell) {
   const std::string name = lower(trimmed(cell));
   const std::string_view all = name;
@@ -336,7 +334,7 @@ std::optional<TableReader::Column> TableReader::find(std::string_view name) cons
 
 TableReader::Column TableReader::column(std::string_view name) const {
   if (const auto found = find(name)) return *found;
-  return {.index = index_of(name)};  // always throws
+  return {.index = index_of(name)};
 }
 
 TableReader::Column TableReader::column(std::size_t index, std::string_view unit) const {

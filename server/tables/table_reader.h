@@ -11,21 +11,18 @@
 
 namespace tendon {
 
-/// Reads a table of numbers from a text file, one row at a time. It supports the formats that are commonly written by
-/// loggers and spreadsheets:
+/// Reads a table of numbers from a text file, one row at a time:
 ///
 /// - UTF-8 byte order marks, blank lines, lines that start with #, and blanks around cells are ignored. Lines can end
 ///   with CR LF.
-/// - The separator can be a semicolon, a tab or a comma. If the first line contains several of these, the first in this
-///   list is used. Separators in quotes are ignored. If the first line only contains numbers and simple names, the
-///   separator can be a blank.
-/// - Cells can be quoted with double quotes. Inside quotes, "" represents a single quote character. Line breaks are not
+/// - The separator is the first of semicolon, tab and comma that is in the first line, except in quotes. If the first
+///   line only contains numbers and simple names, it can also be a blank.
+/// - Cells can be quoted with double quotes. Inside quotes, "" is a single quote character. Line breaks are not
 ///   allowed.
-/// - Numbers can have a decimal point. If the separator is not a comma, they can also have a decimal comma, but a file
-///   must not use both. Thousands separators are not allowed. In quotes or in a tab-separated file, `1,012` could mean
-///   1.012 or 1012. This is an error unless an earlier number shows that the comma is a decimal comma.
-/// - The first line is a header if none of its cells is a number. All rows must have the same number of cells as the
-///   first line.
+/// - Numbers can have a decimal point. If the separator is not a comma, they can have a decimal comma instead.
+///   Thousands separators are not allowed. In quotes or in a tab-separated file, `1,012` could mean 1.012 or 1012. This
+///   is an error unless an earlier number shows that the comma is a decimal comma.
+/// - The first line is a header if none of its cells is a number. All rows must have the same number of cells.
 ///
 /// All errors are reported as std::runtime_error with the message "NAME:LINE: what was expected, what was found". After
 /// an error in a row, the next row can be read. The reader does not read past the end of the current line, so it can be
@@ -39,7 +36,7 @@ class TableReader {
     bool trailing_comments = false;
   };
 
-  /// The maximum length of a line in bytes. It protects against binary files.
+  /// Bytes. Protects against binary files.
   static constexpr std::size_t kMaxLine = 65'536;
 
   /// Reads the first nonblank line. `name` is used in error messages.
@@ -54,14 +51,10 @@ class TableReader {
     double divide = 1;
   };
 
-  /// Returns the names of the columns, or an empty vector if there is no header.
   const std::vector<std::string>& names() const noexcept { return names_; }
-  /// Returns the text of the header or, if there is none, of the first row.
   const std::string& first_line() const noexcept { return first_line_; }
   char separator() const noexcept { return separator_; }
-  /// Returns the number of cells in each row, or 0 if the table is empty.
   std::size_t width() const noexcept { return width_; }
-  /// Returns the number of the current line, starting at 1.
   std::size_t line() const noexcept { return line_number_; }
 
   /// Returns the column with this name, for example "x_mm". If it does not exist, a column with the same name and a
@@ -69,27 +62,21 @@ class TableReader {
   /// "x/m". The names "time" and "timestamp" are equivalent to "t". Returns nothing if there is no such column. Throws
   /// an error if there are two.
   std::optional<Column> find(std::string_view name) const;
-  /// Like find(), but throws an error if there is no such column.
   Column column(std::string_view name) const;
   /// Returns the column with this index. If the header specifies another compatible unit, the numbers are converted to
   /// `unit`.
   Column column(std::size_t index, std::string_view unit) const;
-  /// Returns the index of the column with exactly this name. Throws an error if there is no such column or if there are
-  /// two.
+  /// Throws an error if there is no column with exactly this name, or if there are two.
   std::size_t index_of(std::string_view name) const;
 
-  /// Reads the next row. Returns false if there are no more rows.
   bool next_row();
 
-  /// Returns the text of a cell in the current row, without quotes.
   std::string_view text(std::size_t column) const { return cells_.at(column).text; }
-  /// Returns a number from the current row, or nothing if the cell is empty. Throws an error if it is not a finite
-  /// number.
+  /// Returns nothing if the cell is empty. Throws an error if it is not a finite number.
   std::optional<double> number(const Column& column);
-  /// Like number(), but throws an error if the cell is empty.
   double needed_number(const Column& column);
 
-  /// Throws an error with the number of the current line. Control characters are replaced.
+  /// Throws an error with the current line. Control characters are replaced.
   [[noreturn]] void fail(std::string sentence) const;
 
  private:
@@ -108,7 +95,7 @@ class TableReader {
   std::istream& from_;
   std::string name_;
   Options options_;
-  std::vector<char> buffer_ = std::vector<char>(kMaxLine + 1);  ///< the current line and a null byte
+  std::vector<char> buffer_ = std::vector<char>(kMaxLine + 1);
   std::size_t line_number_ = 0;
   char separator_ = ',';
   std::vector<std::string> names_;
@@ -116,7 +103,7 @@ class TableReader {
   std::size_t width_ = 0;
   std::vector<Cell> cells_;  ///< the current row; points to buffer_ and unquoted_
   std::string unquoted_;
-  bool first_row_waits_ = false;        ///< the first row has not been returned yet
+  bool first_row_waits_ = false;
   std::size_t decimal_point_line_ = 0;  ///< line of the first decimal point, or 0
   std::size_t decimal_comma_line_ = 0;
 };
