@@ -31,7 +31,7 @@ FileSink::Opened FileSink::open(const std::filesystem::path& path) {
     throw std::runtime_error("cannot write recording " + path.string() + ": " + why);
   };
   // O_APPEND is required because an incomplete piece may be removed. O_NONBLOCK prevents us from waiting for the reader
-  // of a pipe, which is refused later. It has no effect on regular files.
+  // of a pipe, and has no effect on regular files.
   constexpr int kFlags = O_WRONLY | O_APPEND | O_CLOEXEC | O_NONBLOCK | O_NOCTTY;
   int descriptor = ::open(path.c_str(), kFlags | O_CREAT | O_EXCL, 0644);
   if (descriptor < 0 && errno == EEXIST) descriptor = ::open(path.c_str(), kFlags);

@@ -11,22 +11,20 @@
 
 namespace tendon {
 
-/// The destination of a recording. Data is appended in complete pieces.
 ///
 /// Thread-safe: no. Realtime-safe: no.
 class ByteSink {
  public:
   virtual ~ByteSink() = default;
 
-  /// Appends all bytes and returns true. If this is not possible, it returns false and removes the incomplete piece if
-  /// it can, so that the data ends with a complete piece.
+  /// Appends all bytes and returns true. Otherwise, returns false and removes the incomplete piece if possible, so that
+  /// the data ends with a complete piece.
   virtual bool append(std::span<const std::byte> bytes) = 0;
 
-  /// Returns the error message of the last failed `append`, or an empty string if there was no error.
   virtual std::string error() const = 0;
 };
 
-/// Stores a recording in memory. This is used for simulated worlds.
+/// Used for simulated worlds.
 class MemorySink final : public ByteSink {
  public:
   bool append(std::span<const std::byte> bytes) override;
@@ -38,21 +36,20 @@ class MemorySink final : public ByteSink {
 };
 
 /// Writes to a new file. Existing data is never modified. Each piece is written immediately, so no data is lost if the
-/// process is killed. However, it can be lost in a power failure. If there is not enough space for a piece, the
-/// incomplete piece is removed. `append` fails if the file has been deleted or truncated.
+/// process is killed, but it can be lost in a power failure. If the disk is full, an incomplete piece is removed.
 ///
-/// Character devices like /dev/null and /dev/full can be used by several sinks at the same time. Pipes, sockets, block
-/// devices and directories are refused, because a recording must be a file, and writing to a pipe could block.
+/// Character devices like /dev/null and /dev/full can be used by several sinks. Pipes, sockets, block devices and
+/// directories are refused.
 class FileSink final : public ByteSink {
  public:
-  /// Creates the file. An empty file can be used if there is no other sink that writes to it. Throws std::runtime_error
-  /// if the file is not empty or is not writable.
+  /// Creates the file, or uses an empty file that is not used by another sink. Throws std::runtime_error if the file is
+  /// not empty or is not writable.
   explicit FileSink(const std::filesystem::path& path);
   ~FileSink() override;
   FileSink(const FileSink&) = delete;
   FileSink& operator=(const FileSink&) = delete;
 
-  /// Like the constructor, but returns null if the file is not empty or is used by another sink.
+  /// Like the constructor, but returns null if the file is not empty or is in use.
   static std::unique_ptr<FileSink> open_new(const std::filesystem::path& path);
 
   bool append(std::span<const std::byte> bytes) override;

@@ -8,16 +8,14 @@
 
 namespace tendon {
 
-/// Selects the datagrams that are recorded. The limits prevent an attacker from filling the disk or the queue of the
-/// log thread.
+/// Selects the datagrams that are recorded, so that an attacker cannot fill the disk or the queue of the log thread.
 ///
 /// * Datagrams that do not belong to a client ("strangers") can be sent by anybody. The first `strangers_per_s` of each
 ///   second are recorded. A normal handshake consists of four datagrams.
-/// * All datagrams of clients are recorded, up to `bytes_per_s`. The default is 10 times the rate of a 1 kHz engine and
-///   an observer.
+/// * Datagrams of clients are recorded up to `bytes_per_s`, which is 10 times the rate of a 1 kHz engine and an
+///   observer.
 ///
-/// The caller must count the datagrams that are not recorded. A second starts with the first datagram after the end of
-/// the previous second.
+/// The caller must count the other datagrams. A second starts with the first datagram after the previous second.
 ///
 /// Thread-safe: no. Realtime-safe: yes.
 class DatagramSieve {
@@ -29,20 +27,20 @@ class DatagramSieve {
   enum class Sender : std::uint8_t { kGuest, kStranger };
   enum class Verdict : std::uint8_t {
     kRecord,
-    kStranger,    ///< the limit for strangers was exceeded
-    kOverBudget,  ///< `bytes_per_s` was exceeded
+    kStranger,
+    kOverBudget,
   };
 
   explicit DatagramSieve(const Config& config) noexcept : config_(config) {}
 
-  /// Must be called for each datagram. `size` is the size on the wire in bytes. `now` must not decrease.
+  /// `size` is in bytes on the wire. `now` must not decrease.
   Verdict judge(LocalTime now, Sender sender, std::size_t size) noexcept;
 
  private:
   Config config_;
   LocalTime second_ends_ = LocalTime::min();
   std::uint32_t strangers_ = 0;  ///< recorded in this second
-  std::uint64_t bytes_ = 0;      ///< recorded in this second
+  std::uint64_t bytes_ = 0;
 };
 
 }  // namespace tendon

@@ -13,21 +13,18 @@
 
 namespace tendon {
 
-/// Returns the path for the steps before a fault of a device. For a recording `run.mcap`, this is `run.fault-1.mcap` in
-/// the same directory. If there is no recording, or if it is a device or a pipe, this is `tendon.fault-1.mcap` in the
-/// working directory. If there are several devices, the name of the device is included, for example
-/// `run.left.fault-1.mcap`. Otherwise, `device` must be empty.
+/// Returns the path for the steps before a fault. For a recording `run.mcap`, this is `run.fault-1.mcap`. If there is
+/// no recording, or if it is a device or a pipe, this is `tendon.fault-1.mcap` in the working directory. If `device` is
+/// not empty, it is included, for example `run.left.fault-1.mcap`. It must be empty if there is only one device.
 std::filesystem::path flight_path(const std::optional<std::filesystem::path>& recording, const std::string& device,
                                   int number);
 
-/// Creates the file for a fault. The number is the first one that does not exist yet, so the files of earlier runs are
-/// kept. Throws std::runtime_error if the file cannot be created. Log thread only.
+/// Creates the file with the first number that does not exist yet, so the files of earlier runs are kept. Throws
+/// std::runtime_error if the file cannot be created. Log thread only.
 std::unique_ptr<FileSink> open_flight(const std::optional<std::filesystem::path>& recording, const std::string& device);
 
-/// Writes the steps before a fault to a new recording.
-///
-/// `flight` must be frozen. It is not modified. Throws std::runtime_error if an error occurs in the sink. Log thread
-/// only.
+/// Writes the steps before a fault to a new recording. `flight` must be frozen. Throws std::runtime_error if an error
+/// occurs in the sink. Log thread only.
 void write_flight(const StepFlight& flight, const Recorder::Config& config, const Ways& ways, ByteSink& sink);
 
 }  // namespace tendon

@@ -5,7 +5,7 @@
 
 namespace tendon {
 
-/// Determines which parts of a recording are kept (PartRecorder).
+/// See PartRecorder.
 enum class Keep : std::uint8_t {
   kAll,
   kFaults,  ///< from 60 s before to 10 s after the start of a fault

@@ -149,7 +149,7 @@ File::File(std::unique_ptr<std::istream> input, std::string name) : input_(std::
 }
 
 void File::read(std::uint64_t at, std::span<std::byte> bytes) {
-  // This only seeks if necessary because seeking discards the buffer of the stream.
+  // Seeking would discard the buffer of the stream.
   if (cursor_ != at) input_->seekg(static_cast<std::streamoff>(at));
   input_->read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
   if (!*input_) throw std::runtime_error(name_ + ": byte " + std::to_string(at) + ": cannot be read");

@@ -30,7 +30,6 @@ class Fields {
   std::span<const std::byte> bytes(std::uint64_t size);
   std::span<const std::byte> rest() const noexcept { return rest_; }
   bool ok() const noexcept { return ok_; }
-  /// Returns true if all bytes have been read without an error.
   bool done() const noexcept { return ok_ && rest_.empty(); }
 
  private:
@@ -46,7 +45,7 @@ struct ChunkHead {
   std::string_view compression;
   std::span<const std::byte> records;  ///< may be compressed
 };
-/// Parses the content of a chunk. Returns nothing if the lengths are inconsistent with the size of `content`.
+/// Returns nothing if the lengths are inconsistent with the size of `content`.
 std::optional<ChunkHead> chunk_head(std::span<const std::byte> content);
 
 /// Corrects the lengths in the content of a chunk. Returns false if the CRC of the records does not match.
@@ -55,46 +54,43 @@ bool mend_chunk(std::span<std::byte> content);
 /// Returns true if the content of this type of record is checked by `why_damaged`.
 bool is_checked(Opcode opcode);
 
-/// Returns an error message if `content` is not valid for this type of record, for example "the CRC of a chunk does not
-/// match". Returns an empty string otherwise. This function checks the lengths of the fields and the CRC of a chunk.
+/// Returns an error message if the lengths of the fields or the CRC of a chunk are not valid, for example "the CRC of a
+/// chunk does not match". Returns an empty string otherwise.
 std::string why_damaged(Opcode opcode, std::span<const std::byte> content);
 
 /// Provides random access to an MCAP file that may be damaged. Thread-safe: no.
 class File {
  public:
-  /// The maximum size of a record. It limits the memory that is allocated if a length is damaged. Tendon writes chunks
-  /// of 256 KiB.
+  /// Limits the memory that is allocated if a length is damaged. Tendon writes chunks of 256 KiB.
   static constexpr std::uint64_t kMaxRecord = std::uint64_t{64} << 20;
 
   struct Record {
     Opcode opcode{};
     std::uint64_t at = 0;
-    std::uint64_t end = 0;  ///< the position after the content
+    std::uint64_t end = 0;
   };
 
-  /// `name` is used in error messages. All functions that read from the file throw std::runtime_error if an error
-  /// occurs.
+  /// `name` is used in error messages. All functions that read from the file throw std::runtime_error.
   File(std::unique_ptr<std::istream> input, std::string name);
 
   const std::string& name() const noexcept { return name_; }
   std::uint64_t size() const noexcept { return size_; }
-  /// Returns the position after the last nonzero byte. If the power has failed, there may be zeros at the end of the
-  /// file.
+  /// Returns the position after the last nonzero byte. A power failure can leave zeros at the end of the file.
   std::uint64_t zeros_from() const noexcept { return zeros_from_; }
 
   void read(std::uint64_t at, std::span<std::byte> bytes);
   std::vector<std::byte> read(std::uint64_t at, std::uint64_t size);
   bool magic_at(std::uint64_t at);
 
-  /// Returns the record at `at`. Returns nothing if the record is too large or extends past the end of the file.
+  /// Returns nothing if the record is too large or extends past the end of the file.
   std::optional<Record> record_at(std::uint64_t at);
-  /// Returns the chunk at `at`, even if the opcode is not correct. The length of a chunk is stored in three places.
-  /// Returns nothing if all of them are different.
+  /// Returns the chunk at `at`, even if the opcode is damaged. The length of a chunk is stored in three places. Returns
+  /// nothing if all of them are different.
   std::optional<Record> chunk_at(std::uint64_t at);
   /// Returns true if there is a valid record at `at`, or if the remaining bytes are zero.
   bool goes_on_at(std::uint64_t at);
-  /// Returns the position of the first valid chunk, schema or channel in the range [from, end). The next record must
-  /// also be valid because there is no CRC for schemas and channels.
+  /// Returns the first valid chunk, schema or channel in [from, end). The next record must also be valid because there
+  /// is no CRC for schemas and channels.
   std::optional<std::uint64_t> find_record(std::uint64_t from, std::uint64_t end) { return find(from, end, false); }
   std::optional<std::uint64_t> find_chunk(std::uint64_t from, std::uint64_t end) { return find(from, end, true); }
 
@@ -106,7 +102,7 @@ class File {
   std::string name_;
   std::uint64_t size_ = 0;
   std::uint64_t zeros_from_ = 0;
-  std::uint64_t cursor_ = UINT64_MAX;  ///< the position of the stream
+  std::uint64_t cursor_ = UINT64_MAX;
 };
 
 }  // namespace tendon::mcap

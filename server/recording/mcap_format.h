@@ -6,8 +6,7 @@
 #include <cstdint>
 #include <span>
 
-// Constants of the MCAP container format, version 0. They are used by the writer and by the reader.
-// Source: https://mcap.dev/spec
+// Constants of the MCAP container format, version 0 (https://mcap.dev/spec).
 //
 //   file   = magic, Header, data section, DataEnd, summary section, summary offset section, Footer, magic
 //   record = opcode (1 byte), length of content (8 bytes), content
@@ -33,11 +32,9 @@ enum class Opcode : std::uint8_t {
   kDataEnd = 0x0F,
 };
 
-/// The size of the opcode and the length at the start of a record.
 inline constexpr std::size_t kRecordHead = 1 + 8;
 
-/// Updates a CRC-32 as used by zlib, PNG and Ethernet. `crc` is the value for the previous bytes, or 0 if there are
-/// none.
+/// Updates a CRC-32 as used by zlib, PNG and Ethernet. `crc` is 0 if there are no previous bytes.
 std::uint32_t extend_crc(std::uint32_t crc, std::span<const std::byte> bytes);
 
 }  // namespace tendon::mcap

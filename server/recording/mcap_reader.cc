@@ -77,7 +77,6 @@ std::optional<McapReader::Message> McapReader::next() {
   }
 }
 
-/// Reads the next valid record. Returns false at the end of the file.
 bool McapReader::next_record() {
   while (!finished_) {
     if (position_ >= file_.zeros_from()) return finish(!ends_with_magic_);
@@ -103,7 +102,6 @@ bool McapReader::next_record() {
   return false;
 }
 
-/// Moves to the end of `record_`. If it is the end of the data or of the summary, its CRC is checked.
 void McapReader::accept_record() {
   position_ = record_.end;
   if (record_.opcode == Opcode::kChunk) sure_ = position_;
@@ -115,15 +113,13 @@ void McapReader::accept_record() {
   if (record_.opcode == Opcode::kDataEnd) {
     in_summary_ = true;
     const auto expected = Fields(content_).u32();
-    // If the file is damaged, the CRC cannot match.
     if (expected != 0 && expected != crc_ && damage_.empty() && record_.end <= file_.zeros_from())
       note(record_.at, record_.at, "the CRC of the data before it does not match");
   }
   crc_ = extend_crc(extend_crc(crc_, head), content_);
 }
 
-/// Skips the damaged record at `position_`. If only the opcode or a length of a chunk is damaged, it returns true, and
-/// `record_` is set to the chunk.
+/// Returns true if only the opcode or a length of a chunk is damaged, and sets `record_` to the chunk.
 bool McapReader::skip_damage(const std::string& what) {
   const std::uint64_t at = position_;
   const auto by_length = file_.record_at(at);
@@ -171,7 +167,6 @@ void McapReader::check_end() {
   }
 }
 
-/// Always returns false.
 bool McapReader::finish(bool truncated) {
   finished_ = true;
   truncated_ = truncated;
@@ -185,7 +180,6 @@ void McapReader::open_chunk() {
   chunk_ = head->records;
 }
 
-/// Processes a record. If it is a message, the message is returned.
 std::optional<McapReader::Message> McapReader::take(Opcode opcode, std::span<const std::byte> content) {
   Fields fields(content);
   switch (opcode) {
@@ -253,7 +247,6 @@ std::optional<McapReader::Message> McapReader::take_message(Fields fields) {
   return Message{channels_.at(id), sequence, log_time, mcap::text_of(fields.rest()), record_.at, missing};
 }
 
-/// Returns the records of the summary without the footer, or an empty vector if there is no valid summary.
 std::vector<std::byte> McapReader::whole_summary() {
   if (!ends_with_magic_ || file_.size() < 2 * kMagic.size() + kFooter) return {};
   const std::uint64_t end = file_.size() - kMagic.size() - kFooter;

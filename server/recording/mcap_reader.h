@@ -19,15 +19,14 @@ namespace tendon {
 
 /// Reads the messages of an MCAP file in the order of the file (https://mcap.dev/spec).
 ///
-/// * If the file is truncated, all messages in complete chunks are returned, and then `truncated()` returns true. This
-///   also applies if the file ends with zeros because of a power failure.
-/// * All CRCs and lengths are checked. If a chunk is damaged, it is skipped, and an error message is added to
-///   `damage()`. If the record of a channel is damaged, the summary at the end of the file is used instead.
+/// * If the file is truncated, all messages in complete chunks are returned. This also applies if the file ends with
+///   zeros because of a power failure.
+/// * If a CRC or a length is not valid, the chunk is skipped, and an error message is added to `damage()`. If the
+///   record of a channel is damaged, the summary at the end of the file is used instead.
 /// * The sequence numbers of each channel are used to count missing messages. McapWriter starts at 0.
 ///
-/// Compressed chunks and messages outside of chunks are not supported because Tendon does not write them.
-///
-/// The reader requires memory for one record and, if the file is damaged, for the summary. Thread-safe: no.
+/// Compressed chunks and messages outside of chunks are not supported because Tendon does not write them. The reader
+/// requires memory for one record and, if the file is damaged, for the summary. Thread-safe: no.
 class McapReader {
  public:
   struct Channel {
@@ -40,55 +39,54 @@ class McapReader {
   struct Message {
     const Channel& channel;
     std::uint32_t sequence;
-    std::uint64_t log_time;     ///< ns
-    std::string_view data;      ///< valid until the next call of `next`
-    std::uint64_t offset;       ///< position of the record in the file
-    std::uint64_t missing = 0;  ///< missing messages before this one
+    std::uint64_t log_time;  ///< ns
+    std::string_view data;   ///< valid until the next call of `next`
+    std::uint64_t offset;    ///< position of the record in the file
+    std::uint64_t missing = 0;
   };
 
-  /// `name` is used in messages. Throws std::runtime_error if this is not an MCAP file.
+  /// Throws std::runtime_error if this is not an MCAP file.
   McapReader(std::unique_ptr<std::istream> input, std::string name);
 
-  /// Returns the next message, or nothing if there are no more messages. Throws std::runtime_error if a chunk is
-  /// compressed or if the file cannot be read.
+  /// Returns nothing at the end of the file. Throws std::runtime_error if a chunk is compressed or if the file cannot
+  /// be read.
   std::optional<Message> next();
 
-  /// Returns true if the file is incomplete. This must only be called after `next` has returned nothing.
+  /// This must only be called after `next` has returned nothing.
   bool truncated() const noexcept { return truncated_; }
 
-  /// Returns an error message for each damaged region that has been found. It contains the position in the file, the
-  /// reason, and the times of the previous and next message relative to the first message.
+  /// Returns an error message for each damaged region so far, with its position in the file, the reason, and the times
+  /// of the adjacent messages relative to the first message.
   std::vector<std::string> damage() const;
 
-  /// Returns the number of messages that are missing at the end of the file according to the summary. Returns 0 if
-  /// there is no summary. This must only be called after `next` has returned nothing.
+  /// Returns the number of missing messages according to the summary, or 0 if there is no summary. This must only be
+  /// called after `next` has returned nothing.
   std::uint64_t missing_at_end(std::string_view topic);
 
-  /// Replaces the channels with those in the summary at the end of the file. This also affects the channels of messages
-  /// that have already been returned. Returns false if this is not possible or if it has already been done.
+  /// Replaces the channels, including those of messages that have already been returned, with those in the summary.
+  /// Returns false if this is not possible or if it has already been done.
   bool use_summary();
 
   std::uint64_t size() const noexcept { return file_.size(); }
 
-  /// Returns the channels that have been read so far.
   const std::map<std::uint16_t, Channel>& channels() const noexcept { return channels_; }
 
-  /// Adds an error message to `damage()`. This can be used if the content of a message is not valid.
+  /// Adds an error message to `damage()`.
   void note(std::uint64_t offset, const std::string& what) { note(offset, offset, what); }
   /// Throws std::runtime_error with the message "NAME: byte OFFSET: what".
   [[noreturn]] void corrupt(std::uint64_t offset, const std::string& what) const;
 
  private:
   struct Damage {
-    std::uint64_t from;  ///< position in the file
+    std::uint64_t from;
     std::uint64_t to;
     std::string what;
     std::optional<std::uint64_t> after;   ///< log time of the previous message
     std::optional<std::uint64_t> before;  ///< log time of the next message
   };
   struct Count {
-    std::uint64_t next = 0;  ///< the next sequence number
-    std::size_t damage = 0;  ///< size of `damage_` after the last message
+    std::uint64_t next = 0;
+    std::size_t damage = 0;
   };
 
   bool next_record();
@@ -107,21 +105,21 @@ class McapReader {
   mcap::File file_;
   bool ends_with_magic_ = false;
 
-  std::uint64_t position_ = 0;  ///< of the next record
-  std::uint64_t sure_ = 0;      ///< the end of the last valid chunk
-  mcap::File::Record record_;   ///< the record in `content_`
+  std::uint64_t position_ = 0;
+  std::uint64_t sure_ = 0;
+  mcap::File::Record record_;
   std::vector<std::byte> content_;
-  std::span<const std::byte> chunk_;  ///< the remaining records of the current chunk
+  std::span<const std::byte> chunk_;
 
-  std::uint32_t crc_ = 0;          ///< of the file before `position_`
-  std::uint32_t summary_crc_ = 0;  ///< of the summary before `position_`
+  std::uint32_t crc_ = 0;  ///< of the file before `position_`
+  std::uint32_t summary_crc_ = 0;
   bool in_summary_ = false;
 
   std::map<std::uint16_t, std::string> schemas_;
   std::map<std::uint16_t, Channel> channels_;
-  std::set<std::uint16_t> doubtful_;              ///< channels with multiple definitions
-  std::map<std::uint16_t, Count> taken_;          ///< by channel
-  std::map<std::uint16_t, std::uint64_t> total_;  ///< number of messages by channel, from the summary
+  std::set<std::uint16_t> doubtful_;  ///< channels with multiple definitions
+  std::map<std::uint16_t, Count> taken_;
+  std::map<std::uint16_t, std::uint64_t> total_;  ///< from the summary
   bool summary_tried_ = false;
   bool summary_used_ = false;
 

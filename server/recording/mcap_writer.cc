@@ -39,7 +39,6 @@ void put_string(Buffer& out, std::string_view text) {
 
 void overwrite(Buffer& out, std::size_t at, std::uint64_t value) { put_little_endian(value, out.data() + at); }
 
-/// Adds a record. The content is written by `fill`.
 template <class Fill>
 void put_record(Buffer& out, Opcode opcode, Fill fill) {
   put(out, opcode);
@@ -173,7 +172,7 @@ void McapWriter::put_chunk() {
 void McapWriter::put_summary() {
   put_record(out_, Opcode::kDataEnd, [&] { put(out_, crc_); });
 
-  const std::size_t begin = out_.size();  // of the summary
+  const std::size_t begin = out_.size();
   const auto position = [&] { return written_ + out_.size(); };
   struct Group {
     Opcode opcode;

@@ -15,47 +15,41 @@
 
 namespace tendon {
 
-/// Writes an indexed MCAP file (https://mcap.dev/spec). The messages are stored in uncompressed chunks with a CRC and
-/// an index. The summary at the end of the file is used for seeking. The content of the messages is not interpreted.
+/// Writes an indexed MCAP file with uncompressed chunks (https://mcap.dev/spec).
 ///
-/// The output is written in complete pieces with one `ByteSink::append` each. The first call of `flush_chunk` also
-/// writes the start of the file, and `close` writes the summary. Therefore, the file can be read at any time up to the
-/// last chunk. Without the summary, it is reported as truncated. The output is deterministic.
-///
-/// If the sink fails, this piece and all subsequent pieces are dropped, and `flush_chunk` and `close` return false.
+/// The first call of `flush_chunk` also writes the start of the file, and `close` writes the summary. Therefore, the
+/// file can be read at any time up to the last chunk, but it is reported as truncated without the summary. The output
+/// is deterministic. If the sink fails, all subsequent data is dropped, and `flush_chunk` and `close` return false.
 ///
 /// Thread-safe: no. Realtime-safe: no.
 class McapWriter {
  public:
-  /// `library` is the name of the program. `sink` must outlive the writer.
+  /// `sink` must outlive the writer.
   McapWriter(std::string_view library, ByteSink& sink);
   McapWriter(const McapWriter&) = delete;
   McapWriter& operator=(const McapWriter&) = delete;
 
-  /// Returns the id of the schema. This must be called before adding the channels that use it.
+  /// Must be called before adding the channels that use the schema.
   std::uint16_t add_schema(std::string_view name, std::string_view encoding, std::string_view data);
 
-  /// Returns the id of the channel. Throws std::invalid_argument if the schema does not exist.
+  /// Throws std::invalid_argument if the schema does not exist.
   std::uint16_t add_channel(std::uint16_t schema_id, std::string_view topic, std::string_view message_encoding);
 
-  /// Adds a message to the current chunk. `log_time` is in ns and does not have to be monotonic. Throws
-  /// std::invalid_argument if the channel does not exist, and std::logic_error if it is called after `close`.
+  /// `log_time` is in ns and does not have to be monotonic. Throws std::invalid_argument if the channel does not exist,
+  /// and std::logic_error after `close`.
   void write(std::uint16_t channel_id, std::uint64_t log_time, std::string_view data);
 
-  /// Returns the size of the messages in the current chunk.
   std::size_t chunk_size() const noexcept { return records_.size(); }
 
-  /// Writes the current chunk to the sink, unless it is empty. Returns false if the sink has failed.
+  /// Writes the current chunk unless it is empty. Returns false if the sink has failed.
   bool flush_chunk();
 
-  /// Writes the current chunk and the summary, and finishes the file. Returns false if the sink has failed. Subsequent
-  /// calls have no effect.
+  /// Flushes and writes the summary. Returns false if the sink has failed. Subsequent calls have no effect.
   bool close();
 
-  /// Returns the number of chunks. Their indexes are kept in memory until `close` is called.
+  /// The indexes of chunks are kept in memory until `close` is called.
   std::size_t chunks() const noexcept { return chunks_.size(); }
 
-  /// Returns the number of bytes that have been written to the sink.
   std::uint64_t bytes_written() const noexcept { return written_; }
 
  private:
@@ -67,16 +61,16 @@ class McapWriter {
   };
   struct IndexEntry {
     std::uint64_t log_time;
-    std::uint64_t offset;  ///< in the records of the chunk
+    std::uint64_t offset;
   };
   struct Channel {
     Buffer record;
-    std::uint64_t messages = 0;     ///< in the file
-    std::vector<IndexEntry> index;  ///< of the current chunk
+    std::uint64_t messages = 0;
+    std::vector<IndexEntry> index;
   };
   struct ChunkInfo {
     TimeRange time;
-    std::uint64_t start;   ///< position in the file
+    std::uint64_t start;
     std::uint64_t length;  ///< of the record
     std::vector<std::pair<std::uint16_t, std::uint64_t>> index_offsets;
     std::uint64_t index_length;
@@ -88,8 +82,8 @@ class McapWriter {
   bool hand_over();
 
   ByteSink& sink_;
-  Buffer out_;      ///< the next piece
-  Buffer records_;  ///< messages of the current chunk
+  Buffer out_;
+  Buffer records_;
   TimeRange chunk_time_;
   std::vector<Buffer> schemas_;
   std::vector<Channel> channels_;
@@ -97,7 +91,7 @@ class McapWriter {
   TimeRange file_time_;
   std::uint64_t messages_ = 0;
   std::uint64_t written_ = 0;
-  std::uint32_t crc_ = 0;  ///< of all bytes written
+  std::uint32_t crc_ = 0;
   bool failed_ = false;
   bool closed_ = false;
 };

@@ -53,11 +53,10 @@ std::optional<std::uint64_t> number_of(const fs::path& path, const fs::path& fil
 struct Part {
   fs::path path;
   std::uint64_t number;
-  fs::file_time_type written;  ///< modification time
+  fs::file_time_type written;
   std::uint64_t bytes;
 };
 
-/// Returns all regular files with the name of a part, or none if the directory cannot be read.
 std::vector<Part> parts_of(const fs::path& path) {
   std::vector<Part> parts;
   std::error_code error;
@@ -83,7 +82,6 @@ bool looks_like_a_recording(const fs::path& path) {
                     [](char a, std::byte b) { return static_cast<std::byte>(a) == b; });
 }
 
-/// Returns the Scene of a part, or nothing if it cannot be read.
 std::optional<SceneRecord> scene_of(const fs::path& part) {
   try {
     RecordingReader reader(part);
@@ -101,7 +99,6 @@ bool may_be_deleted(const fs::path& part, const fs::path& path) {
   return scene && scene->budget_bytes > 0 && scene->first_part == path.filename();
 }
 
-/// Returns true if the Scene of `part` specifies a first part other than `path`.
 bool is_of_another(const fs::path& part, const fs::path& path) {
   const auto scene = scene_of(part);
   return scene && !scene->first_part.empty() && scene->first_part != path.filename();

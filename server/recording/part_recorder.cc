@@ -104,7 +104,6 @@ PartRecorder::Status PartRecorder::status() const {
 
 std::vector<PartRecorder::Notice> PartRecorder::take_notices() { return std::exchange(notices_, {}); }
 
-/// Returns false if the file could not be written. Recording is stopped in this case.
 bool PartRecorder::open_part(LocalTime now) {
   if (config_.budget_bytes > 0) {
     for (const auto& gone : delete_oldest_parts(config_.path, config_.budget_bytes - config_.budget_bytes / 4)) {
@@ -129,7 +128,6 @@ bool PartRecorder::open_part(LocalTime now) {
   return true;
 }
 
-/// This must be called after each record to start a new part if necessary.
 void PartRecorder::look_after(LocalTime now) {
   if (recorder_->failed()) return stop(now, recorder_->status().error);
   const bool due = recorder_->bytes() + config_.run.flush_size >= config_.rotate_bytes ||
@@ -145,7 +143,6 @@ void PartRecorder::look_after(LocalTime now) {
   }
 }
 
-/// Adds the counters of the current part to the totals, even if it has failed.
 void PartRecorder::finish_part(LocalTime now) {
   const Recorder::Status part = recorder_->status();
   missing_.steps += part.lost_steps - told_.steps;
@@ -202,7 +199,6 @@ void PartRecorder::stop(LocalTime now, std::string why) {
 }
 
 void PartRecorder::go_on(LocalTime now) {
-  // Recording was closed, or it is too early.
   if (closed_.error.empty() || now < try_again_) return;
   try_again_ = now + config_.retry_after;
   if (!has_room(config_.path)) return;

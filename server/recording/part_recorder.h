@@ -17,21 +17,18 @@
 
 namespace tendon {
 
-/// Records a run in one or more files (part_files.h). Each of them is a complete recording that starts with the scenes.
-/// The conditions for a new part are:
+/// Records a run in one or more complete recordings (part_files.h). The conditions for a new part are:
 ///
 /// * The current part has reached `rotate_bytes` or `rotate_after`.
 /// * The index has 65 536 chunks, which require about 10 MB. This limits the memory for long runs.
 /// * The previous part could not be written because the disk was full or the file was deleted. The new part is started
-///   as soon as possible. It begins with a Lost record that contains the number of missing steps.
+///   as soon as possible. It begins with a Lost record.
 ///
-/// If there is a budget, the oldest parts are deleted before a new one is started, so that the total size does not
-/// exceed the budget.
+/// If there is a budget, the oldest parts are deleted before a new one is started.
 ///
 /// With Keep::kFaults, the duration of a part is at most one minute. If a fault starts in a part, within 60 s after its
-/// end, or within 10 s before its start, the part is kept. In addition, parts can be kept because of their number
-/// (Config::one_in). All other parts are deleted as soon as this is certain, or at the end of the run. If the process
-/// is killed, the parts that have not been decided yet are kept.
+/// end, or within 10 s before its start, the part is kept. Other parts are deleted as soon as possible, except for
+/// those that are kept because of their number (Config::one_in). If the process is killed, undecided parts are kept.
 ///
 /// The records must be passed in the same order as to Recorder.
 ///
@@ -43,33 +40,31 @@ class PartRecorder {
     Recorder::Config run;
     std::uint64_t rotate_bytes = 4'000'000'000;
     Duration rotate_after = std::chrono::hours(4);
-    /// The maximum total size of all parts with this name, including parts of previous runs. If this is 0, no parts are
-    /// deleted. Otherwise, the size of a part is limited to a quarter of the budget.
+    /// The maximum total size of all parts with this name, including previous runs. If this is 0, no parts are deleted.
+    /// Otherwise, the size of a part is limited to a quarter of the budget.
     std::uint64_t budget_bytes = 0;
     Keep keep = Keep::kAll;
-    /// With Keep::kFaults, the parts 1, 1 + one_in, 1 + 2 one_in, and so on, are also kept. If this is 0, no parts are
-    /// kept because of their number.
+    /// With Keep::kFaults, the parts 1, 1 + one_in, 1 + 2 one_in, and so on, are also kept. Not used if this is 0.
     std::uint64_t one_in = 0;
     /// The period for checking the free space while recording is stopped.
     Duration retry_after = std::chrono::seconds(1);
   };
   struct Status {
-    std::filesystem::path path;  ///< of the newest part
+    std::filesystem::path path;
     std::uint64_t parts = 0;
-    std::uint64_t parts_not_kept = 0;         ///< deleted because of Config::keep
-    std::uint64_t bytes = 0;                  ///< in all parts of this run
-    std::uint64_t steps = 0;                  ///< including the current chunk
-    std::uint64_t datagrams = 0;              ///< including the current chunk
-    std::uint64_t lost_steps = 0;             ///< because of a full disk or a slow log thread
-    std::uint64_t lost_datagrams = 0;         ///< for the same reasons
-    std::uint64_t strangers_left_out = 0;     ///< see DatagramSieve
-    std::uint64_t datagrams_over_budget = 0;  ///< see DatagramSieve
-    std::string error;                        ///< the reason why recording is stopped, or empty
+    std::uint64_t parts_not_kept = 0;  ///< deleted because of Config::keep
+    std::uint64_t bytes = 0;
+    std::uint64_t steps = 0;  ///< including the current chunk
+    std::uint64_t datagrams = 0;
+    std::uint64_t lost_steps = 0;  ///< because of a full disk or a slow log thread
+    std::uint64_t lost_datagrams = 0;
+    std::uint64_t strangers_left_out = 0;
+    std::uint64_t datagrams_over_budget = 0;
+    std::string error;  ///< the reason why recording is stopped, or empty
 
     /// Returns true if no records are missing, except for those that have been left out by DatagramSieve.
     bool complete() const noexcept { return lost_steps == 0 && lost_datagrams == 0 && error.empty(); }
   };
-  /// A message for the log.
   struct Notice {
     bool warning = false;
     std::string text;
@@ -80,7 +75,6 @@ class PartRecorder {
   PartRecorder(const PartRecorder&) = delete;
   PartRecorder& operator=(const PartRecorder&) = delete;
 
-  /// See Recorder.
   void record(const StepRecord& step, std::size_t device = 0, std::string_view force_way = {});
   void record(const PortRecord& port, std::size_t device = 0);
   void record(const DatagramRecord& datagram);
@@ -89,7 +83,6 @@ class PartRecorder {
   void close(LocalTime now);
 
   Status status() const;
-  /// Returns the messages since the last call.
   std::vector<Notice> take_notices();
 
  private:
@@ -111,17 +104,16 @@ class PartRecorder {
   /// The current part. It is empty while recording is stopped, and after `close`.
   std::optional<Recorder> recorder_;
   LocalTime part_began_{};
-  /// A finished part that is kept if there is a fault.
   struct Undecided {
     std::filesystem::path path;
     LocalTime ended;
   };
   std::vector<Undecided> undecided_;
-  std::vector<bool> faulty_;        ///< by device, in its newest step
-  std::optional<LocalTime> fault_;  ///< start of the newest fault
-  bool stays_ = false;              ///< the current part must be kept
-  Counts told_;                     ///< losses that were recorded in the current part
-  Counts missing_;                  ///< since recording was stopped
+  std::vector<bool> faulty_;
+  std::optional<LocalTime> fault_;
+  bool stays_ = false;
+  Counts told_;
+  Counts missing_;  ///< since recording was stopped
   LocalTime try_again_{};
   Status closed_;  ///< previous parts, and all recorded losses
   std::vector<Notice> notices_;

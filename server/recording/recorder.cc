@@ -90,7 +90,6 @@ void Recorder::write(std::uint16_t channel, LocalTime at, const std::string& mes
   tick(at);
 }
 
-/// Updates the counters after the current chunk has been written or lost.
 void Recorder::settle(bool kept) {
   Counts& account = kept ? kept_ : lost_;
   account.steps += pending_.steps;

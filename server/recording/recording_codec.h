@@ -13,12 +13,11 @@
 
 namespace tendon {
 
-/// The scene of a run. It contains all information that is required to run it again.
 struct SceneRecord {
-  std::string text;  ///< the complete scene file in UTF-8
+  std::string text;
   std::uint64_t seed = 0;
-  std::string version;     ///< of the program
-  std::string commit;      ///< of the program
+  std::string version;
+  std::string commit;
   Duration unix_offset{};  ///< log_time − local time
   std::uint32_t part = 0;  ///< starting at 1; 0 if there are no other parts
   /// The recording may be deleted to limit the total size of all parts to this value. It is kept if this is 0.
@@ -30,17 +29,16 @@ struct SceneRecord {
   bool operator==(const SceneRecord&) const = default;
 };
 
-/// The number of missing records since the previous LossRecord.
 struct LossRecord {
   enum class Cause : std::uint8_t {
-    kLogThread = 0,   ///< log thread too slow
-    kDisk = 1,        ///< disk full, write error, or damaged file
+    kLogThread = 0,  ///< log thread too slow
+    kDisk = 1,
     kByteBudget = 2,  ///< exceeded the bytes per second, see DatagramSieve
-    kSample = 3,      ///< exceeded the sample, see DatagramSieve
+    kSample = 3,
   };
   LocalTime at{};
   std::uint64_t steps = 0;
-  std::uint64_t datagrams = 0;  ///< from and to clients
+  std::uint64_t datagrams = 0;
   Cause cause = Cause::kLogThread;
   std::uint64_t strangers = 0;  ///< from and to strangers; only for kSample
 
@@ -49,7 +47,6 @@ struct LossRecord {
 
 namespace recording {
 
-/// The MCAP channel for one type of record.
 struct Channel {
   std::string_view topic;
   std::string_view schema;  ///< full name of the protobuf message
@@ -61,10 +58,8 @@ inline constexpr Channel kDatagram = {"/net/datagram", "tendon.recording.v1.Data
 inline constexpr Channel kClock = {"/merge/clock", "tendon.recording.v1.Clock"};
 inline constexpr Channel kLoss = {"/recording/lost", "tendon.recording.v1.Lost"};
 
-/// The name of the encoding of schemas and messages in MCAP.
 inline constexpr std::string_view kEncoding = "protobuf";
 
-/// Returns a serialized FileDescriptorSet with all messages of recording.proto.
 std::string schema_data();
 
 /// The output is deterministic.

@@ -31,8 +31,7 @@ RecordingReader::RecordingReader(const std::filesystem::path& path, Devices devi
 RecordingReader::RecordingReader(std::unique_ptr<std::istream> input, std::string name, Devices devices)
     : name_(name), mcap_(std::move(input), std::move(name)), wanted_(devices) {}
 
-/// Returns true if the channel has this type and belongs to one of the requested devices. Sets `device_` to this
-/// device.
+/// Sets `device_` if the channel belongs to one of the requested devices.
 bool RecordingReader::belongs(const McapReader::Channel& channel, const recording::Channel& kind) {
   if (is(channel, kind)) {
     device_ = 0;
@@ -70,7 +69,6 @@ std::optional<RecordingReader::Record> RecordingReader::next() {
   return end();
 }
 
-/// Returns nothing if the channel is unknown.
 std::optional<RecordingReader::Record> RecordingReader::decode(const McapReader::Message& message) {
   const McapReader::Channel& channel = message.channel;
   const auto known = [&] {
@@ -80,7 +78,7 @@ std::optional<RecordingReader::Record> RecordingReader::decode(const McapReader:
   if (!known() && !(mcap_.use_summary() && known())) return std::nullopt;
   if (belongs(channel, recording::kScene)) {
     auto scene = recording::decode_scene(message.data);
-    if (device_ == 0) unix_offset_ = scene.unix_offset;  // used for all times
+    if (device_ == 0) unix_offset_ = scene.unix_offset;
     return scene;
   }
   if (!unix_offset_) {

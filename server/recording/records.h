@@ -11,32 +11,31 @@
 
 namespace tendon {
 
-/// The part of a StepRecord that is not provided by the controller.
 struct LoopStep {
   std::uint64_t tick = 0;
   LocalTime scheduled{};        ///< when the step was due
   Vec3 applied = Vec3::Zero();  ///< N, actual force of the device; `force` is the command
-  bool rearmed = false;         ///< rearmed since the previous step
-  bool disarmed = false;        ///< disarmed by the operator
-  std::uint32_t buttons = 0;    ///< bit i: button i is pressed
+  bool rearmed = false;
+  bool disarmed = false;      ///< disarmed by the operator
+  std::uint32_t buttons = 0;  ///< bit i: button i is pressed
 };
 
-/// A recorded haptic step. It contains all inputs that are required to replay the step, and the output of the device.
+/// A recorded haptic step with all inputs that are required to replay it.
 struct StepRecord : Step, LoopStep {};
 
-/// The state of a coupling in a haptic step. It can be replayed together with the StepRecord of the same tick and the
-/// other couplings of this tick.
+/// The state of a coupling in a haptic step. It can be replayed together with the StepRecord and the other couplings of
+/// this tick.
 struct PortRecord {
   std::uint64_t tick = 0;
-  std::uint32_t channel = 0;         ///< used by the leader; 0 if there is one coupling
-  LocalTime at{};                    ///< time of the step's position
+  std::uint32_t channel = 0;  ///< used by the leader; 0 if there is one coupling
+  LocalTime at{};
   Purse::Settlement settled{};       ///< J, transfers to and from the account of the limiter
-  Purse::Settlement grip_settled{};  ///< J, for the gripper
+  Purse::Settlement grip_settled{};  ///< J
   double stiffness = 0;              ///< N/m, current value of K
   Duration round_trip{};             ///< current value; 0 if unknown
-  PortState sent{};                  ///< to the peer
-  std::optional<PortState> peer{};   ///< the newest since the previous step, if any
-  LocalTime peer_arrived{};          ///< time of arrival; only valid with `peer`
+  PortState sent{};
+  std::optional<PortState> peer{};  ///< the newest since the previous step, if any
+  LocalTime peer_arrived{};
 };
 
 /// The offset of the follower's clock from the leader's clock.

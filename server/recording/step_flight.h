@@ -9,13 +9,12 @@
 
 namespace tendon {
 
-/// Stores the last steps of a device, which are saved after a fault. This is a FlightRecorder that does not store the
-/// handle if the device only measures its position. This saves half of the memory of a StepRecord.
+/// Stores the last steps of a device before a fault. Without handles, this saves half of the memory of a StepRecord.
 ///
 /// Thread-safe, Realtime-safe: see FlightRecorder.
 class StepFlight {
  public:
-  /// Stores `capacity` steps, which must be a power of two. The handles are only stored if `handles` is true.
+  /// `capacity` must be a power of two. Without `handles`, the handles of steps are not stored.
   explicit StepFlight(std::size_t capacity, bool handles = true) : steps_(capacity) {
     if (handles) handles_.emplace(capacity);
   }

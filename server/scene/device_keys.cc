@@ -105,7 +105,6 @@ struct Column {
   }
 };
 
-/// A textual description of the axes of the base frame.
 struct Axes {
   static std::string expected(const Unit&) {
     return "the axes that point to the operator's right, up and towards the user, like \"right=x up=y user=z\"";
@@ -138,7 +137,6 @@ struct AlongX {
   static std::string shown(const Unit& unit, const Vec3& value) { return Number::shown(unit, value.x()); }
 };
 
-/// The names of the keys of a motion, which depend on the type of the motion.
 struct MotionNames {
   std::string_view amplitude, centre, from, to, points, scale, origin;
 };

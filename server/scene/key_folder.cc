@@ -31,7 +31,6 @@ struct Descriptor {
   int fd;
 };
 
-/// Returns false and sets errno if the text could not be written completely.
 bool write_whole(int descriptor, std::string_view text) {
   while (!text.empty()) {
     const ssize_t written = ::write(descriptor, text.data(), text.size());
@@ -41,8 +40,8 @@ bool write_whole(int descriptor, std::string_view text) {
   return true;
 }
 
-/// Renames the file. Returns false and sets errno if there is already a file with the new name. Some file systems like
-/// NFS do not support renaming without overwriting, and some like FAT do not support links.
+/// Returns false and sets errno if the new name is already used. Some file systems like NFS do not support renaming
+/// without overwriting, and some like FAT do not support links.
 bool give_name(const std::string& from, const std::filesystem::path& to) {
   if (::renameat2(AT_FDCWD, from.c_str(), AT_FDCWD, to.c_str(), RENAME_NOREPLACE) == 0) return true;
   if (errno != EINVAL || ::link(from.c_str(), to.c_str()) != 0) return false;

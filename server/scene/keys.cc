@@ -38,7 +38,6 @@ Names<Suite> suite_names() {
   return names;
 }
 
-/// Returns the descriptions of the presets for the reference.
 std::string preset_meanings() {
   std::string text;
   for (const PresetInfo& preset : presets()) {
@@ -75,7 +74,6 @@ void declare_watchdog(Table& keys, Watchdog::Config& dog, std::string_view meani
   keys.key("ramp_ms", dog.ramp, kZeroOrMore, "after that the force falls to zero within this time");
 }
 
-/// Declares the safety layer. The layer and each of its parts are enabled if the corresponding table is present.
 template <class Table>
 void declare_safety(Table& safety, SafeDevice::Config& config) {
   using By = SafeDevice::Arming::By;
@@ -219,7 +217,7 @@ Names<OutputEstimator::Model> estimator_models() {
   return {{{"polynomial", kPolynomial}, {"spring-and-bias", kSpringAndBias}, {"output-error", kOutputError}}};
 }
 
-/// Declares how the force changes between two updates of the engine. There can be at most one of these tables.
+/// At most one of these tables is allowed.
 template <class Table>
 void declare_between(Table& force, HeldForce::Config& hold) {
   const Name model{"adaptive_local_model", "models of the engine are blended and capped"};
@@ -254,7 +252,6 @@ void declare_between(Table& force, HeldForce::Config& hold) {
   });
 }
 
-/// Declares the friction bounds for rotation and gripper.
 template <class Table>
 void declare_handle_bounds(Table& limiter, Draft& draft) {
   limiter.table("rotation", [&draft](Table& keys) {
@@ -311,8 +308,8 @@ void declare_law(Table& limiter, Draft& draft) {
   if (used_by({Law::kAolPlus})) declare_parts(limiter, draft);
 }
 
-/// The period is from 100 µs to 4 ms. At 4 ms, the stiffest wall that felt clean was 0.325 N/mm (Choi and Tan, IROS
-/// 2004). The wake-up latency of an ordinary kernel is about 100 µs.
+/// From 100 µs to 4 ms. At 4 ms, the stiffest wall that felt clean was 0.325 N/mm (Choi and Tan, IROS 2004). The
+/// wake-up latency of an ordinary kernel is about 100 µs.
 constexpr Number kPeriod{.least = 100, .most = 4000};
 /// The maximum number in the cpu_set_t of the kernel.
 constexpr Count kProcessor{1023};

@@ -13,14 +13,12 @@
 #include "server/scene/scene.h"
 #include "server/tables/recorded_motion.h"
 
-// Declares the keys of a scene. The declarations are used by classes with the interface of Table: Reader reads a file
-// into a Draft (reader.h), Reference prints the documentation of each key (reference.h), and Parts finds the optional
-// parts of a scene (parts.h). The default value of a key is the initializer of its target. To add a key, add one line
-// to keys.cc or device_keys.cc. Internal to server/scene.
+// Declares the keys of a scene. The declarations are used by Reader (reader.h), Reference (reference.h) and Parts
+// (parts.h). The default value of a key is the initializer of its target. To add a key, add one line to keys.cc or
+// device_keys.cc. Internal to server/scene.
 
 namespace tendon::scene_file {
 
-/// The motion of a hand. It is either specified in the scene or loaded from a recording.
 struct DraftMotion {
   ScriptedMotion::Script script = ScriptedMotion::Sine{};
   std::optional<RecordedMotionFile> recorded{};
@@ -43,7 +41,6 @@ struct Draft {
   std::optional<double> coulomb_bound;
   std::optional<double> viscous_bound;
   std::optional<double> max_force;
-  /// For [limiter.rotation] and [limiter.gripper].
   struct FrictionBounds {
     std::optional<double> coulomb;
     std::optional<double> viscous;
@@ -55,7 +52,7 @@ struct Draft {
   std::optional<double> max_grip;    ///< N
   std::optional<double> ledger_step;
   std::optional<Preset> preset;
-  Coupling::Config coupling;             ///< only used if there is a table [teleoperation]
+  Coupling::Config coupling;
   Vec3 map_rotation = Vec3::Zero();      ///< rad, rotation vector
   std::optional<double> coupling_force;  ///< N
   bool absolute_map = false;
@@ -70,12 +67,10 @@ struct Draft {
   std::vector<double> place_viscous;
 };
 
-/// N. The maximum force if the device has no motors. This is large enough to record the forces of the engines without
-/// changes.
+/// N. For a device without motors. Large enough to record the forces of the engines without changes.
 inline constexpr double kUnfelt = 10;
 
-/// The name of a key or a table. If it is a part that can be removed from a scene, `part` is its description for
-/// `tendond explain`.
+/// `part` is the description for `tendond explain` if the key or table is a part that can be removed from a scene.
 struct Name {
   std::string_view name;
   std::string_view part;
@@ -88,22 +83,18 @@ struct NoKeys {
   void operator()(const auto& /*table*/) const {}
 };
 
-/// Specifies the meaning of a missing key if it is not just the default value.
 struct Absent {
   bool required = false;
   std::string_view text = {};
 };
 inline constexpr Absent kRequired = {.required = true};
 
-/// Declares all keys. It is instantiated for Reader, Reference and Parts.
 template <class Table>
 void declare_scene(Table& scene, Draft& draft);
 
-/// Declares the keys of [teleoperation]. It is instantiated for Reader, Reference and Parts.
 template <class Table>
 void declare_teleoperation(Table& scene, Draft& draft);
 
-/// Declares the keys of [device]. It is instantiated for Reader, Reference and Parts.
 template <class Table>
 void declare_device(Table& device, Draft& draft);
 

@@ -17,7 +17,6 @@
 namespace tendon::scene_file {
 namespace {
 
-/// Computes the configuration of the limiter from several keys.
 class LimiterResolver : SceneErrors {
  public:
   LimiterResolver(Draft& draft, const SceneErrors& errors) : SceneErrors(errors), draft_(draft) {}
@@ -44,8 +43,7 @@ class LimiterResolver : SceneErrors {
   }
 
  private:
-  /// Computes the bounds of torque and grip force. They are required if the device has these motors because the limiter
-  /// must limit all torques.
+  /// The bounds are required if the device has these motors because the limiter must limit all torques.
   void resolve_rotation(HapticController::Config& control) const {
     const auto& device = draft_.simulated.rotation;
     const bool motors = device && device->max_torque;
@@ -73,8 +71,7 @@ class LimiterResolver : SceneErrors {
         GripLimits{.friction = friction, .arm = device->arm, .max_force = draft_.max_grip.value_or(*device->max_force)};
   }
 
-  /// Returns the friction that is assumed by the limiter. `truth` is the friction of the simulated device. Only the
-  /// fraction `share` of the viscous friction is used.
+  /// `truth` is the friction of the simulated device. Only the fraction `share` of its viscous friction is used.
   Friction handle_friction(bool has_motor, const Draft::FrictionBounds& given, const std::array<std::string, 2>& keys,
                            const Friction& truth, const std::string& motor, double share = 1) const {
     const Law law = draft_.scene.loop.control.limiter.law;
@@ -103,7 +100,6 @@ class LimiterResolver : SceneErrors {
             .viscous = bound(given.viscous, keys[1], truth.viscous, share)};
   }
 
-  /// Checks that the friction map does not exceed the actual friction.
   void resolve_places(HapticController::Config& control) const {
     if (!control.limiter.parts.adaptive_friction) return;
     const std::string table = "limiter.adaptive_friction";
@@ -148,7 +144,6 @@ class LimiterResolver : SceneErrors {
               digits(bound) + ": were all columns in the units that tendon-identify expects (s, m, N)?");
   }
 
-  /// Enables the parts of the preset that are not in the scene.
   void resolve_preset(HapticController::Config& control) const {
     if (!draft_.preset) return;
     LimiterConfig& limiter = control.limiter;
@@ -201,7 +196,7 @@ class LimiterResolver : SceneErrors {
     }
   }
 
-  /// Returns the friction that is assumed by the limiter. `axis_share` is the fraction for a single axis.
+  /// `axis_share` is the fraction for a single axis.
   double friction_bound(const std::string& key, std::optional<double> given, const KnownNumber* profiles, double truth,
                         double axis_share) const {
     const std::string full = "limiter." + key;

@@ -12,7 +12,7 @@
 #include "server/scene/reader.h"
 #include "server/scene/values.h"
 
-// Finds the optional parts of a scene in the declarations of its keys (keys.h). Internal to server/scene.
+// Internal to server/scene.
 
 namespace tendon::scene_file {
 
@@ -21,7 +21,7 @@ class Parts {
  public:
   static constexpr bool kDocuments = true;
 
-  /// Removes the part `key`. If it exists, `removed` is set to true.
+  /// Removes the part `key`, and sets `removed` to true if it exists.
   Parts(std::vector<ScenePart>& all, std::string_view key, bool& removed) : all_(all), key_(key), removed_(removed) {}
 
   /// If a key `kind` is a part, the name of the part is the name of its table.

@@ -78,7 +78,6 @@ void apply_setting(toml::table& file, const std::string& setting) {
   }
 }
 
-/// Prints all numbers without loss of precision.
 std::string text_of(const toml::table& file) {
   std::ostringstream text;
   text << toml::toml_formatter(file, toml::toml_formatter::default_flags & ~toml::format_flags::indentation) << '\n';

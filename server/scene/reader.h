@@ -17,18 +17,16 @@
 #include "server/scene/keys.h"
 #include "server/scene/values.h"
 
-// Reads a scene file according to the declarations of its keys (keys.h). Internal to server/scene.
+// Internal to server/scene.
 
 namespace tendon::scene_file {
 
-/// Returns "path.name", or only `name` if the path is empty.
 std::string joined(std::string_view path, std::string_view name);
 
-/// Returns a suffix for the error message about an unknown key. It starts with "; " and suggests the closest known key,
-/// or lists all known keys.
+/// Returns "; " and the closest known key, or all known keys.
 std::string advice(std::string_view unknown, const std::vector<std::string_view>& known);
 
-/// A position in the file for error messages. If the line is 0, it is unknown.
+/// A position in the file. If the line is 0, it is unknown.
 struct Place {
   std::uint32_t line = 0;
   std::uint32_t column = 0;
@@ -42,8 +40,7 @@ Place place_of(const toml::node& node);
 /// Throws SceneError "FILE:LINE: KEY: SENTENCE".
 [[noreturn]] void fail(const std::string& file, Place at, const std::string& key, const std::string& sentence);
 
-/// Collects the errors in a file, and reports the one with the lowest line. Missing keys are only reported if there are
-/// no other errors.
+/// Reports the error with the lowest line. Missing keys are only reported if there are no other errors.
 class SceneProblems {
  public:
   void wrong(Place at, std::string key, std::string sentence) { add({false, at, std::move(key), std::move(sentence)}); }
@@ -92,8 +89,7 @@ class Reader {
     }
     const Verdict refusal = rule.take(*node, unit, target);
     if (!refusal) return true;
-    // If a setting is not valid TOML, it is read as a string. For example, this applies to --set
-    // device.effects.mass_kg=0,05
+    // If a setting is not valid TOML, it is read as a string, for example device.effects.mass_kg=0,05
     const bool number = refusal->expected.starts_with("a number") && refusal->found->is_string();
     const std::string found = found_in(*refusal->found);
     problems_.wrong(place_of(*refusal->found), joined(path_, name),
@@ -102,7 +98,6 @@ class Reader {
     return false;
   }
 
-  /// Reads the required key `kind`. Then, it reads the keys that are common to all kinds, and the keys of this kind.
   template <class T, class Declare, class Common = NoKeys>
   void kind(const Names<T>& names, const Declare& declare, const Common& common = {}) {
     T value{};
@@ -139,7 +134,7 @@ class Reader {
     });
   }
 
-  /// Reads an array of tables [[name]] into `target`. If there are none, `target` is not modified.
+  /// If there are no tables [[name]], `target` is not modified.
   template <class T, class Declare>
   void tables(std::string_view name, std::vector<T>& target, std::size_t most, const Declare& declare) {
     const toml::node* node = look_up(name);

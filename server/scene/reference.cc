@@ -12,10 +12,10 @@
 namespace tendon {
 namespace {
 
-/// The documentation of a table. If there are several kinds of this table, each kind has its own chapter.
+/// If there are several kinds of a table, each kind has its own chapter.
 struct Chapter {
   std::string table;
-  std::string text;  ///< including the heading
+  std::string text;
   std::size_t keys = 0;
 };
 

@@ -12,7 +12,7 @@
 #include "server/scene/reader.h"
 #include "server/scene/values.h"
 
-// Prints the documentation of the keys of a scene (keys.h). Internal to server/scene.
+// Internal to server/scene.
 
 namespace tendon::scene_file {
 
@@ -89,9 +89,9 @@ class Reference {
   std::string& text_;
   std::string path_;
   std::string indent_ = "  ";
-  /// For a kind: the output for its tables, which are printed after the keys of all kinds.
+  /// For a kind: the output for its tables, which are printed last.
   std::string* tables_ = nullptr;
-  std::string of_kind_;  ///< the kind, for the headings of its tables
+  std::string of_kind_;
 };
 
 }  // namespace tendon::scene_file

@@ -31,7 +31,6 @@ namespace {
 /// If a device does not respond for this time, this is a fault. The same value is used in libfranka.
 constexpr Duration kMostMissed = std::chrono::milliseconds(20);
 
-/// Converts a draft to a scene.
 class SceneResolver : SceneErrors {
  public:
   SceneResolver(Draft draft, const toml::table& file, const std::string& name)
@@ -80,7 +79,6 @@ class SceneResolver : SceneErrors {
     return load_recorded_motion(csv, file);
   }
 
-  /// `table` is the table of the hand.
   ScriptedMotion motion_of(DraftMotion& draft, const std::string& table, const std::filesystem::path& directory) {
     std::optional<ScriptedMotion> motion;
     build(table + ".motion", [&] {
@@ -109,7 +107,6 @@ class SceneResolver : SceneErrors {
     return *std::move(motion);
   }
 
-  /// Returns the range of a motion along its longest axis, in m or rad.
   static double length_of(const ScriptedMotion::Script& script) {
     if (const auto* sine = std::get_if<ScriptedMotion::Sine>(&script)) return 2 * sine->amplitude;
     if (const auto* recorded = std::get_if<ScriptedMotion::Recorded>(&script)) {
@@ -189,7 +186,6 @@ class SceneResolver : SceneErrors {
       }
       ReplayDevice{replay};
     });
-    // The device does not provide positions between samples.
     const HapticLoop::Config& loop = draft_.scene.loop;
     const Duration most = (loop.control.max_missed - 1) * loop.period;
     const auto gap = std::ranges::adjacent_find(
@@ -235,8 +231,7 @@ class SceneResolver : SceneErrors {
     blame("recording.one_in", {}, "expected keep = \"faults\" beside it, found keep = \"all\": every file stays");
   }
 
-  /// The friction can be specified for the joints or for the handle. The profiles only contain the friction of the
-  /// handle.
+  /// The profiles only contain the friction of the handle.
   void resolve_joint_friction() {
     SimulatedDevice::Config& device = draft_.simulated;
     if (!device.joint_friction) return;
@@ -272,8 +267,7 @@ class SceneResolver : SceneErrors {
 
   void resolve_safety() {
     Scene& scene = draft_.scene;
-    // A device that moves a real hand must always be armed explicitly, even if no part of the safety layer is enabled
-    // in the scene.
+    // A device that moves a real hand must always be armed explicitly.
     if (scene.driver().moves_a_hand && !scene.safety) scene.safety.emplace();
     if (!scene.safety) return;
     if (scene.safety->dead_man) {
@@ -329,8 +323,7 @@ class SceneResolver : SceneErrors {
     HapticLoop::Config& loop = draft_.scene.loop;
     HapticController::Config& control = loop.control;
 
-    // Without real-time priority, a loop is occasionally delayed by up to one period. If a hold is longer than
-    // longest_hold, it is reported as an overrun.
+    // Without real-time priority, a loop is occasionally delayed by up to one period. Longer holds are overruns.
     control.limiter.longest_hold = draft_.longest_hold.value_or(2 * loop.period);
     control.limiter.follow_holds.reset();
     if (draft_.follow_holds.memory > Duration::zero()) control.limiter.follow_holds = draft_.follow_holds;
@@ -357,8 +350,7 @@ class SceneResolver : SceneErrors {
     resolve_limiter(draft_, *this);
   }
 
-  /// Computes the configuration of the coupling. It is compared with the configuration of the peer when the connection
-  /// is established.
+  /// The result is compared with the configuration of the peer when the connection is established.
   void resolve_teleoperation(const std::filesystem::path& directory) {
     auto& peer = draft_.scene.teleoperation;
     if (!peer) return;
@@ -432,7 +424,6 @@ class SceneResolver : SceneErrors {
     }
   }
 
-  /// Handles a follower with several leaders.
   void resolve_leaders(const Coupling::Config& coupling) {
     const Scene::Teleoperation& peer = *draft_.scene.teleoperation;
     const std::vector<Scene::Channel>& channels = draft_.scene.channels;
@@ -488,8 +479,7 @@ class SceneResolver : SceneErrors {
     }
   }
 
-  /// Checks the rules of the coupling. If one of them is violated, the error refers to the line of the corresponding
-  /// key.
+  /// The error refers to the line of the key that violates a rule.
   void blame_rules(const Coupling::Config& coupling) const {
     struct Row {
       std::string_view field;
@@ -533,8 +523,7 @@ class SceneResolver : SceneErrors {
     }
   }
 
-  /// The grippers of both ends must have motors because energy is transferred between them. A gripper cannot move
-  /// without energy from the other end.
+  /// A gripper cannot move without energy from the other end, so both grippers must have motors.
   void resolve_coupled_grip(const HapticController::Config& control) {
     Coupling::Config& coupling = draft_.coupling;
     if (!coupling.grip) return;

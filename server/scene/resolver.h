@@ -20,8 +20,8 @@ class SceneErrors {
   SceneErrors(const toml::table& file, const std::string& name) : file_(file), name_(name) {}
 
  protected:
-  /// Throws a SceneError. The line is the first of `places` that exists in the file. If none of them exists, it is the
-  /// line of the innermost table that contains the key.
+  /// Throws a SceneError with the line of the first of `places` that exists in the file, or of the innermost table that
+  /// contains the key.
   [[noreturn]] void blame(std::string_view key, std::initializer_list<std::string_view> places,
                           const std::string& sentence) const;
 
@@ -38,11 +38,10 @@ class SceneErrors {
   const std::string& name_;
 };
 
-/// Computes the friction bounds, the parts of the limiter, and the limits for rotation and gripper.
 void resolve_limiter(Draft& draft, const SceneErrors& errors);
 
-/// Converts a valid draft to a scene. All values that depend on several keys are checked and computed. Files in the
-/// scene are read relative to `directory`. `file` and `name` are used in error messages. Throws SceneError.
+/// Checks and computes all values that depend on several keys. Files in the scene are read relative to `directory`.
+/// `file` and `name` are used in error messages. Throws SceneError.
 Scene resolve(Draft draft, const toml::table& file, const std::string& name, const std::filesystem::path& directory);
 
 }  // namespace tendon::scene_file

@@ -27,18 +27,16 @@
 
 // The representation of values in a scene file. Internal to server/scene.
 //
-// A rule specifies which values are valid for a key. `expected(unit)` returns a description of these values.
-// `take(node, unit, to)` converts a value to SI units and stores it in `to`, or returns an error. `shown(unit, value)`
-// is the inverse conversion, which is used for the defaults in the reference.
+// A rule specifies the valid values of a key, which are described by `expected(unit)`. `take(node, unit, to)` converts
+// a value to SI units, or returns an error. `shown(unit, value)` is the inverse.
 
 namespace tendon::scene_file {
 
-/// The unit of a key, which is specified by the suffix of its name.
+/// Specified by the suffix of a key.
 struct Unit {
   std::string_view suffix;
   std::string_view symbol;
-  /// The factor is an integer except for angles and minutes. Dividing by it only rounds once, so that 43 µm is exactly
-  /// the same number as 0.000043.
+  /// Integer except for angles and minutes. Dividing by it only rounds once, so that 43 µm is exactly 0.000043.
   double per_si;
 };
 
@@ -47,33 +45,28 @@ inline constexpr Unit kNoUnit = {"", "", 1};
 /// Returns kNoUnit if the key has no suffix with a unit.
 const Unit& unit_of(std::string_view key);
 
-/// Appends the symbol of the unit, if any.
 std::string with_symbol(std::string text, const Unit& unit);
 
-/// Returns the shortest text that is converted back to the same value. Exponents are only used for very large or small
-/// numbers.
+/// Returns the shortest text that is converted back to the same value. Large exponents are avoided.
 std::string digits(double value);
 
 std::string in_quotes(std::string_view text);
 
-/// Returns a description of the value in the file for error messages.
 std::string found_in(const toml::node& node);
 
 /// Returns nothing if this is not an integer or a floating-point number.
 std::optional<double> number_in(const toml::node& node);
 
-/// The reason why a value is not valid.
 struct Refusal {
   const toml::node* found;
   std::string expected;
-  std::string hint{};  ///< a suggestion, for example "; did you mean aol+?"
+  std::string hint{};  ///< for example "; did you mean aol+?"
 };
 using Verdict = std::optional<Refusal>;
 
-/// The maximum time in a scene. Longer times are not useful in a haptic loop, and this prevents overflow of sums.
+/// Longer times are not useful in a haptic loop, and this prevents overflow of sums.
 inline constexpr Duration kLongest = limits::kMaxTimeout;
 
-/// A number in the unit of the key.
 struct Number {
   double least = -limits::kMaxValue;
   double most = limits::kMaxValue;
@@ -146,7 +139,7 @@ inline constexpr Number kZeroOrMore{.least = 0};
 inline constexpr Number kAboveZero{.least = 0, .without_least = true};
 inline constexpr Number kAboveZeroOrInf{.least = 0, .without_least = true, .or_infinite = true};
 
-/// A parameter of a device effect, or `false` if there is no such effect.
+/// The value can be `false` if there is no such effect.
 struct OrFalse {
   Number number;
 
@@ -253,10 +246,8 @@ struct ListOf {
   }
 };
 
-/// Returns true if this character is allowed in the name of a device or a channel.
 bool in_a_label(char c);
 
-/// Converts a text to a similar valid label.
 std::string label_of(std::string text);
 
 struct Label {
@@ -276,7 +267,6 @@ struct Label {
   static std::string shown(const Unit&, const std::string& value) { return in_quotes(value); }
 };
 
-/// The DNS-SD instance name of a device.
 struct InstanceName {
   static std::string expected(const Unit&) {
     return "a name of 1 to " + std::to_string(dns_sd::kMaxName) + " bytes like \"falcon at bench 3\"";
@@ -323,7 +313,6 @@ struct Path {
   static std::string shown(const Unit&, const std::optional<std::filesystem::path>&) { return "none"; }
 };
 
-/// The listen address of a server.
 struct NetworkAddress {
   static std::string expected(const Unit&) { return "an address like \"127.0.0.1:47100\" or \"[::1]:47100\""; }
 
@@ -346,7 +335,6 @@ struct NetworkAddress {
   static std::string shown(const Unit&, const std::optional<Address>&) { return "none"; }
 };
 
-/// One of several names.
 template <class T>
 struct Names {
   std::vector<std::pair<std::string_view, T>> all;
