@@ -289,6 +289,7 @@ int run(const std::vector<Scene>& scenes, double duration_s, bool json) {
 
   use_small_stacks();
   UnblockedOutput output;
+  // This must outlive the server.
   Lines lines;
   std::array<std::byte, 12> name_of_run;
   fill_random(name_of_run);

@@ -187,6 +187,7 @@ void NetworkLoop::refuse(LocalTime now, const Address& from, const Doorman::Gues
   send(now, sender_of(guest, from), from, std::span(answer).first(size));
 }
 
+/// The value 0 is reserved.
 std::uint32_t NetworkLoop::take_connection_id() {
   if (next_connection_id_ == 0) next_connection_id_ = config_.shard.of;
   return std::exchange(next_connection_id_, next_connection_id_ + config_.shard.of);
@@ -435,7 +436,7 @@ void NetworkLoop::take_force(LocalTime now, Guest& guest, const ForceCommand& co
     return;
   }
   leases_.renew(now, place, command.channel);
-  const double bound = device.about.max_force;
+  const double bound = device.about.max_force;  // N; 0 if unknown
   if (bound > 0 && command.force.squaredNorm() > bound * bound) channel.lateness.cut();
   const LinkStats& link = guest.session.stats();
   const std::uint64_t lost = link.lost + link.lost_outgoing;
@@ -445,7 +446,7 @@ void NetworkLoop::take_force(LocalTime now, Guest& guest, const ForceCommand& co
                             .round_trip = link.round_trip,
                             .valid_for = command.valid_for,
                             .lost = lost > std::exchange(guest.lost, lost)});
-  RemoteForce& force = device.mail->forces[command.channel].back();
+  RemoteForce& force = device.mail->forces[command.channel].back();  // contains an old value
   force.sequence = command.sequence;
   force.answers_tick = command.based_on_tick;
   force.answers = answered->at;

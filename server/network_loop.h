@@ -62,7 +62,7 @@ class NetworkLoop {
     /// Returns true if the operating system has checked the permissions of the sender (UnixSocket::is_peer), so that
     /// the client needs no key. Can be null.
     bool (*needs_no_key)(const Address& from) noexcept = nullptr;
-    Shard shard{};
+    Shard shard{};                          ///< `devices` contains the devices of all shards
     std::uint32_t first_connection_id = 1;  ///< should be random at each start
     std::string server_name = "tendond";
     std::vector<ServedDevice::Config> devices{};  ///< at most kMostDevices

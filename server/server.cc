@@ -340,7 +340,7 @@ LocalTime Server::watch_until(NetworkThread& network, LocalTime due) {
   }
   if (!network.bell.rung()) return now;
   network.bell.answer();
-  return clock::now();
+  return clock::now();  // not earlier than the step that rang the bell
 }
 
 void Server::tell_notices(NetworkThread& network) {
@@ -364,7 +364,7 @@ void Server::run_log() {
     print_log();
     clock::sleep_until(due);
   }
-  assembly_.log().close(clock::now(), unsent());
+  assembly_.log().close(clock::now(), unsent());  // all other threads have ended
   print_log();
 }
 

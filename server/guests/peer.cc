@@ -144,7 +144,7 @@ void Peer::take(LocalTime now, const Session::Event& event) {
     session.answer(asked->id, Code::kOk, {});
     if (!lease_.take(*lost, session, now)) return;
     coupled_ = false;
-    asked_to_couple_.reset();
+    asked_to_couple_.reset();  // ignores a late reply
     say(true, "\"" + lost->to + "\" has taken the channel");
   }
 }

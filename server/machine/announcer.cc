@@ -198,6 +198,7 @@ class Announcer::Avahi {
                   ". Expected a running avahi-daemon; clients find this server by " + "its address all the same");
   }
 
+  /// Schedules another attempt because this may be called from a callback of the bus.
   void no_bus(const std::string& why) {
     lost("there is no D-Bus system bus (" + why + ")");
     if (waits_) return;
@@ -263,6 +264,7 @@ class Announcer::Avahi {
       return no_bus("it is gone");
     }
     const std::unique_ptr<sd_bus_message, Release> message(made);
+    // If the domain and host are empty, Avahi uses its defaults.
     sd().bus_message_append(made, "iiussssq", interface_, protocol_, 0U, entry.name.c_str(), dns_sd::kService, "", "",
                             port_);
     sd().bus_message_open_container(made, 'a', "ay");

@@ -18,6 +18,7 @@ void sleep_until(LocalTime deadline) noexcept;
 
 Duration processor_time() noexcept;
 
+/// Returns Unix time − local time.
 Duration unix_offset() noexcept;
 
 }  // namespace clock

@@ -56,7 +56,7 @@ class Queue {
       const auto next = std::ranges::find_if(waiting_, [&](const Chunk& chunk) { return ready[chunk.stream]; });
       if (next == waiting_.end()) continue;
       const std::size_t stream = next->stream;
-      next->begun = true;
+      next->begun = true;  // must not be changed by `push`
       const std::string part = next->text.substr(0, kWrite);
       lock.unlock();
       const ssize_t written = ::write(files_[stream], part.data(), part.size());
@@ -100,7 +100,7 @@ class Queue {
     std::array<pollfd, 2> polled{};
     for (const std::size_t stream : {0U, 1U}) polled[stream] = {has[stream] ? files_[stream] : -1, POLLOUT, 0};
     ::poll(polled.data(), polled.size(), kLook_ms);
-    return {polled[0].revents != 0, polled[1].revents != 0};
+    return {polled[0].revents != 0, polled[1].revents != 0};  // including errors
   }
 
   void add_line(std::size_t stream, std::string_view text) {

@@ -92,7 +92,7 @@ void use_small_stacks() {
     if (pthread_attr_setstacksize(&small, kBytes) == 0 && pthread_setattr_default_np(&small) == 0) {
       try {
         std::thread([] {}).join();
-      } catch (const std::system_error&) {
+      } catch (const std::system_error&) {  // thread-local data is also on the stack
         pthread_setattr_default_np(&usual);
       }
     }
@@ -148,7 +148,7 @@ std::optional<std::string> stay_on(std::uint32_t cpu) {
 WakefulProcessors::WakefulProcessors(const std::filesystem::path& file)
     : file_(open(file.c_str(), O_WRONLY | O_CLOEXEC)) {
   if (file_ < 0 && errno == ENOENT) return;
-  const std::int32_t none = 0;
+  const std::int32_t none = 0;  // µs
   held_ = file_ >= 0 && write(file_, &none, sizeof none) == static_cast<ssize_t>(sizeof none);
   if (held_) return;
   refused_ = "processors may sleep deep (" + file.string() + ": " + std::system_category().message(errno) +

@@ -54,7 +54,7 @@ void set(int fd, int option, const Value& value, int level = SOL_SOCKET) {
 
 struct Message {
   Message(std::span<const std::byte> datagram, udp::endpoint& peer, std::size_t peer_size)
-      : piece_{const_cast<std::byte*>(datagram.data()), datagram.size()} {
+      : piece_{const_cast<std::byte*>(datagram.data()), datagram.size()} {  // not modified by sendmsg
     header.msg_name = peer.data();
     header.msg_namelen = static_cast<socklen_t>(peer_size);
     header.msg_iov = &piece_;
@@ -226,6 +226,7 @@ std::size_t UdpLink::receive_from_network(Address& from, std::span<std::byte> bu
 LocalTime UdpLink::present(LocalTime now) const { return std::max(now, clock::now()); }
 
 void UdpLink::wait(Duration timeout, Doorbell* doorbell) {
+  // Entries with a negative descriptor are ignored by poll().
   std::array<pollfd, 3> fds = {pollfd{fd_, POLLIN, 0}, pollfd{doorbell != nullptr ? doorbell->fd() : -1, POLLIN, 0},
                                pollfd{unix_ ? unix_->fd() : -1, POLLIN, 0}};
   const Duration left = std::max(timeout, Duration::zero());

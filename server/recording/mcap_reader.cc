@@ -113,6 +113,7 @@ void McapReader::accept_record() {
   if (record_.opcode == Opcode::kDataEnd) {
     in_summary_ = true;
     const auto expected = Fields(content_).u32();
+    // If the file is damaged, the CRC cannot match.
     if (expected != 0 && expected != crc_ && damage_.empty() && record_.end <= file_.zeros_from())
       note(record_.at, record_.at, "the CRC of the data before it does not match");
   }

@@ -78,7 +78,7 @@ std::optional<RecordingReader::Record> RecordingReader::decode(const McapReader:
   if (!known() && !(mcap_.use_summary() && known())) return std::nullopt;
   if (belongs(channel, recording::kScene)) {
     auto scene = recording::decode_scene(message.data);
-    if (device_ == 0) unix_offset_ = scene.unix_offset;
+    if (device_ == 0) unix_offset_ = scene.unix_offset;  // used for all times
     return scene;
   }
   if (!unix_offset_) {

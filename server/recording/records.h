@@ -27,8 +27,8 @@ struct StepRecord : Step, LoopStep {};
 /// this tick.
 struct PortRecord {
   std::uint64_t tick = 0;
-  std::uint32_t channel = 0;  ///< used by the leader; 0 if there is one coupling
-  LocalTime at{};
+  std::uint32_t channel = 0;         ///< used by the leader; 0 if there is one coupling
+  LocalTime at{};                    ///< of the step's position
   Purse::Settlement settled{};       ///< J, transfers to and from the account of the limiter
   Purse::Settlement grip_settled{};  ///< J
   double stiffness = 0;              ///< N/m, current value of K

@@ -187,6 +187,7 @@ class SceneResolver : SceneErrors {
       ReplayDevice{replay};
     });
     const HapticLoop::Config& loop = draft_.scene.loop;
+    // The device does not provide positions between samples.
     const Duration most = (loop.control.max_missed - 1) * loop.period;
     const auto gap = std::ranges::adjacent_find(
         replay.samples, [most](const auto& one, const auto& next) { return next.at - one.at > most; });

@@ -71,6 +71,7 @@ struct Scene {
     std::string name;  ///< if empty, "NAME at HOST"
   };
 
+  /// The law is in loop.control.coupling.
   struct Teleoperation {
     std::optional<Address> dial;               ///< if empty, the peer connects to this server
     std::optional<std::filesystem::path> key;  ///< if empty, the session is not encrypted

@@ -334,7 +334,7 @@ std::optional<TableReader::Column> TableReader::find(std::string_view name) cons
 
 TableReader::Column TableReader::column(std::string_view name) const {
   if (const auto found = find(name)) return *found;
-  return {.index = index_of(name)};
+  return {.index = index_of(name)};  // always throws
 }
 
 TableReader::Column TableReader::column(std::size_t index, std::string_view unit) const {
