@@ -91,8 +91,8 @@ class HapticLoop {
   bool has_more_motors_;           ///< the device has torque or gripper motors
   bool has_outputs_;
   std::array<std::uint32_t, kMostOutputs> outputs_set_{};  ///< OutputSettings::One::number of the settings in effect
-  std::array<std::uint32_t, Couplings::kMost> peer_numbers_{};  ///< the number of each current peer; see kRenew
-  std::array<std::optional<ArrivedPort>, Couplings::kMost> peers_{};
+  std::array<std::uint32_t, Couplings::kMost> peer_numbers_{};        ///< the number of each current peer; see kRenew
+  std::array<std::optional<ArrivedPort>, Couplings::kMost> peers_{};  ///< received since the previous step
   Effort applied_;
   std::uint64_t tick_ = 0;
   LocalTime due_{};

@@ -36,7 +36,7 @@ class LogLoop {
   struct Watched {
     const Scene& scene;
     const Device& device;
-    const SafeDevice* safe;
+    const SafeDevice* safe;  ///< null if there is no safety layer
     const HapticLoop& haptic;
     Mailboxes& mail;
     const std::atomic<bool>& not_realtime;  ///< true if the haptic thread did not get its priority

@@ -46,7 +46,7 @@ struct HapticOrder {
 /// A state received from the peer of a coupling.
 struct ArrivedPort {
   PortState state;
-  LocalTime at{};
+  LocalTime at{};          ///< time of arrival
   std::uint32_t peer = 0;  ///< consecutive number of the peer, see HapticOrder::kRenew
 };
 

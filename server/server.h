@@ -47,7 +47,7 @@ class Server {
     std::string name;
     HapticLoop::Stats haptic;
     std::optional<SafeDevice::Status> safety;  ///< empty if the scene has no safety layer
-    std::optional<DeviceCounts> counts;
+    std::optional<DeviceCounts> counts;        ///< empty if it is not a USB device
   };
   struct Summary {
     std::vector<DeviceSummary> devices;
@@ -136,10 +136,10 @@ class Server {
   void print_log();
 
   LocalTime started_;
-  std::unique_ptr<Guardian> guardian_;
+  std::unique_ptr<Guardian> guardian_;  ///< null if there is no real device with motors
   std::vector<Hardware> hardware_;
-  NetworkThreads networks_;  ///< in the order of their devices
-  std::unique_ptr<Announcer> announcer_;
+  NetworkThreads networks_;               ///< in the order of their devices
+  std::unique_ptr<Announcer> announcer_;  ///< null if no scene is announced
   Assembly assembly_;
   std::vector<std::uint64_t> steps_seen_;  ///< by device, at the last call of turning()
 

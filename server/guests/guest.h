@@ -70,15 +70,15 @@ struct View {
   std::uint32_t pressed = 0;  ///< buttons that were pressed since the last state
   struct Ports {
     LocalTime due{};
-    bool peer_waits = false;
+    bool peer_waits = false;  ///< there is a new port of the peer
   };
   std::array<Ports, Shares::kMost> ports{};
 };
 
 struct Guest {
   Address address;
-  ClientRandom random;  ///< from the Hello, to detect repeated Hellos
-  const ClientKey* key;
+  ClientRandom random;   ///< from the Hello, to detect repeated Hellos
+  const ClientKey* key;  ///< null if the session is not encrypted
   std::string name;
   Role role;
   Features features;
@@ -89,14 +89,14 @@ struct Guest {
   Session session;
   LocalTime arrived;
   std::optional<RateAdaptation> adaptation{};
-  std::optional<LinkMeter> meter{};
+  std::optional<LinkMeter> meter{};  ///< only for controllers
   std::uint64_t reports = 0;
-  std::uint64_t lost = 0;        ///< lost datagrams in both directions at the newest force
-  RefusedForces refused{};       ///< since the session was opened
-  RefusedForces refused_told{};  ///< at the time of the last report
-  bool hopeless = false;         ///< as last logged
-  std::optional<Seat> coupled{};
-  bool gone = false;  ///< removed at the end of the turn
+  std::uint64_t lost = 0;         ///< lost datagrams in both directions at the newest force
+  RefusedForces refused{};        ///< since the session was opened
+  RefusedForces refused_told{};   ///< at the time of the last report
+  bool hopeless = false;          ///< as last logged
+  std::optional<Seat> coupled{};  ///< set if it is the peer of a coupling
+  bool gone = false;              ///< removed at the end of the turn
 
   std::uint32_t id() const noexcept { return session.connection_id(); }
   template <const std::string_view& feature>
@@ -153,8 +153,8 @@ struct ServedDevice {
     std::optional<Couple> coupling{};
     /// The channels of the leaders if a follower has more than one. If this is empty, the leader can use any channel.
     std::vector<std::uint32_t> leaders{};
-    std::optional<Peer::Config> dial{};
-    Mailboxes* mail = nullptr;  ///< must outlive the loop
+    std::optional<Peer::Config> dial{};  ///< the server to connect to, if any
+    Mailboxes* mail = nullptr;           ///< must outlive the loop
   };
 
   DeviceDescription about;  ///< `device` is the number in a session
@@ -162,14 +162,14 @@ struct ServedDevice {
   Mailboxes* mail;
   SampledSteps sampled{};
   std::vector<ServedChannel> channels{};
-  std::optional<Couple> coupling{};  ///< our configuration; empty if the device cannot be coupled
-  PortPhase phase = PortPhase::kAlone;
+  std::optional<Couple> coupling{};     ///< our configuration; empty if the device cannot be coupled
+  PortPhase phase = PortPhase::kAlone;  ///< the newest phase of any coupling
   /// By coupling: the channel of the leader. If this is empty, there is one coupling, and any channel can be used.
   std::vector<std::uint32_t> leaders{};
   std::array<std::uint32_t, Shares::kMost> peers{};   ///< by coupling: the number of peers so far
   std::array<PortFrame, Shares::kMost> peer_ports{};  ///< by coupling: the last port of the peer
   Outputs outputs{};
-  std::optional<Health> told{};
+  std::optional<Health> told{};  ///< the last report to observers
   std::uint64_t reports = 0;
 };
 

@@ -34,9 +34,9 @@ class Leases {
 
   struct Taken {
     bool granted = false;
-    std::uint32_t loser = 0;
-    std::uint32_t holder = 0;
-    Duration wait{};  ///< time until the lease can expire; 0 if unknown
+    std::uint32_t loser = 0;   ///< the previous holder, or 0
+    std::uint32_t holder = 0;  ///< the current holder if not granted
+    Duration wait{};           ///< time until the lease can expire; 0 if unknown
   };
   /// The channel is granted if it is free, if it is already held by the guest, or if the lease has expired. With
   /// `may_take_over`, the lease does not need to have expired, but the channel must have one.

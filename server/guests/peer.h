@@ -29,9 +29,9 @@ class Peer {
     Address server;
     std::string name;
     std::optional<Key> key{};  ///< if empty, the session is not encrypted, and the server must be on this machine
-    Seed seed{};
-    std::string device{};   ///< of the server; if empty, the first one
-    std::string channel{};  ///< of the device; if empty, the first one
+    Seed seed{};               ///< must be random
+    std::string device{};      ///< of the server; if empty, the first one
+    std::string channel{};     ///< of the device; if empty, the first one
     Couple couple{};
   };
   struct Notice {
@@ -52,6 +52,7 @@ class Peer {
 
   /// This has no effect if the devices are not coupled.
   void send(LocalTime now, const PortState& port);
+  /// Returns each state of the peer only once.
   std::optional<PortState> take();
 
   void close(LocalTime now);

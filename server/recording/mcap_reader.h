@@ -106,7 +106,7 @@ class McapReader {
   bool ends_with_magic_ = false;
 
   std::uint64_t position_ = 0;
-  std::uint64_t sure_ = 0;
+  std::uint64_t sure_ = 0;  ///< the end of the last valid chunk
   mcap::File::Record record_;
   std::vector<std::byte> content_;
   std::span<const std::byte> chunk_;

@@ -110,8 +110,8 @@ class PartRecorder {
   };
   std::vector<Undecided> undecided_;
   std::vector<bool> faulty_;
-  std::optional<LocalTime> fault_;
-  bool stays_ = false;
+  std::optional<LocalTime> fault_;  ///< start of the newest fault
+  bool stays_ = false;              ///< the current part must be kept
   Counts told_;
   Counts missing_;  ///< since recording was stopped
   LocalTime try_again_{};

@@ -91,7 +91,7 @@ struct Scene {
   std::string axes;  ///< of the base frame, for example "right=x up=y user=z"; empty if unknown
   std::string group;
   Hand hand = Hand::kAny;
-  std::optional<SafeDevice::Config> safety;  ///< required for real motors
+  std::optional<SafeDevice::Config> safety;  ///< empty if there is none; always set for real motors
   HapticLoop::Config loop;
   std::optional<std::uint32_t> cpu;  ///< pins the haptic thread
   std::vector<Channel> channels = {Channel{}};

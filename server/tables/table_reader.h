@@ -51,7 +51,9 @@ class TableReader {
     double divide = 1;
   };
 
+  /// Empty if there is no header.
   const std::vector<std::string>& names() const noexcept { return names_; }
+  /// Returns the header or, if there is none, the first row.
   const std::string& first_line() const noexcept { return first_line_; }
   char separator() const noexcept { return separator_; }
   std::size_t width() const noexcept { return width_; }
