@@ -17,7 +17,7 @@ struct Refusal {
   std::string reason;
 };
 
-/// Determines whether a client is admitted, and which seats it gets (SESSION.md, "Opening"). It does not modify any state.
+/// Determines whether a client is admitted, and which seats it gets (SESSION.md, "Opening"). It does not change state.
 ///
 /// Thread-safe: no. Realtime-safe: no.
 class Admission {
