@@ -9,17 +9,17 @@
 
 namespace tendon::softbody {
 
-/// How a body of the model "near" has answered: what tendon-softbody says at its end. Another body has nothing to say.
+/// How a kNear body has answered: the statistics that tendon-softbody prints when it ends. Empty for other bodies.
 struct Answered {
-  std::vector<Ladder::Step> rungs;      ///< Body::ladder(); none after a cut
-  std::optional<NearModel::Size> near;  ///< Body::near_field(), where another thread makes its fields
+  std::vector<Ladder::Step> rungs;      ///< Body::ladder(); empty after a cut
+  std::optional<NearModel::Size> near;  ///< Body::near_field(), if a background thread makes the fields
 };
 
-/// For people, in one line. Empty: nothing to say.
+/// One line for people. Empty if there is nothing to report.
 std::string in_words(const Answered& answered);
 
-/// The same as a JSON object in one line, or empty: {"answers":{"tabulated":812,"learned":97,"linear":3,"fields":5,
-/// "fields_late":1}}. The rungs come first, by their names; "linear" and the fields only with another thread.
+/// One line of JSON, or empty: {"answers":{"tabulated":812,"learned":97,"linear":3,"fields":5,"fields_late":1}}. The
+/// rungs come first, by name; "linear" and the fields only with a background thread.
 std::string in_json(const Answered& answered);
 
 }  // namespace tendon::softbody

@@ -8,18 +8,17 @@
 
 namespace tendon::softbody {
 
-/// Takes work that answers must not wait for: calls it once, on any thread, at any time. The work owns all that it
-/// touches. Where factors_may_work_at_once() is false it must not be done beside an answer.
+/// Runs a task once, on any thread, at any time. A task owns all data that it touches. If factors_may_work_at_once() is
+/// false, it must not run concurrently with an answer.
 using Background = std::function<void(std::packaged_task<void()>)>;
 
-/// The thread beside the answers. It does what it is given one after the other, in that order, and rests in between. It
-/// gives way to other threads (nice 5): where there is only one processor an answer comes first.
+/// A worker thread that runs tasks in order. It runs at nice 5, so on a single processor answers take precedence.
 ///
 /// Thread-safe: yes. Realtime-safe: give() takes no lock and does not wait.
 class BackgroundThread {
  public:
   BackgroundThread();
-  /// Waits for the work that has begun. The rest is not done.
+  /// Waits for the running task; drops the others.
   ~BackgroundThread();
   BackgroundThread(const BackgroundThread&) = delete;
   BackgroundThread& operator=(const BackgroundThread&) = delete;
@@ -31,7 +30,7 @@ class BackgroundThread {
   void put(Given* last);
   void run();
 
-  std::atomic<Given*> given_{nullptr};  ///< the last first
+  std::atomic<Given*> given_{nullptr};  ///< newest first
   std::atomic<bool> ends_{false};
   std::thread thread_;
 };

@@ -32,7 +32,7 @@
 
 namespace tendon::softbody {
 
-/// The effects that a scene can list under `effects`. An effect that is not listed is not simulated.
+/// Effects that a scene can list under `effects`. Others are not simulated.
 enum class EffectKind : std::uint8_t {
   kContact,
   kGeometricNonlinearity,
@@ -67,29 +67,29 @@ struct EffectInfo {
   EffectKind kind;
   std::string_view name;
   std::string_view what;  ///< one line
-  EffectSet not_with;     ///< effects with which it cannot be simulated
+  EffectSet not_with;     ///< effects that exclude this one
 };
-std::span<const EffectInfo> effects() noexcept;  ///< in the order of their kinds
+std::span<const EffectInfo> effects() noexcept;  ///< indexed by kind
 const EffectInfo& info(EffectKind kind) noexcept;
 
-/// The models that a scene can choose; folder models/ has a file for each family, near/ the last.
+/// Models that a scene can choose. The sources are in models/, and near/ for kNear.
 enum class ModelKind : std::uint8_t { kLinear, kCondensed, kCorotational, kNeoHookean, kNear };
 
 struct ModelInfo {
   ModelKind kind;
-  Law law;                ///< of kNear the usual one: see NearConfig::law
+  Law law;                ///< default for kNear: NearConfig::law
   std::string_view name;  ///< in scenes, tables and command lines
   std::string_view what;  ///< one line
   EffectSet always;       ///< always simulated
-  EffectSet may;          ///< simulated when they are listed
+  EffectSet may;          ///< simulated if listed
 };
 
-/// Every model, in the order in which tables list them.
+/// All models, in the order used by tables.
 std::span<const ModelInfo> models() noexcept;
 const ModelInfo& info(ModelKind kind) noexcept;
 std::optional<ModelKind> model_named(std::string_view name) noexcept;
 
-/// A possible law of the elements near the tool of a kNear body.
+/// A material law for the near elements of a kNear body.
 struct NearLaw {
   Law law;
   std::string_view name;  ///< in scenes
@@ -103,145 +103,148 @@ struct BlockShape {
 struct CylinderShape {
   double radius;  ///< m
   double height;  ///< m
-  int across;     ///< cells from side to side of its core
+  int across;     ///< cells across its core
   int up;         ///< cells along its axis
 };
 struct FileShape {
   std::filesystem::path file;
   double scale;        ///< from the file's units to m
-  bool slits = false;  ///< do not merge nodes at the same place; see joined()
+  bool slits = false;  ///< keep coincident nodes unmerged; see joined()
 };
-/// The settings that only the model kNear uses.
+/// Settings of the model kNear.
 struct NearConfig {
-  Law law = Law::kCorotational;  ///< The law of the elements near the tool. It cannot be kLinear.
-  /// Keeps all unknowns of the boundary instead of modes. This is slow and serves comparisons.
+  Law law = Law::kCorotational;  ///< of the elements near the tool; not kLinear
+  /// Keeps all unknowns of the near-far interface instead of modes. Slow; for comparisons.
   bool exact_interface = false;
-  /// The body learns shapes, or tabulates answers, for presses within BodyConfig::reach of `middle` along each axis. It
-  /// uses them where their error is at most BodyConfig::tolerance. `reach` is then required, and is at most kFarthest
+  /// Precompute shapes (`learn`) or an energy table (`tabulate`) for presses within BodyConfig::reach of `middle` along
+  /// each axis. They answer where their error is at most BodyConfig::tolerance. Both require `reach`, at most kFarthest
   /// patch radii.
   bool learn = false;
   bool tabulate = false;
-  std::filesystem::path learned_in{};  ///< The folder that keeps the results. If it is empty, they are not kept.
-  std::optional<Learned> learned{};    ///< The result of learn() for the uncut body. If it is empty, Body learns.
+  std::filesystem::path learned_in{};  ///< folder for precomputed results; empty: not stored
+  std::optional<Learned> learned{};    ///< result of learn() for the uncut body; empty: Body computes it
 
   bool learns() const noexcept { return learn || tabulate; }
 
   static constexpr double kFarthest = 1.5;
-  static constexpr double kErrorOfLearned = 0.02;  ///< The default tolerance of a body that learns.
+  static constexpr double kErrorOfLearned = 0.02;  ///< default tolerance of a body that learns
 };
 
-/// The description of a soft body that a tool touches, as plain values. Blocks and cylinders stand on z = 0.
+/// A soft body and the tool that touches it, as plain values. Blocks and cylinders stand on z = 0.
 struct BodyConfig {
   std::variant<BlockShape, CylinderShape, FileShape> shape;
   Element element = Element::kHex8Sri;
   Material material;
-  std::vector<Region> regions{};  ///< parts of another material; where two overlap, the later one counts
+  std::vector<Region> regions{};  ///< parts of another material; the last one wins where they overlap
   ModelKind model = ModelKind::kCondensed;
   NearConfig near{};
-  /// For kCondensed: the table that condense() has made. If it is empty, Body makes one.
+  /// kCondensed: a table written by condense(). Empty: Body computes it.
   std::optional<std::filesystem::path> table_file{};
-  int max_iterations = QuasiStaticModel::Config{}.max_iterations;  ///< for models that iterate until they converge
-  /// Of the force, for the same models: an answer ends when it may be wrong by so much, and says so (Feel::error).
+  int max_iterations = QuasiStaticModel::Config{}.max_iterations;  ///< iterative models: per answer
+  /// Iterative models: an answer ends when its estimated relative force error, reported in Feel::error, is at most
+  /// this.
   double tolerance = QuasiStaticModel::Config{}.tolerance;
-  EffectsConfig effects;           ///< effects that act on the whole body
+  EffectsConfig effects;           ///< effects on the whole body
   std::optional<double> friction;  ///< coefficient
-  std::vector<PlannedCut> cuts;    ///< in the order in which they are made
+  std::vector<PlannedCut> cuts;    ///< in order of execution
   std::optional<StiffnessOverTime> stiffening;
   std::optional<Yield> plasticity;
-  std::optional<double> self_collision;  ///< m: the overlap at which two sides press on each other with Young's modulus
-  double clamped_below = 0;  ///< m; nodes up to this height above the lowest ones are held. The lowest always are
+  std::optional<double> self_collision;  ///< m, overlap at which two sides press with Young's modulus
+  double clamped_below = 0;  ///< m above the lowest nodes; nodes up to this height are fixed, and the lowest always are
 
   Vec3 towards_tool = Vec3::UnitZ();  ///< unit vector, body frame
   double patch_radius = 0;            ///< m
-  std::optional<double> reach;        ///< m, kCondensed: largest distance of a touch from `middle`; empty: no limit
-  Vec3 middle = Vec3::Zero();         ///< m; only its position across `towards_tool` counts
+  /// m, kCondensed: largest tangential distance of a touch from `middle`; empty: no limit
+  std::optional<double> reach;
+  Vec3 middle = Vec3::Zero();  ///< m; only the tangential position counts
   Tool tool;
   double layer = 1e-4;              ///< m, rigid tools on nonlinear bodies: Layer::Config::thickness
-  std::size_t hands = 1;            ///< rigid tools on nonlinear bodies: how many hands hold one each
-  Vec3 tool_offset = Vec3::Zero();  ///< m, handle frame, from the handle's position to the tool's middle
+  std::size_t hands = 1;            ///< rigid tools on nonlinear bodies: number of hands, with one tool each
+  Vec3 tool_offset = Vec3::Zero();  ///< m, handle frame, from the handle's position to the tool's center
   PatchContact::Side side = PatchContact::Side::kUnilateral;
-  /// The stiffness of linear models, and with plasticity, is the whole second derivative of the energy on a flat
-  /// surface too. On a curved one, and of other models at rest, it always is.
+  /// Computes the full second derivative of the energy as stiffness also for linear models and plasticity on a flat
+  /// surface. On a curved surface, and for other models at rest, it is always computed.
   bool whole_stiffness = false;
 };
 
-/// Whether the tool is rigid and presses a nonlinear body: RigidContact.
+/// Whether the tool is rigid and the body nonlinear, so that RigidContact is used.
 bool is_rigid_on_nonlinear(const BodyConfig& config);
 
-/// Whether contact gives a torque: the tool is neither a patch nor a sphere, or its middle is not where the handle is.
+/// Whether contact produces a torque: the tool is not a patch or sphere, or is offset from the handle.
 bool turns_the_hand(const BodyConfig& config);
 
-/// From the handle to the tool's point that is farthest in the body, m, body frame, with the handle turned by `turn`.
+/// Vector from the handle to the tool's deepest point, m, body frame, with handle orientation `turn`.
 Vec3 lowest_of_tool(const BodyConfig& config, const Mat3& turn);
 
-/// The effects that `config` simulates, including those of its model.
+/// The simulated effects, including those implied by the model.
 EffectSet effects_of(const BodyConfig& config);
 
-/// Whether nothing takes energy on a closed way of the tool: a body at rest at every instant, solved until it is, with
-/// no effect that loses or changes anything.
+/// Whether a closed path of the tool loses no energy: the body is always at rest, the solution is converged, and no
+/// effect dissipates or changes the body.
 bool is_elastic(const BodyConfig& config);
 
-/// The table of a kCondensed body, to be kept in a file. `solver` says how the body is solved: on this machine
-/// (with_factor), or on many (mpi/spread_solver.h). Throws what Body throws, and what the solver throws.
+/// Computes the table of a kCondensed body, to be stored in a file. `solver` solves the body on this machine
+/// (with_factor) or on many (mpi/spread_solver.h). Throws the errors of Body and of the solver.
 SurfaceTable condense(const BodyConfig& config, const SolverOf& solver = with_factor);
 
-/// What a kNear body that learns is to know, for NearConfig::learned; for others nothing. It can take
-/// minutes, says so to `tell`, and is read where it was kept. Throws what Body throws, and std::runtime_error when
-/// something cannot be kept.
+/// Precomputes a kNear body for NearConfig::learned; empty for other bodies. Reads the stored result if there is one;
+/// otherwise it can take minutes and reports progress to `tell`. Throws the errors of Body, and std::runtime_error if a
+/// result cannot be stored.
 Learned learn(const BodyConfig& config, const Tell& tell);
 
 /// Mesh, model and contact of one body, built from a BodyConfig. Thread-safe: no. Realtime-safe: no.
 class Body {
  public:
-  /// Throws std::invalid_argument with a sentence when the values describe no possible body, or when the cuts leave
-  /// nothing to touch.
+  /// Throws std::invalid_argument if the values describe no valid body, or if the cuts leave nothing to touch.
   explicit Body(const BodyConfig& config);
-  /// The same, solved by `solver`: a kLinear body without effects but contact and friction; others are refused.
+  /// Solved by `solver`: only for a kLinear body with no effects other than contact and friction. Throws
+  /// std::invalid_argument for others.
   Body(const BodyConfig& config, const SolverOf& solver);
   ~Body();
   Body(Body&&) noexcept;
   Body& operator=(Body&&) noexcept;
 
-  /// The force on a tool with its middle at `tool` (m, body frame), for a capsule with the handle not turned. A body
-  /// with time advances by one step. A cut that waits for this answer's force is made after the answer: the next answer
-  /// is that of the cut body, and says so.
+  /// The force on a tool centered at `tool` (m, body frame), with the handle not rotated. Advances a body with time by
+  /// one step. A cut triggered by this answer's force is made afterwards; the next answer belongs to the cut body and
+  /// sets Feel::topology_changed.
   Feel touch(const Vec3& tool);
 
-  /// The same with the handle at `handle` (body frame): the tool is at its offset from there, and where
-  /// turns_the_hand() the answer has the torque about the handle's position.
+  /// With the handle at `handle` (body frame) and the tool at its offset. If turns_the_hand(), the answer includes the
+  /// torque about the handle's position.
   Feel touch(const Pose& handle);
 
-  /// The same for a body that several hands hold at once: one solution, and what each of them feels. Empty: that hand
-  /// is nowhere. As many as BodyConfig::hands.
+  /// For a body held by several hands: one joint solution, and each hand's answer. `handles` has BodyConfig::hands
+  /// entries; an empty one means an absent hand.
   std::vector<Feel> touch(std::span<const std::optional<Pose>> handles);
 
-  /// From now on no answer waits for a cut, nor for a near field. `background` is called when a cut is due: until its
-  /// work has been done answers are those of the body before the cut, and their error is at least their force, because
-  /// the cut body may push so much less. The first touch() after the work continues from the shape before the cut, with
-  /// what has been prepared. `background` is also called when a kNear body wants its next near field
-  /// (NearModel::make_fields_by). What the work throws, the next touch() throws. Without this call a cut is made between
-  /// two answers, and a near field in pieces within them.
+  /// Moves the preparation of cuts and near fields to `background`, so that no answer waits for it. While a cut is
+  /// being prepared, answers are those of the uncut body with an error of at least their force, because the cut body
+  /// may push much less. The first touch() after completion continues from the current shape on the prepared body. A
+  /// kNear body also requests its near fields this way (NearModel::make_fields_by). An exception in the work is
+  /// rethrown by the next touch(). Without this call, cuts are made between answers and near fields in pieces within
+  /// answers.
   void prepare_by(Background background);
 
-  /// Sets the time since the scene began, s: Young's modulus becomes that of `time`, and cuts that are due are made. An
-  /// earlier time undoes no cut.
+  /// Sets the time since the start of the scene, s: updates Young's modulus and makes the cuts that are due. An earlier
+  /// time undoes no cut.
   void tick(double time);
-  bool has_clock() const noexcept;  ///< true when tick() changes anything
+  bool has_clock() const noexcept;  ///< true if tick() has an effect
 
-  /// Presses the model with a patch around the middle, for scripted tests of stiffness and force. A body with time
-  /// advances by one step; `settle` repeats until the body is at rest, or until an iterative model has converged.
+  /// Presses the model with a patch at `middle`, for tests of stiffness and force. Advances a body with time by one
+  /// step; settle() repeats until the body is at rest or an iterative model has converged.
   Reaction press(Given given, double value);
   Reaction settle(Given given, double value);
 
-  /// m, how deep the middle may be pressed before the material rotates anywhere by more than kLargestTurn. Beyond that,
-  /// a model without geometric nonlinearity mistakes rotations for strains (of 1 − cos) and gives wrong forces; ∞ for
-  /// the other models. Each call makes a factor, but for a table from a file, which tells it.
+  /// Depth in m to which `middle` may be pressed before the material rotates anywhere by more than kLargestTurn. Beyond
+  /// it a model without geometric nonlinearity takes rotation for strain (1 − cos) and its forces are wrong. ∞ for
+  /// other models. Each call factorizes, unless a table file provides the value.
   double linear_up_to() const;
-  static constexpr double kLargestTurn = 0.1;  ///< rad; B1's force is then 5 to 7 % above corotational's
+  /// rad; on the benchmark block B1 the force is then 5 to 7 % above the corotational one
+  static constexpr double kLargestTurn = 0.1;
 
-  double step() const noexcept;  ///< s, the time that an answer simulates; 0: at rest at every instant
+  double step() const noexcept;  ///< s simulated per answer; 0: always at rest
 
-  /// The point of the surface at rest above `middle`, and the direction from there to the tool; body frame.
+  /// The surface point at rest at `middle`, and the unit normal towards the tool; body frame.
   Vec3 touch_point() const;
   const Vec3& normal() const;
 
@@ -253,11 +256,11 @@ class Body {
     std::size_t bytes;      ///< kept by the model, effects included
   };
   Size size() const;
-  /// The near field, of a kNear body; and what answers before it, where something was learned.
+  /// Of a kNear body: the near field, and the precomputed rungs, if any.
   std::optional<NearModel::Size> near_field() const;
   std::vector<Ladder::Step> ladder() const;
-  /// The size of the body that `config` describes, without its model: `bytes` is 0. `under_patch`: the nodes of the
-  /// patch around the middle. Throws as the constructor does.
+  /// Size of the body without building its model (`bytes` is 0). `under_patch` receives the number of nodes of the
+  /// patch at `middle`. Throws the errors of the constructor.
   static Size size_of(const BodyConfig& config, int& under_patch);
 
  private:

@@ -12,43 +12,40 @@
 
 namespace tendon::softbody {
 
-/// A body in its place in a scene. It converts between the device's frame and the body's own.
+/// A body at its place in a scene. Converts between the device frame and the body frame.
 class PlacedBody {
  public:
-  /// Throws std::invalid_argument when the scene describes no possible body.
+  /// Throws std::invalid_argument if the scene describes no valid body.
   explicit PlacedBody(const Scene& scene) : PlacedBody(scene, Body(scene.body)) {}
-  /// The same with its body made already.
+  /// With a body that was built before.
   PlacedBody(const Scene& scene, Body body);
 
-  /// The force on the hand at `position` (m, device frame) with the handle not turned, or at `handle`; all vectors are
-  /// in the device frame. A body with time advances by one step.
+  /// Force on the hand at `position` (m, device frame; handle not rotated) or at `handle`. All vectors are in the
+  /// device frame. Advances a body with time by one step.
   Feel touch(const Vec3& position) { return touch(Pose{.position = position}); }
   Feel touch(const Pose& handle);
 
-  /// The same as an answer to the server. It has the stiffness and how far that holds, the solver's error and, unless
-  /// the tool sticks, the surface. Where turns_the_hand() it has the torque, and the angular stiffness when the device
-  /// measures its handle's orientation; when it does not, the handle counts as not turned. With Scene::table it has the
-  /// force at other depths too: the table begins at the surface, or half a table's depth above the tool where that is
-  /// deeper.
+  /// The answer to the server: stiffness and its valid radius, the solver's error and, unless the tool sticks, the
+  /// surface. If turns_the_hand(), also the torque, and the angular stiffness if the device measures its orientation;
+  /// otherwise the handle counts as not rotated. With Scene::table, also the force at other depths; the table starts at
+  /// the surface, or half its depth above the tool if that is deeper.
   ///
-  /// A body with time moves the tool from the hand's last position to this one, in the steps that fit between the two
-  /// samples; when none fits, the last answer is repeated. After more than `kMostBehind`, or when the server's clock is
-  /// set back, it takes a single step: a pause is not caught up. The times that a scene plans count from the sample of
-  /// the first answer.
+  /// A body with time moves the tool from the previous hand position to this one in as many steps as fit between the
+  /// samples; if none fits, the previous answer is repeated. After more than kMostBehind, or if the server's clock went
+  /// back, it takes a single step: pauses are not caught up. Scene times count from the sample of the first answer.
   Touch answer(const DeviceState& hand);
   static constexpr Duration kMostBehind = std::chrono::milliseconds(200);
 
-  /// The answers to all hands of the scene at once, by their order there: one solution, each the answer to its own
-  /// state. Empty: that hand is nowhere, and so is its answer (Touch::unknown).
+  /// Answers to all hands of the scene, in scene order, from one solution. An absent hand (empty state) gets an empty
+  /// answer (Touch::unknown).
   std::vector<Touch> answer(std::span<const std::optional<DeviceState>> hands);
 
-  /// See Body.
   void prepare_by(Background background) { body_.prepare_by(std::move(background)); }
 
-  std::optional<NearModel::Size> near_field() const { return body_.near_field(); }  ///< see Body
-  std::vector<Ladder::Step> ladder() const { return body_.ladder(); }               ///< see Body
-  double linear_up_to() const { return body_.linear_up_to(); }                      ///< see Body
-  double deepest() const noexcept { return deepest_; }  ///< m, the greatest depth of the tool so far
+  std::optional<NearModel::Size> near_field() const { return body_.near_field(); }
+  std::vector<Ladder::Step> ladder() const { return body_.ladder(); }
+  double linear_up_to() const { return body_.linear_up_to(); }
+  double deepest() const noexcept { return deepest_; }  ///< m, greatest tool depth so far
 
  private:
   void tick(PeerTime sampled);
@@ -61,19 +58,19 @@ class PlacedBody {
   struct Followed {
     PeerTime sampled;
     Pose handle;
-    Duration owed;  ///< time still to be simulated, less than a step
+    Duration owed;  ///< time still to simulate, less than one step
     Feel feel;
   };
 
   Body body_;
   Mat3 to_device_;
-  Vec3 origin_;                ///< of the body's frame, in the device's
-  std::vector<Vec3> origins_;  ///< the same for each of several hands
+  Vec3 origin_;                ///< body frame origin in the device frame
+  std::vector<Vec3> origins_;  ///< origin_ for each of several hands
   Vec3 normal_;                ///< towards the hand
   bool only_pushes_;
   bool turns_;                     ///< turns_the_hand()
-  double depths_;                  ///< m, the depth of the table
-  std::optional<PeerTime> first_;  ///< the time of the first sample that was answered; for bodies with a clock
+  double depths_;                  ///< m, depth range of the force table
+  std::optional<PeerTime> first_;  ///< sample time of the first answer; for bodies with a clock
   std::optional<Followed> followed_;
   double deepest_ = 0;
 };

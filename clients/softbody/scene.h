@@ -12,22 +12,22 @@
 
 namespace tendon::softbody {
 
-/// The body that tendon-softbody simulates, and its place in front of the device.
+/// The simulated body and its place in front of the device.
 struct Scene {
   BodyConfig body;
-  Vec3 at = Vec3::Zero();             ///< m, device frame: the touch point of the body at rest
-  Vec3 towards_hand = Vec3::UnitZ();  ///< unit vector, device frame: the direction from the body to the tool
-  /// Several hands that hold the body at once, each at a device of its own; empty: one hand, at `at`.
+  Vec3 at = Vec3::Zero();             ///< m, device frame: touch point of the body at rest
+  Vec3 towards_hand = Vec3::UnitZ();  ///< unit vector, device frame, from the body to the tool
+  /// Several hands that hold the body together, each with its own device. Empty: one hand, at `at`.
   struct Hand {
-    std::string device;      ///< its name at its server
+    std::string device;      ///< name at its server
     std::string server;      ///< HOST:PORT; empty: the one of the command line
-    Vec3 at = Vec3::Zero();  ///< m, as Scene::at, in the frame of this device
+    Vec3 at = Vec3::Zero();  ///< m, device frame of this device; as Scene::at
   };
   std::vector<Hand> hands = {};
-  double table = 0;  ///< m, the depths that an answer's table of forces covers; 0: no table
+  double table = 0;  ///< m, depth range of the force table in an answer; 0: no table
 };
 
-/// Turns the body's frame into the device's.
+/// Rotation from the body frame to the device frame.
 Mat3 to_device(const Scene& scene);
 
 /// An error in a scene: "FILE:LINE: KEY: expected …, found …".
@@ -36,29 +36,29 @@ class SceneError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// Reads a scene file (TOML); `scene_reference()` lists its keys. Only the effects listed in `effects` are simulated. A
-/// listed effect that the model does not simulate is an error, and so is an effect that the model always simulates when
-/// it is not listed. Throws SceneError, or std::runtime_error if the file cannot be read.
+/// Reads a scene file (TOML; scene_reference() lists the keys). Only listed effects are simulated. Listing an effect
+/// that the model does not simulate is an error, and so is omitting one that it always simulates. Throws SceneError, or
+/// std::runtime_error if the file cannot be read.
 Scene read_scene(const std::filesystem::path& file);
 
-/// The same for text in memory. Errors call it `name`; the path of a mesh is relative to `directory`.
+/// Reads text in memory. `name` is used in error messages; mesh paths are relative to `directory`.
 Scene parse_scene(std::string_view text, const std::string& name, const std::filesystem::path& directory);
 
-/// Every key that a scene may have, and every name that a value may have.
+/// Text that lists all scene keys and value names.
 std::string scene_reference();
 
-/// Warnings about this body, including the repairs in its mesh file and its tool file. Reads both files. Throws
-/// std::invalid_argument if a file cannot be read.
+/// Warnings about the body, including repairs in its mesh and tool files, which are read. Throws std::invalid_argument
+/// if a file cannot be read.
 std::vector<std::string> warnings(const BodyConfig& body);
 /// Writes each warning as a line "PROGRAM: warning: …".
 void warn(std::ostream& to, std::string_view program, const BodyConfig& body);
 
-/// m, how deep a patch may press a nonlinear body before its fixed size makes a force that a rigid tool would not have;
-/// ∞ for other models and tools. And the warning for one that is deeper.
+/// Depth in m to which a patch may press a nonlinear body before its fixed size gives a force that a rigid tool would
+/// not have; ∞ for other models and tools. beyond_the_patch() is the warning for a deeper tool.
 double patch_up_to(const BodyConfig& body);
 std::string beyond_the_patch(const BodyConfig& body);
 
-/// The warning for a tool that is deeper than Body::linear_up_to(), m.
+/// Warning for a tool deeper than Body::linear_up_to(), m.
 std::string turned_too_far(double linear_up_to);
 
 }  // namespace tendon::softbody

@@ -9,14 +9,13 @@
 
 namespace tendon::softbody {
 
-/// What each way to answer a body would cost, predicted from its size alone and from figures that were measured once, at
-/// quadratic blocks on cores of 2023 (clients/softbody/README.md). Good to a factor of two or three: to choose a way by,
-/// not to promise a rate by.
+/// Predicted costs of the ways to answer a body, from its size alone. The constants were measured on quadratic blocks
+/// on processors of 2023. Accurate to a factor of two or three: enough to choose a method, not to promise a rate.
 ///
 ///     factor      answer 28 ms (N / 55 539)^(4/3), set up 2.8 s (N / 55 539)², memory 320 MB (N / 55 539)^(4/3)
-///     multigrid   3.3 rounds of N c / P + 6 L h + g + 3 a log₂ P on P ranks, L = log₂(n / 4) levels of n = (N / 3)^(1/3) / 2
-///                 cells, with c = 1.3 µs, h = 10 µs, g = 100 µs, a = 1.5 µs: a cluster's network
-///     table       m columns of the factor; 8 m (m + 1) / 2 bytes; 2 µs (k / 63)² an answer of k nodes below the patch
+///     multigrid   3.3 rounds of N c / P + 6 L h + g + 3 a log₂ P on P ranks, with L = log₂(n / 4) levels of
+///                 n = (N / 3)^(1/3) / 2 cells, c = 1.3 µs, h = 10 µs, g = 100 µs, a = 1.5 µs (cluster network)
+///     table       m solves with the factor; 8 m (m + 1) / 2 bytes; 2 µs (k / 63)² per answer, k nodes below the patch
 struct Estimate {
   struct Cost {
     double answer_s = 0;
@@ -32,14 +31,14 @@ struct Estimate {
   Cost factor;
   std::vector<Spread> multigrid;
   enum class Take : std::uint8_t { kTable, kFactor, kMultigrid } take = Take::kTable;
-  int ranks = 1;  ///< with kMultigrid: the fewest that answer within kFeltLate, or those that answer soonest
+  /// with kMultigrid: the fewest ranks that answer within kFeltLate, or else the number that answers soonest
+  int ranks = 1;
 };
 inline constexpr double kFeltLate = 0.01;       ///< s
-inline constexpr double kMostTableBytes = 4e9;  ///< of a table and a factor on one machine
+inline constexpr double kMostTableBytes = 4e9;  ///< table and factor on one machine
 inline constexpr double kMostFactorBytes = 16e9;
 
-/// `under_patch`: nodes below the patch (Body::size_of). `ranks`: one number of ranks or more, each at
-/// least 1.
+/// `under_patch`: nodes below the patch (Body::size_of). `ranks`: one or more numbers of ranks, each at least 1.
 Estimate estimate(const Body::Size& size, int under_patch, std::vector<int> ranks);
 
 std::string in_words(const Estimate& estimate);

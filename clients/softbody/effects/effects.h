@@ -10,10 +10,9 @@
 
 namespace tendon::softbody {
 
-/// An effect beside elasticity on the whole body. Within one time step it is an energy, quadratic in the free
-/// displacements u, and the body moves to the minimum of the sum of all energies; with inertia that is the implicit
-/// Euler method. An effect that a scene does not list is not constructed, has no state, and costs a step no
-/// instruction.
+/// An effect on the whole body besides elasticity. Within a time step it is an energy that is quadratic in the free
+/// displacements u; the body moves to the minimum of the total energy, which with inertia is implicit Euler. Effects
+/// that a scene does not list are not constructed and cost nothing.
 ///
 /// Thread-safe: no. Realtime-safe: no.
 class Effect {
@@ -26,14 +25,14 @@ class Effect {
   virtual double energy(const VectorXd& u) const = 0;                    ///< J, up to a constant
   virtual void add_force(const VectorXd& u, VectorXd& force) const = 0;  ///< N, −∂energy/∂u
   virtual void add_stiffness(SymmetricMatrix& to) const = 0;             ///< N/m, ∂²energy/∂u², which is constant
-  virtual void advance(const VectorXd& u) = 0;                           ///< a step ends at u; the next begins there
+  virtual void advance(const VectorXd& u) = 0;                           ///< ends a step at u and begins the next there
   virtual std::size_t bytes() const noexcept = 0;
 };
 
-/// Weight: −Σ m g·u.
+/// Weight: energy −Σ m g·u.
 class Gravity : public Effect {
  public:
-  /// `acceleration` in the body's frame, m/s²; `density` kg/m³.
+  /// `acceleration`: m/s², body frame; `density`: kg/m³.
   Gravity(const Elastic& elastic, const Vec3& acceleration, double density);
   double energy(const VectorXd& u) const override { return -weight_.dot(u); }
   void add_force(const VectorXd&, VectorXd& force) const override { force += weight_; }
@@ -45,7 +44,7 @@ class Gravity : public Effect {
   VectorXd weight_;  ///< N
 };
 
-/// Inertia: ½ Σ m (u − u₀ − v₀ dt)² / dt², for a step from u₀ with the velocity v₀.
+/// Inertia: energy ½ Σ m (u − u₀ − v₀ dt)² / dt² for a step from u₀ with velocity v₀.
 class Inertia : public Effect {
  public:
   Inertia(const Elastic& elastic, const VectorXd& u, double density, double dt);
@@ -61,8 +60,8 @@ class Inertia : public Effect {
   VectorXd ahead_;   ///< u₀ + v₀ dt, m
 };
 
-/// Viscous drag on every particle, −rate·m·v: ½ Σ rate/dt m (u − u₀)². It also slows a body that moves as a whole, so
-/// it serves to bring a body to rest and does not model tissue.
+/// Viscous drag on every particle, −rate·m·v: energy ½ Σ rate/dt m (u − u₀)². It also slows rigid motion, so it only
+/// serves to bring a body to rest; it is not a tissue model.
 class Damping : public Effect {
  public:
   /// `rate` 1/s.
@@ -78,9 +77,8 @@ class Damping : public Effect {
   VectorXd start_;  ///< u₀, m
 };
 
-/// A material that resists fast deformation (Kelvin and Voigt): a strain ε has the stress of ε + τ ∂ε/∂t. With the
-/// stiffness K₀ of the body at rest: ½ τ/dt (u − u₀)ᵀ K₀ (u − u₀). Valid for small rotations only: a body that turns as
-/// a whole is slowed too.
+/// Kelvin–Voigt material: a strain ε has the stress of ε + τ ∂ε/∂t. With K₀ the stiffness at rest, the energy is ½ τ/dt
+/// (u − u₀)ᵀ K₀ (u − u₀). Valid for small rotations only: rigid rotation is slowed too.
 class Viscosity : public Effect {
  public:
   /// `relaxation` τ, s.
@@ -96,12 +94,12 @@ class Viscosity : public Effect {
   VectorXd start_;              ///< u₀, m
 };
 
-/// The effects of a scene. Empty or false: not simulated, costs nothing.
+/// Effects of a scene. Empty or false: not simulated.
 struct EffectsConfig {
-  double density = 0;                    ///< kg/m³, above 0; for gravity, inertia and damping
-  double step = 0;                       ///< s, above 0: the time step of an answer; for effects with time
-  std::optional<Vec3> gravity = {};      ///< m/s², in the body's frame
-  bool inertia = false;                  ///< has time, as the next two have
+  double density = 0;                ///< kg/m³, positive; for gravity, inertia and damping
+  double step = 0;                   ///< s, positive: time step of an answer; for inertia, damping and viscosity
+  std::optional<Vec3> gravity = {};  ///< m/s², in the body's frame
+  bool inertia = false;
   std::optional<double> damping = {};    ///< 1/s
   std::optional<double> viscosity = {};  ///< s
 
@@ -113,12 +111,12 @@ void check(const EffectsConfig& config);
 
 using Effects = std::vector<std::unique_ptr<Effect>>;
 
-/// The effects that act even on a body at rest; and those that act only on a moving body, which starts from rest at u
-/// (m, free displacements).
+/// effects_at_rest() makes the effects that act on a body at rest. add_effects_of_time() adds those that act on a
+/// moving body, starting from rest at u (m, free displacements).
 Effects effects_at_rest(const EffectsConfig& config, const Elastic& elastic);
 void add_effects_of_time(Effects& effects, const EffectsConfig& config, const Elastic& elastic, const VectorXd& u);
 
-/// Adds the effects' energy and forces at u (m, all nodes) to those of elasticity; forces on free displacements.
+/// Adds the effects' energy and free forces at u (m, all nodes) to those of elasticity.
 void add_forces(const Effects& effects, const Elastic& elastic, const VectorXd& u, Elastic::Forces& to);
 
 std::size_t bytes(const Effects& effects) noexcept;

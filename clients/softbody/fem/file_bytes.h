@@ -15,19 +15,19 @@ namespace tendon::softbody {
 
 static_assert(std::endian::native == std::endian::little, "the bytes of files are those of memory");
 
-/// Appends a number as its bytes, little-endian.
+/// Appends the bytes of a number, little-endian.
 template <class Value>
 void put(std::string& bytes, const Value& value) {
   const auto raw = std::bit_cast<std::array<char, sizeof(Value)>>(value);
   bytes.append(raw.data(), raw.size());
 }
 
-/// Takes numbers from the front of what is left.
+/// Reads numbers from the front of a byte string.
 class ByteReader {
  public:
   explicit ByteReader(std::string_view bytes) : left_(bytes) {}
 
-  /// Throws std::invalid_argument when too little is left.
+  /// Throws std::invalid_argument if too few bytes remain.
   template <class Value>
   Value take() {
     if (left_.size() < sizeof(Value)) throw std::invalid_argument("it breaks off");
@@ -45,8 +45,8 @@ class ByteReader {
 /// XXH3, 64 bits.
 std::uint64_t checksum(std::string_view bytes);
 
-/// Writes a file that is given its name by the caller, when it is whole. Throws std::runtime_error if
-/// the file cannot be written. In this case the file is removed.
+/// Writes a temporary file, which the caller renames once it is complete. Throws std::runtime_error and removes the
+/// file if it cannot be written.
 void write_draft(const std::filesystem::path& draft, std::string_view bytes);
 
 }  // namespace tendon::softbody

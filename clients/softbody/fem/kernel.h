@@ -10,32 +10,33 @@
 
 namespace tendon::softbody {
 
-/// Four numbers on which the same is done. GCC's and Clang's vectors compile on every processor: where it has no
-/// registers of this width, they become two of half of it, or four numbers.
+/// Four numbers processed together. GCC and Clang vector extensions compile on every processor; without registers of
+/// this width they become two half-width vectors or four scalars.
 inline constexpr std::size_t kLanes = 4;
 using Lanes [[gnu::vector_size(sizeof(double) * kLanes)]] = double;
 
-/// Energy and forces of elements of one shape and law, four at a time. What does not depend on the displacements is
-/// kept as a structure of arrays: of four elements each number lies beside the others'. No step of the sum depends on
-/// the processor, so results are the same, bit for bit, where it has registers for four numbers and where it has not.
+/// Energy and forces of elements of one shape and law, four elements at a time. Everything independent of the
+/// displacements is stored as a structure of arrays, with the values of four elements next to each other. The order of
+/// summation does not depend on the processor, so results are bit-identical with and without wide registers.
 ///
-/// Thread-safe: yes, once built. Realtime-safe: adding forces is.
+/// Thread-safe: yes, after construction. Realtime-safe: only add_forces().
 class Kernel {
  public:
-  /// Of elements with so many nodes (4, 8, 20 or 27) and points of integration; has no elements yet.
+  /// An empty kernel for elements with `nodes` nodes (4, 8, 20 or 27) and `points` quadrature points.
   Kernel(Law law, int nodes, int points);
 
   using Nodal = Eigen::Matrix<double, 3, Eigen::Dynamic, 0, 3, kMaxNodes>;
   using Gradient = Eigen::Map<const Nodal, 0, Eigen::Stride<3 * kLanes, kLanes>>;
 
-  /// One more element, and the part of it at each of its points: ∂Nᵢ/∂X, 1/m; µ and λ times the volume, J.
+  /// Appends an element. set_point() then sets each of its quadrature points: ∂Nᵢ/∂X in 1/m, and µ and λ times volume
+  /// in J.
   void add_element(std::span<const int> nodes);
   void set_point(int element, int point, const Nodal& gradient, double mu, double lambda);
   Gradient gradient(int element, int point) const;
 
   int elements() const noexcept { return elements_; }
 
-  /// Adds ∂energy/∂u at u (m, all nodes) to `force`, N. Returns the energy, J.
+  /// Adds ∂energy/∂u at u (m, all nodes) to `force` (N). Returns the energy, J.
   double add_forces(const VectorXd& u, VectorXd& force) const;
 
   std::size_t bytes() const noexcept;
@@ -51,11 +52,11 @@ class Kernel {
 
   Law law_;
   int per_element_;  ///< nodes
-  int points_;       ///< of an element
+  int points_;       ///< quadrature points per element
   int elements_ = 0;
-  std::vector<int> nodes_;  ///< of each element, one after the other
-  /// Of each point of four elements: 3 × nodes lanes of ∂N/∂X, and two of the moduli. Zero where the last four are not
-  /// full.
+  std::vector<int> nodes_;  ///< of each element, concatenated
+  /// Per quadrature point and group of four elements: 3 × nodes lanes of ∂N/∂X, and two lanes of moduli. Zero-padded if
+  /// the last group is not full.
   std::vector<double> gradients_;
   std::vector<double> moduli_;
 };

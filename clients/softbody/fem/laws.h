@@ -9,11 +9,11 @@
 
 namespace tendon::softbody {
 
-/// The laws of material.h for numbers of either kind: a double, or Lanes, which are four at a time. µ and λ come
-/// multiplied by the volume that they are integrated over, so energies are in J, and P in N·m.
+/// The laws of material.h for a scalar (double) or for four at a time (Lanes). µ and λ are premultiplied by the
+/// integration volume, so energies are in J and P is in N·m.
 
-/// How often Newton's iteration turns F towards its rotation, and the square of the last change that is too large: the
-/// rotation of that lane is then found alone, by nearest_rotation(). Below this det F it is not tried.
+/// Newton iterations of the polar decomposition, and the largest accepted squared change of the last one. A lane that
+/// changes more, or with det F below kPolarDeterminant, is computed separately by nearest_rotation().
 inline constexpr int kPolarSteps = 6;
 inline constexpr double kPolarChange = 1e-20;
 inline constexpr double kPolarDeterminant = 0.1;
@@ -35,7 +35,7 @@ namespace kernel {
 template <class Number>
 inline constexpr std::size_t kLanesOf = sizeof(Number) / sizeof(double);
 
-/// ∂J/∂F; matrices are nine numbers, column by column.
+/// c = ∂J/∂F. A matrix is nine numbers in column-major order.
 template <class Number>
 [[gnu::always_inline]] inline void cofactor(const Number* f, Number* c) {
   const auto cross = [](const Number* a, const Number* b, Number* r) __attribute__((always_inline)) {
@@ -75,7 +75,7 @@ template <class Number>
   }
 }
 
-/// Adds the energy at F to `energy`; `p` becomes P.
+/// Adds the energy at F to `energy` and writes the first Piola-Kirchhoff stress P to `p`.
 template <Law kLaw, class Number>
 [[gnu::always_inline]] inline void respond(const Number* f, const Number& mu, const Number& lambda, Number& energy,
                                            Number* p) {

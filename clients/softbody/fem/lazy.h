@@ -8,8 +8,8 @@
 
 namespace tendon::softbody {
 
-/// What is made when it is first asked for, and kept: a body whose equations are solved elsewhere never needs most of
-/// what a body that solves its own does.
+/// A value computed on first use and then kept. A body whose equations are solved by another process never needs most
+/// of these values.
 ///
 /// Thread-safe: get() is. Realtime-safe: no.
 template <class T>
@@ -28,7 +28,7 @@ class Lazy {
     return *this;
   }
 
-  /// `make` returns a T. It is called once, whoever asks.
+  /// Returns the value. Calls `make` at most once, even with concurrent callers.
   template <class Make>
   const T& get(const Make& make) const {
     if (const T* const value = made()) return *value;
@@ -40,7 +40,7 @@ class Lazy {
     return *owner_;
   }
 
-  const T* made() const noexcept { return value_.load(std::memory_order_acquire); }  ///< nullptr: not yet asked for
+  const T* made() const noexcept { return value_.load(std::memory_order_acquire); }  ///< nullptr if not yet computed
 
  private:
   void take(std::unique_ptr<const T> value) {

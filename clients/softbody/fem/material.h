@@ -8,15 +8,19 @@
 
 namespace tendon::softbody {
 
-/// Energy densities Ψ(F), F = I + ∂u/∂X. All agree for small strains, and all are linear in µ and λ, as selective
-/// reduced integration requires. With J = det F, ε = sym(F − I), E = ½(FᵀF − I), R the rotation next to F:
+/// Energy densities Ψ(F), F = I + ∂u/∂X. All agree for small strains and are linear in µ and λ, as selective reduced
+/// integration requires. J = det F, ε = sym(F − I), E = ½(FᵀF − I), R is the rotation of F's polar decomposition:
 ///
-///     linear         µ ε:ε + ½ λ (tr ε)²                             a rotation is a strain
-///     corotational   µ |F − R|² + ½ λ (tr(RᵀF) − 3)²
-///     StVK           µ E:E + ½ λ (tr E)²                             soft in compression, then inverts and stays so
-///     Neo-Hookean    ½ µ (|F|² − 3) − µ (J − 1) + ½ (λ + µ) (J − 1)²   "stable": finite through J ≤ 0, and pushes back
+///     linear         µ ε:ε + ½ λ (tr ε)²                             rotations count as strain
+///     corotational   µ
+/// F − R
+/// ² + ½ λ (tr(RᵀF) − 3)²
+///     StVK           µ E:E + ½ λ (tr E)²                             softens in compression, then stays inverted
+///     Neo-Hookean    ½ µ (
+/// F
+/// ² − 3) − µ (J − 1) + ½ (λ + µ) (J − 1)²   stable: finite and restoring for J ≤ 0
 ///
-/// (Müller & Gross 2004; Smith, de Goes & Kim 2018, without their barrier for the collapse to a point.)
+/// Sources: Müller & Gross 2004; Smith, de Goes & Kim 2018, without their barrier against collapse to a point.
 enum class Law : std::uint8_t { kLinear, kCorotational, kStVenantKirchhoff, kNeoHookean };
 
 /// An isotropic solid.
@@ -33,7 +37,7 @@ void check(const Material& material);
 
 using Mat9 = Eigen::Matrix<double, 9, 9>;
 
-/// The matrix of a linear map of 3 × 3 matrices: a column `change(dF)` for each entry of dF.
+/// The matrix of a linear map on 3 × 3 matrices, from its value `change(dF)` for each unit dF.
 template <class Change>
 Mat9 by_columns(const Change& change) {
   Mat9 all;
@@ -46,20 +50,19 @@ Mat9 by_columns(const Change& change) {
   return all;
 }
 
-/// The values of a law at one F.
 struct Stress {
   double energy;  ///< Ψ, J/m³
   Mat3 piola;     ///< P = ∂Ψ/∂F, Pa
 };
 Stress stress(Law law, const Mat3& f, double mu, double lambda);
 
-/// ∂P/∂F, Pa; F and P as columns one below the other. Symmetric. Not definite where the material can buckle.
+/// ∂P/∂F, Pa, with F and P flattened in column-major order. Symmetric; indefinite where the material can buckle.
 Mat9 tangent(Law law, const Mat3& f, double mu, double lambda);
 
-/// The nearest matrix without negative eigenvalues: a Newton step with it always goes downhill.
+/// The nearest positive semidefinite matrix. A Newton step with it is always a descent direction.
 Mat9 without_negative(const Mat9& symmetric);
 
-/// The rotation R that is nearest to F (polar decomposition); a rotation even where F is turned inside out.
+/// The rotation nearest to F (polar decomposition). Also a proper rotation if F is inverted.
 Mat3 nearest_rotation(const Mat3& f);
 
 }  // namespace tendon::softbody

@@ -14,28 +14,27 @@
 
 namespace tendon::softbody {
 
-/// Two points are at the same place if their distance is less than this fraction of the longest side of the bounding
-/// box. A file with six digits is rounded to about this value.
+/// Two points coincide if their distance is below this fraction of the longest side of the bounding box: about the
+/// rounding of a file with six digits.
 inline constexpr double kSamePlace = 1e-6;
 
-/// The bounding box of one or more points.
 Eigen::AlignedBox3d box_around(std::span<const Vec3> points);
 
-/// A cell of a grid that is used to find neighbours.
+/// A cell of a grid for neighbor search.
 using Cell = std::array<std::int64_t, 3>;
 struct HashOfCell {
   std::size_t operator()(const Cell& cell) const;
 };
-/// The distance between the point and `origin` must be less than 10¹⁸ times `size`.
+/// The distance from `origin` must be below 10¹⁸ times `size`.
 Cell cell_of(const Vec3& point, const Vec3& origin, double size);
 
-/// For each point, the index of the first point at the same place.
+/// For each point, the index of the first point that coincides with it.
 std::vector<int> first_at_place(std::span<const Vec3> points);
 
-/// The coordinates with four digits: "(1, 2, 3)".
+/// Coordinates with four digits: "(1, 2, 3)".
 std::string in_words(const Vec3& place);
 
-/// The number and the singular or plural: "1 place", "2 places".
+/// A count with its noun: "1 place", "2 places".
 std::string counted(std::size_t count, std::string_view one, std::string_view several);
 
 }  // namespace tendon::softbody

@@ -5,10 +5,10 @@
 
 namespace tendon::softbody {
 
-/// Products with a matrix that is tall and dense, four numbers at a time as Kernel has them: the same bits on every
-/// processor. A count of rows that is not a multiple of kLanes is refused (std::invalid_argument).
+/// Products with a tall dense matrix, kLanes rows at a time, with bit-identical results on every processor. Throws
+/// std::invalid_argument if the number of rows is not a multiple of kLanes.
 ///
-/// Thread-safe: yes. Realtime-safe: where `to` has its size.
+/// Thread-safe: yes. Realtime-safe: if `to` already has its size.
 void times(const MatrixXd& matrix, const VectorXd& x, VectorXd& to);
 void times_transposed(const MatrixXd& matrix, const VectorXd& x, VectorXd& to);
 

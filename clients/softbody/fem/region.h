@@ -10,8 +10,8 @@
 
 namespace tendon::softbody {
 
-/// A part of a body that is made of another material: a tumour, a bone, a layer. It has the elements whose middle lies
-/// in it, so its side is as smooth as the mesh.
+/// A part of a body with a different material: a tumor, a bone, a layer. It consists of the elements whose center lies
+/// inside, so its boundary is as smooth as the mesh.
 struct Region {
   struct Ball {
     Vec3 middle;    ///< m, in the body's frame at rest
@@ -27,8 +27,8 @@ struct Region {
   bool has(const Vec3& place) const;
 };
 
-/// The material of each element: that of the last region that has its middle, else `elsewhere`. Empty without regions.
-/// Throws std::invalid_argument that names the region when no element is of its material.
+/// The material of each element: that of the last region containing its center, else `elsewhere`. Empty if there are no
+/// regions. Throws std::invalid_argument, naming the region, if a region contains no element center.
 std::vector<Material> materials_of(const Mesh& mesh, const Material& elsewhere, std::span<const Region> regions);
 
 }  // namespace tendon::softbody

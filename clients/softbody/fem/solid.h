@@ -13,52 +13,50 @@
 
 namespace tendon::softbody {
 
-/// A mesh of a material: finite elements.
+/// A finite-element mesh of a material.
 ///
-/// Without state. Thread-safe: yes, once built. Realtime-safe: no.
+/// Stateless. Thread-safe: yes, after construction. Realtime-safe: no.
 class Solid : public Elastic {
  public:
-  /// `of_elements`: the material of each element, where not all are of `material` (region.h). Throws
-  /// std::invalid_argument when the mesh is not sound, the element is not of the mesh's shape, a material is impossible
-  /// or nothing is fixed.
+  /// `of_elements`: the material of each element, if it is not uniform (region.h). Throws std::invalid_argument if the
+  /// mesh is invalid, the element does not fit the mesh's shape, a material is invalid, or nothing is fixed.
   Solid(Mesh at_rest, Element element, const Material& material, Law law, const Fixed& fixed,
         std::vector<Material> of_elements = {});
 
-  /// Some elements of another solid, in their order, with what is fixed of their nodes. Nothing has to hold them.
-  /// `nodes` becomes the number in `whole` of each node, ascending.
+  /// A subset of the elements of another solid, in the same order, with the fixed displacements of their nodes. Need
+  /// not be held. `nodes` receives the node numbers in `whole`, ascending.
   static Solid part_of(const Solid& whole, const std::vector<int>& elements, std::vector<int>& nodes);
 
   Element element() const noexcept { return element_; }
   const Material& material() const noexcept { return material_; }
   const Material& material(int element) const { return of_elements_.empty() ? material_ : of_elements_[at(element)]; }
-  /// Empty where all are of material().
+  /// Empty if the material is uniform.
   const std::vector<Material>& of_elements() const noexcept { return of_elements_; }
-  double largest_poisson() const;  ///< of its materials
+  double largest_poisson() const;  ///< over all materials
   Law law() const noexcept { return law_; }
 
   double energy(const VectorXd& u) const override { return forces(u).energy; }
-  /// Four elements at a time (kernel.h).
   Forces forces(const VectorXd& u) const override;
   void stiffness(const VectorXd& u, Curvature curvature, SymmetricMatrix& to) const override;
 
-  /// Elements with a point at which det F ≤ 0.
+  /// Number of elements with a quadrature point at which det F ≤ 0.
   int inverted(const VectorXd& u) const;
-  /// rad, the largest angle by which the material is turned at a point of integration.
+  /// Largest rotation angle of the material at any quadrature point, rad.
   double largest_turn(const VectorXd& u) const;
 
   std::size_t bytes() const noexcept override;
 
-  /// An integration point: the volume and the moduli that it stands for.
+  /// Volume and moduli at a quadrature point.
   struct Point {
     double volume;  ///< m³
-    double mu;      ///< Pa; 0 where only λ is integrated
-    double lambda;  ///< Pa; 0 where only µ is
+    double mu;      ///< Pa; 0 if only λ is integrated here
+    double lambda;  ///< Pa; 0 if only µ is integrated here
   };
   int points_per_element() const noexcept { return per_element_; }
   const Point& point(int element, int index) const { return parts().points[at(element * per_element_ + index)]; }
   using Nodal = Kernel::Nodal;
   Kernel::Gradient gradient(int element, int point) const { return parts().kernel.gradient(element, point); }  ///< 1/m
-  /// The same two, computed and not kept: for who looks at an element once.
+  /// point() and gradient(), computed without storing them, for one-time use.
   struct Part {
     Point point;
     Nodal gradient;  ///< ∂Nᵢ/∂X, 1/m
@@ -67,16 +65,16 @@ class Solid : public Elastic {
   Nodal displacements(const VectorXd& u, int element) const;  ///< of an element's nodes, m
 
  protected:
-  /// The stiffness of a material with the tangent `tangent_at(element, point, F)`.
+  /// Assembles the stiffness of a material with the tangent `tangent_at(element, point, F)`.
   template <class TangentAt>
   void sum_stiffness(const VectorXd& u, const TangentAt& tangent_at, SymmetricMatrix& to) const;
 
  private:
   Solid(Mesh at_rest, const Solid& whole, const Fixed& fixed, std::vector<Material> of_elements);
 
-  /// All integration points; made when one is first asked for.
+  /// All quadrature points; computed on first use.
   struct Parts {
-    std::vector<Point> points;  ///< of each element, one after the other
+    std::vector<Point> points;  ///< of each element, concatenated
     Kernel kernel;
   };
   const Parts& parts() const {
@@ -90,9 +88,9 @@ class Solid : public Elastic {
   Material material_;
   std::vector<Material> of_elements_;
   Law law_;
-  int per_element_;  ///< points of integration
+  int per_element_;  ///< quadrature points
   Lazy<Parts> parts_;
-  Lazy<std::vector<int>> slots_;  ///< where each entry of an element's matrix goes; −1: nowhere
+  Lazy<std::vector<int>> slots_;  ///< index of each entry of an element matrix in the pattern's values; −1 if dropped
 };
 
 template <class TangentAt>

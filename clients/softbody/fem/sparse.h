@@ -11,7 +11,7 @@ namespace tendon::softbody {
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// A symmetric sparse matrix: its lower triangle by columns, row indices ascending.
+/// A symmetric sparse matrix: lower triangle in compressed column storage, row indices ascending.
 struct SymmetricMatrix {
   int size = 0;
   std::vector<int> column_starts;  ///< size + 1
@@ -19,43 +19,42 @@ struct SymmetricMatrix {
   std::vector<double> values;
 
   VectorXd times(const VectorXd& x) const;
-  int slot(int row, int column) const;  ///< where an entry of the lower triangle is in `values`; it must be there
+  int slot(int row, int column) const;  ///< index in `values` of an existing entry of the lower triangle
   std::size_t bytes() const noexcept;
 };
 
-/// The Cholesky factor of a symmetric positive definite matrix (CHOLMOD, supernodal). The order of elimination is found
-/// once for each pattern; factorize() then uses it for new values. After split() the pattern is the grown one, and the
-/// next factorize() finds its order.
+/// Cholesky factor of a symmetric positive definite matrix (CHOLMOD, supernodal). The fill-reducing ordering is
+/// computed once per pattern and reused by factorize(). After split() the pattern is that of the grown matrix, and the
+/// next factorize() computes its ordering.
 ///
-/// factorize() tells OpenBLAS to use one thread for each call, in the whole process, and OpenMP to use none beside the
-/// calling thread.
+/// factorize() sets OpenBLAS to one thread per call for the whole process, and OpenMP to the calling thread only.
 ///
-/// Thread-safe: no; two threads may each have their own where factors_may_work_at_once(). Realtime-safe: no.
+/// Thread-safe: no; two threads may each use their own factor if factors_may_work_at_once(). Realtime-safe: no.
 class Factor {
  public:
-  /// Finds the order of elimination; has no values yet.
+  /// Computes the ordering only; there are no values yet.
   explicit Factor(const SymmetricMatrix& pattern);
   ~Factor();
   Factor(Factor&&) noexcept;
   Factor& operator=(Factor&&) noexcept;
 
-  /// False when the matrix is not positive definite; the factor then has no values.
+  /// Returns false if the matrix is not positive definite; the factor then has no values.
   [[nodiscard]] bool factorize(const SymmetricMatrix& matrix);
 
-  /// Becomes the factor of `grown`: the same matrix after some unknowns got twins, which take over some of their
-  /// coupling to other unknowns. In `grown` the twins come after the old unknowns; `twin_of` names the original of
-  /// each. With every twin tied to its original, `grown` is the old matrix. With d the distances of the twins from
-  /// their originals, T the map that ties them and C the map that moves each twin alone,
+  /// Becomes the factor of `grown`: the same matrix after some unknowns were duplicated, with some of their couplings
+  /// moved to the twins. The twins follow the old unknowns; `twin_of` gives the original of each. Tying every twin to
+  /// its original recovers the old matrix. With d the displacements of the twins relative to their originals, T the map
+  /// that ties them, and C the map that moves each twin alone,
   ///
   ///     TᵀAT = the old matrix,   S = CᵀAC − (CᵀAT)(TᵀAT)⁻¹(TᵀAC),   S d = Cᵀb − (CᵀAT)(TᵀAT)⁻¹Tᵀb
   ///
-  /// (block elimination; a capacitance matrix, James & Pai 1999): the factor stays, and each row of S, one for each
-  /// twin, costs one solution. False, and nothing changes, when `grown` is not positive definite, or when by CHOLMOD's
-  /// count all solutions since factorize() would be more work than a new factor. CHOLMOD's own rank updates (Davis &
-  /// Hager 1999) need the slower simplicial factor, and many of them, because a twin changes many rows.
+  /// (block elimination with a capacitance matrix, James & Pai 1999): the factor is kept, and each row of S, one per
+  /// twin, costs one solve. Returns false without changes if `grown` is not positive definite, or if by CHOLMOD's
+  /// operation count all solves since factorize() would exceed the work of a new factor. CHOLMOD's rank updates (Davis
+  /// & Hager 1999) are not used: they need the slower simplicial factor, and a twin changes many rows.
   [[nodiscard]] bool split(const SymmetricMatrix& grown, const std::vector<int>& twin_of);
 
-  /// Solves A x = b for each column.
+  /// Solves A x = b for each column of b.
   MatrixXd solve(const MatrixXd& b) const;
 
   std::size_t bytes() const noexcept;
@@ -69,8 +68,8 @@ class Factor {
   std::vector<Split> splits_;
 };
 
-/// Whether two threads may make or use factors at once, each its own. False where the BLAS is an OpenBLAS that was built
-/// for one thread (libopenblas0-serial): it hands the same buffers to both, and most factors come out wrong.
+/// Whether two threads may factorize or solve concurrently, each with its own factor. False with an OpenBLAS built for
+/// one thread (libopenblas0-serial), whose shared buffers corrupt most factors.
 bool factors_may_work_at_once();
 
 }  // namespace tendon::softbody

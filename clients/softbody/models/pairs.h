@@ -9,12 +9,12 @@
 
 namespace tendon::softbody {
 
-/// What the last steps of a solver taught of a stiffness whose factor is older: the inverse H of the stiffness by a kept
-/// factor K₀ and up to eight pairs of a step and the forces that it changed (BFGS with limited memory; Nocedal 1980).
-/// H maps the last change of forces to the last step exactly, and is positive definite when K₀ is.
+/// Quasi-Newton update of a kept factor: the inverse stiffness H from the factor K₀ and up to eight pairs of a step and
+/// its change of forces (limited-memory BFGS; Nocedal 1980). H maps the last change of forces to the last step exactly,
+/// and is positive definite if K₀ is.
 ///
-/// What K₀⁻¹ makes of each change of forces is handed in: a solver that solves for the forces of each shape knows it, so
-/// an answer of H costs no more solutions than one of K₀⁻¹.
+/// K₀⁻¹ times each change of forces is passed in. A solver that solves for the forces at each shape already has it, so
+/// applying H costs no more solves than K₀⁻¹.
 ///
 /// Thread-safe: no. Realtime-safe: no.
 class Pairs {
@@ -23,14 +23,14 @@ class Pairs {
 
   void clear() noexcept { order_.clear(); }
 
-  /// `change` = the forces after `step` minus those before, N; `solved` = K₀⁻¹ `change`. A pair that shows no stiffness
-  /// along its step is left out.
+  /// `change` = forces after `step` minus those before, N; `solved` = K₀⁻¹ `change`. Skips a pair with no positive
+  /// curvature along its step.
   void add(const VectorXd& step, const VectorXd& change, const VectorXd& solved);
 
-  /// H b, from `solved` = K₀⁻¹ b.
+  /// H b, given `solved` = K₀⁻¹ b.
   VectorXd times(const VectorXd& b, const VectorXd& solved) const;
 
-  /// H − K₀⁻¹ among some of the unknowns: its rows and columns, in the order of `unknowns`.
+  /// The submatrix of H − K₀⁻¹ for `unknowns`, in their order.
   MatrixXd adds(const std::vector<int>& unknowns) const;
 
   int count() const noexcept { return static_cast<int>(order_.size()); }
@@ -38,8 +38,8 @@ class Pairs {
 
  private:
   using Small = Eigen::Matrix<double, kMost, kMost>;
-  std::vector<int> order_;  ///< columns, the oldest first
-  MatrixXd steps_;          ///< a column for each pair, as the next two
+  std::vector<int> order_;  ///< column indices, oldest first
+  MatrixXd steps_;          ///< one column per pair, as in the next two
   MatrixXd changes_;
   MatrixXd solved_;
   Small steps_changes_;   ///< stepsᵀ changes

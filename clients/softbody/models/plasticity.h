@@ -9,41 +9,40 @@
 
 namespace tendon::softbody {
 
-/// The stress at which a material begins to keep a dent: von Mises' yield with linear kinematic hardening (Prager). A
-/// stretched bar has the modulus E up to `stress` and E·H/(E + H) beyond it. When it is released it has E again, and
-/// after 2·`stress` it yields the other way.
+/// Von Mises yield with linear kinematic hardening (Prager). A bar in tension has the modulus E up to `stress` and
+/// E·H/(E + H) beyond it. On release it has E again, and after 2·`stress` it yields in reverse.
 struct Yield {
-  double stress = 0;     ///< σ, Pa, above 0: yield stress of a bar in tension or compression
-  double hardening = 0;  ///< H, Pa, above 0: stress that each unit of plastic strain adds
+  double stress = 0;     ///< σ, Pa, positive: uniaxial yield stress
+  double hardening = 0;  ///< H, Pa, positive: stress per unit of plastic strain
 };
 
 /// Throws std::invalid_argument that names the field.
 void check(const Yield& yield);
 
-/// A solid that keeps a plastic strain p, symmetric and traceless, at every point of integration. With the strain ε of
-/// its law (linear: sym(F − I); corotational: RᵀF − I, so that p turns with the material) its stress is that of ε − p.
-/// A step from the plastic strain p₀ has the energy
+/// A solid with a plastic strain p, symmetric and traceless, at every quadrature point. With ε the strain of its law
+/// (linear: sym(F − I); corotational: RᵀF − I, so p rotates with the material) its stress is that of ε − p. A step from
+/// the plastic strain p₀ has the energy
 ///
 ///     min over p:  Ψ(ε − p) + ⅓ H |p|² + √⅔ σ |p − p₀|
 ///
-/// The three terms are stored elastically, stored by hardening, and lost. The minimum is the radial return (Wilkins
-/// 1964; Simo & Hughes 1998, box 3.1). Because a step has an energy (Ortiz & Stainier 1999), Newton's method can search
-/// along a line as it does in an elastic body. Until the first yield the forces are bit for bit those of the solid that
-/// it was made from.
+/// The terms are the elastic energy, the hardening energy, and the dissipation. The minimum is the radial return
+/// (Wilkins 1964; Simo & Hughes 1998, box 3.1). Because a step has an energy (Ortiz & Stainier 1999), Newton's method
+/// can use a line search as for an elastic body. Before the first yield the forces are bit-identical to those of the
+/// original solid.
 ///
 /// Thread-safe: no. Realtime-safe: no.
 class PlasticSolid : public Solid {
  public:
-  /// Throws std::invalid_argument when the law is neither linear nor corotational, and whatever check() throws.
+  /// Throws std::invalid_argument if the law is neither linear nor corotational, and the errors of check().
   PlasticSolid(const Solid& solid, const Yield& yield);
 
-  /// The energy of a step that begins at the u of the last advance().
+  /// Energy of the step that began at the last advance().
   double energy(const VectorXd& u) const override { return forces(u).energy; }
   Forces forces(const VectorXd& u) const override;
   void stiffness(const VectorXd& u, Curvature curvature, SymmetricMatrix& to) const override;
 
-  void advance(const VectorXd& u);                    ///< a step ends at u; the next begins there
-  bool yielded() const noexcept { return yielded_; }  ///< at any point, at any time
+  void advance(const VectorXd& u);                    ///< ends a step at u and begins the next there
+  bool yielded() const noexcept { return yielded_; }  ///< whether any point has ever yielded
   const Mat3& plastic_strain(int element, int point) const {
     return plastic_[at(element * points_per_element() + point)];
   }
@@ -53,23 +52,23 @@ class PlasticSolid : public Solid {
  private:
   struct Flow;
   Flow flow(int element, int point, const Mat3& strain) const;
-  Stress flow_at(int element, int point, const Mat3& f) const;  ///< what plastic strain adds to the elastic stress
+  /// the contribution of plastic strain to the elastic stress
+  Stress flow_at(int element, int point, const Mat3& f) const;
   Mat9 tangent_at(int element, int point, const Mat3& f) const;
 
   Yield yield_;
-  std::vector<Mat3> plastic_;  ///< p₀ of each point; 0 where only the volumetric part is integrated
+  std::vector<Mat3> plastic_;  ///< p₀ per point; 0 where only the volumetric part is integrated
   bool yielded_ = false;
 };
 
-/// Newton's method on a body that keeps its dents: an answer is a step of loading, of whatever length; where the hand
-/// goes on in one direction it does not matter how many there are, to first order of their length where it turns. The
-/// stiffness of an answer in which the material yields is that of pressing on; a hand that goes back meets the elastic
-/// one, which is stiffer. On a closed way the hand never gets back more than it gave.
+/// Newton's method on a plastic body: an answer is one load step of any size. The number of steps does not matter while
+/// the load proceeds in one direction; where it turns the result is first order in the step size. The stiffness of a
+/// yielding answer is the loading one; unloading is stiffer (elastic). On a closed path the hand never gains energy.
 ///
-/// A step that ends after Config::max_iterations leaves its plastic strains where it ended.
+/// A step that stops at Config::max_iterations keeps its plastic strains.
 class PlasticModel : public Model {
  public:
-  /// Throws what PlasticSolid and QuasiStaticModel do. It begins at rest, under its weight if it has any.
+  /// Starts at rest, under its weight if gravity is simulated. Throws the errors of PlasticSolid and QuasiStaticModel.
   PlasticModel(const Solid& solid, const TouchSurface& surface, const QuasiStaticModel::Config& config,
                const EffectsConfig& effects, const Yield& yield);
 

@@ -10,11 +10,11 @@
 
 namespace tendon::softbody {
 
-/// Young's modulus over time, as a factor of the material's value: linear between the points, constant before the first
-/// and after the last one.
+/// Young's modulus over time, relative to the material's value: piecewise linear, constant before the first and after
+/// the last point.
 struct StiffnessOverTime {
   std::vector<double> at;      ///< s, ascending
-  std::vector<double> factor;  ///< one for each time, above 0
+  std::vector<double> factor;  ///< one per time, positive
 
   double factor_at(double time) const;
 };
@@ -22,16 +22,15 @@ struct StiffnessOverTime {
 /// Throws std::invalid_argument that names the field.
 void check(const StiffnessOverTime& law);
 
-/// A body whose Young's modulus changes while it is touched: a muscle that tenses, a graft that cures. It wraps models
-/// whose only load is the tool and whose energy is proportional to the modulus: with `factor` times the modulus every
-/// force in the same shape is `factor` times as large, so a given depth has the same shape. The factor of the system,
-/// or the table, stays valid: forces are scaled, and nothing is solved again.
+/// A body whose Young's modulus changes while it is touched: a muscle that tenses, a graft that cures. Wraps models
+/// whose only load is the tool and whose energy is proportional to the modulus: the shape at a given depth is
+/// unchanged, and forces scale with `factor`, so nothing is solved again.
 ///
-/// Energy: under a tool that is held still, the stored energy changes from E to E·factor, and the hand does not supply
-/// the difference. Such a body is not passive; the server's limiter keeps the hand safe from it.
+/// At constant tool position the stored energy changes from E to E·factor, and the hand does not supply the difference.
+/// The body is therefore not passive; the server's limiter protects the hand.
 class StiffeningModel : public Model {
  public:
-  /// Begins with the modulus of time 0. Throws whatever check() throws.
+  /// Starts with the modulus at time 0. Throws the errors of check().
   StiffeningModel(std::unique_ptr<Model> model, StiffnessOverTime law);
 
   void tick(double time) { factor_ = law_.factor_at(time); }  ///< s

@@ -9,11 +9,10 @@
 
 namespace tendon::softbody {
 
-/// How a linear body gives way at its surface, made once and kept in a file: where it is made, there have to be the
-/// time and the memory for a factor of the whole body; where it is used, an answer takes microseconds whatever the mesh
-/// (CondensedModel).
+/// The surface compliance of a linear body, stored in a file. Computing it takes the time and memory of a factor of the
+/// whole body; an answer from it takes microseconds for any mesh (CondensedModel).
 ///
-/// The file, little-endian, lengths in bytes:
+/// File format, little-endian; the first column is the length in bytes:
 ///
 ///     8   "TENDONST"
 ///     4   version, 1                                4   m, the number of nodes
@@ -23,23 +22,23 @@ namespace tendon::softbody {
 ///     8 m (m + 1)/2   compliance, m/N: the lower half, row by row
 ///     8   XXH3 (64 bits) of everything before
 struct SurfaceTable {
-  std::uint64_t body = 0;        ///< digest_of the solid and the normal
-  double patch_radius = 0;       ///< m, of the patch of the next
-  double stiffness = 0;          ///< N/m, under the patch around `middle`, when the table was made
+  std::uint64_t body = 0;        ///< digest_of() the solid and the normal
+  double patch_radius = 0;       ///< m, of the patch used for `stiffness`
+  double stiffness = 0;          ///< N/m, under the patch around `middle`
   double linear_up_to = 0;       ///< m, Body::linear_up_to()
-  Eigen::Vector2d middle{0, 0};  ///< m, across the normal
-  std::vector<int> nodes{};      ///< of the mesh, ascending
-  Eigen::MatrixXd compliance{};  ///< m/N along the normal; rows and columns as `nodes`, symmetric
+  Eigen::Vector2d middle{0, 0};  ///< m, tangential
+  std::vector<int> nodes{};      ///< mesh nodes, ascending
+  Eigen::MatrixXd compliance{};  ///< m/N along the normal, symmetric, in the order of `nodes`
 };
 
-/// Tells bodies apart: mesh, what of it is held, element, material, and the side that is touched.
+/// Identifies a body: mesh, fixed nodes, element, material, and touched side.
 std::uint64_t digest_of(const Solid& solid, const Vec3& normal);
 
-/// Throws std::runtime_error when the file cannot be written, or is there and is no table.
+/// Throws std::runtime_error if the file cannot be written, or exists and is not a table.
 void write_table(const std::filesystem::path& file, const SurfaceTable& table);
 
-/// Throws std::invalid_argument, naming the file and what is wrong: no table, cut off, changed (its checksum), or not
-/// positive semidefinite, which could give out energy that nobody had put in.
+/// Throws std::invalid_argument, naming the file and the problem: not a table, truncated, bad checksum, or not positive
+/// semidefinite (such a table could generate energy).
 SurfaceTable read_table(const std::filesystem::path& file);
 
 }  // namespace tendon::softbody

@@ -8,24 +8,23 @@
 
 namespace tendon::softbody {
 
-/// A coarser grid below a finer one, for multigrid: how the unknowns of the finer follow those of the coarser. Plain
-/// numbers, on every rank alike.
+/// Interpolation from a coarser to a finer grid, for geometric multigrid. Identical on every rank.
 ///
-/// For a mesh whose nodes fill a grid of equal steps, as block() makes. A coarser cell is two of the finer along each
-/// axis; between its nodes displacements are those of its element: quadratic for hex27, linear for others. All
-/// components of a node are free, or none.
+/// Requires a mesh whose nodes form a grid with equal steps, as made by block(). A coarse cell covers two fine cells
+/// along each axis; displacements between its nodes are those of its element: quadratic for hex27, linear otherwise.
+/// The components of a node must be all free or all fixed.
 struct GridLevel {
-  /// An entry of the interpolation from coarser nodes to finer ones.
+  /// An interpolation weight of a coarse node.
   struct Weight {
-    int node;  ///< of the coarser grid, among its free ones
+    int node;  ///< index among the free coarse nodes
     double value;
   };
-  std::vector<std::vector<Weight>> rows;  ///< for each free node of the finer grid
-  int nodes = 0;                          ///< free ones of the coarser grid
+  std::vector<std::vector<Weight>> rows;  ///< per free fine node
+  int nodes = 0;                          ///< number of free coarse nodes
 };
 
-/// From the finest to the coarsest. Ends where the cells of an axis are odd, or fewer than `least` nodes are free. Empty:
-/// the nodes fill no grid.
+/// Levels from finest to coarsest. Stops when an axis has an odd number of cells or fewer than `least` nodes are free.
+/// Empty if the nodes do not form a grid.
 std::vector<GridLevel> grid_levels(const Solid& solid, int least = 1000);
 
 }  // namespace tendon::softbody

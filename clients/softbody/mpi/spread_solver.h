@@ -10,51 +10,53 @@
 
 namespace tendon::softbody {
 
-/// MPI and PETSc, from the beginning to the end of a program. Everything below is to be called by all ranks alike.
+/// Initializes MPI and PETSc for the lifetime of the object. Everything below must be called collectively by all ranks.
 class Ranks {
  public:
-  /// Takes from the command line what PETSc and MPI want of it. Throws std::runtime_error when they do not start.
+  /// Removes the arguments of PETSc and MPI from the command line. Throws std::runtime_error if they do not start.
   Ranks(int& argc, char**& argv);
   ~Ranks();
   Ranks(const Ranks&) = delete;
   Ranks& operator=(const Ranks&) = delete;
 
-  int rank() const noexcept;  ///< this one's number; 0 reads and writes
+  int rank() const noexcept;  ///< rank 0 reads and writes files
   int count() const noexcept;
 };
 
-/// How K u = f is solved.
+/// Solution method for K u = f.
 enum class Method : std::uint8_t {
-  kChosen,     ///< a factor below kMostForFactor unknowns and above kMostPoisson, multigrid else
-  kFactor,     ///< MUMPS' Cholesky factor
-  kMultigrid,  ///< conjugate gradients; geometric multigrid where the nodes fill a grid (grid_levels.h), PETSc's GAMG else
+  kChosen,  ///< kFactor below kMostForFactor unknowns or above kMostPoisson, else kMultigrid
+  kFactor,  ///< MUMPS' Cholesky factor
+  /// conjugate gradients, preconditioned by geometric multigrid if the nodes form a grid, else by PETSc's GAMG
+  kMultigrid,
 };
 inline constexpr int kMostForFactor = 100'000;
-/// Near incompressibility multigrid wants hundreds of rounds.
+/// Close to incompressibility multigrid takes hundreds of iterations.
 inline constexpr double kMostPoisson = 0.49;
 
-/// Linear elasticity, K u = f, by PETSc on all ranks: each assembles the rows that it keeps, which have the same bits on
-/// any number of ranks. The environment variable PETSC_OPTIONS chooses otherwise
-/// ("-ksp_type cg -pc_type gamg -ksp_rtol 1e-10"). Loads and solutions are whole on every rank.
+/// Linear elasticity, K u = f, by PETSc on all ranks. Each rank assembles its own rows; their bits do not depend on the
+/// number of ranks. The environment variable PETSC_OPTIONS overrides the solver ("-ksp_type cg -pc_type gamg -ksp_rtol
+/// 1e-10"). Loads and solutions are replicated on every rank.
 ///
-/// By multigrid solve() ends at 1e-10 of the energy. solve_roughly() begins with what the last ten answers say of this
-/// one (Fischer 1998) and ends when, with the residual r = f − K u and M the multigrid,
+/// With multigrid, solve() ends at a relative energy error of 1e-10. solve_roughly() starts from the last ten answers
+/// (Fischer 1998) and ends when, with the residual r = f − K u and the multigrid preconditioner M,
 ///
 ///     fᵀ K⁻¹ f = fᵀ u + uᵀ r + rᵀ K⁻¹ r,    0 ≤ rᵀ K⁻¹ r ≤ rᵀ M r / λ ≤ kRough · fᵀ K⁻¹ f
 ///
-/// where λ is 0.8 of the least Ritz value of M K, which a first, exact solution has found.
+/// where λ is 0.8 times the smallest Ritz value of M K from a first exact solve.
 ///
-/// With the same number of ranks the same bytes; across numbers of ranks equal to some 1e-12 of the largest (factor) or
-/// to the tolerance. The mesh is whole on every rank, too: that ends at some 10⁶ unknowns.
+/// Results are byte-identical for the same number of ranks; across numbers of ranks they agree to about 1e-12 of the
+/// largest value (factor) or to the tolerance. The mesh is replicated on every rank, which limits it to about 10⁶
+/// unknowns.
 ///
-/// Throws std::runtime_error with PETSc's sentence when something fails, and when a solver does not converge. The
-/// solid's law counts as linear. Nothing of the solid is kept.
+/// The solid's law is treated as linear, and the solid is not kept. Throws std::runtime_error with PETSc's message on
+/// failure or if a solver does not converge.
 std::unique_ptr<Solver> on_ranks(const Solid& solid, Method method = Method::kChosen);
 inline constexpr double kRough = 1e-3;
 
-/// Shares bytes out from rank 0 to all.
+/// Broadcasts bytes from rank 0.
 void share_out(std::vector<std::byte>& bytes);
-/// Ends all ranks at once: from one that cannot go on, while others wait for it.
+/// Aborts all ranks; for a rank that cannot continue while others wait for it.
 [[noreturn]] void end_all_ranks();
 
 }  // namespace tendon::softbody

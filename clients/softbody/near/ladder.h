@@ -10,30 +10,30 @@
 
 namespace tendon::softbody {
 
-/// A body that answers from the highest rung that is good enough for a press, and by NearModel where none is. Where the
-/// share of a rung falls from 1 to 0 with the place of the hand, the next one takes over, see blended(). Given forces are
-/// answered by NearModel.
+/// A body that answers from the most accurate precomputed rung that is valid for a press, and falls back to NearModel.
+/// Where a rung's share falls from 1 to 0, its answer is blended with the next one (blended()). Presses with a given
+/// force are answered by NearModel.
 ///
-/// While rungs answer alone, NearModel follows the hand (NearModel::follow), so that its field is there where it takes
-/// over. Without another thread that makes an answer slower only where Rung::room() is below 1.
+/// While rungs answer, NearModel tracks the hand (NearModel::follow), so that its field is ready to take over. Without
+/// a background thread this slows answers only where Rung::room() is below 1.
 class Ladder : public Model {
  public:
-  /// The highest rung first.
+  /// In order of preference.
   Ladder(std::vector<std::unique_ptr<Rung>> rungs, std::unique_ptr<NearModel> near);
 
   Reaction press(const Patch& patch, Given given, double value) override;
-  /// Rungs know the whole body alone: they are dropped.
+  /// Drops the rungs, which describe the uncut body only.
   void cut(const Division& division, const EffectsConfig& effects) override;
-  /// With the rungs that this one has of the cut body.
+  /// Continues with the rungs of this object, if it has any for the cut body.
   void go_on_from(const Model& before, std::span<const int> node_before) override;
   bool glides() const noexcept override { return true; }
   std::size_t bytes() const noexcept override;
 
   struct Step {
     Rung::Size size;
-    int answers = 0;  ///< to which it had something to say
+    int answers = 0;  ///< presses that the rung answered, alone or blended
   };
-  std::vector<Step> steps() const;  ///< the highest first, without NearModel
+  std::vector<Step> steps() const;  ///< in order of preference, without NearModel
   const NearModel& near() const noexcept { return *near_; }
 
  private:
@@ -44,8 +44,8 @@ class Ladder : public Model {
   std::unique_ptr<NearModel> near_;
 };
 
-/// The reaction whose force, and whose stiffness however a surface lies, are so far between those of two as `share`
-/// (0 … 1) says. `error` adds how far they are apart.
+/// Interpolates force and stiffness between two reactions with the weight `share` (0 … 1) of `from`, whatever the tilt
+/// of the surface. The difference is added to `error`.
 Reaction blended(const Reaction& from, const Reaction& to, double share);
 
 }  // namespace tendon::softbody

@@ -12,35 +12,35 @@
 
 namespace tendon::softbody {
 
-/// What is learned of a body at set-up, as plain values; without either, nothing is known of it.
+/// Precomputed data of a body, as plain values. Empty members were not computed.
 struct Learned {
   std::optional<LearnedShapes> shapes{};
   std::optional<TabulatedAnswers> answers{};
-  std::vector<std::string> warnings{};  ///< of files that were not as they should be
+  std::vector<std::string> warnings{};  ///< about damaged or unreadable files
 };
 
-/// What is wanted of it.
+/// What to compute.
 struct LearnConfig {
   bool shapes = false;
   bool answers = false;
-  Vec2 middle = Vec2::Zero();  ///< m, across
-  double reach = 0;            ///< m, how far from there a hand goes along each axis
-  /// Where files are read that were kept before, and kept. Each file is named by what it was made of: the body, its law, the
-  /// side that is touched, the patch, where it is pressed, and a version. Empty: nothing is kept.
+  Vec2 middle = Vec2::Zero();  ///< m, tangential
+  double reach = 0;            ///< m, range of the hand from `middle` along each axis
+  /// Folder to read and store results. File names are digests of the input: body, law, touched side, patch, grid and
+  /// format version. Empty: nothing is stored.
   std::filesystem::path folder{};
 };
 
-/// Learns, or reads what was learned before. No file that is there is ever written over: one that is damaged is named in
-/// a warning, and what it should have had is learned anew.
+/// Computes the data, or reads stored results. Never overwrites a file: a damaged one is reported in a warning, and its
+/// contents are recomputed.
 ///
-/// A file, little-endian, lengths in bytes:
+/// File format, little-endian; the first column is the length in bytes:
 ///
 ///     8   "TENDONSH" or "TENDONAN"                  4   version, 3; then 4 zeros
 ///     8   digest of all that it was made of         n   the fields of LearnedShapes or TabulatedAnswers but the grid, in
 ///                                                       their order: numbers of 8, each list and matrix behind its size
 ///     8   XXH3 (64 bits) of everything before
 ///
-/// Throws what solve_presses() throws, and std::runtime_error when a file cannot be written.
+/// Throws the errors of solve_presses(), and std::runtime_error if a file cannot be written.
 Learned learn(const Solid& solid, const TouchSurface& surface, const LearnConfig& config, const Tell& tell);
 
 }  // namespace tendon::softbody

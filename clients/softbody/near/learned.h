@@ -9,46 +9,48 @@
 
 namespace tendon::softbody {
 
-/// What a nonlinear body's shapes under a patch have in common, as plain values: few shapes Φ, so that u = Φ q, and few
-/// elements with weights ω > 0. The reduced energy is
+/// A reduced-order model of a nonlinear body under a patch, as plain values: a basis of shapes Φ, u = Φ q, and a subset
+/// of elements with weights ω > 0. The reduced energy is
 ///
 ///     E(q) = ½ qᵀq + Σ_e ω_e [W_e(Φ_e q) − ½ (Φ_e q)ᵀ K₀ₑ (Φ_e q)],     Φᵀ K₀ Φ = 1
 ///
-/// Its linear part is that of all elements, and only what the law adds to it is summed over few (An, Kim & James 2008;
-/// Farhat, Chapman & Avery 2015, for all of the force).
+/// The linear part is exact for all elements; only the nonlinear correction is summed over the subset (cubature: An,
+/// Kim & James 2008; Farhat, Chapman & Avery 2015, for the full force).
 struct LearnedShapes {
   PressGrid grid;
   std::vector<int> elements{};  ///< ascending
   VectorXd weights{};           ///< ω
-  MatrixXd shapes{};    ///< Φ: three rows for each node of the elements, ascending; √m/√N, displacements for √J
-  MatrixXd depths{};    ///< a row for each shape, a column for each touchable node, ascending: how deep it makes it
-  MatrixXd linear{};    ///< 1 − Σ_e ω_e Φ_eᵀ K₀ₑ Φ_e
-  MatrixXd knots{};     ///< a column q for each knot of the grid
-  MatrixXd inverses{};  ///< for each knot r columns: the inverse of E's second derivative there
+  MatrixXd shapes{};  ///< Φ: three rows per node of the elements, ascending; displacements in √m/√N for q in √J
+  MatrixXd depths{};  ///< row per shape, column per touchable node, ascending: depth per unit of q
+  MatrixXd linear{};  ///< 1 − Σ_e ω_e Φ_eᵀ K₀ₑ Φ_e
+  MatrixXd knots{};   ///< column q per knot of the grid
+  MatrixXd inverses{};           ///< r columns per knot: inverse of ∂²E/∂q² there
   std::vector<double> errors{};  ///< Trust::errors()
 };
 
-/// Learns from `presses`. A shape whose solution is not good enough is left out; so is a knot where E is not stable at a
-/// held depth (its second derivative there has an eigenvalue that is not above 0).
+/// Computes the model from `presses`. Skips inaccurate solutions, and knots where E is not stable at constant depth
+/// (∂²E/∂q² has an eigenvalue ≤ 0 there).
 LearnedShapes learn_shapes(const Solid& solid, const TouchSurface& surface, const SolvedPresses& presses,
                            const Tell& tell);
 
-/// The body as these shapes have it: Newton's method on E, with the depth held. It begins at the cubic between the shapes at
-/// the knots around, with the inverse of the stiffness between theirs, which steps improve (BFGS), and a line search makes
-/// the energy fall in every step. The stiffness is exact to the second order of what is wrong in that inverse.
+/// Newton's method on the reduced energy E at constant depth. Starts from the cubic interpolation of the knots' shapes
+/// and from the interpolated inverse stiffness, which BFGS updates; a line search makes every step reduce the energy.
+/// The error of the returned stiffness is second order in the error of that inverse.
+///
+/// Thread-safe: yes, after construction. Realtime-safe: no.
 ///
 /// Thread-safe: yes, once built. Realtime-safe: no.
 class LearnedBody {
  public:
   LearnedBody(const Solid& solid, const TouchSurface& surface, const LearnedShapes& shapes);
 
-  /// Empty where Newton's method does not come to the share `tolerance` of the force, or E is not stable there.
+  /// Empty if Newton's method does not reach the relative force error `tolerance`, or if E is not stable there.
   std::optional<Reaction> press(const Patch& patch, double depth, const PressGrid::Point& point,
                                 double tolerance) const;
 
-  /// ½ … of above, J, and its derivative.
+  /// Energy E (J) and its gradient.
   double energy(const VectorXd& q, VectorXd& slope) const;
-  /// How deep q's units make the patch: its load on q.
+  /// Depth of the patch per unit of q: the load vector on q.
   VectorXd load(const Patch& patch) const;
 
   int shapes() const noexcept { return static_cast<int>(shapes_.cols()); }
@@ -59,19 +61,19 @@ class LearnedBody {
   MatrixXd depths_below(const Patch& patch) const;
 
   PressGrid grid_;
-  Kernel kernel_;  ///< of the elements, ω times as stiff
+  Kernel kernel_;  ///< elements with moduli scaled by ω
   MatrixXd shapes_;
   MatrixXd depths_;
-  std::vector<int> column_of_;  ///< of `depths_`, by node of the mesh
+  std::vector<int> column_of_;  ///< column of `depths_`, by mesh node
   MatrixXd linear_;
   MatrixXd knots_;
   MatrixXd inverses_;
 };
 
-/// LearnedBody where its errors allow it.
+/// LearnedBody, where its error permits.
 class LearnedRung : public Rung {
  public:
-  /// `tolerance`: by how large a share of the force an answer may be wrong.
+  /// `tolerance`: accepted relative force error.
   LearnedRung(const Solid& solid, const TouchSurface& surface, const LearnedShapes& shapes, double tolerance);
 
   std::optional<Answer> press(const Patch& patch, double depth) const override;

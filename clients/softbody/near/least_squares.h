@@ -5,16 +5,21 @@
 
 namespace tendon::softbody {
 
-/// A least squares problem min |G x − b|² by its products, so that G need not be kept.
+/// The least-squares problem min
+/// G x − b
+/// ² in terms of its normal equations, so that G need not be stored.
 struct Squares {
   MatrixXd gram;      ///< GᵀG
   VectorXd right;     ///< Gᵀb
   double square = 0;  ///< |b|²
 };
 
-/// x ≥ 0 with few entries above 0, until |G x − b| ≤ `left` |b|, or `most` entries, or none that helps is left (Lawson &
-/// Hanson 1974). One entry is let in at a time: several at once stall. One that comes back to 0 is barred until another
-/// has stayed.
+/// A sparse x ≥ 0: adds entries until
+/// G x − b
+///  ≤ `left`
+/// b
+/// , `most` entries are positive, or no entry helps (Lawson & Hanson 1974). Adds one entry at a time, because several
+/// at once stall. An entry that returns to 0 is excluded until another one has stayed.
 VectorXd few_not_negative(const Squares& squares, double left, int most);
 
 }  // namespace tendon::softbody

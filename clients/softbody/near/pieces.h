@@ -6,8 +6,8 @@
 
 namespace tendon::softbody {
 
-/// Work that is done in pieces: a coroutine that says `co_await kPieceDone` behind each. What it refers to must live as
-/// long as this. Where a piece throws, next() throws, and no piece is left.
+/// Work divided into pieces: a coroutine with `co_await kPieceDone` after each. Objects it refers to must outlive it.
+/// If a piece throws, next() throws and the work is over.
 ///
 /// Thread-safe: no. Realtime-safe: no.
 class [[nodiscard]] Pieces {
@@ -29,7 +29,7 @@ class [[nodiscard]] Pieces {
     if (work_) work_.destroy();
   }
 
-  /// Does the next piece. False when none is left.
+  /// Runs the next piece. Returns false when none remains.
   bool next() {
     if (!work_.done()) work_.resume();
     return !work_.done();

@@ -9,8 +9,8 @@
 
 namespace tendon::softbody {
 
-/// A way of answering some presses of a body faster than its model does: near/ladder.h asks several, the fastest first.
-/// A rung remembers nothing: the same press has the same answer.
+/// A fast way to answer some presses of a body; near/ladder.h tries several in order. Stateless: the same press has the
+/// same answer.
 class Rung {
  public:
   Rung() = default;
@@ -20,13 +20,12 @@ class Rung {
 
   struct Answer {
     Reaction reaction;
-    double share;  ///< above 0 and at most 1: below 1 the next rung has the rest
+    double share;  ///< in (0, 1]; if below 1, the next rung contributes the rest
   };
-  /// The answer to a patch at a held depth, m. Empty where this rung knows too little of it.
+  /// The answer to a patch at the given depth, m. Empty if this rung does not cover the press.
   virtual std::optional<Answer> press(const Patch& patch, double depth) const = 0;
 
-  /// How much room a press has until a share is below 1: 0 there, 1 far from it, and evenly between. A rung says so
-  /// without an answer.
+  /// Distance to where the share falls below 1: 0 there, 1 far from it, linear in between. Computes no answer.
   virtual double room(const Vec2& middle, double depth) const = 0;
 
   struct Size {
@@ -34,9 +33,9 @@ class Rung {
     int shapes = 0;            ///< unknowns
     std::size_t elements = 0;  ///< that are summed over
     std::size_t bytes = 0;
-    int cells = 0;  ///< of the grid of places and depths, in which it may answer
+    int cells = 0;  ///< grid cells in which it may answer
     int of_cells = 0;
-    double error = 0;  ///< of the force, the largest share that is said in those
+    double error = 0;  ///< largest relative force error in those cells
   };
   virtual Size size() const = 0;
 };

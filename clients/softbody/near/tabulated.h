@@ -10,27 +10,28 @@
 
 namespace tendon::softbody {
 
-/// The energy of a body without memory under a patch, as a function of three numbers: E(depth δ, place c). At each knot of
-/// a grid it is known with its slopes and the curvatures
+/// The energy of a memoryless body under a patch as a function of depth δ and tangential position c: E(δ, c). At each
+/// grid knot its value, gradient and second derivatives follow from a Reaction with slope s and glide t (tilting), M
+/// (curving) and D (giving):
 ///
 ///     ∂E/∂δ = F,   ∂E/∂c = −F s,   ∂²E/∂δ² = k,   ∂²E/∂δ∂c = −(k s + F t),
 ///     ∂²E/∂c² = k s sᵀ + F (s tᵀ + t sᵀ − M − F D)
 ///
-/// of a Reaction (s its slope, t, M, D its glide). Between, it is quintic in the depth and bicubic across (Hermite), with
-/// two continuous derivatives in the depth and one across. Force and stiffness are its derivatives, so that a closed way
-/// gives nothing, whatever this is wrong by.
+/// In between it is a Hermite interpolant, quintic in depth and bicubic in position, with two continuous derivatives in
+/// depth and one in position. Force and stiffness are its derivatives, so forces are conservative whatever the
+/// interpolation error.
 struct TabulatedAnswers {
   PressGrid grid;
-  /// For each knot E, F and k in units of the grid, each with ∂x, ∂y, ∂x∂y, J.
+  /// For each knot E, F and k in grid units, each with ∂x, ∂y, ∂x∂y; J.
   static constexpr std::size_t kNumbers = 12;
   std::vector<double> numbers{};
   std::vector<double> errors{};  ///< Trust::errors()
 };
 
-/// Answers in the middles of cells, which were solved too, tell how wrong it is. Nothing is known at a knot without its glide.
+/// The solved cell centers give the error. A knot without glide is unknown.
 TabulatedAnswers tabulate(const SolvedPresses& presses);
 
-/// E and its derivatives at a point of the grid, in SI units.
+/// E and its derivatives at a grid point, in SI units.
 struct TabulatedEnergy {
   double energy = 0;           ///< J
   double force = 0;            ///< N, ∂E/∂δ
@@ -41,10 +42,10 @@ struct TabulatedEnergy {
 };
 TabulatedEnergy energy_at(const TabulatedAnswers& table, const PressGrid::Point& point);
 
-/// The table where its errors allow it: some microseconds for an answer.
+/// The table where its error permits; an answer takes microseconds.
 class TabulatedRung : public Rung {
  public:
-  /// `tolerance`: by how large a share of the force an answer may be wrong.
+  /// `tolerance`: accepted relative force error.
   TabulatedRung(TabulatedAnswers table, double tolerance);
 
   std::optional<Answer> press(const Patch& patch, double depth) const override;

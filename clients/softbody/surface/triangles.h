@@ -12,44 +12,43 @@
 
 namespace tendon::softbody {
 
-/// A surface of triangles. The corners are counterclockwise when seen from outside. Lengths are in the unit of the
-/// file.
+/// A triangle surface. Corners are counterclockwise seen from outside. Lengths are in the unit of the file.
 struct Triangles {
   std::vector<Vec3> points;
   std::vector<std::array<int, 3>> facets;
-  std::vector<int> numbers{};        ///< for each triangle, the number of the facet in the file; empty: its own number
-  std::vector<std::string> notes{};  ///< a sentence for each repair by read_surface()
+  std::vector<int> numbers{};        ///< for each triangle, its facet number in the file; empty: its own number
+  std::vector<std::string> notes{};  ///< one sentence per repair by read_surface()
 
-  /// The volume inside the surface. Negative if the surface is inside out.
+  /// Enclosed volume. Negative if the surface is inside out.
   double volume() const;
   double longest_side() const;  ///< of the bounding box
   int number(std::size_t facet) const { return numbers.empty() ? static_cast<int>(facet) + 1 : numbers[facet]; }
   std::array<Vec3, 3> corners(std::size_t facet) const;
-  std::string place(std::size_t facet) const;  ///< the number and the centre: "facet 7 at (1, 2, 3)"
+  std::string place(std::size_t facet) const;  ///< facet number and center: "facet 7 at (1, 2, 3)"
 };
 
-/// Reads a surface file (read_facets()) and divides its polygons into triangles (triangles_of()). Each repair is
-/// added to `notes`:
+/// Reads a surface file (read_facets()) and triangulates its polygons (triangles_of()). Each repair is added to
+/// `notes`:
 ///
-/// - Points at the same place (kSamePlace) are merged. For STL this is normal and not a repair.
-/// - A facet with fewer than three different corners is removed.
+/// - Coincident points (kSamePlace) are merged. For STL this is normal and not a repair.
+/// - A facet with fewer than three distinct corners is removed.
 /// - A duplicate facet is removed.
 ///
 /// Throws std::invalid_argument "FILE: …" with the line or the facet if read_facets() fails, if a polygon is not
 /// simple, if there are no facets, or if the file is larger than kMaxMeshBytes.
 Triangles read_surface(const std::filesystem::path& file);
-/// The same for a file in memory. `ending` is the extension (".stl"), and `name` is used in error messages.
+/// Reads a file in memory. `ending` is the extension (".stl"); `name` is used in error messages.
 Triangles parse_surface(std::string_view text, std::string_view ending, std::string_view name);
 
-/// The largest number of corners in a polygon. The time to divide a polygon is quadratic in this number.
+/// Largest number of corners of a polygon. Triangulation is quadratic in this number.
 inline constexpr std::size_t kMostCorners = 10'000;
 
-/// Checks that the surface is the boundary of one or more volumes: each edge belongs to two facets with opposite
-/// directions, no two facets intersect or overlap, and each shell has the right orientation (check_shells()). Otherwise
-/// throws std::invalid_argument "`name`: …" with the number of a facet and its place.
+/// Checks that the surface bounds one or more volumes: each edge belongs to two facets with opposite directions, no two
+/// facets intersect or overlap, and each shell is oriented correctly (check_shells()). Otherwise throws
+/// std::invalid_argument "`name`: …" with the number and place of a facet.
 void check(const Triangles& surface, std::string_view name);
 
-/// As binary STL.
+/// Binary STL.
 void write_stl(const std::filesystem::path& file, const Triangles& surface);
 
 }  // namespace tendon::softbody

@@ -11,46 +11,44 @@
 
 namespace tendon::softbody {
 
-/// A rigid capsule (all points within `radius` of a line from end to end) that presses a linear body without friction.
-/// With φ the distance of a point from the capsule's surface and yᵢ = xᵢ + uᵢ the places of the nodes, the body takes
-/// the shape of least energy
+/// A rigid capsule (all points within `radius` of a segment) that presses a linear body without friction. With φ the
+/// distance from the capsule's surface and yᵢ = xᵢ + uᵢ the node positions, the body takes the shape of minimum energy
 ///
 ///     E = min ½ uᵀKu   with   φ(yᵢ) ≥ 0
 ///
-/// so a pushed node lies on the capsule, and its push λᵢ ≥ 0 is along the capsule's normal mᵢ = ∇φ(yᵢ) there. The force
-/// and the torque are the slope of that energy as the capsule moves and turns, so no closed path gives out energy; and
-/// they are the sums of what the nodes feel, with the opposite sign:
+/// so a pushed node lies on the capsule, and its push λᵢ ≥ 0 acts along the capsule's normal mᵢ = ∇φ(yᵢ). Force and
+/// torque are the gradient of this energy with respect to the capsule's pose, so they are conservative, and minus the
+/// sums over the nodes:
 ///
 ///     force = −Σ λᵢ mᵢ,   torque = −Σ (yᵢ − p) × λᵢ mᵢ   about a point p
 ///
-/// The body answers with its whole compliance, along the surface too. (SphereContact leaves that out: with ν = 0.45 it
-/// differs by some percent in a deep press.) The search solves one problem of `pushes.h` after another, in which a
-/// plane stands for the capsule at each node: the plane that touches it where it is nearest to the node's last place. A
-/// capsule is convex, so each shape on the way keeps out of it, and the energy never grows from one to the next. The
-/// search ends when the pushes turn by less than kEnough of the force, and `Feel::error` says what is left.
+/// Uses the full compliance, also tangentially. (SphereContact omits the tangential part, a difference of some percent
+/// at ν = 0.45 in a deep press.) Solves a sequence of problems of `pushes.h`, in which the capsule is replaced at each
+/// node by its tangent plane closest to the node's last position. The capsule is convex, so every iterate is admissible
+/// and the energy never increases. Ends when the pushes change direction by less than kEnough of the force; Feel::error
+/// gives the rest.
 ///
-/// The stiffnesses are the slopes of force and torque as the capsule moves and turns while the same nodes are pushed:
-/// of how the pushes change, how their normals turn, and how the lever of each turns with the handle. Where E bends
-/// downwards, as for a long handle that stands on its end and would fall over, the stiffness is 0: neither is ever
-/// negative.
+/// The stiffnesses are the derivatives of force and torque for a fixed set of pushed nodes: changes of the pushes, of
+/// their normals and of their levers. Directions of negative curvature of E, such as a long handle standing on its end,
+/// get stiffness 0, so neither matrix has negative eigenvalues.
 ///
-/// Valid while the contact is many nodes wide, as with SphereContact, and for small strains.
+/// Valid while the contact is many nodes wide, as for SphereContact, and for small strains.
 ///
 /// Thread-safe: no. Realtime-safe: no.
 class CapsuleContact {
  public:
-  /// `nodes`: those that can be touched, ascending; `radius` m, above 0; `half_length` m, from the middle to the centre
-  /// of each end, 0 or more. Makes the compliance of the nodes by three solutions for each. Throws
-  /// std::invalid_argument. Surface must outlive this.
+  /// `nodes`: the touchable ones, ascending; `radius`: m, positive; `half_length`: m, from the center to the center of
+  /// each end, ≥ 0. Computes the compliance of the nodes, three solves each. Throws std::invalid_argument. The surface
+  /// must outlive this object.
   CapsuleContact(const Solid& solid, const TouchSurface& surface, const std::vector<int>& nodes, double radius,
                  double half_length);
 
-  /// With the capsule's middle at `middle` (m), its axis along the unit vector `axis`, and the torque about the point
-  /// `about` (m); body frame. Feel::torque is always there. There is no force when a number is not finite. Throws
-  /// std::out_of_range when the capsule touches the body outside `nodes`, or where it is held.
+  /// Answer with the capsule centered at `middle` (m), its axis along the unit vector `axis`, and the torque about
+  /// `about` (m); body frame. Feel::torque is always set. No force if an argument is not finite. Throws
+  /// std::out_of_range if the capsule touches the body outside `nodes`, or where it is fixed.
   Feel at(const Vec3& middle, const Vec3& axis, const Vec3& about);
 
-  /// Problems of `pushes.h` that the last answer took.
+  /// Number of problems of `pushes.h` solved for the last answer.
   int rounds() const noexcept { return rounds_; }
 
   std::size_t bytes() const noexcept;
@@ -58,10 +56,10 @@ class CapsuleContact {
   static constexpr double kEnough = 1e-6;
 
  private:
-  /// A plane that touches the capsule.
+  /// A tangent plane of the capsule.
   struct Plane {
-    Vec3 point;   ///< m, where
-    Vec3 normal;  ///< unit vector, out of the capsule
+    Vec3 point;   ///< m, point of contact
+    Vec3 normal;  ///< unit vector, outward
   };
   struct Capsule {
     Vec3 middle;
@@ -70,13 +68,13 @@ class CapsuleContact {
     double half_length;
     Vec3 nearest_of_axis(const Vec3& y) const;
     Plane nearest(const Vec3& y, const Vec3& otherwise) const;
-    /// m, how far above x, along n, the capsule's lower side is; empty where it is nowhere above or below x.
+    /// Height in m of the capsule's lower side above x along n; empty if it is nowhere above or below x.
     std::optional<double> above(const Vec3& x, const Vec3& n) const;
   };
   struct Node {
-    Eigen::Index row;  ///< in nodes_
+    Eigen::Index row;  ///< index in nodes_
     Vec3 at_rest;
-    Vec3 at;  ///< under the tool
+    Vec3 at;  ///< deformed position
     Plane plane;
   };
   std::vector<Node> near(const Capsule& tool, double& gap) const;
@@ -88,7 +86,7 @@ class CapsuleContact {
   double radius_;
   double half_length_;
   std::vector<Vec3> places_;          ///< m, at rest, of surface_.nodes()
-  std::vector<Eigen::Index> row_of_;  ///< of surface_.nodes() in compliance_, in threes; −1: not in it
+  std::vector<Eigen::Index> row_of_;  ///< index of each surface_.nodes() in compliance_, in blocks of three; −1: absent
   MatrixXd compliance_;               ///< m/N
   std::vector<bool> pushed_;          ///< by row, in the last answer
   int rounds_ = 0;

@@ -11,14 +11,13 @@ namespace tendon::softbody {
 
 using Vec2 = Eigen::Vector2d;
 
-/// Dry friction between a tool and the patch below it: Coulomb's, with a little elasticity (Hayward & Armstrong 2000).
-/// A spring runs across the surface from the tool to an anchor. The anchor is dragged along, so that the spring never
-/// pulls with more than
+/// Dry (Coulomb) friction between a tool and the patch below it, with a small elastic range (Hayward & Armstrong 2000).
+/// A tangential spring runs from the tool to an anchor, which is dragged along so that the spring force never exceeds
 ///
 ///     |f| ≤ µ F
 ///
-/// where F is the force along the normal. The spring's stiffness is constant, and its energy is only lost, by dragging,
-/// so on any closed path it takes energy and gives none. The body's shape does not follow it sideways.
+/// where F is the normal force. The spring stiffness is constant and dragging only dissipates, so any closed path takes
+/// energy. The tangential force does not deform the body.
 ///
 /// Thread-safe: no.
 class Friction {
@@ -27,11 +26,11 @@ class Friction {
   Friction(double coefficient, double stiffness);
 
   struct Drag {
-    Vec2 force = Vec2::Zero();  ///< N, on the tool, across
-    double stiffness = 0;       ///< N/m, −∂force/∂place; 0 while it slides
-    double until_slip = 0;      ///< m, how far the tool may go before it slides; 0 while it slides
+    Vec2 force = Vec2::Zero();  ///< N, on the tool, tangential
+    double stiffness = 0;       ///< N/m, −∂force/∂place; 0 while sliding
+    double until_slip = 0;      ///< m, tool motion until it slides; 0 while sliding
   };
-  /// Moves the tool to `place` (m, across), pressed with `normal_force` N. At 0 or less the tool has let go.
+  /// Moves the tool to `place` (m, tangential) under `normal_force` (N). A force ≤ 0 releases the anchor.
   Drag move(const Vec2& place, double normal_force);
   void let_go() { anchor_.reset(); }
 
@@ -43,8 +42,8 @@ class Friction {
   std::optional<Vec2> anchor_;
 };
 
-/// The sideways stiffness, N/m, of a half space under a disc of `radius` a (m) that does not slip: 8 G a/(2 − ν)
-/// (Mindlin 1949).
+/// Tangential stiffness, N/m, of a half space under a non-slipping disc of `radius` a (m): 8 G a/(2 − ν) (Mindlin
+/// 1949).
 double sideways_stiffness(const Material& material, double radius);
 
 }  // namespace tendon::softbody

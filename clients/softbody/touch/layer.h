@@ -12,39 +12,39 @@
 
 namespace tendon::softbody {
 
-/// A rigid tool as its handle holds it.
+/// A rigid tool with its offset from the handle.
 struct HeldTool {
   RigidShape shape;
-  Vec3 offset = Vec3::Zero();  ///< m, handle frame, from the handle's position to the tool's middle
+  Vec3 offset = Vec3::Zero();  ///< m, handle frame, from the handle's position to the tool's center
 
   Vec3 middle(const Pose& handle) const { return handle.position + handle.turn * offset; }
-  /// From a point x of the body to the tool's surface; all in the frame of `handle`.position.
+  /// Distance from the tool's surface to a point x of the body, in the frame of `handle`.position.
   Distance distance(const Pose& handle, const Vec3& x) const;
-  double value(const Pose& handle, const Vec3& x) const { return shape.value(in_tool(handle, x)); }  ///< φ alone
+  double value(const Pose& handle, const Vec3& x) const { return shape.value(in_tool(handle, x)); }  ///< φ only
   Vec3 in_tool(const Pose& handle, const Vec3& x) const {
     return handle.turn.transpose() * (x - handle.position) - offset;
   }
 };
 
-/// A thin elastic layer on the surface of a body, which rigid tools press: contact as an energy. With the pose p of a
-/// tool, its distance φ (RigidShape) from each of many points on the facets, and the area that a point stands for,
+/// A thin elastic layer on the surface of a body, pressed by rigid tools: contact as an energy. With the pose p of a
+/// tool, its distance φ (RigidShape) from each of many points on the facets, and the area of each point,
 ///
 ///     Ψ(u, p) = Σ area · ψ(ℓ − φ(x(u); p)),   ψ″(g) = E/ℓ · clamp(g/ε, 0, 1),   ε = ℓ/10
 ///
-/// so a tool that would reach ℓ below the surface presses there with about Young's modulus, and Ψ has two continuous
-/// derivatives wherever φ has. Points and not nodes press, so the force grows without steps on facets that are wider
-/// than the contact.
+/// A tool that would reach ℓ below the surface presses there with about Young's modulus. Ψ has two continuous
+/// derivatives wherever φ has. Points are used instead of nodes so that the force grows smoothly on facets wider than
+/// the contact.
 ///
-/// Points must be closer than the tool is thin. An edge that rests on a single row of them slips off it: the row snaps
-/// into the tool, and what that frees is lost to the hand. A blade 2.6 mm thick (spoon.off end on, B1 in cells of 10 mm,
-/// 3 mm deep and 3 mm across) lost 81 to 88 % of the work put in with points 1.4 mm apart, 3 to 4 % with 0.8 mm, and less
-/// than 0.1 % from 0.6 mm on. Body takes a quarter of the tool's thinnest part. A facet that is wider than 32 such pieces
-/// has too few points for it.
+/// The point spacing must be smaller than the tool is thick. A thin edge on a single row of points slips off: the row
+/// snaps into the tool, and the released energy is lost to the hand. A blade 2.6 mm thick (spoon.off end on, B1 with
+/// cells of 10 mm, 3 mm deep and 3 mm across) lost 81 to 88 % of the work with points 1.4 mm apart, 3 to 4 % with 0.8
+/// mm, and less than 0.1 % from 0.6 mm on. Body uses a quarter of the tool's minimum thickness. A facet wider than 32
+/// such pieces has too few points.
 ///
-/// Friction for each point: where an answer ends, a point that is pressed is tied to the tool by a spring of shear
-/// modulus over ℓ, along the surface. It pulls with at most µ times the pressure. With more, the tie slides on the tool,
-/// along the pull, and what the spring loses is gone: `dissipated`. Within a solution the pressure and the normal that
-/// bound the spring are those of the last iteration (hold()), so that friction too is an energy there.
+/// Friction at each point: at the end of an answer a pressed point is tied to the tool by a tangential spring with the
+/// shear modulus over ℓ. Its force is at most µ times the pressure; beyond that the tie slides along the tool and
+/// dissipates energy (`dissipated`). Within a solution the bounding pressure and normal are those of the last iteration
+/// (hold()), so that friction also has an energy.
 ///
 /// Thread-safe: no. Realtime-safe: no.
 class Layer {
@@ -54,106 +54,106 @@ class Layer {
     double young = 0;         ///< E, Pa, above 0
     double friction = 0;      ///< µ, 0 or more
     double shear = 0;         ///< Pa, above 0 with friction
-    double piece = 0;         ///< m, above 0: the points of a facet are about as far apart; 4 × 4 to 32 × 32 of them
-    std::size_t tools = 1;    ///< how many may press
+    double piece = 0;         ///< m, positive: approximate spacing of points on a facet; 4 × 4 to 32 × 32 points
+    std::size_t tools = 1;    ///< number of tools
   };
-  /// All of the surface of `elastic` that can move. Throws std::invalid_argument. `elastic` must outlive this.
+  /// Covers the movable part of the surface of `elastic`, which must outlive this object. Throws std::invalid_argument.
   Layer(const Elastic& elastic, const Config& config);
 
-  /// A tool where it is now; empty: it is nowhere.
+  /// A tool at its present pose; empty: absent.
   struct Placed {
     const HeldTool* tool;
     std::optional<Pose> handle;
   };
 
-  /// The facets that tools press or may press soon, and the nodes that move them.
+  /// The facets close to a tool, and the nodes that move them.
   struct Near {
     struct Site {
       std::size_t tool;
       int facet;
-      std::vector<int> nodes;  ///< as indices of the next
+      std::vector<int> nodes;  ///< indices into Near::nodes
     };
     std::vector<int> nodes;  ///< of the mesh, ascending
     std::vector<Site> sites;
   };
-  /// With the nodes' displacements u: the facets with a point that is nearer to a tool than `margin` of their size.
+  /// The facets with a point closer to a tool than `margin` times the facet size, at displacements u.
   Near near(std::span<const Placed> tools, const VectorXd& u, double margin) const;
 
   using Vec6 = Eigen::Matrix<double, 6, 1>;
   using Mat6 = Eigen::Matrix<double, 6, 6>;
-  /// What a tool feels: Ψ by its pose, the place of the handle and small turns about it.
+  /// Derivatives of Ψ with respect to a tool's pose: handle position and small rotations about it.
   struct Felt {
-    Vec6 slope = Vec6::Zero();   ///< ∂Ψ/∂p: minus force and torque on the hand
+    Vec6 slope = Vec6::Zero();   ///< ∂Ψ/∂p: minus the force and torque on the hand
     Mat6 curve = Mat6::Zero();   ///< ∂²Ψ/∂p²
-    MatrixXd mixed;              ///< ∂²Ψ/∂u∂p, three rows for each node, a column for each motion
-    double area = 0;             ///< m², of what is pressed
-    Vec3 middle = Vec3::Zero();  ///< m, of the pressed points, by their area
-    double spread = 0;           ///< m, from there to the farthest of them
+    MatrixXd mixed;              ///< ∂²Ψ/∂u∂p; three rows per node, a column per pose component
+    double area = 0;             ///< m², pressed
+    Vec3 middle = Vec3::Zero();  ///< m, area-weighted mean of the pressed points
+    double spread = 0;           ///< m, from `middle` to the farthest pressed point
   };
   struct Press {
     double energy = 0;       ///< Ψ, J
-    VectorXd slope;          ///< ∂Ψ/∂u, N, of Near::nodes
-    MatrixXd curve;          ///< ∂²Ψ/∂u², N/m, of the same
-    std::vector<Felt> felt;  ///< of each tool
+    VectorXd slope;          ///< ∂Ψ/∂u, N, for Near::nodes
+    MatrixXd curve;          ///< ∂²Ψ/∂u², N/m, for Near::nodes
+    std::vector<Felt> felt;  ///< per tool
   };
-  enum class Order { kEnergy, kCurve, kFelt };  ///< what is computed: energy and slope; curve too; all
-  /// With the nodes of `near` at `places`, m, a column for each.
+  enum class Order { kEnergy, kCurve, kFelt };  ///< energy and slope; and curve; and felt
+  /// With the nodes of `near` at `places`, m, one column each.
   Press press(const Near& near, std::span<const Placed> tools, const Eigen::Matrix3Xd& places, Order order) const;
 
-  /// The places of Near::nodes with the displacements u.
+  /// Positions of Near::nodes at displacements u.
   Eigen::Matrix3Xd places(const Near& near, const VectorXd& u) const;
 
-  /// Takes pressures and normals from the present places, for the bounds of friction.
+  /// Sets the pressures and normals that bound friction from `places`.
   void hold(const Near& near, std::span<const Placed> tools, const Eigen::Matrix3Xd& places);
-  /// An answer ends here: ties slide back to their bound, points that are pressed are tied, others let go. Returns the
-  /// least and the sum of what single ties have lost, J.
+  /// Ends an answer: ties slide back to their bound, pressed points are tied, others released. Returns the smallest
+  /// single loss and the total loss of the ties, J.
   struct Dissipated {
     double least = 0;
     double sum = 0;
-    int slid = 0;  ///< ties
+    int slid = 0;  ///< number of ties
   };
   Dissipated advance(const Near& near, std::span<const Placed> tools, const Eigen::Matrix3Xd& places);
   bool rubs() const noexcept { return config_.friction > 0; }
 
-  /// The least distance of the body from a tool, and the way out of the body there; ∞ without a tool.
+  /// The minimum distance of the body from a tool, with the outward normal of the body there; ∞ if the tool is absent.
   struct Gap {
     double value;
-    Vec3 normal;  ///< a unit vector towards the tool
+    Vec3 normal;  ///< unit vector towards the tool
   };
   Gap gap(const Placed& tool, const VectorXd& u) const;
 
   double thickness() const noexcept { return config_.thickness; }
-  double least_facet() const noexcept { return least_facet_; }  ///< m, the root of the least area of a facet
+  double least_facet() const noexcept { return least_facet_; }  ///< m, square root of the smallest facet area
   std::size_t bytes() const noexcept;
 
  private:
   struct FacetOfPoints {
     std::vector<int> nodes;
-    double size;        ///< m, the root of its area at rest
-    double reach;       ///< m, from the mean of its nodes to the farthest of them, at rest
-    std::size_t first;  ///< of its bunches
+    double size;        ///< m, square root of its area at rest
+    double reach;       ///< m, from the mean of its nodes to the farthest node, at rest
+    std::size_t first;  ///< bunch
     std::size_t count;
   };
-  using Shares = Eigen::Matrix<double, 1, Eigen::Dynamic, 1, 1, 9>;  ///< of a facet's nodes
+  using Shares = Eigen::Matrix<double, 1, Eigen::Dynamic, 1, 1, 9>;  ///< weights of a facet's nodes
   struct PointOfFacet {
     double area;  ///< m², at rest
     Shares shares;
   };
-  /// Points that lie together: where their middle is far from a tool, they all are.
+  /// A cluster of points, to skip those far from a tool.
   struct Bunch {
-    std::size_t first;  ///< of its points
+    std::size_t first;  ///< point
     std::size_t count;
     Shares middle;
-    /// No point is farther from the middle than this times the way from the mean of the facet's nodes to the farthest
-    /// of them, in any shape.
+    /// Bound on the distance of a point from `middle`, relative to the distance from the mean of the facet's nodes to
+    /// the farthest node, in any shape.
     double spread;
   };
-  /// A point that is tied to a tool.
+  /// Friction tie between a point and a tool.
   struct Tie {
     bool tied = false;
     Vec3 at = Vec3::Zero();      ///< m, handle frame
-    double most = 0;             ///< Pa, the bound of its pull
-    Vec3 normal = Vec3::Zero();  ///< of the tool there, in the body's frame
+    double most = 0;             ///< Pa, bound of its force per area
+    Vec3 normal = Vec3::Zero();  ///< of the tool at the point, body frame
   };
   double pressure(double overlap, double& stiffness, double& energy) const;
   void add_bunch(FacetOfPoints& facet, std::size_t first);
@@ -169,7 +169,7 @@ class Layer {
   std::vector<FacetOfPoints> facets_;
   std::vector<Bunch> bunches_;
   std::vector<PointOfFacet> points_;
-  std::vector<std::vector<Tie>> ties_;  ///< of each tool, by point; empty without friction
+  std::vector<std::vector<Tie>> ties_;  ///< per tool, by point; empty without friction
   double least_facet_ = 0;
 };
 

@@ -8,17 +8,17 @@
 
 namespace tendon::softbody {
 
-/// The nodes that a rigid tool without friction pushes, and how hard (Signorini's conditions).
+/// The nodes pushed by a frictionless rigid tool, and their forces (Signorini's conditions).
 struct Pushes {
-  std::vector<Eigen::Index> set;  ///< the pushed nodes, ascending
-  VectorXd push;                  ///< N, of each of them, not negative
-  Eigen::LLT<MatrixXd> factor;    ///< of their rows and columns of the table
+  std::vector<Eigen::Index> set;  ///< pushed nodes, ascending
+  VectorXd push;                  ///< N, per pushed node, ≥ 0
+  Eigen::LLT<MatrixXd> factor;    ///< of the table's rows and columns of `set`
 };
 
-/// The pushes λ ≥ 0 of least energy ½ λᵀGλ − dᵀλ: a pushed node gives way by just its `depth` d (m), any other by at
-/// least that. `table` G is how far each node gives way when another is pushed with 1 N (m/N, symmetric, positive
-/// definite). The search is an active set; it begins with the nodes that are `active`, or with all of them when none
-/// is, and leaves in `active` the nodes that are pushed. At least one depth is above 0.
+/// Minimizes ½ λᵀGλ − dᵀλ over λ ≥ 0: a pushed node moves by exactly its `depth` d (m), all others by at least theirs.
+/// `table` is G, the displacement of each node per newton on another (m/N, symmetric positive definite). Active-set
+/// method; starts from `active`, or from all nodes if none is active, and returns the pushed nodes there. At least one
+/// depth must be positive.
 Pushes least_pushes(const MatrixXd& table, const VectorXd& depth, std::vector<bool>& active);
 
 }  // namespace tendon::softbody

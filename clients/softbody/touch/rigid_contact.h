@@ -12,48 +12,48 @@
 
 namespace tendon::softbody {
 
-/// Rigid tools that press a nonlinear body at rest: any RigidShape, one or several at once. With the elastic
-/// energy W, the layer's energy Ψ (layer.h) and the poses p of all tools, the body takes the shape of least
+/// One or several rigid tools (RigidShape) on a nonlinear body at rest. With elastic energy W, layer energy Ψ (layer.h)
+/// and the poses p of all tools, the body takes the shape that minimizes
 ///
 ///     Π(u, p) = W(u) + Ψ(u, p)
 ///
-/// and each hand is sent the slopes and the curvature of that one energy by its own pose:
+/// and each hand receives the derivatives of this energy with respect to its own pose:
 ///
 ///     force and torque = −∂Π/∂p,   K = Π_pp − Π_pu Π_uu⁻¹ Π_up
 ///
-/// so a closed way of all tools together gives out no energy, and the curvatures of tool and surface are in K. Friction
-/// takes energy (layer.h).
+/// so a closed path of all tools generates no energy, and K includes the curvatures of tool and surface. Friction
+/// dissipates energy (layer.h).
 ///
-/// Each step solves exactly who touches: the body's stiffness is known among the nodes near the tools by the model's
-/// kept factor, one solution for each unknown of a new near node, and by what the last steps taught (Pairs). On these
-/// few unknowns Newton's method finds the least of the stiff layer's energy and that of a body with this stiffness; the
-/// rest of the body follows by one solution. A line search makes Π fall. K comes by conjugate gradients with the same
-/// inverse, and differences of the forces, to 0.2 %.
+/// Each step solves for the contact set exactly. The body's stiffness at the nodes near the tools is known from the
+/// model's kept factor, one solve per unknown of a new near node, and from the last steps (Pairs). Newton's method on
+/// these few unknowns minimizes the stiff layer energy plus that of a body with this stiffness; one solve then gives
+/// the rest of the body. A line search reduces Π. K is computed by conjugate gradients with the same inverse and finite
+/// differences of the forces, to 0.2 %.
 ///
-/// Between two answers the tools go in steps of at most half a facet, and an eighth of what the thinnest tool is thick,
-/// so that a fast one does not come out on the other side. One that jumps by more than kMostSteps of these is put down
-/// anew: it comes back from where the model's surface is touched from.
+/// Between two answers the tools move in steps of at most half a facet and an eighth of the thinnest tool's thickness,
+/// so that a fast tool does not pass through. A jump of more than kMostSteps steps places the tool anew, approaching
+/// from the side from which the surface is touched.
 ///
 /// Thread-safe: no. Realtime-safe: no.
 class RigidContact {
  public:
   struct Config {
-    Layer::Config layer;      ///< `tools` is set here
-    double tolerance = 1e-6;  ///< of the force, relative: an answer ends when its error is at most so large
-    int max_iterations = 30;  ///< for each step of the way
-    bool turns = true;        ///< torques and their stiffness are wanted
+    Layer::Config layer;      ///< `tools` is overwritten
+    double tolerance = 1e-6;  ///< relative to the force: an answer ends when its error is at most this
+    int max_iterations = 30;  ///< per step of the tools
+    bool turns = true;        ///< compute torques and their stiffness
   };
-  /// `body`, of the mesh `elastic`, is moved by this; both must outlive it. Its effects may have no time and no
+  /// Moves `body`, whose mesh is `elastic`; both must outlive this object. The body's effects must not include time or
   /// self-collision. Throws std::invalid_argument.
   RigidContact(QuasiStaticModel& body, const Elastic& elastic, const TouchSurface& surface, std::vector<HeldTool> tools,
                const Config& config);
 
-  /// What each hand feels with the handles there (body frame); empty: that hand is nowhere. One solution for all. A
-  /// pose that is not finite changes nothing: that hand gets no force, and its tool stays where it was. Throws
-  /// std::invalid_argument when there are not as many as tools.
+  /// Each hand's answer with the handles at the given poses (body frame), from one solution. An empty pose means an
+  /// absent hand. A hand with a non-finite pose gets no force, and its tool stays in place. Throws
+  /// std::invalid_argument if the number of poses is not that of the tools.
   std::vector<Feel> press(std::span<const std::optional<Pose>> handles);
 
-  int iterations() const noexcept { return iterations_; }  ///< steps of Newton's method in the last answer
+  int iterations() const noexcept { return iterations_; }                       ///< Newton steps in the last answer
   const Layer::Dissipated& dissipated() const noexcept { return dissipated_; }  ///< by friction, in the last answer
 
   std::size_t bytes() const noexcept;
@@ -81,14 +81,14 @@ class RigidContact {
   std::vector<HeldTool> tools_;
   Config config_;
   Layer layer_;
-  Vec3 from_;      ///< the way to where tools come from
-  VectorXd rest_;  ///< m, all nodes: the shape that nothing touches
+  Vec3 from_;      ///< direction from which tools come
+  VectorXd rest_;  ///< m, all nodes: the untouched shape
   std::vector<Layer::Placed> placed_;
   Pairs pairs_;
-  int factors_ = 0;             ///< that the body had made when the next three were filled
-  std::vector<int> column_of_;  ///< by free unknown, in the next; −1: not there
-  MatrixXd follows_;            ///< K₀⁻¹ of unit forces, a column for each
-  int columns_ = 0;             ///< of these, filled
+  int factors_ = 0;             ///< the body's factor count when the next three were filled
+  std::vector<int> column_of_;  ///< by free unknown: column in follows_, or −1
+  MatrixXd follows_;            ///< K₀⁻¹ of unit forces, one column each
+  int columns_ = 0;             ///< columns filled
   int iterations_ = 0;
   int in_vain_ = 0;
   double error_ = 0;  ///< N

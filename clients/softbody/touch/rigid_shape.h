@@ -11,63 +11,65 @@
 
 namespace tendon::softbody {
 
-/// The shortest rotation that takes the direction of `from` to that of `to`; neither is zero. Between opposite directions
-/// it is half a turn about the axis across `from` that is nearest to z, or to x where `from` is nearer to z.
+/// The shortest rotation that takes direction `from` to `to`; both nonzero. For opposite directions: half a turn about
+/// the perpendicular axis closest to z, or to x if `from` is closer to z.
 Mat3 shortest_rotation(const Vec3& from, const Vec3& to);
 
-/// The shape of a rigid tool, around its own middle, as a signed distance: all points within `rounding` of a box, the
-/// core. A core without size makes a sphere, one of a single length a capsule, and any other a box with round edges.
-/// With q = |x| − core, taken for each axis, and w the part of q above 0:
+/// The shape of a rigid tool around its center, as a signed distance: all points within `rounding` of a box, the core.
+/// A core of size zero gives a sphere, a one-dimensional core a capsule, and others a box with round edges. With q =
+/// x
+///  − core (componentwise) and w = max(q, 0):
 ///
 ///     φ = |w| − rounding outside the core,   max q − rounding inside it
 ///
-/// φ is the exact distance everywhere outside the core. There it has one derivative everywhere, and a second one that
-/// jumps where a flat side meets a round edge. Inside the core it lacks the first one halfway between two sides.
+/// φ is exact outside the core. There its gradient is continuous, and the second derivative jumps where a flat side
+/// meets a round edge. Inside the core the gradient is discontinuous halfway between two sides.
 ///
-/// Or the inside of a closed surface of triangles, whose distances are kept on a grid (DistanceGrid): φ then has two
-/// continuous derivatives everywhere, and is right to what MeshFacts says.
+/// Or the inside of a closed triangle surface, with distances on a grid (DistanceGrid): φ then has two continuous
+/// derivatives, with the error given in MeshFacts.
 ///
-/// Without state. Thread-safe: yes. Realtime-safe: yes, once built.
+/// Stateless. Thread-safe: yes. Realtime-safe: yes, after construction.
 class RigidShape {
  public:
   /// Lengths in m. Each throws std::invalid_argument that names the field.
   static RigidShape sphere(double radius);
-  /// `half_length`: from the middle to the centre of each end, 0 or more; `axis`: a unit vector.
+  /// `half_length`: from the center to the center of each end, ≥ 0; `axis`: unit vector.
   static RigidShape capsule(double radius, double half_length, const Vec3& axis);
-  /// `size`: of the whole box along its three axes; `edge`: the radius of its edges and corners, above 0 and at most
-  /// half of the least size.
+  /// `size`: of the whole box along its axes; `edge`: radius of edges and corners, positive and at most half of the
+  /// smallest size.
   static RigidShape box(const Vec3& size, double edge);
-  /// The inside of `surface` (in units of which `scale` is one in m), around its origin; with cells of `cell`, m, on a
-  /// grid that goes on for `around`, m, outside of it. Takes some µs for each point of the grid. Throws
-  /// std::invalid_argument, which begins with `name`, when the surface does not pass check(), has parts within others,
-  /// or is somewhere thinner than 2 cells: the grid would not see that. The sentence names the place.
+  /// The inside of `surface` around its origin, with `scale` units per metre, cells of `cell` m, and a grid margin of
+  /// `around` m. Takes some µs per grid point. Throws std::invalid_argument that starts with `name` if the surface does
+  /// not pass check(), has nested parts, or is thinner than 2 cells at some place, which the message names: the grid
+  /// could not resolve it.
   static RigidShape mesh(const Triangles& surface, double scale, double cell, double around, std::string_view name);
 
-  /// At `x`, m, in the tool's frame; and φ alone, for a fraction of the work.
+  /// At `x`, m, tool frame. value() returns φ only, for a fraction of the work.
   Distance distance(const Vec3& x) const;
   double value(const Vec3& x) const;
 
-  /// m, from the middle to the point of the surface that is farthest from it.
+  /// m, distance from the center to the farthest surface point.
   double reach() const noexcept { return reach_; }
 
-  /// m, how thick the tool is where it is thinnest, or less: a point that goes an eighth as far cannot come through it
-  /// unseen.
+  /// m, lower bound of the tool's thickness: a point that moves an eighth of it cannot pass through the tool
+  /// undetected.
   double thinnest() const noexcept { return thinnest_; }
 
-  /// m, from the middle to the point of the surface that is farthest along `direction`, a unit vector in the tool's
+  /// Surface point farthest along `direction`, m, relative to the center. `direction` is a unit vector in the tool
   /// frame.
   Vec3 farthest(const Vec3& direction) const;
 
-  /// What a surface and its grid are.
+  /// Properties of a surface and its grid.
   struct MeshFacts {
     std::size_t facets;
-    Vec3 size;           ///< m, of the box around the surface
+    Vec3 size;           ///< m, of the bounding box
     double cell;         ///< m
     std::size_t points;  ///< of the grid
-    std::size_t bytes;   ///< kept, by each copy of the shape
-    double error;  ///< m, the largest |φ| at corners and in the middles of edges and facets, where φ should be 0
+    std::size_t bytes;   ///< kept by each copy of the shape
+    double error;        ///< m, largest |φ| at corners and at the centers of edges and facets, where φ should be 0
   };
-  const MeshFacts* mesh_facts() const noexcept { return mesh_ ? &mesh_->facts : nullptr; }  ///< of mesh(), or null
+  /// null unless made by mesh()
+  const MeshFacts* mesh_facts() const noexcept { return mesh_ ? &mesh_->facts : nullptr; }
 
  private:
   RigidShape(const Vec3& core, double rounding, const Mat3& turn);
@@ -81,8 +83,8 @@ class RigidShape {
 
   Vec3 core_ = Vec3::Zero();  ///< half of the core's size, m
   double rounding_ = 0;
-  Mat3 turn_ = Mat3::Identity();  ///< the core's axes, as columns, in the tool's frame
-  std::optional<Mesh> mesh_;      ///< in place of these
+  Mat3 turn_ = Mat3::Identity();  ///< the core's axes, as columns, in the tool frame
+  std::optional<Mesh> mesh_;      ///< replaces the members above
   double reach_;
   double thinnest_;
 };
