@@ -23,7 +23,7 @@ BackgroundThread::BackgroundThread() : thread_([this] { run(); }) {}
 
 BackgroundThread::~BackgroundThread() {
   ends_ = true;
-  put(new Given);  // to wake it
+  put(new Given);  // wakes the thread
   thread_.join();
   for (Given* left = given_; left != nullptr;) delete std::exchange(left, left->before);
 }
@@ -38,7 +38,7 @@ void BackgroundThread::put(Given* last) {
 }
 
 void BackgroundThread::run() {
-  setpriority(PRIO_PROCESS, static_cast<id_t>(gettid()), kNice);  // Linux: of this thread alone
+  setpriority(PRIO_PROCESS, static_cast<id_t>(gettid()), kNice);  // on Linux this affects the calling thread only
   while (!ends_) {
     given_.wait(nullptr);
     std::unique_ptr<Given> first;

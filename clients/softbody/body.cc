@@ -25,7 +25,7 @@ namespace {
 
 using enum EffectKind;
 
-/// If the mesh is not read from a file, `numbers` and `parts` are empty.
+/// `numbers` and `parts` are empty unless the mesh is read from a file.
 FileMesh mesh_of(const BodyConfig& config) {
   const Shape shape = info(config.element).shape;
   if (const auto* b = std::get_if<BlockShape>(&config.shape)) return {.mesh = block(shape, b->size, b->cells)};
@@ -49,15 +49,15 @@ Solid solid_of(const BodyConfig& config) {
   return {std::move(mesh), config.element, config.material, law, fixed, std::move(of_elements)};
 }
 
-/// Whether a model that can do without it is to tell its Glide.
+/// Whether linear models and plasticity compute their Glide.
 bool wants_glide(const BodyConfig& config, const TouchSurface& surface) {
   return config.whole_stiffness || surface.curved();
 }
 
-/// A model, and typed pointers to it for kinds that offer more than Model.
+/// A model, with typed pointers to kinds that offer more than Model.
 struct Made {
   std::unique_ptr<Model> model;
-  std::optional<double> linear_up_to{};  ///< m, where a table tells it
+  std::optional<double> linear_up_to{};  ///< m, if a table file provides it
   const CondensedModel* condensed = nullptr;
   QuasiStaticModel* newton = nullptr;  ///< for rigid tools
   StiffeningModel* stiffening = nullptr;
@@ -70,7 +70,7 @@ Patch middle_patch(const TouchSurface& surface, const Vec3& middle) {
   throw std::invalid_argument("the middle of the touched side is not on the body");
 }
 
-/// A linear body that something else than this machine's factor solves.
+/// A linear body with a solver other than the local factor.
 std::unique_ptr<Model> solved_model_of(const BodyConfig& config, const Solid& solid, const TouchSurface& surface,
                                        const SolverOf& solver) {
   EffectSet known = info(ModelKind::kLinear).always;
@@ -98,11 +98,11 @@ std::vector<int> touchable(const BodyConfig& config, const TouchSurface& surface
   return config.reach ? surface.nodes_of_patches(surface.across(config.middle), *config.reach) : surface.nodes();
 }
 
-/// N/m, at first touch.
+/// Initial stiffness, N/m.
 double stiffness_under(Model& model, const Patch& patch) { return model.press(patch, Given::kForce, 1).stiffness; }
 
-/// The model of a table that was made before. Refuses one of another body, of a smaller part of it, and one that does
-/// not answer as it did when it was made.
+/// A model from a stored table. Rejects a table of another body, one with too few nodes, and one that does not
+/// reproduce its recorded stiffness.
 std::unique_ptr<CondensedModel> condensed_from(const BodyConfig& config, const Solid& solid,
                                                const TouchSurface& surface, double& linear_up_to) {
   SurfaceTable table = read_table(*config.table_file);
@@ -119,7 +119,7 @@ std::unique_ptr<CondensedModel> condensed_from(const BodyConfig& config, const S
   const auto patch = then.patch(table.middle);
   auto model = std::make_unique<CondensedModel>(solid.mesh().nodes.size(), std::move(table.nodes),
                                                 std::move(table.compliance), wants_glide(config, surface));
-  constexpr double kSame = 1e-9;  // of the same sum in another order
+  constexpr double kSame = 1e-9;  // summation order differs
   if (!patch || !(std::abs(stiffness_under(*model, *patch) / expected - 1) < kSame)) {
     refuse(" does not answer as it did when it was made");
   }
@@ -140,7 +140,7 @@ Learned learn_of(const BodyConfig& config, const Solid& solid, const TouchSurfac
                tell);
 }
 
-/// The highest first.
+/// In order of preference.
 std::vector<std::unique_ptr<Rung>> rungs_of(const BodyConfig& config, const Solid& solid, const TouchSurface& surface) {
   std::vector<std::unique_ptr<Rung>> rungs;
   const Learned learned = config.near.learned ? *config.near.learned : learn_of(config, solid, surface, {});
@@ -153,7 +153,7 @@ std::vector<std::unique_ptr<Rung>> rungs_of(const BodyConfig& config, const Soli
   return rungs;
 }
 
-/// With `fields` the model "near" begins without a field, and they make it.
+/// With `fields`, starts without a near field and lets these make it.
 std::unique_ptr<NearModel> near_model_of(const BodyConfig& config, const Solid& solid, const TouchSurface& surface,
                                          Background fields) {
   const NearModel::Config made{.newton = {.max_iterations = config.max_iterations, .tolerance = config.tolerance},
@@ -195,7 +195,7 @@ Made model_of(const BodyConfig& config, const Solid& solid, const TouchSurface& 
   return made;
 }
 
-/// Checks that every effect of a config is simulated: none may be left out silently.
+/// Throws if an effect of the config would not be simulated.
 const BodyConfig& checked(const BodyConfig& config) {
   const ModelInfo& model = info(config.model);
   const EffectSet simulated = effects_of(config);
@@ -261,7 +261,7 @@ std::unique_ptr<Friction> friction_of(const BodyConfig& config) {
   return std::make_unique<Friction>(*config.friction, sideways_stiffness(config.material, config.patch_radius));
 }
 
-/// A tool that is thinner beside the points of the layer slips off them (layer.h).
+/// Point spacing on the layer: a thinner tool slips off the points (layer.h).
 constexpr double kPointsAcrossTool = 4;
 
 RigidContact rigid_contact_of(const BodyConfig& config, QuasiStaticModel& body, const Solid& solid,
@@ -279,11 +279,11 @@ RigidContact rigid_contact_of(const BodyConfig& config, QuasiStaticModel& body, 
   return {body, solid, surface, std::vector<HeldTool>(config.hands, {shape, config.tool_offset}), made};
 }
 
-/// m: how deep the patch may be pressed before the material turns anywhere by more than Body::kLargestTurn.
+/// Depth in m at which the material rotates somewhere by Body::kLargestTurn.
 double linear_limit(const Solid& solid, const TouchSurface& surface, const Patch& patch, const Solver& solver) {
   const VectorXd load = solid.to_free(patch_load(solid, surface.normal(), patch));
   const VectorXd per_newton = solver.solve(load);
-  const double depth = 1e-6 * surface.radius();  // so small that the rotation is proportional to it
+  const double depth = 1e-6 * surface.radius();  // small, so that rotations are proportional to it
   VectorXd u = VectorXd::Zero(solid.size());
   solid.add_free(depth / load.dot(per_newton) * per_newton, u);
   return depth * Body::kLargestTurn / solid.largest_turn(u);
@@ -327,7 +327,7 @@ struct Body::Parts {
   Parts(const BodyConfig& config, const SolverOf& solver) : Parts(config, solver, solid_of(checked(config))) {
     if (!config.cuts.empty()) cutting = std::make_unique<Planned>(config, solid.mesh(), solid.fixed(), surface);
   }
-  /// With no cut planned. With `fields` a near field is made by these, and not here.
+  /// Without planned cuts. With `fields`, these make the near field.
   Parts(const BodyConfig& config, const SolverOf& solver, Solid of, Background fields = {})
       : solid(std::move(of)),
         surface(solid.mesh(), config.towards_tool, config.patch_radius),
@@ -338,7 +338,7 @@ struct Body::Parts {
         knows_turns(info(config.model).always.has(kGeometricNonlinearity)),
         turns(turns_the_hand(config)),
         offset(config.tool_offset) {
-    // checked() has made sure that the model of any other sphere or capsule is condensed.
+    // checked() ensures that the model for other spheres and capsules is condensed.
     if (made.newton != nullptr) {
       rigid.emplace(rigid_contact_of(config, *made.newton, solid, surface));
       hands.resize(config.hands);
@@ -356,13 +356,13 @@ struct Body::Parts {
   void go_on_from(Parts& before);
   void note(Feel& feel);
 
-  /// The cuts that are still to be made, and the values that they need.
+  /// The remaining cuts and what is needed to make them.
   struct Planned {
     Planned(const BodyConfig& config, const Mesh& mesh, const Fixed& fixed, const TouchSurface& surface);
     Cutting cuts;
     BodyConfig described;
     Background background{};
-    std::future<std::unique_ptr<Parts>> next{};  ///< the body after the next cut, while it is prepared
+    std::future<std::unique_ptr<Parts>> next{};  ///< the body after the next cut, during its preparation
   };
 
   Solid solid;
@@ -371,8 +371,8 @@ struct Body::Parts {
   Model& model;
   PatchContact contact;
   std::optional<SphereContact> sphere;    ///< instead of `contact`
-  std::optional<CapsuleContact> capsule;  ///< the same
-  std::optional<RigidContact> rigid;      ///< the same
+  std::optional<CapsuleContact> capsule;  ///< as `sphere`
+  std::optional<RigidContact> rigid;      ///< as `sphere`
   std::vector<std::optional<Pose>> hands;
   Patch patch;       ///< around the middle
   bool knows_turns;  ///< simulates large rotations
@@ -383,11 +383,11 @@ struct Body::Parts {
   std::vector<int> node_before{};  ///< of a body that was prepared: each node's number before the cut
 };
 
-/// Makes the cuts once, on a mesh only: so a plan that cannot work is refused before anything is touched.
+/// Makes all cuts on a mesh only, to reject an impossible plan at the start.
 Body::Parts::Planned::Planned(const BodyConfig& config, const Mesh& mesh, const Fixed& fixed,
                               const TouchSurface& surface)
     : cuts(config.cuts), described(config) {
-  described.near.learned.emplace();  // nothing is known of the body after a cut
+  described.near.learned.emplace();  // precomputed data is invalid after a cut
   Division body{.mesh = mesh, .fixed = fixed, .node_before = {}};
   for (Cutting trial = cuts; trial.left() > 0;) {
     const std::span<const Cut> done = trial.make_next();
@@ -504,11 +504,11 @@ Feel Body::touch(const Pose& handle) {
   const Vec3 lever = handle.turn * parts_->offset;
   const Vec3 tool = handle.position + lever;
   if (parts_->capsule) return parts_->capsule->at(tool, handle.turn * parts_->axis, handle.position);
-  // The force of a sphere, and of a patch, depends on where the tool's middle is alone.
+  // For sphere and patch the force depends only on the position of the tool's center.
   Feel feel = touch(tool);
   const Mat3 cross =
       (Mat3() << 0, -lever.z(), lever.y(), lever.z(), 0, -lever.x(), -lever.y(), lever.x(), 0).finished();
-  // The lever turns with the handle: so does the moment of the force.
+  // The lever arm rotates with the handle, which changes the moment of the force.
   const Mat3 turned = lever.dot(feel.force) * Mat3::Identity() - lever * feel.force.transpose();
   feel.torque = {.torque = lever.cross(feel.force),
                  .stiffness = not_negative(cross * feel.stiffness * cross.transpose() + turned)};

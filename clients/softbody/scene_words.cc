@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The help text for the keys of a scene, and the warnings about a scene.
+// Help text for scene keys, and warnings about scenes.
 #include <algorithm>
 #include <filesystem>
 #include <iomanip>
@@ -120,7 +120,7 @@ std::string scene_reference() {
 
 double patch_up_to(const BodyConfig& body) {
   const bool nonlinear = info(body.model).always.has(EffectKind::kGeometricNonlinearity);
-  constexpr double kDeepest = 0.3;  // of the radius: beyond, the pressure of fixed profile nears its limit load
+  constexpr double kDeepest = 0.3;  // of the radius; deeper, the fixed pressure profile approaches its limit load
   return nonlinear && std::holds_alternative<PatchTool>(body.tool) ? kDeepest * body.patch_radius
                                                                    : std::numeric_limits<double>::infinity();
 }

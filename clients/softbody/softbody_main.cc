@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// tendon-softbody: the reference physics engine, a guest like any other.
+// tendon-softbody: the reference physics engine, an ordinary client of the server.
 #include <unistd.h>
 
 #include <algorithm>
@@ -29,10 +29,10 @@ using namespace tendon;
 
 namespace {
 
-/// A self-test presses 3 mm deep and slides 3 mm sideways, so that it stays on the surface of a scene.
+/// The self-test presses 3 mm deep and slides 3 mm, which stays on the surface of typical scenes.
 constexpr double kWay = 0.003;
 
-/// How often a log is told of long work.
+/// Interval of progress messages in a log.
 constexpr std::chrono::seconds kBetweenLines{10};
 
 int test(const softbody::Scene& scene, const Options& options) {
@@ -46,7 +46,7 @@ int test(const softbody::Scene& scene, const Options& options) {
   script.slide = kWay;
   script.elastic = softbody::is_elastic(scene.body);
   if (options.client.rate_hz > 0) script.rate_hz = options.client.rate_hz;
-  // Of several hands the first one moves, and the others are nowhere.
+  // With several hands, only the first moves; the others are absent.
   std::vector<std::optional<DeviceState>> hands(scene.hands.size());
   const SelfTest result = self_test(
       [&](const DeviceState& hand) {
@@ -55,14 +55,13 @@ int test(const softbody::Scene& scene, const Options& options) {
         return body.answer(hands).front();
       },
       script,
-      [&](const SelfTest::Finding& finding) {  // of a rigid tool all of them take a minute
+      [&](const SelfTest::Finding& finding) {  // with a rigid tool the whole test takes a minute
         std::cout << (options.json ? finding.json() : finding.text()) << std::flush;
       });
   return result.passed() ? 0 : 1;
 }
 
-/// What a body learns before it is touched. A terminal shows in one line what is being done; elsewhere a line says so
-/// now and then.
+/// Precomputes the body, with progress on one terminal line, or as occasional log lines.
 void learn(softbody::BodyConfig& body) {
   const bool terminal = isatty(STDERR_FILENO) != 0;
   auto told = std::chrono::steady_clock::now();
@@ -79,7 +78,6 @@ void learn(softbody::BodyConfig& body) {
     std::cerr << "tendon-softbody: warning: " << warning << '\n';
 }
 
-/// `tendon-softbody condense SCENE FILE`.
 int condense(int argc, char** argv) {
   Options options{.client = {.name = "tendon-softbody condense"}};
   std::string scene_file;
@@ -108,7 +106,8 @@ int condense(int argc, char** argv) {
   return 0;
 }
 
-/// Makes the thread that cuts the body and makes near fields, where the scene has either and it may.
+/// Starts the background thread for cuts and near fields, if the scene needs it and two threads may factorize
+/// concurrently.
 void prepare_beside(const softbody::Scene& scene, std::optional<softbody::BackgroundThread>& thread,
                     softbody::PlacedBody& body) {
   const bool cuts = !scene.body.cuts.empty();
@@ -126,7 +125,7 @@ void prepare_beside(const softbody::Scene& scene, std::optional<softbody::Backgr
             << ", because this OpenBLAS is built for one thread; with libopenblas0-pthread they go on\n";
 }
 
-/// Runs until it is told to stop; the exit code.
+/// Runs until stopped. Returns the exit code.
 int answer(const softbody::Scene& scene, const Options& options, softbody::PlacedBody& body) {
   const double linear_up_to = body.linear_up_to();
   const double patch_up_to = softbody::patch_up_to(scene.body);

@@ -10,7 +10,7 @@
 namespace tendon::softbody {
 namespace {
 
-constexpr double kMeasured = 55'539;  // unknowns of the block that the figures are of
+constexpr double kMeasured = 55'539;  // unknowns of the measured block
 
 double multigrid_seconds(double unknowns, int ranks) {
   constexpr double kRounds = 3.3;
@@ -48,7 +48,7 @@ Estimate estimate(const Body::Size& size, int under_patch, std::vector<int> rank
               .set_up_s = 2.8 * larger * larger,
               .bytes = 320e6 * std::pow(larger, 4.0 / 3)};
   e.table = {.answer_s = 2e-6 * std::pow(under_patch / 63.0, 2),
-             .set_up_s = e.factor.set_up_s + columns * e.factor.answer_s / 4,  // many columns at once
+             .set_up_s = e.factor.set_up_s + columns * e.factor.answer_s / 4,  // columns are solved in blocks
              .bytes = 4 * columns * (columns + 1)};
   for (const int count : ranks) e.multigrid.push_back({count, multigrid_seconds(unknowns, count)});
   const auto soonest = std::ranges::min_element(e.multigrid, {}, &Estimate::Spread::answer_s);

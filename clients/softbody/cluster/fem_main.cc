@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// tendon-fem: a soft body whose answers are computed by many machines. No MPI is in it: it starts the workers, and keeps
-// the session with the server whatever they do.
+// tendon-fem: a soft body whose answers are computed by MPI workers. Contains no MPI itself: it starts the workers and
+// keeps the session with the server when they fail.
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
@@ -31,21 +31,20 @@ double milliseconds(Duration d) { return std::chrono::duration<double, std::mill
 
 Duration from_milliseconds(double ms) { return from_seconds(ms / 1000); }
 
-/// A word for /bin/sh that it does not read anything into.
+/// Quotes a word for /bin/sh.
 std::string shell_word(const std::string& word) {
   std::string text = "'";
   for (const char c : word) text += c == '\'' ? std::string("'\\''") : std::string(1, c);
   return text + "'";
 }
 
-/// The worker beside this program, where it is installed and where it is built.
+/// The worker next to this program, both when installed and in the build tree.
 std::string own_worker() {
   std::error_code error;
   const auto beside = std::filesystem::read_symlink("/proc/self/exe", error).replace_filename("tendon-fem-worker");
   return !error && std::filesystem::exists(beside) ? shell_word(beside.string()) : "tendon-fem-worker";
 }
 
-/// The body of a scene, answered from a table.
 softbody::PlacedBody from_table(const std::string& scene_file, const std::string& table_file) {
   softbody::Scene scene = softbody::read_scene(scene_file);
   scene.body.model = softbody::ModelKind::kCondensed;
@@ -121,7 +120,7 @@ struct Arguments {
   bool json = false;
 };
 
-/// Becomes the worker that makes the table.
+/// Replaces this process by the worker that computes the table.
 int condense(const Arguments& arguments) {
   const std::string command = "exec " + arguments.launch + " " + own_worker() + " condense --way " +
                               shell_word(arguments.way) + (arguments.json ? " --json " : " ") +
@@ -184,7 +183,7 @@ int run_command(int argc, char** argv) {
 
 int main(int argc, char** argv) {
   try {
-    // `serve` has the command line that all guests share.
+    // `serve` has the command line of all clients.
     if (argc > 1 && std::string_view(argv[1]) == "serve") return serve(argc - 1, argv + 1);
     return run_command(argc, argv);
   } catch (const softbody::SceneError& error) {

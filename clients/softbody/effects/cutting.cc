@@ -17,8 +17,8 @@
 namespace tendon::softbody {
 namespace {
 
-/// A share of the distance between two elements' middles. A middle this close to the plane counts as on its far side,
-/// whichever way it was rounded.
+/// Relative to the distance between two element centers. A center this close to the plane counts as on its far side,
+/// independent of rounding.
 constexpr double kOnPlane = 1e-6;
 
 bool between(const Cut& cut, const Vec3& from, const Vec3& to) {
@@ -33,8 +33,8 @@ bool between(const Cut& cut, const Vec3& from, const Vec3& to) {
   return s >= -kOnPlane && s <= 1 + kOnPlane && t >= -kOnPlane && t <= 1 + kOnPlane;
 }
 
-/// Gives every group of elements around a node its own copy of the node. Elements belong to one group when faces that
-/// are not opened connect them.
+/// Gives every group of elements around a node its own copy of the node. Elements that share an unopened face belong to
+/// the same group.
 void part_nodes(const Mesh& mesh, std::span<const Cut> cuts, const Fixed& fixed, Division& to) {
   const int per = nodes_of(mesh.shape);
   const auto place_of = [&](int element, int node) {
@@ -53,7 +53,7 @@ void part_nodes(const Mesh& mesh, std::span<const Cut> cuts, const Fixed& fixed,
       if (!open) places.unite(place_of(face.element, node), place_of(opposite.element, node));
     }
   }
-  std::vector<int> first(mesh.nodes.size(), -1);         // group that keeps the node's number
+  std::vector<int> first(mesh.nodes.size(), -1);         // the group that keeps the original node
   std::vector<int> number_of(mesh.elements.size(), -1);  // by group
   to.mesh = mesh;
   to.fixed = fixed;
@@ -80,7 +80,7 @@ void part_nodes(const Mesh& mesh, std::span<const Cut> cuts, const Fixed& fixed,
   }
 }
 
-/// Removes the pieces that can move as a whole, because they lack three held nodes that are not on one line.
+/// Removes pieces that can move as rigid bodies: those without three non-collinear fixed nodes.
 void drop_loose(Division& to) {
   Mesh& mesh = to.mesh;
   Groups pieces(mesh.nodes.size());

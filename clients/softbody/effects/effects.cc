@@ -14,7 +14,8 @@ std::size_t bytes_of(const VectorXd& vector) noexcept {
 }
 
 void add_diagonal(const VectorXd& diagonal, SymmetricMatrix& to) {
-  for (int i = 0; i < to.size; ++i) to.values[at(to.column_starts[at(i)])] += diagonal[i];  // the first of its column
+  // the diagonal entry comes first in its column
+  for (int i = 0; i < to.size; ++i) to.values[at(to.column_starts[at(i)])] += diagonal[i];
 }
 
 }  // namespace
@@ -35,7 +36,7 @@ void Inertia::add_force(const VectorXd& u, VectorXd& force) const { force -= wei
 void Inertia::add_stiffness(SymmetricMatrix& to) const { add_diagonal(weight_, to); }
 
 void Inertia::advance(const VectorXd& u) {
-  ahead_ = 2 * u - start_;  // v dt = u − u₀
+  ahead_ = 2 * u - start_;  // v₀ dt = u − u₀
   start_ = u;
 }
 

@@ -18,19 +18,19 @@ namespace {
 
 using Box = Eigen::AlignedBox3d;
 
-/// In sizes of a facet: how far behind it a node is still pushed back, and how far in front of it a node is watched.
+/// Search range behind and in front of a facet, relative to its size.
 constexpr double kBehind = 0.5;
 constexpr double kBefore = 1;
 
-/// How far beside a triangle, in shares of its corners, a node still belongs to it. With less, a node at the rim of a
-/// side would alternate between one plane and none.
+/// How far outside a triangle, in barycentric coordinates, a node still belongs to it. With less, a node at the edge of
+/// a side would alternate between one plane and none.
 constexpr double kBeside = 0.15;
 
-/// The most rounds of Gauss and Seidel; they end when a round changes forces by less than this share of the largest.
+/// Gauss–Seidel: maximum number of iterations, and the relative change of forces at which it ends.
 constexpr int kMostRounds = 2000;
 constexpr double kSettled = 1e-8;
 
-/// The query for Eigen's tree: which boxes contain a place.
+/// Query for Eigen's box tree: the boxes that contain a point.
 template <class Visit>
 struct Around {
   const Vec3& place;
@@ -48,9 +48,9 @@ struct Around {
 
 struct SelfCollision::Flat {
   std::array<Vec3, 3> corners;
-  Vec3 out;  ///< points out of the body; its length is twice the area, m²
+  Vec3 out;  ///< outward normal; its length is twice the area, m²
 
-  /// The shares of the corners in the point above or below which `place` lies; empty when it is too far beside.
+  /// Barycentric coordinates of the projection of `place`; empty if it is too far outside.
   std::optional<Vec3> across(const Vec3& place) const {
     Vec3 shares;
     for (int i = 0; i < 3; ++i) {
@@ -152,7 +152,7 @@ std::vector<SelfCollision::Flat> SelfCollision::lie(const VectorXd& u) const {
   return flats;
 }
 
-/// The normal at every node of the mesh; 0 inside the body.
+/// Sum of facet normals at every node; 0 inside the body.
 std::vector<Vec3> SelfCollision::node_normals(const std::vector<Flat>& flats) const {
   std::vector<Vec3> normals(elastic_.mesh().nodes.size(), Vec3::Zero());
   for (const Side& side : sides_) {
@@ -256,14 +256,14 @@ double SelfCollision::foresee(const Factor& factor, const VectorXd& u, const Vec
   MatrixXd right(b.size(), count + 2);
   right << along, b, held != nullptr ? *held : VectorXd::Zero(b.size());
   const MatrixXd solution = factor.solve(right);
-  VectorXd gaps = along.transpose() * solution.col(count);  // at the end of the step without a bed
+  VectorXd gaps = along.transpose() * solution.col(count);  // at the end of the step, without the bed
   MatrixXd matrix = along.transpose() * solution.leftCols(count);
   for (Eigen::Index i = 0; i < count; ++i) {
     gaps[i] += pairs[static_cast<std::size_t>(i)]->gap(u);
     matrix(i, i) += 1 / pairs[static_cast<std::size_t>(i)]->stiffness;
   }
   double compliance = 0;
-  VectorXd across;  // how far each gap opens with 1 N along `held`
+  VectorXd across;  // opening of each gap per newton along `held`
   double force = 0;
   if (held != nullptr) {
     compliance = held->dot(solution.col(count + 1));

@@ -10,8 +10,8 @@
 namespace tendon::softbody {
 namespace {
 
-// T4 on the pressed block of the README is 70 % too stiff at ν = 0.45 and 1208 % at 0.499; a hexahedron with all points
-// of integration 24 % and 257 %; a quadratic one 2 % and 8 %.
+// Stiffness errors on block B1 (REFERENCE.md) at ν = 0.45 and 0.499: tet4 70 % and 1208 %, fully integrated hex8 24 %
+// and 257 %, quadratic 2 % and 8 %.
 constexpr std::array kElements{
     ElementInfo{Element::kTet4, Shape::kTet4, "tet4", "linear tetrahedron: any mesh, but far too stiff", 0.45},
     ElementInfo{Element::kHex8, Shape::kHex8, "hex8", "trilinear hexahedron, fully integrated", 0.45},
@@ -22,7 +22,7 @@ constexpr std::array kElements{
                 0.5},
 };
 
-/// gmsh's order of the edges and faces of a hexahedron.
+/// Edges and faces of a hexahedron in gmsh's order.
 constexpr std::array<std::array<int, 2>, 12> kEdges{
     {{0, 1}, {0, 3}, {0, 4}, {1, 2}, {1, 5}, {2, 3}, {2, 6}, {3, 7}, {4, 5}, {4, 7}, {5, 6}, {6, 7}}};
 constexpr std::array<std::array<int, 2>, 6> kFaceDiagonals{{{0, 2}, {0, 5}, {0, 7}, {1, 6}, {2, 7}, {4, 6}}};
@@ -38,7 +38,6 @@ Vec3 hex_node(int node) {
   return 0.5 * (hex_node(a) + hex_node(b));
 }
 
-/// A function of one coordinate and its derivative.
 struct Along {
   double value;
   double slope;
@@ -46,7 +45,7 @@ struct Along {
 
 Along linear(double x, double node) { return {0.5 * (1 + node * x), 0.5 * node}; }
 
-/// The quadratic Lagrange polynomial of the node at −1, 0 or 1.
+/// Quadratic Lagrange polynomial of the node at −1, 0 or 1.
 Along quadratic(double x, double node) {
   if (node == 0) return {1 - x * x, -2 * x};
   return {0.5 * x * (x + node), x + 0.5 * node};
@@ -61,7 +60,8 @@ void set_product(ShapeValues& values, int node, const Vec3& at, const Vec3& plac
   values.gradient.col(node) << x.slope * y.value * z.value, x.value * y.slope * z.value, x.value * y.value * z.slope;
 }
 
-/// Serendipity: an edge's node has (1 − x²)(1 ± y)(1 ± z) / 4, a corner its product minus the share of the edges.
+/// Serendipity functions: (1 − x²)(1 ± y)(1 ± z) / 4 for an edge node; a corner's trilinear function minus half of its
+/// edges' functions.
 void set_serendipity(ShapeValues& values, const Vec3& at) {
   for (int node = 0; node < 8; ++node) set_product(values, node, at, hex_node(node), linear);
   for (int node = 8; node < 20; ++node) {

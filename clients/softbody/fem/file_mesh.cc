@@ -30,7 +30,7 @@ std::string named_place(const FileMesh& file, int element) {
   return named_element(file, element) + " at " + in_words(middle(file.mesh, element));
 }
 
-/// The corner numbers of each face, counterclockwise when seen from outside.
+/// The corners of each face, counterclockwise seen from outside.
 std::vector<std::vector<int>> corners_around(Shape shape) {
   std::vector<std::vector<int>> all;
   for (const Face& face : faces(shape)) {
@@ -52,10 +52,10 @@ std::vector<std::vector<int>> corners_around(Shape shape) {
   return all;
 }
 
-/// A face and the places of its corners.
+/// A face with its corners as place numbers (coincident nodes share one).
 struct PlacedFace {
-  std::array<int, 4> around;   ///< counterclockwise, starting at the lowest; −1 if unused
-  std::array<int, 4> corners;  ///< the same numbers in ascending order
+  std::array<int, 4> around;   ///< counterclockwise, starting at the lowest; −1: unused
+  std::array<int, 4> corners;  ///< ascending
   Facet facet;
 };
 
@@ -82,13 +82,11 @@ std::vector<PlacedFace> placed_faces(const Mesh& mesh, const std::vector<int>& p
   return all;
 }
 
-/// True if two faces with the same corners have opposite orientations.
 bool face_each_other(const PlacedFace& a, const PlacedFace& b) {
   const auto end = a.around[3] < 0 ? a.around.end() - 1 : a.around.end();
   return std::equal(a.around.begin() + 1, end, std::make_reverse_iterator(b.around.begin() + (end - a.around.begin())));
 }
 
-/// If elements have the same nodes, keeps only the first.
 void drop_repeated_elements(FileMesh& file, const std::vector<int>& place) {
   const Mesh& mesh = file.mesh;
   std::map<std::vector<int>, int> known;
@@ -115,7 +113,7 @@ void drop_repeated_elements(FileMesh& file, const std::vector<int>& place) {
   file.numbers = std::move(numbers);
 }
 
-/// Removes unused nodes. The order of the nodes does not change.
+/// Removes unused nodes and keeps the order of the others.
 void drop_unused(Mesh& mesh) {
   std::vector<int> number(mesh.nodes.size(), -1);
   for (const int node : mesh.elements) number[at(node)] = 0;
@@ -140,7 +138,7 @@ void expect_apart(const FileMesh& file, const std::vector<int>& place, std::stri
   }
 }
 
-/// Finds the parts. Throws if elements overlap.
+/// Numbers the parts. Throws if elements overlap.
 void find_parts(FileMesh& file, const std::vector<int>& place, std::string_view name) {
   const std::vector<PlacedFace> all = placed_faces(file.mesh, place);
   Groups groups(at(file.mesh.element_count()));

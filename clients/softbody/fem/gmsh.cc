@@ -21,12 +21,12 @@ namespace {
 
 constexpr int kMaxCount = 10'000'000;
 
-/// The words of a text, each with its line.
+/// Splits a text into words and tracks the line number.
 class Words {
  public:
   Words(std::string_view text, std::string_view name) : rest_(without_mark(text, name)), name_(name) {}
 
-  /// The next word, or an empty string at the end of the file.
+  /// Next word; empty at the end of the file.
   std::string_view next() {
     std::size_t begin = 0;
     while (begin < rest_.size() &&
@@ -59,7 +59,7 @@ class Words {
     if (found != keyword) fail("expected " + std::string(keyword) + ", found \"" + std::string(found) + '"');
   }
 
-  /// Continues behind the line that is `keyword`. False when there is none.
+  /// Skips to behind the word `keyword`. Returns false if there is none.
   bool seek(std::string_view keyword) {
     for (;;) {
       const std::string_view found = next();
@@ -89,7 +89,7 @@ class Words {
   int line_ = 1;
 };
 
-/// An element type by gmsh's number: how many nodes it has, and its shape when Tendon reads it.
+/// A gmsh element type; `shape` is empty if Tendon does not read it.
 struct Type {
   int number;
   int nodes;
@@ -109,7 +109,7 @@ struct FileElement {
   std::vector<std::int64_t> nodes;
 };
 
-/// The content of a file, in its own numbers.
+/// Contents of a file, with the file's own numbers.
 struct Content {
   std::unordered_map<std::int64_t, Vec3> nodes;
   std::vector<FileElement> elements;
@@ -150,7 +150,6 @@ class Reader {
     if (!words_.seek(keyword)) words_.fail("there is no " + std::string(keyword));
   }
 
-  /// Only the first mesh is read, so a second one in the same file is an error.
   void expect_no_other_mesh() {
     for (std::string_view word = words_.next(); !word.empty(); word = words_.next()) {
       if (word == "$Nodes" || word == "$Elements" || word == "$NOD" || word == "$ELM") {
@@ -246,7 +245,7 @@ class Reader {
   Content content_;
 };
 
-/// check() counts the elements of a Mesh; a person looks for the file's own number.
+/// Repeats check() so that the message has the file's own element number.
 void check_each(const Mesh& mesh, const std::vector<FileElement>& named, std::string_view name) {
   Mesh one{.shape = mesh.shape, .nodes = mesh.nodes, .elements = {}};
   try {

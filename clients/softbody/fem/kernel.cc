@@ -6,8 +6,7 @@
 
 #include "clients/softbody/fem/laws.h"
 
-// GCC says that four lanes are passed otherwise where a processor has registers for them: here they are passed only to
-// what is inlined.
+// GCC warns that the ABI for passing vectors depends on the processor. Here they are passed to inlined functions only.
 #pragma GCC diagnostic ignored "-Wpsabi"
 
 namespace tendon::softbody {
@@ -76,8 +75,7 @@ template <Law kLaw, int kNodes>
   return energy[0] + energy[1] + energy[2] + energy[3];
 }
 
-// The same twice, for processors with registers of four numbers and for all others. Without multiplications that add in
-// one rounding (no "fma"), both give the same bits.
+// Compiled for AVX2 and for the baseline. Without FMA, which rounds once, both give the same bits.
 #ifdef __x86_64__
 template <Law kLaw, int kNodes>
 [[gnu::target("avx2")]] double wide_sum_of(const View& all, const double* u, double* to) {

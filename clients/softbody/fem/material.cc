@@ -12,14 +12,13 @@
 namespace tendon::softbody {
 namespace {
 
-/// ∂J/∂F.
 Mat3 cofactor(const Mat3& f) {
   Mat3 c;
   c << f.col(1).cross(f.col(2)), f.col(2).cross(f.col(0)), f.col(0).cross(f.col(1));
   return c;
 }
 
-/// The change of the cofactor with F.
+/// Directional derivative of the cofactor.
 Mat3 cofactor_change(const Mat3& f, const Mat3& df) {
   Mat3 c;
   c << df.col(1).cross(f.col(2)) + f.col(1).cross(df.col(2)), df.col(2).cross(f.col(0)) + f.col(2).cross(df.col(0)),
@@ -36,8 +35,8 @@ Mat3 isotropic(const Mat3& strain, double mu, double lambda) {
 Mat9 corotational_tangent(const Mat3& f, double mu, double lambda) {
   const Mat3 r = nearest_rotation(f);
   const Mat3 s = r.transpose() * f;
-  // dR = R [ω]×, with (tr S · I − S) ω the axis of RᵀdF − dFᵀR. It is singular where two stretches cancel, which only
-  // an inverted element has; any ω will do there, because a line search follows.
+  // dR = R [ω]×, where (tr S · I − S) ω is the axial vector of RᵀdF − dFᵀR. Singular where two stretches cancel, which
+  // happens only in inverted elements; any ω will do there, because a line search follows.
   Mat3 turn = s.trace() * Mat3::Identity() - sym(s);
   if (std::abs(turn.determinant()) < 1e-9) turn += 1e-3 * Mat3::Identity();
   const Mat3 solve = turn.inverse();
@@ -60,19 +59,19 @@ void check(const Material& material) {
 }
 
 Mat3 nearest_rotation(const Mat3& f) {
-  // Newton's iteration (Higham 1986) where it is safe: every step squares the distance.
+  // Newton's iteration (Higham 1986), quadratically convergent.
   if (f.determinant() > 0.1) {
     Mat3 r = f;
     for (int i = 0; i < 12; ++i) {
       const Mat3 next = 0.5 * (r + r.inverse().transpose());
       const double change = (next - r).squaredNorm();
       r = next;
-      if (change < 1e-20) return r;  // 1e-10, squared by the step just taken
+      if (change < 1e-20) return r;  // 1e-10; the last step squared it
     }
   }
   const Eigen::JacobiSVD<Mat3> svd(f, Eigen::ComputeFullU | Eigen::ComputeFullV);
   Mat3 u = svd.matrixU();
-  if ((u * svd.matrixV().transpose()).determinant() < 0) u.col(2) *= -1;  // turns over the axis of least stretch
+  if ((u * svd.matrixV().transpose()).determinant() < 0) u.col(2) *= -1;  // flips the axis of least stretch
   return u * svd.matrixV().transpose();
 }
 

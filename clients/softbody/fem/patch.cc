@@ -15,22 +15,22 @@
 namespace tendon::softbody {
 namespace {
 
-constexpr double kLeastFacing = 0.2588;  // cos 75°: steeper facets have almost no area across
+constexpr double kLeastFacing = 0.2588;  // cos 75°; steeper facets have almost no projected area
 
-/// Pieces are a tenth of the patch's radius wide: the compliance of the README's pressed block then changes by 1e-5 as
-/// the patch moves over a facet; with a fifth it changes by 2e-4.
+/// Piece width relative to the patch radius. As the patch moves over a facet, the compliance of block B1 then varies by
+/// 1e-5; with 0.2 by 2e-4.
 constexpr double kPiece = 0.1;
 
-/// A facet with nodes between its corners is cut at least so often along each side: fewer pieces would not see its
-/// quadratic shapes, and a mesh that is fine below the patch would be too soft (B1, 32 cells: 0.3 % with two pieces).
+/// Minimum number of pieces along each side of a quadratic facet. Fewer do not resolve the quadratic shape functions,
+/// and a mesh that is fine below the patch is too soft (B1, 32 cells: 0.3 % with two pieces).
 constexpr int kLeastCutsOfQuadratic = 4;
 
-/// Facets wider than three patches are not cut finer than this: they are far from the part that is meant to be touched.
+/// Maximum number of pieces per side. Only facets wider than three patches, far from the touched area, reach it.
 constexpr int kMostCuts = 32;
 
 constexpr int kMostFacetNodes = 9;
 
-/// Of the touchable side's width: nodes that are so little above a plane lie in it.
+/// Coplanarity tolerance, relative to the width of the touchable side.
 constexpr double kFlat = 1e-6;
 
 }  // namespace
@@ -39,7 +39,7 @@ TouchSurface::TouchSurface(const Mesh& mesh, const Vec3& towards_tool, double ra
     : normal_(towards_tool), radius_(radius) {
   expect(std::abs(normal_.norm() - 1) < 1e-9, "norm of towards_tool", normal_.norm(), "1");
   expect_above_zero(radius, "radius");
-  // The first axis across is the x axis where that is possible.
+  // The first tangential axis is the projected x axis, unless the normal is close to x.
   const Vec3 start = std::abs(normal_.x()) < 0.9 ? Vec3::UnitX() : Vec3::UnitY();
   const Vec3 first = (start - start.dot(normal_) * normal_).normalized();
   across_ << first.transpose(), normal_.cross(first).transpose();
@@ -59,7 +59,7 @@ TouchSurface::TouchSurface(const Mesh& mesh, const Vec3& towards_tool, double ra
 }
 
 void TouchSurface::look_for_a_curve() {
-  // The plane next to all nodes: height = a + b · place.
+  // Least-squares plane through all nodes: height = a + b · place.
   MatrixXd places(static_cast<Eigen::Index>(nodes_.size()), 3);
   VectorXd heights(places.rows());
   for (Eigen::Index i = 0; i < places.rows(); ++i) {
@@ -159,7 +159,7 @@ std::optional<Patch> TouchSurface::patch_with_curvatures(const Vec2& middle, dou
 
 template <bool kCurved>
 std::optional<Patch> TouchSurface::patch_around(const Vec2& middle, double least_covered) const {
-  using Share = Eigen::Matrix<double, kCurved ? 6 : 3, 1>;  // weight; slope x, y; curvature xx, xy, yy
+  using Share = Eigen::Matrix<double, kCurved ? 6 : 3, 1>;  // weight; gradient x, y; second derivatives xx, xy, yy
   if (!middle.allFinite()) return std::nullopt;
   const double top = 3 / (std::numbers::pi * radius_ * radius_);
   std::vector<Share> sums(nodes_.size(), Share::Zero());
@@ -212,7 +212,7 @@ std::optional<Patch> TouchSurface::patch_around(const Vec2& middle, double least
     const Vec2 all = total.template segment<2>(1);
     patch.slopes.col(i) = (sums[node].template segment<2>(1) - patch.weights[i] * all) / total[0];
     if constexpr (kCurved) {
-      // The second derivative of a quotient.
+      // Second derivative of the quotient sums / total.
       const Vec2 slope = patch.slopes.col(i);
       patch.curvatures.col(i) =
           (sums[node].template tail<3>() - patch.weights[i] * total.template tail<3>() -

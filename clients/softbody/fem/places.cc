@@ -30,7 +30,7 @@ std::vector<int> first_at_place(std::span<const Vec3> points) {
   if (points.empty()) return first;
   const Eigen::AlignedBox3d box = box_around(points);
   const double near = kSamePlace * box.sizes().maxCoeff();
-  if (!(near > 0) || !std::isfinite(near)) return first;  // all points are at the same place
+  if (!(near > 0) || !std::isfinite(near)) return first;  // all points coincide
   std::unordered_map<Cell, std::vector<int>, HashOfCell> cells;
   const auto found_around = [&](const Vec3& point, const Cell& own) {
     for (std::int64_t x = -1; x <= 1; ++x) {

@@ -7,7 +7,7 @@
 
 #include "clients/softbody/fem/laws.h"
 
-// Lanes are passed only to what is inlined: see kernel.cc.
+// See kernel.cc: vectors are passed to inlined functions only.
 #pragma GCC diagnostic ignored "-Wpsabi"
 
 namespace tendon::softbody {
@@ -15,7 +15,7 @@ namespace {
 
 using kernel::lanes_at;
 
-/// Columns that are read side by side: each number of `x` or `to` then serves so often.
+/// Columns processed together, so that each entry of `x` or `to` is loaded once for all of them.
 constexpr std::ptrdiff_t kColumns = 4;
 
 struct Tall {

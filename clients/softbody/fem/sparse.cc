@@ -13,8 +13,8 @@
 namespace tendon::softbody {
 namespace {
 
-/// A solution needs 4 multiplications and additions for each entry of the factor. They take as long as 6 of those that
-/// make a factor (tendon-bench-softbody, 7803 unknowns).
+/// A solve needs 4 operations per entry of the factor, which take as long as 6 operations of a factorization
+/// (tendon-bench-softbody, 7803 unknowns).
 constexpr double kWorkPerEntry = 6;
 
 using View = Eigen::Map<const Eigen::SparseMatrix<double>>;
@@ -28,15 +28,15 @@ View view(const SymmetricMatrix& matrix) {
           matrix.values.data()};
 }
 
-/// A function of a library that may be another one; then it is null.
+/// A function of a library that may not be loaded; then null.
 template <class Function>
 Function* function_named(const char* name) {
   return reinterpret_cast<Function*>(dlsym(RTLD_DEFAULT, name));
 }
 
-/// An answer is due in less time than threads take to meet, and who wants two factors at once has a thread for each.
-/// OpenBLAS is told for the process. CHOLMOD assembles by four threads of OpenMP, whatever OMP_NUM_THREADS says, and
-/// each thread that calls it has to allow none.
+/// An answer takes less time than synchronizing threads, and callers that need two factors at once have their own
+/// threads. OpenBLAS is configured per process. CHOLMOD assembles with four OpenMP threads regardless of
+/// OMP_NUM_THREADS, so each calling thread must disable them.
 void one_thread_for_a_factor() {
   const auto told = [](const char* name, int count) {
     auto* const set = function_named<void(int)>(name);
@@ -64,7 +64,7 @@ std::size_t SymmetricMatrix::bytes() const noexcept {
 struct Factor::Cholmod {
   Eigen::CholmodSupernodalLLT<Eigen::SparseMatrix<double>, Eigen::Lower> llt;
   void analyze(const SymmetricMatrix& pattern) {
-    llt.cholmod().print = 0;  // a matrix that is not definite is a result, not a reason for a message
+    llt.cholmod().print = 0;  // an indefinite matrix is an expected result
     llt.analyzePattern(view(pattern));
     if (llt.info() != Eigen::Success) throw std::runtime_error("CHOLMOD cannot analyse the matrix");
   }
@@ -72,9 +72,9 @@ struct Factor::Cholmod {
 
 struct Factor::Split {
   std::vector<int> twin_of;
-  Eigen::SparseMatrix<double> coupling;  // TᵀAC: couples the old unknowns to the twins
+  Eigen::SparseMatrix<double> coupling;  // TᵀAC: couples old unknowns and twins
   MatrixXd follows;                      // (TᵀAT)⁻¹ TᵀAC
-  Eigen::LLT<MatrixXd> openings;         // of S
+  Eigen::LLT<MatrixXd> openings;         // Cholesky factor of S
 };
 
 Factor::Factor(const SymmetricMatrix& pattern) : cholmod_(new Cholmod) { cholmod_->analyze(pattern); }
@@ -100,7 +100,7 @@ bool Factor::split(const SymmetricMatrix& grown, const std::vector<int>& twin_of
   if (twins * kWorkPerEntry * counts.lnz > counts.fl) return false;
 
   Split split{twin_of, {before, count}, {}, {}};
-  MatrixXd among = MatrixXd::Zero(count, count);  // CᵀAC
+  MatrixXd among = MatrixXd::Zero(count, count);
   std::vector<Eigen::Triplet<double>> entries;
   const auto own = [&](Eigen::Index i) {
     return i < before ? static_cast<int>(i) : twin_of[static_cast<std::size_t>(i - before)];

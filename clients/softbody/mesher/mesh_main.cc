@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// tendon-mesh: from a surface to a volume that is fit for touch.
+// tendon-mesh: meshes the volume inside a surface for tendon-softbody.
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
@@ -90,7 +90,8 @@ void make(Arguments& arguments) {
   }
   tell("");
   const std::string text = to_gmsh(mesh);
-  MeshReport report = report_on(parse_gmsh(text, "gmsh's mesh", 1).mesh, surface);  // as tendon-softbody will read it
+  // the same reader as in tendon-softbody
+  MeshReport report = report_on(parse_gmsh(text, "gmsh's mesh", 1).mesh, surface);
   const std::vector<std::string> notes = notes_on(surface);
   report.warnings.insert(report.warnings.begin(), notes.begin(), notes.end());
   std::ofstream out(arguments.out);

@@ -29,7 +29,7 @@
 namespace tendon::softbody {
 namespace {
 
-/// A folder of its own, gone at the end.
+/// A temporary directory.
 class Scratch {
  public:
   Scratch() {
@@ -49,9 +49,9 @@ class Scratch {
   std::filesystem::path path_;
 };
 
-/// What gmsh is told. All names in it are ours.
+/// The gmsh script. It contains no user-supplied names.
 std::string script_of(const VolumeConfig& config) {
-  // A tetrahedron's edge is halved where it becomes four hexahedra.
+  // Splitting a tetrahedron into four hexahedra halves its edges.
   const double small = config.size * (config.hexahedra ? 2 : 1);
   const double large = config.touched ? config.coarsest * small : small;
   std::string text = "Merge \"surface.stl\";\nClassifySurfaces{" + shortest(config.sharp) +
@@ -95,13 +95,12 @@ void run_gmsh(const std::filesystem::path& folder) {
   }
 }
 
-/// The volume of three edges over the product of their lengths.
 double scaled(const Vec3& a, const Vec3& b, const Vec3& c) {
   const double lengths = a.norm() * b.norm() * c.norm();
   return lengths > 0 ? a.dot(b.cross(c)) / lengths : 0;
 }
 
-/// Of each corner of a hexahedron, in gmsh's order, the three that it is joined with, right-handed.
+/// For each corner of a hexahedron, in gmsh's order, its three adjacent corners, right-handed.
 constexpr std::array<std::array<int, 3>, 8> kJoined{
     {{1, 3, 4}, {2, 0, 5}, {3, 1, 6}, {0, 2, 7}, {7, 5, 0}, {4, 6, 1}, {5, 7, 2}, {6, 4, 3}}};
 
@@ -133,7 +132,7 @@ double quality(const Mesh& mesh, int element) {
   return least;
 }
 
-/// The tetrahedra in a file that gmsh has just written, in its format 2.2.
+/// Reads the tetrahedra of a file written by gmsh in format 2.2.
 Mesh read_made(const std::string& text) {
   std::istringstream file(text);
   Mesh mesh{.shape = Shape::kTet4, .nodes = {}, .elements = {}};
@@ -153,7 +152,7 @@ Mesh read_made(const std::string& text) {
     number[id] = static_cast<int>(mesh.nodes.size());
     mesh.nodes.push_back(place);
   }
-  constexpr long kTetrahedron = 4;  // gmsh's number
+  constexpr long kTetrahedron = 4;  // gmsh's element type
   for (std::size_t left = find("$Elements"); left > 0; --left) {
     std::getline(file >> std::ws, line);
     std::istringstream words(line);
@@ -189,7 +188,7 @@ Mesh made_by_gmsh(const Triangles& body, const VolumeConfig& config, std::string
   return read_made(read_file(made, kMaxMeshBytes));
 }
 
-/// The point of a triangle that is nearest to `point` (Ericson, Real-Time Collision Detection, 5.1.5).
+/// Nearest point of a triangle (Ericson, Real-Time Collision Detection, 5.1.5).
 Vec3 nearest_on(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& point) {
   const Vec3 ab = b - a;
   const Vec3 ac = c - a;
@@ -211,7 +210,7 @@ Vec3 nearest_on(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& point) 
   return a + (vb * ab + vc * ac) / (va + vb + vc);
 }
 
-/// The nearest point of the surface; `point` itself where that is farther than `most`.
+/// Nearest point of the surface; `point` itself if that is farther than `most`.
 Vec3 nearest_on(const Triangles& surface, const Vec3& point, double most) {
   Vec3 nearest = point;
   for (const auto& facet : surface.facets) {
@@ -219,7 +218,7 @@ Vec3 nearest_on(const Triangles& surface, const Vec3& point, double most) {
     const Vec3& b = surface.points[at(facet[1])];
     const Vec3& c = surface.points[at(facet[2])];
     const Vec3 outside = (a.cwiseMin(b).cwiseMin(c) - point).cwiseMax(point - a.cwiseMax(b).cwiseMax(c));
-    if (outside.maxCoeff() > most) continue;  // the box around it
+    if (outside.maxCoeff() > most) continue;  // bounding box
     const Vec3 here = nearest_on(a, b, c, point);
     if ((here - point).norm() > most) continue;
     most = (here - point).norm();
@@ -228,7 +227,8 @@ Vec3 nearest_on(const Triangles& surface, const Vec3& point, double most) {
   return nearest;
 }
 
-/// Four hexahedra for each tetrahedron. `places`: where nodes of the boundary belong, on the surface.
+/// Splits each tetrahedron into four hexahedra. `places` receives the target positions of boundary nodes, on the
+/// surface.
 Mesh in_hexahedra(const Mesh& tetrahedra, const Triangles& surface, std::vector<Vec3>& places) {
   Mesh mesh{.shape = Shape::kHex8, .nodes = tetrahedra.nodes, .elements = {}};
   std::map<std::vector<int>, int> known;
@@ -242,7 +242,7 @@ Mesh in_hexahedra(const Mesh& tetrahedra, const Triangles& surface, std::vector<
     }
     return found->second;
   };
-  // Each corner first, and the others so that they stay right-handed.
+  // Each corner first; the others in an order that keeps the orientation.
   constexpr std::array<std::array<int, 4>, 4> kOrders{{{0, 1, 2, 3}, {1, 2, 0, 3}, {2, 0, 1, 3}, {3, 1, 0, 2}}};
   for (int e = 0; e < tetrahedra.element_count(); ++e) {
     const auto nodes = tetrahedra.element(e);
@@ -269,7 +269,7 @@ Mesh in_hexahedra(const Mesh& tetrahedra, const Triangles& surface, std::vector<
   return mesh;
 }
 
-/// Moves nodes towards `places`, each as far as the elements around it stay as good as kGoodElement, or as they are.
+/// Moves nodes towards `places` as far as the adjacent elements stay at least as good as kGoodElement, or as they were.
 void bring_closer(Mesh& mesh, const std::vector<Vec3>& places) {
   constexpr double kGoodElement = 2 * kPoorElement;
   constexpr int kHalvings = 6;
@@ -282,7 +282,7 @@ void bring_closer(Mesh& mesh, const std::vector<Vec3>& places) {
     mesh.nodes[node] = start[node] + way * (places[node] - start[node]);
   };
   for (std::size_t node = 0; node < start.size(); ++node) put(node);
-  for (bool moved = true; moved;) {  // ends: each round shortens a way, and there are kHalvings of each
+  for (bool moved = true; moved;) {  // terminates: each pass halves a step, at most kHalvings times per node
     moved = false;
     for (int e = 0; e < mesh.element_count(); ++e) {
       if (quality(mesh, e) >= least[at(e)]) continue;

@@ -10,14 +10,13 @@
 namespace tendon::softbody {
 namespace {
 
-/// How a body gives way to a gliding patch is found by the shapes of an earlier place while W differs by at most this
-/// share: its square is what may be wrong.
+/// Glide results of an earlier position are reused while W differs by at most this fraction; the error is its square.
 constexpr double kSlopesAlike = 0.1;
 
-/// A surface steeper than this is none of a linear body: how a patch would glide there means nothing.
+/// Linear elasticity is meaningless for steeper surfaces, and so is the glide.
 constexpr double kSteepest = 10;
 
-constexpr Eigen::Index kAtOnce = 64;  // columns: CHOLMOD's blocks are then products of matrices
+constexpr Eigen::Index kAtOnce = 64;  // columns per solve, so that CHOLMOD uses matrix-matrix products
 
 SymmetricMatrix stiffness_of(const Solid& solid, const Effects& effects) {
   if (solid.law() != Law::kLinear) throw std::invalid_argument("a linear model wants the linear law");
@@ -35,7 +34,7 @@ Factor factor_of(const SymmetricMatrix& stiffness) {
   return factor;
 }
 
-/// How deep each node of the patch is.
+/// Depth of each node of the patch.
 VectorXd depth_of(const Solid& solid, const Vec3& normal, const Patch& patch, const VectorXd& displacements) {
   VectorXd all = VectorXd::Zero(solid.size());
   solid.add_free(displacements, all);
@@ -105,8 +104,7 @@ Mat2 LinearModel::giving(const Patch& patch) {
     return patch.slopes.squaredNorm() - 2 * common + size <= kSlopesAlike * kSlopesAlike * size;
   };
   if (slopes_.size() == 0 || !alike()) glide_from(patch);
-  // 2 WᵀY − YᵀAY is largest, and right, for the shapes Y of W itself: what those of a place nearby are wrong by counts
-  // squared.
+  // 2 WᵀY − YᵀAY has its maximum, WᵀA⁻¹W, at Y = A⁻¹W, so the error is quadratic in the error of Y.
   Mat2 across = Mat2::Zero();
   for (Eigen::Index i = 0; i < patch.slopes.cols(); ++i) {
     across += patch.slopes.col(i) * given_way_.row(patch.nodes[static_cast<std::size_t>(i)]);
@@ -165,7 +163,7 @@ Reaction LinearModel::press_among_effects(const Patch& patch, Given given, doubl
   reaction.stiffness = step_ > 0 ? secant(reaction, depth_below(patch, normal_, rest_)) : 1 / compliance;
   if (patch.curvatures.size() > 0) {
     add_glide(patch, depth_of(solid_, normal_, patch, per_newton), giving(patch), reaction);
-    reaction.glide.curving = curve_below(patch, normal_, all);  // of the weight too
+    reaction.glide.curving = curve_below(patch, normal_, all);  // includes the effect of gravity
   }
   return reaction;
 }
@@ -224,7 +222,7 @@ MatrixXd surface_compliance(const Solid& solid, const Vec3& normal, const std::v
       alone.weights = VectorXd::Ones(1);
       loads.col(j) = solid.to_free(patch_load(solid, normal, alone));
     }
-    // The functional that reads the depth is the one that wrote the load, so the table is symmetric.
+    // Load and depth use the same functional, so the table is symmetric.
     const MatrixXd solution = solver.solve(loads);
     for (Eigen::Index j = 0; j < some; ++j) {
       VectorXd all = VectorXd::Zero(solid.size());
@@ -301,7 +299,7 @@ Reaction CondensedModel::press(const Patch& patch, Given given, double value) {
 }
 
 Mat2 CondensedModel::giving(const Patch& patch) const {
-  Mat2 half = Mat2::Zero();  // the table is symmetric
+  Mat2 half = Mat2::Zero();  // uses the symmetry of the table
   for (Eigen::Index j = 0; j < patch.slopes.cols(); ++j) {
     const double* const column = table_.col(rows_[static_cast<std::size_t>(j)]).data();
     Vec2 below = 0.5 * column[rows_[static_cast<std::size_t>(j)]] * patch.slopes.col(j);

@@ -8,8 +8,8 @@
 namespace tendon::softbody {
 namespace {
 
-constexpr double kApart = 0.01;  // s, between the answers that are compared
-constexpr int kAlike = 10;       // in a row: a single one could be the turning point of a slow oscillation
+constexpr double kApart = 0.01;  // s, between the compared answers
+constexpr int kAlike = 10;  // consecutive similar answers; one alone can be the turning point of a slow oscillation
 
 }  // namespace
 

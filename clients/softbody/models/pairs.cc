@@ -4,7 +4,7 @@
 namespace tendon::softbody {
 namespace {
 
-/// The least cosine of the angle between a step and the forces that it changed.
+/// Minimum cosine between a step and its change of forces.
 constexpr double kLeastCurvature = 1e-8;
 
 }  // namespace
@@ -59,8 +59,8 @@ MatrixXd Pairs::adds(const std::vector<int>& unknowns) const {
   const auto size = static_cast<Eigen::Index>(unknowns.size());
   const int pairs = count();
   if (pairs == 0) return MatrixXd::Zero(size, size);
-  // The compact form (Byrd, Nocedal & Schnabel 1994): with S, Y the pairs and R the upper triangle of SᵀY,
-  // H − K₀⁻¹ = [S, K₀⁻¹Y] [[R⁻ᵀ(diag R + Yᵀ K₀⁻¹ Y)R⁻¹, −R⁻ᵀ], [−R⁻¹, 0]] [S, K₀⁻¹Y]ᵀ.
+  // Compact form (Byrd, Nocedal & Schnabel 1994): with S, Y the pairs and R the upper triangle of SᵀY, H − K₀⁻¹ = [S,
+  // K₀⁻¹Y] [[R⁻ᵀ(diag R + Yᵀ K₀⁻¹ Y)R⁻¹, −R⁻ᵀ], [−R⁻¹, 0]] [S, K₀⁻¹Y]ᵀ.
   MatrixXd both(size, 2 * pairs);
   both << steps_(unknowns, order_), solved_(unknowns, order_);
   const MatrixXd upper = MatrixXd(steps_changes_(order_, order_)).triangularView<Eigen::Upper>();

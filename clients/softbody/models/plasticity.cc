@@ -11,15 +11,15 @@
 namespace tendon::softbody {
 namespace {
 
-/// The least sum of two principal stretches. In an element that is not inverted the sum is about 2. In an inverted one
-/// two stretches may cancel, and the rotation is undefined; this value then replaces 0.
+/// Lower bound for the sum of two principal stretches, about 2 in a regular element. In an inverted element two
+/// stretches may cancel, which leaves the rotation undefined.
 constexpr double kLeastSum = 0.02;
 
 Mat3 sym(const Mat3& a) { return 0.5 * (a + a.transpose()); }
 
 Mat3 deviator(const Mat3& a) { return a - a.trace() / 3 * Mat3::Identity(); }
 
-/// The stretch S of F = R S. It turns changes of FᵀF = S² into changes of S: the X with S X + X S = Y.
+/// The stretch S of F = R S. share() maps a change Y of FᵀF = S² to the change X of S: S X + X S = Y.
 class Stretch {
  public:
   explicit Stretch(const Mat3& f) : stretch_(sym(nearest_rotation(f).transpose() * f)), axes_(stretch_) {
@@ -50,12 +50,12 @@ void check(const Yield& yield) {
   expect_above_zero(yield.hardening, "plasticity.hardening");
 }
 
-/// The plastic flow of one step at one point.
+/// Plastic flow of one step at one point.
 struct PlasticSolid::Flow {
   Mat3 plastic;       ///< p at the end of the step
   double lost = 0;    ///< J/m³
-  Mat3 way;           ///< unit direction of p − p₀
-  double onward = 0;  ///< ∂p/∂ε along `way`, and across it
+  Mat3 way;           ///< unit tensor along p − p₀
+  double onward = 0;  ///< ∂p/∂ε along and across `way`
   double sideways = 0;
 
   Mat3 change(const Mat3& strain) const {
@@ -104,7 +104,6 @@ Stress PlasticSolid::flow_at(int element, int point, const Mat3& f) const {
   }
   const Stretch stretch(f);
   const Flow step = flow(element, point, stretch.strain());
-  // ∂(p:S)/∂F = 2 F share(p)
   return {energy(step, stretch.strain()), -4 * mu * f * stretch.share(step.plastic)};
 }
 
@@ -119,7 +118,7 @@ Mat9 PlasticSolid::tangent_at(int element, int point, const Mat3& f) const {
   const Stretch stretch(f);
   const Flow step = flow(element, point, stretch.strain());
   if (step.plastic.isZero(0)) return all;
-  // With Z = share(p):  d(2 F Z) = 2 dF Z + 2 F share(dp − Z dS − dS Z),  from the second derivative of S S = FᵀF.
+  // With Z = share(p):  d(2 F Z) = 2 dF Z + 2 F share(dp − Z dS − dS Z), from the second derivative of S S = FᵀF.
   const Mat3 z = stretch.share(step.plastic);
   return all - by_columns([&](const Mat3& df) -> Mat3 {
            const Mat3 ds = stretch.share(df.transpose() * f + f.transpose() * df);

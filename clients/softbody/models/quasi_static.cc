@@ -14,43 +14,40 @@
 namespace tendon::softbody {
 namespace {
 
-/// Armijo's share of the predicted decrease that a step must bring, and the shortest step tried.
+/// Armijo parameter, and the shortest step.
 constexpr double kDecrease = 1e-4;
 constexpr double kShortest = 1.0 / 64;
 
-/// A factor is made anew after so many steps without an answer that is good enough. Of a body whose sides push each
-/// other it serves only while each step with it leaves at most this share of the energy that has still to be lost, a
-/// quarter of the error: who is pushed changes, so that earlier steps teach nothing.
+/// Number of steps without an accurate answer after which the factor is recomputed. With self-contact it is recomputed
+/// when a step leaves more than kSlow of the remaining energy (a quarter of the error): the contact set changes, so
+/// earlier steps carry no information.
 constexpr int kPatience = 16;
 constexpr double kSlow = 1.0 / 16;
 
-/// What H says of the stiffness is wrong by the first order of H's error, and the energy of the shape by the second. Where
-/// the two differ by at most Config::tangent, and H finds no more than this that another shape would take off, that is
-/// taken off and serves. The two alone may agree by accident, as near an edge. How a body gives way to a gliding patch is
-/// right to this part of Config::tangent.
+/// The stiffness from H has an error of first order in that of H, the energy of the corresponding shape one of second
+/// order. If they differ by at most Config::tangent, and H predicts at most that much further reduction, the reduction
+/// is applied and the result accepted. Agreement of the two alone can be accidental, as near an edge. The glide is
+/// accurate to kOfTangentForGlide times Config::tangent.
 constexpr double kOfTangentForGlide = 0.5;
 constexpr int kTangentRounds = 5;
 
-/// A shape whose force may be wrong by a larger share is none of rest: how it would glide means nothing.
+/// Relative force error above which a shape is not in equilibrium, so that no glide is computed.
 constexpr double kAtRest = 0.1;
 
-/// How a body gives way to a gliding patch is kept while load and force differ by at most this share.
+/// The glide is reused while load and force differ by at most this fraction.
 constexpr double kGlidesAlike = 0.04;
 
-/// m, how far at most a node is moved to measure a slope of the force: for a body of some mm the next derivative adds
-/// 1e-4 of it.
+/// Finite-difference step, m, for derivatives of the force: in a body of some mm the next derivative adds 1e-4.
 constexpr double kNudge = 1e-7;
 
-/// How often at most the neighbouring sides are looked up for one answer, and the relative change of their forces that
-/// ends this.
+/// Self-contact: maximum number of neighbor searches per answer, and the relative change of forces at which they end.
 constexpr int kLooks = 10;
 constexpr double kParted = 1e-3;
 
-/// A change of forces of a smaller share is rounding, and teaches nothing.
+/// Smaller relative changes of forces are rounding errors and are not added to Pairs.
 constexpr double kHeard = 1e-8;
 
-/// m: an error of the force that so small a change of depth explains counts as zero, even when there is no force to
-/// compare it with.
+/// m: force errors explained by a smaller change of depth count as zero, even if there is no force to compare with.
 constexpr double kUnseen = 1e-12;
 
 }  // namespace
@@ -106,8 +103,8 @@ bool QuasiStaticModel::factorize() {
   stiffness(Elastic::Curvature::kExact);
   if (factor_.factorize(stiffness_)) return true;
   stiffness(Elastic::Curvature::kWithoutNegative);
-  // Where points are crushed flat, no stiffness may be left in some direction; a millionth of the largest entry is then
-  // added.
+  // With elements crushed flat, some direction may have no stiffness. Adds a millionth of the largest entry to the
+  // diagonal.
   for (double shift = 0; !factor_.factorize(stiffness_);) {
     double largest = 0;
     for (const double value : stiffness_.values) largest = std::max(largest, std::abs(value));

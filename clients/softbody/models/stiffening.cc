@@ -39,7 +39,7 @@ std::size_t StiffeningModel::bytes() const noexcept {
 }
 
 void StiffeningModel::go_on_from(const Model& before, std::span<const int> node_before) {
-  const auto& same = static_cast<const StiffeningModel&>(before);  // of the same kind
+  const auto& same = static_cast<const StiffeningModel&>(before);  // same kind by contract
   factor_ = same.factor_;
   model_->go_on_from(*same.model_, node_before);
 }

@@ -17,7 +17,7 @@
 namespace tendon::softbody {
 namespace {
 
-/// Throws what PETSc says.
+/// Throws PETSc's error message.
 void check(PetscErrorCode code) {
   if (code == 0) return;
   const char* text = nullptr;
@@ -27,7 +27,7 @@ void check(PetscErrorCode code) {
                            (more != nullptr && *more != '\0' ? std::string(": ") + more : std::string()));
 }
 
-/// One of PETSc's objects, destroyed at the end.
+/// RAII owner of a PETSc object.
 template <class Handle, PetscErrorCode (*kDestroy)(Handle*)>
 class Owned {
  public:
@@ -63,12 +63,12 @@ int count_of(MPI_Comm comm) {
   return count;
 }
 
-/// The share of `whole` that begins at rank `index` of `parts`.
+/// Start of rank `index`'s share of `whole`.
 PetscInt share(PetscInt whole, int index, int parts) {
   return static_cast<PetscInt>(static_cast<std::int64_t>(whole) * index / parts);
 }
 
-/// The stiffness of an element of linear, isotropic material: Σ V (λ gᵢ gⱼᵀ + µ (gⱼ gᵢᵀ + gᵢ·gⱼ)).
+/// Stiffness of an isotropic linear element: Σ V (λ gᵢ gⱼᵀ + µ (gⱼ gᵢᵀ + gᵢ·gⱼ I)).
 using StiffnessOfElement = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 StiffnessOfElement stiffness_of_element(const Solid& solid, int element) {
   const auto nodes = static_cast<Eigen::Index>(solid.mesh().element(element).size());
@@ -117,7 +117,7 @@ class SpreadSolver : public Solver {
     if (!iterates_) return Solver::solve_roughly(load);
     put(load, load_);
     Rough rough;
-    // The scale of the compliance is that of the answer before: patches of one body differ little.
+    // Scaled by the previous compliance: patches of one body differ little.
     double end = std::sqrt(kRough * least_ * compliance_);
     constexpr int kTries = 4;
     for (int i = 0; i < kTries; ++i) {
@@ -176,7 +176,7 @@ class SpreadSolver : public Solver {
  private:
   static constexpr PetscInt kMostRounds = 1000;
 
-  /// Whole nodes belong to a rank.
+  /// All components of a node belong to the same rank.
   PetscInt first_row(int rank) const { return 3 * share(size_ / 3, rank, count_of(comm_)); }
 
   void expect_convergence() const {
@@ -207,7 +207,8 @@ class SpreadSolver : public Solver {
       make_interpolation(levels[i], interpolation);
       const auto level = static_cast<PetscInt>(levels.size() - i);
       check(PCMGSetInterpolation(preconditioner, level, interpolation));
-      // Chebyshev's two rounds, PETSc's own choice, over the diagonal: twice the rounds of SOR, in a third of the time.
+      // Chebyshev smoothing (PETSc's default, two iterations) with Jacobi: twice the iterations of SOR in a third of
+      // the time.
       KSP smoother = nullptr;
       PC diagonal = nullptr;
       check(PCMGGetSmoother(preconditioner, level, &smoother));
@@ -244,7 +245,7 @@ class SpreadSolver : public Solver {
     check(MatSetValuesCOO(to, values.data(), INSERT_VALUES));
   }
 
-  /// What GAMG wants to know of elasticity: that a body can move as a whole.
+  /// Gives GAMG the rigid body modes.
   void tell_rigid_motions(const Solid& solid) {
     Vector places;
     check(VecCreate(comm_, places.address()));
@@ -261,9 +262,9 @@ class SpreadSolver : public Solver {
     check(MatSetNearNullSpace(matrix_, motions));
   }
 
-  /// λ: how much the multigrid may take too little of a residual.
+  /// Computes λ, the lower bound of the preconditioned spectrum.
   void know_the_spectrum() {
-    VectorXd load(size_);  // something of every shape, the same on every rank and machine
+    VectorXd load(size_);  // pseudorandom, identical on every rank and machine
     std::uint64_t state = 1;
     for (double& entry : load) {
       state = state * 6364136223846793005ULL + 1442695040888963407ULL;
@@ -282,7 +283,7 @@ class SpreadSolver : public Solver {
     check(KSPSetUseFischerGuess(krylov_, 1, kRemembered));
   }
 
-  /// This rank's rows of a vector that is whole here.
+  /// Copies this rank's rows of a replicated vector.
   void put(const VectorXd& from, Vec to) const {
     PetscScalar* values = nullptr;
     check(VecGetArrayWrite(to, &values));
@@ -290,8 +291,8 @@ class SpreadSolver : public Solver {
     check(VecRestoreArrayWrite(to, &values));
   }
 
-  /// The rows of this rank's nodes, from every element that has one of them, in the order of the elements: nothing is
-  /// sent, and a row has the same bits on any number of ranks.
+  /// Assembles this rank's rows from all adjacent elements in element order, without communication, so that rows have
+  /// the same bits on any number of ranks.
   void assemble(const Solid& solid) {
     const Mesh& mesh = solid.mesh();
     const PetscInt first = first_ / 3;
@@ -313,7 +314,7 @@ class SpreadSolver : public Solver {
         beside[static_cast<std::size_t>(row - first)].push_back(e);
       }
     }
-    // Exactly as many blocks as a row of nodes has.
+    // Exact preallocation.
     std::vector<PetscInt> here(static_cast<std::size_t>(mine));
     std::vector<PetscInt> elsewhere(static_cast<std::size_t>(mine));
     std::vector<int> neighbours;
@@ -341,7 +342,7 @@ class SpreadSolver : public Solver {
       const StiffnessOfElement k = stiffness_of_element(solid, e);
       rows.clear();
       columns.clear();
-      for (const int node : mesh.element(e)) {  // PETSc leaves negative ones out
+      for (const int node : mesh.element(e)) {  // PETSc ignores negative indices
         columns.push_back(free_node(node));
         rows.push_back(is_mine(columns.back()) ? columns.back() : -1);
       }
@@ -353,7 +354,7 @@ class SpreadSolver : public Solver {
     check(MatSetOption(matrix_, MAT_SPD, PETSC_TRUE));
   }
 
-  /// All rows of a column, on every rank.
+  /// Gathers all rows of a column on every rank.
   void gather(const PetscScalar* values, double* whole) const {
     const int ranks = count_of(comm_);
     std::vector<int> sizes(static_cast<std::size_t>(ranks));
@@ -390,19 +391,19 @@ class SpreadSolver : public Solver {
   bool iterates_;
   Matrix matrix_;
   Krylov krylov_;
-  // Of multigrid:
+  // For multigrid:
   Vector load_;
   Vector solution_;
   Vector residual_;
   double least_ = 0;               ///< λ
-  mutable double compliance_ = 0;  ///< m/N, of the last rough solution
+  mutable double compliance_ = 0;  ///< m/N, of the last approximate solve
 };
 
 }  // namespace
 
 Ranks::Ranks(int& argc, char**& argv) {
   check(PetscInitialize(&argc, &argv, nullptr, nullptr));
-  // What fails is thrown, and said once.
+  // Errors are thrown, so PETSc need not print them.
   PetscPushErrorHandler(PetscIgnoreErrorHandler, nullptr);
 }
 

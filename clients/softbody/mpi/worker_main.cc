@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// tendon-fem-worker: a soft body on as many ranks as MPI is started on. tendon-fem starts it.
+// tendon-fem-worker: a soft body solved on all MPI ranks. Started by tendon-fem.
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
@@ -27,8 +27,8 @@ using namespace tendon::softbody;
 
 namespace {
 
-/// Does this PETSc solve a body that we can solve by ourselves? Some versions silently do not (a matrix of DMDA on one
-/// rank, 3.18).
+/// Checks PETSc against the local solver on a small block. Some versions silently give wrong results (a DMDA matrix on
+/// one rank, 3.18).
 void expect_right_answers() {
   BodyConfig block;
   block.shape = BlockShape{Vec3(0.1, 0.1, 0.05), {4, 4, 2}};
@@ -52,7 +52,7 @@ struct Arguments {
   bool json = false;
 };
 
-/// On all ranks, and says on a terminal how far it is.
+/// on_ranks() with a progress display.
 class Told : public Solver {
  public:
   Told(const Solid& solid, Method method) : solver_(on_ranks(solid, method)) {}
@@ -96,14 +96,14 @@ int condense_scene(const Arguments& arguments, const Ranks& ranks) {
   return 0;
 }
 
-/// The body that answers: condensed is linear, by a table that is not made here.
+/// The body for live answers. A condensed body is replaced by the equivalent linear one, without a table.
 Body live_body(BodyConfig config, Method method) {
   if (config.model == ModelKind::kCondensed) config.model = ModelKind::kLinear;
   config.table_file.reset();
   return Body(config, [method](const Solid& solid) { return on_ranks(solid, method); });
 }
 
-/// Answers the front until it ends the stream. Rank 0 has the stream; every rank answers every state.
+/// Answers the front until it closes the stream, which only rank 0 has; every rank computes every answer.
 int answer(const Arguments& arguments, const Ranks& ranks) {
   expect_right_answers();
   const Scene scene = read_scene(arguments.scene);
@@ -171,7 +171,7 @@ int main(int argc, char** argv) {
   } catch (const CLI::ParseError& error) {
     return tendon::usage::exit_code(app, error);
   }
-  int none = 1;  // PETSc's options come by the environment
+  int none = 1;  // PETSc's options come from the environment
   try {
     const Ranks ranks(none, argv);
     try {
@@ -180,7 +180,7 @@ int main(int argc, char** argv) {
       if (ranks.rank() == 0) std::cerr << "tendon-fem-worker: " << error.what() << '\n';
       return 2;
     } catch (const std::exception& error) {
-      // All ranks fail alike but for what only rank 0 does: others must not wait for it.
+      // Ranks fail together, except where only rank 0 is involved: the others must not wait for it.
       if (ranks.rank() == 0) std::cerr << "tendon-fem-worker: " << error.what() << '\n';
       return 1;
     }

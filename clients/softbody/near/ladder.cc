@@ -16,7 +16,7 @@ Reaction Ladder::press(const Patch& patch, Given given, double value) {
   bool whole = false;
   for (std::size_t i = 0; i < rungs_.size() && !whole; ++i) {
     const auto answer = rungs_[i]->press(patch, value);
-    // A rung holds the depth, and pulls where it has to.
+    // A rung holds the depth and may pull.
     if (!answer || (given == Given::kLeastDepth && answer->reaction.force < 0)) continue;
     ++answers_[i];
     answers.push_back(*answer);
@@ -44,7 +44,7 @@ void Ladder::cut(const Division& division, const EffectsConfig& effects) {
 }
 
 void Ladder::go_on_from(const Model& before, std::span<const int> node_before) {
-  near_->go_on_from(*static_cast<const Ladder&>(before).near_, node_before);  // of the same kind
+  near_->go_on_from(*static_cast<const Ladder&>(before).near_, node_before);  // same kind by contract
 }
 
 std::vector<Ladder::Step> Ladder::steps() const {
@@ -71,8 +71,8 @@ Reaction blended(const Reaction& from, const Reaction& to, double share) {
   all.slope = mix(Vec2(from.force * from.slope), Vec2(to.force * to.slope)) / all.force;
   all.knows_glide = from.knows_glide && to.knows_glide;
   if (!all.knows_glide) return all;
-  // PatchContact's K in parts: k along the normal, k s + F t beside it, and across k s sᵀ + F (s tᵀ + t sᵀ − M − F D).
-  // The surface at rest adds the same to both. `giving` stays 0, and `curving` has both.
+  // Blends the parts of PatchContact's K: k along the normal, k s + F t mixed, and k s sᵀ + F (s tᵀ + t sᵀ − M − F D)
+  // tangential. The surface at rest contributes equally to both. `giving` stays 0; `curving` contains both.
   const auto beside = [](const Reaction& r) { return Vec2(r.stiffness * r.slope + r.force * r.glide.tilting); };
   const auto across = [](const Reaction& r) {
     const Mat2 turned = r.slope * r.glide.tilting.transpose();

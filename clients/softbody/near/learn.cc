@@ -20,7 +20,7 @@ namespace {
 constexpr std::uint64_t kLearnedVersion = 3;
 constexpr std::uintmax_t kMostLearnedBytes = std::uintmax_t{1} << 30;
 
-/// The kinds of what is learned: how a file of it begins, what its name begins with, and its fields.
+/// File magic, name prefix and fields of each kind of data.
 struct OfShapes {
   using Value = LearnedShapes;
   static constexpr std::string_view kBegins = "TENDONSH";
@@ -113,7 +113,7 @@ class Reads {
   ByteReader& from_;
 };
 
-/// All that a file depends on.
+/// Digest of everything a file depends on.
 std::uint64_t digest_of(const Solid& solid, const TouchSurface& surface, const PressGrid& grid) {
   std::string bytes;
   put(bytes, softbody::digest_of(solid, surface.normal()));
@@ -164,14 +164,14 @@ typename Kind::Value value_of(std::string_view bytes, std::uint64_t digest, cons
   return value;
 }
 
-/// Keeps what was learned, unless something has its name. Whole, or not at all.
+/// Writes the file atomically, unless it already exists.
 void keep(const std::filesystem::path& file, std::string_view bytes) {
   std::filesystem::create_directories(file.parent_path());
   std::filesystem::path draft = file;
   draft += ".new";
   write_draft(draft, bytes);
   std::error_code there;
-  std::filesystem::create_hard_link(draft, file, there);  // another program may have been as quick
+  std::filesystem::create_hard_link(draft, file, there);  // another process may have written it
   std::filesystem::remove(draft);
   if (there && there != std::errc::file_exists) {
     throw std::runtime_error("cannot write " + file.string() + ": " + there.message());

@@ -19,42 +19,43 @@
 namespace tendon::softbody {
 namespace {
 
-/// At most so many shapes, fewer where these leave so small a share of the energies' square root …
+/// Maximum numbers of shapes. Fewer are used if the rest is at most kShapesLeft (square root of energy).
 constexpr std::array<int, 2> kMostLearned{45, 60};
 constexpr double kShapesLeft = 3e-4;
-/// … the more of them only where an answer by the fewer may be wrong by more than this share of the force.
+/// The larger number is used only if answers with the smaller one may be wrong by more than this relative force error.
 constexpr double kGoodEnough = 0.015;
 
-/// What the few elements may miss of what the law adds, and how many there may be.
+/// Accepted residual of the nonlinear correction with the chosen elements, and their maximum number.
 constexpr double kElementsLeft = 5e-3;
 constexpr int kMostElements = 240;
-/// Of a fine mesh only so many elements are looked at, those in which the law adds most.
+/// On a fine mesh, only the elements with the largest corrections are candidates.
 constexpr Eigen::Index kCandidates = 1500;
 
-/// How far q is moved to measure a slope of the forces, of its size; and at least, √J.
+/// Finite-difference step for q, relative to
+/// q
+/// , and its minimum, √J.
 constexpr double kNudged = 1e-6;
 constexpr double kLeastNudge = 1e-9;
 
-/// Steps of Newton's method in an answer; the shortest, and Armijo's share of the decrease foreseen.
+/// Maximum Newton steps per answer; shortest step and Armijo parameter of the line search.
 constexpr int kMostSteps = 8;
 constexpr double kShortestShare = 1.0 / 64;
 constexpr double kShareOfDecrease = 1e-4;
-/// The least cosine of the angle between a step and what it changes.
+/// Minimum cosine between a step and its change of forces.
 constexpr double kLeastCurved = 1e-8;
 
-/// Shares of what an answer may be wrong by: for Newton's method. The rest is for the shapes.
+/// Fraction of the tolerance that is left to Newton's method; the rest covers the shapes.
 constexpr double kForNewton = 0.25;
 
-/// To what share of the force knots are solved, and learned answers that are judged: what the force is wrong by is of the
-/// second order of this.
+/// Relative tolerance at knots, and of the answers used for validation; the force error is quadratic in it.
 constexpr double kExactly = 1e-6;
 constexpr double kJudged = 1e-4;
 
-/// Rounds of Rayleigh's quotient for the stiffness, until so small a share of it is doubtful.
+/// Rayleigh quotient for the stiffness: maximum iterations, and the relative uncertainty at which they end.
 constexpr int kStiffnessRounds = 5;
 constexpr double kStiffnessAlike = 0.02;
 
-/// The corners of each element have numbers of their own, so that its forces are its alone.
+/// A kernel in which each element has its own corner numbers, so that forces are kept per element.
 Kernel apart(const Solid& solid, Law law, const std::vector<int>& elements, const std::vector<int>& node_of,
              const VectorXd& weights) {
   const int per_element = nodes_of(solid.mesh().shape);
@@ -71,7 +72,7 @@ Kernel apart(const Solid& solid, Law law, const std::vector<int>& elements, cons
   return kernel;
 }
 
-/// The nodes of some elements, ascending, and for each corner of each which of them it is.
+/// The nodes of some elements, ascending, and the index of each element corner among them.
 struct Corners {
   Corners(const Mesh& mesh, const std::vector<int>& elements) {
     for (const int element : elements) {
@@ -89,7 +90,7 @@ struct Corners {
   std::vector<int> own;
 };
 
-/// The rows of all components of some nodes, zero where they are held.
+/// Rows of all components of some nodes; zero where fixed.
 MatrixXd rows_of(const Solid& solid, const MatrixXd& free, const std::vector<int>& nodes) {
   MatrixXd rows = MatrixXd::Zero(3 * static_cast<Eigen::Index>(nodes.size()), free.cols());
   for (Eigen::Index i = 0; i < rows.rows(); ++i) {
@@ -99,10 +100,10 @@ MatrixXd rows_of(const Solid& solid, const MatrixXd& free, const std::vector<int
   return rows;
 }
 
-/// The leading shapes, orthonormal in the stiffness at rest, and each press's q.
+/// Leading shapes, orthonormal in the stiffness at rest, and the coordinates q of each press.
 struct Basis {
   MatrixXd shapes;  ///< free displacements
-  MatrixXd q;       ///< a column for each press
+  MatrixXd q;       ///< one column per press
 };
 
 Basis basis_of(const std::vector<const SolvedPress*>& presses, const SymmetricMatrix& at_rest, int most) {
@@ -111,7 +112,8 @@ Basis basis_of(const std::vector<const SolvedPress*>& presses, const SymmetricMa
   VectorXd sizes(count);
   for (Eigen::Index s = 0; s < count; ++s) {
     const VectorXd& shape = presses[static_cast<std::size_t>(s)]->shape;
-    // Between equal weights of all presses and equal errors in metres: deep presses bring shapes that others lack.
+    // Compromise between equal weight of all presses and equal errors in metres: deep presses contribute distinct
+    // shapes.
     sizes[s] = std::sqrt(shape.norm());
     all.col(s) = shape / sizes[s];
   }
@@ -128,7 +130,7 @@ Basis basis_of(const std::vector<const SolvedPress*>& presses, const SymmetricMa
   return {all * mix, mix.transpose() * gram * sizes.asDiagonal()};
 }
 
-/// What the law adds to the linear forces, element by element, on the shapes.
+/// The law's correction to the linear forces, per element, projected on the shapes.
 class Added {
  public:
   Added(const Solid& solid, const Basis& basis)
@@ -144,7 +146,7 @@ class Added {
     per_element_ = nodes_of(solid.mesh().shape);
   }
 
-  /// A column for each element, in press s.
+  /// One column per element, for press s.
   MatrixXd at_press(Eigen::Index s) const {
     const VectorXd u = rows_.transpose() * basis_.q.col(s);
     const auto size = 3 * static_cast<Eigen::Index>(corners_->own.size());
@@ -167,13 +169,13 @@ class Added {
   const Basis& basis_;
   std::vector<int> elements_;
   std::unique_ptr<Corners> corners_;
-  MatrixXd rows_;  ///< of the shapes, as columns: they are read one after the other
+  MatrixXd rows_;  ///< shapes as columns, for sequential access
   std::unique_ptr<Kernel> law_;
   std::unique_ptr<Kernel> linear_;
   int per_element_ = 0;
 };
 
-/// Elements and their weights, by which all forces that the law adds in the presses are nearly those of the whole.
+/// Chooses elements and weights that reproduce the total correction in all presses.
 void choose_elements(const Solid& solid, const Basis& basis, LearnedShapes& learned) {
   const Added added(solid, basis);
   const Eigen::Index presses = basis.q.cols();
@@ -215,7 +217,7 @@ void choose_elements(const Solid& solid, const Basis& basis, LearnedShapes& lear
   learned.weights = Eigen::Map<const VectorXd>(chosen.data(), static_cast<Eigen::Index>(chosen.size()));
 }
 
-/// E's second derivative.
+/// ∂²E/∂q² by central differences.
 MatrixXd curvature_at(const LearnedBody& body, const VectorXd& q) {
   const Eigen::Index size = q.size();
   const double nudge = std::max(kLeastNudge, kNudged * q.norm());
@@ -241,7 +243,7 @@ bool stable_at_held_depth(const MatrixXd& curvature, const VectorXd& load) {
   return parts.eigenvalues()[0] > 0;
 }
 
-/// Goes along `step` as far as the energy falls. `slope` has its derivative before the call and after it.
+/// Line search along `step`. `slope` holds ∂E/∂q before and after.
 bool go(const LearnedBody& body, const VectorXd& step, double& energy, VectorXd& q, VectorXd& slope) {
   const double foreseen = slope.dot(step);
   VectorXd there_slope(q.size());
@@ -257,7 +259,7 @@ bool go(const LearnedBody& body, const VectorXd& step, double& energy, VectorXd&
   return false;
 }
 
-/// What a step and the change of forces along it teach of the inverse (BFGS).
+/// BFGS update of the inverse.
 void learn_step(const VectorXd& step, const VectorXd& change, MatrixXd& inverse) {
   const double stiff = step.dot(change);
   if (!(stiff > kLeastCurved * step.norm() * change.norm())) return;
@@ -266,7 +268,7 @@ void learn_step(const VectorXd& step, const VectorXd& change, MatrixXd& inverse)
   inverse += mixed * step.transpose() + step * mixed.transpose();
 }
 
-/// Finds the shape of a knot and the inverse there. False where there is none.
+/// Finds shape and inverse of a knot. Returns false if there is no stable one.
 bool solve_knot(const LearnedBody& body, const VectorXd& load, double depth, VectorXd& q, MatrixXd& inverse) {
   VectorXd slope(q.size());
   for (int i = 0; i < kMostSteps; ++i) {
@@ -325,7 +327,7 @@ LearnedShapes learn_shapes_of(const Solid& solid, const TouchSurface& surface, c
     tell("learning: " + std::to_string(learned.elements.size()) + " elements of " +
          std::to_string(solid.mesh().element_count()));
 
-  // The knots, and how wrong answers are there and in the middles of cells.
+  // Knots, and relative errors at knots and cell centers.
   learned.knots = MatrixXd::Zero(count, grid.knots());
   learned.inverses = MatrixXd::Zero(count, count * grid.knots());
   std::vector<double> at_knots(at(grid.knots()), -1);
@@ -461,7 +463,7 @@ std::optional<Reaction> LearnedBody::press(const Patch& patch, double depth, con
   reaction.depth = load.dot(q);
   reaction.slope = patch.slopes * (below.transpose() * q);
 
-  // Rayleigh's quotient: the shape of unit depth minimises the stiffness.
+  // Rayleigh quotient: the shape of unit depth minimizes the stiffness.
   const double nudge = std::max(kLeastNudge, kNudged * q.norm());
   VectorXd there(size);
   const auto stiff = [&](const VectorXd& shape) {

@@ -10,9 +10,9 @@
 namespace tendon::softbody {
 namespace {
 
-/// Of the diagonal: columns that depend on each other still have a solution.
+/// Relative to the diagonal: regularizes linearly dependent columns.
 constexpr double kRidge = 1e-12;
-/// An entry that is so small is none.
+/// Smaller entries count as zero.
 constexpr double kNone = 1e-12;
 
 }  // namespace
@@ -39,7 +39,7 @@ VectorXd few_not_negative(const Squares& squares, double left, int most) {
       MatrixXd among = squares.gram(in, in);
       among.diagonal() *= 1 + kRidge;
       const VectorXd wanted = among.ldlt().solve(VectorXd(squares.right(in)));
-      double share = 1;  // of the way there, as far as none becomes negative
+      double share = 1;  // fraction of the step that keeps all entries ≥ 0
       for (std::size_t i = 0; i < in.size(); ++i) {
         const double to = wanted[static_cast<Eigen::Index>(i)];
         if (to <= 0) share = std::min(share, x[in[i]] / (x[in[i]] - to));
@@ -62,7 +62,11 @@ VectorXd few_not_negative(const Squares& squares, double left, int most) {
     } else {
       barred[static_cast<std::size_t>(newest)] = true;
     }
-    // |b − G x|² = |b|² − x·(Gᵀb + what still pulls)
+    //
+    // b − G x
+    // ² =
+    // b
+    // ² − x·(Gᵀb + Gᵀ(b − G x))
     if (squares.square - x.dot(squares.right + pull) <= left * left * squares.square) break;
   }
   return x;

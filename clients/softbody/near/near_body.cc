@@ -11,14 +11,14 @@
 namespace tendon::softbody {
 namespace {
 
-/// For each mode so many random loads; the least share of the traces that is kept.
+/// Random loads per mode, and the relative RMS of the motion of Γ that the modes may neglect.
 constexpr int kLoadsPerMode = 2;
 constexpr double kLeft = 1e-3;
 
-/// For so many loads solutions are found at once.
+/// Loads per solve.
 constexpr Eigen::Index kLoadsAtOnce = 8;
 
-/// So many far elements at most are asked for what the linear far field leaves out.
+/// Maximum number of far elements sampled by left_out().
 constexpr std::size_t kWatched = 96;
 
 Vec3 middle_of(const Mesh& mesh, int element) {
@@ -27,7 +27,7 @@ Vec3 middle_of(const Mesh& mesh, int element) {
   return sum / static_cast<double>(mesh.element(element).size());
 }
 
-/// Evenly within ±1, the same everywhere.
+/// Uniform in ±1, with a fixed seed.
 class Noise {
  public:
   double next() { return static_cast<double>(random_() >> 11U) * 0x1p-52 - 1; }
@@ -42,7 +42,7 @@ SymmetricMatrix stiffness_at(const Solid& solid, const VectorXd& u) {
   return stiffness;
 }
 
-/// Of the displacements of a whole those of a part, whose nodes have these numbers there.
+/// Displacements of a part, whose nodes have the numbers `nodes` in the whole.
 VectorXd of_nodes(const VectorXd& all, const std::vector<int>& nodes) {
   VectorXd own(3 * static_cast<Eigen::Index>(nodes.size()));
   for (Eigen::Index i = 0; i < own.size(); ++i) own[i] = all[3 * nodes[static_cast<std::size_t>(i / 3)] + i % 3];
@@ -83,7 +83,7 @@ Pieces NearBody::make(const Solid& whole, const Factor& factor, Config config, s
   made.reset();
   const Mesh& mesh = whole.mesh();
   std::vector<int> near;
-  std::vector<std::pair<double, int>> far;  // by distance from the middle
+  std::vector<std::pair<double, int>> far;  // by distance from `middle`
   std::vector<bool> touches_far(mesh.nodes.size());
   std::vector<bool> reached(mesh.nodes.size());
   for (const int node : config.pressed) reached[at(node)] = true;
@@ -114,8 +114,8 @@ Pieces NearBody::make(const Solid& whole, const Factor& factor, Config config, s
   co_await kPieceDone;
 
   parts.own_of.assign(mesh.nodes.size(), -1);
-  std::vector<int> whole_of;  // of each free component of the part, its free number in the whole
-  std::vector<int> rim_free;  // the free numbers in the part of `rim`
+  std::vector<int> whole_of;  // free number in the whole of each free component of the part
+  std::vector<int> rim_free;  // free number in the part of each component of `rim`
   std::vector<double> weight;
   for (int i = 0; i < static_cast<int>(nodes.size()); ++i) {
     const int node = nodes[at(i)];
@@ -154,7 +154,7 @@ Pieces NearBody::make(const Solid& whole, const Factor& factor, Config config, s
   co_await kPieceDone;
 
   MatrixXd shapes(loads.rows(), loads.cols());
-  // What the far field's force on Γ is in each of these shapes: that of the load and of the near field is missing.
+  // The far field's force on Γ in each of these shapes balances the load and the near field.
   MatrixXd traces(interface, loads_count);
   MatrixXd forces(interface, loads_count);
   VectorXd local(part.free_count());
@@ -249,7 +249,7 @@ Elastic::Forces NearBody::forces(const VectorXd& u) const {
 void NearBody::stiffness(const VectorXd& u, Curvature curvature, SymmetricMatrix& to) const {
   SymmetricMatrix near = part_.pattern();
   part_.stiffness(placed(u), curvature, near);
-  // Of each free component of the part: its place on Γ, or −1; and its number here.
+  // For each free component of the part: its index on Γ, or −1; and its free number in this body.
   std::vector<int> on_rim(at(part_.free_count()), -1);
   for (std::size_t i = 0; i < rim_.size(); ++i) on_rim[at(part_.free_of(rim_[i]))] = static_cast<int>(i);
   std::vector<int> own(at(part_.free_count()), -1);

@@ -33,8 +33,8 @@ class NearBody : public Elastic {
   struct Config {
     Vec3 middle = Vec3::Zero();  ///< m
     double radius = 0;           ///< m: an element is near if its center is within this distance of `middle`
-    /// Upper limit; fewer are used if the rest of the singular values is below 1e-3. At least the number of unknowns of
-    /// Γ: the exact interface.
+    /// Upper limit; fewer are used if the others add less than 1e-3 (RMS) to the motion of Γ. With at least as many modes
+    /// as Γ has unknowns the interface is exact.
     int modes = 60;
     std::vector<int> pressed;  ///< nodes that a tool may press; all their elements are near
     VectorXd press;            ///< N, free components of the whole: a typical tool load at `middle`

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The near model when no field is available: a linear solution with one Newton step. Also blends the force and slope of
-// two models.
+// NearModel without a field: the linear solution with one Newton step; and the blending of force and slope between two
+// models.
 #include <algorithm>
 #include <cmath>
 
@@ -10,16 +10,16 @@
 namespace tendon::softbody {
 namespace {
 
-/// By how much more the true error may be than what is seen of it.
+/// Safety factors on the observed part of the error.
 constexpr double kLinearSafety = 6;
 constexpr double kStepSafety = 2;
 constexpr double kPartedSafety = 3;
 
-/// While no field has the patch, the step from the linear shape counts in full where it strays by at most the first, and
-/// not at all from the second on. It strays by the share of the energy's slope along it that is left at its end, and so
-/// many times the share of the energy that it is about to lose. (B1: 0.3 at a/4 where ν = 0.45, and 0.9 beside a cut; the
-/// step is good. 0.6 at a/20 and 2.6 at a/10 where ν = 0.499: there it is not. The slope alone is small again at 0.17 a, by
-/// accident.)
+/// Weight of the Newton step from the linear shape, while no field contains the patch: full up to kStrays, zero from
+/// kStraysTooFar on. The measure is the remaining fraction of the energy's slope at the end of the step, plus kByEnergy
+/// times the fraction of the energy that the step is predicted to release. On block B1: 0.3 at a/4 for ν = 0.45 and 0.9
+/// next to a cut, where the step is good; 0.6 at a/20 and 2.6 at a/10 for ν = 0.499, where it is not. The slope alone
+/// is small again at 0.17 a, by accident.
 constexpr double kStrays = 1;
 constexpr double kStraysTooFar = 1.5;
 constexpr double kByEnergy = 5;
@@ -43,7 +43,7 @@ Reaction NearModel::linear_press(const Patch& patch, Given given, double value) 
   by_law = solid_.to_free(solid_.forces(u).force);
   const double left = by_law.dot(step) / slope;
   const double strays = std::abs(left) + kByEnergy * std::abs(slope) / load.dot(shape) / linear;
-  const bool leads = strays < kStraysTooFar;  // not where there is no step
+  const bool leads = strays < kStraysTooFar;  // false if there is no step
   const double share = leads ? std::min(1.0, (kStraysTooFar - strays) / (kStraysTooFar - kStrays)) : 0;
   u.setZero();
   solid_.add_free(shape, u);
@@ -57,7 +57,7 @@ Reaction NearModel::linear_press(const Patch& patch, Given given, double value) 
   }
   reaction.error =
       kStepSafety * std::abs(work - reaction.force) + (1 - share) * kLinearSafety * std::abs(work - linear);
-  // What the law adds to the linear force grows with the square of the depth.
+  // The nonlinear correction of the force is quadratic in the depth.
   reaction.stiffness = (linear != 0 ? 2 * reaction.force / linear - 1 : 1) / compliance;
   if (given == Given::kForce) {
     solid_.add_free((value - reaction.force) * per_newton, u);
@@ -65,7 +65,7 @@ Reaction NearModel::linear_press(const Patch& patch, Given given, double value) 
   }
   reaction.depth = depth_below(patch, surface_.normal(), u);
   reaction.slope = slope_below(patch, surface_.normal(), u);
-  // Sides of a cut turn freely: the energy that is lost on the way to the body's own shape, for each metre.
+  // The sides of a cut rotate freely. Adds the energy released on the way to the equilibrium shape, per metre of depth.
   if (parted_) reaction.error += kPartedSafety * std::abs(slope / reaction.depth);
   if (!std::isfinite(reaction.error)) reaction.error = std::abs(reaction.force);
   return reaction;

@@ -17,51 +17,52 @@
 namespace tendon::softbody {
 namespace {
 
-/// Radii of the near field, in radii of the patch, and from where on a material is nearly incompressible.
+/// Near-field radii, in patch radii, and the Poisson ratio above which the larger one is used.
 constexpr double kRadius = 1.5;
 constexpr double kRadiusIncompressible = 2;
 constexpr double kIncompressible = 0.45;
 constexpr double kElementsBeyond = 2;
 
-/// How much of a patch's radius the hand goes until an answer is that of a new field alone.
+/// Distance of hand motion over which the old answer fades out, in patch radii.
 constexpr double kFadesOver = 0.25;
 
-/// Without another thread a new field is made while the patch goes from so far from the old one's middle as this serves,
-/// to so many times as far: at least a piece with each answer, and so many evenly over this way. Sixty modes have 29
-/// pieces. The old field has the patch to twice as far as it serves.
+/// Without a background thread: a new field is built while the patch moves from serves_to() to kWaits times as far from
+/// the old field's center, at least one piece per answer, evenly distributed. 60 modes have 29 pieces. The old field
+/// contains the patch up to twice serves_to().
 constexpr double kWaits = 1.7;
 constexpr double kPiecesOnTheWay = 30;
 
-/// A field that nobody needs yet is whole when so much of the room is left: the hand is still near its middle then.
+/// A field that is not needed yet is completed while this much of `room` is left, when the hand is still near its
+/// center.
 constexpr double kRoomLeft = 0.3;
 
-/// Iterations of Newton's method in a piece; so many pieces press the new field, and the factor is made in one of them.
+/// Newton iterations per piece; number of pieces that press the new field; index of the piece that factorizes.
 constexpr int kIterationsAtOnce = 6;
 constexpr int kPresses = 4;
 constexpr int kFactorAt = 1;
 
-/// By how much more the true error may be than what is seen of it.
+/// Safety factors on the observed part of the error.
 constexpr double kFarSafety = 3;
 constexpr double kModesSafety = 3;
 
-/// A field has every patch whose place is so many patch's radii at most from its middle.
+/// Largest distance of a patch from the center of its field, in patch radii.
 constexpr double kReach = 0.45;
 
-/// The other thread is asked for a field about another shape when the tool is so many patch's radii deeper, or less deep.
+/// Depth change, in patch radii, at which a field about another shape is requested.
 constexpr double kDeeper = 0.1;
 
-/// Of the force: how wrong a shape of the whole body may be, and how often at most it is pressed for some iterations to
-/// become so right. One that stays ten times as wrong is none to be linear about.
+/// Relative force tolerance of the whole body's shape, and maximum number of refinement passes. If the error is still
+/// ten times the tolerance, the shape is not used.
 constexpr double kShape = 1e-3;
 constexpr int kShapePresses = 6;
 
-/// A field whose middle is so many times as far from the hand as it serves is not made to its end.
+/// A field in progress is abandoned when the hand is this many times serves_to() from its center.
 constexpr double kLeftBehind = 3;
 
-/// The way of the hand in an answer is a mean over about so many.
+/// Averaging length of the hand's motion per answer.
 constexpr double kAnswersInMean = 16;
 
-/// m: farther from the middle of a field a patch wants a new one.
+/// m, distance of the patch from a field's center beyond which a new field is needed.
 double serves_to(const TouchSurface& surface) { return kReach * surface.radius() / 2; }
 
 Vec3 place_of(const Mesh& mesh, const Patch& patch) {
@@ -72,7 +73,7 @@ Vec3 place_of(const Mesh& mesh, const Patch& patch) {
   return place;
 }
 
-/// m, along the axes: the largest element that has a node of the patch.
+/// Size of the largest element with a node of the patch, along the axes, m.
 double element_below(const Mesh& mesh, const Patch& patch) {
   double largest = 0;
   for (int e = 0; e < mesh.element_count(); ++e) {
@@ -104,25 +105,25 @@ Factor factor_at_rest(const Solid& solid) {
 struct NearModel::Field {
   Vec3 middle = Vec3::Zero();
   double radius = 0;
-  double depth = 0;                                   ///< m, of the tool, for which it was made
+  double depth = 0;                                   ///< m, tool depth for which it was made
   double serves = 0;                                  ///< m, serves_to()
-  std::unique_ptr<NearBody> body = nullptr;           ///< null: all of the body is near
-  std::unique_ptr<QuasiStaticModel> model = nullptr;  ///< null: it was given up
-  double missed = 0;                                  ///< share of the force, by too few modes and by a rough u*
-  Handover handover = {};                             ///< from the hand's last answer that it knew
+  std::unique_ptr<NearBody> body = nullptr;           ///< null: the whole body is near
+  std::unique_ptr<QuasiStaticModel> model = nullptr;  ///< null: abandoned
+  double missed = 0;                                  ///< relative force error due to the modes and the approximate u*
+  Handover handover = {};                             ///< from the last answer known to the thread
   std::exception_ptr failed = nullptr;
   std::unique_ptr<Field> behind = nullptr;
 
   bool holds(const Patch& patch) const {
     return body == nullptr || std::ranges::all_of(patch.nodes, [&](int node) { return body->own_node(node) >= 0; });
   }
-  /// Its modes were looked at up to twice as far from its middle as it serves.
+  /// The modes were validated up to twice serves_to().
   bool holds(const Patch& patch, const Vec3& place, double times) const {
     return body == nullptr || ((place - middle).norm() <= times * serves && holds(patch));
   }
   double away(const Vec3& place, double deep) const { return std::hypot((place - middle).norm(), deep - depth); }
 
-  /// With its own numbers of the nodes.
+  /// The patch with this field's node numbers.
   Patch own(Patch patch) const {
     for (int& node : patch.nodes) node = body->own_node(node);
     return patch;
@@ -136,7 +137,7 @@ struct NearModel::Field {
     }
     const Patch here = own(patch);
     Reaction reaction = model->press(here, given, value);
-    if (reaction.error > std::abs(reaction.force)) {  // lost on the way from the last shape
+    if (reaction.error > std::abs(reaction.force)) {  // diverged from the last shape
       model->set_displacements(body->beginning());
       reaction = model->press(here, given, value);
     }
@@ -151,30 +152,30 @@ struct NearModel::Field {
   }
 };
 
-/// Of one field. What it refers to must live as long as its pieces.
+/// A field in progress. Objects it refers to must outlive its pieces.
 struct NearModel::Making {
   const Solid& solid;
   const TouchSurface& surface;
   const Factor& factor;  ///< of the whole stiffness about the shape
   const Config& config;
-  Patch first;  ///< around which it is
+  Patch first;  ///< the patch at the center
   double depth;
-  Hand hand;            ///< the newest
+  Hand hand;            ///< newest
   VectorXd about = {};  ///< the shape, all nodes; empty: at rest
-  double unsure = 0;    ///< share of the force, by a rough shape
+  double unsure = 0;    ///< relative force error due to an approximate shape
   std::unique_ptr<Field> field = nullptr;
   std::optional<Pieces> work = {};
   int done = 0;  ///< pieces
   Vec3 middle = place_of(solid.mesh(), first);
 
-  /// Makes the field: pressed by the hand already, where that presses, and at rest with the factor of that shape.
+  /// Makes the field, pressed at the hand if that touches. At rest it is pressed with the factor of that shape.
   Pieces pieces();
 
  private:
   void look_at_modes(const Vec2& across);
 };
 
-/// What the other thread makes fields from, with a body of its own. Both threads touch the first three.
+/// The background thread's state, with its own copy of the body. The first three members are shared by both threads.
 struct NearModel::Oracle {
   Oracle(const Solid& of, const TouchSurface& touched, const Config& with)
       : solid(of),
@@ -187,14 +188,14 @@ struct NearModel::Oracle {
   Oracle& operator=(const Oracle&) = delete;
 
   Latest<Hand> hand;
-  std::atomic<Field*> made{nullptr};  ///< to be taken
-  std::atomic<bool> left{false};      ///< nobody will take it
+  std::atomic<Field*> made{nullptr};  ///< field to be taken by the answering thread
+  std::atomic<bool> left{false};      ///< the answering thread will not take it
 
   const Solid solid;
   const TouchSurface surface;
   const Config config;
   QuasiStaticModel whole;
-  bool at_rest = true;  ///< the whole's shape and factor
+  bool at_rest = true;  ///< shape and factor of `whole` are those of rest
   const std::size_t bytes;
 
   std::unique_ptr<Field> make(const Vec3& ahead, const Hand& newest);
@@ -246,7 +247,7 @@ void NearModel::cut(const Division&, const EffectsConfig&) {
 }
 
 void NearModel::go_on_from(const Model& before, std::span<const int>) {
-  const auto& same = static_cast<const NearModel&>(before);  // of the same kind
+  const auto& same = static_cast<const NearModel&>(before);  // same kind by contract
   handover_ = same.beyond_linear();
   last_ = same.last_;
   begin_cut();
@@ -273,7 +274,7 @@ void NearModel::go_on(const Patch& patch, const Vec3& place, double depth, doubl
   making->hand = last_;
   making->depth = depth;
   bool more = true;
-  const auto due = [&] {  // pieces
+  const auto due = [&] {  // number of pieces
     if (!waits) return kPiecesOnTheWay * (1 - room) / (1 - kRoomLeft);
     return kPiecesOnTheWay * ((place - field_->middle).norm() / field_->serves - 1) / (kWaits - 1);
   };
@@ -316,7 +317,8 @@ Pieces NearModel::Making::pieces() {
   const Vec2 across = surface.across(middle);
   {
     std::vector<int> pressed = surface.nodes_of_patches(across, kReach * a);
-    pressed.insert(pressed.end(), first.nodes.begin(), first.nodes.end());  // half off the body it may be farther away
+    // if the patch is half off the body it may be farther away
+    pressed.insert(pressed.end(), first.nodes.begin(), first.nodes.end());
     Pieces body = NearBody::make(solid, factor,
                                  {.middle = middle,
                                   .radius = field->radius,
@@ -337,7 +339,8 @@ Pieces NearModel::Making::pieces() {
 
   if (depth <= 0) co_return;
   co_await kPieceDone;
-  // At rest pressed once more, by the factor of that shape: it serves the answers around it better than that of the rest.
+  // At rest, presses once more with the factor of that shape, which serves the nearby answers better than the factor at
+  // rest.
   field->model->set_max_iterations(std::min(kIterationsAtOnce, config.newton.max_iterations));
   for (int i = 0; i < kPresses; ++i) {
     const bool held = !hand.patch.nodes.empty() && hand.felt.depth > 0 && field->holds(hand.patch, hand.place, 2);
@@ -353,7 +356,7 @@ Pieces NearModel::Making::pieces() {
   field->model->set_max_iterations(config.newton.max_iterations);
 }
 
-/// How much stiffer they make the body, at the middle and as far from it as the field has the patch.
+/// Excess stiffness of the modes, at the center and at the limits of the field's range.
 void NearModel::Making::look_at_modes(const Vec2& across) {
   const NearBody& body = *field->body;
   const double held = kReach * surface.radius();
@@ -455,7 +458,7 @@ void NearModel::take_made(const Patch& patch, const Vec3& place, double depth) {
 Reaction NearModel::press_by_field_or_linear(const Patch& patch, const Vec3& place, Given given, double value) {
   if (field_ && field_->holds(patch, place, 2)) {
     Reaction reaction = field_->press(patch, given, value);
-    if (by_linear_) {  // the hand has come back
+    if (by_linear_) {  // the hand has returned to the field
       handover_ = handover(kept(handover_, 1, linear_press(patch, given, value)), reaction, reaction.depth);
       faded_ = 0;
       by_linear_ = false;
@@ -502,7 +505,7 @@ void NearModel::make_or_take(const Patch& patch, const Vec3& place, double depth
     return;
   }
   if (room >= 1) return;
-  // Where the hand has gone elsewhere meanwhile.
+  // The hand has moved elsewhere in the meantime.
   if (making_ && (making_->middle - place).norm() > serves_to(surface_)) making_.reset();
   if (!making_ && !(field_ && field_->holds(patch, place, 1))) begin(patch, depth);
   if (making_) go_on(patch, place, depth, room);

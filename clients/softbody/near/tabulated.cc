@@ -10,7 +10,7 @@
 namespace tendon::softbody {
 namespace {
 
-/// Hermite's polynomials on 0 … 1: one for each derivative at 0, then the same at 1; each with its own derivatives.
+/// Hermite polynomials on [0, 1]: one per derivative at 0, then at 1; each with its derivatives.
 struct Cubic {
   explicit Cubic(double x) {
     const double x2 = x * x;
@@ -42,11 +42,11 @@ struct Quintic {
   std::array<double, 6> second{};
 };
 
-/// Of a knot: E, F and k; with each its ∂x, ∂y, ∂x∂y.
+/// Per knot: E, F and k, each with ∂x, ∂y, ∂x∂y.
 enum Number : std::uint8_t { kValue, kAlongX, kAlongY, kTwisted };
 constexpr std::size_t number(std::size_t field, Number which) { return 4 * field + which; }
 
-/// What is known of each knot, and what differences of its neighbours make of it. `known` says where something is.
+/// Known values at the knots, and finite differences between neighbors. `known` marks valid knots.
 class Knots {
  public:
   Knots(const PressGrid& grid, TabulatedAnswers& table, const std::vector<bool>& known)
@@ -55,7 +55,7 @@ class Knots {
   double& at_knot(int i, int j, int level, std::size_t which) {
     return table_.numbers[at(grid_.knot(i, j, level)) * TabulatedAnswers::kNumbers + which];
   }
-  /// The difference of a number for one cell more along x or y; of one side where only that is known.
+  /// Difference of a number per cell along x or y; one-sided if only one neighbor is known.
   double slope(int i, int j, int level, std::size_t which, bool along_x) {
     const auto there = [&](int by) {
       const int x = i + (along_x ? by : 0);
@@ -112,12 +112,12 @@ TabulatedAnswers tabulate(const SolvedPresses& presses) {
     knots.at_knot(i, j, level, number(1, kAlongY)) = mixed.y();
     knots.at_knot(i, j, level, number(2, kValue)) = grid.step * grid.step * r.stiffness;
     if (level > 0) return;
-    // At rest k = 1/(w·K⁻¹w), and its slope −2 k t.
+    // At rest k = 1/(w·K⁻¹w), with derivative −2 k t.
     const Vec2 steeper = -2 * grid.spacing * grid.step * grid.step * r.stiffness * r.glide.tilting;
     knots.at_knot(i, j, level, number(2, kAlongX)) = steeper.x();
     knots.at_knot(i, j, level, number(2, kAlongY)) = steeper.y();
   });
-  // What one solution does not tell: third derivatives.
+  // Third derivatives, which a solution does not provide.
   for_each_knot([&](int i, int j, int level, std::size_t knot) {
     if (!known[knot]) return;
     knots.at_knot(i, j, level, number(1, kTwisted)) =
@@ -221,7 +221,7 @@ std::optional<Rung::Answer> TabulatedRung::press(const Patch& patch, double dept
   reaction.stiffness = e.stiffness;
   reaction.error = trust_.errors()[at(point->cell)] * std::abs(e.force);
   if (!(e.force > 0)) return Answer{reaction, share};
-  // PatchContact's K is made of these: `giving` stays 0, and `curving` has both.
+  // The components of PatchContact's K; `giving` stays 0 and `curving` contains both.
   const Vec2 slope = -e.across / e.force;
   reaction.slope = slope;
   reaction.knows_glide = patch.curvatures.size() > 0;

@@ -23,19 +23,19 @@ std::string in_lower_case(std::string_view text) {
   return lower;
 }
 
-/// Splits a text into lines and words. A line ends with LF, CR LF or CR.
+/// Splits text into lines (LF, CR LF or CR) and words.
 class SurfaceWords {
  public:
   SurfaceWords(std::string_view text, std::string_view name) : rest_(without_mark(text, name)), name_(name) {}
 
-  /// The words of the next line that is not empty, or nothing at the end of the file. Comments ('#') are ignored.
+  /// Words of the next nonempty line; empty at the end of the file. Skips comments ('#').
   const std::vector<std::string_view>& next() {
     words_.clear();
     while (words_.empty() && !rest_.empty()) add_line();
     return words_;
   }
 
-  /// Also joins lines that end with a backslash.
+  /// Also joins continued lines (trailing backslash).
   const std::vector<std::string_view>& next_continued() {
     do {
       next();
@@ -121,7 +121,7 @@ Facets read_binary_stl(std::string_view bytes, std::string_view name) {
   return made;
 }
 
-/// Line breaks do not matter. The name after "solid" and "endsolid" ends at the end of the line or at "facet".
+/// Line breaks are ignored, except that the name after "solid" or "endsolid" ends at the end of the line or at "facet".
 Facets read_text_stl(std::string_view text, std::string_view name) {
   Facets made{.points = {}, .each_by_itself = true};
   SurfaceWords words(text, name);
@@ -165,7 +165,7 @@ Facets read_stl(std::string_view bytes, std::string_view name) {
   const std::uint64_t expected = kStlHead + std::uint64_t{kStlFacet} * count;
   if (bytes.size() == expected) return read_binary_stl(bytes, name);
   if (bytes.find('\0') == std::string_view::npos) return read_text_stl(bytes, name);
-  without_mark(bytes, name);  // UTF-16 also contains zeros
+  without_mark(bytes, name);  // UTF-16 also contains zero bytes
   const bool more = bytes.size() > expected;
   const std::uint64_t off = more ? bytes.size() - expected : expected - bytes.size();
   refuse_file(name, "the head of this binary STL file says " + std::to_string(count) + " facets, which take " +
@@ -185,7 +185,7 @@ Facets read_obj(std::string_view text, std::string_view name) {
       const std::string_view word = (*line)[i];
       const long number = words.whole(word.substr(0, word.find('/')));
       const auto count = static_cast<long>(made.points.size());
-      const long index = number < 0 ? count + number : number - 1;  // from the end, or from 1
+      const long index = number < 0 ? count + number : number - 1;  // negative: from the end; positive: from 1
       if (index < 0 || index >= count) words.fail("there is no vertex " + std::string(word));
       made.corners.push_back(static_cast<int>(index));
     }
@@ -194,7 +194,7 @@ Facets read_obj(std::string_view text, std::string_view name) {
   return made;
 }
 
-/// Checks the keyword OFF and its prefix, and removes it from `line`. The first count may follow without a space.
+/// Checks and removes the keyword OFF with its prefix. The first count may follow without a space.
 void take_off_head(std::vector<std::string_view>& line, const SurfaceWords& words) {
   std::string_view word = line.front();
   const std::size_t off = word.find("OFF");

@@ -58,7 +58,9 @@ std::optional<double> CapsuleContact::Capsule::above(const Vec3& x, const Vec3& 
     const double inside = radius * radius - (out.squaredNorm() - along * along);
     if (inside > 0) take(-along - std::sqrt(inside));
   }
-  // |out + t n|² = radius² with both parts taken across the axis.
+  //
+  // out + t n
+  // ² = radius², with the components perpendicular to the axis.
   const double tilt = n.dot(axis);
   const double a = 1 - tilt * tilt;
   const double along = from.dot(axis);
@@ -71,15 +73,15 @@ std::optional<double> CapsuleContact::Capsule::above(const Vec3& x, const Vec3& 
   return lowest;
 }
 
-/// The nodes that the capsule may push: those inside, and those that are nearer to it than the deepest is inside, since
-/// a press can move them into it sideways. `gap` becomes the least gap of all touchable nodes.
+/// Candidate nodes: those inside the capsule, and those closer to it than the deepest one is inside, because a press
+/// can move them in sideways. Sets `gap` to the minimum gap over all touchable nodes.
 std::vector<CapsuleContact::Node> CapsuleContact::near(const Capsule& tool, double& gap) const {
   const Vec3& n = surface_.normal();
   gap = std::numeric_limits<double>::infinity();
   std::vector<Node> all;
   const double reach = radius_ + half_length_;
   std::vector<std::size_t> around;
-  std::vector<double> heights;  // of the capsule above them
+  std::vector<double> heights;  // of the capsule above each node
   for (std::size_t i = 0; i < places_.size(); ++i) {
     const Vec3 out = places_[i] - tool.middle;
     const double up = out.dot(n);
@@ -105,7 +107,7 @@ std::vector<CapsuleContact::Node> CapsuleContact::near(const Capsule& tool, doub
       continue;
     }
     Plane plane = tool.nearest(x, -n);
-    // A node beside the axis, or above it, goes out below: that is where the tool came from.
+    // A node beside or above the axis exits below, where the tool came from.
     if (inside && plane.normal.dot(n) > -0.5) plane = tool.nearest(x + heights[k] * n, -n);
     all.push_back({row, x, x, plane});
   }
@@ -122,20 +124,21 @@ void CapsuleContact::give_way(std::vector<Node>& nodes, const std::vector<Eigen:
   }
 }
 
-/// The two stiffnesses, from the capsule's motions along x, y, z and its turns about them at `about`. With w the motion
-/// of the capsule and v = δu − w that of a node past it, its force on the body grows by
+/// The two stiffnesses from the capsule's translations along x, y, z and rotations about `about`. With w the motion of
+/// the capsule at a node and v = δu − w the node's motion relative to it, the node's force on the body changes by
 ///
 ///     δf = m δλ + λ (P v/r + δθ × m),   δu = G δf,   m·v = 0
 ///
-/// where P is 1 in the directions in which the capsule is round. They are solved by turns: δλ with the last v.
+/// where P projects on the directions in which the capsule is curved. Solved by fixed-point iteration: δλ with the
+/// previous v.
 void CapsuleContact::add_slopes(const Capsule& tool, const Vec3& about, const std::vector<Node>& nodes,
                                 const Pushes& pushes, Feel& feel) const {
-  constexpr int kTurns = 5;  // each leaves about a quarter of the error
+  constexpr int kTurns = 5;  // each reduces the error to about a quarter
   const auto size = static_cast<Eigen::Index>(pushes.set.size());
   const auto node_of = [&](Eigen::Index k) -> const Node& {
     return nodes[static_cast<std::size_t>(pushes.set[static_cast<std::size_t>(k)])];
   };
-  using Motions = Eigen::Matrix<double, Eigen::Dynamic, 6>;  // for each node three rows, for each motion a column
+  using Motions = Eigen::Matrix<double, Eigen::Dynamic, 6>;  // three rows per node, one column per motion
   MatrixXd gives(3 * size, 3 * size);
   Motions w = Motions::Zero(3 * size, 6);
   Motions grows = Motions::Zero(3 * size, 6);  // λ δθ × m
@@ -242,7 +245,7 @@ Feel CapsuleContact::at(const Vec3& middle, const Vec3& axis, const Vec3& about)
   const auto size = static_cast<Eigen::Index>(pushes.set.size());
   Eigen::Matrix<double, 6, Eigen::Dynamic> unit(6, size);  // force and torque of unit pushes
   unit.topRows<3>() = ways;
-  double wide = 0;  // m, across, to the farthest node that is pushed
+  double wide = 0;  // m, tangential, to the farthest pushed node
   for (Eigen::Index k = 0; k < size; ++k) {
     const Node& node = nodes[static_cast<std::size_t>(pushes.set[static_cast<std::size_t>(k)])];
     unit.col(k).tail<3>() = (node.at - about).cross(ways.col(k));

@@ -12,14 +12,14 @@
 namespace tendon::softbody {
 namespace {
 
-constexpr int kAround = 2;  // points outside of the box on each side, of which the outermost make only weights
+constexpr int kAround = 2;  // points beyond the box on each side; the outermost only contribute to weights
 constexpr double kRoundingOfWay = 1e-6;
 
-/// Along an axis: the four splines around a place, and their first two derivatives by it, in cells.
+/// The four cubic B-splines at a position along an axis, with two derivatives, per cell.
 struct Splines {
   std::array<double, 4> value, slope, bend;
 
-  explicit Splines(double t) {  // 0 to 1, from the cell's lower point
+  explicit Splines(double t) {  // t in [0, 1], from the cell's lower point
     const double s = 1 - t;
     value = {s * s * s / 6, (4 - 6 * t * t + 3 * t * t * t) / 6, (4 - 6 * s * s + 3 * s * s * s) / 6, t * t * t / 6};
     slope = {-s * s / 2, -2 * t + 1.5 * t * t, 2 * s - 1.5 * s * s, t * t / 2};
@@ -27,7 +27,7 @@ struct Splines {
   }
 };
 
-/// Numbers on a grid, x first.
+/// Grid values, x fastest.
 struct Samples {
   std::array<int, 3> count;
   std::vector<double> values;
@@ -37,7 +37,7 @@ struct Samples {
     for (std::size_t i = 0; i < axis; ++i) sum *= static_cast<std::size_t>(count[i]);
     return sum;
   }
-  /// The weights of the splines along `axis`: there are two less.
+  /// Spline weights along `axis`: two fewer than samples.
   Samples to_weights(std::size_t axis) const {
     Samples made{count, {}};
     made.count[axis] -= 2;
@@ -98,9 +98,9 @@ DistanceGrid::DistanceGrid(const std::function<double(const Vec3&)>& distance, c
   weights_.assign(samples.values.begin(), samples.values.end());
 }
 
-/// The cell of a place within the box.
+/// The cell of a point in the box.
 struct DistanceGrid::Around {
-  const float* first;  ///< of its weights
+  const float* first;  ///< spline weights of the cell
   std::size_t row, layer;
   Splines x, y, z;
 };
@@ -161,7 +161,7 @@ Distance DistanceGrid::within(const Vec3& place) const {
   return found;
 }
 
-/// Of a place outside of the box: the surface's point that is nearest to where the way from there enters the box.
+/// For a point outside the box: the surface point nearest to where the path from it enters the box.
 Vec3 DistanceGrid::foot_of(const Vec3& x) const {
   const auto below = [&](const Vec3& entry) -> Vec3 {
     const Distance there = within(entry);

@@ -8,8 +8,8 @@
 namespace tendon::softbody {
 namespace {
 
-/// In the first rounds all wrong nodes change sides. That may go round in circles; in later rounds only the most wrong
-/// node changes, so the energy falls in every round and the search is sure to end (Lawson & Hanson 1974).
+/// In the first rounds all inconsistent nodes change sets, which may cycle. Later only the worst node changes, so the
+/// energy falls in every round and the search terminates (Lawson & Hanson 1974).
 constexpr int kQuickRounds = 20;
 constexpr int kMostSweeps = 1000;
 
@@ -28,7 +28,7 @@ Pushes least_pushes(const MatrixXd& table, const VectorXd& depth, std::vector<bo
     }
     factor.compute(table(set, set));
     push = factor.solve(depth(set));
-    // A pushed node is wrong when it pulls; any other node is wrong when it lies in the tool.
+    // A pushed node is inconsistent if it pulls, any other node if it is inside the tool.
     const VectorXd left = depth - table(Eigen::all, set) * push;
     std::vector<std::pair<double, std::size_t>> wrong;
     for (std::size_t k = 0; k < set.size(); ++k) {

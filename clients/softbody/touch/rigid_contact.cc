@@ -13,47 +13,46 @@
 namespace tendon::softbody {
 namespace {
 
-/// On the way to where an answer is asked for, forces may be wrong by this share, and take so many steps of Newton's
-/// method at most.
+/// Relative force tolerance and maximum number of Newton steps at intermediate tool positions.
 constexpr double kOnTheWay = 0.03;
 constexpr int kMostOnTheWay = 4;
 
-/// Facets are near that have a point nearer to a tool than this share of their size.
+/// Facets count as near if a point is closer to a tool than this fraction of their size.
 constexpr double kMargin = 0.25;
 
-/// Armijo's share of the predicted decrease that a step must bring, the shortest step tried, and the rounding of an
-/// energy. Near the least energy a step that is right changes it by less than its rounding.
+/// Armijo parameter, shortest step, and relative rounding of the energy. Close to the minimum, a correct step changes
+/// the energy by less than rounding.
 constexpr double kToolDecrease = 1e-4;
 constexpr double kToolShortest = 1.0 / 64;
 constexpr double kContactRounding = 1e-13;
 
-/// Of the whole body: a factor is made anew after so many steps without an answer that is good enough.
+/// Steps without an accurate answer after which the body's factor is recomputed.
 constexpr int kToolPatience = 16;
-/// Of the unknowns near the tools.
+/// Newton steps on the unknowns near the tools.
 constexpr int kMostMeets = 60;
-/// The energy that is left there, as a share of that which an answer may leave.
+/// Energy that meet() may leave, relative to that allowed for an answer.
 constexpr double kMet = 1e-3;
-constexpr double kNoDrop = 1e-24;  // of the energy: a step along which it falls less is one of rounding
+constexpr double kNoDrop = 1e-24;  // relative to the energy: smaller decreases are rounding
 
-/// m: an error of the force that so small a motion of the tool explains counts as zero.
+/// m: force errors explained by a smaller tool motion count as zero.
 constexpr double kToolUnseen = 1e-12;
-/// m: the same while nothing touches.
+/// As kToolUnseen, without contact.
 constexpr double kUnfelt = 1e-10;
 
-/// A change of forces of a smaller share is rounding, and teaches nothing.
+/// Smaller relative changes of forces are rounding errors and are not added to Pairs.
 constexpr double kToolHeard = 1e-8;
 
-/// The stiffness is right to this share of its norm, or has taken so many rounds.
+/// Relative accuracy of the stiffness, and maximum number of CG iterations.
 constexpr double kCurveError = 2e-3;
 constexpr int kCurveRounds = 12;
 
-/// m, how far at most a node is moved to measure a slope of the force.
+/// Finite-difference step for derivatives of the force, m.
 constexpr double kToolNudge = 1e-7;
 
-/// Unknowns whose compliance is kept, at the least.
+/// Minimum number of unknowns whose compliance is kept.
 constexpr int kKept = 600;
 
-/// So many half facets the way back is looked for along which a tool comes anew.
+/// Maximum distance for placing a tool anew, in half facets.
 constexpr int kFarthest = 400;
 
 bool finite(const Pose& pose) { return pose.position.allFinite() && pose.turn.allFinite(); }
@@ -66,19 +65,19 @@ Pose between(const Pose& from, const Pose& to, double share) {
 
 }  // namespace
 
-/// What lies near the tools, in the present shape of the body.
+/// The neighborhood of the tools in the present shape.
 struct RigidContact::Local {
-  Elastic::Forces now;  ///< of the body without tools, on its free unknowns
-  VectorXd solved;      ///< K₀⁻¹ of them
+  Elastic::Forces now;  ///< of the body without tools; free unknowns
+  VectorXd solved;      ///< K₀⁻¹ times the forces
   Layer::Near near;
-  std::vector<int> unknowns;  ///< free numbers of those of the near nodes
-  std::vector<int> rows;      ///< where they are among three for each near node
+  std::vector<int> unknowns;  ///< free indices of the near nodes' components
+  std::vector<int> rows;      ///< index of each among the 3 components per near node
   Eigen::Matrix3Xd places;    ///< m, of the near nodes
-  MatrixXd stiffness;         ///< R, N/m: of the body among these unknowns, all others following
+  MatrixXd stiffness;         ///< R, N/m: of the body at these unknowns, with all others condensed
   Layer::Press press;
-  MatrixXd curve;             ///< A, N/m: of the layer among the same
+  MatrixXd curve;             ///< A, N/m: of the layer at these unknowns
   Eigen::LLT<MatrixXd> held;  ///< of R + A
-  MatrixXd curve_held;        ///< A in that factor: shifted where R + A is not positive definite
+  MatrixXd curve_held;        ///< A as used in `held`: shifted if R + A is not positive definite
 
   VectorXd slope() const { return press.slope(rows); }
   VectorXd spread(const VectorXd& among, Eigen::Index size) const {
@@ -91,7 +90,7 @@ struct RigidContact::Local {
     all.reshaped()(rows) += by;
     return all;
   }
-  /// The factor of R + A, with the least shift of A that makes it positive definite.
+  /// Factor of R + A, shifting A until it is positive definite.
   static Eigen::LLT<MatrixXd> factor(const MatrixXd& stiffness, MatrixXd& curve) {
     Eigen::LLT<MatrixXd> found(stiffness + curve);
     for (double shift = 0.01; found.info() != Eigen::Success && shift < 1e9; shift *= 10) {
@@ -131,8 +130,8 @@ void RigidContact::renew(Local& local) {
   in_vain_ = 0;
 }
 
-/// The near facets in the present shape; the compliance of their nodes, by one solution for each unknown that is new;
-/// and the layer's slopes.
+/// Updates the near facets, the compliance of their nodes (one solve per new unknown), and the derivatives of the
+/// layer.
 void RigidContact::look(Local& local) {
   if (factors_ != body_.factors()) {
     factors_ = body_.factors();
@@ -185,8 +184,8 @@ void RigidContact::look(Local& local) {
       Eigen::LLT<MatrixXd>((compliance + compliance.transpose()) / 2).solve(MatrixXd::Identity(count, count));
 }
 
-/// How the near unknowns move when the layer's energy and that of a body of the stiffness R, which would go by `free`
-/// (m) without the layer, are least together: by Newton's method, to `enough` J.
+/// Motion of the near unknowns that minimizes the layer's energy plus that of a body with stiffness R, whose motion
+/// without the layer would be `free` (m). Newton's method, to `enough` J.
 VectorXd RigidContact::meet(const Local& local, const VectorXd& free, double enough) const {
   VectorXd by = VectorXd::Zero(free.size());
   VectorXd slope = local.slope();
@@ -225,7 +224,7 @@ VectorXd RigidContact::by_near(const Local& local, const VectorXd& forces) const
   return pairs_.times(local.spread(forces, elastic_.free_count()), solved);
 }
 
-/// By Woodbury's identity: (H⁻¹ + A)⁻¹ b, with A among the near unknowns and `by_factor` = K₀⁻¹ b.
+/// (H⁻¹ + A)⁻¹ b by Woodbury's identity, with A on the near unknowns and `by_factor` = K₀⁻¹ b.
 VectorXd RigidContact::solve(const Local& local, const VectorXd& b, const VectorXd& by_factor) const {
   const VectorXd free = pairs_.times(b, by_factor);
   if (local.unknowns.empty()) return free;
@@ -252,7 +251,7 @@ bool RigidContact::go(const VectorXd& step, double slope, Local& local) {
   return false;
 }
 
-/// N/m, of what the hand feels along the way that gives least.
+/// The hand's stiffness norm, N/m.
 double RigidContact::stiffest(const Local& local, std::size_t tool) const {
   const Layer::Felt& felt = local.press.felt[tool];
   if (felt.area == 0) return config_.layer.young * tools_[tool].shape.reach();
@@ -268,7 +267,7 @@ void RigidContact::settle(Local& local, bool arrives) {
   local.now = body_.forces();
   local.solved = body_.factor().solve(local.now.force);
   bool stale = false;
-  bool fresh = false;  // the factor is that of this shape
+  bool fresh = false;  // the factor is that of the present shape
   for (int round = 0;; ++round) {
     if (stale) renew(local);
     fresh = stale;
@@ -290,7 +289,7 @@ void RigidContact::settle(Local& local, bool arrives) {
     VectorXd step = free;
     if (!local.unknowns.empty()) {
       const VectorXd by = meet(local, free(local.unknowns), kMet * enough * enough / stiffness);
-      // The forces that hold the near unknowns there.
+      // Adds the forces that hold the near unknowns there.
       step -= by_near(local, local.stiffness * (free(local.unknowns) - by));
     }
     const double slope = (local.now.force + local.spread(local.slope(), size)).dot(step);
@@ -318,7 +317,7 @@ void RigidContact::settle(Local& local, bool arrives) {
   if (layer_.rubs()) dissipated_ = layer_.advance(local.near, placed_, local.places);
 }
 
-/// The stiffness of body and layer times `shape`, N.
+/// Stiffness of body and layer times `shape`, N.
 VectorXd RigidContact::needed(const Local& local, const VectorXd& shape) {
   const double nudge = kToolNudge / shape.lpNorm<Eigen::Infinity>();
   if (!std::isfinite(nudge)) return VectorXd::Zero(shape.size());
@@ -329,8 +328,8 @@ VectorXd RigidContact::needed(const Local& local, const VectorXd& shape) {
   return all;
 }
 
-/// K = Π_pp − Π_pu Π_uu⁻¹ Π_up of one tool, with the same inverse of Π_uu as the solver's and conjugate gradients on
-/// what it is wrong by. That is wrong by the square of what the shapes are wrong by.
+/// K = Π_pp − Π_pu Π_uu⁻¹ Π_up of one tool, with the solver's approximate inverse of Π_uu, refined by conjugate
+/// gradients. The error is quadratic in that of the shapes.
 Layer::Mat6 RigidContact::curve(const Local& local, std::size_t tool) {
   const Layer::Felt& felt = local.press.felt[tool];
   const int motions = config_.turns ? 6 : 3;
@@ -352,7 +351,7 @@ Layer::Mat6 RigidContact::curve(const Local& local, std::size_t tool) {
     for (int round = 0; round < kCurveRounds && std::abs(gain) > kCurveError * scale; ++round) {
       const VectorXd by_way = needed(local, way);
       const double bend = way.dot(by_way);
-      if (!(bend > 0) || !(gain > 0)) break;  // the body is not stable here
+      if (!(bend > 0) || !(gain > 0)) break;  // the body is unstable here
       shapes.col(c) += gain / bend * way;
       rest -= gain / bend * by_way;
       better = solve(local, rest, body_.factor().solve(rest));
@@ -396,14 +395,14 @@ Feel RigidContact::feel(const Local& local, std::size_t tool) {
   return feel;
 }
 
-/// m, that a tool may go before the body must follow.
+/// Largest step of a tool before the body must follow, m.
 double RigidContact::longest_step() const {
   double most = layer_.least_facet() / 2;
   for (const HeldTool& tool : tools_) most = std::min(most, tool.shape.thinnest() / 8);
   return most;
 }
 
-/// Puts a tool where it comes from, just outside of the body.
+/// Moves a tool back along from_ until it is just outside the body.
 void RigidContact::put_down(std::size_t tool, const Pose& handle) {
   placed_[tool].handle = handle;
   for (int i = 0; i < kFarthest; ++i) {
