@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The cost of an answer, beside its error: the pressed block B1 at ν = 0.45, and a tool that moves up and down and to
 // and fro and is sampled 100 times a second. A body with time takes the steps in between. The counter error_percent is
-// that of the stiffness at rest, against 420.2 N/m. clients/softbody/README.md has the results.
+// that of the stiffness at rest, against 420.2 N/m.
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
