@@ -9,17 +9,16 @@
 
 namespace tendon::softbody {
 
-/// How a kNear body has answered: the statistics that tendon-softbody prints when it ends. Empty for other bodies.
+/// Statistics of a kNear body, which tendon-softbody prints when it ends. Empty for other bodies.
 struct Answered {
-  std::vector<Ladder::Step> rungs;      ///< Body::ladder(); empty after a cut
-  std::optional<NearModel::Size> near;  ///< Body::near_field(), if a background thread makes the fields
+  std::vector<Ladder::Step> rungs;
+  std::optional<NearModel::Size> near;
 };
 
-/// One line for people. Empty if there is nothing to report.
+/// Returns one line of text, or an empty string if there is nothing to report.
 std::string in_words(const Answered& answered);
 
-/// One line of JSON, or empty: {"answers":{"tabulated":812,"learned":97,"linear":3,"fields":5,"fields_late":1}}. The
-/// rungs come first, by name; "linear" and the fields only with a background thread.
+/// Returns one line of JSON: {"answers":{"tabulated":812,"learned":97,"linear":3,"fields":5,"fields_late":1}}.
 std::string in_json(const Answered& answered);
 
 }  // namespace tendon::softbody

@@ -30,7 +30,7 @@ class BackgroundThread {
   void put(Given* last);
   void run();
 
-  std::atomic<Given*> given_{nullptr};  ///< newest first
+  std::atomic<Given*> given_{nullptr};
   std::atomic<bool> ends_{false};
   std::thread thread_;
 };

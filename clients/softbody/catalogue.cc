@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-// The list of effects and models.
 #include <algorithm>
 #include <array>
 #include <cstddef>

@@ -12,32 +12,28 @@
 
 namespace tendon::softbody {
 
-/// A body at its place in a scene. Converts between the device frame and the body frame.
+/// Converts between the frame of the device and the frame of the body.
 class PlacedBody {
  public:
   /// Throws std::invalid_argument if the scene describes no valid body.
   explicit PlacedBody(const Scene& scene) : PlacedBody(scene, Body(scene.body)) {}
-  /// With a body that was built before.
   PlacedBody(const Scene& scene, Body body);
 
-  /// Force on the hand at `position` (m, device frame; handle not rotated) or at `handle`. All vectors are in the
-  /// device frame. Advances a body with time by one step.
+  /// Returns the force on the hand in the device frame. A body with time advances by one step.
   Feel touch(const Vec3& position) { return touch(Pose{.position = position}); }
   Feel touch(const Pose& handle);
 
-  /// The answer to the server: stiffness and its valid radius, the solver's error and, unless the tool sticks, the
-  /// surface. If turns_the_hand(), also the torque, and the angular stiffness if the device measures its orientation;
-  /// otherwise the handle counts as not rotated. With Scene::table, also the force at other depths; the table starts at
-  /// the surface, or half its depth above the tool if that is deeper.
+  /// Returns the answer for the server. It contains the torque if turns_the_hand() is true, and its stiffness if the
+  /// device measures the orientation of the handle. With Scene::table it contains the force at several depths. The
+  /// table starts at the surface, or half of its depth above the tool if the tool is deeper.
   ///
-  /// A body with time moves the tool from the previous hand position to this one in as many steps as fit between the
-  /// samples; if none fits, the previous answer is repeated. After more than kMostBehind, or if the server's clock went
-  /// back, it takes a single step: pauses are not caught up. Scene times count from the sample of the first answer.
+  /// A body with time moves the tool from the previous position to this one, in as many steps as fit between both
+  /// samples. If no step fits, the previous answer is repeated. After a pause of more than kMostBehind, or if the clock
+  /// of the server went back, it takes one step. Times in a scene start with the first sample.
   Touch answer(const DeviceState& hand);
   static constexpr Duration kMostBehind = std::chrono::milliseconds(200);
 
-  /// Answers to all hands of the scene, in scene order, from one solution. An absent hand (empty state) gets an empty
-  /// answer (Touch::unknown).
+  /// The same for all hands of the scene, from one solution. An absent hand has an empty state and an empty answer.
   std::vector<Touch> answer(std::span<const std::optional<DeviceState>> hands);
 
   void prepare_by(Background background) { body_.prepare_by(std::move(background)); }
@@ -58,19 +54,19 @@ class PlacedBody {
   struct Followed {
     PeerTime sampled;
     Pose handle;
-    Duration owed;  ///< time still to simulate, less than one step
+    Duration owed;  ///< simulated time that is still missing, less than a step
     Feel feel;
   };
 
   Body body_;
   Mat3 to_device_;
-  Vec3 origin_;                ///< body frame origin in the device frame
-  std::vector<Vec3> origins_;  ///< origin_ for each of several hands
-  Vec3 normal_;                ///< towards the hand
+  Vec3 origin_;                ///< of the body frame, in the device frame
+  std::vector<Vec3> origins_;  ///< for several hands
+  Vec3 normal_;
   bool only_pushes_;
-  bool turns_;                     ///< turns_the_hand()
+  bool turns_;
   double depths_;                  ///< m, depth range of the force table
-  std::optional<PeerTime> first_;  ///< sample time of the first answer; for bodies with a clock
+  std::optional<PeerTime> first_;  ///< time of the first sample
   std::optional<Followed> followed_;
   double deepest_ = 0;
 };

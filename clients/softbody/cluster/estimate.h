@@ -31,14 +31,14 @@ struct Estimate {
   Cost factor;
   std::vector<Spread> multigrid;
   enum class Take : std::uint8_t { kTable, kFactor, kMultigrid } take = Take::kTable;
-  /// with kMultigrid: the fewest ranks that answer within kFeltLate, or else the number that answers soonest
+  /// The number of ranks for kMultigrid.
   int ranks = 1;
 };
-inline constexpr double kFeltLate = 0.01;       ///< s
-inline constexpr double kMostTableBytes = 4e9;  ///< table and factor on one machine
+inline constexpr double kFeltLate = 0.01;  ///< s
+inline constexpr double kMostTableBytes = 4e9;
 inline constexpr double kMostFactorBytes = 16e9;
 
-/// `under_patch`: nodes below the patch (Body::size_of). `ranks`: one or more numbers of ranks, each at least 1.
+/// `under_patch` is the number of nodes below the patch (Body::size_of).
 Estimate estimate(const Body::Size& size, int under_patch, std::vector<int> ranks);
 
 std::string in_words(const Estimate& estimate);

@@ -17,48 +17,44 @@ struct Cut {
   Vec3 deep;
 };
 
-/// A mesh after cuts. Cuts run along element faces: a face opens if the centers of its two elements are on different
-/// sides of the parallelogram. Nodes keep their numbers; copies on the other side of a cut are appended. A node at the
-/// tip of a cut, whose elements are still connected around it, is not copied.
+/// A mesh after cuts. A face is opened if the centers of its two elements are on different sides of the parallelogram.
+/// The nodes of opened faces are copied, except at the tip of a cut. The copies follow the other nodes.
 struct Division {
   Mesh mesh;
-  Fixed fixed;                        ///< copies of fixed nodes are fixed, and so are nodes without an element
-  std::vector<int> node_before;       ///< for each node, its number before the cuts
-  std::vector<int> element_before{};  ///< for each element, its number before the cuts
-  int opened = 0;                     ///< faces, including those opened before
-  int lost = 0;  ///< elements removed with unheld pieces; a piece is held by three non-collinear fixed nodes
+  Fixed fixed;  ///< also true for nodes without an element
+  std::vector<int> node_before;
+  std::vector<int> element_before{};
+  int opened = 0;  ///< faces
+  int lost = 0;    ///< elements in pieces that were removed because they are not held by three nodes
 };
 
-/// `cuts`: all cuts ever made in this mesh, including those already visible, because a later cut can split a node for
-/// which an earlier one was too short.
+/// `cuts` must contain all cuts that were ever made, because a later cut can open more faces of an earlier one.
 Division divide(const Mesh& mesh, const Fixed& fixed, std::span<const Cut> cuts);
 
-/// For each new free displacement, the one it was copied from. Only for a division without lost elements, in which
-/// earlier displacements keep their numbers.
+/// For each new free displacement, returns the original one. The division must not have lost elements.
 std::vector<int> twins(const Elastic& divided, const Division& division);
 
 struct PlannedCut {
   enum class When : std::uint8_t {
-    kTime,   ///< at the time `value`, s
-    kForce,  ///< after an answer with a normal force above `value`, N
+    kTime,   ///< s since the first answer
+    kForce,  ///< N along the normal, in an answer
   };
   Cut cut;
   When when;
   double value;
 };
 
-/// Keeps track of the cuts that were made. Cuts are made in order; each waits for the previous ones. Thread-safe: no.
+/// Keeps track of the cuts, which are made in order. Thread-safe: no.
 class Cutting {
  public:
-  /// Throws std::invalid_argument, naming the cut, if a parallelogram has no area, a time is negative, or a force is
-  /// not positive.
+  /// Throws std::invalid_argument if a parallelogram has no area, a time is negative, or a force is not positive.
   explicit Cutting(std::vector<PlannedCut> plan);
 
   bool due(PlannedCut::When when, double value) const noexcept;
-  std::span<const Cut> make_next();    ///< makes the next cut and returns all made; one must be left
-  std::vector<Cut> with_next() const;  ///< the same list without making the cut
+  std::span<const Cut> make_next();    ///< returns all cuts made so far
+  std::vector<Cut> with_next() const;  ///< returns the result of make_next() without making the cut
   std::size_t left() const noexcept { return plan_.size() - made_.size(); }
-  bool take_changed() noexcept;  ///< true if cuts were made since the last call
+  bool take_changed() noexcept;
   std::size_t bytes() const noexcept;
 
  private:

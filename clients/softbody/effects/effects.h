@@ -10,9 +10,9 @@
 
 namespace tendon::softbody {
 
-/// An effect on the whole body besides elasticity. Within a time step it is an energy that is quadratic in the free
-/// displacements u; the body moves to the minimum of the total energy, which with inertia is implicit Euler. Effects
-/// that a scene does not list are not constructed and cost nothing.
+/// An effect on the whole body. In each time step it is a quadratic energy of the free displacements u. The body moves
+/// to the minimum of the total energy; with inertia this is the implicit Euler method. If a scene does not list an
+/// effect, it is not constructed.
 ///
 /// Thread-safe: no. Realtime-safe: no.
 class Effect {
@@ -25,7 +25,7 @@ class Effect {
   virtual double energy(const VectorXd& u) const = 0;                    ///< J, up to a constant
   virtual void add_force(const VectorXd& u, VectorXd& force) const = 0;  ///< N, −∂energy/∂u
   virtual void add_stiffness(SymmetricMatrix& to) const = 0;             ///< N/m, ∂²energy/∂u², which is constant
-  virtual void advance(const VectorXd& u) = 0;                           ///< ends a step at u and begins the next there
+  virtual void advance(const VectorXd& u) = 0;                           ///< ends the step at u
   virtual std::size_t bytes() const noexcept = 0;
 };
 
@@ -64,7 +64,6 @@ class Inertia : public Effect {
 /// serves to bring a body to rest; it is not a tissue model.
 class Damping : public Effect {
  public:
-  /// `rate` 1/s.
   Damping(const Elastic& elastic, const VectorXd& u, double density, double rate, double dt);
   double energy(const VectorXd& u) const override;
   void add_force(const VectorXd& u, VectorXd& force) const override;
@@ -81,7 +80,6 @@ class Damping : public Effect {
 /// (u − u₀)ᵀ K₀ (u − u₀). Valid for small rotations only: rigid rotation is slowed too.
 class Viscosity : public Effect {
  public:
-  /// `relaxation` τ, s.
   Viscosity(const Elastic& elastic, const VectorXd& u, double relaxation, double dt);
   double energy(const VectorXd& u) const override;
   void add_force(const VectorXd& u, VectorXd& force) const override;
@@ -94,7 +92,7 @@ class Viscosity : public Effect {
   VectorXd start_;              ///< u₀, m
 };
 
-/// Effects of a scene. Empty or false: not simulated.
+/// If a member is empty or false, the effect is not simulated.
 struct EffectsConfig {
   double density = 0;                ///< kg/m³, positive; for gravity, inertia and damping
   double step = 0;                   ///< s, positive: time step of an answer; for inertia, damping and viscosity
@@ -106,17 +104,17 @@ struct EffectsConfig {
   bool has_time() const noexcept { return inertia || damping || viscosity; }
 };
 
-/// Throws std::invalid_argument that names the field.
+/// Throws std::invalid_argument with the name of the field.
 void check(const EffectsConfig& config);
 
 using Effects = std::vector<std::unique_ptr<Effect>>;
 
-/// effects_at_rest() makes the effects that act on a body at rest. add_effects_of_time() adds those that act on a
-/// moving body, starting from rest at u (m, free displacements).
+/// Creates the effects that act on a body at rest, and those that act only on a moving body. The body starts from rest
+/// at u (m, free displacements).
 Effects effects_at_rest(const EffectsConfig& config, const Elastic& elastic);
 void add_effects_of_time(Effects& effects, const EffectsConfig& config, const Elastic& elastic, const VectorXd& u);
 
-/// Adds the effects' energy and free forces at u (m, all nodes) to those of elasticity.
+/// Adds the energies and the free forces at u (m, all nodes) to `to`.
 void add_forces(const Effects& effects, const Elastic& elastic, const VectorXd& u, Elastic::Forces& to);
 
 std::size_t bytes(const Effects& effects) noexcept;

@@ -29,15 +29,14 @@ namespace tendon::softbody {
 /// Thread-safe: no. Realtime-safe: no.
 class SelfCollision {
  public:
-  /// `bed`: c, Pa/m. Searches for neighbors at `u` (m, all nodes). `elastic` must outlive this object. Throws
-  /// std::invalid_argument if `bed` is not positive.
+  /// `bed` is c in Pa/m. `elastic` must outlive this object. Throws std::invalid_argument if `bed` is not positive.
   SelfCollision(const Elastic& elastic, double bed, const VectorXd& u);
 
-  /// Updates the neighbors at u. Returns the relative change of the forces there, 0 … 2.
+  /// Updates the neighbors at u. Returns the relative change of the forces, between 0 and 2.
   double look(const VectorXd& u);
 
   VectorXd free_forces(const VectorXd& u) const { return elastic_.to_free(forces(u)); }  ///< ∂energy/∂u, N
-  /// Adds the bed's energy and free forces to those of elasticity.
+  /// Adds the energy and the free forces of the bed to `to`.
   void add_forces(const VectorXd& u, Elastic::Forces& to) const;
 
   /// A Newton step must predict which nodes are in contact at its end: the bed only pushes, and a step that ignores
@@ -50,21 +49,21 @@ class SelfCollision {
   /// matrix, solved by projected Gauss–Seidel (Cottle, Pang & Stone 1992, chapter 5).
   double foresee(const Factor& factor, const VectorXd& u, const VectorXd& b, const VectorXd* held, double by);
 
-  /// Whether any node is pushed at u, or will be at the end of the step.
+  /// Returns true if a node is pushed at u or at the end of the step.
   bool pushes(const VectorXd& u) const;
 
-  /// Free forces at u if exactly the predicted nodes are pushed, or pulled, minus the present forces.
+  /// Returns the change of the free forces if exactly the predicted nodes are pushed.
   VectorXd foreseen_forces(const VectorXd& u) const;
 
-  /// Solves (K + bed stiffness at the predicted nodes) x = b for each column; `factor` is that of K. By Woodbury's
-  /// identity: one solve per node, without changing K's factor or pattern.
+  /// Solves (K + bed stiffness) x = b for each column. `factor` is the factor of K. This needs one solve for each
+  /// pushed node (Woodbury's identity).
   MatrixXd solve(const Factor& factor, const MatrixXd& b) const;
 
-  double overlap(const VectorXd& u) const;  ///< m, largest distance of a node behind its facet
+  double overlap(const VectorXd& u) const;
   std::size_t bytes() const noexcept;
 
  private:
-  /// A point of a facet, as a weighted sum of nodes.
+  /// A weighted sum of nodes.
   struct Point {
     std::vector<int> nodes;
     std::vector<double> shares;
@@ -79,21 +78,20 @@ class SelfCollision {
     int side;
     std::array<int, 3> points;
   };
-  /// A triangle in the present shape.
   struct Flat;
   struct SurfaceNode {
     int node;
     double stiffness;       ///< kᵢ, N/m
-    std::vector<int> ring;  ///< nodes of its elements, ascending
+    std::vector<int> ring;  ///< ascending
   };
   /// A node and a facet point: gap(u) = offset + Σ along·u = n·(xᵢ − y).
   struct Pair {
     int node;
     double stiffness;
     double offset;
-    std::vector<int> nodes;   ///< the node itself, then those of y
-    std::vector<Vec3> along;  ///< n, then −share·n
-    bool pushed = false;      ///< predicted for the end of the step
+    std::vector<int> nodes;  ///< first the node itself
+    std::vector<Vec3> along;
+    bool pushed = false;  ///< prediction for the end of the step
 
     double gap(const VectorXd& u) const;
     void add(double force, VectorXd& to) const;

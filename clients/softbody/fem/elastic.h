@@ -12,11 +12,10 @@
 
 namespace tendon::softbody {
 
-/// Marks the fixed displacements. Component c of node i has index 3 i + c. The further unknowns of an Elastic, if any,
-/// follow those of its nodes.
+/// True for fixed displacements. Component c of node i has index 3 i + c; further unknowns of an Elastic follow.
 using Fixed = std::vector<bool>;
 
-/// Fixes all three components of every node for which `holds(position)` is true.
+/// Fixes all components of the nodes for which `holds(position)` is true.
 template <class Predicate>
 Fixed fix_where(const Mesh& mesh, Predicate holds) {
   Fixed fixed(3 * mesh.nodes.size());
@@ -40,7 +39,6 @@ class Elastic {
   /// Length of u: 3 per node, plus the further unknowns.
   int size() const noexcept { return static_cast<int>(free_of_.size()); }
   int free_count() const noexcept { return static_cast<int>(all_of_.size()); }
-  /// index among the free displacements, or −1 if fixed
   int free_of(int component) const noexcept { return free_of_[at(component)]; }
   Fixed fixed() const;
   VectorXd to_free(const VectorXd& all) const;
@@ -49,7 +47,7 @@ class Elastic {
   /// The displacements from which a solver starts, m. Nonzero if the energy is expanded about a deformed shape.
   virtual VectorXd beginning() const { return VectorXd::Zero(size()); }
 
-  virtual double energy(const VectorXd& u) const = 0;  ///< J
+  virtual double energy(const VectorXd& u) const = 0;
   /// force = ∂energy/∂u, N: the external forces that hold the nodes at u.
   struct Forces {
     double energy;
@@ -60,7 +58,7 @@ class Elastic {
   enum class Curvature : std::uint8_t { kExact, kWithoutNegative };
   /// The second derivative with respect to the free displacements, N/m.
   virtual void stiffness(const VectorXd& u, Curvature curvature, SymmetricMatrix& to) const = 0;
-  /// The sparsity pattern of the stiffness, with zero values. Computed on first use.
+  /// Computed on first use; all values are zero.
   const SymmetricMatrix& pattern() const;
 
   virtual std::size_t bytes() const noexcept = 0;
@@ -68,7 +66,7 @@ class Elastic {
  protected:
   /// Throws std::invalid_argument if the mesh is invalid or no displacement is fixed.
   Elastic(Mesh mesh, const Fixed& fixed);
-  /// Further unknowns that move the nodes of `rim` together. The components of those nodes themselves are fixed.
+  /// Further unknowns that move the nodes of `rim`, whose own components are fixed.
   struct Together {
     int count = 0;
     std::vector<int> rim = {};
@@ -83,29 +81,28 @@ class Elastic {
 
   /// Index of an entry in the pattern's values; −1 if it is above the diagonal or a component is fixed.
   int slot(int row_component, int column_component) const;
-  std::size_t mesh_bytes() const noexcept;  ///< of the members of this base class
+  std::size_t mesh_bytes() const noexcept;
 
  private:
   Mesh mesh_;
-  std::vector<int> free_of_;  ///< by component; −1 if fixed
-  std::vector<int> all_of_;   ///< by free component
+  std::vector<int> free_of_;
+  std::vector<int> all_of_;
   Together together_;
   Lazy<SymmetricMatrix> pattern_;
 };
 
-/// Lumped mass of each free displacement, kg.
+/// The mass of each free displacement, kg.
 VectorXd lumped_mass(const Elastic& elastic, double density);
 
-/// Nodal forces of 1 N on the patch, against the normal; all nodes.
+/// The nodal forces for 1 N on the patch, against the normal.
 VectorXd patch_load(const Elastic& elastic, const Vec3& normal, const Patch& patch);
 
-/// ∂patch_load/∂(patch position), N/m, with one column per tangential axis.
+/// The derivative of patch_load() with respect to the patch position, N/m.
 MatrixXd patch_load_slopes(const Elastic& elastic, const Vec3& normal, const Patch& patch);
 
-/// Mean depth of a patch at displacements u, m, and its derivative with respect to the patch position.
+/// The mean depth of a patch, m, and its derivatives with respect to the patch position.
 double depth_below(const Patch& patch, const Vec3& normal, const VectorXd& u);
 Vec2 slope_below(const Patch& patch, const Vec3& normal, const VectorXd& u);
-/// Its second derivative. The patch must have its curvatures.
 Mat2 curve_below(const Patch& patch, const Vec3& normal, const VectorXd& u);
 
 }  // namespace tendon::softbody

@@ -13,37 +13,34 @@ namespace tendon::softbody {
 using Vec3 = Eigen::Vector3d;  ///< m or N, scene frame
 using Mat3 = Eigen::Matrix3d;
 
-/// Converts a signed node or element index (as in Eigen) for the standard containers.
+/// Converts an index for the standard containers.
 inline std::size_t at(int index) noexcept { return static_cast<std::size_t>(index); }
 
 /// Element geometry and node positions, in gmsh's node order.
 enum class Shape : std::uint8_t { kTet4, kHex8, kHex20, kHex27 };
 
-/// A shape with a quadrature rule.
 enum class Element : std::uint8_t { kTet4, kHex8, kHex8Sri, kHex20, kHex27, kHex27Sri };
 
 struct ElementInfo {
   Element element;
   Shape shape;
-  std::string_view name;  ///< in scenes, tables and command lines
-  std::string_view what;  ///< one line
+  std::string_view name;
+  std::string_view what;
   /// Poisson ratio above which the element locks: its stiffness error grows without limit as ν approaches ½.
   double locks_above;
 };
 
-/// All elements, in the order used by tables.
 std::span<const ElementInfo> elements() noexcept;
 const ElementInfo& info(Element element) noexcept;
 std::optional<Element> element_named(std::string_view name) noexcept;
 
 inline constexpr int kMaxNodes = 27;
 int nodes_of(Shape shape) noexcept;
-int corners_of(Shape shape) noexcept;  ///< the corners are an element's first nodes
+int corners_of(Shape shape) noexcept;
 
 /// Node position in the reference element: the cube [−1, 1]³ or the tetrahedron x, y, z ≥ 0, x + y + z ≤ 1.
 Vec3 node_at(Shape shape, int node) noexcept;
 
-/// Shape functions at one point of the reference element.
 struct ShapeValues {
   Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMaxNodes, 1> value;     ///< Nᵢ; their sum is 1
   Eigen::Matrix<double, 3, Eigen::Dynamic, 0, 3, kMaxNodes> gradient;  ///< ∂Nᵢ/∂ξ, ξ the reference coordinate
@@ -55,9 +52,9 @@ ShapeValues shape_at(Shape shape, const Vec3& at);
 /// which avoids volumetric locking in nearly incompressible materials (Hughes 1980).
 struct QuadraturePoint {
   Vec3 at;
-  double weight;  ///< relative to the reference element's volume
-  double mu;      ///< 0 or 1
-  double lambda;  ///< 0 or 1
+  double weight;
+  double mu;
+  double lambda;
 };
 std::span<const QuadraturePoint> quadrature(Element element);
 

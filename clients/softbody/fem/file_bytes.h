@@ -15,19 +15,17 @@ namespace tendon::softbody {
 
 static_assert(std::endian::native == std::endian::little, "the bytes of files are those of memory");
 
-/// Appends the bytes of a number, little-endian.
 template <class Value>
 void put(std::string& bytes, const Value& value) {
   const auto raw = std::bit_cast<std::array<char, sizeof(Value)>>(value);
   bytes.append(raw.data(), raw.size());
 }
 
-/// Reads numbers from the front of a byte string.
 class ByteReader {
  public:
   explicit ByteReader(std::string_view bytes) : left_(bytes) {}
 
-  /// Throws std::invalid_argument if too few bytes remain.
+  /// Throws std::invalid_argument if there are too few bytes.
   template <class Value>
   Value take() {
     if (left_.size() < sizeof(Value)) throw std::invalid_argument("it breaks off");
@@ -42,7 +40,7 @@ class ByteReader {
   std::string_view left_;
 };
 
-/// XXH3, 64 bits.
+/// Returns the XXH3 hash (64 bits).
 std::uint64_t checksum(std::string_view bytes);
 
 /// Writes a temporary file, which the caller renames once it is complete. Throws std::runtime_error and removes the

@@ -12,7 +12,6 @@ namespace tendon::softbody {
 /// (reading a pipe or device might never end), or is larger than `most` bytes.
 std::string read_file(const std::filesystem::path& file, std::uintmax_t most);
 
-/// Throws std::invalid_argument "`name`: `what`".
 [[noreturn]] void refuse_file(std::string_view name, const std::string& what);
 
 /// Removes a UTF-8 byte order mark. Throws std::invalid_argument if the text starts with a UTF-16 mark.

@@ -18,7 +18,6 @@ namespace tendon::softbody {
 /// shapes are mixed; or the file contains several meshes. Also throws the errors of joined().
 FileMesh read_gmsh(const std::filesystem::path& file, double scale, bool slits = false);
 
-/// Reads text in memory. `name` is used in error messages.
 FileMesh parse_gmsh(std::string_view text, std::string_view name, double scale, bool slits = false);
 
 /// Largest accepted file, in bytes. No model here is fast enough for a mesh with a million nodes.

@@ -20,7 +20,7 @@ class Groups {
   void unite(int a, int b) {
     a = find(a);
     b = find(b);
-    of_[at(std::max(a, b))] = std::min(a, b);  // the lowest number represents the group
+    of_[at(std::max(a, b))] = std::min(a, b);
   }
 
  private:

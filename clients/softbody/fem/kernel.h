@@ -22,7 +22,7 @@ using Lanes [[gnu::vector_size(sizeof(double) * kLanes)]] = double;
 /// Thread-safe: yes, after construction. Realtime-safe: only add_forces().
 class Kernel {
  public:
-  /// An empty kernel for elements with `nodes` nodes (4, 8, 20 or 27) and `points` quadrature points.
+  /// Creates an empty kernel for elements with 4, 8, 20 or 27 nodes.
   Kernel(Law law, int nodes, int points);
 
   using Nodal = Eigen::Matrix<double, 3, Eigen::Dynamic, 0, 3, kMaxNodes>;
@@ -51,10 +51,10 @@ class Kernel {
   double sum(const double* u, double* force) const;
 
   Law law_;
-  int per_element_;  ///< nodes
-  int points_;       ///< quadrature points per element
+  int per_element_;
+  int points_;
   int elements_ = 0;
-  std::vector<int> nodes_;  ///< of each element, concatenated
+  std::vector<int> nodes_;
   /// Per quadrature point and group of four elements: 3 × nodes lanes of ∂N/∂X, and two lanes of moduli. Zero-padded if
   /// the last group is not full.
   std::vector<double> gradients_;

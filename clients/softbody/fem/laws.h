@@ -69,7 +69,7 @@ template <class Number>
     if (lane(det, k) > kPolarDeterminant && lane(change, k) < kPolarChange) continue;
     Mat3 alone;
     for (int i = 0; i < 9; ++i) alone.data()[i] = lane(f[i], k);
-    if (!alone.allFinite()) continue;  // as the energy will be
+    if (!alone.allFinite()) continue;
     alone = nearest_rotation(alone);
     for (int i = 0; i < 9; ++i) set_lane(r[i], k, alone.data()[i]);
   }
@@ -82,7 +82,7 @@ template <Law kLaw, class Number>
   if constexpr (kLaw == Law::kNeoHookean) {
     Number c[9];
     cofactor(f, c);
-    const Number more = f[0] * c[0] + f[1] * c[1] + f[2] * c[2] - 1.0;  // J − 1
+    const Number more = f[0] * c[0] + f[1] * c[1] + f[2] * c[2] - 1.0;
     Number square = more - more - 3.0;
     for (int i = 0; i < 9; ++i) square += f[i] * f[i];
     const Number all = lambda + mu;

@@ -40,7 +40,7 @@ class Lazy {
     return *owner_;
   }
 
-  const T* made() const noexcept { return value_.load(std::memory_order_acquire); }  ///< nullptr if not yet computed
+  const T* made() const noexcept { return value_.load(std::memory_order_acquire); }
 
  private:
   void take(std::unique_ptr<const T> value) {

@@ -12,18 +12,13 @@ namespace tendon::softbody {
 /// integration requires. J = det F, ε = sym(F − I), E = ½(FᵀF − I), R is the rotation of F's polar decomposition:
 ///
 ///     linear         µ ε:ε + ½ λ (tr ε)²                             rotations count as strain
-///     corotational   µ
-/// F − R
-/// ² + ½ λ (tr(RᵀF) − 3)²
+///     corotational   µ |F − R|² + ½ λ (tr(RᵀF) − 3)²
 ///     StVK           µ E:E + ½ λ (tr E)²                             softens in compression, then stays inverted
-///     Neo-Hookean    ½ µ (
-/// F
-/// ² − 3) − µ (J − 1) + ½ (λ + µ) (J − 1)²   stable: finite and restoring for J ≤ 0
+///     Neo-Hookean    ½ µ (|F|² − 3) − µ (J − 1) + ½ (λ + µ) (J − 1)²   stable: finite and restoring for J ≤ 0
 ///
 /// Sources: Müller & Gross 2004; Smith, de Goes & Kim 2018, without their barrier against collapse to a point.
 enum class Law : std::uint8_t { kLinear, kCorotational, kStVenantKirchhoff, kNeoHookean };
 
-/// An isotropic solid.
 struct Material {
   double young = 0;    ///< E, Pa; > 0
   double poisson = 0;  ///< ν, 0 ≤ ν < ½

@@ -12,10 +12,9 @@
 
 namespace tendon::softbody {
 
-/// A body at rest, divided into elements of one shape.
 struct Mesh {
   Shape shape = Shape::kTet4;
-  std::vector<Vec3> nodes;    ///< m
+  std::vector<Vec3> nodes;
   std::vector<int> elements;  ///< nodes of each element, concatenated, in gmsh's order
 
   int element_count() const noexcept { return static_cast<int>(elements.size()) / nodes_of(shape); }
@@ -44,7 +43,6 @@ inline constexpr double kLeastQuality = 1e-9;
 /// total volume (Hinton, Rock & Zienkiewicz 1976).
 std::vector<double> nodal_volumes(const Mesh& mesh);
 
-/// Mean of an element's corners, m.
 Vec3 middle(const Mesh& mesh, int element);
 
 struct Facet {
@@ -58,7 +56,6 @@ std::vector<Facet> surface(const Mesh& mesh);
 /// Faces that belong to one element only: the surface, and both sides of each cut, even where they touch.
 std::vector<Facet> sides(const Mesh& mesh);
 
-/// Faces shared by two elements.
 std::vector<std::pair<Facet, Facet>> inner_faces(const Mesh& mesh);
 
 std::vector<int> nodes_on(const Mesh& mesh, const Facet& facet);

@@ -21,7 +21,7 @@ using Mat2 = Eigen::Matrix2d;
 /// integrated with the shape functions. The radius a is fixed because the stiffness under a patch converges under mesh
 /// refinement; under a single node it does not (displacements grow as 1/r, Boussinesq).
 struct Patch {
-  std::vector<int> nodes;                               ///< ascending
+  std::vector<int> nodes;
   VectorXd weights;                                     ///< their sum is 1
   Eigen::Matrix<double, 2, Eigen::Dynamic> slopes;      ///< 1/m, ∂weights/∂(patch center)
   Eigen::Matrix<double, 3, Eigen::Dynamic> curvatures;  ///< 1/m², second derivatives xx, xy, yy; empty unless requested
@@ -40,7 +40,6 @@ class TouchSurface {
 
   const Vec3& normal() const noexcept { return normal_; }
   double radius() const noexcept { return radius_; }
-  /// True if the touchable facets are not coplanar.
   bool curved() const noexcept { return curved_; }
 
   /// Tangential coordinates of a position, m, and the inverse map.
@@ -56,7 +55,6 @@ class TouchSurface {
   /// The patch around `middle`; empty if less than `least_covered` of its area is on the body.
   std::optional<Patch> patch(const Vec2& middle, double least_covered = 0.5) const;
 
-  /// As patch(), with its curvatures.
   std::optional<Patch> patch_with_curvatures(const Vec2& middle, double least_covered = 0.5) const;
 
   /// Tangential position of a node, and its height along the normal; m.
@@ -64,14 +62,13 @@ class TouchSurface {
   double height(int node) const { return heights_[static_cast<std::size_t>(node)]; }
 
  private:
-  /// A facet, divided into small pieces for quadrature.
   struct Pieces {
-    std::vector<int> nodes;                       ///< of the facet, as indices into nodes_
+    std::vector<int> nodes;                       ///< indices into nodes_
     Eigen::Matrix<double, 2, Eigen::Dynamic> at;  ///< m, tangential center of each piece
     VectorXd area;                                ///< m² of each piece, projected along the normal
-    MatrixXd shares;                              ///< shape function of each node (row) at each piece (column)
+    MatrixXd shares;                              ///< of nodes (rows) in pieces (columns)
     Vec2 middle;
-    double reach = 0;  ///< m, from `middle` to the farthest piece
+    double reach = 0;
   };
 
   void add(const Mesh& mesh, const Facet& facet);
@@ -82,7 +79,7 @@ class TouchSurface {
   Vec3 normal_;
   double radius_;
   Eigen::Matrix<double, 2, 3> across_;
-  std::vector<Vec2> places_;  ///< m, tangential, of all nodes of the mesh
+  std::vector<Vec2> places_;
   std::vector<double> heights_;
   std::vector<Pieces> facets_;
   std::vector<int> nodes_;

@@ -20,7 +20,6 @@ inline constexpr double kSamePlace = 1e-6;
 
 Eigen::AlignedBox3d box_around(std::span<const Vec3> points);
 
-/// A cell of a grid for neighbor search.
 using Cell = std::array<std::int64_t, 3>;
 struct HashOfCell {
   std::size_t operator()(const Cell& cell) const;
@@ -31,10 +30,10 @@ Cell cell_of(const Vec3& point, const Vec3& origin, double size);
 /// For each point, the index of the first point that coincides with it.
 std::vector<int> first_at_place(std::span<const Vec3> points);
 
-/// Coordinates with four digits: "(1, 2, 3)".
+/// Formats the coordinates with four digits: "(1, 2, 3)".
 std::string in_words(const Vec3& place);
 
-/// A count with its noun: "1 place", "2 places".
+/// Formats a count with its noun: "1 place", "2 places".
 std::string counted(std::size_t count, std::string_view one, std::string_view several);
 
 }  // namespace tendon::softbody

@@ -18,8 +18,8 @@ struct Region {
     double radius;  ///< m
   };
   struct Box {
-    Vec3 middle;  ///< m
-    Vec3 size;    ///< m, along the axes of the body's frame
+    Vec3 middle;
+    Vec3 size;  ///< m, along the axes of the body's frame
   };
   std::variant<Ball, Box> where;
   Material material;

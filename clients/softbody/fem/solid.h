@@ -30,9 +30,8 @@ class Solid : public Elastic {
   Element element() const noexcept { return element_; }
   const Material& material() const noexcept { return material_; }
   const Material& material(int element) const { return of_elements_.empty() ? material_ : of_elements_[at(element)]; }
-  /// Empty if the material is uniform.
   const std::vector<Material>& of_elements() const noexcept { return of_elements_; }
-  double largest_poisson() const;  ///< over all materials
+  double largest_poisson() const;
   Law law() const noexcept { return law_; }
 
   double energy(const VectorXd& u) const override { return forces(u).energy; }
@@ -46,7 +45,6 @@ class Solid : public Elastic {
 
   std::size_t bytes() const noexcept override;
 
-  /// Volume and moduli at a quadrature point.
   struct Point {
     double volume;  ///< m³
     double mu;      ///< Pa; 0 if only λ is integrated here
@@ -59,10 +57,10 @@ class Solid : public Elastic {
   /// point() and gradient(), computed without storing them, for one-time use.
   struct Part {
     Point point;
-    Nodal gradient;  ///< ∂Nᵢ/∂X, 1/m
+    Nodal gradient;
   };
   Part part(int element, int index) const;
-  Nodal displacements(const VectorXd& u, int element) const;  ///< of an element's nodes, m
+  Nodal displacements(const VectorXd& u, int element) const;
 
  protected:
   /// Assembles the stiffness of a material with the tangent `tangent_at(element, point, F)`.
@@ -72,9 +70,8 @@ class Solid : public Elastic {
  private:
   Solid(Mesh at_rest, const Solid& whole, const Fixed& fixed, std::vector<Material> of_elements);
 
-  /// All quadrature points; computed on first use.
   struct Parts {
-    std::vector<Point> points;  ///< of each element, concatenated
+    std::vector<Point> points;
     Kernel kernel;
   };
   const Parts& parts() const {
@@ -88,9 +85,9 @@ class Solid : public Elastic {
   Material material_;
   std::vector<Material> of_elements_;
   Law law_;
-  int per_element_;  ///< quadrature points
+  int per_element_;
   Lazy<Parts> parts_;
-  Lazy<std::vector<int>> slots_;  ///< index of each entry of an element matrix in the pattern's values; −1 if dropped
+  Lazy<std::vector<int>> slots_;  ///< index in the pattern's values, or −1
 };
 
 template <class TangentAt>

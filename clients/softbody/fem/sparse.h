@@ -14,7 +14,7 @@ using Eigen::VectorXd;
 /// A symmetric sparse matrix: lower triangle in compressed column storage, row indices ascending.
 struct SymmetricMatrix {
   int size = 0;
-  std::vector<int> column_starts;  ///< size + 1
+  std::vector<int> column_starts;
   std::vector<int> rows;
   std::vector<double> values;
 
@@ -54,7 +54,6 @@ class Factor {
   /// & Hager 1999) are not used: they need the slower simplicial factor, and a twin changes many rows.
   [[nodiscard]] bool split(const SymmetricMatrix& grown, const std::vector<int>& twin_of);
 
-  /// Solves A x = b for each column of b.
   MatrixXd solve(const MatrixXd& b) const;
 
   std::size_t bytes() const noexcept;

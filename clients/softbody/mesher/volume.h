@@ -13,15 +13,15 @@
 
 namespace tendon::softbody {
 
-/// How to mesh the volume inside a surface for touch. Lengths are in the unit of the surface file.
+/// All lengths are in the unit of the surface file.
 struct VolumeConfig {
-  double size = 0;                ///< element edge length at the touched place; > 0
-  double coarsest = 3;            ///< factor on `size` away from the touched place; >= 1
-  std::optional<Vec3> touched{};  ///< center of the touched place; empty: `size` everywhere
-  double reach = 0;               ///< radius of the fine region; > 0 with `touched`
-  /// Dihedral angle between facet normals above which an edge is preserved, rad.
+  double size = 0;                ///< edge of an element at the touched place
+  double coarsest = 3;            ///< ratio between the largest edge and `size`
+  std::optional<Vec3> touched{};  ///< center of the touched place; if empty, all elements are small
+  double reach = 0;               ///< radius of the touched place
+  /// Edges are preserved if the angle between their facets is larger than this (rad).
   double sharp = 40 * std::numbers::pi / 180;
-  /// Splits each tetrahedron into four hexahedra: a linear tetrahedron is far too stiff (README.md).
+  /// Divides each tetrahedron into four hexahedra, because linear tetrahedra are too stiff.
   bool hexahedra = true;
 };
 
@@ -36,15 +36,14 @@ struct VolumeConfig {
 /// or produces no volume.
 Mesh volume_of(const Triangles& surface, const VolumeConfig& config, std::string& words);
 
-/// The mesh as text in gmsh's format 2.2.
+/// Returns the mesh in the text format 2.2 of gmsh.
 std::string to_gmsh(const Mesh& mesh);
 
-/// Quality of a mesh for touch.
 struct MeshReport {
   int nodes = 0;
   int elements = 0;
-  double volume = 0;        ///< in cubic file units
-  double volume_error = 0;  ///< relative to the surface's volume: the part cut off by flat element faces
+  double volume = 0;        ///< cubic units of the file
+  double volume_error = 0;  ///< relative to the volume of the surface
   /// Scaled Jacobian of an element: the minimum over its corners of the volume spanned by the three edges over the
   /// product of their lengths (times √2 for a tetrahedron). 1 for a cube and a regular tetrahedron, 0 for a flat
   /// element.
@@ -54,13 +53,11 @@ struct MeshReport {
   Vec3 worst_at = Vec3::Zero();  ///< center of the worst element
   double shortest_edge = 0;
   double longest_edge = 0;
-  /// Problems that the user should know of.
   std::vector<std::string> warnings{};
 };
-/// `mesh` is in the unit of the surface file.
 MeshReport report_on(const Mesh& mesh, const Triangles& surface);
 
-/// Scaled Jacobian below which an element is inaccurate however fine the mesh.
+/// Elements below this value are inaccurate in every mesh.
 inline constexpr double kPoorElement = 0.1;
 
 }  // namespace tendon::softbody

@@ -31,9 +31,7 @@ constexpr int kMostElements = 240;
 /// On a fine mesh, only the elements with the largest corrections are candidates.
 constexpr Eigen::Index kCandidates = 1500;
 
-/// Finite-difference step for q, relative to
-/// q
-/// , and its minimum, √J.
+/// Finite-difference step for q, relative to |q|, and its minimum, √J.
 constexpr double kNudged = 1e-6;
 constexpr double kLeastNudge = 1e-9;
 

@@ -62,11 +62,7 @@ VectorXd few_not_negative(const Squares& squares, double left, int most) {
     } else {
       barred[static_cast<std::size_t>(newest)] = true;
     }
-    //
-    // b − G x
-    // ² =
-    // b
-    // ² − x·(Gᵀb + Gᵀ(b − G x))
+    // |b − G x|² = |b|² − x·(Gᵀb + Gᵀ(b − G x))
     if (squares.square - x.dot(squares.right + pull) <= left * left * squares.square) break;
   }
   return x;

@@ -58,9 +58,7 @@ std::optional<double> CapsuleContact::Capsule::above(const Vec3& x, const Vec3& 
     const double inside = radius * radius - (out.squaredNorm() - along * along);
     if (inside > 0) take(-along - std::sqrt(inside));
   }
-  //
-  // out + t n
-  // ² = radius², with the components perpendicular to the axis.
+  // |out + t n|² = radius², with the components perpendicular to the axis.
   const double tilt = n.dot(axis);
   const double a = 1 - tilt * tilt;
   const double along = from.dot(axis);

@@ -16,9 +16,8 @@ namespace tendon::softbody {
 Mat3 shortest_rotation(const Vec3& from, const Vec3& to);
 
 /// The shape of a rigid tool around its center, as a signed distance: all points within `rounding` of a box, the core.
-/// A core of size zero gives a sphere, a one-dimensional core a capsule, and others a box with round edges. With q =
-/// x
-///  − core (componentwise) and w = max(q, 0):
+/// A core of size zero gives a sphere, a one-dimensional core a capsule, and others a box with round edges. With the
+/// componentwise q = |x| − core and w = max(q, 0):
 ///
 ///     φ = |w| − rounding outside the core,   max q − rounding inside it
 ///

@@ -69,11 +69,7 @@ Feel SphereContact::at(const Vec3& q) {
     const Overlap& node = inside[static_cast<std::size_t>(set[k])];
     ways.col(static_cast<Eigen::Index>(k)) = node.way;
     pushed_[static_cast<std::size_t>(node.row)] = true;
-    //
-    // r
-    // /√(R² −
-    // r
-    // ²) is the tangent of the sphere surface's inclination there.
+    // |r|/√(R² − |r|²) is the tangent of the sphere surface's inclination there.
     const double lean = (node.way - surface_.normal()).norm();
     contact_radius_ = std::max(contact_radius_, radius_ * lean / std::sqrt(1 + lean * lean));
   }
