@@ -14,16 +14,16 @@ namespace tendon::softbody {
 struct Division;
 struct EffectsConfig;
 
-/// Whether a press prescribes depth or force; the answer gives the other.
+/// The quantity that is prescribed; the answer contains the other one.
 enum class Given : std::uint8_t {
-  kDepth,       ///< m, mean depth of the patch; the force may pull
-  kLeastDepth,  ///< m, lower bound of the mean depth: the tool pushes but does not pull
-  kForce,       ///< N, on the body
+  kDepth,       ///< mean depth of the patch, m; the force may pull
+  kLeastDepth,  ///< minimum of the mean depth, m; the tool cannot pull
+  kForce,       ///< force on the body, N
 };
 
-/// How a kNear body has answered (near/). The values and kWayNames are sent to the server.
+/// How a kNear body has answered. The server receives these values and kWayNames.
 enum class Way : std::uint8_t {
-  kOnly = 0,   ///< the model has only one way, or was not asked
+  kOnly = 0,   ///< the model has only one way
   kTabulated,  ///< energy table
   kLearned,    ///< learned shapes
   kNear,       ///< near field
@@ -31,38 +31,37 @@ enum class Way : std::uint8_t {
   kLinear,     ///< linear body, while no near field is ready
 };
 
-/// Indexed by Way − 1.
 inline constexpr std::array<std::string_view, 5> kWayNames = {"tabulated", "learned", "near", "whole", "linear"};
 constexpr std::string_view name_of(Way way) {
   return way == Way::kOnly ? "" : kWayNames.at(static_cast<std::size_t>(way) - 1);
 }
 
-/// A body's answer to a patch that presses into it, against the surface normal.
+/// The answer of a body to a patch that presses into it.
 struct Reaction {
-  double force = 0;  ///< N, of the body on the tool, along the normal
-  double depth = 0;  ///< m, mean over the patch, below the mesh surface
-  /// N/m, ∂force/∂depth. For a body with time: force over displacement from the rest shape, so a steadily moving hand
-  /// does not feel the stiffness that inertia adds within one step.
+  double force = 0;  ///< N, on the tool, along the normal
+  double depth = 0;  ///< m, mean over the patch
+  /// N/m, ∂force/∂depth. For a body with time it is the force divided by the displacement from the shape at rest,
+  /// without the stiffness that inertia adds within one step.
   double stiffness = 0;
-  Vec2 slope = Vec2::Zero();  ///< ∂depth/∂(patch position) with the body frozen: the mean tilt below the patch
-  /// How force and slope change as the patch slides by c; PatchContact needs it for the full stiffness. With w the
-  /// patch weights as a load, W = ∂w/∂c, and A the body's stiffness:
+  Vec2 slope = Vec2::Zero();  ///< ∂depth/∂(patch position) for the present shape
+  /// The derivatives with respect to the patch position c. W is ∂w/∂c for the weights w of the patch, and A is the
+  /// stiffness of the body.
   struct Glide {
     Vec2 tilting = Vec2::Zero();  ///< 1/m, ∂slope/∂depth
-    Mat2 curving = Mat2::Zero();  ///< 1/m, ∂slope/∂c with the body frozen
-    Mat2 giving = Mat2::Zero();   ///< 1/(N m), Wᵀ A⁻¹ W at a held depth
+    Mat2 curving = Mat2::Zero();  ///< 1/m, ∂slope/∂c for the present shape
+    Mat2 giving = Mat2::Zero();   ///< 1/(N m), Wᵀ A⁻¹ W at constant depth
   };
   Glide glide;
-  bool knows_glide = false;  ///< otherwise `glide` is zero; see Model::glides()
-  double error = 0;  ///< N, estimated distance to the exact solution on this mesh; excludes the discretization error
-  Way way = Way::kOnly;  ///< of a blended answer, the way with the larger share
+  bool knows_glide = false;  ///< see Model::glides()
+  double error = 0;          ///< N, estimated error of the solution; the error of the mesh is not included
+  Way way = Way::kOnly;      ///< the way with the larger share if two are blended
 };
 
-/// The tool force (N) for a prescribed depth or force, if the depth without the tool is `untouched` (m) and each newton
-/// adds `compliance` (m/N).
+/// Returns the force (N) of the tool. `untouched` is the depth without the tool (m), and `compliance` is the change of
+/// depth per force (m/N).
 double constrained_force(Given given, double value, double untouched, double compliance);
 
-/// Reaction::stiffness of a body with time whose untouched depth at rest is `rest` (m).
+/// Returns Reaction::stiffness of a body with time. `rest` is its depth (m) at rest.
 double secant(const Reaction& reaction, double rest);
 
 /// A body that can be pressed.
@@ -75,34 +74,32 @@ class Model {
   Model(const Model&) = delete;
   Model& operator=(const Model&) = delete;
 
-  /// The answer to one patch. A model with state continues from the previous call; a model with time advances by one
-  /// step. A patch without nodes means no contact.
+  /// Returns the answer to one patch. A model with state continues from the last call, and a model with time advances
+  /// by one step. If the patch has no nodes, there is no contact.
   virtual Reaction press(const Patch& patch, Given given, double value) = 0;
 
-  /// To be called after the solid was cut in place. Continues from the current displacements and reuses the factor if
-  /// possible. Throws std::logic_error if the model does not support cutting (ModelInfo::may).
+  /// Must be called after the solid has been cut in place. Throws std::logic_error if the model does not support
+  /// cutting.
   virtual void cut(const Division& division, const EffectsConfig& effects);
 
-  /// Continues from the shape of `before`, the same model and effects before a cut. Node i here was node_before[i]
-  /// there. Throws the errors of cut().
+  /// Continues from the shape of `before`, which is the same model before a cut. Node i of this model was
+  /// node_before[i]. Throws the errors of cut().
   virtual void go_on_from(const Model& before, std::span<const int> node_before);
 
-  /// Time simulated by one press, s. 0: the body is always at rest.
+  /// Returns the time that one press simulates in s, or 0 if the body is always at rest.
   virtual double step() const noexcept { return 0; }
 
-  /// True if the untouched body always has its mesh shape, so that press() can be skipped.
+  /// Returns true if an untouched body always has the shape of its mesh.
   virtual bool still() const noexcept { return true; }
 
-  /// True if press() computes Reaction::glide for a patch with curvatures.
+  /// Returns true if Reaction::glide is computed for patches with curvatures.
   virtual bool glides() const noexcept { return false; }
 
-  /// Memory of the model's matrices and state.
   virtual std::size_t bytes() const noexcept = 0;
 };
 
-/// Presses until two answers differ by less than `tolerance` (relative, in force and depth), or `most` seconds were
-/// simulated. For a body with time the two answers are 0.01 s apart. Returns the last answer; its error includes the
-/// remaining change.
+/// Presses until the relative difference of two answers is below `tolerance`, or for at most `most` seconds. For a body
+/// with time, the two answers are 0.01 s apart. The error of the answer includes the remaining change.
 Reaction settle(Model& model, const Patch& patch, Given given, double value, double tolerance = 1e-4, double most = 5);
 
 }  // namespace tendon::softbody

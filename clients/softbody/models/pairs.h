@@ -9,12 +9,10 @@
 
 namespace tendon::softbody {
 
-/// Quasi-Newton update of a kept factor: the inverse stiffness H from the factor K₀ and up to eight pairs of a step and
-/// its change of forces (limited-memory BFGS; Nocedal 1980). H maps the last change of forces to the last step exactly,
-/// and is positive definite if K₀ is.
+/// Limited-memory BFGS (Nocedal 1980) with a kept factor K₀ of the stiffness and up to eight pairs of a step and its
+/// change of forces. The inverse H maps the last change of forces to the last step, and is positive definite if K₀ is.
 ///
-/// K₀⁻¹ times each change of forces is passed in. A solver that solves for the forces at each shape already has it, so
-/// applying H costs no more solves than K₀⁻¹.
+/// The caller passes K₀⁻¹ times each change of forces, because it usually has this result already.
 ///
 /// Thread-safe: no. Realtime-safe: no.
 class Pairs {
@@ -23,14 +21,14 @@ class Pairs {
 
   void clear() noexcept { order_.clear(); }
 
-  /// `change` = forces after `step` minus those before, N; `solved` = K₀⁻¹ `change`. Skips a pair with no positive
-  /// curvature along its step.
+  /// `change` is the change of the forces by `step` (N), and `solved` is K₀⁻¹ `change`. The pair is ignored if the
+  /// curvature along the step is not positive.
   void add(const VectorXd& step, const VectorXd& change, const VectorXd& solved);
 
-  /// H b, given `solved` = K₀⁻¹ b.
+  /// Returns H b. `solved` is K₀⁻¹ b.
   VectorXd times(const VectorXd& b, const VectorXd& solved) const;
 
-  /// The submatrix of H − K₀⁻¹ for `unknowns`, in their order.
+  /// Returns the rows and columns of H − K₀⁻¹ for `unknowns`.
   MatrixXd adds(const std::vector<int>& unknowns) const;
 
   int count() const noexcept { return static_cast<int>(order_.size()); }
@@ -38,8 +36,8 @@ class Pairs {
 
  private:
   using Small = Eigen::Matrix<double, kMost, kMost>;
-  std::vector<int> order_;  ///< column indices, oldest first
-  MatrixXd steps_;          ///< one column per pair, as in the next two
+  std::vector<int> order_;  ///< oldest first
+  MatrixXd steps_;          ///< one column for each pair
   MatrixXd changes_;
   MatrixXd solved_;
   Small steps_changes_;   ///< stepsᵀ changes

@@ -12,11 +12,11 @@ namespace tendon::softbody {
 /// Von Mises yield with linear kinematic hardening (Prager). A bar in tension has the modulus E up to `stress` and
 /// E·H/(E + H) beyond it. On release it has E again, and after 2·`stress` it yields in reverse.
 struct Yield {
-  double stress = 0;     ///< σ, Pa, positive: uniaxial yield stress
-  double hardening = 0;  ///< H, Pa, positive: stress per unit of plastic strain
+  double stress = 0;     ///< σ, Pa, yield stress of a bar
+  double hardening = 0;  ///< H, Pa, stress per unit of plastic strain
 };
 
-/// Throws std::invalid_argument that names the field.
+/// Throws std::invalid_argument with the name of the field.
 void check(const Yield& yield);
 
 /// A solid with a plastic strain p, symmetric and traceless, at every quadrature point. With ε the strain of its law
@@ -36,13 +36,13 @@ class PlasticSolid : public Solid {
   /// Throws std::invalid_argument if the law is neither linear nor corotational, and the errors of check().
   PlasticSolid(const Solid& solid, const Yield& yield);
 
-  /// Energy of the step that began at the last advance().
+  /// Returns the energy of the step since the last advance().
   double energy(const VectorXd& u) const override { return forces(u).energy; }
   Forces forces(const VectorXd& u) const override;
   void stiffness(const VectorXd& u, Curvature curvature, SymmetricMatrix& to) const override;
 
-  void advance(const VectorXd& u);                    ///< ends a step at u and begins the next there
-  bool yielded() const noexcept { return yielded_; }  ///< whether any point has ever yielded
+  void advance(const VectorXd& u);  ///< ends the step at u
+  bool yielded() const noexcept { return yielded_; }
   const Mat3& plastic_strain(int element, int point) const {
     return plastic_[at(element * points_per_element() + point)];
   }
@@ -52,23 +52,19 @@ class PlasticSolid : public Solid {
  private:
   struct Flow;
   Flow flow(int element, int point, const Mat3& strain) const;
-  /// the contribution of plastic strain to the elastic stress
   Stress flow_at(int element, int point, const Mat3& f) const;
   Mat9 tangent_at(int element, int point, const Mat3& f) const;
 
   Yield yield_;
-  std::vector<Mat3> plastic_;  ///< p₀ per point; 0 where only the volumetric part is integrated
+  std::vector<Mat3> plastic_;  ///< p₀ of each point
   bool yielded_ = false;
 };
 
-/// Newton's method on a plastic body: an answer is one load step of any size. The number of steps does not matter while
-/// the load proceeds in one direction; where it turns the result is first order in the step size. The stiffness of a
-/// yielding answer is the loading one; unloading is stiffer (elastic). On a closed path the hand never gains energy.
-///
-/// A step that stops at Config::max_iterations keeps its plastic strains.
+/// Newton's method on a plastic body. Each answer is one load step, and its plastic strains are kept even if it does
+/// not converge. The stiffness of a yielding body is that of loading. On a closed path the hand never gains energy.
 class PlasticModel : public Model {
  public:
-  /// Starts at rest, under its weight if gravity is simulated. Throws the errors of PlasticSolid and QuasiStaticModel.
+  /// Starts at rest, under the weight of the body. Throws the errors of PlasticSolid and QuasiStaticModel.
   PlasticModel(const Solid& solid, const TouchSurface& surface, const QuasiStaticModel::Config& config,
                const EffectsConfig& effects, const Yield& yield);
 

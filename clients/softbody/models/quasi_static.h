@@ -24,83 +24,77 @@ namespace tendon::softbody {
 class QuasiStaticModel : public Model {
  public:
   struct Config {
-    int max_iterations = 30;  ///< per answer; what remains is in Reaction::error, and the next answer continues
-    /// Relative to the force: an answer ends when its error is at most this. Force, depth and tilt then include the
-    /// step that is no longer taken.
+    int max_iterations = 30;  ///< for each answer
+    /// The relative error of the force at which an answer ends. Force, depth and slope include the last step, which is
+    /// not taken.
     double tolerance = 1e-6;
-    std::optional<double> self_collision = {};  ///< Pa/m: the bed c of SelfCollision
-    bool glides = true;                         ///< answers at rest include Reaction::glide
-    /// Accepted relative uncertainty of an answer's stiffness, and half of it for the glide. The result is mostly
-    /// accurate to its square. Smaller values cost more solves.
+    std::optional<double> self_collision = {};  ///< Pa/m, c of SelfCollision
+    bool glides = true;                         ///< compute Reaction::glide at rest
+    /// The accepted relative uncertainty of the stiffness. The error is usually the square of it.
     double tangent = 0.02;
   };
-  /// Starts at rest, under its weight if gravity is simulated. `elastic` must outlive this object.
+  /// Starts at rest, under the weight of the body. `elastic` must outlive this object.
   QuasiStaticModel(const Elastic& elastic, const TouchSurface& surface, const Config& config,
                    const EffectsConfig& effects = {});
 
   Reaction press(const Patch& patch, Given given, double value) override;
   void cut(const Division& division, const EffectsConfig& effects) override;
-  /// Keeps its own factor; Pairs starts empty.
   void go_on_from(const Model& before, std::span<const int> node_before) override;
   double step() const noexcept override { return step_; }
   bool still() const noexcept override { return effects_.empty(); }
   bool glides() const noexcept override { return step_ == 0 && config_.glides; }
   std::size_t bytes() const noexcept override;
 
-  int iterations() const noexcept { return iterations_; }  ///< Newton steps in the last answer
-  int factors() const noexcept { return factors_; }        ///< made since construction
+  int iterations() const noexcept { return iterations_; }  ///< in the last answer
+  int factors() const noexcept { return factors_; }        ///< since construction
   const VectorXd& displacements() const noexcept { return u_; }
-  const SelfCollision* self_collision() const noexcept { return self_collision_.get(); }  ///< null: not simulated
-  /// Takes effect with the next answer.
+  const SelfCollision* self_collision() const noexcept { return self_collision_.get(); }
   void set_max_iterations(int count) { config_.max_iterations = count; }
-  /// Sets the displacements of all nodes, including fixed ones, m.
+  /// Sets the displacements of all nodes (m), including fixed ones.
   void set_displacements(const VectorXd& u) {
     u_ = u;
     stale_ = true;
     glided_.reset();
     forget_forces();
   }
-  /// For an Elastic whose energy changes at fixed displacements: the next answer sums the forces again.
+  /// Must be called if `elastic` has changed.
   void forget_forces() { known_.reset(); }
-  /// Removes the tool and finds the shape at rest, or advances one time step. Returns the remaining energy, J.
+  /// Removes the tool and finds the shape at rest, or advances by one time step. Returns the remaining energy (J).
   double release();
 
-  // For a contact that runs its own solver (RigidContact): the present body without a tool.
-  /// Energy and free forces, effects included.
+  // For RigidContact: the energy and the free forces without a tool.
   Elastic::Forces forces() const;
-  /// The factor may be that of an earlier shape; renew_factor() factorizes the stiffness of the present one. It returns
-  /// false if that is not positive definite and a modified one was used.
+  /// The factor may belong to an earlier shape. renew_factor() returns false if the stiffness is not positive definite;
+  /// the factor is then that of a modified stiffness.
   const Factor& factor() const noexcept { return factor_; }
   bool renew_factor() {
-    forget_forces();  // they include results of the old factor
+    forget_forces();  // includes results of the old factor
     return factorize();
   }
-  void move(const VectorXd& free);  ///< free displacements, m
+  void move(const VectorXd& free);  ///< m, free displacements
 
  private:
   struct Step {
-    VectorXd by_itself;  ///< H (−internal force), H ≈ inverse stiffness
+    VectorXd by_itself;  ///< H (−internal force)
     VectorXd by_tool;    ///< H w
   };
   void stiffness(Elastic::Curvature curvature);
   bool factorize();
-  /// Returns whether sides of the body are, or will be, in contact.
+  /// Returns true if two sides of the body will be in contact.
   bool foresee(const VectorXd& internal, const VectorXd& load, Given given, double value);
   Step step_among_sides(const VectorXd& internal, const VectorXd& load) const;
-  /// H b; and its part at constant tool depth, by H w.
   VectorXd solve(const VectorXd& b, bool among_sides) const;
   VectorXd solve_at_depth(const VectorXd& b, bool among_sides, const VectorXd& load, const VectorXd& by_tool) const;
-  /// Line search along `step` on energy minus tool work. Returns false if there is no decrease. `now` holds the forces
-  /// before the call, and those of the new shape after it.
+  /// Searches along `step` for a lower energy. Returns false if there is none. `now` is updated to the new shape.
   bool go(const VectorXd& step, const VectorXd& load, double force, double slope, Elastic::Forces& now);
-  /// Stiffness times `shape`, N.
+  /// Returns the stiffness times `shape` (N).
   VectorXd needed(const VectorXd& shape, const Elastic::Forces& now);
   struct Tangent;
   void find_shapes(const VectorXd& load, const MatrixXd& slopes, const Tangent& tangent);
   void find_tangent(const VectorXd& load, const Patch* patch, const Tangent& tangent, Reaction& reaction);
-  /// Solves with fixed self-contact pairs. Returns the error, N. If the patch has curvatures, sets reaction.glide.
+  /// Solves for fixed pairs of sides. Returns the error (N).
   double newton(const VectorXd& load, const Patch* patch, Given given, double value, Reaction& reaction);
-  /// Updates the self-contact pairs and solves again until they no longer change. Returns the error, N.
+  /// Solves and updates the pairs of sides until they do not change. Returns the error (N).
   double part_sides(const VectorXd& load, const Patch* patch, Given given, double value, Reaction& reaction);
 
   const Elastic& elastic_;
@@ -113,8 +107,7 @@ class QuasiStaticModel : public Model {
   double step_;
   Effects effects_;
   std::unique_ptr<SelfCollision> self_collision_;
-  /// The last computed response to a patch that slides at constant depth: load, force, and a shape (m) for each column
-  /// of the load slopes.
+  /// The last response to a sliding patch at constant depth.
   struct Glided {
     VectorXd load;
     double force = 0;
@@ -122,8 +115,8 @@ class QuasiStaticModel : public Model {
     Mat2 giving;
   };
   std::optional<Glided> glided_;
-  VectorXd rest_;  ///< m, all nodes: shape at rest; empty without time
-  /// Forces at the end of the last answer, and K₀⁻¹ times them; empty if they are no longer valid.
+  VectorXd rest_;  ///< m, all nodes; empty for a body without time
+  /// The last forces, and K₀⁻¹ times these forces.
   struct Known {
     Elastic::Forces forces;
     VectorXd solved;
@@ -131,8 +124,8 @@ class QuasiStaticModel : public Model {
   std::optional<Known> known_;
   int iterations_ = 0;
   int factors_ = 0;
-  int in_vain_ = 0;    ///< iterations since the last accurate answer or new factor
-  bool stale_ = true;  ///< the factor is to be recomputed
+  int in_vain_ = 0;    ///< iterations without an accurate answer
+  bool stale_ = true;  ///< the factor must be computed again
 };
 
 }  // namespace tendon::softbody

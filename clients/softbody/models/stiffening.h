@@ -10,27 +10,26 @@
 
 namespace tendon::softbody {
 
-/// Young's modulus over time, relative to the material's value: piecewise linear, constant before the first and after
-/// the last point.
+/// A piecewise linear factor of Young's modulus. It is constant before the first and after the last time.
 struct StiffnessOverTime {
   std::vector<double> at;      ///< s, ascending
-  std::vector<double> factor;  ///< one per time, positive
+  std::vector<double> factor;  ///< positive
 
   double factor_at(double time) const;
 };
 
-/// Throws std::invalid_argument that names the field.
+/// Throws std::invalid_argument with the name of the field.
 void check(const StiffnessOverTime& law);
 
-/// A body whose Young's modulus changes while it is touched: a muscle that tenses, a graft that cures. Wraps models
-/// whose only load is the tool and whose energy is proportional to the modulus: the shape at a given depth is
-/// unchanged, and forces scale with `factor`, so nothing is solved again.
+/// A body with a variable Young's modulus, such as a muscle. The tool must be the only load, and the energy must be
+/// proportional to the modulus. The shape at a given depth does not depend on the modulus, so only the forces are
+/// scaled.
 ///
-/// At constant tool position the stored energy changes from E to E·factor, and the hand does not supply the difference.
-/// The body is therefore not passive; the server's limiter protects the hand.
+/// The body is not passive: if the modulus changes, the stored energy changes without work of the hand. The limiter of
+/// the server protects the hand.
 class StiffeningModel : public Model {
  public:
-  /// Starts with the modulus at time 0. Throws the errors of check().
+  /// Starts with the factor at time 0. Throws the errors of check().
   StiffeningModel(std::unique_ptr<Model> model, StiffnessOverTime law);
 
   void tick(double time) { factor_ = law_.factor_at(time); }  ///< s

@@ -22,23 +22,23 @@ namespace tendon::softbody {
 ///     8 m (m + 1)/2   compliance, m/N: the lower half, row by row
 ///     8   XXH3 (64 bits) of everything before
 struct SurfaceTable {
-  std::uint64_t body = 0;        ///< digest_of() the solid and the normal
-  double patch_radius = 0;       ///< m, of the patch used for `stiffness`
-  double stiffness = 0;          ///< N/m, under the patch around `middle`
+  std::uint64_t body = 0;        ///< digest_of() the body
+  double patch_radius = 0;       ///< m, for `stiffness`
+  double stiffness = 0;          ///< N/m, with the patch at `middle`
   double linear_up_to = 0;       ///< m, Body::linear_up_to()
   Eigen::Vector2d middle{0, 0};  ///< m, tangential
-  std::vector<int> nodes{};      ///< mesh nodes, ascending
-  Eigen::MatrixXd compliance{};  ///< m/N along the normal, symmetric, in the order of `nodes`
+  std::vector<int> nodes{};      ///< ascending
+  Eigen::MatrixXd compliance{};  ///< m/N along the normal, symmetric
 };
 
-/// Identifies a body: mesh, fixed nodes, element, material, and touched side.
+/// Returns a digest of the mesh, the fixed nodes, the element, the material and the touched side.
 std::uint64_t digest_of(const Solid& solid, const Vec3& normal);
 
-/// Throws std::runtime_error if the file cannot be written, or exists and is not a table.
+/// Throws std::runtime_error if the file cannot be written, or if it exists and is not a table.
 void write_table(const std::filesystem::path& file, const SurfaceTable& table);
 
-/// Throws std::invalid_argument, naming the file and the problem: not a table, truncated, bad checksum, or not positive
-/// semidefinite (such a table could generate energy).
+/// Throws std::invalid_argument if the file is not a valid table. The table must be positive semidefinite, because it
+/// could generate energy otherwise.
 SurfaceTable read_table(const std::filesystem::path& file);
 
 }  // namespace tendon::softbody

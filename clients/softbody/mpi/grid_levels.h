@@ -8,23 +8,22 @@
 
 namespace tendon::softbody {
 
-/// Interpolation from a coarser to a finer grid, for geometric multigrid. Identical on every rank.
+/// The interpolation from a coarse grid to a fine grid, for geometric multigrid. It is the same on every rank.
 ///
-/// Requires a mesh whose nodes form a grid with equal steps, as made by block(). A coarse cell covers two fine cells
-/// along each axis; displacements between its nodes are those of its element: quadratic for hex27, linear otherwise.
-/// The components of a node must be all free or all fixed.
+/// The nodes must form a grid with equal steps, as in block(). A coarse cell contains two fine cells along each axis.
+/// Interpolation is quadratic for hex27 and linear for other elements. The components of a node must be all free or all
+/// fixed.
 struct GridLevel {
-  /// An interpolation weight of a coarse node.
   struct Weight {
-    int node;  ///< index among the free coarse nodes
+    int node;  ///< free coarse node
     double value;
   };
-  std::vector<std::vector<Weight>> rows;  ///< per free fine node
-  int nodes = 0;                          ///< number of free coarse nodes
+  std::vector<std::vector<Weight>> rows;  ///< for each free fine node
+  int nodes = 0;                          ///< free coarse nodes
 };
 
-/// Levels from finest to coarsest. Stops when an axis has an odd number of cells or fewer than `least` nodes are free.
-/// Empty if the nodes do not form a grid.
+/// Returns the levels from fine to coarse. A level is the last one if an axis has an odd number of cells, or if fewer
+/// than `least` nodes are free. The result is empty if the nodes do not form a grid.
 std::vector<GridLevel> grid_levels(const Solid& solid, int least = 1000);
 
 }  // namespace tendon::softbody

@@ -10,10 +10,10 @@
 
 namespace tendon::softbody {
 
-/// Initializes MPI and PETSc for the lifetime of the object. Everything below must be called collectively by all ranks.
+/// Initializes MPI and PETSc. All functions below are collective.
 class Ranks {
  public:
-  /// Removes the arguments of PETSc and MPI from the command line. Throws std::runtime_error if they do not start.
+  /// Throws std::runtime_error if MPI or PETSc cannot be started.
   Ranks(int& argc, char**& argv);
   ~Ranks();
   Ranks(const Ranks&) = delete;
@@ -23,7 +23,6 @@ class Ranks {
   int count() const noexcept;
 };
 
-/// Solution method for K u = f.
 enum class Method : std::uint8_t {
   kChosen,  ///< kFactor below kMostForFactor unknowns or above kMostPoisson, else kMultigrid
   kFactor,  ///< MUMPS' Cholesky factor
@@ -31,7 +30,7 @@ enum class Method : std::uint8_t {
   kMultigrid,
 };
 inline constexpr int kMostForFactor = 100'000;
-/// Close to incompressibility multigrid takes hundreds of iterations.
+/// Multigrid needs hundreds of iterations for nearly incompressible materials.
 inline constexpr double kMostPoisson = 0.49;
 
 /// Linear elasticity, K u = f, by PETSc on all ranks. Each rank assembles its own rows; their bits do not depend on the
@@ -54,9 +53,9 @@ inline constexpr double kMostPoisson = 0.49;
 std::unique_ptr<Solver> on_ranks(const Solid& solid, Method method = Method::kChosen);
 inline constexpr double kRough = 1e-3;
 
-/// Broadcasts bytes from rank 0.
+/// Sends bytes from rank 0 to all ranks.
 void share_out(std::vector<std::byte>& bytes);
-/// Aborts all ranks; for a rank that cannot continue while others wait for it.
+/// Ends all ranks if one of them cannot continue.
 [[noreturn]] void end_all_ranks();
 
 }  // namespace tendon::softbody

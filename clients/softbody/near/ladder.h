@@ -10,30 +10,27 @@
 
 namespace tendon::softbody {
 
-/// A body that answers from the most accurate precomputed rung that is valid for a press, and falls back to NearModel.
-/// Where a rung's share falls from 1 to 0, its answer is blended with the next one (blended()). Presses with a given
-/// force are answered by NearModel.
+/// Uses the first precomputed rung that is valid for a press, and NearModel otherwise. Answers are blended at the
+/// border of a rung. NearModel answers all presses with a given force.
 ///
-/// While rungs answer, NearModel tracks the hand (NearModel::follow), so that its field is ready to take over. Without
-/// a background thread this slows answers only where Rung::room() is below 1.
+/// While a rung answers, NearModel follows the hand, so that a field is ready when it takes over (NearModel::follow).
 class Ladder : public Model {
  public:
-  /// In order of preference.
+  /// The first rung is preferred.
   Ladder(std::vector<std::unique_ptr<Rung>> rungs, std::unique_ptr<NearModel> near);
 
   Reaction press(const Patch& patch, Given given, double value) override;
-  /// Drops the rungs, which describe the uncut body only.
+  /// Removes the rungs, which are valid for the uncut body only.
   void cut(const Division& division, const EffectsConfig& effects) override;
-  /// Continues with the rungs of this object, if it has any for the cut body.
   void go_on_from(const Model& before, std::span<const int> node_before) override;
   bool glides() const noexcept override { return true; }
   std::size_t bytes() const noexcept override;
 
   struct Step {
     Rung::Size size;
-    int answers = 0;  ///< presses that the rung answered, alone or blended
+    int answers = 0;  ///< presses that this rung has answered
   };
-  std::vector<Step> steps() const;  ///< in order of preference, without NearModel
+  std::vector<Step> steps() const;  ///< without NearModel
   const NearModel& near() const noexcept { return *near_; }
 
  private:
@@ -44,8 +41,8 @@ class Ladder : public Model {
   std::unique_ptr<NearModel> near_;
 };
 
-/// Interpolates force and stiffness between two reactions with the weight `share` (0 … 1) of `from`, whatever the tilt
-/// of the surface. The difference is added to `error`.
+/// Interpolates the force and the stiffness. `share` (0 … 1) is the weight of `from`. The difference is added to
+/// `error`.
 Reaction blended(const Reaction& from, const Reaction& to, double share);
 
 }  // namespace tendon::softbody

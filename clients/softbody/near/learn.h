@@ -12,21 +12,20 @@
 
 namespace tendon::softbody {
 
-/// Precomputed data of a body, as plain values. Empty members were not computed.
+/// Precomputed results for a body.
 struct Learned {
   std::optional<LearnedShapes> shapes{};
   std::optional<TabulatedAnswers> answers{};
-  std::vector<std::string> warnings{};  ///< about damaged or unreadable files
+  std::vector<std::string> warnings{};  ///< about damaged files
 };
 
-/// What to compute.
 struct LearnConfig {
   bool shapes = false;
   bool answers = false;
   Vec2 middle = Vec2::Zero();  ///< m, tangential
-  double reach = 0;            ///< m, range of the hand from `middle` along each axis
-  /// Folder to read and store results. File names are digests of the input: body, law, touched side, patch, grid and
-  /// format version. Empty: nothing is stored.
+  double reach = 0;            ///< m, range of the hand along each axis
+  /// The folder with the results. If it is empty, results are not stored. File names contain a digest of the body, the
+  /// law, the touched side, the patch, the grid and the version.
   std::filesystem::path folder{};
 };
 

@@ -20,16 +20,16 @@ struct LearnedShapes {
   PressGrid grid;
   std::vector<int> elements{};  ///< ascending
   VectorXd weights{};           ///< ω
-  MatrixXd shapes{};  ///< Φ: three rows per node of the elements, ascending; displacements in √m/√N for q in √J
-  MatrixXd depths{};  ///< row per shape, column per touchable node, ascending: depth per unit of q
-  MatrixXd linear{};  ///< 1 − Σ_e ω_e Φ_eᵀ K₀ₑ Φ_e
-  MatrixXd knots{};   ///< column q per knot of the grid
-  MatrixXd inverses{};           ///< r columns per knot: inverse of ∂²E/∂q² there
+  MatrixXd shapes{};    ///< Φ: three rows for each node of the elements; displacements in √m/√N for q in √J
+  MatrixXd depths{};    ///< depth per q: a row for each shape, a column for each touchable node
+  MatrixXd linear{};    ///< 1 − Σ_e ω_e Φ_eᵀ K₀ₑ Φ_e
+  MatrixXd knots{};     ///< q, a column for each knot
+  MatrixXd inverses{};  ///< inverse of ∂²E/∂q² for each knot
   std::vector<double> errors{};  ///< Trust::errors()
 };
 
-/// Computes the model from `presses`. Skips inaccurate solutions, and knots where E is not stable at constant depth
-/// (∂²E/∂q² has an eigenvalue ≤ 0 there).
+/// Inaccurate solutions and unstable knots are left out. A knot is unstable if ∂²E/∂q² at constant depth is not
+/// positive definite.
 LearnedShapes learn_shapes(const Solid& solid, const TouchSurface& surface, const SolvedPresses& presses,
                            const Tell& tell);
 
@@ -38,19 +38,17 @@ LearnedShapes learn_shapes(const Solid& solid, const TouchSurface& surface, cons
 /// The error of the returned stiffness is second order in the error of that inverse.
 ///
 /// Thread-safe: yes, after construction. Realtime-safe: no.
-///
-/// Thread-safe: yes, once built. Realtime-safe: no.
 class LearnedBody {
  public:
   LearnedBody(const Solid& solid, const TouchSurface& surface, const LearnedShapes& shapes);
 
-  /// Empty if Newton's method does not reach the relative force error `tolerance`, or if E is not stable there.
+  /// The result is empty if Newton's method does not reach the relative error `tolerance`, or if E is not stable.
   std::optional<Reaction> press(const Patch& patch, double depth, const PressGrid::Point& point,
                                 double tolerance) const;
 
-  /// Energy E (J) and its gradient.
+  /// Returns the energy E (J) and its derivative in `slope`.
   double energy(const VectorXd& q, VectorXd& slope) const;
-  /// Depth of the patch per unit of q: the load vector on q.
+  /// Returns the depth of the patch per q.
   VectorXd load(const Patch& patch) const;
 
   int shapes() const noexcept { return static_cast<int>(shapes_.cols()); }
@@ -61,19 +59,18 @@ class LearnedBody {
   MatrixXd depths_below(const Patch& patch) const;
 
   PressGrid grid_;
-  Kernel kernel_;  ///< elements with moduli scaled by ω
+  Kernel kernel_;  ///< with moduli times ω
   MatrixXd shapes_;
   MatrixXd depths_;
-  std::vector<int> column_of_;  ///< column of `depths_`, by mesh node
+  std::vector<int> column_of_;  ///< of `depths_`, by node
   MatrixXd linear_;
   MatrixXd knots_;
   MatrixXd inverses_;
 };
 
-/// LearnedBody, where its error permits.
 class LearnedRung : public Rung {
  public:
-  /// `tolerance`: accepted relative force error.
+  /// `tolerance` is the accepted relative error of the force.
   LearnedRung(const Solid& solid, const TouchSurface& surface, const LearnedShapes& shapes, double tolerance);
 
   std::optional<Answer> press(const Patch& patch, double depth) const override;

@@ -5,7 +5,7 @@
 
 namespace tendon::softbody {
 
-/// The least-squares problem min |G x − b|² in terms of its normal equations, so that G need not be stored.
+/// The normal equations of min |G x − b|².
 struct Squares {
   MatrixXd gram;      ///< GᵀG
   VectorXd right;     ///< Gᵀb

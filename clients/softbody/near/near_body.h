@@ -32,19 +32,17 @@ class NearBody : public Elastic {
  public:
   struct Config {
     Vec3 middle = Vec3::Zero();  ///< m
-    double radius = 0;           ///< m: an element is near if its center is within this distance of `middle`
-    /// Upper limit; fewer are used if the others add less than 1e-3 (RMS) to the motion of Γ. With at least as many modes
-    /// as Γ has unknowns the interface is exact.
+    double radius = 0;           ///< m, maximum distance of the centers of near elements
+    /// The maximum number of modes. If Γ does not have more unknowns than this, the interface is exact.
     int modes = 60;
-    std::vector<int> pressed;  ///< nodes that a tool may press; all their elements are near
-    VectorXd press;            ///< N, free components of the whole: a typical tool load at `middle`
-    VectorXd about{};          ///< u*, m, all nodes of the whole; empty: at rest
-    double about_depth = 0;    ///< m: tool depth at u*
+    std::vector<int> pressed;  ///< nodes that the tool may press
+    VectorXd press;            ///< N, free components: the load of a tool at `middle`
+    VectorXd about{};          ///< u*, m, all nodes; empty: at rest
+    double about_depth = 0;    ///< m, depth of the tool in u*
   };
 
-  /// Builds the body in pieces; the last one sets `made`, to null if no element is far. `factor` is that of the whole
-  /// stiffness at u*. It and `whole` must live until the last piece is done. The division into pieces is the same on
-  /// every machine; most pieces solve for a few of the 2 modes + 1 loads.
+  /// Builds the body in pieces, most of which are solves for a few loads. The last piece sets `made`, which is null if
+  /// all elements are near. `factor` is the factor of the stiffness at u*. `whole` and `factor` must exist until then.
   static Pieces make(const Solid& whole, const Factor& factor, Config config, std::unique_ptr<NearBody>& made);
 
   VectorXd beginning() const override { return beginning_; }
@@ -53,16 +51,15 @@ class NearBody : public Elastic {
   void stiffness(const VectorXd& u, Curvature curvature, SymmetricMatrix& to) const override;
   std::size_t bytes() const noexcept override;
 
-  /// This body's number of a node of the whole solid; −1 if it is far or on Γ, where no tool may press.
+  /// Returns the number of a node of the whole solid in this body, or −1 if the tool may not press it.
   int own_node(int node) const noexcept { return own_of_[at(node)]; }
 
   int modes() const noexcept { return static_cast<int>(modes_.cols()); }
-  int interface() const noexcept { return static_cast<int>(rim_.size()); }  ///< unknowns of Γ, which the modes replace
+  int interface() const noexcept { return static_cast<int>(rim_.size()); }  ///< unknowns of Γ
 
-  /// Estimate of the force (N) that the far elements' own law would add on a tool at `depth` (m), at the shape v of the
-  /// linear far field: z·(f(v) − f(u*) − K (v − u*)). z is the shape per metre of depth: v/depth, or that of u* if u*
-  /// is deeper. Sampled on some elements next to Γ and scaled by their share of the total at a small press of the
-  /// center.
+  /// Estimates the force (N) on a tool at `depth` (m) that is missing because the far field is linear: z·(f(v) − f(u*)
+  /// − K (v − u*)). v is the shape of the linear far field, and z is the shape per depth. Only some elements next to Γ
+  /// are evaluated, and their result is scaled.
   double left_out(const VectorXd& u, double depth) const;
 
  private:
@@ -71,8 +68,8 @@ class NearBody : public Elastic {
 
   VectorXd placed(const VectorXd& u) const;
 
-  Solid part_;            ///< near elements; Γ is free in it
-  std::vector<int> rim_;  ///< components of Γ that are free in `part_`
+  Solid part_;            ///< near elements
+  std::vector<int> rim_;  ///< free components of Γ in `part_`
   MatrixXd modes_;        ///< Ψ
   MatrixXd far_;          ///< S
   VectorXd held_;         ///< r
@@ -81,21 +78,20 @@ class NearBody : public Elastic {
   double about_depth_;
   std::vector<int> own_of_;
 
-  /// A solid linearized about u*.
   struct Linear {
     Linear() = default;
     Linear(const Solid& solid, VectorXd u);
-    /// Work (J) along `along` of the nonlinear forces beyond the linearized ones, at the motion `moved` from u*.
+    /// Returns the work (J) of the nonlinear part of the forces along `along`.
     double excess(const Solid& solid, const VectorXd& moved, const VectorXd& along) const;
     VectorXd about;   ///< u*, m
-    VectorXd forces;  ///< N, free components
+    VectorXd forces;  ///< N, free
     SymmetricMatrix stiffness;
   };
-  /// Sampled far elements next to Γ.
+  /// The far elements that left_out() evaluates.
   struct Watched {
     Solid part;
     Linear linear{};
-    MatrixXd followed{};  ///< their displacements from u* per mode
+    MatrixXd followed{};  ///< displacements of each mode
     double share = 1;
   };
   Watched watched_;

@@ -11,16 +11,16 @@
 
 namespace tendon::softbody {
 
-/// Difference between two ways of answering at the point where the second takes over.
+/// The difference between two methods where the second one takes over.
 struct Handover {
-  double ratio = 1;           ///< force before / force after
-  Vec2 slope = Vec2::Zero();  ///< slope before − slope after
-  double depth = 0;           ///< m, tool depth at the handover
+  double ratio = 1;           ///< of the forces, before to after
+  Vec2 slope = Vec2::Zero();  ///< before minus after
+  double depth = 0;           ///< m, of the tool
 };
 Handover handover(const Reaction& before, const Reaction& after, double depth);
 
-/// Adds `share` (0 … 1) of a handover's difference to force, stiffness and slope. Below the handover's depth the ratio
-/// of the forces is applied, above it their difference. Also added to `error`.
+/// Returns `reaction` plus the share (0 … 1) of the difference. If the tool is less deep than at the handover, the
+/// ratio of the forces is used, otherwise their difference.
 Reaction kept(const Handover& before, double share, const Reaction& reaction);
 
 /// Large rotations and strains near the tool, a linear body elsewhere: Newton's method on a NearBody around the patch.
@@ -69,52 +69,48 @@ class NearModel : public Model {
     QuasiStaticModel::Config newton = {};
     int modes = NearBody::Config{}.modes;
   };
-  /// Builds the near field of `first`. Solid and surface must outlive this object. Throws the errors of
+  /// Builds the near field of `first`. `solid` and `surface` must outlive this object. Throws the errors of
   /// QuasiStaticModel.
   NearModel(const Solid& solid, const TouchSurface& surface, const Patch& first, const Config& config);
-  /// Builds no field: `background` makes them (make_fields_by()), starting with the first answer.
+  /// Lets `background` build all near fields.
   NearModel(const Solid& solid, const TouchSurface& surface, const Config& config, Background background);
   ~NearModel() override;
 
-  /// Makes all further fields by `background`, one at a time; its tasks own a copy of the body. An exception in a task
-  /// is rethrown by the next press().
+  /// Lets `background` build the next fields, one at a time. The work owns a copy of the body. If it throws, the next
+  /// press() rethrows the exception.
   void make_fields_by(Background background);
-  /// Abandons the field in progress and requests no more: the body is about to be cut.
+  /// Must be called before the body is cut.
   void make_no_more_fields();
 
   Reaction press(const Patch& patch, Given given, double value) override;
-  /// To be called when a rung has answered instead. `room` is 1 far from the border of the rung's region and 0 at the
-  /// border, where this model takes over. With a background thread the next field is requested as usual. Without one,
-  /// nothing is built while `room` is 1; below 1 an answer makes a piece if the present field does not contain the
-  /// patch, and more if `room` falls quickly, so that the field is complete at 0. No fading follows, since the previous
-  /// force did not come from a field.
+  /// Must be called if a rung has answered. `room` is 0 at the border of the rung and 1 far from it. The background
+  /// thread makes fields as usual. Without it, answers build a field while `room` is below 1, so that it is complete at
+  /// 0.
   void follow(const Patch& patch, const Reaction& felt, double room);
   void cut(const Division& division, const EffectsConfig& effects) override;
-  /// The first answers are those of the cut body without a field, scaled by the nonlinear correction of the last force
-  /// before the cut.
+  /// The first answers are those of the cut body without a field, scaled by the nonlinear part of the last force.
   void go_on_from(const Model& before, std::span<const int> node_before) override;
   bool glides() const noexcept override { return true; }
-  /// Includes the background thread's memory, but not a field in progress, which needs two numbers per unknown of the
-  /// whole body and load (2 modes + 1 loads).
+  /// Includes the background thread, but not a field that is being built. Such a field needs two numbers for each
+  /// unknown and each of the 2 modes + 1 loads.
   std::size_t bytes() const noexcept override;
 
-  /// The present near field (zero while a cut body has none), and counts since construction, also before cuts.
+  /// The present near field, and counters since construction.
   struct Size {
-    double radius = 0;         ///< ρ, m; 0: the whole body is near
-    std::size_t elements = 0;  ///< near elements
-    int interface = 0;         ///< unknowns of the nodes shared by near and far
-    int modes = 0;             ///< that replace them
+    double radius = 0;  ///< ρ, m; 0 if the whole body is near
+    std::size_t elements = 0;
+    int interface = 0;  ///< unknowns on the boundary
+    int modes = 0;      ///< number of modes that replace them
     int unknowns = 0;
-    int made = 0;               ///< near fields used, including the first
-    int pieces = 0;             ///< made by answers, including those of unfinished fields
+    int made = 0;               ///< near fields that were used
+    int pieces = 0;             ///< made by answers
     int late = 0;               ///< background fields that were discarded
-    int linear = 0;             ///< answers without a field: linear body and one Newton step
-    std::size_t elsewhere = 0;  ///< bytes kept by the background thread, part of bytes(); 0: no thread
+    int linear = 0;             ///< answers without a field
+    std::size_t elsewhere = 0;  ///< bytes of the background thread
   };
   Size size() const;
 
  private:
-  /// The last answer.
   struct Hand {
     Patch patch;  ///< without curvatures
     Vec3 place = Vec3::Zero();
@@ -124,48 +120,47 @@ class NearModel : public Model {
   struct Making;
   struct Oracle;
 
-  /// Begins a field around the patch, replacing the one in progress.
+  /// Starts to build a field around the patch.
   void begin(const Patch& patch, double depth);
-  /// Makes one piece of the field in progress, or as many as are due; all of them if `room` is 0.
+  /// Builds the pieces that are due. If `room` is 0, all of them are due.
   void go_on(const Patch& patch, const Vec3& place, double depth, double room);
-  /// Advances or takes over a field for this patch.
+  /// Builds or takes a field for the patch.
   void make_or_take(const Patch& patch, const Vec3& place, double depth, double room);
   void keep(const Patch& patch, const Vec3& place, const Reaction& felt);
   void take_over(std::unique_ptr<Field> field);
-  /// Discards the fields and the last patch position, which refer to the uncut body.
   void begin_cut();
 
-  // With a background thread:
+  // With a background thread.
   void take_made(const Patch& patch, const Vec3& place, double depth);
   void ask();
-  /// With the present field, or linear_press() if it does not contain the patch.
+  /// Uses linear_press() if the field does not contain the patch.
   Reaction press_by_field_or_linear(const Patch& patch, const Vec3& place, Given given, double value);
-  /// The linear body and one Newton step from its shape.
+  /// Uses the linear body and one Newton step.
   Reaction linear_press(const Patch& patch, Given given, double value) const;
-  /// Difference between the last answer and linear_press() there.
+  /// Returns the difference between the last answer and linear_press().
   Handover beyond_linear() const;
 
   const Solid& solid_;
   const TouchSurface& surface_;
   Config config_;
-  Factor at_rest_;  ///< of the whole body at rest
+  Factor at_rest_;  ///< of the whole body
   Size size_;
-  std::unique_ptr<Making> making_;  ///< the next field, or null
-  std::unique_ptr<Field> field_;    ///< null if a cut body has none yet
+  std::unique_ptr<Making> making_;  ///< the next field
+  std::unique_ptr<Field> field_;    ///< null if a cut body has none
   Hand last_;
   Handover handover_;
-  double fading_over_ = 0;  ///< m, length of the fading
-  double faded_ = 0;        ///< m, faded so far
+  double fading_over_ = 0;  ///< m
+  double faded_ = 0;        ///< m
 
-  std::shared_ptr<Oracle> oracle_;  ///< null without a background thread
+  std::shared_ptr<Oracle> oracle_;  ///< null if there is no background thread
   Background background_;
-  std::unique_ptr<Field> spent_;  ///< list of old fields to return to the background thread
+  std::unique_ptr<Field> spent_;  ///< to be freed by the background thread
   bool asked_ = false;
-  bool by_linear_ = false;          ///< how the last answer was computed
-  bool parted_ = false;             ///< the body has been cut
-  int since_asked_ = 0;             ///< answers since the last request
-  int last_took_ = 0;               ///< answers between request and use of the last field
-  Vec3 per_answer_ = Vec3::Zero();  ///< m, hand motion per answer
+  bool by_linear_ = false;  ///< the last answer was linear_press()
+  bool parted_ = false;
+  int since_asked_ = 0;             ///< answers
+  int last_took_ = 0;               ///< answers
+  Vec3 per_answer_ = Vec3::Zero();  ///< m, motion of the hand
 };
 
 }  // namespace tendon::softbody

@@ -9,8 +9,7 @@
 
 namespace tendon::softbody {
 
-/// A fast way to answer some presses of a body; near/ladder.h tries several in order. Stateless: the same press has the
-/// same answer.
+/// A fast method for some presses (near/ladder.h). It has no state.
 class Rung {
  public:
   Rung() = default;
@@ -20,22 +19,22 @@ class Rung {
 
   struct Answer {
     Reaction reaction;
-    double share;  ///< in (0, 1]; if below 1, the next rung contributes the rest
+    double share;  ///< between 0 and 1
   };
-  /// The answer to a patch at the given depth, m. Empty if this rung does not cover the press.
+  /// Returns the answer at a given depth (m). Empty if the press is outside the valid region.
   virtual std::optional<Answer> press(const Patch& patch, double depth) const = 0;
 
-  /// Distance to where the share falls below 1: 0 there, 1 far from it, linear in between. Computes no answer.
+  /// Returns 0 where the share is below 1, and 1 far from there.
   virtual double room(const Vec2& middle, double depth) const = 0;
 
   struct Size {
     std::string_view name;
-    int shapes = 0;            ///< unknowns
-    std::size_t elements = 0;  ///< that are summed over
+    int shapes = 0;  ///< unknowns
+    std::size_t elements = 0;
     std::size_t bytes = 0;
-    int cells = 0;  ///< grid cells in which it may answer
+    int cells = 0;  ///< grid cells with answers
     int of_cells = 0;
-    double error = 0;  ///< largest relative force error in those cells
+    double error = 0;  ///< largest relative error of the force
   };
   virtual Size size() const = 0;
 };

@@ -22,16 +22,16 @@ namespace tendon::softbody {
 /// interpolation error.
 struct TabulatedAnswers {
   PressGrid grid;
-  /// For each knot E, F and k in grid units, each with ∂x, ∂y, ∂x∂y; J.
+  /// E, F and k in units of the grid, each with ∂x, ∂y, ∂x∂y.
   static constexpr std::size_t kNumbers = 12;
   std::vector<double> numbers{};
   std::vector<double> errors{};  ///< Trust::errors()
 };
 
-/// The solved cell centers give the error. A knot without glide is unknown.
+/// The centers of cells define the error. Knots without Reaction::glide are left out.
 TabulatedAnswers tabulate(const SolvedPresses& presses);
 
-/// E and its derivatives at a grid point, in SI units.
+/// E and its derivatives in SI units.
 struct TabulatedEnergy {
   double energy = 0;           ///< J
   double force = 0;            ///< N, ∂E/∂δ
@@ -42,10 +42,9 @@ struct TabulatedEnergy {
 };
 TabulatedEnergy energy_at(const TabulatedAnswers& table, const PressGrid::Point& point);
 
-/// The table where its error permits; an answer takes microseconds.
 class TabulatedRung : public Rung {
  public:
-  /// `tolerance`: accepted relative force error.
+  /// `tolerance` is the accepted relative error of the force.
   TabulatedRung(TabulatedAnswers table, double tolerance);
 
   std::optional<Answer> press(const Patch& patch, double depth) const override;

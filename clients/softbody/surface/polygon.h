@@ -11,7 +11,6 @@
 
 namespace tendon::softbody {
 
-/// The corners of a polygon in two dimensions.
 using Flat = std::vector<Eigen::Vector2d>;
 
 /// Projects a polygon along the coordinate axis that gives the largest area. The coordinates are copied, so there is no

@@ -8,15 +8,15 @@
 
 namespace tendon::softbody {
 
-/// A closed part of a surface. Its facets are connected by edges.
+/// A closed part of a surface.
 struct Shell {
   std::vector<std::size_t> facets;
   double volume = 0;  ///< negative if the facets point inwards
-  int depth = 0;      ///< the number of shells that contain it
-  int within = -1;    ///< the innermost of these, or −1
+  int depth = 0;      ///< number of shells around it
+  int within = -1;    ///< innermost of these, or −1
 };
 
-/// The shells in the order of their first facets. If the surface is not closed, `depth` and `within` are undefined.
+/// Returns the shells. If the surface is not closed, `depth` and `within` are undefined.
 std::vector<Shell> shells(const Triangles& surface);
 
 /// A shell inside an even number of others is a body and must point outwards. A shell inside an odd number of others
@@ -24,10 +24,10 @@ std::vector<Shell> shells(const Triangles& surface);
 /// "`name`: …" with a facet and its place.
 void check_shells(const Triangles& surface, std::string_view name);
 
-/// Separates the bodies. Each result contains one body and its cavities.
+/// Separates the bodies with their cavities.
 std::vector<Triangles> bodies(const Triangles& surface);
 
-/// Triangles::notes, and a note if the surface has cavities or more than one body.
+/// Returns Triangles::notes, and notes about cavities and about several bodies.
 std::vector<std::string> notes_on(const Triangles& surface);
 
 inline constexpr std::size_t kMostShells = 1000;

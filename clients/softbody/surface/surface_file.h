@@ -13,8 +13,8 @@ namespace tendon::softbody {
 /// The facets of a surface file: polygons with three or more corners.
 struct Facets {
   std::vector<Vec3> points;
-  std::vector<int> corners{};       ///< the points of all facets, one facet after another
-  std::vector<std::size_t> ends{};  ///< for each facet, the end of its range in `corners`
+  std::vector<int> corners{};       ///< points of all facets
+  std::vector<std::size_t> ends{};  ///< end of each facet in `corners`
   bool each_by_itself = false;      ///< true for STL: facets do not share points
 
   std::span<const int> facet(std::size_t number) const {
@@ -23,7 +23,7 @@ struct Facets {
   }
 };
 
-/// The sizes of the header and of one facet in a binary STL file, in bytes.
+/// Sizes of the header and of a facet in a binary STL file, in bytes.
 inline constexpr std::size_t kStlHead = 84;
 inline constexpr std::size_t kStlFacet = 50;
 

@@ -16,15 +16,15 @@ namespace tendon::softbody {
 struct Triangles {
   std::vector<Vec3> points;
   std::vector<std::array<int, 3>> facets;
-  std::vector<int> numbers{};        ///< for each triangle, its facet number in the file; empty: its own number
-  std::vector<std::string> notes{};  ///< one sentence per repair by read_surface()
+  std::vector<int> numbers{};        ///< numbers of the facets in the file, if they are different
+  std::vector<std::string> notes{};  ///< repairs
 
-  /// Enclosed volume. Negative if the surface is inside out.
+  /// The volume is negative if the surface is inside out.
   double volume() const;
-  double longest_side() const;  ///< of the bounding box
+  double longest_side() const;
   int number(std::size_t facet) const { return numbers.empty() ? static_cast<int>(facet) + 1 : numbers[facet]; }
   std::array<Vec3, 3> corners(std::size_t facet) const;
-  std::string place(std::size_t facet) const;  ///< facet number and center: "facet 7 at (1, 2, 3)"
+  std::string place(std::size_t facet) const;  ///< "facet 7 at (1, 2, 3)"
 };
 
 /// Reads a surface file (read_facets()) and triangulates its polygons (triangles_of()). Each repair is added to
@@ -37,10 +37,10 @@ struct Triangles {
 /// Throws std::invalid_argument "FILE: …" with the line or the facet if read_facets() fails, if a polygon is not
 /// simple, if there are no facets, or if the file is larger than kMaxMeshBytes.
 Triangles read_surface(const std::filesystem::path& file);
-/// Reads a file in memory. `ending` is the extension (".stl"); `name` is used in error messages.
+/// `ending` is the extension (".stl"), and `name` is used in error messages.
 Triangles parse_surface(std::string_view text, std::string_view ending, std::string_view name);
 
-/// Largest number of corners of a polygon. Triangulation is quadratic in this number.
+/// The maximum number of corners of a polygon.
 inline constexpr std::size_t kMostCorners = 10'000;
 
 /// Checks that the surface bounds one or more volumes: each edge belongs to two facets with opposite directions, no two
@@ -48,7 +48,6 @@ inline constexpr std::size_t kMostCorners = 10'000;
 /// std::invalid_argument "`name`: …" with the number and place of a facet.
 void check(const Triangles& surface, std::string_view name);
 
-/// Binary STL.
 void write_stl(const std::filesystem::path& file, const Triangles& surface);
 
 }  // namespace tendon::softbody

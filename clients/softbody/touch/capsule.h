@@ -37,18 +37,18 @@ namespace tendon::softbody {
 /// Thread-safe: no. Realtime-safe: no.
 class CapsuleContact {
  public:
-  /// `nodes`: the touchable ones, ascending; `radius`: m, positive; `half_length`: m, from the center to the center of
-  /// each end, ≥ 0. Computes the compliance of the nodes, three solves each. Throws std::invalid_argument. The surface
+  /// `nodes` are the touchable nodes, in ascending order. `half_length` is the distance (m) from the center to the
+  /// center of an end. Computes the compliance with three solves for each node. Throws std::invalid_argument. `surface`
   /// must outlive this object.
   CapsuleContact(const Solid& solid, const TouchSurface& surface, const std::vector<int>& nodes, double radius,
                  double half_length);
 
-  /// Answer with the capsule centered at `middle` (m), its axis along the unit vector `axis`, and the torque about
-  /// `about` (m); body frame. Feel::torque is always set. No force if an argument is not finite. Throws
-  /// std::out_of_range if the capsule touches the body outside `nodes`, or where it is fixed.
+  /// Returns the answer for a capsule at `middle` with the unit vector `axis` (body frame). The torque is about
+  /// `about`. There is no force if an argument is not finite. Throws std::out_of_range if the capsule touches the body
+  /// outside `nodes`.
   Feel at(const Vec3& middle, const Vec3& axis, const Vec3& about);
 
-  /// Number of problems of `pushes.h` solved for the last answer.
+  /// Returns the number of problems that the last answer has solved.
   int rounds() const noexcept { return rounds_; }
 
   std::size_t bytes() const noexcept;
@@ -56,9 +56,8 @@ class CapsuleContact {
   static constexpr double kEnough = 1e-6;
 
  private:
-  /// A tangent plane of the capsule.
   struct Plane {
-    Vec3 point;   ///< m, point of contact
+    Vec3 point;   ///< m
     Vec3 normal;  ///< unit vector, outward
   };
   struct Capsule {
@@ -68,13 +67,13 @@ class CapsuleContact {
     double half_length;
     Vec3 nearest_of_axis(const Vec3& y) const;
     Plane nearest(const Vec3& y, const Vec3& otherwise) const;
-    /// Height in m of the capsule's lower side above x along n; empty if it is nowhere above or below x.
+    /// Returns the height (m) of the capsule above x along n. Empty if it is not above or below x.
     std::optional<double> above(const Vec3& x, const Vec3& n) const;
   };
   struct Node {
-    Eigen::Index row;  ///< index in nodes_
+    Eigen::Index row;
     Vec3 at_rest;
-    Vec3 at;  ///< deformed position
+    Vec3 at;
     Plane plane;
   };
   std::vector<Node> near(const Capsule& tool, double& gap) const;
@@ -85,10 +84,10 @@ class CapsuleContact {
   const TouchSurface& surface_;
   double radius_;
   double half_length_;
-  std::vector<Vec3> places_;          ///< m, at rest, of surface_.nodes()
-  std::vector<Eigen::Index> row_of_;  ///< index of each surface_.nodes() in compliance_, in blocks of three; −1: absent
+  std::vector<Vec3> places_;          ///< m, at rest
+  std::vector<Eigen::Index> row_of_;  ///< row of each node in compliance_, or −1
   MatrixXd compliance_;               ///< m/N
-  std::vector<bool> pushed_;          ///< by row, in the last answer
+  std::vector<bool> pushed_;          ///< by row
   int rounds_ = 0;
 };
 

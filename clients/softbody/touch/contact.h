@@ -15,34 +15,32 @@ namespace tendon::softbody {
 /// Position and orientation of a handle.
 struct Pose {
   Vec3 position = Vec3::Zero();  ///< m
-  Mat3 turn = Mat3::Identity();  ///< rotation from the handle frame to the frame of `position`
+  Mat3 turn = Mat3::Identity();  ///< from the handle frame
 };
 
-/// The torque on the hand.
 struct FeltTorque {
-  Vec3 torque = Vec3::Zero();  ///< N·m, about the handle's position
-  Mat3 stiffness = Mat3::Zero();  ///< N·m/rad, −∂torque/∂θ for a small rotation θ; symmetric positive semidefinite
+  Vec3 torque = Vec3::Zero();     ///< N·m, about the handle's position
+  Mat3 stiffness = Mat3::Zero();  ///< N·m/rad, −∂torque/∂θ, positive semidefinite
 };
 
-/// The nearest symmetric positive semidefinite matrix.
+/// Returns the nearest positive semidefinite matrix.
 Mat3 not_negative(const Mat3& stiffness);
 
-/// The answer to one tool position.
+/// The answer to one position of the tool.
 struct Feel {
   Vec3 force = Vec3::Zero();  ///< N, on the hand
-  /// N/m, −∂force/∂position, symmetric. Can be indefinite, in directions in which the tool would slip off.
+  /// N/m, −∂force/∂position. It is symmetric and can be indefinite.
   Mat3 stiffness = Mat3::Zero();
-  /// m, distance from the tool to the body along the normal; negative inside. During contact it is measured to the
-  /// surface at rest.
+  /// The distance from the tool to the surface at rest along the normal (m). Negative if the tool is inside.
   double gap = 0;
-  /// m, tool motion within which `force` and `stiffness` hold. Does not account for leaving the surface: see `gap`.
+  /// The tool may move by this distance (m) before `force` and `stiffness` are invalid. It does not consider `gap`.
   double valid_radius = 0;
-  double error = 0;  ///< N, estimated error of the solver
+  double error = 0;  ///< N, estimated by the solver
   Way way = Way::kOnly;
   bool touching = false;
-  std::optional<Vec3> normal{};   ///< unit vector from the body to the tool; empty: the scene's direction to the tool
-  bool topology_changed = false;  ///< first answer after a cut; earlier answers no longer hold
-  std::optional<FeltTorque> torque{};  ///< empty: the tool is at the handle, and no force rotates it
+  std::optional<Vec3> normal{};        ///< unit vector; empty: the scene's direction to the tool
+  bool topology_changed = false;       ///< true for the first answer after a cut
+  std::optional<FeltTorque> torque{};  ///< empty if the force cannot turn the handle
 };
 
 /// A tool that presses a patch of a body.
@@ -66,26 +64,24 @@ struct Feel {
 class PatchContact {
  public:
   enum class Side : std::uint8_t {
-    kUnilateral,  ///< the tool separates instead of pulling
-    kBilateral,   ///< after first contact the tool sticks to the patch along the normal, and can pull
+    kUnilateral,  ///< the tool cannot pull
+    kBilateral,   ///< after the first contact the tool sticks and can pull
   };
 
-  /// `tool_radius` (m): 0 for a point; a sphere makes contact earlier by its radius. Model and surface must outlive
-  /// this.
+  /// A tool with a `tool_radius` (m) above 0 touches earlier. `model` and `surface` must outlive this object.
   PatchContact(Model& model, const TouchSurface& surface, double tool_radius, Side side,
                std::unique_ptr<Friction> friction = {});
 
-  /// The answer with the tool's center at `tool` (m, body frame). No force if the patch is not on the body or `tool` is
-  /// not finite.
+  /// Returns the answer for a tool at `tool` (m, body frame). There is no force if the patch is not on the body.
   Feel at(const Vec3& tool);
 
-  /// Continues from `before`, and takes over its friction.
+  /// Continues from `before` and takes its friction.
   void go_on_from(PatchContact& before) {
     stuck_ = before.stuck_;
     friction_ = std::move(before.friction_);
   }
 
-  std::size_t bytes() const noexcept { return friction_ ? friction_->bytes() : 0; }  ///< of the effects
+  std::size_t bytes() const noexcept { return friction_ ? friction_->bytes() : 0; }
 
  private:
   void rub(const Vec2& place, double normal_force, Feel& feel);

@@ -10,10 +10,10 @@
 
 namespace tendon::softbody {
 
-/// Signed distance from a surface, with its first two derivatives with respect to position.
+/// A signed distance with its first two derivatives.
 struct Distance {
-  double value = 0;               ///< φ, m; negative inside
-  Vec3 gradient = Vec3::Zero();   ///< ∇φ, outward; of length 1 where φ is exact
+  double value = 0;               ///< φ, m, negative inside
+  Vec3 gradient = Vec3::Zero();   ///< ∇φ, outward
   Mat3 curvature = Mat3::Zero();  ///< ∇∇φ, 1/m
 };
 
@@ -28,17 +28,17 @@ struct Distance {
 /// Outside the box: the distance from the surface point nearest to where the path enters the box, found in two
 /// iterations. Slightly too large; continuous in value and direction at the box.
 ///
-/// Without state. Thread-safe: yes. Realtime-safe: yes, once built.
+/// Stateless. Thread-safe: yes. Realtime-safe: yes, after construction.
 class DistanceGrid {
  public:
-  /// Samples `distance` on a grid of `cell` (m, positive), x fastest, on and around the box from `low` to `high`, which
-  /// must contain the surface. Throws std::invalid_argument if there would be more than kMostPoints, or if the samples
-  /// are not a distance: they differ by more than the distance between two points.
+  /// Calls `distance` for a grid around the box from `low` to `high`, which must contain the surface. `cell` is the
+  /// step (m). Throws std::invalid_argument if there are more than kMostPoints, or if two neighbors differ by more than
+  /// their distance.
   DistanceGrid(const std::function<double(const Vec3&)>& distance, const Vec3& low, const Vec3& high, double cell);
 
-  /// At `x`, m. NaN if `x` is not finite.
+  /// Returns NaN if `x` (m) is not finite.
   Distance at(const Vec3& x) const;
-  double value(const Vec3& x) const;  ///< φ only, for a quarter of the work
+  double value(const Vec3& x) const;
 
   std::size_t points() const noexcept { return weights_.size(); }
   std::size_t bytes() const noexcept { return weights_.size() * sizeof(float); }
@@ -55,7 +55,7 @@ class DistanceGrid {
   Vec3 high_;
   double cell_;
   std::array<int, 3> cells_{};
-  std::vector<float> weights_;  ///< spline weights, x fastest; cell i along an axis uses i to i + 3
+  std::vector<float> weights_;  ///< x first; cell i along an axis uses i to i + 3
 };
 
 }  // namespace tendon::softbody

@@ -22,15 +22,15 @@ using Vec2 = Eigen::Vector2d;
 /// Thread-safe: no.
 class Friction {
  public:
-  /// `coefficient` µ ≥ 0; `stiffness` N/m, above 0. Throws std::invalid_argument.
+  /// `stiffness` is in N/m. Throws std::invalid_argument.
   Friction(double coefficient, double stiffness);
 
   struct Drag {
     Vec2 force = Vec2::Zero();  ///< N, on the tool, tangential
     double stiffness = 0;       ///< N/m, −∂force/∂place; 0 while sliding
-    double until_slip = 0;      ///< m, tool motion until it slides; 0 while sliding
+    double until_slip = 0;      ///< m, distance until the tool slides; 0 while it slides
   };
-  /// Moves the tool to `place` (m, tangential) under `normal_force` (N). A force ≤ 0 releases the anchor.
+  /// Moves the tool to `place` (m). If `normal_force` (N) is not positive, the anchor is released.
   Drag move(const Vec2& place, double normal_force);
   void let_go() { anchor_.reset(); }
 
@@ -42,8 +42,8 @@ class Friction {
   std::optional<Vec2> anchor_;
 };
 
-/// Tangential stiffness, N/m, of a half space under a non-slipping disc of `radius` a (m): 8 G a/(2 − ν) (Mindlin
-/// 1949).
+/// Returns the tangential stiffness (N/m) of a half space under a disc with `radius` a (m) that does not slip: 8 G a/(2
+/// − ν) (Mindlin 1949).
 double sideways_stiffness(const Material& material, double radius);
 
 }  // namespace tendon::softbody

@@ -12,15 +12,15 @@
 
 namespace tendon::softbody {
 
-/// A rigid tool with its offset from the handle.
+/// A rigid tool in a handle.
 struct HeldTool {
   RigidShape shape;
-  Vec3 offset = Vec3::Zero();  ///< m, handle frame, from the handle's position to the tool's center
+  Vec3 offset = Vec3::Zero();  ///< m, from the handle to the center of the tool, handle frame
 
   Vec3 middle(const Pose& handle) const { return handle.position + handle.turn * offset; }
-  /// Distance from the tool's surface to a point x of the body, in the frame of `handle`.position.
+  /// Returns the distance of a point x from the surface of the tool.
   Distance distance(const Pose& handle, const Vec3& x) const;
-  double value(const Pose& handle, const Vec3& x) const { return shape.value(in_tool(handle, x)); }  ///< φ only
+  double value(const Pose& handle, const Vec3& x) const { return shape.value(in_tool(handle, x)); }
   Vec3 in_tool(const Pose& handle, const Vec3& x) const {
     return handle.turn.transpose() * (x - handle.position) - offset;
   }
@@ -50,110 +50,108 @@ struct HeldTool {
 class Layer {
  public:
   struct Config {
-    double thickness = 1e-4;  ///< ℓ, m, above 0
-    double young = 0;         ///< E, Pa, above 0
-    double friction = 0;      ///< µ, 0 or more
-    double shear = 0;         ///< Pa, above 0 with friction
-    double piece = 0;         ///< m, positive: approximate spacing of points on a facet; 4 × 4 to 32 × 32 points
-    std::size_t tools = 1;    ///< number of tools
+    double thickness = 1e-4;  ///< ℓ, m
+    double young = 0;         ///< E, Pa
+    double friction = 0;      ///< µ
+    double shear = 0;         ///< Pa
+    double piece = 0;         ///< m, distance between points; a facet has 4 × 4 to 32 × 32 points
+    std::size_t tools = 1;
   };
-  /// Covers the movable part of the surface of `elastic`, which must outlive this object. Throws std::invalid_argument.
+  /// `elastic` must outlive this object. Throws std::invalid_argument.
   Layer(const Elastic& elastic, const Config& config);
 
-  /// A tool at its present pose; empty: absent.
+  /// A tool with its pose. The pose is empty if the hand is absent.
   struct Placed {
     const HeldTool* tool;
     std::optional<Pose> handle;
   };
 
-  /// The facets close to a tool, and the nodes that move them.
+  /// The facets near the tools, and their nodes.
   struct Near {
     struct Site {
       std::size_t tool;
       int facet;
-      std::vector<int> nodes;  ///< indices into Near::nodes
+      std::vector<int> nodes;  ///< indices of the nodes below
     };
-    std::vector<int> nodes;  ///< of the mesh, ascending
+    std::vector<int> nodes;  ///< ascending
     std::vector<Site> sites;
   };
-  /// The facets with a point closer to a tool than `margin` times the facet size, at displacements u.
+  /// Returns the facets with a point closer to a tool than `margin` times the size of the facet.
   Near near(std::span<const Placed> tools, const VectorXd& u, double margin) const;
 
   using Vec6 = Eigen::Matrix<double, 6, 1>;
   using Mat6 = Eigen::Matrix<double, 6, 6>;
-  /// Derivatives of Ψ with respect to a tool's pose: handle position and small rotations about it.
+  /// The derivatives of Ψ with respect to the pose of a tool.
   struct Felt {
-    Vec6 slope = Vec6::Zero();   ///< ∂Ψ/∂p: minus the force and torque on the hand
+    Vec6 slope = Vec6::Zero();   ///< ∂Ψ/∂p: minus force and torque
     Mat6 curve = Mat6::Zero();   ///< ∂²Ψ/∂p²
-    MatrixXd mixed;              ///< ∂²Ψ/∂u∂p; three rows per node, a column per pose component
-    double area = 0;             ///< m², pressed
-    Vec3 middle = Vec3::Zero();  ///< m, area-weighted mean of the pressed points
-    double spread = 0;           ///< m, from `middle` to the farthest pressed point
+    MatrixXd mixed;              ///< ∂²Ψ/∂u∂p
+    double area = 0;             ///< m², in contact
+    Vec3 middle = Vec3::Zero();  ///< m, center of the contact
+    double spread = 0;           ///< m, radius of the contact
   };
   struct Press {
-    double energy = 0;       ///< Ψ, J
-    VectorXd slope;          ///< ∂Ψ/∂u, N, for Near::nodes
-    MatrixXd curve;          ///< ∂²Ψ/∂u², N/m, for Near::nodes
-    std::vector<Felt> felt;  ///< per tool
+    double energy = 0;  ///< Ψ, J
+    VectorXd slope;     ///< ∂Ψ/∂u, N
+    MatrixXd curve;     ///< ∂²Ψ/∂u², N/m
+    std::vector<Felt> felt;
   };
-  enum class Order { kEnergy, kCurve, kFelt };  ///< energy and slope; and curve; and felt
-  /// With the nodes of `near` at `places`, m, one column each.
+  enum class Order { kEnergy, kCurve, kFelt };  ///< each one includes the previous ones
+  /// `places` are the positions (m) of the nodes of `near`.
   Press press(const Near& near, std::span<const Placed> tools, const Eigen::Matrix3Xd& places, Order order) const;
 
-  /// Positions of Near::nodes at displacements u.
+  /// Returns the positions of the nodes for the displacements u.
   Eigen::Matrix3Xd places(const Near& near, const VectorXd& u) const;
 
-  /// Sets the pressures and normals that bound friction from `places`.
+  /// Sets the pressures and normals for friction.
   void hold(const Near& near, std::span<const Placed> tools, const Eigen::Matrix3Xd& places);
-  /// Ends an answer: ties slide back to their bound, pressed points are tied, others released. Returns the smallest
-  /// single loss and the total loss of the ties, J.
+  /// Ends an answer and updates the ties. Returns the minimum and the sum of the energies (J) that the ties have lost.
   struct Dissipated {
     double least = 0;
     double sum = 0;
-    int slid = 0;  ///< number of ties
+    int slid = 0;  ///< ties
   };
   Dissipated advance(const Near& near, std::span<const Placed> tools, const Eigen::Matrix3Xd& places);
   bool rubs() const noexcept { return config_.friction > 0; }
 
-  /// The minimum distance of the body from a tool, with the outward normal of the body there; ∞ if the tool is absent.
+  /// The minimum distance between a tool and the body. Infinite if the hand is absent.
   struct Gap {
     double value;
-    Vec3 normal;  ///< unit vector towards the tool
+    Vec3 normal;
   };
   Gap gap(const Placed& tool, const VectorXd& u) const;
 
   double thickness() const noexcept { return config_.thickness; }
-  double least_facet() const noexcept { return least_facet_; }  ///< m, square root of the smallest facet area
+  double least_facet() const noexcept { return least_facet_; }  ///< m, root of the area
   std::size_t bytes() const noexcept;
 
  private:
   struct FacetOfPoints {
     std::vector<int> nodes;
-    double size;        ///< m, square root of its area at rest
-    double reach;       ///< m, from the mean of its nodes to the farthest node, at rest
-    std::size_t first;  ///< bunch
+    double size;   ///< m, root of the area at rest
+    double reach;  ///< m, from the center to the farthest node at rest
+    std::size_t first;
     std::size_t count;
   };
-  using Shares = Eigen::Matrix<double, 1, Eigen::Dynamic, 1, 1, 9>;  ///< weights of a facet's nodes
+  using Shares = Eigen::Matrix<double, 1, Eigen::Dynamic, 1, 1, 9>;
   struct PointOfFacet {
     double area;  ///< m², at rest
     Shares shares;
   };
-  /// A cluster of points, to skip those far from a tool.
+  /// A group of points, which is skipped if it is far from the tool.
   struct Bunch {
-    std::size_t first;  ///< point
+    std::size_t first;
     std::size_t count;
     Shares middle;
-    /// Bound on the distance of a point from `middle`, relative to the distance from the mean of the facet's nodes to
-    /// the farthest node, in any shape.
+    /// An upper bound of the distance of its points from the center, divided by FacetOfPoints::reach of any shape.
     double spread;
   };
-  /// Friction tie between a point and a tool.
+  /// Connects a point to a tool.
   struct Tie {
     bool tied = false;
     Vec3 at = Vec3::Zero();      ///< m, handle frame
-    double most = 0;             ///< Pa, bound of its force per area
-    Vec3 normal = Vec3::Zero();  ///< of the tool at the point, body frame
+    double most = 0;             ///< Pa, maximum force per area
+    Vec3 normal = Vec3::Zero();  ///< of the tool, body frame
   };
   double pressure(double overlap, double& stiffness, double& energy) const;
   void add_bunch(FacetOfPoints& facet, std::size_t first);
@@ -169,7 +167,7 @@ class Layer {
   std::vector<FacetOfPoints> facets_;
   std::vector<Bunch> bunches_;
   std::vector<PointOfFacet> points_;
-  std::vector<std::vector<Tie>> ties_;  ///< per tool, by point; empty without friction
+  std::vector<std::vector<Tie>> ties_;  ///< by tool and point
   double least_facet_ = 0;
 };
 

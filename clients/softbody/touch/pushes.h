@@ -8,17 +8,16 @@
 
 namespace tendon::softbody {
 
-/// The nodes pushed by a frictionless rigid tool, and their forces (Signorini's conditions).
+/// The nodes that a rigid tool pushes without friction (Signorini's conditions).
 struct Pushes {
-  std::vector<Eigen::Index> set;  ///< pushed nodes, ascending
-  VectorXd push;                  ///< N, per pushed node, ≥ 0
-  Eigen::LLT<MatrixXd> factor;    ///< of the table's rows and columns of `set`
+  std::vector<Eigen::Index> set;  ///< ascending
+  VectorXd push;                  ///< N
+  Eigen::LLT<MatrixXd> factor;    ///< of `table` for `set`
 };
 
-/// Minimizes ½ λᵀGλ − dᵀλ over λ ≥ 0: a pushed node moves by exactly its `depth` d (m), all others by at least theirs.
-/// `table` is G, the displacement of each node per newton on another (m/N, symmetric positive definite). Active-set
-/// method; starts from `active`, or from all nodes if none is active, and returns the pushed nodes there. At least one
-/// depth must be positive.
+/// Minimizes ½ λᵀGλ − dᵀλ for λ ≥ 0. A pushed node moves by its `depth` d (m), and all others by at least theirs.
+/// `table` is G, the displacement of each node for 1 N on another (m/N, positive definite). The search starts with the
+/// `active` nodes, or with all nodes if there are none, and updates them. At least one depth must be positive.
 Pushes least_pushes(const MatrixXd& table, const VectorXd& depth, std::vector<bool>& active);
 
 }  // namespace tendon::softbody

@@ -38,23 +38,23 @@ namespace tendon::softbody {
 class RigidContact {
  public:
   struct Config {
-    Layer::Config layer;      ///< `tools` is overwritten
-    double tolerance = 1e-6;  ///< relative to the force: an answer ends when its error is at most this
-    int max_iterations = 30;  ///< per step of the tools
-    bool turns = true;        ///< compute torques and their stiffness
+    Layer::Config layer;      ///< `tools` is ignored
+    double tolerance = 1e-6;  ///< relative error of the force
+    int max_iterations = 30;  ///< for each step of the tools
+    bool turns = true;        ///< compute torques
   };
-  /// Moves `body`, whose mesh is `elastic`; both must outlive this object. The body's effects must not include time or
+  /// `elastic` is the mesh of `body`; both must outlive this object. The effects of the body must not include time or
   /// self-collision. Throws std::invalid_argument.
   RigidContact(QuasiStaticModel& body, const Elastic& elastic, const TouchSurface& surface, std::vector<HeldTool> tools,
                const Config& config);
 
-  /// Each hand's answer with the handles at the given poses (body frame), from one solution. An empty pose means an
-  /// absent hand. A hand with a non-finite pose gets no force, and its tool stays in place. Throws
-  /// std::invalid_argument if the number of poses is not that of the tools.
+  /// Returns an answer for each hand (body frame). An empty pose means that the hand is absent. If a pose is not
+  /// finite, there is no force and the tool does not move. Throws std::invalid_argument if the number of poses is
+  /// wrong.
   std::vector<Feel> press(std::span<const std::optional<Pose>> handles);
 
-  int iterations() const noexcept { return iterations_; }                       ///< Newton steps in the last answer
-  const Layer::Dissipated& dissipated() const noexcept { return dissipated_; }  ///< by friction, in the last answer
+  int iterations() const noexcept { return iterations_; }                       ///< in the last answer
+  const Layer::Dissipated& dissipated() const noexcept { return dissipated_; }  ///< in the last answer
 
   std::size_t bytes() const noexcept;
 
@@ -81,14 +81,14 @@ class RigidContact {
   std::vector<HeldTool> tools_;
   Config config_;
   Layer layer_;
-  Vec3 from_;      ///< direction from which tools come
-  VectorXd rest_;  ///< m, all nodes: the untouched shape
+  Vec3 from_;      ///< direction to the tools
+  VectorXd rest_;  ///< m, all nodes
   std::vector<Layer::Placed> placed_;
   Pairs pairs_;
-  int factors_ = 0;             ///< the body's factor count when the next three were filled
-  std::vector<int> column_of_;  ///< by free unknown: column in follows_, or −1
-  MatrixXd follows_;            ///< K₀⁻¹ of unit forces, one column each
-  int columns_ = 0;             ///< columns filled
+  int factors_ = 0;             ///< value of QuasiStaticModel::factors() for the columns below
+  std::vector<int> column_of_;  ///< of follows_, by free unknown, or −1
+  MatrixXd follows_;            ///< K₀⁻¹ of unit forces
+  int columns_ = 0;
   int iterations_ = 0;
   int in_vain_ = 0;
   double error_ = 0;  ///< N

@@ -11,8 +11,8 @@
 
 namespace tendon::softbody {
 
-/// The shortest rotation that takes direction `from` to `to`; both nonzero. For opposite directions: half a turn about
-/// the perpendicular axis closest to z, or to x if `from` is closer to z.
+/// Returns the shortest rotation from one direction to another. For opposite directions, the axis is close to z, or to
+/// x if `from` is close to z.
 Mat3 shortest_rotation(const Vec3& from, const Vec3& to);
 
 /// The shape of a rigid tool around its center, as a signed distance: all points within `rounding` of a box, the core.
@@ -30,44 +30,38 @@ Mat3 shortest_rotation(const Vec3& from, const Vec3& to);
 /// Stateless. Thread-safe: yes. Realtime-safe: yes, after construction.
 class RigidShape {
  public:
-  /// Lengths in m. Each throws std::invalid_argument that names the field.
+  /// All lengths are in m. Throws std::invalid_argument with the name of the field.
   static RigidShape sphere(double radius);
-  /// `half_length`: from the center to the center of each end, ≥ 0; `axis`: unit vector.
+  /// `half_length` is the distance from the center to the center of an end. `axis` is a unit vector.
   static RigidShape capsule(double radius, double half_length, const Vec3& axis);
-  /// `size`: of the whole box along its axes; `edge`: radius of edges and corners, positive and at most half of the
-  /// smallest size.
+  /// `edge` is the radius of the edges and corners, at most half of the smallest size.
   static RigidShape box(const Vec3& size, double edge);
-  /// The inside of `surface` around its origin, with `scale` units per metre, cells of `cell` m, and a grid margin of
-  /// `around` m. Takes some µs per grid point. Throws std::invalid_argument that starts with `name` if the surface does
-  /// not pass check(), has nested parts, or is thinner than 2 cells at some place, which the message names: the grid
-  /// could not resolve it.
+  /// The inside of `surface` around its origin. `scale` is the number of units per metre, and `around` is the margin of
+  /// the grid (m). Throws std::invalid_argument with `name` if the surface does not pass check(), contains parts inside
+  /// each other, or is thinner than two cells.
   static RigidShape mesh(const Triangles& surface, double scale, double cell, double around, std::string_view name);
 
-  /// At `x`, m, tool frame. value() returns φ only, for a fraction of the work.
+  /// `x` is in the tool frame. value() needs less time.
   Distance distance(const Vec3& x) const;
   double value(const Vec3& x) const;
 
-  /// m, distance from the center to the farthest surface point.
+  /// The distance (m) from the center to the farthest point.
   double reach() const noexcept { return reach_; }
 
-  /// m, lower bound of the tool's thickness: a point that moves an eighth of it cannot pass through the tool
-  /// undetected.
+  /// A lower bound of the thickness (m). A point that moves by less than an eighth of it cannot pass through the tool.
   double thinnest() const noexcept { return thinnest_; }
 
-  /// Surface point farthest along `direction`, m, relative to the center. `direction` is a unit vector in the tool
-  /// frame.
+  /// Returns the farthest point (m) along `direction`, a unit vector in the tool frame.
   Vec3 farthest(const Vec3& direction) const;
 
-  /// Properties of a surface and its grid.
   struct MeshFacts {
     std::size_t facets;
-    Vec3 size;           ///< m, of the bounding box
-    double cell;         ///< m
-    std::size_t points;  ///< of the grid
-    std::size_t bytes;   ///< kept by each copy of the shape
-    double error;        ///< m, largest |φ| at corners and at the centers of edges and facets, where φ should be 0
+    Vec3 size;    ///< m
+    double cell;  ///< m
+    std::size_t points;
+    std::size_t bytes;
+    double error;  ///< m, the largest |φ| on the surface
   };
-  /// null unless made by mesh()
   const MeshFacts* mesh_facts() const noexcept { return mesh_ ? &mesh_->facts : nullptr; }
 
  private:
@@ -80,10 +74,10 @@ class RigidShape {
   };
   explicit RigidShape(Mesh mesh);
 
-  Vec3 core_ = Vec3::Zero();  ///< half of the core's size, m
+  Vec3 core_ = Vec3::Zero();  ///< m, half of the size
   double rounding_ = 0;
-  Mat3 turn_ = Mat3::Identity();  ///< the core's axes, as columns, in the tool frame
-  std::optional<Mesh> mesh_;      ///< replaces the members above
+  Mat3 turn_ = Mat3::Identity();  ///< axes of the core in the tool frame
+  std::optional<Mesh> mesh_;      ///< used in place of the members above
   double reach_;
   double thinnest_;
 };

@@ -24,13 +24,13 @@ namespace tendon::softbody {
 /// Thread-safe: no. Realtime-safe: no.
 class SphereContact {
  public:
-  /// Throws std::invalid_argument if the radius is not positive. Model and surface must outlive this object.
+  /// `body` and `surface` must outlive this object. Throws std::invalid_argument if the radius is not positive.
   SphereContact(const CondensedModel& body, const TouchSurface& surface, double radius);
 
-  /// No force if q is not finite. Throws std::out_of_range if the sphere touches the body outside the table.
+  /// There is no force if q is not finite. Throws std::out_of_range if the sphere touches the body outside the table.
   Feel at(const Vec3& q);
 
-  /// m, tangential distance from q to the farthest pushed node in the last answer; 0 if there was none.
+  /// The tangential distance (m) from q to the farthest node that was pushed, or 0.
   double contact_radius() const noexcept { return contact_radius_; }
 
  private:
@@ -39,15 +39,15 @@ class SphereContact {
     double depth;  ///< dᵢ, m
     Vec3 way;      ///< vᵢ
   };
-  /// The table's nodes inside the sphere. Lowers `gap` to the minimum gap over all touchable nodes.
+  /// Returns the nodes inside the sphere. `gap` is the minimum over all touchable nodes.
   std::vector<Overlap> overlaps(const Vec3& q, double& gap) const;
 
   const CondensedModel& body_;
   const TouchSurface& surface_;
   double radius_;
-  std::vector<Vec2> places_;          ///< tangential, of surface_.nodes()
-  std::vector<Eigen::Index> row_of_;  ///< table row of each node; −1: absent
-  std::vector<bool> pushed_;          ///< by row, in the last answer
+  std::vector<Vec2> places_;          ///< tangential
+  std::vector<Eigen::Index> row_of_;  ///< row of each node, or −1
+  std::vector<bool> pushed_;          ///< by row
   double contact_radius_ = 0;
 };
 

@@ -19,30 +19,30 @@ namespace tendon::softbody {
 /// Stateless. Thread-safe: yes. Realtime-safe: yes, after construction.
 class SurfaceDistance {
  public:
-  /// `surface` must have passed check() and have at least one facet.
+  /// `surface` must have passed check().
   explicit SurfaceDistance(const Triangles& surface);
 
-  /// At `x`, in the surface's unit. `at_most`: upper bound of the distance, which limits the search.
+  /// The distance of `x` must not be larger than `at_most`, which limits the search.
   double at(const Vec3& x, double at_most = std::numeric_limits<double>::infinity()) const;
 
  private:
   struct FlatFacet {
     std::array<Vec3, 3> corners;
     Vec3 normal;                     ///< unit vector
-    std::array<Vec3, 3> edges;       ///< edge normals, from each corner to the next
-    std::array<Vec3, 3> of_corners;  ///< corner normals
+    std::array<Vec3, 3> edges;       ///< normals of the edges
+    std::array<Vec3, 3> of_corners;  ///< normals of the corners
   };
-  /// A box around some facets: a leaf, or an inner node with two halves.
+  /// A box around some facets.
   struct BoxOfFacets {
     Vec3 low, high;
-    int first = 0;  ///< facet
-    int count = 0;  ///< own facets; 0: the halves are the next box and `second`
+    int first = 0;
+    int count = 0;  ///< if 0, the halves are the next box and `second`
     int second = 0;
   };
   struct NearestPoint {
     double squared;
-    Vec3 away;    ///< from the nearest surface point to x
-    Vec3 normal;  ///< pseudonormal, not normalized
+    Vec3 away;
+    Vec3 normal;  ///< of any length
   };
   int divide(int first, int count);
   static NearestPoint nearest(const FlatFacet& facet, const Vec3& x);
