@@ -9,7 +9,7 @@ namespace {
 struct AnswerCount {
   std::string key;
   int count;
-  std::string words;  ///< text after the count
+  std::string words;
 };
 
 std::vector<AnswerCount> counts_of(const Answered& answered) {

@@ -25,7 +25,6 @@ namespace {
 
 using enum EffectKind;
 
-/// `numbers` and `parts` are empty unless the mesh is read from a file.
 FileMesh mesh_of(const BodyConfig& config) {
   const Shape shape = info(config.element).shape;
   if (const auto* b = std::get_if<BlockShape>(&config.shape)) return {.mesh = block(shape, b->size, b->cells)};
@@ -54,12 +53,12 @@ bool wants_glide(const BodyConfig& config, const TouchSurface& surface) {
   return config.whole_stiffness || surface.curved();
 }
 
-/// A model, with typed pointers to kinds that offer more than Model.
+/// The model, with pointers to the types that need more than Model.
 struct Made {
   std::unique_ptr<Model> model;
   std::optional<double> linear_up_to{};  ///< m, if a table file provides it
   const CondensedModel* condensed = nullptr;
-  QuasiStaticModel* newton = nullptr;  ///< for rigid tools
+  QuasiStaticModel* newton = nullptr;
   StiffeningModel* stiffening = nullptr;
   NearModel* near = nullptr;
   const Ladder* ladder = nullptr;
@@ -70,7 +69,6 @@ Patch middle_patch(const TouchSurface& surface, const Vec3& middle) {
   throw std::invalid_argument("the middle of the touched side is not on the body");
 }
 
-/// A linear body with a solver other than the local factor.
 std::unique_ptr<Model> solved_model_of(const BodyConfig& config, const Solid& solid, const TouchSurface& surface,
                                        const SolverOf& solver) {
   EffectSet known = info(ModelKind::kLinear).always;
@@ -98,11 +96,9 @@ std::vector<int> touchable(const BodyConfig& config, const TouchSurface& surface
   return config.reach ? surface.nodes_of_patches(surface.across(config.middle), *config.reach) : surface.nodes();
 }
 
-/// Initial stiffness, N/m.
 double stiffness_under(Model& model, const Patch& patch) { return model.press(patch, Given::kForce, 1).stiffness; }
 
-/// A model from a stored table. Rejects a table of another body, one with too few nodes, and one that does not
-/// reproduce its recorded stiffness.
+/// Throws if the table does not belong to this body, or does not reproduce its recorded stiffness.
 std::unique_ptr<CondensedModel> condensed_from(const BodyConfig& config, const Solid& solid,
                                                const TouchSurface& surface, double& linear_up_to) {
   SurfaceTable table = read_table(*config.table_file);
@@ -140,7 +136,6 @@ Learned learn_of(const BodyConfig& config, const Solid& solid, const TouchSurfac
                tell);
 }
 
-/// In order of preference.
 std::vector<std::unique_ptr<Rung>> rungs_of(const BodyConfig& config, const Solid& solid, const TouchSurface& surface) {
   std::vector<std::unique_ptr<Rung>> rungs;
   const Learned learned = config.near.learned ? *config.near.learned : learn_of(config, solid, surface, {});
@@ -153,7 +148,7 @@ std::vector<std::unique_ptr<Rung>> rungs_of(const BodyConfig& config, const Soli
   return rungs;
 }
 
-/// With `fields`, starts without a near field and lets these make it.
+/// If there are `fields`, they build the near field.
 std::unique_ptr<NearModel> near_model_of(const BodyConfig& config, const Solid& solid, const TouchSurface& surface,
                                          Background fields) {
   const NearModel::Config made{.newton = {.max_iterations = config.max_iterations, .tolerance = config.tolerance},
@@ -195,7 +190,6 @@ Made model_of(const BodyConfig& config, const Solid& solid, const TouchSurface& 
   return made;
 }
 
-/// Throws if an effect of the config would not be simulated.
 const BodyConfig& checked(const BodyConfig& config) {
   const ModelInfo& model = info(config.model);
   const EffectSet simulated = effects_of(config);
@@ -261,7 +255,7 @@ std::unique_ptr<Friction> friction_of(const BodyConfig& config) {
   return std::make_unique<Friction>(*config.friction, sideways_stiffness(config.material, config.patch_radius));
 }
 
-/// Point spacing on the layer: a thinner tool slips off the points (layer.h).
+/// Thinner tools slip off the points of the layer (layer.h).
 constexpr double kPointsAcrossTool = 4;
 
 RigidContact rigid_contact_of(const BodyConfig& config, QuasiStaticModel& body, const Solid& solid,
@@ -279,7 +273,7 @@ RigidContact rigid_contact_of(const BodyConfig& config, QuasiStaticModel& body, 
   return {body, solid, surface, std::vector<HeldTool>(config.hands, {shape, config.tool_offset}), made};
 }
 
-/// Depth in m at which the material rotates somewhere by Body::kLargestTurn.
+/// Returns the depth (m) at which the material rotates somewhere by Body::kLargestTurn.
 double linear_limit(const Solid& solid, const TouchSurface& surface, const Patch& patch, const Solver& solver) {
   const VectorXd load = solid.to_free(patch_load(solid, surface.normal(), patch));
   const VectorXd per_newton = solver.solve(load);
@@ -327,7 +321,7 @@ struct Body::Parts {
   Parts(const BodyConfig& config, const SolverOf& solver) : Parts(config, solver, solid_of(checked(config))) {
     if (!config.cuts.empty()) cutting = std::make_unique<Planned>(config, solid.mesh(), solid.fixed(), surface);
   }
-  /// Without planned cuts. With `fields`, these make the near field.
+  /// If there are `fields`, they build the near field.
   Parts(const BodyConfig& config, const SolverOf& solver, Solid of, Background fields = {})
       : solid(std::move(of)),
         surface(solid.mesh(), config.towards_tool, config.patch_radius),
@@ -356,13 +350,13 @@ struct Body::Parts {
   void go_on_from(Parts& before);
   void note(Feel& feel);
 
-  /// The remaining cuts and what is needed to make them.
+  /// The remaining cuts.
   struct Planned {
     Planned(const BodyConfig& config, const Mesh& mesh, const Fixed& fixed, const TouchSurface& surface);
     Cutting cuts;
     BodyConfig described;
     Background background{};
-    std::future<std::unique_ptr<Parts>> next{};  ///< the body after the next cut, during its preparation
+    std::future<std::unique_ptr<Parts>> next{};  ///< the body after the next cut
   };
 
   Solid solid;
@@ -370,20 +364,20 @@ struct Body::Parts {
   Made made;
   Model& model;
   PatchContact contact;
-  std::optional<SphereContact> sphere;    ///< instead of `contact`
-  std::optional<CapsuleContact> capsule;  ///< as `sphere`
-  std::optional<RigidContact> rigid;      ///< as `sphere`
+  std::optional<SphereContact> sphere;  ///< instead of `contact`
+  std::optional<CapsuleContact> capsule;
+  std::optional<RigidContact> rigid;
   std::vector<std::optional<Pose>> hands;
-  Patch patch;       ///< around the middle
-  bool knows_turns;  ///< simulates large rotations
-  bool turns;        ///< turns_the_hand()
+  Patch patch;
+  bool knows_turns;
+  bool turns;
   Vec3 offset;
-  Vec3 axis = Vec3::UnitZ();  ///< of `capsule`
+  Vec3 axis = Vec3::UnitZ();
   std::unique_ptr<Planned> cutting;
-  std::vector<int> node_before{};  ///< of a body that was prepared: each node's number before the cut
+  std::vector<int> node_before{};  ///< set if the body was prepared in the background
 };
 
-/// Makes all cuts on a mesh only, to reject an impossible plan at the start.
+/// Makes all cuts on a mesh first, so that an invalid plan is an error at the start.
 Body::Parts::Planned::Planned(const BodyConfig& config, const Mesh& mesh, const Fixed& fixed,
                               const TouchSurface& surface)
     : cuts(config.cuts), described(config) {
@@ -508,7 +502,7 @@ Feel Body::touch(const Pose& handle) {
   Feel feel = touch(tool);
   const Mat3 cross =
       (Mat3() << 0, -lever.z(), lever.y(), lever.z(), 0, -lever.x(), -lever.y(), lever.x(), 0).finished();
-  // The lever arm rotates with the handle, which changes the moment of the force.
+  // The lever rotates with the handle, so the moment of the force changes.
   const Mat3 turned = lever.dot(feel.force) * Mat3::Identity() - lever * feel.force.transpose();
   feel.torque = {.torque = lever.cross(feel.force),
                  .stiffness = not_negative(cross * feel.stiffness * cross.transpose() + turned)};

@@ -16,7 +16,7 @@ namespace {
 constexpr double kWay = 0.003;  // m
 constexpr int kAnswers = 40;    // forth and back
 constexpr int kMostTurns = 4;
-constexpr double kEnough = 3;       // s of processor time after which no further round starts
+constexpr double kEnough = 3;       // s of processor time
 constexpr double kInterval = 0.01;  // s, between answers
 
 BodyConfig without(BodyConfig body, EffectKind effect) {
@@ -72,10 +72,10 @@ Explanation::Cost press_and_come_back(const BodyConfig& config, const Mat3& turn
   return {(processor_time() - start) / kAnswers, static_cast<std::int64_t>(body.size().bytes)};
 }
 
-/// As press_and_come_back(), measuring the background thread's work between answers.
+/// Also runs and measures the work of the background thread.
 std::optional<Explanation::Beside> fields_beside(const BodyConfig& config, const Mat3& turn,
                                                  const std::function<double()>& processor_time) {
-  Body body(without(config, EffectKind::kCutting));  // a cut also uses the background
+  Body body(without(config, EffectKind::kCutting));  // a cut would use it too
   if (!body.near_field() || body.near_field()->radius == 0 || !factors_may_work_at_once()) return std::nullopt;
   double spent = 0;
   int made = 0;
@@ -125,7 +125,7 @@ double off_the_exact_interface(const BodyConfig& config) {
   if (config.model != ModelKind::kNear) {
     throw std::invalid_argument("only the model \"near\" has an interface, and can be compared with the exact one");
   }
-  BodyConfig alone = config;  // without rungs, so that the near field answers
+  BodyConfig alone = config;
   alone.near.learn = alone.near.tabulate = false;
   Body modes(alone);
   alone.near.exact_interface = true;
@@ -149,7 +149,7 @@ Explanation explain(const Scene& scene, const std::function<double()>& processor
     tool = {*shape.mesh_facts(), processor_time() - start};
   }
   Body body(config);
-  // A small push keeps the answer linear. The force is prescribed because gravity moves the surface away from the mesh.
+  // The push is small, so that the answer is linear. A depth cannot be given, because gravity moves the surface.
   const double push = 1e-3 * scene.body.material.young * scene.body.patch_radius * scene.body.patch_radius;
   Explanation out{.parts = {},
                   .all = {},
@@ -163,7 +163,7 @@ Explanation explain(const Scene& scene, const std::function<double()>& processor
                   .stiffness = body.settle(Given::kForce, push).stiffness,
                   .linear_up_to = body.linear_up_to()};
 
-  std::vector<BodyConfig> bodies{config, config};  // the second one measures the resolution
+  std::vector<BodyConfig> bodies{config, config};  // the difference of both is the resolution
   const EffectSet simulated = effects_of(scene.body);
   const EffectSet always = info(scene.body.model).always;
   for (const EffectInfo& effect : effects()) {
@@ -172,7 +172,6 @@ Explanation explain(const Scene& scene, const std::function<double()>& processor
     out.parts.back().adds = Explanation::Cost{};
     bodies.push_back(without(config, effect.kind));
   }
-  // Each rung in first position.
   const std::size_t first_rung = bodies.size();
   for (const Ladder::Step& step : body.ladder()) {
     out.learned.push_back({.size = step.size});
@@ -296,21 +295,13 @@ std::string in_json(const Scene& scene, const Explanation& explanation) {
     }
     parts.push_back(std::move(part));
   }
-  Json json = {{"model", info(scene.body.model).name},
-               {"element", info(scene.body.element).name},
-               {"nodes", explanation.size.nodes},
-               {"elements", explanation.size.elements},
-               {"unknowns", explanation.size.free},
-               {"touchable_nodes", explanation.size.touchable},
-               {"bytes", explanation.size.bytes},
-               {"step_s", explanation.step},
-               // infinity becomes null
-               {"k_n_per_m", explanation.stiffness},
-               {"linear_up_to_m", explanation.linear_up_to},
-               {"answer_s", explanation.all.answer_s},
-               {"resolution_s", explanation.resolution_s},
-               {"regions", scene.body.regions.size()},
-               {"effects", std::move(parts)},
+  Json json = {{"model", info(scene.body.model).name}, {"element", info(scene.body.element).name},
+               {"nodes", explanation.size.nodes},      {"elements", explanation.size.elements},
+               {"unknowns", explanation.size.free},    {"touchable_nodes", explanation.size.touchable},
+               {"bytes", explanation.size.bytes},      {"step_s", explanation.step},
+               {"k_n_per_m", explanation.stiffness},   {"linear_up_to_m", explanation.linear_up_to},
+               {"answer_s", explanation.all.answer_s}, {"resolution_s", explanation.resolution_s},
+               {"regions", scene.body.regions.size()}, {"effects", std::move(parts)},
                {"warnings", warnings(scene.body)}};
   if (const auto& near = explanation.near) {
     json["near"] = {{"radius_m", near->radius},

@@ -109,7 +109,7 @@ std::optional<ForceTable> PlacedBody::table(const Pose& handle, double gap) {
     try {
       table.force[table.size] = normal_.dot(touch(Pose{handle.position - depth * normal_, handle.turn}).force);
     } catch (const std::out_of_range&) {
-      break;  // deeper, the tool would touch outside the condensed part
+      break;  // outside the table
     }
   }
   return table.size >= ForceTable::kMinEntries ? std::optional(table) : std::nullopt;
@@ -129,9 +129,8 @@ Feel PlacedBody::follow(const DeviceState& hand) {
   bool changed = false;
   for (auto i = steps; i > 0; --i) {
     owed -= step;
-    // fraction of the motion still ahead
     const double share = past > Duration(0) ? std::min(1.0, seconds(owed) / seconds(past)) : 0;
-    // Rotations are interpolated as matrices, so that the tool's center moves in a straight line.
+    // Interpolated as matrices, so that the center of the tool moves on a line.
     followed_->feel =
         touch(Pose{now.position + share * (from.position - now.position), now.turn + share * (from.turn - now.turn)});
     changed = changed || followed_->feel.topology_changed;

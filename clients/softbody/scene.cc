@@ -19,9 +19,9 @@
 namespace tendon::softbody {
 namespace {
 
-/// toml++ recurses: even a small file of nested brackets could overflow the stack.
+/// The TOML parser is recursive, so the file must be small.
 constexpr std::uintmax_t kMaxSceneBytes = 16'384;
-constexpr double kMaxLength = 1e3;  // m; larger values are likely a wrong unit
+constexpr double kMaxLength = 1e3;  // m
 constexpr std::int64_t kMaxCells = 200;
 constexpr double kMaxError = 10;  // %; larger errors can be felt
 
@@ -32,7 +32,7 @@ std::string names(const Infos& infos) {
   return all;
 }
 
-/// A table of a scene. Keys that were never requested are reported as unknown by check_unknown().
+/// Keys that are never requested are errors (check_unknown()).
 class Table {
  public:
   Table(const toml::table& table, std::string path, const std::string& file)
@@ -59,7 +59,7 @@ class Table {
                      ", found nothing");
   }
 
-  /// Reads a number above `least` (or equal, with `or_equal`), at most `most`, and divides it by `per_si`.
+  /// Returns the number divided by `per_si`.
   double number(std::string_view key, double least, bool or_equal, double most, double per_si,
                 std::optional<double> otherwise = {}) {
     std::ostringstream expected;
@@ -75,10 +75,8 @@ class Table {
     return *value / per_si;
   }
 
-  /// A positive length in mm, converted to m.
   double length(std::string_view key) { return number(key, 0, false, 1e3 * kMaxLength, 1e3); }
 
-  /// false if missing
   bool flag(std::string_view key) {
     const toml::node* node = find(key);
     if (node == nullptr) return false;
@@ -106,7 +104,6 @@ class Table {
     return **value;
   }
 
-  /// A name from a catalogue.
   template <class Named>
   auto choice(std::string_view key, const std::string& all, Named named) {
     const std::string name = text(key, "one of " + all);
@@ -160,10 +157,8 @@ class Table {
     return all;
   }
 
-  /// Reports an error at the line of this table.
   [[noreturn]] void fail(const std::string& what) const { fail(table_, "", what); }
 
-  /// Reads numbers above `least` (or equal, with `or_equal`).
   std::vector<double> numbers(std::string_view key, double least, bool or_equal) {
     std::ostringstream expected;
     expected << "a list of numbers " << (or_equal ? "of at least " : "above ") << least;
@@ -206,7 +201,6 @@ class Table {
   std::set<std::string, std::less<>> known_;
 };
 
-/// Also reads the density, kg/m³, if `density` is given.
 Material read_material(Table& of, double* density = nullptr) {
   Table table = of.table("material");
   Material material;
@@ -373,7 +367,7 @@ double read_self_collision(Table table) {
   return layer;
 }
 
-/// Former scene models, now in tests/tools/lab/models.
+/// These models are now in tests/tools/lab/models.
 constexpr std::array<std::string_view, 7> kOfTheLab = {"stvk",        "mass-spring", "projective", "modal",
                                                        "tensor-mass", "tled",        "xpbd"};
 
@@ -392,7 +386,6 @@ std::optional<Law> law_named(std::string_view name) {
   return found == near_laws().end() ? std::nullopt : std::optional(found->law);
 }
 
-/// Only the neo-Hookean law of the model "near" simulates large strains.
 void check_law(Table& root, Law law, EffectSet listed) {
   const bool simulates = law == Law::kNeoHookean;
   if (simulates == listed.has(EffectKind::kMaterialNonlinearity)) return;
@@ -420,7 +413,6 @@ std::vector<Scene::Hand> read_hands(Table& root) {
   return hands;
 }
 
-/// Reads the list of effects: it must include all that the model always simulates, and only those that it can simulate.
 EffectSet read_effects(Table& root, const ModelInfo& model, BodyConfig& body) {
   const toml::node& node = root.need("effects", "a list of effects");
   const auto* list = node.as_array();
@@ -455,7 +447,7 @@ EffectSet read_effects(Table& root, const ModelInfo& model, BodyConfig& body) {
                     "\", which is not listed");
     }
   }
-  // A key is requested only if its effect is listed; otherwise it counts as unknown.
+  // Keys are only requested if their effect is listed.
   constexpr double kMost = 1e6;
   EffectsConfig& config = body.effects;
   config.inertia = listed.has(EffectKind::kInertia);

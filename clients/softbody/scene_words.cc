@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-// Help text for scene keys, and warnings about scenes.
 #include <algorithm>
 #include <filesystem>
 #include <iomanip>
@@ -120,7 +119,7 @@ std::string scene_reference() {
 
 double patch_up_to(const BodyConfig& body) {
   const bool nonlinear = info(body.model).always.has(EffectKind::kGeometricNonlinearity);
-  constexpr double kDeepest = 0.3;  // of the radius; deeper, the fixed pressure profile approaches its limit load
+  constexpr double kDeepest = 0.3;  // of the radius; near this depth a fixed pressure profile has its limit load
   return nonlinear && std::holds_alternative<PatchTool>(body.tool) ? kDeepest * body.patch_radius
                                                                    : std::numeric_limits<double>::infinity();
 }

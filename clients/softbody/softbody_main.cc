@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// tendon-softbody: the reference physics engine, an ordinary client of the server.
+// tendon-softbody: the reference physics engine.
 #include <unistd.h>
 
 #include <algorithm>
@@ -29,10 +29,9 @@ using namespace tendon;
 
 namespace {
 
-/// The self-test presses 3 mm deep and slides 3 mm, which stays on the surface of typical scenes.
+/// With 3 mm the self-test stays on the surface.
 constexpr double kWay = 0.003;
 
-/// Interval of progress messages in a log.
 constexpr std::chrono::seconds kBetweenLines{10};
 
 int test(const softbody::Scene& scene, const Options& options) {
@@ -46,7 +45,7 @@ int test(const softbody::Scene& scene, const Options& options) {
   script.slide = kWay;
   script.elastic = softbody::is_elastic(scene.body);
   if (options.client.rate_hz > 0) script.rate_hz = options.client.rate_hz;
-  // With several hands, only the first moves; the others are absent.
+  // Only the first hand moves.
   std::vector<std::optional<DeviceState>> hands(scene.hands.size());
   const SelfTest result = self_test(
       [&](const DeviceState& hand) {
@@ -55,13 +54,13 @@ int test(const softbody::Scene& scene, const Options& options) {
         return body.answer(hands).front();
       },
       script,
-      [&](const SelfTest::Finding& finding) {  // with a rigid tool the whole test takes a minute
+      [&](const SelfTest::Finding& finding) {  // printed at once, because rigid tools need a minute
         std::cout << (options.json ? finding.json() : finding.text()) << std::flush;
       });
   return result.passed() ? 0 : 1;
 }
 
-/// Precomputes the body, with progress on one terminal line, or as occasional log lines.
+/// The progress is one line in a terminal, and a line from time to time in a log.
 void learn(softbody::BodyConfig& body) {
   const bool terminal = isatty(STDERR_FILENO) != 0;
   auto told = std::chrono::steady_clock::now();
@@ -106,8 +105,6 @@ int condense(int argc, char** argv) {
   return 0;
 }
 
-/// Starts the background thread for cuts and near fields, if the scene needs it and two threads may factorize
-/// concurrently.
 void prepare_beside(const softbody::Scene& scene, std::optional<softbody::BackgroundThread>& thread,
                     softbody::PlacedBody& body) {
   const bool cuts = !scene.body.cuts.empty();
@@ -125,7 +122,7 @@ void prepare_beside(const softbody::Scene& scene, std::optional<softbody::Backgr
             << ", because this OpenBLAS is built for one thread; with libopenblas0-pthread they go on\n";
 }
 
-/// Runs until stopped. Returns the exit code.
+/// Returns the exit code.
 int answer(const softbody::Scene& scene, const Options& options, softbody::PlacedBody& body) {
   const double linear_up_to = body.linear_up_to();
   const double patch_up_to = softbody::patch_up_to(scene.body);

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// tendon-fem: a soft body whose answers are computed by MPI workers. Contains no MPI itself: it starts the workers and
-// keeps the session with the server when they fail.
+// tendon-fem: a soft body that is solved by MPI workers. The program itself does not use MPI.
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
@@ -31,14 +30,13 @@ double milliseconds(Duration d) { return std::chrono::duration<double, std::mill
 
 Duration from_milliseconds(double ms) { return from_seconds(ms / 1000); }
 
-/// Quotes a word for /bin/sh.
 std::string shell_word(const std::string& word) {
   std::string text = "'";
   for (const char c : word) text += c == '\'' ? std::string("'\\''") : std::string(1, c);
   return text + "'";
 }
 
-/// The worker next to this program, both when installed and in the build tree.
+/// The worker is in the same folder as this program.
 std::string own_worker() {
   std::error_code error;
   const auto beside = std::filesystem::read_symlink("/proc/self/exe", error).replace_filename("tendon-fem-worker");

@@ -17,8 +17,7 @@
 namespace tendon::softbody {
 namespace {
 
-/// Relative to the distance between two element centers. A center this close to the plane counts as on its far side,
-/// independent of rounding.
+/// Relative to the distance between two centers. A center that is this close to the plane is on its far side.
 constexpr double kOnPlane = 1e-6;
 
 bool between(const Cut& cut, const Vec3& from, const Vec3& to) {
@@ -33,8 +32,7 @@ bool between(const Cut& cut, const Vec3& from, const Vec3& to) {
   return s >= -kOnPlane && s <= 1 + kOnPlane && t >= -kOnPlane && t <= 1 + kOnPlane;
 }
 
-/// Gives every group of elements around a node its own copy of the node. Elements that share an unopened face belong to
-/// the same group.
+/// Copies the nodes of opened faces. Elements that share an unopened face keep sharing their nodes.
 void part_nodes(const Mesh& mesh, std::span<const Cut> cuts, const Fixed& fixed, Division& to) {
   const int per = nodes_of(mesh.shape);
   const auto place_of = [&](int element, int node) {
@@ -53,8 +51,8 @@ void part_nodes(const Mesh& mesh, std::span<const Cut> cuts, const Fixed& fixed,
       if (!open) places.unite(place_of(face.element, node), place_of(opposite.element, node));
     }
   }
-  std::vector<int> first(mesh.nodes.size(), -1);         // the group that keeps the original node
-  std::vector<int> number_of(mesh.elements.size(), -1);  // by group
+  std::vector<int> first(mesh.nodes.size(), -1);
+  std::vector<int> number_of(mesh.elements.size(), -1);
   to.mesh = mesh;
   to.fixed = fixed;
   to.element_before.resize(at(mesh.element_count()));
@@ -80,7 +78,7 @@ void part_nodes(const Mesh& mesh, std::span<const Cut> cuts, const Fixed& fixed,
   }
 }
 
-/// Removes pieces that can move as rigid bodies: those without three non-collinear fixed nodes.
+/// Removes pieces without three fixed nodes that are not collinear.
 void drop_loose(Division& to) {
   Mesh& mesh = to.mesh;
   Groups pieces(mesh.nodes.size());

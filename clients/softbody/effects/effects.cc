@@ -14,7 +14,7 @@ std::size_t bytes_of(const VectorXd& vector) noexcept {
 }
 
 void add_diagonal(const VectorXd& diagonal, SymmetricMatrix& to) {
-  // the diagonal entry comes first in its column
+  // the diagonal is first in its column
   for (int i = 0; i < to.size; ++i) to.values[at(to.column_starts[at(i)])] += diagonal[i];
 }
 

@@ -18,19 +18,18 @@ namespace {
 
 using Box = Eigen::AlignedBox3d;
 
-/// Search range behind and in front of a facet, relative to its size.
+/// The range of the search behind and in front of a facet, relative to its size.
 constexpr double kBehind = 0.5;
 constexpr double kBefore = 1;
 
-/// How far outside a triangle, in barycentric coordinates, a node still belongs to it. With less, a node at the edge of
-/// a side would alternate between one plane and none.
+/// The tolerance in barycentric coordinates. With a smaller value, nodes at an edge would alternate between two states.
 constexpr double kBeside = 0.15;
 
-/// Gauss–Seidel: maximum number of iterations, and the relative change of forces at which it ends.
+/// The maximum number of Gauss–Seidel iterations, and the relative change at which they end.
 constexpr int kMostRounds = 2000;
 constexpr double kSettled = 1e-8;
 
-/// Query for Eigen's box tree: the boxes that contain a point.
+/// A query for the tree of boxes of Eigen.
 template <class Visit>
 struct Around {
   const Vec3& place;
@@ -48,9 +47,9 @@ struct Around {
 
 struct SelfCollision::Flat {
   std::array<Vec3, 3> corners;
-  Vec3 out;  ///< outward normal; its length is twice the area, m²
+  Vec3 out;  ///< its length is twice the area, m²
 
-  /// Barycentric coordinates of the projection of `place`; empty if it is too far outside.
+  /// Returns the barycentric coordinates. Empty if `place` is outside.
   std::optional<Vec3> across(const Vec3& place) const {
     Vec3 shares;
     for (int i = 0; i < 3; ++i) {
@@ -152,7 +151,6 @@ std::vector<SelfCollision::Flat> SelfCollision::lie(const VectorXd& u) const {
   return flats;
 }
 
-/// Sum of facet normals at every node; 0 inside the body.
 std::vector<Vec3> SelfCollision::node_normals(const std::vector<Flat>& flats) const {
   std::vector<Vec3> normals(elastic_.mesh().nodes.size(), Vec3::Zero());
   for (const Side& side : sides_) {
@@ -263,7 +261,7 @@ double SelfCollision::foresee(const Factor& factor, const VectorXd& u, const Vec
     matrix(i, i) += 1 / pairs[static_cast<std::size_t>(i)]->stiffness;
   }
   double compliance = 0;
-  VectorXd across;  // opening of each gap per newton along `held`
+  VectorXd across;  // opening of the gaps per newton
   double force = 0;
   if (held != nullptr) {
     compliance = held->dot(solution.col(count + 1));

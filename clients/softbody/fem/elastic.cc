@@ -27,7 +27,6 @@ Elastic::Elastic(Mesh mesh, const Fixed& fixed, Together together)
 const SymmetricMatrix& Elastic::pattern() const {
   return pattern_.get([this] {
     SymmetricMatrix pattern;
-    // Nodes that share an element with each node, including itself.
     std::vector<std::vector<int>> near(mesh_.nodes.size());
     for (int e = 0; e < mesh_.element_count(); ++e) {
       for (const int a : mesh_.element(e)) {

@@ -22,7 +22,7 @@ constexpr std::array kElements{
                 0.5},
 };
 
-/// Edges and faces of a hexahedron in gmsh's order.
+/// The order of gmsh.
 constexpr std::array<std::array<int, 2>, 12> kEdges{
     {{0, 1}, {0, 3}, {0, 4}, {1, 2}, {1, 5}, {2, 3}, {2, 6}, {3, 7}, {4, 5}, {4, 7}, {5, 6}, {6, 7}}};
 constexpr std::array<std::array<int, 2>, 6> kFaceDiagonals{{{0, 2}, {0, 5}, {0, 7}, {1, 6}, {2, 7}, {4, 6}}};
@@ -45,7 +45,6 @@ struct Along {
 
 Along linear(double x, double node) { return {0.5 * (1 + node * x), 0.5 * node}; }
 
-/// Quadratic Lagrange polynomial of the node at −1, 0 or 1.
 Along quadratic(double x, double node) {
   if (node == 0) return {1 - x * x, -2 * x};
   return {0.5 * x * (x + node), x + 0.5 * node};
@@ -60,8 +59,7 @@ void set_product(ShapeValues& values, int node, const Vec3& at, const Vec3& plac
   values.gradient.col(node) << x.slope * y.value * z.value, x.value * y.slope * z.value, x.value * y.value * z.slope;
 }
 
-/// Serendipity functions: (1 − x²)(1 ± y)(1 ± z) / 4 for an edge node; a corner's trilinear function minus half of its
-/// edges' functions.
+/// Serendipity: a node on an edge has (1 − x²)(1 ± y)(1 ± z) / 4.
 void set_serendipity(ShapeValues& values, const Vec3& at) {
   for (int node = 0; node < 8; ++node) set_product(values, node, at, hex_node(node), linear);
   for (int node = 8; node < 20; ++node) {

@@ -30,7 +30,6 @@ std::string named_place(const FileMesh& file, int element) {
   return named_element(file, element) + " at " + in_words(middle(file.mesh, element));
 }
 
-/// The corners of each face, counterclockwise seen from outside.
 std::vector<std::vector<int>> corners_around(Shape shape) {
   std::vector<std::vector<int>> all;
   for (const Face& face : faces(shape)) {
@@ -52,9 +51,9 @@ std::vector<std::vector<int>> corners_around(Shape shape) {
   return all;
 }
 
-/// A face with its corners as place numbers (coincident nodes share one).
+/// The corners are numbers of places, which coincident nodes share.
 struct PlacedFace {
-  std::array<int, 4> around;   ///< counterclockwise, starting at the lowest; −1: unused
+  std::array<int, 4> around;   ///< counterclockwise from the lowest; −1 if unused
   std::array<int, 4> corners;  ///< ascending
   Facet facet;
 };
@@ -113,7 +112,6 @@ void drop_repeated_elements(FileMesh& file, const std::vector<int>& place) {
   file.numbers = std::move(numbers);
 }
 
-/// Removes unused nodes and keeps the order of the others.
 void drop_unused(Mesh& mesh) {
   std::vector<int> number(mesh.nodes.size(), -1);
   for (const int node : mesh.elements) number[at(node)] = 0;
@@ -138,7 +136,7 @@ void expect_apart(const FileMesh& file, const std::vector<int>& place, std::stri
   }
 }
 
-/// Numbers the parts. Throws if elements overlap.
+/// Throws std::invalid_argument if elements overlap.
 void find_parts(FileMesh& file, const std::vector<int>& place, std::string_view name) {
   const std::vector<PlacedFace> all = placed_faces(file.mesh, place);
   Groups groups(at(file.mesh.element_count()));
@@ -171,7 +169,7 @@ void find_parts(FileMesh& file, const std::vector<int>& place, std::string_view 
 }
 
 struct MeshPart {
-  int first = -1;  ///< element
+  int first = -1;
   std::size_t elements = 0;
 };
 std::vector<MeshPart> mesh_parts(const FileMesh& file) {

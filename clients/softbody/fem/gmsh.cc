@@ -21,12 +21,11 @@ namespace {
 
 constexpr int kMaxCount = 10'000'000;
 
-/// Splits a text into words and tracks the line number.
 class Words {
  public:
   Words(std::string_view text, std::string_view name) : rest_(without_mark(text, name)), name_(name) {}
 
-  /// Next word; empty at the end of the file.
+  /// Returns an empty word at the end of the file.
   std::string_view next() {
     std::size_t begin = 0;
     while (begin < rest_.size() &&
@@ -59,7 +58,7 @@ class Words {
     if (found != keyword) fail("expected " + std::string(keyword) + ", found \"" + std::string(found) + '"');
   }
 
-  /// Skips to behind the word `keyword`. Returns false if there is none.
+  /// Returns false if the keyword is missing.
   bool seek(std::string_view keyword) {
     for (;;) {
       const std::string_view found = next();
@@ -89,7 +88,7 @@ class Words {
   int line_ = 1;
 };
 
-/// A gmsh element type; `shape` is empty if Tendon does not read it.
+/// `shape` is empty if the type is not supported.
 struct Type {
   int number;
   int nodes;
@@ -109,7 +108,6 @@ struct FileElement {
   std::vector<std::int64_t> nodes;
 };
 
-/// Contents of a file, with the file's own numbers.
 struct Content {
   std::unordered_map<std::int64_t, Vec3> nodes;
   std::vector<FileElement> elements;
@@ -245,7 +243,7 @@ class Reader {
   Content content_;
 };
 
-/// Repeats check() so that the message has the file's own element number.
+/// check() does not know the element numbers of the file.
 void check_each(const Mesh& mesh, const std::vector<FileElement>& named, std::string_view name) {
   Mesh one{.shape = mesh.shape, .nodes = mesh.nodes, .elements = {}};
   try {

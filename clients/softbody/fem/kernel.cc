@@ -6,7 +6,7 @@
 
 #include "clients/softbody/fem/laws.h"
 
-// GCC warns that the ABI for passing vectors depends on the processor. Here they are passed to inlined functions only.
+// The ABI for vectors depends on the processor, but all functions that take them are inlined.
 #pragma GCC diagnostic ignored "-Wpsabi"
 
 namespace tendon::softbody {
@@ -75,7 +75,7 @@ template <Law kLaw, int kNodes>
   return energy[0] + energy[1] + energy[2] + energy[3];
 }
 
-// Compiled for AVX2 and for the baseline. Without FMA, which rounds once, both give the same bits.
+// Compiled twice. The results are the same, because neither version uses FMA.
 #ifdef __x86_64__
 template <Law kLaw, int kNodes>
 [[gnu::target("avx2")]] double wide_sum_of(const View& all, const double* u, double* to) {

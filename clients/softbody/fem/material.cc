@@ -18,7 +18,6 @@ Mat3 cofactor(const Mat3& f) {
   return c;
 }
 
-/// Directional derivative of the cofactor.
 Mat3 cofactor_change(const Mat3& f, const Mat3& df) {
   Mat3 c;
   c << df.col(1).cross(f.col(2)) + f.col(1).cross(df.col(2)), df.col(2).cross(f.col(0)) + f.col(2).cross(df.col(0)),
@@ -66,12 +65,12 @@ Mat3 nearest_rotation(const Mat3& f) {
       const Mat3 next = 0.5 * (r + r.inverse().transpose());
       const double change = (next - r).squaredNorm();
       r = next;
-      if (change < 1e-20) return r;  // 1e-10; the last step squared it
+      if (change < 1e-20) return r;  // the square of 1e-10
     }
   }
   const Eigen::JacobiSVD<Mat3> svd(f, Eigen::ComputeFullU | Eigen::ComputeFullV);
   Mat3 u = svd.matrixU();
-  if ((u * svd.matrixV().transpose()).determinant() < 0) u.col(2) *= -1;  // flips the axis of least stretch
+  if ((u * svd.matrixV().transpose()).determinant() < 0) u.col(2) *= -1;  // the axis of least stretch
   return u * svd.matrixV().transpose();
 }
 

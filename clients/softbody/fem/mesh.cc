@@ -17,15 +17,13 @@
 namespace tendon::softbody {
 namespace {
 
-/// A plane figure of counterclockwise quadrilaterals, to be extruded. Tetrahedra start at the node of lowest rank of
-/// each prism; ties are broken by node number.
+/// Quadrilaterals that are extruded. Tetrahedra start at the node with the lowest rank, then the lowest number.
 struct Outline {
   std::vector<Eigen::Vector2d> nodes;
   std::vector<std::array<int, 4>> quads;
   std::vector<int> rank;
 };
 
-/// Extruded hexahedra; the nodes are ordered by layer.
 Mesh draw_up_hexahedra(const Outline& outline, std::span<const double> zs) {
   Mesh mesh{.shape = Shape::kHex8, .nodes = {}, .elements = {}};
   const int per_layer = static_cast<int>(outline.nodes.size());
@@ -42,8 +40,8 @@ Mesh draw_up_hexahedra(const Outline& outline, std::span<const double> zs) {
   return mesh;
 }
 
-/// Splits each quadrilateral along the diagonal through its lowest rank, and each prism into three tetrahedra (Kuhn).
-/// All prisms use the same node order, so faces of neighbors match.
+/// Splits quadrilaterals along the diagonal through the lowest rank, and prisms into three tetrahedra (Kuhn). The faces
+/// of neighbors match, because the order of nodes is the same everywhere.
 Mesh draw_up_tetrahedra(const Outline& outline, std::span<const double> zs) {
   Mesh mesh = draw_up_hexahedra(outline, zs);
   mesh.shape = Shape::kTet4;
@@ -75,10 +73,9 @@ Mesh draw_up_tetrahedra(const Outline& outline, std::span<const double> zs) {
   return mesh;
 }
 
-/// Adds edge nodes, and for Hex27 also face and center nodes.
 Mesh quadratic(const Mesh& mesh, Shape shape) {
   Mesh fine{.shape = shape, .nodes = mesh.nodes, .elements = {}};
-  std::map<std::vector<int>, int> between;  // from corners to the node between them
+  std::map<std::vector<int>, int> between;  // corners around a node → node
   for (int e = 0; e < mesh.element_count(); ++e) {
     const auto corners = mesh.element(e);
     fine.elements.insert(fine.elements.end(), corners.begin(), corners.end());
@@ -135,8 +132,7 @@ double longest_edge(const Mesh& mesh, std::span<const int> element) {
   return longest;
 }
 
-/// Calls `use(shape functions, det J, weight)` at quadrature points that integrate the square of a polynomial of the
-/// element's order.
+/// Calls `use(shape functions, det J, weight)` at points that integrate the mass matrix exactly.
 template <class Use>
 void for_points(const Mesh& mesh, int element, Use use) {
   const auto nodes = mesh.element(element);
@@ -160,7 +156,6 @@ std::vector<int> corners_on(const Mesh& mesh, const Facet& facet) {
   return nodes;
 }
 
-/// The faces of all elements, grouped by the sorted `name(corner)` of their corners.
 template <class Name>
 auto faces_by(const Mesh& mesh, Name name) {
   std::map<std::vector<std::decay_t<decltype(name(0))>>, std::vector<Facet>> sharing;
@@ -175,7 +170,6 @@ auto faces_by(const Mesh& mesh, Name name) {
   return sharing;
 }
 
-/// Faces in groups of one, in element order.
 template <class Name>
 std::vector<Facet> alone(const std::map<Name, std::vector<Facet>>& sharing) {
   std::vector<Facet> alone;
@@ -224,14 +218,14 @@ Mesh cylinder(Shape shape, double radius, double height, int across, int up) {
   if (!(radius > 0) || across < 2 || across % 2 != 0) {
     throw std::invalid_argument("a cylinder has a radius above 0 and an even number of cells across, 2 or more");
   }
-  // The core's corners are at 0.6 of the radius, so that its outermost cells and the rings are about equally wide.
+  // The factor 0.6 makes the outer cells of the core as wide as the rings.
   const double half = 0.6 * radius * std::numbers::sqrt2 / 2;
   const int rings = across / 2;
   const int around = 4 * across;
   Outline outline;
   for (int j = 0; j <= across; ++j) {
     for (int i = 0; i <= across; ++i) {
-      // Bulged sides keep the angle between a core side and a radial line above 45°.
+      // The sides are curved, so that the angles stay above 45°.
       const Eigen::Vector2d square(2.0 * i / across - 1, 2.0 * j / across - 1);
       const Eigen::Vector2d bulge(square.x() * (1 + 0.15 * (1 - square.y() * square.y())),
                                   square.y() * (1 + 0.15 * (1 - square.x() * square.x())));
@@ -244,7 +238,6 @@ Mesh cylinder(Shape shape, double radius, double height, int across, int up) {
       outline.quads.push_back({corner, corner + 1, corner + across + 2, corner + across + 1});
     }
   }
-  // Boundary of the core, counterclockwise from corner (−, −).
   std::vector<int> inner;
   for (int i = 0; i < across; ++i) inner.push_back(i);
   for (int j = 0; j < across; ++j) inner.push_back(j * (across + 1) + across);

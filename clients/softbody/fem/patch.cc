@@ -15,22 +15,21 @@
 namespace tendon::softbody {
 namespace {
 
-constexpr double kLeastFacing = 0.2588;  // cos 75°; steeper facets have almost no projected area
+constexpr double kLeastFacing = 0.2588;  // cos 75°
 
-/// Piece width relative to the patch radius. As the patch moves over a facet, the compliance of block B1 then varies by
-/// 1e-5; with 0.2 by 2e-4.
+/// Relative to the patch radius. If the patch moves over a facet, the compliance of block B1 changes by 1e-5; with 0.2,
+/// it changes by 2e-4.
 constexpr double kPiece = 0.1;
 
-/// Minimum number of pieces along each side of a quadratic facet. Fewer do not resolve the quadratic shape functions,
-/// and a mesh that is fine below the patch is too soft (B1, 32 cells: 0.3 % with two pieces).
+/// With two pieces for each side of a quadratic facet, block B1 with 32 cells is too soft by 0.3 %.
 constexpr int kLeastCutsOfQuadratic = 4;
 
-/// Maximum number of pieces per side. Only facets wider than three patches, far from the touched area, reach it.
+/// This limits facets that are wider than three patches.
 constexpr int kMostCuts = 32;
 
 constexpr int kMostFacetNodes = 9;
 
-/// Coplanarity tolerance, relative to the width of the touchable side.
+/// Relative to the width of the touchable side.
 constexpr double kFlat = 1e-6;
 
 }  // namespace
@@ -39,7 +38,7 @@ TouchSurface::TouchSurface(const Mesh& mesh, const Vec3& towards_tool, double ra
     : normal_(towards_tool), radius_(radius) {
   expect(std::abs(normal_.norm() - 1) < 1e-9, "norm of towards_tool", normal_.norm(), "1");
   expect_above_zero(radius, "radius");
-  // The first tangential axis is the projected x axis, unless the normal is close to x.
+  // The first axis is x, unless this is the normal.
   const Vec3 start = std::abs(normal_.x()) < 0.9 ? Vec3::UnitX() : Vec3::UnitY();
   const Vec3 first = (start - start.dot(normal_) * normal_).normalized();
   across_ << first.transpose(), normal_.cross(first).transpose();
@@ -59,7 +58,7 @@ TouchSurface::TouchSurface(const Mesh& mesh, const Vec3& towards_tool, double ra
 }
 
 void TouchSurface::look_for_a_curve() {
-  // Least-squares plane through all nodes: height = a + b · place.
+  // A plane by least squares.
   MatrixXd places(static_cast<Eigen::Index>(nodes_.size()), 3);
   VectorXd heights(places.rows());
   for (Eigen::Index i = 0; i < places.rows(); ++i) {
@@ -159,7 +158,7 @@ std::optional<Patch> TouchSurface::patch_with_curvatures(const Vec2& middle, dou
 
 template <bool kCurved>
 std::optional<Patch> TouchSurface::patch_around(const Vec2& middle, double least_covered) const {
-  using Share = Eigen::Matrix<double, kCurved ? 6 : 3, 1>;  // weight; gradient x, y; second derivatives xx, xy, yy
+  using Share = Eigen::Matrix<double, kCurved ? 6 : 3, 1>;  // weight, first and second derivatives
   if (!middle.allFinite()) return std::nullopt;
   const double top = 3 / (std::numbers::pi * radius_ * radius_);
   std::vector<Share> sums(nodes_.size(), Share::Zero());
@@ -212,7 +211,7 @@ std::optional<Patch> TouchSurface::patch_around(const Vec2& middle, double least
     const Vec2 all = total.template segment<2>(1);
     patch.slopes.col(i) = (sums[node].template segment<2>(1) - patch.weights[i] * all) / total[0];
     if constexpr (kCurved) {
-      // Second derivative of the quotient sums / total.
+      // Second derivative of a quotient.
       const Vec2 slope = patch.slopes.col(i);
       patch.curvatures.col(i) =
           (sums[node].template tail<3>() - patch.weights[i] * total.template tail<3>() -

@@ -7,7 +7,7 @@
 
 #include "clients/softbody/fem/laws.h"
 
-// See kernel.cc: vectors are passed to inlined functions only.
+// See kernel.cc.
 #pragma GCC diagnostic ignored "-Wpsabi"
 
 namespace tendon::softbody {
@@ -15,7 +15,7 @@ namespace {
 
 using kernel::lanes_at;
 
-/// Columns processed together, so that each entry of `x` or `to` is loaded once for all of them.
+/// Columns that are processed together.
 constexpr std::ptrdiff_t kColumns = 4;
 
 struct Tall {

@@ -13,8 +13,8 @@
 namespace tendon::softbody {
 namespace {
 
-/// A solve needs 4 operations per entry of the factor, which take as long as 6 operations of a factorization
-/// (tendon-bench-softbody, 7803 unknowns).
+/// A solve needs 4 operations for each entry of the factor. They take the time of 6 operations of a factorization,
+/// measured with 7803 unknowns.
 constexpr double kWorkPerEntry = 6;
 
 using View = Eigen::Map<const Eigen::SparseMatrix<double>>;
@@ -28,15 +28,14 @@ View view(const SymmetricMatrix& matrix) {
           matrix.values.data()};
 }
 
-/// A function of a library that may not be loaded; then null.
+/// Returns null if the function is not loaded.
 template <class Function>
 Function* function_named(const char* name) {
   return reinterpret_cast<Function*>(dlsym(RTLD_DEFAULT, name));
 }
 
-/// An answer takes less time than synchronizing threads, and callers that need two factors at once have their own
-/// threads. OpenBLAS is configured per process. CHOLMOD assembles with four OpenMP threads regardless of
-/// OMP_NUM_THREADS, so each calling thread must disable them.
+/// Threads would take longer to synchronize than an answer. OpenBLAS is set for the process. CHOLMOD uses four OpenMP
+/// threads whatever OMP_NUM_THREADS is, so each calling thread must disable them.
 void one_thread_for_a_factor() {
   const auto told = [](const char* name, int count) {
     auto* const set = function_named<void(int)>(name);
@@ -64,7 +63,7 @@ std::size_t SymmetricMatrix::bytes() const noexcept {
 struct Factor::Cholmod {
   Eigen::CholmodSupernodalLLT<Eigen::SparseMatrix<double>, Eigen::Lower> llt;
   void analyze(const SymmetricMatrix& pattern) {
-    llt.cholmod().print = 0;  // an indefinite matrix is an expected result
+    llt.cholmod().print = 0;  // indefinite matrices are expected
     llt.analyzePattern(view(pattern));
     if (llt.info() != Eigen::Success) throw std::runtime_error("CHOLMOD cannot analyse the matrix");
   }
@@ -72,9 +71,9 @@ struct Factor::Cholmod {
 
 struct Factor::Split {
   std::vector<int> twin_of;
-  Eigen::SparseMatrix<double> coupling;  // TᵀAC: couples old unknowns and twins
+  Eigen::SparseMatrix<double> coupling;  // TᵀAC
   MatrixXd follows;                      // (TᵀAT)⁻¹ TᵀAC
-  Eigen::LLT<MatrixXd> openings;         // Cholesky factor of S
+  Eigen::LLT<MatrixXd> openings;         // of S
 };
 
 Factor::Factor(const SymmetricMatrix& pattern) : cholmod_(new Cholmod) { cholmod_->analyze(pattern); }

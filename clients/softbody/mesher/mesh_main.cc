@@ -90,7 +90,6 @@ void make(Arguments& arguments) {
   }
   tell("");
   const std::string text = to_gmsh(mesh);
-  // the same reader as in tendon-softbody
   MeshReport report = report_on(parse_gmsh(text, "gmsh's mesh", 1).mesh, surface);
   const std::vector<std::string> notes = notes_on(surface);
   report.warnings.insert(report.warnings.begin(), notes.begin(), notes.end());

@@ -29,7 +29,6 @@
 namespace tendon::softbody {
 namespace {
 
-/// A temporary directory.
 class Scratch {
  public:
   Scratch() {
@@ -49,9 +48,9 @@ class Scratch {
   std::filesystem::path path_;
 };
 
-/// The gmsh script. It contains no user-supplied names.
+/// The script contains no names from the user.
 std::string script_of(const VolumeConfig& config) {
-  // Splitting a tetrahedron into four hexahedra halves its edges.
+  // The edges of the hexahedra are half as long as those of the tetrahedra.
   const double small = config.size * (config.hexahedra ? 2 : 1);
   const double large = config.touched ? config.coarsest * small : small;
   std::string text = "Merge \"surface.stl\";\nClassifySurfaces{" + shortest(config.sharp) +
@@ -100,7 +99,7 @@ double scaled(const Vec3& a, const Vec3& b, const Vec3& c) {
   return lengths > 0 ? a.dot(b.cross(c)) / lengths : 0;
 }
 
-/// For each corner of a hexahedron, in gmsh's order, its three adjacent corners, right-handed.
+/// The three neighbors of each corner, right-handed.
 constexpr std::array<std::array<int, 3>, 8> kJoined{
     {{1, 3, 4}, {2, 0, 5}, {3, 1, 6}, {0, 2, 7}, {7, 5, 0}, {4, 6, 1}, {5, 7, 2}, {6, 4, 3}}};
 
@@ -132,7 +131,6 @@ double quality(const Mesh& mesh, int element) {
   return least;
 }
 
-/// Reads the tetrahedra of a file written by gmsh in format 2.2.
 Mesh read_made(const std::string& text) {
   std::istringstream file(text);
   Mesh mesh{.shape = Shape::kTet4, .nodes = {}, .elements = {}};
@@ -152,7 +150,7 @@ Mesh read_made(const std::string& text) {
     number[id] = static_cast<int>(mesh.nodes.size());
     mesh.nodes.push_back(place);
   }
-  constexpr long kTetrahedron = 4;  // gmsh's element type
+  constexpr long kTetrahedron = 4;
   for (std::size_t left = find("$Elements"); left > 0; --left) {
     std::getline(file >> std::ws, line);
     std::istringstream words(line);
@@ -188,7 +186,7 @@ Mesh made_by_gmsh(const Triangles& body, const VolumeConfig& config, std::string
   return read_made(read_file(made, kMaxMeshBytes));
 }
 
-/// Nearest point of a triangle (Ericson, Real-Time Collision Detection, 5.1.5).
+/// Ericson, Real-Time Collision Detection, 5.1.5.
 Vec3 nearest_on(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& point) {
   const Vec3 ab = b - a;
   const Vec3 ac = c - a;
@@ -210,7 +208,7 @@ Vec3 nearest_on(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& point) 
   return a + (vb * ab + vc * ac) / (va + vb + vc);
 }
 
-/// Nearest point of the surface; `point` itself if that is farther than `most`.
+/// Returns `point` if the surface is farther than `most`.
 Vec3 nearest_on(const Triangles& surface, const Vec3& point, double most) {
   Vec3 nearest = point;
   for (const auto& facet : surface.facets) {
@@ -218,7 +216,7 @@ Vec3 nearest_on(const Triangles& surface, const Vec3& point, double most) {
     const Vec3& b = surface.points[at(facet[1])];
     const Vec3& c = surface.points[at(facet[2])];
     const Vec3 outside = (a.cwiseMin(b).cwiseMin(c) - point).cwiseMax(point - a.cwiseMax(b).cwiseMax(c));
-    if (outside.maxCoeff() > most) continue;  // bounding box
+    if (outside.maxCoeff() > most) continue;
     const Vec3 here = nearest_on(a, b, c, point);
     if ((here - point).norm() > most) continue;
     most = (here - point).norm();
@@ -227,8 +225,7 @@ Vec3 nearest_on(const Triangles& surface, const Vec3& point, double most) {
   return nearest;
 }
 
-/// Splits each tetrahedron into four hexahedra. `places` receives the target positions of boundary nodes, on the
-/// surface.
+/// `places` are the positions of the boundary nodes on the surface.
 Mesh in_hexahedra(const Mesh& tetrahedra, const Triangles& surface, std::vector<Vec3>& places) {
   Mesh mesh{.shape = Shape::kHex8, .nodes = tetrahedra.nodes, .elements = {}};
   std::map<std::vector<int>, int> known;
@@ -242,7 +239,7 @@ Mesh in_hexahedra(const Mesh& tetrahedra, const Triangles& surface, std::vector<
     }
     return found->second;
   };
-  // Each corner first; the others in an order that keeps the orientation.
+  // These orders keep the orientation.
   constexpr std::array<std::array<int, 4>, 4> kOrders{{{0, 1, 2, 3}, {1, 2, 0, 3}, {2, 0, 1, 3}, {3, 1, 0, 2}}};
   for (int e = 0; e < tetrahedra.element_count(); ++e) {
     const auto nodes = tetrahedra.element(e);
@@ -269,7 +266,7 @@ Mesh in_hexahedra(const Mesh& tetrahedra, const Triangles& surface, std::vector<
   return mesh;
 }
 
-/// Moves nodes towards `places` as far as the adjacent elements stay at least as good as kGoodElement, or as they were.
+/// Moves nodes towards `places` as far as their elements stay good.
 void bring_closer(Mesh& mesh, const std::vector<Vec3>& places) {
   constexpr double kGoodElement = 2 * kPoorElement;
   constexpr int kHalvings = 6;
@@ -282,7 +279,7 @@ void bring_closer(Mesh& mesh, const std::vector<Vec3>& places) {
     mesh.nodes[node] = start[node] + way * (places[node] - start[node]);
   };
   for (std::size_t node = 0; node < start.size(); ++node) put(node);
-  for (bool moved = true; moved;) {  // terminates: each pass halves a step, at most kHalvings times per node
+  for (bool moved = true; moved;) {  // at most kHalvings times for each node
     moved = false;
     for (int e = 0; e < mesh.element_count(); ++e) {
       if (quality(mesh, e) >= least[at(e)]) continue;

@@ -10,13 +10,13 @@
 namespace tendon::softbody {
 namespace {
 
-/// Glide results of an earlier position are reused while W differs by at most this fraction; the error is its square.
+/// The glide is used again if W has changed by less than this. Its relative error is the square.
 constexpr double kSlopesAlike = 0.1;
 
-/// Linear elasticity is meaningless for steeper surfaces, and so is the glide.
+/// Steeper surfaces are outside the range of linear elasticity.
 constexpr double kSteepest = 10;
 
-constexpr Eigen::Index kAtOnce = 64;  // columns per solve, so that CHOLMOD uses matrix-matrix products
+constexpr Eigen::Index kAtOnce = 64;  // makes CHOLMOD use products of matrices
 
 SymmetricMatrix stiffness_of(const Solid& solid, const Effects& effects) {
   if (solid.law() != Law::kLinear) throw std::invalid_argument("a linear model wants the linear law");
@@ -34,7 +34,6 @@ Factor factor_of(const SymmetricMatrix& stiffness) {
   return factor;
 }
 
-/// Depth of each node of the patch.
 VectorXd depth_of(const Solid& solid, const Vec3& normal, const Patch& patch, const VectorXd& displacements) {
   VectorXd all = VectorXd::Zero(solid.size());
   solid.add_free(displacements, all);
@@ -104,7 +103,7 @@ Mat2 LinearModel::giving(const Patch& patch) {
     return patch.slopes.squaredNorm() - 2 * common + size <= kSlopesAlike * kSlopesAlike * size;
   };
   if (slopes_.size() == 0 || !alike()) glide_from(patch);
-  // 2 WᵀY − YᵀAY has its maximum, WᵀA⁻¹W, at Y = A⁻¹W, so the error is quadratic in the error of Y.
+  // 2 WᵀY − YᵀAY has its maximum at the exact Y, so an error of Y is squared.
   Mat2 across = Mat2::Zero();
   for (Eigen::Index i = 0; i < patch.slopes.cols(); ++i) {
     across += patch.slopes.col(i) * given_way_.row(patch.nodes[static_cast<std::size_t>(i)]);
@@ -163,7 +162,7 @@ Reaction LinearModel::press_among_effects(const Patch& patch, Given given, doubl
   reaction.stiffness = step_ > 0 ? secant(reaction, depth_below(patch, normal_, rest_)) : 1 / compliance;
   if (patch.curvatures.size() > 0) {
     add_glide(patch, depth_of(solid_, normal_, patch, per_newton), giving(patch), reaction);
-    reaction.glide.curving = curve_below(patch, normal_, all);  // includes the effect of gravity
+    reaction.glide.curving = curve_below(patch, normal_, all);  // including gravity
   }
   return reaction;
 }
@@ -222,7 +221,7 @@ MatrixXd surface_compliance(const Solid& solid, const Vec3& normal, const std::v
       alone.weights = VectorXd::Ones(1);
       loads.col(j) = solid.to_free(patch_load(solid, normal, alone));
     }
-    // Load and depth use the same functional, so the table is symmetric.
+    // The table is symmetric, because the load and the depth have the same weights.
     const MatrixXd solution = solver.solve(loads);
     for (Eigen::Index j = 0; j < some; ++j) {
       VectorXd all = VectorXd::Zero(solid.size());
@@ -299,7 +298,7 @@ Reaction CondensedModel::press(const Patch& patch, Given given, double value) {
 }
 
 Mat2 CondensedModel::giving(const Patch& patch) const {
-  Mat2 half = Mat2::Zero();  // uses the symmetry of the table
+  Mat2 half = Mat2::Zero();
   for (Eigen::Index j = 0; j < patch.slopes.cols(); ++j) {
     const double* const column = table_.col(rows_[static_cast<std::size_t>(j)]).data();
     Vec2 below = 0.5 * column[rows_[static_cast<std::size_t>(j)]] * patch.slopes.col(j);

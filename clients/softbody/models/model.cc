@@ -8,14 +8,14 @@
 namespace tendon::softbody {
 namespace {
 
-constexpr double kApart = 0.01;  // s, between the compared answers
-constexpr int kAlike = 10;  // consecutive similar answers; one alone can be the turning point of a slow oscillation
+constexpr double kApart = 0.01;  // s between answers
+constexpr int kAlike = 10;       // several in a row, because an oscillation can have a turning point
 
 }  // namespace
 
 double constrained_force(Given given, double value, double untouched, double compliance) {
   if (given == Given::kForce) return value;
-  if (!(compliance > 0)) return 0;  // no patch
+  if (!(compliance > 0)) return 0;
   const double force = (value - untouched) / compliance;
   return given == Given::kLeastDepth ? std::max(0.0, force) : force;
 }

@@ -11,8 +11,7 @@
 namespace tendon::softbody {
 namespace {
 
-/// Lower bound for the sum of two principal stretches, about 2 in a regular element. In an inverted element two
-/// stretches may cancel, which leaves the rotation undefined.
+/// A lower limit, because two stretches of an inverted element may cancel. The usual value is about 2.
 constexpr double kLeastSum = 0.02;
 
 Mat3 sym(const Mat3& a) { return 0.5 * (a + a.transpose()); }
@@ -50,11 +49,10 @@ void check(const Yield& yield) {
   expect_above_zero(yield.hardening, "plasticity.hardening");
 }
 
-/// Plastic flow of one step at one point.
 struct PlasticSolid::Flow {
-  Mat3 plastic;       ///< p at the end of the step
+  Mat3 plastic;       ///< p
   double lost = 0;    ///< J/m³
-  Mat3 way;           ///< unit tensor along p − p₀
+  Mat3 way;           ///< direction of p − p₀
   double onward = 0;  ///< ∂p/∂ε along and across `way`
   double sideways = 0;
 

@@ -14,40 +14,39 @@
 namespace tendon::softbody {
 namespace {
 
-/// Armijo parameter, and the shortest step.
+/// Armijo's parameter and the shortest step.
 constexpr double kDecrease = 1e-4;
 constexpr double kShortest = 1.0 / 64;
 
-/// Number of steps without an accurate answer after which the factor is recomputed. With self-contact it is recomputed
-/// when a step leaves more than kSlow of the remaining energy (a quarter of the error): the contact set changes, so
-/// earlier steps carry no information.
+/// The factor is computed again after kPatience steps without an accurate answer. If sides of the body are in contact,
+/// it is computed again if a step leaves more than kSlow of the remaining energy, because the set of nodes in contact
+/// changes.
 constexpr int kPatience = 16;
 constexpr double kSlow = 1.0 / 16;
 
-/// The stiffness from H has an error of first order in that of H, the energy of the corresponding shape one of second
-/// order. If they differ by at most Config::tangent, and H predicts at most that much further reduction, the reduction
-/// is applied and the result accepted. Agreement of the two alone can be accidental, as near an edge. The glide is
-/// accurate to kOfTangentForGlide times Config::tangent.
+/// The energy of a shape from H has an error of second order, so it is accepted if it differs from the first-order
+/// value by less than Config::tangent, and if H predicts only a small improvement. Both conditions are needed, because
+/// two values can be equal by accident. kOfTangentForGlide is the part of Config::tangent for the glide.
 constexpr double kOfTangentForGlide = 0.5;
 constexpr int kTangentRounds = 5;
 
-/// Relative force error above which a shape is not in equilibrium, so that no glide is computed.
+/// If the relative error of the force is larger, the body is not at rest, and there is no glide.
 constexpr double kAtRest = 0.1;
 
-/// The glide is reused while load and force differ by at most this fraction.
+/// The glide is used again if the load and the force have changed by less than this.
 constexpr double kGlidesAlike = 0.04;
 
-/// Finite-difference step, m, for derivatives of the force: in a body of some mm the next derivative adds 1e-4.
+/// The step (m) of finite differences. In a body of some mm its relative error is 1e-4.
 constexpr double kNudge = 1e-7;
 
-/// Self-contact: maximum number of neighbor searches per answer, and the relative change of forces at which they end.
+/// The maximum number of searches for neighbors, and the relative change of forces at which they end.
 constexpr int kLooks = 10;
 constexpr double kParted = 1e-3;
 
-/// Smaller relative changes of forces are rounding errors and are not added to Pairs.
+/// Smaller relative changes are rounding errors.
 constexpr double kHeard = 1e-8;
 
-/// m: force errors explained by a smaller change of depth count as zero, even if there is no force to compare with.
+/// An error that corresponds to a smaller depth (m) is ignored.
 constexpr double kUnseen = 1e-12;
 
 }  // namespace
@@ -103,8 +102,7 @@ bool QuasiStaticModel::factorize() {
   stiffness(Elastic::Curvature::kExact);
   if (factor_.factorize(stiffness_)) return true;
   stiffness(Elastic::Curvature::kWithoutNegative);
-  // With elements crushed flat, some direction may have no stiffness. Adds a millionth of the largest entry to the
-  // diagonal.
+  // If elements are flat, the stiffness can be singular. A small number is added to the diagonal.
   for (double shift = 0; !factor_.factorize(stiffness_);) {
     double largest = 0;
     for (const double value : stiffness_.values) largest = std::max(largest, std::abs(value));
@@ -176,16 +174,15 @@ VectorXd QuasiStaticModel::needed(const VectorXd& shape, const Elastic::Forces& 
   return change;
 }
 
-/// Where the last step of an answer began: H is that of Pairs, or of who is pushed.
+/// The state at the last step of an answer.
 struct QuasiStaticModel::Tangent {
   const VectorXd& by_tool;  ///< H w
   const Elastic::Forces& now;
   bool among_sides;
 };
 
-/// The shapes Y at a held depth with A Y = W there: Y minimises ½ YᵀAY − WᵀY over all shapes of a growing space
-/// (Galerkin), so that what they are wrong by counts squared. Nothing is found where the body is not stable at a held
-/// depth.
+/// Finds Y with A Y = W at constant depth. Y minimizes ½ YᵀAY − WᵀY over a growing space (Galerkin), so errors of the
+/// space are squared. There is no result if the body is not stable.
 void QuasiStaticModel::find_shapes(const VectorXd& load, const MatrixXd& slopes, const Tangent& tangent) {
   const auto products = [&](const MatrixXd& shapes) {
     MatrixXd all(shapes.rows(), shapes.cols());
@@ -219,7 +216,7 @@ void QuasiStaticModel::find_shapes(const VectorXd& load, const MatrixXd& slopes,
       found.giving += missing;
       break;
     }
-    // Of one size, so that the sums are well conditioned.
+    // Normalized for a good condition.
     space = (MatrixXd(space.rows(), 4) << found.shapes, more).finished();
     by_space = (MatrixXd(space.rows(), 4) << by_shapes, products(more)).finished();
     for (int i = 0; i < 4; ++i) {
@@ -232,9 +229,8 @@ void QuasiStaticModel::find_shapes(const VectorXd& load, const MatrixXd& slopes,
   glided_ = std::move(found);
 }
 
-/// Stiffness and glide of the present shape, by the factor of an older one. Rayleigh quotient: the body's own shape
-/// minimises the stiffness over all shapes with unit depth, so a first-order error of the shape is only a second-order
-/// error of the stiffness. Every round removes the most that one more direction can.
+/// Computes the stiffness and the glide with an older factor. The exact shape minimizes the stiffness (Rayleigh
+/// quotient), so an error of the shape is squared. Each round adds one direction.
 void QuasiStaticModel::find_tangent(const VectorXd& load, const Patch* patch, const Tangent& tangent,
                                     Reaction& reaction) {
   VectorXd shape = tangent.by_tool / load.dot(tangent.by_tool);
@@ -266,7 +262,7 @@ void QuasiStaticModel::find_tangent(const VectorXd& load, const Patch* patch, co
     glided_->load = load;
     glided_->force = reaction.force;
   }
-  // What the shape of unit depth is still wrong by is seen by the shapes of the glide.
+  // Corrects the first-order error of `shape`.
   reaction.glide = {.tilting = slopes.transpose() * shape - glided_->shapes.transpose() * by_shape,
                     .curving = curve_below(*patch, normal_, u_),
                     .giving = glided_->giving};
@@ -277,11 +273,11 @@ double QuasiStaticModel::newton(const VectorXd& load, const Patch* patch, Given 
                                 Reaction& reaction) {
   double error = std::numeric_limits<double>::infinity();
   double before = std::numeric_limits<double>::infinity();
-  bool exact = false;  // true when the factor is that of the present shape
+  bool exact = false;  // the factor is that of the present shape
   bool among_sides = false;
   Step step;
   Elastic::Forces now = known_ ? std::move(known_->forces) : forces();
-  VectorXd solved;  // by the factor alone, as the next
+  VectorXd solved;  // K₀⁻¹ times the forces
   if (known_) solved = std::move(known_->solved);
   known_.reset();
   VectorXd solved_load;
@@ -301,7 +297,7 @@ double QuasiStaticModel::newton(const VectorXd& load, const Patch* patch, Given 
     reaction.stiffness = 1 / compliance;
     reaction.force = constrained_force(given, value, depth + load.dot(step.by_itself), compliance);
     const VectorXd move = step.by_itself + reaction.force * step.by_tool;
-    // −slope = moveᵀ K move is twice the energy that has still to be lost; a force error of √(… K) would explain it.
+    // −slope = moveᵀ K move is twice the remaining energy. The error of the force follows from this energy.
     const double slope = (now.force - reaction.force * load).dot(move);
     error = std::sqrt(std::abs(slope * reaction.stiffness));
     const double enough = config_.tolerance * std::abs(reaction.force) + kUnseen * reaction.stiffness;
@@ -333,8 +329,7 @@ double QuasiStaticModel::newton(const VectorXd& load, const Patch* patch, Given 
   if (step_ == 0 && patch != nullptr)
     find_tangent(load, at_rest ? patch : nullptr, {step.by_tool, now, among_sides}, reaction);
   if (patch != nullptr) {
-    // The force is that of the step which was not taken any more, and so is the tilt: else a hand that hardly moves would
-    // feel a force aside that stands still.
+    // Includes the last step, which is not taken. Otherwise a tangential force would not change with small motions.
     VectorXd there = u_;
     if (at_rest) elastic_.add_free(step.by_itself + reaction.force * step.by_tool, there);
     reaction.depth = depth_below(*patch, normal_, there);
@@ -382,12 +377,12 @@ void QuasiStaticModel::cut(const Division& division, const EffectsConfig& effect
   pairs_.clear();
   glided_.reset();
   known_.reset();
-  factor_ = Factor(stiffness_);  // a split factor would not serve: under load the shape changes in the first step
+  factor_ = Factor(stiffness_);  // a split factor would be useless, because the shape changes at once
   stale_ = true;
 }
 
 void QuasiStaticModel::go_on_from(const Model& before, std::span<const int> node_before) {
-  const VectorXd& u = static_cast<const QuasiStaticModel&>(before).u_;  // of the same kind
+  const VectorXd& u = static_cast<const QuasiStaticModel&>(before).u_;  // same kind by contract
   for (int i = 0; i < u_.size(); ++i) u_[i] = u[3 * node_before[at(i / 3)] + i % 3];
   if (self_collision_) self_collision_ = std::make_unique<SelfCollision>(elastic_, *config_.self_collision, u_);
   pairs_.clear();
@@ -399,7 +394,7 @@ void QuasiStaticModel::go_on_from(const Model& before, std::span<const int> node
 double QuasiStaticModel::release() {
   Reaction free;
   VectorXd nothing = VectorXd::Zero(elastic_.free_count());
-  nothing[0] = 1;  // any direction, with no force along it
+  nothing[0] = 1;  // any direction
   free.error = newton(nothing, nullptr, Given::kForce, 0, free);
   if (self_collision_) part_sides(nothing, nullptr, Given::kForce, 0, free);
   for (const auto& effect : effects_) effect->advance(elastic_.to_free(u_));

@@ -19,7 +19,7 @@ constexpr std::string_view kMagic = "TENDONST";
 constexpr std::uint32_t kVersion = 1;
 constexpr std::uintmax_t kMostBytes = std::uintmax_t{4} << 30;
 constexpr std::size_t kHeader = 64;
-/// Relative to the largest diagonal entry: tolerated negative eigenvalue.
+/// The tolerance for negative eigenvalues, relative to the diagonal.
 constexpr double kRounding = 1e-10;
 
 std::size_t bytes_of(std::size_t nodes) {
@@ -109,7 +109,6 @@ void write_table(const std::filesystem::path& file, const SurfaceTable& table) {
     for (Eigen::Index j = 0; j <= i; ++j) put(bytes, table.compliance(i, j));
   }
   put(bytes, checksum(bytes));
-  // Atomic replacement.
   std::filesystem::path draft = file;
   draft += ".new";
   write_draft(draft, bytes);

@@ -9,9 +9,9 @@
 namespace tendon::softbody {
 namespace {
 
-constexpr double kSame = 1e-6;  // relative to a step
+constexpr double kSame = 1e-6;  // relative
 
-/// A grid of nodes: `free` has the free index of each, or −1; x fastest.
+/// `free` contains the number of each free node, or −1.
 struct Grid {
   std::array<int, 3> count{};
   std::vector<int> free;
@@ -22,7 +22,7 @@ struct Grid {
   }
 };
 
-/// Node coordinates along an axis; empty if the steps are not equal.
+/// Returns an empty list if the steps are not equal.
 std::vector<double> places(const Mesh& mesh, Eigen::Index axis) {
   std::vector<double> all;
   all.reserve(mesh.nodes.size());
@@ -69,7 +69,6 @@ std::optional<Grid> grid_of(const Solid& solid) {
   return grid;
 }
 
-/// Every other node along each axis, renumbered.
 Grid coarser(const Grid& fine) {
   Grid coarse;
   for (std::size_t axis = 0; axis < 3; ++axis) coarse.count[axis] = (fine.count[axis] - 1) / 2 + 1;
@@ -85,13 +84,13 @@ Grid coarser(const Grid& fine) {
 }
 
 struct Along {
-  int node;  ///< coarse index along the axis
+  int node;
   double weight;
 };
 
-/// Interpolation of fine node `i` along an axis with `count` fine nodes.
+/// Returns the interpolation weights of fine node `i`.
 std::vector<Along> along(int i, int count, int order) {
-  const int wide = 2 * order;  // fine steps per coarse cell
+  const int wide = 2 * order;
   const int cell = std::min(i / wide, (count - 1) / wide - 1);
   const double t = static_cast<double>(i - cell * wide) / wide;
   std::vector<Along> found;

@@ -17,7 +17,6 @@
 namespace tendon::softbody {
 namespace {
 
-/// Throws PETSc's error message.
 void check(PetscErrorCode code) {
   if (code == 0) return;
   const char* text = nullptr;
@@ -27,7 +26,7 @@ void check(PetscErrorCode code) {
                            (more != nullptr && *more != '\0' ? std::string(": ") + more : std::string()));
 }
 
-/// RAII owner of a PETSc object.
+/// Destroys an object of PETSc.
 template <class Handle, PetscErrorCode (*kDestroy)(Handle*)>
 class Owned {
  public:
@@ -49,7 +48,7 @@ using Vector = Owned<Vec, VecDestroy>;
 using NullSpace = Owned<MatNullSpace, MatNullSpaceDestroy>;
 
 constexpr double kFineTolerance = 1e-10;
-constexpr int kRemembered = 10;  // answers
+constexpr int kRemembered = 10;
 
 int rank_of(MPI_Comm comm) {
   int rank = 0;
@@ -63,12 +62,11 @@ int count_of(MPI_Comm comm) {
   return count;
 }
 
-/// Start of rank `index`'s share of `whole`.
 PetscInt share(PetscInt whole, int index, int parts) {
   return static_cast<PetscInt>(static_cast<std::int64_t>(whole) * index / parts);
 }
 
-/// Stiffness of an isotropic linear element: Σ V (λ gᵢ gⱼᵀ + µ (gⱼ gᵢᵀ + gᵢ·gⱼ I)).
+/// Σ V (λ gᵢ gⱼᵀ + µ (gⱼ gᵢᵀ + gᵢ·gⱼ I))
 using StiffnessOfElement = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 StiffnessOfElement stiffness_of_element(const Solid& solid, int element) {
   const auto nodes = static_cast<Eigen::Index>(solid.mesh().element(element).size());
@@ -117,7 +115,7 @@ class SpreadSolver : public Solver {
     if (!iterates_) return Solver::solve_roughly(load);
     put(load, load_);
     Rough rough;
-    // Scaled by the previous compliance: patches of one body differ little.
+    // The compliance of the last patch is a good estimate.
     double end = std::sqrt(kRough * least_ * compliance_);
     constexpr int kTries = 4;
     for (int i = 0; i < kTries; ++i) {
@@ -176,7 +174,7 @@ class SpreadSolver : public Solver {
  private:
   static constexpr PetscInt kMostRounds = 1000;
 
-  /// All components of a node belong to the same rank.
+  /// Ranks own whole nodes.
   PetscInt first_row(int rank) const { return 3 * share(size_ / 3, rank, count_of(comm_)); }
 
   void expect_convergence() const {
@@ -190,7 +188,7 @@ class SpreadSolver : public Solver {
   void iterate(const Solid& solid, PC preconditioner) {
     check(KSPSetType(krylov_, KSPCG));
     check(KSPSetNormType(krylov_, KSP_NORM_NATURAL));
-    check(KSPSetComputeSingularValues(krylov_, PETSC_TRUE));  // before KSPSetUp
+    check(KSPSetComputeSingularValues(krylov_, PETSC_TRUE));  // must precede KSPSetUp
     check(MatCreateVecs(matrix_, solution_.address(), load_.address()));
     check(VecDuplicate(load_, residual_.address()));
     const std::vector<GridLevel> levels = grid_levels(solid);
@@ -207,8 +205,7 @@ class SpreadSolver : public Solver {
       make_interpolation(levels[i], interpolation);
       const auto level = static_cast<PetscInt>(levels.size() - i);
       check(PCMGSetInterpolation(preconditioner, level, interpolation));
-      // Chebyshev smoothing (PETSc's default, two iterations) with Jacobi: twice the iterations of SOR in a third of
-      // the time.
+      // Chebyshev with Jacobi needs twice the iterations of SOR, but a third of the time.
       KSP smoother = nullptr;
       PC diagonal = nullptr;
       check(PCMGGetSmoother(preconditioner, level, &smoother));
@@ -245,7 +242,6 @@ class SpreadSolver : public Solver {
     check(MatSetValuesCOO(to, values.data(), INSERT_VALUES));
   }
 
-  /// Gives GAMG the rigid body modes.
   void tell_rigid_motions(const Solid& solid) {
     Vector places;
     check(VecCreate(comm_, places.address()));
@@ -262,9 +258,9 @@ class SpreadSolver : public Solver {
     check(MatSetNearNullSpace(matrix_, motions));
   }
 
-  /// Computes λ, the lower bound of the preconditioned spectrum.
+  /// Computes λ.
   void know_the_spectrum() {
-    VectorXd load(size_);  // pseudorandom, identical on every rank and machine
+    VectorXd load(size_);  // the same pseudorandom numbers on every rank
     std::uint64_t state = 1;
     for (double& entry : load) {
       state = state * 6364136223846793005ULL + 1442695040888963407ULL;
@@ -283,7 +279,6 @@ class SpreadSolver : public Solver {
     check(KSPSetUseFischerGuess(krylov_, 1, kRemembered));
   }
 
-  /// Copies this rank's rows of a replicated vector.
   void put(const VectorXd& from, Vec to) const {
     PetscScalar* values = nullptr;
     check(VecGetArrayWrite(to, &values));
@@ -291,8 +286,7 @@ class SpreadSolver : public Solver {
     check(VecRestoreArrayWrite(to, &values));
   }
 
-  /// Assembles this rank's rows from all adjacent elements in element order, without communication, so that rows have
-  /// the same bits on any number of ranks.
+  /// Rows are assembled without communication, and have the same bits for any number of ranks.
   void assemble(const Solid& solid) {
     const Mesh& mesh = solid.mesh();
     const PetscInt first = first_ / 3;
@@ -302,7 +296,7 @@ class SpreadSolver : public Solver {
       return free < 0 ? -1 : free / 3;
     };
     const auto is_mine = [&](int free) { return free >= first && free < first + mine; };
-    std::vector<int> elements;  // with a node of this rank
+    std::vector<int> elements;
     std::vector<std::vector<int>> beside(static_cast<std::size_t>(mine));
     for (int e = 0; e < mesh.element_count(); ++e) {
       const auto nodes = mesh.element(e);
@@ -314,7 +308,6 @@ class SpreadSolver : public Solver {
         beside[static_cast<std::size_t>(row - first)].push_back(e);
       }
     }
-    // Exact preallocation.
     std::vector<PetscInt> here(static_cast<std::size_t>(mine));
     std::vector<PetscInt> elsewhere(static_cast<std::size_t>(mine));
     std::vector<int> neighbours;
@@ -342,7 +335,7 @@ class SpreadSolver : public Solver {
       const StiffnessOfElement k = stiffness_of_element(solid, e);
       rows.clear();
       columns.clear();
-      for (const int node : mesh.element(e)) {  // PETSc ignores negative indices
+      for (const int node : mesh.element(e)) {  // PETSc ignores negative numbers
         columns.push_back(free_node(node));
         rows.push_back(is_mine(columns.back()) ? columns.back() : -1);
       }
@@ -354,7 +347,6 @@ class SpreadSolver : public Solver {
     check(MatSetOption(matrix_, MAT_SPD, PETSC_TRUE));
   }
 
-  /// Gathers all rows of a column on every rank.
   void gather(const PetscScalar* values, double* whole) const {
     const int ranks = count_of(comm_);
     std::vector<int> sizes(static_cast<std::size_t>(ranks));
@@ -391,19 +383,19 @@ class SpreadSolver : public Solver {
   bool iterates_;
   Matrix matrix_;
   Krylov krylov_;
-  // For multigrid:
+  // For multigrid.
   Vector load_;
   Vector solution_;
   Vector residual_;
   double least_ = 0;               ///< λ
-  mutable double compliance_ = 0;  ///< m/N, of the last approximate solve
+  mutable double compliance_ = 0;  ///< of the last solution, m/N
 };
 
 }  // namespace
 
 Ranks::Ranks(int& argc, char**& argv) {
   check(PetscInitialize(&argc, &argv, nullptr, nullptr));
-  // Errors are thrown, so PETSc need not print them.
+  // check() throws instead.
   PetscPushErrorHandler(PetscIgnoreErrorHandler, nullptr);
 }
 

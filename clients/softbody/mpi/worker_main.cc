@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// tendon-fem-worker: a soft body solved on all MPI ranks. Started by tendon-fem.
+// tendon-fem-worker: a soft body on all MPI ranks. tendon-fem starts it.
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
@@ -27,8 +27,7 @@ using namespace tendon::softbody;
 
 namespace {
 
-/// Checks PETSc against the local solver on a small block. Some versions silently give wrong results (a DMDA matrix on
-/// one rank, 3.18).
+/// Some versions of PETSc give wrong results without an error (a DMDA matrix on one rank, 3.18).
 void expect_right_answers() {
   BodyConfig block;
   block.shape = BlockShape{Vec3(0.1, 0.1, 0.05), {4, 4, 2}};
@@ -52,7 +51,7 @@ struct Arguments {
   bool json = false;
 };
 
-/// on_ranks() with a progress display.
+/// Prints the progress.
 class Told : public Solver {
  public:
   Told(const Solid& solid, Method method) : solver_(on_ranks(solid, method)) {}
@@ -96,14 +95,14 @@ int condense_scene(const Arguments& arguments, const Ranks& ranks) {
   return 0;
 }
 
-/// The body for live answers. A condensed body is replaced by the equivalent linear one, without a table.
+/// kCondensed is replaced by kLinear, because the workers have no table.
 Body live_body(BodyConfig config, Method method) {
   if (config.model == ModelKind::kCondensed) config.model = ModelKind::kLinear;
   config.table_file.reset();
   return Body(config, [method](const Solid& solid) { return on_ranks(solid, method); });
 }
 
-/// Answers the front until it closes the stream, which only rank 0 has; every rank computes every answer.
+/// Only rank 0 reads the stream, but every rank computes all answers.
 int answer(const Arguments& arguments, const Ranks& ranks) {
   expect_right_answers();
   const Scene scene = read_scene(arguments.scene);
@@ -115,7 +114,7 @@ int answer(const Arguments& arguments, const Ranks& ranks) {
       stream = std::make_unique<tendon::worker::WorkerStream>();
     } catch (const std::exception& error) {
       std::cerr << "tendon-fem-worker: " << error.what() << '\n';
-      end_all_ranks();  // the others wait for a state
+      end_all_ranks();  // other ranks are waiting
     }
   }
   tendon::worker::Codec codec;
@@ -171,7 +170,7 @@ int main(int argc, char** argv) {
   } catch (const CLI::ParseError& error) {
     return tendon::usage::exit_code(app, error);
   }
-  int none = 1;  // PETSc's options come from the environment
+  int none = 1;  // options come from the environment
   try {
     const Ranks ranks(none, argv);
     try {
@@ -180,7 +179,7 @@ int main(int argc, char** argv) {
       if (ranks.rank() == 0) std::cerr << "tendon-fem-worker: " << error.what() << '\n';
       return 2;
     } catch (const std::exception& error) {
-      // Ranks fail together, except where only rank 0 is involved: the others must not wait for it.
+      // All ranks fail together, except for errors of rank 0.
       if (ranks.rank() == 0) std::cerr << "tendon-fem-worker: " << error.what() << '\n';
       return 1;
     }

@@ -16,7 +16,7 @@ Reaction Ladder::press(const Patch& patch, Given given, double value) {
   bool whole = false;
   for (std::size_t i = 0; i < rungs_.size() && !whole; ++i) {
     const auto answer = rungs_[i]->press(patch, value);
-    // A rung holds the depth and may pull.
+    // A rung may pull.
     if (!answer || (given == Given::kLeastDepth && answer->reaction.force < 0)) continue;
     ++answers_[i];
     answers.push_back(*answer);
@@ -72,7 +72,7 @@ Reaction blended(const Reaction& from, const Reaction& to, double share) {
   all.knows_glide = from.knows_glide && to.knows_glide;
   if (!all.knows_glide) return all;
   // Blends the parts of PatchContact's K: k along the normal, k s + F t mixed, and k s sᵀ + F (s tᵀ + t sᵀ − M − F D)
-  // tangential. The surface at rest contributes equally to both. `giving` stays 0; `curving` contains both.
+  // tangential. The result is stored in `curving`.
   const auto beside = [](const Reaction& r) { return Vec2(r.stiffness * r.slope + r.force * r.glide.tilting); };
   const auto across = [](const Reaction& r) {
     const Mat2 turned = r.slope * r.glide.tilting.transpose();

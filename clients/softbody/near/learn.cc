@@ -20,7 +20,7 @@ namespace {
 constexpr std::uint64_t kLearnedVersion = 3;
 constexpr std::uintmax_t kMostLearnedBytes = std::uintmax_t{1} << 30;
 
-/// File magic, name prefix and fields of each kind of data.
+/// The magic bytes, the name and the fields of each file type.
 struct OfShapes {
   using Value = LearnedShapes;
   static constexpr std::string_view kBegins = "TENDONSH";
@@ -113,7 +113,6 @@ class Reads {
   ByteReader& from_;
 };
 
-/// Digest of everything a file depends on.
 std::uint64_t digest_of(const Solid& solid, const TouchSurface& surface, const PressGrid& grid) {
   std::string bytes;
   put(bytes, softbody::digest_of(solid, surface.normal()));
@@ -164,14 +163,14 @@ typename Kind::Value value_of(std::string_view bytes, std::uint64_t digest, cons
   return value;
 }
 
-/// Writes the file atomically, unless it already exists.
+/// Does not overwrite an existing file.
 void keep(const std::filesystem::path& file, std::string_view bytes) {
   std::filesystem::create_directories(file.parent_path());
   std::filesystem::path draft = file;
   draft += ".new";
   write_draft(draft, bytes);
   std::error_code there;
-  std::filesystem::create_hard_link(draft, file, there);  // another process may have written it
+  std::filesystem::create_hard_link(draft, file, there);  // another process may be faster
   std::filesystem::remove(draft);
   if (there && there != std::errc::file_exists) {
     throw std::runtime_error("cannot write " + file.string() + ": " + there.message());

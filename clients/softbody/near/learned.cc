@@ -19,41 +19,41 @@
 namespace tendon::softbody {
 namespace {
 
-/// Maximum numbers of shapes. Fewer are used if the rest is at most kShapesLeft (square root of energy).
+/// The maximum numbers of shapes, and the part of the energy (square root) that may be neglected.
 constexpr std::array<int, 2> kMostLearned{45, 60};
 constexpr double kShapesLeft = 3e-4;
-/// The larger number is used only if answers with the smaller one may be wrong by more than this relative force error.
+/// The second number is used if the relative error with the first one is larger than this.
 constexpr double kGoodEnough = 0.015;
 
-/// Accepted residual of the nonlinear correction with the chosen elements, and their maximum number.
+/// The accepted error of the chosen elements, and their maximum number.
 constexpr double kElementsLeft = 5e-3;
 constexpr int kMostElements = 240;
-/// On a fine mesh, only the elements with the largest corrections are candidates.
+/// Only the elements with the largest nonlinear parts are considered.
 constexpr Eigen::Index kCandidates = 1500;
 
-/// Finite-difference step for q, relative to |q|, and its minimum, √J.
+/// The step of finite differences, relative to |q|, and its minimum (√J).
 constexpr double kNudged = 1e-6;
 constexpr double kLeastNudge = 1e-9;
 
-/// Maximum Newton steps per answer; shortest step and Armijo parameter of the line search.
+/// Newton's method: the maximum number of steps, the shortest step, and Armijo's parameter.
 constexpr int kMostSteps = 8;
 constexpr double kShortestShare = 1.0 / 64;
 constexpr double kShareOfDecrease = 1e-4;
-/// Minimum cosine between a step and its change of forces.
+/// The minimum cosine between a step and its change of forces.
 constexpr double kLeastCurved = 1e-8;
 
-/// Fraction of the tolerance that is left to Newton's method; the rest covers the shapes.
+/// The part of the tolerance that Newton's method may use.
 constexpr double kForNewton = 0.25;
 
-/// Relative tolerance at knots, and of the answers used for validation; the force error is quadratic in it.
+/// Relative tolerances for knots and for validation. The error of the force is quadratic.
 constexpr double kExactly = 1e-6;
 constexpr double kJudged = 1e-4;
 
-/// Rayleigh quotient for the stiffness: maximum iterations, and the relative uncertainty at which they end.
+/// Rayleigh quotient: the maximum number of rounds, and the accepted relative error.
 constexpr int kStiffnessRounds = 5;
 constexpr double kStiffnessAlike = 0.02;
 
-/// A kernel in which each element has its own corner numbers, so that forces are kept per element.
+/// Elements do not share corners here, so their forces are separate.
 Kernel apart(const Solid& solid, Law law, const std::vector<int>& elements, const std::vector<int>& node_of,
              const VectorXd& weights) {
   const int per_element = nodes_of(solid.mesh().shape);
@@ -70,7 +70,7 @@ Kernel apart(const Solid& solid, Law law, const std::vector<int>& elements, cons
   return kernel;
 }
 
-/// The nodes of some elements, ascending, and the index of each element corner among them.
+/// The nodes of some elements, and their indices for each corner.
 struct Corners {
   Corners(const Mesh& mesh, const std::vector<int>& elements) {
     for (const int element : elements) {
@@ -88,7 +88,6 @@ struct Corners {
   std::vector<int> own;
 };
 
-/// Rows of all components of some nodes; zero where fixed.
 MatrixXd rows_of(const Solid& solid, const MatrixXd& free, const std::vector<int>& nodes) {
   MatrixXd rows = MatrixXd::Zero(3 * static_cast<Eigen::Index>(nodes.size()), free.cols());
   for (Eigen::Index i = 0; i < rows.rows(); ++i) {
@@ -98,10 +97,10 @@ MatrixXd rows_of(const Solid& solid, const MatrixXd& free, const std::vector<int
   return rows;
 }
 
-/// Leading shapes, orthonormal in the stiffness at rest, and the coordinates q of each press.
+/// Shapes that are orthonormal with the stiffness at rest.
 struct Basis {
-  MatrixXd shapes;  ///< free displacements
-  MatrixXd q;       ///< one column per press
+  MatrixXd shapes;
+  MatrixXd q;  ///< one column for each press
 };
 
 Basis basis_of(const std::vector<const SolvedPress*>& presses, const SymmetricMatrix& at_rest, int most) {
@@ -110,15 +109,14 @@ Basis basis_of(const std::vector<const SolvedPress*>& presses, const SymmetricMa
   VectorXd sizes(count);
   for (Eigen::Index s = 0; s < count; ++s) {
     const VectorXd& shape = presses[static_cast<std::size_t>(s)]->shape;
-    // Compromise between equal weight of all presses and equal errors in metres: deep presses contribute distinct
-    // shapes.
+    // A compromise between equal weights and equal errors (m), because deep presses have special shapes.
     sizes[s] = std::sqrt(shape.norm());
     all.col(s) = shape / sizes[s];
   }
   MatrixXd gram(count, count);
   for (Eigen::Index s = 0; s < count; ++s) gram.col(s) = all.transpose() * at_rest.times(all.col(s));
   const Eigen::SelfAdjointEigenSolver<MatrixXd> parts((gram + gram.transpose()) / 2);
-  const VectorXd& energies = parts.eigenvalues();  // ascending
+  const VectorXd& energies = parts.eigenvalues();
   Eigen::Index kept = std::min<Eigen::Index>(count, most);
   const double sum = energies.sum();
   const auto left = [&](Eigen::Index of) { return energies.head(count - of).cwiseMax(0.0).sum(); };
@@ -128,7 +126,7 @@ Basis basis_of(const std::vector<const SolvedPress*>& presses, const SymmetricMa
   return {all * mix, mix.transpose() * gram * sizes.asDiagonal()};
 }
 
-/// The law's correction to the linear forces, per element, projected on the shapes.
+/// The nonlinear part of the forces for each element.
 class Added {
  public:
   Added(const Solid& solid, const Basis& basis)
@@ -144,7 +142,7 @@ class Added {
     per_element_ = nodes_of(solid.mesh().shape);
   }
 
-  /// One column per element, for press s.
+  /// Returns a column for each element.
   MatrixXd at_press(Eigen::Index s) const {
     const VectorXd u = rows_.transpose() * basis_.q.col(s);
     const auto size = 3 * static_cast<Eigen::Index>(corners_->own.size());
@@ -167,13 +165,12 @@ class Added {
   const Basis& basis_;
   std::vector<int> elements_;
   std::unique_ptr<Corners> corners_;
-  MatrixXd rows_;  ///< shapes as columns, for sequential access
+  MatrixXd rows_;
   std::unique_ptr<Kernel> law_;
   std::unique_ptr<Kernel> linear_;
   int per_element_ = 0;
 };
 
-/// Chooses elements and weights that reproduce the total correction in all presses.
 void choose_elements(const Solid& solid, const Basis& basis, LearnedShapes& learned) {
   const Added added(solid, basis);
   const Eigen::Index presses = basis.q.cols();
@@ -215,7 +212,6 @@ void choose_elements(const Solid& solid, const Basis& basis, LearnedShapes& lear
   learned.weights = Eigen::Map<const VectorXd>(chosen.data(), static_cast<Eigen::Index>(chosen.size()));
 }
 
-/// ∂²E/∂q² by central differences.
 MatrixXd curvature_at(const LearnedBody& body, const VectorXd& q) {
   const Eigen::Index size = q.size();
   const double nudge = std::max(kLeastNudge, kNudged * q.norm());
@@ -241,7 +237,7 @@ bool stable_at_held_depth(const MatrixXd& curvature, const VectorXd& load) {
   return parts.eigenvalues()[0] > 0;
 }
 
-/// Line search along `step`. `slope` holds ∂E/∂q before and after.
+/// Searches along `step` for a lower energy. `slope` is updated.
 bool go(const LearnedBody& body, const VectorXd& step, double& energy, VectorXd& q, VectorXd& slope) {
   const double foreseen = slope.dot(step);
   VectorXd there_slope(q.size());
@@ -257,7 +253,7 @@ bool go(const LearnedBody& body, const VectorXd& step, double& energy, VectorXd&
   return false;
 }
 
-/// BFGS update of the inverse.
+/// BFGS.
 void learn_step(const VectorXd& step, const VectorXd& change, MatrixXd& inverse) {
   const double stiff = step.dot(change);
   if (!(stiff > kLeastCurved * step.norm() * change.norm())) return;
@@ -266,7 +262,7 @@ void learn_step(const VectorXd& step, const VectorXd& change, MatrixXd& inverse)
   inverse += mixed * step.transpose() + step * mixed.transpose();
 }
 
-/// Finds shape and inverse of a knot. Returns false if there is no stable one.
+/// Returns false if there is no solution.
 bool solve_knot(const LearnedBody& body, const VectorXd& load, double depth, VectorXd& q, MatrixXd& inverse) {
   VectorXd slope(q.size());
   for (int i = 0; i < kMostSteps; ++i) {
@@ -325,7 +321,6 @@ LearnedShapes learn_shapes_of(const Solid& solid, const TouchSurface& surface, c
     tell("learning: " + std::to_string(learned.elements.size()) + " elements of " +
          std::to_string(solid.mesh().element_count()));
 
-  // Knots, and relative errors at knots and cell centers.
   learned.knots = MatrixXd::Zero(count, grid.knots());
   learned.inverses = MatrixXd::Zero(count, count * grid.knots());
   std::vector<double> at_knots(at(grid.knots()), -1);
@@ -461,7 +456,7 @@ std::optional<Reaction> LearnedBody::press(const Patch& patch, double depth, con
   reaction.depth = load.dot(q);
   reaction.slope = patch.slopes * (below.transpose() * q);
 
-  // Rayleigh quotient: the shape of unit depth minimizes the stiffness.
+  // The exact shape minimizes the stiffness (Rayleigh quotient).
   const double nudge = std::max(kLeastNudge, kNudged * q.norm());
   VectorXd there(size);
   const auto stiff = [&](const VectorXd& shape) {

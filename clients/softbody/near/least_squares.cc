@@ -10,9 +10,9 @@
 namespace tendon::softbody {
 namespace {
 
-/// Relative to the diagonal: regularizes linearly dependent columns.
+/// Relative to the diagonal, for columns that are linearly dependent.
 constexpr double kRidge = 1e-12;
-/// Smaller entries count as zero.
+/// Smaller entries are zero.
 constexpr double kNone = 1e-12;
 
 }  // namespace
@@ -39,7 +39,7 @@ VectorXd few_not_negative(const Squares& squares, double left, int most) {
       MatrixXd among = squares.gram(in, in);
       among.diagonal() *= 1 + kRidge;
       const VectorXd wanted = among.ldlt().solve(VectorXd(squares.right(in)));
-      double share = 1;  // fraction of the step that keeps all entries ≥ 0
+      double share = 1;  // keeps all entries ≥ 0
       for (std::size_t i = 0; i < in.size(); ++i) {
         const double to = wanted[static_cast<Eigen::Index>(i)];
         if (to <= 0) share = std::min(share, x[in[i]] / (x[in[i]] - to));

@@ -11,14 +11,13 @@
 namespace tendon::softbody {
 namespace {
 
-/// Random loads per mode, and the relative RMS of the motion of Γ that the modes may neglect.
+/// The number of random loads for each mode, and the part of the motion of Γ (RMS) that may be neglected.
 constexpr int kLoadsPerMode = 2;
 constexpr double kLeft = 1e-3;
 
-/// Loads per solve.
 constexpr Eigen::Index kLoadsAtOnce = 8;
 
-/// Maximum number of far elements sampled by left_out().
+/// The maximum number of elements that left_out() evaluates.
 constexpr std::size_t kWatched = 96;
 
 Vec3 middle_of(const Mesh& mesh, int element) {
@@ -27,7 +26,7 @@ Vec3 middle_of(const Mesh& mesh, int element) {
   return sum / static_cast<double>(mesh.element(element).size());
 }
 
-/// Uniform in ±1, with a fixed seed.
+/// Random numbers between −1 and 1, always the same.
 class Noise {
  public:
   double next() { return static_cast<double>(random_() >> 11U) * 0x1p-52 - 1; }
@@ -42,7 +41,6 @@ SymmetricMatrix stiffness_at(const Solid& solid, const VectorXd& u) {
   return stiffness;
 }
 
-/// Displacements of a part, whose nodes have the numbers `nodes` in the whole.
 VectorXd of_nodes(const VectorXd& all, const std::vector<int>& nodes) {
   VectorXd own(3 * static_cast<Eigen::Index>(nodes.size()));
   for (Eigen::Index i = 0; i < own.size(); ++i) own[i] = all[3 * nodes[static_cast<std::size_t>(i / 3)] + i % 3];
@@ -62,8 +60,8 @@ double NearBody::Linear::excess(const Solid& solid, const VectorXd& moved, const
 struct NearBody::Parts {
   Solid part;
   Watched watched;
-  std::vector<int> rim{};        ///< components in `part`
-  std::vector<int> rim_nodes{};  ///< in `part`
+  std::vector<int> rim{};
+  std::vector<int> rim_nodes{};
   std::vector<int> own_of{};
   MatrixXd modes{};
   MatrixXd far{};
@@ -114,8 +112,8 @@ Pieces NearBody::make(const Solid& whole, const Factor& factor, Config config, s
   co_await kPieceDone;
 
   parts.own_of.assign(mesh.nodes.size(), -1);
-  std::vector<int> whole_of;  // free number in the whole of each free component of the part
-  std::vector<int> rim_free;  // free number in the part of each component of `rim`
+  std::vector<int> whole_of;  // free numbers in the whole body
+  std::vector<int> rim_free;  // free numbers in the part
   std::vector<double> weight;
   for (int i = 0; i < static_cast<int>(nodes.size()); ++i) {
     const int node = nodes[at(i)];
@@ -154,7 +152,7 @@ Pieces NearBody::make(const Solid& whole, const Factor& factor, Config config, s
   co_await kPieceDone;
 
   MatrixXd shapes(loads.rows(), loads.cols());
-  // The far field's force on Γ in each of these shapes balances the load and the near field.
+  // The forces of the far field on Γ are the loads minus the forces of the near field.
   MatrixXd traces(interface, loads_count);
   MatrixXd forces(interface, loads_count);
   VectorXd local(part.free_count());
@@ -173,7 +171,7 @@ Pieces NearBody::make(const Solid& whole, const Factor& factor, Config config, s
     co_await kPieceDone;
   }
   const Eigen::SelfAdjointEigenSolver<MatrixXd> parts_of_traces(traces.transpose() * traces);
-  const VectorXd& squares = parts_of_traces.eigenvalues();  // ascending
+  const VectorXd& squares = parts_of_traces.eigenvalues();
   Eigen::Index count = loads_count;
   double left = 0;
   while (!exact && count > 1 &&
@@ -249,7 +247,7 @@ Elastic::Forces NearBody::forces(const VectorXd& u) const {
 void NearBody::stiffness(const VectorXd& u, Curvature curvature, SymmetricMatrix& to) const {
   SymmetricMatrix near = part_.pattern();
   part_.stiffness(placed(u), curvature, near);
-  // For each free component of the part: its index on Γ, or −1; and its free number in this body.
+  // For each free component: the index on Γ or −1, and the free number in this body.
   std::vector<int> on_rim(at(part_.free_count()), -1);
   for (std::size_t i = 0; i < rim_.size(); ++i) on_rim[at(part_.free_of(rim_[i]))] = static_cast<int>(i);
   std::vector<int> own(at(part_.free_count()), -1);

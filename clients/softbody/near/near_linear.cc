@@ -10,16 +10,15 @@
 namespace tendon::softbody {
 namespace {
 
-/// Safety factors on the observed part of the error.
+/// Safety factors of the estimated errors.
 constexpr double kLinearSafety = 6;
 constexpr double kStepSafety = 2;
 constexpr double kPartedSafety = 3;
 
-/// Weight of the Newton step from the linear shape, while no field contains the patch: full up to kStrays, zero from
-/// kStraysTooFar on. The measure is the remaining fraction of the energy's slope at the end of the step, plus kByEnergy
-/// times the fraction of the energy that the step is predicted to release. On block B1: 0.3 at a/4 for ν = 0.45 and 0.9
-/// next to a cut, where the step is good; 0.6 at a/20 and 2.6 at a/10 for ν = 0.499, where it is not. The slope alone
-/// is small again at 0.17 a, by accident.
+/// The step from the linear shape has its full weight up to kStrays, and no weight from kStraysTooFar. The criterion is
+/// the part of the slope that remains after the step, plus kByEnergy times the part of the energy that the step
+/// releases. Values on block B1: 0.3 at a/4 (ν = 0.45) and 0.9 next to a cut, where the step is good; 0.6 at a/20 and
+/// 2.6 at a/10 (ν = 0.499), where it is bad. The slope alone is not sufficient: it is small again at 0.17 a.
 constexpr double kStrays = 1;
 constexpr double kStraysTooFar = 1.5;
 constexpr double kByEnergy = 5;
@@ -57,7 +56,7 @@ Reaction NearModel::linear_press(const Patch& patch, Given given, double value) 
   }
   reaction.error =
       kStepSafety * std::abs(work - reaction.force) + (1 - share) * kLinearSafety * std::abs(work - linear);
-  // The nonlinear correction of the force is quadratic in the depth.
+  // The nonlinear part of the force is quadratic in the depth.
   reaction.stiffness = (linear != 0 ? 2 * reaction.force / linear - 1 : 1) / compliance;
   if (given == Given::kForce) {
     solid_.add_free((value - reaction.force) * per_newton, u);
@@ -65,7 +64,7 @@ Reaction NearModel::linear_press(const Patch& patch, Given given, double value) 
   }
   reaction.depth = depth_below(patch, surface_.normal(), u);
   reaction.slope = slope_below(patch, surface_.normal(), u);
-  // The sides of a cut rotate freely. Adds the energy released on the way to the equilibrium shape, per metre of depth.
+  // The sides of a cut can rotate. This is the energy that is not yet released, per metre.
   if (parted_) reaction.error += kPartedSafety * std::abs(slope / reaction.depth);
   if (!std::isfinite(reaction.error)) reaction.error = std::abs(reaction.force);
   return reaction;

@@ -17,52 +17,50 @@
 namespace tendon::softbody {
 namespace {
 
-/// Near-field radii, in patch radii, and the Poisson ratio above which the larger one is used.
+/// The radius of the near field in patch radii. The larger one is for nearly incompressible materials.
 constexpr double kRadius = 1.5;
 constexpr double kRadiusIncompressible = 2;
 constexpr double kIncompressible = 0.45;
 constexpr double kElementsBeyond = 2;
 
-/// Distance of hand motion over which the old answer fades out, in patch radii.
+/// The motion of the hand, in patch radii, until only the new field is used.
 constexpr double kFadesOver = 0.25;
 
-/// Without a background thread: a new field is built while the patch moves from serves_to() to kWaits times as far from
-/// the old field's center, at least one piece per answer, evenly distributed. 60 modes have 29 pieces. The old field
-/// contains the patch up to twice serves_to().
+/// Without a background thread, a new field is built while the distance of the patch from the center grows from
+/// serves_to() to kWaits times this value. 60 modes need 29 pieces. The old field is valid up to twice serves_to().
 constexpr double kWaits = 1.7;
 constexpr double kPiecesOnTheWay = 30;
 
-/// A field that is not needed yet is completed while this much of `room` is left, when the hand is still near its
-/// center.
+/// A field is complete when this value of `room` is left.
 constexpr double kRoomLeft = 0.3;
 
-/// Newton iterations per piece; number of pieces that press the new field; index of the piece that factorizes.
+/// Iterations for each piece, pieces that press the new field, and the piece that computes the factor.
 constexpr int kIterationsAtOnce = 6;
 constexpr int kPresses = 4;
 constexpr int kFactorAt = 1;
 
-/// Safety factors on the observed part of the error.
+/// Safety factors of the estimated errors.
 constexpr double kFarSafety = 3;
 constexpr double kModesSafety = 3;
 
-/// Largest distance of a patch from the center of its field, in patch radii.
+/// The maximum distance between a patch and the center of its field, in patch radii.
 constexpr double kReach = 0.45;
 
-/// Depth change, in patch radii, at which a field about another shape is requested.
+/// A new field is requested if the depth has changed by this, in patch radii.
 constexpr double kDeeper = 0.1;
 
-/// Relative force tolerance of the whole body's shape, and maximum number of refinement passes. If the error is still
-/// ten times the tolerance, the shape is not used.
+/// The accepted relative error of the shape of the whole body, and the maximum number of solves. A shape with ten times
+/// this error is not used.
 constexpr double kShape = 1e-3;
 constexpr int kShapePresses = 6;
 
-/// A field in progress is abandoned when the hand is this many times serves_to() from its center.
+/// If the distance is larger, the field is abandoned.
 constexpr double kLeftBehind = 3;
 
-/// Averaging length of the hand's motion per answer.
+/// The number of answers in the mean motion of the hand.
 constexpr double kAnswersInMean = 16;
 
-/// m, distance of the patch from a field's center beyond which a new field is needed.
+/// The distance (m) from the center at which a new field is needed.
 double serves_to(const TouchSurface& surface) { return kReach * surface.radius() / 2; }
 
 Vec3 place_of(const Mesh& mesh, const Patch& patch) {
@@ -73,7 +71,7 @@ Vec3 place_of(const Mesh& mesh, const Patch& patch) {
   return place;
 }
 
-/// Size of the largest element with a node of the patch, along the axes, m.
+/// Returns the size (m) of the largest element below the patch.
 double element_below(const Mesh& mesh, const Patch& patch) {
   double largest = 0;
   for (int e = 0; e < mesh.element_count(); ++e) {
@@ -105,25 +103,25 @@ Factor factor_at_rest(const Solid& solid) {
 struct NearModel::Field {
   Vec3 middle = Vec3::Zero();
   double radius = 0;
-  double depth = 0;                                   ///< m, tool depth for which it was made
-  double serves = 0;                                  ///< m, serves_to()
-  std::unique_ptr<NearBody> body = nullptr;           ///< null: the whole body is near
-  std::unique_ptr<QuasiStaticModel> model = nullptr;  ///< null: abandoned
-  double missed = 0;                                  ///< relative force error due to the modes and the approximate u*
-  Handover handover = {};                             ///< from the last answer known to the thread
+  double depth = 0;                                   ///< m, of the tool
+  double serves = 0;                                  ///< m
+  std::unique_ptr<NearBody> body = nullptr;           ///< null if the whole body is near
+  std::unique_ptr<QuasiStaticModel> model = nullptr;  ///< null if it was abandoned
+  double missed = 0;                                  ///< relative error of the force due to the modes and u*
+  Handover handover = {};
   std::exception_ptr failed = nullptr;
   std::unique_ptr<Field> behind = nullptr;
 
   bool holds(const Patch& patch) const {
     return body == nullptr || std::ranges::all_of(patch.nodes, [&](int node) { return body->own_node(node) >= 0; });
   }
-  /// The modes were validated up to twice serves_to().
+  /// The error of the modes was checked up to twice `serves`.
   bool holds(const Patch& patch, const Vec3& place, double times) const {
     return body == nullptr || ((place - middle).norm() <= times * serves && holds(patch));
   }
   double away(const Vec3& place, double deep) const { return std::hypot((place - middle).norm(), deep - depth); }
 
-  /// The patch with this field's node numbers.
+  /// Converts the numbers of the nodes.
   Patch own(Patch patch) const {
     for (int& node : patch.nodes) node = body->own_node(node);
     return patch;
@@ -137,7 +135,7 @@ struct NearModel::Field {
     }
     const Patch here = own(patch);
     Reaction reaction = model->press(here, given, value);
-    if (reaction.error > std::abs(reaction.force)) {  // diverged from the last shape
+    if (reaction.error > std::abs(reaction.force)) {  // no solution from the last shape
       model->set_displacements(body->beginning());
       reaction = model->press(here, given, value);
     }
@@ -152,30 +150,28 @@ struct NearModel::Field {
   }
 };
 
-/// A field in progress. Objects it refers to must outlive its pieces.
 struct NearModel::Making {
   const Solid& solid;
   const TouchSurface& surface;
-  const Factor& factor;  ///< of the whole stiffness about the shape
+  const Factor& factor;  ///< at the shape `about`
   const Config& config;
-  Patch first;  ///< the patch at the center
+  Patch first;  ///< in the center
   double depth;
-  Hand hand;            ///< newest
-  VectorXd about = {};  ///< the shape, all nodes; empty: at rest
-  double unsure = 0;    ///< relative force error due to an approximate shape
+  Hand hand;            ///< the latest
+  VectorXd about = {};  ///< all nodes; empty: at rest
+  double unsure = 0;    ///< relative error of the force due to `about`
   std::unique_ptr<Field> field = nullptr;
   std::optional<Pieces> work = {};
-  int done = 0;  ///< pieces
+  int done = 0;
   Vec3 middle = place_of(solid.mesh(), first);
 
-  /// Makes the field, pressed at the hand if that touches. At rest it is pressed with the factor of that shape.
   Pieces pieces();
 
  private:
   void look_at_modes(const Vec2& across);
 };
 
-/// The background thread's state, with its own copy of the body. The first three members are shared by both threads.
+/// The state of the background thread. The first three members are shared.
 struct NearModel::Oracle {
   Oracle(const Solid& of, const TouchSurface& touched, const Config& with)
       : solid(of),
@@ -188,14 +184,14 @@ struct NearModel::Oracle {
   Oracle& operator=(const Oracle&) = delete;
 
   Latest<Hand> hand;
-  std::atomic<Field*> made{nullptr};  ///< field to be taken by the answering thread
-  std::atomic<bool> left{false};      ///< the answering thread will not take it
+  std::atomic<Field*> made{nullptr};  ///< for the other thread
+  std::atomic<bool> left{false};      ///< the other thread does not need it
 
   const Solid solid;
   const TouchSurface surface;
   const Config config;
   QuasiStaticModel whole;
-  bool at_rest = true;  ///< shape and factor of `whole` are those of rest
+  bool at_rest = true;  ///< `whole` is at rest
   const std::size_t bytes;
 
   std::unique_ptr<Field> make(const Vec3& ahead, const Hand& newest);
@@ -274,7 +270,7 @@ void NearModel::go_on(const Patch& patch, const Vec3& place, double depth, doubl
   making->hand = last_;
   making->depth = depth;
   bool more = true;
-  const auto due = [&] {  // number of pieces
+  const auto due = [&] {
     if (!waits) return kPiecesOnTheWay * (1 - room) / (1 - kRoomLeft);
     return kPiecesOnTheWay * ((place - field_->middle).norm() / field_->serves - 1) / (kWaits - 1);
   };
@@ -317,7 +313,7 @@ Pieces NearModel::Making::pieces() {
   const Vec2 across = surface.across(middle);
   {
     std::vector<int> pressed = surface.nodes_of_patches(across, kReach * a);
-    // if the patch is half off the body it may be farther away
+    // may be farther away if the patch is half off the body
     pressed.insert(pressed.end(), first.nodes.begin(), first.nodes.end());
     Pieces body = NearBody::make(solid, factor,
                                  {.middle = middle,
@@ -339,8 +335,7 @@ Pieces NearModel::Making::pieces() {
 
   if (depth <= 0) co_return;
   co_await kPieceDone;
-  // At rest, presses once more with the factor of that shape, which serves the nearby answers better than the factor at
-  // rest.
+  // The factor of the present shape is better for the next answers than the factor at rest.
   field->model->set_max_iterations(std::min(kIterationsAtOnce, config.newton.max_iterations));
   for (int i = 0; i < kPresses; ++i) {
     const bool held = !hand.patch.nodes.empty() && hand.felt.depth > 0 && field->holds(hand.patch, hand.place, 2);
@@ -356,7 +351,7 @@ Pieces NearModel::Making::pieces() {
   field->model->set_max_iterations(config.newton.max_iterations);
 }
 
-/// Excess stiffness of the modes, at the center and at the limits of the field's range.
+/// Checks the modes in the center and at the border.
 void NearModel::Making::look_at_modes(const Vec2& across) {
   const NearBody& body = *field->body;
   const double held = kReach * surface.radius();
@@ -458,7 +453,7 @@ void NearModel::take_made(const Patch& patch, const Vec3& place, double depth) {
 Reaction NearModel::press_by_field_or_linear(const Patch& patch, const Vec3& place, Given given, double value) {
   if (field_ && field_->holds(patch, place, 2)) {
     Reaction reaction = field_->press(patch, given, value);
-    if (by_linear_) {  // the hand has returned to the field
+    if (by_linear_) {  // the field is valid again
       handover_ = handover(kept(handover_, 1, linear_press(patch, given, value)), reaction, reaction.depth);
       faded_ = 0;
       by_linear_ = false;
@@ -505,7 +500,7 @@ void NearModel::make_or_take(const Patch& patch, const Vec3& place, double depth
     return;
   }
   if (room >= 1) return;
-  // The hand has moved elsewhere in the meantime.
+  // The hand has moved away.
   if (making_ && (making_->middle - place).norm() > serves_to(surface_)) making_.reset();
   if (!making_ && !(field_ && field_->holds(patch, place, 1))) begin(patch, depth);
   if (making_) go_on(patch, place, depth, room);

@@ -12,42 +12,40 @@
 namespace tendon::softbody {
 namespace {
 
-/// Maximum spacing of positions and depths, in patch radii. With shapes a quarter radius apart, interpolated forces are
-/// accurate to some thousandths. Five depths of 0.07 reach the limit of 0.3 for a patch and leave the last one for the
-/// handover.
+/// The maximum steps in patch radii. With these positions, the relative error of interpolated forces is about 1e-3.
+/// Five depths of 0.07 are sufficient for the maximum depth of a patch, 0.3, and for the transition.
 constexpr double kPlaceApart = 0.25;
 constexpr double kDepthApart = 0.07;
 
-/// Solutions are more accurate than the answers derived from them. The force is accurate to 2e-6, since it includes the
-/// step that is not taken; stiffness and glide to about kTangentTo².
+/// The error of the force is 2e-6, because the force includes the last step. The error of the stiffness is about
+/// kTangentTo².
 constexpr double kSolvedTo = 1e-5;
 constexpr double kTangentTo = 1e-3;
 constexpr double kSolvedWellEnough = 1e-4;
 constexpr int kMostIterations = 60;
 
-/// A press that does not converge is retried in this many steps from the one above.
+/// If a press does not converge, it is repeated in this number of steps.
 constexpr int kSmallSteps = 4;
 
-/// Cost of a factorization in Newton steps.
+/// The cost of a factor, in steps.
 constexpr int kStepsOfFactor = 30;
 
-/// From one depth to the next the force must grow by the mean stiffness, to this relative accuracy; otherwise the body
-/// has changed to another equilibrium branch.
+/// The accepted relative difference between a force and its extrapolation. If it is larger, the body is on another
+/// branch.
 constexpr double kGoesOn = 0.05;
 
-/// Safety factor on the errors seen at cell centers and knots, for points in between.
+/// A safety factor for points between knots and centers.
 constexpr double kUnseenBetween = 2;
 
 constexpr double kInfinite = std::numeric_limits<double>::infinity();
 
-/// Presses one body repeatedly.
 class Presser {
  public:
   Presser(const Solid& solid, const TouchSurface& surface)
       : solid_(solid),
         model_(solid, surface, {.max_iterations = kMostIterations, .tolerance = kSolvedTo, .tangent = kTangentTo}) {}
 
-  /// Initial stiffness, before the first press. `shape` receives that of unit depth.
+  /// Must be called before the first press. `shape` is the shape of unit depth.
   SolvedPress touch(const std::optional<Patch>& patch, const Vec3& normal, VectorXd& shape) const {
     SolvedPress solved;
     if (!patch) return solved;
@@ -61,7 +59,6 @@ class Presser {
     return solved;
   }
 
-  /// Starts from the shape `start`. If the patch has curvatures, computes the glide.
   SolvedPress press(const Patch& patch, double depth, const VectorXd& start) {
     const int factors = model_.factors();
     if (lost_) {
@@ -86,7 +83,7 @@ class Presser {
     return solved;
   }
 
-  /// The next press does not start from this one's state.
+  /// The next press does not use the present state.
   void leave() { lost_ = true; }
 
   VectorXd shape() const { return solid_.to_free(model_.displacements()); }
@@ -103,12 +100,11 @@ class Presser {
   const Solid& solid_;
   QuasiStaticModel model_;
   SolvedPresses::Work work_{};
-  bool lost_ = false;            ///< the present state is not a valid start
-  int least_ = kMostIterations;  ///< Newton steps of the best press since the last factorization
-  int wasted_ = 0;               ///< steps beyond least_ since the last factorization
+  bool lost_ = false;            ///< the present state is not valid
+  int least_ = kMostIterations;  ///< best number of steps with this factor
+  int wasted_ = 0;               ///< additional steps with this factor
 };
 
-/// Presses the knots of a grid, each after those above it and its previous neighbors.
 class KnotPresses {
  public:
   KnotPresses(const TouchSurface& surface, const PressGrid& grid, Presser& presser, std::vector<SolvedPress>& all)
@@ -154,7 +150,7 @@ class KnotPresses {
     of(i, j, level) = std::move(solved);
   }
 
-  /// Interpolates the shapes of the surrounding knots; empty if a corner of the cell has none.
+  /// Returns an empty vector if a corner of the cell has no shape.
   VectorXd between(const PressGrid::Point& point) const {
     const auto good = [&](const auto& corners) {
       return std::ranges::all_of(corners, [&](const PressGrid::Corner& corner) { return all_[at(corner.knot)].good; });
@@ -176,8 +172,7 @@ class KnotPresses {
   int place(int i, int j) const { return i * grid_.side() + j; }
   SolvedPress& of(int i, int j, int level) { return all_[at(grid_.knot(i, j, level))]; }
 
-  /// Extrapolates the shapes above a knot: u(l) = l t + l² v(l) with t the slope at rest, and v the polynomial through
-  /// all of them.
+  /// Extrapolates the shapes above: u(l) = l t + l² v(l), with the slope t at rest and a polynomial v.
   VectorXd foreseen(int i, int j, int level) {
     const VectorXd& first = first_[at(place(i, j))];
     VectorXd shape = level * first;
@@ -198,7 +193,7 @@ class KnotPresses {
   const PressGrid& grid_;
   Presser& presser_;
   std::vector<SolvedPress>& all_;
-  std::vector<VectorXd> first_;  ///< per position, m: shape at the first depth, if the body were linear
+  std::vector<VectorXd> first_;  ///< linear shapes of the first depth, m
 };
 
 }  // namespace
@@ -240,7 +235,6 @@ std::array<PressGrid::Corner, 8> PressGrid::corners(const Point& point) const {
 
 std::array<PressGrid::Corner, 64> PressGrid::around_point(const Point& point) const {
   struct Row {
-    /// For position `in` of `cell` on an axis with knots 0 … last.
     Row(int cell, double in, int last) : first(std::clamp(cell - 1, 0, last - 3)) {
       const double x = cell - first + in;
       for (int k = 0; k < 4; ++k) {
@@ -276,7 +270,6 @@ SolvedPresses solve_presses(const Solid& solid, const TouchSurface& surface, con
   const auto told = [&] {
     if (tell) tell("pressing the body: " + std::to_string(++done) + " of " + std::to_string(presses) + " presses");
   };
-  // Initial stiffness first, with the factor at rest.
   Presser presser(solid, surface);
   KnotPresses knots(surface, grid, presser, all.knots);
   for (int i = 0; i + 1 < side; ++i) {
@@ -297,7 +290,7 @@ SolvedPresses solve_presses(const Solid& solid, const TouchSurface& surface, con
   if (std::ranges::none_of(all.knots, [](const SolvedPress& press) { return press.shape.size() > 0; })) {
     throw std::invalid_argument("of all places to learn from none is on the body");
   }
-  for (int level = PressGrid::kLevels; level-- > 0;) {  // starts next to where the knots ended
+  for (int level = PressGrid::kLevels; level-- > 0;) {  // starts at the last knots
     for (int i = 0; i + 1 < side; ++i) {
       for (int j = 0; j + 1 < side; ++j) {
         const Vec2 place = grid.place(i + 0.5, j + 0.5);
@@ -324,7 +317,7 @@ Trust::Trust(const PressGrid& grid, const std::vector<double>& at_knots, const s
         for (int c = 0; c < 8; ++c) {
           worse(error, at_knots[at(grid.knot(i + c / 4, j + c / 2 % 2, level + c % 2))]);
         }
-        // Neighboring cell centers show how fast the error changes; a missing one counts only in the cell itself.
+        // If a neighbor has no value, only the cell itself must be accurate.
         worse(error, in_middles[at(grid.cell(i, j, level))]);
         for (int c = 0; c < 27; ++c) {
           const int x = i + c / 9 - 1;
@@ -344,7 +337,7 @@ Trust::Allowed::Allowed(const Trust& trust, double tolerance)
   const int last = 2 * grid_.around;
   for (int i = 0; i <= last; ++i) {
     for (int j = 0; j <= last; ++j) {
-      // Unknown beyond the edge and below the last depth; above the first depth there is no contact.
+      // Nothing is known at the edge and below the last depth.
       const bool rim = i == 0 || j == 0 || i == last || j == last;
       for (int level = 0; level <= PressGrid::kLevels; ++level) {
         if (rim || level == PressGrid::kLevels) at_knots_[at(grid_.knot(i, j, level))] = false;
@@ -363,7 +356,7 @@ Trust::Allowed::Allowed(const Trust& trust, double tolerance)
     }
   }
   amid_ = at_knots_;
-  for (int i = 1; i < last; ++i) {  // edge knots are excluded already
+  for (int i = 1; i < last; ++i) {
     for (int j = 1; j < last; ++j) {
       for (int level = 0; level < PressGrid::kLevels; ++level) {
         for (int c = 0; c < 27; ++c) {
@@ -377,7 +370,7 @@ Trust::Allowed::Allowed(const Trust& trust, double tolerance)
 }
 
 double Trust::Allowed::share_of(const std::vector<bool>& knots, const PressGrid::Point& point) const {
-  double share = 1;  // exactly 1 among good knots
+  double share = 1;  // exact if all knots are good
   for (const auto& [knot, counts] : grid_.corners(point)) share -= knots[at(knot)] ? 0 : counts;
   return std::max(0.0, share);
 }

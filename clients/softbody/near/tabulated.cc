@@ -10,7 +10,7 @@
 namespace tendon::softbody {
 namespace {
 
-/// Hermite polynomials on [0, 1]: one per derivative at 0, then at 1; each with its derivatives.
+/// Hermite polynomials with their derivatives.
 struct Cubic {
   explicit Cubic(double x) {
     const double x2 = x * x;
@@ -42,11 +42,9 @@ struct Quintic {
   std::array<double, 6> second{};
 };
 
-/// Per knot: E, F and k, each with ∂x, ∂y, ∂x∂y.
 enum Number : std::uint8_t { kValue, kAlongX, kAlongY, kTwisted };
 constexpr std::size_t number(std::size_t field, Number which) { return 4 * field + which; }
 
-/// Known values at the knots, and finite differences between neighbors. `known` marks valid knots.
 class Knots {
  public:
   Knots(const PressGrid& grid, TabulatedAnswers& table, const std::vector<bool>& known)
@@ -55,7 +53,7 @@ class Knots {
   double& at_knot(int i, int j, int level, std::size_t which) {
     return table_.numbers[at(grid_.knot(i, j, level)) * TabulatedAnswers::kNumbers + which];
   }
-  /// Difference of a number per cell along x or y; one-sided if only one neighbor is known.
+  /// One-sided if only one neighbor is known.
   double slope(int i, int j, int level, std::size_t which, bool along_x) {
     const auto there = [&](int by) {
       const int x = i + (along_x ? by : 0);
@@ -117,7 +115,7 @@ TabulatedAnswers tabulate(const SolvedPresses& presses) {
     knots.at_knot(i, j, level, number(2, kAlongX)) = steeper.x();
     knots.at_knot(i, j, level, number(2, kAlongY)) = steeper.y();
   });
-  // Third derivatives, which a solution does not provide.
+  // Third derivatives.
   for_each_knot([&](int i, int j, int level, std::size_t knot) {
     if (!known[knot]) return;
     knots.at_knot(i, j, level, number(1, kTwisted)) =
@@ -221,7 +219,7 @@ std::optional<Rung::Answer> TabulatedRung::press(const Patch& patch, double dept
   reaction.stiffness = e.stiffness;
   reaction.error = trust_.errors()[at(point->cell)] * std::abs(e.force);
   if (!(e.force > 0)) return Answer{reaction, share};
-  // The components of PatchContact's K; `giving` stays 0 and `curving` contains both.
+  // The components of PatchContact's K. `giving` is 0.
   const Vec2 slope = -e.across / e.force;
   reaction.slope = slope;
   reaction.knows_glide = patch.curvatures.size() > 0;

@@ -39,11 +39,11 @@ class ExactSum {
     }
     parts_[count_++] = value;
   }
-  std::array<double, 12> parts_{};  // six products
+  std::array<double, 12> parts_{};
   std::size_t count_ = 0;
 };
 
-/// Exact orientation: 1 if c is left of the line a–b, −1 if right, 0 if on it.
+/// Returns 1 if c is left of a–b, −1 if it is right, and 0 if it is on the line. The result is exact.
 int side_of(const Vec2d& a, const Vec2d& b, const Vec2d& c) {
   const double left = (b.x() - a.x()) * (c.y() - a.y());
   const double right = (b.y() - a.y()) * (c.x() - a.x());
@@ -62,7 +62,7 @@ int side_of(const Vec2d& a, const Vec2d& b, const Vec2d& c) {
 
 bool comes_before(const Vec2d& a, const Vec2d& b) { return a.x() < b.x() || (a.x() == b.x() && a.y() < b.y()); }
 
-/// Whether x lies between a and b; the points are collinear.
+/// The points must be collinear.
 bool on_side(const Vec2d& a, const Vec2d& b, const Vec2d& x) {
   return comes_before(a, b) ? !comes_before(x, a) && !comes_before(b, x) : !comes_before(x, b) && !comes_before(a, x);
 }
@@ -83,14 +83,14 @@ bool sides_meet(const Vec2d& a, const Vec2d& b, const Vec2d& c, const Vec2d& d) 
          (b_side == 0 && on_side(c, d, b));
 }
 
-/// The remaining polygon during ear clipping, counterclockwise.
+/// The remaining polygon. It is counterclockwise.
 class Rest {
  public:
   explicit Rest(const Flat& polygon) : points_(polygon), left_(static_cast<int>(polygon.size())) {
     const int count = left_;
     const int low = static_cast<int>(std::ranges::min_element(polygon, comes_before) - polygon.begin());
     const auto around = [&](int corner) -> const Vec2d& { return polygon[at((corner + count) % count)]; };
-    if (side_of(around(low - 1), around(low), around(low + 1)) < 0) {  // clockwise: use the mirror image
+    if (side_of(around(low - 1), around(low), around(low + 1)) < 0) {  // use the mirror image
       for (Vec2d& point : points_) point.x() = -point.x();
     }
     for (int i = 0; i < count; ++i) {
@@ -112,7 +112,7 @@ class Rest {
     for (std::size_t i = 0; i < shapes.size(); ++i) shapes[i] = shape_of_ear(static_cast<int>(i));
     while (left_ >= 3) {
       int best = best_of(shapes);
-      if (best < 0) {  // clipping may have created ears
+      if (best < 0) {
         for (int i = after_[at(last_)], n = 0; n < left_; i = after_[at(i)], ++n) shapes[at(i)] = shape_of_ear(i);
         best = best_of(shapes);
         if (best < 0) return {};
@@ -143,7 +143,7 @@ class Rest {
     return best;
   }
 
-  /// Area over squared longest side; 0 if the corner is not an ear.
+  /// Returns the area divided by the square of the longest side, or 0 if the corner is not an ear.
   double shape_of_ear(int corner) const {
     if (turn(corner) <= 0) return 0;
     const int previous = before_[at(corner)];
@@ -167,7 +167,7 @@ class Rest {
   std::vector<int> before_;
   std::vector<int> after_;
   int left_;
-  int last_ = 0;  ///< an unclipped corner
+  int last_ = 0;
 };
 
 }  // namespace

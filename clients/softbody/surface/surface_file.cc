@@ -23,19 +23,18 @@ std::string in_lower_case(std::string_view text) {
   return lower;
 }
 
-/// Splits text into lines (LF, CR LF or CR) and words.
 class SurfaceWords {
  public:
   SurfaceWords(std::string_view text, std::string_view name) : rest_(without_mark(text, name)), name_(name) {}
 
-  /// Words of the next nonempty line; empty at the end of the file. Skips comments ('#').
+  /// Returns an empty list at the end of the file. Comments are ignored.
   const std::vector<std::string_view>& next() {
     words_.clear();
     while (words_.empty() && !rest_.empty()) add_line();
     return words_;
   }
 
-  /// Also joins continued lines (trailing backslash).
+  /// Joins lines that end with a backslash.
   const std::vector<std::string_view>& next_continued() {
     do {
       next();
@@ -121,7 +120,7 @@ Facets read_binary_stl(std::string_view bytes, std::string_view name) {
   return made;
 }
 
-/// Line breaks are ignored, except that the name after "solid" or "endsolid" ends at the end of the line or at "facet".
+/// Line breaks are ignored, except after a name.
 Facets read_text_stl(std::string_view text, std::string_view name) {
   Facets made{.points = {}, .each_by_itself = true};
   SurfaceWords words(text, name);
@@ -185,7 +184,7 @@ Facets read_obj(std::string_view text, std::string_view name) {
       const std::string_view word = (*line)[i];
       const long number = words.whole(word.substr(0, word.find('/')));
       const auto count = static_cast<long>(made.points.size());
-      const long index = number < 0 ? count + number : number - 1;  // negative: from the end; positive: from 1
+      const long index = number < 0 ? count + number : number - 1;  // negative numbers count from the end
       if (index < 0 || index >= count) words.fail("there is no vertex " + std::string(word));
       made.corners.push_back(static_cast<int>(index));
     }
@@ -194,7 +193,7 @@ Facets read_obj(std::string_view text, std::string_view name) {
   return made;
 }
 
-/// Checks and removes the keyword OFF with its prefix. The first count may follow without a space.
+/// The first count may follow the keyword without a space.
 void take_off_head(std::vector<std::string_view>& line, const SurfaceWords& words) {
   std::string_view word = line.front();
   const std::size_t off = word.find("OFF");

@@ -25,11 +25,10 @@
 namespace tendon::softbody {
 namespace {
 
-constexpr double kTouching = 1e-9;  // relative to the longest side; smaller distances are rounding
+constexpr double kTouching = 1e-9;  // relative; smaller distances are rounding errors
 
 Vec3 twice_area(const std::array<Vec3, 3>& t) { return (t[1] - t[0]).cross(t[2] - t[0]); }
 
-/// The facets of a file after repairs.
 class Welded {
  public:
   explicit Welded(Facets facets) : facets_(std::move(facets)) {
@@ -56,7 +55,6 @@ class Welded {
   }
 
  private:
-  /// Removes unused points and merges coincident ones.
   void weld() {
     std::vector<int> number(facets_.points.size(), -1);
     std::vector<Vec3> used;
@@ -85,7 +83,6 @@ class Welded {
          in_words(used[at(*merged.begin())]));
   }
 
-  /// Removes repeated corners, and facets with fewer than three distinct corners.
   void shorten() {
     Facets made{.points = std::move(facets_.points), .each_by_itself = facets_.each_by_itself};
     std::size_t flat = 0;
@@ -111,9 +108,8 @@ class Welded {
     }
   }
 
-  /// Removes facets with the same corners and orientation.
   void drop_repeated_facets() {
-    std::vector<int> turned = facets_.corners;  // each facet starts at its lowest corner
+    std::vector<int> turned = facets_.corners;
     for (std::size_t f = 0, begin = 0; f < facets_.ends.size(); begin = facets_.ends[f++]) {
       const auto from = turned.begin() + static_cast<std::ptrdiff_t>(begin);
       const auto to = turned.begin() + static_cast<std::ptrdiff_t>(facets_.ends[f]);
@@ -185,12 +181,12 @@ class Welded {
   void note(std::string text) { notes_.push_back(std::move(text)); }
 
   Facets facets_;
-  std::vector<int> numbers_;  ///< facet number in the file
+  std::vector<int> numbers_;
   std::vector<std::string> notes_;
 };
 
 void check_edges(const Triangles& surface, std::string_view name) {
-  std::map<std::pair<int, int>, std::pair<std::size_t, int>> edges;  // directed edge → facet, count
+  std::map<std::pair<int, int>, std::pair<std::size_t, int>> edges;  // edge → facet and count
   for (std::size_t f = 0; f < surface.facets.size(); ++f) {
     const auto& facet = surface.facets[f];
     for (std::size_t i = 0; i < 3; ++i) {
@@ -210,7 +206,6 @@ void check_edges(const Triangles& surface, std::string_view name) {
   }
 }
 
-/// Whether the open segment a–b passes through the interior of the triangle.
 bool pierces(const Vec3& a, const Vec3& b, const std::array<Vec3, 3>& t, double rounding) {
   const Vec3 normal = (t[1] - t[0]).cross(t[2] - t[0]).normalized();
   const double from = normal.dot(a - t[0]);
@@ -224,7 +219,6 @@ bool pierces(const Vec3& a, const Vec3& b, const std::array<Vec3, 3>& t, double 
   return true;
 }
 
-/// Whether two triangles are coplanar and overlap by more than `rounding`.
 bool lie_on_each_other(const std::array<Vec3, 3>& a, const std::array<Vec3, 3>& b, double rounding) {
   for (const auto& [own, other] : {std::pair(&a, &b), std::pair(&b, &a)}) {
     const Vec3 normal = twice_area(*own).normalized();
@@ -253,7 +247,7 @@ void check_cuts(const Triangles& surface, std::string_view name) {
     mean += ((t[1] - t[0]).norm() + (t[2] - t[1]).norm() + (t[0] - t[2]).norm()) / 3 /
             static_cast<double>(surface.facets.size());
   }
-  // Cells about as large as a facet; larger facets are entered in several.
+  // The cells are about as large as a facet.
   const double size = std::max(2 * mean, longest / 200);
   std::unordered_map<Cell, std::vector<std::size_t>, HashOfCell> cells;
   const auto each_cell = [&](const std::array<Vec3, 3>& t, auto visit) {

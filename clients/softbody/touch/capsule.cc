@@ -71,15 +71,14 @@ std::optional<double> CapsuleContact::Capsule::above(const Vec3& x, const Vec3& 
   return lowest;
 }
 
-/// Candidate nodes: those inside the capsule, and those closer to it than the deepest one is inside, because a press
-/// can move them in sideways. Sets `gap` to the minimum gap over all touchable nodes.
+/// Returns the nodes inside, and those that a press may move into the capsule. `gap` is the minimum over all nodes.
 std::vector<CapsuleContact::Node> CapsuleContact::near(const Capsule& tool, double& gap) const {
   const Vec3& n = surface_.normal();
   gap = std::numeric_limits<double>::infinity();
   std::vector<Node> all;
   const double reach = radius_ + half_length_;
   std::vector<std::size_t> around;
-  std::vector<double> heights;  // of the capsule above each node
+  std::vector<double> heights;
   for (std::size_t i = 0; i < places_.size(); ++i) {
     const Vec3 out = places_[i] - tool.middle;
     const double up = out.dot(n);
@@ -105,7 +104,7 @@ std::vector<CapsuleContact::Node> CapsuleContact::near(const Capsule& tool, doub
       continue;
     }
     Plane plane = tool.nearest(x, -n);
-    // A node beside or above the axis exits below, where the tool came from.
+    // The exit is below, because the tool came from there.
     if (inside && plane.normal.dot(n) > -0.5) plane = tool.nearest(x + heights[k] * n, -n);
     all.push_back({row, x, x, plane});
   }
@@ -131,12 +130,12 @@ void CapsuleContact::give_way(std::vector<Node>& nodes, const std::vector<Eigen:
 /// previous v.
 void CapsuleContact::add_slopes(const Capsule& tool, const Vec3& about, const std::vector<Node>& nodes,
                                 const Pushes& pushes, Feel& feel) const {
-  constexpr int kTurns = 5;  // each reduces the error to about a quarter
+  constexpr int kTurns = 5;  // each one reduces the error to a quarter
   const auto size = static_cast<Eigen::Index>(pushes.set.size());
   const auto node_of = [&](Eigen::Index k) -> const Node& {
     return nodes[static_cast<std::size_t>(pushes.set[static_cast<std::size_t>(k)])];
   };
-  using Motions = Eigen::Matrix<double, Eigen::Dynamic, 6>;  // three rows per node, one column per motion
+  using Motions = Eigen::Matrix<double, Eigen::Dynamic, 6>;  // three rows for each node
   MatrixXd gives(3 * size, 3 * size);
   Motions w = Motions::Zero(3 * size, 6);
   Motions grows = Motions::Zero(3 * size, 6);  // λ δθ × m
@@ -241,9 +240,9 @@ Feel CapsuleContact::at(const Vec3& middle, const Vec3& axis, const Vec3& about)
 
   std::fill(pushed_.begin(), pushed_.end(), false);
   const auto size = static_cast<Eigen::Index>(pushes.set.size());
-  Eigen::Matrix<double, 6, Eigen::Dynamic> unit(6, size);  // force and torque of unit pushes
+  Eigen::Matrix<double, 6, Eigen::Dynamic> unit(6, size);
   unit.topRows<3>() = ways;
-  double wide = 0;  // m, tangential, to the farthest pushed node
+  double wide = 0;  // m
   for (Eigen::Index k = 0; k < size; ++k) {
     const Node& node = nodes[static_cast<std::size_t>(pushes.set[static_cast<std::size_t>(k)])];
     unit.col(k).tail<3>() = (node.at - about).cross(ways.col(k));

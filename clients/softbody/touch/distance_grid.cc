@@ -12,14 +12,14 @@
 namespace tendon::softbody {
 namespace {
 
-constexpr int kAround = 2;  // points beyond the box on each side; the outermost only contribute to weights
+constexpr int kAround = 2;  // points outside the box
 constexpr double kRoundingOfWay = 1e-6;
 
-/// The four cubic B-splines at a position along an axis, with two derivatives, per cell.
+/// Cubic B-splines with two derivatives.
 struct Splines {
   std::array<double, 4> value, slope, bend;
 
-  explicit Splines(double t) {  // t in [0, 1], from the cell's lower point
+  explicit Splines(double t) {  // 0 ≤ t ≤ 1
     const double s = 1 - t;
     value = {s * s * s / 6, (4 - 6 * t * t + 3 * t * t * t) / 6, (4 - 6 * s * s + 3 * s * s * s) / 6, t * t * t / 6};
     slope = {-s * s / 2, -2 * t + 1.5 * t * t, 2 * s - 1.5 * s * s, t * t / 2};
@@ -27,7 +27,6 @@ struct Splines {
   }
 };
 
-/// Grid values, x fastest.
 struct Samples {
   std::array<int, 3> count;
   std::vector<double> values;
@@ -37,7 +36,6 @@ struct Samples {
     for (std::size_t i = 0; i < axis; ++i) sum *= static_cast<std::size_t>(count[i]);
     return sum;
   }
-  /// Spline weights along `axis`: two fewer than samples.
   Samples to_weights(std::size_t axis) const {
     Samples made{count, {}};
     made.count[axis] -= 2;
@@ -98,9 +96,8 @@ DistanceGrid::DistanceGrid(const std::function<double(const Vec3&)>& distance, c
   weights_.assign(samples.values.begin(), samples.values.end());
 }
 
-/// The cell of a point in the box.
 struct DistanceGrid::Around {
-  const float* first;  ///< spline weights of the cell
+  const float* first;
   std::size_t row, layer;
   Splines x, y, z;
 };
@@ -161,7 +158,7 @@ Distance DistanceGrid::within(const Vec3& place) const {
   return found;
 }
 
-/// For a point outside the box: the surface point nearest to where the path from it enters the box.
+/// Returns the point of the surface that is nearest to where the line from `x` enters the box.
 Vec3 DistanceGrid::foot_of(const Vec3& x) const {
   const auto below = [&](const Vec3& entry) -> Vec3 {
     const Distance there = within(entry);

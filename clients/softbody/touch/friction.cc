@@ -18,7 +18,7 @@ Friction::Drag Friction::move(const Vec2& place, double normal_force) {
     return {};
   }
   if (!anchor_) anchor_ = place;
-  const double most = coefficient_ * normal_force / stiffness_;  // m, largest stretch of the spring
+  const double most = coefficient_ * normal_force / stiffness_;  // m
   const Vec2 stretch = place - *anchor_;
   const double length = stretch.norm();
   if (length <= most) return {-stiffness_ * stretch, stiffness_, most - length};

@@ -11,12 +11,12 @@
 namespace tendon::softbody {
 namespace {
 
-constexpr double kOnset = 0.1;  // relative to the thickness: overlap at which the full stiffness is reached
+constexpr double kOnset = 0.1;  // relative to the thickness
 constexpr int kLeastPieces = 4;
 constexpr int kMostPieces = 32;
 constexpr int kBunch = 4;  // points along each side of a bunch
 
-/// Factor by which a facet may have grown.
+/// A facet may be larger than at rest by this factor.
 constexpr double kGrown = 1.5;
 
 Mat3 cross(const Vec3& v) { return (Mat3() << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0).finished(); }
@@ -30,7 +30,6 @@ Eigen::Matrix3Xd places_of(const Mesh& mesh, const std::vector<int>& nodes, cons
   return all;
 }
 
-/// Largest distance of a node from the mean, m.
 double reach_of(const Eigen::Matrix3Xd& nodes) {
   return (nodes.colwise() - nodes.rowwise().mean()).colwise().norm().maxCoeff();
 }
@@ -101,7 +100,6 @@ Layer::Layer(const Elastic& elastic, const Config& config) : elastic_(elastic), 
   if (rubs()) ties_.assign(config.tools, std::vector<Tie>(points_.size()));
 }
 
-/// Adds a cluster of the points from `first` on, if any.
 void Layer::add_bunch(FacetOfPoints& facet, std::size_t first) {
   if (first == points_.size()) return;
   Bunch bunch{.first = first, .count = points_.size() - first, .middle = points_[first].shares, .spread = 0};
@@ -185,7 +183,7 @@ bool Layer::tied(const Bunch& bunch, std::size_t tool) const {
   return std::ranges::any_of(std::span(ties_[tool]).subspan(bunch.first, bunch.count), &Tie::tied);
 }
 
-/// Calls visit(site, point, x) for all points that are in the layer or tied, and some nearby ones.
+/// Calls visit(site, point, x) for all points in the layer or with a tie.
 template <class Visit>
 void Layer::each_point(const Near& near, std::span<const Placed> tools, const Eigen::Matrix3Xd& places,
                        const Visit& visit) const {
@@ -232,11 +230,11 @@ Layer::Press Layer::press(const Near& near, std::span<const Placed> tools, const
     double stiffness = 0;
     double energy = 0;
     const double push = pressure(config_.thickness - d.value, stiffness, energy);
-    Vec3 slope = -push * d.gradient;  // gradient of the energy per m²
+    Vec3 slope = -push * d.gradient;  // per m²
     Mat3 curve = stiffness * d.gradient * d.gradient.transpose() - push * d.curvature;
     Vec3 drag = Vec3::Zero();
     if (tie != nullptr) {
-      // A spring with bounded force: Huber's energy.
+      // Huber's energy of a spring with a maximum force.
       const double c = config_.shear / config_.thickness;
       const Vec3 stretched = stretch(*tie, *placed.handle, x);
       const double length = stretched.norm();
@@ -275,7 +273,7 @@ Layer::Press Layer::press(const Near& near, std::span<const Placed> tools, const
     const Mat3 lever = cross(r);
     Eigen::Matrix<double, 3, 6> w;
     w << -Mat3::Identity(), lever;
-    const Vec3 n = point.area * -push * d.gradient;  // without friction
+    const Vec3 n = point.area * -push * d.gradient;
     felt.slope.head<3>() -= slope;
     felt.slope.tail<3>() -= r.cross(slope);
     felt.curve += w.transpose() * curve * w;

@@ -8,8 +8,8 @@
 namespace tendon::softbody {
 namespace {
 
-/// In the first rounds all inconsistent nodes change sets, which may cycle. Later only the worst node changes, so the
-/// energy falls in every round and the search terminates (Lawson & Hanson 1974).
+/// First, all wrong nodes change at once, which may lead to a cycle. Then only the worst one changes, so that the
+/// energy decreases and the search ends (Lawson & Hanson 1974).
 constexpr int kQuickRounds = 20;
 constexpr int kMostSweeps = 1000;
 
@@ -28,7 +28,7 @@ Pushes least_pushes(const MatrixXd& table, const VectorXd& depth, std::vector<bo
     }
     factor.compute(table(set, set));
     push = factor.solve(depth(set));
-    // A pushed node is inconsistent if it pulls, any other node if it is inside the tool.
+    // A node is wrong if it pulls, or if it is inside the tool.
     const VectorXd left = depth - table(Eigen::all, set) * push;
     std::vector<std::pair<double, std::size_t>> wrong;
     for (std::size_t k = 0; k < set.size(); ++k) {

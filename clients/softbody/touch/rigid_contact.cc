@@ -13,46 +13,45 @@
 namespace tendon::softbody {
 namespace {
 
-/// Relative force tolerance and maximum number of Newton steps at intermediate tool positions.
+/// The relative tolerance and the maximum number of steps at intermediate positions.
 constexpr double kOnTheWay = 0.03;
 constexpr int kMostOnTheWay = 4;
 
-/// Facets count as near if a point is closer to a tool than this fraction of their size.
+/// Relative to the size of a facet.
 constexpr double kMargin = 0.25;
 
-/// Armijo parameter, shortest step, and relative rounding of the energy. Close to the minimum, a correct step changes
-/// the energy by less than rounding.
+/// Armijo's parameter, the shortest step, and the rounding error of the energy.
 constexpr double kToolDecrease = 1e-4;
 constexpr double kToolShortest = 1.0 / 64;
 constexpr double kContactRounding = 1e-13;
 
-/// Steps without an accurate answer after which the body's factor is recomputed.
+/// Steps without an accurate answer until the factor is computed again.
 constexpr int kToolPatience = 16;
-/// Newton steps on the unknowns near the tools.
+/// For the unknowns near the tools.
 constexpr int kMostMeets = 60;
-/// Energy that meet() may leave, relative to that allowed for an answer.
+/// The remaining energy there, relative to that of an answer.
 constexpr double kMet = 1e-3;
-constexpr double kNoDrop = 1e-24;  // relative to the energy: smaller decreases are rounding
+constexpr double kNoDrop = 1e-24;  // smaller relative changes are rounding errors
 
-/// m: force errors explained by a smaller tool motion count as zero.
+/// An error that corresponds to a smaller motion (m) is ignored.
 constexpr double kToolUnseen = 1e-12;
-/// As kToolUnseen, without contact.
+/// The same without contact.
 constexpr double kUnfelt = 1e-10;
 
-/// Smaller relative changes of forces are rounding errors and are not added to Pairs.
+/// Smaller relative changes are rounding errors.
 constexpr double kToolHeard = 1e-8;
 
-/// Relative accuracy of the stiffness, and maximum number of CG iterations.
+/// The accepted relative error of the stiffness, and the maximum number of rounds.
 constexpr double kCurveError = 2e-3;
 constexpr int kCurveRounds = 12;
 
-/// Finite-difference step for derivatives of the force, m.
+/// The step of finite differences, m.
 constexpr double kToolNudge = 1e-7;
 
-/// Minimum number of unknowns whose compliance is kept.
+/// The minimum number of columns.
 constexpr int kKept = 600;
 
-/// Maximum distance for placing a tool anew, in half facets.
+/// The maximum number of steps back.
 constexpr int kFarthest = 400;
 
 bool finite(const Pose& pose) { return pose.position.allFinite() && pose.turn.allFinite(); }
@@ -65,19 +64,19 @@ Pose between(const Pose& from, const Pose& to, double share) {
 
 }  // namespace
 
-/// The neighborhood of the tools in the present shape.
+/// The state near the tools.
 struct RigidContact::Local {
-  Elastic::Forces now;  ///< of the body without tools; free unknowns
+  Elastic::Forces now;  ///< of the body
   VectorXd solved;      ///< K₀⁻¹ times the forces
   Layer::Near near;
-  std::vector<int> unknowns;  ///< free indices of the near nodes' components
-  std::vector<int> rows;      ///< index of each among the 3 components per near node
-  Eigen::Matrix3Xd places;    ///< m, of the near nodes
-  MatrixXd stiffness;         ///< R, N/m: of the body at these unknowns, with all others condensed
+  std::vector<int> unknowns;  ///< free numbers
+  std::vector<int> rows;      ///< of these in three rows for each node
+  Eigen::Matrix3Xd places;    ///< m
+  MatrixXd stiffness;         ///< R, N/m, of the body
   Layer::Press press;
-  MatrixXd curve;             ///< A, N/m: of the layer at these unknowns
+  MatrixXd curve;             ///< A, N/m, of the layer
   Eigen::LLT<MatrixXd> held;  ///< of R + A
-  MatrixXd curve_held;        ///< A as used in `held`: shifted if R + A is not positive definite
+  MatrixXd curve_held;        ///< A in this factor, with a shift if it is needed
 
   VectorXd slope() const { return press.slope(rows); }
   VectorXd spread(const VectorXd& among, Eigen::Index size) const {
@@ -90,7 +89,7 @@ struct RigidContact::Local {
     all.reshaped()(rows) += by;
     return all;
   }
-  /// Factor of R + A, shifting A until it is positive definite.
+  /// Adds a shift to A until R + A is positive definite.
   static Eigen::LLT<MatrixXd> factor(const MatrixXd& stiffness, MatrixXd& curve) {
     Eigen::LLT<MatrixXd> found(stiffness + curve);
     for (double shift = 0.01; found.info() != Eigen::Success && shift < 1e9; shift *= 10) {
@@ -130,8 +129,7 @@ void RigidContact::renew(Local& local) {
   in_vain_ = 0;
 }
 
-/// Updates the near facets, the compliance of their nodes (one solve per new unknown), and the derivatives of the
-/// layer.
+/// Finds the near facets and the compliance of their nodes, with one solve for each new unknown.
 void RigidContact::look(Local& local) {
   if (factors_ != body_.factors()) {
     factors_ = body_.factors();
@@ -184,8 +182,8 @@ void RigidContact::look(Local& local) {
       Eigen::LLT<MatrixXd>((compliance + compliance.transpose()) / 2).solve(MatrixXd::Identity(count, count));
 }
 
-/// Motion of the near unknowns that minimizes the layer's energy plus that of a body with stiffness R, whose motion
-/// without the layer would be `free` (m). Newton's method, to `enough` J.
+/// Minimizes the energy of the layer and of a body with the stiffness R by Newton's method. `free` is the motion (m)
+/// without the layer, and `enough` is the accepted error (J).
 VectorXd RigidContact::meet(const Local& local, const VectorXd& free, double enough) const {
   VectorXd by = VectorXd::Zero(free.size());
   VectorXd slope = local.slope();
@@ -224,7 +222,7 @@ VectorXd RigidContact::by_near(const Local& local, const VectorXd& forces) const
   return pairs_.times(local.spread(forces, elastic_.free_count()), solved);
 }
 
-/// (H⁻¹ + A)⁻¹ b by Woodbury's identity, with A on the near unknowns and `by_factor` = K₀⁻¹ b.
+/// Returns (H⁻¹ + A)⁻¹ b by Woodbury's identity. `by_factor` is K₀⁻¹ b.
 VectorXd RigidContact::solve(const Local& local, const VectorXd& b, const VectorXd& by_factor) const {
   const VectorXd free = pairs_.times(b, by_factor);
   if (local.unknowns.empty()) return free;
@@ -251,7 +249,6 @@ bool RigidContact::go(const VectorXd& step, double slope, Local& local) {
   return false;
 }
 
-/// The hand's stiffness norm, N/m.
 double RigidContact::stiffest(const Local& local, std::size_t tool) const {
   const Layer::Felt& felt = local.press.felt[tool];
   if (felt.area == 0) return config_.layer.young * tools_[tool].shape.reach();
@@ -267,7 +264,7 @@ void RigidContact::settle(Local& local, bool arrives) {
   local.now = body_.forces();
   local.solved = body_.factor().solve(local.now.force);
   bool stale = false;
-  bool fresh = false;  // the factor is that of the present shape
+  bool fresh = false;
   for (int round = 0;; ++round) {
     if (stale) renew(local);
     fresh = stale;
@@ -289,7 +286,6 @@ void RigidContact::settle(Local& local, bool arrives) {
     VectorXd step = free;
     if (!local.unknowns.empty()) {
       const VectorXd by = meet(local, free(local.unknowns), kMet * enough * enough / stiffness);
-      // Adds the forces that hold the near unknowns there.
       step -= by_near(local, local.stiffness * (free(local.unknowns) - by));
     }
     const double slope = (local.now.force + local.spread(local.slope(), size)).dot(step);
@@ -317,7 +313,6 @@ void RigidContact::settle(Local& local, bool arrives) {
   if (layer_.rubs()) dissipated_ = layer_.advance(local.near, placed_, local.places);
 }
 
-/// Stiffness of body and layer times `shape`, N.
 VectorXd RigidContact::needed(const Local& local, const VectorXd& shape) {
   const double nudge = kToolNudge / shape.lpNorm<Eigen::Infinity>();
   if (!std::isfinite(nudge)) return VectorXd::Zero(shape.size());
@@ -328,8 +323,7 @@ VectorXd RigidContact::needed(const Local& local, const VectorXd& shape) {
   return all;
 }
 
-/// K = Π_pp − Π_pu Π_uu⁻¹ Π_up of one tool, with the solver's approximate inverse of Π_uu, refined by conjugate
-/// gradients. The error is quadratic in that of the shapes.
+/// K = Π_pp − Π_pu Π_uu⁻¹ Π_up. The approximate inverse is improved by conjugate gradients, so its error is squared.
 Layer::Mat6 RigidContact::curve(const Local& local, std::size_t tool) {
   const Layer::Felt& felt = local.press.felt[tool];
   const int motions = config_.turns ? 6 : 3;
@@ -351,7 +345,7 @@ Layer::Mat6 RigidContact::curve(const Local& local, std::size_t tool) {
     for (int round = 0; round < kCurveRounds && std::abs(gain) > kCurveError * scale; ++round) {
       const VectorXd by_way = needed(local, way);
       const double bend = way.dot(by_way);
-      if (!(bend > 0) || !(gain > 0)) break;  // the body is unstable here
+      if (!(bend > 0) || !(gain > 0)) break;  // not stable
       shapes.col(c) += gain / bend * way;
       rest -= gain / bend * by_way;
       better = solve(local, rest, body_.factor().solve(rest));
@@ -395,14 +389,13 @@ Feel RigidContact::feel(const Local& local, std::size_t tool) {
   return feel;
 }
 
-/// Largest step of a tool before the body must follow, m.
 double RigidContact::longest_step() const {
   double most = layer_.least_facet() / 2;
   for (const HeldTool& tool : tools_) most = std::min(most, tool.shape.thinnest() / 8);
   return most;
 }
 
-/// Moves a tool back along from_ until it is just outside the body.
+/// Moves the tool out of the body.
 void RigidContact::put_down(std::size_t tool, const Pose& handle) {
   placed_[tool].handle = handle;
   for (int i = 0; i < kFarthest; ++i) {

@@ -16,7 +16,7 @@
 namespace tendon::softbody {
 namespace {
 
-/// Minimum thickness of a surface in cells, and the largest that is measured.
+/// In cells: the minimum thickness, and the maximum that is measured.
 constexpr int kThinnestInCells = 2;
 constexpr int kThickInCells = 6;
 
@@ -26,10 +26,10 @@ Triangles in_metres(const Triangles& surface, double scale) {
   return made;
 }
 
-/// Relative to the rounding: distance from the core below which a point counts as inside it.
+/// Relative to the rounding.
 constexpr double kCoreShare = 1e-9;
 
-/// Minimum thickness of the surface behind its facet centers, m, in whole cells up to kThickInCells.
+/// Returns the minimum thickness (m) behind the centers of the facets.
 double thickness_of(const Triangles& surface, const SurfaceDistance& distance, double cell, std::string_view name) {
   int least = kThickInCells;
   for (std::size_t f = 0; f < surface.facets.size(); ++f) {
@@ -78,7 +78,7 @@ Mat3 shortest_rotation(const Vec3& from, const Vec3& to) {
     const Vec3 axis = (near - near.dot(a) * a).normalized();
     return Eigen::Quaterniond(0, axis.x(), axis.y(), axis.z()).toRotationMatrix();
   }
-  const double twice = std::sqrt((1 + cosine) * 2);  // twice the cosine of half the angle
+  const double twice = std::sqrt((1 + cosine) * 2);  // of half the angle
   const Vec3 axis = a.cross(b) / twice;
   return Eigen::Quaterniond(twice / 2, axis.x(), axis.y(), axis.z()).toRotationMatrix();
 }

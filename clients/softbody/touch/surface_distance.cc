@@ -19,7 +19,7 @@ double squared_way_to(const Vec3& low, const Vec3& high, const Vec3& x) {
 }  // namespace
 
 SurfaceDistance::SurfaceDistance(const Triangles& surface) {
-  std::map<std::pair<int, int>, Vec3> normal_left_of;  // directed edge → normal of its facet
+  std::map<std::pair<int, int>, Vec3> normal_left_of;  // edge → normal of its facet
   std::vector<Vec3> at_points(surface.points.size(), Vec3::Zero());
   facets_.resize(surface.facets.size());
   for (std::size_t f = 0; f < facets_.size(); ++f) {
@@ -44,7 +44,6 @@ SurfaceDistance::SurfaceDistance(const Triangles& surface) {
   divide(0, static_cast<int>(facets_.size()));
 }
 
-/// Returns the index of the new box.
 int SurfaceDistance::divide(int first, int count) {
   BoxOfFacets made{.low = Vec3::Constant(std::numeric_limits<double>::infinity()),
                    .high = Vec3::Constant(-std::numeric_limits<double>::infinity()),
@@ -73,7 +72,7 @@ int SurfaceDistance::divide(int first, int count) {
   return number;
 }
 
-/// Ericson, Real-Time Collision Detection, 2005, 5.1.5: by the Voronoi region of x.
+/// Ericson, Real-Time Collision Detection, 2005, 5.1.5.
 SurfaceDistance::NearestPoint SurfaceDistance::nearest(const FlatFacet& facet, const Vec3& x) {
   const auto& [a, b, c] = facet.corners;
   const auto found = [&](const Vec3& point, const Vec3& normal) {
@@ -117,7 +116,7 @@ void SurfaceDistance::look(int number, const Vec3& x, NearestPoint& found) const
 }
 
 double SurfaceDistance::at(const Vec3& x, double at_most) const {
-  // Margin for rounding: a point exactly at the limit must be found.
+  // The margin is for rounding errors.
   NearestPoint found{at_most * at_most * (1 + 1e-6) + std::numeric_limits<double>::min(), Vec3::Zero(), Vec3::Zero()};
   look(0, x, found);
   return std::copysign(std::sqrt(found.squared), found.away.dot(found.normal));
