@@ -9,7 +9,7 @@
 
 namespace tendon::softbody {
 
-/// Statistics of a kNear body, which tendon-softbody prints when it ends. Empty for other bodies.
+/// The statistics of a kNear body. They are empty for other bodies.
 struct Answered {
   std::vector<Ladder::Step> rungs;
   std::optional<NearModel::Size> near;

@@ -8,8 +8,8 @@
 
 namespace tendon::softbody {
 
-/// Runs a task once, on any thread, at any time. A task owns all data that it touches. If factors_may_work_at_once() is
-/// false, it must not run concurrently with an answer.
+/// Runs the work once, on any thread and at any time. The work owns its data. If factors_may_work_at_once() is false,
+/// it must not run during an answer.
 using Background = std::function<void(std::packaged_task<void()>)>;
 
 /// A worker thread that runs tasks in order. It runs at nice 5, so on a single processor answers take precedence.

@@ -108,8 +108,8 @@ struct FileShape {
   bool slits = false;  ///< keep coincident nodes unmerged; see joined()
 };
 struct NearConfig {
-  Law law = Law::kCorotational;  ///< of the elements near the tool; not kLinear
-  /// Keeps all unknowns of the near-far interface instead of modes. Slow; for comparisons.
+  Law law = Law::kCorotational;  ///< not kLinear
+  /// Uses all unknowns of the interface instead of modes. This is slow.
   bool exact_interface = false;
   /// Precompute shapes (`learn`) or an energy table (`tabulate`) for presses within BodyConfig::reach of `middle` along
   /// each axis. They answer where their error is at most BodyConfig::tolerance. Both require `reach`, at most kFarthest
@@ -195,28 +195,28 @@ class Body {
   Body(Body&&) noexcept;
   Body& operator=(Body&&) noexcept;
 
-  /// Returns the force on a tool with its center at `tool` (m, body frame) and the handle not rotated. A body with time
-  /// advances by one step. If the force triggers a cut, the next answer is that of the cut body.
+  /// Returns the force on a tool with its center at `tool` (m, body frame) if the handle is not rotated. If the body
+  /// has time, this is one step. If the force triggers a cut, the next answer is that of the cut body.
   Feel touch(const Vec3& tool);
 
-  /// The same for a handle pose. If turns_the_hand() is true, the answer includes the torque about the handle.
+  /// The handle is in the body frame. If turns_the_hand() is true, the answer contains the torque about the handle.
   Feel touch(const Pose& handle);
 
-  /// The same for several hands, from one solution. An empty pose means that the hand is absent.
+  /// Returns one answer for each hand. An empty pose means that the hand is absent.
   std::vector<Feel> touch(std::span<const std::optional<Pose>> handles);
 
-  /// Makes `background` prepare the cuts and the near fields, so that no answer waits for them. While a cut is
-  /// prepared, answers are those of the uncut body, and their error is at least their force, because the cut body may
-  /// push much less. The next touch() after that continues from the current shape. If the work throws, the next touch()
-  /// rethrows the exception. Without this call, answers wait for cuts, and make near fields in pieces.
+  /// Cuts and near fields are prepared by `background`, so that no answer waits for them. Until a cut is ready, the
+  /// uncut body answers, and the error is at least the force, because the cut body may push much less. If the work
+  /// throws, the next touch() rethrows the exception. Without this call, answers wait for cuts and build near fields in
+  /// pieces.
   void prepare_by(Background background);
 
-  /// Sets the time since the scene began, s. This changes Young's modulus and makes the cuts that are due.
+  /// Sets the time (s). Young's modulus is updated, and cuts are made if they are due.
   void tick(double time);
   bool has_clock() const noexcept;  ///< true if tick() has an effect
 
-  /// Presses the model with a patch at `middle`. A body with time advances by one step. settle() repeats this until the
-  /// body is at rest, or until an iterative model has converged.
+  /// Presses the model with a patch at `middle`. If the body has time, this is one step. settle() repeats this until
+  /// the body is at rest or until the model has converged.
   Reaction press(Given given, double value);
   Reaction settle(Given given, double value);
 
@@ -224,7 +224,7 @@ class Body {
   /// without geometric nonlinearity is wrong, because it treats rotation as strain. Infinite for all other models.
   /// Computes a factor, unless a table file contains the depth.
   double linear_up_to() const;
-  /// rad; the force on block B1 is then 5 to 7 % too large
+  /// rad; the force on B1 is then too large by 5 to 7 %
   static constexpr double kLargestTurn = 0.1;
 
   double step() const noexcept;  ///< s, time of one answer; 0: the body is always at rest

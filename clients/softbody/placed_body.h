@@ -19,17 +19,16 @@ class PlacedBody {
   explicit PlacedBody(const Scene& scene) : PlacedBody(scene, Body(scene.body)) {}
   PlacedBody(const Scene& scene, Body body);
 
-  /// Returns the force on the hand in the device frame. A body with time advances by one step.
+  /// Returns the force on the hand in the frame of the device. If the body has time, this is one step.
   Feel touch(const Vec3& position) { return touch(Pose{.position = position}); }
   Feel touch(const Pose& handle);
 
-  /// Returns the answer for the server. It contains the torque if turns_the_hand() is true, and its stiffness if the
-  /// device measures the orientation of the handle. With Scene::table it contains the force at several depths. The
-  /// table starts at the surface, or half of its depth above the tool if the tool is deeper.
+  /// Returns the answer for the server. It contains the torque if turns_the_hand() is true, and the angular stiffness
+  /// if the device measures the orientation of the handle. If Scene::table is set, it contains the force at several
+  /// depths. The table starts at the surface, or half of its depth above the tool if the tool is deeper.
   ///
-  /// A body with time moves the tool from the previous position to this one, in as many steps as fit between both
-  /// samples. If no step fits, the previous answer is repeated. After a pause of more than kMostBehind, or if the clock
-  /// of the server went back, it takes one step. Times in a scene start with the first sample.
+  /// If the body has time, the tool moves from the previous position to this one in steps. If no step fits between the
+  /// samples, the previous answer is repeated. After a pause of more than kMostBehind, there is only one step.
   Touch answer(const DeviceState& hand);
   static constexpr Duration kMostBehind = std::chrono::milliseconds(200);
 
@@ -54,13 +53,13 @@ class PlacedBody {
   struct Followed {
     PeerTime sampled;
     Pose handle;
-    Duration owed;  ///< simulated time that is still missing, less than a step
+    Duration owed;  ///< time of the next step
     Feel feel;
   };
 
   Body body_;
   Mat3 to_device_;
-  Vec3 origin_;                ///< of the body frame, in the device frame
+  Vec3 origin_;                ///< in the device frame
   std::vector<Vec3> origins_;  ///< for several hands
   Vec3 normal_;
   bool only_pushes_;

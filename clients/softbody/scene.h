@@ -12,7 +12,7 @@
 
 namespace tendon::softbody {
 
-/// A body and its place in front of the device.
+/// A body and its position relative to the device.
 struct Scene {
   BodyConfig body;
   Vec3 at = Vec3::Zero();             ///< m, device frame: touch point of the body at rest

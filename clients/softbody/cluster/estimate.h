@@ -9,8 +9,8 @@
 
 namespace tendon::softbody {
 
-/// Predicted costs of the ways to answer a body, from its size alone. The constants were measured on quadratic blocks
-/// on processors of 2023. Accurate to a factor of two or three: enough to choose a method, not to promise a rate.
+/// A prediction of the costs from the size of a body. The constants were measured with quadratic blocks on processors
+/// of 2023. The error is a factor of two or three.
 ///
 ///     factor      answer 28 ms (N / 55 539)^(4/3), set up 2.8 s (N / 55 539)², memory 320 MB (N / 55 539)^(4/3)
 ///     multigrid   3.3 rounds of N c / P + 6 L h + g + 3 a log₂ P on P ranks, with L = log₂(n / 4) levels of

@@ -21,7 +21,7 @@ struct Cut {
 /// The nodes of opened faces are copied, except at the tip of a cut. The copies follow the other nodes.
 struct Division {
   Mesh mesh;
-  Fixed fixed;  ///< also true for nodes without an element
+  Fixed fixed;  ///< also set for nodes without an element
   std::vector<int> node_before;
   std::vector<int> element_before{};
   int opened = 0;  ///< faces

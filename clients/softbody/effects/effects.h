@@ -76,8 +76,8 @@ class Damping : public Effect {
   VectorXd start_;  ///< u₀, m
 };
 
-/// Kelvin–Voigt material: a strain ε has the stress of ε + τ ∂ε/∂t. With K₀ the stiffness at rest, the energy is ½ τ/dt
-/// (u − u₀)ᵀ K₀ (u − u₀). Valid for small rotations only: rigid rotation is slowed too.
+/// A Kelvin–Voigt material: the stress of a strain ε is that of ε + τ ∂ε/∂t. The energy is ½ τ/dt (u − u₀)ᵀ K₀ (u −
+/// u₀), where K₀ is the stiffness at rest. It also slows down rigid rotation, so it is valid for small rotations only.
 class Viscosity : public Effect {
  public:
   Viscosity(const Elastic& elastic, const VectorXd& u, double relaxation, double dt);

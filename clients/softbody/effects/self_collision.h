@@ -10,21 +10,20 @@
 
 namespace tendon::softbody {
 
-/// Keeps the sides of one body from overlapping, in a fold, at a flap, or where a cut closes. If a surface node lies g
-/// > 0 m behind a facet that faces it, a bed of springs between the two sides pushes them apart with the pressure c·g,
-/// half of it from the nodes of either side:
+/// Keeps the sides of one body from overlapping. If a node of the surface is behind a facet by g > 0 m, springs push
+/// both sides apart with the pressure c·g. Each side contributes one half:
 ///
 ///     energy = Σ ½ kᵢ gᵢ²,   gᵢ = max(0, −n·(xᵢ − y)),   kᵢ = ½ c Aᵢ
 ///
-/// with y the nearest point of the facet, n the facet's outward normal, and Aᵢ the node's share of the surface at rest.
-/// Node and facet receive equal and opposite collinear forces (node-to-segment penalty: Hallquist, Goudreau & Benson
-/// 1985). The facet of each node, the position of y on it and n are fixed during a solution and updated in the new
-/// shape until nothing changes; because y is the nearest point, the forces are then the gradient of the energy. Facets
-/// extend slightly beyond their edges.
+/// y is the nearest point of the facet, n is the normal of the facet, and Aᵢ is the area of the node at rest. The
+/// forces on the node and on the facet are opposite and collinear (Hallquist, Goudreau & Benson 1985). The facet, y and
+/// n are constant during a solution and are updated after it until they do not change. y is the nearest point, so the
+/// forces are the gradient of the energy.
 ///
-/// Facets are divided into flat triangles around their centers. A facet never pushes a node if one of the node's
-/// elements has a node on that facet. Not detected: folds over fewer than two elements, edge-edge contact, and sides
-/// that overlapped by more than half a facet before the first search.
+/// Facets are divided into triangles around their centers and extend a little beyond their edges. A facet does not push
+/// a node if an element of the node has a node on the facet. The following cases are not detected: folds over fewer
+/// than two elements, edges that cross edges, and sides that overlapped by more than half a facet before the first
+/// search.
 ///
 /// Thread-safe: no. Realtime-safe: no.
 class SelfCollision {
@@ -39,14 +38,14 @@ class SelfCollision {
   /// Adds the energy and the free forces of the bed to `to`.
   void add_forces(const VectorXd& u, Elastic::Forces& to) const;
 
-  /// A Newton step must predict which nodes are in contact at its end: the bed only pushes, and a step that ignores
-  /// this makes no progress. Selects the nodes that are pushed by the step d that minimizes
+  /// Predicts the nodes that are pushed at the end of a Newton step, because a step without this prediction would make
+  /// no progress. The step d minimizes
   ///
   ///     ½ dᵀK d − d·b + energy(u + d)
   ///
-  /// over all steps, or over those with held·d = `by` if `held` is given; `factor` is that of K. Returns the force
-  /// along `held`, N. In terms of the nodal forces this is a linear complementarity problem with a positive definite
-  /// matrix, solved by projected Gauss–Seidel (Cottle, Pang & Stone 1992, chapter 5).
+  /// If `held` is given, held·d is equal to `by`, and the force (N) along `held` is returned. `factor` is the factor of
+  /// K. For the forces on the nodes this is a linear complementarity problem, which is solved by projected Gauss–Seidel
+  /// iteration (Cottle, Pang & Stone 1992, chapter 5).
   double foresee(const Factor& factor, const VectorXd& u, const VectorXd& b, const VectorXd* held, double by);
 
   /// Returns true if a node is pushed at u or at the end of the step.

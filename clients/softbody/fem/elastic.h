@@ -58,7 +58,7 @@ class Elastic {
   enum class Curvature : std::uint8_t { kExact, kWithoutNegative };
   /// The second derivative with respect to the free displacements, N/m.
   virtual void stiffness(const VectorXd& u, Curvature curvature, SymmetricMatrix& to) const = 0;
-  /// Computed on first use; all values are zero.
+  /// All values are zero.
   const SymmetricMatrix& pattern() const;
 
   virtual std::size_t bytes() const noexcept = 0;
@@ -66,13 +66,13 @@ class Elastic {
  protected:
   /// Throws std::invalid_argument if the mesh is invalid or no displacement is fixed.
   Elastic(Mesh mesh, const Fixed& fixed);
-  /// Further unknowns that move the nodes of `rim`, whose own components are fixed.
+  /// Additional unknowns that move the nodes of `rim`. The components of these nodes are fixed.
   struct Together {
     int count = 0;
     std::vector<int> rim = {};
   };
-  /// For a mesh that another body may hold, so nothing needs to be fixed. The further unknowns are coupled to each
-  /// other and to every node that shares an element with the rim.
+  /// The mesh may be held by another body, so no node has to be fixed. The additional unknowns are coupled to all nodes
+  /// that share an element with the rim.
   Elastic(Mesh mesh, const Fixed& fixed, Together together);
   Elastic(const Elastic&) = default;
   Elastic(Elastic&&) = default;
@@ -91,10 +91,10 @@ class Elastic {
   Lazy<SymmetricMatrix> pattern_;
 };
 
-/// The mass of each free displacement, kg.
+/// Returns the lumped mass (kg) of each free displacement.
 VectorXd lumped_mass(const Elastic& elastic, double density);
 
-/// The nodal forces for 1 N on the patch, against the normal.
+/// Returns the forces on all nodes for 1 N on the patch, against the normal.
 VectorXd patch_load(const Elastic& elastic, const Vec3& normal, const Patch& patch);
 
 /// The derivative of patch_load() with respect to the patch position, N/m.

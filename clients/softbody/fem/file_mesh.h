@@ -32,9 +32,9 @@ struct FileMesh {
 /// same place, or if elements overlap: more than two share a face, or two are on the same side of a shared face.
 FileMesh joined(FileMesh file, bool slits, std::string_view name);
 
-/// Throws std::invalid_argument with the number and the place of an element if a part can move as a rigid body. To be
-/// held, a part needs three nodes that are not collinear. Each must be fixed or belong to a part that is held. A mesh
-/// with only one part is not checked.
+/// Throws std::invalid_argument with the number and the place of an element if a part is not held. A part is held if it
+/// has three nodes that are not collinear and that are fixed or belong to another held part. If there is only one part,
+/// it is not checked.
 void expect_held(const FileMesh& file, const Fixed& fixed, std::string_view name);
 
 }  // namespace tendon::softbody

@@ -8,8 +8,7 @@
 
 namespace tendon::softbody {
 
-/// A value computed on first use and then kept. A body whose equations are solved by another process never needs most
-/// of these values.
+/// A value that is computed when it is used for the first time.
 ///
 /// Thread-safe: get() is. Realtime-safe: no.
 template <class T>

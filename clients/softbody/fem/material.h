@@ -51,7 +51,7 @@ struct Stress {
 };
 Stress stress(Law law, const Mat3& f, double mu, double lambda);
 
-/// ∂P/∂F, Pa, with F and P flattened in column-major order. Symmetric; indefinite where the material can buckle.
+/// Returns ∂P/∂F (Pa) with F and P as columns. The matrix is symmetric. It is indefinite if the material can buckle.
 Mat9 tangent(Law law, const Mat3& f, double mu, double lambda);
 
 /// The nearest positive semidefinite matrix. A Newton step with it is always a descent direction.

@@ -23,13 +23,12 @@ struct SymmetricMatrix {
   std::size_t bytes() const noexcept;
 };
 
-/// Cholesky factor of a symmetric positive definite matrix (CHOLMOD, supernodal). The fill-reducing ordering is
-/// computed once per pattern and reused by factorize(). After split() the pattern is that of the grown matrix, and the
-/// next factorize() computes its ordering.
+/// The Cholesky factor of a symmetric positive definite matrix (CHOLMOD, supernodal). The ordering is computed once for
+/// each pattern.
 ///
-/// factorize() sets OpenBLAS to one thread per call for the whole process, and OpenMP to the calling thread only.
+/// factorize() limits OpenBLAS to one thread in the whole process, and OpenMP to the calling thread.
 ///
-/// Thread-safe: no; two threads may each use their own factor if factors_may_work_at_once(). Realtime-safe: no.
+/// Thread-safe: no, but two threads can use different factors if factors_may_work_at_once(). Realtime-safe: no.
 class Factor {
  public:
   /// Computes the ordering only; there are no values yet.
@@ -41,17 +40,16 @@ class Factor {
   /// Returns false if the matrix is not positive definite; the factor then has no values.
   [[nodiscard]] bool factorize(const SymmetricMatrix& matrix);
 
-  /// Becomes the factor of `grown`: the same matrix after some unknowns were duplicated, with some of their couplings
-  /// moved to the twins. The twins follow the old unknowns; `twin_of` gives the original of each. Tying every twin to
-  /// its original recovers the old matrix. With d the displacements of the twins relative to their originals, T the map
-  /// that ties them, and C the map that moves each twin alone,
+  /// Changes the factor to that of `grown`, in which some unknowns have twins. The twins follow the old unknowns, and
+  /// `twin_of` contains their originals. If the twins are tied to their originals, `grown` is equal to the old matrix.
+  /// T is the map that ties the twins, C is the map that moves only the twins, and d are the distances of the twins
+  /// from their originals:
   ///
   ///     TᵀAT = the old matrix,   S = CᵀAC − (CᵀAT)(TᵀAT)⁻¹(TᵀAC),   S d = Cᵀb − (CᵀAT)(TᵀAT)⁻¹Tᵀb
   ///
-  /// (block elimination with a capacitance matrix, James & Pai 1999): the factor is kept, and each row of S, one per
-  /// twin, costs one solve. Returns false without changes if `grown` is not positive definite, or if by CHOLMOD's
-  /// operation count all solves since factorize() would exceed the work of a new factor. CHOLMOD's rank updates (Davis
-  /// & Hager 1999) are not used: they need the slower simplicial factor, and a twin changes many rows.
+  /// This is block elimination with a capacitance matrix (James & Pai 1999). It needs one solve for each twin. Returns
+  /// false if `grown` is not positive definite, or if a new factor needs fewer operations than all solves since
+  /// factorize(). CHOLMOD can update a factor (Davis & Hager 1999), but only the slower simplicial factor.
   [[nodiscard]] bool split(const SymmetricMatrix& grown, const std::vector<int>& twin_of);
 
   MatrixXd solve(const MatrixXd& b) const;
@@ -59,7 +57,7 @@ class Factor {
   std::size_t bytes() const noexcept;
 
  private:
-  struct Cholmod;  // keeps CHOLMOD and Eigen/Sparse out of this header
+  struct Cholmod;
   struct Split;
   MatrixXd solve(const MatrixXd& b, std::size_t splits) const;
 
@@ -67,8 +65,8 @@ class Factor {
   std::vector<Split> splits_;
 };
 
-/// Whether two threads may factorize or solve concurrently, each with its own factor. False with an OpenBLAS built for
-/// one thread (libopenblas0-serial), whose shared buffers corrupt most factors.
+/// Returns false if two threads must not use factors at the same time. This is the case for an OpenBLAS that was built
+/// for one thread (libopenblas0-serial), because its buffers are shared and the factors would be wrong.
 bool factors_may_work_at_once();
 
 }  // namespace tendon::softbody

@@ -25,15 +25,14 @@ struct VolumeConfig {
   bool hexahedra = true;
 };
 
-/// Runs gmsh (4.8 or later) for each body of the surface (bodies()). The surface must have passed check(). The output
-/// of gmsh is appended to `words`, even if gmsh fails.
+/// Runs gmsh (4.8 or later) for each body of the surface. The surface must have passed check(). The output of gmsh is
+/// added to `words`, even if gmsh fails.
 ///
-/// Each tetrahedron becomes four hexahedra, with new nodes at the centers of its edges, faces and volume. New boundary
-/// nodes are moved towards the nearest surface point as far as their elements stay well shaped: moving all of them
-/// fully would invert some elements, and not moving them would lose volume.
+/// Each tetrahedron becomes four hexahedra, with new nodes in the middle of its edges, its faces and its volume. The
+/// new nodes on the boundary are moved to the surface as far as their elements stay well shaped.
 ///
-/// Throws std::invalid_argument, naming the invalid field of `config`, and std::runtime_error if gmsh is not installed
-/// or produces no volume.
+/// Throws std::invalid_argument with the name of the field of `config`, and std::runtime_error if gmsh is not installed
+/// or does not make a volume.
 Mesh volume_of(const Triangles& surface, const VolumeConfig& config, std::string& words);
 
 /// Returns the mesh in the text format 2.2 of gmsh.

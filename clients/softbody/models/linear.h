@@ -42,7 +42,7 @@ class LinearModel : public Model {
   double step_;
   bool glides_;
   Effects effects_;
-  VectorXd rest_;  ///< m, all nodes: shape at rest; empty without time
+  VectorXd rest_;  ///< m, all nodes
   /// W and A⁻¹ W by node, for the last patch position for which they were computed.
   MatrixXd slopes_;
   MatrixXd given_way_;
@@ -112,8 +112,7 @@ class SolvedModel : public Model {
 /// discrete Green's function; James & Pai 1999). An answer is wᵀ G w over the patch.
 class CondensedModel : public Model {
  public:
-  /// Computes the table with one solve for each node. The solid and the surface are not kept. If `glides` is true, an
-  /// answer contains Reaction::glide.
+  /// Computes the table with one solve for each node. If `glides` is true, an answer contains Reaction::glide.
   CondensedModel(const Solid& solid, const TouchSurface& surface, const std::vector<int>& nodes, bool glides = false);
   /// Uses a stored table (SurfaceTable).
   CondensedModel(std::size_t mesh_nodes, std::vector<int> nodes, MatrixXd table, bool glides = false);
@@ -128,11 +127,10 @@ class CondensedModel : public Model {
   const std::vector<int>& nodes() const noexcept { return nodes_; }
 
  private:
-  /// Wᵀ A⁻¹ W of Reaction::Glide, without a held depth, for the patch of rows_.
   Mat2 giving(const Patch& patch) const;
 
   std::vector<int> nodes_;
-  std::vector<int> row_of_;  ///< by node; −1: not in the table
+  std::vector<int> row_of_;  ///< by node
   MatrixXd table_;
   bool glides_;
   std::vector<int> rows_;  ///< table rows of the current patch

@@ -14,7 +14,7 @@ namespace tendon::softbody {
 struct Division;
 struct EffectsConfig;
 
-/// The quantity that is prescribed; the answer contains the other one.
+/// The quantity that is given.
 enum class Given : std::uint8_t {
   kDepth,       ///< mean depth of the patch, m; the force may pull
   kLeastDepth,  ///< minimum of the mean depth, m; the tool cannot pull
@@ -28,7 +28,7 @@ enum class Way : std::uint8_t {
   kLearned,    ///< learned shapes
   kNear,       ///< near field
   kWhole,      ///< near field that covers the whole body
-  kLinear,     ///< linear body, while no near field is ready
+  kLinear,     ///< linear body, if there is no near field
 };
 
 inline constexpr std::array<std::string_view, 5> kWayNames = {"tabulated", "learned", "near", "whole", "linear"};
@@ -36,9 +36,9 @@ constexpr std::string_view name_of(Way way) {
   return way == Way::kOnly ? "" : kWayNames.at(static_cast<std::size_t>(way) - 1);
 }
 
-/// The answer of a body to a patch that presses into it.
+/// The answer of a body to a patch.
 struct Reaction {
-  double force = 0;  ///< N, on the tool, along the normal
+  double force = 0;  ///< N, along the normal
   double depth = 0;  ///< m, mean over the patch
   /// N/m, ∂force/∂depth. For a body with time it is the force divided by the displacement from the shape at rest,
   /// without the stiffness that inertia adds within one step.
@@ -74,8 +74,8 @@ class Model {
   Model(const Model&) = delete;
   Model& operator=(const Model&) = delete;
 
-  /// Returns the answer to one patch. A model with state continues from the last call, and a model with time advances
-  /// by one step. If the patch has no nodes, there is no contact.
+  /// Returns the answer to one patch. If the model has a state, it continues from the last call. If the model has time,
+  /// this is one step. If the patch has no nodes, there is no contact.
   virtual Reaction press(const Patch& patch, Given given, double value) = 0;
 
   /// Must be called after the solid has been cut in place. Throws std::logic_error if the model does not support

@@ -9,11 +9,11 @@
 
 namespace tendon::softbody {
 
-/// Von Mises yield with linear kinematic hardening (Prager). A bar in tension has the modulus E up to `stress` and
-/// E·H/(E + H) beyond it. On release it has E again, and after 2·`stress` it yields in reverse.
+/// Von Mises plasticity with linear kinematic hardening (Prager). The modulus of a bar is E up to `stress`, and E·H/(E
+/// + H) above it. If the bar is released, the modulus is E again up to a change of 2·`stress`.
 struct Yield {
-  double stress = 0;     ///< σ, Pa, yield stress of a bar
-  double hardening = 0;  ///< H, Pa, stress per unit of plastic strain
+  double stress = 0;     ///< σ, Pa
+  double hardening = 0;  ///< H, Pa
 };
 
 /// Throws std::invalid_argument with the name of the field.

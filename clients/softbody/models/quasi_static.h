@@ -11,22 +11,19 @@
 
 namespace tendon::softbody {
 
-/// Large rotations and strains at rest: Newton's method on the elastic energy with the tool's depth as a constraint,
-/// starting from the previous shape. Effects on the whole body add their energies. Without inertia there is no velocity
-/// and no mass; with it this is implicit Euler, solved to convergence.
+/// Newton's method on the elastic energy, for large rotations and strains. The depth of the tool is a constraint, and
+/// the initial shape is that of the last answer. With inertia this is the implicit Euler method. Without it there is no
+/// velocity and no mass.
 ///
-/// The factor is kept between steps and answers and corrected by the last eight steps (Pairs). It is recomputed only
-/// when it no longer serves, because a factor costs as much as thirty steps. It factors the exact second derivative; if
-/// that is not positive definite, negative eigenvalues are removed at every quadrature point. A line search makes every
-/// step reduce the energy. An inverted body therefore returns to its shape (Law::kCorotational), or at least comes to
-/// rest without inverted elements (kNeoHookean): the neo-Hookean energy has further minima, in which an edge of the
-/// body is wound around itself.
+/// The factor is used for several answers and is corrected by the last eight steps (Pairs), because a new factor needs
+/// the time of thirty steps. If the stiffness is not positive definite, the negative eigenvalues are removed at each
+/// quadrature point. Each step reduces the energy, so an inverted body returns to its shape (kCorotational), or to a
+/// shape without inverted elements (kNeoHookean, whose energy has other minima).
 class QuasiStaticModel : public Model {
  public:
   struct Config {
     int max_iterations = 30;  ///< for each answer
-    /// The relative error of the force at which an answer ends. Force, depth and slope include the last step, which is
-    /// not taken.
+    /// The relative error of the force at which an answer is complete.
     double tolerance = 1e-6;
     std::optional<double> self_collision = {};  ///< Pa/m, c of SelfCollision
     bool glides = true;                         ///< compute Reaction::glide at rest

@@ -55,7 +55,7 @@ inline constexpr double kRough = 1e-3;
 
 /// Sends bytes from rank 0 to all ranks.
 void share_out(std::vector<std::byte>& bytes);
-/// Ends all ranks if one of them cannot continue.
+/// Ends all ranks.
 [[noreturn]] void end_all_ranks();
 
 }  // namespace tendon::softbody

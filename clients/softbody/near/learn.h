@@ -23,7 +23,7 @@ struct LearnConfig {
   bool shapes = false;
   bool answers = false;
   Vec2 middle = Vec2::Zero();  ///< m, tangential
-  double reach = 0;            ///< m, range of the hand along each axis
+  double reach = 0;            ///< m, for each axis
   /// The folder with the results. If it is empty, results are not stored. File names contain a digest of the body, the
   /// law, the touched side, the patch, the grid and the version.
   std::filesystem::path folder{};

@@ -9,13 +9,13 @@
 
 namespace tendon::softbody {
 
-/// A reduced-order model of a nonlinear body under a patch, as plain values: a basis of shapes Φ, u = Φ q, and a subset
-/// of elements with weights ω > 0. The reduced energy is
+/// A reduced model of a nonlinear body under a patch. u = Φ q for some shapes Φ, and ω > 0 are the weights of some
+/// elements. The energy is
 ///
 ///     E(q) = ½ qᵀq + Σ_e ω_e [W_e(Φ_e q) − ½ (Φ_e q)ᵀ K₀ₑ (Φ_e q)],     Φᵀ K₀ Φ = 1
 ///
-/// The linear part is exact for all elements; only the nonlinear correction is summed over the subset (cubature: An,
-/// Kim & James 2008; Farhat, Chapman & Avery 2015, for the full force).
+/// The linear part is exact. Only the nonlinear part is a sum over some elements (An, Kim & James 2008; Farhat, Chapman
+/// & Avery 2015).
 struct LearnedShapes {
   PressGrid grid;
   std::vector<int> elements{};  ///< ascending
@@ -28,14 +28,14 @@ struct LearnedShapes {
   std::vector<double> errors{};  ///< Trust::errors()
 };
 
-/// Inaccurate solutions and unstable knots are left out. A knot is unstable if ∂²E/∂q² at constant depth is not
-/// positive definite.
+/// Ignores inaccurate solutions and unstable knots. A knot is unstable if ∂²E/∂q² at constant depth is not positive
+/// definite.
 LearnedShapes learn_shapes(const Solid& solid, const TouchSurface& surface, const SolvedPresses& presses,
                            const Tell& tell);
 
-/// Newton's method on the reduced energy E at constant depth. Starts from the cubic interpolation of the knots' shapes
-/// and from the interpolated inverse stiffness, which BFGS updates; a line search makes every step reduce the energy.
-/// The error of the returned stiffness is second order in the error of that inverse.
+/// Newton's method for E at constant depth. The initial shape is a cubic interpolation between knots. The inverse of
+/// the stiffness is interpolated as well and is updated by BFGS. The error of the stiffness is the square of the error
+/// of the inverse.
 ///
 /// Thread-safe: yes, after construction. Realtime-safe: no.
 class LearnedBody {

@@ -12,9 +12,9 @@ struct Squares {
   double square = 0;  ///< |b|²
 };
 
-/// Minimizes |G x − b| over sparse x ≥ 0 (Lawson & Hanson 1974). Adds one entry at a time, since several at once stall,
-/// until |G x − b| ≤ `left` |b|, `most` entries are positive, or no entry helps. An entry that returns to 0 is excluded
-/// until another one has stayed.
+/// Minimizes |G x − b| for x ≥ 0 with few entries (Lawson & Hanson 1974). It ends if |G x − b| ≤ `left` |b|, if there
+/// are `most` entries, or if no other entry helps. One entry is added at a time, because the method stalls with
+/// several.
 VectorXd few_not_negative(const Squares& squares, double left, int most);
 
 }  // namespace tendon::softbody

@@ -10,22 +10,20 @@
 
 namespace tendon::softbody {
 
-/// A solid in which only the elements near one place keep their nonlinear law. The others, the far field, are
-/// linearized about a shape u* and condensed onto the shared nodes Γ, whose motion is restricted to a few modes Ψ. The
-/// energy is
+/// A solid in which only the elements near the tool have a nonlinear law. The far field is linear about a shape u* and
+/// is condensed to the common nodes Γ. The motion of Γ is limited to some modes Ψ. The energy is
 ///
 ///     E(u_n, y) = Σ_near W_e(u) + r·y + ½ yᵀ S y,   u_Γ = u*_Γ + Ψ y,   r = Ψᵀ (force of the far elements on Γ at u*),
 ///     S = Ψᵀ (K_ΓΓ − K_Γf K_ff⁻¹ K_fΓ) Ψ,   K of the far elements at u*
 ///
-/// It is exact to first order in the motion since u*, and a single energy, so forces are conservative. u* is the shape
-/// at rest or one in which tools press near nodes only.
+/// It is exact to first order at u*, which is the shape at rest or a shape with tools on near nodes.
 ///
-/// The modes are the leading singular vectors of the motion of Γ under random forces on near nodes, weighted towards
-/// the center, in the whole body linearized about u*. Each such solution includes its own far field, so S Ψ is minus
-/// the force of the near field on Γ, and the far field needs no factor.
+/// The modes are singular vectors of the motion of Γ for random forces on near nodes. The forces are larger close to
+/// the center. Each motion is a solution of the whole body, which is linear about u*. The forces of the near field on Γ
+/// are then −S Ψ, so the far field needs no factor.
 ///
-/// As an Elastic it has the near nodes followed by y. The nodes of Γ count as fixed, and their entries of u are not
-/// read. It has its own node numbering, see own_node(). It starts at u*, where its energy need not be 0.
+/// The unknowns are the near nodes and y. The nodes of Γ count as fixed, and their values in u are ignored. own_node()
+/// returns the numbers of the nodes. The initial shape is u*, and its energy can be different from 0.
 ///
 /// Stateless. Thread-safe: yes, after construction. Realtime-safe: no.
 class NearBody : public Elastic {
@@ -35,14 +33,15 @@ class NearBody : public Elastic {
     double radius = 0;           ///< m, maximum distance of the centers of near elements
     /// The maximum number of modes. If Γ does not have more unknowns than this, the interface is exact.
     int modes = 60;
-    std::vector<int> pressed;  ///< nodes that the tool may press
+    std::vector<int> pressed;  ///< touchable nodes
     VectorXd press;            ///< N, free components: the load of a tool at `middle`
     VectorXd about{};          ///< u*, m, all nodes; empty: at rest
     double about_depth = 0;    ///< m, depth of the tool in u*
   };
 
   /// Builds the body in pieces, most of which are solves for a few loads. The last piece sets `made`, which is null if
-  /// all elements are near. `factor` is the factor of the stiffness at u*. `whole` and `factor` must exist until then.
+  /// all elements are near. `factor` is the factor of the stiffness at u*. `whole` and `factor` must outlive the
+  /// pieces.
   static Pieces make(const Solid& whole, const Factor& factor, Config config, std::unique_ptr<NearBody>& made);
 
   VectorXd beginning() const override { return beginning_; }

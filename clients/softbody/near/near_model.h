@@ -11,9 +11,9 @@
 
 namespace tendon::softbody {
 
-/// The difference between two methods where the second one takes over.
+/// The difference between the last answer of one method and the first answer of another.
 struct Handover {
-  double ratio = 1;           ///< of the forces, before to after
+  double ratio = 1;           ///< force before / force after
   Vec2 slope = Vec2::Zero();  ///< before minus after
   double depth = 0;           ///< m, of the tool
 };
@@ -23,46 +23,40 @@ Handover handover(const Reaction& before, const Reaction& after, double depth);
 /// ratio of the forces is used, otherwise their difference.
 Reaction kept(const Handover& before, double share, const Reaction& reaction);
 
-/// Large rotations and strains near the tool, a linear body elsewhere: Newton's method on a NearBody around the patch.
-/// The cost of an answer depends on the number of near elements, not on the size of the mesh.
+/// Newton's method on a NearBody around the patch: large rotations and strains near the tool, and a linear body
+/// elsewhere. The cost of an answer depends on the number of near elements.
 ///
-/// The near field has radius ρ = max(1.5 a, a + 2 elements) around the patch at rest, and at least 2 a if ν > 0.45,
-/// with a the patch radius; plus the elements that the patch touches within 0.45 a in any direction. When the patch has
-/// moved half of that, a new near field is begun. A body that is entirely near is solved by QuasiStaticModel.
+/// The radius ρ of the near field is max(1.5 a, a + 2 elements), where a is the radius of the patch. It is at least 2 a
+/// if ν > 0.45. The elements that the patch can touch within 0.45 a are also near. If the patch has moved by half of
+/// this distance, a new field is built. If all elements are near, QuasiStaticModel is used.
 ///
-/// Without a background thread a field is linearized at rest and built in about 30 pieces. Most are solves with the
-/// factor of the whole body, eight at a time; the longest are the two factors of the near field. Each answer makes one
-/// piece and uses the old field. If the hand moves more than a/200 per answer, answers make more pieces, distributed up
-/// to a distance of 0.38 a. If it leaves the old field, one answer makes all remaining pieces, or a whole field. Only
-/// counts and positions decide, not a clock, so answers are the same on every machine.
+/// Without a background thread, a field is linear about the shape at rest and is built in about 30 pieces. Each answer
+/// builds one piece, and more if the hand moves by more than a/200 in an answer. If the hand leaves the old field, one
+/// answer builds the rest. The number of pieces does not depend on a clock, so the answers are the same on every
+/// machine.
 ///
-/// With make_fields_by() answers make no pieces. When the patch has moved half its range, or its depth has changed by
-/// a/10 since the last request, a new field is requested. The background thread solves the whole body by Newton's
-/// method at a predicted hand position and linearizes about that shape. Fields are passed through one atomic pointer,
-/// and old ones are returned the same way to be freed, so an answer takes no lock and never waits. A field that the
-/// hand has already left is discarded. While no field contains the patch, answers come from the linear body and one
-/// Newton step from its shape, with the factor K₀ of the whole body at rest:
+/// With make_fields_by(), a field is requested when the patch has moved or when the depth has changed by a/10. The
+/// background thread solves the whole body at a predicted position of the hand, and the field is linear about this
+/// shape. An atomic pointer transfers the field, so that no answer waits or takes a lock. Old fields are freed by the
+/// background thread. If no field contains the patch, an answer is the linear shape and one Newton step with the factor
+/// K₀ at rest:
 ///
 ///     u₀ = δ z,   F₀ = z·f(u₀),   s = −P K₀⁻¹ (f(u₀) − F₀ w),   q = s·f(u₀ + s) / s·f(u₀),
 ///     u = u₀ + s/(1 − q),         F = F₀ + (z·f(u₀ + s) − F₀)/(1 − q)
 ///
-/// where z is the linear shape of unit depth, δ the depth, w the patch load, f the nonlinear forces (N), and P the
-/// projection that keeps the depth. The error of F is of order δ⁴: within 1 % down to a/4 on block B1 (n = 8), where
-/// the linear force is off by 15 %. If the step does not converge (ν = 0.499), its weight falls to zero and the linear
-/// force remains, with a correspondingly larger error.
+/// z is the linear shape of unit depth, δ is the depth, w is the load of the patch, f are the nonlinear forces (N), and
+/// P keeps the depth. The error of F is of the order δ⁴. It is less than 1 % down to a/4 for block B1 with n = 8, where
+/// the error of the linear force is 15 %. If the step does not converge (ν = 0.499), its weight is reduced, and the
+/// error is larger.
 ///
-/// A cut discards everything built for the uncut body, including fields in progress. The next answer builds a field of
-/// the cut body. With a background thread the field is requested instead, and the cut linear body answers until it
-/// arrives.
+/// A cut discards all fields of the uncut body. The next answer builds a new field or requests it.
 ///
-/// When a field takes over, the force is continuous: the force ratio and the slope difference fade over a/4 of hand
-/// motion, independent of time. Within one near field the force is the gradient of one energy. While a ratio fades it
-/// is not: on different paths forth and back a hand may gain the difference times a/4, and this difference is included
-/// in the error.
+/// When a new field is used, the ratio of the forces and the difference of the slopes decrease to zero while the hand
+/// moves by a/4. Meanwhile the force is not the gradient of an energy, so a hand may gain the difference times a/4 on a
+/// closed path. The error includes this difference.
 ///
-/// Reaction::error covers Newton's method and the approximations relative to the whole mesh: three times
-/// NearBody::left_out() for the linear far field, and three times the largest excess stiffness of the modes over the
-/// whole body, at five places of the near field.
+/// Reaction::error includes the error of Newton's method, three times NearBody::left_out(), and three times the error
+/// of the modes, which is the largest excess of the stiffness at five positions.
 class NearModel : public Model {
  public:
   struct Config {
@@ -72,23 +66,22 @@ class NearModel : public Model {
   /// Builds the near field of `first`. `solid` and `surface` must outlive this object. Throws the errors of
   /// QuasiStaticModel.
   NearModel(const Solid& solid, const TouchSurface& surface, const Patch& first, const Config& config);
-  /// Lets `background` build all near fields.
+  /// All near fields are built by `background`.
   NearModel(const Solid& solid, const TouchSurface& surface, const Config& config, Background background);
   ~NearModel() override;
 
-  /// Lets `background` build the next fields, one at a time. The work owns a copy of the body. If it throws, the next
-  /// press() rethrows the exception.
+  /// From now on, fields are built by `background`, one at a time. The work owns a copy of the body. If it throws, the
+  /// next press() rethrows the exception.
   void make_fields_by(Background background);
   /// Must be called before the body is cut.
   void make_no_more_fields();
 
   Reaction press(const Patch& patch, Given given, double value) override;
-  /// Must be called if a rung has answered. `room` is 0 at the border of the rung and 1 far from it. The background
-  /// thread makes fields as usual. Without it, answers build a field while `room` is below 1, so that it is complete at
-  /// 0.
+  /// Must be called if a rung has answered. `room` is 0 at the border of the rung, and 1 if the border is far. If there
+  /// is no background thread, a field is built while `room` is less than 1, so that it is complete at 0.
   void follow(const Patch& patch, const Reaction& felt, double room);
   void cut(const Division& division, const EffectsConfig& effects) override;
-  /// The first answers are those of the cut body without a field, scaled by the nonlinear part of the last force.
+  /// The first answers use the cut body without a field. They are scaled by the nonlinear part of the last force.
   void go_on_from(const Model& before, std::span<const int> node_before) override;
   bool glides() const noexcept override { return true; }
   /// Includes the background thread, but not a field that is being built. Such a field needs two numbers for each
@@ -97,7 +90,7 @@ class NearModel : public Model {
 
   /// The present near field, and counters since construction.
   struct Size {
-    double radius = 0;  ///< ρ, m; 0 if the whole body is near
+    double radius = 0;  ///< ρ, m, or 0 if the whole body is near
     std::size_t elements = 0;
     int interface = 0;  ///< unknowns on the boundary
     int modes = 0;      ///< number of modes that replace them

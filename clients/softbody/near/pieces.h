@@ -6,8 +6,8 @@
 
 namespace tendon::softbody {
 
-/// Work divided into pieces: a coroutine with `co_await kPieceDone` after each. Objects it refers to must outlive it.
-/// If a piece throws, next() throws and the work is over.
+/// A coroutine that is divided into pieces by `co_await kPieceDone`. Its arguments must outlive it. If a piece throws,
+/// next() throws, and there are no more pieces.
 ///
 /// Thread-safe: no. Realtime-safe: no.
 class [[nodiscard]] Pieces {

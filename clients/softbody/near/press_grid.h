@@ -63,7 +63,7 @@ struct SolvedPress {
   bool good = false;  ///< Newton's method has found the expected shape
   double energy = 0;  ///< J
   Reaction reaction;
-  VectorXd shape;  ///< m, free displacements; empty at rest
+  VectorXd shape;  ///< m, free
 };
 
 /// The answers at all knots, and at the centers of all cells for validation.
@@ -114,7 +114,7 @@ class Trust {
    public:
     Allowed(const Trust& trust, double tolerance);
     double share(const PressGrid::Point& point) const;
-    /// Returns 0 where share() is below 1, and 1 if the distance from there is a cell or more.
+    /// Returns 1 if all cells around are accurate, and 0 where share() decreases.
     double room(const PressGrid::Point& point) const;
     int cells() const noexcept { return cells_; }
 

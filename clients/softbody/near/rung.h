@@ -24,7 +24,7 @@ class Rung {
   /// Returns the answer at a given depth (m). Empty if the press is outside the valid region.
   virtual std::optional<Answer> press(const Patch& patch, double depth) const = 0;
 
-  /// Returns 0 where the share is below 1, and 1 far from there.
+  /// Returns 1 if the press is far from the border of the valid region, and 0 at the border.
   virtual double room(const Vec2& middle, double depth) const = 0;
 
   struct Size {

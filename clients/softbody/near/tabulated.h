@@ -10,16 +10,14 @@
 
 namespace tendon::softbody {
 
-/// The energy of a memoryless body under a patch as a function of depth δ and tangential position c: E(δ, c). At each
-/// grid knot its value, gradient and second derivatives follow from a Reaction with slope s and glide t (tilting), M
-/// (curving) and D (giving):
+/// The energy E(δ, c) of a body without memory, where δ is the depth and c is the position of the patch. Its
+/// derivatives at a knot follow from a Reaction with the slope s and the glide t (tilting), M (curving) and D (giving):
 ///
 ///     ∂E/∂δ = F,   ∂E/∂c = −F s,   ∂²E/∂δ² = k,   ∂²E/∂δ∂c = −(k s + F t),
 ///     ∂²E/∂c² = k s sᵀ + F (s tᵀ + t sᵀ − M − F D)
 ///
-/// In between it is a Hermite interpolant, quintic in depth and bicubic in position, with two continuous derivatives in
-/// depth and one in position. Force and stiffness are its derivatives, so forces are conservative whatever the
-/// interpolation error.
+/// Hermite interpolation is quintic in δ and bicubic in c. The force and the stiffness are derivatives of the
+/// interpolated energy, so a closed path gives no energy.
 struct TabulatedAnswers {
   PressGrid grid;
   /// E, F and k in units of the grid, each with ∂x, ∂y, ∂x∂y.
@@ -28,7 +26,7 @@ struct TabulatedAnswers {
   std::vector<double> errors{};  ///< Trust::errors()
 };
 
-/// The centers of cells define the error. Knots without Reaction::glide are left out.
+/// The error is computed from the centers of the cells.
 TabulatedAnswers tabulate(const SolvedPresses& presses);
 
 /// E and its derivatives in SI units.

@@ -11,28 +11,26 @@
 
 namespace tendon::softbody {
 
-/// A rigid capsule (all points within `radius` of a segment) that presses a linear body without friction. With φ the
-/// distance from the capsule's surface and yᵢ = xᵢ + uᵢ the node positions, the body takes the shape of minimum energy
+/// A rigid capsule that presses a linear body without friction. φ is the distance from the surface of the capsule, and
+/// yᵢ = xᵢ + uᵢ are the positions of the nodes. The body minimizes the energy
 ///
 ///     E = min ½ uᵀKu   with   φ(yᵢ) ≥ 0
 ///
-/// so a pushed node lies on the capsule, and its push λᵢ ≥ 0 acts along the capsule's normal mᵢ = ∇φ(yᵢ). Force and
-/// torque are the gradient of this energy with respect to the capsule's pose, so they are conservative, and minus the
-/// sums over the nodes:
+/// A pushed node is on the capsule, and its force λᵢ ≥ 0 is along the normal mᵢ = ∇φ(yᵢ). The force and the torque are
+/// derivatives of the energy, so a closed path gives no energy:
 ///
 ///     force = −Σ λᵢ mᵢ,   torque = −Σ (yᵢ − p) × λᵢ mᵢ   about a point p
 ///
-/// Uses the full compliance, also tangentially. (SphereContact omits the tangential part, a difference of some percent
-/// at ν = 0.45 in a deep press.) Solves a sequence of problems of `pushes.h`, in which the capsule is replaced at each
-/// node by its tangent plane closest to the node's last position. The capsule is convex, so every iterate is admissible
-/// and the energy never increases. Ends when the pushes change direction by less than kEnough of the force; Feel::error
-/// gives the rest.
+/// The tangential compliance is included. SphereContact does not include it, and the difference is some percent for a
+/// deep press with ν = 0.45. In each iteration, the capsule is replaced by a tangent plane at each node, and a problem
+/// of `pushes.h` is solved. The capsule is convex, so the energy never increases. The search ends if the directions of
+/// the forces change by less than kEnough. Feel::error contains the rest.
 ///
-/// The stiffnesses are the derivatives of force and torque for a fixed set of pushed nodes: changes of the pushes, of
-/// their normals and of their levers. Directions of negative curvature of E, such as a long handle standing on its end,
-/// get stiffness 0, so neither matrix has negative eigenvalues.
+/// The stiffnesses are derivatives for a constant set of pushed nodes. They include the changes of the forces, of the
+/// normals and of the levers. If E has a negative curvature, as for a long handle that stands on its end, the stiffness
+/// is 0.
 ///
-/// Valid while the contact is many nodes wide, as for SphereContact, and for small strains.
+/// The contact must be many nodes wide, and the strains must be small.
 ///
 /// Thread-safe: no. Realtime-safe: no.
 class CapsuleContact {
@@ -67,7 +65,7 @@ class CapsuleContact {
     double half_length;
     Vec3 nearest_of_axis(const Vec3& y) const;
     Plane nearest(const Vec3& y, const Vec3& otherwise) const;
-    /// Returns the height (m) of the capsule above x along n. Empty if it is not above or below x.
+    /// Returns the height (m) of the capsule above x along n, if there is one.
     std::optional<double> above(const Vec3& x, const Vec3& n) const;
   };
   struct Node {

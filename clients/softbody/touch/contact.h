@@ -45,20 +45,20 @@ struct Feel {
 
 /// A tool that presses a patch of a body.
 ///
-/// Without friction the force is the gradient of one energy, E(q) = minimum elastic energy with the tool at q, so a
-/// body at rest never generates energy on any path. With the tangential patch center c, the rest height h(c) of the
-/// surface (mean over the patch), the depth δ = h(c) − q·n and the body's reaction F(δ, c):
+/// Without friction the force is the gradient of an energy E(q), the minimum of the elastic energy for the tool at q.
+/// If the body is at rest, it never gives out energy. c is the tangential position of the patch, h(c) is the mean
+/// height of the surface at rest, δ = h(c) − q·n is the depth, and F(δ, c) is the force of the body:
 ///
 ///     force = F·n + F·(∂depth/∂c − ∂h/∂c)
 ///
-/// The tangential part is the effect of the deformed surface's slope on a sliding tool. With k = ∂F/∂δ, P the
-/// tangential projection, g = ∂depth/∂c − ∂h/∂c, and t = tilting, M = curving, D = giving of Reaction::Glide:
+/// The second part is tangential: the surface below the patch has a slope. The stiffness is the second derivative of E.
+/// k = ∂F/∂δ, P is the tangential projection, g = ∂depth/∂c − ∂h/∂c, and t = tilting, M = curving and D = giving are
+/// from Reaction::Glide:
 ///
 ///     K = k v vᵀ + F (v (Pᵀt)ᵀ + Pᵀt vᵀ) + F Pᵀ (∂²h/∂c² − M − F D) P,   v = n + Pᵀg
 ///
-/// the second derivative of E. If the model does not provide its Glide, the stiffness is k v vᵀ with v = n + Pᵀ(2
-/// ∂depth/∂c − ∂h/∂c), that of a linear body without second derivatives. For a body with time each answer simulates one
-/// Model::step(). Friction adds its tangential force and stiffness.
+/// If the model has no Glide, K is k v vᵀ with v = n + Pᵀ(2 ∂depth/∂c − ∂h/∂c), as for a linear body. If the body has
+/// time, each answer is one Model::step(). Friction adds a tangential force and stiffness.
 ///
 /// Thread-safe: no. Realtime-safe: no.
 class PatchContact {
@@ -75,7 +75,6 @@ class PatchContact {
   /// Returns the answer for a tool at `tool` (m, body frame). There is no force if the patch is not on the body.
   Feel at(const Vec3& tool);
 
-  /// Continues from `before` and takes its friction.
   void go_on_from(PatchContact& before) {
     stuck_ = before.stuck_;
     friction_ = std::move(before.friction_);

@@ -17,16 +17,16 @@ struct Distance {
   Mat3 curvature = Mat3::Zero();  ///< ∇∇φ, 1/m
 };
 
-/// A signed distance sampled on a grid and interpolated by cubic B-splines. Within the box it has two continuous
-/// derivatives, exactly those of the interpolant. Each spline weight is
+/// A signed distance on a grid with cubic B-splines. In the box it has two continuous derivatives. The weight of a
+/// spline is
 ///
 ///     (−1, 8, −1)/6 of three samples, along each axis in turn
 ///
-/// so cubic functions are reproduced, and other smooth ones are approximated to fourth order in the cell size. Kinks
-/// (edges of the surface, the medial axis) are rounded over about one cell, with an error of up to a fifth of a cell.
+/// This is exact for cubic functions and of fourth order for other smooth functions. Edges are rounded over about one
+/// cell, with an error of up to a fifth of a cell.
 ///
-/// Outside the box: the distance from the surface point nearest to where the path enters the box, found in two
-/// iterations. Slightly too large; continuous in value and direction at the box.
+/// Outside the box, it is the distance from a point of the surface. This is the point nearest to where the line to the
+/// surface enters the box, after two iterations. The distance is a little too large, but there is no step at the box.
 ///
 /// Stateless. Thread-safe: yes. Realtime-safe: yes, after construction.
 class DistanceGrid {
@@ -55,7 +55,7 @@ class DistanceGrid {
   Vec3 high_;
   double cell_;
   std::array<int, 3> cells_{};
-  std::vector<float> weights_;  ///< x first; cell i along an axis uses i to i + 3
+  std::vector<float> weights_;  ///< x is first
 };
 
 }  // namespace tendon::softbody

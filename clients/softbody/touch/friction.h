@@ -11,13 +11,13 @@ namespace tendon::softbody {
 
 using Vec2 = Eigen::Vector2d;
 
-/// Dry (Coulomb) friction between a tool and the patch below it, with a small elastic range (Hayward & Armstrong 2000).
-/// A tangential spring runs from the tool to an anchor, which is dragged along so that the spring force never exceeds
+/// Coulomb friction between a tool and a patch, with a small elastic range (Hayward & Armstrong 2000). A tangential
+/// spring connects the tool to an anchor. The anchor is dragged so that the force of the spring is limited:
 ///
 ///     |f| ≤ µ F
 ///
-/// where F is the normal force. The spring stiffness is constant and dragging only dissipates, so any closed path takes
-/// energy. The tangential force does not deform the body.
+/// F is the normal force. The stiffness of the spring is constant, and dragging only loses energy, so friction takes
+/// energy on every closed path. The force does not deform the body.
 ///
 /// Thread-safe: no.
 class Friction {
@@ -28,7 +28,7 @@ class Friction {
   struct Drag {
     Vec2 force = Vec2::Zero();  ///< N, on the tool, tangential
     double stiffness = 0;       ///< N/m, −∂force/∂place; 0 while sliding
-    double until_slip = 0;      ///< m, distance until the tool slides; 0 while it slides
+    double until_slip = 0;      ///< m, distance until the tool slides
   };
   /// Moves the tool to `place` (m). If `normal_force` (N) is not positive, the anchor is released.
   Drag move(const Vec2& place, double normal_force);

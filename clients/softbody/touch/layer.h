@@ -26,25 +26,24 @@ struct HeldTool {
   }
 };
 
-/// A thin elastic layer on the surface of a body, pressed by rigid tools: contact as an energy. With the pose p of a
-/// tool, its distance φ (RigidShape) from each of many points on the facets, and the area of each point,
+/// A thin elastic layer on a body that is pressed by rigid tools. Contact is an energy of points on the facets. p is
+/// the pose of a tool, φ is its distance (RigidShape) from a point, and each point has an area:
 ///
 ///     Ψ(u, p) = Σ area · ψ(ℓ − φ(x(u); p)),   ψ″(g) = E/ℓ · clamp(g/ε, 0, 1),   ε = ℓ/10
 ///
-/// A tool that would reach ℓ below the surface presses there with about Young's modulus. Ψ has two continuous
-/// derivatives wherever φ has. Points are used instead of nodes so that the force grows smoothly on facets wider than
-/// the contact.
+/// Where the tool would be ℓ below the surface, the pressure is about Young's modulus. There are many points on each
+/// facet, so that the force has no steps if the facets are wider than the contact.
 ///
-/// The point spacing must be smaller than the tool is thick. A thin edge on a single row of points slips off: the row
-/// snaps into the tool, and the released energy is lost to the hand. A blade 2.6 mm thick (spoon.off end on, B1 with
-/// cells of 10 mm, 3 mm deep and 3 mm across) lost 81 to 88 % of the work with points 1.4 mm apart, 3 to 4 % with 0.8
-/// mm, and less than 0.1 % from 0.6 mm on. Body uses a quarter of the tool's minimum thickness. A facet wider than 32
-/// such pieces has too few points.
+/// The distance between points must be smaller than the thickness of the tool. Otherwise an edge of the tool slips off
+/// a row of points, and energy is lost. A blade of 2.6 mm (spoon.off end on, B1 with cells of 10 mm, 3 mm deep and 3 mm
+/// across) lost 81 to 88 % of the work with a distance of 1.4 mm, 3 to 4 % with 0.8 mm, and less than 0.1 % with 0.6
+/// mm. Body uses a quarter of the thickness of the tool. This is not possible if a facet is wider than 32 such
+/// distances.
 ///
-/// Friction at each point: at the end of an answer a pressed point is tied to the tool by a tangential spring with the
-/// shear modulus over ℓ. Its force is at most µ times the pressure; beyond that the tie slides along the tool and
-/// dissipates energy (`dissipated`). Within a solution the bounding pressure and normal are those of the last iteration
-/// (hold()), so that friction also has an energy.
+/// With friction, points in contact are tied to the tool at the end of an answer. A tie is a tangential spring with the
+/// shear modulus divided by ℓ. Its force is at most µ times the pressure. If it is larger, the tie slides and loses
+/// energy. During a solution, the pressure and the normal of a tie are those of the last iteration (hold()), so
+/// friction has an energy too.
 ///
 /// Thread-safe: no. Realtime-safe: no.
 class Layer {
@@ -54,7 +53,7 @@ class Layer {
     double young = 0;         ///< E, Pa
     double friction = 0;      ///< µ
     double shear = 0;         ///< Pa
-    double piece = 0;         ///< m, distance between points; a facet has 4 × 4 to 32 × 32 points
+    double piece = 0;         ///< m, distance between points
     std::size_t tools = 1;
   };
   /// `elastic` must outlive this object. Throws std::invalid_argument.
@@ -105,7 +104,7 @@ class Layer {
 
   /// Sets the pressures and normals for friction.
   void hold(const Near& near, std::span<const Placed> tools, const Eigen::Matrix3Xd& places);
-  /// Ends an answer and updates the ties. Returns the minimum and the sum of the energies (J) that the ties have lost.
+  /// Updates the ties after an answer. Returns the minimum and the sum of the energies (J) that the ties have lost.
   struct Dissipated {
     double least = 0;
     double sum = 0;

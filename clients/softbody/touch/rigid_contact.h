@@ -12,27 +12,26 @@
 
 namespace tendon::softbody {
 
-/// One or several rigid tools (RigidShape) on a nonlinear body at rest. With elastic energy W, layer energy Ψ (layer.h)
-/// and the poses p of all tools, the body takes the shape that minimizes
+/// One or several rigid tools (RigidShape) on a nonlinear body at rest. W is the elastic energy, Ψ is the energy of the
+/// layer (layer.h), and p are the poses of the tools. The body minimizes
 ///
 ///     Π(u, p) = W(u) + Ψ(u, p)
 ///
-/// and each hand receives the derivatives of this energy with respect to its own pose:
+/// Each hand receives the derivatives with respect to its own pose:
 ///
 ///     force and torque = −∂Π/∂p,   K = Π_pp − Π_pu Π_uu⁻¹ Π_up
 ///
-/// so a closed path of all tools generates no energy, and K includes the curvatures of tool and surface. Friction
-/// dissipates energy (layer.h).
+/// If there is no friction, a closed path of all tools gives no energy. K includes the curvatures of the tools and of
+/// the surface.
 ///
-/// Each step solves for the contact set exactly. The body's stiffness at the nodes near the tools is known from the
-/// model's kept factor, one solve per unknown of a new near node, and from the last steps (Pairs). Newton's method on
-/// these few unknowns minimizes the stiff layer energy plus that of a body with this stiffness; one solve then gives
-/// the rest of the body. A line search reduces Π. K is computed by conjugate gradients with the same inverse and finite
-/// differences of the forces, to 0.2 %.
+/// In each step, the contact is solved exactly. The compliance of the nodes near the tools is computed with the factor
+/// of the model, one solve for each new unknown, and is corrected by the last steps (Pairs). Newton's method finds the
+/// minimum for these unknowns, and one solve moves the other nodes. A line search reduces Π. K is computed by conjugate
+/// gradients and finite differences, with an error of 0.2 %.
 ///
-/// Between two answers the tools move in steps of at most half a facet and an eighth of the thinnest tool's thickness,
-/// so that a fast tool does not pass through. A jump of more than kMostSteps steps places the tool anew, approaching
-/// from the side from which the surface is touched.
+/// Between two answers, the tools move in steps of at most half a facet and an eighth of the thickness of the thinnest
+/// tool, so that no tool passes through the body. If a tool would need more than kMostSteps steps, it is moved out of
+/// the body and approaches again.
 ///
 /// Thread-safe: no. Realtime-safe: no.
 class RigidContact {
@@ -86,7 +85,7 @@ class RigidContact {
   std::vector<Layer::Placed> placed_;
   Pairs pairs_;
   int factors_ = 0;             ///< value of QuasiStaticModel::factors() for the columns below
-  std::vector<int> column_of_;  ///< of follows_, by free unknown, or −1
+  std::vector<int> column_of_;  ///< by free unknown; −1 if there is none
   MatrixXd follows_;            ///< K₀⁻¹ of unit forces
   int columns_ = 0;
   int iterations_ = 0;

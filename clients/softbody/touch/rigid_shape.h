@@ -15,17 +15,16 @@ namespace tendon::softbody {
 /// x if `from` is close to z.
 Mat3 shortest_rotation(const Vec3& from, const Vec3& to);
 
-/// The shape of a rigid tool around its center, as a signed distance: all points within `rounding` of a box, the core.
-/// A core of size zero gives a sphere, a one-dimensional core a capsule, and others a box with round edges. With the
+/// The shape of a rigid tool, as the signed distance from all points within `rounding` of a box, the core. A core
+/// without size is a sphere, a core with one length is a capsule, and other cores are boxes with round edges. With the
 /// componentwise q = |x| − core and w = max(q, 0):
 ///
 ///     φ = |w| − rounding outside the core,   max q − rounding inside it
 ///
-/// φ is exact outside the core. There its gradient is continuous, and the second derivative jumps where a flat side
-/// meets a round edge. Inside the core the gradient is discontinuous halfway between two sides.
+/// φ is exact outside the core, and its gradient is continuous there. Its second derivative has a step between flat and
+/// round sides. Inside the core, the gradient has a step halfway between two sides.
 ///
-/// Or the inside of a closed triangle surface, with distances on a grid (DistanceGrid): φ then has two continuous
-/// derivatives, with the error given in MeshFacts.
+/// The shape can also be the inside of a closed surface, with distances on a grid (DistanceGrid).
 ///
 /// Stateless. Thread-safe: yes. Realtime-safe: yes, after construction.
 class RigidShape {
@@ -36,19 +35,19 @@ class RigidShape {
   static RigidShape capsule(double radius, double half_length, const Vec3& axis);
   /// `edge` is the radius of the edges and corners, at most half of the smallest size.
   static RigidShape box(const Vec3& size, double edge);
-  /// The inside of `surface` around its origin. `scale` is the number of units per metre, and `around` is the margin of
-  /// the grid (m). Throws std::invalid_argument with `name` if the surface does not pass check(), contains parts inside
-  /// each other, or is thinner than two cells.
+  /// The inside of `surface`. `scale` is the number of units per metre, and `around` is the margin of the grid (m).
+  /// Throws std::invalid_argument with `name` if the surface does not pass check(), contains parts inside each other,
+  /// or is thinner than two cells.
   static RigidShape mesh(const Triangles& surface, double scale, double cell, double around, std::string_view name);
 
-  /// `x` is in the tool frame. value() needs less time.
+  /// `x` is in the frame of the tool. value() is faster.
   Distance distance(const Vec3& x) const;
   double value(const Vec3& x) const;
 
   /// The distance (m) from the center to the farthest point.
   double reach() const noexcept { return reach_; }
 
-  /// A lower bound of the thickness (m). A point that moves by less than an eighth of it cannot pass through the tool.
+  /// A lower bound of the thickness (m).
   double thinnest() const noexcept { return thinnest_; }
 
   /// Returns the farthest point (m) along `direction`, a unit vector in the tool frame.

@@ -8,18 +8,18 @@
 
 namespace tendon::softbody {
 
-/// A rigid sphere with a growing frictionless contact (Signorini's conditions). With q the center, R the radius and rᵢ
-/// the tangential vector from q to node i, the sphere overlaps the body at rest by
+/// A rigid sphere without friction (Signorini's conditions). q is the center, R is the radius, and rᵢ is the tangential
+/// vector from q to node i. The overlap with the body at rest is
 ///
 ///     dᵢ = heightᵢ − q·n + √(R² − |rᵢ|²),   |rᵢ| < R
 ///
-/// The nodal forces λ minimize ½ λᵀGλ − dᵀλ with λ ≥ 0: a pushed node lies on the sphere, all others are unloaded. An
-/// active-set method (`pushes.h`) starts from the last answer's set. The force is the gradient of that energy with
-/// respect to q, so it is conservative:
+/// The forces λ ≥ 0 of the nodes minimize ½ λᵀGλ − dᵀλ, so that a pushed node is on the sphere. The active set starts
+/// with that of the last answer (`pushes.h`). The force is the derivative of this energy, so a closed path gives no
+/// energy:
 ///
 ///     force = Σ λᵢ vᵢ,   vᵢ = n − rᵢ/√(R² − |rᵢ|²),      K = V G_AA⁻¹ Vᵀ   (second derivatives of d left out)
 ///
-/// Valid while the contact is many nodes wide: with fewer than eight nodes along its radius the force changes in steps.
+/// With fewer than eight nodes along the radius of the contact, the force changes in steps.
 ///
 /// Thread-safe: no. Realtime-safe: no.
 class SphereContact {

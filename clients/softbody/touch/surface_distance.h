@@ -9,12 +9,12 @@
 
 namespace tendon::softbody {
 
-/// The exact signed distance from a closed triangle surface, negative inside. The nearest point is in a facet, on an
-/// edge or at a corner. The sign comes from the pseudonormal there: the facet normal, the mean of two facets, or the
-/// angle-weighted mean around the corner (Bærentzen & Aanæs, Signed distance computation using the angle weighted
+/// The exact signed distance from a closed surface of triangles. It is negative inside. The sign follows from the
+/// normal at the nearest point. This is the normal of a facet, the mean of two facets, or the mean of all facets at a
+/// corner weighted by their angles (Bærentzen & Aanæs, Signed distance computation using the angle weighted
 /// pseudonormal, 2005).
 ///
-/// Facets are kept in a tree of boxes; a query costs some hundred instructions per doubling of their number.
+/// The facets are in a tree of boxes. If the number of facets is doubled, a query needs some hundred instructions more.
 ///
 /// Stateless. Thread-safe: yes. Realtime-safe: yes, after construction.
 class SurfaceDistance {
