@@ -18,7 +18,7 @@ struct Answered {
 /// Returns one line of text, or an empty string if there is nothing to report.
 std::string in_words(const Answered& answered);
 
-/// Returns one line of JSON: {"answers":{"tabulated":812,"learned":97,"linear":3,"fields":5,"fields_late":1}}.
+/// Returns a line of JSON: {"answers":{"tabulated":812,"learned":97,"linear":3,"fields":5,"fields_late":1}}.
 std::string in_json(const Answered& answered);
 
 }  // namespace tendon::softbody

@@ -8,8 +8,8 @@
 
 namespace tendon::softbody {
 
-/// Runs the work once, on any thread and at any time. The work owns its data. If factors_may_work_at_once() is false,
-/// it must not run during an answer.
+/// A function that runs work once, on any thread. The work owns its data. If factors_may_work_at_once() is false, it
+/// must not run during an answer.
 using Background = std::function<void(std::packaged_task<void()>)>;
 
 /// A worker thread that runs tasks in order. It runs at nice 5, so on a single processor answers take precedence.

@@ -356,7 +356,7 @@ struct Body::Parts {
     Cutting cuts;
     BodyConfig described;
     Background background{};
-    std::future<std::unique_ptr<Parts>> next{};  ///< the body after the next cut
+    std::future<std::unique_ptr<Parts>> next{};
   };
 
   Solid solid;
@@ -421,7 +421,7 @@ void Body::Parts::cut(PlannedCut::When when, double value) {
     surface = TouchSurface(solid.mesh(), surface.normal(), surface.radius());
     patch = middle_patch(surface, cutting->described.middle);
     model.cut(division, cutting->described.effects);
-    if (when == PlannedCut::When::kForce) return;  // the force on the cut body is not known yet
+    if (when == PlannedCut::When::kForce) return;  // the force is not known yet
   }
 }
 

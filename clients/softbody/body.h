@@ -125,7 +125,6 @@ struct NearConfig {
   static constexpr double kErrorOfLearned = 0.02;  ///< default tolerance of a body that learns
 };
 
-/// A soft body and the tool that touches it, as plain values.
 struct BodyConfig {
   std::variant<BlockShape, CylinderShape, FileShape> shape;
   Element element = Element::kHex8Sri;
@@ -143,12 +142,12 @@ struct BodyConfig {
   std::vector<PlannedCut> cuts;
   std::optional<StiffnessOverTime> stiffening;
   std::optional<Yield> plasticity;
-  std::optional<double> self_collision;  ///< m, overlap at which two sides press with Young's modulus
-  double clamped_below = 0;              ///< m, height above the lowest nodes up to which nodes are fixed
+  std::optional<double> self_collision;  ///< m, overlap for a pressure of Young's modulus
+  double clamped_below = 0;              ///< m, maximum height of fixed nodes
 
   Vec3 towards_tool = Vec3::UnitZ();  ///< unit vector, body frame
   double patch_radius = 0;            ///< m
-  /// m, kCondensed: largest tangential distance of a touch from `middle`; empty: no limit
+  /// m, maximum tangential distance from `middle`, for kCondensed
   std::optional<double> reach;
   Vec3 middle = Vec3::Zero();  ///< m; only the tangential position counts
   Tool tool;
@@ -184,7 +183,7 @@ SurfaceTable condense(const BodyConfig& config, const SolverOf& solver = with_fa
 /// Throws the errors of Body, and std::runtime_error if a result cannot be stored.
 Learned learn(const BodyConfig& config, const Tell& tell);
 
-/// Mesh, model and contact of one body. Thread-safe: no. Realtime-safe: no.
+/// A body with its mesh, model and contact. Thread-safe: no. Realtime-safe: no.
 class Body {
  public:
   /// Throws std::invalid_argument if the values describe no valid body.
@@ -227,7 +226,7 @@ class Body {
   /// rad; the force on B1 is then too large by 5 to 7 %
   static constexpr double kLargestTurn = 0.1;
 
-  double step() const noexcept;  ///< s, time of one answer; 0: the body is always at rest
+  double step() const noexcept;  ///< s; 0: the body is always at rest
 
   /// The surface point at `middle`, and the unit normal towards the tool. Body frame.
   Vec3 touch_point() const;
@@ -244,8 +243,7 @@ class Body {
   /// Empty if the model is not kNear.
   std::optional<NearModel::Size> near_field() const;
   std::vector<Ladder::Step> ladder() const;
-  /// Returns the size of a body without its model. `under_patch` is the number of nodes below the patch at `middle`.
-  /// Throws the errors of the constructor.
+  /// `under_patch` is the number of nodes below the patch at `middle`. Throws the errors of the constructor.
   static Size size_of(const BodyConfig& config, int& under_patch);
 
  private:

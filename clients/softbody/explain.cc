@@ -75,7 +75,7 @@ Explanation::Cost press_and_come_back(const BodyConfig& config, const Mat3& turn
 /// Also runs and measures the work of the background thread.
 std::optional<Explanation::Beside> fields_beside(const BodyConfig& config, const Mat3& turn,
                                                  const std::function<double()>& processor_time) {
-  Body body(without(config, EffectKind::kCutting));  // a cut would use it too
+  Body body(without(config, EffectKind::kCutting));  // a cut uses the thread too
   if (!body.near_field() || body.near_field()->radius == 0 || !factors_may_work_at_once()) return std::nullopt;
   double spent = 0;
   int made = 0;
@@ -163,7 +163,7 @@ Explanation explain(const Scene& scene, const std::function<double()>& processor
                   .stiffness = body.settle(Given::kForce, push).stiffness,
                   .linear_up_to = body.linear_up_to()};
 
-  std::vector<BodyConfig> bodies{config, config};  // the difference of both is the resolution
+  std::vector<BodyConfig> bodies{config, config};
   const EffectSet simulated = effects_of(scene.body);
   const EffectSet always = info(scene.body.model).always;
   for (const EffectInfo& effect : effects()) {

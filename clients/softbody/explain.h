@@ -25,7 +25,7 @@ struct Explanation {
   struct Part {
     EffectKind kind;
     bool simulated;
-    std::optional<Cost> adds;  ///< empty if the effect cannot be left out
+    std::optional<Cost> adds;  ///< empty for necessary effects
   };
   std::vector<Part> parts;
   Cost all;

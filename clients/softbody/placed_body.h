@@ -32,7 +32,7 @@ class PlacedBody {
   Touch answer(const DeviceState& hand);
   static constexpr Duration kMostBehind = std::chrono::milliseconds(200);
 
-  /// The same for all hands of the scene, from one solution. An absent hand has an empty state and an empty answer.
+  /// Answers all hands of the scene. An absent hand has an empty state and an empty answer.
   std::vector<Touch> answer(std::span<const std::optional<DeviceState>> hands);
 
   void prepare_by(Background background) { body_.prepare_by(std::move(background)); }

@@ -119,7 +119,7 @@ std::string scene_reference() {
 
 double patch_up_to(const BodyConfig& body) {
   const bool nonlinear = info(body.model).always.has(EffectKind::kGeometricNonlinearity);
-  constexpr double kDeepest = 0.3;  // of the radius; near this depth a fixed pressure profile has its limit load
+  constexpr double kDeepest = 0.3;  // fraction of the radius, close to the limit load
   return nonlinear && std::holds_alternative<PatchTool>(body.tool) ? kDeepest * body.patch_radius
                                                                    : std::numeric_limits<double>::infinity();
 }

@@ -29,7 +29,7 @@ using namespace tendon;
 
 namespace {
 
-/// With 3 mm the self-test stays on the surface.
+/// The self-test stays on the surface.
 constexpr double kWay = 0.003;
 
 constexpr std::chrono::seconds kBetweenLines{10};

@@ -28,7 +28,7 @@ struct Division {
   int lost = 0;    ///< elements in pieces that were removed because they are not held by three nodes
 };
 
-/// `cuts` must contain all cuts that were ever made, because a later cut can open more faces of an earlier one.
+/// `cuts` must contain all cuts of this mesh, because a later cut can open more faces of an earlier one.
 Division divide(const Mesh& mesh, const Fixed& fixed, std::span<const Cut> cuts);
 
 /// For each new free displacement, returns the original one. The division must not have lost elements.
@@ -37,7 +37,7 @@ std::vector<int> twins(const Elastic& divided, const Division& division);
 struct PlannedCut {
   enum class When : std::uint8_t {
     kTime,   ///< s since the first answer
-    kForce,  ///< N along the normal, in an answer
+    kForce,  ///< N
   };
   Cut cut;
   When when;

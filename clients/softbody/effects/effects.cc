@@ -14,7 +14,7 @@ std::size_t bytes_of(const VectorXd& vector) noexcept {
 }
 
 void add_diagonal(const VectorXd& diagonal, SymmetricMatrix& to) {
-  // the diagonal is first in its column
+  // diagonal
   for (int i = 0; i < to.size; ++i) to.values[at(to.column_starts[at(i)])] += diagonal[i];
 }
 

@@ -31,7 +31,7 @@ class SelfCollision {
   /// `bed` is c in Pa/m. `elastic` must outlive this object. Throws std::invalid_argument if `bed` is not positive.
   SelfCollision(const Elastic& elastic, double bed, const VectorXd& u);
 
-  /// Updates the neighbors at u. Returns the relative change of the forces, between 0 and 2.
+  /// Returns the relative change of the forces (0 … 2).
   double look(const VectorXd& u);
 
   VectorXd free_forces(const VectorXd& u) const { return elastic_.to_free(forces(u)); }  ///< ∂energy/∂u, N
@@ -70,7 +70,7 @@ class SelfCollision {
   struct Side {
     int first_triangle;
     int triangles;
-    double size;  ///< m, square root of its area at rest
+    double size;  ///< m, root of the area at rest
     std::vector<int> nodes;
   };
   struct Triangle {

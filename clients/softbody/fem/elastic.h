@@ -44,7 +44,7 @@ class Elastic {
   VectorXd to_free(const VectorXd& all) const;
   void add_free(const VectorXd& free, VectorXd& all) const;  ///< all += free; fixed components are unchanged
 
-  /// The displacements from which a solver starts, m. Nonzero if the energy is expanded about a deformed shape.
+  /// Returns the initial displacements of a solver (m).
   virtual VectorXd beginning() const { return VectorXd::Zero(size()); }
 
   virtual double energy(const VectorXd& u) const = 0;
@@ -79,7 +79,7 @@ class Elastic {
   Elastic& operator=(const Elastic&) = default;
   Elastic& operator=(Elastic&&) = default;
 
-  /// Index of an entry in the pattern's values; −1 if it is above the diagonal or a component is fixed.
+  /// Returns −1 for an entry above the diagonal and for fixed components.
   int slot(int row_component, int column_component) const;
   std::size_t mesh_bytes() const noexcept;
 
@@ -91,10 +91,10 @@ class Elastic {
   Lazy<SymmetricMatrix> pattern_;
 };
 
-/// Returns the lumped mass (kg) of each free displacement.
+/// Returns the lumped masses (kg).
 VectorXd lumped_mass(const Elastic& elastic, double density);
 
-/// Returns the forces on all nodes for 1 N on the patch, against the normal.
+/// Returns the forces of 1 N on the patch, against the normal.
 VectorXd patch_load(const Elastic& elastic, const Vec3& normal, const Patch& patch);
 
 /// The derivative of patch_load() with respect to the patch position, N/m.

@@ -225,7 +225,7 @@ Mesh cylinder(Shape shape, double radius, double height, int across, int up) {
   Outline outline;
   for (int j = 0; j <= across; ++j) {
     for (int i = 0; i <= across; ++i) {
-      // The sides are curved, so that the angles stay above 45°.
+      // Curved sides keep the angles above 45°.
       const Eigen::Vector2d square(2.0 * i / across - 1, 2.0 * j / across - 1);
       const Eigen::Vector2d bulge(square.x() * (1 + 0.15 * (1 - square.y() * square.y())),
                                   square.y() * (1 + 0.15 * (1 - square.x() * square.x())));

@@ -24,7 +24,7 @@ struct Patch {
   std::vector<int> nodes;
   VectorXd weights;                                     ///< their sum is 1
   Eigen::Matrix<double, 2, Eigen::Dynamic> slopes;      ///< 1/m, ∂weights/∂(patch center)
-  Eigen::Matrix<double, 3, Eigen::Dynamic> curvatures;  ///< 1/m², second derivatives xx, xy, yy; empty unless requested
+  Eigen::Matrix<double, 3, Eigen::Dynamic> curvatures;  ///< 1/m², xx, xy, yy; empty unless requested
   double covered = 0;                                   ///< fraction of the patch area on the body, 0 … 1
   Vec2 middle = Vec2::Zero();                           ///< m, tangential coordinates
 };
@@ -48,7 +48,7 @@ class TouchSurface {
   /// Maps a quadratic form in tangential coordinates to three dimensions.
   Mat3 form_from_across(const Mat2& form) const { return across_.transpose() * form * across_; }
 
-  /// All nodes of the facets, ascending; and those of patches whose center is within `reach` (m) of `middle`.
+  /// The nodes of all facets, and of the patches within `reach` (m) of `middle`.
   const std::vector<int>& nodes() const noexcept { return nodes_; }
   std::vector<int> nodes_of_patches(const Vec2& middle, double reach) const;
 
@@ -64,7 +64,7 @@ class TouchSurface {
  private:
   struct Pieces {
     std::vector<int> nodes;                       ///< indices into nodes_
-    Eigen::Matrix<double, 2, Eigen::Dynamic> at;  ///< m, tangential center of each piece
+    Eigen::Matrix<double, 2, Eigen::Dynamic> at;  ///< m, centers of the pieces
     VectorXd area;                                ///< m² of each piece, projected along the normal
     MatrixXd shares;                              ///< of nodes (rows) in pieces (columns)
     Vec2 middle;

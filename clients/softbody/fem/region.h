@@ -14,12 +14,12 @@ namespace tendon::softbody {
 /// inside, so its boundary is as smooth as the mesh.
 struct Region {
   struct Ball {
-    Vec3 middle;    ///< m, in the body's frame at rest
+    Vec3 middle;    ///< m, body frame at rest
     double radius;  ///< m
   };
   struct Box {
     Vec3 middle;
-    Vec3 size;  ///< m, along the axes of the body's frame
+    Vec3 size;  ///< m
   };
   std::variant<Ball, Box> where;
   Material material;

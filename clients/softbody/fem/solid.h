@@ -23,8 +23,7 @@ class Solid : public Elastic {
   Solid(Mesh at_rest, Element element, const Material& material, Law law, const Fixed& fixed,
         std::vector<Material> of_elements = {});
 
-  /// A subset of the elements of another solid, in the same order, with the fixed displacements of their nodes. Need
-  /// not be held. `nodes` receives the node numbers in `whole`, ascending.
+  /// Returns some elements of another solid. `nodes` contains their node numbers in `whole`, in ascending order.
   static Solid part_of(const Solid& whole, const std::vector<int>& elements, std::vector<int>& nodes);
 
   Element element() const noexcept { return element_; }

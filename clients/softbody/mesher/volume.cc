@@ -266,7 +266,7 @@ Mesh in_hexahedra(const Mesh& tetrahedra, const Triangles& surface, std::vector<
   return mesh;
 }
 
-/// Moves nodes towards `places` as far as their elements stay good.
+/// The elements must stay well shaped.
 void bring_closer(Mesh& mesh, const std::vector<Vec3>& places) {
   constexpr double kGoodElement = 2 * kPoorElement;
   constexpr int kHalvings = 6;

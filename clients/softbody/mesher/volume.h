@@ -15,7 +15,7 @@ namespace tendon::softbody {
 
 /// All lengths are in the unit of the surface file.
 struct VolumeConfig {
-  double size = 0;                ///< edge of an element at the touched place
+  double size = 0;                ///< of elements at the touched place
   double coarsest = 3;            ///< ratio between the largest edge and `size`
   std::optional<Vec3> touched{};  ///< center of the touched place; if empty, all elements are small
   double reach = 0;               ///< radius of the touched place
@@ -56,7 +56,7 @@ struct MeshReport {
 };
 MeshReport report_on(const Mesh& mesh, const Triangles& surface);
 
-/// Elements below this value are inaccurate in every mesh.
+/// The minimum quality of an accurate element.
 inline constexpr double kPoorElement = 0.1;
 
 }  // namespace tendon::softbody

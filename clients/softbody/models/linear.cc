@@ -10,7 +10,7 @@
 namespace tendon::softbody {
 namespace {
 
-/// The glide is used again if W has changed by less than this. Its relative error is the square.
+/// The relative change of W for which the glide is used again.
 constexpr double kSlopesAlike = 0.1;
 
 /// Steeper surfaces are outside the range of linear elasticity.

@@ -61,10 +61,10 @@ struct Reaction {
 /// depth per force (m/N).
 double constrained_force(Given given, double value, double untouched, double compliance);
 
-/// Returns Reaction::stiffness of a body with time. `rest` is its depth (m) at rest.
+/// `rest` is the depth (m) at rest.
 double secant(const Reaction& reaction, double rest);
 
-/// A body that can be pressed.
+/// The interface of all models.
 ///
 /// Thread-safe: no. Realtime-safe: no.
 class Model {

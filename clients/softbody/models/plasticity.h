@@ -36,7 +36,6 @@ class PlasticSolid : public Solid {
   /// Throws std::invalid_argument if the law is neither linear nor corotational, and the errors of check().
   PlasticSolid(const Solid& solid, const Yield& yield);
 
-  /// Returns the energy of the step since the last advance().
   double energy(const VectorXd& u) const override { return forces(u).energy; }
   Forces forces(const VectorXd& u) const override;
   void stiffness(const VectorXd& u, Curvature curvature, SymmetricMatrix& to) const override;

@@ -33,7 +33,7 @@ constexpr int kTangentRounds = 5;
 /// If the relative error of the force is larger, the body is not at rest, and there is no glide.
 constexpr double kAtRest = 0.1;
 
-/// The glide is used again if the load and the force have changed by less than this.
+/// The relative change of the load and the force for which the glide is used again.
 constexpr double kGlidesAlike = 0.04;
 
 /// The step (m) of finite differences. In a body of some mm its relative error is 1e-4.
@@ -273,7 +273,7 @@ double QuasiStaticModel::newton(const VectorXd& load, const Patch* patch, Given 
                                 Reaction& reaction) {
   double error = std::numeric_limits<double>::infinity();
   double before = std::numeric_limits<double>::infinity();
-  bool exact = false;  // the factor is that of the present shape
+  bool exact = false;
   bool among_sides = false;
   Step step;
   Elastic::Forces now = known_ ? std::move(known_->forces) : forces();
@@ -329,7 +329,7 @@ double QuasiStaticModel::newton(const VectorXd& load, const Patch* patch, Given 
   if (step_ == 0 && patch != nullptr)
     find_tangent(load, at_rest ? patch : nullptr, {step.by_tool, now, among_sides}, reaction);
   if (patch != nullptr) {
-    // Includes the last step, which is not taken. Otherwise a tangential force would not change with small motions.
+    // Without the last step, the tangential force would not change with small motions.
     VectorXd there = u_;
     if (at_rest) elastic_.add_free(step.by_itself + reaction.force * step.by_tool, there);
     reaction.depth = depth_below(*patch, normal_, there);

@@ -82,9 +82,8 @@ class QuasiStaticModel : public Model {
   Step step_among_sides(const VectorXd& internal, const VectorXd& load) const;
   VectorXd solve(const VectorXd& b, bool among_sides) const;
   VectorXd solve_at_depth(const VectorXd& b, bool among_sides, const VectorXd& load, const VectorXd& by_tool) const;
-  /// Searches along `step` for a lower energy. Returns false if there is none. `now` is updated to the new shape.
+  /// The line search. Returns false if the energy does not decrease. `now` is updated to the new shape.
   bool go(const VectorXd& step, const VectorXd& load, double force, double slope, Elastic::Forces& now);
-  /// Returns the stiffness times `shape` (N).
   VectorXd needed(const VectorXd& shape, const Elastic::Forces& now);
   struct Tangent;
   void find_shapes(const VectorXd& load, const MatrixXd& slopes, const Tangent& tangent);
@@ -112,8 +111,8 @@ class QuasiStaticModel : public Model {
     Mat2 giving;
   };
   std::optional<Glided> glided_;
-  VectorXd rest_;  ///< m, all nodes; empty for a body without time
-  /// The last forces, and K₀⁻¹ times these forces.
+  VectorXd rest_;  ///< m; empty for a body without time
+  /// The forces at the end of the last answer.
   struct Known {
     Elastic::Forces forces;
     VectorXd solved;
@@ -121,8 +120,8 @@ class QuasiStaticModel : public Model {
   std::optional<Known> known_;
   int iterations_ = 0;
   int factors_ = 0;
-  int in_vain_ = 0;    ///< iterations without an accurate answer
-  bool stale_ = true;  ///< the factor must be computed again
+  int in_vain_ = 0;  ///< iterations without an accurate answer
+  bool stale_ = true;
 };
 
 }  // namespace tendon::softbody

@@ -9,10 +9,10 @@
 
 namespace tendon::softbody {
 
-/// The surface compliance of a linear body, stored in a file. Computing it takes the time and memory of a factor of the
-/// whole body; an answer from it takes microseconds for any mesh (CondensedModel).
+/// The surface compliance of a linear body. It needs a factor of the whole body once, and an answer then needs some
+/// microseconds (CondensedModel).
 ///
-/// File format, little-endian; the first column is the length in bytes:
+/// The format of the file is little-endian. The first column is the number of bytes:
 ///
 ///     8   "TENDONST"
 ///     4   version, 1                                4   m, the number of nodes

@@ -11,7 +11,7 @@ namespace {
 
 constexpr double kSame = 1e-6;  // relative
 
-/// `free` contains the number of each free node, or −1.
+/// `free` is −1 for fixed nodes.
 struct Grid {
   std::array<int, 3> count{};
   std::vector<int> free;

@@ -388,7 +388,7 @@ class SpreadSolver : public Solver {
   Vector solution_;
   Vector residual_;
   double least_ = 0;               ///< λ
-  mutable double compliance_ = 0;  ///< of the last solution, m/N
+  mutable double compliance_ = 0;  ///< m/N
 };
 
 }  // namespace

@@ -29,14 +29,16 @@ struct LearnConfig {
   std::filesystem::path folder{};
 };
 
-/// Computes the data, or reads stored results. Never overwrites a file: a damaged one is reported in a warning, and its
-/// contents are recomputed.
+/// Reads stored results, or computes them. An existing file is never overwritten. If a file is damaged, the result
+/// contains a warning, and the data are computed again.
 ///
-/// File format, little-endian; the first column is the length in bytes:
+/// The format is little-endian. The first column is the number of bytes:
 ///
 ///     8   "TENDONSH" or "TENDONAN"                  4   version, 3; then 4 zeros
-///     8   digest of all that it was made of         n   the fields of LearnedShapes or TabulatedAnswers but the grid, in
-///                                                       their order: numbers of 8, each list and matrix behind its size
+///     8   digest of the input                       n   the fields of LearnedShapes or TabulatedAnswers without the
+///     grid,
+///                                                       in order: numbers of 8 bytes, lists and matrices after their
+///                                                       size
 ///     8   XXH3 (64 bits) of everything before
 ///
 /// Throws the errors of solve_presses(), and std::runtime_error if a file cannot be written.

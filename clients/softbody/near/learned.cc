@@ -42,7 +42,7 @@ constexpr double kShareOfDecrease = 1e-4;
 /// The minimum cosine between a step and its change of forces.
 constexpr double kLeastCurved = 1e-8;
 
-/// The part of the tolerance that Newton's method may use.
+/// The fraction of the tolerance for Newton's method.
 constexpr double kForNewton = 0.25;
 
 /// Relative tolerances for knots and for validation. The error of the force is quadratic.
@@ -237,7 +237,7 @@ bool stable_at_held_depth(const MatrixXd& curvature, const VectorXd& load) {
   return parts.eigenvalues()[0] > 0;
 }
 
-/// Searches along `step` for a lower energy. `slope` is updated.
+/// The line search of Newton's method. `slope` is updated.
 bool go(const LearnedBody& body, const VectorXd& step, double& energy, VectorXd& q, VectorXd& slope) {
   const double foreseen = slope.dot(step);
   VectorXd there_slope(q.size());

@@ -247,7 +247,7 @@ Elastic::Forces NearBody::forces(const VectorXd& u) const {
 void NearBody::stiffness(const VectorXd& u, Curvature curvature, SymmetricMatrix& to) const {
   SymmetricMatrix near = part_.pattern();
   part_.stiffness(placed(u), curvature, near);
-  // For each free component: the index on Γ or −1, and the free number in this body.
+  // The index of each free component on Γ, and its free number in this body.
   std::vector<int> on_rim(at(part_.free_count()), -1);
   for (std::size_t i = 0; i < rim_.size(); ++i) on_rim[at(part_.free_of(rim_[i]))] = static_cast<int>(i);
   std::vector<int> own(at(part_.free_count()), -1);

@@ -34,8 +34,8 @@ class NearBody : public Elastic {
     /// The maximum number of modes. If Γ does not have more unknowns than this, the interface is exact.
     int modes = 60;
     std::vector<int> pressed;  ///< touchable nodes
-    VectorXd press;            ///< N, free components: the load of a tool at `middle`
-    VectorXd about{};          ///< u*, m, all nodes; empty: at rest
+    VectorXd press;            ///< N: the load of a tool at `middle`
+    VectorXd about{};          ///< u*, m; empty: at rest
     double about_depth = 0;    ///< m, depth of the tool in u*
   };
 
@@ -86,7 +86,6 @@ class NearBody : public Elastic {
     VectorXd forces;  ///< N, free
     SymmetricMatrix stiffness;
   };
-  /// The far elements that left_out() evaluates.
   struct Watched {
     Solid part;
     Linear linear{};

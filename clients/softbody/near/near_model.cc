@@ -31,7 +31,7 @@ constexpr double kFadesOver = 0.25;
 constexpr double kWaits = 1.7;
 constexpr double kPiecesOnTheWay = 30;
 
-/// A field is complete when this value of `room` is left.
+/// The value of `room` at which a field must be complete.
 constexpr double kRoomLeft = 0.3;
 
 /// Iterations for each piece, pieces that press the new field, and the piece that computes the factor.
@@ -135,7 +135,7 @@ struct NearModel::Field {
     }
     const Patch here = own(patch);
     Reaction reaction = model->press(here, given, value);
-    if (reaction.error > std::abs(reaction.force)) {  // no solution from the last shape
+    if (reaction.error > std::abs(reaction.force)) {  // the solution is lost
       model->set_displacements(body->beginning());
       reaction = model->press(here, given, value);
     }

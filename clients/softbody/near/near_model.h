@@ -66,12 +66,12 @@ class NearModel : public Model {
   /// Builds the near field of `first`. `solid` and `surface` must outlive this object. Throws the errors of
   /// QuasiStaticModel.
   NearModel(const Solid& solid, const TouchSurface& surface, const Patch& first, const Config& config);
-  /// All near fields are built by `background`.
+  /// Builds all near fields in `background`.
   NearModel(const Solid& solid, const TouchSurface& surface, const Config& config, Background background);
   ~NearModel() override;
 
-  /// From now on, fields are built by `background`, one at a time. The work owns a copy of the body. If it throws, the
-  /// next press() rethrows the exception.
+  /// Builds the next fields in `background`, one at a time. The work owns a copy of the body. If it throws, the next
+  /// press() rethrows the exception.
   void make_fields_by(Background background);
   /// Must be called before the body is cut.
   void make_no_more_fields();
@@ -90,7 +90,7 @@ class NearModel : public Model {
 
   /// The present near field, and counters since construction.
   struct Size {
-    double radius = 0;  ///< ρ, m, or 0 if the whole body is near
+    double radius = 0;  ///< ρ, m; 0 without a far field
     std::size_t elements = 0;
     int interface = 0;  ///< unknowns on the boundary
     int modes = 0;      ///< number of modes that replace them

@@ -337,7 +337,7 @@ Trust::Allowed::Allowed(const Trust& trust, double tolerance)
   const int last = 2 * grid_.around;
   for (int i = 0; i <= last; ++i) {
     for (int j = 0; j <= last; ++j) {
-      // Nothing is known at the edge and below the last depth.
+      // The edge and the last depth have no neighbors.
       const bool rim = i == 0 || j == 0 || i == last || j == last;
       for (int level = 0; level <= PressGrid::kLevels; ++level) {
         if (rim || level == PressGrid::kLevels) at_knots_[at(grid_.knot(i, j, level))] = false;

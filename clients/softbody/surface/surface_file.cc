@@ -34,7 +34,7 @@ class SurfaceWords {
     return words_;
   }
 
-  /// Joins lines that end with a backslash.
+  /// A backslash at the end joins two lines.
   const std::vector<std::string_view>& next_continued() {
     do {
       next();

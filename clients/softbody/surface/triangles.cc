@@ -247,7 +247,6 @@ void check_cuts(const Triangles& surface, std::string_view name) {
     mean += ((t[1] - t[0]).norm() + (t[2] - t[1]).norm() + (t[0] - t[2]).norm()) / 3 /
             static_cast<double>(surface.facets.size());
   }
-  // The cells are about as large as a facet.
   const double size = std::max(2 * mean, longest / 200);
   std::unordered_map<Cell, std::vector<std::size_t>, HashOfCell> cells;
   const auto each_cell = [&](const std::array<Vec3, 3>& t, auto visit) {

@@ -104,7 +104,7 @@ std::vector<CapsuleContact::Node> CapsuleContact::near(const Capsule& tool, doub
       continue;
     }
     Plane plane = tool.nearest(x, -n);
-    // The exit is below, because the tool came from there.
+    // The tool came from below.
     if (inside && plane.normal.dot(n) > -0.5) plane = tool.nearest(x + heights[k] * n, -n);
     all.push_back({row, x, x, plane});
   }

@@ -78,7 +78,7 @@ Feel PatchContact::at(const Vec3& tool) {
   }
   feel.error = reaction.error;
   feel.way = reaction.way;
-  feel.valid_radius = surface_.radius() / 4;  // then the patch has other nodes
+  feel.valid_radius = surface_.radius() / 4;  // the patch has the same nodes
   if (friction_) rub(place, reaction.force, feel);
   return feel;
 }

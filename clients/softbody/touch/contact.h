@@ -19,14 +19,13 @@ struct Pose {
 };
 
 struct FeltTorque {
-  Vec3 torque = Vec3::Zero();     ///< N·m, about the handle's position
+  Vec3 torque = Vec3::Zero();     ///< N·m
   Mat3 stiffness = Mat3::Zero();  ///< N·m/rad, −∂torque/∂θ, positive semidefinite
 };
 
 /// Returns the nearest positive semidefinite matrix.
 Mat3 not_negative(const Mat3& stiffness);
 
-/// The answer to one position of the tool.
 struct Feel {
   Vec3 force = Vec3::Zero();  ///< N, on the hand
   /// N/m, −∂force/∂position. It is symmetric and can be indefinite.
@@ -39,7 +38,7 @@ struct Feel {
   Way way = Way::kOnly;
   bool touching = false;
   std::optional<Vec3> normal{};        ///< unit vector; empty: the scene's direction to the tool
-  bool topology_changed = false;       ///< true for the first answer after a cut
+  bool topology_changed = false;       ///< true after a cut
   std::optional<FeltTorque> torque{};  ///< empty if the force cannot turn the handle
 };
 

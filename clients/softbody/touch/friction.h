@@ -27,7 +27,7 @@ class Friction {
 
   struct Drag {
     Vec2 force = Vec2::Zero();  ///< N, on the tool, tangential
-    double stiffness = 0;       ///< N/m, −∂force/∂place; 0 while sliding
+    double stiffness = 0;       ///< N/m, −∂force/∂place
     double until_slip = 0;      ///< m, distance until the tool slides
   };
   /// Moves the tool to `place` (m). If `normal_force` (N) is not positive, the anchor is released.

@@ -65,7 +65,6 @@ class Layer {
     std::optional<Pose> handle;
   };
 
-  /// The facets near the tools, and their nodes.
   struct Near {
     struct Site {
       std::size_t tool;
@@ -127,7 +126,7 @@ class Layer {
  private:
   struct FacetOfPoints {
     std::vector<int> nodes;
-    double size;   ///< m, root of the area at rest
+    double size;   ///< m, root of the area
     double reach;  ///< m, from the center to the farthest node at rest
     std::size_t first;
     std::size_t count;

@@ -25,9 +25,8 @@ constexpr double kToolDecrease = 1e-4;
 constexpr double kToolShortest = 1.0 / 64;
 constexpr double kContactRounding = 1e-13;
 
-/// Steps without an accurate answer until the factor is computed again.
+/// The number of steps until a new factor.
 constexpr int kToolPatience = 16;
-/// For the unknowns near the tools.
 constexpr int kMostMeets = 60;
 /// The remaining energy there, relative to that of an answer.
 constexpr double kMet = 1e-3;
@@ -70,11 +69,11 @@ struct RigidContact::Local {
   VectorXd solved;      ///< K₀⁻¹ times the forces
   Layer::Near near;
   std::vector<int> unknowns;  ///< free numbers
-  std::vector<int> rows;      ///< of these in three rows for each node
+  std::vector<int> rows;      ///< rows of these unknowns
   Eigen::Matrix3Xd places;    ///< m
-  MatrixXd stiffness;         ///< R, N/m, of the body
+  MatrixXd stiffness;         ///< R, N/m
   Layer::Press press;
-  MatrixXd curve;             ///< A, N/m, of the layer
+  MatrixXd curve;             ///< A, N/m
   Eigen::LLT<MatrixXd> held;  ///< of R + A
   MatrixXd curve_held;        ///< A in this factor, with a shift if it is needed
 
@@ -129,7 +128,7 @@ void RigidContact::renew(Local& local) {
   in_vain_ = 0;
 }
 
-/// Finds the near facets and the compliance of their nodes, with one solve for each new unknown.
+/// Updates the facets near the tools and the compliance of their nodes.
 void RigidContact::look(Local& local) {
   if (factors_ != body_.factors()) {
     factors_ = body_.factors();

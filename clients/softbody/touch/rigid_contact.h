@@ -85,7 +85,7 @@ class RigidContact {
   std::vector<Layer::Placed> placed_;
   Pairs pairs_;
   int factors_ = 0;             ///< value of QuasiStaticModel::factors() for the columns below
-  std::vector<int> column_of_;  ///< by free unknown; −1 if there is none
+  std::vector<int> column_of_;  ///< −1 if there is no column
   MatrixXd follows_;            ///< K₀⁻¹ of unit forces
   int columns_ = 0;
   int iterations_ = 0;

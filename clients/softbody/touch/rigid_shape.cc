@@ -16,7 +16,7 @@
 namespace tendon::softbody {
 namespace {
 
-/// In cells: the minimum thickness, and the maximum that is measured.
+/// The minimum thickness, and the maximum that is measured, in cells.
 constexpr int kThinnestInCells = 2;
 constexpr int kThickInCells = 6;
 
