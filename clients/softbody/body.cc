@@ -53,7 +53,6 @@ bool wants_glide(const BodyConfig& config, const TouchSurface& surface) {
   return config.whole_stiffness || surface.curved();
 }
 
-/// The model, with pointers to the types that need more than Model.
 struct Made {
   std::unique_ptr<Model> model;
   std::optional<double> linear_up_to{};  ///< m, if a table file provides it
@@ -350,7 +349,6 @@ struct Body::Parts {
   void go_on_from(Parts& before);
   void note(Feel& feel);
 
-  /// The remaining cuts.
   struct Planned {
     Planned(const BodyConfig& config, const Mesh& mesh, const Fixed& fixed, const TouchSurface& surface);
     Cutting cuts;
@@ -364,7 +362,7 @@ struct Body::Parts {
   Made made;
   Model& model;
   PatchContact contact;
-  std::optional<SphereContact> sphere;  ///< instead of `contact`
+  std::optional<SphereContact> sphere;
   std::optional<CapsuleContact> capsule;
   std::optional<RigidContact> rigid;
   std::vector<std::optional<Pose>> hands;

@@ -75,7 +75,7 @@ enum class ModelKind : std::uint8_t { kLinear, kCondensed, kCorotational, kNeoHo
 
 struct ModelInfo {
   ModelKind kind;
-  Law law;  ///< default for kNear: NearConfig::law
+  Law law;
   std::string_view name;
   std::string_view what;
   EffectSet always;
@@ -99,8 +99,8 @@ struct BlockShape {
 struct CylinderShape {
   double radius;  ///< m
   double height;  ///< m
-  int across;     ///< cells across its core
-  int up;         ///< cells along its axis
+  int across;
+  int up;
 };
 struct FileShape {
   std::filesystem::path file;
@@ -108,7 +108,7 @@ struct FileShape {
   bool slits = false;  ///< keep coincident nodes unmerged; see joined()
 };
 struct NearConfig {
-  Law law = Law::kCorotational;  ///< not kLinear
+  Law law = Law::kCorotational;
   /// Uses all unknowns of the interface instead of modes. This is slow.
   bool exact_interface = false;
   /// Precompute shapes (`learn`) or an energy table (`tabulate`) for presses within BodyConfig::reach of `middle` along
@@ -117,12 +117,12 @@ struct NearConfig {
   bool learn = false;
   bool tabulate = false;
   std::filesystem::path learned_in{};  ///< folder for precomputed results; empty: not stored
-  std::optional<Learned> learned{};    ///< result of learn() for the uncut body; empty: Body computes it
+  std::optional<Learned> learned{};    ///< empty: computed by Body
 
   bool learns() const noexcept { return learn || tabulate; }
 
   static constexpr double kFarthest = 1.5;
-  static constexpr double kErrorOfLearned = 0.02;  ///< default tolerance of a body that learns
+  static constexpr double kErrorOfLearned = 0.02;
 };
 
 struct BodyConfig {

@@ -19,7 +19,7 @@ namespace tendon::softbody {
 /// scene without the effect, and can be negative.
 struct Explanation {
   struct Cost {
-    double answer_s = 0;  ///< of processor time
+    double answer_s = 0;
     std::int64_t bytes = 0;
   };
   struct Part {
@@ -34,20 +34,20 @@ struct Explanation {
   std::optional<NearModel::Size> near;
   struct Tool {
     RigidShape::MeshFacts facts;
-    double made_s;  ///< processor time at each start
+    double made_s;
   };
   std::optional<Tool> tool;
-  std::optional<double> off_exact;  ///< off_the_exact_interface()
+  std::optional<double> off_exact;
   /// The background thread. Empty if it makes no fields.
   struct Beside {
-    double field_s = 0;  ///< processor time of a field
+    double field_s = 0;
     std::size_t bytes = 0;
   };
   std::optional<Beside> beside;
   /// The cost of an answer for each rung of the Ladder.
   struct Learned {
     Rung::Size size;
-    double answer_s = 0;  ///< processor time
+    double answer_s = 0;
   };
   std::vector<Learned> learned;
   double near_answer_s = 0;

@@ -53,14 +53,14 @@ class PlacedBody {
   struct Followed {
     PeerTime sampled;
     Pose handle;
-    Duration owed;  ///< time of the next step
+    Duration owed;  ///< time that is not yet simulated, less than a step
     Feel feel;
   };
 
   Body body_;
   Mat3 to_device_;
-  Vec3 origin_;                ///< in the device frame
-  std::vector<Vec3> origins_;  ///< for several hands
+  Vec3 origin_;  ///< in the device frame
+  std::vector<Vec3> origins_;
   Vec3 normal_;
   bool only_pushes_;
   bool turns_;

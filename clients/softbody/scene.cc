@@ -21,7 +21,7 @@ namespace {
 
 /// The TOML parser is recursive, so the file must be small.
 constexpr std::uintmax_t kMaxSceneBytes = 16'384;
-constexpr double kMaxLength = 1e3;  // m
+constexpr double kMaxLength = 1e3;  // m; larger values are in a wrong unit
 constexpr std::int64_t kMaxCells = 200;
 constexpr double kMaxError = 10;  // %; larger errors can be felt
 

@@ -29,7 +29,6 @@ constexpr double kBeside = 0.15;
 constexpr int kMostRounds = 2000;
 constexpr double kSettled = 1e-8;
 
-/// A query for the tree of boxes of Eigen.
 template <class Visit>
 struct Around {
   const Vec3& place;

@@ -34,7 +34,7 @@ class SelfCollision {
   /// Returns the relative change of the forces (0 … 2).
   double look(const VectorXd& u);
 
-  VectorXd free_forces(const VectorXd& u) const { return elastic_.to_free(forces(u)); }  ///< ∂energy/∂u, N
+  VectorXd free_forces(const VectorXd& u) const { return elastic_.to_free(forces(u)); }
   /// Adds the energy and the free forces of the bed to `to`.
   void add_forces(const VectorXd& u, Elastic::Forces& to) const;
 

@@ -42,7 +42,7 @@ class Elastic {
   int free_of(int component) const noexcept { return free_of_[at(component)]; }
   Fixed fixed() const;
   VectorXd to_free(const VectorXd& all) const;
-  void add_free(const VectorXd& free, VectorXd& all) const;  ///< all += free; fixed components are unchanged
+  void add_free(const VectorXd& free, VectorXd& all) const;  ///< all += free
 
   /// Returns the initial displacements of a solver (m).
   virtual VectorXd beginning() const { return VectorXd::Zero(size()); }

@@ -53,8 +53,8 @@ std::vector<std::vector<int>> corners_around(Shape shape) {
 
 /// The corners are numbers of places, which coincident nodes share.
 struct PlacedFace {
-  std::array<int, 4> around;   ///< counterclockwise from the lowest; −1 if unused
-  std::array<int, 4> corners;  ///< ascending
+  std::array<int, 4> around;  ///< counterclockwise from the lowest; −1 if unused
+  std::array<int, 4> corners;
   Facet facet;
 };
 
@@ -230,7 +230,7 @@ void expect_held(const FileMesh& file, const Fixed& fixed, std::string_view name
   std::vector<bool> held(mesh.nodes.size());
   for (std::size_t i = 0; i < held.size(); ++i) held[i] = fixed[3 * i] && fixed[3 * i + 1] && fixed[3 * i + 2];
   std::vector<bool> fast(parts.size());
-  for (bool changed = true; changed;) {  // at least one part in each pass
+  for (bool changed = true; changed;) {  // each pass adds a part
     changed = false;
     for (std::size_t p = 0; p < parts.size(); ++p) {
       if (fast[p]) continue;

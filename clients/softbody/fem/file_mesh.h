@@ -14,9 +14,9 @@ namespace tendon::softbody {
 /// A mesh read from a file. Messages use the element numbers of the file.
 struct FileMesh {
   Mesh mesh;
-  std::vector<std::int64_t> numbers{};  ///< file numbers of the elements
-  std::vector<int> parts{};             ///< part of each element
-  std::vector<std::string> notes{};     ///< repairs and warnings
+  std::vector<std::int64_t> numbers{};
+  std::vector<int> parts{};
+  std::vector<std::string> notes{};
 };
 
 /// Joins the elements of a file into one body. Each repair is added to `notes`.

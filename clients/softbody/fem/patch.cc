@@ -15,7 +15,7 @@
 namespace tendon::softbody {
 namespace {
 
-constexpr double kLeastFacing = 0.2588;  // cos 75°
+constexpr double kLeastFacing = 0.2588;  // cos 75°; steeper facets have almost no projected area
 
 /// Relative to the patch radius. If the patch moves over a facet, the compliance of block B1 changes by 1e-5; with 0.2,
 /// it changes by 2e-4.
@@ -211,7 +211,6 @@ std::optional<Patch> TouchSurface::patch_around(const Vec2& middle, double least
     const Vec2 all = total.template segment<2>(1);
     patch.slopes.col(i) = (sums[node].template segment<2>(1) - patch.weights[i] * all) / total[0];
     if constexpr (kCurved) {
-      // Second derivative of a quotient.
       const Vec2 slope = patch.slopes.col(i);
       patch.curvatures.col(i) =
           (sums[node].template tail<3>() - patch.weights[i] * total.template tail<3>() -

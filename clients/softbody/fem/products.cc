@@ -15,7 +15,6 @@ namespace {
 
 using kernel::lanes_at;
 
-/// Columns that are processed together.
 constexpr std::ptrdiff_t kColumns = 4;
 
 struct Tall {

@@ -41,7 +41,7 @@ std::string to_gmsh(const Mesh& mesh);
 struct MeshReport {
   int nodes = 0;
   int elements = 0;
-  double volume = 0;        ///< cubic units of the file
+  double volume = 0;
   double volume_error = 0;  ///< relative to the volume of the surface
   /// Scaled Jacobian of an element: the minimum over its corners of the volume spanned by the three edges over the
   /// product of their lengths (times √2 for a tetrahedron). 1 for a cube and a regular tetrahedron, 0 for a flat

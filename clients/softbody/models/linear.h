@@ -130,10 +130,10 @@ class CondensedModel : public Model {
   Mat2 giving(const Patch& patch) const;
 
   std::vector<int> nodes_;
-  std::vector<int> row_of_;  ///< by node
+  std::vector<int> row_of_;
   MatrixXd table_;
   bool glides_;
-  std::vector<int> rows_;  ///< table rows of the current patch
+  std::vector<int> rows_;
 };
 
 }  // namespace tendon::softbody

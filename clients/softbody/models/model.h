@@ -23,12 +23,12 @@ enum class Given : std::uint8_t {
 
 /// How a kNear body has answered. The server receives these values and kWayNames.
 enum class Way : std::uint8_t {
-  kOnly = 0,   ///< the model has only one way
-  kTabulated,  ///< energy table
-  kLearned,    ///< learned shapes
-  kNear,       ///< near field
-  kWhole,      ///< near field that covers the whole body
-  kLinear,     ///< linear body, if there is no near field
+  kOnly = 0,
+  kTabulated,
+  kLearned,
+  kNear,
+  kWhole,   ///< near field that covers the whole body
+  kLinear,  ///< linear body, if there is no near field
 };
 
 inline constexpr std::array<std::string_view, 5> kWayNames = {"tabulated", "learned", "near", "whole", "linear"};

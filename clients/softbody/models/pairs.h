@@ -37,11 +37,11 @@ class Pairs {
  private:
   using Small = Eigen::Matrix<double, kMost, kMost>;
   std::vector<int> order_;  ///< oldest first
-  MatrixXd steps_;          ///< one column for each pair
+  MatrixXd steps_;
   MatrixXd changes_;
   MatrixXd solved_;
-  Small steps_changes_;   ///< stepsᵀ changes
-  Small changes_solved_;  ///< changesᵀ K₀⁻¹ changes
+  Small steps_changes_;
+  Small changes_solved_;
 };
 
 }  // namespace tendon::softbody

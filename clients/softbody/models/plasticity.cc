@@ -50,7 +50,7 @@ void check(const Yield& yield) {
 }
 
 struct PlasticSolid::Flow {
-  Mat3 plastic;       ///< p
+  Mat3 plastic;
   double lost = 0;    ///< J/m³
   Mat3 way;           ///< direction of p − p₀
   double onward = 0;  ///< ∂p/∂ε along and across `way`

@@ -22,11 +22,11 @@ namespace tendon::softbody {
 class QuasiStaticModel : public Model {
  public:
   struct Config {
-    int max_iterations = 30;  ///< for each answer
+    int max_iterations = 30;
     /// The relative error of the force at which an answer is complete.
     double tolerance = 1e-6;
     std::optional<double> self_collision = {};  ///< Pa/m, c of SelfCollision
-    bool glides = true;                         ///< compute Reaction::glide at rest
+    bool glides = true;
     /// The accepted relative uncertainty of the stiffness. The error is usually the square of it.
     double tangent = 0.02;
   };
@@ -43,7 +43,7 @@ class QuasiStaticModel : public Model {
   std::size_t bytes() const noexcept override;
 
   int iterations() const noexcept { return iterations_; }  ///< in the last answer
-  int factors() const noexcept { return factors_; }        ///< since construction
+  int factors() const noexcept { return factors_; }
   const VectorXd& displacements() const noexcept { return u_; }
   const SelfCollision* self_collision() const noexcept { return self_collision_.get(); }
   void set_max_iterations(int count) { config_.max_iterations = count; }
@@ -65,7 +65,7 @@ class QuasiStaticModel : public Model {
   /// the factor is then that of a modified stiffness.
   const Factor& factor() const noexcept { return factor_; }
   bool renew_factor() {
-    forget_forces();  // includes results of the old factor
+    forget_forces();
     return factorize();
   }
   void move(const VectorXd& free);  ///< m, free displacements

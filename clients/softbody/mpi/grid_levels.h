@@ -15,11 +15,11 @@ namespace tendon::softbody {
 /// fixed.
 struct GridLevel {
   struct Weight {
-    int node;  ///< free coarse node
+    int node;
     double value;
   };
-  std::vector<std::vector<Weight>> rows;  ///< for each free fine node
-  int nodes = 0;                          ///< free coarse nodes
+  std::vector<std::vector<Weight>> rows;
+  int nodes = 0;  ///< free coarse nodes
 };
 
 /// Returns the levels from fine to coarse. A level is the last one if an axis has an odd number of cells, or if fewer

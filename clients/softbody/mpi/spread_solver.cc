@@ -258,7 +258,6 @@ class SpreadSolver : public Solver {
     check(MatSetNearNullSpace(matrix_, motions));
   }
 
-  /// Computes λ.
   void know_the_spectrum() {
     VectorXd load(size_);  // the same pseudorandom numbers on every rank
     std::uint64_t state = 1;
@@ -387,7 +386,7 @@ class SpreadSolver : public Solver {
   Vector load_;
   Vector solution_;
   Vector residual_;
-  double least_ = 0;               ///< λ
+  double least_ = 0;
   mutable double compliance_ = 0;  ///< m/N
 };
 

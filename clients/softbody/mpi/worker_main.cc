@@ -51,7 +51,6 @@ struct Arguments {
   bool json = false;
 };
 
-/// Prints the progress.
 class Told : public Solver {
  public:
   Told(const Solid& solid, Method method) : solver_(on_ranks(solid, method)) {}
@@ -170,7 +169,7 @@ int main(int argc, char** argv) {
   } catch (const CLI::ParseError& error) {
     return tendon::usage::exit_code(app, error);
   }
-  int none = 1;  // options come from the environment
+  int none = 1;  // PETSc reads its options from the environment
   try {
     const Ranks ranks(none, argv);
     try {

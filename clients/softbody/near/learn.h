@@ -16,7 +16,7 @@ namespace tendon::softbody {
 struct Learned {
   std::optional<LearnedShapes> shapes{};
   std::optional<TabulatedAnswers> answers{};
-  std::vector<std::string> warnings{};  ///< about damaged files
+  std::vector<std::string> warnings{};
 };
 
 struct LearnConfig {
@@ -35,10 +35,9 @@ struct LearnConfig {
 /// The format is little-endian. The first column is the number of bytes:
 ///
 ///     8   "TENDONSH" or "TENDONAN"                  4   version, 3; then 4 zeros
-///     8   digest of the input                       n   the fields of LearnedShapes or TabulatedAnswers without the
-///     grid,
-///                                                       in order: numbers of 8 bytes, lists and matrices after their
-///                                                       size
+///     8   digest of the input
+///     n   the fields of LearnedShapes or TabulatedAnswers without the grid, in order: numbers of 8 bytes, and lists and
+///         matrices after their size
 ///     8   XXH3 (64 bits) of everything before
 ///
 /// Throws the errors of solve_presses(), and std::runtime_error if a file cannot be written.

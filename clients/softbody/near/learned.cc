@@ -100,7 +100,7 @@ MatrixXd rows_of(const Solid& solid, const MatrixXd& free, const std::vector<int
 /// Shapes that are orthonormal with the stiffness at rest.
 struct Basis {
   MatrixXd shapes;
-  MatrixXd q;  ///< one column for each press
+  MatrixXd q;
 };
 
 Basis basis_of(const std::vector<const SolvedPress*>& presses, const SymmetricMatrix& at_rest, int most) {
@@ -142,7 +142,6 @@ class Added {
     per_element_ = nodes_of(solid.mesh().shape);
   }
 
-  /// Returns a column for each element.
   MatrixXd at_press(Eigen::Index s) const {
     const VectorXd u = rows_.transpose() * basis_.q.col(s);
     const auto size = 3 * static_cast<Eigen::Index>(corners_->own.size());

@@ -25,7 +25,7 @@ struct LearnedShapes {
   MatrixXd linear{};    ///< 1 − Σ_e ω_e Φ_eᵀ K₀ₑ Φ_e
   MatrixXd knots{};     ///< q, a column for each knot
   MatrixXd inverses{};  ///< inverse of ∂²E/∂q² for each knot
-  std::vector<double> errors{};  ///< Trust::errors()
+  std::vector<double> errors{};
 };
 
 /// Ignores inaccurate solutions and unstable knots. A knot is unstable if ∂²E/∂q² at constant depth is not positive
@@ -62,7 +62,7 @@ class LearnedBody {
   Kernel kernel_;  ///< with moduli times ω
   MatrixXd shapes_;
   MatrixXd depths_;
-  std::vector<int> column_of_;  ///< of `depths_`, by node
+  std::vector<int> column_of_;
   MatrixXd linear_;
   MatrixXd knots_;
   MatrixXd inverses_;

@@ -81,7 +81,7 @@ Pieces NearBody::make(const Solid& whole, const Factor& factor, Config config, s
   made.reset();
   const Mesh& mesh = whole.mesh();
   std::vector<int> near;
-  std::vector<std::pair<double, int>> far;  // by distance from `middle`
+  std::vector<std::pair<double, int>> far;
   std::vector<bool> touches_far(mesh.nodes.size());
   std::vector<bool> reached(mesh.nodes.size());
   for (const int node : config.pressed) reached[at(node)] = true;

@@ -33,10 +33,10 @@ class NearBody : public Elastic {
     double radius = 0;           ///< m, maximum distance of the centers of near elements
     /// The maximum number of modes. If Γ does not have more unknowns than this, the interface is exact.
     int modes = 60;
-    std::vector<int> pressed;  ///< touchable nodes
-    VectorXd press;            ///< N: the load of a tool at `middle`
-    VectorXd about{};          ///< u*, m; empty: at rest
-    double about_depth = 0;    ///< m, depth of the tool in u*
+    std::vector<int> pressed;
+    VectorXd press;          ///< N: the load of a tool at `middle`
+    VectorXd about{};        ///< u*, m; empty: at rest
+    double about_depth = 0;  ///< m, depth of the tool in u*
   };
 
   /// Builds the body in pieces, most of which are solves for a few loads. The last piece sets `made`, which is null if
@@ -54,7 +54,7 @@ class NearBody : public Elastic {
   int own_node(int node) const noexcept { return own_of_[at(node)]; }
 
   int modes() const noexcept { return static_cast<int>(modes_.cols()); }
-  int interface() const noexcept { return static_cast<int>(rim_.size()); }  ///< unknowns of Γ
+  int interface() const noexcept { return static_cast<int>(rim_.size()); }
 
   /// Estimates the force (N) on a tool at `depth` (m) that is missing because the far field is linear: z·(f(v) − f(u*)
   /// − K (v − u*)). v is the shape of the linear far field, and z is the shape per depth. Only some elements next to Γ
@@ -67,7 +67,7 @@ class NearBody : public Elastic {
 
   VectorXd placed(const VectorXd& u) const;
 
-  Solid part_;            ///< near elements
+  Solid part_;
   std::vector<int> rim_;  ///< free components of Γ in `part_`
   MatrixXd modes_;        ///< Ψ
   MatrixXd far_;          ///< S

@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// NearModel without a field: the linear solution with one Newton step; and the blending of force and slope between two
-// models.
+// NearModel without a field: the linear solution with one Newton step, and the transition between two models.
 #include <algorithm>
 #include <cmath>
 

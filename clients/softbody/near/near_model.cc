@@ -121,7 +121,6 @@ struct NearModel::Field {
   }
   double away(const Vec3& place, double deep) const { return std::hypot((place - middle).norm(), deep - depth); }
 
-  /// Converts the numbers of the nodes.
   Patch own(Patch patch) const {
     for (int& node : patch.nodes) node = body->own_node(node);
     return patch;
@@ -155,9 +154,9 @@ struct NearModel::Making {
   const TouchSurface& surface;
   const Factor& factor;  ///< at the shape `about`
   const Config& config;
-  Patch first;  ///< in the center
+  Patch first;
   double depth;
-  Hand hand;            ///< the latest
+  Hand hand;
   VectorXd about = {};  ///< all nodes; empty: at rest
   double unsure = 0;    ///< relative error of the force due to `about`
   std::unique_ptr<Field> field = nullptr;

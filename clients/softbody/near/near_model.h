@@ -136,10 +136,10 @@ class NearModel : public Model {
   const Solid& solid_;
   const TouchSurface& surface_;
   Config config_;
-  Factor at_rest_;  ///< of the whole body
+  Factor at_rest_;
   Size size_;
-  std::unique_ptr<Making> making_;  ///< the next field
-  std::unique_ptr<Field> field_;    ///< null if a cut body has none
+  std::unique_ptr<Making> making_;
+  std::unique_ptr<Field> field_;  ///< null if a cut body has none
   Hand last_;
   Handover handover_;
   double fading_over_ = 0;  ///< m
@@ -151,8 +151,8 @@ class NearModel : public Model {
   bool asked_ = false;
   bool by_linear_ = false;  ///< the last answer was linear_press()
   bool parted_ = false;
-  int since_asked_ = 0;             ///< answers
-  int last_took_ = 0;               ///< answers
+  int since_asked_ = 0;
+  int last_took_ = 0;
   Vec3 per_answer_ = Vec3::Zero();  ///< m, motion of the hand
 };
 

@@ -100,7 +100,7 @@ class Presser {
   const Solid& solid_;
   QuasiStaticModel model_;
   SolvedPresses::Work work_{};
-  bool lost_ = false;            ///< the present state is not valid
+  bool lost_ = false;
   int least_ = kMostIterations;  ///< best number of steps with this factor
   int wasted_ = 0;               ///< additional steps with this factor
 };

@@ -74,7 +74,7 @@ struct SolvedPresses {
   std::vector<double> at_rest{};  ///< N/m at the centers of cells; 0 if the position is not on the body
   struct Work {
     int presses = 0;
-    int steps = 0;  ///< Newton steps
+    int steps = 0;
     int factors = 0;
   };
   Work work{};

@@ -29,10 +29,10 @@ class Rung {
 
   struct Size {
     std::string_view name;
-    int shapes = 0;  ///< unknowns
+    int shapes = 0;
     std::size_t elements = 0;
     std::size_t bytes = 0;
-    int cells = 0;  ///< grid cells with answers
+    int cells = 0;
     int of_cells = 0;
     double error = 0;  ///< largest relative error of the force
   };

@@ -10,7 +10,6 @@
 namespace tendon::softbody {
 namespace {
 
-/// Hermite polynomials with their derivatives.
 struct Cubic {
   explicit Cubic(double x) {
     const double x2 = x * x;

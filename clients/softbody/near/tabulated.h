@@ -23,7 +23,7 @@ struct TabulatedAnswers {
   /// E, F and k in units of the grid, each with ∂x, ∂y, ∂x∂y.
   static constexpr std::size_t kNumbers = 12;
   std::vector<double> numbers{};
-  std::vector<double> errors{};  ///< Trust::errors()
+  std::vector<double> errors{};
 };
 
 /// The error is computed from the centers of the cells.

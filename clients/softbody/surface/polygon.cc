@@ -83,7 +83,6 @@ bool sides_meet(const Vec2d& a, const Vec2d& b, const Vec2d& c, const Vec2d& d) 
          (b_side == 0 && on_side(c, d, b));
 }
 
-/// The remaining polygon. It is counterclockwise.
 class Rest {
  public:
   explicit Rest(const Flat& polygon) : points_(polygon), left_(static_cast<int>(polygon.size())) {

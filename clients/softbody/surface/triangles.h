@@ -16,8 +16,8 @@ namespace tendon::softbody {
 struct Triangles {
   std::vector<Vec3> points;
   std::vector<std::array<int, 3>> facets;
-  std::vector<int> numbers{};        ///< numbers of the facets in the file, if they are different
-  std::vector<std::string> notes{};  ///< repairs
+  std::vector<int> numbers{};  ///< numbers of the facets in the file, if they are different
+  std::vector<std::string> notes{};
 
   /// The volume is negative if the surface is inside out.
   double volume() const;

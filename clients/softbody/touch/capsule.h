@@ -85,7 +85,7 @@ class CapsuleContact {
   std::vector<Vec3> places_;          ///< m, at rest
   std::vector<Eigen::Index> row_of_;  ///< row of each node in compliance_, or −1
   MatrixXd compliance_;               ///< m/N
-  std::vector<bool> pushed_;          ///< by row
+  std::vector<bool> pushed_;
   int rounds_ = 0;
 };
 

@@ -78,7 +78,7 @@ Feel PatchContact::at(const Vec3& tool) {
   }
   feel.error = reaction.error;
   feel.way = reaction.way;
-  feel.valid_radius = surface_.radius() / 4;  // the patch has the same nodes
+  feel.valid_radius = surface_.radius() / 4;  // farther away, the patch has other nodes
   if (friction_) rub(place, reaction.force, feel);
   return feel;
 }

@@ -69,9 +69,9 @@ class Layer {
     struct Site {
       std::size_t tool;
       int facet;
-      std::vector<int> nodes;  ///< indices of the nodes below
+      std::vector<int> nodes;
     };
-    std::vector<int> nodes;  ///< ascending
+    std::vector<int> nodes;
     std::vector<Site> sites;
   };
   /// Returns the facets with a point closer to a tool than `margin` times the size of the facet.
@@ -107,7 +107,7 @@ class Layer {
   struct Dissipated {
     double least = 0;
     double sum = 0;
-    int slid = 0;  ///< ties
+    int slid = 0;
   };
   Dissipated advance(const Near& near, std::span<const Placed> tools, const Eigen::Matrix3Xd& places);
   bool rubs() const noexcept { return config_.friction > 0; }

@@ -10,9 +10,9 @@ namespace tendon::softbody {
 
 /// The nodes that a rigid tool pushes without friction (Signorini's conditions).
 struct Pushes {
-  std::vector<Eigen::Index> set;  ///< ascending
-  VectorXd push;                  ///< N
-  Eigen::LLT<MatrixXd> factor;    ///< of `table` for `set`
+  std::vector<Eigen::Index> set;
+  VectorXd push;  ///< N
+  Eigen::LLT<MatrixXd> factor;
 };
 
 /// Minimizes ½ λᵀGλ − dᵀλ for λ ≥ 0. A pushed node moves by its `depth` d (m), and all others by at least theirs.

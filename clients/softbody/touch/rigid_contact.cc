@@ -63,17 +63,16 @@ Pose between(const Pose& from, const Pose& to, double share) {
 
 }  // namespace
 
-/// The state near the tools.
 struct RigidContact::Local {
-  Elastic::Forces now;  ///< of the body
-  VectorXd solved;      ///< K₀⁻¹ times the forces
+  Elastic::Forces now;
+  VectorXd solved;  ///< K₀⁻¹ times the forces
   Layer::Near near;
   std::vector<int> unknowns;  ///< free numbers
   std::vector<int> rows;      ///< rows of these unknowns
-  Eigen::Matrix3Xd places;    ///< m
-  MatrixXd stiffness;         ///< R, N/m
+  Eigen::Matrix3Xd places;
+  MatrixXd stiffness;  ///< R, N/m, of the body, with the other unknowns condensed
   Layer::Press press;
-  MatrixXd curve;             ///< A, N/m
+  MatrixXd curve;             ///< A, N/m, of the layer
   Eigen::LLT<MatrixXd> held;  ///< of R + A
   MatrixXd curve_held;        ///< A in this factor, with a shift if it is needed
 

@@ -39,8 +39,8 @@ class RigidContact {
   struct Config {
     Layer::Config layer;      ///< `tools` is ignored
     double tolerance = 1e-6;  ///< relative error of the force
-    int max_iterations = 30;  ///< for each step of the tools
-    bool turns = true;        ///< compute torques
+    int max_iterations = 30;
+    bool turns = true;
   };
   /// `elastic` is the mesh of `body`; both must outlive this object. The effects of the body must not include time or
   /// self-collision. Throws std::invalid_argument.
@@ -52,8 +52,8 @@ class RigidContact {
   /// wrong.
   std::vector<Feel> press(std::span<const std::optional<Pose>> handles);
 
-  int iterations() const noexcept { return iterations_; }                       ///< in the last answer
-  const Layer::Dissipated& dissipated() const noexcept { return dissipated_; }  ///< in the last answer
+  int iterations() const noexcept { return iterations_; }
+  const Layer::Dissipated& dissipated() const noexcept { return dissipated_; }
 
   std::size_t bytes() const noexcept;
 
@@ -80,7 +80,7 @@ class RigidContact {
   std::vector<HeldTool> tools_;
   Config config_;
   Layer layer_;
-  Vec3 from_;      ///< direction to the tools
+  Vec3 from_;
   VectorXd rest_;  ///< m, all nodes
   std::vector<Layer::Placed> placed_;
   Pairs pairs_;

@@ -78,7 +78,7 @@ Mat3 shortest_rotation(const Vec3& from, const Vec3& to) {
     const Vec3 axis = (near - near.dot(a) * a).normalized();
     return Eigen::Quaterniond(0, axis.x(), axis.y(), axis.z()).toRotationMatrix();
   }
-  const double twice = std::sqrt((1 + cosine) * 2);  // of half the angle
+  const double twice = std::sqrt((1 + cosine) * 2);  // twice the cosine of half the angle
   const Vec3 axis = a.cross(b) / twice;
   return Eigen::Quaterniond(twice / 2, axis.x(), axis.y(), axis.z()).toRotationMatrix();
 }

@@ -45,9 +45,9 @@ class SphereContact {
   const CondensedModel& body_;
   const TouchSurface& surface_;
   double radius_;
-  std::vector<Vec2> places_;          ///< tangential
+  std::vector<Vec2> places_;
   std::vector<Eigen::Index> row_of_;  ///< row of each node, or −1
-  std::vector<bool> pushed_;          ///< by row
+  std::vector<bool> pushed_;
   double contact_radius_ = 0;
 };
 

@@ -28,9 +28,9 @@ class SurfaceDistance {
  private:
   struct FlatFacet {
     std::array<Vec3, 3> corners;
-    Vec3 normal;                     ///< unit vector
-    std::array<Vec3, 3> edges;       ///< normals of the edges
-    std::array<Vec3, 3> of_corners;  ///< normals of the corners
+    Vec3 normal;  ///< unit vector
+    std::array<Vec3, 3> edges;
+    std::array<Vec3, 3> of_corners;
   };
   /// A box around some facets.
   struct BoxOfFacets {
