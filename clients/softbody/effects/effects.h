@@ -104,7 +104,7 @@ struct EffectsConfig {
   bool has_time() const noexcept { return inertia || damping || viscosity; }
 };
 
-/// Throws std::invalid_argument with the name of the field.
+/// Throws std::invalid_argument if a field is invalid. The message contains its name.
 void check(const EffectsConfig& config);
 
 using Effects = std::vector<std::unique_ptr<Effect>>;

@@ -14,8 +14,8 @@ namespace tendon::softbody {
 /// the whole body change K and f, and an answer is then two solves.
 class LinearModel : public Model {
  public:
-  /// Starts at rest, under the weight of the body. The solid must outlive this object. If `glides` is true, an answer
-  /// at rest contains Reaction::glide. Throws std::invalid_argument if the law of the solid is not linear, and
+  /// The initial shape is the shape at rest with gravity. The solid must outlive this object. If `glides` is true, an
+  /// answer at rest contains Reaction::glide. Throws std::invalid_argument if the law of the solid is not linear, and
   /// std::runtime_error if the solid is not held.
   LinearModel(const Solid& solid, const TouchSurface& surface, const EffectsConfig& effects = {}, bool glides = false);
 

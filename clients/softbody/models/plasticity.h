@@ -16,7 +16,7 @@ struct Yield {
   double hardening = 0;  ///< H, Pa
 };
 
-/// Throws std::invalid_argument with the name of the field.
+/// Throws std::invalid_argument if a field is invalid. The message contains its name.
 void check(const Yield& yield);
 
 /// A solid with a plastic strain p, symmetric and traceless, at every quadrature point. With ε the strain of its law
@@ -63,7 +63,7 @@ class PlasticSolid : public Solid {
 /// not converge. The stiffness of a yielding body is that of loading. On a closed path the hand never gains energy.
 class PlasticModel : public Model {
  public:
-  /// Starts at rest, under the weight of the body. Throws the errors of PlasticSolid and QuasiStaticModel.
+  /// The initial shape is the shape at rest with gravity. Throws the errors of PlasticSolid and QuasiStaticModel.
   PlasticModel(const Solid& solid, const TouchSurface& surface, const QuasiStaticModel::Config& config,
                const EffectsConfig& effects, const Yield& yield);
 

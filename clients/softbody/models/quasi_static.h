@@ -22,15 +22,16 @@ namespace tendon::softbody {
 class QuasiStaticModel : public Model {
  public:
   struct Config {
-    int max_iterations = 30;
-    /// The relative error of the force at which an answer is complete.
+    int max_iterations = 30;  ///< for each answer; Reaction::error contains the rest
+    /// The relative error of the force at which an answer is complete. Force, depth and slope then include one more
+    /// step, which does not change the shape.
     double tolerance = 1e-6;
     std::optional<double> self_collision = {};  ///< Pa/m, c of SelfCollision
     bool glides = true;
     /// The accepted relative uncertainty of the stiffness. The error is usually the square of it.
     double tangent = 0.02;
   };
-  /// Starts at rest, under the weight of the body. `elastic` must outlive this object.
+  /// The initial shape is the shape at rest with gravity. `elastic` must outlive this object.
   QuasiStaticModel(const Elastic& elastic, const TouchSurface& surface, const Config& config,
                    const EffectsConfig& effects = {});
 

@@ -18,7 +18,7 @@ struct StiffnessOverTime {
   double factor_at(double time) const;
 };
 
-/// Throws std::invalid_argument with the name of the field.
+/// Throws std::invalid_argument if a field is invalid. The message contains its name.
 void check(const StiffnessOverTime& law);
 
 /// A body with a variable Young's modulus, such as a muscle. The tool must be the only load, and the energy must be

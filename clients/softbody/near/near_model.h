@@ -63,8 +63,8 @@ class NearModel : public Model {
     QuasiStaticModel::Config newton = {};
     int modes = NearBody::Config{}.modes;
   };
-  /// Builds the near field of `first`. `solid` and `surface` must outlive this object. Throws the errors of
-  /// QuasiStaticModel.
+  /// Builds the near field of `first`. `solid` and `surface` must remain valid for the lifetime of this object. Throws
+  /// the errors of QuasiStaticModel.
   NearModel(const Solid& solid, const TouchSurface& surface, const Patch& first, const Config& config);
   /// Builds all near fields in `background`.
   NearModel(const Solid& solid, const TouchSurface& surface, const Config& config, Background background);

@@ -67,7 +67,8 @@ class PatchContact {
     kBilateral,   ///< after the first contact the tool sticks and can pull
   };
 
-  /// A tool with a `tool_radius` (m) above 0 touches earlier. `model` and `surface` must outlive this object.
+  /// A tool with a `tool_radius` (m) above 0 touches earlier. `model` and `surface` must remain valid for the lifetime
+  /// of this object.
   PatchContact(Model& model, const TouchSurface& surface, double tool_radius, Side side,
                std::unique_ptr<Friction> friction = {});
 

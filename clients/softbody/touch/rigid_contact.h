@@ -42,8 +42,8 @@ class RigidContact {
     int max_iterations = 30;
     bool turns = true;
   };
-  /// `elastic` is the mesh of `body`; both must outlive this object. The effects of the body must not include time or
-  /// self-collision. Throws std::invalid_argument.
+  /// `elastic` is the mesh of `body`; both must remain valid for the lifetime of this object. The effects of the body
+  /// must not include time or self-collision. Throws std::invalid_argument.
   RigidContact(QuasiStaticModel& body, const Elastic& elastic, const TouchSurface& surface, std::vector<HeldTool> tools,
                const Config& config);
 

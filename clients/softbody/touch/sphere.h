@@ -24,7 +24,8 @@ namespace tendon::softbody {
 /// Thread-safe: no. Realtime-safe: no.
 class SphereContact {
  public:
-  /// `body` and `surface` must outlive this object. Throws std::invalid_argument if the radius is not positive.
+  /// `body` and `surface` must remain valid for the lifetime of this object. Throws std::invalid_argument if the radius
+  /// is not positive.
   SphereContact(const CondensedModel& body, const TouchSurface& surface, double radius);
 
   /// There is no force if q is not finite. Throws std::out_of_range if the sphere touches the body outside the table.
