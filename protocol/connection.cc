@@ -11,7 +11,7 @@ namespace tendon {
 
 Connection::Connection(Link& link, const Address& server, const Config& config)
     : link_(link), server_(server), config_(config), secrets_(config.seed), back_off_(config.retry_min) {
-  config_.seed = {};  // from it, whoever reads our memory later could find every key again
+  config_.seed = {};  // the seed would reveal all later keys to anyone who reads this memory
 }
 
 void Connection::greet(LocalTime now, const Hello& hello) {
@@ -48,7 +48,7 @@ const Connection::Event* Connection::next_of_session(LocalTime now) {
   const Session::Event* const event = session_ ? session_->next_event() : nullptr;
   if (event == nullptr) return nullptr;
   if (const auto* closed = std::get_if<Session::Closed>(event)) {
-    flush(now);  // a Bye of our own
+    flush(now);  // send our own Bye
     return end(now, Cause::kLost, closed->code, closed->reason);
   }
   if (std::holds_alternative<Session::StateArrived>(*event)) back_off_ = config_.retry_min;
@@ -56,9 +56,8 @@ const Connection::Event* Connection::next_of_session(LocalTime now) {
   return &told_;
 }
 
-/// Takes one datagram from the link.
 const Connection::Event* Connection::receive(LocalTime& now) {
-  // One byte more than the largest datagram: one that is too large stays too large after the cut.
+  // One byte more than the largest datagram, so that an oversized datagram stays oversized after truncation.
   std::array<std::byte, kMaxDatagram + 1> buffer;
   Address from;
   const std::size_t size = link_.receive(from, buffer);
@@ -81,7 +80,6 @@ const Connection::Event* Connection::receive(LocalTime& now) {
   return nullptr;
 }
 
-/// Does what is due by time.
 const Connection::Event* Connection::tick(LocalTime now) {
   if (session_) {
     session_->tick(now);
@@ -97,7 +95,7 @@ const Connection::Event* Connection::tick(LocalTime now) {
   return nullptr;
 }
 
-/// Acts on the server's answer, once it is there.
+/// Handles the server's answer to the Hello, if it has arrived.
 const Connection::Event* Connection::settle(LocalTime now) {
   if (!handshake_->outcome()) return nullptr;
   ClientHandshake::Outcome outcome = *handshake_->outcome();

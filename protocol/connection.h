@@ -15,88 +15,88 @@
 
 namespace tendon {
 
-/// A guest's way to one server, over all its attempts and sessions: it says Hello, waits for the answer, runs the
-/// session, and when that is over waits and asks for the next attempt. It has no socket, clock or thread, and it calls
-/// nobody: its owner pulls events.
+/// Connects a client to one server and reconnects after a failure. It sends a Hello, waits for the answer, runs the
+/// session and, when that ends, waits and asks its owner for the next attempt. It has no socket, clock or thread and no
+/// callbacks: the owner polls for events.
 ///
 ///     connection.begin_turn();
-///     while (const auto event = connection.next(now)) act on it;         // `now` grows with each datagram
+///     while (const auto event = connection.next(now)) handle(event);     // `now` grows with each datagram
 ///     connection.flush(now);
 ///     wait for a datagram, at most until connection.next_turn()
 ///
-/// * **Attempts.** An attempt ends after Config::patience without an answer. The next one begins after a wait of
-///   retry_min, then twice as long each time, at most retry_max. The first state of a session sets the wait back to
-///   retry_min. Each attempt has a new random and, with a key, a new ephemeral key.
-/// * **The owner greets.** What a Hello says may change from attempt to attempt. So GreetingDue only says that the wait
-///   is over; the owner then calls greet().
+/// * An attempt fails if there is no answer within Config::patience. The first retry follows after retry_min, and the
+///   wait doubles up to retry_max. The first state received in a session resets it to retry_min. Each attempt uses a
+///   new random and, with a key, a new ephemeral key.
+/// * The Hello may change from attempt to attempt. GreetingDue therefore only reports that the wait is over; the owner
+///   then calls greet().
 ///
 /// Thread-safe: no. Realtime-safe: no.
 class Connection {
  public:
   struct Config {
-    std::optional<Key> key{};                             ///< when set, sessions are sealed, and only so
-    Suites suites = suites_of_this_machine();             ///< … by one of these
-    Seed seed{};                                          ///< of randoms and ephemeral keys: 32 bytes from the system
-    Duration patience = std::chrono::seconds(2);          ///< of one attempt; > 0
-    Duration retry_min = std::chrono::milliseconds(100);  ///< first wait before the next attempt; > 0
-    Duration retry_max = std::chrono::seconds(2);         ///< longest wait; not below retry_min
-    int max_datagrams = 256;                              ///< taken from the link in one turn; > 0
+    std::optional<Key> key{};                     ///< if set, only sealed sessions are accepted
+    Suites suites = suites_of_this_machine();     ///< the cipher suites allowed in sealed sessions
+    Seed seed{};                                  ///< source of randoms and ephemeral keys: 32 bytes from the system
+    Duration patience = std::chrono::seconds(2);  ///< time that one attempt waits for an answer; > 0
+    Duration retry_min = std::chrono::milliseconds(100);  ///< first wait before a retry; > 0
+    Duration retry_max = std::chrono::seconds(2);         ///< longest wait before a retry; not below retry_min
+    int max_datagrams = 256;  ///< maximum number of datagrams taken from the link in one turn; > 0
   };
 
-  /// The wait is over: greet() now.
+  /// The wait is over: call greet().
   struct GreetingDue {};
-  /// The server has let us in, and a session is open.
+  /// The server accepted this client and a session is open.
   struct Opened {
     Welcome welcome;
   };
   enum class Cause : std::uint8_t {
-    kUnanswered = 1,  ///< an attempt: nobody answered within the patience
-    kRefused = 2,     ///< an attempt: the server said no
-    kLost = 3,        ///< a session
+    kUnanswered = 1,  ///< the attempt: no answer within `patience`
+    kRefused = 2,     ///< the attempt: the server refused it
+    kLost = 3,        ///< the session ended
   };
-  /// An attempt or a session is over. GreetingDue comes after the wait.
+  /// An attempt or a session ended. GreetingDue follows after the wait.
   struct Ended {
     Cause cause;
     Code code;
-    std::string reason;  ///< the server's words where it had any
+    std::string reason;  ///< the reason given by the server, if any
   };
-  /// A Session::Event in here is never Session::Closed: that is told as Ended. It is the session's own.
+  /// The Session::Event belongs to the session. It is never Session::Closed, which is reported as Ended.
   using Event = std::variant<GreetingDue, Opened, Ended, const Session::Event*>;
 
   /// `link` must outlive this object. Nothing is sent before greet().
   Connection(Link& link, const Address& server, const Config& config);
 
-  /// Begins an attempt. `hello` says who comes; random and keys are added here. Throws std::invalid_argument when the
-  /// Hello is longer than a datagram holds.
+  /// Begins an attempt with `hello`, to which random and keys are added. Throws std::invalid_argument if the Hello does
+  /// not fit into a datagram.
   void greet(LocalTime now, const Hello& hello);
 
-  /// Opens a turn: next() may take Config::max_datagrams from the link again.
+  /// Starts a turn, in which next() may take up to Config::max_datagrams from the link.
   void begin_turn() noexcept;
-  /// The next thing to act on, null when this turn has no more. It stays until the next call. `now` grows to when a
-  /// datagram was certainly here.
+  /// Returns the next event, or null when this turn has no more. The event is valid until the next call. `now` is
+  /// advanced to a time by which the received datagram had certainly arrived.
   const Event* next(LocalTime& now);
-  /// The link may hold more than one turn may take: the next turn is due at once.
+  /// Returns true if the turn ended at Config::max_datagrams. The link may hold more, so the next turn is due at once.
   bool more() const noexcept { return more_; }
-  /// Sends all that is due.
+  /// Sends all datagrams that are due.
   void flush(LocalTime now);
-  /// When the next turn is due at the latest.
+  /// The latest time at which the next turn must begin.
   LocalTime next_turn() const;
 
-  /// Says Bye and ends the session or the attempt, with nothing to follow: greet() may begin another one.
+  /// Sends a Bye and ends the session or the attempt. No event follows; greet() may begin another attempt.
   void close(LocalTime now, std::string reason);
-  /// Ends the session without a word; GreetingDue comes after the wait.
+  /// Ends the session without a Bye. GreetingDue follows after the wait.
   void drop(LocalTime now);
 
-  /// The server is found at another address from the next attempt on. Not to be called while a session is open.
+  /// Sets the address for the next attempt. Must not be called while a session is open.
   void move_to(const Address& server) { server_ = server; }
   const Address& server() const noexcept { return server_; }
 
-  /// The open session; null while there is none.
+  /// Null while no session is open.
   Session* session() noexcept { return session_ ? &*session_ : nullptr; }
   const Session* session() const noexcept { return session_ ? &*session_ : nullptr; }
-  /// Of the present session, or of the last one.
+  /// Statistics of the present session, or of the last one.
   const LinkStats& link_stats() const noexcept { return session_ ? session_->stats() : last_stats_; }
-  /// Datagrams that were not from the server: dropped.
+  /// Number of datagrams dropped because they did not come from the server.
   std::uint64_t strangers() const noexcept { return strangers_; }
 
  private:
@@ -115,13 +115,13 @@ class Connection {
   std::optional<Session> session_;
   LinkStats last_stats_;
   std::uint64_t strangers_ = 0;
-  LocalTime give_up_{};  ///< end of the present attempt's patience
+  LocalTime give_up_{};  ///< when the present attempt fails
   LocalTime retry_{};    ///< when the next attempt begins
-  Duration back_off_;    ///< wait before the attempt after that
-  int left_ = 0;         ///< datagrams that this turn may still take
+  Duration back_off_;    ///< wait before the retry after that one
+  int left_ = 0;         ///< number of datagrams that this turn may still take
   bool more_ = false;
-  bool ticked_ = true;  ///< in this turn
-  Event told_;          ///< the newest one
+  bool ticked_ = true;  ///< tick() was called in this turn
+  Event told_;          ///< storage for the event returned by next()
 };
 
 }  // namespace tendon

@@ -8,54 +8,56 @@
 #include <string_view>
 #include <vector>
 
-/// How a server is found by name: DNS-SD (RFC 6763), service _tendon._udp, one instance for each device. This file has
-/// the names and texts; server/machine/announcer.h announces, clients/cpp/discovery looks.
+/// Names and TXT records of DNS-SD (RFC 6763), by which clients find servers: service _tendon._udp, one instance per
+/// device. server/machine/announcer.h announces them; clients/cpp/discovery looks them up.
 ///
-/// Anybody can announce any name. An instance says where to knock; who answers is told by the key alone (SESSION.md).
+/// Any host can announce any name. An instance only gives an address; the client's key authenticates the server
+/// (SESSION.md).
 ///
 /// Thread-safe. Realtime-safe: no (heap).
 namespace tendon::dns_sd {
 
 inline constexpr const char* kService = "_tendon._udp";
 inline constexpr const char* kLocal = "local";
-/// Bytes of an instance's name, one label of DNS.
+/// Maximum number of bytes in the name of an instance, which is one DNS label.
 inline constexpr std::size_t kMaxName = 63;
 
-/// Whether an instance can have this name: 1 to 63 bytes of UTF-8 without control characters (RFC 6763, 4.1.1).
+/// Returns true if `name` is a valid instance name: 1 to 63 bytes of UTF-8 without control characters (RFC 6763,
+/// 4.1.1).
 bool is_instance_name(std::string_view name) noexcept;
 
-/// Whether `name` is one of a domain or a host: labels of 1 to 63 letters, digits, - and _, with dots between them.
+/// Returns true if `name` is a domain or host name: labels of 1 to 63 letters, digits, - and _, separated by dots.
 bool is_domain(std::string_view name) noexcept;
 
-/// The name to try when `name` is taken for the `attempt`-th time (from 2 on): "falcon at bench 3 #2". A long one is
-/// cut, so that 63 bytes are enough.
+/// Returns an alternative such as "falcon at bench 3 #2" when `name` is taken. `attempt` starts at 2. A long name is
+/// cut so that the result has at most 63 bytes.
 std::string another_name(const std::string& name, int attempt);
 
-/// One instance: "falcon at bench 3" of the domain "local", which multicast answers for on the local network; for every
-/// other domain name servers do.
+/// One instance, for example "falcon at bench 3" in the domain "local". Multicast DNS resolves "local"; name servers
+/// resolve all other domains.
 struct Instance {
-  std::string name;  ///< as is_instance_name(); empty: all of the domain
+  std::string name;  ///< see is_instance_name(); empty: all instances of the domain
   std::string domain = kLocal;
   bool operator==(const Instance&) const = default;
 };
 
-/// Reads "NAME", "NAME.DOMAIN", and, for all of a domain, "" or ".DOMAIN". The name ends at the first dot; a dot in it
-/// is written "\.", a backslash "\\", any byte "\DDD" in decimals, as in zone files. Throws std::invalid_argument:
-/// `expected NAME or NAME.DOMAIN like "falcon at bench 3", got "…": …`.
+/// Parses "NAME" or "NAME.DOMAIN", or "" or ".DOMAIN" for all instances of a domain. The name ends at the first dot. As
+/// in zone files, "\." is a dot in the name, "\\" a backslash and "\DDD" any byte in decimal. Throws
+/// std::invalid_argument: `expected NAME or NAME.DOMAIN like "falcon at bench 3", got "…": …`.
 Instance parse_instance(std::string_view text);
 
-/// What parse_instance() reads; the domain is left out when it is "local".
+/// The inverse of parse_instance(). The domain "local" is left out.
 std::string to_string(const Instance& instance);
 
-/// As DNS asks for it: "falcon at bench 3._tendon._udp.example.org"; without a name "_tendon._udp.example.org".
+/// The name in DNS queries: "falcon at bench 3._tendon._udp.example.org", or "_tendon._udp.example.org" without a name.
 std::string full_name(const Instance& instance);
 
-/// What a server says of a device in the TXT record of its instance. No key, and no person's name.
+/// The TXT record of a device. It contains no key and no personal name.
 struct About {
-  std::uint32_t version = 0;            ///< "v": of the wire; 0: not said
-  std::string device;                   ///< as clients claim it; empty: not said
-  std::uint32_t hz = 0;                 ///< haptic steps per second; 0: not said
-  std::uint32_t suite = 0;              ///< 1: only who has a key is let in
+  std::uint32_t version = 0;            ///< "v": version of the wire; 0: unknown
+  std::string device;                   ///< device name for claims; empty: unknown
+  std::uint32_t hz = 0;                 ///< haptic steps per second; 0: unknown
+  std::uint32_t suite = 0;              ///< 1: the server requires a key
   std::vector<std::string> channels{};  ///< at most limits::kMaxChannels
   bool operator==(const About&) const = default;
 };
@@ -63,11 +65,11 @@ struct About {
 /// The strings of the record: "v=1", "device=falcon", "hz=1000", "suite=1", "channels=main,tissue".
 std::vector<std::string> to_txt(const About& about);
 
-/// Reads such strings from anybody. What is not as to_txt() writes it counts as not said; of a key that comes twice the
-/// first counts; the case of keys does not matter (RFC 6763, 6.4).
+/// Parses the strings of a record from an untrusted source. An entry that is not in the format of to_txt() is ignored.
+/// If a key occurs more than once, the first one counts. Keys are not case-sensitive (RFC 6763, 6.4).
 About read_txt(std::span<const std::string> strings);
 
-/// The strings in the data of a TXT record: each has its length in front. A string that is cut ends the list.
+/// Splits the data of a TXT record into its strings, each preceded by its length. Parsing stops at a truncated string.
 std::vector<std::string> split_txt(std::span<const std::byte> data);
 
 }  // namespace tendon::dns_sd

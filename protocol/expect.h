@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// The one form in which impossible values are refused, "FIELD = VALUE: expected …", for clients too: they may include
-// protocol and nothing of core.
+// Makes the checks of core available to clients, which may include protocol but not core. All of them report a bad
+// value as "FIELD = VALUE: expected …".
 
 #include "core/base/expect.h"

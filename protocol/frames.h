@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// The frames of programs and interfaces, for guests: where a device's axes are before the operator, and other programs'.
+// Makes the coordinate frames of core available to clients, which may include protocol but not core.
 #include "core/base/frames.h"

@@ -21,9 +21,8 @@ std::array<std::byte, Size> first_of(const Bytes32& bytes) noexcept {
   return first;
 }
 
-/// What both ends know before the first message of Noise. The cookie is not part of it: an attempt has one message 1,
-/// however many cookies it collects. A second prologue would make one ephemeral key authenticate two messages with one
-/// nonce.
+/// The prologue of the Noise handshake. It excludes the cookie, so that an attempt has a single message 1 however many
+/// cookies it collects. With a second prologue, one ephemeral key would authenticate two messages with the same nonce.
 std::vector<std::byte> prologue(const KeyId& id, const ClientRandom& random) {
   const auto header = encode_header({.type = DatagramType::kHello, .suite = Suite::kNoise});
   std::vector<std::byte> out;
@@ -34,7 +33,7 @@ std::vector<std::byte> prologue(const KeyId& id, const ClientRandom& random) {
   return out;
 }
 
-/// Both ends of suite 2 have named it, inside the sealed messages of the handshake: that binds the choice.
+/// In suite 2, both peers name kFeatureAesGcm inside the sealed handshake messages, which authenticates the choice.
 bool names_aes(const std::vector<std::string>& features) noexcept {
   return std::find(features.begin(), features.end(), kFeatureAesGcm) != features.end();
 }
@@ -79,8 +78,8 @@ void ClientHandshake::receive(LocalTime now, std::span<const std::byte> datagram
   if (outcome_) return;
   const Suite suite = noise_ ? Suite::kNoise : Suite::kPlain;
   if (const auto retry = decode_retry(datagram); retry && retry->suite == suite && retry->random == random_) {
-    // Only the first cookie is answered by an immediate Hello. Otherwise we and a server that rejects our cookies would
-    // exchange datagrams as fast as the network carries them.
+    // Only the first cookie is answered with an immediate Hello. Otherwise we and a server that rejects our cookies
+    // would exchange datagrams as fast as the network allows.
     if (!cookie_) {
       due_ = true;
       next_tick_ = now;
@@ -119,7 +118,7 @@ void ClientHandshake::settle(const AnswerDatagram& datagram) {
       outcome_ = std::move(accepted);
     }
   }
-  noise_.reset();  // wipes the ephemeral key
+  noise_.reset();  // erases the ephemeral key
   due_ = false;
   next_tick_ = LocalTime::max();
 }
@@ -287,7 +286,8 @@ Doorman::Answered Doorman::answer(const Guest& guest, std::uint32_t connection_i
 Doorman::Answered Doorman::welcome(const Guest& guest, std::uint32_t connection_id, const Welcome& welcome,
                                    std::span<std::byte, kMaxDatagram> buffer) {
   Welcome whole = welcome;
-  if (guest.suite == Suite::kAesGcm) whole.features.emplace(whole.features.begin(), kFeatureAesGcm);  // never cut off
+  // first, so that it is never truncated
+  if (guest.suite == Suite::kAesGcm) whole.features.emplace(whole.features.begin(), kFeatureAesGcm);
   return answer(guest, connection_id, whole, buffer);
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Rotations as unit quaternions, for clients too: they may include protocol and nothing of core.
+// Makes the rotations of core (unit quaternions) available to clients, which may include protocol but not core.
 
 #include "core/base/rotation.h"

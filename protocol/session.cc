@@ -18,17 +18,18 @@
 namespace tendon {
 namespace {
 
-/// Keeps the newest value of each stream: the states and reports of a device, or of a channel. `Told` is the event that
-/// wraps a value, or void. Allocates only for the first value of a stream and for the text of a report. The codec bounds
-/// the number of streams: kMaxDevices, and kMaxDevices · kMaxChannels.
+/// Keeps the newest value of each stream, where a stream is the states or reports of one device or channel. `Told` is
+/// the event that wraps a value, or void. Allocates only for the first value of a stream and for the text of a report.
+/// The codec limits the number of streams to kMaxDevices or kMaxDevices · kMaxChannels.
 template <class Value, class Told = void>
 class Newest {
  public:
   using Kept = std::conditional_t<std::is_void_v<Told>, Value, Session::Event>;
 
-  /// Replaces what was not taken.
+  /// Replaces the value of this stream if it was not taken.
   void put(const Value& value) { put(stream(value), value); }
-  /// Does the same if the value is newer than all earlier ones of its stream. Else returns false and changes nothing.
+  /// Does the same if the value is newer than all earlier ones of its stream. Otherwise returns false and changes
+  /// nothing.
   bool put_if_newer(const Value& value) {
     Stream& mine = stream(value);
     const auto order = order_of(value);
@@ -40,9 +41,9 @@ class Newest {
 
   bool empty() const noexcept { return waiting_ == 0; }
 
-  /// The value to be taken next, null when there is none; streams come in the order of their first values.
+  /// The value that take() returns next, or null. Streams are in the order of their first values.
   const Kept* first() const noexcept { return empty() ? nullptr : &next_waiting()->value; }
-  /// Takes it out. It stays as it is until the next `put`.
+  /// Returns the next value, which is valid until the next `put`.
   const Kept* take() noexcept {
     const auto next = streams_.begin() + (next_waiting() - streams_.cbegin());
     next->waiting = false;
@@ -55,7 +56,7 @@ class Newest {
       if (stream.waiting) visit(stream.value);
     }
   }
-  /// Takes it out; for_each_waiting() has shown it.
+  /// Takes a value that for_each_waiting() has visited.
   void take(const Value* value) {
     for (Stream& stream : streams_) {
       if (&stream.value != value) continue;
@@ -69,7 +70,7 @@ class Newest {
   struct Stream {
     Kept value;
     bool waiting = false;
-    std::optional<Order> order{};  ///< of the newest value
+    std::optional<Order> order{};  ///< order of the newest value
   };
 
   static Order order_of(const DeviceState& state) noexcept { return {0, state.tick}; }
@@ -122,7 +123,7 @@ class Newest {
 template <class... Newests>
 struct Streams : Newests... {
   bool empty() const noexcept { return (Newests::empty() && ...); }
-  /// Takes the next value, of the first kind that has one. Null when there is none.
+  /// Takes the next value of the first kind that has one. Returns null if there is none.
   const auto* take() noexcept {
     const std::common_type_t<typename Newests::Kept...>* taken = nullptr;
     ((!taken && !Newests::empty() ? void(taken = Newests::take()) : void()), ...);
@@ -130,7 +131,7 @@ struct Streams : Newests... {
   }
 };
 
-/// The streams of one kind: of<DeviceState>(streams).
+/// Selects the streams of one kind, as in of<DeviceState>(streams).
 template <class Value, class Told>
 Newest<Value, Told>& of(Newest<Value, Told>& streams) noexcept {
   return streams;
@@ -149,17 +150,17 @@ struct Session::State {
 
   Config config;
   LocalTime opened;
-  LocalTime latest;  ///< the newest `now` we were told
+  LocalTime latest;  ///< the newest `now`
   bool open = true;
   LinkStats stats;
 
-  // In suites 1 and 2.
+  // Only in suites 1 and 2.
   Suite suite = Suite::kPlain;
   std::optional<Sealer> sealer;
   std::optional<Opener> opener;
   std::array<std::byte, kMaxDatagram> opened_body{};
 
-  // Out.
+  // Output.
   DataWriter writer;
   std::uint64_t next_packet = 0;
   std::optional<LocalTime> last_sent;
@@ -169,27 +170,27 @@ struct Session::State {
   OutgoingRequests asked;
   Bye bye;
   int byes_left = 0;
-  LocalTime silent_until = LocalTime::min();  ///< nothing is to be said before; min: not known since the last news()
+  LocalTime silent_until = LocalTime::min();  ///< nothing to send before this time; min: unknown since the last news()
 
-  // In.
+  // Input.
   DataReader reader;
   LocalTime last_heard;
   ReplayWindow seen;
   std::optional<OutgoingEcho> echo;
-  std::optional<std::uint64_t> newest_echoed;  ///< newest packet of ours that the peer has told of
+  std::optional<std::uint64_t> newest_echoed;  ///< newest of our packets that the peer has acknowledged
   IncomingRequests answering;
   RoundTrip round_trip;
   std::optional<ClockExchange> exchange;
   ClockOffsetEstimator peer_clock;
 
-  // Events that wait, in the order in which they are returned.
+  // Waiting events, in the order in which they are returned.
   Streams<Newest<ForceCommand, ForceArrived>, Newest<PortFrame, PortArrived>, Newest<LinkReport, ReportArrived>,
           Newest<DeviceReport, DeviceReportArrived>, Newest<PeerReport, PeerReportArrived>,
           Newest<DeviceState, StateArrived>>
       arrived;
   std::optional<Closed> closed;
-  bool untold = false;  ///< something of these, of `asked` or of `answering` may wait
-  Event rare;           ///< the newest one of the others that was told
+  bool untold = false;  ///< `arrived`, `closed`, `asked` or `answering` may hold an event
+  Event rare;           ///< storage for the last returned event that is not in `arrived`
 
   std::optional<std::span<const std::byte>> open_body(LocalTime now, const Header& header,
                                                       std::span<const std::byte> datagram);
@@ -197,12 +198,12 @@ struct Session::State {
   void observe(LocalTime now, PeerTime sent, const IncomingEcho& told);
   void count_lost_outgoing(const IncomingEcho& told);
 
-  // A frame of a datagram that is the newest so far, or is not.
+  // Handles a frame. `newest` is true if its datagram is the newest so far.
   template <class Value>
   void take(const Value& value, bool newest) {
     if (of<Value>(arrived).put_if_newer(value)) return;
     ++stats.stale;
-    // In a datagram that is not the newest, the network has caused it.
+    // In an older datagram, the network caused it and not the engine.
     if constexpr (std::is_same_v<Value, ForceCommand>) stats.refused_forces.old_sequence += newest ? 1 : 0;
   }
   void take(const Control& control, bool /*newest*/) { stats.invalid += news().answering.take(control) ? 0 : 1; }
@@ -210,7 +211,7 @@ struct Session::State {
   void take(const Bye& said, bool newest);
 
   bool silent_too_long(LocalTime now) const noexcept { return !last_sent || now - *last_sent >= config.keep_alive; }
-  /// What is to be said, or when, changes: it is looked for again.
+  /// Call before any change to what is sent or when: it discards the cached `silent_until`.
   State& news() noexcept {
     silent_until = LocalTime::min();
     return *this;
@@ -266,7 +267,7 @@ bool Session::receive(LocalTime now, std::span<const std::byte> datagram) {
 
   const std::optional<Header> header = decode_header(datagram);
   if (header && header->type != DatagramType::kData) {
-    ++my.stats.duplicated;  // a copy of the handshake that took its time
+    ++my.stats.duplicated;  // a delayed copy of a handshake datagram
     return false;
   }
   if (!header || header->suite != my.suite || header->connection_id != my.config.connection_id ||
@@ -282,8 +283,8 @@ bool Session::receive(LocalTime now, std::span<const std::byte> datagram) {
   if (!body) return false;
   const DataContent* content = my.reader.read(*body);
   if (!content) {
-    // Its number is used up when it was authentic. In suite 0 nobody knows: a damaged copy must not shut
-    // out the good one.
+    // An authentic datagram uses up its packet number. In suite 0 it does not, because a damaged copy must not block
+    // the original.
     if (my.opener) my.seen.insert(header->packet_number);
     ++my.stats.malformed;
     return false;
@@ -291,7 +292,7 @@ bool Session::receive(LocalTime now, std::span<const std::byte> datagram) {
   return my.accept(now, header->packet_number, *content);
 }
 
-/// What follows the header, in the clear; empty, and counted, when it is not authentic.
+/// Returns the decrypted body. If the datagram is not authentic, counts it and returns nullopt.
 std::optional<std::span<const std::byte>> Session::State::open_body(LocalTime now, const Header& header,
                                                                     std::span<const std::byte> datagram) {
   if (!opener) return datagram.subspan(kHeaderSize);
@@ -340,7 +341,7 @@ void Session::State::observe(LocalTime now, PeerTime sent, const IncomingEcho& t
   exchange = {.sent = told.sent, .received = told.received, .answered = sent, .answered_at = now};
   peer_clock.observe(*exchange);
   const Duration sample = (now - told.sent) - (sent - told.received);
-  if (sample < Duration::zero()) return;  // two clocks of different rates, and a peer that held the echo for long
+  if (sample < Duration::zero()) return;  // the clocks run at different rates and the peer held the echo for long
   round_trip.observe(sample);
   stats.round_trip = round_trip.newest();
   stats.smoothed_round_trip = round_trip.smoothed();
@@ -349,7 +350,7 @@ void Session::State::observe(LocalTime now, PeerTime sent, const IncomingEcho& t
 
 void Session::State::count_lost_outgoing(const IncomingEcho& told) {
   if (newest_echoed && told.packet_number <= *newest_echoed) return;
-  // Of the packets since the last echo, those the vector reaches: itself and at most 32 before.
+  // The vector covers the echoed packet and the 32 packets before it.
   const std::uint64_t since = newest_echoed ? told.packet_number - *newest_echoed : told.packet_number + 1;
   const std::uint64_t before = std::min<std::uint64_t>(since - 1, 32);
   const std::uint64_t reached = (std::uint64_t{1} << before) - 1;
@@ -434,7 +435,7 @@ std::size_t Session::State::sent(LocalTime now, const Header& header,
   return sealer ? sealer->seal(header, buffer, writer.size()) : writer.size();
 }
 
-/// The states that columns can say: a frame for each instant, in the order of the devices.
+/// Adds the states that columns can represent: one frame for each instant, ordered by device.
 void Session::State::fill_columns() {
   for (;;) {
     std::array<const DeviceState*, limits::kMaxDevices> together{};
@@ -452,7 +453,7 @@ void Session::State::fill_columns() {
   }
 }
 
-/// Adds what waits of these kinds, as far as it fits.
+/// Adds the waiting values of these kinds until the datagram is full.
 template <class... Value>
 void Session::State::fill_with() {
   const auto add = [this](auto& waiting) {
@@ -461,8 +462,8 @@ void Session::State::fill_with() {
   (add(of<Value>(to_send)), ...);
 }
 
-/// Adds as much as fits; what ages fastest comes first. The rest stays due for the next datagram. A state and a force
-/// always fit together.
+/// Adds as much as fits, in the order of urgency. The rest is sent in the next datagram. A state and a force always fit
+/// together.
 void Session::State::fill(LocalTime now) {
   if (config.states_in_columns) fill_columns();
   fill_with<DeviceState, PortFrame, ForceCommand>();
@@ -479,7 +480,7 @@ void Session::State::fill(LocalTime now) {
 std::size_t Session::next_datagram(LocalTime now, std::span<std::byte, kMaxDatagram> buffer) {
   State& my = *state_;
   my.latest = now;
-  if (now < my.silent_until && my.byes_left == 0) return 0;  // most ask in vain
+  if (now < my.silent_until && my.byes_left == 0) return 0;  // fast path: usually nothing is due
   return my.say(now, buffer);
 }
 
@@ -510,7 +511,7 @@ const Session::Event* Session::State::tell() {
     return &rare;
   };
   if (answering.has_next()) {
-    const Control* const control = news().answering.next();  // this also answers unknown and invalid requests
+    const Control* const control = news().answering.next();  // also answers unknown and invalid requests
     if (control != nullptr) return keep(RequestArrived{.id = control->id, .request = *control->request});
   }
   if (asked.has_answer()) {
