@@ -19,7 +19,7 @@ bool Deadband::differs(LocalTime now, const Vec3& value) const noexcept {
   const bool imperceptible =
       sent_ && now - sent_->at < config_.longest_silence &&
       (value - sent_->value).norm() <= std::max(config_.share * sent_->value.norm(), config_.floor);
-  return !imperceptible;  // what is not a number differs
+  return !imperceptible;  // NaN differs from everything
 }
 
 bool Deadband::passes(LocalTime now, const Vec3& value) noexcept {

@@ -11,33 +11,33 @@
 
 namespace tendon {
 
-/// Measures a link: quantiles of its delays, and its longest silence, since the last report.
+/// Measures quantiles of the delays of a link, and its longest silence, since the last report.
 ///
 ///     round trip = (T4 − T1) − (T3 − T2)      to the peer = T2 − θ − T1      from the peer = T4 − (T3 − θ)
 ///
-/// with θ the estimated offset of the peer's clock when the exchange arrives. An error of θ makes both one-way delays
-/// wrong by that much, in opposite directions.
+/// θ is the estimated offset of the peer's clock when the exchange arrives. An error of θ changes both one-way delays
+/// by the same amount in opposite directions.
 ///
-/// Keeps at most 1024 samples of each delay; when there are more, only every second, then every fourth … is used.
-/// Allocates all its memory in the constructor.
+/// At most 1024 samples of each delay are kept. With more samples, only every second one is used, then every fourth,
+/// and so on. All memory is allocated in the constructor.
 ///
 /// Thread-safe: no. Realtime-safe: yes, except report().
 class LinkMeter {
  public:
   explicit LinkMeter(LocalTime now) : heard_(now) {}
 
-  /// A good datagram of the peer has arrived.
+  /// Call when a valid datagram of the peer has arrived.
   void heard(LocalTime now) noexcept;
-  /// The datagram carried an echo. `clock` relates the peer's clock to ours.
+  /// Call when the datagram carried an echo. `clock` relates the peer's clock to ours.
   void observe(const ClockExchange& exchange, const ClockOffsetEstimator::Estimate& clock) noexcept;
 
   struct Report {
     std::optional<Delays> round_trip;
     std::optional<Delays> to_peer;
     std::optional<Delays> from_peer;
-    Duration longest_gap{};  ///< a silence that still lasts counts too
+    Duration longest_gap{};  ///< includes a silence that has not ended yet
   };
-  /// The measurements since the last call.
+  /// Returns the measurements since the last call.
   Report report(LocalTime now);
 
  private:
@@ -45,11 +45,11 @@ class LinkMeter {
    public:
     Samples() { kept_.reserve(kMost); }
     void add(Duration sample) noexcept;
-    /// The quantiles of the samples, which are then forgotten; empty when there are none.
+    /// Returns the quantiles and discards the samples. Empty if there are no samples.
     std::optional<Delays> take();
 
    private:
-    static constexpr std::size_t kMost = 1024;  ///< all those of one second at 1 kHz
+    static constexpr std::size_t kMost = 1024;  ///< samples of one second at 1 kHz
     std::vector<Duration> kept_;
     std::uint64_t seen_ = 0;
     std::uint64_t one_in_ = 1;
@@ -57,7 +57,7 @@ class LinkMeter {
 
   LocalTime heard_;
   Duration longest_gap_{};
-  std::optional<LocalTime> newest_sent_;  ///< T1 of the newest exchange: counts each way there only once
+  std::optional<LocalTime> newest_sent_;  ///< T1 of the newest exchange, so that each delay to the peer is counted once
   Samples round_trip_;
   Samples to_peer_;
   Samples from_peer_;

@@ -10,35 +10,37 @@
 #include "protocol/limits.h"
 #include "protocol/wire/frame.h"
 
-// The reliable part of a session: requests arrive exactly once and in order, and each gets its answer.
+// The reliable part of a session. Requests arrive exactly once and in order, and each one is answered.
 //
-// The requester numbers its requests 1, 2, 3 … and repeats each until its answer arrives; the answer is the
-// acknowledgement. The answerer keeps its last 16 answers and repeats one whenever its request comes again. Sixteen are
-// always enough: the requester has at most 16 requests open, so when request n + 16 arrives, it has the answer to n.
+// The requester numbers its requests 1, 2, 3 … and repeats each one until its answer arrives; the answer is the
+// acknowledgment. The responder keeps its last 16 answers and repeats one when its request arrives again. Sixteen are
+// enough, because the requester has at most 16 open requests: when request n + 16 arrives, it has received the answer
+// to n.
 
 namespace tendon {
 
-/// The end that asks.
+/// The requester.
 class OutgoingRequests {
  public:
-  /// The wait doubles with every repetition up to this, so that a request is repeated at least twice within a timeout
-  /// of 2 s. The limit holds even where the round trip is longer: a request that has lost a copy on a slow link must
-  /// not wait for another slow round trip, and one copy a second costs nothing.
+  /// Longest time between repetitions. The time doubles up to this value, so that a request is repeated at least twice
+  /// within a timeout of 2 s. It applies even if the round trip is longer: on a slow link, a lost copy should not cost
+  /// another round trip, and one copy per second is cheap.
   static constexpr Duration kMaxWait = std::chrono::seconds(1);
 
-  /// Queues a request and returns its id; empty when kRequestWindow are open.
+  /// Queues a request and returns its id, or nullopt if kRequestWindow requests are open.
   std::optional<std::uint32_t> add(const Request& request);
 
-  /// The first request that is due to be sent, or sent again; null when none is.
+  /// The first request that must be sent or resent now, or null.
   const Control* next_due(LocalTime now) const noexcept { return oldest_ == next_ ? nullptr : first_due(now); }
-  /// Request `id` has been sent. It is due again after `timeout`, doubled for each earlier time, at most kMaxWait.
+  /// Records that request `id` was sent. It is due again after `timeout`, which doubles with every repetition up to
+  /// kMaxWait.
   void sent(std::uint32_t id, LocalTime now, Duration timeout) noexcept;
-  /// When the next request is due: LocalTime::min() = one was never sent, LocalTime::max() = none is open.
+  /// When the next request is due. LocalTime::min() if one was never sent, LocalTime::max() if none is open.
   LocalTime next_due_time() const noexcept { return oldest_ == next_ ? LocalTime::max() : first_due_time(); }
 
-  /// Takes an answer. False when it answers a request that was never sent.
+  /// Handles an answer. Returns false if that request was never sent.
   bool acknowledge(const ControlAck& ack);
-  /// The next answer, in the order of the requests.
+  /// Returns the next answer, in the order of the requests.
   std::optional<ControlAck> next_answer();
   bool has_answer() const noexcept { return oldest_ != next_ && slot(oldest_).answer.has_value(); }
 
@@ -55,24 +57,24 @@ class OutgoingRequests {
   LocalTime first_due_time() const noexcept;
 
   std::array<Slot, limits::kRequestWindow> slots_;
-  std::uint32_t oldest_ = 1;  ///< oldest request whose answer was not taken out
+  std::uint32_t oldest_ = 1;  ///< oldest request whose answer was not taken
   std::uint32_t next_ = 1;    ///< id of the next request
 };
 
-/// The end that answers.
+/// The responder.
 class IncomingRequests {
  public:
-  /// Takes a request, in any order. The answer to one that was answered before is sent again. False when a correct peer
-  /// cannot use that id yet.
+  /// Handles a request; they may arrive in any order. If it was answered before, the answer is sent again. Returns
+  /// false if a correct peer could not use that id yet.
   bool take(const Control& control);
-  /// Returns each request exactly once, in order, or null if there is none. The request is valid until the next call of
-  /// `take`. This also answers requests that are unknown or invalid.
+  /// Returns each request exactly once and in order, or null if there is none. It is valid until the next call of
+  /// `take`. Unknown and invalid requests are answered here and skipped.
   const Control* next();
   bool has_next() const noexcept { return slots_[next_ % limits::kRequestWindow].stage == Slot::Stage::kArrived; }
-  /// Answers a request that `next` returned; any other id is ignored.
+  /// Answers a request that was returned by `next`. Other ids are ignored.
   void answer(ControlAck ack);
 
-  /// The first answer that is due to be sent; null when none is.
+  /// The first answer that must be sent now, or null.
   const ControlAck* next_due() const noexcept { return due_ == 0 ? nullptr : first_due(); }
   void sent(std::uint32_t id) noexcept;
 
@@ -89,8 +91,8 @@ class IncomingRequests {
   const ControlAck* first_due() const noexcept;
 
   std::array<Slot, limits::kRequestWindow> slots_;
-  std::uint32_t next_ = 1;  ///< the next request to hand out
-  int due_ = 0;             ///< slots with `due` set; it saves the search, which nearly every datagram would do in vain
+  std::uint32_t next_ = 1;  ///< id of the next request to return
+  int due_ = 0;             ///< number of slots with `due` set; avoids a search that nearly always finds nothing
 };
 
 }  // namespace tendon

@@ -14,7 +14,7 @@ namespace {
 
 constexpr std::string_view kLabel = "tendon-key-id";
 
-/// 32 random bytes have about 30 different values. One random key in 10¹¹ has fewer than 18.
+/// 32 random bytes contain about 30 different values. One random key in 10¹¹ contains fewer than 18.
 constexpr std::size_t kFewestDifferent = 18;
 
 constexpr std::string_view kExpected = "expected one line, `controller` or `observer` and 64 hexadecimal digits";
@@ -38,7 +38,7 @@ std::vector<std::string_view> words_of(std::string_view line) {
   }
 }
 
-/// The words of the only line that is not a comment.
+/// Returns the words of the only line that is not a comment.
 std::vector<std::string_view> only_line(std::string_view text) {
   std::vector<std::string_view> found;
   text = without_byte_order_mark(text);

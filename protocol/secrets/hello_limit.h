@@ -13,24 +13,24 @@
 
 namespace tendon {
 
-/// Limits the handshakes of each source: `kPerSecond` in the long run, `kBurst` at once. A source is an IPv4 address,
-/// or the /64 of an IPv6 address, because whoever has one address of a /64 has all of them.
+/// Limits the rate of handshakes for each source to `kPerSecond` on average with bursts of `kBurst`. A source is an
+/// IPv4 address or the /64 prefix of an IPv6 address, because hosts usually control a whole /64.
 ///
-/// The table never grows: sources share kBuckets buckets, by a hash that outsiders cannot predict. It is consulted only
-/// after a cookie has proved the address, so spoofed sources cannot use up the share of a real one.
+/// The table has a fixed size: sources share kBuckets buckets, by a hash that others cannot predict. It is used only
+/// after a cookie has verified the address, so spoofed sources cannot use up the limit of a real one.
 class HelloLimit {
  public:
-  static constexpr int kPerSecond = 20;  ///< two clients at the handshake's 10 Hz
-  static constexpr int kBurst = 40;      ///< a laboratory behind one address, after a power cut
+  static constexpr int kPerSecond = 20;  ///< two clients that repeat their Hello at 10 Hz
+  static constexpr int kBurst = 40;      ///< a laboratory behind one address after a power cut
   static constexpr std::size_t kBuckets = 1024;
 
   explicit HelloLimit(const std::array<std::byte, 16>& hash_key) noexcept : hash_key_(hash_key) {
     buckets_.fill(LocalTime::min());
   }
 
-  /// True when the source is within its limit; the handshake is then counted.
+  /// Returns true if the source is within its limit, and counts the handshake.
   bool admit(LocalTime now, const Address& from) noexcept {
-    // Generic cell rate algorithm: a bucket stores the time at which it will be empty again.
+    // Generic cell rate algorithm. A bucket stores the time at which it will be empty.
     constexpr Duration kEvery = std::chrono::nanoseconds(std::chrono::seconds(1)) / kPerSecond;
     LocalTime& empty_at = buckets_[bucket(from)];
     const LocalTime begin = std::max(empty_at, now);

@@ -10,34 +10,34 @@
 
 namespace tendon {
 
-/// A suite that seals, by the name that scenes and people call it. The name of suite 2 is also the feature by which a
-/// client offers it and a server chooses it.
+/// A sealed suite and its name in scene files and messages. The name of suite 2 is also the feature that a client
+/// offers and a server chooses.
 struct NamedSuite {
   Suite suite;
   std::string_view name;
 };
 
-/// All of them, in the order in which a server chooses: the fastest first. The only list.
+/// All sealed suites in the order of the server's preference, fastest first.
 inline constexpr std::array kSealedSuites = {NamedSuite{Suite::kAesGcm, "aes-256-gcm"},
                                              NamedSuite{Suite::kNoise, "chacha20-poly1305"}};
 inline constexpr std::string_view kFeatureAesGcm = kSealedSuites[0].name;
 static_assert(kSealedSuites[0].suite == Suite::kAesGcm);
 
-/// Some of them, each once.
+/// Some of the suites above, without duplicates.
 using Suites = std::vector<Suite>;
 
 Suites all_suites();
 bool contains(const Suites& suites, Suite suite) noexcept;
 
-/// Those of kSealedSuites that this processor can speak: suite 2 takes AES in hardware (crypto::has_aes). Throws
-/// std::runtime_error when libsodium cannot start.
+/// The suites of kSealedSuites that this processor supports. Suite 2 requires AES instructions (crypto::has_aes).
+/// Throws std::runtime_error if libsodium cannot be initialized.
 Suites suites_of_this_machine();
 
-/// The names, for a sentence: "aes-256-gcm, chacha20-poly1305".
+/// Returns the names as a list for messages: "aes-256-gcm, chacha20-poly1305".
 std::string names_of(const Suites& suites);
 
-/// Refuses a list that one end cannot work with: throws std::invalid_argument when it is empty, holds anything else
-/// than the suites above, or one that this processor cannot speak.
+/// Throws std::invalid_argument if the list is empty or contains a suite that is not sealed or not supported by this
+/// processor.
 void expect_speakable(const Suites& suites);
 
 }  // namespace tendon
