@@ -7,17 +7,17 @@
 #include <span>
 #include <vector>
 
-// Protobuf allows more than our Writer makes. Fields may come in any order and several times, there may be unknown
-// fields, a list may be split into its numbers, and a varint may be longer than necessary. AnyOrder rewrites such a
-// message in the form of our Writer, so that the Reader needs to know this form only.
+// Protobuf permits encodings that our Writer never produces: fields in any order, duplicate or unknown fields, lists
+// that are split or not packed, and varints that are longer than necessary. AnyOrder rewrites such a message in the
+// form of our Writer, which is the only form that the Reader accepts.
 
 namespace tendon::wire {
 
 /// How a field is encoded.
 enum class Shape : std::uint8_t {
-  kFlag,     ///< a varint: 0 or not
-  kCount32,  ///< a varint, cut to 32 bits; enums, too
-  kCount64,  ///< a varint
+  kFlag,     ///< varint, 0 or not 0
+  kCount32,  ///< varint, truncated to 32 bits; also for enums
+  kCount64,  ///< varint
   kBits32,   ///< 4 bytes
   kBits64,   ///< 8 bytes
   kText,
@@ -35,23 +35,23 @@ struct Schema;
 struct FieldShape {
   std::uint32_t number;
   Shape shape;
-  const Schema* inside = nullptr;  ///< of a message
-  bool arm = false;                ///< of the oneof: no message has two
+  const Schema* inside = nullptr;  ///< fields of a message
+  bool arm = false;                ///< member of the oneof, of which a message has one at most
 };
-/// The fields of a message, by number (wire/generated/schema.h).
+/// The fields of a message, by field number (wire/generated/schema.h).
 struct Schema {
   std::span<const FieldShape> fields;
 };
 
-/// Rewrites messages. It reuses its memory.
+/// Rewrites messages. The object keeps its memory between calls.
 ///
 /// Thread-safe: no.
 class AnyOrder {
  public:
   /// Returns the message as libprotobuf understands it (tests/protocol/wire/protobuf_test.cc). If a number, a text or
-  /// an arm of a oneof appears several times, the last one wins. Messages are merged, lists are joined, and unknown fields
-  /// are dropped. Returns nothing if the message is malformed: if it is truncated, if a text is not UTF-8, or if groups
-  /// do not match or are nested more than 100 deep. The result is valid until the next call.
+  /// an arm of a oneof appears several times, the last one wins. Messages are merged, lists are joined, and unknown
+  /// fields are dropped. Returns nullopt if the message is malformed: if it is truncated, if a text is not UTF-8, or if
+  /// groups do not match or are nested more than 100 deep. The result is valid until the next call.
   std::optional<std::span<const std::byte>> in_order(const Schema& schema, std::span<const std::byte> message);
 
  private:

@@ -8,30 +8,29 @@
 #include "protocol/limits.h"
 #include "protocol/messages.h"
 
-// Whether values are within the bounds of the wire (limits.h).
+// Checks values against the bounds of the wire (limits.h).
 //
 // Realtime-safe.
 
 namespace tendon {
 
-/// False for NaN, too.
+/// Returns false for NaN.
 inline bool bounded(double value) noexcept { return std::abs(value) <= limits::kMaxValue; }
 
-/// Whether a receiver accepts what `command` says of the force: `force`, `model` and `error` are within their bounds
+/// Returns true if the force of `command`, its model and its error are within the bounds that a receiver checks
 /// (WIRE.md).
 bool in_bounds(const ForceCommand& command) noexcept;
 
-/// Returns the name of the first field that is out of bounds, or an empty string. The name is in static storage. This
-/// does not check the device and the channel.
+/// Returns the name of the first field that is out of bounds, or an empty string. The name has static storage. The
+/// device and the channel are not checked.
 std::string_view refused_field(SetOutput wanted) noexcept;
 std::string_view refused_field(SetScale wanted) noexcept;
 std::string_view refused_field(SetShare wanted) noexcept;
 
-/// Whether `command` holds no NaN, and no infinity except as a model's `valid_radius`.
+/// Returns true if `command` contains no NaN, and no infinity except for the `valid_radius` of a model.
 bool is_finite(const ForceCommand& command) noexcept;
 
-/// Why `command` is not in bounds, for the author of the engine that it comes from; empty when it is. Of static
-/// storage.
+/// Explains to the author of an engine why `command` is out of bounds. Empty if it is not. The text has static storage.
 std::string_view objection(const ForceCommand& command) noexcept;
 
 }  // namespace tendon

@@ -15,35 +15,36 @@
 #include "protocol/wire/frame.h"
 #include "protocol/wire/header.h"
 
-// Data datagrams as values, to bytes and back. The bytes are in WIRE.md, the bounds in limits.h.
+// Encodes and decodes Data datagrams. WIRE.md describes the bytes, limits.h the bounds.
 //
-// Encoding trusts its input, except that texts and lists are cut to their bounds. Decoding trusts nothing: it never
-// throws, never prints, and returns "nothing" for what it refuses.
+// The encoder does not check its input, but truncates texts and lists to their bounds. The decoder accepts any input:
+// it never throws or prints, and it returns null or nullopt for bad input.
 
 namespace tendon {
 
-/// Whether a DeviceState has nothing that columns cannot say: a wanted force, a handle that turns, grips or has joints.
+/// Returns true if columns can represent this state, which requires that it has no wanted force and no orientation,
+/// torque, gripper, force sensor or joints.
 inline bool fits_columns(const DeviceState& state) noexcept {
   return !state.force_wanted && !state.stiffness_wanted && !state.turning && !state.torque_applied && !state.grip &&
          !state.grip_applied && !state.hand_force && !state.joints;
 }
 
-/// As it is when it has come in columns: all but its position rounded to single precision.
+/// Rounds everything except the position to single precision, as transmission in columns does.
 void round_to_columns(DeviceState& state) noexcept;
 
-/// Writes one Data datagram after the other, in the clear. It never allocates memory.
+/// Writes Data datagrams without encryption. It never allocates memory.
 ///
-/// Use: `begin`, `add` until it is false or nothing is left, then send `size()` bytes.
+/// Call `begin`, then `add` until it returns false or nothing is left, then send `size()` bytes.
 ///
 /// Thread-safe: no.
 class DataWriter {
  public:
-  /// `buffer` must live until the last `add`; what is written stays within it.
+  /// `buffer` must remain valid until the last `add`.
   void begin(std::span<std::byte> buffer, const Header& header, LocalTime sent,
              const std::optional<OutgoingEcho>& echo);
 
-  /// Appends one frame; false when it does not fit any more, or is the 65th (then the datagram is as before). A buffer
-  /// of kMaxDatagram − 16 bytes or more, without other frames, holds any frame.
+  /// Appends one frame. Returns false, and leaves the datagram unchanged, if the frame does not fit or would be the
+  /// 65th. Any frame fits into an otherwise empty buffer of at least kMaxDatagram − 16 bytes.
   bool add(const DeviceState& state);
   bool add(const ForceCommand& command);
   bool add(const Control& control);
@@ -54,9 +55,9 @@ class DataWriter {
   bool add(const PeerReport& report);
   bool add(const PortFrame& port);
 
-  /// Appends states as one frame in columns: as many of the first ones as fit, and how many they were; 0: none, and the
-  /// datagram is as before. They are of one tick and one instant, in the order of their devices, each has
-  /// fits_columns(), and there are at most kMaxDevices of them.
+  /// Appends as many of the first states as fit, as one frame in columns, and returns their number. If it returns 0,
+  /// the datagram is unchanged. The states must belong to the same tick and time, be sorted by device, satisfy
+  /// fits_columns(), and number kMaxDevices at most.
   std::size_t add(std::span<const DeviceState* const> states);
 
   std::size_t size() const noexcept { return size_; }
@@ -70,32 +71,33 @@ class DataWriter {
   int frames_ = 0;
 };
 
-/// Encodes the message alone, without the frame and the datagram around it.
+/// Encodes only the message, without frame and datagram.
 std::string message_of(const DeviceReport& report);
 std::string message_of(const PeerReport& report);
 
-/// What a Data datagram holds.
+/// The decoded content of a Data datagram.
 struct DataContent {
   PeerTime sent{};
   std::optional<IncomingEcho> echo;
-  std::vector<Frame> frames;  ///< in the order of the datagram, every value within bounds; of columns each state
-  /// The number of frames and echoes with a value out of bounds. They are left out, except for requests
-  /// (see Control::invalid) and answers (see Code::kInvalid) with a valid id.
+  /// in the order of the datagram, all values within bounds; columns yield one frame per state
+  std::vector<Frame> frames;
+  /// The number of frames and echoes that were dropped because a value is out of bounds. Requests (see
+  /// Control::invalid) and answers (see Code::kInvalid) with a valid id are counted but not dropped.
   std::uint32_t invalid = 0;
-  // Of these, the forces:
+  // Those of them that are forces:
   std::uint32_t forces_not_finite = 0;
   std::uint32_t forces_out_of_bounds = 0;
 };
 
-/// Reads one Data datagram after the other. Keeps its memory.
+/// Reads Data datagrams. The object keeps its memory between calls.
 ///
 /// Thread-safe: no.
 class DataReader {
  public:
-  /// `body` is what follows the header. Null when it is malformed: not protobuf, too many frames, or
-  /// without a usable tx_time. The content lives until the next call.
+  /// Decodes `body`, the bytes after the header. Returns null if it is malformed: if it is not protobuf, has too many
+  /// frames, or has no usable tx_time. The content is valid until the next call.
   const DataContent* read(std::span<const std::byte> body);
-  /// Does the same, but always through AnyOrder. Tests compare the two.
+  /// Does the same, but always through AnyOrder, so that tests can compare the two.
   const DataContent* read_in_any_order(std::span<const std::byte> body);
 
  private:

@@ -10,9 +10,9 @@
 #include "protocol/wire/ways/reader.h"
 #include "protocol/wire/ways/writer.h"
 
-// Encodes and decodes DeviceStates: the states of several devices at one step, in columns. This is the only message
-// without a list of fields, because a column collects one member of many values, and the Writer takes only as many
-// states as fit into the datagram. For codec.cc only.
+// Encodes and decodes DeviceStates, the states of several devices at one step in columns. This is the only message
+// without a list of fields, because a column contains one member of many values and only as many states are written as
+// fit into the datagram. For codec.cc only.
 //
 // Realtime-safe.
 
@@ -20,14 +20,15 @@ namespace tendon::wire {
 
 using States = std::span<const DeviceState* const>;
 
-/// How many bytes a length takes. It is less than 2¹⁴.
+/// The number of bytes of a length, which is less than 2¹⁴.
 constexpr std::size_t size_of_length(std::size_t value) noexcept { return value < 0x80 ? 1 : 2; }
 constexpr std::size_t size_of_varint(std::uint64_t value) noexcept {
   return (static_cast<std::size_t>(std::bit_width(value | 1U)) * 9 + 64) / 64;  // one byte for 7 bits
 }
 constexpr std::size_t size_of_field(std::size_t inside) noexcept { return 1 + size_of_length(inside) + inside; }
 
-/// The columns of varints have consecutive numbers. Calls visit(i, f) for each column, where f(state) is its entry.
+/// The columns of varints have consecutive field numbers. Calls visit(i, f) for each column, where f(state) is its
+/// entry.
 constexpr unsigned kFirstCount = 9;
 constexpr std::size_t kCounts = 6;
 template <class Visit>
@@ -40,9 +41,9 @@ void for_each_count(Visit visit) noexcept {
   visit(std::size_t{5}, [](const DeviceState& state) { return std::uint64_t{state.buttons}; });
 }
 
-/// The sizes of all columns for these states.
 struct ColumnSizes {
-  std::array<std::size_t, kCounts> counts;  ///< bytes of each column of varints; 0 if all entries are 0: it is omitted
+  /// bytes of each varint column; 0 if all its entries are 0 and it is omitted
+  std::array<std::size_t, kCounts> counts;
   std::uint32_t devices = 0;
   std::size_t body = 0;  ///< bytes of the message
 
@@ -63,11 +64,11 @@ struct ColumnSizes {
       body += counts[column] > 0 ? size_of_field(counts[column]) : 0;
     });
   }
-  /// Returns the size of the frame with all tags and lengths.
+  /// Returns the size of the whole frame in bytes.
   std::size_t whole() const noexcept { return size_of_field(size_of_field(body)); }
 };
 
-/// Writes a frame with the first states, as many as fit into `room` bytes. Returns their number.
+/// Writes a frame with as many of the first states as fit into `room` bytes, and returns their number.
 inline std::size_t write_columns(Writer& to, std::size_t room, States states) noexcept {
   std::optional<ColumnSizes> sizes;
   for (; !states.empty(); states = states.first(states.size() - 1)) {
@@ -98,7 +99,8 @@ inline std::size_t write_columns(Writer& to, std::size_t room, States states) no
   return states.size();
 }
 
-/// Reads the states. next(tick) must return a new state each time. If a state is refused, the caller must drop all.
+/// Reads the states. next(tick) must return a new state each time. If a state is refused, the caller must drop all of
+/// them.
 template <class Next>
 void read_columns(Reader& in, Next next) {
   std::uint64_t tick = 0;

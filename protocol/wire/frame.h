@@ -10,18 +10,16 @@
 #include "core/base/time.h"
 #include "protocol/messages.h"
 
-// What a Data datagram carries, as values.
-
 namespace tendon {
 
-/// The newest datagram that one end has received from the other, told back to it. `Sent` is the clock
-/// of the one who sent that datagram, `Received` the clock of the one who tells.
+/// Acknowledges the newest datagram received from the peer. `Sent` is the clock of the sender of that datagram,
+/// `Received` the clock of its receiver.
 template <class Sent, class Received>
 struct BasicEcho {
-  Sent sent{};                      ///< T1: when it was sent
-  Received received{};              ///< T2: when it arrived
-  std::uint64_t packet_number = 0;  ///< its number
-  std::uint32_t received_mask = 0;  ///< bit i: packet (packet_number − 1 − i) has arrived too
+  Sent sent{};          ///< T1, when it was sent
+  Received received{};  ///< T2, when it arrived
+  std::uint64_t packet_number = 0;
+  std::uint32_t received_mask = 0;  ///< bit i: packet (packet_number − 1 − i) has also arrived
 };
 using OutgoingEcho = BasicEcho<PeerTime, LocalTime>;
 using IncomingEcho = BasicEcho<LocalTime, PeerTime>;
@@ -35,9 +33,9 @@ struct ControlAck {
   std::uint32_t id = 0;
   Code code = Code::kOk;
   std::string detail;
-  Duration wait{};                            ///< with kBusy of a TakeLease; 0 = nobody knows
-  std::optional<DeviceDescription> device{};  ///< with kOk of a Describe
-  std::optional<HandleDescription> handle{};  ///< with kOk of a Describe that asks for the handle
+  Duration wait{};                            ///< for a TakeLease answered kBusy; 0 = unknown
+  std::optional<DeviceDescription> device{};  ///< for a Describe answered kOk
+  std::optional<HandleDescription> handle{};  ///< for a Describe with `handle` answered kOk
 };
 struct Bye {
   Code code = Code::kOk;

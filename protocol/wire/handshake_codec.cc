@@ -14,7 +14,7 @@
 namespace tendon {
 namespace {
 
-/// The largest size of a Hello or an Answer, with all texts and lists cut to their bounds.
+/// Maximum size of a Hello or an Answer after texts and lists were truncated to their bounds.
 constexpr std::size_t kMostBody = 2048;
 
 template <class Value, class List>
@@ -26,7 +26,7 @@ std::vector<std::byte> bytes_of(const Value& value, List list) {
   return {written.begin(), written.end()};
 }
 
-/// Reads a message, whatever the order of its fields.
+/// Reads a message whose fields may be in any order.
 template <class Value, class List>
 std::optional<Value> read_message(std::span<const std::byte> body, const wire::Schema& schema, List list) {
   wire::AnyOrder any_order;
@@ -39,7 +39,7 @@ std::optional<Value> read_message(std::span<const std::byte> body, const wire::S
   return value;
 }
 
-// Bytes of the handshake datagrams, after the header.
+// Byte offsets in the handshake datagrams.
 constexpr std::size_t kRandomAt = kHeaderSize;
 constexpr std::size_t kCookieAt = kRandomAt + sizeof(ClientRandom);
 constexpr std::size_t kRetrySize = kCookieAt + sizeof(Cookie);
@@ -57,7 +57,7 @@ void put16(const std::array<std::byte, 16>& value, std::byte* to) noexcept {
   std::copy(value.begin(), value.end(), to);
 }
 
-/// The header, when the datagram is a handshake datagram of that type.
+/// Returns the header if this is a handshake datagram of the given type.
 std::optional<Header> handshake_header(std::span<const std::byte> datagram, DatagramType type) noexcept {
   const std::optional<Header> header = decode_header(datagram);
   if (!header || header->type != type || header->packet_number != 0) return {};

@@ -14,11 +14,12 @@
 #include "core/remote/remote_force.h"
 #include "protocol/limits.h"
 
-// The parts of a list of fields. Each message of tendon.proto has one list (wire/generated/), in the order of the field
-// numbers. A way visits it: the Writer encodes a value, the Reader decodes one and checks the bounds. Each line of a
-// list is a field, with its number, its name, the member of the value and its bound. The Writer ignores name and bound.
+// The building blocks of field lists. Each message of tendon.proto has one list (wire/generated/), ordered by field
+// number. Each entry of a list gives a field with its number, its name, the member of the value and its bound. Lists
+// are applied to a visitor: the Writer encodes a value, the Reader decodes one and checks the bounds. The Writer
+// ignores names and bounds.
 
-/// For lists and ways. A way stays in registers only if the compiler inlines every function that uses it.
+/// For lists and visitors. A visitor is kept in registers only if the compiler inlines every function that uses it.
 #define TENDON_INLINE __attribute__((always_inline))
 
 namespace tendon::wire {
@@ -31,28 +32,28 @@ inline constexpr unsigned kFixed64 = 1;
 inline constexpr unsigned kLength = 2;
 inline constexpr unsigned kFixed32 = 5;
 
-/// The number of a field, as an argument. It needs the wire type only if the Reader asks whether the field is present.
+/// A field number as an argument. The wire type is needed only where the Reader asks whether the field is present.
 template <unsigned kNumber, unsigned kType = 0>
 struct Field {};
 template <unsigned kNumber, unsigned kType = 0>
 inline constexpr Field<kNumber, kType> field{};
 
-/// The type of the value for one arm of a oneof.
+/// Selects the type of an arm of a oneof.
 template <class Value>
 struct Kind {};
 template <class Value>
 inline constexpr Kind<Value> kind{};
 
-/// The name of a field in tendon.proto. The answer to a refused request contains it. It has static storage.
+/// The name of a field in tendon.proto, used in the answer to a refused request. It has static storage.
 using Name = const char*;
 
 /// The bound of a number. NaN is always out of bounds.
 struct Within {
   double least = -limits::kMaxValue;
   double most = limits::kMaxValue;
-  bool beyond = false;    ///< `least` is not allowed
-  bool infinity = false;  ///< +infinity is allowed too
-  bool zero = false;      ///< 0 is allowed too
+  bool beyond = false;    ///< `least` itself is not allowed
+  bool infinity = false;  ///< +infinity is also allowed
+  bool zero = false;      ///< 0 is also allowed
   constexpr bool holds(double value) const noexcept {
     if (infinity && value == std::numeric_limits<double>::infinity()) return true;
     if (zero && value == 0) return true;
@@ -60,21 +61,20 @@ struct Within {
   }
 };
 
-/// The bound of an integer.
 struct Counts {
   std::uint64_t least = 0;
   std::uint64_t most = std::numeric_limits<std::uint64_t>::max();
 };
 
-/// A length of time that is sent as a 32-bit number of units. The Writer rounds up.
+/// A duration that is sent as a 32-bit number of units, rounded up.
 struct Period {
-  /// What the Writer sends if the length is out of bounds. A plain cast could make it look valid.
+  /// What the Writer sends if the duration is out of bounds. A plain cast could make it look valid.
   enum class Else { kZero, kMost, kNearest };
   Duration unit;
   Duration least;
   Duration most;
   Else otherwise;
-  bool any = false;  ///< the Reader accepts every number
+  bool any = false;  ///< the Reader accepts any value
 
   constexpr bool holds(Duration length) const noexcept { return any || (length >= least && length <= most); }
   constexpr std::uint32_t units(Duration length) const noexcept {
@@ -86,18 +86,16 @@ struct Period {
   }
 };
 
-/// How long a force is valid, and the time between two PortStates. The receiver refuses 0.
+/// The validity of a force, and the time between two PortStates. A receiver refuses 0.
 inline constexpr Period kValidity{std::chrono::microseconds(1), Duration(1), limits::kMaxValidFor, Period::Else::kZero};
-/// The longest silence between states. No server grants the largest number.
+/// The longest silence between states. The largest number, which no server grants, marks an invalid value.
 inline constexpr Period kMaxSilence{
     std::chrono::microseconds(1), {}, limits::kMaxStateSilence, Period::Else::kMost, true};
 inline constexpr Period kPulse{std::chrono::milliseconds(1), {}, limits::kMaxVibration, Period::Else::kMost};
-/// How long to wait for a lease.
 inline constexpr Period kWait{std::chrono::milliseconds(1), {}, limits::kMaxTimeout, Period::Else::kNearest};
 inline constexpr Period kTimeout{std::chrono::milliseconds(1), std::chrono::milliseconds(1), limits::kMaxTimeout,
                                  Period::Else::kZero};
 
-/// How many entries a list may have.
 struct Entries {
   std::size_t least = 0;
   std::size_t most = 0;
@@ -106,7 +104,7 @@ struct Entries {
 inline bool is_unit(const Vec3& normal) noexcept { return std::abs(normal.norm() - 1) <= Contact::kUnitTolerance; }
 constexpr bool in_time(Duration d) noexcept { return d >= -limits::kMaxTime && d <= limits::kMaxTime; }
 
-/// Returns true if the sum of the counts is at most `all`. It cannot overflow.
+/// Returns true if the sum of the counts is at most `all`, without overflow.
 template <class Counts>
 constexpr bool is_part(const Counts& counts, std::uint64_t all) noexcept {
   for (const std::uint64_t count : counts) {
@@ -116,7 +114,7 @@ constexpr bool is_part(const Counts& counts, std::uint64_t all) noexcept {
   return true;
 }
 
-/// The one or two bytes in front of each field. They hold its number, which is below 2048, and its wire type.
+/// The one or two bytes before each field, with its number (below 2048) and its wire type.
 template <unsigned kField, unsigned kType>
 struct Tag {
   static constexpr unsigned kValue = kField << 3U | kType;
@@ -135,7 +133,6 @@ template <class Value, class... Values>
 const Value* arm_of(const std::optional<std::variant<Values...>>& one) noexcept {
   return one ? std::get_if<Value>(&*one) : nullptr;
 }
-/// Sets this arm.
 template <class Value, class... Values>
 Value& make_arm(std::variant<Values...>& one) {
   return one.template emplace<Value>();

@@ -19,7 +19,8 @@
 
 namespace tendon::wire {
 
-/// Makes a stiffness from 1 entry (k·I), 3 (the diagonal) or 9 (row by row). Returns false for any other number.
+/// Builds a stiffness matrix from 1 entry (k·I), 3 entries (the diagonal) or 9 entries (row by row). Returns false for
+/// any other number of entries.
 inline bool matrix_of(std::span<const double> entries, Mat3& to) noexcept {
   switch (entries.size()) {
     case 1:
@@ -36,7 +37,7 @@ inline bool matrix_of(std::span<const double> entries, Mat3& to) noexcept {
   }
 }
 
-/// Constructs the value in place. emplace() would first set all bytes of an aggregate to 0, which costs time.
+/// Constructs the value in place. emplace() would first zero all bytes of an aggregate, which costs time.
 template <class Value>
 Value& made(std::optional<Value>& value) {
   struct Made {
@@ -48,13 +49,13 @@ Value& made(std::optional<Value>& value) {
   return value.emplace(Made{});
 }
 
-/// Decodes one field after the other, in the order of the field numbers. If a field is not next in the bytes, it is
-/// absent. There are two kinds of failure:
+/// Decodes fields in the order of their numbers. A field that is not next in the bytes is absent. There are two kinds
+/// of failure:
 ///
-/// - The bytes do not have the form of our Writer, because a field is unknown, duplicated, out of order or longer than
-///   necessary, a text is not UTF-8, or the message is truncated. Then `done` returns false, and the value is not
-///   usable. AnyOrder can rewrite the message or tell that it is malformed.
-/// - The form is right, but a number is out of bounds. Then `refused` returns the name of the first such field.
+/// * The encoding is not that of our Writer: a field is unknown, duplicated, out of order or longer than necessary, a
+///   text is not UTF-8, or the message is truncated. Then `done` returns false and the value must not be used. AnyOrder
+///   can rewrite the message or determine that it is malformed.
+/// * A number is out of bounds. Then `refused` returns the name of the first such field.
 ///
 /// The value must be newly constructed.
 class Reader {
@@ -82,7 +83,7 @@ class Reader {
   [[gnu::always_inline]] void flag(Field<kField> f, Name /*name*/, bool& value) noexcept {
     value = count_up_to(f, 1) != 0;
   }
-  /// Reads an enum. `offset` is the difference between the number on the wire and in C++.
+  /// `offset` is the difference between the numbers on the wire and in C++.
   template <unsigned kField, class Enum>
   [[gnu::always_inline]] void choice(Field<kField> f, Name name, Enum& value, Enum first, Enum last,
                                      unsigned offset = 0) noexcept {
@@ -151,7 +152,7 @@ class Reader {
   }
   template <unsigned kField>
   [[gnu::always_inline]] void vector(Field<kField> /*unused*/, Name name, Vec3& value) noexcept {
-    if (!take_three<kField>(value)) {  // a number is 0
+    if (!take_three<kField>(value)) {  // at least one number is 0 and was omitted
       value.setZero();
       inside<kField>([&]() TENDON_INLINE {
         fixed<1, kFixed64>(value.x());
@@ -251,7 +252,7 @@ class Reader {
     }
     require(name, size >= bound.least && size <= bound.most);
   }
-  /// Refuses a message that is absent.
+  /// An absent message is refused.
   template <unsigned kField, class Value, class List>
   [[gnu::always_inline]] void message(Field<kField> /*unused*/, Name name, Value& value, List list) {
     if (!inside<kField>([&]() TENDON_INLINE { list(*this, value); })) require(name, false);
@@ -273,19 +274,19 @@ class Reader {
                                     const Within& bound = {}) noexcept {
     if (next_is<kField, kFixed64>()) present(f, name, value.emplace(), bound);
   }
-  /// Reads the first field of a part. The part is present if this field is.
+  /// Reads the first field of a part, which is present if and only if this field is.
   template <unsigned kField, unsigned kType, class Value, class Fields>
   [[gnu::always_inline]] void part(Field<kField, kType> /*unused*/, std::optional<Value>& value, Fields fields) {
     if (next_is<kField, kType>()) fields(value ? *value : made(value));
   }
-  /// Reads another field of a part. If the part is absent, it only checks the bound.
+  /// Reads another field of a part. If the part is absent, only the bound is checked.
   template <unsigned kField, unsigned kType, class Value, class Fields>
   [[gnu::always_inline]] void rest(Field<kField, kType> /*unused*/, std::optional<Value>& value, Fields fields) {
     if (!next_is<kField, kType>()) return;
     Value none;
     fields(value ? *value : none);
   }
-  /// Reads both corners of a box. It refuses a single corner.
+  /// Reads the two corners of a box. A single corner is refused.
   template <unsigned kLeast, unsigned kMost, class Box>
   void box(Field<kLeast> least, Field<kMost> most, Name name, std::optional<Box>& value) noexcept {
     const bool begins = next_is<kLeast, kLength>();
@@ -297,8 +298,8 @@ class Reader {
     require(name, !begins || (box.min.array() <= box.max.array()).all());
     value = box;
   }
-  /// Reads this arm of a oneof if it is present, and returns whether it is. The caller tries one arm after the other
-  /// and stops at the first, so a second arm remains unread.
+  /// Reads this arm of a oneof if it is present, and returns whether it was. The caller stops at the first arm that is
+  /// present, so a second arm remains unread.
   template <unsigned kField, class Value, class OneOf, class List>
   bool arm(Field<kField, kLength> /*unused*/, Name name, Kind<Value> /*unused*/, OneOf& one, List list) {
     if (!next_is<kField, kLength>()) return false;
@@ -311,7 +312,7 @@ class Reader {
     fields(*this, make_arm<Value>(one));
     return true;
   }
-  /// Refuses a message if none of these arms is next.
+  /// Refuses the message if none of these arms is next.
   template <unsigned... kFields, unsigned... kTypes>
   void one_of(Name name, Field<kFields, kTypes>... /*arms*/) noexcept {
     require(name, (next_is<kFields, kTypes>() || ...));
@@ -325,7 +326,7 @@ class Reader {
     require(name, static_cast<bool>(holds()));
   }
 
-  /// Reads a column of numbers. It refuses a column of another length.
+  /// Reads a column of numbers. A column of another length is refused.
   template <unsigned kField, class Number>
   void column(Field<kField> /*unused*/, Name name, std::span<Number> to) noexcept {
     bool fits = false;
@@ -338,7 +339,7 @@ class Reader {
     });
     require(name, fits);
   }
-  /// Reads a column of varints. If it is absent, `to` does not change.
+  /// Reads a column of varints. If the column is absent, `to` is unchanged.
   template <unsigned kField>
   void column(Field<kField> /*unused*/, Name name, std::span<std::uint64_t> to, std::uint64_t most) noexcept {
     inside<kField>([&]() TENDON_INLINE {
@@ -352,7 +353,7 @@ class Reader {
       require(name, size == to.size() || size == 0);
     });
   }
-  /// If this field is next, skips it and returns true. `inside` can read its content.
+  /// If this field is next, skips it and returns true. `inside` then reads its content.
   template <unsigned kField>
   [[gnu::always_inline]] bool enter(Reader& inside) noexcept {
     if (!take<kField, kLength>()) return false;
@@ -395,7 +396,7 @@ class Reader {
     end_ = end;
     return true;
   }
-  /// Reads a vector if all three numbers are present, which is the usual case.
+  /// Fast path for a vector whose three numbers are all present.
   template <unsigned kField>
   [[gnu::always_inline]] bool take_three(Vec3& value) noexcept {
     constexpr std::size_t kTag = Tag<kField, kLength>::kSize;
@@ -427,7 +428,7 @@ class Reader {
       const Byte byte = *at_++;
       sum |= std::uint64_t{byte & 0x7FU} << shift;
       if (byte >= 0x80) continue;
-      // The shortest form does not end with a 0. The tenth byte has only one bit.
+      // The shortest form does not end with a 0, and the tenth byte has only one bit.
       if ((byte == 0 && shift > 0) || (shift == 63 && byte > 1)) break;
       value = sum;
       return;
@@ -451,7 +452,7 @@ class Reader {
     at_ += sizeof taken;
     value = taken;
   }
-  /// Reads a list of numbers and returns its length. It refuses a list that is longer than `to`.
+  /// Reads a list of numbers and returns its length. A list that is longer than `to` is refused.
   template <unsigned kField>
   [[gnu::always_inline]] std::size_t entries_of(Field<kField> /*unused*/, Name name, std::span<double> to) noexcept {
     std::size_t size = 0;

@@ -28,9 +28,9 @@ inline std::size_t entries_of(const Mat3& k, std::array<double, 9>& entries) noe
   return k(0, 0) == k(1, 1) && k(0, 0) == k(2, 2) ? 1 : 3;
 }
 
-/// Encodes one field after the other. It omits numbers that are 0 and empty texts, as proto3 requires, but writes every
-/// optional value that is present. It cuts texts and lists to their bounds and does not check anything else. The caller
-/// must provide enough memory for the largest message.
+/// Encodes fields one after the other. Numbers that are 0 and empty texts are omitted, as proto3 requires; optional
+/// values are written whenever they are present. Texts and lists are truncated to their bounds, and nothing else is
+/// checked. The caller must provide enough memory for the largest message.
 ///
 /// Realtime-safe.
 class Writer {
@@ -84,7 +84,7 @@ class Writer {
   [[gnu::always_inline]] void number(Field<kField> /*unused*/, Name /*name*/, double value,
                                      const Within& /*bound*/ = {}) noexcept {
     const auto bits = std::bit_cast<std::uint64_t>(value);
-    if (bits != 0) fixed<kField, kFixed64>(bits);  // −0 is none
+    if (bits != 0) fixed<kField, kFixed64>(bits);  // −0 is written
   }
   // These are written even if they are 0.
   template <unsigned kField>
@@ -154,7 +154,7 @@ class Writer {
     numbers(angles, name, value->angle, value->count);
     numbers(velocities, name, value->velocity, value->count);
   }
-  /// Omits the zeros at the end.
+  /// Omits trailing zeros.
   template <unsigned kField, std::size_t kSize>
   void counts(Field<kField> /*unused*/, Name /*name*/, const std::array<std::uint64_t, kSize>& value) noexcept {
     const auto last = std::find_if(value.rbegin(), value.rend(), [](std::uint64_t count) { return count > 0; });
@@ -227,7 +227,6 @@ class Writer {
     if (value) fields(*this, *value);
     return value != nullptr;
   }
-  // Only the Reader checks these.
   template <class... Fields>
   void one_of(Name /*name*/, Fields... /*arms*/) noexcept {}
   void require(Name /*name*/, std::invocable auto /*holds*/) noexcept {}
@@ -251,7 +250,7 @@ class Writer {
     *at_++ = T::kFirst;
     if constexpr (T::kSize == 2) *at_++ = T::kSecond;
   }
-  /// Writes a message of less than 128 bytes, so that its length takes one byte.
+  /// Writes a message of less than 128 bytes, whose length takes one byte.
   template <unsigned kField, class Fields>
   [[gnu::always_inline]] void small(Fields fields) noexcept {
     tag<kField, kLength>();
@@ -261,7 +260,7 @@ class Writer {
   }
 
  private:
-  /// Writes a message of any length. It moves the content by one byte if the length takes two.
+  /// Writes a message of any length. Its content is moved by one byte if the length takes two bytes.
   template <unsigned kField, class Fields>
   [[gnu::always_inline]] void inside(Fields fields) noexcept {
     tag<kField, kLength>();
