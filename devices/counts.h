@@ -10,7 +10,7 @@
 
 namespace tendon {
 
-/// What the drivers of real devices count, since the driver was made, over all its connections. A driver counts those
+/// The event counters of a driver, from its construction on and over all connections. A driver counts only those events
 /// that its device can show. The order is that of `kDeviceCounters`.
 enum class DeviceCount : std::uint8_t {
   kAnswers,
@@ -23,19 +23,19 @@ enum class DeviceCount : std::uint8_t {
   kUnanswered,
 };
 
-/// The row of one counter. This table is the only place that names it: `tendond --json` prints each by its name, the
-/// log gives the meaning, and observers and /metrics are told that the device is degraded.
+/// Describes one counter. `tendond --json` prints it by name, the log prints its meaning, and observers and /metrics
+/// are told that the device is degraded.
 struct DeviceCounter {
   DeviceCount count;
   std::string_view name;      ///< key in `tendond --json`
-  std::string_view meaning;   ///< for people: what it is a number of
-  std::string_view degraded;  ///< what observers are told of a report's time in which it rose; empty: nothing
+  std::string_view meaning;   ///< what is counted, for people
+  std::string_view degraded;  ///< reported to observers if the counter rose during a report; empty: not reported
 };
 
-/// Those that degrade the device, the worst first: a report names only the first that rose, in at most 18 bytes.
+/// Counters that degrade the device, the worst first. A report names only the first one that rose, in at most 18 bytes.
 inline constexpr std::array kDeviceCounters = {
     DeviceCounter{DeviceCount::kAnswers, "answers", "answers of the device that were believed", ""},
-    // A serial line begins in the middle of an answer: some bytes after each opening are normal.
+    // A serial line may begin in the middle of an answer, so a few bytes after each opening are normal.
     DeviceCounter{DeviceCount::kUnreadable, "unreadable", "packets, or bytes of a serial line, that are no answer", ""},
     DeviceCounter{DeviceCount::kFailedSetups, "failed_setups", "firmware or calibrations that the device did not take",
                   "set-up fails"},
@@ -57,7 +57,7 @@ static_assert([] {
   return true;
 }());
 
-/// The numbers, in the order of `kDeviceCounters`.
+/// The values of all counters, in the order of `kDeviceCounters`.
 struct DeviceCounts {
   std::array<std::uint64_t, kDeviceCounters.size()> values{};
 
@@ -67,9 +67,9 @@ struct DeviceCounts {
   friend bool operator==(const DeviceCounts&, const DeviceCounts&) = default;
 };
 
-/// What a driver keeps.
+/// The counters inside a driver.
 ///
-/// Thread-safe: `counts` from any thread, the rest from one. Realtime-safe.
+/// Thread-safe: `counts` from any thread, the others from one thread. Realtime-safe.
 class DeviceCountersKept {
  public:
   void add(DeviceCount count) noexcept { kept_[static_cast<std::size_t>(count)].add(); }

@@ -3,7 +3,7 @@
 
 namespace tendon {
 
-// Here, so that no compiler weighs it where a device's step is inlined.
+// Not inline, so that the compiler does not count it when it inlines the step of a device.
 bool Device::armed() const noexcept { return true; }
 
 void Device::set_output(LocalTime /*now*/, std::uint32_t /*output*/, const OutputSetting& /*setting*/) noexcept {}

@@ -8,7 +8,7 @@
 namespace tendon {
 
 LateLibrary::LateLibrary(const std::string& file) {
-  // As if linked: its symbols are for all, and all that it needs is looked up now and not by a thread that must not wait.
+  // RTLD_GLOBAL: as if the program were linked with it. RTLD_NOW: no symbol is resolved later on a realtime thread.
   if (dlopen(file.c_str(), RTLD_NOW | RTLD_GLOBAL) != nullptr) return;
   const char* const why = dlerror();  // NOLINT(concurrency-mt-unsafe): the C library has one for each thread
   throw std::runtime_error(std::string(why) + "; expected it to be installed");

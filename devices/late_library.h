@@ -5,22 +5,21 @@
 
 namespace tendon {
 
-/// A shared library that comes into the process when this is made, and stays until the process ends. A program that
-/// seldom needs a library is not linked with it: the library's pages, and those of all that it needs itself, are then
-/// taken by the scenes that list what it is for.
+/// Loads a shared library at construction; it stays loaded until the process ends. A program that seldom needs a
+/// library is not linked with it, so that only scenes that use the library spend memory on it and its dependencies.
 ///
 ///     struct Libusb {
 ///       LateLibrary file{"libusb-1.0.so.0"};
 ///       decltype(&::libusb_init) init = file["libusb_init"];
 ///     };
 ///
-/// Names are looked up as the dynamic linker looks them up for a program that is linked: a preloaded library comes first.
+/// Names are resolved as for a linked library: a preloaded library takes precedence.
 ///
 /// Thread-safe: yes. Realtime-safe: no.
 class LateLibrary {
  public:
-  /// What a library exports. It becomes a pointer to a function of the type that the caller declares, which nobody
-  /// checks: take the type from the library's header.
+  /// The address of an exported function. It converts to any function pointer without a check, so take the type from
+  /// the header of the library.
   class Function {
    public:
     template <class Signature>
@@ -34,12 +33,11 @@ class LateLibrary {
     void* at_;
   };
 
-  /// `file`: its name with its version of the interface, as in "libusb-1.0.so.0". Throws std::runtime_error when there
-  /// is none: "libusb-1.0.so.0: cannot open shared object file: No such file or directory; expected it to be
-  /// installed".
+  /// `file` includes the version of the interface, as in "libusb-1.0.so.0". Throws std::runtime_error if it cannot be
+  /// loaded: "libusb-1.0.so.0: cannot open shared object file: No such file or directory; expected it to be installed".
   explicit LateLibrary(const std::string& file);
 
-  /// Throws std::runtime_error when the library exports nothing by this name.
+  /// Throws std::runtime_error if the library does not export this name.
   Function operator[](const char* name) const;
 };
 

@@ -11,12 +11,12 @@ namespace tendon {
 
 namespace {
 
-/// × 0.999 each ms, as a time constant.
+/// × 0.999 each ms as a time constant.
 constexpr double kBoundTime_s = 1.0;
 constexpr double kWarm = 0.7;
 constexpr double kCool = 0.5;
 
-/// The share that shortens `size` to `max`; 0 when `size` is not a number.
+/// Returns the factor that reduces `size` to `max`, or 0 if `size` is NaN.
 double up_to(double max, double size) noexcept {
   if (size <= max) return 1;
   return size > max && max > 0 ? max / size : 0;
@@ -62,7 +62,7 @@ HeatLimit::HeatLimit(const Config& config) : config_(config), bound_(config.peak
 void HeatLimit::observe(double held, Duration elapsed) noexcept {
   const double t = std::max(0.0, seconds(elapsed));
   const double load = held / config_.continuous;
-  // Exact for a force that is constant over the interval, however long.
+  // Exact for a constant force over an interval of any length.
   heat_ += (load * load - heat_) * -std::expm1(-t / seconds(config_.time_constant));
   const double moved = -std::expm1(-t / kBoundTime_s);
   if (heat_ >= 1) {

@@ -7,23 +7,24 @@
 
 namespace tendon {
 
-// The parts of the safety layer that reduce a force. Each gives a share s of it, 0 ≤ s ≤ 1, the same for all
-// components. So none makes a force longer, turns it or raises a component, and the force still keeps every bound that
-// it kept before: the energy limiter's on the norm or on each axis. A SafeDevice has those that its Config lists.
+// The parts of the safety layer that reduce a force. Each returns a factor s, 0 ≤ s ≤ 1, for all components of the
+// force. No part can therefore lengthen or rotate a force or increase a component, and the force stays within all
+// bounds that it satisfied before, such as those of the energy limiter on the norm or on each axis. SafeDevice uses the
+// parts that its Config lists.
 //
-// A torque has a limit and a growth limit of its own, in N·m, and a grip, as a vector of one component.
+// A torque has its own limit and growth limit, in N·m. A grip force is treated as a vector with one component.
 //
-// Thread-safe: no. Realtime-safe: all but the constructors, which throw std::invalid_argument naming the field.
+// Thread-safe: no. Realtime-safe: all except the constructors, which throw std::invalid_argument, naming the field.
 
-/// No force is longer than `max`: s = max / ‖F‖. Clipping each component by itself would turn the force; wrapping
-/// (Novint Falcon with libnifalcon: 30 N·m asked for, 16 bits sent) would reverse it. Source: HD_EXCEEDED_MAX_FORCE of
-/// OpenHaptics.
+/// Limits the norm of the force to `max`: s = max / ‖F‖. Clipping each component would rotate the force; integer
+/// wrap-around would reverse it (Novint Falcon with libnifalcon: 30 N·m requested, 16 bits sent). Source:
+/// HD_EXCEEDED_MAX_FORCE of OpenHaptics.
 class ForceLimit {
  public:
   struct Config {
-    double max = 0;  ///< N, of a torque N·m; > 0
+    double max = 0;  ///< N, or N·m for a torque; > 0
   };
-  /// `field`: its name in errors.
+  /// `field` is the name in error messages.
   explicit ForceLimit(const Config& config, const char* field = "force_limit");
   double share(const Vec3& asked) const noexcept;
   double max() const noexcept { return config_.max; }
@@ -32,27 +33,28 @@ class ForceLimit {
   Config config_;
 };
 
-/// No force grows along its own direction faster than `rate`:
+/// Limits the rate at which a force grows along its own direction:
 ///
 ///     ‖s F‖ ≤ (F_before · F/‖F‖)₊ + rate · T
 ///
-/// A force falls at once; one that reverses begins at zero. A limit on every change would keep up a force that nobody
-/// asks for any more, which a safety layer must not do. Source: HD_EXCEEDED_MAX_FORCE_IMPULSE (0x0202) of OpenHaptics.
+/// A force may fall immediately, and a force that reverses starts at zero. A limit on every change would keep up a
+/// force that is no longer requested, which a safety layer must not do. Source: HD_EXCEEDED_MAX_FORCE_IMPULSE (0x0202)
+/// of OpenHaptics.
 class GrowthLimit {
  public:
   struct Config {
-    double rate = 0;  ///< N/s, of a torque N·m/s; > 0
+    double rate = 0;  ///< N/s, or N·m/s for a torque; > 0
   };
-  /// `field`: its name in errors.
+  /// `field` is the name in error messages.
   explicit GrowthLimit(const Config& config, const char* field = "growth_limit");
-  /// `before`: the force really held for the last `elapsed`.
+  /// `before` is the force that was actually held during the last `elapsed`.
   double share(const Vec3& asked, const Vec3& before, Duration elapsed) const noexcept;
 
  private:
   Config config_;
 };
 
-/// From zero to the whole force in `time` after arming: s = t / time. Source: HD_FORCE_RAMPING_RATE of OpenHaptics.
+/// Ramps the force up from zero within `time` after arming: s = t / time. Source: HD_FORCE_RAMPING_RATE of OpenHaptics.
 class RampIn {
  public:
   struct Config {
@@ -65,23 +67,24 @@ class RampIn {
   Config config_;
 };
 
-/// From the whole force to zero: s = 1 − (t − since) / time. A watchdog that has tripped ends a force this way.
+/// Ramps the force down to zero: s = 1 − (t − since) / time. Used when a watchdog trips.
 struct RampOut {
   LocalTime since{};
   Duration time{};
   double share(LocalTime now) const noexcept;
 };
 
-/// Keeps motors from burning: a first-order model of their heat under the force that was really held,
+/// Protects the motors from overheating. A first-order thermal model is driven by the force that was actually held,
 ///
-///     τ dθ/dt = (‖F‖ / continuous)² − θ                         θ = 1: as warm as `continuous` for ever makes them
+///     τ dθ/dt = (‖F‖ / continuous)² − θ                         θ = 1: the steady state at `continuous`
 ///
-/// and a bound on ‖F‖ that starts at `peak`, falls towards `continuous` with a time constant of 1 s while θ > 0.7, and
-/// rises again with the same one when θ < 0.5. At θ ≥ 1 it is `continuous` at once; so θ never exceeds
+/// and ‖F‖ is bounded. The bound starts at `peak`, falls to `continuous` with a time constant of 1 s while θ > 0.7, and
+/// rises again with the same time constant while θ < 0.5. For θ ≥ 1 it is `continuous` immediately, so θ never exceeds
 /// 1 + (T/τ)(peak/continuous)².
 ///
-/// There is one heat for all motors, from the force at the handle. It is right where the motors share the force evenly,
-/// and too low for a motor that bears more. Only the device knows the torque of each joint, and has to bound it itself.
+/// There is one temperature for all motors, computed from the force at the handle. It is correct if the motors share
+/// the force evenly, and too low for a motor that carries more. Only the device knows the torque of each joint and must
+/// limit it itself.
 ///
 /// Source: PreventWarmMotors of OpenHaptics (0.7, 0.5, × 0.999 each ms). Touch: peak 3.3 N, continuous 0.88 N.
 class HeatLimit {
@@ -89,10 +92,10 @@ class HeatLimit {
   struct Config {
     double peak = 0;           ///< N, ≥ continuous
     double continuous = 0;     ///< N, > 0
-    Duration time_constant{};  ///< τ, of the motors' heat, > 0
+    Duration time_constant{};  ///< τ of the motors, > 0
   };
   explicit HeatLimit(const Config& config);
-  /// `held` (N, norm) was on for `elapsed`.
+  /// Updates the temperature. `held` (N, norm) was applied for `elapsed`.
   void observe(double held, Duration elapsed) noexcept;
   double share(const Vec3& asked) const noexcept;
   double heat() const noexcept { return heat_; }    ///< θ
@@ -104,25 +107,25 @@ class HeatLimit {
   double bound_;
 };
 
-/// Forces may push outwards inside a sphere or box, less and less outside it, and no more at the distance `margin` from
-/// it. With the outward direction n, and w = 1 inside, 0 from that distance on and linear between,
+/// Fades out outward forces outside a sphere or box; at the distance `margin` from it they are zero. With the outward
+/// direction n, and the weight w that falls linearly from 1 at the surface to 0 at `margin`,
 ///
 ///     s = 1 − (1 − w) (F·n/‖F‖)₊
 ///
-/// so a force that pulls the hand back stays whole. Far out, devices come near their stops and singularities, where a
-/// small error of position makes a large error of force.
+/// so a force that pulls the hand back is not reduced. Far out, devices are close to their stops and singularities,
+/// where a small position error causes a large force error.
 ///
-/// It neither pushes nor brakes by itself. The energy limiter would not see the force of such a wall, which is passive
-/// only while b > K T/2 + |B| (Colgate and Schenkel, J. Robotic Systems 14(1), 1997): with b = 1 N·s/m at 1 kHz, a wall
-/// of 2 N/mm without a brake, or a brake of 1 N·s/m without a spring; and the limiter could not count on that b any
-/// more. An engine can render such a wall through the limiter.
+/// The workspace itself neither pushes nor damps. The energy limiter would not see the force of such a wall, which is
+/// passive only while b > K T/2 + |B| (Colgate and Schenkel, J. Robotic Systems 14(1), 1997). With b = 1 N·s/m at 1
+/// kHz, that allows a wall of 2 N/mm without damping or a damper of 1 N·s/m without a spring, and the limiter could no
+/// longer rely on that b. An engine can render such a wall through the limiter.
 class Workspace {
  public:
   struct Sphere {
     double radius;  ///< m, > 0
   };
   struct Box {
-    Vec3 half;  ///< m, half its edges, each > 0; parallel to the axes of the device's frame
+    Vec3 half;  ///< m, half of each edge, > 0; edges are parallel to the axes of the device's base frame
   };
   struct Config {
     Vec3 centre = Vec3::Zero();  ///< m
@@ -131,7 +134,7 @@ class Workspace {
   };
   explicit Workspace(const Config& config);
   double share(const Vec3& asked, const Vec3& position) const noexcept;
-  /// The vector from the nearest point inside to `position`, m; zero inside.
+  /// Returns the vector from the nearest point inside to `position`, m; zero inside.
   Vec3 outside(const Vec3& position) const noexcept;
 
  private:

@@ -33,7 +33,7 @@ namespace {
 constexpr int kTries = 5;
 constexpr unsigned kTryTime_ms = 10;
 
-/// The server's message to its guardian. It carries a descriptor, unless the device is to be forgotten.
+/// A message of the server to its guardian. It carries a descriptor unless the device is to be unregistered.
 struct Order {
   std::size_t device;
   ZeroPacket zero;
@@ -58,11 +58,11 @@ bool send_order(int socket, const Order& order, int fd) noexcept {
   return sendmsg(socket, &message, MSG_NOSIGNAL) == static_cast<ssize_t>(sizeof(order));
 }
 
-/// The period at which the guardian reads the heartbeats.
+/// Period at which the guardian reads the heartbeats.
 constexpr Duration kLook = std::chrono::milliseconds(2);
 constexpr std::uint64_t kStillLooks = Heartbeat::kStill / kLook;
 
-/// A device as the guardian knows it.
+/// A device from the guardian's point of view.
 struct Charge {
   int fd = -1;
   std::optional<ZeroPacket> zero;
@@ -70,8 +70,8 @@ struct Charge {
   std::uint64_t looks = 0;  ///< number of reads since `beat` changed
 };
 
-/// Takes the next order; waits for it unless `flags` has MSG_DONTWAIT. False when there is none: without the flag, this
-/// means that the server is gone.
+/// Handles the next order. Waits for it unless `flags` contains MSG_DONTWAIT. Returns false if there is none, which
+/// without that flag means that the server has exited.
 bool take_order(int socket, std::array<Charge, Guardian::kDevices>& charges, int flags = 0) noexcept {
   alignas(Order) std::array<std::byte, sizeof(Order)> bytes{};
   iovec part{.iov_base = bytes.data(), .iov_len = bytes.size()};
@@ -104,8 +104,8 @@ void end_forces(const std::array<Charge, Guardian::kDevices>& charges) noexcept 
   }
 }
 
-/// Sends the zero packet to each device whose heartbeat has stopped. `looks` is the number of timer ticks since the last
-/// call.
+/// Sends the zero packet to each device whose heartbeat has stopped. `looks` is the number of timer ticks since the
+/// last call.
 void watch_hearts(const Heartbeat* hearts, std::array<Charge, Guardian::kDevices>& charges,
                   std::uint64_t looks) noexcept {
   for (std::size_t i = 0; i < charges.size(); ++i) {
@@ -122,7 +122,6 @@ void watch_hearts(const Heartbeat* hearts, std::array<Charge, Guardian::kDevices
   }
 }
 
-/// Starts the timer if any device is guarded, and stops it otherwise.
 void set_timer(int timer, const std::array<Charge, Guardian::kDevices>& charges) noexcept {
   const bool any = std::ranges::any_of(charges, [](const Charge& charge) { return charge.fd >= 0; });
   const timespec period{.tv_sec = 0, .tv_nsec = any ? kLook.count() : 0};
@@ -130,8 +129,8 @@ void set_timer(int timer, const std::array<Charge, Guardian::kDevices>& charges)
   timerfd_settime(timer, 0, &times, nullptr);
 }
 
-/// While it exists, blocks all signals of the calling thread. Threads and processes started meanwhile inherit this and
-/// keep it.
+/// Blocks all signals of the calling thread during its lifetime. Threads and processes that are started in that time
+/// inherit the mask and keep it.
 class NoSignals {
  public:
   NoSignals() noexcept {
@@ -147,12 +146,12 @@ class NoSignals {
   sigset_t before_;
 };
 
-/// The kernel sends this signal to the guardian when its parent, a thread of the server, is dead.
+/// The kernel sends this signal to the guardian when its parent thread dies.
 constexpr int kParentDied = SIGUSR1;
-/// The guardian sends this byte as soon as it is certain to get that signal.
+/// The guardian sends this byte when it is certain to receive that signal.
 constexpr char kStandsGuard = 'g';
 
-// The caller has blocked all signals.
+// The caller must have blocked all signals.
 [[noreturn]] void stand_guard(int socket, const Heartbeat* hearts) noexcept {
   setsid();
   prctl(PR_SET_PDEATHSIG, kParentDied);
@@ -178,8 +177,8 @@ constexpr char kStandsGuard = 'g';
     if (signalfd_siginfo info{}; told[1].revents != 0 && read(parent.fd, &info, sizeof info) > 0) {
       while (take_order(socket, charges, MSG_DONTWAIT)) {
       }
-      // Only the parent is known to be dead. Other threads may still be dying, one of them in the middle of a last
-      // command. So the packets are written again at the end, when no thread is left.
+      // Only the parent is known to be dead. Other threads may be dying in the middle of a last command. The packets
+      // are therefore written again at the end, when no thread is left.
       end_forces(charges);
     } else if (told[0].revents != 0) {
       server_lives = take_order(socket, charges);
@@ -216,7 +215,7 @@ bool ZeroPacket::send_once(int fd) const noexcept {
 bool ZeroPacket::send(int fd) const noexcept {
   for (int i = 0; i < kTries; ++i) {
     if (send_once(fd)) return true;
-    if (errno == ENODEV || errno == EBADF || errno == EPIPE) return false;  // nobody is there to feel anything
+    if (errno == ENODEV || errno == EBADF || errno == EPIPE) return false;  // the device is disconnected
     if (errno != ETIMEDOUT) usleep(kTryTime_ms * 1000);
   }
   return false;
@@ -245,7 +244,8 @@ Guardian::Guardian(const std::function<void()>& on_start) {
     }
     const int error = errno;
     close(ends[1]);
-    forked.set_value(guardian > 0 ? guardian : -error);  // the constructor's variables may be gone after this line
+    // from here on, the variables of the constructor may no longer exist
+    forked.set_value(guardian > 0 ? guardian : -error);
     while (guardian > 0) {
       int status = 0;
       if (waitpid(guardian, &status, WUNTRACED | WCONTINUED) < 0 && errno == EINTR) continue;

@@ -9,13 +9,13 @@
 
 namespace tendon {
 
-/// Tells the guardian that the haptic thread has stepped a device, and whether the device holds a force. The memory is
-/// shared by both processes (Guardian::heartbeat).
+/// Tells the guardian that the haptic thread has stepped a device, and whether the device holds a force. It lies in
+/// memory that both processes share (Guardian::heartbeat).
 ///
 /// Realtime-safe: yes. One thread calls `beat`; `last` may be called from any thread or process.
 class Heartbeat {
  public:
-  /// If no step comes for this time, the guardian ends the force, and the device has to be armed again (SafeDevice).
+  /// If there is no step for this long, the guardian ends the force, and the device must be armed again (SafeDevice).
   static constexpr Duration kStill = std::chrono::milliseconds(20);
 
   void beat(bool holds_force) noexcept {

@@ -14,11 +14,12 @@ namespace tendon {
 
 namespace {
 
-/// A handle rests when it has been still for this long, which no turning point of a tremor (8 to 12 Hz) is.
+/// A handle counts as being at rest after this long without motion. It is longer than the pause at a turning point of a
+/// tremor (8 to 12 Hz).
 constexpr Duration kRest = std::chrono::milliseconds(50);
-/// Missing samples for up to 10 ms do not reset the rest timer; USB replies jitter.
+/// Gaps of up to 10 ms between samples do not reset the rest timer, because USB replies jitter.
 constexpr Duration kBlind = std::chrono::milliseconds(10);
-/// After a pause, the force may grow by one step of this length at most, not by the whole pause.
+/// After a pause, the force may grow by one step of at most this length and not by the whole pause.
 constexpr Duration kLongestStep = std::chrono::milliseconds(10);
 
 template <class Part, class Config, class... More>
@@ -30,13 +31,13 @@ std::optional<Part> made(const std::optional<Config>& config, More... more) {
 DeviceInfo limited_info(DeviceInfo info, const std::optional<ForceLimit>& force,
                         const std::optional<ForceLimit>& torque, const std::optional<ForceLimit>& grip) {
   if (force) info.max_force = info.max_force > 0 ? std::min(info.max_force, force->max()) : force->max();
-  // 0 = no motor here, and a limit makes none.
+  // 0 = no motor, which a limit does not change.
   if (torque) info.max_torque = std::min(info.max_torque, torque->max());
   if (grip && info.gripper) info.gripper->max_force = std::min(info.gripper->max_force, grip->max());
   return info;
 }
 
-/// The grip as a vector, for the parts that are made for forces.
+/// The grip as a vector, for parts that operate on forces.
 Vec3 along(double grip) noexcept { return {grip, 0, 0}; }
 
 }  // namespace
@@ -133,7 +134,7 @@ void SafeDevice::disarm() noexcept {
   publish();
 }
 
-/// For a reason that is no fault. A fault whose force is still on its way to zero remains a fault.
+/// Leaves Armed without a fault. A fault that is still ramping the force down remains a fault.
 void SafeDevice::leave_armed() noexcept {
   if (stage_ != Stage::kArmed) return;
   stage_ = stopping_ ? Stage::kFault : Stage::kWaiting;
@@ -152,7 +153,7 @@ std::optional<PositionSample> SafeDevice::read(LocalTime now) noexcept {
   return sample;
 }
 
-/// Whether the sample has numbers that mean something.
+/// Returns false if a value of the sample is not meaningful.
 bool SafeDevice::is_sound(const PositionSample& sample) noexcept {
   if (!sample.position.allFinite() || (sample.opening && !std::isfinite(*sample.opening))) {
     trip(SafetyFault::kPositionNotFinite);
@@ -177,7 +178,7 @@ bool SafeDevice::accept(const PositionSample& sample) noexcept {
   if (step_bound_ && last_ && step_bound_->tripped(last_->position, sample.position, sample.at - last_->at)) {
     trip(SafetyFault::kPositionJumped);
     forget_motion();
-    last_ = sample;  // where it is from now on
+    last_ = sample;  // the new reference for the next sample
     return false;
   }
   last_ = sample;

@@ -13,84 +13,84 @@
 
 namespace tendon {
 
-/// Where a device stands between the plug and the force. There is force in `kArmed` only.
+/// The state of a device between connection and force output. Forces are rendered only in `kArmed`.
 enum class SafetyState : std::uint8_t {
-  kAbsent,    ///< kAbsent to kHomed: the Device::State of the device inside
-  kOpening,   ///< see kAbsent
-  kFirmware,  ///< see kAbsent
-  kUnhomed,   ///< see kAbsent
-  kHomed,     ///< ready, and waiting to be armed
-  kArmed,     ///< gives forces
-  kFault,     ///< there was a fault (SafetyFault): no force until it is armed again
+  kAbsent,  ///< kAbsent to kHomed are the Device::State of the wrapped device
+  kOpening,
+  kFirmware,
+  kUnhomed,
+  kHomed,  ///< ready and waiting to be armed
+  kArmed,
+  kFault,  ///< after a SafetyFault: no force until it is armed again
 };
 std::string_view to_string(SafetyState state) noexcept;
 
-/// Why an armed device gives no force any more.
+/// Why an armed device no longer renders forces.
 enum class SafetyFault : std::uint8_t {
   kNone,
-  kForceNotFinite,     ///< NaN or infinity was asked for: of a force, torque or grip
-  kPositionNotFinite,  ///< the device measured NaN or infinity: a position or an opening
+  kForceNotFinite,     ///< a requested force, torque or grip is NaN or infinite
+  kPositionNotFinite,  ///< a measured position or opening is NaN or infinite
   kPositionJumped,     ///< StepBound
   kTooFast,            ///< SpeedTrip
-  kCommandSilent,      ///< nobody called `apply` in time (Watchdog)
+  kCommandSilent,      ///< `apply` was not called in time (Watchdog)
   kDeviceSilent,       ///< the device gave no position in time (Watchdog)
-  kDeviceLost,         ///< it is not homed any more: unplugged, or lost its origin
-  kNoRotation,         ///< the device measured an orientation that is not a rotation
+  kDeviceLost,         ///< it is no longer homed: disconnected, or lost its origin
+  kNoRotation,         ///< a measured orientation is not a rotation
   kTurnsTooFast,       ///< TurnTrip
   kGuardianLost,       ///< the guardian is dead or stopped (Guardian::stands)
 };
-/// A sentence for people: "the handle was faster than a hand".
+/// Returns a message for people, such as "the handle was faster than a hand".
 std::string_view to_string(SafetyFault fault) noexcept;
 
-/// The safety layer: a device around any other, between the control law and the motors.
+/// The safety layer: a decorator for any other device, between the control law and the motors.
 ///
 ///     F ← 0                              unless armed; F with a NaN or infinity is a fault
 ///     F ← s F, 0 ≤ s ≤ 1                 for each listed part: size, heat, workspace, ramp-in, the ramp to zero of a
 ///                                        watchdog that has tripped, and growth
 ///
-/// So |F_i applied| ≤ |F_i asked| for each component i, provided that the device inside writes no more than it is told.
-/// `apply` returns the force that the device wrote, and the energy ledger counts that one. A part that the scene does
-/// not list costs a branch. The state machine is always there:
+/// Therefore |F_i applied| ≤ |F_i requested| for each component i, provided that the wrapped device writes no more than
+/// it is told. `apply` returns the force that the device wrote, which the energy ledger counts. A part that the scene
+/// does not list costs one branch. The state machine is always active:
 ///
 ///     Absent → Opening → Firmware → Unhomed → Homed ⇄ Armed → Fault → Armed
 ///
-/// **Torque and grip** (`apply_all`) have all of this too. Force and torque have one share, so a wrench keeps its
-/// direction: the least that any part demands of the force or of the torque. The workspace and the heat look at the
-/// force alone, and their shares hold for the torque as well. The grip has a limit and a growth limit of its own, the
-/// same ramps, and the same ends. `apply` gives no torque and no grip.
+/// **Torque and grip** (`apply_all`) are treated in the same way. Force and torque have a common factor, the smallest
+/// that any part requires for either, so that a wrench keeps its direction. Workspace and heat consider only the force,
+/// and their factors also apply to the torque. The grip has its own limit and growth limit, the same ramps, and ends
+/// under the same conditions. `apply` renders no torque and no grip.
 ///
-/// **Arming** needs a request (Arming::By). The first `apply` grants it at which all of this holds: the device is
-/// homed; for 50 ms its handle has moved no further than `rest_speed` allows, and no two positions were more than 10 ms
-/// apart; the force and the grip asked for are at most `rest_force`, the torque at most `rest_torque`; the dead man's
-/// button, if the scene lists one, is held. A handle that only turns is at rest. A request that is not granted within
-/// `patience` is forgotten. So is a request before the first `read`.
+/// **Arming** requires a request (Arming::By). It is granted by the first `apply` at which all of these conditions
+/// hold: the device is homed; for 50 ms the handle has not moved further than `rest_speed` allows, with no gap of more
+/// than 10 ms between two positions; the requested force and grip are at most `rest_force` and the torque at most
+/// `rest_torque`; and the dead man's button, if the scene lists one, is held. A handle that only rotates counts as
+/// being at rest. A request that is not granted within `patience` expires. A request before the first `read` is
+/// ignored.
 ///
-/// **Faults** are latched in Armed only. Outside Armed there is no force to take away, and a trouble there keeps the
-/// device from being armed. The force is zero from the next `apply` on. A watchdog with a ramp takes the force to zero
-/// over that time; the state stays Armed until the force is zero. Releasing the dead man's button is no fault: Armed →
-/// Homed, and the force is zero at once.
+/// **Faults** are latched in Armed only. Otherwise there is no force to end, and the condition prevents arming. The
+/// force is zero from the next `apply` on. A watchdog with a ramp takes the force to zero over that time, and the state
+/// stays Armed until the force is zero. Releasing the dead man's button is not a fault: Armed → Homed, and the force is
+/// zero immediately.
 ///
-/// **Disarming** is the operator's order and no fault: Armed → Homed, and the force is zero at once. It withdraws a
-/// request to arm that is not granted yet. Only `arm` ends it: neither the start (`kStart`) arms the device then, nor
-/// the dead man's button, which has to be pressed anew after `arm`. A fault stays a fault; a ramp of a watchdog becomes
-/// one at once.
+/// **Disarming** is a command of the operator and not a fault: Armed → Homed, and the force is zero immediately. It
+/// withdraws a request to arm that was not granted yet. Only `arm` ends it: until then, neither startup (`kStart`) nor
+/// the dead man's button arms the device, and the button must be pressed again after `arm`. A fault stays a fault. If a
+/// watchdog is ramping the force down, it becomes a fault immediately.
 ///
-/// If the process hangs or dies, the guardian (guardian.h) or the watchdog of the device ends the force. If the device has
-/// a guardian, there are two more faults. If `apply` is not called for Heartbeat::kStill, the guardian ends the force, and
-/// the next `read` sets kCommandSilent. If the guardian is killed or stopped, `read` sets kGuardianLost, and the device
-/// cannot be armed.
+/// If the process hangs or dies, the guardian (guardian.h) or the watchdog of the device ends the force. A guardian
+/// adds two faults. If `apply` is not called for Heartbeat::kStill, the guardian ends the force and the next `read`
+/// sets kCommandSilent. If the guardian is killed or stopped, `read` sets kGuardianLost and the device cannot be armed.
 ///
-/// A sample whose position or opening is not a number, whose orientation is no rotation, or that jumped (StepBound), is
-/// passed on as no sample.
+/// `read` returns nullopt for a sample whose position or opening is not finite, whose orientation is not a rotation, or
+/// whose position jumped (StepBound).
 ///
-/// Thread-safe: no; but `status` may be read from any thread. Realtime-safe: all but the constructor.
+/// Thread-safe: no, except `status`, which may be called from any thread. Realtime-safe: all except the constructor.
 class SafeDevice final : public Device {
  public:
   struct Arming {
     enum class By : std::uint8_t {
-      kRequest,  ///< only `arm`
-      kStart,    ///< the first time by itself, then `arm`
-      kDeadMan,  ///< only by pressing the dead man's button; `arm` only takes a `disarm` back
+      kRequest,  ///< by `arm` only
+      kStart,    ///< automatically the first time, then by `arm`
+      kDeadMan,  ///< only by pressing the dead man's button; `arm` only revokes a `disarm`
     };
     By by = By::kRequest;
     double rest_speed = 0.02;   ///< m/s, > 0
@@ -108,10 +108,10 @@ class SafeDevice final : public Device {
     std::optional<RampIn::Config> ramp_in;
     std::optional<SpeedTrip::Config> speed_trip;
     std::optional<StepBound::Config> step_bound;
-    std::optional<Watchdog::Config> command_watchdog;  ///< between two calls of `apply`
-    std::optional<Watchdog::Config> link_watchdog;     ///< since the newest position was sampled
+    std::optional<Watchdog::Config> command_watchdog;  ///< limits the time between two calls of `apply`
+    std::optional<Watchdog::Config> link_watchdog;     ///< limits the age of the newest position
     std::optional<DeadManSwitch::Config> dead_man;
-    const std::atomic<bool>* guardian = nullptr;             ///< Guardian::stands; null if there is no guardian
+    const std::atomic<bool>* guardian = nullptr;             ///< Guardian::stands; null without a guardian
     std::optional<ForceLimit::Config> torque_limit;          ///< N·m
     std::optional<GrowthLimit::Config> torque_growth_limit;  ///< N·m/s
     std::optional<TurnTrip::Config> turn_trip;
@@ -121,11 +121,11 @@ class SafeDevice final : public Device {
 
   struct Status {
     SafetyState state = SafetyState::kAbsent;
-    SafetyFault last_fault = SafetyFault::kNone;  ///< stays after the device was armed again
-    std::uint32_t faults = 0;                     ///< so far
+    SafetyFault last_fault = SafetyFault::kNone;  ///< is kept when the device is armed again
+    std::uint32_t faults = 0;                     ///< number of faults so far
   };
 
-  /// `device` must outlive it. Throws std::invalid_argument naming the field when a value is impossible.
+  /// `device` must outlive this object. Throws std::invalid_argument, naming the field, if a value is out of bounds.
   SafeDevice(const Config& config, Device& device);
 
   const DeviceInfo& info() const noexcept override { return info_; }
@@ -146,7 +146,7 @@ class SafeDevice final : public Device {
 
   Status status() const noexcept;
 
-  /// Sets the fault to kCommandSilent if the device is armed. This is called before the haptic thread is suspended.
+  /// Sets the fault kCommandSilent if the device is armed. Call this before the haptic thread is suspended.
   void stand_still() noexcept {
     if (now_) trip(SafetyFault::kCommandSilent);
     publish();
@@ -163,7 +163,7 @@ class SafeDevice final : public Device {
   void trip(SafetyFault fault, Duration ramp = Duration::zero()) noexcept;
   void forget_motion() noexcept;
   bool may_be_armed(const Effort& asked) const noexcept;
-  /// Whether the device is armed for what is asked; arms it when it may be.
+  /// Arms the device if it may be armed, and returns whether it is armed.
   bool armed_for(const Effort& asked) noexcept;
   bool stopped() const noexcept;
   Effort limited(const Effort& asked) const noexcept;
@@ -193,20 +193,20 @@ class SafeDevice final : public Device {
   std::optional<GrowthLimit> grip_growth_limit_;
 
   Stage stage_ = Stage::kWaiting;
-  std::optional<RampOut> stopping_;             ///< a fault whose force is on its way to zero
-  LocalTime request_until_ = LocalTime::min();  ///< the operator's request to arm is open until then
-  bool button_held_ = true;                     ///< true at first: a stuck button was never pressed
-  bool disarmed_ = false;                       ///< by the operator; only `arm` ends it
+  std::optional<RampOut> stopping_;             ///< set while a fault ramps the force down
+  LocalTime request_until_ = LocalTime::min();  ///< until then, the request to arm is valid
+  bool button_held_ = true;                     ///< initially true, because a stuck button was never pressed
+  bool disarmed_ = false;                       ///< by the operator; only `arm` resets it
 
-  std::optional<LocalTime> now_;  ///< of the last `read`
-  Duration passed_{};             ///< between the last two
+  std::optional<LocalTime> now_;  ///< time of the last `read`
+  Duration passed_{};             ///< time between the last two calls of `read`
   std::optional<PositionSample> last_;
-  /// When and where the handle came to rest; empty: it is not known to rest.
+  /// Time and position at which the handle came to rest; empty if it is not known to be at rest.
   std::optional<PositionSample> rest_;
-  LocalTime heard_at_{};  ///< when the newest good position was sampled
+  LocalTime heard_at_{};  ///< sampling time of the newest valid position
   LocalTime applied_at_{};
   LocalTime armed_at_{};
-  Effort applied_;  ///< what the device really holds
+  Effort applied_;  ///< what the device actually holds
 
   std::uint32_t times_armed_ = 0;
   SafetyFault last_fault_ = SafetyFault::kNone;

@@ -9,23 +9,23 @@
 
 namespace tendon {
 
-// Each of these says when all force has to end. A SafeDevice has those that its Config lists, and latches a trip.
+// Conditions that must end all forces. SafeDevice uses those that its Config lists, and latches them.
 //
-// Thread-safe: no. Realtime-safe: all but the constructors, which throw std::invalid_argument naming the field.
+// Thread-safe: no. Realtime-safe: all except the constructors, which throw std::invalid_argument, naming the field.
 
-/// Trips when the handle is faster than any hand that holds it: it has been let go, or is being thrown.
-/// Source: Force Dimension's SDK: above the velocity threshold "forces are automatically disabled and brakes engaged";
+/// Trips if the handle is faster than any hand that holds it, because it was released or thrown. Source: Force
+/// Dimension's SDK: above the velocity threshold "forces are automatically disabled and brakes engaged";
 /// HD_EXCEEDED_MAX_VELOCITY of OpenHaptics.
 class SpeedTrip {
  public:
   struct Config {
     double max = 0;  ///< m/s, > 0
   };
-  /// `resolution`: one encoder count, m, ≥ 0, for the VelocityEstimator.
+  /// `resolution` is one encoder count (m, ≥ 0), for the VelocityEstimator.
   SpeedTrip(const Config& config, double resolution);
-  /// The next position, sampled at `at`.
+  /// Adds a position that was sampled at `at`.
   bool tripped(LocalTime at, const Vec3& position) noexcept;
-  /// Forgets all positions so far: the next one is the first.
+  /// Discards all positions, as after construction.
   void forget() noexcept;
 
  private:
@@ -34,18 +34,18 @@ class SpeedTrip {
   VelocityEstimator estimator_;
 };
 
-/// Trips when the handle turns faster than any hand turns it. It adds up the small turns from sample to sample, and
-/// estimates the speed of that sum as SpeedTrip does.
+/// Trips if the handle rotates faster than any hand. It sums the small rotations between samples and estimates the rate
+/// of that sum as SpeedTrip does.
 class TurnTrip {
  public:
   struct Config {
     double max = 0;  ///< rad/s, > 0
   };
-  /// `resolution`: one encoder count, rad, ≥ 0, for the VelocityEstimator.
+  /// `resolution` is one encoder count (rad, ≥ 0), for the VelocityEstimator.
   TurnTrip(const Config& config, double resolution);
-  /// The next orientation, sampled at `at`. It has to be a rotation.
+  /// Adds an orientation that was sampled at `at`. It must be a rotation.
   bool tripped(LocalTime at, const Quat& orientation) noexcept;
-  /// Forgets all orientations so far: the next one is the first.
+  /// Discards all orientations, as after construction.
   void forget() noexcept;
 
  private:
@@ -53,20 +53,20 @@ class TurnTrip {
   double resolution_;
   VelocityEstimator estimator_;
   std::optional<Quat> before_;
-  Vec3 turned_ = Vec3::Zero();  ///< rad, the sum
+  Vec3 turned_ = Vec3::Zero();  ///< rad, sum of all rotations
 };
 
-/// Trips when a position is further from the one before than `max_speed` and one count on each axis allow: the encoders
-/// have wrapped or lost count, or the packet was garbled. The Falcon's packets have neither checksum nor number, so a
-/// garbled one looks like any other.
+/// Trips if a position is further from the previous one than `max_speed` and one count on each axis allow, because the
+/// encoders have wrapped or lost counts, or because the packet was corrupted. The Falcon's packets have neither
+/// checksum nor sequence number, so a corrupted one cannot be recognized otherwise.
 class StepBound {
  public:
   struct Config {
-    double max_speed = 0;  ///< m/s, > 0: more than any hand
+    double max_speed = 0;  ///< m/s, > 0: faster than any hand
   };
-  /// `resolution`: one encoder count, m, ≥ 0.
+  /// `resolution` is one encoder count, m, ≥ 0.
   StepBound(const Config& config, double resolution);
-  /// `elapsed` since the position before.
+  /// `elapsed` is the time since the previous position.
   bool tripped(const Vec3& before, const Vec3& position, Duration elapsed) const noexcept;
 
  private:
@@ -74,15 +74,15 @@ class StepBound {
   double resolution_;
 };
 
-/// Trips when nothing has come for longer than `timeout`. The force then falls to zero over the time `ramp`.
-/// Source: watchdogs of Force Dimension (firmware ≥ 3.0), Haptikfabriken Polhem (0.5 s); the Falcon documents none.
+/// Trips if nothing arrives for longer than `timeout`. The force then falls to zero within `ramp`. Source: watchdogs of
+/// Force Dimension (firmware ≥ 3.0) and Haptikfabriken Polhem (0.5 s); none is documented for the Falcon.
 class Watchdog {
  public:
   struct Config {
     Duration timeout{};                             ///< > 0
-    Duration ramp = std::chrono::milliseconds(20);  ///< ≥ 0; 0: zero at once
+    Duration ramp = std::chrono::milliseconds(20);  ///< ≥ 0; 0: immediately
   };
-  /// `field`: its name in errors.
+  /// `field` is the name in error messages.
   Watchdog(const Config& config, const char* field);
   bool tripped(Duration silent) const noexcept { return silent > config_.timeout; }
   Duration ramp() const noexcept { return config_.ramp; }
@@ -91,12 +91,12 @@ class Watchdog {
   Config config_;
 };
 
-/// A button that has to be held, as on every robot's teach pendant (ISO 10218-1 calls it an enabling device). Whoever
-/// lets go of the handle releases it.
+/// A button that must be held, as on the teach pendant of a robot (ISO 10218-1: enabling device). It is released when
+/// the user lets go of the handle.
 class DeadManSwitch {
  public:
   struct Config {
-    std::uint32_t button = 0;  ///< its bit in PositionSample::buttons, below 32
+    std::uint32_t button = 0;  ///< bit in PositionSample::buttons, below 32
   };
   explicit DeadManSwitch(const Config& config);
   bool held(std::uint32_t buttons) const noexcept { return ((buttons >> config_.button) & 1U) != 0; }

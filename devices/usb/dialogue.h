@@ -13,64 +13,64 @@
 
 namespace tendon::usb {
 
-/// What a driver and its device say to each other over a `Pipe`, one connection after another: who is there, which
-/// request still waits for its answer, since when nothing was heard, and what went wrong how often. The driver gives
-/// the bytes their meaning.
+/// The request and reply protocol between a driver and its device over a `Pipe`, for one connection after another. It
+/// tracks the connection, which requests are unanswered, how long the device has been silent, and how often errors
+/// occur. The driver interprets the bytes.
 ///
-/// In each turn the driver calls, in this order:
+/// In each turn, the driver makes these calls in this order:
 ///
-///     begin(now)                       true: another connection, or none; the driver starts over, with `restart`
-///     receive(…)                       each packet; for an answer `hear`, and `believe` when it can be true
+///     begin(now)                       true: the connection has changed; the driver starts over with `restart`
+///     receive(…)                       each packet; `hear` for an answer, and `believe` if it is plausible
 ///     silent(), lost_count()           for 100 ms: the driver gives the device up or has it homed again
-///     trusted()                        false for 10 ms without an answer that can be true: then no force
+///     trusted()                        false after 10 ms without a plausible answer: no force
 ///     may_send(…), send(…)             the next request
 ///
-/// **Requests.** Up to `Patience::most_under_way` of them go without an answer; one answer is an answer to all. When
-/// the oldest waits for `Patience::answer`, they are taken for lost, and the next request may be sent. A request that
-/// ends a force waits for none of this: it is sent at once.
+/// **Requests.** Up to `Patience::most_under_way` requests may be unanswered; one answer counts for all of them. When
+/// the oldest has waited for `Patience::answer`, they are considered lost, and the next request may be sent. A request
+/// that ends a force is always sent immediately.
 ///
-/// **Force.** The device is taken to hold what it was told last, until its own watchdog ends it.
+/// **Force.** The device is assumed to hold the last command until its own watchdog ends it.
 ///
-/// Thread-safe: `counts` from any thread, the rest from one. Realtime-safe: all but the constructor.
+/// Thread-safe: `counts` from any thread, the others from one thread. Realtime-safe: all except the constructor.
 class Dialogue {
  public:
   struct Patience {
-    int most_under_way = 1;                          ///< requests without an answer, ≥ 1
-    Duration answer = std::chrono::milliseconds(5);  ///< then the answer is late: it is asked for again
+    int most_under_way = 1;                          ///< maximum number of unanswered requests, ≥ 1
+    Duration answer = std::chrono::milliseconds(5);  ///< time after which an answer is late and the request is repeated
   };
 
-  /// Without an answer that can be true for so long (ten periods of 1 kHz), the device gets no force.
+  /// After this long without a plausible answer (ten periods of 1 kHz), the device gets no force.
   static constexpr Duration kQuiet = std::chrono::milliseconds(10);
-  /// After so long a silence the device is as good as unplugged; after so long without an answer that can be true, its
-  /// encoders have lost count. A loop that was stopped for so long by its machine has the answers waiting, and takes
-  /// them before it looks.
+  /// After this much silence, the device is treated as disconnected; after this long without a plausible answer, its
+  /// encoders have lost counts. A loop that was suspended for this long finds the answers waiting and receives them
+  /// before it checks.
   static constexpr Duration kLost = std::chrono::milliseconds(100);
-  /// So many answers in a row must say that a device is homed, or that it is not: one garbled byte can say either.
+  /// Number of consecutive answers that must agree on whether a device is homed, because one corrupted byte can say
+  /// either.
   static constexpr int kSure = 10;
 
-  /// `watchdog`: the device's own ends a force so long after the last request; zero: it has none.
+  /// `watchdog` is the time after the last request at which the device itself ends a force; zero: none.
   explicit Dialogue(std::unique_ptr<Pipe> pipe, Duration watchdog = Duration::zero());
 
-  /// Begins the turn at `now`, which all that follows happens at. True when this is not the connection of the turn
-  /// before; `connected` says whether there is one.
+  /// Begins a turn; all following calls happen at `now`. Returns true if the connection has changed since the last
+  /// turn. `connected` tells whether there is one.
   bool begin(LocalTime now) noexcept;
   bool connected() const noexcept { return connection_ != 0; }
   LocalTime now() const noexcept { return now_; }
 
-  /// The device has just been opened or set up: nothing is under way, and it holds no force as far as anybody knows.
+  /// Call after the device was opened or set up. No request is unanswered, and the device is assumed to hold no force.
   void restart(const Patience& patience) noexcept;
-  /// From now on.
   void set_patience(const Patience& patience) noexcept { patience_ = patience; }
 
-  /// Hands each packet that has come to `take`, as std::span<const std::uint8_t>.
+  /// Passes each received packet to `take`, as std::span<const std::uint8_t>.
   template <class Take>
   void receive(const Take& take) noexcept {
     std::array<std::uint8_t, kPacketSize> packet;
     while (const std::size_t size = pipe_->read(packet)) take(std::span<const std::uint8_t>(packet).first(size));
   }
-  /// A well-formed answer has come.
+  /// Call for each well-formed answer.
   void hear() noexcept;
-  /// … and what it says can be true.
+  /// Call in addition if the answer is plausible.
   void believe() noexcept;
 
   Duration since_heard() const noexcept { return now_ - heard_; }
@@ -80,15 +80,15 @@ class Dialogue {
 
   bool awaits_answer() const noexcept { return under_way_ > 0; }
   bool holds_force() const noexcept;
-  /// Whether a request may be sent now; `exerts`: it commands a force other than zero.
+  /// Returns true if a request may be sent now. `exerts` means that it commands a force other than zero.
   bool may_send(bool exerts) const noexcept;
-  /// Sends one. False when the pipe has no room: then nothing is changed.
+  /// Sends a request. Returns false, and changes nothing, if the pipe has no room.
   bool send(std::span<const std::uint8_t> request, bool exerts) noexcept;
 
-  /// Ends the connection from our side: the device is looked for again.
+  /// Closes the device, and opens it again if it is still plugged in.
   void reopen() noexcept { pipe_->reopen(); }
 
-  /// For what is no request with an answer: a serial chip's set-up, a boot loader.
+  /// For transfers without an answer, such as the setup of a serial chip or a boot loader.
   Pipe& pipe() noexcept { return *pipe_; }
 
   DeviceCountersKept& counters() noexcept { return counters_; }
@@ -103,13 +103,13 @@ class Dialogue {
   LocalTime now_{};
 
   Patience patience_;
-  int under_way_ = 0;      ///< requests sent since the last answer
-  bool answered_ = false;  ///< has answered since `restart`
-  LocalTime asked_{};      ///< when the first of those under way was sent
-  LocalTime told_{};       ///< when the last request of all was sent
-  bool exerts_ = false;    ///< it commanded a force
-  LocalTime heard_{};      ///< when the last answer came
-  LocalTime believed_{};   ///< when the last one came that can be true
+  int under_way_ = 0;      ///< number of requests sent since the last answer
+  bool answered_ = false;  ///< the device has answered since `restart`
+  LocalTime asked_{};      ///< time of the first unanswered request
+  LocalTime told_{};       ///< time of the last request
+  bool exerts_ = false;    ///< the last request commanded a force
+  LocalTime heard_{};      ///< time of the last answer
+  LocalTime believed_{};   ///< time of the last plausible answer
 
   DeviceCountersKept counters_;
 };

@@ -7,7 +7,7 @@
 
 namespace tendon::usb {
 
-/// A vendor request to the device, without data (bmRequestType 0x40); serial chips are set up by these.
+/// A vendor request without data (bmRequestType 0x40), used to set up serial chips.
 struct Request {
   std::uint8_t request = 0;
   std::uint16_t value = 0;
@@ -15,46 +15,46 @@ struct Request {
   friend bool operator==(const Request&, const Request&) = default;
 };
 
-/// The identity of a USB device: the number of its maker, and the maker's number for it.
+/// Vendor and product id of a USB device.
 struct Id {
   std::uint16_t vendor = 0;
   std::uint16_t product = 0;
   friend bool operator==(const Id&, const Id&) = default;
 };
 
-/// The largest full-speed packet, bulk or interrupt (USB 2.0, 5.8.3 and 5.7.3). An IN transfer brings at most this
-/// much, and a `write` takes at most this much.
+/// Size of the largest full-speed packet, bulk or interrupt (USB 2.0, 5.8.3 and 5.7.3). It limits IN transfers and
+/// `write`.
 inline constexpr std::size_t kPacketSize = 64;
 
-/// One USB device with an endpoint each way. No call waits. Drivers use it through `Dialogue`; behind it is libusb
-/// (`usb.h`), or a model in memory.
+/// One USB device with an endpoint in each direction. No call blocks. Drivers use it through `Dialogue`; the
+/// implementation is libusb (`usb.h`) or a model in memory.
 ///
-/// A transfer that fails ends the connection; the next device that is plugged in is a new connection. A driver has no
-/// other error to handle: unplugging, a stall and a device that babbles all look the same.
+/// A transfer that fails ends the connection, and the next device that is plugged in is a new connection. A driver
+/// handles no other error: unplugging, a stall and babble look the same.
 ///
 /// Thread-safe: no; one thread uses it. Realtime-safe: every function.
 class Pipe {
  public:
   virtual ~Pipe() = default;
 
-  /// 0 while there is no device; otherwise a number that is different for each opening. A packet accepted for any
-  /// connection but the one that this function returned last is dropped: a force never reaches the wrong device.
+  /// Returns 0 while there is no device, otherwise a number that differs for each opening. A packet that was accepted
+  /// for another connection than the one last returned here is dropped, so that a force never reaches the wrong device.
   virtual std::uint32_t connection() noexcept = 0;
 
-  /// Sends `request` after everything accepted before it. False, and nothing is sent, when there is no room or no
+  /// Sends `request` after everything accepted before it. Returns false, and sends nothing, if there is no room or no
   /// device.
   virtual bool request(const Request& request) noexcept = 0;
 
-  /// Sends at most `kPacketSize` bytes to the OUT endpoint, likewise; more are refused.
+  /// Sends at most `kPacketSize` bytes to the OUT endpoint, under the same conditions. Larger packets are refused.
   virtual bool write(std::span<const std::uint8_t> bytes) noexcept = 0;
 
-  /// Whether everything accepted has reached the device.
+  /// Returns true if the device has received everything that was accepted.
   virtual bool settled() const noexcept = 0;
 
-  /// Copies the next packet of the IN endpoint, unchanged. Returns its size, 0 when there is none.
+  /// Copies the next packet of the IN endpoint, unchanged. Returns its size, or 0 if there is none.
   virtual std::size_t read(std::span<std::uint8_t, kPacketSize> packet) noexcept = 0;
 
-  /// Ends this connection from our side: the device is closed, and opened again if it is still plugged in.
+  /// Closes the device, and opens it again if it is still plugged in.
   virtual void reopen() noexcept = 0;
 };
 
