@@ -18,21 +18,22 @@ using namespace std::chrono_literals;
 using falcon::Counts;
 using falcon::Reply;
 
-/// 1.5 Mbaud. The last byte of a reply makes the chip send it at once, instead of after its latency timer of 1 ms.
+/// 1.5 Mbaud. The chip sends a reply immediately at its last byte, instead of after its latency timer of 1 ms.
 constexpr std::array kRunMode = {latency(1), divisor(2), k8N1, kNoFlowControl, flush_at(falcon::kPacketEnd),
                                  kPurgeOne,  kPurgeOther};
 
-/// A device with firmware answers within 2 ms; libnifalcon asks some hundred times before it believes that it has none.
+/// A device with firmware answers within 2 ms. libnifalcon asks about a hundred times before it decides that there is
+/// none.
 constexpr Duration kProbing = 300ms;
-/// Then the plug is looked at again: somebody may have switched the device's own supply on.
+/// The device is then opened again, because its power may have been switched on.
 constexpr Duration kGiveUpAfter = 2s;
-/// 16 bytes each way at 1.5 Mbaud take 0.2 ms.
+/// A transfer of 16 bytes in each direction takes 0.2 ms at 1.5 Mbaud.
 constexpr usb::Dialogue::Patience kPatience{.most_under_way = 1, .answer = 5ms};
 
-/// Within 50 mm of the centre, a mm is at most 55 counts of a motor: so this is 3 m/s there, and 5 m/s at the centre.
-/// A handle that nobody holds does not reach 3 m/s within the workspace.
+/// Within 50 mm of the centre, 1 mm is at most 55 counts of a motor, so this limit is 3 m/s there and 5 m/s at the
+/// centre. A released handle does not reach 3 m/s within the workspace.
 constexpr double kMostCountsPerSecond = 165e3;
-/// Allows for replies that come closer together than they were taken.
+/// Tolerance for replies that arrive at shorter intervals than they were sampled.
 constexpr double kMoreCounts = 30;
 
 constexpr Counts kNoTorque{};
@@ -130,7 +131,7 @@ void FalconDevice::believe(const Reply& reply) noexcept {
   const bool homed = reply.homed == Reply::kAllHomed;
   const bool in_step = plausible(reply);
   dialogue_.hear();
-  // The encoders of a leg that finds its home, or loses it, jump.
+  // Encoder counts jump when a leg becomes homed or loses its home position.
   if (state() == State::kHomed && homed && !in_step) {
     dialogue_.counters().add(DeviceCount::kImplausible);
     return;
@@ -186,7 +187,7 @@ void FalconDevice::advance() noexcept {
           break;
         case falcon::FirmwareLoader::Progress::kDone:
           loaded_ = true;
-          moved_origin_ = false;  // the boot loader answered: nothing is left of it
+          moved_origin_ = false;  // the boot loader has answered, so the device was reset
           enter(State::kOpening);
           break;
         case falcon::FirmwareLoader::Progress::kFailed:
@@ -224,8 +225,6 @@ Vec3 FalconDevice::apply(const Vec3& force) noexcept {
   return pose_ && dialogue_.holds_force() ? falcon::force_of(*pose_, held_) : Vec3::Zero();
 }
 
-/// The light-emitting diodes are on or off: each by its half of the colour. Red without another tells that the device is
-/// not ready, whoever sets the ring.
 void FalconDevice::set_output(LocalTime /*now*/, std::uint32_t output, const OutputSetting& setting) noexcept {
   const auto* const colour = std::get_if<LampColour>(&setting);
   if (output != 0 || colour == nullptr) return;

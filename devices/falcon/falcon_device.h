@@ -20,33 +20,36 @@
 
 namespace tendon {
 
-/// The Novint Falcon: from the plug to the force as one state machine that `read` turns, over a `usb::Pipe`.
+/// The driver of the Novint Falcon: a state machine from connection to force output over a `usb::Pipe`, advanced by
+/// `read`.
 ///
 ///     kAbsent ──plugged in──▶ kOpening ──answers──────────────────────▶ kUnhomed ──its three legs are homed──▶ kHomed
 ///                               │                                         ▲   ▲                                  │
 ///                               └─no answer in 300 ms─▶ kFirmware ─loaded─┘   └──the device says: a leg is not──┘
-///     any ──unplugged, a transfer failed, or silent for 100 ms──▶ kAbsent, and all the way again
+///     any ──unplugged, a transfer failed, or silent for 100 ms──▶ kAbsent, and starts again
 ///
-/// Each packet to the device carries torques. They are zero in every state other than kHomed, and in kHomed while no
-/// believable reply has come for 10 ms. No watchdog of the device is documented.
+/// Each packet to the device carries torques. They are zero in every state other than kHomed, and in kHomed if there
+/// was no plausible reply for 10 ms. The device has no documented watchdog.
 ///
-/// Each reply brings the encoders. A reply whose encoders moved further than a hand can move them is not believed. When
-/// none is believed for 100 ms, the encoders have lost count, and the device has to be reset: the driver loads the
-/// firmware again when it has the file; otherwise the user switches the device off and on.
+/// Each reply contains the encoder counts. A reply is implausible if its encoders moved further than a hand can move
+/// them. After 100 ms without a plausible reply, the encoders have lost counts and the device must be reset: the driver
+/// loads the firmware again if it has the file; otherwise the user must switch the device off and on.
 ///
-/// Positions are relative to `falcon::kCentre`: x to the right, y up, z towards the user. A sample's time is that of
-/// `read`; the device took it up to one period later. Buttons, from bit 0: right, forward, centre, left.
+/// Positions are relative to `falcon::kCentre`: x to the right, y up, z towards the user. The time of a sample is that
+/// of `read`; the device sampled up to one period later. Buttons, from bit 0: right, forward, centre, left.
 ///
-/// One request is under way at a time. When its answer is late, `read` has no sample and `apply` changes nothing; only
-/// zero is sent at once (`usb::Dialogue`).
+/// There is one outstanding request at a time. If its answer is late, `read` returns no sample and `apply` changes
+/// nothing, except that a zero force is sent immediately (`usb::Dialogue`).
 ///
-/// Thread-safe: `counts` and `state` from any thread, the rest from one. Realtime-safe: `read`, `apply` and `counts`.
+/// Thread-safe: `counts` and `state` from any thread, the others from one thread. Realtime-safe: `read`, `apply` and
+/// `counts`.
 class FalconDevice final : public Device {
  public:
   static constexpr usb::Id kId{0x0403, 0xCB48};
 
   struct Config {
-    /// From `read_firmware`. Empty: a device that has its firmware already is used; any other waits in kFirmware.
+    /// From `read_firmware`. If empty, only a device that already has firmware can be used; any other stays in
+    /// kFirmware.
     std::vector<std::uint8_t> firmware{};
   };
 
@@ -59,9 +62,9 @@ class FalconDevice final : public Device {
   std::optional<PositionSample> read(LocalTime now) noexcept override;
   Joints joints(const Motion& hand) const noexcept override;
   Vec3 apply(const Vec3& force) noexcept override;
-  /// The ring of light-emitting diodes is its one output, "ring": red, green and blue, each on from half its strength.
-  /// It shows that colour while the device may give a force, and green when the colour is off or red alone. Red alone
-  /// says that the device is not ready, and no client can change that.
+  /// The device has one output, "ring", a ring of light-emitting diodes. Red, green and blue are each on from half of
+  /// their strength. The ring shows the color while the device may render forces, and green if the color is off or pure
+  /// red. Pure red means that the device is not ready, which a client cannot change.
   void set_output(LocalTime now, std::uint32_t output, const OutputSetting& setting) noexcept override;
 
  private:
@@ -78,38 +81,38 @@ class FalconDevice final : public Device {
   std::vector<std::uint8_t> firmware_;
   usb::Dialogue dialogue_;
   std::atomic<State> state_{State::kAbsent};
-  LocalTime entered_{};  ///< when the state began
+  LocalTime entered_{};  ///< time at which the state was entered
 
   // kOpening
   usb::ftdi::Setup setup_{{}};
   bool set_up_ = false;
   // kFirmware
   falcon::FirmwareLoader loader_;
-  bool loaded_ = false;   ///< on this connection
-  bool resting_ = false;  ///< there is no firmware, or it did not go in
+  bool loaded_ = false;   ///< loaded on this connection
+  bool resting_ = false;  ///< no firmware is available, or loading has failed
 
   // From kOpening on
   falcon::ReplyParser parser_;
-  std::optional<falcon::Reply> newest_{};      ///< the last reply that was believed
-  bool fresh_ = false;                         ///< newest_ came in this `read`, and belongs to a position
-  int homed_replies_ = 0;                      ///< in a row that say "homed"; below 0: that many that say the contrary
-  bool moved_origin_ = false;                  ///< the encoders have lost count since the device was homed
-  std::optional<falcon::Pose> pose_{};         ///< the last one that is known; of newest_ when
-  bool located_ = false;                       ///< newest_ belongs to a position
-  falcon::Counts held_{};                      ///< the torques that were sent last
-  std::uint8_t ready_lamps_ = falcon::kGreen;  ///< while the device may give a force
+  std::optional<falcon::Reply> newest_{};  ///< last plausible reply
+  bool fresh_ = false;                     ///< newest_ arrived in this `read` and has a pose
+  int homed_replies_ = 0;      ///< number of consecutive replies that say "homed", or, if negative, "not homed"
+  bool moved_origin_ = false;  ///< the encoders have lost counts since the device was homed
+  std::optional<falcon::Pose> pose_{};         ///< last known pose; belongs to newest_ if located_
+  bool located_ = false;                       ///< newest_ has a pose
+  falcon::Counts held_{};                      ///< the last torques sent
+  std::uint8_t ready_lamps_ = falcon::kGreen;  ///< lamps while the device may render forces
 };
 
 namespace falcon {
 
-/// A Falcon, as a scene describes it.
+/// Configuration of a Falcon in a scene.
 struct Config {
-  std::string port{};                               ///< as `tendond devices` names it; empty: the first free one
-  std::optional<std::filesystem::path> firmware{};  ///< empty: one that has its firmware already
+  std::string port{};                               ///< name in `tendond devices`; empty: the first free one
+  std::optional<std::filesystem::path> firmware{};  ///< empty: the device already has firmware
   bool accept_unknown_firmware = false;
 };
 
-// The overloads of driver.h. `make` throws what `read_firmware` throws.
+// The overloads of driver.h. `make` throws the exceptions of `read_firmware`.
 const Driver& driver(const Config& config);
 SimulatedDevice::Config stand_in(const Config& config);
 std::unique_ptr<Device> make(const Config& config, FromOutside outside);

@@ -7,8 +7,8 @@
 
 namespace tendon {
 
-/// A part of a simulated device is there with a number above zero, or not there. Throws std::invalid_argument naming
-/// the field.
+/// Checks an optional part of a simulated device, which must be above zero if it is set. Throws std::invalid_argument,
+/// naming the field.
 inline void expect_part(const std::optional<double>& value, const char* field) {
   if (value) expect_above_zero(*value, field);
 }

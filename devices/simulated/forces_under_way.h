@@ -9,12 +9,12 @@
 
 namespace tendon {
 
-/// Commands on their way from the loop to the motors: each arrives after a constant delay, in order.
+/// Commands in transit from the loop to the motors. Each arrives after a constant delay, in order.
 ///
-/// There is room for one command every 100 µs; when they come faster and the room is full, a new command replaces the
-/// newest one. The constructor allocates the room.
+/// There is room for one command per 100 µs of delay. If commands are sent faster and the room is used up, a new
+/// command replaces the newest one. The constructor allocates all memory.
 ///
-/// Thread-safe: no. Realtime-safe: all but the constructor.
+/// Thread-safe: no. Realtime-safe: all except the constructor.
 class ForcesUnderWay {
  public:
   struct Command {
@@ -22,7 +22,7 @@ class ForcesUnderWay {
     Effort effort;
   };
 
-  /// `delay` ≥ 0 is the delay of each command.
+  /// `delay` must be ≥ 0.
   explicit ForcesUnderWay(Duration delay) : delay_(delay), ring_(static_cast<std::size_t>(delay / kClosest) + 2) {}
 
   void send(Duration now, const Effort& effort) noexcept {
@@ -32,7 +32,7 @@ class ForcesUnderWay {
     newest() = {arrives, effort};
   }
 
-  /// The command that arrives next; null when none is under way.
+  /// The command that arrives next, or null.
   const Command* next() const noexcept { return count_ > 0 ? &ring_[first_] : nullptr; }
 
   void pop() noexcept {

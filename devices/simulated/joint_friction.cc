@@ -15,17 +15,17 @@
 namespace tendon {
 namespace {
 
-/// For each joint: the way it turns (−1 or 1), or 0 when it stands.
+/// For each joint: the sign of its velocity, or 0 if it is at rest.
 using Turns = std::array<int, 3>;
 
 struct Stiction {
   Turns turns;
-  Vec3 impulse;  ///< of friction on each joint
+  Vec3 impulse;  ///< impulse of friction on each joint
   double wrong =
-      std::numeric_limits<double>::infinity();  ///< how far its law is violated, as a velocity; ≤ 0: it is kept
+      std::numeric_limits<double>::infinity();  ///< violation of the friction law, as a velocity; ≤ 0: satisfied
 };
 
-/// The friction when each joint turns or stands as `turns` says: velocity = free − coupling · impulse.
+/// Friction for the given `turns`: velocity = free − coupling · impulse.
 Stiction sticking(const Turns& turns, const Mat3& coupling, const Vec3& free, const Vec3& most, const Turns& known) {
   Mat3 equations = Mat3::Identity();
   Vec3 right;
@@ -48,9 +48,9 @@ Stiction sticking(const Turns& turns, const Mat3& coupling, const Vec3& free, co
   return stiction;
 }
 
-/// The only impulse with |impulseᵢ| ≤ mostᵢ that equals mostᵢ, against the velocity, at each joint that turns. A joint
-/// that is not 0 in `known` is taken to turn that way. The answer is one of 27 cases; rounding may leave several, and
-/// then it is the least wrong one.
+/// Returns the unique impulse with |impulseᵢ| ≤ mostᵢ that equals mostᵢ, opposite to the velocity, at each joint that
+/// moves. A joint that is not 0 in `known` moves in that direction. The solution is one of 27 cases. If several satisfy
+/// the law because of rounding, the one with the smallest violation is returned.
 Stiction stiction_of(const Mat3& coupling, const Vec3& free, const Vec3& most, const Turns& known = {}) noexcept {
   Stiction best;
   const auto holds = [&](Turns turns) {
@@ -71,7 +71,7 @@ Stiction stiction_of(const Mat3& coupling, const Vec3& free, const Vec3& most, c
   return best;
 }
 
-/// The velocity nearest to `v` at which the joints that stand according to `turns` have no speed.
+/// Returns the velocity closest to `v` at which the joints that are at rest in `turns` do not move.
 Vec3 standing(const Turns& turns, const Mat3& jacobian, const Vec3& v) {
   if (turns == Turns{}) return Vec3::Zero();
   const Mat3 coupling = jacobian * jacobian.transpose();
@@ -118,7 +118,8 @@ Friction JointFriction::least_at(const Vec3& position) const noexcept {
 Vec3 JointFriction::torques(const Mechanism::Kind& mechanism, double coulomb) {
   const Vec3 levers = Mechanism(mechanism).levers();
   Vec3 torques = coulomb * levers;
-  for (Eigen::Index i = 0; i < 3; ++i) {  // rounding must not make it less: others count on at least `coulomb`
+  // rounding must not make it smaller, because callers rely on at least `coulomb`
+  for (Eigen::Index i = 0; i < 3; ++i) {
     while (torques[i] / levers[i] < coulomb) torques[i] = std::nextafter(torques[i], HUGE_VAL);
   }
   return torques;

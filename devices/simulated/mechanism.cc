@@ -11,13 +11,14 @@
 namespace tendon {
 namespace {
 
-/// The radius of the ball that falcon::kCentre promises, and the furthest that one leg alone moves the grip in it. The
-/// largest of three million positions had 0.091685 m/rad, rounded up here; the centre has 0.0672, the smallest 0.0314.
+/// The radius of the ball around falcon::kCentre, and the largest displacement of the grip per radian of one leg in it.
+/// The largest value of three million positions was 0.091685 m/rad, rounded up here; the centre has 0.0672, the
+/// smallest was 0.0314.
 constexpr double kFalconReach = 0.05;    // m
 constexpr double kFalconLever = 0.0917;  // m/rad
 
-/// The share of the distance from the middle of an arm's workspace to the nearest position without a finite Jacobian.
-/// There friction grows beyond all bounds, and no device is used so far out.
+/// Fraction of the distance from the middle of an arm's workspace to the nearest position without a finite Jacobian.
+/// Friction is unbounded there, and devices are not used so far out.
 constexpr double kShareOfArmsReach = 0.8;
 
 double reach_of(const Mechanism::Arm& arm) {
@@ -27,15 +28,14 @@ double reach_of(const Mechanism::Arm& arm) {
   return kShareOfArmsReach * std::min({stretched, folded, arm.upper_arm});
 }
 
-/// The elbow, in the plane of the arm.
+/// The elbow in the plane of the arm.
 struct Elbow {
-  double r;          ///< m, from the turntable's axis to the handle
-  double cos_gamma;  ///< of γ = q₃ − q₂ in (−90°, 90°)
+  double r;          ///< m, from the axis of the turntable to the handle
+  double cos_gamma;  ///< for γ = q₃ − q₂ in (−90°, 90°)
   double q2;
   double q3;
 };
 
-/// The closed form.
 Elbow elbow_of(const Mechanism::Arm& arm, const Vec3& x) noexcept {
   const double r = std::hypot(x.x(), x.z() + arm.upper_arm);
   const double up = x.y() - arm.forearm;
@@ -54,7 +54,7 @@ Vec3 angles_of(const Mechanism::Arm& arm, const Vec3& x) noexcept {
 
 Mat3 jacobian_of(const Mechanism::Arm& arm, const Vec3& x) noexcept {
   const auto [r, cos_gamma, q2, q3] = elbow_of(arm, x);
-  const Vec3 out(x.x() / r, 0, (x.z() + arm.upper_arm) / r);  // from the turntable's axis to the handle
+  const Vec3 out(x.x() / r, 0, (x.z() + arm.upper_arm) / r);  // from the axis of the turntable to the handle
   const Vec3 aside(out.z(), 0, -out.x());
   Mat3 jacobian;
   jacobian.row(0) = aside / r;
@@ -68,13 +68,13 @@ Mat3 jacobian_of(const Mechanism::Arm& arm, const Vec3& x) noexcept {
 Mechanism::Mechanism(const Kind& kind) : kind_(kind), reach_(kFalconReach), levers_(Vec3::Constant(kFalconLever)) {
   const auto* arm = std::get_if<Arm>(&kind);
   if (arm == nullptr) return;
-  // No haptic device is shorter or longer, and the squares of these lengths are far from the limits of a double.
+  // Covers all haptic devices, and the squares of these lengths are far from the limits of a double.
   const auto sound = [](double length) { return length >= 0.01 && length <= 10; };
   expect(sound(arm->upper_arm), "upper_arm", arm->upper_arm, "0.01 to 10 m");
   expect(sound(arm->forearm), "forearm", arm->forearm, "0.01 to 10 m");
   reach_ = reach_of(*arm);
-  // For each radian, q₁ moves the handle by r, which is l_u in the middle of the workspace; q₂ and q₃ always move it
-  // by the length of the arm that they turn.
+  // Per radian, q₁ moves the handle by r, which is l_u in the middle of the workspace, and q₂ and q₃ always move it by
+  // the length of their arm.
   levers_ = Vec3(arm->upper_arm + reach_, arm->upper_arm, arm->forearm);
 }
 
@@ -87,7 +87,7 @@ Vec3 Mechanism::angles(const Vec3& position) const noexcept {
   const Vec3 within = within_reach(position);
   if (const auto* arm = std::get_if<Arm>(&kind_)) return angles_of(*arm, within);
   const std::optional<falcon::Pose> pose = falcon::pose_at(falcon::kCentre + within);
-  return pose ? pose->angles : Vec3(Vec3::Zero());  // never empty within kFalconReach
+  return pose ? pose->angles : Vec3(Vec3::Zero());  // always set within kFalconReach
 }
 
 std::array<std::string_view, 3> Mechanism::joints() const noexcept {
@@ -99,7 +99,7 @@ Mat3 Mechanism::jacobian(const Vec3& position) const noexcept {
   const Vec3 within = within_reach(position);
   if (const auto* arm = std::get_if<Arm>(&kind_)) return jacobian_of(*arm, within);
   const std::optional<falcon::Pose> pose = falcon::pose_at(falcon::kCentre + within);
-  return pose ? pose->jacobian : Mat3(Mat3::Zero());  // never empty within kFalconReach
+  return pose ? pose->jacobian : Mat3(Mat3::Zero());  // always set within kFalconReach
 }
 
 }  // namespace tendon

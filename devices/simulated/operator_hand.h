@@ -6,16 +6,16 @@
 
 namespace tendon {
 
-/// The operator's hand on the handle: a mass that moves with the handle, tied by a spring and a damper to the point
-/// s(t) where the operator wants to be:
+/// The operator's hand on the handle: a mass that moves with the handle, connected by a spring and a damper to the
+/// point s(t) at which the operator aims:
 ///
 ///     F_hand = k (s − x) + c (ṡ − v) − m_hand dv/dt        (N, on the handle)
 ///
 /// This is the second-order model with a moving equilibrium point of Hajian and Howe (J. Biomech. Eng. 119:109, 1997)
-/// and Kuchenbecker, Park and Niemeyer (IMECE 2003). OperatorProfile has the numbers of a fingertip, of a hand with a
-/// stylus and of an arm.
+/// and Kuchenbecker, Park and Niemeyer (IMECE 2003). OperatorProfile contains the parameters of a fingertip, of a hand
+/// with a stylus and of an arm.
 ///
-/// Thread-safe: yes, it never changes. Realtime-safe: all but the constructor.
+/// Thread-safe: yes, immutable. Realtime-safe: all except the constructor.
 class OperatorHand {
  public:
   struct Config {
@@ -25,14 +25,14 @@ class OperatorHand {
     ScriptedMotion motion{ScriptedMotion::Sine{}};
   };
 
-  /// Throws std::invalid_argument naming the field, its value and what was expected.
+  /// Throws std::invalid_argument, naming the field, its value and the expected range.
   explicit OperatorHand(Config config);
 
-  /// k (s(t) − x) + c ṡ(t), the part of the force that does not depend on the handle's velocity or acceleration. The
-  /// caller integrates the other two parts implicitly.
+  /// Returns k (s(t) − x) + c ṡ(t), the part of the force that is independent of the velocity and acceleration of the
+  /// handle. The caller integrates the other two parts implicitly.
   Vec3 drive(double t, const Vec3& x) const noexcept;
 
-  /// Where the hand wants to be `t` seconds after the start.
+  /// The target point `t` seconds after the start.
   ScriptedMotion::Point target(double t) const noexcept { return config_.motion.at(t); }
 
   double stiffness() const noexcept { return config_.stiffness; }

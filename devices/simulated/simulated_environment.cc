@@ -11,10 +11,10 @@
 namespace tendon {
 namespace {
 
-/// The part of `v` that does not lie along `normal`.
+/// Returns the component of `v` perpendicular to `normal`.
 Vec3 along_surface(const Vec3& v, const Vec3& normal) { return v - normal.dot(v) * normal; }
 
-/// Takes up to `most` out of `momentum`, of which `moving` is a part. True when that stops it.
+/// Subtracts up to `most` of `moving`, a part of `momentum`. Returns true if that stops it.
 bool brake(Vec3& momentum, const Vec3& moving, double most) {
   const double size = moving.norm();
   momentum -= size <= most ? moving : Vec3((most / size) * moving);

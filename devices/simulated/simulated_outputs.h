@@ -8,21 +8,21 @@
 
 namespace tendon {
 
-/// The lamps and the vibration of a simulated device: they keep what was set, for whoever looks.
+/// The lamps and the vibration of a simulated device. They store the last settings for inspection.
 ///
-/// Thread-safe: no. Realtime-safe: all but the constructor.
+/// Thread-safe: no. Realtime-safe: all except the constructor.
 class SimulatedOutputs {
  public:
   SimulatedOutputs() = default;
-  /// Throws std::invalid_argument when there are more than kMostOutputs.
+  /// Throws std::invalid_argument if there are more than kMostOutputs.
   explicit SimulatedOutputs(const std::vector<OutputDescription>& outputs);
 
-  /// A setting of another kind than the output's, or beyond the last output, changes nothing.
+  /// Ignores an index that does not exist and a setting of another kind.
   void set(LocalTime now, std::uint32_t output, const OutputSetting& setting) noexcept;
 
-  /// The colour of a lamp, 0xRRGGBB; 0 for one that is off, and for what is no lamp.
+  /// Returns the color of a lamp, 0xRRGGBB; 0 if it is off or is not a lamp.
   std::uint32_t colour(std::uint32_t output) const noexcept;
-  /// The amplitude of a vibration; 0 after the end of its pulse, and for what does not vibrate.
+  /// Returns the amplitude of a vibration; 0 after the end of its pulse or if it is not a vibration.
   double amplitude(LocalTime now, std::uint32_t output) const noexcept;
 
  private:

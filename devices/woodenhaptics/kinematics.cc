@@ -20,7 +20,7 @@ double radius_of(const Model& model, const Vec3& angles) {
 
 Vec3 origin_of(const Model& model) { return {model.origin[0], model.origin[1], model.origin[2]}; }
 
-/// N·m at the body for each A in the motor.
+/// N·m at the body per A in the motor.
 Vec3 torques_per_ampere(const Model& model) {
   Vec3 torques;
   for (std::size_t i = 0; i < model.joints.size(); ++i) {
@@ -66,7 +66,7 @@ std::optional<Pose> pose_at(const Model& model, const Vec3& position) noexcept {
   const double height = at.z() - model.joints[0].length;
   const double bend =
       (upper * upper + lower * lower - radius * radius - height * height) / (2 * upper * lower);  // cos e
-  if (!(radius > 0) || !(std::abs(bend) < 1)) return std::nullopt;                                // so is NaN
+  if (!(radius > 0) || !(std::abs(bend) < 1)) return std::nullopt;                                // also for NaN
   const double elbow = std::acos(bend);
   const double b = std::atan2(radius, height) - std::atan2(lower * std::sin(elbow), upper - lower * bend);
   Pose pose = pose_with(model, {std::atan2(at.y(), at.x()), b, elbow - b});

@@ -16,51 +16,51 @@
 
 namespace tendon {
 
-/// A WoodenHaptics, or a relative with the same board and firmware: from the plug to the force as one state machine
-/// that `read` turns, over a `usb::Pipe` with interrupt endpoints.
+/// The driver of a WoodenHaptics, or of a related device with the same board and firmware: a state machine from
+/// connection to force output over a `usb::Pipe` with interrupt endpoints, advanced by `read`.
 ///
 ///     kAbsent ──plugged in──▶ kOpening ──answers──▶ kUnhomed ──calibrated──▶ kHomed
 ///                                                      ▲                       │
 ///                     the calibrate button, or lost count over 100 ms ─────────┘
-///     any ──unplugged, a transfer failed, or silent for 100 ms──▶ kAbsent, and all the way again
+///     any ──unplugged, a transfer failed, or silent for 100 ms──▶ kAbsent, and starts again
 ///
-/// **Calibrating.** The operator holds the arm in its calibration pose (see the README) and presses the board's button,
-/// which the firmware remembers. When ten reports in a row say so, the driver sends command 1, which sets the counters;
-/// when ten in a row show the counters as set, the device is homed. A board that was calibrated before is calibrated
-/// again: it may have been reset since, and nothing it says shows that.
+/// **Calibration.** The operator holds the arm in its calibration pose (see the README) and presses the button of the
+/// board, which the firmware latches. After ten consecutive reports of it the driver sends command 1, which sets the
+/// counters; after ten consecutive reports with these counters the device is homed. A board that was calibrated before
+/// is calibrated again, because its reports do not show whether it was reset since.
 ///
-/// **Requests.** The firmware answers each report with one, and obeys the newest. At most two are under way without an
-/// answer, which is what 1 kHz takes on a full-speed bus; zero is sent at once (`usb::Dialogue`). Currents are zero in
-/// every state other than kHomed, and in kHomed while no believable report has come for 10 ms. A report whose counters
-/// moved further than a hand can move them is not believed.
+/// **Requests.** The firmware answers each report with one and obeys the newest. At most two are unanswered, which 1
+/// kHz requires on a full-speed bus; a zero force is sent immediately (`usb::Dialogue`). Currents are zero in every
+/// state other than kHomed, and in kHomed if there was no plausible report for 10 ms. A report is implausible if its
+/// counters moved further than a hand can move them.
 ///
-/// **Watchdog.** The firmware disables the amplifiers 0.5 s after the last report of the right length, whatever becomes
-/// of the host. The first report arms it. So DeviceInfo says 0.5 s, and `apply` counts on it: a current that was sent
-/// longer ago has ended.
+/// **Watchdog.** The firmware disables the amplifiers 0.5 s after the last report of the right length, whatever happens
+/// to the host. The first report arms the watchdog. DeviceInfo therefore says 0.5 s, and `apply` relies on it: a
+/// current that was sent longer ago has ended.
 ///
-/// Positions are relative to the middle of the workspace, in the frame of kinematics.h. A sample is some 1 ms older
-/// than its `at`, the time of `read`. Button 0: the switch at the tip, where there is one.
+/// Positions are relative to the middle of the workspace, in the frame of kinematics.h. A sample is about 1 ms older
+/// than its `at`, the time of `read`. Button 0 is the switch at the tip, if there is one.
 ///
-/// Thread-safe: `counts` and `state` from any thread, the rest from one. Realtime-safe: `read`, `apply` and `counts`.
+/// Thread-safe: `counts` and `state` from any thread, the others from one thread. Realtime-safe: `read`, `apply` and
+/// `counts`.
 class WoodenHapticsDevice final : public Device {
  public:
-  /// mbed's example number, which its USBHID uses when no other is given: other gadgets may have it too.
+  /// Default id of mbed's USBHID, from its examples, which other devices may also use.
   static constexpr usb::Id kId{0x1234, 0x0006};
-  static constexpr std::uint8_t kIn = 0x81;  ///< EP1 of the LPC1768, 64 bytes, each ms
+  static constexpr std::uint8_t kIn = 0x81;  ///< EP1 of the LPC1768: 64 bytes, every ms
   static constexpr std::uint8_t kOut = 0x01;
   static constexpr Duration kWatchdog = std::chrono::milliseconds(500);
 
   struct Config {
     const woodenhaptics::Model* model = nullptr;  ///< one of `models()`
-    /// A, of each motor; above 0, at most the model's full scale. The published host stops at the same current, because
-    /// the smaller of the amplifiers it knows (ESCON 24/4) gives no more for long.
+    /// A, for each motor; above 0, at most the model's full scale. The published host uses the same limit, because the
+    /// smaller one of its two amplifiers (ESCON 24/4) cannot supply more continuously.
     double max_current = 2.0;
   };
 
-  /// Takes the pipe to a device. Throws std::invalid_argument naming the field, its value and what was expected.
+  /// Takes the pipe to a device. Throws std::invalid_argument, naming the field, its value and the expected range.
   WoodenHapticsDevice(const Config& config, std::unique_ptr<usb::Pipe> pipe);
 
-  /// The data sheet of a device of this model.
   static DeviceInfo info_of(const woodenhaptics::Model& model);
 
   const DeviceInfo& info() const noexcept override { return info_; }
@@ -83,34 +83,34 @@ class WoodenHapticsDevice final : public Device {
 
   woodenhaptics::Model model_;
   double most_ma_;
-  Vec3 counts_per_radian_;  ///< of the bodies, above 0
+  Vec3 counts_per_radian_;  ///< of the bodies, > 0
   DeviceInfo info_;
   usb::Dialogue dialogue_;
   std::atomic<State> state_{State::kAbsent};
 
-  std::optional<woodenhaptics::Report> newest_{};  ///< the last report that was believed
-  bool fresh_ = false;                             ///< newest_ came in this `read`
+  std::optional<woodenhaptics::Report> newest_{};  ///< last plausible report
+  bool fresh_ = false;                             ///< newest_ arrived in this `read`
 
-  // Calibrating
-  int asking_replies_ = 0;                 ///< in a row that say that the button was pressed
-  int set_replies_ = 0;                    ///< in a row that have the counters as they were set
-  std::optional<LocalTime> calibrated_{};  ///< when command 1 was sent
+  // Calibration
+  int asking_replies_ = 0;                 ///< number of consecutive reports that the button was pressed
+  int set_replies_ = 0;                    ///< number of consecutive reports with the counters as set
+  std::optional<LocalTime> calibrated_{};  ///< time at which command 1 was sent
 
-  woodenhaptics::Counts counts_{};  ///< the counters without wrap
-  woodenhaptics::Pose pose_{};      ///< of counts_
-  woodenhaptics::Currents held_{};  ///< the currents that were sent last
-  Vec3 held_force_ = Vec3::Zero();  ///< their force, when it was last known
+  woodenhaptics::Counts counts_{};  ///< counters without wrap-around
+  woodenhaptics::Pose pose_{};      ///< pose for counts_
+  woodenhaptics::Currents held_{};  ///< the last currents sent
+  Vec3 held_force_ = Vec3::Zero();  ///< last known force of these currents
 };
 
 namespace woodenhaptics {
 
-/// A WoodenHaptics, or a relative, as a scene describes it.
+/// Configuration of a WoodenHaptics or a related device in a scene.
 struct Config {
-  std::string port{};  ///< as `tendond devices` names it; empty: the first free one
+  std::string port{};  ///< name in `tendond devices`; empty: the first free one
   WoodenHapticsDevice::Config drive{};
 };
 
-// The overloads of driver.h. `stand_in` and `make` need a model.
+// The overloads of driver.h. `stand_in` and `make` require a model.
 const Driver& driver(const Config& config);
 SimulatedDevice::Config stand_in(const Config& config);
 std::unique_ptr<Device> make(const Config& config, FromOutside outside);
