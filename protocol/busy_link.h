@@ -9,25 +9,23 @@
 
 namespace tendon {
 
-/// A link for a thread that polls instead of sleeping. It saves the wake-up latency of a sleeping thread, about 10 to
-/// 50 µs in each direction, and occupies one processor core.
+/// A link for threads that poll instead of sleeping. Polling avoids the wake-up latency of about 10 to 50 µs in each
+/// direction, but keeps one processor core busy.
 ///
 ///     while (now < due && !busy.look(now)) {}
 ///     due = turn(now);                            // receives from `busy`
 ///
-/// look() takes the datagram from the link and receive() returns it. If the look just before found nothing, the
-/// datagram is assumed to be the only one, and the next receive() returns 0 without a system call, so that the answer
-/// leaves sooner.
+/// If the previous look() was empty, the next datagram is assumed to be alone: after it, receive() returns 0 without a
+/// system call, which would delay the answer.
 ///
 /// Thread-safe: no. Realtime-safe: as the wrapped link.
 class BusyLink : public Link {
  public:
-  /// `link` must outlive this object and must have a clock (Link::present). Nothing else may receive from it.
+  /// `link` must outlive this object, must have a clock (Link::present), and must not be used for receiving elsewhere.
   explicit BusyLink(Link& link) : link_(link) {}
 
-  /// Returns true if a datagram can be received. Pass the time of the previous look, or a later one, as `now`; it is
-  /// set to the present time, read after this look. `now` does not change while a datagram from an earlier look is
-  /// waiting.
+  /// Returns true if a datagram can be received. Sets `now`, which must be the time of the previous look or later, to
+  /// the present time unless a datagram was already waiting.
   bool look(LocalTime& now);
 
   void send(const Address& to, std::span<const std::byte> datagram) override { link_.send(to, datagram); }
@@ -37,19 +35,19 @@ class BusyLink : public Link {
   LocalTime arrived(LocalTime now) const override { return by_look_ ? std::max(now, looked_) : link_.arrived(now); }
 
  private:
-  /// Longest time from the start of a look that found nothing to the end of the next one for which the datagram is
-  /// assumed to be the only one. After a longer time the thread was preempted and more datagrams may have arrived.
+  /// If more time than this has passed since the start of an empty look, the thread was preempted, and more than one
+  /// datagram may have arrived.
   static constexpr Duration kAtOnce = std::chrono::microseconds(20);
 
   Link& link_;
   Address from_;
-  /// datagram taken by look(); the extra byte keeps an oversized one oversized
+  /// The extra byte marks datagrams that are too large.
   std::array<std::byte, kMaxDatagram + 1> ahead_;
-  std::size_t size_ = 0;  ///< its size; 0 if there is none
-  bool alone_ = false;    ///< no other datagram is expected behind it
-  bool by_look_ = false;  ///< the last received datagram was taken by look()
-  LocalTime looked_{};    ///< time after the look that found a datagram
-  LocalTime nothing_{};   ///< time before the last look that found nothing
+  std::size_t size_ = 0;
+  bool alone_ = false;
+  bool by_look_ = false;
+  LocalTime looked_{};
+  LocalTime nothing_{};  ///< start of the last empty look
 };
 
 }  // namespace tendon

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Makes the checks of core available to clients, which may include protocol but not core. All of them report a bad
-// value as "FIELD = VALUE: expected …".
+// Checks of the form "FIELD = VALUE: expected …". This header makes them available to clients, which may not include
+// core.
 
 #include "core/base/expect.h"

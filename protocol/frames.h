@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Makes the coordinate frames of core available to clients, which may include protocol but not core.
+// Coordinate frames. This header makes them available to clients, which may not include core.
 #include "core/base/frames.h"

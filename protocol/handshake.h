@@ -24,25 +24,24 @@
 
 namespace tendon {
 
-/// The client's half of the handshake. It repeats its Hello until a Retry brings a cookie, then repeats it with the
-/// cookie until an Answer arrives. It never gives up; its owner may. It does no I/O.
-///
-/// Datagrams that are malformed, of another suite, not authentic, or that lack this attempt's `random` are ignored.
+/// The client's half of the handshake, without I/O. It repeats its Hello until a Retry provides a cookie, and then
+/// repeats it with the cookie until an Answer arrives. It does not time out. Ignores datagrams that are malformed, of
+/// another suite, not authentic, or do not contain this attempt's `random`.
 class ClientHandshake {
  public:
   struct Config {
     Hello hello;
-    ClientRandom random{};  ///< from a cryptographic source, new for each attempt
-    /// If set, the handshake is sealed, and no answer can make the client fall back to suite 0.
+    ClientRandom random{};  ///< cryptographically random, new for each attempt
+    /// If set, the handshake is sealed, and an answer cannot make the client fall back to suite 0.
     struct Secret {
-      Key key;        ///< ClientKey::key
-      Key ephemeral;  ///< from a cryptographic source, new for each attempt
+      Key key;
+      Key ephemeral;  ///< cryptographically random, new for each attempt
     };
     std::optional<Secret> secret{};
-    /// With a secret: the allowed cipher suites. If suite 2 is among them, the Hello offers it as kFeatureAesGcm. If
-    /// the server chooses a suite that is not among them, the outcome is Refused with kUnsupported.
+    /// The allowed suites of a sealed session. Suite 2 is offered as kFeatureAesGcm. If the server chooses a suite that
+    /// is not allowed, the outcome is Refused with kUnsupported.
     Suites suites = suites_of_this_machine();
-    /// A lost Hello delays the client by 0.1 s. A server that does not answer is sent 12 kB/s.
+    /// A lost Hello delays the client by 0.1 s. An unreachable server receives 12 kB/s.
     Duration resend = std::chrono::milliseconds(100);
   };
   struct Accepted {
@@ -52,17 +51,17 @@ class ClientHandshake {
   };
   using Outcome = std::variant<Accepted, Refused>;
 
-  /// Throws std::invalid_argument if the Hello does not fit into a datagram (too many claims with long names), or if
+  /// Throws std::invalid_argument if the Hello is too large for a datagram (too many claims with long names), or if
   /// this processor does not support one of the suites.
   ClientHandshake(const Config& config, LocalTime now);
 
   void receive(LocalTime now, std::span<const std::byte> datagram);
   void tick(LocalTime now);
-  /// Writes the Hello if it is due. Returns its size, or 0 if nothing is to be sent now.
+  /// Writes the Hello and returns its size, or returns 0 if it is not due.
   std::size_t next_datagram(LocalTime now, std::span<std::byte, kMaxDatagram> buffer);
-  /// Set when the server has answered. The handshake is then complete.
+  /// Set if the server has answered.
   const std::optional<Outcome>& outcome() const noexcept { return outcome_; }
-  /// When `tick` is due. Not in the future if a Hello is waiting to be sent.
+  /// When to call `tick`. Not in the future if a Hello is due.
   LocalTime next_tick() const noexcept { return next_tick_; }
 
  private:
@@ -73,67 +72,66 @@ class ClientHandshake {
   ClientRandom random_;
   Duration resend_;
   Suites suites_;
-  std::optional<NoiseInitiator> noise_;  ///< set with a secret
-  std::vector<std::byte> body_;          ///< body of the Hello, the same for every cookie
+  std::optional<NoiseInitiator> noise_;
+  std::vector<std::byte> body_;  ///< the same for every cookie
   std::optional<Cookie> cookie_;
   std::optional<Outcome> outcome_;
   bool due_ = true;
   LocalTime next_tick_;
 };
 
-/// The server's half of the handshake. It answers a Hello without a valid cookie with a Retry, keeps no state for it,
-/// and never sends more bytes than it received. Spoofed Hellos therefore can neither exhaust memory nor flood a third
-/// party.
+/// The server's half of the handshake, without I/O. It answers a Hello that does not contain a valid cookie with a
+/// Retry, stores no state for it, and never sends more bytes than it has received. Spoofed Hellos therefore cannot
+/// exhaust the memory or flood a third party.
 ///
 ///     key n  = HMAC-SHA-256(secret, "tendon-cookie-key" ‖ n as 8 bytes LE),  n = ⌊now / key_lifetime⌋
 ///     cookie = HMAC-SHA-256(key n, "tendon-cookie" ‖ ip[16] ‖ port as 2 bytes LE ‖ client random)[0..16)
 ///
-/// Cookies of key n and of key n − 1 are valid, so a cookie is valid for one to two key lifetimes and no key is stored.
-/// A Hello counts against the limit of its source, and a client's key is tried, only after the cookie was found valid.
-/// All failures are silent. There is no I/O, and all randomness comes from Config::secret.
+/// Cookies of the keys n and n − 1 are valid, so a cookie can be used for one to two key lifetimes and keys are not
+/// stored. The rate limit and the client's key are checked only if the cookie is valid. All failures are silent.
 class Doorman {
  public:
   struct Config {
-    /// Random bytes drawn at startup. Cookie keys are derived from the secret and the time, ephemeral keys by a
-    /// Ratchet. Wipe it after construction: it would open all later handshakes.
+    /// Random bytes drawn at startup, from which all cookie keys and ephemeral keys are derived. Must be erased after
+    /// construction, because it can be used to decrypt later handshakes.
     Bytes32 secret{};
-    /// Keys of the clients that are admitted in suites 1 and 2.
+    /// The keys that are accepted in suites 1 and 2.
     std::vector<ClientKey> keys{};
-    /// Allowed cipher suites. The session uses the first of kSealedSuites that the client supports as well.
+    /// The allowed suites. A session uses the first of kSealedSuites that is also supported by the client.
     Suites suites = suites_of_this_machine();
     std::uint32_t version_min = kProtocolVersion;
     std::uint32_t version_max = kProtocolVersion;
-    /// Longer than any client needs to return its cookie, and short enough that a stolen cookie is of little use.
+    /// Long enough for any client to return its cookie, but too short for a stolen cookie to be useful.
     Duration key_lifetime = std::chrono::seconds(120);
-    /// Instances in one server share the secret and have different numbers. Each accepts the cookies of all others, and
-    /// no two draw the same ephemeral keys.
+    /// Instances with the same secret accept each other's cookies. They must have different numbers, so that they do
+    /// not draw the same ephemeral keys.
     std::uint32_t number = 0;
   };
   /// A Hello whose sender has proved that it owns its address and, in suite 1, its key.
   struct Guest {
     Hello hello;
-    ClientRandom random;                  ///< an equal random means that the Hello was resent: repeat the answer
-    std::uint32_t version;                ///< highest version that both support; 0 = none: refuse, and send our range
-    std::optional<Suite> suite{};         ///< suite of the Data datagrams; empty = none in common: refuse
+    ClientRandom random;                  ///< the same if the Hello was resent
+    std::uint32_t version;                ///< highest common version; 0: must be refused
+    std::optional<Suite> suite{};         ///< for Data; empty: must be refused
     const ClientKey* key = nullptr;       ///< null in suite 0
     std::optional<NoiseResponder> noise;  ///< set with a key
   };
   struct Reply {
-    std::size_t size = 0;  ///< number of bytes of `answer` to send back; 0 = send nothing
+    std::size_t size = 0;  ///< of `answer`; 0: do not reply
     std::optional<Guest> guest;
   };
   struct Answered {
-    std::size_t size = 0;             ///< size of the Answer; 0 = send nothing
-    std::optional<SessionKeys> keys;  ///< set if the guest has a key and is admitted
+    std::size_t size = 0;             ///< 0: do not reply
+    std::optional<SessionKeys> keys;  ///< only for guests with a key
   };
-  /// Counts the Hellos that did not lead to a Guest, by reason.
+  /// Reasons for which a Hello did not lead to a Guest.
   struct Stats {
-    std::uint64_t retries = 0;      ///< no valid cookie: a Retry was sent
-    std::uint64_t malformed = 0;    ///< not a well-formed Hello
-    std::uint64_t plain = 0;        ///< suite 0 from another host
-    std::uint64_t limited = 0;      ///< too many from one source
-    std::uint64_t unknown_key = 0;  ///< the key id belongs to no client
-    std::uint64_t forged = 0;       ///< not sealed with the key that it names
+    std::uint64_t retries = 0;  ///< no valid cookie: a Retry was sent
+    std::uint64_t malformed = 0;
+    std::uint64_t plain = 0;  ///< suite 0 from another host
+    std::uint64_t limited = 0;
+    std::uint64_t unknown_key = 0;
+    std::uint64_t forged = 0;
 
     Stats& operator+=(const Stats& more) noexcept;
   };
@@ -146,13 +144,13 @@ class Doorman {
   Doorman(const Doorman&) = delete;
   Doorman& operator=(const Doorman&) = delete;
 
-  /// Handles a datagram of type Hello. Writes a Retry into `answer` or returns a guest.
+  /// Handles a Hello. Writes a Retry into `answer` or returns a guest.
   Reply receive(LocalTime now, const Address& from, std::span<const std::byte> datagram,
                 std::span<std::byte, kMaxDatagram> answer);
 
-  /// Writes the Answer that admits or refuses the guest. Both are shorter than a Hello. With a key, every call draws
-  /// new session keys and writes different bytes, so keep the bytes for when the same Hello is resent. A Welcome in
-  /// suite 2 names kFeatureAesGcm, which is added here. The guest must have a `suite` to be welcomed.
+  /// Writes an Answer, which is always shorter than a Hello. With a key, each call uses new session keys, so the bytes
+  /// must be kept and sent again if the Hello is resent. welcome() requires a `suite` and adds kFeatureAesGcm in suite
+  /// 2.
   Answered welcome(const Guest& guest, std::uint32_t connection_id, const Welcome& welcome,
                    std::span<std::byte, kMaxDatagram> buffer);
   Answered refuse(const Guest& guest, const Refused& refused, std::span<std::byte, kMaxDatagram> buffer);

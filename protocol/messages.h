@@ -22,312 +22,301 @@
 #include "core/teleoperation/port_state.h"
 #include "protocol/limits.h"
 
-// The messages of the protocol as plain values. tendon.proto defines their encoding and WIRE.md the bytes around them.
-// All quantities are in SI units, forces act on the hand, and vectors are expressed in the base frame of the device.
+// The messages of the protocol as plain values. See tendon.proto and WIRE.md for their encoding. SI units are used,
+// forces act on the hand, and vectors are in the base frame of the device.
 
 namespace tendon {
 
-/// The version of the wire that this build implements.
 inline constexpr std::uint32_t kProtocolVersion = 1;
 
 enum class Role : std::uint8_t {
-  kObserver = 1,    ///< sees device states
-  kController = 2,  ///< sees device states and sends forces; one per channel
+  kObserver = 1,
+  kController = 2,  ///< also sends forces; one per channel
 };
 
-/// The reason for which something was refused or ended. The numbers are part of the wire and must not change.
+/// Part of the wire: never renumber.
 enum class Code : std::uint8_t {
   kOk = 1,
-  kInvalid = 2,      ///< the value is not acceptable
-  kUnsupported = 3,  ///< this peer does not support the request or the version
-  kBusy = 4,         ///< in use, for example by another controller
+  kInvalid = 2,
+  kUnsupported = 3,  ///< unknown request or version
+  kBusy = 4,         ///< used by another controller
   kDenied = 5,       ///< not allowed for this role
-  kShutdown = 6,     ///< the server is shutting down
-  kTimedOut = 7,     ///< the peer was silent for too long
-  kExpired = 8,      ///< a session of suite 1 has reached its maximum age; repeat the handshake
-  kReplaced = 9,     ///< another program with the same key has taken this place; do not reconnect unasked
+  kShutdown = 6,
+  kTimedOut = 7,
+  kExpired = 8,   ///< the session is too old; repeat the handshake
+  kReplaced = 9,  ///< another program uses the same key; do not reconnect automatically
 };
 
-// The devices of a session and the channels of a device are numbered from 0, below limits::kMaxDevices and
-// limits::kMaxChannels. Each channel takes the forces of one engine, and the device renders the combination of its
-// channels.
+// Devices and channels are numbered from 0, below limits::kMaxDevices and limits::kMaxChannels. Each channel takes the
+// forces of one engine, and the device renders the combination of all channels.
 
-/// Server → client, unreliable, newest wins for each device: the state of the device at one haptic step.
+/// Server → client, unreliable, newest wins for each device: the device at one haptic step.
 struct DeviceState {
-  std::uint64_t tick = 0;             ///< number of the haptic step
-  PeerTime sampled{};                 ///< time at which the position was sampled, server clock
+  std::uint64_t tick = 0;
+  PeerTime sampled{};                 ///< on the server's clock
   Vec3 position = Vec3::Zero();       ///< m
   Vec3 velocity = Vec3::Zero();       ///< m/s
-  Vec3 force_applied = Vec3::Zero();  ///< N, the force that the device actually renders from this step on
-  double energy = 0;                  ///< J, the value of the energy ledger at this step
-  double permitted_force = 0;         ///< N, the limit of the limiter at this step; +infinity if there is none
-  std::uint32_t reasons = 0;          ///< why the force differs from the wanted one: bits of Reason
-  std::uint64_t force_sequence = 0;   ///< sequence of the ForceCommand being rendered; 0 = none
-  Duration force_age{};               ///< time since that force arrived; 0 if there is none
+  Vec3 force_applied = Vec3::Zero();  ///< N, actually rendered from this step on
+  double energy = 0;                  ///< J, of the energy ledger
+  double permitted_force = 0;         ///< N, by the limiter; may be +infinity
+  std::uint32_t reasons = 0;          ///< bits of Reason for reducing the force
+  std::uint64_t force_sequence = 0;   ///< of the rendered ForceCommand, or 0
+  Duration force_age{};               ///< since the arrival of that force
   Mode mode = Mode::kIdle;
   std::uint32_t device = 0;
-  std::uint32_t channel = 0;  ///< the channel that `force_sequence`, `force_age` and `mode` describe
-  /// N, the force that the engines ask for at this step, after hold or local model and before any limit. Sent only to
-  /// an observer that named kFeatureDiagnostics.
+  std::uint32_t channel = 0;  ///< for `force_sequence`, `force_age` and `mode`
+  /// N, requested by the engines, after hold or local model and before all limits. Only for observers with
+  /// kFeatureDiagnostics.
   std::optional<Vec3> force_wanted{};
-  /// N/m, −∂force_wanted/∂position of the engines' models at this step. Sent to the same observers as force_wanted;
-  /// empty if there is no model.
+  /// N/m, −∂force_wanted/∂position, using the engines' models. Empty if there is no model.
   std::optional<Mat3> stiffness_wanted{};
-  /// Bit i is set while button i is held. Sent only to a client that named kFeatureHandle, otherwise 0. A press between
-  /// two states of a client is reported in the next state that it is sent.
+  /// Bit i is set while button i is held, only for clients with kFeatureHandle. Short presses are included in the next
+  /// state that is sent.
   std::uint32_t buttons = 0;
-  // The rest of the handle is sent only to a client that named kFeatureHandle.
-  std::optional<Turning> turning{};      ///< empty if the device does not measure its orientation
-  std::optional<Vec3> torque_applied{};  ///< N·m, on the hand, from this step on; empty if no motor turns the handle
-  std::optional<Grip> grip{};            ///< empty if there is no gripper
-  std::optional<double> grip_applied{};  ///< N, on the fingers, > 0 opens them; empty if the gripper has no motor
-  std::optional<Vec3> hand_force{};      ///< N, of the hand on the handle; empty if there is no force sensor
-  /// In the order of HandleDescription::joints. Sent only to a client that named kFeatureJoints; empty if the device
-  /// does not report them.
+  // Only for clients with kFeatureHandle, and only if the device has such a sensor or motor:
+  std::optional<Turning> turning{};
+  std::optional<Vec3> torque_applied{};  ///< N·m, on the hand, from this step on
+  std::optional<Grip> grip{};
+  std::optional<double> grip_applied{};  ///< N, on the fingers, > 0 opens them
+  std::optional<Vec3> hand_force{};      ///< N, of the hand on the handle
+  /// In the order of HandleDescription::joints. Only for clients with kFeatureJoints.
   std::optional<Joints> joints{};
 };
 
-/// Client → server, unreliable, newest wins for each device and channel: the force computed by the physics engine.
+/// Client → server, unreliable, newest wins for each device and channel: the force from the physics engine.
 struct ForceCommand {
   std::uint64_t sequence = 0;       ///< 1, 2, 3 … per session, device and channel
-  std::uint64_t based_on_tick = 0;  ///< DeviceState::tick from which the force was computed
+  std::uint64_t based_on_tick = 0;  ///< DeviceState::tick used for computing it
   Vec3 force = Vec3::Zero();        ///< N, on the hand
   std::optional<LocalModel> model{};
-  Duration valid_for{};  ///< counted from arrival; > 0, at most 10 s; travels in whole µs, rounded up
+  Duration valid_for{};  ///< since arrival; > 0, at most 10 s; whole µs, rounded up
   std::uint32_t device = 0;
   std::uint32_t channel = 0;
-  bool topology_changed = false;         ///< the body was cut or torn since the last answer: no model is used
-  std::optional<double> error{};         ///< N, the engine's estimate of the error of `force`
-  std::optional<RemoteTorque> torque{};  ///< only to a server that agreed to kFeatureHandle, like `grip_force`
+  bool topology_changed = false;         ///< the body was cut or torn: models are not used
+  std::optional<double> error{};         ///< N, estimated by the engine
+  std::optional<RemoteTorque> torque{};  ///< requires kFeatureHandle, like `grip_force`
   std::optional<double> grip_force{};    ///< N, on the fingers; > 0 opens them
-  /// The index, from 1 on, of the entry of Hello::ways that produced the force, at most limits::kMaxWays; 0 if it is
-  /// not specified. Only to a server that agreed to kFeatureWays.
+  /// The number, starting at 1, of the entry of Hello::ways that was used, or 0. Requires kFeatureWays.
   std::uint32_t way = 0;
 };
 
-/// Two quantiles of a delay. They can be negative only where two clocks had to be compared.
+/// Quantiles of a delay. They can be negative if two clocks were compared.
 struct Delays {
   Duration median{};
   Duration p99{};
 };
 
-/// Forces that a receiver cannot use because of an error in the engine, by kind.
+/// Forces that were refused because of an error in the engine.
 struct RefusedForces {
-  std::uint64_t not_finite = 0;     ///< the force, its model or its error contains NaN or infinity
-  std::uint64_t out_of_bounds = 0;  ///< a value exceeds its bound (WIRE.md), or `valid_for` or `sequence` is 0
-  std::uint64_t unknown_tick = 0;   ///< `based_on_tick` never existed or is more than 4096 ticks old
-  std::uint64_t old_sequence = 0;   ///< `sequence` has not increased although the datagram is the newest
+  std::uint64_t not_finite = 0;     ///< of the force, its model or its error
+  std::uint64_t out_of_bounds = 0;  ///< see WIRE.md; includes `valid_for` 0 and `sequence` 0
+  std::uint64_t unknown_tick = 0;   ///< unknown, or more than 4096 ticks old
+  std::uint64_t old_sequence = 0;   ///< not increased, although the datagram is the newest
   bool operator==(const RefusedForces&) const = default;
 };
 
-/// Server → client, unreliable, newest wins: a report on the client's forces and datagrams. It is sent once per `span`
-/// while forces arrive, are missing or are refused. Delays are absent if nothing was measured; one-way delays have an
-/// error of at most `clock_error`.
+/// Server → client, unreliable, newest wins: statistics of the client's forces and datagrams, sent once per `span`
+/// while forces arrive, are missing or are refused. Delays that were not measured are empty. One-way delays are
+/// accurate to ± `clock_error`.
 struct LinkReport {
   std::uint64_t number = 0;  ///< 1, 2, 3 … per session
-  PeerTime until{};          ///< end of the reported time, server clock
-  Duration span{};           ///< length of the reported time
-  // In that time:
-  std::uint64_t forces = 0;        ///< forces received
-  std::uint64_t late_server = 0;   ///< late because the server sent a state late
-  std::uint64_t late_network = 0;  ///< late because of the network in either direction
-  std::uint64_t late_engine = 0;   ///< late because the engine took longer than usual
-  Duration worst_late{};           ///< longest time that the device had no valid force
-  Duration longest_gap{};          ///< longest silence of the client
+  PeerTime until{};          ///< end of the span, on the server's clock
+  Duration span{};
+  // During the span:
+  std::uint64_t forces = 0;
+  std::uint64_t late_server = 0;   ///< late because a state was late
+  std::uint64_t late_network = 0;  ///< in either direction
+  std::uint64_t late_engine = 0;   ///< late because the engine was slow
+  Duration worst_late{};           ///< maximum time without a valid force
+  Duration longest_gap{};          ///< maximum silence of the client
   std::optional<Delays> round_trip;
   std::optional<Delays> to_server;
   std::optional<Delays> to_client;
-  Duration clock_offset{};     ///< the client's clock minus the server's clock
-  double clock_drift_ppm = 0;  ///< rate at which clock_offset grows
-  Duration clock_error{};      ///< |true offset − clock_offset| is at most this
-  // Datagrams of the client since the session opened:
+  Duration clock_offset{};  ///< client's clock − server's clock
+  double clock_drift_ppm = 0;
+  Duration clock_error{};  ///< bound of |true offset − clock_offset|
+  // Since the session was opened:
   std::uint64_t received = 0;
   std::uint64_t lost = 0;
   std::uint64_t reordered = 0;
   std::uint64_t duplicated = 0;
-  std::string words;  ///< why forces were late or refused, for people; empty if none was. At most 128 bytes
-  // In the reported time:
-  std::uint64_t late_unknown = 0;  ///< late forces whose cause is unknown because the client is silent
-  /// sum over all channels of the client, since some of these forces have no readable channel
+  std::string words;  ///< reasons, for people; at most 128 bytes
+  // During the span:
+  std::uint64_t late_unknown = 0;  ///< not yet known, because the client is silent
+  /// Of all channels together, because some refused forces do not have a readable channel.
   RefusedForces refused{};
 };
 
-/// The state of a device between connection and force output. The numbers are part of the wire and must not change.
+/// The state of a device and its safety layer. Part of the wire: never renumber.
 enum class Safety : std::uint8_t {
-  kAbsent = 1,     ///< not connected
-  kOpening = 2,    ///< being opened
-  kFirmware = 3,   ///< has no firmware yet, or is receiving it
-  kUnhomed = 4,    ///< not homed yet: its position is unknown
-  kHomed = 5,      ///< ready and waiting to be armed
-  kArmed = 6,      ///< renders forces
-  kFault = 7,      ///< a fault occurred while armed; no force until it is armed again
-  kUnguarded = 8,  ///< ready; the scene has no safety layer, so there is nothing to arm
+  kAbsent = 1,
+  kOpening = 2,
+  kFirmware = 3,  ///< has no firmware yet
+  kUnhomed = 4,   ///< position not known yet
+  kHomed = 5,     ///< waiting to be armed
+  kArmed = 6,
+  kFault = 7,      ///< must be armed again
+  kUnguarded = 8,  ///< ready, without a safety layer
 };
 
-/// Histogram of the wake-up delays of a loop. Bucket [0] counts steps at most 1 µs after they were due, bucket [i]
-/// those later than 2^(i−1) µs and at most 2^i µs, and the last bucket all later ones.
+/// Steps by wake-up delay: [0] at most 1 µs, [i] above 2^(i−1) µs and at most 2^i µs, and all others in the last one.
 using LatenessHistogram = std::array<std::uint64_t, limits::kLatenessBuckets>;
 
-/// Returns the bucket for a step that ran `late` after it was due.
 constexpr std::size_t lateness_bucket(Duration late) noexcept {
-  // rounded down just below whole µs: exactly 2 µs belongs to the lower bucket
+  // 2 µs, for example, is in the lower bucket
   const std::int64_t us = late.count() <= 0 ? 0 : (late.count() - 1) / 1000;
   const auto bucket = static_cast<std::size_t>(std::bit_width(static_cast<std::uint64_t>(us)));
   return std::min(bucket, limits::kLatenessBuckets - 1);
 }
 
-/// Either direction, unreliable: the state of one end of a coupling of two devices, sent to the other end. Observers
-/// are sent both ends. For each device, channel and end, the highest sequence of the highest epoch wins. Only between
-/// peers that both named kFeatureTeleoperation.
+/// Both directions, unreliable: one end of a coupling, sent to the other end, and both ends sent to observers. For each
+/// device, channel and end, the highest sequence of the highest epoch wins. Requires kFeatureTeleoperation.
 struct PortFrame : PortState {
-  std::uint32_t device = 0;  ///< device of the session's server, in both directions
+  std::uint32_t device = 0;  ///< always of the session's server
   std::uint32_t channel = 0;
-  bool of_peer = false;  ///< to an observer: this is the remote end of the coupling
+  bool of_peer = false;  ///< for observers: the remote end
 };
 
-/// Server → client, unreliable, newest wins for each device: statistics of its haptic loop. Sent once a second to an
-/// observer of the device that named kFeatureDiagnostics. All counts refer to the reported time.
+/// Server → client, unreliable, newest wins for each device: statistics of its loop over `span`, sent every second to
+/// observers with kFeatureDiagnostics.
 struct DeviceReport {
-  std::uint64_t number = 0;  ///< 1, 2, 3 … per device
-  PeerTime until{};          ///< end of the reported time, server clock
-  Duration span{};           ///< length of the reported time
+  std::uint64_t number = 0;
+  PeerTime until{};  ///< end of the span, on the server's clock
+  Duration span{};
   std::uint32_t device = 0;
-  std::uint64_t steps = 0;     ///< haptic steps
-  std::uint64_t missed = 0;    ///< periods without a step because the previous step ran late
-  std::uint64_t overruns = 0;  ///< steps so late that they set Reason::kOverrun
-  std::uint64_t unseen = 0;    ///< steps in which the device returned no position
-  /// The sum is at most `steps`. It is smaller only if the server lost count of some steps.
+  std::uint64_t steps = 0;
+  std::uint64_t missed = 0;    ///< periods skipped because of a late step
+  std::uint64_t overruns = 0;  ///< late enough for Reason::kOverrun
+  std::uint64_t unseen = 0;    ///< steps without a position
+  /// The sum can be less than `steps` if the server lost count.
   LatenessHistogram lateness{};
   Safety safety = Safety::kAbsent;
-  std::string fault{};     ///< why there is no force until it is armed or rearmed; empty: no fault. At most 128 bytes
-  std::string degraded{};  ///< what the server has reduced at present; empty: nothing. At most 128 bytes
+  std::string fault{};     ///< reason for being disarmed; at most 128 bytes
+  std::string degraded{};  ///< services reduced by the server; at most 128 bytes
 };
 
-/// Server → client, unreliable, newest wins for each device and channel: statistics of the engine that sends the forces
-/// of the channel. Sent once a second to an observer of the device that named kFeatureDiagnostics.
+/// Server → client, unreliable, newest wins for each device and channel: statistics of the engine that uses a channel,
+/// sent every second to observers with kFeatureDiagnostics.
 struct PeerReport {
   std::uint32_t device = 0;
   std::uint32_t channel = 0;
-  std::string name{};  ///< of the engine; at most 64 bytes
-  /// the server sends it one of every `state_one_in` states that it asked for, because its link is congested
+  std::string name{};  ///< at most 64 bytes
+  /// Due to congestion, only one of this many requested states is sent.
   std::uint32_t state_one_in = 1;
-  bool forces_refused = false;  ///< its forces are ignored because its link loses too many datagrams
-  LinkReport link{};            ///< `number`: 1, 2, 3 … of the channel; the forces are the channel's
-  // The least certain force of that time by ForceCommand::error, or the newest one if no force carries an error.
-  std::optional<double> error{};  ///< N; empty if no force carries an error
-  std::string way{};  ///< the entry of Hello::ways that produced it; empty if not specified. At most 24 bytes
+  bool forces_refused = false;  ///< due to excessive loss
+  LinkReport link{};            ///< for this channel only
+  // Of the force with the largest ForceCommand::error, or of the newest force if errors are not reported.
+  std::optional<double> error{};  ///< N
+  std::string way{};              ///< from Hello::ways; at most 24 bytes
 };
 
-/// Client → server, reliable: the number of states per second that this client wants of a device. The server uses the
-/// nearest rate that divides its own rate, and never a higher one.
+/// Client → server, reliable: sets the state rate of a device. The server uses the nearest rate that divides its own
+/// rate, and never a higher one.
 struct SetStateRate {
   std::uint32_t hz = 0;
   std::uint32_t device = 0;
 };
 
-/// Client → server, reliable: omit the states that the client can predict. See StateDeadband; limits.h has the bounds.
+/// Client → server, reliable: omits states that the client can predict (see StateDeadband). The bounds are in limits.h.
 struct SetStateDeadband {
-  double share = 0;        ///< fraction of the speed
+  double share = 0;        ///< of the speed
   double floor = 0;        ///< m/s
-  Duration max_silence{};  ///< 0: every state is sent, as without this request; travels in whole µs
+  Duration max_silence{};  ///< 0 disables the deadband; whole µs
 };
 
-/// Client → server, reliable: clears a latched fault and revokes a Disarm. Only from a controller of the device.
+/// Client → server, reliable: clears a latched fault or a Disarm. Only for controllers of the device.
 struct Rearm {
   std::uint32_t device = 0;
 };
 
-/// Client → server, reliable: no force from the next haptic step on, until a Rearm. Only from a controller of the
-/// device.
+/// Client → server, reliable: no force until a Rearm, starting with the next step. Only for controllers of the device.
 struct Disarm {
   std::uint32_t device = 0;
 };
 
-/// Client → server, reliable: sets a lamp or starts a vibration pulse. Only from a controller that holds a channel of
-/// the device, and only to a server that agreed to kFeatureOutputs.
+/// Client → server, reliable: sets a lamp or starts a vibration pulse. Only for controllers that hold a channel of the
+/// device. Requires kFeatureOutputs.
 struct SetOutput {
   std::uint32_t device = 0;
   std::uint32_t output = 0;  ///< index in HandleDescription::outputs
-  OutputSetting setting{};   ///< a pulse's duration travels in whole ms, rounded up
+  OutputSetting setting{};   ///< duration of a pulse: whole ms, rounded up
 };
 
-/// Client → server, reliable: asks for the DeviceDescription, or, if `handle` is set, for the HandleDescription. Set
-/// `handle` only if the server agreed to kFeatureHandle: an older server ignores it.
+/// Client → server, reliable: asks for the DeviceDescription, or for the HandleDescription if `handle` is set, which
+/// requires kFeatureHandle because older servers ignore it.
 struct Describe {
   std::uint32_t device = 0;
   bool handle = false;
 };
 
-/// Client → server, reliable: requests the lease of a channel, whose holder's forces the channel takes. Only from a
-/// client that claimed the channel.
+/// Client → server, reliable: requests the lease of a channel that this client has claimed. The channel takes the
+/// forces of the holder.
 struct TakeLease {
   std::uint32_t device = 0;
   std::uint32_t channel = 0;
 };
 
-/// Client → server, reliable: gives up the lease of a channel.
 struct GiveLease {
   std::uint32_t device = 0;
   std::uint32_t channel = 0;
 };
 
-/// Server → client, reliable: the client has lost the lease of a channel.
+/// Server → client, reliable: another client has taken the lease.
 struct LeaseLost {
   std::uint32_t device = 0;
   std::uint32_t channel = 0;
-  std::string to;  ///< name of the new holder; at most 64 bytes
+  std::string to;  ///< name of the holder; at most 64 bytes
 };
 
-/// Client → server, reliable: couples the client's device to this one, with the settings of the client's end. Only from
-/// a client that claimed the channel.
+/// Client → server, reliable: couples the client's device to this one. Only for clients that claimed the channel.
 struct Couple {
   std::uint32_t device = 0;
   std::uint32_t channel = 0;
-  PortRole role = PortRole::kLeader;  ///< role of the sender
+  PortRole role = PortRole::kLeader;  ///< of the sender
   CouplingMethod method = CouplingMethod::kPositionPosition;
   double position_scale = 1;  ///< follower / leader
   double force_scale = 1;     ///< leader / follower
-  Quat rotation{};            ///< from the leader's base frame to the follower's
-  std::uint32_t axes = 7;     ///< bits 1, 2, 4: the axes x, y, z of the leader's frame are coupled
-  double stiffness = 0;       ///< N/m; this and the dampings as felt by the leader
+  Quat rotation{};            ///< leader's base frame → follower's
+  std::uint32_t axes = 7;     ///< bits 1, 2, 4: x, y, z of the leader
+  double stiffness = 0;       ///< N/m, felt by the leader, like the dampings
   double mutual_damping = 0;  ///< N·s/m
   double damping = 0;         ///< N·s/m
   bool adapt_to_delay = false;
   bool purse = false;
-  Duration period{};          ///< time between two PortStates; travels in whole µs; > 0, at most 10 s
-  bool absolute = false;      ///< the offsets are zero, and both ends align first
-  double turn_stiffness = 0;  ///< N·m/rad; 0: orientations are not coupled
+  Duration period{};          ///< between PortStates; whole µs; > 0, at most 10 s
+  bool absolute = false;      ///< without offsets; both ends align first
+  double turn_stiffness = 0;  ///< N·m/rad; 0: not coupled
   double turn_damping = 0;    ///< N·m·s/rad
-  double grip_stiffness = 0;  ///< N/m at the fingers; 0: grippers are not coupled
+  double grip_stiffness = 0;  ///< N/m at the fingers; 0: not coupled
   double grip_damping = 0;    ///< N·s/m
-  double drift_rate = 0;      ///< 1/s, drift rate of the passivity control
+  double drift_rate = 0;      ///< 1/s, for passivity control
   std::optional<RateControl> rate{};
 
   bool operator==(const Couple&) const = default;
 };
 
-/// Client → server, reliable: new scales of a coupling, while the leader is not engaged or holds its clutch. Only from
-/// a controller of the leader's device.
+/// Client → server, reliable: changes the scales while the leader is not engaged or uses its clutch. Only for
+/// controllers of the leader's device.
 struct SetScale {
   std::uint32_t device = 0;
   double position_scale = 1;  ///< follower / leader; 0.01 … 100
   double force_scale = 1;     ///< leader / follower; 0.01 … 100
 };
 
-/// Client → server, reliable: the weight of the leader of that channel among several leaders. Only from a controller of
-/// the follower's device.
+/// Client → server, reliable: sets the weight of the leader of that channel. Only for controllers of the follower's
+/// device.
 struct SetShare {
   std::uint32_t device = 0;
   std::uint32_t channel = 0;
   double share = 0;  ///< 0 … 1
 };
 
-/// Client → server, reliable: the operator engages the coupling. Only from a controller of the device.
+/// Client → server, reliable: engages the coupling. Only for controllers of the device.
 struct Engage {
   std::uint32_t device = 0;
 };
 
-/// Client → server, reliable: the operator disengages the coupling. Only from a controller of the device.
+/// Client → server, reliable: disengages the coupling. Only for controllers of the device.
 struct Disengage {
   std::uint32_t device = 0;
 };
@@ -338,134 +327,123 @@ using Request = std::variant<SetStateRate, Rearm, Disarm, Describe, TakeLease, G
 struct ChannelDescription {
   std::string name;  ///< at most 24 bytes
   ChannelRule rule = ChannelRule::kSum;
-  /// Another controller may take over from a holder that sends no usable force for this long; 0 = the holder stays
-  /// until it leaves.
+  /// A holder that does not send usable forces for this long can be replaced. 0 disables this.
   Duration lease{};
-  std::string holder{};  ///< name of the client whose forces it takes; empty: none; cut to 24 bytes
+  std::string holder{};  ///< empty if the channel is free; cut to 24 bytes
 };
 
-/// Properties of a device. Where a value cannot be 0, 0 means that it is not known.
+/// Unknown values are 0, unless 0 is a possible value.
 struct DeviceDescription {
   struct Box {
     Vec3 min = Vec3::Zero();  ///< m
     Vec3 max = Vec3::Zero();
   };
   std::uint32_t device = 0;
-  std::string name{};              ///< name on the server; at most 24 bytes
+  std::string name{};              ///< at most 24 bytes
   std::string model{};             ///< at most 64 bytes
   std::uint32_t position_dof = 3;  ///< measured axes, 1 … 6
   std::uint32_t force_dof = 3;     ///< actuated axes, 1 … 6
-  std::optional<Box> workspace{};  ///< range of the handle position
-  double max_force = 0;            ///< N, largest norm of the force
-  double continuous_force = 0;     ///< N, largest norm that it can render without a time limit
-  double max_stiffness = 0;        ///< N/m, largest stiffness that it renders stably
-  double position_resolution = 0;  ///< m, one encoder count at the handle; 0 = exact
-  std::uint32_t loop_hz = 0;       ///< haptic steps per second
+  std::optional<Box> workspace{};  ///< of the handle
+  double max_force = 0;            ///< N, maximum norm
+  double continuous_force = 0;     ///< N, without a time limit
+  double max_stiffness = 0;        ///< N/m, rendered stably
+  double position_resolution = 0;  ///< m, encoder count at the handle; 0 = exact
+  std::uint32_t loop_hz = 0;
   std::vector<ChannelDescription> channels{};
 };
 
-/// The hand for which a device is meant.
 enum class Hand : std::uint8_t { kAny = 0, kLeft = 1, kRight = 2 };
 
-/// Properties of the handle of a device. This is a separate message because it does not fit into one datagram together
-/// with the longest DeviceDescription.
+/// This is a separate message, because together with the longest DeviceDescription it is too large for a datagram.
 struct HandleDescription {
   std::uint32_t device = 0;
-  /// Rotates from the base frame to the operator's frame, x right, y up, z to the user (core/base/frames.h); empty:
-  /// unknown.
+  /// Device base frame → operator's frame: x right, y up, z to the user (core/base/frames.h). Empty if unknown.
   std::optional<Quat> operator_from_device{};
-  std::vector<std::string> buttons{};    ///< names by bit of DeviceState::buttons; at most 16 of at most 24 bytes
-  bool orientation_measured = false;     ///< if false, no state has `turning`
-  double max_torque = 0;                 ///< N·m, largest norm of the torque; 0 = none
-  std::optional<double> gripper_open{};  ///< rad, opening of the open gripper; empty: no gripper
-  double max_gripper_force = 0;          ///< N, on the fingers; 0 = it has no motor
-  std::string group{};                   ///< shared by the devices of one body; at most 24 bytes; empty: no group
+  std::vector<std::string> buttons{};    ///< names by bit; at most 16 of at most 24 bytes
+  bool orientation_measured = false;     ///< otherwise `turning` is always empty
+  double max_torque = 0;                 ///< N·m, maximum norm; 0: none
+  std::optional<double> gripper_open{};  ///< rad; empty: no gripper
+  double max_gripper_force = 0;          ///< N, on the fingers; 0: no motor
+  std::string group{};                   ///< same for devices of one body; at most 24 bytes
   Hand hand = Hand::kAny;
-  /// Names of the joints, in the order of DeviceState::joints; at most 8 of at most 24 bytes. Sent only to a client
-  /// that named kFeatureJoints; empty if the device does not report joints.
+  /// At most 8 names of at most 24 bytes, in the order of DeviceState::joints. Only for clients with kFeatureJoints.
   std::vector<std::string> joints{};
-  /// The outputs, indexed by SetOutput::output; at most 8, with names of at most 24 bytes. Sent only to a client that
-  /// named kFeatureOutputs.
+  /// Indexed by SetOutput::output; at most 8, with names of at most 24 bytes. Only for clients with kFeatureOutputs.
   std::vector<OutputDescription> outputs{};
 };
 
-/// Feature: the client may send a local model with its forces, and the server evaluates it at the position of the hand.
+/// Features, which are used if both peers name them. Forces can include a local model, which the server evaluates at
+/// the position of the hand.
 inline constexpr std::string_view kFeatureLocalModel = "local-model";
-/// Feature: the client claims devices and channels by name and is notified when it loses a lease.
+/// Claims use the names of devices and channels, and the client is notified if it loses a lease.
 inline constexpr std::string_view kFeatureChannels = "channels";
 
-/// Feature: the client receives the orientation of the device relative to the operator, the names of its buttons, and
-/// which are held.
+/// The client receives the orientation of the device, the names of the buttons, and their states.
 inline constexpr std::string_view kFeatureHandle = "handle";
 
-/// Feature: the client receives the joint angles in each state and the names of the joints in HandleDescription.
+/// The client receives joint angles and their names.
 inline constexpr std::string_view kFeatureJoints = "joints";
 
-/// Feature: the client receives the list of outputs of the device (lamps, vibration) and may set them.
+/// The client receives the list of outputs (lamps, vibration) and can set them.
 inline constexpr std::string_view kFeatureOutputs = "outputs";
 
-/// Feature: the client may be the remote end of a coupling. It sends Couple, and PortStates travel in both directions.
-/// An observer receives those of both ends.
+/// The client can be the remote end of a coupling, using Couple and PortState. Observers receive the PortStates of both
+/// ends.
 inline constexpr std::string_view kFeatureTeleoperation = "teleoperation";
 
-/// Feature: the states of several devices at one step are sent in columns if that halves the bytes, with all values
-/// except positions in single precision. For clients with more than seven devices, whose full states do not fit into
-/// one datagram.
+/// States of several devices at the same step are sent in columns if this halves the size, using single precision
+/// except for positions. For clients with more than seven devices, whose complete states do not fit into a datagram.
 inline constexpr std::string_view kFeatureStateColumns = "state-columns";
 
-/// Feature: an engine names its solver paths and each force says which one produced it. Other servers are sent the
-/// forces without that index.
+/// An engine names its solver paths, and each force indicates which one was used.
 inline constexpr std::string_view kFeatureWays = "ways";
 
-/// Feature: an observer receives the forces that the engines ask for and statistics of loops and engines (DeviceReport,
-/// PeerReport). It is not granted to controllers.
+/// For observers only: requested forces and statistics of loops and engines (DeviceReport, PeerReport).
 inline constexpr std::string_view kFeatureDiagnostics = "diagnostics";
 
-/// A client's claim of a device and, as a controller, of one of its channels, by name.
+/// Claims a device, and a channel if the role is controller.
 struct Claim {
   std::string device;   ///< empty: device 0; at most 24 bytes
   std::string channel;  ///< empty: channel 0; at most 24 bytes
   Role role = Role::kObserver;
 };
 
-/// The numbers that replace the names of a claim from now on.
+/// The numbers that are used instead of names after the handshake.
 struct Grant {
   std::uint32_t device = 0;
   std::uint32_t channel = 0;
-  Role role = Role::kObserver;  ///< kObserver for a controller's claim: another client holds the lease, see TakeLease
+  Role role = Role::kObserver;  ///< observer if another client holds the lease
 };
 
-/// The first message of a client. It is repeated with the server's cookie after a Retry.
+/// The first message of a client, sent again with the cookie of a Retry.
 struct Hello {
   std::uint32_t version_min = kProtocolVersion;
   std::uint32_t version_max = kProtocolVersion;
   Role role = Role::kObserver;
   std::string name;                   ///< for logs; at most 64 bytes
-  std::vector<std::string> features;  ///< offered features; the intersection is used. At most 16 of at most 32 bytes
-  /// No duplicates; at most 16. If empty: device 0, its channel 0, and `role`. Otherwise `role` is the highest of their
-  /// roles.
+  std::vector<std::string> features;  ///< at most 16 of at most 32 bytes
+  /// At most 16, without duplicates. If not empty, `role` is the highest of their roles. The default is device 0,
+  /// channel 0, `role`.
   std::vector<Claim> claims{};
-  /// With kFeatureWays: the names of the engine's solver paths. At most limits::kMaxWays, each of at most 24 bytes.
+  /// Solver paths, if kFeatureWays is named; at most limits::kMaxWays of at most 24 bytes.
   std::vector<std::string> ways{};
 };
 
-/// The answer that admits a client.
 struct Welcome {
   std::uint32_t version = 0;
-  std::vector<std::string> features;  ///< features that both peers support
+  std::vector<std::string> features;  ///< common features
   Role role = Role::kObserver;
   std::string device_name;
   double max_force = 0;            ///< N
   double position_resolution = 0;  ///< m
-  std::uint32_t loop_hz = 0;       ///< haptic steps per second
-  Duration timeout{};              ///< silence after which the server drops this client
-  std::string server;              ///< name and version of the server
-  /// One for each claim, in their order; device_name … loop_hz describe the device of the first one. A server without
-  /// support for claims returns none, which is equivalent to a Hello without claims.
+  std::uint32_t loop_hz = 0;
+  Duration timeout{};  ///< for dropping a silent client
+  std::string server;  ///< name and version
+  /// In the order of the claims. The fields from device_name to loop_hz describe the first device. Empty if the server
+  /// does not support claims.
   std::vector<Grant> grants{};
 };
 
-/// The answer that refuses a client.
 struct Refused {
   Code code = Code::kInvalid;
   std::string detail;

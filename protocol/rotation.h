@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Makes the rotations of core (unit quaternions) available to clients, which may include protocol but not core.
+// Unit quaternions. This header makes them available to clients, which may not include core.
 
 #include "core/base/rotation.h"
