@@ -11,7 +11,7 @@ namespace tendon {
 
 Connection::Connection(Link& link, const Address& server, const Config& config)
     : link_(link), server_(server), config_(config), secrets_(config.seed), back_off_(config.retry_min) {
-  config_.seed = {};  // the seed would reveal all later keys to anyone who reads this memory
+  config_.seed = {};  // later keys can be computed from the seed
 }
 
 void Connection::greet(LocalTime now, const Hello& hello) {
@@ -48,7 +48,7 @@ const Connection::Event* Connection::next_of_session(LocalTime now) {
   const Session::Event* const event = session_ ? session_->next_event() : nullptr;
   if (event == nullptr) return nullptr;
   if (const auto* closed = std::get_if<Session::Closed>(event)) {
-    flush(now);  // send our own Bye
+    flush(now);
     return end(now, Cause::kLost, closed->code, closed->reason);
   }
   if (std::holds_alternative<Session::StateArrived>(*event)) back_off_ = config_.retry_min;
@@ -57,7 +57,7 @@ const Connection::Event* Connection::next_of_session(LocalTime now) {
 }
 
 const Connection::Event* Connection::receive(LocalTime& now) {
-  // One byte more than the largest datagram, so that an oversized datagram stays oversized after truncation.
+  // The extra byte marks datagrams that are too large.
   std::array<std::byte, kMaxDatagram + 1> buffer;
   Address from;
   const std::size_t size = link_.receive(from, buffer);
@@ -95,7 +95,6 @@ const Connection::Event* Connection::tick(LocalTime now) {
   return nullptr;
 }
 
-/// Handles the server's answer to the Hello, if it has arrived.
 const Connection::Event* Connection::settle(LocalTime now) {
   if (!handshake_->outcome()) return nullptr;
   ClientHandshake::Outcome outcome = *handshake_->outcome();

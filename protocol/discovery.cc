@@ -12,13 +12,12 @@
 namespace tendon::dns_sd {
 namespace {
 
-/// Limits of DNS, in bytes.
 constexpr std::size_t kMaxDomain = 253;
 constexpr std::size_t kMaxDomainLabel = 63;
 
 bool is_alnum(char c) { return std::isalnum(static_cast<unsigned char>(c)) != 0; }
 
-/// Names of devices and channels follow the rules of scene files.
+/// For names of devices and channels, as in scene files.
 bool is_label(std::string_view text) {
   return !text.empty() && text.size() <= limits::kMaxLabel &&
          std::all_of(text.begin(), text.end(), [](char c) { return is_alnum(c) || c == '-' || c == '_'; });
@@ -30,7 +29,7 @@ std::string lower(std::string_view text) {
   return out;
 }
 
-/// Removes "\X" or "\DDD" from the front of `text` and returns the character that it stands for.
+/// Removes "\X" or "\DDD" from the front of `text`, and returns the character.
 char take_escaped(std::string_view& text) {
   text.remove_prefix(1);
   if (text.empty()) throw std::invalid_argument("a backslash at the end escapes nothing");
@@ -81,7 +80,7 @@ std::string escaped(std::string_view name) {
   return text;
 }
 
-/// Returns 0 unless all of `text` is a number of at most `most`.
+/// Returns 0 if `text` is not a number up to `most`.
 std::uint32_t number(std::string_view text, std::uint32_t most) {
   std::uint32_t value = 0;
   const char* const end = text.data() + text.size();

@@ -21,8 +21,8 @@ std::array<std::byte, Size> first_of(const Bytes32& bytes) noexcept {
   return first;
 }
 
-/// The prologue of the Noise handshake. It excludes the cookie, so that an attempt has a single message 1 however many
-/// cookies it collects. With a second prologue, one ephemeral key would authenticate two messages with the same nonce.
+/// Does not include the cookie, so that all datagrams of an attempt contain the same message 1. A different prologue
+/// would use the same ephemeral key and nonce for another message.
 std::vector<std::byte> prologue(const KeyId& id, const ClientRandom& random) {
   const auto header = encode_header({.type = DatagramType::kHello, .suite = Suite::kNoise});
   std::vector<std::byte> out;
@@ -33,7 +33,7 @@ std::vector<std::byte> prologue(const KeyId& id, const ClientRandom& random) {
   return out;
 }
 
-/// In suite 2, both peers name kFeatureAesGcm inside the sealed handshake messages, which authenticates the choice.
+/// The sealed messages of the handshake contain this feature, so the choice of suite 2 is authenticated.
 bool names_aes(const std::vector<std::string>& features) noexcept {
   return std::find(features.begin(), features.end(), kFeatureAesGcm) != features.end();
 }
@@ -50,8 +50,6 @@ NoiseSplit split_of(Suite suite, const NoiseSplit& split) noexcept {
 std::int64_t floor_divide(std::int64_t a, std::int64_t b) noexcept { return a / b - (a % b < 0 ? 1 : 0); }
 
 }  // namespace
-
-// ---- ClientHandshake ----
 
 ClientHandshake::ClientHandshake(const Config& config, LocalTime now)
     : version_min_(config.hello.version_min),
@@ -78,8 +76,8 @@ void ClientHandshake::receive(LocalTime now, std::span<const std::byte> datagram
   if (outcome_) return;
   const Suite suite = noise_ ? Suite::kNoise : Suite::kPlain;
   if (const auto retry = decode_retry(datagram); retry && retry->suite == suite && retry->random == random_) {
-    // Only the first cookie is answered with an immediate Hello. Otherwise we and a server that rejects our cookies
-    // would exchange datagrams as fast as the network allows.
+    // Replies immediately only to the first cookie. A server that rejects our cookies could otherwise cause an endless
+    // exchange without delay.
     if (!cookie_) {
       due_ = true;
       next_tick_ = now;
@@ -137,8 +135,6 @@ std::size_t ClientHandshake::next_datagram(LocalTime now, std::span<std::byte, k
                  .body = body_},
                 buffer);
 }
-
-// ---- Doorman ----
 
 namespace {
 

@@ -35,7 +35,7 @@ bool LeaseRequest::take(const Session::RequestAnswered& answer, LocalTime now) n
   if (answer.id != asked_) return false;
   asked_.reset();
   ask_at_ = LocalTime::max();
-  if (answer.code != Code::kUnsupported) holds_ = answer.code == Code::kOk;  // kUnsupported: the server has no leases
+  if (answer.code != Code::kUnsupported) holds_ = answer.code == Code::kOk;  // the server does not support leases
   if (!holds_ && keep_asking_ && answer.code == Code::kBusy) ask_at_ = now + std::max(answer.wait, again_);
   return true;
 }
@@ -43,8 +43,7 @@ bool LeaseRequest::take(const Session::RequestAnswered& answer, LocalTime now) n
 bool LeaseRequest::take(const LeaseLost& lost, Session& session, LocalTime now) {
   if (lost.device != place_.device || lost.channel != place_.channel) return false;
   holds_ = false;
-  // The answer to an earlier request can arrive after this message although it was sent before it. A new request is
-  // answered after it.
+  // The answer to an earlier request can still arrive after this message. A new request is answered after both.
   if (asked_ && ask(session)) return true;
   if (keep_asking_) ask_at_ = now + again_;
   return true;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "protocol/link.h"
 
-#include <arpa/inet.h>  // inet_pton and inet_ntop
+#include <arpa/inet.h>
 
 #include <algorithm>
 #include <charconv>
@@ -53,7 +53,7 @@ std::string to_string(const Address& address) {
 }
 
 Address parse_address(std::string_view text) {
-  // inet_pton would stop at a NUL inside the host.
+  // inet_pton() would ignore everything after a NUL.
   const std::optional<Address> address = text.find('\0') == std::string_view::npos ? parse(text) : std::nullopt;
   if (!address) {
     throw std::invalid_argument("expected HOST:PORT like 127.0.0.1:47100 or [::1]:47100, got \"" + std::string(text) +

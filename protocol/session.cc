@@ -18,18 +18,16 @@
 namespace tendon {
 namespace {
 
-/// Keeps the newest value of each stream, where a stream is the states or reports of one device or channel. `Told` is
-/// the event that wraps a value, or void. Allocates only for the first value of a stream and for the text of a report.
-/// The codec limits the number of streams to kMaxDevices or kMaxDevices · kMaxChannels.
+/// The newest value of each stream. A stream consists of the states or reports of a device or channel, so the codec
+/// limits the number of streams to kMaxDevices or kMaxDevices · kMaxChannels. `Told` is the event that wraps a value,
+/// or void. Memory is only allocated for the first value of a stream and for the text of a report.
 template <class Value, class Told = void>
 class Newest {
  public:
   using Kept = std::conditional_t<std::is_void_v<Told>, Value, Session::Event>;
 
-  /// Replaces the value of this stream if it was not taken.
   void put(const Value& value) { put(stream(value), value); }
-  /// Does the same if the value is newer than all earlier ones of its stream. Otherwise returns false and changes
-  /// nothing.
+  /// Returns false if the value is not newer than all earlier ones of its stream.
   bool put_if_newer(const Value& value) {
     Stream& mine = stream(value);
     const auto order = order_of(value);
@@ -41,9 +39,9 @@ class Newest {
 
   bool empty() const noexcept { return waiting_ == 0; }
 
-  /// The value that take() returns next, or null. Streams are in the order of their first values.
+  /// Streams are in the order of their first values.
   const Kept* first() const noexcept { return empty() ? nullptr : &next_waiting()->value; }
-  /// Returns the next value, which is valid until the next `put`.
+  /// The value is valid until the next `put`.
   const Kept* take() noexcept {
     const auto next = streams_.begin() + (next_waiting() - streams_.cbegin());
     next->waiting = false;
@@ -56,7 +54,7 @@ class Newest {
       if (stream.waiting) visit(stream.value);
     }
   }
-  /// Takes a value that for_each_waiting() has visited.
+  /// Removes a value visited by for_each_waiting().
   void take(const Value* value) {
     for (Stream& stream : streams_) {
       if (&stream.value != value) continue;
@@ -70,7 +68,7 @@ class Newest {
   struct Stream {
     Kept value;
     bool waiting = false;
-    std::optional<Order> order{};  ///< order of the newest value
+    std::optional<Order> order{};
   };
 
   static Order order_of(const DeviceState& state) noexcept { return {0, state.tick}; }
@@ -119,11 +117,10 @@ class Newest {
   std::size_t waiting_ = 0;
 };
 
-/// The streams of several kinds of value.
 template <class... Newests>
 struct Streams : Newests... {
   bool empty() const noexcept { return (Newests::empty() && ...); }
-  /// Takes the next value of the first kind that has one. Returns null if there is none.
+  /// Returns a value of the first kind that is not empty, or null.
   const auto* take() noexcept {
     const std::common_type_t<typename Newests::Kept...>* taken = nullptr;
     ((!taken && !Newests::empty() ? void(taken = Newests::take()) : void()), ...);
@@ -131,7 +128,7 @@ struct Streams : Newests... {
   }
 };
 
-/// Selects the streams of one kind, as in of<DeviceState>(streams).
+/// Selects a kind, as in of<DeviceState>(streams).
 template <class Value, class Told>
 Newest<Value, Told>& of(Newest<Value, Told>& streams) noexcept {
   return streams;
@@ -150,17 +147,16 @@ struct Session::State {
 
   Config config;
   LocalTime opened;
-  LocalTime latest;  ///< the newest `now`
+  LocalTime latest;
   bool open = true;
   LinkStats stats;
 
-  // Only in suites 1 and 2.
+  // Only used in suites 1 and 2.
   Suite suite = Suite::kPlain;
   std::optional<Sealer> sealer;
   std::optional<Opener> opener;
   std::array<std::byte, kMaxDatagram> opened_body{};
 
-  // Output.
   DataWriter writer;
   std::uint64_t next_packet = 0;
   std::optional<LocalTime> last_sent;
@@ -170,27 +166,26 @@ struct Session::State {
   OutgoingRequests asked;
   Bye bye;
   int byes_left = 0;
-  LocalTime silent_until = LocalTime::min();  ///< nothing to send before this time; min: unknown since the last news()
+  LocalTime silent_until = LocalTime::min();  ///< min: must be computed
 
-  // Input.
   DataReader reader;
   LocalTime last_heard;
   ReplayWindow seen;
   std::optional<OutgoingEcho> echo;
-  std::optional<std::uint64_t> newest_echoed;  ///< newest of our packets that the peer has acknowledged
+  std::optional<std::uint64_t> newest_echoed;
   IncomingRequests answering;
   RoundTrip round_trip;
   std::optional<ClockExchange> exchange;
   ClockOffsetEstimator peer_clock;
 
-  // Waiting events, in the order in which they are returned.
+  // Pending events, in the order of next_event().
   Streams<Newest<ForceCommand, ForceArrived>, Newest<PortFrame, PortArrived>, Newest<LinkReport, ReportArrived>,
           Newest<DeviceReport, DeviceReportArrived>, Newest<PeerReport, PeerReportArrived>,
           Newest<DeviceState, StateArrived>>
       arrived;
   std::optional<Closed> closed;
-  bool untold = false;  ///< `arrived`, `closed`, `asked` or `answering` may hold an event
-  Event rare;           ///< storage for the last returned event that is not in `arrived`
+  bool untold = false;  ///< some event may be pending
+  Event rare;           ///< other events returned by next_event()
 
   std::optional<std::span<const std::byte>> open_body(LocalTime now, const Header& header,
                                                       std::span<const std::byte> datagram);
@@ -198,12 +193,12 @@ struct Session::State {
   void observe(LocalTime now, PeerTime sent, const IncomingEcho& told);
   void count_lost_outgoing(const IncomingEcho& told);
 
-  // Handles a frame. `newest` is true if its datagram is the newest so far.
+  // `newest` is true if this datagram is the newest so far.
   template <class Value>
   void take(const Value& value, bool newest) {
     if (of<Value>(arrived).put_if_newer(value)) return;
     ++stats.stale;
-    // In an older datagram, the network caused it and not the engine.
+    // In an older datagram, this is due to the network.
     if constexpr (std::is_same_v<Value, ForceCommand>) stats.refused_forces.old_sequence += newest ? 1 : 0;
   }
   void take(const Control& control, bool /*newest*/) { stats.invalid += news().answering.take(control) ? 0 : 1; }
@@ -211,7 +206,7 @@ struct Session::State {
   void take(const Bye& said, bool newest);
 
   bool silent_too_long(LocalTime now) const noexcept { return !last_sent || now - *last_sent >= config.keep_alive; }
-  /// Call before any change to what is sent or when: it discards the cached `silent_until`.
+  /// Must be called before data to be sent are changed.
   State& news() noexcept {
     silent_until = LocalTime::min();
     return *this;
@@ -258,8 +253,6 @@ Session::~Session() = default;
 Session::Session(Session&&) noexcept = default;
 Session& Session::operator=(Session&&) noexcept = default;
 
-// ---- In ----
-
 bool Session::receive(LocalTime now, std::span<const std::byte> datagram) {
   State& my = *state_;
   my.latest = now;
@@ -267,7 +260,7 @@ bool Session::receive(LocalTime now, std::span<const std::byte> datagram) {
 
   const std::optional<Header> header = decode_header(datagram);
   if (header && header->type != DatagramType::kData) {
-    ++my.stats.duplicated;  // a delayed copy of a handshake datagram
+    ++my.stats.duplicated;
     return false;
   }
   if (!header || header->suite != my.suite || header->connection_id != my.config.connection_id ||
@@ -283,7 +276,7 @@ bool Session::receive(LocalTime now, std::span<const std::byte> datagram) {
   if (!body) return false;
   const DataContent* content = my.reader.read(*body);
   if (!content) {
-    // An authentic datagram uses up its packet number. In suite 0 it does not, because a damaged copy must not block
+    // If the datagram is authentic, its number must not be accepted again. In suite 0, a damaged copy must not block
     // the original.
     if (my.opener) my.seen.insert(header->packet_number);
     ++my.stats.malformed;
@@ -292,7 +285,7 @@ bool Session::receive(LocalTime now, std::span<const std::byte> datagram) {
   return my.accept(now, header->packet_number, *content);
 }
 
-/// Returns the decrypted body. If the datagram is not authentic, counts it and returns nullopt.
+/// Returns the plaintext. Datagrams that are not authentic are counted.
 std::optional<std::span<const std::byte>> Session::State::open_body(LocalTime now, const Header& header,
                                                                     std::span<const std::byte> datagram) {
   if (!opener) return datagram.subspan(kHeaderSize);
@@ -341,7 +334,7 @@ void Session::State::observe(LocalTime now, PeerTime sent, const IncomingEcho& t
   exchange = {.sent = told.sent, .received = told.received, .answered = sent, .answered_at = now};
   peer_clock.observe(*exchange);
   const Duration sample = (now - told.sent) - (sent - told.received);
-  if (sample < Duration::zero()) return;  // the clocks run at different rates and the peer held the echo for long
+  if (sample < Duration::zero()) return;  // different clock rates, and a long delay at the peer
   round_trip.observe(sample);
   stats.round_trip = round_trip.newest();
   stats.smoothed_round_trip = round_trip.smoothed();
@@ -350,7 +343,7 @@ void Session::State::observe(LocalTime now, PeerTime sent, const IncomingEcho& t
 
 void Session::State::count_lost_outgoing(const IncomingEcho& told) {
   if (newest_echoed && told.packet_number <= *newest_echoed) return;
-  // The vector covers the echoed packet and the 32 packets before it.
+  // The vector contains 32 packets before the echoed one.
   const std::uint64_t since = newest_echoed ? told.packet_number - *newest_echoed : told.packet_number + 1;
   const std::uint64_t before = std::min<std::uint64_t>(since - 1, 32);
   const std::uint64_t reached = (std::uint64_t{1} << before) - 1;
@@ -414,8 +407,6 @@ void Session::tick(LocalTime now) {
   }
 }
 
-// ---- Out ----
-
 Header Session::State::begin(LocalTime now, std::span<std::byte, kMaxDatagram> buffer) {
   if (echo) echo->received_mask = seen.mask_before(echo->packet_number);
   const Header header{.type = DatagramType::kData,
@@ -435,7 +426,7 @@ std::size_t Session::State::sent(LocalTime now, const Header& header,
   return sealer ? sealer->seal(header, buffer, writer.size()) : writer.size();
 }
 
-/// Adds the states that columns can represent: one frame for each instant, ordered by device.
+/// Adds the states that can be sent in columns, using one frame per instant.
 void Session::State::fill_columns() {
   for (;;) {
     std::array<const DeviceState*, limits::kMaxDevices> together{};
@@ -453,7 +444,6 @@ void Session::State::fill_columns() {
   }
 }
 
-/// Adds the waiting values of these kinds until the datagram is full.
 template <class... Value>
 void Session::State::fill_with() {
   const auto add = [this](auto& waiting) {
@@ -462,8 +452,8 @@ void Session::State::fill_with() {
   (add(of<Value>(to_send)), ...);
 }
 
-/// Adds as much as fits, in the order of urgency. The rest is sent in the next datagram. A state and a force always fit
-/// together.
+/// Adds as much data as possible, starting with the most urgent. The rest is sent in the next datagram. There is always
+/// room for a state and a force.
 void Session::State::fill(LocalTime now) {
   if (config.states_in_columns) fill_columns();
   fill_with<DeviceState, PortFrame, ForceCommand>();
@@ -480,7 +470,7 @@ void Session::State::fill(LocalTime now) {
 std::size_t Session::next_datagram(LocalTime now, std::span<std::byte, kMaxDatagram> buffer) {
   State& my = *state_;
   my.latest = now;
-  if (now < my.silent_until && my.byes_left == 0) return 0;  // fast path: usually nothing is due
+  if (now < my.silent_until && my.byes_left == 0) return 0;  // fast path for the usual case
   return my.say(now, buffer);
 }
 

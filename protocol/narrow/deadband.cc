@@ -19,7 +19,7 @@ bool Deadband::differs(LocalTime now, const Vec3& value) const noexcept {
   const bool imperceptible =
       sent_ && now - sent_->at < config_.longest_silence &&
       (value - sent_->value).norm() <= std::max(config_.share * sent_->value.norm(), config_.floor);
-  return !imperceptible;  // NaN differs from everything
+  return !imperceptible;  // also true for NaN
 }
 
 bool Deadband::passes(LocalTime now, const Vec3& value) noexcept {

@@ -9,13 +9,12 @@
 
 namespace tendon {
 
-/// Omits changes that a person cannot feel (Weber's law). A vector is sent if it differs from the last one sent by more
-/// than a share of that one's length, and also after a maximum silence, so that a lost vector is replaced.
+/// Omits changes that cannot be felt (Weber's law). A vector is sent if it differs from the last one sent by more than
+/// a share of its norm, and also after a maximum silence, so that lost vectors are replaced.
 ///
 ///     ‖v − v_sent‖ > max(share · ‖v_sent‖, floor)   or   now − sent ≥ longest_silence
 ///
-/// The reconstructed signal can contain more energy than the original, so the receiver must use a limiter. Tendon's
-/// server does.
+/// The result can contain more energy than the input, so the receiver must use a limiter, as Tendon does.
 ///
 /// Source: Hinterseer, Hirche, Chaudhuri, Steinbach, Buss, "Perception-based data reduction and transmission of haptic
 /// data in telepresence and teleaction systems", IEEE TSP 56(2), 2008.
@@ -24,21 +23,20 @@ namespace tendon {
 class Deadband {
  public:
   struct Config {
-    double share = 0.10;  ///< 0 … 1; the just noticeable difference of a force is 7 to 15 %
-    double floor = 0.05;  ///< in the unit of the vector, ≥ 0; smaller changes are omitted
+    double share = 0.10;  ///< 0 … 1; just noticeable: 7 to 15 % of a force
+    double floor = 0.05;  ///< in the unit of the vector, ≥ 0
     Duration longest_silence = std::chrono::milliseconds(20);
   };
   static constexpr Config force() noexcept { return {}; }
   static constexpr Config velocity() noexcept { return {.floor = 1e-3}; }
 
-  /// Throws std::invalid_argument, naming the field, if a value of `config` is out of bounds.
+  /// Throws std::invalid_argument naming the field if a value of `config` is out of bounds.
   explicit Deadband(const Config& config);
 
-  /// Returns true if `value` should be sent at `now`, and records it as sent.
+  /// Returns true if `value` should be sent, and records it as sent.
   bool passes(LocalTime now, const Vec3& value) noexcept;
-  /// Returns true if `value` should be sent at `now`.
   bool differs(LocalTime now, const Vec3& value) const noexcept;
-  /// Records that `value` was sent for another reason.
+  /// Must be called if `value` was sent for another reason.
   void sent(LocalTime now, const Vec3& value) noexcept { sent_ = {now, value}; }
 
  private:
@@ -50,14 +48,11 @@ class Deadband {
   std::optional<Sent> sent_;
 };
 
-/// The length in m that converts between rotation and translation: from the middle of a handle to its end. It converts
-/// a floor in N to one in N·m, and a floor in m/s to one in rad/s.
+/// m, from the middle of a handle to its end. Used to convert N to N·m, and m/s to rad/s.
 inline constexpr double kHandleLever = 0.05;  // m
 
-/// A deadband for a handle that may also rotate and have a gripper. The vector, its rotational counterpart and the
-/// value of the gripper are sent together as soon as one of them should be sent, or when one of them appears or
-/// disappears.
-///
+/// A deadband for a vector, its rotational equivalent, and a gripper. All are sent together if one of them should be
+/// sent, or if one of them appears or disappears.
 /// Thread-safe: no. Realtime-safe: yes.
 class HandleDeadband {
  public:
@@ -67,19 +62,18 @@ class HandleDeadband {
     std::optional<double> grip{};
   };
 
-  /// For forces. The floor is `floor` · kHandleLever (N·m) for a torque and `floor` (N) for a grip force.
+  /// The floor is `floor` · kHandleLever (N·m) for torques and `floor` (N) for grip forces.
   static HandleDeadband of_forces(const Deadband::Config& config) {
     return {config, config.floor * kHandleLever, config.floor};
   }
-  /// For velocities. The floor is `floor` / kHandleLever (rad/s) for angular velocity and for the velocity of the
-  /// gripper.
+  /// The floor is `floor` / kHandleLever (rad/s) for the angular velocity and the gripper.
   static HandleDeadband of_velocities(const Deadband::Config& config) {
     return {config, config.floor / kHandleLever, config.floor / kHandleLever};
   }
 
-  /// Returns true if `value` should be sent at `now`, and records it as sent.
+  /// Returns true if `value` should be sent, and records it as sent.
   bool passes(LocalTime now, const Value& value) noexcept;
-  /// Records that `value` was sent for another reason.
+  /// Must be called if `value` was sent for another reason.
   void sent(LocalTime now, const Value& value) noexcept;
 
  private:
@@ -88,40 +82,38 @@ class HandleDeadband {
   Deadband vector_;
   Deadband turning_;
   Deadband grip_;
-  bool turns_ = false;  ///< the last value sent had `turning`
-  bool grips_ = false;  ///< the last value sent had `grip`
+  bool turns_ = false;
+  bool grips_ = false;
 };
 
-/// Predicts the state `later` after `sent` under the assumption of constant velocity. Both peers use this function, so
-/// the sender knows what the receiver predicts. With the haptic period T, the prediction is for a whole tick:
+/// Predicts the state after `later`, assuming constant velocity. Both peers use this function, so the sender knows the
+/// prediction of the receiver. The result is at a multiple of the haptic period T:
 ///
 ///     n = ⌊later / haptic_period⌋      tick + n      sampled + n T      position + velocity · n T
 ///     orientation turned by the rotation vector angular velocity · n T      opening + its velocity · n T
 ///
-/// All other fields are copied from `sent`. A negative `later` counts as zero. Realtime-safe: yes.
+/// Copies all other fields. A negative `later` is treated as zero. Realtime-safe: yes.
 DeviceState foretell(const DeviceState& sent, Duration later, Duration haptic_period) noexcept;
 
-/// Omits device states that the receiver can predict with foretell(), by a deadband on the velocity, the angular
-/// velocity and the velocity of the gripper. A state whose mode or buttons differ from the last one sent is never
-/// omitted.
-///
+/// Omits device states that the receiver can predict using foretell(), by a deadband on all velocities. States with new
+/// modes or buttons are always sent.
 /// Thread-safe: no. Realtime-safe: yes.
 class StateDeadband {
  public:
-  /// Returns the reason why a client's request cannot be granted, or an empty string if it can. A request to turn the
-  /// deadband off is always granted.
+  /// Returns the reason for refusing a request, or an empty string. A request to turn the deadband off is always
+  /// granted.
   static std::string objection(const SetStateDeadband& asked);
 
-  /// `asked` must be grantable and must not turn the deadband off.
+  /// `asked` must be valid and must not turn the deadband off.
   explicit StateDeadband(const SetStateDeadband& asked);
 
-  /// Returns true if the receiver needs this state, and records it as sent.
+  /// Returns true if the state should be sent, and records it as sent.
   bool passes(const DeviceState& state) noexcept;
 
  private:
   HandleDeadband velocity_;
-  std::optional<Mode> mode_;   ///< mode of the last state sent
-  std::uint32_t buttons_ = 0;  ///< buttons of the last state sent
+  std::optional<Mode> mode_;
+  std::uint32_t buttons_ = 0;
 };
 
 }  // namespace tendon

@@ -28,12 +28,12 @@ LinkMeter::Report LinkMeter::report(LocalTime now) {
 }
 
 void LinkMeter::Samples::add(Duration sample) noexcept {
-  if ((seen_++ & (one_in_ - 1)) != 0) return;  // % one_in_, which is a power of two
+  if ((seen_++ & (one_in_ - 1)) != 0) return;  // same as % one_in_, but faster
   if (kept_.size() == kMost) {
     for (std::size_t i = 0; i < kMost / 2; ++i) kept_[i] = kept_[2 * i];
     kept_.resize(kMost / 2);
     one_in_ *= 2;
-    // The index of this sample is also a multiple of the doubled one_in_.
+    // This sample is kept, because its index is a multiple of the new one_in_.
   }
   kept_.push_back(sample);
 }
@@ -41,7 +41,7 @@ void LinkMeter::Samples::add(Duration sample) noexcept {
 std::optional<Delays> LinkMeter::Samples::take() {
   std::optional<Delays> delays;
   if (!kept_.empty()) {
-    // The smallest sample that at least `percent` of the samples do not exceed.
+    // The smallest sample that is not exceeded by `percent` of all samples.
     const auto quantile = [&](std::size_t percent) {
       const auto at = kept_.begin() + static_cast<std::ptrdiff_t>((kept_.size() * percent + 99) / 100 - 1);
       std::nth_element(kept_.begin(), at, kept_.end());

@@ -11,33 +11,30 @@
 
 namespace tendon {
 
-/// Measures quantiles of the delays of a link, and its longest silence, since the last report.
+/// Measures quantiles of the delays of a link, and the longest silence, since the last report.
 ///
 ///     round trip = (T4 − T1) − (T3 − T2)      to the peer = T2 − θ − T1      from the peer = T4 − (T3 − θ)
 ///
-/// θ is the estimated offset of the peer's clock when the exchange arrives. An error of θ changes both one-way delays
-/// by the same amount in opposite directions.
-///
-/// At most 1024 samples of each delay are kept. With more samples, only every second one is used, then every fourth,
-/// and so on. All memory is allocated in the constructor.
+/// θ is the estimated offset of the peer's clock. An error of θ changes the one-way delays by the same amount, in
+/// opposite directions. Keeps up to 1024 samples of each delay by dropping every other sample if necessary. Allocates
+/// memory only in the constructor.
 ///
 /// Thread-safe: no. Realtime-safe: yes, except report().
 class LinkMeter {
  public:
   explicit LinkMeter(LocalTime now) : heard_(now) {}
 
-  /// Call when a valid datagram of the peer has arrived.
+  /// Must be called for each valid datagram of the peer.
   void heard(LocalTime now) noexcept;
-  /// Call when the datagram carried an echo. `clock` relates the peer's clock to ours.
+  /// Must be called for each echo. `clock` relates the peer's clock to ours.
   void observe(const ClockExchange& exchange, const ClockOffsetEstimator::Estimate& clock) noexcept;
 
   struct Report {
     std::optional<Delays> round_trip;
     std::optional<Delays> to_peer;
     std::optional<Delays> from_peer;
-    Duration longest_gap{};  ///< includes a silence that has not ended yet
+    Duration longest_gap{};  ///< including the present silence
   };
-  /// Returns the measurements since the last call.
   Report report(LocalTime now);
 
  private:
@@ -45,11 +42,11 @@ class LinkMeter {
    public:
     Samples() { kept_.reserve(kMost); }
     void add(Duration sample) noexcept;
-    /// Returns the quantiles and discards the samples. Empty if there are no samples.
+    /// Clears the samples. Empty if there are no samples.
     std::optional<Delays> take();
 
    private:
-    static constexpr std::size_t kMost = 1024;  ///< samples of one second at 1 kHz
+    static constexpr std::size_t kMost = 1024;  ///< one second at 1 kHz
     std::vector<Duration> kept_;
     std::uint64_t seen_ = 0;
     std::uint64_t one_in_ = 1;
@@ -57,7 +54,7 @@ class LinkMeter {
 
   LocalTime heard_;
   Duration longest_gap_{};
-  std::optional<LocalTime> newest_sent_;  ///< T1 of the newest exchange, so that each delay to the peer is counted once
+  std::optional<LocalTime> newest_sent_;  ///< T1 of the newest exchange
   Samples round_trip_;
   Samples to_peer_;
   Samples from_peer_;

@@ -9,10 +9,10 @@
 namespace tendon {
 namespace {
 
-/// Long enough for a queue that we caused to drain at least once, and short enough to follow a new route.
+/// Allows a queue to drain at least once, but also follows a new route quickly.
 constexpr Duration kLeastWindow = std::chrono::seconds(10);
 
-/// With fewer datagrams, one lost datagram would exceed 5 %.
+/// A single lost datagram must not exceed 5 %.
 constexpr std::uint64_t kLossSample = 20;
 
 }  // namespace
@@ -45,7 +45,7 @@ void RateAdaptation::step_down(LocalTime now) noexcept {
 
 void RateAdaptation::step_up(LocalTime now) noexcept {
   trouble_at_ = now;
-  if (just_up_) clean_[step_ + 1] = config_.clean;  // the last step up was justified
+  if (just_up_) clean_[step_ + 1] = config_.clean;
   just_up_ = step_ > 0;
   if (step_ > 0) --step_;
 }
@@ -66,7 +66,7 @@ void RateAdaptation::observe(LocalTime now, Duration round_trip, std::uint64_t s
     trouble_at_ = now;
     longest_queue_ = std::max(longest_queue_, queue);
     if (now - short_queue_at_ >= config_.patience) {
-      // A queue that was filled at an earlier, higher rate takes time to drain. Wait while it shrinks.
+      // Wait while a queue is shrinking, because it was filled at a higher rate.
       full = queue > longest_queue_ * 9 / 10;
       short_queue_at_ = now;
       longest_queue_ = queue;

@@ -6,19 +6,19 @@
 
 namespace tendon {
 
-/// Records which packet numbers have arrived, so that each packet is accepted once. The window is a ring of bits as in
-/// RFC 6479: the bit of a number never moves, and advancing clears the words that it passes.
+/// Records packet numbers, so that each packet is accepted only once. The ring of bits is described in RFC 6479: the
+/// bit of a number never moves, and advancing clears the words in between.
 ///
-/// Call `contains` before a packet is decrypted, and `insert` only after it was authenticated. A forged packet can then
-/// not use up the number of a real one.
+/// Call `contains` before decrypting a packet, but `insert` only after authenticating it. Otherwise a forged packet
+/// could use up the number of a genuine one.
 class ReplayWindow {
  public:
-  /// The word that is being filled may be almost empty, so only 1984 of the 2048 numbers are always remembered: about
-  /// two seconds at 1 kHz. Later datagrams are of no use to haptics.
+  /// The newest word may be nearly empty, so only 1984 of 2048 numbers are always remembered, about two seconds at 1
+  /// kHz. This is longer than haptic data are useful.
   static constexpr std::uint64_t kBits = 2048;
   static constexpr std::uint64_t kRemembered = kBits - 64;
 
-  /// Returns true if `number` was inserted or is too old to tell.
+  /// Returns true if `number` was inserted or is too old.
   bool contains(std::uint64_t number) const noexcept {
     if (empty_ || number > highest_) return false;
     if (highest_ - number >= kRemembered) return true;
@@ -28,7 +28,6 @@ class ReplayWindow {
   /// `number` must not be contained.
   void insert(std::uint64_t number) noexcept {
     if (empty_ || number > highest_) {
-      // For the first number, the words are already zero.
       const std::uint64_t from = empty_ ? number / 64 : highest_ / 64;
       const std::uint64_t to = number / 64;
       const std::uint64_t steps = to - from < words_.size() ? to - from : words_.size();
@@ -40,9 +39,9 @@ class ReplayWindow {
     ++count_;
   }
 
-  /// Bit i is set if (number − 1 − i) is known to have been inserted. `number` must not be above the highest.
+  /// Bit i is set if (number − 1 − i) was inserted. `number` must not be above the highest.
   std::uint32_t mask_before(std::uint64_t number) const noexcept {
-    // The 64 numbers before `number`; its predecessor is the most significant bit.
+    // The 64 numbers before `number`, starting at the most significant bit.
     const std::uint64_t into = number % 64;
     const std::uint64_t whole = words_[word(number - 64)];
     const std::uint64_t before = into == 0 ? whole : words_[word(number)] << (64 - into) | whole >> into;
@@ -54,7 +53,7 @@ class ReplayWindow {
 
   bool empty() const noexcept { return empty_; }
   std::uint64_t highest() const noexcept { return highest_; }
-  /// The number of packet numbers from 0 to the highest that were never inserted.
+  /// The number of values from 0 to the highest that were not inserted.
   std::uint64_t missing() const noexcept { return empty_ ? 0 : highest_ + 1 - count_; }
 
  private:

@@ -10,7 +10,7 @@
 namespace tendon {
 
 std::optional<std::uint32_t> OutgoingRequests::add(const Request& request) {
-  // Ids never wrap: at one request per second they last for 136 years.
+  // At one request per second, the ids last for 136 years.
   if (next_ - oldest_ == limits::kRequestWindow || next_ == std::numeric_limits<std::uint32_t>::max()) return {};
   slot(next_) = {.control = {.id = next_, .request = request}, .due = LocalTime::min(), .times_sent = 0, .answer = {}};
   return next_++;
@@ -41,7 +41,7 @@ LocalTime OutgoingRequests::first_due_time() const noexcept {
 
 bool OutgoingRequests::acknowledge(const ControlAck& ack) {
   if (ack.id >= next_) return false;
-  if (ack.id < oldest_) return true;  // repeated
+  if (ack.id < oldest_) return true;
   Slot& asked = slot(ack.id);
   if (asked.times_sent == 0) return false;
   if (!asked.answer) asked.answer = ack;
@@ -56,19 +56,18 @@ std::optional<ControlAck> OutgoingRequests::next_answer() {
 bool IncomingRequests::take(const Control& control) {
   Slot& mine = slot(control.id);
   if (control.id < next_) {
-    // If the slot holds a newer request, this is a late copy of one whose answer was received long ago.
+    // If the slot already contains a newer request, this is a late copy.
     if (mine.control.id == control.id && mine.stage == Slot::Stage::kAnswered) set_due(mine, true);
     return true;
   }
   if (control.id - next_ >= limits::kRequestWindow) return false;
-  if (mine.stage == Slot::Stage::kTaken) return false;  // the request 16 before this one is not answered yet
+  if (mine.stage == Slot::Stage::kTaken) return false;  // request n − 16 is not answered yet
   set_due(mine, false);
   mine = {.stage = Slot::Stage::kArrived, .control = control, .answer = {}, .due = false};
   return true;
 }
 
 const Control* IncomingRequests::next() {
-  // The loop ends because each iteration changes the stage of a slot from kArrived.
   while (has_next()) {
     Slot& mine = slot(next_++);
     mine.stage = Slot::Stage::kTaken;

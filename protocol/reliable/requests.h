@@ -10,37 +10,34 @@
 #include "protocol/limits.h"
 #include "protocol/wire/frame.h"
 
-// The reliable part of a session. Requests arrive exactly once and in order, and each one is answered.
+// The reliable part of a session: requests arrive exactly once and in order, and each one is answered.
 //
-// The requester numbers its requests 1, 2, 3 … and repeats each one until its answer arrives; the answer is the
-// acknowledgment. The responder keeps its last 16 answers and repeats one when its request arrives again. Sixteen are
-// enough, because the requester has at most 16 open requests: when request n + 16 arrives, it has received the answer
-// to n.
+// Requests are numbered 1, 2, 3 … and resent until they are answered; there is no other acknowledgment. The responder
+// keeps its last 16 answers, and resends an answer if the request arrives again. This is sufficient because the
+// requester has at most 16 pending requests: if it sends request n + 16, it has already received answer n.
 
 namespace tendon {
 
-/// The requester.
 class OutgoingRequests {
  public:
-  /// Longest time between repetitions. The time doubles up to this value, so that a request is repeated at least twice
-  /// within a timeout of 2 s. It applies even if the round trip is longer: on a slow link, a lost copy should not cost
-  /// another round trip, and one copy per second is cheap.
+  /// The maximum time between two copies of a request, starting with `timeout` and doubling. At least two copies are
+  /// sent within the session timeout of 2 s, even if the round trip is longer. One copy per second is cheap.
   static constexpr Duration kMaxWait = std::chrono::seconds(1);
 
-  /// Queues a request and returns its id, or nullopt if kRequestWindow requests are open.
+  /// Returns the id, or nullopt if kRequestWindow requests are pending.
   std::optional<std::uint32_t> add(const Request& request);
 
-  /// The first request that must be sent or resent now, or null.
+  /// Returns the first request that must be sent or resent, or null.
   const Control* next_due(LocalTime now) const noexcept { return oldest_ == next_ ? nullptr : first_due(now); }
-  /// Records that request `id` was sent. It is due again after `timeout`, which doubles with every repetition up to
+  /// Must be called after sending a request. It is due again after `timeout`, which is doubled for each copy, up to
   /// kMaxWait.
   void sent(std::uint32_t id, LocalTime now, Duration timeout) noexcept;
-  /// When the next request is due. LocalTime::min() if one was never sent, LocalTime::max() if none is open.
+  /// LocalTime::min() if a request was not sent yet, LocalTime::max() if all are answered.
   LocalTime next_due_time() const noexcept { return oldest_ == next_ ? LocalTime::max() : first_due_time(); }
 
-  /// Handles an answer. Returns false if that request was never sent.
+  /// Returns false if the request was not sent.
   bool acknowledge(const ControlAck& ack);
-  /// Returns the next answer, in the order of the requests.
+  /// Returns the answers in the order of the requests.
   std::optional<ControlAck> next_answer();
   bool has_answer() const noexcept { return oldest_ != next_ && slot(oldest_).answer.has_value(); }
 
@@ -57,24 +54,23 @@ class OutgoingRequests {
   LocalTime first_due_time() const noexcept;
 
   std::array<Slot, limits::kRequestWindow> slots_;
-  std::uint32_t oldest_ = 1;  ///< oldest request whose answer was not taken
-  std::uint32_t next_ = 1;    ///< id of the next request
+  std::uint32_t oldest_ = 1;  ///< whose answer was not returned yet
+  std::uint32_t next_ = 1;
 };
 
-/// The responder.
 class IncomingRequests {
  public:
-  /// Handles a request; they may arrive in any order. If it was answered before, the answer is sent again. Returns
-  /// false if a correct peer could not use that id yet.
+  /// Requests may arrive in any order. Resends the answer to an earlier request. Returns false if a correct peer could
+  /// not use this id.
   bool take(const Control& control);
-  /// Returns each request exactly once and in order, or null if there is none. It is valid until the next call of
-  /// `take`. Unknown and invalid requests are answered here and skipped.
+  /// Returns each request exactly once and in order, or null. It is valid until the next call of `take`. Answers
+  /// unknown and invalid requests without returning them.
   const Control* next();
   bool has_next() const noexcept { return slots_[next_ % limits::kRequestWindow].stage == Slot::Stage::kArrived; }
-  /// Answers a request that was returned by `next`. Other ids are ignored.
+  /// Ignores ids that were not returned by `next`.
   void answer(ControlAck ack);
 
-  /// The first answer that must be sent now, or null.
+  /// Returns the first answer that must be sent, or null.
   const ControlAck* next_due() const noexcept { return due_ == 0 ? nullptr : first_due(); }
   void sent(std::uint32_t id) noexcept;
 
@@ -91,8 +87,8 @@ class IncomingRequests {
   const ControlAck* first_due() const noexcept;
 
   std::array<Slot, limits::kRequestWindow> slots_;
-  std::uint32_t next_ = 1;  ///< id of the next request to return
-  int due_ = 0;             ///< number of slots with `due` set; avoids a search that nearly always finds nothing
+  std::uint32_t next_ = 1;
+  int due_ = 0;  ///< number of slots with `due`, to avoid searching
 };
 
 }  // namespace tendon

@@ -8,15 +8,15 @@
 
 namespace tendon {
 
-/// The smoothed round trip and the retransmission timeout of RFC 6298:
+/// The smoothed round trip and the retransmission timeout (RFC 6298):
 ///
 ///     first sample R:  SRTT = R, RTTVAR = R/2
 ///     then:            RTTVAR += (|SRTT − R| − RTTVAR)/4,  SRTT += (R − SRTT)/8
-/// timeout:          max(minimum, SRTT + 4 RTTVAR)
+///     timeout:         max(minimum, SRTT + 4 RTTVAR)
 class RoundTrip {
  public:
-  /// The timeout before the first sample. RFC 6298 uses 1 s. Here the handshake has shown that the peer is reachable,
-  /// and 100 ms is longer than the round trip of any link that is suitable for haptics.
+  /// RFC 6298 uses 1 s. After a handshake, 100 ms is sufficient, since haptics is not possible with a longer round
+  /// trip.
   static constexpr Duration kFirstTimeout = std::chrono::milliseconds(100);
 
   void observe(Duration sample) noexcept {

@@ -14,7 +14,7 @@ namespace {
 
 constexpr std::string_view kLabel = "tendon-key-id";
 
-/// 32 random bytes contain about 30 different values. One random key in 10¹¹ contains fewer than 18.
+/// 32 random bytes contain about 30 different values. Only one random key in 10¹¹ contains fewer than 18.
 constexpr std::size_t kFewestDifferent = 18;
 
 constexpr std::string_view kExpected = "expected one line, `controller` or `observer` and 64 hexadecimal digits";

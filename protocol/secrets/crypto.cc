@@ -24,14 +24,14 @@ Nonce nonce(std::uint64_t number) noexcept {
   return nonce;
 }
 
-/// The nonce of AESGCM in Noise has the number in big-endian order.
+/// In Noise, the number is big-endian for AESGCM.
 Nonce nonce_of_aes(std::uint64_t number) noexcept {
   Nonce nonce{};
   for (std::size_t i = 0; i < sizeof number; ++i) nonce[4 + i] = static_cast<unsigned char>(number >> (56 - 8 * i));
   return nonce;
 }
 
-/// REKEY of Noise: the first half of 32 zero bytes sealed with number 2⁶⁴ − 1, which no datagram uses.
+/// REKEY of Noise: encrypts 32 zero bytes using the number 2⁶⁴ − 1, which is never used for datagrams.
 template <class Seal>
 Key renewed_by(const Seal& seal) noexcept {
   constexpr Bytes32 kZeros{};

@@ -13,24 +13,24 @@
 
 namespace tendon {
 
-/// Limits the rate of handshakes for each source to `kPerSecond` on average with bursts of `kBurst`. A source is an
-/// IPv4 address or the /64 prefix of an IPv6 address, because hosts usually control a whole /64.
+/// Limits the handshakes of each source to `kPerSecond` on average and `kBurst` at once. A source is an IPv4 address or
+/// an IPv6 /64 prefix, since a host usually controls all of its /64.
 ///
-/// The table has a fixed size: sources share kBuckets buckets, by a hash that others cannot predict. It is used only
-/// after a cookie has verified the address, so spoofed sources cannot use up the limit of a real one.
+/// Sources share a table of kBuckets buckets, using a hash that they cannot predict. Only used for verified addresses,
+/// so that spoofed sources cannot use up the limit of a genuine one.
 class HelloLimit {
  public:
-  static constexpr int kPerSecond = 20;  ///< two clients that repeat their Hello at 10 Hz
-  static constexpr int kBurst = 40;      ///< a laboratory behind one address after a power cut
+  static constexpr int kPerSecond = 20;  ///< two clients repeating their Hello at 10 Hz
+  static constexpr int kBurst = 40;      ///< a laboratory behind a NAT after a power failure
   static constexpr std::size_t kBuckets = 1024;
 
   explicit HelloLimit(const std::array<std::byte, 16>& hash_key) noexcept : hash_key_(hash_key) {
     buckets_.fill(LocalTime::min());
   }
 
-  /// Returns true if the source is within its limit, and counts the handshake.
+  /// Returns false if the source exceeds its limit.
   bool admit(LocalTime now, const Address& from) noexcept {
-    // Generic cell rate algorithm. A bucket stores the time at which it will be empty.
+    // Generic cell rate algorithm, which stores the time at which a bucket will be empty.
     constexpr Duration kEvery = std::chrono::nanoseconds(std::chrono::seconds(1)) / kPerSecond;
     LocalTime& empty_at = buckets_[bucket(from)];
     const LocalTime begin = std::max(empty_at, now);

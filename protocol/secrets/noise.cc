@@ -14,7 +14,7 @@ constexpr std::string_view kSuite2 = "tendon-suite-2";
 
 using Bytes = std::span<const std::byte>;
 
-/// HKDF of Noise. Each output is an HMAC-SHA-256 of the one before and a counter byte.
+/// HKDF of Noise: each output is an HMAC-SHA-256 of the previous output and a counter byte.
 template <std::size_t Count>
 std::array<Key, Count> hkdf(const Key& chaining_key, Bytes material) noexcept {
   const Key secret(crypto::hmac_sha256(chaining_key.bytes(), {material}));
@@ -42,7 +42,7 @@ void mix_key_and_hash(NoiseState& state, const Key& material) noexcept {
   state.key = keys[2];
 }
 
-/// Initializes the state with the protocol name, the prologue and the token `psk`. The result is equal for both peers.
+/// Mixes the protocol name, the prologue and the token `psk`.
 NoiseState begin(const Key& psk, Bytes prologue) noexcept {
   NoiseState state;
   state.hash = crypto::sha256({std::as_bytes(std::span(kName))});
@@ -52,7 +52,7 @@ NoiseState begin(const Key& psk, Bytes prologue) noexcept {
   return state;
 }
 
-/// Token `e`. With a pre-shared key, the public key is also mixed into the chaining key.
+/// Token `e`. In psk handshakes, the public key is also mixed into the chaining key.
 void mix_ephemeral(NoiseState& state, const Bytes32& public_key) noexcept {
   mix_hash(state, public_key);
   mix_key(state, public_key);
@@ -66,7 +66,7 @@ bool mix_shared(NoiseState& state, const Key& ephemeral, const Bytes32& peer) no
   return true;
 }
 
-/// Each key of this handshake seals one payload, so the nonce is always 0.
+/// The nonce is always 0, because each key is used for a single payload.
 std::vector<std::byte> write(NoiseState& state, const Bytes32& public_key, Bytes payload) {
   std::vector<std::byte> message(kNoiseOverhead + payload.size());
   const auto sealed = std::span(message).subspan(kNoisePublicSize);

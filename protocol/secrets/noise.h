@@ -13,38 +13,34 @@
 //     -> psk, e
 //     <- e, ee
 //
-// Both peers know the pre-shared key. Each contributes an ephemeral key, which must be used for one handshake only.
+// Both peers know the pre-shared key, and both use a new ephemeral key for each handshake.
 
 namespace tendon {
 
-/// The result of a handshake, equal for both peers.
 struct NoiseSplit {
   Key initiator_to_responder;
   Key responder_to_initiator;
-  Bytes32 handshake_hash{};  ///< hash of both messages
+  Bytes32 handshake_hash{};  ///< of both messages
 };
 
-/// The SymmetricState of the specification.
+/// SymmetricState in the specification.
 struct NoiseState {
   Bytes32 hash{};
   Key chaining_key;
   Key key;
 };
 
-/// Derives the keys of suite 2: HMAC-SHA-256(key, "tendon-suite-2" ‖ handshake hash) for each key. No key is therefore
-/// used with two ciphers. The hash covers Hello and Answer, so two peers that saw different offers or choices derive
-/// different keys.
+/// Returns HMAC-SHA-256(key, "tendon-suite-2" ‖ handshake hash) for each key, so that keys are never used with two
+/// ciphers. The hash includes Hello and Answer, so peers that received different offers or choices do not share keys.
 NoiseSplit split_of_suite_2(const NoiseSplit& split) noexcept;
 
 inline constexpr std::size_t kNoisePublicSize = 32;
-/// Difference in size between a message and its payload, in bytes.
 inline constexpr std::size_t kNoiseOverhead = kNoisePublicSize + crypto::kTagSize;
 
-/// The client's half of the handshake.
+/// The client's half.
 class NoiseInitiator {
  public:
-  /// Writes message 1. Each object writes one message only: a second payload under the same ephemeral key would reuse a
-  /// nonce.
+  /// Writes message 1. A second payload must not be written, because it would use the same nonce.
   NoiseInitiator(const Key& psk, const Key& ephemeral, std::span<const std::byte> prologue,
                  std::span<const std::byte> payload);
 
@@ -54,7 +50,7 @@ class NoiseInitiator {
     std::vector<std::byte> payload;
     NoiseSplit split;
   };
-  /// Reads message 2. Returns nullopt if it is not authentic, after which another message may be read.
+  /// Reads message 2. Can be called again if this message was not authentic.
   std::optional<Answer> read(std::span<const std::byte> message) const;
 
  private:
@@ -63,10 +59,10 @@ class NoiseInitiator {
   std::vector<std::byte> message_;
 };
 
-/// The server's half of the handshake, after message 1 was read.
+/// The server's half, after reading message 1.
 class NoiseResponder {
  public:
-  /// Returns nullopt if message 1 was not written with this `psk` and `prologue`.
+  /// Returns nullopt if message 1 was written using another `psk` or `prologue`.
   static std::optional<NoiseResponder> read(const Key& psk, std::span<const std::byte> prologue,
                                             std::span<const std::byte> message);
 
@@ -83,7 +79,7 @@ class NoiseResponder {
   NoiseResponder() = default;
 
   NoiseState state_;
-  Bytes32 peer_{};  ///< ephemeral public key of the peer
+  Bytes32 peer_{};  ///< ephemeral public key
   std::vector<std::byte> payload_;
 };
 

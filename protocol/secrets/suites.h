@@ -10,30 +10,29 @@
 
 namespace tendon {
 
-/// A sealed suite and its name in scene files and messages. The name of suite 2 is also the feature that a client
-/// offers and a server chooses.
+/// A sealed suite. The name is used in scene files, and for suite 2 also as the feature that is offered and chosen.
 struct NamedSuite {
   Suite suite;
   std::string_view name;
 };
 
-/// All sealed suites in the order of the server's preference, fastest first.
+/// In the order of the server's preference.
 inline constexpr std::array kSealedSuites = {NamedSuite{Suite::kAesGcm, "aes-256-gcm"},
                                              NamedSuite{Suite::kNoise, "chacha20-poly1305"}};
 inline constexpr std::string_view kFeatureAesGcm = kSealedSuites[0].name;
 static_assert(kSealedSuites[0].suite == Suite::kAesGcm);
 
-/// Some of the suites above, without duplicates.
+/// A set of sealed suites.
 using Suites = std::vector<Suite>;
 
 Suites all_suites();
 bool contains(const Suites& suites, Suite suite) noexcept;
 
-/// The suites of kSealedSuites that this processor supports. Suite 2 requires AES instructions (crypto::has_aes).
-/// Throws std::runtime_error if libsodium cannot be initialized.
+/// The suites supported by this processor; suite 2 requires crypto::has_aes(). Throws std::runtime_error if libsodium
+/// cannot be initialized.
 Suites suites_of_this_machine();
 
-/// Returns the names as a list for messages: "aes-256-gcm, chacha20-poly1305".
+/// For messages: "aes-256-gcm, chacha20-poly1305".
 std::string names_of(const Suites& suites);
 
 /// Throws std::invalid_argument if the list is empty or contains a suite that is not sealed or not supported by this

@@ -11,7 +11,7 @@
 namespace tendon::wire {
 namespace {
 
-constexpr int kMostDepth = 100;  ///< limit of libprotobuf for nested messages and groups
+constexpr int kMostDepth = 100;  ///< nested messages and groups, as in libprotobuf
 
 // The other wire types of protobuf.
 constexpr unsigned kGroup = 3;
@@ -47,7 +47,7 @@ std::uint64_t cut(Shape shape, std::uint64_t value) noexcept {
   return shape == Shape::kCount32 || shape == Shape::kCount32s ? value & 0xFFFFFFFFU : value;
 }
 
-/// Reads a varint of at most `most` bytes. Bits beyond the 64th are dropped.
+/// Drops bits beyond the 64th.
 template <class From>
 bool take_varint(From& from, unsigned most, std::uint64_t& value) noexcept {
   value = 0;
@@ -59,7 +59,7 @@ bool take_varint(From& from, unsigned most, std::uint64_t& value) noexcept {
   return false;
 }
 
-/// Reads a tag. Returns false if protobuf does not permit it.
+/// Returns false if the tag is invalid.
 template <class From>
 bool take_tag(From& from, std::uint32_t& field, unsigned& type) noexcept {
   std::uint64_t tag = 0;
@@ -90,7 +90,6 @@ bool AnyOrder::skip_group(Piece& from, std::uint32_t field, int depth) {
   }
 }
 
-/// Reads the value of a field according to its wire type.
 bool AnyOrder::take(Piece& from, std::uint32_t field, int depth, Found& found) {
   std::uint64_t length = 0;
   switch (found.type) {
@@ -109,7 +108,6 @@ bool AnyOrder::take(Piece& from, std::uint32_t field, int depth, Found& found) {
   }
 }
 
-/// Appends all known fields of this part of a message to `found_`.
 bool AnyOrder::collect(const Schema& schema, Piece piece, int depth) {
   while (piece.at != piece.end) {
     std::uint32_t number = 0;
@@ -127,13 +125,13 @@ bool AnyOrder::collect(const Schema& schema, Piece piece, int depth) {
 
 bool AnyOrder::write_all(const Schema& schema, std::size_t from, std::size_t to, int depth) {
   const auto is_arm = [&](const Found& found) { return schema.fields[found.field].arm; };
-  std::size_t last = schema.fields.size();  // index of the winning arm; initially none
+  std::size_t last = schema.fields.size();  // winning arm, initially unset
   for (std::size_t i = to; i-- > from;) {
     Found& found = found_[i];
     if (!is_arm(found)) continue;
     if (last == schema.fields.size()) last = found.field;
     found.replaced = found.field != last;
-    if (found.replaced) last = schema.fields.size() + 1;  // no earlier arm wins
+    if (found.replaced) last = schema.fields.size() + 1;  // earlier arms cannot win
   }
   for (std::size_t place = 0; place < schema.fields.size(); ++place) {
     if (!write(schema.fields[place], place, from, to, depth)) return false;
@@ -158,7 +156,7 @@ bool AnyOrder::write_message(const FieldShape& field, std::size_t from, std::siz
   const std::size_t begin = out_.size();
   if (!write_merged(*field.inside, from, to, like, depth + 1)) return false;
   put_length(begin);
-  if (like.replaced) out_.resize(whole);  // it was only validated
+  if (like.replaced) out_.resize(whole);  // only validated
   return true;
 }
 
@@ -172,7 +170,7 @@ bool AnyOrder::write_text(const FieldShape& field, const Found& found) {
   return true;
 }
 
-/// Writes a list of numbers, packed or not.
+/// Both packed and unpacked lists are accepted.
 bool AnyOrder::write_list(const FieldShape& field, std::size_t place, std::size_t from, std::size_t to) {
   const unsigned type = type_of(field.shape);
   put_tag(field, kLength);
@@ -195,7 +193,7 @@ bool AnyOrder::write_list(const FieldShape& field, std::size_t place, std::size_
   return true;
 }
 
-/// Writes all occurrences of a field in [from, to).
+/// Writes all occurrences in [from, to).
 bool AnyOrder::write(const FieldShape& field, std::size_t place, std::size_t from, std::size_t to, int depth) {
   const std::size_t whole = out_.size();
   bool there = false;
@@ -209,7 +207,7 @@ bool AnyOrder::write(const FieldShape& field, std::size_t place, std::size_t fro
       case Shape::kFlag:
       case Shape::kCount32:
       case Shape::kCount64:
-        out_.resize(whole);  // the last occurrence wins
+        out_.resize(whole);
         put_tag(field, kVarint);
         put_varint(cut(field.shape, found.number));
         break;
@@ -251,7 +249,7 @@ void AnyOrder::put_varint(std::uint64_t value) {
   out_.push_back(static_cast<Byte>(value));
 }
 
-/// Inserts the number of bytes written since `begin`.
+/// Inserts the size of everything after `begin`.
 void AnyOrder::put_length(std::size_t begin) {
   std::array<Byte, 3> length{};
   std::size_t bytes = 0;

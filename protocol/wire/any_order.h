@@ -7,16 +7,15 @@
 #include <span>
 #include <vector>
 
-// Protobuf permits encodings that our Writer never produces: fields in any order, duplicate or unknown fields, lists
-// that are split or not packed, and varints that are longer than necessary. AnyOrder rewrites such a message in the
-// form of our Writer, which is the only form that the Reader accepts.
+// Protobuf allows encodings that our Writer never uses: fields in any order, duplicate or unknown fields, split lists,
+// and varints that are too long. AnyOrder converts a message to the form of our Writer, which is the only form
+// supported by the Reader.
 
 namespace tendon::wire {
 
-/// How a field is encoded.
 enum class Shape : std::uint8_t {
-  kFlag,     ///< varint, 0 or not 0
-  kCount32,  ///< varint, truncated to 32 bits; also for enums
+  kFlag,     ///< varint
+  kCount32,  ///< varint, truncated; also for enums
   kCount64,  ///< varint
   kBits32,   ///< 4 bytes
   kBits64,   ///< 8 bytes
@@ -35,23 +34,21 @@ struct Schema;
 struct FieldShape {
   std::uint32_t number;
   Shape shape;
-  const Schema* inside = nullptr;  ///< fields of a message
-  bool arm = false;                ///< member of the oneof, of which a message has one at most
+  const Schema* inside = nullptr;
+  bool arm = false;  ///< of a oneof
 };
-/// The fields of a message, by field number (wire/generated/schema.h).
+/// Sorted by field number (wire/generated/schema.h).
 struct Schema {
   std::span<const FieldShape> fields;
 };
 
-/// Rewrites messages. The object keeps its memory between calls.
-///
-/// Thread-safe: no.
+/// Keeps its memory between calls. Thread-safe: no.
 class AnyOrder {
  public:
-  /// Returns the message as libprotobuf understands it (tests/protocol/wire/protobuf_test.cc). If a number, a text or
-  /// an arm of a oneof appears several times, the last one wins. Messages are merged, lists are joined, and unknown
-  /// fields are dropped. Returns nullopt if the message is malformed: if it is truncated, if a text is not UTF-8, or if
-  /// groups do not match or are nested more than 100 deep. The result is valid until the next call.
+  /// Returns the message as interpreted by libprotobuf (tests/protocol/wire/protobuf_test.cc). The last number, text or
+  /// arm of a oneof is used, messages are merged, lists are joined, and unknown fields are dropped. Returns nullopt if
+  /// the message is truncated, if a text is not UTF-8, or if groups do not match or are nested more than 100 deep. The
+  /// result is valid until the next call.
   std::optional<std::span<const std::byte>> in_order(const Schema& schema, std::span<const std::byte> message);
 
  private:
@@ -59,11 +56,10 @@ class AnyOrder {
     const std::uint8_t* at;
     const std::uint8_t* end;
   };
-  /// One occurrence of a field in the message.
   struct Found {
     std::size_t field = 0;  ///< index in the schema
     unsigned type = 0;      ///< wire type
-    bool replaced = false;  ///< a later arm of the oneof replaces it
+    bool replaced = false;  ///< by a later arm of the oneof
     std::uint64_t number = 0;
     Piece piece{};
   };

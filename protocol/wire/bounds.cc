@@ -47,7 +47,7 @@ bool is_finite(const RemoteTorque& torque) noexcept {
          std::isfinite(at.z);
 }
 
-/// Encodes a request and returns the name of the field that a receiver would refuse.
+/// Encodes a request and returns the name of a field that would be refused.
 template <class Wanted, class List>
 std::string_view refused(Wanted& wanted, List list) noexcept {
   wanted.device = 0;

@@ -8,29 +8,26 @@
 #include "protocol/limits.h"
 #include "protocol/messages.h"
 
-// Checks values against the bounds of the wire (limits.h).
-//
-// Realtime-safe.
+// Checks of the bounds in limits.h. Realtime-safe.
 
 namespace tendon {
 
 /// Returns false for NaN.
 inline bool bounded(double value) noexcept { return std::abs(value) <= limits::kMaxValue; }
 
-/// Returns true if the force of `command`, its model and its error are within the bounds that a receiver checks
-/// (WIRE.md).
+/// Checks the force, the model and the error of `command`, using the bounds of a receiver (WIRE.md).
 bool in_bounds(const ForceCommand& command) noexcept;
 
-/// Returns the name of the first field that is out of bounds, or an empty string. The name has static storage. The
-/// device and the channel are not checked.
+/// Returns the first field that is out of bounds, or an empty string, in static storage. Does not check the device and
+/// the channel.
 std::string_view refused_field(SetOutput wanted) noexcept;
 std::string_view refused_field(SetScale wanted) noexcept;
 std::string_view refused_field(SetShare wanted) noexcept;
 
-/// Returns true if `command` contains no NaN, and no infinity except for the `valid_radius` of a model.
+/// Returns false if `command` contains NaN, or infinity except for the `valid_radius` of a model.
 bool is_finite(const ForceCommand& command) noexcept;
 
-/// Explains to the author of an engine why `command` is out of bounds. Empty if it is not. The text has static storage.
+/// Explains to the author of an engine why `command` is out of bounds. Empty if it is not. In static storage.
 std::string_view objection(const ForceCommand& command) noexcept;
 
 }  // namespace tendon

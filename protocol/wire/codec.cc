@@ -22,13 +22,13 @@ using wire::Byte;
 using wire::Reader;
 using wire::Writer;
 
-/// Maximum sizes in bytes of a head, of a frame that is sent at every step, and of any frame.
+/// In bytes: the head, a frame sent at every step, and any frame.
 constexpr std::size_t kMostHead = 48;
 constexpr std::size_t kMostOfAStep = 640;
 constexpr std::size_t kMostFrame = 2048;
 
-/// Writes a frame with two tags, two lengths and the fields of `value`, and returns its size. The fields are written
-/// first, after `kUsualFront` bytes, and are moved if tags and lengths need another number of bytes.
+/// Writes a frame and returns its size. Fields are written first, after `kUsualFront` bytes, and moved if the tags and
+/// lengths have another size.
 template <unsigned kBody, std::size_t kUsualFront, class Value, class List>
 std::size_t write_frame(Byte* to, const Value& value, List list) noexcept {
   Writer body(to + kUsualFront);
@@ -45,7 +45,7 @@ std::size_t write_frame(Byte* to, const Value& value, List list) noexcept {
   return front + size;
 }
 
-/// Appends the result of `make` to `frames`. It is constructed in place because moving it costs time.
+/// Constructs the result of `make` in place, because moving it is expensive.
 template <class Make>
 auto& append(std::vector<Frame>& frames, Make make) {
   using Value = decltype(make());
@@ -56,8 +56,8 @@ auto& append(std::vector<Frame>& frames, Make make) {
   return std::get<Value>(frames.emplace_back(std::in_place_type<Value>, Made{make}));
 }
 
-/// Counts a value with a field out of bounds. Returns false if it must be dropped. A request or an answer is kept
-/// unless its id is 0, because later ones would otherwise never be delivered.
+/// Counts a value that is out of bounds. Returns false if it must be dropped. Requests and answers with a valid id must
+/// be kept, because later ones would otherwise never be delivered.
 template <class Value>
 bool keep_refused(Value& value, wire::Name field, DataContent& content) {
   ++content.invalid;
@@ -73,8 +73,7 @@ bool keep_refused(Value& value, wire::Name field, DataContent& content) {
   return false;
 }
 
-/// Reads one arm of a frame. Returns false if its fields are not in order. Each arm has its own function, so that its
-/// list has enough registers.
+/// Returns false if the fields are not in order. This function is not inlined, so that each list has enough registers.
 template <class List, class Make>
 [[gnu::noinline]] bool read_arm(const Reader& arm, DataContent& content, List list, Make make) {
   Reader in = arm;
@@ -84,7 +83,7 @@ template <class List, class Make>
   return in.done();
 }
 
-/// Reads this arm if it is present, and returns whether it was.
+/// Returns true if this arm is present.
 template <unsigned kBody, class List, class Make>
 bool take(Reader& frame, DataContent& content, bool& good, List list, Make make) {
   Reader in(nullptr, nullptr);
@@ -93,7 +92,7 @@ bool take(Reader& frame, DataContent& content, bool& good, List list, Make make)
   return true;
 }
 
-/// Does the same for states in columns. If one of them is out of bounds, all are dropped.
+/// Drops all states if one of them is out of bounds.
 bool take_columns(Reader& frame, DataContent& content, bool& good) {
   Reader in(nullptr, nullptr);
   if (!frame.enter<10>(in)) return false;
@@ -109,11 +108,11 @@ bool take_columns(Reader& frame, DataContent& content, bool& good) {
   return true;
 }
 
-/// Reads a frame. Returns false if its fields are not in order.
+/// Returns false if the fields are not in order.
 bool read_frame(const Reader& bytes, DataContent& content) {
   Reader frame = bytes;
   bool good = true;
-  // Without a designated initializer, all bytes of the aggregate would first be zeroed.
+  // Without designated initializers, these aggregates would be zeroed first.
   const bool known =
       take<1>(frame, content, good, wire::kDeviceStateFields, [] { return DeviceState{.tick = 0}; }) ||
       take<2>(frame, content, good, wire::kForceCommandFields, [] { return ForceCommand{.sequence = 0}; }) ||
@@ -125,11 +124,11 @@ bool read_frame(const Reader& bytes, DataContent& content) {
       take<6>(frame, content, good, wire::kLinkReportFields, [] { return LinkReport{}; }) ||
       take<7>(frame, content, good, wire::kDeviceReportFields, [] { return DeviceReport{}; }) ||
       take<8>(frame, content, good, wire::kPeerReportFields, [] { return PeerReport{}; });
-  static_cast<void>(known);  // a frame of a newer peer is empty after AnyOrder
+  static_cast<void>(known);  // frames of newer peers are empty after AnyOrder
   return good && frame.done();
 }
 
-/// Clears the content but keeps the memory of the frames.
+/// Keeps the memory of the frames.
 void empty(DataContent& content) noexcept {
   content.sent = {};
   content.echo.reset();
@@ -137,8 +136,8 @@ void empty(DataContent& content) noexcept {
   content.invalid = content.forces_not_finite = content.forces_out_of_bounds = 0;
 }
 
-/// Reads a body. Returns false if its fields are not in order, if it has too many frames, or if it has no usable
-/// tx_time; `content` must then not be used.
+/// Returns false if the fields are not in order, there are too many frames, or tx_time is not usable. `content` must
+/// not be used then.
 bool read_in_order(std::span<const std::byte> body, DataContent& content) {
   empty(content);
   Reader in(body);
@@ -173,7 +172,7 @@ Byte* as_bytes(std::byte* p) noexcept { return reinterpret_cast<Byte*>(p); }
 }  // namespace
 
 void round_to_columns(DeviceState& state) noexcept {
-  // GCC 12 vectorizes two neighbors and then removes the conversion double → float → double.
+  // Volatile, because GCC 12 otherwise removes the conversion double → float → double when vectorizing.
   const auto in_single = [](double number) {
     const volatile auto single = static_cast<float>(number);
     return static_cast<double>(single);
@@ -186,8 +185,8 @@ void round_to_columns(DeviceState& state) noexcept {
   state.permitted_force = in_single(state.permitted_force);
 }
 
-/// Writes directly into the datagram if there is room for the largest frame of this kind. Otherwise writes into a
-/// buffer first, to determine whether the frame fits.
+/// Writes directly into the datagram if there is room for the largest frame of this kind, and otherwise checks the size
+/// first, using a buffer.
 template <unsigned kBody, std::size_t kUsualFront, class Value, class List>
 bool DataWriter::add_frame(const Value& value, std::size_t most, List list) noexcept {
   if (frames_ == limits::kMaxFrames) return false;

@@ -15,27 +15,23 @@
 #include "protocol/wire/frame.h"
 #include "protocol/wire/header.h"
 
-// Encodes and decodes Data datagrams. WIRE.md describes the bytes, limits.h the bounds.
-//
-// The encoder does not check its input, but truncates texts and lists to their bounds. The decoder accepts any input:
-// it never throws or prints, and it returns null or nullopt for bad input.
+// Encodes and decodes Data datagrams (WIRE.md, limits.h). The encoder only truncates texts and lists and does not check
+// anything else. The decoder accepts any input, does not throw or print, and returns null or nullopt if the input is
+// invalid.
 
 namespace tendon {
 
-/// Returns true if columns can represent this state, which requires that it has no wanted force and no orientation,
-/// torque, gripper, force sensor or joints.
+/// Returns true if the state can be sent in columns, without optional fields for forces, rotation, gripper or joints.
 inline bool fits_columns(const DeviceState& state) noexcept {
   return !state.force_wanted && !state.stiffness_wanted && !state.turning && !state.torque_applied && !state.grip &&
          !state.grip_applied && !state.hand_force && !state.joints;
 }
 
-/// Rounds everything except the position to single precision, as transmission in columns does.
+/// Rounds all values except the position to single precision, as in columns.
 void round_to_columns(DeviceState& state) noexcept;
 
-/// Writes Data datagrams without encryption. It never allocates memory.
-///
-/// Call `begin`, then `add` until it returns false or nothing is left, then send `size()` bytes.
-///
+/// Writes unencrypted Data datagrams without allocating memory. Call `begin`, then `add` until it returns false or all
+/// data were added, then send `size()` bytes.
 /// Thread-safe: no.
 class DataWriter {
  public:
@@ -43,8 +39,8 @@ class DataWriter {
   void begin(std::span<std::byte> buffer, const Header& header, LocalTime sent,
              const std::optional<OutgoingEcho>& echo);
 
-  /// Appends one frame. Returns false, and leaves the datagram unchanged, if the frame does not fit or would be the
-  /// 65th. Any frame fits into an otherwise empty buffer of at least kMaxDatagram − 16 bytes.
+  /// Appends a frame. Returns false, without changing the datagram, if there is not enough room or there are already 64
+  /// frames. An empty buffer of kMaxDatagram − 16 bytes has enough room for any frame.
   bool add(const DeviceState& state);
   bool add(const ForceCommand& command);
   bool add(const Control& control);
@@ -55,9 +51,9 @@ class DataWriter {
   bool add(const PeerReport& report);
   bool add(const PortFrame& port);
 
-  /// Appends as many of the first states as fit, as one frame in columns, and returns their number. If it returns 0,
-  /// the datagram is unchanged. The states must belong to the same tick and time, be sorted by device, satisfy
-  /// fits_columns(), and number kMaxDevices at most.
+  /// Appends as many of the first states as possible, using one frame in columns, and returns their number. The states
+  /// must have the same tick and time, be sorted by device, and satisfy fits_columns(). There must not be more than
+  /// kMaxDevices.
   std::size_t add(std::span<const DeviceState* const> states);
 
   std::size_t size() const noexcept { return size_; }
@@ -71,33 +67,30 @@ class DataWriter {
   int frames_ = 0;
 };
 
-/// Encodes only the message, without frame and datagram.
+/// Encodes the message without a frame and a datagram.
 std::string message_of(const DeviceReport& report);
 std::string message_of(const PeerReport& report);
 
-/// The decoded content of a Data datagram.
 struct DataContent {
   PeerTime sent{};
   std::optional<IncomingEcho> echo;
-  /// in the order of the datagram, all values within bounds; columns yield one frame per state
+  /// In their original order, with values within bounds. Columns are split into states.
   std::vector<Frame> frames;
-  /// The number of frames and echoes that were dropped because a value is out of bounds. Requests (see
-  /// Control::invalid) and answers (see Code::kInvalid) with a valid id are counted but not dropped.
+  /// The number of frames and echoes with values out of bounds. They are dropped, except for requests (see
+  /// Control::invalid) and answers (see Code::kInvalid) with a valid id.
   std::uint32_t invalid = 0;
-  // Those of them that are forces:
+  // Only the forces:
   std::uint32_t forces_not_finite = 0;
   std::uint32_t forces_out_of_bounds = 0;
 };
 
-/// Reads Data datagrams. The object keeps its memory between calls.
-///
-/// Thread-safe: no.
+/// Keeps its memory between calls. Thread-safe: no.
 class DataReader {
  public:
-  /// Decodes `body`, the bytes after the header. Returns null if it is malformed: if it is not protobuf, has too many
-  /// frames, or has no usable tx_time. The content is valid until the next call.
+  /// Decodes the bytes after the header. Returns null if they are malformed: not protobuf, too many frames, or without
+  /// a usable tx_time. The content is valid until the next call.
   const DataContent* read(std::span<const std::byte> body);
-  /// Does the same, but always through AnyOrder, so that tests can compare the two.
+  /// For tests: always uses AnyOrder.
   const DataContent* read_in_any_order(std::span<const std::byte> body);
 
  private:

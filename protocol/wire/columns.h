@@ -10,25 +10,22 @@
 #include "protocol/wire/ways/reader.h"
 #include "protocol/wire/ways/writer.h"
 
-// Encodes and decodes DeviceStates, the states of several devices at one step in columns. This is the only message
-// without a list of fields, because a column contains one member of many values and only as many states are written as
-// fit into the datagram. For codec.cc only.
-//
-// Realtime-safe.
+// Encodes and decodes DeviceStates: the states of several devices at the same step, in columns. Does not use a list of
+// fields, since a column contains values of several states and the number of states is limited by the size of the
+// datagram. For codec.cc only. Realtime-safe.
 
 namespace tendon::wire {
 
 using States = std::span<const DeviceState* const>;
 
-/// The number of bytes of a length, which is less than 2¹⁴.
+/// For lengths below 2¹⁴.
 constexpr std::size_t size_of_length(std::size_t value) noexcept { return value < 0x80 ? 1 : 2; }
 constexpr std::size_t size_of_varint(std::uint64_t value) noexcept {
   return (static_cast<std::size_t>(std::bit_width(value | 1U)) * 9 + 64) / 64;  // one byte for 7 bits
 }
 constexpr std::size_t size_of_field(std::size_t inside) noexcept { return 1 + size_of_length(inside) + inside; }
 
-/// The columns of varints have consecutive field numbers. Calls visit(i, f) for each column, where f(state) is its
-/// entry.
+/// Calls visit(i, f) for each column of varints, where f(state) returns an entry. Their field numbers are consecutive.
 constexpr unsigned kFirstCount = 9;
 constexpr std::size_t kCounts = 6;
 template <class Visit>
@@ -42,10 +39,10 @@ void for_each_count(Visit visit) noexcept {
 }
 
 struct ColumnSizes {
-  /// bytes of each varint column; 0 if all its entries are 0 and it is omitted
+  /// Bytes of each column of varints, or 0 if it is omitted because all entries are 0.
   std::array<std::size_t, kCounts> counts;
   std::uint32_t devices = 0;
-  std::size_t body = 0;  ///< bytes of the message
+  std::size_t body = 0;
 
   explicit ColumnSizes(States states) noexcept {
     for (const DeviceState* state : states) devices |= 1U << state->device;
@@ -64,7 +61,7 @@ struct ColumnSizes {
       body += counts[column] > 0 ? size_of_field(counts[column]) : 0;
     });
   }
-  /// Returns the size of the whole frame in bytes.
+  /// Returns the size of the frame.
   std::size_t whole() const noexcept { return size_of_field(size_of_field(body)); }
 };
 
@@ -99,8 +96,7 @@ inline std::size_t write_columns(Writer& to, std::size_t room, States states) no
   return states.size();
 }
 
-/// Reads the states. next(tick) must return a new state each time. If a state is refused, the caller must drop all of
-/// them.
+/// next(tick) must return a new state for each call. If a state is refused, all of them must be dropped.
 template <class Next>
 void read_columns(Reader& in, Next next) {
   std::uint64_t tick = 0;

@@ -14,7 +14,7 @@
 namespace tendon {
 namespace {
 
-/// Maximum size of a Hello or an Answer after texts and lists were truncated to their bounds.
+/// After truncating texts and lists.
 constexpr std::size_t kMostBody = 2048;
 
 template <class Value, class List>
@@ -26,7 +26,7 @@ std::vector<std::byte> bytes_of(const Value& value, List list) {
   return {written.begin(), written.end()};
 }
 
-/// Reads a message whose fields may be in any order.
+/// Reads a message with its fields in any order.
 template <class Value, class List>
 std::optional<Value> read_message(std::span<const std::byte> body, const wire::Schema& schema, List list) {
   wire::AnyOrder any_order;
@@ -39,7 +39,7 @@ std::optional<Value> read_message(std::span<const std::byte> body, const wire::S
   return value;
 }
 
-// Byte offsets in the handshake datagrams.
+// Byte offsets in handshake datagrams.
 constexpr std::size_t kRandomAt = kHeaderSize;
 constexpr std::size_t kCookieAt = kRandomAt + sizeof(ClientRandom);
 constexpr std::size_t kRetrySize = kCookieAt + sizeof(Cookie);
@@ -57,7 +57,7 @@ void put16(const std::array<std::byte, 16>& value, std::byte* to) noexcept {
   std::copy(value.begin(), value.end(), to);
 }
 
-/// Returns the header if this is a handshake datagram of the given type.
+/// Returns nullopt if this is not a handshake datagram of this type.
 std::optional<Header> handshake_header(std::span<const std::byte> datagram, DatagramType type) noexcept {
   const std::optional<Header> header = decode_header(datagram);
   if (!header || header->type != type || header->packet_number != 0) return {};

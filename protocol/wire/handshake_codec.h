@@ -17,13 +17,13 @@
 
 namespace tendon {
 
-/// Chosen by the client. It assigns Retry and Answer to an attempt.
+/// Chosen by the client, to identify the attempt.
 using ClientRandom = std::array<std::byte, 16>;
-/// Chosen by the server. All zeros in the first Hello.
+/// Chosen by the server. Zero in the first Hello.
 using Cookie = std::array<std::byte, 16>;
 
-/// The handshake datagrams. `body` points into the datagram. In suite 0 it is the result of write_body(), in suite 1 it
-/// also contains what the handshake adds.
+/// `body` points into the datagram. In suite 0 it is the result of write_body(). In suite 1 it is a Noise message, which
+/// follows the key id in a Hello.
 struct HelloDatagram {
   Suite suite = Suite::kPlain;
   ClientRandom random{};
@@ -37,22 +37,22 @@ struct RetryDatagram {
 };
 struct AnswerDatagram {
   Suite suite = Suite::kPlain;
-  std::uint32_t connection_id = 0;  ///< 0 for a Refused
+  std::uint32_t connection_id = 0;
   ClientRandom random{};
   std::span<const std::byte> body;
 };
 
-/// Maximum size of a body in bytes: the largest Hello without claims (882) or the largest Welcome (874), and the 56
-/// bytes that suite 1 adds. A reply is never longer than the Hello that it answers.
+/// For the largest Hello without claims (882), the largest Welcome (874), and the overhead of suite 1 (56). A reply is
+/// never longer than its Hello.
 inline constexpr std::size_t kMaxHandshakeBody = 1000;
 
-/// Returns the size of the datagram. A Hello is always padded to kMaxDatagram bytes, so that no reply is larger. The
-/// body must have at most kMaxHandshakeBody bytes.
+/// Returns the size of the datagram. A Hello is padded to kMaxDatagram bytes, so that replies are never larger. Bodies
+/// must not exceed kMaxHandshakeBody.
 std::size_t encode(const HelloDatagram& hello, std::span<std::byte, kMaxDatagram> buffer);
 std::size_t encode(const RetryDatagram& retry, std::span<std::byte, kMaxDatagram> buffer);
 std::size_t encode(const AnswerDatagram& answer, std::span<std::byte, kMaxDatagram> buffer);
 
-/// Returns nullopt if the datagram has another type or an invalid layout. The body is not checked.
+/// Returns nullopt if the type or the layout is wrong. Does not check the body.
 std::optional<HelloDatagram> decode_hello(std::span<const std::byte> datagram) noexcept;
 std::optional<RetryDatagram> decode_retry(std::span<const std::byte> datagram) noexcept;
 std::optional<AnswerDatagram> decode_answer(std::span<const std::byte> datagram) noexcept;
@@ -62,7 +62,7 @@ using Answer = std::variant<Welcome, Refused>;
 std::vector<std::byte> write_body(const Hello& hello);
 std::vector<std::byte> write_body(const Answer& answer);
 
-/// Returns nullopt if the bytes are not such a message or contain a value out of bounds.
+/// Returns nullopt if the message is malformed or a value is out of bounds.
 std::optional<Hello> read_hello(std::span<const std::byte> body);
 std::optional<Answer> read_answer(std::span<const std::byte> body);
 

@@ -8,7 +8,7 @@
 namespace tendon {
 namespace {
 
-constexpr std::byte kMagic{0x54};  // 'T'
+constexpr std::byte kMagic{0x54};
 
 }  // namespace
 

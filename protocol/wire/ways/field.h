@@ -14,44 +14,42 @@
 #include "core/remote/remote_force.h"
 #include "protocol/limits.h"
 
-// The building blocks of field lists. Each message of tendon.proto has one list (wire/generated/), ordered by field
-// number. Each entry of a list gives a field with its number, its name, the member of the value and its bound. Lists
-// are applied to a visitor: the Writer encodes a value, the Reader decodes one and checks the bounds. The Writer
-// ignores names and bounds.
+// Building blocks of field lists. Each message of tendon.proto has a list (wire/generated/), which is sorted by field
+// number. An entry contains the number, the name, the member and the bound of a field. Lists are used with a visitor:
+// the Writer encodes a value, and the Reader decodes a value and checks its bounds.
 
-/// For lists and visitors. A visitor is kept in registers only if the compiler inlines every function that uses it.
+/// For lists and visitors. Visitors are only kept in registers if everything is inlined.
 #define TENDON_INLINE __attribute__((always_inline))
 
 namespace tendon::wire {
 
 using Byte = std::uint8_t;
 
-// The wire types of protobuf.
 inline constexpr unsigned kVarint = 0;
 inline constexpr unsigned kFixed64 = 1;
 inline constexpr unsigned kLength = 2;
 inline constexpr unsigned kFixed32 = 5;
 
-/// A field number as an argument. The wire type is needed only where the Reader asks whether the field is present.
+/// A field number. The wire type is only used for checking whether the field is present.
 template <unsigned kNumber, unsigned kType = 0>
 struct Field {};
 template <unsigned kNumber, unsigned kType = 0>
 inline constexpr Field<kNumber, kType> field{};
 
-/// Selects the type of an arm of a oneof.
+/// Selects an arm of a oneof.
 template <class Value>
 struct Kind {};
 template <class Value>
 inline constexpr Kind<Value> kind{};
 
-/// The name of a field in tendon.proto, used in the answer to a refused request. It has static storage.
+/// The name in tendon.proto, used for reporting refused requests. Static storage.
 using Name = const char*;
 
-/// The bound of a number. NaN is always out of bounds.
+/// NaN is always out of bounds.
 struct Within {
   double least = -limits::kMaxValue;
   double most = limits::kMaxValue;
-  bool beyond = false;    ///< `least` itself is not allowed
+  bool beyond = false;    ///< `least` is not allowed
   bool infinity = false;  ///< +infinity is also allowed
   bool zero = false;      ///< 0 is also allowed
   constexpr bool holds(double value) const noexcept {
@@ -66,15 +64,15 @@ struct Counts {
   std::uint64_t most = std::numeric_limits<std::uint64_t>::max();
 };
 
-/// A duration that is sent as a 32-bit number of units, rounded up.
+/// A duration sent as a 32-bit number of units, rounded up.
 struct Period {
-  /// What the Writer sends if the duration is out of bounds. A plain cast could make it look valid.
+  /// Used by the Writer if the duration is out of bounds. A plain cast could make it look valid.
   enum class Else { kZero, kMost, kNearest };
   Duration unit;
   Duration least;
   Duration most;
   Else otherwise;
-  bool any = false;  ///< the Reader accepts any value
+  bool any = false;  ///< not checked by the Reader
 
   constexpr bool holds(Duration length) const noexcept { return any || (length >= least && length <= most); }
   constexpr std::uint32_t units(Duration length) const noexcept {
@@ -86,9 +84,9 @@ struct Period {
   }
 };
 
-/// The validity of a force, and the time between two PortStates. A receiver refuses 0.
+/// Also for the time between PortStates. Receivers refuse 0.
 inline constexpr Period kValidity{std::chrono::microseconds(1), Duration(1), limits::kMaxValidFor, Period::Else::kZero};
-/// The longest silence between states. The largest number, which no server grants, marks an invalid value.
+/// The largest number marks an invalid value, which is never granted.
 inline constexpr Period kMaxSilence{
     std::chrono::microseconds(1), {}, limits::kMaxStateSilence, Period::Else::kMost, true};
 inline constexpr Period kPulse{std::chrono::milliseconds(1), {}, limits::kMaxVibration, Period::Else::kMost};
@@ -104,7 +102,7 @@ struct Entries {
 inline bool is_unit(const Vec3& normal) noexcept { return std::abs(normal.norm() - 1) <= Contact::kUnitTolerance; }
 constexpr bool in_time(Duration d) noexcept { return d >= -limits::kMaxTime && d <= limits::kMaxTime; }
 
-/// Returns true if the sum of the counts is at most `all`, without overflow.
+/// Returns true if the sum is at most `all`, without overflow.
 template <class Counts>
 constexpr bool is_part(const Counts& counts, std::uint64_t all) noexcept {
   for (const std::uint64_t count : counts) {
@@ -114,7 +112,7 @@ constexpr bool is_part(const Counts& counts, std::uint64_t all) noexcept {
   return true;
 }
 
-/// The one or two bytes before each field, with its number (below 2048) and its wire type.
+/// The field number (below 2048) and the wire type.
 template <unsigned kField, unsigned kType>
 struct Tag {
   static constexpr unsigned kValue = kField << 3U | kType;
@@ -124,7 +122,7 @@ struct Tag {
   static constexpr Byte kSecond = static_cast<Byte>(kValue >> 7U);
 };
 
-/// Returns the value of this arm, or null if another arm is set.
+/// Returns null if another arm is set.
 template <class Value, class... Values>
 const Value* arm_of(const std::variant<Values...>& one) noexcept {
   return std::get_if<Value>(&one);

@@ -19,8 +19,7 @@
 
 namespace tendon::wire {
 
-/// Builds a stiffness matrix from 1 entry (k·I), 3 entries (the diagonal) or 9 entries (row by row). Returns false for
-/// any other number of entries.
+/// Accepts 1 entry (k·I), 3 entries (diagonal) or 9 entries (row-major).
 inline bool matrix_of(std::span<const double> entries, Mat3& to) noexcept {
   switch (entries.size()) {
     case 1:
@@ -37,7 +36,7 @@ inline bool matrix_of(std::span<const double> entries, Mat3& to) noexcept {
   }
 }
 
-/// Constructs the value in place. emplace() would first zero all bytes of an aggregate, which costs time.
+/// Constructs the value in place without zeroing it first, as emplace() would do.
 template <class Value>
 Value& made(std::optional<Value>& value) {
   struct Made {
@@ -49,13 +48,12 @@ Value& made(std::optional<Value>& value) {
   return value.emplace(Made{});
 }
 
-/// Decodes fields in the order of their numbers. A field that is not next in the bytes is absent. There are two kinds
-/// of failure:
+/// Decodes fields in the order of their numbers. If a field is not next, it is absent. There are two kinds of errors:
 ///
-/// * The encoding is not that of our Writer: a field is unknown, duplicated, out of order or longer than necessary, a
-///   text is not UTF-8, or the message is truncated. Then `done` returns false and the value must not be used. AnyOrder
-///   can rewrite the message or determine that it is malformed.
-/// * A number is out of bounds. Then `refused` returns the name of the first such field.
+/// * If the encoding differs from the Writer's (unknown, duplicate or reordered fields, overlong varints, invalid
+///   UTF-8, or a truncated message), `done` returns false and the value must not be used. AnyOrder can convert the
+///   message, or determine that it is malformed.
+/// * If a number is out of bounds, `refused` returns the name of the first such field.
 ///
 /// The value must be newly constructed.
 class Reader {
@@ -64,9 +62,7 @@ class Reader {
   explicit Reader(std::span<const std::byte> bytes) noexcept
       : Reader(reinterpret_cast<const Byte*>(bytes.data()),
                reinterpret_cast<const Byte*>(bytes.data()) + bytes.size()) {}
-  /// Returns true if the message was read to its end.
   bool done() const noexcept { return at_ == end_ && good_; }
-  /// Returns null if all values are within their bounds.
   Name refused() const noexcept { return refused_; }
 
   template <unsigned kField>
@@ -83,7 +79,7 @@ class Reader {
   [[gnu::always_inline]] void flag(Field<kField> f, Name /*name*/, bool& value) noexcept {
     value = count_up_to(f, 1) != 0;
   }
-  /// `offset` is the difference between the numbers on the wire and in C++.
+  /// `offset` is the number on the wire minus the number in C++.
   template <unsigned kField, class Enum>
   [[gnu::always_inline]] void choice(Field<kField> f, Name name, Enum& value, Enum first, Enum last,
                                      unsigned offset = 0) noexcept {
@@ -152,7 +148,7 @@ class Reader {
   }
   template <unsigned kField>
   [[gnu::always_inline]] void vector(Field<kField> /*unused*/, Name name, Vec3& value) noexcept {
-    if (!take_three<kField>(value)) {  // at least one number is 0 and was omitted
+    if (!take_three<kField>(value)) {  // if a number is 0 and was omitted
       value.setZero();
       inside<kField>([&]() TENDON_INLINE {
         fixed<1, kFixed64>(value.x());
@@ -252,7 +248,7 @@ class Reader {
     }
     require(name, size >= bound.least && size <= bound.most);
   }
-  /// An absent message is refused.
+  /// Refuses absent messages.
   template <unsigned kField, class Value, class List>
   [[gnu::always_inline]] void message(Field<kField> /*unused*/, Name name, Value& value, List list) {
     if (!inside<kField>([&]() TENDON_INLINE { list(*this, value); })) require(name, false);
@@ -274,19 +270,19 @@ class Reader {
                                     const Within& bound = {}) noexcept {
     if (next_is<kField, kFixed64>()) present(f, name, value.emplace(), bound);
   }
-  /// Reads the first field of a part, which is present if and only if this field is.
+  /// The part is present if this field is present.
   template <unsigned kField, unsigned kType, class Value, class Fields>
   [[gnu::always_inline]] void part(Field<kField, kType> /*unused*/, std::optional<Value>& value, Fields fields) {
     if (next_is<kField, kType>()) fields(value ? *value : made(value));
   }
-  /// Reads another field of a part. If the part is absent, only the bound is checked.
+  /// Only checks the bound if the part is absent.
   template <unsigned kField, unsigned kType, class Value, class Fields>
   [[gnu::always_inline]] void rest(Field<kField, kType> /*unused*/, std::optional<Value>& value, Fields fields) {
     if (!next_is<kField, kType>()) return;
     Value none;
     fields(value ? *value : none);
   }
-  /// Reads the two corners of a box. A single corner is refused.
+  /// Refuses a box with a single corner.
   template <unsigned kLeast, unsigned kMost, class Box>
   void box(Field<kLeast> least, Field<kMost> most, Name name, std::optional<Box>& value) noexcept {
     const bool begins = next_is<kLeast, kLength>();
@@ -298,8 +294,7 @@ class Reader {
     require(name, !begins || (box.min.array() <= box.max.array()).all());
     value = box;
   }
-  /// Reads this arm of a oneof if it is present, and returns whether it was. The caller stops at the first arm that is
-  /// present, so a second arm remains unread.
+  /// Returns true if this arm is present. The caller then skips the other arms, so a second one remains unread.
   template <unsigned kField, class Value, class OneOf, class List>
   bool arm(Field<kField, kLength> /*unused*/, Name name, Kind<Value> /*unused*/, OneOf& one, List list) {
     if (!next_is<kField, kLength>()) return false;
@@ -312,7 +307,7 @@ class Reader {
     fields(*this, make_arm<Value>(one));
     return true;
   }
-  /// Refuses the message if none of these arms is next.
+  /// Refuses messages without any of these arms.
   template <unsigned... kFields, unsigned... kTypes>
   void one_of(Name name, Field<kFields, kTypes>... /*arms*/) noexcept {
     require(name, (next_is<kFields, kTypes>() || ...));
@@ -326,7 +321,7 @@ class Reader {
     require(name, static_cast<bool>(holds()));
   }
 
-  /// Reads a column of numbers. A column of another length is refused.
+  /// Refuses columns of another length.
   template <unsigned kField, class Number>
   void column(Field<kField> /*unused*/, Name name, std::span<Number> to) noexcept {
     bool fits = false;
@@ -339,7 +334,7 @@ class Reader {
     });
     require(name, fits);
   }
-  /// Reads a column of varints. If the column is absent, `to` is unchanged.
+  /// If the column is absent, `to` is unchanged.
   template <unsigned kField>
   void column(Field<kField> /*unused*/, Name name, std::span<std::uint64_t> to, std::uint64_t most) noexcept {
     inside<kField>([&]() TENDON_INLINE {
@@ -353,7 +348,7 @@ class Reader {
       require(name, size == to.size() || size == 0);
     });
   }
-  /// If this field is next, skips it and returns true. `inside` then reads its content.
+  /// If this field is next, skips it and sets `inside` to its content.
   template <unsigned kField>
   [[gnu::always_inline]] bool enter(Reader& inside) noexcept {
     if (!take<kField, kLength>()) return false;
@@ -379,7 +374,7 @@ class Reader {
     varint(length);
     return length;
   }
-  /// Calls `fields` to read the content of this field. Returns false if the field is not next.
+  /// Calls `fields` for reading this field. Returns false if it is not next.
   template <unsigned kField, class Fields>
   [[gnu::always_inline]] bool inside(Fields fields) {
     if (!take<kField, kLength>()) return false;
@@ -396,7 +391,7 @@ class Reader {
     end_ = end;
     return true;
   }
-  /// Fast path for a vector whose three numbers are all present.
+  /// Fast path if all three numbers are present.
   template <unsigned kField>
   [[gnu::always_inline]] bool take_three(Vec3& value) noexcept {
     constexpr std::size_t kTag = Tag<kField, kLength>::kSize;
@@ -428,7 +423,7 @@ class Reader {
       const Byte byte = *at_++;
       sum |= std::uint64_t{byte & 0x7FU} << shift;
       if (byte >= 0x80) continue;
-      // The shortest form does not end with a 0, and the tenth byte has only one bit.
+      // Overlong, or more than 64 bits.
       if ((byte == 0 && shift > 0) || (shift == 63 && byte > 1)) break;
       value = sum;
       return;
@@ -452,7 +447,7 @@ class Reader {
     at_ += sizeof taken;
     value = taken;
   }
-  /// Reads a list of numbers and returns its length. A list that is longer than `to` is refused.
+  /// Returns the length. Refuses lists that are longer than `to`.
   template <unsigned kField>
   [[gnu::always_inline]] std::size_t entries_of(Field<kField> /*unused*/, Name name, std::span<double> to) noexcept {
     std::size_t size = 0;

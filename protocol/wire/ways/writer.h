@@ -17,7 +17,7 @@
 
 namespace tendon::wire {
 
-/// Finds the shortest of the three forms of a stiffness (tendon.proto) and returns the number of its entries.
+/// Returns the number of entries of the shortest form (tendon.proto).
 inline std::size_t entries_of(const Mat3& k, std::array<double, 9>& entries) noexcept {
   const bool diagonal = k(0, 1) == 0 && k(0, 2) == 0 && k(1, 0) == 0 && k(1, 2) == 0 && k(2, 0) == 0 && k(2, 1) == 0;
   if (!diagonal) {
@@ -28,10 +28,9 @@ inline std::size_t entries_of(const Mat3& k, std::array<double, 9>& entries) noe
   return k(0, 0) == k(1, 1) && k(0, 0) == k(2, 2) ? 1 : 3;
 }
 
-/// Encodes fields one after the other. Numbers that are 0 and empty texts are omitted, as proto3 requires; optional
-/// values are written whenever they are present. Texts and lists are truncated to their bounds, and nothing else is
-/// checked. The caller must provide enough memory for the largest message.
-///
+/// Encodes fields in the order of the calls. Omits zero numbers and empty texts, as proto3 requires, but writes all
+/// optional values that are present. Truncates texts and lists, and does not check anything else. There must be enough
+/// memory for the largest message.
 /// Realtime-safe.
 class Writer {
  public:
@@ -84,7 +83,7 @@ class Writer {
   [[gnu::always_inline]] void number(Field<kField> /*unused*/, Name /*name*/, double value,
                                      const Within& /*bound*/ = {}) noexcept {
     const auto bits = std::bit_cast<std::uint64_t>(value);
-    if (bits != 0) fixed<kField, kFixed64>(bits);  // −0 is written
+    if (bits != 0) fixed<kField, kFixed64>(bits);  // does not omit −0
   }
   // These are written even if they are 0.
   template <unsigned kField>
@@ -231,7 +230,7 @@ class Writer {
   void one_of(Name /*name*/, Fields... /*arms*/) noexcept {}
   void require(Name /*name*/, std::invocable auto /*holds*/) noexcept {}
 
-  /// Writes `kWidth` numbers for each state. value(state, i) returns the i-th one.
+  /// value(state, i) returns the i-th of `kWidth` numbers.
   template <unsigned kField, class Number, int kWidth, class Value>
   void column(std::span<const DeviceState* const> states, Value value) noexcept {
     tag<kField, kLength>();
@@ -250,7 +249,7 @@ class Writer {
     *at_++ = T::kFirst;
     if constexpr (T::kSize == 2) *at_++ = T::kSecond;
   }
-  /// Writes a message of less than 128 bytes, whose length takes one byte.
+  /// For messages of less than 128 bytes, whose length takes one byte.
   template <unsigned kField, class Fields>
   [[gnu::always_inline]] void small(Fields fields) noexcept {
     tag<kField, kLength>();
@@ -260,7 +259,7 @@ class Writer {
   }
 
  private:
-  /// Writes a message of any length. Its content is moved by one byte if the length takes two bytes.
+  /// For messages of any length. The content is moved by one byte if the length takes two bytes.
   template <unsigned kField, class Fields>
   [[gnu::always_inline]] void inside(Fields fields) noexcept {
     tag<kField, kLength>();
