@@ -10,8 +10,8 @@
 
 namespace tendon {
 
-/// The event counters of a driver, from its construction on and over all connections. A driver counts only those events
-/// that its device can show. The order is that of `kDeviceCounters`.
+/// Events counted by a driver since its construction, for all connections, if its device can show them. Same order as
+/// `kDeviceCounters`.
 enum class DeviceCount : std::uint8_t {
   kAnswers,
   kUnreadable,
@@ -23,19 +23,19 @@ enum class DeviceCount : std::uint8_t {
   kUnanswered,
 };
 
-/// Describes one counter. `tendond --json` prints it by name, the log prints its meaning, and observers and /metrics
-/// are told that the device is degraded.
+/// `tendond --json` uses the name, and the log uses the meaning. Observers and /metrics receive the reason for a
+/// degraded device.
 struct DeviceCounter {
   DeviceCount count;
   std::string_view name;      ///< key in `tendond --json`
-  std::string_view meaning;   ///< what is counted, for people
-  std::string_view degraded;  ///< reported to observers if the counter rose during a report; empty: not reported
+  std::string_view meaning;   ///< for people
+  std::string_view degraded;  ///< sent to observers, if not empty
 };
 
-/// Counters that degrade the device, the worst first. A report names only the first one that rose, in at most 18 bytes.
+/// If several counters have increased, a report contains only the first reason, using at most 18 bytes.
 inline constexpr std::array kDeviceCounters = {
     DeviceCounter{DeviceCount::kAnswers, "answers", "answers of the device that were believed", ""},
-    // A serial line may begin in the middle of an answer, so a few bytes after each opening are normal.
+    // A serial line can start in the middle of an answer, so a few bytes after opening are normal.
     DeviceCounter{DeviceCount::kUnreadable, "unreadable", "packets, or bytes of a serial line, that are no answer", ""},
     DeviceCounter{DeviceCount::kFailedSetups, "failed_setups", "firmware or calibrations that the device did not take",
                   "set-up fails"},
@@ -57,7 +57,7 @@ static_assert([] {
   return true;
 }());
 
-/// The values of all counters, in the order of `kDeviceCounters`.
+/// In the order of `kDeviceCounters`.
 struct DeviceCounts {
   std::array<std::uint64_t, kDeviceCounters.size()> values{};
 
@@ -67,8 +67,6 @@ struct DeviceCounts {
   friend bool operator==(const DeviceCounts&, const DeviceCounts&) = default;
 };
 
-/// The counters inside a driver.
-///
 /// Thread-safe: `counts` from any thread, the others from one thread. Realtime-safe.
 class DeviceCountersKept {
  public:

@@ -3,7 +3,7 @@
 
 namespace tendon {
 
-// Not inline, so that the compiler does not count it when it inlines the step of a device.
+// Not inlined, because this would affect the inlining of a device's step.
 bool Device::armed() const noexcept { return true; }
 
 void Device::set_output(LocalTime /*now*/, std::uint32_t /*output*/, const OutputSetting& /*setting*/) noexcept {}

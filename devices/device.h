@@ -12,100 +12,96 @@
 
 namespace tendon {
 
-/// The properties of a device.
 struct DeviceInfo {
   std::string name;
-  double max_force = 0;            ///< N, largest norm of the force vector
-  double position_resolution = 0;  ///< m, one encoder count at the handle; 0 = exact
-  double force_resolution = 0;  ///< N, largest difference between the force written and the force requested; 0 = exact
-  bool measures_orientation = false;  ///< every sample has an orientation
-  double max_torque = 0;              ///< N·m, largest norm of the torque vector; 0 = no torque
-  double angular_resolution = 0;      ///< rad, one encoder count of the orientation; 0 = exact
-  /// A gripper with two fingers that open by an angle.
+  double max_force = 0;               ///< N, maximum norm
+  double position_resolution = 0;     ///< m, encoder count at the handle; 0 = exact
+  double force_resolution = 0;        ///< N, accuracy of the written force; 0 = exact
+  bool measures_orientation = false;  ///< in every sample
+  double max_torque = 0;              ///< N·m, maximum norm; 0 = no torque
+  double angular_resolution = 0;      ///< rad, encoder count; 0 = exact
   struct Gripper {
-    double open = 0;       ///< rad, largest opening
-    double arm = 0;        ///< m per radian, relative travel of the fingers
+    double open = 0;       ///< rad, fully open
+    double arm = 0;        ///< m/rad, travel between the fingers
     double max_force = 0;  ///< N, on the fingers; 0 = no motor
     bool operator==(const Gripper&) const = default;
   };
   std::optional<Gripper> gripper{};
-  std::vector<std::string> joints{};         ///< names of the joints, at most Joints::kMost; empty: not reported
-  std::vector<OutputDescription> outputs{};  ///< lamps and vibration, at most 8; empty: none
-  Duration watchdog{};  ///< the force drops to zero if no command arrives for this long; 0 = no watchdog
+  std::vector<std::string> joints{};         ///< at most Joints::kMost names
+  std::vector<OutputDescription> outputs{};  ///< lamps and vibration, at most 8
+  Duration watchdog{};                       ///< ends the force if commands stop; 0 = none
 
-  /// Returns true if samples contain neither orientation nor gripper nor joints.
   bool position_only() const noexcept { return !measures_orientation && !gripper && joints.empty(); }
 };
 
 struct PositionSample {
   LocalTime at{};
   Vec3 position = Vec3::Zero();  ///< m, device base frame
-  /// N, force of the hand on the handle (and not the reverse), measured by a force sensor; empty without a sensor.
+  /// N, force of the hand on the handle, as measured by a force sensor.
   std::optional<Vec3> hand_force = std::nullopt;
-  std::uint32_t buttons = 0;  ///< bit i is set while button i is held down
-  /// From the handle frame to the base frame; empty if it is not measured. In the handle frame, −z is the direction of
-  /// the stylus or finger, y is up and x to the right when the handle is in its middle position (OpenXR's aim pose).
+  std::uint32_t buttons = 0;  ///< bit i is set while button i is held
+  /// Handle frame → base frame. In the handle frame, −z is the direction of the stylus or finger. In the middle
+  /// position of the handle, y is up and x is to the right (OpenXR's aim pose).
   std::optional<Quat> orientation = std::nullopt;
-  std::optional<double> opening = std::nullopt;  ///< rad, opening of the gripper; empty without a gripper
+  std::optional<double> opening = std::nullopt;  ///< rad, of the gripper
 };
 
-/// A haptic device: it measures a position and renders a force. A device of admittance type also measures the force of
-/// the hand. All values are in SI units; encoder counts and USB transfers are hidden by the implementation.
+/// A device that measures the position of a handle and renders a force. Devices of admittance type also measure the
+/// force of the hand. SI units are used; encoder counts and USB transfers are only used by the implementations.
 ///
-/// Thread-safe: no; the haptic thread owns it. Realtime-safe: `read` and `apply` must not allocate, lock or log, and
-/// must not block for longer than the transfer of the device.
+/// Thread-safe: no; used by the haptic thread. Realtime-safe: `read` and `apply` must not allocate, lock or log, and
+/// must not block longer than a transfer of the device.
 class Device {
  public:
-  /// The state between connection and force output. Positions are valid only in `kHomed`.
+  /// Positions are only valid in `kHomed`.
   enum class State : std::uint8_t {
-    kAbsent,    ///< not connected
-    kOpening,   ///< being opened and set up
-    kFirmware,  ///< receiving its firmware
-    kUnhomed,   ///< running, but its encoders have no origin yet
-    kHomed,     ///< ready
+    kAbsent,
+    kOpening,
+    kFirmware,
+    kUnhomed,  ///< encoders without an origin
+    kHomed,
   };
 
   virtual ~Device() = default;
 
   virtual const DeviceInfo& info() const noexcept = 0;
 
-  /// A device that needs neither opening nor homing is always kHomed. May be called from any thread.
+  /// May be called from any thread. Always kHomed if the device does not need opening or homing.
   virtual State state() const noexcept { return State::kHomed; }
 
-  /// The operator requests forces, for the first time or after a fault. A safety layer decides later whether to grant
-  /// this (SafeDevice). A device without a safety layer is ready as soon as it is homed, so the default does nothing.
+  /// The operator requests forces, also after a fault. Only used by safety layers (SafeDevice), which grant the request
+  /// later. Other devices are ready when they are homed.
   virtual void arm() noexcept {}
-  /// The operator requests no forces until the next `arm`. A safety layer (SafeDevice) renders none from the next
-  /// `apply` on. For other devices the control law does this (HapticController::disarm), so the default does nothing.
+  /// No forces until the next `arm`. Only used by safety layers (SafeDevice). For other devices, the control law is
+  /// disarmed (HapticController::disarm).
   virtual void disarm() noexcept {}
-  /// False while a safety layer holds the force at zero (SafeDevice).
+  /// False if a safety layer keeps the force at zero.
   virtual bool armed() const noexcept;
-  /// The number of times that `arm` was granted. Each one clears the fault before it.
+  /// How often `arm` was granted, which also clears faults.
   virtual std::uint32_t times_armed() const noexcept { return 0; }
-  /// The number of faults because of which the device has ended the force (SafeDevice).
+  /// How often a safety layer has ended the force because of a fault.
   virtual std::uint32_t faults() const noexcept { return 0; }
-  /// The counters of the driver. May be called from any thread.
+  /// May be called from any thread.
   virtual DeviceCounts counts() const noexcept { return {}; }
 
-  /// Samples the position. Returns nullopt if the device did not answer.
+  /// Returns nullopt if the device did not answer.
   virtual std::optional<PositionSample> read(LocalTime now) noexcept = 0;
 
-  /// Returns angles and velocities of the joints `info().joints` for `hand`, whose position is that of the last sample.
-  /// The velocities are unbounded near a singular pose. Called only if the device names joints. Realtime-safe.
+  /// Only called for devices with joints, using the position returned by `read`. Joint velocities are unbounded near
+  /// singular poses. Realtime-safe.
   virtual Joints joints(const Motion& /*hand*/) const noexcept { return {}; }
 
-  /// Commands `force` (N, on the hand) and returns the force that was actually written, after all clamping and
-  /// rounding. The device holds it until the next `apply` or until its watchdog ends it. The energy ledger counts the
-  /// returned force and not the requested one.
+  /// Commands `force` (N, on the hand) and returns the force that was actually written after clamping and rounding.
+  /// This is the force counted by the energy ledger. The device keeps it until the next `apply` or until its watchdog
+  /// expires.
   virtual Vec3 apply(const Vec3& force) noexcept = 0;
 
-  /// Does the same for a device that also has motors for torque or a gripper: commands all of them at once and returns
-  /// what was actually written. Called instead of `apply` if `info` names a torque or a gripper with a motor. By
-  /// default, torque and grip are zero.
+  /// Called instead of `apply` if `info` contains a torque or a gripper with a motor. Commands all motors and returns
+  /// what was actually written.
   virtual Effort apply_all(const Effort& effort) noexcept { return {.force = apply(effort.force)}; }
 
-  /// Sets `info().outputs[output]`. An index that does not exist or a setting of another kind is ignored. Outputs are
-  /// not part of the energy ledger, because they do not move the handle.
+  /// Ignores unknown outputs and settings of a different kind. Not included in the energy ledger, because outputs do
+  /// not move the handle.
   virtual void set_output(LocalTime now, std::uint32_t output, const OutputSetting& setting) noexcept;
 };
 

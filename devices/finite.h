@@ -7,9 +7,7 @@
 
 namespace tendon {
 
-/// Returns false if any component of `effort` is NaN or infinite.
-///
-/// Realtime-safe.
+/// Returns false for NaN and infinity. Realtime-safe.
 inline bool is_finite(const Effort& effort) noexcept {
   return effort.force.allFinite() && effort.torque.allFinite() && std::isfinite(effort.grip);
 }

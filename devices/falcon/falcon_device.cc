@@ -18,22 +18,21 @@ using namespace std::chrono_literals;
 using falcon::Counts;
 using falcon::Reply;
 
-/// 1.5 Mbaud. The chip sends a reply immediately at its last byte, instead of after its latency timer of 1 ms.
+/// 1.5 Mbaud. Replies are sent immediately, without waiting for the latency timer of 1 ms.
 constexpr std::array kRunMode = {latency(1), divisor(2), k8N1, kNoFlowControl, flush_at(falcon::kPacketEnd),
                                  kPurgeOne,  kPurgeOther};
 
-/// A device with firmware answers within 2 ms. libnifalcon asks about a hundred times before it decides that there is
-/// none.
+/// Firmware answers within 2 ms. libnifalcon tries about a hundred times.
 constexpr Duration kProbing = 300ms;
-/// The device is then opened again, because its power may have been switched on.
+/// Then reopens the device, because it may have been switched on.
 constexpr Duration kGiveUpAfter = 2s;
-/// A transfer of 16 bytes in each direction takes 0.2 ms at 1.5 Mbaud.
+/// 16 bytes in both directions take 0.2 ms at 1.5 Mbaud.
 constexpr usb::Dialogue::Patience kPatience{.most_under_way = 1, .answer = 5ms};
 
-/// Within 50 mm of the centre, 1 mm is at most 55 counts of a motor, so this limit is 3 m/s there and 5 m/s at the
-/// centre. A released handle does not reach 3 m/s within the workspace.
+/// Within 50 mm of the centre, 1 mm corresponds to at most 55 counts, so this is 3 m/s there and 5 m/s at the centre.
+/// Even a released handle does not reach 3 m/s within the workspace.
 constexpr double kMostCountsPerSecond = 165e3;
-/// Tolerance for replies that arrive at shorter intervals than they were sampled.
+/// For replies that arrive at irregular intervals.
 constexpr double kMoreCounts = 30;
 
 constexpr Counts kNoTorque{};
@@ -42,9 +41,9 @@ constexpr Counts kNoTorque{};
 
 FalconDevice::FalconDevice(Config config, std::unique_ptr<usb::Pipe> pipe)
     : info_{.name = "Novint Falcon",
-            .max_force = 8,  // from CHAI3D's device table; ±4096 counts give 16 N along z, 6 to 8 N across
+            .max_force = 8,  // from CHAI3D's device table; ±4096 counts are 16 N along z, 6 to 8 N across
             .position_resolution = 43e-6,
-            .force_resolution = 0.01,  // one count of each motor, within 50 mm of the centre
+            .force_resolution = 0.01,  // one count, within 50 mm of the centre
             .joints = {"thigh 1", "thigh 2", "thigh 3"},
             .outputs = {{.name = "ring", .kind = OutputKind::kLamp}},
             .watchdog = Duration::zero()},
@@ -131,7 +130,7 @@ void FalconDevice::believe(const Reply& reply) noexcept {
   const bool homed = reply.homed == Reply::kAllHomed;
   const bool in_step = plausible(reply);
   dialogue_.hear();
-  // Encoder counts jump when a leg becomes homed or loses its home position.
+  // The encoders jump if a leg is homed or loses its home position.
   if (state() == State::kHomed && homed && !in_step) {
     dialogue_.counters().add(DeviceCount::kImplausible);
     return;
@@ -187,7 +186,7 @@ void FalconDevice::advance() noexcept {
           break;
         case falcon::FirmwareLoader::Progress::kDone:
           loaded_ = true;
-          moved_origin_ = false;  // the boot loader has answered, so the device was reset
+          moved_origin_ = false;  // the device was reset
           enter(State::kOpening);
           break;
         case falcon::FirmwareLoader::Progress::kFailed:
@@ -245,7 +244,7 @@ const Driver& driver(const Config& /*config*/) {
                   .name = "Novint Falcon",
                   .moves_a_hand = true,
                   .axes = "right=x up=y user=z",
-                  .buttons = {"right", "forward", "centre", "left"},  // of its grip
+                  .buttons = {"right", "forward", "centre", "left"},
                   .buttons_in_words = "one of a Falcon's, 0 to 3",
                   .homing = "homed: pull the grip all the way out, then push it all the way in",
                   .ids = kIds,

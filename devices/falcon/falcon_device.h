@@ -20,40 +20,37 @@
 
 namespace tendon {
 
-/// The driver of the Novint Falcon: a state machine from connection to force output over a `usb::Pipe`, advanced by
-/// `read`.
+/// The driver of the Novint Falcon: a state machine over a `usb::Pipe`, which is advanced by `read`.
 ///
 ///     kAbsent ──plugged in──▶ kOpening ──answers──────────────────────▶ kUnhomed ──its three legs are homed──▶ kHomed
 ///                               │                                         ▲   ▲                                  │
 ///                               └─no answer in 300 ms─▶ kFirmware ─loaded─┘   └──the device says: a leg is not──┘
 ///     any ──unplugged, a transfer failed, or silent for 100 ms──▶ kAbsent, and starts again
 ///
-/// Each packet to the device carries torques. They are zero in every state other than kHomed, and in kHomed if there
-/// was no plausible reply for 10 ms. The device has no documented watchdog.
+/// Every packet contains torques. They are only different from zero in kHomed, while there are plausible replies (at
+/// least every 10 ms). A watchdog of the device is not documented.
 ///
-/// Each reply contains the encoder counts. A reply is implausible if its encoders moved further than a hand can move
-/// them. After 100 ms without a plausible reply, the encoders have lost counts and the device must be reset: the driver
-/// loads the firmware again if it has the file; otherwise the user must switch the device off and on.
+/// Every reply contains encoder counts. It is not plausible if a hand cannot move the encoders as fast. After 100 ms
+/// without a plausible reply, the encoders have lost counts and the device must be reset, either by loading the
+/// firmware again or, if the driver does not have the file, by switching it off and on.
 ///
-/// Positions are relative to `falcon::kCentre`: x to the right, y up, z towards the user. The time of a sample is that
-/// of `read`; the device sampled up to one period later. Buttons, from bit 0: right, forward, centre, left.
+/// Positions are relative to `falcon::kCentre`: x to the right, y up, z towards the user. Samples use the time of
+/// `read`, but can be up to one period older. The buttons, starting at bit 0, are right, forward, centre and left.
 ///
-/// There is one outstanding request at a time. If its answer is late, `read` returns no sample and `apply` changes
-/// nothing, except that a zero force is sent immediately (`usb::Dialogue`).
+/// If the answer to the pending request is late, `read` returns nullopt and `apply` only sends a zero force
+/// (`usb::Dialogue`).
 ///
-/// Thread-safe: `counts` and `state` from any thread, the others from one thread. Realtime-safe: `read`, `apply` and
+/// Thread-safe: `counts` and `state` from any thread, the others from one thread. Realtime-safe: `read`, `apply`,
 /// `counts`.
 class FalconDevice final : public Device {
  public:
   static constexpr usb::Id kId{0x0403, 0xCB48};
 
   struct Config {
-    /// From `read_firmware`. If empty, only a device that already has firmware can be used; any other stays in
-    /// kFirmware.
+    /// From `read_firmware`. If empty, a device without firmware stays in kFirmware.
     std::vector<std::uint8_t> firmware{};
   };
 
-  /// Takes the pipe to a Falcon.
   FalconDevice(Config config, std::unique_ptr<usb::Pipe> pipe);
 
   const DeviceInfo& info() const noexcept override { return info_; }
@@ -62,9 +59,9 @@ class FalconDevice final : public Device {
   std::optional<PositionSample> read(LocalTime now) noexcept override;
   Joints joints(const Motion& hand) const noexcept override;
   Vec3 apply(const Vec3& force) noexcept override;
-  /// The device has one output, "ring", a ring of light-emitting diodes. Red, green and blue are each on from half of
-  /// their strength. The ring shows the color while the device may render forces, and green if the color is off or pure
-  /// red. Pure red means that the device is not ready, which a client cannot change.
+  /// Output 0, "ring", consists of light-emitting diodes. Red, green and blue are switched on from half their
+  /// intensity. The color is used while the device may render forces. Pure red always means that the device is not
+  /// ready, so if the color is pure red or off, green is used instead.
   void set_output(LocalTime now, std::uint32_t output, const OutputSetting& setting) noexcept override;
 
  private:
@@ -81,38 +78,35 @@ class FalconDevice final : public Device {
   std::vector<std::uint8_t> firmware_;
   usb::Dialogue dialogue_;
   std::atomic<State> state_{State::kAbsent};
-  LocalTime entered_{};  ///< time at which the state was entered
+  LocalTime entered_{};  ///< when the current state was entered
 
-  // kOpening
   usb::ftdi::Setup setup_{{}};
   bool set_up_ = false;
-  // kFirmware
   falcon::FirmwareLoader loader_;
-  bool loaded_ = false;   ///< loaded on this connection
-  bool resting_ = false;  ///< no firmware is available, or loading has failed
+  bool loaded_ = false;
+  bool resting_ = false;  ///< without firmware, or after a failure
 
-  // From kOpening on
   falcon::ReplyParser parser_;
   std::optional<falcon::Reply> newest_{};  ///< last plausible reply
-  bool fresh_ = false;                     ///< newest_ arrived in this `read` and has a pose
-  int homed_replies_ = 0;      ///< number of consecutive replies that say "homed", or, if negative, "not homed"
-  bool moved_origin_ = false;  ///< the encoders have lost counts since the device was homed
-  std::optional<falcon::Pose> pose_{};         ///< last known pose; belongs to newest_ if located_
-  bool located_ = false;                       ///< newest_ has a pose
-  falcon::Counts held_{};                      ///< the last torques sent
-  std::uint8_t ready_lamps_ = falcon::kGreen;  ///< lamps while the device may render forces
+  bool fresh_ = false;                     ///< located in this `read`
+  int homed_replies_ = 0;                  ///< consecutive replies, < 0 if not homed
+  bool moved_origin_ = false;              ///< encoders have lost counts
+  std::optional<falcon::Pose> pose_{};     ///< last known pose
+  bool located_ = false;                   ///< whether newest_ has a pose
+  falcon::Counts held_{};                  ///< last torques sent
+  std::uint8_t ready_lamps_ = falcon::kGreen;
 };
 
 namespace falcon {
 
-/// Configuration of a Falcon in a scene.
+/// A Falcon in a scene.
 struct Config {
-  std::string port{};                               ///< name in `tendond devices`; empty: the first free one
-  std::optional<std::filesystem::path> firmware{};  ///< empty: the device already has firmware
+  std::string port{};                               ///< from `tendond devices`; optional
+  std::optional<std::filesystem::path> firmware{};  ///< empty if already loaded
   bool accept_unknown_firmware = false;
 };
 
-// The overloads of driver.h. `make` throws the exceptions of `read_firmware`.
+// See driver.h. `make` can throw the exceptions of `read_firmware`.
 const Driver& driver(const Config& config);
 SimulatedDevice::Config stand_in(const Config& config);
 std::unique_ptr<Device> make(const Config& config, FromOutside outside);

@@ -22,7 +22,7 @@ struct KnownFile {
   std::string_view sha256;
 };
 
-/// Files of a libnifalcon checkout.
+/// From a checkout of libnifalcon.
 constexpr std::array kKnownFiles = {
     KnownFile{"nvent_firmware.bin", "1119e39c39fab1f37678ea62dfc715b23dd86ee7f13d78f88f707d9f09b896a1"},
     KnownFile{"test_firmware.bin", "b2700d5cd5ca217e48565fb4de5a502a636c53f6e01ebd0cad193e9f84856c6a"},
@@ -37,8 +37,7 @@ std::string sha256_of(std::span<const std::uint8_t> bytes) {
   return text;
 }
 
-/// DTR is connected to the reset of the processor. With a shorter latency "firmware checks tend to always fail"
-/// (libnifalcon).
+/// DTR resets the processor. With a shorter latency "firmware checks tend to always fail" (libnifalcon).
 constexpr std::array kResetToLoader = {kPurgeOne,      kPurgeOther, latency(16), divisor(0x4138), k8N1,
                                        kNoFlowControl, kRtsLow,     kDtrLow,     kDtrHigh};
 constexpr std::array<std::uint8_t, 3> kGreeting = {0x0A, 0x43, 0x0D};
@@ -49,10 +48,10 @@ constexpr int kMostGreetings = 100;
 constexpr std::array kFaster = {kDtrLow, divisor(0x15)};
 constexpr std::array<std::uint8_t, 1> kAutobaudLetter = {'A'};
 
-/// Size of an IN packet without the status bytes, so that the echo of one chunk arrives in one packet without delay.
+/// The echo of this many bytes fits into one IN packet with its status bytes.
 constexpr std::size_t kChunkBytes = usb::kPacketSize - kStatusBytes;
 
-/// The slowest answer takes 20 ms: four bytes at 9600 baud and the latency timer.
+/// Four bytes at 9600 baud, plus the latency timer, take 20 ms.
 constexpr Duration kPatience = std::chrono::milliseconds(100);
 
 }  // namespace

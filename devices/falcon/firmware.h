@@ -14,26 +14,25 @@
 #include "devices/usb/ftdi.h"
 #include "devices/usb/pipe.h"
 
-/// The Falcon loses its firmware when it loses power, and the host must load it again. Novint's license does not permit
-/// redistribution, so Tendon contains no firmware: the user names a file that came with the device.
+/// The firmware of the Falcon must be loaded by the host whenever the device was switched on. It is not part of Tendon,
+/// because Novint's license does not allow redistribution; it must be loaded from a file that came with the device.
 namespace tendon::falcon {
 
-/// Whether to accept a file that looks like firmware but is not one of the known files.
+/// For files that look like firmware but are not known.
 enum class UnknownFirmware : std::uint8_t { kRefuse, kAccept };
 
-/// Returns `bytes` if they are valid firmware: 4 to 64 KiB that begin with AA 08, the key of TI's boot loader, with the
-/// SHA-256 of one of the files that users of libnifalcon have loaded (firmware.cc contains the hashes). kAccept skips
-/// the comparison of the SHA-256. Otherwise throws std::runtime_error with a sentence that begins with `name` and
-/// states what was found and expected.
+/// Returns `bytes` if they contain 4 to 64 KiB, starting with AA 08, the key of TI's boot loader, and have the SHA-256
+/// of a file that has been used with libnifalcon (see firmware.cc). kAccept does not check the SHA-256. Throws
+/// std::runtime_error with a sentence starting with `name` otherwise.
 std::vector<std::uint8_t> check_firmware(std::vector<std::uint8_t> bytes, const std::string& name,
                                          UnknownFirmware unknown);
 
-/// Does the same for a file. Reads at most one byte more than the maximum size of firmware.
+/// Reads a file of limited size, and checks it.
 std::vector<std::uint8_t> read_firmware(std::istream& file, const std::string& name, UnknownFirmware unknown);
 
-/// Loads the firmware into a Falcon without blocking. A reset starts the boot loader of the device's processor, which
-/// echoes every byte; each echo is compared with the bytes sent. Loading 8 KiB takes about 2 s. Source: libnifalcon,
-/// FalconCommLibUSB.cpp (setFirmwareMode) and FalconFirmware.cpp.
+/// Loads the firmware without blocking. After a reset, the boot loader of the processor echoes every byte, and the
+/// loader compares these echoes. 8 KiB take about 2 s. Source: libnifalcon, FalconCommLibUSB.cpp (setFirmwareMode) and
+/// FalconFirmware.cpp.
 ///
 ///     reset ─▶ greet (9600 baud; again until answered, at most 100 times) ─▶ "A" (142 857 baud) ─▶ 62 bytes at a time
 ///
@@ -45,13 +44,13 @@ class FirmwareLoader {
   /// `image` must outlive the loader.
   explicit FirmwareLoader(std::span<const std::uint8_t> image) noexcept : image_(image) {}
 
-  /// Starts again with the reset. Must be called before the first `step`.
+  /// Must be called before the first `step`. Starts with the reset.
   void restart() noexcept;
 
-  /// Adds serial data from the device, without the status bytes of the chip.
+  /// `bytes` must not include the status bytes of the serial chip.
   void receive(std::span<const std::uint8_t> bytes) noexcept;
 
-  /// Sends the next bytes if they are due. After kDone, the serial chip still has the settings of the loader.
+  /// Sends more bytes if possible. After kDone, the serial chip still uses the loader's settings.
   Progress step(LocalTime now, usb::Pipe& pipe) noexcept;
 
  private:
@@ -65,13 +64,13 @@ class FirmwareLoader {
   std::span<const std::uint8_t> image_;
   Stage stage_ = Stage::kFailed;
   usb::ftdi::Setup setup_{{}};
-  std::size_t sent_ = 0;  ///< bytes of the image that were sent and correctly echoed
+  std::size_t sent_ = 0;  ///< bytes that were echoed correctly
   int greetings_ = 0;
-  bool said_ = false;  ///< something was sent at since_ and awaits its answer
+  bool said_ = false;  ///< waiting for an answer since since_
   LocalTime since_{};
   std::array<std::uint8_t, usb::kPacketSize> heard_{};
   std::size_t heard_size_ = 0;
-  bool too_much_ = false;  ///< more bytes arrived than any answer has
+  bool too_much_ = false;  ///< unexpected bytes were received
 };
 
 }  // namespace tendon::falcon

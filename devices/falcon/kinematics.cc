@@ -25,10 +25,10 @@ constexpr double kDegree = std::numbers::pi / 180;
 constexpr double kAtZero = 35 * kDegree;
 constexpr double kPerCount = 2 * std::numbers::pi * (14.25 / 110.0) / 1280;
 
-/// N·m at the joint per count. The sign is that of the firmware.
+/// N·m at the joint, with the sign used by the firmware.
 constexpr double kTorquePerCount = -1e-4;
 
-/// The rows are the unit vectors along U, V, W in the device frame.
+/// Rows: unit vectors along U, V, W in the device frame.
 Mat3 frame_of_leg(double azimuth) {
   Mat3 frame;
   frame << std::cos(azimuth), std::sin(azimuth), 0,  //
@@ -40,11 +40,10 @@ Mat3 frame_of_leg(double azimuth) {
 const std::array<Mat3, 3> kLegs = {frame_of_leg((90 + 15) * kDegree), frame_of_leg((-30 + 15) * kDegree),
                                    frame_of_leg((-150 + 15) * kDegree)};
 
-// Newton's method.
 constexpr int kMostSteps = 25;
 constexpr int kMostHalvings = 12;
-constexpr double kLongestStep = 0.015;  // m, a quarter of a thigh; the linear model is poor for longer steps
-constexpr double kClose = 1e-12;        // m: stop after a step this short
+constexpr double kLongestStep = 0.015;  // m; the linear model is poor for longer steps
+constexpr double kClose = 1e-12;        // m; the last step
 
 }  // namespace
 
@@ -65,7 +64,7 @@ std::optional<Pose> pose_at(const Vec3& position) noexcept {
     const double square = u * u + w * w;
     const double bend = (square + kThigh * kThigh - reach * reach) / (2 * kThigh * std::sqrt(square));
     const double theta1 = std::atan2(w, u) - std::acos(bend);
-    // Cosine and sine of the direction from the knee to the grip, at distance `reach`.
+    // The direction from the knee to the grip, at the distance `reach`.
     const double cos2 = (u - kThigh * std::cos(theta1)) / reach;
     const double sin2 = (w - kThigh * std::sin(theta1)) / reach;
     const double lever = kThigh * sin3 * (sin2 * std::cos(theta1) - cos2 * std::sin(theta1));

@@ -7,7 +7,7 @@ namespace tendon::falcon {
 namespace {
 
 constexpr std::uint8_t kZero = 0x41;
-constexpr std::size_t kNibbles = 4;  ///< per count
+constexpr std::size_t kNibbles = 4;
 
 }  // namespace
 
@@ -33,7 +33,7 @@ std::optional<Reply> decode(std::span<const std::uint8_t, kPacketBytes> bytes) n
   for (std::size_t leg = 0; leg < reply.encoders.size(); ++leg) {
     unsigned count = 0;
     for (std::size_t i = 0; i < kNibbles; ++i) {
-      // wraps to a huge number for a byte below kZero
+      // Bytes below kZero become very large.
       const unsigned nibble = bytes[1 + kNibbles * leg + i] - unsigned{kZero};
       if (nibble > 15) return std::nullopt;
       count |= nibble << (4 * i);
@@ -65,7 +65,7 @@ std::optional<Reply> ReplyParser::next() noexcept {
   std::optional<Reply> reply;
   for (; begin < size_ && !reply; ++begin) {
     if (bytes_[begin] != kPacketBegin) continue;
-    if (size_ - begin < kPacketBytes) break;  // the rest may still arrive
+    if (size_ - begin < kPacketBytes) break;
     reply = decode(std::span(bytes_).subspan(begin).first<kPacketBytes>());
     if (reply) break;
   }

@@ -10,7 +10,7 @@
 namespace tendon {
 namespace {
 
-constexpr double kLongest_s = 1e9;  // 30 years; the sum of two fits into a Duration
+constexpr double kLongest_s = 1e9;  // 30 years; twice this can still be represented
 
 }  // namespace
 
@@ -18,7 +18,7 @@ ReplayDevice::ReplayDevice(Config config) : config_(std::move(config)) {
   const auto& samples = config_.samples;
   expect(samples.size() >= 2, "replay.samples (their number)", static_cast<double>(samples.size()), "2 or more");
   const auto later = [&samples](std::size_t i) {
-    // Unsigned, because the difference of any two then does not overflow.
+    // Unsigned, to avoid overflow.
     return static_cast<std::uint64_t>(samples[i].at.count()) - static_cast<std::uint64_t>(samples.front().at.count());
   };
   for (std::size_t i = 0; i < samples.size(); ++i) {

@@ -13,37 +13,36 @@
 
 namespace tendon {
 
-/// Plays back a recorded motion as a device. It returns the recorded positions bit for bit, with their time stamps. It
-/// renders no force: `apply` always returns zero. Engines and the whole loop can thus run on the same motion
-/// repeatedly.
+/// Plays a recorded motion with its original positions and time stamps. There is no force: `apply` always returns zero.
+/// This can be used to run engines, and the whole loop, with the same motion repeatedly.
 ///
-/// The first `read` is the time of the first sample; sample i is due tᵢ − t₀ later, and `at` is that time. There is no
-/// interpolation: `read` returns one sample, or nullopt if none has become due since the last `read`. A due sample
-/// waits for one `read` but not for a second. A loop as fast as the recording therefore misses no sample despite
-/// jitter, and a slower loop gets the newest sample that was due one `read` ago. Sample times always increase.
+/// The first `read` returns the first sample. Sample i is due tᵢ − t₀ later and uses this time. There is no
+/// interpolation: `read` returns a sample, or nullopt if a new sample is not due. A sample waits for a single `read`. A
+/// loop as fast as the recording therefore returns all samples, even with jitter, and a slower loop returns the newest
+/// sample that was due in the previous `read`. The times always increase.
 ///
 /// Thread-safe: no. Realtime-safe: `read` and `apply`.
 class ReplayDevice final : public Device {
  public:
   struct Sample {
-    Duration at{};  ///< relative to any time; only differences matter
+    Duration at{};  ///< only differences matter
     Vec3 position = Vec3::Zero();
   };
-  /// kHold: the hand stays at the last sample; later calls of `read` return it with their own time. kRepeat: the first
-  /// sample follows one mean interval after the last; the position jumps if the ends differ.
+  /// kHold: continues with the last position. kRepeat: starts again, one mean interval after the last sample; the
+  /// position jumps if the ends differ.
   using AtEnd = ScriptedMotion::Recorded::AtEnd;
 
   struct Config {
-    std::vector<Sample> samples{};  ///< 2 or more, strictly increasing in time, 10⁹ s at most
+    std::vector<Sample> samples{};  ///< 2 or more, strictly increasing, 10⁹ s at most
     AtEnd at_end = AtEnd::kHold;
-    double position_resolution = 0;  ///< m, one encoder count of the recorded device; 0 = exact
+    double position_resolution = 0;  ///< m; 0 = exact
   };
 
-  /// Throws std::invalid_argument, naming the field, its value and the expected range.
+  /// Throws std::invalid_argument with the field, its value and the expected range.
   explicit ReplayDevice(Config config);
 
-  /// Returns the samples of a motion along a line from a CSV file (`load_recorded_motion`): origin + x · direction /
-  /// ‖direction‖. Throws std::invalid_argument if the direction is zero or the motion is longer than 10⁹ s.
+  /// For motions along a line (`load_recorded_motion`): origin + x · direction / ‖direction‖. Throws
+  /// std::invalid_argument if the direction is zero or the motion is longer than 10⁹ s.
   static std::vector<Sample> samples_of(const ScriptedMotion::Recorded& motion);
 
   const DeviceInfo& info() const noexcept override { return info_; }
@@ -56,14 +55,14 @@ class ReplayDevice final : public Device {
 
   Config config_;
   DeviceInfo info_;
-  Duration round_;  ///< from the first sample to its next repetition
+  Duration round_;  ///< period of repetition
   std::optional<LocalTime> start_{};
-  // Sample numbers continue to increase from one repetition to the next.
-  std::uint64_t next_ = 0;        ///< the first sample that was neither returned nor skipped
-  std::uint64_t due_before_ = 0;  ///< number of samples that were due at the last read
+  // Numbers continue to increase when the samples are repeated.
+  std::uint64_t next_ = 0;        ///< not yet returned or skipped
+  std::uint64_t due_before_ = 0;  ///< due at the last `read`
 };
 
-// The overloads of driver.h.
+// See driver.h.
 const Driver& driver(const ReplayDevice::Config& config);
 SimulatedDevice::Config stand_in(const ReplayDevice::Config& config);
 std::unique_ptr<Device> make(const ReplayDevice::Config& config, FromOutside outside);

@@ -11,12 +11,12 @@ namespace tendon {
 
 namespace {
 
-/// × 0.999 each ms as a time constant.
+/// Same as × 0.999 each ms.
 constexpr double kBoundTime_s = 1.0;
 constexpr double kWarm = 0.7;
 constexpr double kCool = 0.5;
 
-/// Returns the factor that reduces `size` to `max`, or 0 if `size` is NaN.
+/// Returns the factor for reducing `size` to `max`, or 0 for NaN.
 double up_to(double max, double size) noexcept {
   if (size <= max) return 1;
   return size > max && max > 0 ? max / size : 0;
@@ -62,7 +62,7 @@ HeatLimit::HeatLimit(const Config& config) : config_(config), bound_(config.peak
 void HeatLimit::observe(double held, Duration elapsed) noexcept {
   const double t = std::max(0.0, seconds(elapsed));
   const double load = held / config_.continuous;
-  // Exact for a constant force over an interval of any length.
+  // Exact for a constant force, even over a long interval.
   heat_ += (load * load - heat_) * -std::expm1(-t / seconds(config_.time_constant));
   const double moved = -std::expm1(-t / kBoundTime_s);
   if (heat_ >= 1) {

@@ -7,24 +7,22 @@
 
 namespace tendon {
 
-// The parts of the safety layer that reduce a force. Each returns a factor s, 0 ≤ s ≤ 1, for all components of the
-// force. No part can therefore lengthen or rotate a force or increase a component, and the force stays within all
-// bounds that it satisfied before, such as those of the energy limiter on the norm or on each axis. SafeDevice uses the
-// parts that its Config lists.
+// The parts of the safety layer that reduce a force. Each part returns a factor s, 0 ≤ s ≤ 1, for all components, so it
+// cannot increase, rotate or lengthen a force. The force also stays within the bounds of the energy limiter, both on
+// the norm and on each axis. Torques have a separate limit and growth limit in N·m, and a grip force is used as a
+// vector with one component.
 //
-// A torque has its own limit and growth limit, in N·m. A grip force is treated as a vector with one component.
-//
-// Thread-safe: no. Realtime-safe: all except the constructors, which throw std::invalid_argument, naming the field.
+// Thread-safe: no. Realtime-safe: all except the constructors, which throw std::invalid_argument naming the field.
 
-/// Limits the norm of the force to `max`: s = max / ‖F‖. Clipping each component would rotate the force; integer
-/// wrap-around would reverse it (Novint Falcon with libnifalcon: 30 N·m requested, 16 bits sent). Source:
-/// HD_EXCEEDED_MAX_FORCE of OpenHaptics.
+/// Limits the norm of a force: s = max / ‖F‖. Clipping each component would rotate the force, and integer overflow
+/// would reverse it (Novint Falcon with libnifalcon: 30 N·m requested, 16 bits sent). Source: HD_EXCEEDED_MAX_FORCE of
+/// OpenHaptics.
 class ForceLimit {
  public:
   struct Config {
-    double max = 0;  ///< N, or N·m for a torque; > 0
+    double max = 0;  ///< N, or N·m; > 0
   };
-  /// `field` is the name in error messages.
+  /// `field` is used in error messages.
   explicit ForceLimit(const Config& config, const char* field = "force_limit");
   double share(const Vec3& asked) const noexcept;
   double max() const noexcept { return config_.max; }
@@ -33,28 +31,28 @@ class ForceLimit {
   Config config_;
 };
 
-/// Limits the rate at which a force grows along its own direction:
+/// Limits how fast a force grows in its own direction:
 ///
 ///     ‖s F‖ ≤ (F_before · F/‖F‖)₊ + rate · T
 ///
-/// A force may fall immediately, and a force that reverses starts at zero. A limit on every change would keep up a
-/// force that is no longer requested, which a safety layer must not do. Source: HD_EXCEEDED_MAX_FORCE_IMPULSE (0x0202)
-/// of OpenHaptics.
+/// Forces may decrease at once, and reversed forces start at zero. Limiting every change would extend a force that is
+/// no longer requested, which must not be done by a safety layer. Source: HD_EXCEEDED_MAX_FORCE_IMPULSE (0x0202) of
+/// OpenHaptics.
 class GrowthLimit {
  public:
   struct Config {
-    double rate = 0;  ///< N/s, or N·m/s for a torque; > 0
+    double rate = 0;  ///< N/s, or N·m/s; > 0
   };
-  /// `field` is the name in error messages.
+  /// `field` is used in error messages.
   explicit GrowthLimit(const Config& config, const char* field = "growth_limit");
-  /// `before` is the force that was actually held during the last `elapsed`.
+  /// `before` was actually rendered during the last `elapsed`.
   double share(const Vec3& asked, const Vec3& before, Duration elapsed) const noexcept;
 
  private:
   Config config_;
 };
 
-/// Ramps the force up from zero within `time` after arming: s = t / time. Source: HD_FORCE_RAMPING_RATE of OpenHaptics.
+/// A ramp from zero after arming: s = t / time. Source: HD_FORCE_RAMPING_RATE of OpenHaptics.
 class RampIn {
  public:
   struct Config {
@@ -67,7 +65,7 @@ class RampIn {
   Config config_;
 };
 
-/// Ramps the force down to zero: s = 1 − (t − since) / time. Used when a watchdog trips.
+/// A ramp to zero, used for watchdogs: s = 1 − (t − since) / time.
 struct RampOut {
   LocalTime since{};
   Duration time{};

@@ -33,7 +33,7 @@ namespace {
 constexpr int kTries = 5;
 constexpr unsigned kTryTime_ms = 10;
 
-/// A message of the server to its guardian. It carries a descriptor unless the device is to be unregistered.
+/// Sent by the server with a descriptor, or without one to unregister a device.
 struct Order {
   std::size_t device;
   ZeroPacket zero;
@@ -58,20 +58,18 @@ bool send_order(int socket, const Order& order, int fd) noexcept {
   return sendmsg(socket, &message, MSG_NOSIGNAL) == static_cast<ssize_t>(sizeof(order));
 }
 
-/// Period at which the guardian reads the heartbeats.
 constexpr Duration kLook = std::chrono::milliseconds(2);
 constexpr std::uint64_t kStillLooks = Heartbeat::kStill / kLook;
 
-/// A device from the guardian's point of view.
 struct Charge {
   int fd = -1;
   std::optional<ZeroPacket> zero;
   Heartbeat::Beat beat{};
-  std::uint64_t looks = 0;  ///< number of reads since `beat` changed
+  std::uint64_t looks = 0;  ///< since `beat` has changed
 };
 
-/// Handles the next order. Waits for it unless `flags` contains MSG_DONTWAIT. Returns false if there is none, which
-/// without that flag means that the server has exited.
+/// Waits for the next order, unless `flags` contains MSG_DONTWAIT. Returns false if there are no more orders because
+/// the server has exited.
 bool take_order(int socket, std::array<Charge, Guardian::kDevices>& charges, int flags = 0) noexcept {
   alignas(Order) std::array<std::byte, sizeof(Order)> bytes{};
   iovec part{.iov_base = bytes.data(), .iov_len = bytes.size()};
@@ -104,7 +102,7 @@ void end_forces(const std::array<Charge, Guardian::kDevices>& charges) noexcept 
   }
 }
 
-/// Sends the zero packet to each device whose heartbeat has stopped. `looks` is the number of timer ticks since the
+/// Sends the zero packet to all devices whose heartbeat has stopped. `looks` is the number of timer ticks since the
 /// last call.
 void watch_hearts(const Heartbeat* hearts, std::array<Charge, Guardian::kDevices>& charges,
                   std::uint64_t looks) noexcept {
@@ -129,8 +127,7 @@ void set_timer(int timer, const std::array<Charge, Guardian::kDevices>& charges)
   timerfd_settime(timer, 0, &times, nullptr);
 }
 
-/// Blocks all signals of the calling thread during its lifetime. Threads and processes that are started in that time
-/// inherit the mask and keep it.
+/// Blocks all signals of the calling thread, and of all threads and processes that it creates in the meantime.
 class NoSignals {
  public:
   NoSignals() noexcept {
@@ -146,17 +143,17 @@ class NoSignals {
   sigset_t before_;
 };
 
-/// The kernel sends this signal to the guardian when its parent thread dies.
+/// Sent by the kernel if the parent thread dies.
 constexpr int kParentDied = SIGUSR1;
-/// The guardian sends this byte when it is certain to receive that signal.
+/// Sent when the guardian is sure to receive that signal.
 constexpr char kStandsGuard = 'g';
 
-// The caller must have blocked all signals.
+// All signals must be blocked.
 [[noreturn]] void stand_guard(int socket, const Heartbeat* hearts) noexcept {
   setsid();
   prctl(PR_SET_PDEATHSIG, kParentDied);
   prctl(PR_SET_NAME, "tendon-guardian", 0UL, 0UL, 0UL);
-  // A reader of the server's output must see it end with the server, and no other file of the server may stay open.
+  // Readers of the server's output must not have to wait for the guardian, and it must not keep other files open.
   if (const int null = open("/dev/null", O_RDWR | O_CLOEXEC); null >= 0) {
     for (const int standard : {0, 1, 2}) dup2(null, standard);
   }
@@ -177,8 +174,8 @@ constexpr char kStandsGuard = 'g';
     if (signalfd_siginfo info{}; told[1].revents != 0 && read(parent.fd, &info, sizeof info) > 0) {
       while (take_order(socket, charges, MSG_DONTWAIT)) {
       }
-      // Only the parent is known to be dead. Other threads may be dying in the middle of a last command. The packets
-      // are therefore written again at the end, when no thread is left.
+      // Other threads may still be running and may send a last command. The packets are therefore sent again when all
+      // threads are dead.
       end_forces(charges);
     } else if (told[0].revents != 0) {
       server_lives = take_order(socket, charges);
@@ -215,7 +212,7 @@ bool ZeroPacket::send_once(int fd) const noexcept {
 bool ZeroPacket::send(int fd) const noexcept {
   for (int i = 0; i < kTries; ++i) {
     if (send_once(fd)) return true;
-    if (errno == ENODEV || errno == EBADF || errno == EPIPE) return false;  // the device is disconnected
+    if (errno == ENODEV || errno == EBADF || errno == EPIPE) return false;  // the device was unplugged
     if (errno != ETIMEDOUT) usleep(kTryTime_ms * 1000);
   }
   return false;
@@ -244,7 +241,7 @@ Guardian::Guardian(const std::function<void()>& on_start) {
     }
     const int error = errno;
     close(ends[1]);
-    // from here on, the variables of the constructor may no longer exist
+    // the constructor's variables may be destroyed after this
     forked.set_value(guardian > 0 ? guardian : -error);
     while (guardian > 0) {
       int status = 0;

@@ -9,13 +9,12 @@
 
 namespace tendon {
 
-/// Tells the guardian that the haptic thread has stepped a device, and whether the device holds a force. It lies in
-/// memory that both processes share (Guardian::heartbeat).
-///
+/// Indicates that the haptic thread is running, and whether the device renders a force. Used in shared memory
+/// (Guardian::heartbeat).
 /// Realtime-safe: yes. One thread calls `beat`; `last` may be called from any thread or process.
 class Heartbeat {
  public:
-  /// If there is no step for this long, the guardian ends the force, and the device must be armed again (SafeDevice).
+  /// After this time without a step, the guardian ends the force and the device must be armed again (SafeDevice).
   static constexpr Duration kStill = std::chrono::milliseconds(20);
 
   void beat(bool holds_force) noexcept {

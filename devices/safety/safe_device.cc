@@ -14,12 +14,11 @@ namespace tendon {
 
 namespace {
 
-/// A handle counts as being at rest after this long without motion. It is longer than the pause at a turning point of a
-/// tremor (8 to 12 Hz).
+/// The handle must not move for this long. At a turning point of a tremor (8 to 12 Hz), the pause is shorter.
 constexpr Duration kRest = std::chrono::milliseconds(50);
-/// Gaps of up to 10 ms between samples do not reset the rest timer, because USB replies jitter.
+/// Shorter gaps between samples are allowed, because USB replies jitter.
 constexpr Duration kBlind = std::chrono::milliseconds(10);
-/// After a pause, the force may grow by one step of at most this length and not by the whole pause.
+/// Limits the growth of the force after a pause.
 constexpr Duration kLongestStep = std::chrono::milliseconds(10);
 
 template <class Part, class Config, class... More>
@@ -31,13 +30,13 @@ std::optional<Part> made(const std::optional<Config>& config, More... more) {
 DeviceInfo limited_info(DeviceInfo info, const std::optional<ForceLimit>& force,
                         const std::optional<ForceLimit>& torque, const std::optional<ForceLimit>& grip) {
   if (force) info.max_force = info.max_force > 0 ? std::min(info.max_force, force->max()) : force->max();
-  // 0 = no motor, which a limit does not change.
+  // 0 means that there is no motor.
   if (torque) info.max_torque = std::min(info.max_torque, torque->max());
   if (grip && info.gripper) info.gripper->max_force = std::min(info.gripper->max_force, grip->max());
   return info;
 }
 
-/// The grip as a vector, for parts that operate on forces.
+/// For parts that use vectors.
 Vec3 along(double grip) noexcept { return {grip, 0, 0}; }
 
 }  // namespace
@@ -134,7 +133,7 @@ void SafeDevice::disarm() noexcept {
   publish();
 }
 
-/// Leaves Armed without a fault. A fault that is still ramping the force down remains a fault.
+/// Leaves Armed without a fault. If a fault is still ramping the force down, it remains a fault.
 void SafeDevice::leave_armed() noexcept {
   if (stage_ != Stage::kArmed) return;
   stage_ = stopping_ ? Stage::kFault : Stage::kWaiting;
@@ -153,7 +152,6 @@ std::optional<PositionSample> SafeDevice::read(LocalTime now) noexcept {
   return sample;
 }
 
-/// Returns false if a value of the sample is not meaningful.
 bool SafeDevice::is_sound(const PositionSample& sample) noexcept {
   if (!sample.position.allFinite() || (sample.opening && !std::isfinite(*sample.opening))) {
     trip(SafetyFault::kPositionNotFinite);
@@ -178,7 +176,7 @@ bool SafeDevice::accept(const PositionSample& sample) noexcept {
   if (step_bound_ && last_ && step_bound_->tripped(last_->position, sample.position, sample.at - last_->at)) {
     trip(SafetyFault::kPositionJumped);
     forget_motion();
-    last_ = sample;  // the new reference for the next sample
+    last_ = sample;
     return false;
   }
   last_ = sample;

@@ -13,84 +13,83 @@
 
 namespace tendon {
 
-/// The state of a device between connection and force output. Forces are rendered only in `kArmed`.
+/// Forces are only rendered in `kArmed`.
 enum class SafetyState : std::uint8_t {
-  kAbsent,  ///< kAbsent to kHomed are the Device::State of the wrapped device
+  kAbsent,  ///< to kHomed: Device::State of the wrapped device
   kOpening,
   kFirmware,
   kUnhomed,
-  kHomed,  ///< ready and waiting to be armed
+  kHomed,
   kArmed,
-  kFault,  ///< after a SafetyFault: no force until it is armed again
+  kFault,  ///< must be armed again
 };
 std::string_view to_string(SafetyState state) noexcept;
 
-/// Why an armed device no longer renders forces.
+/// Why a device was disarmed.
 enum class SafetyFault : std::uint8_t {
   kNone,
-  kForceNotFinite,     ///< a requested force, torque or grip is NaN or infinite
-  kPositionNotFinite,  ///< a measured position or opening is NaN or infinite
+  kForceNotFinite,     ///< requested NaN or infinity
+  kPositionNotFinite,  ///< measured NaN or infinity
   kPositionJumped,     ///< StepBound
   kTooFast,            ///< SpeedTrip
-  kCommandSilent,      ///< `apply` was not called in time (Watchdog)
-  kDeviceSilent,       ///< the device gave no position in time (Watchdog)
-  kDeviceLost,         ///< it is no longer homed: disconnected, or lost its origin
-  kNoRotation,         ///< a measured orientation is not a rotation
+  kCommandSilent,      ///< `apply` was late (Watchdog)
+  kDeviceSilent,       ///< positions were late (Watchdog)
+  kDeviceLost,         ///< no longer homed, or unplugged
+  kNoRotation,         ///< measured an invalid orientation
   kTurnsTooFast,       ///< TurnTrip
-  kGuardianLost,       ///< the guardian is dead or stopped (Guardian::stands)
+  kGuardianLost,       ///< see Guardian::stands
 };
-/// Returns a message for people, such as "the handle was faster than a hand".
+/// A sentence for people: "the handle was faster than a hand".
 std::string_view to_string(SafetyFault fault) noexcept;
 
-/// The safety layer: a decorator for any other device, between the control law and the motors.
+/// The safety layer, which can be used with any device, between the control law and the motors.
 ///
 ///     F ← 0                              unless armed; F with a NaN or infinity is a fault
 ///     F ← s F, 0 ≤ s ≤ 1                 for each listed part: size, heat, workspace, ramp-in, the ramp to zero of a
 ///                                        watchdog that has tripped, and growth
 ///
-/// Therefore |F_i applied| ≤ |F_i requested| for each component i, provided that the wrapped device writes no more than
-/// it is told. `apply` returns the force that the device wrote, which the energy ledger counts. A part that the scene
-/// does not list costs one branch. The state machine is always active:
+/// So |F_i applied| ≤ |F_i requested| for each component i, if the wrapped device does not write more than requested.
+/// `apply` returns the force that was actually written, which is counted by the energy ledger. Unused parts only cost a
+/// branch. The state machine is always used:
 ///
 ///     Absent → Opening → Firmware → Unhomed → Homed ⇄ Armed → Fault → Armed
 ///
-/// **Torque and grip** (`apply_all`) are treated in the same way. Force and torque have a common factor, the smallest
-/// that any part requires for either, so that a wrench keeps its direction. Workspace and heat consider only the force,
-/// and their factors also apply to the torque. The grip has its own limit and growth limit, the same ramps, and ends
-/// under the same conditions. `apply` renders no torque and no grip.
+/// **Torque and grip** (`apply_all`) are limited in the same way. Force and torque are reduced by a common factor, the
+/// smallest one for either of them, to keep the direction of the wrench. Workspace and heat are computed from the force
+/// only. The grip has a separate limit and growth limit, but the same ramps and conditions. `apply` does not render
+/// torque or grip.
 ///
-/// **Arming** requires a request (Arming::By). It is granted by the first `apply` at which all of these conditions
-/// hold: the device is homed; for 50 ms the handle has not moved further than `rest_speed` allows, with no gap of more
-/// than 10 ms between two positions; the requested force and grip are at most `rest_force` and the torque at most
-/// `rest_torque`; and the dead man's button, if the scene lists one, is held. A handle that only rotates counts as
-/// being at rest. A request that is not granted within `patience` expires. A request before the first `read` is
-/// ignored.
+/// **Arming** must be requested (Arming::By). The request is granted in the first `apply` for which the device is
+/// homed, the handle has not moved faster than `rest_speed` for 50 ms, using positions at most 10 ms apart, the
+/// requested force and grip are at most `rest_force`, the requested torque is at most `rest_torque`, and the dead man's
+/// button, if listed, is held. Rotating the handle is allowed. Requests expire after `patience`, and are ignored before
+/// the first `read`.
 ///
-/// **Faults** are latched in Armed only. Otherwise there is no force to end, and the condition prevents arming. The
-/// force is zero from the next `apply` on. A watchdog with a ramp takes the force to zero over that time, and the state
-/// stays Armed until the force is zero. Releasing the dead man's button is not a fault: Armed → Homed, and the force is
-/// zero immediately.
+/// **Faults** are only latched while armed; otherwise, they just prevent arming. The force is zero in the next `apply`.
+/// For watchdogs with a ramp, the device stays armed until the force has decreased to zero. Releasing the dead man's
+/// button is not a fault: the device returns to Homed, without a force.
 ///
-/// **Disarming** is a command of the operator and not a fault: Armed → Homed, and the force is zero immediately. It
-/// withdraws a request to arm that was not granted yet. Only `arm` ends it: until then, neither startup (`kStart`) nor
-/// the dead man's button arms the device, and the button must be pressed again after `arm`. A fault stays a fault. If a
-/// watchdog is ramping the force down, it becomes a fault immediately.
+/// **Disarming** by the operator is not a fault either: the device returns to Homed, without a force, and a pending
+/// request is cancelled. It cannot be armed by `kStart` or the dead man's button until `arm` is called; the button must
+/// be pressed again after that. A fault remains a fault. If a watchdog is ramping the force down, it becomes a fault
+/// immediately.
 ///
-/// If the process hangs or dies, the guardian (guardian.h) or the watchdog of the device ends the force. A guardian
-/// adds two faults. If `apply` is not called for Heartbeat::kStill, the guardian ends the force and the next `read`
-/// sets kCommandSilent. If the guardian is killed or stopped, `read` sets kGuardianLost and the device cannot be armed.
+/// If the process hangs or dies, the force is ended by the guardian (guardian.h) or by the watchdog of the device.
+/// Using a guardian adds two faults: kCommandSilent, if `apply` is not called for Heartbeat::kStill, and kGuardianLost,
+/// if the guardian is killed or stopped. Both are set by the next `read`. If its guardian is
+/// not running, the device cannot be armed.
 ///
-/// `read` returns nullopt for a sample whose position or opening is not finite, whose orientation is not a rotation, or
-/// whose position jumped (StepBound).
+/// `read` returns nullopt if the position or the opening is not finite, the orientation is not a rotation, or the
+/// position has jumped (StepBound).
 ///
-/// Thread-safe: no, except `status`, which may be called from any thread. Realtime-safe: all except the constructor.
+/// Thread-safe: no, except `status`. Realtime-safe: all except the constructor.
 class SafeDevice final : public Device {
  public:
   struct Arming {
     enum class By : std::uint8_t {
-      kRequest,  ///< by `arm` only
-      kStart,    ///< automatically the first time, then by `arm`
-      kDeadMan,  ///< only by pressing the dead man's button; `arm` only revokes a `disarm`
+      kRequest,
+      kStart,    ///< initially at the start, then by `arm`
+      kDeadMan,  ///< by pressing the dead man's button; `arm` only cancels `disarm`
     };
     By by = By::kRequest;
     double rest_speed = 0.02;   ///< m/s, > 0
@@ -108,10 +107,10 @@ class SafeDevice final : public Device {
     std::optional<RampIn::Config> ramp_in;
     std::optional<SpeedTrip::Config> speed_trip;
     std::optional<StepBound::Config> step_bound;
-    std::optional<Watchdog::Config> command_watchdog;  ///< limits the time between two calls of `apply`
-    std::optional<Watchdog::Config> link_watchdog;     ///< limits the age of the newest position
+    std::optional<Watchdog::Config> command_watchdog;  ///< for calls of `apply`
+    std::optional<Watchdog::Config> link_watchdog;     ///< for positions
     std::optional<DeadManSwitch::Config> dead_man;
-    const std::atomic<bool>* guardian = nullptr;             ///< Guardian::stands; null without a guardian
+    const std::atomic<bool>* guardian = nullptr;             ///< Guardian::stands, or null
     std::optional<ForceLimit::Config> torque_limit;          ///< N·m
     std::optional<GrowthLimit::Config> torque_growth_limit;  ///< N·m/s
     std::optional<TurnTrip::Config> turn_trip;
@@ -121,11 +120,11 @@ class SafeDevice final : public Device {
 
   struct Status {
     SafetyState state = SafetyState::kAbsent;
-    SafetyFault last_fault = SafetyFault::kNone;  ///< is kept when the device is armed again
-    std::uint32_t faults = 0;                     ///< number of faults so far
+    SafetyFault last_fault = SafetyFault::kNone;  ///< not cleared by arming
+    std::uint32_t faults = 0;
   };
 
-  /// `device` must outlive this object. Throws std::invalid_argument, naming the field, if a value is out of bounds.
+  /// `device` must outlive this object. Throws std::invalid_argument naming the field if a value is invalid.
   SafeDevice(const Config& config, Device& device);
 
   const DeviceInfo& info() const noexcept override { return info_; }
@@ -146,7 +145,7 @@ class SafeDevice final : public Device {
 
   Status status() const noexcept;
 
-  /// Sets the fault kCommandSilent if the device is armed. Call this before the haptic thread is suspended.
+  /// Must be called before suspending the haptic thread. Sets kCommandSilent if the device is armed.
   void stand_still() noexcept {
     if (now_) trip(SafetyFault::kCommandSilent);
     publish();
@@ -163,7 +162,7 @@ class SafeDevice final : public Device {
   void trip(SafetyFault fault, Duration ramp = Duration::zero()) noexcept;
   void forget_motion() noexcept;
   bool may_be_armed(const Effort& asked) const noexcept;
-  /// Arms the device if it may be armed, and returns whether it is armed.
+  /// Arms the device if possible, and returns whether it is armed.
   bool armed_for(const Effort& asked) noexcept;
   bool stopped() const noexcept;
   Effort limited(const Effort& asked) const noexcept;
@@ -193,20 +192,20 @@ class SafeDevice final : public Device {
   std::optional<GrowthLimit> grip_growth_limit_;
 
   Stage stage_ = Stage::kWaiting;
-  std::optional<RampOut> stopping_;             ///< set while a fault ramps the force down
-  LocalTime request_until_ = LocalTime::min();  ///< until then, the request to arm is valid
-  bool button_held_ = true;                     ///< initially true, because a stuck button was never pressed
-  bool disarmed_ = false;                       ///< by the operator; only `arm` resets it
+  std::optional<RampOut> stopping_;             ///< during a fault with a ramp
+  LocalTime request_until_ = LocalTime::min();  ///< end of the pending request to arm
+  bool button_held_ = true;                     ///< a stuck button must not arm the device
+  bool disarmed_ = false;                       ///< by the operator, until `arm`
 
-  std::optional<LocalTime> now_;  ///< time of the last `read`
-  Duration passed_{};             ///< time between the last two calls of `read`
+  std::optional<LocalTime> now_;
+  Duration passed_{};  ///< since the previous `read`
   std::optional<PositionSample> last_;
-  /// Time and position at which the handle came to rest; empty if it is not known to be at rest.
+  /// Where and when the handle came to rest, if known.
   std::optional<PositionSample> rest_;
-  LocalTime heard_at_{};  ///< sampling time of the newest valid position
+  LocalTime heard_at_{};  ///< time of the newest valid sample
   LocalTime applied_at_{};
   LocalTime armed_at_{};
-  Effort applied_;  ///< what the device actually holds
+  Effort applied_;  ///< what the device actually renders
 
   std::uint32_t times_armed_ = 0;
   SafetyFault last_fault_ = SafetyFault::kNone;

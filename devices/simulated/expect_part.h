@@ -7,8 +7,7 @@
 
 namespace tendon {
 
-/// Checks an optional part of a simulated device, which must be above zero if it is set. Throws std::invalid_argument,
-/// naming the field.
+/// Throws std::invalid_argument naming the field if it is set and not above zero.
 inline void expect_part(const std::optional<double>& value, const char* field) {
   if (value) expect_above_zero(*value, field);
 }

@@ -9,12 +9,8 @@
 
 namespace tendon {
 
-/// Commands in transit from the loop to the motors. Each arrives after a constant delay, in order.
-///
-/// There is room for one command per 100 µs of delay. If commands are sent faster and the room is used up, a new
-/// command replaces the newest one. The constructor allocates all memory.
-///
-/// Thread-safe: no. Realtime-safe: all except the constructor.
+/// A queue of commands from the loop to the motors, with a constant delay. If commands are sent faster than every 100
+/// µs, the newest one may be replaced. Thread-safe: no. Realtime-safe: all except the constructor, which allocates.
 class ForcesUnderWay {
  public:
   struct Command {
@@ -32,7 +28,6 @@ class ForcesUnderWay {
     newest() = {arrives, effort};
   }
 
-  /// The command that arrives next, or null.
   const Command* next() const noexcept { return count_ > 0 ? &ring_[first_] : nullptr; }
 
   void pop() noexcept {

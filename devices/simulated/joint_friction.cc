@@ -15,23 +15,22 @@
 namespace tendon {
 namespace {
 
-/// For each joint: the sign of its velocity, or 0 if it is at rest.
+/// The sign of each joint's velocity.
 using Turns = std::array<int, 3>;
 
 struct Stiction {
   Turns turns;
-  Vec3 impulse;  ///< impulse of friction on each joint
-  double wrong =
-      std::numeric_limits<double>::infinity();  ///< violation of the friction law, as a velocity; ≤ 0: satisfied
+  Vec3 impulse;
+  double wrong = std::numeric_limits<double>::infinity();  ///< violation of the friction law, as a velocity
 };
 
-/// Friction for the given `turns`: velocity = free − coupling · impulse.
+/// Friction for given `turns`: velocity = free − coupling · impulse.
 Stiction sticking(const Turns& turns, const Mat3& coupling, const Vec3& free, const Vec3& most, const Turns& known) {
   Mat3 equations = Mat3::Identity();
   Vec3 right;
   for (Eigen::Index i = 0; i < 3; ++i) {
     const int turn = turns[static_cast<std::size_t>(i)];
-    if (turn == 0) equations.row(i) = coupling.row(i);  // the velocity is zero
+    if (turn == 0) equations.row(i) = coupling.row(i);
     right[i] = turn == 0 ? free[i] : turn * most[i];
   }
   Stiction stiction{turns, equations.inverse() * right};
@@ -48,9 +47,9 @@ Stiction sticking(const Turns& turns, const Mat3& coupling, const Vec3& free, co
   return stiction;
 }
 
-/// Returns the unique impulse with |impulseᵢ| ≤ mostᵢ that equals mostᵢ, opposite to the velocity, at each joint that
-/// moves. A joint that is not 0 in `known` moves in that direction. The solution is one of 27 cases. If several satisfy
-/// the law because of rounding, the one with the smallest violation is returned.
+/// Returns the unique impulse with |impulseᵢ| ≤ mostᵢ that equals mostᵢ, opposite to the velocity, at all moving
+/// joints. Nonzero entries of `known` are given. There are 27 cases; due to rounding, the best one is used if several
+/// are correct.
 Stiction stiction_of(const Mat3& coupling, const Vec3& free, const Vec3& most, const Turns& known = {}) noexcept {
   Stiction best;
   const auto holds = [&](Turns turns) {
@@ -62,7 +61,7 @@ Stiction stiction_of(const Mat3& coupling, const Vec3& free, const Vec3& most, c
     return stiction.wrong <= 0;
   };
   const auto sign = [](double x) { return (x > 0 ? 1 : 0) - (x < 0 ? 1 : 0); };
-  if (holds({sign(free[0]), sign(free[1]), sign(free[2])})) return best;  // the usual case while the handle slides
+  if (holds({sign(free[0]), sign(free[1]), sign(free[2])})) return best;  // usual while sliding
   if (holds({})) return best;
   for (int code = 0; code < 27; ++code) {
     const auto digit = [code](int place) { return code / place % 3 - 1; };
@@ -71,7 +70,7 @@ Stiction stiction_of(const Mat3& coupling, const Vec3& free, const Vec3& most, c
   return best;
 }
 
-/// Returns the velocity closest to `v` at which the joints that are at rest in `turns` do not move.
+/// Returns the velocity closest to `v` without motion of the joints that are 0 in `turns`.
 Vec3 standing(const Turns& turns, const Mat3& jacobian, const Vec3& v) {
   if (turns == Turns{}) return Vec3::Zero();
   const Mat3 coupling = jacobian * jacobian.transpose();
@@ -118,7 +117,7 @@ Friction JointFriction::least_at(const Vec3& position) const noexcept {
 Vec3 JointFriction::torques(const Mechanism::Kind& mechanism, double coulomb) {
   const Vec3 levers = Mechanism(mechanism).levers();
   Vec3 torques = coulomb * levers;
-  // rounding must not make it smaller, because callers rely on at least `coulomb`
+  // Rounding must not reduce `coulomb`, which is used as a lower bound.
   for (Eigen::Index i = 0; i < 3; ++i) {
     while (torques[i] / levers[i] < coulomb) torques[i] = std::nextafter(torques[i], HUGE_VAL);
   }

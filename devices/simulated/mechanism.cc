@@ -11,14 +11,12 @@
 namespace tendon {
 namespace {
 
-/// The radius of the ball around falcon::kCentre, and the largest displacement of the grip per radian of one leg in it.
-/// The largest value of three million positions was 0.091685 m/rad, rounded up here; the centre has 0.0672, the
-/// smallest was 0.0314.
+/// The ball around falcon::kCentre, and the maximum motion of the grip when only one leg moves. For three million
+/// positions, the maximum was 0.091685 m/rad, and the minimum 0.0314; the centre has 0.0672.
 constexpr double kFalconReach = 0.05;    // m
 constexpr double kFalconLever = 0.0917;  // m/rad
 
-/// Fraction of the distance from the middle of an arm's workspace to the nearest position without a finite Jacobian.
-/// Friction is unbounded there, and devices are not used so far out.
+/// Relative to the distance of the nearest position without a finite Jacobian, where friction is unbounded.
 constexpr double kShareOfArmsReach = 0.8;
 
 double reach_of(const Mechanism::Arm& arm) {
@@ -28,9 +26,8 @@ double reach_of(const Mechanism::Arm& arm) {
   return kShareOfArmsReach * std::min({stretched, folded, arm.upper_arm});
 }
 
-/// The elbow in the plane of the arm.
 struct Elbow {
-  double r;          ///< m, from the axis of the turntable to the handle
+  double r;          ///< m, from the axis of the turntable
   double cos_gamma;  ///< for γ = q₃ − q₂ in (−90°, 90°)
   double q2;
   double q3;
@@ -54,7 +51,7 @@ Vec3 angles_of(const Mechanism::Arm& arm, const Vec3& x) noexcept {
 
 Mat3 jacobian_of(const Mechanism::Arm& arm, const Vec3& x) noexcept {
   const auto [r, cos_gamma, q2, q3] = elbow_of(arm, x);
-  const Vec3 out(x.x() / r, 0, (x.z() + arm.upper_arm) / r);  // from the axis of the turntable to the handle
+  const Vec3 out(x.x() / r, 0, (x.z() + arm.upper_arm) / r);  // from the turntable's axis to the handle
   const Vec3 aside(out.z(), 0, -out.x());
   Mat3 jacobian;
   jacobian.row(0) = aside / r;
@@ -68,13 +65,13 @@ Mat3 jacobian_of(const Mechanism::Arm& arm, const Vec3& x) noexcept {
 Mechanism::Mechanism(const Kind& kind) : kind_(kind), reach_(kFalconReach), levers_(Vec3::Constant(kFalconLever)) {
   const auto* arm = std::get_if<Arm>(&kind);
   if (arm == nullptr) return;
-  // Covers all haptic devices, and the squares of these lengths are far from the limits of a double.
+  // Includes all haptic devices. The squares of these lengths can be represented accurately.
   const auto sound = [](double length) { return length >= 0.01 && length <= 10; };
   expect(sound(arm->upper_arm), "upper_arm", arm->upper_arm, "0.01 to 10 m");
   expect(sound(arm->forearm), "forearm", arm->forearm, "0.01 to 10 m");
   reach_ = reach_of(*arm);
-  // Per radian, q₁ moves the handle by r, which is l_u in the middle of the workspace, and q₂ and q₃ always move it by
-  // the length of their arm.
+  // q₁ moves the handle by r per radian, which is l_u in the middle of the workspace; q₂ and q₃ by the lengths of their
+  // arms.
   levers_ = Vec3(arm->upper_arm + reach_, arm->upper_arm, arm->forearm);
 }
 

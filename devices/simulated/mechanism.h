@@ -9,27 +9,25 @@
 
 namespace tendon {
 
-/// The three joints of a device: their angles q and their velocities when the handle moves,
+/// The three joints of a device, with angles q:
 ///
 ///     dq/dt = J(x) dx/dt,      J in rad/m, x in m in the device base frame, from the middle of the workspace
 ///
-/// The workspace is a ball in which J is finite and smooth. Outside it, J is that of the nearest point of the ball,
-/// because a simulated hand may pull the handle further than the mechanism reaches.
-///
-/// Thread-safe: yes, immutable. Realtime-safe: all except the constructor.
+/// In the workspace, which is a ball, J is finite and smooth. Outside it, the nearest point of the ball is used,
+/// because simulated hands may move too far. Thread-safe: yes, immutable. Realtime-safe: all except the constructor.
 class Mechanism {
  public:
-  /// Novint Falcon: the three thighs of a delta robot (devices/falcon/kinematics.h), around falcon::kCentre.
+  /// The thighs of a Novint Falcon around falcon::kCentre (devices/falcon/kinematics.h).
   struct Falcon {};
 
-  /// Phantom and its successor Touch: a turntable q₁ carries an upper arm q₂ and a forearm q₃. All motors are in the
-  /// base (a parallelogram drives the forearm), so q₂ and q₃ are both measured relative to the base:
+  /// Phantom and Touch: a turntable q₁ with an upper arm q₂ and a forearm q₃, which are both measured from the base,
+  /// because all motors are in the base (a parallelogram drives the forearm).
   ///
   ///     x = r sin q₁,  y = l_f − l_f cos q₃ + l_u sin q₂,  z = r cos q₁ − l_u,      r = l_u cos q₂ + l_f sin q₃
   ///
-  /// x to the right, y up, z towards the user. At q = 0 the upper arm is horizontal and the forearm hangs down. From
-  /// Çavuşoğlu, Feygin and Tendick, Presence 11(6), 2002. The radius of the workspace is four fifths of the distance to
-  /// the nearest position at which the arm is stretched, folded, or above its turntable.
+  /// x is to the right, y up, z towards the user. At q = 0, the upper arm is horizontal and the forearm vertical.
+  /// Source: Çavuşoğlu, Feygin and Tendick, Presence 11(6), 2002. The radius of the workspace is four fifths of the
+  /// distance to the nearest position where the arm is stretched, folded, or above its turntable.
   struct Arm {
     double upper_arm = 0;  ///< l_u, m, > 0
     double forearm = 0;    ///< l_f, m, > 0
@@ -37,22 +35,20 @@ class Mechanism {
 
   using Kind = std::variant<Falcon, Arm>;
 
-  /// Throws std::invalid_argument, naming the field, its value and the expected range.
+  /// Throws std::invalid_argument with the field, its value and the expected range.
   explicit Mechanism(const Kind& kind);
 
   Mat3 jacobian(const Vec3& position) const noexcept;
 
-  /// Returns q (rad) at `position`, or at the nearest point of the workspace.
+  /// In rad.
   Vec3 angles(const Vec3& position) const noexcept;
 
-  /// Names of q₁, q₂ and q₃.
   std::array<std::string_view, 3> joints() const noexcept;
 
-  /// m, radius of the workspace.
+  /// Radius of the workspace, in m.
   double reach() const noexcept { return reach_; }
 
-  /// m/rad, for each joint an upper bound of ‖J⁻¹ eᵢ‖ in the workspace: the displacement of the handle if only this
-  /// joint rotates.
+  /// Upper bounds of ‖J⁻¹ eᵢ‖ in the workspace, in m/rad: the motion of the handle if only joint i moves.
   const Vec3& levers() const noexcept { return levers_; }
 
  private:

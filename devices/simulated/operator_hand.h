@@ -6,14 +6,12 @@
 
 namespace tendon {
 
-/// The operator's hand on the handle: a mass that moves with the handle, connected by a spring and a damper to the
-/// point s(t) at which the operator aims:
+/// A hand on the handle: a mass moving with the handle, which is connected to a target s(t) by a spring and a damper.
 ///
 ///     F_hand = k (s − x) + c (ṡ − v) − m_hand dv/dt        (N, on the handle)
 ///
-/// This is the second-order model with a moving equilibrium point of Hajian and Howe (J. Biomech. Eng. 119:109, 1997)
-/// and Kuchenbecker, Park and Niemeyer (IMECE 2003). OperatorProfile contains the parameters of a fingertip, of a hand
-/// with a stylus and of an arm.
+/// Source: Hajian and Howe (J. Biomech. Eng. 119:109, 1997); Kuchenbecker, Park and Niemeyer (IMECE 2003). See
+/// OperatorProfile for the parameters of a fingertip, a hand with a stylus, and an arm.
 ///
 /// Thread-safe: yes, immutable. Realtime-safe: all except the constructor.
 class OperatorHand {
@@ -25,14 +23,14 @@ class OperatorHand {
     ScriptedMotion motion{ScriptedMotion::Sine{}};
   };
 
-  /// Throws std::invalid_argument, naming the field, its value and the expected range.
+  /// Throws std::invalid_argument with the field, its value and the expected range.
   explicit OperatorHand(Config config);
 
-  /// Returns k (s(t) − x) + c ṡ(t), the part of the force that is independent of the velocity and acceleration of the
-  /// handle. The caller integrates the other two parts implicitly.
+  /// Returns k (s(t) − x) + c ṡ(t). The remaining force depends on the motion of the handle, and is integrated
+  /// implicitly by the caller.
   Vec3 drive(double t, const Vec3& x) const noexcept;
 
-  /// The target point `t` seconds after the start.
+  /// `t` in s, since the start.
   ScriptedMotion::Point target(double t) const noexcept { return config_.motion.at(t); }
 
   double stiffness() const noexcept { return config_.stiffness; }

@@ -16,9 +16,8 @@ constexpr std::string_view kDiolaiti = "Diolaiti et al., IEEE T-RO 22(2), 2006, 
 constexpr std::string_view kPhantomSheet = "SensAble PHANToM Premium 1.0/1.5 data sheet";
 constexpr std::string_view kTouchSheet = "Geomagic/3D Systems Touch data sheet";
 
-/// 5 ms is five haptic periods at 1 kHz. It is longer than the late wake-ups of a healthy loop (0.2 ms at p99 without
-/// realtime priority, periods of up to 2 ms in our own tests), and ends the force before a hand at 1 m/s has moved 5 mm
-/// against it.
+/// Longer than the delays of a healthy loop (0.2 ms at p99 without realtime priority, periods of up to 2 ms in our own
+/// tests). A hand at 1 m/s moves 5 mm before the force is ended.
 constexpr KnownNumber kAssumedWatchdog = {0.005, kAssumed, "5 haptic periods at 1 kHz; not documented"};
 
 constexpr std::array kProfiles = {
@@ -87,7 +86,6 @@ constexpr std::array kOperators = {
     },
 };
 
-/// Appends the line of one number: name, value with unit, provenance, source.
 template <class Known>
 void add_line(std::ostream& table, std::string_view what, const std::string& value, const Known& number) {
   table << "  " << std::left << std::setw(28) << what << std::setw(15) << value << std::setw(10)

@@ -11,25 +11,24 @@
 
 namespace tendon {
 
-/// The origin of a number, from the most to the least reliable.
+/// Starting with the most reliable.
 enum class Provenance {
-  kMeasured,  ///< identified by us on a real device
-  kQuoted,    ///< read in the named source, or computed from its data
-  kRecalled,  ///< quoted from memory of the named source; check it before you rely on it
-  kAssumed,   ///< a guess; the note gives the reason
+  kMeasured,  ///< by us, on a real device
+  kQuoted,    ///< read in the source, or computed from it
+  kRecalled,  ///< quoted from memory; must be checked
+  kAssumed,   ///< for the given reason
 };
 
 std::string_view to_string(Provenance provenance) noexcept;
 
-/// A number and its origin.
 struct KnownNumber {
   double value;
   Provenance provenance;
   std::string_view note;  ///< source or reason
 };
 
-/// Parameters of a real device, for a simulated device like it. They are initial values and not those of a particular
-/// unit. Before a limiter runs on hardware, identify the friction of that unit.
+/// Initial values for simulating a device, which may differ for each unit. The friction of the actual unit must be
+/// identified before using a limiter.
 struct DeviceProfile {
   std::string_view name;
   KnownNumber mass;                     ///< kg
@@ -38,57 +37,56 @@ struct DeviceProfile {
   KnownNumber encoder_step;             ///< m
   KnownNumber max_force;                ///< N
   KnownNumber amplifier_bandwidth;      ///< Hz
-  std::optional<KnownNumber> watchdog;  ///< s; empty for a device without a watchdog
+  std::optional<KnownNumber> watchdog;  ///< s
   KnownNumber viscous_bound;            ///< N·s/m, for the limiter
   KnownNumber coulomb_bound;            ///< N, for the limiter
 
-  /// Returns the configuration of the simulated device, without a hand. Its `info()` has the numbers of the data sheet.
+  /// Without a hand.
   SimulatedDevice::Config device() const;
-  /// The friction that the limiter may assume, never above that of the device.
+  /// Lower bounds, for the limiter.
   Friction friction_bounds() const noexcept { return {.coulomb = coulomb_bound.value, .viscous = viscous_bound.value}; }
 };
 
-/// All device profiles: phantom-premium, touch, falcon.
+/// phantom-premium, touch, falcon
 std::span<const DeviceProfile> device_profiles() noexcept;
 
-/// Returns the profile of that name, or null.
+/// Returns null if there is no such profile.
 const DeviceProfile* find_device_profile(std::string_view name) noexcept;
 
-/// The range of a number, and its origin.
 struct KnownRange {
   double least;
   double most;
   Provenance provenance;
   std::string_view note;  ///< source or reason
 
-  /// The value to use if nothing else is known.
+  /// To be used by default.
   double middle() const noexcept { return least + (most - least) / 2; }
 };
 
-/// Parameters of a finger, hand or arm that holds the handle, for a simulated hand like it. Each one is a range,
-/// because people differ and because a firmer grip is stiffer. A spring, a damper and a mass are the simplest model
-/// that distinguishes a hand from a wall. It is inaccurate above about 50 Hz and for a grip force close to zero.
+/// Parameters of a finger, hand or arm. They vary between people and increase with the grip force. A spring, a damper
+/// and a mass are the simplest model that differs from a wall. It is not accurate above about 50 Hz, or with a very
+/// light grip.
 struct OperatorProfile {
   std::string_view name;
   KnownRange stiffness;  ///< N/m
   KnownRange damping;    ///< N·s/m
   KnownRange mass;       ///< kg
 
-  /// Returns the hand with the middle of all three ranges.
+  /// Uses the middle of each range.
   OperatorHand::Config hand(ScriptedMotion motion) const;
 };
 
-/// All operator profiles: fingertip, stylus, arm.
+/// fingertip, stylus, arm
 std::span<const OperatorProfile> operator_profiles() noexcept;
 
-/// Returns the profile of that name, or null.
+/// Returns null if there is no such profile.
 const OperatorProfile* find_operator_profile(std::string_view name) noexcept;
 
-/// A heavy device of admittance type, without a hand: 2 kg, 20 N·s/m, 1 N, a force sensor, no other effects. It does
-/// not represent a real device. These are the parameters in core/PROOFS.md, "Admittance loop".
+/// A heavy device of admittance type without a hand: 2 kg, 20 N·s/m, 1 N, and a force sensor. Not a real device; the
+/// parameters are from core/PROOFS.md, "Admittance loop".
 SimulatedDevice::Config admittance_device();
 
-/// Lists every number of a profile, one per line: name, value with unit, provenance, source.
+/// One line per number, with its unit, provenance and source.
 std::string provenance_table(const DeviceProfile& profile);
 std::string provenance_table(const OperatorProfile& profile);
 

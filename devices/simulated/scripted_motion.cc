@@ -23,7 +23,7 @@ Vec3 unit(const Vec3& direction, const std::string& field) {
   return direction.stableNormalized();
 }
 
-/// Checks a script and normalizes it for `point_at`.
+/// Checks a script and normalizes directions.
 struct Prepare {
   void operator()(ScriptedMotion::Sine& s) const {
     expect(s.amplitude >= 0 && std::isfinite(s.amplitude), "sine.amplitude", s.amplitude, "0 m or more");
@@ -105,8 +105,8 @@ Point point_at(const ScriptedMotion::MinimumJerk& s, double t) {
           way * (sign * 30 * u * u * (1 - u) * (1 - u) / duration)};
 }
 
-/// The slope of Fritsch and Butland at sample i: the weighted harmonic mean of the secants on both sides, or zero where
-/// their signs differ (which preserves an extremum) and at both ends.
+/// Fritsch and Butland's slope at sample i: the weighted harmonic mean of both secants, or zero if their signs differ
+/// (which preserves extrema) and at the ends.
 double slope(const std::vector<Recorded::Sample>& s, std::size_t i) {
   if (i == 0 || i + 1 == s.size()) return 0;
   const double h0 = s[i].t - s[i - 1].t;

@@ -9,18 +9,14 @@
 
 namespace tendon {
 
-/// The target position of the operator's hand as a function of the time since the start, i.e. the moving equilibrium
-/// point of OperatorHand. m and m/s, device base frame.
-///
-/// It is constructed before the loop runs. An invalid script throws std::invalid_argument, naming the field, its value
-/// and the expected range.
-///
+/// The motion of an operator's hand: the moving equilibrium point of OperatorHand, in m, device base frame. Invalid
+/// scripts throw std::invalid_argument with the field, its value and the expected range.
 /// Thread-safe: yes, immutable. Realtime-safe: `at`.
 class ScriptedMotion {
  public:
   struct Point {
     Vec3 position = Vec3::Zero();  ///< m
-    Vec3 velocity = Vec3::Zero();  ///< m/s, time derivative of `position`
+    Vec3 velocity = Vec3::Zero();  ///< m/s
   };
 
   /// position = centre + direction · amplitude · sin(2π · frequency · t)
@@ -28,46 +24,43 @@ class ScriptedMotion {
     double amplitude = 0;  ///< m, ≥ 0
     double frequency = 0;  ///< Hz, ≥ 0
     Vec3 centre = Vec3::Zero();
-    Vec3 direction = Vec3::UnitX();  ///< need not be normalized
+    Vec3 direction = Vec3::UnitX();  ///< normalized automatically
   };
 
-  /// Moves from `from` to `to` at constant speed and stays there. With `hold`, it moves back and forth forever and
-  /// stays at each end for that long. The velocity is discontinuous at the corners. With `from == to`, the hand does
-  /// not move.
+  /// Moves from `from` to `to` at constant speed and stays there. With `hold`, it waits at each end for this time and
+  /// moves back and forth. The velocity is discontinuous. If both points are equal, the hand does not move.
   struct RampHold {
     Vec3 from = Vec3::Zero();
     Vec3 to = Vec3::Zero();
     Duration ramp{};               ///< > 0
-    std::optional<Duration> hold;  ///< ≥ 0; empty: stays at `to`
+    std::optional<Duration> hold;  ///< ≥ 0; optional
   };
 
-  /// Reaching movements from point to point, each of which starts and ends at rest:
+  /// Minimum-jerk movements, which start and end at rest (Flash and Hogan, J. Neuroscience 5(7):1688, 1985):
   ///
   ///     position = p₀ + (p₁ − p₀)(10 s³ − 15 s⁴ + 6 s⁵),  s = (time in this leg) / (its duration)
-  ///
-  /// This is the minimum-jerk trajectory (Flash and Hogan, J. Neuroscience 5(7):1688, 1985).
   struct MinimumJerk {
     std::vector<Vec3> points;         ///< 2 or more
-    std::vector<Duration> durations;  ///< of the legs: one fewer than points, each > 0
-    bool back_and_forth = true;       ///< forever; false: stays at the last point
+    std::vector<Duration> durations;  ///< for each leg, > 0
+    bool back_and_forth = true;       ///< repeatedly, or only once
   };
 
-  /// A recorded motion: position = origin + direction · x(t). x interpolates the samples by cubic Hermite splines with
-  /// the slopes of Fritsch and Butland (SIAM J. Sci. Stat. Comput. 5(2):300, 1984). The velocity is continuous, and
-  /// between two samples x stays within their range, so that quantized recordings do not overshoot. The slope is zero
-  /// at both ends, so the velocity is continuous when the motion holds or repeats.
+  /// A recording: position = origin + direction · x(t), using cubic Hermite interpolation with Fritsch and Butland's
+  /// slopes (SIAM J. Sci. Stat. Comput. 5(2):300, 1984). The velocity is continuous, also when repeating, because the
+  /// slope at both ends is zero. Between two samples, x stays in their range, so that quantized recordings do not
+  /// overshoot.
   struct Recorded {
     struct Sample {
-      double t;  ///< s, strictly increasing; the first one is the start
+      double t;  ///< s, strictly increasing
       double x;  ///< m
     };
     enum class AtEnd {
-      kHold,    ///< stays at the last sample
-      kRepeat,  ///< starts again with the first sample: the position jumps if the ends differ
+      kHold,
+      kRepeat,  ///< the position jumps if the ends differ
     };
     std::vector<Sample> samples;  ///< 2 or more
     Vec3 origin = Vec3::Zero();
-    Vec3 direction = Vec3::UnitX();  ///< need not be normalized
+    Vec3 direction = Vec3::UnitX();  ///< normalized automatically
     AtEnd at_end = AtEnd::kHold;
   };
 
@@ -75,7 +68,7 @@ class ScriptedMotion {
 
   explicit ScriptedMotion(Script script);
 
-  /// Returns the point `t` seconds after the start, t ≥ 0.
+  /// `t` in s, since the start, ≥ 0.
   Point at(double t) const noexcept;
 
  private:

@@ -23,8 +23,7 @@ void expect_effect(const std::optional<double>& value, std::string_view field) {
          "a number above 0 (left out when there is no such effect)");
 }
 
-/// Reduces `force` to the norm `limit`. Divides by the largest component first, because the square of a huge but finite
-/// force overflows.
+/// Limits the norm. Divides by the largest component first, because the square of a large force may overflow.
 Vec3 saturated(const Vec3& force, double limit) {
   const double largest = force.lpNorm<Eigen::Infinity>();
   if (!(largest > 0)) return force;
@@ -34,7 +33,7 @@ Vec3 saturated(const Vec3& force, double limit) {
   return shape * (limit / length);
 }
 
-/// Returns the factor that reduces `vector` to the norm `limit`, computed in the same way.
+/// Returns a factor for limiting the norm.
 double share_within(const Vec3& vector, double limit) {
   const double largest = vector.lpNorm<Eigen::Infinity>();
   if (!(largest > 0)) return 1;
@@ -60,7 +59,7 @@ void check(const SimulatedDevice::Config::StructuralMode& mode, double mass) {
   expect_not_negative(mode.damping, "structural_mode.damping");
 }
 
-/// Returns the centre of the count that contains `x`.
+/// Returns the centre of a count.
 Vec3 counted(const Vec3& x, double step) { return (x.array() / step + 0.5).floor().matrix() * step; }
 
 }  // namespace
@@ -199,7 +198,7 @@ Effort SimulatedDevice::apply_all(const Effort& effort) noexcept {
   return held;
 }
 
-/// Returns what the motors can render.
+/// Limits the effort to what the motors can render.
 Effort SimulatedDevice::written(const Effort& effort) const noexcept {
   Effort most;
   if (!is_finite(effort)) return most;
@@ -214,7 +213,7 @@ Effort SimulatedDevice::written(const Effort& effort) const noexcept {
   return most;
 }
 
-/// Called when a command reaches the motors.
+/// When a command has reached the motors.
 void SimulatedDevice::hold(const Effort& effort) noexcept {
   command_ = effort.force;
   if (turns_or_grips_) hold_torque_and_grip(effort);
@@ -242,7 +241,7 @@ void SimulatedDevice::advance(Duration gap) noexcept {
   live(gap);
 }
 
-/// Integrates the gap up to the last force that reaches the motors in it. Returns the rest of the gap.
+/// Integrates up to the last force that reaches the motors, and returns the remaining time.
 Duration SimulatedDevice::live_to_last_arrival(Duration gap) noexcept {
   const Duration end = lived_ + gap;
   for (const auto* next = under_way_->next(); next != nullptr && next->arrives <= end; next = under_way_->next()) {
@@ -258,8 +257,7 @@ void SimulatedDevice::live(Duration gap) noexcept {
   integrate(gap);
 }
 
-/// Ends the force if the watchdog expires within the gap. Returns the rest of the gap, or all of it if it does not
-/// expire.
+/// Ends the force if the watchdog expires, and returns the remaining time.
 Duration SimulatedDevice::live_with_watchdog(Duration gap) noexcept {
   if (gap <= *until_watchdog_) {
     *until_watchdog_ -= gap;
@@ -286,7 +284,7 @@ void SimulatedDevice::integrate(Duration span) noexcept {
   move(span);
 }
 
-/// Returns the rest of the span, or all of it if the hand holds the handle throughout.
+/// Returns the remaining time, which is the whole span if the hand does not release the handle.
 Duration SimulatedDevice::move_until_let_go(Duration span) noexcept {
   const Duration held = std::max(*config_.lets_go_after - lived_, Duration::zero());
   if (held > span) return span;
@@ -314,8 +312,8 @@ SimulatedDevice::Substeps SimulatedDevice::substeps_with(const Effects& effects)
   return kAll.at(effects.number());
 }
 
-/// `mean` is the half-step momentum before the call and the mean velocity after it; `velocity` is v₀ before and v₁
-/// after. They are references because copies of vectors dominate the cost of a substep.
+/// Before the call, `mean` is the half-step momentum and `velocity` is v₀. After the call, they are the mean velocity
+/// and v₁. References are used because copying vectors is expensive here.
 template <SimulatedDevice::Rub kRub>
 void SimulatedDevice::slide(Vec3& mean, Vec3& velocity, const Side& side, const Vec3& push, const Vec3& position,
                             double h) const noexcept {
@@ -345,7 +343,7 @@ void SimulatedDevice::take_substeps(Duration::rep count, double h) noexcept {
   const double begin = seconds(lived_);
   double viscous = 0;
   if (config_.viscous_friction) viscous = h / 2 * *config_.viscous_friction;
-  Side handle{config_.mass, 0};  // the whole mass, or its handle side in a structural mode
+  Side handle{config_.mass, 0};  // all of the mass, or the side of the handle
   if constexpr (kMode) handle.mass = config_.structural_mode->handle_mass;
   if constexpr (kEffects.hand) handle.mass += hand_->mass();
   handle.resistance = handle.mass;
@@ -358,7 +356,7 @@ void SimulatedDevice::take_substeps(Duration::rep count, double h) noexcept {
     coupling = h / 2 * (config_.structural_mode->damping + h / 2 * config_.structural_mode->stiffness);
     handle.resistance += coupling;
     motor.mass = config_.mass - config_.structural_mode->handle_mass;
-    // The velocity of the handle has been eliminated from the equations.
+    // After eliminating the handle's velocity.
     motor.resistance = motor.mass + viscous + coupling - coupling * coupling / handle.resistance;
   }
   Lag lag;
@@ -415,15 +413,14 @@ void SimulatedDevice::take_substeps(Duration::rep count, double h) noexcept {
   }
 }
 
-/// The mean motor force over the next substep: the exact mean of the first-order response to the command.
+/// The exact mean of the motors' first-order response over the next substep.
 Vec3 SimulatedDevice::force_over(const Lag& lag) noexcept {
   const Vec3 missing = command_ - *amplifier_force_;
   *amplifier_force_ += missing * lag.reached;
   return command_ - missing * (lag.reached / lag.h_over_tau);
 }
 
-/// The mass of the hand moves with the handle, so the kinetic energy that it has gained was not transferred to the
-/// handle.
+/// The hand's mass moves with the handle, so its kinetic energy was not transferred to the handle.
 void SimulatedDevice::settle_energies() noexcept {
   const double half_v2 = truth_.velocity.squaredNorm() / 2;
   truth_.kinetic_energy = config_.mass * half_v2;

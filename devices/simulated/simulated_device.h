@@ -22,116 +22,108 @@
 
 namespace tendon {
 
-/// A simulated haptic device with an operator's hand on its handle, given by the equation of motion
+/// A simulated haptic device with a hand on its handle:
 ///
 ///     m dv/dt = F_device + F_hand − b v − f_c sgn(v),      sgn(v) = v/|v|;  any |sgn| ≤ 1 at v = 0
 ///
-/// with forces in N on the handle. F_device is the force of the device on the hand, F_hand the force of the hand on the
-/// device. Friction is isotropic or that of the joints of a mechanism (JointFriction). The device has exactly the
-/// effects that its configuration lists. An omitted effect costs nothing in a substep, because each combination of
-/// effects has its own loop.
+/// Forces are in N on the handle: F_device is applied to the hand, and F_hand is applied by the hand to the device.
+/// Friction is either isotropic or in the joints of a mechanism (JointFriction). All effects are optional. Unused
+/// effects do not cost any time in a substep, because each combination of effects has a separate loop.
 ///
-/// **A structural mode** divides the mass. Motors, friction and encoder are on one side of a spring K and damper C,
-/// handle and hand on the other. With the motor side at y = x + e and of mass m − m_h,
+/// **Structural mode.** Motors, friction and encoder are connected to the handle and the hand by a spring K and a
+/// damper C. With the motor side at y = x + e and of mass m − m_h,
 ///
 ///     (m − m_h) dẏ/dt = F_device − b ẏ − f_c sgn(ẏ) − K e − C ė,      m_h dv/dt = F_hand + K e + C ė
 ///
-/// If the handle is released, the mode oscillates at ω² = K (1/(m − m_h) + 1/m_h), ζ = C ω/(2 K); with the motor side
-/// fixed, at ω² = K/m_h. Structural resonances reduce the range of impedances that a device can render (Gil et al.,
-/// IROS 2010; Çavuşoğlu, Feygin and Tendick, Presence 11(6), 2002). Here the hand never feels a stiffness above K. The
-/// maximum damping that can be rendered falls from about 2 m/T to 2 (m − m_h)/T, and further if the mode is close to
-/// the loop rate. The maximum stable stiffness of a sampled spring is unchanged, because encoder and motors are on the
-/// same side.
+/// If the handle is released, the mode has ω² = K (1/(m − m_h) + 1/m_h), ζ = C ω/(2 K); with the motor side fixed, ω² =
+/// K/m_h. Structural resonances reduce the range of impedances that can be rendered (Gil et al., IROS 2010; Çavuşoğlu,
+/// Feygin and Tendick, Presence 11(6), 2002). The stiffness felt by the hand cannot exceed K. The maximum damping
+/// decreases from about 2 m/T to 2 (m − m_h)/T, and further if the mode is close to the loop rate. The maximum
+/// stiffness of a stable sampled spring does not change, because the encoder and the motors are on the same side.
 ///
-/// **Time.** The first `read` defines time 0. Each later one integrates up to its `now` with the force of the last
-/// `apply`. Encoder and force change at the same time, that of the last `read`. Time that goes backwards has no effect.
-/// If a gap is longer than kMaxGap, only that much is integrated and the rest is skipped.
+/// **Time.** The first `read` defines time 0. Each later `read` integrates up to `now`, using the force of the last
+/// `apply`. Encoder and force change at the same time, that of the last `read`. `now` must not decrease; otherwise, it
+/// is ignored. In longer gaps, only kMaxGap is integrated.
 ///
-/// **Transport delay.** With `sample_delay` d_s, `read(now)` returns the sample taken at now − d_s, which is its `at`.
-/// The integration, and with it `truth()`, ends at that time: read now − d_s for now above. With `force_delay` d_f, the
-/// force returned by `apply` reaches the motors that much later; there is no force before the first one arrives. Both
-/// delays are exact to the nanosecond for any period. A sample shows the first effect of a force d_s + d_f after it was
-/// applied. The watchdog of the device counts the forces that arrive.
+/// **Transport delay.** With `sample_delay` d_s, `read(now)` returns the sample at now − d_s, and integrates (and
+/// updates `truth()`) up to this time only. With `force_delay` d_f, forces reach the motors later, and the initial
+/// force is zero. Both delays are exact to the nanosecond for any period, so a force affects samples after d_s + d_f.
+/// The watchdog uses the forces that have arrived.
 ///
-/// **Rotation and gripper** (SimulatedRotation, SimulatedGripper) are integrated in the same substeps and share nothing
-/// else with the position: no mass, no friction, no amplifier. Delays and the watchdog apply to torque and grip as
-/// well. If a wrench is too large, force and torque are reduced by the same factor, so that it keeps its direction; the
-/// grip is clamped separately.
+/// **Rotation and gripper** (SimulatedRotation, SimulatedGripper) use the same substeps, delays and watchdog, but have
+/// a separate mass and friction, and no amplifier. If a wrench is too large, force and torque are reduced by the same
+/// factor, to keep its direction. The grip is limited separately.
 ///
-/// **The environment** (SimulatedEnvironment) consists of walls and a medium at the handle. It adds a force on the
-/// right-hand side, which a force sensor also measures. It is evaluated at the midpoint of a substep in time and
-/// position.
+/// **Environment** (SimulatedEnvironment): the force of walls and a medium on the handle, evaluated in the middle of
+/// each substep in time and position. It is also measured by a force sensor.
 ///
-/// **Integration.** Substeps of equal length h ≤ max_substep, each an implicit midpoint rule with set-valued friction
-/// (Moreau's time stepping with θ = ½). With v̄ = (v₀ + v₁)/2 it satisfies, exactly,
+/// **Integration.** Substeps of equal length h ≤ max_substep use the implicit midpoint rule with set-valued friction
+/// (Moreau's time stepping with θ = ½). With v̄ = (v₀ + v₁)/2, the following is satisfied exactly:
 ///
 ///     m (v₁ − v₀)/h = F_device + F_hand − b v̄ − f_c sgn(v̄),      x₁ = x₀ + h v̄
 ///
-/// where F_hand is evaluated at the midpoint in time, position and velocity. The solution has a closed form: the
-/// half-step momentum p is reduced by the friction impulse, then divided by mass and damping,
+/// where F_hand is evaluated at the midpoint in time, position and velocity. The closed-form solution reduces the
+/// half-step momentum p by the friction impulse, and then divides it by mass and damping:
 ///
 ///     v̄ = (1 − h f_c/(2|p|))₊ p / (m + (h/2)(b + c + k h/2)),      p = m v₀ + (h/2)(F_device + drive)
 ///
-/// If the velocity reaches or crosses zero and friction can hold the pushing force, the device comes to rest: v₁ = 0.
-/// It sticks exactly, without a velocity threshold, in any direction. This rule is used because it is stable for any
-/// hand and neither generates nor dissipates energy: m (v₁ − v₀)·v̄ is exactly the change of kinetic energy. An
-/// integrator with numerical damping would make every limiter look better than it is; semi-implicit Euler at 50 µs
-/// stabilizes springs that are 5 % too stiff for the real device. With a structural mode, the spring force is that of
-/// the mean deflection, and both velocities follow from one linear equation; the mode oscillates at (2/h) atan(ω h/2),
-/// 0.03 % low at 200 Hz. Consequently, while the force held is the force returned (no transport delay, no amplifier
-/// lag, no expired watchdog), with E of an EnergyLedger that receives the true position at the encoder and
-/// `least_friction`, up to rounding,
+/// If the velocity reaches or crosses zero and friction can hold the device, it stops: v₁ = 0. Sticking is exact,
+/// without a velocity threshold. This rule is stable for any hand. It does not add or remove energy, since m (v₁ −
+/// v₀)·v̄ is exactly the change of the kinetic energy. With numerical damping, all limiters would look better than they
+/// are: using semi-implicit Euler at 50 µs, springs that are 5 % too stiff for the real device are still stable. In a
+/// structural mode, the mean deflection is used for the spring, and both velocities are computed from a linear
+/// equation; its frequency is (2/h) atan(ω h/2), 0.03 % low at 200 Hz.
+///
+/// Energy balance: if the applied force is the one returned (without transport delay, amplifier lag, or an expired
+/// watchdog), and E is computed by an EnergyLedger from the true position at the encoder and `least_friction`, then up
+/// to rounding
 ///
 ///     work of hand and environment + stored energy at the start ≥ E + stored energy now
 ///
-/// where the stored energy is the kinetic energy of the device and that of the spring between its masses. With
-/// transport delay, this holds for the forces that have reached the motors and not for those returned: a delayed spring
-/// does generate energy.
+/// where stored energy includes the kinetic energy of the device and the energy of the structural mode. With transport
+/// delay, this is only true for the forces at the motors, because a delayed spring does generate energy.
 class SimulatedDevice final : public Device {
  public:
   struct Config {
     std::string name = "simulated";
     double mass = 0;                     ///< kg, apparent mass at the handle, > 0
-    std::optional<Vec3> start_position;  ///< m; empty: the start of the hand's motion, or the origin
+    std::optional<Vec3> start_position;  ///< m; default: that of the hand, or 0
     Vec3 start_velocity = Vec3::Zero();  ///< m/s
 
-    /// Optional effects, each > 0.
-    std::optional<double> viscous_friction;  ///< b, N·s/m
-    std::optional<double> coulomb_friction;  ///< f_c, N
-    /// Friction in the joints, instead of `coulomb_friction`. The energy balance remains valid.
+    /// Optional effects. The energy balance remains valid unless noted otherwise.
+    std::optional<double> viscous_friction;  ///< b, N·s/m, > 0
+    std::optional<double> coulomb_friction;  ///< f_c, N, > 0
+    /// Instead of `coulomb_friction`.
     std::optional<JointFriction::Config> joint_friction;
-    /// The hand holds a part of the mass that is on a spring, see above. The energy balance remains valid.
     struct StructuralMode {
-      double handle_mass = 0;  ///< m_h, kg, part of `mass`; > 0 and below it
+      double handle_mass = 0;  ///< m_h, kg; > 0, below `mass`
       double stiffness = 0;    ///< K, N/m, > 0
       double damping = 0;      ///< C, N·s/m, ≥ 0
     };
     std::optional<StructuralMode> structural_mode;
-    /// m, one encoder count per axis. The sample is the centre of the count, so its error is at most half a count; the
-    /// origin is a centre.
+    /// m per count and axis. Samples are rounded to multiples of this.
     std::optional<double> encoder_step;
-    std::optional<double> max_force;  ///< N, norm of the force vector; its direction is preserved
-    /// Hz, −3 dB, first order. The motors follow the force returned by `apply` with this lag.
+    std::optional<double> max_force;  ///< N, maximum norm
+    /// Hz, −3 dB: first-order lag of the motors. No energy balance.
     std::optional<double> amplifier_bandwidth;
-    /// A sensor between handle and hand, as in devices of admittance type and at the wrist of robots. It measures the
-    /// mean force of hand and environment over the last substep, without noise. The energy balance remains valid.
+    /// Between handle and hand, as in devices of admittance type or at the wrist of a robot. Measures the mean force of
+    /// hand and environment over the last substep, without noise.
     struct ForceSensor {
-      std::optional<double> resolution;  ///< N, one count per axis; the sample is the centre of the count
+      std::optional<double> resolution;  ///< N per count and axis
     };
     std::optional<ForceSensor> force_sensor;
-    std::optional<Duration> watchdog;  ///< time without an `apply` after which the force is zero until the next one
-    /// d_s and d_f, each up to kMostDelay. USB and the loop of a device take 1 to 2 ms. The energy balance is not
-    /// valid.
+    std::optional<Duration> watchdog;  ///< timeout for ending the force
+    /// d_s and d_f, up to kMostDelay. Typically 1 to 2 ms for USB and the loop of a device. No energy balance.
     std::optional<Duration> sample_delay;
     std::optional<Duration> force_delay;
 
-    /// Walls and a medium at the handle; not with a structural mode. The energy balance remains valid.
+    /// Cannot be used with a structural mode.
     std::optional<SimulatedEnvironment::Config> environment{};
 
     std::optional<OperatorHand::Config> hand;
-    /// Time after the first `read` at which the hand permanently releases the handle; its mass leaves with it.
+    /// When the hand permanently releases the handle, relative to the first `read`. Its mass is also removed.
     std::optional<Duration> lets_go_after{};
-    std::optional<Duration> button_after;  ///< time after the first `read` at which the hand presses and holds button 0
+    std::optional<Duration> button_after;  ///< when button 0 is pressed and held
     struct Press {
       std::uint32_t button = 0;  ///< bit in PositionSample::buttons, below 32
       Duration from{};           ///< since the first `read`, ≥ 0
@@ -139,56 +131,53 @@ class SimulatedDevice final : public Device {
     };
     std::vector<Press> presses{};
 
-    /// The handle also rotates, and every sample has an orientation. The energy balance then includes −τ·ω.
+    /// The energy balance then includes −τ·ω.
     std::optional<SimulatedRotation::Config> rotation{};
-    /// The handle has a gripper, which has its own energy balance.
+    /// With its own energy balance.
     std::optional<SimulatedGripper::Config> gripper{};
-    std::vector<OutputDescription> outputs{};  ///< lamps and vibration, at most kMostOutputs
+    std::vector<OutputDescription> outputs{};  ///< at most kMostOutputs
 
-    /// > 0. 50 µs gives 20 substeps per haptic period at 1 kHz. The stiffness at which a sampled spring becomes
-    /// unstable (75 g, 1 kHz) is then accurate to 1.4e-6 at 0.26 N·s/m and to 2.8e-5 at 5. The error is proportional to
-    /// the square of the substep and the cost to its inverse; the energy balance is exact for any value.
+    /// > 0. 50 µs are 20 substeps per haptic period of 1 kHz. The stiffness limit of a sampled spring (75 g, 1 kHz) is
+    /// then accurate to 1.4e-6 at 0.26 N·s/m, and to 2.8e-5 at 5 N·s/m. The error is proportional to the square of this
+    /// value. The energy balance is exact for any value.
     Duration max_substep = std::chrono::microseconds(50);
   };
 
-  /// The true state, for tests only.
+  /// The true state. Only for tests.
   struct Truth {
-    Vec3 position = Vec3::Zero();      ///< m, of the handle
-    Vec3 velocity = Vec3::Zero();      ///< m/s, of the handle
-    Vec3 deflection = Vec3::Zero();    ///< m, e: the encoder is at position + deflection; 0 without a structural mode
-    Vec3 device_force = Vec3::Zero();  ///< N, mean over the last substep, on the handle
-    Vec3 hand_force = Vec3::Zero();    ///< N, mean over the last substep, on the handle
-    Vec3 environment_force = Vec3::Zero();  ///< N, mean over the last substep, on the handle
+    Vec3 position = Vec3::Zero();           ///< m, of the handle
+    Vec3 velocity = Vec3::Zero();           ///< m/s, of the handle
+    Vec3 deflection = Vec3::Zero();         ///< m, e: the encoder is at position + deflection
+    Vec3 device_force = Vec3::Zero();       ///< N, on the handle, mean over the last substep
+    Vec3 hand_force = Vec3::Zero();         ///< N, on the handle, mean over the last substep
+    Vec3 environment_force = Vec3::Zero();  ///< N, on the handle, mean over the last substep
     double hand_work = 0;                   ///< J, ∫ F_hand·dx since the start
-    double environment_work = 0;            ///< J, the same for the environment
-    double kinetic_energy = 0;              ///< J, of the device without the mass of the hand
+    double environment_work = 0;            ///< J, of the environment
+    double kinetic_energy = 0;              ///< J, excluding the mass of the hand
     double spring_energy = 0;               ///< J, of the structural mode
-    bool watchdog_fired = false;            ///< it ended the force during the last interval
+    bool watchdog_fired = false;            ///< during the last interval
   };
 
-  /// 10 s is much longer than any pause that a loop survives, and limits the cost of one `read` to 200 000 substeps,
-  /// about 10 ms.
+  /// Longer than any pause of a working loop. Limits the cost of a `read` to 200 000 substeps, about 10 ms.
   static constexpr Duration kMaxGap = std::chrono::seconds(10);
 
-  /// Fifty times the delay of a bus; a slower device is not a haptic one. It limits the number of forces in transit.
+  /// Fifty times the delay of a bus. Limits the number of forces that are stored.
   static constexpr Duration kMostDelay = std::chrono::milliseconds(100);
 
-  /// Throws std::invalid_argument, naming the field, its value and the expected range.
+  /// Throws std::invalid_argument with the field, its value and the expected range.
   explicit SimulatedDevice(Config config);
 
   const DeviceInfo& info() const noexcept override { return info_; }
 
-  /// Always returns a sample.
   std::optional<PositionSample> read(LocalTime now) noexcept override;
-  /// With `joint_friction`, returns the joints of its mechanism at the position returned by `read`.
+  /// With `joint_friction`, at the position returned by `read`.
   Joints joints(const Motion& hand) const noexcept override { return joints_ ? joints_->at(hand) : Joints{}; }
 
-  /// Returns the force after saturation. If a component is not finite, zero is held and returned. Ends torque and grip.
+  /// Returns the force after saturation, or zero for infinity and NaN. Also ends torque and grip.
   Vec3 apply(const Vec3& force) noexcept override;
 
-  /// Returns the effort after saturation: the wrench is reduced to `max_force` and `max_torque` by a common factor.
-  /// Torque and grip are zero without the corresponding motors. If a component is not finite, all of the effort is
-  /// zero.
+  /// Returns the effort after saturation, or zero for infinity and NaN. Force and torque are reduced by a common
+  /// factor. Torque and grip are zero if there is no such motor.
   Effort apply_all(const Effort& effort) noexcept override;
 
   void set_output(LocalTime now, std::uint32_t output, const OutputSetting& setting) noexcept override;
@@ -199,14 +188,13 @@ class SimulatedDevice final : public Device {
   const SimulatedOutputs& outputs() const noexcept { return outputs_; }
 
  private:
-  /// The amplifier over one substep of length h with the time constant τ.
+  /// Amplifier with the time constant τ, for a substep of length h.
   struct Lag {
     double reached = 1;     ///< 1 − e^(−h/τ)
     double h_over_tau = 0;  ///< h/τ
   };
-  /// Kind of Coulomb friction.
   enum class Rub : std::uint8_t { kNone, kHandle, kJoints };
-  /// What acts on the handle in addition to the hand.
+  /// In addition to the hand.
   enum class Far : std::uint8_t { kNone, kMode, kEnvironment };
   struct Effects {
     Rub rub = Rub::kNone;
@@ -222,7 +210,7 @@ class SimulatedDevice final : public Device {
       return 12 * static_cast<std::size_t>(rub) + (hand ? 6U : 0U) + (lag ? 3U : 0U) + static_cast<std::size_t>(far);
     }
   };
-  /// A mass in a substep, in kg. `resistance` adds h/2 times all coefficients of forces proportional to its velocity.
+  /// In kg. `resistance` also includes h/2 times all damping.
   struct Side {
     double mass = 0;
     double resistance = 0;
@@ -230,7 +218,7 @@ class SimulatedDevice final : public Device {
 
   Vec3 sensed_force() const noexcept;
   std::uint32_t pressed() const noexcept;
-  // Not inlined, so that a device without such parts only pays for a branch.
+  // Not inlined, so that other devices only pay for a branch.
   [[gnu::noinline]] Vec3 apply_alone(const Vec3& force) noexcept;
   Effort written(const Effort& effort) const noexcept;
   [[gnu::noinline]] Vec3 send(const Vec3& force) noexcept;
@@ -265,32 +253,32 @@ class SimulatedDevice final : public Device {
   std::optional<SimulatedRotation> rotation_;
   std::optional<SimulatedGripper> gripper_;
   SimulatedOutputs outputs_;
-  bool turns_or_grips_ = false;  ///< it has a rotation or a gripper
-  bool has_more_ = false;        ///< … or button presses
+  bool turns_or_grips_ = false;
+  bool has_more_ = false;  ///< including button presses
   Substeps take_substeps_;
   DeviceInfo info_;
   std::optional<LocalTime> last_read_;
-  Duration lived_{};             ///< time since the first read
-  Vec3 command_ = Vec3::Zero();  ///< N, held
+  Duration lived_{};             ///< since the first `read`
+  Vec3 command_ = Vec3::Zero();  ///< N
   std::optional<ForcesUnderWay> under_way_;
   Vec3 motor_velocity_ = Vec3::Zero();      ///< m/s, ẏ of a structural mode
   std::optional<Vec3> amplifier_force_;     ///< N, lags behind `command_`
-  std::optional<Duration> until_watchdog_;  ///< empty: expired, or no watchdog
-  double drive_work_ = 0;                   ///< J, work of the hand's spring and damper
+  std::optional<Duration> until_watchdog_;  ///< empty if expired or not used
+  double drive_work_ = 0;                   ///< J, of the hand's spring and damper
   Truth truth_;
 };
 
-/// Lower bounds of the friction for all positions and directions: the largest values that a limiter may assume.
+/// Lower bounds in all positions and directions, which can be used by a limiter.
 Friction least_friction(const SimulatedDevice::Config& config);
-/// Lower bounds at `position` (m) for all directions.
+/// Lower bounds at `position` (m) in all directions.
 Friction least_friction_at(const SimulatedDevice::Config& config, const Vec3& position);
 
-// The overloads of driver.h.
+// See driver.h.
 const Driver& driver(const SimulatedDevice::Config& config);
 SimulatedDevice::Config stand_in(const SimulatedDevice::Config& config);
 std::unique_ptr<Device> make(const SimulatedDevice::Config& config, FromOutside outside);
 
-/// A handle of 0.1 kg without any effects, for a device about which nothing else is known.
+/// 0.1 kg without other effects, for devices with unknown properties.
 SimulatedDevice::Config plain_stand_in(std::string name);
 
 }  // namespace tendon

@@ -11,10 +11,10 @@
 namespace tendon {
 namespace {
 
-/// Returns the component of `v` perpendicular to `normal`.
+/// Returns the component perpendicular to `normal`.
 Vec3 along_surface(const Vec3& v, const Vec3& normal) { return v - normal.dot(v) * normal; }
 
-/// Subtracts up to `most` of `moving`, a part of `momentum`. Returns true if that stops it.
+/// Reduces the part `moving` of `momentum` by up to `most`. Returns true if this part has stopped.
 bool brake(Vec3& momentum, const Vec3& moving, double most) {
   const double size = moving.norm();
   momentum -= size <= most ? moving : Vec3((most / size) * moving);

@@ -41,7 +41,7 @@ double SimulatedGripper::drive(double t) const noexcept {
 
 void SimulatedGripper::integrate(double begin, Duration::rep substeps, double h) noexcept {
   const double coulomb = config_.coulomb_friction.value_or(0);
-  double hands = 0;  // N·s/m, velocity-proportional part of the hand
+  double hands = 0;  // N·s/m, damping of the hand
   if (config_.hand) hands = config_.hand->damping + h / 2 * config_.hand->stiffness;
   const double resistance = config_.mass + h / 2 * (config_.viscous_friction.value_or(0) + hands);
   double& velocity = truth_.velocity;

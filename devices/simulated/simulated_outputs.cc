@@ -33,7 +33,7 @@ double SimulatedOutputs::amplitude(LocalTime now, std::uint32_t output) const no
   return pulse != nullptr && now - outputs_[output].since < pulse->duration ? pulse->amplitude : 0;
 }
 
-// Here, so that no compiler weighs it where a device's step is inlined.
+// Defined here because inlining it would affect a device's step.
 void SimulatedDevice::set_output(LocalTime now, std::uint32_t output, const OutputSetting& setting) noexcept {
   outputs_.set(now, output, setting);
 }

@@ -12,14 +12,12 @@
 namespace tendon {
 namespace {
 
-/// The angular velocity of rotation_by(φ(t)) in the base frame:
-///
-///     ω = φ̇ + (1 − cos φ)/φ² φ × φ̇ + (φ − sin φ)/φ³ φ × (φ × φ̇)
+/// In the base frame, for rotation_by(φ(t)): ω = φ̇ + (1 − cos φ)/φ² φ × φ̇ + (φ − sin φ)/φ³ φ × (φ × φ̇)
 Vec3 angular_velocity(const ScriptedMotion::Point& turn) noexcept {
   const Vec3& vector = turn.position;
   const double angle = vector.norm();
   double first = 0.5;
-  double second = 1.0 / 6;  // for smaller angles, the next terms of both series are lost in rounding
+  double second = 1.0 / 6;  // accurate for very small angles
   if (angle > 1e-8) {
     const double half = portable::sin(angle / 2);
     first = 2 * half * half / (angle * angle);

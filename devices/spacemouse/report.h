@@ -7,8 +7,8 @@
 #include <span>
 #include <variant>
 
-/// The HID input reports of a 3Dconnexion SpaceMouse: the report id, then little-endian integers. Source: free drivers
-/// (spacenavd, users of hidapi); the manufacturer publishes no documentation.
+/// HID input reports of a 3Dconnexion SpaceMouse: an id and little-endian integers. There is no official documentation;
+/// source: free drivers (spacenavd, users of hidapi).
 ///
 ///     id 1    X Y Z (7 bytes), or X Y Z Rx Ry Rz (13 bytes): int16 each, ±350 at the stops
 ///     id 2    Rx Ry Rz (7 bytes): older devices, in addition to id 1 with 7 bytes
@@ -16,10 +16,10 @@
 ///     id 23   battery of a wireless device
 namespace tendon::spacemouse {
 
-/// Raw values of the cap: X to the right, Y towards the user, Z down.
+/// Raw: X to the right, Y towards the user, Z down.
 using Axes = std::array<std::int16_t, 3>;
 
-/// Value at the stops; some devices report slightly more.
+/// At the stops; some devices exceed this slightly.
 inline constexpr double kFullDeflection = 350;
 
 struct Motion {
@@ -27,15 +27,14 @@ struct Motion {
   std::optional<Axes> rotation{};
 };
 struct Buttons {
-  std::uint32_t held = 0;  ///< the first 32 buttons
+  std::uint32_t held = 0;  ///< at most 32
 };
 struct Battery {
-  std::uint8_t percent = 0;  ///< first byte of the report, 0 to 100
+  std::uint8_t percent = 0;  ///< 0 to 100
 };
 using Report = std::variant<Motion, Buttons, Battery>;
 
-/// Parses a report whose first byte is its id. Returns nullopt for an unknown id and for a length that does not match
-/// the id. Thread-safe, realtime-safe.
+/// Returns nullopt if the id is unknown or its length is wrong. Thread-safe, realtime-safe.
 std::optional<Report> parse(std::span<const std::uint8_t> bytes) noexcept;
 
 }  // namespace tendon::spacemouse

@@ -15,10 +15,10 @@ namespace {
 
 using namespace std::chrono_literals;
 
-/// While the cap is pushed, reports arrive every 16 ms or faster.
+/// While the cap is pushed, there are reports every 16 ms or faster.
 constexpr Duration kHeld = 100ms;
 
-/// Maps the three axes of the cap to a vector that is 0 in the dead band and has length 1 at the stop.
+/// 0 in the dead band, length 1 at the stop.
 Vec3 rate_of(const spacemouse::Axes& cap, double dead_band) noexcept {
   const Vec3 push = Vec3(cap[0], -cap[2], cap[1]) / spacemouse::kFullDeflection;
   const double length = push.norm();

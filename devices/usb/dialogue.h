@@ -13,11 +13,8 @@
 
 namespace tendon::usb {
 
-/// The request and reply protocol between a driver and its device over a `Pipe`, for one connection after another. It
-/// tracks the connection, which requests are unanswered, how long the device has been silent, and how often errors
-/// occur. The driver interprets the bytes.
-///
-/// In each turn, the driver makes these calls in this order:
+/// Exchanges requests and answers with a device over a `Pipe`, and detects missing answers and errors. The bytes are
+/// interpreted by the driver, which must call in each turn:
 ///
 ///     begin(now)                       true: the connection has changed; the driver starts over with `restart`
 ///     receive(…)                       each packet; `hear` for an answer, and `believe` if it is plausible
@@ -25,52 +22,50 @@ namespace tendon::usb {
 ///     trusted()                        false after 10 ms without a plausible answer: no force
 ///     may_send(…), send(…)             the next request
 ///
-/// **Requests.** Up to `Patience::most_under_way` requests may be unanswered; one answer counts for all of them. When
-/// the oldest has waited for `Patience::answer`, they are considered lost, and the next request may be sent. A request
-/// that ends a force is always sent immediately.
+/// **Requests.** Up to `Patience::most_under_way` requests can be pending, and an answer completes all of them. After
+/// `Patience::answer`, they are considered lost and another request can be sent. Requests that end a force are always
+/// sent immediately.
 ///
-/// **Force.** The device is assumed to hold the last command until its own watchdog ends it.
+/// **Force.** The device is assumed to render the last command until its own watchdog expires.
 ///
 /// Thread-safe: `counts` from any thread, the others from one thread. Realtime-safe: all except the constructor.
 class Dialogue {
  public:
   struct Patience {
-    int most_under_way = 1;                          ///< maximum number of unanswered requests, ≥ 1
-    Duration answer = std::chrono::milliseconds(5);  ///< time after which an answer is late and the request is repeated
+    int most_under_way = 1;                          ///< maximum number of pending requests, ≥ 1
+    Duration answer = std::chrono::milliseconds(5);  ///< timeout of an answer
   };
 
-  /// After this long without a plausible answer (ten periods of 1 kHz), the device gets no force.
+  /// Ten periods of 1 kHz without a plausible answer, after which the force is zero.
   static constexpr Duration kQuiet = std::chrono::milliseconds(10);
-  /// After this much silence, the device is treated as disconnected; after this long without a plausible answer, its
-  /// encoders have lost counts. A loop that was suspended for this long finds the answers waiting and receives them
-  /// before it checks.
+  /// After this time without an answer, the device is considered unplugged; without a plausible answer, its encoders
+  /// have lost counts. If the loop itself was suspended, it first receives the pending answers.
   static constexpr Duration kLost = std::chrono::milliseconds(100);
-  /// Number of consecutive answers that must agree on whether a device is homed, because one corrupted byte can say
-  /// either.
+  /// Consecutive answers for detecting whether a device is homed, because a single byte may be corrupted.
   static constexpr int kSure = 10;
 
-  /// `watchdog` is the time after the last request at which the device itself ends a force; zero: none.
+  /// `watchdog` is the timeout of the device's own watchdog, or zero.
   explicit Dialogue(std::unique_ptr<Pipe> pipe, Duration watchdog = Duration::zero());
 
-  /// Begins a turn; all following calls happen at `now`. Returns true if the connection has changed since the last
-  /// turn. `connected` tells whether there is one.
+  /// Begins a turn. Returns true if the connection has changed (see `connected`).
   bool begin(LocalTime now) noexcept;
   bool connected() const noexcept { return connection_ != 0; }
   LocalTime now() const noexcept { return now_; }
 
-  /// Call after the device was opened or set up. No request is unanswered, and the device is assumed to hold no force.
+  /// Must be called after opening the device or setting it up. Clears all pending requests, and assumes that there is
+  /// no force.
   void restart(const Patience& patience) noexcept;
   void set_patience(const Patience& patience) noexcept { patience_ = patience; }
 
-  /// Passes each received packet to `take`, as std::span<const std::uint8_t>.
+  /// Calls take(std::span<const std::uint8_t>) for each packet.
   template <class Take>
   void receive(const Take& take) noexcept {
     std::array<std::uint8_t, kPacketSize> packet;
     while (const std::size_t size = pipe_->read(packet)) take(std::span<const std::uint8_t>(packet).first(size));
   }
-  /// Call for each well-formed answer.
+  /// For each well-formed answer.
   void hear() noexcept;
-  /// Call in addition if the answer is plausible.
+  /// For each plausible answer, after `hear`.
   void believe() noexcept;
 
   Duration since_heard() const noexcept { return now_ - heard_; }
@@ -80,15 +75,14 @@ class Dialogue {
 
   bool awaits_answer() const noexcept { return under_way_ > 0; }
   bool holds_force() const noexcept;
-  /// Returns true if a request may be sent now. `exerts` means that it commands a force other than zero.
+  /// `exerts` is true if the request commands a force other than zero.
   bool may_send(bool exerts) const noexcept;
-  /// Sends a request. Returns false, and changes nothing, if the pipe has no room.
+  /// Returns false if the pipe does not have enough room.
   bool send(std::span<const std::uint8_t> request, bool exerts) noexcept;
 
-  /// Closes the device, and opens it again if it is still plugged in.
   void reopen() noexcept { pipe_->reopen(); }
 
-  /// For transfers without an answer, such as the setup of a serial chip or a boot loader.
+  /// For transfers without an answer, for example to a serial chip or a boot loader.
   Pipe& pipe() noexcept { return *pipe_; }
 
   DeviceCountersKept& counters() noexcept { return counters_; }
@@ -103,11 +97,11 @@ class Dialogue {
   LocalTime now_{};
 
   Patience patience_;
-  int under_way_ = 0;      ///< number of requests sent since the last answer
-  bool answered_ = false;  ///< the device has answered since `restart`
-  LocalTime asked_{};      ///< time of the first unanswered request
+  int under_way_ = 0;      ///< pending requests
+  bool answered_ = false;  ///< since `restart`
+  LocalTime asked_{};      ///< time of the first pending request
   LocalTime told_{};       ///< time of the last request
-  bool exerts_ = false;    ///< the last request commanded a force
+  bool exerts_ = false;    ///< whether it commanded a force
   LocalTime heard_{};      ///< time of the last answer
   LocalTime believed_{};   ///< time of the last plausible answer
 

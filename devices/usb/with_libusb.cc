@@ -25,12 +25,11 @@ constexpr std::size_t kInTransfers = 4;
 constexpr std::size_t kOutTransfers = 4;
 constexpr unsigned kTransferTimeout_ms = 100;
 constexpr int kLookAgain_ms = 200;
-/// The haptic thread empties this ring in each period. It has room for the packets of an idle FTDI chip during a
-/// quarter of a second.
+/// Emptied in each haptic period. Large enough for a quarter of a second of an idle FTDI chip's packets.
 constexpr std::size_t kInPackets = 256;
 constexpr std::size_t kOutPackets = 16;
 
-/// The functions of libusb that are used. The library is loaded with the first pipe or the first call of plugged_in().
+/// Loaded when it is first used.
 struct Libusb {
   LateLibrary file{"libusb-1.0.so.0"};
   decltype(&::libusb_alloc_transfer) alloc_transfer = file["libusb_alloc_transfer"];
@@ -82,7 +81,6 @@ Context make_context() {
   return Context(context);
 }
 
-/// The devices that are connected when the list is created.
 class List {
  public:
   explicit List(libusb_context* context) { size_ = std::max<ssize_t>(0, libusb().get_device_list(context, &devices_)); }
@@ -105,7 +103,7 @@ PluggedIn describe(libusb_device* device) {
   if (libusb().get_device_descriptor(device, &descriptor) == LIBUSB_SUCCESS) {
     plugged.id = {descriptor.idVendor, descriptor.idProduct};
   }
-  std::array<std::uint8_t, 7> ports{};  // maximum number of tiers (USB 3.0, 8.9)
+  std::array<std::uint8_t, 7> ports{};  // maximum depth (USB 3.0, 8.9)
   const int count = libusb().get_port_numbers(device, ports.data(), static_cast<int>(ports.size()));
   plugged.port = std::to_string(libusb().get_bus_number(device));
   for (int i = 0; i < count; ++i) {
@@ -186,19 +184,19 @@ class LibusbPipe final : public Pipe {
   SpscRing<Order> orders_{kOutPackets};
   SpscRing<Packet> packets_{kInPackets};
   std::atomic<std::uint32_t> connection_{0};
-  std::atomic<std::uint32_t> to_end_{0};  ///< connection that the user wants to close
-  std::atomic<std::uint64_t> done_{0};    ///< number of orders that have succeeded or failed
+  std::atomic<std::uint32_t> to_end_{0};  ///< requested by the user
+  std::atomic<std::uint64_t> done_{0};    ///< completed or failed
   std::atomic<bool> stop_{false};
 
-  // Used only by the user's thread
+  // Only used by the user's thread
   std::uint32_t seen_ = 0;
   std::uint64_t accepted_ = 0;
 
-  // Used only by the pipe's thread
-  int node_ = -1;  ///< open while handle_ is set
+  // Only used by the pipe's thread
+  int node_ = -1;
   Handle handle_;
-  std::uint32_t number_ = 0;  ///< number of this connection, or of the last one if there is none
-  bool broken_ = false;       ///< a transfer has failed
+  std::uint32_t number_ = 0;  ///< of the current or last connection
+  bool broken_ = false;
   bool closing_ = false;
   std::string told_;
   std::vector<pollfd> descriptors_;
@@ -210,7 +208,7 @@ class LibusbPipe final : public Pipe {
 };
 
 LibusbPipe::LibusbPipe(const PipeConfig& config) : config_(config) {
-  // The node is opened elsewhere, so this must work without /dev/bus/usb.
+  // Works without /dev/bus/usb, because the node is opened elsewhere.
   if (config_.node) libusb().set_option(nullptr, LIBUSB_OPTION_NO_DEVICE_DISCOVERY);
   context_ = make_context();
   bell_ = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
@@ -238,7 +236,7 @@ LibusbPipe::~LibusbPipe() {
 
 void LibusbPipe::wake() noexcept {
   const std::uint64_t one = 1;
-  // Fails only if the counter of the eventfd would exceed 2^64 - 2.
+  // Can only fail after 2^64 - 2 calls.
   [[maybe_unused]] const ssize_t rung = ::write(bell_, &one, sizeof one);
 }
 
@@ -303,12 +301,12 @@ void LibusbPipe::tell(const std::string& why) {
 
 int LibusbPipe::open_node() {
   if (config_.node) return config_.node();
-  // Each search uses a new context. An existing context learns of new devices only from udevd, which is missing in some
+  // A new context for each attempt. Existing contexts use udevd for finding new devices, which is missing in some
   // containers and small systems.
   libusb_context* looking = nullptr;
   if (libusb().init(&looking) != LIBUSB_SUCCESS) return -1;
   const Context look(looking);
-  std::string why;  // empty: the device is not connected, which is not an error
+  std::string why;  // empty if the device is not plugged in
   for (libusb_device* device : List(look.get())) {
     const PluggedIn plugged = describe(device);
     if (std::ranges::find(config_.ids, plugged.id) == config_.ids.end()) continue;
@@ -328,8 +326,7 @@ bool LibusbPipe::open() {
   int error = libusb().wrap_sys_device(context_.get(), node_, &handle);
   handle_.reset(handle);
   if (error == LIBUSB_SUCCESS) {
-    // A SpaceMouse is claimed by the kernel driver usbhid. FTDI's driver does not claim a Falcon unless a user has
-    // added its id.
+    // usbhid uses the SpaceMouse. FTDI's driver uses the Falcon only if a user has added its id.
     libusb().set_auto_detach_kernel_driver(handle, 1);
     error = libusb().claim_interface(handle, 0);
   }
@@ -373,7 +370,7 @@ bool LibusbPipe::sending() const noexcept { return control_.under_way || std::ra
 
 bool LibusbPipe::under_way() const noexcept { return sending() || std::ranges::any_of(in_, &Slot::under_way); }
 
-// Control and bulk transfers are not ordered relative to each other, so neither kind starts before the other has ended.
+// Control and bulk transfers are not ordered relative to each other, so they must not overlap.
 void LibusbPipe::obey() {
   while (const Order* order = orders_.front()) {
     if (broken_ || order->packet.connection != number_) {
@@ -397,7 +394,7 @@ void LibusbPipe::obey() {
       submit(*slot);
     }
     orders_.pop();
-    if (broken_) done_.fetch_add(1, std::memory_order_release);  // there will be no callback to count it
+    if (broken_) done_.fetch_add(1, std::memory_order_release);  // not counted by a callback
   }
 }
 
@@ -411,7 +408,7 @@ void LibusbPipe::discard() {
 void LibusbPipe::close() {
   connection_.store(0, std::memory_order_release);
   closing_ = true;
-  // The last accepted packet may be the zero force.
+  // The last packet may contain the zero force.
   while (!broken_ && (orders_.front() != nullptr || sending())) {
     obey();
     if (!broken_ && sending()) wait(-1);
@@ -439,7 +436,7 @@ void LibusbPipe::look_at_descriptors() {
   libusb().free_pollfds(all);
 }
 
-// libusb's own wait function watches only libusb's descriptors; this one also wakes up for the eventfd.
+// Also waits for the eventfd, unlike libusb's own function.
 void LibusbPipe::wait(int most_ms) {
   timeval due{};
   if (libusb().get_next_timeout(context_.get(), &due) == 1) {

@@ -20,7 +20,7 @@ double radius_of(const Model& model, const Vec3& angles) {
 
 Vec3 origin_of(const Model& model) { return {model.origin[0], model.origin[1], model.origin[2]}; }
 
-/// N·m at the body per A in the motor.
+/// N·m at the body per A.
 Vec3 torques_per_ampere(const Model& model) {
   Vec3 torques;
   for (std::size_t i = 0; i < model.joints.size(); ++i) {

@@ -8,13 +8,11 @@
 #include "core/base/motion.h"
 #include "devices/woodenhaptics/model.h"
 
-/// Kinematics of the arms: the position of the tip from the three encoders, and the currents that render a given force.
-/// The source is haptikfabrikenapi's src/kinematics.cpp, for every model except Polhem v2 and v3.
+/// Kinematics of the arms, from haptikfabrikenapi's src/kinematics.cpp, for all models except Polhem v2 and v3.
 ///
-/// The frame is that of the arm: z up, x from the column to the tip when A is 0, y completing a right-handed frame, in
-/// m, with the origin in the middle of the published workspace. B is measured from the upward vertical and C from the
-/// downward vertical. Both are absolute angles of their link and not relative to the previous link, because the motor
-/// of C stands on body A. With lengths Lₐ, L_b, L_c and origin o:
+/// The frame has its origin in the middle of the published workspace, z up, x from the column to the tip when A is 0,
+/// in m. B is measured from the upward vertical and C from the downward vertical. Both are absolute angles, because the
+/// motor of C is mounted on body A. With lengths Lₐ, L_b, L_c and origin o:
 ///
 ///     ρ = L_b sin B + L_c sin C
 ///     p = (ρ cos A, ρ sin A, Lₐ + L_b cos B − L_c cos C) − o
@@ -30,10 +28,10 @@
 /// All functions are thread-safe and realtime-safe.
 namespace tendon::woodenhaptics {
 
-/// Counts of the three encoders. They do not wrap, unlike the 16 bits that the device sends.
+/// Encoder counts without the overflow of 16 bits.
 using Counts = std::array<std::int32_t, 3>;
 
-/// Currents of the three motors, mA.
+/// mA, for each motor.
 using Currents = std::array<std::int16_t, 3>;
 
 Vec3 angles_at(const Model& model, const Counts& counts) noexcept;
@@ -44,25 +42,22 @@ struct Pose {
   Mat3 jacobian;  ///< m/rad: dposition = jacobian · dangles
 };
 
-/// Returns the pose with these angles, which always exists.
 Pose pose_with(const Model& model, const Vec3& angles) noexcept;
 
-/// Returns the pose at `position` in closed form. Returns nullopt if the links do not reach it, on the axis of the
-/// column, and for NaN.
+/// Returns nullopt if the arm does not reach `position`, on the axis of the column, and for NaN. Closed form.
 std::optional<Pose> pose_at(const Model& model, const Vec3& position) noexcept;
 
-/// Returns the factor by which a force is scaled in this pose: 1, decreasing to 0 near a singular pose. There the
-/// motors cannot render forces in all directions, and the rendered force is known poorly. With e and ρ as above:
+/// Returns a factor for reducing forces near singular poses, where the motors cannot render all directions, and the
+/// rendered force is not known accurately. With e and ρ as above:
 ///
 ///     min((sin e − 0.1) / 0.1, (ρ − 20 mm) / 20 mm), clamped to 0 … 1
 double force_share(const Model& model, const Pose& pose) noexcept;
 
-/// Returns the currents closest to `force` (N, on the hand) times force_share(). If one exceeds ±`most` (mA, at most 32
-/// 767), all three are reduced by the same factor, so that 16 bits never wrap. Rounds towards zero. A force that is not
-/// finite counts as zero.
+/// Returns the currents for `force` (N, on the hand) times force_share(), rounded towards zero. If a current exceeds
+/// ±`most` (mA, at most 32 767), all of them are reduced by the same factor. Infinity and NaN are treated as zero.
 Currents currents_for(const Model& model, const Pose& pose, const Vec3& force, double most) noexcept;
 
-/// Returns the force (N, on the hand) of these currents, or nullopt if force_share() is 0.
+/// In N, on the hand. Returns nullopt if force_share() is 0.
 std::optional<Vec3> force_of(const Model& model, const Pose& pose, const Currents& currents) noexcept;
 
 }  // namespace tendon::woodenhaptics

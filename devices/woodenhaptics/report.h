@@ -27,19 +27,19 @@ using ReportBytes = std::array<std::uint8_t, kReportBytes>;
 
 ReportBytes encode(const Currents& currents) noexcept;
 
-/// Command 1: sets the counters of the three motors to `counters` and those of the gimbal to 0.
+/// Command 1. The counters of the gimbal are set to 0.
 ReportBytes encode_calibration(const Currents& counters) noexcept;
 
 struct Report {
-  std::array<std::int16_t, 6> counters{};  ///< a b c of the motors, which wrap; d e f of the gimbal, 0 without a gimbal
-  bool calibrate = false;                  ///< the calibrate button was pressed
+  std::array<std::int16_t, 6> counters{};  ///< a b c of the motors; d e f of the gimbal, or 0
+  bool calibrate = false;
 };
 
-/// Parses a report. Returns nullopt if the length is wrong or `info` is neither 0 nor 1. Thread-safe, realtime-safe.
+/// Returns nullopt if the length or `info` is invalid. Thread-safe, realtime-safe.
 std::optional<Report> parse(std::span<const std::uint8_t> bytes) noexcept;
 
-/// Returns true if the switch at the tip is closed, which some arms have. The host library interprets counter d above
-/// 5000 as a closed switch. The published firmware never sets it.
+/// The switch at the tip, which only some arms have. The host library compares counter d with 5000; the published
+/// firmware never sets it.
 inline bool switch_is_closed(const Report& report) noexcept { return report.counters[3] > 5000; }
 
 }  // namespace tendon::woodenhaptics

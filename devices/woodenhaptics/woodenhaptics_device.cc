@@ -25,23 +25,23 @@ using woodenhaptics::Report;
 
 constexpr Currents kNoCurrent{};
 
-/// A board that was just switched on flashes its lamps for a second before it listens. Until then it can accept one
-/// report; a second one would wait until its transfer fails.
+/// After power-on, the lamps of the board flash for a second. In the meantime it accepts a single report, and a second
+/// one would time out.
 constexpr usb::Dialogue::Patience kWhileItStarts{.most_under_way = 1, .answer = 1500ms};
-/// An answer takes 2 ms: one frame of the bus in each direction.
+/// An answer takes 2 ms, a frame in each direction.
 constexpr usb::Dialogue::Patience kPatience{.most_under_way = 2, .answer = 5ms};
 
-/// If the board still requests calibration this long after command 1, a newer report has overtaken the command.
+/// If the board still requests calibration, command 1 was replaced by a newer report.
 constexpr Duration kCalibrateAgain = 20ms;
 
-/// rad/s of a body: 5 m/s at 0.1 m from the axis of the column, and more at the end of either link. A released handle
-/// does not reach this within the workspace.
+/// rad/s: 5 m/s at 0.1 m from the axis of the column, and more at the end of each link. Even a released handle does not
+/// move this fast within the workspace.
 constexpr double kMostSpeed = 50;
-/// rad/s of a body while the operator holds the arm in its calibration pose.
+/// rad/s, while the arm is held in its calibration pose.
 constexpr double kStillSpeed = 2;
-/// Tolerance for reports that arrive at shorter intervals than they were sampled.
+/// For reports that arrive at irregular intervals.
 constexpr double kMoreCounts = 30;
-/// A quarter turn of a 16-bit counter. For larger steps, the direction would be ambiguous.
+/// A quarter turn of a 16-bit counter, beyond which the direction is ambiguous.
 constexpr double kMostStep = 16'384;
 
 const Model& checked(const Model* model) {
@@ -59,7 +59,7 @@ Vec3 counts_per_radian(const Model& model) {
 DeviceInfo WoodenHapticsDevice::info_of(const Model& model) {
   const auto centre = woodenhaptics::pose_at(model, Vec3::Zero());
   const Vec3 radians = counts_per_radian(model).cwiseInverse();
-  double force = 0;  // 1 mA of each motor, in the worst combination
+  double force = 0;  // 1 mA for each motor, worst case
   for (const Currents& one : {Currents{1, 0, 0}, Currents{0, 1, 0}, Currents{0, 0, 1}}) {
     force += woodenhaptics::force_of(model, *centre, one)->norm();
   }
@@ -133,7 +133,7 @@ Counts WoodenHapticsDevice::steps_to(const Report& report) const noexcept {
   if (!newest_) return steps;
   for (std::size_t i = 0; i < steps.size(); ++i) {
     const int step = int{report.counters[i]} - int{newest_->counters[i]};
-    steps[i] = static_cast<std::int16_t>(static_cast<std::uint16_t>(step));  // the shorter way around
+    steps[i] = static_cast<std::int16_t>(static_cast<std::uint16_t>(step));  // shorter way around
   }
   return steps;
 }
@@ -148,7 +148,7 @@ bool WoodenHapticsDevice::plausible(const Counts& steps) const noexcept {
 }
 
 void WoodenHapticsDevice::believe(const Report& report) noexcept {
-  // There was no request yet, so this report may date from the previous host.
+  // Before the first request, reports may be old.
   if (state() == State::kOpening && !dialogue_.awaits_answer()) return;
   const Counts steps = steps_to(report);
   const bool in_step = plausible(steps);
@@ -220,7 +220,7 @@ void WoodenHapticsDevice::write(const Currents& wanted) noexcept {
   if (!dialogue_.send(report, wanted != kNoCurrent)) return;
   if (calibrate) {
     calibrated_ = dialogue_.now();
-    asking_replies_ = 0;  // only later reports can request it again
+    asking_replies_ = 0;
   }
   held_ = wanted;
 }
@@ -231,7 +231,7 @@ Vec3 WoodenHapticsDevice::apply(const Vec3& force) noexcept {
   const Currents wanted = ready ? woodenhaptics::currents_for(model_, pose_, force, most_ma_) : kNoCurrent;
   if (dialogue_.may_send(wanted != kNoCurrent)) write(wanted);
   if (!dialogue_.holds_force()) return Vec3::Zero();
-  // In a singular pose the force is unknown, so the last known one is kept.
+  // Use the last known force if the pose is singular.
   held_force_ = woodenhaptics::force_of(model_, pose_, held_).value_or(held_force_);
   return held_force_;
 }
