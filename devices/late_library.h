@@ -5,7 +5,7 @@
 
 namespace tendon {
 
-/// Loads a shared library, which stays loaded until the process ends. Used for libraries that most scenes do not need,
+/// Loads a shared library and keeps it loaded until the process ends. Used for libraries that most scenes do not need,
 /// to save the memory used by them and their dependencies.
 ///
 ///     struct Libusb {

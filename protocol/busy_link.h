@@ -31,7 +31,7 @@ class BusyLink : public Link {
   void send(const Address& to, std::span<const std::byte> datagram) override { link_.send(to, datagram); }
   std::size_t receive(Address& from, std::span<std::byte> buffer) override;
   LocalTime present(LocalTime now) const override { return link_.present(now); }
-  /// Returns the time of the look that took the datagram, if a look took it.
+  /// If the datagram was taken by look(), this is the time of that call.
   LocalTime arrived(LocalTime now) const override { return by_look_ ? std::max(now, looked_) : link_.arrived(now); }
 
  private:

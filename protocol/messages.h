@@ -53,13 +53,13 @@ enum class Code : std::uint8_t {
 /// Server → client, unreliable, newest wins for each device: the device at one haptic step.
 struct DeviceState {
   std::uint64_t tick = 0;
-  PeerTime sampled{};                 ///< on the server's clock
+  PeerTime sampled{};                 ///< time of the position, on the server's clock
   Vec3 position = Vec3::Zero();       ///< m
   Vec3 velocity = Vec3::Zero();       ///< m/s
   Vec3 force_applied = Vec3::Zero();  ///< N, actually rendered from this step on
   double energy = 0;                  ///< J, of the energy ledger
-  double permitted_force = 0;         ///< N, by the limiter; may be +infinity
-  std::uint32_t reasons = 0;          ///< bits of Reason for reducing the force
+  double permitted_force = 0;         ///< N, bound of the limiter; may be +infinity
+  std::uint32_t reasons = 0;          ///< bits of Reason for changing the force
   std::uint64_t force_sequence = 0;   ///< of the rendered ForceCommand, or 0
   Duration force_age{};               ///< since the arrival of that force
   Mode mode = Mode::kIdle;
@@ -163,7 +163,7 @@ enum class Safety : std::uint8_t {
 using LatenessHistogram = std::array<std::uint64_t, limits::kLatenessBuckets>;
 
 constexpr std::size_t lateness_bucket(Duration late) noexcept {
-  // 2 µs, for example, is in the lower bucket
+  // Rounds down, but 2 µs, for example, belongs to the lower bucket.
   const std::int64_t us = late.count() <= 0 ? 0 : (late.count() - 1) / 1000;
   const auto bucket = static_cast<std::size_t>(std::bit_width(static_cast<std::uint64_t>(us)));
   return std::min(bucket, limits::kLatenessBuckets - 1);
@@ -191,7 +191,7 @@ struct DeviceReport {
   /// The sum can be less than `steps` if the server lost count.
   LatenessHistogram lateness{};
   Safety safety = Safety::kAbsent;
-  std::string fault{};     ///< reason for being disarmed; at most 128 bytes
+  std::string fault{};     ///< why there is no force; at most 128 bytes
   std::string degraded{};  ///< services reduced by the server; at most 128 bytes
 };
 
@@ -277,7 +277,7 @@ struct Couple {
   double position_scale = 1;  ///< follower / leader
   double force_scale = 1;     ///< leader / follower
   Quat rotation{};            ///< leader's base frame → follower's
-  std::uint32_t axes = 7;     ///< bits 1, 2, 4: x, y, z of the leader
+  std::uint32_t axes = 7;     ///< coupled axes of the leader: 1 x, 2 y, 4 z
   double stiffness = 0;       ///< N/m, felt by the leader, like the dampings
   double mutual_damping = 0;  ///< N·s/m
   double damping = 0;         ///< N·s/m
@@ -332,7 +332,7 @@ struct ChannelDescription {
   std::string holder{};  ///< empty if the channel is free; cut to 24 bytes
 };
 
-/// Unknown values are 0, unless 0 is a possible value.
+/// Describes a device. Unknown values are 0, unless 0 is a possible value.
 struct DeviceDescription {
   struct Box {
     Vec3 min = Vec3::Zero();  ///< m
@@ -354,7 +354,7 @@ struct DeviceDescription {
 
 enum class Hand : std::uint8_t { kAny = 0, kLeft = 1, kRight = 2 };
 
-/// This is a separate message, because together with the longest DeviceDescription it is too large for a datagram.
+/// Describes the handle of a device. This is a separate message, because together with the longest DeviceDescription it is too large for a datagram.
 struct HandleDescription {
   std::uint32_t device = 0;
   /// Device base frame → operator's frame: x right, y up, z to the user (core/base/frames.h). Empty if unknown.
@@ -372,8 +372,9 @@ struct HandleDescription {
   std::vector<OutputDescription> outputs{};
 };
 
-/// Features, which are used if both peers name them. Forces can include a local model, which the server evaluates at
-/// the position of the hand.
+// Features are only used if both peers name them.
+
+/// Forces can include a local model, which the server evaluates at the position of the hand.
 inline constexpr std::string_view kFeatureLocalModel = "local-model";
 /// Claims use the names of devices and channels, and the client is notified if it loses a lease.
 inline constexpr std::string_view kFeatureChannels = "channels";
@@ -437,7 +438,7 @@ struct Welcome {
   double max_force = 0;            ///< N
   double position_resolution = 0;  ///< m
   std::uint32_t loop_hz = 0;
-  Duration timeout{};  ///< for dropping a silent client
+  Duration timeout{};  ///< maximum silence of the client
   std::string server;  ///< name and version
   /// In the order of the claims. The fields from device_name to loop_hz describe the first device. Empty if the server
   /// does not support claims.

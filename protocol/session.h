@@ -23,11 +23,11 @@ namespace tendon {
 struct LinkStats {
   std::uint64_t datagrams_sent = 0;
   std::uint64_t datagrams_received = 0;  ///< accepted
-  std::uint64_t lost = 0;                ///< packet numbers not seen so far
-  std::uint64_t lost_outgoing = 0;       ///< according to the peer's ack vectors
-  std::uint64_t seen_outgoing = 0;       ///< according to the peer's ack vectors
+  std::uint64_t lost = 0;                ///< packet numbers of the peer not yet seen
+  std::uint64_t lost_outgoing = 0;       ///< missing in the peer's ack vectors
+  std::uint64_t seen_outgoing = 0;       ///< received, in the peer's ack vectors
   std::uint64_t reordered = 0;           ///< accepted, but not the newest
-  std::uint64_t duplicated = 0;          ///< or too old to tell, or a late handshake datagram
+  std::uint64_t duplicated = 0;          ///< also too old, or a late handshake datagram
   std::uint64_t malformed = 0;           ///< not a datagram of this conversation
   std::uint64_t forged = 0;              ///< not authentic, or damaged in transit
   std::uint64_t old_key = 0;             ///< key expired or not yet known

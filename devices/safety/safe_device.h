@@ -200,7 +200,7 @@ class SafeDevice final : public Device {
   std::optional<LocalTime> now_;
   Duration passed_{};  ///< since the previous `read`
   std::optional<PositionSample> last_;
-  /// Where and when the handle came to rest, if known.
+  /// When and where the handle stopped. Empty if it is not known to be at rest.
   std::optional<PositionSample> rest_;
   LocalTime heard_at_{};  ///< time of the newest valid sample
   LocalTime applied_at_{};

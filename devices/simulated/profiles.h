@@ -13,7 +13,7 @@ namespace tendon {
 
 /// Starting with the most reliable.
 enum class Provenance {
-  kMeasured,  ///< by us, on a real device
+  kMeasured,  ///< measured by us on a real device
   kQuoted,    ///< read in the source, or computed from it
   kRecalled,  ///< quoted from memory; must be checked
   kAssumed,   ///< for the given reason

@@ -123,7 +123,7 @@ class SimulatedDevice final : public Device {
     std::optional<OperatorHand::Config> hand;
     /// When the hand permanently releases the handle, relative to the first `read`. Its mass is also removed.
     std::optional<Duration> lets_go_after{};
-    std::optional<Duration> button_after;  ///< when button 0 is pressed and held
+    std::optional<Duration> button_after;  ///< since the first `read`, for holding button 0
     struct Press {
       std::uint32_t button = 0;  ///< bit in PositionSample::buttons, below 32
       Duration from{};           ///< since the first `read`, ≥ 0

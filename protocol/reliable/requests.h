@@ -54,7 +54,7 @@ class OutgoingRequests {
   LocalTime first_due_time() const noexcept;
 
   std::array<Slot, limits::kRequestWindow> slots_;
-  std::uint32_t oldest_ = 1;  ///< whose answer was not returned yet
+  std::uint32_t oldest_ = 1;  ///< oldest request without a returned answer
   std::uint32_t next_ = 1;
 };
 

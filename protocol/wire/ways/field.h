@@ -84,7 +84,7 @@ struct Period {
   }
 };
 
-/// Also for the time between PortStates. Receivers refuse 0.
+/// Used for the validity of forces and the period of PortStates. Receivers refuse 0.
 inline constexpr Period kValidity{std::chrono::microseconds(1), Duration(1), limits::kMaxValidFor, Period::Else::kZero};
 /// The largest number marks an invalid value, which is never granted.
 inline constexpr Period kMaxSilence{
