@@ -354,7 +354,8 @@ struct DeviceDescription {
 
 enum class Hand : std::uint8_t { kAny = 0, kLeft = 1, kRight = 2 };
 
-/// Describes the handle of a device. This is a separate message, because together with the longest DeviceDescription it is too large for a datagram.
+/// Describes the handle of a device. This is a separate message, because together with the longest DeviceDescription it
+/// is too large for a datagram.
 struct HandleDescription {
   std::uint32_t device = 0;
   /// Device base frame → operator's frame: x right, y up, z to the user (core/base/frames.h). Empty if unknown.

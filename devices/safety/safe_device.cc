@@ -14,8 +14,8 @@ namespace tendon {
 
 namespace {
 
-/// A handle is at rest if it has not moved during this time. At the turning points of a tremor (8 to 12 Hz), the pause is
-/// shorter.
+/// A handle is at rest if it has not moved during this time. At the turning points of a tremor (8 to 12 Hz), the pause
+/// is shorter.
 constexpr Duration kRest = std::chrono::milliseconds(50);
 /// Shorter gaps between samples are allowed, because USB replies jitter.
 constexpr Duration kBlind = std::chrono::milliseconds(10);
