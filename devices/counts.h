@@ -27,8 +27,8 @@ enum class DeviceCount : std::uint8_t {
 /// degraded device.
 struct DeviceCounter {
   DeviceCount count;
-  std::string_view name;      ///< key in `tendond --json`
-  std::string_view meaning;   ///< for people
+  std::string_view name;  ///< key in `tendond --json`
+  std::string_view meaning;
   std::string_view degraded;  ///< sent to observers, if not empty
 };
 

@@ -14,12 +14,12 @@ namespace tendon {
 
 struct DeviceInfo {
   std::string name;
-  double max_force = 0;               ///< N, maximum norm
-  double position_resolution = 0;     ///< m, encoder count at the handle; 0 = exact
-  double force_resolution = 0;        ///< N, accuracy of the written force; 0 = exact
-  bool measures_orientation = false;  ///< in every sample
-  double max_torque = 0;              ///< N·m, maximum norm; 0 = no torque
-  double angular_resolution = 0;      ///< rad, encoder count; 0 = exact
+  double max_force = 0;            ///< N, maximum norm
+  double position_resolution = 0;  ///< m, encoder count at the handle; 0 = exact
+  double force_resolution = 0;     ///< N, accuracy of the written force; 0 = exact
+  bool measures_orientation = false;
+  double max_torque = 0;          ///< N·m, maximum norm; 0 = no torque
+  double angular_resolution = 0;  ///< rad, encoder count; 0 = exact
   struct Gripper {
     double open = 0;       ///< rad, fully open
     double arm = 0;        ///< m/rad, travel between the fingers

@@ -55,7 +55,7 @@ class Connection {
   struct Ended {
     Cause cause;
     Code code;
-    std::string reason;  ///< from the server, if available
+    std::string reason;
   };
   /// Never contains Session::Closed, which is reported as Ended.
   using Event = std::variant<GreetingDue, Opened, Ended, const Session::Event*>;
@@ -108,8 +108,8 @@ class Connection {
   std::optional<Session> session_;
   LinkStats last_stats_;
   std::uint64_t strangers_ = 0;
-  LocalTime give_up_{};  ///< end of the current attempt
-  LocalTime retry_{};    ///< start of the next attempt
+  LocalTime give_up_{};
+  LocalTime retry_{};
   Duration back_off_;
   int left_ = 0;  ///< datagrams left in this turn
   bool more_ = false;

@@ -44,7 +44,7 @@ class LeaseRequest {
   bool keep_asking_;
   Grant place_{};
   bool holds_ = false;
-  std::optional<std::uint32_t> asked_;  ///< the pending request
+  std::optional<std::uint32_t> asked_;
   LocalTime ask_at_ = LocalTime::max();
 };
 

@@ -40,7 +40,7 @@ enum class Code : std::uint8_t {
   kInvalid = 2,
   kUnsupported = 3,  ///< unknown request or version
   kBusy = 4,         ///< used by another controller
-  kDenied = 5,       ///< not allowed for this role
+  kDenied = 5,
   kShutdown = 6,
   kTimedOut = 7,
   kExpired = 8,   ///< the session is too old; repeat the handshake
@@ -181,7 +181,7 @@ struct PortFrame : PortState {
 /// observers with kFeatureDiagnostics.
 struct DeviceReport {
   std::uint64_t number = 0;
-  PeerTime until{};  ///< end of the span, on the server's clock
+  PeerTime until{};
   Duration span{};
   std::uint32_t device = 0;
   std::uint64_t steps = 0;
@@ -343,7 +343,7 @@ struct DeviceDescription {
   std::string model{};             ///< at most 64 bytes
   std::uint32_t position_dof = 3;  ///< measured axes, 1 … 6
   std::uint32_t force_dof = 3;     ///< actuated axes, 1 … 6
-  std::optional<Box> workspace{};  ///< of the handle
+  std::optional<Box> workspace{};
   double max_force = 0;            ///< N, maximum norm
   double continuous_force = 0;     ///< N, without a time limit
   double max_stiffness = 0;        ///< N/m, rendered stably
@@ -433,14 +433,14 @@ struct Hello {
 
 struct Welcome {
   std::uint32_t version = 0;
-  std::vector<std::string> features;  ///< common features
+  std::vector<std::string> features;
   Role role = Role::kObserver;
   std::string device_name;
   double max_force = 0;            ///< N
   double position_resolution = 0;  ///< m
   std::uint32_t loop_hz = 0;
   Duration timeout{};  ///< maximum silence of the client
-  std::string server;  ///< name and version
+  std::string server;
   /// In the order of the claims. The fields from device_name to loop_hz describe the first device. Empty if the server
   /// does not support claims.
   std::vector<Grant> grants{};

@@ -22,21 +22,21 @@ namespace tendon {
 /// `malformed`, `forged` and `old_key`.
 struct LinkStats {
   std::uint64_t datagrams_sent = 0;
-  std::uint64_t datagrams_received = 0;  ///< accepted
-  std::uint64_t lost = 0;                ///< packet numbers of the peer not yet seen
-  std::uint64_t lost_outgoing = 0;       ///< missing in the peer's ack vectors
-  std::uint64_t seen_outgoing = 0;       ///< received, in the peer's ack vectors
-  std::uint64_t reordered = 0;           ///< accepted, but not the newest
-  std::uint64_t duplicated = 0;          ///< also too old, or a late handshake datagram
-  std::uint64_t malformed = 0;           ///< not a datagram of this conversation
-  std::uint64_t forged = 0;              ///< not authentic, or damaged in transit
-  std::uint64_t old_key = 0;             ///< key expired or not yet known
-  std::uint64_t invalid = 0;             ///< frames with a value out of bounds (NaN, Inf …)
-  std::uint64_t stale = 0;               ///< frames not newer than the newest one
-  RefusedForces refused_forces{};        ///< of `invalid` and `stale`, those caused by an engine
-  Duration round_trip{};                 ///< newest sample, (T4 − T1) − (T3 − T2); 0: none
-  Duration smoothed_round_trip{};        ///< RFC 6298 SRTT
-  Duration round_trip_variation{};       ///< RFC 6298 RTTVAR
+  std::uint64_t datagrams_received = 0;
+  std::uint64_t lost = 0;           ///< packet numbers of the peer not yet seen
+  std::uint64_t lost_outgoing = 0;  ///< missing in the peer's ack vectors
+  std::uint64_t seen_outgoing = 0;  ///< received, in the peer's ack vectors
+  std::uint64_t reordered = 0;      ///< accepted, but not the newest
+  std::uint64_t duplicated = 0;     ///< also too old, or a late handshake datagram
+  std::uint64_t malformed = 0;      ///< not a datagram of this conversation
+  std::uint64_t forged = 0;         ///< not authentic, or damaged in transit
+  std::uint64_t old_key = 0;        ///< key expired or not yet known
+  std::uint64_t invalid = 0;        ///< frames with a value out of bounds (NaN, Inf …)
+  std::uint64_t stale = 0;          ///< frames not newer than the newest one
+  RefusedForces refused_forces{};   ///< of `invalid` and `stale`, those caused by an engine
+  Duration round_trip{};            ///< newest sample, (T4 − T1) − (T3 − T2); 0: none
+  Duration smoothed_round_trip{};   ///< RFC 6298 SRTT
+  Duration round_trip_variation{};  ///< RFC 6298 RTTVAR
 };
 
 /// A conversation between a client and a server, used by both. It does not use sockets, clocks, threads or random

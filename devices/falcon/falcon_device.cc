@@ -186,7 +186,7 @@ void FalconDevice::advance() noexcept {
           break;
         case falcon::FirmwareLoader::Progress::kDone:
           loaded_ = true;
-          moved_origin_ = false;  // the device was reset
+          moved_origin_ = false;
           enter(State::kOpening);
           break;
         case falcon::FirmwareLoader::Progress::kFailed:

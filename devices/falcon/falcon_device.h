@@ -78,7 +78,7 @@ class FalconDevice final : public Device {
   std::vector<std::uint8_t> firmware_;
   usb::Dialogue dialogue_;
   std::atomic<State> state_{State::kAbsent};
-  LocalTime entered_{};  ///< when the current state was entered
+  LocalTime entered_{};
 
   usb::ftdi::Setup setup_{{}};
   bool set_up_ = false;
@@ -87,13 +87,13 @@ class FalconDevice final : public Device {
   bool resting_ = false;  ///< without firmware, or after a failure
 
   falcon::ReplyParser parser_;
-  std::optional<falcon::Reply> newest_{};  ///< last plausible reply
-  bool fresh_ = false;                     ///< located in this `read`
-  int homed_replies_ = 0;                  ///< consecutive replies, < 0 if not homed
-  bool moved_origin_ = false;              ///< encoders have lost counts
-  std::optional<falcon::Pose> pose_{};     ///< last known pose
-  bool located_ = false;                   ///< whether newest_ has a pose
-  falcon::Counts held_{};                  ///< last torques sent
+  std::optional<falcon::Reply> newest_{};
+  bool fresh_ = false;         ///< located in this `read`
+  int homed_replies_ = 0;      ///< consecutive replies, < 0 if not homed
+  bool moved_origin_ = false;  ///< encoders have lost counts
+  std::optional<falcon::Pose> pose_{};
+  bool located_ = false;
+  falcon::Counts held_{};
   std::uint8_t ready_lamps_ = falcon::kGreen;
 };
 

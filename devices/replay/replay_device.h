@@ -55,7 +55,7 @@ class ReplayDevice final : public Device {
 
   Config config_;
   DeviceInfo info_;
-  Duration round_;  ///< period of repetition
+  Duration round_;
   std::optional<LocalTime> start_{};
   // Numbers continue to increase when the samples are repeated.
   std::uint64_t next_ = 0;        ///< not yet returned or skipped

@@ -98,7 +98,7 @@ class Guardian {
   std::thread parent_;
   pid_t pid_ = -1;
   int socket_ = -1;
-  Heartbeat* hearts_ = nullptr;  ///< shared memory for kDevices
+  Heartbeat* hearts_ = nullptr;
 };
 
 }  // namespace tendon

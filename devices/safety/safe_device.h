@@ -198,11 +198,11 @@ class SafeDevice final : public Device {
   bool disarmed_ = false;                       ///< by the operator, until `arm`
 
   std::optional<LocalTime> now_;
-  Duration passed_{};  ///< since the previous `read`
+  Duration passed_{};
   std::optional<PositionSample> last_;
   /// When and where the handle stopped. Empty if it is not known to be at rest.
   std::optional<PositionSample> rest_;
-  LocalTime heard_at_{};  ///< time of the newest valid sample
+  LocalTime heard_at_{};
   LocalTime applied_at_{};
   LocalTime armed_at_{};
   Effort applied_;  ///< what the device actually renders

@@ -24,7 +24,7 @@ std::string_view to_string(Provenance provenance) noexcept;
 struct KnownNumber {
   double value;
   Provenance provenance;
-  std::string_view note;  ///< source or reason
+  std::string_view note;
 };
 
 /// Initial values for simulating a device, which may differ for each unit. The friction of the actual unit must be
@@ -57,7 +57,7 @@ struct KnownRange {
   double least;
   double most;
   Provenance provenance;
-  std::string_view note;  ///< source or reason
+  std::string_view note;
 
   /// To be used by default.
   double middle() const noexcept { return least + (most - least) / 2; }

@@ -135,7 +135,7 @@ class SimulatedDevice final : public Device {
     std::optional<SimulatedRotation::Config> rotation{};
     /// With its own energy balance.
     std::optional<SimulatedGripper::Config> gripper{};
-    std::vector<OutputDescription> outputs{};  ///< at most kMostOutputs
+    std::vector<OutputDescription> outputs{};
 
     /// > 0. 50 µs are 20 substeps per haptic period of 1 kHz. The stiffness limit of a sampled spring (75 g, 1 kHz) is
     /// then accurate to 1.4e-6 at 0.26 N·s/m, and to 2.8e-5 at 5 N·s/m. The error is proportional to the square of this
@@ -155,7 +155,7 @@ class SimulatedDevice final : public Device {
     double environment_work = 0;            ///< J, of the environment
     double kinetic_energy = 0;              ///< J, excluding the mass of the hand
     double spring_energy = 0;               ///< J, of the structural mode
-    bool watchdog_fired = false;            ///< during the last interval
+    bool watchdog_fired = false;
   };
 
   /// Longer than any pause of a working loop. Limits the cost of a `read` to 200 000 substeps, about 10 ms.

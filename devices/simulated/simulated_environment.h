@@ -66,8 +66,8 @@ class SimulatedEnvironment {
     double pressed = 0;  ///< N, F_n
     bool sticks = false;
   };
-  std::vector<Touched> touched_;  ///< by wall
-  bool sticks_ = false;           ///< in the medium
+  std::vector<Touched> touched_;
+  bool sticks_ = false;  ///< in the medium
 };
 
 }  // namespace tendon

@@ -72,9 +72,9 @@ class SpaceMouseDevice final : public Device {
   DeviceInfo info_;
   usb::Dialogue dialogue_;
   std::atomic<State> state_{State::kAbsent};
-  LocalTime before_{};   ///< last `read`
-  LocalTime pushed_{};   ///< last translation report
-  LocalTime twisted_{};  ///< last rotation report
+  LocalTime before_{};
+  LocalTime pushed_{};
+  LocalTime twisted_{};
   Vec3 velocity_ = Vec3::Zero();
   Vec3 angular_velocity_ = Vec3::Zero();
   Vec3 position_ = Vec3::Zero();

@@ -32,8 +32,8 @@ namespace tendon::usb {
 class Dialogue {
  public:
   struct Patience {
-    int most_under_way = 1;                          ///< maximum number of pending requests, ≥ 1
-    Duration answer = std::chrono::milliseconds(5);  ///< timeout of an answer
+    int most_under_way = 1;  ///< maximum number of pending requests, ≥ 1
+    Duration answer = std::chrono::milliseconds(5);
   };
 
   /// Ten periods of 1 kHz without a plausible answer, after which the force is zero.
@@ -97,13 +97,13 @@ class Dialogue {
   LocalTime now_{};
 
   Patience patience_;
-  int under_way_ = 0;      ///< pending requests
+  int under_way_ = 0;
   bool answered_ = false;  ///< since `restart`
   LocalTime asked_{};      ///< time of the first pending request
-  LocalTime told_{};       ///< time of the last request
-  bool exerts_ = false;    ///< whether it commanded a force
-  LocalTime heard_{};      ///< time of the last answer
-  LocalTime believed_{};   ///< time of the last plausible answer
+  LocalTime told_{};
+  bool exerts_ = false;  ///< whether it commanded a force
+  LocalTime heard_{};
+  LocalTime believed_{};  ///< time of the last plausible answer
 
   DeviceCountersKept counters_;
 };

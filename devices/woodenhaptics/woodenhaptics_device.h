@@ -87,7 +87,7 @@ class WoodenHapticsDevice final : public Device {
   usb::Dialogue dialogue_;
   std::atomic<State> state_{State::kAbsent};
 
-  std::optional<woodenhaptics::Report> newest_{};  ///< last plausible report
+  std::optional<woodenhaptics::Report> newest_{};
   bool fresh_ = false;
 
   int asking_replies_ = 0;                 ///< consecutive reports of the button
@@ -96,8 +96,8 @@ class WoodenHapticsDevice final : public Device {
 
   woodenhaptics::Counts counts_{};  ///< without overflow
   woodenhaptics::Pose pose_{};
-  woodenhaptics::Currents held_{};  ///< last currents sent
-  Vec3 held_force_ = Vec3::Zero();  ///< last known force
+  woodenhaptics::Currents held_{};
+  Vec3 held_force_ = Vec3::Zero();
 };
 
 namespace woodenhaptics {

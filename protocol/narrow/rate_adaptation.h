@@ -60,8 +60,8 @@ class RateAdaptation {
   Duration least_ = Duration::max();
   Duration least_before_ = Duration::max();
 
-  LocalTime short_queue_at_;                     ///< or of the last decision
-  Duration longest_queue_{};                     ///< since then
+  LocalTime short_queue_at_;  ///< or of the last decision
+  Duration longest_queue_{};
   LocalTime trouble_at_;                         ///< last congestion or step
   std::array<Duration, kOneIn.size()> clean_{};  ///< before stepping up from each rate
   bool just_up_ = false;                         ///< last step was up, and is not yet confirmed

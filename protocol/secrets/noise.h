@@ -20,7 +20,7 @@ namespace tendon {
 struct NoiseSplit {
   Key initiator_to_responder;
   Key responder_to_initiator;
-  Bytes32 handshake_hash{};  ///< of both messages
+  Bytes32 handshake_hash{};
 };
 
 /// SymmetricState in the specification.
@@ -79,7 +79,7 @@ class NoiseResponder {
   NoiseResponder() = default;
 
   NoiseState state_;
-  Bytes32 peer_{};  ///< ephemeral public key
+  Bytes32 peer_{};
   std::vector<std::byte> payload_;
 };
 

@@ -62,7 +62,7 @@ class Sealer {
   SealingKey key_;
   std::uint8_t epoch_ = 0;
   std::uint64_t sealed_ = 0;  ///< using the current key
-  LocalTime since_;           ///< start of the current key
+  LocalTime since_;
 };
 
 class Opener {

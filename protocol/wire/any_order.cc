@@ -131,7 +131,7 @@ bool AnyOrder::write_all(const Schema& schema, std::size_t from, std::size_t to,
     if (!is_arm(found)) continue;
     if (last == schema.fields.size()) last = found.field;
     found.replaced = found.field != last;
-    if (found.replaced) last = schema.fields.size() + 1;  // earlier arms cannot win
+    if (found.replaced) last = schema.fields.size() + 1;
   }
   for (std::size_t place = 0; place < schema.fields.size(); ++place) {
     if (!write(schema.fields[place], place, from, to, depth)) return false;
@@ -156,7 +156,7 @@ bool AnyOrder::write_message(const FieldShape& field, std::size_t from, std::siz
   const std::size_t begin = out_.size();
   if (!write_merged(*field.inside, from, to, like, depth + 1)) return false;
   put_length(begin);
-  if (like.replaced) out_.resize(whole);  // only validated
+  if (like.replaced) out_.resize(whole);
   return true;
 }
 

@@ -57,8 +57,8 @@ class AnyOrder {
     const std::uint8_t* end;
   };
   struct Found {
-    std::size_t field = 0;  ///< index in the schema
-    unsigned type = 0;      ///< wire type
+    std::size_t field = 0;
+    unsigned type = 0;
     bool replaced = false;  ///< by a later arm of the oneof
     std::uint64_t number = 0;
     Piece piece{};
