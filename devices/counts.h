@@ -67,7 +67,7 @@ struct DeviceCounts {
   friend bool operator==(const DeviceCounts&, const DeviceCounts&) = default;
 };
 
-/// Thread-safe: `counts` from any thread, the others from one thread. Realtime-safe.
+/// Thread-safe: `counts` only. Realtime-safe.
 class DeviceCountersKept {
  public:
   void add(DeviceCount count) noexcept { kept_[static_cast<std::size_t>(count)].add(); }

@@ -40,8 +40,7 @@ namespace tendon {
 /// If the answer to the pending request is late, `read` returns nullopt and `apply` only sends a zero force
 /// (`usb::Dialogue`).
 ///
-/// Thread-safe: `counts` and `state` from any thread, the others from one thread. Realtime-safe: `read`, `apply`,
-/// `counts`.
+/// Thread-safe: `counts` and `state` only. Realtime-safe: `read`, `apply`, `counts`.
 class FalconDevice final : public Device {
  public:
   static constexpr usb::Id kId{0x0403, 0xCB48};

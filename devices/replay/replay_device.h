@@ -38,7 +38,7 @@ class ReplayDevice final : public Device {
     double position_resolution = 0;  ///< m; 0 = exact
   };
 
-  /// Throws std::invalid_argument with the field, its value and the expected range.
+  /// Throws std::invalid_argument if a value is out of range, naming the field.
   explicit ReplayDevice(Config config);
 
   /// For motions along a line (`load_recorded_motion`): origin + x · direction / ‖direction‖. Throws

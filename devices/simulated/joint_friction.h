@@ -30,8 +30,7 @@ class JointFriction {
     Vec3 viscous = Vec3::Zero();  ///< b_i, N·m·s/rad, each ≥ 0
   };
 
-  /// Throws std::invalid_argument with the field, its value and the expected range. At least one joint must have
-  /// friction.
+  /// Throws std::invalid_argument if a value is out of range, naming the field, or if no joint has friction.
   explicit JointFriction(const Config& config);
 
   /// Lower bounds of f_c and b in the whole workspace.

@@ -35,7 +35,7 @@ class Mechanism {
 
   using Kind = std::variant<Falcon, Arm>;
 
-  /// Throws std::invalid_argument with the field, its value and the expected range.
+  /// Throws std::invalid_argument if a value is out of range, naming the field.
   explicit Mechanism(const Kind& kind);
 
   Mat3 jacobian(const Vec3& position) const noexcept;

@@ -23,7 +23,7 @@ class OperatorHand {
     ScriptedMotion motion{ScriptedMotion::Sine{}};
   };
 
-  /// Throws std::invalid_argument with the field, its value and the expected range.
+  /// Throws std::invalid_argument if a value is out of range, naming the field.
   explicit OperatorHand(Config config);
 
   /// Returns k (s(t) − x) + c ṡ(t). The remaining force depends on the motion of the handle, and is integrated

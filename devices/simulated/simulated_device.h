@@ -148,9 +148,9 @@ class SimulatedDevice final : public Device {
     Vec3 position = Vec3::Zero();           ///< m, of the handle
     Vec3 velocity = Vec3::Zero();           ///< m/s, of the handle
     Vec3 deflection = Vec3::Zero();         ///< m, e: the encoder is at position + deflection
-    Vec3 device_force = Vec3::Zero();       ///< N, on the handle, mean over the last substep
-    Vec3 hand_force = Vec3::Zero();         ///< N, on the handle, mean over the last substep
-    Vec3 environment_force = Vec3::Zero();  ///< N, on the handle, mean over the last substep
+    Vec3 device_force = Vec3::Zero();       ///< N, mean of last substep
+    Vec3 hand_force = Vec3::Zero();         ///< N, mean of last substep
+    Vec3 environment_force = Vec3::Zero();  ///< N, mean of last substep
     double hand_work = 0;                   ///< J, ∫ F_hand·dx since the start
     double environment_work = 0;            ///< J, of the environment
     double kinetic_energy = 0;              ///< J, excluding the mass of the hand
@@ -164,7 +164,7 @@ class SimulatedDevice final : public Device {
   /// Fifty times the delay of a bus. Limits the number of forces that are stored.
   static constexpr Duration kMostDelay = std::chrono::milliseconds(100);
 
-  /// Throws std::invalid_argument with the field, its value and the expected range.
+  /// Throws std::invalid_argument if a value is out of range, naming the field.
   explicit SimulatedDevice(Config config);
 
   const DeviceInfo& info() const noexcept override { return info_; }

@@ -45,7 +45,7 @@ class SimulatedEnvironment {
     std::vector<Wall> walls{};
   };
 
-  /// Throws std::invalid_argument with the field ("environment.…"), its value and the expected range.
+  /// Throws std::invalid_argument if a value is out of range, naming the field ("environment.…").
   explicit SimulatedEnvironment(Config config);
 
   double damping() const noexcept { return config_.damping; }

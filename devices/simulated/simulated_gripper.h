@@ -52,7 +52,7 @@ class SimulatedGripper {
     double kinetic_energy = 0;  ///< J
   };
 
-  /// Throws std::invalid_argument with the field ("gripper.…"), its value and the expected range.
+  /// Throws std::invalid_argument if a value is out of range, naming the field ("gripper.…").
   explicit SimulatedGripper(Config config);
 
   DeviceInfo::Gripper info() const noexcept;

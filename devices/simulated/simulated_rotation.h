@@ -67,12 +67,12 @@ class SimulatedRotation {
     Quat orientation;
     Vec3 angular_velocity = Vec3::Zero();  ///< rad/s
     Vec3 device_torque = Vec3::Zero();     ///< N·m, on the handle
-    Vec3 hand_torque = Vec3::Zero();       ///< N·m, on the handle, mean over the last substep
+    Vec3 hand_torque = Vec3::Zero();       ///< N·m, mean of last substep
     double hand_work = 0;                  ///< J, ∫ τ_hand·ω dt since the start
     double kinetic_energy = 0;             ///< J
   };
 
-  /// Throws std::invalid_argument with the field ("rotation.…"), its value and the expected range.
+  /// Throws std::invalid_argument if a value is out of range, naming the field ("rotation.…").
   explicit SimulatedRotation(Config config);
 
   /// In N·m, within `max_torque`; zero without motors.

@@ -31,8 +31,7 @@ namespace tendon {
 ///
 /// The state is kAbsent or kHomed. Buttons start at bit 0; the two names are correct for models with two buttons.
 ///
-/// Thread-safe: `counts` and `state` from any thread, the others from one thread. Realtime-safe: `read`, `apply`,
-/// `counts`.
+/// Thread-safe: `counts` and `state` only. Realtime-safe: `read`, `apply`, `counts`.
 class SpaceMouseDevice final : public Device {
  public:
   /// From spacenavd: from the SpaceMouse Plus XT to Bluetooth models connected by a cable.
@@ -49,7 +48,7 @@ class SpaceMouseDevice final : public Device {
     double turn_speed = 1;    ///< rad/s at the stop, > 0
   };
 
-  /// Throws std::invalid_argument with the field, its value and the expected range.
+  /// Throws std::invalid_argument if a value is out of range, naming the field.
   SpaceMouseDevice(const Config& config, std::unique_ptr<usb::Pipe> pipe);
 
   const DeviceInfo& info() const noexcept override { return info_; }

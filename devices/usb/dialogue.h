@@ -28,7 +28,7 @@ namespace tendon::usb {
 ///
 /// **Force.** The device is assumed to render the last command until its own watchdog expires.
 ///
-/// Thread-safe: `counts` from any thread, the others from one thread. Realtime-safe: all except the constructor.
+/// Thread-safe: `counts` only. Realtime-safe: all except the constructor.
 class Dialogue {
  public:
   struct Patience {

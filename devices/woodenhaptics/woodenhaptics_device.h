@@ -40,8 +40,7 @@ namespace tendon {
 /// Positions are relative to the middle of the workspace, in the frame of kinematics.h. Samples use the time of `read`,
 /// but are about 1 ms older. Button 0 is the switch at the tip.
 ///
-/// Thread-safe: `counts` and `state` from any thread, the others from one thread. Realtime-safe: `read`, `apply`,
-/// `counts`.
+/// Thread-safe: `counts` and `state` only. Realtime-safe: `read`, `apply`, `counts`.
 class WoodenHapticsDevice final : public Device {
  public:
   /// Used in mbed's examples, and possibly by other devices.
@@ -57,7 +56,7 @@ class WoodenHapticsDevice final : public Device {
     double max_current = 2.0;
   };
 
-  /// Throws std::invalid_argument with the field, its value and the expected range.
+  /// Throws std::invalid_argument if a value is out of range, naming the field.
   WoodenHapticsDevice(const Config& config, std::unique_ptr<usb::Pipe> pipe);
 
   static DeviceInfo info_of(const woodenhaptics::Model& model);
