@@ -9,8 +9,8 @@
 
 namespace tendon {
 
-/// The motion of an operator's hand: the moving equilibrium point of OperatorHand, in m, device base frame. Invalid
-/// scripts throw std::invalid_argument with the field, its value and the expected range.
+/// The motion of an operator's hand: the moving equilibrium point of OperatorHand, in m, device base frame. Throws
+/// std::invalid_argument if a value of the script is out of range, naming the field.
 /// Thread-safe: yes, immutable. Realtime-safe: `at`.
 class ScriptedMotion {
  public:
