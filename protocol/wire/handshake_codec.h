@@ -22,8 +22,8 @@ using ClientRandom = std::array<std::byte, 16>;
 /// Chosen by the server. Zero in the first Hello.
 using Cookie = std::array<std::byte, 16>;
 
-/// `body` points into the datagram. In suite 0 it is the result of write_body(). In suite 1 it is a Noise message, after
-/// the key id in a Hello.
+/// `body` points into the datagram. In suite 0 it is the result of write_body(). In suite 1 it is a Noise message,
+/// preceded by the key id in a Hello.
 struct HelloDatagram {
   Suite suite = Suite::kPlain;
   ClientRandom random{};
