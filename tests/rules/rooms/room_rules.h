@@ -30,9 +30,11 @@ struct Finding {
 ///                     └───────  server  ────┘
 ///
 /// who may include whom; one front door per library; what core and protocol must not know; who may read a clock; what
-/// nobody may use; the licence line; a README.md in every room; nothing at the root that has no place there.
-/// Comments and the contents of string literals are not code and break no rule. Findings come in the order of `tree`,
-/// by line in each file; those about the tree as a whole come last. Empty when all rules are kept.
+/// nobody may use; the licence line; a README.md in every room; nothing at the root that has no place there; no citation
+/// of a file, or of a section of core/PROOFS.md, that does not exist.
+/// The last rule reads pages (but CHANGELOG.md) and comments. The other rules ignore comments and the contents of string
+/// literals. Findings come in the order of `tree`, by line in each file; those about the tree as a whole come last. Empty
+/// when all rules are kept.
 std::vector<Finding> check(const std::vector<File>& tree);
 
 /// All files under `root` in the order of their paths, without what is made there and ignored by git (build folders,

@@ -218,6 +218,42 @@ auto h = R"x( )" )x"; std::shared_ptr<int> z;
             (Places{"core/a.cc:3", "core/a.cc:4", "core/a.cc:5", "core/a.cc:6", "core/a.cc:7"}));
 }
 
+TEST(Rooms, ACitedFileExists) {
+  EXPECT_EQ(places("core/a.cc", kLicence + "// See core/gone.h and\n/* proofs.md. */ int a;  ///< lost.md\n"),
+            (Places{"core/a.cc:2", "core/a.cc:3", "core/a.cc:3"}));
+  EXPECT_EQ(places("core/CMakeLists.txt", "# SPDX-License-Identifier: Apache-2.0\nset(a b)  # core/gone.md\n"),
+            Places{"core/CMakeLists.txt:2"});
+  EXPECT_EQ(places("core/notes.md", "[old](gone.md#part)\n[new](../core/README.md), README.md, core/notes.md.\n"),
+            Places{"core/notes.md:1"});
+}
+
+TEST(Rooms, ACitationIsOfThisTree) {
+  EXPECT_EQ(
+      places("core/a.cc", kLicence + "// https://example.org/gone.md, /usr/gone.md, *.md, core/*.h, sys/gone.h\n"),
+      Places{});
+  EXPECT_EQ(places("core/a.cc", kLicence + "const char* a = \"core/gone.md\";\n"), Places{});
+  EXPECT_EQ(places("core/notes.md", "`core/x.h`, `core/x_test.cc` and a file pair in core\n"), Places{});
+  EXPECT_EQ(check({{"CHANGELOG.md", "gone.md"}}), std::vector<Finding>{});
+}
+
+TEST(Rooms, ACitedSectionOfTheProofsExists) {
+  const auto findings = [](const std::string& comment) {
+    std::vector<std::string> lines;
+    for (const auto& finding : check({{"core/PROOFS.md", "# Proofs\n\n## 1. Output bound\n\n## 2. Late holds\n"},
+                                      {"core/README.md", ""},
+                                      {"core/a.cc", kLicence + comment}})) {
+      lines.push_back(to_string(finding));
+    }
+    return lines;
+  };
+  EXPECT_EQ(findings("// core/PROOFS.md, \"Output bound\" and \"Late\n// holds\". core/PROOFS.md has \"more\".\n"),
+            Places{});
+  EXPECT_EQ(findings("//\n/// core/PROOFS.md, \"Early holds\": never\n"),
+            Places{"core/a.cc:3: core/PROOFS.md has no section \"Early holds\""});
+  EXPECT_EQ(findings("// core/PROOFS.md,\n// \"Output bound\" and \"Bound\"\n"),
+            Places{"core/a.cc:2: core/PROOFS.md has no section \"Bound\""});
+}
+
 TEST(Rooms, EveryRoomHasItsPage) {
   const auto findings = check({{"core/a.cc", kLicence}});
   ASSERT_EQ(findings.size(), 1u);
