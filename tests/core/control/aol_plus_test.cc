@@ -485,7 +485,7 @@ TEST(AolPlus, ABrokenAssumptionIsCountedAndThePlainBoundHoldsForThatStep) {
 }
 
 TEST(AolPlus, TheReserveMakesUpForAForceThatIsHeldLate) {
-  // The same adversary without the reserve finds the late force out (control.md 8.6).
+  // Without the reserve the same adversary breaks the law (core/PROOFS.md, "Output latency").
   int broken = 0;
   for (std::uint64_t seed = 1; seed <= 50; ++seed) {
     Dice dice(seed);

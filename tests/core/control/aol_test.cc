@@ -46,8 +46,8 @@ TEST(Aol, JointFormIsTheSameInEveryFrameAndBoxFormPermitsWhatAxesDo) {
 }
 
 TEST(Aol, ThePaperFormLosesALateralForceThatTheJointFormKeeps) {
-  // control.md 8.5: motion along x only, wanted (−35.9, −2) N. In a frame at 45° the axes end up alike, and the
-  // lateral force is gone.
+  // core/PROOFS.md, "Several coordinates": motion along x only, demand (−35.9, −2) N. In a frame turned by 45° both
+  // axes have the same bound, so the lateral force vanishes.
   const auto lateral = [](double angle, bool joint) {
     const Friction friction{0.0, 0.26};
     Mat3 frame = Mat3::Identity();

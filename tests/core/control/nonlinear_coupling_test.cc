@@ -31,7 +31,7 @@ TEST(NonlinearCoupling, TheLedgerCoversTheSpringAndTheProxysAccount) {
   }
 }
 
-// The slope condition: control.md 5.8.
+// The condition K_max ≤ 2b/T on the slope: core/PROOFS.md, "Comparison laws".
 TEST(NonlinearCoupling, AStaticFieldNoSteeperThanItMayBePassesUnchanged) {
   for (std::uint64_t seed = 0; seed < 200; ++seed) {
     Dice dice(seed);

@@ -17,9 +17,9 @@ struct Press {
   double least_work = 0;  ///< J, the lowest that work of the hand + kinetic energy at the start ever is
 };
 
-/// The common test of all laws, control.md 5: 75 g device and 50 g hand (400 N/m, 0.3 N·s/m), b = 0.26 N·s/m,
-/// f_c = 0.02 N, 1 kHz. The hand comes from 20 mm before a wall of `wall` N/m and wants to be 10 mm inside; the device
-/// gives out 60 N at most.
+/// Presses a hand into a wall of `wall` N/m, with every law in the same setting: device 75 g, hand 50 g with 400 N/m and
+/// 0.3 N·s/m, b = 0.26 N·s/m, f_c = 0.02 N, 1 kHz. The hand starts 20 mm in front of the wall, and its target is 10 mm
+/// inside. The device saturates at 60 N.
 template <class Law>
 requires StabilityController<Law, 1> Press press(Law law, double wall) {
   using std::chrono::milliseconds;

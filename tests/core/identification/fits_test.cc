@@ -39,7 +39,8 @@ TEST(KellyFit, DoesNotCareWhenTheClockStarted) {
 }
 
 TEST(KellyFit, OnADesktopSeesTheFrictionThatTheSpecSays) {
-  // control.md 2: 0.25 m of travel, true f_c = 0.05 N. There the line was fitted to speeds, here to positions: 5 %.
+  // 0.25 m of travel, true f_c = 0.05 N. The expected values are from a line fitted to velocities, and kelly_fit fits
+  // positions: hence 5 %.
   struct Row {
     double viscous, rate, kelly_viscous, kelly_coulomb;
   };

@@ -113,7 +113,7 @@ TEST(OutputBound, ABoundOnePercentHigherIsBrokenByTheWorstMotion) {
   }
 }
 
-// control.md 8.5: history of pure x-motion, desired (35.9, 2.0) N.
+// core/PROOFS.md, "Several coordinates": motion along x only, then a demand of (35.9, 2.0) N.
 TEST(OutputBound, OnlyTheJointFormIsTheSameInEveryFrame) {
   const auto after_pushing_along_x = [](double angle, bool joint) {
     const Eigen::Rotation2D<double> turn(angle);
@@ -149,7 +149,7 @@ TEST(OutputBound, OnlyTheJointFormIsTheSameInEveryFrame) {
   }
 }
 
-// control.md 6, oracle (iv).
+// core/PROOFS.md, "Operational stiffness".
 TEST(OutputBound, NeverClipsASpringSofterThanTwoBOverT) {
   std::mt19937_64 random(4);
   const auto uniform = [&random] { return static_cast<double>(random() >> 11) * 0x1p-53; };
@@ -171,7 +171,7 @@ TEST(OutputBound, NeverClipsASpringSofterThanTwoBOverT) {
   }
 }
 
-// control.md 1.4: a saturated slow push is felt as a spring of stiffness 2b/T, whatever the wall.
+// core/PROOFS.md, "Operational stiffness": a slow, saturated push displays 2b/T, whatever the wall.
 TEST(OutputBound, ShowsAStiffWallAsASpringOfTwoBOverT) {
   const Friction friction{0.0, 0.26};
   const OutputBound bound = OutputBound::of(friction, milliseconds(1));

@@ -10,7 +10,7 @@
 #include "core/stability/stability_boundary.h"
 #include "tests/support/refusal.h"
 
-/// The closed forms against each other and against the numbers of control.md 6, which another program computed.
+/// The closed forms against each other, and against numbers that an independent program computed.
 
 namespace tendon::closed_forms_test {
 namespace {
@@ -40,7 +40,7 @@ TEST(ColgateSchenkel, DelayCostsAWholePeriodOfStiffnessEach) {
 }
 
 TEST(ColgateSchenkel, WithDelayADamperMayHelpSpringAndMayHurt) {
-  EXPECT_NEAR(passive_viscous_friction(spring(500, 0.2, 1)), 0.60625, 5e-6);  // control.md 6.1
+  EXPECT_NEAR(passive_viscous_friction(spring(500, 0.2, 1)), 0.60625, 5e-6);  // from the independent program
   // Never above the sufficient K(T/2 + dT) + |B|, never below the value at θ → 0.
   for (const double b : {-1.0, -0.2, 0.2, 1.0}) {
     for (int d = 0; d <= 8; ++d) {
@@ -120,7 +120,7 @@ TEST(Jury, HasNoSeamWhereTheSeriesTakesOver) {
 struct Ratio {
   double damping;
   int delay;
-  double exact_to_linear;  ///< control.md 6.3
+  double exact_to_linear;  ///< from the independent program
   double tolerance = 0.0006;
 };
 

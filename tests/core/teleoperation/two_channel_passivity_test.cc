@@ -25,7 +25,7 @@ struct Channel {
   double drift = 0;  // m, of the tool against the leader, when both have come to rest in free space
 };
 
-// The setting of control.md 7: the leader moves as it is told, the tool (without mass) leans on a spring of 400 N/m.
+// The leader follows a prescribed motion; the massless tool presses against a spring of 400 N/m.
 Channel run(bool on, const Network& network, double drift_rate) {
   constexpr int kPeriods = 22000;
   PassivityLeader<1> leader({.max_damping = 1e9, .period = kPeriod});

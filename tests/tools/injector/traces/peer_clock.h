@@ -16,7 +16,7 @@ namespace tendon::injector {
 ///     reading(t) = t + offset + ⌊(t − start) · drift_ppb / 10⁹⌋ + Σ change of the steps with start + at ≤ t
 ///
 /// in whole nanoseconds, without floating point. Real machines differ by any offset (since their boot), drift by up to
-/// 100 ppm (10⁵ ppb; quartz; Tendon's network.md measured 16 ppm), and step when somebody sets them; a monotonic clock
+/// 100 ppm (10⁵ ppb; quartz; 16 ppm was measured between two hosts), and step when somebody sets them; a monotonic clock
 /// does not step, but one that a virtual machine was resumed with does.
 ///
 /// Thread-safe: yes, it has no state.

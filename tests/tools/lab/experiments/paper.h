@@ -16,7 +16,7 @@ namespace tendon::lab {
 
 /// An experiment of Lee & Lee 2009, section III: an environment that no sampled loop can display as it is.
 ///
-/// The source's Table IV is lost; `assumed` says what stands in its place (control.md 3.1, 3.2).
+/// Table IV of the paper is lost. `assumed` names the values that replace it (core/PROOFS.md, "Paper's experiments").
 struct PaperExperiment {
   std::string name;                   ///< "A" … "E", "12", "14"
   std::string what;                   ///< one line
@@ -33,15 +33,16 @@ struct PaperExperiment {
 
 const std::vector<PaperExperiment>& paper_experiments();
 
-/// The friction that explains all five operational stiffnesses of the paper together (control.md 3.2). Not evidence of
-/// what any device has.
+/// The friction that reproduces all five operational stiffnesses of the paper (core/PROOFS.md, "Paper's experiments"). It
+/// is no evidence for the friction of any device.
 inline constexpr Friction kPaperFriction{.coulomb = 0.005, .viscous = 0.26};
 inline constexpr double kPaperMaxForce = 8.5;   ///< N
 inline constexpr double kPaperEncoder = 30e-6;  ///< m, of the device with the free hand
 
 /// AOL+ as a scene for this device has it: cap, robust ledger, knee.
 AolPlus<1, 3>::Parts default_parts(double encoder_step);
-/// … and for a device with next to no damping: bounded acceleration too (control.md 8.7, 8.12).
+/// default_parts() and bounded acceleration, for a device with very little damping (core/PROOFS.md, "Bounded
+/// acceleration").
 AolPlus<1, 3>::Parts low_friction_parts(double encoder_step);
 /// The one of these two that this device needs: bounded acceleration where 2b/T is less than what objects are made of.
 AolPlus<1, 3>::Parts parts_without_preset(const Friction& friction, double encoder_step);

@@ -69,7 +69,7 @@ TEST(Paper, AWrongEstimateCannotPushTheHandHarderThanEnergyAllows) {
   EXPECT_GE(plus.least_energy(), -1e-12);
 }
 
-// ---- control.md 8.12 ----------------------------------------------------------------------------------------------
+// ---- AOL+ as a whole: core/PROOFS.md, "Force inside the bound" -----------------------------------------------------
 
 struct Composite {
   const char* name;

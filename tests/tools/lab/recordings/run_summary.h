@@ -117,7 +117,7 @@ struct RunSummary {
 ///
 /// F is the part of the applied force that pushes out of the contact; n runs over the steps deeper than 0.1 × the
 /// largest depth while forces were fresh. The steps with the last force of a run do not count: when an engine leaves, that
-/// force stands still for its validity. Source: control.md 1.4, for Lee & Lee 2009.
+/// force stands still for its validity. Source: core/PROOFS.md, "Operational stiffness".
 ///
 /// **Not stable**: the device gave out energy (the ledger is not passive), *and* the hand moved faster than a hand
 /// chooses to. With the velocity v = v_slow + v_fast split by a first-order low-pass of 3 Hz, that is when
