@@ -7,32 +7,29 @@
 
 namespace tendon {
 
-/// Keeps the account of the device: a lower bound of the energy that the hand has put into it and not got back.
+/// The energy ledger of a port: a lower bound of the energy that the hand has supplied to the device and not received
+/// back.
 ///
-///     E(n) = Σₖ [ f(k−1)·Δx(k) + f_c ‖Δx(k)‖ + b ‖Δx(k)‖² / T(k) ],   E(0) = 0
+///     E(n) = Σₖ [ f(k−1)·Δx(k) + f_c ‖Δx(k)‖ + b ‖Δx(k)‖²/T(k) ],   E(0) = 0
 ///
-/// with f = −F the reflective force that was **really held** during interval k (F is on the hand), Δx
-/// the displacement in it and T(k) its **measured** length. The work W of the hand satisfies
-/// W(n) + KE(0) ≥ E(n) for every motion: the device's friction dissipates at least b ‖Δx‖²/T
-/// (Cauchy–Schwarz) and f_c ‖Δx‖ in an interval. So the port is passive as long as E is never negative.
+/// f = −F is the reflective force that was **really held** in interval k (F is on the hand), Δx the displacement in it,
+/// and T(k) its **measured** length. For every motion the work W of the hand satisfies W(n) + KE(0) ≥ E(n), so the port
+/// is passive as long as E ≥ 0.
 ///
-/// Source: Lee & Lee 2009, eqs (5), (6) (one degree of freedom); the vector form with Euclidean norms
-/// for isotropic friction is derived in control.md 8.5. Exact for exact position sensing; an encoder
-/// of resolution Δ can over-credit (control.md 8.9).
+/// The bound holds for exact positions. For an encoder use RobustLedger. `N` is the number of coordinates with
+/// isotropic friction: 3 for the joint form, 1 per axis for the form of the paper.
 ///
-/// `N` is the number of degrees of freedom that share one account: 3 for the joint form, 1 for each
-/// axis of the paper's per-axis form.
+/// Source: Lee & Lee 2009, eqs (5), (6); the vector form: core/PROOFS.md, "Energy ledger".
 ///
 /// Thread-safe: no. Realtime-safe: yes.
 class EnergyLedger {
  public:
-  /// Throws std::invalid_argument unless both bounds are finite and not negative.
+  /// Throws std::invalid_argument if a bound is negative or not finite.
   explicit EnergyLedger(const Friction& friction);
 
-  /// Books one interval and returns the new energy (J).
-  ///
-  /// `applied` (N, on the hand) was held for all of `held`, while the hand moved by `dx` (m). A `held`
-  /// that is not positive earns no viscous credit. When anything is not finite nothing is booked.
+  /// Books one interval and returns E in J. The device held the force `applied` (N, on the hand) for the time `held`,
+  /// while the hand moved by `dx` (m). The function ignores an interval that is not finite, and gives no viscous credit
+  /// if `held` is not positive.
   template <int N>
   double observe(const Eigen::Matrix<double, N, 1>& applied, const Eigen::Matrix<double, N, 1>& dx,
                  Duration held) noexcept {
@@ -40,27 +37,26 @@ class EnergyLedger {
     return book(-applied.dot(dx), squared, held);
   }
 
-  /// Books an interval in which a force of norm `applied` (N) was held for at most `at_most` and then
-  /// vanished, while nobody saw the motion: the device's own watchdog ended it, a reading failed. The
-  /// worst that any motion can have done to the account in that time (eq. (7)):
+  /// Books the worst possible motion for an interval without a position measurement. This happens if the watchdog of
+  /// the device ends the hold, or if a reading fails. The device held a force of norm `applied` (N) for at most
+  /// `at_most`, and then the force vanished:
   ///
   ///     ΔE = −at_most · (‖F‖ − f_c)₊² / (4b)
   ///
-  /// No motion earns credit in it. With b = 0 a force above f_c has no such bound; then nothing is booked (the limiter
-  /// keeps such forces at f_c).
+  /// If b is 0, a force above f_c has no such bound. The function then books nothing, because the limiter keeps the
+  /// force at f_c.
   double observe_unseen(double applied, Duration at_most) noexcept;
 
-  /// Adds `energy` (J) that the account of another port has given up, or takes away what this one gives (negative). A
-  /// value that is not finite changes nothing. E is then the account of a port that shares (Purse), no more the ledger
-  /// of this port alone.
+  /// Adds energy (J) from the account of another port, or subtracts it if negative. E is then a shared account (Purse).
+  /// A value that is not finite is ignored.
   void transfer(double energy) noexcept;
 
-  /// From the next interval on friction has these lower bounds. Throws nothing: values that are not finite
-  /// or negative change nothing.
+  /// Sets the lower bounds of friction from the next interval on. Negative values and values that are not finite are
+  /// ignored.
   void adapt(const Friction& friction) noexcept;
 
-  /// E, J. Negative only after a hold longer than the limiter's bound counted on (OutputBound), or in a force that no
-  /// limiter bounds.
+  /// Returns E in J. It can be negative after a hold that was longer than the limiter expected (see OutputBound), or if
+  /// no limiter bounds the force.
   double energy() const noexcept { return energy_.value(); }
 
  private:

@@ -3,12 +3,12 @@
 
 namespace tendon {
 
-/// **Lower bounds** of a device's own friction, isotropic in the device base frame: the only income of
-/// the energy ledger besides the work of the hand.
+/// **Lower bounds** of the friction of a device, isotropic in its base frame. Besides the work of the hand they are the
+/// only income of the energy ledger.
 ///
-/// Claiming more than the device has voids the passivity theorem (with viscous friction claimed twice
-/// too high an adversary draws 7.6 mJ, control.md 2); claiming less only makes contact softer. Net of
-/// any friction or gravity compensation of the driver.
+/// Values above the true friction void the passivity theorem: with twice the true viscous friction an adversarial
+/// motion draws 7.6 mJ (core/PROOFS.md, "Energy ledger"). Lower values only make contact softer. Subtract any friction
+/// or gravity compensation by the driver.
 struct Friction {
   double coulomb = 0;  ///< f_c, N
   double viscous = 0;  ///< b, N·s/m

@@ -8,12 +8,12 @@
 
 namespace tendon {
 
-/// Lower bounds of friction that differ over the workspace, from an identification at several places. Cables and gears
-/// do not slide alike everywhere, and one bound for the whole workspace would have to be the least.
+/// Lower bounds of friction that depend on the position, from an identification at several places. A single bound for
+/// the whole workspace would have to be the minimum.
 ///
-/// At x, each bound is the least of the place nearest to x and of all places within `reach` of x.
+/// At x each bound is the minimum over the place nearest to x and all places within `reach` of x.
 ///
-/// Thread-safe: yes, it never changes. Realtime-safe: `at` is; it looks at every place.
+/// Thread-safe: yes (immutable). Realtime-safe: `at`, which is linear in the number of places.
 class FrictionMap {
  public:
   struct Place {
@@ -22,12 +22,12 @@ class FrictionMap {
   };
   struct Config {
     std::vector<Place> places;  ///< 1 to kMostPlaces
-    double reach = 0.05;        ///< m, ≥ 0: about the distance of neighbouring places
+    double reach = 0.05;        ///< m, ≥ 0: about the distance between neighbouring places
   };
-  /// 4 to each edge of a cube: some 0.2 µs per haptic step.
+  /// Four along each edge of a cube: about 0.2 µs per haptic step.
   static constexpr std::size_t kMostPlaces = 64;
 
-  /// Throws std::invalid_argument naming the field when there is no place, or too many, or an impossible value.
+  /// Throws std::invalid_argument with the name of the field if the number of places or a value is out of range.
   explicit FrictionMap(Config config);
 
   Friction at(const Vec3& position) const noexcept;

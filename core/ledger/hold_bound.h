@@ -5,42 +5,41 @@
 
 namespace tendon {
 
-/// How long the next force may be held: the T that the bounds of OutputBound count on, following what the machine
-/// shows.
+/// The bound T on how long the next force may be held. OutputBound uses it. It follows the measured holds:
 ///
-///     T(0)   = T_max                                        what the scene says
-///     T(n+1) = min((1 + margin) · held, most · T_max)       after an interval with held > T(n); never below T(n)
-///     T(n+1) = T(n) − max(1 ns, (T(n) − T_max) · held/memory), not below T_max            after any other interval
+///     T(0)   = T_max                                        from the scene
+///     T(n+1) = min((1 + margin) · held, most · T_max)       if held > T(n); never below T(n)
+///     T(n+1) = T(n) − max(1 ns, (T(n) − T_max) · held/memory), not below T_max            otherwise
 ///
-/// Up at once, down slowly, and never below T_max: a machine that is late again within `memory` finds a bound that
-/// already allows for it. As long as no interval is longer than T_max, T is T_max to the last bit.
+/// T rises at once and falls slowly, so a machine that is late again within `memory` already has a suitable bound.
+/// While no interval is longer than T_max, T equals T_max exactly.
 ///
-/// The promise of the limiter counts on T: E ≥ 0 while every hold is no longer than the T in force when it began. The
-/// first longer one, of length T_act with the force F, can take at most
+/// The limiter keeps E ≥ 0 while no hold is longer than the T in force at its start. The first longer hold, of length T_act with
+/// the force F, takes at most this much more than the ledger contains:
 ///
 ///     (T_act − T)(‖F‖ − f_c)₊²/(4b)  ≤  (T_act/T − 1) · E
 ///
-/// more than the ledger has (OutputBound).
+/// Source: core/PROOFS.md, "Late holds".
 ///
 /// Thread-safe: no. Realtime-safe: all but the constructor.
 class HoldBound {
  public:
   struct Follow {
-    double margin = 0.25;  ///< ≥ 0: how much longer than the longest hold seen the next one may be
-    /// > 0. Time constant of the way back: overruns of ordinary kernels come minutes apart.
+    double margin = 0.25;  ///< ≥ 0: T exceeds the longest hold by this fraction
+    /// > 0. Time constant of the return to T_max. Overruns of ordinary kernels are minutes apart.
     Duration memory = std::chrono::seconds(60);
-    /// ≥ 1, in T_max. Longer is a machine that stopped, and no measure of its jitter: at 4 the force above f_c is still
-    /// half of what it was.
+    /// ≥ 1: the largest T, in T_max. Longer holds occur if the machine stops, so they say nothing about its jitter.
+    /// With T = 4 T_max the limiter still permits half of the force above f_c.
     double most = 4;
   };
 
-  /// Throws std::invalid_argument naming the field when a value is impossible. `longest_hold`: T_max, > 0.
+  /// `longest_hold`: T_max, > 0. Throws std::invalid_argument with the name of the field if a value is out of range.
   HoldBound(Duration longest_hold, const Follow& follow);
 
-  /// An interval has ended after `held`. One that is not positive changes nothing.
+  /// Updates T with the length of the last interval. A length that is not positive is ignored.
   void observe(Duration held) noexcept;
 
-  /// T.
+  /// Returns T.
   Duration in_force() const noexcept { return longest_hold_ + excess_; }
 
  private:

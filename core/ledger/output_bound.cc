@@ -38,12 +38,12 @@ double largest_scale(const std::array<OutputBound, Parts>& bounds, const std::ar
     return sizes[0] > 0 ? bounds[0].largest(energy) / sizes[0] : kInfinite;
   }
   const double budget = energy > 0 ? energy : 0;
-  // Where a part leaves Coulomb friction, and where it meets its reach. All that follows is measured from these scales:
-  // a scale times a size may round to above Coulomb friction at the very scale where the part leaves it.
+  // The scales at which a part exceeds Coulomb friction (starts) or reaches L (corners). Excesses are measured from
+  // `starts`, because scale · size can round to above the Coulomb friction at the start itself.
   std::array<double, Parts> starts;
   std::array<double, 2 * Parts> corners;
   std::size_t count = 0;
-  double ceiling = kInfinite;  // where friction gives no bound of the loss at all
+  double ceiling = kInfinite;  // a larger scale has no finite ℓ
   for (std::size_t i = 0; i < Parts; ++i) {
     const OutputBound& bound = bounds[i];
     starts[i] = kInfinite;
@@ -64,12 +64,12 @@ double largest_scale(const std::array<OutputBound, Parts>& bounds, const std::ar
     }
     return sum;
   };
-  // The sum is convex and smooth between the corners, and zero at the first.
+  // The sum is convex, smooth between the corners, and zero at the first one.
   std::sort(corners.begin(), corners.begin() + static_cast<std::ptrdiff_t>(count));
   double from = corners[0];
   for (std::size_t k = 1; k < count && corners[k] <= ceiling && loss_at(corners[k]) <= budget; ++k) from = corners[k];
 
-  // From `from` on the sum is ℓ₀ + ℓ₁ δ + ℓ₂ δ² up to the next corner, behind which it exceeds the budget.
+  // Up to the next corner, where the sum exceeds the budget, it is ℓ₀ + ℓ₁ δ + ℓ₂ δ².
   double slope = 0;
   double curvature = 0;
   for (std::size_t i = 0; i < Parts; ++i) {
@@ -88,7 +88,7 @@ double largest_scale(const std::array<OutputBound, Parts>& bounds, const std::ar
   if (left <= 0) return std::min(from, ceiling);
   const double divisor = slope + std::sqrt(slope * slope + 4 * curvature * left);
   if (divisor > 0) return std::min(from + 2 * left / divisor, ceiling);
-  return slope + curvature > 0 ? from : ceiling;  // of a budget so small that its square root is lost
+  return slope + curvature > 0 ? from : ceiling;  // the square root of a tiny budget underflows
 }
 
 template double largest_scale<1>(const std::array<OutputBound, 1>&, const std::array<double, 1>&, double) noexcept;

@@ -9,7 +9,7 @@
 namespace tendon {
 namespace {
 
-/// Of each coordinate the travel that a count cannot hide.
+/// Reduces each component of the travel by `count`, which rounding may have added.
 template <int N>
 Vec<N> beyond(double count, const Vec<N>& travel) noexcept {
   return (travel.array().abs() - count).max(0.0).matrix();
@@ -59,7 +59,7 @@ void RobustLedger<N>::observe(const Interval<N>& interval) noexcept {
     credited_ = travel;
     to_peak_ = from_turn_;
   } else if (const Vec<N> back = from_turn_ - to_peak_; beyond<N>(config_.encoder_step, back).squaredNorm() > 0) {
-    // The hand has turned back by more than a count can hide: a new path begins at the peak.
+    // The hand has turned by more than one count: a new path begins at the peak.
     from_turn_ = back;
     to_peak_ = back;
     least_coulomb_ = config_.friction.coulomb;
@@ -85,7 +85,7 @@ void RobustLedger<N>::observe_unseen(const Vec<N>& applied, Duration at_most) no
   if (config_.friction.viscous > 0 && std::isfinite(excess)) {
     energy_ -= seconds(at_most) * excess * excess / (4 * config_.friction.viscous);
   }
-  // Settle the margin of the force held so far; the next interval starts from no force.
+  // Settle the margin of the force held so far. The next interval starts from zero force.
   energy_ -= margin_;
   margin_ = 0;
   last_applied_.setZero();

@@ -7,23 +7,24 @@
 
 namespace tendon {
 
-/// The energy ledger for a position that an encoder has rounded: a lower bound of EnergyLedger's E as exact
-/// sensing would have found it, whatever the true motion between the counts.
+/// The energy ledger for positions that an encoder has rounded: a lower bound of the E of EnergyLedger for the true
+/// positions.
 ///
-/// With counts of Δ the plain ledger is wrong in three ways, and each has its remedy here (measured positions are the
-/// centres of counts, so each component is off by at most Δ/2):
+/// Measured positions are the centres of counts of Δ, so each component is wrong by at most Δ/2. Therefore:
 ///
-///     work       Σ f·dx measured ≤ Σ f·dx true + (Δ/2) Σ ‖f(k) − f(k−1)‖₁ + (Δ/2) ‖f(n)‖₁      (Abel summation)
-///     Coulomb    a hand that rests on the edge of a count earns nothing: the credit is f_c times the net travel
-///                since the last turning point, each component less Δ. The path is never shorter than that
-///     viscous    once per `window` of N intervals: b ‖D‖² / (T₁ + … + T_N), each component of the net travel D
-///                less Δ (Cauchy–Schwarz over the window). A single count at 1 kHz would pass for 30 mm/s
+///     work       Σ f·dx measured ≤ Σ f·dx true + (Δ/2) Σ ‖f(k) − f(k−1)‖₁ + (Δ/2) ‖f(n)‖₁      (Abel summation);
+///                the ledger subtracts the two terms
+///     Coulomb    credits f_c times the net travel since the last turning point, each component reduced by Δ. The path
+///                is never shorter. A handle at rest on the edge of a count earns nothing
+///     viscous    credits b ‖D‖² / (T₁ + … + T_N) once per `window` of N intervals, each component of the net travel D
+///                reduced by Δ (Cauchy–Schwarz). Per interval, one count of 30 µm at 1 kHz would count as 30 mm/s
 ///
-/// Credit comes late and never too high, so E − (Δ/2)‖f‖₁ is what may be spent (control.md 8.9, Theorem A; the
-/// form for several components is derived here: the spec's play filter, applied to each axis, would follow a
-/// diagonal as a staircase and over-credit it by √N).
+/// Credit arrives late and is never too large, so E − (Δ/2)‖f‖₁ may be spent. Net travel replaces a play filter per
+/// axis, which would follow a diagonal as a staircase and over-credit it by √N.
 ///
-/// One account for N components of isotropic friction. Thread-safe: no. Realtime-safe: yes.
+/// Source: core/PROOFS.md, "Encoder counts".
+///
+/// One account for N components with isotropic friction. Thread-safe: no. Realtime-safe: yes.
 template <int N>
 class RobustLedger {
  public:
@@ -33,13 +34,13 @@ class RobustLedger {
     int window = 10;          ///< intervals; ≥ 1
   };
 
-  /// Throws std::invalid_argument naming the field when a value is impossible.
+  /// Throws std::invalid_argument with the name of the field if a value is out of range.
   explicit RobustLedger(const Config& config);
 
-  /// Books one interval. When anything is not finite nothing is booked.
+  /// Books one interval. An interval that is not finite is not booked.
   void observe(const Interval<N>& interval) noexcept;
 
-  /// As EnergyLedger::observe_unseen. Where the hand is now is unknown: travel starts again from zero.
+  /// As EnergyLedger::observe_unseen. The travel restarts at zero, because the position is unknown.
   void observe_unseen(const Vec<N>& applied, Duration at_most) noexcept;
 
   /// As EnergyLedger::transfer.
@@ -58,18 +59,18 @@ class RobustLedger {
 
   Config config_;
   CompensatedSum energy_;
-  double margin_ = 0;                     ///< (Δ/2) ‖force held in the last interval‖₁, J
+  double margin_ = 0;                     ///< J, (Δ/2) ‖force of the last interval‖₁
   Vec<N> last_applied_ = Vec<N>::Zero();  ///< N
 
   Vec<N> from_turn_ = Vec<N>::Zero();  ///< m, net travel since the last turning point
-  Vec<N> to_peak_ = Vec<N>::Zero();    ///< m, the longest of it
-  double credited_ = 0;                ///< m, of that travel
-  double least_coulomb_ = 0;           ///< N, since the turning point
+  Vec<N> to_peak_ = Vec<N>::Zero();    ///< m, from_turn_ at the largest credited travel
+  double credited_ = 0;                ///< m, travel since the turning point that has been credited
+  double least_coulomb_ = 0;           ///< N, minimum since the turning point
 
   Vec<N> in_window_ = Vec<N>::Zero();  ///< m, net travel
   Duration window_length_{};
   int in_window_count_ = 0;
-  double least_viscous_ = 0;  ///< N·s/m, in the window
+  double least_viscous_ = 0;  ///< N·s/m, minimum in the window
 };
 
 }  // namespace tendon
