@@ -5,40 +5,39 @@
 
 namespace tendon {
 
-/// Makes a heavy device with a force sensor feel like a tool of another mass: the admittance form of haptic control.
+/// Admittance control: makes a heavy device with a force sensor feel like a tool of another mass.
 ///
 ///     M dv_d/dt = F_hand + F_env − D v_d − S x_d,   dx_d/dt = v_d        (the tool; v_d(0) = x_d(0) = 0)
 ///     F_wanted  = K_p (v_d − v) + K_i Σ (v_d T − Δx)                      (PI loop on the velocity)
 ///
-/// F_hand is the measured force of the hand **on the handle**, F_env the remote environment's force on the hand-held
-/// tool (a wall that resists motion along +x has it along −x), F_wanted the device's force on the hand; v is the
-/// handle's velocity, Δx and T displacement and measured length of the last interval. M, D, S, K_p and K_i are
-/// diagonal. The tool is integrated by the implicit Euler rule, stable for any T.
+/// F_hand is the measured force of the hand **on the handle**. F_env is the force of the remote environment on the
+/// tool; a wall that resists motion along +x has it along −x. F_wanted is the force of the device on the hand, v the
+/// velocity of the handle, Δx and T the displacement and the measured length of the last interval. M, D, S, K_p and K_i
+/// are diagonal. The tool is integrated with the implicit Euler method, which is stable for any T.
 ///
-/// F_wanted takes the place of the reflective force. Hand it to a stability controller like any other demand, and
-/// show both of them the same intervals:
+/// F_wanted replaces the reflective force. Pass it to a stability controller like any other demand, and pass the same
+/// intervals to both:
 ///
 ///     law.observe(interval);                                 loop.observe(interval);
 ///     force = law.limit(loop.command({hand_force, environment, velocity})).force;
 ///
-/// Then the port is passive as it is with any demand, whatever the gains.
+/// The port is then passive for all gains, as with any demand.
 ///
-/// Anti-windup. `observe` gets the force that was really applied. Where it fell short of the command, the last step of
-/// the integral is not taken in the direction of the shortfall (conditional integration), and the integral's share in
-/// that direction is cut to the applied force. So the force leaves its bound as soon as the velocity error changes
-/// sign, even when the bound has shrunk meanwhile. A force output that rounds leaves a velocity error worth up to one
-/// of its counts.
+/// Anti-windup: `observe` receives the applied force. If it was smaller than the command, the last integration step is
+/// not taken in the direction of the shortfall (conditional integration), and the integral in that direction is cut to
+/// the applied force. The force therefore leaves its bound as soon as the velocity error changes sign, even if the
+/// bound has shrunk. A force output that rounds leaves a velocity error worth at most one of its counts.
 ///
-/// Limitation: the limiter's account contains the device's friction but not its kinetic energy. To speed up a
-/// handle of mass m like a lighter tool, the motors must put in ½ (m − M) v² ahead of the hand. While the tool's
-/// damping has not earned that, the excess is clipped and the hand feels the device's own mass; with D = 0 that is
-/// always. The credit ½ m (|v| − a_max T)₊² that control.md 1.5 proposes for this is not passive, and not here: the
-/// hand can take the kinetic energy back after the limiter has lent on it (admittance_loop_test.cc has the motion).
+/// Limitation: the account of the limiter contains friction, not kinetic energy. To accelerate a handle of mass m like
+/// a lighter tool, the motors must put in ½ (m − M) v² ahead of the hand. The part that the damping of the tool has not
+/// earned is clipped, and the hand feels the mass of the device; with D = 0 always. A credit of ½ m (|v| − a_max T)₊²
+/// would not be passive: the hand can take the kinetic energy back after the limiter has lent on it
+/// (admittance_loop_test.cc contains the motion).
 ///
-/// Source: Lee & Lee, IEEE TCST 17(4), 2009, section II-A; control.md 1.5.
+/// Source: Lee & Lee, IEEE TCST 17(4), 2009, section II-A; core/PROOFS.md, "Admittance loop".
 ///
-/// A measurement that is not finite resets tool and integral to rest, and the demand is not finite: the law answers
-/// it with zero force and the reason. An interval that is not finite or not longer than zero is ignored.
+/// A measurement that is not finite resets the tool and the integral to rest. The demand is then not finite, and the
+/// law returns zero force with the reason. An interval that is not finite or not positive is ignored.
 ///
 /// Thread-safe: no. Realtime-safe: all but the constructor.
 template <int N>
@@ -47,28 +46,28 @@ class AdmittanceLoop {
   struct Config {
     Vec<N> mass;                        ///< M, kg (kg·m² for angles); > 0
     Vec<N> damping = Vec<N>::Zero();    ///< D, N·s/m; ≥ 0
-    Vec<N> stiffness = Vec<N>::Zero();  ///< S, N/m, towards where the tool was at the start; ≥ 0
+    Vec<N> stiffness = Vec<N>::Zero();  ///< S, N/m, towards the start position of the tool; ≥ 0
     Vec<N> proportional;                ///< K_p, N·s/m; ≥ 0
     Vec<N> integral = Vec<N>::Zero();   ///< K_i, N/m; ≥ 0
   };
 
-  /// What was measured at this step.
+  /// Measurements of this step.
   struct Measured {
     Vec<N> hand_force;   ///< N, of the hand on the handle
     Vec<N> environment;  ///< N, of the remote environment on the tool
     Vec<N> velocity;     ///< m/s, of the handle
   };
 
-  /// Throws std::invalid_argument naming the field, its value and what was expected.
+  /// Throws std::invalid_argument with the field, its value and the expected range.
   explicit AdmittanceLoop(const Config& config);
 
-  /// The interval that has just ended; not in the first step.
+  /// Takes the interval that has just ended. Not called in the first step.
   void observe(const Interval<N>& interval) noexcept;
 
-  /// In place of `observe` when nobody saw the motion: tool and integral wait.
+  /// Replaces `observe` if the motion was not measured. Tool and integral do not advance.
   void observe_unseen() noexcept;
 
-  /// The force that makes the handle follow the tool: for the stability controller.
+  /// Returns the force that makes the handle follow the tool, for the stability controller.
   Demand<N> command(const Measured& measured) noexcept;
 
   const Vec<N>& tool_velocity() const noexcept { return velocity_; }  ///< v_d, m/s
@@ -77,10 +76,10 @@ class AdmittanceLoop {
   Config config_;
   Vec<N> velocity_ = Vec<N>::Zero();      ///< v_d
   Vec<N> displacement_ = Vec<N>::Zero();  ///< x_d
-  Vec<N> integral_ = Vec<N>::Zero();      ///< N, K_i Σ (v_d T − Δx), of the steps that were taken
-  Vec<N> step_ = Vec<N>::Zero();          ///< N, the integral's last step, to be taken by the next `observe`
+  Vec<N> integral_ = Vec<N>::Zero();      ///< N, K_i Σ (v_d T − Δx), of the accepted steps
+  Vec<N> step_ = Vec<N>::Zero();          ///< N, last step of the integral; the next `observe` takes it
   Vec<N> commanded_ = Vec<N>::Zero();     ///< N
-  Vec<N> dx_ = Vec<N>::Zero();            ///< m, of the interval that `command` is to answer
+  Vec<N> dx_ = Vec<N>::Zero();            ///< m, of the interval that `command` uses
   double held_ = 0;                       ///< s, its length; 0: none
 };
 

@@ -10,25 +10,25 @@
 
 namespace tendon {
 
-/// The Adjusting Output-Limiter on one ledger; it keeps the direction of the force.
+/// The Adjusting Output-Limiter with one ledger. It keeps the direction of the force.
 ///
-/// The port's N = Blocks · Size coordinates come in `Blocks` groups of `Size`. Friction is isotropic within a group
-/// (its own lower bounds f_c,i and b_i); all groups share one account:
+/// The N = Blocks · Size coordinates of the port form `Blocks` groups of `Size`. The friction is isotropic within a
+/// group, with its own lower bounds f_c,i and b_i. All groups share one account:
 ///
 ///     E(n) = Σₖ [ −F(k−1)·Δx(k) + Σ_i ( f_c,i ‖Δx_i‖ + b_i ‖Δx_i‖²/T(k) ) ]
 ///     F    = γ F_wanted,  γ ≤ 1 the largest with  Σ_i T_max (γ‖F_wanted,i‖ − f_c,i)₊²/(4 b_i) ≤ max(E, 0)
 ///
 ///     Aol<1>        one axis: eqs (1)–(9) of the paper
-///     Aol<1, 3>     a point: friction isotropic in space; the same in every frame ("aol")
-///     Aol<3>, <6>   the box form, for joint torques: N·m, rad, τ_c and b of each joint ("aol-box"). Exact when
+///     Aol<1, 3>     a point with isotropic friction; the same in every frame ("aol")
+///     Aol<3>, <6>   the box form for joint torques: N·m, rad, τ_c and b of each joint ("aol-box"). It is exact if
 ///                   torques, not Cartesian forces, are held between two steps
 ///     Aol<2, 3>     a wrench: force and torque, each with its own friction
 ///
-/// The set of forces it allows contains that of one limiter per coordinate with the same history.
+/// Passive for every demand: E ≥ 0 as long as no hold is longer than T_max. The set of permitted forces contains that
+/// of one limiter per coordinate with the same history.
 ///
-/// Passive whatever is wanted: E ≥ 0 while every hold is no longer than T_max (OutputBound, Theorem 1).
-///
-/// Source: Lee & Lee, IEEE TCST 17(4), 2009, eqs (1)–(9), Table I; the joint forms: control.md 8.5.
+/// Source: Lee & Lee, IEEE TCST 17(4), 2009, eqs (1)–(9), Table I; core/PROOFS.md, "Output bound" and "Several
+/// coordinates".
 ///
 /// Thread-safe: no. Realtime-safe: all but the constructor.
 template <int Blocks, int Size = 1>
@@ -41,7 +41,7 @@ class Aol {
     Duration longest_hold{};  ///< T_max: no force may be held longer; > 0
   };
 
-  /// Throws std::invalid_argument when a friction bound is negative or longest_hold not above zero.
+  /// Throws std::invalid_argument if a friction bound is negative or longest_hold is not positive.
   explicit Aol(const Config& config);
 
   void observe(const Interval<kSize>& interval) noexcept;
@@ -55,7 +55,7 @@ class Aol {
   double payable() const noexcept { return energy(); }
   double worst_loss(const Vec<kSize>& force) const noexcept;
 
-  /// From the next `limit` on, T_max is this (> 0).
+  /// Sets T_max (> 0) for the next `limit` and all later ones.
   void hold_at_most(Duration longest_hold) noexcept;
 
  private:
@@ -64,34 +64,36 @@ class Aol {
   std::array<OutputBound, Blocks> bounds_;
 };
 
-/// The paper's form for several degrees of freedom (eq. 10): a ledger and a limiter for each axis by itself.
+/// The form of the paper for several degrees of freedom (eq. 10), with a separate ledger and limiter for each axis.
 ///
 ///     E = Σ_i E_i,   |F_i| ≤ f_c,i + 2 √( b_i max(E_i, 0) / T_max )
 ///
-/// Its output depends on the frame and can lose or reverse a lateral force (control.md 8.5); and the bounds must
-/// hold for each axis **by itself** for every direction of motion: of isotropic Coulomb friction f_c an axis has
-/// f_c/√N (control.md 1.6 (a)). Kept because it is what the paper's experiments ran.
+/// The output depends on the frame and can lose or reverse a lateral force. The friction bounds must hold for each axis
+/// **alone**, for every direction of motion. With isotropic Coulomb friction f_c an axis has only f_c/√N. The class
+/// reproduces the experiments of the paper.
+///
+/// Source: core/PROOFS.md, "Several coordinates".
 ///
 /// Thread-safe: no. Realtime-safe: all but the constructor.
 template <int N>
 class PerAxisAol {
  public:
   struct Config {
-    Friction friction;        ///< of each axis by itself
+    Friction friction;        ///< of each axis alone
     Duration longest_hold{};  ///< T_max; > 0
   };
 
-  /// Throws std::invalid_argument when a friction bound is negative or longest_hold not above zero.
+  /// Throws std::invalid_argument if a friction bound is negative or longest_hold is not positive.
   explicit PerAxisAol(const Config& config);
 
   void observe(const Interval<N>& interval) noexcept;
   void observe_unseen(const Vec<N>& applied, Duration at_most) noexcept;
-  /// `permitted` is that of the axis with the largest bound.
+  /// `permitted` is the largest of the bounds of the axes.
   LimitedForce<N> limit(const Demand<N>& wanted) noexcept;
-  /// The least of the accounts, J: none may be negative.
+  /// Returns the smallest of the accounts in J.
   double energy() const noexcept;
 
-  /// From the next `limit` on, T_max is this (> 0).
+  /// Sets T_max (> 0) for the next `limit` and all later ones.
   void hold_at_most(Duration longest_hold) noexcept;
 
  private:

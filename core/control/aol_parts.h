@@ -9,19 +9,19 @@
 
 namespace tendon {
 
-/// The law of a scene that has parts: AOL+ for a point in space.
+/// AOL+ for a point in space, the law of a scene with parts.
 using PointAolPlus = AolPlus<1, 3>;
 
-/// One part of AOL+: its name, what it is for, and where its configuration is.
+/// One part of AOL+: its name, its purpose, and the member with its configuration.
 template <class Config>
 struct AolPart {
-  std::string_view name;  ///< of its table in a scene, below [limiter]
-  std::string_view what;  ///< what it is for, one line
+  std::string_view name;  ///< of its table in a scene, under [limiter]
+  std::string_view what;  ///< its purpose in one line
   std::optional<Config> PointAolPlus::Parts::*config;
 };
 
-/// Every part of AOL+, in the order in which tables list them. Scenes, `tendond explain` and the lab read this list,
-/// and tests hold the table in core/control/README.md against it.
+/// All parts of AOL+ in the order of the tables. Scenes, `tendond explain` and the lab use this list, and a test
+/// compares it with the table in core/control/README.md.
 inline constexpr std::tuple kAolParts{
     AolPart<PointAolPlus::EnergyCap>{"energy_cap", "credit is capped", &PointAolPlus::Parts::energy_cap},
     AolPart<PointAolPlus::Robust>{"robust_ledger", "rounding of positions earns nothing",
@@ -40,7 +40,7 @@ inline constexpr std::tuple kAolParts{
                                          &PointAolPlus::Parts::fading_contact},
 };
 
-/// Calls `visit` with each part, in that order: `parts.*part.config` is the optional configuration of one.
+/// Calls `visit` for each part in that order. `parts.*part.config` is its optional configuration.
 template <class Visit>
 constexpr void for_each_aol_part(Visit&& visit) {
   std::apply([&](const auto&... part) { (visit(part), ...); }, kAolParts);

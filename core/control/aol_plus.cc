@@ -14,17 +14,17 @@ namespace tendon {
 
 namespace {
 
-// Where thrift and damper begin: the share of the bound that is wanted, and over how much more of it they set in.
+// Thrift and damper start at the share kFrom of the bound, and are in full effect kOver above it.
 constexpr double kThriftFrom = 0.4;
 constexpr double kThriftOver = 0.4;
 constexpr double kDamperFrom = 0.3;
 constexpr double kDamperOver = 0.4;
-constexpr double kStiffEnough = 0.3;   // of shaping's stiffness
-constexpr double kOldAnswer = 0.01;    // s: behind an answer of this age the damper is whole
-constexpr double kSlowHand = 2e-3;     // m/s, below which the direction of motion means little
-constexpr double kMostDamping = 1;     // of the force that is damped
-constexpr double kDamperMemory = 0.3;  // s, for which the damper's debt is remembered
-constexpr double kCountsAhead = 4;     // counts that a growing force has to be able to pay
+constexpr double kStiffEnough = 0.3;   // share of K_s
+constexpr double kOldAnswer = 0.01;    // s: age of an answer with full damping
+constexpr double kSlowHand = 2e-3;     // m/s: the direction of slower motion is unreliable
+constexpr double kMostDamping = 1;     // share of the damped force
+constexpr double kDamperMemory = 0.3;  // s, time constant of the debt of the damper
+constexpr double kCountsAhead = 4;     // a growing force must be able to pay for this number of counts
 constexpr double kEuler = 2.718281828459045;
 
 template <class Ledger, std::size_t Count, class Make, std::size_t... I>
@@ -124,7 +124,7 @@ void AolPlus<Blocks, Size>::use(std::size_t block, const Friction& friction) noe
 
 template <int Blocks, int Size>
 void AolPlus<Blocks, Size>::hold_at_most(Duration longest_hold) noexcept {
-  // Forces under way may be held longer, too. When T falls, their reserve stays: it was enough.
+  // Forces under way can be held longer, too. When T falls, their reserve remains sufficient.
   const double longer = seconds(longest_hold) / seconds(longest_hold_);
   if (longer > 1) {
     for (double& loss : under_way_) loss *= longer;
@@ -186,15 +186,15 @@ void AolPlus<Blocks, Size>::watch_acceleration(const Interval<kSize>& interval) 
   acceleration_holds_ = false;
   const Vec<kSize> velocity = interval.dx / held;
   if (velocity_) {
-    // The mean velocities of neighbouring intervals differ by at most a times the time between their middles, plus the
-    // counts by which the three positions may be wrong.
+    // The mean velocities of neighbouring intervals differ by at most a times the time between their midpoints, plus
+    // the rounding of the three positions.
     acceleration_holds_ = true;
     const double before = seconds(last_held_);
     for (int i = 0; i < Blocks; ++i) {
       const auto block = static_cast<std::size_t>(i);
       const double change = (velocity - *velocity_).template segment<Size>(i * Size).norm();
       const double most = parts_.bounded_acceleration->most[block] * (held + before) / 2;
-      // 1e-9: a hand exactly at the limit must not be flagged because of rounding.
+      // 1e-9: rounding must not flag a hand that is exactly at the limit.
       if (!(change <= most * (1 + 1e-9) + count(block) * (1 / held + 1 / before))) acceleration_holds_ = false;
     }
     if (!acceleration_holds_) ++broken_;
@@ -213,7 +213,7 @@ template <int Blocks, int Size>
   smoothed_ += fast * (once_smoothed_ - smoothed_);
   slow_ += slow * (smoothed_ - slow_);
   if (!parts_.damper) return;
-  // What the damper has earned, less what its counts cost; forgotten slowly, and never saved up.
+  // The debt decays, and income beyond it is not saved.
   const double forgotten = std::min(1.0, held / kDamperMemory);
   double earned = damped_.dot(interval.dx);
   if (robust_) {
@@ -286,7 +286,7 @@ template <int Blocks, int Size>
 
 template <int Blocks, int Size>
 void AolPlus<Blocks, Size>::cap(const Vec<kSize>& wanted) noexcept {
-  // C_b: what a spring that shows this force over this travel gives back at the most.
+  // C_b: the largest energy that a spring with this force and travel returns.
   const auto most = [&] {
     double sum = 0;
     for (int i = 0; i < Blocks; ++i) {
@@ -303,7 +303,7 @@ void AolPlus<Blocks, Size>::cap(const Vec<kSize>& wanted) noexcept {
     travel_.setZero();
   } else {
     contact_ = std::min(contact_, parts_.energy_cap->most_contact);
-    // A branch, not a minimum: as a rule C is below C_b, and then the step need not wait for the wanted force here.
+    // A branch instead of std::min: C is normally below C_b, so the step does not wait for the wanted force here.
     if (const double bound = most(); bound < contact_) [[unlikely]] {
       contact_ = bound;
     }
@@ -314,7 +314,7 @@ void AolPlus<Blocks, Size>::cap(const Vec<kSize>& wanted) noexcept {
   discarded_ = std::max(discarded_, account() - kept);
 }
 
-/// ℓ of a group of coordinates while `force`, of this size, is held.
+/// ℓ of a group of coordinates while `force` of norm `size` is held.
 template <int Blocks, int Size>
 [[gnu::noinline]] OutputBound AolPlus<Blocks, Size>::bound_along(std::size_t block, const Vec<Size>& force,
                                                                  double size) const noexcept {
@@ -327,7 +327,7 @@ template <int Blocks, int Size>
   return bound;
 }
 
-/// The largest share of `force` that the account lets through; above 1 when more would be.
+/// The largest share of `force` that the account permits; can exceed 1.
 template <int Blocks, int Size>
 double AolPlus<Blocks, Size>::largest_share(const Vec<kSize>& force, double budget) const noexcept {
   std::array<double, Blocks> sizes{};
@@ -347,7 +347,7 @@ OutputBound AolPlus<Blocks, Size>::shaping_along(std::size_t block) const noexce
   return {.coulomb = friction_[block].coulomb, .viscous_per_hold = parts_.shaping->stiffness[block] / 2};
 }
 
-/// As largest_share, of shaping.
+/// As largest_share, for shaping.
 template <int Blocks, int Size>
 double AolPlus<Blocks, Size>::shaped_share(const Vec<kSize>& force, double budget) const noexcept {
   std::array<double, Blocks> sizes{};
@@ -372,7 +372,7 @@ double AolPlus<Blocks, Size>::give_back(const Vec<kSize>& force, double size, do
   return 1 - thrift.share * away * close * (1 - std::max(budget, 0.0) / thrift.energy);
 }
 
-/// The share of a force of this size that the account can still pay the counts of.
+/// The largest share of a force of norm `size` whose counts the account can pay for.
 template <int Blocks, int Size>
 double AolPlus<Blocks, Size>::grow(double size, double budget) const noexcept {
   if (!robust_ || parts_.robust_ledger->encoder_step[0] == 0) return 1;
@@ -380,7 +380,7 @@ double AolPlus<Blocks, Size>::grow(double size, double budget) const noexcept {
   return std::min(1.0, std::max(most, friction_[0].coulomb) / size);
 }
 
-/// How stiff the contact is, of the stiffness from which on a late answer needs all of the damper.
+/// The stiffness of the contact over the one from which a late answer needs the full damper, at most 1.
 template <int Blocks, int Size>
 double AolPlus<Blocks, Size>::stiff(std::size_t block) const noexcept {
   if (!parts_.energy_cap || !parts_.shaping) return 1;
@@ -391,7 +391,7 @@ double AolPlus<Blocks, Size>::stiff(std::size_t block) const noexcept {
   return force < enough ? force / enough : 1;
 }
 
-/// D, for a contact that shows `force`.
+/// D for a contact with `force`.
 template <int Blocks, int Size>
 auto AolPlus<Blocks, Size>::damping(const Vec<kSize>& force, double near, Duration age) const noexcept -> Vec<kSize> {
   Vec<kSize> damping = Vec<kSize>::Zero();
@@ -420,7 +420,7 @@ auto AolPlus<Blocks, Size>::damping(const Vec<kSize>& force, double near, Durati
   return damping;
 }
 
-/// Thrift and damper, for a force that the account lets through. `near`: what is wanted, of what is permitted.
+/// Thrift and damper, for a force that the account permits. `near`: wanted over permitted force.
 template <int Blocks, int Size>
 [[gnu::noinline]] void AolPlus<Blocks, Size>::shape(Duration age, double near, double budget,
                                                     LimitedForce<kSize>& result) noexcept {
@@ -476,7 +476,7 @@ auto AolPlus<Blocks, Size>::limit(const Demand<kSize>& wanted) noexcept -> Limit
   } else if (parts_.knee) {
     const double start = parts_.knee->start;
     if (size > 0 && scale * start < 1) {
-      const double excess = (1 / scale - start) / (1 - start);  // ∞ when nothing is permitted: tanh is 1
+      const double excess = (1 / scale - start) / (1 - start);  // ∞ if nothing is permitted; then tanh is 1
       result.force = force * (scale * (start + (1 - start) * portable::tanh(excess)));
       result.reasons = Reason::kEnergy;
     }

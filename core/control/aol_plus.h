@@ -13,118 +13,114 @@
 
 namespace tendon {
 
-/// AOL+: the Adjusting Output-Limiter with what it needs on real devices, as parts. A part that is not listed is not
-/// used and costs nothing; without any it is Aol<Blocks, Size>, bit for bit.
+/// AOL+ is the Adjusting Output-Limiter with optional parts for real devices. A part that is not listed costs nothing.
+/// Without parts the law equals Aol<Blocks, Size>, bit for bit.
 ///
 ///     E ← E + the interval just ended               exactly, or as robust_ledger does
 ///     E ← min(E, E_cap + C)                         energy_cap
 ///     Ē = E − (Δ/2)‖F_held‖₁ − Σ ℓ(under way)       robust_ledger, latency_reserve
 ///     γ : the largest with Σ_i ℓ_i(γ ‖F_i‖) ≤ Ē     ℓ: OutputBound; bounded_acceleration; shaping
 ///     F₁ = κ(1/γ) γ F_wanted                        knee; κ(r) = min(r, 1) without it
-///     F₁ ← F₁ less a share of it                    thrift
+///     F₁ ← F₁ · (1 − a share)                       thrift
 ///     F₂ = F₁ − D(hand)                             damper
-///     F = F₂, no longer than the largest with Σ_i ℓ_i(‖F_i‖) ≤ Ē along F₂
+///     F = F₂, shortened to Σ_i ℓ_i(‖F_i‖) ≤ Ē along F₂
 ///
-/// Why it stays passive: E never exceeds the true ledger (to discard credit is safe, Theorem A of control.md 8), and
-/// any force F with Σ ℓ_i(‖F_i‖) ≤ Ē is safe, wherever it comes from (Theorem 1; Theorem B): the last line asks for
-/// nothing else, and without a damper the lines before it have seen to that. As in Aol, E ≥ 0 while every hold is no
-/// longer than T_max; a hold of length T_act > T_max takes at most ℓ(F) with T_act in place of T_max, less E, from
-/// below zero.
+/// It is passive because E never exceeds the true ledger (core/PROOFS.md, "Discarded credit"), and any force with Σ
+/// ℓ_i(‖F_i‖) ≤ Ē is safe ("Output bound"). Only the last line is needed for that; without a damper the lines before it
+/// already satisfy it. E ≥ 0 holds as long as no hold is longer than T_max. A hold of length T_act > T_max takes at
+/// most ℓ(F), with T_act in place of T_max, less E, from below zero.
 ///
-/// **energy_cap** Free motion earns friction credit without end, and enough credit switches the limiter off: 30 s of
-/// waving pay for 18 N. The cap keeps E ≤ E_cap + C, where C is the work that the hand has put into the present contact
-/// and may get back from it: that pays for springs which are let go.
+/// **energy_cap** Without a cap, friction credit from free motion switches the limiter off: 30 s of waving pay for 18
+/// N. The cap keeps E ≤ E_cap + C. C is the work that the hand has put into the current contact and can get back from
+/// it, so it pays for springs that are released.
 ///     C ← max(0, C + work),  C ≤ ‖F_wanted‖ · ‖travel since the contact began‖,  C ≤ C_most
-/// A contact ends when no force is wanted, or when the wanted force reverses: friction that is dragged to and fro gives
-/// nothing back. (A spring whose force grows with its travel d returns at most F·d. The leak in time of control.md 8.1
-/// would weaken the force on a hand that just holds a spring.)
+/// A contact ends when no force is wanted, or when the wanted force reverses: friction that is dragged back and forth
+/// returns nothing. A spring whose force grows with its travel d returns at most F·d. C does not leak in time, because
+/// that would weaken the force on a hand that holds a spring still.
 ///
-/// An account that ports share (Purse) keeps ℓ(F_wanted) besides: E ≤ E_cap + C + ℓ(F_wanted). A follower's port does
-/// work, so it has no C of its own, and what its peer paid for the force would be discarded each period (README of
-/// core/teleoperation has the figures).
+/// A shared account (Purse) also keeps ℓ(F_wanted): E ≤ E_cap + C + ℓ(F_wanted). The port of a follower does work, so
+/// its C is zero, and the cap would discard the energy that its peer paid for the force.
 ///
-/// **robust_ledger** For positions in counts of Δ.
+/// **robust_ledger** Uses RobustLedger for positions in counts of Δ.
 ///
-/// **knee** Forces above 80 % of the bound are compressed smoothly instead of clipped: quieter on stiff walls.
+/// **knee** Compresses forces above 80 % of the bound smoothly. This is quieter on stiff walls than clipping.
 ///     κ(r) = r                                  r ≤ s
 ///          = s + (1 − s) tanh((r − s)/(1 − s))  beyond
 ///
-/// **latency_reserve** The force chosen now is held only `holds` periods later: the most that the forces still under
-/// way may take is set aside. K_op → 2b/((holds + 1) T).
+/// **latency_reserve** For a force that is held only `holds` periods after it was chosen. The law reserves the largest
+/// energy that the forces under way can take. K_op → 2b/((holds + 1) T).
 ///
-/// **bounded_acceleration** For devices with next to no damping, where 2b/T is a few N/m. The hand's acceleration is
-/// at most a, so in the next hold it travels along F by no more than
+/// **bounded_acceleration** For devices with very little damping, where 2b/T is a few N/m. If the acceleration of the
+/// hand is at most a, its travel along F in the next hold is at most
 ///     L = T_max (F̂·Δx/T_act + a (T_act + T_max)/2) + Δ-allowance,   and a larger force is safe (OutputBound).
-/// When an interval shows that the assumption was broken, the plain bound holds for that step, and it is counted.
-/// Not proved for a force held later than the next period: not with latency_reserve. Nothing else then limits how hard
-/// a wall may be, so it needs shaping.
+/// If an interval violates the assumption, the plain bound applies in that step, and the violation is counted. The
+/// proof covers only forces that are held in the next period, so this part cannot be combined with latency_reserve. It
+/// requires shaping, because nothing else limits how hard a wall feels.
 ///
-/// **shaping** The force that is wanted is kept below the one of a spring of stiffness K_s that stores Ē,
-///     ℓ_s(f) = (f − f_c)₊² / (2 K_s)            J, beside ℓ: f ≤ f_c + √(2 K_s Ē)
-/// so no object is shown stiffer than K_s, whatever T is. (b_v of the papers is K_s T/2.) Between this bound and ℓ is
-/// the room in which a damper works; a clipped spring alone is a conservative one, and rings.
+/// **shaping** Keeps the wanted force below that of a spring of stiffness K_s that stores Ē,
+///     ℓ_s(f) = (f − f_c)₊² / (2 K_s)            J, in addition to ℓ: f ≤ f_c + √(2 K_s Ē)
+/// so no object appears stiffer than K_s, whatever T is. (The b_v of the papers is K_s T/2.) The range between this
+/// bound and ℓ is available to a damper. A clipped spring alone conserves energy and rings.
 ///
-/// **thrift** While the hand is let out (F₁·u > 0, u its velocity, below) and Ē < E_s, a little less is given back than
-/// may be:
+/// **thrift** Returns slightly less energy while F does work on the hand (F₁·u > 0, with the velocity u below) and Ē <
+/// E_s:
 ///     F₁ ← F₁ (1 − σ a n (1 − Ē/E_s)),   a = clamp(F₁·u/(‖F₁‖ (‖u‖ + 2 mm/s)), 0, 1),
 ///                                        n = clamp((‖F_wanted‖/f_γ − 0.4)/0.4, 0, 1),   f_γ = γ ‖F_wanted‖
-/// It leaves the 0.1 to 0.3 mJ with which the next contact begins. And with a robust ledger a force grows only by what
-/// the account can pay the counts of, ‖F₁‖ ≤ max(f_c, ‖F_held‖ + Ē/(4Δ)): else a nearly empty account spends on the
-/// force's going up and down what the motion earns, and stays empty. A shorter force of the same direction is safe.
+/// The 0.1 to 0.3 mJ that remain are the start of the next contact. With a robust ledger a force grows only as far as
+/// the account can pay for its counts, ‖F₁‖ ≤ max(f_c, ‖F_held‖ + Ē/(4Δ)). Otherwise the variation of the force would
+/// use up all that the motion earns, and a nearly empty account would stay empty.
 ///
-/// **damper** For the hand that rings on a late or a clipped spring: a damper on fast motion, blind to counts, in contact
-/// only, behind the clip. With the velocity v of the interval, the filters and the force of one group of coordinates
+/// **damper** Damps fast motion in contact, after the bound, for hands that ring on a late or clipped spring. With the
+/// velocity v of the interval, for the filters and the force of one group of coordinates:
 ///     u₁ ← u₁ + (T/τ_v)(v − u₁),   u ← u + (T/τ_v)(u₁ − u),   s ← s + (T/τ_h)(u − s),   w = u − s       m/s
 ///     D = min(B h (1 − O/O_most)₊ (1 − v_q/‖w‖)₊ ‖F₁‖/(‖F₁‖ + f_s), ‖F₁‖/‖w‖) w                         N
 ///     v_q = z Δ/(e τ_v) / (1 + (‖s‖ τ_v/Δ)²)                                                            m/s
 ///     h = clamp(max((‖F_wanted‖/f_γ − 0.3)/0.4, age/10 ms · min(1, k/(0.3 K_s))), 0, 1)
 ///     k = ‖F_wanted‖/‖travel since the contact began‖ with energy_cap and shaping, else ∞                 N/m
 ///     O ← max(0, O − O T/0.3 s − D_held·Δx + (Δ/2)‖D_held − D_before‖₁)                                 J
-/// None is needed where a fresh answer is shown well inside the bound. A late spring gives the hand −k · age N·s/m, so a
-/// soft one needs little. And a damper never turns a force round: a hand that is drawn out is not held.
-/// Δ/(e τ_v) is the height of the pulse that one lone count Δ makes behind the two filters; where counts come faster
-/// than the filters forget them, pulses run together and only a ripple is left. A count costs the robust ledger the
-/// variation of the damper's force times Δ/2, which is B Δ²/(e τ_v), and friction pays f_c Δ: without the dead zone (z
-/// = 0) the damper eats the account. A true vibration above v_q earns instead: D·Δx = B w² T enters as measured work.
-/// O is what the damper owes: D_held, what it really took of the force, has to earn what its counts cost.
+/// A fresh answer well inside the bound needs no damping (h). A late spring acts on the hand like a damper of −k · age
+/// N·s/m, so a soft spring needs little. The damper never reverses a force. Δ/(e τ_v) is the peak of the pulse that a
+/// single count Δ causes behind the two filters. At higher rates of counts the pulses merge and only a ripple remains.
+/// One count costs the robust ledger B Δ²/(e τ_v), and friction pays f_c Δ; without the dead zone (z = 0) the damper
+/// would drain the account. A true vibration above v_q earns energy, because D·Δx = B w² T is booked as measured work.
+/// O is the debt of the damper: the part D_held that it took from the force must earn what its counts cost.
 ///
-/// **fading_contact** With energy_cap, C fades where it would vanish. With C_b = min(‖F_wanted‖ ‖travel‖, C_most)
-///     C ← C + (C_b − C) T/τ_C   while C > C_b;  at a change of sign only the travel starts anew
-/// so an object that softens to nothing and comes back does not begin from E_cap. Still E ≤ E_cap + C and credit is
-/// only ever discarded: Theorem A holds unchanged. The price: stirring pays for a blow for about τ_C longer.
+/// **fading_contact** With energy_cap, C decays instead of vanishing. With C_b = min(‖F_wanted‖ ‖travel‖, C_most)
+///     C ← C + (C_b − C) T/τ_C   while C > C_b;  at a change of sign only the travel starts again
+/// so an object that softens to nothing and returns does not start from E_cap. E ≤ E_cap + C still holds, and credit is
+/// only discarded. The price: the energy of stirring can pay for an impact for about τ_C longer.
 ///
-/// **adaptive_friction** The lower bounds follow `adapt`: down at once, up slowly.
+/// **adaptive_friction** The lower bounds follow `adapt`: downwards at once, upwards slowly.
 ///
-/// Source: control.md 8.1, 8.4, 8.6, 8.7, 8.9, 8.10, 8.12; for several groups of coordinates derived here from 8.5
-/// (box form) with ℓ_i in place of its quadratic. Blocks and Size as in Aol.
+/// Source: core/PROOFS.md, "Force inside the bound", "Output latency", "Bounded acceleration" and "Encoder counts".
+/// Blocks and Size as in Aol.
 ///
 /// Thread-safe: no. Realtime-safe: all but the constructor.
 template <int Blocks, int Size = 1>
 class AolPlus {
  public:
   static constexpr int kSize = Blocks * Size;
-  /// A reserve for more than 16 periods would leave no force worth rendering.
+  /// A reserve for more than 16 periods would leave no useful force.
   static constexpr int kMostHolds = 16;
 
-  /// The default of an array is for the movement of a handle, which is the first group of coordinates. The other groups
-  /// have no default.
+  /// Default arrays are for the movement of a handle, the first group of coordinates. The other groups have no default.
   struct EnergyCap {
-    double energy = 0.005;       ///< E_cap, J: with it a 20 kN/m wall after 10 s of waving is quiet (control.md 8.1)
-    double most_contact = 0.13;  ///< J, the most C may be: F_max · 30 mm / 2 for 8.5 N
+    double energy = 0.005;       ///< E_cap, J: quiet on a 20 kN/m wall after 10 s of waving
+    double most_contact = 0.13;  ///< C_most, J: F_max · 30 mm / 2 for 8.5 N
   };
   struct Robust {
     std::array<double, Blocks> encoder_step{};  ///< Δ, m or rad
     int window = 10;                            ///< intervals per viscous credit
   };
   struct Knee {
-    double start = 0.8;  ///< s, in (0, 1): lower is smoother, and costs displayed stiffness
+    double start = 0.8;  ///< s, in (0, 1); lower is smoother and reduces the displayed stiffness
   };
   struct LatencyReserve {
     int holds = 1;  ///< 1 to kMostHolds
   };
   struct BoundedAcceleration {
-    /// a, m/s² or rad/s²; must cover (F_hand + F_motor)/m at their largest. 8.5 N on a handle of 75 g that nobody holds
-    /// are 113 m/s²; a tap is some 200 (control.md 8.7).
+    /// a, m/s² or rad/s². It must cover the largest (F_hand + F_motor)/m: 8.5 N on a free handle of 75 g are 113 m/s²,
+    /// and a tap is about 200 m/s².
     std::array<double, Blocks> most{300};
   };
   struct Shaping {
@@ -135,21 +131,21 @@ class AolPlus {
     double energy = 0.004;  ///< E_s, J
   };
   struct Damper {
-    std::array<double, Blocks> viscous{24};                ///< B, N·s/m or N·m·s/rad; 0: that group is not damped
-    std::array<double, Blocks> contact{0.1};               ///< f_s, N or N·m, > 0; a larger force counts as a contact
+    std::array<double, Blocks> viscous{24};                ///< B, N·s/m or N·m·s/rad; 0: the group is not damped
+    std::array<double, Blocks> contact{0.1};               ///< f_s, N or N·m, > 0; larger forces count as contact
     Duration smoothing = std::chrono::microseconds(2200);  ///< τ_v, of the velocity
-    Duration slow = std::chrono::milliseconds(20);         ///< τ_h: what is slower is not vibration
-    double dead_zone = 0.7;                                ///< z, ≥ 0; Δ is the robust ledger's
+    Duration slow = std::chrono::milliseconds(20);         ///< τ_h: slower motion is not vibration
+    double dead_zone = 0.7;                                ///< z, ≥ 0; Δ is that of robust_ledger
     double most_owed = 3e-4;                               ///< O_most, J, > 0
   };
   struct FadingContact {
     Duration memory = std::chrono::milliseconds(300);  ///< τ_C
   };
   struct AdaptiveFriction {
-    Duration rise = std::chrono::seconds(10);  ///< time constant with which a bound may go up
+    Duration rise = std::chrono::seconds(10);  ///< time constant of a rising bound
   };
 
-  /// Empty: not used, costs nothing. AolPart (aol_parts.h) lists them by name.
+  /// An empty part is not used. AolPart (aol_parts.h) lists the parts by name.
   struct Parts {
     std::optional<EnergyCap> energy_cap{};
     std::optional<Robust> robust_ledger{};
@@ -167,36 +163,36 @@ class AolPlus {
     std::array<Friction, Blocks> friction{};
     Duration longest_hold{};  ///< T_max; > 0
     Parts parts{};
-    bool shared_account = false;  ///< other ports pay into the account: see energy_cap
+    bool shared_account = false;  ///< other ports pay into the account; see energy_cap
   };
 
-  /// Throws std::invalid_argument naming the part and its field.
+  /// Throws std::invalid_argument with the names of the part and its field.
   explicit AolPlus(const Config& config);
 
   void observe(const Interval<kSize>& interval) noexcept;
   void observe_unseen(const Vec<kSize>& applied, Duration at_most) noexcept;
   LimitedForce<kSize> limit(const Demand<kSize>& wanted) noexcept;
 
-  /// The ledger of eq. (5) with the positions as they were measured, J: the same account that every law keeps.
+  /// Returns the ledger of eq. (5) for the measured positions in J. All laws publish this account.
   double energy() const noexcept;
-  /// What may be spent: Ē before it is cut off at zero, and before the reserve is set aside. J; a lower bound of the
-  /// **true** ledger, below zero by at most what rounding may have hidden.
+  /// Returns Ē in J, before it is limited to zero and before the reserve is subtracted. It is a lower bound of the
+  /// **true** ledger, and can be negative by at most the energy that rounding can hide.
   double spendable() const noexcept;
 
-  /// SharesAccount. `credit` and `withdraw` change the exact and the robust ledger alike.
+  /// SharesAccount. Both functions change the exact and the robust ledger alike.
   void credit(double energy) noexcept;
   void withdraw(double energy) noexcept;
   double payable() const noexcept { return spendable() - reserved(); }
-  /// Counts the knee (a bound of F/s lets F through whole), the forces under way and shaping in.
+  /// Accounts for the knee (a bound of F/s lets F through whole), the forces under way and shaping.
   double worst_loss(const Vec<kSize>& force) const noexcept;
 
-  /// The device's friction is now at least this. Without the part adaptive_friction nothing changes.
+  /// Sets lower bounds of the friction. Does nothing without the part adaptive_friction.
   void adapt(const std::array<Friction, Blocks>& friction) noexcept;
 
-  /// From the next `limit` on, T_max is this (> 0).
+  /// Sets T_max (> 0) for the next `limit` and all later ones.
   void hold_at_most(Duration longest_hold) noexcept;
 
-  /// Intervals in which the hand accelerated by more than bounded_acceleration allows.
+  /// Returns the number of intervals with a larger acceleration than bounded_acceleration allows.
   std::uint64_t broken_assumptions() const noexcept { return broken_; }
 
  private:
@@ -232,23 +228,23 @@ class AolPlus {
   std::array<Friction, Blocks> target_;
   std::array<OutputBound, Blocks> bounds_;
 
-  std::optional<Vec<kSize>> velocity_;  ///< m/s, mean over the last interval; empty when not known
+  std::optional<Vec<kSize>> velocity_;  ///< m/s, mean over the last interval; empty if unknown
   Duration last_held_{};
   bool acceleration_holds_ = false;
   std::uint64_t broken_ = 0;
 
-  /// The hand's motion behind the filters of the damper.
+  /// The velocity behind the filters of the damper.
   Vec<kSize> once_smoothed_ = Vec<kSize>::Zero();  ///< u₁, m/s
   Vec<kSize> smoothed_ = Vec<kSize>::Zero();       ///< u, m/s
   Vec<kSize> slow_ = Vec<kSize>::Zero();           ///< s, m/s
-  Vec<kSize> damped_ = Vec<kSize>::Zero();         ///< N, what the damper took of the force now held
-  Vec<kSize> damped_before_ = Vec<kSize>::Zero();  ///< N, and of the one before
+  Vec<kSize> damped_ = Vec<kSize>::Zero();         ///< N, the part that the damper took from the force now held
+  Vec<kSize> damped_before_ = Vec<kSize>::Zero();  ///< N, … from the force before
   double damper_owes_ = 0;                         ///< O, J
-  double held_ = 0;                                ///< N, ‖F_held‖; of thrift
-  double smoothing_ = 0;                           ///< τ_v, s; the damper's, or as without one
+  double held_ = 0;                                ///< N, ‖F_held‖, for thrift
+  double smoothing_ = 0;                           ///< τ_v, s; a default without a damper
   double slowness_ = 0;                            ///< τ_h, s
 
-  std::array<double, kMostHolds> under_way_{};  ///< J, the most that each force under way may take
+  std::array<double, kMostHolds> under_way_{};  ///< J, ℓ of each force under way
   std::size_t next_under_way_ = 0;
 };
 

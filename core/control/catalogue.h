@@ -25,10 +25,10 @@
 
 namespace tendon {
 
-// The catalogue of the laws: all that the rest of the house knows of a law by name. A new law is an enumerator and a
-// row here. Scenes, `tendon-lab`, the property tests and the golden numbers find it by laws().
+// The catalogue of the laws. A new law is an enumerator and a row here. Scenes, `tendon-lab`, the property tests and
+// the golden numbers find it through laws().
 
-/// The stability controllers that a scene can choose; each has its file in core/control.
+/// The stability controllers that a scene can choose. Each has its own file in core/control.
 enum class Law : std::uint8_t {
   kNone,
   kClamp,
@@ -47,49 +47,49 @@ enum class Law : std::uint8_t {
   kAolPerAxis,
   kAol,
   kAolBox,
-  kAolPlus,  ///< the last: the catalogue counts by it
+  kAolPlus,  ///< must be the last enumerator
 };
 
-/// The name of a law, and what a person needs to know to choose it.
+/// Name and description of a law.
 struct LawInfo {
   Law law;
   std::string_view name;  ///< in scenes, tables and command lines
   std::string_view what;  ///< one line
-  /// Its own theory promises that the ledger is never negative, **whatever** the remote environment asks for. The
-  /// others are passive in some environments, or take back what they gave out.
+  /// The theory of the law guarantees that the ledger is never negative, **whatever** the remote environment requests.
+  /// The other laws are passive in some environments, or correct a deficit afterwards.
   bool passive;
-  bool needs_stiffness;  ///< of an environment that does not send its own
+  bool needs_stiffness;  ///< for demands without a stiffness
 };
 
-/// Every law, in the order in which tables list them.
+/// Returns all laws in the order of the tables.
 std::span<const LawInfo> laws() noexcept;
 const LawInfo& info(Law law) noexcept;
 std::optional<Law> law_named(std::string_view name) noexcept;
 
-/// Which law stands between the remote environment and the hand, and its parameters.
+/// The law between the remote environment and the hand, and its parameters.
 struct LimiterConfig {
   Law law = Law::kAolPlus;
-  Friction friction{};      ///< lower bounds of the device's friction (kAolPerAxis, kAolBox: of each axis by itself)
+  Friction friction{};      ///< lower bounds of the friction (kAolPerAxis, kAolBox: of each axis alone)
   Duration longest_hold{};  ///< T_max; > 0
-  /// How the laws that are `passive` follow holds longer than T_max. Empty: they do not.
+  /// Lets the `passive` laws follow holds longer than T_max. Empty: T stays T_max.
   std::optional<HoldBound::Follow> follow_holds = HoldBound::Follow{};
   AolPlus<1, 3>::Parts parts{};                   ///< of kAolPlus
   double max_force = 0;                           ///< N, of kClamp
-  std::optional<double> environment_stiffness{};  ///< N/m, of an environment that does not send its own
-  Duration environment_delay{};  ///< t_d of kPassiveSynthesis: from a position to the force answering it
-  /// N·s/m, what the passivity controllers and kReferenceEnergy may inject at most; far below 2m/T, where a digital
-  /// damper is unstable. 20 is an eighth of that at 75 g and 1 kHz.
+  std::optional<double> environment_stiffness{};  ///< N/m, for demands without a stiffness
+  Duration environment_delay{};                   ///< t_d of kPassiveSynthesis: from a position to its force
+  /// N·s/m, the largest damping of the passivity controllers and kReferenceEnergy. It must be far below 2m/T, where a
+  /// digital damper is unstable. 20 is an eighth of that for 75 g and 1 kHz.
   double max_damping = 20;
-  /// Other ports pay into the account and draw on it (Purse). Refused for laws that have none to share.
+  /// Other ports can credit the account and draw on it (Purse). Refused for laws that cannot share.
   bool shared_account = false;
 };
 
 namespace catalogue {
 
-/// m/(N·s): 1 N gives way by at most 1 mm in each period at 1 kHz.
+/// m/(N·s): a force of 1 N yields by at most 1 mm per period at 1 kHz.
 inline constexpr double kMostMobility = 1;
 
-/// A law: what people read about it, and how it is built.
+/// Description and factory of a law.
 template <class Make>
 struct LawRow {
   LawInfo info;
@@ -216,11 +216,11 @@ struct Laws<const std::tuple<Rows...>> : Union<std::variant<>, Rows...> {};
 
 }  // namespace catalogue
 
-/// Any law of the catalogue; laws that are of one class are one alternative.
+/// Any law of the catalogue. Laws of the same class share one alternative.
 using AnyLaw = catalogue::Laws<decltype(catalogue::kRows)>::Type;
 
-/// The law that `config` names. Throws what the law's constructor throws, and std::invalid_argument for a law that is
-/// none.
+/// Creates the law that `config` names. Throws what its constructor throws, and std::invalid_argument for an unknown
+/// enumerator.
 AnyLaw make_law(const LimiterConfig& config);
 
 }  // namespace tendon

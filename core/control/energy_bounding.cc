@@ -33,7 +33,7 @@ void EnergyBounding<N>::observe_unseen(const Vec<N>& applied, Duration at_most) 
 
 template <int N>
 LimitedForce<N> EnergyBounding<N>::limit(const Demand<N>& demand) noexcept {
-  // (ii) is a ball around c₂Δx, (i) a half-space whose boundary is at right angles to Δx.
+  // (ii) is a ball around c₂Δx, (i) a half-space with a boundary perpendicular to Δx.
   const double travel = dx_.norm();
   const double middle = c2_ * travel;  // of the ball, along Δx
   const double radius = portable::hypot(middle, before_.norm());
@@ -49,7 +49,7 @@ LimitedForce<N> EnergyBounding<N>::limit(const Demand<N>& demand) noexcept {
 
   Vec<N> f = centre + law_support::shortened<N>(wanted - centre, radius);
   if (along.dot(f) > ceiling) {
-    // The half-space alone, if what is nearest there is in the ball too; else the disc that its boundary cuts out.
+    // The nearest force in the half-space if it is in the ball, too. Otherwise that on the disc where they intersect.
     const double height = along.dot(wanted);
     const Vec<N> across = wanted - height * along;
     f = std::min(height, ceiling) * along + across;

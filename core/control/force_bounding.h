@@ -6,30 +6,31 @@
 
 namespace tendon {
 
-/// Bounds a force by the energy that this contact has earned: the less conservative force-bounding algorithm.
+/// The less conservative force-bounding algorithm: bounds a force by the energy that the current contact has earned.
 ///
 ///     E(n)  = E(n−1) − F(n−1)·Δx + b ‖Δx‖²/T(n)         E(n−1) := 0 first, when F(n−1) = 0 (no contact)
 ///     F(n)  = F_wanted · min(1, F_max/‖F_wanted‖),       F_max = 2 √( b max(E, 0)/T_max )
 ///
-/// F in N on the hand, Δx in m, E in J. Without Coulomb friction and within one contact this is the Adjusting
-/// Output-Limiter; with it, it does not claim that part of the credit. Forgetting E between contacts costs the first
-/// millimetres of each contact and keeps energy won in free motion from feeding a buzz (control.md 8.1).
+/// F is in N on the hand, Δx in m, E in J. Without Coulomb friction and within one contact this is the Adjusting
+/// Output-Limiter. It does not use the credit of Coulomb friction. The reset between contacts softens the first
+/// millimetres of each contact, and prevents energy from free motion from feeding a vibration. Only a positive E is
+/// reset.
 ///
-/// Passive for every demand while no hold is longer than T_max: its E is never above the port's ledger, and only credit
-/// is thrown away (control.md 8, Theorem A); a debt is never forgotten.
+/// Passive for every demand as long as no hold is longer than T_max, because E never exceeds the ledger of the port
+/// (core/PROOFS.md, "Discarded credit").
 ///
-/// Source: Kim, Baek, Ryu, 2015 (recalled; form as in published code, control.md 5.3), B = b/T · I.
+/// Source: Kim, Baek, Ryu, 2015 (recalled; form as in published code), B = b/T · I.
 ///
 /// Thread-safe: no. Realtime-safe: all but the constructor.
 template <int N>
 class ForceBounding {
  public:
   struct Config {
-    Friction friction;        ///< f_c serves the ledger alone; b > 0
+    Friction friction;        ///< f_c is only for the ledger; b > 0
     Duration longest_hold{};  ///< T_max, > 0
   };
 
-  /// Throws std::invalid_argument when a field is out of its range.
+  /// Throws std::invalid_argument if a field is out of range.
   explicit ForceBounding(const Config& config);
 
   void observe(const Interval<N>& interval) noexcept;
@@ -37,7 +38,7 @@ class ForceBounding {
   LimitedForce<N> limit(const Demand<N>& demand) noexcept;
   double energy() const noexcept { return port_.energy(); }
 
-  /// From the next `limit` on, T_max is this (> 0).
+  /// Sets T_max (> 0) for the next `limit` and all later ones.
   void hold_at_most(Duration longest_hold) noexcept { viscous_per_hold_ = viscous_ / seconds(longest_hold); }
 
  private:
@@ -48,23 +49,23 @@ class ForceBounding {
   EnergyLedger budget_;  ///< E
 };
 
-/// Bounds a force by the one before it and the motion since. It remembers nothing else.
+/// Bounds a force by the previous force and the motion since then, without any other memory.
 ///
 ///     ‖F(n)‖ ≤ ‖F(n−1) − 2b Δx/T‖
 ///
-/// F in N on the hand, F(n−1) the force really held, T the longest hold. It shows a wall as a spring of 2b/T. A step
-/// that does not use its bound loses the rest: a force appears only as the hand moves into the wall, and a held force
-/// shrinks by 2b/T times the way that the hand has come back from its deepest place.
+/// F is in N on the hand, F(n−1) the applied force, T the longest hold. A wall appears as a spring of 2b/T. A step that
+/// does not use its bound loses the rest: a force arises only while the hand moves into the wall, and a held force
+/// shrinks by 2b/T times the distance of the hand from its deepest point.
 ///
-/// Passive for every demand: E(n) ≥ T ‖F(n)‖²/(4b) holds at every step, since
+/// Passive for every demand, because E(n) ≥ T ‖F(n)‖²/(4b) in every step:
 ///
 ///     E(n) ≥ T ‖F(n−1)‖²/(4b) − F(n−1)·Δx + b ‖Δx‖²/T = T/(4b) · ‖F(n−1) − 2b Δx/T‖²
 ///
-/// (in any number of dimensions), and the worst motion in the next hold takes no more than that. After a hold longer
-/// than T the viscous term is divided by its measured length, so that an overrun is not credited.
+/// in any number of dimensions, and the worst motion in the next hold takes no more. After a hold longer than T the
+/// viscous term is divided by its measured length.
 ///
-/// Source: Kim, Baek, Ryu, 2015, "more conservative" form with ξ = 1 (recalled; form as in published code). Invariant
-/// and vector form: control.md 5.3.
+/// Source: Kim, Baek, Ryu, 2015, "more conservative" form with ξ = 1 (recalled; form as in published code);
+/// core/PROOFS.md, "Comparison laws".
 ///
 /// Thread-safe: no. Realtime-safe: all but the constructor.
 template <int N>

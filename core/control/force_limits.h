@@ -9,7 +9,7 @@
 
 namespace tendon {
 
-/// A force after a memoryless limit, and why.
+/// A force after a memoryless limit, and the reason for a change.
 struct Limited {
   Vec3 force;
   Reasons reasons;
@@ -24,9 +24,8 @@ inline Limited saturate(const Vec3& wanted, double max) noexcept {
   return {wanted * (max / size), Reason::kMaxForce};
 }
 
-/// Bounds how fast a force may change: ‖F − F_before‖ ≤ rate · elapsed, with rate in N/s. What is left
-/// of the change keeps its direction. An infinite rate changes nothing; in an interval that is not positive nothing
-/// may change.
+/// Bounds the rate of change of a force, ‖F − F_before‖ ≤ rate · elapsed, and keeps the direction of the change. `rate`
+/// is in N/s; an infinite rate changes nothing. If `elapsed` is not positive, the force stays `before`.
 ///
 /// Thread-safe, realtime-safe.
 inline Limited limit_slew(const Vec3& wanted, const Vec3& before, double rate, Duration elapsed) noexcept {

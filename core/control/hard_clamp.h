@@ -6,23 +6,22 @@
 
 namespace tendon {
 
-/// Bounds the size of a force and nothing else, as a device's own limit does.
+/// Bounds the norm of a force and keeps its direction.
 ///
 ///     F(n) = F_wanted(n) · min(1, F_max / ‖F_wanted(n)‖)
 ///
-/// Promises that no force is larger than F_max (N); the direction is kept. It is **not** passive: an instability
-/// becomes a limit cycle of that amplitude.
+/// **Not** passive: an instability becomes a limit cycle with the amplitude F_max.
 ///
 /// Thread-safe: no. Realtime-safe: all but the constructor.
 template <int N>
 class HardClamp {
  public:
   struct Config {
-    Friction friction;     ///< for the ledger alone
+    Friction friction;     ///< only for the ledger
     double max_force = 0;  ///< F_max, N; ≥ 0 and finite
   };
 
-  /// Throws std::invalid_argument when a field is out of its range.
+  /// Throws std::invalid_argument if a field is out of range.
   explicit HardClamp(const Config& config);
 
   void observe(const Interval<N>& interval) noexcept;

@@ -10,19 +10,20 @@
 
 namespace tendon {
 
-/// The law of a scene, for a point in space: one of the catalogue, chosen when it is built.
+/// The law of a scene for a point in space, chosen from the catalogue at construction.
 ///
-/// It keeps the promise of a law that is `passive` through overruns. T is how long a hold may be (HoldBound): T_max, or
-/// longer after a hold that was longer. The laws with a bound like equation (8) then bound by T (FollowsHolds). The
-/// proofs of the other passive laws end with the first hold beyond T_max; from then on equation (8) with T and the
-/// port's ledger bounds their force as well (OutputBound, Theorem 1). As long as no hold is longer than T_max, none of
-/// this changes a bit.
+/// It keeps the guarantee of a `passive` law through overruns. T is the bound on a hold (HoldBound): T_max, or longer
+/// after a longer hold. Laws with a bound like equation (8) use T (FollowsHolds). The proofs of the other passive laws
+/// end with the first hold beyond T_max. From then on equation (8), with T and the ledger of the port, also bounds
+/// their force. While no hold is longer than T_max, the result is the same to the last bit.
+///
+/// Source: core/PROOFS.md, "Late holds".
 ///
 /// Satisfies StabilityController<Limiter, 3>. Thread-safe: no. Realtime-safe: all but the constructor.
 class Limiter {
  public:
-  /// Throws what the law's constructor throws, and std::invalid_argument for a `shared_account` on a law that has none
-  /// to share.
+  /// Throws what the constructor of the law throws, and std::invalid_argument for a `shared_account` with a law that
+  /// cannot share its account.
   explicit Limiter(const LimiterConfig& config);
 
   void observe(const Interval<3>& interval) noexcept;
@@ -30,8 +31,8 @@ class Limiter {
   LimitedForce<3> limit(const Demand<3>& wanted) noexcept;
   double energy() const noexcept;
 
-  /// SharesAccount, of a law that does so (`shared_account` refuses the others). Other laws pass over `credit` and
-  /// `withdraw`; their `payable` is 0 and their `worst_loss` +∞.
+  /// SharesAccount, for laws that implement it. Other laws ignore `credit` and `withdraw`; their `payable` is 0 and
+  /// their `worst_loss` is +∞.
   void credit(double energy) noexcept;
   void withdraw(double energy) noexcept;
   double payable() const noexcept;
@@ -40,9 +41,9 @@ class Limiter {
   /// Forwards to AolPlus::adapt. Other laws ignore it.
   void adapt(const Friction& friction) noexcept;
 
-  /// T: the next force may be held for so long.
+  /// Returns T, the longest time for which the next force may be held.
   Duration longest_hold() const noexcept { return holds_ ? holds_->in_force() : longest_hold_; }
-  /// Forwards to AolPlus::broken_assumptions. Other laws have none: 0.
+  /// Forwards to AolPlus::broken_assumptions. Returns 0 for other laws.
   std::uint64_t broken_assumptions() const noexcept;
 
  private:
@@ -53,7 +54,7 @@ class Limiter {
   std::optional<HoldBound> holds_;  ///< empty: T stays T_max
   double viscous_ = 0;              ///< b, N·s/m
   OutputBound bound_;               ///< equation (8) with T
-  bool bounded_from_here_ = false;  ///< the law's own proof has ended: `bound_` applies, too
+  bool bounded_from_here_ = false;  ///< the proof of the law has ended, so `bound_` applies as well
 };
 
 }  // namespace tendon

@@ -22,7 +22,7 @@ void NonlinearCoupling<N>::observe(const Interval<N>& interval) noexcept {
     return;
   }
   elastic_ = max_slope_ * interval.dx - interval.applied;
-  // What a device holds beyond what it was told (rounding) stretches the spring, and the proxy's account pays.
+  // A device that rounds up stretches the spring, and the account of the proxy pays.
   const double beyond = interval.applied.squaredNorm() - returned_.squaredNorm();
   if (beyond > 0) account_ -= beyond / (2 * max_slope_);
 }

@@ -8,11 +8,11 @@
 
 namespace tendon {
 
-/// Passes every static force law that is no steeper than the device's friction affords, and ties all others to the hand
-/// by a spring of that slope: virtual coupling by its slope condition.
+/// A virtual coupling with a slope condition. It passes every static force law that is not steeper than the friction of
+/// the device allows, and connects all others to the hand through a spring of that slope.
 ///
-/// A spring K_max ties the hand to a proxy. While the proxy stays, the reflective force f = −F becomes g; it becomes
-/// f(n) when the proxy gives way by (g − f(n))/K_max. The proxy has taken in the energy P so far:
+/// A spring K_max connects the hand to a proxy. While the proxy stays, the reflective force f = −F becomes g. It
+/// becomes f(n) when the proxy moves by (g − f(n))/K_max. P is the energy that the proxy has received so far:
 ///
 ///     g    = f(n−1) + K_max Δx(n)
 ///     f(n) = the force nearest to f_e with  P(n) = P(n−1) + f(n)·(g − f(n))/K_max ≥ 0
@@ -21,29 +21,28 @@ namespace tendon {
 ///
 ///     b ≥ K_max T/2
 ///
-/// because E(n) ≥ ‖f(n)‖²/(2 K_max) + P(n) at every step (K_max/2 ≤ b/T pays for the sampling), and the worst motion in
-/// a hold takes no more than the first of the two. And a static field that starts at rest, has a convex potential and a
-/// slope within [0, K_max] passes **unchanged**: its proxy takes U − ‖f‖²/(2 K_max) ≥ 0. A field with less than that —
-/// late, or stiffer — is shown as a spring of K_max that yields.
+/// because E(n) ≥ ‖f(n)‖²/(2 K_max) + P(n) in every step, and the worst motion in a hold takes at most the first term.
+/// A static field that starts at rest, and has a convex potential and slopes in [0, K_max], passes **unchanged**: its
+/// proxy takes U − ‖f‖²/(2 K_max) ≥ 0. A late or stiffer field appears as a spring of K_max that yields.
 ///
-/// A force that the device shortens keeps all this. An interval that was not seen, or is not finite, starts from zero
-/// force with the P there is.
+/// The device may shorten the force. After an interval that was not measured or is not finite, the law starts from zero
+/// force with the current P.
 ///
-/// Source: the slope condition is that of Lee & Lee's nonlinear virtual coupling (ref. [17] of IEEE TCST 17(4), 2009),
-/// whose formula is lost to us; the law and both proofs are ours (control.md 5.8 has the condition). Digital damping B
-/// is not a part of it: b ≥ K_max T/2 + |B| would be needed.
+/// Source: the slope condition is that of the nonlinear virtual coupling of Lee & Lee (ref. [17] of IEEE TCST 17(4),
+/// 2009), whose formula is lost. The law and the proofs are ours: core/PROOFS.md, "Comparison laws". Digital damping B
+/// is not part of it; it would require b ≥ K_max T/2 + |B|.
 ///
 /// Thread-safe: no. Realtime-safe: all but the constructor.
 template <int N>
 class NonlinearCoupling {
  public:
   struct Config {
-    Friction friction;                  ///< f_c serves the ledger alone; b > 0
+    Friction friction;                  ///< f_c is only for the ledger; b > 0
     Duration longest_hold{};            ///< T, > 0
-    std::optional<double> max_slope{};  ///< K_max, N/m, in (0, 2b/T]; left out: 2b/T
+    std::optional<double> max_slope{};  ///< K_max, N/m, in (0, 2b/T]; empty: 2b/T
   };
 
-  /// Throws std::invalid_argument when a field is out of its range.
+  /// Throws std::invalid_argument if a field is out of range.
   explicit NonlinearCoupling(const Config& config);
 
   void observe(const Interval<N>& interval) noexcept;
@@ -51,13 +50,13 @@ class NonlinearCoupling {
   LimitedForce<N> limit(const Demand<N>& demand) noexcept;
   double energy() const noexcept { return port_.energy(); }
 
-  /// P, J: the energy that the proxy has taken in and can give back.
+  /// Returns P in J, the energy that the proxy has received and can return.
   double account() const noexcept { return account_; }
 
  private:
   double max_slope_;
   EnergyLedger port_;
-  Vec<N> returned_ = Vec<N>::Zero();  ///< N, reflective: what `limit` said last
+  Vec<N> returned_ = Vec<N>::Zero();  ///< N, reflective: last result of `limit`
   Vec<N> elastic_ = Vec<N>::Zero();   ///< g, N
   double account_ = 0;
 };

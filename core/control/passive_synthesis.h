@@ -8,34 +8,34 @@
 
 namespace tendon {
 
-/// Softens a whole force field by one factor, so far that the device's friction pays for sampling and delay.
+/// Scales a whole force field by one factor, such that the friction of the device pays for sampling and delay.
 ///
 ///     F = γ F_wanted,    γ = min(1, b / (K_max (T/2 + t_d)))
 ///
-/// K_max (N/m) is the steepest slope of the field: `stiffness`, or the spectral norm of the stiffest demand so far,
-/// whichever is larger. It never forgets, so γ only falls. While no slope is known (demands without stiffness, and none
-/// configured) the force is zero, because nothing could be promised.
+/// K_max (N/m) is the steepest slope of the field: the larger of `stiffness` and the spectral norm of the stiffest
+/// demand so far. γ never rises. While no slope is known (demands without stiffness, and no configured value) the force
+/// is zero.
 ///
-/// Passive for a static field with a convex potential whose slope K_max really bounds, sampled in every period and
-/// delivered t_d late (a multiple of the period), when what is returned is what is held: the force differs from the
-/// field's own by at most K_max times the way since it was sampled, whose mean age is T/2 + t_d. A field that changes
-/// with time is scaled, without any promise. Even the soft parts of the field are softened.
+/// Passive for a static field with a convex potential and slopes up to K_max, sampled in every period and delivered t_d
+/// late (a multiple of the period), if the returned force is applied: the error of the force is at most K_max times the
+/// travel since it was sampled, and its mean age is T/2 + t_d. A field that changes with time is scaled without any
+/// guarantee. The soft parts of the field become softer as well.
 ///
-/// Source: Mahvash & Hayward, IEEE Trans. Robotics 21(1), 2005 (recalled; proof: control.md 5.6). Learning K_max from
-/// the demand is ours: a slope that is met for the first time is paid only from then on.
+/// Source: Mahvash & Hayward, IEEE Trans. Robotics 21(1), 2005 (recalled); proof: core/PROOFS.md, "Comparison laws".
+/// Learning K_max from the demand is ours; a new slope only has an effect from then on.
 ///
 /// Thread-safe: no. Realtime-safe: all but the constructor.
 template <int N>
 class PassiveSynthesis {
  public:
   struct Config {
-    Friction friction;                  ///< f_c serves the ledger alone; b > 0
+    Friction friction;                  ///< f_c is only for the ledger; b > 0
     Duration longest_hold{};            ///< T, > 0
-    Duration delay{};                   ///< t_d, ≥ 0: from the position to the force that answers it
-    std::optional<double> stiffness{};  ///< N/m, > 0: least value of K_max; left out: learned from the demands
+    Duration delay{};                   ///< t_d, ≥ 0: from the position to its force
+    std::optional<double> stiffness{};  ///< N/m, > 0: lower limit of K_max; empty: learned from the demands
   };
 
-  /// Throws std::invalid_argument when a field is out of its range.
+  /// Throws std::invalid_argument if a field is out of range.
   explicit PassiveSynthesis(const Config& config);
 
   void observe(const Interval<N>& interval) noexcept;
@@ -45,7 +45,7 @@ class PassiveSynthesis {
 
  private:
   double affordable_;  ///< N/m, b/(T/2 + t_d)
-  double steepest_;    ///< N/m, K_max; 0: not known
+  double steepest_;    ///< N/m, K_max; 0: unknown
   EnergyLedger port_;
 };
 

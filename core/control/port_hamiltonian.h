@@ -6,52 +6,51 @@
 
 namespace tendon {
 
-/// A spring whose state is the energy that has really gone into it: an energy-consistent sampled-data port-Hamiltonian
-/// system.
+/// An energy-consistent sampled port-Hamiltonian system: a spring whose state is the energy that has really gone in.
 ///
-///     H(n) = H(n−1) + f(n−1)·Δx(n)                  J, f = −F really held: exact for a zero-order hold
-///     q(n) = √(2 H(n)/K)                            m, the state that belongs to it
+///     H(n) = H(n−1) + f(n−1)·Δx(n)                  J, f = −F as applied: exact for a zero-order hold
+///     q(n) = √(2 H(n)/K)                            m, the corresponding state
 ///     F(n) = F_wanted · min(1, K q(n)/‖F_wanted‖)
 ///
-/// K (N/m) is the demand's stiffness along its force where that is above zero, else `stiffness`. The plain spring would
-/// hold ½ K x² while only ½ K x² − Σ ½ K Δx² has gone in: the energy leaps. Here the storage pays for them, and the
-/// state lags behind the position. The storage cannot pay for two things; they are booked as debt and dissipated later,
-/// from half of all income:
+/// K (N/m) is the stiffness of the demand along its force if that is positive, else `stiffness`. A plain spring would
+/// hold ½ K x² while only ½ K x² − Σ ½ K Δx² has gone in (an energy leap). Here the storage pays for the leaps, so the
+/// state lags behind the position. Two amounts that the storage cannot pay are booked as debt. Half of all income
+/// repays it later:
 ///
-///     leap       while moving into the force, q is at least the motion of the last interval (from q = 0 nothing would
-///                ever load): ½ K ‖Δx‖² − H
-///     overdraft  H below zero, because the hand left further than the state reached: H := 0
+///     leap       while moving into the force, q is at least the motion of the last interval (otherwise the spring
+///                could not load from q = 0): ½ K ‖Δx‖² − H
+///     overdraft  H below zero, because the hand moved further out than the state: H := 0
 ///
-/// so that H ≥ 0 always, and the energy that has gone in is never below H − debt. Neither friction nor mass is
-/// needed. Debt grows by no more than ½ K ‖Δx‖² per interval, so the port is passive for **every** demand when
+/// so H ≥ 0, and the energy that has gone in is at least H − debt. Neither friction nor mass is needed. Debt grows by
+/// at most ½ K ‖Δx‖² per interval, so the port is passive for **every** demand if
 ///
 ///     K ≤ 2b/T
 ///
-/// and for stiffer springs only up to its debt. When the environment demands nothing the storage is emptied.
+/// and for stiffer springs up to its debt. The storage is emptied when the environment demands no force.
 ///
 /// Source: Stramigioli, Secchi, van der Schaft, Fantuzzi, IEEE Trans. Robotics 21(4), 2005 (abstract read, rest
-/// recalled); control.md 5.7. The rules for booking, one of many possible, and the theorem above are ours.
+/// recalled). The booking rules and the theorem are ours: core/PROOFS.md, "Comparison laws".
 ///
 /// Thread-safe: no. Realtime-safe: all but the constructor.
 template <int N>
 class PortHamiltonian {
  public:
   struct Config {
-    Friction friction;     ///< for the ledger alone
-    double stiffness = 0;  ///< N/m, > 0: of an environment that does not send its own
+    Friction friction;     ///< only for the ledger
+    double stiffness = 0;  ///< N/m, > 0: for demands without a stiffness
   };
 
-  /// Throws std::invalid_argument when a field is out of its range.
+  /// Throws std::invalid_argument if a field is out of range.
   explicit PortHamiltonian(const Config& config);
 
   void observe(const Interval<N>& interval) noexcept;
-  /// The energy that went in or out is unknown: the storage is emptied.
+  /// Empties the storage, because the energy of the interval is unknown.
   void observe_unseen(const Vec<N>& applied, Duration at_most) noexcept;
   LimitedForce<N> limit(const Demand<N>& demand) noexcept;
   double energy() const noexcept { return port_.energy(); }
 
   double stored() const noexcept { return stored_; }  ///< H, J
-  double debt() const noexcept { return debt_; }      ///< J, booked and not yet dissipated
+  double debt() const noexcept { return debt_; }      ///< J, booked and not yet repaid
 
  private:
   void repay(double energy) noexcept;
@@ -60,7 +59,7 @@ class PortHamiltonian {
   EnergyLedger port_;
   double stored_ = 0;
   double debt_ = 0;
-  Vec<N> dx_ = Vec<N>::Zero();  ///< m, that a leap may still use
+  Vec<N> dx_ = Vec<N>::Zero();  ///< m, available for a leap
 };
 
 }  // namespace tendon

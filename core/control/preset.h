@@ -13,8 +13,8 @@
 
 namespace tendon {
 
-/// Parts that were chosen together by measuring them (tests/tools/lab/README.md): what a newcomer lists instead of each
-/// part with its numbers.
+/// Sets of parts whose values were measured together (tests/tools/lab/README.md). A scene can name a preset instead of
+/// listing parts.
 enum class Preset : std::uint8_t {
   kFeel,
   kFeelUnconditional,
@@ -23,30 +23,29 @@ enum class Preset : std::uint8_t {
 struct PresetInfo {
   Preset preset;
   std::string_view name;  ///< in scenes and tables
-  std::string_view what;  ///< one line: for which device
+  std::string_view what;  ///< one line: the device it is for
 };
 
-/// Every preset, the one for a newcomer first.
+/// Returns all presets. The first one is the recommended default.
 std::span<const PresetInfo> presets() noexcept;
 const PresetInfo& info(Preset preset) noexcept;
 
-/// The device that a preset is for.
+/// The device that a preset is configured for.
 struct PresetDevice {
   Friction friction{};      ///< lower bounds
   Duration longest_hold{};  ///< T_max
-  double encoder_step = 0;  ///< Δ, m; 0: exact, and there is no robust ledger
+  double encoder_step = 0;  ///< Δ, m; 0: exact, without a robust ledger
 };
 
-/// What a preset lists. Values that are lengths, forces and stiffnesses do not depend on T; only what follows from the
-/// device does.
+/// The parts of a preset. Only values that follow from the device depend on T.
 struct PresetParts {
   AolPlus<1, 3>::Parts parts{};
   std::optional<LearnedModel::Config> learned_model{};
 };
 PresetParts preset_parts(Preset preset, const PresetDevice& device) noexcept;
 
-/// What a limiter promises, in a sentence without a full stop: "passive while the handle accelerates by less than 300
-/// m/s², …", "passive whatever the hand does", or that it promises nothing.
+/// Returns what a limiter guarantees, as a sentence without a full stop: "passive while the handle accelerates by less
+/// than 300 m/s², …", "passive whatever the hand does", or that it guarantees nothing.
 std::string promise_of(const LimiterConfig& limiter);
 
 }  // namespace tendon

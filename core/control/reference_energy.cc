@@ -35,7 +35,7 @@ template <int N>
 double ReferenceEnergyController<N>::reference(const Demand<N>& demand) const noexcept {
   if (demand.stiffness == Mat<N>::Zero()) return demand.force.squaredNorm() / (2 * config_.stiffness);
   const auto principal = law_support::principal_stiffness<N>(demand.stiffness);
-  const double least = 1e-9 * principal.values[N - 1];  // below, a direction has no stiffness but rounding
+  const double least = 1e-9 * principal.values[N - 1];  // smaller values are rounding errors
   double energy = 0;
   for (int i = 0; i < N; ++i) {
     const double stiffness = principal.values[i];

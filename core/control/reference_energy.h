@@ -7,34 +7,34 @@
 
 namespace tendon {
 
-/// Adds damping as soon as the environment holds less energy than an ideal one would: passivity control that follows a
-/// reference energy, instead of waiting until all energy is lost.
+/// Passivity control that follows a reference energy: adds damping as soon as the environment holds less energy than an
+/// ideal one would.
 ///
-///     E(n)     = Σ f(n−1)·Δx(n)                        what has gone in (J), f = −F really held
-///     E_ref(n) = ½ F_wanted(n)ᵀ K⁻¹ F_wanted(n)        what a spring of stiffness K holds at that force (J)
+///     E(n)     = Σ f(n−1)·Δx(n)                        energy that has gone in (J), f = −F as applied
+///     E_ref(n) = ½ F_wanted(n)ᵀ K⁻¹ F_wanted(n)        energy of a spring K at that force (J)
 ///     α(n)     = (E_ref − E − f_e·Δx)/(T ‖v‖²)  when E + f_e·Δx < E_ref, within [0, max_damping]
 ///     F(n)     = F_wanted(n) − α(n) v(n)               v = Δx/T, m/s
 ///
-/// K is the demand's stiffness where it sends one (its symmetric part; directions without stiffness hold nothing), else
-/// `stiffness`. Quiet on stiff walls **if** the environment is that spring and its force is fresh in every period; with
-/// a reference that is not the environment's own, it brakes without need or too late. It promises nothing about the
-/// hand's port (see PassivityController).
+/// K is the symmetric part of the stiffness of the demand, if it has one; directions without stiffness hold no energy.
+/// Otherwise K is `stiffness`. The law is quiet on stiff walls **if** the environment is that spring and its force is
+/// fresh in every period. With another reference it brakes without need, or too late. It does not guarantee a passive
+/// port (see PassivityController).
 ///
-/// Source: Ryu, Preusche, Hannaford, Hirzinger, IEEE TCST 13(5), 2005 (recalled); the trigger uses the predicted energy
-/// as PassivityObserver::kZohExact does. control.md 5.2.
+/// Source: Ryu, Preusche, Hannaford, Hirzinger, IEEE TCST 13(5), 2005 (recalled); the trigger uses the predicted
+/// energy, like PassivityObserver::kZohExact. core/PROOFS.md, "Comparison laws".
 ///
 /// Thread-safe: no. Realtime-safe: all but the constructor.
 template <int N>
 class ReferenceEnergyController {
  public:
   struct Config {
-    Friction friction;        ///< for the ledger alone
-    double stiffness = 0;     ///< N/m, > 0: of an environment that does not send its own
+    Friction friction;        ///< only for the ledger
+    double stiffness = 0;     ///< N/m, > 0: for demands without a stiffness
     double max_damping = 0;   ///< N·s/m, > 0; far below 2m/T
-    double min_speed = 1e-4;  ///< m/s, ≥ 0: slower motion is not divided by
+    double min_speed = 1e-4;  ///< m/s, ≥ 0: α is 0 for slower motion
   };
 
-  /// Throws std::invalid_argument when a field is out of its range.
+  /// Throws std::invalid_argument if a field is out of range.
   explicit ReferenceEnergyController(const Config& config);
 
   void observe(const Interval<N>& interval) noexcept;
@@ -42,9 +42,9 @@ class ReferenceEnergyController {
   LimitedForce<N> limit(const Demand<N>& demand) noexcept;
   double energy() const noexcept { return port_.energy(); }
 
-  /// E, J.
+  /// Returns E in J.
   double observed() const noexcept { return observed_; }
-  /// E_ref of a demand, J.
+  /// Returns E_ref of a demand in J.
   double reference(const Demand<N>& demand) const noexcept;
 
  private:

@@ -7,21 +7,20 @@
 
 namespace tendon {
 
-/// A law that makes the force at a device's port safe to feel: what every law in core/control implements.
+/// A law that makes the force at the port of a device safe. Every law in core/control satisfies this concept.
 ///
-/// Once in each haptic period, in this order: `observe` the interval that has just ended (not in the first period,
-/// which has none), then `limit` the wanted force to the one to hold until the next period. When nobody saw the motion
-/// in an interval, call `observe_unseen` instead of `observe`: the force `applied` was held for at most `at_most`, and
-/// then vanished.
+/// Call it once in each haptic period, in this order: `observe` with the interval that has just ended (not in the first
+/// period), then `limit`, which converts the wanted force into the force to hold until the next period. If the motion
+/// in an interval was not measured, call `observe_unseen` instead of `observe`: the force `applied` was held for at
+/// most `at_most` and then vanished.
 ///
-/// N is 1, 3 (forces in N, displacements in m) or 6 (joint torques in N·m and angles in rad, or a wrench and
-/// a twist; each law says which it takes).
+/// N is 1, 3 (forces in N, displacements in m) or 6 (joint torques in N·m and angles in rad, or a wrench and a twist,
+/// as documented by each law).
 ///
-/// `energy` is the law's account of the port, J: the ledger E of Lee & Lee 2009, eq. (5), or a lower bound of it. Laws
-/// that do not act on it keep it too, so that every law can be judged by it.
+/// `energy` is the account of the port in J: the ledger E of Lee & Lee 2009, eq. (5), or a lower bound of it. Laws that
+/// do not use it keep it as well, so that all laws can be compared.
 ///
-/// A demand that is not finite gives zero force with Reason::kNotFinite; an interval that is not finite is
-/// not booked.
+/// A demand that is not finite yields zero force with Reason::kNotFinite. An interval that is not finite is not booked.
 ///
 /// Thread-safe: no. Realtime-safe: all of it.
 template <class Law, int N>
@@ -37,15 +36,15 @@ concept StabilityController = requires(Law law, const Interval<N>& interval, con
   noexcept->std::convertible_to<double>;
 };
 
-/// A law whose account other ports may pay into and draw on (Purse), J:
+/// A law whose account other ports can credit and draw on (Purse). In J:
 ///
-///     credit(J)        the account rises: another port has given up as much. Below zero or not finite: nothing happens
-///     withdraw(J)      the account falls. The caller withdraws no more than `payable`; the same for bad values
-///     payable()        what bounds the next force; of it max(payable, 0) may be withdrawn
-///     worst_loss(F)    ℓ(F) of OutputBound: the account that lets F (N) through whole; +∞ when none does
+///     credit(J)        raises the account by energy that another port gave up. Ignores values that are not positive
+///     withdraw(J)      lowers the account, by at most `payable`. Ignores values that are not positive
+///     payable()        the value that bounds the next force; max(payable, 0) may be withdrawn
+///     worst_loss(F)    ℓ(F) of OutputBound: the account at which F (N) passes unchanged; +∞ if there is none
 ///
-/// `energy` is then the account, the port's own ledger + credited − withdrawn. Both take place between `observe` and
-/// `limit` of one period: what is withdrawn after `limit` was already lent to the force.
+/// `energy` is then the ledger of the port + credited − withdrawn. Call `credit` and `withdraw` between `observe` and
+/// `limit` of one period. After `limit` the energy has already been lent to the force.
 template <class Law, int N>
 concept SharesAccount = requires(Law law, const Law& same, const Vec<N>& force, double energy) {
   { law.credit(energy) }
@@ -58,7 +57,7 @@ concept SharesAccount = requires(Law law, const Law& same, const Vec<N>& force, 
   noexcept->std::same_as<double>;
 };
 
-/// A law whose bound counts on how long its forces are held, and follows a new bound of that from the next `limit` on
+/// A law whose bound depends on the length of the holds. `hold_at_most` sets it for the next `limit` and all later ones
 /// (HoldBound).
 template <class Law>
 concept FollowsHolds = requires(Law law, Duration longest_hold) {

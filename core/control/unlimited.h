@@ -6,7 +6,7 @@
 
 namespace tendon {
 
-/// No law at all: every finite force goes through, and the ledger shows what that costs. For simulated devices only.
+/// Passes every finite force unchanged, and keeps the ledger. Use it only with simulated devices.
 template <int N>
 class Unlimited {
  public:
@@ -14,7 +14,7 @@ class Unlimited {
     Friction friction;  ///< for the ledger
   };
 
-  /// Throws std::invalid_argument when a friction bound is negative or not finite.
+  /// Throws std::invalid_argument if a friction bound is negative or not finite.
   explicit Unlimited(const Config& config) : ledger_(config.friction) {}
 
   void observe(const Interval<N>& interval) noexcept { ledger_.observe(interval.applied, interval.dx, interval.held); }

@@ -53,7 +53,7 @@ void check_design(double viscous, Duration longest_hold, double damping) {
   law_support::checked_hold(longest_hold);
 }
 
-// 2b(B_c + κ) − max over c of what it must not be below.
+// 2b(B_c + κ) less the maximum over c of the right-hand side of the condition.
 double llewellyn_margin(double viscous, double damping, double kappa) {
   constexpr int kPoints = 2000;
   const double sum = damping + kappa;
@@ -75,7 +75,7 @@ double colgate_coupling(double viscous, Duration longest_hold, double damping) {
 double two_port_coupling(double viscous, Duration longest_hold, double damping) {
   check_design(viscous, longest_hold, damping);
   expect(damping >= 0, "damping", damping, "0 N·s/m or more");
-  // The margin is concave in κ; at κ = 0 it is negative, and falling, when B_c > 8b. So there is one change of sign.
+  // The margin is concave in κ. For B_c > 8b it is negative and falls at κ = 0; otherwise it changes sign once.
   if (viscous == 0 || damping > 8 * viscous) return 0;
   double low = 0;
   double high = viscous;

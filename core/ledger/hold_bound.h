@@ -14,8 +14,8 @@ namespace tendon {
 /// T rises at once and falls slowly, so a machine that is late again within `memory` already has a suitable bound.
 /// While no interval is longer than T_max, T equals T_max exactly.
 ///
-/// The limiter keeps E ≥ 0 while no hold is longer than the T in force at its start. The first longer hold, of length T_act with
-/// the force F, takes at most this much more than the ledger contains:
+/// The limiter keeps E ≥ 0 as long as no hold is longer than the T that was in force when it began. If the hold T_act
+/// of a force F is longer, it takes at most this much more than the ledger contains:
 ///
 ///     (T_act − T)(‖F‖ − f_c)₊²/(4b)  ≤  (T_act/T − 1) · E
 ///
