@@ -12,31 +12,32 @@ namespace tendon {
 
 /// One question and its answer, with the four time stamps of NTP (RFC 5905).
 struct ClockExchange {
-  LocalTime sent;         ///< T1, we asked
-  PeerTime received;      ///< T2, the peer heard it
-  PeerTime answered;      ///< T3, the peer answered; ≥ T2
-  LocalTime answered_at;  ///< T4, we heard that; ≥ T1
+  LocalTime sent;         ///< T1, question sent
+  PeerTime received;      ///< T2, question received by the peer
+  PeerTime answered;      ///< T3, answer sent by the peer; ≥ T2
+  LocalTime answered_at;  ///< T4, answer received; ≥ T1
 };
 
-/// How far the peer's clock is ahead of ours, how fast it drifts, and how wrong that can be at most.
+/// Estimates the offset and drift of the clock of the peer, and an error bound of the offset.
 ///
-/// Both one-way delays of an exchange are unknown but not negative, and the offset θ (peer − ours) drifts by at most ρ.
-/// So an exchange bounds θ at its middle:
+/// The one-way delays of an exchange are unknown but not negative, and the offset θ (peer − local) drifts by at most ρ.
+/// So an exchange bounds θ at its midpoint:
 ///
 ///     θᵢ = ((T2 − T1) + (T3 − T4)) / 2,   δᵢ = (T4 − T1) − (T3 − T2),   |θ(tᵢ) − θᵢ| ≤ (δᵢ + ρ (T4 − T1)) / 2 = eᵢ
 ///
-/// Exchanges with a short round trip δ say most, unless the peer has held its answer for long: the clocks drift all
-/// that time, and with a fast peer δ even looks short. Time is cut into blocks; each keeps only its exchange with the
-/// least e, and a line is fitted to them with weights 1 / (δ₀ + 2 eᵢ − 2 e_min). The line is then moved into the range
-/// that all of them permit at time t:
+/// Exchanges with a short round trip δ give the smallest bounds, unless the peer has delayed its answer: the clocks
+/// drift during this time, and the clock of a fast peer shortens δ. Time is divided into blocks. Each keeps its
+/// exchange with the smallest e, and a line is fitted to them with weights 1 / (δ₀ + 2 eᵢ − 2 e_min). The line is then
+/// moved into the range that all of them allow at time t:
 ///
 ///     maxᵢ (θᵢ − eᵢ − ρ|t − tᵢ|) ≤ θ(t) ≤ minᵢ (θᵢ + eᵢ + ρ|t − tᵢ|)
 ///
-/// Its distance from the farther end is the error bound, which is proved, given ρ. An empty range means that the peer's
-/// clock has been set: the past is forgotten, and that is counted in `steps`.
+/// The error bound is the distance to the farther end of the range. It is proved for a given ρ (core/PROOFS.md, "Clock
+/// offset"). An empty range means that the clock of the peer was set. The past is then dropped, and `steps` counts the
+/// event.
 ///
-/// Blocks of 16 exchanges at 5 Hz, eight of them, were the best of six estimators on three real host pairs
-/// (network.md). Here a block is also at least 3.2 s long, so that exchanges at 1 kHz see as much weather.
+/// Eight blocks of 16 exchanges at 5 Hz were the best of six estimators on three real pairs of hosts. Here a block also
+/// lasts at least 3.2 s, so that exchanges at 1 kHz cover as much time.
 ///
 /// Thread-safe: no. Realtime-safe: yes.
 class ClockOffsetEstimator {
@@ -44,36 +45,36 @@ class ClockOffsetEstimator {
   static constexpr std::size_t kBlocks = 8;
   static constexpr int kExchangesPerBlock = 16;
   static constexpr Duration kLeastBlock = std::chrono::milliseconds(3200);
-  /// δ₀: differences of round trip below it are the scheduler's, not the path's.
+  /// δ₀: smaller differences of the round trip are due to the scheduler, not to the path.
   static constexpr Duration kResolution = std::chrono::microseconds(100);
 
   struct Estimate {
-    Duration offset{};            ///< peer's reading − ours, at the time asked for
-    double drift = 0;             ///< s/s, how fast it grows
+    Duration offset{};            ///< clock of the peer − local clock, at the requested time
+    double drift = 0;             ///< s/s, rate of change of the offset
     Duration error_bound{};       ///< |true offset − offset| ≤ this
-    Duration least_round_trip{};  ///< of the exchange that says most
+    Duration least_round_trip{};  ///< of the exchange with the smallest bound
 
     PeerTime to_peer(LocalTime ours) const noexcept { return PeerTime(ours.time_since_epoch() + offset); }
     LocalTime to_local(PeerTime theirs) const noexcept { return LocalTime(theirs.time_since_epoch() - offset); }
   };
 
-  /// `fastest_drift`: ρ, s/s, of the two clocks against each other; 200 ppm is beyond any quartz. Throws
-  /// std::invalid_argument when it is not within 0 … 0.01.
+  /// `fastest_drift`: ρ, s/s, of the two clocks against each other. 200 ppm is more than any quartz. Throws
+  /// std::invalid_argument if it is not within 0 … 0.01.
   explicit ClockOffsetEstimator(double fastest_drift = 200e-6);
 
-  /// An exchange that is impossible (T4 < T1, T3 < T2, or a negative round trip beyond what drift explains) changes
-  /// nothing. `answered_at` should not go back.
+  /// Ignores an impossible exchange (T4 < T1, T3 < T2, or a negative round trip that the drift does not explain).
+  /// `answered_at` should not decrease.
   void observe(const ClockExchange& exchange) noexcept;
 
-  /// At `at`, past or future; empty before the first exchange.
+  /// Returns the estimate at `at`, past or future. It is empty before the first exchange.
   std::optional<Estimate> estimate(LocalTime at) const noexcept;
 
-  /// How often the peer's clock was seen to be set to another time.
+  /// Returns how often the clock of the peer was set.
   std::uint64_t steps() const noexcept { return steps_; }
 
  private:
   struct Sample {
-    LocalTime at;             ///< the middle of the exchange on our clock
+    LocalTime at;             ///< local time of the midpoint of the exchange
     std::int64_t offset_ns;   ///< θ
     std::int64_t round_trip;  ///< δ, ns, ≥ 0
     std::int64_t doubt;       ///< 2 e, ns
@@ -89,10 +90,10 @@ class ClockOffsetEstimator {
 
   double fastest_drift_;
   std::array<Sample, kBlocks> blocks_{};  // a ring of finished blocks
-  std::size_t finished_ = 0;              // ever; the newest is blocks_[(finished_ − 1) % kBlocks]
-  std::optional<Sample> best_;            // of the block under way
+  std::size_t finished_ = 0;              // total; the newest is blocks_[(finished_ − 1) % kBlocks]
+  std::optional<Sample> best_;            // of the current block
   LocalTime block_started_{};
-  int exchanges_ = 0;  // in the block under way
+  int exchanges_ = 0;  // in the current block
   std::uint64_t steps_ = 0;
 };
 

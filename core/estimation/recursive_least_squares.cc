@@ -19,7 +19,7 @@ const LeastSquaresConfig& checked(const LeastSquaresConfig& config) {
   return config;
 }
 
-/// The update itself can only shrink tr P, so dividing P by no less than tr P / cap keeps it below the cap.
+/// The update alone reduces tr P, so a divisor of at least tr P / cap keeps tr P below the cap.
 template <class Scalar>
 Scalar capped(Scalar forgetting, Scalar trace, Scalar cap) noexcept {
   return std::max(forgetting, std::min(Scalar(1), trace / cap));

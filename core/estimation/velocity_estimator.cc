@@ -12,7 +12,7 @@
 namespace tendon {
 namespace {
 
-/// To the bit: −0 less 0 is not 0 less 0.
+/// Compares bits, because −0 − 0 and 0 − 0 differ.
 bool is_same(double a, double b) noexcept { return std::bit_cast<std::uint64_t>(a) == std::bit_cast<std::uint64_t>(b); }
 
 }  // namespace
@@ -39,19 +39,20 @@ Vec<N> VelocityEstimatorOf<N>::observe(LocalTime at, const Vec<N>& position) noe
   }
   count_ = std::min(count_ + 1, kWindow + 1);
 
-  // Divisions are dear: one for each sample that is looked at serves all axes.
+  // Divisions are slow: the axes share one per sample.
   std::array<double, kWindow + 1> rate;  // 1/s
-  std::size_t known = 1;                 // of the first samples before the newest
+  std::size_t known = 1;                 // number of valid entries of `rate`
   const auto rate_to = [&](const Sample& past) { return 1e9 / static_cast<double>((at - past.at).count()); };
 
   for (Eigen::Index axis = 0; axis < N; ++axis) {
-    // The slopes to samples at the same position are 0, and the last of them, whose r(i) is the least, allows least.
+    // The slopes to samples at the same position are 0. The last of them has the smallest r(i), so its test is the
+    // strictest one.
     const std::size_t first = std::max<std::size_t>(same_[static_cast<std::size_t>(axis)], 1);
     if (first < count_) {
       for (; known < first; ++known) rate[known] = rate_to(now[known]);
     }
-    // A line of slope v through the newest sample passes within `resolution` of sample i just when v lies within
-    // resolution · r(i) of the slope to it: keep the intersection.
+    // A line of slope v through the newest sample passes within `resolution` of sample i if and only if v is within
+    // resolution · r(i) of the slope to it. Keep the intersection of these ranges.
     const double x = position[axis];
     const double resolution = resolution_;
     double lowest = -std::numeric_limits<double>::infinity();

@@ -7,9 +7,9 @@
 
 namespace tendon {
 
-/// Limits that no real handle exceeds. A number beyond a limit is a mistake and is refused. Most often it is in the wrong
-/// unit (ms instead of s, mm instead of m, g instead of kg). The limits leave a large margin: the largest known arms have
-/// a reach of 1.5 m, and admittance devices have a friction of 20 N·s/m and a mass of 10 kg.
+/// Limits that no real handle exceeds. A value beyond a limit is refused, because it is almost always in the wrong unit
+/// (ms instead of s, mm instead of m, g instead of kg). The limits leave a large margin: the largest known arms have a
+/// reach of 1.5 m, and admittance devices have a friction of 20 N·s/m and a mass of 10 kg.
 ///
 /// For a rotation, the units are rad, kg·m² and N·m instead of m, kg and N.
 struct HandleBounds {

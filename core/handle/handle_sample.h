@@ -7,7 +7,7 @@
 
 namespace tendon {
 
-/// What the rest of a handle has measured, and what its other motors have held since the step before.
+/// Measurements of a handle other than its position, and the torque and grip force since the previous step.
 struct HandleSample {
   std::optional<Turning> turning{};  ///< empty: not measured
   std::optional<Grip> grip{};        ///< empty: no gripper

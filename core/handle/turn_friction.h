@@ -3,9 +3,9 @@
 
 namespace tendon {
 
-/// The share of a rotation's true viscous friction that a limiter may count on at most. HandlePort books a turn as if
-/// its axis stayed the same during the interval; a wandering axis takes up to 2 % of the viscous friction more than is
-/// booked.
+/// The largest share of the true viscous friction of rotation that a limiter may use. HandlePort assumes a constant
+/// axis during the interval. If the axis turns, the booked energy can exceed the true energy by 2 % of the viscous
+/// friction (core/PROOFS.md, "Several coordinates").
 inline constexpr double kTurnFrictionShare = 0.98;
 
 }  // namespace tendon

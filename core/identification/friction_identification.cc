@@ -25,7 +25,7 @@ struct Mean {
   double error = 0;  ///< one standard deviation
 };
 
-/// Weighted by the errors; wider when the runs scatter more than their errors say.
+/// Mean weighted by the errors. Its error increases if the runs scatter more than their errors.
 Mean mean_of(const Runs& runs, double Friction::*which) {
   double weights = 0;
   double sum = 0;
@@ -53,11 +53,11 @@ struct KellyVerdict {
   std::string flaw;  ///< empty: valid
 };
 
-/// Of the runs of one direction at one place.
+/// Validity of the runs of one direction at one place.
 KellyVerdict kelly_verdict(const Runs& runs) {
   const KellyFit& slow =
       (*std::ranges::min_element(runs, {}, [](const RunEstimate* run) { return run->kelly.rate; }))->kelly;
-  // Of several runs at that slope, the mean.
+  // Mean of several runs at that slope.
   KellyVerdict verdict;
   double count = 0;
   const KellyFit* fast = nullptr;
@@ -132,7 +132,7 @@ PlaceEstimate place_estimate(const std::string& place, const std::vector<RunEsti
 
 std::string at(const PlaceEstimate& place) { return place.place.empty() ? "" : " at " + place.place; }
 
-/// Sets `trust` and `reason`; where Kelly's fit is valid no more than it says is published.
+/// Sets `trust` and `reason`. Where Kelly's fit is valid, it limits the published value.
 void judge(Identification& result) {
   const auto flawed = std::ranges::find(result.places, false, &PlaceEstimate::kelly_valid);
   const auto apart = std::ranges::find_if(result.places, [](const PlaceEstimate& place) {
@@ -232,7 +232,7 @@ Identification identify_friction(std::vector<RunEstimate> runs) {
     result.mass += run.integral.mass / static_cast<double>(runs.size());
   }
   result.runs = std::move(runs);
-  // One device, one noise: a single run knows its own only roughly.
+  // All runs of a device share one noise, because the estimate of a single run is rough.
   result.force_noise = std::sqrt(squares / unit);
   for (RunEstimate& run : result.runs) {
     run.integral_error.viscous = result.force_noise * std::sqrt(run.integral.unit_covariance(0, 0));

@@ -24,24 +24,24 @@ struct RunEstimate {
   Friction integral_error;  ///< one standard deviation of `integral.friction`, N and N·s/m
 };
 
-/// The result of all runs of one place.
+/// The combined result of all runs of one place.
 struct PlaceEstimate {
   std::string place;
-  bool both_directions = false;  ///< else a constant force (gravity, bias) is in f_c, by its full size
-  /// b of the direction that has less, f_c the mean of both, in which a constant force cancels.
+  bool both_directions = false;  ///< if false, f_c includes any constant force (gravity, bias)
+  /// b: minimum of both directions; f_c: mean of both, in which a constant force cancels.
   Friction integral;
-  Friction integral_error;  ///< one standard deviation, widened when the runs scatter more than it says
-  /// Kelly's, of the slowest ramp of each direction, combined in the same way.
+  Friction integral_error;  ///< one standard deviation, increased if the runs scatter more
+  /// Kelly's estimate from the slowest ramp of each direction, combined in the same way.
   Friction kelly;
-  bool kelly_valid = false;  ///< its validity test passed, in all directions
-  std::string kelly_flaw;    ///< when it did not: where and why
+  bool kelly_valid = false;  ///< the validity test passed in all directions
+  std::string kelly_flaw;    ///< otherwise: place and cause
 };
 
-/// Which of the two methods is believed.
+/// The methods that are trusted.
 enum class Trust {
   kIntegral,  ///< Kelly's validity test failed
-  kBoth,      ///< it passed, and the two agree: the lesser of the two is published
-  kNeither,   ///< the test passed, but the two do not agree; the mass may be wrong, and neither is a bound
+  kBoth,      ///< it passed and both agree; the smaller value is published
+  kNeither,   ///< it passed but they disagree; the mass can be wrong, and neither is a bound
 };
 
 /// "integral", "both" or "neither".
@@ -49,45 +49,44 @@ std::string_view to_string(Trust trust) noexcept;
 
 struct Identification {
   std::vector<RunEstimate> runs;      ///< in the order given
-  std::vector<PlaceEstimate> places;  ///< in the order of their first run
+  std::vector<PlaceEstimate> places;  ///< in the order of the first runs
   double force_noise = 0;             ///< N, one standard deviation of a sample, from all runs
-  double mass = 0;                    ///< kg, given or the mean of the fitted ones
-  Friction estimate;                  ///< least of the places: the best estimate of the device's friction
-  /// Bounds for a limiter: the least of the places of the integral's estimate − 3 standard deviations and, where
-  /// it is valid, of Kelly's estimate; never negative. A mass 30 % too small makes the integral's b 9 % too large at
-  /// 0.26 N·s/m: Kelly's b, which needs no mass, stands against that.
+  double mass = 0;                    ///< kg, given or mean of the fitted masses
+  Friction estimate;                  ///< minimum over the places: best estimate of the friction
+  /// Bounds for a limiter: the minimum over the places of the integral estimate − 3 standard deviations and, where it
+  /// is valid, of Kelly's estimate; never negative. If the mass is 30 % too small, the b of the integral fit is 9 % too
+  /// large at 0.26 N·s/m. Kelly's b does not depend on the mass and limits this error.
   Friction lower_bound;
   Trust trust = Trust::kIntegral;
-  std::string reason;                 ///< for `trust`: a sentence for people
-  std::vector<std::string> warnings;  ///< what is missing before these are lower bounds
+  std::string reason;                 ///< of `trust`, as a sentence
+  std::vector<std::string> warnings;  ///< conditions that are missing for lower bounds
 };
 
-/// Viscous and Coulomb friction of a device from runs of the ramp experiment (RampRun), by Kelly's procedure and by the
-/// integral fit, and which of the two to believe.
+/// Identifies viscous and Coulomb friction from runs of the ramp experiment (RampRun) with Kelly's procedure and the
+/// integral fit, and selects the method to trust.
 ///
-/// Kelly's fit is valid at a place when, in each direction, the slowest ramp s and one at least 1.5 times as fast both
-/// slide for 4 m/b after break-away and give f_c > 0, and their b agree within 10 % (assumed: on 0.25 m of travel it
-/// parts 1.5 % at b = 0.26 N·s/m from 19 % and more where the fit is wrong). The two methods agree when b differs by no
-/// more than 10 %.
+/// Kelly's fit is valid at a place if, in each direction, the slowest ramp s and one that is at least 1.5 times as fast
+/// both slide for 4 m/b after break-away and give f_c > 0, and if their b agree within 10 %. (On 0.25 m of travel the
+/// difference is 1.5 % at b = 0.26 N·s/m, and 19 % or more where the fit is wrong.) The two methods agree if b differs
+/// by at most 10 %.
 ///
-/// A friction that differs between the directions looks like a constant force: its mean is published as f_c. Only a
-/// stop of a free handle in both directions could tell.
+/// A friction that differs between the directions looks like a constant force, and its mean is published as f_c. Only a
+/// stop of a free handle in both directions could distinguish them.
 struct IdentificationConfig {
-  std::optional<double> mass;  ///< kg, of handle and mechanism; left out: fitted
+  std::optional<double> mass;  ///< kg, of handle and mechanism; empty: fitted
   double encoder_step = 0;     ///< m, one count
 };
 
-/// The fits of one run, which know nothing of the others: without RunEstimate::integral_error, which takes all. Throws
-/// std::invalid_argument with the message of slide_of, kelly_fit or integral_fit.
-/// Thread-safe: yes. Realtime-safe: no.
+/// Fits one run, independently of the others and without RunEstimate::integral_error, which needs all runs. Throws
+/// std::invalid_argument with the message of slide_of, kelly_fit or integral_fit. Thread-safe: yes. Realtime-safe: no.
 RunEstimate fit_run(const RampRun& run, const IdentificationConfig& config);
 
-/// What the runs say together, by their fits. Throws std::invalid_argument when there are no runs.
-/// Thread-safe: yes. Realtime-safe: no.
+/// Combines the fits of all runs. Throws std::invalid_argument if there are no runs. Thread-safe: yes. Realtime-safe:
+/// no.
 Identification identify_friction(std::vector<RunEstimate> runs);
 
-/// Both. Throws std::invalid_argument when there are no runs, or "run i: …" (counted from 1) with the message of fit_run.
-/// Thread-safe: yes. Realtime-safe: no.
+/// Fits and combines all runs. Throws std::invalid_argument if there are no runs, or "run i: …" (counted from 1) with
+/// the message of fit_run. Thread-safe: yes. Realtime-safe: no.
 Identification identify_friction(std::span<const RampRun> runs, const IdentificationConfig& config);
 
 }  // namespace tendon

@@ -70,8 +70,8 @@ double median_of_absolutes(const VectorXd& values) {
   return *middle;
 }
 
-/// Lᵀu, where r = L ε are the residuals that force noise ε leaves: noise held from t_j to t_j + h moves the double
-/// integral at a later t by h (t − t_j − h/2).
+/// Lᵀu, with the residuals r = L ε of force noise ε. Noise that is held from t_j to t_j + h changes the double integral
+/// at a later t by h (t − t_j − h/2).
 VectorXd transposed_double_integral(const Regression& r, const VectorXd& u) {
   VectorXd result = VectorXd::Zero(u.size());
   double sum = 0;
@@ -84,7 +84,7 @@ VectorXd transposed_double_integral(const Regression& r, const VectorXd& u) {
   return result;
 }
 
-/// Σ of all squares of diag(√weights) L.
+/// Sum of the squares of all elements of diag(√weights) L.
 double squares_of_double_integral(const Regression& r, const VectorXd& weights) {
   double squares = 0;
   double count = 0;
@@ -114,7 +114,7 @@ IntegralFit integral_fit(const Slide& slide, std::optional<double> mass) {
   const VectorXd scale = r.a.colwise().norm().cwiseMax(1e-300);
   const MatrixXd a = r.a * scale.cwiseInverse().asDiagonal();
 
-  // W^½ A θ = W^½ y, reweighted until it stays.
+  // W^½ A θ = W^½ y, reweighted until it converges.
   VectorXd root_weights = VectorXd::Ones(r.y.size());
   VectorXd theta = VectorXd::Zero(a.cols());
   VectorXd residual = r.y;

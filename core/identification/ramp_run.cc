@@ -44,7 +44,7 @@ void check(const RampRun& run, double encoder_step) {
   }
 }
 
-/// Median of 5 neighbours; at the ends, of those that exist twice.
+/// Median of 5 neighbours. At the ends, the window is shifted inwards.
 std::vector<double> without_glitches(const std::vector<RampSample>& samples) {
   std::vector<double> result;
   result.reserve(samples.size());

@@ -28,8 +28,8 @@ namespace tendon {
 ///
 /// Theorem 1: if every force obeys the bound and no hold is longer than T_max, then E(n) ≥ 0 for all n. The bound is
 /// tight. Use T_max here and the measured length in the ledger; this covers jitter. While E < 0 the bound is f_c, and
-/// then no interval lowers E, so the ledger recovers by itself. If a hold of length T_act is longer than T_max, it takes at most
-/// (T_act/T_max − 1) E more than the ledger contains; HoldBound keeps such holds rare.
+/// then no interval lowers E, so the ledger recovers by itself. If a hold of length T_act is longer than T_max, it
+/// takes at most (T_act/T_max − 1) E more than the ledger contains. HoldBound keeps such holds rare.
 ///
 /// Source: Lee & Lee, IEEE TCST 17(4), 2009, eqs (7)–(9), Table I. Proofs: core/PROOFS.md, "Output bound", "Bounded
 /// acceleration" and "Late holds".

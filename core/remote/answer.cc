@@ -33,7 +33,7 @@ Mat3 conservative(const Mat3& stiffness, double max) noexcept {
   const Mat3 symmetric = (stiffness + stiffness.transpose()) / 2;
   const Eigen::SelfAdjointEigenSolver<Mat3> solver(symmetric);
   const Vec3 bounded = solver.eigenvalues().cwiseMax(0).cwiseMin(max);
-  if (bounded == solver.eigenvalues()) return symmetric;  // exactly what was sent
+  if (bounded == solver.eigenvalues()) return symmetric;  // avoids rounding
   return solver.eigenvectors() * bounded.asDiagonal() * solver.eigenvectors().transpose();
 }
 
@@ -48,7 +48,7 @@ void flatten(ForceTable& table, double max_slope) noexcept {
   for (std::size_t i = middle; i-- > 0;) table.force[i] = near(table.force[i], table.force[i + 1]);
 }
 
-/// The force along the normal, and how it grows with position: its negative gradient.
+/// The force along the normal, and its negative gradient.
 struct Along {
   double force;
   Vec3 gradient;

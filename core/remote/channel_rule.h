@@ -5,10 +5,10 @@
 
 namespace tendon {
 
-/// How a device combines the forces of its channels: see ForceChannels. Part of the wire: never renumber.
+/// How a device combines the forces of its channels (ForceChannels). Part of the wire format: never renumber.
 enum class ChannelRule : std::uint8_t {
-  kSum = 1,       ///< its force is added to the others
-  kPriority = 2,  ///< while its force is fresh, it silences the channels of this rule that come after it
+  kSum = 1,       ///< its force is added
+  kPriority = 2,  ///< while its force is fresh, later channels of this rule are silent
 };
 
 }  // namespace tendon

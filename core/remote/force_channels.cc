@@ -7,7 +7,7 @@
 namespace tendon {
 namespace {
 
-/// 0 is the freshest.
+/// Rank of freshness; 0 is the freshest.
 int staleness(Mode mode) noexcept {
   switch (mode) {
     case Mode::kActive:
@@ -52,7 +52,7 @@ void ForceChannels::shift_weights(LocalTime now) noexcept {
     if (ranked(channel)) others += channel.weight;
   }
   others -= winner->weight;
-  // Nobody to fade from.
+  // Without another channel there is no cross-fade.
   const double step = others <= 0 ? 1.0 : ramp_ > Duration::zero() ? seconds(now - last_) / seconds(ramp_) : 1.0;
   const double mine = std::min(1.0, winner->weight + std::max(0.0, step));
   const double share = others > 0 ? (1 - mine) / others : 0.0;
@@ -84,7 +84,7 @@ ForceChannels::Wanted ForceChannels::wanted(const Motion& hand, const Quat* orie
       sum.handle->torque += channel.weight * asked->torque;
       sum.handle->grip += channel.weight * asked->grip;
     }
-    // A channel that has stopped beside one that goes on is no safe stop of the device.
+    // While another channel is active, a stopped one is no safe stop of the device.
     if (channel.wants.mode != Mode::kSafeStop) sum.reasons |= channel.wants.reasons;
   }
   return sum;

@@ -10,52 +10,52 @@
 
 namespace tendon {
 
-/// Combines the forces of several engines into one wanted force. Each engine has a channel with its own HeldForce (the
-/// force it holds, its age, what its estimator has learned):
+/// Combines the forces of several engines into one wanted force. Each engine has a channel with its own HeldForce (held
+/// force, age, estimator):
 ///
 ///     F  =  Σ Fᵢ  over the channels of rule kSum  +  Σ wⱼ Fⱼ  over those of rule kPriority
 ///
-/// Among the channels of rule kPriority, the first in order whose force is fresh (the freshest, when none is) takes all
-/// the weight: its w goes to 1 at the rate of 1 per `ramp_in`, and the others keep their proportions, so that Σ w = 1
-/// and one engine fades over into the next. Stiffnesses, torques and grip forces are combined in the same way.
+/// Among the channels of rule kPriority, the first one with a fresh force (or with the freshest, if none is fresh)
+/// receives all the weight. Its w goes to 1 at a rate of 1 per `ramp_in`, and the others keep their proportions, so Σ w
+/// = 1 and engines are cross-faded. Stiffnesses, torques and grip forces are combined in the same way.
 ///
-/// ForceChannels decides which force is *wanted*. The limiter after it sees only the sum, and keeps engines that fight
-/// each other in check as it does a single wrong one.
+/// The result is a demand. The limiter only sees the sum, so it also protects against engines that oppose each other
+/// (core/PROOFS.md, "Several channels").
 ///
 /// Thread-safe: no. Realtime-safe: yes, but for the constructor.
 class ForceChannels {
  public:
   struct Config {
     HeldForce::Config hold;                                ///< of every channel
-    std::vector<ChannelRule> rules = {ChannelRule::kSum};  ///< of the channels, in order; at least one
+    std::vector<ChannelRule> rules = {ChannelRule::kSum};  ///< one per channel; at least one
   };
 
   struct Wanted : HeldForce::Wanted {
-    /// The channel of the freshest force, the first of equally fresh ones: `mode` and `age` are its.
+    /// The channel of the freshest force, or the first of them. `mode` and `age` belong to it.
     std::size_t channel = 0;
   };
 
-  /// Throws std::invalid_argument when there is no channel, and what HeldForce throws.
+  /// Throws std::invalid_argument if there is no channel, and what HeldForce throws.
   explicit ForceChannels(const Config& config);
 
   std::size_t size() const noexcept { return channels_.size(); }
 
-  /// A newer force of one channel; false when it was refused because it is not sound.
+  /// Takes a newer force of one channel. Returns false if it was refused because it is not sound.
   bool observe(std::size_t channel, const RemoteForce& force) noexcept {
     return channels_[channel].held.observe(force);
   }
-  /// The remote environment of one channel has left.
+  /// The remote environment of a channel has disconnected.
   void release(std::size_t channel, std::uint32_t source, LocalTime now) noexcept {
     channels_[channel].held.release(source, now);
   }
   /// Forgets all forces.
   void disengage() noexcept;
 
-  /// The force wanted at `hand.position` at `hand.at`, and the torque at `orientation`. Call it once in each haptic
-  /// step.
+  /// Returns the force wanted at `hand.position` and `hand.at`, and the torque at `orientation`. Call it once in each
+  /// haptic step.
   Wanted wanted(const Motion& hand, const Quat* orientation = nullptr) noexcept;
 
-  /// The force that a channel holds; empty when idle.
+  /// Returns the force that a channel holds. It is empty when idle.
   const std::optional<RemoteForce>& newest(std::size_t channel) const noexcept {
     return channels_[channel].held.newest();
   }
@@ -64,7 +64,7 @@ class ForceChannels {
   struct Channel {
     HeldForce held;
     ChannelRule rule;
-    double weight;  ///< 1 for ever in a sum
+    double weight;  ///< always 1 in a sum
     HeldForce::Wanted wants{};
   };
 
@@ -72,7 +72,7 @@ class ForceChannels {
 
   Duration ramp_;
   std::vector<Channel> channels_;
-  LocalTime last_{};  ///< the step before
+  LocalTime last_{};  ///< previous step
 };
 
 }  // namespace tendon

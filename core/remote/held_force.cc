@@ -41,7 +41,7 @@ bool HeldForce::observe(const RemoteForce& force) noexcept {
     const double lost = anew ? 1.0 : 1 - presence_;
     ramp_ = Duration(static_cast<Duration::rep>(lost * static_cast<double>(config_.ramp_in.count())));
   }
-  if (anew && local_model_) local_model_.emplace(*config_.adaptive_local_model);  // there is nothing to blend it with
+  if (anew && local_model_) local_model_.emplace(*config_.adaptive_local_model);  // no blend from another source
   if (learned_ && (anew || force.topology_changed)) learned_->forget();
   newest_ = believed(force, config_.max_stiffness);
   if (newest_->torque) {
@@ -88,7 +88,7 @@ HeldForce::Wanted HeldForce::wanted(const Motion& hand, const Quat* orientation)
   if (learned_) learned_->observe(hand);
   if (!newest_) return {};
   Wanted result;
-  // A force may arrive after the device took this step's sample; the wire has no ages below zero.
+  // A force can arrive after the sample of this step. The wire format has no negative ages.
   result.age = std::max(Duration::zero(), hand.at - newest_->received);
   result.loop_age = std::max(Duration::zero(), hand.at - newest_->answers);
   const Duration overdue = result.age - validity();
@@ -114,7 +114,7 @@ HeldForce::Wanted HeldForce::wanted(const Motion& hand, const Quat* orientation)
     gain = portable::exp(-seconds(overdue - config_.hold) / seconds(config_.decay));
   }
   const Duration since_engaged = std::max(Duration::zero(), hand.at - engaged_);
-  double rest = 0;  // the share of what the ramp starts from
+  double rest = 0;  // share of the force at the start of the ramp
   if (since_engaged < ramp_) {
     result.reasons |= Reason::kRampIn;
     const double ramp = seconds(since_engaged) / seconds(ramp_);

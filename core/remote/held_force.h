@@ -14,62 +14,61 @@
 
 namespace tendon {
 
-/// What is wanted of a handle beside its force.
+/// The torque and the grip force that are wanted in addition to the force.
 struct HandleWanted {
   Vec3 torque = Vec3::Zero();  ///< N·m, on the hand
   double grip = 0;             ///< N, on the fingers, > 0 opens them
 };
 
-/// Holds the newest remote force between arrivals, and decides what to render when they stop coming.
+/// Holds the newest remote force between arrivals, and fades it out when no more arrive.
 ///
 /// With age = now − received and v = valid_for (clipped to max_valid_for):
 ///
 ///     age ≤ v                        Active     F(x)                    as it was sent
 ///     age ≤ v + hold                 Holding    F(x)
 ///     age < v + safe_stop            Decaying   F(x) · e^(−(age − v − hold)/decay)
-///     otherwise                      SafeStop   0, until a fresh force comes
+///     otherwise                      SafeStop   0, until a fresh force arrives
 ///
 /// F(x) follows the hand between two arrivals:
 ///
-///     without a part         as the remote environment's local model says, with its contact and its table, or the
-///                            force alone when it sent none                      (reconstruct, estimation/answer.h)
-///     adaptive_local_model   its stiffness, but a new one is blended in          (AdaptiveLocalModel)
-///     output_estimator       a model of the environment, learned on the way      (OutputEstimator)
-///     learned_model          … of how its force changes with the place; an answer that brings its own model is
-///                            reconstructed from that instead                     (LearnedModel)
+///     without a part         the local model of the remote environment, with its contact and table, or the constant
+///                            force if there is no model                        (reconstruct, core/remote/answer.h)
+///     adaptive_local_model   blends from one stiffness to the next              (AdaptiveLocalModel)
+///     output_estimator       learns a model of the environment                  (OutputEstimator)
+///     learned_model          learns how the force depends on the position; answers with a model of their own are
+///                            reconstructed from it                              (LearnedModel)
 ///
-/// A torque is led on by its own model of rotation (answer.h), a grip force stays as it was sent. Both are held, faded
-/// and ramped in together with the force that they came with. The three parts above know forces only.
+/// A torque follows its own model of rotation (answer.h), and a grip force stays constant. Both are held, faded and
+/// ramped in together with the force. The three parts only apply to forces.
 ///
-/// Only the trustworthy part of an answer is used (answer.h): stiffness is capped at `max_stiffness`, and the model is
-/// dropped when the answer says that the topology of the body has changed.
+/// Only the trusted part of an answer is used (answer.h): the stiffness is limited to `max_stiffness`, and the model is
+/// dropped if the topology of the body has changed.
 ///
-/// The first force ever, the first one after a safe stop, and the first one from another source are ramped in linearly
-/// over `ramp_in`, from the force rendered at that moment. A fresh force that arrives while the one before decays is
-/// ramped in over the share of `ramp_in` that the decay has taken: (1 − gain) · ramp_in. So an engine that comes back,
-/// stutters or takes over never kicks the hand. An answer that is not sound (answer.h) is refused, and the one before
-/// it ages on.
+/// The first force, the first one after a safe stop, and the first one from another source are ramped in linearly over
+/// `ramp_in`, starting from the force rendered at that moment. A fresh force that arrives during the decay is ramped in
+/// over (1 − gain) · ramp_in. An engine that returns, stutters or takes over therefore does not cause a step of the
+/// force. An answer that is not sound (answer.h) is refused, and the previous one continues to age.
 ///
-/// HeldForce decides which force is *wanted*. The limiter after it keeps that force from doing harm.
+/// The result is a demand; the limiter bounds it.
 ///
 /// Thread-safe: no. Realtime-safe: yes.
 class HeldForce {
  public:
   struct Config {
-    /// Bridges two lost datagrams of a 100 Hz engine.
+    /// Covers two lost datagrams of a 100 Hz engine.
     Duration hold = std::chrono::milliseconds(20);
-    /// Time constant: 90 % gone after 115 ms, too slow to be felt as a kick, too fast to be leant on.
+    /// Time constant. 90 % is gone after 115 ms: too slow to be felt as a kick, too fast to lean on.
     Duration decay = std::chrono::milliseconds(50);
-    /// Counted from the end of validity; the force has faded to 1 % by then.
+    /// From the end of validity. By then the force has faded to 1 %.
     Duration safe_stop = std::chrono::milliseconds(250);
     Duration ramp_in = std::chrono::milliseconds(100);
-    /// No engine can ask to be believed for longer.
+    /// Upper limit of valid_for.
     Duration max_valid_for = std::chrono::milliseconds(500);
-    /// N/m, > 0: the stiffest model that is followed between two forces. Grounded devices render less stably at 1 kHz.
+    /// N/m, > 0: the stiffest model between two forces. Grounded devices can render less at 1 kHz.
     double max_stiffness = 5000;
     /// N·m/rad, > 0: the same for rotation.
     double max_angular_stiffness = 5;
-    /// At most one of these three. Empty: not used, costs nothing.
+    /// At most one of these three. An empty part is not used and costs nothing.
     std::optional<AdaptiveLocalModel::Config> adaptive_local_model{};
     std::optional<OutputEstimator::Config> output_estimator{};
     std::optional<LearnedModel::Config> learned_model{};
@@ -81,22 +80,22 @@ class HeldForce {
     Mode mode = Mode::kIdle;
     Reasons reasons;
     Duration age{};                        ///< since it was received; 0 when idle
-    Duration loop_age{};                   ///< since the motion that it answers was sampled; 0 when idle
-    std::optional<HandleWanted> handle{};  ///< empty: nothing is asked of torque and grip
+    Duration loop_age{};                   ///< since the sample of the answered motion; 0 when idle
+    std::optional<HandleWanted> handle{};  ///< empty: no torque and grip force are wanted
   };
 
-  /// Throws std::invalid_argument naming the field when a duration is negative, decay is not positive, safe_stop is
-  /// shorter than hold, max_stiffness is not above zero, a part refuses its configuration, or several parts are listed.
+  /// Throws std::invalid_argument with the name of the field if a duration is negative, decay is not positive,
+  /// safe_stop is shorter than hold, max_stiffness is not positive, a part refuses its configuration, or several parts
+  /// are listed.
   explicit HeldForce(const Config& config);
 
-  /// Takes a newer force. Returns false, and changes nothing, when it is not sound.
+  /// Takes a newer force. Returns false, without an effect, if it is not sound.
   bool observe(const RemoteForce& force) noexcept;
 
-  /// The remote environment `source` has left: if its force is the one held, that force is no longer fresh from `now`
-  /// on.
+  /// The remote environment `source` has disconnected. Its force, if held, is not fresh from `now` on.
   void release(std::uint32_t source, LocalTime now) noexcept;
 
-  /// Forgets the force: idle, until a fresh one comes and is ramped in.
+  /// Drops the force. The next fresh one is ramped in.
   void disengage() noexcept {
     newest_.reset();
     mode_ = Mode::kIdle;
@@ -122,7 +121,7 @@ class HeldForce {
   LocalTime engaged_{};       ///< start of the ramp
   Duration ramp_{};           ///< its length
   Vec3 from_ = Vec3::Zero();  ///< N, the force it starts from
-  double presence_ = 0;       ///< the share of the environment's force in `rendered_`, 0 to 1
+  double presence_ = 0;       ///< share of the environment in `rendered_`, 0 to 1
   Vec3 rendered_ = Vec3::Zero();
   std::optional<HandleWanted> handle_from_;
   std::optional<HandleWanted> handle_rendered_;

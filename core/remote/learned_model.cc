@@ -8,11 +8,11 @@
 namespace tendon {
 namespace {
 
-constexpr double kOtherSide = 3e-4;   // m: a force of zero so far from the last push is the end of an object
-constexpr double kSameObject = 3e-3;  // m: a force that turns round within this is of one object
-constexpr double kBeyond = 1.5;       // of the largest force of late: no prediction is larger
-constexpr double kOfLate = 1;         // s, time constant with which that is forgotten
-constexpr double kOfTheNewGap = 0.2;  // weight of one gap in the mean time between answers
+constexpr double kOtherSide = 3e-4;   // m: a zero force at this distance from the last push ends the object
+constexpr double kSameObject = 3e-3;  // m: a force that reverses within this is of one object
+constexpr double kBeyond = 1.5;       // limit of predictions, in F_late
+constexpr double kOfLate = 1;         // s, time constant of F_late
+constexpr double kOfTheNewGap = 0.2;  // weight of a new gap in the mean time between answers
 
 }  // namespace
 
@@ -32,8 +32,8 @@ void LearnedModel::observe(const Motion& hand) noexcept {
   ++next_;
 }
 
-/// Where the hand was in the last step that was not after `at`. Time stamps rise with the number of the step, so the ring
-/// is searched by halves.
+/// The position of the hand in the last step not after `at`. Binary search, because the time stamps in the ring
+/// increase.
 std::optional<Vec3> LearnedModel::place_at(LocalTime at) const noexcept {
   std::uint64_t low = next_ > kSlots ? next_ - kSlots : 0;
   std::uint64_t high = next_;
@@ -100,7 +100,7 @@ void LearnedModel::correct(const RemoteForce& answer) noexcept {
   rest_ = before - led().force;
 }
 
-/// The anchor, led to the newest motion.
+/// The anchor, moved to the newest position.
 Prediction LearnedModel::led() const noexcept {
   Prediction result{.force = anchor_->force, .stiffness = Mat3::Zero()};
   if (!known_place_ || trust_ == 0 || (one_sided_ && anchor_->force.isZero(0))) return result;

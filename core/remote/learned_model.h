@@ -12,41 +12,41 @@
 
 namespace tendon {
 
-/// Learns how the remote force changes with the hand's place, from the answers alone, and moves the newest answer to
-/// where the hand is now: over the delay, and between two answers.
+/// Learns from the answers how the remote force changes with the position of the hand, and moves the newest answer to
+/// the current position. It compensates the delay, and interpolates between two answers.
 ///
-/// x_a is where the hand was when the motion was sampled that answer F_a belongs to. At a new answer, with (F_p, x_p)
-/// the last one that taught something, p = x_a − x_p, and if ‖p‖ ≥ ℓ (`least_travel`):
+/// x_a is the position of the hand when the motion of answer F_a was sampled. At a new answer, with (F_p, x_p) the last
+/// one that was learned from, p = x_a − x_p, and if ‖p‖ ≥ ℓ (`least_travel`):
 ///
-///     q = K p                                                              N, what the model says
+///     q = K p                                                              N, prediction of the model
 ///     N ← λ N − (F_a − F_p)·q,   D ← λ D + ‖q‖²,   θ = clamp(N/D, 0, 1)    trust; 0 before two lessons
 ///     K ← K + g (−(F_a − F_p) − q) pᵀ / (‖p‖² + ℓ²/10)                     N/m, 3 × 3
 ///     (F_p, x_p) ← (F_a, x_a)
 ///
-/// and at every haptic step, with d = x − x_a:
+/// and in every haptic step, with d = x − x_a:
 ///
 ///     F = F_a − θ K d + r,   ‖θ K d‖ ≤ max_stiffness ‖d‖,   ‖F − r‖ ≤ 1.5 F_late;   r ← r τ_r/(τ_r + T)
 ///
-/// where r is set at an answer so that F does not jump, and τ_r is the least of `blend` and `blend_share` of the mean
-/// time between answers: always `blend` would lag where answers are fresh. F_late is the largest of the answers, forgotten
-/// within 1 s: a force that friction or a yielding object limits is not led far beyond that limit.
+/// r is set at an answer so that F does not jump. τ_r is the minimum of `blend` and `blend_share` of the mean time
+/// between answers; a constant `blend` would lag if answers are fresh. F_late is the largest recent answer, forgotten
+/// within 1 s, so the prediction does not exceed the limit of friction or of a yielding object by much.
 ///
-/// Trust is the least-squares share of the predicted change that really came, so a force that changes in time makes its
-/// own model fade. There is no covariance, hence none to wind up: a hand that travels less than ℓ teaches nothing.
+/// The trust is the least-squares ratio of the observed to the predicted change. A force that changes in time reduces
+/// it. There is no covariance that could wind up: motion below ℓ has no effect.
 ///
-/// One-sided contact: after an answer of exactly zero, 0.3 mm or more from where a force was felt last, the object counts
-/// as one that only pushes. Then F fades to zero along F_a but does not turn round, F_a = 0 predicts zero, and pairs with
-/// a zero in them teach nothing. A force that turns round within 3 mm ends that.
+/// One-sided contact: after an answer of exactly zero, at least 0.3 mm from the last force, the object only pushes. F
+/// then fades to zero along F_a but does not reverse, F_a = 0 predicts zero, and pairs with a zero are not used. A
+/// force that reverses within 3 mm ends this state.
 ///
-/// It decides which force is *wanted*; a limiter comes after it. An answer with a model of its own is for `reconstruct`.
+/// The result is a demand; a limiter bounds it. Answers with a model of their own are for `reconstruct`.
 ///
-/// Source: derived for Tendon (feel.md 3.1). The update is the normalised least-mean-squares step (Nagumo and Noda, IEEE
+/// Source: core/PROOFS.md, "Local models". The update is the normalized least-mean-squares step (Nagumo and Noda, IEEE
 /// Trans. Automatic Control 12(3), 1967).
 ///
 /// Thread-safe: no. Realtime-safe: yes; observe and predict O(1), correct O(log kSlots).
 class LearnedModel {
  public:
-  /// Steps remembered: an answer that comes more than this many steps late is held as it is.
+  /// Number of stored steps. An answer that is older is held without a model.
   static constexpr std::size_t kSlots = 1024;
 
   struct Config {
@@ -58,20 +58,20 @@ class LearnedModel {
     double blend_share = 0.3;                       ///< ≥ 0
   };
 
-  /// Throws std::invalid_argument naming the field when it is out of range.
+  /// Throws std::invalid_argument with the name of the field if it is out of range.
   explicit LearnedModel(const Config& config);
 
-  /// Remembers the motion of this haptic step. One that is not finite or not newer changes nothing.
+  /// Stores the motion of this haptic step. Ignores a motion that is not finite or not newer.
   void observe(const Motion& hand) noexcept;
 
-  /// Takes a newer answer. Only `force` and `answers` are read.
+  /// Takes a newer answer. Uses only `force` and `answers`.
   void correct(const RemoteForce& answer) noexcept;
 
-  /// What the environment would answer at the newest motion observed; empty before the first answer. Call it once in each
-  /// haptic step: r fades by it.
+  /// Returns the answer predicted for the newest motion. It is empty before the first answer. Call it once in each
+  /// haptic step, because r fades with each call.
   std::optional<Prediction> predict() noexcept;
 
-  /// Forgets everything but the motion: the next answer is of another environment.
+  /// Drops everything but the motion, for answers of another environment.
   void forget() noexcept;
 
   double trust() const noexcept { return trust_; }               ///< θ
@@ -103,14 +103,14 @@ class LearnedModel {
   double trust_ = 0;
   int lessons_ = 0;  ///< 0, 1, or 2 for more
   std::optional<Answered> teacher_;
-  std::optional<Answered> pushed_;  ///< the last answer that was not zero; until there is one, the first that was
+  std::optional<Answered> pushed_;  ///< last nonzero answer, or the first zero one
   bool one_sided_ = false;
 
   std::optional<Answered> anchor_;
-  bool known_place_ = false;     ///< of the anchor; without it the answer is held
+  bool known_place_ = false;     ///< of the anchor; if false, the answer is held
   Vec3 rest_ = Vec3::Zero();     ///< r, N
-  LocalTime answered_{};         ///< when the anchor came
-  LocalTime faded_{};            ///< when `rest_` was looked at last
+  LocalTime answered_{};         ///< arrival of the anchor
+  LocalTime faded_{};            ///< last update of `rest_`
   double largest_ = 0;           ///< F_late, N
   std::optional<double> gap_{};  ///< s, mean time between answers
 };

@@ -9,8 +9,8 @@
 namespace tendon {
 namespace {
 
-/// m/N; scales the regressor F(k−1) so that one prior serves pole and stiffness: with p0 = 1e8 (N/m)²
-/// the pole may be wrong by 10.
+/// m/N; scales the regressor F(k−1) so that pole and stiffness have the same prior. p0 = 1e8 (N/m)² corresponds to an
+/// error of 10 of the pole.
 constexpr double kPoleScale = 1e-3;
 
 LeastSquaresConfig checked(const OutputEstimator::Config& config) {
@@ -86,7 +86,7 @@ Eigen::Vector2d OutputEstimator::parameters(int axis) const noexcept {
   return theta;
 }
 
-/// Time stamps rise with the number of the step, so the ring is searched by halves.
+/// Binary search, because the time stamps in the ring increase.
 std::optional<std::uint64_t> OutputEstimator::find(LocalTime at) const noexcept {
   std::uint64_t low = next_ > kSlots ? next_ - kSlots : 0;
   std::uint64_t high = next_;
@@ -136,7 +136,7 @@ Eigen::Vector2d OutputEstimator::bounded(const Eigen::Vector2d& estimate) const 
   const double max = config_.max_stiffness;
   switch (config_.model) {
     case Model::kPolynomial:
-    case Model::kSpringAndBias:  // neither hardening nor a bias has a sign of its own
+    case Model::kSpringAndBias:  // hardening and bias can have either sign
       return {std::clamp(estimate[0], 0.0, max), std::clamp(estimate[1], -max, max)};
     case Model::kOutputError:
       break;
@@ -151,7 +151,7 @@ double OutputEstimator::output(int axis, double position, double before) const n
   return std::clamp(free, -config_.max_force, config_.max_force);
 }
 
-/// The newest answer is what the force was; what came after it is computed again.
+/// Sets the force at the newest answered motion to the answer, and recomputes the forces since.
 void OutputEstimator::anchor() noexcept {
   Step& known = step(anchor_->step);
   if (config_.model != Model::kOutputError) {

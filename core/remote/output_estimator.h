@@ -13,19 +13,18 @@
 
 namespace tendon {
 
-/// Learns the remote environment from its rare and late forces, and predicts at every haptic step what it would answer
-/// to the present position.
+/// Learns the remote environment from its infrequent and late forces, and predicts in every haptic step the answer to
+/// the current position.
 ///
-/// Each axis is a model of its own with two parameters θ in N/m, of the displacement x = position −
-/// origin along that axis. Parameters are physical: a spring that pushes the hand back has θ₁ > 0 and
-/// F = −θ₁ x; forces in and out have Tendon's sign, on the hand. With ℓ = `scale`:
+/// Each axis is a separate model with two parameters θ in N/m, of the displacement x = position − origin along that
+/// axis. A spring that pushes the hand back has θ₁ > 0 and F = −θ₁ x; forces are on the hand. With ℓ = `scale`:
 ///
 ///     kPolynomial     F = −(θ₁ x + θ₂ x|x|/ℓ) − off           −∂F/∂x = θ₁ + 2 θ₂ |x|/ℓ
 ///     kSpringAndBias  F = −(θ₁ x + θ₂ ℓ) − off                −∂F/∂x = θ₁
 ///     kOutputError    F(k) = a F(k−1) − θ₂ x(k)               −∂F/∂x = θ₂, of this step
 ///
-/// A force that answers the motion at time t is compared with the model's force for that motion, which is kept in a
-/// ring. **The time and the order in which answers arrive do not matter.** Then:
+/// A force that answers the motion at time t is compared with the force of the model for that motion, from a ring of
+/// past motions. **The time and the order of arrival have no effect.** Then:
 ///
 ///     e = −F − φᵀθ
 ///     if |e| > reset_error, and reset_cooldown answers since the last one:  P ← p0 I  (θ stays)
@@ -33,24 +32,23 @@ namespace tendon {
 ///     θ ← into its bounds: stiffness 0 … max_stiffness (other parameters either sign), |a| ≤ 0.9
 ///     re-anchor on the newest motion that was answered: off = −F − φᵀθ, or F(k) computed again since
 ///
-/// An axis on which the hand has moved less than three encoder counts since it last learned is frozen:
-/// it is re-anchored but learns nothing from quantisation. Before it has learned, the prediction is the
-/// force held. The pole is bounded because a pole fitted to 25 Hz data and run at 1 kHz is unstable as
-/// often as not; a prediction is bounded because even so it can be wrong by newtons for a round trip
-/// after the environment changes. The estimator decides which force is *wanted*; a limiter always comes after it.
+/// If the hand has moved less than three encoder counts along an axis since its last lesson, the axis is frozen: it is
+/// re-anchored but does not learn from quantization. Before the first lesson the prediction is the held force. The pole
+/// is bounded, because a pole fitted to 25 Hz data is often unstable at 1 kHz. The prediction is bounded as well,
+/// because it can be wrong by some newtons for a round trip after a change of the environment. The result is a demand;
+/// a limiter bounds it.
 ///
-/// Coupling between axes is not modelled: a wall at an angle to the axes is seen as three springs, which are right
-/// only along the direction in which it was pressed last. An engine that knows better sends a LocalModel
-/// (see AdaptiveLocalModel).
+/// Coupling between axes is not modelled. A wall at an angle to the axes appears as three springs that are right only
+/// along the direction of the last press. Engines can send a LocalModel instead (see AdaptiveLocalModel).
 ///
-/// Source: Lee and Lee, "Multirate output estimation for real-time haptic rendering" (abstract only: the
-/// structure; the condition of the P reset is lost and ours is a guess). Cap, cooldown, bounds, freeze
-/// and re-anchoring are ours.
+/// Source: Lee and Lee, "Multirate output estimation for real-time haptic rendering" (abstract only: the structure; the
+/// condition of the P reset is lost, and ours is a guess). Cap, cooldown, bounds, freeze and re-anchoring are ours:
+/// core/PROOFS.md, "Local models".
 ///
 /// Thread-safe: no. Realtime-safe: yes; observe and predict O(1), correct at most kSlots steps.
 class OutputEstimator {
  public:
-  /// Steps remembered: an answer that comes more than this many steps late is ignored.
+  /// Number of stored steps. Older answers are ignored.
   static constexpr std::size_t kSlots = 1024;
   static constexpr double kMaxPole = 0.9;
   static constexpr double kFreezeCounts = 3;
@@ -61,17 +59,17 @@ class OutputEstimator {
     Model model = Model::kPolynomial;
     /// m; the position at which the environment is at rest.
     Vec3 origin = Vec3::Zero();
-    /// ℓ, m; about the travel, so that both parameters are of one size.
+    /// ℓ, m: about the travel, so that both parameters have the same magnitude.
     double scale = 0.01;
-    /// Per answer: with 0.95 at 25 Hz, half is forgotten in 0.5 s.
+    /// Per answer. At 25 Hz, 0.95 forgets half in 0.5 s.
     double forgetting = 0.95;
-    /// (N/m)²/N²: a parameter may be wrong by 500 N/m, a force by 0.05 N.
+    /// (N/m)²/N²: errors of 500 N/m of a parameter and 0.05 N of a force.
     double prior_variance = 1e8;
     /// N; about the noise of the engine's force.
     double dead_zone = 0;
-    /// N; a larger error is another environment.
+    /// N; a larger error indicates another environment.
     double reset_error = 0.3;
-    /// Answers; one more than there are parameters, or a reset would undo what the last one began.
+    /// Answers. One more than there are parameters; with fewer, a reset would undo the previous one.
     int reset_cooldown = 3;
     /// N/m
     double max_stiffness = 5000;
@@ -83,26 +81,26 @@ class OutputEstimator {
 
   struct Counts {
     std::uint64_t corrections = 0;  ///< answers used
-    std::uint64_t ignored = 0;      ///< answers to motions unknown, too old or answered already, or not finite
+    std::uint64_t ignored = 0;      ///< answers to unknown, too old or already answered motions, or not finite
     std::uint64_t resets = 0;       ///< of P, over all axes
-    std::uint64_t frozen = 0;       ///< axes that did not learn from an answer, for lack of motion
+    std::uint64_t frozen = 0;       ///< axes without enough motion to learn from an answer
   };
 
-  /// Throws std::invalid_argument naming the field when it is out of range.
+  /// Throws std::invalid_argument with the name of the field if it is out of range.
   explicit OutputEstimator(const Config& config);
 
-  /// Remembers the motion of this haptic step. One that is not finite or not newer changes nothing.
+  /// Stores the motion of this haptic step. Ignores a motion that is not finite or not newer.
   void observe(const Motion& hand) noexcept;
 
-  /// Learns from a remote force; false when it was ignored. Only `force` and `answers` are read.
+  /// Learns from a remote force. Returns false if it was ignored. Uses only `force` and `answers`.
   bool correct(const RemoteForce& force) noexcept;
 
-  /// What the environment would answer at `hand.position`, in the step of `hand.at` or, when that was
-  /// not observed, the one after the newest. Empty before the first correction, or for a position that
-  /// is not finite. On an axis at ±max_force the stiffness is zero.
+  /// Returns the predicted answer at `hand.position`, in the step of `hand.at` or, if that was not observed, the one
+  /// after the newest. It is empty before the first correction, and for a position that is not finite. On an axis at
+  /// ±max_force the stiffness is zero.
   std::optional<Prediction> predict(const Motion& hand) const noexcept;
 
-  /// θ of an axis, N/m; for kOutputError (a, θ₂) with a as a number.
+  /// Returns θ of an axis in N/m. For kOutputError it is (a, θ₂) with the dimensionless a.
   Eigen::Vector2d parameters(int axis) const noexcept;
 
   const Counts& counts() const noexcept { return counts_; }
@@ -138,7 +136,7 @@ class OutputEstimator {
 
   Config config_;
   std::array<Step, kSlots> steps_{};
-  std::uint64_t next_ = 0;  ///< number of the step that comes next; the newest has next_ − 1
+  std::uint64_t next_ = 0;  ///< number of the next step; the newest has next_ − 1
   std::array<Axis, 3> axes_;
   std::optional<Anchor> anchor_;
   Counts counts_;

@@ -38,7 +38,7 @@ std::string_view to_string(DiolaitiRegion region) noexcept {
 Diolaiti diolaiti(const SampledSpring& spring) {
   check_without_damper(spring);
   const double k = spring.stiffness;
-  const double leak = k * mean_age(spring) - spring.viscous;  // N·s/m that the hold adds, net of friction
+  const double leak = k * mean_age(spring) - spring.viscous;  // N·s/m, negative damping of the hold less friction
   Diolaiti result;
   result.beta = k == 0 ? kInfinity : spring.viscous / (k * seconds(spring.period));
   result.sigma = k * spring.encoder_step == 0 ? kInfinity : spring.coulomb / (k * spring.encoder_step);

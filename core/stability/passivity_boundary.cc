@@ -14,7 +14,7 @@ namespace {
 
 constexpr double kPi = std::numbers::pi;
 
-/// What the condition demands of b at the angle θ.
+/// The b that the condition requires at the angle θ.
 double demand(const SampledSpring& spring, double theta) {
   const double half = theta / 2;
   const double d = spring.delay_samples;
@@ -23,7 +23,7 @@ double demand(const SampledSpring& spring, double theta) {
   return spring.stiffness * seconds(spring.period) / 2 * kernel - spring.damping * std::cos((d + 1) * theta);
 }
 
-/// Between `low` and `high` the demand has one maximum: golden section.
+/// Golden-section search. The function has one maximum between `low` and `high`.
 double refined_maximum(const SampledSpring& spring, double low, double high) {
   constexpr double kGolden = 0.6180339887498949;
   for (int i = 0; i < 60; ++i) {
@@ -39,7 +39,7 @@ double refined_maximum(const SampledSpring& spring, double low, double high) {
 
 double passive_viscous_friction(const SampledSpring& spring) {
   check(spring);
-  // 32 points for each half wave of the fastest term: the grid finds the hill, the section its top.
+  // 32 points per half wave of the fastest term locate the maximum, and the section search refines it.
   const int points = 32 * (spring.delay_samples + 1);
   int best = 0;
   double most = -std::numeric_limits<double>::infinity();
@@ -81,7 +81,7 @@ double largest_passive_stiffness(const SampledSpring& spring) {
     return passive_viscous_friction(tried);
   };
   if (demanded(0) > spring.viscous) return 0;
-  // The demand is convex in K, and at θ → 0 it is K (T/2 + dT) − B.
+  // The required friction is convex in K, and K (T/2 + dT) − B for θ → 0.
   double passive = 0;
   double active = 2 * (spring.viscous + std::abs(spring.damping)) / mean_age(spring);
   for (int i = 0; i < 60; ++i) {

@@ -5,16 +5,16 @@
 
 namespace tendon {
 
-/// A virtual spring and damper on a real handle, sampled and held: the one system for which the literature has
-/// closed-form boundaries. Everything in core/stability is a function of it. On the handle,
+/// A virtual spring and damper, sampled and held, on a real handle. The literature has closed-form boundaries for this
+/// system, and all functions of core/stability take it. For the handle,
 ///
 ///     m dv/dt = F − b v − f_c sgn(v),
 ///     F(t) = −[ K x(k−d) + B (x(k−d) − x(k−d−1))/T ]    for kT ≤ t < (k+1)T        (N, on the hand)
 ///
-/// with x(k) the position at kT rounded to the encoder step. No hand, no unilateral contact.
+/// where x(k) is the position at kT, rounded to the encoder step. There is no hand and no unilateral contact.
 ///
-/// Every function that takes one throws std::invalid_argument naming the field, its value and what was expected,
-/// even when a field is set that its law does not use. None is for the haptic loop.
+/// These functions throw std::invalid_argument with the field, its value and the expected range, even for a field that
+/// they do not use. They are not realtime-safe.
 struct SampledSpring {
   double mass = 0;          ///< m, kg
   double viscous = 0;       ///< b, N·s/m, of the device
@@ -26,18 +26,17 @@ struct SampledSpring {
   double encoder_step = 0;  ///< Δ, m, one count; 0 = exact
 };
 
-/// Far beyond any loop in which these laws mean something; bounds the size of an eigenvalue problem.
+/// Far beyond the range of these laws. It limits the size of an eigenvalue problem.
 inline constexpr int kMaxDelaySamples = 200;
 
-/// The age of the force in the middle of the interval in which it is held: T/2 + d T, s. Most boundaries are
-/// "friction against stiffness × this".
+/// Returns the mean age of the held force, T/2 + d T, in s. Most boundaries compare friction with stiffness × this age.
 double mean_age(const SampledSpring& spring);
 
-/// Throws as described above unless all fields are finite, mass and the rest not negative (only B may be), T > 0 and
-/// 0 ≤ d ≤ kMaxDelaySamples. The laws call it themselves.
+/// Throws as described above unless all fields are finite, all but B are not negative, T > 0 and 0 ≤ d ≤
+/// kMaxDelaySamples. The laws call this function.
 void check(const SampledSpring& spring);
 
-/// Throws unless B = 0: for laws that know no virtual damper.
+/// Throws if B ≠ 0, for laws without a virtual damper.
 void check_without_damper(const SampledSpring& spring);
 
 }  // namespace tendon

@@ -25,11 +25,11 @@ double spectral_radius(const SampledSpring& spring) {
   const double t = seconds(spring.period);
   const double u = spring.viscous * t / m;
   // Exact over one period: v decays with δ; a force moves x by T²/m · g(u) and v by T/m · h(u),
-  // h = (1 − e^{−u})/u, g = (1 − h)/u. The series where the differences lose their digits.
+  // h = (1 − e^{−u})/u, g = (1 − h)/u. Series expansions avoid cancellation for small u.
   const double h = u < 1e-8 ? 1 - u / 2 : -std::expm1(-u) / u;
   const double g = u < 1e-3 ? 0.5 - u / 6 + u * u / 24 : (1 - h) / u;
 
-  // State: x, v, x of the sample before, and the forces under way, oldest first.
+  // State: x, v, previous x, and the forces under way, oldest first.
   const Eigen::Index d = spring.delay_samples;
   const Eigen::Index n = 3 + d;
   Eigen::RowVectorXd computed = Eigen::RowVectorXd::Zero(n);
@@ -60,7 +60,7 @@ double largest_stable_stiffness(const SampledSpring& spring) {
     tried.stiffness = stiffness;
     return spectral_radius(tried) < 1;
   };
-  // A spring this soft moves the slowest eigenvalue off 1 by about 1e-6, far above the rounding.
+  // Such a soft spring moves the slowest eigenvalue by about 1e-6 from 1, far more than rounding.
   double stable = 1e-6 * (spring.viscous + std::abs(spring.damping)) / seconds(spring.period);
   if (stable == 0 || !is_stable(stable)) return 0;
   double unstable = stable;
