@@ -10,8 +10,8 @@
 
 namespace tendon {
 
-/// Unsigned integers as bytes, the lowest byte first: the byte order of the wire, of MCAP and of every hash that takes
-/// a number. The result is the same on every machine.
+/// Unsigned integers in little-endian byte order, for the wire, MCAP and hashes. The result is the same on every
+/// machine.
 ///
 /// Realtime-safe.
 
@@ -19,7 +19,7 @@ namespace tendon {
 template <std::unsigned_integral T>
 constexpr void put_little_endian(T value, std::byte* to) noexcept {
   if (!std::is_constant_evaluated() && std::endian::native == std::endian::little) {
-    std::memcpy(to, &value, sizeof value);  // one store; no compiler sees that in the loop
+    std::memcpy(to, &value, sizeof value);  // a single store, which compilers do not generate from the loop
     return;
   }
   for (std::size_t i = 0; i < sizeof(T); ++i) to[i] = static_cast<std::byte>(value >> (8 * i) & 0xFFU);

@@ -7,8 +7,8 @@
 
 namespace tendon {
 
-/// A sum that keeps what each addition rounds off (Neumaier 1974): it is off by one rounding, however many terms it
-/// has. 1e8 times 1 µJ, 28 hours at 1 kHz, is 100 J; a plain double is 0.16 µJ off, a float ends at 32 J.
+/// A sum that compensates rounding errors (Neumaier 1974): its error is one rounding, for any number of terms. 1e8
+/// times 1 µJ (28 hours at 1 kHz) is 100 J; a plain double is wrong by 0.16 µJ, and a float ends at 32 J.
 ///
 /// Terms must be finite. Realtime-safe: yes.
 class CompensatedSum {

@@ -9,7 +9,7 @@
 
 namespace tendon {
 std::string shortest(double value) {
-  std::array<char, 32> text{};  // the longest shortest form of a double has 24 characters
+  std::array<char, 32> text{};  // the shortest form of a double has at most 24 characters
   const auto end = std::to_chars(text.data(), text.data() + text.size(), value).ptr;
   return {text.data(), end};
 }

@@ -17,7 +17,7 @@ constexpr std::string_view kAxes = "xyz";
                               "\": expected three words like \"right=x up=y user=z\": " + why);
 }
 
-/// A matrix whose rows are given as axes with a sign: {2, -1, 0} stands for nothing, ±1 … ±3 for ±x, ±y, ±z.
+/// A matrix with three signed axes as rows: ±1 … ±3 are ±x, ±y, ±z. 0 is not allowed.
 Mat3 of_rows(int first, int second, int third) {
   Mat3 m = Mat3::Zero();
   const std::array<int, 3> rows = {first, second, third};

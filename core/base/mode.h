@@ -5,14 +5,14 @@
 
 namespace tendon {
 
-/// How fresh the remote force is that is rendered now (see HeldForce). The values are part of the wire and of
+/// The freshness of the rendered remote force (see HeldForce). The values are part of the wire format and of
 /// recordings: never renumber.
 enum class Mode : std::uint8_t {
-  kIdle = 1,      ///< no force has come yet
+  kIdle = 1,      ///< no force has arrived yet
   kActive = 2,    ///< a fresh force is rendered
-  kHolding = 3,   ///< the force has outlived its validity and is held a little longer
-  kDecaying = 4,  ///< after that it fades
-  kSafeStop = 5,  ///< after that it is zero; only a fresh force re-engages, ramped in
+  kHolding = 3,   ///< the force is no longer valid and still held
+  kDecaying = 4,  ///< the force fades after that
+  kSafeStop = 5,  ///< the force is zero; a fresh one is ramped in
   kFault = 6,     ///< latched: zero force until an explicit re-arm
 };
 

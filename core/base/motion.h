@@ -13,8 +13,8 @@ namespace tendon {
 using Vec3 = Eigen::Vector3d;
 using Mat3 = Eigen::Matrix3d;
 
-/// A rotation as a unit quaternion, Hamilton's: w + x i + y j + z k. q and −q are the same rotation. These are plain
-/// numbers, as they travel; core/base/frames.h turns them into a matrix and back.
+/// A rotation as a unit quaternion in Hamilton's convention: w + x i + y j + z k. q and −q are the same rotation.
+/// core/base/frames.h converts it to a matrix and back.
 struct Quat {
   double w = 1;
   double x = 0;
@@ -24,15 +24,15 @@ struct Quat {
   bool operator==(const Quat&) const = default;
 };
 
-/// How the handle is turned at one instant.
+/// The orientation of the handle at one instant.
 struct Turning {
-  Quat orientation;                      ///< turns the handle frame into the base frame; see core/base/rotation.h
+  Quat orientation;                      ///< rotates the handle frame into the base frame
   Vec3 angular_velocity = Vec3::Zero();  ///< rad/s, base frame axes, an estimate
 
   bool operator==(const Turning&) const = default;
 };
 
-/// How far the gripper of the handle is open at one instant.
+/// The opening of the gripper of the handle at one instant.
 struct Grip {
   double opening = 0;   ///< rad; 0 = closed
   double velocity = 0;  ///< rad/s, an estimate
@@ -40,14 +40,14 @@ struct Grip {
   bool operator==(const Grip&) const = default;
 };
 
-/// The joints of the mechanism that carries the handle, at one instant.
+/// The joints of the mechanism of the handle at one instant.
 struct Joints {
   static constexpr std::size_t kMost = 8;
-  std::size_t count = 0;                 ///< at most kMost; the numbers beyond are 0
+  std::size_t count = 0;                 ///< at most kMost; other elements are 0
   std::array<double, kMost> angle{};     ///< rad
   std::array<double, kMost> velocity{};  ///< rad/s, an estimate
 
-  /// Three of them, as most devices have.
+  /// Three joints, as in most devices.
   static Joints three(const Vec3& angles, const Vec3& velocities) noexcept {
     return {.count = 3,
             .angle = {angles[0], angles[1], angles[2]},
@@ -56,18 +56,18 @@ struct Joints {
   bool operator==(const Joints&) const = default;
 };
 
-/// What the motors of a handle exert on the hand.
+/// Force, torque and grip force of the motors on the hand.
 struct Effort {
   Vec3 force = Vec3::Zero();   ///< N, base frame axes
-  Vec3 torque = Vec3::Zero();  ///< N·m, base frame axes, about the handle's position
+  Vec3 torque = Vec3::Zero();  ///< N·m, base frame axes, about the position of the handle
   double grip = 0;             ///< N, on the fingers; > 0 opens them
 
   bool operator==(const Effort&) const = default;
 };
 
-/// Where the hand is, as the device saw it at one instant.
+/// The measured motion of the hand at one instant.
 struct Motion {
-  LocalTime at{};                ///< when the position was sampled
+  LocalTime at{};                ///< sample time
   Vec3 position = Vec3::Zero();  ///< m
   Vec3 velocity = Vec3::Zero();  ///< m/s, an estimate (see VelocityEstimator)
 };

@@ -9,7 +9,7 @@ namespace {
 
 constexpr std::size_t kLongestWord = 64;
 
-/// How many letters have to be added, left out, replaced or swapped with their neighbour to turn `a` into `b`.
+/// Edit distance between `a` and `b`: insert, delete, replace, or swap two neighbours.
 std::size_t edits(std::string_view a, std::string_view b) {
   std::vector<std::vector<std::size_t>> d(a.size() + 1, std::vector<std::size_t>(b.size() + 1));
   for (std::size_t i = 0; i <= a.size(); ++i) {
@@ -34,7 +34,7 @@ std::string_view nearest_word(std::string_view unknown, const std::vector<std::s
   std::size_t fewest = unknown.size() <= kLongestWord ? unknown.size() / 3 + 1 : 0;
   for (const std::string_view word : known) {
     const auto [shorter, longer] = std::minmax({unknown.size(), word.size()});
-    if (longer - shorter >= fewest) continue;  // that many letters are missing at least
+    if (longer - shorter >= fewest) continue;  // lower bound of the distance
     if (const std::size_t count = edits(unknown, word); count < fewest) {
       fewest = count;
       closest = word;

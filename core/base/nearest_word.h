@@ -7,8 +7,8 @@
 
 namespace tendon {
 
-/// Returns the known word with the smallest edit distance to a misspelled word. Swapping two adjacent letters counts as one
-/// edit. Returns an empty view if more than a third of the letters are different, or if `unknown` is longer than 64
+/// Returns the known word with the smallest edit distance to a misspelled word. Swapping two adjacent letters counts as
+/// one edit. Returns an empty view if more than a third of the letters are different, or if `unknown` is longer than 64
 /// characters.
 std::string_view nearest_word(std::string_view unknown, const std::vector<std::string_view>& known);
 

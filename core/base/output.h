@@ -8,18 +8,18 @@
 
 #include "core/base/time.h"
 
-// What a device shows or does beside its forces: lamps, and vibration by something else than the motors of the
-// position. No energy ledger counts it.
+// Outputs of a device other than forces: lamps, and vibration that the position motors do not generate. The energy
+// ledger ignores them.
 
 namespace tendon {
 
-/// Of one device.
+/// The maximum number of outputs of a device.
 inline constexpr std::size_t kMostOutputs = 8;
 
-/// Part of the wire: never renumber.
+/// Part of the wire format: never renumber.
 enum class OutputKind : std::uint8_t { kLamp = 1, kVibration = 2 };
 
-/// One of them.
+/// One output of a device.
 struct OutputDescription {
   std::string name;  ///< at most 24 bytes
   OutputKind kind = OutputKind::kLamp;
@@ -27,17 +27,17 @@ struct OutputDescription {
   bool operator==(const OutputDescription&) const = default;
 };
 
-/// The colour of a lamp; 0 = off: it shows what the device itself shows.
+/// The colour of a lamp. 0 = off: the device controls the lamp.
 struct LampColour {
   std::uint32_t rgb = 0;  ///< 0xRRGGBB
 
   bool operator==(const LampColour&) const = default;
 };
 
-/// A pulse, as OpenXR's XrHapticVibration: it ends by itself, and another one takes its place at once.
+/// A pulse like XrHapticVibration of OpenXR. It ends by itself; a new pulse replaces it immediately.
 struct Vibration {
-  double amplitude = 0;  ///< [0, 1] of the strongest that the output can; 0 = off
-  double frequency = 0;  ///< Hz, 20 … 1000; 0 = the output's own
+  double amplitude = 0;  ///< [0, 1], relative to the maximum of the output; 0 = off
+  double frequency = 0;  ///< Hz, 20 … 1000; 0 = default of the output
   Duration duration{};   ///< at most 10 s
 
   bool operator==(const Vibration&) const = default;
@@ -45,12 +45,12 @@ struct Vibration {
 
 using OutputSetting = std::variant<LampColour, Vibration>;
 
-/// Which kind of output a setting is for.
+/// Returns the kind of output of a setting.
 inline OutputKind kind_of(const OutputSetting& setting) noexcept {
   return std::holds_alternative<LampColour>(setting) ? OutputKind::kLamp : OutputKind::kVibration;
 }
 
-/// The setting that turns an output of that kind off.
+/// Returns the setting that switches off an output of this kind.
 inline OutputSetting turned_off(OutputKind kind) noexcept {
   return kind == OutputKind::kLamp ? OutputSetting(LampColour{}) : OutputSetting(Vibration{});
 }

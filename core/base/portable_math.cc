@@ -41,17 +41,17 @@ constexpr std::array<double, N> alternating(int first, double sign) {
   }
   return series;
 }
-constexpr auto kSine = alternating<8>(3, -1);   // to x¹⁷: what is left out is below 1e-19
+constexpr auto kSine = alternating<8>(3, -1);   // to x¹⁷: the remainder is below 1e-19
 constexpr auto kCosine = alternating<8>(4, 1);  // to x¹⁸
 
-/// x = k ln 2 + rest, |rest| ≤ ½ ln 2 and a little.
+/// x = k ln 2 + rest, |rest| slightly above ½ ln 2 at most.
 struct Doublings {
   std::int64_t k;
   double rest;
 };
 Doublings doublings(double x) noexcept {
-  // A step waits for this k. A double of that size has no places behind the point, so adding it rounds the product; the
-  // quotient that k is defined by follows at leisure, and overrules it where the two round to different sides.
+  // The critical path uses this k: adding a double without fractional bits rounds the product. The exact quotient that
+  // defines k follows off the critical path, and replaces k in the rare case where both round differently.
   constexpr double kWhole = 0x1.8p52;
   double whole = (x * (1 / std::numbers::ln2) + kWhole) - kWhole;
   auto k = static_cast<std::int64_t>(whole);
@@ -62,12 +62,13 @@ Doublings doublings(double x) noexcept {
   return {k, (x - whole * kLn2High) - whole * kLn2Low};
 }
 
-/// 1 + r/first (1 + r/(first + 1) (… (1 + r/last))), from its small end: each sum is 1 + sum * r / n of the one before.
+/// 1 + r/first (1 + r/(first + 1) (… (1 + r/last))), summed from the smallest term: each sum is 1 + sum * r / n of the
+/// previous one.
 ///
-/// As written, each division waits for the one before: 100 ns, two fifths of a haptic step with a knee. So the sums are
-/// guessed with r / n, whose divisions do not wait, and each is then compared with its definition, which nothing waits
-/// for. In one series of 15 a guess is wrong by its last bit; from there on the sums are taken as they are defined.
-/// Unrolled, for n as a constant: 5 ns and 120 instructions of a step.
+/// In this form each division waits for the previous one, which takes 100 ns, two fifths of a haptic step with a knee.
+/// So the sums are first predicted with r / n, whose divisions are independent, and then each is compared with its
+/// definition off the critical path. In one of 15 series a prediction is wrong in its last bit; from there on the sums
+/// follow the definition. Unrolled, with constant n: 5 ns and 120 instructions of a step.
 template <std::size_t kFirst, std::size_t kLast>
 double taylor(double r) noexcept {
   std::array<double, kLast + 1> sums;  // [n]: from n + 1 on
@@ -88,7 +89,7 @@ double power_of_two(std::int64_t k) noexcept {
   return std::bit_cast<double>(static_cast<std::uint64_t>(k + 1023) << 52);
 }
 
-/// x = quarter · π/2 + rest, |rest| ≤ π/4 and a little.
+/// x = quarter · π/2 + rest, |rest| slightly above π/4 at most.
 struct Angle {
   double rest;
   std::int64_t quarter;
@@ -147,7 +148,7 @@ double exp(double x) noexcept {
 
 // eˣ − 1 = 2ᵏ (eʳ − 1) + (2ᵏ − 1), |r| ≤ ½ ln 2.
 double expm1(double x) noexcept {
-  if (!(std::abs(x) < 40)) return exp(x) - 1;  // 1 is lost beside eˣ, or eˣ beside 1
+  if (!(std::abs(x) < 40)) return exp(x) - 1;  // 1 or eˣ is negligible
   const auto [k, r] = doublings(x);
   const double scale = power_of_two(k);
   return scale * (r * taylor<2, 15>(r)) + (scale - 1);
@@ -176,7 +177,7 @@ double atan2(double y, double x) noexcept {
   const double up = std::abs(y);
   const double along = std::abs(x);
   if (up == 0 && along == 0) return 0;
-  // The angle to the nearer axis, of a tangent between 0 and 1: atan(t) = atan(c) + atan((t − c)/(1 + t c)), c = i/4.
+  // The angle to the nearer axis, with a tangent t in [0, 1]: atan(t) = atan(c) + atan((t − c)/(1 + t c)), c = i/4.
   constexpr std::array kAngle{0.0, 0.24497866312686414, 0.4636476090008061, 0.6435011087932844, 0.7853981633974483};
   const double t = up < along ? up / along : along / up;
   const auto i = static_cast<std::size_t>(round(t * 4));

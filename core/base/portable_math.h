@@ -4,42 +4,41 @@
 #include <cmath>
 #include <cstdint>
 
-/// Functions of doubles that give the same bits on every processor, with every compiler and every C library.
+/// Functions of doubles with bitwise identical results on every processor, compiler and C library.
 ///
-/// libm does not: glibc takes other instructions on a processor with FMA, and each version of it may round the last bit
-/// otherwise. A law that calls it decides otherwise on another machine, and a simulation with an encoder magnifies that
-/// last bit to another run. These use only + − · ÷ √, whole-number rounding and std::fmod, which are exact or which
-/// IEEE 754 rounds correctly, in a fixed order. Compile with -ffp-contract=off (CMakeLists.txt does): a fused
-/// multiply-add would round once less.
+/// The results of libm differ: glibc uses other instructions on processors with FMA, and its versions can round the
+/// last bit differently. A simulation with an encoder amplifies such a bit to a different run. These functions only use
+/// + − · ÷ √, rounding to integers and std::fmod, which are exact or correctly rounded in IEEE 754, in a fixed order.
+/// Compile with -ffp-contract=off (as in CMakeLists.txt), because a fused multiply-add rounds only once.
 ///
-/// Errors are at most 2e-16 of the result and 1e-16 of 1, whichever is more, unless stated. NaN gives NaN where it is
-/// accepted. Realtime-safe: yes.
+/// Unless stated otherwise, errors are at most 2e-16 of the result or 1e-16, whichever is larger. NaN gives NaN where
+/// it is accepted. Realtime-safe: yes.
 namespace tendon::portable {
 
-/// The nearest whole number, halves away from zero; |x| below 2⁶².
+/// Rounds to the nearest integer, halves away from zero; |x| below 2⁶².
 std::int64_t round(double x) noexcept;
 
-/// Natural logarithm; x above zero, normal and finite. Anything else is a mistake of the caller.
+/// Natural logarithm. x must be positive, normal and finite.
 double log(double x) noexcept;
 
 /// eˣ. Relative error below 1e-15 for x in −700 … 700; 0 below −700, ∞ above 709.
 double exp(double x) noexcept;
 
-/// eˣ − 1, with full precision near zero too.
+/// eˣ − 1, with full precision near zero.
 double expm1(double x) noexcept;
 
-/// Between −1 and 1; ±1 from |x| = 20 on. tanh(±∞) = ±1.
+/// Hyperbolic tangent; exactly ±1 for |x| ≥ 20, also for ±∞.
 double tanh(double x) noexcept;
 
-/// Sine and cosine of x rad. Beyond 2³⁰ rad x is first reduced by the double nearest to 2π, whose error grows with x as
-/// that of x itself. ±∞ gives NaN.
+/// Sine and cosine of x rad. Beyond 2³⁰ rad x is first reduced by the double nearest to 2π, with an error that grows
+/// with x. ±∞ gives NaN.
 double sin(double x) noexcept;
 double cos(double x) noexcept;
 
-/// The angle of the point (x, y), rad, −π … π; of (0, 0) it is 0. The sign of a zero does not count. Both finite.
+/// The angle of the point (x, y) in rad, −π … π; 0 for (0, 0). The sign of a zero has no effect. Both must be finite.
 double atan2(double y, double x) noexcept;
 
-/// √(a² + b²), without overflow or underflow on the way.
+/// √(a² + b²) without intermediate overflow or underflow.
 template <class Scalar>
 Scalar hypot(Scalar a, Scalar b) noexcept {
   const Scalar x = std::abs(a);

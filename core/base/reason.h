@@ -6,26 +6,26 @@
 
 namespace tendon {
 
-/// Why the force is not the one that was asked for. Every limiter returns one with its result.
-/// The values are bits, part of the wire and of recordings: never renumber.
+/// The reason why a force differs from the demand. Every limiter returns one with its result. The values are bits, and
+/// part of the wire format and of recordings: never renumber.
 enum class Reason : std::uint32_t {
   kNone = 0,
-  kEnergy = 1U << 0,       ///< the output limiter: more would let the device give out energy it never got
-  kMaxForce = 1U << 1,     ///< the device's or the scene's force limit
-  kSlew = 1U << 2,         ///< the force may not grow that fast
-  kRampIn = 1U << 3,       ///< forces have just (re-)engaged
-  kHeld = 1U << 4,         ///< the remote force has outlived its validity and is held
+  kEnergy = 1U << 0,       ///< output limiter: a larger force could break passivity
+  kMaxForce = 1U << 1,     ///< force limit of the device or the scene
+  kSlew = 1U << 2,         ///< slew rate limit
+  kRampIn = 1U << 3,       ///< ramp after (re-)engaging
+  kHeld = 1U << 4,         ///< the remote force is no longer valid and still held
   kDecaying = 1U << 5,     ///< the remote force fades
-  kSafeStop = 1U << 6,     ///< the remote force is zero until a fresh one comes
-  kNotFinite = 1U << 7,    ///< NaN or infinity was asked for or measured
+  kSafeStop = 1U << 6,     ///< the remote force is zero until a fresh one arrives
+  kNotFinite = 1U << 7,    ///< NaN or infinity in the demand or a measurement
   kFault = 1U << 8,        ///< a latched fault holds the force at zero
-  kDeviceClamp = 1U << 9,  ///< the device wrote less than it was told to
-  kOverrun = 1U << 10,     ///< not a limit: the force before was held for longer than the scene's longest_hold
-  kWatchdog = 1U << 11,    ///< not a limit: and for so long that the device's own watchdog ended it
-  kUnseen = 1U << 12,      ///< the device gave no position this time, so no force is given out
-  kDisarmed = 1U << 13,    ///< the operator has disarmed the device: no force until it is rearmed
-  kDamped = 1U << 14,      ///< the output limiter's damper: the hand vibrates in contact
-  /// Not a limit: the hand accelerated harder than bounded_acceleration counts on, so this step counts on friction alone.
+  kDeviceClamp = 1U << 9,  ///< the device applied less than the commanded force
+  kOverrun = 1U << 10,     ///< no limit: the previous hold was longer than longest_hold of the scene
+  kWatchdog = 1U << 11,    ///< no limit: the watchdog of the device ended the previous hold
+  kUnseen = 1U << 12,      ///< no position was measured, so the force is zero
+  kDisarmed = 1U << 13,    ///< the operator has disarmed the device
+  kDamped = 1U << 14,      ///< damper of the output limiter: the hand vibrates in contact
+  /// No limit: the hand exceeded the assumption of bounded_acceleration, so this step uses the plain bound.
   kAcceleration = 1U << 15,
 };
 
@@ -53,7 +53,7 @@ class Reasons {
   std::uint32_t bits_ = 0;
 };
 
-/// "energy, slew": for people. Empty for no reason.
+/// Formats reasons as "energy, slew". Empty if there are none.
 std::string to_string(Reasons reasons);
 
 }  // namespace tendon

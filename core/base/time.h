@@ -6,11 +6,11 @@
 
 namespace tendon {
 
-/// A length of time in whole nanoseconds. Every interval in Tendon is one of these.
+/// A duration in whole nanoseconds.
 using Duration = std::chrono::nanoseconds;
 
-/// The monotonic clock of this machine, as a type only. It has no `now()`, so code that merely handles times cannot
-/// read a clock. The owner of a real or a simulated clock passes times in.
+/// The monotonic clock of this machine, as a type only. It has no `now()`, so code cannot read it. The owner of a real
+/// or simulated clock passes times in.
 struct LocalClock {
   using duration = Duration;
   using rep = Duration::rep;
@@ -19,8 +19,8 @@ struct LocalClock {
   static constexpr bool is_steady = true;
 };
 
-/// The monotonic clock of the peer. Its zero and its rate are not ours: `LocalTime - PeerTime` does
-/// not compile (see the test `Time.APeersTimeCannotBeSubtractedFromOurs`).
+/// The monotonic clock of the peer, with another zero and rate. `LocalTime - PeerTime` does not compile (test
+/// `Time.APeersTimeCannotBeSubtractedFromOurs`).
 struct PeerClock {
   using duration = Duration;
   using rep = Duration::rep;
@@ -32,11 +32,10 @@ struct PeerClock {
 using LocalTime = LocalClock::time_point;
 using PeerTime = PeerClock::time_point;
 
-/// Seconds, for equations.
+/// Converts to seconds, for equations.
 constexpr double seconds(Duration d) noexcept { return std::chrono::duration<double>(d).count(); }
 
-/// The nearest whole number of nanoseconds at or below `s` seconds. `s` must be finite and within
-/// ±292 years.
+/// Converts `s` seconds, rounded down to whole nanoseconds. `s` must be finite and within ±292 years.
 constexpr Duration from_seconds(double s) noexcept {
   return std::chrono::floor<Duration>(std::chrono::duration<double, std::nano>(s * 1e9));
 }

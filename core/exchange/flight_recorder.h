@@ -11,20 +11,20 @@
 
 namespace tendon {
 
-/// Keeps the last values of a loop that must not stop to write to a file. A fault freezes it; then another thread can
-/// read what led to the fault, at leisure, and thaw it. It allocates only when it is made.
+/// Keeps the last values of a loop that must not block on a file. A fault freezes the recorder, another thread then
+/// reads the values before the fault, and thaws it. Only the constructor allocates.
 ///
 /// Thread-safe: one thread records and freezes; another reads and thaws, only while it is frozen.
 /// Realtime-safe when copying T is.
 template <typename T>
 class FlightRecorder {
  public:
-  /// Keeps the last `capacity` values. Throws std::invalid_argument unless it is a power of two.
+  /// Keeps the last `capacity` values. Throws std::invalid_argument if it is not a power of two.
   explicit FlightRecorder(std::size_t capacity) : values_(std::make_unique<T[]>(capacity)), capacity_(capacity) {
     expect(std::has_single_bit(capacity), "capacity", static_cast<double>(capacity), "a power of two");
   }
 
-  /// Recording thread. Does nothing while frozen. `value` is a T, or what a T takes a part of when it is assigned.
+  /// Recording thread. Does nothing while frozen. `value` must be assignable to T.
   template <typename U = T>
   void record(const U& value) {
     if (frozen()) return;
@@ -32,21 +32,21 @@ class FlightRecorder {
     ++count_;
   }
 
-  /// Recording thread: nothing is overwritten from now on.
+  /// Recording thread. Stops overwriting values.
   void freeze() noexcept { frozen_.store(true, std::memory_order_release); }
 
   bool frozen() const noexcept { return frozen_.load(std::memory_order_acquire); }
 
-  /// Reading thread: empties it and records again. Only while frozen.
+  /// Reading thread, only while frozen. Removes all values and resumes recording.
   void thaw() noexcept {
     count_ = 0;
     frozen_.store(false, std::memory_order_release);
   }
 
-  /// How many values are kept, at most the capacity. Only while frozen (or on the recording thread).
+  /// Returns the number of values. Only while frozen, or on the recording thread.
   std::size_t size() const noexcept { return count_ < capacity_ ? count_ : capacity_; }
 
-  /// The i-th oldest kept value, i < size(). Only while frozen (or on the recording thread).
+  /// Returns the i-th oldest value, i < size(). Only while frozen, or on the recording thread.
   const T& operator[](std::size_t i) const noexcept {
     return values_[count_ < capacity_ ? i : (count_ + i) & (capacity_ - 1)];
   }

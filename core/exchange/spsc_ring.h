@@ -11,11 +11,9 @@
 
 namespace tendon {
 
-/// Hands every value from one thread to another in order, wait-free on both sides. When the reader is too slow,
-/// `try_push` returns false and does not take the value. For values that must not be lost unnoticed: steps and
-/// datagrams on their way to the recording, commands to the haptic thread.
-///
-/// It allocates only when it is made.
+/// Passes every value from one thread to another in order, wait-free on both sides. If the reader is too slow,
+/// `try_push` returns false and does not take the value. For values whose loss must be detected, such as steps and
+/// datagrams for the recording, or commands for the haptic thread. Only the constructor allocates.
 ///
 /// Thread-safe: one writer thread, one reader thread. Realtime-safe when copying T is.
 template <typename T>
@@ -23,23 +21,23 @@ class SpscRing {
   static_assert(std::atomic<std::size_t>::is_always_lock_free);
 
  public:
-  /// Holds up to `capacity` values. Throws std::invalid_argument unless it is a power of two.
+  /// Holds up to `capacity` values. Throws std::invalid_argument if it is not a power of two.
   explicit SpscRing(std::size_t capacity) : slots_(std::make_unique<T[]>(capacity)), mask_(capacity - 1) {
     expect(std::has_single_bit(capacity), "capacity", static_cast<double>(capacity), "a power of two");
   }
 
-  /// Writer only: the place of the next value, or null when the ring is full. It holds some earlier value. Nobody else
-  /// sees it until `push`. For values so large that they are written in place.
+  /// Writer only. Returns the slot of the next value, or null if the ring is full. The slot contains an older value,
+  /// and the reader does not see it before `push`. For large values that are written in place.
   T* back() {
     const std::size_t head = head_.load(std::memory_order_relaxed);
     if (head - tail_.load(std::memory_order_acquire) > mask_) return nullptr;
     return &slots_[head & mask_];
   }
 
-  /// Writer only, and only after `back` was not null.
+  /// Writer only, after `back` returned a slot.
   void push() { head_.store(head_.load(std::memory_order_relaxed) + 1, std::memory_order_release); }
 
-  /// Writer only. False, and nothing is taken, when the ring is full.
+  /// Writer only. Returns false, without taking the value, if the ring is full.
   bool try_push(const T& value) {
     T* const slot = back();
     if (slot == nullptr) return false;
@@ -48,14 +46,14 @@ class SpscRing {
     return true;
   }
 
-  /// Reader only: the oldest value, or null when empty. Valid until `pop`.
+  /// Reader only. Returns the oldest value, or null if the ring is empty. Valid until `pop`.
   const T* front() const {
     const std::size_t tail = tail_.load(std::memory_order_relaxed);
     if (tail == head_.load(std::memory_order_acquire)) return nullptr;
     return &slots_[tail & mask_];
   }
 
-  /// Reader only, and only after `front` was not null.
+  /// Reader only, after `front` returned a value.
   void pop() { tail_.store(tail_.load(std::memory_order_relaxed) + 1, std::memory_order_release); }
 
  private:
