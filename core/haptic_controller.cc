@@ -52,8 +52,8 @@ void HapticController::book_unseen(const Vec3& applied, const HandleSample* hand
   if (admittance_) admittance_->observe_unseen();
 }
 
-// A step of a point pays for the parts of a handle with a branch only, so what all steps have is not called but
-// inlined.
+// The functions that every step needs are inlined, so a device with a position only pays one branch for the other parts
+// of a handle.
 [[gnu::always_inline]] inline void HapticController::book_seen(const Motion& hand, const Vec3& applied,
                                                                const HandleSample* handle, Step& step) noexcept {
   const Vec3 dx = hand.position - last_->position;
@@ -92,7 +92,7 @@ void HapticController::add_accounts(Step& step) const noexcept {
   } else if (last_) {
     book_seen(hand, applied, handle, step);
   } else if (started_) {
-    // The position before was not seen, and the device may hold a force although it was told zero.
+    // The previous position is unknown, and the device may hold a force despite a command of zero.
     book_unseen(applied, handle, step.held);
   }
   add_accounts(step);
@@ -111,7 +111,7 @@ void HapticController::follow_tool(Step& step) noexcept {
   }
 }
 
-/// Of a handle with motors that turn it or close its gripper these are measured in every sample.
+/// Orientation and opening are required in every sample if their motors exist.
 bool HapticController::is_finite(const Motion& hand, const HandleSample* handle) const noexcept {
   if (!hand.position.allFinite()) return false;
   if (handle == nullptr) return !wrench_ && !grip_;
@@ -179,7 +179,7 @@ void HapticController::add_coupling(const Motion& hand, const HandleSample* hand
   if (silent && couplings_->live()) wanted.mode = Mode::kActive;
 }
 
-/// What the peers have paid raises the account, what this port pays lowers it: before the force is bounded by it.
+/// Credits the energy from the peers and withdraws the energy given to them, before the account bounds the force.
 template <class Port, class Force>
 void HapticController::settle(Port& port, const Force& wanted, Duration elapsed) noexcept {
   if (couplings_) settled_ = couplings_->settle(port.payable(), port.worst_loss(wanted), elapsed);
@@ -195,7 +195,7 @@ void HapticController::settle_grip(double wanted, Duration elapsed) noexcept {
   grip_->withdraw(grip_settled_.withdraw);
 }
 
-/// What the handle measured, and what the remote environment asks of it.
+/// Records the measurements of the handle and the demands of the remote environment.
 void HapticController::note(const HandleSample& handle, const ForceChannels::Wanted& wanted, Step& step) noexcept {
   HandleStep& noted = step.handle.emplace();
   const HandleWanted asked = wanted.handle.value_or(HandleWanted{});
@@ -240,7 +240,7 @@ void HapticController::take(Step& step, const Motion& hand, const Vec3& applied,
     limit_wrench(wanted.loop_age, applied, step);
   } else {
     limit_force(wanted, applied, step);
-    // No motor turns it. A device that does not even measure its orientation was never asked for a torque.
+    // The device has no motor for rotation. A device without an orientation never receives a torque demand.
     if (step.turn() && !step.turn()->wanted.isZero(0)) step.reasons |= Reason::kMaxForce;
   }
   if (grip_) limit_grip(step);
@@ -255,29 +255,29 @@ void HapticController::take(Step& step, const Motion& hand, const Vec3& applied,
 [[gnu::always_inline]] inline void HapticController::limit_force(const ForceChannels::Wanted& wanted,
                                                                  const Vec3& applied, Step& step) noexcept {
   const Limited saturated = saturate(step.force, config_.max_force);
-  // After a pause the force may grow by what one longest hold allows, not by what the whole pause would.
+  // After a pause the force changes by at most one longest hold, not by the whole pause.
   const Duration elapsed = std::min(step.held, config_.limiter.longest_hold);
   const Limited slewed = limit_slew(saturated.force, applied, config_.max_slew, elapsed);
   if (friction_map_) limiter_.adapt(friction_map_->at(step.hand.position));
   if (config_.limiter.shared_account) settle(limiter_, slewed.force, step.held);
-  // A limit changes the environment as the hand feels it, so its stiffness is known only for an unlimited force.
+  // A limit changes the felt environment, so the stiffness is only known for an unlimited force.
   const bool as_wanted =
       !admittance_ && !disarmed_ && saturated.reasons.empty() && slewed.reasons.empty() && step.mode == wanted.mode;
   const LimitedForce<3> limited = limiter_.limit(
       {.force = slewed.force, .stiffness = as_wanted ? wanted.stiffness : Mat3(Mat3::Zero()), .age = wanted.loop_age});
   step.force = limited.force;
-  // A damper adds to what is wanted; a shorter force of the same direction is as safe.
+  // A damper adds to the wanted force. A shorter force of the same direction remains safe.
   if (limited.reasons.has(Reason::kDamped)) step.force = saturate(step.force, config_.max_force).force;
   step.permitted = limited.permitted;
   step.reasons |= limited.reasons;
-  // Only the tightest bound is a reason: when the limiter cut further, the bounds before it made no difference.
+  // Only the tightest bound is a reason: if the limiter cut further, the bounds before it had no effect.
   if (!step.reasons.has(Reason::kEnergy)) {
     step.reasons |= saturated.reasons;
     step.reasons |= slewed.reasons;
   }
 }
 
-/// The same for force and torque together. The laws of a wrench do not use stiffness.
+/// As limit_force, for force and torque together. The laws of a wrench do not use stiffness.
 void HapticController::limit_wrench(Duration age, const Vec3& applied, Step& step) noexcept {
   const RotationLimits& rotation = *config_.rotation;
   TurnStep& turn = *step.turn();
@@ -306,7 +306,7 @@ void HapticController::limit_wrench(Duration age, const Vec3& applied, Step& ste
   }
 }
 
-/// The gripper's own limits give no reasons: those are of the force.
+/// The limits of the gripper give no reasons, because the reasons are those of the force.
 void HapticController::limit_grip(Step& step) noexcept {
   const GripLimits& limits = *config_.grip;
   GripStep& grip = *step.grip();

@@ -18,7 +18,7 @@ constexpr std::array kPresets = {
 };
 
 constexpr double kStiffness = 1500;    // N/m
-constexpr double kUsualCount = 30e-6;  // m: the default smoothing of the damper is for this count
+constexpr double kUsualCount = 30e-6;  // m: count of the default smoothing of the damper
 
 }  // namespace
 
@@ -34,7 +34,7 @@ PresetParts preset_parts(Preset preset, const PresetDevice& device) noexcept {
   if (device.encoder_step > 0) parts.robust_ledger.emplace().encoder_step = {device.encoder_step};
   parts.knee.emplace().start = 0.7;
   if (preset == Preset::kFeel) parts.bounded_acceleration.emplace();
-  // Never softer than the friction alone allows.
+  // At least the stiffness that friction alone allows.
   const double by_friction = 2 * device.friction.viscous / seconds(device.longest_hold);
   parts.shaping.emplace().stiffness = {std::max(kStiffness, by_friction)};
   parts.thrift.emplace();
