@@ -10,29 +10,24 @@ namespace tendon {
 ///     M dv_d/dt = F_hand + F_env − D v_d − S x_d,   dx_d/dt = v_d        (the tool; v_d(0) = x_d(0) = 0)
 ///     F_wanted  = K_p (v_d − v) + K_i Σ (v_d T − Δx)                      (PI loop on the velocity)
 ///
-/// F_hand is the measured force of the hand **on the handle**. F_env is the force of the remote environment on the
-/// tool; a wall that resists motion along +x has it along −x. F_wanted is the force of the device on the hand, v the
-/// velocity of the handle, Δx and T the displacement and the measured length of the last interval. M, D, S, K_p and K_i
-/// are diagonal. The tool is integrated with the implicit Euler method, which is stable for any T.
+/// F_hand is the measured force of the hand on the handle. F_env is the force of the remote environment on the tool.
+/// F_wanted is the force of the device on the hand. v is the velocity of the handle, and Δx and T are the displacement
+/// and the measured length of the last interval. M, D, S, K_p and K_i are diagonal. The implicit Euler method
+/// integrates the tool and is stable for any T.
 ///
-/// F_wanted replaces the reflective force. Pass it to a stability controller like any other demand, and pass the same
-/// intervals to both:
+/// Pass F_wanted to a stability controller, and the same intervals to both. The port is then passive for all gains:
 ///
 ///     law.observe(interval);                                 loop.observe(interval);
 ///     force = law.limit(loop.command({hand_force, environment, velocity})).force;
 ///
-/// The port is then passive for all gains, as with any demand.
-///
-/// Anti-windup: `observe` receives the applied force. If it was smaller than the command, the last integration step is
-/// not taken in the direction of the shortfall (conditional integration), and the integral in that direction is cut to
-/// the applied force. The force therefore leaves its bound as soon as the velocity error changes sign, even if the
-/// bound has shrunk. A force output that rounds leaves a velocity error worth at most one of its counts.
+/// Anti-windup: if the applied force was smaller than the command, the last integration step is not taken in the
+/// direction of the shortfall, and the integral in that direction is limited to the applied force. The force therefore
+/// leaves its bound as soon as the velocity error changes sign.
 ///
 /// Limitation: the account of the limiter contains friction, not kinetic energy. To accelerate a handle of mass m like
-/// a lighter tool, the motors must put in ½ (m − M) v² ahead of the hand. The part that the damping of the tool has not
-/// earned is clipped, and the hand feels the mass of the device; with D = 0 always. A credit of ½ m (|v| − a_max T)₊²
-/// would not be passive: the hand can take the kinetic energy back after the limiter has lent on it
-/// (admittance_loop_test.cc contains the motion).
+/// a lighter tool, the motors must provide ½ (m − M) v² before the hand does. The limiter clips the part that the
+/// damping of the tool has not earned, and the hand feels the mass of the device. A credit of ½ m (|v| − a_max T)₊²
+/// would not be passive (admittance_loop_test.cc contains a motion that breaks it).
 ///
 /// Source: Lee & Lee, IEEE TCST 17(4), 2009, section II-A; core/PROOFS.md, "Admittance loop".
 ///
@@ -61,7 +56,7 @@ class AdmittanceLoop {
   /// Throws std::invalid_argument with the field, its value and the expected range.
   explicit AdmittanceLoop(const Config& config);
 
-  /// Takes the interval that has just ended. Not called in the first step.
+  /// Updates the integral with the last interval. Not called in the first step.
   void observe(const Interval<N>& interval) noexcept;
 
   /// Replaces `observe` if the motion was not measured. Tool and integral do not advance.
@@ -77,7 +72,7 @@ class AdmittanceLoop {
   Vec<N> velocity_ = Vec<N>::Zero();      ///< v_d
   Vec<N> displacement_ = Vec<N>::Zero();  ///< x_d
   Vec<N> integral_ = Vec<N>::Zero();      ///< N, K_i Σ (v_d T − Δx), of the accepted steps
-  Vec<N> step_ = Vec<N>::Zero();          ///< N, last step of the integral; the next `observe` takes it
+  Vec<N> step_ = Vec<N>::Zero();          ///< N, last step of the integral, which the next `observe` adds
   Vec<N> commanded_ = Vec<N>::Zero();     ///< N
   Vec<N> dx_ = Vec<N>::Zero();            ///< m, of the interval that `command` uses
   double held_ = 0;                       ///< s, its length; 0: none

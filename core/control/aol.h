@@ -12,8 +12,8 @@ namespace tendon {
 
 /// The Adjusting Output-Limiter with one ledger. It keeps the direction of the force.
 ///
-/// The N = Blocks · Size coordinates of the port form `Blocks` groups of `Size`. The friction is isotropic within a
-/// group, with its own lower bounds f_c,i and b_i. All groups share one account:
+/// The N = Blocks · Size coordinates form `Blocks` groups of `Size`. The friction of a group is isotropic, with the
+/// lower bounds f_c,i and b_i, and all groups share one account:
 ///
 ///     E(n) = Σₖ [ −F(k−1)·Δx(k) + Σ_i ( f_c,i ‖Δx_i‖ + b_i ‖Δx_i‖²/T(k) ) ]
 ///     F    = γ F_wanted,  γ ≤ 1 the largest with  Σ_i T_max (γ‖F_wanted,i‖ − f_c,i)₊²/(4 b_i) ≤ max(E, 0)
@@ -24,8 +24,7 @@ namespace tendon {
 ///                   torques, not Cartesian forces, are held between two steps
 ///     Aol<2, 3>     a wrench: force and torque, each with its own friction
 ///
-/// Passive for every demand: E ≥ 0 as long as no hold is longer than T_max. The set of permitted forces contains that
-/// of one limiter per coordinate with the same history.
+/// The port is passive for every demand if each force is held for at most T_max.
 ///
 /// Source: Lee & Lee, IEEE TCST 17(4), 2009, eqs (1)–(9), Table I; core/PROOFS.md, "Output bound" and "Several
 /// coordinates".
@@ -38,7 +37,7 @@ class Aol {
 
   struct Config {
     std::array<Friction, Blocks> friction;
-    Duration longest_hold{};  ///< T_max: no force may be held longer; > 0
+    Duration longest_hold{};  ///< T_max, > 0: the longest time for which a force is held
   };
 
   /// Throws std::invalid_argument if a friction bound is negative or longest_hold is not positive.
@@ -68,9 +67,9 @@ class Aol {
 ///
 ///     E = Σ_i E_i,   |F_i| ≤ f_c,i + 2 √( b_i max(E_i, 0) / T_max )
 ///
-/// The output depends on the frame and can lose or reverse a lateral force. The friction bounds must hold for each axis
-/// **alone**, for every direction of motion. With isotropic Coulomb friction f_c an axis has only f_c/√N. The class
-/// reproduces the experiments of the paper.
+/// The friction bounds must be valid for each axis alone, so with isotropic Coulomb friction f_c an axis can only use
+/// f_c/√N. The output depends on the frame and can lose or reverse a lateral force. Use this class to reproduce the
+/// experiments of the paper.
 ///
 /// Source: core/PROOFS.md, "Several coordinates".
 ///

@@ -40,7 +40,7 @@ inline constexpr std::tuple kAolParts{
                                          &PointAolPlus::Parts::fading_contact},
 };
 
-/// Calls `visit` for each part in that order. `parts.*part.config` is its optional configuration.
+/// Calls `visit` for each part. `parts.*part.config` is its optional configuration.
 template <class Visit>
 constexpr void for_each_aol_part(Visit&& visit) {
   std::apply([&](const auto&... part) { (visit(part), ...); }, kAolParts);

@@ -124,7 +124,7 @@ void AolPlus<Blocks, Size>::use(std::size_t block, const Friction& friction) noe
 
 template <int Blocks, int Size>
 void AolPlus<Blocks, Size>::hold_at_most(Duration longest_hold) noexcept {
-  // Forces under way can be held longer, too. When T falls, their reserve remains sufficient.
+  // The forces under way can be held longer as well. If T falls, their reserve is still sufficient.
   const double longer = seconds(longest_hold) / seconds(longest_hold_);
   if (longer > 1) {
     for (double& loss : under_way_) loss *= longer;
@@ -303,7 +303,7 @@ void AolPlus<Blocks, Size>::cap(const Vec<kSize>& wanted) noexcept {
     travel_.setZero();
   } else {
     contact_ = std::min(contact_, parts_.energy_cap->most_contact);
-    // A branch instead of std::min: C is normally below C_b, so the step does not wait for the wanted force here.
+    // A branch is faster than std::min, because C is normally below C_b.
     if (const double bound = most(); bound < contact_) [[unlikely]] {
       contact_ = bound;
     }

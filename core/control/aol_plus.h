@@ -13,10 +13,10 @@
 
 namespace tendon {
 
-/// AOL+ is the Adjusting Output-Limiter with optional parts for real devices. A part that is not listed costs nothing.
-/// Without parts the law equals Aol<Blocks, Size>, bit for bit.
+/// AOL+ is the Adjusting Output-Limiter with optional parts for real devices. Without parts it is equal to Aol<Blocks,
+/// Size>, bit for bit.
 ///
-///     E ← E + the interval just ended               exactly, or as robust_ledger does
+///     E ← E + the last interval                     exactly, or as robust_ledger does
 ///     E ← min(E, E_cap + C)                         energy_cap
 ///     Ē = E − (Δ/2)‖F_held‖₁ − Σ ℓ(under way)       robust_ledger, latency_reserve
 ///     γ : the largest with Σ_i ℓ_i(γ ‖F_i‖) ≤ Ē     ℓ: OutputBound; bounded_acceleration; shaping
@@ -25,75 +25,67 @@ namespace tendon {
 ///     F₂ = F₁ − D(hand)                             damper
 ///     F = F₂, shortened to Σ_i ℓ_i(‖F_i‖) ≤ Ē along F₂
 ///
-/// It is passive because E never exceeds the true ledger (core/PROOFS.md, "Discarded credit"), and any force with Σ
-/// ℓ_i(‖F_i‖) ≤ Ē is safe ("Output bound"). Only the last line is needed for that; without a damper the lines before it
-/// already satisfy it. E ≥ 0 holds as long as no hold is longer than T_max. A hold of length T_act > T_max takes at
-/// most ℓ(F), with T_act in place of T_max, less E, from below zero.
+/// The port is passive because E never exceeds the true ledger, and because the last line bounds the force whatever the
+/// other parts do. If a force is held for T_act > T_max, this can take E below zero by at most ℓ(F) − E, with T_act in
+/// ℓ.
 ///
-/// **energy_cap** Without a cap, friction credit from free motion switches the limiter off: 30 s of waving pay for 18
-/// N. The cap keeps E ≤ E_cap + C. C is the work that the hand has put into the current contact and can get back from
-/// it, so it pays for springs that are released.
+/// **energy_cap** limits the credit from free motion, which would otherwise switch the limiter off: 30 s of waving pay
+/// for 18 N. E ≤ E_cap + C, where C is the work that the hand has put into the current contact. It pays for springs
+/// that are released.
 ///     C ← max(0, C + work),  C ≤ ‖F_wanted‖ · ‖travel since the contact began‖,  C ≤ C_most
-/// A contact ends when no force is wanted, or when the wanted force reverses: friction that is dragged back and forth
-/// returns nothing. A spring whose force grows with its travel d returns at most F·d. C does not leak in time, because
-/// that would weaken the force on a hand that holds a spring still.
+/// A contact ends if no force is wanted, or if the wanted force reverses. C does not decay with time, because this
+/// would weaken the force on a hand that holds a spring still. A shared account (Purse) also keeps ℓ(F_wanted): the C
+/// of a follower is zero, so the cap would discard the energy that its peer paid for the force.
 ///
-/// A shared account (Purse) also keeps ℓ(F_wanted): E ≤ E_cap + C + ℓ(F_wanted). The port of a follower does work, so
-/// its C is zero, and the cap would discard the energy that its peer paid for the force.
+/// **robust_ledger** uses RobustLedger for positions in counts of Δ.
 ///
-/// **robust_ledger** Uses RobustLedger for positions in counts of Δ.
-///
-/// **knee** Compresses forces above 80 % of the bound smoothly. This is quieter on stiff walls than clipping.
+/// **knee** compresses forces above 80 % of the bound smoothly, which is quieter on stiff walls than clipping.
 ///     κ(r) = r                                  r ≤ s
 ///          = s + (1 − s) tanh((r − s)/(1 − s))  beyond
 ///
-/// **latency_reserve** For a force that is held only `holds` periods after it was chosen. The law reserves the largest
-/// energy that the forces under way can take. K_op → 2b/((holds + 1) T).
+/// **latency_reserve** is for devices that apply a force only `holds` periods after the step. It reserves ℓ of all
+/// forces under way. K_op → 2b/((holds + 1) T).
 ///
-/// **bounded_acceleration** For devices with very little damping, where 2b/T is a few N/m. If the acceleration of the
-/// hand is at most a, its travel along F in the next hold is at most
-///     L = T_max (F̂·Δx/T_act + a (T_act + T_max)/2) + Δ-allowance,   and a larger force is safe (OutputBound).
-/// If an interval violates the assumption, the plain bound applies in that step, and the violation is counted. The
-/// proof covers only forces that are held in the next period, so this part cannot be combined with latency_reserve. It
-/// requires shaping, because nothing else limits how hard a wall feels.
+/// **bounded_acceleration** is for devices with very little damping, where 2b/T is a few N/m. If the acceleration of
+/// the hand is at most a, then its travel along F in the next period is at most
+///     L = T_max (F̂·Δx/T_act + a (T_act + T_max)/2) + Δ-allowance
+/// and a larger force is safe (OutputBound). If an interval violates the assumption, the step uses the plain bound and
+/// the violation is counted. Not with latency_reserve, because the proof only covers the next period. Requires shaping,
+/// which limits how hard a wall feels.
 ///
-/// **shaping** Keeps the wanted force below that of a spring of stiffness K_s that stores Ē,
+/// **shaping** keeps the force below that of a spring of stiffness K_s with the energy Ē, for any T:
 ///     ℓ_s(f) = (f − f_c)₊² / (2 K_s)            J, in addition to ℓ: f ≤ f_c + √(2 K_s Ē)
-/// so no object appears stiffer than K_s, whatever T is. (The b_v of the papers is K_s T/2.) The range between this
-/// bound and ℓ is available to a damper. A clipped spring alone conserves energy and rings.
+/// The b_v of the papers is K_s T/2. The damper uses the range between this bound and ℓ; without a damper a clipped
+/// spring rings.
 ///
-/// **thrift** Returns slightly less energy while F does work on the hand (F₁·u > 0, with the velocity u below) and Ē <
+/// **thrift** reduces the force slightly while it does work on the hand (F₁·u > 0, with the velocity u below) and Ē <
 /// E_s:
 ///     F₁ ← F₁ (1 − σ a n (1 − Ē/E_s)),   a = clamp(F₁·u/(‖F₁‖ (‖u‖ + 2 mm/s)), 0, 1),
 ///                                        n = clamp((‖F_wanted‖/f_γ − 0.4)/0.4, 0, 1),   f_γ = γ ‖F_wanted‖
-/// The 0.1 to 0.3 mJ that remain are the start of the next contact. With a robust ledger a force grows only as far as
-/// the account can pay for its counts, ‖F₁‖ ≤ max(f_c, ‖F_held‖ + Ē/(4Δ)). Otherwise the variation of the force would
-/// use up all that the motion earns, and a nearly empty account would stay empty.
+/// This leaves 0.1 to 0.3 mJ for the next contact. With a robust ledger the force also grows only as far as the account
+/// can pay for its counts, ‖F₁‖ ≤ max(f_c, ‖F_held‖ + Ē/(4Δ)), because otherwise an empty account would stay empty.
 ///
-/// **damper** Damps fast motion in contact, after the bound, for hands that ring on a late or clipped spring. With the
-/// velocity v of the interval, for the filters and the force of one group of coordinates:
+/// **damper** damps fast motion in contact, for hands that ring on a late or clipped spring. With the velocity v of the
+/// interval, for each group of coordinates:
 ///     u₁ ← u₁ + (T/τ_v)(v − u₁),   u ← u + (T/τ_v)(u₁ − u),   s ← s + (T/τ_h)(u − s),   w = u − s       m/s
 ///     D = min(B h (1 − O/O_most)₊ (1 − v_q/‖w‖)₊ ‖F₁‖/(‖F₁‖ + f_s), ‖F₁‖/‖w‖) w                         N
 ///     v_q = z Δ/(e τ_v) / (1 + (‖s‖ τ_v/Δ)²)                                                            m/s
 ///     h = clamp(max((‖F_wanted‖/f_γ − 0.3)/0.4, age/10 ms · min(1, k/(0.3 K_s))), 0, 1)
 ///     k = ‖F_wanted‖/‖travel since the contact began‖ with energy_cap and shaping, else ∞                 N/m
 ///     O ← max(0, O − O T/0.3 s − D_held·Δx + (Δ/2)‖D_held − D_before‖₁)                                 J
-/// A fresh answer well inside the bound needs no damping (h). A late spring acts on the hand like a damper of −k · age
-/// N·s/m, so a soft spring needs little. The damper never reverses a force. Δ/(e τ_v) is the peak of the pulse that a
-/// single count Δ causes behind the two filters. At higher rates of counts the pulses merge and only a ripple remains.
-/// One count costs the robust ledger B Δ²/(e τ_v), and friction pays f_c Δ; without the dead zone (z = 0) the damper
-/// would drain the account. A true vibration above v_q earns energy, because D·Δx = B w² T is booked as measured work.
-/// O is the debt of the damper: the part D_held that it took from the force must earn what its counts cost.
+/// h is zero for a fresh answer well inside the bound, and small for a soft spring: a late spring acts on the hand like
+/// a damper of −k · age N·s/m. The dead zone v_q removes the pulses of single counts, whose cost B Δ²/(e τ_v) would
+/// drain the robust ledger. O is the energy that the damper owes for its counts. The damper never reverses a force.
 ///
-/// **fading_contact** With energy_cap, C decays instead of vanishing. With C_b = min(‖F_wanted‖ ‖travel‖, C_most)
+/// **fading_contact** lets C decay instead of vanish, so an object that softens and returns does not start from E_cap.
+/// The price: work on one object can pay for an impact for about τ_C longer. With C_b = min(‖F_wanted‖ ‖travel‖,
+/// C_most)
 ///     C ← C + (C_b − C) T/τ_C   while C > C_b;  at a change of sign only the travel starts again
-/// so an object that softens to nothing and returns does not start from E_cap. E ≤ E_cap + C still holds, and credit is
-/// only discarded. The price: the energy of stirring can pay for an impact for about τ_C longer.
 ///
-/// **adaptive_friction** The lower bounds follow `adapt`: downwards at once, upwards slowly.
+/// **adaptive_friction** follows `adapt`: downwards immediately, upwards slowly.
 ///
-/// Source: core/PROOFS.md, "Force inside the bound", "Output latency", "Bounded acceleration" and "Encoder counts".
-/// Blocks and Size as in Aol.
+/// Source: core/PROOFS.md, "Discarded credit", "Force inside the bound", "Output latency", "Bounded acceleration" and
+/// "Encoder counts". Blocks and Size are as in Aol.
 ///
 /// Thread-safe: no. Realtime-safe: all but the constructor.
 template <int Blocks, int Size = 1>
@@ -237,14 +229,14 @@ class AolPlus {
   Vec<kSize> once_smoothed_ = Vec<kSize>::Zero();  ///< u₁, m/s
   Vec<kSize> smoothed_ = Vec<kSize>::Zero();       ///< u, m/s
   Vec<kSize> slow_ = Vec<kSize>::Zero();           ///< s, m/s
-  Vec<kSize> damped_ = Vec<kSize>::Zero();         ///< N, the part that the damper took from the force now held
-  Vec<kSize> damped_before_ = Vec<kSize>::Zero();  ///< N, … from the force before
+  Vec<kSize> damped_ = Vec<kSize>::Zero();         ///< N, the damping in the current force
+  Vec<kSize> damped_before_ = Vec<kSize>::Zero();  ///< N, the damping in the previous force
   double damper_owes_ = 0;                         ///< O, J
   double held_ = 0;                                ///< N, ‖F_held‖, for thrift
-  double smoothing_ = 0;                           ///< τ_v, s; a default without a damper
+  double smoothing_ = 0;                           ///< τ_v in s, also used without a damper
   double slowness_ = 0;                            ///< τ_h, s
 
-  std::array<double, kMostHolds> under_way_{};  ///< J, ℓ of each force under way
+  std::array<double, kMostHolds> under_way_{};  ///< ℓ of each force under way in J
   std::size_t next_under_way_ = 0;
 };
 

@@ -69,14 +69,14 @@ std::optional<Law> law_named(std::string_view name) noexcept;
 /// The law between the remote environment and the hand, and its parameters.
 struct LimiterConfig {
   Law law = Law::kAolPlus;
-  Friction friction{};      ///< lower bounds of the friction (kAolPerAxis, kAolBox: of each axis alone)
+  Friction friction{};      ///< lower bounds of the friction (per axis for kAolPerAxis and kAolBox)
   Duration longest_hold{};  ///< T_max; > 0
-  /// Lets the `passive` laws follow holds longer than T_max. Empty: T stays T_max.
+  /// How the `passive` laws adapt if a force is held longer than T_max. If this is empty, T stays T_max.
   std::optional<HoldBound::Follow> follow_holds = HoldBound::Follow{};
   AolPlus<1, 3>::Parts parts{};                   ///< of kAolPlus
   double max_force = 0;                           ///< N, of kClamp
   std::optional<double> environment_stiffness{};  ///< N/m, for demands without a stiffness
-  Duration environment_delay{};                   ///< t_d of kPassiveSynthesis: from a position to its force
+  Duration environment_delay{};                   ///< t_d of kPassiveSynthesis, the delay of the environment
   /// N·s/m, the largest damping of the passivity controllers and kReferenceEnergy. It must be far below 2m/T, where a
   /// digital damper is unstable. 20 is an eighth of that for 75 g and 1 kHz.
   double max_damping = 20;
@@ -219,8 +219,7 @@ struct Laws<const std::tuple<Rows...>> : Union<std::variant<>, Rows...> {};
 /// Any law of the catalogue. Laws of the same class share one alternative.
 using AnyLaw = catalogue::Laws<decltype(catalogue::kRows)>::Type;
 
-/// Creates the law that `config` names. Throws what its constructor throws, and std::invalid_argument for an unknown
-/// enumerator.
+/// Creates the law that `config` names. Throws std::invalid_argument if a value is out of range.
 AnyLaw make_law(const LimiterConfig& config);
 
 }  // namespace tendon

@@ -6,18 +6,18 @@
 
 namespace tendon {
 
-/// The less conservative force-bounding algorithm: bounds a force by the energy that the current contact has earned.
+/// The less conservative force-bounding algorithm, which bounds a force by the energy that the current contact has
+/// earned.
 ///
 ///     E(n)  = E(n−1) − F(n−1)·Δx + b ‖Δx‖²/T(n)         E(n−1) := 0 first, when F(n−1) = 0 (no contact)
 ///     F(n)  = F_wanted · min(1, F_max/‖F_wanted‖),       F_max = 2 √( b max(E, 0)/T_max )
 ///
-/// F is in N on the hand, Δx in m, E in J. Without Coulomb friction and within one contact this is the Adjusting
-/// Output-Limiter. It does not use the credit of Coulomb friction. The reset between contacts softens the first
-/// millimetres of each contact, and prevents energy from free motion from feeding a vibration. Only a positive E is
-/// reset.
+/// F is in N on the hand, Δx in m, E in J. Within one contact this is the Adjusting Output-Limiter without Coulomb
+/// friction. The reset of a positive E between contacts softens the first millimetres of each contact, and prevents
+/// energy from free motion from feeding a vibration.
 ///
-/// Passive for every demand as long as no hold is longer than T_max, because E never exceeds the ledger of the port
-/// (core/PROOFS.md, "Discarded credit").
+/// The port is passive for every demand if each force is held for at most T_max, because E never exceeds the ledger of
+/// the port (core/PROOFS.md, "Discarded credit").
 ///
 /// Source: Kim, Baek, Ryu, 2015 (recalled; form as in published code), B = b/T · I.
 ///
@@ -49,20 +49,16 @@ class ForceBounding {
   EnergyLedger budget_;  ///< E
 };
 
-/// Bounds a force by the previous force and the motion since then, without any other memory.
+/// The more conservative force-bounding algorithm, which bounds a force by the previous force and the last motion only.
 ///
 ///     ‖F(n)‖ ≤ ‖F(n−1) − 2b Δx/T‖
 ///
-/// F is in N on the hand, F(n−1) the applied force, T the longest hold. A wall appears as a spring of 2b/T. A step that
-/// does not use its bound loses the rest: a force arises only while the hand moves into the wall, and a held force
-/// shrinks by 2b/T times the distance of the hand from its deepest point.
+/// F is in N on the hand, F(n−1) is the applied force, and T the longest hold time. A wall appears as a spring of 2b/T.
+/// The law does not save an unused bound. A force therefore only grows while the hand moves into the wall, and shrinks
+/// by 2b/T times the distance of the hand from its deepest point.
 ///
-/// Passive for every demand, because E(n) ≥ T ‖F(n)‖²/(4b) in every step:
-///
-///     E(n) ≥ T ‖F(n−1)‖²/(4b) − F(n−1)·Δx + b ‖Δx‖²/T = T/(4b) · ‖F(n−1) − 2b Δx/T‖²
-///
-/// in any number of dimensions, and the worst motion in the next hold takes no more. After a hold longer than T the
-/// viscous term is divided by its measured length.
+/// The port is passive for every demand, because E(n) ≥ T ‖F(n)‖²/(4b) in every step. If a force was held longer than
+/// T, the law divides the viscous term by the measured time.
 ///
 /// Source: Kim, Baek, Ryu, 2015, "more conservative" form with ξ = 1 (recalled; form as in published code);
 /// core/PROOFS.md, "Comparison laws".

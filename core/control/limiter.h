@@ -12,10 +12,10 @@ namespace tendon {
 
 /// The law of a scene for a point in space, chosen from the catalogue at construction.
 ///
-/// It keeps the guarantee of a `passive` law through overruns. T is the bound on a hold (HoldBound): T_max, or longer
-/// after a longer hold. Laws with a bound like equation (8) use T (FollowsHolds). The proofs of the other passive laws
-/// end with the first hold beyond T_max. From then on equation (8), with T and the ledger of the port, also bounds
-/// their force. While no hold is longer than T_max, the result is the same to the last bit.
+/// It keeps the guarantee of a `passive` law if the loop is late. T is the bound on the hold time (HoldBound). It is
+/// T_max until a force has been held longer. Laws with a bound like equation (8) use T (FollowsHolds). For the other
+/// passive laws, whose proofs then no longer apply, the limiter adds the bound of equation (8) with T. The result is
+/// unchanged, bit for bit, if no force is held longer than T_max.
 ///
 /// Source: core/PROOFS.md, "Late holds".
 ///
@@ -41,7 +41,7 @@ class Limiter {
   /// Forwards to AolPlus::adapt. Other laws ignore it.
   void adapt(const Friction& friction) noexcept;
 
-  /// Returns T, the longest time for which the next force may be held.
+  /// Returns T, the longest time for which the next force can be held.
   Duration longest_hold() const noexcept { return holds_ ? holds_->in_force() : longest_hold_; }
   /// Forwards to AolPlus::broken_assumptions. Returns 0 for other laws.
   std::uint64_t broken_assumptions() const noexcept;
@@ -54,7 +54,7 @@ class Limiter {
   std::optional<HoldBound> holds_;  ///< empty: T stays T_max
   double viscous_ = 0;              ///< b, N·s/m
   OutputBound bound_;               ///< equation (8) with T
-  bool bounded_from_here_ = false;  ///< the proof of the law has ended, so `bound_` applies as well
+  bool bounded_from_here_ = false;  ///< a force was held too long for the law, so `bound_` is used as well
 };
 
 }  // namespace tendon

@@ -11,26 +11,24 @@ namespace tendon {
 /// A virtual coupling with a slope condition. It passes every static force law that is not steeper than the friction of
 /// the device allows, and connects all others to the hand through a spring of that slope.
 ///
-/// A spring K_max connects the hand to a proxy. While the proxy stays, the reflective force f = −F becomes g. It
-/// becomes f(n) when the proxy moves by (g − f(n))/K_max. P is the energy that the proxy has received so far:
+/// A spring K_max connects the hand to a proxy. The reflective force f = −F becomes g while the proxy does not move,
+/// and f(n) if it moves by (g − f(n))/K_max. P is the energy that the proxy has received so far:
 ///
 ///     g    = f(n−1) + K_max Δx(n)
-///     f(n) = the force nearest to f_e with  P(n) = P(n−1) + f(n)·(g − f(n))/K_max ≥ 0
+///     f(n) = the force nearest to f_e with  P(n) = P(n−1) + f(n)·(g − f(n))/K_max ≥ 0      (a ball about g/2)
 ///
-/// (a ball about g/2). N, m, J; P(0) = 0. Passive for **every** demand if
+/// in N, m and J, with P(0) = 0. The port is passive for every demand if
 ///
 ///     b ≥ K_max T/2
 ///
-/// because E(n) ≥ ‖f(n)‖²/(2 K_max) + P(n) in every step, and the worst motion in a hold takes at most the first term.
-/// A static field that starts at rest, and has a convex potential and slopes in [0, K_max], passes **unchanged**: its
-/// proxy takes U − ‖f‖²/(2 K_max) ≥ 0. A late or stiffer field appears as a spring of K_max that yields.
+/// because E(n) ≥ ‖f(n)‖²/(2 K_max) + P(n). A static field that starts at rest, with a convex potential and slopes in
+/// [0, K_max], passes unchanged. A late or stiffer field appears as a spring of K_max that yields.
 ///
-/// The device may shorten the force. After an interval that was not measured or is not finite, the law starts from zero
-/// force with the current P.
+/// The device may shorten the force. The law restarts from zero force, with the current P, after an interval that was
+/// not measured or is not finite.
 ///
 /// Source: the slope condition is that of the nonlinear virtual coupling of Lee & Lee (ref. [17] of IEEE TCST 17(4),
-/// 2009), whose formula is lost. The law and the proofs are ours: core/PROOFS.md, "Comparison laws". Digital damping B
-/// is not part of it; it would require b ≥ K_max T/2 + |B|.
+/// 2009), whose formula is lost. The law and the proofs are ours: core/PROOFS.md, "Comparison laws".
 ///
 /// Thread-safe: no. Realtime-safe: all but the constructor.
 template <int N>

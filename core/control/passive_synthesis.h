@@ -13,16 +13,14 @@ namespace tendon {
 ///     F = γ F_wanted,    γ = min(1, b / (K_max (T/2 + t_d)))
 ///
 /// K_max (N/m) is the steepest slope of the field: the larger of `stiffness` and the spectral norm of the stiffest
-/// demand so far. γ never rises. While no slope is known (demands without stiffness, and no configured value) the force
-/// is zero.
+/// demand so far. γ therefore never increases. The force is zero while no slope is known.
 ///
-/// Passive for a static field with a convex potential and slopes up to K_max, sampled in every period and delivered t_d
-/// late (a multiple of the period), if the returned force is applied: the error of the force is at most K_max times the
-/// travel since it was sampled, and its mean age is T/2 + t_d. A field that changes with time is scaled without any
-/// guarantee. The soft parts of the field become softer as well.
+/// The port is passive for a static field with a convex potential and slopes up to K_max, if it is sampled in every
+/// period, delivered t_d late (a multiple of the period), and applied unchanged. There is no guarantee for a field that
+/// changes with time. The soft parts of the field become softer as well.
 ///
 /// Source: Mahvash & Hayward, IEEE Trans. Robotics 21(1), 2005 (recalled); proof: core/PROOFS.md, "Comparison laws".
-/// Learning K_max from the demand is ours; a new slope only has an effect from then on.
+/// Learning K_max from the demands is ours. A new slope only has an effect from then on.
 ///
 /// Thread-safe: no. Realtime-safe: all but the constructor.
 template <int N>
@@ -31,7 +29,7 @@ class PassiveSynthesis {
   struct Config {
     Friction friction;                  ///< f_c is only for the ledger; b > 0
     Duration longest_hold{};            ///< T, > 0
-    Duration delay{};                   ///< t_d, ≥ 0: from the position to its force
+    Duration delay{};                   ///< t_d, ≥ 0: the delay of the environment
     std::optional<double> stiffness{};  ///< N/m, > 0: lower limit of K_max; empty: learned from the demands
   };
 

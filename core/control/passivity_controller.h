@@ -15,27 +15,29 @@ enum class PassivityObserver : std::uint8_t {
   /// energy that a sampled spring generates:
   ///     Σ K x(n) Δx(n) = K x²/2 + K/2 Σ Δx² ≥ 0 for every motion
   kSameSample,
-  /// Σ f(n−1)·Δx(n) of the applied force, which is exact for a zero-order hold. A spring gives K x²/2 − K/2 Σ Δx². The
-  /// controller uses the prediction E + f_e(n)·Δx(n), which assumes that the next motion equals the last one.
+  /// Σ f(n−1)·Δx(n) of the applied force, which is exact for a zero-order hold. The result for a spring is K x²/2 − K/2
+  /// Σ Δx². The controller uses the prediction E + f_e(n)·Δx(n), which assumes that the next motion is equal to the
+  /// last one.
   kZohExact,
 };
 
-/// Returns α = min( missing · T/‖Δx‖², max_damping ) in N·s/m: the damper that dissipates `missing` J in another
-/// interval like this one (T = `held`). Returns 0 if nothing is missing or the speed is not above `min_speed`.
+/// Returns α = min( missing · T/‖Δx‖², max_damping ) in N·s/m. This is the damper that dissipates `missing` J in
+/// another interval like this one (T = `held`). The result is 0 if `missing` is not positive or if the speed is at most
+/// `min_speed`.
 double series_damping(double missing, double squared_motion, Duration held, double min_speed,
                       double max_damping) noexcept;
 
-/// The time-domain passivity observer and controller in series (impedance causality). It adds damping when the
-/// environment is observed to generate energy.
+/// The time-domain passivity observer and controller in series (impedance causality). It adds damping if the observer
+/// finds that the environment generates energy.
 ///
 ///     α(n) = −E(n) / (T ‖v(n)‖²)  when E(n) < 0, within [0, max_damping]       v = Δx/T, m/s
 ///     F(n) = F_wanted(n) − α(n) v(n)
 ///
-/// It does not guarantee a passive port: the correction acts one interval late, and assumes a motion that may not
-/// occur. It needs no model and no friction, and chatters in stiff contact. A digital damper is itself unstable above
-/// 2m/T (m: mass of the device), so max_damping must be far smaller.
+/// The port is not guaranteed to be passive, because the correction acts one interval late and assumes that the motion
+/// continues. The controller does not need a model or friction. It chatters in stiff contact. A digital damper is
+/// unstable above 2m/T (m is the mass of the device), so max_damping must be far smaller.
 ///
-/// The observer skips intervals without a measurement. For N = 6 one α must make sense for all components.
+/// For N = 6 the same α is used for all components.
 ///
 /// Source: Hannaford & Ryu, IEEE Trans. Robotics & Automation 18(1), 2002 (recalled); kZohExact: Ryu, Kim, Hannaford,
 /// IEEE Trans. Robotics 20(2), 2004 (recalled). The vector form uses scalar products. core/PROOFS.md, "Comparison
@@ -71,18 +73,18 @@ class PassivityController {
   Interval<N> last_{Vec<N>::Zero(), Vec<N>::Zero(), Duration::zero()};
 };
 
-/// The passivity observer and controller in parallel (admittance causality). The environment moves less than the hand
-/// when it is observed to generate energy.
+/// The passivity observer and controller in parallel (admittance causality). It reduces the motion of the environment
+/// if the observer finds that the environment generates energy.
 ///
 ///     1/α(n) = −E(n) / (T ‖f(n)‖²)  when E(n) < 0, within [0, max_mobility]
 ///     v₁ = v₂ + f/α           hand v₁, environment v₂ (m/s), f = −F (N)
 ///
-/// The controller changes the velocity, so the environment is at x − δ with δ = Σ T f/α, and the stiffness of the
-/// demand gives its force there: F = F_wanted + K δ. Without a stiffness in the demand the controller has no effect.
-/// Hand and environment drift apart by δ, a known weakness. δ is reset out of contact, when both force and stiffness of
-/// the demand are zero. The affine model can pull where the true environment would release the hand.
+/// The environment is then at x − δ with δ = Σ T f/α, and the stiffness of the demand gives its force there: F =
+/// F_wanted + K δ. The controller has no effect if the demand has no stiffness. A known weakness is that hand and
+/// environment drift apart by δ. The controller resets δ if both the force and the stiffness of the demand are zero.
+/// The linear model can pull the hand where the true environment would release it.
 ///
-/// It does not guarantee a passive port (see PassivityController, also for the observers and sources).
+/// The port is not guaranteed to be passive. See PassivityController, also for the observers and sources.
 ///
 /// Thread-safe: no. Realtime-safe: all but the constructor.
 template <int N>

@@ -6,27 +6,26 @@
 
 namespace tendon {
 
-/// An energy-consistent sampled port-Hamiltonian system: a spring whose state is the energy that has really gone in.
+/// An energy-consistent sampled port-Hamiltonian system: a spring whose state is given by the energy that was really
+/// put in.
 ///
 ///     H(n) = H(n−1) + f(n−1)·Δx(n)                  J, f = −F as applied: exact for a zero-order hold
 ///     q(n) = √(2 H(n)/K)                            m, the corresponding state
 ///     F(n) = F_wanted · min(1, K q(n)/‖F_wanted‖)
 ///
-/// K (N/m) is the stiffness of the demand along its force if that is positive, else `stiffness`. A plain spring would
-/// hold ½ K x² while only ½ K x² − Σ ½ K Δx² has gone in (an energy leap). Here the storage pays for the leaps, so the
-/// state lags behind the position. Two amounts that the storage cannot pay are booked as debt. Half of all income
-/// repays it later:
+/// K (N/m) is the stiffness of the demand along its force if that is positive, else `stiffness`. A plain sampled spring
+/// has the energy ½ K x² although only ½ K x² − Σ ½ K Δx² was put in. Here the storage pays for the difference, so the
+/// state lags behind the position. Two amounts are booked as debt, and half of all later income repays it:
 ///
-///     leap       while moving into the force, q is at least the motion of the last interval (otherwise the spring
-///                could not load from q = 0): ½ K ‖Δx‖² − H
-///     overdraft  H below zero, because the hand moved further out than the state: H := 0
+///     leap       while the hand moves into the force, q is at least the last motion, because the spring could not load from
+///                q = 0 otherwise: ½ K ‖Δx‖² − H
+///     overdraft  H < 0, because the hand moved further out than the state: H := 0
 ///
-/// so H ≥ 0, and the energy that has gone in is at least H − debt. Neither friction nor mass is needed. Debt grows by
-/// at most ½ K ‖Δx‖² per interval, so the port is passive for **every** demand if
+/// So H ≥ 0. Debt grows by at most ½ K ‖Δx‖² per interval, so the port is passive for every demand if
 ///
 ///     K ≤ 2b/T
 ///
-/// and for stiffer springs up to its debt. The storage is emptied when the environment demands no force.
+/// The storage is emptied if the environment demands no force.
 ///
 /// Source: Stramigioli, Secchi, van der Schaft, Fantuzzi, IEEE Trans. Robotics 21(4), 2005 (abstract read, rest
 /// recalled). The booking rules and the theorem are ours: core/PROOFS.md, "Comparison laws".

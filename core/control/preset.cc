@@ -34,7 +34,7 @@ PresetParts preset_parts(Preset preset, const PresetDevice& device) noexcept {
   if (device.encoder_step > 0) parts.robust_ledger.emplace().encoder_step = {device.encoder_step};
   parts.knee.emplace().start = 0.7;
   if (preset == Preset::kFeel) parts.bounded_acceleration.emplace();
-  // At least the stiffness that friction alone allows.
+  // Not softer than the limit that friction allows.
   const double by_friction = 2 * device.friction.viscous / seconds(device.longest_hold);
   parts.shaping.emplace().stiffness = {std::max(kStiffness, by_friction)};
   parts.thrift.emplace();

@@ -34,7 +34,7 @@ const PresetInfo& info(Preset preset) noexcept;
 struct PresetDevice {
   Friction friction{};      ///< lower bounds
   Duration longest_hold{};  ///< T_max
-  double encoder_step = 0;  ///< Δ, m; 0: exact, without a robust ledger
+  double encoder_step = 0;  ///< Δ in m; 0 if exact, without a robust ledger
 };
 
 /// The parts of a preset. Only values that follow from the device depend on T.

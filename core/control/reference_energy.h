@@ -7,20 +7,20 @@
 
 namespace tendon {
 
-/// Passivity control that follows a reference energy: adds damping as soon as the environment holds less energy than an
-/// ideal one would.
+/// Passivity control that follows a reference energy. It adds damping as soon as the environment contains less energy
+/// than an ideal one.
 ///
-///     E(n)     = Σ f(n−1)·Δx(n)                        energy that has gone in (J), f = −F as applied
+///     E(n)     = Σ f(n−1)·Δx(n)                        energy that was put in (J), f = −F as applied
 ///     E_ref(n) = ½ F_wanted(n)ᵀ K⁻¹ F_wanted(n)        energy of a spring K at that force (J)
 ///     α(n)     = (E_ref − E − f_e·Δx)/(T ‖v‖²)  when E + f_e·Δx < E_ref, within [0, max_damping]
 ///     F(n)     = F_wanted(n) − α(n) v(n)               v = Δx/T, m/s
 ///
-/// K is the symmetric part of the stiffness of the demand, if it has one; directions without stiffness hold no energy.
-/// Otherwise K is `stiffness`. The law is quiet on stiff walls **if** the environment is that spring and its force is
-/// fresh in every period. With another reference it brakes without need, or too late. It does not guarantee a passive
-/// port (see PassivityController).
+/// K is the symmetric part of the stiffness of the demand, or `stiffness` if the demand has none. Directions without
+/// stiffness contain no energy. The law is quiet on stiff walls if the environment is this spring and its force is
+/// fresh in every period. Otherwise it can brake unnecessarily or too late. The port is not guaranteed to be passive
+/// (see PassivityController).
 ///
-/// Source: Ryu, Preusche, Hannaford, Hirzinger, IEEE TCST 13(5), 2005 (recalled); the trigger uses the predicted
+/// Source: Ryu, Preusche, Hannaford, Hirzinger, IEEE TCST 13(5), 2005 (recalled). The trigger uses the predicted
 /// energy, like PassivityObserver::kZohExact. core/PROOFS.md, "Comparison laws".
 ///
 /// Thread-safe: no. Realtime-safe: all but the constructor.

@@ -9,10 +9,9 @@ namespace tendon {
 
 /// A law that makes the force at the port of a device safe. Every law in core/control satisfies this concept.
 ///
-/// Call it once in each haptic period, in this order: `observe` with the interval that has just ended (not in the first
-/// period), then `limit`, which converts the wanted force into the force to hold until the next period. If the motion
-/// in an interval was not measured, call `observe_unseen` instead of `observe`: the force `applied` was held for at
-/// most `at_most` and then vanished.
+/// In each haptic period, first call `observe` with the last interval (not in the first period), and then `limit`,
+/// which returns the force to apply until the next period. If the motion in the last interval was not measured, call
+/// `observe_unseen` instead of `observe`. The force `applied` was then held for at most `at_most` and vanished.
 ///
 /// N is 1, 3 (forces in N, displacements in m) or 6 (joint torques in N·m and angles in rad, or a wrench and a twist,
 /// as documented by each law).

@@ -11,16 +11,16 @@ namespace tendon {
 ///     f(n) = K_c s(n) + B_c (s(n) − s(n−1))/T,     s = x − x_tool                   (f = −F, N;  s in m)
 ///     f(n) = f_e(n) − K s(n)                       the tool is in equilibrium: backward Euler, implicit
 ///
-/// f_e and K are the demand, affine about the hand (symmetric part of K; negative eigenvalues count as 0). In a spring
-/// K the hand feels the series value K_c K/(K_c + K). A demand **without** a stiffness is a constant force on the tool.
-/// It passes unchanged, and nothing is guaranteed.
+/// f_e and K are the demand, linear about the hand (symmetric part of K; negative eigenvalues count as 0). In a spring
+/// K the hand feels K_c K/(K_c + K). A demand without a stiffness is a constant force on the tool. It is passed on
+/// unchanged and without a guarantee.
 ///
-/// Passive for all motions and dimensions if the environment is static and convex, equally stiff at the tool and at the
-/// hand (a linear environment, or one wall at a time), fresh in every period, the returned force is applied, and
+/// The port is passive if the returned force is applied, if the environment is static, convex, fresh in every period,
+/// and equally stiff at the tool and at the hand (a linear environment, or one wall at a time), and if
 ///
-///     b ≥ K_c T/2 + B_c            (T: the longest hold)
+///     b ≥ K_c T/2 + B_c            (T: the longest hold time)
 ///
-/// This rule of Colgate is tight. The constructor does not check it (see colgate_coupling).
+/// This is the rule of Colgate. The constructor does not check it (see colgate_coupling).
 ///
 /// Source: Colgate, Stanley, Brown, IROS 1995 (recalled). Proof for vectors and convex environments: core/PROOFS.md,
 /// "Comparison laws".

@@ -5,17 +5,17 @@
 
 namespace tendon {
 
-/// The bound T on how long the next force may be held. OutputBound uses it. It follows the measured holds:
+/// The bound T on the time for which the next force can be held. It follows the measured times, and OutputBound uses
+/// it.
 ///
 ///     T(0)   = T_max                                        from the scene
 ///     T(n+1) = min((1 + margin) · held, most · T_max)       if held > T(n); never below T(n)
 ///     T(n+1) = T(n) − max(1 ns, (T(n) − T_max) · held/memory), not below T_max            otherwise
 ///
-/// T rises at once and falls slowly, so a machine that is late again within `memory` already has a suitable bound.
-/// While no interval is longer than T_max, T equals T_max exactly.
+/// T rises immediately and falls slowly, so a machine that is late again within `memory` already has a suitable bound.
+/// T is exactly T_max while no interval is longer.
 ///
-/// The limiter keeps E ≥ 0 as long as no hold is longer than the T that was in force when it began. If the hold T_act
-/// of a force F is longer, it takes at most this much more than the ledger contains:
+/// If a force F is held for T_act > T, it can take E below zero, but by no more than
 ///
 ///     (T_act − T)(‖F‖ − f_c)₊²/(4b)  ≤  (T_act/T − 1) · E
 ///
@@ -28,8 +28,8 @@ class HoldBound {
     double margin = 0.25;  ///< ≥ 0: T exceeds the longest hold by this fraction
     /// > 0. Time constant of the return to T_max. Overruns of ordinary kernels are minutes apart.
     Duration memory = std::chrono::seconds(60);
-    /// ≥ 1: the largest T, in T_max. Longer holds occur if the machine stops, so they say nothing about its jitter.
-    /// With T = 4 T_max the limiter still permits half of the force above f_c.
+    /// ≥ 1: the largest T, in T_max. An interval that is longer shows that the machine was stopped, not how much it
+    /// jitters. With 4 T_max the limiter still permits half of the force above f_c.
     double most = 4;
   };
 

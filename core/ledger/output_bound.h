@@ -11,7 +11,7 @@
 
 namespace tendon {
 
-/// The bound on the force, such that no motion within one hold can make the energy ledger negative.
+/// A bound on the force, such that no motion until the next step can make the energy ledger negative.
 ///
 /// The largest energy that a motion can take from the ledger while a force of norm f (N) is held:
 ///
@@ -20,19 +20,15 @@ namespace tendon {
 ///          = T (f − f_c)₊² / (4b)              while the worst travel T (f − f_c)/(2b) ≤ L
 ///          = (f − f_c) L − b L²/T              beyond
 ///
-/// A force is permitted if ℓ(f) ≤ E. With unbounded travel (L = ∞) this is equation (8) of the paper,
+/// A force is permitted if ℓ(f) ≤ E. If the travel is not bounded (L = ∞), this is equation (8) of the paper,
 ///
 ///     f_max = f_c + 2 √( b · max(E, 0) / T_max )
 ///
-/// and with a finite L it is the form for bounded acceleration.
+/// If every force obeys the bound and is held for at most T_max, then E(n) ≥ 0 for all n (Theorem 1). The bound is
+/// tight. If E is negative, the bound is f_c, and E recovers.
 ///
-/// Theorem 1: if every force obeys the bound and no hold is longer than T_max, then E(n) ≥ 0 for all n. The bound is
-/// tight. Use T_max here and the measured length in the ledger; this covers jitter. While E < 0 the bound is f_c, and
-/// then no interval lowers E, so the ledger recovers by itself. If a hold of length T_act is longer than T_max, it
-/// takes at most (T_act/T_max − 1) E more than the ledger contains. HoldBound keeps such holds rare.
-///
-/// Source: Lee & Lee, IEEE TCST 17(4), 2009, eqs (7)–(9), Table I. Proofs: core/PROOFS.md, "Output bound", "Bounded
-/// acceleration" and "Late holds".
+/// Source: Lee & Lee, IEEE TCST 17(4), 2009, eqs (7)–(9), Table I; core/PROOFS.md, "Output bound" and "Bounded
+/// acceleration".
 ///
 /// Thread-safe: yes (a value). Realtime-safe: all but `of`.
 struct OutputBound {
