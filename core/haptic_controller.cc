@@ -255,7 +255,7 @@ void HapticController::take(Step& step, const Motion& hand, const Vec3& applied,
 [[gnu::always_inline]] inline void HapticController::limit_force(const ForceChannels::Wanted& wanted,
                                                                  const Vec3& applied, Step& step) noexcept {
   const Limited saturated = saturate(step.force, config_.max_force);
-  // After a pause the force changes by at most one longest hold, not by the whole pause.
+  // The slew limit uses at most one longest_hold, also after a pause.
   const Duration elapsed = std::min(step.held, config_.limiter.longest_hold);
   const Limited slewed = limit_slew(saturated.force, applied, config_.max_slew, elapsed);
   if (friction_map_) limiter_.adapt(friction_map_->at(step.hand.position));
@@ -266,7 +266,7 @@ void HapticController::take(Step& step, const Motion& hand, const Vec3& applied,
   const LimitedForce<3> limited = limiter_.limit(
       {.force = slewed.force, .stiffness = as_wanted ? wanted.stiffness : Mat3(Mat3::Zero()), .age = wanted.loop_age});
   step.force = limited.force;
-  // A damper adds to the wanted force. A shorter force of the same direction remains safe.
+  // The damper can add to the force. It is safe to reduce it again.
   if (limited.reasons.has(Reason::kDamped)) step.force = saturate(step.force, config_.max_force).force;
   step.permitted = limited.permitted;
   step.reasons |= limited.reasons;
@@ -306,7 +306,7 @@ void HapticController::limit_wrench(Duration age, const Vec3& applied, Step& ste
   }
 }
 
-/// The limits of the gripper give no reasons, because the reasons are those of the force.
+/// The limits of the gripper do not set reasons, which only describe the force.
 void HapticController::limit_grip(Step& step) noexcept {
   const GripLimits& limits = *config_.grip;
   GripStep& grip = *step.grip();

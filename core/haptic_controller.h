@@ -22,7 +22,7 @@ namespace tendon {
 /// The rotation of the handle in a step.
 struct TurnStep {
   Turning hand;
-  Vec3 was_applied = Vec3::Zero();  ///< N·m, held in the interval that has ended
+  Vec3 was_applied = Vec3::Zero();  ///< N·m, applied in the last interval
   Vec3 wanted = Vec3::Zero();       ///< N·m, demand of the remote environment
   Vec3 torque = Vec3::Zero();       ///< N·m, to be applied now
   Vec3 applied = Vec3::Zero();      ///< N·m, applied by the device
@@ -31,7 +31,7 @@ struct TurnStep {
 /// The gripper of the handle in a step. It has a separate account.
 struct GripStep {
   Grip hand;
-  double was_applied = 0;  ///< N, held in the interval that has ended
+  double was_applied = 0;  ///< N, applied in the last interval
   double wanted = 0;       ///< N, demand of the remote environment
   double force = 0;        ///< N, to be applied now
   double applied = 0;      ///< N, applied by the device
@@ -43,21 +43,21 @@ struct GripStep {
 struct HandleStep {
   std::optional<TurnStep> turn{};  ///< empty: the device does not measure its orientation
   std::optional<GripStep> grip{};  ///< empty: it has no gripper
-  std::optional<Joints> joints{};  ///< empty: not measured; no law uses them
+  std::optional<Joints> joints{};  ///< empty if not measured; not used by the laws
 };
 
 /// The position of the handle in a step. Every handle has one.
 struct PositionStep {
   Motion hand;                       ///< measured motion; hand.at is the time of the step
-  Duration held{};                   ///< T_act: length of the interval that has ended; 0 in the first step
-  Vec3 was_applied = Vec3::Zero();   ///< N, the force held in that interval
+  Duration held{};                   ///< T_act: length of the last interval; 0 in the first step
+  Vec3 was_applied = Vec3::Zero();   ///< N, applied in the last interval
   std::optional<Vec3> hand_force{};  ///< N, of the hand on the handle, as measured; empty without a force sensor
-  Vec3 wanted = Vec3::Zero();        ///< N, demand of the remote environment, after hold or local model
+  Vec3 wanted = Vec3::Zero();        ///< N, demand of the remote environment (HeldForce)
   Mat3 stiffness = Mat3::Zero();     ///< N/m, −∂wanted/∂x from the remote environment; zero if unknown
   double permitted = 0;  ///< N, bound of the limiter on ‖force‖ (per axis: on the largest component); ∞ when off
   Vec3 force = Vec3::Zero();  ///< N, to be applied now
   double energy = 0;          ///< J, account of the limiter after the interval (per axis: the minimum)
-  Duration longest_hold{};    ///< T of `permitted`: E stays ≥ 0 if `force` is held no longer
+  Duration longest_hold{};    ///< T: `force` can be applied for this time
   Reasons reasons;            ///< why `force` is not `wanted`
   Mode mode = Mode::kIdle;
   std::uint8_t force_way = 0;           ///< solver path of the engine for the remote force in use; 0: unknown
@@ -83,7 +83,7 @@ struct Step : PositionStep {
 
 /// One haptic step: from the measured motion of the hand to the force to apply.
 ///
-///     account ← the interval that has ended, with the applied force         (Limiter::observe)
+///     account ← the last interval, with the force that was applied          (Limiter::observe)
 ///     F ← newest remote force, held, faded or stopped by its age            (HeldForce; several: ForceChannels)
 ///     F ← F + force of the coupling to one or several peers                 (Couplings, when listed)
 ///     F ← the force that makes the handle follow a tool on which F acts     (AdmittanceLoop, when listed)
@@ -93,29 +93,25 @@ struct Step : PositionStep {
 ///     F ← the bound of the account, e.g. ‖F‖ ≤ f_c + 2 √(b E / T_max)        (Limiter::limit)
 ///     F ← ‖F‖ ≤ max_force again, if the damper of the limiter has added to it
 ///
-/// For a handle with motors for rotation, F is a wrench. Force and torque are shortened together, so their direction
-/// stays, and one account bounds both (WrenchPort). The gripper is a separate port (GripPort). The torque and the grip
-/// force of the coupling are added to those of the remote environment. The account of the wrench is the shared one,
-/// even if the coupling only connects positions.
+/// If the device has motors for rotation, F is a wrench. Force and torque then share one account and are reduced by the
+/// same factor (WrenchPort). The gripper is a separate port (GripPort). The torque and the grip force of the coupling
+/// are added to those of the remote environment.
 ///
-/// The limiter is last, so nothing can raise a force above its bound. It can reduce a force faster than the slew limit
+/// The limiter is the last step, so the force cannot exceed its bound. It can reduce a force faster than the slew limit
 /// allows.
 ///
-/// Guarantee: E ≥ −1 nJ in every step, as long as no force is held longer than the `longest_hold` of the step that
-/// chose it. If a hold T_act is longer than that T, it takes at most (T_act − T)(‖F‖ − f_c)₊²/(4b) from below zero.
-/// Until the ledger has recovered, which it does by itself, forces are at most f_c. See core/PROOFS.md, "Output bound"
-/// and "Late holds".
+/// Guarantee: E ≥ −1 nJ in every step, if each force is applied for at most the `longest_hold` of its step. Otherwise E
+/// can fall below zero by at most (T_act − T)(‖F‖ − f_c)₊²/(4b), and forces are limited to f_c until E has recovered.
+/// See core/PROOFS.md, "Output bound" and "Late holds".
 ///
-/// Overruns: an interval longer than the longest_hold of the scene is booked with its measured length and flagged, and
-/// the limiter then expects such holds (HoldBound). If the interval was longer than the watchdog of the device, the
-/// length of the hold is unknown, and the worst case is booked. (With longest_hold = watchdog the guarantee has no
-/// condition, but the bound is lower: K_op → 2b / T_max.) An interval with an unmeasured end is booked with the worst
-/// case as well.
+/// Overruns: if an interval is longer than the longest_hold of the scene, it is booked with its measured length and
+/// flagged, and the limiter adapts (HoldBound). If it is longer than the watchdog of the device, or if a position is
+/// missing, the worst motion is booked. (If longest_hold is the watchdog time, the guarantee has no condition, but the
+/// bound is lower: K_op → 2b / T_max.)
 ///
-/// A fault is latched: the force is zero (through the slew limit while positions are measured) until `rearm`.
-///
-/// `disarm` is for the operator. The force is zero from the next step on, without a ramp, until `rearm`. It is not a
-/// fault and does not clear one.
+/// A fault is latched: the force is zero (through the slew limit while positions are measured) until `rearm`. `disarm`
+/// is for the operator. It sets the force to zero from the next step on, without a ramp, until `rearm`. It does not
+/// clear a fault.
 ///
 /// Thread-safe: no. Realtime-safe: yes.
 class HapticController {
@@ -137,8 +133,9 @@ class HapticController {
     std::optional<GripLimits> grip{};
     /// For a device with a force sensor. Without it the device is of impedance type.
     std::optional<AdmittanceLoop<3>::Config> admittance{};
-    /// Couples the handle to that of a peer. With a purse the limiter has a shared_account. A coupled orientation must
-    /// be measured in every step; without `rotation` there is no torque. A coupled gripper needs `grip`.
+    /// Couples the handle to that of a peer. The limiter has a shared_account if the coupling has a purse. A coupled
+    /// orientation must be measured in every step, and produces a torque only with `rotation`. A coupled gripper needs
+    /// `grip`.
     std::optional<Coupling::Config> coupling{};
     /// For a follower with several leaders: one `coupling` per leader (Couplings). Empty: one leader.
     std::vector<CoupledLeader> leaders{};

@@ -43,7 +43,7 @@ struct Grip {
 /// The joints of the mechanism of the handle at one instant.
 struct Joints {
   static constexpr std::size_t kMost = 8;
-  std::size_t count = 0;                 ///< at most kMost; other elements are 0
+  std::size_t count = 0;                 ///< at most kMost; all other elements are 0
   std::array<double, kMost> angle{};     ///< rad
   std::array<double, kMost> velocity{};  ///< rad/s, an estimate
 

@@ -34,7 +34,7 @@ struct LampColour {
   bool operator==(const LampColour&) const = default;
 };
 
-/// A pulse like XrHapticVibration of OpenXR. It ends by itself; a new pulse replaces it immediately.
+/// A vibration pulse, like XrHapticVibration in OpenXR. A new pulse replaces the current one.
 struct Vibration {
   double amplitude = 0;  ///< [0, 1], relative to the maximum of the output; 0 = off
   double frequency = 0;  ///< Hz, 20 … 1000; 0 = default of the output
@@ -50,7 +50,7 @@ inline OutputKind kind_of(const OutputSetting& setting) noexcept {
   return std::holds_alternative<LampColour>(setting) ? OutputKind::kLamp : OutputKind::kVibration;
 }
 
-/// Returns the setting that switches off an output of this kind.
+/// Returns the setting that turns off an output of this kind.
 inline OutputSetting turned_off(OutputKind kind) noexcept {
   return kind == OutputKind::kLamp ? OutputSetting(LampColour{}) : OutputSetting(Vibration{});
 }

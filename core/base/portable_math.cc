@@ -65,10 +65,10 @@ Doublings doublings(double x) noexcept {
 /// 1 + r/first (1 + r/(first + 1) (… (1 + r/last))), summed from the smallest term: each sum is 1 + sum * r / n of the
 /// previous one.
 ///
-/// In this form each division waits for the previous one, which takes 100 ns, two fifths of a haptic step with a knee.
-/// So the sums are first predicted with r / n, whose divisions are independent, and then each is compared with its
-/// definition off the critical path. In one of 15 series a prediction is wrong in its last bit; from there on the sums
-/// follow the definition. Unrolled, with constant n: 5 ns and 120 instructions of a step.
+/// In this form each division depends on the previous one, which takes 100 ns. The function therefore predicts the sums
+/// with r / n, whose divisions are independent, and compares each with its definition off the critical path. If a
+/// prediction differs in its last bit (in one of 15 series), the following sums use the definition. This takes 5 ns if
+/// the loop is unrolled with constant n.
 template <std::size_t kFirst, std::size_t kLast>
 double taylor(double r) noexcept {
   std::array<double, kLast + 1> sums;  // [n]: from n + 1 on

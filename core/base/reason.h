@@ -20,8 +20,8 @@ enum class Reason : std::uint32_t {
   kNotFinite = 1U << 7,    ///< NaN or infinity in the demand or a measurement
   kFault = 1U << 8,        ///< a latched fault holds the force at zero
   kDeviceClamp = 1U << 9,  ///< the device applied less than the commanded force
-  kOverrun = 1U << 10,     ///< no limit: the previous hold was longer than longest_hold of the scene
-  kWatchdog = 1U << 11,    ///< no limit: the watchdog of the device ended the previous hold
+  kOverrun = 1U << 10,     ///< no limit: the last interval exceeded the longest_hold of the scene
+  kWatchdog = 1U << 11,    ///< no limit: the last interval exceeded the watchdog of the device
   kUnseen = 1U << 12,      ///< no position was measured, so the force is zero
   kDisarmed = 1U << 13,    ///< the operator has disarmed the device
   kDamped = 1U << 14,      ///< damper of the output limiter: the hand vibrates in contact

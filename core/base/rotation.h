@@ -35,8 +35,8 @@ Vec3 turn_between(const Quat& from, const Quat& to) noexcept;
 /// Returns R v.
 Vec3 rotated(const Quat& q, const Vec3& v) noexcept;
 
-/// Returns whether the rotation from `rest` to `q` is at most 150°. A spring is not used beyond that: its torque has
-/// fallen to a half, and at 180° it has no direction.
+/// Returns whether the rotation from `rest` to `q` is at most 150°. A spring is not valid beyond this, because its
+/// torque decreases and has no direction at 180°.
 bool is_within_reach(const Quat& rest, const Quat& q) noexcept;
 
 /// Returns the torque of a spring of `stiffness` K (N·m/rad, symmetric, base frame axes) that is rotated from `rest` to

@@ -17,8 +17,8 @@ namespace tendon {
 /// has the energy ½ K x² although only ½ K x² − Σ ½ K Δx² was put in. Here the storage pays for the difference, so the
 /// state lags behind the position. Two amounts are booked as debt, and half of all later income repays it:
 ///
-///     leap       while the hand moves into the force, q is at least the last motion, because the spring could not load from
-///                q = 0 otherwise: ½ K ‖Δx‖² − H
+///     leap       while the hand moves into the force, q is at least the last motion, because the spring could not
+///                load from q = 0 otherwise: ½ K ‖Δx‖² − H
 ///     overdraft  H < 0, because the hand moved further out than the state: H := 0
 ///
 /// So H ≥ 0. Debt grows by at most ½ K ‖Δx‖² per interval, so the port is passive for every demand if

@@ -21,23 +21,21 @@ struct ClockExchange {
 /// Estimates the offset and drift of the clock of the peer, and an error bound of the offset.
 ///
 /// The one-way delays of an exchange are unknown but not negative, and the offset θ (peer − local) drifts by at most ρ.
-/// So an exchange bounds θ at its midpoint:
+/// At the midpoint of the exchange this gives
 ///
 ///     θᵢ = ((T2 − T1) + (T3 − T4)) / 2,   δᵢ = (T4 − T1) − (T3 − T2),   |θ(tᵢ) − θᵢ| ≤ (δᵢ + ρ (T4 − T1)) / 2 = eᵢ
 ///
-/// Exchanges with a short round trip δ give the smallest bounds, unless the peer has delayed its answer: the clocks
-/// drift during this time, and the clock of a fast peer shortens δ. Time is divided into blocks. Each keeps its
-/// exchange with the smallest e, and a line is fitted to them with weights 1 / (δ₀ + 2 eᵢ − 2 e_min). The line is then
-/// moved into the range that all of them allow at time t:
+/// Time is divided into blocks. Each block keeps the exchange with the smallest e, and a line is fitted to these with
+/// the weights 1 / (δ₀ + 2 eᵢ − 2 e_min). The line is then moved into the range that all of them allow at time t:
 ///
 ///     maxᵢ (θᵢ − eᵢ − ρ|t − tᵢ|) ≤ θ(t) ≤ minᵢ (θᵢ + eᵢ + ρ|t − tᵢ|)
 ///
-/// The error bound is the distance to the farther end of the range. It is proved for a given ρ (core/PROOFS.md, "Clock
-/// offset"). An empty range means that the clock of the peer was set. The past is then dropped, and `steps` counts the
-/// event.
+/// The error bound is the distance to the farther end of this range. It is proved for a given ρ (core/PROOFS.md, "Clock
+/// offset"). If the range is empty, the clock of the peer was set. The estimator then forgets the past and increments
+/// `steps`.
 ///
-/// Eight blocks of 16 exchanges at 5 Hz were the best of six estimators on three real pairs of hosts. Here a block also
-/// lasts at least 3.2 s, so that exchanges at 1 kHz cover as much time.
+/// A block contains at least 16 exchanges and 3.2 s. Eight blocks of 16 exchanges at 5 Hz were the best of six
+/// estimators in measurements between three pairs of hosts.
 ///
 /// Thread-safe: no. Realtime-safe: yes.
 class ClockOffsetEstimator {
@@ -58,8 +56,8 @@ class ClockOffsetEstimator {
     LocalTime to_local(PeerTime theirs) const noexcept { return LocalTime(theirs.time_since_epoch() - offset); }
   };
 
-  /// `fastest_drift`: ρ, s/s, of the two clocks against each other. 200 ppm is more than any quartz. Throws
-  /// std::invalid_argument if it is not within 0 … 0.01.
+  /// `fastest_drift` is ρ in s/s. 200 ppm is more than the drift of any quartz. Throws std::invalid_argument if it is
+  /// not within 0 … 0.01.
   explicit ClockOffsetEstimator(double fastest_drift = 200e-6);
 
   /// Ignores an impossible exchange (T4 < T1, T3 < T2, or a negative round trip that the drift does not explain).

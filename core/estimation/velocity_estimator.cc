@@ -45,8 +45,8 @@ Vec<N> VelocityEstimatorOf<N>::observe(LocalTime at, const Vec<N>& position) noe
   const auto rate_to = [&](const Sample& past) { return 1e9 / static_cast<double>((at - past.at).count()); };
 
   for (Eigen::Index axis = 0; axis < N; ++axis) {
-    // The slopes to samples at the same position are 0. The last of them has the smallest r(i), so its test is the
-    // strictest one.
+    // The slopes to samples at the same position are 0. The oldest of them has the smallest r(i), so only its test
+    // matters.
     const std::size_t first = std::max<std::size_t>(same_[static_cast<std::size_t>(axis)], 1);
     if (first < count_) {
       for (; known < first; ++known) rate[known] = rate_to(now[known]);

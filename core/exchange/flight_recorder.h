@@ -11,8 +11,8 @@
 
 namespace tendon {
 
-/// Keeps the last values of a loop that must not block on a file. A fault freezes the recorder, another thread then
-/// reads the values before the fault, and thaws it. Only the constructor allocates.
+/// Keeps the last values of a loop that cannot wait for a file. If a fault freezes the recorder, another thread can
+/// read the values before the fault and thaw it. Only the constructor allocates memory.
 ///
 /// Thread-safe: one thread records and freezes; another reads and thaws, only while it is frozen.
 /// Realtime-safe when copying T is.

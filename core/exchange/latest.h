@@ -7,8 +7,8 @@
 
 namespace tendon {
 
-/// Passes the newest value from one thread to another, wait-free on both sides. Older values that were not taken are
-/// dropped. For values that are only useful while they are new, such as the remote force or the device state.
+/// A wait-free slot that passes the newest value from one thread to another. If the reader is slow, it misses older
+/// values. Use it for values that are only useful while they are new, such as the remote force or the device state.
 ///
 /// There are three slots: one of the writer, one of the reader, and one that they exchange through an atomic byte.
 ///

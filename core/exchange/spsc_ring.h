@@ -11,9 +11,9 @@
 
 namespace tendon {
 
-/// Passes every value from one thread to another in order, wait-free on both sides. If the reader is too slow,
-/// `try_push` returns false and does not take the value. For values whose loss must be detected, such as steps and
-/// datagrams for the recording, or commands for the haptic thread. Only the constructor allocates.
+/// A wait-free queue from one thread to another. If the queue is full, `try_push` returns false and does not take the
+/// value. Use it if a loss must be detected, for example for the recording or for commands. Only the constructor
+/// allocates memory.
 ///
 /// Thread-safe: one writer thread, one reader thread. Realtime-safe when copying T is.
 template <typename T>

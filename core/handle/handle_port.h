@@ -72,7 +72,7 @@ class HandlePort {
 
   void adapt(const std::array<Friction, Blocks>& friction) noexcept { law_.adapt(friction); }
 
-  /// Returns T, the longest time for which the next force may be held.
+  /// Returns T, the longest time for which the next force can be applied.
   Duration longest_hold() const noexcept { return holds_ ? holds_->in_force() : longest_hold_; }
   std::uint64_t broken_assumptions() const noexcept { return law_.broken_assumptions(); }
 
@@ -83,7 +83,7 @@ class HandlePort {
   Plus law_;
   Duration longest_hold_;  ///< T_max
   std::optional<HoldBound> holds_;
-  OutputBound first_;  ///< bound on the first block alone
+  OutputBound first_;  ///< the bound for the first block alone
   double viscous_;     ///< b of the first block
 };
 

@@ -41,7 +41,7 @@ struct PlaceEstimate {
 enum class Trust {
   kIntegral,  ///< Kelly's validity test failed
   kBoth,      ///< it passed and both agree; the smaller value is published
-  kNeither,   ///< it passed but they disagree; the mass can be wrong, and neither is a bound
+  kNeither,   ///< it passed but the two disagree, so neither is a bound; the mass can be wrong
 };
 
 /// "integral", "both" or "neither".
@@ -53,9 +53,9 @@ struct Identification {
   double force_noise = 0;             ///< N, one standard deviation of a sample, from all runs
   double mass = 0;                    ///< kg, given or mean of the fitted masses
   Friction estimate;                  ///< minimum over the places: best estimate of the friction
-  /// Bounds for a limiter: the minimum over the places of the integral estimate − 3 standard deviations and, where it
-  /// is valid, of Kelly's estimate; never negative. If the mass is 30 % too small, the b of the integral fit is 9 % too
-  /// large at 0.26 N·s/m. Kelly's b does not depend on the mass and limits this error.
+  /// Bounds for a limiter. They are the minimum over all places of the integral estimate − 3 standard deviations and,
+  /// where it is valid, of Kelly's estimate, and never negative. Kelly's b does not depend on the mass: if the mass is
+  /// 30 % too small, the b of the integral fit is 9 % too large at 0.26 N·s/m.
   Friction lower_bound;
   Trust trust = Trust::kIntegral;
   std::string reason;                 ///< of `trust`, as a sentence
@@ -77,8 +77,8 @@ struct IdentificationConfig {
   double encoder_step = 0;     ///< m, one count
 };
 
-/// Fits one run, independently of the others and without RunEstimate::integral_error, which needs all runs. Throws
-/// std::invalid_argument with the message of slide_of, kelly_fit or integral_fit. Thread-safe: yes. Realtime-safe: no.
+/// Fits one run. RunEstimate::integral_error is not set, because it needs all runs. Throws std::invalid_argument with
+/// the message of slide_of, kelly_fit or integral_fit. Thread-safe: yes. Realtime-safe: no.
 RunEstimate fit_run(const RampRun& run, const IdentificationConfig& config);
 
 /// Combines the fits of all runs. Throws std::invalid_argument if there are no runs. Thread-safe: yes. Realtime-safe:

@@ -11,16 +11,15 @@
 namespace tendon {
 
 /// Friction from a slide of any length. The equation of motion is integrated twice from the first sample of the slide,
-/// so there is no derivative and no need for a steady state:
+/// so the fit does not need a derivative or a steady state:
 ///
 ///     m X + b ∫X dt + f_c τ²/2 + c τ = ∬F dt²,       τ = t − t_a,  X = x − x(t_a)
 ///
-/// It is linear in b, f_c, the unknown momentum term c at t_a, and m if unknown. Least squares with Huber weights
-/// suppress single outliers.
+/// It is linear in b, f_c, the unknown momentum term c at t_a, and m if that is unknown. Least squares with Huber
+/// weights reduces the influence of outliers.
 ///
-/// **Covariance.** The disturbance is white noise ε of the force, which enters as ∬ε dt², so the residuals are an
-/// integrated random walk. The textbook formula σ²(AᵀA)⁻¹ assumes independent residuals. Its errors are 35 to 70 times
-/// too small (0.005 and 0.26 N·s/m, 0.1 N/s), so bounds from it would be wrong.
+/// White noise ε of the force enters as ∬ε dt², so the residuals are not independent. `unit_covariance` accounts for
+/// this; the textbook formula σ²(AᵀA)⁻¹ gives errors that are 35 to 70 times too small.
 ///
 /// Source: core/PROOFS.md, "Friction identification".
 struct IntegralFit {

@@ -30,7 +30,7 @@ struct KellyFit {
   bool plausible() const noexcept { return long_enough() && friction.coulomb > 0; }
 };
 
-/// `mass`: kg, > 0. Throws std::invalid_argument for another mass, and as `ramp_of`. Thread-safe: yes. Realtime-safe:
+/// `mass`: kg, > 0. Throws std::invalid_argument if it is not, or if `ramp_of` throws. Thread-safe: yes. Realtime-safe:
 /// no.
 KellyFit kelly_fit(const Slide& slide, double mass);
 

@@ -13,18 +13,15 @@ namespace tendon {
 /// Returns whether every number is finite and in range, and every orientation is a rotation (remote_force.h).
 bool is_sound(const RemoteForce& answer) noexcept;
 
-/// Returns the part of a sound answer that the loop uses:
+/// Returns the part of a sound answer that the loop uses (core/PROOFS.md, "Local models"):
 ///
 ///     topology_changed   only the force; the model is dropped
-///     stiffness          the nearest symmetric matrix with eigenvalues in [0, max_stiffness]:
-///                        (K + Kᵀ)/2 with clamped eigenvalues
+///     stiffness          (K + Kᵀ)/2 with its eigenvalues clamped to [0, max_stiffness], which cannot generate energy
 ///     table              adjacent entries from the one nearest to the answered depth, as long as neighbours differ by
 ///                        at most max_stiffness · step
 ///     normal             of unit length
 ///
-/// The antisymmetric part of K would generate energy on a circle, and a negative stiffness can only come from an
-/// environment that is not passive. A table may fall, because any force along one line has a potential. `max_stiffness`
-/// is in N/m. See core/PROOFS.md, "Local models".
+/// `max_stiffness` is in N/m.
 ///
 /// Realtime-safe: yes.
 RemoteForce believed(const RemoteForce& answer, double max_stiffness) noexcept;
@@ -37,8 +34,8 @@ RemoteTorque believed(const RemoteTorque& torque, double max_angular_stiffness) 
 /// handle has turned by more than 150° since, and constant without a model.
 Vec3 reconstruct(const RemoteTorque& torque, const Quat& q) noexcept;
 
-/// Returns the position nearest to `position` for which the model is valid. Beyond the radius the force stays as at the
-/// edge, because a jump back to the answered force would be felt as a kick.
+/// Returns the position nearest to `position` for which the model is valid. The force is constant beyond the radius,
+/// because a jump to the answered force would be felt as a kick.
 Vec3 within(const LocalModel& model, const Vec3& position) noexcept;
 
 /// Returns the force of an answer at `position`. With x′ = within(model, x), the depth d = −n·(x − at) since the

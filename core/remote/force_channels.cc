@@ -84,7 +84,7 @@ ForceChannels::Wanted ForceChannels::wanted(const Motion& hand, const Quat* orie
       sum.handle->torque += channel.weight * asked->torque;
       sum.handle->grip += channel.weight * asked->grip;
     }
-    // While another channel is active, a stopped one is no safe stop of the device.
+    // The device is not in a safe stop if another channel is active.
     if (channel.wants.mode != Mode::kSafeStop) sum.reasons |= channel.wants.reasons;
   }
   return sum;

@@ -10,28 +10,25 @@
 
 namespace tendon {
 
-/// Combines the forces of several engines into one wanted force. Each engine has a channel with its own HeldForce (held
-/// force, age, estimator):
+/// Combines the forces of several engines into one demand. Each engine has a channel with its own HeldForce.
 ///
 ///     F  =  Σ Fᵢ  over the channels of rule kSum  +  Σ wⱼ Fⱼ  over those of rule kPriority
 ///
-/// Among the channels of rule kPriority, the first one with a fresh force (or with the freshest, if none is fresh)
-/// receives all the weight. Its w goes to 1 at a rate of 1 per `ramp_in`, and the others keep their proportions, so Σ w
-/// = 1 and engines are cross-faded. Stiffnesses, torques and grip forces are combined in the same way.
-///
-/// The result is a demand. The limiter only sees the sum, so it also protects against engines that oppose each other
-/// (core/PROOFS.md, "Several channels").
+/// The first channel of rule kPriority with a fresh force (or with the freshest, if no force is fresh) gets all the
+/// weight. Its w goes to 1 at a rate of 1 per `ramp_in`, and the others keep their proportions, so Σ w = 1 and the
+/// engines are cross-faded. Stiffnesses, torques and grip forces are combined in the same way. The limiter bounds the
+/// result, even if the engines oppose each other (core/PROOFS.md, "Several channels").
 ///
 /// Thread-safe: no. Realtime-safe: yes, but for the constructor.
 class ForceChannels {
  public:
   struct Config {
     HeldForce::Config hold;                                ///< of every channel
-    std::vector<ChannelRule> rules = {ChannelRule::kSum};  ///< one per channel; at least one
+    std::vector<ChannelRule> rules = {ChannelRule::kSum};  ///< for each channel; not empty
   };
 
   struct Wanted : HeldForce::Wanted {
-    /// The channel of the freshest force, or the first of them. `mode` and `age` belong to it.
+    /// The channel with the freshest force, to which `mode` and `age` belong.
     std::size_t channel = 0;
   };
 
@@ -51,8 +48,7 @@ class ForceChannels {
   /// Forgets all forces.
   void disengage() noexcept;
 
-  /// Returns the force wanted at `hand.position` and `hand.at`, and the torque at `orientation`. Call it once in each
-  /// haptic step.
+  /// Returns the demand for this haptic step. Must be called once per step.
   Wanted wanted(const Motion& hand, const Quat* orientation = nullptr) noexcept;
 
   /// Returns the force that a channel holds. It is empty when idle.

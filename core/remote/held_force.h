@@ -20,7 +20,7 @@ struct HandleWanted {
   double grip = 0;             ///< N, on the fingers, > 0 opens them
 };
 
-/// Holds the newest remote force between arrivals, and fades it out when no more arrive.
+/// Holds the newest remote force between arrivals, and fades it out if no more arrive.
 ///
 /// With age = now − received and v = valid_for (clipped to max_valid_for):
 ///
@@ -35,21 +35,17 @@ struct HandleWanted {
 ///                            force if there is no model                        (reconstruct, core/remote/answer.h)
 ///     adaptive_local_model   blends from one stiffness to the next              (AdaptiveLocalModel)
 ///     output_estimator       learns a model of the environment                  (OutputEstimator)
-///     learned_model          learns how the force depends on the position; answers with a model of their own are
-///                            reconstructed from it                              (LearnedModel)
+///     learned_model          learns how the force depends on the position, for answers without a model (LearnedModel)
 ///
-/// A torque follows its own model of rotation (answer.h), and a grip force stays constant. Both are held, faded and
-/// ramped in together with the force. The three parts only apply to forces.
-///
-/// Only the trusted part of an answer is used (answer.h): the stiffness is limited to `max_stiffness`, and the model is
-/// dropped if the topology of the body has changed.
+/// A torque follows its own model of rotation (answer.h), and a grip force is constant. Both are held, faded and ramped
+/// in together with the force. Only the trusted part of an answer is used, and an answer that is not sound is refused
+/// (answer.h).
 ///
 /// The first force, the first one after a safe stop, and the first one from another source are ramped in linearly over
-/// `ramp_in`, starting from the force rendered at that moment. A fresh force that arrives during the decay is ramped in
-/// over (1 − gain) · ramp_in. An engine that returns, stutters or takes over therefore does not cause a step of the
-/// force. An answer that is not sound (answer.h) is refused, and the previous one continues to age.
+/// `ramp_in`, starting from the current force. A fresh force during the decay is ramped in over (1 − gain) · ramp_in.
+/// So the force does not jump if an engine returns, stutters or takes over.
 ///
-/// The result is a demand; the limiter bounds it.
+/// The result is a demand, and the limiter bounds it.
 ///
 /// Thread-safe: no. Realtime-safe: yes.
 class HeldForce {
@@ -64,7 +60,7 @@ class HeldForce {
     Duration ramp_in = std::chrono::milliseconds(100);
     /// Upper limit of valid_for.
     Duration max_valid_for = std::chrono::milliseconds(500);
-    /// N/m, > 0: the stiffest model between two forces. Grounded devices can render less at 1 kHz.
+    /// N/m, > 0: the limit of the stiffness between two forces.
     double max_stiffness = 5000;
     /// N·m/rad, > 0: the same for rotation.
     double max_angular_stiffness = 5;
@@ -81,7 +77,7 @@ class HeldForce {
     Reasons reasons;
     Duration age{};                        ///< since it was received; 0 when idle
     Duration loop_age{};                   ///< since the sample of the answered motion; 0 when idle
-    std::optional<HandleWanted> handle{};  ///< empty: no torque and grip force are wanted
+    std::optional<HandleWanted> handle{};  ///< empty if there is no torque or grip force
   };
 
   /// Throws std::invalid_argument with the name of the field if a duration is negative, decay is not positive,
@@ -92,7 +88,7 @@ class HeldForce {
   /// Takes a newer force. Returns false, without an effect, if it is not sound.
   bool observe(const RemoteForce& force) noexcept;
 
-  /// The remote environment `source` has disconnected. Its force, if held, is not fresh from `now` on.
+  /// The remote environment `source` has disconnected. If its force is held, it is no longer fresh from `now` on.
   void release(std::uint32_t source, LocalTime now) noexcept;
 
   /// Drops the force. The next fresh one is ramped in.

@@ -13,10 +13,10 @@
 namespace tendon {
 
 /// Learns from the answers how the remote force changes with the position of the hand, and moves the newest answer to
-/// the current position. It compensates the delay, and interpolates between two answers.
+/// the current position. This compensates the delay, and interpolates between two answers.
 ///
-/// x_a is the position of the hand when the motion of answer F_a was sampled. At a new answer, with (F_p, x_p) the last
-/// one that was learned from, p = x_a − x_p, and if ‖p‖ ≥ ℓ (`least_travel`):
+/// x_a is the position of the hand that answer F_a belongs to. At a new answer, with the last pair (F_p, x_p) that was
+/// used, p = x_a − x_p, and if ‖p‖ ≥ ℓ (`least_travel`):
 ///
 ///     q = K p                                                              N, prediction of the model
 ///     N ← λ N − (F_a − F_p)·q,   D ← λ D + ‖q‖²,   θ = clamp(N/D, 0, 1)    trust; 0 before two lessons
@@ -27,18 +27,15 @@ namespace tendon {
 ///
 ///     F = F_a − θ K d + r,   ‖θ K d‖ ≤ max_stiffness ‖d‖,   ‖F − r‖ ≤ 1.5 F_late;   r ← r τ_r/(τ_r + T)
 ///
-/// r is set at an answer so that F does not jump. τ_r is the minimum of `blend` and `blend_share` of the mean time
-/// between answers; a constant `blend` would lag if answers are fresh. F_late is the largest recent answer, forgotten
-/// within 1 s, so the prediction does not exceed the limit of friction or of a yielding object by much.
+/// r is set such that F does not jump at an answer. τ_r is the smaller of `blend` and `blend_share` of the mean time
+/// between answers. F_late is the largest recent answer, forgotten within 1 s. The trust θ decreases if the force
+/// changes with time.
 ///
-/// The trust is the least-squares ratio of the observed to the predicted change. A force that changes in time reduces
-/// it. There is no covariance that could wind up: motion below ℓ has no effect.
+/// One-sided contact: if an answer is exactly zero, at least 0.3 mm from the last force, the object only pushes. F then
+/// fades to zero along F_a but does not reverse, F_a = 0 predicts zero, and pairs with a zero are not used. This ends
+/// if a force reverses within 3 mm.
 ///
-/// One-sided contact: after an answer of exactly zero, at least 0.3 mm from the last force, the object only pushes. F
-/// then fades to zero along F_a but does not reverse, F_a = 0 predicts zero, and pairs with a zero are not used. A
-/// force that reverses within 3 mm ends this state.
-///
-/// The result is a demand; a limiter bounds it. Answers with a model of their own are for `reconstruct`.
+/// The result is a demand, and a limiter bounds it. Use `reconstruct` for answers that have a model.
 ///
 /// Source: core/PROOFS.md, "Local models". The update is the normalized least-mean-squares step (Nagumo and Noda, IEEE
 /// Trans. Automatic Control 12(3), 1967).
@@ -46,7 +43,7 @@ namespace tendon {
 /// Thread-safe: no. Realtime-safe: yes; observe and predict O(1), correct O(log kSlots).
 class LearnedModel {
  public:
-  /// Number of stored steps. An answer that is older is held without a model.
+  /// The number of stored steps. Older answers are held without a model.
   static constexpr std::size_t kSlots = 1024;
 
   struct Config {
@@ -67,11 +64,11 @@ class LearnedModel {
   /// Takes a newer answer. Uses only `force` and `answers`.
   void correct(const RemoteForce& answer) noexcept;
 
-  /// Returns the answer predicted for the newest motion. It is empty before the first answer. Call it once in each
-  /// haptic step, because r fades with each call.
+  /// Returns the answer predicted for the newest motion, or nothing before the first answer. Must be called once per
+  /// haptic step, because each call reduces r.
   std::optional<Prediction> predict() noexcept;
 
-  /// Drops everything but the motion, for answers of another environment.
+  /// Removes everything but the motion, before the answers of another environment.
   void forget() noexcept;
 
   double trust() const noexcept { return trust_; }               ///< θ

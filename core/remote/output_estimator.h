@@ -13,18 +13,18 @@
 
 namespace tendon {
 
-/// Learns the remote environment from its infrequent and late forces, and predicts in every haptic step the answer to
-/// the current position.
+/// Learns the remote environment from its infrequent and late forces, and predicts the answer to the current position
+/// in every haptic step.
 ///
-/// Each axis is a separate model with two parameters θ in N/m, of the displacement x = position − origin along that
-/// axis. A spring that pushes the hand back has θ₁ > 0 and F = −θ₁ x; forces are on the hand. With ℓ = `scale`:
+/// Each axis has a separate model with two parameters θ in N/m, of the displacement x = position − origin along that
+/// axis. A spring that pushes the hand back has θ₁ > 0 and F = −θ₁ x. Forces are on the hand. With ℓ = `scale`:
 ///
 ///     kPolynomial     F = −(θ₁ x + θ₂ x|x|/ℓ) − off           −∂F/∂x = θ₁ + 2 θ₂ |x|/ℓ
 ///     kSpringAndBias  F = −(θ₁ x + θ₂ ℓ) − off                −∂F/∂x = θ₁
 ///     kOutputError    F(k) = a F(k−1) − θ₂ x(k)               −∂F/∂x = θ₂, of this step
 ///
-/// A force that answers the motion at time t is compared with the force of the model for that motion, from a ring of
-/// past motions. **The time and the order of arrival have no effect.** Then:
+/// A force that answers the motion at time t is compared with the force of the model for that motion, so the time and
+/// the order of arrival have no effect. Then:
 ///
 ///     e = −F − φᵀθ
 ///     if |e| > reset_error, and reset_cooldown answers since the last one:  P ← p0 I  (θ stays)
@@ -32,17 +32,16 @@ namespace tendon {
 ///     θ ← into its bounds: stiffness 0 … max_stiffness (other parameters either sign), |a| ≤ 0.9
 ///     re-anchor on the newest motion that was answered: off = −F − φᵀθ, or F(k) computed again since
 ///
-/// If the hand has moved less than three encoder counts along an axis since its last lesson, the axis is frozen: it is
-/// re-anchored but does not learn from quantization. Before the first lesson the prediction is the held force. The pole
-/// is bounded, because a pole fitted to 25 Hz data is often unstable at 1 kHz. The prediction is bounded as well,
-/// because it can be wrong by some newtons for a round trip after a change of the environment. The result is a demand;
-/// a limiter bounds it.
+/// An axis does not learn if the hand has moved by less than three encoder counts since the last lesson. Before the
+/// first lesson the prediction is the held force. The pole is bounded, because a pole fitted to 25 Hz data is often
+/// unstable at 1 kHz. The prediction is bounded as well, because it can be wrong by some newtons after a change of the
+/// environment. The result is a demand, and a limiter bounds it.
 ///
-/// Coupling between axes is not modelled. A wall at an angle to the axes appears as three springs that are right only
-/// along the direction of the last press. Engines can send a LocalModel instead (see AdaptiveLocalModel).
+/// The axes are independent. A wall at an angle to the axes appears as three springs that are only right along the
+/// direction of the last press. Engines can send a LocalModel instead (see AdaptiveLocalModel).
 ///
-/// Source: Lee and Lee, "Multirate output estimation for real-time haptic rendering" (abstract only: the structure; the
-/// condition of the P reset is lost, and ours is a guess). Cap, cooldown, bounds, freeze and re-anchoring are ours:
+/// Source: Lee and Lee, "Multirate output estimation for real-time haptic rendering" (only the abstract is available,
+/// so the condition of the P reset is a guess). Cap, cooldown, bounds, freeze and re-anchoring are ours:
 /// core/PROOFS.md, "Local models".
 ///
 /// Thread-safe: no. Realtime-safe: yes; observe and predict O(1), correct at most kSlots steps.
@@ -59,7 +58,7 @@ class OutputEstimator {
     Model model = Model::kPolynomial;
     /// m; the position at which the environment is at rest.
     Vec3 origin = Vec3::Zero();
-    /// ℓ, m: about the travel, so that both parameters have the same magnitude.
+    /// ℓ in m, about the travel. Both parameters then have the same magnitude.
     double scale = 0.01;
     /// Per answer. At 25 Hz, 0.95 forgets half in 0.5 s.
     double forgetting = 0.95;
@@ -69,7 +68,7 @@ class OutputEstimator {
     double dead_zone = 0;
     /// N; a larger error indicates another environment.
     double reset_error = 0.3;
-    /// Answers. One more than there are parameters; with fewer, a reset would undo the previous one.
+    /// Answers between two resets. This must be more than the number of parameters.
     int reset_cooldown = 3;
     /// N/m
     double max_stiffness = 5000;
@@ -95,9 +94,9 @@ class OutputEstimator {
   /// Learns from a remote force. Returns false if it was ignored. Uses only `force` and `answers`.
   bool correct(const RemoteForce& force) noexcept;
 
-  /// Returns the predicted answer at `hand.position`, in the step of `hand.at` or, if that was not observed, the one
-  /// after the newest. It is empty before the first correction, and for a position that is not finite. On an axis at
-  /// ±max_force the stiffness is zero.
+  /// Returns the predicted answer at `hand.position`, in the step of `hand.at` or, if that was not observed, in the
+  /// step after the newest. The result is empty before the first correction and for a position that is not finite. The
+  /// stiffness of an axis at ±max_force is zero.
   std::optional<Prediction> predict(const Motion& hand) const noexcept;
 
   /// Returns θ of an axis in N/m. For kOutputError it is (a, θ₂) with the dimensionless a.

@@ -25,7 +25,7 @@ struct ForceTable {
 
 /// A surface that the tool touches or is about to touch. Without a table it only pushes.
 struct Contact {
-  static constexpr double kUnitTolerance = 1e-3;  ///< of the length of the normal; single precision gives 1e-7
+  static constexpr double kUnitTolerance = 1e-3;  ///< for the length of the normal
   Vec3 normal = Vec3::UnitX();                    ///< unit vector, out of the body, to the hand
   double gap = 0;  ///< m, distance from the surface to the tool along the normal; negative: penetration
   std::optional<ForceTable> table{};
@@ -57,13 +57,13 @@ struct RotationModel {
   Mat3 stiffness = Mat3::Zero();  ///< N·m/rad, −∂τ/∂θ, base frame axes
 };
 
-/// The torque on the hand that a remote physics engine wants, in base frame axes, about the position of the handle.
+/// The torque on the hand that a remote physics engine requests, in base frame axes, about the position of the handle.
 struct RemoteTorque {
   Vec3 torque = Vec3::Zero();  ///< N·m
   std::optional<RotationModel> model{};
 };
 
-/// The force on the hand that a remote physics engine wants.
+/// The force on the hand that a remote physics engine requests.
 ///
 /// **Sign, everywhere in Tendon:** a force is exerted by the device *on the hand*, so a wall that resists motion along
 /// +x sends −x. (The reflective force f of Lee & Lee 2009 is its negative.)
@@ -75,7 +75,7 @@ struct RemoteForce {
   Vec3 force = Vec3::Zero();       ///< N, on the hand
   std::optional<LocalModel> model{};
   Duration valid_for{};      ///< from `received`; an older force is not fresh
-  std::uint32_t source = 0;  ///< sender; the forces of another engine are ramped in
+  std::uint32_t source = 0;  ///< identifies the sender, because the first force of another engine is ramped in
   /// The body was cut or torn since the previous answer, so the model of neither answer is valid.
   bool topology_changed = false;
   std::uint8_t way = 0;           ///< number of the solver path in the engine; 0: unknown. For diagnostics only

@@ -16,10 +16,10 @@ double abbott_okamura_stiffness(const SampledSpring& spring);
 
 /// The behavior of a sampled spring, according to the three numbers of Diolaiti.
 enum class DiolaitiRegion {
-  kPassive,          ///< comes to rest from any speed
-  kLimitCycle,       ///< slows down; about one count of motion can remain
-  kLocallyStable,    ///< comes to rest below `speed_limit`, diverges above
-  kLocalLimitCycle,  ///< as kLimitCycle below `speed_limit`, diverges above
+  kPassive,          ///< always comes to rest
+  kLimitCycle,       ///< slows down, but about one count of motion can remain
+  kLocallyStable,    ///< as kPassive below `speed_limit`, and unstable above
+  kLocalLimitCycle,  ///< as kLimitCycle below `speed_limit`, and unstable above
 };
 
 std::string_view to_string(DiolaitiRegion region) noexcept;
@@ -36,8 +36,9 @@ struct Diolaiti {
   double speed_limit = 0;
 };
 
-/// Returns the numbers and the region:  β ≥ ½ + τ: from any speed;  σ ≥ ½: to rest. Source: Diolaiti et al., IEEE T-RO
-/// 22(2), 2006; σ as in Abbott and Okamura; v_lim: core/PROOFS.md, "Stability boundaries".
+/// Returns the numbers and the region. The motion slows down from any speed if β ≥ ½ + τ, and comes to rest if σ ≥ ½.
+/// Source: Diolaiti et al., IEEE T-RO 22(2), 2006; σ as in Abbott and Okamura; v_lim: core/PROOFS.md, "Stability
+/// boundaries".
 Diolaiti diolaiti(const SampledSpring& spring);
 
 }  // namespace tendon
