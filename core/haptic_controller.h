@@ -141,8 +141,8 @@ class HapticController {
     std::vector<CoupledLeader> leaders{};
     Duration watchdog{};   ///< of the device; 0 = none
     double max_force = 0;  ///< N; > 0
-    /// N/s; > 0, can be infinite. The default is 1 N per step at 1 kHz. The hand cannot distinguish such a ramp from a
-    /// step, and a force that changes its sign with each datagram becomes smoother.
+    /// N/s; > 0, can be infinite. The default of 1 N per step at 1 kHz feels like a step to the hand, but smooths a
+    /// force that changes its sign with each datagram.
     double max_slew = 1000;
     HeldForce::Config hold;
     /// One rule per channel of remote forces. Each channel has its own HeldForce.

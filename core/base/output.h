@@ -50,7 +50,7 @@ inline OutputKind kind_of(const OutputSetting& setting) noexcept {
   return std::holds_alternative<LampColour>(setting) ? OutputKind::kLamp : OutputKind::kVibration;
 }
 
-/// Returns the setting that turns off an output of this kind.
+/// Returns the setting to turn off an output.
 inline OutputSetting turned_off(OutputKind kind) noexcept {
   return kind == OutputKind::kLamp ? OutputSetting(LampColour{}) : OutputSetting(Vibration{});
 }

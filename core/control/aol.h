@@ -37,7 +37,7 @@ class Aol {
 
   struct Config {
     std::array<Friction, Blocks> friction;
-    Duration longest_hold{};  ///< T_max, > 0: the longest time for which a force is held
+    Duration longest_hold{};  ///< T_max, > 0
   };
 
   /// Throws std::invalid_argument if a friction bound is negative or longest_hold is not positive.

@@ -124,7 +124,7 @@ void AolPlus<Blocks, Size>::use(std::size_t block, const Friction& friction) noe
 
 template <int Blocks, int Size>
 void AolPlus<Blocks, Size>::hold_at_most(Duration longest_hold) noexcept {
-  // The forces under way can be held longer as well. If T falls, their reserve is still sufficient.
+  // This also affects the reserved forces. If T decreases, the reserve is still sufficient.
   const double longer = seconds(longest_hold) / seconds(longest_hold_);
   if (longer > 1) {
     for (double& loss : under_way_) loss *= longer;

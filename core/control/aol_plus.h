@@ -127,7 +127,7 @@ class AolPlus {
     std::array<double, Blocks> contact{0.1};               ///< f_s, N or N·m, > 0; larger forces count as contact
     Duration smoothing = std::chrono::microseconds(2200);  ///< τ_v, of the velocity
     Duration slow = std::chrono::milliseconds(20);         ///< τ_h: slower motion is not vibration
-    double dead_zone = 0.7;                                ///< z, ≥ 0; Δ is that of robust_ledger
+    double dead_zone = 0.7;                                ///< z, ≥ 0
     double most_owed = 3e-4;                               ///< O_most, J, > 0
   };
   struct FadingContact {
@@ -236,7 +236,7 @@ class AolPlus {
   double smoothing_ = 0;                           ///< τ_v in s, also used without a damper
   double slowness_ = 0;                            ///< τ_h, s
 
-  std::array<double, kMostHolds> under_way_{};  ///< ℓ of each force under way in J
+  std::array<double, kMostHolds> under_way_{};  ///< J, the reserve for each force
   std::size_t next_under_way_ = 0;
 };
 

@@ -13,7 +13,7 @@ namespace tendon {
 ///     F = γ F_wanted,    γ = min(1, b / (K_max (T/2 + t_d)))
 ///
 /// K_max (N/m) is the steepest slope of the field: the larger of `stiffness` and the spectral norm of the stiffest
-/// demand so far. γ therefore never increases. The force is zero while no slope is known.
+/// demand so far. γ therefore never increases. If the slope is unknown, the force is zero.
 ///
 /// The port is passive for a static field with a convex potential and slopes up to K_max, if it is sampled in every
 /// period, delivered t_d late (a multiple of the period), and applied unchanged. There is no guarantee for a field that

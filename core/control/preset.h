@@ -13,8 +13,8 @@
 
 namespace tendon {
 
-/// Sets of parts whose values were measured together (tests/tools/lab/README.md). A scene can name a preset instead of
-/// listing parts.
+/// Sets of parts that were measured together (tests/tools/lab/README.md). A scene can use a preset instead of single
+/// parts.
 enum class Preset : std::uint8_t {
   kFeel,
   kFeelUnconditional,
@@ -44,8 +44,7 @@ struct PresetParts {
 };
 PresetParts preset_parts(Preset preset, const PresetDevice& device) noexcept;
 
-/// Returns what a limiter guarantees, as a sentence without a full stop: "passive while the handle accelerates by less
-/// than 300 m/s², …", "passive whatever the hand does", or that it guarantees nothing.
+/// Returns the guarantee of a limiter as a sentence without a full stop, for example "passive whatever the hand does".
 std::string promise_of(const LimiterConfig& limiter);
 
 }  // namespace tendon

@@ -32,15 +32,15 @@ namespace tendon {
 template <int N>
 class VelocityEstimatorOf {
  public:
-  /// A longer window is smoother at low speed and detects a reversal later. 16 ms at 1 kHz resolve 2 mm/s with a 30 µm
-  /// encoder.
+  /// A longer window is smoother at low speed, but detects a reversal later. With a 30 µm encoder, 16 ms at 1 kHz
+  /// resolve 2 mm/s.
   static constexpr std::size_t kWindow = 16;
 
   /// `resolution`: one encoder count at the handle, m; 0 = exact. Throws std::invalid_argument if it is negative or not
   /// finite.
   explicit VelocityEstimatorOf(double resolution);
 
-  /// Takes the next sample and returns the velocity in m/s. A sample that is not finite or not newer is ignored.
+  /// Takes the next sample and returns the velocity in m/s. Ignores a sample that is not finite or not newer.
   Vec<N> observe(LocalTime at, const Vec<N>& position) noexcept;
 
  private:

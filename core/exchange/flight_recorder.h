@@ -43,10 +43,10 @@ class FlightRecorder {
     frozen_.store(false, std::memory_order_release);
   }
 
-  /// Returns the number of values. Only while frozen, or on the recording thread.
+  /// Returns the number of values. Must be frozen, or called from the recording thread.
   std::size_t size() const noexcept { return count_ < capacity_ ? count_ : capacity_; }
 
-  /// Returns the i-th oldest value, i < size(). Only while frozen, or on the recording thread.
+  /// Returns the i-th oldest value, i < size(). Must be frozen, or called from the recording thread.
   const T& operator[](std::size_t i) const noexcept {
     return values_[count_ < capacity_ ? i : (count_ + i) & (capacity_ - 1)];
   }

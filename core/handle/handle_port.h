@@ -83,7 +83,7 @@ class HandlePort {
   Plus law_;
   Duration longest_hold_;  ///< T_max
   std::optional<HoldBound> holds_;
-  OutputBound first_;  ///< the bound for the first block alone
+  OutputBound first_;  ///< for the first block only
   double viscous_;     ///< b of the first block
 };
 

@@ -14,9 +14,8 @@ struct RampSample {
   double force = 0;     ///< N, of the device on the handle, along +x, held from t to the next sample
 };
 
-/// One run of the friction experiment. Nobody touches the handle, the other axes are constrained, and gravity is
-/// compensated. The force rises from zero at a constant rate until the handle breaks away and moves through its
-/// workspace.
+/// One run of the friction experiment on a free handle. The other axes are constrained and gravity is compensated. The
+/// force increases from zero at a constant rate until the handle breaks away and moves through its workspace.
 struct RampRun {
   std::string place;  ///< axis and pose as text; runs of the same place are compared
   std::vector<RampSample> samples;

@@ -25,7 +25,7 @@ namespace tendon {
 class HoldBound {
  public:
   struct Follow {
-    double margin = 0.25;  ///< ≥ 0: T exceeds the longest hold by this fraction
+    double margin = 0.25;  ///< ≥ 0: the relative margin of T
     /// > 0. Time constant of the return to T_max. Overruns of ordinary kernels are minutes apart.
     Duration memory = std::chrono::seconds(60);
     /// ≥ 1: the largest T, in T_max. An interval that is longer shows that the machine was stopped, not how much it
@@ -36,7 +36,7 @@ class HoldBound {
   /// `longest_hold`: T_max, > 0. Throws std::invalid_argument with the name of the field if a value is out of range.
   HoldBound(Duration longest_hold, const Follow& follow);
 
-  /// Updates T with the length of the last interval. A length that is not positive is ignored.
+  /// Updates T with the length of the last interval. Ignores a length that is not positive.
   void observe(Duration held) noexcept;
 
   /// Returns T.

@@ -20,7 +20,7 @@ using Mat = Eigen::Matrix<double, N, N>;
 /// What the port measured in the last haptic period.
 template <int N>
 struct Interval {
-  Vec<N> applied;   ///< N, on the hand: the force that was **really held**
+  Vec<N> applied;   ///< N, the force on the hand that was really applied
   Vec<N> dx;        ///< m, measured displacement
   Duration held{};  ///< T_act, measured length
 };

@@ -55,7 +55,7 @@ class HeldForce {
     Duration hold = std::chrono::milliseconds(20);
     /// Time constant. 90 % is gone after 115 ms: too slow to be felt as a kick, too fast to lean on.
     Duration decay = std::chrono::milliseconds(50);
-    /// From the end of validity. By then the force has faded to 1 %.
+    /// Time from the end of validity to the safe stop. The force is then below 1 %.
     Duration safe_stop = std::chrono::milliseconds(250);
     Duration ramp_in = std::chrono::milliseconds(100);
     /// Upper limit of valid_for.

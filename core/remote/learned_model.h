@@ -68,7 +68,7 @@ class LearnedModel {
   /// haptic step, because each call reduces r.
   std::optional<Prediction> predict() noexcept;
 
-  /// Removes everything but the motion, before the answers of another environment.
+  /// Resets everything except the stored motion. Call this if the environment changes.
   void forget() noexcept;
 
   double trust() const noexcept { return trust_; }               ///< θ

@@ -23,7 +23,7 @@ struct ForceTable {
   std::array<double, kMaxEntries> force{};        ///< N
 };
 
-/// A surface that the tool touches or is about to touch. Without a table it only pushes.
+/// A surface that the tool touches or is about to touch. If there is no table, it can only push.
 struct Contact {
   static constexpr double kUnitTolerance = 1e-3;  ///< for the length of the normal
   Vec3 normal = Vec3::UnitX();                    ///< unit vector, out of the body, to the hand

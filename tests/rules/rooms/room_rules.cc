@@ -160,7 +160,7 @@ const Names kClockReaders = {"server/machine/clock.h",
 const Names kCitedSources = {"*.h",  "*.cc",   "*.py",  "*.ts",    "*.mjs",  "*.proto",
                              "*.sh", "*.toml", "*.csv", "*.cmake", "*.html", "*.css"};
 
-/// Pages of other projects.
+/// Cited pages of other projects.
 const Names kPagesElsewhere = {"docs/spec.md"};
 
 constexpr std::string_view kProofs = "core/PROOFS.md";
@@ -272,7 +272,7 @@ void for_each_comment_and_literal(std::string_view text, const OnComment& commen
   }
 }
 
-/// Spaces in place of every character of `text` but the line ends.
+/// Returns `text` with a space in place of each character except for line ends.
 std::string spaces_for(std::string_view text) {
   std::string spaces(text);
   std::ranges::replace_if(
@@ -439,7 +439,7 @@ void check_first_lines(const File& file, std::vector<Finding>& findings) {
 
 // ---- The rule about citations ---------------------------------------------------------------------------------------
 
-/// What a citation may name. The views are into the tree.
+/// The names that can be cited. The views refer to the tree.
 struct Citable {
   std::set<std::string_view> endings;   ///< "x.cc" and "core/x.cc" for core/x.cc
   std::set<std::string_view> sections;  ///< headings "## 1. Name" of core/PROOFS.md, without the number
@@ -467,7 +467,7 @@ Citable citable_in(const std::vector<File>& tree) {
   return citable;
 }
 
-/// The text of a page, or the comments of a source without their marks. Lines and columns stay.
+/// Returns the text of a page, or the comments of a source without their marks, at the same lines and columns.
 std::string prose_of(const File& file) {
   const std::string_view text = file.text;
   if (file.path.ends_with(".md")) {
@@ -509,7 +509,7 @@ bool is_of_path(char c) {
   return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_' || c == '.' || c == '/' || c == '-';
 }
 
-/// Whether these characters, which stand alone, name a file of this tree. "x" in a name stands for any name.
+/// Returns whether `name` cites a file of this tree. The name "x" is a placeholder.
 bool names_a_file(std::string_view name) {
   if (name.starts_with('/') || name.substr(name.rfind('/') + 1).starts_with('.') || one_of(name, kPagesElsewhere) ||
       contains(name, "/x.") || contains(name, "/x_") || contains(name, "/x/")) {
@@ -541,7 +541,7 @@ void check_cited_files(const File& file, std::string_view prose, const Citable& 
       while (name.ends_with('.')) {  // the end of a sentence
         name.remove_suffix(1);
       }
-      // Parts of addresses, variables and patterns.
+      // The name is a part of a URL, a variable or a pattern.
       const bool part = (from > 0 && contains(":~@$<>{}*\\", line.substr(from - 1, 1))) ||
                         (to < line.size() && contains("<>{}*$", line.substr(to, 1)));
       from = to;
