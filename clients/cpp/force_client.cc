@@ -16,12 +16,11 @@
 namespace tendon {
 namespace {
 
-// See Config::valid_for.
+// The numbers are explained at Config::valid_for.
 constexpr int kValidPeriods = 3;
 constexpr Duration kMinValidFor = std::chrono::milliseconds(20);
 constexpr Duration kMaxObservedPeriod = std::chrono::milliseconds(100);
-/// A lease is asked for again when it may be over, but not at a higher rate than this: the holder renews it all the
-/// time.
+/// Minimum time between two lease requests. The current holder renews its lease continuously.
 constexpr Duration kAskLeaseAgain = std::chrono::milliseconds(50);
 
 constexpr const char* kNoDiagnostics = "0: they are for observers only";
@@ -54,7 +53,7 @@ const ForceClient::Config& checked(const ForceClient::Config& config) {
   expect_above_zero(seconds(config.retry_min), "retry_min_s");
   expect(config.retry_max >= config.retry_min, "retry_max_s", seconds(config.retry_max), "at least retry_min_s");
   expect(config.max_datagrams > 0, "max_datagrams", config.max_datagrams, "1 or more");
-  if (config.deadband) Deadband{*config.deadband};  // throws what is wrong with it
+  if (config.deadband) Deadband{*config.deadband};  // throws if it is invalid
   if (config.state_deadband) {
     const std::string objection = StateDeadband::objection(*config.state_deadband);
     if (!objection.empty()) throw std::invalid_argument("state_deadband." + objection);
@@ -91,7 +90,7 @@ ForceClient::ForceClient(Link& link, const Address& server, const Config& config
                    .max_datagrams = config.max_datagrams}),
       lease_(kAskLeaseAgain, config.take_lease && role == Role::kController),
       next_call_(now) {
-  config_.seed = {};  // from it, whoever reads our memory later could find every key again
+  config_.seed = {};  // keeping it would allow an attacker who reads the memory later to derive every key
   greet(now);
 }
 
@@ -153,12 +152,12 @@ bool ForceClient::give_lease() {
 
 LocalTime ForceClient::turn(LocalTime now) {
   if (stats_.phase == Phase::kStopped) return LocalTime::max();
-  connection_.flush(now);  // an answer() since the last turn waits for no system call
+  connection_.flush(now);  // sends a force from answer() before the system calls below
   connection_.begin_turn();
-  const LocalTime begun = now;  // what is read moves `now` on to when it was read
+  const LocalTime begun = now;  // next() advances `now` to the receive time
   while (const auto event = connection_.next(now)) take(now, *event);
   if (connection_.session() != nullptr && now >= lease_.due() && !take_lease()) lease_.ask_at(now + kAskLeaseAgain);
-  connection_.flush(now);  // nothing that is due waits for the engine
+  connection_.flush(now);  // send everything that is due before the engine computes
   if (call(now)) connection_.flush(link_.present(now));
   return connection_.more() ? begun : next_turn();
 }
@@ -218,7 +217,7 @@ void ForceClient::open(LocalTime now, const Welcome& welcome) {
   sequence_ = 0;
   answered_tick_ = 0;
   if (config_.deadband)
-    deadband_ = HandleDeadband::of_forces(*config_.deadband);  // this session was sent none of the forces before
+    deadband_ = HandleDeadband::of_forces(*config_.deadband);  // the new session has not sent any force yet
   stats_.phase = Phase::kOpen;
   ++stats_.sessions;
 }
@@ -262,7 +261,7 @@ void ForceClient::take_event(LocalTime now, const Session::Event& event) {
     if (unseen_) ++stats_.states_skipped;
     newest_ = arrived->state;
     unseen_ = true;
-    if (physics_ && !lease_.holds()) pressed_ = 0;  // a press of that time was another engine's
+    if (physics_ && !lease_.holds()) pressed_ = 0;  // another engine held the channel when the button was pressed
     pressed_ |= arrived->state.buttons;
     newest_arrived_ = now;
   } else if (const auto* report = std::get_if<Session::ReportArrived>(&event)) {
@@ -297,18 +296,18 @@ void ForceClient::take_request(LocalTime now, const Session::RequestArrived& arr
   if (lease_.take(*lost, session, now)) stats_.lease_lost_to = lost->to;
 }
 
-/// The state that the callback is due to see; empty when there is nothing new.
+/// Returns the state for the callback; empty if there is nothing new.
 std::optional<DeviceState> ForceClient::due_state(LocalTime now) {
   if (!foretell_) return std::exchange(unseen_, false) ? newest_ : std::nullopt;
   if (!newest_ || now - newest_arrived_ > config_.state_deadband->max_silence) return {};
   const DeviceState state = foretell(*newest_, now - newest_arrived_, haptic_period());
-  if (state.tick <= seen_tick_) return {};  // the previous state took less time to arrive
+  if (state.tick <= seen_tick_) return {};  // the network delay of the previous state was shorter
   unseen_ = false;
   stats_.states_foretold += state.tick > newest_->tick ? 1 : 0;
   return state;
 }
 
-/// True when the engine has answered: a force may wait to be sent.
+/// Returns true if the engine has answered, so that a force may be waiting.
 bool ForceClient::call(LocalTime now) {
   if (now < next_call_ || (physics_ && !lease_.holds())) return false;
   std::optional<DeviceState> due = due_state(now);
@@ -342,7 +341,7 @@ bool ForceClient::answer(LocalTime now, const Reply& reply) {
   return true;
 }
 
-/// Takes from a command what this server or its device does not know.
+/// Removes the fields of the command that the server or its device does not support.
 void ForceClient::leave_out(const Touch& touch, const DeviceState& answered, ForceCommand& command) {
   if (command.model && !agreed_to(kFeatureLocalModel)) command.model.reset();
   if (command.way > config_.ways.size()) stats_.left_out = "the way of answering: Config::ways has none of its number";
@@ -395,11 +394,11 @@ Duration ForceClient::valid_for(std::uint64_t tick) const {
 
 Duration ForceClient::haptic_period() const { return from_seconds(1.0 / welcome_->loop_hz); }
 
-/// When the callback is due next; LocalTime::max() while it has seen everything.
+/// Returns the time of the next callback, or LocalTime::max() if no unseen state is available.
 LocalTime ForceClient::next_call() const {
   if (!foretell_) return unseen_ ? next_call_ : LocalTime::max();
   if (!newest_) return LocalTime::max();
-  // The first tick that it has not seen.
+  // The first tick that the callback has not received.
   const std::uint64_t ahead = seen_tick_ >= newest_->tick ? seen_tick_ + 1 - newest_->tick : 0;
   const LocalTime at = std::max(next_call_, newest_arrived_ + static_cast<Duration::rep>(ahead) * haptic_period());
   return at - newest_arrived_ <= config_.state_deadband->max_silence ? at : LocalTime::max();

@@ -23,229 +23,231 @@
 
 namespace tendon {
 
-/// A state that an engine was shown, to be named when its answer comes later.
+/// A device state that the callback received, kept so that an answer computed later can refer to it.
 struct Seen {
   DeviceState hand{};
-  std::uint64_t session = 0;  ///< ForceClient::Stats::sessions when it came
+  std::uint64_t session = 0;  ///< value of ForceClient::Stats::sessions on arrival
 };
 
-/// An answer that took its time, and the state that it is to (ForceClient::answer).
+/// A delayed answer and the state that it answers. See ForceClient::answer.
 struct Reply {
   Seen to{};
   Touch touch{};
 };
 
-/// The physics engine as a function: device state in, force out. It may take its time: while it computes, newer states
-/// replace older ones, and a button that was held in one of those is held in the next state that it is shown. Its
-/// exceptions pass through ForceClient::turn.
+/// The physics engine as a function from device state to force. The callback may block: newer states replace older
+/// ones in the meantime, and the next state reports every button that was pressed in one of the skipped states.
+/// Exceptions propagate through ForceClient::turn.
 using Physics = std::function<Touch(const DeviceState& hand)>;
 
-/// An onlooker: device state and the state of the link in, nothing out.
+/// Callback of an observer.
 using Watch = std::function<void(const DeviceState& hand, const LinkStats& link)>;
 
-/// A guest at a Tendon server. It says Hello, keeps the session alive, hands the newest device state to one callback,
-/// sends the force that the callback returns, and starts again when the server is gone. It has no socket, clock or
-/// thread.
+/// A client of a Tendon server. It opens a session and keeps it alive, passes the newest device state to one
+/// callback, sends the returned force, and reconnects after the session ends. It has no socket, clock or thread.
 ///
 ///     ForceClient client(link, server, config, physics, now);
 ///     for (;;) wait for a datagram, at most until client.turn(now);
 ///
-/// * **Newest wins.** A turn drains the link. The callback sees the newest of the states that came in, once; the others
-///   are counted as skipped.
-/// * **Rate.** With rate_hz = r the callback is called at multiples of 1/r, or as soon after as there
-///   is a state it has not seen; after a delay of a whole period the grid starts anew, it never
-///   catches up. With rate_hz = 0 it is called once for every new state.
-/// * **Force.** Each carries the tick it answers, a sequence number (1, 2, 3 … per session) and how
-///   long it is valid (see Config::valid_for). It leaves in the turn after the one that computed it,
-///   which is due at once: the datagram's time stamp must not be older than the physics' work.
-///   An answer with a number that is not finite or out of its bounds (WIRE.md) is counted and not sent;
-///   the server then treats this client as one that is late.
-/// * **Taken over.** When a program with the same key has taken our place, we do not come back: the two would replace
-///   each other for ever.
-/// * **Reconnection.** However an attempt or a session ends (no answer, refused, Bye, silence), the next
-///   attempt waits retry_min, then twice as long each time, at most retry_max. The first state of a
-///   new session resets that. Each attempt has a new random.
+/// * **Newest wins.** Each turn drains the link. The callback receives only the newest state; the others are counted as
+///   skipped.
+/// * **Rate.** If rate_hz = r > 0, the callback runs at multiples of 1/r, or as soon as an unseen state is available
+///   after that. After a delay of a full period, the schedule restarts; missed calls are not made up. If rate_hz = 0, the
+///   callback runs once for each new state.
+/// * **Force.** Each force carries the tick of the state that it answers, a sequence number (1, 2, 3 … per session) and
+///   its validity (see Config::valid_for). It is sent after the callback returns, with a time stamp that is read then, so
+///   the time stamp does not include the time of the computation. Forces that are not finite or out of the bounds in
+///   WIRE.md are counted and not sent; the server then treats this client as late.
+/// * **Replacement.** If another program with the same key replaces this client, the client stops and does not reconnect.
+///   Otherwise the two programs would keep replacing each other.
+/// * **Reconnection.** After an attempt or a session ends (no answer, refusal, Bye, silence), the client waits for
+///   retry_min before the next attempt. The wait doubles with each attempt up to retry_max. The first state of a new
+///   session resets it. Each attempt uses new random numbers.
 ///
 /// Thread-safe: no. Realtime-safe: no.
 class ForceClient {
  public:
   struct Config {
-    std::string name = "guest";  ///< for the server's log; at most limits::kMaxName bytes
-    /// Names of the device and its channel, on a server with several; empty: the first one.
+    std::string name = "guest";  ///< for the log of the server; at most limits::kMaxName bytes
+    /// Names of the device and its channel. Empty: the first one of the server.
     std::string device{};
     std::string channel{};
-    /// When another controller holds the channel's lease: keep asking until we have it. We ask again when the server
-    /// says that the lease may be over.
+    /// If another controller holds the lease of the channel, keep asking for it. The client asks again when the
+    /// server reports that the lease may have ended.
     bool take_lease = false;
-    double rate_hz = 0;  ///< calls per second, kMinRateHz … kMaxRateHz; 0 = one for every new state
-    /// States per second to ask the server for, 0 … limits::kMaxLoopHz; 0 = what the server gives by itself.
+    double rate_hz = 0;  ///< calls per second, kMinRateHz … kMaxRateHz; 0: one call for each new state
+    /// States per second to request from the server, 0 … limits::kMaxLoopHz; 0: the default of the server.
     std::uint32_t state_hz = 0;
-    /// How long the server may take a force as fresh, counted from its arrival; at most
-    /// limits::kMaxValidFor. 0 = derived from the period T at which forces really leave, that is the
-    /// asked one or, when the physics is slower, the time between the states of the last two forces:
+    /// How long after its arrival the server may use a force; at most limits::kMaxValidFor. 0: derived from the
+    /// period T between forces, which is the requested period or, if the engine is slower, the time between the
+    /// states that the last two forces answer:
     ///
-    ///     T         = max(1 / rate_hz, min(Δtick / loop_hz, 100 ms))      with rate_hz = 0: the second term
+    ///     T         = max(1 / rate_hz, min(Δtick / loop_hz, 100 ms))      if rate_hz = 0: the second term
     ///     valid_for = max(3 T, 20 ms)                          with a deadband: T ≥ its longest silence
     ///
-    /// 3 T: two forces in a row may be lost and the third is still in time. 20 ms: an engine at 1 kHz
-    /// would otherwise be late by a delay variation of 3 ms. 100 ms: a gap is not a period; an engine
-    /// slower than 10 Hz says so by rate_hz.
+    /// 3 T tolerates the loss of two consecutive forces. 20 ms tolerates network jitter, which would otherwise make
+    /// an engine at 1 kHz late after 3 ms. The limit of 100 ms prevents a pause from being taken for a period; an
+    /// engine below 10 Hz must set rate_hz.
     Duration valid_for{};
-    /// For links where datagrams are dear: a force that a hand cannot tell from the last one sent is not sent (Weber's
-    /// law), which leaves a tenth of the datagrams at 1 kHz. Only forces, torques and grip forces are compared
-    /// (HandleDeadband): a changed stiffness waits for the next force, at most for the longest silence. A changed
-    /// topology is sent at once. Empty: every force is sent.
+    /// For links with limited bandwidth: omits forces that a human cannot distinguish from the last one sent (Weber's
+    /// law), about 90 % of the datagrams at 1 kHz. Only forces, torques and grip forces are compared
+    /// (HandleDeadband). A changed stiffness is sent with the next force, at the latest after the longest silence; a
+    /// changed topology is sent immediately. Empty: every force is sent.
     std::optional<Deadband::Config> deadband{};
-    /// For links where datagrams are dear: the server leaves out states that we can predict, which are most of them.
-    /// With rate_hz = r the callback is called at multiples of 1/r with the state predicted for that instant, tick and
-    /// sampling time included. It never sees a tick twice, nor an older one. Nothing is predicted for longer than
-    /// max_silence: when states are lost, the callback waits for the next one. With rate_hz = 0 it is called for each
-    /// state that comes. Empty: we ask for every state. A server that does not know this feature sends every state.
+    /// For links with limited bandwidth: the server omits states that the client can predict. If rate_hz = r > 0, the
+    /// callback runs at multiples of 1/r with the state predicted for that time, including tick and sampling time.
+    /// Ticks always increase. States are predicted for at most max_silence; after that, the callback waits for the
+    /// next state. If rate_hz = 0, the callback runs for each received state. Empty: all states are requested.
+    /// Servers without this feature send every state.
     std::optional<SetStateDeadband> state_deadband{};
-    /// For an observer: ask for the forces that the engines want (DeviceState::force_wanted), and once a second for
-    /// reports on the device's loop and its engines. A server that does not know this feature leaves them out.
+    /// For observers: requests the forces of the engines before limiting (DeviceState::force_wanted), and reports on
+    /// the loop of the device and its engines once per second. Servers without this feature omit them.
     bool diagnostics = false;
-    /// Ask for the joints of the device (DeviceState::joints, HandleDescription::joints): 16 bytes each in every state.
+    /// Requests the joints of the device (DeviceState::joints, HandleDescription::joints): 16 bytes per joint and
+    /// state.
     bool joints = false;
-    /// Ask for the outputs of the device (HandleDescription::outputs), to set them with `set_output`.
+    /// Requests access to the outputs of the device (HandleDescription::outputs). Required for `set_output`.
     bool outputs = false;
-    /// Names of the ways in which this engine answers, which Touch::way counts from 1: observers are told, and a
-    /// recording holds, by which a force was made. At most limits::kMaxWays, each of 1 to limits::kMaxLabel bytes, no two
-    /// alike.
+    /// Names of the methods with which this engine computes forces. Touch::way is an index into this list, starting
+    /// at 1. Observers and recordings receive the names. At most limits::kMaxWays unique names, each of 1 to
+    /// limits::kMaxLabel bytes.
     std::vector<std::string> ways{};
-    /// With a Watch: be a controller that sends no force. It may rearm, disarm and hold a
+    /// Only with a Watch callback: register as a controller that sends no forces. It may rearm, disarm and hold a
     /// channel.
     bool operates = false;
-    /// Shared with the server: all is sealed then, and nothing in the clear is heard. Without one the server must be on
-    /// this machine.
+    /// Shared with the server. With a key, all traffic is encrypted and unencrypted datagrams are ignored. Without a
+    /// key, the server must run on this machine.
     std::optional<Key> key{};
-    /// With a key: by which of them the session may be sealed; the server chooses.
+    /// Cipher suites offered for an encrypted session. The server selects one.
     Suites suites = suites_of_this_machine();
-    Seed seed{};  ///< of the randoms and keys of the handshakes; 32 bytes from the system at each start
-    /// How long one attempt waits for an answer: 20 Hellos at the handshake's 100 ms, enough for a round
-    /// trip of 1 s at 50 % loss.
+    Seed seed{};  ///< for the handshakes; must be 32 new bytes from the operating system for each object
+    /// How long an attempt waits for an answer. 2 s is 20 Hellos at the handshake interval of 100 ms, enough for a
+    /// round trip of 1 s at 50 % loss.
     Duration patience = std::chrono::seconds(2);
-    Duration retry_min = std::chrono::milliseconds(100);  ///< first wait before the next attempt; > 0
-    /// Longest wait before the next attempt: a server that restarts is found again within it, and one
-    /// that refuses us is asked no more often.
+    Duration retry_min = std::chrono::milliseconds(100);  ///< wait before the first retry; > 0
+    /// Upper limit of the wait between attempts. It bounds both the time to find a restarted server and the load on a
+    /// server that refuses the client.
     Duration retry_max = std::chrono::seconds(2);
-    /// Datagrams taken from the link in one turn: a flood must not keep us from sending. 256 are what a
-    /// 1 kHz server sends in a quarter of a second, the longest silence before it stops the device.
+    /// Maximum number of datagrams read in one turn, so that a flood cannot prevent sending. A server at 1 kHz sends
+    /// 256 datagrams in a quarter of a second, the longest silence before it stops the device.
     int max_datagrams = 256;
   };
   static constexpr double kMinRateHz = 1e-3;
   static constexpr double kMaxRateHz = 1e5;
 
   enum class Phase : std::uint8_t {
-    kGreeting = 1,    ///< an attempt is under way
-    kOpen = 2,        ///< states come in, forces go out
-    kUnanswered = 3,  ///< nobody answered; waiting for the next attempt
-    kRefused = 4,     ///< the server said no; waiting for the next attempt
-    kLost = 5,        ///< the session has ended; waiting for the next attempt
-    kStopped = 6,     ///< stop() was called, the callback threw, or another has our place (kReplaced); for good
+    kGreeting = 1,    ///< waiting for an answer to the handshake
+    kOpen = 2,        ///< session open
+    kUnanswered = 3,  ///< the server did not answer; waiting before the next attempt
+    kRefused = 4,     ///< the server refused the client; waiting before the next attempt
+    kLost = 5,        ///< the session ended; waiting before the next attempt
+    kStopped = 6,     ///< final: stop() was called, the callback threw, or another program replaced this client
+                      ///< (kReplaced)
   };
 
   struct Stats {
     Phase phase = Phase::kGreeting;
-    /// Why the last attempt or session ended: the server's words where it had any.
+    /// Why the last attempt or session ended. Contains the message of the server if there is one.
     Code code = Code::kOk;
     std::string reason;
-    LinkStats link;  ///< of the present session, or of the last one
+    LinkStats link;  ///< of the current or the last session
     std::uint64_t attempts = 0;
-    std::uint64_t sessions = 0;         ///< of these, answered with a Welcome
-    std::uint64_t states = 0;           ///< states that came in
-    std::uint64_t states_foretold = 0;  ///< predicted states that the callback saw; they never came
-    std::uint64_t states_skipped = 0;   ///< of these, replaced by a newer one before a callback was due
+    std::uint64_t sessions = 0;         ///< attempts that the server accepted
+    std::uint64_t states = 0;           ///< received states
+    std::uint64_t states_foretold = 0;  ///< predicted states that the callback received
+    std::uint64_t states_skipped = 0;   ///< received states that a newer one replaced before the callback ran
     std::uint64_t forces = 0;           ///< forces sent
-    std::uint64_t forces_unusable = 0;  ///< forces not sent: not finite, or out of bounds
-    std::string_view unusable{};        ///< what was wrong with the newest of them; empty: none
-    std::string_view left_out{};        ///< what of the present session's answers is not sent, and why; empty: nothing
-    std::uint64_t forces_alike = 0;     ///< forces not sent: a hand cannot tell them from the previous one
-    std::uint64_t strangers = 0;        ///< datagrams that were not from the server: dropped
-    std::string lease_lost_to;          ///< name of the client that took the channel from us; empty: nobody
+    std::uint64_t forces_unusable = 0;  ///< forces not sent because they are not finite or out of bounds
+    std::string_view unusable{};        ///< reason for the newest unusable force; empty: none
+    std::string_view left_out{};        ///< which part of this session's forces is not sent, and why; empty: none
+    std::uint64_t forces_alike = 0;     ///< forces not sent because they are within the deadband
+    std::uint64_t strangers = 0;        ///< datagrams dropped because they did not come from the server
+    std::string lease_lost_to;          ///< name of the client that took over the channel; empty: none
   };
 
-  /// A controller: sees states and sends forces. `link` must outlive this object. The first Hello leaves with the first
-  /// turn. Throws std::invalid_argument "FIELD = VALUE: expected …" when a value of `config` is impossible.
+  /// Creates a controller, which receives states and sends forces. `link` must outlive this object. The first Hello
+  /// is sent by the first turn. Throws std::invalid_argument "FIELD = VALUE: expected …" if `config` is invalid.
   ForceClient(Link& link, const Address& server, const Config& config, Physics physics, LocalTime now);
-  /// An observer: sees states, and reports when it asks for them; or an operator (Config::operates). Never sends a
-  /// force.
+  /// Creates an observer, which receives states and, if requested, reports; or an operator (Config::operates). Never
+  /// sends a force.
   ForceClient(Link& link, const Address& server, const Config& config, Watch watch, LocalTime now);
 
-  /// Does everything due at `now` and returns the latest time for the next call; call earlier when a datagram arrives.
-  /// A force leaves in the turn that has computed it. The callback may have taken its time: read the clock again
-  /// before a sleep until then. The callback's exceptions pass through, after a Bye to the server.
+  /// Does all the work that is due at `now` and returns the time of the next call. Call it earlier when a datagram
+  /// arrives. The callback may take long, so read the clock again before sleeping. An exception of the callback
+  /// propagates after a Bye is sent to the server.
   LocalTime turn(LocalTime now);
 
-  /// Shows the callback the newest state once more, in the next turn: for an engine whose answer has changed since it saw
-  /// that state, and for which the next state would come late. Nothing happens without a state.
+  /// Passes the newest state to the callback again in the next turn. Use it if the answer of the engine has changed
+  /// and waiting for the next state would take too long. Does nothing if no state has arrived.
   void answer_again() { unseen_ = newest_.has_value(); }
 
-  /// For an engine that computes elsewhere while this thread goes on: its callback returned an unknown force, and this
-  /// is what it has come to. The force leaves with the next turn, which is due at once. False, and nothing is sent:
-  /// the session of that state is over, another client holds the channel, or a newer state has been answered. No force
-  /// answers an older motion than the one before.
+  /// Sends a force that was computed asynchronously, after the callback returned an unknown force (Touch::unknown).
+  /// The force is sent in the next turn, which is due immediately. Returns false and sends nothing if the session of
+  /// that state has ended, another client holds the channel, or a newer state has been answered.
   bool answer(LocalTime now, const Reply& reply);
 
-  /// Asks the server to clear a latched fault of its device, and to take a disarm back; with a safety layer it is the
-  /// request to arm. Controllers only: an observer is refused. False when there is no session to ask in, or too many
-  /// requests are open.
+  /// Asks the server to clear a latched fault of the device and to undo a disarm. With a safety layer, this is the
+  /// request to arm. Only for controllers; the server refuses observers. Returns false if there is no session or if
+  /// too many requests are pending.
   bool rearm();
-  /// Asks the server for no force, from the device's next step on, until somebody rearms. False as for rearm().
+  /// Asks the server to disable all forces from the next step of the device until a client rearms. Returns false as
+  /// rearm() does.
   bool disarm();
-  /// The operator's act of a coupling, at the leader's server ([teleoperation]), and its end, at either's. False as for
-  /// rearm().
+  /// Engages or disengages a coupling of two devices ([teleoperation] in the scene). engage() must be sent to the
+  /// server of the leader, disengage() to either server. Returns false as rearm() does.
   bool engage();
   bool disengage();
-  /// The scales of the coupling from now on, at the leader's server, while it is not engaged or its clutch is held.
-  /// False as for rearm(), and beyond 0.01 … 100.
+  /// Sets the scales of the coupling at the server of the leader. Allowed while the coupling is not engaged or its
+  /// clutch is held. Returns false as rearm() does, and if a scale is outside of 0.01 … 100.
   bool set_scale(double position_scale, double force_scale);
-  /// How much the leader of that channel of our device counts among several, at the follower's server: 0 … 1. False as
-  /// for rearm(), and out of bounds.
+  /// Sets the weight, 0 … 1, of the leader on that channel if several leaders share one follower. Must be sent to the
+  /// server of the follower. Returns false as rearm() does, and if the weight is out of bounds.
   bool set_share(std::uint32_t channel, double share);
-  /// Sets a lamp of the device, or starts a pulse of vibration (`handle()->outputs`). For whoever `holds()`. False as
-  /// for rearm(), without Config::outputs, when the server does not know kFeatureOutputs, and out of bounds.
+  /// Sets an indicator lamp or starts a vibration pulse (`handle()->outputs`). Requires the channel (`holds()`).
+  /// Returns false as rearm() does, and also without Config::outputs, if the server does not support kFeatureOutputs,
+  /// or if `setting` is out of bounds.
   bool set_output(std::uint32_t output, const OutputSetting& setting);
 
-  /// What the server has said to the newest of these seven of the present session; empty until then.
+  /// The server's answer to the most recent of these requests in this session; empty if there is none.
   const std::optional<Session::RequestAnswered>& order_answer() const noexcept { return order_answer_; }
 
-  /// Whether the channel takes our forces; while it does not, the callback is not called.
+  /// Whether this client holds the channel. Otherwise the callback is not called.
   bool holds() const noexcept { return lease_.holds(); }
-  /// Asks for the channel's lease, once more when it is lost before the answer; or gives it up. False as for rearm().
+  /// Requests or releases the lease of the channel. The request is repeated if the lease is lost before the answer
+  /// arrives. Return false as rearm() does.
   bool take_lease();
   bool give_lease();
 
-  /// The server is found at another address: for the next attempt. To be called while no session is open.
+  /// Sets the server address for the next attempt. Must be called while no session is open.
   void move_to(const Address& server) { connection_.move_to(server); }
 
-  /// Says Bye, so that the server need not wait for a timeout, and ends. Any further turn does nothing.
+  /// Sends a Bye, so that the server does not have to wait for a timeout, and stops. Further turns do nothing.
   void stop(LocalTime now);
 
   Stats stats() const;
   Phase phase() const noexcept { return stats_.phase; }
 
-  /// What the server said of itself and its device when the newest session opened; empty before that.
+  /// Description of the server in the newest session; empty before the first.
   const std::optional<Welcome>& welcome() const noexcept { return welcome_; }
-  /// What the device is and can do, once the server has answered; empty before, and for good when we have named neither
-  /// a device nor a channel and the server does not know kFeatureHandle.
+  /// Description of the device; empty until it arrives. It never arrives if Config names neither a device nor a
+  /// channel and the server does not support kFeatureHandle.
   const std::optional<DeviceDescription>& description() const noexcept { return description_; }
-  /// How the device lies before the operator, its buttons' names, and what else its handle can do, once the server has
-  /// answered; empty before, and for good when the server does not know kFeatureHandle.
+  /// Orientation of the device relative to the operator, names of the buttons, and other properties of the handle;
+  /// empty until it arrives. It never arrives if the server does not support kFeatureHandle.
   const std::optional<HandleDescription>& handle() const noexcept { return handle_; }
 
-  /// The server's clock, estimated in the present session; empty without one, and before its first round trip.
+  /// Estimate of the server's clock in this session; empty without a session and before the first round trip.
   std::optional<ClockOffsetEstimator::Estimate> server_clock() const noexcept {
     return connection_.session() != nullptr ? connection_.session()->peer_clock() : std::nullopt;
   }
 
-  /// The server's newest report on our forces, once a second while they come: late ones by cause, delays, losses.
-  /// From the present session; empty before the first.
+  /// Newest report of the server on the received forces: late forces by cause, delays, losses. Sent once per second
+  /// while forces arrive. Empty before the first report of this session.
   const std::optional<LinkReport>& report() const noexcept { return report_; }
 
-  /// With Config::diagnostics: the newest reports on our device's loop, and on the engine of each channel that has one,
-  /// in the order of their first reports. From the present session; empty before the first. The last report on an
-  /// engine stays when the engine has gone.
+  /// Newest reports on the loop of the device and on the engine of each channel, in the order of their first reports.
+  /// Requires Config::diagnostics. Empty before the first report of this session. The last report on an engine stays
+  /// after the engine has left.
   const std::optional<DeviceReport>& device_report() const noexcept { return device_report_; }
   const std::vector<PeerReport>& peer_reports() const noexcept { return peer_reports_; }
 
@@ -277,29 +279,29 @@ class ForceClient {
   Config config_;
   Link& link_;
   Role role_;
-  Physics physics_;  ///< the controller's callback
-  Watch watch_;      ///< the observer's callback
-  Duration period_;  ///< of the callback; 0 = none
+  Physics physics_;
+  Watch watch_;
+  Duration period_;  ///< of the callback; 0: none
 
   Connection connection_;
   std::optional<Welcome> welcome_;
   std::optional<DeviceDescription> description_;
   std::optional<HandleDescription> handle_;
-  std::optional<std::uint32_t> order_;  ///< the newest order, but for leases: number of the request
+  std::optional<std::uint32_t> order_;  ///< request number of the newest request other than for a lease
   std::optional<Session::RequestAnswered> order_answer_;
-  LeaseRequest lease_;  ///< of our channel, and the numbers of device and channel
+  LeaseRequest lease_;  ///< also stores the indices of the device and the channel
 
   std::optional<DeviceState> newest_;
-  bool unseen_ = false;        ///< the callback has not seen it
-  std::uint32_t pressed_ = 0;  ///< buttons held in any of the states since the one that it has seen
+  bool unseen_ = false;        ///< the callback has not received newest_
+  std::uint32_t pressed_ = 0;  ///< buttons pressed in any state since the last callback
   LocalTime newest_arrived_{};
-  std::uint64_t seen_tick_ = 0;                      ///< newest tick that the callback has seen
-  std::optional<std::uint32_t> deadband_request_{};  ///< … of the states
-  bool foretell_ = false;                            ///< the server leaves states out
+  std::uint64_t seen_tick_ = 0;                      ///< newest tick passed to the callback
+  std::optional<std::uint32_t> deadband_request_{};  ///< request number of the state deadband
+  bool foretell_ = false;                            ///< the server omits predictable states
   LocalTime next_call_{};
   std::optional<HandleDeadband> deadband_;
   std::uint64_t sequence_ = 0;       ///< of the newest force
-  std::uint64_t answered_tick_ = 0;  ///< the tick it answers
+  std::uint64_t answered_tick_ = 0;  ///< state tick that the newest force answers
   std::optional<LinkReport> report_;
   std::optional<DeviceReport> device_report_;
   std::vector<PeerReport> peer_reports_;

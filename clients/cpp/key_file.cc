@@ -16,7 +16,7 @@ ClientKey read_client_key(const std::string& file) {
   };
   struct stat status {};
   if (::stat(file.c_str(), &status) != 0) refuse(std::generic_category().message(errno));
-  // Before it is opened: a pipe would wait for ever.
+  // Check before opening, because opening a pipe would block.
   if (!S_ISREG(status.st_mode)) refuse(S_ISDIR(status.st_mode) ? "it is a folder" : "it is not a regular file");
   std::ifstream stream(file, std::ios::binary);
   if (!stream) refuse(std::generic_category().message(errno));

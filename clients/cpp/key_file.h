@@ -7,8 +7,8 @@
 
 namespace tendon {
 
-/// The key in this file, as `tendond keygen` writes it. Throws std::runtime_error, "FILE: what is wrong": it
-/// cannot be read, it is a folder or a pipe, others may read it, it is no key file, or the key is weak.
+/// Reads a key file written by `tendond keygen`. Throws std::runtime_error, "FILE: what is wrong", if the file is
+/// unreadable, not a regular file, readable by other users, or malformed, or if the key is weak.
 ClientKey read_client_key(const std::string& file);
 
 }  // namespace tendon

@@ -6,19 +6,14 @@
 
 namespace tendon {
 
-/// What a client takes from its machine: the time, random numbers, and to be woken in time. Everything else is told
-/// both.
-
-/// CLOCK_MONOTONIC.
-///
-/// Thread-safe.
+/// Reads CLOCK_MONOTONIC. Thread-safe.
 LocalTime read_clock();
 
-/// Whether this process may run on one processor only.
+/// Returns whether the affinity mask of this process contains only one processor.
 bool has_one_processor();
 
-/// While it lives, the calling thread is woken from a sleep when it is over, and not up to 50 µs later as the kernel
-/// allows itself by default (timer slack). Afterwards as before. To be made and destroyed on one thread.
+/// Reduces the timer slack of the calling thread to its minimum during its lifetime. By default, Linux may wake the
+/// thread up to 50 µs late. Must be constructed and destroyed on the same thread.
 class Punctual {
  public:
   Punctual() noexcept;
@@ -27,12 +22,11 @@ class Punctual {
   Punctual& operator=(const Punctual&) = delete;
 
  private:
-  int slack_ns_;  ///< as it was
+  int slack_ns_;  ///< previous timer slack
 };
 
-/// 32 bytes of the system's random numbers, for one handshake's keys. Throws std::runtime_error when it gives none.
-///
-/// Thread-safe.
+/// Returns 32 random bytes from the operating system, for the keys of one handshake. Throws std::runtime_error if
+/// they are not available. Thread-safe.
 Seed seed_from_system();
 
 }  // namespace tendon

@@ -15,9 +15,9 @@
 namespace tendon {
 namespace {
 
-constexpr double kMaxDurationS = 1e9;  // 31 years, and far from where Duration ends (292)
+constexpr double kMaxDurationS = 1e9;  // 31 years; Duration overflows after 292
 
-/// Empty unless the whole text is a number.
+/// Returns empty unless the entire text is a number.
 std::optional<double> to_number(const std::string& text) {
   double value = 0;
   const char* const end = text.data() + text.size();
@@ -26,7 +26,7 @@ std::optional<double> to_number(const std::string& text) {
   return value;
 }
 
-/// Accepts 0 and the numbers from `least` to `most`. (CLI::Range accepts NaN.)
+/// Accepts 0 and the numbers in [least, most]. CLI::Range would accept NaN.
 CLI::Validator number(double least, double most) {
   return CLI::Validator(
       [=](const std::string& text) -> std::string {
@@ -39,7 +39,7 @@ CLI::Validator number(double least, double most) {
       "");
 }
 
-/// Accepts the finite numbers from `least` on.
+/// Accepts finite numbers ≥ `least`.
 CLI::Validator at_least(double least) {
   return CLI::Validator(
       [=](const std::string& text) -> std::string {
@@ -131,7 +131,7 @@ std::optional<int> CommandLine::parse(int argc, const char* const* argv) {
     return list_servers(parser_->options.server, parser_->options.json);
   } catch (const CLI::ParseError& error) {
     return usage::exit_code(parser_->app, error);
-  } catch (const std::runtime_error& error) {  // a key that cannot be read
+  } catch (const std::runtime_error& error) {  // unreadable key file
     std::cerr << parser_->app.get_name() << ": " << error.what() << '\n';
     return 1;
   }

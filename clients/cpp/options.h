@@ -10,31 +10,31 @@
 
 namespace tendon {
 
-/// The command line that all guests share (--server, --rate-hz, --duration-s, --json, --help …), with the options that
-/// a program adds.
+/// The command line shared by all clients (--server, --rate-hz, --duration-s, --json, --help …), extended by the
+/// options of the program.
 class CommandLine {
  public:
-  /// `purpose` heads the --help; `options` holds the defaults and receives what is given. The options
-  /// and values named here must outlive parse().
+  /// `purpose` is the first line of --help. `options` contains the defaults and receives the values. All references
+  /// passed to this object must outlive parse().
   CommandLine(std::string purpose, Options& options);
   ~CommandLine();
   CommandLine(const CommandLine&) = delete;
   CommandLine& operator=(const CommandLine&) = delete;
 
-  /// A required argument without a name before it: "SCENE".
+  /// Adds a required positional argument: "SCENE".
   void add_argument(const std::string& name, std::string& value, const std::string& meaning);
-  /// The same, one of `choices`.
+  /// Adds a required positional argument with a fixed set of values.
   void add_argument(const std::string& name, std::string& value, const std::vector<std::string>& choices,
                     const std::string& meaning);
-  /// A finite number ≥ `least`: "--stiffness-n-per-m".
+  /// Adds a finite number ≥ `least`: "--stiffness-n-per-m".
   void add(const std::string& name, double& value, const std::string& meaning, double least = 0);
-  /// A text: "--launch COMMAND", where `type` is "COMMAND".
+  /// Adds a text: "--launch COMMAND", where `type` is "COMMAND".
   void add(const std::string& name, std::string& value, const std::string& type, const std::string& meaning);
-  /// A switch: "--local-model".
+  /// Adds a flag: "--local-model".
   void add(const std::string& name, bool& value, const std::string& meaning);
 
-  /// Empty: go on. Otherwise the exit code to leave with: 0 after --help, 2 after a wrong usage, which has
-  /// been explained on stderr; that of list_servers() after `--server dns-sd:`.
+  /// Returns nullopt if the program should continue, otherwise its exit code: 0 after --help, 2 after a usage error
+  /// (printed to stderr), and the result of list_servers() after `--server dns-sd:`.
   std::optional<int> parse(int argc, const char* const* argv);
 
  private:

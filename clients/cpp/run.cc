@@ -24,23 +24,22 @@
 namespace tendon {
 namespace {
 
-using Json = nlohmann::ordered_json;  // members in the order in which they are written here
+using Json = nlohmann::ordered_json;  // preserves the order of the members
 
-/// Longest sleep: a signal that slips in just before the sleep is noticed after it.
+/// Upper limit of a sleep, because a signal that arrives immediately before it does not interrupt it.
 constexpr Duration kLongestWait = std::chrono::milliseconds(100);
 
 double milliseconds(Duration d) { return std::chrono::duration<double, std::milli>(d).count(); }
 
-/// One object in one line of stdout.
 void say_json(const Json& json) { std::cout << json << std::endl; }
 
-/// Whether another attempt would be refused too.
+/// Returns whether further attempts are pointless.
 bool is_final(Code code) { return code != Code::kBusy && code != Code::kShutdown; }
 
-/// One session with the server: the guest, its socket, and what has been said of it.
+/// A client with its socket and the messages already printed.
 class Guest {
  public:
-  /// `device` is named in what is said; empty: there is only one.
+  /// Messages contain the name `device` unless it is empty.
   template <typename Callback>
   Guest(const Options& options, const std::string& device, Callback callback, LocalTime start)
       : options_(options),
@@ -52,19 +51,19 @@ class Guest {
   Guest(const Guest&) = delete;
   Guest& operator=(const Guest&) = delete;
 
-  /// Does what is due at `now` and says what has changed. The latest time for the next turn; empty when it is over for
-  /// good.
+  /// Does the work that is due at `now` and prints changes. Returns the time of the next turn, or empty if the client
+  /// has stopped permanently.
   std::optional<LocalTime> turn(LocalTime now);
   void answer(LocalTime now, const Reply& reply) { client_.answer(now, reply); }
   std::uint64_t sessions() const { return client_.stats().sessions; }
   bool open() const { return client_.phase() == ForceClient::Phase::kOpen; }
-  /// Says Bye.
+  /// Sends a Bye.
   void leave(LocalTime now) { client_.stop(now); }
-  /// Says Bye, and sums up. Whether there was a session.
+  /// Sends a Bye and prints the summary. Returns whether there was a session.
   bool end(LocalTime now, Duration duration);
 
   UdpTransport& transport() { return transport_; }
-  /// With Options::busy: whether a datagram can be received. `now` becomes the present time.
+  /// With Options::busy: returns whether a datagram can be received. Updates `now`.
   bool look(LocalTime& now) { return busy_.look(now); }
 
  private:
@@ -73,7 +72,7 @@ class Guest {
   void say(const std::string& text) const { std::cerr << who_ + ": " + visible(text) + "\n"; }
   void look_up_again();
   Json to_json(const LinkReport& report) const;
-  /// In front of what stdout is told of the session.
+  /// Begins a JSON object with the device name if there are several devices.
   Json named() const { return device_.empty() ? Json::object() : Json{{"device", device_}}; }
 
   const Options& options_;
@@ -84,9 +83,9 @@ class Guest {
   ForceClient client_;
 
   std::string said_;
-  std::string missing_;        ///< said of the last look-up; empty: it found the server
-  std::string_view unusable_;  // the newest reason that was said
-  std::string_view left_out_;  ///< likewise, of a part of a force
+  std::string missing_;        ///< last error of the name lookup; empty: none
+  std::string_view unusable_;  // last printed reason
+  std::string_view left_out_;  ///< last printed reason for an omitted part of a force
   ForceClient::Phase phase_ = ForceClient::Phase::kGreeting;
   PeerTime reported_{};
 };
@@ -99,7 +98,7 @@ ForceClient::Config Guest::config(const Options& options, const std::string& dev
   return config;
 }
 
-/// The connection's state in a sentence; empty when there is nothing to say.
+/// Describes the state of the connection in one sentence; empty if there is nothing to report.
 std::string Guest::sentence() const {
   const ForceClient::Stats stats = client_.stats();
   const std::string server = options_.server.at(transport_.server());
@@ -122,7 +121,6 @@ std::string Guest::sentence() const {
   return {};
 }
 
-/// What the server says of our forces.
 Json Guest::to_json(const LinkReport& report) const {
   Json json = named();
   json.update(Json{{"number", report.number},
@@ -152,13 +150,13 @@ Json Guest::to_json(const LinkReport& report) const {
   return json;
 }
 
-/// Whether an attempt or a session is over, and the next attempt not begun.
+/// Whether the client is waiting between two attempts.
 bool waits(ForceClient::Phase phase) {
   return phase == ForceClient::Phase::kUnanswered || phase == ForceClient::Phase::kRefused ||
          phase == ForceClient::Phase::kLost;
 }
 
-/// The server may have another address by now. Where nobody answered at one, the next one is tried.
+/// The address of the server may have changed. If the current address did not answer, the next one is tried.
 void Guest::look_up_again() {
   try {
     transport_.look_up_again(client_.phase() == ForceClient::Phase::kUnanswered);
@@ -225,22 +223,22 @@ bool Guest::end(LocalTime now, Duration duration) {
   return stats.sessions > 0;
 }
 
-/// An engine of several hands, and the newest state of each.
+/// An engine for several hands, with the newest state of each hand.
 struct AllHands {
   const Together& engine;
   std::vector<std::optional<DeviceState>> hands;
-  bool fresh = false;  ///< it has not seen one of them
+  bool fresh = false;  ///< the engine has not received one of them
 };
 
-/// What a run does beside its callbacks.
+/// Optional parts of a run.
 struct Beside {
-  bool* heard = nullptr;           ///< set by the callback: Options::on_silence
-  Elsewhere* elsewhere = nullptr;  ///< its states come by the callback
+  bool* heard = nullptr;           ///< set by the callback, for Options::on_silence
+  Elsewhere* elsewhere = nullptr;  ///< its states are passed by the callback in `seen`
   std::optional<DeviceState>* seen = nullptr;
-  AllHands* all_hands = nullptr;  ///< the same, of a guest for each hand
+  AllHands* all_hands = nullptr;  ///< likewise for several hands
 };
 
-/// Shows the engine what was seen, and sends what it has come to. When the next turn is due.
+/// Passes the newest state to the engine and sends its answers. Returns the time of the next turn.
 LocalTime turn_elsewhere(const Beside& beside, Guest& guest, LocalTime now) {
   if (beside.seen->has_value()) {
     beside.elsewhere->see(now, {.hand = **beside.seen, .session = guest.sessions()});
@@ -254,12 +252,12 @@ LocalTime turn_elsewhere(const Beside& beside, Guest& guest, LocalTime now) {
   return answered ? now : beside.elsewhere->next_turn();
 }
 
-/// Shows the engine all hands where one of them has a new state, and sends each its answer. When the next turn is due.
+/// Passes all states to the engine if at least one is new, and sends the answers. Returns the time of the next turn.
 LocalTime turn_together(AllHands& all, std::deque<Guest>& guests, LocalTime now) {
   for (std::size_t i = 0; i < guests.size(); ++i) {
     if (guests[i].open() || !all.hands[i]) continue;
     all.hands[i].reset();
-    all.fresh = true;  // the others feel that it has let go
+    all.fresh = true;  // the object must respond to the released hand
   }
   if (!std::exchange(all.fresh, false)) return LocalTime::max();
   const std::vector<Touch> touches = all.engine(all.hands);
@@ -270,7 +268,7 @@ LocalTime turn_together(AllHands& all, std::deque<Guest>& guests, LocalTime now)
   return now;
 }
 
-/// Until one of the guests can receive, or the file `also` can be read (−1: none), or it is `end`; without a sleep.
+/// Busy-waits until a client's socket or `also` (−1: none) is readable, or until `end`. Returns the current time.
 LocalTime watch(std::deque<Guest>& guests, int also, LocalTime now, LocalTime end) {
   while (now < end) {
     for (Guest& guest : guests) {
@@ -281,7 +279,7 @@ LocalTime watch(std::deque<Guest>& guests, int also, LocalTime now, LocalTime en
   return now;
 }
 
-/// A session to be: its options, the name of its device ("" is whatever these name) and its callback.
+/// Arguments of a session. An empty `device` selects the one in `options`.
 template <typename Callback>
 struct Seat {
   const Options* options;
@@ -289,7 +287,6 @@ struct Seat {
   Callback callback;
 };
 
-/// One session for each seat.
 template <typename Callback>
 int run_with(const Options& options, const std::vector<Seat<Callback>>& seats, const Beside& beside = {}) {
   try {
@@ -334,7 +331,7 @@ int run_with(const Options& options, const std::vector<Seat<Callback>>& seats, c
         if (answered || now >= quiet) quiet = now + options.silence;
         next = std::min(next, quiet);
       }
-      now = read_clock();  // the turns have taken their time
+      now = read_clock();  // the turns may have taken long
       if (now >= next) continue;
       const Duration wait = std::min(next - now, kLongestWait);
       const int also = beside.elsewhere != nullptr ? beside.elsewhere->descriptor() : -1;

@@ -13,77 +13,75 @@
 
 namespace tendon {
 
-/// What run() needs to know; CommandLine (options.h) fills it from a command line.
+/// Settings of run(). CommandLine (options.h) fills them from a command line.
 struct Options {
-  ServerName server = "127.0.0.1:47100";  ///< looked up at the start, and again before each further attempt
-  ForceClient::Config client;             ///< `seed` is replaced by one from the system
-  Duration duration{};                    ///< ends after this time; 0 = at SIGINT or SIGTERM
-  /// Never sleeps: a state is answered some 10 to 50 µs sooner, and a whole processor is taken all the time. run() says
-  /// so where there is only one.
+  ServerName server = "127.0.0.1:47100";  ///< resolved at the start and again before each further attempt
+  ForceClient::Config client;             ///< `seed` is replaced by random bytes from the operating system
+  Duration duration{};                    ///< 0: run until SIGINT or SIGTERM
+  /// Polls without sleeping: answers are 10 to 50 µs faster, but a processor is always fully loaded. run() prints a
+  /// warning if there is only one processor.
   bool busy = false;
-  bool json = false;  ///< the closing summary as one JSON object on stdout, not as text on stderr
-  /// Called with read_clock()'s time (machine.h) whenever `silence` (at least 1 ms) has passed without a state for the
-  /// callback, also before the first: what must not go on without a hand stops there. For one device alone.
+  bool json = false;  ///< print the final summary to stdout as one JSON object instead of to stderr as text
+  /// Called with the time of read_clock() (machine.h) when no state has arrived for `silence` (at least 1 ms), also
+  /// before the first state. Stop anything here that must not continue without an operator. Only for one device.
   std::function<void(LocalTime now)> on_silence{};
   Duration silence = std::chrono::milliseconds(10);
 };
 
-/// Runs a guest in real time, on this thread, until it is told to stop (Options::duration, SIGINT or SIGTERM); then it
-/// says Bye. This is all that `main` needs. Returns the exit code:
+/// Runs a client in real time on the calling thread until Options::duration, SIGINT or SIGTERM, then sends a Bye.
+/// Returns the exit code for main():
 ///
-///     0   it has been connected to the server
-///     1   it could not connect, there is no such host, the server refused it for good, another has its place, or the
-///         callback threw
+///     0   a session was open at least once
+///     1   connecting failed, the host is unknown, the server refused permanently, another program replaced this client,
+///         or the callback threw
 ///
-/// Another controller at the device (Code::kBusy) and a server that goes down are not for good: it keeps trying. stderr
-/// gets one sentence for each change of the connection. stdout gets only the callback's own output and, with `json`,
-/// what the server says of our forces once a second, {"report":{"number":1, …}}, and the summary,
-/// {"summary":{"duration_s":…, …}}. Without `json` stderr gets the server's sentence when forces were late.
+/// If another controller holds the device (Code::kBusy) or the server shuts down, run() keeps trying. It prints one
+/// sentence to stderr for each change of the connection. stdout contains only the output of the callback and, with
+/// `json`, the server's reports on the received forces once per second, {"report":{"number":1, …}}, and the summary,
+/// {"summary":{"duration_s":…, …}}. Without `json`, stderr contains a warning if forces were late.
 ///
-/// One at a time in a process, because the signal handlers are the process's.
+/// Only one run() at a time per process, because it installs signal handlers.
 int run(const Options& options, Physics physics);  ///< a controller
 int run(const Options& options, Watch watch);      ///< an observer
 
-/// The same for one engine that touches several devices of the server, as two hands hold one object: its callbacks by
-/// the names of their devices. They are called one after the other on this thread and need no locks. Each device has a
-/// session of its own; the options hold for each, and what is said of a session names its device.
-/// `options.client.device` must be empty. 0 means that every session was open once; the run ends when one ends for
-/// good.
+/// Runs one engine for several devices of one server, for example two hands that hold one object. The map assigns a
+/// callback to each device name. The callbacks run sequentially on this thread and need no locks. Each device has its
+/// own session with these options, and messages contain the device name. `options.client.device` must be empty.
+/// Returns 0 if every session was open at least once. Ends when one session ends permanently.
 int run(const Options& options, const std::map<std::string, Physics>& physics);
 
 /// One of several hands that hold the same object.
 struct HandAt {
-  std::string device;                  ///< its name at its server
+  std::string device;                  ///< device name at its server
   std::optional<ServerName> server{};  ///< empty: Options::server
 };
 
-/// An engine that several hands touch at once: the newest state of each in, empty while that hand is not there; the
-/// answer to each of these states out, in the same order. One for an empty state does not matter.
+/// An engine that computes the forces of several hands together. An entry of `hands` is empty while that hand is not
+/// connected. Returns one answer for each entry in the same order; answers to empty entries are ignored.
 using Together = std::function<std::vector<Touch>(std::span<const std::optional<DeviceState>> hands)>;
 
-/// The same for an engine with one solution for all hands, at devices of one server or of several, which share
-/// `options.client.key`. It is called when a hand has a new state. It then sends a force to every hand, tagged with
-/// the state of this hand. There must be at least one hand. An exception of the engine ends the run after a Bye to each
-/// server.
+/// Runs an engine that solves for all hands at once. The devices may belong to several servers that share
+/// `options.client.key`. The engine is called when any hand has a new state. Each hand then receives a force that is
+/// tagged with the state of that hand. `hands` must not be empty. If the engine throws, run() sends a Bye to each
+/// server and ends.
 int run(const Options& options, const std::vector<HandAt>& hands, const Together& engine);
 
-/// An engine that computes elsewhere: in another process, or on many machines. run() never waits for it.
+/// An engine that computes asynchronously, in another process or on a cluster. run() never blocks on it.
 class Elsewhere {
  public:
   virtual ~Elsewhere() = default;
 
-  /// The newest state of the hand. Returns at once.
+  /// Passes the newest state. Must return immediately.
   virtual void see(LocalTime now, const Seen& seen) = 0;
-  /// Does what is due at `now`. The next answer, if there is one: called until it is empty.
+  /// Does the work that is due at `now`. Returns the next answer, if any. run() calls it until it returns empty.
   virtual std::optional<Reply> turn(LocalTime now) = 0;
-  /// The latest time for the next turn. A descriptor that can be read makes it due at once.
+  /// Time of the next turn. The turn is due earlier if the descriptor becomes readable.
   virtual LocalTime next_turn() const = 0;
-  /// For poll(): readable when there is something to do.
+  /// File descriptor for poll(). It is readable when turn() has work to do.
   virtual int descriptor() const = 0;
 };
 
-/// The same as a controller whose forces come from `engine`, for one device. Forces that come too late to be sent
-/// (ForceClient::answer) are dropped.
+/// Runs a controller for one device with the forces of `engine`. Late forces are dropped; see ForceClient::answer.
 int run(const Options& options, Elsewhere& engine);
 
 }  // namespace tendon

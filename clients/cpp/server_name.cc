@@ -23,7 +23,7 @@
 namespace tendon {
 namespace {
 
-/// DNS has 253 bytes.
+/// Limit of DNS.
 constexpr std::size_t kMaxHost = 253;
 
 std::optional<Address> numeric(const std::string& text) {
@@ -39,7 +39,7 @@ struct HostAndPort {
   std::uint16_t port;
 };
 
-/// A host name and a port; empty when `text` is none. The port is read as that of a numeric address.
+/// Splits a host name and a port. Returns nullopt if `text` has another format.
 std::optional<HostAndPort> split(const std::string& text) {
   const std::size_t colon = text.rfind(':');
   if (colon == std::string::npos || colon == 0 || colon > kMaxHost) return std::nullopt;
@@ -52,7 +52,7 @@ std::optional<HostAndPort> split(const std::string& text) {
   return HostAndPort{host, port->port};
 }
 
-/// Empty for what does not begin as a name of DNS-SD does.
+/// Returns nullopt unless `text` starts with "dns-sd:" or "tendon://".
 std::optional<dns_sd::Instance> instance_in(std::string_view text) {
   for (const std::string_view scheme : {"dns-sd:", "tendon://"}) {
     if (text.starts_with(scheme)) return dns_sd::parse_instance(text.substr(scheme.size()));
@@ -60,7 +60,7 @@ std::optional<dns_sd::Instance> instance_in(std::string_view text) {
   return std::nullopt;
 }
 
-/// The file of "unix:PATH"; empty for what does not begin so.
+/// Returns the path of "unix:PATH", or an empty string for other names.
 std::string unix_path_in(std::string_view text) {
   constexpr std::string_view kScheme = "unix:";
   constexpr std::size_t kMost = sizeof sockaddr_un::sun_path - 1;
@@ -89,7 +89,6 @@ Address from_system(const addrinfo& found, std::uint16_t port) {
   return address;
 }
 
-/// The addresses of a host, by the system.
 std::vector<Address> addresses_of(const std::string& host, std::uint16_t port) {
   addrinfo hints{};
   hints.ai_family = AF_UNSPEC;
@@ -112,7 +111,9 @@ std::vector<Address> addresses_of(const std::string& host, std::uint16_t port) {
 
 ServerName::ServerName(std::string text)
     : text_(std::move(text)), unix_path_(unix_path_in(text_)), instance_(instance_in(text_)) {
-  if (unix_path_.empty() && !instance_ && !split(text_)) parse_address(text_);  // throws what is wrong
+  if (unix_path_.empty() && !instance_ && !split(text_))
+    parse_address(text_);  // throws a message that describes the
+                           // problem
 }
 
 ServerName::ServerName(const Address& address) : text_(to_string(address)) {}

@@ -10,44 +10,43 @@
 
 namespace tendon {
 
-/// Where a server is, as a person writes it: "haptics.lab:47100", "127.0.0.1:47100", "[::1]:47100" or
-/// "localhost:47100", which is 127.0.0.1; "unix:/run/tendon.sock", the file of a server on this machine ([network] unix
-/// of its scene), where the file's permissions are the key; or the name of a device that DNS-SD finds
+/// The name of a server as a user writes it: "haptics.lab:47100", "127.0.0.1:47100", "[::1]:47100", or
+/// "localhost:47100" for 127.0.0.1; "unix:/run/tendon.sock" for the Unix socket of a server on this machine
+/// ([network] unix in its scene), where the file permissions control access; or a device found by DNS-SD
 /// (clients/cpp/discovery):
 ///
-///     dns-sd:falcon at bench 3              on the local network; tendon://falcon at bench 3 is the same
-///     dns-sd:falcon at bench 3.example.org  by the name servers of that domain
-///     dns-sd:  dns-sd:.example.org          all of the local network, of that domain: list_servers() prints them
+///     dns-sd:falcon at bench 3              in the local network; same as tendon://falcon at bench 3
+///     dns-sd:falcon at bench 3.example.org  in a domain, by its name servers
+///     dns-sd:  dns-sd:.example.org          everything in the local network or the domain, for list_servers()
 class ServerName {
  public:
-  /// Looks nothing up. Throws std::invalid_argument if `text` has another format.
+  /// Does not resolve the name. Throws std::invalid_argument if the format of `text` is invalid.
   ServerName(std::string text);                                    // NOLINT(google-explicit-constructor)
   ServerName(const char* text) : ServerName(std::string(text)) {}  // NOLINT(google-explicit-constructor)
   ServerName(const Address& address);                              // NOLINT(google-explicit-constructor)
 
   const std::string& text() const noexcept { return text_; }
 
-  /// The file of a Unix socket, of at most 107 bytes; empty for all else.
+  /// Path of the Unix socket, at most 107 bytes; empty for other names.
   const std::string& unix_path() const noexcept { return unix_path_; }
 
-  /// What DNS-SD is to look for; empty for HOST:PORT.
+  /// The DNS-SD instance; empty for other names.
   const std::optional<dns_sd::Instance>& instance() const noexcept { return instance_; }
 
   struct Place {
-    std::vector<Address> addresses;  ///< the one to prefer first; at least one
-    std::string device;              ///< that DNS-SD names; empty: none
+    std::vector<Address> addresses;  ///< in order of preference; at least one
+    std::string device;              ///< from DNS-SD; empty: none
   };
 
-  /// Where this name leads. A numeric address is its own, at once; the file of a socket stands for "127.240.0.0:0". A
-  /// host name is looked up by the system (/etc/hosts, DNS, …), which waits, up to some seconds where no name server
-  /// answers; so does DNS-SD. Throws std::runtime_error when there is nothing: "cannot find haptics.lab: Name or
-  /// service not known".
+  /// Resolves the name. A numeric address is returned immediately; a Unix socket is represented by "127.240.0.0:0".
+  /// For host names and DNS-SD this blocks, up to some seconds if no name server answers. Throws std::runtime_error
+  /// if the name cannot be resolved: "cannot find haptics.lab: Name or service not known".
   ///
-  /// Anybody can announce any name, and without a key a client believes whoever answers. So a name of DNS-SD is refused
-  /// unless the caller `has_key`, and speaks with that key alone.
+  /// Any host can announce any DNS-SD name, and a client without a key trusts whichever server answers. DNS-SD names
+  /// are therefore refused unless the caller sets `has_key` and uses that key for all sessions.
   Place look_up(bool has_key = false) const;
 
-  /// This name, with the address in use where that is not the same: "haptics.lab:47100 (192.0.2.7:47100)".
+  /// Returns this name, followed by the address if it differs: "haptics.lab:47100 (192.0.2.7:47100)".
   std::string at(const Address& address) const;
 
  private:

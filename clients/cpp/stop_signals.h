@@ -5,9 +5,9 @@
 
 namespace tendon {
 
-/// While one lives, SIGINT and SIGTERM ask for a stop; a second one of the same kind ends the process as usual. One at a
-/// time in a process, because the signal handlers are the process's. A signal that slips in just before a sleep does not
-/// end it: sleep 100 ms at most.
+/// Catches SIGINT and SIGTERM during its lifetime. The first signal sets `asked`; a second one of the same kind
+/// terminates the process. Only one instance per process, because signal handlers are global. A signal that arrives
+/// immediately before a sleep does not interrupt it, so sleep for at most 100 ms.
 ///
 /// Thread-safe: no. Realtime-safe: no.
 class StopSignals {

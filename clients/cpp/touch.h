@@ -9,43 +9,44 @@
 
 namespace tendon {
 
-/// The physics engine's answer to one device state.
+/// The answer of a physics engine to one device state.
 struct Touch {
   Touch() = default;
-  /// Implicit, so that a callback may simply return a Vec3.
+  /// Implicit so that a callback can return a Vec3.
   Touch(const Vec3& f) : force(f) {}  // NOLINT(google-explicit-constructor)
 
-  Vec3 force = Vec3::Zero();  ///< N, on the hand: a wall that resists motion along +x sends −x
-  // The rest lets the device loop follow the hand until the next answer (core/remote/answer.h). The engine gives as
-  // much of it as it knows; the server uses it when both have agreed to `kFeatureLocalModel`.
+  Vec3 force = Vec3::Zero();  ///< N, acting on the hand: a wall that resists motion along +x pushes along −x
+  // The optional fields below allow the device loop to extrapolate the force until the next answer
+  // (core/remote/answer.h). The server uses them if `kFeatureLocalModel` is negotiated.
   std::optional<Mat3> stiffness{};  ///< N/m, −∂force/∂position at the state's position; a wall with normal n: k·n·nᵀ
-  double valid_radius = std::numeric_limits<double>::infinity();  ///< m, how far from there the stiffness holds
-  std::optional<Contact> contact{};  ///< the surface, with the force at other depths in a table where that is known
-  /// The body has been cut or torn since the previous answer: the server then uses neither answer's stiffness or table.
+  double valid_radius = std::numeric_limits<double>::infinity();  ///< m, distance from the state's position within
+                                                                  ///< which the stiffness is valid
+  std::optional<Contact> contact{};  ///< the contact surface, optionally with a table of force over depth
+  /// The body was cut or torn since the previous answer. The server discards the stiffness and table of both answers.
   bool topology_changed = false;
-  std::optional<double> error{};  ///< N, the engine's own estimate of the error of `force`; recorded with it
-  /// Which of Config::ways has answered, from 1 on; 0: not said. It is left out where there is none of that number
-  /// (Stats::left_out), and of a server that does not know `kFeatureWays`.
+  std::optional<double> error{};  ///< N, the engine's estimate of the error of `force`; for recordings
+  /// Index into Config::ways of the method that computed this answer, starting at 1; 0: unspecified. It is not sent
+  /// if the index is invalid (Stats::left_out) or the server does not support `kFeatureWays`.
   std::uint32_t way = 0;
-  // For a device whose handle has more motors than those of its position (ForceClient::handle()), of a server that
-  // knows `kFeatureHandle`; another one is sent `force` without these (Stats::left_out).
-  std::optional<Vec3> torque{};  ///< N·m, on the hand, base frame axes, about the handle's position
-  /// N·m/rad, −∂torque/∂θ at the state's orientation: with it the device loop follows the turning hand. Symmetric; a
-  /// spring is positive. Only in answer to a state with an orientation.
+  // For handles with additional actuators (ForceClient::handle()), if the server supports `kFeatureHandle`. Otherwise
+  // only `force` is sent (Stats::left_out).
+  std::optional<Vec3> torque{};  ///< N·m, acting on the hand, in the axes of the base frame, about the position of the
+                                 ///< handle
+  /// N·m/rad, −∂torque/∂θ at the orientation of the state; symmetric, and positive definite for a spring. Only valid
+  /// if the state has an orientation.
   std::optional<Mat3> angular_stiffness{};
-  std::optional<double> grip_force{};  ///< N, on the fingers of the gripper; > 0 opens them
-  /// How long the server may take this answer as fresh, for an engine that knows it: cut to 1 µs … limits::kMaxValidFor.
-  /// Empty: Config::valid_for.
+  std::optional<double> grip_force{};  ///< N, on the fingers in the gripper; > 0 opens them
+  /// Validity of this answer, clamped to 1 µs … limits::kMaxValidFor. Empty: Config::valid_for.
   std::optional<Duration> valid_for{};
-  /// The engine knows no force: nothing is sent, because a zero would look known. The rest does not matter.
+  /// The engine has no force for this state. Nothing is sent and the other fields are ignored.
   bool unknown = false;
 };
 
-/// All of `touch` as an answer to `hand`. `sequence`, `valid_for`, `device` and `channel` are the caller's to set.
-/// Angular stiffness without Turning in `hand` cannot be said and is left out.
+/// Converts `touch` to a command that answers `hand`. The caller must set `sequence`, `valid_for`, `device` and
+/// `channel`. The angular stiffness is omitted if `hand` has no Turning.
 ForceCommand to_command(const Touch& touch, const DeviceState& hand);
 
-/// What `command` says of the force, as an answer to the state that it was made for.
+/// Converts back. The result answers the state for which `command` was made.
 Touch to_touch(const ForceCommand& command);
 
 }  // namespace tendon

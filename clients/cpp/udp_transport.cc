@@ -23,8 +23,8 @@ namespace {
 
 using asio::ip::udp;
 
-/// Times that one receive() skips an empty datagram or an error report (ICMP "port unreachable", while
-/// no server is up): a flood of them must not keep us from sending.
+/// Maximum number of empty datagrams and errors (ICMP "port unreachable" while no server is running) that one
+/// receive() skips, so that a flood cannot prevent sending.
 constexpr int kMaxSkips = 64;
 
 udp::endpoint to_endpoint(const Address& address) {
@@ -35,14 +35,14 @@ udp::endpoint to_endpoint(const Address& address) {
 
 }  // namespace
 
-/// In place of the socket before. Asio has given it away: it watches its sockets with an epoll, which each datagram would
-/// wake, and nobody waits for.
+/// Replaces the socket with a descriptor that was released from Asio. Asio would add its sockets to an epoll
+/// instance, which every datagram would signal without need.
 void UdpTransport::use(int connected) noexcept {
   if (fd_ >= 0) ::close(fd_);
   fd_ = connected;
 }
 
-/// From a name of the kernel's (unix(7), autobind), so that the server can answer.
+/// Binds to an address chosen by the kernel (unix(7), autobind), so that the server can answer.
 void UdpTransport::connect_to_file() {
   const asio::local::datagram_protocol::endpoint file(name_.unix_path());
   try {
@@ -68,7 +68,7 @@ UdpTransport::UdpTransport(const ServerName& server, bool has_key) : name_(serve
 
 UdpTransport::~UdpTransport() { use(-1); }
 
-/// Connects to the first one that the system can reach, in their order, beginning with the one at `first`.
+/// Connects to the first reachable address, starting at index `first`.
 void UdpTransport::connect(const std::vector<Address>& addresses, std::size_t first) {
   if (!name_.unix_path().empty()) {
     connect_to_file();
@@ -110,7 +110,7 @@ void UdpTransport::send(const Address& to, std::span<const std::byte> datagram) 
 std::size_t UdpTransport::receive(Address& from, std::span<std::byte> buffer) {
   from = server_;
   for (int i = 0; i < kMaxSkips; ++i) {
-    // MSG_TRUNC: the size is that of the datagram, even when the buffer is smaller.
+    // MSG_TRUNC: returns the size of the datagram even if the buffer is smaller.
     const ssize_t size = ::recv(fd_, buffer.data(), buffer.size(), MSG_TRUNC);
     if (size > 0) return static_cast<std::size_t>(size);
     if (size < 0 && (errno == EAGAIN || errno == EWOULDBLOCK)) return 0;

@@ -42,7 +42,7 @@ class Help : public CLI::Formatter {
   }
 
  private:
-  /// Returns false for a fixed number of values, because the type has a name for each of them: "X,Y,Z".
+  /// Returns false for a fixed number of values, because the type already names each of them: "X,Y,Z".
   static bool takes_several(const CLI::Option& option) {
     return option.get_items_expected_max() > 1 && option.get_items_expected_min() != option.get_items_expected_max();
   }
@@ -57,7 +57,7 @@ class Help : public CLI::Formatter {
       }
       return words;
     }
-    if (option.get_positional()) return {};  // its name says it
+    if (option.get_positional()) return {};  // the name of the argument is enough
     for (const char* const check : {":FLOAT in [", ":INT in [", ":UINT in [", ":POSITIVE", ":NONNEGATIVE", ":FILE"}) {
       type.resize(std::min(type.find(check), type.size()));
     }

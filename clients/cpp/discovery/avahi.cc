@@ -23,21 +23,21 @@ namespace {
 constexpr const char* kAvahi = "org.freedesktop.Avahi";
 constexpr const char* kServer = "org.freedesktop.Avahi.Server";
 constexpr const char* kServiceBrowser = "org.freedesktop.Avahi.ServiceBrowser";
-constexpr int kAny = -1;  ///< interface, protocol
+constexpr int kAny = -1;  ///< any interface or protocol
 constexpr int kIpv4 = 0;
 constexpr int kIpv6 = 1;
 constexpr unsigned kNoAddress = 8;  ///< AVAHI_LOOKUP_NO_ADDRESS
 
-// µs. Avahi asks again after 1 and 3 s: a lost question does not matter.
+// µs. Avahi repeats queries after 1 and 3 s, so that the loss of one query does not matter.
 constexpr std::uint64_t kResolveFor = 3'000'000;
 constexpr std::uint64_t kBrowseFor = 4'000'000;
-/// Avahi says "all for now" a second after it has begun to ask. Where many answer, or answers were lost and asked for
-/// again, more come after that: a list is whole when so long nothing has come.
+/// Avahi reports "all for now" one second after the first query. With many answers, or after losses, more arrive
+/// later; a list is complete if nothing arrives for this time.
 constexpr std::uint64_t kQuiet = 1'000'000;
-/// After the first address: a host that answers by IPv4 and IPv6 answers at once.
+/// Wait after the first address, because a host with IPv4 and IPv6 answers over both immediately.
 constexpr std::uint64_t kOtherAddress = 200'000;
 
-/// No link has so many devices, and a stranger can announce for ever.
+/// Upper bound, because any host on the link can announce services without limit.
 constexpr std::size_t kMaxFound = 4096;
 
 struct Release {
@@ -49,10 +49,10 @@ int end_loop(sd_event_source* source, std::uint64_t /*at*/, void* /*unused*/) {
   return sd_event_exit(sd_event_source_get_event(source), 0);
 }
 
-/// A conversation with Avahi, on this thread, that is over after some time at the latest.
+/// A synchronous Avahi query with a deadline.
 class Conversation {
  public:
-  /// `what` is named in refusals.
+  /// `what` is part of the error messages.
   Conversation(std::string what, std::uint64_t longest) : what_(std::move(what)) {
     sd_event* loop = nullptr;
     expect(sd_event_new(&loop), "no event loop");
@@ -70,7 +70,7 @@ class Conversation {
   }
   void end() noexcept { sd_event_exit(loop_.get(), 0); }
 
-  /// Calls a method of Avahi's server; `answered` gets the answer, or an error.
+  /// Calls a method of the Avahi server. `answered` receives the answer or an error.
   template <class... Values>
   void call(sd_bus_message_handler_t answered, void* self, const char* method, const char* types, Values... values) {
     asked(
@@ -80,13 +80,13 @@ class Conversation {
     asked(sd_bus_match_signal_async(bus_.get(), nullptr, kAvahi, nullptr, interface, nullptr, heard, nullptr, self));
   }
 
-  /// Until end(), or the time is over. Throws what refused() has said.
+  /// Runs until end() or the deadline. Throws the error kept by refused().
   void run() {
     expect(sd_event_loop(loop_.get()), "the event loop ended");
     if (!refusal_.empty()) throw std::runtime_error(refusal_);
   }
 
-  /// Keeps the error for run(), unless it says that nobody has answered on the network.
+  /// Keeps the error for run(), unless it reports that no host answered.
   void refused(sd_bus_message* answer) {
     const sd_bus_error* error = sd_bus_message_get_error(answer);
     const std::string_view name = error->name;
@@ -109,7 +109,7 @@ class Conversation {
     throw std::runtime_error(refusal_);
   }
 
-  /// As expect(), for what libsystemd calls: no exception passes through it.
+  /// Like expect(), for callbacks of libsystemd, which exceptions must not cross.
   void asked(int result) {
     if (result >= 0) return;
     refuse("the D-Bus system bus is gone", std::generic_category().message(-result));
@@ -122,7 +122,7 @@ class Conversation {
   std::unique_ptr<sd_bus, Release> bus_;
 };
 
-/// The strings of an "aay".
+/// Reads an array of byte arrays ("aay").
 std::vector<std::string> read_strings(sd_bus_message* message) {
   std::vector<std::string> strings;
   if (sd_bus_message_enter_container(message, 'a', "ay") < 0) return strings;
@@ -137,7 +137,7 @@ std::vector<std::string> read_strings(sd_bus_message* message) {
 
 bool is_link_local(const Address& address) { return address.ip[0] == 0xFE && (address.ip[1] & 0xC0U) == 0x80U; }
 
-/// Fills `found` from an answer to ResolveService.
+/// Fills `found` from the answer to ResolveService.
 void read_service(sd_bus_message* answer, Found& found) {
   const char* host = nullptr;
   const char* ip = nullptr;
@@ -153,7 +153,7 @@ void read_service(sd_bus_message* answer, Found& found) {
   try {
     const Address address =
         parse_address((text.find(':') == std::string::npos ? text : "[" + text + "]") + ":" + std::to_string(port));
-    // Without an interface beside it, it leads nowhere.
+    // A link-local address is unusable without its interface.
     if (is_link_local(address)) return;
     found.addresses.insert(is_ipv4(address) ? found.addresses.begin() : found.addresses.end(), address);
   } catch (const std::invalid_argument&) {
@@ -165,7 +165,8 @@ class Resolution {
  public:
   explicit Resolution(const Instance& instance)
       : what_("dns-sd:" + to_string(instance)), avahi_(what_, kResolveFor), found_{.instance = instance} {
-    // Avahi does not tell IPv4 addresses over IPv6 (publish-a-on-ipv6): each kind is asked for over itself.
+    // By default, Avahi does not publish IPv4 addresses over IPv6 (publish-a-on-ipv6), so each family is queried over
+    // itself.
     for (const int family : {kIpv4, kIpv6}) {
       avahi_.call(answered, this, "ResolveService", "iisssiu", kAny, family, instance.name.c_str(), kService, kLocal,
                   family, 0U);
@@ -201,13 +202,13 @@ class Resolution {
   std::string what_;
   Conversation avahi_;
   Found found_;
-  int open_ = 2;  ///< questions
+  int open_ = 2;  ///< pending queries
 };
 
 class Browsing {
  public:
   Browsing() : avahi_(std::string("dns-sd: (") + kService + ")", kBrowseFor) {
-    avahi_.listen(kServiceBrowser, heard, this);  // before there is anything to hear
+    avahi_.listen(kServiceBrowser, heard, this);  // before the browser exists, so that no signal is missed
     avahi_.call(begun, this, "ServiceBrowserNew", "iissu", kAny, kAny, kService, kLocal, 0U);
   }
 
@@ -219,7 +220,7 @@ class Browsing {
   }
 
  private:
-  /// Of one instance. The address stays the same, because Avahi's answer comes to it.
+  /// State of one instance. Its address must not change, since callbacks of Avahi refer to it.
   struct One {
     Browsing* all;
     Found found;
@@ -248,7 +249,7 @@ class Browsing {
     return 0;
   }
 
-  /// Ends when nothing has come for a while.
+  /// Ends the query when nothing has arrived for a while.
   void watch() {
     watched_ = found_.size();
     avahi_.call_after(kQuiet, watched, this);
@@ -276,8 +277,8 @@ class Browsing {
 
   Conversation avahi_;
   std::map<std::string, One> found_;
-  std::size_t open_ = 0;     ///< questions
-  std::size_t watched_ = 0;  ///< had been found when watch() was called
+  std::size_t open_ = 0;     ///< pending queries
+  std::size_t watched_ = 0;  ///< size of found_ when watch() was called
 };
 
 }  // namespace

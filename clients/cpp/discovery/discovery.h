@@ -10,37 +10,37 @@
 #include "protocol/discovery.h"
 #include "protocol/link.h"
 
-/// Looks for servers by DNS-SD. ServerName (server_name.h) is the door for programs.
+/// Finds servers by DNS-SD. Programs use ServerName (server_name.h) instead.
 ///
-/// Of the domain "local" Avahi is asked, over D-Bus; of every other one the system's name servers. Nothing that is found
-/// is to be believed: anybody can announce any name.
+/// The domain "local" is queried through Avahi over D-Bus, other domains through the name servers of the system. The
+/// results are not trustworthy, because any host can announce any name.
 ///
-/// Each call waits, for at most some seconds, and throws std::runtime_error when nothing could be asked or nobody
-/// answered: what was looked for, where, and what to do. Thread-safe. Realtime-safe: no.
+/// Each function blocks for up to some seconds. It throws std::runtime_error if the query cannot be sent or is not
+/// answered. Thread-safe. Realtime-safe: no.
 namespace tendon::dns_sd {
 
 struct Found {
   Instance instance;
   About about{};
-  std::string host{};  ///< as is_domain(), "bench3.local"; empty: nobody has said it
+  std::string host{};  ///< satisfies is_domain(), "bench3.local"; empty: unknown
   std::uint16_t port = 0;
-  std::vector<Address> addresses{};  ///< of the host, the one to prefer first; of "local" alone, and not in a list
+  std::vector<Address> addresses{};  ///< addresses of the host in order of preference; only in "local", and not from
+                                     ///< browse()
 };
 
-/// Where `instance` is; one entry for each host that has it, the one to prefer first, at least one. Of "local" there is
-/// one, at the first address that came and what came 0.2 s after it; waits at most 3 s.
+/// Resolves `instance`. Returns one entry for each host in order of preference, at least one. In "local", returns one
+/// entry with the first address and those that arrive within 0.2 s after it; blocks for at most 3 s.
 std::vector<Found> resolve(const Instance& instance);
 
-/// All instances of a domain, by name; may be empty. Of "local" waits 1 to 4 s. The first kDescribed that come have
-/// their host and TXT record, where somebody answered for those: each is two more questions to everybody.
+/// Lists all instances in a domain by name; may be empty. In "local", blocks for 1 to 4 s. Only the first kDescribed
+/// instances are resolved to host and TXT record, because each costs two more multicast queries.
 std::vector<Found> browse(const std::string& domain);
 inline constexpr std::size_t kDescribed = 64;
 
-/// What the two do for the domain "local".
 std::vector<Found> resolve_by_avahi(const Instance& instance);
 std::vector<Found> browse_by_avahi();
 
-/// What the two do for other domains. `server`, an IPv4 address, is asked in place of the system's name servers.
+/// For other domains. `server`, an IPv4 address, replaces the name servers of the system.
 std::vector<Found> resolve_by_dns(const Instance& instance, const std::optional<Address>& server = {});
 std::vector<Found> browse_by_dns(const std::string& domain, const std::optional<Address>& server = {});
 

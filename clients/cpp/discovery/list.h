@@ -7,13 +7,12 @@
 
 namespace tendon {
 
-/// For a program that has read its command line: when `server` is "dns-sd:" or "dns-sd:.DOMAIN", prints what is found
-/// there on stdout and returns the exit code to leave with: 0, also when nothing is found, which stderr is told; 1 when
-/// nothing could be asked. Empty for the name of one server: go on.
+/// Lists servers if `server` is "dns-sd:" or "dns-sd:.DOMAIN", and returns the exit code: 0, also if none is found
+/// (with a message on stderr); 1 if the query failed. Returns nullopt for the name of a single server.
 ///
-/// A line for each device, the name as --server takes it, "dns-sd:falcon at bench 3", then what is said of it; with
-/// `json`, {"server":"dns-sd:falcon at bench 3","device":"falcon","hz":1000,"suite":1,"channels":["main"],"version":1,
-/// "host":"bench3.local","port":47100}. Nobody vouches for any of it.
+/// Prints one line for each device to stdout, first the name for --server, "dns-sd:falcon at bench 3", then its
+/// description. With `json`: {"server":"dns-sd:falcon at bench 3","device":"falcon","hz":1000,"suite":1,
+/// "channels":["main"],"version":1,"host":"bench3.local","port":47100}. The results are not authenticated.
 std::optional<int> list_servers(const ServerName& server, bool json);
 
 }  // namespace tendon

@@ -23,16 +23,16 @@ constexpr std::size_t kMaxAnswer = 65'535;
 struct Record {
   std::uint16_t type;
   std::vector<std::byte> data;
-  std::size_t at;  ///< of the data in the answer
+  std::size_t at;  ///< offset of the data in the answer
 };
 
-/// An answer, and the records in it that were asked for.
+/// An answer and its records of the requested type.
 struct Answer {
   std::vector<unsigned char> bytes;
   std::vector<Record> records;
 
-  /// The name at `offset` of a record's data, escaped as in zone files; empty when there is none. Of a name whose parts
-  /// point at each other in a ring there is none.
+  /// Returns the name at `offset` in a record's data, escaped as in zone files; empty if there is none or its
+  /// compression pointers form a loop.
   std::string name(const Record& record, std::size_t offset) const {
     std::array<char, NS_MAXDNAME> text{};
     const unsigned char* const end = bytes.data() + bytes.size();
@@ -67,7 +67,7 @@ class Resolver {
   Resolver(const Resolver&) = delete;
   Resolver& operator=(const Resolver&) = delete;
 
-  /// The records of that type; none when the name has none. Throws when nobody answers, or nothing of use.
+  /// Returns the records of a type; empty if the name has none. Throws if no name server gives a usable answer.
   Answer ask(const std::string& name, ns_type type) {
     Answer answer;
     answer.bytes.resize(kMaxAnswer);
@@ -103,14 +103,14 @@ class Resolver {
   struct __res_state state_ {};
 };
 
-/// The hosts of an instance, the one to prefer first (RFC 2782: the lowest priority; we take the heaviest of it).
+/// Returns the hosts of an instance in order of preference: lowest priority first (RFC 2782), then highest weight.
 std::vector<Found> hosts_of(Resolver& resolver, const Instance& instance) {
   constexpr std::size_t kTarget = 6;  // after priority, weight, port
   const Answer answer = resolver.ask(full_name(instance), ns_t_srv);
   std::vector<std::pair<std::pair<int, int>, Found>> ranked;
   for (const Record& record : answer.records) {
     const std::string host = answer.name(record, kTarget);
-    if (!is_domain(host)) continue;  // ".": decidedly not here
+    if (!is_domain(host)) continue;  // ".": the service is not available (RFC 2782)
     Found found{.instance = instance, .host = host, .port = two_bytes(record, 4)};
     ranked.emplace_back(std::pair<int, int>(two_bytes(record, 0), -two_bytes(record, 2)), std::move(found));
   }
@@ -150,7 +150,7 @@ std::vector<Found> browse_by_dns(const std::string& domain, const std::optional<
       if (instance.name.empty() || instance.domain != std::string(kService) + "." + domain) continue;
       all.push_back({.instance = {instance.name, domain}});
     } catch (const std::invalid_argument&) {
-      continue;  // no name that can be asked for
+      continue;  // not a valid name
     }
   }
   std::sort(all.begin(), all.end(), [](const Found& a, const Found& b) { return a.instance.name < b.instance.name; });

@@ -21,7 +21,7 @@ namespace {
 
 constexpr std::string_view kHeader = "tendon conversation 1";
 
-// What an answer may bring besides its force: a word, then its numbers.
+// Keywords of the optional fields of an answer.
 constexpr std::string_view kStiffness = "stiffness";
 constexpr std::string_view kRadius = "radius";
 constexpr std::string_view kContact = "contact";
@@ -29,11 +29,10 @@ constexpr std::string_view kTable = "table";
 constexpr std::string_view kCut = "cut";
 constexpr std::string_view kError = "error";
 
-/// One line, as it grows.
 class Line {
  public:
   void add(double value) {
-    if (std::isnan(value)) return add(std::string_view("nan"));  // whatever its bits are
+    if (std::isnan(value)) return add(std::string_view("nan"));  // regardless of its sign and payload
     std::array<char, 64> text{};
     const auto end = std::to_chars(text.data(), text.data() + text.size(), value, std::chars_format::hex).ptr;
     add(std::string_view(text.data(), static_cast<std::size_t>(end - text.data())));
@@ -109,7 +108,7 @@ std::string text_of(const Touch& touch) {
   return line.text();
 }
 
-/// The words of one line, taken one after another.
+/// Tokenizes a line.
 class Words {
  public:
   Words(std::uint64_t line, const std::string& text) : line_(line) {
@@ -117,7 +116,7 @@ class Words {
     for (std::string word; stream >> word;) words_.push_back(word);
   }
 
-  /// Whether the next word is this one; it is taken then.
+  /// Consumes the next word if it equals `word`. Returns whether it did.
   bool take_word(std::string_view word) {
     if (!more() || words_[next_] != word) return false;
     ++next_;

@@ -10,7 +10,7 @@
 namespace tendon {
 namespace {
 
-/// Puts the engine back at the end of a scope.
+/// Restores the engine at the end of a scope.
 class Restored {
  public:
   explicit Restored(const SavedState& state) : state_(state) {

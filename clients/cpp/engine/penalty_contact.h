@@ -5,23 +5,22 @@
 
 namespace tendon {
 
-/// A body's surface as seen from one point: the answer of a distance query.
+/// Result of a distance query between a point and the surface of a body.
 struct SurfacePoint {
-  double distance = 0;            ///< d, m, signed: < 0 inside the body
-  Vec3 normal = Vec3::UnitX();    ///< n = ∇d, out of the body; its length is not used
-  Mat3 curvature = Mat3::Zero();  ///< ∇∇d, 1/m: 0 for a plane, (I − n·nᵀ)/(distance to the centre) for a sphere
+  double distance = 0;            ///< d, m, signed: negative inside the body
+  Vec3 normal = Vec3::UnitX();    ///< n = ∇d, pointing out of the body; need not be normalized
+  Mat3 curvature = Mat3::Zero();  ///< ∇∇d, 1/m: 0 for a plane, (I − n·nᵀ)/(distance to the center) for a sphere
 };
 
-/// The force of a body that pushes back the more the deeper the hand is inside, and never pulls, with its exact
-/// stiffness; for engines whose own contact gives no force, and for shapes that are given by a distance alone:
+/// Penalty contact with its exact stiffness, for engines that detect contact but compute no force, and for signed
+/// distance functions. The force never pulls:
 ///
-///     F = max(0, −k·d − b·v·n)·n  where d < 0, else 0                  N, on the hand
-///     K = k·n·nᵀ + k·d·∇∇d        where F is not 0, else 0             N/m, for a hand at rest: without the share
-///                                                                      of b
+///     F = max(0, −k·d − b·v·n)·n  if d < 0, else 0                 N, acting on the hand
+///     K = k·n·nᵀ + k·d·∇∇d        if F ≠ 0, else 0                 N/m, without the contribution of b
 ///
-/// k N/m and b N·s/m. With b the force begins at b times the speed of the touch, and no sooner.
-/// A distance, normal or velocity that is not finite, or a normal of length 0, makes a force that is not finite, which
-/// ForceClient counts and does not send. Realtime-safe: yes.
+/// with k in N/m and b in N·s/m. With b > 0, the force jumps at contact to b times the approach speed. A distance,
+/// normal or velocity that is not finite, or a zero normal, results in a force that is not finite, which ForceClient
+/// does not send. Realtime-safe: yes.
 class PenaltyContact {
  public:
   struct Config {
@@ -29,10 +28,10 @@ class PenaltyContact {
     double damping = 0;      ///< b, ≥ 0
   };
 
-  /// Throws std::invalid_argument "FIELD = VALUE: expected …" when a value of `config` is impossible.
+  /// Throws std::invalid_argument "FIELD = VALUE: expected …" if `config` is invalid.
   explicit PenaltyContact(const Config& config);
 
-  /// The answer to a hand at that point with this velocity (m/s).
+  /// Returns the answer for a hand at that point with the given velocity (m/s).
   Touch touch(const SurfacePoint& surface, const Vec3& velocity) const noexcept;
 
  private:

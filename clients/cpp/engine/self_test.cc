@@ -25,11 +25,11 @@ namespace {
 using Verdict = SelfTest::Verdict;
 using Finding = SelfTest::Finding;
 
-/// Below this nobody has pressed anything.
+/// J. With less work than this, the hand has not touched anything.
 constexpr double kNothingJ = 1e-12;
-/// An engine that computes in single precision answers the same place twice to so much of the force.
+/// Relative force difference between two answers at the same place, for engines that use single precision.
 constexpr double kSameForce = 1e-6;
-/// A surface is near where the stiffness ahead differs from that behind by more than a fifth.
+/// Relative kink above which a surface is near: the one-sided stiffnesses differ by more than 20 %.
 constexpr double kSmoothKink = 0.1;
 
 bool usable(const Touch& touch) {
@@ -45,12 +45,11 @@ std::string words(const Vec3& v, const char* unit) {
   return out.str();
 }
 
-/// An answer that ends the present claim.
+/// Thrown by an answer that ends the current test.
 struct Unusable : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// The scripted hand: each state a period after the one before.
 class Hand {
  public:
   Hand(const Physics& engine, const SelfTestScript& script)
@@ -59,7 +58,7 @@ class Hand {
     state_.mode = Mode::kActive;
   }
 
-  /// Throws Unusable when the answer to a finite place is not.
+  /// Throws Unusable if the position is finite but the answer is not.
   Touch at(const Vec3& position, const Vec3& velocity = Vec3::Zero()) {
     ++state_.tick;
     state_.sampled += period_;
@@ -67,7 +66,7 @@ class Hand {
     state_.velocity = velocity;
     return again();
   }
-  /// The same state once more.
+  /// Repeats the last state.
   Touch again() const {
     Touch touch;
     try {
@@ -83,12 +82,13 @@ class Hand {
   }
   void pause(Duration time) { state_.sampled += time; }
 
-  /// Goes to `to` in a line, from rest to rest, at most at `speed`; `each` sees every place and answer.
+  /// Moves to `to` on a straight line from rest to rest at most at `speed`, and calls `each` with every position and
+  /// answer.
   template <typename Each>
   void go(const Vec3& to, double speed, Each each) {
     const Vec3 from = state_.position;
     const double length = (to - from).norm();
-    // x = from + (to − from)·(1 − cos(πs))/2 is fastest in the middle: π/2 of the mean.
+    // x = from + (to − from)·(1 − cos(πs))/2 has its maximum speed in the middle, π/2 times the mean.
     const double time = std::numbers::pi / 2 * length / speed;
     const auto steps = std::max(1L, std::lround(time * script_.rate_hz));
     for (long i = 1; i <= steps; ++i) {
@@ -106,11 +106,11 @@ class Hand {
   DeviceState state_;
 };
 
-/// What a force does along a way, by trapezoids.
+/// Integrates the work of a force along a path with the trapezoidal rule.
 class WorkAlong {
  public:
   WorkAlong(const Vec3& position, const Vec3& force) : position_(position), force_(force) {}
-  /// J, of the part that this adds.
+  /// Returns the work on the added segment, J.
   double to(const Vec3& position, const Vec3& force) {
     const double part = (force_ + force).dot(position - position_) / 2;
     position_ = position;
@@ -123,16 +123,16 @@ class WorkAlong {
   Vec3 force_;
 };
 
-/// What the engine has done to the hand along a way.
+/// Work done by the engine on the hand along a path.
 struct Work {
-  double given = 0;    ///< J, out of the engine less into it, so far
-  double most = 0;     ///< J, the largest of that at any time
-  double put_in = 0;   ///< J, by the hand, without what came back
-  double every_2 = 0;  ///< J, `given` by every second place alone
+  double given = 0;    ///< J, net energy from the engine to the hand so far
+  double most = 0;     ///< J, maximum of `given` along the path
+  double put_in = 0;   ///< J, work done by the hand, not reduced by returned energy
+  double every_2 = 0;  ///< J, `given` computed from every second sample
   double largest_n = 0;
 };
 
-/// Along `corners`, one after another, and back to where the hand is now.
+/// Moves along `corners` and back to the initial position.
 Work around(Hand& hand, std::vector<Vec3> corners, double speed) {
   corners.push_back(hand.position());
   const Vec3 first = hand.position();
@@ -197,7 +197,8 @@ class Tester {
     try {
       const Work work = around(hand_, std::move(corners), speed);
       felt_ = felt_ || work.largest_n > 0;
-      // Three times what the trapezoids are wrong by: of twice the width they are wrong by four times as much.
+      // Three times the trapezoidal-rule error, since doubling the step quadruples the error (Richardson
+      // extrapolation).
       const double doubt = std::abs(work.given - work.every_2);
       const double bound = std::max(script_.work_tolerance * work.put_in + doubt, kNothingJ);
       std::ostringstream why;
@@ -219,12 +220,12 @@ class Tester {
         bound);
   }
 
-  /// To where the next claim begins, whatever is answered.
+  /// Moves to the start of the next test, ignoring errors.
   void hand_back() {
     try {
       hand_.at(script_.start);
     } catch (const Unusable&) {
-      // It has been said, or will be.
+      // already reported, or reported by the next test
     }
   }
 
@@ -243,7 +244,7 @@ class Tester {
 
   void judge_stiffness_at(const Vec3& place, const std::string& claim) {
     hand_.go(place, script_.speed, [](const Vec3&, const Touch&) {});
-    // At rest for a fifth of a second, so that what a body does of itself has died down.
+    // Rest for 0.2 s, so that the body settles.
     for (int i = 0; i < std::lround(script_.rate_hz / 5); ++i) hand_.at(place);
     const Touch touch = hand_.at(place);
     if (!touch.stiffness) return add(Verdict::kNotJudged, claim, "it gives none");
@@ -262,7 +263,7 @@ class Tester {
     add(off <= bound ? Verdict::kPassed : Verdict::kFailed, claim, why.str(), off, bound);
   }
 
-  /// N/m, what a difference of single-precision forces is worth.
+  /// N/m, roundoff error of a finite difference of single-precision forces.
   double roundoff(const Vec3& force) const {
     return std::numeric_limits<float>::epsilon() * force.norm() / script_.stiffness_step;
   }

@@ -16,7 +16,7 @@ int main(int argc, char** argv) {
   if (const auto exit_code = line.parse(argc, argv)) return *exit_code;
 
   constexpr double kTable = 1000, kBristle = 500;  // N/m
-  std::optional<Vec3> foot;                        // of the bristle, on the table; empty: it does not touch
+  std::optional<Vec3> foot;                        // end point of the bristle on the table; empty: no contact
   return run(options, [&](const DeviceState& hand) -> Touch {
     const double depth = height_mm / 1000 - hand.position.y();
     if (depth <= 0) foot.reset();
@@ -25,7 +25,7 @@ int main(int argc, char** argv) {
     const Vec3 bend = at - foot.value_or(at);
     const double length = bend.norm() > 0 ? bend.norm() : 1;
     const double slip = std::min(1.0, friction * kTable * depth / kBristle / length);
-    foot = at - slip * bend;  // it follows, so that the force stays at the limit
+    foot = at - slip * bend;  // slides so that the force stays at the limit
     return Vec3(Vec3(0, kTable * depth, 0) - kBristle * slip * bend);
   });
 }

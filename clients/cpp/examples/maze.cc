@@ -15,7 +15,7 @@ int main(int argc, char** argv) {
 
   const std::string maze[] = {"#########", "#   #   #", "# #   # #", "#   #   #", "#########"};
   constexpr double kCell = 0.008, kStiffness = 1200;  // m, N/m; the middle cell is at the origin
-  std::array<std::size_t, 2> room = {4, 2};           // where the hand is, were the walls rigid
+  std::array<std::size_t, 2> room = {4, 2};           // the cell of the hand if the walls were rigid
   return run(options, [&](const DeviceState& hand) -> Touch {
     const double at[] = {hand.position.x() / kCell + 4.5, 2.5 - hand.position.y() / kCell};  // in cells
     Vec3 force(0, 0, -200 * hand.position.z());

@@ -18,7 +18,7 @@ int main(int argc, char** argv) {
   Pose tool{.position =
                 Vec3(0.4, 0, 0.04)};  // m: your robot's pose, motion and force sensor go into these three places
   const auto move = [&](const std::optional<Pose>& target) {
-    if (target) tool = *target;  // else the robot holds its place
+    if (target) tool = *target;  // otherwise the robot holds its pose
   };
   options.on_silence = [&](LocalTime now) { move(follow.silence(now)); };
   return run(options, [&](const DeviceState& hand) {

@@ -19,7 +19,7 @@ int main(int argc, char** argv) {
     const double per_metre = 2 * std::numbers::pi / (pitch_mm / 1000);
     const double phase = per_metre * hand.position.x();  // 0 in the middle of a groove
     Touch corduroy = Vec3(-force_n * std::sin(phase), 0, 0);
-    const double stiffness = force_n * per_metre * std::cos(phase);  // below 0 on a ridge: it throws the hand off
+    const double stiffness = force_n * per_metre * std::cos(phase);  // negative on a ridge: unstable equilibrium
     corduroy.stiffness = Vec3(stiffness, 0, 0).asDiagonal();
     return corduroy;
   });

@@ -15,7 +15,7 @@ int main(int argc, char** argv) {
   line.add("--length-mm", length_mm, "At which it is at rest", 1);
   if (const auto exit_code = line.parse(argc, argv)) return *exit_code;
 
-  std::map<std::string, Vec3> ends;  // of the rod, m, in the frame between the two devices
+  std::map<std::string, Vec3> ends;  // of the rod, m, in the frame centered between the two devices
   const auto rod = [&](const char* mine, const char* other, double device_x, const DeviceState& hand) -> Touch {
     const Vec3 end = ends[mine] = hand.position + Vec3(device_x, 0, 0);
     const Vec3 along = ends.contains(other) ? Vec3(end - ends[other]) : Vec3(0, 0, 0);

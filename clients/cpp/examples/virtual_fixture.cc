@@ -24,7 +24,7 @@ int main(int argc, char** argv) {
     flat.stiffness = Vec3(0, k, 0).asDiagonal();
     if (shape == "plane") return flat;
     if (shape == "line") return Vec3(-k * aside);
-    if (up.y() <= -away * slope) return Vec3(-k * hand.position);  // nothing of the cone is nearer than its tip
+    if (up.y() <= -away * slope) return Vec3(-k * hand.position);  // the tip is the closest point of the cone
     // Along the cone's normal, which is (1, -slope) in radius and height.
     const double out = (away - slope * up.y()) / (1 + slope * slope);
     return out <= 0 ? Vec3(0, 0, 0) : Vec3(-k * out * (aside / away - Vec3(0, slope, 0)));

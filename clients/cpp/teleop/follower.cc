@@ -14,8 +14,8 @@ namespace {
 
 using std::chrono::milliseconds;
 
-constexpr double kSmoothingNs = 1e9;                  // time constant of the delay that counts as usual
-constexpr Duration kLongestStep = milliseconds(100);  // a robot program that paused does not catch up at once
+constexpr double kSmoothingNs = 1e9;                  // time constant of the delay filter
+constexpr Duration kLongestStep = milliseconds(100);  // after a pause of the robot program, the target does not jump
 constexpr Duration kHold = milliseconds(20);
 constexpr Duration kLost = milliseconds(250);
 
@@ -61,7 +61,7 @@ bool is_finite(const Pose& pose) {
   return pose.position.allFinite() && std::isfinite(q.w + q.x + q.y + q.z) && std::isfinite(pose.grip.value_or(0));
 }
 
-/// Of a way, so that no more than `most` is gone.
+/// Returns the factor that limits a displacement of length `whole` to `most`.
 double share(double whole, double most) { return whole <= most ? 1 : most / whole; }
 
 }  // namespace
@@ -91,7 +91,7 @@ bool Follower::set_scale(double scale, double force_scale) {
 
 std::optional<Pose> Follower::target(const DeviceState& hand, const Pose& pose, LocalTime now) noexcept {
   double elapsed = advance(now);
-  if (hand.tick < tick_) lose();  // another server, or the same one anew
+  if (hand.tick < tick_) lose();  // the server has been replaced or restarted
   const Duration old = take(hand);
   if (old > late_ + kLost) lose();
   const bool fresh = phase_ != Following::kLost && old <= late_;
@@ -148,7 +148,7 @@ Touch Follower::touch(const std::optional<ToolContact>& contact) noexcept {
   return felt;
 }
 
-/// Time passes; s since the last time, bounded.
+/// Advances the time. Returns the elapsed time in s, at most kLongestStep.
 double Follower::advance(LocalTime now) noexcept {
   const Duration elapsed = std::clamp<Duration>(now - now_, Duration::zero(), kLongestStep);
   now_ = std::max(now, now_);
@@ -156,13 +156,13 @@ double Follower::advance(LocalTime now) noexcept {
   return seconds(elapsed);
 }
 
-/// Of the newest state, beyond the smoothed delay.
+/// Age of the newest state, beyond the smoothed delay.
 Duration Follower::age() const noexcept {
   if (!base_) return Duration::zero();
   return (now_ - base_->came) - (sampled_ - base_->sampled) - Duration(std::llround(usual_ns_));
 }
 
-/// A new state; its age as it comes. The first one after silence says what delay is usual.
+/// Records a new state and returns its age on arrival. The first state after a silence defines the base of the delay.
 Duration Follower::take(const DeviceState& hand) noexcept {
   if (!base_) {
     base_ = {now_, hand.sampled};
@@ -188,7 +188,7 @@ void Follower::lose() noexcept {
   tick_ = 0;
 }
 
-/// What the operator does.
+/// Handles the clutch button and engage().
 void Follower::act(const DeviceState& hand, const Pose& pose, bool fresh) noexcept {
   const bool held = config_.clutch_button && ((hand.buttons >> *config_.clutch_button) & 1U) != 0;
   const bool pressed = held && !held_;
@@ -208,7 +208,7 @@ void Follower::act(const DeviceState& hand, const Pose& pose, bool fresh) noexce
   }
 }
 
-/// Engaged from a map that moves nothing now.
+/// Engages with an offset that keeps the target at the current pose.
 void Follower::begin(const DeviceState& hand, const Pose& pose) noexcept {
   phase_ = Following::kEngaged;
   gain_from_ = now_;
@@ -218,7 +218,7 @@ void Follower::begin(const DeviceState& hand, const Pose& pose) noexcept {
   waits_ = true;
 }
 
-/// The target goes to the hand's place, no faster than it may.
+/// Moves the target toward the pose of the hand within the speed limits.
 void Follower::approach(const DeviceState& hand, double seconds) noexcept {
   const Vec3 wanted = pose0_.position + scale_ * rotated(turn_, masked(hand.position - hand0_));
   const Vec3 way = wanted - target_.position;

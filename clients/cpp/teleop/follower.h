@@ -10,32 +10,32 @@
 
 namespace tendon {
 
-/// Of a robot's tool, in the robot's frame; of a target, what the tool is to reach.
+/// Pose of the robot's tool, or its target, in the frame of the robot.
 struct Pose {
   Vec3 position = Vec3::Zero();       ///< m
-  std::optional<Quat> orientation{};  ///< unit quaternion; empty: position alone is followed
+  std::optional<Quat> orientation{};  ///< unit quaternion; empty: only the position is controlled
   std::optional<double> grip{};       ///< opening of the gripper, m or rad; empty: no gripper
 };
 
-/// What the surroundings exert on the tool, in the robot's frame: a table below pushes up.
+/// Force that the environment exerts on the tool, in the frame of the robot. A table below the tool pushes up.
 struct ToolContact {
   Vec3 force = Vec3::Zero();           ///< N
-  std::optional<Vec3> torque{};        ///< N·m, about the tool's position
-  std::optional<double> stiffness{};   ///< N/m, > 0, of the surface along its normal, where it is known
-  std::optional<Vec3> normal{};        ///< out of the body, to the tool, of any length; empty: along the force
+  std::optional<Vec3> torque{};        ///< N·m, about the position of the tool
+  std::optional<double> stiffness{};   ///< N/m, > 0, of the surface along its normal, if known
+  std::optional<Vec3> normal{};        ///< points from the surface to the tool, any length; empty: along the force
   std::optional<double> grip_force{};  ///< N, on the fingers; > 0 opens them
 };
 
 enum class Following : std::uint8_t {
-  kAlone = 1,     ///< no state has come
-  kCoupled = 2,   ///< states come; the robot stands until somebody engages
-  kEngaged = 4,   ///< the robot follows
-  kClutched = 5,  ///< the hand moves freely, the robot holds its place
-  kLost = 6,      ///< silence; never engaged again without the act
+  kAlone = 1,     ///< no state has arrived
+  kCoupled = 2,   ///< states arrive; the robot stands still until the operator engages
+  kEngaged = 4,   ///< the robot follows the hand
+  kClutched = 5,  ///< the hand moves freely and the robot holds its pose
+  kLost = 6,      ///< states stopped; the operator must engage again
 };
 
-/// A robot follows the hand at a Tendon server, and the hand feels what the robot touches: map, clutch, loss ladder and
-/// signs. It has no clock, thread or socket.
+/// Teleoperation of a robot by the hand at a Tendon server, with force feedback. Implements the position mapping, the
+/// clutch, and the reaction to loss of connection. It has no clock, thread or socket.
 ///
 ///     Follower follow({.scale = 0.5, .clutch_button = 1});
 ///     const auto move = [&](const std::optional<Pose>& target) { target ? robot.go_to(*target) : robot.hold(); };
@@ -45,69 +45,72 @@ enum class Following : std::uint8_t {
 ///       return follow.touch(robot.contact());
 ///     });
 ///
-/// Position p, orientation q; l is the hand (the leader), f the tool (the follower), 0 the moment of engaging:
+/// With positions p, orientations q, the hand l (leader), the tool f (follower), and 0 for the values at the time of
+/// engaging:
 ///
-///     p_f = p_f0 + s_x R M (p_l − p_l0)        q_f = (R q_l q_l0⁻¹ R⁻¹) q_f0        M leaves out axes not coupled
+///     p_f = p_f0 + s_x R M (p_l − p_l0)        q_f = (R q_l q_l0⁻¹ R⁻¹) q_f0        M selects the coupled axes
 ///     F_l = s_f M Rᵀ F_f                       τ_l = s_f / s_x Rᵀ τ_f               K_l = s_f s_x M Rᵀ K_f R M
 ///
-/// so what the hand pays in power is s_f / s_x of what the tool gives. Nothing moves before the act of engaging, by
-/// the button or engage(). The pose of that moment is the offset: neither engaging nor releasing the clutch moves the
-/// robot. The age of the newest state beyond the smoothed delay decides when states stop, v being three periods and at
-/// least 20 ms:
+/// so the power at the hand is s_f / s_x times the power at the tool. The robot does not move before the operator
+/// engages, by the button or by engage(). The poses at that time define the offset, so neither engaging nor releasing
+/// the clutch moves the robot. The reaction to missing states depends on the age of the newest state beyond the
+/// smoothed delay, where v is three periods, at least 20 ms:
 ///
-///     v             the target stays where it is
-///     v + 20 ms     no target: the robot holds its place
-///     v + 250 ms    lost: a new state couples again, only a new act engages
+///     v             the target stops
+///     v + 20 ms     no target: the robot must hold its pose
+///     v + 250 ms    lost: new states couple again, but the operator must engage again
 ///
-/// The two clocks are never compared. A fault or a disarmed device disengages, as does a pose that is not finite.
-/// Written also in Python and TypeScript; tests/clients/follower_cases.json holds all three to the same numbers.
+/// Absolute times of the two clocks are never compared. A fault, a disarmed device, or a pose that is not finite
+/// disengages. There are equivalent implementations in Python and TypeScript; tests/clients/follower_cases.json
+/// checks all three.
 ///
 /// Thread-safe: no. Realtime-safe: yes, except the constructor and set_scale when they throw.
 class Follower {
  public:
   enum class EngageBy : std::uint8_t {
-    kButton,  ///< of the clutch, pressed and released; with `toggle`, pressed
-    kCall,    ///< engage()
+    kButton,  ///< pressing and releasing the clutch button; with `toggle`, pressing it
+    kCall,
   };
   struct Config {
-    double scale = 1;          ///< s_x, follower / leader, 0.01 … 100
-    double force_scale = 1;    ///< s_f, leader / follower, 0.01 … 100
-    Quat rotation{};           ///< R, turns the device's base frame into the robot's; length 1 ± 1e-3
-    std::string axes = "xyz";  ///< of the device, coupled; the others are free and feel nothing
-    std::optional<std::uint32_t> clutch_button{};  ///< 0 … 31; held: clutched. Empty: engage() and disengage() alone
-    bool toggle = false;                           ///< each press of the button changes between engaged and clutched
+    double scale = 1;                              ///< s_x, motion of the follower / motion of the leader, 0.01 … 100
+    double force_scale = 1;                        ///< s_f, force on the leader / force on the follower, 0.01 … 100
+    Quat rotation{};                               ///< R, from the device base frame to the robot frame; norm 1 ± 1e-3
+    std::string axes = "xyz";                      ///< coupled axes of the device; the others move freely without force
+    std::optional<std::uint32_t> clutch_button{};  ///< 0 … 31, clutched while pressed. Empty: only engage() and
+                                                   ///< disengage()
+    bool toggle = false;                           ///< each press switches between engaged and clutched
     EngageBy engage_by = EngageBy::kButton;
-    double speed = 0.25;      ///< m/s, 0.001 … 10: no target moves faster
-    double spin = 2;          ///< rad/s, 0.01 … 100: nor turns faster
-    double ramp_s = 0.3;      ///< 0 … 10, in which the force grows from 0 to all of it after engaging
-    double grip_ratio = 1;    ///< opening of the robot's gripper / that of the hand's, 0.001 … 1000
-    double grip_speed = 0.1;  ///< m/s or rad/s, 0.001 … 100, of the gripper
-    double rate_hz = 500;     ///< states per second that target() is given, 1 … 100000
+    double speed = 0.25;      ///< m/s, 0.001 … 10, maximum speed of the target
+    double spin = 2;          ///< rad/s, 0.01 … 100, maximum angular speed of the target
+    double ramp_s = 0.3;      ///< 0 … 10, duration of the force ramp after engaging
+    double grip_ratio = 1;    ///< opening of the robot's gripper / opening of the hand's gripper, 0.001 … 1000
+    double grip_speed = 0.1;  ///< m/s or rad/s, 0.001 … 100, maximum speed of the gripper
+    double rate_hz = 500;     ///< rate at which target() is called, 1 … 100000
   };
 
-  /// Throws std::invalid_argument "FIELD = VALUE: expected …" when a value of `config` is impossible.
+  /// Throws std::invalid_argument "FIELD = VALUE: expected …" if `config` is invalid.
   explicit Follower(const Config& config);
 
   Following phase() const noexcept { return phase_; }
-  /// The newest sentence for the operator; empty: none.
+  /// Newest message for the operator; empty: none.
   std::string_view words() const noexcept { return words_; }
 
-  /// The act, for the next state. False, and nothing happens, unless states come and the robot does not follow.
+  /// Engages at the next state. Returns false and does nothing unless phase() is kCoupled.
   bool engage() noexcept { return asked_ = phase_ == Following::kCoupled; }
-  /// The robot stands until the next act.
+  /// Stops the robot until the operator engages again.
   void disengage() noexcept;
-  /// False, and nothing changes, while the robot follows. Throws std::invalid_argument when a scale is out of its
+  /// Returns false and changes nothing while the robot follows. Throws std::invalid_argument if a scale is out of
   /// bounds.
   bool set_scale(double scale, double force_scale);
 
-  /// Where the tool is to go, no faster than `speed`; empty: hold. `pose`: where the tool is. `now`: when the state
-  /// came, of a clock that does not go back.
+  /// Returns the next target of the tool, which moves at most at `speed`; empty: the robot must hold its pose. `pose`
+  /// is the current pose of the tool. `now` is the arrival time of the state, from a monotonic clock.
   std::optional<Pose> target(const DeviceState& hand, const Pose& pose, LocalTime now) noexcept;
-  /// The same while no state comes, every few milliseconds: the frozen target, then none.
+  /// Must be called every few milliseconds while no state arrives. Returns the last target at first, then empty.
   std::optional<Pose> silence(LocalTime now) noexcept;
 
-  /// What the hand feels of the tool's contact; nothing while the robot does not follow. Empty `contact`: a Touch that
-  /// is not sent (Touch::unknown), because a zero would look measured.
+  /// Returns the force on the hand for a contact of the tool; zero while the robot does not follow. If `contact` is
+  /// empty, returns a Touch that is not sent (Touch::unknown), because a zero force would look like a measurement.
   Touch touch(const std::optional<ToolContact>& contact) noexcept;
 
  private:
@@ -129,19 +132,19 @@ class Follower {
   Following phase_ = Following::kAlone;
   std::string_view words_{};
   bool asked_ = false;
-  bool held_ = true;  ///< the button at the newest state: only one that was seen free can be pressed
+  bool held_ = true;  ///< button in the newest state. Initially true, so that a press counts only after a release
   std::uint64_t tick_ = 0;
   PeerTime sampled_{};
-  /// Of the state that began the link, when it came and when it was sampled: the others are counted from it.
+  /// Arrival and sampling time of the first state. Delays are measured relative to it.
   struct Base {
     LocalTime came;
     PeerTime sampled;
   };
   std::optional<Base> base_{};
-  double usual_ns_ = 0;  ///< smoothed delay, less that of the first state
+  double usual_ns_ = 0;  ///< smoothed delay, relative to that of the first state
   LocalTime now_{};
   LocalTime gain_from_{};
-  bool waits_ = false;  ///< the robot was told to hold since the newest target
+  bool waits_ = false;  ///< target() has returned empty since the last target
   Vec3 hand0_ = Vec3::Zero();
   std::optional<Quat> turned0_{};
   Pose pose0_{};

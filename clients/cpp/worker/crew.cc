@@ -32,12 +32,12 @@
 namespace tendon::worker {
 namespace {
 
-/// Connections that have not said the secret yet.
+/// Maximum number of connections that have not sent the secret.
 constexpr std::size_t kMostStrangers = 8;
 
 [[noreturn]] void fail_with(const std::string& what) { throw std::system_error(errno, std::generic_category(), what); }
 
-/// A file descriptor, closed at the end.
+/// An owned file descriptor.
 class File {
  public:
   File() = default;
@@ -57,7 +57,7 @@ class File {
   int fd_ = -1;
 };
 
-/// A folder that only this user can enter, removed at the end with the socket in it.
+/// A private directory that is removed in the destructor together with the socket in it.
 class PrivateFolder {
  public:
   PrivateFolder() {
@@ -90,7 +90,7 @@ File listen_at_path(const std::string& path) {
   return file;
 }
 
-/// Listens at `name`, whose port may be 0, and puts the port in use into it.
+/// Listens at `name`. If its port is 0, `port` receives the assigned port.
 File listen_at(const ServerName& name, std::uint16_t& port) {
   const Address address = name.look_up().addresses.front();
   if (address.ip == parse_address("0.0.0.0:0").ip || address.ip == Address{}.ip) {
@@ -115,7 +115,6 @@ File listen_at(const ServerName& name, std::uint16_t& port) {
   return file;
 }
 
-/// The parent of each process.
 std::map<pid_t, pid_t> parents() {
   std::map<pid_t, pid_t> parents;
   std::error_code ignored;
@@ -126,7 +125,7 @@ std::map<pid_t, pid_t> parents() {
     std::ifstream file(entry.path() / "stat");
     std::string text;
     std::getline(file, text);
-    const auto name_ends = text.rfind(')');  // "12 (a name) S 11 …"
+    const auto name_ends = text.rfind(')');  // format: "12 (a name) S 11 …"
     if (name_ends == std::string::npos || name_ends + 4 > text.size()) continue;
     pid_t parent = 0;
     std::from_chars(text.data() + name_ends + 4, text.data() + text.size(), parent);
@@ -135,7 +134,7 @@ std::map<pid_t, pid_t> parents() {
   return parents;
 }
 
-/// All descendants of this process but `but` and its own.
+/// Returns all descendants of this process except `but` and its descendants.
 std::vector<pid_t> descendants(pid_t but) {
   const std::map<pid_t, pid_t> parent_of = parents();
   const pid_t self = ::getpid();
@@ -169,8 +168,8 @@ struct Crew::Files {
   File listener;
   File stream;
   std::vector<Stranger> strangers;
-  pid_t pid = 0;  ///< of the program; 0: none runs
-  File process;   ///< readable when it has ended
+  pid_t pid = 0;  ///< of the program; 0: not running
+  File process;   ///< readable when the program has ended
 
   void watch(const File& file) const {
     epoll_event event{};
@@ -226,7 +225,7 @@ void Crew::launch(const std::string& secret) {
   const pid_t self = ::getpid();
   const pid_t pid = ::fork();
   if (pid < 0) fail_with("cannot start a process");
-  if (pid == 0) {  // only what may be done after fork()
+  if (pid == 0) {  // only async-signal-safe calls from here
     sigset_t none;
     sigemptyset(&none);
     ::pthread_sigmask(SIG_SETMASK, &none, nullptr);
@@ -254,7 +253,8 @@ void Crew::kill() {
   reap();
 }
 
-/// Ends what is left of earlier programs, and buries what has ended. The present program is left alone.
+/// Kills the remaining processes of earlier programs and reaps terminated children. Does not affect the current
+/// program.
 void Crew::reap() {
   if (ending_) {
     for (const pid_t pid : descendants(files_->pid != 0 ? files_->pid : -1)) ::kill(pid, SIGKILL);
@@ -270,7 +270,7 @@ void Crew::reap() {
   if (ending_) ending_ = !descendants(files_->pid != 0 ? files_->pid : -1).empty();
 }
 
-/// The worker is of no use any more. Only the first reason counts.
+/// Reports that the worker is unusable. Only the first reason is reported.
 void Crew::fail(const std::string& why) {
   files_->stream = File();
   secret_.clear();
@@ -316,7 +316,7 @@ void Crew::read_stream() {
       files_->stream = std::move(stranger.file);
       reader_ = std::move(stranger.reader);
       files_->strangers.clear();
-      secret_.clear();  // it opens once
+      secret_.clear();  // a secret opens the stream only once
       events_.emplace_back(Opened{});
     } else if (first || !keep) {
       files_->strangers.erase(files_->strangers.begin() + static_cast<std::ptrdiff_t>(i));
@@ -332,7 +332,7 @@ void Crew::read_stream() {
     return fail(error.what());
   }
   if (!more) {
-    reap();  // a program that has ended says more than its stream
+    reap();  // the exit status explains more than the end of the stream
     fail("its stream has ended");
   }
 }

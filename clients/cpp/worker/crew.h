@@ -11,37 +11,39 @@
 
 namespace tendon::worker {
 
-/// The worker's program and the stream to it. One worker at a time: `mpirun` with all its ranks counts as one.
+/// Launches the worker program and owns the stream to it. Only one worker at a time; `mpirun` with all its ranks
+/// counts as one.
 ///
-/// The stream is a Unix socket in a folder that only this user can enter, or, with Config::listen, TCP without delay.
-/// The program learns the address and a secret by its environment (stream.h). Each launch has a new secret, and one
-/// program may open the stream once with it. TCP is in the clear: for a network where only the cluster listens.
+/// The stream is a Unix socket in a directory that is accessible only to this user, or, with Config::listen, TCP
+/// without Nagle's algorithm. The program receives the address and a secret in its environment (stream.h). Each
+/// launch has a new secret, which opens the stream once. TCP is not encrypted: use it only in the network of a
+/// cluster.
 ///
-/// Everything that the program starts is ended with it, even what has left its process group, as Open MPI's ranks do:
-/// this process adopts orphans (PR_SET_CHILD_SUBREAPER) and kills all its descendants. When this process dies, the
-/// kernel kills the program that it started, and a worker ends with its stream. What runs on other machines ends with
-/// its launcher there. One in a process: any other child of this process is ended, too.
+/// All processes started by the program are killed with it, including those that left its process group, as the ranks
+/// of Open MPI do: this process adopts orphans (PR_SET_CHILD_SUBREAPER) and kills all its descendants. If this
+/// process dies, the kernel kills the program, and workers end with their stream. Processes on other machines end
+/// with their launcher there. Only one Crew per process, because it kills all other children of the process as well.
 ///
 /// Thread-safe: no. Realtime-safe: no.
 class Crew {
  public:
   struct Config {
-    std::string command;   ///< for /bin/sh; its standard output goes to this one's standard error
-    std::string listen{};  ///< "HOST:PORT" for TCP; port 0: any
+    std::string command;   ///< for /bin/sh; its stdout is redirected to stderr
+    std::string listen{};  ///< "HOST:PORT" for TCP; port 0: any free port
   };
 
-  /// Throws std::system_error or std::runtime_error when the address cannot be had.
+  /// Throws std::system_error or std::runtime_error if it cannot listen at the address.
   explicit Crew(const Config& config);
-  /// Ends what is there.
+  /// Kills the running program.
   ~Crew();
   Crew(const Crew&) = delete;
   Crew& operator=(const Crew&) = delete;
 
-  /// Starts the program; `secret` is kSecretDigits hexadecimal digits. Throws std::system_error.
+  /// Starts the program. `secret` must consist of kSecretDigits hexadecimal digits. Throws std::system_error.
   void launch(const std::string& secret);
-  /// SIGKILL, and the end of the stream. Processes that are not gone at once are killed again with each turn.
+  /// Sends SIGKILL and closes the stream. Remaining processes are killed again in each turn.
   void kill();
-  /// Sends a record. A worker that does not read it is one whose stream has ended.
+  /// Sends a record. The stream is ended if the worker does not read it.
   void send(const Record& record);
 
   struct Opened {};
@@ -49,12 +51,12 @@ class Crew {
     std::string why;
   };
   using Event = std::variant<Opened, Record, Ended>;
-  /// The next thing that has happened; call it until it is empty. Of each program, one Ended.
+  /// Returns the next event; call until it returns empty. There is one Ended event for each program.
   std::optional<Event> next();
-  /// For poll(): readable when next() has something.
+  /// File descriptor for poll(). Readable if next() has an event.
   int descriptor() const noexcept;
 
-  /// What the program is told: "unix:PATH" or "tcp:HOST:PORT".
+  /// Address passed to the program: "unix:PATH" or "tcp:HOST:PORT".
   const std::string& address() const noexcept { return address_; }
 
  private:
@@ -70,8 +72,8 @@ class Crew {
   std::unique_ptr<Files> files_;
   RecordReader reader_;
   std::vector<Event> events_;
-  bool ended_ = false;   ///< it has been said of the present program
-  bool ending_ = false;  ///< processes of earlier programs are left
+  bool ended_ = false;   ///< Ended has been reported for the current program
+  bool ending_ = false;  ///< processes of earlier programs still exist
 };
 
 }  // namespace tendon::worker

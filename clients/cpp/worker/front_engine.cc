@@ -12,7 +12,6 @@
 namespace tendon::worker {
 namespace {
 
-/// A new one for each launch.
 std::string secret_from_system() {
   constexpr std::string_view kDigits = "0123456789abcdef";
   std::string secret;

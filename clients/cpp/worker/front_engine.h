@@ -11,19 +11,20 @@
 
 namespace tendon::worker {
 
-/// A front: an engine for run() whose answers come from a worker, a program that may take its time, stop or die. The
-/// session with the server goes on whatever the worker does.
+/// An engine for run() whose answers come from a worker, a separate program that may be slow, stop or crash. The
+/// session with the server stays open in all cases.
 ///
 /// Thread-safe: no. Realtime-safe: no.
 class FrontEngine : public Elsewhere {
  public:
   struct Config {
-    std::string name;  ///< of the program, in front of what is said
+    std::string name;  ///< program name, prefix of the messages
     Front::Config front{};
     Crew::Config crew;
   };
 
-  /// `says` gets a sentence for each change of the worker, and must outlive this. Throws what Front and Crew throw.
+  /// `says` receives a message for each change of the worker and must outlive this object. Throws as Front and Crew
+  /// do.
   FrontEngine(const Config& config, LocalTime now, std::ostream& says);
 
   void see(LocalTime now, const Seen& seen) override;
@@ -44,7 +45,7 @@ class FrontEngine : public Elsewhere {
   Crew crew_;
   Codec codec_;
   Front::Ask question_{};
-  std::string_view refused_{};  ///< the newest reason that was said
+  std::string_view refused_{};  ///< last printed reason
 };
 
 }  // namespace tendon::worker

@@ -13,25 +13,27 @@
 #include "clients/cpp/touch.h"
 #include "protocol/wire/codec.h"
 
-// What a front and its worker say to each other (README.md of this folder): records on a stream of bytes, either way:
+// The protocol between a front and its worker (README.md in this directory) consists of records on a byte stream in
+// both directions:
 //
-//     4 bytes   n, the length of what follows, little-endian: 8 … 8 + kMaxDatagram
+//     4 bytes   n, length of the rest, little-endian: 8 … 8 + kMaxDatagram
 //     8 bytes   sequence, little-endian
-//     n − 8     the body
+//     n − 8     body
 //
-// The worker opens the stream: sequence 0, the body kOpeningMagic and 64 hexadecimal digits of the secret. From then on
-// each body is a `Datagram` of tendon.proto, without the header that it has on the network:
+// The worker opens the stream with sequence 0 and a body of kOpeningMagic and 64 hexadecimal digits of the secret.
+// Each further body is a `Datagram` of tendon.proto without the network header:
 //
 //     front → worker   sequence 1, 2, 3 …, one frame `state`
-//     worker → front   the same sequence, one frame `force` with based_on_tick = the state's tick and sequence = that
-//                      sequence; or no frame: no force is known. valid_for_us is not used, but must be within its bounds
+//     worker → front   the same sequence, one frame `force` with based_on_tick = tick of the state and sequence = the
+//                      record's sequence; or no frame if no force is known. valid_for_us is ignored but must be in bounds
 //
-// There is one state at a time: the next comes after the answer. The end of the stream ends the worker.
+// Only one state is in flight: the front waits for the answer before it sends the next. The worker exits at the end
+// of the stream.
 
 namespace tendon::worker {
 
 inline constexpr std::string_view kOpeningMagic = "tendon worker 1\n";
-/// The environment of a worker: "unix:PATH" or "tcp:HOST:PORT", and the secret.
+/// Environment variables of a worker: the address, "unix:PATH" or "tcp:HOST:PORT", and the secret.
 inline constexpr const char* kAddressVariable = "TENDON_WORKER_ADDRESS";
 inline constexpr const char* kSecretVariable = "TENDON_WORKER_SECRET";
 inline constexpr std::size_t kSecretDigits = 64;
@@ -43,11 +45,12 @@ struct Record {
 
 std::vector<std::byte> to_bytes(const Record& record);
 
-/// Puts a stream together again. Thread-safe: no.
+/// Reassembles records from a byte stream. Thread-safe: no.
 class RecordReader {
  public:
   void add(std::span<const std::byte> bytes) { bytes_.insert(bytes_.end(), bytes.begin(), bytes.end()); }
-  /// The next whole record. Throws std::runtime_error when the length is impossible: the stream is of no use then.
+  /// Returns the next complete record. Throws std::runtime_error if its length is invalid; the reader is unusable
+  /// then.
   std::optional<Record> next();
 
  private:
@@ -55,24 +58,24 @@ class RecordReader {
 };
 
 Record opening(std::string_view secret);
-/// In constant time for a secret of the right length.
+/// Compares in constant time if the secret has the right length.
 bool opens(const Record& record, std::string_view secret);
 
-/// Bodies to values and back. Thread-safe: no.
+/// Converts between bodies and values. Thread-safe: no.
 class Codec {
  public:
   Record state(std::uint64_t sequence, const DeviceState& hand);
-  /// Empty: it is no state.
+  /// Returns nullopt if the record is not a state.
   std::optional<DeviceState> read_state(const Record& record);
 
-  /// The answer `touch` to the state `hand` of that sequence. A force that cannot be sent (ForceClient) goes out as it
-  /// is, and the front says what is wrong with it.
+  /// Encodes the answer `touch` to the state `hand` with that sequence. Invalid forces are encoded unchanged, so that
+  /// the front can report the reason.
   Record answer(std::uint64_t sequence, const DeviceState& hand, const Touch& touch);
   struct ReadAnswer {
-    std::optional<Touch> touch{};  ///< empty: refused
-    std::string_view refused{};    ///< why; of static storage
+    std::optional<Touch> touch{};  ///< empty if refused
+    std::string_view refused{};    ///< reason, in static storage
   };
-  /// The answer to `hand`, which was sent with `sequence`.
+  /// Decodes the answer to `hand`, which was sent with `sequence`.
   ReadAnswer read_answer(const Record& record, std::uint64_t sequence, const DeviceState& hand);
 
  private:

@@ -9,22 +9,22 @@
 
 namespace tendon::worker {
 
-/// A worker's end of the stream to the front that has started it (stream.h). A program on many ranks has one, on the
-/// rank that reads and writes; it shares the record out, and every rank reads the state from it (Codec).
+/// The worker's end of the stream to its front (stream.h). An MPI program uses it on one rank, which broadcasts the
+/// record; every rank decodes the state from it (Codec).
 ///
 /// Thread-safe: no. Realtime-safe: no (system calls).
 class WorkerStream {
  public:
-  /// Connects to where the environment says, and opens the stream: the program is ready to answer. Throws
-  /// std::runtime_error when the environment has no address, "TENDON_WORKER_ADDRESS: …", or nobody listens there.
+  /// Connects to the address in the environment and opens the stream, which reports that the worker is ready. Throws
+  /// std::runtime_error "TENDON_WORKER_ADDRESS: …" if the variable is missing or nothing listens there.
   WorkerStream();
   ~WorkerStream();
   WorkerStream(const WorkerStream&) = delete;
   WorkerStream& operator=(const WorkerStream&) = delete;
 
-  /// Waits for the next record, which has a state; empty when the front has ended the stream.
+  /// Blocks until the next record, which contains a state. Returns empty when the front has closed the stream.
   std::optional<Record> next();
-  /// Sends an answer (Codec::answer). False when the stream has ended.
+  /// Sends an answer (Codec::answer). Returns false if the stream is closed.
   bool send(const Record& answer);
 
  private:
@@ -32,9 +32,9 @@ class WorkerStream {
   RecordReader reader_;
 };
 
-/// Answers every state by `engine`, until the front ends the stream: all that a worker's `main` needs. Exceptions of
-/// `engine` pass through; the front then starts the next worker. Throws std::runtime_error as WorkerStream does, and
-/// when what comes is no state.
+/// Answers each state with `engine` until the front closes the stream. This is all that the `main` of a worker needs.
+/// Exceptions of `engine` propagate; the front then starts a new worker. Throws std::runtime_error as WorkerStream
+/// does, and if a record is not a state.
 void work(const Physics& engine);
 
 }  // namespace tendon::worker
