@@ -49,17 +49,17 @@ using Watch = std::function<void(const DeviceState& hand, const LinkStats& link)
 ///     ForceClient client(link, server, config, physics, now);
 ///     for (;;) wait for a datagram, at most until client.turn(now);
 ///
-/// * **Newest wins.** Each turn drains the link. The callback receives only the newest state; the others are counted as
-///   skipped.
+/// * **Newest wins.** Each turn drains the link. The callback receives only the newest state; the others are counted
+///   as skipped.
 /// * **Rate.** If rate_hz = r > 0, the callback runs at multiples of 1/r, or as soon as an unseen state is available
-///   after that. After a delay of a full period, the schedule restarts; missed calls are not made up. If rate_hz = 0, the
-///   callback runs once for each new state.
-/// * **Force.** Each force carries the tick of the state that it answers, a sequence number (1, 2, 3 … per session) and
-///   its validity (see Config::valid_for). It is sent after the callback returns, with a time stamp that is read then, so
-///   the time stamp does not include the time of the computation. Forces that are not finite or out of the bounds in
-///   WIRE.md are counted and not sent; the server then treats this client as late.
-/// * **Replacement.** If another program with the same key replaces this client, the client stops and does not reconnect.
-///   Otherwise the two programs would keep replacing each other.
+///   after that. After a delay of a full period, the schedule restarts; missed calls are not made up. If rate_hz = 0,
+///   the callback runs once for each new state.
+/// * **Force.** Each force carries the tick of the state that it answers, a sequence number (1, 2, 3 … per session)
+///   and its validity (see Config::valid_for). It is sent after the callback returns, with a time stamp that is read
+///   then, so the time stamp does not include the time of the computation. Forces that are not finite or out of the
+///   bounds in WIRE.md are counted and not sent; the server then treats this client as late.
+/// * **Replacement.** If another program with the same key replaces this client, the client stops and does not
+///   reconnect. Otherwise the two programs would keep replacing each other.
 /// * **Reconnection.** After an attempt or a session ends (no answer, refusal, Bye, silence), the client waits for
 ///   retry_min before the next attempt. The wait doubles with each attempt up to retry_max. The first state of a new
 ///   session resets it. Each attempt uses new random numbers.

@@ -32,8 +32,8 @@ struct Options {
 /// Returns the exit code for main():
 ///
 ///     0   a session was open at least once
-///     1   connecting failed, the host is unknown, the server refused permanently, another program replaced this client,
-///         or the callback threw
+///     1   connecting failed, the host is unknown, the server refused permanently, another program replaced this
+///         client, or the callback threw
 ///
 /// If another controller holds the device (Code::kBusy) or the server shuts down, run() keeps trying. It prints one
 /// sentence to stderr for each change of the connection. stdout contains only the output of the callback and, with

@@ -111,9 +111,7 @@ std::vector<Address> addresses_of(const std::string& host, std::uint16_t port) {
 
 ServerName::ServerName(std::string text)
     : text_(std::move(text)), unix_path_(unix_path_in(text_)), instance_(instance_in(text_)) {
-  if (unix_path_.empty() && !instance_ && !split(text_))
-    parse_address(text_);  // throws a message that describes the
-                           // problem
+  if (unix_path_.empty() && !instance_ && !split(text_)) parse_address(text_);  // throws if invalid
 }
 
 ServerName::ServerName(const Address& address) : text_(to_string(address)) {}

@@ -47,7 +47,7 @@ class Help : public CLI::Formatter {
     return option.get_items_expected_max() > 1 && option.get_items_expected_min() != option.get_items_expected_max();
   }
 
-  /// CLI11 adds the descriptions of the validators to the type, for example "TEXT:{on,off}" or "FLOAT:FLOAT in [0 - 1]".
+  /// CLI11 adds the descriptions of the validators to the type: "TEXT:{on,off}" or "FLOAT:FLOAT in [0 - 1]".
   std::string type_of(const CLI::Option& option) const {
     std::string type = option.get_type_name();
     if (const std::size_t set = type.find(":{"); set != std::string::npos) {

@@ -7,11 +7,11 @@
 namespace tendon::dash {
 namespace {
 
-/// Reports on the device after which a silent engine is forgotten. Both are reported once a second, and a report may be
-/// lost on the way.
+/// Number of reports on the device after which a silent engine is removed. Both reports are sent once per second, and
+/// one may be lost.
 constexpr std::uint64_t kForgetAfter = 3;
 
-/// True when the page would show the same: numbers that grow all the time are not compared.
+/// Ignores counters that always increase.
 bool same(const DeviceDescription& a, const DeviceDescription& b) {
   if (a.name != b.name || a.model != b.model || a.loop_hz != b.loop_hz || a.max_force != b.max_force ||
       a.channels.size() != b.channels.size()) {
@@ -70,7 +70,7 @@ void Board::observe(const DeviceState& state) {
   ++device.states;
   for (std::size_t bit = 0; bit < kReasons; ++bit) device.limited[bit] += (state.reasons >> bit) & 1U;
   if (device.waiting.size() >= kMaxWaiting) {
-    const auto half = device.waiting.size() / 2;  // one move for many states
+    const auto half = device.waiting.size() / 2;  // amortizes the cost of erasing
     device.waiting.erase(device.waiting.begin(), device.waiting.begin() + static_cast<std::ptrdiff_t>(half));
     device.dropped += half;
   }
@@ -93,7 +93,7 @@ void Board::observe(const PeerReport& report) {
   auto& engines = devices_[report.device].engines;
   if (const auto known = engines.find(report.channel);
       known != engines.end() && known->second.newest.name != report.name) {
-    engines.erase(known);  // another engine holds the channel now: its sums begin at zero
+    engines.erase(known);  // another engine holds the channel; restart its sums
   }
   Engine& engine = engines[report.channel];
   engine.newest = report;
@@ -112,7 +112,7 @@ void Board::observe(const PeerReport& report) {
 void Board::observe(const PortFrame& port) {
   Device& device = devices_[port.device];
   if (port.of_peer) {
-    if (!device.ports) return;  // its own end comes first
+    if (!device.ports) return;  // the own end is received first
     device.ports->peer = port;
     if (!device.ports_waiting.empty()) device.ports_waiting.back().peer = port;
     return;
@@ -138,7 +138,7 @@ std::vector<DeviceState> Board::take_states(std::uint32_t number) {
 }
 
 std::optional<PortRole> role_of(const Board::Ports& ports) {
-  // An observer is told the scales by the leader's end only.
+  // Observers receive the scales only from the leader.
   if (ports.own.position_scale > 0) return PortRole::kLeader;
   if (ports.peer && ports.peer->position_scale > 0) return PortRole::kFollower;
   return std::nullopt;
@@ -153,8 +153,8 @@ std::optional<double> pair_account(const Board::Ports& ports) {
   if (leader.need <= 0 || follower.need <= 0) return std::nullopt;
   if (leader.answers_epoch != follower.epoch || follower.answers_epoch != leader.epoch) return std::nullopt;
   const double worth = leader.force_scale / leader.position_scale;
-  // A payment is told by its payer and by its receiver in the payer's joules. Of two states that are not of one time
-  // the receiver's may be the newer one.
+  // Both the payer and the receiver report payments in joules of the payer. The receiver's state may be newer than
+  // that of the payer.
   const double to_follower = std::max(0.0, leader.given - follower.taken);
   const double to_leader = std::max(0.0, follower.given - leader.taken);
   return leader.account + to_follower + worth * (follower.account + to_leader);

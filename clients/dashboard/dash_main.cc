@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// tendon-dash: a web page that shows what a Tendon server does, live and recorded. It only looks on, unless it may arm.
+// tendon-dash: a web page with live and recorded data of a Tendon server. It can only arm if permitted explicitly.
 #include <CLI/CLI.hpp>
 #include <chrono>
 #include <cstddef>
@@ -36,8 +36,8 @@
 namespace tendon::dash {
 namespace {
 
-/// The link of the operator. It is separate from the link of the observer, because the server identifies a guest by its
-/// address. Sending to another address connects the socket to that address.
+/// The operator needs its own link, because the server identifies clients by their address. Sending to another
+/// address connects the socket to that address.
 class OperatorLink : public Link {
  public:
   explicit OperatorLink(const Address& server) : transport_(std::make_unique<UdpTransport>(server)) {}
@@ -57,7 +57,7 @@ class OperatorLink : public Link {
   std::unique_ptr<UdpTransport> transport_;
 };
 
-/// A new pass of 128 bits, for one run.
+/// Returns a random password of 128 bits, valid for one run.
 std::string new_pass() {
   const Seed seed = seed_from_system();
   std::string pass;
@@ -71,7 +71,7 @@ std::string new_pass() {
 
 struct Options {
   ServerName server = "127.0.0.1:47100";
-  WebServer::Config web;  ///< its `server` is what the name is looked up to
+  WebServer::Config web;  ///< `server` is the resolved address
   Routes::Config routes;
   std::string device;
   std::string key_file;
@@ -81,7 +81,7 @@ struct Options {
   bool json = false;
 };
 
-/// Reads the command line into `options`. Returns an exit code when there is nothing more to do.
+/// Parses the command line. Returns an exit code if the program should end.
 std::optional<int> parse(int argc, char** argv, Options& options) {
   CLI::App app(
       "A web page that shows what a Tendon server does, live and recorded; /metrics for Prometheus, and /bridge for "

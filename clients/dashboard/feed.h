@@ -15,21 +15,21 @@
 
 namespace tendon::dash {
 
-/// Tells every open page the news of the Board. It has no socket: lines from a page go in, texts for it come out.
+/// Distributes changes of the Board to all open pages. It has no socket: it consumes lines and produces texts.
 ///
-/// A page watches one device, at first the server's first one. The line "watch N" changes to device N; with "watch N
-/// beside" the page also gets the newest state of each other device, once a tick: the 3-D view shows all of them.
+/// A page watches one device, initially the first one. The line "watch N" selects device N. After "watch N beside",
+/// the page also receives the newest state of each other device in every tick, for the 3-D view.
 ///
-/// Every tick the page gets the new states of its device and of its coupling, and once a second the reports on the loop
-/// and the engines. Each text is made once for all pages that watch the same device.
+/// In each tick, a page receives the new states of its device and its coupling, and once per second the reports on
+/// the loop and the engines. Texts are shared by all pages that watch the same device.
 ///
 /// Thread-safe: no. Realtime-safe: no.
 class Feed {
  public:
   using PageId = std::uint64_t;
-  /// Between two ticks: a screen's refresh period.
+  /// Time between ticks: the refresh period of a screen.
   static constexpr Duration kTick = std::chrono::microseconds(16'667);
-  /// Lines that a page may send in a second: a person clicks less often.
+  /// Lines per second that a page may send.
   static constexpr double kMaxLinesHz = 20;
 
   /// `board` and `counts` must outlive the feed.
@@ -40,18 +40,18 @@ class Feed {
   void leave(PageId page);
   std::size_t pages() const noexcept { return pages_.size(); }
 
-  /// Takes a line of a page. False when it is not understood, or came too fast: the page should then be closed.
+  /// Handles a line from a page. Returns false if it is invalid or too frequent; the page should then be closed.
   bool hear(LocalTime now, PageId page, std::string_view line);
-  /// Takes what is new on the board.
+  /// Collects changes from the board.
   void tick(LocalTime now);
-  /// The next text for a page; empty when none waits.
+  /// Returns the next text for a page, if any.
   std::optional<std::string> next(PageId page);
 
  private:
   struct Page {
     std::uint32_t device = 0;
-    bool beside = false;        ///< the other devices too
-    std::uint64_t version = 0;  ///< the board's version that the page knows
+    bool beside = false;        ///< also send the other devices
+    std::uint64_t version = 0;  ///< board version known to the page
     bool reports_due = true;
     PagePost post;
     RateLimit lines;

@@ -119,7 +119,7 @@ std::optional<FoxgloveSession::Message> FoxgloveFeed::next(ClientId client) {
   return found == clients_.end() ? std::nullopt : found->second.session.next();
 }
 
-/// Advertises what has come and withdraws what has gone.
+/// Advertises new channels and unadvertises removed ones.
 void FoxgloveFeed::take_channels() {
   if (std::exchange(version_, board_.version()) == board_.version()) return;
   const std::vector<Channel> wanted = wanted_channels();
@@ -148,7 +148,7 @@ void FoxgloveFeed::take_channels() {
   }
 }
 
-/// Without their numbers.
+/// The ids of the returned channels are not set.
 std::vector<FoxgloveFeed::Channel> FoxgloveFeed::wanted_channels() const {
   std::vector<Channel> wanted;
   for (const auto& [number, device] : board_.devices()) {
@@ -168,7 +168,7 @@ std::vector<FoxgloveFeed::Channel> FoxgloveFeed::wanted_channels() const {
 
 void FoxgloveFeed::take_states(LocalTime now, std::uint32_t device, const Board::Device& news) {
   std::uint64_t& taken = states_[device];
-  // A device that was forgotten and has come back is counted anew.
+  // The counter restarts if a device was removed and has returned.
   const std::uint64_t fresh = news.states - std::min(std::exchange(taken, news.states), news.states);
   const Channel* const channel = subscribed(FoxgloveKind::kStep, device);
   if (channel == nullptr) return;
@@ -192,7 +192,7 @@ void FoxgloveFeed::take_reports(LocalTime now, std::uint32_t device, const Board
   }
 }
 
-/// The channel, if somebody subscribes to it.
+/// Returns the channel if a client subscribes to it.
 const FoxgloveFeed::Channel* FoxgloveFeed::subscribed(FoxgloveKind kind, std::uint32_t device) const {
   const auto channel = std::ranges::find_if(
       channels_, [&](const Channel& one) { return one.about.kind == kind && one.device == device; });
@@ -207,7 +207,7 @@ void FoxgloveFeed::put(const Channel& channel, UnixTime at, const std::string& p
 }
 
 UnixTime FoxgloveFeed::unix_time(LocalTime now, PeerTime at) {
-  // Until the clocks have been compared, what arrives is as old as if it had taken no time.
+  // Before the clocks are compared, assume no network delay.
   const Duration server_ahead = board_.server_ahead().value_or(at.time_since_epoch() - now.time_since_epoch());
   const Duration ahead = config_.unix_offset - server_ahead;
   if (!unix_ahead_ || ahead > *unix_ahead_ + kClockSlack || ahead < *unix_ahead_ - kClockSlack) unix_ahead_ = ahead;

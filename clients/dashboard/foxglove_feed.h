@@ -16,32 +16,33 @@
 
 namespace tendon::dash {
 
-/// Tells the clients of /foxglove the news of the Board, under the topics that a recording has. It has no socket:
-/// messages of a client go in, messages for it come out. It is read-only; nothing that a client says reaches the server.
+/// Distributes changes of the Board to the clients of /foxglove, under the topics of a recording. It has no socket:
+/// it consumes and produces messages. Read-only: messages of clients never reach the server.
 ///
-///     /haptic/step, /NAME/haptic/step   every state that arrived, of the first device and of each other one
-///     /NAME/device, /NAME/peer          the reports on its loop and on its engines, once a second each
-///     /tf, /NAME/scene                  the newest state, at each tick (60 in a second), to be drawn
+///     /haptic/step, /NAME/haptic/step   each received state of the first device and of the other devices
+///     /NAME/device, /NAME/peer          reports on the loop and on the engines, once per second each
+///     /tf, /NAME/scene                  the newest state for drawing, 60 times per second
 ///
-/// A topic is advertised when its device is known, and withdrawn when the device is gone. When the server dies nothing
-/// is withdrawn: a status says what happened, and when the server is back, the same subscriptions give messages again.
+/// A topic is advertised while its device is known. If the server stops, topics stay and a status message reports it.
+/// When the server is back, the same subscriptions continue.
 ///
-/// **Times.** A message's time is that of the state's sample (of a report: of the end of its span) by the server's clock,
-/// plus how far this machine's Unix time is ahead of that clock. The difference is the one of Board::server_ahead. It is
-/// kept while it is wrong by no more than kClockSlack, so the times of a 1 kHz loop are as regular as its samples are.
+/// **Time stamps.** A message has the sampling time of the state (for reports, the end of the reported interval) in
+/// the server's clock, plus the offset between Unix time and that clock. The offset is derived from
+/// Board::server_ahead and changes only if its error exceeds kClockSlack, so that time stamps are as regular as the
+/// samples.
 ///
 /// Thread-safe: no. Realtime-safe: no.
 class FoxgloveFeed {
  public:
   struct Config {
-    std::string name = "tendon-dash";  ///< as viewers show it
-    /// Unix time − LocalTime. It is read once: this program's Unix time does not follow when the system's is set.
+    std::string name = "tendon-dash";  ///< shown by viewers
+    /// Unix time − LocalTime. Read once, so later changes of the system clock have no effect.
     Duration unix_offset{};
   };
   using ClientId = std::uint64_t;
   static constexpr Duration kClockSlack = std::chrono::milliseconds(1);
-  /// Messages that a client may send in a second, and a tenth of them at once: a viewer that opens a layout subscribes
-  /// to each topic by a message of its own.
+  /// Messages per second from one client, with bursts of a tenth of that. Opening a layout sends one message for each
+  /// topic.
   static constexpr double kMaxOrdersHz = 2000;
 
   /// `board` must outlive the feed.
@@ -50,17 +51,18 @@ class FoxgloveFeed {
   ClientId join(LocalTime now);
   void leave(ClientId client);
   std::size_t clients() const noexcept { return clients_.size(); }
-  /// Somebody subscribes to something that is made of states, so that the Observer should ask for all of them.
+  /// Whether a client needs all states, which the Observer must then request.
   bool wants_states() const;
 
-  /// Takes a text message of a client. False when it came too fast, or more waits for this client than can be: it should
-  /// then be closed. A status tells the client which message was not understood.
+  /// Handles a text message. Returns false if messages are too frequent or too many texts are waiting; the client
+  /// should then be closed. Invalid messages are answered with a status.
   bool hear(LocalTime now, ClientId client, std::string_view text);
-  /// Takes what is new on the board. Call it after each turn of the Observer, before Feed::tick takes the states away.
+  /// Collects changes from the board. Must be called after each turn of the Observer and before Feed::tick, which
+  /// removes the states.
   void take(LocalTime now);
-  /// Gives out what is drawn.
+  /// Sends the messages for drawing.
   void tick(LocalTime now);
-  /// The next message for a client; empty when none waits.
+  /// Returns the next message for a client, if any.
   std::optional<FoxgloveSession::Message> next(ClientId client);
 
  private:
@@ -88,12 +90,12 @@ class FoxgloveFeed {
   std::map<ClientId, Client> clients_;
   std::vector<Channel> channels_;
   std::uint32_t last_channel_ = 0;
-  std::uint64_t version_ = 0;                      ///< of the board that the channels were made from
-  std::pair<Contact, std::string> said_{};         ///< of the server, to all clients
-  std::optional<Duration> unix_ahead_;             ///< Unix time − the server's clock
-  std::map<std::uint32_t, std::uint64_t> states_;  ///< of each device, as the board counts them, that were taken
-  std::map<std::uint32_t, PeerTime> reported_;     ///< the newest report on each device that was taken
-  std::map<std::pair<std::uint32_t, std::uint32_t>, PeerTime> engines_;  ///< … on each device's channel
+  std::uint64_t version_ = 0;                                            ///< board version of channels_
+  std::pair<Contact, std::string> said_{};                               ///< last status of the server, for all clients
+  std::optional<Duration> unix_ahead_;                                   ///< Unix time − the server's clock
+  std::map<std::uint32_t, std::uint64_t> states_;                        ///< number of states already taken, by device
+  std::map<std::uint32_t, PeerTime> reported_;                           ///< newest report already taken, by device
+  std::map<std::pair<std::uint32_t, std::uint32_t>, PeerTime> engines_;  ///< likewise, by device and channel
 };
 
 }  // namespace tendon::dash

@@ -19,13 +19,13 @@ namespace {
 
 namespace recorded = tendon::recording::v1;
 
-/// Forces below it have no arrow.
+/// N. Smaller forces have no arrow.
 constexpr double kLeastDrawn = 0.01;
-constexpr double kBall = 0.02;             ///< m, diameter of a handle
+constexpr double kBall = 0.02;             ///< m, diameter of the handle
 constexpr double kStylusLength = 0.1;      ///< m
 constexpr double kStylusDiameter = 0.008;  ///< m
 
-/// Turns the operator's frame (x right, y up, z to the user) into the world's (x forward, y left, z up).
+/// Rotates the operator frame (x right, y up, z to the user) to the world frame (x forward, y left, z up).
 constexpr Quat kWorldFromOperator{.w = 0.5, .x = 0.5, .y = -0.5, .z = -0.5};
 
 const google::protobuf::Descriptor* descriptor_of(FoxgloveKind kind) {
@@ -44,7 +44,7 @@ const google::protobuf::Descriptor* descriptor_of(FoxgloveKind kind) {
   throw std::logic_error("a kind of channel that nobody knows");
 }
 
-/// Adds `file` after the files that it imports, each of them once.
+/// Adds `file` after its imports, without duplicates.
 void add_file(const google::protobuf::FileDescriptor& file, google::protobuf::FileDescriptorSet& set) {
   if (std::ranges::any_of(set.file(), [&](const auto& one) { return one.name() == file.name(); })) return;
   for (int i = 0; i < file.dependency_count(); ++i) add_file(*file.dependency(i), set);
@@ -101,7 +101,7 @@ struct Shade {
   double b = 0;
   double a = 1;
 };
-// The wanted arrow is thick and lets the applied one through, because often both are the same.
+// The arrows often coincide, so that of the wanted force is thicker and transparent.
 constexpr Shade kWantedShade{0.55, 0.6, 0.65, 0.4};
 constexpr Shade kAppliedShade{0.9, 0.45, 0.1};
 constexpr Shade kHandleShade{0.2, 0.45, 0.8};
@@ -119,9 +119,9 @@ void put_stamp(Stamp* out, UnixTime at) {
   out->set_nanos(static_cast<std::int32_t>(at % 1'000'000'000));
 }
 
-/// The shortest rotation that turns +x to `direction`, of length 1.
+/// Returns the shortest rotation from +x to the unit vector `direction`.
 Quat from_x_to(const Vec3& direction) {
-  // Opposite to x any axis across will do.
+  // At 180° any perpendicular axis is valid.
   if (direction.x() < -0.999999) return {.w = 0, .x = 0, .y = 0, .z = 1};
   return unit({.w = 1 + direction.x(), .x = 0, .y = -direction.z(), .z = direction.y()});  // 1 + x·d, x × d
 }

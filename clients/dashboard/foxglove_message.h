@@ -10,10 +10,10 @@
 
 namespace tendon::dash {
 
-/// Nanoseconds since 1970, as Foxglove counts them.
+/// Nanoseconds since 1970-01-01.
 using UnixTime = std::int64_t;
 
-/// What a channel of /foxglove holds. Every payload is one protobuf message.
+/// Content of a channel. Every payload is one protobuf message.
 enum class FoxgloveKind : std::uint8_t {
   kStep,        ///< tendon.recording.v1.Step, as in recordings
   kDevice,      ///< tendon.v1.DeviceReport, as on the wire
@@ -22,45 +22,41 @@ enum class FoxgloveKind : std::uint8_t {
   kScene,       ///< foxglove.SceneUpdate
 };
 
-/// The full name of the message type.
 std::string foxglove_schema_name(FoxgloveKind kind);
-/// A serialized google.protobuf.FileDescriptorSet: the file of the type, and before it all that it imports.
+/// Returns a serialized google.protobuf.FileDescriptorSet with the file of the type after its imports.
 std::string foxglove_schema(FoxgloveKind kind);
 
-/// A state as a step of a recording. A state knows less than a recording: the fields that it does not know are absent
-/// (late, interval, held and commanded forces, loop age, error, longest hold, the gripper's bound and account), and so
-/// are the wanted force and the stiffness where the server does not tell them.
+/// Converts a state to a step of a recording. Fields that a state does not contain are absent: lateness, interval,
+/// held and commanded force, loop age, error, longest hold, limit and account of the gripper; the wanted force and
+/// the stiffness are absent if the server does not send them.
 std::string step_payload(const DeviceState& state);
 std::string report_payload(const DeviceReport& report);
 std::string report_payload(const PeerReport& report);
 
-/// A device at one time, to be drawn.
+/// A device at one time, for drawing.
 struct Drawn {
   std::string name;
-  std::uint32_t place = 0;  ///< beside the others: devices stand kPlaceWidth apart
+  std::uint32_t place = 0;  ///< index; devices are drawn kPlaceWidth apart
   std::optional<Quat> operator_from_device{};
   DeviceState state{};
   UnixTime at = 0;
 };
 
-/// m. The server does not know how devices are placed relative to each other. Device 1 is drawn to the right of device 0.
+/// m. The relative placement of the devices is unknown. Device 1 is drawn to the right of device 0.
 inline constexpr double kPlaceWidth = 0.5;
-/// m for each newton of an arrow.
+/// m/N, length of arrows.
 inline constexpr double kArrowLength = 0.01;
 
-/// Two transforms for each device: NAME_base in `world`, and NAME_handle in NAME_base, which is the measured position
-/// and, where the device measures it, orientation.
-///
-/// `world` is as robots have it, x forward, y left, z up, for the person at the device. Its rotation to the base frame
-/// comes from `operator_from_device`; where that is not known, the axes of the base frame are those of the world.
+/// Two transforms for each device: NAME_base in `world`, and NAME_handle in NAME_base with the measured position and,
+/// if available, orientation. `world` has x forward, y left, z up for the operator. Its rotation to the base frame is
+/// `operator_from_device`, or the identity if that is unknown.
 std::string transforms_payload(std::span<const Drawn> devices);
 
-/// One entity, NAME, in the frame NAME_base. It holds the handle, and arrows for the wanted force (where it is told)
-/// and the applied one, both on the hand, which begin at the handle: kArrowLength for each newton. A force below 0.01 N
-/// has no arrow. A device that measures its orientation is a stylus, which points along −z of its handle frame, with a
-/// ball for its tip; another one is a ball.
+/// One entity NAME in the frame NAME_base: the handle, and arrows for the wanted force (if known) and the applied
+/// force on the hand. Forces below 0.01 N have no arrow. A device with measured orientation is drawn as a stylus
+/// along −z of its handle frame with a ball at the tip, otherwise as a ball.
 ///
-/// The entity lives for one second, so nothing is drawn of a server that is gone.
+/// The lifetime of the entity is one second, so that it disappears when the server stops.
 std::string scene_payload(const Drawn& device);
 
 }  // namespace tendon::dash

@@ -14,20 +14,20 @@
 
 namespace tendon::dash {
 
-/// One client of /foxglove: what it has subscribed to, and what waits for it while it does not read.
+/// Subscriptions and message queue of one client of /foxglove.
 ///
-/// * Messages of channels may fill `kMaxBytes`. Beyond that the oldest tenth of a second is dropped, whole: all messages
-///   whose times have the same ⌊t / 0.1 s⌋, of all channels. A plot then has a gap that is seen, and not a line that
-///   lies. The next thing that the client reads is a status with the number of messages that were dropped.
-/// * Texts are never dropped; of the server's state only the newest is kept. A client for which `kMaxTexts` wait is
-///   `hopeless`, and should be closed.
+/// * Channel messages are limited to `kMaxBytes`. Beyond that, the oldest interval of 0.1 s is dropped as a whole:
+///   the messages of all channels with the same ⌊t / 0.1 s⌋. This leaves a visible gap in plots instead of an
+///   interpolated line. A status message then reports the number of dropped messages.
+/// * Texts are never dropped, except outdated server states. A client with `kMaxTexts` waiting texts is `hopeless`
+///   and should be closed.
 ///
 /// Thread-safe: no. Realtime-safe: no.
 class FoxgloveSession {
  public:
-  /// About 5 s of one device's steps.
+  /// About 5 s of the steps of one device.
   static constexpr std::size_t kMaxBytes = 1'000'000;
-  /// Far more than a client causes that reads what it is told.
+  /// Not reached by a client that reads its messages.
   static constexpr std::size_t kMaxTexts = 64;
   static constexpr UnixTime kDropped = 100'000'000;
 
@@ -36,21 +36,21 @@ class FoxgloveSession {
     bool binary = false;
   };
 
-  /// False: it has that subscription, or subscribes to that channel already.
+  /// Returns false if the subscription exists or the channel is already subscribed.
   bool subscribe(std::uint32_t subscription, std::uint32_t channel);
-  /// What waits of it is forgotten. False: there is no such subscription.
+  /// Discards the waiting messages of the subscription. Returns false if it does not exist.
   bool unsubscribe(std::uint32_t subscription);
-  /// Ends the subscription to a channel that is no longer there.
+  /// Ends the subscription to a channel that was removed.
   void forget(std::uint32_t channel);
   bool subscribes_to(std::uint32_t channel) const noexcept { return subscription_of_.contains(channel); }
 
-  /// Gives out the payload if it subscribes to the channel.
+  /// Queues the payload if the channel is subscribed.
   void put(std::uint32_t channel, UnixTime at, std::string_view payload);
   void put_text(std::string text) { texts_.push_back(std::move(text)); }
-  /// What the server is doing; takes the place of an older one that still waits.
+  /// Replaces a waiting server state.
   void put_server_state(std::string text) { server_state_ = std::move(text); }
 
-  /// The next message to send: first what was dropped, then texts in their order, the server's state, and data.
+  /// Returns the next message: dropped count, texts in order, server state, then data.
   std::optional<Message> next();
 
   bool hopeless() const noexcept { return texts_.size() > kMaxTexts; }
@@ -70,8 +70,8 @@ class FoxgloveSession {
   std::deque<std::string> texts_;
   std::optional<std::string> server_state_;
   std::deque<Waiting> data_;
-  std::size_t bytes_ = 0;      ///< of all data
-  std::uint64_t dropped_ = 0;  ///< messages, not told yet
+  std::size_t bytes_ = 0;      ///< in data_
+  std::uint64_t dropped_ = 0;  ///< not reported yet
 };
 
 }  // namespace tendon::dash

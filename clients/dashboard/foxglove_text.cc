@@ -27,7 +27,7 @@ std::string base64(std::string_view bytes) {
   return text;
 }
 
-/// The text that goes out, however odd the bytes of a name are.
+/// Replaces invalid UTF-8.
 std::string dumped(const Object& object) { return object.dump(-1, ' ', false, Object::error_handler_t::replace); }
 
 template <class Integer>

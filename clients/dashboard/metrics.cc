@@ -20,10 +20,10 @@ using prometheus::MetricFamily;
 using prometheus::MetricType;
 using Labels = std::vector<ClientMetric::Label>;
 
-/// Families of samples, in the order in which they began.
+/// Metric families in the order of their creation.
 class Exposition {
  public:
-  /// Begins a family; the samples that follow belong to it.
+  /// Begins a family. The following samples belong to it.
   void begin(const char* name, MetricType type, const char* help) {
     families_.emplace_back();
     families_.back().name = name;
@@ -63,7 +63,7 @@ constexpr std::array kPhases = {PortPhase::kAlone,    PortPhase::kCoupled, PortP
 constexpr std::array kSafeties = {Safety::kAbsent, Safety::kOpening, Safety::kFirmware, Safety::kUnhomed,
                                   Safety::kHomed,  Safety::kArmed,   Safety::kFault,    Safety::kUnguarded};
 
-/// Of `board`'s devices, those for which `what` is there; `add` gets each with its label.
+/// Calls `add` with the label of each device for which `what` is available.
 template <class Add>
 void each(const Board& board, Add add) {
   for (const auto& [number, device] : board.devices()) {
@@ -81,7 +81,7 @@ ClientMetric::Histogram lateness(const Board::Device& device) {
   }
   histogram.sample_count += device.lateness.back();
   histogram.bucket.push_back({histogram.sample_count, std::numeric_limits<double>::infinity()});
-  histogram.sample_sum = std::numeric_limits<double>::quiet_NaN();  // the wire counts buckets only
+  histogram.sample_sum = std::numeric_limits<double>::quiet_NaN();  // the protocol only contains bucket counts
   return histogram;
 }
 

@@ -9,17 +9,17 @@
 
 namespace tendon::dash {
 
-/// The counts of tendon-dash itself.
+/// Counters of tendon-dash.
 struct WebCounts {
-  std::uint64_t pages = 0;  ///< open now
+  std::uint64_t pages = 0;  ///< currently open
   std::uint64_t requests = 0;
-  std::uint64_t refused = 0;         ///< requests: another Host or Origin, too many, malformed
-  std::uint64_t states_skipped = 0;  ///< not told to a page that did not keep up
+  std::uint64_t refused = 0;         ///< requests refused because of Host, Origin, load or syntax
+  std::uint64_t states_skipped = 0;  ///< not sent to a page that was too slow
 };
 
-/// All these values for Prometheus, in its text format 0.0.4. Names follow its conventions: base units (seconds,
-/// meters, newtons, joules), `_total` on counters. Unknown values are not exported. The test that reads
-/// deploy/monitoring lists the names.
+/// Returns all metrics in the Prometheus text format 0.0.4. Names follow its conventions: base units (seconds,
+/// meters, newtons, joules), `_total` for counters. Unknown values are omitted. A test compares the names with
+/// deploy/monitoring.
 ///
 /// Thread-safe: no. Realtime-safe: no.
 std::string metrics_text(const Board& board, const WebCounts& web, const BridgeCounts& bridge);

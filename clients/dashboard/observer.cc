@@ -84,7 +84,7 @@ void Observer::end(const Connection::Ended& ended) {
       return board_.tell(Contact::kUnanswered, ended.reason + ": is tendond running there" +
                                                    (config_.key ? ", and does it have this key?" : "?"));
     case Connection::Cause::kRefused:
-      // Another server may run there now, with other devices.
+      // The address may now belong to another server with other devices.
       names_.clear();
       counted_ = false;
       return board_.tell(Contact::kRefused, server + " refuses: " + ended.reason);
@@ -135,7 +135,6 @@ void Observer::take_answer(LocalTime now, const Session::RequestAnswered& answer
     describe_at_ = now;
     if (next_describe_ < limits::kMaxDevices) return;
   }
-  // There are no more devices.
   next_describe_ = 0;
   describe_at_ = now + config_.describe_every;
   if (!counted_) board_.counted(static_cast<std::uint32_t>(names_.size()));
@@ -144,14 +143,14 @@ void Observer::take_answer(LocalTime now, const Session::RequestAnswered& answer
   greet(now);
 }
 
-/// Sends the requests that are due, one of each kind at a time.
+/// Sends the requests that are due, at most one of each kind at a time.
 void Observer::ask(LocalTime now) {
   Session* const session = connection_.session();
   if (session == nullptr) return;
   const bool describing =
       std::ranges::any_of(asked_, [](const auto& asked) { return asked.second.what == Asked::What::kDevice; });
   if (!describing && now >= describe_at_) {
-    // Once the number of devices is known, there is no need to ask beyond the last one.
+    // The last device has been described; start again later.
     if (counted_ && next_describe_ >= names_.size()) {
       next_describe_ = 0;
       describe_at_ = now + config_.describe_every;

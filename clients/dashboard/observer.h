@@ -16,56 +16,56 @@
 
 namespace tendon::dash {
 
-/// Watches every device of a Tendon server, or of one bank of a large server, in one session and writes all news on a
-/// Board. It is an observer and never
-/// sends a force. It has no socket, clock or thread.
+/// Observes all devices of a Tendon server, or one group of up to 16 devices of a large server, in one session and
+/// writes the changes to a Board. It never sends forces and has no socket, clock or thread.
 ///
 ///     Observer observer(link, server, config, board, now);
 ///     for (;;) wait for a datagram, at most until observer.turn(now);
 ///
-/// A guest sees only the devices that it has claimed by name, and learns their names by asking (Describe) for device 0,
-/// 1, 2 … until there is none. So a server with several devices is greeted twice: the first session asks, the second
-/// one claims all of them.
+/// A client sees only the devices that it claims by name. It finds their names by requesting the descriptions of
+/// devices 0, 1, 2 … until there is none. On a server with several devices, a first session therefore requests the
+/// names, and a second one claims all devices.
 ///
-/// * **Reconnection.** It tries for ever (see Connection), so it finds a server that comes back.
-/// * **Handles.** It asks for each device's HandleDescription once a session, where the server knows kFeatureHandle.
-/// * **Holders.** It asks for each device's description again every `describe_every`, because engines come and go.
+/// * **Reconnection.** It reconnects indefinitely (see Connection).
+/// * **Handles.** It requests the HandleDescription of each device once per session if the server supports
+///   kFeatureHandle.
+/// * **Holders.** It requests each description again every `describe_every`, because engines may change.
 ///
 /// Thread-safe: no. Realtime-safe: no.
 class Observer {
  public:
   struct Config {
-    std::string name = "tendon-dash";  ///< for the server's log; at most limits::kMaxName bytes
-    /// One of those to watch. A session has 16 devices, those of one bank; empty: the first bank. A server that has no
-    /// such device refuses us, and says which it has.
+    std::string name = "tendon-dash";  ///< for the log of the server; at most limits::kMaxName bytes
+    /// Name of one device in the group to observe, since a session is limited to 16 devices. Empty: the first group.
+    /// If the server has no such device, it refuses and lists its devices.
     std::string device{};
-    /// Additional addresses of the server. If there is no answer, the next address is tried.
+    /// Alternative addresses of the server. If there is no answer, the next address is tried.
     std::vector<Address> further{};
-    std::optional<Key> key{};  ///< as ForceClient::Config::key; an observer's will do
-    Seed seed{};               ///< 32 bytes from the system at each start
+    std::optional<Key> key{};  ///< see ForceClient::Config::key; a key for observers is enough
+    Seed seed{};               ///< 32 random bytes from the operating system
     Duration patience = std::chrono::seconds(2);
     Duration retry_min = std::chrono::milliseconds(100);
     Duration retry_max = std::chrono::seconds(2);
     Duration describe_every = std::chrono::seconds(1);
-    /// Datagrams taken from the link in one turn: a quarter of a second of states at 1 kHz.
+    /// Maximum number of datagrams per turn: a quarter of a second of states at 1 kHz.
     int max_datagrams = 256;
   };
-  /// States per second and device while nobody looks: enough for /metrics. While somebody looks it gets all states.
+  /// States per second and device for /metrics while no page is open. Otherwise all states are requested.
   static constexpr std::uint32_t kIdleStateHz = 20;
 
-  /// `link` and `board` must outlive this object. The first Hello leaves with the first turn.
+  /// `link` and `board` must outlive this object. The first Hello is sent in the first turn.
   Observer(Link& link, const Address& server, const Config& config, Board& board, LocalTime now);
 
-  /// Does everything due at `now` and returns the latest time for the next call; call earlier when a datagram arrives.
+  /// Does all the work that is due at `now` and returns the time of the next call. Call it earlier when a datagram
+  /// arrives.
   LocalTime turn(LocalTime now);
 
-  /// Says whether somebody looks at the states, which then come at the loop's own rate.
+  /// Requests states at the full loop rate while `watched`.
   void set_watched(bool watched) noexcept { watched_ = watched; }
 
-  /// The address that is currently used.
   const Address& server() const noexcept { return connection_.server(); }
 
-  /// Says Bye. Any further turn does nothing.
+  /// Sends a Bye. Further turns do nothing.
   void stop(LocalTime now);
 
  private:
@@ -86,15 +86,15 @@ class Observer {
   Config config_;
   Board& board_;
   Connection connection_;
-  std::map<std::uint32_t, std::string> names_;  ///< of the devices, as far as they are known
-  bool claims_ = false;                         ///< this attempt or session has claimed the devices by name
+  std::map<std::uint32_t, std::string> names_;  ///< known device names, by index
+  bool claims_ = false;                         ///< the devices are claimed by name in this attempt or session
   bool counted_ = false;                        ///< the number of devices is known
-  std::map<std::uint32_t, Asked> asked_;        ///< open requests, by id
-  std::set<std::uint32_t> handles_asked_;       ///< devices whose HandleDescription was asked for in this session
-  std::uint32_t next_describe_ = 0;             ///< the device to ask about next
+  std::map<std::uint32_t, Asked> asked_;        ///< pending requests, by id
+  std::set<std::uint32_t> handles_asked_;       ///< devices whose HandleDescription was requested in this session
+  std::uint32_t next_describe_ = 0;             ///< next device to describe
   LocalTime describe_at_{};
   bool watched_ = true;
-  std::map<std::uint32_t, std::uint32_t> rates_;  ///< states per second that each device was asked for
+  std::map<std::uint32_t, std::uint32_t> rates_;  ///< requested states per second, by device
   bool stopped_ = false;
 };
 

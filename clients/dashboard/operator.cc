@@ -9,7 +9,7 @@
 namespace tendon::dash {
 namespace {
 
-/// States per second: few, because the session lasts a few round trips and nobody looks at the states.
+/// States per second. A low rate is enough for a session of a few round trips.
 constexpr std::uint32_t kStateHz = 20;
 
 const ChannelDescription* channel_of(const Board::Device& device, const std::string& name) {
@@ -28,7 +28,7 @@ std::string because(const std::string& detail, Code code) {
   return detail.empty() ? "the server refuses (code " + std::to_string(static_cast<int>(code)) + ")" : detail;
 }
 
-/// Of two orders the higher one ends the other.
+/// An order cancels pending orders of lower rank.
 int rank(Order order) {
   switch (order) {
     case Order::kDisarm:
@@ -69,7 +69,7 @@ std::string Operator::objection(std::uint32_t number) const {
     return "This device has no channel \"" + config_.channel + "\", which --arm names, but " +
            names_of(device->second.about->channels) + ".";
   }
-  // The operator's own name stays there for a moment after its session has ended.
+  // The operator itself is listed for a moment after its session has ended.
   if (!channel->holder.empty() && channel->holder != config_.name) return held_by(*channel);
   return {};
 }
@@ -134,7 +134,7 @@ void Operator::turn(LocalTime now) {
   }
 }
 
-/// The part of a press up to the server's answer.
+/// First part of an order: until the server has answered.
 void Operator::ask(LocalTime now) {
   client_->turn(now);
   const ForceClient::Phase phase = client_->phase();
@@ -165,7 +165,7 @@ void Operator::ask(LocalTime now) {
     asked_ = send();
     client_->turn(now);
   } else if (const auto& about = client_->description()) {
-    // A client has taken the channel since the Board's last description.
+    // Another client has taken the channel since the last update of the Board.
     const auto channel = std::ranges::find(about->channels, config_.channel, &ChannelDescription::name);
     finish(now, false, "Not done: " + (channel != about->channels.end() ? held_by(*channel) : "the channel is gone."));
   }
@@ -185,7 +185,7 @@ bool Operator::send() {
   return false;
 }
 
-/// The part of a press after the server's answer: watches what the device does.
+/// Second part of an order: waits for the reaction of the device.
 void Operator::look(LocalTime now) {
   const auto found = board_.devices().find(device_);
   const Board::Device* const device = found != board_.devices().end() ? &found->second : nullptr;

@@ -12,55 +12,54 @@
 
 namespace tendon::dash {
 
-/// Arms and disarms devices, and engages and disengages couplings, for the person who presses the page's buttons. It
-/// has no socket, clock or thread.
+/// Arms and disarms devices, and engages and disengages couplings, on request of the user of the page. It has no
+/// socket, clock or thread.
 ///
-/// Each press is a session of its own, beside the Observer's: a controller with the operator's key that claims one
-/// channel of the device, holds it, sends the order and never a force, and leaves at the answer. Between two
-/// presses there is no controller. The result of a press is written on the Board in words. It tells what the device
-/// did, not what the server answered: the device's states have the reason "disarmed" and no force, or its report says
-/// "armed"; or its end of the coupling says that it is engaged, or that it is not.
+/// Each button press opens a session separate from that of the Observer: a controller with the operator's key that
+/// claims and holds one channel of the device, sends the order but no force, and leaves after the answer. The result
+/// on the Board depends on the reaction of the device, not only on the answer of the server: the reason "disarmed"
+/// without force, the report "armed", or the coupling state.
 ///
-/// * **An engine is never disturbed.** While another client holds the channel nothing is sent at all (`objection`), and
-///   a lease is never taken from anybody, not even by a key that the scene lets take over. It is best to give the
-///   operator a channel of his own. The key, too, should be his own: tendond gives a key's place to the newest client
-///   that comes with it, and the Board's list of holders is up to a second old.
-/// * **Disarm has priority.** It ends any other order that is under way; nothing ends a disarming. Disengaging ends an
-///   arming or engaging.
-/// * **Engaging** is for the leader's end, while both ends are coupled and wait for it.
+/// * **Engines are not disturbed.** While another client holds the channel, nothing is sent (`objection`), and leases
+///   are never taken over, even if the key has the permission. The operator should have a separate channel and key:
+///   tendond replaces a client by a newer one with the same key, and the Board's list of holders may be one second
+///   old.
+/// * **Disarm has priority.** It cancels any other pending order and cannot be canceled. Disengaging cancels arming
+///   and engaging.
+/// * **Engaging** requires the leader's end, and both ends must be coupled and waiting.
 ///
 /// Thread-safe: no. Realtime-safe: no.
 class Operator {
  public:
   struct Config {
-    std::string name = "tendon-dash operator";  ///< for the server's log; at most limits::kMaxLabel bytes
-    std::string channel;                        ///< the channel that each device has for the operator
-    Key key;                                    ///< a controller's
-    Seed seed{};                                ///< 32 bytes from the system at each start
-    /// Time for the session and the server's answer: enough for a round trip of 1 s at 50 % loss.
+    std::string name = "tendon-dash operator";  ///< for the log of the server; at most limits::kMaxLabel bytes
+    std::string channel;                        ///< channel reserved for the operator at each device
+    Key key;                                    ///< of a controller
+    Seed seed{};                                ///< 32 random bytes from the operating system
+    /// Timeout for the session and the answer: enough for a round trip of 1 s at 50 % loss.
     Duration patience = std::chrono::seconds(5);
-    /// Time for the device, from the answer on: the safety layer may take a second to grant the order, and the next
-    /// report on it may take another second.
+    /// Timeout for the reaction of the device after the answer: up to one second for the safety layer and one for the
+    /// next report.
     Duration granted_within = std::chrono::seconds(4);
   };
 
-  /// `link` must not be the Observer's, because to the server one address is one guest. `link` and `board` must outlive
-  /// this object.
+  /// `link` must be separate from the Observer's, because the server identifies clients by address. `link` and
+  /// `board` must outlive this object.
   Operator(Link& link, const Address& server, const Config& config, Board& board);
 
-  /// Why no order can be given to a device now, in a sentence; empty when one can.
+  /// Returns why no order can be given to a device now. Empty if it can.
   std::string objection(std::uint32_t device) const;
 
-  /// Takes the press of a button. Returns why nothing is done; empty when the order has begun.
+  /// Starts an order. Returns the reason if it cannot be started, otherwise an empty string.
   std::string press(LocalTime now, std::uint32_t device, Order order);
 
-  /// Does everything due at `now`; call it about sixty times a second.
+  /// Does all the work that is due at `now`. Must be called about 60 times per second.
   void turn(LocalTime now);
 
-  /// Sets the address of the server for the next press.
+  /// Sets the server address for the next order.
   void move_to(const Address& server) { server_ = server; }
 
-  /// Leaves.
+  /// Ends the session.
   void stop(LocalTime now);
 
  private:
@@ -85,7 +84,7 @@ class Operator {
   std::optional<ForceClient> client_;  ///< until the server has answered
   bool asked_ = false;
   LocalTime give_up_{};
-  PeerTime answered_{};  ///< the device's newest sample when the server answered
+  PeerTime answered_{};  ///< newest sampling time of the device at the server's answer
 };
 
 }  // namespace tendon::dash

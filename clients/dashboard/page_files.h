@@ -6,15 +6,15 @@
 
 namespace tendon::dash {
 
-/// One file of the page, as it was built and put into this program.
+/// A file of the page, embedded at build time.
 struct PageFile {
   std::string_view path;  ///< "/index.html"
   std::string_view type;  ///< Content-Type
   std::string_view bytes;
-  std::string_view gzip;  ///< the same, compressed
+  std::string_view gzip;  ///< compressed `bytes`
 };
 
-/// All files of the page, from embed.cmake. In a build without Node it is one page that says what is missing.
+/// Returns all files of the page, from embed.cmake. Builds without Node contain a single page that reports this.
 std::span<const PageFile> page_files();
 
 }  // namespace tendon::dash

@@ -12,12 +12,12 @@
 namespace tendon::dash {
 namespace {
 
-using Json = nlohmann::ordered_json;  // members in the order in which they are written here
+using Json = nlohmann::ordered_json;  // preserves the order of the members
 
 double milliseconds(Duration d) { return std::chrono::duration<double, std::milli>(d).count(); }
 double nanoseconds(PeerTime t) { return static_cast<double>(t.time_since_epoch().count()); }
 
-/// In JSON it is null.
+/// Written as null.
 constexpr double kUntold = std::numeric_limits<double>::quiet_NaN();
 
 Json vector(const Vec3& v) { return {v.x(), v.y(), v.z()}; }
@@ -143,7 +143,7 @@ Json engine_json(const std::string& channel, const PeerReport& peer) {
           {"words", link.words}};
 }
 
-/// `number`, rounded to seven digits: a plot shows no more.
+/// Rounds to seven digits, enough for plots.
 double plotted(double number) {
   std::array<char, 32> digits;
   const auto end = std::to_chars(digits.data(), digits.data() + digits.size(), static_cast<float>(number)).ptr;
@@ -152,7 +152,6 @@ double plotted(double number) {
   return shown;
 }
 
-/// One number of each state.
 template <class Of>
 Json column(std::span<const DeviceState> states, Of of) {
   Json numbers = Json::array();
@@ -169,7 +168,7 @@ Json columns(std::span<const DeviceState> states, Of of) {
   return axes;
 }
 
-/// Adds the stiffness that the engines' models say, row by row. Where no state holds one it is left out.
+/// Adds the stiffness of the engines' models, row-major, if any state has one.
 void add_stiffness(Json& json, std::span<const DeviceState> states) {
   if (std::ranges::none_of(states, [](const DeviceState& s) { return s.stiffness_wanted.has_value(); })) return;
   json["stiffness_n_per_m"] = columns<9>(states, [](const DeviceState& s) {
@@ -178,7 +177,7 @@ void add_stiffness(Json& json, std::span<const DeviceState> states) {
   });
 }
 
-/// Adds what the handle has beyond a point. A value that no state holds is left out: most devices have none of them.
+/// Adds the additional quantities of the handle. Quantities that no state has are omitted.
 void add_handle(Json& json, std::span<const DeviceState> states) {
   const auto any = [&](auto has) { return std::ranges::any_of(states, has); };
   const auto vectors = [&](const char* name, std::optional<Vec3> DeviceState::*value) {
@@ -218,7 +217,7 @@ Json in_json(const PortFrame& port) {
           {"share", port.share ? Json(*port.share) : Json()}};
 }
 
-/// The text of a JSON value. Bytes that are not UTF-8 become U+FFFD; NaN and infinities become null.
+/// Replaces invalid UTF-8 by U+FFFD; writes NaN and infinities as null.
 std::string text_of(const Json& json) { return json.dump(-1, ' ', false, Json::error_handler_t::replace); }
 
 }  // namespace
@@ -342,7 +341,7 @@ std::string states_json(std::uint32_t device, std::span<const DeviceState> state
       {"type", "states"},
       {"device", device},
       {"tick", column(states, [](const DeviceState& s) { return s.tick; })},
-      // µs on the server's clock: a double holds them exactly for as long as a machine runs.
+      // µs in the server's clock; exact in a double for any realistic uptime.
       {"sampled_us", column(states, [](const DeviceState& s) { return nanoseconds(s.sampled) / 1e3; })},
       {"position_m", columns(states, [](const DeviceState& s) { return s.position; })},
       {"wanted_n", columns(states, wanted)},

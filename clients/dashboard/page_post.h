@@ -12,24 +12,23 @@
 
 namespace tendon::dash {
 
-/// The messages that wait for one page while it is busy; the newest wins. A page that does not read costs at most one
-/// text of each kind and a few batches of states, however long it sleeps.
+/// Messages waiting for one page. The newest wins: a page that does not read costs at most one text of each kind and
+/// kMaxBatches batches of states.
 ///
 /// Thread-safe: no. Realtime-safe: no.
 class PagePost {
  public:
   enum class Kind : std::uint8_t {
-    kServer,   ///< only the newest text of each of these kinds is kept
+    kServer,   ///< only the newest text of each kind is kept
     kReports,  //
     kPorts,    //
   };
-  /// The most batches that wait, an eighth of a second: a page can catch up with that, and the hand on the screen does
-  /// not look late.
+  /// Limit of waiting batches: 1/8 s, which a page can catch up without visible delay.
   static constexpr std::size_t kMaxBatches = 8;
 
   void put(Kind kind, std::string text) { newest_[static_cast<std::size_t>(kind)] = std::move(text); }
 
-  /// Adds a batch of `states` states. When there is no room the oldest batch is dropped, and its states are counted.
+  /// Adds a batch of `states` states. If the queue is full, the oldest batch is dropped and its states are counted.
   void put_states(std::string text, std::size_t states) {
     batches_.push_back({std::move(text), states});
     if (batches_.size() <= kMaxBatches) return;
@@ -37,13 +36,13 @@ class PagePost {
     batches_.pop_front();
   }
 
-  /// The newest state of a device beside the one that the page watches; only the newest is kept.
+  /// Replaces the waiting state of a device that the page does not watch.
   void put_beside(std::uint32_t device, std::string text) { beside_[device] = std::move(text); }
 
-  /// States dropped since the last call.
+  /// Returns the number of dropped states since the last call.
   std::uint64_t take_skipped() noexcept { return std::exchange(skipped_, 0); }
 
-  /// The next text to send; empty when nothing waits.
+  /// Returns the next text to send, if any.
   std::optional<std::string> next() {
     for (auto& text : newest_) {
       if (text) return std::exchange(text, std::nullopt);
@@ -55,7 +54,7 @@ class PagePost {
     return text;
   }
 
-  /// The page looks at another device: the waiting states of the previous one are of no use.
+  /// Discards waiting states after the page has selected another device.
   void forget_states() {
     batches_.clear();
     beside_.clear();

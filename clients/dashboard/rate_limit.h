@@ -7,16 +7,16 @@
 
 namespace tendon::dash {
 
-/// Lets `rate` things a second pass, and at most a tenth of that, but at least one, at once:
+/// A token bucket for `rate` events per second with a burst of a tenth of that, at least one:
 ///
-///     left ← min(left + rate · Δt, max(rate / 10, 1)),      a thing takes 1 of it
+///     left ← min(left + rate · Δt, max(rate / 10, 1)),      each event takes 1
 ///
 /// Thread-safe: no. Realtime-safe: yes.
 class RateLimit {
  public:
   RateLimit(double rate_hz, LocalTime now) noexcept : rate_hz_(rate_hz), left_(most()), then_(now) {}
 
-  /// True when one more may pass; it is then counted.
+  /// Returns whether an event may pass, and counts it.
   bool take(LocalTime now) noexcept {
     left_ = std::min(left_ + rate_hz_ * seconds(now - then_), most());
     then_ = now;

@@ -15,7 +15,7 @@
 namespace tendon::dash {
 namespace {
 
-/// True when `text` is UTF-8 without control characters.
+/// Returns whether `text` is UTF-8 without control characters.
 bool is_plain_text(std::string_view text) noexcept {
   while (!text.empty()) {
     const std::size_t size = utf8_character(text);
@@ -66,7 +66,7 @@ Recordings::Recordings(std::filesystem::path folder) : folder_(std::move(folder)
 
 std::vector<Recordings::Entry> Recordings::list() const {
   std::vector<Entry> entries;
-  std::error_code gone;  // a file may vanish in the meantime
+  std::error_code gone;  // files may be removed at any time
   for (auto file = std::filesystem::directory_iterator(folder_, gone); file != std::filesystem::directory_iterator();
        file.increment(gone)) {
     std::string name = file->path().filename().string();

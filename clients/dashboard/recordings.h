@@ -12,7 +12,7 @@
 
 namespace tendon::dash {
 
-/// A file that is open for reading. Its size is that at the time of opening; a file that is still being written grows.
+/// A file opened for reading. Its size is that at the time of opening, because recordings may still grow.
 class OpenFile {
  public:
   OpenFile(int descriptor, std::uint64_t size) noexcept : descriptor_(descriptor), size_(size) {}
@@ -21,7 +21,7 @@ class OpenFile {
   ~OpenFile();
 
   std::uint64_t size() const noexcept { return size_; }
-  /// Bytes read from `offset` on, at most `most`; fewer at the end, none after an error.
+  /// Reads at most `most` bytes at `offset`. Returns fewer at the end of the file, and none after an error.
   std::string read(std::uint64_t offset, std::size_t most) const;
 
  private:
@@ -29,27 +29,27 @@ class OpenFile {
   std::uint64_t size_;
 };
 
-/// The recordings (*.mcap) of one folder, without its subfolders. No name leads out of the folder.
+/// The recordings (*.mcap) in one folder, without subfolders. Names cannot refer to files outside of the folder.
 ///
-/// Thread-safe: no. Realtime-safe: no (files).
+/// Thread-safe: no. Realtime-safe: no (file access).
 class Recordings {
  public:
   struct Entry {
     std::string name;
     std::uint64_t size = 0;      ///< bytes
-    double modified_unix_s = 0;  ///< s since 1970
+    double modified_unix_s = 0;  ///< s since 1970-01-01
   };
-  /// The most recordings that are listed, the newest ones: a page is no file manager.
+  /// Only the newest recordings are listed.
   static constexpr std::size_t kMaxListed = 1000;
 
-  /// Throws std::runtime_error when `folder` is not a folder: "runs: not a folder".
+  /// Throws std::runtime_error if `folder` is not a folder: "runs: not a folder".
   explicit Recordings(std::filesystem::path folder);
 
-  /// The newest first.
+  /// Newest first.
   std::vector<Entry> list() const;
 
-  /// Opens a recording. Empty when `name` has a slash, is hidden, is not *.mcap, or names a symbolic link or no regular
-  /// file.
+  /// Opens a recording. Returns nullopt if `name` contains a slash, is hidden, is not *.mcap, or is not a regular
+  /// file (including symbolic links).
   std::optional<OpenFile> open(std::string_view name) const;
 
  private:
@@ -69,8 +69,8 @@ struct Unsatisfiable {
   bool operator==(const Unsatisfiable&) const = default;
 };
 
-/// The bytes that a Range header (RFC 9110, 14.2) asks for, of a file of `size` bytes. A header with several ranges,
-/// with another unit, or that cannot be read is ignored, as the RFC allows: the whole file.
+/// Parses a Range header (RFC 9110, 14.2) for a file of `size` bytes. Headers with several ranges, another unit or
+/// invalid syntax select the whole file, as the RFC allows.
 std::variant<WholeFile, ByteRange, Unsatisfiable> parse_range(std::string_view header, std::uint64_t size);
 
 }  // namespace tendon::dash

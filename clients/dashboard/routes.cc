@@ -12,7 +12,7 @@
 namespace tendon::dash {
 namespace {
 
-/// Allows only the page's own scripts, styles and connections, and no frame around it. The icon is a data: image.
+/// Allows only scripts, styles and connections of the page itself, and no embedding. The icon is a data: image.
 constexpr std::string_view kContentSecurity =
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data:; connect-src 'self'; "
     "base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
@@ -26,7 +26,6 @@ constexpr OrderPath kOrders[] = {{"/api/arm", Order::kArm},
                                  {"/api/engage", Order::kEngage},
                                  {"/api/disengage", Order::kDisengage}};
 
-/// Prometheus' text format.
 constexpr std::string_view kMetricsType = "text/plain; version=0.0.4; charset=utf-8";
 
 std::string_view status_words(unsigned status) {
@@ -69,7 +68,7 @@ bool equal_but_for_case(std::string_view a, std::string_view b) {
   return std::ranges::equal(a, b, {}, lower, lower);
 }
 
-/// "localhost" of "localhost:8080", "[::1]" of "[::1]:8080"; empty when what follows is no port.
+/// Returns "localhost" for "localhost:8080", "[::1]" for "[::1]:8080", or an empty string if the port is invalid.
 std::string_view host_name(std::string_view host) {
   const auto end = host.starts_with('[') ? host.find(']') + 1 : std::min(host.find(':'), host.size());
   if (host.starts_with('[') && end == 0) return {};
@@ -79,7 +78,7 @@ std::string_view host_name(std::string_view host) {
   return port.empty() || (port[0] == ':' && digits) ? host.substr(0, end) : std::string_view();
 }
 
-/// 127.0.0.0/8 in four decimal numbers: a browser writes addresses this way, however they were typed.
+/// Matches 127.0.0.0/8 in dotted decimal, the form to which browsers normalize addresses.
 bool is_ipv4_loopback(std::string_view name) {
   int parts = 0;
   for (std::string_view rest = name; !rest.empty() || parts == 0; ++parts) {
@@ -102,7 +101,7 @@ bool is_loopback_name(std::string_view name) {
          (name.size() > kBelow.size() && equal_but_for_case(name.substr(name.size() - kBelow.size()), kBelow));
 }
 
-/// "localhost:8000" of "http://localhost:8000"; empty for an origin of any other kind, such as "null".
+/// Returns "localhost:8000" for "http://localhost:8000", or an empty string for other origins such as "null".
 std::string_view origin_host(std::string_view origin) {
   for (const std::string_view scheme : {"http://", "https://"}) {
     if (!origin.starts_with(scheme)) continue;
@@ -112,7 +111,7 @@ std::string_view origin_host(std::string_view origin) {
   return {};
 }
 
-/// The first subprotocol of the list that /foxglove speaks; empty when there is none. Names are compared as they are.
+/// Returns the first supported subprotocol in the list, or an empty string. Case-sensitive.
 std::string foxglove_protocol(std::string_view list) {
   while (!list.empty()) {
     const auto comma = list.find(',');
@@ -128,7 +127,7 @@ std::string foxglove_protocol(std::string_view list) {
 
 void set(Reply& reply, std::string_view name, std::string_view value) { reply.headers.emplace_back(name, value); }
 
-/// Headers that every answer has.
+/// Adds the headers common to all replies.
 Reply begin(unsigned status, std::string_view type) {
   Reply reply;
   reply.status = status;
@@ -201,7 +200,7 @@ bool Routes::is_our_origin(std::string_view origin) const {
   return std::ranges::find(config_.origins, origin) != config_.origins.end();
 }
 
-/// Of a WebSocket: the page that asks may not have it.
+/// Whether a page from another origin requests a WebSocket that it may not use.
 bool Routes::is_foreign(const Request& request, std::string_view path) const {
   if (!request.origin) return false;
   if (path != "/live" && is_our_origin(*request.origin)) return false;
@@ -277,7 +276,7 @@ Reply Routes::file(const Request& request, std::string_view path) const {
   const auto found = std::ranges::find(sources_.page, path, &PageFile::path);
   if (found == sources_.page.end()) return plain(404, "there is nothing here");
   Reply reply = begin(200, found->type);
-  // The names of the parts change with their content.
+  // Asset names contain a hash of their content.
   set(reply, "Cache-Control", path.starts_with("/assets/") ? "public, max-age=31536000, immutable" : "no-cache");
   set(reply, "Vary", "Accept-Encoding");
   const bool gzip = request.accept_encoding.find("gzip") != std::string_view::npos && !found->gzip.empty();

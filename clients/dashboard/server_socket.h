@@ -32,12 +32,10 @@ Address address_of(const Endpoint& endpoint) {
   return {v6.to_bytes(), endpoint.port()};
 }
 
-/// A UDP socket that is connected to the server. Sending to another address connects it to that address.
-///
-/// Thread-safe: no.
+/// A UDP socket connected to the server. Sending to another address reconnects it to that address. Thread-safe: no.
 class ServerSocket : public Link {
  public:
-  /// Throws std::runtime_error if the system refuses.
+  /// Throws std::runtime_error if the socket cannot be created or connected.
   ServerSocket(asio::io_context& context, const Address& server, WebServer::Clock clock)
       : clock_(clock), context_(context), socket_(context) {
     const error_code error = connect(server);
@@ -53,10 +51,10 @@ class ServerSocket : public Link {
 
   std::size_t receive(Address& from, std::span<std::byte> buffer) override {
     from = server_;
-    // An empty datagram, or an error report (ICMP "port unreachable"), is skipped.
+    // Skip empty datagrams and errors (ICMP "port unreachable").
     for (int i = 0; i < kMaxSkips; ++i) {
       error_code error;
-      // MSG_TRUNC returns the size of the datagram even if the buffer is smaller.
+      // MSG_TRUNC: returns the size of the datagram even if the buffer is smaller.
       const std::size_t size = socket_.receive(asio::buffer(buffer.data(), buffer.size()), MSG_TRUNC, error);
       if (!error && size > 0) return size;
       if (error == asio::error::would_block) return 0;
@@ -74,7 +72,7 @@ class ServerSocket : public Link {
   const Address& server() const noexcept { return server_; }
 
  private:
-  /// If this fails, the socket is not changed.
+  /// Leaves the socket unchanged on failure.
   error_code connect(const Address& server) {
     error_code error;
     udp::socket connected(context_);

@@ -37,35 +37,34 @@ namespace http = beast::http;
 namespace websocket = beast::websocket;
 using asio::ip::tcp;
 
-/// Datagrams from the server are taken in batches. Otherwise tendon-dash would wake a thousand times a second, on the
-/// processors of the haptic loop. Its own measured round trip is longer by this time; nothing is computed from it.
+/// Datagrams are read in batches. Otherwise tendon-dash would wake up 1000 times per second on the processors of the
+/// haptic loop. The measured round trip includes this delay, but is not used in computations.
 constexpr Duration kGather = std::chrono::milliseconds(3);
-/// Datagrams taken from a socket of the bridge before other sockets have their turn.
+/// Maximum number of datagrams read from one bridge socket before other sockets are served.
 constexpr int kMaxDrained = 64;
-/// Bytes of a file in one write.
+/// Size of one write of a file, in bytes.
 constexpr std::size_t kPiece = 64 * 1024;
-/// The most connections that are being refused at one time; a further one is closed without an answer.
+/// Maximum number of connections that are being refused. Further ones are closed without a reply.
 constexpr std::size_t kMaxRefusals = 64;
-/// The time for which a refused connection is still read before it is closed, and the bytes: a reset would destroy the
-/// answer.
+/// A refused connection is read for this time and number of bytes, because a reset would discard the reply.
 constexpr Duration kLinger = std::chrono::seconds(1);
 constexpr std::size_t kMaxLingered = 64 * 1024;
-/// Longest message of a page that looks on: "watch 15".
+/// Longest message of a page: "watch 15".
 constexpr std::size_t kMaxLine = 64;
-/// Longest message of a viewer, which may subscribe to all channels of 16 devices in one.
+/// Longest message of a viewer, which may subscribe to all channels of 16 devices at once.
 constexpr std::size_t kMaxOrder = 16 * 1024;
-/// What the system may hold for a viewer that does not read, beside FoxgloveSession::kMaxBytes. Linux takes twice that.
+/// Kernel buffer for a viewer that does not read, in addition to FoxgloveSession::kMaxBytes. Linux doubles this
+/// value.
 constexpr int kViewerSendBuffer = 128 * 1024;
 
-/// The addresses that count as one. One machine can easily have many addresses of an IPv6 network, so all of them are
-/// one.
+/// Returns the prefix that counts as one address. All addresses in one IPv6 network are equal, because a machine can
+/// easily use many of them.
 std::array<std::uint8_t, 16> network_of(const Address& address) {
   auto ip = address.ip;
   if (!is_ipv4(address)) std::fill(ip.begin() + 8, ip.end(), std::uint8_t{0});
   return ip;
 }
 
-/// Timers use Asio's own clock.
 auto waiting_time(Duration d) {
   return std::chrono::duration_cast<asio::steady_timer::duration>(std::max(d, Duration::zero()));
 }
@@ -76,7 +75,7 @@ Bytes bytes_of(const beast::flat_buffer& buffer) {
 
 class Connection;
 
-/// The things that all connections share.
+/// State shared by all connections.
 struct Shared {
   const WebServer::Config& config;
   const Routes& routes;
@@ -87,12 +86,12 @@ struct Shared {
   WebServer::Clock clock;
   asio::io_context context{1};
   std::list<std::unique_ptr<Connection>> connections;
-  const ServerSocket* link = nullptr;  ///< the link of the Observer
+  const ServerSocket* link = nullptr;  ///< of the Observer
 };
 
-/// One connection of a browser, from its first request until it is closed: requests, or a WebSocket.
+/// One browser connection from its first request until it is closed: HTTP requests or a WebSocket.
 ///
-/// It is deleted only when it is closed and none of its operations is pending (`pending_`), so handlers may use `this`.
+/// Deleted only after it is closed and has no pending operations (`pending_`), so that handlers can use `this`.
 class Connection {
  public:
   Connection(Shared& shared, tcp::socket socket)
@@ -101,7 +100,7 @@ class Connection {
     const tcp::endpoint peer = stream_.socket().remote_endpoint(gone);
     if (!gone) network_ = network_of(address_of(peer));
     local_ = !gone && is_loopback(address_of(peer));
-    // A batch of states must not wait for the acknowledgement of the one before.
+    // A batch of states must not wait for the acknowledgement of the previous one.
     stream_.socket().set_option(tcp::no_delay(true), gone);
   }
   ~Connection() {
@@ -113,7 +112,7 @@ class Connection {
   Connection& operator=(const Connection&) = delete;
 
   void start() { read_request(); }
-  /// Answers that there is no place, and closes.
+  /// Replies that there are too many connections, and closes.
   void refuse() {
     refused_ = true;
     write_reply(Routes::plain(503, "too many connections"));
@@ -121,7 +120,7 @@ class Connection {
   bool refused() const noexcept { return refused_; }
   bool closed() const noexcept { return closed_; }
   const std::array<std::uint8_t, 16>& network() const noexcept { return network_; }
-  /// The time since which it waits for a whole request; LocalTime::max() while it does anything else.
+  /// Time since which it waits for a complete request, or LocalTime::max() in other states.
   LocalTime waits_since() const noexcept { return waits_since_; }
   bool done() const noexcept { return closed_ && pending_ == 0; }
 
@@ -134,7 +133,7 @@ class Connection {
     server_.reset();
   }
 
-  /// Sends the next waiting text to the page, unless one is being sent.
+  /// Sends the next waiting text, unless a write is pending.
   void pump() {
     if (closed_ || !web_socket_ || !open_ || std::exchange(writing_, true)) return;
     if (page_) {
@@ -271,7 +270,7 @@ class Connection {
                           const std::uint64_t left = file->range.count - sent_;
                           text_ = file->file.read(file->range.first + sent_, std::min<std::uint64_t>(left, kPiece));
                           if (text_.empty())
-                            return close();  // the file is shorter now: the browser sees that bytes are missing
+                            return close();  // the file was truncated; the browser detects missing bytes
                           sent_ += text_.size();
                           return write_piece();
                         }
@@ -383,7 +382,7 @@ class Connection {
   bool with_body_ = true;
   Reply reply_;
   std::string text_;        ///< being sent
-  std::uint64_t sent_ = 0;  ///< of a file
+  std::uint64_t sent_ = 0;  ///< bytes of the file
 
   std::optional<websocket::stream<beast::tcp_stream>> web_socket_;
   beast::flat_buffer message_;
@@ -426,7 +425,7 @@ struct WebServer::State {
 
   void accept() {
     acceptor.async_accept([this](error_code error, tcp::socket socket) {
-      if (error) {  // out of descriptors: some become free when other connections end
+      if (error) {  // out of descriptors; retry when other connections may have ended
         accept_again.expires_after(waiting_time(std::chrono::milliseconds(100)));
         return accept_again.async_wait([this](error_code) { accept(); });
       }
@@ -451,11 +450,11 @@ struct WebServer::State {
     }
   }
 
-  /// True when there is a place for one more; for this, the connection that has waited longest for a request may be
-  /// closed.
+  /// Returns whether there is room for another connection. May close the connection that has waited longest for a
+  /// request.
   bool make_room(const Connection& newcomer) {
     std::size_t all = 0;
-    std::size_t near = 0;  // from the newcomer's address
+    std::size_t near = 0;  // from the address of the newcomer
     Connection* idlest = nullptr;
     Connection* idlest_near = nullptr;
     const auto pick = [](Connection*& longest, Connection& one) {
@@ -494,7 +493,7 @@ struct WebServer::State {
       const LocalTime next = turn(now);
       shared.foxglove.take(now);
       for (const auto& connection : shared.connections) connection->pump();
-      // This cancels the pending wait, if there is one.
+      // Cancels a pending wait.
       schedule_turn(std::min(next - now, Duration(std::chrono::seconds(1))));
       wait_for_server();
     });

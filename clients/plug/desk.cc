@@ -15,7 +15,7 @@
 namespace tendon::plug {
 namespace {
 
-/// A signal that slips in just before the sleep is noticed after it.
+/// A signal that arrives immediately before a sleep does not interrupt it.
 constexpr Duration kLongestWait = std::chrono::milliseconds(100);
 constexpr Duration kLineEvery = std::chrono::seconds(1);
 
@@ -41,7 +41,7 @@ Desk::Desk(DeskConfig config, LocalTime now) : config_(std::move(config)), next_
 
 void Desk::say(const std::string& sentence) const { std::cerr << "tendon-plug: " + visible(sentence) + "\n"; }
 
-/// The server may have another address by now. Where nobody answered at one, the next one is tried.
+/// The address of the server may have changed. If the current address did not answer, the next one is tried.
 void Desk::look_up_again(Place& place) {
   try {
     const bool another = place.phase == ForceClient::Phase::kUnanswered;

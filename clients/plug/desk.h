@@ -18,56 +18,56 @@
 
 namespace tendon::plug {
 
-/// What the command line says for every bridge.
+/// Command-line options shared by all bridges.
 struct DeskConfig {
   ServerName server = "127.0.0.1:47100";
-  ForceClient::Config client{};        ///< `device` and `seed` are set for each plug
-  std::vector<std::string> devices{};  ///< their names; none: the server's first device, which is called "device"
+  ForceClient::Config client{};        ///< `device` and `seed` are set for each Plug
+  std::vector<std::string> devices{};  ///< device names; empty: the first device of the server, named "device"
   bool observe = false;
-  bool json = false;  ///< a line a second on stdout
+  bool json = false;  ///< print one line per second to stdout
 };
 
-/// All devices of one bridge with their sockets: what a bridge's loop turns and sleeps on.
+/// All devices of a bridge with their sockets, for use in the main loop of the bridge.
 ///
 ///     Desk desk(config, read_clock());
 ///     for (LocalTime now = read_clock(); !stop; now = read_clock()) {
 ///       const LocalTime next = desk.turn(now);
-///       … serve the programs: desk.plug(0).state(), desk.plug(0).ask(…); when something was asked: desk.turn(now)
+///       … serve the programs: desk.plug(0).state(), desk.plug(0).ask(…); if a force was requested: desk.turn(now)
 ///       desk.wait(sockets_of_the_programs, now, next);
 ///     }
 ///
-/// It looks the server's name up again between two attempts, and says each change of a plug in one sentence on stderr:
-/// "tendon-plug: right: connected to …". With `json`, once a second, a line for each device:
+/// It resolves the name of the server again between two attempts, and prints each change to stderr: "tendon-plug:
+/// right: connected to …". With `json`, it prints one line per second for each device:
 ///
 ///     {"device":"right","states":1000,"forces":998,"dropped":0,"unusable":0,"owner":1,"pushes":true,
-///      "round_trip_ms":0.4, …}                     counts from the start; then the bridge's own
+///      "round_trip_ms":0.4, …}                     totals since the start, followed by the counts of the bridge
 ///
 /// Thread-safe: no. Realtime-safe: no.
 class Desk {
  public:
-  /// A number of the bridge's own for the JSON lines.
+  /// Name and value of a counter of the bridge for the JSON lines.
   using Count = std::pair<std::string_view, std::uint64_t>;
 
-  /// Throws std::runtime_error as UdpTransport does when the server's name is not known.
+  /// Throws std::runtime_error as UdpTransport does if the server's name cannot be resolved.
   Desk(DeskConfig config, LocalTime now);
 
   std::size_t size() const noexcept { return places_.size(); }
   Plug& plug(std::size_t i) { return places_[i].plug; }
   const std::string& name(std::size_t i) const { return places_[i].name; }
 
-  /// Turns every plug; the latest time for the next turn. `counts` are for the JSON lines.
+  /// Turns every Plug and returns the time of the next turn. `counts` are added to the JSON lines.
   LocalTime turn(LocalTime now, std::span<const Count> counts = {});
 
-  /// One sentence on stderr, "tendon-plug: …".
+  /// Prints a message to stderr, "tendon-plug: …".
   void say(const std::string& sentence) const;
 
-  /// Sleeps until a datagram of the server or one of `others` is ready, or until `until`; at most 100 ms, so that a
-  /// signal is noticed. `others` have their `revents` afterwards.
+  /// Sleeps until a server socket or one of `others` is ready or until `until`, at most 100 ms so that signals are
+  /// noticed. Sets `revents` of `others`.
   void wait(std::span<pollfd> others, LocalTime now, LocalTime until);
-  /// The sockets towards the server, for a loop that sleeps otherwise. They are others after a look-up: ask each time.
+  /// Sockets connected to the server, for bridges with their own event loop. They change after each name lookup.
   std::vector<int> descriptors() const;
 
-  /// Says Bye for each. Returns the exit code: 1 if a device has never sent a state, which is then said.
+  /// Sends a Bye for each device. Returns the exit code, which is 1 (with a message) if a device never sent a state.
   int stop(LocalTime now);
 
  private:

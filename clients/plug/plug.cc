@@ -11,8 +11,8 @@ namespace {
 
 using Phase = ForceClient::Phase;
 
-/// The states of two sessions may overtake each other. One that is older by so many ticks comes from a server that has
-/// started anew.
+/// States of the two sessions may arrive out of order. A state that is older by more than this number of ticks comes
+/// from a restarted server.
 constexpr std::uint64_t kReordered = 1000;
 
 constexpr std::size_t kMaxSentences = 16;
@@ -27,7 +27,7 @@ Plug::Plug(const Way& watcher, const Way& controller, Config config, LocalTime n
       config_(std::move(config)),
       watcher_(new_client(now, false)) {}
 
-/// What still comes for a session that has ended is read and forgotten, or the socket would stay ready for ever.
+/// Discards datagrams for a session that has ended; otherwise the socket would stay readable.
 void Plug::drain(Link& link) {
   Address from;
   std::array<std::byte, kMaxDatagram> forgotten;
@@ -40,7 +40,7 @@ std::unique_ptr<ForceClient> Plug::new_client(LocalTime now, bool controls) {
   ForceClient::Config config = config_.client;
   config.seed = config_.new_seed();
   if (controls) {
-    config.diagnostics = false;  // they are for observers only
+    config.diagnostics = false;  // only for observers
     const Physics physics = [this](const DeviceState& state) { return answer(state); };
     return std::make_unique<ForceClient>(way.link, way.server, config, physics, now);
   }

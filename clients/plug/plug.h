@@ -12,102 +12,102 @@
 
 namespace tendon::plug {
 
-/// One device of a Tendon server, for programs that know nothing of Tendon. Every bridge has one for each device: it
-/// reads the newest state here, and says here what its programs ask for. It has no socket, clock or thread.
+/// One device of a Tendon server, for programs that do not know Tendon. A bridge has one Plug for each device. It
+/// reads the newest state from it and passes it the forces of its programs. A Plug has no socket, clock or thread.
 ///
 ///     Plug plug({link, server}, {another, server}, config, now);
 ///     for (;;) wait for a datagram, at most until plug.turn(now);
 ///
-/// * **Onlooker first.** It begins as an observer, so that a program that only reads shuts no engine out. The first
-///   force that is asked for makes it a controller of the channel (felt two round trips later); Config::idle without
-///   one makes it an observer again.
-/// * **One owner.** Of several programs the first one that asks for a force owns the device. Others are told that they
-///   do not, and their forces are dropped. It is free again when its owner leaves or asks for nothing for Config::idle.
-/// * **Freshness.** A force is sent once, and a field answers states until its time is over. Then nothing is sent: the
-///   server holds, fades and stops the old force as for any engine that falls silent (protocol/SESSION.md). An old force
-///   is never sent as if it were new.
-/// * **At once.** What is asked for now is sent in the next turn, in answer to the newest state.
+/// * **Observer first.** It starts as an observer, so that a program that only reads does not exclude an engine. The
+///   first requested force makes it a controller of the channel, which takes two round trips. After Config::idle
+///   without a force it becomes an observer again.
+/// * **One owner.** The first program that requests a force owns the device. Forces of other programs are dropped,
+///   and they are informed. The device is free again when its owner leaves or requests nothing for Config::idle.
+/// * **Freshness.** A single force is sent once; a field answers states until it expires. After that nothing is sent,
+///   and the server holds, fades and stops the last force as for any silent engine (protocol/SESSION.md). An old
+///   force is never sent as a new one.
+/// * **Latency.** A requested force is sent in the next turn as an answer to the newest state.
 ///
 /// Thread-safe: no. Realtime-safe: no.
 class Plug {
  public:
-  /// One of the old programs, as the bridge numbers them; 0 is nobody.
+  /// Number of a program, assigned by the bridge. 0: none.
   using Program = std::uint32_t;
 
   struct Config {
-    ForceClient::Config client{};  ///< name, device, channel, key, take_lease …; `seed` is replaced by `new_seed`
+    ForceClient::Config client{};  ///< `seed` is replaced by `new_seed`
     std::function<Seed()> new_seed{};
-    bool observe = false;                     ///< no force of any program is sent
-    Duration idle = std::chrono::seconds(1);  ///< … without a force asked for: the owner and the channel are let go
+    bool observe = false;                     ///< drop the forces of all programs
+    Duration idle = std::chrono::seconds(1);  ///< time without a requested force after which the owner and the channel
+                                              ///< are released
   };
 
-  /// How one of the two sessions reaches the server: two clients, each with a socket of its own.
+  /// Connection of one of the two sessions. Each has its own socket.
   struct Way {
     Link& link;
     Address server;
   };
 
   enum class Answer : std::uint8_t {
-    kTaken = 1,      ///< it will be sent
-    kOwned = 2,      ///< another program owns the device: dropped
-    kObserving = 3,  ///< Config::observe: dropped
+    kTaken = 1,      ///< will be sent
+    kOwned = 2,      ///< dropped: another program owns the device
+    kObserving = 3,  ///< dropped: Config::observe is set
   };
 
-  /// The links must outlive this object. The first Hello leaves with the first turn.
+  /// The links must outlive this object. The first Hello is sent in the first turn.
   Plug(const Way& watcher, const Way& controller, Config config, LocalTime now);
 
-  /// Does everything due at `now` and returns the latest time for the next call; call earlier when a datagram arrives
-  /// or something has been asked for.
+  /// Does all the work that is due at `now` and returns the time of the next call. Call it earlier when a datagram
+  /// arrives or a force has been requested.
   LocalTime turn(LocalTime now);
 
-  /// The newest state, with the buttons that were held since `turn` was called last; empty until the first comes and
-  /// while there is no session.
+  /// The newest state, including buttons pressed since the last turn. Empty before the first state and without a
+  /// session.
   const std::optional<DeviceState>& state() const noexcept { return state_; }
-  /// When it arrived.
   LocalTime arrived() const noexcept { return arrived_; }
-  /// When it was sampled, on our clock, by the estimate of the server's clock; not later than it arrived. Before the
-  /// first round trip of a session: when it arrived.
+  /// Sampling time of the state in the local clock, computed with the estimate of the server's clock, at most
+  /// arrived(). Equals arrived() before the first round trip of a session.
   LocalTime sampled() const noexcept { return sampled_; }
-  /// The number of states that have come: when it has grown, state() is new.
+  /// Number of received states. If it has increased, state() is new.
   std::uint64_t states() const noexcept { return states_; }
-  /// What the server has said of itself, the device and its handle; empty until it has.
+  /// Descriptions received from the server; empty before they arrive.
   const std::optional<Welcome>& welcome() const noexcept { return welcome_; }
   const std::optional<DeviceDescription>& description() const noexcept { return description_; }
   const std::optional<HandleDescription>& handle() const noexcept { return handle_; }
 
-  /// `program` wants the hand to feel `touch`, in the device base frame: one force, as it was computed from a state that
-  /// the program has seen. It is sent once, in answer to the newest state; it waits until `until` for the channel.
+  /// Requests one force on the hand, in the device base frame. It answers the newest state and is sent once. If the
+  /// channel is not available yet, it waits for it until `until`.
   Answer push(Program program, LocalTime now, LocalTime until, const Touch& touch);
-  /// `program` wants the hand to feel `physics`, a field whose force is known wherever the hand is: it answers the newest
-  /// state and every state until `until`. Either replaces what the same program asked for before.
+  /// Requests a force field, which answers the newest state and each new state until `until`. push() and ask()
+  /// replace the previous request of the same program.
   Answer ask(Program program, LocalTime now, LocalTime until, Physics physics);
-  /// `program` asks for nothing any more. Nothing happens when it is not the owner.
+  /// Ends the requests of `program`. Does nothing if it is not the owner.
   void release(Program program);
   Program owner() const noexcept { return owner_; }
 
-  /// Whether the server takes our forces.
+  /// Whether the server accepts forces from this object.
   bool pushes() const noexcept { return controller_ && controller_->holds(); }
-  std::uint64_t forces() const noexcept;                              ///< sent, in all sessions
-  std::uint64_t forces_dropped() const noexcept { return dropped_; }  ///< asked for by others than the owner
-  std::uint64_t forces_unusable() const noexcept;                     ///< not sent: not finite, or out of bounds
-  LinkStats link() const;                                             ///< of the session that the states come by
-  /// The server's newest reports, of the present sessions: on our forces (while it takes them), and, with
-  /// ForceClient::Config::diagnostics and only while no force is asked for, on the device's loop.
+  std::uint64_t forces() const noexcept;                              ///< sent in all sessions
+  std::uint64_t forces_dropped() const noexcept { return dropped_; }  ///< requested by programs other than the owner
+  std::uint64_t forces_unusable() const noexcept;                     ///< not sent because not finite or out of bounds
+  LinkStats link() const;                                             ///< of the session that receives the states
+  /// Newest reports of the server in the current sessions: on the forces, while a channel is held; and on the loop of
+  /// the device, with ForceClient::Config::diagnostics and only while no force is requested.
   std::optional<LinkReport> report() const { return controller_ ? controller_->report() : std::nullopt; }
   std::optional<DeviceReport> device_report() const { return watcher_ ? watcher_->device_report() : std::nullopt; }
 
-  /// Each change in a sentence, once: connected, lost, refused, no answer, axes unknown, controls, controls no more, a
-  /// force not sent. The newest 16 that nobody has taken. Empty: nothing new.
+  /// Returns the next message about a change: connected, lost, refused, no answer, orientation unknown, control
+  /// gained or lost, force not sent. Empty: none. Only the newest 16 messages are kept.
   std::optional<std::string> next_sentence();
 
-  /// Of the session that the states come by; kStopped after stop().
+  /// Phase of the session that receives the states; kStopped after stop().
   ForceClient::Phase phase() const noexcept;
-  /// Whether no session is open: not yet, or not any more.
+  /// Whether no session is open.
   bool lost() const noexcept { return phase() != ForceClient::Phase::kOpen; }
-  /// The server is found at other addresses, for the next attempts. To be called while `lost`.
+  /// Sets the server addresses for the next attempts. Must be called while lost().
   void move_to(const Address& watcher, const Address& controller);
 
-  /// Says Bye. Any further turn does nothing.
+  /// Sends a Bye. Further turns do nothing.
   void stop(LocalTime now);
 
  private:
@@ -128,7 +128,7 @@ class Plug {
   Config config_;
   std::unique_ptr<ForceClient> watcher_;
   std::unique_ptr<ForceClient> controller_;
-  LocalTime now_{};  ///< of the present turn, for the callbacks
+  LocalTime now_{};  ///< of the current turn, for the callbacks
 
   std::optional<DeviceState> state_;
   LocalTime arrived_{};
@@ -140,13 +140,13 @@ class Plug {
 
   Program owner_ = 0;
   Physics physics_;    ///< of the owner; empty: nothing to send
-  bool once_ = false;  ///< it is one force
+  bool once_ = false;  ///< physics_ is a single force
   LocalTime asked_{};
   LocalTime until_{};
   std::uint64_t dropped_ = 0;
-  std::uint64_t forces_before_ = 0;  ///< of the controllers that have ended
+  std::uint64_t forces_before_ = 0;  ///< sent by previous controllers
   std::uint64_t unusable_before_ = 0;
-  /// What sentences are made from: while it stays, there is nothing new to say.
+  /// The state that the messages describe. While it is unchanged, there are no new messages.
   struct Shown {
     ForceClient::Phase watcher = ForceClient::Phase::kStopped;
     ForceClient::Phase controller = ForceClient::Phase::kStopped;
@@ -154,15 +154,15 @@ class Plug {
     bool operator==(const Shown&) const = default;
   };
   Shown shown_;
-  std::deque<std::string> sentences_;  ///< that nobody has taken yet
-  std::string said_;                   ///< the newest sentence about the connection
-  std::string said_of_axes_;           ///< … about how the device lies
-  std::string said_of_force_;          ///< likewise, about the channel
-  std::string said_of_unusable_;       ///< likewise, about a force that was not sent
+  std::deque<std::string> sentences_;  ///< not yet returned
+  std::string said_;                   ///< last message about the connection
+  std::string said_of_axes_;           ///< last message about the orientation of the device
+  std::string said_of_force_;          ///< last message about the channel
+  std::string said_of_unusable_;       ///< last message about an unusable force
   bool stopped_ = false;
 };
 
-/// Whether an attempt or a session is over and the next attempt not begun.
+/// Whether the client is waiting between two attempts.
 constexpr bool is_between_attempts(ForceClient::Phase phase) {
   return phase == ForceClient::Phase::kUnanswered || phase == ForceClient::Phase::kRefused ||
          phase == ForceClient::Phase::kLost;

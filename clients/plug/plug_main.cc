@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// tendon-plug: programs that exist already use a Tendon device without new code. One subcommand for each way in.
+// tendon-plug: connects existing programs to Tendon devices without changes. One subcommand for each protocol.
 #include <CLI/CLI.hpp>
 #include <exception>
 #include <iostream>

@@ -11,15 +11,15 @@ class App;
 
 namespace tendon::plug {
 
-/// What the chosen subcommand does once the whole command line has been read; returns the exit code. An exception is
-/// said on stderr and ends the program with 1.
+/// Runs the chosen subcommand after the command line is parsed; returns the exit code. Exceptions are printed to
+/// stderr and result in exit code 1.
 using Chosen = std::function<int()>;
 
-/// The options that every bridge has: --server, --key, --device, --channel, --take-lease, --observe, --json. The
-/// server knows it as "tendon-plug" with the subcommand's name.
+/// Adds the options of all bridges: --server, --key, --device, --channel, --take-lease, --observe, --json. The client
+/// name sent to the server is "tendon-plug" followed by the name of the subcommand.
 void add_common(CLI::App& app, DeskConfig& desk);
 
-// Each bridge adds its subcommand, in FOLDER/…_main.cc, and sets `chosen` when it is the one.
+// Each adds a subcommand, defined in FOLDER/…_main.cc, which sets `chosen` when it is selected.
 void add_chai3d(CLI::App& app, Chosen& chosen);
 void add_inverse(CLI::App& app, Chosen& chosen);
 void add_ros2(CLI::App& app, Chosen& chosen);

@@ -8,28 +8,28 @@
 
 namespace tendon::plug {
 
-/// A device as another program sees it: its device base frame ⇄ the program's frame (core/base/frames.h).
+/// Transforms between the device base frame and the frame of a program (core/base/frames.h):
 ///
 ///     p_program = per_metre M A p_base        A: HandleDescription::operator_from_device, M: Frame::from_operator
-///     K_base    = (M A)ᵀ K_program (M A)      a stiffness, N/m; forces are turned, never scaled
-///     R_program = M A R_handle Mᵀ             an orientation; R_handle turns the handle frame into the base frame
+///     K_base    = (M A)ᵀ K_program (M A)      stiffness, N/m; forces are rotated but not scaled
+///     R_program = M A R_handle Mᵀ             orientation; R_handle rotates the handle frame to the base frame
 ///
-/// The handle frame has the operator's axes while the handle is in its middle: the stylus points along −z. So the
-/// program's frame of the handle has the program's own axes there, and the identity means "not turned" everywhere.
+/// With the handle in its center, the axes of the handle frame are those of the operator, with the stylus along −z.
+/// The identity therefore means "not rotated" in both frames.
 ///
 /// Thread-safe, realtime-safe: yes.
 class View {
  public:
-  /// Without a rotation the device's frame is taken for the operator's.
+  /// Without a rotation, the device frame is assumed to equal the operator frame.
   View(const Frame& frame, const std::optional<Quat>& operator_from_device)
       : frame_(&frame),
         operator_from_base_(operator_from_device ? matrix_of(*operator_from_device) : Mat3(Mat3::Identity())) {}
 
-  Vec3 position(const Vec3& base) const { return frame_->position(operator_from_base_ * base); }  ///< velocities too
+  Vec3 position(const Vec3& base) const { return frame_->position(operator_from_base_ * base); }  ///< or a velocity
   Vec3 force(const Vec3& base) const { return frame_->force(operator_from_base_ * base); }
   Vec3 torque(const Vec3& base) const {
     return frame_->torque(operator_from_base_ * base);
-  }  ///< angular velocities too
+  }  ///< or an angular velocity
   Mat3 orientation(const Quat& handle) const { return frame_->orientation(operator_from_base_ * matrix_of(handle)); }
 
   Vec3 base_position(const Vec3& here) const { return back(frame_->operator_position(here)); }

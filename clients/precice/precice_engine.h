@@ -8,18 +8,17 @@
 
 namespace tendon::precice_worker {
 
-/// The hand as a participant of a preCICE coupling: it provides the mesh of a TouchedPatch, writes the nodes'
-/// displacements and reads the forces that it takes to hold them there. One time window for each answer, one step in it.
+/// The hand as a participant of a preCICE coupling. It provides the mesh of a TouchedPatch, writes the displacements
+/// of the nodes, and reads the forces required to hold the nodes there. Each answer is one time window with one step.
 ///
-/// The coupling scheme must be serial-explicit with the hand first: then the force that is read is the partner's answer
-/// to the displacement just written. With a parallel one it would be the answer to the hand before, and would be sent as
-/// that to this hand (README.md).
+/// The coupling scheme must be serial-explicit with the hand first, so that the forces answer the displacements just
+/// written. A parallel scheme would return forces for the previous displacements (README.md).
 ///
 /// Thread-safe: no. Realtime-safe: no (it waits for the partner).
 class PreciceEngine {
  public:
   struct Config {
-    std::string file;  ///< preCICE's own configuration
+    std::string file;  ///< configuration file of preCICE
     std::string participant = "Hand";
     std::string mesh = "Hand-Mesh";
     std::string displacement = "Displacement";
@@ -27,14 +26,14 @@ class PreciceEngine {
     TouchedPatch::Config patch{};
   };
 
-  /// Waits for the partner. Throws std::invalid_argument for a patch that is impossible; preCICE's own errors (an
-  /// unknown mesh, …) are std::runtime_error with its sentence.
+  /// Waits for the partner. Throws std::invalid_argument for an invalid patch, and std::runtime_error for errors
+  /// reported by preCICE, for example an unknown mesh.
   explicit PreciceEngine(const Config& config);
   ~PreciceEngine();
   PreciceEngine(const PreciceEngine&) = delete;
   PreciceEngine& operator=(const PreciceEngine&) = delete;
 
-  /// Throws std::runtime_error when the coupling has come to its end, and as preCICE does.
+  /// Throws std::runtime_error at the end of the coupling and for errors of preCICE.
   Touch answer(const DeviceState& hand);
 
  private:

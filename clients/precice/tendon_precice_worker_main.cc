@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// tendon-precice-worker: a worker whose solver is any program that preCICE couples.
+// tendon-precice-worker: a worker whose solver is coupled through preCICE.
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <exception>

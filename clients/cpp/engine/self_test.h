@@ -58,17 +58,18 @@ struct SelfTestScript {
 
 /// Tests the callback of an engine with scripted motion, without a server, device or network:
 ///
-/// * **Passivity.** On closed paths (press and release, and loops with a slide in three planes; in both directions, slowly
-///   and fast), the work done on the hand, Σ ½(F(k) + F(k+1))·(x(k+1) − x(k)), never exceeds `work_tolerance` times the
-///   work done by the hand, plus the difference between the sums with all samples and with every second sample. That
-///   difference is three times the error of the trapezoidal rule. Forces that lag, increase with speed, or have a curl
-///   fail. The server's limiter would contain such an engine, but the body would feel soft.
-/// * **Elasticity**, if the script sets `elastic`: the energy lost at the end of each path is within the same bound. A
-///   shape that snaps from one equilibrium to another loses more, as does a solver that stops too early.
-/// * **Stiffness** equals −∂F/∂x as computed by fd_stiffness at rest at four depths, unless a surface is within one step.
-/// * **Robustness** to a hand at NaN, infinity, 1 km away, or a denormal position; a repeated tick; a pause of one second;
-///   a jump. The engine must not throw, its answers to finite states must be finite (at most limits::kMaxValue), and its
-///   answer at `start` must be unchanged afterwards.
+/// * **Passivity.** On closed paths (press and release, and loops with a slide in three planes; in both directions,
+///   slowly and fast), the work done on the hand, Σ ½(F(k) + F(k+1))·(x(k+1) − x(k)), never exceeds `work_tolerance`
+///   times the work done by the hand, plus the difference between the sums with all samples and with every second
+///   sample. That difference is three times the error of the trapezoidal rule. Forces that lag, increase with speed,
+///   or have a curl fail. The server's limiter would contain such an engine, but the body would feel soft.
+/// * **Elasticity**, if the script sets `elastic`: the energy lost at the end of each path is within the same bound.
+///   A shape that snaps from one equilibrium to another loses more, as does a solver that stops too early.
+/// * **Stiffness** equals −∂F/∂x as computed by fd_stiffness at rest at four depths, unless a surface is within one
+///   step.
+/// * **Robustness** to a hand at NaN, infinity, 1 km away, or a denormal position; a repeated tick; a pause of one
+///   second; a jump. The engine must not throw, its answers to finite states must be finite (at most
+///   limits::kMaxValue), and its answer at `start` must be unchanged afterwards.
 ///
 /// Unless stated otherwise, each state follows the previous one by one tick and 1/rate_hz s. The test covers half a
 /// minute of simulated time and ends at `start`. Throws std::invalid_argument "FIELD = VALUE: expected …" if `script`

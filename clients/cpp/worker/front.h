@@ -16,17 +16,18 @@ namespace tendon::worker {
 /// Scheduling policy of a front: when to send a state to the worker, which answers to use, and when to replace the
 /// worker. A pure state machine without sockets, processes or clocks.
 ///
-/// * **Newest wins.** The worker has one state at a time. After its answer it gets the newest one; states are not queued.
+/// * **Newest wins.** The worker has one state at a time. After its answer it gets the newest one; states are not
+///   queued.
 /// * **Late answers are dropped.** Answers that exceed the deadline are counted and dropped. The worker stays.
 /// * **Timing statistics use answers with a force.** Answers in free space are fast and frequent, so they are not
 ///   representative. The first answer with a force may be slow because a solver has no warm start yet.
 /// * **Slow answers stay valid longer.** If three times the median is above kMinDeadline, it is the validity of each
 ///   answer; otherwise the client would derive the validity from the fast answers before contact.
-/// * **A dead worker is replaced.** A worker is given up after `dead` without an answer, or when its stream ends. The next
-///   one starts after `retry_min`. The wait doubles with each failure up to `retry_max`, and is reset once a worker has
-///   answered for longer than the wait.
-/// * **Fallback.** While no worker is available or the answer is late, `fallback` (if set) answers each new state. Its
-///   error is increased by its last difference from an answer of the worker to the same state.
+/// * **A dead worker is replaced.** A worker is given up after `dead` without an answer, or when its stream ends. The
+///   next one starts after `retry_min`. The wait doubles with each failure up to `retry_max`, and is reset once a
+///   worker has answered for longer than the wait.
+/// * **Fallback.** While no worker is available or the answer is late, `fallback` (if set) answers each new state.
+///   Its error is increased by its last difference from an answer of the worker to the same state.
 ///
 /// Thread-safe: no. Realtime-safe: no.
 class Front {

@@ -25,7 +25,7 @@
 //
 //     front → worker   sequence 1, 2, 3 …, one frame `state`
 //     worker → front   the same sequence, one frame `force` with based_on_tick = tick of the state and sequence = the
-//                      record's sequence; or no frame if no force is known. valid_for_us is ignored but must be in bounds
+//                      record's sequence; or no frame if no force is known. valid_for_us is ignored but must be valid
 //
 // Only one state is in flight: the front waits for the answer before it sends the next. The worker exits at the end
 // of the stream.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// tendon-plug chai3d: starts a CHAI3D program with a libhdPhantom.so of ours, and gives it the devices of a server.
+// tendon-plug chai3d: runs a CHAI3D program with a replacement of libhdPhantom.so that provides the server's devices.
 #include <fcntl.h>
 #include <linux/futex.h>
 #include <signal.h>
@@ -41,10 +41,10 @@ namespace {
 using chai3d::Host;
 using chai3d::SharedHands;
 
-/// The program counts its devices at its start and never again, so it is started when they have answered; or after
-/// this time, when they may not come.
+/// A CHAI3D program counts its devices only once, at its start. It is therefore started when all devices have
+/// answered, or after this time.
 constexpr Duration kBeforeTheProgram = std::chrono::seconds(1);
-constexpr int kMaxWakes = 64;  ///< taken from the socket in one turn: the program sends one for each force
+constexpr int kMaxWakes = 64;  ///< wake-ups read in one turn; the program sends one for each force
 
 struct Options {
   DeskConfig desk;
@@ -57,7 +57,7 @@ struct Options {
 
 [[noreturn]] void fail(const std::string& what) { throw std::runtime_error(what + ": " + std::strerror(errno)); }
 
-/// The memory that the program shares: it lives as long as one of the two processes.
+/// Memory shared with the program. It exists as long as one of the two processes.
 class Memory {
  public:
   Memory() : file_(::memfd_create("tendon-chai3d", MFD_CLOEXEC)) {
@@ -81,14 +81,14 @@ class Memory {
   SharedHands* hands_ = nullptr;
 };
 
-/// What the program wakes us by: a socket with an abstract name that the system has chosen. Its bytes say nothing, so
-/// nobody can do more with it than wake us.
+/// Socket with which the program wakes this process. It has an abstract name chosen by the kernel. The contents of
+/// the datagrams are ignored, so other processes can only cause wake-ups.
 class Waker {
  public:
   Waker() : socket_(::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0)) {
     sockaddr_un address{};
     address.sun_family = AF_UNIX;
-    socklen_t size = sizeof address.sun_family;  // no name: the system chooses one
+    socklen_t size = sizeof address.sun_family;  // no name: the kernel chooses one
     if (socket_ < 0 || ::bind(socket_, reinterpret_cast<sockaddr*>(&address), size) != 0) fail("no socket");
     size = sizeof address;
     if (::getsockname(socket_, reinterpret_cast<sockaddr*>(&address), &size) != 0) fail("no socket");
@@ -111,7 +111,7 @@ class Waker {
   std::string name_;
 };
 
-/// The folder of our libHD.so and libhdPhantom.so: beside this program where it is built or installed.
+/// Directory of the replacement libHD.so and libhdPhantom.so, relative to this program in build and install trees.
 std::filesystem::path library_folder() {
   const std::filesystem::path self = std::filesystem::read_symlink("/proc/self/exe").parent_path();
   const std::filesystem::path folder = self.parent_path() / "lib" / "tendon" / "chai3d";
@@ -122,7 +122,7 @@ std::filesystem::path library_folder() {
   return folder;
 }
 
-/// Where the shell would find the program.
+/// Finds a program as the shell does.
 std::filesystem::path find_program(const std::string& name) {
   const auto runs = [](const std::filesystem::path& path) {
     return std::filesystem::is_regular_file(path) && ::access(path.c_str(), X_OK) == 0;
@@ -141,7 +141,7 @@ std::filesystem::path find_program(const std::string& name) {
   throw std::runtime_error(name + " is no program that can be started");
 }
 
-/// A program that is linked to OpenHaptics would find our empty libHD.so in its place.
+/// A program linked to OpenHaptics would load our empty libHD.so instead of the original.
 void refuse_openhaptics(const std::filesystem::path& program) {
   std::ifstream file(program, std::ios::binary);
   const std::vector<char> bytes{std::istreambuf_iterator<char>(file), {}};
@@ -153,7 +153,7 @@ void refuse_openhaptics(const std::filesystem::path& program) {
   }
 }
 
-/// Becomes PROGRAM, in the child.
+/// Executes PROGRAM, in the child process.
 [[noreturn]] void become(const Options& options, const std::string& memory, const std::string& wake,
                          const std::filesystem::path& libraries) {
   std::string path = libraries.string();
@@ -173,7 +173,7 @@ void refuse_openhaptics(const std::filesystem::path& program) {
 
 // NOLINTEND(concurrency-mt-unsafe)
 
-/// Serves the program until it has ended, and returns its exit code, 128 + the signal that has killed it.
+/// Serves the program until it ends. Returns its exit code, or 128 + the number of the signal that terminated it.
 int serve(const Options& options) {
   const std::filesystem::path libraries = library_folder();
   refuse_openhaptics(find_program(options.program.front()));
@@ -210,7 +210,7 @@ int serve(const Options& options) {
     }
     if (signals.asked() && !std::exchange(told, true)) {
       if (!child) return 0;
-      ::kill(*child, SIGTERM);  // it ends as it likes; then so do we
+      ::kill(*child, SIGTERM);  // wait until the program has ended
     }
     std::array<pollfd, 1> programs = {waker.to_poll()};
     desk.wait(programs, read_clock(), next);
@@ -221,7 +221,7 @@ int serve(const Options& options) {
 }  // namespace
 
 void add_chai3d(CLI::App& app, Chosen& chosen) {
-  static Options options;  // CLI11 writes into it when it parses
+  static Options options;  // CLI11 writes to it while parsing
   CLI::App& command = *app.add_subcommand(
       "chai3d", "Starts a program that is built with CHAI3D, as it is; the devices are its Phantoms");
   command.footer("Example: tendon-plug chai3d --server lab:47100 --key wall.key -- ./01-mydevice");

@@ -1,2 +1,2 @@
 // SPDX-License-Identifier: Apache-2.0
-// libHD.so: CHAI3D opens it before libhdPhantom.so and asks it for nothing.
+// libHD.so: CHAI3D loads it before libhdPhantom.so but uses no symbols from it.

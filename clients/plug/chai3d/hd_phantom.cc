@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// libhdPhantom.so: what CHAI3D's driver for Phantoms loads, 14 C functions. It runs in a stranger's process, which
-// tendon-plug has started, and disturbs nothing there: no thread, no signal, no exception, no Protocol Buffers, and at
-// most one line of output. It reads and writes the memory that it shares with tendon-plug, which does the rest.
+// libhdPhantom.so: the 14 C functions that CHAI3D's Phantom driver loads. It runs in the process of the CHAI3D
+// program and must not interfere with it: no threads, no signals, no exceptions, no Protocol Buffers, and at most one
+// line of output. It only accesses the memory shared with tendon-plug.
 //
-// What the functions mean to CHAI3D was read in its CPhantomDevices.cpp (3.2 and 3.3, BSD-3): the getters and Close
-// return 0 for a failure, the force functions −1, and Open's result is not looked at.
+// The semantics of the functions are those of CHAI3D's CPhantomDevices.cpp (3.2 and 3.3, BSD-3): the getters and
+// Close return 0 on failure, the force functions −1, and the result of Open is ignored.
 #include <fcntl.h>
 #include <linux/futex.h>
 #include <signal.h>
@@ -32,9 +32,9 @@ namespace tendon::plug::chai3d {
 namespace {
 
 constexpr std::int64_t kMillisecond = 1'000'000;
-/// CHAI3D counts its devices at the start and never again.
+/// CHAI3D counts its devices only once, at the start.
 constexpr std::int64_t kLongestCount = 400 * kMillisecond;
-/// A state that is older is no state: the plug or the server is gone.
+/// Older states are not used, because the bridge or the server has stopped.
 constexpr std::int64_t kOldestState = 500 * kMillisecond;
 constexpr std::int64_t kLongestPace = 2 * kMillisecond;
 constexpr int kFailure = 0;
@@ -48,8 +48,8 @@ std::int64_t now_ns() noexcept {
   return time.tv_sec * 1'000'000'000 + time.tv_nsec;
 }
 
-/// What a thread of the program keeps others from: one writer at a time. It is held for some 30 stores; who does not
-/// get it soon gives up, as after a thread that was killed in between.
+/// A spin lock for writers. It is held for about 30 stores. Acquiring it fails after some attempts, in case the
+/// holding thread was killed.
 class Turnstile {
  public:
   explicit Turnstile(std::atomic_flag& flag) noexcept : flag_(flag) {
@@ -67,22 +67,22 @@ class Turnstile {
   bool entered_ = false;
 };
 
-/// The program's end of one device.
+/// One device as seen by the program.
 struct Handle {
   std::atomic_flag writing = ATOMIC_FLAG_INIT;
-  Asked asked;  ///< the newest, under `writing`
+  Asked asked;  ///< newest request; protected by `writing`
 };
 
-/// Of the newest state of each device that this thread has read, or that a force of its own has waited for. Each thread
-/// has its own: one that draws takes no state from the one that pushes.
+/// Tick of the newest state of each device that this thread has read or waited for. Per thread, so that a graphics
+/// thread does not consume states of the haptic thread.
 thread_local std::array<std::uint64_t, SharedHands::kMaxDevices> tick_read{};
 
-/// Which device a thread waits for: of several that it pushes in turn, the first. One turn of the program is then one
-/// haptic step, whether it reads all of them before it pushes or one after the other.
+/// Selects the device that a thread waits for: the first of those that it updates in turn. One iteration of the
+/// program is then one haptic step, independent of the order in which it reads states and sets forces.
 class Pacer {
  public:
-  /// Whether the force that this thread has set on that device waits. Once the thread pushes another device twice in
-  /// between, as after the first one's Close, that one sets the pace.
+  /// Returns whether setting a force on this device waits. If the thread sets forces on another device twice in
+  /// between, for example after closing the first one, that device is selected instead.
   bool waits(int id) noexcept {
     const std::uint32_t bit = 1U << static_cast<unsigned>(id);
     if (id != device_ && device_ >= 0 && (others_ & bit) == 0) {
@@ -96,12 +96,12 @@ class Pacer {
 
  private:
   int device_ = -1;           ///< none yet
-  std::uint32_t others_ = 0;  ///< pushed since it was, by bit
+  std::uint32_t others_ = 0;  ///< bit mask of the devices updated since device_
 };
 static_assert(SharedHands::kMaxDevices <= 32);
 thread_local Pacer pacer;
 
-/// The shared memory and the socket. Made once, by the first call, and kept until the process ends.
+/// The shared memory and the socket. Created by the first call and kept until the process ends.
 class Attached {
  public:
   Attached() noexcept {
@@ -111,7 +111,7 @@ class Attached {
     // NOLINTEND(concurrency-mt-unsafe)
     if (memory == nullptr || wake == nullptr || !map(memory)) {
       constexpr char kSaid[] = "libhdPhantom: no device: start this program with `tendon-plug chai3d -- PROGRAM`\n";
-      if (::write(STDERR_FILENO, kSaid, sizeof kSaid - 1) < 0) return;  // nobody can be told
+      if (::write(STDERR_FILENO, kSaid, sizeof kSaid - 1) < 0) return;  // stderr is closed
       return;
     }
     socket_ = ::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
@@ -129,12 +129,12 @@ class Attached {
   }
   Handle& handle(int id) noexcept { return handles_[static_cast<std::size_t>(id)]; }
 
-  /// One byte, or none when tendon-plug has some to read already.
+  /// Sends one byte, or nothing if the socket buffer is full.
   void wake() const noexcept {
     ::sendto(socket_, "", 1, MSG_DONTWAIT | MSG_NOSIGNAL, reinterpret_cast<const sockaddr*>(&address_), address_size_);
   }
 
-  /// Sleeps until `news` is another number than `seen`, or until `end`.
+  /// Sleeps until `news` differs from `seen`, or until `end`.
   void sleep_until_news(std::uint32_t seen, std::int64_t end) noexcept {
     const std::int64_t left = end - now_ns();
     if (left <= 0) return;
@@ -172,7 +172,7 @@ Attached& attached() noexcept {
   return once;
 }
 
-/// The newest state; false when there is none that is young enough.
+/// Reads the newest state. Returns false if there is none or it is too old.
 bool read(int id, HandNow& hand) noexcept {
   const SharedDevice* const device = attached().device(id);
   if (device == nullptr || !device->hand.get(hand)) return false;
@@ -180,8 +180,8 @@ bool read(int id, HandNow& hand) noexcept {
   return now_ns() - hand.at_ns <= kOldestState;
 }
 
-/// Returns once a state is there that this thread has not read, at most kLongestPace later: CHAI3D's loops do not sleep
-/// by themselves.
+/// Blocks until a state arrives that this thread has not read, for at most kLongestPace. The haptic loops of CHAI3D
+/// do not sleep themselves.
 void pace(int id) noexcept {
   Attached& memory = attached();
   if (memory.hands()->paced == 0 || !pacer.waits(id)) return;
@@ -196,7 +196,7 @@ void pace(int id) noexcept {
   }
 }
 
-/// Changes what is asked for by `change`, and tells tendon-plug. False when another process has the device.
+/// Applies `change` to the request and wakes tendon-plug. Returns false if another process owns the device.
 template <typename Change>
 bool ask(int id, Change change) noexcept {
   SharedDevice* const device = attached().device(id);
@@ -243,7 +243,7 @@ int hdPhantomOpen(int id) {
   if (device == nullptr) return kForceFailure;
   std::int32_t owner = device->owner.load();
   const auto self = static_cast<std::int32_t>(::getpid());
-  // A process that was killed has closed nothing.
+  // The owner may have been killed without closing the device.
   const bool is_free = owner == 0 || owner == self || (::kill(owner, 0) != 0 && errno == ESRCH);
   return is_free && device->owner.compare_exchange_strong(owner, self) ? id : kForceFailure;
 }
@@ -332,7 +332,7 @@ int hdPhantomGetType(int id, char* type) {
   return kSuccess;
 }
 
-// The server has its own loop. CHAI3D calls the second one with every Close, even while another device is open.
+// The haptic loop runs in the server. CHAI3D calls hdPhantomStopServo in every Close, even if other devices are open.
 void hdPhantomStartServo() {}
 void hdPhantomStopServo() {}
 

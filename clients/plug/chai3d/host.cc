@@ -8,7 +8,6 @@
 namespace tendon::plug::chai3d {
 namespace {
 
-/// The one program that tendon-plug has started.
 constexpr Plug::Program kProgram = 1;
 
 std::array<double, 3> array_of(const Vec3& v) { return {v.x(), v.y(), v.z()}; }
@@ -52,7 +51,7 @@ void Host::describe(std::size_t i, Plug& plug) {
 bool Host::exchange(std::size_t i, Plug& plug, LocalTime now) {
   Device& device = devices_[i];
   SharedDevice& shared = hands_.device[i];
-  if (plug.lost()) device.view.reset();  // the next server's device may lie otherwise
+  if (plug.lost()) device.view.reset();  // the orientation of the next device may differ
   if (!device.view && plug.state() && plug.handle() && plug.description()) {
     device.view.emplace(*find_frame("chai3d"), plug.handle()->operator_from_device);
   }

@@ -12,37 +12,39 @@
 
 namespace tendon::plug::chai3d {
 
-/// tendon-plug's end of the memory that it shares with a CHAI3D program: what a plug knows goes to the program in
-/// CHAI3D's frame, and what the program asks for goes to the plug. It has no socket, clock or thread.
+/// The tendon-plug side of the memory shared with a CHAI3D program. It transfers states to the program, in the frame
+/// of CHAI3D, and requests of the program to the Plug. It has no socket, clock or thread.
 ///
-/// A force that the program asked for at t is fresh until t + Config::stale, however late it is read here: a program
-/// that renders its last frame for a second must not be felt for a second.
+/// A force requested at time t is valid until t + Config::stale, independent of when it is read here. A program with
+/// a low frame rate must not apply its last force for long.
 ///
 /// Thread-safe: no. Realtime-safe: no.
 class Host {
  public:
   struct Config {
     Duration stale = std::chrono::milliseconds(50);
-    std::string model{};  ///< what CHAI3D takes limits and quirks from; empty: the device's own; at most 254 bytes
+    std::string model{};  ///< device model reported to CHAI3D, which selects limits; empty: the device's own; at most
+                          ///< 254 bytes
   };
-  /// In CHAI3D a device without a described workspace has this radius, m.
+  /// Workspace radius reported to CHAI3D if the device has no described workspace, m.
   static constexpr double kWorkspaceRadius = 0.1;
 
-  /// `hands` must outlive this object, and have its number of devices.
+  /// `hands` must outlive this object and contain the number of devices.
   Host(SharedHands& hands, Config config) : hands_(hands), config_(std::move(config)) {}
 
-  /// Takes over what is new on either side of device `i`. True when the program has asked for something: turn the plug
-  /// again, so that it leaves at once.
+  /// Transfers new data in both directions for device `i`. Returns true if the program has requested something; the
+  /// Plug should then be turned again so that the force is sent immediately.
   bool exchange(std::size_t i, Plug& plug, LocalTime now);
 
-  /// After all devices: tells the program that there is news. True when one of its threads sleeps on it: wake it.
+  /// Must be called after all devices. Announces news to the program. Returns true if one of its threads must be
+  /// woken.
   bool announce();
 
  private:
   struct Device {
     std::optional<View> view;
-    std::uint64_t states = 0;  ///< of the plug, that the program has been told
-    std::uint64_t asked = 0;   ///< of the program, that the plug has been told
+    std::uint64_t states = 0;  ///< number of Plug states already passed to the program
+    std::uint64_t asked = 0;   ///< number of program requests already passed to the Plug
     bool described = false;
   };
   void describe(std::size_t i, Plug& plug);

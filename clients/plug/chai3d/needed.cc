@@ -10,7 +10,7 @@
 namespace tendon::plug::chai3d {
 namespace {
 
-/// The T at that place of the file; empty when it is not within it.
+/// Reads a T at `offset`. Returns nullopt if it is outside of the file.
 template <typename T>
 std::optional<T> at(std::span<const std::byte> file, std::uint64_t offset) {
   if (offset > file.size() || file.size() - offset < sizeof(T)) return {};
@@ -19,7 +19,7 @@ std::optional<T> at(std::span<const std::byte> file, std::uint64_t offset) {
   return value;
 }
 
-/// Where in the file the address of the loaded program is.
+/// Converts an address of the loaded program to an offset in the file.
 std::optional<std::uint64_t> offset_of(const std::vector<Elf64_Phdr>& segments, std::uint64_t address) {
   for (const Elf64_Phdr& segment : segments) {
     if (segment.p_type == PT_LOAD && address >= segment.p_vaddr && address - segment.p_vaddr < segment.p_filesz) {
@@ -50,7 +50,7 @@ std::vector<std::string> needed_libraries(std::span<const std::byte> file) {
     if (!segment) return {};
     segments.push_back(*segment);
   }
-  std::vector<std::uint64_t> names;  // in the table of strings
+  std::vector<std::uint64_t> names;  // offsets in the string table
   std::optional<std::uint64_t> strings;
   for (const Elf64_Phdr& segment : segments) {
     if (segment.p_type != PT_DYNAMIC) continue;

@@ -8,9 +8,9 @@
 
 namespace tendon::plug::chai3d {
 
-/// The shared libraries that a program names (DT_NEEDED, System V ABI, chapter 5), from the bytes of its file: an ELF
-/// file of 64 bits of this machine's byte order. Empty for everything else, for a script too, and for a file that
-/// contradicts itself.
+/// Returns the shared libraries that a program depends on (DT_NEEDED; System V ABI, chapter 5). `file` contains a
+/// 64-bit ELF file in native byte order. Returns an empty list for other files, including scripts, and for malformed
+/// files.
 std::vector<std::string> needed_libraries(std::span<const std::byte> file);
 
 }  // namespace tendon::plug::chai3d

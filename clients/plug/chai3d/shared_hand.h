@@ -10,14 +10,14 @@
 
 namespace tendon::plug::chai3d {
 
-// The memory that tendon-plug and the program that it has started share: tendon-plug makes it, and libhdPhantom.so in
-// the program maps it. Only these types cross; neither side ever waits for the other. All numbers are CHAI3D's: SI, x
-// to the user, y right, z up. Times are CLOCK_MONOTONIC, ns, which both processes share.
+// Memory shared between tendon-plug, which creates it, and libhdPhantom.so in the program. Neither side blocks the
+// other. Values are in the frame of CHAI3D, x to the user, y right, z up, in SI units. Times are CLOCK_MONOTONIC in
+// ns.
 
-/// A value that one writer at a time puts and any thread of either process reads: a sequence lock. A writer that dies
-/// while it writes leaves a box that cannot be read, and blocks nobody.
+/// A value protected by a sequence lock, shared between processes. If a writer dies during put(), get() fails but
+/// does not block.
 ///
-/// Thread-safe: one writer at a time, any readers. Realtime-safe: yes.
+/// Thread-safe: one writer at a time, any number of readers. Realtime-safe: yes.
 template <typename T>
 class Box {
   static_assert(std::is_trivially_copyable_v<T> && sizeof(T) % sizeof(std::uint64_t) == 0);
@@ -34,7 +34,8 @@ class Box {
     turn_.store(turn + 1, std::memory_order_release);
   }
 
-  /// False when nothing was put yet, or when a writer is writing for kTries tries in a row; `value` is unchanged then.
+  /// Returns false and leaves `value` unchanged before the first put(), or if a write is in progress in kTries
+  /// attempts.
   bool get(T& value) const noexcept {
     std::array<std::uint64_t, kWords> words;
     for (int i = 0; i < kTries; ++i) {
@@ -51,28 +52,28 @@ class Box {
   }
 
  private:
-  static constexpr int kTries = 1000;  ///< some µs: a write takes 30 stores
+  static constexpr int kTries = 1000;  ///< some µs; a write takes 30 stores
   static_assert(std::atomic<std::uint64_t>::is_always_lock_free);
 
-  std::atomic<std::uint64_t> turn_{0};  ///< odd while it is written, 0 before the first
+  std::atomic<std::uint64_t> turn_{0};  ///< odd during a write, 0 before the first
   std::array<std::atomic<std::uint64_t>, kWords> words_{};
 };
 
-/// tendon-plug → program.
+/// From tendon-plug to the program.
 struct HandNow {
-  std::int64_t at_ns = 0;  ///< when it arrived
-  std::uint64_t tick = 0;  ///< of the haptic step
+  std::int64_t at_ns = 0;  ///< arrival time
+  std::uint64_t tick = 0;
   std::array<double, 3> position{};
   std::array<double, 3> velocity{};
-  std::array<double, 9> rotation{};  ///< row by row; the identity when it is not measured
+  std::array<double, 9> rotation{};  ///< row-major; the identity if it is not measured
   std::uint64_t buttons = 0;
 };
 
-/// Program → tendon-plug.
+/// From the program to tendon-plug.
 struct Asked {
-  std::int64_t at_ns = 0;   ///< when it was asked for
-  std::uint64_t count = 0;  ///< of this and all before: a new one is another one
-  std::uint64_t open = 0;   ///< 0: the program has closed the device and asks for nothing
+  std::int64_t at_ns = 0;   ///< time of the request
+  std::uint64_t count = 0;  ///< number of requests so far; a new value marks a new request
+  std::uint64_t open = 0;   ///< 0: the program has closed the device
   std::array<double, 3> force{};
   std::array<double, 3> torque{};
 };
@@ -80,26 +81,26 @@ struct Asked {
 struct SharedDevice {
   Box<HandNow> hand;
   Box<Asked> asked;
-  std::atomic<std::int32_t> owner{0};  ///< the process that has opened it; 0: none
-  double workspace_radius = 0;         ///< m; written before `ready`, as is the next
-  std::array<char, 255> model{};       ///< with its NUL
+  std::atomic<std::int32_t> owner{0};  ///< process that opened the device; 0: none
+  double workspace_radius = 0;         ///< m; this and `model` are written before `ready`
+  std::array<char, 255> model{};       ///< NUL-terminated
 };
 
 struct SharedHands {
   static constexpr std::uint32_t kVersion = 1;
-  static constexpr std::size_t kMaxDevices = 16;  ///< as many as CHAI3D has places for
+  static constexpr std::size_t kMaxDevices = 16;  ///< limit of CHAI3D
 
   std::uint32_t version = kVersion;
   std::uint32_t devices = 0;
   std::uint32_t paced = 1;                ///< whether the force functions wait for the next state
   std::atomic<std::uint32_t> ready{0};    ///< 1 once every device has sent a state
-  std::atomic<std::uint32_t> news{0};     ///< grows with every state: what a futex waits on
-  std::atomic<std::uint32_t> waiting{0};  ///< threads that do
+  std::atomic<std::uint32_t> news{0};     ///< futex; incremented with every state
+  std::atomic<std::uint32_t> waiting{0};  ///< number of threads waiting on `news`
   std::array<SharedDevice, kMaxDevices> device;
 };
 
-/// How the library finds it: the memory's path, /proc/PID/fd/N, and the abstract name of the socket that wakes
-/// tendon-plug.
+/// Environment variables for the library: the path of the memory, /proc/PID/fd/N, and the abstract name of the socket
+/// that wakes tendon-plug.
 inline constexpr const char* kMemoryVariable = "TENDON_CHAI3D_MEMORY";
 inline constexpr const char* kWakeVariable = "TENDON_CHAI3D_WAKE";
 

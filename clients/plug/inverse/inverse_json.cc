@@ -17,7 +17,7 @@ constexpr std::string_view kLetters = "XYZ";
 constexpr std::string_view kDigits = "0123456789ABCDEF";
 constexpr std::array<const char*, 3> kAxes = {"x", "y", "z"};
 
-/// Objects and arrays within each other, counted before anything is built.
+/// Returns the nesting depth of objects and arrays. Checked before parsing.
 int depth_of(std::string_view text) {
   int depth = 0;
   int deepest = 0;
@@ -117,7 +117,7 @@ void read_device(const json& entry, Wish& wish) {
   }
 }
 
-// A reply is written without a tree of values: it is made for each message, and a tree takes most of a reply's time.
+// Replies are written directly to a string. Building a JSON tree would take most of the time of a reply.
 
 void add(std::string& out, double value) {
   if (!std::isfinite(value)) {
@@ -139,7 +139,7 @@ void add(std::string& out, std::string_view text) {
 
 void add(std::string& out, bool value) { out += value ? "true" : "false"; }
 
-void add(std::string& out, const char* text) = delete;  // which would be a bool
+void add(std::string& out, const char* text) = delete;  // prevents the conversion to bool
 
 void add(std::string& out, const Vec3& v) {
   add(out += "{\"x\":", v.x());
@@ -211,7 +211,6 @@ void add_ours(std::string& out, const DeviceNews& news) {
   out += '}';
 }
 
-/// "[a,b,c]", each written by `add_one`.
 template <class Things, class AddOne>
 void add_array(std::string& out, const Things& things, AddOne add_one) {
   out += '[';
@@ -270,7 +269,7 @@ Wish read_wish(std::string_view text) {
         continue;
       }
       for (const json& entry : value) read_device(entry, wish);
-    } else if (name != "wireless_verse_grip" && name != "verse_grip") {  // whose only command is to ask
+    } else if (name != "wireless_verse_grip" && name != "verse_grip") {  // their only command is a query
       ++wish.ignored;
     }
   }

@@ -11,11 +11,11 @@
 #include "clients/plug/view.h"
 #include "protocol/messages.h"
 
-/// The messages of Haply's Inverse service, version 3.5, as values: its documentation, pages "WebSocket Protocol",
-/// "Simulation Channel" and "Basis Permutation"; Isaac Lab's device class for what clients read. SI units. Numbers
-/// without a unit in their name are as the service has them: m, m/s, N on the hand, quaternions w x y z.
+/// Messages of Haply's Inverse service, version 3.5, as structs. Sources: its documentation, pages "WebSocket
+/// Protocol", "Simulation Channel" and "Basis Permutation", and Isaac Lab's device class for the client side. SI
+/// units: positions in m, velocities in m/s, forces on the hand in N, quaternions as w x y z.
 ///
-/// In, everything optional, what is not named here is ignored and counted:
+/// Input; all fields are optional, and unknown fields are ignored and counted:
 ///
 ///     {"session": {"configure": {"basis": {"permutation": "XZY"}}, "force_render_full_state": {}},
 ///      "inverse3": [{"device_id": "8C4A51F0",
@@ -24,7 +24,7 @@
 ///                                 "probe_position": {},
 ///                                 "tendon": {"torque_nm": {"x": 0, "y": 0, "z": 0.01}, "grip_force_n": 0.5}}}]}
 ///
-/// Out, for each device; "session_id" and each "config" are in the first message, and in one that was asked for by
+/// Output for each device. "session_id" and "config" are only in the first message and after
 /// "force_render_full_state":
 ///
 ///     {"session_id": 3,
@@ -42,48 +42,50 @@
 ///                              "energy_j", "permitted_force_n" (null: no bound), "force_age_ms",
 ///                              "angular_velocity_radps" {…}, "torque_nm" {…}, "grip_rad", "grip_force_n"}]}}
 ///
-/// A device whose server does not answer has no "state", "ready" is false, and so is "connected". Those of the last
-/// line that a device does not measure are absent.
+/// If the server of a device does not answer, "state" is missing and "ready" and "connected" are false. Quantities in
+/// the last line that a device does not measure are missing.
 ///
-/// Thread-safe: yes (no state). Realtime-safe: no.
+/// Thread-safe: yes (stateless). Realtime-safe: no.
 namespace tendon::plug {
 
-/// Axes of the client in those of the service (x right, y forward, z up), "X-ZY": the client's y is the service's −z.
-/// X, Y and Z once each, with − or + before it or not. Rows of the matrix are the client's axes: v_client = B v_service.
-/// Empty for any other text. 48 exist; 24 make a left-handed frame.
+/// Returns the matrix B of a basis permutation, v_client = B v_service, where the service has x right, y forward, z
+/// up. In "X-ZY", y of the client is −z of the service. X, Y and Z must each occur once, with an optional sign;
+/// otherwise returns nullopt. 24 of the 48 permutations are left-handed.
 std::optional<Mat3> basis_of(std::string_view permutation);
 
-/// The frame of a client: the service's, turned by B.
+/// Returns the frame of a client: the frame of the service, rotated by B.
 Frame inverse_frame(const Mat3& basis);
 
-/// What a message says about one device.
+/// The part of a message about one device.
 struct DeviceWish {
   std::string device_id;
   std::optional<std::string> permutation;
-  /// A force command was there: the force in the client's frame, N, on the hand; and our own words, N·m and N.
+  /// From a force command: the force in the frame of the client, N, acting on the hand; torque in N·m, grip force in
+  /// N.
   std::optional<Vec3> force;
   std::optional<Vec3> torque;
   std::optional<double> grip_force;
 };
 
 struct Wish {
-  bool read = false;                       ///< else it was no message: `refused` says why, and nothing was taken
+  bool read = false;                       ///< if false, the message was invalid and rejected for the reason in
+                                           ///< `refused`
   std::optional<std::string> permutation;  ///< of the session
   bool full_state = false;
   std::vector<DeviceWish> devices;
-  std::vector<std::string> refused;  ///< what of it was not taken, in sentences; at most 8
-  std::uint64_t ignored = 0;         ///< commands that mean nothing here
+  std::vector<std::string> refused;  ///< reasons for rejected parts; at most 8
+  std::uint64_t ignored = 0;         ///< number of unsupported commands
 };
 
-inline constexpr std::size_t kLongestMessage = 64 * 1024;  ///< bytes: 16 devices with every command take 6 kB
-inline constexpr int kDeepest = 16;                        ///< nested objects and arrays: a message has 5
-inline constexpr std::size_t kMostRefusals = 8;            ///< sentences in one reply
+inline constexpr std::size_t kLongestMessage = 64 * 1024;  ///< bytes; 16 devices with every command need 6 kB
+inline constexpr int kDeepest = 16;                        ///< nesting depth; valid messages have 5
+inline constexpr std::size_t kMostRefusals = 8;            ///< per reply
 
-/// Reads a message. Bad input is never an exception: too long, too deep, no JSON, a number beyond a double (1e999) or
-/// no object make an unread Wish; a command that is not as above is refused and the rest is taken.
+/// Parses a message. Never throws. Messages that are too long, too deep or not a JSON object, or that contain numbers
+/// outside of the range of double (1e999), set `read` to false. Invalid commands are refused individually.
 Wish read_wish(std::string_view text);
 
-/// What is told of one device, in the client's frame.
+/// Reply for one device, in the frame of the client.
 struct DeviceNews {
   struct State {
     Vec3 position;
@@ -106,20 +108,20 @@ struct DeviceNews {
   std::string_view device_id;
   std::string_view grip_id;
   std::string_view permutation;
-  bool left_handed = false;  ///< held by the left hand
-  bool in_use = false;       ///< some client owns its force
+  bool left_handed = false;  ///< held in the left hand
+  bool in_use = false;       ///< a client owns its force
   std::optional<State> state{};
 };
 
 struct News {
-  std::optional<std::uint32_t> session_id{};  ///< with it, everything is told: each config too
+  std::optional<std::uint32_t> session_id{};  ///< if set, the message also contains every config
   std::vector<DeviceNews> devices{};
   std::vector<std::string> refused{};
 };
 
 std::string to_json(const News& news);
 
-/// The id of a device: eight hexadecimal digits made from its name, the same in every run.
+/// Returns the id of a device: eight hexadecimal digits, computed from its name.
 std::string id_of(std::string_view name);
 
 }  // namespace tendon::plug

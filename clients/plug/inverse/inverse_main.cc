@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// tendon-plug inverse: programs that speak the JSON of Haply's Inverse service over a WebSocket use a Tendon device.
+// tendon-plug inverse: for programs that use the JSON WebSocket protocol of Haply's Inverse service.
 #include <CLI/CLI.hpp>
 #include <iostream>
 #include <nlohmann/json.hpp>

@@ -43,18 +43,18 @@ namespace websocket = beast::websocket;
 using asio::ip::tcp;
 using boost::system::error_code;
 
-/// Messages of all clients that one turn reads before it answers.
 constexpr std::size_t kMostInOneTurn = 256;
-/// Turns of the desk before the clients have theirs.
+/// Maximum number of turns of the desk before the clients are served.
 constexpr int kMostDeskTurns = 4;
-/// The longest sleep, so that patience runs out in time.
+/// Upper limit of a sleep, so that timeouts are noticed.
 constexpr Duration kLongestSleep = std::chrono::milliseconds(100);
-/// A WebSocket that is silent for so long gets a ping, and is closed when it does not answer.
+/// A WebSocket that is silent for this time gets a ping, and is closed if it does not answer.
 constexpr Duration kSilence = std::chrono::seconds(30);
-/// Connections that have not said their request; a further one is closed at once.
+/// Maximum number of connections without a complete request. Further ones are closed immediately.
 constexpr std::size_t kMostWaiting = 16;
 constexpr std::uint32_t kLongestRequest = 16 * 1024;
-/// The time for which a connection is read on after a plain answer, and the bytes: a reset would destroy the answer.
+/// After a plain HTTP response, the connection is read for this time and number of bytes, because a reset would
+/// discard the response.
 constexpr Duration kLinger = std::chrono::seconds(1);
 constexpr std::size_t kMostLingered = 64 * 1024;
 
@@ -70,15 +70,14 @@ Address address_of(const tcp::endpoint& endpoint) {
   return {v6.to_bytes(), endpoint.port()};
 }
 
-/// Timers use Asio's own clock.
 auto waiting_time(Duration d) {
   return std::chrono::duration_cast<asio::steady_timer::duration>(std::max(d, Duration::zero()));
 }
 
-/// A socket of the desk, watched through a descriptor of our own: the desk may close its own at any time.
+/// A socket of the desk, watched through a duplicated descriptor because the desk may close its own at any time.
 struct WatchedSocket {
-  std::uint64_t number = 0;  ///< 1, 2, 3 …: handlers of one that is gone find another number
-  ino_t id = 0;              ///< numbers of descriptors are used again, but what they name is not
+  std::uint64_t number = 0;  ///< 1, 2, 3 …; lets handlers of a closed socket detect that it was replaced
+  ino_t id = 0;              ///< inode; unlike descriptor numbers, it is not reused immediately
   std::optional<asio::posix::stream_descriptor> own{};
   bool waits = false;
 };
@@ -90,7 +89,7 @@ ino_t socket_id(int descriptor) {
 
 class InverseConnection;
 
-/// The things that all connections share.
+/// State shared by all connections.
 struct InverseShared {
   const InverseServer::Config& config;
   Desk& desk;
@@ -99,23 +98,23 @@ struct InverseShared {
   std::vector<InverseDevice> devices{};
   InverseCounts counts{};
   std::list<std::unique_ptr<InverseConnection>> connections{};
-  std::size_t clients = 0;  ///< of these, with a session
+  std::size_t clients = 0;  ///< connections with a session
   Plug::Program newest = 0;
-  bool full_said = false;            ///< that one was turned away, since the last one left
-  std::size_t read = 0;              ///< messages that wait for the turn
-  std::function<void()> read_one{};  ///< a message has been read
+  bool full_said = false;            ///< a rejected client was reported since the last one left
+  std::size_t read = 0;              ///< messages waiting for the turn
+  std::function<void()> read_one{};  ///< called after a message was read
 };
 
-/// One connection, from its request until it is closed. It is deleted only when it is closed and none of its operations
-/// is pending, so handlers may use `this`.
+/// One connection from its request until it is closed. Deleted only after it is closed and has no pending operations,
+/// so that handlers can use `this`.
 class InverseConnection {
  public:
   InverseConnection(InverseShared& shared, tcp::socket socket) : shared_(shared), stream_(std::move(socket)) {
     error_code gone;
     const tcp::endpoint peer = stream_.socket().remote_endpoint(gone);
     if (!gone) peer_ = to_string(address_of(peer));
-    // A reply must not wait for the acknowledgement of the one before; and what the system keeps of unread replies is
-    // as bounded as what we keep.
+    // A reply must not wait for the acknowledgement of the previous one. The kernel buffer of unread replies is
+    // limited as well.
     stream_.socket().set_option(tcp::no_delay(true), gone);
     stream_.socket().set_option(asio::socket_base::send_buffer_size(static_cast<int>(shared_.config.max_unread)), gone);
   }
@@ -143,7 +142,7 @@ class InverseConnection {
     shared_.desk.say("client " + std::to_string(program_) + " left" + (why_.empty() ? "" : ": " + why_));
   }
 
-  /// Answers what has been read; whether there was anything.
+  /// Answers the messages that were read. Returns whether there were any.
   bool answer(LocalTime now) {
     if (closed_ || inbox_.empty()) return false;
     for (std::string& reply : session_->answer(now, inbox_)) {
@@ -155,7 +154,7 @@ class InverseConnection {
     return true;
   }
 
-  /// Writes the replies, and reads on unless too many are unread.
+  /// Writes replies, and continues reading unless too many replies are unread.
   void pump(LocalTime now) {
     if (closed_ || !open_) return;
     write_message();
@@ -182,7 +181,7 @@ class InverseConnection {
     };
   }
 
-  // ---- The request
+  // ---- Request
 
   void read_request() {
     parser_.emplace();
@@ -236,7 +235,7 @@ class InverseConnection {
                       }));
   }
 
-  // ---- The WebSocket
+  // ---- WebSocket
 
   void accept() {
     program_ = ++shared_.newest;
@@ -296,17 +295,17 @@ class InverseConnection {
   std::string peer_;
   beast::flat_buffer request_buffer_{kLongestRequest};
   std::optional<http::request_parser<http::empty_body>> parser_;
-  std::string text_;  ///< of an answer that is no WebSocket
+  std::string text_;  ///< of a plain HTTP response
 
   Plug::Program program_ = 0;
   std::optional<InverseSession> session_;
   std::optional<websocket::stream<beast::tcp_stream>> web_socket_;
   beast::flat_buffer message_;
-  std::vector<std::string> inbox_;  ///< read, and to be answered in the next turn
+  std::vector<std::string> inbox_;  ///< read, to be answered in the next turn
   std::deque<std::string> outbox_;  ///< the first one is being written
-  std::size_t unread_ = 0;          ///< bytes of these
+  std::size_t unread_ = 0;          ///< bytes in outbox_
   std::optional<LocalTime> stuck_since_;
-  std::string why_;  ///< it ends
+  std::string why_;  ///< reason for closing
   bool open_ = false;
   bool reading_ = false;
   bool writing_ = false;
@@ -336,7 +335,7 @@ struct InverseServer::State {
 
   void accept() {
     acceptor.async_accept([this](error_code error, tcp::socket socket) {
-      if (error) {  // out of descriptors: some become free when other connections end
+      if (error) {  // out of descriptors; retry when other connections may have ended
         accept_again.expires_after(waiting_time(kLongestSleep));
         return accept_again.async_wait([this](error_code) { accept(); });
       }
@@ -348,7 +347,7 @@ struct InverseServer::State {
     });
   }
 
-  /// A turn when nothing more is there to be read, or enough has been.
+  /// Schedules a turn after all available messages, or enough of them, have been read.
   void schedule_answers() {
     if (std::exchange(answers_due, true)) return;
     read_before = shared.read;
@@ -359,7 +358,7 @@ struct InverseServer::State {
     });
   }
 
-  /// Turns the desk until nothing is due: a force leaves in the turn after the one that computed it.
+  /// Turns the desk until nothing is due. A force computed in one turn is sent in the next.
   LocalTime turn_desk() {
     const InverseCounts& counts = shared.counts;
     const std::array<Desk::Count, 6> all = {{{"clients", shared.clients},
@@ -402,7 +401,7 @@ struct InverseServer::State {
     wake_at(std::min(next, now + kLongestSleep), now);
   }
 
-  /// A timer that goes off too early is left alone: the turn that it makes sets the next one.
+  /// A timer that expires too early is kept, because the turn sets the next one.
   void wake_at(LocalTime at, LocalTime now) {
     if (wakes_at && *wakes_at <= at) return;
     wakes_at = at;
@@ -424,7 +423,7 @@ struct InverseServer::State {
     }
   }
 
-  /// The desk's sockets are others after a look-up, which is made only while a device has no session.
+  /// The sockets of the desk change after a name lookup, which happens only while a device has no session.
   void watch() {
     bool lost = false;
     for (std::size_t i = 0; i < shared.desk.size(); ++i) lost = lost || shared.desk.plug(i).lost();

@@ -11,7 +11,7 @@
 namespace tendon::plug {
 namespace {
 
-/// Older messages that may be read at once, after a silence: those of a tenth of a second.
+/// Burst of older messages that may be read after a silence: those of 0.1 s.
 constexpr double kMostAtOnce = InverseSession::kMostPerSecond / 10;
 
 double milliseconds_of(Duration d) { return std::chrono::duration<double, std::milli>(d).count(); }
@@ -99,7 +99,7 @@ Plug::Answer InverseSession::push(LocalTime now, Plug& plug, Eye& eye, const Tou
   return plug.push(program_, now, now + kFresh, touch);
 }
 
-/// The newest message is counted before the older ones. It is read even where there is nothing left for it.
+/// The newest message of a batch is always read, so it is subtracted first.
 void InverseSession::refill(LocalTime now) {
   const double passed = std::chrono::duration<double>(now - refilled_).count();
   refilled_ = now;

@@ -13,7 +13,7 @@
 
 namespace tendon::plug {
 
-/// A device as the clients of the bridge know it.
+/// A device as presented to the clients of the bridge.
 struct InverseDevice {
   std::string name;
   std::string id;
@@ -21,34 +21,34 @@ struct InverseDevice {
   Plug* plug = nullptr;
 };
 
-/// The devices with their ids, which differ from each other. The plugs must outlive what is returned.
+/// Returns the devices with unique ids. The plugs must outlive the result.
 std::vector<InverseDevice> inverse_devices(std::span<const std::pair<std::string, Plug*>> plugs);
 
-/// What the bridge has counted, of all clients.
+/// Counters of the bridge for all clients.
 struct InverseCounts {
-  std::uint64_t clients = 0;   ///< that came
+  std::uint64_t clients = 0;   ///< total number of clients
   std::uint64_t messages = 0;  ///< each was answered
-  std::uint64_t skipped = 0;   ///< of these, not read: too many of one client, and a newer one was there
-  std::uint64_t unread = 0;    ///< … not JSON, too long, too deep
-  std::uint64_t refused = 0;   ///< sentences of refusal
-  std::uint64_t ignored = 0;   ///< commands that mean nothing here
+  std::uint64_t skipped = 0;   ///< messages not read, because one client sent too many and a newer one was available
+  std::uint64_t unread = 0;    ///< messages that are not JSON, too long or too deep
+  std::uint64_t refused = 0;   ///< refused parts of messages
+  std::uint64_t ignored = 0;   ///< unsupported commands
 };
 
-/// One client's conversation: the first message, and then exactly one reply for each message of the client. It has no
-/// socket and no clock.
+/// The conversation with one client: a first message, then exactly one reply for each message of the client. It has
+/// no socket and no clock.
 ///
-/// * A force is sent once, and the server takes it as fresh for kFresh, which the plugs' `client.valid_for` says. A client
-///   that falls silent, or leaves, sends no more; the server holds, fades and stops the last one (protocol/SESSION.md).
-/// * One force for each state, or for each kPace where no state comes: a client may say many more, because it is answered
-///   as fast as it asks. Then the newest waits for the next state, and replaces the one that waits.
-/// * A message says all that is wanted of a device: a set_cursor_force without the word `tendon` asks for no torque.
-///   One without either asks for nothing.
-/// * A force of zero claims nothing, because clients send it to be answered at all. It counts only from the client that
-///   owns the device.
-/// * Of the messages that are there at once the newest is always read. The older are read while they are not more than
-///   kMostPerSecond; beyond that they are answered and counted, and not read.
-/// * Positions are of the newest state at the time of the reply. A button that was held in a state since the reply
-///   before is held in this one.
+/// * A force is sent once with the validity kFresh, which must be `client.valid_for` of the plugs. After a client
+///   falls silent or leaves, the server holds, fades and stops the last force (protocol/SESSION.md).
+/// * At most one force is sent for each state, or every kPace while no state arrives, because clients send as fast as
+///   they receive replies. The newest force waits for the next state and replaces an older waiting one.
+/// * A message contains the complete request for a device: without `tendon`, set_cursor_force requests no torque. A
+///   message without both requests nothing.
+/// * A zero force does not make a client the owner of the device, because clients send it only to obtain replies. It
+///   counts only if the client is the owner already.
+/// * The newest message of a batch is always read. Older messages are read up to kMostPerSecond; beyond that, they
+///   are answered and counted but not read.
+/// * Replies contain the newest state. A button that was pressed in any state since the previous reply is reported as
+///   pressed.
 ///
 /// Thread-safe: no. Realtime-safe: no.
 class InverseSession {
@@ -57,35 +57,36 @@ class InverseSession {
   static constexpr Duration kPace = std::chrono::milliseconds(1);
   static constexpr double kMostPerSecond = 4000;
 
-  /// `devices` and `counts` must outlive the session. `program` names this client to the plugs.
+  /// `devices` and `counts` must outlive the session. `program` identifies this client at the plugs.
   InverseSession(Plug::Program program, std::span<const InverseDevice> devices, InverseCounts& counts, LocalTime now);
-  /// Lets go of what it owns.
+  /// Releases the devices that it owns.
   ~InverseSession();
   InverseSession(const InverseSession&) = delete;
   InverseSession& operator=(const InverseSession&) = delete;
 
-  /// The message that a client is sent when it comes.
+  /// Returns the first message to the client.
   std::string greeting(LocalTime now);
-  /// One reply for each message, in their order.
+  /// Returns one reply for each message, in the same order.
   std::vector<std::string> answer(LocalTime now, std::span<const std::string> messages);
-  /// To be called after each turn of the plugs, and when it is due. Whether a force that waited leaves in the next turn.
+  /// Must be called after each turn of the plugs and at due(). Returns whether a waiting force will be sent in the
+  /// next turn.
   bool see(LocalTime now);
-  /// When a force that waits leaves without a state; LocalTime::max(): none waits.
+  /// Time at which a waiting force is sent even without a new state; LocalTime::max(): none is waiting.
   LocalTime due() const noexcept;
 
   Plug::Program program() const noexcept { return program_; }
 
  private:
-  /// A device as this client wants to see it, and what it has seen.
+  /// Settings of the client for one device, and the last reported data.
   struct Eye {
     std::string permutation = "XYZ";
     Frame frame = inverse_frame(Mat3::Identity());
-    std::uint64_t states = 0;   ///< of the plug, when it was seen last
-    std::uint32_t buttons = 0;  ///< held since the reply before
+    std::uint64_t states = 0;   ///< value of Plug::states() at the last turn
+    std::uint32_t buttons = 0;  ///< pressed since the previous reply
     std::optional<Touch> waiting{};
-    LocalTime until{};           ///< it waits
-    LocalTime pushed{};          ///< when the newest force was sent
-    std::uint64_t answered = 0;  ///< `states` when it was
+    LocalTime until{};           ///< expiry of `waiting`
+    LocalTime pushed{};          ///< time of the newest force
+    std::uint64_t answered = 0;  ///< `states` at that time
   };
 
   std::string reply(LocalTime now, std::vector<std::string> refused, bool whole);
@@ -101,7 +102,7 @@ class InverseSession {
   InverseCounts& counts_;
   std::vector<Eye> eyes_;
   LocalTime refilled_;
-  double readable_ = kMostPerSecond / 10;  ///< older messages that may be read now
+  double readable_ = kMostPerSecond / 10;  ///< number of older messages that may be read now
 };
 
 }  // namespace tendon::plug

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// tendon-plug ros2, where it was built without DDS.
+// tendon-plug ros2 in a build without DDS.
 #include <CLI/CLI.hpp>
 #include <stdexcept>
 

@@ -15,7 +15,7 @@ constexpr Duration kLeastFresh = milliseconds(20);
 constexpr Duration kMostFresh = milliseconds(200);
 constexpr std::size_t kGapsNeeded = 3;
 constexpr Duration kJoyEvery = milliseconds(20);
-constexpr Duration kSayEvery = std::chrono::seconds(1);  ///< about one program at most: two mistakes may alternate
+constexpr Duration kSayEvery = std::chrono::seconds(1);  ///< for each program, in case it alternates between two errors
 constexpr std::size_t kMaxSentences = 16;
 
 std::string number(double value) {
@@ -98,7 +98,7 @@ bool RosDevice::joy_is_due(LocalTime now) {
   return true;
 }
 
-/// What a new session tells of the handle.
+/// Reads the handle description of a new session.
 void RosDevice::learn() {
   if (plug_.lost()) knows_ = false;
   if (knows_ || !plug_.handle()) return;

@@ -17,8 +17,8 @@
 
 namespace tendon::plug {
 
-/// How long a program's newest force is good for: three times the median of its last 8 gaps, 20 … 200 ms; 200 ms until
-/// three gaps are known. A program at 1 kHz is let go after 20 ms, one at 20 Hz after 150 ms.
+/// Validity of the newest force of a program: three times the median of its last 8 intervals, within 20 … 200 ms; 200
+/// ms until three intervals are known. For a program at 1 kHz this is 20 ms, at 20 Hz 150 ms.
 class Freshness {
  public:
   void came(LocalTime now);
@@ -27,35 +27,34 @@ class Freshness {
  private:
   static constexpr std::size_t kGaps = 8;
   std::array<Duration, kGaps> gaps_{};
-  std::size_t count_ = 0;  ///< of gaps, ever
+  std::size_t count_ = 0;  ///< total number of intervals
   std::optional<LocalTime> newest_;
 };
 
-/// What one device is for ROS 2's programs, without DDS: which messages are due, and what becomes of their
-/// `wrench_command`s.
+/// The ROS 2 interface of one device without DDS: determines which messages are due and handles `wrench_command`s.
 ///
-/// * Each new state is pose, twist, wrench, joint states and, with the clutch, a servo message; at most Config::rate_hz
-///   a second. Joy goes out at once when a button changes, else 50/s.
-/// * A command is the owner's, or it is dropped. It is sent once, and the server is told how long it is good:
-///   Freshness::good_for(). A torque is sent on when the device has motors for it.
-/// * At most 16 programs publish commands: the commands of another one are dropped.
+/// * Each new state results in pose, twist, wrench and joint state messages and, with the clutch, a servo message; at
+///   most Config::rate_hz per second. Joy is published immediately when a button changes, otherwise at 50 Hz.
+/// * Commands of programs other than the owner are dropped. Each command is sent once with the validity
+///   Freshness::good_for(). Torques are forwarded if the device has actuators for them.
+/// * At most 16 programs can publish commands; those of further programs are dropped.
 ///
 /// Thread-safe: no. Realtime-safe: no.
 class RosDevice {
  public:
   struct Config {
     std::string name;    ///< see ros_name()
-    double rate_hz = 0;  ///< 0: every state
+    double rate_hz = 0;  ///< 0: publish every state
     bool negate = false;
     std::optional<RosServo> servo{};
-    std::string clutch{};  ///< name or number of the button that is the servo's clutch
+    std::string clutch{};  ///< name or number of the clutch button for the servo messages
   };
   static constexpr std::size_t kMostPrograms = 16;
 
   /// `plug` must outlive this object.
   RosDevice(Plug& plug, Config config) : plug_(plug), config_(std::move(config)) {}
 
-  /// What is due now.
+  /// The messages that are due.
   struct Messages {
     std::optional<RosPose> pose{};
     std::optional<RosTwist> twist{};
@@ -64,20 +63,20 @@ class RosDevice {
     std::optional<RosJoy> joy{};
     RosServo::Output servo{};
   };
-  /// To be called after each turn of the plug. `since_1970` is that time at LocalTime 0, by the system's clock.
+  /// Must be called after each turn of the Plug. `since_1970` is the system time at LocalTime 0.
   Messages messages(LocalTime now, Duration since_1970);
 
-  /// A `wrench_command` of the program that DDS knows by the number `writer` and people by `called`.
+  /// Handles a `wrench_command`. `writer` identifies the program in DDS, and `called` is its name in messages.
   void take(std::uint64_t writer, std::string_view called, const RosWrench& command, LocalTime now);
-  /// Only these publish commands now: what others asked for is let go.
+  /// Releases the device from all programs that are not in `writers`, the current publishers.
   void keep(std::span<const std::uint64_t> writers);
 
-  /// How it stands, for /diagnostics; of the time since it was asked last.
+  /// Returns the status for /diagnostics since the previous call.
   RosDiagnosis diagnosis();
 
-  std::uint64_t refused() const noexcept { return refused_; }  ///< commands: frame, not finite, too many programs
+  std::uint64_t refused() const noexcept { return refused_; }  ///< commands with an invalid frame, value or program
 
-  /// Each change in a sentence, once. Empty: nothing new.
+  /// Returns the next message about a change. Empty: none.
   std::optional<std::string> next_sentence();
 
  private:
@@ -85,7 +84,7 @@ class RosDevice {
     Plug::Program number = 0;
     std::string called;
     Freshness freshness{};
-    std::string said{};  ///< the newest sentence about it
+    std::string said{};  ///< last message about it
     LocalTime said_at{};
   };
 
@@ -99,11 +98,11 @@ class RosDevice {
 
   Plug& plug_;
   Config config_;
-  std::uint64_t states_ = 0;  ///< seen
+  std::uint64_t states_ = 0;  ///< number of states seen
   LocalTime next_{};
   LocalTime next_joy_{};
   std::uint32_t buttons_ = 0;
-  bool knows_ = false;  ///< the handle of the present session
+  bool knows_ = false;  ///< the handle of the current session is known
   std::optional<std::size_t> clutch_;
   std::map<std::uint64_t, Program> programs_;
   Plug::Program numbers_ = 0;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// tendon-plug ros2: a device as topics of ROS 2, by plain DDS.
+// tendon-plug ros2: publishes a device as ROS 2 topics, with plain DDS.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <array>
@@ -40,10 +40,10 @@ struct Ros2Options {
 };
 
 constexpr Duration kDiagnosticsEvery = std::chrono::seconds(1);
-/// Commands are taken so often at most: 4000 a second. Of those that come faster the newest is taken.
+/// Minimum time between two reads of commands. Only the newest command of an interval is used.
 constexpr Duration kLeastGap = std::chrono::microseconds(250);
 
-/// For what goes into the XML of Cyclone's configuration.
+/// Rejects characters with a meaning in XML, because the text becomes part of the Cyclone DDS configuration.
 std::string host_or_interface(const std::string& text) {
   const auto fits = [](char c) {
     return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') ||
@@ -54,7 +54,7 @@ std::string host_or_interface(const std::string& text) {
              : "expected the name of an interface or a host, or an address, got \"" + text + "\"";
 }
 
-/// What is added to LocalTime to make it the system's clock.
+/// Offset from LocalTime to the system clock.
 Duration since_1970() {
   const auto system = std::chrono::system_clock::now().time_since_epoch();
   return std::chrono::duration_cast<Duration>(system) - read_clock().time_since_epoch();
@@ -84,7 +84,7 @@ class Ros2Bridge {
     const LocalTime end = options_.duration_s < 1e9 ? now + from_seconds(options_.duration_s) : LocalTime::max();
     LocalTime next_diagnosis = now + kDiagnosticsEvery;
     LocalTime next_take = now;
-    bool rings = true;  // a command may be there
+    bool rings = true;  // a command may be available
     for (; !signals.asked() && now < end; now = read_clock()) {
       const std::array<Desk::Count, 4> counts = {{{"published", node_.published()},
                                                   {"unsent", node_.unsent()},
@@ -109,7 +109,7 @@ class Ros2Bridge {
   }
 
  private:
-  /// All that is due now: what a turn has computed leaves in the one after it.
+  /// Turns until nothing is due. A force computed in one turn is sent in the next.
   LocalTime turn(LocalTime now, std::span<const Desk::Count> counts) {
     LocalTime next = now;
     for (int turns = 0; next <= now && turns < 4; ++turns) next = desk_.turn(now, counts);
@@ -152,7 +152,7 @@ class Ros2Bridge {
     }
   }
 
-  /// True when something was asked for.
+  /// Returns true if a force was requested.
   bool take(LocalTime now) {
     node_.clear();
     bool asked = false;
@@ -193,7 +193,7 @@ class Ros2Bridge {
 }  // namespace
 
 void add_ros2(CLI::App& app, Chosen& chosen) {
-  static Ros2Options o;  // lives until the chosen subcommand has run
+  static Ros2Options o;  // must exist until the chosen subcommand has run
   CLI::App& ros2 = *app.add_subcommand("ros2", "A device as topics of ROS 2, by plain DDS: /tendon/NAME/pose, …");
   ros2.footer(
       "Example: tendon-plug ros2 --server lab:47100 --device right\n"

@@ -14,11 +14,11 @@
 
 namespace tendon::plug {
 
-// ROS 2's messages as values, and what of a device is in them. No DDS here. SI units; a wrench is what the device exerts
-// **on the hand**. Axes are REP 103's, x forward, y left, z up, and those of `NAME_base`, whose origin is the device's.
+// ROS 2 messages as plain structs, independent of DDS. SI units. Wrenches act **on the hand**. The axes follow REP
+// 103 (x forward, y left, z up) in frame `NAME_base`, whose origin is that of the device.
 
 struct RosTime {
-  std::int32_t sec = 0;  ///< since 1970
+  std::int32_t sec = 0;  ///< since 1970-01-01
   std::uint32_t nanosec = 0;
   bool operator==(const RosTime&) const = default;
 };
@@ -67,42 +67,40 @@ struct RosDiagnosis {
   std::vector<std::pair<std::string, std::string>> values;
 };
 
-/// `since_1970` is not before that.
+/// Requires `since_1970` ≥ 0.
 RosTime ros_time(Duration since_1970);
 
-/// A device's name as a part of topics and frames: what is no letter of ASCII, digit or "_" becomes "_", and a digit
-/// at the beginning gets a "_" before it.
+/// Converts a device name for use in topics and frames: replaces all characters except ASCII letters, digits and "_"
+/// by "_", and inserts "_" before a leading digit.
 std::string ros_name(std::string_view device);
 
-/// `text` for people: at most 64 bytes of it, and "?" for all that is not printable ASCII.
+/// Returns at most 64 bytes of `text`, with "?" in place of bytes that are not printable ASCII.
 std::string printable(std::string_view text);
 
-/// One device in ROS's frames.
-///
-/// Thread-safe, realtime-safe: no.
+/// Transforms one device to the frames of ROS. Thread-safe, realtime-safe: no.
 class RosView {
  public:
-  /// `name`: see ros_name(). Without a rotation the device's frame is taken for the operator's.
+  /// `name`: see ros_name(). Without a rotation, the device frame is assumed to equal the operator frame.
   RosView(std::string_view name, const std::optional<Quat>& operator_from_device);
 
   const std::string& base_id() const noexcept { return base_id_; }          ///< "right_base"
   const std::string& operator_id() const noexcept { return operator_id_; }  ///< "right_operator"
 
-  /// The orientation is the identity when the device does not measure it: the handle is not turned.
+  /// The orientation is the identity if the device does not measure it.
   RosPose pose(const DeviceState& state, RosTime stamp) const;
-  /// In axes of the base; the angular velocity is 0 when it is not measured.
+  /// In the axes of the base. The angular velocity is 0 if it is not measured.
   RosTwist twist(const DeviceState& state, RosTime stamp) const;
-  /// What the device really gives out; the torque about the handle's position.
+  /// The force that the device applies; the torque is about the position of the handle.
   RosWrench wrench(const DeviceState& state, RosTime stamp) const;
 
-  /// What a `wrench_command` asks for.
+  /// The force requested by a `wrench_command`.
   struct Wish {
-    Vec3 force = Vec3::Zero();  ///< N and N·m, on the hand, device base frame
+    Vec3 force = Vec3::Zero();  ///< N and N·m, acting on the hand, device base frame
     Vec3 torque = Vec3::Zero();
   };
-  /// The wish, or why there is none: its `frame_id` is none of "", NAME_base and NAME_operator (the operator frame: x
-  /// right, y up, z to the user), or a number is not finite. `negate`: the message says what a robot feels or what the
-  /// hand exerts, so that the hand gets its opposite.
+  /// Converts a command, or returns the reason for rejecting it: `frame_id` must be "", NAME_base or NAME_operator (x
+  /// right, y up, z to the user), and all numbers finite. With `negate`, the message contains the force on a robot or
+  /// by the hand, and the hand receives the opposite force.
   std::variant<Wish, std::string> wish(const RosWrench& command, bool negate) const;
 
  private:
@@ -112,11 +110,11 @@ class RosView {
   std::string operator_id_;
 };
 
-/// `buttons`: 1 while held, in the order of the handle's names. `axes`: with a gripper its opening, 0 closed … 1 open;
-/// rad where the handle does not say how far it opens.
+/// `buttons`: 1 while pressed, in the order of the handle description. `axes`: opening of the gripper if there is
+/// one, from 0 closed to 1 open, or in rad if its range is unknown.
 RosJoy joy_of(const DeviceState& state, const std::optional<HandleDescription>& handle, RosHeader header);
 
-/// Empty when the device tells no joints, or has not named them.
+/// Returns nullopt if the device measures no joints or has no names for them.
 std::optional<RosJointState> joints_of(const DeviceState& state, const std::optional<HandleDescription>& handle,
                                        RosHeader header);
 

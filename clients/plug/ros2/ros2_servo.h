@@ -8,22 +8,22 @@
 
 namespace tendon::plug {
 
-/// The hand's motion for a robot arm, only while a button (the clutch) is held: the inputs of MoveIt Servo.
+/// Input of MoveIt Servo from the motion of the hand while a button (the clutch) is pressed:
 ///
-///     twist:  v = scale · v_hand,  ω = ω_hand;                     one of zero when the clutch is let go
+///     twist:  v = scale · v_hand,  ω = ω_hand;                     one zero message after the clutch is released
 ///     pose:   p = p₀ + scale · (p_hand − p_hand,₀),  R = R_hand R_hand,₀ᵀ R₀
 ///
-/// with ₀ at the press. p₀ and R₀ are where the last hold has ended, at first the origin, not turned: so the pose is
-/// seen from a frame that stands where the tool was at the first press, with REP 103's axes as the operator sees them.
-/// Whoever has the robot tells tf where that frame is. A session that is lost ends the hold; the hand is taken anew
-/// afterwards, so that nothing jumps.
+/// where ₀ denotes the time of the press. p₀ and R₀ are the pose at the end of the previous press, initially zero and
+/// identity. The pose is therefore relative to a frame at the pose of the tool at the first press, with the axes of
+/// REP 103 as seen by the operator; the user must publish this frame to tf. If the session is lost, the press ends,
+/// and the hand pose is taken again afterwards to avoid jumps.
 ///
 /// Thread-safe, realtime-safe: no.
 class RosServo {
  public:
   enum class Kind : std::uint8_t { kTwist, kPose };
 
-  /// `frame_id` is for the headers.
+  /// `frame_id` is written to the headers.
   RosServo(Kind kind, double scale, std::string frame_id)
       : kind_(kind), scale_(scale), frame_id_(std::move(frame_id)) {}
 
@@ -31,9 +31,9 @@ class RosServo {
     std::optional<RosTwist> twist{};
     std::optional<RosPose> pose{};
   };
-  /// `pose` and `twist` are of one state, in the device's base frame.
+  /// `pose` and `twist` must be of the same state, in the base frame of the device.
   Output take(const RosPose& pose, const RosTwist& twist, bool held);
-  /// There is no session.
+  /// Must be called while there is no session.
   void lose() { hand_.reset(); }
 
  private:
@@ -44,7 +44,7 @@ class RosServo {
   Kind kind_;
   double scale_;
   std::string frame_id_;
-  std::optional<Hand> hand_;  ///< at the press; empty: not held
+  std::optional<Hand> hand_;  ///< pose at the press; empty: not pressed
   Vec3 start_ = Vec3::Zero();
   Mat3 start_turn_ = Mat3::Identity();
   Vec3 target_ = Vec3::Zero();

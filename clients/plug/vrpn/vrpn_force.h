@@ -11,33 +11,32 @@
 
 namespace tendon::plug::vrpn {
 
-/// The hand, in the program's frame.
+/// Motion of the hand in the frame of the program.
 struct Hand {
   Vec3 position = Vec3::Zero();  ///< m
   Vec3 velocity = Vec3::Zero();  ///< m/s
 };
 
-/// A plane that is drawn, and the bristle of its friction.
+/// A plane with the state of its friction bristle.
 struct Surface {
-  Plane plane;                 ///< with a normal of length 1
-  std::optional<Vec3> foot{};  ///< of the bristle; empty: the hand is outside
+  Plane plane;                 ///< with a unit normal
+  std::optional<Vec3> foot{};  ///< end point of the bristle; empty: the hand is outside
   bool slips = false;
 };
 
-/// What one program has drawn around one device: a force field and four planes. Their sum is felt:
+/// What one program has requested for one device: a force field and four planes. The force is their sum:
 ///
-///     field    F = force + J (x − origin)     where |x − origin| ≤ radius; stiffness −J, valid radius − |x − origin|
-///     plane    gap = (n·x + d) / |n|          below 0: the hand is in it
-///              N = k (−gap) − b n·v, ≥ 0      along +n; k = spring · stiffest, spring cut to 0 … 1
-///              stiffness k n nᵀ               b = damping (N·s/m), but 0 below 0.1: those are in units of a library
-///                                             that is gone
-///     friction −μ N (bristle / 0.2 mm)        Dahl's rule: the bristle follows the hand along the plane, at most 0.2
-///                                             mm behind, where it sticks with the static μ; once there it slips with
-///                                             the dynamic one, until the hand turns back
+///     plane    gap = (n·x + d) / |n|          negative: the hand is inside
+///              N = k (−gap) − b n·v, ≥ 0      along +n; k = spring · stiffest, spring clamped to 0 … 1
+///              stiffness k n nᵀ               b = damping (N·s/m); 0 if damping < 0.1, which is in units of an
+///                                             obsolete library
+///     friction −μ N (bristle / 0.2 mm)        Dahl model: the bristle follows the hand along the plane, at most 0.2 mm
+///                                             behind. It sticks with the static μ; at the limit it slips with the
+///                                             dynamic μ until the hand reverses
 ///
-/// A plane that is felt alone is a Contact too, so that it never pulls between two answers; together with another thing
-/// it is not, because a Contact would cut that one's pull. Coefficients are cut to 0 … 1, as VRPN's server does, and
-/// the dynamic one to the static one.
+/// A single plane is also sent as a Contact, so that it never pulls between two answers. In combination with other
+/// forces it is not, because a Contact would remove their pull. Coefficients are clamped to 0 … 1, as in VRPN's
+/// server, and the dynamic coefficient to the static one.
 ///
 /// Thread-safe: no. Realtime-safe: yes.
 class Drawing {
@@ -45,18 +44,18 @@ class Drawing {
   static constexpr std::size_t kPlanes = 4;
   static constexpr double kLeastDamping = 0.1;
   static constexpr double kBristle = 0.2e-3;  ///< m
-  /// The dynamic coefficient is at least this share of the static one: a bristle that is not bent at all would not know
-  /// which way it slips, and would stick again at once.
+  /// Minimum ratio of dynamic to static friction. A bristle with zero deflection would have no slip direction and
+  /// would stick again immediately.
   static constexpr double kLeastSlip = 0.1;
 
-  /// Replaces the field. One without force and jacobian ends it.
+  /// Replaces the field. A field without force and jacobian removes it.
   void draw(const ForceField& field);
-  /// Replaces the plane of that index; false when there is no such index. One without a normal ends it.
+  /// Replaces the plane with that index; false if the index is invalid. A zero normal removes it.
   bool draw(const Plane& plane);
   bool empty() const;
 
-  /// What the hand feels, in the program's frame. `stiffest` is the stiffness (N/m) of a plane with spring 1. A bristle
-  /// is bent by this call.
+  /// Returns the force on the hand in the frame of the program. `stiffest` is the stiffness (N/m) of a plane with
+  /// spring 1. Updates the bristles.
   Touch touch(const Hand& hand, double stiffest);
 
  private:
@@ -66,30 +65,31 @@ class Drawing {
   std::array<std::optional<Surface>, kPlanes> surfaces_;
 };
 
-/// The same in the device base frame.
+/// Transforms to the device base frame.
 Touch in_base_frame(Touch touch, const View& view);
 
-/// Whether a program that has drawn something still means it. VRPN has no heartbeat: a frozen program looks like one
-/// that wants its force to stay. But one that goes on sending can be told from one that has stopped:
+/// Decides whether the requests of a program are still valid. VRPN has no heartbeat, so a frozen program cannot be
+/// distinguished from one that wants a constant force. A program that sends continuously, however, is known to have
+/// stopped:
 ///
-///     stale after 10 × the median gap of the last 8, 100 ms … 2 s, once three have come
+///     stale after 10 × the median interval of the last 8, 100 ms … 2 s, once three are known
 ///
-/// Messages within 10 ms of each other count as one: a burst of settings at the start is no stream. Before three have
-/// come, and where the median gap is above 2 s, what was drawn lives as long as the program's connection.
+/// Messages within 10 ms count as one, because a burst of settings at the start is not a stream. Before three
+/// intervals are known, or if their median is above 2 s, requests are valid as long as the connection.
 ///
 /// Thread-safe: no. Realtime-safe: yes.
 class Freshness {
  public:
   void heard(LocalTime now);
   void forget() { *this = {}; }
-  /// LocalTime::max(): as long as the connection.
+  /// Returns LocalTime::max() if requests are valid as long as the connection.
   LocalTime until() const;
 
  private:
   static constexpr std::size_t kGaps = 8;
   std::array<Duration, kGaps> gaps_{};
-  std::size_t count_ = 0;  ///< of gaps, since the beginning
-  LocalTime counted_{};    ///< the newest that counts for itself
+  std::size_t count_ = 0;  ///< total number of intervals
+  LocalTime counted_{};    ///< start of the newest group of messages
   LocalTime newest_{};
   bool any_ = false;
 };

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// tendon-plug vrpn: VRPN programs use a Tendon device.
+// tendon-plug vrpn: connects VRPN programs to Tendon devices.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <chrono>
@@ -25,10 +25,10 @@ struct VrpnOptions {
   double duration_s = 0;
 };
 
-/// Desk::turn is called again at once, at most so often, while something computed has yet to leave.
+/// Maximum number of consecutive calls of Desk::turn while a computed force has not been sent.
 constexpr int kTurnsAtOnce = 4;
 
-/// "Phantom0=right", or "Phantom0" for the first device. Adds the device to the desk's.
+/// Parses "Phantom0=right", or "Phantom0" for the first device. Adds the device to `devices`.
 vrpn::Server::Alias alias_of(const std::string& text, std::vector<std::string>& devices) {
   const std::size_t equals = text.find('=');
   const std::string name = text.substr(0, equals);
@@ -89,7 +89,7 @@ int run_vrpn(VrpnOptions& options) {
     names += (names.empty() ? "" : ", ") + alias.name + " (" + desk.name(alias.place) + ")";
   desk.say("VRPN at " + to_string(server.address()) + ": " + names);
   if (!is_loopback(config.listen)) desk.say("whoever reaches this port moves a motor: VRPN asks nobody who he is");
-  // Messages are stamped with the time of day, which may be set meanwhile.
+  // Messages contain the time of day, and the system clock may be adjusted while running.
   Duration to_1970{};
   LocalTime look_again = start;
   LocalTime now = start;
@@ -112,7 +112,7 @@ int run_vrpn(VrpnOptions& options) {
 
 void add_vrpn(CLI::App& app, Chosen& chosen) {
   CLI::App* vrpn = app.add_subcommand("vrpn", "A VRPN server: programs find NAME@localhost");
-  static VrpnOptions options;  // the command line is parsed into it, after this function
+  static VrpnOptions options;  // the command line is parsed into it after this function returns
   vrpn->footer("Example: tendon-plug vrpn --server lab:47100 --name Phantom0=right");
   add_common(*vrpn, options.desk);
   vrpn->add_option(

@@ -13,7 +13,7 @@ namespace tendon::plug::vrpn {
 namespace {
 
 constexpr std::string_view kMagic = "vrpn: ver. 07.38";
-constexpr std::size_t kMajor = 14;  ///< bytes up to the last point, with it
+constexpr std::size_t kMajor = 14;  ///< number of bytes up to and including the last point
 constexpr std::size_t kLogMode = 18;
 constexpr std::size_t kAlignment = 8;
 
@@ -37,7 +37,7 @@ void append_characters(Buffer& out, std::string_view text) {
 
 std::string_view text_of(Bytes bytes) { return {reinterpret_cast<const char*>(bytes.data()), bytes.size()}; }
 
-/// Takes numbers from the front. The caller has looked at the size.
+/// Reads numbers from the front. The caller must check the size.
 class Reader {
  public:
   explicit Reader(Bytes bytes) : left_(bytes) {}
@@ -50,7 +50,7 @@ class Reader {
     const double x = f32(), y = f32(), z = f32();
     return {x, y, z};
   }
-  /// Whether all numbers so far were finite, and within the bounds of Tendon's wire.
+  /// Whether all numbers so far were finite and within the limits of Tendon's protocol.
   bool sound() const { return sound_; }
 
  private:
@@ -153,7 +153,7 @@ std::optional<std::string_view> read_description(Bytes payload) {
 }
 
 void append_pose(Buffer& out, const Vec3& position, const Quat& rotation) {
-  append_whole(out, std::uint64_t{0});  // the sensor, and four bytes that align the rest
+  append_whole(out, std::uint64_t{0});  // the sensor, and four bytes of padding
   append_f64(out, position);
   append_f64(out, rotation);
 }
@@ -214,7 +214,7 @@ std::optional<ForceField> read_field(Bytes payload) {
   field.origin = reader.three_f32();
   field.force = reader.three_f32();
   for (Eigen::Index i = 0; i < 3; ++i) field.jacobian.row(i) = reader.three_f32();
-  // A program that wants its field everywhere says so by the largest number that it can write.
+  // The radius may be infinite, because programs use the largest number for an unbounded field.
   const bool sound = reader.sound();
   field.radius = reader.f32();
   if (!sound || !(field.radius >= 0)) return {};
@@ -240,7 +240,7 @@ std::optional<bool> read_effects(Bytes payload) {
   if (payload.size() != 6 * sizeof(float)) return {};
   Reader reader(payload);
   const Vec3 adhesion_and_texture = reader.three_f32();
-  reader.f32();  // the texture's wavelength: programs leave it above 0 while there is none
+  reader.f32();  // wavelength of the texture; ignored because programs leave it positive without a texture
   return !adhesion_and_texture.isZero(0) || reader.f32() != 0;
 }
 

@@ -11,11 +11,11 @@
 
 #include "protocol/messages.h"
 
-// VRPN's bytes ⇄ values. VRPN.md is the page: each layout, and golden messages that a test compares with
-// these functions. Everything is big-endian. No socket, no clock; what a stranger sends is never believed: a function
-// that reads returns nothing when the bytes are too few, too many, or not finite.
+// Encoding of VRPN messages. VRPN.md specifies each layout and contains golden messages, which a test compares with
+// these functions. All numbers are big-endian. The input is untrusted: read functions return nothing if bytes are
+// missing, left over, or contain numbers that are not finite.
 //
-// Thread-safe, realtime-safe: yes, but for those that append to a vector.
+// Thread-safe, realtime-safe: yes, except functions that append to a vector.
 
 namespace tendon::plug::vrpn {
 
@@ -24,23 +24,23 @@ using Buffer = std::vector<std::byte>;
 
 inline constexpr std::size_t kCookieSize = 24;
 inline constexpr std::size_t kHeaderSize = 24;
-/// Longest payload with its padding: VRPN's own buffer for TCP. A longer one ends the connection, as there.
+/// Maximum payload with padding; the size of VRPN's TCP buffer. Longer messages end the connection, as in VRPN.
 inline constexpr std::size_t kLongestPayload = 64000;
-/// Longest datagram: VRPN's buffer for UDP, an Ethernet frame without its headers.
+/// Maximum datagram; the size of VRPN's UDP buffer, which is an Ethernet frame without its headers.
 inline constexpr std::size_t kLongestDatagram = 1472;
-/// Longest name of a sender or a type, without its zero.
+/// Maximum length of a sender or type name, without its zero.
 inline constexpr std::size_t kLongestName = 99;
-/// Senders and types are numbered below this, each end for itself.
+/// Limit of the sender and type numbers, which each side assigns itself.
 inline constexpr std::int32_t kMostNumbers = 2000;
 
-/// Ports below this one are the system's: no program is expected there.
+/// Lower ports are reserved for the system.
 inline constexpr int kLowestPort = 1024;
 inline constexpr int kHighestPort = 0xffff;
 
-// Types that every VRPN knows. Ours are the numbers of `Type`.
-inline constexpr std::int32_t kSenderDescription = -1;  ///< the sender field is the number
+// Predefined types. Other numbers sent by this server are those of `Type`.
+inline constexpr std::int32_t kSenderDescription = -1;  ///< the sender field contains the number
 inline constexpr std::int32_t kTypeDescription = -2;    ///< likewise
-inline constexpr std::int32_t kUdpDescription = -3;     ///< the sender field is the port
+inline constexpr std::int32_t kUdpDescription = -3;     ///< the sender field contains the port
 
 enum class Type : std::int32_t {
   kPosQuat,
@@ -78,7 +78,7 @@ inline constexpr std::array<std::string_view, 20> kTypeNames = {
 };
 std::optional<Type> type_of(std::string_view name);
 
-/// Unix time in VRPN's two numbers.
+/// Unix time as sent by VRPN.
 struct Stamp {
   std::uint32_t seconds = 0;
   std::uint32_t us = 0;
@@ -93,37 +93,38 @@ struct Message {
   Bytes payload;
 };
 
-/// The first bytes of either end.
+/// The first bytes sent by either side.
 std::array<std::byte, kCookieSize> cookie();
 enum class Kinship : std::uint8_t {
   kSame = 1,
-  kOtherMinor = 2,  ///< they talk all the same
-  kOtherMajor = 3,  ///< another protocol, or none: the connection ends
+  kOtherMinor = 2,  ///< compatible
+  kOtherMajor = 3,  ///< another protocol or version; the connection must be closed
 };
 Kinship kinship(Bytes cookie);
 
-/// The TCP port in a datagram "HOST PORT" with or without a zero at its end. HOST is read over: it could be anyone's.
-/// Empty: the datagram is something else, or the port is below 1024.
+/// Parses the TCP port in a datagram "HOST PORT" with an optional trailing zero. HOST is ignored, because it is not
+/// trustworthy. Returns nullopt for other datagrams and for ports below 1024.
 std::optional<std::uint16_t> port_in_hello(Bytes datagram);
 
-/// The message at the beginning of `bytes`.
+/// The first message in a buffer.
 struct First {
-  std::optional<Message> message;  ///< its payload lies in `bytes`; empty: more bytes are needed, or it is broken
-  std::size_t size = 0;            ///< of the message with its padding
-  bool broken = false;             ///< its length is impossible: nothing after it can be read
+  std::optional<Message> message;  ///< its payload points into the buffer; empty: incomplete or broken
+  std::size_t size = 0;            ///< including padding
+  bool broken = false;             ///< invalid length; the rest of the stream cannot be parsed
 };
 First first_message(Bytes bytes);
 
 /// Appends a message with its padding.
 void append(Buffer& out, const Message& message, std::uint32_t sequence);
 
-// ---- Payloads. append_… append one, read_… read one. ----------------------------------------------------------------
+// ---- Payloads
+// -------------------------------------------------------------------------------------------------------
 
 void append_description(Buffer& out, std::string_view name);
-/// The name, which lies in `payload`.
+/// Returns the name, which points into `payload`.
 std::optional<std::string_view> read_description(Bytes payload);
 
-/// Of sensor 0; velocities have one more number, the time (s) in which the handle turns by `rotation`.
+/// For sensor 0. The velocity also contains the time (s) in which the handle rotates by `rotation`.
 void append_pose(Buffer& out, const Vec3& position, const Quat& rotation);
 void append_velocity(Buffer& out, const Vec3& velocity, const Quat& rotation, double time);
 void append_workspace(Buffer& out, const Vec3& min, const Vec3& max);
@@ -139,7 +140,7 @@ void append_error(Buffer& out, std::int32_t code);
 enum class Severity : std::uint32_t { kNormal = 0, kWarning = 1, kError = 2 };
 void append_text(Buffer& out, Severity severity, std::string_view text);
 
-/// F(x) = force + jacobian (x − origin) where |x − origin| ≤ radius, else 0; N on the hand.
+/// F(x) = force + jacobian (x − origin) if |x − origin| ≤ radius, else 0; N, acting on the hand.
 struct ForceField {
   Vec3 origin = Vec3::Zero();    ///< m
   Vec3 force = Vec3::Zero();     ///< N
@@ -149,11 +150,11 @@ struct ForceField {
 };
 std::optional<ForceField> read_field(Bytes payload);
 
-/// a x + b y + c z + d = 0; the hand is outside where that is above 0.
+/// The plane a x + b y + c z + d = 0. The hand is outside where the left side is positive.
 struct Plane {
-  Vec3 normal = Vec3::Zero();  ///< (a, b, c), of any length; 0 ends the plane
+  Vec3 normal = Vec3::Zero();  ///< (a, b, c), any length; 0 removes the plane
   double offset = 0;           ///< d
-  double spring = 0;           ///< no unit: a share of the stiffest that the device can do
+  double spring = 0;           ///< fraction of the maximum stiffness of the device
   double damping = 0;
   double dynamic_friction = 0;
   double static_friction = 0;
@@ -161,7 +162,7 @@ struct Plane {
 };
 std::optional<Plane> read_plane(Bytes payload);
 
-/// Adhesion, texture, buzz: whether any of them is not 0. Empty: no such payload.
+/// Returns whether adhesion, texture or buzz is nonzero, or nullopt if the payload is invalid.
 std::optional<bool> read_effects(Bytes payload);
 
 }  // namespace tendon::plug::vrpn

@@ -9,11 +9,11 @@
 namespace tendon::plug::vrpn {
 namespace {
 
-constexpr std::size_t kMaxSentences = 32;  ///< not yet said
-constexpr double kTurnTime = 0.01;  ///< s: a quaternion tells a turn of up to half a circle in it, 50 turns a second
+constexpr std::size_t kMaxSentences = 32;  ///< not yet printed
+constexpr double kTurnTime = 0.01;  ///< s; a quaternion then represents up to half a turn, which is 50 turns per second
 constexpr double kSlowest = 1;      ///< Hz
 constexpr std::string_view kForceDevice = "vrpn_ForceDevice ";
-/// Of every VRPN program's own making: no device.
+/// Sender that every VRPN program creates; not a device.
 constexpr std::string_view kControl = "VRPN Control";
 
 std::int32_t number_of(std::size_t i) { return static_cast<std::int32_t>(i); }
@@ -40,7 +40,7 @@ std::optional<std::string> Peer::next_sentence() {
 void Peer::send(const Moment& now, std::int32_t sender, std::int32_t type, bool soon) {
   const Message message{.stamp = stamp_of(now.since_1970), .sender = sender, .type = type, .payload = payload_};
   if (soon && udp_port_) {
-    const std::size_t size = kHeaderSize + payload_.size() + 8;  // at most, with its padding
+    const std::size_t size = kHeaderSize + payload_.size() + 8;  // upper bound, including padding
     if (datagrams_.empty() || datagrams_.back().size() + size > kLongestDatagram) datagrams_.emplace_back();
     append(datagrams_.back(), message, sequence_++);
   } else {
@@ -119,7 +119,7 @@ void Peer::take_datagram(const Moment& now, Bytes datagram) {
     if (first.message->type >= 0) {
       take(now, *first.message);
     } else {
-      ++counts_.nonsense;  // descriptions come by TCP: anybody can send us a datagram
+      ++counts_.nonsense;  // descriptions must arrive over TCP, because anyone can send datagrams
     }
     datagram = datagram.subspan(first.size);
   }
@@ -205,7 +205,7 @@ void Peer::take_system(const Message& message) {
       udp_port_ = static_cast<std::uint16_t>(message.sender);
       return;
     default:
-      break;  // a log on our disk, for instance
+      break;  // for example, a log file on this machine
   }
   ++counts_.nonsense;
 }
@@ -280,7 +280,7 @@ void Peer::understand(const Moment& now, std::size_t station, Type type, Bytes p
     case Type::kPong:
       return;
     default:
-      break;  // what only a device says
+      break;  // messages that only a device sends
   }
   ++counts_.nonsense;
 }

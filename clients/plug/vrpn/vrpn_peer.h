@@ -19,45 +19,44 @@
 
 namespace tendon::plug::vrpn {
 
-/// One instant: for intervals, and for the stamps of messages.
+/// One instant in both clocks: for intervals and for message time stamps.
 struct Moment {
   LocalTime at{};
   Duration since_1970{};
 };
 
-/// The conversation with one VRPN program (VRPN.md). Bytes and instants go in; bytes, sentences and what the
-/// program has drawn come out. It has no socket and no clock.
+/// The connection to one VRPN program (VRPN.md) as a state machine: bytes and times in; bytes, messages and the
+/// program's requests out. It has no socket and no clock.
 ///
 ///     Peer peer(stations, number, now);
-///     peer.take_stream(now, bytes); peer.take_datagram(now, bytes);      all that has come, then
+///     peer.take_stream(now, bytes); peer.take_datagram(now, bytes);      for everything received, then
 ///     peer.end_of_batch(now);
 ///     peer.report(now, i, state, round_trip);                            for each new state of station i
 ///     write peer.stream(), peer.sent(n); send each of peer.datagrams()   to peer.udp_port()
 ///
-/// * **Bounded.** A message that says it is longer than kLongestPayload, a cookie of another major version and more
-///   than kMaxUnread bytes that the program does not read end it (`end()`). Everything else that makes no sense is
-///   counted.
-/// * **Newest wins.** Of more than kMaxPerSecond messages in a second all but the newest of each batch are skipped and
-///   counted; descriptions never are.
-/// * **Reports.** Pose at every state; velocity, force and channels at every tenth; a button when it changes. By UDP
-///   once the program has described a port, and as one datagram a state where they fit; buttons and texts always by
-///   TCP.
+/// * **Bounded.** The connection ends (`end()`) after a message longer than kLongestPayload, a cookie of another
+///   major version, or more than kMaxUnread unread bytes. Other invalid input is counted.
+/// * **Newest wins.** Above kMaxPerSecond messages per second, only the newest message of each batch is handled. The
+///   others are skipped and counted, except descriptions.
+/// * **Reports.** The pose is sent for every state; velocity, force and channels for every tenth; buttons when they
+///   change. Reports are sent over UDP once the program has described a port, if possible in one datagram per state.
+///   Buttons and texts are always sent over TCP.
 ///
 /// Thread-safe: no. Realtime-safe: no.
 class Peer {
  public:
   static constexpr std::size_t kMaxUnread = 64 * 1024;
   static constexpr int kMaxPerSecond = 4000;
-  static constexpr int kBurst = 256;              ///< messages that may come at once
-  static constexpr int kRareReports = 10;         ///< one in so many has velocity, force and channels
-  static constexpr int kForceError = 2;           ///< vrpn_ForceDevice's FD_FORCE_ERROR
-  static constexpr std::size_t kMaxWarnings = 8;  ///< names and types that one program is told about
+  static constexpr int kBurst = 256;              ///< burst of messages
+  static constexpr int kRareReports = 10;         ///< divider of velocity, force and channel reports
+  static constexpr int kForceError = 2;           ///< FD_FORCE_ERROR of vrpn_ForceDevice
+  static constexpr std::size_t kMaxWarnings = 8;  ///< unknown names and types reported to one program
 
   struct Counts {
-    std::uint64_t messages = 0;      ///< that came, but for descriptions
-    std::uint64_t skipped = 0;       ///< of these, because there were too many
-    std::uint64_t nonsense = 0;      ///< not understood, or with impossible values
-    std::uint64_t not_rendered = 0;  ///< meshes, effects and what else no device here can do
+    std::uint64_t messages = 0;      ///< received, without descriptions
+    std::uint64_t skipped = 0;       ///< messages skipped because of the rate limit
+    std::uint64_t nonsense = 0;      ///< unknown messages or invalid values
+    std::uint64_t not_rendered = 0;  ///< meshes, effects and other unsupported requests
     std::uint64_t reports = 0;       ///< poses sent
   };
 
@@ -68,26 +67,26 @@ class Peer {
   void take_datagram(const Moment& now, Bytes datagram);
   void end_of_batch(const Moment& now);
   void report(const Moment& now, std::size_t station, const DeviceState& state, Duration round_trip);
-  /// A text that the program's user sees.
+  /// Sends a text that is shown to the user of the program.
   void tell(const Moment& now, std::size_t station, Severity severity, std::string_view text);
-  /// Says where we take datagrams. `host` is for VRPN's eyes only.
+  /// Announces the UDP port of this server. `host` is required by VRPN but not used otherwise.
   void describe_port(const Moment& now, std::string_view host, std::uint16_t port);
 
   Bytes stream() const { return std::span(out_).subspan(sent_); }
   void sent(std::size_t bytes);
   std::vector<Buffer>& datagrams() { return datagrams_; }
-  /// The program's port for datagrams, at the address that its TCP connection has; empty: it takes none.
+  /// UDP port of the program, at the address of its TCP connection; empty: none.
   std::optional<std::uint16_t> udp_port() const { return udp_port_; }
 
-  /// What the program has drawn around a station, and whether that has changed since the last call.
+  /// The requests of the program for a station, and whether they have changed since the last call.
   Drawing& drawing(std::size_t station) { return wishes_[station].drawing; }
   const Freshness& freshness(std::size_t station) const { return wishes_[station].freshness; }
   bool take_change(std::size_t station) { return std::exchange(wishes_[station].changed, false); }
 
-  /// Whether it has sent more than its share: who reads it may let it wait.
+  /// Whether it has exceeded its message rate; reading it may be delayed.
   bool is_above_its_share() const { return allowance_ < 1; }
-  bool open() const { return open_; }  ///< its cookie has come, and is right
-  /// Why the conversation is over; empty while it is not.
+  bool open() const { return open_; }  ///< a valid cookie was received
+  /// Reason for the end of the connection; empty while it is open.
   const std::string& end() const { return end_; }
   std::optional<std::string> next_sentence();
   const Counts& counts() const { return counts_; }
@@ -104,11 +103,11 @@ class Peer {
     bool changed = false;
   };
   struct Told {
-    bool any = false;  ///< a state
+    bool any = false;  ///< a state was sent
     double next_tick = 0;
     double period_ticks = 1;
     std::uint64_t reports = 0;
-    int buttons = 0;  ///< that it knows of
+    int buttons = 0;  ///< number of buttons known to the program
     std::uint32_t held = 0;
     bool stopped = false;
   };
@@ -119,7 +118,7 @@ class Peer {
   void not_rendered(const Moment& now, std::size_t station, const std::string& what);
   void describe_all(const Moment& now);
   void say(std::string sentence);
-  /// Ends a payload that has been appended to `payload_` and sends it.
+  /// Completes the payload in `payload_` and sends it.
   void send(const Moment& now, std::int32_t sender, std::int32_t type, bool soon);
   void send(const Moment& now, std::size_t station, Type type, bool soon) {
     send(now, static_cast<std::int32_t>(station), static_cast<std::int32_t>(type), soon);
@@ -139,8 +138,8 @@ class Peer {
   std::uint32_t sequence_ = 0;
   std::optional<std::uint16_t> udp_port_;
 
-  std::vector<std::int32_t> senders_;  ///< the program's number → station, or kNobody
-  std::vector<Name> types_;            ///< the program's number → type
+  std::vector<std::int32_t> senders_;  ///< number used by the program → station, or kNobody
+  std::vector<Name> types_;            ///< number used by the program → type
 
   double allowance_ = kBurst;  ///< messages
   LocalTime allowed_{};
@@ -148,7 +147,7 @@ class Peer {
     Message message;
     Buffer payload;
   };
-  std::optional<Held> held_;  ///< the newest of those above the allowance
+  std::optional<Held> held_;  ///< newest message above the rate limit
 
   std::set<std::string, std::less<>> warned_;
   std::deque<std::string> sentences_;

@@ -18,15 +18,15 @@ namespace tendon::plug::vrpn {
 namespace {
 
 constexpr int kBacklog = 16;
-constexpr int kMaxAccepted = 16;             ///< in one turn
-constexpr int kMaxHellos = 64;               ///< in one turn
-constexpr int kMaxDatagrams = 256;           ///< of one client in one turn
-constexpr std::size_t kMaxRead = 64 * 1024;  ///< from one client's stream in one turn: 256 messages of 256 bytes
+constexpr int kMaxAccepted = 16;             ///< per turn
+constexpr int kMaxHellos = 64;               ///< per turn
+constexpr int kMaxDatagrams = 256;           ///< per client and turn
+constexpr std::size_t kMaxRead = 64 * 1024;  ///< per client and turn; 256 messages of 256 bytes
 constexpr int kPortTries = 16;
-/// A program that sends more than its share is read so much later: in batches, instead of one wake-up a message.
+/// Delay before reading a program that exceeds its rate, so that its messages are handled in batches.
 constexpr Duration kRest = std::chrono::microseconds(500);
-constexpr std::size_t kEach = 2;  ///< sockets of a client
-/// A machine that has vanished without a word is noticed after as many seconds.
+constexpr std::size_t kEach = 2;  ///< sockets per client
+/// Keep-alive settings (s, count), which detect a machine that disappeared.
 constexpr int kKeepAliveS = 2;
 constexpr int kKeepAlives = 3;
 
@@ -102,12 +102,12 @@ struct Server::Client {
   Address address;
   std::uint32_t number;
   std::string name;
-  bool dialling;    ///< we have asked for the connection, and it is not there yet
-  LocalTime until;  ///< … or the cookie must be there
+  bool dialling;    ///< the connection to the program is not established yet
+  LocalTime until;  ///< deadline for the connection or the cookie
   LocalTime rests_until{};
   Peer peer;
   std::vector<Asker> askers;  ///< one for each station
-  std::string over;           ///< why it is dropped; empty: it stays
+  std::string over;           ///< reason for closing; empty: none
 };
 
 Server::Server(Desk& desk, Config config, LocalTime now) : desk_(desk), config_(std::move(config)), dialled_(now) {
@@ -117,7 +117,7 @@ Server::Server(Desk& desk, Config config, LocalTime now) : desk_(desk), config_(
   seen_.resize(stations_.size());
   buffer_.resize(kMaxRead);
   int error = 0;
-  for (int i = 0; i < kPortTries && !udp_; ++i) {  // a free port for TCP may be taken for UDP
+  for (int i = 0; i < kPortTries && !udp_; ++i) {  // a port that is free for TCP may be in use for UDP
     tcp_ = new_socket(SOCK_STREAM);
     set(tcp_.number(), SOL_SOCKET, SO_REUSEADDR, 1);
     if (!bind_to(tcp_.number(), config_.listen) || ::listen(tcp_.number(), kBacklog) != 0) {
@@ -209,7 +209,7 @@ void Server::take_hello(const Moment& now) {
 }
 
 void Server::dial(const Moment& now, const Address& to) {
-  // A client says its hello once a second until we are there.
+  // A client repeats its hello every second until the connection is established.
   if (std::ranges::any_of(clients_, [&](const auto& client) { return client->address == to; })) return;
   dials_ = std::min<double>(kDialsPerSecond, dials_ + kDialsPerSecond * seconds(now.at - dialled_));
   dialled_ = now.at;
@@ -251,7 +251,7 @@ void Server::finish_dial(const Moment& now, Client& client, short ready) {
   client.until = now.at + kPatience;
 }
 
-/// Where a program takes datagrams, so do we.
+/// Opens a UDP socket for a program that has described its port.
 void Server::open_udp(const Moment& now, Client& client) {
   Address ours = local_address(client.tcp.number());
   ours.port = 0;
@@ -280,7 +280,7 @@ void Server::read(const Moment& now, Client& client, short ready, short datagram
       const ssize_t got =
           ::recvfrom(client.udp.number(), buffer_.data(), buffer_.size(), 0, reinterpret_cast<sockaddr*>(&from), &size);
       if (got < 0) break;
-      if (address_of(from).ip != client.address.ip) continue;  // a program's datagrams come from any of its ports
+      if (address_of(from).ip != client.address.ip) continue;  // datagrams of a program may come from any of its ports
       client.peer.take_datagram(now, std::span(buffer_).first(static_cast<std::size_t>(got)));
     }
   }
@@ -328,7 +328,7 @@ LocalTime Server::turn(const Moment& now) {
   serve_states(now);
   bool asked = false;
   LocalTime next = LocalTime::max();
-  const std::size_t known = clients_.size();  // polled_ has these; the order stays
+  const std::size_t known = clients_.size();  // polled_ covers these clients, in this order
   for (std::size_t c = 0; c < known; ++c) {
     Client& client = *clients_[c];
     const short ready = polled_[2 + kEach * c].revents;
@@ -374,7 +374,7 @@ void Server::poll_again(LocalTime now) {
     const bool writes = client->dialling || !client->peer.stream().empty();
     const auto events = static_cast<short>((reads ? POLLIN : 0) | (writes ? POLLOUT : 0));
     polled_.push_back({client->tcp.number(), events, 0});
-    polled_.push_back({reads ? client->udp.number() : -1, POLLIN, 0});  // −1 is passed over
+    polled_.push_back({reads ? client->udp.number() : -1, POLLIN, 0});  // poll() ignores −1
   }
 }
 

@@ -17,7 +17,7 @@
 
 namespace tendon::plug::vrpn {
 
-/// A file descriptor that is closed with its owner.
+/// An owned file descriptor.
 class Descriptor {
  public:
   Descriptor() = default;
@@ -35,19 +35,19 @@ class Descriptor {
   int number_ = -1;
 };
 
-/// The sockets of a VRPN server: one port, TCP and UDP.
+/// The sockets of a VRPN server: one port for TCP and UDP.
 ///
 ///     Server server(desk, config, now);
 ///     for (…) desk.turn(now, server.counts()); next = server.turn(moment); desk.wait(server.polled(), now, next);
 ///
-/// * **Two ways in.** A datagram that names a TCP port, whereupon we connect to that port *of the address that the
-///   datagram came from*; or a TCP connection to us. The address in the datagram's text is never used, nor is the one
-///   in the description of a UDP port. A connection that we open is never waited for; at most kDialsPerSecond, and one
-///   at a time to the same port; without an answer it is given up after kPatience.
-/// * **Limits.** kMaxClients, those that are being connected to with them; further ones are closed, and said once until
-///   a place is free. One whose cookie does not come within kPatience is dropped.
-/// * **Forces.** Each program has an Asker for each station. When its connection ends it is let go at once: the server
-///   fades its last force.
+/// * **Connections.** A program sends a datagram with its TCP port, and the server connects to that port *at the
+///   source address of the datagram*; or the program opens a TCP connection. Addresses in the text of the datagram or
+///   in the description of a UDP port are never used. Connecting is asynchronous, limited to kDialsPerSecond and to
+///   one connection per port, and is given up after kPatience.
+/// * **Limits.** At most kMaxClients, including those being connected. Further ones are closed, which is reported
+///   once until a client leaves. A client that sends no cookie within kPatience is closed.
+/// * **Forces.** Each program has an Asker for each station. When its connection ends, it releases the devices, and
+///   the server fades the last force.
 ///
 /// Thread-safe: no. Realtime-safe: no (system calls).
 class Server {
@@ -57,8 +57,8 @@ class Server {
   static constexpr Duration kPatience = std::chrono::seconds(3);
 
   struct Alias {
-    std::string name;   ///< that VRPN programs ask for
-    std::size_t place;  ///< of the device at the desk
+    std::string name;   ///< used by VRPN programs
+    std::size_t place;  ///< index of the device at the desk
   };
   struct Config {
     Address listen;  ///< IPv4; port 0: any
@@ -71,10 +71,10 @@ class Server {
 
   const Address& address() const noexcept { return address_; }
 
-  /// Serves everybody, after Desk::turn and Desk::wait. The latest time for the next turn; `now` when something has
-  /// been asked for that should leave at once.
+  /// Serves all clients; must be called after Desk::turn and Desk::wait. Returns the time of the next turn, or `now`
+  /// if a requested force should be sent immediately.
   LocalTime turn(const Moment& now);
-  /// For Desk::wait. Another set after each turn.
+  /// Arguments for Desk::wait; valid until the next turn.
   std::span<pollfd> polled() { return polled_; }
   std::span<const Desk::Count> counts();
 

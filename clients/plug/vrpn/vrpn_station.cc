@@ -11,11 +11,10 @@ namespace tendon::plug::vrpn {
 namespace {
 
 constexpr Duration kAskAgain = std::chrono::milliseconds(500);
-/// Each ask is a datagram. A program that says more waits for the next state at most, which is answered by the newest
-/// that it has said: VRPN's own ff_client sends 60 000 fields a second, as fast as it can.
+/// Minimum interval between requests, since each is a datagram. A changed drawing waits at most for the next state.
+/// VRPN's ff_client sends 60 000 fields per second, as fast as it can.
 constexpr Duration kShortest = std::chrono::microseconds(250);
-/// … is fresh for longer than that, so that a turn that comes late loses nothing, and not for ever: a plug that hangs
-/// must not push.
+/// Validity of a request. It must cover a late turn, but must end so that a program that hangs does not push.
 constexpr Duration kAskedFor = std::chrono::seconds(1);
 
 }  // namespace

@@ -13,40 +13,40 @@
 
 namespace tendon::plug::vrpn {
 
-/// A device under the name that VRPN programs ask for: Tracker, Button, Analog and ForceDevice at once.
+/// A device under the name used by VRPN programs. It is a Tracker, Button, Analog and ForceDevice.
 struct Station {
   std::string name;
-  View view{*find_frame("openhaptics"), {}};  ///< VRPN's frame is that of its Phantom server
-  double stiffest = 1000;                     ///< N/m, of a plane with spring 1: the device's, where it is known
-  std::optional<DeviceDescription::Box> workspace{};  ///< device base frame
-  int buttons = 0;                                    ///< that it has
+  View view{*find_frame("openhaptics"), {}};  ///< VRPN uses the frame of its Phantom server
+  double stiffest = 1000;                     ///< N/m, of a plane with spring 1; from the device description if known
+  std::optional<DeviceDescription::Box> workspace{};  ///< in the device base frame
+  int buttons = 0;                                    ///< number of buttons
   std::uint32_t loop_hz = 1000;
-  bool described = false;        ///< … have been learned from the plug
-  bool handle_is_known = false;  ///< likewise view and buttons
+  bool described = false;        ///< the description was read
+  bool handle_is_known = false;  ///< `view` and `buttons` are valid
   bool axes_said = false;
 
   Hand hand(const DeviceState& state) const { return {view.position(state.position), view.position(state.velocity)}; }
 
-  /// Takes what the device's server says of it. A sentence, once, when it does not say which way is up: the device's
-  /// own axes are then taken for VRPN's.
+  /// Reads the device description. Returns a message, once, if the orientation of the device is unknown; the axes of
+  /// the device are then used for VRPN.
   std::optional<std::string> learn(const Plug& plug);
 };
 
 class Peer;
 
-/// Asks a plug for what a program has drawn around its station: at a change, and again twice a second while it is fresh
-/// (Freshness), so that the program stays the owner; at most 4000 times a second. Once its drawing has ended, zero is
-/// asked for; then the plug lets the program go. A program whose force is not felt, because another one has the device,
-/// is told.
+/// Requests from a Plug what a program has drawn at its station: after each change, at most 4000 times per second,
+/// and twice per second while it is fresh (Freshness) to keep the ownership. When the drawing is removed, it requests
+/// a zero force, after which the Plug releases the program. A program whose force is not applied because another one
+/// owns the device is informed.
 ///
 /// Thread-safe: no. Realtime-safe: no.
 class Asker {
  public:
-  /// `number` is the program at every plug; `who` is it in sentences. `i` is the station among the peer's.
+  /// `number` identifies the program at every Plug, `who` in messages. `i` is the index of the station.
   Asker(Plug::Program number, std::string who, std::size_t i) : number_(number), who_(std::move(who)), i_(i) {}
 
-  /// `plug` is the station's; `peer` and `station` must outlive what is asked for, which ends with Plug::release. True
-  /// when something has been asked for that should leave at once.
+  /// `peer` and `station` must outlive the request, which ends with Plug::release. Returns true if a request was made
+  /// that should be sent immediately.
   bool turn(LocalTime now, Duration since_1970, Plug& plug, const Station& station, Peer& peer);
 
   std::optional<std::string> next_sentence() { return std::exchange(sentence_, {}); }
@@ -56,11 +56,11 @@ class Asker {
   std::string who_;
   std::size_t i_;
   std::optional<std::string> sentence_;
-  LocalTime at_{};           ///< the last time that the drawing was asked for
-  bool asks_ = false;        ///< a drawing is asked for
-  bool is_stale_ = false;    ///< … but the program has fallen silent
-  bool is_refused_ = false;  ///< another one owns the device, and the program has been told
-  bool for_long_ = false;    ///< it has been said that the drawing lives as long as the connection
+  LocalTime at_{};           ///< time of the last request
+  bool asks_ = false;        ///< a request is active
+  bool is_stale_ = false;    ///< the program has stopped sending
+  bool is_refused_ = false;  ///< another program owns the device, and this one was informed
+  bool for_long_ = false;    ///< reported that the drawing is valid as long as the connection
 };
 
 }  // namespace tendon::plug::vrpn
