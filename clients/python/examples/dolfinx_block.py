@@ -36,7 +36,6 @@ faces = mesh.locate_entities_boundary(block, 2, lambda x: np.isclose(x[0], 0))
 back = mesh.locate_entities_boundary(block, 2, lambda x: np.isclose(x[0], SIZE))
 held = fem.dirichletbc(np.zeros(3), fem.locate_dofs_topological(space, 2, back), space)
 
-# The stiffness matrix and its factor, once.
 u, v = ufl.TrialFunction(space), ufl.TestFunction(space)
 lame, shear = YOUNG * POISSON / ((1 + POISSON) * (1 - 2 * POISSON)), YOUNG / (2 * (1 + POISSON))
 strain = ufl.sym(ufl.grad(u))
@@ -50,7 +49,7 @@ solver.getPC().setFactorSolverType("mumps")
 solver.setOperators(matrix)
 solver.setUp()
 
-# The patch: the weights 3/(πa²)·(1 − (r/a)²)² of clients/softbody/fem/patch.h, around a middle that moves.
+# The patch has the weights 3/(πa²)·(1 − (r/a)²)² of clients/softbody/fem/patch.h around a moving center.
 x, middle = ufl.SpatialCoordinate(block), fem.Constant(block, np.zeros(3))
 r2 = ((x[1] - middle[1]) ** 2 + (x[2] - middle[2]) ** 2) / PATCH**2
 weight = ufl.conditional(ufl.lt(r2, 1), 3 / (np.pi * PATCH**2) * (1 - r2) ** 2, 0.0)
@@ -63,13 +62,14 @@ ones.vector.copy(inwards)
 
 
 def stiffness_at(y: float, z: float) -> float:
-    """N/m of the patch around (y, z): 1 / (mean displacement over the patch, of a force of 1 N that it shares out)."""
+    """Stiffness of the patch around (y, z), N/m: 1 / (mean displacement of the patch under a distributed force of 1
+    N)."""
     middle.value[:] = (0, y, z)
     with load.localForm() as local:
         local.set(0)
     fem.petsc.assemble_vector(load, pressed)
     load.ghostUpdate(PETSc.InsertMode.ADD, PETSc.ScatterMode.REVERSE)
-    covered = load.dot(inwards)  # 1 where the whole patch lies on the block
+    covered = load.dot(inwards)  # 1 if the entire patch is on the block
     if covered < 0.5:
         return 0.0
     load.scale(1 / covered)
@@ -85,5 +85,5 @@ def answer(hand: tendon.DeviceState) -> tendon.Touch:
     return tendon.Touch(force=(-k * max(depth, 0), 0, 0), stiffness=(k, 0, 0), contact=contact)
 
 
-stiffness_at(0, 0)  # what is compiled and made at the first use
+stiffness_at(0, 0)  # compiles and caches everything before the first state
 tendon.worker.run(answer, comm)

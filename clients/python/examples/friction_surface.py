@@ -11,7 +11,7 @@ parser.add_argument("--height-mm", type=cli.at_least(-100), default=2, help="Of 
 parser.add_argument("--friction", type=cli.number(), default=0.5, help="Its coefficient [%(default)s]")
 options = parser.parse_args()
 TABLE, BRISTLE = 1000, 500  # N/m
-foot: list[float] = []  # of the bristle, on the table; empty: it does not touch
+foot: list[float] = []  # end point of the bristle on the table; empty: no contact
 
 
 def table(hand: DeviceState) -> Touch:
@@ -22,7 +22,7 @@ def table(hand: DeviceState) -> Touch:
         return Touch()
     bend = (x - foot[0], z - foot[1]) if foot else (0.0, 0.0)
     slip = min(1.0, options.friction * TABLE * depth / BRISTLE / (hypot(*bend) or 1.0))
-    foot[:] = (x - slip * bend[0], z - slip * bend[1])  # it follows, so that the force stays at the limit
+    foot[:] = (x - slip * bend[0], z - slip * bend[1])  # slides so that the force stays at the limit
     return Touch(force=(-BRISTLE * slip * bend[0], TABLE * depth, -BRISTLE * slip * bend[1]))
 
 

@@ -8,7 +8,7 @@ from tendon import DeviceState, Touch, cli
 options = cli.parser("maze", __doc__).parse_args()
 MAZE = ["#########", "#   #   #", "# #   # #", "#   #   #", "#########"]  # the middle cell is at the origin
 CELL, STIFFNESS = 0.008, 1200  # m, N/m
-room = [len(MAZE[0]) // 2, len(MAZE) // 2]  # where the hand is, were the walls rigid
+room = [len(MAZE[0]) // 2, len(MAZE) // 2]  # the cell of the hand if the walls were rigid
 
 
 def maze(hand: DeviceState) -> Touch:

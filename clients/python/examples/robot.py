@@ -8,13 +8,13 @@ from tendon import DeviceState, Touch, cli
 from tendon.teleop import Follower, FollowerConfig, Pose, ToolContact
 
 options = cli.parser("robot", __doc__, rate_hz=200).parse_args()
-UP = (0.5**0.5, 0.5**0.5, 0, 0)  # the device's y points up, as the robot's z does
+UP = (0.5**0.5, 0.5**0.5, 0, 0)  # y of the device points up, as z of the robot does
 follow = Follower(FollowerConfig(scale=0.5, rotation=UP, clutch_button=0, rate_hz=options.rate_hz or 1000))
 tool = [0.4, 0.0, 0.02]  # m: your robot's pose, motion and force sensor go into these three places
 
 
 def move(target: Pose | None) -> None:
-    tool[:] = tool if target is None else target.position  # None: the robot holds its place
+    tool[:] = tool if target is None else target.position  # None: the robot holds its pose
 
 
 def step(hand: DeviceState) -> Touch | None:

@@ -15,7 +15,7 @@ options = parser.parse_args()
 def corduroy(hand: DeviceState) -> Touch:
     per_metre = 2 * pi / (options.pitch_mm / 1000)
     phase = per_metre * hand.position[0]  # 0 in the middle of a groove
-    stiffness = options.force_n * per_metre * cos(phase)  # below 0 on a ridge: it throws the hand off
+    stiffness = options.force_n * per_metre * cos(phase)  # negative on a ridge: unstable equilibrium
     return Touch(force=(-options.force_n * sin(phase), 0, 0), stiffness=(stiffness, 0, 0))
 
 

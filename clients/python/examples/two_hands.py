@@ -10,7 +10,7 @@ parser = cli.parser("two_hands", __doc__)
 parser.add_argument("--stiffness-n-per-m", type=cli.number(), default=400, help="How hard it is to stretch [%(default)s]")
 parser.add_argument("--length-mm", type=cli.at_least(1), default=200, help="At which it is at rest [%(default)s]")
 options = parser.parse_args()
-ends: dict[str, list[float]] = {}  # of the rod, m, in the frame between the two devices
+ends: dict[str, list[float]] = {}  # of the rod, m, in the frame centered between the two devices
 
 
 def rod(mine: str, other: str, device_x: float, hand: DeviceState) -> Touch:

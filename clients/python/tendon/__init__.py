@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A physics engine in Python touches a real hand: the client of the Tendon haptics server.
+"""Python client of the Tendon haptics server.
 
     import tendon
 
     with tendon.Client("127.0.0.1:47100", tendon.Config(name="spring", rate_hz=200)) as client:
         client.drive(lambda hand: [-500 * x for x in hand.position])
 
-`Client` waits; `tendon.aio.Client` is the same for asyncio; `ForceClient` is the whole behaviour without socket and
-clock, for a loop of your own. `tendon.worker.run(answer)` is all of a program that a front asks. SI units, device base
-frame; a force is what the device exerts **on the hand**.
+`Client` blocks, `tendon.aio.Client` is for asyncio, and `ForceClient` contains the protocol without socket and
+clock, for use in your own event loop. `tendon.worker.run(answer)` implements a worker. SI units, device base
+frame; forces act **on the hand**.
 """
 
 import sys as _sys

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""AES-256-GCM for cipher suite 2. The only module that knows `cryptography` (OpenSSL): PyNaCl has no AES. Without that
-package there is no suite 2."""
+"""AES-256-GCM for cipher suite 2. The only module that uses `cryptography` (OpenSSL), because PyNaCl has no AES.
+Suite 2 requires that package."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ TAG_SIZE = 16
 
 
 class AesGcm:
-    """One key, whose schedule is computed once."""
+    """A key with its precomputed key schedule."""
 
     def __init__(self, key: bytes) -> None:
         self._aes = AESGCM(key)
@@ -25,8 +25,8 @@ class AesGcm:
         return self._aes.encrypt(_nonce(number), plain, associated)
 
     def unseal(self, number: int, associated: bytes, sealed: bytes) -> bytes | None:
-        """None when it is not authentic."""
-        if len(sealed) < TAG_SIZE:  # it would raise something else
+        """Returns None if authentication fails."""
+        if len(sealed) < TAG_SIZE:  # `cryptography` would raise another exception
             return None
         try:
             return self._aes.decrypt(_nonce(number), sealed, associated)
@@ -34,10 +34,10 @@ class AesGcm:
             return None
 
     def renewed(self) -> AesGcm:
-        """REKEY(key) of Noise: the next key, from which this one cannot be computed."""
+        """REKEY(key) of Noise: the next key, from which this one cannot be derived."""
         return AesGcm(self.seal(2**64 - 1, b"", bytes(32))[:32])
 
 
 def _nonce(number: int) -> bytes:
-    """That of Noise's AESGCM: unlike ChaChaPoly's, it has the highest byte first."""
+    """The nonce of Noise's AESGCM is big-endian, unlike that of ChaChaPoly."""
     return bytes(4) + number.to_bytes(8, "big")

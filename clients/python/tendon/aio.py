@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The asyncio client: the session lives in the event loop while your coroutine computes or waits."""
+"""The asyncio client. The event loop keeps the session alive while your coroutine computes or waits."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ Physics = Callable[[DeviceState], Awaitable[Union[Touch, Sequence[float], None]]
 
 
 class Client(AnyClient):
-    """A guest at a Tendon server, as tendon.Client, in an event loop that can watch sockets (on Windows
-    asyncio's SelectorEventLoop):
+    """A client of a Tendon server like tendon.Client, for event loops that can watch sockets (SelectorEventLoop on
+    Windows):
 
         async with aio.Client("127.0.0.1:47100", Config(name="spring")) as client:
             async for hand in client.states():
                 client.send(hand, force)
 
-    The session stays alive as long as the event loop runs. Only one task at a time may ask for states. The
-    constructor looks the host name up, and blocks meanwhile.
+    The session stays alive as long as the event loop runs. Only one task at a time may request states. The
+    constructor resolves the host name and blocks meanwhile.
     """
 
     def __init__(self, server: str, config: Config = Config()) -> None:
@@ -38,7 +38,7 @@ class Client(AnyClient):
         self._wake_at: Instant = NEVER
 
     async def states(self, duration_s: float | None = None) -> AsyncIterator[DeviceState]:
-        """The newest state, at Config.rate_hz or as soon after as there is a new one; older ones are skipped.
+        """Yields the newest state, at Config.rate_hz or as soon as a new one is available; older states are skipped.
         Ends after `duration_s`, or never. Raises RefusedForGood."""
         guest, core = self._guest, self._guest.core
         now = time.monotonic_ns()
@@ -47,9 +47,9 @@ class Client(AnyClient):
             now = guest.take(now)
             state = core.next_state(now)
             if state is not None:
-                yield state  # is answered before anything else is done
+                yield state  # the caller answers before the client does anything else
                 guest.tend(time.monotonic_ns())
-                await asyncio.sleep(0)  # the other tasks get their turn, however fast states come
+                await asyncio.sleep(0)  # give other tasks a turn even if states arrive fast
             else:
                 guest.tend(now)
                 guest.raise_if_refused()
@@ -57,7 +57,7 @@ class Client(AnyClient):
             now = time.monotonic_ns()
 
     async def drive(self, physics: Physics, duration_s: float | None = None) -> None:
-        """Answers every state with the result of `physics`. Raises RefusedForGood, and whatever `physics` raises."""
+        """Answers each state with the result of `physics`. Raises RefusedForGood, and exceptions of `physics`."""
         async for hand in self.states(duration_s):
             self.answer(hand, await physics(hand))
 
@@ -69,7 +69,7 @@ class Client(AnyClient):
     async def __aexit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Says Bye, so that the server need not wait for a timeout."""
+        """Sends a Bye, so that the server does not have to wait for a timeout."""
         asyncio.get_running_loop().remove_reader(self._guest.socket)
         if self._timer is not None:
             self._timer.cancel()
@@ -81,7 +81,7 @@ class Client(AnyClient):
         loop.add_reader(new, self._turn)
 
     def _turn(self) -> None:
-        """Runs when something has come in or is due. A task that waits for a state is woken, and does the rest."""
+        """Handles received datagrams and due work. If a task waits for a state, wakes that task instead."""
         if self._waiter is not None and not self._waiter.done():
             self._waiter.set_result(None)
             return
@@ -89,7 +89,7 @@ class Client(AnyClient):
         self._set_timer()
 
     async def _wait_until(self, instant: Instant) -> None:
-        """Waits until `instant`, or until something happens."""
+        """Waits until `instant` or an event."""
         self._wake_at = instant
         self._waiter = asyncio.get_running_loop().create_future()
         self._set_timer()
@@ -102,7 +102,7 @@ class Client(AnyClient):
                 self._set_timer()
 
     def _set_timer(self) -> None:
-        """Before the next turn is due. A timer that ends sooner stays: it asks again."""
+        """Sets the timer for the next turn. A timer that expires earlier is kept, because it sets the next one."""
         due = min(self._guest.core.next_turn(), self._wake_at)
         if self._timer is not None:
             if self._timer_due <= due:

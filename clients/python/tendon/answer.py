@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a haptic function returns, in Python's own numbers, and why it cannot be sent."""
+"""Conversion and validation of the result of a haptic function."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from .messages import (
 
 @dataclass(frozen=True, kw_only=True)
 class Answer:
-    """A Touch whose shapes are right. Its numbers may still be impossible: see objection()."""
+    """A Touch with valid shapes. Its numbers may still be invalid; see objection()."""
 
     force: Vec3
     stiffness: Mat3 | None
@@ -40,7 +40,7 @@ class Answer:
     way: int = 0
 
     def objection(self) -> str:
-        """Why this answer cannot be used; empty when it can."""
+        """Returns why this answer is unusable, or an empty string."""
         if not _usable(self.force):
             if not all(map(math.isfinite, self.force)):
                 return "the force is not finite (NaN or infinity)"
@@ -63,18 +63,18 @@ class Answer:
         return ""
 
     def local_model(self, at: Vec3) -> LocalModel | None:
-        """The model around `at`; None when the engine told neither stiffness nor contact."""
+        """Returns the local model around `at`, or None if the engine provided neither stiffness nor contact."""
         if self.stiffness is None and self.contact is None:
             return None
         return LocalModel(at, self.stiffness or (ZERO, ZERO, ZERO), self.valid_radius, self.contact)
 
     @property
     def asks_for_handle(self) -> bool:
-        """Whether it asks for more than a force."""
+        """Whether the answer contains a torque or a grip force."""
         return (self.torque, self.angular_stiffness, self.grip_force) != (None, None, None)
 
     def turning(self, hand: Turning | None) -> Torque | None:
-        """The torque, with its model around the hand's orientation where the device measures that."""
+        """Returns the torque, with a model around the orientation of the hand if the device measures it."""
         if self.torque is None and self.angular_stiffness is None:
             return None
         model = RotationModel(hand.orientation, self.angular_stiffness) if hand and self.angular_stiffness else None
@@ -82,7 +82,7 @@ class Answer:
 
 
 def read_touch(touch: Touch) -> Answer:
-    """Raises ValueError when a force, stiffness or normal has a wrong shape."""
+    """Raises ValueError if a force, stiffness or normal has a wrong shape."""
     return Answer(
         force=_vector(touch.force),
         stiffness=None if touch.stiffness is None else _matrix(touch.stiffness),
@@ -100,7 +100,7 @@ def read_touch(touch: Touch) -> Answer:
 def _usable(vector: Vec3) -> bool:
     x, y, z = vector
     most = limits.MAX_VALUE
-    return -most <= x <= most and -most <= y <= most and -most <= z <= most  # nor is NaN
+    return -most <= x <= most and -most <= y <= most and -most <= z <= most  # False for NaN
 
 
 def _vector(numbers: Sequence[float], expected: str = "a force of three numbers") -> Vec3:
@@ -112,7 +112,7 @@ def _vector(numbers: Sequence[float], expected: str = "a force of three numbers"
 
 
 def _matrix(stiffness: Stiffness) -> Mat3:
-    """3 × 3 from any of the forms that Touch.stiffness may have."""
+    """Converts any form of Touch.stiffness to a 3 × 3 matrix."""
     expected = "a stiffness of one number, three, or 3 × 3"
     if not hasattr(stiffness, "__len__"):
         k = float(stiffness)
@@ -126,7 +126,7 @@ def _matrix(stiffness: Stiffness) -> Mat3:
 
 
 def _contact(contact: Contact) -> Contact:
-    """The same in Python's own numbers."""
+    """Converts the numbers to Python types."""
     table = contact.table
     if table is not None:
         table = ForceTable(float(table.first), float(table.step), tuple(map(float, table.force)))

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Protects a session's datagrams: not at all (suite 0), or with renewed keys by ChaCha20-Poly1305 (suite 1) or
-AES-256-GCM (suite 2)."""
+"""Protection of a session's datagrams: none (suite 0), or authenticated encryption with key renewal, by
+ChaCha20-Poly1305 (suite 1) or AES-256-GCM (suite 2)."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from . import aes, noise
 from .codec import Suite
 
 SUITE_NAMES = {Suite.AES_GCM: "aes-256-gcm", Suite.NOISE: "chacha20-poly1305"}
-"""The suites that seal; the first that both ends have is taken. The name of suite 2 is also the feature by which a client
-offers it and a server chooses it."""
+"""Encrypting suites in order of preference. The name of suite 2 is also the feature with which a client offers and a
+server selects it."""
 
 
 def usable_suites() -> tuple[Suite, ...]:
-    """Those of them that can be spoken here: suite 2 takes the package `cryptography`."""
+    """Returns the available encrypting suites. Suite 2 requires the package `cryptography`."""
     return tuple(suite for suite in SUITE_NAMES if suite is not Suite.AES_GCM or aes.AVAILABLE)
 
 
@@ -27,15 +27,15 @@ def names_of(suites: Iterable[Suite]) -> str:
 RENEW_AFTER_DATAGRAMS = 1 << 20
 RENEW_AFTER_NS = 600_000_000_000
 OVERLAP_NS = 2_000_000_000
-"""How long datagrams under the previous key are still opened after the peer has renewed its key."""
+"""How long datagrams with the previous key are accepted after the peer has renewed its key."""
 
 
 class Forged(Exception):
-    """The datagram is not sealed with the key of its epoch: it is forged, or damaged in transit."""
+    """Authentication failed: the datagram was forged or damaged."""
 
 
 class OldKey(Exception):
-    """We do not hold the key of the datagram's epoch: it has expired, or is more than one ahead."""
+    """The key of the datagram's epoch has expired or is more than one epoch ahead."""
 
 
 class Cipher(Protocol):
@@ -44,13 +44,13 @@ class Cipher(Protocol):
     """Number of bytes that `seal` adds."""
 
     def next_epoch(self, now: int) -> int:
-        """Key epoch of the next datagram to be sealed; renews the key when that is due."""
+        """Returns the key epoch of the next datagram. Renews the key if that is due."""
 
     def seal(self, number: int, header: bytes, body: bytes) -> bytes:
-        """The body in the form in which it is sent."""
+        """Encrypts the body of a datagram."""
 
     def open(self, now: int, epoch: int, number: int, header: bytes, body: bytes) -> bytes:
-        """The body in the clear. Raises Forged or OldKey."""
+        """Decrypts the body of a datagram. Raises Forged or OldKey."""
 
 
 class Plain:
@@ -68,7 +68,7 @@ class Plain:
 
 
 class _ChaCha:
-    """One key of suite 1, in the form of an AesGcm."""
+    """A key of suite 1 with the interface of AesGcm."""
 
     def __init__(self, key: bytes) -> None:
         self._key = key
@@ -90,12 +90,12 @@ class Sealed:
     overhead = noise.TAG_SIZE
 
     def __init__(self, ours: bytes, theirs: bytes, now: int, suite: Suite = Suite.NOISE) -> None:
-        """`ours` seals what we send, `theirs` what the peer sends, from `now` on."""
+        """`ours` encrypts sent datagrams, `theirs` decrypts received ones."""
         key_of: type[_Key] = aes.AesGcm if suite is Suite.AES_GCM else _ChaCha
         self.suite = suite
         self._ours: _Key = key_of(ours)
         self._our_epoch = 0
-        self._sealed = 0  # datagrams under our present key
+        self._sealed = 0  # datagrams encrypted with the current key
         self._renewed_at = now
 
         self._theirs: _Key = key_of(theirs)

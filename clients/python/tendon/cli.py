@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The command line that all guests share, and run(), the main function of a program with one callback."""
+"""Command line shared by all clients, and run(), which implements a program with one callback."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ from .keys import read_key
 from .messages import Delays, DeviceReport, DeviceState, LinkReport, LinkStats, PeerReport, Role
 
 Watch = Callable[[DeviceState, LinkStats], None]
-"""An observer as a function: device state and the state of the link in, nothing out."""
+"""Callback of an observer."""
 
 
 def number(least: float = 0, most: float = math.inf) -> Callable[[str], float]:
-    """For add_argument(type=…): 0, or a number from `least` to `most`."""
+    """Type for add_argument: 0, or a number from `least` to `most`."""
 
     def parse(text: str) -> float:
         try:
@@ -43,7 +43,7 @@ def number(least: float = 0, most: float = math.inf) -> Callable[[str], float]:
 
 
 def at_least(least: float) -> Callable[[str], float]:
-    """For add_argument(type=…): a finite number from `least` on."""
+    """Type for add_argument: a finite number ≥ `least`."""
 
     def parse(text: str) -> float:
         try:
@@ -70,13 +70,13 @@ def _key(program: str, text: str) -> bytes:
     try:
         return read_key(text)
     except (OSError, ValueError) as error:
-        # argparse would leave with 2, as for wrong words.
+        # argparse would exit with status 2, which means wrong usage.
         raise SystemExit(f"{program}: {error}") from None
 
 
 def parser(name: str, purpose: str | None, rate_hz: float = 0) -> argparse.ArgumentParser:
-    """--server, --key, --device, --channel, --take-lease, --rate-hz, --duration-s, --json and --help.
-    Add the options of your program."""
+    """Returns a parser with --server, --key, --device, --channel, --take-lease, --rate-hz, --duration-s, --json and
+    --help. Add the options of your program."""
     example = f"Example: {name} --server 127.0.0.1:47100 --duration-s 10"
     line = argparse.ArgumentParser(name, description=purpose, epilog=example)
     line.add_argument(
@@ -118,21 +118,22 @@ def run(
     watch: Watch | None = None,
     on_silence: Callable[[int], object] | None = None,
 ) -> int:
-    """Runs a controller (`physics`) or an observer (`watch`) until it is told to stop: --duration-s, SIGINT or SIGTERM.
-    Then it says Bye. Returns an exit code:
+    """Runs a controller (`physics`) or an observer (`watch`) until --duration-s, SIGINT or SIGTERM, then sends a Bye.
+    Returns an exit code:
 
-        0   it has been connected to the server
-        1   it could not connect, or the server refused it for good
+        0   a session was open at least once
+        1   connecting failed, or the server refused permanently
 
-    stderr gets one sentence for each change of the connection, and the server's sentence when forces were late. stdout
-    gets only the callback's own output and, with --json, once a second the server's report on our forces,
-    {"report":{"number":1, …}}, or to an observer those on the device's loop and its engines, {"device":{"number":1, …}}
-    and {"peer":{"name":"wall", …}}, and the summary, {"summary":{"duration_s":…, …}}. Exceptions of the callback pass
-    through, after a Bye.
+    Prints one sentence to stderr for each change of the connection and a warning if forces were late. stdout
+    contains only the output of the callback and, with --json, once per second the server's report on the received
+    forces, {"report":{"number":1, …}}, or for an observer those on the loop of the device and its engines,
+    {"device":{"number":1, …}} and {"peer":{"name":"wall", …}}, and the summary, {"summary":{"duration_s":…, …}}.
+    Exceptions of the callback propagate after a Bye.
 
-    One engine may touch several devices of the server, as two hands hold one object: `physics` then has a function for
-    each, by the device's name. They are called one after the other and need no locks. Each device has a session of its
-    own, the options hold for each, and what --json prints names the device. 0 means that every session was open once.
+    One engine may serve several devices of the server, for example two hands that hold one object: `physics` then
+    maps each device name to a function. The functions are called sequentially and need no locks. Each device has
+    its own session with these options, and the output of --json contains the device name. Returns 0 if every
+    session was open at least once.
     """
     if (physics is None) == (watch is None):
         raise TypeError("run: expected physics or watch")
@@ -148,7 +149,7 @@ def run(
         with Client(options.server, config) as client:
             try:
                 reported: LinkReport | None = None
-                told: dict[int | None, DeviceReport | PeerReport] = {}  # by channel; None: of the device
+                told: dict[int | None, DeviceReport | PeerReport] = {}  # by channel; None: the device itself
                 for hand in client.states(options.duration_s or None, on_silence):
                     if options.json and client.report is not reported:
                         reported = client.report
@@ -160,7 +161,7 @@ def run(
                     elif watch is not None:
                         watch(hand, client.stats.link)
             except KeyboardInterrupt:
-                pass  # the way to stop it
+                pass  # the regular way to stop
             stats = client.stats
     except (RefusedForGood, OSError, ValueError) as error:
         log.error(error)
@@ -198,7 +199,7 @@ def _run_several(options: argparse.Namespace, physics: Mapping[str, Physics]) ->
 
 
 async def _touch_several(options: argparse.Namespace, physics: Mapping[str, Physics]) -> dict[str, Stats]:
-    """Until --duration-s, SIGINT or SIGTERM, or an exception of one of them."""
+    """Runs until --duration-s, SIGINT or SIGTERM, or an exception of a callback."""
 
     async def touch(device: str, client: aio.Client) -> None:
         reported: LinkReport | None = None
@@ -219,7 +220,7 @@ async def _touch_several(options: argparse.Namespace, physics: Mapping[str, Phys
         try:
             await asyncio.gather(*tasks)
         except asyncio.CancelledError:
-            pass  # the way to stop it
+            pass  # the regular way to stop
         finally:
             for task in tasks:
                 task.cancel()
@@ -228,7 +229,7 @@ async def _touch_several(options: argparse.Namespace, physics: Mapping[str, Phys
 
 
 def _print_report(report: LinkReport | None, device: str = "") -> None:
-    if report is not None:  # None: of a new session
+    if report is not None:  # None: a new session
         words = ({"device": device} if device else {}) | _in_words(report)
         print(json.dumps({"report": words}, separators=(",", ":")), flush=True)
 
@@ -236,7 +237,7 @@ def _print_report(report: LinkReport | None, device: str = "") -> None:
 def _print_diagnoses(
     device: DeviceReport | None, peers: dict[int, PeerReport], told: dict[int | None, DeviceReport | PeerReport]
 ) -> None:
-    """Those that are not in `told` yet."""
+    """Prints the reports that are not in `told`."""
     if device is not None and told.get(None) is not device:
         told[None] = device
         words: dict[str, object] = {

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The blocking client: one thread, which waits for states."""
+"""The blocking client."""
 
 from __future__ import annotations
 
@@ -14,23 +14,23 @@ from .guest import AnyClient
 from .messages import NEVER, DeviceState, Touch
 
 Physics = Callable[[DeviceState], Union[Touch, Sequence[float], None]]
-"""The physics engine as a function: device state in, force (and stiffness) out. None: it knows none, and nothing is sent."""
+"""The physics engine as a function from device state to force (and stiffness). If it returns None, nothing is sent."""
 
 
 class Client(AnyClient):
-    """A guest at a Tendon server:
+    """A client of a Tendon server:
 
         with Client("127.0.0.1:47100", Config(name="spring")) as client:
             client.drive(lambda hand: [-500 * x for x in hand.position])
 
-    or, with the loop in your hands,
+    or, with your own loop,
 
             for hand in client.states():
                 client.send(hand, force)
 
-    The server may start later or be restarted: the client reconnects, with a back-off, and logs what
-    happens ("tendon" of `logging`). It keeps the session alive only while it is asked for states: the server
-    takes an engine that computes for 2 s between two states for dead. (`tendon.aio` has no such limit.)
+    The client reconnects if the server starts later or is restarted, and logs changes of the connection to the
+    logger "tendon". It keeps the session alive only while states are requested: the server closes the session if
+    an engine computes for 2 s between two states. `tendon.aio` does not have this limit.
     """
 
     def states(
@@ -39,10 +39,10 @@ class Client(AnyClient):
         on_silence: Callable[[int], object] | None = None,
         silence_s: float = 0.01,
     ) -> Iterator[DeviceState]:
-        """The newest state, at Config.rate_hz or as soon after as there is a new one; older ones are skipped.
-        Ends after `duration_s`, or never. `on_silence(now)` is called whenever `silence_s` has passed without a state
-        to hand out, also before the first, with time.monotonic_ns(): what must not go on without a hand stops there.
-        Raises RefusedForGood, and whatever `on_silence` raises."""
+        """Yields the newest state, at Config.rate_hz or as soon as a new one is available; older states are skipped.
+        Ends after `duration_s`, or never. Calls `on_silence` with time.monotonic_ns() when no state has arrived
+        for `silence_s`, also before the first state. Stop anything there that must not continue without an
+        operator. Raises RefusedForGood, and exceptions of `on_silence`."""
         expect(0.001 <= silence_s <= 10, "silence_s", silence_s, "0.001 to 10")
         guest, core = self._guest, self._guest.core
         silence_ns = NEVER if on_silence is None else silence_s * 1e9
@@ -53,7 +53,7 @@ class Client(AnyClient):
             now = guest.take(now)
             state = core.next_state(now)
             if state is not None:
-                yield state  # is answered before anything else is done
+                yield state  # the caller answers before the client does anything else
                 guest.tend(time.monotonic_ns())
             else:
                 guest.tend(now)
@@ -74,13 +74,13 @@ class Client(AnyClient):
         on_silence: Callable[[int], object] | None = None,
         silence_s: float = 0.01,
     ) -> None:
-        """Answers every state with the result of `physics`; the rest as for states(). Raises RefusedForGood, and
-        whatever `physics` raises."""
+        """Answers each state with the result of `physics`. The other arguments are those of states(). Raises
+        RefusedForGood, and exceptions of `physics`."""
         for hand in self.states(duration_s, on_silence, silence_s):
             self.answer(hand, physics(hand))
 
     def close(self) -> None:
-        """Says Bye, so that the server need not wait for a timeout."""
+        """Sends a Bye, so that the server does not have to wait for a timeout."""
         self._guest.end(time.monotonic_ns())
 
     def __enter__(self) -> Client:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The configuration and the statistics of a guest."""
+"""Configuration and statistics of a client."""
 
 from __future__ import annotations
 
@@ -20,62 +20,61 @@ MAX_RATE_HZ = 1e5
 
 @dataclass(frozen=True, kw_only=True)
 class Config:
-    """How a guest behaves. Raises ValueError "FIELD = VALUE: expected …" when a value is impossible."""
+    """Configuration of a client. Raises ValueError "FIELD = VALUE: expected …" if a value is invalid."""
 
     name: str = "guest"
-    """For the server's log; at most 64 bytes."""
+    """For the log of the server; at most 64 bytes."""
     role: Role = Role.CONTROLLER
-    """A controller sees states and sends forces, one per channel; an observer looks on."""
+    """A controller receives states and sends forces, one per channel. An observer only receives."""
     device: str = ""
-    """Name of the device, on a server with several; empty: the first one. At most 24 bytes."""
+    """Name of the device. Empty: the first one of the server. At most 24 bytes."""
     channel: str = ""
-    """Name of the device's channel, likewise."""
+    """Name of the channel of the device. Empty: the first one. At most 24 bytes."""
     take_lease: bool = False
-    """When another controller holds the channel's lease: keep asking until we have it. We ask again when the server
-    says that the lease may be over."""
+    """If another controller holds the lease of the channel, keep asking for it. The client asks again when the server
+    reports that the lease may have ended."""
     key: bytes | None = field(default=None, repr=False)
-    """32 bytes that the server knows too (`read_key`): all is sealed. None: plain, which servers accept on loopback
-    only."""
+    """32 bytes shared with the server (`read_key`). With a key, all traffic is encrypted. Without a key, servers
+    accept only local clients."""
     suites: tuple[Suite, ...] = usable_suites()
-    """With a key: by which of them the session may be sealed; the server chooses."""
+    """Cipher suites offered for an encrypted session. The server selects one."""
     rate_hz: float = 0
-    """States handed out per second: at multiples of 1/rate_hz, or as soon after as there is a new one; after
-    a delay of a whole period the grid starts anew, it never catches up. 0 = every new state, once."""
+    """States returned per second, at multiples of 1/rate_hz or as soon as a new one is available after that. After a
+    delay of a full period, the schedule restarts; missed calls are not made up. 0: every new state."""
     state_hz: int = 0
-    """States per second to ask the server for; 0 = what the server gives by itself."""
+    """States per second to request from the server; 0: the default of the server."""
     valid_for_s: float = 0
-    """How long the server may take a force as fresh, counted from its arrival; at most 10. 0 = derived from
-    the period T at which forces really leave, that is the asked one or, when the physics is slower, the time
-    between the states of the last two forces:
+    """How long after its arrival the server may use a force; at most 10 s. 0: derived from the period T between
+    forces, which is the requested period or, if the engine is slower, the time between the states that the last
+    two forces answer:
 
-        T         = max(1 / rate_hz, min(Δtick / loop_hz, 0.1))      with rate_hz = 0: the second term
+        T         = max(1 / rate_hz, min(Δtick / loop_hz, 0.1))      if rate_hz = 0: the second term
         valid_for = max(3 T, 0.02)                           with a deadband: T ≥ its longest silence
     """
     deadband: ForceDeadband | None = None
-    """A force that a hand cannot tell from the last one sent is not sent. None: every force is sent."""
+    """Omit forces that a human cannot distinguish from the last one sent. None: every force is sent."""
     state_deadband: SetStateDeadband | None = None
-    """The server leaves out states that we can predict. With rate_hz = r, states are handed out at multiples of 1/r as
-    predicted for that instant, tick and sampling time included. No tick comes twice, none is older than the one before,
-    and nothing is predicted for longer than max_silence_us. With rate_hz = 0, only the states that come are handed out.
-    None: we ask for every state."""
+    """The server omits states that the client can predict. If rate_hz = r > 0, states are returned at multiples of
+    1/r as predicted for that time, including tick and sampling time. Ticks always increase. States are predicted
+    for at most max_silence_us. If rate_hz = 0, only received states are returned. None: all states are requested."""
     diagnostics: bool = False
-    """For an observer: ask for the forces that the engines want (`DeviceState.force_wanted`), and once a second for
-    reports on the device's loop and its engines. A server that does not know this feature leaves them out."""
+    """For observers: requests the forces of the engines before limiting (`DeviceState.force_wanted`), and reports on
+    the loop of the device and its engines once per second. Servers without this feature omit them."""
     joints: bool = False
-    """Ask for the joints of the device (`DeviceState.joints`, `HandleDescription.joints`): 16 bytes each in every
+    """Requests the joints of the device (`DeviceState.joints`, `HandleDescription.joints`): 16 bytes per joint and
     state."""
     outputs: bool = False
-    """Ask for the outputs of the device (`HandleDescription.outputs`: lamps, vibration), to set them with
+    """Requests access to the outputs of the device (`HandleDescription.outputs`: lamps, vibration). Required for
     `set_output`."""
     ways: tuple[str, ...] = ()
-    """Names of the ways in which this engine answers, which `Touch.way` counts from 1: observers are told, and a
-    recording holds, by which a force was made. At most 8, each of 1 to 24 bytes, no two alike."""
+    """Names of the methods with which this engine computes forces. `Touch.way` is an index into this list, starting
+    at 1. Observers and recordings receive the names. At most 8 unique names, each of 1 to 24 bytes."""
     patience_s: float = 2.0
-    """How long one attempt waits for an answer to its Hellos."""
+    """How long an attempt waits for an answer."""
     retry_min_s: float = 0.1
-    """First wait before the next attempt; then twice as long each time …"""
+    """Wait before the first retry. It doubles with each attempt."""
     retry_max_s: float = 2.0
-    """… up to this. The first state of a session resets it."""
+    """Upper limit of the wait. The first state of a session resets it."""
 
     def __post_init__(self) -> None:
         def expect_at_most(most: int, text: str, field: str) -> None:
@@ -108,28 +107,28 @@ class Config:
 
 
 class Phase(Enum):
-    GREETING = "greeting"  # an attempt is under way
-    OPEN = "open"  # states come in, forces go out
-    UNANSWERED = "unanswered"  # nobody answered; waiting for the next attempt
-    REFUSED = "refused"  # the server said no; waiting for the next attempt
-    LOST = "lost"  # the session has ended; waiting for the next attempt
-    STOPPED = "stopped"  # stop() was called, or another program has our place (Code.REPLACED); for good
+    GREETING = "greeting"  # waiting for an answer to the handshake
+    OPEN = "open"  # session open
+    UNANSWERED = "unanswered"  # the server did not answer; waiting before the next attempt
+    REFUSED = "refused"  # the server refused the client; waiting before the next attempt
+    LOST = "lost"  # the session ended; waiting before the next attempt
+    STOPPED = "stopped"  # final: stop() was called, or another program replaced this client (Code.REPLACED)
 
 
 @dataclass
 class Stats:
     phase: Phase = Phase.GREETING
-    code: Code = Code.OK  # why the last attempt or session ended: the server's words where it had any
+    code: Code = Code.OK  # why the last attempt or session ended, with the message of the server
     reason: str = ""
-    link: LinkStats = field(default_factory=LinkStats)  # of the present session, or of the last one
+    link: LinkStats = field(default_factory=LinkStats)  # of the current or the last session
     attempts: int = 0
-    sessions: int = 0  # of these, answered with a Welcome
-    states: int = 0  # states that came in
-    states_foretold: int = 0  # predicted and handed out
-    states_skipped: int = 0  # states that came in and were replaced by a newer one before they were due
-    forces: int = 0  # forces sent
-    forces_unusable: int = 0  # forces not sent: not finite, out of bounds, or to a state that did not come
-    unusable: str = ""  # what was wrong with the newest of them; empty: none
-    left_out: str = ""  # what of the present session's answers is not sent, and why; empty: nothing
-    forces_alike: int = 0  # forces not sent: a hand could not tell them from the one before
-    lease_lost_to: str = ""  # name of the client that has taken the channel from us; empty: nobody
+    sessions: int = 0  # attempts that the server accepted
+    states: int = 0  # received states
+    states_foretold: int = 0  # predicted states that were returned
+    states_skipped: int = 0  # received states that a newer one replaced before they were due
+    forces: int = 0
+    forces_unusable: int = 0  # forces not sent: not finite, out of bounds, or for an unknown state
+    unusable: str = ""  # reason for the newest unusable force; empty: none
+    left_out: str = ""  # which part of this session's forces is not sent, and why; empty: none
+    forces_alike: int = 0  # forces not sent because they are within the deadband
+    lease_lost_to: str = ""  # name of the client that took over the channel; empty: none

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Deadbands drop forces that a hand cannot tell apart, and states that their receiver can predict (SESSION.md)."""
+"""Deadbands that omit indistinguishable forces and predictable states (SESSION.md)."""
 
 from __future__ import annotations
 
@@ -13,15 +13,16 @@ from .messages import ZERO, DeviceState, Quat, SetStateDeadband, Vec3
 
 @dataclass(frozen=True, kw_only=True)
 class ForceDeadband:
-    """Leaves out a force, with its torque and grip force, unless it differs from the last one sent by more than max(share · its norm, floor), or that one was
-    sent `longest_silence_s` ago (Weber's law; Hinterseer et al., IEEE TSP 56(2), 2008)."""
+    """Omits a force, with its torque and grip force, unless it differs from the last one sent by more than max(share
+    · its norm, floor), or that one was sent `longest_silence_s` ago (Weber's law; Hinterseer et al., IEEE TSP
+    56(2), 2008)."""
 
     share: float = 0.10
-    """0 … 1; the just noticeable difference of force is 7 to 15 %."""
+    """0 … 1. The just noticeable difference of force is 7 to 15 %."""
     floor: float = 0.05
-    """N: a smaller change is left out until the longest silence."""
+    """N. Smaller changes are omitted until the longest silence."""
     longest_silence_s: float = 0.02
-    """Bounds how long the device renders an old force after a loss."""
+    """Limits how long the device renders an old force after a packet loss."""
 
     def __post_init__(self) -> None:
         expect(0 <= self.share <= 1, "deadband.share", self.share, "0 to 1")
@@ -30,11 +31,11 @@ class ForceDeadband:
 
 
 HANDLE_LEVER = 0.05
-"""m, from the middle of a handle to its end: it makes the floor of a force (N) that of a torque (N·m)."""
+"""m, from the center to the end of a handle. Converts the floor of a force (N) to that of a torque (N·m)."""
 
 
 class Deadband:
-    """The deadband of forces in one session, with their torques and grip forces."""
+    """The force deadband of one session, including torques and grip forces."""
 
     def __init__(self, config: ForceDeadband) -> None:
         self._config = config
@@ -42,7 +43,8 @@ class Deadband:
         self._sent: tuple[int, Vec3, Vec3 | None, float | None] | None = None
 
     def passes(self, now: int, force: Vec3, torque: Vec3 | None = None, grip_force: float | None = None) -> bool:
-        """Whether one of the three is worth sending, or has come or gone; if so all count as sent."""
+        """Returns whether one of the three values must be sent, or has appeared or disappeared. If so, all are
+        recorded as sent."""
         if self._sent is not None and now - self._sent[0] < self._silence_ns:
             _, force_before, torque_before, grip_before = self._sent
             same_parts = (torque is None, grip_force is None) == (torque_before is None, grip_before is None)
@@ -62,8 +64,8 @@ class Deadband:
 
 
 def foretell(sent: DeviceState, later_ns: int, haptic_period_ns: int) -> DeviceState:
-    """The device `later_ns` after `sent` at constant velocities of position, rotation and gripper, in whole haptic
-    periods."""
+    """Predicts the device state `later_ns` after `sent` with constant velocities of position, rotation and gripper,
+    in whole haptic periods."""
     periods = max(later_ns // haptic_period_ns, 0)
     time_s = periods * haptic_period_ns / 1e9
     x, y, z = (at + speed * time_s for at, speed in zip(sent.position, sent.velocity))
@@ -83,7 +85,7 @@ def foretell(sent: DeviceState, later_ns: int, haptic_period_ns: int) -> DeviceS
 
 
 def _turned(q: Quat, angular_velocity: Vec3, time_s: float) -> Quat:
-    """q, turned on about the axis of the velocity, and of length 1."""
+    """Rotates q with a constant angular velocity and normalizes it."""
     speed = hypot(*angular_velocity)
     half = speed * time_s / 2
     s = sin(half) / speed if speed > 0 else 0.0
@@ -100,7 +102,7 @@ def _turned(q: Quat, angular_velocity: Vec3, time_s: float) -> Quat:
 
 
 def check_state_deadband(asked: SetStateDeadband) -> None:
-    """Raises ValueError when no server grants this deadband."""
+    """Raises ValueError if no server would accept this deadband."""
     if asked.max_silence_us == 0:
         return
     expect(0 <= asked.share <= 0.5, "state_deadband.share", asked.share, "0 to 0.5")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Writes down what a robot that follows a hand did, for robot learning (clients/dataset).
+"""Records the motion of a robot that follows a hand, for robot learning (clients/dataset).
 
     with Demonstration("press.jsonl") as demonstration:
         def step(hand):
@@ -9,8 +9,8 @@
             demonstration.add(hand, pose, target, follow.phase, contact)
             ...
 
-The server's recording knows the hand, and not the robot. This file knows the robot: where its tool was when a state of
-the hand came, and where the tool was to go then.
+The recording of the server contains the hand but not the robot. This file contains the pose of the tool when a
+state of the hand arrived, and its target.
 """
 
 from __future__ import annotations
@@ -29,17 +29,18 @@ VERSION = 1
 
 
 class Demonstration:
-    """A file of JSON lines. The first names its kind and version; then one for each state of the hand:
+    """A file of JSON lines. The first line contains its kind and version, and each further line one state of the
+    hand:
 
-        tick          of the state: by it the line meets the hand's step in the server's recording
-        sampled_ns    when the hand was sampled, server clock
+        tick          of the state; matches the step in the server's recording
+        sampled_ns    sampling time of the hand, server clock
         phase         "engaged", "clutched" …, as Follower.phase
-        position_m    of the tool, robot's frame
-        target_m      where it is to go; null: the robot holds its place
-        contact_n     of the surroundings on the tool; absent: not measured
+        position_m    of the tool, robot frame
+        target_m      of the tool; null: the robot holds its pose
+        contact_n     force on the tool; absent: not measured
 
-    A state with a pose, target or contact that is not finite is left out. Nothing is overwritten: FileExistsError.
-    Lines go through a buffer, so that `add` seldom waits for the disk.
+    States with a pose, target or contact that is not finite are omitted. Existing files are not overwritten
+    (FileExistsError). Lines are buffered, so that `add` rarely waits for the disk.
     """
 
     def __init__(self, path: str | PathLike[str]) -> None:
@@ -57,7 +58,7 @@ class Demonstration:
     def add(
         self, hand: DeviceState, pose: Pose, target: Pose | None, phase: Following, contact: ToolContact | None = None
     ) -> None:
-        """`pose`: what Follower.target was given for `hand`; `target`: what it returned."""
+        """`pose` is the argument of Follower.target for `hand`, and `target` its result."""
         line: dict[str, object] = {"tick": hand.tick, "sampled_ns": hand.sampled_ns, "phase": phase.name.lower()}
         line["position_m"] = _three(pose.position)
         line["target_m"] = None if target is None else _three(target.position)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The one form in which impossible values are refused."""
+"""Error messages for invalid values."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A guest at a Tendon server, sans I/O: says Hello, keeps the session alive, hands out the newest device
-state, sends the force that comes back, and begins again when the server is gone.
+"""A client of a Tendon server, sans I/O: it opens a session and keeps it alive, returns the newest device state,
+sends the force that answers it, and reconnects after the session ends.
 """
 
 from __future__ import annotations
@@ -61,71 +61,72 @@ from .messages import (
 from .noise import KEY_SIZE
 from .session import Closed, Session
 
-# See Config.valid_for_s.
+# The numbers are explained at Config.valid_for_s.
 _VALID_PERIODS = 3
 _MIN_VALID_FOR_NS = 20_000_000
 _MAX_OBSERVED_PERIOD_NS = 100_000_000
 
 _ASK_LEASE_AGAIN_NS = 50_000_000
-"""Shortest time between two requests for a lease that may be over: its holder renews it all the time."""
+"""Minimum time between two lease requests. The current holder renews its lease continuously."""
 
 
 _WAITING = (Phase.UNANSWERED, Phase.REFUSED, Phase.LOST)
 
 
 class ForceClient:
-    """Use: `receive` what arrives; then, and whenever `next_turn()` is due, `tick`, and send what
-    `next_datagram` gives until it is None. When `next_state` gives a state, `send` the answer of the physics.
+    """Call `receive` for each datagram that arrives. Then, and whenever `next_turn()` is due, call `tick` and send
+    the results of `next_datagram` until it returns None. When `next_state` returns a state, `send` the answer of
+    the engine.
 
-    Instants are nanoseconds of a monotonic clock; `now` never goes back.
+    Times are nanoseconds of a monotonic clock.
     """
 
     def __init__(self, config: Config, now: int, random: Callable[[int], bytes] = os.urandom) -> None:
-        """`random(n)`: n bytes from a cryptographic source. The first Hello is due at once."""
+        """`random(n)` must return n cryptographically secure bytes. The first Hello is due immediately."""
         self.welcome: Welcome | None = None
-        """The server's description of itself and its device at the opening of the newest session."""
+        """Description of the server in the newest session."""
         self.description: DeviceDescription | None = None
-        """Description of the device, once we have named a device or a channel and the server has answered."""
+        """Description of the device. None until it arrives; it is only requested if a device or channel is named."""
         self.handle: HandleDescription | None = None
-        """What its handle is and can do, once the server has answered; None for good when it does not know that."""
+        """Description of the handle. None until it arrives, and always if the server does not support it."""
         self.holds = False
-        """Whether the channel takes our forces. While it does not, a controller is handed no states."""
+        """Whether this client holds the channel. Otherwise a controller receives no states."""
         self.report: LinkReport | None = None
-        """The server's newest report on our forces in the present session; one comes each second while forces come."""
+        """Newest report on the received forces in this session. Sent once per second while forces arrive."""
         self.device_report: DeviceReport | None = None
-        """With Config.diagnostics, the newest report on the device's loop in the present session."""
+        """Newest report on the loop of the device in this session. Requires Config.diagnostics."""
         self.peer_reports: dict[int, PeerReport] = {}
-        """With Config.diagnostics, the newest report on the engine of each channel, even one that has gone."""
+        """Newest report on the engine of each channel, also after it has left. Requires Config.diagnostics."""
         self.config = config
         self._random = random
         self._period = _ns(1 / config.rate_hz) if config.rate_hz > 0 else 0
         self._stats = Stats()
         self._handshake: ClientHandshake | None = None
         self._session: Session | None = None
-        self._ended: Session | None = None  # the previous session while it still has a Bye to send
-        self._place = Grant(config.role)  # the numbers of our device and channel
-        self._asked_lease: int | None = None  # the request that waits for its answer
-        self._ask_lease: Instant = NEVER  # when to ask (again)
-        self._give_up = now  # end of the present attempt's patience
-        self._retry = now  # when the next attempt begins
+        self._ended: Session | None = None  # the previous session while its Bye is not sent
+        self._place = Grant(config.role)  # indices of the device and channel
+        self._asked_lease: int | None = None  # id of the pending lease request
+        self._ask_lease: Instant = NEVER  # time of the next lease request
+        self._give_up = now  # timeout of the current attempt
+        self._retry = now  # start of the next attempt
         self._back_off = _ns(config.retry_min_s)  # wait before the attempt after that
-        self._unseen: DeviceState | None = None  # newest state that was not handed out
-        self._pressed = 0  # buttons held in any of the states since the one that was handed out
-        self._newest: DeviceState | None = None  # newest state, handed out or not
+        self._unseen: DeviceState | None = None  # newest state that was not returned
+        self._pressed = 0  # buttons pressed in any state since the last returned one
+        self._newest: DeviceState | None = None  # newest state, returned or not
         self._newest_arrived = now
-        self._seen_tick = 0  # newest tick handed out
-        self._deadband_request: int | None = None  # the request for the deadband of states
-        self._foretell = False  # the server leaves states out
+        self._seen_tick = 0  # newest returned tick
+        self._deadband_request: int | None = None  # id of the request for the state deadband
+        self._foretell = False  # the server omits predictable states
         self._deadband: Deadband | None = None
         self._next_call = now
-        self._sequence = 0  # sequence number of the newest force
-        self._answered_tick = 0  # the tick it answers
+        self._sequence = 0  # of the newest force
+        self._answered_tick = 0  # state tick that the newest force answers
         self._greet(now)
 
     # ---- In ----
 
     def receive(self, now: int, datagram: bytes) -> None:
-        """Takes any bytes from the server's address."""
+        """Handles a datagram from the server's address, which may contain arbitrary bytes."""
         if self._handshake is not None:
             self._handshake.receive(now, datagram)
             self._settle(now)
@@ -134,7 +135,7 @@ class ForceClient:
             self._take_events(now)
 
     def tick(self, now: int) -> None:
-        """Does everything that is due at `now`."""
+        """Does all the work that is due at `now`."""
         if self._session is not None:
             self._session.tick(now)
             self._take_events(now)
@@ -147,13 +148,13 @@ class ForceClient:
             self._greet(now)
 
     def _objection(self, hand: DeviceState, answer: Answer) -> str:
-        """Why an answer cannot be used; empty when it can."""
+        """Returns why an answer is unusable, or an empty string."""
         if not 0 < hand.tick <= max(self._seen_tick, self._newest.tick if self._newest else 0):
             return f"it answers tick {hand.tick}, which has not come"
         return answer.objection()
 
     def _of_handle(self, hand: DeviceState, answer: Answer) -> tuple[Torque | None, float | None]:
-        """Torque and grip force of an answer, as far as they can be sent."""
+        """Returns the torque and grip force of an answer if the server and the device support them."""
         if not answer.asks_for_handle:
             return None, None
         if self.welcome is None or FEATURE_HANDLE not in self.welcome.features:
@@ -164,12 +165,13 @@ class ForceClient:
         return answer.turning(hand.turning), answer.grip_force
 
     def send(self, hand: DeviceState, touch: Touch) -> None:
-        """Answers a state. An answer with a number that is not finite or out of bounds, or to a state that did not
-        come in this session, is counted and not sent (`stats.unusable` says why); the server then treats this client
-        as late. While another client holds the channel, nothing is sent. Raises ValueError when an answer has a wrong
-        shape, PermissionError for an observer.
+        """Answers a state. Answers that are not finite or out of bounds, or to a state of another session, are
+        counted and not sent (`stats.unusable` contains the reason); the server then treats this client as late.
+        While another client holds the channel, nothing is sent. Raises ValueError if the answer has a wrong shape,
+        PermissionError for an observer.
 
-        Take a fresh `now` before the next call: the datagram's time stamp must not be older than the physics' work.
+        Read the clock again before the next call, so that the time stamp of the datagram does not include the
+        computation.
         """
         if self.config.role is not Role.CONTROLLER:
             raise PermissionError("an observer sends no force: role=Role.CONTROLLER")
@@ -218,41 +220,42 @@ class ForceClient:
         return answer.way if self.welcome and FEATURE_WAYS in self.welcome.features else 0
 
     def rearm(self) -> bool:
-        """Asks the server to clear a latched fault, and to take a disarm back. False when there is no session,
-        or too many requests are open. Controllers only: the server refuses an observer."""
+        """Asks the server to clear a latched fault and to undo a disarm. Only for controllers. Returns False if there
+        is no session or if too many requests are pending."""
         return self._session is not None and self._session.request(Rearm(self._place.device)) is not None
 
     def disarm(self) -> bool:
-        """Asks the server for no force, from the device's next step on, until somebody rearms. False as for rearm()."""
+        """Asks the server to disable all forces until a client rearms. Returns False as rearm() does."""
         return self._session is not None and self._session.request(Disarm(self._place.device)) is not None
 
     def engage(self) -> bool:
-        """The operator's act of a coupling, at the leader's server ([teleoperation]). False as for rearm()."""
+        """Engages a coupling ([teleoperation]), at the server of the leader. Returns False as rearm() does."""
         return self._session is not None and self._session.request(Engage(self._place.device)) is not None
 
     def disengage(self) -> bool:
-        """The end of that, at either end's server. False as for rearm()."""
+        """Disengages a coupling, at either server. Returns False as rearm() does."""
         return self._session is not None and self._session.request(Disengage(self._place.device)) is not None
 
     def set_scale(self, position_scale: float, force_scale: float) -> bool:
-        """The scales of the coupling from now on, at the leader's server, while it is not engaged or its clutch is
-        held. False as for rearm(); ValueError beyond 0.01 … 100."""
+        """Sets the scales of the coupling, at the server of the leader, while it is not engaged or its clutch is
+        held. Returns False as rearm() does. Raises ValueError outside of 0.01 … 100."""
         wanted = SetScale(self._place.device, position_scale, force_scale)
         if not is_request(wanted):
             raise ValueError(f"set_scale({position_scale}, {force_scale}): expected two scales, each 0.01 … 100")
         return self._session is not None and self._session.request(wanted) is not None
 
     def set_share(self, channel: int, share: float) -> bool:
-        """How much the leader of that channel of our device counts among several, at the follower's server.
-        False as for rearm(); ValueError when it is out of its bounds."""
+        """Sets the weight of the leader on that channel if several leaders share one follower, at the follower's
+        server. Returns False as rearm() does. Raises ValueError if it is out of bounds."""
         wanted = SetShare(self._place.device, channel, share)
         if not is_request(wanted):
             raise ValueError(f"set_share({channel}, {share}): expected a channel 0 … 7 and a share 0 … 1")
         return self._session is not None and self._session.request(wanted) is not None
 
     def set_output(self, output: int, setting: LampColour | Vibration) -> bool:
-        """Sets a lamp of the device, or starts a pulse of vibration (`handle.outputs`). For whoever `holds`. False as
-        for rearm(), and without `Config.outputs`; ValueError when the setting is out of its bounds."""
+        """Sets an indicator lamp or starts a vibration pulse (`handle.outputs`). Requires the channel (`holds`).
+        Returns False as rearm() does, and without `Config.outputs`. Raises ValueError if `setting` is out of
+        bounds."""
         wanted = SetOutput(self._place.device, output, setting)
         if not is_request(wanted):
             raise ValueError(
@@ -267,8 +270,8 @@ class ForceClient:
         )
 
     def take_lease(self) -> bool:
-        """Asks for the channel's lease, and once more when it is lost before the answer; `holds` tells the result.
-        False as for rearm()."""
+        """Requests the lease of the channel. The request is repeated if the lease is lost before the answer arrives.
+        `holds` contains the result. Returns False as rearm() does."""
         wanted = TakeLease(self._place.device, self._place.channel)
         asked = None if self._session is None else self._session.request(wanted)
         if asked is None:
@@ -277,17 +280,18 @@ class ForceClient:
         return True
 
     def give_lease(self) -> bool:
-        """Gives the lease up, and stops asking for it. False as for rearm()."""
+        """Releases the lease and stops requesting it. Returns False as rearm() does."""
         self._ask_lease = NEVER
         given = GiveLease(self._place.device, self._place.channel)
         if self._session is None or self._session.request(given) is None:
             return False
-        self._asked_lease = None  # any answer is older than this release
+        self._asked_lease = None  # a later answer would be outdated
         self.holds = False
         return True
 
     def stop(self, now: int) -> None:
-        """Ends for good. `next_datagram` then gives the Byes, so that the server need not wait for a timeout."""
+        """Stops permanently. `next_datagram` then returns the Byes, so that the server does not have to wait for a
+        timeout."""
         if self.phase is Phase.STOPPED:
             return
         if self._session is not None:
@@ -297,7 +301,7 @@ class ForceClient:
     # ---- Out ----
 
     def next_datagram(self, now: int) -> bytes | None:
-        """The next datagram to send; None = nothing to send now."""
+        """Returns the next datagram to send, or None."""
         if self._ended is not None:
             bye = self._ended.next_datagram(now)
             if bye is not None:
@@ -308,7 +312,7 @@ class ForceClient:
         return None if self._handshake is None else self._handshake.next_datagram(now)
 
     def next_state(self, now: int) -> DeviceState | None:
-        """The newest state, if it is due and was not handed out before."""
+        """Returns the newest state if it is due and was not returned before."""
         if now < self._next_call or self._waits_for_lease():
             return None
         state = self._foretold(now) if self._foretell else self._unseen
@@ -325,7 +329,7 @@ class ForceClient:
         return state
 
     def next_turn(self) -> Instant:
-        """When `tick` and `next_datagram` are due next at the latest."""
+        """Returns when `tick` and `next_datagram` must be called next."""
         if self._ended is not None:
             return self._ended.next_turn()
         if self._session is not None:
@@ -336,14 +340,15 @@ class ForceClient:
         return self._retry if self.phase in _WAITING else NEVER
 
     def next_state_due(self) -> Instant:
-        """When `next_state` gives a state; NEVER until another state has come in, or the channel is ours."""
+        """Returns when `next_state` will return a state, or NEVER while no new state is available or the channel is
+        not held."""
         if self._waits_for_lease():
             return NEVER
         if not self._foretell:
             return NEVER if self._unseen is None else self._next_call
         if self._newest is None:
             return NEVER
-        ahead = max(self._seen_tick + 1 - self._newest.tick, 0)  # the first tick that was not handed out
+        ahead = max(self._seen_tick + 1 - self._newest.tick, 0)  # the first tick that was not returned
         due = max(self._next_call, self._newest_arrived + ahead * self._haptic_period())
         return due if due - self._newest_arrived <= self._silence_ns() else NEVER
 
@@ -353,13 +358,13 @@ class ForceClient:
 
     @property
     def stats(self) -> Stats:
-        """A copy."""
+        """Returns a copy."""
         link = self._stats.link if self._session is None else self._session.stats
         return replace(self._stats, link=replace(link))
 
     @property
     def live_stats(self) -> Stats:
-        """The statistics themselves, to look at now and not to keep or change; their `link` is not up to date."""
+        """Returns the statistics without a copy. Do not keep or modify them. `link` is not up to date."""
         return self._stats
 
     # ---- Inside ----
@@ -393,7 +398,7 @@ class ForceClient:
         self._stats.attempts += 1
 
     def _settle(self, now: int) -> None:
-        """Acts on the server's answer once it has come."""
+        """Handles the answer of the server, if it has arrived."""
         outcome = None if self._handshake is None else self._handshake.outcome
         if outcome is None:
             return
@@ -428,7 +433,7 @@ class ForceClient:
         self._seen_tick = 0
         self.report = self.device_report = None
         self.peer_reports = {}
-        # This session has not received what another session was sent.
+        # The new session has not sent any force yet.
         self._deadband = Deadband(self.config.deadband) if self.config.deadband else None
         self._sequence = 0
         self._stats.phase = Phase.OPEN
@@ -454,7 +459,7 @@ class ForceClient:
                 self._stats.states += 1
                 self._stats.states_skipped += self._unseen is not None
                 self._unseen = self._newest = event
-                # A press of the time when the channel was not ours was another engine's.
+                # Another engine held the channel when the button was pressed.
                 self._pressed = event.buttons | (0 if self._waits_for_lease() else self._pressed)
                 self._newest_arrived = now
                 self._back_off = _ns(self.config.retry_min_s)
@@ -469,7 +474,7 @@ class ForceClient:
             elif isinstance(event, Control):
                 self._take_request(now, self._session, event)
             elif isinstance(event, Closed):
-                taken_over = event.code is Code.REPLACED  # two programs with one key would replace each other for ever
+                taken_over = event.code is Code.REPLACED  # reconnecting would start a cycle of replacements
                 self._end(now, Phase.STOPPED if taken_over else Phase.LOST, event.code, event.reason)
 
     def _take_answer(self, now: int, answer: ControlAck) -> None:
@@ -483,7 +488,7 @@ class ForceClient:
             return
         self._asked_lease = None
         self._ask_lease = NEVER
-        if answer.code is not Code.UNSUPPORTED:  # otherwise the server knows no leases
+        if answer.code is not Code.UNSUPPORTED:  # otherwise the server does not support leases
             self.holds = answer.code is Code.OK
         if self.holds:
             self._stats.lease_lost_to = ""
@@ -500,7 +505,7 @@ class ForceClient:
             return
         self.holds = False
         self._stats.lease_lost_to = lost.to
-        # A request still in flight may cross this message. One sent now is answered after it.
+        # A pending request may be older than this message, so send a new one.
         if self._asked_lease is not None and self.take_lease():
             return
         if self.config.take_lease:
@@ -513,12 +518,12 @@ class ForceClient:
         return 1000 * self.config.state_deadband.max_silence_us if self.config.state_deadband else 0
 
     def _foretold(self, now: int) -> DeviceState | None:
-        """The state predicted for now; None when nothing is new, or nothing has come for too long."""
+        """Returns the state predicted for `now`, or None if there is nothing new or the last state is too old."""
         newest, age = self._newest, now - self._newest_arrived
         if newest is None or age > self._silence_ns():
             return None
         state = foretell(newest, age, self._haptic_period())
-        if state.tick <= self._seen_tick:  # the state before it spent less time on its way
+        if state.tick <= self._seen_tick:  # the previous state had a shorter network delay
             return None
         self._stats.states_foretold += state.tick > newest.tick
         return state

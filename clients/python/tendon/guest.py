@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Shared by the blocking and the asyncio client: a ForceClient, its socket, and a log of what happens to it."""
+"""Base of the blocking and the asyncio client: a ForceClient with its socket and log messages."""
 
 from __future__ import annotations
 
@@ -34,8 +34,8 @@ log = logging.getLogger("tendon")
 
 
 def visible(text: str) -> str:
-    """Escapes the words of a peer for a log or a terminal, so that they cannot start a line or move the cursor: control
-    characters (C0, DEL, C1) become \\n, \\t or \\xNN."""
+    """Escapes control characters (C0, DEL, C1) in the text of a peer as \\n, \\t or \\xNN, so that it cannot start a
+    new line or move the cursor in a log or terminal."""
     known = {"\n": "\\n", "\t": "\\t"}
     return re.sub(r"[\x00-\x1f\x7f-\x9f]", lambda c: known.get(c[0], f"\\x{ord(c[0]):02x}"), text)
 
@@ -48,17 +48,17 @@ def _make_visible(record: logging.LogRecord) -> bool:
 log.addFilter(_make_visible)
 
 MAX_DATAGRAMS = 256
-"""Most datagrams taken from the socket in one turn: a flood must not keep us from sending. A 1 kHz server sends this
-many in a quarter of a second, the longest silence before it stops the device."""
+"""Maximum number of datagrams read in one turn, so that a flood cannot prevent sending. A server at 1 kHz sends 256
+datagrams in a quarter of a second, the longest silence before it stops the device."""
 
 _MAX_ERRORS = 64
-"""Most error reports passed over in search of one datagram: a flood of them must not keep us from sending either."""
+"""Maximum number of errors skipped when reading a datagram."""
 
 _KEEP_TRYING = (Code.BUSY, Code.SHUTDOWN)
 
 
 class RefusedForGood(ConnectionError):
-    """The server refuses, and another attempt would not change that."""
+    """The server refused the connection permanently."""
 
     def __init__(self, sentence: str, code: Code) -> None:
         super().__init__(visible(sentence))
@@ -66,7 +66,7 @@ class RefusedForGood(ConnectionError):
 
 
 def parse_address(text: str) -> tuple[str, int]:
-    """127.0.0.1:47100, [::1]:47100, name:47100. Raises ValueError."""
+    """Parses 127.0.0.1:47100, [::1]:47100 or name:47100. Raises ValueError."""
     host, colon, port = text.rpartition(":")
     bracketed = host.startswith("[") and host.endswith("]")
     if not colon or not port.isascii() or not port.isdigit() or not 0 < int(port) < 65536:
@@ -77,12 +77,12 @@ def parse_address(text: str) -> tuple[str, int]:
 
 
 _MAX_UNIX_PATH = 107
-"""Bytes; the system has room for no more in a socket's address."""
+"""Size limit of a socket address in bytes."""
 
 
 def unix_path(server: str) -> str | None:
-    """The file of "unix:/run/tendon.sock", a server's Unix socket on this machine; None for all else. Raises ValueError
-    for a path that no socket can have."""
+    """Returns the path of "unix:/run/tendon.sock", the Unix socket of a server on this machine, or None for other
+    names. Raises ValueError if the path is too long."""
     if not server.startswith("unix:"):
         return None
     path = server.removeprefix("unix:")
@@ -92,17 +92,17 @@ def unix_path(server: str) -> str | None:
 
 
 class Guest:
-    """`turn(now)` does everything that is due. Only one thread or event loop may use a guest at a time."""
+    """`turn(now)` does all the work that is due. Not thread-safe."""
 
     def __init__(self, server: str, config: Config, now: int, clock: Callable[[], int] = time.monotonic_ns) -> None:
-        """Raises ValueError when `server` is neither HOST:PORT nor unix:PATH, OSError when there is no such host or the system cannot
-        reach it. A host name is looked up here, which may wait, and again, in a thread of its own, before each further
-        attempt."""
+        """Raises ValueError if `server` is neither HOST:PORT nor unix:PATH, and OSError if the host is unknown or
+        unreachable. Resolves a host name, which may block. The name is resolved again, in a separate thread,
+        before each further attempt."""
         self.server = server
         self._place = _look_up(server)[0]
         self.socket = _connected(self.server, self._place)
         self.moved: Callable[[socket.socket, socket.socket], None] = lambda old, new: None
-        """Called when the socket has been replaced, before the old one is closed."""
+        """Called after the socket is replaced, before the old one is closed."""
         self._found: list[Place] = []
         self._waited = False
         self.core = ForceClient(config, now)
@@ -116,23 +116,23 @@ class Guest:
         self._seen_reason = ""
 
     def turn(self, now: int) -> None:
-        """Takes what has come in, does what is due, sends what is to be sent."""
+        """Receives, does the work that is due, and sends."""
         self.tend(self.take(now))
 
     def take(self, now: int) -> int:
-        """The first half of a turn: takes what has come in, and gives the time at which that was. A state that is waited
-        for is answered before the other half."""
+        """First half of a turn: receives, and returns the time. The newest state should be answered before the other
+        half."""
         for _ in range(MAX_DATAGRAMS):
             datagram = self._receive()
             if datagram is None:
                 break
-            # The datagram may have come since the turn began, so its time of arrival is taken now.
+            # The datagram may have arrived after the turn began.
             now = max(now, self.clock())
             self.core.receive(now, datagram)
         return now
 
     def tend(self, now: int) -> None:
-        """The other half."""
+        """Second half of a turn."""
         self.core.tick(now)
         self.flush(now)
         self._follow_the_name()
@@ -143,14 +143,14 @@ class Guest:
             try:
                 self.socket.send(datagram)
             except OSError:
-                pass  # the datagram counts as lost, as on the network
+                pass  # the datagram is lost
 
     def send(self, hand: DeviceState, touch: Touch | Sequence[float]) -> None:
-        """Answers a state: a force alone, or a Touch with the stiffness too."""
+        """Answers a state with a force or a Touch."""
         self.core.send(hand, touch if isinstance(touch, Touch) else Touch(touch))
 
     def end(self, now: int) -> None:
-        """Says Bye and closes the socket."""
+        """Sends a Bye and closes the socket."""
         self.core.stop(now)
         self.flush(now)
         self.socket.close()
@@ -165,8 +165,8 @@ class Guest:
             raise RefusedForGood(f"{self.server} has ended this: {stats.reason}", stats.code)
 
     def _follow_the_name(self) -> None:
-        """Between two attempts the name is looked up again: the server may have another address by now. Where nobody
-        answered at one address, the next one of the name is tried."""
+        """Resolves the name again between two attempts, because the address of the server may have changed. If the
+        current address did not answer, the next one is tried."""
         phase = self.core.phase
         waits = phase in (Phase.UNANSWERED, Phase.REFUSED, Phase.LOST)
         if waits and not self._waited and not _is_numeric(self.server):
@@ -189,13 +189,13 @@ class Guest:
             place = found[0]
         elif silent:
             place = found[(found.index(place) + 1) % len(found)]
-        # The same file may be another server's socket by now.
+        # The path of a Unix socket may belong to a new server.
         if place == self._place and unix_path(self.server) is None:
             return
         try:
             new = _connected(self.server, place)
         except OSError:
-            return  # the address cannot be reached: the present socket stays
+            return  # unreachable; keep the current socket
         old, self.socket, self._place = self.socket, new, place
         self.moved(old, new)
         old.close()
@@ -203,16 +203,16 @@ class Guest:
     def _receive(self) -> bytes | None:
         for _ in range(_MAX_ERRORS):
             try:
-                # One byte more than the largest datagram: one that is too large stays too large after the cut.
+                # One more byte than the limit, so that a datagram that is too large can be detected.
                 return self.socket.recv(limits.MAX_DATAGRAM + 1)
             except BlockingIOError:
                 return None
             except OSError:
-                pass  # an ICMP error: no server listens, or no route. Each error is reported once
+                pass  # an ICMP error: no server is listening, or no route
         return None
 
     def _say(self) -> None:
-        """Says what is new. Each turn asks, so what is not new costs comparisons only."""
+        """Logs changes. Called in each turn, so the common case only compares values."""
         report, stats = self.core.report, self.core.live_stats
         if report is not self._told and report is not None:
             self._told = report
@@ -246,23 +246,23 @@ class Guest:
 
 
 class AnyClient:
-    """Base of the blocking and the asyncio client: sends forces and requests, and tells what is known of the guest."""
+    """Base of the blocking and the asyncio client: sends forces and requests, and returns received descriptions."""
 
     def __init__(self, server: str, config: Config = Config()) -> None:
-        """`server`: HOST:PORT, HOST a name or an address. Raises ValueError or OSError, with the host's name, when
-        there is no such host; nobody need listen there yet."""
+        """`server` is HOST:PORT with a name or address as HOST. Raises ValueError or OSError if the host is unknown.
+        The server may start later."""
         self._guest = Guest(server, config, time.monotonic_ns())
-        self._first_none_ns: int | None = None  # on the server's clock
-        self._may_lack_return = True  # until a force has come, or the log has said so
+        self._first_none_ns: int | None = None  # in the server's clock
+        self._may_lack_return = True  # until a force was returned or the warning was logged
 
     def send(self, hand: DeviceState, touch: Touch | Sequence[float]) -> None:
-        """Sends the answer to a state at once: a force in N on the hand, or a Touch with the stiffness too."""
+        """Sends the answer to a state immediately: a force in N on the hand, or a Touch."""
         self._guest.send(hand, touch)
         self._guest.flush(time.monotonic_ns())
 
     def answer(self, hand: DeviceState, touch: Touch | Sequence[float] | None) -> None:
-        """Sends the force that an engine returned for this state. If it returned None, nothing is sent. If it only returned
-        None for a second, a warning is logged once, because its `return` statement may be missing."""
+        """Sends the result of an engine for this state, unless it is None. If the engine returns only None for one
+        second, a warning is logged once, because its `return` statement may be missing."""
         if touch is not None:
             self._may_lack_return = False
             self.send(hand, touch)
@@ -274,43 +274,43 @@ class AnyClient:
                 log.warning("the engine has returned None for 1 s, so no force is sent: is its `return` missing?")
 
     def rearm(self) -> bool:
-        """Asks the server to clear a latched fault of its device. False when there is no session to ask in."""
+        """Asks the server to clear a latched fault of its device. Returns False if there is no session."""
         return self._ask(self._guest.core.rearm)
 
     def disarm(self) -> bool:
-        """Asks the server for no force of its device until somebody rearms. False when there is no session."""
+        """Asks the server to disable all forces until a client rearms. Returns False if there is no session."""
         return self._ask(self._guest.core.disarm)
 
     def engage(self) -> bool:
-        """The operator's act of a coupling, at the leader's server. False when there is no session."""
+        """Engages a coupling, at the server of the leader. Returns False if there is no session."""
         return self._ask(self._guest.core.engage)
 
     def disengage(self) -> bool:
-        """The end of that, at either end's server. False when there is no session."""
+        """Disengages a coupling, at either server. Returns False if there is no session."""
         return self._ask(self._guest.core.disengage)
 
     def set_scale(self, position_scale: float, force_scale: float) -> bool:
-        """The scales of the coupling from now on, at the leader's server, while it is not engaged or its clutch is
-        held. False when there is no session."""
+        """Sets the scales of the coupling, at the server of the leader, while it is not engaged or its clutch is
+        held. Returns False if there is no session."""
         return self._ask(lambda: self._guest.core.set_scale(position_scale, force_scale))
 
     def set_share(self, channel: int, share: float) -> bool:
-        """How much the leader of that channel of the device counts among several, at the follower's server: 0 … 1.
-        False when there is no session."""
+        """Sets the weight, 0 … 1, of the leader on that channel if several leaders share one follower. Must be sent
+        to the server of the follower. Returns False if there is no session."""
         return self._ask(lambda: self._guest.core.set_share(channel, share))
 
     def set_output(self, output: int, setting: LampColour | Vibration) -> bool:
-        """Sets a lamp of the device, or starts a pulse of vibration (`handle.outputs`, asked for with
-        `Config.outputs`). False when there is no session to ask in, or it does not know outputs."""
+        """Sets an indicator lamp or starts a vibration pulse (`handle.outputs`; requires `Config.outputs`). Returns
+        False if there is no session or it does not support outputs."""
         return self._ask(lambda: self._guest.core.set_output(output, setting))
 
     def take_lease(self) -> bool:
-        """Asks for the channel's lease, and once more when it is lost before the answer; `holds` tells the result.
-        False when there is no session."""
+        """Requests the lease of the channel. The request is repeated if the lease is lost before the answer arrives.
+        `holds` contains the result. Returns False if there is no session."""
         return self._ask(self._guest.core.take_lease)
 
     def give_lease(self) -> bool:
-        """Gives the lease up, and stops asking for it. False when there is no session."""
+        """Releases the lease and stops requesting it. Returns False if there is no session."""
         return self._ask(self._guest.core.give_lease)
 
     @property
@@ -319,38 +319,39 @@ class AnyClient:
 
     @property
     def welcome(self) -> Welcome | None:
-        """The server's description of itself and its device at the opening of the newest session; None before that."""
+        """Description of the server in the newest session. None before the first."""
         return self._guest.core.welcome
 
     @property
     def description(self) -> DeviceDescription | None:
-        """Description of the device, once we have named a device or a channel and the server has answered."""
+        """Description of the device. None until it arrives; it is only requested if a device or channel is named."""
         return self._guest.core.description
 
     @property
     def handle(self) -> HandleDescription | None:
-        """How the device lies before the operator, its buttons' names, and what else its handle can do, once the server has
-        answered. None for good when the server does not know FEATURE_HANDLE."""
+        """Orientation of the device relative to the operator, names of the buttons, and other properties of the
+        handle. None until it arrives, and always if the server does not support FEATURE_HANDLE."""
         return self._guest.core.handle
 
     @property
     def holds(self) -> bool:
-        """Whether the channel takes our forces. While it does not, a controller is handed no states."""
+        """Whether this client holds the channel. Otherwise a controller receives no states."""
         return self._guest.core.holds
 
     @property
     def report(self) -> LinkReport | None:
-        """The server's newest report on our forces, once a second while they come; None before the first."""
+        """Newest report on the received forces, once per second while they arrive. None before the first."""
         return self._guest.core.report
 
     @property
     def device_report(self) -> DeviceReport | None:
-        """With Config.diagnostics, the newest report on the device's loop, once a second; None before the first."""
+        """Newest report on the loop of the device, once per second. None before the first. Requires
+        Config.diagnostics."""
         return self._guest.core.device_report
 
     @property
     def peer_reports(self) -> dict[int, PeerReport]:
-        """With Config.diagnostics, the newest report on the engine of each channel, even one that has gone."""
+        """Newest report on the engine of each channel, also after it has left. Requires Config.diagnostics."""
         return self._guest.core.peer_reports
 
     def _ask(self, request: Callable[[], bool]) -> bool:
@@ -360,7 +361,7 @@ class AnyClient:
 
 
 Place = tuple[int, int, Any]
-"""A server's address as the system gives it: family, protocol and address."""
+"""A server address: family, protocol and address."""
 
 
 def _is_numeric(server: str) -> bool:
@@ -372,7 +373,7 @@ def _is_numeric(server: str) -> bool:
 
 
 def _look_up(server: str) -> list[Place]:
-    """The addresses of a server's name, the one to prefer first. Raises OSError with the host's name."""
+    """Returns the addresses of a server in order of preference. Raises OSError with the name of the host."""
     if (path := unix_path(server)) is not None:
         return [(socket.AF_UNIX, 0, path)]
     host, port = parse_address(server)
@@ -385,7 +386,7 @@ def _look_up(server: str) -> list[Place]:
 
 
 def _connected(server: str, place: Place) -> socket.socket:
-    """A socket on a port that the system chooses, or, to a Unix socket, with a name that it chooses. It is connected, so
+    """Creates a socket with an ephemeral port, or a Unix socket with an autobind address. It is connected, so that
     the kernel drops datagrams from other senders."""
     family, protocol, address = place
     connected = socket.socket(family, socket.SOCK_DGRAM, protocol)

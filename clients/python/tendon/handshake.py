@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The client's half of the opening (SESSION.md, "Opening"), sans I/O."""
+"""The client side of the handshake (SESSION.md, "Opening"), sans I/O."""
 
 from __future__ import annotations
 
@@ -27,19 +27,19 @@ Outcome = Union[Accepted, Refused]
 
 
 def key_id(key: bytes) -> bytes:
-    """Tells the server which key to try, and nothing else."""
+    """Identifies the key to the server without revealing it."""
     return sha256(b"tendon-key-id" + key).digest()[:8]
 
 
 def prologue(header: bytes, identity: bytes, random: bytes) -> bytes:
-    """What both ends of suite 1 must agree on besides the key."""
+    """The data that both sides of suite 1 must agree on in addition to the key."""
     return b"tendon-1" + header + identity + random
 
 
 class ClientHandshake:
-    """Says Hello until a Retry brings a cookie, says Hello with the cookie until it is answered.
+    """Sends Hellos until a Retry with a cookie arrives, then Hellos with the cookie until the answer arrives.
 
-    It never gives up; its owner may. It ignores datagrams that are malformed, not authentic, or of another attempt.
+    It has no timeout. Datagrams that are malformed, not authentic, or of another attempt are ignored.
     """
 
     def __init__(
@@ -52,8 +52,8 @@ class ClientHandshake:
         ephemeral: bytes = b"",
         suites: tuple[Suite, ...] = usable_suites(),
     ):
-        """`random`: 16 bytes, new for each attempt. With `key` all is sealed; `ephemeral`: 32 bytes, new for each
-        attempt. The session is sealed by one of `suites`, as the server chooses, or it has refused us."""
+        """`random` must be 16 new bytes and `ephemeral` 32 new bytes for each attempt. With `key`, the session is
+        encrypted with one of `suites`, which the server selects."""
         self._hello = hello
         self._random = random
         self._suites = suites
@@ -72,7 +72,7 @@ class ClientHandshake:
         self._cookie: bytes | None = None
         self._next_hello: Instant = now
         self.outcome: Outcome | None = None
-        """Set once the server has answered; the handshake is then over."""
+        """Set when the server has answered, which ends the handshake."""
 
     def receive(self, now: int, datagram: bytes) -> None:
         if self.outcome is not None:
@@ -80,7 +80,7 @@ class ClientHandshake:
         retry = codec.decode_retry(datagram)
         if retry is not None:
             if retry.random == self._random and retry.suite == self._suite:
-                if self._cookie is None:  # only the first cookie is answered at once: no ping-pong
+                if self._cookie is None:  # only the first cookie is answered immediately, to prevent a loop
                     self._next_hello = now
                 self._cookie = retry.cookie
             return
@@ -91,7 +91,7 @@ class ClientHandshake:
                 self._next_hello = NEVER
 
     def next_datagram(self, now: int) -> bytes | None:
-        """The Hello, when it is due."""
+        """Returns the Hello if it is due."""
         if now < self._next_hello:
             return None
         self._next_hello = now + RESEND_NS
@@ -99,7 +99,7 @@ class ClientHandshake:
         return codec.encode_hello(codec.HelloDatagram(self._random, self._body, cookie, self._suite))
 
     def next_turn(self) -> Instant:
-        """When `next_datagram` is due next."""
+        """Returns when `next_datagram` is due."""
         return self._next_hello
 
     def _read(self, now: int, answer: codec.AnswerDatagram) -> Outcome | None:

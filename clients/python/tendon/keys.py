@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Key files. `tendond keygen` writes them, and both ends of a conversation have the same one."""
+"""Key files, created by `tendond keygen` and shared by client and server."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ _FEWEST_DIFFERENT = 18
 
 
 def read_key(file: Path | str) -> bytes:
-    """The 32 bytes in a key file: one line, `controller` or `observer` and 64 hexadecimal digits; empty lines and
-    those that begin with # are comments.
+    """Returns the 32 bytes in a key file. It contains one line, `controller` or `observer` and 64 hexadecimal digits.
+    Empty lines and lines that begin with # are ignored.
 
-    Raises ValueError with a sentence (never with the key) when it is no key file or the key is weak, OSError when it
-    cannot be read or is a folder or a pipe, PermissionError when others may read it.
+    Raises ValueError, with a message that does not contain the key, if the file is not a key file or the key is
+    weak; OSError if it is unreadable or not a regular file; PermissionError if other users may read it.
     """
-    if not stat.S_ISREG(os.stat(file).st_mode):  # before it is opened: a pipe would wait for ever
+    if not stat.S_ISREG(os.stat(file).st_mode):  # check before opening, because opening a pipe would block
         raise OSError(f"{file}: cannot read this key: it is not a regular file")
     with open(file, encoding="utf-8-sig") as text:
         if os.name == "posix" and os.fstat(text.fileno()).st_mode & (stat.S_IRWXG | stat.S_IRWXO):
@@ -36,7 +36,6 @@ def read_key(file: Path | str) -> bytes:
 
 
 def _weak(key: bytes) -> bool:
-    """Whether a key repeats a few bytes, counts up, or is typed text. Fewer than one in 10⁹ random keys are called
-    weak."""
+    """Whether a key repeats a few bytes, counts up, or is typed text. Rejects fewer than one in 10⁹ random keys."""
     steps = {(after - before) % 256 for before, after in zip(key, key[1:])}
     return min(len(set(key)), len(steps)) < _FEWEST_DIFFERENT or all(0x20 <= byte < 0x7F for byte in key)

@@ -4,8 +4,8 @@
     -> psk, e
     <- e, ee
 
-and the primitives it is made of. The only module that knows libsodium (PyNaCl). It draws no randomness:
-ephemeral keys are passed in, each for one handshake.
+and its primitives. The only module that uses libsodium (PyNaCl). It generates no random numbers: ephemeral keys
+are arguments, each for one handshake.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ def seal(key: bytes, number: int, associated: bytes, plain: bytes) -> bytes:
 
 
 def unseal(key: bytes, number: int, associated: bytes, sealed: bytes) -> bytes | None:
-    """None when it is not authentic."""
+    """Returns None if authentication fails."""
     if len(sealed) < TAG_SIZE:  # PyNaCl does not check this
         return None
     try:
@@ -43,7 +43,7 @@ def unseal(key: bytes, number: int, associated: bytes, sealed: bytes) -> bytes |
 
 
 def renewed(key: bytes) -> bytes:
-    """REKEY(key) of Noise: the next key, from which this one cannot be computed."""
+    """REKEY(key) of Noise: the next key, from which this one cannot be derived."""
     return seal(key, 2**64 - 1, b"", bytes(KEY_SIZE))[:KEY_SIZE]
 
 
@@ -52,7 +52,7 @@ def public_key(secret: bytes) -> bytes:
 
 
 def shared_key(secret: bytes, point: bytes) -> bytes | None:
-    """None when the point is of low order: everybody could compute the shared secret."""
+    """Returns None if the point has a low order, because anyone could then compute the shared secret."""
     try:
         return bytes(sodium.crypto_scalarmult(secret, point))
     except (CryptoError, RuntimeError):  # depends on PyNaCl's version
@@ -61,14 +61,14 @@ def shared_key(secret: bytes, point: bytes) -> bytes | None:
 
 @dataclass(frozen=True, slots=True)
 class Split:
-    """The result of a handshake, the same at both ends."""
+    """The result of a handshake, equal on both sides."""
 
     initiator_to_responder: bytes
     responder_to_initiator: bytes
-    handshake_hash: bytes  # hash of the whole handshake
+    handshake_hash: bytes  # hash of the entire handshake
 
     def of_suite_2(self) -> Split:
-        """The keys of suite 2: bound to Hello and Answer, and none of them a key of suite 1."""
+        """Derives the keys of suite 2, which are bound to Hello and Answer and differ from those of suite 1."""
         ours, theirs = (
             hmac.digest(key, b"tendon-suite-2" + self.handshake_hash, "sha256")
             for key in (self.initiator_to_responder, self.responder_to_initiator)
@@ -77,9 +77,9 @@ class Split:
 
 
 class SymmetricState:
-    """The symmetric state of Noise: the hash and key that both ends have mixed so far.
+    """The symmetric state of Noise: the hash and key that both sides have mixed so far.
 
-    In this pattern a new key precedes every encryption, so the nonce is always 0.
+    In this pattern a new key precedes each encryption, so the nonce is always 0.
     """
 
     def __init__(self, prologue: bytes) -> None:
@@ -99,7 +99,7 @@ class SymmetricState:
         self.mix_hash(mixed)
 
     def mix_ephemeral(self, point: bytes) -> None:
-        """The token e, in a pattern with a pre-shared key."""
+        """Mixes the token e in a pattern with a pre-shared key."""
         self.mix_hash(point)
         self.mix_key(point)
 
@@ -118,7 +118,7 @@ class SymmetricState:
         return Split(first, second, self.hash)
 
     def _derive(self, material: bytes, outputs: int) -> list[bytes]:
-        """HKDF of the specification."""
+        """HKDF as specified by Noise."""
         temporary = hmac.digest(self._chaining_key, material, "sha256")
         derived = [b""]
         for i in range(1, outputs + 1):
@@ -127,7 +127,7 @@ class SymmetricState:
 
 
 class Initiator:
-    """The client's end. One object, one message 1: another payload under this ephemeral key would use a nonce twice."""
+    """The client side. Each object must encrypt only one message 1, because another payload would reuse the nonce."""
 
     def __init__(self, key: bytes, ephemeral: bytes, prologue: bytes, payload: bytes) -> None:
         self._ephemeral = ephemeral
@@ -138,7 +138,7 @@ class Initiator:
         self.message = point + self._state.encrypt(payload)
 
     def read(self, message: bytes) -> tuple[bytes, Split] | None:
-        """The payload of message 2. None when it is not authentic; a later one may be."""
+        """Returns the payload of message 2, or None if authentication fails. Another message may then be tried."""
         state = copy.copy(self._state)
         point = message[:KEY_SIZE]
         if len(message) < KEY_SIZE + TAG_SIZE:

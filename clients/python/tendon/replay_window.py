@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Remembers which packet numbers have arrived, so that each packet is accepted once."""
+"""Remembers received packet numbers, so that each packet is accepted only once."""
 
 
 class ReplayWindow:
-    """Ask `contains` before using a packet, and `insert` it once it is authentic, so that a forged packet cannot
-    use up the number of a real one.
+    """Call `contains` before using a packet, and `insert` after it was authenticated, so that a forged packet cannot
+    consume the number of a real one.
     """
 
     REMEMBERED = 1984
-    """Numbers behind the newest that are remembered; older ones count as seen."""
+    """Size of the window behind the newest number. Older numbers are treated as received."""
 
     _MASK = (1 << REMEMBERED) - 1
 
@@ -33,9 +33,9 @@ class ReplayWindow:
         self._count += 1
 
     def mask_before(self, number: int) -> int:
-        """Bit i: (number − 1 − i) is known to have been inserted."""
+        """Returns a bit mask in which bit i is set if (number − 1 − i) was inserted."""
         return self._seen >> self.highest - number + 1 & 0xFFFFFFFF
 
     def missing(self) -> int:
-        """Numbers from 0 to the highest that were never inserted."""
+        """Returns the number of missing packets from 0 to the highest number."""
         return self.highest + 1 - self._count

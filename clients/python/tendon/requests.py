@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The reliable part of a session: requests arrive exactly once and in order, and each gets its answer.
+"""Reliable requests of a session: they arrive exactly once and in order, and each is answered.
 
-The answer is the acknowledgement. The answerer keeps its last 16 answers and repeats one whenever its
-request comes again. That is enough: the requester has at most 16 requests open, so when request n + 16
-arrives, the answer to n has.
+The answer is the acknowledgement. The receiver stores its last 16 answers and repeats an answer if the request is
+repeated. This is sufficient because at most 16 requests are pending: when request n + 16 arrives, the answer to n
+has been received.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from .limits import REQUEST_WINDOW
 from .messages import NEVER, Code, Control, ControlAck, Instant, Request
 
-_MAX_WAIT = 1_000_000_000  # ns; waits double up to this, even where the round trip is longer
+_MAX_WAIT = 1_000_000_000  # ns; upper limit of the exponential back-off
 
 
 @dataclass(slots=True)
@@ -25,14 +25,14 @@ class _Asked:
 
 
 class OutgoingRequests:
-    """The asking end."""
+    """The requesting side."""
 
     def __init__(self) -> None:
-        self._open: dict[int, _Asked] = {}  # in the order of the ids
+        self._open: dict[int, _Asked] = {}  # in order of their ids
         self._next = 1
 
     def add(self, request: Request) -> int | None:
-        """Queues a request and returns its id; None when as many as the window holds are open."""
+        """Queues a request. Returns its id, or None if the window is full."""
         if len(self._open) == REQUEST_WINDOW:
             return None
         number = self._next
@@ -41,11 +41,11 @@ class OutgoingRequests:
         return number
 
     def due(self, now: int) -> list[Control]:
-        """The requests to be sent (again) now."""
+        """Returns the requests to send or repeat now."""
         return [asked.control for asked in self._open.values() if asked.answer is None and asked.due <= now]
 
     def sent(self, number: int, now: int, timeout: int) -> None:
-        """The request is due again after `timeout`, doubled for every earlier transmission."""
+        """Schedules a repetition after `timeout`, doubled for each previous transmission."""
         asked = self._open[number]
         asked.due = now + min(timeout << min(asked.times_sent, 32), _MAX_WAIT)
         asked.times_sent += 1
@@ -54,10 +54,10 @@ class OutgoingRequests:
         return min((asked.due for asked in self._open.values() if asked.answer is None), default=NEVER)
 
     def acknowledge(self, ack: ControlAck) -> bool:
-        """False when the answer belongs to no request."""
+        """Returns False if the answer does not belong to a request."""
         asked = self._open.get(ack.id)
         if asked is None:
-            return ack.id < self._next  # repeated, or never asked
+            return ack.id < self._next  # True: repeated; False: never requested
         if asked.times_sent == 0:
             return False
         if asked.answer is None:
@@ -65,7 +65,7 @@ class OutgoingRequests:
         return True
 
     def next_answer(self) -> ControlAck | None:
-        """The next answer, in the order of the requests."""
+        """Returns the next answer in the order of the requests."""
         for number, asked in self._open.items():
             if asked.answer is not None:
                 del self._open[number]
@@ -74,17 +74,17 @@ class OutgoingRequests:
 
 
 class IncomingRequests:
-    """The answering end."""
+    """The answering side."""
 
     def __init__(self) -> None:
-        self._next = 1  # the next request to hand out
+        self._next = 1  # the next request to return
         self._arrived: dict[int, Control] = {}
         self._taken: set[int] = set()
         self._answers: dict[int, ControlAck] = {}
-        self._due: dict[int, None] = {}  # ids of answers to be sent, in the order they became due
+        self._due: dict[int, None] = {}  # ids of answers to send, in order
 
     def take(self, control: Control) -> bool:
-        """Takes a request in any order. False when the id is one that a correct peer cannot use yet."""
+        """Accepts requests in any order. Returns False if a correct peer could not use this id yet."""
         number = control.id
         if number < self._next:
             if number in self._answers:
@@ -96,7 +96,7 @@ class IncomingRequests:
         return True
 
     def next(self) -> Control | None:
-        """The next request, exactly once and in order. This also answers requests that are unknown or invalid."""
+        """Returns the next request, exactly once and in order. Answers unknown or invalid requests itself."""
         while (control := self._arrived.pop(self._next, None)) is not None:
             self._next += 1
             self._taken.add(control.id)
@@ -109,7 +109,7 @@ class IncomingRequests:
         return None
 
     def answer(self, ack: ControlAck) -> None:
-        """Answers a request that `next` returned; any other id is ignored."""
+        """Answers a request returned by `next`. Other ids are ignored."""
         if ack.id not in self._taken:
             return
         self._taken.remove(ack.id)
@@ -118,7 +118,7 @@ class IncomingRequests:
         self._due[ack.id] = None
 
     def due(self) -> list[ControlAck]:
-        """The answers to be sent now."""
+        """Returns the answers to send now."""
         return [self._answers[number] for number in self._due if number in self._answers]
 
     def sent(self, number: int) -> None:

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The round trip's time, and how long to wait for an answer before asking again (RFC 6298)."""
+"""Round-trip time and retransmission timeout (RFC 6298)."""
 
 
 class RoundTrip:
-    """All times are nanoseconds."""
+    """All times are in nanoseconds."""
 
     FIRST_TIMEOUT = 100_000_000
-    """How long to wait before the first sample: a handshake has just succeeded, so the peer is there."""
+    """Timeout before the first sample. The peer is known to be available after the handshake."""
 
     def __init__(self) -> None:
         self.newest = 0

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One open conversation, seen from either end (SESSION.md): bytes and instants in, bytes and events out."""
+"""One session, usable by client and server (SESSION.md), as a state machine: bytes and times in, bytes and events
+out."""
 
 from __future__ import annotations
 
@@ -33,27 +34,28 @@ from .requests import IncomingRequests, OutgoingRequests
 from .round_trip import RoundTrip
 
 KEEP_ALIVE_NS = 50_000_000
-"""Longest time between two of our datagrams: five in a row are lost before a server's 250 ms safe stop."""
+"""Maximum time between two sent datagrams, so that a server stops after 250 ms only if five in a row are lost."""
 TIMEOUT_NS = 2_000_000_000
-"""Silence of the peer after which it is gone: longer than a Wi-Fi roam, shorter than patience."""
+"""The session ends after this silence of the peer: longer than Wi-Fi roaming."""
 MIN_RESEND_NS = 20_000_000
-"""A request is sent again after max(this, SRTT + 4 RTTVAR)."""
+"""A request is repeated after max(this, SRTT + 4 RTTVAR)."""
 
 
 @dataclass(frozen=True, slots=True)
 class Closed:
-    """The end of the conversation, as the peer said Bye. Code.TIMED_OUT: it fell silent. Code.EXPIRED: too old."""
+    """The end of the session by a Bye of the peer. Code.TIMED_OUT: the peer was silent. Code.EXPIRED: maximum age
+    reached."""
 
     code: Code
     reason: str
 
 
 Event = Union[DeviceState, ForceCommand, LinkReport, DeviceReport, PeerReport, PortState, Control, ControlAck, Closed]
-"""A Control is a request that has arrived and wants an answer, a ControlAck the answer to one of ours."""
+"""A Control is a received request that must be answered. A ControlAck is the answer to a sent request."""
 
 
 def _stream(report: DeviceReport | PeerReport) -> tuple[int, int]:
-    """Device and channel; −1 of the device itself."""
+    """Device and channel; −1 for the device itself."""
     return (report.device, report.channel if isinstance(report, PeerReport) else -1)
 
 
@@ -62,22 +64,22 @@ def _end(port: PortState) -> tuple[int, int, bool]:
 
 
 class Session:
-    """Sans I/O, pull: no socket, clock, thread or randomness of its own.
+    """Sans I/O: no socket, clock, thread or random numbers.
 
-    Use: `receive` what arrives and `tick` when `next_turn()` is due; then pull `next_event` and
-    `next_datagram` until they are empty. `now` never goes back.
+    Call `receive` for each datagram and `tick` when `next_turn()` is due, then call `next_event` and
+    `next_datagram` until they are empty. `now` must not decrease.
 
-    Nothing queues without a bound: there is room for one state, one force, one report and one port (of each device, channel and end)
-    and limits.REQUEST_WINDOW requests each way; a newer one replaces one of its kind that was not taken out.
+    All queues are bounded: one state, one force, one report and one port state (for each device, channel and end),
+    and limits.REQUEST_WINDOW requests in each direction. A newer value replaces one that was not taken.
     """
 
     def __init__(self, connection_id: int, opened: int, cipher: Cipher | None = None) -> None:
-        """`opened` is the instant of the handshake's end. The first datagram is due at once."""
+        """`opened` is the time of the end of the handshake. The first datagram is due immediately."""
         self.open = True
         self.stats = LinkStats()
         self._connection_id = connection_id
         self._opened = opened
-        self.latest = opened  # the newest `now` we were told
+        self.latest = opened  # newest value of `now`
         self._cipher = cipher or Plain()
         self._expires = NEVER if self._cipher.suite is Suite.PLAIN else opened + limits.LIFE_NS
         self._room = limits.MAX_DATAGRAM - codec.HEADER_SIZE - self._cipher.overhead
@@ -95,20 +97,19 @@ class Session:
         # In.
         self._last_heard = opened
         self._seen = ReplayWindow()
-        self._newest_number = -1  # of the datagrams accepted, with its T1 and T2
+        self._newest_number = -1  # of the accepted datagrams, with its T1 and T2
         self._newest_sent_ns = 0
         self._newest_received_ns = 0
         self._newest_tick: dict[int, int] = {}  # by device
         self._newest_sequence: dict[tuple[int, int], int] = {}  # by device and channel
         self._newest_report = 0
         self._newest_diagnosis: dict[tuple[int, int], int] = {}  # by _stream
-        self._newest_port: dict[tuple[int, int, bool], tuple[int, int]] = {}  # epoch and sequence, by the same
-        self._newest_echoed = -1  # newest packet of ours that the peer has echoed
+        self._newest_port: dict[tuple[int, int, bool], tuple[int, int]] = {}  # epoch and sequence, by the same key
+        self._newest_echoed = -1  # newest sent packet that the peer has echoed
         self._answering = IncomingRequests()
         self._round_trip = RoundTrip()
-        # To tell.
         self.has_events = False
-        """Whether next_event() is worth a call; it may still say None."""
+        """Whether next_event() may return an event."""
         self._state_arrived: DeviceState | None = None
         self._force_arrived: ForceCommand | None = None
         self._report_arrived: LinkReport | None = None
@@ -119,13 +120,13 @@ class Session:
     # ---- In ----
 
     def receive(self, now: int, datagram: bytes) -> None:
-        """Takes any bytes. A datagram that is malformed, or of another conversation, is counted and dropped."""
+        """Handles a datagram. Datagrams that are malformed or of another session are counted and dropped."""
         self.latest = now
         if not self.open:
             return
         header = codec.decode_header(datagram)
         if header is not None and header.type is not DatagramType.DATA:
-            self.stats.duplicated += 1  # a late copy of the handshake
+            self.stats.duplicated += 1  # a late duplicate of the handshake
             return
         if (
             header is None
@@ -152,12 +153,12 @@ class Session:
         if content is None:
             self.stats.malformed += 1
             if self._cipher.suite is not Suite.PLAIN:
-                self._seen.insert(number)  # it was authentic. In suite 0 a damaged copy must not shut out the good one
+                self._seen.insert(number)  # only if authentic: in suite 0, a damaged copy must not block the original
             return
         self._accept(now, number, content)
 
     def send(self, frame: DeviceState | ForceCommand | LinkReport | DeviceReport | PeerReport | PortState) -> None:
-        """Queues a frame in place of the one of its kind that has not left yet."""
+        """Queues a frame, replacing an unsent one of the same kind."""
         if isinstance(frame, ForceCommand):
             self._force_to_send = frame
         elif isinstance(frame, LinkReport):
@@ -170,7 +171,7 @@ class Session:
             self._state_to_send = frame
 
     def request(self, request: Request) -> int | None:
-        """Queues a reliable request and returns its id; None when limits.REQUEST_WINDOW are open."""
+        """Queues a reliable request and returns its id, or None if limits.REQUEST_WINDOW requests are pending."""
         return self._asked.add(request)
 
     def answer(
@@ -182,18 +183,18 @@ class Session:
         device: DeviceDescription | None = None,
         handle: HandleDescription | None = None,
     ) -> None:
-        """Answers a Control that has arrived. Every one must be answered; an id that waits for no answer is ignored."""
+        """Answers a received Control. Each must be answered. Ids without a pending request are ignored."""
         self._answering.answer(ControlAck(number, code, detail, wait_ms, device, handle))
 
     def close(self, code: Code, reason: str) -> None:
-        """Says Bye and closes. Frames not sent yet are dropped. No Closed event follows, because the owner knows."""
+        """Sends a Bye and closes. Unsent frames are dropped. No Closed event follows."""
         if self.open:
             self.open = False
             self._bye = Bye(code, reason)
             self._byes_left = limits.BYES
 
     def tick(self, now: int) -> None:
-        """Notices the silence of the peer and the age of the session."""
+        """Checks the timeout of the peer and the age of the session."""
         self.latest = now
         if not self.open:
             return
@@ -209,7 +210,7 @@ class Session:
     # ---- Out ----
 
     def next_datagram(self, now: int) -> bytes | None:
-        """The next datagram to send; None = nothing to send now."""
+        """Returns the next datagram to send, or None."""
         self.latest = now
         if self._byes_left > 0 and self._bye is not None:
             self._byes_left -= 1
@@ -219,7 +220,7 @@ class Session:
         return self._seal(now, self._fill(now))
 
     def next_event(self) -> Event | None:
-        """The next event; Closed is the last."""
+        """Returns the next event. Closed is the last one."""
         event: Event | None = self._answering.next() or self._asked.next_answer()
         if event is None:
             event, self._force_arrived = self._force_arrived, None
@@ -237,7 +238,8 @@ class Session:
         return event
 
     def next_turn(self) -> Instant:
-        """When `tick` and `next_datagram` are due next; not in the future when something waits to be sent."""
+        """Returns when `tick` and `next_datagram` are due. The time is not in the future if there is something to
+        send."""
         if not self.open:
             return self.latest if self._byes_left > 0 else NEVER
         if self._last_sent is None or self._something_to_say(self.latest):
@@ -321,7 +323,7 @@ class Session:
             return
         self._count_lost_outgoing(told)
         sample = (now - told.sent_ns) - (sent_ns - told.received_ns)
-        if sample < 0:  # the clocks' rates differ, and the peer held the echo for long
+        if sample < 0:  # possible if the clock rates differ and the peer held the echo for long
             return
         self._round_trip.observe(sample)
         self.stats.round_trip_ns = self._round_trip.newest
@@ -332,7 +334,7 @@ class Session:
         since = told.packet_number - self._newest_echoed
         if since <= 0:
             return
-        # Of the packets since the last echo, those the vector reaches: itself and at most 32 before.
+        # The ack vector covers the echoed packet and at most 32 before it.
         before = min(since - 1, 32)
         self.stats.lost_outgoing += before - (told.received_mask & ((1 << before) - 1)).bit_count()
         self._newest_echoed = told.packet_number
@@ -358,7 +360,7 @@ class Session:
         return codec.write_data_head(now, echo)
 
     def _fill(self, now: int) -> bytes:
-        """Writes as many frames as fit, those that age fastest first. The rest goes into the next datagram."""
+        """Writes as many frames as fit, most time-critical first. The others are sent in the next datagram."""
         body = bytearray(self._head(now))
 
         def add(frame: Frame) -> bool:

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A robot follows the hand at a Tendon server, and the hand feels what the robot touches.
+"""Teleoperation of a robot by the hand at a Tendon server, with force feedback.
 
     follow = Follower(FollowerConfig(scale=0.5, clutch_button=1))
 
-    def move(target):                                        # None: the robot holds its place
+    def move(target):                                        # None: the robot must hold its pose
         robot.hold() if target is None else robot.go_to(target)
 
     def step(hand):
@@ -13,13 +13,14 @@
     with tendon.Client(server, tendon.Config(name="robot", rate_hz=500)) as client:
         client.drive(step, on_silence=lambda now: move(follow.silence(now)))
 
-Position p, orientation q; l is the hand (the leader), f the tool (the follower), 0 the moment of engaging:
+With positions p, orientations q, the hand l (leader), the tool f (follower), and 0 for the values at the time of
+engaging:
 
-    p_f = p_f0 + s_x R M (p_l − p_l0)        q_f = (R q_l q_l0⁻¹ R⁻¹) q_f0        M leaves out axes that are not coupled
+    p_f = p_f0 + s_x R M (p_l − p_l0)        q_f = (R q_l q_l0⁻¹ R⁻¹) q_f0        M selects the coupled axes
     F_l = s_f M Rᵀ F_f                       τ_l = s_f / s_x Rᵀ τ_f               K_l = s_f s_x M Rᵀ K_f R M
 
-so what the hand pays in power is s_f / s_x of what the tool gives. Written also in C++ and TypeScript;
-tests/clients/follower_cases.json holds all three to the same numbers.
+so the power at the hand is s_f / s_x times the power at the tool. There are equivalent implementations in C++ and
+TypeScript; tests/clients/follower_cases.json checks all three.
 """
 
 from __future__ import annotations
@@ -36,56 +37,56 @@ from .messages import Contact, DeviceState, Mat3, Mode, Quat, Reason, Touch, Vec
 
 log = logging.getLogger("tendon")
 
-_SMOOTHING_NS = 1e9  # time constant of the delay that counts as usual
-_LONGEST_STEP_NS = 100_000_000  # a robot program that paused does not catch up at once
+_SMOOTHING_NS = 1e9  # time constant of the delay filter
+_LONGEST_STEP_NS = 100_000_000  # after a pause of the robot program, the target does not jump
 
 NO_CONTACT = "the robot measures no contact force: the hand feels nothing"
 BAD_POSE = "the robot's pose is not finite: disengaged"
 
 
 class Following(IntEnum):
-    ALONE = 1  # no state has come
-    COUPLED = 2  # states come; the robot stands until somebody engages
-    ENGAGED = 4  # the robot follows
-    CLUTCHED = 5  # the hand moves freely, the robot holds its place
-    LOST = 6  # silence; never engaged again without the act
+    ALONE = 1  # no state has arrived
+    COUPLED = 2  # states arrive; the robot stands still until the operator engages
+    ENGAGED = 4  # the robot follows the hand
+    CLUTCHED = 5  # the hand moves freely and the robot holds its pose
+    LOST = 6  # states stopped; the operator must engage again
 
 
 class Pose(NamedTuple):
-    """Of the tool, in the robot's frame; of a target, what the tool is to reach."""
+    """Pose of the tool, or its target, in the frame of the robot."""
 
     position: Sequence[float]  # m
-    orientation: Sequence[float] | None = None  # unit quaternion w, x, y, z; None: position alone is followed
+    orientation: Sequence[float] | None = None  # unit quaternion w, x, y, z; None: only the position is controlled
     grip: float | None = None  # opening of the gripper, m or rad; None: no gripper
 
 
 class ToolContact(NamedTuple):
-    """What the surroundings exert on the tool, in the robot's frame: a table below pushes up."""
+    """Force of the environment on the tool, in the frame of the robot. A table below the tool pushes up."""
 
     force: Sequence[float]  # N
-    torque: Sequence[float] | None = None  # N·m, about the tool's position
-    stiffness: float | None = None  # N/m, > 0, of the surface along its normal, where it is known
-    normal: Sequence[float] | None = None  # out of the body, to the tool; None: along the force
+    torque: Sequence[float] | None = None  # N·m, about the position of the tool
+    stiffness: float | None = None  # N/m, > 0, of the surface along its normal, if known
+    normal: Sequence[float] | None = None  # points from the surface to the tool; None: along the force
     grip_force: float | None = None  # N, on the fingers; > 0 opens them
 
 
 @dataclass(frozen=True, kw_only=True)
 class FollowerConfig:
-    """How a hand's motion becomes a tool's. Raises ValueError "FIELD = VALUE: expected …" for impossible values."""
+    """Mapping from the hand to the tool. Raises ValueError "FIELD = VALUE: expected …" for invalid values."""
 
-    scale: float = 1.0  # s_x, follower / leader, 0.01 … 100
-    force_scale: float = 1.0  # s_f, leader / follower, 0.01 … 100
-    rotation: Quat = (1.0, 0.0, 0.0, 0.0)  # R, turns the device's base frame into the robot's; of length 1 ± 1e-3
-    axes: str = "xyz"  # of the device that are coupled; the others are free and feel nothing
-    clutch_button: int | None = None  # 0 … 31; held: clutched. None: engage() and disengage() alone
-    toggle: bool = False  # each press of the button changes between engaged and clutched
-    engage_by: str = "button"  # "button": of the clutch, pressed and released (toggle: pressed); or "call": engage()
-    speed: float = 0.25  # m/s, 0.001 … 10, no target moves faster
-    spin: float = 2.0  # rad/s, 0.01 … 100, nor turns faster
-    ramp_s: float = 0.3  # 0 … 10, in which the force grows from 0 to all of it after engaging
-    grip_ratio: float = 1.0  # opening of the robot's gripper / that of the hand's, 0.001 … 1000
-    grip_speed: float = 0.1  # m/s or rad/s, 0.001 … 100, of the gripper
-    rate_hz: float = 500.0  # states per second that `target` is given, 1 … 100000
+    scale: float = 1.0  # s_x, motion of the follower / motion of the leader, 0.01 … 100
+    force_scale: float = 1.0  # s_f, force on the leader / force on the follower, 0.01 … 100
+    rotation: Quat = (1.0, 0.0, 0.0, 0.0)  # R, from the device base frame to the robot frame; norm 1 ± 1e-3
+    axes: str = "xyz"  # coupled axes of the device; the others move freely without force
+    clutch_button: int | None = None  # 0 … 31, clutched while pressed. None: only engage() and disengage()
+    toggle: bool = False  # each press switches between engaged and clutched
+    engage_by: str = "button"  # "button": pressing and releasing the clutch (toggle: pressing it); "call": engage()
+    speed: float = 0.25  # m/s, 0.001 … 10, maximum speed of the target
+    spin: float = 2.0  # rad/s, 0.01 … 100, maximum angular speed of the target
+    ramp_s: float = 0.3  # 0 … 10, duration of the force ramp after engaging
+    grip_ratio: float = 1.0  # opening of the robot's gripper / opening of the hand's gripper, 0.001 … 1000
+    grip_speed: float = 0.1  # m/s or rad/s, 0.001 … 100, maximum speed of the gripper
+    rate_hz: float = 500.0  # rate at which `target` is called, 1 … 100000
 
     def __post_init__(self) -> None:
         def between(least: float, most: float, **fields: float) -> None:
@@ -112,17 +113,18 @@ class FollowerConfig:
 
 
 class Follower:
-    """Map, clutch, loss ladder and signs of a robot that follows a hand. It has no clock, thread or socket.
+    """Position mapping, clutch and reaction to loss of connection. It has no clock, thread or socket.
 
-    Nothing moves before the act of engaging, by the button or engage(). The pose of that moment is the offset: neither
-    engaging nor releasing the clutch moves the robot. The age of the newest state beyond the smoothed delay decides
-    when states stop, v being three periods and at least 20 ms:
+    The robot does not move before the operator engages, by the button or by engage(). The poses at that time
+    define the offset, so neither engaging nor releasing the clutch moves the robot. The reaction to missing states
+    depends on the age of the newest state beyond the smoothed delay, where v is three periods, at least 20 ms:
 
-        v             the target stays where it is
-        v + 20 ms     None: the robot holds its place
-        v + 250 ms    lost: a new state couples again, only a new act engages
+        v             the target stops
+        v + 20 ms     None: the robot must hold its pose
+        v + 250 ms    lost: new states couple again, but the operator must engage again
 
-    The two clocks are never compared. A fault or a disarmed device disengages, as does a pose that is not finite.
+    Absolute times of the two clocks are never compared. A fault, a disarmed device, or a pose that is not finite
+    disengages.
     """
 
     def __init__(self, config: FollowerConfig) -> None:
@@ -132,14 +134,14 @@ class Follower:
         self._phase = Following.ALONE
         self._words = ""
         self._asked = False  # engage() was called
-        self._held = True  # the button, at the newest state: only one that was seen free can be pressed
+        self._held = True  # button in the newest state; initially True, so that a press counts only after a release
         self._tick = 0
         self._sampled = 0  # ns, of the newest state
-        self._base: int | None = None  # ns, delay of the first state, clocks' offset included
-        self._usual = 0.0  # ns, smoothed delay, less that
-        self._now = 0  # ns, newest
-        self._gain_from = 0  # ns, when the force began to grow
-        self._waits = False  # the robot was told to hold since the newest target
+        self._base: int | None = None  # ns, delay of the first state, including the offset of the clocks
+        self._usual = 0.0  # ns, smoothed delay, relative to _base
+        self._now = 0  # ns
+        self._gain_from = 0  # ns, start of the force ramp
+        self._waits = False  # target() has returned None since the last target
         self._hand0: tuple[Vec3, Quat | None] = ((0.0, 0.0, 0.0), None)
         self._pose0 = Pose((0.0, 0.0, 0.0))
         self._target = self._pose0
@@ -151,22 +153,22 @@ class Follower:
 
     @property
     def words(self) -> str:
-        """The newest sentence for the operator; each is logged once."""
+        """Newest message for the operator. Each message is logged once."""
         return self._words
 
     def engage(self) -> bool:
-        """The act, for the next state. False, and nothing happens, unless states come and the robot does not follow."""
+        """Engages at the next state. Returns False and does nothing unless the phase is COUPLED."""
         self._asked = self._phase is Following.COUPLED
         return self._asked
 
     def disengage(self) -> None:
-        """The robot stands until the next act."""
+        """Stops the robot until the operator engages again."""
         self._asked = False
         if self._phase in (Following.ENGAGED, Following.CLUTCHED):
             self._phase = Following.COUPLED
 
     def set_scale(self, scale: float, force_scale: float) -> bool:
-        """False, and nothing changes, while the robot follows. Raises ValueError when a scale is out of its bounds."""
+        """Returns False and changes nothing while the robot follows. Raises ValueError if a scale is out of bounds."""
         FollowerConfig(scale=scale, force_scale=force_scale, engage_by="call")
         if self._phase is Following.ENGAGED:
             return False
@@ -174,11 +176,12 @@ class Follower:
         return True
 
     def target(self, hand: DeviceState, pose: Pose, now_ns: int) -> Pose | None:
-        """Where the tool is to go, at most `speed` away from the last target; None: hold. `pose`: where the tool is.
-        `now_ns`: when the state came, of any clock that does not go back."""
+        """Returns the next target of the tool, which moves at most at `speed`, or None if the robot must hold its
+        pose. `pose` is the current pose of the tool. `now_ns` is the arrival time of the state, from any monotonic
+        clock."""
         elapsed = self._advance(now_ns)
         if hand.tick < self._tick:
-            self._lose()  # another server, or the same one anew
+            self._lose()  # the server has been replaced or restarted
         age = self._take(hand)
         if age > self._late_ns + 250_000_000:
             self._lose()
@@ -198,7 +201,7 @@ class Follower:
         return self._target
 
     def silence(self, now_ns: int) -> Pose | None:
-        """The same while no state comes, every few milliseconds: the frozen target, then None."""
+        """Must be called every few milliseconds while no state arrives. Returns the last target at first, then None."""
         self._advance(now_ns)
         if self._phase is not Following.ENGAGED or self._age() > self._late_ns + 20_000_000:
             self._waits = True
@@ -206,8 +209,8 @@ class Follower:
         return self._target
 
     def touch(self, contact: ToolContact | None) -> Touch | None:
-        """What the hand feels of the tool's contact; nothing while the robot does not follow. None for None: nothing is
-        sent, because a zero would look measured."""
+        """Returns the force on the hand for a contact of the tool; zero while the robot does not follow. Returns
+        None, which is not sent, if `contact` is None, because a zero force would look like a measurement."""
         if contact is None:
             self._say(NO_CONTACT)
             return None
@@ -224,7 +227,7 @@ class Follower:
         return Touch(force, stiffness, contact=surface, torque=torque, grip_force=grip)
 
     def _surface(self, contact: ToolContact, back: Quat, gain: float) -> tuple[Mat3 | None, Contact | None]:
-        """Stiffness and surface in the hand's units, where both are known."""
+        """Transforms stiffness and surface to the units of the hand, if both are known."""
         k, normal = contact.stiffness, contact.force if contact.normal is None else contact.normal
         length = math.hypot(*normal)
         if k is None or not k > 0 or not 0 < length < math.inf:
@@ -237,18 +240,19 @@ class Follower:
         return (a, b, c), Contact(n, -depth) if self._config.axes == "xyz" else None
 
     def _advance(self, now_ns: int) -> int:
-        """Time passes; ns since the last time, bounded."""
+        """Advances the time. Returns the elapsed time in ns, at most _LONGEST_STEP_NS."""
         elapsed, self._now = max(now_ns - self._now, 0), max(now_ns, self._now)
         if self._base is not None and self._age() > self._late_ns + 250_000_000:
             self._lose()
         return min(elapsed, _LONGEST_STEP_NS)
 
     def _age(self) -> float:
-        """ns, of the newest state, beyond the smoothed delay."""
+        """Age of the newest state beyond the smoothed delay, ns."""
         return 0.0 if self._base is None else (self._now - self._sampled - self._base) - self._usual
 
     def _take(self, hand: DeviceState) -> float:
-        """A new state; its age as it comes. The first one after silence says what delay is usual."""
+        """Records a new state and returns its age on arrival. The first state after a silence defines the base of the
+        delay."""
         if self._base is None:
             self._base, self._usual = self._now - hand.sampled_ns, 0.0
             self._sampled = hand.sampled_ns
@@ -265,7 +269,7 @@ class Follower:
         self._tick = 0
 
     def _act(self, hand: DeviceState, pose: Pose, fresh: bool) -> None:
-        """What the operator does."""
+        """Handles the clutch button and engage()."""
         config = self._config
         button = config.clutch_button
         held = button is not None and bool(hand.buttons >> button & 1)
@@ -291,14 +295,14 @@ class Follower:
             self._begin(hand, pose)
 
     def _begin(self, hand: DeviceState, pose: Pose) -> None:
-        """Engaged from a map that moves nothing now."""
+        """Engages with an offset that keeps the target at the current pose."""
         self._phase, self._gain_from = Following.ENGAGED, self._now
         self._hand0 = (hand.position, hand.turning.orientation if hand.turning else None)
         self._pose0 = pose
         self._waits = True
 
     def _approach(self, hand: DeviceState, seconds: float) -> None:
-        """The target goes to the hand's place, no faster than it may."""
+        """Moves the target toward the pose of the hand within the speed limits."""
         config, last = self._config, self._target
         moved = self._masked([a - b for a, b in zip(hand.position, self._hand0[0])])
         wanted = [a + b for a, b in zip(self._pose0.position, _times(self._scale, _rotated(self._turn, moved)))]
@@ -338,7 +342,7 @@ def _finite(pose: Pose) -> bool:
 
 
 def _share(whole: float, most: float) -> float:
-    """Of a way, so that no more than `most` is gone."""
+    """Returns the factor that limits a displacement of length `whole` to `most`."""
     return 1.0 if whole <= most else most / whole
 
 

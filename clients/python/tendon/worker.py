@@ -1,18 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A worker: a program that a front starts and asks, and that may take its time, stop or die.
+"""A worker: a program that computes forces for a front, and that may be slow, stop or crash.
 
     import tendon
 
     tendon.worker.run(lambda hand: [-500 * x for x in hand.position])
 
-The front is `tendon-fem serve --worker "python3 FILE"` or another program with clients/cpp/worker. It owns the session
-with the server; clients/cpp/worker/stream.h has the bytes between the two. On many ranks of MPI,
+The front owns the session with the server. It is `tendon-fem serve --worker "python3 FILE"` or another program
+based on clients/cpp/worker; the protocol is described in clients/cpp/worker/stream.h. With several MPI ranks,
 
     from mpi4py import MPI
 
     tendon.worker.run(answer, MPI.COMM_WORLD)
 
-rank 0 alone speaks to the front. `tendon-conformance worker -- python3 FILE` tests such a program.
+only rank 0 communicates with the front. `tendon-conformance worker -- python3 FILE` tests a worker.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from .messages import DeviceState, ForceCommand, Touch
 
 ADDRESS_VARIABLE = "TENDON_WORKER_ADDRESS"
 SECRET_VARIABLE = "TENDON_WORKER_SECRET"
-"""The environment of a worker: unix:PATH or tcp:HOST:PORT, and the secret that opens the stream."""
+"""Environment variables of a worker: the address, unix:PATH or tcp:HOST:PORT, and the secret."""
 
 OPENING_MAGIC = b"tendon worker 1\n"
 
@@ -40,7 +40,7 @@ _SEQUENCE_BYTES = 8
 
 
 class Communicator(Protocol):
-    """What run() needs of mpi4py's communicators, so that this package does not need mpi4py."""
+    """The part of mpi4py's communicator that run() uses, so that this package does not depend on mpi4py."""
 
     def Get_rank(self) -> int: ...
 
@@ -50,17 +50,18 @@ class Communicator(Protocol):
 
 
 def run(answer: Physics, comm: Communicator | None = None) -> None:
-    """Answers every state by `answer` until the front ends the stream. None is the answer where no force is known.
+    """Answers each state with the result of `answer` until the front closes the stream. None means that no force is
+    known.
 
-    With `comm` every rank calls this: each state is given to `answer` on every rank, the same one at once, and the
-    answer of rank 0 is sent. An exception of `answer` passes through; with `comm` it is printed and ends all ranks,
-    because the others may wait for this one for ever. The front then starts the next worker.
+    With `comm`, all ranks must call this function. `answer` is called with the same state on each rank, and the
+    result of rank 0 is sent. Exceptions of `answer` propagate. With `comm`, they are printed and terminate all
+    ranks, because the others could wait forever. The front then starts a new worker.
 
-    A number that is not finite or out of bounds is sent as it is: the front refuses it, counts it and says so.
+    Forces that are not finite or out of bounds are sent unchanged; the front refuses, counts and reports them.
 
-    Raises RuntimeError when the environment has no address or no secret, "TENDON_WORKER_ADDRESS: …", when it is of
-    another form, and when what comes is no state; ConnectionError when no front listens there; ValueError when an
-    answer has a wrong shape. On all other ranks an error of the stream is its end.
+    Raises RuntimeError if the address or secret is missing in the environment ("TENDON_WORKER_ADDRESS: …") or
+    malformed, or if a record is not a state; ConnectionError if no front listens there; ValueError if an answer
+    has a wrong shape. The other ranks treat an error of the stream as its end.
     """
     if comm is None:
         with Stream() as stream:
@@ -75,17 +76,17 @@ def run(answer: Physics, comm: Communicator | None = None) -> None:
 
 
 class Stream:
-    """A worker's end of the stream to its front, for a loop of your own. run() has all that most programs need."""
+    """The worker's end of the stream to its front, for programs with their own loop. Most programs only need run()."""
 
     def __init__(self) -> None:
-        """Connects to where the environment says, and opens the stream: the program is ready to answer. Raises as
-        run() does."""
+        """Connects to the address in the environment and opens the stream, which reports that the worker is ready.
+        Raises as run() does."""
         self._socket = _connected(_variable(ADDRESS_VARIABLE), OPENING_MAGIC + _variable(SECRET_VARIABLE).encode())
         self._bytes = bytearray()
 
     def next_state(self) -> tuple[int, DeviceState] | None:
-        """Waits for the next state, and the sequence to answer it with; None when the front has ended the stream.
-        Raises RuntimeError when what comes is no state."""
+        """Blocks until the next state and returns its sequence and the state. Returns None if the front has closed
+        the stream. Raises RuntimeError if the record is not a state."""
         if (head := self._take(_LENGTH_BYTES)) is None:
             return None
         length = int.from_bytes(head, "little")
@@ -101,8 +102,8 @@ class Stream:
         raise RuntimeError("the front has sent what is no state")
 
     def send(self, sequence: int, hand: DeviceState, touch: Touch | Sequence[float] | None) -> bool:
-        """Answers the state `hand`, which came with `sequence`; None: no force is known. False when the stream has
-        ended. Raises ValueError when `touch` has a wrong shape."""
+        """Answers the state `hand` with that `sequence`. None means that no force is known. Returns False if the
+        stream is closed. Raises ValueError if `touch` has a wrong shape."""
         body = b"" if touch is None else codec.write_frame(_command(sequence, hand, touch))
         if len(body) > limits.MAX_DATAGRAM:
             raise ValueError(f"the answer has {len(body)} bytes: expected at most {limits.MAX_DATAGRAM}")
@@ -122,7 +123,7 @@ class Stream:
         self.close()
 
     def _take(self, size: int) -> bytes | None:
-        """The next bytes of the stream; None at its end."""
+        """Returns the next `size` bytes of the stream, or None at its end."""
         while len(self._bytes) < size:
             try:
                 piece = self._socket.recv(4096)
@@ -137,7 +138,7 @@ class Stream:
 
 
 def _lead(answer: Physics, comm: Communicator) -> None:
-    """Rank 0. Whatever becomes of the stream, the others hear of its end."""
+    """The loop of rank 0. Informs the other ranks of the end of the stream, also after errors."""
     try:
         with Stream() as stream:
             while (asked := stream.next_state()) is not None:
@@ -164,7 +165,7 @@ def _command(sequence: int, hand: DeviceState, touch: Touch | Sequence[float]) -
         sequence,
         hand.tick,
         answer.force,
-        limits.MAX_VALID_FOR_US,  # not used, but must be within its bounds
+        limits.MAX_VALID_FOR_US,  # ignored, but must be within its bounds
         answer.local_model(hand.position),
         topology_changed=answer.topology_changed,
         error=answer.error,
@@ -186,7 +187,7 @@ def _variable(name: str) -> str:
 
 
 def _connected(address: str, opening: bytes) -> socket.socket:
-    """A stream to `address` that has been opened."""
+    """Connects to `address` and sends `opening`."""
     kind, _, place = address.partition(":")
     try:
         host = parse_address(place) if kind == "tcp" else None

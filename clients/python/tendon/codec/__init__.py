@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Values to bytes and back: the only modules that know the layout of the header and protobuf (WIRE.md).
+"""Encoding and decoding of messages. Only these modules depend on the header layout and on protobuf (WIRE.md).
 
-Encoding trusts its input, except that texts and lists are cut to their bounds. Decoding trusts nothing: it returns
-None for input that it refuses.
+Encoding trusts its input, except that texts and lists are truncated to their bounds. Decoding does not: it returns
+None for invalid input.
 """
 
 from ..generated import Answer, Echo

@@ -17,20 +17,19 @@ from .fields import OutOfBounds, parsed
 
 @dataclass(frozen=True, slots=True)
 class DataContent:
-    """What a Data datagram holds."""
+    """The content of a Data datagram."""
 
     sent_ns: int
     echo: Echo | None
-    frames: list[Frame]  # in the order of the datagram, every value within bounds; of columns each state
-    # The number of frames and echoes with a value out of bounds. They are left out, except for requests
-    # (see Control.invalid) and answers (see Code.INVALID) with a valid id.
+    frames: list[Frame]  # in order, with all values within bounds; states in columns are separate entries
+    # Number of frames and echoes with a value out of bounds. They are omitted, except requests (see Control.invalid)
+    # and answers (see Code.INVALID) with a valid id.
     invalid: int
 
 
 def write_data_head(sent_ns: int, echo: Echo | None) -> bytes:
-    """The front of a Data datagram's body. Any number of results of write_frame() may follow it.
-
-    (Protobuf defines the concatenation of two messages as their merge.)
+    """Encodes the beginning of a Data body. Results of write_frame() may follow, since Protobuf merges concatenated
+    messages.
     """
     head = pb.Datagram(tx_time_ns=sent_ns)
     if echo is not None:
@@ -45,7 +44,7 @@ def write_frame(frame: Frame) -> bytes:
 
 
 def read_data(body: bytes) -> DataContent | None:
-    """None when the body is malformed: not protobuf, too many frames, or without a usable tx_time."""
+    """Returns None if the body is malformed: not protobuf, too many frames, or without a valid tx_time."""
     try:
         message = parsed(pb.Datagram(), body)
     except DecodeError:

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Converts single fields of protobuf messages, for `generated`. Each function checks the bound of the field. If the
-value is out of bounds, it raises OutOfBounds with the name of the field."""
+"""Conversion of single fields of protobuf messages, for `generated`. Each function checks the bounds of the field and
+raises OutOfBounds with the name of the field if they are violated."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from ..generated import Mat3, Quat, Vec3
 
 
 class OutOfBounds(Exception):
-    """A value that is out of bounds."""
+    """A value is out of bounds."""
 
     def __init__(self, field: str) -> None:
         super().__init__(field)
@@ -28,7 +28,7 @@ _Inner = TypeVar("_Inner")
 
 
 def read_inner(name: str, read: Callable[[_Inner], _Value], message: _Inner) -> _Value:
-    """Reads a message inside another one. An exception gets the name of its field as a prefix."""
+    """Reads a nested message. Exceptions are prefixed with the name of the field."""
     try:
         return read(message)
     except OutOfBounds as error:
@@ -45,18 +45,18 @@ def read_each(
 
 def read_vector(name: str, message: pb.Vec3) -> Vec3:
     x, y, z = message.x, message.y, message.z
-    if not (-1e12 <= x <= 1e12 and -1e12 <= y <= 1e12 and -1e12 <= z <= 1e12):  # nor is NaN
+    if not (-1e12 <= x <= 1e12 and -1e12 <= y <= 1e12 and -1e12 <= z <= 1e12):  # false for NaN
         raise OutOfBounds(name)
     return (x, y, z)
 
 
 def write_vector(message: pb.Vec3, vector: Sequence[float]) -> None:
     message.x, message.y, message.z = vector
-    message.SetInParent()  # the message is there even if all of it is zero
+    message.SetInParent()  # marks the message as present even if all values are zero
 
 
 def read_normal(name: str, message: pb.Vec3) -> Vec3:
-    """Reads a vector of length 1."""
+    """Reads a unit vector."""
     normal = read_vector(name, message)
     if not abs(hypot(*normal) - 1) <= limits.UNIT_TOLERANCE:
         raise OutOfBounds(name)
@@ -64,7 +64,7 @@ def read_normal(name: str, message: pb.Vec3) -> Vec3:
 
 
 def read_box(name: str, low: Vec3 | None, high: Vec3 | None) -> tuple[Vec3, Vec3] | None:
-    """Returns both corners, or None if neither is there. Each coordinate of `low` is at most that of `high`."""
+    """Returns both corners, or None if neither is present. Requires `low` ≤ `high` in each coordinate."""
     if low is None and high is None:
         return None
     if low is None or high is None or any(a > b for a, b in zip(low, high)):
@@ -74,7 +74,7 @@ def read_box(name: str, low: Vec3 | None, high: Vec3 | None) -> tuple[Vec3, Vec3
 
 def read_rotation(name: str, message: pb.Quat) -> Quat:
     q = (message.w, message.x, message.y, message.z)
-    if not abs(hypot(*q) - 1) <= limits.UNIT_TOLERANCE:  # nor is NaN
+    if not abs(hypot(*q) - 1) <= limits.UNIT_TOLERANCE:  # false for NaN
         raise OutOfBounds(name)
     return q
 
@@ -99,7 +99,7 @@ def read_counts(name: str, entries: Sequence[int], fewest: int, most: int) -> tu
 
 
 def read_padded(entries: tuple[float, ...], length: int) -> tuple[float, ...]:
-    """Returns `length` entries. Missing ones are 0."""
+    """Returns `length` entries, padded with 0."""
     return entries[:length] + (0.0,) * (length - len(entries))
 
 
@@ -116,7 +116,7 @@ def read_matrix(name: str, entries: Sequence[float]) -> Mat3:
 
 
 def entries(matrix: Mat3) -> list[float]:
-    """The shortest of the three forms."""
+    """Returns the shortest of the three forms."""
     (a, b, c), (d, e, f), (g, h, i) = matrix
     if any((b, c, d, f, g, h)):
         return [a, b, c, d, e, f, g, h, i]
@@ -137,7 +137,7 @@ def read_texts(name: str, texts: Iterable[str], fewest: int, most: int, bytes: i
 
 
 def clip(text: str, limit: int) -> str:
-    """The front of `text`, at most `limit` bytes of UTF-8, and up to the first lone surrogate, which has no UTF-8."""
+    """Truncates `text` to at most `limit` bytes of UTF-8, and before the first lone surrogate, which has no UTF-8."""
     try:
         encoded = text.encode()
     except UnicodeEncodeError as error:
@@ -149,7 +149,7 @@ _Message = TypeVar("_Message", pb.Datagram, pb.Hello, pb.Answer)
 
 
 def parsed(message: _Message, body: bytes) -> _Message:
-    """Raises DecodeError when the body is not protobuf."""
+    """Raises DecodeError if the body is not protobuf."""
     message.ParseFromString(body)
     try:
         whole = _is_whole(body)
@@ -161,9 +161,8 @@ def parsed(message: _Message, body: bytes) -> _Message:
 
 
 def _is_whole(body: bytes) -> bool:
-    """Whether the whole body is one message. Some versions of protobuf, Debian's among them, end the message at a
-    field 0 or at the end of a group that has not begun, and ignore the rest. Raises IndexError when
-    that is not protobuf."""
+    """Whether the body is exactly one message. Some versions of protobuf, including that of Debian, end the message
+    at a field 0 or an unexpected end of group and ignore the rest. Raises IndexError if the body is not protobuf."""
     at, groups, end = 0, 0, len(body)
     while at < end:
         tag = body[at]
@@ -195,7 +194,7 @@ def _is_whole(body: bytes) -> bool:
 
 
 def _varint(body: bytes, at: int) -> tuple[int, int]:
-    """The integer at `at`, and where it ends."""
+    """Returns the integer at `at` and the position after it."""
     value = shift = 0
     while True:
         byte = body[at]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Frames that need more than their fields: invalid requests and answers, and states in columns."""
+"""Frames with additional rules: invalid requests and answers, and states in columns."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from .fields import OutOfBounds
 
 
 class Refused(OutOfBounds):
-    """A request or an answer that is out of bounds. `frame` replaces it. If it was dropped, the later ones would never
-    be delivered."""
+    """A request or answer that is out of bounds. `frame` is used instead, because dropping it would block the
+    following ones."""
 
     def __init__(self, field: str, frame: Control | ControlAck) -> None:
         super().__init__(field)
@@ -22,7 +22,7 @@ class Refused(OutOfBounds):
 
 
 def read(message: pb.Frame) -> Frame | None:
-    """Returns None for a frame that only newer peers know."""
+    """Returns None for frames that only newer peers know."""
     if message.HasField("control"):
         return _read_control(message.control)
     if message.HasField("control_ack"):
@@ -61,7 +61,7 @@ def write_into(message: pb.Frame, frame: Frame) -> None:
 
 
 def read_states(message: pb.DeviceStates) -> list[DeviceState]:
-    """States in columns, one by one; each column has an entry of each device, or where it may be absent none."""
+    """Expands states in columns. Each column has one entry for each device, or none if it is optional."""
     devices = [device for device in range(limits.MAX_DEVICES) if message.devices >> device & 1]
     count = len(devices)
     vectors = (message.position_m, message.velocity_mps, message.force_applied_n)
@@ -88,7 +88,7 @@ def read_states(message: pb.DeviceStates) -> list[DeviceState]:
     return states
 
 
-# ---- Checks of what the user wants to send ----
+# ---- Validation of values before sending ----
 
 
 def is_radius(metres: float) -> bool:
@@ -96,7 +96,7 @@ def is_radius(metres: float) -> bool:
 
 
 def is_contact(contact: Contact) -> bool:
-    """Returns True if a peer accepts it."""
+    """Returns True if a peer accepts the contact."""
     message = pb.Contact()
     generated.write_contact(message, contact)
     try:
@@ -107,11 +107,11 @@ def is_contact(contact: Contact) -> bool:
 
 
 def is_request(request: Request) -> bool:
-    """Returns True if a peer accepts it."""
+    """Returns True if a peer accepts the request."""
     message = pb.Control()
     try:
         generated.write_request(message, request)
         generated.read_request(message)
-    except (OutOfBounds, ValueError):  # ValueError: protobuf cannot hold the number
+    except (OutOfBounds, ValueError):  # ValueError: out of the range of the protobuf type
         return False
     return True

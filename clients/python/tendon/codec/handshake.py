@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The datagrams of the handshake, Hello, Retry and Answer, and the messages in them."""
+"""The datagrams of the handshake, Hello, Retry and Answer, and their messages."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ _RETRY_SIZE = 48
 
 @dataclass(frozen=True, slots=True)
 class HelloDatagram:
-    """A Hello as it is sent. In suite 0 `body` is the result of write_hello(); in suite 1 the handshake adds to it."""
+    """A Hello datagram. In suite 0, `body` is the result of write_hello(); in suite 1, the handshake extends it."""
 
-    random: bytes  # chosen by the client; ties Retry and Answer to one attempt
+    random: bytes  # chosen by the client; identifies the attempt in Retry and Answer
     body: bytes
     cookie: bytes = NO_COOKIE
     suite: Suite = Suite.PLAIN
@@ -50,7 +50,7 @@ class AnswerDatagram:
 
 
 def encode_hello(hello: HelloDatagram) -> bytes:
-    """Always MAX_DATAGRAM bytes, so that no reply to it is larger."""
+    """Always returns MAX_DATAGRAM bytes, so that replies are never larger (no amplification)."""
     header = encode_header(Header(DatagramType.HELLO, hello.suite))
     datagram = header + _HELLO.pack(hello.random, hello.cookie, len(hello.body)) + hello.body
     return datagram.ljust(limits.MAX_DATAGRAM, b"\0")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The 16 bytes in the clear at the front of every datagram (WIRE.md, "Header")."""
+"""The unencrypted 16-byte header of each datagram (WIRE.md, "Header")."""
 
 from __future__ import annotations
 
@@ -12,29 +12,29 @@ from ..messages import PROTOCOL_VERSION, Hello, Refused, Welcome
 
 
 class DatagramType(IntEnum):
-    HELLO = 1  # client → server: may I come in?
-    RETRY = 2  # server → client: say it again with this cookie
-    DATA = 3  # either way, once connected
+    HELLO = 1  # client → server: request for a session
+    RETRY = 2  # server → client: request to repeat the Hello with this cookie
+    DATA = 3  # both directions, in a session
     ANSWER = 4  # server → client: Welcome or Refused
 
 
 class Suite(IntEnum):
-    """How a datagram is protected."""
+    """Protection of a datagram."""
 
-    PLAIN = 0  # not at all: loopback only
+    PLAIN = 0  # none; only on loopback
     NOISE = 1  # Noise_NNpsk0_25519_ChaChaPoly_SHA256
-    AES_GCM = 2  # the handshake of suite 1, and AES-256-GCM from then on: Data only
+    AES_GCM = 2  # handshake of suite 1, then AES-256-GCM; Data only
 
 
 @dataclass(frozen=True, slots=True)
 class Header:
-    """The 16 bytes in the clear at the front of every datagram; suites 1 and 2 authenticate them."""
+    """The unencrypted 16-byte header of each datagram. Suites 1 and 2 authenticate it."""
 
     type: DatagramType
     suite: Suite = Suite.PLAIN
-    epoch: int = 0  # how often the sender has renewed its key, modulo 256; Data of suites 1 and 2 only
-    connection_id: int = 0  # 0 before the server has given one
-    packet_number: int = 0  # 0, 1, 2 … per direction in Data, 0 in all others
+    epoch: int = 0  # number of key renewals of the sender modulo 256; only in Data of suites 1 and 2
+    connection_id: int = 0  # 0 until the server has assigned one
+    packet_number: int = 0  # 0, 1, 2 … for each direction in Data, otherwise 0
 
 
 HEADER_SIZE = 16
