@@ -19,8 +19,7 @@ struct Touch {
   // The optional fields below allow the device loop to extrapolate the force until the next answer
   // (core/remote/answer.h). The server uses them if `kFeatureLocalModel` is negotiated.
   std::optional<Mat3> stiffness{};  ///< N/m, −∂force/∂position at the state's position; a wall with normal n: k·n·nᵀ
-  double valid_radius = std::numeric_limits<double>::infinity();  ///< m, distance from the state's position within
-                                                                  ///< which the stiffness is valid
+  double valid_radius = std::numeric_limits<double>::infinity();  ///< m, range of the stiffness
   std::optional<Contact> contact{};  ///< the contact surface, optionally with a table of force over depth
   /// The body was cut or torn since the previous answer. The server discards the stiffness and table of both answers.
   bool topology_changed = false;

@@ -38,8 +38,7 @@ class Plug {
     ForceClient::Config client{};  ///< `seed` is replaced by `new_seed`
     std::function<Seed()> new_seed{};
     bool observe = false;                     ///< drop the forces of all programs
-    Duration idle = std::chrono::seconds(1);  ///< time without a requested force after which the owner and the channel
-                                              ///< are released
+    Duration idle = std::chrono::seconds(1);  ///< the owner and the channel are released after this time
   };
 
   /// Connection of one of the two sessions. Each has its own socket.

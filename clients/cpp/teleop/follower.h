@@ -76,8 +76,7 @@ class Follower {
     double force_scale = 1;                        ///< s_f, force on the leader / force on the follower, 0.01 … 100
     Quat rotation{};                               ///< R, from the device base frame to the robot frame; norm 1 ± 1e-3
     std::string axes = "xyz";                      ///< coupled axes of the device; the others move freely without force
-    std::optional<std::uint32_t> clutch_button{};  ///< 0 … 31, clutched while pressed. Empty: only engage() and
-                                                   ///< disengage()
+    std::optional<std::uint32_t> clutch_button{};  ///< 0 … 31, clutched while pressed; empty: no button
     bool toggle = false;                           ///< each press switches between engaged and clutched
     EngageBy engage_by = EngageBy::kButton;
     double speed = 0.25;      ///< m/s, 0.001 … 10, maximum speed of the target

@@ -68,8 +68,7 @@ struct DeviceWish {
 };
 
 struct Wish {
-  bool read = false;                       ///< if false, the message was invalid and rejected for the reason in
-                                           ///< `refused`
+  bool read = false;                       ///< false: invalid, for the reason in `refused`
   std::optional<std::string> permutation;  ///< of the session
   bool full_state = false;
   std::vector<DeviceWish> devices;

@@ -94,13 +94,11 @@ class Touch:
     stiffness: Stiffness | None = None
     valid_radius: float = inf  # m, distance from the state's position within which the stiffness is valid
     contact: Contact | None = None  # the contact surface, optionally with a table of force over depth
-    topology_changed: bool = False  # the body was cut or torn since the previous answer; the server discards both local
-                                    # models
+    topology_changed: bool = False  # cut or torn since the previous answer; the server discards both local models
     error: float | None = None  # N, the engine's estimate of the error of the force
     # For handles with additional actuators (`client.handle`). Servers without FEATURE_HANDLE are sent only the force
     # (`stats.left_out`).
-    torque: Sequence[float] | None = None  # N·m, acting on the hand, axes of the base frame, about the handle's
-                                           # position
+    torque: Sequence[float] | None = None  # N·m on the hand, base frame axes, about the handle's position
     angular_stiffness: Stiffness | None = None  # N·m/rad, −∂torque/∂θ at the state's orientation, in the same forms
     grip_force: float | None = None  # N, on the fingers in the gripper; > 0 opens them
     # Index into `Config.ways` of the method that computed this answer, starting at 1; 0: unspecified. It is not sent

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Prints where the hand is, what it feels, and how far away it is. It only looks on.
+// Prints the position of the hand, the force on it, and the network's round-trip time. An observer.
 import { commandLine, run, type Vec3 } from "tendon-client/node";
 
 const { options } = commandLine("Prints the hand's motion, the force it feels and the network's round trip.", {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// AES-256-GCM of suite 2, in Node only. WebCrypto would do, but it answers by promises; and AES in plain JavaScript tells
-// of the key by the time that it takes. So pages speak suite 1.
+// AES-256-GCM of suite 2, only in Node. WebCrypto is asynchronous, and AES in plain JavaScript leaks the key through
+// timing. Therefore pages use suite 1.
 import { concat } from "./datagram.js";
 
 /** Node 20.16 or newer; undefined elsewhere. */
@@ -9,17 +9,17 @@ export const kHasAes = crypto !== undefined;
 
 const kTagSize = 16;
 const kCipher = "aes-256-gcm";
-/** The nonce of REKEY. */
+/** Nonce of REKEY. */
 const kMaxNonce = 0xffff_ffff_ffff_ffffn;
 
-/** 4 zeros, then the number: big-endian, unlike suite 1's. */
+/** 4 zero bytes and the number in big-endian order, unlike suite 1. */
 function nonce(number: bigint): Uint8Array {
   const bytes = new Uint8Array(12);
   new DataView(bytes.buffer).setBigUint64(4, number);
   return bytes;
 }
 
-/** One key of suite 2. Only where kHasAes. */
+/** A key of suite 2. Requires kHasAes. */
 export class AesKey {
   readonly #key;
 
@@ -27,14 +27,14 @@ export class AesKey {
     this.#key = crypto!.createSecretKey(key);
   }
 
-  /** Ciphertext and tag. */
+  /** Returns ciphertext and tag. */
   encrypt(number: bigint, header: Uint8Array, plain: Uint8Array): Uint8Array {
     const cipher = crypto!.createCipheriv(kCipher, this.#key, nonce(number), { authTagLength: kTagSize });
     cipher.setAAD(header);
     return concat(cipher.update(plain), cipher.final(), cipher.getAuthTag());
   }
 
-  /** Undefined when it is not authentic. */
+  /** Returns undefined if authentication fails. */
   decrypt(number: bigint, header: Uint8Array, sealed: Uint8Array): Uint8Array | undefined {
     if (sealed.length < kTagSize) return undefined;
     const decipher = crypto!.createDecipheriv(kCipher, this.#key, nonce(number), { authTagLength: kTagSize });
@@ -48,7 +48,7 @@ export class AesKey {
     }
   }
 
-  /** The key that follows this one, from which this one cannot be computed. */
+  /** Returns the next key, from which this one cannot be derived. */
   rekey(): AesKey {
     return new AesKey(this.encrypt(kMaxNonce, new Uint8Array(0), new Uint8Array(32)).slice(0, 32));
   }

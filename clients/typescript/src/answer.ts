@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a haptic function returns, why it cannot be sent, and what of it a server takes.
+// Result of a haptic function, its validation, and the part that a server supports.
 import { isBounded, isError, isRadius, isStiffness, isVec3 } from "./bounds.js";
 import { isContact } from "./codec.js";
 import { kMaxValue } from "./limits.js";
@@ -7,39 +7,38 @@ import {
   kFeatureHandle, kFeatureLocalModel, type Contact, type DeviceState, type ForceCommand, type Stiffness, type Vec3,
 } from "./messages.js";
 
-/** The physics engine's answer to one device state. */
+/** The answer of a physics engine to one device state. */
 export interface Touch {
-  /** N, on the hand: a wall that resists motion along +x sends −x. */
+  /** N, acting on the hand: a wall that resists motion along +x pushes along −x. */
   readonly force: Vec3;
   /**
-   * N/m, −∂force/∂position at the state's position, so that the device loop can follow the hand until the next force;
-   * a wall with normal n: k·n·nᵀ. Used when the server has agreed to it.
+   * N/m, −∂force/∂position at the state's position; a wall with normal n: k·n·nᵀ. The device loop uses it to
+   * extrapolate the force until the next answer, if the server supports it.
    */
   readonly stiffness?: Stiffness | undefined;
-  /** m, how far from there the stiffness holds. */
+  /** m, distance from the state's position within which the stiffness is valid. */
   readonly validRadius?: number | undefined;
-  /** The surface, with the force at other depths in a table where that is known. */
+  /** The contact surface, optionally with a table of force over depth. */
   readonly contact?: Contact | undefined;
-  /** The body has been cut or torn since the previous answer: neither answer's stiffness and table are used. */
+  /** The body was cut or torn since the previous answer. The server discards both local models. */
   readonly topologyChanged?: boolean | undefined;
   /** N, the engine's estimate of the error of the force. */
   readonly error?: number | undefined;
   /**
-   * N·m on the hand, base frame axes, about the handle's position. For a device whose handle has more motors than those
-   * of its position (`handle`). A server that does not know this is sent the force without it and without the next two
-   * (ClientStats.leftOut).
+   * N·m, acting on the hand, axes of the base frame, about the handle's position. For handles with additional
+   * actuators (`handle`). Other servers are sent the force without it and the next two fields (ClientStats.leftOut).
    */
   readonly torque?: Vec3 | undefined;
   /**
-   * N·m/rad, −∂torque/∂θ at the state's orientation, so that the device loop can follow the turning hand; a spring is
-   * positive. Only in answer to a state with an orientation.
+   * N·m/rad, −∂torque/∂θ at the state's orientation, positive for a spring. The device loop uses it to extrapolate
+   * the torque. Only valid if the state has an orientation.
    */
   readonly angularStiffness?: Stiffness | undefined;
-  /** N on the fingers of the gripper; > 0 opens them. */
+  /** N, on the fingers in the gripper; > 0 opens them. */
   readonly gripForce?: number | undefined;
   /**
-   * Which of the config's `ways` has answered, from 1 on; absent: not said. Left out where there is none of that number
-   * (ClientStats.leftOut), and of a server that does not know kFeatureWays.
+   * Index into `ways` of the config of the method that computed this answer, starting at 1; absent: unspecified. It
+   * is not sent if the index is invalid (ClientStats.leftOut) or the server does not support kFeatureWays.
    */
   readonly way?: number | undefined;
 }
@@ -49,7 +48,7 @@ const objectionTo = (what: string, { x, y, z }: Vec3, unit: string): string =>
     ? `the ${what} is beyond ${kMaxValue} ${unit}`
     : `the ${what} is not finite (NaN or infinity)`;
 
-/** Why an answer cannot be used; empty when it can. */
+/** Returns why an answer is unusable, or an empty string. */
 export function objection(touch: Touch): string {
   const { force, stiffness, validRadius, contact, error, torque, angularStiffness, gripForce } = touch;
   if (!isVec3(force)) return objectionTo("force", force, "N");
@@ -65,7 +64,7 @@ export function objection(touch: Touch): string {
   return good ? "" : "its stiffness, radius, contact or error is not finite, or out of the bounds of WIRE.md";
 }
 
-/** What a server with these features takes of an answer, and what it does not; empty: all of it. */
+/** Returns the part of an answer that a server with these features supports, and a description of the rest. */
 export function usable(
   touch: Touch, hand: DeviceState, features: readonly string[],
 ): { readonly answer: Pick<ForceCommand, "force" | "model" | "torque" | "gripForce">; readonly leftOut: string } {

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// Checks of single values against the bounds of protocol/WIRE.md. gen/codec.ts calls them.
+// Validation of single values against the bounds of protocol/WIRE.md, for gen/codec.ts.
 import type { Quat, Stiffness, Vec3 } from "./messages.js";
 import { kMaxValue, kUnitTolerance } from "./limits.js";
 
-/** Returns false for NaN, too. */
+/** Returns false for NaN. */
 export const isWithin = (value: number, least: number, most: number): boolean => value >= least && value <= most;
 export const isWhole = (value: number, least: number, most: number): boolean =>
   Number.isInteger(value) && value >= least && value <= most;
@@ -12,15 +12,15 @@ export const isVec3 = (v: Vec3): boolean => isBounded(v.x) && isBounded(v.y) && 
 
 const isUnit = (length: number): boolean => Math.abs(length - 1) <= kUnitTolerance;
 export const isRotation = ({ w, x, y, z }: Quat): boolean => isUnit(Math.hypot(w, x, y, z));
-/** Returns true if the vector has length 1. */
+/** Returns whether the vector has length 1. */
 export const isNormal = (v: Vec3 | undefined): boolean =>
   v !== undefined && isVec3(v) && isUnit(Math.hypot(v.x, v.y, v.z));
 
-/** Returns true if both corners are there and min ≤ max, or if neither is there. */
+/** Returns whether both corners are present and min ≤ max, or neither is present. */
 export const isBox = (min: Vec3 | undefined, max: Vec3 | undefined): boolean =>
   min && max ? min.x <= max.x && min.y <= max.y && min.z <= max.z : !min && !max;
 
-/** Returns true if there are 1, 3 or 9 entries, and all are within bounds. */
+/** Returns whether there are 1, 3 or 9 entries within bounds. */
 export const isStiffness = (stiffness: Stiffness): boolean =>
   (stiffness.length === 1 || stiffness.length === 3 || stiffness.length === 9) && stiffness.every(isBounded);
 
@@ -36,17 +36,17 @@ export const areMessages = <Message>(
   messages: readonly Message[], fewest: number, most: number, refused: (message: Message) => string | undefined,
 ): boolean => isWithin(messages.length, fewest, most) && messages.every((message) => refused(message) === undefined);
 
-/** Returns false for number 0 and for numbers that this version does not know. */
+/** Returns false for 0 and unknown values. */
 export const isEnum = (value: number, schema: { readonly value: Record<number, unknown> }): boolean =>
   value !== 0 && schema.value[value] !== undefined;
 
 const kEncoder = new TextEncoder();
-/** Returns true if the text has at most `bytes` bytes of UTF-8. */
+/** Returns whether the text has at most `bytes` bytes of UTF-8. */
 export const isText = (text: string, bytes: number): boolean => kEncoder.encode(text).length <= bytes;
 export const areTexts = (texts: readonly string[], fewest: number, most: number, bytes: number): boolean =>
   isWithin(texts.length, fewest, most) && texts.every((text) => isText(text, bytes));
 
-// The next two check the answer of an engine. An infinite radius means the same as an absent one.
+// The next two check the answer of an engine. An infinite radius is equivalent to an absent one.
 export const isRadius = (metres: number | undefined): boolean =>
   metres === undefined || metres === Infinity || isWithin(metres, 0, kMaxValue);
 export const isError = (newtons: number | undefined): boolean =>

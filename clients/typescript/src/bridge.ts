@@ -8,15 +8,15 @@ import { kMaxDatagram } from "./limits.js";
 import { addressText, isLoopback, lookUp, parseAddress, parseServer, udp } from "./udp.js";
 
 export interface BridgeConfig {
-  /** HOST:PORT for WebSockets; port 0 lets the system choose. */
+  /** HOST:PORT for WebSockets; port 0: chosen by the system. */
   readonly listen: string;
   /** HOST:PORT of tendond; HOST is a name or an address. */
   readonly to: string;
-  /** Pages from there may connect, besides those from this machine: "https://lab.example". */
+  /** Additional origins of pages that may connect: "https://lab.example". */
   readonly origins: readonly string[];
-  /** WebSockets at once. */
+  /** Maximum number of open WebSockets. */
   readonly maxPeers: number;
-  /** Datagrams per second that one page may send; more are dropped. */
+  /** Datagrams per second that a page may send; more are dropped. */
   readonly maxRateHz: number;
 }
 
@@ -24,39 +24,39 @@ export const kBridgeDefaults: BridgeConfig = {
   listen: "127.0.0.1:47180", to: "127.0.0.1:47100", origins: [], maxPeers: 32, maxRateHz: 4000,
 };
 
-/** Counts of what the bridge has passed on and dropped. */
+/** Counters of the bridge. */
 export interface BridgeCounts {
-  /** WebSockets open now. */
+  /** Open WebSockets. */
   peers: number;
   opened: number;
-  /** WebSockets refused: a foreign origin, or too many. */
+  /** WebSockets refused because of their origin or their number. */
   refusedOrigin: number;
   refusedFull: number;
   toServer: number;
   toPage: number;
-  /** Not passed on: not a datagram of Tendon. */
+  /** Dropped: not a Tendon datagram. */
   malformed: number;
-  /** Not passed on: not encrypted, and from another machine. */
+  /** Dropped: unencrypted and from another machine. */
   plain: number;
-  /** Not passed on: more than maxRateHz. */
+  /** Dropped: above maxRateHz. */
   tooFast: number;
-  /** Not passed on: the page does not keep up, and a newer one follows. */
+  /** Dropped: replaced by a newer one because the page is too slow. */
   tooSlow: number;
 }
 
-/** Waiting in a WebSocket: some 60 ms of states at 1 kHz. */
+/** Bytes waiting in a WebSocket: about 60 ms of states at 1 kHz. */
 const kMaxWaitingBytes = 16 * 1024;
-/** A page that has been silent for this long is gone; a session sends something every 50 ms. */
+/** A page that is silent for this time is disconnected. A session sends every 50 ms. */
 const kIdleMs = 30_000;
 
 /**
- * Lets pages in browsers, which have no UDP, talk to tendond: one binary message of a WebSocket is one datagram, and each
- * WebSocket has a UDP socket of its own. It has no key and reads only the header in the clear.
+ * Connects browsers, which have no UDP, to tendond. Each binary WebSocket message contains one datagram, and each
+ * WebSocket has its own UDP socket. The bridge has no key and reads only the unencrypted header.
  *
- * To tendond all of this comes from the bridge's machine, and there it believes datagrams in the clear. So the bridge lets
- * in only pages of this machine and of the origins it was told (a page from elsewhere that happens to be open here could
- * otherwise move the hand), and passes datagrams in the clear on only from WebSockets that come from this machine, not
- * through a proxy either.
+ * For tendond, all datagrams come from the machine of the bridge, from which it accepts unencrypted datagrams.
+ * Therefore the bridge accepts only pages of this machine and of the configured origins, because any page open in a
+ * browser could otherwise move the hand. Unencrypted datagrams are forwarded only from WebSockets of this machine
+ * without a proxy.
  */
 export class Bridge {
   readonly counts: BridgeCounts = {
@@ -75,7 +75,7 @@ export class Bridge {
     this.#http.on("upgrade", (request: IncomingMessage, socket: Duplex, head: Buffer) => this.#meet(request, socket, head));
   }
 
-  /** Throws a sentence when an address is invalid, or the system refuses it. */
+  /** Throws an Error if an address is invalid or cannot be used. */
   static async open(config: Partial<BridgeConfig> = {}): Promise<Bridge> {
     const bridge = new Bridge({ ...kBridgeDefaults, ...config });
     await lookUp(parseServer(bridge.#config.to).host);
@@ -90,13 +90,13 @@ export class Bridge {
     return bridge;
   }
 
-  /** Where it listens: HOST:PORT. */
+  /** Address at which it listens, HOST:PORT. */
   get address(): string {
     const { address, port } = this.#http.address() as AddressInfo;
     return addressText({ host: address, port });
   }
 
-  /** Ends all conversations. */
+  /** Closes all connections. */
   async close(): Promise<void> {
     for (const page of this.#webSockets.clients) page.terminate();
     await new Promise<void>((resolve) => {
@@ -107,7 +107,7 @@ export class Bridge {
 
   #meet(request: IncomingMessage, socket: Duplex, head: Buffer): void {
     const refuse = (status: string): void => {
-      socket.once("finish", () => socket.destroy()); // whatever the other end does
+      socket.once("finish", () => socket.destroy()); // even if the client does not close
       socket.end(`HTTP/1.1 ${status}\r\nConnection: close\r\n\r\n`);
     };
     socket.on("error", () => {}); // "close" follows
@@ -122,7 +122,7 @@ export class Bridge {
     }
   }
 
-  /** A program that is not a browser sends no origin. It could use UDP as well. */
+  /** Programs other than browsers send no origin. They could use UDP as well. */
   #isWelcome(origin: string | undefined): boolean {
     if (origin === undefined || this.#config.origins.includes(origin)) return true;
     return URL.canParse(origin) && isLoopbackName(new URL(origin).hostname);
@@ -163,7 +163,7 @@ export class Bridge {
   }
 }
 
-/** A rate limit: that many per second, and at most a tenth of that at once. */
+/** A token bucket for a rate per second with a burst of a tenth of that. */
 class RateLimit {
   #left: number;
   #then = 0;
@@ -185,7 +185,7 @@ class RateLimit {
 const isLoopbackName = (name: string): boolean =>
   name === "localhost" || name.endsWith(".localhost") || isLoopback(name.replace(/^\[|\]$/g, ""));
 
-/** From this machine, and not from another through a proxy on this one. */
+/** Whether the request comes from this machine without a proxy. */
 function isLocal(request: IncomingMessage): boolean {
   const { headers, socket } = request;
   const proxied = ["forwarded", "x-forwarded-for", "x-real-ip", "via"].some((name) => headers[name] !== undefined);

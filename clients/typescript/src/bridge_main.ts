@@ -68,7 +68,7 @@ function parse(): { readonly config: BridgeConfig; readonly json: boolean } {
   };
 }
 
-/** Exits with 0 after --help and with 2 if the command line is not valid. */
+/** Exits with 0 after --help and with 2 if the command line is invalid. */
 function commandLine(): { readonly config: BridgeConfig; readonly json: boolean } {
   try {
     return parse();

@@ -3,14 +3,14 @@ import { readFileSync, statSync } from "node:fs";
 import { parseKeyFile, type ClientKey } from "./key_file.js";
 
 /**
- * The key in this file, as `tendond keygen` writes it. Throws an Error, "FILE: what is wrong": it cannot be read, it is a folder
- * or a pipe, others may read it, it is no key file, or the key is weak.
+ * Reads a key file written by `tendond keygen`. Throws an Error, "FILE: what is wrong", if the file is unreadable,
+ * not a regular file, readable by other users, or malformed, or if the key is weak.
  */
 export function readClientKey(file: string): ClientKey {
   try {
     const status = statSync(file);
-    if (!status.isFile()) throw new RangeError("it is not a regular file"); // before it is opened: a pipe would wait for ever
-    // Windows has no such bits: they are all set there.
+    if (!status.isFile()) throw new RangeError("it is not a regular file"); // opening a pipe would block
+    // Windows has no permission bits; all are set there.
     if (process.platform !== "win32" && (status.mode & 0o077) !== 0) {
       throw new RangeError(`others may read this key: run \`chmod 600 ${file}\``);
     }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Converts the bodies of datagrams to values and back, with gen/codec.ts. Only these two and fields.ts know protobuf.
-// Encoding trusts its input, except that texts and lists are cut to their bounds. Decoding trusts nothing: undefined for
-// what it refuses, and never throws.
+// Conversion of datagram bodies, with gen/codec.ts. Only these two and fields.ts depend on protobuf. Encoding trusts
+// its input, except that texts and lists are truncated to their bounds. Decoding never throws and returns undefined
+// for invalid input.
 import { create, fromBinary, toBinary, type DescMessage, type MessageShape } from "@bufbuild/protobuf";
 import * as gen from "./gen/codec.js";
 import * as pb from "./gen/tendon_pb.js";
@@ -13,42 +13,42 @@ export type { Bye, ControlAck, Echo } from "./messages.js";
 
 export interface Control {
   readonly id: number;
-  /** Undefined if this version does not know the request, or if it is invalid. */
+  /** Undefined if it is unknown in this version or invalid. */
   readonly request?: Request | undefined;
-  /** The name of the field that is out of bounds. */
+  /** Name of the field that is out of bounds. */
   readonly invalid?: string | undefined;
 }
 
 export type Frame = PlainFrame | { readonly kind: "control"; readonly value: Control };
 
-/** What a Data datagram holds. */
+/** The content of a Data datagram. */
 export interface DataContent {
   readonly sent: Nanoseconds;
   readonly echo: Echo | undefined;
-  /** In the order of the datagram, every value within bounds. */
+  /** In order, with all values within bounds. */
   readonly frames: readonly Frame[];
   /**
-   * The number of frames and echoes with a value out of bounds. They are left out, except for requests
-   * (see Control.invalid) and answers (see Code.INVALID) with a valid id.
+   * Number of frames and echoes with a value out of bounds. They are omitted, except requests (see Control.invalid)
+   * and answers (see Code.INVALID) with a valid id.
    */
   readonly invalid: number;
 }
 
-// ---- Data. Protobuf defines the concatenation of two messages as their merge, so a datagram is written piece by piece.
+// ---- Data. Protobuf merges concatenated messages, so a datagram can be written in pieces.
 
-/** The first piece of a Data body. */
+/** Encodes the beginning of a Data body. */
 export function encodeHead(sent: Nanoseconds, echo: Echo | undefined): Uint8Array {
   const head = create(pb.DatagramSchema, { txTimeNs: sent, ...(echo && { echo: gen.writeEcho(echo) }) });
   return toBinary(pb.DatagramSchema, head);
 }
 
-/** A further piece of a Data body: one frame. */
+/** Encodes a further piece of a Data body: one frame. */
 export function encodeFrame(frame: Frame): Uint8Array {
   const body = frame.kind === "control" ? writeControl(frame.value) : gen.writeFrame(frame);
   return toBinary(pb.DatagramSchema, create(pb.DatagramSchema, { frames: [{ body }] }));
 }
 
-/** Undefined when the body is malformed: not protobuf, too many frames, or without a usable time. */
+/** Returns undefined if the body is malformed: not protobuf, too many frames, or without a valid time. */
 export function decodeData(body: Uint8Array): DataContent | undefined {
   const datagram = parse(pb.DatagramSchema, body);
   if (!datagram || datagram.frames.length > limits.kMaxFrames) return undefined;
@@ -57,7 +57,7 @@ export function decodeData(body: Uint8Array): DataContent | undefined {
   const frames: Frame[] = [];
   let invalid = 0;
   for (const { body } of datagram.frames) {
-    if (body.case === undefined || body.case === "states") continue; // of a newer peer, or not asked for
+    if (body.case === undefined || body.case === "states") continue; // from a newer peer, or not requested
     const frame = body.case === "control" ? readControl(body.value) : gen.readFrame(body);
     if (!frame || (frame.kind === "control" && frame.value.invalid !== undefined)) ++invalid;
     const told = frame ?? refusedAck(body);
@@ -68,8 +68,7 @@ export function decodeData(body: Uint8Array): DataContent | undefined {
   return { sent, echo, frames, invalid };
 }
 
-// A request or an answer that is out of bounds is replaced, not dropped. If it was dropped, the later ones would never
-// be delivered.
+// Requests and answers that are out of bounds are replaced, because dropping them would block the following ones.
 
 /** Returns undefined if the id is 0. */
 function readControl({ id, op }: pb.Control): Frame | undefined {
@@ -124,7 +123,7 @@ function parse<Schema extends DescMessage>(schema: Schema, bytes: Uint8Array): M
   }
 }
 
-// ---- Checks of what the user wants to send: true if a peer accepts it
+// ---- Validation of values before sending: true if a peer accepts them
 
 export const isContact = (contact: Contact): boolean => gen.refusedContact(gen.writeContact(contact)) === undefined;
 export const isRequest = (request: Request): boolean => typeof gen.readRequest(gen.writeRequest(request)) !== "string";

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The configuration and the statistics of a guest.
+// Configuration and statistics of a client.
 import { randomBytes } from "@noble/hashes/utils";
 import { checkForceDeadband, checkStateDeadband, type ForceDeadband } from "./deadband.js";
 import type { CipherSuite } from "./datagram.js";
@@ -11,97 +11,97 @@ import type { LinkStats } from "./session.js";
 import { kUsableSuites, namesOf } from "./suites.js";
 
 export interface ClientConfig {
-  /** For the server's log; at most 64 bytes. */
+  /** For the log of the server; at most 64 bytes. */
   readonly name?: string;
-  /** Names of the device and its channel, on a server with several, at most 24 bytes each; empty: the first one. */
+  /** Names of the device and its channel, at most 24 bytes each. Empty: the first one of the server. */
   readonly device?: string;
   readonly channel?: string;
   /**
-   * When another controller holds the channel's lease: keep asking until we have it. We ask again when the server says
-   * that the lease may be over.
+   * If another controller holds the lease of the channel, keep asking for it. The client asks again when the server
+   * reports that the lease may have ended.
    */
   readonly takeLease?: boolean;
-  /** The 32 bytes that the server knows too: everything is encrypted, and only loopback does without. */
+  /** 32 bytes shared with the server. With a key, all traffic is encrypted. Without a key, only loopback is accepted.
+   */
   readonly key?: Uint8Array | undefined;
-  /** With a key: by which suites the session may be sealed; the server chooses. Default: all that this runtime has. */
+  /** Cipher suites offered for an encrypted session. The server selects one. Default: all suites of this runtime. */
   readonly suites?: readonly CipherSuite[];
-  /** Calls of the callback per second, 0.001 … 100 000; 0 = one for every new state. */
+  /** Calls of the callback per second, 0.001 … 100 000; 0: one for each new state. */
   readonly rateHz?: number;
-  /** States per second to ask the server for; 0 = what the server gives by itself. */
+  /** States per second to request from the server; 0: the default of the server. */
   readonly stateHz?: number;
   /**
-   * How long the server may take a force as fresh, counted from its arrival; at most 10 s. 0 = derived from the period T
-   * at which forces really leave, that is the asked one or, when the physics is slower, the time between the states of
-   * the last two forces: max(3 T, 20 ms). Two forces in a row may be lost and the third is still in time.
+   * How long after its arrival the server may use a force; at most 10 s. 0: max(3 T, 20 ms) with the period T between
+   * forces, which is the requested period or, if the engine is slower, the time between the states that the last two
+   * forces answer. 3 T tolerates the loss of two consecutive forces.
    */
   readonly validForMs?: number;
-  /** Forces that a hand cannot tell from the last one sent are not sent. Absent: every force is. */
+  /** Omit forces that a human cannot distinguish from the last one sent. Absent: every force is sent. */
   readonly deadband?: ForceDeadband | undefined;
   /**
-   * The server leaves out states that we can predict. With rateHz = r the callback is called at multiples of 1/r with
-   * the state predicted for that instant, tick and sampling time included. It never sees a tick twice, nor an older
-   * one, and nothing is predicted for longer than maxSilenceUs. With rateHz = 0 it sees only the states that come.
-   * Absent: we ask for every state.
+   * The server omits states that the client can predict. If rateHz = r > 0, the callback runs at multiples of 1/r
+   * with the state predicted for that time, including tick and sampling time. Ticks always increase. States are
+   * predicted for at most maxSilenceUs. If rateHz = 0, the callback receives only received states. Absent: all states
+   * are requested.
    */
   readonly stateDeadband?: StateDeadband | undefined;
   /**
-   * For an observer: ask for the forces that the engines want (DeviceState.forceWanted), and once a second for reports on
-   * the device's loop and its engines. A server that does not know this feature leaves them out.
+   * For observers: requests the forces of the engines before limiting (DeviceState.forceWanted), and reports on the
+   * loop of the device and its engines once per second. Servers without this feature omit them.
    */
   readonly diagnostics?: boolean;
-  /** Ask for the joints of the device (DeviceState.joints, HandleDescription.joints): 16 bytes each in every state. */
+  /** Requests the joints of the device (DeviceState.joints, HandleDescription.joints): 16 bytes per joint and state. */
   readonly joints?: boolean;
-  /** Ask for the outputs of the device (HandleDescription.outputs: lamps, vibration), to set them with setOutput(). */
+  /** Requests access to the outputs of the device (HandleDescription.outputs: lamps, vibration), for setOutput(). */
   readonly outputs?: boolean;
   /**
-   * Names of the ways in which this engine answers, which Touch.way counts from 1: observers are told, and a recording
-   * holds, by which a force was made. At most 8, each of 1 to 24 bytes, no two alike.
+   * Names of the methods with which this engine computes forces. Touch.way is an index into this list, starting at 1.
+   * Observers and recordings receive the names. At most 8 unique names, each of 1 to 24 bytes.
    */
   readonly ways?: readonly string[];
-  /** The Hellos of one attempt go unanswered for so long before it is given up. */
+  /** How long an attempt waits for an answer. */
   readonly patienceMs?: number;
-  /** First wait before the next attempt. */
+  /** Wait before the first retry. It doubles with each attempt. */
   readonly retryMinMs?: number;
-  /** Longest wait before the next attempt. */
+  /** Upper limit of the wait. */
   readonly retryMaxMs?: number;
-  /** Gives that many random bytes for the handshakes; by default the system's. */
+  /** Returns random bytes for the handshakes. Default: those of the system. */
   readonly random?: (size: number) => Uint8Array;
 }
 
 /**
- * greeting: an attempt is under way. open: states come in, forces go out. unanswered, refused, lost: nobody answered, the
- * server said no, the session has ended; waiting for the next attempt. stopped: for good, by stop(), by what the callback
- * threw, or because another program with the same key has taken this place.
+ * greeting: waiting for an answer to the handshake. open: session open. unanswered, refused, lost: the server did not
+ * answer, refused the client, or the session ended; waiting before the next attempt. stopped: final, after stop(), an
+ * exception of the callback, or replacement by another program with the same key.
  */
 export type Phase = "greeting" | "open" | "unanswered" | "refused" | "lost" | "stopped";
 
 export interface ClientStats {
   phase: Phase;
-  /** Why the last attempt or session ended: the server's words where it had any. */
+  /** Why the last attempt or session ended, with the message of the server if there is one. */
   code: Code;
   reason: string;
-  /** Of the present session, or of the last one. */
+  /** Of the current or the last session. */
   link: LinkStats | undefined;
   attempts: number;
-  /** Of these, answered with a Welcome. */
+  /** Attempts that the server accepted. */
   sessions: number;
-  /** States that came in. */
+  /** Received states. */
   states: number;
-  /** States that were predicted and that the callback saw. */
+  /** Predicted states that the callback received. */
   statesForetold: number;
-  /** States that came in and were replaced by a newer one before a callback was due. */
+  /** Received states that a newer one replaced before the callback ran. */
   statesSkipped: number;
-  /** Forces sent. */
   forces: number;
-  /** Forces not sent: not finite, or out of bounds. */
+  /** Forces not sent because they are not finite or out of bounds. */
   forcesUnusable: number;
-  /** What was wrong with the newest of them; empty: none. */
+  /** Reason for the newest unusable force. Empty if there is none. */
   unusable: string;
-  /** What of the present session's answers is not sent, and why; empty: nothing. */
+  /** Which part of this session's forces is not sent, and why. Empty if all is sent. */
   leftOut: string;
-  /** Forces not sent: a hand could not tell them from the one before. */
+  /** Forces not sent because they are within the deadband. */
   forcesAlike: number;
-  /** Name of the client that has taken the channel from us; empty: nobody. */
+  /** Name of the client that took over the channel. Empty if there is none. */
   leaseLostTo: string;
 }
 
@@ -111,7 +111,7 @@ const kDefaults: Required<Omit<ClientConfig, "key" | "deadband" | "stateDeadband
   suites: kUsableSuites,
 };
 
-/** Throws a RangeError "FIELD = VALUE: expected …" when a value is impossible. */
+/** Throws a RangeError "FIELD = VALUE: expected …" if a value is invalid. */
 export function checked(config: ClientConfig): Required<ClientConfig> {
   const given = Object.fromEntries(Object.entries(config).filter(([, value]) => value !== undefined));
   const full: Required<ClientConfig> = {

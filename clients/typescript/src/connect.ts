@@ -6,69 +6,70 @@ import type {
 } from "./messages.js";
 import { fromMilliseconds, kNever, toMilliseconds, type Nanoseconds } from "./time.js";
 
-/** The way of datagrams to one server. */
+/** Sends and receives datagrams of one server. */
 export interface Transport {
-  /** Sends one datagram, or loses it. */
+  /** Sends a datagram, or drops it. */
   send(datagram: Uint8Array): void;
-  /** An attempt or a session is over: the server may have another address by now. `another`: nobody answered at this one. */
+  /** Called after an attempt or a session, when the server's address may have changed. `another`: it did not answer. */
   again?(another: boolean): void;
   close(): void;
 }
 /**
- * Opens a way to one server: udp() of "tendon-client/node", webSocket(), or your own. Never calls back at once. `fail` ends the
- * guest: there is no way there and there will be none.
+ * Opens a transport to one server: udp() of "tendon-client/node", webSocket(), or your own. Must not call back
+ * synchronously. `fail` reports a permanent error and ends the client.
  */
 export type OpenTransport = (receive: (datagram: Uint8Array) => void, fail: (error: Error) => void) => Transport;
 
 export interface ConnectConfig extends ClientConfig {
-  /** Told whenever the connection's phase has changed. */
+  /** Called when the phase of the connection has changed. */
   readonly onPhase?: (guest: Guest) => void;
-  /** Told of each report of the server. */
+  /** Called for each report of the server. */
   readonly onReport?: (report: LinkReport) => void;
-  /** Told, once for each new reason, why a force of the callback, or a part of it (`leftOut`), was not sent. */
+  /** Called for each new reason why a force, or a part of it (`leftOut`), was not sent. */
   readonly onUnusable?: (why: string) => void;
 }
 
-/** A guest in real time. */
+/** A client in real time. */
 export interface Guest {
   readonly phase: Phase;
   readonly welcome: Welcome | undefined;
-  /** Description of the device, once `device` or `channel` was named and the server has answered. */
+  /** Description of the device. Absent until it arrives; it is only requested if `device` or `channel` is named. */
   readonly description: DeviceDescription | undefined;
-  /** How the device lies before the operator, and its buttons' names. Absent for good when the server does not know that. */
+  /** Orientation of the device relative to the operator, and names of the buttons. Absent if the server does not
+   * support it. */
   readonly handle: HandleDescription | undefined;
-  /** The channel takes our forces; while it does not, the physics is not called. */
+  /** Whether this client holds the channel. Otherwise the physics callback is not called. */
   readonly holds: boolean;
-  /** The server's newest report on our forces, once a second while they come. */
+  /** Newest report on the received forces, once per second while they arrive. */
   readonly report: LinkReport | undefined;
-  /** With `diagnostics`, the newest report on the device's loop, once a second. */
+  /** Newest report on the loop of the device, once per second. Requires `diagnostics`. */
   readonly deviceReport: DeviceReport | undefined;
-  /** With `diagnostics`, the newest report on the engine of each channel; the last one stays when it has gone. */
+  /** Newest report on the engine of each channel, also after it has left. Requires `diagnostics`. */
   readonly peerReports: ReadonlyMap<number, PeerReport>;
   stats(): ClientStats;
   rearm(): boolean;
   disarm(): boolean;
-  /** The operator's act of a coupling, at the leader's server, and its end. */
+  /** Engages or disengages a coupling, at the server of the leader (disengage: either server). */
   engage(): boolean;
   disengage(): boolean;
-  /** The scales of a coupling from now on, at the leader's server, while it is not engaged or its clutch is held. */
+  /** Sets the scales of a coupling, at the server of the leader, while it is not engaged or its clutch is held. */
   setScale(positionScale: number, forceScale: number): boolean;
-  /** How much the leader of that channel counts among several, at the follower's server. */
+  /** Sets the weight of the leader on that channel if several leaders share one follower, at the follower's server. */
   setShare(channel: number, share: number): boolean;
-  /** Sets a lamp of the device, or starts a pulse of vibration (`outputs` in the config). */
+  /** Sets an indicator lamp or starts a vibration pulse (requires `outputs` in the config). */
   setOutput(output: number, setting: LampColour | Vibration): boolean;
-  /** Asks for the channel's lease, once more when it is lost before the answer; or gives it up. */
+  /** Requests or releases the lease of the channel. */
   takeLease(): boolean;
   giveLease(): boolean;
-  /** Sends Bye and ends. */
+  /** Sends a Bye and stops. */
   stop(): void;
-  /** Resolves at the end; rejects with what a callback threw, or when there is no such host. */
+  /** Resolves at the end. Rejects with the exception of a callback, or if the host is unknown. */
   readonly ended: Promise<void>;
 }
 
 /**
- * Becomes a guest of a server: sees the hand, and with `physics` answers each state with a force. It waits for the server
- * when it is not there yet, and finds it again when it was restarted.
+ * Connects to a server. With `physics`, each device state is answered with a force. Reconnects if the server starts
+ * later or is restarted.
  *
  *     connect(udp("127.0.0.1:47100"), { name: "spring" }, { physics: ({ position: p }) => ({ x: -500 * p.x, … }) });
  */
@@ -80,9 +81,9 @@ export function connect(
   return new RealTimeGuest(open, config, callback);
 }
 
-/** Rounds of the event loop that wait for a backlog to be read, before the callback must have its turn. */
+/** Maximum number of event-loop rounds that a backlog of datagrams may delay the callback. */
 const kMaxRounds = 16;
-/** Longer timers overflow in some runtimes; this one only makes us look again. */
+/** Longer timers overflow in some runtimes. An early timer is harmless. */
 const kLongestTimerMs = 1000;
 
 const readClock = (): Nanoseconds => fromMilliseconds(performance.now());
@@ -106,7 +107,7 @@ class RealTimeGuest implements Guest {
   #timerDue: Nanoseconds = kNever;
   #deferred = false;
   #ended = false;
-  /** Datagrams since the last round of the event loop, and how many rounds they have put the turn off. */
+  /** Datagrams since the last round of the event loop, and the number of rounds by which they delayed the turn. */
   #arrived = 0;
   #rounds = 0;
 
@@ -183,7 +184,7 @@ class RealTimeGuest implements Guest {
     this.#end();
   }
 
-  /** A request leaves in the next turn. */
+  /** The request is sent in the next turn. */
   #ask(request: () => boolean): boolean {
     const asked = request();
     this.#wake();
@@ -203,8 +204,8 @@ class RealTimeGuest implements Guest {
   }
 
   /**
-   * Comes after the datagrams that this round of the event loop has read. When they were several, more may wait in the
-   * socket: the physics must see the newest state, not work through a queue of old ones.
+   * Runs after the datagrams of this event-loop round. If there were several, more may be waiting in the socket, and
+   * the callback must receive the newest state.
    */
   #round(): void {
     this.#deferred = false;
@@ -263,7 +264,7 @@ class RealTimeGuest implements Guest {
     this.#onReport?.(report);
   }
 
-  /** A timer that fires too early costs less than resetting it for every datagram. */
+  /** An early timer is cheaper than resetting it for each datagram. */
   #arm(now: Nanoseconds, next: Nanoseconds): void {
     if (this.#timer !== undefined && this.#timerDue <= next) return;
     clearTimeout(this.#timer);
@@ -285,7 +286,7 @@ class RealTimeGuest implements Guest {
   }
 }
 
-/** Puts a task behind the input that is already there. */
+/** Schedules a task after pending input. */
 function makeDefer(): (task: () => void) => void {
   if (typeof setImmediate === "function") return (task) => void setImmediate(task);
   const channel = new MessageChannel(); // setTimeout(0) would wait for up to 4 ms

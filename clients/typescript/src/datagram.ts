@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The bytes around the protobuf: the header and the three datagrams of the handshake. Decoding trusts nothing: it
-// returns undefined for what it refuses, and never throws.
+// The header and the three datagrams of the handshake. Decoding never throws and returns undefined for invalid input.
 import { kMaxDatagram } from "./limits.js";
 import { kProtocolVersion } from "./messages.js";
 
@@ -8,8 +7,8 @@ export const DatagramType = { Hello: 1, Retry: 2, Data: 3, Answer: 4 } as const;
 export type DatagramType = (typeof DatagramType)[keyof typeof DatagramType];
 
 /**
- * 0: nothing is encrypted, loopback only. 1: Noise_NNpsk0_25519_ChaChaPoly_SHA256. 2: the handshake of suite 1, and
- * AES-256-GCM from then on: Data only.
+ * 0: unencrypted, loopback only. 1: Noise_NNpsk0_25519_ChaChaPoly_SHA256. 2: handshake of suite 1, then AES-256-GCM;
+ * Data only.
  */
 export const CipherSuite = { Plain: 0, Noise: 1, AesGcm: 2 } as const;
 export type CipherSuite = (typeof CipherSuite)[keyof typeof CipherSuite];
@@ -23,14 +22,14 @@ const kContentLengthAt = 48;
 const kContentAt = 50;
 const kAnswerAt = 32;
 
-/** The 16 bytes in the clear at the front of every datagram; the associated data of what is sealed. */
+/** The unencrypted 16-byte header of each datagram. It is the associated data of the encryption. */
 export interface Header {
   readonly type: DatagramType;
   readonly epoch: number;
   readonly suite: CipherSuite;
-  /** Chosen by the server; 0 before that. */
+  /** Assigned by the server; 0 before that. */
   readonly connectionId: number;
-  /** 0, 1, 2 … per direction in Data, 0 in all others. */
+  /** 0, 1, 2 … for each direction in Data, otherwise 0. */
   readonly packetNumber: bigint;
 }
 
@@ -68,9 +67,9 @@ export function decodeHeader(datagram: Uint8Array): Header | undefined {
 
 export interface HelloDatagram {
   readonly suite: CipherSuite;
-  /** 16 bytes of the client's choice; they tie Retry and Answer to one attempt. */
+  /** 16 bytes chosen by the client, which identify the attempt in Retry and Answer. */
   readonly random: Uint8Array;
-  /** 16 bytes of the server's choice; zeros in the first Hello. */
+  /** 16 bytes chosen by the server; zeros in the first Hello. */
   readonly cookie: Uint8Array;
   /** Suite 0: message Hello. Suite 1: key id, then Noise message 1. */
   readonly content: Uint8Array;
@@ -92,10 +91,10 @@ export interface AnswerDatagram {
 const handshakeHeader = (type: DatagramType, suite: CipherSuite, connectionId = 0): Uint8Array =>
   encodeHeader({ type, epoch: 0, suite, connectionId, packetNumber: 0n });
 
-/** The header that every Hello of a suite has. */
+/** Header of all Hellos of a suite. */
 export const helloHeader = (suite: CipherSuite): Uint8Array => handshakeHeader(DatagramType.Hello, suite);
 
-/** Always 1200 bytes, so that no reply is larger. */
+/** Always returns 1200 bytes, so that replies are never larger (no amplification). */
 export function encodeHello(hello: HelloDatagram): Uint8Array {
   const bytes = new Uint8Array(kMaxDatagram);
   bytes.set(helloHeader(hello.suite));

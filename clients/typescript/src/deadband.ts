@@ -1,31 +1,30 @@
 // SPDX-License-Identifier: Apache-2.0
-// Deadbands drop forces that a hand cannot tell apart, and states that their receiver can predict
-// (protocol/SESSION.md, "Deadbands").
+// Deadbands that omit indistinguishable forces and predictable states (protocol/SESSION.md, "Deadbands").
 import { expect } from "./expect.js";
 import type { DeviceState, ForceCommand, Quat, StateDeadband, Vec3 } from "./messages.js";
 import { fromMilliseconds, type Nanoseconds } from "./time.js";
 
 /**
- * Leaves out a force, with its torque and grip force, unless it differs from the last one sent by more than max(share · its norm, floor), or that one was sent
- * longestSilenceMs ago (Weber's law; Hinterseer et al., IEEE TSP 56(2), 2008).
+ * Omits a force, with its torque and grip force, unless it differs from the last one sent by more than max(share ·
+ * its norm, floor), or that one was sent longestSilenceMs ago (Weber's law; Hinterseer et al., IEEE TSP 56(2), 2008).
  */
 export interface ForceDeadband {
-  /** 0 … 1; the just noticeable difference of force is 7 to 15 %: 0.1. */
+  /** 0 … 1, typically 0.1. The just noticeable difference of force is 7 to 15 %. */
   readonly share: number;
-  /** N; a smaller change is left out until the longest silence: 0.05. */
+  /** N, typically 0.05. Smaller changes are omitted until the longest silence. */
   readonly floor: number;
-  /** Bounds how long the device renders an old force after a loss: 20. */
+  /** Typically 20. Limits how long the device renders an old force after a packet loss. */
   readonly longestSilenceMs: number;
 }
 
-/** Refuses an impossible deadband of forces with a RangeError. */
+/** Throws a RangeError if the deadband is invalid. */
 export function checkForceDeadband({ share, floor, longestSilenceMs }: ForceDeadband): void {
   expect(share >= 0 && share <= 1, "deadband.share", share, "0 to 1");
   expect(floor >= 0, "deadband.floor", floor, "0 or more");
   expect(longestSilenceMs > 0, "deadband.longestSilenceMs", longestSilenceMs, "more than 0");
 }
 
-/** Refuses a deadband of states that no server grants with a RangeError. */
+/** Throws a RangeError if no server would accept the deadband. */
 export function checkStateDeadband({ share, floor, maxSilenceUs }: StateDeadband): void {
   if (maxSilenceUs === 0) return;
   expect(share >= 0 && share <= 0.5, "stateDeadband.share", share, "0 to 0.5");
@@ -34,11 +33,11 @@ export function checkStateDeadband({ share, floor, maxSilenceUs }: StateDeadband
   expect(possible, "stateDeadband.maxSilenceUs", maxSilenceUs, "0, or a whole number from 1000 to 20000");
 }
 
-/** m, from the middle of a handle to its end: it makes the floor of a force (N) that of a torque (N·m). */
+/** m, from the center to the end of a handle. Converts the floor of a force (N) to that of a torque (N·m). */
 const kHandleLever = 0.05;
 const kZero: Vec3 = { x: 0, y: 0, z: 0 };
 
-/** The deadband of forces in one session, with their torques and grip forces. */
+/** The force deadband of one session, including torques and grip forces. */
 export class Deadband {
   readonly #config: ForceDeadband;
   #sent: { readonly at: Nanoseconds; readonly force: Vec3; readonly torque: Vec3 | undefined; readonly grip: Vec3 | undefined } | undefined;
@@ -47,7 +46,8 @@ export class Deadband {
     this.#config = config;
   }
 
-  /** Whether force, torque or grip force is worth sending, or has come or gone; if so all of them count as sent. */
+  /** Returns whether one of the three values must be sent, or has appeared or disappeared. If so, all are recorded as
+   * sent. */
   passes(now: Nanoseconds, value: Pick<ForceCommand, "force" | "torque" | "gripForce">): boolean {
     const { floor, longestSilenceMs } = this.#config;
     const { x, y, z } = value.force;
@@ -69,7 +69,7 @@ export class Deadband {
   }
 }
 
-/** q, turned on about the axis of the angular velocity, and of length 1. */
+/** Rotates q with a constant angular velocity and normalizes it. */
 function turned({ w, x, y, z }: Quat, { x: b, y: c, z: d }: Vec3, seconds: number): Quat {
   const speed = Math.hypot(b, c, d);
   const half = (speed * seconds) / 2;
@@ -85,7 +85,8 @@ function turned({ w, x, y, z }: Quat, { x: b, y: c, z: d }: Vec3, seconds: numbe
   return { w: q.w / length, x: q.x / length, y: q.y / length, z: q.z / length };
 }
 
-/** The device `later` after `sent` at constant velocities of position, rotation and gripper, in whole haptic periods. */
+/** Predicts the state `later` after `sent` with constant velocities of position, rotation and gripper, in whole
+ * periods. */
 export function foretell(sent: DeviceState, later: Nanoseconds, hapticPeriod: Nanoseconds): DeviceState {
   const periods = later > 0n ? later / hapticPeriod : 0n;
   const seconds = Number(periods * hapticPeriod) / 1e9;

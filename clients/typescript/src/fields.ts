@@ -1,20 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
-// Converts single fields of protobuf messages, for gen/codec.ts.
+// Conversion of single fields of protobuf messages, for gen/codec.ts.
 import { create } from "@bufbuild/protobuf";
 import * as pb from "./gen/tendon_pb.js";
 import type { Quat, Vec3 } from "./messages.js";
 
 const kEncoder = new TextEncoder();
-/** The front of `text`, in whole characters of at most `limit` bytes. */
+/** Truncates `text` to whole characters and at most `limit` bytes of UTF-8. */
 export function clip(text: string, limit: number): string {
   const { read } = kEncoder.encodeInto(text, new Uint8Array(limit));
   return text.slice(0, read);
 }
-/** Clips the first `most` texts, and drops the rest. */
+/** Truncates the first `most` texts, and drops the rest. */
 export const clipAll = (texts: readonly string[], most: number, limit: number): string[] =>
   texts.slice(0, most).map((text) => clip(text, limit));
 
-/** Returns `length` values. Missing ones are 0. */
+/** Returns `length` values, padded with 0. */
 export const padded = (values: readonly number[], length: number): readonly number[] =>
   Array.from({ length }, (_, i) => values[i] ?? 0);
 

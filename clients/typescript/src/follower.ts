@@ -1,64 +1,65 @@
 // SPDX-License-Identifier: Apache-2.0
-// A robot follows the hand at a Tendon server, and the hand feels what the robot touches.
+// Teleoperation of a robot by the hand at a Tendon server, with force feedback.
 import type { Touch } from "./answer.js";
 import { expect } from "./expect.js";
 import { Mode, type Contact, type DeviceState, type Quat, type Vec3 } from "./messages.js";
 
-/** Of the tool, in the robot's frame; of a target, what the tool is to reach. */
+/** Pose of the tool, or its target, in the frame of the robot. */
 export interface Pose {
   /** m */
   readonly position: Vec3;
-  /** Unit quaternion. Absent: position alone is followed. */
+  /** Unit quaternion. Absent: only the position is controlled. */
   readonly orientation?: Quat | undefined;
   /** Opening of the gripper, m or rad. Absent: no gripper. */
   readonly grip?: number | undefined;
 }
 
-/** What the surroundings exert on the tool, in the robot's frame: a table below pushes up. */
+/** Force of the environment on the tool, in the frame of the robot. A table below the tool pushes up. */
 export interface ToolContact {
   /** N */
   readonly force: Vec3;
-  /** N·m, about the tool's position. */
+  /** N·m, about the position of the tool. */
   readonly torque?: Vec3 | undefined;
-  /** N/m, > 0, of the surface along its normal, where it is known. */
+  /** N/m, > 0, of the surface along its normal, if known. */
   readonly stiffness?: number | undefined;
-  /** Out of the body, to the tool. Absent: along the force. */
+  /** Points from the surface to the tool. Absent: along the force. */
   readonly normal?: Vec3 | undefined;
   /** N, on the fingers; > 0 opens them. */
   readonly gripForce?: number | undefined;
 }
 
-/** How a hand's motion becomes a tool's. */
+/** Mapping from the hand to the tool. Defaults are in brackets. */
 export interface FollowerConfig {
-  /** s_x, follower / leader, 0.01 … 100 [1]. */
+  /** s_x, motion of the follower / motion of the leader, 0.01 … 100 [1]. */
   readonly scale?: number;
-  /** s_f, leader / follower, 0.01 … 100 [1]. */
+  /** s_f, force on the leader / force on the follower, 0.01 … 100 [1]. */
   readonly forceScale?: number;
-  /** R, turns the device's base frame into the robot's; of length 1 ± 1e-3 [none]. */
+  /** R, from the device base frame to the robot frame; norm 1 ± 1e-3 [none]. */
   readonly rotation?: Quat;
-  /** Of the device that are coupled, "x" … "xyz"; the others are free and feel nothing ["xyz"]. */
+  /** Coupled axes of the device, "x" … "xyz"; the others move freely without force ["xyz"]. */
   readonly axes?: string;
-  /** 0 … 31; held: clutched. Absent: engage() and disengage() alone. */
+  /** 0 … 31, clutched while pressed. Absent: only engage() and disengage(). */
   readonly clutchButton?: number | undefined;
-  /** Each press of the button changes between engaged and clutched [false]. */
+  /** Each press switches between engaged and clutched [false]. */
   readonly toggle?: boolean;
-  /** "button": of the clutch, pressed and released (toggle: pressed); or "call": engage() ["button"]. */
+  /** "button": pressing and releasing the clutch (toggle: pressing it); "call": engage() ["button"]. */
   readonly engageBy?: "button" | "call";
-  /** m/s, 0.001 … 10: no target moves faster [0.25]. */
+  /** m/s, 0.001 … 10, maximum speed of the target [0.25]. */
   readonly speed?: number;
-  /** rad/s, 0.01 … 100: nor turns faster [2]. */
+  /** rad/s, 0.01 … 100, maximum angular speed of the target [2]. */
   readonly spin?: number;
-  /** s, 0 … 10, in which the force grows from 0 to all of it after engaging [0.3]. */
+  /** s, 0 … 10, duration of the force ramp after engaging [0.3]. */
   readonly rampS?: number;
-  /** Opening of the robot's gripper / that of the hand's, 0.001 … 1000 [1]. */
+  /** Opening of the robot's gripper / opening of the hand's gripper, 0.001 … 1000 [1]. */
   readonly gripRatio?: number;
-  /** m/s or rad/s, 0.001 … 100, of the gripper [0.1]. */
+  /** m/s or rad/s, 0.001 … 100, maximum speed of the gripper [0.1]. */
   readonly gripSpeed?: number;
-  /** States per second that target() is given, 1 … 100000 [500]. */
+  /** Rate at which target() is called, 1 … 100000 [500]. */
   readonly rateHz?: number;
 }
 
-/** "alone": no state has come. "coupled": the robot stands until somebody engages. "lost": by silence; only the act engages. */
+/** "alone": no state has arrived. "coupled": waiting for the operator to engage. "lost": states stopped; engage again.
+ */
 export type Following = "alone" | "coupled" | "engaged" | "clutched" | "lost";
 
 const kDefaults = {
@@ -67,9 +68,9 @@ const kDefaults = {
 } as const;
 type Complete = Required<FollowerConfig>;
 
-/** Time constant of the delay that counts as usual. */
+/** Time constant of the delay filter. */
 const kSmoothingMs = 1000;
-/** A robot program that paused does not catch up at once. */
+/** After a pause of the robot program, the target does not jump. */
 const kLongestStepMs = 100;
 const kHoldMs = 20;
 const kLostMs = 250;
@@ -104,31 +105,32 @@ function complete(given: FollowerConfig): Complete {
 }
 
 /**
- * Map, clutch, loss ladder and signs of a robot that follows a hand. It has no clock and no timer: `nowMs` is when a state
- * came, of any clock that does not go back (performance.now()).
+ * Position mapping, clutch and reaction to loss of connection. It has no clock and no timer: `nowMs` is the arrival
+ * time of a state, from any monotonic clock (performance.now()).
  *
  *     const follow = new Follower({ scale: 0.5, clutchButton: 1 });
  *     const physics = (hand: DeviceState) => {
- *       move(follow.target(hand, robot.pose(), performance.now())); // undefined: the robot holds its place
+ *       move(follow.target(hand, robot.pose(), performance.now())); // undefined: the robot must hold its pose
  *       return follow.touch(robot.contact());
  *     };
  *     setInterval(() => move(follow.silence(performance.now())), 10);
  *
- * Position p, orientation q; l is the hand (the leader), f the tool (the follower), 0 the moment of engaging:
+ * With positions p, orientations q, the hand l (leader), the tool f (follower), and 0 for the values at the time of
+ * engaging:
  *
- *     p_f = p_f0 + s_x R M (p_l − p_l0)        q_f = (R q_l q_l0⁻¹ R⁻¹) q_f0        M leaves out axes that are not coupled
+ *     p_f = p_f0 + s_x R M (p_l − p_l0)        q_f = (R q_l q_l0⁻¹ R⁻¹) q_f0        M selects the coupled axes
  *     F_l = s_f M Rᵀ F_f                       τ_l = s_f / s_x Rᵀ τ_f               K_l = s_f s_x M Rᵀ K_f R M
  *
- * Nothing moves before the act of engaging, by the button or engage(). The pose of that moment is the offset: neither
- * engaging nor releasing the clutch moves the robot. The age of the newest state beyond the smoothed delay decides when states
- * stop, v being three periods and at least 20 ms:
+ * The robot does not move before the operator engages, by the button or by engage(). The poses at that time define
+ * the offset, so neither engaging nor releasing the clutch moves the robot. The reaction to missing states depends on
+ * the age of the newest state beyond the smoothed delay, where v is three periods, at least 20 ms:
  *
- *     v             the target stays where it is
- *     v + 20 ms     undefined: the robot holds its place
- *     v + 250 ms    lost: a new state couples again, only a new act engages
+ *     v             the target stops
+ *     v + 20 ms     undefined: the robot must hold its pose
+ *     v + 250 ms    lost: new states couple again, but the operator must engage again
  *
- * The two clocks are never compared. A fault or a disarmed device disengages, as does a pose that is not finite.
- * Throws the RangeError "FIELD = VALUE: expected …" for an impossible config.
+ * Absolute times of the two clocks are never compared. A fault, a disarmed device, or a pose that is not finite
+ * disengages. Throws the RangeError "FIELD = VALUE: expected …" if the config is invalid.
  */
 export class Follower {
   readonly #config: Complete;
@@ -140,13 +142,13 @@ export class Follower {
   #phase: Following = "alone";
   #words = "";
   #asked = false;
-  /** The button at the newest state: only one that was seen free can be pressed. */
+  /** Button in the newest state. Initially true, so that a press counts only after a release. */
   #held = true;
   #tick = 0n;
   #sampledNs = 0n;
-  /** Of the state that began the link: the others are counted from it. */
+  /** Arrival and sampling time of the first state. Delays are measured relative to it. */
   #base: { readonly ms: number; readonly sampledNs: bigint } | undefined;
-  /** ms, smoothed delay, less that of the first state. */
+  /** ms, smoothed delay, relative to that of the first state. */
   #usual = 0;
   #now = 0;
   #gainFrom = 0;
@@ -165,21 +167,21 @@ export class Follower {
   get phase(): Following {
     return this.#phase;
   }
-  /** The newest sentence for the operator; empty: none. */
+  /** Newest message for the operator. Empty if there is none. */
   get words(): string {
     return this.#words;
   }
 
-  /** The act, for the next state. False, and nothing happens, unless states come and the robot does not follow. */
+  /** Engages at the next state. Returns false and does nothing unless the phase is "coupled". */
   engage(): boolean {
     return (this.#asked = this.#phase === "coupled");
   }
-  /** The robot stands until the next act. */
+  /** Stops the robot until the operator engages again. */
   disengage(): void {
     this.#asked = false;
     if (this.#phase === "engaged" || this.#phase === "clutched") this.#phase = "coupled";
   }
-  /** False, and nothing changes, while the robot follows. Throws a RangeError when a scale is out of its bounds. */
+  /** Returns false and changes nothing while the robot follows. Throws a RangeError if a scale is out of bounds. */
   setScale(scale: number, forceScale: number): boolean {
     between(0.01, 100, { scale, forceScale });
     if (this.#phase === "engaged") return false;
@@ -187,10 +189,11 @@ export class Follower {
     return true;
   }
 
-  /** Where the tool is to go, no faster than `speed`; undefined: hold. `pose`: where the tool is. */
+  /** Returns the next target of the tool, which moves at most at `speed`, or undefined to hold. `pose`: current pose.
+   */
   target(hand: DeviceState, pose: Pose, nowMs: number): Pose | undefined {
     let elapsed = this.#advance(nowMs);
-    if (hand.tick < this.#tick) this.#lose(); // another server, or the same one anew
+    if (hand.tick < this.#tick) this.#lose(); // the server has been replaced or restarted
     const age = this.#take(hand);
     if (age > this.#lateMs + kLostMs) this.#lose();
     const fresh = this.#phase !== "lost" && age <= this.#lateMs;
@@ -209,7 +212,7 @@ export class Follower {
     return this.#target;
   }
 
-  /** The same while no state comes, every few milliseconds: the frozen target, then undefined. */
+  /** Must be called every few milliseconds while no state arrives. Returns the last target at first, then undefined. */
   silence(nowMs: number): Pose | undefined {
     this.#advance(nowMs);
     if (this.#phase === "engaged" && this.#age() <= this.#lateMs + kHoldMs) return this.#target;
@@ -218,8 +221,8 @@ export class Follower {
   }
 
   /**
-   * What the hand feels of the tool's contact; nothing while the robot does not follow. null for undefined: nothing is sent,
-   * because a zero would look measured.
+   * Returns the force on the hand for a contact of the tool; zero while the robot does not follow. Returns null,
+   * which is not sent, if `contact` is undefined, because a zero force would look like a measurement.
    */
   touch(contact: ToolContact | undefined): Touch | null {
     if (!contact) {
@@ -239,7 +242,7 @@ export class Follower {
     };
   }
 
-  /** Stiffness and surface in the hand's units, where both are known. */
+  /** Transforms stiffness and surface to the units of the hand, if both are known. */
   #surface(contact: ToolContact, back: Quat, gain: number): { readonly stiffness?: number[]; readonly contact?: Contact } {
     const { force, stiffness: k = 0, normal = force } = contact;
     const length = Math.hypot(normal.x, normal.y, normal.z);
@@ -252,7 +255,7 @@ export class Follower {
     return { stiffness, contact: { normal: n, gap: -depth } };
   }
 
-  /** Time passes; ms since the last time, bounded. */
+  /** Advances the time. Returns the elapsed time in ms, at most kLongestStepMs. */
   #advance(nowMs: number): number {
     const elapsed = Math.max(nowMs - this.#now, 0);
     this.#now = Math.max(nowMs, this.#now);
@@ -260,13 +263,14 @@ export class Follower {
     return Math.min(elapsed, kLongestStepMs);
   }
 
-  /** ms, of the newest state, beyond the smoothed delay. */
+  /** Age of the newest state beyond the smoothed delay, ms. */
   #age(): number {
     if (!this.#base) return 0;
     return this.#now - this.#base.ms - Number(this.#sampledNs - this.#base.sampledNs) / 1e6 - this.#usual;
   }
 
-  /** A new state; its age as it comes. The first one after silence says what delay is usual. */
+  /** Records a new state and returns its age on arrival. The first state after a silence defines the base of the
+   * delay. */
   #take(hand: DeviceState): number {
     if (!this.#base) {
       this.#base = { ms: this.#now, sampledNs: hand.sampledNs };
@@ -283,7 +287,7 @@ export class Follower {
     [this.#phase, this.#base, this.#asked, this.#tick] = ["lost", undefined, false, 0n];
   }
 
-  /** What the operator does. */
+  /** Handles the clutch button and engage(). */
   #act(hand: DeviceState, pose: Pose, fresh: boolean): void {
     const { clutchButton: button, toggle, engageBy } = this.#config;
     const held = button !== undefined && ((hand.buttons >>> button) & 1) === 1;
@@ -309,13 +313,13 @@ export class Follower {
     }
   }
 
-  /** Engaged from a map that moves nothing now. */
+  /** Engages with an offset that keeps the target at the current pose. */
   #begin(hand: DeviceState, pose: Pose): void {
     [this.#phase, this.#gainFrom, this.#pose0, this.#waits] = ["engaged", this.#now, pose, true];
     this.#hand0 = { position: hand.position, orientation: hand.turning?.orientation };
   }
 
-  /** The target goes to the hand's place, no faster than it may. */
+  /** Moves the target toward the pose of the hand within the speed limits. */
   #approach(hand: DeviceState, seconds: number): void {
     const { speed, spin, gripRatio, gripSpeed } = this.#config;
     const [last, start] = [this.#target, this.#hand0];
@@ -350,7 +354,7 @@ function isFinitePose({ position: p, orientation: q, grip }: Pose): boolean {
   return [p.x, p.y, p.z, q?.w ?? 0, q?.x ?? 0, q?.y ?? 0, q?.z ?? 0, grip ?? 0].every(Number.isFinite);
 }
 
-/** Of a way, so that no more than `most` is gone. */
+/** Returns the factor that limits a displacement of length `whole` to `most`. */
 const share = (whole: number, most: number): number => (whole <= most ? 1 : most / whole);
 const times = (factor: number, { x, y, z }: Vec3): Vec3 => ({ x: factor * x, y: factor * y, z: factor * z });
 const plus = (a: Vec3, factor: number, b: Vec3): Vec3 => ({ x: a.x + factor * b.x, y: a.y + factor * b.y, z: a.z + factor * b.z });

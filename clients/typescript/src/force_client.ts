@@ -15,35 +15,36 @@ import {
 import { Session, type LinkStats } from "./session.js";
 import { earliest, fromMilliseconds, kNever, latest, type Nanoseconds } from "./time.js";
 
-/** The physics engine, seen from here. While it computes, newer states replace older ones. null: it knows no force, and none is sent. */
+/** The physics engine as a callback. While it computes, newer states replace older ones. If it returns null, nothing
+ * is sent. */
 export type Physics = (hand: DeviceState) => Vec3 | Touch | null;
 
-/** An onlooker: device state and the state of the link in, nothing out. */
+/** Callback of an observer. */
 export type Watch = (hand: DeviceState, link: Readonly<LinkStats>) => void;
 
 const kValidPeriods = 3;
 const kMinValidForMs = 20;
-/** A gap is not a period; an engine slower than 10 Hz says so by rateHz. */
+/** A longer gap is a pause and not a period. An engine below 10 Hz must set rateHz. */
 const kMaxObservedPeriodMs = 100;
-/** A lease is asked for again when it may be over, but no more often than this: the holder renews it all the time. */
+/** Minimum time between two lease requests. The current holder renews its lease continuously. */
 const kAskLeaseAgain = fromMilliseconds(50);
 
-/** The numbers of a client that names no device and no channel. */
+/** Indices used if neither device nor channel is named. */
 const kFirstPlace: Omit<Grant, "role"> = { device: 0, channel: 0 };
 
 /**
- * A guest at a Tendon server, without socket, clock or timer: it says Hello, keeps the session alive, hands the newest
- * device state to one callback, sends the force that comes back, and begins again when the server is gone.
+ * A client of a Tendon server, without socket, clock or timer. It opens a session and keeps it alive, passes the
+ * newest device state to one callback, sends the returned force, and reconnects after the session ends.
  *
- *     client.receive(now, datagram) for each that has come in; then client.turn(now), again when it says so.
+ *     client.receive(now, datagram) for each received datagram; then client.turn(now), again at the returned time.
  *
- * - Newest wins. Of the states that came in before a turn, the callback sees the newest one, once.
- * - Rate. With rateHz = r the callback is called at multiples of 1/r, or as soon after as there is a state it has not
- *   seen; after a delay of a whole period the grid starts anew. With 0 it is called once for every new state.
- * - Force. It leaves in the turn after the one that computed it, which is due at once: the datagram's time stamp must not
- *   be older than the physics' work. One that is not finite or beyond 10¹² is counted and not sent.
- * - Reconnection. However an attempt or a session ends, the next attempt waits retryMinMs, then twice as long each time,
- *   at most retryMaxMs. The first state of a new session resets that.
+ * - Newest wins. In each turn, the callback receives only the newest state.
+ * - Rate. If rateHz = r > 0, the callback runs at multiples of 1/r, or as soon as an unseen state is available.
+ *   After a delay of a full period, the schedule restarts. If rateHz = 0, it runs once for each new state.
+ * - Force. It is sent in the turn after the callback, which is due immediately, so that the time stamp does not include
+ *   the computation. Forces that are not finite or beyond 10¹² are counted and not sent.
+ * - Reconnection. After an attempt or a session ends, the client waits for retryMinMs before the next attempt. The wait
+ *   doubles with each attempt up to retryMaxMs. The first state of a new session resets it.
  */
 export class ForceClient {
   readonly #config: Required<ClientConfig>;
@@ -51,7 +52,7 @@ export class ForceClient {
   readonly #physics: Physics | undefined;
   readonly #watch: Watch | undefined;
   readonly #send: (datagram: Uint8Array) => void;
-  /** Period of the callback; 0 = none. */
+  /** Period of the callback; 0: none. */
   readonly #period: Nanoseconds;
 
   #handshake: ClientHandshake | undefined;
@@ -59,41 +60,39 @@ export class ForceClient {
   #welcome: Welcome | undefined;
   #description: DeviceDescription | undefined;
   #handle: HandleDescription | undefined;
-  /** The numbers of our device and channel. */
+  /** Indices of the device and channel. */
   #place = kFirstPlace;
   #holds = false;
-  /** The request for the lease that waits for its answer. */
+  /** Id of the pending lease request. */
   #askedLease: number | undefined;
-  /** When to ask for the lease (again). */
+  /** Time of the next lease request. */
   #askLease = kNever;
-  /** End of the present attempt's patience. */
+  /** Timeout of the current attempt. */
   #giveUp = 0n;
-  /** When the next attempt begins. */
+  /** Start of the next attempt. */
   #retry = 0n;
   /** Wait before the attempt after that. */
   #backOff: Nanoseconds;
 
-  /** Newest state that the callback has not seen. */
+  /** Newest state that the callback has not received. */
   #unseen: DeviceState | undefined;
-  /** Buttons held in any of the states since the one that it has seen. */
+  /** Buttons pressed in any state since the last callback. */
   #pressed = 0;
-  /** Newest state, seen or not. */
   #newest: DeviceState | undefined;
   #newestArrived: Nanoseconds;
-  /** Newest tick that the callback has seen. */
+  /** Newest tick passed to the callback. */
   #seenTick = 0n;
-  /** The request for the deadband of states that waits for its answer. */
+  /** Id of the pending request for the state deadband. */
   #deadbandRequest: number | undefined;
-  /** The server leaves states out. */
+  /** The server omits predictable states. */
   #foretells = false;
   #deadband: Deadband | undefined;
   #report: LinkReport | undefined;
   #deviceReport: DeviceReport | undefined;
   #peerReports: ReadonlyMap<number, PeerReport> = new Map();
   #nextCall: Nanoseconds;
-  /** Sequence number of the newest force. */
   #sequence = 0n;
-  /** The tick that it answers. */
+  /** State tick that the newest force answers. */
   #answeredTick = 0n;
   readonly #stats: ClientStats = {
     phase: "greeting", code: Code.OK, reason: "", link: undefined, attempts: 0, sessions: 0, states: 0, statesForetold: 0,
@@ -101,8 +100,8 @@ export class ForceClient {
   };
 
   /**
-   * `send` takes one datagram, or loses it; it is called from within receive(), turn() and stop(). The first Hello leaves with
-   * the first turn. Throws RangeError naming the field when `config` is impossible.
+   * `send` sends or drops a datagram. It is called from receive(), turn() and stop(). The first Hello is sent by the
+   * first turn. Throws a RangeError with the name of the field if `config` is invalid.
    */
   constructor(
     config: ClientConfig,
@@ -122,7 +121,7 @@ export class ForceClient {
     this.#greet(now);
   }
 
-  /** Takes any bytes from the server. */
+  /** Handles a datagram from the server, which may contain arbitrary bytes. */
   receive(now: Nanoseconds, datagram: Uint8Array): void {
     if (this.#handshake) {
       this.#handshake.receive(now, datagram);
@@ -134,8 +133,8 @@ export class ForceClient {
   }
 
   /**
-   * Does everything that is due at `now` and returns the latest instant of the next call; call it earlier when a datagram
-   * comes. An exception of the callback passes through, after a Bye to the server.
+   * Does all the work that is due at `now` and returns the time of the next call. Call it earlier when a datagram
+   * arrives. An exception of the callback propagates after a Bye is sent to the server.
    */
   turn(now: Nanoseconds): Nanoseconds {
     if (this.phase === "stopped") return kNever;
@@ -145,28 +144,28 @@ export class ForceClient {
   }
 
   /**
-   * Asks the server to clear a latched fault of its device, and to take a disarm back. Controllers only: an observer is
-   * refused. False when there is no session to ask in, or too many requests are open.
+   * Asks the server to clear a latched fault of the device and to undo a disarm. Only for controllers. Returns false
+   * if there is no session or if too many requests are pending.
    */
   rearm(): boolean {
     return this.#session?.request({ kind: "rearm", device: this.#place.device }) !== undefined;
   }
-  /** Asks the server for no force, from the device's next step on, until somebody rearms. False as for rearm(). */
+  /** Asks the server to disable all forces until a client rearms. Returns false as rearm() does. */
   disarm(): boolean {
     return this.#session?.request({ kind: "disarm", device: this.#place.device }) !== undefined;
   }
 
-  /** The operator's act of a coupling, at the leader's server ([teleoperation]). False as for rearm(). */
+  /** Engages a coupling ([teleoperation]), at the server of the leader. Returns false as rearm() does. */
   engage(): boolean {
     return this.#session?.request({ kind: "engage", device: this.#place.device }) !== undefined;
   }
-  /** The end of that, at either end's server. False as for rearm(). */
+  /** Disengages a coupling, at either server. Returns false as rearm() does. */
   disengage(): boolean {
     return this.#session?.request({ kind: "disengage", device: this.#place.device }) !== undefined;
   }
   /**
-   * The scales of the coupling from now on, at the leader's server, while it is not engaged or its clutch is held: each
-   * 0.01 … 100, or a RangeError. False as for rearm().
+   * Sets the scales of the coupling, at the server of the leader, while it is not engaged or its clutch is held.
+   * Throws a RangeError outside of 0.01 … 100. Returns false as rearm() does.
    */
   setScale(positionScale: number, forceScale: number): boolean {
     const wanted: Request = { kind: "setScale", device: this.#place.device, positionScale, forceScale };
@@ -176,8 +175,8 @@ export class ForceClient {
     return this.#session?.request(wanted) !== undefined;
   }
   /**
-   * How much the leader of that channel of our device counts among several, at the follower's server: 0 … 1, or a
-   * RangeError. False as for rearm().
+   * Sets the weight of the leader on that channel if several leaders share one follower, at the follower's server.
+   * Throws a RangeError outside of 0 … 1. Returns false as rearm() does.
    */
   setShare(channel: number, share: number): boolean {
     const wanted: Request = { kind: "setShare", device: this.#place.device, channel, share };
@@ -188,8 +187,9 @@ export class ForceClient {
   }
 
   /**
-   * Sets a lamp of the device, or starts a pulse of vibration (HandleDescription.outputs). For whoever `holds`. False as
-   * for rearm(), and without `outputs` in the config; a RangeError when the setting is out of its bounds.
+   * Sets an indicator lamp or starts a vibration pulse (HandleDescription.outputs). Requires the channel (`holds`).
+   * Returns false as rearm() does, and without `outputs` in the config. Throws a RangeError if `setting` is out of
+   * bounds.
    */
   setOutput(output: number, setting: LampColour | Vibration): boolean {
     const wanted: Request = { kind: "setOutput", device: this.#place.device, output, setting };
@@ -200,28 +200,28 @@ export class ForceClient {
     return this.welcome?.features.includes(kFeatureOutputs) === true && this.#session?.request(wanted) !== undefined;
   }
 
-  /** The channel takes our forces; while it does not, the physics is not called. */
+  /** Whether this client holds the channel. Otherwise the physics callback is not called. */
   get holds(): boolean {
     return this.#holds;
   }
-  /** Asks for the channel's lease, once more when it is lost before the answer. False as for rearm(). */
+  /** Requests the lease of the channel, again if it is lost before the answer. Returns false as rearm() does. */
   takeLease(): boolean {
     const { device, channel } = this.#place;
     const asked = this.#session?.request({ kind: "takeLease", device, channel });
     this.#askedLease = asked ?? this.#askedLease;
     return asked !== undefined;
   }
-  /** Gives the lease up, and asks for it no more. False as for rearm(). */
+  /** Releases the lease and stops requesting it. Returns false as rearm() does. */
   giveLease(): boolean {
     const { device, channel } = this.#place;
     this.#askLease = kNever;
     if (this.#session?.request({ kind: "giveLease", device, channel }) === undefined) return false;
-    this.#askedLease = undefined; // any answer is older than this release
+    this.#askedLease = undefined; // a later answer would be outdated
     this.#holds = false;
     return true;
   }
 
-  /** Says Bye, so that the server need not wait for a timeout, and ends. Any further turn does nothing. */
+  /** Sends a Bye, so that the server does not have to wait for a timeout, and stops. Further turns do nothing. */
   stop(now: Nanoseconds): void {
     if (this.phase === "stopped") return;
     this.#session?.close(Code.OK, `${this.#config.name} stops`);
@@ -229,7 +229,7 @@ export class ForceClient {
     this.#end(now, "stopped", Code.OK, "stopped");
   }
 
-  /** A copy that does not change any more. */
+  /** Returns a copy. */
   stats(): ClientStats {
     const link = this.#session?.stats ?? this.#stats.link;
     return { ...this.#stats, link: link && { ...link } };
@@ -237,30 +237,30 @@ export class ForceClient {
   get phase(): Phase {
     return this.#stats.phase;
   }
-  /** The server's description of itself and its device at the opening of the newest session. */
+  /** Description of the server in the newest session. */
   get welcome(): Welcome | undefined {
     return this.#welcome;
   }
-  /** Description of the device, once we have named a device or a channel and the server has answered. */
+  /** Description of the device. Undefined until it arrives; it is only requested if a device or channel is named. */
   get description(): DeviceDescription | undefined {
     return this.#description;
   }
 
-  /** How the device lies before the operator, and its buttons' names. Absent for good when the server does not know that. */
+  /** Orientation of the device relative to the operator, and names of the buttons, if the server supports it. */
   get handle(): HandleDescription | undefined {
     return this.#handle;
   }
 
-  /** The server's newest report on our forces in the present session; one comes each second while forces come. */
+  /** Newest report on the received forces in this session. Sent once per second while forces arrive. */
   get report(): LinkReport | undefined {
     return this.#report;
   }
 
-  /** With `diagnostics`, the newest report on the device's loop in the present session, once a second. */
+  /** Newest report on the loop of the device in this session, once per second. Requires `diagnostics`. */
   get deviceReport(): DeviceReport | undefined {
     return this.#deviceReport;
   }
-  /** With `diagnostics`, a copy of the newest report on the engine of each channel, even one that has gone. */
+  /** Newest report on the engine of each channel, also after it has left. Requires `diagnostics`. */
   get peerReports(): ReadonlyMap<number, PeerReport> {
     return this.#peerReports;
   }
@@ -292,7 +292,7 @@ export class ForceClient {
     ++this.#stats.attempts;
   }
 
-  /** Acts on the server's answer once it has come. */
+  /** Handles the answer of the server, if it has arrived. */
   #settle(now: Nanoseconds): void {
     const outcome = this.#handshake?.outcome;
     if (!outcome) return;
@@ -326,7 +326,7 @@ export class ForceClient {
     this.#seenTick = 0n;
     this.#report = this.#deviceReport = undefined;
     this.#peerReports = new Map();
-    this.#deadband = deadband && new Deadband(deadband); // this session was not sent what another was
+    this.#deadband = deadband && new Deadband(deadband); // the new session has not sent any force yet
     this.#sequence = 0n;
     this.#stats.phase = "open";
     ++this.#stats.sessions;
@@ -343,7 +343,6 @@ export class ForceClient {
     this.#backOff = earliest(2n * this.#backOff, fromMilliseconds(this.#config.retryMaxMs));
   }
 
-  /** Does everything that is due by time. */
   #tick(now: Nanoseconds): void {
     if (this.#session) {
       this.#session.tick(now);
@@ -366,7 +365,7 @@ export class ForceClient {
         ++this.#stats.states;
         if (this.#unseen) ++this.#stats.statesSkipped;
         this.#unseen = this.#newest = event.state;
-        if (this.#physics && !this.#holds) this.#pressed = 0; // a press of that time was another engine's
+        if (this.#physics && !this.#holds) this.#pressed = 0; // pressed for another engine
         this.#pressed |= event.state.buttons;
         this.#newestArrived = now;
         this.#backOff = fromMilliseconds(this.#config.retryMinMs);
@@ -381,8 +380,8 @@ export class ForceClient {
       } else if (event.kind === "request") {
         this.#takeRequest(now, event.id, event.request);
       } else if (event.kind === "closed") {
-        this.#flush(now); // our own Bye, when the session ends by its age
-        // Two programs with one key would otherwise take the place from each other for ever.
+        this.#flush(now); // sends the Bye of a session that reached its maximum age
+        // Reconnecting would start a cycle of replacements.
         this.#end(now, event.code === Code.REPLACED ? "stopped" : "lost", event.code, event.reason);
       }
     }
@@ -395,7 +394,7 @@ export class ForceClient {
     if (id !== this.#askedLease) return;
     this.#askedLease = undefined;
     this.#askLease = kNever;
-    if (code !== Code.UNSUPPORTED) this.#holds = code === Code.OK; // otherwise the server knows no leases
+    if (code !== Code.UNSUPPORTED) this.#holds = code === Code.OK; // otherwise the server does not support leases
     if (this.#holds) {
       this.#stats.leaseLostTo = "";
     } else if (this.#config.takeLease && code === Code.BUSY) {
@@ -412,7 +411,7 @@ export class ForceClient {
     if (request.device !== this.#place.device || request.channel !== this.#place.channel) return;
     this.#holds = false;
     this.#stats.leaseLostTo = request.to;
-    // A request still in flight may cross this message. One sent now is answered after it.
+    // A pending request may be older than this message, so send a new one.
     if (this.#askedLease !== undefined && this.takeLease()) return;
     if (this.#config.takeLease) this.#askLease = now + kAskLeaseAgain;
   }
@@ -421,7 +420,7 @@ export class ForceClient {
     for (let datagram; (datagram = (this.#session ?? this.#handshake)?.nextDatagram(now)); ) this.#send(datagram);
   }
 
-  /** True when a force now waits to be sent. */
+  /** Returns whether a force is waiting to be sent. */
   #call(now: Nanoseconds): boolean {
     if (now < this.#nextCall || (this.#physics && !this.#holds)) return false;
     const newest = this.#foretells ? this.#foretold(now) : this.#unseen;
@@ -447,12 +446,12 @@ export class ForceClient {
     }
   }
 
-  /** The state predicted for now; undefined when nothing is new, or nothing has come for too long. */
+  /** Returns the state predicted for `now`, or undefined if there is nothing new or the last state is too old. */
   #foretold(now: Nanoseconds): DeviceState | undefined {
     const age = now - this.#newestArrived;
     if (!this.#newest || age > this.#silence()) return undefined;
     const state = foretell(this.#newest, age, this.#hapticPeriod());
-    if (state.tick <= this.#seenTick) return undefined; // the state before it spent less time on its way
+    if (state.tick <= this.#seenTick) return undefined; // the previous state had a shorter network delay
     if (state.tick > this.#newest.tick) ++this.#stats.statesForetold;
     return state;
   }
@@ -511,11 +510,11 @@ export class ForceClient {
     return Math.min(Math.max(kValidPeriods * period, kMinValidForMs), kMaxValidForMs);
   }
 
-  /** When the callback is due next; kNever while there is nothing that it has not seen. */
+  /** Returns the time of the next callback, or kNever if no unseen state is available. */
   #nextDue(): Nanoseconds {
     if (!this.#foretells) return this.#unseen ? this.#nextCall : kNever;
     if (!this.#newest) return kNever;
-    const ahead = latest(this.#seenTick + 1n - this.#newest.tick, 0n); // the first tick that it has not seen
+    const ahead = latest(this.#seenTick + 1n - this.#newest.tick, 0n); // the first unseen tick
     const due = latest(this.#nextCall, this.#newestArrived + ahead * this.#hapticPeriod());
     return due - this.#newestArrived <= this.#silence() ? due : kNever;
   }

@@ -15,8 +15,7 @@ export type Outcome =
   | { readonly kind: "refused"; readonly refused: Refused };
 
 /**
- * One attempt of a client to be let in: bytes and times in, bytes and the outcome out (sans-I/O, pull). It says Hello
- * every 100 ms until it is answered; the one who calls it decides when to give up.
+ * A connection attempt of a client, sans I/O. It sends a Hello every 100 ms until it is answered. It has no timeout.
  */
 export class ClientHandshake {
   static readonly kResend = 100n * kMillisecond;
@@ -32,9 +31,8 @@ export class ClientHandshake {
   #outcome: Outcome | undefined;
 
   /**
-   * `random` gives that many bytes from a cryptographic source. With a `key` of 32 bytes all is sealed, and whoever
-   * answers has proved that it knows the key; the session is of one of `suites`, as the server chooses, or it has refused
-   * us.
+   * `random` must return cryptographically secure bytes. With a `key` of 32 bytes, the session is encrypted with one
+   * of `suites`, which the server selects, and the answer proves that the server knows the key.
    */
   constructor(
     hello: Hello,
@@ -60,13 +58,12 @@ export class ClientHandshake {
     }
   }
 
-  /** Takes any bytes; anything but an answer to this attempt changes nothing. */
+  /** Handles a datagram. Anything but an answer to this attempt is ignored. */
   receive(now: Nanoseconds, datagram: Uint8Array): void {
     if (this.#outcome) return;
     const retry = decodeRetry(datagram);
     if (retry && retry.suite === this.#suite && equal(retry.random, this.#random)) {
-      // Only the first cookie is worth an immediate Hello. Were every Retry, a server that dislikes our cookies and we
-      // would play ping-pong.
+      // Only the first cookie is answered immediately, to prevent a loop with a server that rejects the cookie.
       if (!this.#cookie) {
         this.#due = true;
         this.#nextTick = now;
@@ -87,7 +84,7 @@ export class ClientHandshake {
     if (!this.#outcome && now >= this.#nextTick) this.#due = true;
   }
 
-  /** The next datagram to send; undefined = nothing to send now. */
+  /** Returns the next datagram to send, or undefined. */
   nextDatagram(now: Nanoseconds): Uint8Array | undefined {
     if (!this.#due) return undefined;
     this.#due = false;
@@ -97,7 +94,6 @@ export class ClientHandshake {
     });
   }
 
-  /** When `tick` is due next. */
   nextTick(): Nanoseconds {
     return this.#nextTick;
   }

@@ -3,19 +3,19 @@ import { Role } from "./messages.js";
 import { kKeySize } from "./noise.js";
 
 export interface ClientKey {
-  /** The most that the server grants: a controller may also observe. */
+  /** The maximum role; a controller may also observe. */
   readonly role: Role;
   readonly key: Uint8Array;
 }
 
-/** Of 32 random bytes some 30 are different; that fewer than 18 are happens once in 10¹¹ keys. */
+/** 32 random bytes have about 30 distinct values. Fewer than 18 occur once in 10¹¹ keys. */
 const kFewestDifferent = 18;
 const kExpected = "expected one line, `controller` or `observer` and 64 hexadecimal digits";
 
 /**
- * Reads the text of a key file, which `tendond keygen` writes: empty lines and lines that begin with # are comments; one
- * line is left, `controller` or `observer` and 64 hexadecimal digits. Throws a RangeError with a sentence, never with the
- * key, when the text is no key file or the key is weak.
+ * Parses a key file, which `tendond keygen` writes: empty lines and lines that begin with # are ignored, and one line
+ * contains `controller` or `observer` and 64 hexadecimal digits. Throws a RangeError with a message that does not
+ * contain the key if the text is malformed or the key is weak.
  */
 export function parseKeyFile(text: string): ClientKey {
   const lines = text.split("\n").map((line) => line.trim()).filter((line) => line !== "" && !line.startsWith("#"));
@@ -34,7 +34,7 @@ export function parseKeyFile(text: string): ClientKey {
   return { role, key };
 }
 
-/** Why nobody should use this key. */
+/** Returns why the key is weak, or undefined. */
 function weakness(key: Uint8Array): string | undefined {
   if (new Set(key).size < kFewestDifferent) return "it repeats the same few bytes";
   const steps = new Set(Array.from(key.subarray(1), (byte, i) => (byte - key[i]!) & 0xff));

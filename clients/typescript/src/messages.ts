@@ -1,49 +1,49 @@
 // SPDX-License-Identifier: Apache-2.0
-// What peers say to each other, as plain values; protocol/WIRE.md has the same nouns as bytes. SI units, device base
-// frame. A force is what the device exerts ON THE HAND: a wall that resists motion along +x sends −x.
+// Messages between client and server as plain values (protocol/WIRE.md). SI units, device base frame. Forces act ON
+// THE HAND: a wall that resists motion along +x sends −x.
 export * from "./gen/messages.js";
 
-/** The version of the wire that this client speaks. */
 export const kProtocolVersion = 1;
-/** A feature: the client may send a local model with its forces, and the server follows the hand with it. */
+/** Feature: the client may send a local model with its forces, with which the server extrapolates them. */
 export const kFeatureLocalModel = "local-model";
 
-/** A feature: the client understands that a lease can be lost. */
+/** Feature: the client supports losing a lease. */
 export const kFeatureChannels = "channels";
 
 /**
- * A feature: the client is told how the device lies before the operator, its buttons, orientation, gripper and torques,
- * and may ask for torque and grip force.
+ * Feature: the client receives the orientation of the device relative to the operator, its buttons, orientation,
+ * gripper and torques, and may send torques and grip forces.
  */
 export const kFeatureHandle = "handle";
 
-/** Whoever offers this is told the joints of the device, with `joints` of a client's config. */
+/** Feature: the client receives the joints of the device (`joints` in the config). */
 export const kFeatureJoints = "joints";
-/** Whoever offers this is told the outputs of the device, with `outputs` of a client's config, and may set them. */
+/** Feature: the client receives the outputs of the device and may set them (`outputs` in the config). */
 export const kFeatureOutputs = "outputs";
 
-/** A feature: the client may be the other end of a coupling: it says Couple, and PortStates go both ways. */
+/** Feature: the client may be the other end of a coupling: it sends Couple, and PortStates are sent both ways. */
 export const kFeatureTeleoperation = "teleoperation";
 
-/** A feature: an engine names the ways in which it answers, and says of each force which one it was. */
+/** Feature: an engine names its methods, and each force contains the method that computed it. */
 export const kFeatureWays = "ways";
 
-/** A feature: an observer wants to be told what the engines ask for, how the loop does, and how each engine does. */
+/** Feature: an observer receives the forces before limiting, and reports on the loop and the engines. */
 export const kFeatureDiagnostics = "diagnostics";
 
-/** Any object with x, y and z will do: the vector of your engine too. */
+/** Any object with x, y and z, for example the vector type of your engine. */
 export interface Vec3 {
   readonly x: number;
   readonly y: number;
   readonly z: number;
 }
 
-/** A rotation as a unit quaternion, Hamilton's. q and −q are the same rotation. */
+/** A rotation as a unit quaternion (Hamilton convention). q and −q are the same rotation. */
 export interface Quat extends Vec3 {
   readonly w: number;
 }
 
-/** N/m, −∂force/∂position; a spring is positive. 1 entry k: k·I. 3: the diagonal. 9: the matrix, row by row. */
+/** N/m, −∂force/∂position, positive for a spring. 1 entry k: k·I. 3 entries: the diagonal. 9 entries: row-major
+ * matrix. */
 export type Stiffness = readonly number[];
 
 const kReasons = [
@@ -52,7 +52,7 @@ const kReasons = [
   "damped", "acceleration",
 ] as const;
 
-/** The names of the bits of DeviceState.reasons. */
+/** Returns the names of the bits in DeviceState.reasons. */
 export function reasonNames(reasons: number): string[] {
   return kReasons.filter((_, bit) => (reasons & (1 << bit)) !== 0);
 }

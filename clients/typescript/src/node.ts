@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The additions for Node: UDP, and the command line that all guests share.
+// Additions for Node: UDP and the command line shared by all clients.
 export * from "./index.js";
 export { readClientKey } from "./client_key.js";
 export { commandLine, type Options } from "./options.js";

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Noise_NNpsk0_25519_ChaChaPoly_SHA256 (Noise rev. 34), for Node and browsers alike: WebCrypto has no ChaCha20.
+// Noise_NNpsk0_25519_ChaChaPoly_SHA256 (Noise rev. 34), for Node and browsers; WebCrypto has no ChaCha20.
 import { chacha20poly1305 } from "@noble/ciphers/chacha";
 import { x25519 } from "@noble/curves/ed25519";
 import { hmac } from "@noble/hashes/hmac";
@@ -8,25 +8,25 @@ import { concat } from "./datagram.js";
 
 export const kKeySize = 32;
 const kTagSize = 16;
-/** The nonce of REKEY. */
+/** Nonce of REKEY. */
 const kMaxNonce = 0xffff_ffff_ffff_ffffn;
 const kName = "Noise_NNpsk0_25519_ChaChaPoly_SHA256"; // longer than a hash, so it is hashed
 const kNothing = new Uint8Array(0);
 
 const ascii = (text: string): Uint8Array => new TextEncoder().encode(text);
 
-/** 4 zeros, then the number, little-endian. */
+/** 4 zero bytes and the number in little-endian order. */
 function nonce(number: bigint): Uint8Array {
   const bytes = new Uint8Array(12);
   new DataView(bytes.buffer).setBigUint64(4, number, true);
   return bytes;
 }
 
-/** Ciphertext and tag. */
+/** Returns ciphertext and tag. */
 export const encrypt = (key: Uint8Array, number: bigint, header: Uint8Array, plain: Uint8Array): Uint8Array =>
   chacha20poly1305(key, nonce(number), header).encrypt(plain);
 
-/** Undefined when it is not authentic. */
+/** Returns undefined if authentication fails. */
 export function decrypt(key: Uint8Array, number: bigint, header: Uint8Array, sealed: Uint8Array): Uint8Array | undefined {
   if (sealed.length < kTagSize) return undefined;
   try {
@@ -36,19 +36,19 @@ export function decrypt(key: Uint8Array, number: bigint, header: Uint8Array, sea
   }
 }
 
-/** The key that follows `key`, from which `key` cannot be computed. */
+/** Returns the next key, from which `key` cannot be derived. */
 export const rekey = (key: Uint8Array): Uint8Array =>
   encrypt(key, kMaxNonce, kNothing, new Uint8Array(kKeySize)).slice(0, kKeySize);
 
-/** Tells the server which key to try, and nothing else: 8 bytes. */
+/** Identifies the key to the server without revealing it: 8 bytes. */
 export const keyId = (key: Uint8Array): Uint8Array => sha256(concat(ascii("tendon-key-id"), key)).slice(0, 8);
 
-/** The hash and key that both ends have mixed so far. Immutable, so a message that does not open changes nothing. */
+/** The hash and key that both sides have mixed so far. Immutable, so that an invalid message changes nothing. */
 export class SymmetricState {
   private constructor(
     readonly hash: Uint8Array,
     readonly chainingKey: Uint8Array,
-    /** None until the first is mixed in. */
+    /** Empty before the first is mixed in. */
     readonly key: Uint8Array = kNothing,
     readonly number: bigint = 0n,
   ) {}
@@ -69,7 +69,7 @@ export class SymmetricState {
     const [chainingKey, hash, key] = hkdf(this.chainingKey, material, 3);
     return new SymmetricState(sha256(concat(this.hash, hash!)), chainingKey!, key!);
   }
-  /** Token "e" of a pattern with a pre-shared key: both hashed and mixed into the key. */
+  /** Token "e" in a pattern with a pre-shared key: hashed and mixed into the key. */
   mixEphemeral(publicKey: Uint8Array): SymmetricState {
     return this.mixHash(publicKey).mixKey(publicKey);
   }
@@ -82,7 +82,7 @@ export class SymmetricState {
     const plain = decrypt(this.key, this.number, this.hash, sealed);
     return plain && [this.#after(sealed), plain];
   }
-  /** The keys of the two directions: initiator → responder first. */
+  /** Returns the keys of both directions, initiator → responder first. */
   split(): [Uint8Array, Uint8Array] {
     const [first, second] = hkdf(this.chainingKey, kNothing, 2);
     return [first!, second!];
@@ -93,7 +93,7 @@ export class SymmetricState {
   }
 }
 
-/** HKDF over HMAC-SHA-256, as Noise has it. */
+/** HKDF over HMAC-SHA-256 as specified by Noise. */
 function hkdf(chainingKey: Uint8Array, material: Uint8Array, outputs: number): Uint8Array[] {
   const temporary = hmac(sha256, chainingKey, material);
   const out: Uint8Array[] = [];
@@ -104,21 +104,23 @@ function hkdf(chainingKey: Uint8Array, material: Uint8Array, outputs: number): U
 }
 
 export interface Finished {
-  /** What message 2 carried. */
+  /** Payload of message 2. */
   readonly payload: Uint8Array;
-  /** Seals initiator → responder. */
+  /** Encrypts initiator → responder. */
   readonly sendKey: Uint8Array;
-  /** Opens responder → initiator. */
+  /** Decrypts responder → initiator. */
   readonly receiveKey: Uint8Array;
-  /** The handshake's hash: the same at both ends. */
+  /** Handshake hash, equal on both sides. */
   readonly hash: Uint8Array;
 }
 
-/** A key of suite 2, from that of a direction: bound to Hello and Answer, and never a key of suite 1. */
+/** Derives a key of suite 2 from the key of a direction, bound to Hello and Answer and different from all keys of
+ * suite 1. */
 export const keyOfSuite2 = (key: Uint8Array, hash: Uint8Array): Uint8Array =>
   hmac(sha256, key, concat(ascii("tendon-suite-2"), hash));
 
-/** The initiator of NNpsk0: psk, e → and ← e, ee. `secret` is the ephemeral one: 32 new random bytes for each attempt. */
+/** The initiator of NNpsk0: psk, e → and ← e, ee. `secret` is the ephemeral key: 32 new random bytes for each attempt.
+ */
 export class Initiator {
   /** e, payload, tag. */
   readonly message1: Uint8Array;
@@ -133,7 +135,7 @@ export class Initiator {
     this.#state = state;
   }
 
-  /** Undefined, and nothing has changed, when the message is not from one who knows the key. */
+  /** Returns undefined and changes nothing if the sender does not know the key. */
   readMessage2(message: Uint8Array): Finished | undefined {
     if (message.length < kKeySize + kTagSize) return undefined;
     const theirs = message.slice(0, kKeySize);

@@ -5,17 +5,17 @@ import type { ClientConfig } from "./config.js";
 import { kMaxLabel } from "./limits.js";
 import { parseServer } from "./udp.js";
 
-/** What run() needs to know; commandLine() fills it. */
+/** Options of run(), filled by commandLine(). */
 export interface Options extends ClientConfig {
-  /** Where tendond listens. */
+  /** Address of tendond. */
   readonly server: string;
-  /** Ends after this time; 0 = at SIGINT or SIGTERM. */
+  /** 0: run until SIGINT or SIGTERM. */
   readonly durationS: number;
-  /** The closing summary as one JSON object on stdout, not as text on stderr. */
+  /** Print the final summary to stdout as one JSON object instead of to stderr as text. */
   readonly json: boolean;
 }
 
-/** A number ≥ 0 or a switch: its default and its meaning. */
+/** Default and description of a number ≥ 0 or a flag. */
 type Extra = readonly [number, string] | readonly [false, string];
 type ValueOf<E extends Extra> = E extends readonly [number, string] ? number : boolean;
 
@@ -24,14 +24,14 @@ interface Shared {
   readonly rateHz: number;
 }
 
-/** 0, or a number from `least` to `most`. */
+/** Parses 0 or a number from `least` to `most`. */
 function number(option: string, text: string, least: number, most: number): number {
   const value = text.trim() === "" ? NaN : Number(text);
   if (value === 0 || (value >= least && value <= most)) return value;
   throw new RangeError(`--${option}: expected ${least > 0 ? "0, or " : ""}${least} to ${most}, got "${text}"`);
 }
 
-/** The name of a device or a channel. */
+/** Parses the name of a device or channel. */
 function label(option: string, text: string): string {
   const size = new TextEncoder().encode(text).length;
   if (size <= kMaxLabel) return text;
@@ -39,9 +39,9 @@ function label(option: string, text: string): string {
 }
 
 /**
- * The command line that all guests share, --server, --key, --device, --channel, --take-lease, --rate-hz, --duration-s, --json
- * and --help, and what a program adds to it: `{ "stiffness-n-per-m": [2000, "How hard the wall is"] }`. It exits with 0
- * after --help, with 1 if the key cannot be read, and with 2 if the command line is not valid.
+ * Parses the command line shared by all clients, --server, --key, --device, --channel, --take-lease, --rate-hz,
+ * --duration-s, --json and --help, and the options of the program: `{ "stiffness-n-per-m": [2000, "How hard the wall
+ * is"] }`. Exits with 0 after --help, with 1 if the key cannot be read, and with 2 if the command line is invalid.
  */
 export function commandLine<Extras extends Record<string, Extra> = Record<never, never>>(
   purpose: string,

@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 
-/** 2048 bits, of which the 64 being filled are not a full memory: 1984 numbers are always remembered. */
+/** 2048 bits, of which 64 are being filled, so that at least 1984 numbers are remembered. */
 const kWords = 32n;
 const kRemembered = (kWords - 1n) * 64n;
 
 /**
- * Remembers which recent packet numbers have arrived, so that each packet is accepted once. A ring of bits as in RFC 6479:
- * a number's bit never moves, advancing clears the words it runs over.
+ * Remembers recently received packet numbers, so that each packet is accepted only once. A bit ring as in RFC 6479:
+ * the bit of a number never moves, and advancing clears whole words.
  *
- * Ask `contains` before using a packet, and `insert` it once it is authentic, so that a forged packet cannot use up the
- * number of a real one.
+ * Call `contains` before using a packet, and `insert` after it was authenticated, so that a forged packet cannot
+ * consume the number of a real one.
  */
 export class ReplayWindow {
   readonly #words = new BigUint64Array(Number(kWords));
@@ -18,7 +18,7 @@ export class ReplayWindow {
   #mask = 0;
   #count = 0n;
 
-  /** True when `number` was inserted, or is too old to know. */
+  /** Returns true if `number` was inserted or is older than the window. */
   contains(number: bigint): boolean {
     if (number > this.#highest) return false;
     return this.#highest - number >= kRemembered || this.#has(number);
@@ -42,9 +42,9 @@ export class ReplayWindow {
     ++this.#count;
   }
 
-  /** Bit i: (number − 1 − i) is known to have been inserted. */
+  /** Returns a bit mask in which bit i is set if (number − 1 − i) was inserted. */
   maskBefore(number: bigint): number {
-    if (number === this.#highest) return this.#mask; // nearly always
+    if (number === this.#highest) return this.#mask; // the common case
     let mask = 0;
     for (let i = 0; i < 32; ++i) {
       const earlier = number - 1n - BigInt(i);
@@ -54,11 +54,11 @@ export class ReplayWindow {
     return mask >>> 0;
   }
 
-  /** −1 before the first. */
+  /** −1 before the first insertion. */
   get highest(): bigint {
     return this.#highest;
   }
-  /** How many numbers from 0 to the highest were never inserted. */
+  /** Number of missing packets from 0 to the highest number. */
   get missing(): bigint {
     return this.#highest + 1n - this.#count;
   }

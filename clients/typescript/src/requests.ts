@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// The reliable part of a session: requests arrive exactly once and in order, and each gets its answer. The requester
-// repeats each until the answer has come; the answerer keeps its last 16 answers and repeats one whenever its request
-// comes again. That is enough: the requester has at most 16 open, so when n + 16 arrives, the answer to n has.
+// Reliable requests of a session: they arrive exactly once and in order, and each is answered. The requester repeats
+// each until it is answered; the receiver stores its last 16 answers and repeats an answer if the request is
+// repeated. This is sufficient because at most 16 requests are pending: when n + 16 arrives, the answer to n has been
+// received.
 import type { Control, ControlAck } from "./codec.js";
 import { kRequestWindow } from "./limits.js";
 import { Code, type Request } from "./messages.js";
@@ -11,34 +12,34 @@ const kMaxId = 0xffffffff;
 
 interface Asked {
   readonly control: Control;
-  /** Undefined: never sent. */
+  /** Undefined before the first transmission. */
   due: Nanoseconds | undefined;
   timesSent: number;
   answer: ControlAck | undefined;
 }
 
-/** The asking end. */
+/** The requesting side. */
 export class OutgoingRequests {
-  /** Waits double with every repetition up to this; a longer round trip wins. */
+  /** Upper limit of the exponential back-off, unless the round trip is longer. */
   static readonly kMaxWait = kSecond;
 
-  /** In the order of the ids; the first is the oldest whose answer was not taken out. */
+  /** In order of the ids. The first is the oldest whose answer was not taken. */
   readonly #asked: Asked[] = [];
   #next = 1;
 
-  /** Queues a request and returns its id; undefined when 16 are open. */
+  /** Queues a request and returns its id, or undefined if 16 are pending. */
   add(request: Request): number | undefined {
     if (this.#asked.length === kRequestWindow || this.#next === kMaxId) return undefined;
     this.#asked.push({ control: { id: this.#next, request }, due: undefined, timesSent: 0, answer: undefined });
     return this.#next++;
   }
 
-  /** The first request to be sent (again) now. */
+  /** Returns the first request to send or repeat now. */
   nextDue(now: Nanoseconds): Control | undefined {
     return this.#asked.find(({ due, answer }) => !answer && (due === undefined || due <= now))?.control;
   }
 
-  /** It has been sent; it is due again after `timeout`, doubled for every time before, at most `kMaxWait`. */
+  /** Schedules a repetition after `timeout`, doubled for each previous transmission up to `kMaxWait`. */
   sent(id: number, now: Nanoseconds, timeout: Nanoseconds): void {
     const asked = this.#find(id);
     if (!asked) return;
@@ -46,21 +47,21 @@ export class OutgoingRequests {
     ++asked.timesSent;
   }
 
-  /** When the next one is due to be repeated. */
+  /** Returns the time of the next repetition. */
   nextDueTime(): Nanoseconds {
     return this.#asked.reduce((next, { due, answer }) => (answer ? next : earliest(next, due ?? 0n)), kNever);
   }
 
-  /** Takes an answer. False when the answer belongs to no request. */
+  /** Returns false if the answer does not belong to a request. */
   acknowledge(ack: ControlAck): boolean {
     const asked = this.#find(ack.id);
-    if (!asked) return ack.id < this.#next; // repeated
+    if (!asked) return ack.id < this.#next; // true if repeated
     if (asked.timesSent === 0) return false;
     asked.answer ??= ack;
     return true;
   }
 
-  /** The next answer, in the order of the requests. */
+  /** Returns the next answer in the order of the requests. */
   nextAnswer(): ControlAck | undefined {
     return this.#asked[0]?.answer && this.#asked.shift()?.answer;
   }
@@ -77,12 +78,12 @@ interface Answering {
   due: boolean;
 }
 
-/** The answering end. */
+/** The answering side. */
 export class IncomingRequests {
   readonly #slots: (Answering | undefined)[] = new Array<Answering | undefined>(kRequestWindow).fill(undefined);
   #next = 1;
 
-  /** Takes a request in any order. False when the id is one that a correct peer cannot use yet. */
+  /** Accepts requests in any order. Returns false if a correct peer could not use this id yet. */
   take(control: Control): boolean {
     const mine = this.#slot(control.id);
     if (control.id < this.#next) {
@@ -94,7 +95,7 @@ export class IncomingRequests {
     return true;
   }
 
-  /** The next request, exactly once and in order. This also answers requests that are unknown or invalid. */
+  /** Returns the next request, exactly once and in order. Answers unknown or invalid requests itself. */
   next(): { id: number; request: Request } | undefined {
     for (let mine = this.#slot(this.#next); mine?.stage === "arrived"; mine = this.#slot(this.#next)) {
       ++this.#next;
@@ -108,7 +109,7 @@ export class IncomingRequests {
     return undefined;
   }
 
-  /** Answers a request that `next` returned; any other id is ignored. */
+  /** Answers a request returned by `next`. Other ids are ignored. */
   answer(answer: ControlAck): void {
     const mine = this.#slot(answer.id);
     if (mine?.control.id !== answer.id || mine.stage !== "taken") return;
@@ -117,7 +118,7 @@ export class IncomingRequests {
     mine.due = true;
   }
 
-  /** The first answer to be sent now. */
+  /** Returns the first answer to send now. */
   nextDue(): ControlAck | undefined {
     return this.#slots.find((slot) => slot?.due)?.answer;
   }

@@ -2,14 +2,14 @@
 import { kMillisecond, latest, type Nanoseconds } from "./time.js";
 
 /**
- * The round trip's time, and how long to wait for an answer before asking again (RFC 6298):
+ * Round-trip time and retransmission timeout (RFC 6298):
  *
  *     first sample R:  SRTT = R, RTTVAR = R/2
  *     then:            RTTVAR += (|SRTT − R| − RTTVAR)/4,  SRTT += (R − SRTT)/8
- *     wait for:        max(minimum, SRTT + 4 RTTVAR)
+ *     timeout:         max(minimum, SRTT + 4 RTTVAR)
  */
 export class RoundTrip {
-  /** How long to wait before the first sample. */
+  /** Timeout before the first sample. */
   static readonly kFirstTimeout = 100n * kMillisecond;
 
   newest: Nanoseconds | undefined;

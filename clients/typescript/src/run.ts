@@ -6,17 +6,18 @@ import { Code, type LinkReport } from "./messages.js";
 import type { Options } from "./options.js";
 import { NoSuchHost, udp } from "./udp.js";
 
-/** One line on stderr. A server's words cannot start another line or move the cursor: control characters are escaped. */
+/** Prints one line to stderr. Escapes control characters, so that text of a server cannot start a line or move the
+ * cursor. */
 function say(program: string | undefined, sentence: string): void {
   const escaped = sentence.replace(/[\x00-\x1f\x7f-\x9f]/g, (c) =>
     c === "\n" ? "\\n" : c === "\t" ? "\\t" : `\\x${c.charCodeAt(0).toString(16).padStart(2, "0")}`);
   process.stderr.write(`${program ?? "tendon"}: ${escaped}\n`);
 }
 
-/** Refusals that another attempt does not change. */
+/** Whether further attempts are pointless. */
 const isFinal = (code: Code): boolean => code !== Code.BUSY && code !== Code.SHUTDOWN;
 
-/** The connection's state in a sentence; empty when there is nothing to say. */
+/** Describes the state of the connection in one sentence. Empty if there is nothing to report. */
 function sentence(guest: Guest, { server, key }: Options): string {
   const { phase, code, reason } = guest.stats();
   switch (phase) {
@@ -57,7 +58,6 @@ function printSummary(stats: ClientStats, seconds: number, { name, json }: Optio
   }
 }
 
-/** Prints each of the server's reports on our forces. */
 function printReport(report: LinkReport, { name, json }: Options): void {
   if (!json) {
     if (report.words) say(name, `the server says: ${report.words}`);
@@ -83,11 +83,12 @@ function printReport(report: LinkReport, { name, json }: Options): void {
 }
 
 /**
- * Runs a guest over UDP until it is told to stop (durationS, SIGINT or SIGTERM); then it says Bye. The exit code comes
- * back: 0 = it has been connected to the server, 1 = it could not connect, there is no such host, the server refused it for
- * good, or the callback threw. Another controller at the device and a server that goes down are not for good: it keeps trying. stderr gets one
- * sentence for each change of the connection, and the server's sentence when forces were late. stdout gets only the callback's own
- * output and, with `json`, the server's report on our forces once a second, and the summary.
+ * Runs a client over UDP until durationS, SIGINT or SIGTERM, then sends a Bye. Returns the exit code: 0 if a session
+ * was open at least once; 1 if connecting failed, the host is unknown, the server refused permanently, or the
+ * callback threw. If another controller holds the device or the server shuts down, it keeps trying. Prints one
+ * sentence to stderr for each change of the connection and a warning if forces were late. stdout contains only the
+ * output of the callback and, with `json`, the server's report on the received forces once per second, and the
+ * summary.
  */
 export async function run(
   options: Options,

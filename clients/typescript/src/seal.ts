@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// How the body of a Data datagram is closed and opened: in the clear, or sealed with keys that are renewed.
+// Protection of the body of a Data datagram: none, or authenticated encryption with key renewal.
 import { AesKey } from "./aes.js";
 import { CipherSuite, concat, DatagramType, encodeHeader, kHeaderSize, type Header } from "./datagram.js";
 import { decrypt, encrypt, rekey } from "./noise.js";
@@ -7,15 +7,14 @@ import { kSecond, type Nanoseconds } from "./time.js";
 
 export interface Seal {
   readonly suite: CipherSuite;
-  /** Bytes that closing adds to a body. */
+  /** Number of bytes that close() adds. */
   readonly overhead: number;
-  /** The datagram. */
+  /** Returns the datagram. */
   close(now: Nanoseconds, connectionId: number, packetNumber: bigint, body: Uint8Array): Uint8Array;
-  /** The body, or why there is none: not sealed by the peer, or with a key that is over or far ahead. */
+  /** Returns the body. "forged": authentication failed. "oldKey": the key has expired or is far ahead. */
   open(now: Nanoseconds, header: Header, datagram: Uint8Array): Uint8Array | "forged" | "oldKey";
 }
 
-/** Suite 0. */
 export class PlainSeal implements Seal {
   readonly suite = CipherSuite.Plain;
   readonly overhead = 0;
@@ -29,7 +28,7 @@ export class PlainSeal implements Seal {
   }
 }
 
-/** One key of suite 1, in the form of an AesKey. */
+/** A key of suite 1 with the interface of AesKey. */
 class ChaChaKey {
   constructor(private readonly key: Uint8Array) {}
 
@@ -50,7 +49,7 @@ type SealingKey = ChaChaKey | AesKey;
  * Suites 1 and 2: ChaCha20-Poly1305 or AES-256-GCM with the packet number as nonce and the header as associated data.
  */
 export class NoiseSeal implements Seal {
-  /** The sender renews its key after this many datagrams or this much time, whichever comes first. */
+  /** The sender renews its key after this number of datagrams or this time, whichever is first. */
   static readonly kRenewAfter = { datagrams: 1n << 20n, time: 600n * kSecond };
   /** How long the previous key stays valid after a renewal. */
   static readonly kOverlap = 2n * kSecond;

@@ -14,30 +14,30 @@ import { PlainSeal, type Seal } from "./seal.js";
 import { earliest, kMillisecond, kNever, kSecond, toMilliseconds, type Nanoseconds } from "./time.js";
 
 /**
- * Everything that is counted about one conversation. Each datagram received adds one to exactly one of `received`,
- * `duplicated`, `malformed`, `forged` and `oldKey`.
+ * Counters of one session. Each received datagram increments exactly one of `received`, `duplicated`, `malformed`,
+ * `forged` and `oldKey`.
  */
 export interface LinkStats {
   sent: number;
-  /** Accepted ones. */
+  /** Accepted. */
   received: number;
-  /** Numbers of the peer's packets never seen (so far). */
+  /** Packet numbers of the peer that were never received (so far). */
   lost: number;
-  /** Ours that the peer had not seen, as far as its ack vectors reach. */
+  /** Packets that the peer had not received according to its ack vectors. */
   lostOutgoing: number;
-  /** Accepted, but older than one seen before. */
+  /** Accepted, but older than a previous one. */
   reordered: number;
-  /** Seen before, older than the window, or of the handshake: dropped. */
+  /** Dropped: received before, older than the window, or of the handshake. */
   duplicated: number;
-  /** Not a datagram of this conversation: dropped. */
+  /** Dropped: not a datagram of this session. */
   malformed: number;
-  /** Suites 1 and 2: did not open; forged, or damaged under way: dropped. */
+  /** Dropped: authentication failed (suites 1 and 2). */
   forged: number;
-  /** Suite 1: of a key that is over, or far ahead: dropped. */
+  /** Dropped: its key has expired or is far ahead (suites 1 and 2). */
   oldKey: number;
-  /** Well-formed, with a value out of bounds (NaN, Infinity …): frame dropped. */
+  /** Frame dropped: a value is out of bounds (NaN, Infinity …). */
   invalid: number;
-  /** State, force or report not newer than the newest one: frame dropped. */
+  /** Frame dropped: not newer than the newest state, force or report. */
   stale: number;
   /** ms, newest sample; undefined before the first. */
   roundTripMs: number | undefined;
@@ -47,12 +47,12 @@ export interface LinkStats {
   roundTripVariationMs: number;
 }
 
-/** Told to an observer that asks for diagnostics. */
+/** Sent to observers that request diagnostics. */
 export type Diagnosis =
   | { readonly kind: "deviceReport"; readonly value: DeviceReport }
   | { readonly kind: "peerReport"; readonly value: PeerReport };
 
-/** Newest wins for each device, and for each of its channels. */
+/** Key of the streams in which the newest report replaces older ones. */
 function streamOf({ kind, value }: Diagnosis): string {
   return kind === "deviceReport" ? `${value.device}` : `${value.device}/${value.channel}`;
 }
@@ -60,7 +60,7 @@ function numberOf({ kind, value }: Diagnosis): bigint {
   return kind === "deviceReport" ? value.number : value.link.number;
 }
 const endOf = ({ device, channel, ofPeer }: PortState): string => `${device}/${channel}/${ofPeer ? "peer" : "own"}`;
-/** Removes and returns the entry that was put in first. */
+/** Removes and returns the oldest entry. */
 function takeFirst<Value>(from: Map<string, Value>): Value | undefined {
   for (const [key, value] of from) {
     from.delete(key);
@@ -69,7 +69,6 @@ function takeFirst<Value>(from: Map<string, Value>): Value | undefined {
   return undefined;
 }
 
-/** An event for the owner of a session. */
 export type SessionEvent =
   | { readonly kind: "state"; readonly state: DeviceState }
   | { readonly kind: "force"; readonly command: ForceCommand }
@@ -78,31 +77,32 @@ export type SessionEvent =
   | { readonly kind: "port"; readonly port: PortState }
   | { readonly kind: "request"; readonly id: number; readonly request: Request }
   | ({ readonly kind: "answered" } & ControlAck)
-  /** As the peer said Bye; Code.TIMED_OUT: it fell silent; Code.EXPIRED: too old. The last event. */
+  /** The last event, after a Bye of the peer. Code.TIMED_OUT: the peer was silent; Code.EXPIRED: maximum age reached.
+   */
   | { readonly kind: "closed"; readonly code: Code; readonly reason: string };
 
 export interface SessionConfig {
   readonly connectionId: number;
   readonly seal?: Seal;
-  /** Longest time between two of our datagrams. */
+  /** Maximum time between two sent datagrams. */
   readonly keepAlive?: Nanoseconds;
-  /** Silence of the peer after which it is gone. */
+  /** The session ends after this silence of the peer. */
   readonly timeout?: Nanoseconds;
-  /** A request is sent again after max(this, SRTT + 4 RTTVAR). */
+  /** A request is repeated after max(this, SRTT + 4 RTTVAR). */
   readonly minResend?: Nanoseconds;
-  /** Suite 1: after this age a session ends, Code.EXPIRED: no key is older than a day. */
+  /** Maximum age of an encrypted session (Code.EXPIRED), so that no key is older than a day. */
   readonly life?: Nanoseconds;
 }
 
 /**
- * One open conversation between a client and a server, seen from either end: bytes and times in, bytes and events out
- * (sans-I/O, pull). protocol/SESSION.md describes the behaviour.
+ * One session, usable by client and server, sans I/O: bytes and times in, bytes and events out. The protocol is
+ * described in protocol/SESSION.md.
  *
- * State, force and reports: newest wins. Requests: reliable and in order. Every datagram carries an echo, so each gives a round
- * trip and an ack vector. Nothing queues without a bound.
+ * States, forces and reports: the newest value replaces older ones. Requests are reliable and ordered. Each datagram
+ * contains an echo, which yields a round trip and an ack vector. All queues are bounded.
  *
- * Use: `receive` what arrives and `tick` when `nextTick()` is due; then pull `nextEvent` and `nextDatagram` until they
- * are empty.
+ * Call `receive` for each datagram and `tick` when `nextTick()` is due, then call `nextEvent` and `nextDatagram`
+ * until they are empty.
  */
 export class Session {
   readonly stats: LinkStats = {
@@ -121,7 +121,7 @@ export class Session {
   #forceToSend: ForceCommand | undefined;
   #reportToSend: LinkReport | undefined;
   readonly #diagnosesToSend = new Map<string, Diagnosis>();
-  /** Of each device and channel, likewise of those that have arrived. */
+  /** By device, channel and end, as for received ones. */
   readonly #portsToSend = new Map<string, PortState>();
   readonly #asked = new OutgoingRequests();
   #bye: Frame | undefined;
@@ -137,12 +137,11 @@ export class Session {
   #newestReport = 0n;
   readonly #newestDiagnosis = new Map<string, bigint>();
   readonly #newestPort = new Map<string, PortState>();
-  /** Newest packet of ours that the peer has echoed. */
+  /** Newest sent packet that the peer has echoed. */
   #newestEchoed = -1n;
   readonly #answering = new IncomingRequests();
   readonly #roundTrip = new RoundTrip();
 
-  // To tell.
   #stateArrived: DeviceState | undefined;
   #forceArrived: ForceCommand | undefined;
   #reportArrived: LinkReport | undefined;
@@ -150,7 +149,7 @@ export class Session {
   readonly #portsArrived = new Map<string, PortState>();
   #closed: SessionEvent | undefined;
 
-  /** `opened` is the instant of the handshake's end. The first datagram is due at once. */
+  /** `opened` is the time of the end of the handshake. The first datagram is due immediately. */
   constructor(config: SessionConfig, opened: Nanoseconds) {
     this.#config = {
       seal: new PlainSeal(), keepAlive: 50n * kMillisecond, timeout: 2n * kSecond, minResend: 20n * kMillisecond,
@@ -165,13 +164,13 @@ export class Session {
 
   // ---- In
 
-  /** Takes any bytes. A datagram that is malformed, or of another conversation, is counted and dropped. */
+  /** Handles a datagram. Datagrams that are malformed or of another session are counted and dropped. */
   receive(now: Nanoseconds, datagram: Uint8Array): void {
     this.#latest = now;
     if (!this.#open) return;
     const header = decodeHeader(datagram);
     if (header && header.type !== DatagramType.Data) {
-      ++this.stats.duplicated; // a late copy of the handshake
+      ++this.stats.duplicated; // a late duplicate of the handshake
       return;
     }
     const { connectionId, seal } = this.#config;
@@ -193,8 +192,8 @@ export class Session {
     const content = decodeData(body);
     if (!content) {
       ++this.stats.malformed;
-      // Its number is used up when it was authentic. In suite 0 nobody knows: a damaged copy must not shut out the good
-      // one.
+      // The number is consumed only if the datagram is authentic. In suite 0, a damaged copy must not block the
+      // original.
       if (seal.suite !== CipherSuite.Plain) this.#seen.insert(header.packetNumber);
       return;
     }
@@ -216,25 +215,25 @@ export class Session {
   sendPort(port: PortState): void {
     this.#portsToSend.set(endOf(port), port);
   }
-  /** Queues a reliable request and returns its id; undefined when 16 are open. */
+  /** Queues a reliable request and returns its id, or undefined if 16 are pending. */
   request(request: Request): number | undefined {
     return this.#asked.add(request);
   }
   get suite(): CipherSuite {
     return this.#config.seal.suite;
   }
-  /** Answers a request; an id that waits for no answer is ignored. */
+  /** Answers a request. Ids without a pending request are ignored. */
   answer(answer: ControlAck): void {
     this.#answering.answer(answer);
   }
-  /** Says Bye and closes; frames not sent yet are dropped. No event follows, because the owner knows. */
+  /** Sends a Bye and closes. Unsent frames are dropped, and no event follows. */
   close(code: Code, reason: string): void {
     if (!this.#open) return;
     this.#open = false;
     this.#bye = { kind: "bye", value: { code, reason } };
     this.#byesLeft = kByes;
   }
-  /** Notices the silence of the peer and the age of the session. */
+  /** Checks the timeout of the peer and the age of the session. */
   tick(now: Nanoseconds): void {
     this.#latest = now;
     const { timeout, life, seal } = this.#config;
@@ -254,7 +253,7 @@ export class Session {
 
   // ---- Out
 
-  /** The next datagram to send; undefined = nothing to send now. */
+  /** Returns the next datagram to send, or undefined. */
   nextDatagram(now: Nanoseconds): Uint8Array | undefined {
     this.#latest = now;
     if (this.#byesLeft > 0) {
@@ -264,7 +263,6 @@ export class Session {
     return this.#open && this.#somethingToSay(now) ? this.#write(now) : undefined;
   }
 
-  /** The next event. */
   nextEvent(): SessionEvent | undefined {
     const request = this.#answering.next();
     if (request) return { kind: "request", ...request };
@@ -288,7 +286,7 @@ export class Session {
     return closed;
   }
 
-  /** When `tick` and `nextDatagram` are due next; not in the future when something waits to be sent. */
+  /** Returns when `tick` and `nextDatagram` are due. The time is not in the future if there is something to send. */
   nextTick(): Nanoseconds {
     if (!this.#open) return this.#byesLeft > 0 ? this.#latest : kNever;
     if (this.#lastSent === undefined || this.#somethingToSay(this.#latest)) return this.#latest;
@@ -322,14 +320,14 @@ export class Session {
     }
     this.#countLostOutgoing(told);
     const sample = now - told.sent - (sent - told.received);
-    if (sample < 0n) return; // the clocks' rates differ, and the peer held the echo for long
+    if (sample < 0n) return; // possible if the clock rates differ and the peer held the echo for long
     this.#roundTrip.observe(sample);
     this.stats.roundTripMs = toMilliseconds(sample);
     this.stats.smoothedRoundTripMs = toMilliseconds(this.#roundTrip.smoothed);
     this.stats.roundTripVariationMs = toMilliseconds(this.#roundTrip.variation);
   }
 
-  /** Of our packets since the last echo, those that the vector reaches: the echoed one and at most 32 before. */
+  /** The ack vector covers the echoed packet and at most 32 before it. */
   #countLostOutgoing(told: Echo): void {
     if (told.packetNumber <= this.#newestEchoed) return;
     const between = told.packetNumber - this.#newestEchoed - 1n;
@@ -409,7 +407,7 @@ export class Session {
   }
 
   /**
-   * Writes as many frames as fit, those that age fastest first. The rest goes into the next datagram; state and force
+   * Writes as many frames as fit, most time-critical first. The others are sent in the next datagram. State and force
    * always fit together.
    */
   #write(now: Nanoseconds): Uint8Array {

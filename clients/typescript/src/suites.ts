@@ -3,13 +3,13 @@ import { kHasAes } from "./aes.js";
 import { CipherSuite } from "./datagram.js";
 
 /**
- * The suites that seal, the preferred one first. The name of suite 2 is also the feature by which a client offers it and
- * a server chooses it.
+ * Encrypting suites in order of preference. The name of suite 2 is also the feature with which a client offers and a
+ * server selects it.
  */
 const kNames = [[CipherSuite.AesGcm, "aes-256-gcm"], [CipherSuite.Noise, "chacha20-poly1305"]] as const;
 export const kFeatureAesGcm = kNames[0][1];
 
-/** Those that can be spoken here: suite 2 takes Node. */
+/** Suites of this runtime. Suite 2 requires Node. */
 export const kUsableSuites: readonly CipherSuite[] = kNames
   .map(([suite]) => suite)
   .filter((suite) => suite !== CipherSuite.AesGcm || kHasAes);

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 
 /**
- * A time or a duration in nanoseconds: exact, because the wire has 64 bits for it. A local time and a time of the peer
- * do not subtract. The core never reads a clock: it is told the time, and the time it is told never goes back.
+ * A time or duration in nanoseconds, exact like the 64 bits of the protocol. Local times and times of the peer must
+ * not be subtracted. The core reads no clock: times are arguments and must not decrease.
  */
 export type Nanoseconds = bigint;
 

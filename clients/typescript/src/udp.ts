@@ -10,8 +10,8 @@ export interface Address {
 }
 
 /**
- * "127.0.0.1:47100" or "[::1]:47100". HOST is a numeric address or `localhost` (127.0.0.1); there is no name lookup, so
- * nothing here waits. Anything else throws a RangeError.
+ * Parses "127.0.0.1:47100" or "[::1]:47100". HOST is a numeric address or `localhost` (127.0.0.1); names are not
+ * resolved, so this never blocks. Throws a RangeError for other texts.
  */
 export function parseAddress(text: string): Address {
   const [, bracketed, plain, digits] = /^(?:\[([^\]]*)\]|([^:]*)):(\d{1,5})$/.exec(text) ?? [];
@@ -25,23 +25,23 @@ export function parseAddress(text: string): Address {
 
 export const addressText = ({ host, port }: Address): string => `${isIPv6(host) ? `[${host}]` : host}:${port}`;
 
-/** 127.0.0.0/8 and ::1: datagrams to it never leave this machine. False when it is not a numeric address. */
+/** Whether the address is in 127.0.0.0/8 or ::1. False for names. */
 export function isLoopback(host: string): boolean {
   const ip = host.replace(/^::ffff:/i, "");
   return isIPv4(ip) ? ip.startsWith("127.") : ip === "::1";
 }
 
-/** As parseAddress(), and HOST may be a name: "haptics.lab:47100". Looks nothing up. */
+/** Like parseAddress(), but HOST may also be a name: "haptics.lab:47100". Does not resolve it. */
 export function parseServer(text: string): Address {
   const [, host = "", digits] = /^([A-Za-z0-9_][A-Za-z0-9_.-]{0,252}):(\d{1,5})$/.exec(text) ?? [];
   if (host === "" || host === "localhost" || isIPv4(host) || Number(digits) > 0xffff) return parseAddress(text);
   return { host, port: Number(digits) };
 }
 
-/** A name that the system does not know; the message has the name. */
+/** The host name is unknown. The message contains the name. */
 export class NoSuchHost extends Error {}
 
-/** The addresses of a host name, the one to prefer first; a numeric address is its own. Rejects with NoSuchHost. */
+/** Returns the addresses of a host in order of preference. Rejects with NoSuchHost. */
 export async function lookUp(host: string): Promise<readonly string[]> {
   if (isIP(host)) return [host];
   try {
@@ -52,13 +52,13 @@ export async function lookUp(host: string): Promise<readonly string[]> {
   }
 }
 
-/** Most datagrams that wait for the socket; beyond that the newest are kept. */
+/** Maximum number of datagrams waiting for the socket; older ones are dropped. */
 const kMostWaiting = 16;
 
 /**
- * A UDP socket that talks to one server, from a port that the system chooses. It is connected, so that the kernel drops
- * what others send to it. Datagrams that the system does not take are lost. A host name is looked up at the start, and again before each
- * further attempt; a guest whose server's name nobody knows at the start ends with NoSuchHost.
+ * A UDP socket connected to one server from an ephemeral port, so that the kernel drops datagrams from other senders.
+ * Datagrams that the system rejects are dropped. The host name is resolved at the start and again before each further
+ * attempt. If it is unknown at the start, the client ends with NoSuchHost.
  */
 export function udp(server: string): OpenTransport {
   const { host, port } = parseServer(server);
@@ -66,19 +66,19 @@ export function udp(server: string): OpenTransport {
     let socket: Socket | undefined;
     let present = "";
     let closed = false;
-    /** Until a socket is connected, which takes some rounds of the event loop. */
+    /** Used until a socket is connected, which takes some rounds of the event loop. */
     const waiting: Uint8Array[] = [];
     const send = (datagram: Uint8Array): void => {
       if (socket) socket.send(datagram, () => {});
       else if (waiting.push(datagram) > kMostWaiting) waiting.shift();
     };
-    /** Resolves to whether the system has a way there. */
+    /** Resolves to whether the address is reachable. */
     const moveTo = (ip: string): Promise<boolean> =>
       new Promise((resolve) => {
         const next = createSocket(isIPv6(ip) ? "udp6" : "udp4");
         next.on("message", receive);
-        next.on("error", () => {}); // nobody listens there (yet)
-        // Node calls back with an error, though its types do not say so.
+        next.on("error", () => {}); // the server is not listening (yet)
+        // Node passes an error to the callback, contrary to its type declarations.
         next.connect(port, ip, (...results: unknown[]) => {
           if (closed || results[0]) {
             next.close();
@@ -102,7 +102,7 @@ export function udp(server: string): OpenTransport {
     find(false).catch(fail);
     return {
       send,
-      again: (another) => void find(another).catch(() => {}), // the present address stays
+      again: (another) => void find(another).catch(() => {}), // keep the current address
       close() {
         closed = true;
         socket?.close();

@@ -1,20 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
 import type { OpenTransport } from "./connect.js";
 
-/** A WebSocket is a queue; what waits in it longer than this is older than a hand can use. */
+/** Datagrams that wait longer than this are too old to be useful. */
 const kMaxWaitingBytes = 16 * 1024;
 
 /**
- * The way of a browser, which has no UDP: one binary message is one datagram, and tendon-bridge passes it on as it is. With
- * a key the bridge sees sealed datagrams only. When the WebSocket has closed, the next datagram opens another; a session of
- * suite 1 goes on over it.
+ * Transport for browsers, which have no UDP: each binary message contains one datagram, which tendon-bridge forwards
+ * unchanged. With a key, the bridge sees only encrypted datagrams. After the WebSocket is closed, the next datagram
+ * opens a new one; a session of suite 1 continues over it.
  *
  *     webSocket("ws://127.0.0.1:47180")
  */
 export function webSocket(url: string | URL, WebSocketClass: typeof WebSocket = WebSocket): OpenTransport {
   return (receive) => {
     let socket: WebSocket | undefined;
-    /** The newest datagram that came while the socket was opening. */
+    /** The newest datagram sent while the socket was opening. */
     let waiting: Uint8Array | undefined;
     let closed = false;
 
