@@ -1,21 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
-// Reads what the program of a robot that follows a hand has written down: JSON lines of clients/python's
-// tendon.demonstration.
+// Reads the JSON lines written by tendon.demonstration of clients/python.
 import { createReadStream } from "node:fs";
 import { createInterface } from "node:readline";
 import type { Vec3 } from "./recording.js";
 
-/** The robot as a state of the hand came. */
+/** The robot at the arrival of a state of the hand. */
 export interface Moment {
-  /** s, when the hand was sampled, by the clock of its server. */
+  /** s, sampling time of the hand in the server's clock. */
   readonly t: number;
   /** "engaged", "clutched" … */
   readonly phase: string;
-  /** m, of the tool, in the robot's frame. */
+  /** m, of the tool in the frame of the robot. */
   readonly position: Vec3;
-  /** m, where it is to go; undefined: it holds its place. */
+  /** m, of the tool; undefined: it holds its pose. */
   readonly target?: Vec3 | undefined;
-  /** N, of the surroundings on the tool; undefined: not measured. */
+  /** N, on the tool; undefined: not measured. */
   readonly contact?: Vec3 | undefined;
 }
 
@@ -41,7 +40,7 @@ function momentOf(line: Record<string, unknown>): Moment {
 }
 
 /**
- * Throws an Error with the file and line if this is not a demonstration. It ignores an incomplete last line, blank lines
+ * Throws an Error with the file and line if this is not a demonstration. Ignores an incomplete last line, blank lines
  * and a byte order mark.
  */
 export async function readDemonstration(file: string): Promise<Moment[]> {

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// A coupling as demonstrations: one episode for each time that the operator engaged.
+// Extracts episodes from a coupling, one for each time that the operator engaged.
 import type { Moment } from "./demonstration.js";
 import type { Coupling, PoseMap, Port, Step, Vec3 } from "./recording.js";
 
 export interface Frame {
-  /** m, m/s: the follower's tool, in its base frame. */
+  /** m, m/s: the tool of the follower, in its base frame. */
   readonly state: readonly number[];
-  /** N, of what it runs into; undefined: not measured. */
+  /** N, contact force on the tool; undefined: not measured. */
   readonly contact?: Vec3 | undefined;
-  /** m: where the operator wanted the tool to be, in the follower's base frame. */
+  /** m: position requested by the operator, in the base frame of the follower. */
   readonly action: Vec3;
 }
 
@@ -24,7 +24,7 @@ function mapped({ scale, rotation }: PoseMap, u: Vec3): Vec3 {
   return [row(rotation[0]), row(rotation[1]), row(rotation[2])];
 }
 
-/** The last of `rows` that is not later than t; they rise. Looks on from where it looked last. */
+/** Finds the last of the sorted `rows` that is not later than t. Continues at the previous result. */
 class Latest<T extends { readonly t: number }> {
   readonly #rows: readonly T[];
   #next = 0;
@@ -41,7 +41,7 @@ class Latest<T extends { readonly t: number }> {
 
 const kEngaged = 4;
 
-/** The stretches in which the follower was engaged by one act. */
+/** Returns the time intervals in which the follower was engaged. */
 function acts(ports: readonly Port[]): { readonly from: number; readonly to: number }[] {
   const found: { from: number; to: number }[] = [];
   let before: Port | undefined;
@@ -56,7 +56,7 @@ function acts(ports: readonly Port[]): { readonly from: number; readonly to: num
   return found;
 }
 
-/** Frames at `fps`, from the moment of each act on; an act of less than two frames is none. */
+/** Returns frames at `fps` from the beginning of each engagement. Episodes with fewer than two frames are omitted. */
 export function episodesOf({ leader, follower, map }: Coupling, fps: number): Episode[] {
   const tool = new Latest<Step>(follower.steps);
   const told = new Latest<Port>(follower.ports);
@@ -78,12 +78,12 @@ export function episodesOf({ leader, follower, map }: Coupling, fps: number): Ep
   return episodes;
 }
 
-/** s: a robot that heard nothing of the hand for that long has lost it. */
+/** s, silence after which a robot has lost the hand. */
 const kSilence = 0.5;
 /** s: times of ns, as sums of floating-point numbers, are not exact. */
 const kRounding = 1e-7;
 
-/** The stretches in which a robot followed, from the act that engaged it on; a clutch belongs to it. */
+/** Returns the sequences in which a robot followed, each from engaging on. Clutching does not end a sequence. */
 function followed(moments: readonly Moment[]): Moment[][] {
   const found: Moment[][] = [];
   let open = false;
@@ -100,9 +100,9 @@ function followed(moments: readonly Moment[]): Moment[][] {
 }
 
 /**
- * Returns the same for a robot that is a guest. The velocity is the difference between two samples divided by the time
- * between them. It is zero in the first frame. If a frame has no new sample, the velocity is the same as in the previous
- * frame. The action does not change while the robot is not following.
+ * Like episodesOf, for a robot that is a client. The velocity is the finite difference between two samples. It is
+ * zero in the first frame and unchanged in frames without a new sample. The action does not change while the robot is
+ * not following.
  */
 export function episodesOfRobot(moments: readonly Moment[], fps: number): Episode[] {
   const episodes: Episode[] = [];

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Writes episodes in the layout that LeRobot calls v2.1, without videos:
+// Writes episodes in the LeRobot v2.1 format, without videos:
 //
 //     meta/info.json, tasks.jsonl, episodes.jsonl, episodes_stats.jsonl
 //     data/chunk-000/episode_000000.parquet
@@ -11,10 +11,10 @@ import { parquetWriteBuffer } from "hyparquet-writer";
 import type { Episode, Frame } from "./episodes.js";
 
 export interface DatasetConfig {
-  /** A folder that does not exist yet, or is empty. */
+  /** An empty or new folder. */
   readonly out: string;
   readonly fps: number;
-  /** What the operator did, for people and language models. */
+  /** Description of the task in natural language. */
   readonly task: string;
   readonly robot: string;
 }
@@ -25,7 +25,7 @@ interface Feature {
   readonly of: (frame: Frame, at: Index) => readonly number[];
 }
 
-/** Where a frame stands. */
+/** Position of a frame in the dataset. */
 interface Index {
   readonly frame: number;
   readonly episode: number;
@@ -35,7 +35,7 @@ interface Index {
 
 const kChunk = 1000; // episodes
 
-/** By name. The contact is there when every frame measured it. */
+/** Features by name. The contact force is included if it was measured in every frame. */
 function featuresOf(episodes: readonly Episode[]): ReadonlyMap<string, Feature> {
   const one = (dtype: Feature["dtype"], of: (at: Index) => number): Feature => ({ dtype, names: null, of: (_, at) => [of(at)] });
   const all = new Map<string, Feature>();
@@ -76,7 +76,7 @@ function parquet(features: ReadonlyMap<string, Feature>, rows: ReadonlyMap<strin
   return new Uint8Array(parquetWriteBuffer({ columnData, schema }));
 }
 
-/** Least, most, mean and standard deviation of each component. */
+/** Minimum, maximum, mean and standard deviation of each component. */
 function statsOf(rows: readonly (readonly number[])[]): Record<string, number[]> {
   const components = rows[0]!.map((_, i) => rows.map((row) => row[i]!));
   const mean = components.map((values) => values.reduce((sum, value) => sum + value, 0) / values.length);
@@ -91,7 +91,7 @@ function statsOf(rows: readonly (readonly number[])[]): Record<string, number[]>
 
 const padded = (value: number, digits: number): string => String(value).padStart(digits, "0");
 
-/** Returns how many frames it wrote. Throws an Error when `out` has something in it, or there is no episode. */
+/** Returns the number of written frames. Throws an Error if `out` is not empty or there is no episode. */
 export function writeDataset(episodes: readonly Episode[], { out, fps, task, robot }: DatasetConfig): number {
   if (episodes.length === 0) throw new Error("no episode: the follower was engaged in none of the recordings");
   mkdirSync(out, { recursive: true });

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Reads what `tendon-replay --merge` has written: both ends of a coupling, in the leader's time.
+// Reads the output of `tendon-replay --merge`: both ends of a coupling, in the clock of the leader.
 import { createFileRegistry, fromBinary, type DescMessage, type FileRegistry } from "@bufbuild/protobuf";
 import { FileDescriptorSetSchema } from "@bufbuild/protobuf/wkt";
 import { McapStreamReader } from "@mcap/core";
@@ -10,23 +10,23 @@ export type Vec3 = readonly [number, number, number];
 
 /** A haptic step of one end. */
 export interface Step {
-  /** s, of the leader's clock. */
+  /** s, in the clock of the leader. */
   readonly t: number;
   readonly tick: bigint;
   readonly position: Vec3;
   readonly velocity: Vec3;
-  /** N, of what the handle runs into; undefined: not measured. */
+  /** N, contact force; undefined: not measured. */
   readonly contact?: Vec3 | undefined;
 }
 
-/** What one end told the other in a step. */
+/** The state that one end sent to the other in a step. */
 export interface Port {
   readonly t: number;
   readonly tick: bigint;
   /** 4: engaged, 5: clutched. */
   readonly phase: number;
   readonly engagement: bigint;
-  /** m, from its offset, in its own frame and scale. */
+  /** m, relative to its offset, in its own frame and scale. */
   readonly displacement: Vec3;
 }
 
@@ -35,10 +35,10 @@ export interface End {
   readonly ports: Port[];
 }
 
-/** How the leader's displacements are the follower's: u_f = scale · R · u_l. */
+/** Mapping of displacements from leader to follower: u_f = scale · R · u_l. */
 export interface PoseMap {
   readonly scale: number;
-  /** R by rows. */
+  /** Rows of R. */
   readonly rotation: readonly [Vec3, Vec3, Vec3];
 }
 
@@ -64,7 +64,7 @@ const vec3 = (from: Vec3Message | undefined): Vec3 => (from ? [from.x, from.y, f
 
 const kIdentity: PoseMap = { scale: 1, rotation: [[1, 0, 0], [0, 1, 0], [0, 0, 1]] };
 
-/** Of a rotation vector in degrees, by Rodrigues' formula. */
+/** Converts a rotation vector in degrees by Rodrigues' formula. */
 function rotationOf(degrees: readonly number[]): PoseMap["rotation"] {
   const [x = 0, y = 0, z = 0] = degrees.map((value) => (value * Math.PI) / 180);
   const angle = Math.hypot(x, y, z);
@@ -79,7 +79,7 @@ function rotationOf(degrees: readonly number[]): PoseMap["rotation"] {
   ];
 }
 
-/** The map in the text of a scene. */
+/** Reads the map from the text of a scene. */
 export function mapOf(scene: string): PoseMap {
   const { teleoperation } = parseToml(scene) as {
     teleoperation?: { map?: { position_scale?: number; rotation_deg?: number[] } };
@@ -88,7 +88,7 @@ export function mapOf(scene: string): PoseMap {
   return { scale: map?.position_scale ?? 1, rotation: rotationOf(map?.rotation_deg ?? []) };
 }
 
-/** Throws an Error that names the file when it is not a merged recording. */
+/** Throws an Error with the file name if it is not a merged recording. */
 export async function readCoupling(file: string): Promise<Coupling> {
   const ends: Record<string, End> = { leader: { steps: [], ports: [] }, follower: { steps: [], ports: [] } };
   const types = new Map<number, { readonly topic: string; readonly message: DescMessage }>();

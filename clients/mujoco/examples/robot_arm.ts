@@ -6,13 +6,13 @@ import { armScene } from "./arm_scene.js";
 
 const { options } = commandLine("A robot arm, simulated by MuJoCo.", { name: "robot_arm", rateHz: 200 });
 const arm = await Arm.load(armScene, "tool");
-const rotation = { w: Math.SQRT1_2, x: Math.SQRT1_2, y: 0, z: 0 }; // the device's y points up, as the scene's z does
+const rotation = { w: Math.SQRT1_2, x: Math.SQRT1_2, y: 0, z: 0 }; // y of the device points up, as z of the scene does
 const follow = new Follower({ scale: 0.5, forceScale: 0.4, rotation, clutchButton: 0, rateHz: options.rateHz || 1000 });
 const move = (target: Pose | undefined): void => (target ? arm.goTo(target) : arm.hold());
 let [before, lines] = [performance.now(), 0];
 let newest: DeviceState | undefined;
 
-setInterval(() => { // the robot's own loop, whether or not somebody is there
+setInterval(() => { // the loop of the robot, independent of the connection
   const now = performance.now();
   move(follow.silence(now));
   arm.advance((now - before) / 1000);

@@ -5,15 +5,15 @@ import { ContactForce, type Triple } from "./contact_force.js";
 import { loadModel } from "./load.js";
 import { inverse, product, rotationOf, rotationVector } from "./rotation.js";
 
-/** λ of the damped least squares: where the arm is stretched, it is slow there instead of fast everywhere. */
+/** λ of the damped least squares, which limits joint speeds near singular configurations. */
 const kDamping = 0.05;
-/** m and rad, the most that the servos see: what bounds the force of an arm that is stopped. */
+/** m and rad, limits of the error that the servos receive. They bound the force of an arm that is blocked. */
 const kMostWay = 0.05;
 const kMostTurn = 0.3;
-/** Steps of one call at most: after a pause of the program the arm does not catch up. */
+/** Maximum number of steps per call, so that the arm does not jump after a pause of the program. */
 const kMostSteps = 50;
 
-/** x of a · x = b for a symmetric, positive definite `a` of n rows: Gauss, which needs no pivoting there. */
+/** Solves a · x = b for a symmetric, positive definite `a` with n rows by Gaussian elimination without pivoting. */
 function solve(a: Float64Array, b: Float64Array): Float64Array {
   const n = b.length;
   for (let i = 0; i < n; ++i) {
@@ -31,13 +31,14 @@ function solve(a: Float64Array, b: Float64Array): Float64Array {
 }
 
 /**
- * A robot arm in MuJoCo, with what a Follower needs: pose(), goTo(), hold(), contact(). Its joints are those of the scene,
- * one position servo on each (`<position>`, in the same order); its tool is a site, and the body of the site is what touches.
- * The servos are led by damped least squares:
+ * A robot arm in MuJoCo with the interface required for a Follower: pose(), goTo(), hold(), contact(). The joints are
+ * those of the scene, each with a position servo (`<position>`, in the same order). The tool is a site, and contacts
+ * are those of its body. The servo targets are computed by damped least squares:
  *
- *     q_wanted = q + Jᵀ (J Jᵀ + λ² I)⁻¹ e        e: way and turn from the tool to where it is to go, bounded
+ *     q_wanted = q + Jᵀ (J Jᵀ + λ² I)⁻¹ e        e: bounded position and rotation error of the tool
  *
- * so a tool that is stopped presses with the servos' stiffness and no more for waiting. Memory is WebAssembly's: delete().
+ * so a blocked tool pushes only with the stiffness of the servos. The memory belongs to WebAssembly; free it with
+ * delete().
  */
 export class Arm {
   readonly #mj: MainModule;
@@ -48,10 +49,10 @@ export class Arm {
   readonly #jacobian: readonly [DoubleBuffer, DoubleBuffer];
   #goal: Pose;
   #holds = true;
-  /** s that have passed and were not simulated yet. */
+  /** s, elapsed time that was not simulated yet. */
   #due = 0;
 
-  /** Throws an Error that says what in the scene is wrong. */
+  /** Throws an Error if the scene is invalid. */
   static async load(mjcf: string, site: string): Promise<Arm> {
     const mj = await loadMujoco();
     const model = loadModel(mj, mjcf, {}, (text) => console.error(`MuJoCo scene: ${text}`));
@@ -79,9 +80,9 @@ export class Arm {
     this.#goal = this.pose();
   }
 
-  /** Of the tool, m, in the scene's frame. */
+  /** Pose of the tool in the frame of the scene. */
   pose(): Pose {
-    const [at, turned] = [this.#data.site_xpos, this.#data.site_xmat]; // views, anew each time: they die when the heap grows
+    const [at, turned] = [this.#data.site_xpos, this.#data.site_xmat]; // views; invalid after the heap grows
     const matrix = Array.from({ length: 9 }, (_, i) => turned[9 * this.#site + i] as number);
     const [w, x, y, z] = rotationOf(matrix);
     return { position: { x: at[3 * this.#site], y: at[3 * this.#site + 1], z: at[3 * this.#site + 2] }, orientation: { w, x, y, z } };
@@ -91,18 +92,18 @@ export class Arm {
     [this.#goal, this.#holds] = [goal, false];
   }
 
-  /** It stays where it is when it is told so for the first time. */
+  /** Holds the pose at the first call. */
   hold(): void {
     if (!this.#holds) [this.#goal, this.#holds] = [this.pose(), true];
   }
 
-  /** N on the tool, in the scene's frame, of the newest step. */
+  /** N, force on the tool in the frame of the scene, from the newest step. */
   contact(): ToolContact {
     const [x, y, z] = this.#contacts.on(this.#data);
     return { force: { x, y, z } };
   }
 
-  /** `seconds` pass: what is less than a step waits for the next call. */
+  /** Simulates `seconds`. The remainder of a step is carried over to the next call. */
   advance(seconds: number): void {
     const step: number = this.#model.opt.timestep;
     this.#due = Math.min(this.#due + seconds, kMostSteps * step);
@@ -124,7 +125,7 @@ export class Arm {
     const way: Triple = [to.x - p.x, to.y - p.y, to.z - p.z];
     const back = inverse([q!.w, q!.x, q!.y, q!.z]);
     const turn = rotationVector(product([turned!.w, turned!.x, turned!.y, turned!.z], back));
-    const part = Math.min(1, kMostWay / Math.hypot(...way)); // 1 where there is no way: most / 0
+    const part = Math.min(1, kMostWay / Math.hypot(...way)); // 1 if there is no error: most / 0
     const share = Math.min(1, kMostTurn / Math.hypot(...turn));
     return Float64Array.from([...way.map((c) => part * c), ...turn.map((c) => share * c)]);
   }
@@ -132,7 +133,7 @@ export class Arm {
   #lead(): void {
     const n: number = this.#model.nv;
     this.#mj.mj_jacSite(this.#model, this.#data, this.#jacobian[0], this.#jacobian[1], this.#site);
-    const j = new Float64Array(6 * n); // 6 rows of n
+    const j = new Float64Array(6 * n); // 6 × n, row-major
     this.#jacobian.forEach((buffer, half) => j.set(buffer.GetView(), 3 * n * half));
     const a = new Float64Array(36);
     for (let row = 0; row < 6; ++row) {

@@ -1,18 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
-// From MJCF to a model whose contact forces mean something: what MuJoCo would take and answer wrongly is refused, put right
-// or warned of here, with the number that was measured for it (README.md).
+// Loads a model from MJCF. Scenes for which MuJoCo would silently compute wrong contact forces are rejected,
+// corrected or reported here, with the measured effect (README.md).
 import type { MainModule, MjModel, MjSpec } from "@mujoco/mujoco";
 
-/** MuJoCo's own contact: so soft that of a push of 2 mm into B1 the tool penetrates 0.85 to 1.35 mm, the more the finer. */
+/** MuJoCo's default contact. It is soft: in a push of 2 mm into B1, the tool penetrates by 0.85 to 1.35 mm. */
 const kDefaultSolref = [0.02, 1];
 const kDefaultSolimp = [0.9, 0.95, 0.001];
-/** With which 0.03 to 0.06 mm of those 2 mm are lost, and a finer mesh comes nearer to the truth. */
+/** With these values, 0.03 to 0.06 mm of the 2 mm are lost, and finer meshes converge. */
 const kStiffSolref = [0.004, 1];
 const kStiffSolimp = [0.99, 0.999, 0.0001];
-/** Tetrahedra lock beyond: B1 is 1.7 times too stiff at 0.45, 12 times at 0.499. */
+/** Limit of locking in tetrahedra: B1 is 1.7 times too stiff at 0.45, and 12 times at 0.499. */
 const kLargestPoisson = 0.45;
 
-/** Files that the scene names: "liver.msh" → its bytes. MuJoCo sees no others. */
+/** Files referenced by the scene: "liver.msh" → content. MuJoCo has no access to other files. */
 export type Assets = Readonly<Record<string, Uint8Array>>;
 
 interface Flex {
@@ -55,7 +55,7 @@ function compile(mj: MainModule, xml: string, assets: Assets): { readonly model:
 const isAlike = (values: Float64Array, at: number, expected: readonly number[]): boolean =>
   expected.every((value, i) => values[at + i] === value);
 
-/** Stiff contact for each of the `count` geoms or flexes that has MuJoCo's default; how many had. */
+/** Sets stiff contact for each of the `count` geoms or flexes with MuJoCo's default. Returns their number. */
 function stiffen(solref: Float64Array, solimp: Float64Array, count: number): number {
   let changed = 0;
   const [refs, imps] = [solref.length / count, solimp.length / count];
@@ -68,7 +68,8 @@ function stiffen(solref: Float64Array, solimp: Float64Array, count: number): num
   return changed;
 }
 
-/** Throws an Error that says what in the scene is wrong; what is only doubtful it tells `warn`. The caller deletes the model. */
+/** Throws an Error if the scene is invalid, and calls `warn` if it is questionable. The caller must delete the model.
+ */
 export function loadModel(mj: MainModule, xml: string, assets: Assets, warn: (text: string) => void): MjModel {
   const { model, flexes } = compile(mj, xml, assets);
   const option = model.opt;

@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
-// Rotations as unit quaternions w, x, y, z, and matrices row by row; the same words as core/base/rotation.h.
+// Rotations as unit quaternions w, x, y, z, and row-major matrices; same names as core/base/rotation.h.
 import type { Quat } from "tendon-client";
 import type { Triple } from "./contact_force.js";
 
 export type Rotation = readonly [number, number, number, number];
-/** 9 numbers, row by row. */
+/** 9 numbers, row-major. */
 export type Matrix = readonly number[];
 
 export const kNoTurn: Rotation = [1, 0, 0, 0];
 
-/** a b: first b, then a. */
+/** Returns a b: first b, then a. */
 export const product = ([a, b, c, d]: Rotation, [w, x, y, z]: Rotation): Rotation => [
   a * w - b * x - c * y - d * z, a * x + b * w + c * z - d * y, a * y - b * z + c * w + d * x, a * z + b * y - c * x + d * w,
 ];
@@ -20,14 +20,14 @@ export function unit(q: Rotation): Rotation {
   return [q[0] / length, q[1] / length, q[2] / length, q[3] / length];
 }
 
-/** About the axis of `vector` by its length, rad. */
+/** Returns the rotation about `vector` by its length in rad. */
 export function rotationBy(vector: Triple): Rotation {
   const angle = Math.hypot(...vector);
   const share = angle > 0 ? Math.sin(angle / 2) / angle : 0.5;
   return [Math.cos(angle / 2), share * vector[0], share * vector[1], share * vector[2]];
 }
 
-/** The vector of that rotation, at most π long; the same for q and −q. */
+/** Returns the rotation vector with norm ≤ π. Equal for q and −q. */
 export function rotationVector([w, x, y, z]: Rotation): Triple {
   const length = Math.hypot(x, y, z);
   if (length === 0) return [0, 0, 0];
@@ -48,7 +48,8 @@ export const matrixOf = ([w, x, y, z]: Rotation): Matrix => [
   2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y),
 ];
 
-/** Of a rotation matrix. Source: the largest of the four components first, Shepperd, J. Guidance and Control 1(3), 1978. */
+/** Converts a rotation matrix. The largest component is computed first (Shepperd, J. Guidance and Control 1(3), 1978).
+ */
 export function rotationOf(m: Matrix): Rotation {
   const [a, b, c] = [m[0]!, m[4]!, m[8]!];
   const squares = [1 + a + b + c, 1 + a - b - c, 1 - a + b - c, 1 - a - b + c]; // 4 w², 4 x², 4 y², 4 z²
@@ -61,8 +62,8 @@ export function rotationOf(m: Matrix): Rotation {
 }
 
 /**
- * The symmetric matrix next to `m` whose eigenvalues are from 0 to `most`: a spring that stores energy and makes none.
- * Undefined where a number of `m` is not finite. Eigenvalues: Jacobi's rotations, of which a 3 × 3 matrix wants few.
+ * Returns the closest symmetric matrix to `m` with eigenvalues in [0, most]: a passive spring. Undefined if `m` is
+ * not finite. The eigenvalues are computed by Jacobi rotations.
  */
 export function spring(m: Matrix, most: number): Matrix | undefined {
   if (!m.every(Number.isFinite)) return undefined;
@@ -86,8 +87,8 @@ export function spring(m: Matrix, most: number): Matrix | undefined {
 }
 
 /**
- * Device frame to a scene whose z points up: x to the operator's right, y away from the operator. `operatorFromDevice` is
- * the HandleDescription's, of x right, y up, z to the operator; left out: the device's axes are those.
+ * Rotation from the device frame to a scene with z up, x to the right of the operator, and y away from the operator.
+ * `operatorFromDevice` is that of the HandleDescription (x right, y up, z to the operator); default: identity.
  */
 export function zUp(operatorFromDevice: Quat = { w: 1, x: 0, y: 0, z: 0 }): Matrix {
   const { w, x, y, z } = operatorFromDevice;

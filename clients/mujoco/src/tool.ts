@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The body of the scene that the hand holds. Everything here is in the scene's frame.
+// The body in the scene that the hand holds. All quantities are in the frame of the scene.
 import type { MainModule, MjData, MjModel } from "@mujoco/mujoco";
 import { ContactForce, type Triple } from "./contact_force.js";
 import {
@@ -9,31 +9,32 @@ import {
 export interface Pose {
   /** m */
   readonly at: Triple;
-  /** Turns the tool's frame into the scene's. */
+  /** Rotates the frame of the tool to that of the scene. */
   readonly turn: Rotation;
 }
 
-/** What the hand feels of the tool, on the hand, about the point that it holds. */
+/** Force on the hand, about the point that it holds. */
 export interface Felt {
   /** N */
   readonly force: Triple;
   /** N·m */
   readonly torque?: Triple;
-  /** N/m and N·m/rad, what the scene sets against the hand's next motion and turn. */
+  /** N/m and N·m/rad, resistance of the scene to a displacement and a rotation of the hand. */
   readonly stiffness?: Matrix | undefined;
   readonly angularStiffness?: Matrix | undefined;
-  /** m, how far from here the stiffness holds. */
+  /** m, range of the stiffness. */
   readonly validRadius?: number;
 }
 
 export interface Tool {
-  /** Where the scene file puts it: there is the device's origin. */
+  /** Initial pose in the scene file, which corresponds to the origin of the device. */
   readonly home: Pose;
-  /** Before a step of `seconds`, at whose end the hand is at `pose`; it comes there evenly. */
+  /** Must be called before a step of `seconds`. `pose` is the pose of the hand at its end, reached at constant speed.
+   */
   lead(pose: Pose, seconds: number): void;
-  /** Of the newest step. It changes nothing. */
+  /** Force of the newest step. Does not change the scene. */
   felt(): Felt;
-  /** The scene begins anew. */
+  /** Called when the scene is reset. */
   restart(): void;
   delete(): void;
 }
@@ -50,7 +51,7 @@ export interface Coupling {
   readonly angularStiffness: number;
 }
 
-/** A mocap body, which is where the hand is; it does not turn. The contact forces on it go to the hand. */
+/** A mocap body at the position of the hand, without rotation. The hand feels the contact forces on it. */
 class LedTool implements Tool {
   readonly home: Pose;
   readonly #data: MjData;
@@ -65,7 +66,7 @@ class LedTool implements Tool {
   }
 
   lead({ at }: Pose): void {
-    this.#data.mocap_pos.set(at, 3 * this.#mocap); // a view dies when the heap grows
+    this.#data.mocap_pos.set(at, 3 * this.#mocap); // views become invalid when the heap grows
   }
   felt(): Felt {
     return { force: this.#contacts.on(this.#data) };
@@ -76,29 +77,29 @@ class LedTool implements Tool {
   }
 }
 
-/** So far to either side are the poses at which the answer is taken for its derivative: m and rad. */
+/** Step of the finite differences: m and rad. */
 const kProbe = 1e-4;
 const kProbeTurn = 2e-3;
 
 /**
- * A free body that a virtual coupling holds to the hand. With p, q the tool's place and orientation, p_h, q_h the hand's, and
- * (w, v) = q q_h⁻¹ the rotation error, the coupling exerts on the tool, at the origin of its frame,
+ * A free body, coupled to the hand by a virtual coupling. With the pose p, q of the tool, the pose p_h, q_h of the
+ * hand, and the rotation error (w, v) = q q_h⁻¹, the coupling exerts on the tool, at the origin of its frame,
  *
  *     F = −k (p − p_h) − B (ṗ − ṗ_h)
  *     τ = −2 (w K v + v × K v) − B_r (ω − ω_h)         K = κ I, so τ = −2 κ w v: κ sin θ about the axis of the error
  *
- * which is the torsion spring of core/base/rotation.h, the gradient of 2 vᵀ K v. K is the same about every axis because only then
- * the hand's torque is the tool's, reversed. B and B_r damp the tool critically on the coupling (of each of its axes, by
- * its inertia in the scene file); MuJoCo integrates them implicitly.
+ * This is the torsion spring of core/base/rotation.h, the gradient of 2 vᵀ K v. K must be isotropic so that the
+ * torque on the hand is the opposite of that on the tool. B and B_r damp the tool critically (each axis by its
+ * inertia in the scene file); MuJoCo integrates them implicitly.
  *
- * **The hand feels the springs alone**, reversed: k (p − p_h) and 2 κ w v, about p_h. The dampers are there so that the tool
- * does not ring, and are not felt.
+ * **The hand feels only the springs**: k (p − p_h) and 2 κ w v, about p_h. The dampers prevent oscillations of the
+ * tool but are not felt.
  *
- * **Stiffness**: finite differences at constant state. All that moves stays where it is and as fast; the hand is put 0.1 mm (2
- * mrad) to either side along each axis, so that the coupling pulls otherwise, and MuJoCo says what its constraints (contacts,
- * joints, limits) set against that in the same instant: c. Then K = −∂c/∂x. A tool in free space gives way: 0. Against
- * a wall it is k along the normal, and along the wall too while friction holds. A body that can be moved counts by its inertia.
- * Of the result the spring next to it is taken that stores energy and makes none, no stiffer than the coupling.
+ * **Stiffness** is computed by finite differences at constant state: with unchanged positions and velocities, the
+ * hand is moved by 0.1 mm (2 mrad) in both directions along each axis, which changes the coupling force, and MuJoCo
+ * computes the constraint force c (contacts, joints, limits) at the same time. Then K = −∂c/∂x. It is 0 for a tool in
+ * free space, and k along the normal of a wall, also along the wall while friction holds. A movable body contributes
+ * by its inertia. The result is projected to the closest passive spring that is not stiffer than the coupling.
  */
 class HeldTool implements Tool {
   readonly home: Pose;
@@ -109,10 +110,10 @@ class HeldTool implements Tool {
   readonly #derives: boolean;
   readonly #qpos: number;
   readonly #dof: number;
-  /** N·s/m and N·m·s/rad, of the six degrees of freedom; those of rotation are about the tool's own axes. */
+  /** N·s/m and N·m·s/rad, of the six degrees of freedom; rotations are about the axes of the tool. */
   readonly #damping: readonly number[];
   #hand: Pose;
-  /** N and N·m, what the dampers owe to the hand's motion; their part of the tool's own is MuJoCo's. */
+  /** N and N·m, damper forces due to the motion of the hand. MuJoCo adds those due to the motion of the tool. */
   #dragged: readonly number[] = [0, 0, 0, 0, 0, 0];
 
   constructor(mj: MainModule, model: MjModel, data: MjData, body: number, name: string, coupling: Coupling, derives: boolean) {
@@ -140,7 +141,7 @@ class HeldTool implements Tool {
     const turned = rotationVector(product(hand.turn, inverse(this.#hand.turn)));
     const spin = this.#toTool(turned.map((angle) => angle / seconds) as never);
     this.#dragged = [...speed, ...spin].map((rate, i) => this.#damping[i]! * rate);
-    this.#pull(this.#hand); // from where both are now: a tool that runs beside the hand feels nothing
+    this.#pull(this.#hand); // from the current poses, so that a tool moving with the hand exerts no force
     this.#hand = hand;
   }
 
@@ -148,7 +149,7 @@ class HeldTool implements Tool {
     const { force, torque } = this.#springs(this.#hand);
     const felt = { force: negative(force), torque: negative(torque) };
     if (!this.#derives) return felt;
-    // So far back the hand lets go of what it presses; a spring beyond would pull.
+    // After this distance the spring has no force; beyond it, the model would pull.
     return { ...felt, ...this.#derivatives(), validRadius: Math.hypot(...force) / this.#coupling.stiffness };
   }
 
@@ -177,7 +178,7 @@ class HeldTool implements Tool {
     };
   }
 
-  /** MuJoCo has forces on a free joint along the scene's axes, and torques about the body's own. */
+  /** In MuJoCo, forces on a free joint are in the axes of the scene, and torques in those of the body. */
   #pull(hand: Pose): void {
     const { force, torque } = this.#springs(hand);
     const all = [...force, ...this.#toTool(torque)];
@@ -192,7 +193,7 @@ class HeldTool implements Tool {
       this.#mj.mj_forwardSkip(this.#model, this.#data, stage, 1);
       return this.#data.qfrc_constraint.slice(this.#dof, this.#dof + 6);
     };
-    answer(this.#hand, none.value); // once with all that depends on places and speeds
+    answer(this.#hand, none.value); // updates all quantities that depend on positions and velocities
     const columns = [0, 1, 2, 3, 4, 5].map((axis) => {
       const probe = axis < 3 ? kProbe : kProbeTurn;
       const [more, less] = [1, -1].map((side) => {
@@ -205,7 +206,7 @@ class HeldTool implements Tool {
       });
       return [0, 1, 2].map((i) => -(more![i]! - less![i]!) / (2 * probe));
     });
-    answer(this.#hand, velocity.value); // what else reads the scene finds it as it is
+    answer(this.#hand, velocity.value); // restores the scene
     const rows = (first: number): Matrix => [0, 1, 2].flatMap((row) => [0, 1, 2].map((axis) => columns[first + axis]![row]!));
     return {
       stiffness: spring(rows(0), this.#coupling.stiffness),
@@ -214,7 +215,7 @@ class HeldTool implements Tool {
   }
 }
 
-/** Throws an Error that says why the hand cannot hold this body. */
+/** Throws an Error if the hand cannot hold this body. */
 export function toolOf(
   mj: MainModule, model: MjModel, data: MjData, body: number, name: string, geoms: readonly number[], coupling: Coupling,
   derives: boolean,

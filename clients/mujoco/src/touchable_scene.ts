@@ -10,51 +10,52 @@ import { toolOf, type Coupling, type Pose, type Tool } from "./tool.js";
 
 export interface SceneConfig {
   /**
-   * Name of the body that the hand holds, with a geom. Where and how the scene puts it is where the device's origin is, and how
-   * a handle lies that is not turned. With mocap="true" the hand leads it: a point. With a <freejoint/> a virtual coupling holds it:
-   * it turns with the handle, and torque, stiffness and angular stiffness are sent besides (tool.ts has the law).
+   * Name of the body that the hand holds; it must have a geom. Its pose in the scene corresponds to the origin of the
+   * device and to an unrotated handle. A body with mocap="true" follows the position of the hand. A body with a
+   * <freejoint/> is held by a virtual coupling: it rotates with the handle, and torque, stiffness and angular
+   * stiffness are sent as well (see tool.ts).
    */
   readonly tool: string;
-  /** Of a held tool: 1000 N/m and 2 N·m/rad. */
+  /** For a held tool. Default: 1000 N/m and 2 N·m/rad. */
   readonly coupling?: Partial<Coupling>;
-  /** Of a held tool: it is found by 14 evaluations of the scene at each answer, without its collisions. true. */
+  /** For a held tool. Requires 14 evaluations of the scene for each answer, without collision detection. Default:
+   * true. */
   readonly sendStiffness?: boolean;
-  /** Device frame to scene frame: a rotation, row by row. The identity; zUp() is for scenes whose z points up. */
+  /** Rotation from device frame to scene frame, row-major. Default: identity. See zUp() for scenes with z up. */
   readonly rotation?: readonly number[];
   /**
-   * m/s. The tool follows the hand no faster: a hand that comes from nowhere (at the start, after a gap, by mistake) would be
-   * deep inside a body from one step to the next. 1: faster than hands are in contact.
+   * m/s, maximum speed of the tool. Otherwise a jump of the hand (at the start, or after a gap) could put it deep
+   * into a body within one step. Default: 1, which is faster than a hand in contact.
    */
   readonly maxToolSpeed?: number;
-  /** rad/s, likewise. 20. */
+  /** rad/s, likewise. Default: 20. */
   readonly maxToolSpin?: number;
-  /** Steps for one answer; where more are due, simulated time falls behind, and the hand is not made to wait. 20. */
+  /** Maximum number of steps per answer. If more are due, simulated time falls behind. Default: 20. */
   readonly maxSteps?: number;
-  /** Files that the scene names. */
+  /** Files referenced by the scene. */
   readonly assets?: Assets;
-  /** Hears what is doubtful in the scene, and what goes wrong while it runs. console.warn. */
+  /** Called with warnings about the scene and the simulation. Default: console.warn. */
   readonly onWarning?: (text: string) => void;
 }
 
 export interface SceneStats {
-  /** Forces that were given. */
   readonly answers: number;
-  /** Of MuJoCo. */
+  /** Steps of MuJoCo. */
   readonly steps: number;
-  /** Positions that were no numbers, orientations that were no rotations: nothing was computed. */
+  /** Positions that were not finite and invalid orientations; not simulated. */
   readonly badPositions: number;
-  /** Answers in which the hand was faster than maxToolSpeed or maxToolSpin: the force is that at the tool, which lags. */
+  /** Answers in which the hand was faster than maxToolSpeed or maxToolSpin, so that the tool lagged. */
   readonly lagging: number;
-  /** MuJoCo lost the solution; the scene began anew. */
+  /** Resets of the scene because MuJoCo lost the solution. */
   readonly restarts: number;
-  /** MuJoCo ran out of memory and left contacts out. */
+  /** Answers without some contacts because MuJoCo ran out of memory. */
   readonly incomplete: number;
-  /** s of the hand's time that were not simulated, because maxSteps is less than what was due. */
+  /** s of the hand's time that were not simulated because of maxSteps. */
   readonly behind: number;
 }
 
 const kIdentity = [1, 0, 0, 0, 1, 0, 0, 0, 1];
-/** A force that ForceClient counts and does not send: to have none is better than to have a wrong one. */
+/** ForceClient does not send this force. No force is better than a wrong one. */
 const kNoTouch: Touch = { force: { x: NaN, y: NaN, z: NaN } };
 
 function checkRotation(r: readonly number[]): readonly number[] {
@@ -72,37 +73,37 @@ function positive(name: string, value: number): number {
 }
 
 /**
- * A MuJoCo scene that a hand can touch: hand it to connect() or run() as the callback.
+ * A MuJoCo scene that a hand can touch, for use as the callback of connect() or run().
  *
  *     const scene = await TouchableScene.load(mjcf, { tool: "tool" });
  *     process.exitCode = await run(options, scene);
  *
- * The tool follows the hand, the scene is stepped by as much time as has passed at the device, and what the tool feels goes
- * back. What MuJoCo would get wrong without a word is refused at load (an Error), or comes as no force
- * and a warning: README.md lists it. Memory is WebAssembly's: delete() frees it.
+ * The tool follows the hand, the scene is simulated for the time elapsed at the device, and the force on the tool is
+ * returned. Errors that MuJoCo would not report are rejected in load() or result in a warning without a force
+ * (README.md). The memory belongs to WebAssembly; free it with delete().
  */
 export class TouchableScene {
-  /** MuJoCo itself and the scene in it, for what else a scene needs: actuators, more bodies, a picture. */
+  /** MuJoCo and the scene, for additional uses: actuators, more bodies, rendering. */
   readonly mujoco: MainModule;
   readonly model: MjModel;
   readonly data: MjData;
   readonly #config: Required<Pick<SceneConfig, "maxToolSpeed" | "maxToolSpin" | "maxSteps" | "onWarning">>;
   readonly #timestep: number;
-  /** Device to scene. */
+  /** From device to scene. */
   readonly #frame: Matrix;
   readonly #turned: Rotation;
   readonly #tool: Tool;
-  /** Where the tool was led last. */
+  /** Last pose of the tool. */
   #led: Pose;
   readonly #stats = { answers: 0, steps: 0, badPositions: 0, lagging: 0, restarts: 0, incomplete: 0, behind: 0 };
   #sampledNs: bigint | undefined;
-  /** s that have passed and were not simulated yet: less than a step. */
+  /** s, elapsed time that was not simulated yet: less than one step. */
   #due = 0;
   #touch: Touch | undefined;
-  /** How often MuJoCo has warned, by mjtWarning. */
+  /** Number of warnings of MuJoCo, by mjtWarning. */
   #warned: readonly number[];
 
-  /** Throws an Error that says what in the scene is wrong, a RangeError for an impossible `config`. */
+  /** Throws an Error if the scene is invalid, a RangeError if `config` is invalid. */
   static async load(mjcf: string, config: SceneConfig): Promise<TouchableScene> {
     const mujoco = await loadMujoco();
     const onWarning = config.onWarning ?? ((text) => console.warn(`MuJoCo scene: ${text}`));
@@ -141,30 +142,30 @@ export class TouchableScene {
     this.#warned = this.#warnings();
   }
 
-  /** The callback of connect() and run(). */
+  /** Callback for connect() and run(). */
   readonly physics = (hand: DeviceState): Touch => {
     const before = this.#sampledNs ?? hand.sampledNs;
-    this.#sampledNs = hand.sampledNs; // a server that was restarted counts from another beginning
+    this.#sampledNs = hand.sampledNs; // a restarted server has a new time origin
     const elapsed = Math.max(Number(hand.sampledNs - before) / 1e9, 0);
     return this.touch(hand.position, elapsed, hand.turning?.orientation) ?? kNoTouch;
   };
 
-  /** The force of touch(), N. */
+  /** Returns the force of touch(), N. */
   answer(position: Vec3, elapsed: number, orientation?: Quat): Vec3 | undefined {
     return this.touch(position, elapsed, orientation)?.force;
   }
 
   /**
-   * What the hand feels, in the device's frame: it is at `position` (m) and turned by `orientation`, `elapsed` s after the last
-   * call. The tool goes there in a line, turning about one axis, while the scene is stepped; at the first call by one step. A held
-   * tool gives torque, too, and only for a hand with an orientation. Undefined where there is no force that could be believed;
-   * onWarning has heard why.
+   * Returns the force on the hand in the device frame. The hand is at `position` (m) with `orientation`, `elapsed` s
+   * after the last call. The tool moves there at constant velocity during the simulated steps (one step in the first
+   * call). A held tool also returns a torque if the hand has an orientation. Returns undefined and calls onWarning if
+   * there is no reliable force.
    */
   touch(position: Vec3, elapsed: number, orientation?: Quat): Touch | undefined {
     const hand = [position.x, position.y, position.z] as const;
     const { w, x, y, z } = orientation ?? { w: 1, x: 0, y: 0, z: 0 };
     const isTurn = Math.abs(Math.hypot(w, x, y, z) - 1) <= 1e-3;
-    // MuJoCo takes NaN and 1e30 for a tool that touches nothing, and says nothing.
+    // MuJoCo silently treats a tool at NaN or 1e30 as not in contact.
     if (!hand.every((value) => Math.abs(value) < this.mujoco.mjMAXVAL) || !isTurn || !(elapsed >= 0 && Number.isFinite(elapsed))) {
       const turned = isTurn ? "" : `, turned by (${[w, x, y, z].join(", ")}),`;
       this.#tell(++this.#stats.badPositions, `a hand at (${hand.join(", ")}) m,${turned} ${elapsed} s later, is nowhere: not computed`);
@@ -184,7 +185,7 @@ export class TouchableScene {
     return (this.#touch = touch);
   }
 
-  /** N, in the scene's frame: what all contacts together exert on a body, as of the newest step. */
+  /** N, sum of all contact forces on a body in the frame of the scene, from the newest step. */
   contactForce(body: string): Vec3 {
     const reader = new ContactForce(this.mujoco, this.model, this.#geomsOf(this.#body(body)));
     const [x, y, z] = reader.on(this.data);
@@ -192,7 +193,7 @@ export class TouchableScene {
     return { x, y, z };
   }
 
-  /** As it is now; it does not change any more. */
+  /** Returns a copy. */
   stats(): SceneStats {
     return { ...this.#stats };
   }
@@ -213,7 +214,7 @@ export class TouchableScene {
     return Array.from({ length: this.model.ngeom }, (_, geom) => geom).filter((geom) => this.model.geom_bodyid[geom] === body);
   }
 
-  /** Whole steps; what is left of a step waits for the next call. */
+  /** Returns the number of whole steps. The remainder is carried over to the next call. */
   #stepsFor(elapsed: number): number {
     const { steps, restarts } = this.#stats;
     this.#due += steps === 0 && restarts === 0 ? Math.max(elapsed, this.#timestep) : elapsed;
@@ -239,7 +240,7 @@ export class TouchableScene {
     const way = from.at.map((at, i) => hand.at[i]! - at) as never as Triple;
     const spin = rotationVector(product(hand.turn, inverse(from.turn)));
     const time = steps * this.#timestep;
-    // 1 where there is no way: reach / 0
+    // 1 if there is no displacement: reach / 0
     const share = Math.min(1, (maxToolSpeed * time) / Math.hypot(...way), (maxToolSpin * time) / Math.hypot(...spin));
     if (share < 1)
       this.#tell(++this.#stats.lagging, `the hand is faster than ${maxToolSpeed} m/s or ${maxToolSpin} rad/s: the tool lags behind it`);
@@ -253,7 +254,7 @@ export class TouchableScene {
   }
 
   #warnings(): number[] {
-    const all = this.data.warning; // MuJoCo's own, unlike data.contact: to delete it would end the program
+    const all = this.data.warning; // owned by MuJoCo, unlike data.contact; deleting it would crash
     return Array.from({ length: all.size() }, (_, i) => {
       const one = all.get(i)!; // a copy
       const { number } = one;
@@ -262,7 +263,8 @@ export class TouchableScene {
     });
   }
 
-  /** Why the state is none, in words; empty: it is one. MuJoCo, which begins at time 0 then, says it by these numbers only. */
+  /** Returns why the state is invalid, or an empty string. MuJoCo then restarts at time 0 and only increments a
+   * counter. */
   #lost(): string {
     const now = this.#warnings();
     const kinds = this.mujoco.mjtWarning;
@@ -288,7 +290,7 @@ export class TouchableScene {
     this.#warned = this.#warnings();
   }
 
-  /** Of a hand without an orientation nobody can use the torque. */
+  /** The torque is omitted for a hand without an orientation. */
   #felt(turns: boolean): Touch {
     const { force, torque, stiffness, angularStiffness, validRadius } = this.#tool.felt();
     return {
@@ -309,7 +311,7 @@ export class TouchableScene {
     return matrixProduct(transposed(this.#frame), matrixProduct(k, this.#frame));
   }
 
-  /** The 1st, 2nd, 4th, 8th … time. */
+  /** Warns at the 1st, 2nd, 4th, 8th … time. */
   #tell(times: number, text: string): void {
     if (Number.isInteger(Math.log2(times))) this.#config.onWarning(times === 1 ? text : `${text} (${times} times so far)`);
   }

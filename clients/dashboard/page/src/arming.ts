@@ -3,17 +3,17 @@ import { h, mark, say } from "./dom.js";
 import type { Order, PressInfo, ServerMessage } from "./stream.js";
 import type { Level } from "./words.js";
 
-/** From the address that tendon-dash says when it starts: `#/operator/PASS`. Of this tab only, and of no history. */
+/** Password from the URL that tendon-dash prints at its start: `#/operator/PASS`. Stored only for this tab. */
 const kPass = "operator-pass";
 export function takePass(pass: string): void {
   sessionStorage.setItem(kPass, pass);
   location.replace("#/live");
 }
 
-/** Whether this tab may press: tendon-dash may, and the tab has the pass. */
+/** Whether tendon-dash may arm and this tab has the password. */
 export const mayPress = (server: ServerMessage | undefined): boolean => server?.arms === true && sessionStorage.getItem(kPass) !== null;
 
-/** Begins an order; why it does not begin, or undefined when it does. */
+/** Starts an order. Returns the reason if it cannot be started. */
 export async function press(order: Order, device: number): Promise<string | undefined> {
   try {
     const answer = await fetch(`/api/${order}?device=${device}`, { method: "POST", headers: { authorization: `Bearer ${sessionStorage.getItem(kPass)}` } });
@@ -23,12 +23,12 @@ export async function press(order: Order, device: number): Promise<string | unde
   }
 }
 
-/** How long a success is shown: later the device's state may have changed. A failure stays. */
+/** How long a success is shown. After that, the state of the device may have changed. Failures stay. */
 const kToldMs = 8000;
 
 /**
- * The device's safety in words, and the two buttons. A press only starts an order; the server of this page tells its
- * result to every page that looks on.
+ * The safety state of the device and the two buttons. A press only starts an order; the server sends the result to
+ * all pages.
  */
 export class Arming {
   readonly element: HTMLElement;
@@ -39,7 +39,7 @@ export class Arming {
   readonly #buttons: Readonly<Record<"arm" | "disarm", HTMLButtonElement>>;
   readonly #group: HTMLElement;
   #device = 0;
-  /** Why our own press was not taken; until the next one, or until the server of this page tells something newer. */
+  /** Why our own press was refused; until the next press or a newer result. */
   #refused: string | undefined;
   #told: string | undefined;
   #toldAt = -Infinity;
@@ -61,11 +61,11 @@ export class Arming {
     const told = server ? JSON.stringify(server.press) : this.#told;
     if (told !== this.#told) {
       this.#refused = undefined;
-      // The result of an order given before this page opened is not shown.
+      // Results of orders given before this page was opened are not shown.
       this.#toldAt = this.#told === undefined ? -Infinity : performance.now();
       this.#told = told;
     }
-    // Nor is an arming shown when the device is no longer armed.
+    // A success is hidden when the device is no longer armed.
     const over = server?.press?.order === "arm" && state.level !== "good";
     const old = server?.press?.state === "done" && (over || performance.now() - this.#toldAt > kToldMs);
     const ours = server?.press?.order === "arm" || server?.press?.order === "disarm";
@@ -75,7 +75,7 @@ export class Arming {
     const withoutPass = server?.arms === true && !mayPress(server);
     this.#group.hidden = !mayPress(server);
     this.#buttons.arm.disabled = objection !== "" || busy !== undefined;
-    // It goes before an arming.
+    // Disarming has priority over arming.
     this.#buttons.disarm.disabled = objection !== "" || busy?.order === "disarm";
     say(this.#needs, withoutPass ? "To arm and disarm here, open the address that tendon-dash printed when it started." : objection);
     this.#needs.hidden = !withoutPass && objection === "";

@@ -7,13 +7,13 @@ import { digits } from "./words.js";
 export interface Line<C extends string = Column> {
   readonly column: C;
   readonly name: string;
-  /** CSS variable of its colour; told apart by dashes and width as well. */
+  /** CSS variable of the color. Lines also differ in dash and width. */
   readonly colour: string;
   readonly dash?: readonly number[];
   readonly width?: number;
-  /** Fills down to zero. */
+  /** Color of the area down to zero. */
   readonly fill?: string;
-  /** Shown only while the button of this name in the legend is pressed. */
+  /** Shown only while the legend button with this name is pressed. */
   readonly toggle?: string;
 }
 
@@ -21,32 +21,32 @@ export interface ChartSpec<C extends string = Column> {
   readonly id: string;
   readonly title: string;
   readonly unit: string;
-  /** From SI to `unit`. */
+  /** Factor from SI to `unit`. */
   readonly scale: number;
   readonly lines: readonly Line<C>[];
-  /** The axis begins at zero. */
+  /** The axis starts at zero. */
   readonly positive?: boolean;
-  /** The axis shows at least this much. */
+  /** Minimum range of the axis. */
   readonly least: number;
-  /** Lines that may leave the axis: values far beyond the others would flatten them. */
+  /** Line that may leave the axis, because its large values would flatten the others. */
   readonly mayLeave?: C;
   /** The chart keeps its own axis if a shared axis would make it ten times smaller. */
   readonly ownScale?: boolean;
 }
 
-/** The requests of a user who drags or scrolls a chart. */
+/** Requests of a user who drags or scrolls a chart. */
 export interface ChartEvents {
   zoom(from: number, to: number): void;
   reset(): void;
   hover(time: number | undefined): void;
-  /** Lines were shown or hidden: draw again. */
+  /** Lines were shown or hidden; draw again. */
   changed(): void;
 }
 
-/** Of a plot: lower where there is little room. */
+/** Height of a plot, which is lower on narrow screens. */
 const heightFor = (width: number): number => (width < 500 ? 168 : 196);
 
-/** One plot over time: lines with a unit, and a legend that tells their values at the cursor and shows or hides lines. */
+/** A plot over time with a unit. The legend shows values at the cursor and toggles lines. */
 export class Chart<C extends string = Column> {
   readonly element: HTMLElement;
   #plot: uPlot;
@@ -121,7 +121,7 @@ export class Chart<C extends string = Column> {
     this.#plot.over.addEventListener("dblclick", () => events.reset());
   }
 
-  /** Shows [from, to]; the legend tells what was at `cursor`. */
+  /** Shows [from, to]. The legend shows the values at `cursor`. */
   draw(track: Plotted<C>, from: number, to: number, cursor: number): void {
     const width = this.#box.clientWidth;
     if (width === 0) return;
@@ -145,7 +145,7 @@ export class Chart<C extends string = Column> {
     });
   }
 
-  /** The least and the greatest value that is drawn, without the line that may leave. */
+  /** Range of the drawn values, without the line that may leave the axis. */
   extent(): [number, number] {
     let [from, to] = [Infinity, -Infinity];
     this.spec.lines.forEach((line, k) => {
@@ -159,7 +159,7 @@ export class Chart<C extends string = Column> {
     return from > to ? [0, 0] : [from, to];
   }
 
-  /** Sets the axis to a range that several runs share. */
+  /** Sets the axis to a range shared by several runs. */
   share([from, to]: readonly [number, number]): void {
     const [ownFrom, ownTo] = this.extent();
     const finer = (Math.max(to, 0) - Math.min(from, 0)) / Math.max(Math.max(ownTo, 0) - Math.min(ownFrom, 0), this.spec.least);
@@ -171,7 +171,7 @@ export class Chart<C extends string = Column> {
     this.#shared = undefined;
   }
 
-  /** The theme has changed. */
+  /** Redraws after a change of the theme. */
   repaint(): void {
     this.#plot.redraw(false, true);
   }

@@ -9,11 +9,11 @@ import { digits, duration, kPhases, type Level, type StateWords } from "./words.
 const kColumns = ["x", "y", "z", "px", "py", "pz", "felt", "contact", "given", "own", "peer", "pair"] as const;
 type Column = (typeof kColumns)[number];
 
-/** Rows that are kept: two minutes at 50 in a second. */
+/** Number of rows to keep: two minutes at 50 per second. */
 const kKept = 6000;
-/** s: after that long without a row nothing is told any more. */
+/** s, maximum age of shown values. */
 const kStale = 1;
-/** How long a success is shown. */
+/** ms, how long a success is shown. */
 const kToldMs = 8000;
 
 const kCharts: readonly ChartSpec<Column>[] = [
@@ -105,7 +105,7 @@ const tile = (id: string): { element: HTMLElement; name: HTMLElement; value: HTM
 };
 type Tile = ReturnType<typeof tile>;
 
-/** Both ends of the watched device's coupling: where they are, what is felt, their accounts, and the two buttons. Hidden without one. */
+/** Both ends of the watched device's coupling: positions, forces, accounts, and the two buttons. Hidden without one. */
 export class Coupling {
   readonly element: HTMLElement;
   readonly #track = new PortTrack();
@@ -120,7 +120,7 @@ export class Coupling {
   readonly #scales = h("span", { class: "quiet" });
   readonly #result = h("p", { class: "result", role: "status", hidden: true });
   #device = 0;
-  /** The device does not change its role. */
+  /** Constant for a device. */
   #leads: boolean | undefined;
   #refused: string | undefined;
   #told: string | undefined;
@@ -152,7 +152,7 @@ export class Coupling {
     for (const chart of this.#charts) chart.repaint();
   }
 
-  /** Shows [from, to]; the tiles tell what was at `cursor`. `plots`: not beside the 3-D view. */
+  /** Shows [from, to]. The tiles show the values at `cursor`. `plots` is false next to the 3-D view. */
   draw(server: ServerMessage | undefined, device: number, from: number, to: number, cursor: number, plots: boolean): void {
     this.#device = device;
     this.element.hidden = this.#track.length === 0;

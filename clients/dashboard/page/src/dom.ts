@@ -3,7 +3,8 @@
 type Child = Node | string | undefined | false;
 type Attributes = Readonly<Record<string, string | number | boolean | ((event: Event) => void) | undefined>>;
 
-/** An element: attributes are set as such, functions listen, `class` and `text` are what they say. Never any HTML in text. */
+/** Creates an element. Functions become listeners; `class` and `text` set the class and the text content, never HTML.
+ */
 export function h<K extends keyof HTMLElementTagNameMap>(tag: K, attributes: Attributes = {}, ...children: Child[]): HTMLElementTagNameMap[K] {
   const element = document.createElement(tag);
   apply(element, attributes);
@@ -11,7 +12,7 @@ export function h<K extends keyof HTMLElementTagNameMap>(tag: K, attributes: Att
   return element;
 }
 
-/** The same of SVG. */
+/** Creates an SVG element. */
 export function s(tag: string, attributes: Attributes = {}, ...children: Child[]): SVGElement {
   const element = document.createElementNS("http://www.w3.org/2000/svg", tag);
   apply(element, attributes);
@@ -28,7 +29,7 @@ function apply(element: Element, attributes: Attributes): void {
   }
 }
 
-/** Sets a text only when it differs, to spare the browser a layout. */
+/** Sets a text only if it differs, to avoid a layout. */
 export function say(element: Element, text: string): void {
   if (element.textContent !== text) element.textContent = text;
 }
@@ -37,5 +38,5 @@ export function mark(element: Element, name: string, value: string): void {
   if (element.getAttribute(name) !== value) element.setAttribute(name, value);
 }
 
-/** The value of a CSS variable of the present theme. */
+/** Value of a CSS variable in the current theme. */
 export const theme = (name: string): string => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();

@@ -5,10 +5,10 @@ import { count, duration, percent } from "./words.js";
 const kWidth = 320;
 const kHeight = 112;
 const kFloor = 92;
-/** Half a label. */
+/** Half the width of a label. */
 const kMargin = 12;
 
-/** How late the haptic loop woke: counts by powers of two of a microsecond, on a logarithmic axis, so that the tail is visible. */
+/** Lateness of the haptic loop: counts by powers of two of 1 µs, on a logarithmic axis that shows the tail. */
 export class Histogram {
   readonly element: HTMLElement;
   readonly #words = h("p", { class: "words" });
@@ -20,7 +20,7 @@ export class Histogram {
     this.element = h("section", { class: "panel lateness" }, h("h3", { text: "How late the haptic loop woke" }), this.#words, this.#svg as unknown as HTMLElement, this.#more);
   }
 
-  /** `buckets`: counts as in DeviceReport; `what` says of when they are, `more` what else is known. */
+  /** `buckets` contains counts as in DeviceReport. `what` describes their time span, `more` is an additional text. */
   draw(buckets: readonly number[], what: string, more: string): void {
     const all = buckets.reduce((sum, n) => sum + n, 0);
     if (all === 0) {

@@ -12,7 +12,7 @@ interface Lane {
   readonly canvas: HTMLCanvasElement;
 }
 
-/** Why the force was not what was asked for: in words, and a lane for each reason that says when. */
+/** Reasons why the force differed from the requested one: a summary, and a timeline for each reason. */
 export class Lanes {
   readonly element: HTMLElement;
   readonly #sentence = h("p", { class: "why" });
@@ -28,7 +28,7 @@ export class Lanes {
     const found = shares(track, from, to, kLimiting);
     const { share } = found;
     say(this.#sentence, found.n === 0 ? "No states in this time." : sentence(found, to - from));
-    // A lane stays once it has been shown: rows that come and go cannot be read.
+    // A lane stays visible after it was shown once, because changing rows are hard to read.
     const now = kReasons.filter((reason) => share.has(reason.bit) || this.#seen.includes(reason));
     if (now.length !== this.#seen.length) {
       this.#seen = now;
@@ -41,7 +41,7 @@ export class Lanes {
     }
   }
 
-  /** Another device, another recording. */
+  /** Removes all lanes, for another device or recording. */
   clear(): void {
     this.#seen = [];
     this.#list.replaceChildren();

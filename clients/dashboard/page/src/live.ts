@@ -11,19 +11,19 @@ import { Track, noHandle, type HandleSample } from "./track.js";
 import { View, type Facts } from "./view.js";
 import { count, digits, duration, kDisarmed, kDisarmedBit, kSafety, moment } from "./words.js";
 
-/** Steps that are kept: two minutes at 1 kHz. */
+/** Number of steps to keep: two minutes at 1 kHz. */
 const kKept = 120_000;
 const kWindows = [0.5, 2, 5, 20, 60] as const;
-/** Frames per second: enough for a hand's motion, and it spares a phone's battery. */
+/** ms per frame: enough for hand motion, and saves battery. */
 const kFrameMs = 33;
-/** The same beside the 3-D view, which is drawn in every frame and is what is looked at. */
+/** ms per frame next to the 3-D view, which is drawn in every frame. */
 const kBesideSpaceMs = 66;
 
 /** The view of a running server. */
 export class Live {
   readonly element: HTMLElement;
   readonly #track = new Track(kKept);
-  /** The newest states of the devices beside the watched one, sixty a second, while they are shown in 3-D. */
+  /** The newest states of the other devices, 60 per second, while they are shown in 3-D. */
   readonly #beside = new Map<number, { track: Track; zero: number }>();
   readonly #stream: Stream;
   readonly #view: View;
@@ -39,7 +39,7 @@ export class Live {
   #watched = 0;
   #zero: number | undefined;
   #open = false;
-  /** Of the window while it stands still; undefined: it follows. */
+  /** The shown time window while paused; undefined: it follows. */
   #still: { from: number; to: number } | undefined;
   #hover: number | undefined;
   #drawn = 0;
@@ -94,7 +94,7 @@ export class Live {
     this.#dirty = true;
   }
 
-  /** 2-D or 3-D was chosen. */
+  /** Called when the user switches between 2-D and 3-D. */
   chosen(): void {
     this.#dirty = this.#spaceDirty = true;
     this.#say();
@@ -112,7 +112,7 @@ export class Live {
     if (message.device !== this.#watched) return this.#takeBeside(message);
     for (let i = 0; i < message.tick.length; ++i) {
       const sampled = message.sampled_us[i]! / 1e6;
-      // The server has been started again: its clock may have begun anew.
+      // The server was restarted, and its clock may have a new origin.
       if (this.#zero === undefined || sampled - this.#zero < this.#track.last) {
         this.#zero = sampled;
         this.#track.clear();
@@ -170,7 +170,7 @@ export class Live {
     this.#coupling.clear();
     this.#view.clear();
     this.#setStill(undefined);
-    // Its states of until now came sixty times a second; now all come.
+    // Its previous states had 60 Hz; from now on all states are received.
     this.#beside.delete(device);
     this.#say();
   }
@@ -220,12 +220,12 @@ export class Live {
     requestAnimationFrame(frame);
   }
 
-  /** In every frame of the screen: a hand's motion at thirty pictures a second looks rough. */
+  /** Called in every screen frame, because hand motion looks rough at 30 Hz. */
   #drawSpace(): void {
     this.#spaceDirty = false;
     const { from, to } = this.#still ?? this.#following();
     const cursor = this.#hover !== undefined && this.#still ? this.#hover : to;
-    // Others are shown as long before their newest state as the watched one before its own.
+    // The other devices are shown with the same age relative to their newest state as the watched one.
     const back = this.#track.last - cursor;
     const shown = (this.#server?.devices ?? []).map((d): Shown => {
       const watched = d.number === this.#watched;
@@ -287,11 +287,11 @@ export class Live {
   }
 }
 
-/** Steps that are kept of a device beside the watched one: two minutes. */
+/** Number of steps to keep of other devices: two minutes. */
 const kKeptBeside = 7200;
 const kNothing = new Track();
 
-/** Row `i` of a batch. */
+/** Adds row `i` of a batch. */
 function push(track: Track, message: StatesMessage, i: number, t: number): void {
   const number = (value: number | null | undefined): number => value ?? NaN;
   const handle = handleOf(message, i);
@@ -306,7 +306,7 @@ function push(track: Track, message: StatesMessage, i: number, t: number): void 
   });
 }
 
-/** Undefined: the batch tells nothing of the handle. */
+/** Returns undefined if the batch contains no data of the handle. */
 function handleOf(message: StatesMessage, i: number): HandleSample | undefined {
   const { orientation, torque_nm: torque, hand_force_n: hand, grip_rad: grip, grip_n: gripForce, buttons, stiffness_n_per_m: stiffness } = message;
   if (!orientation && !torque && !hand && !grip && !gripForce && !buttons && !stiffness) return undefined;

@@ -12,7 +12,7 @@ const contact = h("span", { class: "contact", role: "status", "data-level": "off
 const place = h("div", { class: "place" });
 const tabs = { live: h("a", { href: "#/live" }, "Live"), recordings: h("a", { href: "#/recordings" }, "Recordings") };
 
-/** As the system says, or as chosen here; the choice is kept in this browser. */
+/** "auto" follows the system. The choice is stored in this browser. */
 const kThemes = ["auto", "light", "dark"] as const;
 const themeButton = h("button", { type: "button", id: "theme", class: "quiet" });
 function setTheme(name: string): void {
@@ -46,7 +46,7 @@ document.body.append(
   h("header", {}, h("a", { href: "#/live", class: "brand" }, mark_ as unknown as HTMLElement, "Tendon"), contact, h("nav", {}, tabs.live, tabs.recordings), spaceButton, themeButton),
   place);
 
-/** The parts of a path after its "#/"; undefined when their % signs encode nothing. */
+/** Returns the parts of a path after its "#/", or undefined if the percent-encoding is invalid. */
 function partsOf(path: string): string[] | undefined {
   try {
     return path.replace(/^#?\/?/, "").split("/").map(decodeURIComponent);

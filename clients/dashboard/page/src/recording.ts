@@ -8,18 +8,18 @@ import { contactOf, frameOfScene, type Quat } from "./space/figure.js";
 import { Track, noHandle, type HandleColumn, type HandleSample, type Sample } from "./track.js";
 import { moment } from "./words.js";
 
-/** Steps that are read at once: ten minutes at 1 kHz. A longer recording is opened in parts. */
+/** Maximum number of steps to read at once: ten minutes at 1 kHz. Longer recordings are opened in parts. */
 const kMaxSteps = 600_000;
-/** A file up to this size is fetched whole: one request instead of hundreds. */
+/** Files up to this size are fetched with one request instead of hundreds. */
 const kWhole = 48 * 1024 * 1024;
 const kStepTopic = /(?:^|\/)haptic\/step$/;
 const kSceneTopic = /(?:^|\/)scene$/;
 
 export interface DeviceTrack {
-  /** Of the device, as its topic says; empty: the first one of the recording. */
+  /** Name of the device in its topic; empty: the first one of the recording. */
   readonly name: string;
   readonly track: Track;
-  /** Turns its base frame into the operator's; undefined: its scene does not say. */
+  /** Rotation from its base frame to the operator frame; undefined: not in its scene. */
   readonly frame: Quat | undefined;
 }
 
@@ -27,18 +27,18 @@ export interface Recording {
   readonly name: string;
   readonly devices: readonly DeviceTrack[];
   readonly scene: { readonly text: string; readonly version: string; readonly commit: string } | undefined;
-  /** ns since 1970 of the first step. */
+  /** ns since 1970-01-01 of the first step. */
   readonly began: bigint;
-  /** Warnings: that the recording is cut short. */
+  /** Warnings, for example that the recording is truncated. */
   readonly remarks: readonly string[];
-  /** Where the part begins that was read, and the one after it, s after the recording's beginning. */
+  /** Start of the part that was read and of the next one, in s since the start of the recording. */
   readonly from: number;
   readonly next: number | undefined;
 }
 
 /**
- * Reads the steps of a recording from `from` on, s after its beginning, as many as are read at once; `progress` hears how many so
- * far. Throws a sentence when it is none.
+ * Reads a limited number of steps of a recording, starting `from` s after its beginning. Calls `progress` with the
+ * number of steps. Throws an Error if it is not a recording.
  */
 export async function readRecording(url: string, name: string, from: number, progress: (steps: number) => void): Promise<Recording> {
   const file = await openFile(url);
@@ -52,7 +52,7 @@ async function readIndexed(file: Readable, collected: Collector, progress: (step
     const topics = [...reader.channelsById.values()].map((c) => c.topic).filter((t) => kStepTopic.test(t) || kSceneTopic.test(t));
     for (const channel of reader.channelsById.values()) collected.channel(channel, reader.schemasById.get(channel.schemaId));
     if (collected.from > 0) {
-      // The scene, and when it all began.
+      // The scene and the first step.
       for await (const message of reader.readMessages({ topics })) {
         collected.message(message);
         if (collected.began !== undefined) break;
@@ -95,10 +95,10 @@ function damageOf({ damaged }: Salvage): string[] {
   return [`The recording is damaged in ${places}: steps are missing. tendon-report says where, and tendon-replay --repair writes a whole file.`];
 }
 
-/** The NAME of /NAME/haptic/step; empty: the first device. */
+/** Returns NAME of /NAME/haptic/step; empty: the first device. */
 const deviceOf = (topic: string, end: RegExp): string => topic.replace(end, "").replace(/^\//, "");
 
-/** What has been read so far. */
+/** The data read so far. */
 class Collector {
   steps = 0;
   readonly schemas = new Map<number, McapTypes.TypedMcapRecords["Schema"]>();
@@ -106,7 +106,7 @@ class Collector {
   readonly #sceneChannels = new Map<number, { device: string; fields: Map<string, number> }>();
   readonly #frames = new Map<string, Quat | undefined>();
   #scene: Recording["scene"];
-  /** The log time of the first step, shown or not. */
+  /** Log time of the first step, shown or not. */
   began: bigint | undefined;
   #next: number | undefined;
 
@@ -127,7 +127,7 @@ class Collector {
     }
   }
 
-  /** False: that is as much as is read at once. */
+  /** Returns false if the limit of steps is reached. */
   message(message: McapTypes.TypedMcapRecords["Message"]): boolean {
     const ofScene = this.#sceneChannels.get(message.channelId);
     if (ofScene) {
@@ -163,7 +163,8 @@ class Collector {
   }
 }
 
-/** Numbers of the fields of a message type, by name: recordings outlive programs, so the file says what is in it. */
+/** Returns the field numbers of a message type by name. The types are read from the file, because recordings outlive
+ * programs. */
 function fieldsOf(types: FileDescriptorSet & Message, fullName: string): Map<string, number> {
   let found: DescriptorProto | undefined;
   for (const file of types.file) {
@@ -175,10 +176,10 @@ function fieldsOf(types: FileDescriptorSet & Message, fullName: string): Map<str
 
 const kVectors = { position_m: ["x", "y", "z"], force_wanted_n: ["wx", "wy", "wz"], force_applied_n: ["ax", "ay", "az"] } as const;
 
-/** The numbers of a message of them, such as Vec3: field 1 is `names[0]`. */
+/** Reads a message of numbers, such as Vec3: field 1 is `names[0]`. */
 function readNumbers(reader: BinaryReader, names: readonly HandleColumn[], into: HandleSample): void {
   const end = reader.uint32() + reader.pos;
-  // Zeros do not travel.
+  // Zeros are not encoded.
   for (const name of names) into[name] = 0;
   while (reader.pos < end) {
     const [number, type] = reader.tag();
@@ -188,7 +189,7 @@ function readNumbers(reader: BinaryReader, names: readonly HandleColumn[], into:
   }
 }
 
-/** Reads one part of the handle, by the names that its type's fields have in the file. */
+/** Reads one part of the handle, by the field names of its type in the file. */
 type PartReader = (reader: BinaryReader, into: HandleSample) => void;
 function partDecoder(fields: Map<string, number>, parts: Readonly<Record<string, PartReader>>): PartReader {
   const readers: PartReader[] = [];
@@ -244,7 +245,7 @@ function stepDecoder(types: FileDescriptorSet & Message, step: string): (data: U
   read("mode", (reader, s) => (s.mode = reader.int32()));
   read("late_ns", (reader, s) => (s.late = Number(reader.sint64()) / 1e9));
   read("loop_age_ns", (reader, s) => (s.age = Number(reader.sint64()) / 1e9));
-  // Recordings from before there were turning handles lack these.
+  // Missing in recordings from before rotations were supported.
   if (fields.has("turn")) {
     const turn = partDecoder(fieldsOf(types, beside("Turn")), kTurn);
     read("turn", (reader, s) => turn(reader, handle(s)));
@@ -252,7 +253,7 @@ function stepDecoder(types: FileDescriptorSet & Message, step: string): (data: U
   if (fields.has("grip")) {
     const grip = partDecoder(fieldsOf(types, beside("Grip")), kGrip);
     read("grip", (reader, s) => {
-      // Zeros do not travel: a closed gripper says nothing of its opening.
+      // Zeros are not encoded, so a closed gripper has no opening field.
       handle(s).grip = handle(s).gripForce = 0;
       grip(reader, handle(s));
     });
@@ -296,13 +297,13 @@ function decodeScene(data: Uint8Array, fields: Map<string, number>): NonNullable
   return scene;
 }
 
-/** A file of the server: whole where it is small, else in the ranges that are asked for. */
+/** Opens a file of the server: entirely if it is small, otherwise by ranges. */
 async function openFile(url: string): Promise<Readable> {
   const head = await fetch(url, { method: "HEAD" });
   if (!head.ok) throw new Error(head.status === 404 ? "There is no such recording." : `The server says ${head.status}.`);
   const size = Number(head.headers.get("Content-Length"));
   if (size <= kWhole) {
-    // Reads no byte beyond the present size, because the file may grow.
+    // Reads only up to the current size, because the file may grow.
     const all = size === 0 ? new Uint8Array() : await fetchRange(url, 0, size);
     return { size: async () => BigInt(all.length), read: async (offset, length) => all.subarray(Number(offset), Number(offset + length)) };
   }

@@ -14,10 +14,10 @@ interface Entry {
   readonly modified_unix_s: number;
 }
 
-/** Side by side. */
+/** Shown side by side. */
 const kMostRuns = 2;
 
-/** The recordings of a folder: a list, one of them, or two side by side, in the view of a live device. */
+/** The recordings of a folder: a list, or one or two of them in the view of a live device. */
 export class Runs {
   readonly element = h("main", { class: "recordings" });
   #open: Run[] = [];
@@ -34,7 +34,7 @@ export class Runs {
     this.#draw();
   }
 
-  /** No name: the list. One or two: these, from `from` on, s after their beginnings. */
+  /** Without names, shows the list. Otherwise shows one or two recordings, starting `from` s after their beginnings. */
   async show(names: readonly string[], from: number): Promise<void> {
     const asked = ++this.#asked;
     for (const run of this.#open) run.view.destroy();
@@ -113,7 +113,7 @@ export class Runs {
   #draw(): void {
     if (!this.#scrubber || this.#open.length === 0) return;
     this.#scrubber.draw(this.#open.map((run) => run.track), this.#from, this.#to);
-    // Where the reader begins: what a recording ends with would stand for all of it.
+    // Starts at the beginning, because the end of a recording is not representative.
     const cursor = this.#cursor ?? this.#from;
     for (const run of this.#open) run.draw(this.#from, this.#to, cursor);
     if (this.#open.length < 2) return;
@@ -125,16 +125,16 @@ export class Runs {
 
 const addressOf = (names: readonly string[]): string => `#/recordings/${names.map(encodeURIComponent).join("/")}`;
 
-/** A recording tells of the handle only what its scene says. */
+/** A recording contains only the properties of the handle that are in its scene. */
 const kUntold: HandleInfo = { operator_from_device: null, buttons: [], orientation_measured: false, max_torque_nm: 0, gripper_open_rad: null, max_gripper_force_n: 0, group: "", hand: "any" };
 
-/** One recording in its view. */
+/** A recording in its view. */
 class Run {
   readonly element: HTMLElement;
   #device: DeviceTrack;
   #facts: { key: string; facts: Facts } | undefined;
 
-  /** `address`: of all that is shown, from its beginning. */
+  /** `address` is the URL of all shown recordings from their beginning. */
   constructor(
     readonly recording: Recording,
     address: string,

@@ -18,7 +18,7 @@ const kChunk = 0x06;
 const kMessageIndex = 0x07;
 const kDataEnd = 0x0f;
 const kBehindChunks: ReadonlySet<number> = new Set([kSchema, kChannel, kChunk, kMessageIndex, kDataEnd]);
-/** The chunks that we write have 256 KiB. */
+/** tendond writes chunks of 256 KiB. */
 const kMaxRecord = 64 * 1024 * 1024;
 const kBlock = 4 * 1024 * 1024;
 

@@ -5,7 +5,7 @@ import { duration } from "./words.js";
 
 const kHeight = 44;
 
-/** A strip with the whole of one or more tracks, and the window that the view shows: drag it, or its ends; arrow keys too. */
+/** An overview of one or more tracks with the shown time window, which can be dragged or moved with the arrow keys. */
 export class Scrubber {
   readonly element: HTMLElement;
   readonly #canvas: HTMLCanvasElement;
@@ -94,7 +94,7 @@ export class Scrubber {
     this.moved(Math.max(from, this.#begin), Math.min(to, this.#end));
   }
 
-  /** The largest force, wanted and applied, in each pixel. */
+  /** Draws the largest wanted and applied force in each pixel. */
   #picture(): void {
     const width = this.element.clientWidth;
     const drawn = [width, this.#begin, this.#end, ...this.#tracks.map((t) => t.length)].join();

@@ -6,7 +6,7 @@ export interface ChannelInfo {
   readonly lease_ms: number;
   readonly holder: string;
 }
-/** What the handle of a device is. Quaternions are w, x, y, z. */
+/** Description of a handle. Quaternions are w, x, y, z. */
 export interface HandleInfo {
   readonly operator_from_device: readonly [number, number, number, number] | null;
   readonly buttons: readonly string[];
@@ -24,15 +24,15 @@ export interface DeviceInfo {
   readonly loop_hz: number;
   readonly max_force_n: number;
   readonly workspace_m: readonly [readonly [number, number, number], readonly [number, number, number]] | null;
-  /** Null: the server has not told. */
+  /** Null: not received. */
   readonly handle: HandleInfo | null;
   readonly channels: readonly ChannelInfo[];
-  /** Why it cannot be armed and disarmed from here now; empty: it can. */
+  /** Why it cannot be armed from here now; empty: it can. */
   readonly arming_objection: string;
 }
-/** What the buttons order. */
+/** Commands of the buttons. */
 export type Order = "arm" | "disarm" | "engage" | "disengage";
-/** What became of the newest press of a button. */
+/** The result of the newest button press. */
 export interface PressInfo {
   readonly device: number;
   readonly order: Order;
@@ -65,7 +65,7 @@ export interface StatesMessage {
   readonly reasons: readonly number[];
   readonly mode: readonly number[];
   readonly force_age_ms: readonly number[];
-  // Absent where no state holds it: the stiffness that engines ask for, row by row, and the handle.
+  // Absent if no state has them: the stiffness of the engines, row-major, and the handle.
   readonly stiffness_n_per_m?: readonly Numbers[];
   readonly orientation?: readonly [Numbers, Numbers, Numbers, Numbers];
   readonly torque_nm?: Triple;
@@ -111,9 +111,9 @@ export interface EngineReport {
   readonly lost: number;
   readonly state_one_in: number;
   readonly forces_refused: boolean;
-  /** Newtons that the least sure of its forces may be wrong by, as it says itself; null: it does not say. */
+  /** N, largest error estimate of its forces; null: none. */
   readonly error_n: number | null;
-  /** How it answered that one; empty: it does not say. */
+  /** Method of that force; empty: unspecified. */
   readonly way: string;
   readonly words: string;
 }
@@ -125,17 +125,17 @@ export interface ReportsMessage {
   readonly engines: readonly EngineReport[];
 }
 type Place = readonly [number, number, number];
-/** One end of a coupling. The position is from where it was coupled, in the end's own axes and scale, as the forces are. */
+/** One end of a coupling. Positions are relative to the offset, in the axes and scale of this end, as are forces. */
 export interface PortEnd {
   readonly phase: string;
   readonly position_m: Place;
   readonly force_n: Place;
   /** Null: not measured. */
   readonly contact_n: Place | null;
-  /** Joules of its own; null: it has no purse. */
+  /** J of this end; null: without an account. */
   readonly account_j: number | null;
   readonly round_trip_ms: number | null;
-  /** Of the surface that it has found. */
+  /** Of the detected surface. */
   readonly stiffness_n_per_m: number | null;
   readonly share: number | null;
 }
@@ -143,11 +143,11 @@ export interface PortRow {
   readonly at_us: number;
   readonly role: "leader" | "follower" | null;
   readonly own: PortEnd;
-  /** Null: nothing is heard of it. */
+  /** Null: not received. */
   readonly peer: PortEnd | null;
   readonly position_scale: number | null;
   readonly force_scale: number | null;
-  /** Joules of the leader. */
+  /** J of the leader. */
   readonly pair_j: number | null;
 }
 export interface PortsMessage {
@@ -157,7 +157,7 @@ export interface PortsMessage {
 }
 export type Message = ServerMessage | StatesMessage | ReportsMessage | PortsMessage;
 
-/** The way to tendon-dash, which is found again when it was gone. */
+/** The connection to tendon-dash, which reconnects automatically. */
 export class Stream {
   #socket: WebSocket | undefined;
   #wait = 250;
@@ -170,7 +170,7 @@ export class Stream {
     this.#open();
   }
 
-  /** Says a line now, and `first` again whenever the way is opened anew. */
+  /** Sends a line. If `first` is true, sends it again after each reconnection. */
   say(line: string, first = false): void {
     if (first) this.#first = line;
     if (this.#socket?.readyState === WebSocket.OPEN) this.#socket.send(line);

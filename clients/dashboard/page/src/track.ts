@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-/** One haptic step, as the page knows it. Unknown values are NaN. */
+/** One haptic step. Unknown values are NaN. */
 export interface Sample {
   /** s */ t: number;
   /** m */ x: number;
@@ -23,21 +23,21 @@ export interface Sample {
 
 const kHandleColumns = ["qw", "qx", "qy", "qz", "tx", "ty", "tz", "hx", "hy", "hz", "grip", "gripForce", "buttons", "nx", "ny", "nz", "gap"] as const;
 /**
- * q…: its orientation, into the base frame; t…: N·m applied; h…: N of the hand; grip: rad; gripForce: N; buttons: bits; n… and gap:
- * the surface that the engine speaks of (see contactOf).
+ * q…: orientation of the handle in the base frame; t…: N·m, applied; h…: N, force of the hand; grip: rad; gripForce:
+ * N; buttons: bits; n… and gap: the contact surface of the engine (see contactOf).
  */
 export type HandleColumn = (typeof kHandleColumns)[number];
 export type HandleSample = Record<HandleColumn, number>;
 
-/** Nothing is known of it, and no button is held. */
+/** All values are unknown, and no button is pressed. */
 export const noHandle = (): HandleSample => ({ ...kNoHandle });
 const kNoHandle = Object.freeze(Object.fromEntries(kHandleColumns.map((name) => [name, name === "buttons" ? 0 : NaN])) as HandleSample);
 
 const kColumns = ["x", "y", "z", "wx", "wy", "wz", "ax", "ay", "az", "permitted", "energy", "age", "late", "wanted", "applied"] as const;
-/** A column of numbers; `wanted` and `applied` are the norms. */
+/** A column of numbers. `wanted` and `applied` are norms. */
 export type Column = (typeof kColumns)[number];
 
-/** What a plot reads: rows in the order of their times, in columns. */
+/** Input of a plot: columns, with rows sorted by time. */
 export interface Plotted<C extends string> {
   readonly t: ArrayLike<number>;
   readonly begin: number;
@@ -48,15 +48,15 @@ export interface Plotted<C extends string> {
   at(time: number): number;
 }
 
-/** Steps in the order of their times, in columns; of a live device the newest `limit` of them. */
+/** Steps in columns, sorted by time. For a live device, only the newest `limit` steps. */
 export class Track implements Plotted<Column> {
   t = new Float64Array(4096);
   reasons = new Uint32Array(4096);
   mode = new Uint8Array(4096);
   readonly #columns: Record<Column, Float32Array>;
-  /** Made when the first step comes that has any: most devices are points. */
+  /** Created with the first step that has such values, because most devices have none. */
   #handle: Record<HandleColumn, Float32Array> | undefined;
-  /** Index of the first one that is kept, and of the end. */
+  /** Indices of the first kept step and of the end. */
   begin = 0;
   end = 0;
 
@@ -156,7 +156,7 @@ export class Track implements Plotted<Column> {
   }
 }
 
-/** What a plot of `columns` pixels can show of steps: with more steps than that, the least and the most in each pixel; gaps are null. */
+/** Reduces steps to `columns` pixels: minimum and maximum in each pixel; null in gaps. */
 export function thin<C extends string>(
   track: Plotted<C>, names: readonly C[], from: number, to: number, columns: number, scale: number,
 ): [number[], ...(number | null)[][]] {
@@ -180,7 +180,7 @@ export function thin<C extends string>(
     }
     return [times, ...values];
   }
-  // The grid stands still while time goes by; otherwise the picture would shimmer.
+  // The grid is fixed in time; otherwise the picture would flicker.
   const width = Math.max((to - from) / columns, 1e-9);
   const lows = sources.map(() => 0);
   const highs = sources.map(() => 0);
@@ -190,7 +190,7 @@ export function thin<C extends string>(
     const end = track.at((cell + 1) * width);
     const stop = Math.min(Math.max(end, i), last);
     const some = stop > i;
-    // A pixel without a step is no gap yet.
+    // A pixel without a step is not necessarily a gap.
     if (!some && i > track.begin && track.t[i]! - track.t[i - 1]! <= gap) continue;
     times.push(cell * width, (cell + 0.5) * width);
     sources.forEach((source, k) => {
@@ -209,16 +209,16 @@ export function thin<C extends string>(
   return [times, ...values];
 }
 
-/** s, from one step to the next. */
+/** s, time between steps. */
 export function usualStep(track: Pick<Plotted<string>, "t" | "begin" | "length">): number {
   const n = Math.min(track.length, 200);
   return n < 2 ? 0.001 : (track.t[track.begin + n - 1]! - track.t[track.begin]!) / (n - 1);
 }
 
-/** The mode of a step with a fresh force (core/base/mode.h). */
+/** Mode of a step with a fresh force (core/base/mode.h). */
 const kActive = 2;
 
-/** Of some steps. */
+/** Statistics of a range of steps. */
 export interface Shares {
   /** Of them that have each reason bit. */ readonly share: Map<number, number>;
   /** Of them with any that limits the force. */ readonly any: number;
@@ -227,7 +227,7 @@ export interface Shares {
   /** They reach from the first one with a fresh force to the last; else there was none, and they are all. */ readonly served: boolean;
 }
 
-/** Of the steps in [from, to], from the first one with a fresh force to the last: what comes before and after limits nothing. */
+/** Statistics of [from, to], restricted to the range from the first to the last step with a fresh force. */
 export function shares(track: Track, from: number, to: number, limiting: number): Shares {
   let [first, last] = [track.at(from), track.after(to)];
   const all = [first, last] as const;
@@ -258,7 +258,7 @@ export function shares(track: Track, from: number, to: number, limiting: number)
   return { share, any: n > 0 ? any / n : 0, apart: [at(0.5), at(0.95)], n, served };
 }
 
-/** Quantiles of one column over the steps in [from, to]; NaN where no step has a number. */
+/** Quantiles of one column over the steps in [from, to]; NaN without numbers. */
 export function quantiles(track: Track, name: Column, from: number, to: number, wanted: readonly number[]): number[] {
   const values = track.column(name).slice(track.at(from), track.after(to)).filter((v) => Number.isFinite(v)).sort();
   return wanted.map((q) => (values.length === 0 ? NaN : values[Math.min(values.length - 1, Math.floor(q * values.length))]!));

@@ -39,18 +39,18 @@ export const kCharts: readonly ChartSpec[] = [
   },
 ];
 
-/** What a view shows beside the track: a live server's reports, or figures computed from a recording. */
+/** Additional data of a view: reports of a live server, or values computed from a recording. */
 export interface Facts {
   readonly state: { readonly level: Level; readonly name: string; readonly meaning: string };
   readonly engines: readonly EngineReport[];
-  /** Shown in place of the cards when there is no engine. */
+  /** Shown instead of the cards if there is no engine. */
   readonly noEngines: string;
   readonly delay: { readonly name: string; readonly value: string; readonly note: string };
   readonly loss: { readonly name: string; readonly value: string; readonly note: string };
   readonly lateness: { readonly buckets: readonly number[]; readonly what: string; readonly more: string };
-  /** The device gives out what it is told to. */
+  /** The device outputs forces. */
   readonly gives: boolean;
-  /** In what the server is degraded, in words; empty: in nothing. */
+  /** Describes degradations of the server; empty: none. */
   readonly degraded: string;
 }
 
@@ -61,7 +61,7 @@ const tile = (id: string, text: string): { element: HTMLElement; name: HTMLEleme
   return { element: h("div", { class: "tile", "data-tile": id }, name, value, note), name, value, note };
 };
 
-/** The same instruments for a live device and for a recording. */
+/** The common view of a live device and of a recording. */
 export class View {
   readonly element: HTMLElement;
   readonly #charts: Chart[];
@@ -87,7 +87,7 @@ export class View {
         h("div", { class: "side" }, this.#lanes.element, engines, this.#histogram.element)));
   }
 
-  /** Shows [from, to]. The tiles and legends tell what was at `cursor`; `instant` names that, and is empty for "now". */
+  /** Shows [from, to]. Tiles and legends show the values at `cursor`. `instant` describes that time; empty: now. */
   draw(track: Track, from: number, to: number, cursor: number, instant: string, facts: Facts): void {
     for (const chart of this.#charts) chart.draw(track, from, to, cursor);
     this.#lanes.draw(track, from, to);
@@ -96,7 +96,8 @@ export class View {
     this.#drawEngines(facts);
   }
 
-  /** True: the 3-D view is shown, and wants `drawSpace` for each frame. Of the plots only the force's stays. */
+  /** Returns whether the 3-D view is visible and needs `drawSpace` for each frame. Only the force plot is then shown.
+   */
   space(): boolean {
     const shown = inSpace() && !this.#space.missing;
     for (const chart of this.#charts) chart.element.hidden = shown && chart.spec.id !== "force";
@@ -104,7 +105,7 @@ export class View {
     return shown;
   }
 
-  /** The devices in 3-D; `instants` where time stands still. */
+  /** Draws the devices in 3-D. `instants` is set while time is paused. */
   drawSpace(shown: readonly Shown[], instants: Instants | undefined): void {
     this.#space.draw(shown, instants);
   }
@@ -152,7 +153,8 @@ export class View {
     else show(mode, words?.level ?? "off", words?.name ?? "–", words?.meaning ?? "no state has come");
     const bound = Number.isFinite(value("permitted")) ? `${digits(value("permitted"))} permitted` : "no bound";
     show(force, "off", `${digits(value("applied"))} N`, Number.isFinite(value("wanted")) ? `of ${digits(value("wanted"))} wanted, ${bound}` : bound);
-    // Without a limiter the account can be overdrawn: then nothing may be given out, and the debt is told apart.
+    // Without a limiter the account may be negative. Then no energy may be output, and the deficit is shown
+    // separately.
     const account = 1e3 * value("energy");
     if (account < 0) show(energy, "bad", "0 mJ", `may be given out: ${digits(-account)} mJ more came out than was put in`);
     else show(energy, "off", `${digits(account)} mJ`, "may still be given out");

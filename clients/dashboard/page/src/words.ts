@@ -1,17 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 
-/** Green, amber and red, said by a shape and a word as well as by a colour. */
+/** Green, amber and red, also shown by shape and text. */
 export type Level = "good" | "notice" | "bad" | "off";
 
 export interface ReasonWords {
   readonly bit: number;
   readonly name: string;
   readonly meaning: string;
-  /** It makes the force smaller or later than asked for; the others tell only that something happened. */
+  /** The reason reduces or delays the force. Others are informational. */
   readonly limits: boolean;
 }
 
-/** The bits of core/base/reason.h. */
+/** Bits of core/base/reason.h. */
 export const kReasons: readonly ReasonWords[] = [
   { bit: 8, name: "Fault", meaning: "a latched fault holds the force at zero", limits: true },
   { bit: 13, name: "Disarmed", meaning: "an operator has disarmed the device: zero until it is armed again", limits: true },
@@ -37,7 +37,7 @@ export interface StateWords {
   readonly level: Level;
 }
 
-/** The numbers of Mode, on the wire and in recordings. */
+/** Values of Mode in the protocol and in recordings. */
 export const kModes: Readonly<Record<number, StateWords>> = {
   1: { name: "Idle", meaning: "no engine has sent a force yet", level: "off" },
   2: { name: "Active", meaning: "a fresh force is rendered", level: "good" },
@@ -58,7 +58,7 @@ export const kSafety: Readonly<Record<string, StateWords>> = {
   unguarded: { name: "Gives forces", meaning: "its scene lists no safety layer: there is nothing to arm", level: "good" },
 };
 
-/** Phases of an end of a coupling. */
+/** Phases of one end of a coupling. */
 export const kPhases: Readonly<Record<string, StateWords>> = {
   alone: { name: "Alone", meaning: "nothing is heard of another end", level: "off" },
   coupled: { name: "Coupled", meaning: "hears the other end and waits to be engaged: no force", level: "off" },
@@ -69,11 +69,11 @@ export const kPhases: Readonly<Record<string, StateWords>> = {
   fault: { name: "Fault", meaning: "its device gives no force", level: "bad" },
 };
 
-/** Bit 13 of the reasons: there is no force, whatever state the safety layer last reported. */
+/** Reason bit 13: no force, independent of the last reported safety state. */
 export const kDisarmedBit = 1 << 13;
 export const kDisarmed: StateWords = { name: "Disarmed", meaning: "gives no force until it is armed again", level: "notice" };
 
-/** "0.42", "12.3", "1234": three digits that count, whatever the size. */
+/** Formats three significant digits: "0.42", "12.3", "1234". */
 export function digits(value: number, most = 3): string {
   if (!Number.isFinite(value)) return "–";
   const size = Math.abs(value);
@@ -82,25 +82,25 @@ export function digits(value: number, most = 3): string {
   return value.toFixed(Math.min(Math.max(most - before, 0), size < 0.001 ? 6 : 3)).replace("-", "−");
 }
 
-/** A count with thin spaces: "12 345". */
+/** Formats a count with thin spaces: "12 345". */
 export const count = (value: number): string => Math.round(value).toLocaleString("en-US").replaceAll(",", "\u202f");
 
 export const percent = (share: number): string =>
   !Number.isFinite(share) ? "–" : share > 0 && share < 0.001 ? "< 0.1 %" : `${digits(100 * share, share < 0.1 ? 2 : 3)} %`;
 
-/** "2026-11-23 14:05:09 UTC+1": in the time zone of the browser. Sweden writes the date as ISO 8601 does. */
+/** "2026-11-23 14:05:09 UTC+1", in the local time zone. The Swedish locale uses the format of ISO 8601. */
 export const dateTime = (when: Date): string => when.toLocaleString("sv-SE", {
   year: "numeric", month: "2-digit", day: "2-digit", hour: "2-digit", minute: "2-digit", second: "2-digit", timeZoneName: "short",
 });
 
-/** "64 µs", "1.02 ms", "2.1 s". */
+/** Formats "64 µs", "1.02 ms", "2.1 s". */
 export function duration(seconds: number): string {
   if (!Number.isFinite(seconds)) return "–";
   const [value, unit] = seconds < 1e-3 ? [seconds * 1e6, "µs"] : seconds < 1 ? [seconds * 1e3, "ms"] : [seconds, "s"];
   return `${Number(value.toPrecision(3))}\u00a0${unit}`;
 }
 
-/** When in a recording: "59.5 s", "10 min 4 s". */
+/** Formats a time in a recording: "59.5 s", "10 min 4 s". */
 export function moment(seconds: number): string {
   if (seconds < 60) return `${digits(seconds)}\u00a0s`;
   return `${Math.floor(seconds / 60)}\u00a0min ${Math.floor(seconds % 60)}\u00a0s`;

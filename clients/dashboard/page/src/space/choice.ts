@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// 2-D or 3-D: one choice for the whole page, kept in this browser.
+// The choice of 2-D or 3-D for the entire page, stored in this browser.
 import { h, mark, say } from "../dom.js";
 
 const kKey = "view";

@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// What the 3-D view draws for a state, as plain numbers: no three.js, no browser.
+// Computes what the 3-D view draws for a state, without three.js or a browser.
 import type { HandleInfo } from "../stream.js";
 import type { Track } from "../track.js";
 
 export type Vec = readonly [number, number, number];
-/** A unit quaternion, Hamilton's: w + x i + y j + z k. */
+/** A unit quaternion (Hamilton convention): w + x i + y j + z k. */
 export type Quat = readonly [w: number, x: number, y: number, z: number];
 
 const kNoTurn: Quat = [1, 0, 0, 0];
 
-/** a b: first b, then a. */
+/** Returns a b: first b, then a. */
 export function product(a: Quat, b: Quat): Quat {
   return [
     a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3],
@@ -20,16 +20,15 @@ export function product(a: Quat, b: Quat): Quat {
   ];
 }
 
-/** R v. */
 export function rotated([w, x, y, z]: Quat, v: Vec): Vec {
   const [tx, ty, tz] = [2 * (y * v[2] - z * v[1]), 2 * (z * v[0] - x * v[2]), 2 * (x * v[1] - y * v[0])];
   return [v[0] + w * tx + y * tz - z * ty, v[1] + w * ty + z * tx - x * tz, v[2] + w * tz + x * ty - y * tx];
 }
 
-/** The order of three.js: x, y, z, w. */
+/** In the order of three.js: x, y, z, w. */
 export const threeOrder = ([w, x, y, z]: Quat): [number, number, number, number] => [x, y, z, w];
 
-/** One state of a device, in its base frame. A part is undefined when the device does not measure it, or nobody has told it. */
+/** One state of a device in its base frame. Quantities that are not measured or not received are undefined. */
 export interface Pose {
   readonly position: Vec;
   readonly orientation?: Quat | undefined;
@@ -38,7 +37,7 @@ export interface Pose {
   readonly wanted?: Vec | undefined;
   /** N·m, applied. */
   readonly torque?: Vec | undefined;
-  /** N, of the hand on the handle. */
+  /** N, force of the hand on the handle. */
   readonly hand?: Vec | undefined;
   /** rad */
   readonly grip?: number | undefined;
@@ -48,7 +47,7 @@ export interface Pose {
   readonly contact?: Contact | undefined;
 }
 
-/** A flat surface. `gap`: m, from it to the tool along the normal; below 0: so deep is the tool pressed in. */
+/** A flat surface. `gap`: m, distance of the tool along the normal; negative inside. */
 export interface Contact {
   readonly normal: Vec;
   readonly gap: number;
@@ -56,7 +55,7 @@ export interface Contact {
 
 const vec = (x: number, y: number, z: number): Vec | undefined => (Number.isFinite(x + y + z) ? [x, y, z] : undefined);
 
-/** The state at index `i` of a track. */
+/** Returns the state at index `i` of a track. */
 export function poseAt(track: Track, i: number): Pose | undefined {
   const base = (name: Parameters<Track["column"]>[0]): number => track.column(name)[i]!;
   const position = vec(base("x"), base("y"), base("z"));
@@ -80,11 +79,11 @@ export function poseAt(track: Track, i: number): Pose | undefined {
   };
 }
 
-/** The same in the operator's frame: x right, y up, z to the viewer. Lengths in m. */
+/** A pose in the operator frame: x right, y up, z to the viewer. Lengths in m. */
 export interface Figure {
   readonly kind: "stylus" | "point";
   readonly position: Vec;
-  /** three.js's order; turns the handle frame into the operator's. */
+  /** In the order of three.js; rotates the handle frame to the operator frame. */
   readonly quaternion: readonly [number, number, number, number];
   readonly force: Vec | undefined;
   readonly wanted: Vec | undefined;
@@ -94,11 +93,11 @@ export interface Figure {
   readonly opening: number | undefined;
   readonly gripForce: number | undefined;
   readonly buttons: readonly { readonly name: string; readonly held: boolean }[];
-  /** A point of the surface, nearest to the handle, and its normal. */
+  /** The point of the surface closest to the handle, and its normal. */
   readonly plane: { readonly at: Vec; readonly normal: Vec; readonly gap: number } | undefined;
 }
 
-/** `handle`: null or without a frame: as if x were right, y up and z to the user. */
+/** Without a `handle` or its frame, x is right, y up and z to the user. */
 export function figureOf(pose: Pose, handle: HandleInfo | null | undefined): Figure {
   const frame = frameOf(handle);
   const turned = (v: Vec | undefined): Vec | undefined => v && rotated(frame, v);
@@ -127,12 +126,12 @@ export function figureOf(pose: Pose, handle: HandleInfo | null | undefined): Fig
 
 export const frameOf = (handle: HandleInfo | null | undefined): Quat => handle?.operator_from_device ?? kNoTurn;
 
-/** What of a stiffness (3 × 3 by rows) may be another direction's, for the surface to count as flat. */
+/** Maximum fraction of a stiffness in other directions for which the surface counts as flat. */
 const kFlat = 0.1;
 
 /**
- * The flat surface that an engine's stiffness and force speak of: k n nᵀ and k·depth·n. Undefined where the stiffness
- * has more than one direction, as of a spring to a point, or where no force presses: then nobody has told of a surface.
+ * Returns the flat surface of an engine from its stiffness k n nᵀ and force k·depth·n. Returns undefined if the
+ * stiffness has more than one direction, as for a point spring, or if there is no pushing force.
  */
 export function contactOf(stiffness: readonly number[], force: Vec): Contact | undefined {
   if (stiffness.length !== 9 || !stiffness.every(Number.isFinite)) return undefined;
@@ -152,8 +151,8 @@ export function contactOf(stiffness: readonly number[], force: Vec): Contact | u
 }
 
 /**
- * The rotation that "right=x up=y user=z" names in the text of a scene: recordings hold no description of the device.
- * Undefined when the scene does not say, or says no right-handed frame.
+ * Returns the rotation for "right=x up=y user=z" in the text of a scene, because recordings contain no device
+ * description. Returns undefined if it is missing or not right-handed.
  */
 export function frameOfScene(text: string): Quat | undefined {
   const words = /^\s*axes\s*=\s*["']([^"']*)["']/m.exec(text)?.[1];
@@ -171,7 +170,7 @@ export function frameOfScene(text: string): Quat | undefined {
   return quatOfRows(right, up, user);
 }
 
-/** Of a rotation matrix. The largest of four squares is divided by, so that nothing small is. */
+/** Converts a rotation matrix. Divides by the largest of four squares for accuracy. */
 function quatOfRows(a: Vec, b: Vec, c: Vec): Quat {
   const squares = [1 + a[0] + b[1] + c[2], 1 + a[0] - b[1] - c[2], 1 - a[0] + b[1] - c[2], 1 - a[0] - b[1] + c[2]];
   const largest = squares.indexOf(Math.max(...squares));
@@ -185,7 +184,7 @@ function quatOfRows(a: Vec, b: Vec, c: Vec): Quat {
   return q as unknown as Quat;
 }
 
-/** What is seen, in words: for those who do not see it. */
+/** Describes the picture in words, for accessibility. */
 export function wordsOf(figure: Figure): string {
   const parts: string[] = [figure.kind === "stylus" ? "a stylus" : "a point"];
   const some = (v: Vec | undefined, least: number): boolean => v !== undefined && Math.hypot(...v) > least;
@@ -199,6 +198,6 @@ export function wordsOf(figure: Figure): string {
   return parts.join(", ");
 }
 
-/** Smaller ones are not drawn: an arrow of a tenth of a millimetre is a dot that flickers. */
+/** N and N·m. Smaller ones are not drawn, because tiny arrows flicker. */
 export const kLeastForce = 0.01;
 export const kLeastTorque = 0.0005;

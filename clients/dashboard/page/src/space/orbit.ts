@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// From where the devices are seen. It changes only when somebody changes it.
+// The viewpoint. Only the user changes it.
 
-/** rad; 0, 0 looks along −z, from the user's side; `turn` > 0 goes to the right, `rise` > 0 up. */
+/** rad. 0, 0 looks along −z from the user's side; `turn` > 0 moves to the right, `rise` > 0 up. */
 export interface View {
   readonly turn: number;
   readonly rise: number;
-  /** 1: all of it fills the picture. */
+  /** 1: the scene fills the picture. */
   readonly zoom: number;
 }
 
@@ -21,7 +21,8 @@ export function zoomedBy(view: View, factor: number): View {
   return { ...view, zoom: Math.min(Math.max(view.zoom * factor, 0.3), 12) };
 }
 
-/** The grid in which `n` cells of that aspect (width / height) are drawn largest in a picture of that aspect. */
+/** Returns the grid in which `n` cells with aspect ratio `cell` are largest in a picture with aspect ratio `picture`.
+ */
 export function gridOf(n: number, cell: number, picture: number): { columns: number; rows: number } {
   let best = { columns: 1, rows: Math.max(n, 1), size: 0 };
   for (let columns = 1; columns <= n; ++columns) {
@@ -32,12 +33,13 @@ export function gridOf(n: number, cell: number, picture: number): { columns: num
   return { columns: best.columns, rows: best.rows };
 }
 
-/** rad for each pixel of a drag. */
+/** rad per pixel of a drag. */
 const kTurnPerPixel = 0.008;
 
 /**
- * Drags, wheels, fingers and keys on `element`. One finger turns sideways and leaves up and down to the page, which must
- * scroll; two fingers turn in both ways and zoom. The wheel zooms only once the view has been clicked, for the same reason.
+ * Handles drags, wheel, touch and keys on `element`. One finger rotates only sideways, so that the page can still be
+ * scrolled vertically; two fingers rotate and zoom. For the same reason, the wheel zooms only after a click on the
+ * view.
  */
 export class Orbit {
   view: View = kFirstView;
@@ -64,7 +66,7 @@ export class Orbit {
       } else {
         const other = others[0]!;
         const apart = (x: number, y: number): number => Math.max(Math.hypot(x - other.x, y - other.y), 10);
-        // Each of the two fingers makes half of a turn.
+        // Each finger contributes half of the rotation.
         view = turnedBy(view, (-kTurnPerPixel * dx) / 2, (kTurnPerPixel * dy) / 2);
         view = zoomedBy(view, apart(event.clientX, event.clientY) / apart(before.x, before.y));
       }

@@ -4,7 +4,7 @@ import { digits, moment } from "../words.js";
 import type { Figure, Vec } from "./figure.js";
 import type { Shown, Stage } from "./stage.js";
 
-/** Of something that stands still, the time that can be looked at: s. */
+/** s, available time range while paused. */
 export interface Instants {
   readonly from: number;
   readonly to: number;
@@ -13,10 +13,10 @@ export interface Instants {
 
 const kNoWebGl = "This browser has no WebGL, so the view stays 2-D.";
 
-/** The place of the 3-D view: it loads three.js when it is first drawn, and says in numbers what the arrows show. */
+/** Container of the 3-D view. It loads three.js when needed and shows the values of the arrows as numbers. */
 export class SpacePanel {
   readonly element: HTMLElement;
-  /** 3-D cannot be had here, and the sentence says so. */
+  /** 3-D is not available, which is shown as a message. */
   missing = false;
   readonly #canvas: HTMLCanvasElement;
   readonly #said = h("p", { class: "quiet", role: "status" });
@@ -32,7 +32,7 @@ export class SpacePanel {
   #playing: number | undefined;
   #readout: Row[] = [];
 
-  /** `changed`: draw again; `seek`: somebody wants to see that instant. */
+  /** `changed`: draw again. `seek`: the user wants to see that time. */
   constructor(readonly changed: () => void, readonly seek: (time: number) => void) {
     this.#canvas = h("canvas", { tabindex: 0, role: "img", "aria-label": "3-D view" });
     this.#slider = h("input", { type: "range", min: 0, max: 1000, "aria-label": "Instant that is shown", input: () => {
@@ -48,7 +48,7 @@ export class SpacePanel {
       this.#said, h("div", { class: "stage" }, this.#canvas), this.#seek, this.#rows);
   }
 
-  /** Hides it, or shows the devices; `instants` where time stands still. */
+  /** Hides the view, or shows the devices. `instants` is set while time is paused. */
   hide(): void {
     this.#stop();
     this.element.hidden = true;
@@ -105,7 +105,7 @@ export class SpacePanel {
     this.changed();
   }
 
-  /** In real time, from the instant that is shown; again from the beginning when it was the last one. */
+  /** Plays in real time from the shown time, or from the beginning if that is the last one. */
   #start(): void {
     if (!this.#instants) return;
     const { from, to } = this.#instants;
@@ -130,7 +130,7 @@ export class SpacePanel {
     mark(this.#play, "aria-label", "Play");
   }
 
-  /** Texts ten times a second at most: nobody reads faster, and layouts are dear. */
+  /** Updates texts at most ten times per second, because layouts are expensive. */
   #tell(shown: readonly Shown[], figures: readonly (Figure | undefined)[]): void {
     if (this.#readout.length !== shown.length) {
       this.#readout = shown.map(() => new Row());
@@ -151,7 +151,7 @@ const key = (colour: string, name: string, thin = false): HTMLElement => {
   return h("span", { class: "key" }, swatch, name);
 };
 
-/** One device in numbers, and its buttons as lights. */
+/** The values of one device, and its buttons. */
 class Row {
   readonly element: HTMLElement;
   readonly #name = h("b", {});
@@ -191,5 +191,5 @@ function valuesOf(figure: Figure): string {
   return parts.join(" · ");
 }
 
-/** As many places as always: a width that changes cannot be read. */
+/** Uses a constant number of digits, because a changing width is hard to read. */
 const fixed = (value: number, places: number): string => (Number.isFinite(value) ? value.toFixed(places).replace("-", "−") : "–");

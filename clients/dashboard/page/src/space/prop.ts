@@ -6,22 +6,22 @@ import {
 } from "three";
 import { kLeastForce, kLeastTorque, type Figure, type Vec } from "./figure.js";
 
-/** Of a force's arrow: 1 cm for each newton. */
+/** Length of a force arrow: 1 cm/N. */
 export const kMetresPerNewton = 0.01;
 const kLongestArrow = 0.15;
-/** Where nobody says how much torque the device can give. */
+/** Used if the maximum torque of the device is unknown. */
 export const kUsualTorque = 0.2;
-/** The most points of a path. */
+/** Maximum number of points of a path. */
 export const kPathPoints = 220;
 
-/** The colours of the theme that the view uses, by the names of style.css. */
+/** Returns a color of the theme by its name in style.css. */
 export type Paint = (name: string) => Color;
 
 const kUp = new Vector3(0, 1, 0);
 const kAhead = new Vector3(0, 0, 1);
 const scratch = { to: new Vector3(), turn: new Quaternion() };
 
-/** Shared by all props: one of each shape. */
+/** Geometries shared by all props. */
 const shapes = {
   shaft: new CylinderGeometry(0.5, 0.5, 1, 14).translate(0, 0.5, 0),
   head: new ConeGeometry(0.5, 1, 20).translate(0, 0.5, 0),
@@ -29,7 +29,7 @@ const shapes = {
   handle: new CylinderGeometry(0.0042, 0.0052, 0.085, 28).rotateX(Math.PI / 2).translate(0, 0, 0.0685),
   end: new SphereGeometry(0.0052, 24, 14).translate(0, 0, 0.111),
   knob: new SphereGeometry(0.006, 24, 14),
-  // From the hinge ahead, along −z.
+  // From the hinge along −z.
   finger: new BoxGeometry(0.0035, 0.008, 0.036).translate(0, 0, -0.018),
   ball: new SphereGeometry(0.0065, 28, 18),
   dot: new SphereGeometry(0.0034, 16, 10),
@@ -37,11 +37,12 @@ const shapes = {
   rim: new RingGeometry(0.0372, 0.0384, 64),
 };
 
-/** rad, of the ring for the largest torque. */
+/** rad, sweep of the ring for the maximum torque. */
 const kMostSweep = (320 / 180) * Math.PI;
 const kRing = { radius: 0.024, thick: 0.085, segments: 80, sides: 8 };
 
-/** A tube along an arc of radius 1 about z, from +x on. Its triangles follow the arc, so that a part of it can be drawn. */
+/** A tube along an arc of radius 1 about z, starting at +x. The triangles are ordered along the arc for partial
+ * drawing. */
 function arcShape(): BufferGeometry {
   const { segments, sides, thick } = kRing;
   const [places, normals, index]: [number[], number[], number[]] = [[], [], []];
@@ -64,7 +65,7 @@ function arcShape(): BufferGeometry {
   return shape;
 }
 
-/** An arrow from its own origin; thin ones lie beside thick ones. */
+/** An arrow from its own origin. Thin arrows are offset from thick ones. */
 class Arrow {
   readonly object = new Group();
   readonly #shaft: Mesh;
@@ -89,7 +90,8 @@ class Arrow {
   }
 }
 
-/** A torque: a ring about its axis, whose arrow turns as the right hand's fingers do; the longer, the larger. */
+/** A torque: a ring about its axis with an arrow in the direction of the right-hand rule. Its length is proportional.
+ */
 class Ring {
   readonly object = new Group();
   readonly #arc: Mesh;
@@ -120,7 +122,7 @@ class Ring {
   }
 }
 
-/** Where the tool was: a ribbon that faces the eye and fades with age. */
+/** The path of the tool: a ribbon that faces the viewer and fades with age. */
 class Path {
   readonly object: Mesh;
   readonly #places = new Float32Array(kPathPoints * 6);
@@ -140,7 +142,7 @@ class Path {
     this.object.frustumCulled = false;
   }
 
-  /** `points`: x, y, z of `n` places, the oldest first; `eye`: from where they are seen, in the same frame. */
+  /** `points` contains x, y, z of `n` positions, oldest first. `eye` is the viewpoint in the same frame. */
   show(points: Float32Array, n: number, eye: Vector3, width: number): void {
     this.object.visible = n >= 2;
     if (!this.object.visible) return;
@@ -152,7 +154,7 @@ class Path {
       const [ex, ey, ez] = [eye.x - points[c]!, eye.y - points[c + 1]!, eye.z - points[c + 2]!];
       const [x, y, z] = [dy * ez - dz * ey, dz * ex - dx * ez, dx * ey - dy * ex];
       const length = Math.sqrt(x * x + y * y + z * z);
-      // A hand that rests has no direction: the ribbon keeps the one that it had.
+      // A resting hand has no direction; keep the previous one.
       if (length > 1e-9) [sx, sy, sz] = [(x / length) * width, (y / length) * width, (z / length) * width];
       for (const [k, sign] of [[0, 1], [3, -1]] as const) {
         out[6 * i + k] = points[c]! + sign * sx;
@@ -161,7 +163,7 @@ class Path {
       }
     }
     this.#geometry.getAttribute("position").needsUpdate = true;
-    // The newest place is always at the full end of the fading.
+    // The newest position always has full opacity.
     const first = kPathPoints - n;
     if (first > 0) {
       out.copyWithin(6 * first, 0, 6 * n);
@@ -174,7 +176,7 @@ class Path {
   }
 }
 
-/** Everything of one device that moves. Its frame is the operator's, its origin the device's. */
+/** All moving parts of one device, in the operator frame with the origin of the device. */
 export class Prop {
   readonly object = new Group();
   readonly #tool = new Group();
@@ -194,7 +196,7 @@ export class Prop {
   readonly #flat: Record<"plane" | "rim" | "path", MeshBasicMaterial>;
   readonly #line = new LineBasicMaterial();
 
-  /** `triad`: three axes of a frame, `length` long. */
+  /** `triad` creates three axes of the given length. */
   constructor(triad: (length: number) => Group) {
     const lit = (): MeshLambertMaterial => new MeshLambertMaterial();
     this.#materials = { body: lit(), tip: lit(), applied: lit(), wanted: lit(), torque: lit(), hand: lit(), off: lit(), on: lit(), finger: lit() };
@@ -238,7 +240,7 @@ export class Prop {
     this.#line.color.copy(colour("text"));
   }
 
-  /** Undefined: no state has come. */
+  /** `figure` is undefined before the first state. */
   show(figure: Figure | undefined, mostTorque: number, path: Float32Array, points: number, eye: Vector3, width: number): void {
     this.object.visible = figure !== undefined;
     if (!figure) return;
@@ -265,7 +267,7 @@ export class Prop {
     this.#path.show(path, points, eye, width);
   }
 
-  /** Along the handle; lit while held. */
+  /** Draws the buttons along the handle. They are lit while pressed. */
   #showButtons(figure: Figure, stylus: boolean): void {
     figure.buttons.forEach((button, i) => {
       let dot = this.#dots[i];

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The 3-D view itself. Only this file and prop.ts use three.js; panel.ts loads them when somebody asks for the view.
+// The 3-D view. Only this file and prop.ts use three.js; panel.ts loads them when needed.
 import {
   AmbientLight, BoxGeometry, BufferAttribute, BufferGeometry, CanvasTexture, Color, ConeGeometry, CylinderGeometry, DirectionalLight,
   EdgesGeometry, Group, LineBasicMaterial, LineSegments, Mesh, MeshBasicMaterial, PerspectiveCamera, Quaternion, Scene, Sprite,
@@ -13,22 +13,22 @@ import { figureOf, frameOf, poseAt, rotated, threeOrder, wordsOf, type Figure, t
 import { Orbit, gridOf } from "./orbit.js";
 import { Prop, kPathPoints, kUsualTorque } from "./prop.js";
 
-/** One device, and the instant at which it is shown. */
+/** A device and the shown time. */
 export interface Shown {
   readonly name: string;
   readonly track: Track;
-  /** s on the track's clock. */
+  /** s, in the clock of the track. */
   readonly time: number;
   readonly handle: HandleInfo | null;
-  /** m, base frame; null: nobody says. */
+  /** m, base frame; null: unknown. */
   readonly workspace: readonly [Vec, Vec] | null;
   readonly watched: boolean;
 }
 
-/** s of the path that is drawn. */
+/** s, duration of the drawn path. */
 export const kPathSpan = 3;
 const kFieldOfView = 22;
-/** Of a name, in heights of a box. */
+/** Height of a name relative to a box. */
 const kTitle = 0.075;
 const kRight = new Vector3(1, 0, 0);
 const kUp = new Vector3(0, 1, 0);
@@ -40,9 +40,9 @@ interface Box {
   readonly max: Vec;
 }
 
-/** A device's place on the stage: what stands still is built anew when its name, frame or box changes. */
+/** One device on the stage. Static parts are rebuilt when its name, frame or box changes. */
 class Place {
-  /** In its cell; what a person turns; and in the device's own coordinates. */
+  /** In its cell, rotated by the user, and in the coordinates of the device. */
   readonly group = new Group();
   readonly turned = new Group();
   readonly inner = new Group();
@@ -87,7 +87,7 @@ export class Stage {
     });
   }
 
-  /** Draws; returns in words what is seen. */
+  /** Draws. Returns a description in words. */
   draw(shown: readonly Shown[]): string {
     this.#shown = shown;
     if (this.#colours.size === 0) this.#moved = true;
@@ -112,7 +112,7 @@ export class Stage {
     return this.#shown.map((_, i) => this.#places[i]!.figure);
   }
 
-  /** The theme has changed. */
+  /** Redraws after a change of the theme. */
   repaint(): void {
     this.#colours.clear();
     for (const place of this.#places) place.key = "";
@@ -145,13 +145,13 @@ export class Stage {
     }
     const local = eye.clone().sub(place.group.position).applyQuaternion(place.turned.quaternion.clone().invert()).sub(place.inner.position);
     const most = handle && handle.max_torque_nm > 0 ? handle.max_torque_nm : kUsualTorque;
-    // As wide as two pixels are in the middle of the picture.
+    // Width of two pixels in the center of the picture.
     const width = (Math.tan((kFieldOfView * Math.PI) / 360) * eye.z * 2.2) / Math.max(this.canvas.clientHeight, 1);
     place.prop.show(place.figure, most, place.path, n, local, width);
     return place.figure ? wordsOf(place.figure) : "no state has come";
   }
 
-  /** Builds anew what of the devices has changed. */
+  /** Rebuilds the parts that have changed. */
   #arrange(): void {
     this.#shown.forEach((device, i) => {
       const place = this.#places[i]!;
@@ -168,8 +168,8 @@ export class Stage {
   }
 
   /**
-   * Puts the devices into the cells of a grid that fills the picture, and the camera before it. What a person turns are the
-   * devices, each about its own middle: so all are seen from the same side, however many there are.
+   * Arranges the devices in a grid that fills the picture, and sets the camera. User rotation is applied to each
+   * device about its center, so that all are seen from the same direction.
    */
   #look(): Vector3 {
     const { clientWidth: width, clientHeight: height } = this.canvas;
@@ -213,7 +213,7 @@ export class Stage {
     return this.#camera.position;
   }
 
-  /** What stands still: the box, the floor, the frame of the base, and the name. */
+  /** Builds the static parts: box, floor, axes of the base, and name. */
   #build(place: Place, { name, watched }: Shown, frame: Quat): void {
     this.#clear(place.still);
     const { min, max } = place.box;
@@ -221,7 +221,7 @@ export class Stage {
     const edges = new EdgesGeometry(new BoxGeometry(...size));
     const box = new LineSegments(edges, this.#lines.box);
     box.position.set((min[0] + max[0]) / 2, (min[1] + max[1]) / 2, (min[2] + max[2]) / 2);
-    // In a corner, not at its origin: there it would be taken for arrows of forces.
+    // In a corner, because at the origin it would look like force arrows.
     const base = this.#triad(Math.max(0.025, 0.17 * Math.min(...size)), this.#letters());
     base.quaternion.set(...threeOrder(frame));
     base.position.set(min[0], min[1], min[2]);
@@ -240,7 +240,7 @@ export class Stage {
     return (axis) => this.#text("xyz"[axis]!, "xyz"[axis]!, 0.013);
   }
 
-  /** Three axes, in the colours of the position's plot. */
+  /** Three axes in the colors of the position plot. */
   #triad(length: number, letter?: (axis: number) => Sprite): Group {
     const triad = new Group();
     const turns = [new Quaternion().setFromAxisAngle(new Vector3(0, 0, 1), -Math.PI / 2), new Quaternion(), new Quaternion().setFromAxisAngle(new Vector3(1, 0, 0), Math.PI / 2)];
@@ -288,7 +288,7 @@ export class Stage {
     }
     const known = this.#colours.get(name);
     if (known) return known;
-    // Eight digits hold an opacity, which a Color has not.
+    // Colors with eight digits contain opacity, which Color does not support.
     const colour = new Color(theme(name).slice(0, 7));
     this.#colours.set(name, colour);
     return colour;
@@ -308,14 +308,14 @@ export class Stage {
 
 const kCorners = [-1, 1].flatMap((a) => [-1, 1].flatMap((b) => [-1, 1].map((c): Vec => [a, b, c])));
 
-/** The box about the corners of a base-frame box, in the operator's frame. */
+/** Returns the bounding box of a base-frame box in the operator frame. */
 function boxOf([low, high]: readonly [Vec, Vec], frame: Quat): Box {
   const corners = kCorners.map((signs) => rotated(frame, signs.map((s, k) => (s < 0 ? low[k]! : high[k]!)) as unknown as Vec));
   const of = (least: (...values: number[]) => number): Vec => [0, 1, 2].map((k) => least(...corners.map((c) => c[k]!))) as unknown as Vec;
   return { min: of(Math.min), max: of(Math.max) };
 }
 
-/** Where a device has been, in steps of 2 cm so that the picture does not breathe: for one whose workspace nobody tells. */
+/** Returns the range of the path, rounded to 2 cm to keep the picture stable, for devices without a workspace. */
 function extentOf(track: Track): readonly [Vec, Vec] {
   const grid = 0.02;
   const ends = (["x", "y", "z"] as const).map((name) => {
