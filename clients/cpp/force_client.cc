@@ -53,7 +53,7 @@ const ForceClient::Config& checked(const ForceClient::Config& config) {
   expect_above_zero(seconds(config.retry_min), "retry_min_s");
   expect(config.retry_max >= config.retry_min, "retry_max_s", seconds(config.retry_max), "at least retry_min_s");
   expect(config.max_datagrams > 0, "max_datagrams", config.max_datagrams, "1 or more");
-  if (config.deadband) Deadband{*config.deadband};  // throws if it is invalid
+  if (config.deadband) Deadband{*config.deadband};  // throws if invalid
   if (config.state_deadband) {
     const std::string objection = StateDeadband::objection(*config.state_deadband);
     if (!objection.empty()) throw std::invalid_argument("state_deadband." + objection);
@@ -90,7 +90,7 @@ ForceClient::ForceClient(Link& link, const Address& server, const Config& config
                    .max_datagrams = config.max_datagrams}),
       lease_(kAskLeaseAgain, config.take_lease && role == Role::kController),
       next_call_(now) {
-  config_.seed = {};  // keeping it would allow an attacker who reads the memory later to derive every key
+  config_.seed = {};  // an attacker who reads the memory later must not find the keys
   greet(now);
 }
 
@@ -216,8 +216,7 @@ void ForceClient::open(LocalTime now, const Welcome& welcome) {
   if (config_.state_hz > 0) session.request(SetStateRate{.hz = config_.state_hz, .device = lease_.place().device});
   sequence_ = 0;
   answered_tick_ = 0;
-  if (config_.deadband)
-    deadband_ = HandleDeadband::of_forces(*config_.deadband);  // the new session has not sent any force yet
+  if (config_.deadband) deadband_ = HandleDeadband::of_forces(*config_.deadband);  // no force was sent in this session
   stats_.phase = Phase::kOpen;
   ++stats_.sessions;
 }
@@ -261,7 +260,7 @@ void ForceClient::take_event(LocalTime now, const Session::Event& event) {
     if (unseen_) ++stats_.states_skipped;
     newest_ = arrived->state;
     unseen_ = true;
-    if (physics_ && !lease_.holds()) pressed_ = 0;  // another engine held the channel when the button was pressed
+    if (physics_ && !lease_.holds()) pressed_ = 0;  // pressed for another engine
     pressed_ |= arrived->state.buttons;
     newest_arrived_ = now;
   } else if (const auto* report = std::get_if<Session::ReportArrived>(&event)) {
@@ -296,7 +295,6 @@ void ForceClient::take_request(LocalTime now, const Session::RequestArrived& arr
   if (lease_.take(*lost, session, now)) stats_.lease_lost_to = lost->to;
 }
 
-/// Returns the state for the callback; empty if there is nothing new.
 std::optional<DeviceState> ForceClient::due_state(LocalTime now) {
   if (!foretell_) return std::exchange(unseen_, false) ? newest_ : std::nullopt;
   if (!newest_ || now - newest_arrived_ > config_.state_deadband->max_silence) return {};
@@ -307,7 +305,6 @@ std::optional<DeviceState> ForceClient::due_state(LocalTime now) {
   return state;
 }
 
-/// Returns true if the engine has answered, so that a force may be waiting.
 bool ForceClient::call(LocalTime now) {
   if (now < next_call_ || (physics_ && !lease_.holds())) return false;
   std::optional<DeviceState> due = due_state(now);
@@ -341,7 +338,6 @@ bool ForceClient::answer(LocalTime now, const Reply& reply) {
   return true;
 }
 
-/// Removes the fields of the command that the server or its device does not support.
 void ForceClient::leave_out(const Touch& touch, const DeviceState& answered, ForceCommand& command) {
   if (command.model && !agreed_to(kFeatureLocalModel)) command.model.reset();
   if (command.way > config_.ways.size()) stats_.left_out = "the way of answering: Config::ways has none of its number";
@@ -394,11 +390,9 @@ Duration ForceClient::valid_for(std::uint64_t tick) const {
 
 Duration ForceClient::haptic_period() const { return from_seconds(1.0 / welcome_->loop_hz); }
 
-/// Returns the time of the next callback, or LocalTime::max() if no unseen state is available.
 LocalTime ForceClient::next_call() const {
   if (!foretell_) return unseen_ ? next_call_ : LocalTime::max();
   if (!newest_) return LocalTime::max();
-  // The first tick that the callback has not received.
   const std::uint64_t ahead = seen_tick_ >= newest_->tick ? seen_tick_ + 1 - newest_->tick : 0;
   const LocalTime at = std::max(next_call_, newest_arrived_ + static_cast<Duration::rep>(ahead) * haptic_period());
   return at - newest_arrived_ <= config_.state_deadband->max_silence ? at : LocalTime::max();

@@ -26,7 +26,7 @@ namespace tendon {
 /// A device state that the callback received, kept so that an answer computed later can refer to it.
 struct Seen {
   DeviceState hand{};
-  std::uint64_t session = 0;  ///< value of ForceClient::Stats::sessions on arrival
+  std::uint64_t session = 0;
 };
 
 /// A delayed answer and the state that it answers. See ForceClient::answer.
@@ -141,8 +141,7 @@ class ForceClient {
     kUnanswered = 3,  ///< the server did not answer; waiting before the next attempt
     kRefused = 4,     ///< the server refused the client; waiting before the next attempt
     kLost = 5,        ///< the session ended; waiting before the next attempt
-    kStopped = 6,     ///< final: stop() was called, the callback threw, or another program replaced this client
-                      ///< (kReplaced)
+    kStopped = 6,     ///< final: stop(), an exception, or replacement (kReplaced)
   };
 
   struct Stats {
@@ -150,13 +149,13 @@ class ForceClient {
     /// Why the last attempt or session ended. Contains the message of the server if there is one.
     Code code = Code::kOk;
     std::string reason;
-    LinkStats link;  ///< of the current or the last session
+    LinkStats link;  ///< of the newest session
     std::uint64_t attempts = 0;
-    std::uint64_t sessions = 0;         ///< attempts that the server accepted
-    std::uint64_t states = 0;           ///< received states
+    std::uint64_t sessions = 0;  ///< attempts that the server accepted
+    std::uint64_t states = 0;
     std::uint64_t states_foretold = 0;  ///< predicted states that the callback received
     std::uint64_t states_skipped = 0;   ///< received states that a newer one replaced before the callback ran
-    std::uint64_t forces = 0;           ///< forces sent
+    std::uint64_t forces = 0;
     std::uint64_t forces_unusable = 0;  ///< forces not sent because they are not finite or out of bounds
     std::string_view unusable{};        ///< reason for the newest unusable force; empty: none
     std::string_view left_out{};        ///< which part of this session's forces is not sent, and why; empty: none
@@ -281,13 +280,13 @@ class ForceClient {
   Role role_;
   Physics physics_;
   Watch watch_;
-  Duration period_;  ///< of the callback; 0: none
+  Duration period_;
 
   Connection connection_;
   std::optional<Welcome> welcome_;
   std::optional<DeviceDescription> description_;
   std::optional<HandleDescription> handle_;
-  std::optional<std::uint32_t> order_;  ///< request number of the newest request other than for a lease
+  std::optional<std::uint32_t> order_;  ///< request id; never that of a lease request
   std::optional<Session::RequestAnswered> order_answer_;
   LeaseRequest lease_;  ///< also stores the indices of the device and the channel
 
@@ -296,7 +295,7 @@ class ForceClient {
   std::uint32_t pressed_ = 0;  ///< buttons pressed in any state since the last callback
   LocalTime newest_arrived_{};
   std::uint64_t seen_tick_ = 0;                      ///< newest tick passed to the callback
-  std::optional<std::uint32_t> deadband_request_{};  ///< request number of the state deadband
+  std::optional<std::uint32_t> deadband_request_{};  ///< request id
   bool foretell_ = false;                            ///< the server omits predictable states
   LocalTime next_call_{};
   std::optional<HandleDeadband> deadband_;

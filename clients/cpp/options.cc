@@ -17,7 +17,6 @@ namespace {
 
 constexpr double kMaxDurationS = 1e9;  // 31 years; Duration overflows after 292
 
-/// Returns empty unless the entire text is a number.
 std::optional<double> to_number(const std::string& text) {
   double value = 0;
   const char* const end = text.data() + text.size();
@@ -39,7 +38,6 @@ CLI::Validator number(double least, double most) {
       "");
 }
 
-/// Accepts finite numbers ≥ `least`.
 CLI::Validator at_least(double least) {
   return CLI::Validator(
       [=](const std::string& text) -> std::string {

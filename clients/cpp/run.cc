@@ -33,10 +33,8 @@ double milliseconds(Duration d) { return std::chrono::duration<double, std::mill
 
 void say_json(const Json& json) { std::cout << json << std::endl; }
 
-/// Returns whether further attempts are pointless.
 bool is_final(Code code) { return code != Code::kBusy && code != Code::kShutdown; }
 
-/// A client with its socket and the messages already printed.
 class Guest {
  public:
   /// Messages contain the name `device` unless it is empty.
@@ -57,13 +55,11 @@ class Guest {
   void answer(LocalTime now, const Reply& reply) { client_.answer(now, reply); }
   std::uint64_t sessions() const { return client_.stats().sessions; }
   bool open() const { return client_.phase() == ForceClient::Phase::kOpen; }
-  /// Sends a Bye.
   void leave(LocalTime now) { client_.stop(now); }
   /// Sends a Bye and prints the summary. Returns whether there was a session.
   bool end(LocalTime now, Duration duration);
 
   UdpTransport& transport() { return transport_; }
-  /// With Options::busy: returns whether a datagram can be received. Updates `now`.
   bool look(LocalTime& now) { return busy_.look(now); }
 
  private:
@@ -83,7 +79,7 @@ class Guest {
   ForceClient client_;
 
   std::string said_;
-  std::string missing_;        ///< last error of the name lookup; empty: none
+  std::string missing_;
   std::string_view unusable_;  // last printed reason
   std::string_view left_out_;  ///< last printed reason for an omitted part of a force
   ForceClient::Phase phase_ = ForceClient::Phase::kGreeting;
@@ -98,7 +94,6 @@ ForceClient::Config Guest::config(const Options& options, const std::string& dev
   return config;
 }
 
-/// Describes the state of the connection in one sentence; empty if there is nothing to report.
 std::string Guest::sentence() const {
   const ForceClient::Stats stats = client_.stats();
   const std::string server = options_.server.at(transport_.server());
@@ -150,7 +145,6 @@ Json Guest::to_json(const LinkReport& report) const {
   return json;
 }
 
-/// Whether the client is waiting between two attempts.
 bool waits(ForceClient::Phase phase) {
   return phase == ForceClient::Phase::kUnanswered || phase == ForceClient::Phase::kRefused ||
          phase == ForceClient::Phase::kLost;
@@ -223,14 +217,12 @@ bool Guest::end(LocalTime now, Duration duration) {
   return stats.sessions > 0;
 }
 
-/// An engine for several hands, with the newest state of each hand.
 struct AllHands {
   const Together& engine;
   std::vector<std::optional<DeviceState>> hands;
   bool fresh = false;  ///< the engine has not received one of them
 };
 
-/// Optional parts of a run.
 struct Beside {
   bool* heard = nullptr;           ///< set by the callback, for Options::on_silence
   Elsewhere* elsewhere = nullptr;  ///< its states are passed by the callback in `seen`
@@ -331,7 +323,7 @@ int run_with(const Options& options, const std::vector<Seat<Callback>>& seats, c
         if (answered || now >= quiet) quiet = now + options.silence;
         next = std::min(next, quiet);
       }
-      now = read_clock();  // the turns may have taken long
+      now = read_clock();
       if (now >= next) continue;
       const Duration wait = std::min(next - now, kLongestWait);
       const int also = beside.elsewhere != nullptr ? beside.elsewhere->descriptor() : -1;

@@ -23,7 +23,6 @@
 namespace tendon {
 namespace {
 
-/// Limit of DNS.
 constexpr std::size_t kMaxHost = 253;
 
 std::optional<Address> numeric(const std::string& text) {
@@ -39,7 +38,6 @@ struct HostAndPort {
   std::uint16_t port;
 };
 
-/// Splits a host name and a port. Returns nullopt if `text` has another format.
 std::optional<HostAndPort> split(const std::string& text) {
   const std::size_t colon = text.rfind(':');
   if (colon == std::string::npos || colon == 0 || colon > kMaxHost) return std::nullopt;
@@ -60,7 +58,6 @@ std::optional<dns_sd::Instance> instance_in(std::string_view text) {
   return std::nullopt;
 }
 
-/// Returns the path of "unix:PATH", or an empty string for other names.
 std::string unix_path_in(std::string_view text) {
   constexpr std::string_view kScheme = "unix:";
   constexpr std::size_t kMost = sizeof sockaddr_un::sun_path - 1;

@@ -29,8 +29,7 @@ struct Touch {
   std::uint32_t way = 0;
   // For handles with additional actuators (ForceClient::handle()), if the server supports `kFeatureHandle`. Otherwise
   // only `force` is sent (Stats::left_out).
-  std::optional<Vec3> torque{};  ///< N·m, acting on the hand, in the axes of the base frame, about the position of the
-                                 ///< handle
+  std::optional<Vec3> torque{};  ///< N·m, acting on the hand, in base frame axes, about the position of the handle
   /// N·m/rad, −∂torque/∂θ at the orientation of the state; symmetric, and positive definite for a spring. Only valid
   /// if the state has an orientation.
   std::optional<Mat3> angular_stiffness{};

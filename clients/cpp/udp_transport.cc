@@ -68,7 +68,6 @@ UdpTransport::UdpTransport(const ServerName& server, bool has_key) : name_(serve
 
 UdpTransport::~UdpTransport() { use(-1); }
 
-/// Connects to the first reachable address, starting at index `first`.
 void UdpTransport::connect(const std::vector<Address>& addresses, std::size_t first) {
   if (!name_.unix_path().empty()) {
     connect_to_file();

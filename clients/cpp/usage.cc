@@ -65,7 +65,6 @@ class Help : public CLI::Formatter {
   }
 };
 
-/// Returns the selected subcommand, or null if there is none.
 const CLI::App* chosen_in(const CLI::App& app) {
   const std::vector<CLI::App*> chosen = app.get_subcommands();
   return chosen.empty() ? nullptr : chosen.front();

@@ -93,7 +93,7 @@ void Board::observe(const PeerReport& report) {
   auto& engines = devices_[report.device].engines;
   if (const auto known = engines.find(report.channel);
       known != engines.end() && known->second.newest.name != report.name) {
-    engines.erase(known);  // another engine holds the channel; restart its sums
+    engines.erase(known);
   }
   Engine& engine = engines[report.channel];
   engine.newest = report;
@@ -112,7 +112,7 @@ void Board::observe(const PeerReport& report) {
 void Board::observe(const PortFrame& port) {
   Device& device = devices_[port.device];
   if (port.of_peer) {
-    if (!device.ports) return;  // the own end is received first
+    if (!device.ports) return;
     device.ports->peer = port;
     if (!device.ports_waiting.empty()) device.ports_waiting.back().peer = port;
     return;

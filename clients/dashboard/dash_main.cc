@@ -36,8 +36,7 @@
 namespace tendon::dash {
 namespace {
 
-/// The operator needs its own link, because the server identifies clients by their address. Sending to another
-/// address connects the socket to that address.
+/// Separate from the link of the observer, because the server identifies clients by address.
 class OperatorLink : public Link {
  public:
   explicit OperatorLink(const Address& server) : transport_(std::make_unique<UdpTransport>(server)) {}
@@ -57,7 +56,6 @@ class OperatorLink : public Link {
   std::unique_ptr<UdpTransport> transport_;
 };
 
-/// Returns a random password of 128 bits, valid for one run.
 std::string new_pass() {
   const Seed seed = seed_from_system();
   std::string pass;
@@ -81,7 +79,6 @@ struct Options {
   bool json = false;
 };
 
-/// Parses the command line. Returns an exit code if the program should end.
 std::optional<int> parse(int argc, char** argv, Options& options) {
   CLI::App app(
       "A web page that shows what a Tendon server does, live and recorded; /metrics for Prometheus, and /bridge for "

@@ -13,10 +13,8 @@ namespace tendon::dash {
 namespace {
 
 constexpr Duration kReportsEvery = std::chrono::seconds(1);
-/// Suffix of "watch N beside".
 constexpr std::string_view kBeside = " beside";
 
-/// Parses N in "watch N".
 std::optional<std::uint32_t> number_after(std::string_view line, std::string_view word) {
   if (!line.starts_with(word)) return std::nullopt;
   line.remove_prefix(word.size());

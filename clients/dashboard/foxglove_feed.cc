@@ -119,7 +119,6 @@ std::optional<FoxgloveSession::Message> FoxgloveFeed::next(ClientId client) {
   return found == clients_.end() ? std::nullopt : found->second.session.next();
 }
 
-/// Advertises new channels and unadvertises removed ones.
 void FoxgloveFeed::take_channels() {
   if (std::exchange(version_, board_.version()) == board_.version()) return;
   const std::vector<Channel> wanted = wanted_channels();
@@ -192,7 +191,6 @@ void FoxgloveFeed::take_reports(LocalTime now, std::uint32_t device, const Board
   }
 }
 
-/// Returns the channel if a client subscribes to it.
 const FoxgloveFeed::Channel* FoxgloveFeed::subscribed(FoxgloveKind kind, std::uint32_t device) const {
   const auto channel = std::ranges::find_if(
       channels_, [&](const Channel& one) { return one.about.kind == kind && one.device == device; });

@@ -44,7 +44,6 @@ const google::protobuf::Descriptor* descriptor_of(FoxgloveKind kind) {
   throw std::logic_error("a kind of channel that nobody knows");
 }
 
-/// Adds `file` after its imports, without duplicates.
 void add_file(const google::protobuf::FileDescriptor& file, google::protobuf::FileDescriptorSet& set) {
   if (std::ranges::any_of(set.file(), [&](const auto& one) { return one.name() == file.name(); })) return;
   for (int i = 0; i < file.dependency_count(); ++i) add_file(*file.dependency(i), set);
@@ -101,7 +100,7 @@ struct Shade {
   double b = 0;
   double a = 1;
 };
-// The arrows often coincide, so that of the wanted force is thicker and transparent.
+// The wanted force is thicker and transparent, because both arrows often coincide.
 constexpr Shade kWantedShade{0.55, 0.6, 0.65, 0.4};
 constexpr Shade kAppliedShade{0.9, 0.45, 0.1};
 constexpr Shade kHandleShade{0.2, 0.45, 0.8};

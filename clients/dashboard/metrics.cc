@@ -20,10 +20,8 @@ using prometheus::MetricFamily;
 using prometheus::MetricType;
 using Labels = std::vector<ClientMetric::Label>;
 
-/// Metric families in the order of their creation.
 class Exposition {
  public:
-  /// Begins a family. The following samples belong to it.
   void begin(const char* name, MetricType type, const char* help) {
     families_.emplace_back();
     families_.back().name = name;

@@ -143,14 +143,12 @@ void Observer::take_answer(LocalTime now, const Session::RequestAnswered& answer
   greet(now);
 }
 
-/// Sends the requests that are due, at most one of each kind at a time.
 void Observer::ask(LocalTime now) {
   Session* const session = connection_.session();
   if (session == nullptr) return;
   const bool describing =
       std::ranges::any_of(asked_, [](const auto& asked) { return asked.second.what == Asked::What::kDevice; });
   if (!describing && now >= describe_at_) {
-    // The last device has been described; start again later.
     if (counted_ && next_describe_ >= names_.size()) {
       next_describe_ = 0;
       describe_at_ = now + config_.describe_every;

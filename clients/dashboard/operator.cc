@@ -134,7 +134,7 @@ void Operator::turn(LocalTime now) {
   }
 }
 
-/// First part of an order: until the server has answered.
+/// Runs until the server has answered.
 void Operator::ask(LocalTime now) {
   client_->turn(now);
   const ForceClient::Phase phase = client_->phase();
@@ -185,7 +185,7 @@ bool Operator::send() {
   return false;
 }
 
-/// Second part of an order: waits for the reaction of the device.
+/// Waits for the reaction of the device after the answer.
 void Operator::look(LocalTime now) {
   const auto found = board_.devices().find(device_);
   const Board::Device* const device = found != board_.devices().end() ? &found->second : nullptr;

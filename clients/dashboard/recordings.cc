@@ -15,7 +15,6 @@
 namespace tendon::dash {
 namespace {
 
-/// Returns whether `text` is UTF-8 without control characters.
 bool is_plain_text(std::string_view text) noexcept {
   while (!text.empty()) {
     const std::size_t size = utf8_character(text);

@@ -127,7 +127,6 @@ std::string foxglove_protocol(std::string_view list) {
 
 void set(Reply& reply, std::string_view name, std::string_view value) { reply.headers.emplace_back(name, value); }
 
-/// Adds the headers common to all replies.
 Reply begin(unsigned status, std::string_view type) {
   Reply reply;
   reply.status = status;
@@ -200,7 +199,6 @@ bool Routes::is_our_origin(std::string_view origin) const {
   return std::ranges::find(config_.origins, origin) != config_.origins.end();
 }
 
-/// Whether a page from another origin requests a WebSocket that it may not use.
 bool Routes::is_foreign(const Request& request, std::string_view path) const {
   if (!request.origin) return false;
   if (path != "/live" && is_our_origin(*request.origin)) return false;

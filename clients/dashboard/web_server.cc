@@ -42,7 +42,6 @@ using asio::ip::tcp;
 constexpr Duration kGather = std::chrono::milliseconds(3);
 /// Maximum number of datagrams read from one bridge socket before other sockets are served.
 constexpr int kMaxDrained = 64;
-/// Size of one write of a file, in bytes.
 constexpr std::size_t kPiece = 64 * 1024;
 /// Maximum number of connections that are being refused. Further ones are closed without a reply.
 constexpr std::size_t kMaxRefusals = 64;
@@ -57,8 +56,7 @@ constexpr std::size_t kMaxOrder = 16 * 1024;
 /// value.
 constexpr int kViewerSendBuffer = 128 * 1024;
 
-/// Returns the prefix that counts as one address. All addresses in one IPv6 network are equal, because a machine can
-/// easily use many of them.
+/// All addresses of an IPv6 /64 network count as one, because a machine can easily use many of them.
 std::array<std::uint8_t, 16> network_of(const Address& address) {
   auto ip = address.ip;
   if (!is_ipv4(address)) std::fill(ip.begin() + 8, ip.end(), std::uint8_t{0});
@@ -75,7 +73,6 @@ Bytes bytes_of(const beast::flat_buffer& buffer) {
 
 class Connection;
 
-/// State shared by all connections.
 struct Shared {
   const WebServer::Config& config;
   const Routes& routes;
@@ -112,7 +109,6 @@ class Connection {
   Connection& operator=(const Connection&) = delete;
 
   void start() { read_request(); }
-  /// Replies that there are too many connections, and closes.
   void refuse() {
     refused_ = true;
     write_reply(Routes::plain(503, "too many connections"));
@@ -120,7 +116,6 @@ class Connection {
   bool refused() const noexcept { return refused_; }
   bool closed() const noexcept { return closed_; }
   const std::array<std::uint8_t, 16>& network() const noexcept { return network_; }
-  /// Time since which it waits for a complete request, or LocalTime::max() in other states.
   LocalTime waits_since() const noexcept { return waits_since_; }
   bool done() const noexcept { return closed_ && pending_ == 0; }
 
@@ -133,7 +128,6 @@ class Connection {
     server_.reset();
   }
 
-  /// Sends the next waiting text, unless a write is pending.
   void pump() {
     if (closed_ || !web_socket_ || !open_ || std::exchange(writing_, true)) return;
     if (page_) {
@@ -168,8 +162,6 @@ class Connection {
       all.erase(std::ranges::find(all, this, [](const auto& one) { return one.get(); }));
     };
   }
-
-  // ---- Requests
 
   void read_request() {
     parser_.emplace();
@@ -289,8 +281,6 @@ class Connection {
     asio::async_read(stream_, asio::buffer(text_), with([this](error_code, std::size_t) { close(); }));
   }
 
-  // ---- WebSockets
-
   enum class Side : std::uint8_t { kPage, kViewer, kBridge };
 
   void accept(Side side, const std::string& protocol = {}) {
@@ -381,7 +371,7 @@ class Connection {
   bool keep_alive_ = false;
   bool with_body_ = true;
   Reply reply_;
-  std::string text_;        ///< being sent
+  std::string text_;
   std::uint64_t sent_ = 0;  ///< bytes of the file
 
   std::optional<websocket::stream<beast::tcp_stream>> web_socket_;
@@ -390,7 +380,7 @@ class Connection {
   std::optional<FoxgloveFeed::ClientId> viewer_;
   std::optional<BridgeGate> gate_;
   std::unique_ptr<ServerSocket> server_;
-  std::vector<std::byte> datagram_;  ///< being sent
+  std::vector<std::byte> datagram_;
   bool open_ = false;
   bool writing_ = false;
 
@@ -450,11 +440,10 @@ struct WebServer::State {
     }
   }
 
-  /// Returns whether there is room for another connection. May close the connection that has waited longest for a
-  /// request.
+  /// Returns whether there is room. May close the connection that has waited longest for a request.
   bool make_room(const Connection& newcomer) {
     std::size_t all = 0;
-    std::size_t near = 0;  // from the address of the newcomer
+    std::size_t near = 0;
     Connection* idlest = nullptr;
     Connection* idlest_near = nullptr;
     const auto pick = [](Connection*& longest, Connection& one) {
@@ -493,7 +482,6 @@ struct WebServer::State {
       const LocalTime next = turn(now);
       shared.foxglove.take(now);
       for (const auto& connection : shared.connections) connection->pump();
-      // Cancels a pending wait.
       schedule_turn(std::min(next - now, Duration(std::chrono::seconds(1))));
       wait_for_server();
     });
@@ -518,7 +506,7 @@ struct WebServer::State {
   asio::steady_timer turn_timer{shared.context};
   asio::steady_timer tick_timer{shared.context};
   asio::steady_timer accept_again{shared.context};
-  bool waiting = false;  ///< for the server
+  bool waiting = false;
   std::function<LocalTime(LocalTime)> turn;
   std::function<void(LocalTime)> tick;
 };

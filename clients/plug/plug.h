@@ -86,10 +86,10 @@ class Plug {
 
   /// Whether the server accepts forces from this object.
   bool pushes() const noexcept { return controller_ && controller_->holds(); }
-  std::uint64_t forces() const noexcept;                              ///< sent in all sessions
+  std::uint64_t forces() const noexcept;                              ///< in all sessions
   std::uint64_t forces_dropped() const noexcept { return dropped_; }  ///< requested by programs other than the owner
-  std::uint64_t forces_unusable() const noexcept;                     ///< not sent because not finite or out of bounds
-  LinkStats link() const;                                             ///< of the session that receives the states
+  std::uint64_t forces_unusable() const noexcept;
+  LinkStats link() const;  ///< of the session that receives the states
   /// Newest reports of the server in the current sessions: on the forces, while a channel is held; and on the loop of
   /// the device, with ForceClient::Config::diagnostics and only while no force is requested.
   std::optional<LinkReport> report() const { return controller_ ? controller_->report() : std::nullopt; }
@@ -127,7 +127,7 @@ class Plug {
   Config config_;
   std::unique_ptr<ForceClient> watcher_;
   std::unique_ptr<ForceClient> controller_;
-  LocalTime now_{};  ///< of the current turn, for the callbacks
+  LocalTime now_{};
 
   std::optional<DeviceState> state_;
   LocalTime arrived_{};
@@ -153,11 +153,11 @@ class Plug {
     bool operator==(const Shown&) const = default;
   };
   Shown shown_;
-  std::deque<std::string> sentences_;  ///< not yet returned
-  std::string said_;                   ///< last message about the connection
-  std::string said_of_axes_;           ///< last message about the orientation of the device
-  std::string said_of_force_;          ///< last message about the channel
-  std::string said_of_unusable_;       ///< last message about an unusable force
+  std::deque<std::string> sentences_;
+  std::string said_;
+  std::string said_of_axes_;
+  std::string said_of_force_;
+  std::string said_of_unusable_;
   bool stopped_ = false;
 };
 

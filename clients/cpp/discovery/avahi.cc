@@ -52,7 +52,6 @@ int end_loop(sd_event_source* source, std::uint64_t /*at*/, void* /*unused*/) {
 /// A synchronous Avahi query with a deadline.
 class Conversation {
  public:
-  /// `what` is part of the error messages.
   Conversation(std::string what, std::uint64_t longest) : what_(std::move(what)) {
     sd_event* loop = nullptr;
     expect(sd_event_new(&loop), "no event loop");
@@ -70,7 +69,6 @@ class Conversation {
   }
   void end() noexcept { sd_event_exit(loop_.get(), 0); }
 
-  /// Calls a method of the Avahi server. `answered` receives the answer or an error.
   template <class... Values>
   void call(sd_bus_message_handler_t answered, void* self, const char* method, const char* types, Values... values) {
     asked(
@@ -122,7 +120,6 @@ class Conversation {
   std::unique_ptr<sd_bus, Release> bus_;
 };
 
-/// Reads an array of byte arrays ("aay").
 std::vector<std::string> read_strings(sd_bus_message* message) {
   std::vector<std::string> strings;
   if (sd_bus_message_enter_container(message, 'a', "ay") < 0) return strings;
@@ -137,7 +134,6 @@ std::vector<std::string> read_strings(sd_bus_message* message) {
 
 bool is_link_local(const Address& address) { return address.ip[0] == 0xFE && (address.ip[1] & 0xC0U) == 0x80U; }
 
-/// Fills `found` from the answer to ResolveService.
 void read_service(sd_bus_message* answer, Found& found) {
   const char* host = nullptr;
   const char* ip = nullptr;
@@ -249,7 +245,6 @@ class Browsing {
     return 0;
   }
 
-  /// Ends the query when nothing has arrived for a while.
   void watch() {
     watched_ = found_.size();
     avahi_.call_after(kQuiet, watched, this);

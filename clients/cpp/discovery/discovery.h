@@ -24,8 +24,7 @@ struct Found {
   About about{};
   std::string host{};  ///< satisfies is_domain(), "bench3.local"; empty: unknown
   std::uint16_t port = 0;
-  std::vector<Address> addresses{};  ///< addresses of the host in order of preference; only in "local", and not from
-                                     ///< browse()
+  std::vector<Address> addresses{};  ///< in order of preference; empty in a list and outside of "local"
 };
 
 /// Resolves `instance`. Returns one entry for each host in order of preference, at least one. In "local", returns one

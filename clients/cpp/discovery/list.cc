@@ -26,7 +26,6 @@ std::string in_json(const dns_sd::Found& found, const std::string& name) {
   return json.dump();
 }
 
-/// Describes the known properties.
 std::string in_words(const dns_sd::Found& found) {
   std::string text;
   const auto add = [&text](const std::string& part) { text += (text.empty() ? "" : ", ") + part; };

@@ -26,7 +26,6 @@ struct Record {
   std::size_t at;  ///< offset of the data in the answer
 };
 
-/// An answer and its records of the requested type.
 struct Answer {
   std::vector<unsigned char> bytes;
   std::vector<Record> records;

@@ -21,7 +21,6 @@ namespace {
 
 constexpr std::string_view kHeader = "tendon conversation 1";
 
-// Keywords of the optional fields of an answer.
 constexpr std::string_view kStiffness = "stiffness";
 constexpr std::string_view kRadius = "radius";
 constexpr std::string_view kContact = "contact";
@@ -108,7 +107,6 @@ std::string text_of(const Touch& touch) {
   return line.text();
 }
 
-/// Tokenizes a line.
 class Words {
  public:
   Words(std::uint64_t line, const std::string& text) : line_(line) {
@@ -116,7 +114,7 @@ class Words {
     for (std::string word; stream >> word;) words_.push_back(word);
   }
 
-  /// Consumes the next word if it equals `word`. Returns whether it did.
+  /// Consumes the next word if it equals `word`.
   bool take_word(std::string_view word) {
     if (!more() || words_[next_] != word) return false;
     ++next_;

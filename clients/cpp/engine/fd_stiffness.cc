@@ -10,7 +10,6 @@
 namespace tendon {
 namespace {
 
-/// Restores the engine at the end of a scope.
 class Restored {
  public:
   explicit Restored(const SavedState& state) : state_(state) {

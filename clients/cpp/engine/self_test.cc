@@ -45,7 +45,6 @@ std::string words(const Vec3& v, const char* unit) {
   return out.str();
 }
 
-/// Thrown by an answer that ends the current test.
 struct Unusable : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
@@ -66,7 +65,6 @@ class Hand {
     state_.velocity = velocity;
     return again();
   }
-  /// Repeats the last state.
   Touch again() const {
     Touch touch;
     try {
@@ -110,7 +108,7 @@ class Hand {
 class WorkAlong {
  public:
   WorkAlong(const Vec3& position, const Vec3& force) : position_(position), force_(force) {}
-  /// Returns the work on the added segment, J.
+  /// J.
   double to(const Vec3& position, const Vec3& force) {
     const double part = (force_ + force).dot(position - position_) / 2;
     position_ = position;
@@ -123,7 +121,6 @@ class WorkAlong {
   Vec3 force_;
 };
 
-/// Work done by the engine on the hand along a path.
 struct Work {
   double given = 0;    ///< J, net energy from the engine to the hand so far
   double most = 0;     ///< J, maximum of `given` along the path
@@ -132,7 +129,6 @@ struct Work {
   double largest_n = 0;
 };
 
-/// Moves along `corners` and back to the initial position.
 Work around(Hand& hand, std::vector<Vec3> corners, double speed) {
   corners.push_back(hand.position());
   const Vec3 first = hand.position();

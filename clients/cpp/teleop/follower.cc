@@ -148,7 +148,7 @@ Touch Follower::touch(const std::optional<ToolContact>& contact) noexcept {
   return felt;
 }
 
-/// Advances the time. Returns the elapsed time in s, at most kLongestStep.
+/// Returns the elapsed time in s, at most kLongestStep.
 double Follower::advance(LocalTime now) noexcept {
   const Duration elapsed = std::clamp<Duration>(now - now_, Duration::zero(), kLongestStep);
   now_ = std::max(now, now_);
@@ -162,7 +162,7 @@ Duration Follower::age() const noexcept {
   return (now_ - base_->came) - (sampled_ - base_->sampled) - Duration(std::llround(usual_ns_));
 }
 
-/// Records a new state and returns its age on arrival. The first state after a silence defines the base of the delay.
+/// Returns the age of the state on arrival. The first state after a silence is the reference.
 Duration Follower::take(const DeviceState& hand) noexcept {
   if (!base_) {
     base_ = {now_, hand.sampled};
@@ -188,7 +188,6 @@ void Follower::lose() noexcept {
   tick_ = 0;
 }
 
-/// Handles the clutch button and engage().
 void Follower::act(const DeviceState& hand, const Pose& pose, bool fresh) noexcept {
   const bool held = config_.clutch_button && ((hand.buttons >> *config_.clutch_button) & 1U) != 0;
   const bool pressed = held && !held_;
@@ -218,7 +217,6 @@ void Follower::begin(const DeviceState& hand, const Pose& pose) noexcept {
   waits_ = true;
 }
 
-/// Moves the target toward the pose of the hand within the speed limits.
 void Follower::approach(const DeviceState& hand, double seconds) noexcept {
   const Vec3 wanted = pose0_.position + scale_ * rotated(turn_, masked(hand.position - hand0_));
   const Vec3 way = wanted - target_.position;

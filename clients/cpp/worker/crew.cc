@@ -32,12 +32,10 @@
 namespace tendon::worker {
 namespace {
 
-/// Maximum number of connections that have not sent the secret.
 constexpr std::size_t kMostStrangers = 8;
 
 [[noreturn]] void fail_with(const std::string& what) { throw std::system_error(errno, std::generic_category(), what); }
 
-/// An owned file descriptor.
 class File {
  public:
   File() = default;
@@ -90,7 +88,7 @@ File listen_at_path(const std::string& path) {
   return file;
 }
 
-/// Listens at `name`. If its port is 0, `port` receives the assigned port.
+/// If the port of `name` is 0, `port` receives the assigned port.
 File listen_at(const ServerName& name, std::uint16_t& port) {
   const Address address = name.look_up().addresses.front();
   if (address.ip == parse_address("0.0.0.0:0").ip || address.ip == Address{}.ip) {
@@ -134,7 +132,6 @@ std::map<pid_t, pid_t> parents() {
   return parents;
 }
 
-/// Returns all descendants of this process except `but` and its descendants.
 std::vector<pid_t> descendants(pid_t but) {
   const std::map<pid_t, pid_t> parent_of = parents();
   const pid_t self = ::getpid();
@@ -253,8 +250,7 @@ void Crew::kill() {
   reap();
 }
 
-/// Kills the remaining processes of earlier programs and reaps terminated children. Does not affect the current
-/// program.
+/// Kills the remaining processes of earlier programs and reaps terminated children.
 void Crew::reap() {
   if (ending_) {
     for (const pid_t pid : descendants(files_->pid != 0 ? files_->pid : -1)) ::kill(pid, SIGKILL);

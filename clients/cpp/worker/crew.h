@@ -72,7 +72,7 @@ class Crew {
   std::unique_ptr<Files> files_;
   RecordReader reader_;
   std::vector<Event> events_;
-  bool ended_ = false;   ///< Ended has been reported for the current program
+  bool ended_ = false;
   bool ending_ = false;  ///< processes of earlier programs still exist
 };
 

@@ -46,26 +46,26 @@ class Front {
   static constexpr Duration kDeadAtFirst = std::chrono::seconds(10);
 
   enum class Worker : std::uint8_t {
-    kAbsent = 1,    ///< waiting to launch the next one
-    kStarting = 2,  ///< launched, stream not open
-    kIdle = 3,      ///< waiting for a state
-    kBusy = 4,      ///< computing an answer
+    kAbsent = 1,
+    kStarting = 2,
+    kIdle = 3,
+    kBusy = 4,
   };
 
   struct Stats {
     Worker worker = Worker::kAbsent;
     std::uint64_t launches = 0;
-    std::uint64_t asked = 0;         ///< states sent to a worker
-    std::uint64_t answers = 0;       ///< in time
-    std::uint64_t unknown = 0;       ///< subset of `answers` without a force
-    std::uint64_t late = 0;          ///< dropped
-    std::uint64_t refused = 0;       ///< invalid answers, dropped
-    std::string_view why_refused{};  ///< newest reason
-    std::uint64_t fallback = 0;      ///< answers of the fallback
+    std::uint64_t asked = 0;  ///< states sent to a worker
+    std::uint64_t answers = 0;
+    std::uint64_t unknown = 0;  ///< subset of `answers` without a force
+    std::uint64_t late = 0;
+    std::uint64_t refused = 0;
+    std::string_view why_refused{};
+    std::uint64_t fallback = 0;
     double fallback_difference = 0;  ///< N, last difference from an answer of the worker
-    std::uint64_t given_up = 0;      ///< workers
-    std::string why_given_up{};      ///< newest reason
-    Duration median{};               ///< of the newest answers with a force, including late ones
+    std::uint64_t given_up = 0;
+    std::string why_given_up{};
+    Duration median{};  ///< of the newest answers with a force, including late ones
   };
 
   /// Throws std::invalid_argument "FIELD = VALUE: expected …". The first launch is due immediately.
@@ -123,7 +123,7 @@ class Front {
   std::optional<Reply> answer_;
   std::optional<std::string> to_give_up_;
   std::array<Duration, kTimes> times_{};
-  std::size_t count_ = 0;  ///< number of answers with a force
+  std::size_t count_ = 0;
   Stats stats_;
 };
 

@@ -45,7 +45,7 @@ class FrontEngine : public Elsewhere {
   Crew crew_;
   Codec codec_;
   Front::Ask question_{};
-  std::string_view refused_{};  ///< last printed reason
+  std::string_view refused_{};
 };
 
 }  // namespace tendon::worker

@@ -27,7 +27,6 @@ void append_little_endian(std::uint64_t value, std::vector<std::byte>& to) {
   for (std::size_t i = 0; i < kBytes; ++i) to.push_back(static_cast<std::byte>(value >> (8 * i)));
 }
 
-/// Returns the frame of a datagram that has exactly one.
 template <class Value>
 const Value* only_frame(const DataContent* content) {
   return content != nullptr && content->frames.size() == 1 ? std::get_if<Value>(&content->frames.front()) : nullptr;

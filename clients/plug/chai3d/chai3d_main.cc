@@ -57,7 +57,7 @@ struct Options {
 
 [[noreturn]] void fail(const std::string& what) { throw std::runtime_error(what + ": " + std::strerror(errno)); }
 
-/// Memory shared with the program. It exists as long as one of the two processes.
+/// Shared with the program. It exists as long as one of the two processes.
 class Memory {
  public:
   Memory() : file_(::memfd_create("tendon-chai3d", MFD_CLOEXEC)) {
@@ -111,7 +111,6 @@ class Waker {
   std::string name_;
 };
 
-/// Directory of the replacement libHD.so and libhdPhantom.so, relative to this program in build and install trees.
 std::filesystem::path library_folder() {
   const std::filesystem::path self = std::filesystem::read_symlink("/proc/self/exe").parent_path();
   const std::filesystem::path folder = self.parent_path() / "lib" / "tendon" / "chai3d";
@@ -122,7 +121,6 @@ std::filesystem::path library_folder() {
   return folder;
 }
 
-/// Finds a program as the shell does.
 std::filesystem::path find_program(const std::string& name) {
   const auto runs = [](const std::filesystem::path& path) {
     return std::filesystem::is_regular_file(path) && ::access(path.c_str(), X_OK) == 0;
@@ -153,7 +151,6 @@ void refuse_openhaptics(const std::filesystem::path& program) {
   }
 }
 
-/// Executes PROGRAM, in the child process.
 [[noreturn]] void become(const Options& options, const std::string& memory, const std::string& wake,
                          const std::filesystem::path& libraries) {
   std::string path = libraries.string();
@@ -210,7 +207,7 @@ int serve(const Options& options) {
     }
     if (signals.asked() && !std::exchange(told, true)) {
       if (!child) return 0;
-      ::kill(*child, SIGTERM);  // wait until the program has ended
+      ::kill(*child, SIGTERM);  // the loop ends with the program
     }
     std::array<pollfd, 1> programs = {waker.to_poll()};
     desk.wait(programs, read_clock(), next);
@@ -221,7 +218,7 @@ int serve(const Options& options) {
 }  // namespace
 
 void add_chai3d(CLI::App& app, Chosen& chosen) {
-  static Options options;  // CLI11 writes to it while parsing
+  static Options options;  // written by CLI11 while parsing
   CLI::App& command = *app.add_subcommand(
       "chai3d", "Starts a program that is built with CHAI3D, as it is; the devices are its Phantoms");
   command.footer("Example: tendon-plug chai3d --server lab:47100 --key wall.key -- ./01-mydevice");

@@ -67,7 +67,6 @@ class Turnstile {
   bool entered_ = false;
 };
 
-/// One device as seen by the program.
 struct Handle {
   std::atomic_flag writing = ATOMIC_FLAG_INIT;
   Asked asked;  ///< newest request; protected by `writing`
@@ -95,13 +94,12 @@ class Pacer {
   }
 
  private:
-  int device_ = -1;           ///< none yet
+  int device_ = -1;
   std::uint32_t others_ = 0;  ///< bit mask of the devices updated since device_
 };
 static_assert(SharedHands::kMaxDevices <= 32);
 thread_local Pacer pacer;
 
-/// The shared memory and the socket. Created by the first call and kept until the process ends.
 class Attached {
  public:
   Attached() noexcept {
@@ -129,12 +127,10 @@ class Attached {
   }
   Handle& handle(int id) noexcept { return handles_[static_cast<std::size_t>(id)]; }
 
-  /// Sends one byte, or nothing if the socket buffer is full.
   void wake() const noexcept {
     ::sendto(socket_, "", 1, MSG_DONTWAIT | MSG_NOSIGNAL, reinterpret_cast<const sockaddr*>(&address_), address_size_);
   }
 
-  /// Sleeps until `news` differs from `seen`, or until `end`.
   void sleep_until_news(std::uint32_t seen, std::int64_t end) noexcept {
     const std::int64_t left = end - now_ns();
     if (left <= 0) return;
@@ -172,7 +168,6 @@ Attached& attached() noexcept {
   return once;
 }
 
-/// Reads the newest state. Returns false if there is none or it is too old.
 bool read(int id, HandNow& hand) noexcept {
   const SharedDevice* const device = attached().device(id);
   if (device == nullptr || !device->hand.get(hand)) return false;

@@ -23,8 +23,7 @@ class Host {
  public:
   struct Config {
     Duration stale = std::chrono::milliseconds(50);
-    std::string model{};  ///< device model reported to CHAI3D, which selects limits; empty: the device's own; at most
-                          ///< 254 bytes
+    std::string model{};  ///< device model, from which CHAI3D derives limits; at most 254 bytes
   };
   /// Workspace radius reported to CHAI3D if the device has no described workspace, m.
   static constexpr double kWorkspaceRadius = 0.1;

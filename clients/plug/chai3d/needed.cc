@@ -10,7 +10,6 @@
 namespace tendon::plug::chai3d {
 namespace {
 
-/// Reads a T at `offset`. Returns nullopt if it is outside of the file.
 template <typename T>
 std::optional<T> at(std::span<const std::byte> file, std::uint64_t offset) {
   if (offset > file.size() || file.size() - offset < sizeof(T)) return {};

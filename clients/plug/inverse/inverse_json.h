@@ -73,7 +73,7 @@ struct Wish {
   bool full_state = false;
   std::vector<DeviceWish> devices;
   std::vector<std::string> refused;  ///< reasons for rejected parts; at most 8
-  std::uint64_t ignored = 0;         ///< number of unsupported commands
+  std::uint64_t ignored = 0;
 };
 
 inline constexpr std::size_t kLongestMessage = 64 * 1024;  ///< bytes; 16 devices with every command need 6 kB
@@ -107,8 +107,8 @@ struct DeviceNews {
   std::string_view device_id;
   std::string_view grip_id;
   std::string_view permutation;
-  bool left_handed = false;  ///< held in the left hand
-  bool in_use = false;       ///< a client owns its force
+  bool left_handed = false;
+  bool in_use = false;
   std::optional<State> state{};
 };
 

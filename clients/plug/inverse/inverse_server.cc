@@ -44,7 +44,6 @@ using asio::ip::tcp;
 using boost::system::error_code;
 
 constexpr std::size_t kMostInOneTurn = 256;
-/// Maximum number of turns of the desk before the clients are served.
 constexpr int kMostDeskTurns = 4;
 /// Upper limit of a sleep, so that timeouts are noticed.
 constexpr Duration kLongestSleep = std::chrono::milliseconds(100);
@@ -89,7 +88,6 @@ ino_t socket_id(int descriptor) {
 
 class InverseConnection;
 
-/// State shared by all connections.
 struct InverseShared {
   const InverseServer::Config& config;
   Desk& desk;
@@ -100,7 +98,7 @@ struct InverseShared {
   std::list<std::unique_ptr<InverseConnection>> connections{};
   std::size_t clients = 0;  ///< connections with a session
   Plug::Program newest = 0;
-  bool full_said = false;            ///< a rejected client was reported since the last one left
+  bool full_said = false;
   std::size_t read = 0;              ///< messages waiting for the turn
   std::function<void()> read_one{};  ///< called after a message was read
 };
@@ -113,8 +111,7 @@ class InverseConnection {
     error_code gone;
     const tcp::endpoint peer = stream_.socket().remote_endpoint(gone);
     if (!gone) peer_ = to_string(address_of(peer));
-    // A reply must not wait for the acknowledgement of the previous one. The kernel buffer of unread replies is
-    // limited as well.
+    // Replies must not wait for acknowledgements, and the kernel must not buffer more than we do.
     stream_.socket().set_option(tcp::no_delay(true), gone);
     stream_.socket().set_option(asio::socket_base::send_buffer_size(static_cast<int>(shared_.config.max_unread)), gone);
   }
@@ -142,7 +139,6 @@ class InverseConnection {
     shared_.desk.say("client " + std::to_string(program_) + " left" + (why_.empty() ? "" : ": " + why_));
   }
 
-  /// Answers the messages that were read. Returns whether there were any.
   bool answer(LocalTime now) {
     if (closed_ || inbox_.empty()) return false;
     for (std::string& reply : session_->answer(now, inbox_)) {
@@ -180,8 +176,6 @@ class InverseConnection {
       all.erase(std::ranges::find(all, this, [](const auto& one) { return one.get(); }));
     };
   }
-
-  // ---- Request
 
   void read_request() {
     parser_.emplace();
@@ -234,8 +228,6 @@ class InverseConnection {
                                          with([this](error_code, std::size_t) { close(); }));
                       }));
   }
-
-  // ---- WebSocket
 
   void accept() {
     program_ = ++shared_.newest;
@@ -295,7 +287,7 @@ class InverseConnection {
   std::string peer_;
   beast::flat_buffer request_buffer_{kLongestRequest};
   std::optional<http::request_parser<http::empty_body>> parser_;
-  std::string text_;  ///< of a plain HTTP response
+  std::string text_;
 
   Plug::Program program_ = 0;
   std::optional<InverseSession> session_;
@@ -305,7 +297,7 @@ class InverseConnection {
   std::deque<std::string> outbox_;  ///< the first one is being written
   std::size_t unread_ = 0;          ///< bytes in outbox_
   std::optional<LocalTime> stuck_since_;
-  std::string why_;  ///< reason for closing
+  std::string why_;
   bool open_ = false;
   bool reading_ = false;
   bool writing_ = false;
@@ -347,7 +339,6 @@ struct InverseServer::State {
     });
   }
 
-  /// Schedules a turn after all available messages, or enough of them, have been read.
   void schedule_answers() {
     if (std::exchange(answers_due, true)) return;
     read_before = shared.read;
@@ -401,7 +392,7 @@ struct InverseServer::State {
     wake_at(std::min(next, now + kLongestSleep), now);
   }
 
-  /// A timer that expires too early is kept, because the turn sets the next one.
+  /// A timer that is set too early does no harm: its turn sets the next one.
   void wake_at(LocalTime at, LocalTime now) {
     if (wakes_at && *wakes_at <= at) return;
     wakes_at = at;

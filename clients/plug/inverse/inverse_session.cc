@@ -11,7 +11,7 @@
 namespace tendon::plug {
 namespace {
 
-/// Burst of older messages that may be read after a silence: those of 0.1 s.
+/// Limit of the older messages that may be read at once.
 constexpr double kMostAtOnce = InverseSession::kMostPerSecond / 10;
 
 double milliseconds_of(Duration d) { return std::chrono::duration<double, std::milli>(d).count(); }

@@ -26,12 +26,12 @@ std::vector<InverseDevice> inverse_devices(std::span<const std::pair<std::string
 
 /// Counters of the bridge for all clients.
 struct InverseCounts {
-  std::uint64_t clients = 0;   ///< total number of clients
-  std::uint64_t messages = 0;  ///< each was answered
-  std::uint64_t skipped = 0;   ///< messages not read, because one client sent too many and a newer one was available
-  std::uint64_t unread = 0;    ///< messages that are not JSON, too long or too deep
-  std::uint64_t refused = 0;   ///< refused parts of messages
-  std::uint64_t ignored = 0;   ///< unsupported commands
+  std::uint64_t clients = 0;
+  std::uint64_t messages = 0;
+  std::uint64_t skipped = 0;  ///< messages not read, because one client sent too many and a newer one was available
+  std::uint64_t unread = 0;   ///< messages that are not JSON, too long or too deep
+  std::uint64_t refused = 0;
+  std::uint64_t ignored = 0;
 };
 
 /// The conversation with one client: a first message, then exactly one reply for each message of the client. It has
@@ -102,7 +102,7 @@ class InverseSession {
   InverseCounts& counts_;
   std::vector<Eye> eyes_;
   LocalTime refilled_;
-  double readable_ = kMostPerSecond / 10;  ///< number of older messages that may be read now
+  double readable_ = kMostPerSecond / 10;
 };
 
 }  // namespace tendon::plug

@@ -98,7 +98,6 @@ bool RosDevice::joy_is_due(LocalTime now) {
   return true;
 }
 
-/// Reads the handle description of a new session.
 void RosDevice::learn() {
   if (plug_.lost()) knows_ = false;
   if (knows_ || !plug_.handle()) return;

@@ -27,7 +27,7 @@ class Freshness {
  private:
   static constexpr std::size_t kGaps = 8;
   std::array<Duration, kGaps> gaps_{};
-  std::size_t count_ = 0;  ///< total number of intervals
+  std::size_t count_ = 0;
   std::optional<LocalTime> newest_;
 };
 
@@ -84,7 +84,7 @@ class RosDevice {
     Plug::Program number = 0;
     std::string called;
     Freshness freshness{};
-    std::string said{};  ///< last message about it
+    std::string said{};
     LocalTime said_at{};
   };
 
@@ -98,7 +98,7 @@ class RosDevice {
 
   Plug& plug_;
   Config config_;
-  std::uint64_t states_ = 0;  ///< number of states seen
+  std::uint64_t states_ = 0;
   LocalTime next_{};
   LocalTime next_joy_{};
   std::uint32_t buttons_ = 0;

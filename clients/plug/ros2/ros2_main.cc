@@ -54,7 +54,6 @@ std::string host_or_interface(const std::string& text) {
              : "expected the name of an interface or a host, or an address, got \"" + text + "\"";
 }
 
-/// Offset from LocalTime to the system clock.
 Duration since_1970() {
   const auto system = std::chrono::system_clock::now().time_since_epoch();
   return std::chrono::duration_cast<Duration>(system) - read_clock().time_since_epoch();
@@ -84,7 +83,7 @@ class Ros2Bridge {
     const LocalTime end = options_.duration_s < 1e9 ? now + from_seconds(options_.duration_s) : LocalTime::max();
     LocalTime next_diagnosis = now + kDiagnosticsEvery;
     LocalTime next_take = now;
-    bool rings = true;  // a command may be available
+    bool rings = true;
     for (; !signals.asked() && now < end; now = read_clock()) {
       const std::array<Desk::Count, 4> counts = {{{"published", node_.published()},
                                                   {"unsent", node_.unsent()},
@@ -152,7 +151,6 @@ class Ros2Bridge {
     }
   }
 
-  /// Returns true if a force was requested.
   bool take(LocalTime now) {
     node_.clear();
     bool asked = false;

@@ -88,8 +88,8 @@ class Freshness {
  private:
   static constexpr std::size_t kGaps = 8;
   std::array<Duration, kGaps> gaps_{};
-  std::size_t count_ = 0;  ///< total number of intervals
-  LocalTime counted_{};    ///< start of the newest group of messages
+  std::size_t count_ = 0;
+  LocalTime counted_{};  ///< start of the newest group of messages
   LocalTime newest_{};
   bool any_ = false;
 };

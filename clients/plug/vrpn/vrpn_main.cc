@@ -25,7 +25,6 @@ struct VrpnOptions {
   double duration_s = 0;
 };
 
-/// Maximum number of consecutive calls of Desk::turn while a computed force has not been sent.
 constexpr int kTurnsAtOnce = 4;
 
 /// Parses "Phantom0=right", or "Phantom0" for the first device. Adds the device to `devices`.
@@ -112,7 +111,7 @@ int run_vrpn(VrpnOptions& options) {
 
 void add_vrpn(CLI::App& app, Chosen& chosen) {
   CLI::App* vrpn = app.add_subcommand("vrpn", "A VRPN server: programs find NAME@localhost");
-  static VrpnOptions options;  // the command line is parsed into it after this function returns
+  static VrpnOptions options;  // written by CLI11 while parsing
   vrpn->footer("Example: tendon-plug vrpn --server lab:47100 --name Phantom0=right");
   add_common(*vrpn, options.desk);
   vrpn->add_option(

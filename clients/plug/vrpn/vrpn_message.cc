@@ -37,7 +37,6 @@ void append_characters(Buffer& out, std::string_view text) {
 
 std::string_view text_of(Bytes bytes) { return {reinterpret_cast<const char*>(bytes.data()), bytes.size()}; }
 
-/// Reads numbers from the front. The caller must check the size.
 class Reader {
  public:
   explicit Reader(Bytes bytes) : left_(bytes) {}
@@ -50,7 +49,6 @@ class Reader {
     const double x = f32(), y = f32(), z = f32();
     return {x, y, z};
   }
-  /// Whether all numbers so far were finite and within the limits of Tendon's protocol.
   bool sound() const { return sound_; }
 
  private:

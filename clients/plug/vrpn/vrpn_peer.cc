@@ -9,7 +9,7 @@
 namespace tendon::plug::vrpn {
 namespace {
 
-constexpr std::size_t kMaxSentences = 32;  ///< not yet printed
+constexpr std::size_t kMaxSentences = 32;
 constexpr double kTurnTime = 0.01;  ///< s; a quaternion then represents up to half a turn, which is 50 turns per second
 constexpr double kSlowest = 1;      ///< Hz
 constexpr std::string_view kForceDevice = "vrpn_ForceDevice ";

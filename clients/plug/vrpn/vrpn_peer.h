@@ -47,9 +47,9 @@ class Peer {
  public:
   static constexpr std::size_t kMaxUnread = 64 * 1024;
   static constexpr int kMaxPerSecond = 4000;
-  static constexpr int kBurst = 256;              ///< burst of messages
+  static constexpr int kBurst = 256;
   static constexpr int kRareReports = 10;         ///< divider of velocity, force and channel reports
-  static constexpr int kForceError = 2;           ///< FD_FORCE_ERROR of vrpn_ForceDevice
+  static constexpr int kForceError = 2;           ///< of vrpn_ForceDevice
   static constexpr std::size_t kMaxWarnings = 8;  ///< unknown names and types reported to one program
 
   struct Counts {
@@ -103,7 +103,7 @@ class Peer {
     bool changed = false;
   };
   struct Told {
-    bool any = false;  ///< a state was sent
+    bool any = false;
     double next_tick = 0;
     double period_ticks = 1;
     std::uint64_t reports = 0;
@@ -141,7 +141,7 @@ class Peer {
   std::vector<std::int32_t> senders_;  ///< number used by the program → station, or kNobody
   std::vector<Name> types_;            ///< number used by the program → type
 
-  double allowance_ = kBurst;  ///< messages
+  double allowance_ = kBurst;
   LocalTime allowed_{};
   struct Held {
     Message message;

@@ -106,8 +106,8 @@ struct Server::Client {
   LocalTime until;  ///< deadline for the connection or the cookie
   LocalTime rests_until{};
   Peer peer;
-  std::vector<Asker> askers;  ///< one for each station
-  std::string over;           ///< reason for closing; empty: none
+  std::vector<Asker> askers;
+  std::string over;
 };
 
 Server::Server(Desk& desk, Config config, LocalTime now) : desk_(desk), config_(std::move(config)), dialled_(now) {
@@ -251,7 +251,6 @@ void Server::finish_dial(const Moment& now, Client& client, short ready) {
   client.until = now.at + kPatience;
 }
 
-/// Opens a UDP socket for a program that has described its port.
 void Server::open_udp(const Moment& now, Client& client) {
   Address ours = local_address(client.tcp.number());
   ours.port = 0;

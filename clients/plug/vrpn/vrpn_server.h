@@ -57,7 +57,7 @@ class Server {
   static constexpr Duration kPatience = std::chrono::seconds(3);
 
   struct Alias {
-    std::string name;   ///< used by VRPN programs
+    std::string name;
     std::size_t place;  ///< index of the device at the desk
   };
   struct Config {
@@ -109,7 +109,7 @@ class Server {
   bool full_said_ = false;
   double dials_ = kDialsPerSecond;
   LocalTime dialled_{};
-  Peer::Counts gone_;  ///< of clients that have left
+  Peer::Counts gone_;
   std::vector<Desk::Count> counts_;
   std::vector<pollfd> polled_;
   Buffer buffer_;

@@ -19,7 +19,7 @@ struct Station {
   View view{*find_frame("openhaptics"), {}};  ///< VRPN uses the frame of its Phantom server
   double stiffest = 1000;                     ///< N/m, of a plane with spring 1; from the device description if known
   std::optional<DeviceDescription::Box> workspace{};  ///< in the device base frame
-  int buttons = 0;                                    ///< number of buttons
+  int buttons = 0;
   std::uint32_t loop_hz = 1000;
   bool described = false;        ///< the description was read
   bool handle_is_known = false;  ///< `view` and `buttons` are valid
@@ -56,11 +56,11 @@ class Asker {
   std::string who_;
   std::size_t i_;
   std::optional<std::string> sentence_;
-  LocalTime at_{};           ///< time of the last request
-  bool asks_ = false;        ///< a request is active
-  bool is_stale_ = false;    ///< the program has stopped sending
-  bool is_refused_ = false;  ///< another program owns the device, and this one was informed
-  bool for_long_ = false;    ///< reported that the drawing is valid as long as the connection
+  LocalTime at_{};
+  bool asks_ = false;
+  bool is_stale_ = false;  ///< the program has stopped sending
+  bool is_refused_ = false;
+  bool for_long_ = false;
 };
 
 }  // namespace tendon::plug::vrpn
