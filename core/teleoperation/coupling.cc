@@ -20,13 +20,12 @@ const CouplingConfig& checked(const CouplingConfig& config) {
   throw std::invalid_argument(std::string(reasons.front().key) + ": " + reasons.front().sentence);
 }
 
-/// K, D and B of this end.
 PositionPosition<3>::Config spring_of(const CouplingConfig& config, const MappedEnd& frame) {
   PositionPosition<3>::Config spring = config.spring;
   const bool both = config.method == CouplingMethod::kPositionPosition || config.method == CouplingMethod::kSetPosition;
-  // The leader of a position–force coupling has no spring: the follower's is not in a loop with the delay.
+  // The leader of a position–force coupling has no spring, so the follower's spring is not in a loop with the delay.
   if (!both) spring.adapt_to_delay = false;
-  if (config.method == CouplingMethod::kSetPosition) spring.damping = 0;  // no velocity travels
+  if (config.method == CouplingMethod::kSetPosition) spring.damping = 0;  // the method does not use velocities
   for (double* const value : {&spring.stiffness, &spring.damping, &spring.own_damping}) {
     *value = frame.stiffness(*value);
   }
@@ -38,7 +37,7 @@ std::optional<Purse> purse_of(const CouplingConfig& config, const MappedEnd& fra
   Purse::Config purse = *config.purse;
   purse.peers = 1;
   purse.joule[0] = frame.joule();
-  // The same at both ends: the end whose joules are worth less would else be left with too little.
+  // The start is equal at both ends. Otherwise the end whose joules are worth less would have too little.
   purse.start = frame.worth(purse.start);
   purse.epoch = config.spring.epoch;
   return Purse(purse);
@@ -130,7 +129,7 @@ void Coupling::receive(const PortState& peer, LocalTime now) noexcept {
     }
   }
   take_scales(peer);
-  // It refuses none of those that are left: either all of a state is taken or nothing.
+  // PositionPosition accepts all states that passed the checks above, so a state is used entirely or not at all.
   std::visit(
       [&](auto& law) {
         spring_.receive({.epoch = peer.epoch,

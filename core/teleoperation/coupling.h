@@ -17,74 +17,75 @@
 
 namespace tendon {
 
-/// One end of a coupling between two devices: engage, clutch and loss of the peer, the map, the law and the purse. Both
-/// ends are this class, each in the haptic loop of its device; the network only carries PortStates.
+/// One end of a coupling between two devices: engaging, clutch, loss of the peer, position mapping, law, and energy
+/// exchange. Both ends use this class in the haptic loop of their device; the network only transfers PortStates.
 ///
 /// **In each period**, in this order:
 ///
-///     coupling.receive(state of the peer)            any number, late or twice
+///     coupling.receive(state of the peer)            any number of states, possibly late or duplicated
 ///     limiter.observe(interval)                      the account: L − given + taken
 ///     coupling.observe(interval, limiter.payable())
-///     demand = coupling.command(hand, …)             phases, map, law: the force to want
+///     demand = coupling.command(hand, …)             phases, map, law: the requested force
 ///     settlement = coupling.settle(…)                limiter.credit, limiter.withdraw
-///     limiter.limit(everything that is wanted)       the bound
+///     limiter.limit(sum of all requested forces)     the bound
 ///     coupling.conclude(applied, contact)            the end of the period
 ///     send(coupling.message())
 ///
-/// **Displacements.** Each end has an offset p₀ and tells u = p − p₀, in its own axes. While an end is not *live* its u
-/// stands still, and p₀ moves with the handle. The leader is live while it is engaged and the follower has answered the
-/// act; the follower while it is engaged. When it becomes live the follower sets its u to the leader's as mapped, so
-/// that the law has no force at that moment; the leader's u begins each act at 0 and goes on from where it stood, after
-/// a clutch too. So nothing moves at the other end, however often the clutch is pressed.
+/// **Displacements.** Each end has an offset p₀ and sends u = p − p₀ in its own axes. While an end is not *live*, its
+/// u is constant and p₀ moves with the handle. The leader is live if it is engaged and the follower has answered the
+/// act. The follower is live if it is engaged. When the follower becomes live, it sets its u to the mapped u of the
+/// leader, so that the force of the law is 0. The u of the leader is 0 at the start of each act and continues from
+/// its last value after the clutch. The clutch therefore does not move the other end.
 ///
-/// **Phases.** The function `next` (phase_machine.h) contains the table of phases. The device is ready if it is connected,
-/// armed, and has no fault. The leader engages if its operator calls engage() or presses the button, the leader is ready,
-/// and the peer is fresh and in the phase coupled, engaged, or clutched. The follower engages if it receives an act that
-/// is newer than all previous acts and belongs to the current epoch of the follower. An act ends if the peer starts again
-/// or is no longer engaged in this act. The leader also ends the act if the peer knows the act and is not engaged, if the
-/// peer is not ready, or if there is no answer within kAnswerWithin. If the leader is clutched, the follower stays engaged
-/// and holds its position.
+/// **Phases.** The function `next` (phase_machine.h) contains the table of phases. The device is ready if it is
+/// connected, armed, and has no fault. The leader engages if its operator calls engage() or presses the button, the
+/// leader is ready, and the peer is fresh and in the phase coupled, engaged, or clutched. The follower engages if it
+/// receives an act that is newer than all previous acts and belongs to the current epoch of the follower. An act ends
+/// if the peer starts again or is no longer engaged in this act. The leader also ends the act if the peer knows the
+/// act and is not engaged, if the peer is not ready, or if there is no answer within kAnswerWithin. If the leader is
+/// clutched, the follower stays engaged and holds its position.
 ///
-/// The force increases within `ramp` and decreases within ForceRamp::kFade, so there are no steps. A fault sets the force
-/// to 0 immediately. If there is no position in a period, the gain decreases at the same rate.
+/// The force increases within `ramp` and decreases within ForceRamp::kFade, so there are no steps. A fault sets the
+/// force to 0 immediately. If there is no position in a period, the gain decreases at the same rate.
 ///
-/// **Another peer** (renew): who takes a channel over has an epoch that is not above that of the one before. renew()
-/// forgets the peer, so that any epoch is heard, and raises our own by one, so that no total and no act of before
-/// counts. Whatever was engaged is not any more, and its force fades.
+/// **A new peer** (renew). A client that takes over a channel may have an epoch that is not larger than that of the
+/// previous one. The function renew() resets the peer, so that each epoch is accepted, and increments the own epoch,
+/// so that previous totals and acts are not used. The act ends and the force fades.
 ///
-/// **Scales that change** (set_scale, MappedEnd). The displacement of the leader is multiplied by the old s_x over the new
-/// s_x, so that its mapped position does not change. The force changes within ForceRamp::kFade. The methods waves and
-/// passivity cannot change their scales (keeps_scales), and a coupling of grippers cannot do so either.
+/// **Scales that change** (set_scale, MappedEnd). The displacement of the leader is multiplied by the old s_x over
+/// the new s_x, so that its mapped position does not change. The force changes within ForceRamp::kFade. The methods
+/// waves and passivity cannot change their scales (keeps_scales), and a coupling of grippers cannot do so either.
 ///
-/// **Loss of the peer** (LossLadder). If the peer is silent, the force decreases. If the peer is gone, the phase is `lost`
-/// and the force is 0. A link with a delay of more than max_delay counts as lost. A robot (`holds_place`) holds its last
-/// position with a spring of K and B along all axes if it is ready and not live. The ramp blends this spring with the law.
-/// After a loss, the round trip is measured again, so that the spring of the next act does not depend on the silence. The
-/// pair loses the energy that the network has not delivered.
+/// **Loss of the peer** (LossLadder). If the peer is silent, the force decreases. If the peer is gone, the phase is
+/// `lost` and the force is 0. A link with a delay of more than max_delay counts as lost. A robot (`holds_place`)
+/// holds its last position with a spring of K and B along all axes if it is ready and not live. The ramp blends this
+/// spring with the law. After a loss, the round trip is measured again, so that the spring of the next act does not
+/// depend on the silence. The pair loses the energy that the network has not delivered.
 ///
-/// **Laws.** The folder methods/ contains one law per method. K, D, and B are the values of the leader, and the values of
-/// the follower are smaller by s_f s_x. The norm of all forces is at most max_force.
+/// **Laws.** The folder methods/ contains one law per method. K, D, and B are the values of the leader, and the
+/// values of the follower are smaller by s_f s_x. The norm of all forces is at most max_force.
 ///
-/// **Purse.** If Config::purse is set, the port exchanges energy with its peer (Purse). It only gives energy if it is live
-/// and the peer is engaged and not silent. A pair is only passive with a purse if the method is position-position,
-/// set-position, or passivity. Without a purse, a limiter at each end keeps this end passive and the follower cannot move.
-/// This is also true for the other methods except for waves.
+/// **Purse.** If Config::purse is set, the port exchanges energy with its peer (Purse). It only gives energy if it is
+/// live and the peer is engaged and not silent. A pair is only passive with a purse if the method is
+/// position-position, set-position, or passivity. Without a purse, a limiter at each end keeps this end passive and
+/// the follower cannot move. This is also true for the other methods except for waves.
 ///
-/// **The rest of a handle.** Config::turn couples the orientations (TurnCoupling), and Config::grip couples the grippers
-/// (GripCoupling). They use the same phases and the same ramp. The force and the torque share one account, which `settle`
-/// changes. `settle_grip` changes the account of the gripper. The ends disengage if their orientations differ by more
-/// than 150°.
+/// **The rest of a handle.** Config::turn couples the orientations (TurnCoupling), and Config::grip couples the
+/// grippers (GripCoupling). They use the same phases and the same ramp. The force and the torque share one account,
+/// which `settle` changes. `settle_grip` changes the account of the gripper. The ends disengage if their orientations
+/// differ by more than 150°.
 ///
 /// **Bad input.** The coupling ignores a state and increments `refused` if one of its values is not finite or out of
 /// bounds, if it answers a state that was never sent, if `energy_in` has decreased within the epoch, or if the purse
-/// refuses it. The coupling ignores a state that is not newer. If the position or the velocity of the hand is not finite
-/// or larger than 10¹², the demand is not finite and the limiter sets the force to 0. The same is true for the
-/// orientation and the opening if they are coupled. A measured force that is not finite is replaced with 0, and a contact
-/// force that is not finite counts as not measured.
+/// refuses it. The coupling ignores a state that is not newer. If the position or the velocity of the hand is not
+/// finite or larger than 10¹², the demand is not finite and the limiter sets the force to 0. The same is true for the
+/// orientation and the opening if they are coupled. A measured force that is not finite is replaced with 0, and a
+/// contact force that is not finite counts as not measured.
 ///
-/// **Share.** If a follower has several leaders (Couplings), K, D, B, max_force, and the contact force of each pair are
-/// multiplied by its share α at both ends. The follower sends α (PortState::share). The leader changes its α at most as
-/// fast as Shares::kHandOver allows, so that a late state does not cause a step. If the follower does not send α, it is 1.
+/// **Share.** If a follower has several leaders (Couplings), K, D, B, max_force, and the contact force of each pair
+/// are multiplied by its share α at both ends. The follower sends α (PortState::share). The leader changes its α at
+/// most as fast as Shares::kHandOver allows, so that a late state does not cause a step. If the follower does not
+/// send α, it is 1.
 ///
 /// Thread-safe: no. Realtime-safe: all but the constructor.
 class Coupling {
@@ -95,7 +96,7 @@ class Coupling {
   using Absolute = CouplingAbsolute;
   using Button = CouplingButton;
 
-  /// Throws std::invalid_argument naming the field, its value and what was expected.
+  /// Throws std::invalid_argument with the name of the field, its value and the expected value.
   explicit Coupling(const Config& config);
 
   /// Returns all errors in the combination of fields. The constructor throws the first one.
@@ -103,44 +104,46 @@ class Coupling {
 
   void receive(const PortState& peer, LocalTime now) noexcept;
 
-  /// The operator's act, leader only (a follower passes over it): true when the coupling is engaging, or was already.
-  /// It is false, and nothing happens, in the phases alone, lost and fault, and when the peer is not ready.
+  /// Starts an act of the leader; a follower ignores it. Returns true if the coupling is engaging or was engaged
+  /// before. Returns false and does nothing in the phases alone, lost and fault, and if the peer is not ready.
   bool engage() noexcept;
-  /// Either end.
+  /// Ends the act. Can be called at both ends.
   void disengage() noexcept;
 
-  /// The other end is another one from now on, or one that has been away.
+  /// Must be called if the peer has been replaced or has restarted.
   void renew() noexcept;
 
-  /// The scales from now on, leader only, 0.01 … 100. False, and nothing happens, while it is engaged or aligning, with
-  /// a method or grippers that keep their scales, at a follower, and for a scale out of its bounds.
+  /// Sets the scales of the leader, 0.01 … 100. Returns false and does nothing while the coupling is engaged or
+  /// aligning, for a method or grippers that cannot change their scales, at a follower, and if a scale is out of
+  /// bounds.
   bool set_scale(double position_scale, double force_scale) noexcept;
-  /// Of a follower that has Config::share: α from the next `command` on; and how far the ramp of another of its leaders
-  /// has come, because a robot holds its place only as far as none leads it.
+  /// Sets the share α of a follower with Config::share for the next `command`. `others` is the gain of the ramp of
+  /// another leader. A robot only holds its position with the remaining part.
   void set_share(double share, double others) noexcept;
 
-  /// The interval that has just ended, and the account after it was booked, J (SharesAccount::payable; +∞ for a port
-  /// without a limiter). Not when the interval was not seen.
+  /// Uses the previous interval. `payable` is the account after the interval in J (SharesAccount::payable), and +∞
+  /// for a port without a limiter. Must not be called if the interval was not measured.
   void observe(const Interval<3>& interval, double payable) noexcept;
 
-  /// The force to want in the period that begins, and −∂F/∂x of it. `hand` in base frame axes. `handle`: what of it is
-  /// coupled, at least.
+  /// Returns the requested force for this period and −∂F/∂x. `hand` is in the axes of the base frame. `handle` must
+  /// contain at least the coupled values.
   Demand<3> command(const Motion& hand, std::uint32_t buttons, bool ready,
                     const HandleSample* handle = nullptr) noexcept;
-  /// To want besides, of the newest period; zero when they are not coupled.
-  const Vec3& torque() const noexcept { return torque_; }     ///< N·m, on the hand, base axes
+  /// The other requests of this period. They are 0 if they are not coupled.
+  const Vec3& torque() const noexcept { return torque_; }     ///< N·m, on the hand, in the axes of the base frame
   double grip_force() const noexcept { return grip_force_; }  ///< N, on the fingers; > 0 opens them
-  /// The device gave no position in this period: phases and ladder only. No force.
+  /// Must be called instead of `command` if there is no position. Updates the phase only; the force is 0.
   void command_unseen(LocalTime now, bool ready) noexcept;
 
-  /// For the limiter, after `command`, before `limit` (share). Nothing is given or credited without purse or waves.
+  /// Returns the changes of the account. Must be called after `command` and before the limiter. Without a purse or
+  /// waves, both values are 0.
   Purse::Settlement settle(double payable, double loss, Duration elapsed) noexcept;
 
-  /// … for the limiter of the gripper; nothing when the grippers are not coupled.
+  /// Returns the changes of the account of the gripper. Both values are 0 if the grippers are not coupled.
   Purse::Settlement settle_grip(double payable, double loss, Duration elapsed) noexcept;
 
-  /// Ends the period. `applied`, `torque`, and `grip` are the values of the device in N, N·m, and N, and `contact` is the
-  /// force on the tool in N.
+  /// Ends the period. `applied`, `torque`, and `grip` are the values of the device in N, N·m, and N, and `contact` is
+  /// the force on the tool in N.
   void conclude(const Vec3& applied, const std::optional<Vec3>& contact, const Vec3& torque = Vec3::Zero(),
                 double grip = 0) noexcept;
   /// Returns the state to send in this period. This function must be called after `conclude`.
@@ -148,17 +151,17 @@ class Coupling {
 
   PortPhase phase() const noexcept { return phase_; }
   bool live() const noexcept;
-  double gain() const noexcept { return ramp_.gain(); }  ///< 0 … 1, how far the ramp of the law has come
+  double gain() const noexcept { return ramp_.gain(); }  ///< 0 … 1, of the ramp
   double share() const noexcept { return share_; }
-  double stiffness() const noexcept;  ///< in use at this end, N/m: K, of waves B/d, of surface that of the model
+  double stiffness() const noexcept;  ///< N/m, at this end: K, for waves B/d, for surface that of the model
   Duration round_trip() const noexcept { return spring_.round_trip(); }
-  double account() const noexcept;                                                  ///< J; 0 without a purse
-  double position_scale() const noexcept { return frame_.map().position_scale(); }  ///< in use
+  double account() const noexcept;  ///< J; 0 without a purse
+  double position_scale() const noexcept { return frame_.map().position_scale(); }
   double force_scale() const noexcept { return frame_.map().force_scale(); }
   const TurnCoupling* turn() const noexcept { return turn_ ? &*turn_ : nullptr; }
   const GripCoupling* grip() const noexcept { return grip_ ? &*grip_ : nullptr; }
-  bool contact_measured() const noexcept;  ///< the peer's newest state has a contact force
-  std::uint64_t refused() const noexcept;  ///< states
+  bool contact_measured() const noexcept;  ///< the newest state of the peer contains a contact force
+  std::uint64_t refused() const noexcept;  ///< number of refused states
 
  private:
   bool leads() const noexcept { return frame_.leads(); }
@@ -198,39 +201,39 @@ class Coupling {
   AnyCouplingLaw law_;
 
   PortPhase phase_ = PortPhase::kAlone;
-  std::uint64_t sequence_ = 0;    ///< periods
-  std::uint64_t engagement_ = 0;  ///< of the newest act: made (leader), followed (follower)
-  std::uint64_t seen_ = 0;        ///< follower: no act up to this one engages it any more
-  bool answered_ = false;         ///< leader: the follower is engaged by our act
+  std::uint64_t sequence_ = 0;    ///< number of periods
+  std::uint64_t engagement_ = 0;  ///< of the newest act that was made (leader) or followed (follower)
+  std::uint64_t seen_ = 0;        ///< follower: acts up to this one are ignored
+  bool answered_ = false;         ///< leader: the follower is engaged in this act
   bool ready_ = false;
-  std::uint64_t act_sequence_ = 0;   ///< the first period that tells of our act
-  std::uint64_t lost_sequence_ = 0;  ///< the first period that tells of our loss; 0: none, or the peer knows
+  std::uint64_t act_sequence_ = 0;   ///< the first state that contains the act
+  std::uint64_t lost_sequence_ = 0;  ///< the first state that contains the loss; 0: no loss, or the peer knows about it
   LocalTime acted_at_{};
   Clutch clutch_;
   Alignment alignment_;
-  std::uint32_t buttons_ = ~std::uint32_t{0};  ///< at first all: a button that was held all along is not pressed
-  LocalTime now_{};                            ///< of the newest period
-  Duration elapsed_{};                         ///< since the one before
+  std::uint32_t buttons_ = ~std::uint32_t{0};  ///< initially all, so that a button counts only after it was released
+  LocalTime now_{};
+  Duration elapsed_{};
 
-  PortState newest_;  ///< of the peer; sequence 0: none
+  PortState newest_;  ///< of the peer; sequence 0: no state
   LossLadder ladder_;
   LossLadder::Rung rung_;
-  bool peer_anew_ = false;  ///< it has another epoch than in the last period
+  bool peer_anew_ = false;  ///< the epoch has changed in this period
   std::uint64_t refused_ = 0;
 
   Vec3 offset_ = Vec3::Zero();  ///< m, p₀
   Vec3 u_ = Vec3::Zero();       ///< m
   Vec3 u_velocity_ = Vec3::Zero();
   bool was_live_ = false;
-  bool new_act_ = false;         ///< follower: this period is the first by its act
-  std::optional<Vec3> place_{};  ///< m: where a robot stays
+  bool new_act_ = false;         ///< follower: the first period of an act
+  std::optional<Vec3> place_{};  ///< m, the position that a robot holds
   bool was_aligning_ = false;
   bool rescaled_ = false;  ///< The scales have changed in this period.
   ForceRamp ramp_;
   double share_ = 1;    ///< α
   double others_ = 0;   ///< follower only; the gain of another leader
   double taken_ = 0;    ///< J; received from waves or acts since the last `settle`
-  double given_ = 0;    ///< J, by waves
+  double given_ = 0;    ///< J, sent by waves since the last `settle`
   double payable_ = 0;  ///< J, after the newest interval
   double loss_ = 0;     ///< J; the reserve of the limiter for the last force
 

@@ -5,24 +5,24 @@
 
 namespace tendon {
 
-/// What the laws for the rest of a handle (TurnCoupling, GripCoupling) have to know of a period of their Coupling. The
-/// force that they want is, like the coupling's,
+/// The data of one period of a Coupling for the laws of the other parts of a handle (TurnCoupling, GripCoupling).
+/// Their force is
 ///
-///     gain · law  +  (1 − gain) · spring of the place that a robot holds  +  fade · left
+///     gain · law  +  (1 − gain) · spring that holds the position of a robot  +  fade · left
 ///
-/// left: by how much the force was above the present one when what makes it changed.
+/// where `left` is the difference to the previous force when the source of the force changes.
 struct CouplingPeriod {
   bool in_act = false;    ///< engaged or clutched
-  bool live = false;      ///< what the handle does is told
-  bool driven = false;    ///< the law makes the force
-  bool changed = false;   ///< … or does no longer, since the last period; or does so by another act
-  bool placed = false;    ///< a robot takes the place where it is now, to hold it
-  bool holds = false;     ///< … and has such a place
-  bool fault = false;     ///< no force
-  double gain = 0;        ///< 0 … 1, the ramp
+  bool live = false;      ///< the motion of the handle is sent
+  bool driven = false;    ///< the law computes the force
+  bool changed = false;   ///< `driven` has changed, or there is a new act
+  bool placed = false;    ///< a robot starts to hold its current position
+  bool holds = false;     ///< a robot holds a position
+  bool fault = false;     ///< the force is 0
+  double gain = 0;        ///< 0 … 1, of the ramp
   double fade = 0;        ///< 0 … 1
-  Duration round_trip{};  ///< in use; 0: not known
-  double ahead = 0;       ///< s: so much later than the quickest ones has the peer's newest state come (≤ 20 ms)
+  Duration round_trip{};  ///< 0: not known
+  double ahead = 0;       ///< s, delay of the newest state beyond the fastest ones (≤ 20 ms)
 };
 
 }  // namespace tendon

@@ -156,7 +156,7 @@ bool Coupling::set_scale(double position_scale, double force_scale) noexcept {
   return true;
 }
 
-/// What depends on the scales, after they have changed.
+/// Updates all values that depend on the scales.
 void Coupling::follow_scales() noexcept {
   rescaled_ = true;
   std::visit([](auto& law) { law.forget(); }, law_);

@@ -14,48 +14,47 @@ namespace tendon {
 
 /// One of several leaders of a follower.
 struct CoupledLeader {
-  std::uint32_t channel = 0;  ///< of the follower's device, by which its states come
-  double share = 1;           ///< α at first
+  std::uint32_t channel = 0;  ///< of the follower's device; receives the states of the leader
+  double share = 1;           ///< initial α
 };
 
-/// The couplings of one device: one, or of a follower one for each of 2 … 4 leaders. It is the centre of a star: each
-/// leader is an ordinary leader, which knows nothing of the others and talks to the follower only.
+/// The couplings of one device: one coupling, or the couplings of a follower with 2 to 4 leaders. The leaders do not
+/// know about each other and only communicate with the follower.
 ///
 ///     F = Σ α_i (K (y_i − u_i) + D (ẏ_i − u̇_i) − B u̇_i)       at the follower
 ///     F_i = α_i (K (u_i − y_i) + D (u̇_i − ẏ_i) − B ẏ_i)        at leader i
 ///
-/// so that in free motion x_f = Σ α_i x_i over the leaders that are engaged, their α_i over their sum. Each pair is a
-/// pair of α_i K, α_i D and α_i B: all that is said of one pair holds of each (PositionPosition: α K ≤ 2 α B/T_loop).
-/// With all leaders engaged the follower renders B once. By position-force leader i feels α_i times the contact.
+/// In free motion x_f = Σ α_i x_i over the engaged leaders, where the α_i are divided by their sum. Each pair is a
+/// coupling with α_i K, α_i D and α_i B, so its properties are those of a single pair (PositionPosition: α K ≤ 2 α
+/// B/T_loop). If all leaders are engaged, the follower renders B once. With position-force, leader i feels α_i times
+/// the contact force (core/PROOFS.md, "Coupling springs").
 ///
-/// **Each engages by its own act**, clutches, falls silent and is lost by itself; its own offsets make that nothing
-/// moves. A leader that is not engaged counts for nothing: its spring is absent, and the springs of the others do not
-/// grow. Whoever wants them to grow moves the share (set_share). A robot (`holds_place`) holds its place as far as no
-/// leader has it.
+/// **Phases.** Each coupling has its own phases, clutch, offsets and loss of the peer. A leader that is not engaged
+/// does not contribute, and the other shares do not change; use set_share to change them. A robot (`holds_place`)
+/// holds its position with the part that no leader uses.
 ///
-/// **One account.** All couplings pay and are paid from the one account of the device's limiter, one after the other:
-/// each sees what those before it have left. That is what the theorem of purse.h asks for. Before the bound coupling
-/// j gives ΔG_j ≤ max(A_j, 0), A_j = A + Σ_{k≤j} R_k − Σ_{k<j} ΔG_k. So a gift never takes the account below zero, and
-/// an account that is below zero gives nothing: Σ ΔG ≤ max(A + Σ R, 0), and nothing in between raises A but R. The
-/// force is limited once, after all of them. A move of α under stretch, which costs ½ ΔK δ², is work that this account
-/// or that of the leader pays when it is felt, like any other work of a spring; where there is none, the limiter
-/// leaves less of the force.
+/// **One account.** All couplings use the account of the device's limiter, one after the other, and each only sees
+/// the remaining energy. This satisfies the condition of the theorem in purse.h: before the bound, coupling j gives
+/// ΔG_j ≤ max(A_j, 0) with A_j = A + Σ_{k≤j} R_k − Σ_{k<j} ΔG_k. Therefore Σ ΔG ≤ max(A + Σ R, 0), and only R
+/// increases A. The force is limited once, after all couplings. If α changes while a spring is stretched, the account
+/// pays for the work ½ ΔK δ², and the limiter reduces the force if there is not enough energy.
 ///
-/// **What a leader is told** of the account and of the need is its part, α_i A and α_i n. The ratio A/n, by which the
-/// ports give, is the same for all; but leaders that were each told the whole need would each send what is missing, and
-/// the follower would send some of it back: 2 … 4 leaders that press together sent 7 … 17 % more to and fro, and felt
-/// no more. It is a matter of balance: no promise depends on it.
+/// **Messages.** A leader receives its part of the account and the need, α_i A and α_i n. The ratio A/n, which
+/// determines the payments, is the same for all. If each leader received the entire need, each would send all of the
+/// missing energy: 2 to 4 leaders that pushed together then exchanged 7 to 17 % more energy without a larger force.
+/// The guarantees do not depend on this.
 ///
-/// **Trust.** Each peer has a purse of its own, with max_power and max_account of its own: against n peers that lie the
-/// port alone keeps L ≥ −n (max_account + max_power · t).
+/// **Trust.** Each peer has its own purse with max_power and max_account. Against n dishonest peers, the port alone
+/// keeps L ≥ −n (max_account + max_power · t).
 ///
 /// Thread-safe: no. Realtime-safe: all but the constructor.
 class Couplings {
  public:
   static constexpr std::size_t kMost = Shares::kMost;
 
-  /// `leaders`: empty for one coupling, else 2 … kMost, each by the same `config`, which then couples positions only.
-  /// Throws std::invalid_argument naming the field, its value and what was expected.
+  /// `leaders` is empty for one coupling, and contains 2 … kMost leaders otherwise. All use `config`, which must then
+  /// only couple positions. Throws std::invalid_argument with the name of the field, its value and the expected
+  /// value.
   explicit Couplings(const Coupling::Config& config, std::span<const CoupledLeader> leaders = {});
 
   std::size_t size() const noexcept { return all_.size(); }
@@ -63,10 +62,10 @@ class Couplings {
   Coupling& operator[](std::size_t which) noexcept { return all_[which]; }
   const Coupling& operator[](std::size_t which) const noexcept { return all_[which]; }
 
-  /// From the next period on it goes to `share` (Shares).
+  /// Changes the share to `share`, starting with the next period (Shares).
   void set_share(std::size_t which, double share) noexcept { shares_.set(which, share); }
 
-  // As those of Coupling, in its order, for all of them.
+  // These functions call the functions of Coupling for all couplings.
   void observe(const Interval<3>& interval, double payable) noexcept;
   Demand<3> command(const Motion& hand, std::uint32_t buttons, bool ready,
                     const HandleSample* handle = nullptr) noexcept;
@@ -76,11 +75,11 @@ class Couplings {
   Purse::Settlement settle_grip(double payable, double loss, Duration elapsed) noexcept {
     return all_.front().settle_grip(payable, loss, elapsed);
   }
-  /// The sum of what they settled.
+  /// Returns the sum of all settlements.
   Purse::Settlement settle(double payable, double loss, Duration elapsed) noexcept;
-  /// In the newest period, of one of them.
+  /// Returns the newest settlement of one coupling.
   const Purse::Settlement& settled(std::size_t which) const noexcept { return settled_[which]; }
-  bool live() const noexcept;  ///< one of them is
+  bool live() const noexcept;  ///< at least one coupling is live
 
  private:
   void share(LocalTime now) noexcept;
@@ -88,7 +87,7 @@ class Couplings {
   std::vector<Coupling> all_;
   Shares shares_;
   std::array<Purse::Settlement, kMost> settled_{};
-  LocalTime now_{};  ///< of the newest period
+  LocalTime now_{};
   bool began_ = false;
 };
 

@@ -11,57 +11,59 @@
 
 namespace tendon {
 
-/// Where a port of a coupling stands. Only `kEngaged` has a force of the coupling, apart from the fade out of it and
-/// from a robot that holds its place.
+/// The phase of one end of a coupling. Only `kEngaged` has a force, apart from the fade after it and a robot that
+/// holds its position.
 enum class PortPhase : std::uint8_t {
-  kAlone = 1,  ///< has no peer
-  kCoupled,    ///< hears its peer; no force; waits for the operator's act
-  kAligning,   ///< absolute maps: the leader is led to where the follower is
-  kEngaged,    ///< the law
-  kClutched,   ///< the leader is free; the follower stays where it is
-  kLost,       ///< was engaged, and its peer fell silent; never engaged again without an act
-  kFault,      ///< its device is not armed, disarmed or has a fault: no force
+  kAlone = 1,  ///< no peer
+  kCoupled,    ///< receives states; waits for the operator to engage; no force
+  kAligning,   ///< absolute map: the leader is moved to the position of the follower
+  kEngaged,    ///< the law computes the force
+  kClutched,   ///< the leader moves freely and the follower holds its position
+  kLost,       ///< the peer fell silent during an act; requires a new act
+  kFault,      ///< the device is not armed or has a fault; no force
 };
 
-/// For people: "engaged"; with what is waited for.
+/// Returns a name such as "engaged", and what the phase waits for.
 std::string_view to_string(PortPhase phase) noexcept;
 
 enum class PortRole : std::uint8_t { kLeader, kFollower };
 
 enum class CouplingMethod : std::uint8_t {
   kPositionPosition = 1,  ///< a spring and a damper at both ends (PositionPosition), with a purse
-  kPositionForce,         ///< the follower's spring; the leader feels the contact that the follower measures
-  kWaves,                 ///< wave variables, played out (WavePort)
-  kSurface,               ///< position-force, but the leader touches a model of the surface that the follower found
-  kPassivity,             ///< velocity there, force back, each paid from what the other took in (PassivityLeader)
-  kSetPosition,           ///< springs to late positions, stretched only as far as the account pays
-  kRate,                  ///< the leader's place says how fast the follower moves
+  kPositionForce,         ///< spring at the follower; the leader feels the measured contact force
+  kWaves,                 ///< wave variables with playout (WavePort)
+  kSurface,               ///< as position-force, but the leader feels a model of the surface that the follower has
+                          ///< found
+  kPassivity,             ///< velocity to the follower, force to the leader, with passivity control (PassivityLeader)
+  kSetPosition,           ///< springs to delayed positions, stretched only as far as the account pays
+  kRate,                  ///< the position of the leader sets the velocity of the follower
 };
 inline constexpr std::array kCouplingMethods = {
     CouplingMethod::kPositionPosition, CouplingMethod::kPositionForce, CouplingMethod::kWaves, CouplingMethod::kSurface,
     CouplingMethod::kPassivity,        CouplingMethod::kSetPosition,   CouplingMethod::kRate};
 
-/// As scenes and refusals call it: "position-position".
+/// Returns the name in scenes and error messages: "position-position".
 std::string_view to_string(CouplingMethod method) noexcept;
 
-/// Method rate: the leader's handle, pulled back to its centre, says how fast the follower moves. In the leader's
-/// scale.
+/// The parameters of the method rate, in the scale of the leader. A spring pulls the handle of the leader to its
+/// center, and its displacement sets the velocity of the follower.
 struct RateControl {
-  double dead_zone = 0;  ///< m, ≥ 0: nearer to its centre the follower stands
-  double gain = 0;       ///< 1/s, > 0: speed for each metre beyond that
+  double dead_zone = 0;  ///< m, ≥ 0; the follower does not move if the displacement is smaller
+  double gain = 0;       ///< 1/s, > 0; velocity per displacement beyond the dead zone
   double max_speed = 0;  ///< m/s, > 0
 
   bool operator==(const RateControl&) const = default;
 };
 
-/// A flat, springy surface as the sender's tool has found it: SurfaceModel in the sender's displacements u.
+/// A flat elastic surface found by the tool of the sender: SurfaceModel in its displacements u.
 struct PortSurface {
-  Vec3 normal = Vec3::UnitX();  ///< of length 1 ± 0.001, out of the surface
-  double offset = 0;            ///< m: the surface is at normal·u = offset
-  double stiffness = 0;         ///< N/m, ≥ 0; 0: there is none
+  Vec3 normal = Vec3::UnitX();  ///< out of the surface, norm 1 ± 0.001
+  double offset = 0;            ///< m, the surface is at normal·u = offset
+  double stiffness = 0;         ///< N/m, ≥ 0; 0: no surface
 };
 
-/// Whether a place of the leader can stand for one of the follower (Coupling::Absolute): the others go by velocities.
+/// Returns true if positions of leader and follower correspond (Coupling::Absolute). The other methods use
+/// velocities.
 constexpr bool has_places(CouplingMethod method) noexcept {
   return method == CouplingMethod::kPositionPosition || method == CouplingMethod::kPositionForce ||
          method == CouplingMethod::kSurface || method == CouplingMethod::kSetPosition;
@@ -83,59 +85,60 @@ constexpr bool needs_purse(CouplingMethod method) noexcept {
          method == CouplingMethod::kSetPosition;
 }
 
-/// How a handle has turned since its offset was taken.
+/// The rotation of a handle since its offset was set.
 struct PortTurn {
-  Quat turn{};                           ///< in the axes of the sender's base frame; of length 1 ± 0.001
-  Vec3 angular_velocity = Vec3::Zero();  ///< rad/s, zero while `turn` is frozen
-  Vec3 torque = Vec3::Zero();            ///< N·m, on whoever holds the handle, really applied
+  Quat turn{};                           ///< in the axes of the sender's base frame; norm 1 ± 0.001
+  Vec3 angular_velocity = Vec3::Zero();  ///< rad/s, zero while `turn` is constant
+  Vec3 torque = Vec3::Zero();            ///< N·m, applied by the device to the hand
 };
 
-/// A gripper, measured at its fingers. It is a port of its own, with an account of its own.
+/// A gripper, measured at its fingers. It is a separate port with its own account.
 struct PortGrip {
-  double opening = 0;   ///< m; of a leader, what it asks for (GripCoupling)
+  double opening = 0;   ///< m; for a leader, the requested opening (GripCoupling)
   double velocity = 0;  ///< m/s
-  double force = 0;     ///< N, on the fingers, > 0 opens them; really applied
-  double account = 0;   ///< J, these four as in PortState
+  double force = 0;     ///< N, applied to the fingers, > 0 opens them
+  double account = 0;   ///< J; this and the following values are as in PortState
   double need = 0;
   double given = 0;
   double taken = 0;
 };
 
-/// What one port of a coupling tells the other, once a period. It may be sent as seldom as one likes, late, twice, in
-/// any order: the highest `sequence` of the highest `epoch` counts. Vectors are in the SENDER's base frame and scale;
-/// the receiver maps them (PoseMap).
+/// The state that one port of a coupling sends to the other in each period. States may be rare, late, duplicated or
+/// reordered: the highest `sequence` in the highest `epoch` is used. Vectors are in the base frame and scale of the
+/// SENDER; the receiver maps them (PoseMap).
 struct PortState {
   static constexpr Duration kMostRoundTrip = std::chrono::seconds(10);
 
-  std::uint64_t epoch = 0;          ///< of the sender, > 0: above every one before when it starts anew (Purse)
-  std::uint64_t sequence = 0;       ///< the sender's period in it: 1, 2, …
-  std::uint64_t answers_epoch = 0;  ///< the receiver's epoch that `answers`, `given` and `taken` belong to; 0: none yet
-  std::uint64_t answers = 0;        ///< sequence of the receiver's newest state in use; 0: none yet
-  Duration time{};                  ///< the sender's own: only differences are used; ± 2⁶⁰ ns
-  Duration round_trip{};            ///< that the sender has measured; 0: not yet; ≤ kMostRoundTrip
+  std::uint64_t epoch = 0;          ///< of the sender, > 0; increases with each restart (Purse)
+  std::uint64_t sequence = 0;       ///< period of the sender in this epoch: 1, 2, …
+  std::uint64_t answers_epoch = 0;  ///< epoch of the receiver for `answers`, `given` and `taken`; 0: none
+  std::uint64_t answers = 0;        ///< sequence of the receiver's newest state in use; 0: none
+  Duration time{};                  ///< in the sender's clock; only differences are used; ± 2⁶⁰ ns
+  Duration round_trip{};            ///< measured by the sender; 0: not known; ≤ kMostRoundTrip
   PortPhase phase = PortPhase::kAlone;
-  std::uint64_t engagement = 0;  ///< number of the leader's act that the phase belongs to: 1, 2, …; 0: none yet
-  std::uint32_t buttons = 0;     ///< bit i: button i is held
-  Vec3 position = Vec3::Zero();  ///< m, u: from the sender's offset, so that the peer needs to know no offset of it
-  Vec3 velocity = Vec3::Zero();  ///< m/s, of u: zero while it is frozen
-  Vec3 force = Vec3::Zero();     ///< N, that its device exerts on whoever holds it, really applied
-  std::optional<Vec3> contact_force{};   ///< N, of the surroundings on its tool, as measured; empty: not measured
+  std::uint64_t engagement = 0;          ///< number of the leader's act that the phase belongs to: 1, 2, …; 0: none
+  std::uint32_t buttons = 0;             ///< bit i: button i is pressed
+  Vec3 position = Vec3::Zero();          ///< m, u: relative to the offset of the sender
+  Vec3 velocity = Vec3::Zero();          ///< m/s, of u; zero while u is constant
+  Vec3 force = Vec3::Zero();             ///< N, applied by the device to the hand
+  std::optional<Vec3> contact_force{};   ///< N, measured on the tool; empty: not measured
   double account = 0;                    ///< J, PurseMessage::account
-  double need = 0;                       ///< J, PurseMessage::need; 0: it has no purse
+  double need = 0;                       ///< J, PurseMessage::need; 0: no purse
   double given = 0;                      ///< J, PurseMessage::given
   double taken = 0;                      ///< J, PurseMessage::taken
-  std::optional<PortSurface> surface{};  ///< what its tool touches, or touched last; empty: nothing yet
+  std::optional<PortSurface> surface{};  ///< last surface that the tool has touched; empty: none
   Vec3 wave_integral = Vec3::Zero();     ///< √W·s, WaveMessage::integral
   double wave_energy = 0;                ///< J, WaveMessage::energy; 0 … kMostTotal of PurseMessage
-  std::optional<PortTurn> turn{};        ///< empty: the orientations are not coupled
-  std::optional<PortGrip> grip{};        ///< empty: the grippers are not coupled
-  double energy_in = 0;           ///< J, of passivity: total that its port took in, in this epoch; as wave_energy
-  std::optional<double> share{};  ///< 0 … 1, of a follower: how much this leader counts; empty: it is the only one
-  double position_scale = 0;      ///< of a leader, in use from this state on: 0.01 … 100; 0: as both scenes say
+  std::optional<PortTurn> turn{};        ///< empty: orientations are not coupled
+  std::optional<PortGrip> grip{};        ///< empty: grippers are not coupled
+  double energy_in = 0;           ///< J, for passivity: total energy received by the port in this epoch; bounds of
+                                  ///< wave_energy
+  std::optional<double> share{};  ///< 0 … 1, from a follower: share of this leader; empty: single leader
+  double position_scale = 0;      ///< of a leader, for this state and later ones: 0.01 … 100; 0: that of the scene
   double force_scale = 0;
 };
 
-/// Whether each value is finite and within the bounds that it has above and on the wire (tendon.proto).
+/// Returns true if all values are finite and within their bounds (see above and tendon.proto).
 bool is_sound(const PortState& state) noexcept;
 bool is_sound(const PortSurface& surface) noexcept;
 bool is_sound(const PortTurn& turn) noexcept;

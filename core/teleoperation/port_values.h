@@ -5,9 +5,9 @@
 
 namespace tendon {
 
-/// Whether what a port tells is in its bounds, which NaN is in none of. Thread-safe: yes. Realtime-safe: yes.
+/// Returns true if the value is within its bounds, and false for NaN. Thread-safe: yes. Realtime-safe: yes.
 inline bool within(double value, double low, double high) noexcept { return value >= low && value <= high; }
-/// Each component, in m, m/s, N and so on: at most 10¹².
+/// Returns true if the magnitude of each component is at most 10¹² in SI units.
 inline bool within(const Vec3& vector) noexcept { return (vector.array().abs() <= 1e12).all(); }
 
 /// Returns the force with its norm limited to `most`.

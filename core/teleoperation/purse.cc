@@ -39,10 +39,10 @@ void Purse::receive(std::size_t peer, const PurseMessage& message) noexcept {
     return;
   }
   if (message.epoch < from.epoch || (message.epoch == from.epoch && message.sequence <= from.sequence)) return;
-  // Ours goes on being numbered: the peer may have heard messages of ours that answered its former epoch.
+  // The own numbering continues, because the peer may have messages that answered its previous epoch.
   if (message.epoch > from.epoch) from = {.epoch = message.epoch, .sent = from.sent};
   const bool ours = message.answers_epoch == config_.epoch;
-  // G itself comes back: a copy of a double is exact.
+  // The peer returns G itself, and a copy of a double is exact.
   if (ours && (message.given < from.heard || message.taken < from.arrived || message.taken > from.given)) {
     ++refused_;
     return;
@@ -50,7 +50,7 @@ void Purse::receive(std::size_t peer, const PurseMessage& message) noexcept {
   from.sequence = message.sequence;
   from.account = message.account;
   from.need = message.need;
-  if (!ours) return;  // its totals are those of a pair that is no more
+  if (!ours) return;  // totals of a previous pair of epochs
   from.heard = message.given;
   from.arrived = message.taken;
 }
@@ -82,15 +82,15 @@ double Purse::take() noexcept {
 
 double Purse::give(double account, double need) noexcept {
   if (!(account > 0)) return 0;
-  std::array<double, kMostPeers> there{};  // Â_j and n_j, in our joules
-  std::array<double, kMostPeers> needs{};  // 0: is given nothing
+  std::array<double, kMostPeers> there{};  // Â_j and n_j, in joules of this port
+  std::array<double, kMostPeers> needs{};  // 0: receives nothing
   for (std::size_t j = 0; j < config_.peers; ++j) {
     const Peer& peer = peers_[j];
     if (peer.epoch == 0) continue;
     there[j] = peer.account * config_.joule[j] + (peer.given - peer.arrived);
     needs[j] = peer.need * config_.joule[j];
   }
-  // The common ratio of those that are below it; whoever is above it drops out and lowers nobody.
+  // The common ratio of all ports below it. A port above the ratio is excluded.
   double ratio = 0;
   for (std::size_t round = 0; round < config_.peers; ++round) {
     double accounts = account;
@@ -122,7 +122,7 @@ double Purse::give(double account, double need) noexcept {
   for (std::size_t j = 0; j < config_.peers; ++j) {
     Peer& peer = peers_[j];
     const double total = std::min(peer.given + std::min(share * gifts[j], left), PurseMessage::kMostTotal);
-    // What the total really grew by: the peer will count that.
+    // The actual increase of the rounded total, which the peer will count.
     const double grown = total - peer.given;
     if (!(grown > 0) || grown > left) continue;
     peer.given = total;

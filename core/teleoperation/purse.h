@@ -11,79 +11,80 @@
 
 namespace tendon {
 
-/// What one port tells another about its account. It may be sent as seldom as one likes, late, twice, in any order.
-/// Every J is the sender's.
+/// The message from one port to another about its account. Messages may be rare, late, duplicated or reordered. All
+/// energies are in joules of the sender.
 struct PurseMessage {
   std::uint64_t epoch = 0;          ///< of the sender; 0: no message
-  std::uint64_t answers_epoch = 0;  ///< the receiver's epoch that `given` and `taken` belong to; 0: not heard yet
+  std::uint64_t answers_epoch = 0;  ///< epoch of the receiver for `given` and `taken`; 0: not known
   std::uint64_t sequence = 0;       ///< 1, 2, … within an epoch
   double account = 0;               ///< J, A after giving; ± kMostAccount
   double need = 0;                  ///< J, n; 0 … kMostAccount
-  double given = 0;  ///< J, G: total given to the receiver; never falls within the two epochs; ≤ kMostTotal
-  double taken = 0;  ///< J, R: the receiver's total that was heard of, in the receiver's joules; ≤ kMostTotal
+  double given = 0;  ///< J, G: total given to the receiver; does not decrease within the two epochs; ≤ kMostTotal
+  double taken = 0;  ///< J, R: the receiver's total as known by the sender, in joules of the receiver; ≤ kMostTotal
 
   static constexpr double kMostAccount = 1e3;
   static constexpr double kMostTotal = 1e6;
 };
 
-/// Ports that pay each other: together passive, each for itself able to do net work.
+/// An energy tank (Franken et al.) for each of several coupled ports, which exchange energy. The ports are passive
+/// together, and each of them may generate net energy.
 ///
-/// A limiter at each of two coupled devices makes each of them passive **by itself**. A follower that may do no net
-/// work cannot even move. Only the sum of all ports must be passive. So each port gives the others energy out of its
-/// own account, and its limiter bounds its force by that account in place of its own ledger. Port i has
+/// A limiter at each of two coupled devices makes each device passive **by itself**, but a follower that must not do
+/// net work cannot move. Only the sum of all ports must be passive. Therefore each port gives energy from its account
+/// to the others, and its limiter bounds the force by this account instead of its own ledger. Port i has
 ///
-///     L_i       its ledger (EnergyLedger), with the force that was really applied
-///     G_ij      the total that it has given to j;    R_ji the largest G_ji that it has heard of from j
+///     L_i       its ledger (EnergyLedger), with the applied force
+///     G_ij      the total given to j;    R_ji the largest received G_ji
 ///     A_i = L_i − Σ_j G_ij + Σ_j R_ji − discarded_i          the account: Limiter::energy
 ///
-/// and in each period, in this order: **book** the interval, **add** what came, **give**, **limit** the force. share()
-/// does the middle two.
+/// and in each period, in this order: **observe** the interval, **add** the received energy, **give**, **limit** the
+/// force. The function share() does the second and the third step.
 ///
-/// **Theorem.** If every port gives 0 ≤ ΔG_ij with Σ_j ΔG_ij ≤ max(A_i, 0) before it limits its force, then A_i ≥ 0 for
-/// ever at every port, and Σ_i L_i ≥ 0: the ports together give out nothing that was not put in, for every delay, loss,
-/// order, duplication, pause and motion.
-/// Proof. The step of the limiter needs only that A_i rises by nothing but booked work and R (OutputBound, Theorem 1);
-/// giving leaves A_i ≥ 0 and comes before the bound, so the bound knows of it. R_ij ≤ G_ij, because totals never fall
-/// and only the largest that was heard counts. So Σ L_i = Σ A_i + Σ (G_ij − R_ij) + Σ discarded_i ≥ 0, term by term. ∎
-/// It needs no common clock, no acknowledgement, nothing sent again. It holds while no hold is longer than T_max; a
-/// longer one costs what OutputBound says.
-/// Several purses may settle for one account, one after the other, each with what is left of it as `payable`
-/// (Couplings): what they give in a period is then bounded as the theorem asks.
+/// **Theorem** (core/PROOFS.md, "Energy tank"). If each port gives 0 ≤ ΔG_ij with Σ_j ΔG_ij ≤ max(A_i, 0) before it
+/// limits its force, then A_i ≥ 0 at all times at each port, and Σ_i L_i ≥ 0: together the ports do not generate
+/// energy, for every delay, loss, order, duplication, pause and motion. Proof. The limiter requires that only
+/// observed work and R increase A_i (core/PROOFS.md, "Output bound"). Giving keeps A_i ≥ 0 and is done before the
+/// bound. R_ij ≤ G_ij, because totals do not decrease and only the largest received one is used. So Σ L_i = Σ A_i + Σ
+/// (G_ij − R_ij) + Σ discarded_i ≥ 0, because each term is ≥ 0. ∎ The theorem requires no common clock, no
+/// acknowledgement and no retransmission. It holds while no hold is longer than T_max; see OutputBound for longer
+/// ones. Several purses may use one account one after the other, each with the remaining energy as `payable`
+/// (Couplings). Their sum then satisfies the condition of the theorem.
 ///
-/// **What is given** brings the accounts to one ratio of account to need, what is under way counted in:
+/// **Amount.** The ports give energy so that the ratio of account to need becomes equal, including the energy in
+/// transit:
 ///
-///     n_i = ℓ_i(F_wanted) + ε          ℓ: SharesAccount::worst_loss;  ε, so that somebody at rest has a start
-///     Â_j = A_j(told) + G_ij − R_ij(told)
-///     ΔG_ij = (ρ n_j − Â_j)₊,     ρ = (A_i + Σ Â_j) / (n_i + Σ n_j)    over i and the peers that are given something
+///     n_i = ℓ_i(F_wanted) + ε          ℓ: SharesAccount::worst_loss;  ε > 0, so that a port at rest can start to move
+///     Â_j = A_j(received) + G_ij − R_ij(received)
+///     ΔG_ij = (ρ n_j − Â_j)₊,     ρ = (A_i + Σ Â_j) / (n_i + Σ n_j)    over i and the peers that receive energy
 ///
-/// which for one peer is (A_i n_j − Â_j n_i)₊/(n_i + n_j). If the sum exceeds max(A_i, 0) (an account told below zero),
-/// all are cut in proportion. Nothing is given to a peer that has not been heard, or while `giving` is false.
+/// For one peer this is (A_i n_j − Â_j n_i)₊/(n_i + n_j). If the sum exceeds max(A_i, 0) because a received account
+/// is negative, all amounts are reduced in proportion. Nothing is given to a peer without a message, or if `giving`
+/// is false.
 ///
-/// **Scales.** With x_f = s_x x_l and F_l = s_f F_f one joule of the leader is s_x/s_f joules at the follower: the
-/// leader's `joule` is s_f/s_x and the follower's s_x/s_f, each the worth of one of the **peer's** joules here. Then
-/// W_l + (s_f/s_x) W_f stays ≥ 0.
+/// **Scales.** With x_f = s_x x_l and F_l = s_f F_f, one joule of the leader is s_x/s_f joules of the follower.
+/// `joule` is the value of a joule of the **peer** at this end: s_f/s_x at the leader and s_x/s_f at the follower.
+/// Then W_l + (s_f/s_x) W_f ≥ 0.
 ///
-/// **Scales that change.** A joule that was given at one worth must not be credited at a higher one, and an account
-/// must not be worth more to a peer than when it was filled. So whoever changes `joule` (revalue) forgoes what is under
-/// way until the peer tells that it knows, and the follower gives up the part of its account by which (s_f/s_x) A has
-/// grown: in the leader's joules no change of scale raises the sum of the accounts.
+/// **Changes of the scales.** Energy that was given at one value must not be credited at a higher one, and an account
+/// must not become more valuable for the peer. Therefore, a port that changes `joule` (revalue) discards the energy
+/// in transit until the peer knows the new value, and the follower gives up the part of its account by which
+/// (s_f/s_x) A has increased. No change of the scales increases the sum of the accounts in joules of the leader.
 ///
-/// **Epochs.** A port that starts anew has forgotten what it gave and took; its new purse has an epoch above all that
-/// it had before (a counter that survives, or the time of day at the start: no two machines' are compared). Totals
-/// belong to a pair of epochs. A peer's higher epoch voids both totals of the pair; messages of a lower one, and totals
-/// that answer another epoch than ours, are passed over. So no total is counted twice, whatever arrives late. Energy
-/// that was under way is lost, which is safe.
+/// **Epochs.** A port that restarts has lost its totals. Its new purse must have an epoch above all previous ones (a
+/// persistent counter, or the time of day at the start; clocks of two machines are not compared). Totals belong to a
+/// pair of epochs. A higher epoch of the peer resets both totals. Messages of a lower epoch, and totals for another
+/// epoch of this port, are ignored. No total is therefore counted twice. Energy in transit is lost, which is safe.
 ///
-/// **Trust.** The sum is ≥ 0 while the peers keep their accounts honestly. Against one that does not, this port alone
-/// keeps L ≥ −(max_account + max_power · t): what came is credited up to an allowance, at first max_account, that rises
-/// by max_power (and by what we give) up to max_account; the rest is discarded. An account above max_account is
-/// discarded down to it, too, whoever earned it. To discard is always safe.
+/// **Trust.** The sum is ≥ 0 if the peers keep their accounts correctly. Against other peers, this port alone keeps L
+/// ≥ −(max_account + max_power · t): received energy is credited up to an allowance, which starts at max_account and
+/// increases by max_power and by the given energy up to max_account. The remainder is discarded, as is the part of an
+/// account above max_account. Discarding is always safe (core/PROOFS.md, "Discarded credit").
 ///
-/// **Bad input.** A message with a value that is not finite or out of its bounds, a `taken` above what was given, or a
-/// total that falls although its sequence rises, changes nothing and is counted in `refused`. One that is no newer
-/// than the newest is passed over. A period's values that are not finite give and credit nothing.
+/// **Bad input.** A message is refused and counted in `refused` if a value is not finite or out of bounds, if `taken`
+/// exceeds the given total, or if a total decreases although its sequence increases. A message that is not newer is
+/// ignored. A period with values that are not finite gives and credits nothing.
 ///
-/// Cost, with PositionPosition: 85 ns a period beside one peer (README).
+/// Cost with PositionPosition: 85 ns per period with one peer (README).
 ///
 /// Source: derived here; related to the two-layer tank (Franken et al. 2011) and energy-reflecting TDPA (Ryu et al.
 /// 2010).
@@ -95,53 +96,53 @@ class Purse {
 
   struct Config {
     std::size_t peers = 1;                             ///< 1 … kMostPeers
-    std::array<double, kMostPeers> joule = {1, 1, 1};  ///< what one joule of each peer is worth here; 1e-6 … 1e6
+    std::array<double, kMostPeers> joule = {1, 1, 1};  ///< value of one joule of each peer at this port; 1e-6 … 1e6
     double start = 0.2e-3;                             ///< ε, J; > 0
     double max_power = 2;                              ///< W, > 0
     double max_account = 0.2;                          ///< J, > 0 … kMostAccount
-    std::uint64_t epoch = 1;                           ///< > 0; above every one that this port had before
+    std::uint64_t epoch = 1;                           ///< > 0; larger than all previous epochs of this port
   };
 
-  /// Throws std::invalid_argument naming the field, its value and what was expected.
+  /// Throws std::invalid_argument with the name of the field, its value and the expected value.
   explicit Purse(const Config& config);
 
-  /// At any time before settle(); peer < Config::peers, else nothing happens.
+  /// May be called at any time before settle(). Does nothing unless peer < Config::peers.
   void receive(std::size_t peer, const PurseMessage& message) noexcept;
 
-  /// Forgets all peers, whose next message may be of any epoch, and begins an epoch of its own: above every one before,
-  /// so that no total of before counts again. Energy that was under way is lost.
+  /// Resets all peers, so that any epoch is accepted, and starts an epoch above all previous ones. Energy in transit
+  /// is lost.
   void renew(std::uint64_t epoch) noexcept;
 
-  /// One joule of the peer is worth `joule` here from now on, and ε is `start`. What it has given and is not credited
-  /// yet is lost, because nobody knows at which worth it was given.
+  /// Sets the value of a joule of the peer and ε. Received energy that was not credited is lost, because its value is
+  /// unknown.
   void revalue(std::size_t peer, double joule, double start) noexcept;
-  /// The same, of what a message told that the peer made before it knew of that.
+  /// Discards received energy that the peer gave before it knew about the change.
   void forgo(std::size_t peer) noexcept;
 
-  /// Once in each period, after the interval was booked and before the force is limited.
+  /// Once per period, after the interval was observed and before the force is limited.
   struct Period {
     double payable = 0;  ///< J, SharesAccount::payable
-    double loss = 0;     ///< J, ℓ of the force that is wanted; +∞ is allowed
-    Duration elapsed{};  ///< length of the interval that has just ended
-    bool giving = true;  ///< false: clutched or not engaged; what comes is still added
+    double loss = 0;     ///< J, ℓ of the requested force; +∞ is allowed
+    Duration elapsed{};  ///< length of the previous interval
+    bool giving = true;  ///< false: clutched or not engaged; received energy is still added
   };
-  /// J ≥ 0, for the limiter: credit first, then withdraw.
+  /// J, ≥ 0. The limiter must apply `credit` first.
   struct Settlement {
     double credit = 0;
     double withdraw = 0;
   };
   Settlement settle(const Period& period) noexcept;
 
-  /// What to send to a peer after settle(), or empty epoch (0) for a peer that is none. Each call has a sequence of its
-  /// own.
+  /// Returns the message to a peer after settle(), or one with epoch 0 if the peer does not exist. Each message has
+  /// its own sequence.
   PurseMessage message(std::size_t peer) noexcept;
 
   double account() const noexcept { return account_; }              ///< A after the last settle, J
-  double need() const noexcept { return need_; }                    ///< n at the last settle, J
-  double discarded() const noexcept { return discarded_.value(); }  ///< J so far
-  std::uint64_t refused() const noexcept { return refused_; }       ///< messages
-  double given(std::size_t peer) const noexcept;                    ///< G, J, of the present epochs
-  /// R, in the peer's joules, of the present epochs.
+  double need() const noexcept { return need_; }                    ///< n in the last settle, J
+  double discarded() const noexcept { return discarded_.value(); }  ///< total, J
+  std::uint64_t refused() const noexcept { return refused_; }       ///< number of messages
+  double given(std::size_t peer) const noexcept;                    ///< G, J, in the current epochs
+  /// R, in joules of the peer, in the current epochs.
   double taken(std::size_t peer) const noexcept;
 
  private:
@@ -149,11 +150,11 @@ class Purse {
     std::uint64_t epoch = 0;
     std::uint64_t sequence = 0;
     double account = 0;   ///< J of the peer
-    double need = 0;      ///< J of the peer; 0: nothing heard
+    double need = 0;      ///< J of the peer; 0: not known
     double heard = 0;     ///< R, J of the peer
-    double credited = 0;  ///< of R
-    double given = 0;     ///< G, J of ours
-    double arrived = 0;   ///< of G, as it told
+    double credited = 0;  ///< part of R, J of the peer
+    double given = 0;     ///< G, J of this port
+    double arrived = 0;   ///< part of G known to the peer
     std::uint64_t sent = 0;
   };
 
@@ -162,14 +163,14 @@ class Purse {
 
   Config config_;
   std::array<Peer, kMostPeers> peers_;
-  double allowance_;  ///< J that may be credited now
+  double allowance_;  ///< J that may be credited
   double account_ = 0;
   double need_ = 0;
   CompensatedSum discarded_;
   std::uint64_t refused_ = 0;
 };
 
-/// Adds what came and gives, between `observe` and `limit` of a period: `wanted` is the force that `limit` will get.
+/// Adds and gives energy, between `observe` and `limit`. `wanted` is the argument of `limit`.
 template <int N, class Law>
 requires SharesAccount<Law, N>
 void share(Purse& purse, Law& law, const Vec<N>& wanted, Duration elapsed, bool giving = true) noexcept {

@@ -9,25 +9,26 @@
 
 namespace tendon {
 
-/// How much each of several leaders of one follower counts: α_i ∈ [0, 1], Σ α_i = 1 in every period.
+/// The shares of several leaders of one follower: α_i ∈ [0, 1] and Σ α_i = 1 in each period.
 ///
-/// A share that is set is reached on a straight line within kHandOver. The others share what is left in the proportion
-/// in which they are to count already, equally when that is nothing; they arrive at the same time. A share that is set
-/// meanwhile begins a new line where the old one stands.
+/// A share changes linearly to its new value within kHandOver. The other shares change at the same time, in
+/// proportion to their target values, or equally if these are 0. A new value during a change starts a new line at the
+/// current values.
 ///
-/// A leader that is not engaged keeps its share: the others do not grow by it.
+/// A leader that is not engaged keeps its share.
 ///
 /// Thread-safe: no. Realtime-safe: all but the constructor.
 class Shares {
  public:
   static constexpr std::size_t kMost = 4;
   static constexpr Duration kHandOver = std::chrono::milliseconds(500);
-  static constexpr double kRounding = 1e-9;  ///< by which the sum that the constructor is given may be off
+  static constexpr double kRounding = 1e-9;  ///< tolerance of the sum in the constructor
 
-  /// 1 … kMost of them. Throws std::invalid_argument naming the field, its value and what was expected.
+  /// Requires 1 … kMost shares. Throws std::invalid_argument with the name of the field, its value and the expected
+  /// value.
   explicit Shares(std::span<const double> shares);
 
-  /// Nothing happens when there is no such leader, when it is the only one, or when `share` is not in [0, 1].
+  /// Does nothing if the leader does not exist or is the only one, or if `share` is not in [0, 1].
   void set(std::size_t leader, double share) noexcept;
   void advance(Duration elapsed) noexcept;
 
@@ -37,7 +38,7 @@ class Shares {
   std::size_t count_;
   std::array<double, kMost> now_{};
   std::array<double, kMost> goal_{};
-  Duration left_{};  ///< until the goal is reached
+  Duration left_{};  ///< until `goal_` is reached
 };
 
 }  // namespace tendon

@@ -83,7 +83,7 @@ void GripCoupling::approach(double target) noexcept {
   asked_ = joined_ ? target : asked_ + std::copysign(most, target - asked_);
 }
 
-/// Makes w, and tells it.
+/// Computes w.
 void GripCoupling::lead(double opening, double velocity, const CouplingPeriod& period) noexcept {
   if (begins_) asked_ = heard_ ? newest_.opening + newest_.force / peers_ : opening;
   if (!period.live) joined_ = false;
@@ -93,7 +93,7 @@ void GripCoupling::lead(double opening, double velocity, const CouplingPeriod& p
   speed_ = joined_ ? velocity : 0;
 }
 
-/// Makes z, and tells g_f.
+/// Computes z.
 void GripCoupling::go_after(double opening, double there, const CouplingPeriod& period) noexcept {
   if (begins_) {
     if (place_) {

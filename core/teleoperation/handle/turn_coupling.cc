@@ -9,7 +9,7 @@ namespace {
 
 constexpr double kUnboundedTurn = std::numeric_limits<double>::infinity();
 
-/// The gradient of 4 K (1 − |w|); see the header.
+/// The gradient of 4 K (1 − |w|).
 Vec3 spring(double stiffness, const Quat& rest, const Quat& q) noexcept {
   const Quat between = product(q, inverse(rest));
   return (between.w < 0 ? 2 : -2) * stiffness * Vec3(between.x, between.y, between.z);

@@ -45,8 +45,8 @@ void SurfaceEstimator<N>::Moments::add(double share, const Vec<N>& y, const Vec<
   both = (1 - share) * (both + share * from_place * from_force.transpose());
 }
 
-// The mean force, and the normal until now with four times the memory, without what lies along the directions in which
-// the undeformed surface under the tool spreads.
+// The mean force and the previous normal, weighted with four times the memory, without the components along the
+// directions in which the undeformed surface under the tool spreads.
 template <int N>
 Vec<N> SurfaceEstimator<N>::find_normal() const noexcept {
   const double size = moments_.force.norm();
@@ -60,7 +60,7 @@ Vec<N> SurfaceEstimator<N>::find_normal() const noexcept {
     const Mat<N> cross = compliance * moments_.both;
     const Mat<N> surface = moments_.places + cross + cross.transpose() + compliance * compliance * moments_.forces;
     const Eigen::SelfAdjointEigenSolver<Mat<N>> axes(surface);
-    for (int i = 1; i < N; ++i) {  // never the smallest
+    for (int i = 1; i < N; ++i) {  // the smallest one is the normal
       const Vec<N> axis = axes.eigenvectors().col(i);
       const bool spread = axes.eigenvalues()[i] >= config_.least_spread * config_.least_spread;
       const double along = mean.dot(axis);
@@ -68,11 +68,11 @@ Vec<N> SurfaceEstimator<N>::find_normal() const noexcept {
     }
   }
   const double left = normal.norm();
-  constexpr double kWidest = 0.8;  // the cosine of a friction of 0.75
+  constexpr double kWidest = 0.8;  // cosine for a friction coefficient of 0.75
   return left > 0.1 && normal.dot(mean) > kWidest * left ? Vec<N>(normal / left) : mean;
 }
 
-// m, as deep as the tool may be inside the surface and feel nothing.
+// m, maximum depth of the tool inside of the surface without a measurable force.
 template <int N>
 double SurfaceEstimator<N>::unseen() const noexcept {
   return 2 * config_.contact_force / std::max(model_.stiffness, least_stiffness()) + config_.position_noise;
@@ -85,7 +85,7 @@ SurfaceModel<N> SurfaceEstimator<N>::observe(const Vec<N>& position, const Vec<N
   if (!position.allFinite() || !std::isfinite(size)) return model_;
   if (size < config_.contact_force) {
     touching_ = false;
-    // A contact would have been felt here for sure.
+    // A contact at this depth would have been measured.
     if (model_.depth(position) > unseen()) {
       model_.stiffness = 0;
       known_ = false;
@@ -112,7 +112,7 @@ SurfaceModel<N> SurfaceEstimator<N>::observe(const Vec<N>& position, const Vec<N
     const double covariance = model_.normal.dot(moments_.both * model_.normal);
     model_.stiffness = std::clamp(-covariance / variance, least_stiffness(), config_.max_stiffness);
   }
-  // Through the newest sample, which is what the hand is to feel now.
+  // The surface contains the newest sample, which the hand feels next.
   const double push = std::max(model_.normal.dot(force), 0.0);
   model_.offset = model_.normal.dot(position) + push / model_.stiffness;
   return model_;

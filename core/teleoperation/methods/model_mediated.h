@@ -7,45 +7,46 @@
 
 namespace tendon {
 
-/// A flat, springy surface, which the follower sends instead of forces.
+/// A flat elastic surface, which the follower sends instead of forces.
 ///
-///     F(x) = K (d − n·x)₊ n       N, on whoever is at x
+///     F(x) = K (d − n·x)₊ n       N, on a hand at x
 template <int N>
 struct SurfaceModel {
-  std::uint64_t sequence = 0;       ///< 1, 2, …; a message with one that is not above the newest is dropped
+  std::uint64_t sequence = 0;       ///< 1, 2, …; messages that are not newer are dropped
   Vec<N> normal = Vec<N>::Unit(0);  ///< n, unit vector, out of the surface
-  double offset = 0;                ///< d, m: the surface is at n·x = d
-  double stiffness = 0;             ///< K, N/m; 0: there is none
+  double offset = 0;                ///< d, m; the surface is at n·x = d
+  double stiffness = 0;             ///< K, N/m; 0: no surface
 
-  /// How deep `x` is inside, m; 0 outside.
+  /// Depth of `x` inside of the surface, m; 0 outside.
   double depth(const Vec<N>& x) const noexcept;
   /// ½ K depth², J.
   double energy(const Vec<N>& x) const noexcept;
 };
 
-/// Finds the surface that a tool touches, from where it is and what it feels: the follower's end of model-mediated
-/// teleoperation.
+/// The follower's end of model-mediated teleoperation: estimates the surface that a tool touches from its position
+/// and its contact force.
 ///
-///     n:       the mean force and the normal until now, less what lies along where x + f/K spreads
-///     K and d: least squares of n·f = K d − K (n·x) over the contact, older samples fading out
+///     n:       the mean force and the previous normal, without the directions in which x + f/K spreads
+///     K and d: least squares of n·f = K d − K (n·x) over the contact, with fading weights
 ///
-/// with f the force of the surroundings on the tool (N), at position x (m). Contact is ‖f‖ ≥ contact_force; a new
-/// contact starts afresh, and its moments are about its first point, so it does not matter how far the origin is. On a
-/// springy surface with friction x + f/K is a point of the plane n·x = d, moved along it; so from a spread of
-/// `least_spread` on its principal axes say what lies in the surface, and friction is what is left of f. Where it does
-/// not spread (a press without sliding) the mean force is the normal, tilted by friction; n is never farther from it
-/// than a friction of 0.75 can tilt it. Until the tool has moved enough within the contact for a slope to be seen, K is
-/// `first_stiffness`, or what it was when this contact begins where the last surface was; after that it is kept between
-/// a tenth of first_stiffness and `max_stiffness`. d is such that the model's force at the newest sample is n·f.
+/// f is the force on the tool (N) at the position x (m). There is contact if ‖f‖ ≥ contact_force. Each contact starts
+/// new moments about its first point, so the position of the origin does not matter. On an elastic surface with
+/// friction, x + f/K is a point of the plane n·x = d, moved along it. Principal axes with a spread of at least
+/// `least_spread` are therefore in the surface, and the force along them is friction. Without such a spread (a push
+/// without sliding), the mean force is the normal, tilted by friction; n is limited to the tilt of a friction
+/// coefficient of 0.75. Until the tool has moved enough to determine a slope, K is `first_stiffness`, or the previous
+/// K if the contact starts at the last surface. After that it is limited to first_stiffness/10 … `max_stiffness`. d
+/// is chosen such that the force of the model at the newest sample is n·f.
 ///
-/// Out of contact the last surface stays: it is where the next contact is expected. But when the tool is deeper in it
-/// than 2 contact_force/K + position_noise and feels nothing, it is gone: K is 0 until the next contact. That takes
-/// energy out of the model, so a SurfaceRenderer follows it at once. (To move d to the tool is not enough: the hand is
-/// ahead of the tool by a round trip, and would be let go by a share of its depth in each of them.)
+/// Without contact, the last surface is kept as a prediction of the next contact. If the tool is deeper in it than 2
+/// contact_force/K + position_noise without a force, K becomes 0 until the next contact. This removes energy from the
+/// model, so a SurfaceRenderer uses it immediately. (Moving d to the tool is not enough: the hand is ahead of the
+/// tool by a round trip and would only be released gradually.)
 ///
-/// Source: the idea of Mitra and Niemeyer, IJRR 27(2), 2008 (recalled, not re-read); the estimator is ours.
+/// Source: the idea of Mitra and Niemeyer, IJRR 27(2), 2008 (recalled, not re-read); the estimator is ours
+/// (core/PROOFS.md, "Surfaces").
 ///
-/// Samples that are not finite are passed over. Thread-safe: no. Realtime-safe: all but the constructor.
+/// Samples that are not finite are ignored. Thread-safe: no. Realtime-safe: all but the constructor.
 template <int N>
 class SurfaceEstimator {
  public:
@@ -53,30 +54,30 @@ class SurfaceEstimator {
     double contact_force = 0;    ///< N; > 0
     double first_stiffness = 0;  ///< N/m; > 0
     double max_stiffness = 0;    ///< N/m; ≥ first_stiffness
-    double least_travel = 0;     ///< m, standard deviation of n·x from which on a slope is believed; > 0
-    double memory = 0;           ///< samples after which one has faded to 1/e; > 0
-    double least_spread = 1e-3;  ///< m, standard deviation along a direction from which on it lies in the surface; > 0
-    double position_noise = 0;   ///< m, ≥ 0: a tool that is no deeper than this inside a surface may be outside it
+    double least_travel = 0;     ///< m, standard deviation of n·x above which a slope is used; > 0
+    double memory = 0;           ///< number of samples after which a weight has decreased to 1/e; > 0
+    double least_spread = 1e-3;  ///< m, standard deviation above which a direction is in the surface; > 0
+    double position_noise = 0;   ///< m, ≥ 0; a tool that is less deep inside a surface may be outside of it
   };
 
-  /// Throws std::invalid_argument naming the field, its value and what was expected.
+  /// Throws std::invalid_argument with the name of the field, its value and the expected value.
   explicit SurfaceEstimator(const Config& config);
 
-  /// One sample; returns the surface as it is known now, to be sent when it seems worth it.
+  /// Adds one sample. Returns the current surface.
   SurfaceModel<N> observe(const Vec<N>& position, const Vec<N>& force) noexcept;
 
-  /// Root mean square of what of f is along the surface, over that of what is across it: μ while the tool slides, and
-  /// with what noise adds. 0 before the first contact.
+  /// Ratio of the RMS forces along and across the surface: μ while the tool slides, plus noise. 0 before the first
+  /// contact.
   double friction() const noexcept;
 
  private:
-  /// Fading means, and moments about them.
+  /// Means and second moments with fading weights.
   struct Moments {
-    Vec<N> place = Vec<N>::Zero();   ///< m, from where the contact began
+    Vec<N> place = Vec<N>::Zero();   ///< m, relative to the start of the contact
     Vec<N> force = Vec<N>::Zero();   ///< N
     Mat<N> places = Mat<N>::Zero();  ///< m²
     Mat<N> forces = Mat<N>::Zero();  ///< N²
-    Mat<N> both = Mat<N>::Zero();    ///< N·m: places by rows, forces by columns
+    Mat<N> both = Mat<N>::Zero();    ///< N·m; rows: positions, columns: forces
 
     void add(double share, const Vec<N>& y, const Vec<N>& f) noexcept;
   };
@@ -89,46 +90,46 @@ class SurfaceEstimator {
   SurfaceModel<N> model_;
   bool touching_ = false;
   bool known_ = false;              ///< there was a contact
-  double weight_ = 0;               ///< Σ of fading weights
-  Vec<N> origin_ = Vec<N>::Zero();  ///< m, where the contact began
+  double weight_ = 0;               ///< sum of the weights
+  Vec<N> origin_ = Vec<N>::Zero();  ///< m, start of the contact
   double samples_ = 0;              ///< of this contact
   Moments moments_;
 };
 
-/// Renders a surface at the leader at the full rate, whatever the network does: energy can only enter when the model
-/// changes, and no change enters unless it is paid.
+/// The leader's end: renders a surface at the full rate. Energy can only enter when the model changes, and each
+/// change must be paid for.
 ///
 ///     F_wanted = K (d' − n·x)₊ n,     ½ K (d' − n·x)₊² ≤ ½ K_old (d'_old − n_old·x)₊² + budget
 ///
-/// In every period the surface in use becomes the newest one received, put deeper (d' ≤ d) where it would hold more
-/// energy at the hand than the one before plus what the caller gives for it. It then rises to its place as the
-/// hand withdraws or as budget comes. So what the model has given out is never more than what the hand and the
-/// budget have put in. A good budget is what the port's account has beyond the energy of the surface,
+/// In each period, the newest received surface is used. It is placed deeper (d' ≤ d) if its energy at the hand would
+/// exceed the energy of the previous one plus the budget. It then rises to its position as the hand retracts or as
+/// budget becomes available. The energy from the model therefore never exceeds the energy from the hand and the
+/// budget. A suitable budget is the part of the port's account beyond the energy of the surface,
 ///
 ///     budget = max(E − rendered energy, 0)
 ///
-/// with which a limiter with K ≤ 2b/T_max has nothing left to clip; a budget of zero is passive whatever E is.
+/// With this budget a limiter with K ≤ 2b/T_max does not reduce the force. A budget of 0 is passive for every E.
 ///
-/// Source: as above; the gate: control.md 7.
+/// Source: as above; for the budget core/PROOFS.md, "Surfaces".
 ///
-/// A message whose numbers are not finite, whose stiffness is negative or whose normal is not a unit vector (1e-6) is
-/// passed over; when `position` is not finite, neither is the demand. A budget that is not above zero is none.
+/// A message is ignored if a number is not finite, the stiffness is negative, or the normal is not a unit vector
+/// (1e-6). If `position` is not finite, the demand is not finite. A budget that is not above 0 counts as 0.
 ///
 /// Thread-safe: no. Realtime-safe: all of it.
 template <int N>
 class SurfaceRenderer {
  public:
   struct Rendered {
-    Demand<N> demand;  ///< the force, and the stiffness K n nᵀ while the surface is touched
-    double paid;       ///< J, of the budget; ≥ 0
+    Demand<N> demand;  ///< the force, and the stiffness K n nᵀ during contact
+    double paid;       ///< J, part of the budget; ≥ 0
   };
 
   void receive(const SurfaceModel<N>& message) noexcept;
 
-  /// The force to want in the period that begins, with the hand at `position` (m).
+  /// Returns the requested force for this period, with the hand at `position` (m).
   Rendered command(const Vec<N>& position, double budget) noexcept;
 
-  /// ½ K depth² of the surface in use, J: part of the port's account that is not free.
+  /// ½ K depth² of the current surface, J. This part of the port's account is not available.
   double energy(const Vec<N>& position) const noexcept { return used_.energy(position); }
 
  private:

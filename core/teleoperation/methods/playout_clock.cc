@@ -28,7 +28,7 @@ Duration PlayoutClock::least() const noexcept { return std::min(halves_[0].least
 Duration PlayoutClock::playout() const noexcept {
   const int count = halves_[0].count + halves_[1].count;
   if (count == 0) return Duration::zero();
-  // The (count / 100)-th largest of both, counted from zero: one in a hundred may come later.
+  // The (count / 100)-th largest delay of both intervals, counted from 0, since 1 % may be late.
   std::array<std::size_t, 2> at{};
   const auto has = [&](std::size_t h) {
     return at[h] < std::min(static_cast<std::size_t>(halves_[h].count), kLargest);

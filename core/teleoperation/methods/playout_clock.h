@@ -8,46 +8,46 @@
 
 namespace tendon {
 
-/// Says which moment of a sender to play out now, so late that what belongs to it has come, and no later.
+/// Computes the time of the sender to play out, late enough that the messages for that time have arrived:
 ///
-///     τ = t − least way − D,      D = p99 of (way + what was waited for a gap) − least way,   0 ≤ D ≤ max_playout
+///     τ = t − min delay − D,      D = p99 of (delay + wait for a gap) − min delay,   0 ≤ D ≤ max_playout
 ///
-/// t is our time, τ the sender's; a way is our time of arrival minus the sender's time of sending. Their zeros differ
-/// by anything, which drops out: no clocks are compared. Both figures are of the last 256 to 512 messages, so a rate
-/// that is wrong by 200 ppm shifts τ by less than 0.1 ms at 1000 messages a second. τ is brought to a new place
-/// without jumps: it runs at 1 + (lag / 100 ms) of its rate, at most twice as fast and never backwards.
+/// t is the local time and τ the time of the sender. A delay is the local arrival time minus the sending time; the
+/// offset of the clocks cancels. Both statistics are over the last 256 to 512 messages, so a clock rate error of 200
+/// ppm shifts τ by less than 0.1 ms at 1000 messages per second. τ changes without jumps: its rate is 1 + (lag / 100
+/// ms), at most 2 and at least 0.
 ///
-/// Source: playout buffers of packet voice; the quantile, the gaps and the steering are ours.
+/// Source: playout buffers for voice over packet networks; the quantile, the gaps and the rate control are ours.
 ///
 /// Thread-safe: no. Realtime-safe: yes.
 class PlayoutClock {
  public:
-  /// `max_playout`: the most that D may be; ≥ 0. What comes later than that is played out of its place.
+  /// `max_playout` is the maximum of D, ≥ 0. Messages that arrive later are played out late.
   explicit PlayoutClock(Duration max_playout) : max_playout_(max_playout) {}
 
-  /// The newest message yet has come at our time `now`, sent at its `time`. `waited` (≥ 0): how much longer than its
-  /// own way those before it that have not come (lost, overtaken or never sent) made the playout wait.
+  /// Records a message with the highest `time` so far, which arrived at the local time `now`. `waited` (≥ 0) is the
+  /// additional delay of the playout caused by previous messages that are missing (lost, reordered or not sent).
   void heard(Duration now, Duration time, Duration waited) noexcept;
 
-  /// Our time is now `now`, and does not fall. Returns τ. Before anything was heard τ stays at zero.
+  /// Returns τ. `now` must not decrease. τ is 0 before the first message.
   Duration advance(Duration now) noexcept;
 
-  /// D, as it would be now.
+  /// The current value of D.
   Duration playout() const noexcept;
 
  private:
   static constexpr int kHalf = 256;           ///< messages
-  static constexpr std::size_t kLargest = 6;  ///< 1 % of two halves and one
+  static constexpr std::size_t kLargest = 6;  ///< 1 % of two intervals, plus one
   struct Half {
     int count = 0;
-    Duration least = Duration::max();          ///< way
-    std::array<Duration, kLargest> largest{};  ///< way and wait, falling
+    Duration least = Duration::max();          ///< minimum delay
+    std::array<Duration, kLargest> largest{};  ///< delay plus wait, in decreasing order
   };
 
   Duration least() const noexcept;
 
   Duration max_playout_;
-  std::array<Half, 2> halves_{};  ///< the one that is being filled, and the one before
+  std::array<Half, 2> halves_{};  ///< current and previous interval
   Duration now_{};
   Duration playing_{};  ///< τ
   bool started_ = false;

@@ -12,10 +12,10 @@ namespace tendon {
 
 namespace {
 
-/// s per s: faster than two clocks drift apart, so the floor finds a way that has become longer within seconds.
+/// s/s, faster than the drift between two clocks, so that the minimum adapts to a longer delay within seconds.
 constexpr double kFloorRise = 2e-3;
 
-/// 36 years: no difference of two such times overflows.
+/// 36 years; the difference of two such times does not overflow.
 constexpr Duration kMostMotionTime = std::chrono::nanoseconds(std::int64_t{1} << 60);
 
 }  // namespace
@@ -89,7 +89,7 @@ Demand<N> PositionPosition<N>::command(const Vec<N>& position, const Vec<N>& vel
   position_ = position;
   velocity_ = velocity;
   Vec<N> force = -config_.own_damping * velocity;
-  if (newest_.sequence == 0) return {force + 0 * position};  // not finite when the position is not
+  if (newest_.sequence == 0) return {force + 0 * position};  // propagates a position that is not finite
   const auto counted = [this](std::uint64_t periods) { return static_cast<std::int64_t>(periods) * config_.period; };
   if (newest_.answers > 0) {
     if (counted(sequence_ - stretch_began_) >= config_.recovery) {

@@ -11,21 +11,21 @@
 
 namespace tendon {
 
-/// What one end of a position–position coupling tells the other, in the receiver's frame and scale.
+/// The message between the ends of a position–position coupling, in the frame and scale of the receiver.
 template <int N>
 struct PortMotion {
-  std::uint64_t epoch = 1;     ///< of the sender, > 0: above every one before when it starts anew (Purse)
-  std::uint64_t sequence = 0;  ///< the sender's period in it: 1, 2, …; one that is not above the newest is dropped
-  std::uint64_t answers_epoch = 0;   ///< the receiver's epoch that `answers` belongs to; 0: none yet
-  std::uint64_t answers = 0;         ///< sequence of the receiver's motion that the sender used; 0: none yet
-  Duration time{};                   ///< the sender's own: only differences are used; ± 2⁶⁰ ns
-  Duration round_trip{};             ///< that the sender has measured; 0: not yet
+  std::uint64_t epoch = 1;           ///< of the sender, > 0; increases with each restart (Purse)
+  std::uint64_t sequence = 0;        ///< period of the sender: 1, 2, …; messages that are not newer are dropped
+  std::uint64_t answers_epoch = 0;   ///< epoch of the receiver for `answers`; 0: none
+  std::uint64_t answers = 0;         ///< sequence of the receiver's message that the sender used; 0: none
+  Duration time{};                   ///< in the sender's clock; only differences are used; ± 2⁶⁰ ns
+  Duration round_trip{};             ///< measured by the sender; 0: not known
   Vec<N> position = Vec<N>::Zero();  ///< m
   Vec<N> velocity = Vec<N>::Zero();  ///< m/s
 };
 
-/// As much of a spring's stretch y − x (m) as an account pays for: the nearest to it with ½ K ‖stretch‖² ≤ energy (J,
-/// +∞ is allowed). K in N/m, > 0. Thread-safe: yes. Realtime-safe: yes.
+/// Limits the stretch y − x (m) of a spring such that ½ K ‖stretch‖² ≤ energy (J, +∞ is allowed). K in N/m, > 0.
+/// Thread-safe: yes. Realtime-safe: yes.
 template <int N>
 Vec<N> paid_stretch(const Vec<N>& stretch, double stiffness, double energy) noexcept {
   const double farthest = std::sqrt(2 * std::max(energy, 0.0) / stiffness);
@@ -33,43 +33,43 @@ Vec<N> paid_stretch(const Vec<N>& stretch, double stiffness, double energy) noex
   return distance > farthest ? Vec<N>(stretch * (farthest / distance)) : stretch;
 }
 
-/// Ties two handles with a spring and a damper, each end by itself: the same class at both.
+/// Couples two handles by a spring and a damper. Both ends use this class.
 ///
-///     F = K (y − x) + D (ẏ − v) − B v,   ‖F‖ ≤ max_force        N, on whoever holds this end
+///     F = K (y − x) + D (ẏ − v) − B v,   ‖F‖ ≤ max_force        N, on the hand at this end
 ///     K = min(stiffness, 2B/T_loop)                             with `adapt_to_delay`
 ///
-/// x, v are this end's position and velocity, y, ẏ the other's: the newest that came, and y + ẏ e when that is by e
-/// later than the quickest messages lately (e ≤ kMostAhead, then y stands still and ẏ is 0). F acts along each axis by
-/// itself and is the same in every frame.
+/// x, v are the position and velocity of this end, and y, ẏ those of the other end: the newest received values,
+/// extrapolated to y + ẏ e if they are later than the fastest recent messages by e (e ≤ kMostAhead; beyond that y is
+/// constant and ẏ = 0). The law is isotropic.
 ///
-/// **Why K falls with the delay.** The late spring lags behind the motion and gives out what a damper of K·T_loop/2 at
-/// each end takes up; with K ≤ 2B/T_loop the coupling is quiet (B: all damping at one end that is sure). Above it the
-/// limiters and the purse keep the pair passive, but it buzzes: 0.04 … 0.08 m/s in free motion from 50 ms on.
+/// **Dependence of K on the delay** (core/PROOFS.md, "Coupling springs"). The delayed spring generates energy, which
+/// a damper of K·T_loop/2 at each end dissipates. The coupling is quiet for K ≤ 2B/T_loop, where B is the reliable
+/// damping at one end. Above that, the limiters and the purse keep the pair passive, but it oscillates: 0.04 … 0.08
+/// m/s in free motion for delays above 50 ms.
 ///
-/// **T_loop** is measured without a clock: a message says which of our motions it answers, and our periods since then
-/// are counted, so delay, loss and the other end's waiting are all in it. Both ends take the longer of what they
-/// measured: two different K would hold two different forces. T_loop rises at once; it falls after `recovery`, being
-/// the longest of the last one to two of these, so that a held force does not waver. K follows with kSettling: the two
-/// ends learn of a longer way at different times, and a step of K would be felt. When nothing comes T_loop grows and K
-/// falls; when to give up is the caller's business (the loss ladder). A change of K under stretch costs ½ ΔK δ², which
-/// the accounts pay.
+/// **T_loop** is measured without a common clock: a message contains the sequence that it answers, and the periods
+/// since then are counted. This includes delay, loss and waiting of the other end. Both ends use the longer of the
+/// two measurements, because different K would result in different forces. T_loop increases immediately. It decreases
+/// after `recovery`, since it is the maximum over one to two of these intervals, so that a held force is steady. K
+/// follows with the time constant kSettling, because both ends learn about a longer delay at different times. Without
+/// messages T_loop increases and K decreases; the caller must detect the loss of the peer. A change of K under
+/// stretch costs ½ ΔK δ², which the accounts pay.
 ///
-/// **Why y + ẏ e.** A message that is 5 ms later than the last one leaves y 1 mm behind at 0.2 m/s: 0.4 N of noise at
-/// 400 N/m. Measured free motion at RTT 10 ms with 5 ms of jitter: see the README.
+/// **Extrapolation.** If a message is 5 ms later than the previous one, y is wrong by 1 mm at 0.2 m/s, which causes
+/// 0.4 N of noise at 400 N/m. See the README for measurements.
 ///
-/// **What it feels like** in free motion, as a damper, with a sine of peak speed v̂ and the follower's friction b_f,
-/// f_c:
+/// **Felt damping** in free motion, for a sine with the peak speed v̂ and the friction b_f, f_c of the follower:
 ///
 ///     b_felt = K·T_loop + B_l + B_f + b_f + 4 f_c/(π v̂)
 ///
-/// and a hand cannot feel a coupling stiffer than K_op of the two limiters, 1/K_op = T_l/(2 b_l) + T_f/(2 b_f). Both
-/// ends need the same K, D and B up to the scale of the map: K_l = s_f s_x K_f, and so D and B.
+/// The stiffness that a hand can feel is at most K_op of the two limiters, 1/K_op = T_l/(2 b_l) + T_f/(2 b_f). Both
+/// ends must use the same K, D and B up to the scales: K_l = s_f s_x K_f, and likewise for D and B.
 ///
-/// This law is not passive. It needs a limiter and a Purse at both ends.
+/// This law is not passive. It requires a limiter and a Purse at both ends.
 ///
-/// A message that is not finite or out of its bounds is dropped and counted in `refused`. A higher epoch of the other
-/// end begins anew with it; one of a lower epoch is passed over. When the position is not finite, neither is the
-/// demand, which the limiter turns to zero. Before the first message only −B v.
+/// Messages that are not finite or out of bounds are dropped and counted in `refused`. A higher epoch of the other
+/// end starts anew, and a lower one is ignored. If the position is not finite, the demand is not finite, and the
+/// limiter sets the force to 0. Before the first message, the force is −B v.
 ///
 /// Source: position–position coupling, Hannaford 1989 (recalled); the bound on K derived here and measured.
 ///
@@ -77,49 +77,49 @@ Vec<N> paid_stretch(const Vec<N>& stretch, double stiffness, double energy) noex
 template <int N>
 class PositionPosition {
  public:
-  /// e is at most this.
+  /// Maximum of e.
   static constexpr Duration kMostAhead = std::chrono::milliseconds(20);
-  /// The time constant with which K follows T_loop.
+  /// Time constant of K.
   static constexpr Duration kSettling = QuietStiffness::kSettling;
 
   struct Config {
-    double stiffness = 0;    ///< most K, N/m; > 0
+    double stiffness = 0;    ///< maximum of K, N/m; > 0
     double damping = 0;      ///< D, N·s/m; ≥ 0
     double own_damping = 0;  ///< B, N·s/m; ≥ 0, and > 0 with adapt_to_delay
     bool adapt_to_delay = true;
     Duration period{};        ///< of this end, > 0
-    std::uint64_t epoch = 1;  ///< > 0, as the Purse's
-    /// T_loop falls when it has been shorter for one to two of these; > 0.
+    std::uint64_t epoch = 1;  ///< > 0, see Purse
+    /// T_loop decreases after it has been shorter for one to two of these intervals; > 0.
     Duration recovery = std::chrono::seconds(5);
     double max_force = std::numeric_limits<double>::infinity();  ///< N, > 0
   };
 
-  /// Throws std::invalid_argument naming the field, its value and what was expected.
+  /// Throws std::invalid_argument with the name of the field, its value and the expected value.
   explicit PositionPosition(const Config& config);
 
   void receive(const PortMotion<N>& message) noexcept;
 
-  /// After a loss of the peer: T_loop is measured anew, without the silence in it.
+  /// Must be called after a loss of the peer. T_loop is measured again without the silence.
   void forget_round_trip() noexcept;
 
-  /// Begins a period: the force to want in it, and the spring behind it. The caller maps positions (clutch, scale).
-  /// `energy`, J: the spring is stretched only as far as this pays (paid_stretch).
+  /// Returns the requested force for this period and its stiffness. The caller maps positions (clutch, scale).
+  /// `energy` (J) limits the stretch of the spring (paid_stretch).
   Demand<N> command(const Vec<N>& position, const Vec<N>& velocity,
                     double energy = std::numeric_limits<double>::infinity()) noexcept;
 
-  /// What to send in this period, after `command`.
+  /// Returns the message to send in this period. Must be called after `command`.
   PortMotion<N> message() const noexcept;
 
-  /// Forgets the other end, and has another epoch itself (Purse::renew).
+  /// Resets the other end and sets the own epoch (Purse::renew).
   void renew(std::uint64_t epoch) noexcept;
 
-  /// K, D and B from now on, each in its bounds of Config. K goes there within kSettling.
+  /// Sets K, D and B, within the bounds of Config. K changes with the time constant kSettling.
   void become(double stiffness, double damping, double own_damping) noexcept;
 
   double stiffness() const noexcept { return stiffness_.value(); }  ///< K in use, N/m
-  /// T_loop in use; zero until the other end has answered.
+  /// Current T_loop; 0 until the other end has answered.
   Duration round_trip() const noexcept { return std::max({loop_, loop_before_, newest_.round_trip}); }
-  double ahead() const noexcept { return ahead_; }  ///< e of the newest command, s
+  double ahead() const noexcept { return ahead_; }  ///< e in the last command, s
   std::uint64_t refused() const noexcept { return refused_; }
 
  private:
@@ -129,10 +129,10 @@ class PositionPosition {
   Vec<N> position_ = Vec<N>::Zero();
   Vec<N> velocity_ = Vec<N>::Zero();
   QuietStiffness stiffness_;
-  Duration loop_{};         ///< measured here: the longest of this stretch of `recovery`
-  Duration loop_before_{};  ///< of the stretch before
+  Duration loop_{};         ///< measured here: maximum in the current interval of `recovery`
+  Duration loop_before_{};  ///< maximum in the previous interval
   std::uint64_t stretch_began_ = 0;
-  double floor_ = 0;  ///< s, our time less the other's when its message is used: the least lately
+  double floor_ = 0;  ///< s, minimum of the local time minus the other end's time
   double ahead_ = 0;  ///< s, e
   std::uint64_t refused_ = 0;
 };

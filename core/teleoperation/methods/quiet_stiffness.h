@@ -8,11 +8,11 @@
 
 namespace tendon {
 
-/// The stiffness of a spring between two ends that hear each other late, in N/m or N·m/rad:
+/// The stiffness of a spring between two ends with a delay, in N/m or N·m/rad:
 ///
-///     K → min(most, 2 B/T_loop),    T_loop > 0 and known                 (PositionPosition says why)
+///     K → min(most, 2 B/T_loop),    T_loop > 0 and known                 (see PositionPosition)
 ///
-/// It follows with the time constant kSettling, but takes the first T_loop at once.
+/// K changes with the time constant kSettling, but uses the first T_loop immediately.
 ///
 /// Thread-safe: no. Realtime-safe: yes.
 class QuietStiffness {
@@ -21,13 +21,13 @@ class QuietStiffness {
 
   struct Config {
     double most = 0;     ///< > 0
-    double damping = 0;  ///< B; ∞: K stays `most`
-    Duration period{};   ///< between two calls of `follow`, > 0
+    double damping = 0;  ///< B; ∞: K is `most`
+    Duration period{};   ///< time between two calls of `follow`, > 0
   };
-  /// Checks nothing.
+  /// Does not check the values.
   explicit QuietStiffness(const Config& config) noexcept : config_(config), value_(config.most) {}
 
-  /// Once a period; `loop`: 0 while it is not known.
+  /// Must be called once per period. `loop` is 0 if it is not known.
   double follow(Duration loop) noexcept {
     const double late = seconds(loop);
     double quiet = config_.most;
@@ -37,12 +37,12 @@ class QuietStiffness {
     known_ = late > 0;
     return value_;
   }
-  /// K goes to what these make of it from now on.
+  /// Sets new parameters. K changes gradually.
   void become(double most, double damping) noexcept {
     config_.most = most;
     config_.damping = damping;
   }
-  /// The next T_loop is taken at once.
+  /// Uses the next T_loop immediately.
   void forget() noexcept { known_ = false; }
   double value() const noexcept { return value_; }
 

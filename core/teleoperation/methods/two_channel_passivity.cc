@@ -25,7 +25,7 @@ Demand<N> PassivityLeader<N>::command(const Vec<N>& velocity) noexcept {
   const double excess = newest_.force.dot(velocity) - energy() / seconds(config_.period);  // W
   if (excess <= 0) return {newest_.force};
   const double squared = velocity.squaredNorm();
-  // Written so that a velocity of zero needs no division.
+  // Avoids a division if the velocity is 0.
   const double damping = excess < config_.max_damping * squared ? excess / squared : config_.max_damping;
   return {newest_.force - damping * velocity};
 }
@@ -72,11 +72,11 @@ auto PassivityFollower<N>::step(const Vec<N>& force) noexcept -> Command {
   Vec<N> velocity = fresh_ ? newest_.velocity : Vec<N>::Zero();
   fresh_ = false;
   velocity += config_.drift_rate * (newest_.displacement - displacement_ - period * velocity);
-  const double spring = 0.5 * config_.stiffness * period;   // the spring gains ½K T² v², in W: times v²
+  const double spring = 0.5 * config_.stiffness * period;   // the spring stores ½K T² v²; in W, per v²
   const double allowed = std::max(energy(), 0.0) / period;  // W
   const double excess = force.dot(velocity) + spring * velocity.squaredNorm() - allowed;
   if (excess > 0 && spring > 0) {
-    // The condition is a ball of radius r round −f/(K T); |from_centre|² − r² = excess / spring.
+    // The condition is a ball with radius r around −f/(K T); |from_centre|² − r² = excess / spring.
     const Vec<N> from_centre = velocity + force / (2 * spring);
     const double distance = from_centre.norm();
     const double beyond = excess / spring;

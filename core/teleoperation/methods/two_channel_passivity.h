@@ -7,61 +7,61 @@
 
 namespace tendon {
 
-/// The message that the leader's port sends in each period.
+/// The message of the leader in each period.
 template <int N>
 struct LeaderMessage {
-  std::uint64_t sequence = 0;            ///< 1, 2, …; a message with one that is not above the newest is dropped
-  Vec<N> velocity = Vec<N>::Zero();      ///< m/s, mean over the interval that has just ended
-  Vec<N> displacement = Vec<N>::Zero();  ///< m, since the start: what position drift is corrected with
-  double energy_in = 0;                  ///< J, what the leader's port has taken in, never decreasing
+  std::uint64_t sequence = 0;            ///< 1, 2, …; messages that are not newer are dropped
+  Vec<N> velocity = Vec<N>::Zero();      ///< m/s, mean over the previous interval
+  Vec<N> displacement = Vec<N>::Zero();  ///< m, since the start; used to correct position drift
+  double energy_in = 0;                  ///< J, energy received from the hand; does not decrease
 };
 
-/// The message that the follower's port sends in each period.
+/// The message of the follower in each period.
 template <int N>
 struct FollowerMessage {
   std::uint64_t sequence = 0;
-  Vec<N> force = Vec<N>::Zero();  ///< N, that the hand is to feel: the negative of the force on the tool
-  double energy_in = 0;           ///< J, what the follower's port has taken in, never decreasing
+  Vec<N> force = Vec<N>::Zero();  ///< N, to apply to the hand: the negative force on the tool
+  double energy_in = 0;           ///< J, energy received from the tool; does not decrease
 };
 
-/// The leader's end of two-channel time-domain passivity control: velocity goes out, force comes back, and neither end
-/// gives out energy that the other has not taken in before, whatever the network does.
+/// The leader's end of two-channel time-domain passivity control. The velocity is sent to the follower, and the force
+/// is received. No end outputs energy that the other one has not received before, independent of the network.
 ///
-///     E_in  = Σ (−F·Δx)₊      E_out = Σ (F·Δx)₊         of the force F really applied on the hand
-///     F_wanted = F_received − α v,   α ≥ 0 the least with   T F_wanted·v ≤ E_in,follower(received) − E_out
+///     E_in  = Σ (−F·Δx)₊      E_out = Σ (F·Δx)₊         with the force F applied to the hand
+///     F_wanted = F_received − α v,   smallest α ≥ 0 with   T F_wanted·v ≤ E_in,follower(received) − E_out
 ///
-/// a damper in series (α, N·s/m), at most `max_damping`, which also keeps the division by a small v at bay. Since
-/// E_in never decreases, an old one is a lower bound: delay, loss and reordering only make it careful. The condition
-/// looks one period ahead with the velocity now; where the motion was another, E_out has it right afterwards and
-/// the next period makes it good, so the channel can be short by what one period changed; with a motion that is known
-/// it is exact. The papers' f is −F at the leader, and F at the follower.
+/// α (N·s/m) is a series damper with the limit `max_damping`, which also avoids the division by a small v. Since E_in
+/// does not decrease, an old value is a lower bound, so delay, loss and reordering are safe. The condition uses the
+/// current velocity for the next period. If the motion differs, E_out contains the actual value and the next period
+/// compensates for it; the error is that of one period, and 0 if the motion is known. The f of the papers is −F at
+/// the leader and F at the follower.
 ///
-/// Source: Ryu, Artigas and Preusche, Mechatronics 20(7), 2010 (recalled, not re-read); control.md 7. Ours is: one
-/// period ahead, and booked with the force really applied.
+/// Source: Ryu, Artigas and Preusche, Mechatronics 20(7), 2010 (recalled, not re-read); core/PROOFS.md, "Two-channel
+/// passivity control". The prediction by one period and the use of the applied force are ours.
 ///
-/// A message or an interval that is not finite is passed over; when `velocity` is not finite, neither is the demand.
+/// Messages and intervals that are not finite are ignored. If `velocity` is not finite, the demand is not finite.
 ///
 /// Thread-safe: no. Realtime-safe: all but the constructor.
 template <int N>
 class PassivityLeader {
  public:
   struct Config {
-    double max_damping = 0;  ///< N·s/m; > 0. For a device with viscous friction b no more than b can be rendered
-    Duration period{};       ///< T for which a command is to be held; > 0
+    double max_damping = 0;  ///< N·s/m, > 0. A device with viscous friction b can render at most b
+    Duration period{};       ///< T, hold time of a command; > 0
   };
 
-  /// Throws std::invalid_argument naming the field, its value and what was expected.
+  /// Throws std::invalid_argument with the name of the field, its value and the expected value.
   explicit PassivityLeader(const Config& config);
 
   void receive(const FollowerMessage<N>& message) noexcept;
 
-  /// The force to want in the period that begins; the last one received stays until a newer one comes.
+  /// Returns the requested force for this period. The last received force is used until a newer one arrives.
   Demand<N> command(const Vec<N>& velocity) noexcept;
 
-  /// The interval that has just ended; returns what to send.
+  /// Uses the previous interval. Returns the message to send.
   LeaderMessage<N> observe(const Interval<N>& interval) noexcept;
 
-  /// The energy that may still be given out, J: E_in,follower(received) − E_out. Below zero: see above.
+  /// J, energy that may still be output: E_in,follower(received) − E_out. It may be negative, see above.
   double energy() const noexcept { return newest_.energy_in - out_; }
 
  private:
@@ -71,53 +71,52 @@ class PassivityLeader {
   double out_ = 0;
 };
 
-/// The follower's end: the velocity to make the tool follow, given the force that this takes.
+/// The follower's end: computes the velocity of the tool from the force that the tool requires.
 ///
-///     v = v_received + λ (x_received − ∫ v dt) − β f,   β ≥ 0 the least with
+///     v = v_received + λ (x_received − ∫ v dt) − β f,   smallest β ≥ 0 with
 ///     T f·v + ½ K T² v² ≤ E = E_in,leader(received) − E_out
 ///
-/// f is the force on the tool (N), in the same period and really applied; β an admittance in parallel (m/(N·s)). K is
-/// the stiffness of the controller's spring whose far end moves by T v: its force rises by K T v meanwhile, which costs
-/// ½ K T² v² (J) and is booked. With K > 0 the velocity that breaks the condition goes to the nearest that keeps it.
-/// Both sides are known when they are booked, so that this end is exact. The second term gives back the displacement
-/// that the β of earlier periods, or lost messages, have taken away (about 40 mm in a few seconds without); it stands
-/// under the same condition as the rest, so drift is corrected with what energy there is and waits when there is none.
-/// A period without a newer message has v_received = 0.
+/// f is the applied force on the tool (N) in the same period, and β a parallel admittance (m/(N·s)). K is the
+/// stiffness of the controller's spring, whose end moves by T v, so that its force increases by K T v and it stores ½
+/// K T² v² (J). If K > 0, a velocity that violates the condition is replaced by the closest one that satisfies it.
+/// All values are known when they are used, so this end is exact. The second term restores the displacement that β or
+/// lost messages have removed (without it, about 40 mm in a few seconds). It is subject to the same condition, so the
+/// drift is only corrected with available energy. In a period without a new message, v_received = 0.
 ///
 /// Source: as above; drift compensators: Artigas, Ryu and Preusche, IROS 2010 (recalled, not re-read).
 ///
-/// A message that is not finite is passed over; with a force that is not finite the tool is to stand still.
+/// Messages that are not finite are ignored. If the force is not finite, the tool must not move.
 ///
 /// Thread-safe: no. Realtime-safe: all but the constructor.
 template <int N>
 class PassivityFollower {
  public:
   struct Config {
-    double drift_rate = 0;  ///< λ, 1/s; ≥ 0; 0 corrects no drift
+    double drift_rate = 0;  ///< λ, 1/s; ≥ 0; 0: no correction
     Duration period{};      ///< T; > 0
-    double stiffness = 0;   ///< K of the tool's controller, N/m; ≥ 0; 0: the force does not change within a period
+    double stiffness = 0;   ///< K of the tool's controller, N/m; ≥ 0; 0: constant force in a period
   };
 
   struct Command {
-    Vec<N> velocity;             ///< m/s, for the tool's controller to follow until the next step
+    Vec<N> velocity;             ///< m/s, of the tool until the next step
     FollowerMessage<N> message;  ///< to send
   };
 
-  /// Throws std::invalid_argument naming the field, its value and what was expected.
+  /// Throws std::invalid_argument with the name of the field, its value and the expected value.
   explicit PassivityFollower(const Config& config);
 
   void receive(const LeaderMessage<N>& message) noexcept;
 
-  /// The tool's controller follows from `displacement` (m) on, where the leader's newest one is, too. Energies stay.
+  /// Starts at `displacement` (m), which is also that of the leader. The energies are kept.
   void begin(const Vec<N>& displacement) noexcept;
 
-  /// One step: `force` is what the tool's controller exerts on the tool in the period that begins.
+  /// Computes one step. `force` is the force of the controller on the tool in this period.
   Command step(const Vec<N>& force) noexcept;
 
-  /// m, ∫ v dt: where the tool's controller is to be after the newest step.
+  /// m, ∫ v dt: target of the tool's controller.
   const Vec<N>& displacement() const noexcept { return displacement_; }
 
-  /// The energy that may still be given out, J; below zero only by rounding.
+  /// J, energy that may still be output. It is only negative by rounding.
   double energy() const noexcept { return newest_.energy_in - out_; }
 
  private:

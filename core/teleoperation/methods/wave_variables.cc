@@ -41,10 +41,10 @@ void WavePort<N>::join(const WaveMessage<N>& first) noexcept {
 template <int N>
 void WavePort<N>::receive(const WaveMessage<N>& message) noexcept {
   if (!message.integral.allFinite() || !std::isfinite(message.energy)) return;
-  // Its place, from the back: nearly always the last.
+  // Searches from the back, because messages usually arrive in order.
   std::size_t place = count_;
   while (place > 0 && heard(place - 1).sequence >= message.sequence) --place;
-  if (place == 0) return;  // its time has been played
+  if (place == 0) return;  // already played out
   if (place < count_ && (heard(place).sequence == message.sequence || heard(place).time <= message.time)) return;
   const WaveMessage<N>& before = heard(place - 1);
   if (message.time <= before.time) return;
@@ -99,7 +99,7 @@ Demand<N> WavePort<N>::command(const Vec<N>& velocity) noexcept {
 
 template <int N>
 WaveMessage<N> WavePort<N>::observe(const Interval<N>& interval, const SharedAccount& account) noexcept {
-  account_ = account.payable + interval.applied.dot(interval.dx);  // which is booked there already
+  account_ = account.payable + interval.applied.dot(interval.dx);  // undo the work that is already in the account
   return observe(interval, account.wanted - interval.applied, account.reserve);
 }
 
@@ -117,7 +117,7 @@ WaveMessage<N> WavePort<N>::observe(const Interval<N>& interval, const Vec<N>& c
   sent_.time += interval.held;
   if (!interval.applied.allFinite() || !interval.dx.allFinite() || !cut.allFinite()) return sent_;
 
-  // A period that was longer than planned can have used no more than there was.
+  // A period that is longer than planned cannot use more energy than available.
   taken_ = std::min(held * wave_.squaredNorm() / 2, std::max(newest_energy_ - used_energy_, 0.0));
   used_energy_ += taken_;
   used_integral_ += held * wave_;
@@ -129,7 +129,7 @@ WaveMessage<N> WavePort<N>::observe(const Interval<N>& interval, const Vec<N>& c
   return sent_;
 }
 
-/// `wave` first; what was left out earlier with what is then left beyond one and a half reserves.
+/// Sends `wave`, and the missing part with the energy beyond 1.5 reserves.
 template <int N>
 void WavePort<N>::send(const Vec<N>& wave, double held, double reserve) noexcept {
   const double cost = held * wave.squaredNorm() / 2;

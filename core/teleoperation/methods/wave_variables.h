@@ -11,60 +11,58 @@
 
 namespace tendon {
 
-/// The message that one wave port sends to the other in each period. It holds sums since the start, so that no loss is
-/// permanent.
+/// The message that a wave port sends in each period. It contains sums since the start, so that no loss is permanent.
 template <int N>
 struct WaveMessage {
-  std::uint64_t sequence = 0;        ///< 1, 2, …: the periods of the sender; one that came before is dropped
-  Duration time{};                   ///< of the sender since it began; grows with `sequence`
-  Vec<N> integral = Vec<N>::Zero();  ///< √W·s, ∫ wave dt; half the square of a wave is a power
-  double energy = 0;  ///< J, ∫ ‖wave‖²/2 dt, never decreasing: the most that may be made of the waves
+  std::uint64_t sequence = 0;        ///< 1, 2, …: period of the sender; duplicates are dropped
+  Duration time{};                   ///< time of the sender since its start; increases with `sequence`
+  Vec<N> integral = Vec<N>::Zero();  ///< √W·s, ∫ wave dt; half of the square of a wave is a power
+  double energy = 0;  ///< J, ∫ ‖wave‖²/2 dt, does not decrease; upper bound of the energy of the waves
 };
 
-/// One end of a bilateral connection that stays passive however late its messages are. Instead of velocity and force it
-/// exchanges wave variables, which carry their own energy.
+/// One end of a bilateral connection that is passive for any delay. It exchanges wave variables, which contain their
+/// own energy, instead of velocity and force.
 ///
-///     F_wanted = √(2B) r̂ − B v            r̂: the wave that came in
-///     s        = (B v̄ − F) / √(2B)        s: the wave to send;  −F·v̄ = (s² − r²)/2
+///     F_wanted = √(2B) r̂ − B v            r̂: received wave
+///     s        = (B v̄ − F) / √(2B)        s: wave to send;  −F·v̄ = (s² − r²)/2
 ///
-/// B (N·s/m, any value above zero) is the wave impedance, v the velocity now, v̄ = Δx/T the mean velocity in the
-/// interval that has just ended, and F the force that was **really applied** in it: after the limiter, not the one
-/// that was wanted. F is the force on whatever moves with v: on the hand at the leader, on the tool at the follower.
-/// In this sign both ends have the same equations, so one class serves as both. Niemeyer and Slotine's F is −F at
-/// the leader and F at the follower; u is what the leader sends and w what the follower sends.
+/// B (N·s/m, > 0) is the wave impedance, v the current velocity, v̄ = Δx/T the mean velocity in the previous
+/// interval, and F the **applied** force in it, after the limiter. F acts on the moving side: on the hand at the
+/// leader, on the tool at the follower. With this sign, both ends have the same equations and use the same class. F
+/// of Niemeyer and Slotine is −F at the leader and F at the follower; u is the wave from the leader and w the wave
+/// from the follower.
 ///
-/// **Played out.** What is sent are the sums I = ∫ wave dt and ∫ wave²/2 dt. The receiver plays I out, straight between
-/// the messages that came, at the moment τ that PlayoutClock says, and takes the mean Ī over the last W:
+/// **Playout.** The messages contain I = ∫ wave dt and ∫ wave²/2 dt. The receiver interpolates I linearly between
+/// messages at the time τ of PlayoutClock, and computes the mean Ī over the last W:
 ///
 ///     r̂ = ΔĪ / T + (Ī − ∫ r̂ dt) / W,      T r̂²/2 ≤ energy − ∫ r̂²/2 dt
 ///
-/// A wave of the same sum that varies less has less energy than what was sent (Cauchy–Schwarz), so the bound on the
-/// right hardly ever acts; it is there for what no assumption covers. The second term is zero but after such a cut or a
-/// period of another length. Nothing of the sum is lost by jitter, loss or order, and so neither is the place: both
-/// ends end up where they began to within (their friction)/K, K below. When nothing more comes, r̂ is zero after W.
+/// A wave with the same sum and less variation has less energy (Cauchy–Schwarz), so the bound on the right is rarely
+/// active; it covers all other cases. The second term is 0 except after such a limitation or a period of another
+/// length. Jitter, loss and reordering do not change the sum, so the positions of both ends return to their initial
+/// values up to (friction)/K, with K as below. If no more messages arrive, r̂ is 0 after W.
 ///
-/// **Passive in sampled time.** The account A of the port (J) books what really went through it,
+/// **Passivity in sampled time** (core/PROOFS.md, "Wave variables"). The account A of the port (J) contains the
+/// actual energy
 ///
 ///     A += T r̂²/2 − T s²/2 − F·Δx
 ///
-/// and s is shortened where it would take A below zero; what was left out of its sum is sent within 200 ms when A has it
-/// again.
-/// So A + A' + (what is on the way in both directions) is exactly what the two ends have put in, and none of its parts
-/// is negative, except that A is when the motion in one period was another than v promised; then nothing is sent until
-/// it has been earned back. (The limiter at the device is what bounds the leader's port in every case.)
+/// s is reduced if A would become negative, and the missing part of its sum is sent within 200 ms when A allows it.
+/// So A + A' + (energy in transit in both directions) is exactly the energy received at both ends. No part is
+/// negative, except that A can become negative if the motion in a period differs from v; then nothing is sent until A
+/// is positive. (In all cases the limiter at the device bounds the leader's port.)
 ///
-/// **What it feels like.** A spring of K = B/d with the inertia B d, and a damper B when it is let move fast. d is the
-/// least way from `observe` to the `command` that uses it plus the playout D, the mean of both directions, plus
-/// T + (W − T)/2. So a hand of k_h pressing by Δx at something of k_w feels
+/// **Felt dynamics.** A spring K = B/d with the inertia B d, and a damper B for fast motion. d is the minimum delay
+/// from `observe` to the `command` that uses it, plus the playout D, averaged over both directions, plus T + (W −
+/// T)/2. A hand k_h that pushes by Δx on an object k_w feels
 ///
 ///     F = Δx / (1/k_h + d/B + 1/k_w)
 ///
-/// Source: Niemeyer and Slotine, IEEE J. Oceanic Eng. 16(1), 1991, and IJRR 23(9), 2004 (both recalled, not re-read);
-/// control.md 7. Playing out the sum, the energy counter, and the account for sampled ports, are ours.
+/// Source: Niemeyer and Slotine, IEEE J. Oceanic Eng. 16(1), 1991, and IJRR 23(9), 2004 (both recalled, not re-read).
+/// The playout of the sum, the energy counter, and the account for sampled ports are ours.
 ///
-/// A message or an interval that is not finite is passed over, and so is a message whose time does not lie between
-/// those of its neighbours; when `velocity` is not finite, neither is the demand, and the law at the port answers it
-/// with zero force.
+/// Messages and intervals that are not finite are ignored, as are messages whose time is not between those of their
+/// neighbors. If `velocity` is not finite, the demand is not finite, and the limiter sets the force to 0.
 ///
 /// Thread-safe: no. Realtime-safe: all but the constructor.
 template <int N>
@@ -72,57 +70,56 @@ class WavePort {
  public:
   struct Config {
     double impedance = 0;                                ///< B, N·s/m; > 0
-    Duration period{};                                   ///< T for which a command is to be held; > 0
-    Duration smoothing = std::chrono::milliseconds(20);  ///< W; ≥ T and ≤ 256 T, rounded to a whole number of T
-    /// The most that D may be; ≥ 0. Messages that wait for more than 255 periods of the sender are played early.
+    Duration period{};                                   ///< T, hold time of a command; > 0
+    Duration smoothing = std::chrono::milliseconds(20);  ///< W; T … 256 T, rounded to a multiple of T
+    /// Maximum of D; ≥ 0. Messages that wait for more than 255 periods of the sender are played out early.
     Duration max_playout = std::chrono::milliseconds(60);
-    /// √W, the longest r̂ that is used: no more than half of its square, in W, comes in. The rest comes later.
+    /// √W, limit of r̂, which bounds the received power (half of its square, in W). The remainder is used later.
     double max_wave = std::numeric_limits<double>::infinity();
   };
 
-  /// Throws std::invalid_argument naming the field, its value and what was expected.
+  /// Throws std::invalid_argument with the name of the field, its value and the expected value.
   explicit WavePort(const Config& config);
 
-  /// The first message of an other end that began before this one heard of it, or began anew: only what it sends from
-  /// now on counts.
+  /// Must be called with the first message of another end that was started before this one, or has restarted. Only
+  /// its later waves are used.
   void join(const WaveMessage<N>& first) noexcept;
 
-  /// A message of the other end has come, in whatever order.
+  /// Messages may arrive in any order.
   void receive(const WaveMessage<N>& message) noexcept;
 
-  /// The force to want in the period that begins: once in each.
+  /// Returns the requested force for this period. Must be called once per period.
   Demand<N> command(const Vec<N>& velocity) noexcept;
 
-  /// The interval that has just ended; returns what to send.
+  /// Uses the previous interval. Returns the message to send.
   WaveMessage<N> observe(const Interval<N>& interval) noexcept;
 
-  /// What the limiter of a port says that lets the line draw on its account (SharesAccount).
+  /// Values of the limiter of a port, whose account the line uses (SharesAccount).
   struct SharedAccount {
-    double payable = 0;              ///< J, after its `observe`: takes the place of A
-    double reserve = 0;              ///< J, ℓ of the force that is wanted: what the limiter needs for itself
-    Vec<N> wanted = Vec<N>::Zero();  ///< N, what the line wanted in the interval, of which `applied` was left
+    double payable = 0;              ///< J, after `observe` of the limiter; replaces A
+    double reserve = 0;              ///< J, ℓ of the requested force, which the limiter needs
+    Vec<N> wanted = Vec<N>::Zero();  ///< N, force that the line requested in the interval
   };
-  /// The same for a port with a limiter, which cuts forces for want of the energy that the line has. Below the reserve
-  /// a fifth of each wave's energy stays here, so that the limiter gets what it needs without the line falling silent;
-  /// what a cut force has left out of the sum is sent when there is more than one and a half reserves. The caller
-  /// credits `taken` to the limiter and withdraws `given`.
+  /// For a port with a limiter, which may reduce the force. Below the reserve, a fifth of the energy of each wave is
+  /// kept for the limiter. The missing part of the sum is sent if the account exceeds 1.5 reserves. The caller must
+  /// credit `taken` to the limiter and withdraw `given`.
   WaveMessage<N> observe(const Interval<N>& interval, const SharedAccount& account) noexcept;
 
-  /// Does not send any more what was left out.
+  /// Discards the missing part of the sum.
   void forgive() noexcept { unsent_.setZero(); }
 
   /// A, J.
   double energy() const noexcept { return account_; }
-  /// J ≥ 0, of the waves that came and went in the interval observed last.
+  /// J, ≥ 0, of the waves received and sent in the last observed interval.
   double taken() const noexcept { return taken_; }
   double given() const noexcept { return given_; }
 
-  /// D in use, but for what the clock still has to steer.
+  /// D; the clock may still be adjusting to it.
   Duration playout() const noexcept { return clock_.playout(); }
 
  private:
   static constexpr std::size_t kMost = 256;
-  static constexpr Duration kLate = std::chrono::milliseconds(200);  ///< what was left out is sent over so long
+  static constexpr Duration kLate = std::chrono::milliseconds(200);  ///< time in which the missing part is sent
   static constexpr double kPoorShare = 0.8;
 
   WaveMessage<N>& heard(std::size_t k) noexcept { return heard_[(begin_ + k) % kMost]; }
@@ -135,11 +132,11 @@ class WavePort {
   std::size_t means_;  ///< W/T
   PlayoutClock clock_;
 
-  std::array<WaveMessage<N>, kMost> heard_{};  ///< a ring, in their order; the first is before the time played out
+  std::array<WaveMessage<N>, kMost> heard_{};  ///< ring buffer in order; the first one is before the time played out
   std::size_t begin_ = 0;
-  std::size_t count_ = 1;               ///< the sender's start counts as heard
-  bool joined_ = false;                 ///< a message has come
-  std::array<Vec<N>, kMost> played_{};  ///< a ring of the last W/T values of I
+  std::size_t count_ = 1;               ///< includes the start of the sender
+  bool joined_ = false;                 ///< a message was received
+  std::array<Vec<N>, kMost> played_{};  ///< ring buffer of the last W/T values of I
   std::size_t next_ = 0;
   Vec<N> mean_ = Vec<N>::Zero();  ///< Ī
 
@@ -151,7 +148,7 @@ class WavePort {
   double taken_ = 0;
   double given_ = 0;
   WaveMessage<N> sent_;
-  Vec<N> unsent_ = Vec<N>::Zero();  ///< of ∫ wave dt, left out for want of energy
+  Vec<N> unsent_ = Vec<N>::Zero();  ///< missing part of ∫ wave dt
 };
 
 }  // namespace tendon
