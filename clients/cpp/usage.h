@@ -27,8 +27,8 @@ std::string problem(const CLI::App& app, const CLI::ParseError& error);
 /// error message to stderr, and returns 2.
 int exit_code(const CLI::App& app, const CLI::ParseError& error);
 
-/// Returns the error message for a text that is not one of these words: `expected pose or twist, got "wrist"`. If one of
-/// the words is close, the message suggests it.
+/// Returns the error message for a text that is not one of these words: `expected pose or twist, got "wrist"`. If one
+/// of the words is close, the message suggests it.
 std::string refusal(const std::vector<std::string>& words, const std::string& text);
 
 /// Accepts only these words. The help shows them as `a|b`.

@@ -32,11 +32,11 @@ struct CouplingConfig {
   PortRole role = PortRole::kLeader;
   CouplingMethod method = CouplingMethod::kPositionPosition;
   PoseMap::Config map{};
-  /// The values of `stiffness`, `damping`, and `own_damping` are those of the leader. The other values are those of this
-  /// end.
+  /// The values of `stiffness`, `damping`, and `own_damping` are those of the leader. The other values are those of
+  /// this end.
   PositionPosition<3>::Config spring{};
-  /// The value of `start` is in joules of the leader. The values of `max_power` and `max_account` are those of this end.
-  /// The constructor sets `peers`, `joule`, and `epoch`.
+  /// The value of `start` is in joules of the leader. The values of `max_power` and `max_account` are those of this
+  /// end. The constructor sets `peers`, `joule`, and `epoch`.
   std::optional<Purse::Config> purse{};
   /// Used by the follower if the method is `surface`, in the scale of the follower.
   SurfaceEstimator<3>::Config surface{
@@ -64,8 +64,8 @@ struct CouplingReason {
   std::string sentence;  ///< The expected value.
 };
 
-/// Checks the rules for the combination of fields and returns all errors. Returns an empty vector if there are none. The
-/// constructor of Coupling checks the bounds of each number.
+/// Checks the rules for the combination of fields and returns all errors. Returns an empty vector if there are none.
+/// The constructor of Coupling checks the bounds of each number.
 std::vector<CouplingReason> check(const CouplingConfig& config);
 
 }  // namespace tendon

@@ -9,10 +9,10 @@
 
 namespace tendon {
 
-/// Maps values between this end of a coupling and its peer. The leader can change the scales while the program runs. The
-/// states of the leader contain the new scales, and the follower uses the scales of the newest state. If a joule of the
-/// follower is worth more after the change, the follower only keeps a part of its account. The pair therefore does not
-/// generate energy.
+/// Maps values between this end of a coupling and its peer. The leader can change the scales while the program runs.
+/// The states of the leader contain the new scales, and the follower uses the scales of the newest state. If a joule
+/// of the follower is worth more after the change, the follower only keeps a part of its account. The pair therefore
+/// does not generate energy.
 ///
 /// Thread-safe: no. Realtime-safe: all but the constructor.
 class MappedEnd {

@@ -40,8 +40,8 @@ struct LawPart {
   WaveMessage<3> wave{};
 };
 
-/// The base class of all laws. Its functions do nothing, and a law only defines the functions that it needs. There are no
-/// virtual functions. In each period, the caller must call `receive` for each state, `observe`, `command`, and
+/// The base class of all laws. Its functions do nothing, and a law only defines the functions that it needs. There
+/// are no virtual functions. In each period, the caller must call `receive` for each state, `observe`, `command`, and
 /// `conclude`. If there is no position, the caller must call `skip` instead of `command`.
 ///
 /// Thread-safe: no. Realtime-safe: all but the constructors.
@@ -60,14 +60,14 @@ struct CouplingLaw {
   void begin_act(const Vec3& /*u*/) noexcept {}
   /// Returns the energy that the law has exchanged with the peer, or an empty value if it does not exchange energy.
   std::optional<Purse::Settlement> observe(const LawInterval& /*ended*/) noexcept { return std::nullopt; }
-  /// Returns the force of the law. `speed` is the velocity along the coupled axes in m/s, and `spring` is the force of the
-  /// common spring.
+  /// Returns the force of the law. `speed` is the velocity along the coupled axes in m/s, and `spring` is the force
+  /// of the common spring.
   Demand<3> command(const LawPeriod& /*period*/, const Vec3& /*speed*/, const Demand<3>& spring) noexcept {
     return spring;
   }
   void skip(const LawPeriod& /*period*/, Duration /*elapsed*/) noexcept {}
-  /// Ends the period. `applied` is the force of the device along the coupled axes in N, and `contact` is the force at the
-  /// tool if it was measured.
+  /// Ends the period. `applied` is the force of the device along the coupled axes in N, and `contact` is the force at
+  /// the tool if it was measured.
   void conclude(const LawPeriod& /*period*/, const Vec3& /*applied*/, const std::optional<Vec3>& /*contact*/) noexcept {
   }
   LawPart part() const noexcept { return {}; }

@@ -6,8 +6,8 @@
 namespace tendon {
 
 /// The method `surface`: the follower uses the law of ContactLaw. It also estimates the surface at its tool from the
-/// contact force (SurfaceEstimator). The leader renders this surface at its own rate (SurfaceRenderer) and adds the force
-/// −B v. The account pays for each change of the surface. Each act starts without a surface.
+/// contact force (SurfaceEstimator). The leader renders this surface at its own rate (SurfaceRenderer) and adds the
+/// force −B v. The account pays for each change of the surface. Each act starts without a surface.
 class SurfaceLaw : public CouplingLaw {
  public:
   SurfaceLaw(const CouplingConfig& config, const MappedEnd& frame);

@@ -9,9 +9,9 @@
 
 namespace tendon {
 
-/// Moves the handle of a leader with an absolute map to the position of the follower. The force is a spring. The end of
-/// the spring moves to the position of the follower with the speed kSpeed, and the force is at most kForce. The alignment
-/// is done if the distance was small for the time kHeld, and fails after the time kMost.
+/// Moves the handle of a leader with an absolute map to the position of the follower. The force is a spring. The end
+/// of the spring moves to the position of the follower with the speed kSpeed, and the force is at most kForce. The
+/// alignment is done if the distance was small for the time kHeld, and fails after the time kMost.
 ///
 /// Thread-safe: no. Realtime-safe: yes.
 class Alignment {
@@ -39,8 +39,8 @@ class Alignment {
     double damping = 0;    ///< N·s/m
     double max_force = 0;  ///< N
   };
-  /// Returns the force on the handle in N. `there` is the position of the follower in m, and `elapsed` is the time since
-  /// the previous period.
+  /// Returns the force on the handle in N. `there` is the position of the follower in m, and `elapsed` is the time
+  /// since the previous period.
   Vec3 force(const Vec3& there, const Vec3& position, const Vec3& velocity, const Spring& spring,
              Duration elapsed) noexcept {
     if (!guide_) guide_ = position;

@@ -7,7 +7,8 @@
 namespace tendon {
 
 /// Avoids steps in the force when the source of the force changes. The force of a new source is multiplied by a gain,
-/// which increases from 0 to 1 in the time `ramp`. The difference to the previous force decreases to 0 in the time kFade.
+/// which increases from 0 to 1 in the time `ramp`. The difference to the previous force decreases to 0 in the time
+/// kFade.
 ///
 /// In each period, the caller must call `drive` and then `fade`. If there is no position, the caller must call `skip`.
 ///

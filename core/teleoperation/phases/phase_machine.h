@@ -24,8 +24,8 @@ enum class PhaseInput : std::uint8_t {
 };
 inline constexpr std::size_t kPhaseInputs = 10;
 
-/// Returns the next phase of one end of a coupling. The function uses this table, in which `–` means that the phase does
-/// not change:
+/// Returns the next phase of one end of a coupling. The function uses this table, in which `–` means that the phase
+/// does not change:
 ///
 ///                  alone     coupled   aligning  engaged   clutched  lost      fault
 ///     kNotReady    fault     fault     fault     fault     fault     fault     fault
