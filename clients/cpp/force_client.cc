@@ -20,7 +20,7 @@ namespace {
 constexpr int kValidPeriods = 3;
 constexpr Duration kMinValidFor = std::chrono::milliseconds(20);
 constexpr Duration kMaxObservedPeriod = std::chrono::milliseconds(100);
-/// Minimum time between two lease requests. The current holder renews its lease continuously.
+/// The minimum time between two requests for a lease. The current holder renews its lease continuously.
 constexpr Duration kAskLeaseAgain = std::chrono::milliseconds(50);
 
 constexpr const char* kNoDiagnostics = "0: they are for observers only";

@@ -44,7 +44,8 @@ using Physics = std::function<Touch(const DeviceState& hand)>;
 using Watch = std::function<void(const DeviceState& hand, const LinkStats& link)>;
 
 /// A client of a Tendon server. It opens a session and keeps it alive, passes the newest device state to one
-/// callback, sends the returned force, and reconnects after the session ends. It has no socket, clock or thread.
+/// callback, sends the returned force, and reconnects after the session ends. This class does not use sockets, clocks
+/// or threads.
 ///
 ///     ForceClient client(link, server, config, physics, now);
 ///     for (;;) wait for a datagram, at most until client.turn(now);
@@ -61,8 +62,8 @@ using Watch = std::function<void(const DeviceState& hand, const LinkStats& link)
 /// * **Replacement.** If another program with the same key replaces this client, the client stops and does not
 ///   reconnect. Otherwise the two programs would keep replacing each other.
 /// * **Reconnection.** After an attempt or a session ends (no answer, refusal, Bye, silence), the client waits for
-///   retry_min before the next attempt. The wait doubles with each attempt up to retry_max. The first state of a new
-///   session resets it. Each attempt uses new random numbers.
+///   retry_min before the next attempt. The wait is doubled with each attempt up to retry_max. It is reset by the
+///   first state of a new session. Each attempt uses new random numbers.
 ///
 /// Thread-safe: no. Realtime-safe: no.
 class ForceClient {
@@ -72,7 +73,7 @@ class ForceClient {
     /// Names of the device and its channel. Empty: the first one of the server.
     std::string device{};
     std::string channel{};
-    /// If another controller holds the lease of the channel, keep asking for it. The client asks again when the
+    /// If another controller holds the lease of the channel, keep asking for it. The request is repeated when the
     /// server reports that the lease may have ended.
     bool take_lease = false;
     double rate_hz = 0;  ///< calls per second, kMinRateHz … kMaxRateHz; 0: one call for each new state
@@ -98,10 +99,10 @@ class ForceClient {
     /// callback runs at multiples of 1/r with the state predicted for that time, including tick and sampling time.
     /// Ticks always increase. States are predicted for at most max_silence; after that, the callback waits for the
     /// next state. If rate_hz = 0, the callback runs for each received state. Empty: all states are requested.
-    /// Servers without this feature send every state.
+    /// Servers that do not support this feature send every state.
     std::optional<SetStateDeadband> state_deadband{};
     /// For observers: requests the forces of the engines before limiting (DeviceState::force_wanted), and reports on
-    /// the loop of the device and its engines once per second. Servers without this feature omit them.
+    /// the loop of the device and its engines once per second. Servers that do not support this feature omit them.
     bool diagnostics = false;
     /// Requests the joints of the device (DeviceState::joints, HandleDescription::joints): 16 bytes per joint and
     /// state.
@@ -121,15 +122,15 @@ class ForceClient {
     /// Cipher suites offered for an encrypted session. The server selects one.
     Suites suites = suites_of_this_machine();
     Seed seed{};  ///< for the handshakes; must be 32 new bytes from the operating system for each object
-    /// How long an attempt waits for an answer. 2 s is 20 Hellos at the handshake interval of 100 ms, enough for a
-    /// round trip of 1 s at 50 % loss.
+    /// The time for which an attempt waits for an answer. 2 s is 20 Hellos at the handshake interval of 100 ms,
+    /// enough for a round trip of 1 s at 50 % loss.
     Duration patience = std::chrono::seconds(2);
     Duration retry_min = std::chrono::milliseconds(100);  ///< wait before the first retry; > 0
     /// Upper limit of the wait between attempts. It bounds both the time to find a restarted server and the load on a
     /// server that refuses the client.
     Duration retry_max = std::chrono::seconds(2);
-    /// Maximum number of datagrams read in one turn, so that a flood cannot prevent sending. A server at 1 kHz sends
-    /// 256 datagrams in a quarter of a second, the longest silence before it stops the device.
+    /// The maximum number of datagrams read in one turn, so that a flood cannot prevent sending. A server at 1 kHz
+    /// sends 256 datagrams in a quarter of a second, the longest silence before it stops the device.
     int max_datagrams = 256;
   };
   static constexpr double kMinRateHz = 1e-3;
@@ -171,9 +172,9 @@ class ForceClient {
   /// sends a force.
   ForceClient(Link& link, const Address& server, const Config& config, Watch watch, LocalTime now);
 
-  /// Does all the work that is due at `now` and returns the time of the next call. Call it earlier when a datagram
-  /// arrives. The callback may take long, so read the clock again before sleeping. An exception of the callback
-  /// propagates after a Bye is sent to the server.
+  /// Performs all work due at `now` and returns the time of the next call. Call it earlier if a datagram arrives. The
+  /// callback may take long, so read the clock again before sleeping. An exception of the callback propagates after a
+  /// Bye is sent to the server.
   LocalTime turn(LocalTime now);
 
   /// Passes the newest state to the callback again in the next turn. Use it if the answer of the engine has changed
@@ -217,7 +218,7 @@ class ForceClient {
   bool take_lease();
   bool give_lease();
 
-  /// Sets the server address for the next attempt. Must be called while no session is open.
+  /// Sets the server address for the next attempt. This must only be called while no session is open.
   void move_to(const Address& server) { connection_.move_to(server); }
 
   /// Sends a Bye, so that the server does not have to wait for a timeout, and stops. Further turns do nothing.

@@ -49,8 +49,8 @@ class Guest {
   Guest(const Guest&) = delete;
   Guest& operator=(const Guest&) = delete;
 
-  /// Does the work that is due at `now` and prints changes. Returns the time of the next turn, or empty if the client
-  /// has stopped permanently.
+  /// Performs the work due at `now` and prints changes. Returns the time of the next turn, or empty if the client has
+  /// stopped permanently.
   std::optional<LocalTime> turn(LocalTime now);
   void answer(LocalTime now, const Reply& reply) { client_.answer(now, reply); }
   std::uint64_t sessions() const { return client_.stats().sessions; }

@@ -73,7 +73,7 @@ class Elsewhere {
 
   /// Passes the newest state. Must return immediately.
   virtual void see(LocalTime now, const Seen& seen) = 0;
-  /// Does the work that is due at `now`. Returns the next answer, if any. run() calls it until it returns empty.
+  /// Performs the work due at `now`. Returns the next answer, if any. run() calls it until it returns empty.
   virtual std::optional<Reply> turn(LocalTime now) = 0;
   /// Time of the next turn. The turn is due earlier if the descriptor becomes readable.
   virtual LocalTime next_turn() const = 0;

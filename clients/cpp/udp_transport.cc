@@ -23,7 +23,7 @@ namespace {
 
 using asio::ip::udp;
 
-/// Maximum number of empty datagrams and errors (ICMP "port unreachable" while no server is running) that one
+/// The maximum number of empty datagrams and errors (ICMP "port unreachable" while no server is running) that one
 /// receive() skips, so that a flood cannot prevent sending.
 constexpr int kMaxSkips = 64;
 

@@ -47,17 +47,16 @@ class Observer {
     Duration retry_min = std::chrono::milliseconds(100);
     Duration retry_max = std::chrono::seconds(2);
     Duration describe_every = std::chrono::seconds(1);
-    /// Maximum number of datagrams per turn: a quarter of a second of states at 1 kHz.
+    /// The maximum number of datagrams per turn: a quarter of a second of states at 1 kHz.
     int max_datagrams = 256;
   };
   /// States per second and device for /metrics while no page is open. Otherwise all states are requested.
   static constexpr std::uint32_t kIdleStateHz = 20;
 
-  /// `link` and `board` must outlive this object. The first Hello is sent in the first turn.
+  /// The `link` and the `board` must outlive this object. The first Hello is sent in the first turn.
   Observer(Link& link, const Address& server, const Config& config, Board& board, LocalTime now);
 
-  /// Does all the work that is due at `now` and returns the time of the next call. Call it earlier when a datagram
-  /// arrives.
+  /// Performs all work due at `now` and returns the time of the next call. Call it earlier if a datagram arrives.
   LocalTime turn(LocalTime now);
 
   /// Requests states at the full loop rate while `watched`.

@@ -12,8 +12,8 @@
 
 namespace tendon::dash {
 
-/// Arms and disarms devices, and engages and disengages couplings, on request of the user of the page. It has no
-/// socket, clock or thread.
+/// Arms and disarms devices, and engages and disengages couplings, on request of the user of the page. This class
+/// does not use sockets, clocks or threads.
 ///
 /// Each button press opens a session separate from that of the Observer: a controller with the operator's key that
 /// claims and holds one channel of the device, sends the order but no force, and leaves after the answer. The result
@@ -43,8 +43,8 @@ class Operator {
     Duration granted_within = std::chrono::seconds(4);
   };
 
-  /// `link` must be separate from the Observer's, because the server identifies clients by address. `link` and
-  /// `board` must outlive this object.
+  /// `link` must be separate from the Observer's, because the server identifies clients by address. The `link` and
+  /// the `board` must outlive this object.
   Operator(Link& link, const Address& server, const Config& config, Board& board);
 
   /// Returns why no order can be given to a device now. Empty if it can.
@@ -53,7 +53,7 @@ class Operator {
   /// Starts an order. Returns the reason if it cannot be started, otherwise an empty string.
   std::string press(LocalTime now, std::uint32_t device, Order order);
 
-  /// Does all the work that is due at `now`. Must be called about 60 times per second.
+  /// Performs all work due at `now`. Must be called about 60 times per second.
   void turn(LocalTime now);
 
   /// Sets the server address for the next order.

@@ -40,10 +40,10 @@ using asio::ip::tcp;
 /// Datagrams are read in batches. Otherwise tendon-dash would wake up 1000 times per second on the processors of the
 /// haptic loop. The measured round trip includes this delay, but is not used in computations.
 constexpr Duration kGather = std::chrono::milliseconds(3);
-/// Maximum number of datagrams read from one bridge socket before other sockets are served.
+/// The maximum number of datagrams read from one bridge socket before other sockets are served.
 constexpr int kMaxDrained = 64;
 constexpr std::size_t kPiece = 64 * 1024;
-/// Maximum number of connections that are being refused. Further ones are closed without a reply.
+/// The maximum number of connections that are being refused. Further connections are closed without a reply.
 constexpr std::size_t kMaxRefusals = 64;
 /// A refused connection is read for this time and number of bytes, because a reset would discard the reply.
 constexpr Duration kLinger = std::chrono::seconds(1);
@@ -415,7 +415,7 @@ struct WebServer::State {
 
   void accept() {
     acceptor.async_accept([this](error_code error, tcp::socket socket) {
-      if (error) {  // out of descriptors; retry when other connections may have ended
+      if (error) {  // no descriptors left: retry later
         accept_again.expires_after(waiting_time(std::chrono::milliseconds(100)));
         return accept_again.async_wait([this](error_code) { accept(); });
       }

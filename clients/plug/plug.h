@@ -56,8 +56,8 @@ class Plug {
   /// The links must outlive this object. The first Hello is sent in the first turn.
   Plug(const Way& watcher, const Way& controller, Config config, LocalTime now);
 
-  /// Does all the work that is due at `now` and returns the time of the next call. Call it earlier when a datagram
-  /// arrives or a force has been requested.
+  /// Performs all work due at `now` and returns the time of the next call. Call it earlier if a datagram arrives or a
+  /// force has been requested.
   LocalTime turn(LocalTime now);
 
   /// The newest state, including buttons pressed since the last turn. Empty before the first state and without a
@@ -161,7 +161,7 @@ class Plug {
   bool stopped_ = false;
 };
 
-/// Whether the client is waiting between two attempts.
+/// Returns true if the client is waiting between two attempts.
 constexpr bool is_between_attempts(ForceClient::Phase phase) {
   return phase == ForceClient::Phase::kUnanswered || phase == ForceClient::Phase::kRefused ||
          phase == ForceClient::Phase::kLost;

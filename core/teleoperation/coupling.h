@@ -87,7 +87,7 @@ namespace tendon {
 /// most as fast as Shares::kHandOver allows, so that a late state does not cause a step. If the follower does not
 /// send α, it is 1.
 ///
-/// Thread-safe: no. Realtime-safe: all but the constructor.
+/// Thread-safe: no. Realtime-safe: yes, except the constructor.
 class Coupling {
  public:
   static constexpr Duration kAnswerWithin = std::chrono::seconds(12);

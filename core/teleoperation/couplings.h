@@ -47,7 +47,7 @@ struct CoupledLeader {
 /// **Trust.** Each peer has its own purse with max_power and max_account. Against n dishonest peers, the port alone
 /// keeps L ≥ −n (max_account + max_power · t).
 ///
-/// Thread-safe: no. Realtime-safe: all but the constructor.
+/// Thread-safe: no. Realtime-safe: yes, except the constructor.
 class Couplings {
  public:
   static constexpr std::size_t kMost = Shares::kMost;

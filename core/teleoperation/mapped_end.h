@@ -14,7 +14,7 @@ namespace tendon {
 /// of the follower is worth more after the change, the follower only keeps a part of its account. The pair therefore
 /// does not generate energy.
 ///
-/// Thread-safe: no. Realtime-safe: all but the constructor.
+/// Thread-safe: no. Realtime-safe: yes, except the constructor.
 class MappedEnd {
  public:
   static constexpr double kLeast = 0.01;  ///< The minimum of a scale.

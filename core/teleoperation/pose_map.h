@@ -26,7 +26,7 @@ namespace tendon {
 /// Grippers have their own account, in which one joule of the leader is 1/s_f joules of the follower. Rotations are
 /// coupled about all axes, independent of `axes`.
 ///
-/// Immutable. Thread-safe. Realtime-safe: all but the constructor.
+/// Immutable. Thread-safe. Realtime-safe: yes, except the constructor.
 class PoseMap {
  public:
   struct Config {

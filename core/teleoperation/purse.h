@@ -89,7 +89,7 @@ struct PurseMessage {
 /// Source: derived here; related to the two-layer tank (Franken et al. 2011) and energy-reflecting TDPA (Ryu et al.
 /// 2010).
 ///
-/// Thread-safe: no. Realtime-safe: all but the constructor.
+/// Thread-safe: no. Realtime-safe: yes, except the constructor.
 class Purse {
  public:
   static constexpr std::size_t kMostPeers = 3;

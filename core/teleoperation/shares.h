@@ -17,7 +17,7 @@ namespace tendon {
 ///
 /// A leader that is not engaged keeps its share.
 ///
-/// Thread-safe: no. Realtime-safe: all but the constructor.
+/// Thread-safe: no. Realtime-safe: yes, except the constructor.
 class Shares {
  public:
   static constexpr std::size_t kMost = 4;

@@ -207,7 +207,7 @@ void Follower::act(const DeviceState& hand, const Pose& pose, bool fresh) noexce
   }
 }
 
-/// Engages with an offset that keeps the target at the current pose.
+/// Engages. The offset is chosen so that the target is the current pose.
 void Follower::begin(const DeviceState& hand, const Pose& pose) noexcept {
   phase_ = Following::kEngaged;
   gain_from_ = now_;

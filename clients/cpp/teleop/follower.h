@@ -17,7 +17,8 @@ struct Pose {
   std::optional<double> grip{};       ///< opening of the gripper, m or rad; empty: no gripper
 };
 
-/// Force that the environment exerts on the tool, in the frame of the robot. A table below the tool pushes up.
+/// Force that the environment exerts on the tool, in the frame of the robot. For example, a table exerts an upward
+/// force.
 struct ToolContact {
   Vec3 force = Vec3::Zero();           ///< N
   std::optional<Vec3> torque{};        ///< N·m, about the position of the tool
@@ -35,7 +36,7 @@ enum class Following : std::uint8_t {
 };
 
 /// Teleoperation of a robot by the hand at a Tendon server, with force feedback. Implements the position mapping, the
-/// clutch, and the reaction to loss of connection. It has no clock, thread or socket.
+/// clutch, and the reaction to loss of connection. This class does not use clocks, threads or sockets.
 ///
 ///     Follower follow({.scale = 0.5, .clutch_button = 1});
 ///     const auto move = [&](const std::optional<Pose>& target) { target ? robot.go_to(*target) : robot.hold(); };
@@ -51,18 +52,18 @@ enum class Following : std::uint8_t {
 ///     p_f = p_f0 + s_x R M (p_l − p_l0)        q_f = (R q_l q_l0⁻¹ R⁻¹) q_f0        M selects the coupled axes
 ///     F_l = s_f M Rᵀ F_f                       τ_l = s_f / s_x Rᵀ τ_f               K_l = s_f s_x M Rᵀ K_f R M
 ///
-/// so the power at the hand is s_f / s_x times the power at the tool. The robot does not move before the operator
-/// engages, by the button or by engage(). The poses at that time define the offset, so neither engaging nor releasing
-/// the clutch moves the robot. The reaction to missing states depends on the age of the newest state beyond the
-/// smoothed delay, where v is three periods, at least 20 ms:
+/// so the power at the hand is s_f / s_x times the power at the tool. The robot does not move until the operator
+/// engages with the button or with engage(). The offset is defined by the poses at that time, so that the robot does
+/// not move when it is engaged or when the clutch is released. The reaction to missing states depends on the age of
+/// the newest state beyond the smoothed delay, where v is three periods, at least 20 ms:
 ///
 ///     v             the target stops
 ///     v + 20 ms     no target: the robot must hold its pose
 ///     v + 250 ms    lost: new states couple again, but the operator must engage again
 ///
-/// Absolute times of the two clocks are never compared. A fault, a disarmed device, or a pose that is not finite
-/// disengages. There are equivalent implementations in Python and TypeScript; tests/clients/follower_cases.json
-/// checks all three.
+/// Absolute times of the two clocks are never compared. The coupling ends if the device has a fault or is disarmed,
+/// or if a pose is not finite. There are equivalent implementations in Python and TypeScript;
+/// tests/clients/follower_cases.json checks all three.
 ///
 /// Thread-safe: no. Realtime-safe: yes, except the constructor and set_scale when they throw.
 class Follower {
@@ -98,7 +99,7 @@ class Follower {
   bool engage() noexcept { return asked_ = phase_ == Following::kCoupled; }
   /// Stops the robot until the operator engages again.
   void disengage() noexcept;
-  /// Returns false and changes nothing while the robot follows. Throws std::invalid_argument if a scale is out of
+  /// Has no effect and returns false while the robot follows. Throws std::invalid_argument if a scale is out of
   /// bounds.
   bool set_scale(double scale, double force_scale);
 
@@ -108,8 +109,9 @@ class Follower {
   /// Must be called every few milliseconds while no state arrives. Returns the last target at first, then empty.
   std::optional<Pose> silence(LocalTime now) noexcept;
 
-  /// Returns the force on the hand for a contact of the tool; zero while the robot does not follow. If `contact` is
-  /// empty, returns a Touch that is not sent (Touch::unknown), because a zero force would look like a measurement.
+  /// Returns the force on the hand for a contact of the tool; the force is zero while the robot does not follow. If
+  /// `contact` is empty, returns a Touch that is not sent (Touch::unknown), because a zero force would look like a
+  /// measurement.
   Touch touch(const std::optional<ToolContact>& contact) noexcept;
 
  private:

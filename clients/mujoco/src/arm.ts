@@ -10,7 +10,7 @@ const kDamping = 0.05;
 /** m and rad, limits of the error that the servos receive. They bound the force of an arm that is blocked. */
 const kMostWay = 0.05;
 const kMostTurn = 0.3;
-/** Maximum number of steps per call, so that the arm does not jump after a pause of the program. */
+/** The maximum number of steps per call, so that the arm does not jump after a pause of the program. */
 const kMostSteps = 50;
 
 /** Solves a · x = b for a symmetric, positive definite `a` with n rows by Gaussian elimination without pivoting. */

@@ -30,7 +30,7 @@ export interface SceneConfig {
   readonly maxToolSpeed?: number;
   /** rad/s, likewise. Default: 20. */
   readonly maxToolSpin?: number;
-  /** Maximum number of steps per answer. If more are due, simulated time falls behind. Default: 20. */
+  /** The maximum number of steps per answer. If more are due, simulated time falls behind. Default: 20. */
   readonly maxSteps?: number;
   /** Files referenced by the scene. */
   readonly assets?: Assets;

@@ -13,7 +13,7 @@
 namespace tendon::plug::chai3d {
 
 /// The tendon-plug side of the memory shared with a CHAI3D program. It transfers states to the program, in the frame
-/// of CHAI3D, and requests of the program to the Plug. It has no socket, clock or thread.
+/// of CHAI3D, and requests of the program to the Plug. This class does not use sockets, clocks or threads.
 ///
 /// A force requested at time t is valid until t + Config::stale, independent of when it is read here. A program with
 /// a low frame rate must not apply its last force for long.

@@ -49,7 +49,7 @@ constexpr int kMostDeskTurns = 4;
 constexpr Duration kLongestSleep = std::chrono::milliseconds(100);
 /// A WebSocket that is silent for this time gets a ping, and is closed if it does not answer.
 constexpr Duration kSilence = std::chrono::seconds(30);
-/// Maximum number of connections without a complete request. Further ones are closed immediately.
+/// The maximum number of connections without a complete request. Further connections are closed immediately.
 constexpr std::size_t kMostWaiting = 16;
 constexpr std::uint32_t kLongestRequest = 16 * 1024;
 /// After a plain HTTP response, the connection is read for this time and number of bytes, because a reset would
@@ -327,7 +327,7 @@ struct InverseServer::State {
 
   void accept() {
     acceptor.async_accept([this](error_code error, tcp::socket socket) {
-      if (error) {  // out of descriptors; retry when other connections may have ended
+      if (error) {  // no descriptors left: retry later
         accept_again.expires_after(waiting_time(kLongestSleep));
         return accept_again.async_wait([this](error_code) { accept(); });
       }

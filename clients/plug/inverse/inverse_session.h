@@ -34,8 +34,8 @@ struct InverseCounts {
   std::uint64_t ignored = 0;
 };
 
-/// The conversation with one client: a first message, then exactly one reply for each message of the client. It has
-/// no socket and no clock.
+/// The conversation with one client: a first message, then exactly one reply for each message of the client. This
+/// class does not use sockets or clocks.
 ///
 /// * A force is sent once with the validity kFresh, which must be `client.valid_for` of the plugs. After a client
 ///   falls silent or leaves, the server holds, fades and stops the last force (protocol/SESSION.md).

@@ -26,7 +26,7 @@ struct Moment {
 };
 
 /// The connection to one VRPN program (VRPN.md) as a state machine: bytes and times in; bytes, messages and the
-/// program's requests out. It has no socket and no clock.
+/// program's requests out. This class does not use sockets or clocks.
 ///
 ///     Peer peer(stations, number, now);
 ///     peer.take_stream(now, bytes); peer.take_datagram(now, bytes);      for everything received, then

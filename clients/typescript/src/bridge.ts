@@ -14,7 +14,7 @@ export interface BridgeConfig {
   readonly to: string;
   /** Additional origins of pages that may connect: "https://lab.example". */
   readonly origins: readonly string[];
-  /** Maximum number of open WebSockets. */
+  /** The maximum number of open WebSockets. */
   readonly maxPeers: number;
   /** Datagrams per second that a page may send; more are dropped. */
   readonly maxRateHz: number;

@@ -17,11 +17,11 @@ export interface ClientConfig {
   readonly device?: string;
   readonly channel?: string;
   /**
-   * If another controller holds the lease of the channel, keep asking for it. The client asks again when the server
+   * If another controller holds the lease of the channel, keep asking for it. The request is repeated when the server
    * reports that the lease may have ended.
    */
   readonly takeLease?: boolean;
-  /** 32 bytes shared with the server. With a key, all traffic is encrypted. Without a key, only loopback is accepted.
+  /** 32 bytes shared with the server. If there is a key, all traffic is encrypted; otherwise, only loopback is accepted.
    */
   readonly key?: Uint8Array | undefined;
   /** Cipher suites offered for an encrypted session. The server selects one. Default: all suites of this runtime. */
@@ -47,7 +47,7 @@ export interface ClientConfig {
   readonly stateDeadband?: StateDeadband | undefined;
   /**
    * For observers: requests the forces of the engines before limiting (DeviceState.forceWanted), and reports on the
-   * loop of the device and its engines once per second. Servers without this feature omit them.
+   * loop of the device and its engines once per second. Servers that do not support this feature omit them.
    */
   readonly diagnostics?: boolean;
   /** Requests the joints of the device (DeviceState.joints, HandleDescription.joints): 16 bytes per joint and state. */
@@ -59,7 +59,7 @@ export interface ClientConfig {
    * Observers and recordings receive the names. At most 8 unique names, each of 1 to 24 bytes.
    */
   readonly ways?: readonly string[];
-  /** How long an attempt waits for an answer. */
+  /** The time for which an attempt waits for an answer. */
   readonly patienceMs?: number;
   /** Wait before the first retry. It doubles with each attempt. */
   readonly retryMinMs?: number;

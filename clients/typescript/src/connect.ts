@@ -44,7 +44,7 @@ export interface Guest {
   readonly report: LinkReport | undefined;
   /** Newest report on the loop of the device, once per second. Requires `diagnostics`. */
   readonly deviceReport: DeviceReport | undefined;
-  /** Newest report on the engine of each channel, also after it has left. Requires `diagnostics`. */
+  /** The newest report on the engine of each channel, kept when the engine leaves. Requires `diagnostics`. */
   readonly peerReports: ReadonlyMap<number, PeerReport>;
   stats(): ClientStats;
   rearm(): boolean;
@@ -52,7 +52,7 @@ export interface Guest {
   /** Engages or disengages a coupling, at the server of the leader (disengage: either server). */
   engage(): boolean;
   disengage(): boolean;
-  /** Sets the scales of a coupling, at the server of the leader, while it is not engaged or its clutch is held. */
+  /** Sets the scales of a coupling at the server of the leader, unless it is engaged and its clutch is not held. */
   setScale(positionScale: number, forceScale: number): boolean;
   /** Sets the weight of the leader on that channel if several leaders share one follower, at the follower's server. */
   setShare(channel: number, share: number): boolean;
@@ -81,7 +81,7 @@ export function connect(
   return new RealTimeGuest(open, config, callback);
 }
 
-/** Maximum number of event-loop rounds that a backlog of datagrams may delay the callback. */
+/** The maximum number of event-loop rounds that a backlog of datagrams may delay the callback. */
 const kMaxRounds = 16;
 /** Longer timers overflow in some runtimes. An early timer is harmless. */
 const kLongestTimerMs = 1000;

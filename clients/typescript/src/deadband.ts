@@ -13,7 +13,7 @@ export interface ForceDeadband {
   readonly share: number;
   /** N, typically 0.05. Smaller changes are omitted until the longest silence. */
   readonly floor: number;
-  /** Typically 20. Limits how long the device renders an old force after a packet loss. */
+  /** Typically 20. Limits the time for which the device renders an old force after a packet loss. */
   readonly longestSilenceMs: number;
 }
 

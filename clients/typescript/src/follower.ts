@@ -14,7 +14,7 @@ export interface Pose {
   readonly grip?: number | undefined;
 }
 
-/** Force of the environment on the tool, in the frame of the robot. A table below the tool pushes up. */
+/** Force of the environment on the tool, in the frame of the robot. For example, a table exerts an upward force. */
 export interface ToolContact {
   /** N */
   readonly force: Vec3;
@@ -121,16 +121,17 @@ function complete(given: FollowerConfig): Complete {
  *     p_f = p_f0 + s_x R M (p_l − p_l0)        q_f = (R q_l q_l0⁻¹ R⁻¹) q_f0        M selects the coupled axes
  *     F_l = s_f M Rᵀ F_f                       τ_l = s_f / s_x Rᵀ τ_f               K_l = s_f s_x M Rᵀ K_f R M
  *
- * The robot does not move before the operator engages, by the button or by engage(). The poses at that time define
- * the offset, so neither engaging nor releasing the clutch moves the robot. The reaction to missing states depends on
- * the age of the newest state beyond the smoothed delay, where v is three periods, at least 20 ms:
+ * The robot does not move until the operator engages with the button or with engage(). The offset is defined by the
+ * poses at that time, so that the robot does not move when it is engaged or when the clutch is released. The reaction
+ * to missing states depends on the age of the newest state beyond the smoothed delay, where v is three periods, at
+ * least 20 ms:
  *
  *     v             the target stops
  *     v + 20 ms     undefined: the robot must hold its pose
  *     v + 250 ms    lost: new states couple again, but the operator must engage again
  *
- * Absolute times of the two clocks are never compared. A fault, a disarmed device, or a pose that is not finite
- * disengages. Throws the RangeError "FIELD = VALUE: expected …" if the config is invalid.
+ * Absolute times of the two clocks are never compared. The coupling ends if the device has a fault or is disarmed, or
+ * if a pose is not finite. Throws the RangeError "FIELD = VALUE: expected …" if the config is invalid.
  */
 export class Follower {
   readonly #config: Complete;
@@ -181,7 +182,7 @@ export class Follower {
     this.#asked = false;
     if (this.#phase === "engaged" || this.#phase === "clutched") this.#phase = "coupled";
   }
-  /** Returns false and changes nothing while the robot follows. Throws a RangeError if a scale is out of bounds. */
+  /** Has no effect and returns false while the robot follows. Throws a RangeError if a scale is out of bounds. */
   setScale(scale: number, forceScale: number): boolean {
     between(0.01, 100, { scale, forceScale });
     if (this.#phase === "engaged") return false;
@@ -221,8 +222,8 @@ export class Follower {
   }
 
   /**
-   * Returns the force on the hand for a contact of the tool; zero while the robot does not follow. Returns null,
-   * which is not sent, if `contact` is undefined, because a zero force would look like a measurement.
+   * Returns the force on the hand for a contact of the tool; the force is zero while the robot does not follow.
+   * Returns null, which is not sent, if `contact` is undefined, because a zero force would look like a measurement.
    */
   touch(contact: ToolContact | undefined): Touch | null {
     if (!contact) {
@@ -313,7 +314,7 @@ export class Follower {
     }
   }
 
-  /** Engages with an offset that keeps the target at the current pose. */
+  /** Engages. The offset is chosen so that the target is the current pose. */
   #begin(hand: DeviceState, pose: Pose): void {
     [this.#phase, this.#gainFrom, this.#pose0, this.#waits] = ["engaged", this.#now, pose, true];
     this.#hand0 = { position: hand.position, orientation: hand.turning?.orientation };

@@ -26,7 +26,7 @@ const kValidPeriods = 3;
 const kMinValidForMs = 20;
 /** A longer gap is a pause and not a period. An engine below 10 Hz must set rateHz. */
 const kMaxObservedPeriodMs = 100;
-/** Minimum time between two lease requests. The current holder renews its lease continuously. */
+/** The minimum time between two requests for a lease. The current holder renews its lease continuously. */
 const kAskLeaseAgain = fromMilliseconds(50);
 
 /** Indices used if neither device nor channel is named. */
@@ -43,8 +43,8 @@ const kFirstPlace: Omit<Grant, "role"> = { device: 0, channel: 0 };
  *   After a delay of a full period, the schedule restarts. If rateHz = 0, it runs once for each new state.
  * - Force. It is sent in the turn after the callback, which is due immediately, so that the time stamp does not include
  *   the computation. Forces that are not finite or beyond 10¹² are counted and not sent.
- * - Reconnection. After an attempt or a session ends, the client waits for retryMinMs before the next attempt. The wait
- *   doubles with each attempt up to retryMaxMs. The first state of a new session resets it.
+ * - Reconnection. After an attempt or a session ends, the client waits for retryMinMs before the next attempt. The
+ *   wait is doubled with each attempt up to retryMaxMs. It is reset by the first state of a new session.
  */
 export class ForceClient {
   readonly #config: Required<ClientConfig>;
@@ -133,8 +133,8 @@ export class ForceClient {
   }
 
   /**
-   * Does all the work that is due at `now` and returns the time of the next call. Call it earlier when a datagram
-   * arrives. An exception of the callback propagates after a Bye is sent to the server.
+   * Performs all work due at `now` and returns the time of the next call. Call it earlier if a datagram arrives. An
+   * exception of the callback propagates after a Bye is sent to the server.
    */
   turn(now: Nanoseconds): Nanoseconds {
     if (this.phase === "stopped") return kNever;
@@ -164,8 +164,8 @@ export class ForceClient {
     return this.#session?.request({ kind: "disengage", device: this.#place.device }) !== undefined;
   }
   /**
-   * Sets the scales of the coupling, at the server of the leader, while it is not engaged or its clutch is held.
-   * Throws a RangeError outside of 0.01 … 100. Returns false as rearm() does.
+   * Sets the scales of the coupling at the server of the leader. The coupling must not be engaged unless its clutch
+   * is held. Throws a RangeError outside of 0.01 … 100. Returns false as rearm() does.
    */
   setScale(positionScale: number, forceScale: number): boolean {
     const wanted: Request = { kind: "setScale", device: this.#place.device, positionScale, forceScale };
@@ -260,7 +260,7 @@ export class ForceClient {
   get deviceReport(): DeviceReport | undefined {
     return this.#deviceReport;
   }
-  /** Newest report on the engine of each channel, also after it has left. Requires `diagnostics`. */
+  /** The newest report on the engine of each channel, kept when the engine leaves. Requires `diagnostics`. */
   get peerReports(): ReadonlyMap<number, PeerReport> {
     return this.#peerReports;
   }

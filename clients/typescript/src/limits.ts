@@ -14,13 +14,13 @@ export const kMaxValidForMs = 10_000;
 /** Exclusive upper bound of packet numbers, so that a nonce never reaches that of REKEY. */
 export const kMaxPacketNumber = 1n << 60n;
 export const kMaxFrames = 64;
-/** Maximum number of pending requests. */
+/** The maximum number of pending requests. */
 export const kRequestWindow = 16;
 /** Bytes of UTF-8 in a name. */
 export const kMaxName = 64;
 /** Bytes of UTF-8 in the name of a device or a channel. */
 export const kMaxLabel = 24;
-/** Maximum number of `ways`. */
+/** The maximum number of `ways`. */
 export const kMaxWays = 8;
 export const kMaxLoopHz = 1_000_000;
 /** How many times a Bye is sent. */

@@ -164,7 +164,7 @@ export class Session {
 
   // ---- In
 
-  /** Handles a datagram. Datagrams that are malformed or of another session are counted and dropped. */
+  /** Handles a datagram. Datagrams are counted and dropped if they are malformed or belong to another session. */
   receive(now: Nanoseconds, datagram: Uint8Array): void {
     this.#latest = now;
     if (!this.#open) return;

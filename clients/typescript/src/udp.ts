@@ -52,7 +52,7 @@ export async function lookUp(host: string): Promise<readonly string[]> {
   }
 }
 
-/** Maximum number of datagrams waiting for the socket; older ones are dropped. */
+/** The maximum number of datagrams waiting for the socket; older ones are dropped. */
 const kMostWaiting = 16;
 
 /**

@@ -50,7 +50,7 @@ namespace tendon {
 ///
 /// **Bad input.** A state that the purse would refuse is refused entirely (`accepts`). Openings must be finite.
 ///
-/// Thread-safe: no. Realtime-safe: all but the constructor.
+/// Thread-safe: no. Realtime-safe: yes, except the constructor.
 class GripCoupling {
  public:
   struct Config {

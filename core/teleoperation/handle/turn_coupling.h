@@ -53,7 +53,7 @@ namespace tendon {
 /// A robot that is not live holds its last orientation with the full K. If it is rotated by more than 150°, it holds
 /// the new orientation.
 ///
-/// Quaternions must have the norm 1 ± 0.001. Thread-safe: no. Realtime-safe: all but the constructor.
+/// Quaternions must have the norm 1 ± 0.001. Thread-safe: no. Realtime-safe: yes, except the constructor.
 class TurnCoupling {
  public:
   struct Config {

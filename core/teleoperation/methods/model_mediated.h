@@ -46,7 +46,7 @@ struct SurfaceModel {
 /// Source: the idea of Mitra and Niemeyer, IJRR 27(2), 2008 (recalled, not re-read); the estimator is ours
 /// (core/PROOFS.md, "Surfaces").
 ///
-/// Samples that are not finite are ignored. Thread-safe: no. Realtime-safe: all but the constructor.
+/// Samples are ignored if they are not finite. Thread-safe: no. Realtime-safe: yes, except the constructor.
 template <int N>
 class SurfaceEstimator {
  public:

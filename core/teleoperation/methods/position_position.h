@@ -73,7 +73,7 @@ Vec<N> paid_stretch(const Vec<N>& stretch, double stiffness, double energy) noex
 ///
 /// Source: position–position coupling, Hannaford 1989 (recalled); the bound on K derived here and measured.
 ///
-/// Thread-safe: no. Realtime-safe: all but the constructor.
+/// Thread-safe: no. Realtime-safe: yes, except the constructor.
 template <int N>
 class PositionPosition {
  public:

@@ -39,9 +39,9 @@ struct FollowerMessage {
 /// Source: Ryu, Artigas and Preusche, Mechatronics 20(7), 2010 (recalled, not re-read); core/PROOFS.md, "Two-channel
 /// passivity control". The prediction by one period and the use of the applied force are ours.
 ///
-/// Messages and intervals that are not finite are ignored. If `velocity` is not finite, the demand is not finite.
+/// Messages and intervals are ignored if they are not finite. If `velocity` is not finite, the demand is not finite.
 ///
-/// Thread-safe: no. Realtime-safe: all but the constructor.
+/// Thread-safe: no. Realtime-safe: yes, except the constructor.
 template <int N>
 class PassivityLeader {
  public:
@@ -85,9 +85,9 @@ class PassivityLeader {
 ///
 /// Source: as above; drift compensators: Artigas, Ryu and Preusche, IROS 2010 (recalled, not re-read).
 ///
-/// Messages that are not finite are ignored. If the force is not finite, the tool must not move.
+/// Messages are ignored if they are not finite. If the force is not finite, the tool must not move.
 ///
-/// Thread-safe: no. Realtime-safe: all but the constructor.
+/// Thread-safe: no. Realtime-safe: yes, except the constructor.
 template <int N>
 class PassivityFollower {
  public:

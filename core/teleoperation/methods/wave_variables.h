@@ -64,7 +64,7 @@ struct WaveMessage {
 /// Messages and intervals that are not finite are ignored, as are messages whose time is not between those of their
 /// neighbors. If `velocity` is not finite, the demand is not finite, and the limiter sets the force to 0.
 ///
-/// Thread-safe: no. Realtime-safe: all but the constructor.
+/// Thread-safe: no. Realtime-safe: yes, except the constructor.
 template <int N>
 class WavePort {
  public:

@@ -11,7 +11,7 @@ export const kMetresPerNewton = 0.01;
 const kLongestArrow = 0.15;
 /** Used if the maximum torque of the device is unknown. */
 export const kUsualTorque = 0.2;
-/** Maximum number of points of a path. */
+/** The maximum number of points of a path. */
 export const kPathPoints = 220;
 
 /** Returns a color of the theme by its name in style.css. */
