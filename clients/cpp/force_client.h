@@ -139,15 +139,15 @@ class ForceClient {
   enum class Phase : std::uint8_t {
     kGreeting = 1,    ///< waiting for an answer to the handshake
     kOpen = 2,        ///< session open
-    kUnanswered = 3,  ///< the server did not answer; waiting before the next attempt
-    kRefused = 4,     ///< the server refused the client; waiting before the next attempt
-    kLost = 5,        ///< the session ended; waiting before the next attempt
+    kUnanswered = 3,  ///< waiting after an attempt without an answer
+    kRefused = 4,     ///< waiting after a refusal
+    kLost = 5,        ///< waiting after a session has ended
     kStopped = 6,     ///< final: stop(), an exception, or replacement (kReplaced)
   };
 
   struct Stats {
     Phase phase = Phase::kGreeting;
-    /// Why the last attempt or session ended. Contains the message of the server if there is one.
+    /// The reason for the end of the last attempt or session. Contains the message of the server if there is one.
     Code code = Code::kOk;
     std::string reason;
     LinkStats link;  ///< of the newest session
@@ -159,10 +159,10 @@ class ForceClient {
     std::uint64_t forces = 0;
     std::uint64_t forces_unusable = 0;  ///< forces not sent because they are not finite or out of bounds
     std::string_view unusable{};        ///< reason for the newest unusable force; empty: none
-    std::string_view left_out{};        ///< which part of this session's forces is not sent, and why; empty: none
+    std::string_view left_out{};        ///< the omitted part of the forces, and the reason
     std::uint64_t forces_alike = 0;     ///< forces not sent because they are within the deadband
     std::uint64_t strangers = 0;        ///< datagrams dropped because they did not come from the server
-    std::string lease_lost_to;          ///< name of the client that took over the channel; empty: none
+    std::string lease_lost_to;          ///< the client that has taken over the channel
   };
 
   /// Creates a controller, which receives states and sends forces. `link` must outlive this object. The first Hello
@@ -182,8 +182,8 @@ class ForceClient {
   void answer_again() { unseen_ = newest_.has_value(); }
 
   /// Sends a force that was computed asynchronously, after the callback returned an unknown force (Touch::unknown).
-  /// The force is sent in the next turn, which is due immediately. Returns false and sends nothing if the session of
-  /// that state has ended, another client holds the channel, or a newer state has been answered.
+  /// The force is sent in the next turn, which is due immediately. Returns false and does not send the force if the
+  /// session has ended, if another client has the channel, or if there was an answer to a newer state.
   bool answer(LocalTime now, const Reply& reply);
 
   /// Asks the server to clear a latched fault of the device and to undo a disarm. With a safety layer, this is the
@@ -246,8 +246,8 @@ class ForceClient {
   const std::optional<LinkReport>& report() const noexcept { return report_; }
 
   /// Newest reports on the loop of the device and on the engine of each channel, in the order of their first reports.
-  /// Requires Config::diagnostics. Empty before the first report of this session. The last report on an engine stays
-  /// after the engine has left.
+  /// Requires Config::diagnostics. Empty before the first report of this session. The last report is kept when the
+  /// engine leaves.
   const std::optional<DeviceReport>& device_report() const noexcept { return device_report_; }
   const std::vector<PeerReport>& peer_reports() const noexcept { return peer_reports_; }
 
@@ -287,7 +287,7 @@ class ForceClient {
   std::optional<Welcome> welcome_;
   std::optional<DeviceDescription> description_;
   std::optional<HandleDescription> handle_;
-  std::optional<std::uint32_t> order_;  ///< request id; never that of a lease request
+  std::optional<std::uint32_t> order_;  ///< request id (not for leases)
   std::optional<Session::RequestAnswered> order_answer_;
   LeaseRequest lease_;  ///< also stores the indices of the device and the channel
 

@@ -44,10 +44,10 @@ struct Options {
 int run(const Options& options, Physics physics);  ///< a controller
 int run(const Options& options, Watch watch);      ///< an observer
 
-/// Runs one engine for several devices of one server, for example two hands that hold one object. The map assigns a
+/// Runs an engine for several devices of a server, for example if two hands hold the same object. The map assigns a
 /// callback to each device name. The callbacks run sequentially on this thread and need no locks. Each device has its
 /// own session with these options, and messages contain the device name. `options.client.device` must be empty.
-/// Returns 0 if every session was open at least once. Ends when one session ends permanently.
+/// Returns 0 if every session was open at least once. The run ends if one of the sessions cannot be opened again.
 int run(const Options& options, const std::map<std::string, Physics>& physics);
 
 /// One of several hands that hold the same object.

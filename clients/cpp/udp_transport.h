@@ -30,7 +30,8 @@ class UdpTransport : public Link {
 
   /// Resolves the name again, which may block. This must only be called while no session is open. Keeps the current
   /// address if the name still resolves to it; with `another`, selects the next address. Reopens a Unix socket, since
-  /// its path may belong to a new server. Throws as the constructor does; the current address then stays in use.
+  /// its path may belong to a new server. Throws the same exceptions as the constructor. In this case the current
+  /// address is kept.
   void look_up_again(bool another);
 
   /// `to` must be server(). Datagrams to other addresses, and those that the system rejects, are dropped.

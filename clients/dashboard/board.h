@@ -55,11 +55,11 @@ class Board {
     std::uint64_t late_engine = 0;
     std::uint64_t late_unknown = 0;
     RefusedForces refused{};
-    /// Reports on the device since the last report on this engine. Reports end when an engine leaves.
+    /// Reports on the device since the last report on this engine. There are no reports after an engine has left.
     std::uint64_t silent_for = 0;
   };
 
-  /// Both ends of a coupling at one time.
+  /// The states of both ends of a coupling.
   struct Ports {
     PeerTime at;  ///< newest sampling time of the device when `own` arrived, because the port's own time uses an
                   ///< unrelated clock
@@ -72,7 +72,7 @@ class Board {
     std::optional<HandleDescription> handle;  ///< for this session; empty until it arrives
     std::optional<DeviceState> newest;
     std::vector<DeviceState> waiting;  ///< states waiting for the page, in order
-    std::uint64_t dropped = 0;         ///< states dropped because the page was too slow
+    std::uint64_t dropped = 0;         ///< dropped states, if the page is slow
     std::uint64_t states = 0;
     std::array<std::uint64_t, kReasons> limited{};  ///< states with each bit of core/base/reason.h
     std::optional<DeviceReport> report;
@@ -135,7 +135,7 @@ std::optional<PortRole> role_of(const Board::Ports& ports);
 
 /// Returns the energy that both ends of a coupling may still output, in J of the leader: both accounts plus payments
 /// in transit. One joule of the follower is s_f/s_x joules of the leader. Returns nullopt if the scales are unknown,
-/// neither end has an account, or an end has not received the other's state.
+/// if there is no account, or if one of the ends has not received the state of the other end.
 std::optional<double> pair_account(const Board::Ports& ports);
 
 }  // namespace tendon::dash

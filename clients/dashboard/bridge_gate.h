@@ -15,8 +15,8 @@ namespace tendon::dash {
 struct BridgeCounts {
   std::uint64_t pages = 0;  ///< open WebSockets
   std::uint64_t opened = 0;
-  std::uint64_t refused_origin = 0;  ///< WebSockets refused because of their origin
-  std::uint64_t refused_full = 0;    ///< WebSockets refused because too many were open
+  std::uint64_t refused_origin = 0;  ///< refused: wrong origin
+  std::uint64_t refused_full = 0;    ///< refused: too many WebSockets
   std::uint64_t to_server = 0;       ///< datagrams
   std::uint64_t to_page = 0;
   std::uint64_t malformed = 0;  ///< dropped: not a Tendon datagram

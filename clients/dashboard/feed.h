@@ -27,7 +27,7 @@ namespace tendon::dash {
 class Feed {
  public:
   using PageId = std::uint64_t;
-  /// Time between ticks: the refresh period of a screen.
+  /// The time between two ticks, which is the refresh period of a screen.
   static constexpr Duration kTick = std::chrono::microseconds(16'667);
   /// Lines per second that a page may send.
   static constexpr double kMaxLinesHz = 20;

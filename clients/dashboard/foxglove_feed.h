@@ -24,7 +24,7 @@ namespace tendon::dash {
 ///     /tf, /NAME/scene                  the newest state for drawing, 60 times per second
 ///
 /// A topic is advertised while its device is known. If the server stops, topics stay and a status message reports it.
-/// When the server is back, the same subscriptions continue.
+/// The subscriptions are still valid after the server has been restarted.
 ///
 /// **Time stamps.** A message has the sampling time of the state (for reports, the end of the reported interval) in
 /// the server's clock, plus the offset between Unix time and that clock. The offset is derived from

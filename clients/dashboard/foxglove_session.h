@@ -25,7 +25,7 @@ namespace tendon::dash {
 /// Thread-safe: no. Realtime-safe: no.
 class FoxgloveSession {
  public:
-  /// About 5 s of the steps of one device.
+  /// This is about 5 s for one device.
   static constexpr std::size_t kMaxBytes = 1'000'000;
   /// Not reached by a client that reads its messages.
   static constexpr std::size_t kMaxTexts = 64;
@@ -40,7 +40,7 @@ class FoxgloveSession {
   bool subscribe(std::uint32_t subscription, std::uint32_t channel);
   /// Discards the waiting messages of the subscription. Returns false if it does not exist.
   bool unsubscribe(std::uint32_t subscription);
-  /// Ends the subscription to a channel that was removed.
+  /// Removes the subscription of a removed channel.
   void forget(std::uint32_t channel);
   bool subscribes_to(std::uint32_t channel) const noexcept { return subscription_of_.contains(channel); }
 

@@ -22,8 +22,8 @@ namespace tendon::dash {
 ///     Observer observer(link, server, config, board, now);
 ///     for (;;) wait for a datagram, at most until observer.turn(now);
 ///
-/// A client sees only the devices that it claims by name. It finds their names by requesting the descriptions of
-/// devices 0, 1, 2 … until there is none. On a server with several devices, a first session therefore requests the
+/// A client can only see the devices that it has claimed by name. It finds their names by requesting the descriptions
+/// of devices 0, 1, 2 … until there is none. On a server with several devices, a first session therefore requests the
 /// names, and a second one claims all devices.
 ///
 /// * **Reconnection.** It reconnects indefinitely (see Connection).

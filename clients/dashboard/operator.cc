@@ -69,7 +69,7 @@ std::string Operator::objection(std::uint32_t number) const {
     return "This device has no channel \"" + config_.channel + "\", which --arm names, but " +
            names_of(device->second.about->channels) + ".";
   }
-  // The operator itself is listed for a moment after its session has ended.
+  // The operator may still be in the list after the end of its session.
   if (!channel->holder.empty() && channel->holder != config_.name) return held_by(*channel);
   return {};
 }

@@ -47,7 +47,7 @@ class Operator {
   /// the `board` must outlive this object.
   Operator(Link& link, const Address& server, const Config& config, Board& board);
 
-  /// Returns why no order can be given to a device now. Empty if it can.
+  /// Returns the reason if the device cannot be controlled. Empty if it can.
   std::string objection(std::uint32_t device) const;
 
   /// Starts an order. Returns the reason if it cannot be started, otherwise an empty string.

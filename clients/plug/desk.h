@@ -64,7 +64,8 @@ class Desk {
   /// Sleeps until a server socket or one of `others` is ready or until `until`, at most 100 ms so that signals are
   /// noticed. Sets `revents` of `others`.
   void wait(std::span<pollfd> others, LocalTime now, LocalTime until);
-  /// Sockets connected to the server, for bridges with their own event loop. They change after each name lookup.
+  /// Sockets connected to the server, for bridges with their own event loop. The list must be read again after each
+  /// name lookup.
   std::vector<int> descriptors() const;
 
   /// Sends a Bye for each device. Returns the exit code, which is 1 (with a message) if a device never sent a state.

@@ -27,7 +27,7 @@ Plug::Plug(const Way& watcher, const Way& controller, Config config, LocalTime n
       config_(std::move(config)),
       watcher_(new_client(now, false)) {}
 
-/// Discards datagrams for a session that has ended; otherwise the socket would stay readable.
+/// Discards the datagrams of a closed session, because otherwise the socket would stay readable.
 void Plug::drain(Link& link) {
   Address from;
   std::array<std::byte, kMaxDatagram> forgotten;

@@ -22,7 +22,8 @@ namespace tendon::plug {
 ///   first requested force makes it a controller of the channel, which takes two round trips. After Config::idle
 ///   without a force it becomes an observer again.
 /// * **One owner.** The first program that requests a force owns the device. Forces of other programs are dropped,
-///   and they are informed. The device is free again when its owner leaves or requests nothing for Config::idle.
+///   and they are informed. The device is released if the owner leaves or if there is no request for the time
+///   Config::idle.
 /// * **Freshness.** A single force is sent once; a field answers states until it expires. After that nothing is sent,
 ///   and the server holds, fades and stops the last force as for any silent engine (protocol/SESSION.md). An old
 ///   force is never sent as a new one.
@@ -49,7 +50,7 @@ class Plug {
 
   enum class Answer : std::uint8_t {
     kTaken = 1,      ///< will be sent
-    kOwned = 2,      ///< dropped: another program owns the device
+    kOwned = 2,      ///< dropped: there is another owner
     kObserving = 3,  ///< dropped: Config::observe is set
   };
 

@@ -37,7 +37,7 @@ std::optional<Purse> purse_of(const CouplingConfig& config, const MappedEnd& fra
   Purse::Config purse = *config.purse;
   purse.peers = 1;
   purse.joule[0] = frame.joule();
-  // The start is equal at both ends. Otherwise the end whose joules are worth less would have too little.
+  // Both ends use the same start value. Otherwise the end whose joules are worth less would have too little.
   purse.start = frame.worth(purse.start);
   purse.epoch = config.spring.epoch;
   return Purse(purse);

@@ -31,8 +31,8 @@ namespace tendon {
 ///     coupling.conclude(applied, contact)            the end of the period
 ///     send(coupling.message())
 ///
-/// **Displacements.** Each end has an offset p₀ and sends u = p − p₀ in its own axes. While an end is not *live*, its
-/// u is constant and p₀ moves with the handle. The leader is live if it is engaged and the follower has answered the
+/// **Displacements.** Each end has an offset p₀ and sends u = p − p₀ in its own axes. If an end is not *live*, its u
+/// is constant and p₀ moves with the handle. The leader is live if it is engaged and the follower has answered the
 /// act. The follower is live if it is engaged. When the follower becomes live, it sets its u to the mapped u of the
 /// leader, so that the force of the law is 0. The u of the leader is 0 at the start of each act and continues from
 /// its last value after the clutch. The clutch therefore does not move the other end.
@@ -203,7 +203,7 @@ class Coupling {
   PortPhase phase_ = PortPhase::kAlone;
   std::uint64_t sequence_ = 0;    ///< number of periods
   std::uint64_t engagement_ = 0;  ///< of the newest act that was made (leader) or followed (follower)
-  std::uint64_t seen_ = 0;        ///< follower: acts up to this one are ignored
+  std::uint64_t seen_ = 0;        ///< follower: the last ignored act
   bool answered_ = false;         ///< leader: the follower is engaged in this act
   bool ready_ = false;
   std::uint64_t act_sequence_ = 0;   ///< the first state that contains the act
@@ -226,7 +226,7 @@ class Coupling {
   Vec3 u_velocity_ = Vec3::Zero();
   bool was_live_ = false;
   bool new_act_ = false;         ///< follower: the first period of an act
-  std::optional<Vec3> place_{};  ///< m, the position that a robot holds
+  std::optional<Vec3> place_{};  ///< m, the held position
   bool was_aligning_ = false;
   bool rescaled_ = false;  ///< The scales have changed in this period.
   ForceRamp ramp_;

@@ -44,8 +44,8 @@ struct CoupledLeader {
 /// missing energy: 2 to 4 leaders that pushed together then exchanged 7 to 17 % more energy without a larger force.
 /// The guarantees do not depend on this.
 ///
-/// **Trust.** Each peer has its own purse with max_power and max_account. Against n dishonest peers, the port alone
-/// keeps L ≥ −n (max_account + max_power · t).
+/// **Trust.** Each peer has its own purse with max_power and max_account. If n peers are dishonest, this port still
+/// guarantees that L ≥ −n (max_account + max_power · t).
 ///
 /// Thread-safe: no. Realtime-safe: yes, except the constructor.
 class Couplings {

@@ -114,7 +114,7 @@ struct PortState {
   std::uint64_t answers_epoch = 0;  ///< epoch of the receiver for `answers`, `given` and `taken`; 0: none
   std::uint64_t answers = 0;        ///< sequence of the receiver's newest state in use; 0: none
   Duration time{};                  ///< in the sender's clock; only differences are used; ± 2⁶⁰ ns
-  Duration round_trip{};            ///< measured by the sender; 0: not known; ≤ kMostRoundTrip
+  Duration round_trip{};            ///< as measured by the sender, or 0; ≤ kMostRoundTrip
   PortPhase phase = PortPhase::kAlone;
   std::uint64_t engagement = 0;          ///< number of the leader's act that the phase belongs to: 1, 2, …; 0: none
   std::uint32_t buttons = 0;             ///< bit i: button i is pressed

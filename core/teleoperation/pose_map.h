@@ -7,7 +7,7 @@
 
 namespace tendon {
 
-/// The map between the two ends of a coupling. For the displacement u of each handle from its offset:
+/// Maps values between the leader and the follower. For the displacement u of each handle from its offset:
 ///
 ///     u_f = s_x R u_l             F_l = s_f Rᵀ F_f
 ///     K_l = s_f s_x K_f           one joule of the leader is s_x/s_f joules of the follower
@@ -33,7 +33,7 @@ class PoseMap {
     double position_scale = 1;  ///< s_x, motion of the follower / motion of the leader; 0.01 … 100
     double force_scale = 1;     ///< s_f, force on the leader / force on the follower; 0.01 … 100
     Quat rotation{};            ///< R, a unit quaternion
-    std::array<bool, 3> axes = {true, true, true};  ///< of the leader's frame; at least one
+    std::array<bool, 3> axes = {true, true, true};  ///< in the leader's frame; at least one
   };
 
   /// Throws std::invalid_argument with the name of the field, its value and the expected value.

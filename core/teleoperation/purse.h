@@ -46,9 +46,9 @@ struct PurseMessage {
 /// observed work and R increase A_i (core/PROOFS.md, "Output bound"). Giving keeps A_i ≥ 0 and is done before the
 /// bound. R_ij ≤ G_ij, because totals do not decrease and only the largest received one is used. So Σ L_i = Σ A_i + Σ
 /// (G_ij − R_ij) + Σ discarded_i ≥ 0, because each term is ≥ 0. ∎ The theorem requires no common clock, no
-/// acknowledgement and no retransmission. It holds while no hold is longer than T_max; see OutputBound for longer
-/// ones. Several purses may use one account one after the other, each with the remaining energy as `payable`
-/// (Couplings). Their sum then satisfies the condition of the theorem.
+/// acknowledgement and no retransmission. All holds must be at most T_max long; see OutputBound for longer holds.
+/// Several purses may use one account one after the other, each with the remaining energy as `payable` (Couplings).
+/// Their sum then satisfies the condition of the theorem.
 ///
 /// **Amount.** The ports give energy so that the ratio of account to need becomes equal, including the energy in
 /// transit:
@@ -70,19 +70,20 @@ struct PurseMessage {
 /// in transit until the peer knows the new value, and the follower gives up the part of its account by which
 /// (s_f/s_x) A has increased. No change of the scales increases the sum of the accounts in joules of the leader.
 ///
-/// **Epochs.** A port that restarts has lost its totals. Its new purse must have an epoch above all previous ones (a
+/// **Epochs.** If a port restarts, it loses its totals. Its new purse must have an epoch above all previous ones (a
 /// persistent counter, or the time of day at the start; clocks of two machines are not compared). Totals belong to a
 /// pair of epochs. A higher epoch of the peer resets both totals. Messages of a lower epoch, and totals for another
 /// epoch of this port, are ignored. No total is therefore counted twice. Energy in transit is lost, which is safe.
 ///
 /// **Trust.** The sum is ≥ 0 if the peers keep their accounts correctly. Against other peers, this port alone keeps L
 /// ≥ −(max_account + max_power · t): received energy is credited up to an allowance, which starts at max_account and
-/// increases by max_power and by the given energy up to max_account. The remainder is discarded, as is the part of an
-/// account above max_account. Discarding is always safe (core/PROOFS.md, "Discarded credit").
+/// increases by max_power and by the given energy up to max_account. The rest is discarded. If an account is larger
+/// than max_account, the difference is also discarded. Discarding is always safe (core/PROOFS.md, "Discarded
+/// credit").
 ///
 /// **Bad input.** A message is refused and counted in `refused` if a value is not finite or out of bounds, if `taken`
 /// exceeds the given total, or if a total decreases although its sequence increases. A message that is not newer is
-/// ignored. A period with values that are not finite gives and credits nothing.
+/// ignored. If a value of the period is not finite, nothing is given or credited.
 ///
 /// Cost with PositionPosition: 85 ns per period with one peer (README).
 ///

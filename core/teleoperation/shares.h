@@ -15,7 +15,7 @@ namespace tendon {
 /// proportion to their target values, or equally if these are 0. A new value during a change starts a new line at the
 /// current values.
 ///
-/// A leader that is not engaged keeps its share.
+/// The share of a leader does not change if it is not engaged.
 ///
 /// Thread-safe: no. Realtime-safe: yes, except the constructor.
 class Shares {

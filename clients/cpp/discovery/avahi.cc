@@ -149,7 +149,7 @@ void read_service(sd_bus_message* answer, Found& found) {
   try {
     const Address address =
         parse_address((text.find(':') == std::string::npos ? text : "[" + text + "]") + ":" + std::to_string(port));
-    // A link-local address is unusable without its interface.
+    // Link-local addresses cannot be used without an interface.
     if (is_link_local(address)) return;
     found.addresses.insert(is_ipv4(address) ? found.addresses.begin() : found.addresses.end(), address);
   } catch (const std::invalid_argument&) {

@@ -29,7 +29,7 @@ struct ToolContact {
 
 enum class Following : std::uint8_t {
   kAlone = 1,     ///< no state has arrived
-  kCoupled = 2,   ///< states arrive; the robot stands still until the operator engages
+  kCoupled = 2,   ///< the robot waits until the operator engages
   kEngaged = 4,   ///< the robot follows the hand
   kClutched = 5,  ///< the hand moves freely and the robot holds its pose
   kLost = 6,      ///< states stopped; the operator must engage again

@@ -166,7 +166,7 @@ struct Crew::Files {
   File stream;
   std::vector<Stranger> strangers;
   pid_t pid = 0;  ///< of the program; 0: not running
-  File process;   ///< readable when the program has ended
+  File process;   ///< readable after the program's exit
 
   void watch(const File& file) const {
     epoll_event event{};

@@ -11,8 +11,8 @@
 
 namespace tendon::worker {
 
-/// Launches the worker program and owns the stream to it. Only one worker at a time; `mpirun` with all its ranks
-/// counts as one.
+/// Launches the worker program and owns the stream to it. Only one worker at a time; All ranks of `mpirun` are one
+/// worker.
 ///
 /// The stream is a Unix socket in a directory that is accessible only to this user, or, with Config::listen, TCP
 /// without Nagle's algorithm. The program receives the address and a secret in its environment (stream.h). Each
@@ -21,8 +21,8 @@ namespace tendon::worker {
 ///
 /// All processes started by the program are killed with it, including those that left its process group, as the ranks
 /// of Open MPI do: this process adopts orphans (PR_SET_CHILD_SUBREAPER) and kills all its descendants. If this
-/// process dies, the kernel kills the program, and workers end with their stream. Processes on other machines end
-/// with their launcher there. Only one Crew per process, because it kills all other children of the process as well.
+/// process dies, the kernel kills the program, and workers end with their stream. Processes on other machines are
+/// ended by their launcher. Only one Crew per process, because it kills all other children of the process as well.
 ///
 /// Thread-safe: no. Realtime-safe: no.
 class Crew {

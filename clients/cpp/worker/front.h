@@ -79,7 +79,7 @@ class Front {
   /// The worker answered the last state, or its answer is invalid for the reason `why` (stream.h).
   void answered(LocalTime now, const Touch& touch);
   void refused(std::string_view why);
-  /// The stream or the program has ended.
+  /// Must be called if the stream or the program has ended.
   void ended(LocalTime now, const std::string& why);
 
   // Outputs; call turn() until it returns empty:

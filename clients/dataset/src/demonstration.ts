@@ -12,9 +12,9 @@ export interface Moment {
   readonly phase: string;
   /** m, of the tool in the frame of the robot. */
   readonly position: Vec3;
-  /** m, of the tool; undefined: it holds its pose. */
+  /** m, of the tool. Undefined if the pose is held. */
   readonly target?: Vec3 | undefined;
-  /** N, on the tool; undefined: not measured. */
+  /** N, on the tool. Undefined if it was not measured. */
   readonly contact?: Vec3 | undefined;
 }
 

@@ -78,7 +78,7 @@ export function episodesOf({ leader, follower, map }: Coupling, fps: number): Ep
   return episodes;
 }
 
-/** s, silence after which a robot has lost the hand. */
+/** A robot has lost the hand after this silence in s. */
 const kSilence = 0.5;
 /** s: times of ns, as sums of floating-point numbers, are not exact. */
 const kRounding = 1e-7;

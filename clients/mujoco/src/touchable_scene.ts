@@ -97,7 +97,7 @@ export class TouchableScene {
   #led: Pose;
   readonly #stats = { answers: 0, steps: 0, badPositions: 0, lagging: 0, restarts: 0, incomplete: 0, behind: 0 };
   #sampledNs: bigint | undefined;
-  /** s, elapsed time that was not simulated yet: less than one step. */
+  /** s, elapsed time that was not simulated yet. */
   #due = 0;
   #touch: Touch | undefined;
   /** Number of warnings of MuJoCo, by mjtWarning. */

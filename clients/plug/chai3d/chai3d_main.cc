@@ -170,7 +170,7 @@ void refuse_openhaptics(const std::filesystem::path& program) {
 
 // NOLINTEND(concurrency-mt-unsafe)
 
-/// Serves the program until it ends. Returns its exit code, or 128 + the number of the signal that terminated it.
+/// Runs until the program exits. Returns its exit code, or 128 + the number of the signal that terminated it.
 int serve(const Options& options) {
   const std::filesystem::path libraries = library_folder();
   refuse_openhaptics(find_program(options.program.front()));

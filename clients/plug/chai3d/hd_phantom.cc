@@ -48,7 +48,7 @@ std::int64_t now_ns() noexcept {
   return time.tv_sec * 1'000'000'000 + time.tv_nsec;
 }
 
-/// A spin lock for writers. It is held for about 30 stores. Acquiring it fails after some attempts, in case the
+/// A spin lock for writers. It is only held for about 30 stores. Acquiring it fails after some attempts, in case the
 /// holding thread was killed.
 class Turnstile {
  public:
@@ -76,8 +76,8 @@ struct Handle {
 /// thread does not consume states of the haptic thread.
 thread_local std::array<std::uint64_t, SharedHands::kMaxDevices> tick_read{};
 
-/// Selects the device that a thread waits for: the first of those that it updates in turn. One iteration of the
-/// program is then one haptic step, independent of the order in which it reads states and sets forces.
+/// Selects the device for which a thread waits. This is the first of the devices that it updates. One iteration of
+/// the program is then one haptic step, independent of the order in which it reads states and sets forces.
 class Pacer {
  public:
   /// Returns whether setting a force on this device waits. If the thread sets forces on another device twice in

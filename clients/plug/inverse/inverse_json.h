@@ -56,7 +56,7 @@ std::optional<Mat3> basis_of(std::string_view permutation);
 /// Returns the frame of a client: the frame of the service, rotated by B.
 Frame inverse_frame(const Mat3& basis);
 
-/// The part of a message about one device.
+/// The commands for one device.
 struct DeviceWish {
   std::string device_id;
   std::optional<std::string> permutation;

@@ -349,7 +349,7 @@ struct InverseServer::State {
     });
   }
 
-  /// Turns the desk until nothing is due. A force computed in one turn is sent in the next.
+  /// Calls the desk until no work is due. A force computed in one turn is sent in the next.
   LocalTime turn_desk() {
     const InverseCounts& counts = shared.counts;
     const std::array<Desk::Count, 6> all = {{{"clients", shared.clients},

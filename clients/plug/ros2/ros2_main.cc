@@ -40,7 +40,7 @@ struct Ros2Options {
 };
 
 constexpr Duration kDiagnosticsEvery = std::chrono::seconds(1);
-/// Minimum time between two reads of commands. Only the newest command of an interval is used.
+/// Commands are only read at this interval. Only the newest command of an interval is used.
 constexpr Duration kLeastGap = std::chrono::microseconds(250);
 
 /// Rejects characters with a meaning in XML, because the text becomes part of the Cyclone DDS configuration.

@@ -54,7 +54,7 @@ class Ros2Node {
     std::string called;  ///< name for messages
     RosWrench wrench;
   };
-  /// Returns the newest command for the device; empty: nothing new.
+  /// Returns the newest command for the device, if there is a new one.
   std::optional<Command> take(std::size_t device);
   /// Returns the publishers of commands for the device; empty: unchanged since the last call.
   std::optional<std::vector<std::uint64_t>> writers_if_changed(std::size_t device);

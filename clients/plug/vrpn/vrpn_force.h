@@ -24,7 +24,8 @@ struct Surface {
   bool slips = false;
 };
 
-/// What one program has requested for one device: a force field and four planes. The force is their sum:
+/// The forces that a program has requested for a device. There can be a force field and four planes. The force is
+/// their sum:
 ///
 ///     plane    gap = (n·x + d) / |n|          negative: the hand is inside
 ///              N = k (−gap) − b n·v, ≥ 0      along +n; k = spring · stiffest, spring clamped to 0 … 1

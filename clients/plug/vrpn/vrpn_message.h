@@ -24,7 +24,7 @@ using Buffer = std::vector<std::byte>;
 
 inline constexpr std::size_t kCookieSize = 24;
 inline constexpr std::size_t kHeaderSize = 24;
-/// Maximum payload with padding; the size of VRPN's TCP buffer. Longer messages end the connection, as in VRPN.
+/// Maximum payload with padding; the size of VRPN's TCP buffer. The connection is closed if a message is longer.
 inline constexpr std::size_t kLongestPayload = 64000;
 /// Maximum datagram; the size of VRPN's UDP buffer, which is an Ethernet frame without its headers.
 inline constexpr std::size_t kLongestDatagram = 1472;

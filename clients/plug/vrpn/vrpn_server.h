@@ -44,8 +44,8 @@ class Descriptor {
 ///   source address of the datagram*; or the program opens a TCP connection. Addresses in the text of the datagram or
 ///   in the description of a UDP port are never used. Connecting is asynchronous, limited to kDialsPerSecond and to
 ///   one connection per port, and is given up after kPatience.
-/// * **Limits.** At most kMaxClients, including those being connected. Further ones are closed, which is reported
-///   once until a client leaves. A client that sends no cookie within kPatience is closed.
+/// * **Limits.** At most kMaxClients, including those being connected. Further connections are closed, and a message
+///   is printed for the first of them. A client that sends no cookie within kPatience is closed.
 /// * **Forces.** Each program has an Asker for each station. When its connection ends, it releases the devices, and
 ///   the server fades the last force.
 ///

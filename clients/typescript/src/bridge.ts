@@ -16,7 +16,7 @@ export interface BridgeConfig {
   readonly origins: readonly string[];
   /** The maximum number of open WebSockets. */
   readonly maxPeers: number;
-  /** Datagrams per second that a page may send; more are dropped. */
+  /** The maximum number of datagrams per second from a page. Other datagrams are dropped. */
   readonly maxRateHz: number;
 }
 
@@ -29,7 +29,7 @@ export interface BridgeCounts {
   /** Open WebSockets. */
   peers: number;
   opened: number;
-  /** WebSockets refused because of their origin or their number. */
+  /** refused: wrong origin or their number. */
   refusedOrigin: number;
   refusedFull: number;
   toServer: number;

@@ -21,8 +21,7 @@ export interface ClientConfig {
    * reports that the lease may have ended.
    */
   readonly takeLease?: boolean;
-  /** 32 bytes shared with the server. If there is a key, all traffic is encrypted; otherwise, only loopback is accepted.
-   */
+  /** 32 bytes shared with the server for encryption. Without a key, only loopback is accepted. */
   readonly key?: Uint8Array | undefined;
   /** Cipher suites offered for an encrypted session. The server selects one. Default: all suites of this runtime. */
   readonly suites?: readonly CipherSuite[];
@@ -71,8 +70,8 @@ export interface ClientConfig {
 
 /**
  * greeting: waiting for an answer to the handshake. open: session open. unanswered, refused, lost: the server did not
- * answer, refused the client, or the session ended; waiting before the next attempt. stopped: final, after stop(), an
- * exception of the callback, or replacement by another program with the same key.
+ * answer, refused the client, or waiting after a session has ended. stopped: final, after stop(), an exception of the
+ * callback, or replacement by another program with the same key.
  */
 export type Phase = "greeting" | "open" | "unanswered" | "refused" | "lost" | "stopped";
 
@@ -97,11 +96,11 @@ export interface ClientStats {
   forcesUnusable: number;
   /** Reason for the newest unusable force. Empty if there is none. */
   unusable: string;
-  /** Which part of this session's forces is not sent, and why. Empty if all is sent. */
+  /** The omitted part of the forces, and the reason. Empty if there is none. */
   leftOut: string;
   /** Forces not sent because they are within the deadband. */
   forcesAlike: number;
-  /** Name of the client that took over the channel. Empty if there is none. */
+  /** The client that has taken over the channel. Empty if there is none. */
   leaseLostTo: string;
 }
 

@@ -83,7 +83,7 @@ export function connect(
 
 /** The maximum number of event-loop rounds that a backlog of datagrams may delay the callback. */
 const kMaxRounds = 16;
-/** Longer timers overflow in some runtimes. An early timer is harmless. */
+/** In some runtimes there is an overflow if the timer is longer. An early timer is harmless. */
 const kLongestTimerMs = 1000;
 
 const readClock = (): Nanoseconds => fromMilliseconds(performance.now());

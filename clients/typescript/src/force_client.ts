@@ -24,7 +24,7 @@ export type Watch = (hand: DeviceState, link: Readonly<LinkStats>) => void;
 
 const kValidPeriods = 3;
 const kMinValidForMs = 20;
-/** A longer gap is a pause and not a period. An engine below 10 Hz must set rateHz. */
+/** If the gap is longer, it is not used as a period. An engine below 10 Hz must set rateHz. */
 const kMaxObservedPeriodMs = 100;
 /** The minimum time between two requests for a lease. The current holder renews its lease continuously. */
 const kAskLeaseAgain = fromMilliseconds(50);

@@ -23,7 +23,7 @@ export class OutgoingRequests {
   /** Upper limit of the exponential back-off, unless the round trip is longer. */
   static readonly kMaxWait = kSecond;
 
-  /** In order of the ids. The first is the oldest whose answer was not taken. */
+  /** In order of the ids. The first one is the oldest without a taken answer. */
   readonly #asked: Asked[] = [];
   #next = 1;
 

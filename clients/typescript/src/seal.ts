@@ -49,7 +49,7 @@ type SealingKey = ChaChaKey | AesKey;
  * Suites 1 and 2: ChaCha20-Poly1305 or AES-256-GCM with the packet number as nonce and the header as associated data.
  */
 export class NoiseSeal implements Seal {
-  /** The sender renews its key after this number of datagrams or this time, whichever is first. */
+  /** The key of the sender is renewed after this number of datagrams or after this time. */
   static readonly kRenewAfter = { datagrams: 1n << 20n, time: 600n * kSecond };
   /** How long the previous key stays valid after a renewal. */
   static readonly kOverlap = 2n * kSecond;

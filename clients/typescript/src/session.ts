@@ -84,9 +84,9 @@ export type SessionEvent =
 export interface SessionConfig {
   readonly connectionId: number;
   readonly seal?: Seal;
-  /** Maximum time between two sent datagrams. */
+  /** The maximum time between two datagrams. */
   readonly keepAlive?: Nanoseconds;
-  /** The session ends after this silence of the peer. */
+  /** The session is closed if the peer is silent for this time. */
   readonly timeout?: Nanoseconds;
   /** A request is repeated after max(this, SRTT + 4 RTTVAR). */
   readonly minResend?: Nanoseconds;

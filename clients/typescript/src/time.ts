@@ -2,7 +2,7 @@
 
 /**
  * A time or duration in nanoseconds, exact like the 64 bits of the protocol. Local times and times of the peer must
- * not be subtracted. The core reads no clock: times are arguments and must not decrease.
+ * not be subtracted. The core does not read a clock. All times are arguments and must not decrease.
  */
 export type Nanoseconds = bigint;
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 import type { OpenTransport } from "./connect.js";
 
-/** Datagrams that wait longer than this are too old to be useful. */
+/** Older datagrams would not be useful. */
 const kMaxWaitingBytes = 16 * 1024;
 
 /**

@@ -17,7 +17,7 @@ namespace tendon {
 /// gripper is a separate port (PortGrip) with its own account and purse. All methods couple grippers by springs at
 /// both ends, because both openings are measured.
 ///
-/// **Openings.** g = arm · opening, m at the fingers, > 0 open. Openings are the same at both ends, without scale or
+/// **Openings.** g = arm · opening, m at the fingers, > 0 open. Both ends use the same openings without a scale or an
 /// offset. The coupled quantity is w, the opening that the leader requests and sends instead of g:
 ///
 ///     not engaged                  w = g_l
@@ -115,7 +115,7 @@ class GripCoupling {
   bool came_ = false;    ///< a state was received since the last period
   bool begins_ = false;  ///< an act starts in this period
   double asked_ = 0;     ///< m, w or z
-  bool joined_ = false;  ///< `asked_` follows its target without a limit
+  bool joined_ = false;  ///< there is no limit for `asked_`
   double told_ = 0;      ///< m
   double speed_ = 0;     ///< m/s, of `told_`
   bool was_driven_ = false;

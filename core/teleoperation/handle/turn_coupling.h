@@ -16,7 +16,7 @@ namespace tendon {
 /// and the account.
 ///
 /// **Rotations.** Each end has an offset q₀ and sends its rotation r = q q₀⁻¹ in its base axes, which corresponds to
-/// u for positions. While an end is not live, r is constant and q₀ follows the handle. When the follower becomes
+/// u for positions. If an end is not live, its r is constant and q₀ follows the handle. When the follower becomes
 /// live, it sets r to the mapped rotation of the leader, r_f = R r_l R⁻¹. The r of the leader is 1 at the start of
 /// each act and continues from its last value after the clutch. The clutch therefore does not rotate the other end,
 /// and
@@ -111,7 +111,7 @@ class TurnCoupling {
   Quat offset_{};              ///< q₀
   Quat turn_{};                ///< r
   Vec3 told_ = Vec3::Zero();   ///< rad/s, of r
-  std::optional<Quat> place_;  ///< the orientation that a robot holds
+  std::optional<Quat> place_;  ///< the held orientation
   Vec3 left_ = Vec3::Zero();   ///< N·m
   Vec3 last_ = Vec3::Zero();   ///< N·m, last requested torque
 };

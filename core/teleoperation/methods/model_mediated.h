@@ -113,7 +113,7 @@ class SurfaceEstimator {
 /// Source: as above; for the budget core/PROOFS.md, "Surfaces".
 ///
 /// A message is ignored if a number is not finite, the stiffness is negative, or the normal is not a unit vector
-/// (1e-6). If `position` is not finite, the demand is not finite. A budget that is not above 0 counts as 0.
+/// (1e-6). If `position` is not finite, the demand is not finite. If the budget is not positive, it is treated as 0.
 ///
 /// Thread-safe: no. Realtime-safe: all of it.
 template <int N>

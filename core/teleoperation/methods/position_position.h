@@ -48,12 +48,12 @@ Vec<N> paid_stretch(const Vec<N>& stretch, double stiffness, double energy) noex
 /// m/s in free motion for delays above 50 ms.
 ///
 /// **T_loop** is measured without a common clock: a message contains the sequence that it answers, and the periods
-/// since then are counted. This includes delay, loss and waiting of the other end. Both ends use the longer of the
-/// two measurements, because different K would result in different forces. T_loop increases immediately. It decreases
-/// after `recovery`, since it is the maximum over one to two of these intervals, so that a held force is steady. K
-/// follows with the time constant kSettling, because both ends learn about a longer delay at different times. Without
-/// messages T_loop increases and K decreases; the caller must detect the loss of the peer. A change of K under
-/// stretch costs ½ ΔK δ², which the accounts pay.
+/// since then are counted. This includes delay, loss and waiting of the other end. Both ends use the maximum of the
+/// two measurements, because the forces would differ if the ends used different values of K. T_loop increases
+/// immediately. It decreases after `recovery`, since it is the maximum over one to two of these intervals, so that a
+/// held force is steady. K follows with the time constant kSettling, because both ends learn about a longer delay at
+/// different times. Without messages T_loop increases and K decreases; the caller must detect the loss of the peer. A
+/// change of K under stretch costs ½ ΔK δ², which the accounts pay.
 ///
 /// **Extrapolation.** If a message is 5 ms later than the previous one, y is wrong by 1 mm at 0.2 m/s, which causes
 /// 0.4 N of noise at 400 N/m. See the README for measurements.
@@ -65,7 +65,7 @@ Vec<N> paid_stretch(const Vec<N>& stretch, double stiffness, double energy) noex
 /// The stiffness that a hand can feel is at most K_op of the two limiters, 1/K_op = T_l/(2 b_l) + T_f/(2 b_f). Both
 /// ends must use the same K, D and B up to the scales: K_l = s_f s_x K_f, and likewise for D and B.
 ///
-/// This law is not passive. It requires a limiter and a Purse at both ends.
+/// This law is not passive. There must be a limiter and a Purse at both ends.
 ///
 /// Messages that are not finite or out of bounds are dropped and counted in `refused`. A higher epoch of the other
 /// end starts anew, and a lower one is ignored. If the position is not finite, the demand is not finite, and the
@@ -89,7 +89,7 @@ class PositionPosition {
     bool adapt_to_delay = true;
     Duration period{};        ///< of this end, > 0
     std::uint64_t epoch = 1;  ///< > 0, see Purse
-    /// T_loop decreases after it has been shorter for one to two of these intervals; > 0.
+    /// The time after which T_loop can decrease, > 0.
     Duration recovery = std::chrono::seconds(5);
     double max_force = std::numeric_limits<double>::infinity();  ///< N, > 0
   };
@@ -99,7 +99,7 @@ class PositionPosition {
 
   void receive(const PortMotion<N>& message) noexcept;
 
-  /// Must be called after a loss of the peer. T_loop is measured again without the silence.
+  /// Must be called after a loss of the peer. This starts a new measurement of T_loop without the silence.
   void forget_round_trip() noexcept;
 
   /// Returns the requested force for this period and its stiffness. The caller maps positions (clutch, scale).
@@ -117,7 +117,7 @@ class PositionPosition {
   void become(double stiffness, double damping, double own_damping) noexcept;
 
   double stiffness() const noexcept { return stiffness_.value(); }  ///< K in use, N/m
-  /// Current T_loop; 0 until the other end has answered.
+  /// Returns T_loop, or 0 if the other end has not answered.
   Duration round_trip() const noexcept { return std::max({loop_, loop_before_, newest_.round_trip}); }
   double ahead() const noexcept { return ahead_; }  ///< e in the last command, s
   std::uint64_t refused() const noexcept { return refused_; }

@@ -22,7 +22,7 @@ class QuietStiffness {
   struct Config {
     double most = 0;     ///< > 0
     double damping = 0;  ///< B; ∞: K is `most`
-    Duration period{};   ///< time between two calls of `follow`, > 0
+    Duration period{};   ///< the period of `follow`, > 0
   };
   /// Does not check the values.
   explicit QuietStiffness(const Config& config) noexcept : config_(config), value_(config.most) {}

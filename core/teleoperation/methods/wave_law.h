@@ -5,8 +5,8 @@
 
 namespace tendon {
 
-/// The method `waves`: both ends use a WavePort. The impedance is B at the leader and B/(s_f s_x) at the follower. K
-/// and D are only used for the position of a robot.
+/// The method `waves` uses a WavePort at both ends. The impedance is B at the leader and B/(s_f s_x) at the follower.
+/// K and D are only used for the position of a robot.
 ///
 /// The account of the limiter pays for the energy that the line sends, and receives the energy of the peer. The pair
 /// is therefore passive even if a limiter reduces the force. The line uses the force that remains after the limiter

@@ -13,7 +13,7 @@ type Column = (typeof kColumns)[number];
 const kKept = 6000;
 /** s, maximum age of shown values. */
 const kStale = 1;
-/** ms, how long a success is shown. */
+/** The time in ms for which a success is shown. */
 const kToldMs = 8000;
 
 const kCharts: readonly ChartSpec<Column>[] = [

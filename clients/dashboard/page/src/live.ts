@@ -170,7 +170,7 @@ export class Live {
     this.#coupling.clear();
     this.#view.clear();
     this.#setStill(undefined);
-    // Its previous states had 60 Hz; from now on all states are received.
+    // Discards the previous states, which had a lower rate.
     this.#beside.delete(device);
     this.#say();
   }

@@ -8,7 +8,7 @@ import { contactOf, frameOfScene, type Quat } from "./space/figure.js";
 import { Track, noHandle, type HandleColumn, type HandleSample, type Sample } from "./track.js";
 import { moment } from "./words.js";
 
-/** The maximum number of steps to read at once: ten minutes at 1 kHz. Longer recordings are opened in parts. */
+/** The maximum number of steps to read at once: ten minutes at 1 kHz. Longer recordings are split. */
 const kMaxSteps = 600_000;
 /** Files up to this size are fetched with one request instead of hundreds. */
 const kWhole = 48 * 1024 * 1024;

@@ -94,7 +94,7 @@ export class Scrubber {
     this.moved(Math.max(from, this.#begin), Math.min(to, this.#end));
   }
 
-  /** Draws the largest wanted and applied force in each pixel. */
+  /** Draws the maximum of the wanted and the applied force for each pixel. */
   #picture(): void {
     const width = this.element.clientWidth;
     const drawn = [width, this.#begin, this.#end, ...this.#tracks.map((t) => t.length)].join();

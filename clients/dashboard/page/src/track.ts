@@ -54,7 +54,7 @@ export class Track implements Plotted<Column> {
   reasons = new Uint32Array(4096);
   mode = new Uint8Array(4096);
   readonly #columns: Record<Column, Float32Array>;
-  /** Created with the first step that has such values, because most devices have none. */
+  /** This is only created if a step has such values. */
   #handle: Record<HandleColumn, Float32Array> | undefined;
   /** Indices of the first kept step and of the end. */
   begin = 0;

@@ -198,6 +198,6 @@ export function wordsOf(figure: Figure): string {
   return parts.join(", ");
 }
 
-/** N and N·m. Smaller ones are not drawn, because tiny arrows flicker. */
+/** N and N·m. Arrows below this limit are not drawn because they would flicker. */
 export const kLeastForce = 0.01;
 export const kLeastTorque = 0.0005;

@@ -151,7 +151,7 @@ export class Stage {
     return place.figure ? wordsOf(place.figure) : "no state has come";
   }
 
-  /** Rebuilds the parts that have changed. */
+  /** Rebuilds all changed parts. */
   #arrange(): void {
     this.#shown.forEach((device, i) => {
       const place = this.#places[i]!;
