@@ -90,7 +90,7 @@ ForceClient::ForceClient(Link& link, const Address& server, const Config& config
                    .max_datagrams = config.max_datagrams}),
       lease_(kAskLeaseAgain, config.take_lease && role == Role::kController),
       next_call_(now) {
-  config_.seed = {};  // the keys must not be in the memory
+  config_.seed = {};  // otherwise all keys could be read from the memory
   greet(now);
 }
 

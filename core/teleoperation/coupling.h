@@ -203,7 +203,7 @@ class Coupling {
   PortPhase phase_ = PortPhase::kAlone;
   std::uint64_t sequence_ = 0;    ///< number of periods
   std::uint64_t engagement_ = 0;  ///< of the newest act that was made (leader) or followed (follower)
-  std::uint64_t seen_ = 0;        ///< follower: the last ignored act
+  std::uint64_t seen_ = 0;        ///< follower: acts up to this one are ignored
   bool answered_ = false;         ///< leader: the follower is engaged in this act
   bool ready_ = false;
   std::uint64_t act_sequence_ = 0;   ///< the first state that contains the act

@@ -11,8 +11,8 @@
 
 namespace tendon::worker {
 
-/// Launches the worker program and owns the stream to it. Only one worker at a time; All ranks of `mpirun` are one
-/// worker.
+/// Launches the worker program and owns the stream to it. There is one worker at a time;
+/// all ranks of `mpirun` are one worker.
 ///
 /// The stream is a Unix socket in a directory that is accessible only to this user, or, with Config::listen, TCP
 /// without Nagle's algorithm. The program receives the address and a secret in its environment (stream.h). Each

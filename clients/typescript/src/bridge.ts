@@ -29,7 +29,7 @@ export interface BridgeCounts {
   /** Open WebSockets. */
   peers: number;
   opened: number;
-  /** refused: wrong origin or their number. */
+  /** Refused: wrong origin, or too many WebSockets. */
   refusedOrigin: number;
   refusedFull: number;
   toServer: number;

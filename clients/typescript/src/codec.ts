@@ -1,6 +1,7 @@
-// SPDX-License-Identifier: Apache-2.0 Conversion of datagram bodies, with gen/codec.ts. Protobuf is only used in
-// these two files and in fields.ts. Encoding trusts its input, except that texts and lists are truncated to their
-// bounds. Decoding never throws and returns undefined for invalid input.
+// SPDX-License-Identifier: Apache-2.0
+// Conversion of datagram bodies, with gen/codec.ts. Protobuf is only used in these two files and in fields.ts.
+// Encoding trusts its input, except that texts and lists are truncated to their bounds. Decoding never throws and
+// returns undefined for invalid input.
 import { create, fromBinary, toBinary, type DescMessage, type MessageShape } from "@bufbuild/protobuf";
 import * as gen from "./gen/codec.js";
 import * as pb from "./gen/tendon_pb.js";

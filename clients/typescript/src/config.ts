@@ -69,9 +69,9 @@ export interface ClientConfig {
 }
 
 /**
- * greeting: waiting for an answer to the handshake. open: session open. unanswered, refused, lost: the server did not
- * answer, refused the client, or waiting after a session has ended. stopped: final, after stop(), an exception of the
- * callback, or replacement by another program with the same key.
+ * greeting: waiting for an answer to the handshake. open: session open. unanswered, refused, lost: waiting for the
+ * next attempt because the server did not answer, refused the client, or the session ended. stopped: final, after
+ * stop(), an exception of the callback, or replacement by another program with the same key.
  */
 export type Phase = "greeting" | "open" | "unanswered" | "refused" | "lost" | "stopped";
 

@@ -115,7 +115,7 @@ class GripCoupling {
   bool came_ = false;    ///< a state was received since the last period
   bool begins_ = false;  ///< an act starts in this period
   double asked_ = 0;     ///< m, w or z
-  bool joined_ = false;  ///< there is no limit for `asked_`
+  bool joined_ = false;  ///< `asked_` has reached its target
   double told_ = 0;      ///< m
   double speed_ = 0;     ///< m/s, of `told_`
   bool was_driven_ = false;
