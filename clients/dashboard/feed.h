@@ -42,7 +42,6 @@ class Feed {
 
   /// Handles a line from a page. Returns false if it is invalid or too frequent; the page should then be closed.
   bool hear(LocalTime now, PageId page, std::string_view line);
-  /// Collects changes from the board.
   void tick(LocalTime now);
   /// Returns the next text for a page, if any.
   std::optional<std::string> next(PageId page);

@@ -9,7 +9,6 @@
 
 namespace tendon::dash {
 
-/// Counters of tendon-dash.
 struct WebCounts {
   std::uint64_t pages = 0;  ///< currently open
   std::uint64_t requests = 0;

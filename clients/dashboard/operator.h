@@ -56,7 +56,6 @@ class Operator {
   /// Performs all work due at `now`. Must be called about 60 times per second.
   void turn(LocalTime now);
 
-  /// Sets the server address for the next order.
   void move_to(const Address& server) { server_ = server; }
 
   /// Ends the session.

@@ -21,7 +21,6 @@ inline constexpr std::string_view kArmingNeeds =
     "This page only looks on. To arm and disarm from here start tendon-dash with --key FILE, a controller's key, and "
     "--arm CHANNEL.";
 
-/// Settings that the page needs.
 struct Abilities {
   std::string server;       ///< HOST:PORT of tendond
   bool recordings = false;  ///< a folder of recordings is set

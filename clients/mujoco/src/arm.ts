@@ -52,7 +52,6 @@ export class Arm {
   /** s, elapsed time that was not simulated yet. */
   #due = 0;
 
-  /** Throws an Error if the scene is invalid. */
   static async load(mjcf: string, site: string): Promise<Arm> {
     const mj = await loadMujoco();
     const model = loadModel(mj, mjcf, {}, (text) => console.error(`MuJoCo scene: ${text}`));

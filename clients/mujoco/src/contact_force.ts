@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 import type { DoubleBuffer, MainModule, MjData, MjModel } from "@mujoco/mujoco";
 
-/** x, y, z */
 export type Triple = readonly [number, number, number];
 
 /** Reads the contact forces on the geoms of one body. */

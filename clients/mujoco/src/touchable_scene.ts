@@ -40,7 +40,6 @@ export interface SceneConfig {
 
 export interface SceneStats {
   readonly answers: number;
-  /** Steps of MuJoCo. */
   readonly steps: number;
   /** Positions that were not finite and invalid orientations; not simulated. */
   readonly badPositions: number;
@@ -89,7 +88,6 @@ export class TouchableScene {
   readonly data: MjData;
   readonly #config: Required<Pick<SceneConfig, "maxToolSpeed" | "maxToolSpin" | "maxSteps" | "onWarning">>;
   readonly #timestep: number;
-  /** From device to scene. */
   readonly #frame: Matrix;
   readonly #turned: Rotation;
   readonly #tool: Tool;
@@ -142,7 +140,6 @@ export class TouchableScene {
     this.#warned = this.#warnings();
   }
 
-  /** Callback for connect() and run(). */
   readonly physics = (hand: DeviceState): Touch => {
     const before = this.#sampledNs ?? hand.sampledNs;
     this.#sampledNs = hand.sampledNs; // a restarted server has a new time origin

@@ -27,7 +27,6 @@ export class AesKey {
     this.#key = crypto!.createSecretKey(key);
   }
 
-  /** Returns ciphertext and tag. */
   encrypt(number: bigint, header: Uint8Array, plain: Uint8Array): Uint8Array {
     const cipher = crypto!.createCipheriv(kCipher, this.#key, nonce(number), { authTagLength: kTagSize });
     cipher.setAAD(header);

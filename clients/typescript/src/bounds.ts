@@ -12,7 +12,6 @@ export const isVec3 = (v: Vec3): boolean => isBounded(v.x) && isBounded(v.y) && 
 
 const isUnit = (length: number): boolean => Math.abs(length - 1) <= kUnitTolerance;
 export const isRotation = ({ w, x, y, z }: Quat): boolean => isUnit(Math.hypot(w, x, y, z));
-/** Returns whether the vector has length 1. */
 export const isNormal = (v: Vec3 | undefined): boolean =>
   v !== undefined && isVec3(v) && isUnit(Math.hypot(v.x, v.y, v.z));
 
@@ -20,7 +19,6 @@ export const isNormal = (v: Vec3 | undefined): boolean =>
 export const isBox = (min: Vec3 | undefined, max: Vec3 | undefined): boolean =>
   min && max ? min.x <= max.x && min.y <= max.y && min.z <= max.z : !min && !max;
 
-/** Returns whether there are 1, 3 or 9 entries within bounds. */
 export const isStiffness = (stiffness: Stiffness): boolean =>
   (stiffness.length === 1 || stiffness.length === 3 || stiffness.length === 9) && stiffness.every(isBounded);
 
@@ -41,7 +39,6 @@ export const isEnum = (value: number, schema: { readonly value: Record<number, u
   value !== 0 && schema.value[value] !== undefined;
 
 const kEncoder = new TextEncoder();
-/** Returns whether the text has at most `bytes` bytes of UTF-8. */
 export const isText = (text: string, bytes: number): boolean => kEncoder.encode(text).length <= bytes;
 export const areTexts = (texts: readonly string[], fewest: number, most: number, bytes: number): boolean =>
   isWithin(texts.length, fewest, most) && texts.every((text) => isText(text, bytes));

@@ -14,7 +14,6 @@ export interface BridgeConfig {
   readonly to: string;
   /** Additional origins of pages that may connect: "https://lab.example". */
   readonly origins: readonly string[];
-  /** The maximum number of open WebSockets. */
   readonly maxPeers: number;
   /** The maximum number of datagrams per second from a page. Other datagrams are dropped. */
   readonly maxRateHz: number;
@@ -24,9 +23,7 @@ export const kBridgeDefaults: BridgeConfig = {
   listen: "127.0.0.1:47180", to: "127.0.0.1:47100", origins: [], maxPeers: 32, maxRateHz: 4000,
 };
 
-/** Counters of the bridge. */
 export interface BridgeCounts {
-  /** Open WebSockets. */
   peers: number;
   opened: number;
   /** Refused: wrong origin, or too many WebSockets. */
@@ -96,7 +93,6 @@ export class Bridge {
     return addressText({ host: address, port });
   }
 
-  /** Closes all connections. */
   async close(): Promise<void> {
     for (const page of this.#webSockets.clients) page.terminate();
     await new Promise<void>((resolve) => {

@@ -21,7 +21,6 @@ export interface Control {
 
 export type Frame = PlainFrame | { readonly kind: "control"; readonly value: Control };
 
-/** The content of a Data datagram. */
 export interface DataContent {
   readonly sent: Nanoseconds;
   readonly echo: Echo | undefined;
@@ -36,7 +35,6 @@ export interface DataContent {
 
 // ---- Data. Protobuf merges concatenated messages, so a datagram can be written in pieces.
 
-/** Encodes the beginning of a Data body. */
 export function encodeHead(sent: Nanoseconds, echo: Echo | undefined): Uint8Array {
   const head = create(pb.DatagramSchema, { txTimeNs: sent, ...(echo && { echo: gen.writeEcho(echo) }) });
   return toBinary(pb.DatagramSchema, head);

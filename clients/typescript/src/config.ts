@@ -62,7 +62,6 @@ export interface ClientConfig {
   readonly patienceMs?: number;
   /** Wait before the first retry. It doubles with each attempt. */
   readonly retryMinMs?: number;
-  /** Upper limit of the wait. */
   readonly retryMaxMs?: number;
   /** Returns random bytes for the handshakes. Default: those of the system. */
   readonly random?: (size: number) => Uint8Array;
@@ -85,7 +84,6 @@ export interface ClientStats {
   attempts: number;
   /** Attempts that the server accepted. */
   sessions: number;
-  /** Received states. */
   states: number;
   /** Predicted states that the callback received. */
   statesForetold: number;

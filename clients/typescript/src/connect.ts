@@ -21,9 +21,7 @@ export interface Transport {
 export type OpenTransport = (receive: (datagram: Uint8Array) => void, fail: (error: Error) => void) => Transport;
 
 export interface ConnectConfig extends ClientConfig {
-  /** Called when the phase of the connection has changed. */
   readonly onPhase?: (guest: Guest) => void;
-  /** Called for each report of the server. */
   readonly onReport?: (report: LinkReport) => void;
   /** Called for each new reason why a force, or a part of it (`leftOut`), was not sent. */
   readonly onUnusable?: (why: string) => void;
@@ -61,7 +59,6 @@ export interface Guest {
   /** Requests or releases the lease of the channel. */
   takeLease(): boolean;
   giveLease(): boolean;
-  /** Sends a Bye and stops. */
   stop(): void;
   /** Resolves at the end. Rejects with the exception of a callback, or if the host is unknown. */
   readonly ended: Promise<void>;
@@ -184,7 +181,6 @@ class RealTimeGuest implements Guest {
     this.#end();
   }
 
-  /** The request is sent in the next turn. */
   #ask(request: () => boolean): boolean {
     const asked = request();
     this.#wake();

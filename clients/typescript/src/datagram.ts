@@ -91,7 +91,6 @@ export interface AnswerDatagram {
 const handshakeHeader = (type: DatagramType, suite: CipherSuite, connectionId = 0): Uint8Array =>
   encodeHeader({ type, epoch: 0, suite, connectionId, packetNumber: 0n });
 
-/** Header of all Hellos of a suite. */
 export const helloHeader = (suite: CipherSuite): Uint8Array => handshakeHeader(DatagramType.Hello, suite);
 
 /** Always returns 1200 bytes, so that replies are never larger (no amplification). */

@@ -17,7 +17,6 @@ export interface ForceDeadband {
   readonly longestSilenceMs: number;
 }
 
-/** Throws a RangeError if the deadband is invalid. */
 export function checkForceDeadband({ share, floor, longestSilenceMs }: ForceDeadband): void {
   expect(share >= 0 && share <= 1, "deadband.share", share, "0 to 1");
   expect(floor >= 0, "deadband.floor", floor, "0 or more");

@@ -11,7 +11,6 @@ export interface Line<C extends string = Column> {
   readonly colour: string;
   readonly dash?: readonly number[];
   readonly width?: number;
-  /** Color of the area down to zero. */
   readonly fill?: string;
   /** Shown only while the legend button with this name is pressed. */
   readonly toggle?: string;
@@ -24,7 +23,6 @@ export interface ChartSpec<C extends string = Column> {
   /** Factor from SI to `unit`. */
   readonly scale: number;
   readonly lines: readonly Line<C>[];
-  /** The axis starts at zero. */
   readonly positive?: boolean;
   /** Minimum range of the axis. */
   readonly least: number;
@@ -39,7 +37,6 @@ export interface ChartEvents {
   zoom(from: number, to: number): void;
   reset(): void;
   hover(time: number | undefined): void;
-  /** Lines were shown or hidden; draw again. */
   changed(): void;
 }
 
@@ -159,7 +156,6 @@ export class Chart<C extends string = Column> {
     return from > to ? [0, 0] : [from, to];
   }
 
-  /** Sets the axis to a range shared by several runs. */
   share([from, to]: readonly [number, number]): void {
     const [ownFrom, ownTo] = this.extent();
     const finer = (Math.max(to, 0) - Math.min(from, 0)) / Math.max(Math.max(ownTo, 0) - Math.min(ownFrom, 0), this.spec.least);
@@ -171,7 +167,6 @@ export class Chart<C extends string = Column> {
     this.#shared = undefined;
   }
 
-  /** Redraws after a change of the theme. */
   repaint(): void {
     this.#plot.redraw(false, true);
   }

@@ -46,7 +46,6 @@ const kCharts: readonly ChartSpec<Column>[] = [
   },
 ];
 
-/** Both ends of a coupling over time. */
 class PortTrack implements Plotted<Column> {
   t: number[] = [];
   rows: PortRow[] = [];
@@ -120,7 +119,6 @@ export class Coupling {
   readonly #scales = h("span", { class: "quiet" });
   readonly #result = h("p", { class: "result", role: "status", hidden: true });
   #device = 0;
-  /** Constant for a device. */
   #leads: boolean | undefined;
   #refused: string | undefined;
   #told: string | undefined;

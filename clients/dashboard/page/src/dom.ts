@@ -12,7 +12,6 @@ export function h<K extends keyof HTMLElementTagNameMap>(tag: K, attributes: Att
   return element;
 }
 
-/** Creates an SVG element. */
 export function s(tag: string, attributes: Attributes = {}, ...children: Child[]): SVGElement {
   const element = document.createElementNS("http://www.w3.org/2000/svg", tag);
   apply(element, attributes);
@@ -38,5 +37,4 @@ export function mark(element: Element, name: string, value: string): void {
   if (element.getAttribute(name) !== value) element.setAttribute(name, value);
 }
 
-/** Value of a CSS variable in the current theme. */
 export const theme = (name: string): string => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();

@@ -41,7 +41,6 @@ export class Lanes {
     }
   }
 
-  /** Removes all lanes, for another device or recording. */
   clear(): void {
     this.#seen = [];
     this.#list.replaceChildren();

@@ -19,7 +19,6 @@ const kFrameMs = 33;
 /** ms per frame next to the 3-D view, which is drawn in every frame. */
 const kBesideSpaceMs = 66;
 
-/** The view of a running server. */
 export class Live {
   readonly element: HTMLElement;
   readonly #track = new Track(kKept);
@@ -291,7 +290,6 @@ export class Live {
 const kKeptBeside = 7200;
 const kNothing = new Track();
 
-/** Adds row `i` of a batch. */
 function push(track: Track, message: StatesMessage, i: number, t: number): void {
   const number = (value: number | null | undefined): number => value ?? NaN;
   const handle = handleOf(message, i);

@@ -52,7 +52,6 @@ async function readIndexed(file: Readable, collected: Collector, progress: (step
     const topics = [...reader.channelsById.values()].map((c) => c.topic).filter((t) => kStepTopic.test(t) || kSceneTopic.test(t));
     for (const channel of reader.channelsById.values()) collected.channel(channel, reader.schemasById.get(channel.schemaId));
     if (collected.from > 0) {
-      // The scene and the first step.
       for await (const message of reader.readMessages({ topics })) {
         collected.message(message);
         if (collected.began !== undefined) break;
@@ -98,7 +97,6 @@ function damageOf({ damaged }: Salvage): string[] {
 /** Returns NAME of /NAME/haptic/step; empty: the first device. */
 const deviceOf = (topic: string, end: RegExp): string => topic.replace(end, "").replace(/^\//, "");
 
-/** The data read so far. */
 class Collector {
   steps = 0;
   readonly schemas = new Map<number, McapTypes.TypedMcapRecords["Schema"]>();

@@ -14,7 +14,6 @@ interface Entry {
   readonly modified_unix_s: number;
 }
 
-/** Shown side by side. */
 const kMostRuns = 2;
 
 /** The recordings of a folder: a list, or one or two of them in the view of a live device. */
@@ -128,7 +127,6 @@ const addressOf = (names: readonly string[]): string => `#/recordings/${names.ma
 /** A recording contains only the properties of the handle that are in its scene. */
 const kUntold: HandleInfo = { operator_from_device: null, buttons: [], orientation_measured: false, max_torque_nm: 0, gripper_open_rad: null, max_gripper_force_n: 0, group: "", hand: "any" };
 
-/** A recording in its view. */
 class Run {
   readonly element: HTMLElement;
   #device: DeviceTrack;

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 import { McapStreamReader, type McapTypes } from "@mcap/core";
 
-/** Random access to a file. */
 export interface Readable {
   size(): Promise<bigint>;
   read(offset: bigint, size: bigint): Promise<Uint8Array>;
@@ -27,7 +26,6 @@ const kBlock = 4 * 1024 * 1024;
  * or its length is wrong.
  */
 export class Salvage {
-  /** The number of damaged regions. */
   damaged = 0;
   /** True if the file is complete. */
   ended = false;

@@ -30,9 +30,7 @@ export interface DeviceInfo {
   /** Why it cannot be armed from here now; empty: it can. */
   readonly arming_objection: string;
 }
-/** Commands of the buttons. */
 export type Order = "arm" | "disarm" | "engage" | "disengage";
-/** The result of the newest button press. */
 export interface PressInfo {
   readonly device: number;
   readonly order: Order;

@@ -112,7 +112,6 @@ export class Track implements Plotted<Column> {
     this.#handle = undefined;
   }
 
-  /** Index of the first step at or after `time`. */
   at(time: number): number {
     let [low, high] = [this.begin, this.end];
     while (low < high) {
@@ -123,7 +122,6 @@ export class Track implements Plotted<Column> {
     return low;
   }
 
-  /** Index of the first step after `time`. */
   after(time: number): number {
     let i = this.at(time);
     while (i < this.end && this.t[i]! === time) ++i;
@@ -218,7 +216,6 @@ export function usualStep(track: Pick<Plotted<string>, "t" | "begin" | "length">
 /** Mode of a step with a fresh force (core/base/mode.h). */
 const kActive = 2;
 
-/** Statistics of a range of steps. */
 export interface Shares {
   /** Of them that have each reason bit. */ readonly share: Map<number, number>;
   /** Of them with any that limits the force. */ readonly any: number;

@@ -48,7 +48,6 @@ export interface Facts {
   readonly delay: { readonly name: string; readonly value: string; readonly note: string };
   readonly loss: { readonly name: string; readonly value: string; readonly note: string };
   readonly lateness: { readonly buckets: readonly number[]; readonly what: string; readonly more: string };
-  /** The device outputs forces. */
   readonly gives: boolean;
   /** Describes degradations of the server; empty: none. */
   readonly degraded: string;
@@ -61,7 +60,6 @@ const tile = (id: string, text: string): { element: HTMLElement; name: HTMLEleme
   return { element: h("div", { class: "tile", "data-tile": id }, name, value, note), name, value, note };
 };
 
-/** The common view of a live device and of a recording. */
 export class View {
   readonly element: HTMLElement;
   readonly #charts: Chart[];

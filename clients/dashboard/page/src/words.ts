@@ -58,7 +58,6 @@ export const kSafety: Readonly<Record<string, StateWords>> = {
   unguarded: { name: "Gives forces", meaning: "its scene lists no safety layer: there is nothing to arm", level: "good" },
 };
 
-/** The phases of a coupling. */
 export const kPhases: Readonly<Record<string, StateWords>> = {
   alone: { name: "Alone", meaning: "nothing is heard of another end", level: "off" },
   coupled: { name: "Coupled", meaning: "hears the other end and waits to be engaged: no force", level: "off" },

@@ -55,7 +55,6 @@ export interface Contact {
 
 const vec = (x: number, y: number, z: number): Vec | undefined => (Number.isFinite(x + y + z) ? [x, y, z] : undefined);
 
-/** Returns the state at index `i` of a track. */
 export function poseAt(track: Track, i: number): Pose | undefined {
   const base = (name: Parameters<Track["column"]>[0]): number => track.column(name)[i]!;
   const position = vec(base("x"), base("y"), base("z"));
@@ -184,7 +183,6 @@ function quatOfRows(a: Vec, b: Vec, c: Vec): Quat {
   return q as unknown as Quat;
 }
 
-/** Describes the picture in words, for accessibility. */
 export function wordsOf(figure: Figure): string {
   const parts: string[] = [figure.kind === "stylus" ? "a stylus" : "a point"];
   const some = (v: Vec | undefined, least: number): boolean => v !== undefined && Math.hypot(...v) > least;

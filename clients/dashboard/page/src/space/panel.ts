@@ -151,7 +151,6 @@ const key = (colour: string, name: string, thin = false): HTMLElement => {
   return h("span", { class: "key" }, swatch, name);
 };
 
-/** The values of one device, and its buttons. */
 class Row {
   readonly element: HTMLElement;
   readonly #name = h("b", {});

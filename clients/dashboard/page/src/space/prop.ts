@@ -9,9 +9,8 @@ import { kLeastForce, kLeastTorque, type Figure, type Vec } from "./figure.js";
 /** Length of a force arrow: 1 cm/N. */
 export const kMetresPerNewton = 0.01;
 const kLongestArrow = 0.15;
-/** Used if the maximum torque of the device is unknown. */
+/** N·m, used if the maximum torque is unknown. */
 export const kUsualTorque = 0.2;
-/** The maximum number of points of a path. */
 export const kPathPoints = 220;
 
 /** Returns a color of the theme by its name in style.css. */
@@ -21,7 +20,6 @@ const kUp = new Vector3(0, 1, 0);
 const kAhead = new Vector3(0, 0, 1);
 const scratch = { to: new Vector3(), turn: new Quaternion() };
 
-/** Geometries shared by all props. */
 const shapes = {
   shaft: new CylinderGeometry(0.5, 0.5, 1, 14).translate(0, 0.5, 0),
   head: new ConeGeometry(0.5, 1, 20).translate(0, 0.5, 0),

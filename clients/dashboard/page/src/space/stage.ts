@@ -13,7 +13,6 @@ import { figureOf, frameOf, poseAt, rotated, threeOrder, wordsOf, type Figure, t
 import { Orbit, gridOf } from "./orbit.js";
 import { Prop, kPathPoints, kUsualTorque } from "./prop.js";
 
-/** A device and the shown time. */
 export interface Shown {
   readonly name: string;
   readonly track: Track;
@@ -112,7 +111,6 @@ export class Stage {
     return this.#shown.map((_, i) => this.#places[i]!.figure);
   }
 
-  /** Redraws after a change of the theme. */
   repaint(): void {
     this.#colours.clear();
     for (const place of this.#places) place.key = "";
@@ -151,7 +149,6 @@ export class Stage {
     return place.figure ? wordsOf(place.figure) : "no state has come";
   }
 
-  /** Rebuilds all changed parts. */
   #arrange(): void {
     this.#shown.forEach((device, i) => {
       const place = this.#places[i]!;
@@ -213,7 +210,6 @@ export class Stage {
     return this.#camera.position;
   }
 
-  /** Builds the static parts: box, floor, axes of the base, and name. */
   #build(place: Place, { name, watched }: Shown, frame: Quat): void {
     this.#clear(place.still);
     const { min, max } = place.box;
@@ -334,7 +330,6 @@ function extentOf(track: Track): readonly [Vec, Vec] {
   return [ends.map((e) => e[0]) as unknown as Vec, ends.map((e) => e[1]) as unknown as Vec];
 }
 
-/** A grid on the bottom of a box. */
 function floorOf({ min, max }: Box, material: LineBasicMaterial): LineSegments {
   const places: number[] = [];
   const lines = 6;
