@@ -39,7 +39,7 @@ class Client(AnyClient):
 
     async def states(self, duration_s: float | None = None) -> AsyncIterator[DeviceState]:
         """Yields the newest state, at Config.rate_hz or as soon as a new one is available; older states are skipped.
-        Ends after `duration_s`, or never. Raises RefusedForGood."""
+        Ends after `duration_s` if it is not None. Raises RefusedForGood."""
         guest, core = self._guest, self._guest.core
         now = time.monotonic_ns()
         end = NEVER if duration_s is None else now + duration_s * 1e9

@@ -130,10 +130,10 @@ def run(
     {"device":{"number":1, …}} and {"peer":{"name":"wall", …}}, and the summary, {"summary":{"duration_s":…, …}}.
     Exceptions of the callback propagate after a Bye.
 
-    One engine may serve several devices of the server, for example two hands that hold one object: `physics` then
-    maps each device name to a function. The functions are called sequentially and need no locks. Each device has
-    its own session with these options, and the output of --json contains the device name. Returns 0 if every
-    session was open at least once.
+    One engine can be used for several devices of the server, for example if two hands hold the same object. In
+    this case, `physics` maps each device name to a function. The functions are called sequentially and need no
+    locks. Each device has its own session with these options, and the output of --json contains the device name.
+    Returns 0 if every session was open at least once.
     """
     if (physics is None) == (watch is None):
         raise TypeError("run: expected physics or watch")

@@ -40,8 +40,8 @@ class Client(AnyClient):
         silence_s: float = 0.01,
     ) -> Iterator[DeviceState]:
         """Yields the newest state, at Config.rate_hz or as soon as a new one is available; older states are skipped.
-        Ends after `duration_s`, or never. Calls `on_silence` with time.monotonic_ns() when no state has arrived
-        for `silence_s`, also before the first state. Stop anything there that must not continue without an
+        Ends after `duration_s` if it is not None. Calls `on_silence` with time.monotonic_ns() when no state has
+        arrived for `silence_s`, also before the first state. Stop anything there that must not continue without an
         operator. Raises RefusedForGood, and exceptions of `on_silence`."""
         expect(0.001 <= silence_s <= 10, "silence_s", silence_s, "0.001 to 10")
         guest, core = self._guest, self._guest.core

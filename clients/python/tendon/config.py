@@ -31,11 +31,11 @@ class Config:
     channel: str = ""
     """Name of the channel of the device. Empty: the first one. At most 24 bytes."""
     take_lease: bool = False
-    """If another controller holds the lease of the channel, keep asking for it. The client asks again when the server
-    reports that the lease may have ended."""
+    """If another controller holds the lease of the channel, keep asking for it. The request is repeated when the
+    server reports that the lease may have ended."""
     key: bytes | None = field(default=None, repr=False)
-    """32 bytes shared with the server (`read_key`). With a key, all traffic is encrypted. Without a key, servers
-    accept only local clients."""
+    """32 bytes shared with the server (`read_key`). If there is a key, all traffic is encrypted. Without a key,
+    servers accept only local clients."""
     suites: tuple[Suite, ...] = usable_suites()
     """Cipher suites offered for an encrypted session. The server selects one."""
     rate_hz: float = 0
@@ -59,7 +59,7 @@ class Config:
     for at most max_silence_us. If rate_hz = 0, only received states are returned. None: all states are requested."""
     diagnostics: bool = False
     """For observers: requests the forces of the engines before limiting (`DeviceState.force_wanted`), and reports on
-    the loop of the device and its engines once per second. Servers without this feature omit them."""
+    the loop of the device and its engines once per second. Servers that do not support this feature omit them."""
     joints: bool = False
     """Requests the joints of the device (`DeviceState.joints`, `HandleDescription.joints`): 16 bytes per joint and
     state."""
@@ -70,7 +70,7 @@ class Config:
     """Names of the methods with which this engine computes forces. `Touch.way` is an index into this list, starting
     at 1. Observers and recordings receive the names. At most 8 unique names, each of 1 to 24 bytes."""
     patience_s: float = 2.0
-    """How long an attempt waits for an answer."""
+    """The time for which an attempt waits for an answer."""
     retry_min_s: float = 0.1
     """Wait before the first retry. It doubles with each attempt."""
     retry_max_s: float = 2.0

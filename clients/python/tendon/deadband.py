@@ -22,7 +22,7 @@ class ForceDeadband:
     floor: float = 0.05
     """N. Smaller changes are omitted until the longest silence."""
     longest_silence_s: float = 0.02
-    """Limits how long the device renders an old force after a packet loss."""
+    """Limits the time for which the device renders an old force after a packet loss."""
 
     def __post_init__(self) -> None:
         expect(0 <= self.share <= 1, "deadband.share", self.share, "0 to 1")

@@ -67,7 +67,7 @@ _MIN_VALID_FOR_NS = 20_000_000
 _MAX_OBSERVED_PERIOD_NS = 100_000_000
 
 _ASK_LEASE_AGAIN_NS = 50_000_000
-"""Minimum time between two lease requests. The current holder renews its lease continuously."""
+"""The minimum time between two requests for a lease. The current holder renews its lease continuously."""
 
 
 _WAITING = (Phase.UNANSWERED, Phase.REFUSED, Phase.LOST)
@@ -78,7 +78,7 @@ class ForceClient:
     the results of `next_datagram` until it returns None. When `next_state` returns a state, `send` the answer of
     the engine.
 
-    Times are nanoseconds of a monotonic clock.
+    All times are in nanoseconds of a monotonic clock.
     """
 
     def __init__(self, config: Config, now: int, random: Callable[[int], bytes] = os.urandom) -> None:
@@ -96,7 +96,8 @@ class ForceClient:
         self.device_report: DeviceReport | None = None
         """Newest report on the loop of the device in this session. Requires Config.diagnostics."""
         self.peer_reports: dict[int, PeerReport] = {}
-        """Newest report on the engine of each channel, also after it has left. Requires Config.diagnostics."""
+        """The newest report on the engine of each channel. It is kept when the engine leaves. Requires
+        Config.diagnostics."""
         self.config = config
         self._random = random
         self._period = _ns(1 / config.rate_hz) if config.rate_hz > 0 else 0
@@ -135,7 +136,7 @@ class ForceClient:
             self._take_events(now)
 
     def tick(self, now: int) -> None:
-        """Does all the work that is due at `now`."""
+        """Performs all work due at `now`."""
         if self._session is not None:
             self._session.tick(now)
             self._take_events(now)
@@ -167,7 +168,7 @@ class ForceClient:
     def send(self, hand: DeviceState, touch: Touch) -> None:
         """Answers a state. Answers that are not finite or out of bounds, or to a state of another session, are
         counted and not sent (`stats.unusable` contains the reason); the server then treats this client as late.
-        While another client holds the channel, nothing is sent. Raises ValueError if the answer has a wrong shape,
+        Nothing is sent if another client has the channel. Raises ValueError if the answer has a wrong shape,
         PermissionError for an observer.
 
         Read the clock again before the next call, so that the time stamp of the datagram does not include the
@@ -237,8 +238,8 @@ class ForceClient:
         return self._session is not None and self._session.request(Disengage(self._place.device)) is not None
 
     def set_scale(self, position_scale: float, force_scale: float) -> bool:
-        """Sets the scales of the coupling, at the server of the leader, while it is not engaged or its clutch is
-        held. Returns False as rearm() does. Raises ValueError outside of 0.01 … 100."""
+        """Sets the scales of the coupling at the server of the leader. The coupling must not be engaged unless its
+        clutch is held. Returns False as rearm() does. Raises ValueError outside of 0.01 … 100."""
         wanted = SetScale(self._place.device, position_scale, force_scale)
         if not is_request(wanted):
             raise ValueError(f"set_scale({position_scale}, {force_scale}): expected two scales, each 0.01 … 100")
@@ -254,7 +255,7 @@ class ForceClient:
 
     def set_output(self, output: int, setting: LampColour | Vibration) -> bool:
         """Sets an indicator lamp or starts a vibration pulse (`handle.outputs`). Requires the channel (`holds`).
-        Returns False as rearm() does, and without `Config.outputs`. Raises ValueError if `setting` is out of
+        Returns False as rearm() does, and if `Config.outputs` is not set. Raises ValueError if `setting` is out of
         bounds."""
         wanted = SetOutput(self._place.device, output, setting)
         if not is_request(wanted):
@@ -301,7 +302,7 @@ class ForceClient:
     # ---- Out ----
 
     def next_datagram(self, now: int) -> bytes | None:
-        """Returns the next datagram to send, or None."""
+        """Returns the next datagram to send, or None if there is none."""
         if self._ended is not None:
             bye = self._ended.next_datagram(now)
             if bye is not None:

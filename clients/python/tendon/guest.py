@@ -48,11 +48,11 @@ def _make_visible(record: logging.LogRecord) -> bool:
 log.addFilter(_make_visible)
 
 MAX_DATAGRAMS = 256
-"""Maximum number of datagrams read in one turn, so that a flood cannot prevent sending. A server at 1 kHz sends 256
-datagrams in a quarter of a second, the longest silence before it stops the device."""
+"""The maximum number of datagrams read in one turn, so that a flood cannot prevent sending. A server at 1 kHz sends
+256 datagrams in a quarter of a second, the longest silence before it stops the device."""
 
 _MAX_ERRORS = 64
-"""Maximum number of errors skipped when reading a datagram."""
+"""The maximum number of errors skipped when reading a datagram."""
 
 _KEEP_TRYING = (Code.BUSY, Code.SHUTDOWN)
 
@@ -290,8 +290,8 @@ class AnyClient:
         return self._ask(self._guest.core.disengage)
 
     def set_scale(self, position_scale: float, force_scale: float) -> bool:
-        """Sets the scales of the coupling, at the server of the leader, while it is not engaged or its clutch is
-        held. Returns False if there is no session."""
+        """Sets the scales of the coupling at the server of the leader. The coupling must not be engaged unless its
+        clutch is held. Returns False if there is no session."""
         return self._ask(lambda: self._guest.core.set_scale(position_scale, force_scale))
 
     def set_share(self, channel: int, share: float) -> bool:
@@ -351,7 +351,8 @@ class AnyClient:
 
     @property
     def peer_reports(self) -> dict[int, PeerReport]:
-        """Newest report on the engine of each channel, also after it has left. Requires Config.diagnostics."""
+        """The newest report on the engine of each channel. It is kept when the engine leaves. Requires
+        Config.diagnostics."""
         return self._guest.core.peer_reports
 
     def _ask(self, request: Callable[[], bool]) -> bool:

@@ -18,7 +18,7 @@ MAX_VALID_FOR_US = 10_000_000
 MAX_FRAMES = 64
 """Frames in one datagram."""
 REQUEST_WINDOW = 16
-"""Maximum number of pending requests, and of stored answers."""
+"""The maximum number of pending requests, and of stored answers."""
 MAX_NAME = 64
 """Bytes of UTF-8 in a name."""
 MAX_LABEL = 24
@@ -26,7 +26,7 @@ MAX_LABEL = 24
 MAX_DEVICES = 16
 MAX_CHANNELS = 8
 MAX_WAYS = 8
-"""Maximum number of Config.ways."""
+"""The maximum number of Config.ways."""
 MAX_LOOP_HZ = 1_000_000
 LATENESS_BUCKETS = 24
 """Buckets in the histogram of a loop's lateness."""

@@ -34,7 +34,7 @@ FEATURE_OUTPUTS = "outputs"
 """The client receives the outputs of the device (lamps, vibration) and may set them."""
 
 FEATURE_TELEOPERATION = "teleoperation"
-"""The client may be the other end of a coupling: it sends Couple, and PortStates are sent in both directions."""
+"""The client can be the other end of a coupling. It sends a Couple request, and both ends send PortStates."""
 
 FEATURE_WAYS = "ways"
 """An engine names its methods, and each force contains the method that computed it."""

@@ -36,7 +36,7 @@ from .round_trip import RoundTrip
 KEEP_ALIVE_NS = 50_000_000
 """Maximum time between two sent datagrams, so that a server stops after 250 ms only if five in a row are lost."""
 TIMEOUT_NS = 2_000_000_000
-"""The session ends after this silence of the peer: longer than Wi-Fi roaming."""
+"""The session is closed if the peer is silent for this time, which is longer than Wi-Fi roaming."""
 MIN_RESEND_NS = 20_000_000
 """A request is repeated after max(this, SRTT + 4 RTTVAR)."""
 
@@ -70,7 +70,7 @@ class Session:
     `next_datagram` until they are empty. `now` must not decrease.
 
     All queues are bounded: one state, one force, one report and one port state (for each device, channel and end),
-    and limits.REQUEST_WINDOW requests in each direction. A newer value replaces one that was not taken.
+    and limits.REQUEST_WINDOW requests in each direction. A value that was not taken is replaced by a newer one.
     """
 
     def __init__(self, connection_id: int, opened: int, cipher: Cipher | None = None) -> None:
@@ -120,7 +120,7 @@ class Session:
     # ---- In ----
 
     def receive(self, now: int, datagram: bytes) -> None:
-        """Handles a datagram. Datagrams that are malformed or of another session are counted and dropped."""
+        """Handles a datagram. Datagrams are counted and dropped if they are malformed or belong to another session."""
         self.latest = now
         if not self.open:
             return
@@ -210,7 +210,7 @@ class Session:
     # ---- Out ----
 
     def next_datagram(self, now: int) -> bytes | None:
-        """Returns the next datagram to send, or None."""
+        """Returns the next datagram to send, or None if there is none."""
         self.latest = now
         if self._byes_left > 0 and self._bye is not None:
             self._byes_left -= 1

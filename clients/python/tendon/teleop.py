@@ -61,7 +61,7 @@ class Pose(NamedTuple):
 
 
 class ToolContact(NamedTuple):
-    """Force of the environment on the tool, in the frame of the robot. A table below the tool pushes up."""
+    """Force of the environment on the tool, in the frame of the robot. For example, a table exerts an upward force."""
 
     force: Sequence[float]  # N
     torque: Sequence[float] | None = None  # N·m, about the position of the tool
@@ -113,18 +113,20 @@ class FollowerConfig:
 
 
 class Follower:
-    """Position mapping, clutch and reaction to loss of connection. It has no clock, thread or socket.
+    """Position mapping, clutch and reaction to loss of connection. This class does not use clocks, threads or
+    sockets.
 
-    The robot does not move before the operator engages, by the button or by engage(). The poses at that time
-    define the offset, so neither engaging nor releasing the clutch moves the robot. The reaction to missing states
-    depends on the age of the newest state beyond the smoothed delay, where v is three periods, at least 20 ms:
+    The robot does not move until the operator engages with the button or with engage(). The offset is defined by
+    the poses at that time, so that the robot does not move when it is engaged or when the clutch is released. The
+    reaction to missing states depends on the age of the newest state beyond the smoothed delay, where v is three
+    periods, at least 20 ms:
 
         v             the target stops
         v + 20 ms     None: the robot must hold its pose
         v + 250 ms    lost: new states couple again, but the operator must engage again
 
-    Absolute times of the two clocks are never compared. A fault, a disarmed device, or a pose that is not finite
-    disengages.
+    Absolute times of the two clocks are never compared. The coupling ends if the device has a fault or is
+    disarmed, or if a pose is not finite.
     """
 
     def __init__(self, config: FollowerConfig) -> None:
@@ -168,7 +170,7 @@ class Follower:
             self._phase = Following.COUPLED
 
     def set_scale(self, scale: float, force_scale: float) -> bool:
-        """Returns False and changes nothing while the robot follows. Raises ValueError if a scale is out of bounds."""
+        """Has no effect and returns False while the robot follows. Raises ValueError if a scale is out of bounds."""
         FollowerConfig(scale=scale, force_scale=force_scale, engage_by="call")
         if self._phase is Following.ENGAGED:
             return False
@@ -209,8 +211,8 @@ class Follower:
         return self._target
 
     def touch(self, contact: ToolContact | None) -> Touch | None:
-        """Returns the force on the hand for a contact of the tool; zero while the robot does not follow. Returns
-        None, which is not sent, if `contact` is None, because a zero force would look like a measurement."""
+        """Returns the force on the hand for a contact of the tool; the force is zero while the robot does not follow.
+        Returns None, which is not sent, if `contact` is None, because a zero force would look like a measurement."""
         if contact is None:
             self._say(NO_CONTACT)
             return None
@@ -295,7 +297,7 @@ class Follower:
             self._begin(hand, pose)
 
     def _begin(self, hand: DeviceState, pose: Pose) -> None:
-        """Engages with an offset that keeps the target at the current pose."""
+        """Engages. The offset is chosen so that the target is the current pose."""
         self._phase, self._gain_from = Following.ENGAGED, self._now
         self._hand0 = (hand.position, hand.turning.orientation if hand.turning else None)
         self._pose0 = pose

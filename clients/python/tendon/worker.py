@@ -50,7 +50,7 @@ class Communicator(Protocol):
 
 
 def run(answer: Physics, comm: Communicator | None = None) -> None:
-    """Answers each state with the result of `answer` until the front closes the stream. None means that no force is
+    """Answers each state with the result of `answer` until the front closes the stream. If it is None, no force is
     known.
 
     With `comm`, all ranks must call this function. `answer` is called with the same state on each rank, and the
@@ -102,7 +102,7 @@ class Stream:
         raise RuntimeError("the front has sent what is no state")
 
     def send(self, sequence: int, hand: DeviceState, touch: Touch | Sequence[float] | None) -> bool:
-        """Answers the state `hand` with that `sequence`. None means that no force is known. Returns False if the
+        """Answers the state `hand` with that `sequence`. If it is None, no force is known. Returns False if the
         stream is closed. Raises ValueError if `touch` has a wrong shape."""
         body = b"" if touch is None else codec.write_frame(_command(sequence, hand, touch))
         if len(body) > limits.MAX_DATAGRAM:
