@@ -9,7 +9,7 @@ namespace tendon {
 /// act. In the scale of the leader:
 ///
 ///     F_l = −K_c u_l − B u̇_l + f,     f = s_f Rᵀ f_contact, ‖f‖ ≤ K_c · dead_zone
-///     v = gain (‖u_l‖ − dead_zone)₊ û_l,  ‖v‖ ≤ max_speed;     the reference of the follower moves by s_x R v T per period
+///     v = gain (‖u_l‖ − dead_zone)₊ û_l,  ‖v‖ ≤ max_speed;     the follower's reference moves by s_x R v T per period
 ///
 /// The spring of the follower has the stiffness K_f and pulls the tool to the reference. The distance between them is
 /// at most max_force/K_f. f cannot move the handle out of the dead zone, so a contact does not move the follower. The
