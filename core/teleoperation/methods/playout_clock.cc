@@ -13,6 +13,7 @@ void PlayoutClock::heard(Duration now, Duration time, Duration waited) noexcept 
   Half& half = halves_[0];
   const Duration way = now - time;
   half.least = std::min(half.least, way);
+  newest_ = std::max(newest_, time);
 
   Duration rising = way + std::max(waited, Duration::zero());
   const std::size_t kept = std::min(static_cast<std::size_t>(half.count), kLargest);
@@ -48,12 +49,12 @@ Duration PlayoutClock::advance(Duration now) noexcept {
   const Duration target = now - least() - playout();
   if (!started_) {
     started_ = true;
-    return playing_ = target;
+    return playing_ = std::min(target, newest_);
   }
-  constexpr double kSteering = 0.1;  // s
   const Duration lag = target - (playing_ + passed);
   const double rate = std::clamp(1 + seconds(lag) / kSteering, 0.0, 2.0);
-  return playing_ += from_seconds(rate * seconds(passed));
+  const Duration latest = std::max(newest_, now - least() - max_playout_);
+  return playing_ = std::max(playing_, std::min(playing_ + from_seconds(rate * seconds(passed)), latest));
 }
 
 }  // namespace tendon

@@ -14,8 +14,12 @@ namespace tendon {
 ///
 /// t is the local time and τ the time of the sender. A delay is the local arrival time minus the sending time; the
 /// offset of the clocks cancels. Both statistics are over the last 256 to 512 messages, so a clock rate error of 200
-/// ppm shifts τ by less than 0.1 ms at 1000 messages per second. τ changes without jumps: its rate is 1 + (lag / 100
+/// ppm shifts τ by less than 0.1 ms at 1000 messages per second. τ changes without jumps: its rate is 1 + (lag / 250
 /// ms), at most 2 and at least 0.
+///
+/// τ does not pass the newest message. If messages arrive in a burst that is longer than D, τ stops until the burst
+/// arrives, and continues at the same place. Nothing is skipped, so that an integral and its energy stay together. If τ
+/// is max_playout behind (t − min delay), it continues without messages.
 ///
 /// Source: playout buffers for voice over packet networks; the quantile, the gaps and the rate control are ours.
 ///
@@ -36,6 +40,7 @@ class PlayoutClock {
   Duration playout() const noexcept;
 
  private:
+  static constexpr double kSteering = 0.25;   ///< s
   static constexpr int kHalf = 256;           ///< messages
   static constexpr std::size_t kLargest = 6;  ///< 1 % of two intervals, plus one
   struct Half {
@@ -49,6 +54,7 @@ class PlayoutClock {
   Duration max_playout_;
   std::array<Half, 2> halves_{};  ///< current and previous interval
   Duration now_{};
+  Duration newest_{};   ///< The time of the newest message.
   Duration playing_{};  ///< τ
   bool started_ = false;
 };

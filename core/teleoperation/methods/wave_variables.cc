@@ -11,7 +11,7 @@ namespace tendon {
 
 template <int N>
 WavePort<N>::WavePort(const Config& config)
-    : config_(config), root_(std::sqrt(2 * config.impedance)), means_(1), clock_(config.max_playout) {
+    : config_(config), root_(std::sqrt(2 * config.impedance)), means_(1), tracking_(0), clock_(config.max_playout) {
   expect_above_zero(config.impedance, "impedance");
   expect_above_zero(seconds(config.period), "period");
   expect_not_negative(seconds(config.max_playout), "max_playout");
@@ -20,6 +20,7 @@ WavePort<N>::WavePort(const Config& config)
   expect(means >= 1 && means <= static_cast<double>(kMost), "smoothing", seconds(config.smoothing),
          "1 to 256 periods of " + shortest(seconds(config.period)) + " s");
   means_ = static_cast<std::size_t>(portable::round(means));
+  tracking_ = 1 / std::max(config.impedance / kTracking, seconds(config.smoothing));
   for (Vec<N>& sum : played_) sum.setZero();
 }
 
@@ -34,7 +35,7 @@ void WavePort<N>::join(const WaveMessage<N>& first) noexcept {
   joined_ = true;
   for (Vec<N>& sum : played_) sum = first.integral;
   mean_ = used_integral_ = first.integral;
-  newest_energy_ = used_energy_ = first.energy;
+  played_energy_ = used_energy_ = first.energy;
   wave_.setZero();
 }
 
@@ -48,7 +49,6 @@ void WavePort<N>::receive(const WaveMessage<N>& message) noexcept {
   if (place < count_ && (heard(place).sequence == message.sequence || heard(place).time <= message.time)) return;
   const WaveMessage<N>& before = heard(place - 1);
   if (message.time <= before.time) return;
-  newest_energy_ = std::max(newest_energy_, message.energy);
 
   const Duration now = sent_.time;
   if (place == count_) {
@@ -68,33 +68,41 @@ void WavePort<N>::receive(const WaveMessage<N>& message) noexcept {
 }
 
 template <int N>
-Vec<N> WavePort<N>::sum_at(Duration time) noexcept {
+typename WavePort<N>::Sums WavePort<N>::sums_at(Duration time) noexcept {
   while (count_ > 1 && heard(1).time <= time) {
     begin_ = (begin_ + 1) % kMost;
     --count_;
   }
   const WaveMessage<N>& before = heard(0);
-  if (count_ == 1 || time <= before.time) return before.integral;
+  if (count_ == 1 || time <= before.time) return {before.integral, before.energy};
   const WaveMessage<N>& after = heard(1);
   const double share = seconds(time - before.time) / seconds(after.time - before.time);
-  return before.integral + share * (after.integral - before.integral);
+  return {before.integral + share * (after.integral - before.integral),
+          before.energy + share * (after.energy - before.energy)};
 }
 
 template <int N>
 Demand<N> WavePort<N>::command(const Vec<N>& velocity) noexcept {
-  const Vec<N> sum = sum_at(clock_.advance(sent_.time));
-  const Vec<N> step = (sum - played_[next_]) / static_cast<double>(means_);
-  played_[next_] = sum;
+  const Sums sums = sums_at(clock_.advance(sent_.time));
+  played_energy_ = std::max(played_energy_, sums.energy);
+  const Vec<N> step = (sums.integral - played_[next_]) / static_cast<double>(means_);
+  played_[next_] = sums.integral;
   next_ = (next_ + 1) % means_;
-  wave_ = step / seconds(config_.period) + (mean_ - used_integral_) / seconds(config_.smoothing);
+  wave_ = step / seconds(config_.period) + (mean_ - used_integral_) / seconds(kLate);
   mean_ += step;
   const double length = wave_.stableNorm();
   if (length > config_.max_wave) wave_ *= config_.max_wave / length;
 
-  const double left = std::max(newest_energy_ - used_energy_, 0.0);
+  const double left = std::max(played_energy_ - used_energy_, 0.0) + spare_;
   const double energy = seconds(config_.period) * wave_.squaredNorm() / 2;
   if (energy > left) wave_ *= std::sqrt(left / energy);
-  return {root_ * wave_ - config_.impedance * velocity};
+
+  const Vec<N> most = seconds(config_.period) * velocity;
+  const double square = most.squaredNorm();
+  const double lags = square > 0 ? std::clamp(ahead_.dot(most) / square, 0.0, 1.0) : 0.0;
+  const Vec<N> tracked = velocity + tracking_ * (ahead_ - lags * most);
+  velocity_ = tracked.allFinite() ? tracked : Vec<N>::Zero();
+  return {root_ * wave_ - config_.impedance * tracked};
 }
 
 template <int N>
@@ -117,8 +125,10 @@ WaveMessage<N> WavePort<N>::observe(const Interval<N>& interval, const Vec<N>& c
   sent_.time += interval.held;
   if (!interval.applied.allFinite() || !interval.dx.allFinite() || !cut.allFinite()) return sent_;
 
+  ahead_ += interval.dx - held * velocity_;
+
   // A period that is longer than planned cannot use more energy than available.
-  taken_ = std::min(held * wave_.squaredNorm() / 2, std::max(newest_energy_ - used_energy_, 0.0));
+  taken_ = std::min(held * wave_.squaredNorm() / 2, std::max(played_energy_ - used_energy_, 0.0));
   used_energy_ += taken_;
   used_integral_ += held * wave_;
   account_ += taken_ - interval.applied.dot(interval.dx);
@@ -126,6 +136,7 @@ WaveMessage<N> WavePort<N>::observe(const Interval<N>& interval, const Vec<N>& c
   const Vec<N> due = (config_.impedance * interval.dx - held * interval.applied) / root_;
   unsent_ -= held * cut / root_;
   send(due / held, held, reserve);
+  spare_ = std::max(account_ - kReserves * reserve, 0.0);
   return sent_;
 }
 
@@ -140,7 +151,7 @@ void WavePort<N>::send(const Vec<N>& wave, double held, double reserve) noexcept
   Vec<N> whole = sent * wave;
   const Vec<N> late = unsent_ / seconds(kLate);
   const double square = late.squaredNorm();
-  const double spare = account_ - affordable - 1.5 * reserve;
+  const double spare = account_ - affordable - kReserves * reserve;
   if (spare > 0 && square > 0) {
     // The largest k ≤ 1 with T ‖whole + k late‖²/2 ≤ T ‖whole‖²/2 + spare.
     const double along = whole.dot(late);

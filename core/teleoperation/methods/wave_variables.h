@@ -23,29 +23,38 @@ struct WaveMessage {
 /// One end of a bilateral connection that is passive for any delay. It exchanges wave variables, which contain their
 /// own energy, instead of velocity and force.
 ///
-///     F_wanted = √(2B) r̂ − B v            r̂: received wave
+///     F_wanted = √(2B) r̂ − B v'           r̂: received wave
 ///     s        = (B v̄ − F) / √(2B)        s: wave to send;  −F·v̄ = (s² − r²)/2
 ///
-/// B (N·s/m, > 0) is the wave impedance, v the current velocity, v̄ = Δx/T the mean velocity in the previous
-/// interval, and F the **applied** force in it, after the limiter. F acts on the moving side: on the hand at the
-/// leader, on the tool at the follower. With this sign, both ends have the same equations and use the same class. F
-/// of Niemeyer and Slotine is −F at the leader and F at the follower; u is the wave from the leader and w the wave
-/// from the follower.
+/// B (N·s/m, > 0) is the wave impedance, v̄ = Δx/T the mean velocity in the previous interval, and F the **applied**
+/// force in it, after the limiter. F acts on the moving side: on the hand at the leader, on the tool at the follower.
+/// With this sign, both ends have the same equations and use the same class. F of Niemeyer and Slotine is −F at the
+/// leader and F at the follower; u is the wave from the leader and w the wave from the follower.
 ///
-/// **Playout.** The messages contain I = ∫ wave dt and ∫ wave²/2 dt. The receiver interpolates I linearly between
-/// messages at the time τ of PlayoutClock, and computes the mean Ī over the last W:
+/// v' is the estimated velocity v, corrected so that its integral follows the measured displacement x:
 ///
-///     r̂ = ΔĪ / T + (Ī − ∫ r̂ dt) / W,      T r̂²/2 ≤ energy − ∫ r̂²/2 dt
+///     v' = v + (x − ∫ v' dt − λ T v) / τ_x,      τ_x = max(B / (150 N/m), W)
 ///
-/// A wave with the same sum and less variation has less energy (Cauchy–Schwarz), so the bound on the right is rarely
-/// active; it covers all other cases. The second term is 0 except after such a limitation or a period of another
-/// length. Jitter, loss and reordering do not change the sum, so the positions of both ends return to their initial
-/// values up to (friction)/K, with K as below. If no more messages arrive, r̂ is 0 after W.
+/// λ (0 … 1) minimizes the correction, so that an estimate that lags by up to one period is not corrected. Without the
+/// correction, the error of the estimator at encoder counts accumulates in the integral of s, and the two ends drift
+/// apart.
+///
+/// **Playout.** The messages contain I = ∫ wave dt and E = ∫ wave²/2 dt. The receiver interpolates both linearly
+/// between messages at the time τ of PlayoutClock, and computes the mean Ī of I over the last W:
+///
+///     r̂ = ΔĪ / T + (Ī − ∫ r̂ dt) / 200 ms,      T r̂²/2 ≤ E(τ) − U + max(A − 1.5 reserve, 0)
+///
+/// U is the energy used so far and A the account below. A wave with the same integral and less variation has less
+/// energy (Cauchy–Schwarz), so the bound is only active while τ catches up. The second term is 0 except after such a
+/// limitation or a period of another length. Energy is available at the time τ and not on arrival: otherwise, the
+/// energy of a burst is spent at once on a part of its integral, nothing is left for the rest, and the force collapses.
+/// Jitter, loss, reordering and bursts do not change the integral, so the positions of both ends return to their
+/// initial values up to (friction)/K, with K as below. If no more messages arrive, r̂ is 0 after W.
 ///
 /// **Passivity in sampled time** (core/PROOFS.md, "Wave variables"). The account A of the port (J) contains the
 /// actual energy
 ///
-///     A += T r̂²/2 − T s²/2 − F·Δx
+///     A += min(T r̂²/2, E(τ) − U) − T s²/2 − F·Δx
 ///
 /// s is reduced if A would become negative, and the missing part of its sum is sent within 200 ms when A allows it.
 /// So A + A' + (energy in transit in both directions) is exactly the energy received at both ends. No part is
@@ -73,7 +82,7 @@ class WavePort {
     Duration period{};                                   ///< T, hold time of a command; > 0
     Duration smoothing = std::chrono::milliseconds(20);  ///< W; T … 256 T, rounded to a multiple of T
     /// Maximum of D; ≥ 0. Messages that wait for more than 255 periods of the sender are played out early.
-    Duration max_playout = std::chrono::milliseconds(60);
+    Duration max_playout = std::chrono::milliseconds(120);
     /// √W, limit of r̂, which bounds the received power (half of its square, in W). The remainder is used later.
     double max_wave = std::numeric_limits<double>::infinity();
   };
@@ -119,17 +128,25 @@ class WavePort {
 
  private:
   static constexpr std::size_t kMost = 256;
-  static constexpr Duration kLate = std::chrono::milliseconds(200);  ///< time in which the missing part is sent
+  static constexpr Duration kLate = std::chrono::milliseconds(200);  ///< time in which a missing part is made up
   static constexpr double kPoorShare = 0.8;
+  static constexpr double kReserves = 1.5;    ///< a missing part is made up with the energy beyond these reserves
+  static constexpr double kTracking = 150.0;  ///< N/m, B/τ_x
 
   WaveMessage<N>& heard(std::size_t k) noexcept { return heard_[(begin_ + k) % kMost]; }
-  Vec<N> sum_at(Duration time) noexcept;
+  /// The integral and the energy of the peer at a time of its clock.
+  struct Sums {
+    Vec<N> integral;
+    double energy;
+  };
+  Sums sums_at(Duration time) noexcept;
   WaveMessage<N> observe(const Interval<N>& interval, const Vec<N>& cut, double reserve) noexcept;
   void send(const Vec<N>& wave, double held, double reserve) noexcept;
 
   Config config_;
   double root_;        ///< √(2B)
   std::size_t means_;  ///< W/T
+  double tracking_;    ///< 1/s, 1/τ_x
   PlayoutClock clock_;
 
   std::array<WaveMessage<N>, kMost> heard_{};  ///< ring buffer in order; the first one is before the time played out
@@ -140,11 +157,14 @@ class WavePort {
   std::size_t next_ = 0;
   Vec<N> mean_ = Vec<N>::Zero();  ///< Ī
 
-  Vec<N> wave_ = Vec<N>::Zero();  ///< r̂ of this period
+  Vec<N> wave_ = Vec<N>::Zero();      ///< r̂ of this period
+  Vec<N> velocity_ = Vec<N>::Zero();  ///< v' of this period
+  Vec<N> ahead_ = Vec<N>::Zero();     ///< m, x − ∫ v' dt
   Vec<N> used_integral_ = Vec<N>::Zero();
   double used_energy_ = 0;
-  double newest_energy_ = 0;
+  double played_energy_ = 0;  ///< E(τ)
   double account_ = 0;
+  double spare_ = 0;  ///< J, the part of A that r̂ may use
   double taken_ = 0;
   double given_ = 0;
   WaveMessage<N> sent_;

@@ -60,7 +60,8 @@ class CouplingWorld {
     return {.delay = dice_.chance(0.3) ? 0 : static_cast<int>(dice_.decades(0, 2)),
             .jitter = dice_.chance(0.3) ? 0 : static_cast<int>(dice_.decades(0, 1.7)),
             .loss = dice_.chance(0.3) ? 0 : dice_.uniform() * 0.6,
-            .seed = dice_.bits()};
+            .seed = dice_.bits(),
+            .burst = dice_.chance(0.7) ? 1 : static_cast<int>(dice_.decades(0, 2.3))};
   }
 
   std::function<double(double)> wave() {

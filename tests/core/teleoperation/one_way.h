@@ -21,6 +21,10 @@ struct Network {
   /// From this period on the delay is so much longer.
   int longer_from = std::numeric_limits<int>::max();
   int longer_by = 0;
+  /// Messages that are sent from one period until another wait for the end of their burst of so many periods.
+  int burst = 1;
+  int burst_from = 0;
+  int burst_until = std::numeric_limits<int>::max();
   /// Messages that are sent from this period on, and before the other, are lost.
   int cut_from = std::numeric_limits<int>::max();
   int cut_until = 0;
@@ -36,7 +40,9 @@ class OneWay {
     const bool lost = dice_.chance(network_.loss);
     const int extra = static_cast<int>(dice_.within(0, network_.jitter + 1));
     if (lost || (now >= network_.cut_from && now < network_.cut_until)) return;
-    const int at = now + network_.delay + extra + (now >= network_.longer_from ? network_.longer_by : 0);
+    const bool waits = now >= network_.burst_from && now < network_.burst_until;
+    const int wait = waits ? network_.burst - 1 - now % network_.burst : 0;
+    const int at = now + wait + network_.delay + extra + (now >= network_.longer_from ? network_.longer_by : 0);
     under_way_.emplace(at, Parcel{sent_++, message});
     if (network_.repeated > 0 && dice_.chance(network_.repeated)) {
       under_way_.emplace(at + static_cast<int>(dice_.within(0, 1000)), Parcel{sent_++, message});

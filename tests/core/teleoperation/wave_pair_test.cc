@@ -67,6 +67,40 @@ TEST(WavePair, HoldsItThroughJitterLossAndReordering) {
   }
 }
 
+// A hand holds. In bursts the line is softer, because it waits for them, and one second later the force is back.
+TEST(WavePair, BurstsSoftenItAsTheirDelaySaysAndLeaveNothingBehind) {
+  for (const int burst : {10, 30, 60, 100}) {
+    for (const bool both : {true, false}) {
+      WavePair::Config config = line(10, 0, 0, 1);
+      config.port.impedance = 20;
+      for (Network* const way : {&config.there, &config.back}) {
+        if (!both && way == &config.back) continue;
+        way->burst = burst;
+        way->burst_from = 4000;
+        way->burst_until = 7000;
+      }
+      config.hand = {.stiffness = kHand, .damping = 2, .reference = [](double t) { return two_presses(t, 90); }};
+      config.tool = {.stiffness = kWall, .reference = [](double) { return 0.01; }, .wall = true};
+      WavePair pair(config);
+      double before = 0;
+      double during = 0;
+      double after = 0;
+      pair.run(9.2, [&](double t) {
+        if (t >= 3 && t < 4) before -= pair.leader.force / 1000;
+        if (t >= 5 && t < 7) during -= pair.leader.force / 2000;
+        // What is longer than 60 ms takes a second more.
+        if (std::abs(t - (burst > 60 ? 9 : 8)) < 0.1) after -= pair.leader.force / 200;
+      });
+      std::cout << burst << (both ? " ms both ways: " : " ms one way: ") << before << ", " << during << ", " << after
+                << " N\n";
+      EXPECT_NEAR(before, felt(one_way(10, 0), 20), 0.03 * before) << burst;
+      EXPECT_GT(during, 0.97 * felt(one_way(10, 1e-3 * burst), 20)) << burst;
+      EXPECT_GT(after, 0.9 * before) << burst;
+      EXPECT_GE(pair.least_sum, -1e-9) << burst;
+    }
+  }
+}
+
 // Nothing is late, but what is lost leaves gaps that the playout has to wait for: else it stands still in each of them.
 TEST(WavePair, WaitsForGapsAndHoldsWithoutRipple) {
   for (const double loss : {0.1, 0.3}) {

@@ -8,6 +8,7 @@
 #include <limits>
 #include <numbers>
 #include <stdexcept>
+#include <vector>
 
 #include "tests/core/teleoperation/one_way.h"
 
@@ -70,10 +71,11 @@ TEST(WaveVariables, ArePassiveForAnyConstantDelayAndAnyImpedance) {
   }
 }
 
-TEST(WaveVariables, ArePassiveThroughLossJitterAndReordering) {
+TEST(WaveVariables, ArePassiveThroughLossJitterReorderingAndBursts) {
   for (std::uint64_t seed = 1; seed <= 6; ++seed) {
     for (const Duration smoothing : {1ms, 20ms, 200ms}) {
-      const Network bad{.delay = 20, .jitter = 40, .loss = 0.2, .seed = seed};
+      const int burst = seed % 2 == 0 ? 1 : 40;
+      const Network bad{.delay = 20, .jitter = 40, .loss = 0.2, .seed = seed, .repeated = 0.1, .burst = burst};
       for (const bool clipped : {false, true}) {
         const auto one = run<1>(2, bad, smoothing, clipped);
         EXPECT_GE(one.least, -1e-12);
@@ -230,7 +232,57 @@ TEST(WaveVariables, MakeNoMoreOfASumThanTheEnergyThatCameWithIt) {
   EXPECT_NEAR(port.command(Vec<1>(0)).force[0], 2 * 0.5, 1e-12);
   port.observe({Vec<1>(1), Vec<1>(0), kPeriod});
   port.receive({2, 2ms, Vec<1>(kT), kT});
-  EXPECT_NEAR(port.command(Vec<1>(0)).force[0], 2 * 0.5, 1e-12) << "the other half of the sum, paid for since";
+  double rest = 0;
+  for (int i = 0; i < 4000; ++i) {
+    const double force = port.command(Vec<1>(0)).force[0];
+    rest += force / 2 * kT;
+    port.observe({Vec<1>(force), Vec<1>(0), kPeriod});
+  }
+  EXPECT_NEAR(rest, 0.5 * kT, 1e-9) << "the other half of the sum, paid for since";
+}
+
+// A port that stands still hears a constant wave of 1. From 2 s to 3 s the messages come in bursts.
+TEST(WaveVariables, ABurstDelaysASteadyWaveAndTakesNothingOfIt) {
+  for (const int burst : {20, 30, 40, 60, 80, 100, 120}) {
+    WavePort<1> port({.impedance = 20, .period = kPeriod});
+    std::vector<WaveMessage<1>> waiting;
+    double during = 0;
+    double after = 0;
+    double most = 0;
+    for (int i = 1; i <= 6000; ++i) {
+      waiting.push_back({static_cast<std::uint64_t>(i), i * 1ms, Vec<1>(i * kT), i * kT / 2});
+      if (i < 2000 || i > 3000 || i % burst == 0) {
+        for (const WaveMessage<1>& message : waiting) port.receive(message);
+        waiting.clear();
+      }
+      const double force = port.command(Vec<1>(0)).force[0];
+      port.observe({Vec<1>(force), Vec<1>(0), kPeriod});
+      const double wave = force / std::sqrt(40.0);
+      if (i > 2500 && i <= 3000) during += wave / 500;
+      if (i > 4000 && i <= 5000) after += wave / 1000;
+      most = std::max(most, wave);
+    }
+    EXPECT_NEAR(after, 1, 0.01) << burst;
+    EXPECT_NEAR(during, 1, 0.1) << burst;
+    EXPECT_LT(most, 1.7) << burst << ": the energy of a burst is not spent at once";
+  }
+}
+
+// The estimate is a fifth too small, and a tenth too large on the way back. What the peer hears is where the handle is.
+TEST(WaveVariables, AWrongVelocityDoesNotMoveThePeer) {
+  const double impedance = 4;
+  WavePort<1> port({.impedance = impedance, .period = kPeriod});
+  double x = 0;
+  double heard = 0;
+  const double root = std::sqrt(2 * impedance);
+  for (int i = 1; i <= 61000; ++i) {
+    const double to = i < 60000 ? 0.01 * (1 - std::cos(2 * std::numbers::pi * i * kT)) : 0;
+    const double v = (to - x) / kT;
+    const Vec<1> force = port.command(Vec<1>(v > 0 ? 0.8 * v : 1.1 * v)).force;
+    heard = port.observe({force, Vec<1>(to - x), kPeriod}, {.payable = 1, .wanted = force}).integral[0] / root;
+    x = to;
+  }
+  EXPECT_NEAR(heard, 0, 1e-6) << "m; without the correction 60 rounds of 10 mm end 60 mm off";
 }
 
 TEST(WaveVariables, SayWhatIsWrongWithTheirConfiguration) {
@@ -248,6 +300,7 @@ TEST(PlayoutClock, PlaysAsLateAsOneInAHundredComes) {
   Dice dice(3);
   Duration playing{};
   Duration before{};
+  std::vector<double> late;
   for (int i = 1; i <= 20000; ++i) {
     const Duration now = i * 1ms;
     const Duration extra = dice.chance(0.005) ? 50ms : from_seconds(dice.within(0, 8e-3));
@@ -257,9 +310,10 @@ TEST(PlayoutClock, PlaysAsLateAsOneInAHundredComes) {
     if (i > 1) {
       ASSERT_GE(playing, before);
     }
+    if (i > 10000) late.push_back(seconds(now + 7h - 30ms - playing));
   }
-  const Duration late = 20000 * 1ms + 7h - 30ms - playing;
-  EXPECT_NEAR(seconds(late), 8e-3, 0.5e-3);
+  std::ranges::nth_element(late, late.begin() + 5000);
+  EXPECT_NEAR(late[5000], 8e-3, 0.5e-3) << "s, the median";
 }
 
 TEST(PlayoutClock, WaitsForGapsAndForNoMoreThanItsMost) {
@@ -289,10 +343,31 @@ TEST(PlayoutClock, FollowsALongerAndAShorterWayWithoutAJumpBack) {
     }
     before = playing;
     if (i == 2000 || i == 6000) {
-      EXPECT_NEAR(seconds(now - playing), 10e-3, 1e-4) << i;
+      EXPECT_NEAR(seconds(now - playing), 10e-3, 5e-4) << i;
     }
     if (i == 4000) {
       EXPECT_NEAR(seconds(now - playing), 300e-3, 1e-3) << i;
+    }
+  }
+}
+
+TEST(PlayoutClock, StopsUntilALateBurstArrivesAndSkipsNothing) {
+  for (const int burst : {40, 100}) {
+    PlayoutClock clock(120ms);
+    Duration before = -10ms;
+    Duration newest = -10ms;
+    for (int i = 0; i < 6000; ++i) {
+      const Duration now = i * 1ms;
+      const bool bursts = i >= 2000 && i < 4000;
+      for (int k = bursts && i % burst == 0 ? i - burst + 1 : i; !(bursts && i % burst != 0) && k <= i; ++k) {
+        newest = k * 1ms - 10ms;
+        clock.heard(now, newest, 0ms);
+      }
+      const Duration playing = clock.advance(now);
+      ASSERT_LE(playing, newest) << burst << ' ' << i;
+      ASSERT_GE(playing, before) << burst << ' ' << i;
+      ASSERT_LE(playing - before, 2ms) << burst << ' ' << i;
+      before = playing;
     }
   }
 }
