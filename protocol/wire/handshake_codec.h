@@ -13,7 +13,7 @@
 #include "protocol/messages.h"
 #include "protocol/wire/header.h"
 
-// Encodes and decodes the datagrams and messages of the handshake (WIRE.md, "Handshake").
+// Encodes and decodes the datagrams and messages of the handshake (WIRE.md, types 1, 2 and 4).
 
 namespace tendon {
 

@@ -344,7 +344,7 @@ double least_hand_work(bool credit, double a_max) {
 
 TEST(AdmittanceLoop, LendingOnTheKineticEnergyIsNotPassive) {
   const double lent = least_hand_work(true, 10);
-  std::cout << "hand work with the credit of control.md 1.5: " << lent << " J, without " << least_hand_work(false, 10)
+  std::cout << "hand work with credit for the kinetic energy: " << lent << " J, without " << least_hand_work(false, 10)
             << " J\n";
   EXPECT_LT(lent, -0.1);
   EXPECT_GE(least_hand_work(false, 10), 0);

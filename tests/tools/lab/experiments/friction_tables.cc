@@ -46,7 +46,7 @@ void write(std::ostream& out, const std::vector<FrictionTable>& tables) {
                   std::string(to_string(table.found.trust)).c_str());
     out << line.data() << "       " << table.found.reason << "\n";
   }
-  out << "     assumed: Tables II and III are lost; ramps, travel, encoder and noise are control.md 2's\n";
+  out << "     assumed: Tables II and III are lost; ramps, travel, encoder and noise are chosen here\n";
 }
 
 JsonLine json_of(const FrictionTable& table) {
