@@ -70,6 +70,17 @@ std::vector<ClockBound> clock_bounds(const std::vector<Crossing>& there, const s
   return bounds;
 }
 
+ClockDrift drift_over(const std::vector<ClockBound>& bounds) {
+  const ClockBound& first = bounds.front();
+  const ClockBound& last = bounds.back();
+  const double time = std::max(seconds(last.at - first.at), 1e-9);
+  return {.rate = seconds(last.offset - first.offset) / time, .error = seconds(first.error + last.error) / time};
+}
+
+bool is_possible(const std::vector<ClockBound>& bounds) {
+  return std::ranges::none_of(bounds, [](const ClockBound& bound) { return bound.error < Duration::zero(); });
+}
+
 Duration offset_at(const std::vector<ClockBound>& bounds, LocalTime at) {
   const auto after = std::ranges::upper_bound(bounds, at, {}, &ClockBound::at);
   if (after == bounds.begin()) return after->offset;

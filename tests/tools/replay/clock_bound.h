@@ -43,6 +43,18 @@ inline constexpr double kMostDrift = 200e-6;
 std::vector<ClockBound> clock_bounds(const std::vector<Crossing>& there, const std::vector<Crossing>& back,
                                      Duration every, double most_drift = kMostDrift);
 
+/// The rate of θ in s/s over all of the messages, and the bound of its error.
+struct ClockDrift {
+  double rate = 0;
+  double error = 0;
+};
+
+/// Estimates the drift from the first and the last of `bounds`, which should allow far more than the expected drift.
+ClockDrift drift_over(const std::vector<ClockBound>& bounds);
+
+/// Whether an offset exists that satisfies all of `bounds`.
+bool is_possible(const std::vector<ClockBound>& bounds);
+
 /// Between two of `bounds` (at least one), and held beyond the ends.
 Duration offset_at(const std::vector<ClockBound>& bounds, LocalTime at);
 

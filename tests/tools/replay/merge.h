@@ -20,8 +20,10 @@ struct MergeOptions {
 /// both recorded (clock_bound.h). Of a server with several devices its first device is the coupled one. Of a follower
 /// with several leaders the ports of this one are taken, and those of the others left out.
 ///
-/// Prints the offset, the bound and the damaged regions to `out`. Throws std::runtime_error when a file cannot be read
-/// or written, when `out` exists, when the two are not the two ends of one coupling, or when one of the clocks stepped.
+/// Prints the offset, the bound, the drift and the damaged regions to `out`, and warns if the drift is probably more than
+/// kMostDrift. Throws std::runtime_error when a file cannot be read
+/// or written, when `out` exists, when the two are not the two ends of one coupling, when one of the clocks stepped, or when they drift by
+/// more than kMostDrift.
 void merge(const MergeOptions& options, std::ostream& out);
 
 }  // namespace tendon::replay

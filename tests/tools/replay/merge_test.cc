@@ -25,22 +25,26 @@ using tendon::testing::ScratchFolder;
 constexpr Duration kAhead = 250ms;  // of the follower's clock
 
 /// Ten seconds of a coupling, as one of its ends records it. `epoch`: the leader's 1, the follower's 2.
-void record(const std::filesystem::path& file, std::uint64_t epoch, Duration ahead) {
+/// `drift` is that of its clock, and `way` the delay of what it receives.
+void record(const std::filesystem::path& file, std::uint64_t epoch, Duration ahead, double drift = 0,
+            Duration way = 2980us) {
   FileSink sink(file);
   Recorder recorder({.scene = {.text = "", .seed = 1, .version = "1", .commit = "c", .unix_offset = 1000s},
                      .ports = true,
                      .started = LocalTime(ahead)},
                     sink);
+  const auto local = [&](Duration time) { return LocalTime(ahead + time + from_seconds(drift * seconds(time))); };
+  const auto late = static_cast<std::uint64_t>((way + 999us) / 1ms);
   for (std::uint64_t tick = 1; tick <= 10'000; ++tick) {
-    const LocalTime at = LocalTime(ahead) + tick * 1ms;
+    const LocalTime at = local(tick * 1ms);
     PortRecord port{.tick = tick, .at = at};
     port.sent.epoch = epoch;
     port.sent.sequence = tick;
-    if (tick > 3) {
+    if (tick > late) {
       port.peer.emplace();
       port.peer->epoch = 3 - epoch;
-      port.peer->sequence = tick - 3;
-      port.peer_arrived = at - 20us;
+      port.peer->sequence = tick - late;
+      port.peer_arrived = local((tick - late) * 1ms + way);
     }
     recorder.record(port);
     StepRecord step;
@@ -100,6 +104,31 @@ TEST_F(Merge, ProvesABoundOfHalfTheRoundTrip) {
   std::ostringstream out;
   merge({.leader = leader_, .follower = follower_, .out = both_, .json = false}, out);
   EXPECT_NE(out.str().find("± 2.98"), std::string::npos) << out.str();
+}
+
+TEST_F(Merge, SaysHowTheClocksDriftAndWarnsAndRefusesAboveTheBound) {
+  const auto printed = [this](double drift, Duration way) {
+    for (const auto& file : {leader_, follower_, both_}) std::filesystem::remove(file);
+    record(leader_, 1, 0s, 0, way);
+    record(follower_, 2, kAhead, drift, way);
+    std::ostringstream out;
+    try {
+      merge({.leader = leader_, .follower = follower_, .out = both_}, out);
+    } catch (const std::runtime_error& error) {
+      return std::string(error.what());
+    }
+    return out.str();
+  };
+  const std::string usual = printed(50e-6, 50us);
+  EXPECT_NE(usual.find("drifts by 50 ± "), std::string::npos) << usual;
+  EXPECT_EQ(usual.find("warning"), std::string::npos) << usual;
+  const std::string probably = printed(260e-6, 600us);
+  EXPECT_NE(probably.find("drifts by 260 ± "), std::string::npos) << probably;
+  EXPECT_NE(probably.find("warning: the clocks probably drift by more than the 200 ppm"), std::string::npos)
+      << probably;
+  const std::string certainly = printed(260e-6, 50us);
+  EXPECT_EQ(certainly.find("the clocks drift by 260 ± "), 0U) << certainly;
+  EXPECT_FALSE(std::filesystem::exists(both_));
 }
 
 /// As a follower of several leaders records it: a port for each of them in each step.
