@@ -56,6 +56,7 @@ std::optional<Purse::Settlement> WaveLaw::observe(const LawInterval& ended) noex
 
 Demand<3> WaveLaw::command(const LawPeriod& period, const Vec3& speed, const Demand<3>& /*spring*/) noexcept {
   moves_ = period.live;
+  if (!moves_ && !period.clutched) port_.rest();
   Demand<3> demand = port_.command(moves_ ? speed : Vec3(Vec3::Zero()));
   demand.force = at_most(demand.force, max_force_);
   force_ = moves_ || period.clutched ? demand.force : Vec3(Vec3::Zero());

@@ -115,7 +115,14 @@ class WavePort {
   WaveMessage<N> observe(const Interval<N>& interval, const SharedAccount& account) noexcept;
 
   /// Discards the missing part of the sum.
-  void forgive() noexcept { unsent_.setZero(); }
+  void forgive() noexcept {
+    unsent_.setZero();
+  }
+  /// Discards x − ∫ v' dt, because the line does not move with the handle.
+  void rest() noexcept {
+    ahead_.setZero();
+    velocity_.setZero();
+  }
 
   /// A, J.
   double energy() const noexcept { return account_; }

@@ -213,7 +213,7 @@ TEST(CouplingHardCases, AFollowerForgetsThemToo) {
   for (int i = 0; i < 10; ++i) period(PortPhase::kEngaged, 1, Vec3(1e-3, 0, 0), 0);  // nothing to pay for the line
   EXPECT_TRUE(played.port.live());
   EXPECT_TRUE(played.told.wave_integral.isZero(0));
-  for (int i = 0; i < 3; ++i) period(PortPhase::kCoupled, 1, Vec3::Zero(), 0);
+  for (int i = 0; i < 500; ++i) period(PortPhase::kCoupled, 1, Vec3::Zero(), 0);  // the ramp has ended
   for (int i = 0; i < 100; ++i) period(PortPhase::kEngaged, 2, Vec3::Zero(), i == 0 ? 0 : 1);
   EXPECT_TRUE(played.port.live());
   EXPECT_TRUE(played.told.wave_integral.isZero(0)) << played.told.wave_integral;
