@@ -144,6 +144,23 @@ TEST(Coupling, AfterALossOfEitherOrBothWaysOnlyAnActEngages) {
   }
 }
 
+TEST(Coupling, AnEndThatHearsALostPeerIsCoupledWithoutForce) {
+  for (const bool cut_there : {false, true}) {
+    for (const int one_way : {0, 50}) {
+      Ports ports = far_apart(one_way);
+      ports.run(2 * one_way);
+      ASSERT_TRUE(ports.engage());
+      (cut_there ? ports.cut_there : ports.cut_back) = true;
+      ports.run(400 + 2 * one_way);
+      const Port& deaf = cut_there ? ports.follower : ports.leader;
+      const Port& hearing = cut_there ? ports.leader : ports.follower;
+      EXPECT_EQ(deaf.coupling->phase(), PortPhase::kLost) << one_way;
+      EXPECT_EQ(hearing.coupling->phase(), PortPhase::kCoupled) << one_way;
+      EXPECT_EQ(hearing.demand.force.norm(), 0) << one_way;
+    }
+  }
+}
+
 TEST(Coupling, AnActFromBeforeTheLossThatComesAfterItEngagesNobody) {
   // The way there fails, the leader lets go and acts again, and the way is back when the follower has lost its peer but
   // nobody has told the leader: the way back takes 250 ms.
