@@ -9,12 +9,12 @@
 
 namespace tendon::bench {
 
-/// The floor of such a fleet: as many datagrams of such sizes there and back, in the same rhythm, between one socket and
-/// those of as many sessions in another process, with nothing in them.
+/// Baseline of a fleet: empty datagrams of the same number, sizes and rate in both directions, between one socket and
+/// one socket per session in another process.
 struct BareTraffic {
   std::size_t sessions = 0;
   Duration period = std::chrono::milliseconds(1);
-  std::size_t out_per_round = 1;  ///< datagrams to each session in a period
+  std::size_t out_per_round = 1;  ///< datagrams to each session per period
   std::size_t out_bytes = 0;
   std::size_t in_per_round = 1;
   std::size_t in_bytes = 0;
@@ -26,7 +26,7 @@ struct BareResult {
   std::uint64_t rounds = 0;
   std::uint64_t sent = 0;
   std::uint64_t received = 0;       ///< answers
-  injector::DurationHistogram age;  ///< when the guest's kernel had one − when its round was due to begin
+  injector::DurationHistogram age;  ///< kernel receive time − start of the round
   Duration host{};                  ///< processor time
   Duration guests{};
 };

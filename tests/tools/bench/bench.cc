@@ -66,7 +66,7 @@ void bench(const BenchOptions& options, std::ostream& out) {
   if (options.plot && !only.empty() && std::find(only.begin(), only.end(), "512") == only.end()) {
     throw std::invalid_argument("--plot: draws the section 512, which --only leaves out");
   }
-  { const AtPriority may_we(options.priority); }  // or say so before an hour has passed
+  { const AtPriority may_we(options.priority); }  // fails now rather than an hour later
 
   Circumstances here = look_around();
   here.seed = options.seed;

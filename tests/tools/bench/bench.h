@@ -16,18 +16,18 @@ namespace tendon::bench {
 
 struct BenchOptions {
   std::vector<std::string> only{};               ///< names of sections; empty: all
-  std::optional<std::filesystem::path> write{};  ///< a page in Markdown
-  std::optional<std::filesystem::path> plot{};   ///< a chart of the section 512, without .svg or .png
+  std::optional<std::filesystem::path> write{};  ///< Markdown page
+  std::optional<std::filesystem::path> plot{};   ///< file name without extension of the chart of section 512
   bool json = false;
-  bool quick = false;     ///< only that it runs: the figures mean nothing
-  bool progress = false;  ///< on standard error
-  /// SCHED_FIFO priority of what is measured, so that other work on the machine does not come between; 0: as it is.
-  /// Haptic threads ask for their own, as in tendond.
+  bool quick = false;     ///< smoke test: the numbers are meaningless
+  bool progress = false;  ///< prints to standard error
+  /// SCHED_FIFO priority of the measured threads, which keeps other work from preempting them; 0: default scheduling.
+  /// Haptic threads set their own priority, as in tendond.
   int priority = 0;
   std::uint64_t seed = 1;
 };
 
-/// Where the sections put their lines.
+/// Collects the rows of all sections.
 class Run {
  public:
   Run(const BenchOptions& the_options, std::function<void(const Row&)> tell)
@@ -48,12 +48,11 @@ class Run {
 
 struct Section {
   std::string_view name;   ///< for --only
-  std::string_view title;  ///< of its table
+  std::string_view title;  ///< heading of the section's table
   void (*measure)(Run& run);
 };
 
-// In the order of the table. Each forks and starts threads as it likes; there is one thread when it begins and when it
-// ends.
+// In the order of the table. Each function may fork and start threads; it starts and returns with a single thread.
 void measure_steps(Run& run);       ///< steps.cc
 void measure_datagrams(Run& run);   ///< datagrams.cc
 void measure_round_trip(Run& run);  ///< round_trip.cc
@@ -65,13 +64,13 @@ void measure_sessions(Run& run);    ///< sessions.cc
 void measure_512(Run& run);         ///< sessions.cc
 const std::vector<Section>& sections();
 
-/// In a child, right after fork(): it does not outlive its parent, however that ends.
+/// Call in a child right after fork(): the kernel kills it when its parent dies.
 void end_with_parent();
 
-/// While it lives, the calling thread has that real-time priority, and no timer slack. 0: nothing.
+/// Sets the calling thread's real-time priority and removes its timer slack during its lifetime. 0: does nothing.
 class AtPriority {
  public:
-  /// Throws std::system_error when the kernel refuses.
+  /// Throws std::system_error if the kernel refuses.
   explicit AtPriority(int priority);
   ~AtPriority();
   AtPriority(const AtPriority&) = delete;
@@ -81,8 +80,8 @@ class AtPriority {
   bool raised_ = false;
 };
 
-/// `tendon-lab bench`: every line with its floor, to `out` as it is measured. Throws std::invalid_argument for a
-/// section that does not exist, std::runtime_error when something cannot be measured or written.
+/// `tendon-lab bench`: writes each row with its baseline to `out` as soon as it is measured. Throws
+/// std::invalid_argument for an unknown section, std::runtime_error if a measurement or a write fails.
 void bench(const BenchOptions& options, std::ostream& out);
 
 }  // namespace tendon::bench

@@ -8,9 +8,9 @@
 
 namespace tendon::bench {
 
-/// What devices cost against how many there are, each curve beside its floor: the rows with the figure `devices`, more
-/// than one. Draws `stem`.svg and `stem`.png and returns their names. Throws std::runtime_error when there are no such
-/// rows, and what gnuplot's absence throws.
+/// Plots cost against number of devices, with baselines, from the rows whose figure `devices` is greater than one.
+/// Writes `stem`.svg and `stem`.png and returns their names. Throws std::runtime_error if there are no such rows or
+/// gnuplot is missing.
 std::vector<std::filesystem::path> draw_devices(const std::filesystem::path& stem, const Circumstances& circumstances,
                                                 const std::vector<Row>& rows);
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// One datagram: encoded, sealed, opened, decoded; and what the kernel takes for it.
+// Cost of one datagram: encode, seal, open, decode, and the kernel's share.
 #include <netinet/in.h>
 #include <sodium.h>
 #include <sys/socket.h>
@@ -54,7 +54,7 @@ ForceCommand some_force() {
   return message;
 }
 
-/// Of a handle that turns and grips, with a sensor of the hand's force.
+/// A handle with rotation, gripper and force sensor.
 DeviceState handle_state() {
   DeviceState message = some_state();
   message.buttons = 1;
@@ -66,7 +66,7 @@ DeviceState handle_state() {
   return message;
 }
 
-/// With a model of its force and of its torque.
+/// A force with local models of force and torque.
 ForceCommand handle_force() {
   ForceCommand message = some_force();
   message.model = LocalModel{.at = {0.0123, -0.0456, 0.0789}, .stiffness = Mat3::Constant(123.4)};
@@ -79,7 +79,7 @@ ForceCommand handle_force() {
 
 const OutgoingEcho kEcho{PeerTime(std::chrono::seconds(5)), LocalTime(std::chrono::seconds(6)), 99, 0xffffffff};
 
-/// As many messages as are wanted and fit, in one datagram.
+/// Writes up to `messages` messages into one datagram, as many as fit.
 template <class Message>
 std::size_t write(DataWriter& writer, Buffer& buffer, Message message, std::size_t messages) {
   writer.begin(std::span(buffer).first(kMaxDatagram - crypto::kTagSize), {.connection_id = 7, .packet_number = 1},
@@ -131,7 +131,7 @@ void codec(Run& run, std::size_t blocks, const std::string& name, const Message&
                  "decode it", floor));
 }
 
-/// libsodium's bare calls over as many bytes: what sealing and opening cannot be cheaper than.
+/// libsodium's calls on the same number of bytes: the lower bound of sealing and opening.
 struct BareSeal {
   BareSeal(Suite by, std::size_t datagram) : suite(by), size(datagram - kHeaderSize) {
     if (suite == Suite::kAesGcm) crypto_aead_aes256gcm_beforenm(&schedule, key.data());
@@ -204,7 +204,7 @@ void sealing(Run& run, std::size_t blocks, Suite suite, std::size_t size) {
                  "open them", "libsodium opens them"));
 }
 
-/// What a Hello with a good cookie costs the server, up to the Answer.
+/// Cost to the server of a Hello with a valid cookie, up to the Answer.
 void handshake(Run& run, std::size_t blocks) {
   const Key psk = Ratchet(1).next();
   Ratchet secrets(2);
@@ -231,7 +231,7 @@ void handshake(Run& run, std::size_t blocks) {
                  "read a Noise Hello and write the Answer", "one X25519 of libsodium"));
 }
 
-/// Datagrams by the batch, beside as many by themselves: what the calls sendmmsg(2) and recvmmsg(2) would save.
+/// Batches of datagrams against single ones: the saving of sendmmsg(2) and recvmmsg(2).
 void batches(Run& run, std::size_t blocks, std::size_t size) {
   const UdpLink from(parse_address("127.0.0.1:0"));
   const UdpLink to(parse_address("127.0.0.1:0"));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// How many devices one core can step in a millisecond, and whether each costs the same however many there are.
+// How many devices one core can step per millisecond, and how the cost per device depends on their number.
 #include <sys/mman.h>
 
 #include <algorithm>
@@ -25,7 +25,7 @@ namespace {
 
 constexpr Duration kPeriod = std::chrono::milliseconds(1);
 
-/// A device that is there, stands for hardware, and costs next to nothing: its handle goes round a circle.
+/// Stands for hardware at negligible cost; its handle moves on a circle.
 class CircleDevice final : public Device {
  public:
   explicit CircleDevice(std::size_t number) : angle_(0.01 * static_cast<double>(number)) {
@@ -33,7 +33,7 @@ class CircleDevice final : public Device {
   }
   const DeviceInfo& info() const noexcept override { return info_; }
   std::optional<PositionSample> read(LocalTime now) noexcept override {
-    // A rotation by 3 mrad, once a millisecond: half a turn a second.
+    // A rotation by 3 mrad per millisecond, about half a turn per second.
     const Vec3 before = arm_;
     arm_ = {before.x() - 3e-3 * before.y(), before.y() + 3e-3 * before.x(), 0};
     arm_ *= 0.015 / arm_.norm();
@@ -57,7 +57,7 @@ HapticController::Config control_of(const Device& device) {
   return config;
 }
 
-/// An engine's answer to what the hand did at `now`.
+/// The answer of an engine to the motion sampled at `now`.
 RemoteForce answer_to(const Vec3& position, std::uint64_t tick, LocalTime now) {
   RemoteForce force;
   force.sequence = tick;
@@ -69,13 +69,13 @@ RemoteForce answer_to(const Vec3& position, std::uint64_t tick, LocalTime now) {
   return force;
 }
 
-/// A device's haptic thread, with what it shares with the others.
+/// A device with its haptic thread's state and mailboxes.
 struct Lane {
   explicit Lane(std::size_t number) : device(number), haptic({.control = control_of(device)}, device, mail) {}
 
   void step(LocalTime now) { haptic.step(now); }
 
-  /// The records taken out, and every tenth step a force, as the network thread puts it into the box.
+  /// Plays the other threads: pops the records, and every tenth step posts a force as the network thread does.
   void be_the_others(std::uint64_t step, LocalTime now) {
     while (mail.steps.front() != nullptr) mail.steps.pop();
     const DeviceState* state = mail.state.take();
@@ -87,7 +87,7 @@ struct Lane {
   HapticLoop haptic;
 };
 
-/// The control law by itself: what it answers nobody is told.
+/// The control law without mailboxes.
 struct BareLane {
   explicit BareLane(std::size_t number)
       : device(number), velocity(device.info().position_resolution), controller(control_of(device)) {}
@@ -117,7 +117,7 @@ struct Paced {
   double seconds = 0;
 };
 
-/// At 1 kHz, in one thread, on one core.
+/// Steps all devices in one thread on one core at 1 kHz.
 template <class AnyLane>
 Paced at_1_khz(std::size_t count, Duration length) {
   std::vector<std::unique_ptr<AnyLane>> lanes;
@@ -146,7 +146,7 @@ Paced at_1_khz(std::size_t count, Duration length) {
       const Duration spent = clock::processor_time();
       for (const auto& lane : lanes) lane->be_the_others(round, now);
       others += clock::processor_time() - spent;
-      due = std::max(due, clock::now());  // what the others take is not the step's to answer for
+      due = std::max(due, clock::now());  // excludes the time of the other threads' part
       clock::sleep_until(due);
     }
     result.processor = seconds(clock::processor_time() - processor - others);
@@ -157,7 +157,7 @@ Paced at_1_khz(std::size_t count, Duration length) {
   return result;
 }
 
-/// `ten`: the median of ten devices, which this fills in when it comes to them.
+/// `ten`: the median with ten devices, set by the call for ten.
 Row row_of(const Paced& paced, std::size_t count, const std::string& what, std::optional<double>& ten) {
   std::vector<double> each;
   for (const double round : paced.rounds) each.push_back(1e3 * round / static_cast<double>(count));
@@ -188,15 +188,15 @@ Row row_of(const Paced& paced, std::size_t count, const std::string& what, std::
   return row;
 }
 
-/// 1, 10, 100 … of one kind, to where they no longer fit into a millisecond.
+/// Measures increasing numbers of devices until they no longer fit into a millisecond.
 template <class AnyLane>
 void measure_lanes(Run& run, const std::string& what, const std::vector<std::size_t>& counts) {
-  // A device by itself pays for a processor that has slept, and ten share that.
+  // A single device pays for a processor that wakes from idle; with ten, this cost is shared.
   std::optional<double> ten;
   for (const std::size_t count : counts) {
     const Paced paced = at_1_khz<AnyLane>(count, std::chrono::milliseconds(run.options.quick ? 50 : 3000));
     run.add(row_of(paced, count, what, ten));
-    if (quantile(paced.rounds, 0.5) > 1000) break;  // here it breaks
+    if (quantile(paced.rounds, 0.5) > 1000) break;  // overloaded
   }
 }
 

@@ -38,7 +38,7 @@ std::string scene_of(const Fleet& fleet, const fs::path& recording) {
   return text;
 }
 
-/// The scene of the fleet in `folder`, with a key for each plan.
+/// Writes the fleet's scene to `folder`, with a key for each plan.
 fs::path written_in(const fs::path& folder, const Fleet& fleet, const std::vector<Plan>& plans) {
   fs::create_directory(folder / "keys");
   for (std::size_t i = 0; i < plans.size(); ++i) {
@@ -133,7 +133,7 @@ class Trial {
         static_cast<std::uint64_t>(result_.seconds / seconds(kPeriod) * static_cast<double>(fleet_.devices));
   }
 
-  /// `stopped`: the server's last line.
+  /// `stopped`: the server's last line of output.
   void take_totals(const std::string& stopped) {
     const auto line = nlohmann::json::parse(stopped);
     result_.steps = line.at("steps");

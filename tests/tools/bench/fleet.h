@@ -9,68 +9,68 @@
 
 namespace tendon::bench {
 
-/// `tendond` with many simulated devices, and the process of its guests, over UDP on the loopback.
+/// Measures `tendond` with many simulated devices and clients in another process, over UDP on the loopback.
 ///
-/// The server is the program itself, with a scene that counts its devices. A device moves in one substep for each step:
-/// it stands for hardware, and is not what is measured.
+/// The server is the real program. Its simulated devices stand for hardware and use one substep per step, to keep their
+/// cost out of the measurement.
 ///
-/// The guests are one thread of another process with the client's half of the protocol; they answer states with
-/// forces. They cost these cores as much as the server does.
+/// The clients are one thread with the client side of the protocol. They answer states with forces and load the cores
+/// about as much as the server does.
 struct Fleet {
   std::size_t devices = 16;
-  std::size_t channels = 1;  ///< of each device
-  /// One session that controls all devices of a bank; otherwise one for each channel.
+  std::size_t channels = 1;  ///< per device
+  /// One session controls all devices of a bank; otherwise each channel has its own session.
   bool one_session_for_16 = false;
-  /// … as many as that, the first ones; those beyond the channels are observers of one device each. 0: all.
+  /// Number of sessions; those beyond the channels observe one device each. 0: one per channel.
   std::size_t sessions = 0;
   std::uint32_t state_hz = 1000;
   std::uint32_t force_hz = 1000;
-  bool recorded = false;                             ///< every step, to a file
-  Duration settle = std::chrono::milliseconds(300);  ///< after the last session has opened
-  Duration length = std::chrono::seconds(2);         ///< and until a state has come
+  bool recorded = false;                             ///< records every step to a file
+  Duration settle = std::chrono::milliseconds(300);  ///< wait after the last session has opened
+  Duration length = std::chrono::seconds(2);         ///< measurement; extended until a state arrives
   std::uint64_t seed = 1;
-  /// Of the guests and of the server's other threads, where it is not 0; its haptic threads ask for their own.
+  /// SCHED_FIFO priority of the clients and of the server's threads except the haptic ones; 0: default scheduling.
   int priority = 0;
 };
 
 struct FleetResult {
   std::size_t sessions = 0;
   std::size_t controllers = 0;
-  bool all_came = false;  ///< every session was open when it began
-  double seconds = 0;     ///< that it lasted
+  bool all_came = false;  ///< every session was open at the start
+  double seconds = 0;     ///< measured duration
 
-  // Of the whole run:
+  // Over the whole run:
   Duration started{};          ///< from exec to listening
-  std::uint64_t resident = 0;  ///< bytes, of the server
-  std::uint64_t steps = 0;     ///< of all devices
-  std::uint64_t overruns = 0;  ///< of them, after an interval longer than the bound assumed
+  std::uint64_t resident = 0;  ///< resident memory of the server, bytes
+  std::uint64_t steps = 0;     ///< all devices
+  std::uint64_t overruns = 0;  ///< steps after an interval longer than the assumed bound
   std::uint64_t forces_sent = 0;
   std::uint64_t forces_taken = 0;  ///< handed to the haptic loops
-  std::uint64_t lost_steps = 0;    ///< of a recording
+  std::uint64_t lost_steps = 0;    ///< steps missing in a recording
 
-  // While it was measured:
-  injector::DurationHistogram loop_age;   ///< of a state: since the motion that the force in use answers
-  injector::DurationHistogram state_age;  ///< when the guest's kernel had a state − when it was sampled
+  // During the measurement:
+  injector::DurationHistogram loop_age;   ///< age of the motion that the force in use answers, per state
+  injector::DurationHistogram state_age;  ///< receive time in the client's kernel − sample time
   std::uint64_t states_owed = 0;
   std::uint64_t states_received = 0;
-  /// The strict measure: steps of which the guest was told that their force answers the motion of the step before, less
-  /// than 1.5 periods old. So the state came to its guest, and the force back, within a period.
+  /// Steps whose force answers the motion of the previous step, less than 1.5 periods old, as reported to the client.
+  /// This requires that the state reached the client and the force returned within a period.
   std::uint64_t answered_in_time = 0;
-  std::uint64_t steps_owed = 0;     ///< of all devices
-  std::uint64_t out_datagrams = 0;  ///< server → guests
+  std::uint64_t steps_owed = 0;     ///< all devices
+  std::uint64_t out_datagrams = 0;  ///< server → clients
   std::uint64_t out_bytes = 0;
   std::uint64_t in_datagrams = 0;
   std::uint64_t in_bytes = 0;
-  std::uint64_t lost = 0;  ///< of both ways, on the way
+  std::uint64_t lost = 0;  ///< lost in transit, both directions
 
   // Processor time:
   Duration haptic{};
   Duration network{};
-  Duration log{};  ///< and all else of the server
+  Duration log{};  ///< rest of the server
   Duration guests{};
 };
 
-/// Throws std::runtime_error when the system refuses sockets, processes or memory, and when there is no `tendond` beside
+/// Throws std::runtime_error if the system refuses sockets, processes or memory, or if there is no `tendond` next to
 /// this program. Forks: call it while there is one thread.
 FleetResult run_fleet(const Fleet& fleet);
 

@@ -50,7 +50,7 @@ std::vector<Plan> plans_of(const Fleet& fleet, Ratchet& secrets) {
 
 namespace {
 
-/// One guest: a handshake, then a session that answers states with the force of a spring.
+/// A client: a handshake, then a session that answers states with the force of a spring.
 class Guest {
  public:
   Guest(const Plan& plan, const Address& server, std::size_t number, const Fleet& fleet, Shared& shared)
@@ -139,7 +139,7 @@ class Guest {
     config.connection_id = accepted.connection_id;
     session_ =
         accepted.keys ? std::make_unique<Session>(config, *accepted.keys, now) : std::make_unique<Session>(config, now);
-    if (state_hz_ == 1000) return;  // as it comes
+    if (state_hz_ == 1000) return;  // every state
     for (const Grant& grant : grants_) session_->request(SetStateRate{.hz = state_hz_, .device = grant.device});
   }
 
@@ -159,7 +159,8 @@ class Guest {
     }
   }
 
-  /// The number of a force is the tick that it answers, so the state tells which motion the force in use is for.
+  /// The sequence number of a force is the tick that it answers, so the state tells which motion the force in use is
+  /// for.
   void judge(const DeviceState& state) {
     if (state.mode != Mode::kActive) return;
     shared_.loop_age.observe(kPeriod * static_cast<Duration::rep>(state.tick - state.force_sequence));
@@ -238,7 +239,7 @@ void serve_guests(const std::vector<Plan>& plans, const Address& server, const F
       open += guest->open() ? 1 : 0;
     }
     shared.open.store(open, std::memory_order_release);
-    // A server answers 16 half-open ones at a time.
+    // A server handles 16 half-open handshakes at a time.
     if (guests.size() < plans.size() && guests.size() < open + 8) {
       const std::size_t number = guests.size();
       guests.push_back(std::make_unique<Guest>(plans[number], server, number, fleet, shared));

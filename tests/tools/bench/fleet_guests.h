@@ -15,16 +15,15 @@
 
 namespace tendon::bench {
 
-// The guests of a fleet: who comes, and the process in which they answer.
+// The clients of a fleet and the process that runs them.
 
 inline constexpr Duration kPeriod = std::chrono::milliseconds(1);
 
-/// The name of the scene of so many devices, and of each of them.
 inline constexpr const char* kFleetName = "d";
 std::string device_name(const Fleet& fleet, std::size_t i);
 std::string channel_name(std::size_t i);
 
-/// Who comes, and what for.
+/// What a client claims, and its key.
 struct Plan {
   std::vector<Claim> claims;
   bool controls = true;
@@ -33,28 +32,28 @@ struct Plan {
 
 std::vector<Plan> plans_of(const Fleet& fleet, Ratchet& secrets);
 
-/// What both processes see.
+/// Memory shared by both processes.
 struct Shared {
   enum Phase : int { kOpening, kMeasuring, kReporting, kQuit };
   std::atomic<int> phase{kOpening};
-  std::atomic<int> at_work{kOpening};  ///< what the guests do
+  std::atomic<int> at_work{kOpening};  ///< phase that the clients have reached
   std::atomic<std::size_t> open{0};    ///< sessions
-  // Written by the guests before they are at kReporting.
+  // Valid after the clients have set kReporting.
   injector::DurationHistogram state_age;
   injector::DurationHistogram loop_age;
-  LocalTime from{};  ///< that it was measured, as they saw it
+  LocalTime from{};  ///< measured interval, by the clients' clock
   LocalTime until{};
   std::atomic<std::uint64_t> states{0};
   std::uint64_t answered_in_time = 0;
   std::uint64_t lost = 0;
-  std::uint64_t out_datagrams = 0;  ///< to the guests
+  std::uint64_t out_datagrams = 0;  ///< to the clients
   std::uint64_t out_bytes = 0;
   std::uint64_t in_datagrams = 0;
   std::uint64_t in_bytes = 0;
-  std::uint64_t forces_sent = 0;  ///< from the first on, also after that
+  std::uint64_t forces_sent = 0;  ///< since the first force, including after the measurement
 };
 
-/// Opens a session for each plan, and answers states until `shared` says kQuit.
+/// Opens a session for each plan and answers states until `shared` says kQuit.
 void serve_guests(const std::vector<Plan>& plans, const Address& server, const Fleet& fleet, Shared& shared);
 
 }  // namespace tendon::bench

@@ -16,10 +16,10 @@
 
 namespace tendon::bench {
 
-/// A server admits 20 handshakes a second from one address, 40 at once; guests come from as many addresses as it takes.
+/// Clients per source address. A server admits 20 handshakes per second from one address, in bursts of 40.
 inline constexpr std::size_t kGuestsPerAddress = 16;
 
-/// A guest's socket, connected, from an address of its own kind; tells when the kernel got a datagram.
+/// Connected socket of a client, whose source address depends on its number. Reports kernel receive times.
 class GuestSocket {
  public:
   GuestSocket(const Address& server, std::size_t number)
@@ -45,7 +45,7 @@ class GuestSocket {
 
   int fd() const { return fd_; }
   void send(std::span<const std::byte> datagram) { ::send(fd_, datagram.data(), datagram.size(), 0); }
-  /// 0: none is there. `at`: Unix time.
+  /// Returns 0 if no datagram is available. `at`: receive time, Unix time.
   std::size_t receive(std::span<std::byte> buffer, Duration& at) {
     iovec piece{buffer.data(), buffer.size()};
     alignas(cmsghdr) std::array<char, CMSG_SPACE(sizeof(timespec))> control;

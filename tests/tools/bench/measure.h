@@ -13,13 +13,13 @@
 
 namespace tendon::bench {
 
-/// Keeps the compiler from leaving out what nobody looks at, and from knowing it beforehand.
+/// Keeps the compiler from removing or constant-folding `value`.
 template <class T>
 void keep(T& value) {
   asm volatile("" : : "g"(&value) : "memory");
 }
 
-/// The value that a share `q` of them does not exceed; 0 when there are none.
+/// Returns the q-quantile of `values`; 0 if there are none.
 inline double quantile(std::vector<double> values, double q) {
   if (values.empty()) return 0;
   const auto nth = values.begin() + static_cast<std::ptrdiff_t>(q * static_cast<double>(values.size() - 1));
@@ -27,16 +27,16 @@ inline double quantile(std::vector<double> values, double q) {
   return *nth;
 }
 
-/// Two things in turns: what else the machine does falls on both.
+/// Times of two alternating calls, so that other load affects both equally.
 struct Turns {
   std::size_t n = 0;          ///< calls of each
-  std::vector<double> times;  ///< ns for one call, of each block
+  std::vector<double> times;  ///< ns per call, for each block
   std::vector<double> floor_times;
-  std::vector<double> ratios;            ///< block by block
-  std::optional<double> instructions{};  ///< of one call, median
+  std::vector<double> ratios;            ///< per block
+  std::optional<double> instructions{};  ///< of one call, median, if available
 };
 
-/// Each in `blocks` blocks of `calls` calls. The first pair is not counted: caches are cold.
+/// Runs both in `blocks` alternating blocks of `calls` calls. Discards the first pair, which runs with cold caches.
 template <class Subject, class Floor>
 Turns in_turns(std::size_t blocks, std::size_t calls, Subject subject, Floor floor) {
   const lab::Meter meter;
@@ -62,7 +62,6 @@ Turns in_turns(std::size_t blocks, std::size_t calls, Subject subject, Floor flo
   return turns;
 }
 
-/// … as a line of the table.
 inline Row row_of(const Turns& turns, std::string what, std::string floor) {
   return {.section = {},
           .what = std::move(what),

@@ -18,14 +18,14 @@
 
 namespace tendon::bench {
 
-// The processes beside the bench's own, and what they share with it.
+// Child processes of the benchmark and memory shared with them.
 
-/// Throws std::system_error of errno.
+/// Throws std::system_error with errno.
 [[noreturn]] void fail(const std::string& what);
 
 Duration read(clockid_t clock);
 
-/// As many open files as the system lets this process have.
+/// Raises the limit of open files to the maximum allowed.
 void raise_file_limit();
 
 template <class T>
@@ -46,7 +46,7 @@ class SharedMemory {
   T* value_;
 };
 
-/// Another process that runs `work`, until it has ended or this one wants no more of it.
+/// A child process that runs `work`. The destructor waits for its end.
 class OtherProcess {
  public:
   template <class Work>
@@ -66,7 +66,7 @@ class OtherProcess {
   OtherProcess(const OtherProcess&) = delete;
   OtherProcess& operator=(const OtherProcess&) = delete;
 
-  /// Throws when it has ended by itself.
+  /// Throws if the child has exited.
   void check() const {
     int status = 0;
     if (::waitpid(pid_, &status, WNOHANG) == pid_) throw std::runtime_error("another process has ended");

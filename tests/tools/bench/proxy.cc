@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// How fast and how punctual tendon-inject is: throughput against a bare forwarder on the same core, release errors
-// against its own thread when it is woken with nothing to send.
+// Throughput of tendon-inject against a bare forwarder on the same core, and its release errors against those of a
+// thread that only wakes up.
 #include <poll.h>
 #include <sched.h>
 #include <sys/socket.h>
@@ -32,7 +32,7 @@ using namespace injector;
 using namespace std::chrono_literals;
 
 constexpr std::size_t kBytes = 200;
-/// A machine that does not forward one datagram in so long is not to be measured.
+/// A machine that takes longer to forward a datagram cannot be measured.
 constexpr Duration kPatience = 10s;
 
 void pin_to(unsigned core) {
@@ -46,7 +46,7 @@ constexpr unsigned kLoadCore = 1;
 
 Address loopback() { return parse_address("127.0.0.1:0"); }
 
-/// recvmmsg and sendmmsg and nothing else: no times, no decisions, no flight. One direction.
+/// One-way baseline: recvmmsg and sendmmsg without timestamps, decisions or delay.
 class BareForwarder {
  public:
   explicit BareForwarder(const Address& server)
@@ -118,8 +118,8 @@ struct Load {
   std::uint64_t lost = 0;
 };
 
-/// Both ends in one thread: as many datagrams as possible with at most `window` of them on their way, so that no buffer
-/// overflows and every lost one is the forwarder's fault.
+/// Both ends in one thread. At most `window` datagrams are in flight, so no buffer overflows and every loss is the
+/// forwarder's.
 Load saturate(UdpBatch& server, const Address& forwarder, std::uint64_t window, Duration length) {
   pin_to(kLoadCore);
   UdpBatch client = UdpBatch::connected(forwarder);
@@ -143,7 +143,7 @@ Load saturate(UdpBatch& server, const Address& forwarder, std::uint64_t window, 
       sent += room - client.send(std::span(batch).first(room)).count();
     } else {
       pollfd readable{server.fd(), POLLIN, 0};
-      // When the window is lost, so is the rest of this round.
+      // If the whole window was lost, ends this round.
       if (::poll(&readable, 1, 200) == 0 && got > 0) break;
     }
     receive();
@@ -163,7 +163,7 @@ double us(Duration d) { return static_cast<double>(d.count()) / 1e3; }
 void compare_throughput(Run& run, const std::string& name, const std::string& profile, std::uint64_t window, int rounds,
                         Duration length) {
   UdpBatch server = UdpBatch::listening(loopback());
-  std::vector<double> bare;  // ns for each datagram
+  std::vector<double> bare;  // ns per datagram
   std::vector<double> proxied;
   std::vector<double> ratios;
   std::uint64_t sent = 0;
@@ -200,7 +200,7 @@ void compare_throughput(Run& run, const std::string& name, const std::string& pr
   run.add(row);
 }
 
-/// 1 kHz each way through 20 ± 5 ms, an echo at the other end; and meanwhile, in turns of a second, the floor.
+/// 1 kHz in each direction through 20 ± 5 ms with an echo at the other end, alternating with the baseline every second.
 void compare_punctuality(Run& run, Duration spin, int rounds, Duration length) {
   UdpBatch server = UdpBatch::listening(loopback());
   RunningProxy proxy(server.local_address(), "delay=uniform(15ms,25ms)", spin);
@@ -245,7 +245,8 @@ void compare_punctuality(Run& run, Duration spin, int rounds, Duration length) {
   line("down", status.of(Direction::kDown).release_error);
 }
 
-/// The threads that are started meanwhile have its priority and its core, too; this one gets back its own.
+/// Runs `work` in a thread with this priority. Threads that it starts inherit its priority and core; those of the
+/// caller remain unchanged.
 class Apart {
  public:
   template <class Work>

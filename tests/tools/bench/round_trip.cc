@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// From a state handed over to the force that answers it, decoded in its box, over the loopback and back through a
-// client like `virtual_wall` in another process; and a bare ping-pong of datagrams of the same sizes between the same
-// two processes and the same kinds of sockets that waits in the same way. The two take turns in blocks, so that what
-// else the machine does falls on both. For the suites that seal there is a second floor: the ping-pong that seals and
-// opens each datagram with libsodium, and does nothing else. Over a Unix socket the floor is one over Unix sockets, and
-// the ping-pong over UDP takes turns with both.
+// Round trip from a state posted by the server to the decoded force that answers it, over the loopback and through a
+// client like `virtual_wall` in another process. The baseline is a ping-pong of bare datagrams of the same sizes
+// between the same processes with the same kinds of sockets and the same waiting. Both alternate in blocks, so that
+// other load affects both. Sealed suites have a second baseline, in which libsodium also seals and opens each datagram.
+// A Unix socket has a baseline over Unix sockets, and alternates with the one over UDP.
 #include <netinet/in.h>
 #include <poll.h>
 #include <sys/mman.h>
@@ -47,28 +46,28 @@ namespace {
 using std::chrono::microseconds;
 using std::chrono::milliseconds;
 
-/// Nothing on a loopback takes so long: something is broken.
+/// Upper bound for anything on the loopback; beyond it the run fails.
 constexpr Duration kGiveUp = std::chrono::seconds(10);
 
 struct Options {
   int blocks = 40;
-  int exchanges = 500;  ///< of each kind in a block
-  int warm_up = 50;     ///< at the beginning of each, not counted: caches, and the processor's clock
-  int priority = 0;     ///< of both processes
+  int exchanges = 500;  ///< per kind and block
+  int warm_up = 50;     ///< excluded exchanges at the start of each block (caches, processor frequency)
+  int priority = 0;     ///< SCHED_FIFO, both processes
 };
 
 enum class Wait : std::uint8_t { kBusy, kBlocking };
 enum class Way : std::uint8_t { kUdp, kUnix };
 
-/// Orders to the other process, in memory that both share.
+/// Commands to the other process, in shared memory.
 struct Orders {
   enum Job : int { kRest, kEcho, kSealedEcho, kUdpEcho, kTendon, kQuit };
   std::atomic<int> job{kRest};
-  std::atomic<int> at_work{kRest};  ///< what it does
-  std::atomic<int> echo_bytes{0};   ///< what it echoes with
+  std::atomic<int> at_work{kRest};  ///< job in progress
+  std::atomic<int> echo_bytes{0};   ///< size of its reply
 };
 
-/// What a socket is called.
+/// A socket address.
 struct Name {
   sockaddr_storage bytes{};
   socklen_t size = sizeof bytes;
@@ -77,7 +76,7 @@ struct Name {
   const sockaddr* get() const noexcept { return reinterpret_cast<const sockaddr*>(&bytes); }
 };
 
-/// Two sockets that do not wait: the server's for whoever comes, as a server's is; the client's is connected to it.
+/// Two nonblocking sockets: the server's is unconnected, as a real server's; the client's is connected to it.
 class BarePair {
  public:
   explicit BarePair(Way way) : server_(named(way)), client_(named(way)), client_name_(name_of(client_)) {
@@ -96,7 +95,7 @@ class BarePair {
   const Name& client_name() const noexcept { return client_name_; }
 
  private:
-  /// The kernel chooses the name.
+  /// The kernel chooses the address.
   static int named(Way way) {
     Name any;
     if (way == Way::kUdp) {
@@ -123,10 +122,10 @@ class BarePair {
   Name client_name_;
 };
 
-/// One end of a bare ping-pong. With a `suite`, what follows the first 16 bytes is sealed and opened by libsodium.
+/// One end of a bare ping-pong. With a `suite`, libsodium seals and opens all but the first 16 bytes.
 class BareSocket {
  public:
-  /// `peer`: whom a server's socket answers; null for a client's, which is connected.
+  /// `peer`: the address that a server's socket answers; null for a client's connected socket.
   BareSocket(int fd, const Name* peer, Wait wait, std::optional<Suite> suite) : fd_(fd), wait_(wait), to_(peer) {
     if (suite) key_.emplace(*suite, Key{});
   }
@@ -139,7 +138,7 @@ class BareSocket {
     const sockaddr* const to = to_ != nullptr ? to_->get() : nullptr;
     if (::sendto(fd_, buffer_.data(), size, 0, to, to_ != nullptr ? to_->size : 0) < 0) fail("send");
   }
-  /// True when a datagram has come; waits as long as it may.
+  /// Returns true when a datagram was received; waits as `wait` allows.
   bool receive() {
     if (wait_ == Wait::kBlocking) {
       pollfd readable{fd_, POLLIN, 0};
@@ -163,7 +162,7 @@ class BareSocket {
   std::array<std::byte, kMaxDatagram> buffer_{};
 };
 
-/// The server's link; between its system calls it looks into the box, as the haptic thread does on a core of its own.
+/// The server's link. Polls the mailbox between system calls, as the haptic thread on its own core does.
 class WatchedLink : public Link {
  public:
   WatchedLink(Link& link, Mailboxes& mail) : link_(link), mail_(mail) {}
@@ -182,15 +181,15 @@ class WatchedLink : public Link {
     seen = clock::now();
   }
 
-  std::uint64_t answered_tick = 0;  ///< by the newest force in the box
-  LocalTime seen{};                 ///< when it was there
+  std::uint64_t answered_tick = 0;  ///< of the newest force in the mailbox
+  LocalTime seen{};                 ///< when that force arrived
 
  private:
   Link& link_;
   Mailboxes& mail_;
 };
 
-/// The other process: a wall at x = 0, or the echo.
+/// Body of the other process: a wall at x = 0, or the echo.
 void serve(Orders& orders, const ServerName& server, int echo, int udp_echo, Wait wait, const std::optional<Key>& key,
            std::optional<Suite> suite) {
   UdpTransport transport(server);
@@ -216,7 +215,7 @@ void serve(Orders& orders, const ServerName& server, int echo, int udp_echo, Wai
       if (socket.receive()) socket.send(static_cast<std::size_t>(orders.echo_bytes.load(std::memory_order_relaxed)));
     } else if (job == Orders::kTendon) {
       const LocalTime next = client.turn(now);
-      now = clock::now();  // the turn has taken its time
+      now = clock::now();
       const LocalTime look_at_orders = std::min(next, now + milliseconds(1));
       if (wait == Wait::kBlocking) {
         if (now < next) transport.wait(look_at_orders - now);
@@ -233,9 +232,9 @@ void serve(Orders& orders, const ServerName& server, int echo, int udp_echo, Wai
 }
 
 struct Result {
-  std::vector<double> bare;    ///< µs, each
-  std::vector<double> sealed;  ///< with a suite: as `bare`, with libsodium at both ends
-  std::vector<double> udp;     ///< over a Unix socket: as `bare`, over UDP
+  std::vector<double> bare;    ///< µs, one per exchange
+  std::vector<double> sealed;  ///< with a suite: as `bare`, plus libsodium at both ends
+  std::vector<double> udp;     ///< for Unix sockets: as `bare`, over UDP
   std::vector<double> tendon;
   std::size_t state_bytes = 0;
   std::size_t force_bytes = 0;
@@ -245,7 +244,7 @@ double us(Duration d) { return 1e6 * seconds(d); }
 
 class RoundTrip {
  public:
-  /// Sealed by `suite`; in the clear without one, as always over a Unix socket.
+  /// Without a `suite` datagrams are not encrypted; a Unix socket never has one.
   RoundTrip(const Options& options, Wait wait, Way way, std::optional<Suite> suite)
       : options_(options), wait_(wait), way_(way), suite_(suite), key_(Ratchet(3).next()) {
     NetworkLoop::Config config;
@@ -284,7 +283,7 @@ class RoundTrip {
 
   Result run() {
     order(Orders::kTendon);
-    exchange();  // the handshake
+    exchange();  // completes the handshake
     for (int i = 0; i < options_.warm_up; ++i) exchange();
     Result result;
     for (int block = 0; block < options_.blocks; ++block) {
@@ -329,7 +328,7 @@ class RoundTrip {
     }
   }
 
-  /// A state into its box, and rounds of the network loop until the force that answers it is in its own.
+  /// Posts a state and runs the network loop until the answering force is in the mailbox. Returns the elapsed time.
   Duration exchange() {
     DeviceState state;
     state.tick = ++tick_;
@@ -361,7 +360,7 @@ class RoundTrip {
         return watched_.seen - began;
       }
       check(began);
-      // The other one is not there yet, or the datagram is lost.
+      // The client has not joined yet, or the datagram was lost.
       if (now - put > milliseconds(200)) {
         put = now;
         state.tick = ++tick_;
@@ -370,7 +369,7 @@ class RoundTrip {
     }
   }
 
-  /// What the log thread does in production.
+  /// The log thread's task in production.
   void see_sizes() {
     while (const DatagramRecord* record = mail_.datagrams.front()) {
       (record->direction == DatagramRecord::Direction::kOut ? state_bytes_ : force_bytes_) = record->size;
@@ -383,7 +382,7 @@ class RoundTrip {
   Way way_;
   std::optional<Suite> suite_;
   Key key_;
-  /// Of the server's Unix socket, which takes it away when it ends.
+  /// The server removes this file when it ends.
   std::optional<std::filesystem::path> file_ =
       way_ == Way::kUnix ? std::optional(std::filesystem::temp_directory_path() /
                                          ("tendon-bench-" + std::to_string(::getpid()) + ".sock"))
@@ -420,14 +419,14 @@ void measure_round_trip(Run& run) {
     const bool busy = wait == Wait::kBusy;
     kinds.push_back(
         {wait, Way::kUdp, std::nullopt, busy ? 1.10 : 1.05, busy ? "≤ 1.10 × the floor" : "≤ 1.05 × the floor"});
-    kinds.push_back({wait, Way::kUnix, std::nullopt, 0, ""});  // without a goal
+    kinds.push_back({wait, Way::kUnix, std::nullopt, 0, ""});
     for (const Suite suite : {Suite::kNoise, Suite::kAesGcm}) {
       if (!contains(suites_of_this_machine(), suite)) continue;
       kinds.push_back({wait, Way::kUdp, suite, busy ? 1.25 : 1.08, busy ? "≤ 1.25 × the floor" : "≤ 1.08 × the floor"});
     }
   }
   for (const auto& [wait, way, suite, goal, words] : kinds) {
-    RoundTrip round_trip(options, wait, way, suite);  // forks before it has a priority of its own
+    RoundTrip round_trip(options, wait, way, suite);  // forks before the priority is raised
     const AtPriority high(options.priority);
     const Result r = round_trip.run();
     const double ratio = quantile(r.tendon, 0.5) / quantile(r.bare, 0.5);

@@ -15,7 +15,7 @@
 namespace tendon::bench {
 namespace {
 
-/// Three digits that mean something, and no more than one after the point: "0.4", "18.1", "1189".
+/// At most three significant digits and one decimal: "0.4", "18.1", "1189".
 std::string figure(double value) {
   std::array<char, 32> text{};
   std::snprintf(text.data(), text.size(), value < 100 ? "%.1f" : "%.0f", value);
@@ -30,7 +30,7 @@ std::string times(const std::optional<double>& ratio) {
   return text.data();
 }
 
-/// Pads by what is seen: a character of UTF-8 is one place.
+/// Pads to `width` displayed characters: UTF-8 continuation bytes do not count.
 std::string pad(const std::string& text, std::size_t width, bool left = true) {
   std::size_t places = 0;
   for (const char c : text) places += (static_cast<unsigned char>(c) & 0xC0U) == 0x80U ? 0 : 1;

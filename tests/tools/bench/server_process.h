@@ -14,11 +14,11 @@
 
 namespace tendon::bench {
 
-/// `tendond`, the one beside this program, as a process of its own. It is gone when this object is.
+/// Runs the `tendond` next to this program in a child process, which ends with this object.
 class ServerProcess {
  public:
-  /// Runs the scene file; what the server says goes into files beside it. `priority`: SCHED_FIFO of all its threads but
-  /// the haptic ones; 0: as it is. Throws std::runtime_error when it does not listen within 20 s.
+  /// Runs the scene file; output goes to files next to it. `priority`: SCHED_FIFO priority of all threads except the
+  /// haptic ones; 0: default scheduling. Throws std::runtime_error if it does not listen within 20 s.
   ServerProcess(const std::filesystem::path& scene, int priority);
   ~ServerProcess();
   ServerProcess(const ServerProcess&) = delete;
@@ -27,16 +27,16 @@ class ServerProcess {
   const Address& address() const { return address_; }
   Duration started() const { return started_; }  ///< from exec to listening
   std::uint64_t resident() const;                ///< bytes
-  void check() const { process_->check(); }      ///< throws when it has ended by itself
+  void check() const { process_->check(); }      ///< throws if the server has exited
 
   struct Spent {
     Duration haptic{};
     Duration network{};
     Duration rest{};
   };
-  Spent spent() const;  ///< processor time so far, by threads
+  Spent spent() const;  ///< processor time so far, by thread
 
-  /// Stops it, and returns its last line.
+  /// Stops the server and returns its last line of output.
   std::string stop();
 
  private:

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// How many sessions one server holds, and how many devices one process: until it breaks (fleet.h).
+// How many sessions one server handles, and how many devices one process, up to the point of overload (fleet.h).
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -14,22 +14,22 @@
 namespace tendon::bench {
 namespace {
 
-constexpr double kInTime = 99.5;    // %
-constexpr double kMostCores = 0.6;  // of the server
+constexpr double kInTime = 99.5;
+constexpr double kMostCores = 0.6;  // server's cores
 
 double us(Duration d) { return 1e6 * seconds(d); }
 double percent(std::uint64_t part, std::uint64_t whole) {
   return whole == 0 ? 0 : 100 * static_cast<double>(part) / static_cast<double>(whole);
 }
 
-/// As many datagrams of such sizes as the fleet's, bare.
+/// Baseline with the fleet's number and sizes of datagrams.
 BareResult floor_of(const Fleet& fleet, const FleetResult& result) {
   BareTraffic bare;
   bare.sessions = result.sessions;
   bare.period = from_seconds(1.0 / fleet.state_hz);
   bare.length = fleet.length / 2;
   bare.priority = fleet.priority;
-  // By what it would have sent had it kept up: what it left out is not to the floor's advantage.
+  // Uses the datagrams that the server owed, not those it sent, so that an overloaded server gets no cheaper baseline.
   const double rounds = result.seconds * fleet.state_hz * static_cast<double>(result.sessions);
   const auto per_round = [&](std::uint64_t datagrams, double kept) {
     return static_cast<std::size_t>(std::max(1.0, std::round(static_cast<double>(datagrams) / rounds / kept)));
@@ -42,10 +42,10 @@ BareResult floor_of(const Fleet& fleet, const FleetResult& result) {
   return run_bare(bare);
 }
 
-/// Of all its threads.
+/// Processor time of all threads.
 Duration server_time(const FleetResult& result) { return result.haptic + result.network + result.log; }
 
-/// The age of a state when its guest's kernel has it, beside a datagram that is sent at once.
+/// Age of a state when the client's kernel receives it, compared with a datagram that is sent immediately.
 Row row_of(const Fleet& fleet, const FleetResult& result, const BareResult& bare, std::string what) {
   const double period = us(from_seconds(1.0 / fleet.state_hz));
   Row row{.section = {},
@@ -135,7 +135,7 @@ void measure_sessions(Run& run) {
         row.target = Row::Target{"200 live, p99 below one period", keeps_up(result) && row.p99 < period};
       }
       run.add(row);
-      if (percent(result.states_received, result.states_owed) < 90 && count >= 200) break;  // it is broken
+      if (percent(result.states_received, result.states_owed) < 90 && count >= 200) break;  // overloaded
     }
   }
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// One haptic step, and the parts that it is made of.
+// Cost of a haptic step and of its parts.
 #include <array>
 #include <chrono>
 #include <cmath>
@@ -29,11 +29,11 @@ constexpr std::size_t kCalls = 1000;
 
 struct Place {
   Vec3 position = Vec3::Zero();
-  double turn = 0;  ///< rad, and the opening of a gripper
+  double turn = 0;  ///< rad; also used as the gripper's opening
   Quat orientation;
 };
 
-/// A hand on a stiff wall: the limiter has work to do in half of the steps.
+/// A hand on a stiff wall; the limiter acts in half of the steps.
 std::array<Place, 2048> hand() {
   std::array<Place, 2048> places;
   for (std::size_t i = 0; i < places.size(); ++i) {
@@ -44,7 +44,6 @@ std::array<Place, 2048> hand() {
   return places;
 }
 
-/// Takes all and keeps nothing.
 class NoSink : public ByteSink {
  public:
   bool append(std::span<const std::byte> bytes) override {
@@ -68,7 +67,7 @@ HapticController::Config controller_config(Law law, const AolPlus<1, 3>::Parts& 
   return config;
 }
 
-/// A controller whose engine of 100 Hz answers: of a point, or of a handle that turns and grips as its point moves.
+/// A controller with an engine at 100 Hz, for a point or for a handle whose rotation and gripper follow the point.
 class Heart {
  public:
   Heart(const HapticController::Config& config, bool whole)
@@ -124,7 +123,7 @@ void measure_steps(Run& run) {
   const std::size_t blocks = run.options.quick ? 20 : 3000;
   const auto places = hand();
 
-  // Each waits for the one before, as a step does for the force of the step before.
+  // Each operation depends on the previous one, as a step depends on the previous step's force.
   const std::string root = "a square root and a divide, each after the other";
   double chained = 2;
   const auto square_root_and_divide = [&](std::size_t) {

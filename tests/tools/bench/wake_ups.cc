@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// How late the haptic thread wakes with a controller alone; with a recording besides; with 32 observers, who cost a
-// datagram each in every step; with tendon-dash and a page that listens to it; and beside them a thread that only
-// sleeps. All take turns in blocks within one run of one server, whose threads are those of tendond: haptic (real-time
-// priority where it is granted), network, and a log that takes records out. The observers are in one process, and cost
-// processor time themselves: it is told apart.
+// Wake-up latency of the haptic thread with a controller alone; with a recording; with 32 observers, each of which
+// receives a datagram per step; and with tendon-dash and a page. The baseline is a thread that only sleeps. All
+// alternate in blocks within one run of one server with tendond's threads: haptic (real-time priority if granted),
+// network, and a log that pops records. The observers are one process; its processor time is reported separately.
 #include <arpa/inet.h>
 #include <netinet/in.h>
 #include <poll.h>
@@ -52,17 +51,17 @@ namespace {
 
 using std::chrono::milliseconds;
 
-/// At the beginning of each block: guests have come or gone.
+/// Wait at the start of each block, after clients have joined or left.
 constexpr Duration kSettle = milliseconds(200);
 
 struct Options {
   std::size_t observers = 32;
-  int blocks = 60;  ///< of each kind: a minute in all
+  int blocks = 60;  ///< of each kind; one minute in total
   int block_ms = 1000;
 };
 
-/// All guests, in one process of their own: a wall, and observers who come when told to. It wakes once in a millisecond
-/// and takes what has come to all of them: 32 that wake by themselves would cost more than the server.
+/// All clients in one process: a wall, and observers that join on command. It wakes once per millisecond and reads for
+/// all of them; 32 separate wake-ups would cost more than the server.
 class Guests {
  public:
   Guests(const Address& server, std::size_t observers) {
@@ -85,13 +84,13 @@ class Guests {
     }
   }
   ~Guests() {
-    ::close(orders_);  // the end of its orders
+    ::close(orders_);  // ends the child
     ::waitpid(child_, nullptr, 0);
   }
   Guests(const Guests&) = delete;
   Guests& operator=(const Guests&) = delete;
 
-  /// Returns when they are all there, or have gone.
+  /// Returns when all observers have joined or left.
   void let_observers_in(bool in) {
     const char order = in ? 'i' : 'o';
     if (::write(orders_, &order, 1) != 1) throw std::runtime_error("the guests are gone");
@@ -131,7 +130,7 @@ class Guests {
     bool told = false;
     for (;;) {
       for (const auto& guest : guests) guest->client.turn(clock::now());
-      // One after the other: a server takes 16 at once.
+      // Observers join one after another: a server handles 16 handshakes at a time.
       if (guests.back()->client.phase() == ForceClient::Phase::kOpen) {
         if (guests.size() <= wanted) {
           guests.push_back(std::make_unique<Guest>(server, config, false));
@@ -156,7 +155,7 @@ class Guests {
   pid_t child_ = 0;
 };
 
-/// What a page does, but for drawing: a WebSocket at tendon-dash's /live (RFC 6455, section 4.1), all of which is read.
+/// The network side of a page: reads a WebSocket at tendon-dash's /live (RFC 6455, section 4.1).
 class Page {
  public:
   explicit Page(const std::string& address) : socket_(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0)) {
@@ -179,7 +178,7 @@ class Page {
   Page(const Page&) = delete;
   Page& operator=(const Page&) = delete;
 
-  /// Bytes that have come since the last call.
+  /// Returns the number of bytes received since the last call.
   std::size_t read() {
     std::array<char, 65536> bytes{};
     std::size_t all = 0;
@@ -193,13 +192,13 @@ class Page {
   int socket_;
 };
 
-/// tendon-dash, in a process of its own, with a page.
+/// tendon-dash in its own process, with a page.
 class Dashboard {
  public:
   Dashboard(const std::filesystem::path& program, const Address& server)
       : process_(program, {"--server", to_string(server), "--listen", "127.0.0.1:0", "--json"}, "/"),
         page_(address_in(process_.wait_for_line("\"listening\""))) {}
-  /// It says Bye, so that the next block is without it.
+  /// SIGTERM lets it send a Bye, so that the next block runs without it.
   ~Dashboard() {
     process_.signal(SIGTERM);
     process_.wait();
@@ -219,7 +218,7 @@ class Dashboard {
   Page page_;
 };
 
-/// A recording into a file that is gone with it.
+/// Records to a temporary file.
 class Recording {
  public:
   Recording() : path_(make()), sink_(path_), recorder_({}, sink_) {}
@@ -242,7 +241,7 @@ class Recording {
   Recorder recorder_;
 };
 
-/// Beside this program; empty where it was not built.
+/// Returns the program next to this one; empty if it was not built.
 std::optional<std::filesystem::path> dashboard_program() {
   const auto program = std::filesystem::read_symlink("/proc/self/exe").parent_path() / "tendon-dash";
   return std::filesystem::exists(program) ? std::optional(program) : std::nullopt;
@@ -250,13 +249,13 @@ std::optional<std::filesystem::path> dashboard_program() {
 
 enum class Kind { kAlone, kRecorder, kObservers, kDashboard };
 
-/// Of one kind of block, all of them together.
+/// Measurements of all blocks of one kind.
 struct Figures {
   std::vector<double> late;  ///< µs, of each wake-up
   std::uint64_t overruns = 0;
-  std::uint64_t datagrams = 0;  ///< that the server has sent
+  std::uint64_t datagrams = 0;  ///< sent by the server
   Duration network_thread{};    ///< processor time
-  Duration guests{};            ///< likewise, of their process
+  Duration guests{};            ///< processor time of their process
   std::uint64_t page_bytes = 0;
 };
 
@@ -319,7 +318,7 @@ class WakeUps {
   }
 
   Figures asleep;
-  std::array<Figures, 4> of;  ///< Kind
+  std::array<Figures, 4> of;  ///< indexed by Kind
   bool realtime = true;
   std::uint64_t welcomed() { return server_.network().stats().welcomed; }
 
@@ -365,7 +364,7 @@ class WakeUps {
     server_.network().close(clock::now());
   }
 
-  /// A thread like the haptic one that does nothing else, while that one rests.
+  /// Baseline: a thread like the haptic one that only sleeps, while the haptic thread is idle.
   void only_sleep() {
     resting_ = true;
     clock::sleep_until(clock::now() + milliseconds(5));
@@ -397,7 +396,7 @@ class WakeUps {
     return std::chrono::seconds(time.tv_sec) + std::chrono::nanoseconds(time.tv_nsec);
   }
 
-  /// The log thread: takes records out, and keeps how late the steps were.
+  /// The log thread: pops records and collects wake-up latencies.
   void watch(Duration lasts, Recorder* recorder, Dashboard* dashboard, Figures* into) {
     Mailboxes& mail = server_.devices().front().mail;
     for (const LocalTime end = clock::now() + lasts; clock::now() < end;) {
@@ -422,11 +421,11 @@ class WakeUps {
   std::optional<std::filesystem::path> dash_ = dashboard_program();
   SimulatedDevice device_;
   UdpLink link_{parse_address("127.0.0.1:0")};
-  Guests guests_;  // forks before there are threads
+  Guests guests_;  // forks before threads are started
   Doorbell stepped_;
   Assembly server_;
   std::atomic<bool> stop_{false};
-  std::atomic<bool> resting_{false};  ///< the haptic thread takes no steps
+  std::atomic<bool> resting_{false};  ///< the haptic thread is idle
   std::uint64_t datagrams_ = 0;
 };
 
@@ -437,7 +436,7 @@ void measure_wake_ups(Run& run) {
   if (run.options.quick) options = {.observers = 3, .blocks = 1, .block_ms = 50};
   WakeUps wake_ups(options);
   wake_ups.run();
-  ::munlockall();  // of enter_realtime
+  ::munlockall();  // undoes enter_realtime
   const std::uint64_t expected = 1 + options.observers * static_cast<std::uint64_t>(options.blocks);
   if (wake_ups.welcomed() < expected || wake_ups.of[0].late.empty() || wake_ups.of[2].late.empty()) {
     throw std::runtime_error(std::to_string(wake_ups.welcomed()) + " sessions were opened, " +

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// How many simulated worlds of 10 s a core can look at in a second (tests/tools/worlds).
+// How many simulated worlds of 10 s (tests/tools/worlds) one core runs per second.
 #include <cstdio>
 #include <stdexcept>
 #include <string>

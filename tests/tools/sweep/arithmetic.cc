@@ -26,7 +26,7 @@ Arithmetic arithmetic_of(std::string_view name) {
 }
 
 std::vector<std::string> environment_of(Arithmetic arithmetic) {
-  // As many threads as cores would sum in as many parts.
+  // Sums depend on the number of threads.
   std::vector<std::string> environment = {"OPENBLAS_NUM_THREADS=1", "OMP_NUM_THREADS=1"};
   if (arithmetic == Arithmetic::kPortable) {
     environment.insert(environment.end(),
@@ -45,12 +45,12 @@ Fingerprint fingerprint() {
       [](double x) { return std::atan2(x, 3.0); },  [](double x) { return std::pow(x + 101, 1.7); },
       [](double x) { return std::hypot(x, 0.7); },  [](double x) { return std::exp2(x / 10); },
   };
-  constexpr int kCalls = 500;  // of each
+  constexpr int kCalls = 500;  // calls of each function
   UnitDigest digest;
   std::uint64_t number = 0;
   for (const Function function : kFunctions) {
     for (int i = 0; i < kCalls; ++i) {
-      const volatile double x = 0.4 * i - 99.7;  // not folded by the compiler
+      const volatile double x = 0.4 * i - 99.7;  // prevents constant folding
       const auto bits = std::bit_cast<std::array<char, sizeof(double)>>(function(x));
       digest.add(number++, {bits.data(), bits.size()});
     }

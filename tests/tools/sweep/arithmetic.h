@@ -8,32 +8,30 @@
 
 namespace tendon::sweep {
 
-// The C library picks sin, exp, pow … by the processor, and OpenBLAS its kernels: with and without fused multiply-adds
-// their last bits differ. Shards that are to be compared byte by byte run with the same arithmetic.
+// The C library selects sin, exp, pow … and OpenBLAS its kernels by processor; results with and without fused
+// multiply-add differ in their last bits. Shards that are compared byte by byte must use the same arithmetic.
 
 enum class Arithmetic : std::uint8_t {
-  kPortable,  ///< that of the oldest x86-64 processor, on any of them
-  kNative,    ///< that of the node: for nodes of one kind
+  kPortable,  ///< reproducible: the baseline x86-64 instructions on every processor
+  kNative,    ///< that of the node; use only with nodes of one kind
 };
 
-/// "portable", "native".
 std::string_view name_of(Arithmetic arithmetic) noexcept;
 /// Throws std::invalid_argument for any other name.
 Arithmetic arithmetic_of(std::string_view name);
 
-/// What a program's environment has to have beside what is there, NAME=value.
+/// Returns the environment variables (NAME=value) to add for a program.
 std::vector<std::string> environment_of(Arithmetic arithmetic);
 
-/// By what the numbers of a process can be told.
+/// Identifies the numerical libraries that a process uses.
 struct Fingerprint {
   std::string c_library;  ///< "glibc 2.36"
-  std::string functions;  ///< hash of the results of some thousand calls of the functions that are used here
-  std::string blas;       ///< OpenBLAS' core; "none" where it is not installed
+  std::string functions;  ///< hash of the results of some thousand calls of math functions
+  std::string blas;       ///< OpenBLAS core; "none" if OpenBLAS is not installed
 
   bool operator==(const Fingerprint&) const = default;
 };
 
-/// Of this process.
 Fingerprint fingerprint();
 
 }  // namespace tendon::sweep

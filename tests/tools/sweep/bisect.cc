@@ -15,10 +15,10 @@ namespace {
 
 using Named = std::vector<std::uint64_t>;
 
-constexpr int kAlone = 3;         // runs of a unit by itself
-constexpr std::size_t kMost = 8;  // units that are run by themselves
+constexpr int kAlone = 3;         // runs of each unit found
+constexpr std::size_t kMost = 8;  // units that are run alone
 
-/// Runs `half` twice: empty when it came to the same, else the units that are known to differ, if any.
+/// Runs `half` twice. Returns nullopt if the outputs are equal, otherwise the units known to differ, if any.
 std::optional<Named> run_twice(const Plan& plan, const Units& half) {
   const std::string once = output_of(plan, half);
   const std::string again = output_of(plan, half);
@@ -26,8 +26,8 @@ std::optional<Named> run_twice(const Plan& plan, const Units& half) {
   return differing_units(once, again, half);
 }
 
-/// Halves of what comes to another result each time, until the units are known; none when it no longer does, or never
-/// did.
+/// Halves `part` while two runs of it differ, until units are identified. Returns none if the difference does not occur
+/// or stops occurring.
 Named by_halves(const Plan& plan, Units part, std::ostream& out) {
   while (part.count > 1) {
     const Units left{.first = part.first, .count = part.count / 2};
@@ -46,7 +46,8 @@ Named by_halves(const Plan& plan, Units part, std::ostream& out) {
   return {};
 }
 
-/// Says how a unit ends by itself. `here`: what the shard came to on this node. True when it is the same each time.
+/// Reports the results of a unit run alone. `here`: its result in the shard's run on this node. Returns true if all are
+/// equal.
 bool run_alone(const Plan& plan, std::uint64_t unit, const std::string& here, std::ostream& out) {
   std::set<std::string> ends;
   for (int i = 0; i < kAlone; ++i) ends.insert(output_of(plan, {.first = unit, .count = 1}));

@@ -9,13 +9,13 @@
 
 namespace tendon::sweep {
 
-/// A shard has had two results that differ: in which units, and is it the program or a node?
+/// Finds the units in which two results of a shard differ, and whether the program or a node is the cause.
 ///
-/// The results themselves tell the units, even when what happened never happens again: by their lines, or by their
-/// digests when one unit differs. Where several differ that have no lines, the program is run again here: all of the
-/// shard and then halves, each twice, until two runs differ in one unit. Units that are known are then run by themselves,
-/// again and again. `out` is told all of it. True when a unit is named.
-/// Throws std::invalid_argument when the shard has not had two results, std::runtime_error when the program fails.
+/// First compares the two stored results: their lines, or their digests if only one unit differs. If several units
+/// without lines differ, runs the program here: the whole shard and then halves of it, each twice, until two runs
+/// differ in one unit. Each unit found is then run alone several times. Writes a report to `out`. Returns true if a
+/// unit was identified. Throws std::invalid_argument if the shard does not have two results, std::runtime_error if the
+/// program fails.
 bool bisect(const std::filesystem::path& folder, const Plan& plan, std::uint64_t shard, std::ostream& out);
 
 }  // namespace tendon::sweep

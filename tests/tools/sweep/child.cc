@@ -19,7 +19,7 @@ namespace {
 
 constexpr std::size_t kLastErrors = 4096;
 
-/// The environment of this process with some variables set anew, and pointers into it.
+/// The environment of this process with some variables replaced, as an array for exec.
 class Environment {
  public:
   explicit Environment(const std::vector<std::string>& added) : added_(added) {
@@ -40,7 +40,7 @@ class Environment {
   std::vector<char*> pointers_;
 };
 
-/// The two ends of a pipe, closed at the end.
+/// Both ends of a pipe; closes them on destruction.
 struct Pipe {
   std::array<int, 2> ends{-1, -1};
 
@@ -58,7 +58,7 @@ struct Pipe {
     if (ends.at(which) >= 0) close(ends.at(which));
     ends.at(which) = -1;
   }
-  /// Appends what is there; closes the reading end when nothing more will come.
+  /// Appends the available bytes to `text`; closes the reading end at end of file.
   void take(std::string& text) {
     std::array<char, 65536> buffer;
     const ssize_t read = ::read(ends[0], buffer.data(), buffer.size());

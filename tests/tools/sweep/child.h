@@ -7,25 +7,25 @@
 
 namespace tendon::sweep {
 
-/// A program that is run to its end.
 struct Child {
-  std::vector<std::string> command;        ///< the program's file, then its arguments
-  std::vector<std::string> environment{};  ///< NAME=value, beside this process'
+  std::vector<std::string> command;        ///< program file, then arguments
+  std::vector<std::string> environment{};  ///< NAME=value, added to the environment of this process
 };
 
 struct ChildEnd {
-  int status = 0;        ///< exit status; 128 + n when signal n ended it, as shells count
-  std::string output{};  ///< what it wrote to standard output
-  std::string errors{};  ///< the last 4 kB of standard error
+  int status = 0;        ///< exit status; 128 + n after signal n
+  std::string output{};  ///< standard output
+  std::string errors{};  ///< last 4 kB of standard error
 
   /// "exit status 3", "signal 9".
   std::string text() const;
 };
 
-/// Runs it, and waits. Its standard input is empty. Throws std::system_error when it cannot be started. Thread-safe: yes.
+/// Runs the child with empty standard input and waits for its end. Throws std::system_error if it cannot be started.
+/// Thread-safe: yes.
 ChildEnd run(const Child& child);
 
-/// … with this process' standard output and error. Returns the status.
+/// Runs the child with this process's standard output and error. Returns its exit status.
 int run_aloud(const Child& child);
 
 }  // namespace tendon::sweep

@@ -11,29 +11,29 @@
 
 namespace tendon::sweep {
 
-/// What a sweep is: FOLDER/plan.json. It never changes.
+/// Contents of FOLDER/plan.json, which never changes.
 struct Plan {
-  std::filesystem::path program;         ///< absolute; every node finds it there
-  std::string sha256;                    ///< of the program's file, 64 hexadecimal digits
-  std::vector<std::string> arguments{};  ///< before --units
+  std::filesystem::path program;         ///< absolute path, the same on every node
+  std::string sha256;                    ///< hash of the program file, 64 hexadecimal digits
+  std::vector<std::string> arguments{};  ///< inserted before --units
   Units units{};
-  std::uint64_t per_shard = 0;  ///< units
+  std::uint64_t per_shard = 0;  ///< units per shard
   Arithmetic arithmetic = Arithmetic::kPortable;
-  Fingerprint fingerprint{};  ///< of a process with that arithmetic, on the node that planned
+  Fingerprint fingerprint{};  ///< of a process with this arithmetic on the planning node
 
   std::uint64_t shards() const noexcept { return (units.count + per_shard - 1) / per_shard; }
-  /// Throws std::invalid_argument when there is no such shard.
+  /// Throws std::invalid_argument if there is no such shard.
   Units shard(std::uint64_t number) const;
 };
 
-/// Writes the plan into a new folder. The same plan again is let through, so that two users may plan at once; throws
-/// std::runtime_error when the folder has another one.
+/// Writes the plan into a new folder. Accepts a folder that already has the same plan, so two users may plan
+/// concurrently. Throws std::runtime_error if the folder has a different plan.
 void write_plan(const std::filesystem::path& folder, const Plan& plan);
 
-/// Throws std::runtime_error, naming the file and what is wrong with it.
+/// Throws std::runtime_error naming the file and the error.
 Plan read_plan(const std::filesystem::path& folder);
 
-/// 64 hexadecimal digits. Throws std::runtime_error when the file cannot be read.
+/// Returns 64 hexadecimal digits. Throws std::runtime_error if the file cannot be read.
 std::string sha256_of(const std::filesystem::path& file);
 
 }  // namespace tendon::sweep

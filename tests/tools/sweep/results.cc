@@ -17,7 +17,7 @@
 namespace tendon::sweep {
 namespace {
 
-/// A file of this process that is closed, and gone, at the end.
+/// Temporary file of this process; closed and removed on destruction.
 class Draft {
  public:
   explicit Draft(const std::filesystem::path& beside) {
@@ -49,7 +49,8 @@ class Draft {
     if (fsync(file_) != 0) fail("cannot be synced");
   }
 
-  /// Whether it has got this name. Over NFS the answer of a link that was made may be lost: the number of names tells.
+  /// Returns whether the file now has this name. Over NFS the reply to a successful link may be lost, so the link count
+  /// is checked.
   bool link_to(const std::filesystem::path& name) const {
     if (link(path_.c_str(), name.c_str()) == 0) return true;
     const int reason = errno;
@@ -124,7 +125,7 @@ Kept keep_result(const std::filesystem::path& folder, std::uint64_t shard, std::
 
 namespace {
 
-/// Empty when there is no such file.
+/// Returns nullopt if the file does not exist.
 std::optional<std::string> result_in(const std::filesystem::path& file, const Units& units) {
   if (!std::filesystem::exists(file)) return std::nullopt;
   std::string text = contents_of(file);
@@ -136,7 +137,6 @@ std::optional<std::string> result_in(const std::filesystem::path& file, const Un
   return text;
 }
 
-/// The lines of each unit that has some.
 std::map<std::uint64_t, std::string> lines_by_unit(std::string_view output) {
   std::map<std::uint64_t, std::string> lines;
   while (!output.empty()) {

@@ -12,61 +12,62 @@
 
 namespace tendon::sweep {
 
-// The folder is the state: no heartbeat, no database, no coordinator. A result is written under a name of its own,
-// synced, and linked to its place; the link fails when a result is there already, and then the two are compared. A shard
-// that runs twice (a retry, a partition, two users) is thereby always the same harmless case.
+// The folder holds the complete state; there is no coordinator, heartbeat or database. A result is written to a
+// temporary file, synced, and hard-linked to its final name. The link fails if a result exists, and then the two are
+// compared. A shard that runs twice (a retry, a partition, two users) is therefore harmless.
 //
 //     FOLDER/plan.json
-//     FOLDER/done/000017.json       what the program printed
-//     FOLDER/done/000017.differs    … and what it printed another time, when that is not the same
-//     FOLDER/failed/000017.log      the end of what the program said when it failed last
-//     FOLDER/merged.jsonl           of `merge`
+//     FOLDER/done/000017.json       output of the program
+//     FOLDER/done/000017.differs    a later output that is different
+//     FOLDER/failed/000017.log      end of standard error of the last failed run
+//     FOLDER/merged.jsonl           written by `merge`
 
 enum class Kept : std::uint8_t {
   kNew,
-  kSame,   ///< it was there, byte for byte
-  kOther,  ///< something else is there, and has been left alone
+  kSame,   ///< an identical file existed
+  kOther,  ///< a different file existed and was left unchanged
 };
 
-/// Gives `file` this text, all of it or none, and never in place of another. Whoever sees the file sees it synced.
+/// Creates `file` with this text atomically and never overwrites one. A file that is visible has been synced.
 Kept keep(const std::filesystem::path& file, std::string_view text);
 
-/// All of a file. Throws std::runtime_error, naming it.
+/// Returns the whole file. Throws std::runtime_error naming it.
 std::string contents_of(const std::filesystem::path& file);
 
-/// What a shard printed becomes its result. kOther: it is kept beside, as .differs.
+/// Stores a shard's output as its result. If this returns kOther, the output was stored as .differs.
 Kept keep_result(const std::filesystem::path& folder, std::uint64_t shard, std::string_view text);
 
-/// A shard's result; empty when there is none. Throws std::runtime_error when it is not one of this shard.
+/// Returns a shard's result, if any. Throws std::runtime_error if the file is not a result of this shard.
 std::optional<std::string> result_of(const std::filesystem::path& folder, const Plan& plan, std::uint64_t shard);
 
-/// … and the one that differs from it, if it has had two.
+/// Returns the second, different result of a shard, if any.
 std::optional<std::string> other_result_of(const std::filesystem::path& folder, const Plan& plan, std::uint64_t shard);
 
-/// The lines of a unit in a program's output; empty when it has none.
+/// Returns the lines of a unit in a program's output, possibly none.
 std::string lines_of(std::string_view output, std::uint64_t unit);
 
-/// The units in which two outputs of the same units differ: by their lines; where no line differs, the one that the
-/// digests tell. Empty when they do not: several units differ, or none and only the end does.
+/// Returns the units in which two outputs differ. Compares lines; if all lines are equal, uses the digests, which
+/// identify the unit if only one differs. Returns an empty list if several units differ without lines, or only the end
+/// line does.
 std::vector<std::uint64_t> differing_units(std::string_view one, std::string_view other, const Units& units);
 
-/// Where two outputs of the same units differ, for people: "unit 13", "units 13, 17", "several units", "no unit, but in
+/// Describes where two outputs of the same units differ: "unit 13", "units 13, 17", "several units", "no unit, but in
 /// their ends".
 std::string difference(std::string_view one, std::string_view other, const Units& units);
 
-/// Throws std::invalid_argument unless this is the whole output of a program that has run these units.
+/// Throws std::invalid_argument unless `output` is the complete output of a run of these units.
 ShardEnd end_of(std::string_view output, const Units& units);
 
 struct Status {
   std::uint64_t shards = 0;
   std::uint64_t done = 0;
   std::vector<std::uint64_t> missing{};
-  std::vector<std::uint64_t> differing{};  ///< of those that are done
-  std::vector<std::uint64_t> failed{};     ///< of those that are missing
+  std::vector<std::uint64_t> differing{};  ///< shards with two different results
+  std::vector<std::uint64_t> failed{};     ///< shards without a result whose last run failed
 };
 Status status_of(const std::filesystem::path& folder, const Plan& plan);
 
-/// "0-3,17", as Slurm's --array takes it; empty for none.
+/// Formats as Slurm's --array expects: "0-3,17". Empty for no numbers.
 std::string ranges(const std::vector<std::uint64_t>& numbers);
 
 std::filesystem::path result_file(const std::filesystem::path& folder, std::uint64_t shard);

@@ -24,14 +24,14 @@ Child program_of(const Plan& plan, const std::vector<std::string>& more) {
   return child;
 }
 
-/// The lines before the end.
+/// Returns the lines before the end line.
 std::string_view body_of(std::string_view result) {
   result.remove_suffix(1);
   const auto last = result.rfind('\n');
   return last == std::string_view::npos ? std::string_view() : result.substr(0, last + 1);
 }
 
-/// Runs these units; `why` says why they are not done, and is empty when they are.
+/// Runs these units. `why` is empty on success, otherwise the reason of the failure.
 ChildEnd run_units(const Plan& plan, const Units& units, std::string& why) {
   ChildEnd end = run(program_of(plan, {"--units", text_of(units), "--json"}));
   why = end.status == 0 ? "" : end.text();

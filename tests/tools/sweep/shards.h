@@ -12,32 +12,32 @@
 
 namespace tendon::sweep {
 
-/// Throws std::runtime_error, saying how to make it equal, where this node's program or arithmetic is not the plan's.
-/// `self`: the file of tendon-sweep, which tells the arithmetic of a process that is started as the program will be.
+/// Throws std::runtime_error if this node's program or arithmetic differs from the plan's; the message says how to
+/// correct it. `self`: the file of tendon-sweep, which is started like the program to get its fingerprint.
 void expect_as_planned(const Plan& plan, const std::filesystem::path& self);
 
-/// What a process with this arithmetic computes on this node.
+/// Returns the fingerprint of a process with this arithmetic on this node.
 Fingerprint fingerprint_of(Arithmetic arithmetic, const std::filesystem::path& self);
 
-/// "FIRST:COUNT".
+/// Returns "FIRST:COUNT".
 std::string text_of(const Units& units);
 
-/// What the program prints of these units. Throws std::runtime_error, with the end of what it complained about, when it
-/// does not end well.
+/// Returns the program's output for these units. If the program fails, throws std::runtime_error with the end of its
+/// standard error.
 std::string output_of(const Plan& plan, const Units& units);
 
-/// Runs one shard and keeps its result, or the end of what it complained about. Says in a line on `out` what became of
-/// it. True when the shard is done now, by us or by another. Thread-safe: yes, but for `out`.
+/// Runs one shard and stores its result, or the end of its standard error. Writes a line about the outcome to `out`.
+/// Returns true if the shard has a result now, from this process or another. Thread-safe: yes, except for `out`.
 bool run_shard(const std::filesystem::path& folder, const Plan& plan, std::uint64_t shard, std::ostream& out);
 
-/// Runs these shards with `jobs` processes at a time, but for those that are done. True when all are done.
-/// `progress`: also says how many are done, on standard error.
+/// Runs those of these shards that have no result, with `jobs` processes at a time. Returns true if all have results.
+/// `progress`: also prints counts to standard error.
 bool run_shards(const std::filesystem::path& folder, const Plan& plan, const std::vector<std::uint64_t>& shards,
                 unsigned jobs, bool progress, std::ostream& out);
 
-/// FOLDER/merged.jsonl: what one process would have printed that had run all units; then what the program says to it
-/// (PROGRAM ARGUMENTS --from merged.jsonl), where it has such an option. Returns the program's exit status: 1 where a
-/// promise was broken. Throws std::runtime_error when a shard is missing, or has differing results.
+/// Writes FOLDER/merged.jsonl, which equals the output of one process over all units. Then runs PROGRAM ARGUMENTS
+/// --from merged.jsonl, if the program has this option, and returns its exit status: 1 if an invariant was violated.
+/// Throws std::runtime_error if a shard has no result or two different ones.
 int merge(const std::filesystem::path& folder, const Plan& plan, std::ostream& out);
 
 }  // namespace tendon::sweep

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// tendon-sweep: its command line.
+// Command line of tendon-sweep.
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
@@ -46,7 +46,7 @@ struct Arguments {
 
 std::filesystem::path self() { return std::filesystem::canonical("/proc/self/exe"); }
 
-/// As a shell finds it, or beside this program.
+/// Looks up `program` as given, in the folder of this program, then in PATH.
 std::filesystem::path found(const std::string& program) {
   if (program.find('/') != std::string::npos) return std::filesystem::canonical(program);
   if (const auto beside = self().parent_path() / program; access(beside.c_str(), X_OK) == 0) return beside;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The whole of tendon-sweep, as its users run it: processes, folders, kills.
+// End-to-end tests of tendon-sweep: processes, folders, killed shards.
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -26,7 +26,7 @@ std::string contents(const std::filesystem::path& file) {
   return {std::istreambuf_iterator<char>(in), {}};
 }
 
-/// A sweep of the toy program, and what is to go wrong in it.
+/// A sweep of the toy program with injected faults.
 class Sweep : public ::testing::Test {
  protected:
   ChildEnd sweep(std::vector<std::string> arguments, std::vector<std::string> environment = {}) const {
@@ -36,7 +36,7 @@ class Sweep : public ::testing::Test {
   ChildEnd plan(const std::string& units, const std::string& per_shard) {
     return sweep({"plan", folder(), "--units", units, "--per-shard", per_shard, "--", TENDON_TOY, faults()});
   }
-  /// That fault is there when the next program of this sweep looks.
+  /// Injects this fault into the next program of the sweep that looks for it.
   void fault(const std::string& name) const { std::ofstream(faults() + "/" + name) << "!"; }
   std::string toy(const std::string& units) const {
     return run({.command = {TENDON_TOY, faults(), "--units", units, "--json"}}).output;
@@ -45,7 +45,7 @@ class Sweep : public ::testing::Test {
   std::string faults() const { return scratch_.path().string(); }
   std::string merged() const { return contents(folder() + "/merged.jsonl"); }
 
-  /// Or one of its mutants.
+  /// tendon-sweep, or the mutant named by the environment.
   static std::string program() {
     const char* const other = std::getenv("TENDON_SWEEP_PROGRAM");  // NOLINT(concurrency-mt-unsafe): nobody sets it
     return other != nullptr ? other : TENDON_SWEEP;
@@ -224,7 +224,7 @@ TEST_F(Sweep, SameBytesWithAndWithoutFma) {
   EXPECT_NE(refused.errors.find("plan with --arithmetic portable"), std::string::npos) << refused.errors;
 }
 
-/// A program of ours, as a sweep of it in shards and as one process.
+/// Compares a sharded sweep of one of our programs with a run in one process.
 class SweepOf : public Sweep {
  protected:
   void expect_the_same(std::vector<std::string> command, const std::string& units, const std::string& per_shard) {
@@ -244,7 +244,7 @@ class SweepOf : public Sweep {
   }
 
  private:
-  /// Or one of its mutants.
+  /// The program, or the mutant of tendon-lab named by the environment.
   static std::string program_of(const std::string& name) {
     const char* const other = std::getenv("TENDON_LAB_PROGRAM");  // NOLINT(concurrency-mt-unsafe): nobody sets it
     return other != nullptr && name == "tendon-lab" ? other : TENDON_BIN "/" + name;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Preloaded into a program: a file that is given a name by link() before what was written to it has been synced ends
-// the program. After a power cut such a file may be there, and empty.
+// Preloaded library that aborts the program if it link()s a file whose writes have not been synced. After a power
+// failure such a file may exist but be empty.
 #include <dlfcn.h>
 #include <sys/stat.h>
 #include <unistd.h>

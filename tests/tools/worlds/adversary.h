@@ -14,7 +14,8 @@
 
 namespace tendon::simulation {
 
-/// A device gives out so many times what it is told to. 1.01 must break passivity, or no test here means anything.
+/// Factors by which the device multiplies its commanded output. Tests require that 1.01 breaks passivity, which shows
+/// that they can detect a violation.
 struct Sabotage {
   double force = 1;
   double torque = 1;
@@ -22,32 +23,31 @@ struct Sabotage {
   bool operator==(const Sabotage&) const = default;
 };
 
-/// A device in the hand of an adversary, who knows the law and the force, senses positions exactly, and
-/// moves so as to get the most energy out: a mixture of random motion and of the worst motion there is,
-/// eq. (7) of Lee & Lee 2009:
+/// A device moved by an adversary that knows the law and the force and senses positions exactly. It mixes random motion
+/// with the worst-case motion, eq. (7) of Lee & Lee 2009:
 ///
 ///     Δx* = F/‖F‖ · T (‖F‖ − f_c)₊ / (2b)
 ///
-/// A handle that turns, and its fingers, are moved in the same way at the same time, and its orientation is now q and
-/// now −q.
+/// Rotation and gripper move by the same rule at the same time. The reported orientation switches sign at random (q or
+/// −q).
 class AdversaryDevice final : public Device {
  public:
   struct Config {
     Friction friction;
-    double hostility = 0.5;                                  ///< share of intervals in which the worst motion is made
+    double hostility = 0.5;                                  ///< share of intervals with worst-case motion
     double largest_move = 1e-2;                              ///< m, of a random motion
     double clamp = std::numeric_limits<double>::infinity();  ///< N, the device's own limit
     struct Turn {
       Friction friction;   ///< N·m and N·m·s/rad
-      double largest = 0;  ///< rad, of a random turn
-      double clamp = 0;    ///< N·m, the device's own limit; 0: it has no motors that turn it
+      double largest = 0;  ///< rad, of a random rotation
+      double clamp = 0;    ///< N·m, the device's own limit; 0: no motors
     };
     std::optional<Turn> turn{};
     struct Fingers {
       Friction friction;
       double arm = 0;    ///< m/rad
       double open = 0;   ///< rad
-      double clamp = 0;  ///< N, the device's own limit; 0: they have no motor
+      double clamp = 0;  ///< N, the device's own limit; 0: no motor
     };
     std::optional<Fingers> fingers{};
     Sabotage more{};
@@ -90,7 +90,7 @@ class AdversaryDevice final : public Device {
     return force_;
   }
 
-  /// A wrench that is too large keeps its direction.
+  /// Keeps the direction of a wrench that exceeds the maximum.
   Effort apply_all(const Effort& effort) noexcept override {
     force_ = effort.force * config_.more.force;
     torque_ = effort.torque * config_.more.torque;
@@ -109,14 +109,14 @@ class AdversaryDevice final : public Device {
   bool saw_only_finite_forces() const { return saw_only_finite_forces_; }
 
  private:
-  /// Half a turn is the largest that has one direction.
+  /// rad; below π, beyond which the shorter rotation would reverse its direction.
   static constexpr double kMostTurn = 3;
 
   void move(Duration held) {
     const bool hostile = dice_.chance(config_.hostility);
     if (!hostile) {
       position_ += dice_.direction() * config_.largest_move * dice_.decades(-5, 0);
-      // Comes back now and then, so that walls are left and entered.
+      // Returns toward the origin at times, so walls are entered and left.
       if (position_.norm() > 0.05) position_ *= 0.5;
     } else if (const double size = force_.norm(); size > config_.friction.coulomb) {
       position_ += force_ / size * worst(size, config_.friction, held);

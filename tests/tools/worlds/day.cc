@@ -20,27 +20,25 @@ namespace {
 using std::chrono::milliseconds;
 
 constexpr std::int64_t kDriftPpb = 200'000;
-/// Served is who gets half of what is sent, for so long.
+/// A client counts as served if it receives half of the data sent during this time.
 constexpr Duration kLook = milliseconds(400);
 constexpr std::uint32_t kHzX = 20;
-/// Each reading of a clock is cut to whole nanoseconds.
+/// Two readings of a clock are each truncated to whole nanoseconds.
 constexpr Duration kClockRounding{4};
-/// A session of this share of its life may end by its age: for a fast clock a day is 17 s shorter. So much earlier,
-/// too, by when an end sees the other one go.
+/// Fraction of its life after which a session may end by age: a fast clock shortens a day by 17 s. kAgeSlack is how
+/// much earlier one end may see the other leave.
 constexpr double kWholeLife = 1 - 1e-9 * kDriftPpb;
 constexpr Duration kAgeSlack = std::chrono::seconds(1);
 
-// The handles of the clients, in the order in which they are added.
 constexpr std::size_t kZ = 0;
 constexpr std::size_t kY = 1;
 constexpr std::size_t kX = 2;
-constexpr std::size_t kZElsewhere = 3;  ///< the same key at another address
+constexpr std::size_t kZElsewhere = 3;  ///< Z's key at another address
 constexpr std::size_t kHandles = 4;
 
 constexpr const char* kLinkOfX =
     "delay=uniform(5ms,45ms) order=free loss=30% duplicate=5% replay(2%,64) rebind(every=600s)";
 
-/// A device that nobody touches.
 class StillDevice final : public Device {
  public:
   StillDevice() {
@@ -98,14 +96,13 @@ class Day {
   }
 
  private:
-  /// What the day knows of a client.
   struct Known {
-    bool open = false;           ///< it is in a session
-    std::uint64_t sessions = 0;  ///< that it has begun
-    std::uint64_t expired = 0;   ///< … and that have ended by their age,
-    LocalTime expired_at{};      ///< … the last time
-    LocalTime began{};           ///< the present session
-    std::uint64_t asked = 0;     ///< requests, in this session
+    bool open = false;
+    std::uint64_t sessions = 0;  ///< sessions begun
+    std::uint64_t expired = 0;   ///< sessions ended by their age
+    LocalTime expired_at{};      ///< last of these
+    LocalTime began{};           ///< current session
+    std::uint64_t asked = 0;     ///< requests in the current session
   };
 
   std::vector<ClientKey> draw_keys() {
@@ -200,7 +197,7 @@ class Day {
     ++known.sessions;
     known.began = world_.now();
     known.asked = 0;
-    if (handle == kX) {  // what the old one has left open, nobody owes
+    if (handle == kX) {  // requests open at the old session are void
       asked_by_x_.clear();
       denied_ = world_.server().stats().denied;
     }
@@ -238,7 +235,6 @@ class Day {
   }
   static std::string us(Duration duration) { return std::to_string(duration.count() / 1000) + " µs"; }
 
-  /// Both ends have believed what they should.
   void see_receipts() {
     const auto compare = [&](const std::string& who, std::uint64_t expected, const LinkStats& counted) {
       if (expected == counted.datagrams_received) return;
@@ -254,7 +250,7 @@ class Day {
 
   // ---- Requests ----
 
-  /// One of Z and one of X, if there is room.
+  /// Sends a request from Z and one from X, if there is room.
   void ask() {
     for (const std::size_t handle : {z_, kX}) {
       if (!world_.alive(handle) || !world_.client(handle).rearm()) continue;
@@ -270,7 +266,7 @@ class Day {
            " carried out";
   }
 
-  /// An observer may not rearm. That is an answer, too.
+  /// An observer may not rearm; a denial counts as execution.
   void see_requests_of_x() {
     const std::uint64_t denied = world_.server().stats().denied;
     for (; denied_ < denied; ++denied_, ++report_.carried_out) {
@@ -307,7 +303,7 @@ class Day {
       come_back(z_);
     }
     world_.network().change(fair(), world_.now());
-    // Datagrams that are still under way may come at any time.
+    // Datagrams in flight may still arrive.
     recover(std::max(world_.now(), world_.network().latest_arrival()));
   }
 
@@ -325,7 +321,7 @@ class Day {
     }
   }
 
-  /// Somebody goes, and comes back after a while: Z perhaps elsewhere.
+  /// A client leaves and returns later; Z possibly at another address.
   void absence(std::size_t handle) {
     if (dice_.chance(0.5)) {
       world_.stop(handle);
@@ -340,8 +336,9 @@ class Day {
     recover(world_.now());
   }
 
-  /// The same key at another address, while the one before is there: it is told, and stays away. (Where it could not be
-  /// told, its address having changed in that instant, it comes back after its timeout and takes the place again.)
+  /// Starts Z's key at another address while the first Z is in session. The first one is notified that it was replaced,
+  /// and stays away. (If the notification could not reach it, because its address changed at that instant, it would
+  /// return after its timeout and take the session back; hence no address changes here.)
   void take_over() {
     Network::Weather calm = fair();
     calm.up.rebind = {};
@@ -372,7 +369,6 @@ class Day {
     return marks;
   }
 
-  /// Whether Z and Y were served for half of `lasted`, in one session.
   bool served_since(const Marks& before, Duration lasted) {
     const Marks now = marks();
     const auto half = static_cast<std::uint64_t>(seconds(lasted) * config_.loop_hz / 2);
@@ -398,7 +394,7 @@ class Day {
     report_.slowest_recovery = std::max<Duration>(report_.slowest_recovery, world_.now() - kLook - from);
   }
 
-  /// In which all are served all the time, but where a session ends by its age.
+  /// Everyone must be served all the time, except where a session ends by its age.
   void see_fair_weather() {
     if (report_.troubles == 0) recover(world_.now());
     const LocalTime end = world_.now() + dice_.milliseconds(10'000, 40'000);
@@ -438,10 +434,10 @@ class Day {
   std::vector<Receipts> up_ = std::vector(kHandles, Receipts(config_.rekey.overlap));
   std::vector<Receipts> down_ = std::vector(kHandles, Receipts(Rekey{}.overlap));
   std::array<Known, kHandles> known_{};
-  std::size_t z_ = kZ;                ///< where Z is
-  std::uint64_t rearmed_ = 0;         ///< by Z, in A's present session with it
-  std::uint64_t denied_ = 0;          ///< requests of X, as far as they are accounted for
-  std::deque<LocalTime> asked_by_x_;  ///< … that A has not answered, oldest first
+  std::size_t z_ = kZ;                ///< handle of the current Z
+  std::uint64_t rearmed_ = 0;         ///< by Z in its current session, as counted by A
+  std::uint64_t denied_ = 0;          ///< denials of X's requests accounted for so far
+  std::deque<LocalTime> asked_by_x_;  ///< open requests of X, oldest first
   std::uint64_t states_of_x_ = 0;
   LocalTime x_served_ = began_;
   bool look_at_clock_ = false;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Days made short: keys are renewed and sessions reach their age within minutes. Whole days are run by day.sh.
+// Shortened days: key changes and session ages within minutes. day.sh runs whole days.
 #include "tests/tools/worlds/day.h"
 
 #include <gtest/gtest.h>
@@ -13,7 +13,7 @@ DayConfig short_day(std::uint64_t seed) {
   config.seed = seed;
   config.length = std::chrono::minutes(6);
   config.loop_hz = 200;
-  config.rekey.datagrams = 4000;  // Z's datagrams reach this first, those of the observers the age
+  config.rekey.datagrams = 4000;  // Z's keys change by count, those of the observers by age
   config.rekey.age = std::chrono::seconds(40);
   config.session_life = std::chrono::minutes(3);
   return config;

@@ -23,14 +23,14 @@ std::string number(double value) {
 namespace {
 
 constexpr double kInf = std::numeric_limits<double>::infinity();
-constexpr double kMargin = 1.02;  ///< of true friction over what the limiter is told, at the least
+constexpr double kMargin = 1.02;  ///< minimum ratio of true friction to the limiter's value
 
 Friction draw_friction(Dice& dice, double coulomb_decade, double viscous_decade) {
   return {dice.chance(0.2) ? 0.0 : dice.decades(coulomb_decade - 1, coulomb_decade),
           dice.decades(viscous_decade - 1, viscous_decade)};
 }
 
-/// What a device really has whose limiter is told `friction`.
+/// Draws the device's true friction, above the limiter's `friction`.
 void draw_true_friction(Dice& dice, const Friction& friction, std::optional<double>& coulomb,
                         std::optional<double>& viscous) {
   if (friction.coulomb > 0) coulomb = friction.coulomb * (kMargin + dice.uniform());
@@ -49,7 +49,7 @@ ScriptedMotion draw_turns(Dice& dice, double least, double most) {
       .amplitude = dice.within(least, most), .frequency = dice.decades(-0.5, 0.8), .direction = about});
 }
 
-/// The fingers of a hand that opens and closes: only x counts.
+/// Opening and closing fingers; only x is used.
 ScriptedMotion draw_squeezes(Dice& dice, double open) {
   return ScriptedMotion(ScriptedMotion::RampHold{.from = dice.within(0, 0.4) * open * Vec3::UnitX(),
                                                  .to = dice.within(0.5, 1.2) * open * Vec3::UnitX(),
@@ -60,7 +60,7 @@ ScriptedMotion draw_squeezes(Dice& dice, double open) {
 void draw_rotation(Dice& dice, DrawnWorld& world, bool motors) {
   HapticController::Config& control = world.config.loop.control;
   const Friction friction = draw_friction(dice, -3.5, -2.5);
-  // In the longest pause the worst turn is then below a half.
+  // Bounds the worst rotation in the longest pause to half a turn.
   const double max_torque = friction.coulomb + friction.viscous * dice.decades(0.5, 1.6);
   const double max_slew = dice.chance(0.3) ? kInf : max_torque * dice.decades(0.5, 3);
   const double encoder_step = dice.chance(0.2) ? dice.decades(-5, -3.5) : 0;
@@ -111,7 +111,7 @@ void draw_gripper(Dice& dice, DrawnWorld& world, bool motor) {
   std::get<SimulatedDevice::Config>(world.device).gripper = gripper;
 }
 
-/// Each of a button of its own, two of them when everybody is served again: an interval of the loop is shorter than any.
+/// Each press uses its own button; two of them come after recovery. A press is longer than any loop interval.
 void draw_presses(Dice& dice, DrawnWorld& world) {
   auto& device = std::get<SimulatedDevice::Config>(world.device);
   constexpr std::array<std::array<double, 2>, 4> kFrom{{{0, 3}, {2, 6}, {8.7, 8.8}, {9.2, 9.3}}};  // s

@@ -8,19 +8,18 @@
 
 namespace tendon::simulation {
 
-/// In four digits, for people.
+/// Formats with four digits.
 std::string number(double value);
 
-/// Gives the device of `world` what a handle can have beyond a position: it turns, with motors or as the hand turns it,
-/// it grips, and its buttons are pressed. Only a device whose law is one of HandlePort's has such motors. True friction
-/// is above what the limiter is told by 2 % or more (HandlePort says why).
+/// Adds rotation, gripper and buttons to the device of `world`. Rotation may be passive or have motors; only laws with
+/// a HandlePort have motors. The true friction is at least 2 % above the limiter's value (see HandlePort).
 void draw_handle(Dice dice, DrawnWorld& world, const Sabotage& sabotage);
 
-/// What `world` has of it, for people; empty when it is a point.
+/// Returns an empty string for a point device.
 std::string describe_handle(const DrawnWorld& world);
 
-/// Adds to an engine's answer a torque, an angular stiffness and a grip force, where the device has such motors: as
-/// right or as wrong as its force.
+/// Adds torque, angular stiffness and grip force to an engine's answer if the device has these motors, with the same
+/// errors as the force.
 void answer_handle(const DrawnClient& client, Dice& dice, const DeviceState& hand, Touch& touch);
 
 }  // namespace tendon::simulation

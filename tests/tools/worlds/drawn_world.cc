@@ -26,8 +26,8 @@ Duration whole_ms(Dice& dice, double low, double high) {
   return milliseconds(static_cast<int>(dice.within(low, high)));
 }
 
-/// Sizes in steps of a factor 2^¼ and whole milliseconds: delay models are compiled, and those of the same numbers only
-/// once.
+/// Quantized to factors of 2^¼ and whole milliseconds, because delay models are compiled once per distinct parameter
+/// set.
 Duration typical(Dice& dice, double low_ms, double high_ms) {
   const double octaves = std::log2(high_ms / low_ms);
   return std::max<Duration>(
@@ -200,7 +200,6 @@ void draw_device(Dice& dice, DrawnWorld& world, bool sabotaged) {
   }
   SimulatedDevice::Config device;
   device.mass = dice.decades(-1.5, 0);
-  // True friction: what the limiter assumes, or more.
   if (friction.coulomb > 0) device.coulomb_friction = friction.coulomb * (1 + dice.uniform());
   device.viscous_friction = friction.viscous * (1 + dice.uniform());
   if (dice.chance(0.5)) device.max_force = control.max_force * dice.within(0.1, 1);
@@ -210,7 +209,7 @@ void draw_device(Dice& dice, DrawnWorld& world, bool sabotaged) {
     device.watchdog = whole_ms(dice, 3, 20);
     control.watchdog = *device.watchdog;
   }
-  // What it is about is the server: the balance of energy is exact for any substep.
+  // The server is under test: the energy balance is exact for any substep.
   device.max_substep = std::chrono::microseconds(250);
   device.hand = OperatorHand::Config{.stiffness = dice.decades(1, 3),
                                      .damping = dice.decades(-1, 1),
@@ -219,9 +218,9 @@ void draw_device(Dice& dice, DrawnWorld& world, bool sabotaged) {
   world.device = std::move(device);
 }
 
-/// Some devices rub in their joints, some have a structural mode: both keep the balance of energy at the motors, where
-/// port and limiter are. (Transport delay does not: what is felt is then not what was returned.) Drawn apart, so that
-/// nothing else of a world depends on it.
+/// Some devices have joint friction, some a structural mode; both preserve the energy balance at the motors, where port
+/// and limiter are. (Transport delay does not: the force felt is then not the force returned.) Uses its own random
+/// stream so that the rest of the world is unchanged.
 void draw_mechanism(Dice dice, DrawnWorld& world) {
   auto* device = std::get_if<SimulatedDevice::Config>(&world.device);
   if (device == nullptr) return;
@@ -284,9 +283,8 @@ void draw_clients(Dice& dice, DrawnWorld& world) {
   std::ranges::stable_sort(world.clients, {}, &DrawnClient::joins);
 }
 
-/// Half of the worlds speak suite 1, and most of those renew keys so often that an outage is longer than some are good
-/// for. There addresses may change at any time, in fair weather too: a session follows. Drawn apart, so that nothing
-/// else of a world depends on it.
+/// Half of the worlds use suite 1. Most of those renew keys so often that outages outlast some keys, and their clients'
+/// addresses may change at any time. Uses its own random stream so that the rest of the world is unchanged.
 void draw_suite(Dice dice, DrawnWorld& world) {
   if (dice.chance(0.5)) return;
   Ratchet secrets(dice.bits());
@@ -310,9 +308,8 @@ void draw_suite(Dice dice, DrawnWorld& world) {
   }
 }
 
-/// From kFirstSeedOfSuite2 on, half of the sealed worlds have a server that seals by AES, and a third of those forbid
-/// anything else; where it is not forbidden, some clients are older than suite 2. Drawn apart, so that nothing else of a
-/// world depends on it.
+/// From kFirstSeedOfSuite2 on, half of the sealed worlds have a server with AES. A third of those allow only AES; in
+/// the others some clients do not know suite 2. Uses its own random stream so that the rest of the world is unchanged.
 void draw_aes(Dice dice, DrawnWorld& world) {
   for (DrawnClient& client : world.clients) client.config.suites = client.rogue.suites = world.config.suites;
   if (world.seed < kFirstSeedOfSuite2 || !world.sealed() || dice.chance(0.5)) return;
@@ -346,8 +343,7 @@ DrawnWorld draw_world(std::uint64_t seed, const Sabotage& sabotage) {
   HapticController::Config& control = config.loop.control;
   control.limiter.friction = {dice.chance(0.2) ? 0.0 : dice.decades(-3, -0.3), dice.decades(-2.5, 0.3)};
 
-  // Periods of 0.5 … 2 ms, mostly 1: each interval is a period and up to as much again, less what the step before was
-  // late.
+  // Periods of 0.5 … 2 ms, mostly 1. An interval is at most two periods, less the lateness of the previous step.
   config.loop.period = std::chrono::microseconds(dice.chance(0.7) ? 1000 : static_cast<int>(dice.within(500, 2000)));
   const bool punctual = dice.chance(0.3) || sabotaged;
   config.latest_wake = punctual ? Duration::zero() : config.loop.period;
@@ -378,7 +374,7 @@ DrawnWorld draw_world(std::uint64_t seed, const Sabotage& sabotage) {
   world.clears = whole_ms(dice, 1500, 4500);
   if (dice.chance(0.4)) world.changes.push_back({whole_ms(dice, 300, 1400), draw_weather(dice, world)});
   Network::Weather fair;
-  // A round trip below what clocks drift while an echo is held (10 µs) would come out negative and be left out.
+  // A round trip shorter than the clock drift during an echo's hold (10 µs) would be negative and be discarded.
   world.one_way_up = whole_ms(dice, 1, 20);
   world.one_way_down = whole_ms(dice, 1, 20);
   fair.up.delay = injector::ConstantDelay{world.one_way_up};
@@ -457,7 +453,7 @@ std::string describe(const DrawnWorld& world) {
 
 namespace {
 
-/// What else an engine can say of its answer, true or not.
+/// Adds optional fields to an engine's answer, correct or not.
 void say_more(Dice& dice, const DeviceState& hand, Touch& touch) {
   if (dice.chance(0.3)) touch.valid_radius = dice.decades(-5, 0);
   if (dice.chance(0.5)) touch.contact = any_contact(dice, hand.position);

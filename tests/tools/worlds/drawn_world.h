@@ -20,14 +20,14 @@
 
 namespace tendon::simulation {
 
-/// What a remote physics engine answers.
+/// Model of the remote physics engine.
 enum class Engine : std::uint8_t {
   kSpring,
   kWall,         ///< with a local model
-  kMillion,      ///< newton
-  kSteps,        ///< in force
-  kNegative,     ///< spring and damper that push
-  kPushesAlong,  ///< in the direction in which the hand is already pushed
+  kMillion,      ///< 10⁶ N
+  kSteps,        ///< force steps
+  kNegative,     ///< spring and damper of the wrong sign
+  kPushesAlong,  ///< along the current motion of the hand
 };
 
 struct DrawnClient {
@@ -35,59 +35,57 @@ struct DrawnClient {
   Kind kind = Kind::kController;
   ForceClient::Config config;
   Engine engine = Engine::kSpring;
-  double stiffness = 0;  ///< N/m, of the engine
-  double bad_days = 0;   ///< probability that it answers NaN or infinity
+  double stiffness = 0;  ///< N/m
+  double bad_days = 0;   ///< probability of an answer of NaN or infinity
   std::uint64_t seed = 0;
-  Rogue::Config rogue;  ///< of a rogue; `quits` counts from the beginning
+  Rogue::Config rogue;  ///< for a rogue; `quits` counts from the beginning
   injector::DriftingClock::Config clock;
   Duration joins{};
-  std::optional<Duration> killed;     ///< without a word
-  std::optional<Duration> restarted;  ///< … and started again at the same address
+  std::optional<Duration> killed;     ///< without a Bye
+  std::optional<Duration> restarted;  ///< restarted at the same address
 };
 
-/// A world as its seed draws it: everything that happens in it but for what the network does to single datagrams, which
-/// the network draws from the same seed. Bad weather first, then it clears and stays fair.
+/// Everything a seed determines except the fate of single datagrams, which the network draws from the same seed. Bad
+/// network conditions come first; then they clear and stay good.
 struct DrawnWorld {
   static constexpr Duration kLength = std::chrono::seconds(10);
 
   std::uint64_t seed = 0;
-  World::Config config;  ///< with the weather of the beginning
+  World::Config config;  ///< with the initial network conditions
   struct Change {
     Duration at{};
     Network::Weather weather;
   };
-  std::vector<Change> changes;  ///< of the weather; the last is the fair one
-  Duration clears{};            ///< when that comes
-  Duration one_way_up{};        ///< then
+  std::vector<Change> changes;  ///< of network conditions; the last is the good one
+  Duration clears{};            ///< time of the last change
+  Duration one_way_up{};        ///< after that
   Duration one_way_down{};
 
   std::variant<SimulatedDevice::Config, AdversaryDevice::Config> device;
   WatchedDevice::Config port;
-  std::vector<DrawnClient> clients;  ///< in the order in which they join: their handles in the world
-  double garbage_hz = 0;             ///< datagrams of random bytes, until it clears
+  std::vector<DrawnClient> clients;  ///< in order of joining, which is the order of their handles
+  double garbage_hz = 0;             ///< rate of random datagrams until the network clears
 
-  bool damages = false;  ///< bits are flipped
+  bool damages = false;  ///< the network flips bits
   bool sealed() const { return !config.keys.empty(); }
-  /// In suite 0 a flipped bit that gets past the checksum of UDP is believed.
+  /// In suite 0 a bit flip that passes the UDP checksum is accepted.
   bool believes_damage() const { return damages && !sealed(); }
   bool pauses() const { return config.pause_probability > 0; }
   bool rogue() const;
-  bool exact() const;  ///< a simulated device whose truth the account of the port must match
+  bool exact() const;  ///< true if the port's account must match the simulated device's exactly
 };
 
-/// A seed below this one draws the world that it drew before there was suite 2.
+/// Smaller seeds draw the same world as before suite 2 existed.
 inline constexpr std::uint64_t kFirstSeedOfSuite2 = 1'000'000'000;
 
-/// With sabotage the device is an adversary's. From kFirstSeedOfSuite2 on, some worlds take a processor with AES.
+/// With sabotage the device is an AdversaryDevice. Seeds from kFirstSeedOfSuite2 on may require a processor with AES.
 DrawnWorld draw_world(std::uint64_t seed, const Sabotage& sabotage = {});
 
-/// One direction of a bad network: any model of the injector but changes of address and flipped bits.
+/// Draws one direction of a bad network: any injector model except address changes and bit flips.
 injector::Profile draw_bad_weather(Dice& dice);
 
-/// All of it, for people.
 std::string describe(const DrawnWorld& world);
 
-/// The physics of a drawn client.
 Physics make_physics(const DrawnClient& client);
 
 }  // namespace tendon::simulation

@@ -13,7 +13,7 @@ namespace tendon::simulation {
 
 namespace {
 
-/// Something that happens at a time, counted from the beginning.
+/// `at` counts from the beginning of the world.
 struct Event {
   Duration at{};
   std::function<void()> happens;
@@ -54,19 +54,19 @@ void add(World& world, const DrawnClient& client, LocalTime began, Watch watch) 
   }
 }
 
-/// Random bytes from a stranger, or in the name of a client.
+/// Sends random bytes from an unknown address or a client's.
 void forge_garbage(World& world, const DrawnWorld& drawn, Dice& dice) {
   std::vector<std::byte> bytes(1 + dice.bits() % kMaxDatagram);
   for (std::byte& b : bytes) b = static_cast<std::byte>(dice.bits());
   Address from = world.server_address();
   from.port = dice.chance(0.5) ? 9 : kFirstClientPort;
-  // As if it were a datagram of ours.
+  // A plausible header of our protocol.
   if (dice.chance(0.5) && bytes.size() >= 4) {
     bytes[0] = std::byte{0x54};
     bytes[1] = static_cast<std::byte>(0x10 | (1 + dice.bits() % 4));
     bytes[2] = bytes[3] = std::byte{0};
   }
-  // … of a sealed session.
+  // A plausible header of a sealed session.
   if (drawn.sealed() && dice.chance(0.5) && bytes.size() >= kHeaderSize) {
     std::ranges::copy(encode_header({.type = DatagramType::kData,
                                      .suite = drawn.config.suites.front(),
@@ -102,7 +102,7 @@ Outcome run(const DrawnWorld& drawn, const Extras& extras) {
     if (client.killed) {
       events.push_back({*client.killed, [&world, &witness, i] {
                           world.kill(i);
-                          // In fair weather too, the others wait until the server has missed it.
+                          // On a good network as well, the other clients wait until the server has timed out this one.
                           if (witness.recovered_by()) witness.weather_clears(world.network().latest_arrival());
                         }});
     }

@@ -10,26 +10,25 @@
 
 namespace tendon::simulation {
 
-/// What became of a world.
 struct Outcome {
-  std::optional<Breach> breach;  ///< the first promise that was broken
+  std::optional<Breach> breach;  ///< the first violated invariant
   bool felt = false;             ///< a remote force was rendered
-  bool limited = false;          ///< … and limited by energy
-  bool turned = false;           ///< a torque was given out
-  bool gripped = false;          ///< a grip force was
-  int presses = 0;               ///< of buttons, that observers had to be shown and were
-  bool recovered = false;        ///< it was checked that everybody is served again
+  bool limited = false;          ///< a remote force was limited by energy
+  bool turned = false;           ///< a torque was commanded
+  bool gripped = false;          ///< a grip force was commanded
+  int presses = 0;               ///< button presses that observers had to receive, and did
+  bool recovered = false;        ///< recovery of all clients was checked
   double least_energy = 0;       ///< J
   std::uint64_t steps = 0;
   Network::Counts network;
 };
 
 struct Extras {
-  Network::Players players{};  ///< instead of the weather, where they decide
+  Network::Players players{};  ///< optional deciders in place of the injectors
   Network::Watch watch{};      ///< sees every decision of the network
 };
 
-/// Runs a world from its beginning to its end, with a witness. The same world gives the same outcome.
+/// Runs a world to its end and checks its invariants. Deterministic: the same world gives the same outcome.
 /// Thread-safe: yes.
 Outcome run(const DrawnWorld& world, const Extras& extras = {});
 

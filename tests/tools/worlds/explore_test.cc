@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Worlds drawn from seeds. That all of them keep every promise is what `tendon-worlds run` shows (ctest -R Worlds);
-// here is what that rests on: the same seed is the same world, broken worlds are found, and shrink to what matters.
+// Determinism of worlds, detection of violations, and shrinking. That all worlds keep their invariants is checked by
+// `tendon-worlds run` (ctest -R Worlds).
 #include "tests/tools/worlds/explore.h"
 
 #include <gtest/gtest.h>
@@ -61,7 +61,7 @@ TEST(Worlds, ItsRecordedNetworkMakesTheSameWorldAgain) {
   }
 }
 
-/// Worlds in which the ledger breaks, of those in which the device gives out so much more than the limiter allowed.
+/// Number of worlds whose ledger is violated by a device with this sabotage.
 int broken_by(const Sabotage& sabotage) {
   int broken = 0;
   for (std::uint64_t seed = 1; seed <= 60; ++seed) {
@@ -72,12 +72,12 @@ int broken_by(const Sabotage& sabotage) {
 }
 
 TEST(Worlds, ADeviceThatGivesOutOnePercentMoreThanTheBoundBreaksThem) {
-  // The others hardly press against their bound, or have a law that keeps away from it.
+  // In the other worlds the force seldom reaches its bound, or the law keeps a margin.
   EXPECT_GT(broken_by({.force = 1.01}), 10);
 }
 
 TEST(Worlds, SoDoesOnePercentMoreTorqueOrGrip) {
-  // Two laws of ten turn and grip.
+  // Two of ten laws have torque and grip.
   EXPECT_GT(broken_by({.torque = 1.01}), 3);
   EXPECT_GT(broken_by({.grip = 1.01}), 3);
 }

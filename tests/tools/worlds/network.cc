@@ -10,20 +10,18 @@ namespace tendon::simulation {
 
 namespace {
 
-/// Ports between a client's own and the one it has after its NAT has rebound it once: there are never so many clients.
+/// Distance between a client's port and its port after one NAT rebinding; larger than the number of clients.
 constexpr std::uint32_t kRebindStride = 128;
 
 }  // namespace
 
-/// Inbox and outlet of one peer.
 class Network::End final : public Link {
  public:
-  /// `link` is empty for the server.
   End(Network& network, std::optional<std::uint32_t> link) : network_(network), link_(link) {}
 
   void send(const Address& to, std::span<const std::byte> datagram) override {
     if (!link_) return network_.launch_down(to, datagram);
-    // Clients know nobody but the server.
+    // Clients can only reach the server.
     if (to == network_.server_address_) network_.launch_up(*link_, datagram);
   }
 
@@ -37,7 +35,7 @@ class Network::End final : public Link {
   }
 
   void arrive(const Address& from, std::span<const std::byte> datagram) {
-    if (datagram.empty()) return;  // no link hands out one without a byte: its size would say that there is none
+    if (datagram.empty()) return;  // Link::receive returns 0 for "nothing received"
     if (count_ == letters_.size()) letters_.emplace_back();
     Letter& letter = letters_[count_++];
     letter.from = from;
@@ -52,7 +50,7 @@ class Network::End final : public Link {
   std::uint64_t arrivals() const noexcept { return arrived_; }
 
  private:
-  /// Keeps its memory for the next one.
+  /// Its buffer is reused.
   struct Letter {
     Address from;
     std::vector<std::byte> bytes;
@@ -76,7 +74,7 @@ struct Network::Client {
         down(network.make_way(injector::Direction::kDown, link)) {}
 
   Address address;
-  Address outside;  ///< as the server sees it
+  Address outside;  ///< as seen by the server
   End end;
   Way up;
   Way down;

@@ -16,14 +16,14 @@
 
 namespace tendon::simulation {
 
-/// A network of simulated links between one server and its clients: what one end sends, the other receives when an
-/// injector says so. Each client has a link of its own (they count from 0 in the order of `open`), and each direction
-/// of it a decider of its own, so no client disturbs another's fates.
+/// Simulated links between one server and its clients; an injector decides when each datagram arrives. Each client has
+/// its own link (numbered from 0 in the order of `open`), and each direction its own decider, so clients do not affect
+/// each other.
 ///
-/// A client whose source port is changed by its NAT (`rebinds`) is a stranger to the server from then on, and what the
-/// server sends to the port before finds nobody.
+/// After a NAT rebinding (`rebinds`) the server sees an unknown source address, and datagrams sent to the old port are
+/// dropped.
 ///
-/// Counted, and an identity at any time: sent + copies = delivered + lost + nowhere + in flight.
+/// Invariant of the counters: sent + copies = delivered + lost + nowhere + in flight.
 ///
 /// No allocation per datagram once warm. Thread-safe: no.
 class Network {
@@ -32,87 +32,85 @@ class Network {
     injector::Profile up;    ///< client to server
     injector::Profile down;  ///< server to client
   };
-  /// Decides instead of an injector where it returns one: a recorded network.
+  /// Returns a decider that replays a recorded network, or null to use an injector.
   using Players = std::function<std::unique_ptr<injector::Decider>(injector::Direction, std::uint32_t link)>;
-  /// A datagram that comes to the server or to a client.
+  /// A datagram that arrives at the server or at a client.
   struct Arrival {
     injector::Direction direction;
     std::uint32_t link;
     std::span<const std::byte> datagram;
-    bool whole;  ///< as it was sent
+    bool whole;  ///< not damaged in transit
   };
-  /// Sees every decision.
   using Watch = std::function<void(injector::Direction, std::uint32_t link, const injector::Decision&)>;
 
   struct Counts {
     std::uint64_t sent = 0;
-    std::uint64_t copies = 0;  ///< duplicates and stale replays made on the way
+    std::uint64_t copies = 0;  ///< duplicates and stale replays made in transit
     std::uint64_t delivered = 0;
     std::uint64_t lost = 0;
-    std::uint64_t nowhere = 0;  ///< to an address where nobody is (any more)
+    std::uint64_t nowhere = 0;  ///< sent to an address without a receiver
   };
 
   Network(std::uint64_t seed, const Weather& weather, const Address& server, Players players = {});
   ~Network();
 
-  /// The server's end.
   Link& server();
-  /// A client's end. Opened again at the same address it is the same link, with an empty inbox. Lives as long as the
+  /// A client's end. Opening the same address again returns the same link with an empty inbox. Lives as long as the
   /// network.
   Link& open(const Address& address);
 
-  /// Another weather from `now` on, on every link that an injector decides about.
+  /// Applies from `now` on to every link that uses an injector.
   void change(const Weather& weather, LocalTime now);
 
-  /// Moves the clock: datagrams due by `now` are in the inboxes after it.
+  /// Advances the clock; datagrams due by `now` are in the inboxes afterwards.
   void deliver(LocalTime now);
-  /// When the next datagram arrives; empty when none is on its way.
+  /// Arrival time of the next datagram in flight, if any.
   std::optional<LocalTime> next_arrival() const { return flight_.next_wake(); }
 
-  /// When the last of those that were ever sent has come at the latest. One that is lost counts if it would have come
-  /// later than that by kLongWait: where the order is kept, those sent after it wait for its turn all the same. A shorter
-  /// wait is within the 600 ms of recovery_promise().
+  /// Upper bound of the arrival times of all datagrams sent so far. A lost datagram counts if it would have arrived
+  /// more than kLongWait later: with order preserved, later datagrams wait for its slot. A shorter wait fits into the
+  /// 600 ms of recovery_promise().
   LocalTime latest_arrival() const noexcept {
     constexpr Duration kLongWait = std::chrono::milliseconds(300);
     return latest_of_lost_ > latest_arrival_ + kLongWait ? latest_of_lost_ : latest_arrival_;
   }
 
-  /// Since the last call, something has arrived at the server, or at the client of this link.
+  /// Returns whether a datagram arrived at the server (or at this link's client) since the last call.
   bool take_news_of_server();
   bool take_news_of(std::uint32_t link);
-  /// Datagrams that have arrived and were not taken out.
+  /// Datagrams that arrived and were not read yet.
   std::size_t unread_by_server() const;
   std::size_t unread_by(std::uint32_t link) const;
-  /// Datagrams that have come to the server, to a client, so far.
+  /// Total datagrams that arrived.
   std::uint64_t arrived_at_server() const;
   std::uint64_t arrived_at(std::uint32_t link) const;
-  /// Datagrams on their way from a client to the server.
+  /// Datagrams in flight from a client to the server.
   std::size_t on_their_way_up(std::uint32_t link) const;
 
-  /// Puts bytes into the inbox of `to` at once, as if they came from `from`: forgeries and garbage.
+  /// Puts bytes into the inbox of `to` immediately, with the source address `from`.
   void forge(const Address& from, const Address& to, std::span<const std::byte> datagram);
 
-  /// The address of a client as the server sees it now.
+  /// The client's current address as seen by the server.
   Address outside(std::uint32_t link) const;
 
   const Counts& counts() const noexcept { return counts_; }
   std::size_t in_flight() const noexcept { return flight_.size(); }
   void watch(Watch watch) { watch_ = std::move(watch); }
-  /// Called with each that comes, before whom it comes to can read it; not with forgeries.
+  /// Called with each arriving datagram before the receiver can read it. Forged datagrams are not reported.
   void watch_arrivals(std::function<void(const Arrival&)> watch) { watch_arrivals_ = std::move(watch); }
 
  private:
   class End;
   struct Way {
     std::unique_ptr<injector::Decider> decider;
-    injector::Injector* injector = nullptr;  ///< the decider, when it is one
+    injector::Injector* injector = nullptr;  ///< the decider if it is an injector, else null
     std::unique_ptr<injector::History> history;
   };
   struct Client;
   struct Tag {
     std::uint32_t link = 0;
     injector::Direction direction{};
-    std::uint16_t port = 0;  ///< of the client, as the server sees it
+    std::uint16_t port = 0;  ///< of the client, as seen by the server
     bool damaged = false;    ///< unless it is a copy
   };
 
@@ -132,7 +130,7 @@ class Network {
   std::vector<std::unique_ptr<Client>> clients_;
   injector::Flight<Tag> flight_;
   LocalTime latest_arrival_{};
-  LocalTime latest_of_lost_{};  ///< would have come
+  LocalTime latest_of_lost_{};  ///< when the last lost datagram would have arrived
   Counts counts_;
 };
 

@@ -11,24 +11,25 @@
 
 namespace tendon::simulation {
 
-/// What one end must make of each datagram of suite 1 that comes to it, as SESSION.md says it: a reference with a set
-/// of numbers in place of the ring of bits, and without keys. Who refuses a genuine datagram, or believes one twice,
-/// has another count.
+/// Reference model of receiver-side replay protection in suite 1 (SESSION.md): counts the datagrams that one end must
+/// accept. Uses a set of packet numbers instead of a bit ring, and no keys. An implementation that drops a genuine
+/// datagram or accepts a duplicate has a different count.
 ///
 /// Thread-safe: no.
 class Receipts {
  public:
-  /// `overlap`: how long the key before is good for.
+  /// `overlap`: how long the previous key remains valid.
   explicit Receipts(Duration overlap) : overlap_(overlap) {}
 
-  /// A datagram that is not whole cannot be authentic.
+  /// A datagram with `whole` = false cannot be authentic.
   void see(LocalTime now, std::span<const std::byte> datagram, bool whole);
 
-  /// That must be accepted (LinkStats::datagrams_received) in the conversation of that id, one of the newest.
+  /// Datagrams that must be accepted (LinkStats::datagrams_received) in this connection, which must be among the
+  /// newest.
   std::uint64_t accepted(std::uint32_t connection) const;
-  /// Of the newest conversation; 0 = none.
+  /// The newest connection; 0 = none.
   std::uint32_t newest() const noexcept { return conversations_.empty() ? 0 : conversations_.rbegin()->first; }
-  /// Times that a new epoch has begun, over all conversations.
+  /// Number of key changes over all connections.
   std::uint64_t new_keys() const noexcept { return new_keys_; }
 
  private:
@@ -37,9 +38,9 @@ class Receipts {
 
   struct Conversation {
     std::uint64_t accepted = 0;
-    std::set<std::uint64_t> numbers;  ///< accepted, as far back as they are remembered
+    std::set<std::uint64_t> numbers;  ///< packet numbers accepted and still remembered
     std::uint8_t epoch = 0;
-    bool previous = false;  ///< the key before is still good
+    bool previous = false;  ///< the previous key is still valid
     LocalTime moved_on{};
   };
 

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The main job on real input: a human hand recorded on a teleoperation rig (TU/e, 2 kHz, lever angle × 0.075 m) moves
-// the handle, and the network is a 5G mid-band link whose one-way delays were measured (DETERMINISTIC6G). The device is
-// the UE: its states take the uplink, the forces that answer them the downlink.
+// A human hand recorded on a teleoperation rig (TU/e, 2 kHz, lever angle × 0.075 m) moves the handle. The network is a
+// 5G mid-band link with measured one-way delays (DETERMINISTIC6G). The device is the UE: its states take the uplink,
+// the forces that answer them the downlink.
 //
-// Reads $TENDON_DATA; leaves its recordings beside the test for `tendon-report`.
+// Reads $TENDON_DATA; writes its recordings next to the test for `tendon-report`.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -34,7 +34,7 @@ struct Outcome {
 
 struct Hand {
   const char* recording;
-  double wall;  ///< m, where the wall is: so that the motion goes in and out of it
+  double wall;  ///< m, position of the wall, within the range of the motion
 };
 
 void PrintTo(const Hand& hand, std::ostream* out) { *out << hand.recording << ", wall at " << hand.wall << " m"; }
@@ -82,7 +82,7 @@ Outcome run(const std::filesystem::path& data, const Hand& hand, Law limiter, co
   });
   world.run_for(from_seconds(length));
 
-  std::filesystem::remove(out);  // of an earlier test run
+  std::filesystem::remove(out);
   FileSink sink(out);
   sink.append(world.finish_recording());
   return outcome;

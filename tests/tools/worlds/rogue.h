@@ -15,16 +15,16 @@
 
 namespace tendon::simulation {
 
-/// A guest that knows the protocol and means ill, or has a bug: answers steps that never were, or long ago ones again;
-/// forces that are not numbers, or a million newton; validities of nothing or of for ever; requests that make no sense.
-/// At `quits` it falls silent, without a Bye.
+/// A malicious or faulty client that knows the protocol. It answers steps that never happened or are long past; sends
+/// non-finite forces or 10⁶ N; validities of zero or without end; and senseless requests. At `quits` it stops without a
+/// Bye.
 class Rogue final : public Guest {
  public:
   struct Config {
     Role role = Role::kController;
     std::uint64_t seed = 0;
     LocalTime quits{};
-    std::optional<Key> key{};  ///< all is sealed then
+    std::optional<Key> key{};  ///< seals all datagrams if set
     Suites suites = {Suite::kNoise};
   };
 
@@ -80,7 +80,7 @@ class Rogue final : public Guest {
       Session::Config config;
       config.connection_id = accepted->connection_id;
       accepted->keys ? session_.emplace(config, *accepted->keys, now) : session_.emplace(config, now);
-    }  // refused: it stays away, and silent
+    }  // refused: stays silent
   }
 
   void take_events() {

@@ -22,7 +22,7 @@ namespace tendon::simulation {
 namespace {
 
 constexpr Duration kTellEvery = std::chrono::milliseconds(500);
-/// So few worlds may by chance have no hand that comes to feel anything.
+/// Smaller samples may by chance lack a world with a felt force.
 constexpr std::uint64_t kEnoughToJudge = 200;
 
 struct Broken {
@@ -56,7 +56,7 @@ struct Tally {
   }
 };
 
-/// What the threads share.
+/// State shared by the threads.
 class Exploration {
  public:
   explicit Exploration(const RunOptions& options) : options_(options) {}
@@ -127,7 +127,6 @@ void tell(const Broken& broken, bool json, std::ostream& out) {
       << "\n  the promise: " << oracle.sentence << "\n  again with:  " << reproduce(broken.seed) << '\n';
 }
 
-/// What happened, for people.
 void tell_events(const Tally& tally, std::ostream& out) {
   out << tally.steps << " haptic steps, " << tally.datagrams << " datagrams; forces felt in " << tally.felt
       << " worlds, limited in " << tally.limited << ", torques in " << tally.turned << ", grips in " << tally.gripped
@@ -165,7 +164,6 @@ void tell(const Tally& tally, double elapsed, bool json, std::ostream& out) {
   tell_events(tally, out);
 }
 
-/// Everything that is known of a world, as text.
 std::string whole(const Outcome& outcome) {
   JsonLine line;
   if (outcome.breach) {
@@ -205,7 +203,7 @@ ShardEnd end_of(const Units& seeds, const Tally& tally, std::uint64_t broken, co
           .digest = digest};
 }
 
-/// Worlds in which nothing happens would prove nothing.
+/// Checks coverage: worlds in which nothing happens prove nothing.
 void expect_events(const Tally& tally) {
   if (tally.worlds >= kEnoughToJudge &&
       (tally.felt < tally.worlds * 8 / 10 || tally.limited < tally.worlds * 6 / 10 ||
@@ -215,7 +213,7 @@ void expect_events(const Tally& tally) {
   }
 }
 
-/// Runs `work` on so many threads, and passes on what one of them throws.
+/// Runs `work` on `jobs` threads and rethrows an exception of any of them.
 void on_threads(unsigned jobs, const std::function<void()>& work) {
   std::vector<std::exception_ptr> failures(jobs);
   {

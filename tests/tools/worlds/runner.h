@@ -18,31 +18,31 @@ struct RunOptions {
   std::uint64_t count = 1000;
   std::uint64_t first_seed = 1;
   unsigned jobs = 1;
-  std::vector<std::uint64_t> seeds;   ///< run before all others
-  std::optional<Duration> budget;     ///< of real time, instead of `count`
+  std::vector<std::uint64_t> seeds;   ///< run first
+  std::optional<Duration> budget;     ///< real time; replaces `count`
   std::function<Duration()> elapsed;  ///< real time since the beginning
   bool json = false;
   bool progress = false;
 };
 
-/// Runs worlds on `jobs` threads until there is no more to do or one has broken a promise: then those that are under
-/// way are finished, and each broken one is named with its oracle and the command that reproduces it. Says at the end
-/// how many there were, how fast, and in how many of them something happened at all. True when every promise was kept.
+/// Runs worlds on `jobs` threads until all are done or one violates an invariant; then it finishes the worlds in
+/// progress. Prints each violation with its oracle and the command that reproduces it, the number of worlds, the rate,
+/// and coverage counts. Returns true if every invariant held.
 bool explore(const RunOptions& options, std::ostream& out, std::ostream& progress);
 
-/// Runs all these seeds and stops at none: a shard of a sweep (tests/support/units.h). A line for each broken world and
-/// one end line, in JSON.
+/// Runs all these seeds without stopping at a violation: one shard of a sweep (tests/support/units.h). Prints a JSON
+/// line per violation and one end line.
 void explore_units(const Units& seeds, unsigned jobs, std::ostream& out);
 
-/// What `explore` says at its end, of the lines of explore_units. True when every promise was kept. Throws
-/// std::invalid_argument naming the line that is none of these, std::runtime_error when too little happened.
+/// Summarizes the lines printed by explore_units as `explore` does. Returns true if every invariant held. Throws
+/// std::invalid_argument, naming the line, for malformed input, and std::runtime_error when coverage is too low.
 bool judge(std::istream& lines, std::ostream& out);
 
-/// One world, and its story when `verbose`. True when it has kept every promise.
+/// Runs one world and prints its events if `verbose`. Returns true if every invariant held.
 bool run_one(std::uint64_t seed, bool verbose, std::ostream& out);
 
-/// A number at the beginning of a line is a seed; what follows it says why it is there, and # begins a comment. Throws
-/// std::runtime_error naming file and line for any other line.
+/// Reads one seed per line; text after the number is a note, and # begins a comment. Throws std::runtime_error, naming
+/// file and line, for anything else.
 std::vector<std::uint64_t> read_seeds(const std::filesystem::path& file);
 
 }  // namespace tendon::simulation

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The whole server around a device with a safety layer.
+// The whole server with a SafeDevice.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -18,9 +18,9 @@ namespace {
 using std::chrono::milliseconds;
 using std::chrono::seconds;
 
-constexpr Friction kBounds = {.coulomb = 0.3, .viscous = 0.8};  // below the falcon's own
+constexpr Friction kBounds = {.coulomb = 0.3, .viscous = 0.8};  // below the falcon's true friction
 
-/// A falcon in a hand that rests for a while, then goes to and fro through a wall at x = 0.
+/// A falcon in a hand that rests at first, then moves back and forth through a wall at x = 0.
 SimulatedDevice::Config hand(const Vec3& to = Vec3(0.02, 0.004, 0)) {
   SimulatedDevice::Config device = find_device_profile("falcon")->device();
   device.hand = OperatorHand::Config{
@@ -53,7 +53,6 @@ Physics wall() {
   return [](const DeviceState& state) -> Touch { return Vec3(-2000 * std::max(0.0, state.position.x()), 0, 0); };
 }
 
-/// May be unplugged.
 class Pluggable final : public Device {
  public:
   explicit Pluggable(Device& device) : device_(device) {}
@@ -97,8 +96,8 @@ TEST(SafeWorld, TheLedgerBooksTheForceAfterTheSafetyLayerAndStaysPassive) {
   });
   world.run_for(seconds(5));
   EXPECT_EQ(safe.status().state, SafetyState::kArmed);
-  EXPECT_GT(peak, 1);     // N: it is felt
-  EXPECT_GT(left, 1000);  // steps in which it took something away
+  EXPECT_GT(peak, 1);     // N: the wall is felt
+  EXPECT_GT(left, 1000);  // steps in which the safety layer reduced the force
   EXPECT_GE(least, -1e-9);
   EXPECT_GE(witness.energy(), -1e-9);
 }
@@ -158,7 +157,7 @@ TEST(SafeWorld, WhatItsEngineHasDisarmedInMidForceGivesNoneUntilItRearms) {
     };
     EXPECT_GT(peak_of(seconds(2)), 1);
     EXPECT_TRUE(world.client(engine).disarm());
-    world.run_for(milliseconds(500));  // the request is on its way
+    world.run_for(milliseconds(500));
     EXPECT_EQ(peak_of(seconds(2)), 0);
     EXPECT_EQ(world.haptic().stats().fault, HapticController::Fault::kNone);
     if (guarded) {

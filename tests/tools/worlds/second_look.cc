@@ -51,7 +51,7 @@ lab::Run run(const Scene& scene, const injector::Trace& trace, Law law, Duration
   config.loop.control.limiter.law = law;
   config.loop.control.limiter.environment_stiffness = options.stiffness;
   config.mail.flight = 1;
-  // A world begins at one second; so does the network then.
+  // Worlds start at one second; shift the trace to match.
   constexpr LocalTime kBegin{std::chrono::seconds(1)};
   config.players = [&](injector::Direction direction, std::uint32_t link) {
     return std::make_unique<injector::TracePlayer>(trace, direction, link, injector::TracePlayer::By::kTime, kBegin);

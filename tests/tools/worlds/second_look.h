@@ -12,21 +12,21 @@ namespace tendon::simulation {
 struct SecondLookOptions {
   std::filesystem::path scene;
   std::filesystem::path trace;
-  std::vector<std::string> laws;  ///< names; empty: every law that promises passivity
+  std::vector<std::string> laws;  ///< empty: every passive law
   double stiffness = 2000;        ///< N/m, of a wall at x = 0
-  double rate_hz = 100;           ///< of its engine
+  double rate_hz = 100;           ///< rate of the wall's engine
   std::optional<double> length_s;
   bool json = false;
 };
 
-/// `tendon-worlds replay`: what would another law have felt on that same network? The device, the hand and the loop of
-/// a scene, the wall of `tendon_virtual_wall` behind the network of a trace, and one law after the other, all else
-/// equal; summarised as `tendon-report` does it.
+/// `tendon-worlds replay`: simulates other laws on a recorded network. Device, hand and loop come from a scene; the
+/// wall of `tendon_virtual_wall` is behind the network of a trace; everything but the law is equal. The summary is that
+/// of `tendon-report`.
 ///
-/// The first link of the trace is played by time: a datagram meets the fate of the newest one recorded before it, so
-/// the network is bad at the same times, whatever the session sends.
+/// Only the first link of the trace is used, by time: each datagram gets the fate of the newest one recorded before it,
+/// so the network is bad at the same times regardless of what the session sends.
 ///
-/// Throws std::invalid_argument for a law that nobody knows, and what reading the files throws.
+/// Throws std::invalid_argument for an unknown law, and the exceptions of the file readers.
 void second_look(const SecondLookOptions& options, std::ostream& out);
 
 }  // namespace tendon::simulation

@@ -10,16 +10,16 @@
 
 namespace tendon::simulation {
 
-/// What the network decided in a world of this seed.
+/// Records the decisions of the network in this world.
 injector::Trace record_network(const DrawnWorld& world);
 
-/// The same world with the network of a trace: datagram i of each link and direction meets the fate of the trace's.
-/// Everything else is as the seed draws it.
+/// Runs the same world with the network of a trace: datagram i of each link and direction gets the fate recorded for
+/// datagram i.
 Outcome run_with_network(const DrawnWorld& world, const injector::Trace& trace);
 
-/// Reduces the network of a broken world to the few datagrams that matter for the promise that it breaks, writes them
-/// as a sparse trace (a test: EXPECT_FALSE(run_with_network(draw_world(seed), read_trace(file)).breach)) and says what
-/// it came to. False when the world breaks no promise, or not because of what happened to single datagrams.
+/// Reduces the network of a failing world to the few datagrams that matter for its violation and writes them as a
+/// sparse trace. A regression test is then EXPECT_FALSE(run_with_network(draw_world(seed), read_trace(file)).breach).
+/// Returns false if the world violates nothing, or not because of single datagrams.
 bool shrink_world(std::uint64_t seed, const std::filesystem::path& file, std::ostream& out);
 
 }  // namespace tendon::simulation

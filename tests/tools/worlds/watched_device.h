@@ -12,28 +12,28 @@
 
 namespace tendon::simulation {
 
-/// A device with a witness at its port: sees every position that is read and every force that is really held, and keeps
-/// an account of its own of what went through the port, from nothing but these:
+/// Wraps a device and records at its port every position that is read and every force that is held. From these alone,
+/// and without code under test, it computes the port's energy
 ///
-///     E = Σ [ −F·Δx + f_c ‖Δx‖ + b ‖Δx‖²/T ]        and the same for each axis by itself
+///     E = Σ [ −F·Δx + f_c ‖Δx‖ + b ‖Δx‖²/T ]
 ///
-/// An interval whose motion nobody saw (a reading at either end failed, or the device's watchdog ended the force) is
-/// booked at its worst, −T (‖F‖ − f_c)₊²/(4b). It uses none of the code under test. Where motors turn the handle, the
-/// same of torque and turn goes into E, and a gripper with a motor has an account of its own.
+/// in total and per axis. An interval with unknown motion (a reading failed at either end, or the device's watchdog
+/// ended the force) is booked at its worst case, −T (‖F‖ − f_c)₊²/(4b). If motors turn the handle, torque and rotation
+/// enter E in the same way; a gripper with a motor has its own account.
 ///
-/// It can make readings fail, as a bad cable does, and go on holding its force when it is told zero, as an amplifier
-/// that falls slowly or a command that was lost does.
+/// Can inject failed readings (a bad cable) and a force that persists after a zero command (a slow amplifier or a lost
+/// command).
 class WatchedDevice final : public Device {
  public:
   struct Config {
-    Friction friction;     ///< what the limiter was told
-    Duration watchdog{};   ///< … of the device; zero: it has none
+    Friction friction;     ///< the limiter's values
+    Duration watchdog{};   ///< of the device; zero: none
     double unseen = 0;     ///< probability that a reading fails
-    double most_gone = 0;  ///< … and then so many in a row, at most
-    double disobeys = 0;   ///< probability that it keeps its force when it is told zero
+    double most_gone = 0;  ///< maximum number of consecutive failures
+    double disobeys = 0;   ///< probability that the force persists after a zero command
     std::uint64_t seed = 0;
-    std::optional<Friction> rotation{};  ///< N·m and N·m·s/rad, where motors turn the handle
-    std::optional<Friction> grip{};      ///< where the gripper has a motor
+    std::optional<Friction> rotation{};  ///< N·m and N·m·s/rad; only with motors that turn the handle
+    std::optional<Friction> grip{};      ///< only for a gripper with a motor
     double arm = 0;                      ///< m/rad, of the gripper
   };
 
@@ -77,34 +77,35 @@ class WatchedDevice final : public Device {
     return held_;
   }
 
-  /// From now on readings come.
   void heal() noexcept {
     config_.unseen = 0;
     failing_ = 0;
   }
 
-  double energy() const noexcept { return joint_ + turned_; }         ///< J, friction isotropic; with what turned
-  double least_of_axes() const noexcept { return axes_.minCoeff(); }  ///< J, each axis has all the friction
-  double sum_of_axes() const noexcept { return axes_.sum(); }         ///< J
-  double grip_energy() const noexcept { return gripped_; }            ///< J, of the gripper
-  const Effort& told() const noexcept { return told_; }               ///< what the device was told
-  const Effort& held() const noexcept { return held_; }               ///< what it holds
+  double energy() const noexcept { return joint_ + turned_; }  ///< J, isotropic friction; includes rotation
+  double least_of_axes() const noexcept {
+    return axes_.minCoeff();
+  }                                                            ///< J, per-axis accounts, each with the full friction
+  double sum_of_axes() const noexcept { return axes_.sum(); }  ///< J
+  double grip_energy() const noexcept { return gripped_; }
+  const Effort& told() const noexcept { return told_; }  ///< last command
+  const Effort& held() const noexcept { return held_; }  ///< output held by the device
 
  private:
   bool keeps(const Effort& told) { return config_.disobeys > 0 && told == Effort{} && dice_.chance(config_.disobeys); }
 
-  /// What a motor of `effort` takes in while its port moves by `along` it and by `length` in all.
+  /// Dissipated energy, J, of a motion `along` the effort with path length `length` in time `t`.
   static double taken(double effort_along, double length, const Friction& friction, double t) {
     const double rate = t > 0 ? friction.viscous / t : 0;
     return -effort_along + friction.coulomb * length + rate * length * length;
   }
-  /// … at the worst.
+  /// Worst case of `taken` over all motions in time `t`.
   static double worst(double effort, const Friction& friction, double t) {
     const double excess = std::max(effort - friction.coulomb, 0.0);
     return excess > 0 ? -t * excess * excess / (4 * friction.viscous) : 0.0;
   }
 
-  /// The shorter way round from one orientation to the other: its axis times its angle, rad.
+  /// Rotation vector (rad) of the shorter rotation from `from` to `to`.
   static Vec3 turn(const Quat& from, const Quat& to) {
     const Eigen::Quaterniond a(from.w, from.x, from.y, from.z);
     const Eigen::Quaterniond b(to.w, to.x, to.y, to.z);

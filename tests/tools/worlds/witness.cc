@@ -11,12 +11,12 @@ namespace tendon::simulation {
 
 namespace {
 
-constexpr double kRounding = 1e-9;  ///< J, and N where forces are compared
-/// A session's own hold of an echo, measured by a clock that drifts by 200 ppm: 50 ms of it are 10 µs.
+constexpr double kRounding = 1e-9;  ///< tolerance: J for energies, N for forces
+/// Drift of 200 ppm over an echo hold of 50 ms is 10 µs; three times that.
 constexpr Duration kRoundTripError = std::chrono::microseconds(30);
-/// Each reading of a clock is cut to whole nanoseconds.
+/// Two readings of a clock are each truncated to whole nanoseconds.
 constexpr Duration kClockRounding{4};
-/// Every end of a client that is served sends and receives at least once in this time.
+/// A served client sends and receives at least once in this time, at both ends.
 constexpr Duration kServed = std::chrono::milliseconds(400);
 
 constexpr std::array kOracles = {
@@ -59,14 +59,14 @@ Duration longest_validity(const DrawnWorld& world) {
   Duration longest{};
   for (const DrawnClient& client : world.clients) {
     if (client.kind != DrawnClient::Kind::kController) continue;
-    // Left to the client it may be 3 × (100 ms, or its period).
+    // By default a client's validity is 3 × max(100 ms, its period).
     longest = std::max(longest, client.config.valid_for > Duration::zero() ? client.config.valid_for : most);
   }
-  // It travels in whole microseconds, rounded up.
+  // On the wire in whole microseconds, rounded up.
   return std::min(longest + std::chrono::microseconds(1), most);
 }
 
-/// Every datagram that a client has taken out of its link is one of these.
+/// Every datagram that a client reads from its link is in one of these counters.
 std::uint64_t counted(const ForceClient::Stats& stats) {
   const LinkStats& link = stats.link;
   return link.datagrams_received + link.duplicated + link.malformed + link.forged + link.old_key + stats.strangers;
@@ -158,8 +158,8 @@ void Witness::see_bounds(const StepRecord& step) {
   }
 }
 
-/// A hold beyond the bound that an effort was chosen for takes at most `may_take` from below zero; then the account only
-/// rises until it is back.
+/// A hold longer than the bound used for an effort takes at most `may_take` below zero; then the account only rises
+/// until it is back at zero.
 void Witness::see_account(const char* whose, double& last, double now, double may_take) {
   const double before = std::exchange(last, now);
   const double may_leave = std::min(before, 0.0) - may_take;
@@ -206,8 +206,8 @@ void Witness::see_age(const StepRecord& step) {
     if (port_.told() != Effort{}) report(Oracle::kStopped, words(port_.told()) + ", and nobody sees the hand");
     return;
   }
-  // Down to zero through the slew limit, which counts at most the longest hold of each interval: a pause adds no more.
-  // (Other laws than these may have a spring of their own to let go of.)
+  // The force decays through the slew limit, which counts at most the longest hold per interval; a pause adds no more.
+  // (Other laws may also have a spring to release.)
   if (!over && step.mode != Mode::kFault) {
     silent_for_.reset();
   } else if (!silent_for_) {
@@ -242,7 +242,6 @@ void Witness::see(const World::Turn& turn) {
   }
 }
 
-/// After a turn in which it has received something.
 void Witness::see_server() {
   const NetworkLoop::Stats server = world_.server().stats();
   if (std::exchange(forces_, server.forces) != server.forces) last_force_ = world_.now();
@@ -285,7 +284,7 @@ void Witness::see_recovered() {
 void Witness::see_served() {
   std::size_t controllers = 0;
   std::size_t open_controllers = 0;
-  std::string others;  // why they are not served
+  std::string others;  // why other clients are not served
   for (std::size_t i = 0; i < marks_.size(); ++i) {
     if (!world_.alive(i)) continue;
     const DrawnClient& drawn = drawn_.clients[i];
@@ -373,8 +372,8 @@ void Witness::see_end() {
     judge("hand", work, port_.energy());
     if (drawn_.port.grip) judge("fingers", simulated_->gripper()->truth().hand_work, port_.grip_energy());
   }
-  // A flipped bit that the checksum of UDP does not see may be a number far ahead, behind which all true ones are late:
-  // where no cipher authenticates datagrams, only safety is promised then.
+  // A bit flip that passes the UDP checksum can be a packet number far ahead, which makes all genuine ones late.
+  // Without authentication only safety is required then.
   const bool long_enough = recovered_by_ && world_.now() - *recovered_by_ >= kServed;
   if (!long_enough || drawn_.believes_damage()) return;
   see_served();
@@ -382,8 +381,8 @@ void Witness::see_end() {
   see_presses();
 }
 
-/// Each press has a button of its own. Where addresses change, states go to where nobody is until the client is heard
-/// from its new one, and a press may be in one of those.
+/// Each press has its own button. While a client's address changes, states go to the old one and may hold a press; skip
+/// such worlds.
 void Witness::see_presses() {
   const auto* const device = std::get_if<SimulatedDevice::Config>(&drawn_.device);
   const bool roams = drawn_.changes.back().weather.up.rebind > Duration::zero();

@@ -38,8 +38,8 @@ Address address_of(std::uint16_t port) {
   return address;
 }
 
-/// Wakes in a stretch of time: more than any storm of datagrams brings. Who wants to be called again at once is called
-/// a nanosecond later.
+/// Wake-ups per kStretch; more than any burst of datagrams causes. A request to be called again immediately is served a
+/// nanosecond later.
 constexpr int kMostWakes = 20'000;
 constexpr Duration kStretch = std::chrono::milliseconds(1);
 
@@ -52,11 +52,11 @@ Network::Weather World::Config::bad() {
 
 World::World(const Config& config, Device& device)
     : config_(config),
-      now_(std::chrono::seconds(1)),  // no code may take zero for the beginning of time
+      now_(std::chrono::seconds(1)),  // catches code that assumes time begins at zero
       random_(config.seed),
       server_address_(address_of(47100)),
       network_(config.seed, config.weather, server_address_, config.players),
-      // An empty description keeps the sizes of all datagrams, and so the digests of README.md.
+      // An empty description preserves datagram sizes, and thereby the digests in README.md.
       assembly_({{.scene = scene_of(config), .device = device, .handle = HandleDescription{}}},
                 assembly_config(config, now_, random_), {&network_.server()}),
       haptic_due_(now_),
@@ -136,7 +136,7 @@ void World::step_haptic() {
     haptic_due_ += Duration(static_cast<Duration::rep>(uniform() * static_cast<double>(config_.latest_wake.count())));
   }
   if (config_.pause_probability > 0 && uniform() < config_.pause_probability) haptic_due_ = now_ + config_.pause;
-  network_due_ = now_;  // the doorbell
+  network_due_ = now_;
   drain_steps();
 }
 
@@ -172,7 +172,7 @@ void World::turn_client(std::size_t handle) {
   Client& client = clients_[handle];
   const LocalTime reading = client.clock.reading(now_);
   const LocalTime due = client.client ? client.client->turn(reading) : client.guest->turn(reading);
-  // `never` is no reading of any clock.
+  // `never` is not a time and must not be converted.
   client.due = due == LocalTime::max() ? due : client.clock.truth(due, now_ + Duration(1));
   if (watch_turns_) watch_turns_({handle, due <= reading});
 }
@@ -201,7 +201,7 @@ void World::run_for(Duration duration) {
       const bool news = network_.take_news_of(static_cast<std::uint32_t>(i));
       if ((clients_[i].client || clients_[i].guest) && (news || clients_[i].due <= now_)) turn_client(i);
     }
-    // The log loop does not add wake-ups, because a wake-up delivers forged datagrams to the server.
+    // The log loop adds no wake-ups: a wake-up would deliver forged datagrams to the server.
     if (log_due_ <= now_) turn_log();
   }
   now_ = end;

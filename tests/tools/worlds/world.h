@@ -22,19 +22,20 @@
 
 namespace tendon::simulation {
 
-/// Port of the first client of a world; the others follow.
+/// Port of the first client; later clients count up.
 inline constexpr std::uint16_t kFirstClientPort = 50000;
 
-/// A peer that is none of ours: what it does is its own business.
+/// A simulated peer other than our own clients.
 class Guest {
  public:
   virtual ~Guest() = default;
-  /// Does all there is to do at `now`, by its own clock, and returns when it wants to be called again at the latest.
+  /// Does everything due at `now` (its own clock) and returns the latest time of its next call.
   virtual LocalTime turn(LocalTime now) = 0;
 };
 
-/// The whole server and its clients in one thread on a virtual clock: the same Assembly, Session, Recorder and
-/// ForceClient as in production, called in the order of their next wake-up. Nothing sleeps; one seed is one world.
+/// The whole server and its clients in one thread on a virtual clock. Uses the same Assembly, Session, Recorder and
+/// ForceClient as production, called in the order of their next wake-up. Nothing sleeps; runs are deterministic in the
+/// seed.
 ///
 /// The server is A, its clients are Z, Y, X …; the network is bad by default.
 class World {
@@ -42,27 +43,26 @@ class World {
   struct Config {
     std::uint64_t seed = 1;
     HapticLoop::Config loop;
-    /// 20 ± 5 ms, 2 % loss each way, unless a test says otherwise.
+    /// Default: 20 ± 5 ms and 2 % loss each way.
     Network::Weather weather = bad();
-    /// A recorded network instead of the weather.
     Network::Players players{};
-    /// The operating system wakes the haptic thread this late, uniformly distributed.
+    /// Upper bound of the uniformly distributed wake-up latency of the haptic thread.
     Duration latest_wake{};
-    /// … or not at all for `pause`, with this probability per step: a virtual machine.
+    /// Probability per step that the haptic thread is suspended for `pause`, as in a virtual machine.
     double pause_probability = 0;
     Duration pause{};
     std::string scene_text;
     bool record = false;
-    /// Steps are taken out as they are made. Datagrams only go to a recording.
+    /// Steps are read as they are made; datagrams only go to a recording.
     Mailboxes::Capacities mail{.steps = 16, .flight = 2048, .datagrams = 1};
     std::size_t max_observers = 8;
     bool adapt_state_rate = false;
-    std::vector<ClientKey> keys{};  ///< of those who may come in; empty: everybody, by suite 0
-    /// Of the server and of the clients that have a key. Suite 2 takes a processor with AES; a world of suite 1 is the
-    /// same on all.
+    std::vector<ClientKey> keys{};  ///< accepted clients; empty: all, by suite 0
+    /// For the server and the clients that have a key. Suite 2 requires a processor with AES; worlds of suite 1 are
+    /// identical on all processors.
     Suites suites = {Suite::kNoise};
-    Rekey rekey{};                                   ///< of what the server says
-    Duration session_life = Session::Config{}.life;  ///< by the server
+    Rekey rekey{};                                   ///< for the server's datagrams
+    Duration session_life = Session::Config{}.life;  ///< at the server
 
     static Network::Weather bad();
   };
@@ -71,36 +71,33 @@ class World {
   World(const Config& config, Device& device);
   ~World();
 
-  /// A client at an address of its own, which reads a clock of its own. Returns a handle for `client` and `kill`;
-  /// clients count from 0.
+  /// Adds a client with its own address and clock. Returns a handle for `client` and `kill`; clients count from 0.
   std::size_t add_controller(const ForceClient::Config& config, Physics physics,
                              const injector::DriftingClock& clock = {});
   std::size_t add_observer(const ForceClient::Config& config, Watch watch, const injector::DriftingClock& clock = {});
   std::size_t add_guest(const std::function<std::unique_ptr<Guest>(Link& link, const Address& server)>& make);
-  /// In place of a client that has gone: at the same address, with the same clock.
+  /// Starts a new client in place of a stopped one, with the same address and clock.
   void restart_controller(std::size_t handle, const ForceClient::Config& config, Physics physics);
   void restart_observer(std::size_t handle, const ForceClient::Config& config, Watch watch);
   bool alive(std::size_t handle) const { return clients_[handle].client != nullptr; }
   ForceClient& client(std::size_t handle) { return *clients_[handle].client; }
   Address client_address(std::size_t handle) const { return clients_[handle].address; }
   const injector::DriftingClock& clock(std::size_t handle) const { return clients_[handle].clock; }
-  /// SIGKILL: it neither says Bye nor anything else, ever again.
+  /// As SIGKILL: no Bye.
   void kill(std::size_t handle);
-  /// It says Bye, and is gone. Clients only.
+  /// Stops a client with a Bye.
   void stop(std::size_t handle);
 
-  /// Called with every haptic step, in order, at once.
+  /// Called synchronously with every haptic step, in order.
   void watch_steps(std::function<void(const StepRecord&)> watch) { watch_steps_ = std::move(watch); }
 
-  /// A turn of the server, or of a client.
   struct Turn {
-    std::optional<std::size_t> client;  ///< empty: the server's
-    bool wants_more = false;            ///< it wants to be called again at once
+    std::optional<std::size_t> client;  ///< empty: the server
+    bool wants_more = false;            ///< wants to be called again immediately
   };
-  /// Called after every turn.
   void watch_turns(std::function<void(const Turn&)> watch) { watch_turns_ = std::move(watch); }
 
-  /// Throws std::runtime_error when somebody wants to be called again and again without an end.
+  /// Throws std::runtime_error when a peer asks to be called again without end.
   void run_for(Duration duration);
 
   LocalTime now() const { return now_; }
@@ -111,7 +108,6 @@ class World {
   Mailboxes& mail() { return assembly_.devices().front().mail; }
   const Recorder::Config& recorder_config() const { return recorder_config_; }
 
-  /// Ends the recording and returns its bytes. Only with Config::record.
   const std::vector<std::byte>& finish_recording();
 
  private:

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The whole server and its clients over time: engagement, loss of the engine, faults, guests, recordings.
+// Whole server and its clients over time: engagement, loss of the engine, faults, clients, recordings.
 #include "tests/tools/worlds/world.h"
 
 #include <gtest/gtest.h>
@@ -38,7 +38,7 @@ ForceClient::Config at_100_hz() {
   return config;
 }
 
-// A falcon in a hand that presses against a wall at x = 0: in contact from half a second on.
+// A falcon pressed against a wall at x = 0; in contact from 0.5 s on.
 SimulatedDevice::Config pressing_hand() {
   SimulatedDevice::Config device = find_device_profile("falcon")->device();
   device.hand = OperatorHand::Config{
@@ -53,7 +53,7 @@ SimulatedDevice::Config pressing_hand() {
 World::Config world_config(const SimulatedDevice& device, std::uint64_t seed = 7) {
   World::Config config;
   config.seed = seed;
-  config.loop.control.limiter.friction = {0.3, 0.8};  // below the falcon's own
+  config.loop.control.limiter.friction = {0.3, 0.8};  // below the falcon's true friction
   config.loop.control.limiter.longest_hold = milliseconds(2);
   config.loop.control.max_force = device.info().max_force;
   config.loop.control.max_slew = 1000;
@@ -65,7 +65,7 @@ struct Log {
   void attach(World& world) {
     world.watch_steps([this](const StepRecord& step) { steps.push_back(step); });
   }
-  // Largest growth of the force applied from one step to the next, N.
+  // Largest increase of the applied force between steps, N.
   double largest_rise() const {
     double largest = 0;
     for (std::size_t i = 1; i < steps.size(); ++i) {
@@ -94,11 +94,11 @@ TEST(World, AHandFeelsARemoteLateSlowWallAndItStaysStable) {
     EXPECT_GE(step.energy, -1e-9);
     peak = std::max(peak, step.applied.norm());
   }
-  EXPECT_GT(peak, 1);  // it is felt
+  EXPECT_GT(peak, 1);
   const StepRecord& last = log.steps.back();
   EXPECT_EQ(last.mode, Mode::kActive);
-  EXPECT_LT(last.hand.velocity.norm(), 0.005);  // and quiet
-  EXPECT_GE(last.loop_age, milliseconds(30));   // though the force is 30 … 70 ms old
+  EXPECT_LT(last.hand.velocity.norm(), 0.005);
+  EXPECT_GE(last.loop_age, milliseconds(30));  // the force's age is 30 … 70 ms
   EXPECT_LE(last.loop_age, milliseconds(90));
 }
 
@@ -175,7 +175,7 @@ TEST(World, AKilledEnginesForceHoldsFadesStopsAndComesBackRampedIn) {
   Log log;
   log.attach(world);
   world.run_for(milliseconds(100));
-  ASSERT_GT(log.steps.back().applied.norm(), 0.5);  // in contact
+  ASSERT_GT(log.steps.back().applied.norm(), 0.5);
   world.kill(z);
   world.run_for(seconds(1));
   EXPECT_EQ(log.modes(), (std::vector{Mode::kActive, Mode::kHolding, Mode::kDecaying, Mode::kSafeStop}));
@@ -186,7 +186,7 @@ TEST(World, AKilledEnginesForceHoldsFadesStopsAndComesBackRampedIn) {
   world.run_for(seconds(6));
   EXPECT_EQ(log.steps.back().mode, Mode::kActive);
   EXPECT_GT(log.steps.back().applied.norm(), 0.5);
-  // The slew limit: 1000 N/s for at most the longest hold.
+  // Slew limit 1000 N/s times the longest hold (2 ms).
   EXPECT_LE(log.largest_rise(), 1000 * 2e-3 + 1e-9);
   bool ramped = false;
   for (const StepRecord& step : log.steps) ramped = ramped || step.reasons.has(Reason::kRampIn);
@@ -239,12 +239,12 @@ TEST(World, ADeviceFaultZeroesTheForceSavesStepsAndOnlyRearmLeavesIt) {
     }
   }
   EXPECT_GT(steps, 1900U);
-  EXPECT_TRUE(last.reasons.has(Reason::kNotFinite));  // the last thing in it is the fault itself
+  EXPECT_TRUE(last.reasons.has(Reason::kNotFinite));
 
   ASSERT_TRUE(world.client(z).rearm());
   world.run_for(seconds(1));
   EXPECT_EQ(world.haptic().stats().fault, HapticController::Fault::kNone);
-  // Idle in between, unless a fresh force came with the order; ramped in either way.
+  // Idle in between, unless a fresh force arrives with the request; ramped in both cases.
   EXPECT_EQ(log.modes().front(), Mode::kFault);
   EXPECT_EQ(log.modes().back(), Mode::kActive);
   EXPECT_TRUE(std::ranges::any_of(log.steps, [](const StepRecord& step) { return step.reasons.has(Reason::kRampIn); }));
@@ -336,7 +336,7 @@ TEST(World, NotANumberOnTheWireIsCountedAndNeverReachesTheDevice) {
   World world(world_config(device), device);
   const std::size_t z = world.add_controller(at_100_hz(), wall());
   world.run_for(seconds(2));
-  // No client of ours sends such a force: an attacker who has seen the session writes it.
+  // Our clients cannot send such a force; writes it as an attacker who knows the session.
   const std::uint64_t sent = world.client(z).stats().link.datagrams_sent;
   const std::uint64_t invalid = world.server().stats().controller.invalid;
   constexpr double kInf = std::numeric_limits<double>::infinity();
@@ -405,7 +405,7 @@ TEST(World, PausesOfTheMachineAreFlaggedAndTheLedgerRecoversByItself) {
       ++overruns;
       continue;
     }
-    // Between overruns it never falls below zero, and from below zero it only rises.
+    // Between overruns the energy stays nonnegative; from below zero it only rises.
     EXPECT_GE(step.energy, std::min(-1e-9, log.steps[i - 1].energy - 1e-15));
     if (step.energy < 0) {
       EXPECT_LE(step.applied.norm(), config.loop.control.limiter.friction.coulomb * (1 + 1e-9));
@@ -415,7 +415,7 @@ TEST(World, PausesOfTheMachineAreFlaggedAndTheLedgerRecoversByItself) {
   EXPECT_EQ(overruns, world.haptic().stats().overruns);
 }
 
-// 700 kbit/s carry 400 states a second.
+// The link's 700 kbit/s carry 400 states/s.
 NetworkLoop::Stats on_a_narrow_link(bool adapt) {
   SimulatedDevice device(pressing_hand());
   World::Config config = world_config(device);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// tendon-worlds: simulated worlds, one for each seed. Here is its command line; each verb is a function of its own.
+// Command line of tendon-worlds: simulated worlds, one per seed.
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
@@ -123,7 +123,8 @@ struct DayArguments {
 int day(const DayArguments& arguments) {
   DayConfig config = arguments.config;
   config.length = from_seconds(arguments.hours * 3600);
-  config.rekey.datagrams = config.rekey.datagrams * config.loop_hz / DayConfig{}.loop_hz;  // after as long at any rate
+  // Keeps the time between key changes equal for all loop rates.
+  config.rekey.datagrams = config.rekey.datagrams * config.loop_hz / DayConfig{}.loop_hz;
   const DayReport report = run_day(config);
   const std::vector<std::pair<const char*, std::variant<std::uint64_t, double>>> figures = {
       {"seed", config.seed},
