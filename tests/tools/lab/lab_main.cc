@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// tendon-lab: experiments with recorded and simulated runs. Each verb is a file in verbs/.
+// tendon-lab: experiments with recorded and simulated runs. Each verb has a file in verbs/.
 #include <CLI/CLI.hpp>
 
 #include "clients/cpp/usage.h"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// tendon-report: recorded runs side by side. A program of its own, so that deploy/demo need not build the lab.
+// tendon-report: compares recorded runs. A separate program, so that deploy/demo need not build the lab.
 #include <CLI/CLI.hpp>
 #include <iostream>
 #include <string>

@@ -23,7 +23,7 @@ constexpr std::int64_t kDriftPpb = 200'000;
 /// A client counts as served if it receives half of the data sent during this time.
 constexpr Duration kLook = milliseconds(400);
 constexpr std::uint32_t kHzX = 20;
-/// Two readings of a clock are each truncated to whole nanoseconds.
+/// Each clock reading is truncated to whole nanoseconds.
 constexpr Duration kClockRounding{4};
 /// Fraction of its life after which a session may end by age: a fast clock shortens a day by 17 s. kAgeSlack is how
 /// much earlier one end may see the other leave.

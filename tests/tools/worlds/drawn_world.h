@@ -27,7 +27,7 @@ enum class Engine : std::uint8_t {
   kMillion,      ///< 10⁶ N
   kSteps,        ///< force steps
   kNegative,     ///< spring and damper of the wrong sign
-  kPushesAlong,  ///< along the current motion of the hand
+  kPushesAlong,  ///< along the force already applied to the hand
 };
 
 struct DrawnClient {

@@ -82,11 +82,9 @@ class WatchedDevice final : public Device {
     failing_ = 0;
   }
 
-  double energy() const noexcept { return joint_ + turned_; }  ///< J, isotropic friction; includes rotation
-  double least_of_axes() const noexcept {
-    return axes_.minCoeff();
-  }                                                            ///< J, per-axis accounts, each with the full friction
-  double sum_of_axes() const noexcept { return axes_.sum(); }  ///< J
+  double energy() const noexcept { return joint_ + turned_; }         ///< J, isotropic friction; includes rotation
+  double least_of_axes() const noexcept { return axes_.minCoeff(); }  ///< J, each axis with the full friction
+  double sum_of_axes() const noexcept { return axes_.sum(); }         ///< J
   double grip_energy() const noexcept { return gripped_; }
   const Effort& told() const noexcept { return told_; }  ///< last command
   const Effort& held() const noexcept { return held_; }  ///< output held by the device

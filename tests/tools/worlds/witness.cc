@@ -14,7 +14,7 @@ namespace {
 constexpr double kRounding = 1e-9;  ///< tolerance: J for energies, N for forces
 /// Drift of 200 ppm over an echo hold of 50 ms is 10 µs; three times that.
 constexpr Duration kRoundTripError = std::chrono::microseconds(30);
-/// Two readings of a clock are each truncated to whole nanoseconds.
+/// Each clock reading is truncated to whole nanoseconds.
 constexpr Duration kClockRounding{4};
 /// A served client sends and receives at least once in this time, at both ends.
 constexpr Duration kServed = std::chrono::milliseconds(400);

@@ -148,7 +148,7 @@ std::vector<GoldenDifference> differences(const GoldenTable& was, const GoldenTa
   for (const GoldenTable::Row& row : is.rows) {
     for (const std::string& figure : is.columns) look(row, figure);
   }
-  for (const GoldenTable::Row& row : was.rows) {  // what is gone: a row, or a column
+  for (const GoldenTable::Row& row : was.rows) {  // removed rows and columns
     const bool row_is_gone = !now.contains({row.law, row.situation});
     for (const std::string& figure : was.columns) {
       if (row_is_gone || std::ranges::find(is.columns, figure) == is.columns.end()) look(row, figure);
@@ -184,7 +184,7 @@ std::string to_text(const std::vector<GoldenDifference>& differences) {
 
 namespace {
 
-/// Writes `table` to a file that has such a table or none, whose first line begins with `beginning`.
+/// Replaces `file`, which must not exist or begin with `beginning`.
 template <class Table>
 void replace(const std::filesystem::path& file, std::string_view beginning, const Table& table, std::ostream& out) {
   expect_replaceable(file, {beginning});

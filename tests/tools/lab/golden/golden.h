@@ -8,10 +8,10 @@
 
 namespace tendon::lab {
 
-/// Golden numbers: what every law does, as a table that is committed. A change of a law shows as a diff of it.
+/// Golden table: results of every law as a committed file, so that a change of a law is visible as a diff.
 ///
-/// Columns are figures in SI units, named in the header. A row is a law in a situation, its key is those two cells.
-/// Numbers are as short as they can be read back exactly, so that equal text means equal bits.
+/// Columns are quantities in SI units, named in the header. Law and situation are the key of a row. Numbers have the
+/// shortest form that parses to the same value, so equal text means equal bits.
 struct GoldenTable {
   struct Row {
     std::string law;
@@ -22,34 +22,34 @@ struct GoldenTable {
   std::vector<Row> rows;
 };
 
-/// Every law in twelve situations, which are each 209th of comparison_grid() and in which every value of every axis
-/// occurs; and the experiments of the paper, on the prescribed motion and with the free hand. Takes some seconds.
+/// Runs every law in twelve situations (every 209th of comparison_grid(), which covers every value of every axis) and
+/// in the paper's experiments, on the prescribed motion and with the free hand. Takes some seconds.
 ///
-/// The same bytes on every x86-64 processor, with every C library: nothing on the way to it calls libm for more than
-/// what IEEE 754 rounds correctly (core/base/portable_math.h).
+/// The result is bit-identical on all x86-64 processors and C libraries, because only correctly rounded IEEE 754
+/// operations of libm are used (core/base/portable_math.h).
 GoldenTable golden_laws();
 
-/// CSV: `law,situation,` and the columns. No cell has a comma or a quote.
+/// Writes CSV: `law,situation,` and the columns. No cell contains a comma or quote.
 void write(std::ostream& out, const GoldenTable& table);
 
-/// Throws std::runtime_error when the file cannot be read or is not such a table.
+/// Throws std::runtime_error if the file cannot be read or is not a golden table.
 GoldenTable read_golden(const std::filesystem::path& file);
 
-/// What differs between two tables, bit for bit.
+/// A bitwise difference of two tables.
 struct GoldenDifference {
   std::string law;
   std::string situation;
   std::string figure;
-  std::string was;  ///< empty: it was not there
-  std::string is;   ///< empty: it is gone
+  std::string was;  ///< empty: added
+  std::string is;   ///< empty: removed
 };
 std::vector<GoldenDifference> differences(const GoldenTable& was, const GoldenTable& is);
 
 /// One line each under a heading: law, situation, figure, was, is.
 std::string to_text(const std::vector<GoldenDifference>& differences);
 
-/// `tendon-lab golden`: compares what is with FOLDER/laws.csv, or writes that anew. With `cost`: with FOLDER/cost.csv
-/// (law_cost.h), which it counts with `law_cost`, the program.
+/// `tendon-lab golden`: compares the current results with FOLDER/laws.csv or rewrites it. With `cost`: FOLDER/cost.csv
+/// (law_cost.h), counted with the program `law_cost`.
 struct GoldenOptions {
   std::filesystem::path folder = "tests/golden";
   bool write = false;
@@ -57,8 +57,8 @@ struct GoldenOptions {
   std::filesystem::path law_cost{};
 };
 
-/// Returns whether nothing differs. Throws std::runtime_error when the file cannot be read or written, or when another
-/// compiler counted the costs in it.
+/// Returns true if nothing differs. Throws std::runtime_error if the file cannot be read or written, or its costs were
+/// counted with another compiler.
 bool golden(const GoldenOptions& options, std::ostream& out);
 
 }  // namespace tendon::lab

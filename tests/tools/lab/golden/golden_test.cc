@@ -61,7 +61,7 @@ TEST(Golden, ADifferenceNamesLawSituationFigureAndBothValues) {
 
 // ---- The same bytes on every x86-64 processor -----------------------------------------------------------------------
 
-/// glibc chooses its variants of sin, exp … by the processor. This makes it choose those of one without FMA.
+/// Makes glibc select the variants of sin, exp … for processors without FMA.
 constexpr const char* kWithoutFma = "GLIBC_TUNABLES=glibc.cpu.hwcaps=-AVX2,-FMA,-FMA4 ";
 
 std::uint64_t bits_of_libm() {
@@ -87,7 +87,7 @@ Ran shell(const std::string& command) {
   return result;
 }
 
-/// Not a claim: the child of the next test.
+/// Helper process of the next test.
 TEST(GoldenChild, DISABLED_SaysTheBitsOfLibm) { std::cout << "bits of libm: " << bits_of_libm() << "\n"; }
 
 TEST(Golden, NoFigureDependsOnTheProcessorsFusedMultiplyAdd) {

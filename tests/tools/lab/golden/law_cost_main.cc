@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// law-cost: the program in which `tendon-lab golden --cost` counts the instructions of every law's step. It prints a
-// line for each law: its name. Callgrind counts within `step_law`, and writes a file each time that returns.
+// law-cost: runs the steps of every law for `tendon-lab golden --cost` and prints each law's name. Callgrind counts
+// inside `step_law` and writes a file at each return from it.
 #include <cstddef>
 #include <iostream>
 #include <string_view>
@@ -13,7 +13,7 @@
 
 using namespace tendon;
 
-/// A name that callgrind finds: not inlined, not mangled.
+/// Not inlined or mangled, so that callgrind finds the name.
 extern "C" [[gnu::noinline]] void step_law(lab::LawSteps& law, int periods) {
   for (int period = 0; period < periods; ++period) {
     for (std::size_t i = 0; i < lab::LawSteps::kPeriod; ++i) law.step(i);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The friction experiment on a Falcon: its driver, its packets, its kinematics and counts, over a model whose friction
-// is known.
+// Friction experiment on a Falcon with its driver, packets, kinematics and encoder counts, on a model with known
+// friction.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -22,7 +22,7 @@ using namespace std::chrono_literals;
 
 constexpr double kMass = 0.1;  // kg
 
-/// A Falcon whose grip is a mass on a rail along x, pushed by its own motors and held back by friction that is known.
+/// A Falcon whose grip is a mass on a rail along x, with its own motors and known friction.
 class FalconOnARail final : public Device {
  public:
   FalconOnARail(const Friction& friction, double begin)
@@ -52,7 +52,7 @@ class FalconOnARail final : public Device {
     const double force = falcon_.force().x();
     const double dt = seconds(kStep);
     for (; now_ < then; now_ += kStep) {
-      // Coulomb's friction takes away at most the speed there is.
+      // Coulomb friction cannot reverse the motion.
       const double pushed = speed_ + dt / kMass * (force - friction_.viscous * speed_);
       const double lost = dt / kMass * friction_.coulomb;
       speed_ = std::copysign(std::max(std::abs(pushed) - lost, 0.0), pushed);
@@ -69,7 +69,7 @@ class FalconOnARail final : public Device {
   FalconDevice device_{{}, std::make_unique<MemoryPipe>(falcon_, now_)};
 };
 
-/// Slow ramps: a reply tells of one period ago, which looks like a Coulomb friction of rate · period more.
+/// Uses slow ramps: a reply is one period old, which adds rate · period to the apparent Coulomb friction.
 Identification identified(const Friction& friction) {
   std::vector<RampRun> runs;
   for (const double rate : {0.1, 0.25, -0.1, -0.25}) {
@@ -89,7 +89,7 @@ TEST(FalconIdentification, FindsTheModelsFrictionWithinTheBoundsItStates) {
   EXPECT_LE(std::abs(place.integral.viscous - truth.viscous), 3 * place.integral_error.viscous);
   EXPECT_LE(found.lower_bound.coulomb, truth.coulomb);
   EXPECT_LE(found.lower_bound.viscous, truth.viscous);
-  // And they are no excuse.
+  // The bounds must not be too low either.
   EXPECT_GE(found.lower_bound.coulomb, 0.95 * truth.coulomb);
   EXPECT_GE(found.lower_bound.viscous, 0.9 * truth.viscous);
   std::cout << "f_c " << place.integral.coulomb << " ± " << place.integral_error.coulomb << " N, b "

@@ -10,29 +10,29 @@
 
 namespace tendon::lab {
 
-/// What of a handle an experiment moves.
+/// The degree of freedom that an experiment moves.
 enum class Freedom : std::uint8_t {
-  kMovement,  ///< one axis of its position: m, N
-  kRotation,  ///< a turn about one axis: rad, N·m
-  kGripper,   ///< its fingers: m of travel, N at the fingers
+  kMovement,  ///< one axis of the position; m, N
+  kRotation,  ///< rotation about one axis; rad, N·m
+  kGripper,   ///< fingers; m of travel, N at the fingers
 };
 
-/// The words for it: the fit is the same with other units.
+/// Names and units of a degree of freedom. The fit is the same for all.
 struct FreedomInfo {
   Freedom freedom;
-  std::string_view name;      ///< of `tendon-identify --of`
+  std::string_view name;      ///< value of `tendon-identify --of`
   std::string_view position;  ///< column of a CSV file
   std::string_view effort;    ///< column of a CSV file
   std::string_view position_unit;
   std::string_view effort_unit;
   std::string_view viscous_unit;
   std::string_view inertia_unit;
-  std::string_view table;        ///< of a scene, where the bounds go
-  std::string_view coulomb_key;  ///< there
+  std::string_view table;        ///< table of the scene for the bounds
+  std::string_view coulomb_key;  ///< key in that table
   std::string_view viscous_key;
-  double share;                          ///< a bound is so much of what was found
+  double share;                          ///< ratio of the published bound to the estimate
   HandleBounds bounds;                   ///< the limits of real handles
-  std::string_view wrong_position_unit;  ///< a common wrong unit for positions
+  std::string_view wrong_position_unit;  ///< common wrong unit of positions, for error messages
   std::string_view wrong_inertia_unit;
   std::string_view wrong_step_unit;
 };

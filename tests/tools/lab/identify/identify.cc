@@ -32,10 +32,10 @@ constexpr double kSimulatedInertia = 1e-4;  // kg·m²
 
 double usual_step(Freedom freedom) { return freedom == Freedom::kRotation ? kAngularStep : kEncoderStep; }
 
-/// Where runs come from, and by what their fits are made.
+/// Source of the runs and parameters of their fits.
 struct Source {
   FreedomInfo freedom = info(Freedom::kMovement);
-  std::vector<std::string> names{};  ///< of the runs, for people
+  std::vector<std::string> names{};  ///< names of the runs in messages
   std::vector<std::string> places{};
   IdentificationConfig config{};
   std::function<RampRun(std::size_t)> run{};
@@ -89,7 +89,7 @@ SimulatedDevice::Config device_of(const IdentifyOptions& options) {
                                   did_you_mean(*options.profile, known));
     }
     SimulatedDevice::Config device = profile->device();
-    device.amplifier_bandwidth.reset();  // the experiment takes seconds: a lag of a millisecond is none
+    device.amplifier_bandwidth.reset();  // a lag of a millisecond does not matter over seconds
     return device;
   }
   const Friction& friction = *options.simulated_friction;
@@ -122,8 +122,7 @@ SimulatedDevice::Config device_of(const IdentifyOptions& options) {
   return device;
 }
 
-/// What is asked of a device whose friction is of the size of a stylus's: torques are a fiftieth of forces, and turns
-/// eight times the travel.
+/// Scales torques to 1/50 of the forces and angles to 8 times the travel, which suits a stylus.
 RampExperiment experiment_of(const IdentifyOptions& options) {
   RampExperiment experiment{.device = device_of(options), .freedom = options.freedom, .seed = options.seed};
   if (options.freedom == Freedom::kRotation) {
@@ -145,7 +144,7 @@ Source simulated(const IdentifyOptions& options) {
   const double step = moves ? experiment.device.encoder_step.value_or(0) : usual_step(options.freedom);
   source.config = {.mass = options.mass.value_or(turns ? kSimulatedInertia : experiment.device.mass),
                    .encoder_step = options.encoder_step.value_or(step)};
-  // The noise of a run goes on where that of the one before has ended: whoever needs one simulates all.
+  // The noise sequence continues from run to run, so any run requires all of them.
   source.run = [experiment, all = std::vector<RampRun>()](std::size_t i) mutable {
     if (all.empty()) all = simulated_ramps(experiment);
     return all.at(i);
@@ -180,7 +179,7 @@ std::string impossible(const FreedomInfo& freedom, const RampRun& run) {
          std::string(freedom.wrong_position_unit) + "?";
 }
 
-/// Throws std::runtime_error, naming the run, when it cannot be used.
+/// Throws std::runtime_error naming a run that cannot be used.
 RunEstimate fit_of(const Source& source, std::size_t i) {
   RampRun run = source.run(i);
   if (!source.places.empty()) run.place = source.places.at(i);
@@ -236,7 +235,7 @@ std::string formatted(const char* format, Values... values) {
   return text.data();
 }
 
-/// Shortest text that is not above `value`: four digits, rounded down. A bound is not rounded up.
+/// Formats with four digits, rounded down so that a lower bound remains one.
 std::string rounded_down(double value) {
   if (!(value > 0)) return "0.0";
   const double unit = std::pow(10, std::floor(std::log10(value)) - 3);
@@ -293,7 +292,7 @@ void write_table(const Source& source, const Identification& result, std::ostrea
 
 // ---- JSON -------------------------------------------------------------------------------------------------------
 
-/// `viscous_…` and `coulomb_…`, with a prefix to the keys.
+/// Adds `viscous_…` and `coulomb_…` with a key prefix.
 void add(JsonLine& line, const std::string& prefix, const Friction& friction, bool turns) {
   line.add(prefix + (turns ? "viscous_nm_s_per_rad" : "viscous_n_s_per_m"), friction.viscous)
       .add(prefix + (turns ? "coulomb_nm" : "coulomb_n"), friction.coulomb);
@@ -344,7 +343,7 @@ JsonLine line_of(const std::string& name, const RunEstimate& run, bool turns) {
   return line;
 }
 
-/// As much as identify_friction needs: not how the errors of b and f_c hang together.
+/// Reads the fields that identify_friction needs; excludes the covariance of b and f_c.
 RunEstimate estimate_of(const nlohmann::json& line, bool turns) {
   const std::string effort = turns ? "_nm" : "_n";
   const auto friction = [&](const std::string& prefix) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// tendon-identify: the friction of a device from runs in which its force rises until it moves. Its command line.
+// Command line of tendon-identify: friction of a device from force ramps.
 #include <CLI/CLI.hpp>
 #include <iostream>
 #include <map>

@@ -20,12 +20,12 @@ namespace {
 
 class Identify : public ::testing::Test {
  protected:
-  /// The numbers of each column are multiplied by these factors.
+  /// Factors that the columns are multiplied by.
   struct Mistake {
     double time = 1, position = 1, force = 1;
   };
 
-  /// Runs of a device with b = 0.005 N·s/m and f_c = 0.05 N, as files.
+  /// Writes runs of a device with b = 0.005 N·s/m and f_c = 0.05 N to files.
   std::vector<std::filesystem::path> recorded_runs() { return recorded_runs(Mistake()); }
   std::vector<std::filesystem::path> recorded_runs(const Mistake& by) {
     RampExperiment experiment;
@@ -123,7 +123,7 @@ TEST_F(Identify, SimulatesEveryProfile) {
   }
 }
 
-/// Of rotations and grippers of any friction; the seeds are of frictions and of noise.
+/// Random frictions and noise, rotations and grippers alternately.
 TEST_F(Identify, TheBoundsOfARotationAndAGripperAreBelowTheTruthAndNearIt) {
   for (std::uint64_t seed = 1; seed <= 12; ++seed) {
     Dice dice(seed);
@@ -179,7 +179,7 @@ TEST_F(Identify, NamesTheFileAndTheLineThatIsBad) {
   EXPECT_EQ(error_of({.files = files}), files[3].string() + ":3: expected a finite number as x_m, found 'oops'");
 }
 
-// With times in ms, the tool trusted a friction that was 1000 times too high.
+// Regression: with times in ms, a friction 1000 times too large was trusted.
 TEST_F(Identify, RefusesWhatNoHandleHasAndNamesTheUnitThatWasMeant) {
   const auto ms = recorded_runs({.time = 1000});
   EXPECT_EQ(error_of({.files = ms}),

@@ -10,15 +10,15 @@
 
 namespace tendon::lab {
 
-/// Reads one run of the friction experiment with TableReader. The header names the column `t_s` and the two columns of
-/// `freedom` (`x_m` and `force_n`, or `angle_rad` and `torque_nm`). Their order is free, other columns are ignored, and
-/// other units are converted.
+/// Reads one run of the friction experiment with TableReader. The header names the columns `t_s` and the two of
+/// `freedom` (`x_m` and `force_n`, or `angle_rad` and `torque_nm`) in any order. Other columns are ignored, other units
+/// are converted.
 ///
-/// It throws std::runtime_error with file and line if TableReader refuses the file, if a column is missing, if the time
-/// does not increase, or if there are more than 4 million rows.
+/// Throws std::runtime_error with file and line if TableReader rejects the file, a column is missing, time does not
+/// increase, or there are more than 4 million rows.
 RampRun read_ramp_csv(std::istream& in, const std::string& name, Freedom freedom = Freedom::kMovement);
 
-/// The same from a file; throws std::runtime_error when it cannot be opened.
+/// Reads the run from a file. Also throws std::runtime_error if it cannot be opened.
 RampRun load_ramp_csv(const std::filesystem::path& file, Freedom freedom = Freedom::kMovement);
 
 }  // namespace tendon::lab

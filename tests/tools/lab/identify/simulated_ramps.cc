@@ -13,7 +13,7 @@
 namespace tendon::lab {
 namespace {
 
-/// Normal numbers by Box and Muller: the same with every standard library.
+/// Normal distribution by Box and Muller; unlike std::normal_distribution the same in every standard library.
 class Noise {
  public:
   explicit Noise(std::uint64_t seed) : random_(seed) {}
@@ -27,7 +27,7 @@ class Noise {
   std::mt19937_64 random_;
 };
 
-/// A device as one axis of it: what a run reads, and what it commands.
+/// One axis of a device: reads its position and commands its effort.
 class Axis {
  public:
   Axis(Device& device, Freedom freedom) : device_(device), freedom_(freedom) {}

@@ -12,41 +12,39 @@
 
 namespace tendon::lab {
 
-/// One run of the friction experiment on a device that nobody touches: from rest, a force along x that rises from zero;
-/// or a torque about x, or a force on the fingers, with their units.
+/// One run of the friction experiment without a hand: from rest, the force along x rises from zero at a constant rate.
+/// For rotations and grippers a torque about x or a grip force, in their units.
 struct RampPlan {
   Freedom freedom = Freedom::kMovement;
-  double rate = 0.1;     ///< N/s, not 0; below 0: towards −x
-  double travel = 0.25;  ///< m, after which it ends
+  double rate = 0.1;     ///< N/s, nonzero; negative: towards −x
+  double travel = 0.25;  ///< m, at which the run ends
   Duration period = std::chrono::milliseconds(1);
   Duration longest = std::chrono::seconds(20);
-  /// N, what the motors do besides, each period; empty: nothing.
+  /// Returns an additional motor force (N) for each period; empty: none.
   std::function<double()> disturbance{};
 };
 
-/// Runs it, from `begin` on, and records what a program beside the device would: positions as they are read, and the
-/// force that the device says it has written, but for the disturbance. While a reading does not come the force stays as
-/// it is. Ends with zero force.
+/// Runs the plan from `begin` on and records what a client could know: the positions read, and the force that the
+/// device reports without the disturbance. The force stays constant while readings fail. Ends with zero force.
 RampRun run_ramp(Device& device, LocalTime begin, const RampPlan& plan);
 
-/// The friction experiment of the paper (Tables II, III) on a simulated device: from rest, a force that rises from zero
-/// at a constant rate, until the handle has travelled through its workspace.
+/// The friction experiment of Lee & Lee 2009 (Tables II, III) on a simulated device: from rest, the force rises at a
+/// constant rate until the handle has crossed its workspace.
 struct RampExperiment {
   SimulatedDevice::Config device{};              ///< without a hand
   Freedom freedom = Freedom::kMovement;          ///< the units below are those of a movement
-  std::vector<double> rates = {0.05, 0.1, 0.5};  ///< N/s, each > 0; every one is run in both directions
-  int repeats = 5;                               ///< of each rate and direction
+  std::vector<double> rates = {0.05, 0.1, 0.5};  ///< N/s, each > 0; run in both directions
+  int repeats = 5;                               ///< per rate and direction
   double travel = 0.25;                          ///< m
-  double force_noise = 0.005;                    ///< N, standard deviation, of the motors: unknown to whoever evaluates
-  double bias = 0;                               ///< N, constant force along +x that nobody knows of: gravity, say
+  double force_noise = 0.005;                    ///< N, standard deviation of the motor force; not recorded
+  double bias = 0;                               ///< N, constant force along +x, such as gravity; not recorded
   Duration period = std::chrono::milliseconds(1);
   Duration longest = std::chrono::seconds(20);  ///< of one run
   std::uint64_t seed = 1;
 };
 
-/// The runs, along x, recorded as a program beside the device would: encoder positions and the force it commanded.
-/// Repeatable from the seed. Throws std::invalid_argument for what SimulatedDevice refuses, and for a rate or travel
-/// that is not positive.
+/// Returns the runs along x with encoder positions and commanded forces. Deterministic in the seed. Throws
+/// std::invalid_argument if SimulatedDevice rejects its configuration or a rate or the travel is not positive.
 std::vector<RampRun> simulated_ramps(const RampExperiment& experiment);
 
 }  // namespace tendon::lab

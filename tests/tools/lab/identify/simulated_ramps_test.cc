@@ -8,7 +8,7 @@
 #include "core/identification/friction_identification.h"
 #include "tests/support/refusal.h"
 
-/// The identification against a device with an encoder of 30 µm and 5 mN of force noise.
+/// Identification with an encoder of 30 µm and 5 mN of force noise.
 
 namespace tendon::lab::simulated_ramps_test {
 namespace {
@@ -87,8 +87,8 @@ TEST(IntegralFit, StatesItsErrorAsItIs) {
     experiment.repeats = 40;
     const Identification result = identify_friction(simulated_ramps(experiment), kConfig);
     const auto n = static_cast<double>(result.runs.size());
-    Friction found{};   // mean squares of the errors made
-    Friction stated{};  // and of those stated
+    Friction found{};   // mean square errors
+    Friction stated{};  // mean square stated errors
     for (const RunEstimate& run : result.runs) {
       found.viscous += std::pow(run.integral.friction.viscous - viscous, 2) / n;
       found.coulomb += std::pow(run.integral.friction.coulomb - 0.05, 2) / n;

@@ -17,7 +17,7 @@
 namespace tendon::lab {
 namespace {
 
-/// While it lives, writing to a process that has ended is an error and not our end.
+/// Ignores SIGPIPE during its lifetime, so that writing to a closed pipe returns an error.
 class IgnoreBrokenPipe {
  public:
   IgnoreBrokenPipe() {
@@ -36,7 +36,7 @@ class IgnoreBrokenPipe {
 constexpr std::string_view kPngBegins = "\x89PNG";
 constexpr std::string_view kSvgBegins = "<?xml";
 
-/// Both formats have a last word.
+/// Checks the end marker of an SVG or PNG file.
 bool is_whole(const std::filesystem::path& path) {
   constexpr std::streamoff kTail = 32;
   std::ifstream picture(path, std::ios::binary | std::ios::ate);
@@ -65,7 +65,7 @@ std::string begin_picture(const std::filesystem::path& path, int width, int heig
   return "set encoding utf8\nset terminal " +
          (path.extension() == ".svg" ? "svg size " + size + " font 'sans-serif,15' background '#ffffff'"
                                      : "pngcairo size " + size + " font 'sans,11.5'") +
-         // Absolute, so that no name begins with the | after which gnuplot takes a command.
+         // An absolute path cannot begin with |, which would make gnuplot run a command.
          "\nset output " + literal(std::filesystem::absolute(path).string()) + "\n";
 }
 
@@ -79,16 +79,15 @@ void check_picture_name(const std::filesystem::path& path) {
 
 void run_gnuplot(const std::string& script, const std::filesystem::path& path) {
   const IgnoreBrokenPipe ignore;
-  // -d: whatever the user has in ~/.gnuplot, the picture is the same. A script that is a file ends at its first error;
-  // one that is typed in goes on.
+  // -d ignores ~/.gnuplot. Reading a file instead of standard input makes gnuplot stop at the first error.
   std::FILE* const gnuplot =
       ::popen("command -v gnuplot >/dev/null || exit 127; exec gnuplot -d /dev/stdin >/dev/null", "w");
   if (gnuplot == nullptr) throw std::system_error(errno, std::generic_category(), "cannot start gnuplot");
-  // A gnuplot that ends early shows in its status.
+  // If gnuplot exits early, its status shows it.
   std::fwrite(script.data(), 1, script.size(), gnuplot);
   const int status = ::pclose(gnuplot);
   if (WIFEXITED(status) && WEXITSTATUS(status) == 0) {
-    // gnuplot does not say when the disk is full.
+    // gnuplot does not report a full disk.
     if (is_whole(path)) return;
     std::error_code ignored;
     if (std::filesystem::is_regular_file(path, ignored)) std::filesystem::remove(path, ignored);

@@ -12,11 +12,11 @@ namespace tendon::lab {
 namespace {
 
 constexpr int kWidth = 1600;
-constexpr int kRow = 470;          ///< pixels for a row of panels
-constexpr int kAbovePanels = 110;  ///< … and for what is above all of them
+constexpr int kRow = 470;          ///< pixels per row of panels
+constexpr int kAbovePanels = 110;  ///< pixels above the first row
 constexpr std::size_t kMostPoints = 1200;
-constexpr std::size_t kNamesInRow = 4;  ///< of the key; two rows of it have room, each further one takes …
-constexpr int kKeyRow = 18;             ///< … pixels
+constexpr std::size_t kNamesInRow = 4;  ///< of the legend; two rows fit, each further row needs kKeyRow pixels
+constexpr int kKeyRow = 18;             ///< pixels
 
 const char* words(Curve::Style style) {
   switch (style) {
@@ -38,7 +38,7 @@ const char* words(Curve::Style style) {
   return "using 1:2 with lines lw 1.6 lc rgb ";
 }
 
-/// Pixels, beyond what every panel has, for the longest key among them.
+/// Additional height in pixels for the longest legend.
 int room_for_keys(const std::vector<Panel>& panels) {
   std::size_t rows = 2;
   for (const Panel& panel : panels) {
@@ -59,7 +59,8 @@ void range(std::ostream& out, char axis, const std::optional<std::pair<double, d
   out << "]\n";
 }
 
-/// Along a logarithmic axis gnuplot names powers of ten, of which a short one may have none: some between them then.
+/// gnuplot labels only powers of ten on a logarithmic axis. A short axis may contain none, so labels in between are
+/// added.
 void ticks(std::ostream& out, const Panel& panel) {
   constexpr double kShort = 30;
   if (!panel.log_x || !panel.x_range || panel.x_range->second > kShort * panel.x_range->first) {
@@ -77,10 +78,10 @@ void ticks(std::ostream& out, const Panel& panel) {
   out << ")\n";
 }
 
-/// Of a curve with labels: those at the right end of their panel, which go below their points and to the left, and the
+/// Returns the labeled points of the curve at the right end of the panel, whose labels go below and to the left, or all
 /// others.
 std::vector<std::size_t> labels_at(const Panel& panel, const Curve& curve, bool right_end) {
-  constexpr double kRightEnd = 0.7;  // of the panel's width: a name takes up to 0.3
+  constexpr double kRightEnd = 0.7;  // share of the panel's width; a label needs up to 0.3
   const auto along = [&](double x) { return panel.log_x ? std::log(x) : x; };
   std::vector<std::size_t> found;
   for (std::size_t i = 0; i < curve.labels.size(); ++i) {

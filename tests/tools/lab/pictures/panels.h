@@ -9,7 +9,7 @@
 
 namespace tendon::lab {
 
-/// Values over values, to be drawn.
+/// A curve of a panel.
 struct Curve {
   enum class Style {
     kLine,
@@ -17,14 +17,14 @@ struct Curve {
     kArea,  ///< between −y and y
     kPoints,
     kRings,
-    kBold,   ///< a line that matters more than the others
+    kBold,   ///< emphasized line
     kBelow,  ///< between the x axis and y
   };
   std::string name;
-  const char* colour;  ///< one of gnuplot.h
+  const char* colour;  ///< a color of gnuplot.h
   std::vector<std::pair<double, double>> points = {};
   Style style = Style::kLine;
-  std::vector<std::string> labels = {};  ///< one beside each point, or none
+  std::vector<std::string> labels = {};  ///< empty, or one per point
 };
 
 struct Panel {
@@ -37,14 +37,14 @@ struct Panel {
   bool log_y = false;
 };
 
-/// Of points in the order of x, as many as a panel can show: the least and the most of every stretch.
+/// Reduces points sorted by x to the resolution of a panel: minimum and maximum of each interval.
 std::vector<std::pair<double, double>> thinned(const std::vector<std::pair<double, double>>& points);
 
-/// What gnuplot is told to draw `panels`, two in a row, under a heading and a line of figures.
+/// Returns the gnuplot script that draws `panels`, two per row, under a heading and a line of figures.
 std::string panels_script(const std::filesystem::path& path, const std::string& heading, const std::string& figures,
                           const std::vector<Panel>& panels);
 
-/// Draws it as `stem`.svg and `stem`.png and returns their names. Throws what `run_gnuplot` throws.
+/// Writes `stem`.svg and `stem`.png and returns their names. Throws the exceptions of `run_gnuplot`.
 std::vector<std::filesystem::path> draw_panels(const std::filesystem::path& stem, const std::string& heading,
                                                const std::string& figures, const std::vector<Panel>& panels);
 

@@ -15,13 +15,13 @@
 namespace tendon::lab {
 namespace {
 
-// Across, places are pixels from the left. Another run makes the picture wider, not its text narrower.
+// Horizontal positions are pixels from the left: more runs make the picture wider.
 constexpr double kColumn = 800;
-constexpr double kLeft = 68;   ///< room for the numbers of an axis
-constexpr double kRight = 16;  ///< … and for half of the last number below
+constexpr double kLeft = 68;   ///< for the axis labels
+constexpr double kRight = 16;  ///< for half of the last label of the x axis
 constexpr int kHeight = 1000;
 
-// Up, they are shares of the height from below.
+// Vertical positions are fractions of the height from the bottom.
 constexpr double kHeading = 0.965;
 constexpr double kFigures = 0.927;
 constexpr double kMoreFigures = 0.902;
@@ -29,9 +29,10 @@ constexpr double kPanelHeight = 0.225;
 constexpr std::array kPanelTops = {0.840, 0.565, 0.290};
 constexpr double kAbovePanel = 0.018;
 
-/// Energies of two runs that differ by more than this are drawn to scales of their own: one would be a flat line.
+/// If the energy ranges of runs differ by more than this factor, each run has its own scale; otherwise one would be a
+/// flat line.
 constexpr double kTooDifferent = 20;
-/// The force wanted may be any number; the force applied has to stay visible.
+/// The wanted force is unbounded; limits it to this multiple so that the applied force remains visible.
 constexpr double kMostWanted = 3;
 
 double picture_width(std::size_t drawings) { return kColumn * static_cast<double>(std::max<std::size_t>(drawings, 2)); }
@@ -44,7 +45,6 @@ struct Scale {
   Scale widened(double share) const { return {least - share * size(), most + share * size()}; }
 };
 
-/// Of all columns of the drawings, the extremes of one thing.
 Extremes extremes(std::span<const Drawing> drawings, Extremes Trace::Column::*what) {
   Extremes all;
   for (const Drawing& drawing : drawings)
@@ -55,7 +55,7 @@ Extremes extremes(std::span<const Drawing> drawings, Extremes Trace::Column::*wh
 Scale position_scale(std::span<const Drawing> drawings) {
   Extremes all = extremes(drawings, &Trace::Column::position);
   if (all.empty()) all.observe(0);
-  constexpr double kLeast = 1e-3;  // m: below it, noise would look like motion
+  constexpr double kLeast = 1e-3;  // m: smaller ranges would show noise as motion
   const double missing = std::max(kLeast - (all.most - all.least), 0.0);
   return Scale{(all.least - missing / 2) * 1e3, (all.most + missing / 2) * 1e3}.widened(0.08);
 }
@@ -80,11 +80,10 @@ Scale energy_scale(std::span<const Drawing> drawings) {
   all.observe(0);
   if (all.most - all.least < 1e-9) all.observe(1e-9);
   Scale scale = Scale{all.least, all.most}.widened(0.08);
-  scale.least = std::min(scale.least, -0.15 * scale.size());  // what lies below zero is always in sight
+  scale.least = std::min(scale.least, -0.15 * scale.size());  // values below zero are always visible
   return scale;
 }
 
-/// One for each drawing.
 std::vector<Scale> energy_scales(std::span<const Drawing> drawings) {
   std::vector<Scale> own;
   for (std::size_t i = 0; i < drawings.size(); ++i) own.push_back(energy_scale(drawings.subspan(i, 1)));
@@ -93,7 +92,7 @@ std::vector<Scale> energy_scales(std::span<const Drawing> drawings) {
   return own;
 }
 
-/// The unit in which a scale has numbers of one to three digits.
+/// A unit in which the values of a scale have one to three digits.
 struct Unit {
   const char* name;
   double per_si;
@@ -115,7 +114,7 @@ std::string axis_name(const Vec3& axis) {
   return name.str();
 }
 
-/// " (scale 1000 × finer)": to one significant digit.
+/// Formats as " (scale 1000 × finer)", with one significant digit.
 std::string stretched(double ratio) {
   const double power = std::pow(10, std::floor(std::log10(ratio)));
   std::ostringstream text;
@@ -123,7 +122,7 @@ std::string stretched(double ratio) {
   return text.str();
 }
 
-/// Writes the picture of some drawings as gnuplot wants to be told.
+/// Generates the gnuplot script.
 class Script {
  public:
   explicit Script(std::span<const Drawing> drawings)
@@ -134,7 +133,7 @@ class Script {
         width_(picture_width(drawings.size())),
         column_(width_ / static_cast<double>(drawings.size())) {
     for (const Drawing& drawing : drawings) span_ = std::max(span_, seconds(drawing.trace.config().span));
-    span_ = std::ceil(span_ * 100) / 100;  // so that a run of 9.999 s ends at 10
+    span_ = std::ceil(span_ * 100) / 100;  // a run of 9.999 s ends at 10
   }
 
   std::string write(const std::filesystem::path& path) {
@@ -160,8 +159,8 @@ class Script {
          << "set datafile missing 'NaN'\n";
   }
 
-  /// Three blocks for each drawing. $run: time, position, wanted, applied, energy, two rows for each column that is
-  /// not empty; $bound: time, permitted; $overruns: time.
+  /// Writes three blocks per drawing. $run: time, position, wanted, applied, energy, two rows per nonempty column;
+  /// $bound: time, permitted; $overruns: time.
   void write_data(std::size_t i) {
     const Trace& trace = drawings_[i].trace;
     const double per_si = energy_unit(energy_[i]).per_si;
@@ -230,7 +229,7 @@ class Script {
     label(left(i), kMoreFigures, figures) << "tc rgb '" << kPale << "'\n";
   }
 
-  /// Makes room for panel `row` of drawing `i`, with what is to be read above it.
+  /// Sets the position of panel `row` of drawing `i` and its title.
   void begin_panel(std::size_t i, std::size_t row, const std::string& title, const Scale& scale) {
     const double top = kPanelTops[row];
     out_ << "set lmargin at screen " << left(i) << "\nset rmargin at screen " << right(i) << "\n"
@@ -246,7 +245,7 @@ class Script {
     }
   }
 
-  /// Overruns hang from the top of every panel; then everything that was only for this panel goes.
+  /// Draws overruns at the top of the panel and resets the panel's settings.
   void end_panel(std::size_t i, const Scale& scale, bool named) {
     const auto& columns = drawings_[i].trace.columns();
     if (std::ranges::any_of(columns, &Trace::Column::overrun)) {
@@ -318,7 +317,7 @@ class Script {
   Scale position_;             ///< mm
   Scale force_;                ///< N
   std::vector<Scale> energy_;  ///< J
-  double width_;               ///< of the picture, pixels
+  double width_;               ///< pixels
   double column_;
   double span_ = 0;  ///< s
   std::ostringstream out_;

@@ -11,34 +11,34 @@
 
 namespace tendon::lab {
 
-/// One run as a column of the picture.
+/// A run as a column of the picture.
 struct Drawing {
   std::string label;
   RunSummary summary;
   Trace trace;
 };
 
-/// More of them side by side cannot be read.
+/// Maximum number of legible columns.
 inline constexpr std::size_t kMostDrawings = 4;
 
-/// Throws std::invalid_argument unless `path` ends with .svg or .png and has no control characters in it, and there
-/// are 1 to kMostDrawings drawings.
+/// Throws std::invalid_argument unless `path` ends with .svg or .png without control characters, and there are 1 to
+/// kMostDrawings drawings.
 void check_picture(const std::filesystem::path& path, std::size_t drawings);
 
-/// As many columns as a panel has pixels.
+/// One trace column per pixel of a panel.
 std::size_t trace_columns(std::size_t drawings);
 
-/// Draws runs side by side as `path`, an .svg or a .png, 1000 pixels high and 1600 wide (800 for each run
-/// from the third on): from top to bottom where the hand was, the
-/// force wanted, permitted and applied, and the energy ledger. Positions, forces and times have one scale in all
-/// columns. So have energies, unless that would hide one: then each has its own, and the picture says so.
+/// Draws runs side by side as an .svg or .png file of 1000 pixels height and 1600 width (800 per run from the third
+/// on). From top to bottom: the position; the wanted, permitted and applied force; the energy ledger. All columns share
+/// the scales of position, force and time. They also share that of energy unless one run would be illegible; then each
+/// has its own, and the picture says so.
 ///
-/// Starts gnuplot (package gnuplot-nox) and waits for it. Neither `path` nor a label can make it do anything else.
+/// Runs gnuplot (package gnuplot-nox) and waits. `path` and labels are quoted and cannot inject commands.
 ///
-/// Throws what `check_picture` throws, and std::runtime_error when gnuplot is not installed or fails.
+/// Throws the exceptions of `check_picture`, and std::runtime_error if gnuplot is missing or fails.
 void draw(const std::filesystem::path& path, std::span<const Drawing> drawings);
 
-/// What gnuplot is told.
+/// Returns the gnuplot script.
 std::string plot_script(const std::filesystem::path& path, std::span<const Drawing> drawings);
 
 }  // namespace tendon::lab

@@ -67,7 +67,6 @@ std::string spread(const std::optional<Spread>& times) {
   return digits(ms(times->p50), "%.1f") + " / " + digits(ms(times->p99), "%.1f ms");
 }
 
-/// Follows from the energy given out, two lines above it in the table.
 std::string kept(const Run& run) {
   if (run.summary.passive()) return "yes";
   return run.summary.kept_its_promise() ? "but for those holds" : "NO";
@@ -89,7 +88,7 @@ std::string limited(const RunSummary& run) {
   return run.served_steps == 0 ? "no force came" : percent(run.share_limited());
 }
 
-/// Columns on a terminal: the text has no combining and no wide characters.
+/// Width on a terminal, for text without combining or wide characters.
 std::size_t width(std::string_view text) {
   return static_cast<std::size_t>(
       std::ranges::count_if(text, [](char c) { return (static_cast<unsigned char>(c) & 0xC0U) != 0x80U; }));
@@ -102,7 +101,7 @@ std::string padded_left(const std::string& text, std::size_t to) {
 using Cell = std::function<std::string(const Run&)>;
 struct Row {
   std::string name;
-  Cell cell;  ///< empty: a heading
+  Cell cell;  ///< empty for a heading
 };
 
 std::vector<Row> rows(std::span<const Run> runs) {
@@ -196,7 +195,7 @@ std::string notes(std::span<const Run> runs) {
     note("         A longer hold can give out (T_act − T)(‖F‖ − f_c)²/(4b); it is in the energy given out.");
   }
   for (const Run& run : runs) {
-    if (&run != &*std::ranges::find(runs, run.recording, &Run::recording)) continue;  // of its devices once
+    if (&run != &*std::ranges::find(runs, run.recording, &Run::recording)) continue;  // once per recording
     if (run.truncated)
       note(run.recording +
            ": has no end mark (the server was killed, or the disk was full). All that is there was read.");
@@ -229,7 +228,7 @@ std::string padded(const std::string& text, std::size_t to) {
 std::string with_unit(double value, std::string_view unit) {
   const std::string symbol = " " + std::string(unit);
   if (std::isnan(value)) return "?" + symbol;
-  if (std::abs(value) < 0.005e-12) return "0" + symbol;  // would read 0.00 pJ
+  if (std::abs(value) < 0.005e-12) return "0" + symbol;  // would be printed as 0.00 pJ
   const std::string sign = value < 0 ? "−" : "";
   double size = std::abs(value);
   if (std::isinf(size)) return sign + "∞" + symbol;

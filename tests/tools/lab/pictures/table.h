@@ -12,28 +12,28 @@
 
 namespace tendon::lab {
 
-/// One recorded run: what it comes down to, and how far its recording can be trusted.
+/// Summary of one recorded run and defects of its recording.
 struct Run {
-  std::string label;      ///< heads its column
-  std::string recording;  ///< the file
-  std::string device;     ///< its name; empty: the recording has one only
+  std::string label;      ///< heading of the column
+  std::string recording;  ///< file name
+  std::string device;     ///< name; empty if the recording has one device
   RunSummary summary;
-  bool truncated = false;  ///< the recording ended before its end mark
+  bool truncated = false;  ///< the recording has no end mark
   std::uint64_t lost_steps = 0;
   std::uint64_t lost_datagrams = 0;
   std::vector<std::string> damage = {};  ///< error messages, see RecordingReader::damage()
 };
 
-/// "12.3 mJ": three significant digits and a prefix from n to G; a true minus sign, "0 J", "∞ N".
+/// Formats as "12.3 mJ": three significant digits and a prefix from n to G, with a true minus sign; "0 J", "∞ N".
 std::string with_unit(double value, std::string_view unit);
 
-/// `text` with spaces after it, `to` columns wide on a terminal: it has no combining and no wide characters.
+/// Pads `text` with spaces to `to` terminal columns. Assumes no combining or wide characters.
 std::string padded(const std::string& text, std::size_t to);
 
-/// A figure that each run has, and an explanation below when one needs it. Text for people, UTF-8, aligned.
+/// Returns an aligned UTF-8 table with a row per quantity, followed by notes.
 std::string to_table(std::span<const Run> runs);
 
-/// One line of JSON without its end; keys have the unit at their end, what is not known is null.
+/// Returns one line of JSON without line end. Keys end with the unit; unknown values are null.
 std::string to_json(const Run& run);
 
 }  // namespace tendon::lab

@@ -17,18 +17,18 @@ namespace {
 constexpr double kUnbounded = std::numeric_limits<double>::infinity();
 constexpr double kNearAxis = 0.9986;      // cosine of 3°
 constexpr double kSameDirection = 0.9;    // cos², mean
-constexpr double kSmall = 0.01;           // of the largest force; smaller forces are not pushes
-constexpr double kNotWild = 0.99;         // share of the forces; larger forces are errors of the engine
-constexpr double kFrequent = 0.05;        // share of the forces in free motion; they are noise
-constexpr double kAboveNoise = 1.5;       // of its 95th percentile
-constexpr double kPure = 0.75;            // share of pushes in a contact
-constexpr std::size_t kFewestPushes = 5;  // in a contact
-constexpr double kFewestSteps = 20;       // in a contact
-constexpr double kDeep = 0.1;             // of the largest depth
-constexpr double kMostError = 0.05;       // of a stiffness
+constexpr double kSmall = 0.01;           // fraction of the largest force; smaller forces are not pushes
+constexpr double kNotWild = 0.99;         // quantile of the forces; larger ones are outliers
+constexpr double kFrequent = 0.05;        // fraction of the forces in free motion that makes them noise
+constexpr double kAboveNoise = 1.5;       // multiple of the noise's 95th percentile
+constexpr double kPure = 0.75;            // minimum fraction of pushes in a contact
+constexpr std::size_t kFewestPushes = 5;  // per contact
+constexpr double kFewestSteps = 20;       // per contact
+constexpr double kDeep = 0.1;             // fraction of the largest depth
+constexpr double kMostError = 0.05;       // relative, of a stiffness
 constexpr double kCorrelated = 10;        // number of successive forces with the same error
 
-/// A force of a contact that is at larger x. The contact pushes towards smaller x.
+/// A force of a contact at larger x, which pushes towards smaller x.
 struct Answer {
   double x;
   double outermost;  ///< the minimum of `x` and the position where the force was used
@@ -41,14 +41,13 @@ struct Edge {
   double deepest;  ///< the maximum of `x`
 };
 
-/// The interval in which a contact begins.
 struct Gap {
   double without = -kUnbounded;  ///< the last position in free motion
   double first = kUnbounded;     ///< the first push
 };
 
-/// Returns the position that minimizes the number of pushes before it plus the number of free forces after it. If there
-/// are several, returns the first one. Both arguments are sorted.
+/// Returns the position that minimizes the number of pushes before it plus free forces after it; the first one if
+/// several. Both arguments are sorted.
 std::optional<Gap> best_gap(const std::vector<double>& pushes, const std::vector<double>& free) {
   std::size_t wrong = free.size();
   std::size_t fewest = wrong;
@@ -68,7 +67,6 @@ std::optional<Gap> best_gap(const std::vector<double>& pushes, const std::vector
   return best;
 }
 
-/// The line that is fitted to the forces.
 struct Fit {
   double zero;   ///< the position where the force is zero
   double slope;  ///< N/m
@@ -104,8 +102,8 @@ std::optional<Fit> line_through(const std::vector<Answer>& pushes) {
   return Fit{zero, slope, error};
 }
 
-/// Returns the smallest force in N that is not noise. If pushes above `least` are frequent in free motion, this is above the
-/// noise, and otherwise it is `least`.
+/// Returns the smallest force in N that is not noise: above the noise if pushes above `least` are frequent in free
+/// motion, otherwise `least`.
 double above_noise(const std::vector<Answer>& answers, double first, double least) {
   std::vector<double> noise;
   std::size_t outside = 0;
@@ -149,7 +147,7 @@ std::optional<Edge> find_edge(const std::vector<Answer>& answers, double least, 
   Edge edge{.at = gap->first, .error = gap->first - gap->without, .deepest = pushes.back()};
   const auto line = line_through(inside);
   if (!line) return edge;
-  // Near the start of the contact, the force of a spring is smaller than `least`, so it counts as free motion.
+  // Near the start of the contact the force of a spring is below `least`, so it counts as free motion.
   const double from = gap->without - 2 * least / line->slope;
   if (line->zero >= from && line->zero <= gap->first) {
     edge.at = line->zero;
@@ -157,7 +155,7 @@ std::optional<Edge> find_edge(const std::vector<Answer>& answers, double least, 
   } else {
     edge.at = line->zero > gap->first ? gap->first : gap->without;
   }
-  // There are no forces in free motion. The line is extrapolated by its own length at most.
+  // Without forces in free motion, the line is extrapolated by at most its own length.
   if (std::isinf(gap->without) && gap->first - edge.at > edge.deepest - gap->first) edge.error = kUnbounded;
   return edge;
 }
@@ -194,7 +192,7 @@ std::optional<Vec3> common_direction(std::span<const Push> pushes) {
   }
   const Eigen::SelfAdjointEigenSolver<Mat3> solver(sum / weight);
   if (solver.eigenvalues()[2] < kSameDirection) return std::nullopt;
-  const Vec3 direction = solver.eigenvectors().col(2);  // eigenvalues come in increasing order
+  const Vec3 direction = solver.eigenvectors().col(2);  // eigenvalues are in increasing order
   Eigen::Index largest = 0;
   direction.cwiseAbs().maxCoeff(&largest);
   if (std::abs(direction[largest]) > kNearAxis) return Vec3::Unit(largest);
@@ -218,7 +216,7 @@ std::optional<Contact> find_contact(std::span<const Push> pushes, const Vec3& ax
   std::optional<Edge> below = find_edge(down, least);
   if (!above && !below) return std::nullopt;
   if (above && below && -below->at > above->at) {
-    // The two contacts cannot overlap, so the overlap is their error.
+    // Two contacts cannot overlap; the overlap is attributed to their error.
     above->at = (above->at - below->at) / 2;
     below->at = -above->at;
   }
@@ -233,7 +231,7 @@ std::optional<double> felt_stiffness(std::span<const FeltStep> felt, const Vec3&
   double deepest = 0;
   for (const FeltStep& step : felt) deepest = std::max(deepest, contact.depth(step.position.dot(axis)));
   double sum = 0;
-  double sensitivity = 0;  // N/m², the derivative of `sum` by the position of the contact
+  double sensitivity = 0;  // N/m², derivative of `sum` with respect to the contact position
   double count = 0;
   for (const FeltStep& step : felt) {
     const double x = step.position.dot(axis);

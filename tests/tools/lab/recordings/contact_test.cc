@@ -25,14 +25,14 @@ namespace {
 using testing::spring_run;
 using testing::step_at;
 
-/// What pushes the hand: springs along `normal`, beyond `above` and before `below`.
+/// Springs along `normal`, beyond `above` and below `below`.
 struct Springs {
   Vec3 normal = Vec3::UnitX();
   double stiffness = 0;  // N/m
   std::optional<double> above{};
   std::optional<double> below{};
 
-  /// Above zero beyond `above`, below zero before `below`, m.
+  /// m, positive beyond `above`, negative below `below`.
   double pressed(const Vec3& position) const {
     const double s = position.dot(normal);
     if (above && s > *above) return s - *above;
@@ -42,7 +42,7 @@ struct Springs {
   Vec3 force(const Vec3& position) const { return -stiffness * pressed(position) * normal; }
 };
 
-/// A hand that goes in and out of springs, and what the real controller records of that without a limiter.
+/// A hand that moves in and out of springs, recorded from the real controller without a limiter.
 class Drawn {
  public:
   explicit Drawn(std::uint64_t seed) : dice_(seed) {
@@ -52,7 +52,7 @@ class Drawn {
 
   const std::vector<StepRecord>& steps() const { return steps_; }
 
-  /// By the definition of RunObserver, from where the springs really are.
+  /// Operational stiffness by the definition of RunObserver, from the true positions of the springs.
   double stiffness() const {
     double deepest = 0;
     for (const auto& [depth, secant] : felt_) deepest = std::max(deepest, depth);
@@ -70,7 +70,7 @@ class Drawn {
     for (const auto& [depth, secant] : felt_) deepest = std::max(deepest, depth);
     return deepest;
   }
-  /// Forces are fresh and follow the hand: what is felt is what the springs have.
+  /// Forces are fresh and follow the hand, so the felt stiffness is that of the springs.
   bool is_near() const { return delay_ <= 1 && every_ <= 2; }
   double drawn_stiffness() const { return springs_.stiffness; }
   std::string text() const {
@@ -182,15 +182,15 @@ class Drawn {
   double amplitude_ = 0;  // m
   double frequency_ = 1;  // Hz
   double phase_ = 0;
-  double slide_ = 0;         // m, aside
+  double slide_ = 0;         // m, lateral
   std::uint64_t delay_ = 0;  // steps
   std::uint64_t every_ = 1;  // steps
   Leads leads_ = Leads::kNobody;
   double noise_ = 0;     // N
-  double count_ = 0;     // m, of the encoder; 0: exact
-  double overruns_ = 0;  // share of steps
+  double count_ = 0;     // m, encoder resolution; 0: exact
+  double overruns_ = 0;  // fraction of steps
   std::uint64_t length_ = 0;
-  std::uint64_t from_ = 0;  // the engine's first and last step
+  std::uint64_t from_ = 0;  // first and last step with the engine
   std::uint64_t until_ = 0;
   std::vector<StepRecord> steps_;
   std::vector<std::pair<double, double>> felt_;  // depth, m; secant, N/m

@@ -14,7 +14,7 @@ std::string name_in(const SceneRecord& scene) {
   const std::string unnamed = "first";
   try {
     return parse_scene(scene.text, unnamed, ".").name_of(0);
-  } catch (const SceneError&) {  // of another version, or with files that are not here
+  } catch (const SceneError&) {  // scene of another version, or with files that are missing here
     return unnamed;
   }
 }

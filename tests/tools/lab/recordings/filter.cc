@@ -46,14 +46,14 @@ Row row_of(std::span<const double> cells, std::size_t axes) {
   return row;
 }
 
-/// Commas separate columns: several reasons are joined by a plus.
+/// Joins reasons with "+", because commas separate columns.
 std::string reasons_cell(Reasons reasons) {
   std::string text = to_string(reasons);
   for (std::size_t at = text.find(", "); at != std::string::npos; at = text.find(", ")) text.replace(at, 2, "+");
   return text;
 }
 
-/// "t_s,x_m" and so on, one after the other.
+/// Splits a header at its commas.
 std::vector<std::string_view> names(std::string_view header) {
   std::vector<std::string_view> result;
   for (;;) {
@@ -64,7 +64,7 @@ std::vector<std::string_view> names(std::string_view header) {
   }
 }
 
-/// Returns the columns of a format in its own order, or nothing if the table does not have exactly these columns.
+/// Returns the columns in the order of the format, or an empty list if the table does not have exactly these columns.
 std::vector<TableReader::Column> columns_of(const TableReader& table, const Format& format) {
   std::vector<TableReader::Column> columns;
   for (const std::string_view name : names(format.header)) {
@@ -76,7 +76,7 @@ std::vector<TableReader::Column> columns_of(const TableReader& table, const Form
   return columns;
 }
 
-/// Returns the text of a number in the current row, with a decimal point and in the unit of the format.
+/// Returns the number in the format's unit, with a decimal point.
 std::string cell_of(const TableReader& table, const TableReader::Column& column, double value) {
   if (column.multiply != 1 || column.divide != 1) return shortest(value);
   std::string text(table.text(column.index));
@@ -84,7 +84,7 @@ std::string cell_of(const TableReader& table, const TableReader::Column& column,
   return text;
 }
 
-/// Reads the next row. It flushes `out` before it waits, because another program can be waiting for the output.
+/// Flushes `out` before it blocks, because another program may be waiting for the output.
 bool next_row(TableReader& table, std::istream& in, std::ostream& out) {
   if (in.rdbuf()->in_avail() <= 0) out.flush();
   return table.next_row();
@@ -93,7 +93,7 @@ bool next_row(TableReader& table, std::istream& in, std::ostream& out) {
 }  // namespace
 
 LimiterConfig limiter_of(const FilterLaw& law) {
-  // The motion is recorded, so the device does not matter. A scene's device has at least the limiter's friction.
+  // The motion is recorded, so the device does not matter. A scene's device must have at least the limiter's friction.
   constexpr std::string_view kScene =
       "[device]\nkind = \"simulated\"\n"
       "[device.effects]\nmass_kg = 0.1\nviscous_friction_n_s_per_m = 1e9\ncoulomb_friction_n = 1e9\n"
@@ -146,7 +146,7 @@ int filter(const FilterOptions& options, std::istream& in, std::ostream& out, st
     Reasons reasons;
     if (before) {
       const Duration held(std::llround((row.t - before->t) * 1e9));
-      // Times in a file are rounded: half a per cent is no overrun.
+      // Tolerates 0.5 %, because times in a file are rounded.
       if (seconds(held) > seconds(options.limiter.longest_hold) * 1.005) reasons |= Reason::kOverrun;
       law.observe({.applied = applied, .dx = row.position - before->position, .held = held});
     }

@@ -10,39 +10,38 @@
 
 namespace tendon::lab {
 
-/// Which law, as the command line says it.
+/// The law, as given on the command line.
 struct FilterLaw {
-  std::string name = "aol+";  ///< of core/control/limiter.h
+  std::string name = "aol+";  ///< a name of core/control/limiter.h
   double viscous = 0;         ///< N·s/m, lower bound of the device's friction
   double coulomb = 0;         ///< N, lower bound of the device's friction
-  double period_us = 1000;    ///< the longest that a force is held
-  /// "TABLE.KEY=VALUE", as `parse_scene` takes them and as tendon-replay does: parts of AOL+ and whatever else a
-  /// scene's limiter may have. They come after the four above.
+  double period_us = 1000;    ///< µs, longest hold of a force
+  /// Scene settings "TABLE.KEY=VALUE" in the syntax of `parse_scene`, such as parts of AOL+. Applied after the fields
+  /// above.
   std::vector<std::string> settings = {};
 };
 
-/// The limiter of a scene that has this law and nothing else. Throws SceneError, naming the key, when a value is
-/// impossible.
+/// Returns the limiter of a scene with this law. Throws SceneError, naming the key, for an invalid value.
 LimiterConfig limiter_of(const FilterLaw& law);
 
 struct FilterOptions {
-  LimiterConfig limiter;  ///< longest_hold: the period that the law may count on
-  bool json = false;      ///< one JSON object for each row instead of CSV
+  LimiterConfig limiter;  ///< longest_hold: the period assumed by the law
+  bool json = false;      ///< one JSON object per row instead of CSV
 };
 
-/// `tendon-lab filter`: any law of the catalogue on anyone's own recording, row by row, so that it works on a pipe.
+/// `tendon-lab filter`: applies a law to a recorded motion, row by row, so it can be used in a pipe.
 ///
 /// The input is a table for TableReader with the columns `t_s,x_m,wanted_n` or
-/// `t_s,x_m,y_m,z_m,wanted_x_n,wanted_y_n,wanted_z_n`. The forces act on the hand, so a wall that resists motion along +x
-/// has a force along −x. The output is CSV with the same columns and these: `applied_n` (or `applied_x_n` …),
-/// `permitted_n` (the limit of the force, or `inf`), `energy_j` (the account of the law after the last interval) and
-/// `reason` (empty if the applied force is the wanted force).
+/// `t_s,x_m,y_m,z_m,wanted_x_n,wanted_y_n,wanted_z_n`. Forces act on the hand: a wall that resists motion along +x has
+/// a force along −x. The output is CSV with these columns plus `applied_n` (or `applied_x_n` …), `permitted_n` (bound
+/// of the force, or `inf`), `energy_j` (the law's account after the last interval) and `reason` (empty if the applied
+/// force is the wanted one).
 ///
-/// The motion is what was recorded: it does not answer to the force applied. Each row's force is held until the next.
+/// The motion does not respond to the applied force. Each row's force is held until the next row.
 ///
-/// If a row is bad, it writes the file and line to `errors` and nothing to `out`, and the previous force is held. A row is
-/// bad if TableReader refuses it or if the time does not increase. It returns the number of bad rows. It throws
-/// std::runtime_error if the header is not one of the two, or if it cannot write to `out`.
+/// A row is bad if TableReader rejects it or time does not increase. For a bad row, writes file and line to `errors`
+/// and nothing to `out`, and holds the previous force. Returns the number of bad rows. Throws std::runtime_error if the
+/// header is neither of the two or writing to `out` fails.
 int filter(const FilterOptions& options, std::istream& in, std::ostream& out, std::ostream& errors);
 
 }  // namespace tendon::lab

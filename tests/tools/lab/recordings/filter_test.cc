@@ -32,7 +32,7 @@ Result filtered(const std::string& text, const FilterOptions& options = aol()) {
 }
 
 TEST(Filter, AddsWhatTheLawMakesOfEachRow) {
-  // Two steps worked out by hand: E = b (0.1 mm)² / 1 ms + f_c 0.1 mm = 3.1 µJ; f = f_c + 2 √(b E / T).
+  // Computed by hand: E = b (0.1 mm)² / 1 ms + f_c 0.1 mm = 3.1 µJ; f = f_c + 2 √(b E / T).
   const Result result = filtered("t_s,x_m,wanted_n\n0,0,0\n0.001,0.0001,-1\n");
   EXPECT_EQ(result.bad, 0);
   EXPECT_EQ(result.out,

@@ -25,7 +25,7 @@ namespace {
 constexpr std::size_t kMostPairs = 2;
 constexpr const char* kTime = "time, s";
 
-/// Which way the end moves most: the axis of its base frame with the widest range.
+/// Returns the axis of the base frame with the widest range of motion.
 template <class Steps>
 Eigen::Index main_axis(const Steps& steps) {
   constexpr double kFar = std::numeric_limits<double>::infinity();
@@ -41,7 +41,6 @@ Eigen::Index main_axis(const Steps& steps) {
   return axis;
 }
 
-/// The ledger of one end at each of its steps.
 template <class Steps, class Ports>
 std::vector<double> ledger(const Steps& steps, const Ports& ports) {
   std::vector<double> values;
@@ -95,7 +94,7 @@ std::string sentence(const PairRun& run) {
          with_unit(std::max(run.least_pair, 0.0), "J") + ".";
 }
 
-/// Columns of the table are this wide, in characters.
+/// Widths of the table's columns, in characters.
 constexpr std::size_t kName = 46;
 constexpr std::size_t kCell = 26;
 
@@ -147,7 +146,8 @@ Curve curve(const std::string& name, const char* colour, const PairRun::Line& li
   return made;
 }
 
-/// One range for the panels of a row, so that two runs are compared by eye; unless that would hide one of them: then
+/// Gives the panels of a row one range, so that runs can be compared, unless one of them would be illegible; then each
+/// has its own, with a note.
 /// each has its own, and says so.
 void share_range(std::span<Panel> row) {
   constexpr double kOwnScaleBeyond = 8;
@@ -256,7 +256,7 @@ PairRun PairObserver::run() const {
     }
     ledgers[static_cast<std::size_t>(which)] = ledger(seen.steps, seen.ports);
   }
-  // At each step of either end, with the newest of the other.
+  // At each step of either end, combined with the newest value of the other.
   const auto& [leader, follower] = ends_;
   double of_leader = 0;
   double of_follower = 0;

@@ -15,32 +15,32 @@
 
 namespace tendon::lab {
 
-/// Two coupled ends together, as time goes on. Times are s from the first step of either, in the leader's clock.
+/// Time series of two coupled devices. Times are seconds since the first step of either, in the leader's clock.
 struct PairRun {
   using Line = std::vector<std::pair<double, double>>;  ///< s, value
   struct End {
-    Line position;             ///< m, along the end's own main axis
-    Line account;              ///< J, what it may still give out
+    Line position;             ///< m, along the end's main axis
+    Line account;              ///< J, energy that it may still output
     double least_account = 0;  ///< J
-    double largest_force = 0;  ///< N, given out by its motors
+    double largest_force = 0;  ///< N, of the motors
   };
   std::string label;
   std::string recording;
   End leader;
   End follower;
-  Line felt;              ///< N, given out by the leader's motors, along its main axis
-  Line contact;           ///< N, of the surroundings on the follower's tool, along its main axis; empty: not measured
-  Line pair;              ///< J, both ledgers: what hands and surroundings have put in at both ends and not got back
-  double least_pair = 0;  ///< J; below zero: so much came from nowhere
+  Line felt;              ///< N, motor force of the leader along its main axis
+  Line contact;           ///< N, contact force on the follower's tool along its main axis; empty: not measured
+  Line pair;              ///< J, sum of both ledgers: net energy put in at both ends
+  double least_pair = 0;  ///< J; negative: the pair generated energy
 };
 
-/// Joins what two ends recorded. At each step
+/// Joins the recordings of two coupled devices. At each step
 ///
-///     ledger = account − Σ credit + Σ withdraw    of the settlements of all steps before it
+///     ledger = account − Σ credit + Σ withdraw    over the settlements of all previous steps
 ///
-/// so what one end has paid and the other has not heard of yet is in the sum of both. What a limiter discarded is in
-/// neither: the sum may be less than the work that was put in, and never more. Joules of both are added as they are,
-/// which is right where position and force scale are equal.
+/// so energy that one end has paid and the other has not received yet is in the sum of both ledgers. Energy discarded
+/// by a limiter is in neither: the sum is a lower bound of the net work put in. The ledgers are added without scaling,
+/// which is correct for equal products of position and force scale.
 ///
 /// Memory: 300 bytes a step. Thread-safe: no. Realtime-safe: no.
 class PairObserver {
@@ -50,7 +50,7 @@ class PairObserver {
   void observe(Which which, const StepRecord& step);
   void observe(Which which, const PortRecord& port);
 
-  /// Throws std::runtime_error when one of the two has no step.
+  /// Throws std::runtime_error if either end has no steps.
   PairRun run() const;
 
  private:
@@ -64,7 +64,7 @@ class PairObserver {
   };
   struct Port {
     std::uint64_t tick;
-    double net;  ///< J, credited less withdrawn
+    double net;  ///< J, credited minus withdrawn
     LocalTime at;
     std::optional<Vec3> contact;
   };
@@ -78,11 +78,11 @@ class PairObserver {
   std::array<Seen, 2> ends_;
 };
 
-/// `tendon-report --pairs`: the recordings are those that `tendon-replay --merge` has written. Writes a table, or JSON,
-/// and a sentence about each pair to `out`, and draws two panels in a row: a column for each of at most two pairs; from
-/// top to bottom where both ends are, what is felt and touched, and the accounts of both and of the pair.
+/// `tendon-report --pairs` for recordings written by `tendon-replay --merge`. Writes a table or JSON and a sentence
+/// about each pair to `out`. Draws a column for each of at most two pairs: positions of both ends; forces felt and
+/// touched; accounts of both ends and of the pair.
 ///
-/// Throws as `report`, and std::runtime_error when a recording is not such a merge.
+/// Throws the exceptions of `report`, and std::runtime_error if a recording is not such a merge.
 void report_pairs(const ReportOptions& options, std::ostream& out);
 
 }  // namespace tendon::lab

@@ -20,7 +20,6 @@
 namespace tendon::lab {
 namespace {
 
-/// A run and its recording.
 struct Source {
   Run run;
   std::filesystem::path recording;
@@ -64,7 +63,7 @@ std::vector<Source> read_runs(const std::filesystem::path& recording, std::strin
   return sources;
 }
 
-/// A second look at the recording: what is drawn depends on what it comes down to.
+/// Second pass over the recording: the plot depends on the summary.
 Trace read_trace(const Source& source, std::size_t columns) {
   const RunSummary& summary = source.run.summary;
   Trace trace(
@@ -83,7 +82,7 @@ std::string list(const std::vector<std::string>& names) {
   return text;
 }
 
-/// Checks that each device is in one of the recordings.
+/// Throws if a requested device is in none of the recordings.
 void check_devices(const ReportOptions& options) {
   std::vector<std::string> known;
   if (options.devices.empty()) return;
@@ -98,7 +97,7 @@ void check_devices(const ReportOptions& options) {
   }
 }
 
-/// Selects up to `most` runs in their order. Runs that broke the promise are preferred.
+/// Selects up to `most` runs, in order; runs that violated the guarantee take precedence.
 std::vector<const Source*> choose(const std::vector<Source>& sources, const ReportOptions& options, std::size_t most) {
   std::vector<const Source*> chosen;
   for (const bool kept : {false, true}) {
@@ -114,7 +113,7 @@ std::vector<const Source*> choose(const std::vector<Source>& sources, const Repo
 
 std::string name_of(const Run& run) { return run.recording + (run.device.empty() ? "" : " " + run.device); }
 
-/// Describes the runs without a column. Lists the runs that broke the promise, and counts the others.
+/// Describes the omitted runs: names those that violated the guarantee and counts the others.
 std::string others(const std::vector<Source>& sources, const std::vector<const Source*>& shown) {
   std::string text;
   std::size_t kept = 0;

@@ -11,37 +11,36 @@
 
 namespace tendon::lab {
 
-/// `tendon-report`: what some recorded runs come down to, side by side.
+/// Options of `tendon-report`, which compares recorded runs.
 struct ReportOptions {
   std::vector<std::filesystem::path> recordings = {};  ///< one or more
-  /// One for each recording. Left out: "limiter on" or "limiter off", as the recorded steps show.
+  /// One per recording. Empty: "limiter on" or "limiter off", according to the recorded steps.
   std::vector<std::string> labels = {};
   std::optional<std::filesystem::path> picture = {};  ///< .svg or .png
-  /// The devices that are shown. If this is empty, all devices are shown if there is enough room.
+  /// Devices to show. Empty: all devices, as far as there is room.
   std::vector<std::string> devices = {};
-  bool json = false;  ///< one object for each device of each recording instead of the table
-  /// Throws std::runtime_error after the report if a device breaks the limiter's promise, even if it has no column. The
-  /// message contains the name and the energy of the first such device.
+  bool json = false;  ///< one object per device and recording instead of the table
+  /// Throws std::runtime_error after the report if any device violates the limiter's guarantee, even one without a
+  /// column. The message contains name and energy of the first one.
   bool check = false;
 };
 
-/// Throws std::invalid_argument unless there are recordings, and labels for all of them or none.
+/// Throws std::invalid_argument unless there are recordings, and no labels or one per recording.
 void check(const ReportOptions& options);
 
-/// The maximum number of columns in a table.
+/// Maximum number of columns of a table.
 inline constexpr std::size_t kMostColumns = 6;
 
-/// Reads the recordings, writes the table (or JSON) to `out`, and draws the picture. Each device of each recording has a
-/// column. If there are more than kMostColumns (kMostDrawings in the picture), the devices that broke the promise are
-/// shown first, and the number of the other devices is printed.
+/// Reads the recordings, writes the table (or JSON) to `out`, and draws the picture. Each device of each recording has
+/// a column. If there are more than kMostColumns (kMostDrawings in the picture), devices that violated the guarantee
+/// come first, and the number of omitted devices is printed.
 ///
-/// If a recording is truncated or damaged, the valid part is used, and the report contains a note. Throws
-/// std::invalid_argument if the options are not valid, before anything is read. Throws std::runtime_error if a
-/// recording cannot be read, has no steps or has no such device (in this case nothing has been written), if the picture
-/// cannot be drawn, or if `check` fails.
+/// Uses the valid part of a truncated or damaged recording, with a note. Throws std::invalid_argument for invalid
+/// options before reading anything. Throws std::runtime_error if a recording cannot be read, has no steps or lacks a
+/// requested device (nothing has been written then), if the picture cannot be drawn, or if `check` fails.
 void report(const ReportOptions& options, std::ostream& out);
 
-/// What `check` throws: `account` of that recording was `least` J at its lowest.
+/// The exception of `check`: the minimum of `account` of that recording was `least` (J).
 std::runtime_error broken_promise(const std::string& recording, const std::string& account, double least);
 
 }  // namespace tendon::lab

@@ -32,7 +32,7 @@ std::string contents(const std::filesystem::path& file) {
   return {std::istreambuf_iterator<char>(in), {}};
 }
 
-/// Of the pictures of a run, what they are made of.
+/// The picture's data for a run.
 Drawing drawing_of(Law limiter, const std::string& label) {
   const auto steps = toy_run(limiter, 6000);
   const RunSummary summary = summarise(steps);
@@ -88,7 +88,7 @@ TEST_F(Report, CheckFailsByTheRecordingThatBreaksThePromiseAfterTheTable) {
 
 class ReportOfSeveral : public Report {
  protected:
-  /// A recording of the given devices; true: with the limiter.
+  /// Records devices; true: with the limiter.
   std::filesystem::path several(const std::vector<bool>& limited) {
     const auto on = toy_run(Law::kAol, 6000);
     const auto off = toy_run(Law::kNone, 6000);

@@ -19,14 +19,14 @@
 namespace tendon::lab {
 namespace {
 
-constexpr double kFastestChosenMotion = 3;  // Hz: above it, hands tremble or are shaken
+constexpr double kFastestChosenMotion = 3;  // Hz; above it, hands tremble or are shaken
 constexpr double kSnap = 0.99;              // cosine of 8°
 
 constexpr std::uint32_t kLimits =
     ~(static_cast<std::uint32_t>(Reason::kOverrun) |  //
       static_cast<std::uint32_t>(Reason::kWatchdog) | static_cast<std::uint32_t>(Reason::kAcceleration));
 
-constexpr double kMoves = 1e-4;  // m, standard deviation along an axis: several encoder counts
+constexpr double kMoves = 1e-4;  // m, standard deviation along an axis; several encoder counts
 
 bool any(Reasons reasons, std::initializer_list<Reason> of) {
   return std::ranges::any_of(of, [reasons](Reason reason) { return reasons.has(reason); });
@@ -78,7 +78,7 @@ void RunObserver::Ledger::observe(double energy_now, bool beyond_bound) noexcept
 }
 
 void RunObserver::observe_energy(const StepRecord& step) {
-  // Recordings made before a step knew its bound have 0 there: the scene's bound, which flags overruns, was in force.
+  // Old recordings have no bound (0). The scene's bound, which flags overruns, was in force then.
   const Duration bound = std::exchange(bound_, step.longest_hold);
   const bool beyond = bound > Duration::zero() ? step.held > bound : step.reasons.has(Reason::kOverrun);
   so_far_.holds_beyond_bound += beyond ? 1 : 0;
@@ -87,7 +87,7 @@ void RunObserver::observe_energy(const StepRecord& step) {
     has_grip_ = true;
     grip_.observe(grip->energy, beyond);
   }
-  // The initial bound is the value from the scene, which is also the minimum.
+  // The scene's T is the first and the smallest.
   if (step.longest_hold > Duration::zero()) least_bound_ = std::min(least_bound_, step.longest_hold);
   careful_ += step.longest_hold > least_bound_ ? 1 : 0;
 }
@@ -105,7 +105,6 @@ void RunObserver::Limits::add(const Limits& other) noexcept {
   for (std::size_t bit = 0; bit < reasons.size(); ++bit) reasons[bit] += other.reasons[bit];
 }
 
-/// Counts from the first fresh force to the last one.
 void RunObserver::observe_limits(const StepRecord& step) {
   const bool fresh = step.mode == Mode::kActive;
   if (!fresh && last_fresh_ == 0) return;
@@ -117,7 +116,7 @@ void RunObserver::observe_limits(const StepRecord& step) {
   last_fresh_ = so_far_.steps;
 }
 
-/// A turn that was not seen is booked as one about a single axis, with the torque held last.
+/// A rotation that was not measured is assumed to be about a single axis, with the last torque.
 void RunObserver::observe_torque(const StepRecord& step) {
   const TurnStep* const turn = step.turn();
   if (turn == nullptr || step.reasons.has(Reason::kUnseen)) return;
@@ -150,7 +149,7 @@ void RunObserver::observe_motion(const StepRecord& step) {
   if (!fresh || step.reasons.has(Reason::kRampIn)) return;
   const FeltStep felt{position, step.applied};
   if (step.force_sequence == 0) {
-    felt_.observe(felt);  // of a coupling
+    felt_.observe(felt);  // a force of a coupling
   } else if (felt_since_.size() < kMostHeld) {
     felt_since_.push_back(felt);
   }
@@ -160,7 +159,7 @@ void RunObserver::observe_force(const StepRecord& step) {
   if (step.force_sequence == 0) return;
   if (step.force_sequence != force_in_use_) {
     if (newest_) asked_.observe(*std::exchange(newest_, std::nullopt));
-    // The steps of the last force are not used, because it does not change after the engine has left.
+    // Excludes the steps with the last force, which stays constant after the engine has left.
     for (const FeltStep& felt : felt_since_) felt_.observe(felt);
     felt_since_.clear();
     force_in_use_ = step.force_sequence;
@@ -200,7 +199,7 @@ void RunObserver::note_sent(const Header& header, LocalTime at) {
   if (header.type == DatagramType::kData) sent.highest_number = std::max(sent.highest_number, header.packet_number);
 }
 
-/// Uses the same rule as the session (SESSION.md). If the recording starts in a session, earlier datagrams are unknown.
+/// The rule of the session (SESSION.md). Datagrams sent before the recording began are unknown.
 bool RunObserver::believable(const Header& header, const DataContent& content, LocalTime at) const {
   const auto sent = sent_.find(header.connection_id);
   return sent != sent_.end() && content.echo->packet_number <= sent->second.highest_number &&
@@ -217,7 +216,7 @@ void RunObserver::observe(const DatagramRecord& datagram) {
     return;
   }
   if (header->type != DatagramType::kData) return;
-  // What is sealed stays sealed: the keys are not in the recording.
+  // Sealed contents cannot be read: recordings contain no keys.
   if (header->suite != Suite::kPlain) {
     so_far_.sealed = true;
     return;
@@ -245,7 +244,7 @@ Vec3 RunObserver::main_axis(std::span<const Push> pushes) const {
   if (const auto axis = common_direction(pushes); axis && axis->dot(motion * *axis) > kMoves * kMoves) return *axis;
   if (!(motion.trace() > 0)) return Vec3::UnitX();
   const Eigen::SelfAdjointEigenSolver<Mat3> solver(motion);
-  Vec3 axis = solver.eigenvectors().col(2);  // eigenvalues come in increasing order
+  Vec3 axis = solver.eigenvectors().col(2);  // eigenvalues are in increasing order
   Eigen::Index largest = 0;
   axis.cwiseAbs().maxCoeff(&largest);
   if (std::abs(axis[largest]) > kSnap) return Vec3::Unit(largest);

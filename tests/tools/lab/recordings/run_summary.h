@@ -22,144 +22,136 @@
 
 namespace tendon::lab {
 
-/// p50 and p99 of some times, as `percentile` defines them.
 struct Spread {
   Duration p50{};
   Duration p99{};
 };
 
-/// By how much the force differed from the one that was asked for: ‖wanted − applied‖, in the steps that were limited.
+/// Force difference ‖wanted − applied‖ over the limited steps.
 struct Difference {
   double p50 = 0;  ///< N
   double p95 = 0;  ///< N
 };
 
-/// J: the ledger may be that much below zero, which is rounding.
+/// J, tolerance of the ledger for rounding.
 inline constexpr double kPromise = 1e-9;
 
-/// What one run comes down to. SI units. Forces are on the hand.
+/// Summary of one run in SI units. Forces act on the hand.
 struct RunSummary {
-  // How much, how long.
   std::uint64_t steps = 0;
   LocalTime start{};            ///< of the first step
   Duration span{};              ///< from the first step to the last
   std::uint64_t overruns = 0;   ///< intervals longer than the scene's longest_hold
-  std::uint64_t watchdogs = 0;  ///< … and than the device's own watchdog
+  std::uint64_t watchdogs = 0;  ///< intervals longer than the device's watchdog
   Duration longest_interval{};
 
   // Energy. E(n) is the recorded ledger.
-  double energy_given_out = 0;  ///< J, max(0, max over n of −E(n)): beyond what the device had taken in
-  /// The ledger was never below −1 nJ.
+  double energy_given_out = 0;  ///< J, max(0, max over n of −E(n)): net output
+  /// True if the ledger was never below −1 nJ.
   bool passive() const noexcept { return std::max(energy_given_out, grip_energy_given_out.value_or(0)) <= kPromise; }
-  /// Likewise that of the gripper's own account; empty: no gripper.
+  /// The same for the gripper's account; empty without a gripper.
   std::optional<double> grip_energy_given_out;
-  /// Intervals longer than the limiter's T in force (Step::longest_hold), for which it promises nothing.
+  /// Intervals longer than the limiter's current T (Step::longest_hold), for which it guarantees nothing.
   std::uint64_t holds_beyond_bound = 0;
-  /// J, min over all other steps of E(n) − D(n). D ≤ 0 is what holds beyond the bound have drawn below zero, until the
-  /// ledger has recovered. +∞ when there is no other step. The lesser of handle and gripper.
+  /// J, minimum over all other steps of E(n) − D(n). D ≤ 0 is the energy below zero caused by holds beyond the bound,
+  /// until the ledger has recovered. The lesser of handle and gripper; +∞ if there is no other step.
   double least_energy = std::numeric_limits<double>::infinity();
-  /// What the limiter promises: never below −1 nJ by anything else than holds beyond its bound.
+  /// The limiter's guarantee: never below −1 nJ except through holds beyond its bound.
   bool kept_its_promise() const noexcept { return least_energy >= -kPromise; }
-  /// A limiter was at work: some step had a finite bound.
+  /// True if some step had a finite bound.
   bool limiter_on = false;
-  /// Of all steps: T in force was above the scene's longest_hold, because there had been overruns. 0 to 1.
+  /// Fraction of steps (0 to 1) in which T was above the scene's longest_hold because of overruns.
   double share_careful = 0;
 
-  /// J, the largest sum so far of τ·Δθ: what the torques alone have done to the hand, friction not counted. What is above
-  /// zero came from the movement's part of the account, from friction, or from nowhere. Empty: the device does not
-  /// measure its orientation.
+  /// J, maximum over time of Σ τ·Δθ, the work of the torques on the hand without friction. A positive value must come
+  /// from the translational part of the account or from friction. Empty: orientation is not measured.
   std::optional<double> torque_work;
 
-  // The hand. Steps without a position count in nothing that has to do with motion.
+  // Hand. Steps without a position do not count for motion.
   double peak_speed = 0;      ///< m/s
-  double peak_force = 0;      ///< N, really applied
+  double peak_force = 0;      ///< N, applied
   Vec3 axis = Vec3::UnitX();  ///< main axis, see RunObserver
 
-  // Why the force was not the one that was asked for: from the first step with a fresh force to the last one.
-  std::uint64_t served_steps = 0;                ///< in that time; 0: no fresh force came
-  std::uint64_t limited_steps = 0;               ///< for any reason that core/base/reason.h calls a limit
+  // Limiting, from the first step with a fresh force to the last.
+  std::uint64_t served_steps = 0;                ///< steps in this interval; 0: no fresh force arrived
+  std::uint64_t limited_steps = 0;               ///< for any reason that core/base/reason.h classifies as a limit
   std::array<std::uint64_t, 32> reason_steps{};  ///< by bit of the reason
   std::optional<Difference> difference;          ///< empty: no step was limited
-  double share_limited() const noexcept;         ///< of served_steps, 0 to 1
+  double share_limited() const noexcept;         ///< fraction of served_steps, 0 to 1
   double share_limited(Reason why) const noexcept;
 
-  // How the contact feels.
-  bool pushed = false;             ///< forces were asked for
-  std::optional<Contact> contact;  ///< empty when no force was asked for, or none that depends on where the hand is
+  // Contact.
+  bool pushed = false;             ///< a force was requested
+  std::optional<Contact> contact;  ///< empty without requested forces that depend on position
   bool stable = true;
-  /// N/m. Empty when there was no contact, or it cannot be told within 5 %; without meaning unless `stable`.
+  /// N/m. Empty without a contact or if the error exceeds 5 %; meaningful only if `stable`.
   std::optional<double> operational_stiffness;
 
-  // Time.
-  std::optional<Spread> loop_age;      ///< from sampling a motion to rendering the force made of it; once per force
-  std::optional<Spread> round_trip;    ///< of the controller's datagrams alone
-  bool sealed = false;                 ///< some datagrams were: of these nobody knows the round trip
-  std::uint64_t forces = 0;            ///< remote forces that steps made use of
-  std::optional<double> forces_per_s;  ///< from the first of them to the last
+  // Times.
+  std::optional<Spread> loop_age;    ///< from sampling a motion to applying the force computed from it; once per force
+  std::optional<Spread> round_trip;  ///< of the controller's datagrams
+  bool sealed = false;               ///< some datagrams were sealed; they have no round trip here
+  std::uint64_t forces = 0;          ///< remote forces that were used
+  std::optional<double> forces_per_s;  ///< from the first to the last of them
 };
 
-/// Reads a run once, step by step, in bounded memory, and says what it comes down to.
+/// Computes the summary of a run from its steps in one pass and bounded memory.
 ///
-/// **Main axis.** The common direction of the forces that were asked for, when they have one and the hand moves along
-/// it by 0.1 mm (standard deviation) or more. Otherwise the direction in which the positions vary most (first principal
-/// component; its largest component is positive); one within 8° of an axis of the device is taken to be that axis, one
-/// of a hand that never moves is x.
+/// **Main axis.** The common direction of the requested forces, if there is one and the hand moves along it with a
+/// standard deviation of at least 0.1 mm. Otherwise the first principal component of the positions, with its largest
+/// component positive. A direction within 8° of a device axis is replaced by that axis; without motion it is x.
 ///
-/// **Contact.** Each remote force answers a motion, `loop_age` before the step that makes use of it; so it says what
-/// the environment does *there*, however late it comes. A force that is led after the hand by a model (with the
-/// stiffness K of the step) is taken back to that place, F + K (x − x_answered), from the last step that makes use of
-/// it: then a blend from the model before has ended. Forces that ramp in or fade say nothing. Where the contact begins:
-/// `find_contact`.
+/// **Contact.** Each remote force answers a motion `loop_age` before the step that uses it, so it describes the
+/// environment at *that* position regardless of delay. A force extrapolated by a model with the step's stiffness K is
+/// referred back to that position by F + K (x − x_answered), from the last step that uses it, when blending from the
+/// previous model has ended. Forces that ramp in or fade out are ignored. `find_contact` determines where the contact
+/// begins.
 ///
-/// **Operational stiffness**: what stiffness the hand felt, whatever was asked for. The mean of the secants
+/// **Operational stiffness.** The stiffness felt by the hand, independent of the requested one: the mean of the secants
 ///
 ///     K_op = mean over n of  F(n) / depth(n)
 ///
 /// F is the part of the applied force that pushes out of the contact; n runs over the steps deeper than 0.1 × the
-/// largest depth while forces were fresh. The steps with the last force of a run do not count: when an engine leaves, that
-/// force stands still for its validity. Source: core/PROOFS.md, "Operational stiffness".
+/// largest depth while forces were fresh. The steps with the last force of a run are excluded: when an engine leaves,
+/// that force stays constant until its validity ends. Source: core/PROOFS.md, "Operational stiffness".
 ///
-/// **Not stable**: the device gave out energy (the ledger is not passive), *and* the hand moved faster than a hand
-/// chooses to. With the velocity v = v_slow + v_fast split by a first-order low-pass of 3 Hz, that is when
-/// ‖v_fast‖² sums up to more than ‖v_slow‖²; for a sine: when its frequency is above 3 Hz. Why both: fast tapping on
-/// a passive wall is stable, and an active wall may still be held by a strong hand. A wall of 2000 N/m with 50 ms of
-/// delay bounces at 5 to 6 Hz.
+/// **Unstable** means that the device output net energy (the ledger is not passive) *and* the hand moved faster than
+/// voluntary motion. With v = v_slow + v_fast split by a first-order low-pass filter at 3 Hz, the latter means
+/// Σ‖v_fast‖² > Σ‖v_slow‖²; for a sine, a frequency above 3 Hz. Both are required: fast tapping on a passive wall is
+/// stable, and a strong hand may hold an active wall. A wall of 2000 N/m with 50 ms of delay bounces at 5 to 6 Hz.
 ///
 /// Memory: under 16 MB. Thread-safe: no. Realtime-safe: no.
 class RunObserver {
  public:
-  /// `of_several`: the recording has other devices, too. A round trip then counts only when the datagram brought a
-  /// force that this device made use of: the numbers of devices in a datagram are those of its session.
+  /// `of_several`: the recording has other devices. A round trip then only counts if the datagram brought a force that
+  /// this device used, because device numbers in datagrams are those of their session.
   explicit RunObserver(bool of_several = false) : of_several_(of_several) {}
 
-  /// A step of the run; they come in order.
+  /// Steps must come in order.
   void observe(const StepRecord& step);
-  /// A datagram of the run. Datagrams of observers, of other programs, and without an echo are ignored. An echo is also
-  /// ignored if the server refused it because the datagram was never sent, or because the time is in the future or
-  /// before the connection.
+  /// Ignores datagrams of observers and other programs, and those without an echo. Also ignores an echo that the server
+  /// rejects, because its datagram was never sent or its time is in the future or before the connection.
   void observe(const DatagramRecord& datagram);
 
-  /// What all that has been observed comes down to.
   RunSummary summary() const;
 
  private:
-  /// Statistics are exact for a minute at 1 kHz, and for ten of forces at 100 Hz.
+  /// Statistics are exact for one minute at 1 kHz, or ten minutes of forces at 100 Hz.
   static constexpr std::size_t kMostSamples = 65'536;
-  /// Forces answer a motion of the last 8 s at 1 kHz, or they are too old to be rendered.
+  /// At 1 kHz, 8 s of motions; older answers are too old to be used.
   static constexpr std::size_t kMostHistory = 8'192;
 
-  /// A step and the datagram of its force are that near to each other in a recording.
+  /// Maximum distance in a recording between a force's datagram and the step that uses it.
   static constexpr std::size_t kMostBrought = 256;
-  /// Steps with one force: 8 s.
+  /// Steps with one force: 8 s at 1 kHz.
   static constexpr std::size_t kMostHeld = 8'192;
-  /// More connections than these are not told apart in one recording.
+  /// Maximum number of connections distinguished in a recording.
   static constexpr std::size_t kMostConnections = 4'096;
 
   struct Seen {
     LocalTime at;
     Vec3 position;
   };
-  /// An account of the limiter.
   struct Ledger {
     double energy = 0;                                       ///< J, E
     double overdrawn = 0;                                    ///< J, D
@@ -168,7 +160,7 @@ class RunObserver {
 
     void observe(double energy_now, bool beyond_bound) noexcept;
   };
-  /// Of steps: those from the first fresh force to the last, or those since that one.
+  /// Counts of steps from the first fresh force to the last, or since the last.
   struct Limits {
     std::uint64_t steps = 0;
     std::uint64_t limited = 0;
@@ -181,13 +173,13 @@ class RunObserver {
     std::uint64_t step;
     double by;  ///< N
   };
-  /// A force that came in a datagram with a round trip, or that a step made use of: what was seen first of the two.
+  /// A force known from a datagram with a round trip or from a step, until the other one is seen.
   struct Brought {
     std::uint64_t sequence;
     LocalTime received;
-    std::optional<Duration> round_trip;  ///< empty: the step was seen first
+    std::optional<Duration> round_trip;  ///< empty: the step came first
   };
-  /// What we have sent on a connection.
+  /// Datagrams sent on a connection.
   struct Sent {
     LocalTime first;
     std::uint64_t highest_number;
@@ -209,19 +201,19 @@ class RunObserver {
   Ledger handle_;
   Ledger grip_;
   bool has_grip_ = false;
-  Duration bound_ = Duration::max();        ///< T in force when the force of the next interval was chosen
-  Duration least_bound_ = Duration::max();  ///< T, the scene's longest_hold
-  std::uint64_t careful_ = 0;               ///< steps with a longer one
+  Duration bound_ = Duration::max();        ///< T when the force of the next interval was chosen
+  Duration least_bound_ = Duration::max();  ///< T of the scene
+  std::uint64_t careful_ = 0;               ///< steps with a longer T
 
   Limits served_;
   Limits since_;                        ///< since the last fresh force
-  std::uint64_t last_fresh_ = 0;        ///< number of its step, from 1
+  std::uint64_t last_fresh_ = 0;        ///< its step number, from 1
   Thinned<Apart> apart_{kMostSamples};  ///< in limited steps
 
-  std::optional<Quat> orientation_;  ///< of the last step that saw one
+  std::optional<Quat> orientation_;  ///< last known orientation
   double torque_work_ = 0;           ///< Σ τ·Δθ, J
 
-  std::optional<Vec3> origin_;  ///< the first position: sums of small numbers keep their digits
+  std::optional<Vec3> origin_;  ///< first position, subtracted for numerical accuracy
   double positions_ = 0;
   Vec3 sum_ = Vec3::Zero();
   Mat3 sum_of_squares_ = Mat3::Zero();
@@ -234,18 +226,17 @@ class RunObserver {
   LocalTime first_force_{};
   LocalTime last_force_{};
   std::optional<Push> newest_;        ///< the force in use
-  std::vector<FeltStep> felt_since_;  ///< since it came
+  std::vector<FeltStep> felt_since_;  ///< steps since it arrived
   Thinned<Push> asked_{kMostSamples};
   Thinned<FeltStep> felt_{kMostSamples};
   Thinned<Duration> loop_ages_{kMostSamples};
 
   DataReader reader_;
   std::map<std::uint32_t, Sent> sent_;  ///< by connection
-  std::deque<Brought> brought_;         ///< the newest, of which one of the two is missing
+  std::deque<Brought> brought_;         ///< the newest, each without its counterpart
   Thinned<Duration> round_trips_{kMostSamples};
 };
 
-/// The summary of a range of steps.
 template <class Steps>
 RunSummary summarise(const Steps& steps) {
   RunObserver observer;
@@ -253,7 +244,7 @@ RunSummary summarise(const Steps& steps) {
   return observer.summary();
 }
 
-/// Whether `why` says that the force is not the one that was asked for. The others are facts about the step.
+/// Returns whether `why` means that the applied force is not the requested one.
 constexpr bool is_limit(Reason why) noexcept { return why != Reason::kOverrun && why != Reason::kWatchdog; }
 
 }  // namespace tendon::lab

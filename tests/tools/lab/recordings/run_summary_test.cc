@@ -107,7 +107,7 @@ TEST(RunSummary, WhatTorquesDoToTheHandIsToldByItself) {
     turn.hand.orientation = rotation_by(Vec3(0, 0, angle));
     turn.was_applied = Vec3(7, 7, torque);
   };
-  turn_on(1.0, 0.5);  // how the first step came to be is not known
+  turn_on(1.0, 0.5);  // the motion before the first step is unknown
   turn_on(0.1, 0.2);
   turn_on(0.2, 0.3);
   turn_on(0, 9, Reason::kUnseen);
@@ -137,7 +137,7 @@ TEST(RunSummary, SharesAreOfTheTimeFromTheFirstFreshForceToTheLast) {
     steps[n].mode = n < 3 ? Mode::kIdle : Mode::kSafeStop;
     steps[n].reasons = Reason::kSafeStop;
   }
-  steps[4].mode = Mode::kSafeStop;  // the engine paused
+  steps[4].mode = Mode::kSafeStop;
   steps[4].reasons = Reason::kSafeStop;
   for (const std::size_t n : {4U, 5U, 9U}) steps[n].wanted = Vec3(3, 0, 4);
   steps[5].applied = Vec3(3, 0, 2);
@@ -168,7 +168,7 @@ TEST(RunSummary, SaysForHowLongOverrunsMadeTheLimiterMoreCareful) {
   for (std::size_t n = 0; n < steps.size(); ++n)
     steps[n].longest_hold = std::chrono::microseconds(n < 3 ? 2000 : n < 7 ? 8000 - static_cast<int>(n) : 2000);
   EXPECT_DOUBLE_EQ(summarise(steps).share_careful, 0.4);
-  for (StepRecord& step : steps) step.longest_hold = {};  // recorded before there was one
+  for (StepRecord& step : steps) step.longest_hold = {};  // as in recordings without this field
   EXPECT_EQ(summarise(steps).share_careful, 0);
 }
 
@@ -207,7 +207,7 @@ TEST(RunSummary, AWallThatIsNoSpringBeginsBetweenNoForceAndForce) {
     if (step.wanted.x() < 0) step.wanted.x() = -5;
   const RunSummary run = summarise(steps);
   ASSERT_TRUE(run.contact && run.contact->above);
-  EXPECT_NEAR(*run.contact->above, 0.002, 6.3e-4);  // so far the hand moves between two forces
+  EXPECT_NEAR(*run.contact->above, 0.002, 6.3e-4);  // tolerance: motion of the hand between two forces
 }
 
 TEST(RunSummary, AWallThatPushesUpTheAxisIsFeltTheSame) {
@@ -274,7 +274,7 @@ TEST(RunSummary, ARunIsNotStableWhenItIsBothActiveAndFasterThanAHandChooses) {
   };
   EXPECT_FALSE(run(6, -1));
   EXPECT_TRUE(run(6, 1));   // fast tapping on a passive wall
-  EXPECT_TRUE(run(1, -1));  // an active wall, held by a strong hand
+  EXPECT_TRUE(run(1, -1));  // an active wall held by a strong hand
   EXPECT_FALSE(run(3.3, -1));
   EXPECT_TRUE(run(2.7, -1));
 }
@@ -302,7 +302,7 @@ TEST(RunSummary, ARunWithoutForcesHasNoLoopAgeAndNoRate) {
   EXPECT_FALSE(run.round_trip);
 }
 
-/// A Data datagram of ours that leaves at `at`.
+/// A Data datagram sent at `at`.
 DatagramRecord sent_at(LocalTime at, std::uint64_t number) {
   DatagramRecord datagram;
   datagram.at = at;
@@ -313,12 +313,13 @@ DatagramRecord sent_at(LocalTime at, std::uint64_t number) {
   return datagram;
 }
 
-/// A force that comes at 145 ms: the peer had our datagram of `sent` at 7000.0 ms of its clock and answers at 7002.5.
+/// A force received at 145 ms. The peer received our datagram of `sent` at 7000.0 ms and answers at 7002.5 ms of its
+/// clock.
 DatagramRecord force_of(std::uint64_t sequence, PeerTime sent, std::uint64_t number = 0) {
   DatagramRecord datagram;
   datagram.at = testing::at_ms(145);
   DataWriter writer;
-  // Written by the peer, to whom its own clock is local.
+  // Written with the peer's clock as local time.
   writer.begin(datagram.bytes, {.connection_id = 1}, LocalTime(7002500us),
                OutgoingEcho{.sent = sent, .received = LocalTime(7000ms), .packet_number = number, .received_mask = 0});
   EXPECT_TRUE(writer.add(
@@ -345,8 +346,8 @@ TEST(RunSummary, AnEchoThatTheServerRefusedIsNoRoundTrip) {
   RunObserver observer;
   observer.observe(sent_at(testing::at_ms(100), 0));
   observer.observe(force_of(1, PeerTime(-66'965'755'690ms)));  // before the session began
-  observer.observe(force_of(2, PeerTime(146ms)));              // of the future
-  observer.observe(force_of(3, PeerTime(100ms), 7));           // of a datagram that was not sent yet
+  observer.observe(force_of(2, PeerTime(146ms)));              // in the future
+  observer.observe(force_of(3, PeerTime(100ms), 7));           // echo of a datagram that was not sent yet
   EXPECT_FALSE(observer.summary().round_trip);
 }
 

@@ -73,7 +73,7 @@ TEST(Trace, NotANumberAndAMissingPositionSayNothing) {
   trace.observe(step);
   EXPECT_TRUE(trace.columns()[0].wanted.empty());
   EXPECT_TRUE(trace.columns()[0].position.empty());
-  EXPECT_TRUE(trace.columns()[0].permitted.empty());  // infinite: there is no bound
+  EXPECT_TRUE(trace.columns()[0].permitted.empty());  // infinite: no bound
   EXPECT_FALSE(trace.columns()[0].empty());
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// tendon-lab accuracy: its command line.
+// Command line of tendon-lab accuracy.
 #include <CLI/CLI.hpp>
 #include <charconv>
 #include <cstdint>
@@ -35,7 +35,7 @@ struct AccuracyArguments {
   std::uint64_t seed = 1;
 };
 
-/// "100x100x50", mm → m.
+/// Parses "100x100x50" in mm; returns m.
 softbody::Vec3 lengths(const std::string& text) {
   softbody::Vec3 size;
   const char* at = text.data();
@@ -53,7 +53,7 @@ softbody::Vec3 lengths(const std::string& text) {
   return size;
 }
 
-/// What the catalogue calls `names`; `find` is its look-up, `all` every name.
+/// Looks up each of `names` with `find`; `all` lists the valid names for the error message.
 template <class Find>
 auto named(const std::vector<std::string>& names, Find find, const std::string& all) {
   std::vector<std::remove_cvref_t<decltype(*find(std::string_view()))>> found;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// tendon-lab bench: its command line.
+// Command line of tendon-lab bench.
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
@@ -37,7 +37,7 @@ void add(CLI::App& verb, int& /*exit*/) {
       "usage.");
   verb.callback([] {
     options.progress = isatty(STDERR_FILENO) != 0;
-    std::signal(SIGPIPE, SIG_IGN);  // a reader that has gone ends the run in order: no process is left behind
+    std::signal(SIGPIPE, SIG_IGN);  // write errors instead of a signal, so that child processes are ended
     bench::bench(options, std::cout);
   });
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// tendon-lab compare: its command line.
+// Command line of tendon-lab compare.
 #include <CLI/CLI.hpp>
 #include <iostream>
 #include <stdexcept>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// tendon-lab cost: its command line.
+// Command line of tendon-lab cost.
 #include <CLI/CLI.hpp>
 #include <iostream>
 

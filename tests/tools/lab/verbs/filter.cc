@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// tendon-lab filter: its command line.
+// Command line of tendon-lab filter.
 #include "tests/tools/lab/recordings/filter.h"
 
 #include <CLI/CLI.hpp>
@@ -44,7 +44,7 @@ void add(CLI::App& verb, int& exit) {
   verb.callback([&exit] {
     const FilterOptions options{.limiter = limiter_of(arguments.law), .json = arguments.json};
     std::ios::sync_with_stdio(false);
-    std::cin.tie(nullptr);  // filter() flushes when nothing waits to be read, not for every row
+    std::cin.tie(nullptr);  // filter() flushes when no input is waiting, not for every row
     if (filter(options, std::cin, std::cout, std::cerr) > 0) exit = 1;
   });
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// tendon-lab floor: its command line.
+// Command line of tendon-lab floor.
 #include <CLI/CLI.hpp>
 #include <iostream>
 

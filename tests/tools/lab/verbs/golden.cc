@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// tendon-lab golden: its command line.
+// Command line of tendon-lab golden.
 #include "tests/tools/lab/golden/golden.h"
 
 #include <CLI/CLI.hpp>

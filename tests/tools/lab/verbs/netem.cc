@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// tendon-lab netem: its command line.
+// Command line of tendon-lab netem.
 #include <CLI/CLI.hpp>
 #include <iostream>
 

@@ -7,7 +7,7 @@
 namespace tendon::lab {
 namespace {
 
-/// Verbs are defined before main() begins, in no certain order.
+/// A function-local static, because verbs register before main() in unspecified order.
 std::vector<Verb>& known() {
   static std::vector<Verb> known;
   return known;

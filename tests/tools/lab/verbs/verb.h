@@ -11,13 +11,13 @@ class App;
 
 namespace tendon::lab {
 
-/// A verb of tendon-lab. Its file defines one at namespace scope, and with that it is on the command line:
+/// A verb of tendon-lab. Its file defines one at namespace scope, which registers it:
 ///
 ///     const Verb kNetem("netem", "What is left of …", [](CLI::App& verb, int& exit) { … });
 ///
-/// `add` gives `verb` its options and its callback. The callback runs the verb and writes to standard output. It may
-/// set `exit` to 1 when the verb ran and failed; it throws std::invalid_argument for wrong usage (exit 2) and anything
-/// else for a failure (exit 1). Options live until the program ends: `add` is called once, so they are static in it.
+/// `add` is called once and gives `verb` its options and callback. The callback writes to standard output. It may set
+/// `exit` to 1 for a negative result; it throws std::invalid_argument for wrong usage (exit 2) and other exceptions for
+/// failures (exit 1). Options must outlive the program's run, so they are static in `add`.
 class Verb {
  public:
   using Add = void (*)(CLI::App& verb, int& exit);
@@ -29,10 +29,10 @@ class Verb {
   Add add;
 };
 
-/// All verbs, by name.
+/// Returns all verbs, sorted by name.
 std::vector<Verb> verbs();
 
-/// "a|b|c", of a catalogue whose rows have a `name`.
+/// Returns "a|b|c" for a catalogue whose rows have a `name`.
 template <class Catalogue>
 std::string names_of(const Catalogue& catalogue) {
   std::string names;
