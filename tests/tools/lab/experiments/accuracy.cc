@@ -30,20 +30,19 @@ namespace {
 using namespace softbody;
 
 constexpr double kNoNumber = std::numeric_limits<double>::quiet_NaN();
-constexpr std::size_t kManyUpdates = 400;  // timed; fewer if …
-constexpr double kSettled = 0.03;          // two times through the script have so nearly the same median, or after …
+constexpr std::size_t kManyUpdates = 400;  // timed updates; fewer after kSettled or kLongestTiming
+constexpr double kSettled = 0.03;          // relative difference of the medians of two passes
 constexpr double kLongestTiming = 4;       // s
-constexpr std::size_t kFirstUpdates = 10;  // show whether it is far too slow
+constexpr std::size_t kFirstUpdates = 10;  // enough to detect a far too slow candidate
 
-/// What a model becomes on a fine mesh: see Accuracy.
+/// Returns the material to which a model converges on a fine mesh; see Accuracy.
 Material material_of(const PressedBlock& block, const AnyModel& model) {
   if (model == AnyModel(compared::Kind::kProjective)) return {.young = 2 * block.material.mu(), .poisson = 0};
   if (model == AnyModel(compared::Kind::kMassSpring)) return {.young = block.material.young, .poisson = 0.25};
   return block.material;
 }
 
-/// What the law of a model makes of its mesh, solved until rounding is all that is left. Models with a law in common
-/// share the answers.
+/// Exact solution of a model's law on its mesh, up to rounding. Models with the same law share results.
 class OnMesh {
  public:
   explicit OnMesh(const PressedBlock& block) : block_(block) {}
@@ -80,7 +79,7 @@ class OnMesh {
   std::map<Key, std::array<Stiffness, 2>> known_;
 };
 
-/// What a settled answer comes to; whose fault it is is not known yet.
+/// Stiffness and total error of a settled answer, not yet divided into parts.
 Accuracy accuracy_of(const Reaction& reaction, const Stiffness& right, double solver) {
   const double k = reaction.force / reaction.depth;
   return {.k = k,
@@ -106,7 +105,7 @@ void split_error(AccuracyPoint& point, Truth& truth, OnMesh& on_mesh) {
     }
     const double mesh = on_mesh.of(point.candidate)[load].secant;
     if (model == AnyModel(compared::Kind::kMassSpring)) {
-      // They have settled, on a mesh whose error is that of the body with ν = 1/4.
+      // These models have converged; the mesh's error is that of the body with ν = 1/4.
       error.model = limit->secant * error.k / mesh / right - 1;
       error.discretisation = error.total - error.model;
       error.solver = 0;
@@ -131,7 +130,7 @@ Route route_of(const Network& network, double update_ms) {
           .compute = from_seconds(1e-3 * update_ms)};
 }
 
-/// What the meter itself costs.
+/// Returns the meter's own cost.
 double floor_of(const Meter& meter) {
   std::vector<double> idle;
   for (int i = 0; i < 200; ++i) {
@@ -141,7 +140,7 @@ double floor_of(const Meter& meter) {
   return quantile(idle, 0.5);
 }
 
-/// The tool goes from one place of the script to the next, in as many steps as a body with time makes meanwhile.
+/// Moves the tool between two positions of the script, in as many steps as a dynamic body needs for the interval.
 template <class Touch>
 void walk(const PressedEngine& engine, const std::vector<Touched>& script, std::size_t to, Touch touch) {
   const int steps =
@@ -150,7 +149,7 @@ void walk(const PressedEngine& engine, const std::vector<Touched>& script, std::
   for (int step = 1; step <= steps; ++step) touch(from + static_cast<double>(step) / steps * (script[to].tool - from));
 }
 
-/// Follows the script once; with a meter it times the updates, and does so again as often as their median asks for.
+/// Follows the script once. With a meter, times the updates and repeats the script until their median is stable.
 void follow_script(PressedEngine& engine, const std::vector<Touched>& script, const Meter* meter, double slowest_ms,
                    AccuracyPoint& point) {
   const double floor = meter != nullptr ? floor_of(*meter) : 0;
@@ -165,7 +164,7 @@ void follow_script(PressedEngine& engine, const std::vector<Touched>& script, co
       times.push_back(std::max(0.0, engine.took(took) - floor));
       if (took.instructions && !point.candidate.elsewhere())
         instructions.push_back(static_cast<double>(*took.instructions));
-      // Twice as long is no accident of a busy machine.
+      // A factor of 2 is not explained by other load on the machine.
       if (times.size() == kFirstUpdates && 1e3 * quantile(times, 0.5) > 2 * slowest_ms) {
         throw TooSlow("an update takes more than " + shortest(slowest_ms) + " ms");
       }
@@ -186,7 +185,7 @@ void follow_script(PressedEngine& engine, const std::vector<Touched>& script, co
     true_squares += script[i].force.squaredNorm();
     largest = std::max(largest, script[i].force.norm());
     point.force_most = std::max(point.force_most, error.norm());
-    if (i < script.size() / 3) aside = std::max(aside, error.head<2>().norm());  // it still goes straight down
+    if (i < script.size() / 3) aside = std::max(aside, error.head<2>().norm());  // while pressing straight down
   }
   point.force_error = std::sqrt(squares / static_cast<double>(script.size()));
   point.force_relative = std::sqrt(squares / true_squares);
@@ -206,7 +205,7 @@ void follow_script(PressedEngine& engine, const std::vector<Touched>& script, co
 
 // ---- The refinement ladders -----------------------------------------------------------------------------------------
 
-/// What a larger n would cost, from the last two: cost ∝ n^p; from one alone with the p that is given.
+/// Extrapolates the cost of a larger n from the last two points with cost ∝ n^p, or from one with the given p.
 double predicted(const std::vector<AccuracyPoint>& ladder, int n, double AccuracyPoint::*cost, double power) {
   if (ladder.empty()) return 0;
   const AccuracyPoint& last = ladder.back();
@@ -219,10 +218,10 @@ double predicted(const std::vector<AccuracyPoint>& ladder, int n, double Accurac
 
 constexpr double kPowerOfFactors = 6;
 constexpr double kPowerOfSolutions = 4;
-constexpr double kPowerOfMeasuring = 2;  // much of it is the loop at the hand, which knows no mesh
+constexpr double kPowerOfMeasuring = 2;  // the loop at the hand does not depend on the mesh
 
-/// The same model and element on finer and finer meshes, up to what an update, a set-up and all of the measuring may
-/// cost. `measured` makes a point of a candidate, or throws.
+/// Measures a model and element on increasingly fine meshes within the limits on update, setup and total time.
+/// `measured` returns a point of a candidate, or throws.
 template <class Measured>
 std::vector<AccuracyPoint> ladder(Candidate candidate, const AccuracyOptions& options,
                                   std::vector<std::string>& left_out, Measured measured) {
@@ -252,7 +251,7 @@ std::vector<AccuracyPoint> ladder(Candidate candidate, const AccuracyOptions& op
 
 std::vector<AnyModel> models_of(const AccuracyOptions& options) {
   if (!options.models.empty()) return options.models;
-  // The quickest first: it is what the others have to beat.
+  // The fastest first, because it sets the error that the others must beat.
   if (options.budget_ms) return {ModelKind::kCondensed, ModelKind::kCorotational, ModelKind::kNeoHookean};
   return all_models();
 }
@@ -264,7 +263,7 @@ std::vector<Element> elements_of(const AccuracyOptions& options) {
   return all;
 }
 
-/// Each model on each element, on no mesh yet; a worker answers after the others.
+/// Each model with each element, without a mesh; workers last.
 std::vector<Candidate> families(const AccuracyOptions& options) {
   std::vector<Candidate> all;
   for (const AnyModel& model : models_of(options)) {
@@ -283,14 +282,13 @@ std::vector<Candidate> families(const AccuracyOptions& options) {
   return all;
 }
 
-/// A candidate on its way to a point: what has been measured of it, and the body for what has not.
+/// A candidate's results so far, and its engine for the rest.
 struct Trial {
   AccuracyPoint point;
   std::unique_ptr<PressedEngine> engine;
 };
 
-/// What it answers, and with a meter what it costs. Whose fault its errors are, and what is left at the hand, is not
-/// asked.
+/// Measures the answers and, with a meter, their cost; neither splits the errors nor runs the loop at the hand.
 Trial tried(const Candidate& candidate, Truth& truth, const Meter* meter, double slowest_ms,
             const std::string& worker = {}) {
   const PressedBlock& block = truth.block();
@@ -319,7 +317,7 @@ void feel(Trial& trial, Truth& truth, const Network& network, double longest_s) 
 
 AccuracyPoint measure(const Candidate& candidate, Truth& truth, OnMesh& on_mesh, const Meter& meter,
                       const std::optional<Network>& network, const Patience& patience, const std::string& worker) {
-  // Work that is done once for all points does not count as this one's.
+  // Computes the shared results first, so that they are not charged to this point.
   truth.script();
   truth.limit(law_of(candidate.model), material_of(truth.block(), candidate.model), 0);
   const Meter::Reading before = meter.read();
@@ -340,13 +338,12 @@ AccuracyPoint measure(const Candidate& candidate, Truth& truth, const Meter& met
 
 namespace {
 
-/// The answer to AccuracyOptions::budget_ms.
 std::optional<AccuracyPoint> best_within(const AccuracyOptions& options, Truth& truth, OnMesh& on_mesh,
                                          const Meter& meter) {
   std::vector<Trial> kept;
-  std::vector<AccuracyPoint> rivals;  // points of the same
+  std::vector<AccuracyPoint> rivals;
   const auto keep = [&](Trial trial) {
-    if (!may_be_best(trial.point, rivals)) return;  // whoever's fault its errors are
+    if (!may_be_best(trial.point, rivals)) return;  // does not depend on the division of its errors
     split_error(trial.point, truth, on_mesh);
     if (!may_be_best(trial.point, rivals)) return;
     std::erase_if(kept, [&](const Trial& one) { return !may_be_best(one.point, {trial.point}); });
@@ -379,7 +376,7 @@ std::optional<AccuracyPoint> best_within(const AccuracyOptions& options, Truth& 
   return best == nullptr ? std::nullopt : std::optional(*best);
 }
 
-/// ms, the median of both ways.
+/// ms, median, both directions.
 double round_trip_ms(const Network& network) {
   const Route route = route_of(network, 0);
   std::vector<double> ms;
@@ -416,7 +413,7 @@ void check(const AccuracyOptions& options) {
     throw std::invalid_argument(
         "--worker: not with --errors-only, --units or --from, whose last bits are the same always");
   }
-  if (options.network) route_of(*options.network, 0);  // an unknown one is refused before anything is measured
+  if (options.network) route_of(*options.network, 0);  // rejects an unknown network before measuring
 }
 
 // ---- Errors alone ---------------------------------------------------------------------------------------------------
@@ -432,7 +429,7 @@ std::vector<Candidate> candidates(const AccuracyOptions& options) {
   return all;
 }
 
-/// What the meshes of a process have in common, from the first one on.
+/// Data shared by the meshes of a process.
 struct Bench {
   explicit Bench(const AccuracyOptions& options) : truth(options.block, options.truth), on_mesh(truth.block()) {
     truth.script();
@@ -448,7 +445,7 @@ MeshErrors errors_of(const Candidate& candidate, Bench& bench) {
     split_error(trial.point, bench.truth, bench.on_mesh);
     errors.point = trial.point;
   } catch (const std::bad_alloc&) {
-    throw;  // another machine has more memory
+    throw;  // another machine may have enough memory
   } catch (const std::exception& error) {
     errors.left_out = error.what();
   }
@@ -522,7 +519,7 @@ void accuracy(const AccuracyOptions& given, std::ostream& out) {
   if (options.errors_only) return errors_only(options, out);
   if (options.part.progress) std::cerr << "the truth …" << std::flush;
   Truth truth(options.block, options.truth);
-  truth.script();  // all that every point needs of it, so that the first one is not charged with it
+  truth.script();  // computed now, so that it is not charged to the first point
   const Meter meter;
   OnMesh on_mesh(options.block);
   if (options.budget_ms) {

@@ -20,16 +20,16 @@ using namespace softbody;
 
 namespace {
 
-/// Of the stiffness of a surface that a bare finger pad feels: Bergmann Tiest & Kappers 2009.
+/// Just noticeable difference of the stiffness of a surface under a bare finger pad: Bergmann Tiest & Kappers 2009.
 constexpr double kJustNoticeable = 15;  // %
-constexpr double kApart = 0.65;         // of the error of another, whose name would lie on this one's
+constexpr double kApart = 0.65;         // ratio of errors below which two labels would overlap
 
 const char* colour_of(std::size_t i) {
   constexpr std::array kColours{kBlue, kVermilion, kGreen, kPurple, kOrange, kSky, kPale};
   return kColours.at(i % kColours.size());
 }
 
-/// A line for a way of answering, the same in all panels; broken for models that are there for comparison …
+/// Line style of a source of answers, the same in all panels; dashed for comparison models.
 Curve curve_of(const Candidate& candidate) {
   const std::vector<AnyModel> models = all_models();
   const auto number = static_cast<std::size_t>(std::ranges::find(models, candidate.model) - models.begin()) +
@@ -39,12 +39,12 @@ Curve curve_of(const Candidate& candidate) {
           .style = for_comparison(candidate.model) ? Curve::Style::kDashed : Curve::Style::kLine};
 }
 
-/// … whose points are rings.
+/// Comparison models have rings as points.
 Curve::Style points_on(const Curve& line) {
   return line.style == Curve::Style::kDashed ? Curve::Style::kRings : Curve::Style::kPoints;
 }
 
-/// Draws a curve and its points; points alone where they make no line.
+/// Draws a curve with its points, or only the points if there are fewer than two.
 void add_with_points(Panel& panel, Curve curve) {
   Curve points{.name = "", .colour = curve.colour, .points = curve.points, .style = points_on(curve)};
   if (curve.points.size() < 2) {
@@ -59,7 +59,6 @@ bool same_way(const std::vector<AccuracyPoint>& ladder, const Candidate& candida
   return ladder.front().candidate.way() == candidate.way();
 }
 
-/// The first of each way of answering.
 std::vector<Candidate> ways_in(const Ladders& ladders) {
   std::vector<Candidate> ways;
   for (const auto& ladder : ladders) {
@@ -70,7 +69,7 @@ std::vector<Candidate> ways_in(const Ladders& ladders) {
   return ways;
 }
 
-/// All of one way, or of all of them.
+/// Returns the points of one source, or of all.
 std::vector<AccuracyPoint> points_of(const Ladders& ladders, const std::optional<Candidate>& way) {
   std::vector<AccuracyPoint> points;
   for (const auto& ladder : ladders) {
@@ -79,13 +78,13 @@ std::vector<AccuracyPoint> points_of(const Ladders& ladders, const std::optional
   return points;
 }
 
-/// "condensed hex27-sri 8"
+/// Formats as "condensed hex27-sri 8".
 std::string label_of(const Candidate& candidate) {
   return candidate.way() + " " + std::string(info(candidate.element).name) + " " + std::to_string(candidate.n);
 }
 
-/// |error| over time: a point for everything, a line for each way of answering through those that nothing else of the
-/// same way is both quicker and closer than; and the front of all of them, by name.
+/// Error (absolute value) over time: a point for each candidate, a line through the Pareto-optimal ones of each source,
+/// and the labeled Pareto front of all.
 Panel error_over_time(const std::string& title, const Ladders& ladders, double extra_ms, std::size_t load) {
   Panel panel{.title = title, .x_label = "ms", .log_x = true, .log_y = true};
   const auto place = [&](const AccuracyPoint& p) {
@@ -103,7 +102,7 @@ Panel error_over_time(const std::string& title, const Ladders& ladders, double e
                           .style = Curve::Style::kBelow});
   Curve front{.name = "best", .colour = kInk, .style = Curve::Style::kBold};
   for (const AccuracyPoint& p : pareto_front(all, load)) {
-    // Of two that are hardly apart the closer one is named.
+    // Of two points with almost equal error, only the more accurate one is labeled.
     if (!front.points.empty() && place(p).second > kApart * front.points.back().second) front.labels.back().clear();
     front.points.push_back(place(p));
     front.labels.push_back(label_of(p.candidate));
@@ -113,7 +112,7 @@ Panel error_over_time(const std::string& title, const Ladders& ladders, double e
     Curve line = curve_of(way);
     Curve points{.name = "", .colour = line.colour, .style = points_on(line)};
     for (const AccuracyPoint& p : points_of(ladders, way)) points.points.push_back(place(p));
-    // A model that collapses on a fine mesh has no parts, and no such points: its name still goes with its colour.
+    // A model that collapses on a fine mesh has no Pareto points; its legend entry is kept.
     for (const AccuracyPoint& p : pareto_front(points_of(ladders, way), load)) line.points.push_back(place(p));
     if (line.points.size() < 2) points.name = std::move(line.name);
     if (line.points.size() >= 2) panel.curves.push_back(std::move(line));
@@ -122,7 +121,7 @@ Panel error_over_time(const std::string& title, const Ladders& ladders, double e
   return panel;
 }
 
-/// |error| of each element over n, for the first way: what refining brings.
+/// Error (absolute value) of each element over n, for the first source.
 Panel error_over_n(const Ladders& ladders) {
   const Candidate& first = ladders.front().front().candidate;
   std::pair range{std::numeric_limits<double>::infinity(), 0.0};
@@ -143,7 +142,7 @@ Panel error_over_n(const Ladders& ladders) {
   return panel;
 }
 
-/// Of all elements of a way of answering the ladder with the point that is felt best.
+/// Returns for each source the ladder that contains the point with the smallest error at the hand.
 std::vector<const std::vector<AccuracyPoint>*> felt_best(const Ladders& ladders) {
   std::vector<const std::vector<AccuracyPoint>*> best;
   const auto least = [](const std::vector<AccuracyPoint>& ladder) {
@@ -163,7 +162,7 @@ std::vector<const std::vector<AccuracyPoint>*> felt_best(const Ladders& ladders)
   return best;
 }
 
-/// What refining a model brings to the hand, over `x` of its points.
+/// Error at the hand over a property `x` of the points.
 template <class X>
 Panel felt_over(const std::string& title, const std::string& label, const Ladders& ladders, bool log_x, X x) {
   Panel panel{.title = title, .x_label = label, .log_x = log_x, .log_y = true};

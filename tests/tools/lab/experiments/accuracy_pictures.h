@@ -6,7 +6,7 @@
 
 namespace tendon::lab {
 
-/// The figures of `tendon-lab accuracy`, in the folder `options.out`. `round_trip_ms`: of the network, if there is one.
+/// Draws the figures of `tendon-lab accuracy` in the folder `options.out`. `round_trip_ms`: of the network, if any.
 void draw(const AccuracyOptions& options, const Ladders& ladders, double round_trip_ms);
 
 }  // namespace tendon::lab

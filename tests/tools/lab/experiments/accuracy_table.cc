@@ -25,7 +25,7 @@
 namespace tendon::lab {
 namespace {
 
-/// All that is known of a point, in the order of the columns of the CSV and the members of the JSON.
+/// All results of a point, in the order of CSV columns and JSON members.
 using Figure = std::variant<std::int64_t, double>;
 using Figures = std::vector<std::pair<const char*, Figure>>;
 std::int64_t count(std::size_t n) { return static_cast<std::int64_t>(n); }
@@ -86,18 +86,18 @@ void add(JsonLine& line, const char* name, const Figure& figure) {
   std::visit([&](auto value) { line.add(name, value); }, figure);
 }
 
-/// "420.2"
+/// Formats as "420.2".
 std::string with_tenths(double value) {
   std::array<char, 32> text{};
   std::snprintf(text.data(), text.size(), "%.1f", value);
   return text.data();
 }
 
-constexpr double kUnfeltMs = 0.1;  // a tenth of a period of the device: nobody feels who is quicker by less
+constexpr double kUnfeltMs = 0.1;  // a tenth of a device period; smaller differences are not felt
 
 double at_the_hand_ms(const AccuracyPoint& p) { return std::max({p.update_ms_p50, p.step_ms, kUnfeltMs}); }
 
-/// Of a point's numbers those that are there without a clock, with their names: to write them and to read them.
+/// Visits a point's clock-independent numbers with their names, for writing and reading.
 template <class Errors, class Visit>
 void visit_numbers(Errors& errors, Visit visit) {
   auto& p = errors.point;
@@ -280,7 +280,7 @@ bool may_be_best(const AccuracyPoint& point, const std::vector<AccuracyPoint>& o
     const Accuracy& own = point.at_load[load];
     const double error = std::isfinite(own.without_luck()) ? own.without_luck() : std::abs(own.total);
     const bool beaten = std::ranges::any_of(others, [&](const AccuracyPoint& other) {
-      // The same mesh by another way is not closer.
+      // Equal up to rounding: the same mesh solved by another method.
       return at_the_hand_ms(other) <= at_the_hand_ms(point) && 0.999 * other.at_load[load].without_luck() <= error;
     });
     if (!beaten && std::isfinite(error)) return true;
@@ -294,7 +294,7 @@ std::vector<AccuracyPoint> pareto_front(std::vector<AccuracyPoint> points, std::
   std::ranges::sort(points, {}, &AccuracyPoint::update_ms_p50);
   double best = std::numeric_limits<double>::infinity();
   std::erase_if(points, [&](const AccuracyPoint& p) {
-    if (error(p) > 0.999 * best) return true;  // the same mesh by another way is not closer
+    if (error(p) > 0.999 * best) return true;  // same mesh solved by another method
     best = error(p);
     return false;
   });

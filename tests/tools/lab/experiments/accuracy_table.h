@@ -12,27 +12,27 @@
 
 namespace tendon::lab {
 
-// What `tendon-lab accuracy` writes: rows for people, CSV, and the answer to --budget-ms.
+// Output of `tendon-lab accuracy`: table rows, CSV, and the answer to --budget-ms.
 
-/// A ladder is one model and element on finer and finer meshes; none is empty.
+/// A ladder is one model and element on increasingly fine meshes. None is empty.
 using Ladders = std::vector<std::vector<AccuracyPoint>>;
 
-/// What is said of the truth, and stays when it is gone.
+/// Properties of the truth that are kept after it is destroyed.
 struct TruthFigures {
-  double linear = 0;  ///< N/m while strains are small
-  double small = 0;   ///< N/m under the small load
-  double hard = 0;    ///< N/m under the hard one
+  double linear = 0;  ///< N/m for small strains
+  double small = 0;   ///< N/m under the smaller load
+  double hard = 0;    ///< N/m under the larger load
   double uncertainty = 0;
 };
 TruthFigures figures_of(Truth& truth);
 
-/// What a mesh comes to without a clock.
+/// Results of a mesh that do not depend on a clock.
 struct MeshErrors {
   AccuracyPoint point;
   TruthFigures truth{};
-  std::string left_out{};  ///< why there is no point
+  std::string left_out{};  ///< reason for a missing point
 };
-/// As a line of JSON with all numbers that are there without a clock, and read again.
+/// Writes all clock-independent numbers as a line of JSON. read_errors() is its inverse.
 JsonLine line_of(const MeshErrors& errors);
 MeshErrors read_errors(const Candidate& candidate, const nlohmann::json& line);
 
@@ -41,16 +41,16 @@ void write_row(std::ostream& out, const AccuracyPoint& p);
 extern const char* const kFeltHeading;
 void write_felt(std::ostream& out, const AccuracyPoint& p);
 void write_truth(std::ostream& out, const TruthFigures& truth, const PressedBlock& block);
-/// What refining costs: a line for each ladder.
+/// Writes the cost exponent of each ladder.
 void write_exponents(std::ostream& out, const Ladders& ladders);
-/// Which one to take.
+/// Writes the recommended candidate.
 void write_answer(std::ostream& out, const AccuracyOptions& options, const std::optional<AccuracyPoint>& best,
                   Truth& truth);
 void write_csv(const std::filesystem::path& file, const std::vector<AccuracyPoint>& points, const TruthFigures& truth,
                const PressedBlock& block);
 std::string to_json(const AccuracyPoint& point, const TruthFigures& truth, const PressedBlock& block);
 
-/// "0.3 N"
+/// Formats as "0.3 N".
 std::string load_text(double newtons);
 
 }  // namespace tendon::lab

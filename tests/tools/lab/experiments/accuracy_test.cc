@@ -18,14 +18,14 @@ using softbody::Element;
 using softbody::Law;
 using softbody::ModelKind;
 
-/// Published: other people's finite elements (deal.II), to 0.1 %.
+/// Published: computed with deal.II, to 0.1 %.
 constexpr double kB1 = 420.2;
 constexpr double kB1NearlyIncompressible = 450.9;
 
-/// Coarser meshes than the verb's, which take half a minute.
+/// Coarser than the verb's default, which takes half a minute.
 constexpr Truth::Config kCoarse{.cells = 2, .cells_for_large = 1.5};
 
-/// A block that is smaller than B1, for the same patch: large strains are the less to be paid for.
+/// A smaller block than B1 with the same patch, which makes large strains cheaper.
 Truth& truth() {
   static Truth the({.size = {0.06, 0.06, 0.03}}, kCoarse);
   return the;
@@ -39,7 +39,7 @@ TEST(AccuracyTruth, OfTheBlockB1IsThatOfOtherPeoplesFiniteElements) {
 TEST(AccuracyTruth, DoesNotLockWhenTheMaterialIsNearlyIncompressible) {
   PressedBlock block;
   block.material.poisson = 0.499;
-  block.loads = {0.01, 0.02};  // next to no strain, which is quick
+  block.loads = {0.01, 0.02};  // very small strain, which is fast
   EXPECT_NEAR(Truth(block, kCoarse).limit(Law::kLinear, 0)->secant / kB1NearlyIncompressible, 1, 0.01);
 }
 
@@ -112,7 +112,7 @@ TEST(Accuracy, TheScriptSeesTheErrorOfTheStiffnessAndNoPushAside) {
   EXPECT_NEAR(point.force_relative, point.at_load[0].total, 0.02);
   EXPECT_GT(point.force_most, point.force_error);
   EXPECT_LT(point.lateral, 1e-3);
-  // A mesh that is not symmetric about the patch does: five tetrahedra's worth of a block of odd cells.
+  // A mesh that is not symmetric about the patch does: tetrahedra with an odd number of cells.
   EXPECT_GT(measure({ModelKind::kCondensed, Element::kTet4, 5}, truth(), meter).lateral, 10 * point.lateral);
 }
 
@@ -190,7 +190,7 @@ TEST(Accuracy, TheParetoFrontKeepsWhatNothingElseIsBothQuickerAndCloserThan) {
                                   0);
   ASSERT_EQ(front.size(), 2U);
   EXPECT_EQ(front[0].update_ms_p50, 1);
-  EXPECT_EQ(front[1].update_ms_p50, 3);  // the last is right by luck, and not among them
+  EXPECT_EQ(front[1].update_ms_p50, 3);  // the last one is accurate only because its errors cancel
 }
 
 TEST(Accuracy, TheExponentOfItsCostIsThatOfItsLadderAndOneMeshHasNone) {
@@ -216,7 +216,7 @@ TEST(Accuracy, AnAsRigidAsPossibleBodyHasNoLambdaAndItsRoundsConverge) {
     EXPECT_NEAR(at.model + at.discretisation + at.solver, at.total, 1e-12);
     EXPECT_LT(std::abs(at.solver), 1e-3);
     EXPECT_GT(at.discretisation, 0.02);
-    EXPECT_LT(at.model, -0.3);  // without resistance against volume
+    EXPECT_LT(at.model, -0.3);  // no volumetric stiffness
   }
 }
 
@@ -255,13 +255,13 @@ TEST(Accuracy, OnlyWhatNothingElseIsAsQuickAndCloserThanMayBeBestAtTheHand) {
   EXPECT_TRUE(may_be_best(point(3, 0.06, 0.09), others));
   EXPECT_TRUE(may_be_best(point(1, 0.5, 0.5), others));
   EXPECT_TRUE(may_be_best(point(3, 0.5, 0.5), {}));
-  // Nobody feels a hundredth of a millisecond.
+  // A hundredth of a millisecond is not felt.
   EXPECT_FALSE(may_be_best(point(0.01, 0.06, 0.2), {point(0.05, 0.05, 0.1)}));
-  // An answer lasts as long as the body's own step.
+  // An answer takes at least the body's own step.
   AccuracyPoint steps = point(1, 0.06, 0.2);
   steps.step_ms = 4;
   EXPECT_FALSE(may_be_best(steps, others));
-  // Errors that cancel do not count, once they are known.
+  // Errors that cancel do not count once the parts are known.
   AccuracyPoint lucky = point(3, 0.01, 0.01);
   EXPECT_TRUE(may_be_best(lucky, others));
   for (Accuracy& at : lucky.at_load) at = {.total = 0.01, .model = -0.2, .discretisation = 0.21};
@@ -271,7 +271,7 @@ TEST(Accuracy, OnlyWhatNothingElseIsAsQuickAndCloserThanMayBeBestAtTheHand) {
 TEST(Accuracy, TheAnswerWithinABudgetIsTheClosestOfThoseThatAreQuickEnough) {
   AccuracyOptions options;
   options.block = truth().block();
-  options.block.loads = {0.01, 0.02};  // next to no strain, which is quick
+  options.block.loads = {0.01, 0.02};  // very small strain, which is fast
   options.truth = kCoarse;
   options.models = {ModelKind::kCondensed, ModelKind::kLinear};
   options.elements = {Element::kHex8Sri, Element::kHex27Sri};

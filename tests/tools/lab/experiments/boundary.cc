@@ -25,9 +25,9 @@
 namespace tendon::lab {
 namespace {
 
-constexpr double kOff = 1e-3;  // m
+constexpr double kOff = 1e-3;  // m, initial displacement
 
-/// Mean of the squared distance from the spring's rest in the last quarter over that in the second.
+/// Returns whether the mean squared distance from equilibrium is larger in the last quarter than in the second.
 bool grows(const SampledSpring& spring) {
   SimulatedDevice::Config config;
   config.mass = spring.mass;
@@ -54,13 +54,13 @@ bool grows(const SampledSpring& spring) {
 
 constexpr std::array kDelays = {0, 1, 2, 3, 5, 8, 13, 20, 32, 50};                        // samples of 1 ms
 constexpr std::array kRates = {25.0, 50.0, 100.0, 200.0, 500.0, 1000.0, 2000.0, 4000.0};  // Hz
-constexpr int kMapped = 6;  // springs below the exact limit and above it, to a quarter and to four times of it
+constexpr int kMapped = 6;  // springs above and below the exact limit, within a factor of 4
 
-/// A row of the table, and a column of the map that the figure shows.
+/// A row of the table and a column of the map in the figure.
 struct Point {
   SampledSpring spring;
   double simulated = 0, eigenvalues = 0, linear = 0, passive = 0;
-  std::string map{};  ///< 'x' for a spring that swings up, '.' for one that comes to rest; empty when nobody draws it
+  std::string map{};  ///< 'x' for a diverging spring, '.' for one that comes to rest; empty without a figure
 };
 
 double mapped_stiffness(const Point& point, int i) { return point.eigenvalues * std::pow(4, i / 6.0); }
@@ -79,7 +79,7 @@ Point point(const SampledSpring& spring, bool mapped) {
   return p;
 }
 
-/// What SimulatedDevice does below and above the boundary: the map over which the curves are drawn.
+/// Simulated results below and above the limit: the map behind the curves.
 std::pair<Curve, Curve> field(std::span<const Point> points, double (*x)(const SampledSpring&)) {
   Curve rests{.name = "comes to rest", .colour = kSky, .style = Curve::Style::kPoints};
   Curve swings{.name = "swings up", .colour = kOrange, .style = Curve::Style::kPoints};
@@ -130,7 +130,7 @@ double simulated_stiffness_limit(const SampledSpring& spring) {
 
 namespace {
 
-/// Of the rows: delays at 1 kHz, then rates without delay.
+/// Rows: delays at 1 kHz, then rates without delay.
 SampledSpring spring_of(const BoundaryOptions& options, std::uint64_t unit) {
   SampledSpring spring{.mass = options.mass, .viscous = options.viscous, .period = std::chrono::milliseconds(1)};
   if (unit < kDelays.size()) {
@@ -218,7 +218,7 @@ void boundary(const BoundaryOptions& options, std::ostream& out) {
         *options.out / "boundary", "How stiff a sampled spring may be",
         shortest(options.mass) + " kg, " + shortest(options.viscous) + " N s/m; commit " + std::string(kCommit),
         {panel("Stiffness, N/m, over delay at 1 kHz", "delay, ms",
-               all.subspan(1, kDelays.size() - 1),  // no delay has no place on a logarithmic axis
+               all.subspan(1, kDelays.size() - 1),  // zero cannot be shown on a logarithmic axis
                [](const SampledSpring& s) { return seconds(s.period) * s.delay_samples * 1e3; }),
          panel("Stiffness, N/m, over rate without delay", "rate, Hz", all.subspan(kDelays.size()),
                [](const SampledSpring& s) { return 1 / seconds(s.period); })});

@@ -10,9 +10,9 @@
 
 namespace tendon::lab {
 
-/// The K (N/m) from which SimulatedDevice, without a hand, does not come to rest on a spring that is sampled and held:
-/// 1 mm off, its amplitude grows over 60 of its own periods. Found by bisection to 0.5 %. Mass, b, T and d as in
-/// `spring`; neither Coulomb friction nor counts.
+/// Returns the K (N/m) above which SimulatedDevice without a hand does not come to rest on a sampled and held spring:
+/// from 1 mm, the amplitude grows over 60 of its periods. Found by bisection to 0.5 %. Mass, b, T and d are those of
+/// `spring`; no Coulomb friction or encoder counts.
 double simulated_stiffness_limit(const SampledSpring& spring);
 
 struct BoundaryOptions {
@@ -23,7 +23,7 @@ struct BoundaryOptions {
   Part part{};  ///< its units are the rows of the table, 0 to 17
 };
 
-/// `tendon-lab boundary`: how stiff a spring may be over delay and over rate, simulated beside the closed forms.
+/// `tendon-lab boundary`: stability limit of a spring over delay and rate, simulated and in closed form.
 void boundary(const BoundaryOptions& options, std::ostream& out);
 
 }  // namespace tendon::lab

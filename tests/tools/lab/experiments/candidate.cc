@@ -14,7 +14,7 @@ namespace {
 
 using namespace softbody;
 
-constexpr double kReach = 0.3;     // patch radii, the size of a surface table
+constexpr double kReach = 0.3;     // patch radii, size of a surface table
 constexpr int kStaticModes = 3;    // per axis
 constexpr double kDensity = 1000;  // kg/m³, the density of water
 

@@ -17,24 +17,24 @@
 
 namespace tendon::lab {
 
-/// A model for `tendon-lab accuracy`: either a model of clients/softbody or a comparison model.
+/// A model of clients/softbody or a comparison model.
 using AnyModel = std::variant<softbody::ModelKind, softbody::compared::Kind>;
 
-/// All models. The comparison models come last.
+/// Returns all models, comparison models last.
 std::vector<AnyModel> all_models();
 std::string names_of_models();  ///< "linear|condensed|…"
 std::optional<AnyModel> any_model_named(std::string_view name);
 
 std::string_view name_of(const AnyModel& model);
-/// Returns true for a comparison model. The figures show it as a dashed line, and it is never recommended.
+/// Returns true for comparison models, which the figures show as dashed lines and which are never recommended.
 bool for_comparison(const AnyModel& model);
 bool wants_tetrahedra(const AnyModel& model);
-/// Returns the material law of a model. For `near` this is the law of the truth.
+/// Returns the material law of a model; for `near` that of the truth.
 softbody::Law law_of(const AnyModel& model);
 
-/// A model on a mesh with `n` cells along x. The cells have about the same size along y and z.
+/// A model on a mesh with `n` cells along x and cells of about the same size along y and z.
 struct Candidate {
-  /// The source of the answers: the model, the learned shapes or the table of a `near` body, or the external process
+  /// Source of the answers: the model, the learned shapes or the table of a `near` body, or the process
   /// AccuracyOptions::worker.
   enum class By : std::uint8_t { kModel, kLearned, kTable, kWorker };
 
@@ -48,13 +48,12 @@ struct Candidate {
   std::string name() const;  ///< way and element: "linear-hex8-sri"
 };
 
-/// Creates the mesh of a candidate, with fixed nodes on its bottom. The material and the law are passed separately
-/// because they can differ from those of the block and of the model.
+/// Creates the candidate's mesh, fixed at the bottom. Material and law may differ from those of block and model.
 softbody::Solid solid_of(const PressedBlock& block, const Candidate& candidate, softbody::Law law,
                          const softbody::Material& material);
 
-/// Creates the engine of a candidate. `worker` is the command of the external process, if the candidate uses one.
-/// Throws the exception of the model if the model does not support the mesh.
+/// Creates the candidate's engine. `worker` is the command of the external process, if used. Throws the model's
+/// exception if it does not support the mesh.
 std::unique_ptr<PressedEngine> engine_of(const PressedBlock& block, const Candidate& candidate,
                                          const std::string& worker);
 

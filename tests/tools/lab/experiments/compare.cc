@@ -108,7 +108,7 @@ JsonLine json_of(const Cell& cell, std::uint64_t seed) {
   return line;
 }
 
-/// Some of the cells by law: what they come down to.
+/// Summary of a law's cells.
 struct Summary {
   Contender contender;
   std::size_t cells = 0;
@@ -117,8 +117,8 @@ struct Summary {
   double error = 0;      ///< median of the relative force error
   double vibration = 0;  ///< m/s, median
   double sensation = 0;  ///< dB above what a hand just feels, median
-  double noticed = 0;    ///< share of the time, median
-  double given_out = 0;  ///< J, the most
+  double noticed = 0;    ///< fraction of the time, median
+  double given_out = 0;  ///< J, maximum
   double limited = 0;    ///< median share
   double latency = 0;    ///< s, median
 };
@@ -161,7 +161,7 @@ std::vector<Summary> summaries(const std::vector<Cell>& cells, const std::functi
   return result;
 }
 
-/// In which sense a law promises to be passive on this device; laws that promise nothing are held against the freest.
+/// Returns the passivity constraint that a law guarantees on this device; for laws without a guarantee the weakest one.
 Passive sense_of(const Contender& contender, const Friction& friction) {
   if (!contender.promises) return Passive::kOnThisMotion;
   if (contender.law != Law::kAolPlus) return Passive::kWhateverComes;
@@ -175,10 +175,10 @@ Passive sense_of(const Contender& contender, const Friction& friction) {
   return parts.bounded_acceleration ? Passive::kAccelerating : Passive::kWhateverComes;
 }
 
-/// The floors of the hands of the grid on perfect springs: each is computed when it is first asked for.
+/// Lower bounds for the grid's hands on ideal springs, computed on demand.
 class Floors {
  public:
-  /// Of each cell of `contender`, as a share of the true force; the median.
+  /// Median over the cells of `contender`, relative to the true force.
   double median_of(const Contender& contender, const std::vector<Cell>& cells) {
     std::vector<double> floors;
     for (const Cell& cell : cells) {
@@ -198,8 +198,8 @@ class Floors {
   std::map<std::tuple<double, double, bool, Passive>, double> known_;
 };
 
-/// A sentence: the law with the least force error of those that promise to be passive, and were, and were stable
-/// throughout; and what would have been better still here, without a promise.
+/// Writes a sentence naming the law with the least force error among those that guarantee passivity, were passive and
+/// stable throughout, and a better law without guarantee, if any.
 void recommend(std::ostream& out, const std::string& where, const std::vector<Summary>& laws) {
   const auto best_of = [&](bool promised) {
     const Summary* best = nullptr;
@@ -387,7 +387,6 @@ Verdict verdict(const std::vector<Cell>& cells, std::uint64_t seed, std::size_t 
 
 namespace {
 
-/// All cells of a situation.
 std::vector<Cell> cells_of(const Situation& situation, std::uint64_t seed) {
   std::vector<Cell> cells;
   for (const Contender& contender : contenders()) {

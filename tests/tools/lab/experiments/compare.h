@@ -14,18 +14,18 @@
 
 namespace tendon::lab {
 
-/// One situation: a spring that pulls and pushes, a network, a device and a hand that is free to move.
+/// A spring (bilateral) behind a network, a device, and a hand that is free to move.
 struct Situation {
   double stiffness = 0;  ///< N/m
   double delay_ms = 0;
-  double jitter_ms = 0;  ///< at most so much later; later forces overtake earlier ones
+  double jitter_ms = 0;  ///< maximum additional delay; forces may overtake each other
   double rate_hz = 0;
-  double loss = 0;    ///< share
+  double loss = 0;    ///< fraction
   Friction friction;  ///< of the device
-  bool firm = false;  ///< hand 800 N/m, 3 N·s/m, 100 g; else 400, 0.3, 50
+  bool firm = false;  ///< hand of 800 N/m, 3 N·s/m, 100 g; otherwise 400, 0.3, 50
 };
 
-/// The grid: every combination, the same for every law, fixed before anything is run.
+/// Returns all combinations; the same for every law.
 std::vector<Situation> comparison_grid();
 
 struct Cell {
@@ -36,32 +36,34 @@ struct Cell {
 
   std::string_view name() const noexcept { return preset ? info(*preset).name : info(law).name; }
 
-  /// The device gave out nothing that had not been put in; rounding aside. Exact positions, true friction.
+  /// True if the device output no net energy, within rounding. Uses exact positions and the true friction.
   bool passive() const noexcept { return outcome.least_energy >= -1e-9; }
 };
 
-/// `law` in a situation: 2 s of a hand that swings 15 mm at 0.5 Hz, a device with counts of 30 µm and 8.5 N. Laws that
-/// have to know the environment are told the truth. AOL+ has its default parts, and bounded acceleration where the
-/// device has little damping.
+/// Runs `law` for 2 s with a hand that moves by 15 mm at 0.5 Hz and a device with 30 µm resolution and 8.5 N. Laws with
+/// a model of the environment get the true one. AOL+ has its default parts, plus bounded acceleration if the device has
+/// little damping.
 Cell compare_cell(const Situation& situation, Law law, std::uint64_t seed);
-/// … or those of `parts`.
+/// Runs AOL+ with these parts.
 Cell compare_cell(const Situation& situation, Law law, std::uint64_t seed, const AolPlus<1, 3>::Parts& parts);
 
-/// … or those of a preset, with its learned model.
+/// Runs a preset with its learned model.
 Cell compare_cell(const Situation& situation, Preset preset, std::uint64_t seed);
 
-/// What AOL+ without a preset has against every other law that promises to be passive.
+/// Comparison of AOL+ without a preset with the other passive laws.
 struct Verdict {
-  std::size_t cells = 0;    ///< of AOL+
-  std::size_t passive = 0;  ///< … in which it was
-  std::size_t beaten = 0;   ///< … in which another law that promises passivity, and keeps it, has a lower force error
-  std::size_t beaten_clearly = 0;  ///< … by more than 5 %
-  /// Why, in the beaten cells: the part without which AOL+ would not have been. Run again, part by part.
+  std::size_t cells = 0;    ///< number of cells
+  std::size_t passive = 0;  ///< cells in which AOL+ was passive
+  /// Cells in which another law that guarantees passivity, and was passive, has a lower force error.
+  std::size_t beaten = 0;
+  std::size_t beaten_clearly = 0;  ///< the same, lower by more than 5 %
+  /// Beaten cells by cause: the part of AOL+ without which it would not have been beaten, found by running it without
+  /// each.
   std::size_t robust_ledger = 0, knee = 0, energy_cap = 0, bounded_acceleration = 0;
-  std::size_t vibrating = 0;  ///< no single part, but it vibrates there: the other is too soft to
+  std::size_t vibrating = 0;  ///< no single part; the other law is too soft to vibrate there, AOL+ vibrates
   std::size_t no_single_part = 0;
 };
-/// The cells of one situation stand together, in the order of laws(); situation i had the seed `seed` + i · `every`.
+/// `cells` are grouped by situation, in the order of laws(); situation i has the seed `seed` + i · `every`.
 Verdict verdict(const std::vector<Cell>& cells, std::uint64_t seed, std::size_t every);
 
 struct CompareOptions {
@@ -69,10 +71,10 @@ struct CompareOptions {
   std::uint64_t seed = 1;
   std::optional<std::filesystem::path> out{};  ///< folder for compare.csv and the figures
   bool json = false;
-  Part part{};  ///< its units are the situations that are taken, from 0 on, each with all laws
+  Part part{};  ///< its units are the selected situations from 0, each with all laws
 };
 
-/// `tendon-lab compare`: every law in every situation, with the same seeds, and which one to use where.
+/// `tendon-lab compare`: runs every law in every situation with the same seeds, and recommends laws.
 void compare(const CompareOptions& options, std::ostream& out);
 
 }  // namespace tendon::lab

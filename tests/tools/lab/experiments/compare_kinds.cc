@@ -25,7 +25,7 @@ namespace {
 struct Result {
   std::uint64_t seed = 0;
   std::string drawn;
-  std::vector<Outcome> outcomes;  ///< of the contenders, in their order
+  std::vector<Outcome> outcomes;  ///< in the order of the contenders
 };
 
 double error_of(const Outcome& outcome) {
@@ -40,18 +40,19 @@ double median_of(std::vector<double> values) {
   return *middle;
 }
 
-/// What the situations of a kind come down to for one contender.
+/// Summary of a contender in a kind of situation.
 struct Line {
   std::size_t cells = 0;
   double passive = 0, within8 = 0, within3 = 0, within1_5 = 0;  ///< shares
   double error = 0, vibration = 0, sensation = 0, noticed = 0;  ///< medians: %, mm/s, dB, share
-  std::size_t beaten = 0;                                       ///< by more than 3 points
-  double worst = 0;  ///< points above the best other one that promises to be passive, and was
+  std::size_t beaten = 0;                                       ///< by more than 3 percentage points
+  /// Percentage points, largest excess over the best other law that guarantees passivity and was passive.
+  double worst = 0;
   std::uint64_t worst_seed = 0;
 };
 
 Line line_of(const std::vector<Result>& results, const std::vector<Contender>& all, std::size_t of) {
-  constexpr double kClearly = 3;  // points
+  constexpr double kClearly = 3;  // percentage points
   Line line{.cells = results.size()};
   std::vector<double> errors;
   std::vector<double> vibrations;
@@ -111,7 +112,7 @@ std::vector<Contender> chosen(const std::vector<std::string>& names) {
   return some;
 }
 
-/// All situations of a kind, on as many threads as there are processors; in the order of their seeds.
+/// Runs all situations of a kind on all processors; results are in the order of their seeds.
 std::vector<Result> results_of(const std::string& kind, std::uint64_t first, std::size_t count,
                                const std::vector<Contender>& all, bool progress) {
   std::vector<Result> results(count);
@@ -153,7 +154,7 @@ void compare_kinds(const CompareKindsOptions& options, std::ostream& out) {
   }
   const std::vector<Contender> all = chosen(options.laws);
   const std::uint64_t first = options.seed + (options.held_out ? kHeldOutSeeds : 0);
-  for (const std::string& kind : kinds) draw_situation(kind, first);  // a name that is none is refused before any work
+  for (const std::string& kind : kinds) draw_situation(kind, first);  // rejects an unknown kind before any work
 
   std::ofstream csv;
   if (options.out) {

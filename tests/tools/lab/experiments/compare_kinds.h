@@ -14,19 +14,19 @@ namespace tendon::lab {
 struct CompareKindsOptions {
   std::vector<std::string> kinds{};            ///< names of situation_kinds(); "all": every one
   std::size_t count = 200;                     ///< situations of each kind
-  std::uint64_t seed = 1;                      ///< of the first; the next has the next
-  bool held_out = false;                       ///< kHeldOutSeeds is added to the seed
-  std::vector<std::string> laws{};             ///< names of contenders(); empty: those that promise to be passive
+  std::uint64_t seed = 1;                      ///< of the first situation; consecutive
+  bool held_out = false;                       ///< adds kHeldOutSeeds to the seed
+  std::vector<std::string> laws{};             ///< names of contenders(); empty: all that guarantee passivity
   std::optional<std::filesystem::path> out{};  ///< folder for compare_kinds.csv
-  bool json = false;                           ///< one object for each kind and contender
-  bool progress = false;                       ///< on standard error
+  bool json = false;                           ///< one object per kind and contender
+  bool progress = false;                       ///< prints to standard error
 };
 
-/// `tendon-lab compare --kinds`: laws in situations that are drawn from seeds. A table for each kind: how many are
-/// passive and quiet, the median error, and where a contender is furthest above the best other one that promises to be
-/// passive and was, with the seed that draws that situation again. The number of threads changes no result.
+/// `tendon-lab compare --kinds`: runs laws in situations drawn from seeds. A table per kind shows how many runs are
+/// passive and quiet, the median error, and where a contender is furthest behind the best other law that guarantees
+/// passivity and was passive, with the seed of that situation. Results do not depend on the number of threads.
 ///
-/// Throws std::invalid_argument for a kind or law that is none.
+/// Throws std::invalid_argument for an unknown kind or law.
 void compare_kinds(const CompareKindsOptions& options, std::ostream& out);
 
 }  // namespace tendon::lab

@@ -21,7 +21,7 @@ TEST(Compare, AolPlusGivesOutNothingInASampleOfTheGrid) {
   }
 }
 
-/// Of the whole grid: 100 % passive, 99.9 % within 8 mm/s, 98 % within 3, 68 % within 1.5; 17.4 % error.
+/// For the whole grid: 100 % passive, 99.9 % within 8 mm/s, 98 % within 3, 68 % within 1.5; 17.4 % error.
 TEST(Compare, ThePresetIsPassiveQuietAndTrueInASampleOfTheGrid) {
   const auto grid = comparison_grid();
   std::size_t within3 = 0;

@@ -27,10 +27,10 @@ namespace {
 constexpr Friction kFriction = LawSteps::kFriction;
 constexpr std::size_t kBatch = LawSteps::kPeriod;
 constexpr double kStiffness = LawSteps::kStiffness;
-constexpr double kSoft = 300;  // N/m, behind an estimator: the limiter is not what costs force then
+constexpr double kSoft = 300;  // N/m, with an estimator, so that the limiter causes no force error
 constexpr Duration kRare = LawSteps::kEnvironmentDelay;
 
-/// Keeps the compiler from leaving out what nobody looks at.
+/// Keeps the compiler from removing `value`.
 template <class T>
 void keep(const T& value) {
   asm volatile("" : : "g"(&value) : "memory");
@@ -41,10 +41,9 @@ struct Costed {
   std::string name;
   double nanoseconds = 0;
   std::optional<double> instructions{};
-  std::optional<double> force_error{};  ///< N, rms, with it
+  std::optional<double> force_error{};  ///< N, rms, remaining
 };
 
-/// Batches of a step.
 class Bench {
  public:
   explicit Bench(int batches) : batches_(batches) {}
@@ -57,7 +56,7 @@ class Bench {
       const Meter::Reading before = meter_.read();
       for (std::size_t i = 0; i < kBatch; ++i) step(i);
       const Meter::Reading took = meter_.read() - before;
-      if (b == 0) continue;  // caches are cold
+      if (b == 0) continue;  // cold caches
       times.push_back(1e9 * took.wall / static_cast<double>(kBatch));
       if (took.instructions) {
         instructions.push_back(static_cast<double>(*took.instructions) / static_cast<double>(kBatch));

@@ -13,10 +13,9 @@ struct CostOptions {
   bool json = false;
 };
 
-/// `tendon-lab cost`: nanoseconds (and instructions, where the kernel lets us count them) in one step of each law, each
-/// part of AOL+, each model of the output estimator and each form and order of its least squares in float32 and
-/// float64, beside the force error that is left with it. The floor is the same loop with nothing in it, in the same
-/// run; it is not taken off.
+/// `tendon-lab cost`: time (and instructions, if the kernel counts them) per step of each law, each part of AOL+, each
+/// model of the output estimator, and each form and order of its least squares in float32 and float64, with the
+/// remaining force error. The baseline, an empty loop in the same run, is not subtracted.
 void cost(const CostOptions& options, std::ostream& out);
 
 }  // namespace tendon::lab

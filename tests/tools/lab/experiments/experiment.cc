@@ -15,12 +15,12 @@
 namespace tendon::lab {
 namespace {
 
-constexpr double kMeanOver = 0.05;         // s, what is slower than this is not vibration
+constexpr double kMeanOver = 0.05;         // s; slower motion is not vibration
 constexpr double kLongestLatency = 0.5;    // s
 constexpr std::uint32_t kDatagram = 200;   // bytes
-constexpr double kCorrelationStep = 2e-3;  // s, between the samples that are correlated
+constexpr double kCorrelationStep = 2e-3;  // s, between the correlated samples
 
-/// The environment and the network to it: takes motions, gives forces when it is time.
+/// The environment behind its network.
 class Remote {
  public:
   Remote(const Environment& environment, std::uint64_t seed) : environment_(environment), dice_(seed) {
@@ -29,7 +29,7 @@ class Remote {
     back_.emplace(environment.route->back, seed, 0, injector::Direction::kUp, LocalTime{});
   }
 
-  /// Where the hand had been resting when the clock starts: that has been answered.
+  /// The answer to the hand's rest position, which has arrived before the clock starts.
   RemoteForce at_rest(const Motion& hand) { return answer(hand, hand.at); }
 
   void observe(const Motion& hand) {
@@ -39,14 +39,14 @@ class Remote {
     }
     if (hand.at < next_) return;
     next_ += environment_.period;
-    // Drawn even if not used, so that every law meets the same fate of the same datagram.
+    // Drawn even if unused, so that the same datagram has the same fate with every law.
     const bool lost = dice_.chance(environment_.loss);
     const Duration late = from_seconds(seconds(environment_.jitter) * dice_.uniform());
     const RemoteForce next = answer(hand, hand.at + environment_.delay + late);
     if (!lost) under_way_.push_back(next);
   }
 
-  /// The newest force that has arrived since the last time, if any.
+  /// Returns the newest force that arrived since the last call, if any.
   std::optional<RemoteForce> arrived(LocalTime now) {
     std::optional<RemoteForce> newest;
     std::erase_if(under_way_, [&](const RemoteForce& force) {
@@ -68,7 +68,7 @@ class Remote {
     work(hand.at);
   }
 
-  /// What the engine has begun by `now`, when all motions that had come to it by then are known.
+  /// Simulates the engine up to `now`; all motions that arrive by then must be known.
   void work(LocalTime now) {
     while (true) {
       auto first = LocalTime::max();
@@ -81,7 +81,7 @@ class Remote {
         if (one.hand.at > newest.at) newest = one.hand;
         return true;
       });
-      if (newest.at <= answered_.at) continue;  // all of them were older than one that overtook them
+      if (newest.at <= answered_.at) continue;  // only motions that were overtaken by a newer one
       answered_ = newest;
       free_ = start + environment_.route->compute;
       const injector::Decision way = back_->decide({.arrival = free_, .size = kDatagram});
@@ -118,9 +118,9 @@ class Remote {
   };
   std::optional<injector::Injector> there_;
   std::optional<injector::Injector> back_;
-  std::vector<Waiting> waiting_;  ///< at the engine or on their way there
+  std::vector<Waiting> waiting_;  ///< at the engine or in transit
   Motion answered_{.at = LocalTime::min()};
-  LocalTime free_{};  ///< when the engine has answered that
+  LocalTime free_{};  ///< when the engine finishes the current answer
 };
 
 HapticController::Config controller(const Experiment& experiment) {
@@ -139,7 +139,7 @@ HapticController::Config controller(const Experiment& experiment) {
 
 double count(double x, double step) { return step > 0 ? std::round(x / step) * step : x; }
 
-/// Both kinds of hand: where it is, where the device says it is, and what becomes of a force.
+/// Common interface of both kinds of hand: true position, measured position, and response to a force.
 class Hand {
  public:
   explicit Hand(const PrescribedMotion& motion) : motion_(&motion), friction_(motion.friction) {}
@@ -148,7 +148,7 @@ class Hand {
   const Friction& friction() const { return friction_; }
   const Vec3& position() const { return position_; }
   const Vec3& velocity() const { return velocity_; }
-  /// Where the motors push: with a structural mode that is not where the handle is.
+  /// Position of the motors, which a structural mode separates from the handle.
   Vec3 motor_position() const { return device_ ? Vec3(position_ + device_->truth().deflection) : position_; }
 
   Motion read(LocalTime now) {
@@ -222,7 +222,7 @@ std::vector<Moment> run(const Experiment& experiment) {
 std::vector<Vec3> fast_velocity(const std::vector<Moment>& record, Duration period, double last) {
   const auto half = static_cast<std::size_t>(kMeanOver / seconds(period) / 2);
   const auto wanted = static_cast<std::size_t>(std::llround(last / seconds(period)));
-  // A mean of two neighbours and the sample itself is the least that tells vibration from motion.
+  // At least one neighbor on each side is needed to separate vibration from motion.
   const std::size_t reach = std::max<std::size_t>(half, 1);
   if (record.size() < 2 * reach + 2) return {};
   const std::size_t end = record.size() - reach;
@@ -269,7 +269,7 @@ double stiffness(const std::vector<Moment>& record) {
   return n > 0 ? sum / n : 0;
 }
 
-/// The shift at which what is felt looks most like what is true.
+/// Returns the shift that maximizes the correlation between felt and true force.
 double latency(const std::vector<Moment>& record, Duration period) {
   const auto stride = std::max<std::size_t>(1, static_cast<std::size_t>(kCorrelationStep / seconds(period)));
   const auto longest = std::min(static_cast<std::size_t>(kLongestLatency / seconds(period)), record.size() / 2);

@@ -14,99 +14,99 @@
 
 namespace tendon::lab {
 
-/// An engine that takes time, behind a network that tendon-inject knows. The device's motions go there once a period
-/// of its loop; when the engine is free it answers the newest that has come, and never queues.
+/// An engine with a computing time behind a network of tendon-inject. The device sends its motion once per engine
+/// period; a free engine answers the newest one that arrived, without a queue.
 struct Route {
-  injector::Profile there;  ///< of motions
-  injector::Profile back;   ///< of forces
-  Duration compute{};       ///< for an answer
+  injector::Profile there;  ///< for motions
+  injector::Profile back;   ///< for forces
+  Duration compute{};       ///< per answer
 };
 
-/// A remote environment behind a network, as values in and values out: what it answers to a place and a time. When the
-/// clock starts the hand has been resting where it is for so long that the answer to that is already there.
+/// A remote environment behind a network: its answer to a position and a time. Before the clock starts the hand has
+/// been at rest at its position, and the answer to that has arrived.
 struct Environment {
   using Force = std::function<Vec3(double t, const Vec3& position)>;
   using Stiffness = std::function<Mat3(double t, const Vec3& position)>;
   using Surface = std::function<Contact(double t, const Vec3& position)>;
 
-  Force force;            ///< N, on the hand, `t` seconds after the start: the truth
-  Stiffness stiffness{};  ///< −∂F/∂x, N/m, sent along as local model; left out: none is sent
-  Surface surface{};      ///< sent along, with its table if it has one; left out: none is sent
+  Force force;                                     ///< N, on the hand, `t` seconds after the start: the truth
+  Stiffness stiffness{};                           ///< −∂F/∂x, N/m, sent as local model; empty: not sent
+  Surface surface{};                               ///< sent with its table, if any; empty: not sent
   Duration period = std::chrono::milliseconds(1);  ///< of its forces
-  Duration delay{};                                ///< from the motion being sampled to the force being there
-  Duration jitter{};             ///< at most so much longer; later forces overtake earlier ones, which then are dropped
-  double loss = 0;               ///< share of its forces that never arrive
-  std::optional<Route> route{};  ///< instead of the four above
-  /// N, on the hand, what an environment without error would answer: Moment::true_force. Left out: `force`.
+  Duration delay{};                                ///< from sampling a motion to the arrival of its force
+  Duration jitter{};             ///< maximum additional delay; a force that is overtaken by a later one is dropped
+  double loss = 0;               ///< fraction of forces lost
+  std::optional<Route> route{};  ///< replaces the four above
+  /// N, on the hand: the error-free answer, see Moment::true_force. Empty: `force`.
   Force truth{};
 };
 
-/// A hand that goes its way whatever it feels. Displayed stiffness is measured on it.
+/// A hand on a prescribed path, independent of forces; used to measure displayed stiffness.
 struct PrescribedMotion {
   std::function<Vec3(double t)> position;  ///< m
-  Friction friction;                       ///< that the device really has
+  Friction friction;                       ///< true friction of the device
   double encoder_step = 0;                 ///< m, per axis; 0 = exact
 };
 
-/// A simulated device with a hand that feels it. Instability is shown on it.
+/// A simulated device with a hand that responds to forces; used to show instability.
 using FreeHand = SimulatedDevice::Config;
 
 struct Experiment {
   Environment environment;
   std::variant<PrescribedMotion, FreeHand> hand;
-  LimiterConfig limiter;  ///< its longest_hold is `period`, its max_force that of the experiment
-  std::optional<OutputEstimator::Config> estimator{};   ///< between two forces; left out: the last one is held
-  std::optional<LearnedModel::Config> learned_model{};  ///< … or this
+  LimiterConfig limiter;  ///< longest_hold is set to `period`, max_force to that of the experiment
+  std::optional<OutputEstimator::Config> estimator{};   ///< used between forces; empty: holds the last force
+  std::optional<LearnedModel::Config> learned_model{};  ///< used between forces instead of the estimator
   Duration period = std::chrono::milliseconds(1);
   Duration length = std::chrono::seconds(5);
   double max_force = 0;    ///< N
-  std::uint64_t seed = 0;  ///< of jitter and loss
+  std::uint64_t seed = 0;  ///< for jitter and loss
 };
 
-/// One period: what the controller found and decided, and how things really were when it did.
+/// One period: the controller's step and the true state.
 struct Moment {
   Step step;
   double t = 0;                    ///< s
   Vec3 position = Vec3::Zero();    ///< m, true
   Vec3 velocity = Vec3::Zero();    ///< m/s, true
-  Vec3 true_force = Vec3::Zero();  ///< N, Environment::truth here and now
-  double energy = 0;               ///< J, of the true ledger: exact positions, the friction that the device has
+  Vec3 true_force = Vec3::Zero();  ///< N, Environment::truth at this position and time
+  double energy = 0;               ///< J, true ledger: exact positions and the device's true friction
 };
 
-/// What a run comes down to.
+/// Summary of a run.
 struct Outcome {
   double operational_stiffness = 0;  ///< N/m: mean of −(F − F₀)·d/‖d‖², d = x − x₀, where ‖d‖ > a tenth of its largest
-  double least_energy = 0;    ///< J, of the true ledger; negative: the device gave out what nobody had put in
-  double late_vibration = 0;  ///< m/s, rms of velocity less its mean over 50 ms, in the last second
+  double least_energy = 0;    ///< J, true ledger; negative: the device output net energy
+  double late_vibration = 0;  ///< m/s, rms of velocity minus its mean over 50 ms, in the last second
   double vibration = 0;       ///< m/s, the same in the last four seconds
   double sensation = 0;       ///< dB above what a hand just feels (perception.h), in the last second
-  double noticed_share = 0;   ///< of the periods that are judged: a hand tells what it feels from what is true
+  double noticed_share = 0;   ///< fraction of the judged periods in which the hand notices the force error
   double largest_force = 0;   ///< N
-  double limited_share = 0;   ///< of the periods: the law changed what was wanted
-  double force_error = 0;     ///< N, rms of what is felt less what is true
-  double true_force = 0;      ///< N, rms of what is true
-  double latency = 0;         ///< s, by which what is felt follows what is true (largest correlation)
+  double limited_share = 0;   ///< fraction of periods in which the law changed the wanted force
+  double force_error = 0;     ///< N, rms of felt minus true force
+  double true_force = 0;      ///< N, rms of the true force
+  double latency = 0;         ///< s, delay of the felt force at the maximum of the correlation with the true one
   bool stable = false;        ///< late_vibration ≤ kMostVibration
 };
 
-/// m/s: a third of the largest speed of a hand that swings 15 mm at 0.25 Hz.
+/// m/s: a third of the peak speed of a hand that moves by 15 mm at 0.25 Hz.
 inline constexpr double kMostVibration = 8e-3;
 
-/// Runs HapticController, as it is in the server, against the environment and the hand, on a clock that is only
-/// counted. Neither hold, ramp nor slew limit interfere: a force stays until the next one comes.
+/// Runs the server's HapticController against the environment and the hand on a virtual clock. Hold, ramp and slew
+/// limits are disabled: a force stays until the next one arrives.
 ///
-/// The same experiment gives the same record on every machine with the same floating point. Throws what the parts
-/// throw when a value is impossible, and std::invalid_argument without an environment.
+/// Deterministic on machines with the same floating point. Throws the exceptions of the parts for invalid values, and
+/// std::invalid_argument without an environment.
 std::vector<Moment> run(const Experiment& experiment);
 
-/// `period` as in the experiment.
+/// `period` must be that of the experiment.
 Outcome outcome(const std::vector<Moment>& record, Duration period);
 
-/// Velocity (m/s) less its mean over 50 ms, in the last `last` seconds of the record but for the 25 ms at its end which
-/// have no such mean.
+/// Returns the velocity (m/s) minus its mean over 50 ms, for the last `last` seconds of the record except its final 25
+/// ms, which have no such mean.
 std::vector<Vec3> fast_velocity(const std::vector<Moment>& record, Duration period, double last);
 
-/// Standard deviation (m/s) of fast_velocity, its axes summed.
+/// Standard deviation (m/s) of fast_velocity, summed over axes.
 double vibration(const std::vector<Moment>& record, Duration period, double last);
 
 }  // namespace tendon::lab

@@ -17,22 +17,22 @@ namespace {
 constexpr Duration kTrialLength = std::chrono::seconds(3);
 constexpr Friction kDevice{.coulomb = 0.02, .viscous = 0.26};
 
-/// An engine's answers: force and stiffness of each are asked for one after the other. A body with time goes on between
-/// two of them for as long as has gone by, as tendon-softbody has it, with the tool on its way from the one place to
-/// the other: a tool that jumps strikes the surface away from itself. An engine that cannot keep up falls behind.
+/// An engine's answers; force and stiffness of each are requested in turn. Between two answers a dynamic body advances
+/// by the elapsed time, as in tendon-softbody, while its tool moves continuously, because a jump would strike the
+/// surface away from it. An engine that is too slow falls behind.
 class Answers {
  public:
-  /// `compute`: s, that the engine takes for a step of the body's time or for an answer of one without.
+  /// `compute`: s, time of the engine per step of a dynamic body, or per answer of a static one.
   Answers(PressedEngine& engine, double compute, double longest)
       : engine_(engine), pace_(std::max(engine.step(), compute)), longest_(longest) {}
 
-  /// Time begins anew, for another hand.
+  /// Restarts time for another hand.
   void restart() {
     given_.clear();
     again();
   }
 
-  /// … for the same: what a hand that goes its way asks once more is not found once more.
+  /// Restarts time for the same hand, with cached answers.
   void again() {
     went_on_to_ = 0;
     asked_at_ = -1;
@@ -66,7 +66,7 @@ class Answers {
     const double steps = engine_.step() > 0 ? std::max(1.0, std::floor((t - went_on_to_) / pace_)) : 1;
     for (double step = 1; step <= steps; ++step) feel_ = engine_.touch(from + step / steps * (tool - from));
     went_on_to_ += steps * pace_;
-    given_.resize(next_++);  // whatever was to come after this is of another hand
+    given_.resize(next_++);  // later answers were for another hand
     given_.push_back({t, tool, feel_});
   }
 
@@ -83,13 +83,13 @@ class Answers {
   std::size_t next_ = 0;  ///< of them
 };
 
-/// How far the hand is below the surface, m.
+/// Depth of the hand below the surface, m.
 double depth_at(double t, double deepest) {
   const double turn = 2 * std::numbers::pi * t;
   return deepest * (0.37 - 0.47 * std::cos(0.8 * turn) + 0.13 * std::sin(2.3 * turn));
 }
 
-/// Share of the true stiffness, over the time in which there is something to feel.
+/// Displayed fraction of the true stiffness while in contact.
 double displayed(const std::vector<Moment>& record, double surface) {
   double shown = 0;
   double right = 0;
@@ -142,7 +142,7 @@ Felt felt(PressedEngine& engine, Truth& truth, const Route& route, std::uint64_t
                                                           .centre = surface - Vec3(0, 0, 0.4 * deepest),
                                                           .direction = Vec3::UnitZ()});
   set.hand = hand;
-  set.environment.truth = [](double, const Vec3&) { return Vec3::Zero().eval(); };  // how it shakes is asked, no more
+  set.environment.truth = [](double, const Vec3&) { return Vec3::Zero().eval(); };  // only vibration is evaluated
   answers.restart();
   result.vibration = outcome(run(set), set.period).late_vibration;
   return result;

@@ -10,21 +10,20 @@
 
 namespace tendon::lab {
 
-/// What is left of a body at the hand: the whole loop with AOL+ in counted time, the body as the engine behind a
-/// network, its measured time for an update as its period; a body with time takes its steps as quickly as that. All
-/// against the truth of the same block.
+/// Quality at the hand: the whole loop with AOL+ in virtual time. The body is the engine behind a network, with its
+/// measured update time as period; a dynamic body steps at that rate. Compared with the truth of the same block.
 struct Felt {
-  double displayed = 0;      ///< Σ F·d / Σ F_true·d over depths d: the share of the true stiffness that is shown
-  double force_error = 0;    ///< rms of force less true force, over that of the true force
-  double held_error = 0;     ///< the same when no stiffness is sent along and forces are held
-  double limited_share = 0;  ///< of the periods: the limiter changed what was wanted
-  double vibration = 0;      ///< m/s, of a hand that is free to move, in its last second
-  double latency = 0;        ///< s, by which what is felt follows what is true
+  double displayed = 0;      ///< Σ F·d / Σ F_true·d over depths d: displayed fraction of the true stiffness
+  double force_error = 0;    ///< rms force error over rms of the true force
+  double held_error = 0;     ///< the same with held forces and no stiffness sent
+  double limited_share = 0;  ///< fraction of periods in which the limiter changed the wanted force
+  double vibration = 0;      ///< m/s, of a free hand, in its last second
+  double latency = 0;        ///< s, delay of the felt force behind the true one
 };
 
-/// A hand that presses in and comes off again 0.8 times a second, not quite evenly, for 3 s, as deep as the hard load
-/// goes at the most; device of 0.26 N·s/m at 1 kHz. `engine` has the block of `truth`.
-/// Throws TooSlow after `longest_s` (PressedEngine::took): Newton's method takes long over a body that collapses.
+/// A hand presses in and releases 0.8 times per second, slightly irregularly, for 3 s, at most as deep as under the
+/// larger load. The device has 0.26 N·s/m and 1 kHz. `engine` must have the block of `truth`. Throws TooSlow after
+/// `longest_s` (PressedEngine::took), because Newton's method is slow for a collapsing body.
 Felt felt(PressedEngine& engine, Truth& truth, const Route& route, std::uint64_t seed,
           double longest_s = std::numeric_limits<double>::infinity());
 

@@ -21,7 +21,7 @@ Truth& truth() {
   return the;
 }
 
-/// A few percent too stiff, like the truth otherwise, and at once.
+/// A body that is a few percent too stiff, otherwise like the truth, and instantaneous.
 std::unique_ptr<PressedEngine> good_body() {
   const PressedBlock& block = truth().block();
   BodyConfig config;
@@ -66,8 +66,8 @@ TEST(Felt, AStiffnessThatIsSentAlongMakesUpForMostOfTheWait) {
   EXPECT_LT(here.force_error, 0.7 * here.held_error);
 }
 
-// It is struck by every count of the encoder, its force goes to and fro between nothing and too much, and the limiter
-// takes half of that away; but it is where the hand is.
+// Every encoder count excites this body, its force oscillates between zero and too much, and the limiter removes half
+// of it; but it follows the hand.
 TEST(Felt, ABodyOfManyShortStepsKeepsUpWithTheHand) {
   const PressedBlock& block = truth().block();
   constexpr auto kModel = softbody::compared::Kind::kTensorMass;
@@ -79,12 +79,12 @@ TEST(Felt, ABodyOfManyShortStepsKeepsUpWithTheHand) {
   const Felt quick = felt(*body, truth(), route("base=0.05ms", 0.2), 1);
   EXPECT_GT(quick.displayed, 0.4);
   EXPECT_LT(quick.latency, 0.006);
-  // Five times as slow as the hand's time: it is still where the hand was.
+  // Five times slower than real time: it lags behind the hand.
   const Felt slow = felt(*body, truth(), route("base=0.05ms", 1), 1);
   EXPECT_LT(slow.displayed, 0.8 * quick.displayed);
 }
 
-/// Forces of an engine that answers with the time at which the motion was sampled, in ms.
+/// Returns the forces of an engine that answers with the sample time of the motion, in ms.
 std::vector<double> answered(const Route& route, std::vector<double>* asked = nullptr) {
   Experiment set;
   set.environment.force = [asked](double t, const Vec3&) {
@@ -107,7 +107,7 @@ std::vector<double> answered(const Route& route, std::vector<double>* asked = nu
 
 TEST(Routes, AForceIsAsLateAsBothWaysAndTheAnswerTogether) {
   const std::vector<double> wanted = answered(route("base=5ms", 2));
-  // Sampled at 0, 2, 4 … ms: 5 ms there, 2 ms of work, 5 ms back.
+  // Sampled at 0, 2, 4 … ms: 5 ms transit, 2 ms of work, 5 ms back.
   EXPECT_EQ(wanted[11], 0);
   for (std::size_t ms = 14; ms < wanted.size(); ++ms) EXPECT_EQ(wanted[ms], ms % 2 == 0 ? ms - 12 : ms - 13) << ms;
 }
@@ -115,7 +115,7 @@ TEST(Routes, AForceIsAsLateAsBothWaysAndTheAnswerTogether) {
 TEST(Routes, AnEngineThatIsBusyTakesTheNewestAndQueuesNothing) {
   std::vector<double> asked;
   answered(route("base=1ms", 30), &asked);
-  // The first is the one at rest before the clock starts.
+  // The first is the rest position before the clock starts.
   ASSERT_GE(asked.size(), 7U);
   for (std::size_t i = 2; i < asked.size(); ++i) EXPECT_EQ(asked[i] - asked[i - 1], 30);
 }

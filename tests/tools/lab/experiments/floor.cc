@@ -19,13 +19,13 @@ namespace tendon::lab {
 namespace {
 
 constexpr double kStart = 1e-6;        // J, E₀
-constexpr double kFirstBarrier = 4;    // of F_max²; begun lower, the first steps stick at the boundary
+constexpr double kFirstBarrier = 4;    // of F_max²; with a smaller one the first steps get stuck at the boundary
 constexpr double kLastBarrier = 1e-8;  // N²
-constexpr double kFewer = 0.3;         // of one barrier to the next
-constexpr int kMostSteps = 400;        // of Newton for each barrier
+constexpr double kFewer = 0.3;         // ratio of successive barriers
+constexpr int kMostSteps = 400;        // Newton steps per barrier
 constexpr double kInfinite = std::numeric_limits<double>::infinity();
 
-/// ℓ and its derivatives to a force with a sign.
+/// ℓ and its derivatives with respect to a signed force.
 struct Loss {
   double value = 0, slope = 0, curvature = 0;
 };
@@ -53,7 +53,7 @@ class Programme {
       error += (force[k] - problem_.truth[k]) * (force[k] - problem_.truth[k]);
       truth += problem_.truth[k] * problem_.truth[k];
     }
-    // Of each force: the account, and the two limits of the force.
+    // Three constraints per force: the account and both limits.
     const double gap = 3 * static_cast<double>(n_) * barrier / kFewer;
     floor.error = std::sqrt(error / truth);
     floor.at_least = centred ? std::sqrt(std::max(0.0, error - gap) / truth) : 0.0;
@@ -96,7 +96,8 @@ class Programme {
     return sum;
   }
 
-  /// Newton's method for one barrier; whether it came to the centre. Its step: backwards for the cost to go P E² + 2 p E, forwards for the forces.
+  /// Newton's method for one barrier; returns whether it converged. The backward pass computes the cost-to-go P E² + 2
+  /// p E, the forward pass the forces.
   bool centre(std::vector<double>& force, double barrier) const {
     std::vector<double> energy = accounts(force);
     std::vector<double> constant(n_);
@@ -141,7 +142,7 @@ class Programme {
         energy = std::move(then);
         break;
       }
-      // No decrease that a double can show, or hardly any by a whole step: this is the centre.
+      // Converged: no decrease beyond double precision, or hardly any in a full step.
       double slope = 0;
       for (std::size_t k = 0; k < n_; ++k) slope += std::abs(change[k]);
       if (after >= before) return slope < 1e-3 * static_cast<double>(n_);
@@ -153,7 +154,7 @@ class Programme {
   const FloorProblem& problem_;
   Passive sense_;
   std::size_t n_;
-  std::vector<double> earned_;  ///< J, by friction in each hold
+  std::vector<double> earned_;  ///< J, by friction during each hold
 };
 
 }  // namespace
@@ -193,7 +194,7 @@ std::optional<double> floor_of(const std::vector<Moment>& record, const Friction
 }
 
 FloorProblem on_perfect_spring(double stiffness, const Friction& friction, bool firm) {
-  constexpr int kFiner = 50;  // 50 kHz: next to nothing is left of the sampled spring
+  constexpr int kFiner = 50;  // 50 kHz, at which sampling of the spring is negligible
   FreeHand hand = paper_hand(friction);
   hand.encoder_step.reset();
   hand.hand->motion = ScriptedMotion(ScriptedMotion::Sine{.amplitude = 0.015, .frequency = 0.5});

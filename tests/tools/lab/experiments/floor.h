@@ -12,53 +12,50 @@
 
 namespace tendon::lab {
 
-// What any law could do at best on a given motion: knowing it, and the object, in advance. What a law is above its
-// floor, it may still win; below it no cleverness leads.
+// Lower bounds of the force error of any law on a given motion, with motion and object known in advance.
 
-/// In which sense a force has to be safe while it is held. E is the account, ℓ of core/ledger/output_bound.h.
+/// Passivity constraint on a held force. E is the account, ℓ that of core/ledger/output_bound.h.
 enum class Passive : std::uint8_t {
-  kOnThisMotion,   ///< E(n) ≥ 0: for this one motion only
-  kWhateverComes,  ///< ℓ(F) ≤ E: whatever the next motion is. What "unconditional" laws keep
-  kAccelerating,   ///< ℓ(F) ≤ E with the travel that a bounded acceleration leaves
+  kOnThisMotion,   ///< E(n) ≥ 0, for this motion only
+  kWhateverComes,  ///< ℓ(F) ≤ E, for every next motion; the constraint of unconditionally passive laws
+  kAccelerating,   ///< ℓ(F) ≤ E with the travel possible under bounded acceleration
 };
 
-/// A motion along one axis, and the force that would be true on it.
+/// A motion along one axis and its true force.
 struct FloorProblem {
-  std::vector<double> dx{};     ///< m, [k]: the travel while force k is held
-  std::vector<double> truth{};  ///< N, on the hand; as many
+  std::vector<double> dx{};     ///< m, travel while force k is held
+  std::vector<double> truth{};  ///< N, on the hand; same size as dx
   Friction friction{};          ///< of the device; viscous > 0
   Duration period{};            ///< T, of each hold
   double max_force = 0;         ///< N
-  double acceleration = 300;    ///< m/s², of kAccelerating
+  double acceleration = 300;    ///< m/s², for kAccelerating
 };
 
 struct Floor {
-  double error = 0;  ///< rms of F less truth, over rms of truth: of the forces found
-  /// No forces have less: the floor itself is between the two (gap of the barrier). 0 when the last barrier was not
-  /// centred, and nothing is known.
+  double error = 0;  ///< rms of F − truth over rms of truth, of the forces found
+  /// Lower bound of the error of all forces (duality gap of the barrier). 0 if the last barrier did not converge.
   double at_least = 0;
   std::vector<double> force;  ///< N
 };
 
-/// The least error of any forces that are passive in this sense. It solves the convex programme
+/// Returns the forces with the least error that satisfy the passivity constraint. Solves the convex program
 ///
 ///     minimise Σ (F_k − t_k)²   subject to   E_(k+1) = E_k − F_k Δx_k + f_c |Δx_k| + b Δx_k²/T,   |F_k| ≤ F_max
 ///
-/// and the constraint of the sense, by an interior point method: a logarithmic barrier, Newton's step by a Riccati
-/// recursion because the only state is E. E₀ = 1 µJ.
+/// and the constraint of `sense` by an interior point method: a logarithmic barrier, and Newton steps by a Riccati
+/// recursion, because E is the only state. E₀ = 1 µJ. Before the first period the hand is at rest.
 ///
-/// Throws std::invalid_argument when the sizes differ, no force is true, or a value is impossible. Before the first
-/// period the hand is at rest.
+/// Throws std::invalid_argument if the sizes differ, all true forces are zero, or a value is invalid.
 ///
 /// Source: Boyd and Vandenberghe, Convex Optimization, 2004, 11.3 (barrier, gap m/t); the recursion: Wright, J. Optim.
 /// Theory Appl. 77(1), 1993.
 Floor floor_of(const FloorProblem& problem, Passive sense);
 
-/// The floor on the motion of a record that lies along x; empty when it does not, or when nothing is true on it.
+/// Returns the bound for a recorded motion along x; nullopt for another motion or if all true forces are zero.
 std::optional<double> floor_of(const std::vector<Moment>& record, const Friction& friction, Duration period,
                                double max_force, Passive sense);
 
-/// The motion of a hand of `compare` on the perfect spring, which shows −stiffness · x (N/m) at once: 2 s, T = 1 ms.
+/// Returns the motion of a hand of `compare` on an ideal spring without sampling, −stiffness · x (N/m): 2 s, T = 1 ms.
 FloorProblem on_perfect_spring(double stiffness, const Friction& friction, bool firm);
 
 struct FloorOptions {
@@ -66,7 +63,7 @@ struct FloorOptions {
   bool json = false;
 };
 
-/// `tendon-lab floor`: the floors of the hands of `compare` on perfect springs.
+/// `tendon-lab floor`: bounds for the hands of `compare` on ideal springs.
 void floors(const FloorOptions& options, std::ostream& out);
 
 }  // namespace tendon::lab

@@ -12,24 +12,23 @@
 
 namespace tendon::lab {
 
-/// The paper's friction identification (Tables II, III; the numbers are lost) on a device whose friction is known: what
-/// Kelly's procedure finds there, what the integral does, and which of the two can be believed.
+/// The friction identification of Lee & Lee 2009 (Tables II, III; the numbers are lost) on a device with known
+/// friction: results of Kelly's procedure and of the integral, and which of them is trusted.
 struct FrictionTable {
   Friction truth;
   Identification found;
   std::uint64_t seed = 0;
 };
 
-/// Ramps of 0.05, 0.1 and 0.5 N/s, 5 times each way over 0.25 m, 75 g, counts of 30 µm, 5 mN of noise in the force; for
-/// b = 0.26, 0.05 and 0.005 N·s/m and f_c = 0.05 N: one for each of kTableDampings.
+/// Ramps of 0.05, 0.1 and 0.5 N/s, 5 times in each direction over 0.25 m, 75 g, 30 µm resolution, 5 mN of force noise;
+/// f_c = 0.05 N and b from kTableDampings.
 FrictionTable friction_table(double damping);
 inline constexpr std::array kTableDampings = {0.26, 0.05, 0.005};  ///< N·s/m
 
-/// Rows of `tendon-lab paper`.
 void write(std::ostream& out, const std::vector<FrictionTable>& tables);
-/// One line of JSON; `commit` is that of the build.
+/// Returns one line of JSON; `commit` is that of the build.
 JsonLine json_of(const FrictionTable& table);
-/// Of such a line, as much as is in it. Throws when it is none.
+/// Reads such a line as far as its fields allow. Throws if the line is not valid.
 FrictionTable friction_table_of(const nlohmann::json& line);
 
 }  // namespace tendon::lab

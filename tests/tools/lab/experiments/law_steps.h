@@ -9,19 +9,19 @@
 
 namespace tendon::lab {
 
-/// The steps of a limiter that are measured: the hand moves as in the paper, 15 mm at 0.25 Hz, and a spring of 2000 N/m
-/// pulls it back. A thousand samples, 4 ms apart, make one period of the motion; each step moves a quarter of the way
-/// from one to the next, as in 1 ms.
+/// Steps of a limiter for cost measurements: the hand moves as in the paper, 15 mm at 0.25 Hz, against a spring of 2000
+/// N/m. A period has a thousand samples 4 ms apart; each step moves a quarter of the distance between samples, as in 1
+/// ms.
 class LawSteps {
  public:
   static constexpr std::size_t kPeriod = 1000;  ///< steps
   static constexpr double kStiffness = 2000;    ///< N/m
   static constexpr Friction kFriction{.coulomb = 0.02, .viscous = 0.26};
-  static constexpr Duration kEnvironmentDelay = std::chrono::milliseconds(40);  ///< of a law that asks for it
+  static constexpr Duration kEnvironmentDelay = std::chrono::milliseconds(40);  ///< for laws that model the environment
 
   explicit LawSteps(const LimiterConfig& config);
 
-  /// Step `i` of a period; i < kPeriod. Returns the force that is held, N.
+  /// Step `i` of a period; i < kPeriod. Returns the held force, N.
   const Vec3& step(std::size_t i) noexcept {
     const Vec3 dx = (places_[i] - places_[i == 0 ? kPeriod - 1 : i - 1]) / 4;
     law_.observe({.applied = applied_, .dx = dx, .held = std::chrono::milliseconds(1)});
@@ -35,8 +35,8 @@ class LawSteps {
   Vec3 applied_ = Vec3::Zero();
 };
 
-/// The limiter whose step is measured: `law`, with LawSteps' friction. A law that has to know the environment is told
-/// LawSteps' stiffness and delay. AOL+ has no part.
+/// Returns the limiter of `law` with LawSteps' friction. A law with a model of the environment gets LawSteps' stiffness
+/// and delay. AOL+ has no parts.
 LimiterConfig measured_limiter(Law law);
 
 }  // namespace tendon::lab

@@ -7,12 +7,12 @@
 
 namespace tendon::lab {
 
-/// Something costs more time than was asked for.
+/// A measurement exceeded its time limit.
 struct TooSlow : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// What something costs: the lab's only look at a clock, and at the processor's counter of instructions.
+/// Measures time and instructions. Everything else in the lab is independent of clocks.
 ///
 ///     const Meter meter;
 ///     const Meter::Reading before = meter.read();
@@ -21,9 +21,9 @@ struct TooSlow : std::runtime_error {
 class Meter {
  public:
   struct Reading {
-    double wall = 0;       ///< s
-    double processor = 0;  ///< s, of all threads of the process: what it would take on one core that nobody else uses
-    std::optional<std::uint64_t> instructions{};  ///< of the thread that made the meter, in user space
+    double wall = 0;                              ///< s
+    double processor = 0;                         ///< s, all threads of the process: the time on a core of its own
+    std::optional<std::uint64_t> instructions{};  ///< user-space instructions of the thread that created the meter
 
     Reading operator-(const Reading& before) const;
   };
@@ -36,7 +36,7 @@ class Meter {
   Reading read() const;
 
  private:
-  int counter_ = -1;  ///< a file; −1 when the kernel does not let us count
+  int counter_ = -1;  ///< file descriptor; −1 if the kernel does not permit counting
 };
 
 }  // namespace tendon::lab

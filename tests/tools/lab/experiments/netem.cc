@@ -26,7 +26,6 @@ namespace {
 
 using injector::autocorrelation;
 
-/// What a series of losses comes down to.
 struct Losses {
   double rate = 0;
   double mean_burst = 0;
@@ -44,7 +43,7 @@ Losses losses(const std::vector<bool>& lost) {
           runs > 0 ? in_runs / runs : std::nan("")};
 }
 
-/// `loss P CORRELATION`: lost when P · 2³² ≥ x.
+/// `loss P CORRELATION`: lost if P · 2³² ≥ x.
 Losses netem_losses(double probability, double correlation, const NetemOptions& options) {
   NetemRandom random(correlation, options.seed);
   const auto below = static_cast<std::uint32_t>(probability * 0x1p32);
@@ -64,8 +63,8 @@ std::vector<injector::Decision> decisions(const std::string& line, const NetemOp
   return result;
 }
 
-/// A burst length that makes the losses of one datagram and the next as correlated as asked for: in Gilbert's chain
-/// that is 1 − P(good → bad) − P(bad → good).
+/// Returns the mean burst length with the requested correlation of consecutive losses. In a Gilbert chain the
+/// correlation is 1 − P(good → bad) − P(bad → good).
 double mean_burst(double probability, double correlation) { return 1 / ((1 - correlation) * (1 - probability)); }
 
 Losses our_losses(double probability, double correlation, const NetemOptions& options) {
@@ -76,7 +75,7 @@ Losses our_losses(double probability, double correlation, const NetemOptions& op
   return losses(lost);
 }
 
-/// Delays in ms, with a correlation of 90 % asked for.
+/// Delays in ms with a requested correlation of 90 %.
 struct Delays {
   std::string name;
   const char* colour;
@@ -85,11 +84,11 @@ struct Delays {
 
 constexpr double kRho = 0.9;
 
-/// What everybody is asked for: 2 ms and an exponential of mean 6 ms.
+/// The requested distribution: 2 ms plus an exponential of mean 6 ms.
 double exponential_quantile(double u) { return 2 - 6 * std::log1p(-u); }
 
-/// netem looks a table up with x % size and takes its uniform jitter from x % (2 · jitter): the low bits of x, which
-/// know nothing of those of the number before.
+/// netem uses x % size as a table index and x % (2 · jitter) for uniform jitter: the low bits of x, which are not
+/// correlated with those of the previous number.
 Delays netem_table(const NetemOptions& options) {
   constexpr std::uint32_t kSize = 4096;
   NetemRandom random(kRho, options.seed);
@@ -100,7 +99,7 @@ Delays netem_table(const NetemOptions& options) {
   return result;
 }
 
-/// What a simulator gets that copies the recursion and takes x for a uniform number.
+/// A simulator that copies the recursion and treats x as uniform.
 Delays mixed_uniforms(const NetemOptions& options) {
   NetemRandom random(kRho, options.seed);
   Delays result{"netem's x taken as uniform", kOrange, {}};

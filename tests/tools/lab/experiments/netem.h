@@ -10,14 +10,14 @@
 
 namespace tendon::lab {
 
-/// The correlated random numbers of tc-netem, as get_crandom() of Linux' net/sched/sch_netem.c makes them:
+/// Correlated random numbers of tc-netem, as get_crandom() in Linux' net/sched/sch_netem.c computes them:
 ///     x_t = (U_t (2³² − ρ') + x_{t−1} ρ') / 2³²,   ρ' = ρ + 1 in units of 2⁻³², U uniform in 0 … 2³² − 1
-/// A mean of uniform numbers is not uniform: the variance is 1/12 · (1 − ρ)/(1 + ρ).
+/// The result is not uniform: its variance is 1/12 · (1 − ρ)/(1 + ρ).
 ///
 /// Thread-safe: no.
 class NetemRandom {
  public:
-  /// `correlation` from 0 (independent) to below 1, as in `loss 10% 50%`.
+  /// `correlation`: from 0 (independent) to below 1, as in `loss 10% 50%`.
   NetemRandom(double correlation, std::uint64_t seed);
   std::uint32_t next();
 
@@ -28,14 +28,14 @@ class NetemRandom {
 };
 
 struct NetemOptions {
-  std::size_t count = 1'000'000;               ///< datagrams for each line
+  std::size_t count = 1'000'000;               ///< datagrams per line
   std::uint64_t seed = 7;                      ///< of both
   std::optional<std::filesystem::path> out{};  ///< folder for the figure
   bool json = false;
 };
 
-/// `tendon-lab netem`: what is left of a loss rate, of bursts, of delays and of their memory when they are asked for
-/// with a correlation: tc-netem's arithmetic beside the injector's.
+/// `tendon-lab netem`: actual loss rates, bursts, delays and autocorrelation when a correlation is requested, from the
+/// arithmetic of tc-netem and from the injector.
 void netem(const NetemOptions& options, std::ostream& out);
 
 }  // namespace tendon::lab

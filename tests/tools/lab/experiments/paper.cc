@@ -24,7 +24,7 @@ using std::chrono::milliseconds;
 
 constexpr double kAmplitude = 0.015;  // m
 constexpr double kFrequency = 0.25;   // Hz
-/// The rows of an experiment; the figures show the first three.
+/// A row of an experiment; the figures show the first three.
 struct RowKind {
   Law law;
   std::optional<Preset> preset{};
@@ -42,7 +42,7 @@ Environment with(Environment environment, Duration period, Duration delay) {
   return environment;
 }
 
-/// Up to `most` and down again, once in `period` seconds.
+/// Triangle wave from 0 to `most` and back, once per `period` seconds.
 double triangle(double t, double period, double most) {
   const double phase = t / period - std::floor(t / period);
   return most * (1 - std::abs(2 * phase - 1));
@@ -88,12 +88,12 @@ std::vector<PaperExperiment> make_experiments() {
   all.back().k_op = 500;
   all.back().k_op_most = 600;
 
-  // 136 ms in each period are below 520 N/m, as between 3.054 and 3.190 s in Fig. 12(d).
+  // Stiffness is below 520 N/m for 136 ms of each period, as from 3.054 to 3.190 s in Fig. 12(d).
   all.push_back(same_for_all("12", "stiffness up to 3000 N/m and down to 0 again every 0.78 s", "law and coefficient",
                              {.force = [](double t, const Vec3& x) { return Vec3(-triangle(t, 0.78, 3000) * x); }}));
 
-  // An estimator that has learned 840 N/m says 3/2 of the truth when that has become 560: more than 4 N too much. It
-  // happens where the hand is deepest, and is known when the next answer comes.
+  // After learning 840 N/m, an estimator overestimates the force by 3/2 when the stiffness becomes 560: by more than 4
+  // N. The change occurs at the greatest depth and is known with the next answer.
   const auto softens = [](double t) { return t < 1 || (t >= 2 && t < 3) || t >= 4 ? 840.0 : 560.0; };
   all.push_back(same_for_all("14", "output estimator, 25 Hz and 40 ms late; 840 N/m become 560 at 1 s and 3 s",
                              "the object, when it changed, the estimator's reset threshold",
@@ -269,7 +269,7 @@ JsonLine json_of(const PaperRow& row) {
   return line;
 }
 
-/// Of such a line, as much as is in it.
+/// Reads such a line as far as its fields allow.
 PaperRow row_of(const nlohmann::json& line) {
   PaperRow row;
   row.experiment = line.at("experiment");
@@ -284,10 +284,10 @@ PaperRow row_of(const nlohmann::json& line) {
   return row;
 }
 
-/// A row of the table: of an experiment, or of Tables II and III.
+/// A row of an experiment, or of Tables II and III.
 using AnyRow = std::variant<PaperRow, FrictionTable>;
 
-/// `drawn`: with the motion that a figure shows.
+/// `drawn`: keeps the motion for a figure.
 PaperRow run_row(std::size_t experiment, std::size_t kind, bool drawn) {
   PaperRow row = paper_row(paper_experiments().at(experiment), kRowKinds.at(kind).law, kRowKinds.at(kind).preset);
   row.prescribed_record = {};

@@ -78,7 +78,7 @@ struct Composite {
   double seconds;
 };
 
-/// 10 s of waving in front of a wall, then into it.
+/// Moves to and fro for 10 s in front of a wall, then into it.
 ScriptedMotion wave(const Vec3& direction) {
   ScriptedMotion::Recorded motion;
   motion.direction = direction;
@@ -95,7 +95,7 @@ Environment along(const std::function<double(double t, double x)>& law, const Ve
   return {.force = [law, direction](double t, const Vec3& x) { return Vec3(law(t, x.dot(direction)) * direction); }};
 }
 
-/// Environments along `direction`, for a hand that moves along `motion`.
+/// Environments along `direction` for a hand that moves along `motion`.
 std::vector<Composite> composites(const Vec3& direction, const Vec3& motion) {
   const ScriptedMotion sine(ScriptedMotion::Sine{.amplitude = 0.015, .frequency = 0.25, .direction = motion});
   const auto spring = [&](double k) { return along([k](double, double x) { return -k * x; }, direction); };
@@ -144,8 +144,7 @@ void expect_quiet(const Vec3& direction, const Vec3& motion) {
         const Outcome felt = feel(composite, friction, {.friction = friction, .parts = parts});
         const std::string which = std::string(composite.name) + ", b " + std::to_string(friction.viscous) +
                                   (bounded ? ", bounded acceleration" : "");
-        // A device without damping whose hand is dragged sideways needs bounded acceleration to be as quiet as the
-        // rest.
+        // Without damping, a hand that is dragged sideways needs bounded acceleration to be as quiet as the others.
         const bool hard = motion != direction && !bounded && friction.viscous < 0.1;
         EXPECT_LE(felt.late_vibration, hard ? 2.5e-3 : 1.5e-3) << which;
         EXPECT_GE(felt.least_energy, -1e-12) << which;
@@ -158,7 +157,7 @@ TEST(AolPlus, IsQuietInEveryCompositeRunAlongOneAxis) { expect_quiet(Vec3::UnitX
 TEST(AolPlus, IsQuietInEveryCompositeRunAcrossTheAxes) {
   const Vec3 direction = Vec3(1, -0.7, 0.4).normalized();
   expect_quiet(direction, direction);
-  expect_quiet(direction, Vec3(1, 0.2, 0.6).normalized());  // dragged sideways too
+  expect_quiet(direction, Vec3(1, 0.2, 0.6).normalized());  // also dragged sideways
 }
 
 TEST(AolPlus, NeverClipsASoftSpring) {

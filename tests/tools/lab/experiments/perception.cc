@@ -12,9 +12,9 @@ namespace tendon::lab {
 namespace {
 
 constexpr double kFlatTo = 40;          // Hz
-constexpr double kFinest = 250;         // Hz, where a hand feels the least
-constexpr double kLeastFelt = 1e-7;     // m, peak, there
-constexpr double kLeastFrequency = 10;  // Hz: what is slower is motion
+constexpr double kFinest = 250;         // Hz, maximum sensitivity
+constexpr double kLeastFelt = 1e-7;     // m, peak, threshold at kFinest
+constexpr double kLeastFrequency = 10;  // Hz; slower motion is not vibration
 
 }  // namespace
 
@@ -27,7 +27,7 @@ double detection_threshold(double frequency) noexcept {
 double sensation_level(std::span<const Vec3> velocity, Duration period) {
   const std::size_t n = velocity.size();
   if (n < 4) return kNothing;
-  // Hann's window: what repeats every half second does not leak to where hands are sensitive.
+  // Hann window; prevents leakage of slow periodic motion into the sensitive range.
   std::vector<double> window(n);
   double squares = 0;
   for (std::size_t i = 0; i < n; ++i) {
@@ -45,7 +45,7 @@ double sensation_level(std::span<const Vec3> velocity, Duration period) {
     for (std::size_t k = 1; 2 * k < n; ++k) {
       const double frequency = static_cast<double>(k) / (static_cast<double>(n) * seconds(period));
       if (frequency < kLeastFrequency) continue;
-      // A sine of amplitude a has the power a²/2, which its line and the one of −f share.
+      // A sine of amplitude a has power a²/2, split between the lines at f and −f.
       const double amplitude_squared = 4 * std::norm(spectrum[k]) / (squares * static_cast<double>(n));
       const double least = detection_threshold(frequency) * 2 * std::numbers::pi * frequency;
       power += amplitude_squared / (least * least);

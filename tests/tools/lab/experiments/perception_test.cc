@@ -24,7 +24,7 @@ std::vector<Vec3> sine(double frequency, double speed) {
   return velocity;
 }
 
-/// m/s, rms, of a sine that is just felt.
+/// m/s, rms, of a sine at the detection threshold.
 double just_felt(double frequency) {
   return detection_threshold(frequency) * 2 * std::numbers::pi * frequency / std::numbers::sqrt2;
 }

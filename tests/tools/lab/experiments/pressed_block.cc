@@ -18,12 +18,13 @@ namespace {
 
 using namespace softbody;
 
-constexpr double kGrowth = 1.5;   // of cells outside the patch, each to the one before
-constexpr double kCoarser = 1.5;  // times as wide, to see what the mesh still changes
+constexpr double kGrowth = 1.5;   // ratio of successive cell widths outside the patch
+constexpr double kCoarser = 1.5;  // ratio of cell widths for estimating the mesh error
 constexpr double kSlide = 0.25;   // patch radii
 constexpr int kSamples = 100;     // of the script
 
-/// How far the ends of cells are from a place: `fine` wide up to `around`, then growing, the last one at `length`.
+/// Returns the cell boundaries as distances from a point: `fine` wide up to `around`, then growing, the last at
+/// `length`.
 std::vector<double> outward(double length, double around, double fine) {
   std::vector<double> ends;
   double width = fine;
@@ -47,9 +48,9 @@ std::vector<double> layers(double low, double high, double middle, double around
   return all;
 }
 
-/// The block with a mesh that is made for this patch.
+/// The block with a mesh refined for this patch.
 Solid graded(const PressedBlock& block, softbody::Law law, double cells) {
-  // Selective integration costs a little accuracy where it is not needed.
+  // Selective integration is slightly less accurate; used only where locking requires it.
   const Element element =
       block.material.poisson > info(Element::kHex27).locks_above ? Element::kHex27Sri : Element::kHex27;
   const double a = block.patch_radius;
@@ -91,7 +92,7 @@ void PressedBlock::check() const {
          "--loads-n: expected a small force above 0 and a larger one");
 }
 
-/// The linear body on the finest mesh, condensed to where tools go.
+/// The linear body on the finest mesh, condensed to the region of the tools.
 struct Truth::Fine {
   Fine(const PressedBlock& block, double cells)
       : solid(graded(block, softbody::Law::kLinear, cells)),
@@ -133,7 +134,7 @@ double Truth::uncertainty() {
 
 const Truth::Factor& Truth::factor() {
   if (!factor_) {
-    // At the depth of each load: what the linear body says there, and the load over that.
+    // At the depth of each load: the force of the linear body, and the ratio of the load to it.
     std::array<double, 2> linear{};
     std::array<double, 2> excess{};
     for (std::size_t load = 0; load < linear.size(); ++load) {

@@ -15,49 +15,47 @@
 
 namespace tendon::lab {
 
-/// A block that is clamped below, and a patch of its top that is pressed: what `tendon-lab accuracy` asks all models.
-/// As it stands here it is B1 of clients/softbody/README.md.
+/// A block that is fixed at the bottom and pressed by a patch on its top: the test problem of `tendon-lab accuracy`.
+/// The defaults are B1 of clients/softbody/README.md.
 struct PressedBlock {
   softbody::Vec3 size{0.1, 0.1, 0.05};  ///< m
   softbody::Material material{.young = 1e4, .poisson = 0.45};
   double patch_radius = 0.02;                            ///< m
-  softbody::Vec2 patch_centre = softbody::Vec2::Zero();  ///< m, from the middle of the top
-  std::array<double, 2> loads{0.3, 1};                   ///< N: one at which strains are small, and one that is hard
+  softbody::Vec2 patch_centre = softbody::Vec2::Zero();  ///< m, from the center of the top
+  std::array<double, 2> loads{0.3, 1};                   ///< N: one for small strains and a large one
 
-  /// Throws std::invalid_argument that names the option.
+  /// Throws std::invalid_argument naming the invalid option.
   void check() const;
-  /// m, of the patch's middle: the body stands on z = 0, its middle above the origin.
+  /// m, center of the patch; the body stands on z = 0, centered at the origin.
   softbody::Vec3 touch_point() const { return {patch_centre.x(), patch_centre.y(), size.z()}; }
 };
 
-/// How stiff a body is under a load.
 struct Stiffness {
   double secant = 0;   ///< N/m, load over mean depth of the patch
   double tangent = 0;  ///< N/m
 };
 
-/// Where a tool is, and what pushes it back.
+/// Position of a tool and the force on it.
 struct Touched {
   softbody::Vec3 tool;
   softbody::Vec3 force;
 };
 
-/// What a pressed block really does: the answers that models are measured against, found in the same run on meshes of
-/// quadratic hexahedra that are finest below the patch.
+/// Reference solution for a pressed block, computed on meshes of quadratic hexahedra refined below the patch.
 ///
-/// The truth is a Neo-Hookean solid. Its stiffness is that of the linear one on the fine mesh, times the ratio of both
-/// on a mesh that Newton's method can still be paid for on:
+/// The material is Neo-Hookean. The stiffness is that of the linear body on the fine mesh times the ratio of both on a
+/// mesh that is coarse enough for Newton's method:
 ///
 ///     K = K_linear(a/cells) · K_neo-Hookean(a/cells_for_large)/K_linear(a/cells_for_large)
 ///
-/// because the ratio hardly depends on the mesh. `uncertainty()` says what both factors still change by from the next
-/// coarser mesh. It computes only what is asked for. Thread-safe: no.
+/// because the ratio hardly depends on the mesh. `uncertainty()` is the change of both factors from the next coarser
+/// mesh. Results are computed on demand. Thread-safe: no.
 class Truth {
  public:
-  /// Cells to a patch's radius, below the patch, 1.5 or more. As they stand here B1 takes half a minute and 0.3 GB.
+  /// Cells per patch radius below the patch, at least 1.5. The defaults take half a minute and 0.3 GB for B1.
   struct Config {
     double cells = 4;
-    double cells_for_large = 2;  ///< … where Newton's method has to be paid for
+    double cells_for_large = 2;  ///< for meshes solved by Newton's method
   };
   Truth(const PressedBlock& block, const Config& config);
   ~Truth();
@@ -66,23 +64,22 @@ class Truth {
 
   const PressedBlock& block() const noexcept { return block_; }
 
-  /// Under block().loads[load].
   Stiffness stiffness(std::size_t load);
 
-  /// What the law `law` alone would make of it on an endlessly fine mesh: the truth and a model's own error. Empty when
-  /// that body collapses under the load.
+  /// Returns the stiffness of the material law `law` on an infinitely fine mesh, that is the truth plus the model's own
+  /// error. Returns nullopt if that body collapses under the load.
   std::optional<Stiffness> limit(softbody::Law law, std::size_t load) { return limit(law, block_.material, load); }
-  /// The same of a body of another material.
+  /// The same for another material.
   std::optional<Stiffness> limit(softbody::Law law, const softbody::Material& material, std::size_t load);
 
   double uncertainty();  ///< relative, of the stiffness under the second load
 
-  /// The force on a tool, within a quarter of the patch's radius of the patch's middle. The linear body's, times a
-  /// factor that is exact for the two loads in the middle: 1 + αF + βF².
+  /// Returns the force on a tool within a quarter of the patch radius from the patch center: that of the linear body
+  /// times 1 + αF + βF², which is exact for both loads at the center.
   softbody::Vec3 force(const softbody::Vec3& tool);
 
-  /// A tool that presses as deep as the first load goes, slides by a quarter of the patch's radius and comes off again,
-  /// looked at every `kScriptInterval`.
+  /// The tool presses to the depth of the first load, slides by a quarter of the patch radius, and releases. Sampled
+  /// every `kScriptInterval`.
   static constexpr double kScriptInterval = 0.03;  ///< s
   const std::vector<Touched>& script();
 
@@ -94,7 +91,7 @@ class Truth {
   };
   const Factor& factor();
   using AtLoads = std::array<std::optional<Stiffness>, 2>;
-  /// Of K to the linear one, empty from where it collapses on.
+  /// Ratios of K to that of the linear body; empty from the load at which it collapses.
   AtLoads ratios(softbody::Law law, const softbody::Material& material, double cells) const;
 
   PressedBlock block_;

@@ -17,11 +17,11 @@ namespace {
 
 using namespace softbody;
 
-constexpr int kMostPresses = 10;  // of Newton's method, for an answer under a load
+constexpr int kMostPresses = 10;  // Newton iterations per answer under a load
 constexpr int kPatienceS = 600;
-constexpr double kFirstDepth = 1e-4;  // m, to see how stiff it is
+constexpr double kFirstDepth = 1e-4;  // m, for the first estimate of the stiffness
 
-/// Repeats the press until Newton's method converges. If the body collapses, the method never converges.
+/// Repeats the press until Newton's method converges, which never happens for a collapsing body.
 template <class AnyBody>
 Reaction pressed(AnyBody& body, double load) {
   Reaction reaction;
@@ -45,7 +45,7 @@ class OwnEngine final : public PressedEngine {
   double took(const Meter::Reading& cost) const override { return cost.processor; }
 
  private:
-  /// What was learned answers to depths alone: that of the load is looked for.
+  /// Learned models only answer depths, so the depth for the load is found by iteration.
   Reaction learned_under(double load) {
     Reaction reaction = body_.press(Given::kDepth, kFirstDepth);
     for (int i = 0; i < kMostPresses && std::abs(reaction.force - load) > 1e-9 * load; ++i) {
@@ -65,7 +65,7 @@ class ComparedEngine final : public PressedEngine {
       : kind_(kind), body_(kind, std::move(solid), patch_radius, middle, config) {}
 
   Feel touch(const Vec3& tool) override { return body_.touch(tool); }
-  /// Models with time steps or with a fixed number of iterations need several presses to come to rest.
+  /// Models with time steps or a fixed number of iterations need several presses to come to rest.
   Reaction under(double load) override {
     const bool settles = body_.step() > 0 || kind_ == compared::Kind::kProjective;
     return settles ? body_.settle(Given::kForce, load) : pressed(body_, load);
@@ -122,7 +122,7 @@ class WorkerEngine final : public PressedEngine {
     feel.error = touch.error.value_or(0);
     return feel;
   }
-  /// It is linear: the second press is as deep as the load is.
+  /// The body is linear, so the second press is at the load's depth.
   Reaction under(double load) override {
     double depth = kFirstDepth;
     Feel feel = touch(middle_ - Vec3(0, 0, depth));

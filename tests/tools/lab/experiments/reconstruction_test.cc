@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the device loop makes of an engine's answers between two of them, on a clock that is only counted.
+// Reconstruction by the device loop between an engine's answers, in virtual time.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -10,10 +10,10 @@
 namespace tendon::lab::reconstruction_test {
 namespace {
 
-/// A hand that goes in and out of a sphere's contact (force as depth to the 3/2, a little more on the way in) with two
-/// swings and a tremor; below the surface x > 0.
+/// A hand moves in and out of a Hertzian contact with a sphere (force ∝ depth^3/2, slightly larger while loading) with
+/// two slow oscillations and a tremor; the object is at x > 0.
 struct Press {
-  static constexpr double kStiffness = 4.0 / 3 * 12539 * 0.1;  // N/m^1.5, of a radius of 10 mm
+  static constexpr double kStiffness = 4.0 / 3 * 12539 * 0.1;  // N/m^1.5, for a radius of 10 mm
 
   static double depth(double t) {
     const double turn = 2 * std::numbers::pi * t;
@@ -29,7 +29,7 @@ struct Press {
   }
 };
 
-/// The surface at x = 0, and with a table the force at 0.32 mm steps from there on down.
+/// The surface at x = 0, optionally with a table of forces in 0.32 mm steps into the object.
 Contact surface(double t, const Vec3& x, bool with_table) {
   Contact contact{.normal = -Vec3::UnitX(), .gap = -x.x()};
   if (!with_table) return contact;
@@ -43,7 +43,7 @@ Contact surface(double t, const Vec3& x, bool with_table) {
 
 enum class Sent { kForce, kForceAndStiffness, kAndSurface, kAndTable };
 
-/// rms of the force less the true one, over that of the true one. An answer takes a period and is `late` besides.
+/// Returns the rms force error over the rms of the true force. An answer takes a period plus `late_ms`.
 double error(double rate_hz, double late_ms, Sent sent) {
   Experiment set;
   set.environment = {

@@ -22,7 +22,7 @@
 namespace tendon::lab {
 namespace {
 
-/// Everything that a kind may change before the experiment is put together.
+/// Parameters that a kind may change before the experiment is created.
 struct Draft {
   Dice& dice;
   Trial trial;
@@ -35,7 +35,7 @@ struct Draft {
     trial.drawn += (trial.drawn.empty() ? "" : " ") + name + "=" + shortest(value) + unit;
   }
   void object(Environment::Force force) { trial.experiment.environment.force = std::move(force); }
-  /// An object with a memory answers in the order of its questions: the truth is a twin that is asked in every period.
+  /// An object with state depends on the sequence of queries, so the truth is a second instance queried every period.
   template <class Make>
   void remembering(const Make& make) {
     trial.experiment.environment.force = make();
@@ -97,7 +97,7 @@ void hardening(Draft& draft) {
   draft.object([k = draft.k](double, const Vec3& x) { return Vec3(-k * x.norm() / 0.01 * x); });
 }
 
-/// Pulls within 2 mm outside of where it is pressed, until it lets go; a hand that comes back has to press again.
+/// The object pulls within 2 mm outside its surface once pressed, until the tool detaches.
 void adhesion(Draft& draft) {
   const double reach = draft.dice.within(0.5e-3, 2e-3);
   draft.remembering([k = draft.k, reach] {
@@ -110,7 +110,7 @@ void adhesion(Draft& draft) {
   draft.say("sticks_for", reach * 1e3, "mm");
 }
 
-/// A bristle at each place: it bends with the tool up to the Coulomb friction of the surface (Dahl's limit).
+/// A bristle that moves with the tool up to the Coulomb friction of the surface (Dahl's limit).
 void dragging(Draft& draft) {
   const double most = draft.dice.within(0.3, 2);
   draft.remembering([k = draft.k, most] {
@@ -149,7 +149,7 @@ void circle(Draft& draft) {
   const Vec3 principal(draft.k, draft.k * draft.dice.within(0.1, 1), draft.k * draft.dice.within(0.1, 1));
   const Mat3 stiffness = turned * principal.asDiagonal() * turned.transpose();
   draft.object([stiffness](double, const Vec3& x) { return Vec3(-stiffness * x); });
-  // A circle of 12 mm, corner by corner of 48, in 2 s.
+  // A circle of 12 mm with 48 corners in 2 s.
   ScriptedMotion::MinimumJerk round;
   constexpr int kCorners = 48;
   for (int i = 0; i <= kCorners; ++i) {
@@ -161,7 +161,7 @@ void circle(Draft& draft) {
   draft.frequency = 0;
 }
 
-/// The hand presses for a second, and is then drawn out within 60 ms.
+/// The hand presses for a second and is withdrawn within 60 ms.
 void drawn_out(Draft& draft) {
   draft.object([k = draft.k](double, const Vec3& x) { return towards_x(x.x() > 0 ? -k * x.x() : 0); });
   draft.hand.hand->motion = ScriptedMotion(ScriptedMotion::MinimumJerk{
@@ -174,7 +174,7 @@ void drawn_out(Draft& draft) {
 constexpr double kInFree = 10;   // s, before the wall
 constexpr double kWall = 20000;  // N/m
 
-/// 10 s of waving to and fro before a wall, and then 12 mm into it, as far as the hand comes.
+/// Moves to and fro for 10 s before a wall, then 12 mm into it as far as the hand can.
 void into_a_wall(Draft& draft) {
   const double amplitude = draft.dice.chance(0.5) ? 0.015 : 0.03;
   const double hz = draft.dice.chance(0.5) ? 0.5 : 1;
@@ -199,12 +199,12 @@ void waving(Draft& draft) {
   into_a_wall(draft);
 }
 
-/// … within a viscous object of 5 N·s/m, into which the hand puts work without end.
+/// As into_a_wall, in a viscous object of 5 N·s/m, into which the hand keeps putting energy.
 void stirring(Draft& draft) {
   draft.remembering([] {
     return [before = Vec3(Vec3::Zero()), then = -1.0, speed = Vec3(Vec3::Zero())](double t, const Vec3& x) mutable {
       constexpr double kViscous = 5;     // N·s/m
-      constexpr double kWithin = 0.005;  // s, over which the object's engine looks at the motion
+      constexpr double kWithin = 0.005;  // s, over which the object's engine differentiates the motion
       if (then < 0 || t - then >= kWithin) {
         if (then >= 0) speed = (x - before) / (t - then);
         before = x;
@@ -216,7 +216,7 @@ void stirring(Draft& draft) {
   into_a_wall(draft);
 }
 
-/// The hand presses for a second, and then lets go of the handle.
+/// The hand presses for a second, then releases the handle.
 void letting_go(Draft& draft) {
   draft.object([k = draft.k](double, const Vec3& x) { return towards_x(x.x() > 0 ? -k * x.x() : 0); });
   const double depth = draft.dice.within(0.005, 0.015);
@@ -229,18 +229,18 @@ void letting_go(Draft& draft) {
   draft.say("pressed", depth * 1e3, "mm");
 }
 
-/// The folder of recordings, or null.
+/// Folder of recordings, or null.
 const char* data_folder() { return std::getenv("TENDON_DATA"); }  // NOLINT(concurrency-mt-unsafe): nobody sets it
 
-/// A person's hand on a real lever (TENDON_DATA/tue-1dof-teleop: its SOURCE.txt), as what this hand intends.
+/// A human hand recorded on a lever (TENDON_DATA/tue-1dof-teleop: its SOURCE.txt), used as the intended motion.
 void recorded(Draft& draft) {
   const std::filesystem::path folder = std::filesystem::path(data_folder()) / "tue-1dof-teleop";
   const bool foam = draft.dice.chance(0.5);
   const std::filesystem::path file = folder / (foam ? "m2_question1d_foam.csv" : "m2_question1d_rigid.csv");
   std::ifstream csv(file);
   if (!csv) throw std::runtime_error(file.string() + ": cannot be read");
-  constexpr double kArm = 0.075;    // m for each rad
-  constexpr std::size_t kThin = 8;  // 2 kHz recorded: 250 Hz are more than a hand has
+  constexpr double kArm = 0.075;    // m per rad
+  constexpr std::size_t kThin = 8;  // 2 kHz to 250 Hz, above the bandwidth of a hand
   const auto all = load_recorded_motion(csv, {.path = file, .position = "master_pos_rad"}).samples;
   ScriptedMotion::Recorded motion;
   for (std::size_t i = 0; i < all.size(); i += kThin) {

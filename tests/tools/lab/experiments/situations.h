@@ -14,44 +14,43 @@
 
 namespace tendon::lab {
 
-// What one grid hides. The grid of compare.h has one size of count, one motion, one period and linear springs; a law
-// that is tuned on it alone learns the grid. Here a situation is drawn from its seed: the network, the device and the
-// hand as in the grid, and one thing that the grid does not vary.
+// Situations beyond the grid of compare.h, which has one encoder resolution, motion, period and only linear springs, so
+// that laws tuned on it could overfit. A situation is drawn from a seed: network, device and hand as in the grid, plus
+// one variation by kind.
 
-/// A kind of situation.
 struct SituationKind {
   std::string_view name;
   std::string_view what;  ///< one line
 };
-/// Every kind, in the order in which tables list them.
+/// Returns all kinds in the order of the tables.
 std::span<const SituationKind> situation_kinds() noexcept;
 
-/// Laws are tuned on seeds below this; the seeds from here on are held out, and nobody tunes a law on them.
+/// Laws may be tuned on smaller seeds only; seeds from here on are held out for evaluation.
 inline constexpr std::uint64_t kHeldOutSeeds = 1'000'000;
 
-/// A situation without a law: the same for every law that is tried in it.
+/// A situation, the same for every law.
 struct Trial {
-  Experiment experiment{};  ///< its limiter has the friction of the device, and no law
+  Experiment experiment{};  ///< its limiter has the device's friction and no law
   double encoder_step = 0;  ///< m
   double stiffness = 0;     ///< N/m, of the object where it is pressed
-  std::string drawn{};      ///< what was drawn, for people and for the CSV
+  std::string drawn{};      ///< drawn parameters, as text
 };
 
-/// The situation of this kind that `seed` draws; empty for the recorded hands when TENDON_DATA is not set. The same seed
-/// gives the same situation on every machine. Throws std::invalid_argument for a kind that is none of the list.
+/// Draws the situation of this kind for `seed`; nullopt for recorded hands if TENDON_DATA is not set. Deterministic on
+/// all machines. Throws std::invalid_argument for an unknown kind.
 std::optional<Trial> draw_situation(std::string_view kind, std::uint64_t seed);
 
-/// What is compared: a law of the catalogue with the parts that a scene would list, or a preset.
+/// A law with its parts, or a preset.
 struct Contender {
   std::string_view name;
   Law law = Law::kAolPlus;
   std::optional<Preset> preset{};
-  bool promises = false;  ///< to be passive
+  bool promises = false;  ///< guarantees passivity
 };
-/// Every law, then every preset.
+/// Returns every law, then every preset.
 std::vector<Contender> contenders();
 
-/// What a contender makes of a situation.
+/// Runs a contender in a situation.
 Outcome outcome_of(const Contender& contender, const Trial& trial);
 
 }  // namespace tendon::lab

@@ -18,7 +18,7 @@ const Contender kFeel{.name = "feel", .preset = Preset::kFeel, .promises = true}
 TEST(Situations, TheSameSeedDrawsTheSameSituationAndAnotherSeedAnother) {
   for (const SituationKind& kind : situation_kinds()) {
     const auto one = draw_situation(kind.name, 7);
-    if (!one) continue;  // recorded hands, without TENDON_DATA
+    if (!one) continue;  // recorded hands without TENDON_DATA
     const auto again = draw_situation(kind.name, 7);
     EXPECT_EQ(one->drawn, again->drawn) << kind.name;
     EXPECT_EQ(outcome_of(kFeel, *one).force_error, outcome_of(kFeel, *again).force_error) << kind.name;
@@ -51,11 +51,11 @@ TEST(Situations, AnObjectWithAMemoryIsAskedApartFromItsTruth) {
   const auto& answers = trial->experiment.environment.force;
   const auto& truth = trial->experiment.environment.truth;
   answers(0, Vec3(0.001, 0, 0));                                 // pressed: it sticks
-  EXPECT_NE(answers(0, Vec3(-0.0001, 0, 0)), Vec3::Zero());      // … and pulls
-  EXPECT_EQ(truth(0, Vec3(-0.0001, 0, 0)), Vec3(Vec3::Zero()));  // which nobody has pressed
+  EXPECT_NE(answers(0, Vec3(-0.0001, 0, 0)), Vec3::Zero());      // pulls
+  EXPECT_EQ(truth(0, Vec3(-0.0001, 0, 0)), Vec3(Vec3::Zero()));  // the second instance was not pressed
 }
 
-/// Until the damper was kept from turning a force round the hand was held: 64 points above three parts at seed 55.
+/// Regression: the damper turned the force around and held the hand; 64 points above three parts at seed 55.
 TEST(Situations, AHandThatIsDrawnOutIsNotHeld) {
   for (std::uint64_t seed = 41; seed <= 60; ++seed) {
     const auto trial = draw_situation("drawn-out", seed);
@@ -65,7 +65,7 @@ TEST(Situations, AHandThatIsDrawnOutIsNotHeld) {
   }
 }
 
-/// The waving or stirring of `seed` without a network, on `friction`.
+/// The waving or stirring of `seed` without a network, with `friction`.
 Trial before_a_wall(std::string_view kind, std::uint64_t seed, const Friction& friction, bool firm) {
   Trial trial = *draw_situation(kind, seed);
   auto& hand = std::get<FreeHand>(trial.experiment.hand);
@@ -82,8 +82,8 @@ Trial before_a_wall(std::string_view kind, std::uint64_t seed, const Friction& f
   return trial;
 }
 
-/// Stirring puts work into the object without end, and the preset shows the wall that follows stiffer than three parts
-/// do: the hand bounces once, up to 1.7 times as fast. The spec asked for 1.2.
+/// Stirring puts energy into the object without end, and the preset displays the following wall stiffer than three
+/// parts do: the hand bounces once, up to 1.7 times as fast. The specified limit was 1.2.
 TEST(Situations, AWallAfterWavingIsNoLouderThanWithThreeParts) {
   struct Case {
     Friction friction;

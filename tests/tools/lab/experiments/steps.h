@@ -17,7 +17,7 @@
 #include "server/recording/recorder.h"
 #include "server/recording/records.h"
 
-// Runs with known answers, for the tests of the lab.
+// Runs with known results for the tests of the lab.
 
 namespace tendon::lab::testing {
 
@@ -25,7 +25,7 @@ inline constexpr Duration kPeriod = std::chrono::milliseconds(1);
 
 inline LocalTime at_ms(double ms) { return LocalTime(from_seconds(ms * 1e-3)); }
 
-/// Step n of a 1 kHz loop, all of it ordinary; what a test is about is set by the test.
+/// Returns step n of a 1 kHz loop with ordinary values, which tests modify.
 inline StepRecord step_at(std::uint64_t n) {
   StepRecord step;
   step.tick = n;
@@ -36,8 +36,8 @@ inline StepRecord step_at(std::uint64_t n) {
   return step;
 }
 
-/// A hand that swings by ± `amplitude` (m) at `frequency` (Hz) through a spring wall at `wall` (m) of `stiffness`
-/// (N/m), all along x. Every 10th step makes use of a new force, which answers the motion `delay` steps before.
+/// A hand moves by ± `amplitude` (m) at `frequency` (Hz) through a spring wall at `wall` (m) of `stiffness` (N/m),
+/// along x. Every 10th step uses a new force, which answers the motion `delay` steps before.
 inline std::vector<StepRecord> spring_run(std::uint64_t steps, double stiffness, double wall, std::uint64_t delay,
                                           double amplitude = 0.01, double frequency = 1) {
   const auto position = [&](std::uint64_t n) {
@@ -61,8 +61,8 @@ inline std::vector<StepRecord> spring_run(std::uint64_t steps, double stiffness,
   return run;
 }
 
-/// The real control law on a toy: a mass of 0.1 kg with viscous friction, pulled through a wall at x = 0 by a spring to
-/// a hand that swings; forces of the wall are 20 steps late and come every 10.
+/// The real control law on a mass of 0.1 kg with viscous friction, pulled by a spring to a moving hand through a wall
+/// at x = 0. Forces of the wall are 20 steps late and arrive every 10 steps.
 inline std::vector<StepRecord> toy_run(Law law, std::uint64_t steps) {
   constexpr double kMass = 0.1;
   constexpr double kFriction = 1;
@@ -102,8 +102,8 @@ inline std::vector<StepRecord> toy_run(Law law, std::uint64_t steps) {
   return run;
 }
 
-/// Writes the runs of several devices to a file. `names` contains the names of all devices except the first. All runs except
-/// the first can be empty.
+/// Writes the runs of several devices to a file. `names`: all devices except the first. All runs except the first may
+/// be empty.
 inline void record_devices(const std::filesystem::path& file, const std::vector<std::vector<StepRecord>>& runs,
                            const std::vector<std::string>& names, bool whole = true) {
   FileSink sink(file);
@@ -121,7 +121,7 @@ inline void record_devices(const std::filesystem::path& file, const std::vector<
   if (!sink.error().empty()) throw std::runtime_error(sink.error());
 }
 
-/// The run as a file. `whole` is false: as a killed server leaves it.
+/// Writes a run to a file. `whole` false: without an end mark, as after the server was killed.
 inline void record(const std::filesystem::path& file, const std::vector<StepRecord>& run, bool whole = true) {
   record_devices(file, {run}, {}, whole);
 }

@@ -19,7 +19,7 @@ namespace {
 
 constexpr int kRoundTrips[] = {0, 10, 20, 50, 100, 200, 400, 600};
 
-/// Rate has no force that comes back, so nothing to compare.
+/// Excludes rate control, which has no force feedback to compare.
 constexpr CouplingMethod kMethods[] = {
     CouplingMethod::kPositionPosition, CouplingMethod::kPositionForce, CouplingMethod::kWaves,
     CouplingMethod::kSurface,          CouplingMethod::kPassivity,     CouplingMethod::kSetPosition};
@@ -70,13 +70,13 @@ double median(std::vector<double>& of) {
   return *middle;
 }
 
-/// What one hand felt.
+/// Results of one hand.
 struct Trial {
   double first = 0;  ///< as in TeleopRow
   double second = 0;
   double buzz = 0;
   double pair = 0;
-  bool live = false;  ///< engaged, to the end
+  bool live = false;  ///< engaged until the end
 };
 
 Trial trial(CouplingMethod method, int round_trip_ms, std::uint64_t seed) {
@@ -108,7 +108,7 @@ TeleopRow row_of(CouplingMethod method, int round_trip_ms, std::span<const Trial
   return row;
 }
 
-/// Every hand at every round trip of every method, in that order.
+/// All trials: each hand at each round trip of each method, in this order.
 class Trials {
  public:
   Trials(int hands, std::uint64_t seed, std::span<const int> round_trips_ms)

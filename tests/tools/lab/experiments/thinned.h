@@ -10,9 +10,9 @@
 
 namespace tendon::lab {
 
-/// Keeps evenly spaced samples of a stream of any length in bounded memory: all of them up to `most`; then every
-/// second one, every fourth, and so on. So statistics of a short run are exact, and those of a long one come from at
-/// least `most` / 2 samples, the same in every run.
+/// Keeps evenly spaced samples of a stream in bounded memory: all of them up to `most`, then every second one, every
+/// fourth, and so on. Statistics of a short run are exact; those of a long one use at least `most` / 2 samples,
+/// deterministically.
 template <class T>
 class Thinned {
  public:
@@ -29,7 +29,7 @@ class Thinned {
     kept_.push_back(sample);
   }
 
-  /// In the order in which they came.
+  /// Samples in order of arrival.
   const std::vector<T>& kept() const noexcept { return kept_; }
   std::uint64_t seen() const noexcept { return seen_; }
 
@@ -40,7 +40,8 @@ class Thinned {
   std::uint64_t stride_ = 1;
 };
 
-/// The least sample that at least the share `p` (above 0, at most 1) of all samples do not exceed. Empty when there is
+/// Returns the smallest sample that is at least as large as the fraction `p` (0 < p ≤ 1) of all samples. Returns
+/// nullopt without samples.
 /// none.
 template <class T>
 std::optional<T> percentile(std::vector<T> samples, double p) {

@@ -31,7 +31,6 @@ std::span<const Info> models() noexcept;
 const Info& info(Kind kind) noexcept;
 std::optional<Kind> named(std::string_view name) noexcept;
 
-/// Parameters of the models.
 struct Config {
   EffectsConfig effects{};
   int iterations = 10;           ///< kXpbd, kProjective: per press
@@ -41,12 +40,13 @@ struct Config {
   bool whole_stiffness = false;  ///< kModal: see BodyConfig::whole_stiffness
 };
 
-/// A body with a comparison model, pressed from above by a patch. Replaces softbody::Body, which does not support these
-/// models. Thread-safe: no.
+/// A body with a comparison model, pressed from above by a patch; corresponds to softbody::Body, which does not have
+/// these models. Thread-safe: no.
 class PressedBody {
  public:
-  /// The law of the solid must be the law of the model. `middle` (m) is the center of the patch for press(), and of the
-  /// static modes; z is ignored. Throws std::invalid_argument if the model does not support the mesh or an effect.
+  /// The material law of the solid must be that of the model. `middle` (m) is the center of the patch for press() and
+  /// of the static modes; z is ignored. Throws std::invalid_argument if the model does not support the mesh or an
+  /// effect.
   PressedBody(Kind kind, Solid solid, double patch_radius, const Vec3& middle, const Config& config);
   PressedBody(const PressedBody&) = delete;
   PressedBody& operator=(const PressedBody&) = delete;

@@ -34,7 +34,7 @@ TEST(ComparedEffects, TheToolMeetsTheSurfaceWhereTheWeightHasSunkItTo) {
   }
 }
 
-/// A cube of 100 mm that can only move along z. It is equivalent to a mass of 0.5 kg on a spring of 1 kN/m.
+/// A cube of 100 mm that only moves along z: a mass of 0.5 kg on a spring of 1 kN/m.
 TEST(TensorMass, OneMassSwingsDampedAndUnderItsWeightAsOnPaper) {
   constexpr double kMass = 0.5;
   constexpr double kSpring = 1000;
@@ -81,7 +81,7 @@ TEST(ComparedEffects, DampingTakesTheEnergyThatASwingHas) {
 }
 
 TEST(MassSpring, ABodyCreepsWithTheRelaxationTimeOfItsMaterial) {
-  // K (u + τ u̇) = f. With the implicit Euler method, u after n steps is u∞ (1 − (1 + dt/τ)⁻ⁿ) for all shapes.
+  // K (u + τ u̇) = f; with implicit Euler, u after n steps is u∞ (1 − (1 + dt/τ)⁻ⁿ) for all shapes.
   const double in_the_end = pressed_b1(Kind::kMassSpring, Element::kTet4, 4).press(Given::kForce, 1e-3).depth;
   Config config;
   config.effects = {.step = 0.01, .viscosity = 0.05};
@@ -106,7 +106,7 @@ TEST(MassSpring, EffectsThatAreNotListedKeepNothing) {
   Config config;
   const auto with = [&] { return pressed_b1(Kind::kMassSpring, Element::kTet4, 4, config).size().bytes; };
   const std::size_t bare = with();
-  config.effects.density = 1000;  // set, but not used by any effect
+  config.effects.density = 1000;  // not used by any enabled effect
   config.effects.step = 0.01;
   EXPECT_EQ(with(), bare);
   EXPECT_EQ(pressed_b1(Kind::kMassSpring, Element::kTet4, 4, config).step(), 0);

@@ -17,7 +17,7 @@ SymmetricMatrix stiffness_at_rest(const Elastic& elastic) {
   return stiffness;
 }
 
-/// Free displacements → all nodes.
+/// Expands free displacements to all nodes.
 VectorXd all_of(const Elastic& elastic, const VectorXd& free) {
   VectorXd all = VectorXd::Zero(elastic.size());
   elastic.add_free(free, all);
@@ -65,7 +65,7 @@ Reaction ExplicitModel::press(const Patch& patch, Given given, double value) {
   velocity_ += dt_ * per_mass_.cwiseProduct(force);
   if (slowing_ < 1) velocity_ *= slowing_;
 
-  // The tool's force is a constraint on the patch: what 1 N of it does to the depth within this step.
+  // The tool is a constraint on the patch; this is the change of depth (m/N) within this step.
   double compliance = 0;
   for (Eigen::Index i = 0; i < patch.weights.size(); ++i) {
     const int node = patch.nodes[static_cast<std::size_t>(i)];

@@ -9,20 +9,20 @@
 
 namespace tendon::softbody::compared {
 
-/// Newton's second law in explicit time steps: no system is solved, and an answer is one evaluation of the forces. With
-/// lumped masses m, and a force F of the tool on its patch w that keeps the patch at the tool:
+/// Explicit time integration (symplectic Euler) with lumped masses m. The tool's force F acts on its patch with weights
+/// w and keeps the patch at the tool:
 ///
 ///     v ← (v + dt (F w − ∂energy/∂u + weight) / m) / (1 + rate dt),   u ← u + dt v
 ///
-/// (symplectic Euler). Stable for dt < 2/ω, where ω is the highest natural frequency of the body at rest; a compressed
-/// body has higher ones. For the linear law the model stores the tensors between nodes, which is the tensor-mass method
-/// (Cotin, Delingette & Ayache 2000); for the other laws it stores the shape functions' gradients at rest, which is
-/// TLED (Miller et al. 2007).
+/// Each answer evaluates the forces once and solves no system. Stable for dt < 2/ω, where ω is the highest natural
+/// frequency at rest; compression raises it. For the linear law the model stores the tensors between nodes (tensor-mass
+/// method; Cotin, Delingette & Ayache 2000), for other laws the shape function gradients at rest (TLED; Miller et al.
+/// 2007).
 class ExplicitModel : public Model {
  public:
-  /// Throws std::invalid_argument without `effects.inertia`, with viscosity (it would make ω larger; damping does not),
-  /// and with a step above `largest_step`, naming both. The solid must outlive this. It begins at rest, under its
-  /// weight if it has any.
+  /// Throws std::invalid_argument without `effects.inertia`, with viscosity (which would raise ω; damping does not),
+  /// and for a step above `largest_step`, naming both. The solid must outlive this object. Starts at rest under
+  /// gravity, if set.
   ExplicitModel(const Solid& solid, const TouchSurface& surface, const EffectsConfig& effects);
 
   Reaction press(const Patch& patch, Given given, double value) override;
@@ -40,14 +40,14 @@ class ExplicitModel : public Model {
   double dt_;
   double slowing_;                          ///< 1/(1 + rate dt); 1 without damping
   std::optional<SymmetricMatrix> tensors_;  ///< for the linear law only
-  VectorXd per_mass_;                       ///< 1/kg, all nodes; 0 where they are held
+  VectorXd per_mass_;                       ///< 1/kg, all nodes; 0 at fixed nodes
   VectorXd weight_;                         ///< N, all nodes; empty without gravity
   VectorXd u_;                              ///< m, all nodes
   VectorXd velocity_;                       ///< m/s
-  VectorXd rest_;                           ///< m, the shape at rest under the weight; empty without gravity
+  VectorXd rest_;                           ///< m, rest shape under gravity; empty without gravity
 };
 
-/// 2/ω of the body at rest, s: a longer explicit step is not stable.
+/// Returns the stability limit 2/ω of an explicit step for the body at rest, s.
 double largest_step(const Elastic& elastic, double density);
 
 }  // namespace tendon::softbody::compared

@@ -11,7 +11,7 @@
 namespace tendon::softbody::compared {
 namespace {
 
-/// The share of its length at rest below which a spring has no direction, because its ends are in one place.
+/// Relative length below which a spring has no direction, because its ends coincide.
 constexpr double kShortest = 1e-9;
 
 std::vector<double> factors_of(const Solid& solid) {
@@ -25,7 +25,7 @@ std::vector<double> factors_of(const Solid& solid) {
 SpringNet::SpringNet(const Mesh& at_rest, double young, const Fixed& fixed, const std::vector<double>& factors)
     : Elastic(at_rest, fixed) {
   if (mesh().shape != Shape::kTet4) throw std::invalid_argument("a net of springs wants a mesh of tetrahedra");
-  std::map<std::pair<int, int>, double> volumes;  // around each edge, times their factors
+  std::map<std::pair<int, int>, double> volumes;  // of the tetrahedra around each edge, times their factors
   for (int e = 0; e < mesh().element_count(); ++e) {
     const auto nodes = mesh().element(e);
     Mat3 edges;
@@ -82,7 +82,7 @@ void SpringNet::stiffness(const VectorXd& u, Curvature curvature, SymmetricMatri
     const Vec3 x = along(spring, u);
     const double length = std::max(x.norm(), kShortest * spring.length);
     const Vec3 way = x / length;
-    double across = 1 - spring.length / length;  // below 0: a compressed spring buckles sideways
+    double across = 1 - spring.length / length;  // negative: a compressed spring buckles sideways
     if (curvature == Curvature::kWithoutNegative) across = std::max(0.0, across);
     const Mat3 k = spring.stiffness * ((1 - across) * way * way.transpose() + across * Mat3::Identity());
     for (int j = 0; j < 6; ++j) {

@@ -8,17 +8,17 @@
 
 namespace tendon::softbody::compared {
 
-/// A spring along every edge of a mesh of tetrahedra. Its stiffness follows the volume around the edge (van Gelder
-/// 1998, with the factor that makes a stretched tetrahedron correct). V are the volumes of the tetrahedra that share
-/// the edge, L is its length at rest, l its present length:
+/// A spring along every edge of a tetrahedral mesh, with stiffness from the volume around the edge (van Gelder 1998,
+/// with the factor that makes a stretched tetrahedron correct). V are the volumes of the tetrahedra at the edge, L its
+/// rest length, l its current length:
 ///
 ///     energy ½ k (l − L)²,   k = Σ E V / L²
 ///
-/// It has no Poisson ratio, and nothing keeps a tetrahedron from being pressed flat. It is here for comparison.
+/// For comparison only: it has no Poisson ratio and does not resist flattening of a tetrahedron.
 class SpringNet : public Elastic {
  public:
-  /// `factors`: by how much the modulus of each tetrahedron is larger than `young`; empty: 1. Throws
-  /// std::invalid_argument when the mesh is not of tetrahedra.
+  /// `factors`: ratio of each tetrahedron's modulus to `young`; empty: 1. Throws std::invalid_argument unless the mesh
+  /// is tetrahedral.
   SpringNet(const Mesh& at_rest, double young, const Fixed& fixed, const std::vector<double>& factors = {});
 
   double energy(const VectorXd& u) const override;
@@ -38,13 +38,13 @@ class SpringNet : public Elastic {
   Vec3 along(const Spring& spring, const VectorXd& u) const;
 
   std::vector<Spring> springs_;
-  std::vector<int> slots_;  ///< where each entry of a spring's 6 × 6 matrix goes; −1: nowhere
+  std::vector<int> slots_;  ///< target of each entry of a spring's 6 × 6 matrix; −1: none
 };
 
-/// The springs, at rest at every instant or with effects, solved by the same Newton's method as the finite elements.
+/// Quasi-static or dynamic spring model, solved by the Newton method of the finite elements.
 class MassSpringModel : public Model {
  public:
-  /// Takes the mesh and Young's modulus from the solid; does not keep the solid.
+  /// Copies mesh and Young's modulus from the solid.
   MassSpringModel(const Solid& solid, const TouchSurface& surface, const QuasiStaticModel::Config& config,
                   const EffectsConfig& effects = {});
 

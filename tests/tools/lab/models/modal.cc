@@ -10,7 +10,7 @@
 namespace tendon::softbody::compared {
 namespace {
 
-/// A shape counts as a combination of the others when at most this share of its elastic energy remains without them.
+/// A shape is linearly dependent if its residual has at most this fraction of its elastic energy.
 constexpr double kNew = 1e-6;
 
 }  // namespace
@@ -25,8 +25,7 @@ ModalModel::ModalModel(const Solid& solid, const TouchSurface& surface, const Co
   for (const Vec2& middle : config.patches) {
     const auto patch = surface.patch(middle);
     if (!patch) throw std::invalid_argument("a static mode's patch is not on the body");
-    // The part of the shape that the others do not have (Gram and Schmidt). The second pass removes the rounding errors
-    // of the first.
+    // Gram-Schmidt; the second pass removes rounding errors of the first.
     VectorXd shape = linear.displacements(*patch);
     shape /= std::sqrt(shape.dot(stiffness.times(shape)));
     for (int i = 0; i < 2; ++i) shape -= shapes * (shapes.transpose() * stiffness.times(shape));
@@ -47,7 +46,7 @@ ModalModel::ModalModel(const Solid& solid, const TouchSurface& surface, const Co
 }
 
 Reaction ModalModel::press(const Patch& patch, Given given, double value) {
-  VectorXd shares = VectorXd::Zero(surface_.cols());  // of each shape under 1 N
+  VectorXd shares = VectorXd::Zero(surface_.cols());  // modal coordinates under 1 N
   for (Eigen::Index i = 0; i < patch.weights.size(); ++i) {
     shares += patch.weights[i] * surface_.row(row_of_[at(patch.nodes[static_cast<std::size_t>(i)])]);
   }
@@ -57,7 +56,8 @@ Reaction ModalModel::press(const Patch& patch, Given given, double value) {
   }
   Reaction reaction = linear_reaction(patch, depth, given, value);
   if (patch.curvatures.size() > 0) {
-    MatrixXd tilted = MatrixXd::Zero(surface_.cols(), 2);  // shares of each shape, of the slopes of the load
+    // Derivatives of `shares` with respect to the slopes of the load.
+    MatrixXd tilted = MatrixXd::Zero(surface_.cols(), 2);
     for (Eigen::Index i = 0; i < depth.size(); ++i) {
       tilted += surface_.row(row_of_[at(patch.nodes[static_cast<std::size_t>(i)])]).transpose() *
                 patch.slopes.col(i).transpose();

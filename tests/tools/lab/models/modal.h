@@ -8,20 +8,20 @@
 
 namespace tendon::softbody::compared {
 
-/// Linear elasticity within a few shapes (Pentland & Williams 1989): the slowest vibration modes of the body, and on
-/// request the static displacements under a force on a patch (static modes). Local contact needs far too many vibration
-/// modes. At rest at every instant: an answer is |Bᵀw|², with B the shapes on the surface, each scaled to the stiffness
-/// 1. It is here for comparison.
+/// Linear elasticity in a reduced basis (Pentland & Williams 1989): the slowest vibration modes and, optionally, static
+/// modes, which are the displacements under a force on a patch. Local contact requires far too many vibration modes.
+/// Quasi-static: the compliance is |Bᵀw|², with B the shapes at the surface, each scaled to unit stiffness. For
+/// comparison only.
 class ModalModel : public Model {
  public:
   struct Config {
     int swings = 30;
-    /// The static displacements of patches around these middles (m, across) become shapes too.
+    /// Centers (m, horizontal) of patches whose static displacements are added to the basis.
     std::vector<Vec2> patches;
-    bool glides = false;  ///< an answer has its Glide
+    bool glides = false;  ///< answers contain a Glide
   };
-  /// The density is the same everywhere, so its value does not matter. Throws std::invalid_argument when the law of the
-  /// solid is not linear, or the solid has fewer modes than `swings`. Keeps neither the solid nor the surface.
+  /// The density is uniform and has no effect. Throws std::invalid_argument unless the material is linear and the solid
+  /// has at least `swings` modes. Keeps no reference to solid or surface.
   ModalModel(const Solid& solid, const TouchSurface& surface, const Config& config);
 
   Reaction press(const Patch& patch, Given given, double value) override;

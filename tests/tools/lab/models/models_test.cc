@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The expected stiffness of block B1 was computed with a different implementation of each model. The tolerance is 1.5
-// percentage points.
+// The expected stiffness of block B1 is from an independent implementation of each model. Tolerance: 1.5 percentage
+// points.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -27,7 +27,7 @@ using softbody::testing::kB1;
 using softbody::testing::kB1PatchRadius;
 using softbody::testing::pressed_block;
 
-/// Returns the stiffness error of block B1 with tetrahedra, at rest under 0.3 N.
+/// Returns the stiffness error of block B1 with tetrahedra at rest under 0.3 N.
 double error_percent(Kind kind, int n, const Config& config) {
   const Reaction reaction = pressed_b1(kind, Element::kTet4, n, config).settle(Given::kForce, 0.3);
   return 100 * (reaction.force / reaction.depth / kB1 - 1);
@@ -75,7 +75,7 @@ TEST(Xpbd, ThePressedBlocksStiffnessIsAMatterOfTheStep) {
   config.iterations = 1;
   EXPECT_NEAR(error_percent(Kind::kXpbd, 8, config), 43, 1.5);
   EXPECT_NEAR(error_percent(Kind::kXpbd, 4, config), 196, 1.5);
-  // With a single step of 10 ms, the result depends on the order of the tetrahedra.
+  // With a single step of 10 ms the result depends on the order of the tetrahedra.
   config.effects.step = 0.01;
   EXPECT_LT(error_percent(Kind::kXpbd, 8, config), -90);
   config.effects.step = 0.2e-3;
@@ -226,7 +226,7 @@ TEST(ComparedModels, EachIsFoundByTheNameThatItHasAndNoOtherIs) {
   EXPECT_EQ(named("linear"), std::nullopt);
 }
 
-/// Creates block B1 with a different Young's modulus in one half.
+/// Block B1 with another Young's modulus in one half.
 Solid half_stiff(const Info& model, double young) {
   const Solid whole = pressed_block(model.tetrahedra ? Element::kTet4 : Element::kHex8Sri, 4, 0.45, model.law);
   const Region half{.where = Region::Box{.middle = Vec3(-0.025, 0, 0.025), .size = Vec3(0.05, 0.2, 0.06)},
@@ -262,7 +262,7 @@ TEST(ComparedModels, AStiffHalfMakesEachStiffer) {
     const double stiff =
         force({whole.mesh(), whole.element(), {.young = 4e4, .poisson = 0.45}, model.law, whole.fixed()});
     EXPECT_GT(mixed, 1.2 * soft) << model.name;
-    // The vibration modes of two materials are different, and xpbd has not converged after ten iterations.
+    // The vibration modes of two materials differ, and xpbd has not converged after ten iterations.
     const bool unfinished = model.kind == Kind::kModal || model.kind == Kind::kXpbd;
     EXPECT_TRUE(unfinished || mixed < 0.9 * stiff) << model.name << ' ' << mixed << ' ' << stiff;
   }

@@ -8,9 +8,9 @@
 namespace tendon::softbody::compared {
 namespace {
 
-/// Σ 2µV ∇N ∇Nᵀ, the same for each axis: three matrices that are not coupled.
+/// Returns Σ 2µV ∇N ∇Nᵀ for each axis; the axes are not coupled.
 SymmetricMatrix matrix_of(const Solid& solid) {
-  // Only entries whose row and column have the same axis. The others are zero and would only make the factor larger.
+  // Omits entries between different axes, which are zero and would only enlarge the factor.
   const SymmetricMatrix& all = solid.pattern();
   std::vector<int> axis_of(static_cast<std::size_t>(all.size));
   for (int i = 0; i < solid.size(); ++i) {
@@ -56,7 +56,8 @@ Factor factor_of(const Solid& solid, const Effects& effects) {
   return factor;
 }
 
-constexpr int kRoundsToRest = 1000;  // at the start, under its weight: reaches 1e-6, relative, in the README's block
+/// Iterations for the rest shape under gravity; reaches a relative error of 1e-6 for the README's block.
+constexpr int kRoundsToRest = 1000;
 
 }  // namespace
 
@@ -88,7 +89,7 @@ VectorXd ProjectiveModel::rotation_force() const {
     for (int q = 0; q < solid_.points_per_element(); ++q) {
       const Solid::Point& point = solid_.point(e, q);
       if (point.mu == 0) continue;
-      // Node by node: the numbers of a gradient lie apart (kernel.h).
+      // Node by node, because the components of a gradient are not contiguous (kernel.h).
       const auto gradient = solid_.gradient(e, q);
       Mat3 change = Mat3::Zero();
       for (int i = 0; i < local.cols(); ++i) change += local.col(i) * Vec3(gradient.col(i)).transpose();

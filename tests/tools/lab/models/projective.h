@@ -9,16 +9,16 @@
 
 namespace tendon::softbody::compared {
 
-/// Projective dynamics (Bouaziz et al. 2014) of elements that are as rigid as possible: energy µ V |F − R|², with R the
-/// rotation nearest to F. A round finds the rotation at every point of integration, and then all displacements by one
-/// solution. The matrix never changes, because |F − R|² with R fixed is the same quadratic for each axis. A round
-/// removes only part of the error; an answer is a few rounds, which continue from the last answer.
+/// Projective dynamics (Bouaziz et al. 2014) with as-rigid-as-possible elements: energy µ V |F − R|², R the rotation
+/// nearest to F. An iteration finds R at every integration point, then solves for all displacements. The matrix is
+/// constant and block-diagonal by axis, because |F − R|² with fixed R is the same quadratic for each axis. An answer is
+/// a few iterations that continue from the previous one and reduce the error only partly.
 ///
-/// The material is that of Law::kCorotational with λ = 0: it has no Poisson ratio. It is here for comparison.
+/// For comparison only. The material is Law::kCorotational with λ = 0, without a Poisson ratio.
 class ProjectiveModel : public Model {
  public:
-  /// Throws std::invalid_argument when iterations < 1 or with viscosity, which would tie the axes together. The solid
-  /// must outlive this. It begins at rest, under its weight if it has any.
+  /// Throws std::invalid_argument if iterations < 1, or with viscosity, which would couple the axes. The solid must
+  /// outlive this object. Starts at rest under gravity, if set.
   ProjectiveModel(const Solid& solid, const TouchSurface& surface, int iterations, const EffectsConfig& effects = {});
 
   Reaction press(const Patch& patch, Given given, double value) override;
@@ -27,7 +27,7 @@ class ProjectiveModel : public Model {
   std::size_t bytes() const noexcept override;
 
  private:
-  VectorXd rotation_force() const;  ///< N, free: the forces of the present shape's rotations
+  VectorXd rotation_force() const;  ///< N, free displacements; forces of the current rotations
 
   const Solid& solid_;
   Vec3 normal_;
@@ -36,7 +36,7 @@ class ProjectiveModel : public Model {
   Effects effects_;
   Factor factor_;
   VectorXd u_;     ///< m, all nodes
-  VectorXd rest_;  ///< m, the shape at rest; empty without effects
+  VectorXd rest_;  ///< m, rest shape; empty without effects
 };
 
 }  // namespace tendon::softbody::compared

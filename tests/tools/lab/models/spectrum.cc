@@ -17,11 +17,11 @@ namespace {
 constexpr double kPrecision = 1e-7;
 constexpr Eigen::Index kMostRestarts = 1000;
 
-/// With y = M^½ x the problem is symmetric, M^−½ K M^−½ y = ω² y, and its inverse gives the slowest modes first.
+/// With y = M^½ x the problem is symmetric, M^−½ K M^−½ y = ω² y, and its inverse yields the slowest modes first.
 template <class Apply>
 class Operator {
  public:
-  using Scalar = double;  // Spectra's name
+  using Scalar = double;  // required by Spectra
   Operator(int size, Apply apply) : size_(size), apply_(std::move(apply)) {}
   Eigen::Index rows() const { return size_; }
   Eigen::Index cols() const { return size_; }
@@ -66,7 +66,7 @@ Swings slowest_swings(const SymmetricMatrix& stiffness, const VectorXd& mass, in
   const VectorXd root = mass.cwiseSqrt();
   const VectorXd scale = root.cwiseInverse();
   Swings swings;
-  if (2 * count >= stiffness.size) {  // Lanczos' method needs room for twice as many vectors
+  if (2 * count >= stiffness.size) {  // Lanczos' method needs twice as many vectors
     const Eigen::SelfAdjointEigenSolver<MatrixXd> all(scale.asDiagonal() * dense(stiffness) * scale.asDiagonal());
     swings.squares = all.eigenvalues().head(count);
     swings.shapes = all.eigenvectors().leftCols(count);

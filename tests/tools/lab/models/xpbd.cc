@@ -95,7 +95,7 @@ Reaction XpbdModel::press(const Patch& patch, Given given, double value) {
   for (int i = 0; i < iterations_; ++i) {
     for (Tet& tet : tets_) relax(tet);
     if (given == Given::kForce) continue;
-    // The tool may take back the impulse of earlier rounds of this step.
+    // The tool may take back impulses of earlier iterations of this step.
     const double untouched = depth_below(patch, normal_, u_) - reaction.force * compliance;
     const double force = constrained_force(given, value, untouched, compliance);
     push(force - reaction.force);

@@ -10,17 +10,17 @@
 
 namespace tendon::softbody::compared {
 
-/// Extended position based dynamics with the stable Neo-Hookean constraints (Macklin, Müller & Chentanez 2016; Macklin
-/// & Müller 2021). In every time step each tetrahedron in turn is moved towards
+/// Extended position based dynamics with stable Neo-Hookean constraints (Macklin, Müller & Chentanez 2016; Macklin &
+/// Müller 2021). Each time step moves the tetrahedra one by one towards
 ///
 ///     |F| = 0 with the compliance 1/(µV),   det F = 1 + µ/(λ + µ) with 1/((λ + µ)V)
 ///
-/// and then the patch to its tool. It is never unstable and never converges: the stiffness depends on the time step and
-/// the iterations, and is wrong by −90 % to +200 %. It is here for comparison.
+/// and then the patch to its tool. For comparison only: unconditionally stable but not convergent; the stiffness
+/// depends on time step and iterations, with errors from −90 % to +200 %.
 class XpbdModel : public Model {
  public:
-  /// Throws std::invalid_argument when the mesh is not of tetrahedra, when iterations < 1, without `effects.inertia`,
-  /// or with viscosity. The solid must outlive this.
+  /// Throws std::invalid_argument unless the mesh is tetrahedral, iterations ≥ 1, and `effects` has inertia and no
+  /// viscosity. The solid must outlive this object.
   XpbdModel(const Solid& solid, const TouchSurface& surface, int iterations, const EffectsConfig& effects);
 
   Reaction press(const Patch& patch, Given given, double value) override;
@@ -37,7 +37,7 @@ class XpbdModel : public Model {
     double volume;                         ///< m³
     double mu;                             ///< Pa
     double both;                           ///< λ + µ, Pa
-    double lambda_shape;                   ///< multipliers that the two constraints have gathered in this step
+    double lambda_shape;                   ///< accumulated multipliers of both constraints in this step
     double lambda_volume;
   };
   void relax(Tet& tet);
@@ -47,11 +47,11 @@ class XpbdModel : public Model {
   int iterations_;
   double slowing_;  ///< 1/(1 + rate dt); 1 without damping
   std::vector<Tet> tets_;
-  VectorXd per_mass_;  ///< 1/kg, all nodes; 0 where they are held
+  VectorXd per_mass_;  ///< 1/kg, all nodes; 0 at fixed nodes
   VectorXd u_;         ///< m, all nodes
   VectorXd velocity_;  ///< m/s
-  VectorXd fall_;      ///< m/s, the velocity that the weight adds in a step; empty without gravity
-  VectorXd rest_;      ///< m, the shape at rest under the weight; empty without gravity
+  VectorXd fall_;      ///< m/s, velocity change by gravity per step; empty without gravity
+  VectorXd rest_;      ///< m, rest shape under gravity; empty without gravity
 };
 
 }  // namespace tendon::softbody::compared
