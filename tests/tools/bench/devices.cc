@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// How many devices one core can step per millisecond, and how the cost per device depends on their number.
+// Measures how many devices one core can step in a millisecond, and how the cost of a device depends on their number.
 #include <sys/mman.h>
 
 #include <algorithm>
@@ -75,7 +75,8 @@ struct Lane {
 
   void step(LocalTime now) { haptic.step(now); }
 
-  /// Plays the other threads: pops the records, and every tenth step posts a force as the network thread does.
+  /// Simulates the other threads. It removes the records, and it posts a force every tenth step, as the network thread
+  /// does.
   void be_the_others(std::uint64_t step, LocalTime now) {
     while (mail.steps.front() != nullptr) mail.steps.pop();
     const DeviceState* state = mail.state.take();
@@ -117,7 +118,7 @@ struct Paced {
   double seconds = 0;
 };
 
-/// Steps all devices in one thread on one core at 1 kHz.
+/// Runs the steps of all devices in one thread at 1 kHz.
 template <class AnyLane>
 Paced at_1_khz(std::size_t count, Duration length) {
   std::vector<std::unique_ptr<AnyLane>> lanes;

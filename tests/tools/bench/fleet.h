@@ -19,24 +19,25 @@ namespace tendon::bench {
 struct Fleet {
   std::size_t devices = 16;
   std::size_t channels = 1;  ///< per device
-  /// One session controls all devices of a bank; otherwise each channel has its own session.
+  /// If this is true, one session controls all devices of a bank. Otherwise, each channel has its own session.
   bool one_session_for_16 = false;
   /// Number of sessions; those beyond the channels observe one device each. 0: one per channel.
   std::size_t sessions = 0;
   std::uint32_t state_hz = 1000;
   std::uint32_t force_hz = 1000;
   bool recorded = false;                             ///< records every step to a file
-  Duration settle = std::chrono::milliseconds(300);  ///< wait after the last session has opened
+  Duration settle = std::chrono::milliseconds(300);  ///< time to wait after the last session has been opened
   Duration length = std::chrono::seconds(2);         ///< measurement; extended until a state arrives
   std::uint64_t seed = 1;
-  /// SCHED_FIFO priority of the clients and of the server's threads except the haptic ones; 0: default scheduling.
+  /// The SCHED_FIFO priority of the clients and of all threads of the server except the haptic threads. If it is 0, the
+  /// default scheduling is used.
   int priority = 0;
 };
 
 struct FleetResult {
   std::size_t sessions = 0;
   std::size_t controllers = 0;
-  bool all_came = false;  ///< every session was open at the start
+  bool all_came = false;  ///< true if all sessions were open at the start
   double seconds = 0;     ///< measured duration
 
   // Over the whole run:

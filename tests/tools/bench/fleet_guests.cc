@@ -159,8 +159,8 @@ class Guest {
     }
   }
 
-  /// The sequence number of a force is the tick that it answers, so the state tells which motion the force in use is
-  /// for.
+  /// The sequence number of a force is the tick of the state that it answers. A state contains the number of the force
+  /// in use.
   void judge(const DeviceState& state) {
     if (state.mode != Mode::kActive) return;
     shared_.loop_age.observe(kPeriod * static_cast<Duration::rep>(state.tick - state.force_sequence));

@@ -23,7 +23,7 @@ inline constexpr const char* kFleetName = "d";
 std::string device_name(const Fleet& fleet, std::size_t i);
 std::string channel_name(std::size_t i);
 
-/// What a client claims, and its key.
+/// The claims and the key of a client.
 struct Plan {
   std::vector<Claim> claims;
   bool controls = true;
@@ -53,7 +53,7 @@ struct Shared {
   std::uint64_t forces_sent = 0;  ///< since the first force, including after the measurement
 };
 
-/// Opens a session for each plan and answers states until `shared` says kQuit.
+/// Opens a session for each plan and answers states until the phase in `shared` is kQuit.
 void serve_guests(const std::vector<Plan>& plans, const Address& server, const Fleet& fleet, Shared& shared);
 
 }  // namespace tendon::bench

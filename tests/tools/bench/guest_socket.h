@@ -16,7 +16,8 @@
 
 namespace tendon::bench {
 
-/// Clients per source address. A server admits 20 handshakes per second from one address, in bursts of 40.
+/// Clients per source address. The server accepts up to 20 handshakes per second from an address, and up to 40 at the
+/// same time.
 inline constexpr std::size_t kGuestsPerAddress = 16;
 
 /// Connected socket of a client, whose source address depends on its number. Reports kernel receive times.

@@ -19,7 +19,7 @@ void keep(T& value) {
   asm volatile("" : : "g"(&value) : "memory");
 }
 
-/// Returns the q-quantile of `values`; 0 if there are none.
+/// Returns the q-quantile of `values`, or 0 if there are no values.
 inline double quantile(std::vector<double> values, double q) {
   if (values.empty()) return 0;
   const auto nth = values.begin() + static_cast<std::ptrdiff_t>(q * static_cast<double>(values.size() - 1));

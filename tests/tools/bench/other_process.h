@@ -46,7 +46,7 @@ class SharedMemory {
   T* value_;
 };
 
-/// A child process that runs `work`. The destructor waits for its end.
+/// A child process that runs `work`. The destructor waits for the process to exit.
 class OtherProcess {
  public:
   template <class Work>

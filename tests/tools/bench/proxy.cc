@@ -32,7 +32,7 @@ using namespace injector;
 using namespace std::chrono_literals;
 
 constexpr std::size_t kBytes = 200;
-/// A machine that takes longer to forward a datagram cannot be measured.
+/// If it takes longer to forward a datagram, the machine is too slow to be measured.
 constexpr Duration kPatience = 10s;
 
 void pin_to(unsigned core) {
@@ -46,7 +46,7 @@ constexpr unsigned kLoadCore = 1;
 
 Address loopback() { return parse_address("127.0.0.1:0"); }
 
-/// One-way baseline: recvmmsg and sendmmsg without timestamps, decisions or delay.
+/// The baseline in one direction, which only calls recvmmsg and sendmmsg.
 class BareForwarder {
  public:
   explicit BareForwarder(const Address& server)

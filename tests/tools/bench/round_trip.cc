@@ -46,7 +46,7 @@ namespace {
 using std::chrono::microseconds;
 using std::chrono::milliseconds;
 
-/// Upper bound for anything on the loopback; beyond it the run fails.
+/// The run fails if an exchange on the loopback takes longer than this.
 constexpr Duration kGiveUp = std::chrono::seconds(10);
 
 struct Options {
@@ -122,7 +122,8 @@ class BarePair {
   Name client_name_;
 };
 
-/// One end of a bare ping-pong. With a `suite`, libsodium seals and opens all but the first 16 bytes.
+/// One of the two ends of a ping-pong without Tendon. With a `suite`, libsodium seals and opens all but the first 16
+/// bytes.
 class BareSocket {
  public:
   /// `peer`: the address that a server's socket answers; null for a client's connected socket.
@@ -181,7 +182,7 @@ class WatchedLink : public Link {
     seen = clock::now();
   }
 
-  std::uint64_t answered_tick = 0;  ///< of the newest force in the mailbox
+  std::uint64_t answered_tick = 0;  ///< the tick of the newest force in the mailbox
   LocalTime seen{};                 ///< when that force arrived
 
  private:
@@ -233,8 +234,8 @@ void serve(Orders& orders, const ServerName& server, int echo, int udp_echo, Wai
 
 struct Result {
   std::vector<double> bare;    ///< µs, one per exchange
-  std::vector<double> sealed;  ///< with a suite: as `bare`, plus libsodium at both ends
-  std::vector<double> udp;     ///< for Unix sockets: as `bare`, over UDP
+  std::vector<double> sealed;  ///< like `bare`, but sealed by libsodium; only used with a suite
+  std::vector<double> udp;     ///< like `bare`, but over UDP; only used for Unix sockets
   std::vector<double> tendon;
   std::size_t state_bytes = 0;
   std::size_t force_bytes = 0;
@@ -382,7 +383,7 @@ class RoundTrip {
   Way way_;
   std::optional<Suite> suite_;
   Key key_;
-  /// The server removes this file when it ends.
+  /// This file is removed by the server.
   std::optional<std::filesystem::path> file_ =
       way_ == Way::kUnix ? std::optional(std::filesystem::temp_directory_path() /
                                          ("tendon-bench-" + std::to_string(::getpid()) + ".sock"))

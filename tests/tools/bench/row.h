@@ -15,7 +15,7 @@ namespace tendon::bench {
 struct Row {
   std::string section;
   std::string what;
-  std::string unit;     ///< of all times of the row: "ns", "µs", "ms"
+  std::string unit;     ///< the unit of all times of the row: "ns", "µs", "ms"
   std::uint64_t n = 0;  ///< number of measurements
   double p50 = 0;
   double p99 = 0;

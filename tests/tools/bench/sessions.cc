@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// How many sessions one server handles, and how many devices one process, up to the point of overload (fleet.h).
+// Measures how many sessions and how many devices a server can handle before it is overloaded (fleet.h).
 #include <algorithm>
 #include <cmath>
 #include <cstdio>

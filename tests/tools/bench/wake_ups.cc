@@ -3,7 +3,8 @@
 // Wake-up latency of the haptic thread with a controller alone; with a recording; with 32 observers, each of which
 // receives a datagram per step; and with tendon-dash and a page. The baseline is a thread that only sleeps. All
 // alternate in blocks within one run of one server with tendond's threads: haptic (real-time priority if granted),
-// network, and a log that pops records. The observers are one process; its processor time is reported separately.
+// network, and a log that pops records. The observers are in a single process, whose processor time is reported
+// separately.
 #include <arpa/inet.h>
 #include <netinet/in.h>
 #include <poll.h>
@@ -56,7 +57,7 @@ constexpr Duration kSettle = milliseconds(200);
 
 struct Options {
   std::size_t observers = 32;
-  int blocks = 60;  ///< of each kind; one minute in total
+  int blocks = 60;  ///< number of blocks of each kind, one minute in total
   int block_ms = 1000;
 };
 
@@ -198,7 +199,7 @@ class Dashboard {
   Dashboard(const std::filesystem::path& program, const Address& server)
       : process_(program, {"--server", to_string(server), "--listen", "127.0.0.1:0", "--json"}, "/"),
         page_(address_in(process_.wait_for_line("\"listening\""))) {}
-  /// SIGTERM lets it send a Bye, so that the next block runs without it.
+  /// Sends SIGTERM, so that the client sends a Bye before the next block.
   ~Dashboard() {
     process_.signal(SIGTERM);
     process_.wait();
@@ -249,7 +250,7 @@ std::optional<std::filesystem::path> dashboard_program() {
 
 enum class Kind { kAlone, kRecorder, kObservers, kDashboard };
 
-/// Measurements of all blocks of one kind.
+/// The measurements of all blocks of a kind.
 struct Figures {
   std::vector<double> late;  ///< µs, of each wake-up
   std::uint64_t overruns = 0;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// How many simulated worlds of 10 s (tests/tools/worlds) one core runs per second.
+// Measures how many simulated worlds of 10 s (tests/tools/worlds) one core runs in a second.
 #include <cstdio>
 #include <stdexcept>
 #include <string>

@@ -13,7 +13,7 @@ namespace tendon::sweep {
 
 enum class Arithmetic : std::uint8_t {
   kPortable,  ///< reproducible: the baseline x86-64 instructions on every processor
-  kNative,    ///< that of the node; use only with nodes of one kind
+  kNative,    ///< the arithmetic of the node, for nodes of the same kind
 };
 
 std::string_view name_of(Arithmetic arithmetic) noexcept;

@@ -9,7 +9,7 @@
 
 namespace tendon::sweep {
 
-/// Finds the units in which two results of a shard differ, and whether the program or a node is the cause.
+/// Finds the units that differ between two results of a shard, and whether the cause is the program or a node.
 ///
 /// First compares the two stored results: their lines, or their digests if only one unit differs. If several units
 /// without lines differ, runs the program here: the whole shard and then halves of it, each twice, until two runs

@@ -11,9 +11,9 @@
 
 namespace tendon::sweep {
 
-/// Contents of FOLDER/plan.json, which never changes.
+/// The contents of FOLDER/plan.json. This file never changes.
 struct Plan {
-  std::filesystem::path program;         ///< absolute path, the same on every node
+  std::filesystem::path program;         ///< absolute path, which must be the same on every node
   std::string sha256;                    ///< hash of the program file, 64 hexadecimal digits
   std::vector<std::string> arguments{};  ///< inserted before --units
   Units units{};

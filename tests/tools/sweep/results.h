@@ -24,11 +24,11 @@ namespace tendon::sweep {
 
 enum class Kept : std::uint8_t {
   kNew,
-  kSame,   ///< an identical file existed
-  kOther,  ///< a different file existed and was left unchanged
+  kSame,   ///< an identical file exists
+  kOther,  ///< a different file exists and has not been changed
 };
 
-/// Creates `file` with this text atomically and never overwrites one. A file that is visible has been synced.
+/// Creates `file` with this text atomically and never overwrites one. If the file is visible, it has been synced.
 Kept keep(const std::filesystem::path& file, std::string_view text);
 
 /// Returns the whole file. Throws std::runtime_error naming it.
@@ -43,7 +43,7 @@ std::optional<std::string> result_of(const std::filesystem::path& folder, const 
 /// Returns the second, different result of a shard, if any.
 std::optional<std::string> other_result_of(const std::filesystem::path& folder, const Plan& plan, std::uint64_t shard);
 
-/// Returns the lines of a unit in a program's output, possibly none.
+/// Returns the lines of a unit in the output of a program. Can be empty.
 std::string lines_of(std::string_view output, std::uint64_t unit);
 
 /// Returns the units in which two outputs differ. Compares lines; if all lines are equal, uses the digests, which

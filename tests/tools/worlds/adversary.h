@@ -14,8 +14,8 @@
 
 namespace tendon::simulation {
 
-/// Factors by which the device multiplies its commanded output. Tests require that 1.01 breaks passivity, which shows
-/// that they can detect a violation.
+/// The device multiplies its output by these factors. Tests require that 1.01 breaks passivity, which shows that they
+/// can detect a violation.
 struct Sabotage {
   double force = 1;
   double torque = 1;
@@ -40,14 +40,14 @@ class AdversaryDevice final : public Device {
     struct Turn {
       Friction friction;   ///< N·m and N·m·s/rad
       double largest = 0;  ///< rad, of a random rotation
-      double clamp = 0;    ///< N·m, the device's own limit; 0: no motors
+      double clamp = 0;    ///< N·m, the limit of the device, or 0 if there are no motors
     };
     std::optional<Turn> turn{};
     struct Fingers {
       Friction friction;
       double arm = 0;    ///< m/rad
       double open = 0;   ///< rad
-      double clamp = 0;  ///< N, the device's own limit; 0: no motor
+      double clamp = 0;  ///< N, the limit of the device, or 0 if there is no motor
     };
     std::optional<Fingers> fingers{};
     Sabotage more{};
@@ -109,7 +109,7 @@ class AdversaryDevice final : public Device {
   bool saw_only_finite_forces() const { return saw_only_finite_forces_; }
 
  private:
-  /// rad; below π, beyond which the shorter rotation would reverse its direction.
+  /// rad. This must be less than π, because a larger rotation would be measured in the other direction.
   static constexpr double kMostTurn = 3;
 
   void move(Duration held) {

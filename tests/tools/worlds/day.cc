@@ -266,7 +266,7 @@ class Day {
            " carried out";
   }
 
-  /// An observer may not rearm; a denial counts as execution.
+  /// An observer is not allowed to rearm, so a denial counts as an execution.
   void see_requests_of_x() {
     const std::uint64_t denied = world_.server().stats().denied;
     for (; denied_ < denied; ++denied_, ++report_.carried_out) {
@@ -321,7 +321,7 @@ class Day {
     }
   }
 
-  /// A client leaves and returns later; Z possibly at another address.
+  /// Stops a client and restarts it later. Z may return from another address.
   void absence(std::size_t handle) {
     if (dice_.chance(0.5)) {
       world_.stop(handle);
@@ -336,9 +336,9 @@ class Day {
     recover(world_.now());
   }
 
-  /// Starts Z's key at another address while the first Z is in session. The first one is notified that it was replaced,
-  /// and stays away. (If the notification could not reach it, because its address changed at that instant, it would
-  /// return after its timeout and take the session back; hence no address changes here.)
+  /// Starts Z's key at another address while the first Z is in session. The first one is notified that it has been
+  /// replaced, and does not return. (If the notification could not reach it, because its address changed at that
+  /// instant, it would return after its timeout and take the session back; hence no address changes here.)
   void take_over() {
     Network::Weather calm = fair();
     calm.up.rebind = {};
@@ -394,7 +394,7 @@ class Day {
     report_.slowest_recovery = std::max<Duration>(report_.slowest_recovery, world_.now() - kLook - from);
   }
 
-  /// Everyone must be served all the time, except where a session ends by its age.
+  /// All clients must be served all the time, unless a session reaches its maximum age.
   void see_fair_weather() {
     if (report_.troubles == 0) recover(world_.now());
     const LocalTime end = world_.now() + dice_.milliseconds(10'000, 40'000);

@@ -35,7 +35,7 @@ namespace tendon::simulation {
 ///                  the simulated network's buffers, sized for the largest burst so far.
 struct DayConfig {
   std::uint64_t seed = 1;
-  Duration length = std::chrono::hours(25);  ///< longer than a session's maximum age
+  Duration length = std::chrono::hours(25);  ///< exceeds the maximum age of a session
   std::uint32_t loop_hz = 1000;
   /// For A's datagrams. At 1 kHz, Z's keys change by datagram count (after 4 min), those of the observers by age.
   /// Clients renew their keys as in production.
@@ -52,9 +52,9 @@ struct DayConfig {
 struct DayReport {
   std::optional<std::string> broken;  ///< the violated invariant and the time
   std::uint64_t troubles = 0;
-  std::uint64_t byes = 0;       ///< faults in which a client left with a Bye
+  std::uint64_t byes = 0;       ///< number of clients that left with a Bye
   std::uint64_t deaths = 0;     ///< clients killed, including under bad conditions
-  std::uint64_t takeovers = 0;  ///< faults in which Z's key started at another address
+  std::uint64_t takeovers = 0;  ///< number of takeovers by Z's key from another address
   std::uint64_t sessions = 0;   ///< of all clients
   std::uint64_t expired = 0;    ///< sessions ended by age
   std::uint64_t rekeys = 0;     ///< both directions
@@ -64,7 +64,7 @@ struct DayReport {
   Network::Counts network;
   std::uint64_t forged = 0;       ///< datagrams that failed authentication at the server
   std::uint64_t requests = 0;     ///< requests of Z and X
-  std::uint64_t carried_out = 0;  ///< the other requests were in sessions that ended
+  std::uint64_t carried_out = 0;  ///< the sessions of all other requests have ended
   Duration slowest_recovery{};
   Duration longest_session{};
   Duration clock_error{};           ///< maximum under good conditions

@@ -308,8 +308,9 @@ void draw_suite(Dice dice, DrawnWorld& world) {
   }
 }
 
-/// From kFirstSeedOfSuite2 on, half of the sealed worlds have a server with AES. A third of those allow only AES; in
-/// the others some clients do not know suite 2. Uses its own random stream so that the rest of the world is unchanged.
+/// If the seed is at least kFirstSeedOfSuite2, half of the sealed worlds have a server with AES. A third of those allow
+/// only AES; in the others some clients do not know suite 2. Uses its own random stream so that the rest of the world
+/// is unchanged.
 void draw_aes(Dice dice, DrawnWorld& world) {
   for (DrawnClient& client : world.clients) client.config.suites = client.rogue.suites = world.config.suites;
   if (world.seed < kFirstSeedOfSuite2 || !world.sealed() || dice.chance(0.5)) return;

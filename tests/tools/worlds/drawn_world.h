@@ -45,8 +45,8 @@ struct DrawnClient {
   std::optional<Duration> restarted;  ///< restarted at the same address
 };
 
-/// Everything a seed determines except the fate of single datagrams, which the network draws from the same seed. Bad
-/// network conditions come first; then they clear and stay good.
+/// Everything a seed determines except the fate of single datagrams, which the network draws from the same seed. The
+/// network conditions are bad at first. Then they become good, and they do not change any more.
 struct DrawnWorld {
   static constexpr Duration kLength = std::chrono::seconds(10);
 
@@ -56,7 +56,7 @@ struct DrawnWorld {
     Duration at{};
     Network::Weather weather;
   };
-  std::vector<Change> changes;  ///< of network conditions; the last is the good one
+  std::vector<Change> changes;  ///< changes of the network conditions, ending with the good ones
   Duration clears{};            ///< time of the last change
   Duration one_way_up{};        ///< after that
   Duration one_way_down{};
@@ -78,7 +78,8 @@ struct DrawnWorld {
 /// Smaller seeds draw the same world as before suite 2 existed.
 inline constexpr std::uint64_t kFirstSeedOfSuite2 = 1'000'000'000;
 
-/// With sabotage the device is an AdversaryDevice. Seeds from kFirstSeedOfSuite2 on may require a processor with AES.
+/// With sabotage the device is an AdversaryDevice. If the seed is at least kFirstSeedOfSuite2, the world can require a
+/// processor with AES.
 DrawnWorld draw_world(std::uint64_t seed, const Sabotage& sabotage = {});
 
 /// Draws one direction of a bad network: any injector model except address changes and bit flips.

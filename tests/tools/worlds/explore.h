@@ -16,7 +16,7 @@ struct Outcome {
   bool limited = false;          ///< a remote force was limited by energy
   bool turned = false;           ///< a torque was commanded
   bool gripped = false;          ///< a grip force was commanded
-  int presses = 0;               ///< button presses that observers had to receive, and did
+  int presses = 0;               ///< number of button presses that observers have received
   bool recovered = false;        ///< recovery of all clients was checked
   double least_energy = 0;       ///< J
   std::uint64_t steps = 0;
@@ -28,8 +28,7 @@ struct Extras {
   Network::Watch watch{};      ///< sees every decision of the network
 };
 
-/// Runs a world to its end and checks its invariants. Deterministic: the same world gives the same outcome.
-/// Thread-safe: yes.
+/// Runs a world to its end and checks its invariants. The outcome is deterministic. Thread-safe: yes.
 Outcome run(const DrawnWorld& world, const Extras& extras = {});
 
 }  // namespace tendon::simulation

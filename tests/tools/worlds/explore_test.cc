@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Determinism of worlds, detection of violations, and shrinking. That all worlds keep their invariants is checked by
+// Determinism of worlds, detection of violations, and shrinking. The invariants of all worlds are checked by
 // `tendon-worlds run` (ctest -R Worlds).
 #include "tests/tools/worlds/explore.h"
 
@@ -72,7 +72,7 @@ int broken_by(const Sabotage& sabotage) {
 }
 
 TEST(Worlds, ADeviceThatGivesOutOnePercentMoreThanTheBoundBreaksThem) {
-  // In the other worlds the force seldom reaches its bound, or the law keeps a margin.
+  // In the other worlds, the force rarely reaches the bound, or the law has a margin.
   EXPECT_GT(broken_by({.force = 1.01}), 10);
 }
 

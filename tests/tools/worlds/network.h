@@ -78,10 +78,10 @@ class Network {
   /// Returns whether a datagram arrived at the server (or at this link's client) since the last call.
   bool take_news_of_server();
   bool take_news_of(std::uint32_t link);
-  /// Datagrams that arrived and were not read yet.
+  /// Returns the number of datagrams that have arrived but have not been read.
   std::size_t unread_by_server() const;
   std::size_t unread_by(std::uint32_t link) const;
-  /// Total datagrams that arrived.
+  /// Returns the number of datagrams that have arrived.
   std::uint64_t arrived_at_server() const;
   std::uint64_t arrived_at(std::uint32_t link) const;
   /// Datagrams in flight from a client to the server.

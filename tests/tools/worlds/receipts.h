@@ -18,7 +18,7 @@ namespace tendon::simulation {
 /// Thread-safe: no.
 class Receipts {
  public:
-  /// `overlap`: how long the previous key remains valid.
+  /// `overlap` is the time for which the previous key remains valid.
   explicit Receipts(Duration overlap) : overlap_(overlap) {}
 
   /// A datagram with `whole` = false cannot be authentic.

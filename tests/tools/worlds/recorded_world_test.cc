@@ -4,7 +4,8 @@
 // 5G mid-band link with measured one-way delays (DETERMINISTIC6G). The device is the UE: its states take the uplink,
 // the forces that answer them the downlink.
 //
-// Reads $TENDON_DATA; writes its recordings next to the test for `tendon-report`.
+// The data is read from $TENDON_DATA. The recordings are written next to the test, so that `tendon-report` can read
+// them.
 #include <gtest/gtest.h>
 
 #include <algorithm>

@@ -16,8 +16,8 @@
 namespace tendon::simulation {
 
 /// A malicious or faulty client that knows the protocol. It answers steps that never happened or are long past; sends
-/// non-finite forces or 10⁶ N; validities of zero or without end; and senseless requests. At `quits` it stops without a
-/// Bye.
+/// non-finite forces or 10⁶ N; validities of zero or without end; and senseless requests. It stops without a Bye at the
+/// time `quits`.
 class Rogue final : public Guest {
  public:
   struct Config {

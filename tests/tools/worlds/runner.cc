@@ -203,7 +203,7 @@ ShardEnd end_of(const Units& seeds, const Tally& tally, std::uint64_t broken, co
           .digest = digest};
 }
 
-/// Checks coverage: worlds in which nothing happens prove nothing.
+/// Throws std::runtime_error if too little happened in the worlds.
 void expect_events(const Tally& tally) {
   if (tally.worlds >= kEnoughToJudge &&
       (tally.felt < tally.worlds * 8 / 10 || tally.limited < tally.worlds * 6 / 10 ||

@@ -41,8 +41,8 @@ bool judge(std::istream& lines, std::ostream& out);
 /// Runs one world and prints its events if `verbose`. Returns true if every invariant held.
 bool run_one(std::uint64_t seed, bool verbose, std::ostream& out);
 
-/// Reads one seed per line; text after the number is a note, and # begins a comment. Throws std::runtime_error, naming
-/// file and line, for anything else.
+/// Reads one seed from each line. The number can be followed by a note, and a comment starts with #. Throws
+/// std::runtime_error, naming file and line, for anything else.
 std::vector<std::uint64_t> read_seeds(const std::filesystem::path& file);
 
 }  // namespace tendon::simulation

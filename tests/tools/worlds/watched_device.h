@@ -12,8 +12,8 @@
 
 namespace tendon::simulation {
 
-/// Wraps a device and records at its port every position that is read and every force that is held. From these alone,
-/// and without code under test, it computes the port's energy
+/// Wraps a device and observes every position that is read and every force that is held. It uses these values, but no
+/// code under test, to compute the energy of the port:
 ///
 ///     E = Σ [ −F·Δx + f_c ‖Δx‖ + b ‖Δx‖²/T ]
 ///
@@ -33,7 +33,7 @@ class WatchedDevice final : public Device {
     double disobeys = 0;   ///< probability that the force persists after a zero command
     std::uint64_t seed = 0;
     std::optional<Friction> rotation{};  ///< N·m and N·m·s/rad; only with motors that turn the handle
-    std::optional<Friction> grip{};      ///< only for a gripper with a motor
+    std::optional<Friction> grip{};      ///< only used if the gripper has a motor
     double arm = 0;                      ///< m/rad, of the gripper
   };
 

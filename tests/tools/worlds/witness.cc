@@ -16,7 +16,7 @@ constexpr double kRounding = 1e-9;  ///< tolerance: J for energies, N for forces
 constexpr Duration kRoundTripError = std::chrono::microseconds(30);
 /// Each clock reading is truncated to whole nanoseconds.
 constexpr Duration kClockRounding{4};
-/// A served client sends and receives at least once in this time, at both ends.
+/// If a client is served, both ends send and receive at least once in this time.
 constexpr Duration kServed = std::chrono::milliseconds(400);
 
 constexpr std::array kOracles = {
@@ -206,8 +206,8 @@ void Witness::see_age(const StepRecord& step) {
     if (port_.told() != Effort{}) report(Oracle::kStopped, words(port_.told()) + ", and nobody sees the hand");
     return;
   }
-  // The force decays through the slew limit, which counts at most the longest hold per interval; a pause adds no more.
-  // (Other laws may also have a spring to release.)
+  // The slew limit reduces the force by at most the amount for the longest hold in each interval, even if there is a
+  // pause. (Other laws may also have a spring to release.)
   if (!over && step.mode != Mode::kFault) {
     silent_for_.reset();
   } else if (!silent_for_) {
@@ -372,8 +372,8 @@ void Witness::see_end() {
     judge("hand", work, port_.energy());
     if (drawn_.port.grip) judge("fingers", simulated_->gripper()->truth().hand_work, port_.grip_energy());
   }
-  // A bit flip that passes the UDP checksum can be a packet number far ahead, which makes all genuine ones late.
-  // Without authentication only safety is required then.
+  // A bit flip that passes the UDP checksum can be a packet number far ahead, which makes all genuine ones late. If
+  // there is no authentication, only safety is required in this case.
   const bool long_enough = recovered_by_ && world_.now() - *recovered_by_ >= kServed;
   if (!long_enough || drawn_.believes_damage()) return;
   see_served();
@@ -381,8 +381,8 @@ void Witness::see_end() {
   see_presses();
 }
 
-/// Each press has its own button. While a client's address changes, states go to the old one and may hold a press; skip
-/// such worlds.
+/// Each press uses a different button. Worlds in which addresses change are skipped, because a press can be in a state
+/// that is sent to the old address.
 void Witness::see_presses() {
   const auto* const device = std::get_if<SimulatedDevice::Config>(&drawn_.device);
   const bool roams = drawn_.changes.back().weather.up.rebind > Duration::zero();

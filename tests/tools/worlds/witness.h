@@ -87,14 +87,14 @@ class Witness {
   bool limited() const { return limited_; }  ///< a remote force was limited by energy
   bool turned() const { return turned_; }    ///< a torque was commanded
   bool gripped() const { return gripped_; }  ///< a grip force was commanded
-  /// Button presses that observers had to receive, and did.
+  /// Number of button presses that observers have received.
   int presses() const { return presses_; }
   bool checked_recovery() const { return checked_recovery_; }
   /// Minimum, J, of the port's account over times without a deficit from holds longer than the law's bound.
   double least_energy() const { return least_energy_; }
 
  private:
-  struct Mark {  ///< a client's counters when it had to be recovered
+  struct Mark {  ///< the counters of a client at the deadline of its recovery
     std::uint64_t sessions = 0;
     std::uint64_t states = 0;
     std::uint64_t arrived = 0;

@@ -52,7 +52,7 @@ Network::Weather World::Config::bad() {
 
 World::World(const Config& config, Device& device)
     : config_(config),
-      now_(std::chrono::seconds(1)),  // catches code that assumes time begins at zero
+      now_(std::chrono::seconds(1)),  // detects code that assumes that the time starts at zero
       random_(config.seed),
       server_address_(address_of(47100)),
       network_(config.seed, config.weather, server_address_, config.players),

@@ -29,13 +29,14 @@ inline constexpr std::uint16_t kFirstClientPort = 50000;
 class Guest {
  public:
   virtual ~Guest() = default;
-  /// Does everything due at `now` (its own clock) and returns the latest time of its next call.
+  /// Runs everything that is due at `now` and returns when it must be called again. Both times are of the peer's own
+  /// clock.
   virtual LocalTime turn(LocalTime now) = 0;
 };
 
 /// The whole server and its clients in one thread on a virtual clock. Uses the same Assembly, Session, Recorder and
-/// ForceClient as production, called in the order of their next wake-up. Nothing sleeps; runs are deterministic in the
-/// seed.
+/// ForceClient as production, called in the order of their next wake-up. Nothing sleeps, and the result only depends on
+/// the seed.
 ///
 /// The server is A, its clients are Z, Y, X …; the network is bad by default.
 class World {
@@ -43,7 +44,7 @@ class World {
   struct Config {
     std::uint64_t seed = 1;
     HapticLoop::Config loop;
-    /// Default: 20 ± 5 ms and 2 % loss each way.
+    /// The default is 20 ± 5 ms and 2 % loss in each direction.
     Network::Weather weather = bad();
     Network::Players players{};
     /// Upper bound of the uniformly distributed wake-up latency of the haptic thread.
@@ -76,7 +77,7 @@ class World {
                              const injector::DriftingClock& clock = {});
   std::size_t add_observer(const ForceClient::Config& config, Watch watch, const injector::DriftingClock& clock = {});
   std::size_t add_guest(const std::function<std::unique_ptr<Guest>(Link& link, const Address& server)>& make);
-  /// Starts a new client in place of a stopped one, with the same address and clock.
+  /// Replaces a client that has stopped by a new one with the same address and clock.
   void restart_controller(std::size_t handle, const ForceClient::Config& config, Physics physics);
   void restart_observer(std::size_t handle, const ForceClient::Config& config, Watch watch);
   bool alive(std::size_t handle) const { return clients_[handle].client != nullptr; }
@@ -93,11 +94,11 @@ class World {
 
   struct Turn {
     std::optional<std::size_t> client;  ///< empty: the server
-    bool wants_more = false;            ///< wants to be called again immediately
+    bool wants_more = false;            ///< must be called again immediately
   };
   void watch_turns(std::function<void(const Turn&)> watch) { watch_turns_ = std::move(watch); }
 
-  /// Throws std::runtime_error when a peer asks to be called again without end.
+  /// Throws std::runtime_error if a peer keeps asking to be called again.
   void run_for(Duration duration);
 
   LocalTime now() const { return now_; }

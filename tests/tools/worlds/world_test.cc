@@ -186,7 +186,7 @@ TEST(World, AKilledEnginesForceHoldsFadesStopsAndComesBackRampedIn) {
   world.run_for(seconds(6));
   EXPECT_EQ(log.steps.back().mode, Mode::kActive);
   EXPECT_GT(log.steps.back().applied.norm(), 0.5);
-  // Slew limit 1000 N/s times the longest hold (2 ms).
+  // The slew limit is 1000 N/s, and the longest hold is 2 ms.
   EXPECT_LE(log.largest_rise(), 1000 * 2e-3 + 1e-9);
   bool ramped = false;
   for (const StepRecord& step : log.steps) ramped = ramped || step.reasons.has(Reason::kRampIn);
@@ -244,7 +244,7 @@ TEST(World, ADeviceFaultZeroesTheForceSavesStepsAndOnlyRearmLeavesIt) {
   ASSERT_TRUE(world.client(z).rearm());
   world.run_for(seconds(1));
   EXPECT_EQ(world.haptic().stats().fault, HapticController::Fault::kNone);
-  // Idle in between, unless a fresh force arrives with the request; ramped in both cases.
+  // The mode is idle in between, unless a fresh force arrives with the request. The force is ramped in both cases.
   EXPECT_EQ(log.modes().front(), Mode::kFault);
   EXPECT_EQ(log.modes().back(), Mode::kActive);
   EXPECT_TRUE(std::ranges::any_of(log.steps, [](const StepRecord& step) { return step.reasons.has(Reason::kRampIn); }));
@@ -405,7 +405,7 @@ TEST(World, PausesOfTheMachineAreFlaggedAndTheLedgerRecoversByItself) {
       ++overruns;
       continue;
     }
-    // Between overruns the energy stays nonnegative; from below zero it only rises.
+    // The energy is not negative between overruns. If it is below zero, it does not decrease.
     EXPECT_GE(step.energy, std::min(-1e-9, log.steps[i - 1].energy - 1e-15));
     if (step.energy < 0) {
       EXPECT_LE(step.applied.norm(), config.loop.control.limiter.friction.coulomb * (1 + 1e-9));

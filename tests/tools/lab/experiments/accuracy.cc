@@ -140,7 +140,7 @@ double floor_of(const Meter& meter) {
   return quantile(idle, 0.5);
 }
 
-/// Moves the tool between two positions of the script, in as many steps as a dynamic body needs for the interval.
+/// Moves the tool to the next position of the script. The number of steps is that of a dynamic body in the same time.
 template <class Touch>
 void walk(const PressedEngine& engine, const std::vector<Touched>& script, std::size_t to, Touch touch) {
   const int steps =
@@ -263,7 +263,7 @@ std::vector<Element> elements_of(const AccuracyOptions& options) {
   return all;
 }
 
-/// Each model with each element, without a mesh; workers last.
+/// Returns each model with each element, but without a mesh. The workers are last.
 std::vector<Candidate> families(const AccuracyOptions& options) {
   std::vector<Candidate> all;
   for (const AnyModel& model : models_of(options)) {

@@ -22,8 +22,7 @@
 namespace tendon::lab {
 
 /// Errors of a model under one load, relative to the true stiffness: total = model + discretisation + solver. The parts
-/// are NaN if the model collapses under the load on an infinitely fine mesh. For a worker, `solver` is the error bound
-/// that it sent.
+/// are NaN if the model collapses on an infinitely fine mesh. For a worker, `solver` is the error bound that it sent.
 ///
 /// Two models converge to another material than their parameters: as-rigid-as-possible elements (projective) have µ but
 /// λ = 0. Springs along edges are, for small strains, a body with central forces: Cauchy's relations, ν = 1/4. The
@@ -32,8 +31,8 @@ namespace tendon::lab {
 struct Accuracy {
   double k = 0;               ///< N/m, force over depth
   double total = 0;           ///< k/truth − 1
-  double model = 0;           ///< of its law on an infinitely fine mesh
-  double discretisation = 0;  ///< of its law on its mesh, solved exactly
+  double model = 0;           ///< the error of the law on an infinitely fine mesh
+  double discretisation = 0;  ///< the error of the law on this mesh, solved exactly
   double solver = 0;          ///< the remainder
   double tangent = 0;         ///< error of the tangent stiffness
 
@@ -49,12 +48,12 @@ struct AccuracyPoint {
   double lateral = 0;         ///< largest lateral error while pressing straight down, over the largest true force
   double force_error = 0;     ///< N, rms along the script
   double force_most = 0;      ///< N, largest
-  double force_relative = 0;  ///< rms error over rms of the true force
+  double force_relative = 0;  ///< the rms of the error divided by the rms of the true force
   double measuring_s = 0;     ///< processor time of the whole measurement
   double setup_s = 0;         ///< processor time, as the next two; wall time for a worker
   double update_ms_p50 = 0;
   double update_ms_p99 = 0;
-  double step_ms = 0;                    ///< simulated time per update; 0: the body has no time
+  double step_ms = 0;                    ///< the simulated time of an update, or 0 if the body is static
   std::optional<double> instructions{};  ///< per update, median; empty if the kernel does not count them
   std::optional<Felt> felt{};            ///< behind the network, if requested
 };
@@ -65,8 +64,8 @@ struct Network {
   std::uint64_t seed = 1;
 };
 
-/// Limits of a measurement. It ends with TooSlow when updates clearly take longer than `update_ms`, or the loop of
-/// `felt` longer than `felt_s`.
+/// Limits of a measurement. The measurement throws TooSlow if updates take much longer than `update_ms`, or if the loop
+/// of `felt` takes longer than `felt_s`.
 struct Patience {
   double update_ms = std::numeric_limits<double>::infinity();
   double felt_s = std::numeric_limits<double>::infinity();
@@ -78,16 +77,16 @@ AccuracyPoint measure(const Candidate& candidate, Truth& truth, const Meter& met
                       const std::optional<Network>& network = {}, const Patience& patience = {},
                       const std::string& worker = {});
 
-/// Returns the Pareto-optimal points in time and error without luck, sorted by time. Points with unknown parts are
-/// excluded.
+/// Returns the points for which no other point has a lower time and a lower error without luck, sorted by time. Points
+/// are excluded if their parts are not known.
 std::vector<AccuracyPoint> pareto_front(std::vector<AccuracyPoint> points, std::size_t load);
 
-/// Returns p of update ∝ unknowns^p by least squares of the logarithms; NaN for fewer than two sizes.
+/// Returns p of update ∝ unknowns^p by least squares of the logarithms; Returns NaN if there are fewer than two sizes.
 double cost_exponent(const std::vector<AccuracyPoint>& ladder);
 
 /// Returns false if, under each load, one of `others` is as fast and has a smaller error without luck, so that the loop
-/// need not be run for this point. A difference below a tenth of a device period does not count as faster. The total
-/// error is used while a point's parts are unknown.
+/// need not be run for this point. A point is not faster if the difference is less than a tenth of a period of the
+/// device. The total error is used if the parts of a point are not known.
 bool may_be_best(const AccuracyPoint& point, const std::vector<AccuracyPoint>& others);
 
 /// Returns the point with the smallest force error at the hand among those that need at most `budget_ms` per update and
@@ -100,10 +99,12 @@ struct AccuracyOptions {
   std::vector<AnyModel> models;
   std::vector<softbody::Element> elements;  ///< empty: all
   std::vector<int> resolutions{4, 6, 8, 10, 12, 16};
-  /// Command of a worker, without its scene, that also answers for the linear block; empty: none. Not with errors_only,
-  /// because its last bits depend on the number of ranks.
+  /// The command of a worker that is also measured with the linear block, without its scene. If this is empty, no
+  /// worker is used. This cannot be combined with errors_only, because the last bits of the answers depend on the
+  /// number of ranks.
   std::string worker{};
-  /// Also measures bodies of the model `near` with learned shapes and with a table of answers. Not with a budget.
+  /// Also measures bodies of the model `near` with learned shapes and with a table of answers. This cannot be combined
+  /// with a budget.
   bool learned = false;
   Truth::Config truth;
   double slowest_ms = 200;                  ///< a refinement ladder ends where an update would take longer
@@ -113,13 +114,13 @@ struct AccuracyOptions {
   /// Finds the best candidate at the hand that needs at most this time per update. Skips the loop for candidates
   /// excluded by may_be_best.
   std::optional<double> budget_ms{};
-  /// Only errors and sizes, which are deterministic; uses no clock and has no time limit. Not with a network or a
-  /// budget.
+  /// Only errors and sizes, which are deterministic; uses no clock and has no time limit. This cannot be combined with
+  /// a network or a budget.
   bool errors_only = false;
   std::optional<std::filesystem::path> out{};  ///< folder for accuracy.csv and the figures
   bool json = false;
-  /// Its units are the meshes: each n of each element of each model that exists, in this order. Shards and their merged
-  /// result have errors only.
+  /// The units are the meshes. There is a unit for each n of each element of each model, in this order. Shards and
+  /// their merged result have errors only.
   Part part{};
 };
 

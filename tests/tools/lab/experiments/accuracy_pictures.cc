@@ -69,7 +69,7 @@ std::vector<Candidate> ways_in(const Ladders& ladders) {
   return ways;
 }
 
-/// Returns the points of one source, or of all.
+/// Returns the points of one source, or all points if `way` is empty.
 std::vector<AccuracyPoint> points_of(const Ladders& ladders, const std::optional<Candidate>& way) {
   std::vector<AccuracyPoint> points;
   for (const auto& ladder : ladders) {
@@ -112,7 +112,7 @@ Panel error_over_time(const std::string& title, const Ladders& ladders, double e
     Curve line = curve_of(way);
     Curve points{.name = "", .colour = line.colour, .style = points_on(line)};
     for (const AccuracyPoint& p : points_of(ladders, way)) points.points.push_back(place(p));
-    // A model that collapses on a fine mesh has no Pareto points; its legend entry is kept.
+    // A model that collapses on a fine mesh has no Pareto points, but its name is still in the legend.
     for (const AccuracyPoint& p : pareto_front(points_of(ladders, way), load)) line.points.push_back(place(p));
     if (line.points.size() < 2) points.name = std::move(line.name);
     if (line.points.size() >= 2) panel.curves.push_back(std::move(line));

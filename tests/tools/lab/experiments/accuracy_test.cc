@@ -112,7 +112,7 @@ TEST(Accuracy, TheScriptSeesTheErrorOfTheStiffnessAndNoPushAside) {
   EXPECT_NEAR(point.force_relative, point.at_load[0].total, 0.02);
   EXPECT_GT(point.force_most, point.force_error);
   EXPECT_LT(point.lateral, 1e-3);
-  // A mesh that is not symmetric about the patch does: tetrahedra with an odd number of cells.
+  // A mesh of tetrahedra with an odd number of cells is not symmetric, so it has a lateral error.
   EXPECT_GT(measure({ModelKind::kCondensed, Element::kTet4, 5}, truth(), meter).lateral, 10 * point.lateral);
 }
 
@@ -257,11 +257,11 @@ TEST(Accuracy, OnlyWhatNothingElseIsAsQuickAndCloserThanMayBeBestAtTheHand) {
   EXPECT_TRUE(may_be_best(point(3, 0.5, 0.5), {}));
   // A hundredth of a millisecond is not felt.
   EXPECT_FALSE(may_be_best(point(0.01, 0.06, 0.2), {point(0.05, 0.05, 0.1)}));
-  // An answer takes at least the body's own step.
+  // An answer cannot be faster than the step of the body.
   AccuracyPoint steps = point(1, 0.06, 0.2);
   steps.step_ms = 4;
   EXPECT_FALSE(may_be_best(steps, others));
-  // Errors that cancel do not count once the parts are known.
+  // Errors that cancel are not counted if the parts are known.
   AccuracyPoint lucky = point(3, 0.01, 0.01);
   EXPECT_TRUE(may_be_best(lucky, others));
   for (Accuracy& at : lucky.at_load) at = {.total = 0.01, .model = -0.2, .discretisation = 0.21};

@@ -60,7 +60,7 @@ constexpr int kMapped = 6;  // springs above and below the exact limit, within a
 struct Point {
   SampledSpring spring;
   double simulated = 0, eigenvalues = 0, linear = 0, passive = 0;
-  std::string map{};  ///< 'x' for a diverging spring, '.' for one that comes to rest; empty without a figure
+  std::string map{};  ///< 'x' if the spring diverges, '.' if it comes to rest. It is empty if there is no figure.
 };
 
 double mapped_stiffness(const Point& point, int i) { return point.eigenvalues * std::pow(4, i / 6.0); }
@@ -130,7 +130,7 @@ double simulated_stiffness_limit(const SampledSpring& spring) {
 
 namespace {
 
-/// Rows: delays at 1 kHz, then rates without delay.
+/// The first rows are delays at 1 kHz. The other rows are rates without a delay.
 SampledSpring spring_of(const BoundaryOptions& options, std::uint64_t unit) {
   SampledSpring spring{.mass = options.mass, .viscous = options.viscous, .period = std::chrono::milliseconds(1)};
   if (unit < kDelays.size()) {

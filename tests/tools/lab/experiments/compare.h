@@ -18,14 +18,14 @@ namespace tendon::lab {
 struct Situation {
   double stiffness = 0;  ///< N/m
   double delay_ms = 0;
-  double jitter_ms = 0;  ///< maximum additional delay; forces may overtake each other
+  double jitter_ms = 0;  ///< the maximum additional delay, so forces can overtake each other
   double rate_hz = 0;
   double loss = 0;    ///< fraction
   Friction friction;  ///< of the device
   bool firm = false;  ///< hand of 800 N/m, 3 N·s/m, 100 g; otherwise 400, 0.3, 50
 };
 
-/// Returns all combinations; the same for every law.
+/// Returns all combinations. They are the same for every law.
 std::vector<Situation> comparison_grid();
 
 struct Cell {
@@ -40,9 +40,9 @@ struct Cell {
   bool passive() const noexcept { return outcome.least_energy >= -1e-9; }
 };
 
-/// Runs `law` for 2 s with a hand that moves by 15 mm at 0.5 Hz and a device with 30 µm resolution and 8.5 N. Laws with
-/// a model of the environment get the true one. AOL+ has its default parts, plus bounded acceleration if the device has
-/// little damping.
+/// Runs `law` for 2 s with a hand that moves by 15 mm at 0.5 Hz and a device with 30 µm resolution and 8.5 N. If a law
+/// has a model of the environment, the true values are used. AOL+ has its default parts, plus bounded acceleration if
+/// the device has little damping.
 Cell compare_cell(const Situation& situation, Law law, std::uint64_t seed);
 /// Runs AOL+ with these parts.
 Cell compare_cell(const Situation& situation, Law law, std::uint64_t seed, const AolPlus<1, 3>::Parts& parts);
@@ -56,9 +56,8 @@ struct Verdict {
   std::size_t passive = 0;  ///< cells in which AOL+ was passive
   /// Cells in which another law that guarantees passivity, and was passive, has a lower force error.
   std::size_t beaten = 0;
-  std::size_t beaten_clearly = 0;  ///< the same, lower by more than 5 %
-  /// Beaten cells by cause: the part of AOL+ without which it would not have been beaten, found by running it without
-  /// each.
+  std::size_t beaten_clearly = 0;  ///< cells in which the error of the other law is lower by more than 5 %
+  /// The number of beaten cells for each cause. The cause is the part of AOL+ without which it is not beaten.
   std::size_t robust_ledger = 0, knee = 0, energy_cap = 0, bounded_acceleration = 0;
   std::size_t vibrating = 0;  ///< no single part; the other law is too soft to vibrate there, AOL+ vibrates
   std::size_t no_single_part = 0;

@@ -112,7 +112,7 @@ std::vector<Contender> chosen(const std::vector<std::string>& names) {
   return some;
 }
 
-/// Runs all situations of a kind on all processors; results are in the order of their seeds.
+/// Runs all situations of a kind on all processors. The results are sorted by seed.
 std::vector<Result> results_of(const std::string& kind, std::uint64_t first, std::size_t count,
                                const std::vector<Contender>& all, bool progress) {
   std::vector<Result> results(count);

@@ -16,7 +16,7 @@ struct CompareKindsOptions {
   std::size_t count = 200;                     ///< situations of each kind
   std::uint64_t seed = 1;                      ///< of the first situation; consecutive
   bool held_out = false;                       ///< adds kHeldOutSeeds to the seed
-  std::vector<std::string> laws{};             ///< names of contenders(); empty: all that guarantee passivity
+  std::vector<std::string> laws{};             ///< names of contenders(). If this is empty, all passive laws are used.
   std::optional<std::filesystem::path> out{};  ///< folder for compare_kinds.csv
   bool json = false;                           ///< one object per kind and contender
   bool progress = false;                       ///< prints to standard error
@@ -26,7 +26,7 @@ struct CompareKindsOptions {
 /// passive and quiet, the median error, and where a contender is furthest behind the best other law that guarantees
 /// passivity and was passive, with the seed of that situation. Results do not depend on the number of threads.
 ///
-/// Throws std::invalid_argument for an unknown kind or law.
+/// Throws std::invalid_argument if there is no such kind or law.
 void compare_kinds(const CompareKindsOptions& options, std::ostream& out);
 
 }  // namespace tendon::lab

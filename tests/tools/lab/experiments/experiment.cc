@@ -68,7 +68,7 @@ class Remote {
     work(hand.at);
   }
 
-  /// Simulates the engine up to `now`; all motions that arrive by then must be known.
+  /// Simulates the engine until `now`. All motions that arrive before `now` must be known.
   void work(LocalTime now) {
     while (true) {
       auto first = LocalTime::max();

@@ -63,43 +63,43 @@ struct Experiment {
   std::uint64_t seed = 0;  ///< for jitter and loss
 };
 
-/// One period: the controller's step and the true state.
+/// The step of the controller and the true state in one period.
 struct Moment {
   Step step;
   double t = 0;                    ///< s
   Vec3 position = Vec3::Zero();    ///< m, true
   Vec3 velocity = Vec3::Zero();    ///< m/s, true
-  Vec3 true_force = Vec3::Zero();  ///< N, Environment::truth at this position and time
+  Vec3 true_force = Vec3::Zero();  ///< N, the value of Environment::truth at this position and time
   double energy = 0;               ///< J, true ledger: exact positions and the device's true friction
 };
 
 /// Summary of a run.
 struct Outcome {
   double operational_stiffness = 0;  ///< N/m: mean of −(F − F₀)·d/‖d‖², d = x − x₀, where ‖d‖ > a tenth of its largest
-  double least_energy = 0;    ///< J, true ledger; negative: the device output net energy
-  double late_vibration = 0;  ///< m/s, rms of velocity minus its mean over 50 ms, in the last second
+  double least_energy = 0;    ///< J, of the true ledger. If it is negative, the device has generated energy.
+  double late_vibration = 0;  ///< m/s, the rms of the velocity minus its mean over 50 ms, in the last second
   double vibration = 0;       ///< m/s, the same in the last four seconds
   double sensation = 0;       ///< dB above what a hand just feels (perception.h), in the last second
   double noticed_share = 0;   ///< fraction of the judged periods in which the hand notices the force error
   double largest_force = 0;   ///< N
-  double limited_share = 0;   ///< fraction of periods in which the law changed the wanted force
+  double limited_share = 0;   ///< the fraction of the periods in which the law changes the force
   double force_error = 0;     ///< N, rms of felt minus true force
-  double true_force = 0;      ///< N, rms of the true force
-  double latency = 0;         ///< s, delay of the felt force at the maximum of the correlation with the true one
+  double true_force = 0;      ///< N, the rms of the true force
+  double latency = 0;         ///< s, the delay that maximizes the correlation with the true force
   bool stable = false;        ///< late_vibration ≤ kMostVibration
 };
 
 /// m/s: a third of the peak speed of a hand that moves by 15 mm at 0.25 Hz.
 inline constexpr double kMostVibration = 8e-3;
 
-/// Runs the server's HapticController against the environment and the hand on a virtual clock. Hold, ramp and slew
-/// limits are disabled: a force stays until the next one arrives.
+/// Runs the server's HapticController against the environment and the hand on a virtual clock. The hold, ramp and slew
+/// limits are disabled, so a force is held until the next one arrives.
 ///
-/// Deterministic on machines with the same floating point. Throws the exceptions of the parts for invalid values, and
-/// std::invalid_argument without an environment.
+/// Deterministic on machines with the same floating point. Throws the exceptions of the parts if a value is not valid,
+/// and std::invalid_argument if there is no environment.
 std::vector<Moment> run(const Experiment& experiment);
 
-/// `period` must be that of the experiment.
+/// The `period` must be the one of the experiment.
 Outcome outcome(const std::vector<Moment>& record, Duration period);
 
 /// Returns the velocity (m/s) minus its mean over 50 ms, for the last `last` seconds of the record except its final 25

@@ -19,7 +19,7 @@ constexpr Friction kDevice{.coulomb = 0.02, .viscous = 0.26};
 
 /// An engine's answers; force and stiffness of each are requested in turn. Between two answers a dynamic body advances
 /// by the elapsed time, as in tendon-softbody, while its tool moves continuously, because a jump would strike the
-/// surface away from it. An engine that is too slow falls behind.
+/// surface away from it. If an engine is too slow, it falls behind.
 class Answers {
  public:
   /// `compute`: s, time of the engine per step of a dynamic body, or per answer of a static one.

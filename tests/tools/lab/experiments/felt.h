@@ -14,16 +14,16 @@ namespace tendon::lab {
 /// measured update time as period; a dynamic body steps at that rate. Compared with the truth of the same block.
 struct Felt {
   double displayed = 0;      ///< Σ F·d / Σ F_true·d over depths d: displayed fraction of the true stiffness
-  double force_error = 0;    ///< rms force error over rms of the true force
-  double held_error = 0;     ///< the same with held forces and no stiffness sent
-  double limited_share = 0;  ///< fraction of periods in which the limiter changed the wanted force
-  double vibration = 0;      ///< m/s, of a free hand, in its last second
-  double latency = 0;        ///< s, delay of the felt force behind the true one
+  double force_error = 0;    ///< the rms of the error divided by the rms of the true force
+  double held_error = 0;     ///< the same without sending the stiffness, with held forces
+  double limited_share = 0;  ///< the fraction of the periods in which the limiter changes the force
+  double vibration = 0;      ///< m/s, the vibration of a free hand in the last second
+  double latency = 0;        ///< s, the delay of the felt force
 };
 
 /// A hand presses in and releases 0.8 times per second, slightly irregularly, for 3 s, at most as deep as under the
-/// larger load. The device has 0.26 N·s/m and 1 kHz. `engine` must have the block of `truth`. Throws TooSlow after
-/// `longest_s` (PressedEngine::took), because Newton's method is slow for a collapsing body.
+/// larger load. The device has a damping of 0.26 N·s/m and a rate of 1 kHz. `engine` must have the block of `truth`.
+/// Throws TooSlow after `longest_s` (PressedEngine::took), because Newton's method is slow for a collapsing body.
 Felt felt(PressedEngine& engine, Truth& truth, const Route& route, std::uint64_t seed,
           double longest_s = std::numeric_limits<double>::infinity());
 

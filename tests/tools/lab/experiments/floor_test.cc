@@ -18,7 +18,7 @@ namespace {
 
 constexpr Friction kDamped{.coulomb = 0.02, .viscous = 0.26};
 
-/// A hand that moves by ± 4 mm at 0.5 Hz on a spring.
+/// A hand that moves ± 4 mm at 0.5 Hz against a spring.
 FloorProblem spring(double stiffness, const Friction& friction = kDamped) {
   FloorProblem problem{.friction = friction, .period = std::chrono::milliseconds(1), .max_force = 8.5};
   const auto place = [](int k) { return 0.004 * portable::sin(2 * 3.14159265358979 * 0.5 * k * 1e-3); };
@@ -73,7 +73,7 @@ TEST(Floor, NoLawIsBelowTheFloorOfItsOwnMotion) {
   for (std::uint64_t seed = 1; seed <= 6; ++seed) {
     auto trial = draw_situation("grid", seed);
     auto& hand = std::get<FreeHand>(trial->experiment.hand);
-    hand.encoder_step.reset();  // laws without a robust ledger guarantee nothing with encoder counts
+    hand.encoder_step.reset();  // laws without a robust ledger do not guarantee anything with encoder counts
     Experiment set = trial->experiment;
     set.limiter.law = Law::kAol;
     const auto record = run(set);

@@ -28,7 +28,7 @@ inline constexpr std::array kTableDampings = {0.26, 0.05, 0.005};  ///< N·s/m
 void write(std::ostream& out, const std::vector<FrictionTable>& tables);
 /// Returns one line of JSON; `commit` is that of the build.
 JsonLine json_of(const FrictionTable& table);
-/// Reads such a line as far as its fields allow. Throws if the line is not valid.
+/// Parses a line that was written by json_of(). Throws an exception if it is not valid.
 FrictionTable friction_table_of(const nlohmann::json& line);
 
 }  // namespace tendon::lab

@@ -22,7 +22,7 @@ class Meter {
  public:
   struct Reading {
     double wall = 0;                              ///< s
-    double processor = 0;                         ///< s, all threads of the process: the time on a core of its own
+    double processor = 0;                         ///< s, the sum over all threads of the process
     std::optional<std::uint64_t> instructions{};  ///< user-space instructions of the thread that created the meter
 
     Reading operator-(const Reading& before) const;

@@ -63,8 +63,8 @@ std::vector<injector::Decision> decisions(const std::string& line, const NetemOp
   return result;
 }
 
-/// Returns the mean burst length with the requested correlation of consecutive losses. In a Gilbert chain the
-/// correlation is 1 − P(good → bad) − P(bad → good).
+/// Returns the mean burst length with the requested correlation of consecutive losses. The correlation of a Gilbert
+/// chain is 1 − P(good → bad) − P(bad → good).
 double mean_burst(double probability, double correlation) { return 1 / ((1 - correlation) * (1 - probability)); }
 
 Losses our_losses(double probability, double correlation, const NetemOptions& options) {

@@ -17,7 +17,7 @@ namespace tendon::lab {
 /// Thread-safe: no.
 class NetemRandom {
  public:
-  /// `correlation`: from 0 (independent) to below 1, as in `loss 10% 50%`.
+  /// The `correlation` must be at least 0 (independent) and less than 1. The value in `loss 10% 50%` is 0.5.
   NetemRandom(double correlation, std::uint64_t seed);
   std::uint32_t next();
 

@@ -269,7 +269,7 @@ JsonLine json_of(const PaperRow& row) {
   return line;
 }
 
-/// Reads such a line as far as its fields allow.
+/// Parses a line of JSON. Fields that the line does not contain keep their defaults.
 PaperRow row_of(const nlohmann::json& line) {
   PaperRow row;
   row.experiment = line.at("experiment");
@@ -287,7 +287,7 @@ PaperRow row_of(const nlohmann::json& line) {
 /// A row of an experiment, or of Tables II and III.
 using AnyRow = std::variant<PaperRow, FrictionTable>;
 
-/// `drawn`: keeps the motion for a figure.
+/// If `drawn` is true, the motion is kept for a figure.
 PaperRow run_row(std::size_t experiment, std::size_t kind, bool drawn) {
   PaperRow row = paper_row(paper_experiments().at(experiment), kRowKinds.at(kind).law, kRowKinds.at(kind).preset);
   row.prescribed_record = {};

@@ -70,8 +70,8 @@ PaperRow paper_row(const PaperExperiment& experiment, Law law, std::optional<Pre
 struct PaperOptions {
   std::optional<std::filesystem::path> out{};  ///< folder for the figures
   bool json = false;
-  /// Its units are the rows of the table: four per experiment, then those of Tables II and III. With `from`, the
-  /// motions of the figures are simulated again, because lines do not contain them.
+  /// The units are the rows of the table, which are four rows for each experiment and then the rows of Tables II and
+  /// III. With `from`, the motions of the figures are simulated again, because lines do not contain them.
   Part part{};
 };
 

@@ -18,9 +18,9 @@ namespace tendon::lab {
 ///
 /// Source: the shape is that of contactors of 2.9 cm² and more on the thenar eminence (Verrillo, JASA 35, 1963, 1962;
 /// corners and slope: Gescheider and Verrillo in Kenshalo, Sensory Functions of the Skin of Humans, 1979, 183). The
-/// level, −20 dB of 1 µm at 250 Hz, is quoted from there. For a cylinder in the whole hand, thresholds down to 0.01 µm
-/// around 150 to 200 Hz were found (Brisben, Hsiao and Johnson, J. Neurophysiol. 81, 1999, 1548). Another level adds
-/// the same number of dB to every law and does not affect comparisons.
+/// level, −20 dB of 1 µm at 250 Hz, is the value in that source. For a cylinder in the whole hand, thresholds down to
+/// 0.01 µm around 150 to 200 Hz were found (Brisben, Hsiao and Johnson, J. Neurophysiol. 81, 1999, 1548). Another level
+/// adds the same number of dB to every law and does not affect comparisons.
 double detection_threshold(double frequency) noexcept;
 
 inline constexpr double kNothing = -60;  ///< dB

@@ -23,7 +23,7 @@ class PressedEngine {
   virtual softbody::Feel touch(const softbody::Vec3& tool) = 0;
   /// Returns the answer of the centered patch at rest under a load (N).
   virtual softbody::Reaction under(double load) = 0;
-  virtual double step() const = 0;  ///< s, simulated time per answer; 0: the body has no time
+  virtual double step() const = 0;  ///< s, the simulated time of an answer, or 0 if the body is static
   virtual softbody::Body::Size size() const = 0;
   /// Returns the time of an answer in s from a meter's reading: processor time of this process, or wall time for a
   /// worker.

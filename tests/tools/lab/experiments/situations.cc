@@ -22,7 +22,7 @@
 namespace tendon::lab {
 namespace {
 
-/// Parameters that a kind may change before the experiment is created.
+/// The parameters that a kind can change before the experiment is created.
 struct Draft {
   Dice& dice;
   Trial trial;
@@ -174,7 +174,7 @@ void drawn_out(Draft& draft) {
 constexpr double kInFree = 10;   // s, before the wall
 constexpr double kWall = 20000;  // N/m
 
-/// Moves to and fro for 10 s before a wall, then 12 mm into it as far as the hand can.
+/// The hand moves back and forth in front of a wall for 10 s, and then up to 12 mm into the wall.
 void into_a_wall(Draft& draft) {
   const double amplitude = draft.dice.chance(0.5) ? 0.015 : 0.03;
   const double hz = draft.dice.chance(0.5) ? 0.5 : 1;
@@ -204,7 +204,7 @@ void stirring(Draft& draft) {
   draft.remembering([] {
     return [before = Vec3(Vec3::Zero()), then = -1.0, speed = Vec3(Vec3::Zero())](double t, const Vec3& x) mutable {
       constexpr double kViscous = 5;     // N·s/m
-      constexpr double kWithin = 0.005;  // s, over which the object's engine differentiates the motion
+      constexpr double kWithin = 0.005;  // s, the interval in which the engine of the object measures the velocity
       if (then < 0 || t - then >= kWithin) {
         if (then >= 0) speed = (x - before) / (t - then);
         before = x;

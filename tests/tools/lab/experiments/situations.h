@@ -28,7 +28,7 @@ std::span<const SituationKind> situation_kinds() noexcept;
 /// Laws may be tuned on smaller seeds only; seeds from here on are held out for evaluation.
 inline constexpr std::uint64_t kHeldOutSeeds = 1'000'000;
 
-/// A situation, the same for every law.
+/// A situation, which is the same for every law.
 struct Trial {
   Experiment experiment{};  ///< its limiter has the device's friction and no law
   double encoder_step = 0;  ///< m
@@ -37,10 +37,10 @@ struct Trial {
 };
 
 /// Draws the situation of this kind for `seed`; nullopt for recorded hands if TENDON_DATA is not set. Deterministic on
-/// all machines. Throws std::invalid_argument for an unknown kind.
+/// all machines. Throws std::invalid_argument if there is no such kind.
 std::optional<Trial> draw_situation(std::string_view kind, std::uint64_t seed);
 
-/// A law with its parts, or a preset.
+/// Either a law with its parts or a preset.
 struct Contender {
   std::string_view name;
   Law law = Law::kAolPlus;

@@ -102,8 +102,8 @@ inline std::vector<StepRecord> toy_run(Law law, std::uint64_t steps) {
   return run;
 }
 
-/// Writes the runs of several devices to a file. `names`: all devices except the first. All runs except the first may
-/// be empty.
+/// Writes the runs of several devices to a file. `names` contains the names of all devices except the first. All runs
+/// except the first may be empty.
 inline void record_devices(const std::filesystem::path& file, const std::vector<std::vector<StepRecord>>& runs,
                            const std::vector<std::string>& names, bool whole = true) {
   FileSink sink(file);

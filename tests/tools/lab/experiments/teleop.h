@@ -18,7 +18,7 @@ struct TeleopOptions {
   std::uint64_t seed = 1;                      ///< of the first hand
   std::optional<std::filesystem::path> out{};  ///< folder for the figure
   bool json = false;
-  Part part{};  ///< its units are trials: each hand at each round trip of each method, in this order
+  Part part{};  ///< the units are the trials, for each hand at each round trip of each method
 };
 
 /// Results of a method at a round trip: medians over the hands, and worst cases.
@@ -28,7 +28,7 @@ struct TeleopRow {
   double first = 0;   ///< felt on the first press, relative to the force of a rigid link
   double second = 0;  ///< the same on the second press
   double buzz = 0;    ///< m/s rms above 20 Hz in free motion, the worst hand
-  double pair = 0;    ///< J, minimum work of both ports together, the worst hand
+  double pair = 0;    ///< J, the minimum work of both ports together, for the worst hand
 };
 
 /// Simulates two devices of 75 g (b 0.26 N·s/m, f_c 0.02 N, 1 kHz, AOL+ with a shared account) and tendond's coupling

@@ -42,7 +42,8 @@ CostTable read_costs(const std::filesystem::path& file);
 /// Returns why two tables cannot be compared (different builds), or an empty string.
 std::string why_not_comparable(const CostTable& was, const CostTable& is);
 
-/// Returns a line (law, was, is) for each law that differs by more than kCostTolerance or is in only one table.
+/// Returns a line (law, was, is) for each law that differs by more than kCostTolerance, or that is in only one of the
+/// tables.
 std::string cost_differences(const CostTable& was, const CostTable& is);
 
 }  // namespace tendon::lab

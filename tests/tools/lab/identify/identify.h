@@ -26,14 +26,14 @@ struct IdentifyOptions {
   std::optional<Friction> simulated_friction = {};
   std::uint64_t seed = 1;                   ///< of the simulation
   std::optional<double> mass = {};          ///< kg or kg·m²; empty: fitted, or that of the simulated device
-  std::optional<double> encoder_step = {};  ///< m or rad; empty: 30 µm, 0.1 mrad, or as simulated
+  std::optional<double> encoder_step = {};  ///< m or rad. The default is 30 µm, 0.1 mrad, or the simulated value.
   bool json = false;
-  Part part{};  ///< its units are the runs in order: the files, or 30 simulated runs
+  Part part{};  ///< the units are the runs, which are the files or 30 simulated runs
 };
 
 /// Identifies the friction and writes the result to `out`: a table, the trusted method and the reason, and a fragment
-/// of a scene with the lower bounds. Without a trusted method there is no fragment. With `json` it writes one line per
-/// run and one more line.
+/// of a scene with the lower bounds. There is no fragment if neither method is trusted. If `json` is set, it writes one
+/// line for each run and one more line.
 ///
 /// Writes nothing until the whole result is known, except in a sweep. Throws std::invalid_argument for invalid options
 /// before reading a file. Throws std::runtime_error with the file name if a run cannot be read or used, and also if

@@ -10,7 +10,7 @@
 namespace tendon::lab {
 namespace {
 
-constexpr std::size_t kMaxRows = 4'000'000;  // more than an hour at 1 kHz
+constexpr std::size_t kMaxRows = 4'000'000;  // this is more than an hour at 1 kHz
 
 }  // namespace
 

@@ -27,7 +27,7 @@ class Noise {
   std::mt19937_64 random_;
 };
 
-/// One axis of a device: reads its position and commands its effort.
+/// Reads the position of one axis of a device and commands the effort of this axis.
 class Axis {
  public:
   Axis(Device& device, Freedom freedom) : device_(device), freedom_(freedom) {}

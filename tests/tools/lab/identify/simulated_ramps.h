@@ -33,7 +33,7 @@ RampRun run_ramp(Device& device, LocalTime begin, const RampPlan& plan);
 struct RampExperiment {
   SimulatedDevice::Config device{};              ///< without a hand
   Freedom freedom = Freedom::kMovement;          ///< the units below are those of a movement
-  std::vector<double> rates = {0.05, 0.1, 0.5};  ///< N/s, each > 0; run in both directions
+  std::vector<double> rates = {0.05, 0.1, 0.5};  ///< N/s, must be positive. Each rate is used in both directions.
   int repeats = 5;                               ///< per rate and direction
   double travel = 0.25;                          ///< m
   double force_noise = 0.005;                    ///< N, standard deviation of the motor force; not recorded

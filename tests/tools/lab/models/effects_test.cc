@@ -34,7 +34,7 @@ TEST(ComparedEffects, TheToolMeetsTheSurfaceWhereTheWeightHasSunkItTo) {
   }
 }
 
-/// A cube of 100 mm that only moves along z: a mass of 0.5 kg on a spring of 1 kN/m.
+/// A cube of 100 mm that can only move along z. This is equivalent to a mass of 0.5 kg on a spring of 1 kN/m.
 TEST(TensorMass, OneMassSwingsDampedAndUnderItsWeightAsOnPaper) {
   constexpr double kMass = 0.5;
   constexpr double kSpring = 1000;

@@ -44,7 +44,7 @@ class ExplicitModel : public Model {
   VectorXd weight_;                         ///< N, all nodes; empty without gravity
   VectorXd u_;                              ///< m, all nodes
   VectorXd velocity_;                       ///< m/s
-  VectorXd rest_;                           ///< m, rest shape under gravity; empty without gravity
+  VectorXd rest_;                           ///< m, the shape at rest under gravity, if any
 };
 
 /// Returns the stability limit 2/ω of an explicit step for the body at rest, s.

@@ -11,7 +11,7 @@
 namespace tendon::softbody::compared {
 namespace {
 
-/// Relative length below which a spring has no direction, because its ends coincide.
+/// The relative length below which a spring has no direction, because its ends are in the same place.
 constexpr double kShortest = 1e-9;
 
 std::vector<double> factors_of(const Solid& solid) {
@@ -25,7 +25,7 @@ std::vector<double> factors_of(const Solid& solid) {
 SpringNet::SpringNet(const Mesh& at_rest, double young, const Fixed& fixed, const std::vector<double>& factors)
     : Elastic(at_rest, fixed) {
   if (mesh().shape != Shape::kTet4) throw std::invalid_argument("a net of springs wants a mesh of tetrahedra");
-  std::map<std::pair<int, int>, double> volumes;  // of the tetrahedra around each edge, times their factors
+  std::map<std::pair<int, int>, double> volumes;  // the volumes around each edge, multiplied by the factors
   for (int e = 0; e < mesh().element_count(); ++e) {
     const auto nodes = mesh().element(e);
     Mat3 edges;

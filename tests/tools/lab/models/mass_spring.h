@@ -17,8 +17,8 @@ namespace tendon::softbody::compared {
 /// For comparison only: it has no Poisson ratio and does not resist flattening of a tetrahedron.
 class SpringNet : public Elastic {
  public:
-  /// `factors`: ratio of each tetrahedron's modulus to `young`; empty: 1. Throws std::invalid_argument unless the mesh
-  /// is tetrahedral.
+  /// `factors`: ratio of each tetrahedron's modulus to `young`; empty: 1. Throws std::invalid_argument if the mesh is
+  /// not tetrahedral.
   SpringNet(const Mesh& at_rest, double young, const Fixed& fixed, const std::vector<double>& factors = {});
 
   double energy(const VectorXd& u) const override;

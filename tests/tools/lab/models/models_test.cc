@@ -27,7 +27,7 @@ using softbody::testing::kB1;
 using softbody::testing::kB1PatchRadius;
 using softbody::testing::pressed_block;
 
-/// Returns the stiffness error of block B1 with tetrahedra at rest under 0.3 N.
+/// Returns the error of the stiffness of block B1 with tetrahedra, at rest under 0.3 N.
 double error_percent(Kind kind, int n, const Config& config) {
   const Reaction reaction = pressed_b1(kind, Element::kTet4, n, config).settle(Given::kForce, 0.3);
   return 100 * (reaction.force / reaction.depth / kB1 - 1);

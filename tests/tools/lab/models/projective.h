@@ -36,7 +36,7 @@ class ProjectiveModel : public Model {
   Effects effects_;
   Factor factor_;
   VectorXd u_;     ///< m, all nodes
-  VectorXd rest_;  ///< m, rest shape; empty without effects
+  VectorXd rest_;  ///< m, the shape at rest, if there are effects
 };
 
 }  // namespace tendon::softbody::compared

@@ -19,8 +19,8 @@ namespace tendon::softbody::compared {
 /// depends on time step and iterations, with errors from −90 % to +200 %.
 class XpbdModel : public Model {
  public:
-  /// Throws std::invalid_argument unless the mesh is tetrahedral, iterations ≥ 1, and `effects` has inertia and no
-  /// viscosity. The solid must outlive this object.
+  /// Throws std::invalid_argument if the mesh is not tetrahedral, if iterations < 1, or if `effects` has no inertia or
+  /// has viscosity. The solid must outlive this object.
   XpbdModel(const Solid& solid, const TouchSurface& surface, int iterations, const EffectsConfig& effects);
 
   Reaction press(const Patch& patch, Given given, double value) override;
@@ -50,8 +50,8 @@ class XpbdModel : public Model {
   VectorXd per_mass_;  ///< 1/kg, all nodes; 0 at fixed nodes
   VectorXd u_;         ///< m, all nodes
   VectorXd velocity_;  ///< m/s
-  VectorXd fall_;      ///< m/s, velocity change by gravity per step; empty without gravity
-  VectorXd rest_;      ///< m, rest shape under gravity; empty without gravity
+  VectorXd fall_;      ///< m/s, the change of the velocity by gravity in a step, if any
+  VectorXd rest_;      ///< m, the shape at rest under gravity, if any
 };
 
 }  // namespace tendon::softbody::compared

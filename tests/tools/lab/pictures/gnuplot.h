@@ -18,14 +18,14 @@ inline constexpr const char* kGreen = "#009E73";
 inline constexpr const char* kVermilion = "#D55E00";
 inline constexpr const char* kPurple = "#CC79A7";
 
-/// Returns `text` in single quotes for gnuplot; control characters become spaces.
+/// Returns `text` in single quotes for gnuplot. Control characters are replaced by spaces.
 std::string literal(std::string_view text);
 
 /// Returns the commands `set encoding`, `set terminal` and `set output` for an .svg or .png file.
 std::string begin_picture(const std::filesystem::path& path, int width, int height);
 
-/// Throws std::invalid_argument unless `path` ends with .svg or .png and has no control characters; std::runtime_error
-/// if a file of another type exists there.
+/// Throws std::invalid_argument if `path` does not end with .svg or .png, or if it contains control characters. Throws
+/// std::runtime_error if the file exists and has a different type.
 void check_picture_name(const std::filesystem::path& path);
 
 /// Runs gnuplot (package gnuplot-nox) with a script that draws `path`, and waits. Throws std::runtime_error if gnuplot

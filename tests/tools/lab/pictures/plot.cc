@@ -92,7 +92,7 @@ std::vector<Scale> energy_scales(std::span<const Drawing> drawings) {
   return own;
 }
 
-/// A unit in which the values of a scale have one to three digits.
+/// The unit in which the values of a scale have one to three digits.
 struct Unit {
   const char* name;
   double per_si;
@@ -133,7 +133,7 @@ class Script {
         width_(picture_width(drawings.size())),
         column_(width_ / static_cast<double>(drawings.size())) {
     for (const Drawing& drawing : drawings) span_ = std::max(span_, seconds(drawing.trace.config().span));
-    span_ = std::ceil(span_ * 100) / 100;  // a run of 9.999 s ends at 10
+    span_ = std::ceil(span_ * 100) / 100;  // rounds a run of 9.999 s up to 10 s
   }
 
   std::string write(const std::filesystem::path& path) {

@@ -21,8 +21,8 @@ struct Drawing {
 /// Maximum number of legible columns.
 inline constexpr std::size_t kMostDrawings = 4;
 
-/// Throws std::invalid_argument unless `path` ends with .svg or .png without control characters, and there are 1 to
-/// kMostDrawings drawings.
+/// Throws std::invalid_argument if `path` does not end with .svg or .png, if it contains control characters, or if the
+/// number of drawings is not from 1 to kMostDrawings.
 void check_picture(const std::filesystem::path& path, std::size_t drawings);
 
 /// One trace column per pixel of a panel.
@@ -30,8 +30,8 @@ std::size_t trace_columns(std::size_t drawings);
 
 /// Draws runs side by side as an .svg or .png file of 1000 pixels height and 1600 width (800 per run from the third
 /// on). From top to bottom: the position; the wanted, permitted and applied force; the energy ledger. All columns share
-/// the scales of position, force and time. They also share that of energy unless one run would be illegible; then each
-/// has its own, and the picture says so.
+/// the scales of position, force and time. They also share the scale of energy if this is legible. Otherwise, each
+/// column has its own scale and a note.
 ///
 /// Runs gnuplot (package gnuplot-nox) and waits. `path` and labels are quoted and cannot inject commands.
 ///

@@ -15,7 +15,7 @@ struct FilterLaw {
   std::string name = "aol+";  ///< a name of core/control/limiter.h
   double viscous = 0;         ///< N·s/m, lower bound of the device's friction
   double coulomb = 0;         ///< N, lower bound of the device's friction
-  double period_us = 1000;    ///< µs, longest hold of a force
+  double period_us = 1000;    ///< µs, the longest time for which a force is held
   /// Scene settings "TABLE.KEY=VALUE" in the syntax of `parse_scene`, such as parts of AOL+. Applied after the fields
   /// above.
   std::vector<std::string> settings = {};
@@ -32,16 +32,16 @@ struct FilterOptions {
 /// `tendon-lab filter`: applies a law to a recorded motion, row by row, so it can be used in a pipe.
 ///
 /// The input is a table for TableReader with the columns `t_s,x_m,wanted_n` or
-/// `t_s,x_m,y_m,z_m,wanted_x_n,wanted_y_n,wanted_z_n`. Forces act on the hand: a wall that resists motion along +x has
-/// a force along −x. The output is CSV with these columns plus `applied_n` (or `applied_x_n` …), `permitted_n` (bound
-/// of the force, or `inf`), `energy_j` (the law's account after the last interval) and `reason` (empty if the applied
-/// force is the wanted one).
+/// `t_s,x_m,y_m,z_m,wanted_x_n,wanted_y_n,wanted_z_n`. The forces act on the hand, so a wall that resists motion along
+/// +x has a force along −x. The output is CSV with these columns plus `applied_n` (or `applied_x_n` …), `permitted_n`
+/// (bound of the force, or `inf`), `energy_j` (the law's account after the last interval) and `reason` (empty if the
+/// applied force is the wanted one).
 ///
-/// The motion does not respond to the applied force. Each row's force is held until the next row.
+/// The motion does not respond to the applied force. The force of a row is held until the next row.
 ///
-/// A row is bad if TableReader rejects it or time does not increase. For a bad row, writes file and line to `errors`
-/// and nothing to `out`, and holds the previous force. Returns the number of bad rows. Throws std::runtime_error if the
-/// header is neither of the two or writing to `out` fails.
+/// A row is bad if it is rejected by TableReader or if the time does not increase. If a row is bad, it writes the file
+/// and the line to `errors` and nothing to `out`, and the previous force is held. Returns the number of bad rows.
+/// Throws std::runtime_error if the header is neither of the two or writing to `out` fails.
 int filter(const FilterOptions& options, std::istream& in, std::ostream& out, std::ostream& errors);
 
 }  // namespace tendon::lab

@@ -146,9 +146,8 @@ Curve curve(const std::string& name, const char* colour, const PairRun::Line& li
   return made;
 }
 
-/// Gives the panels of a row one range, so that runs can be compared, unless one of them would be illegible; then each
-/// has its own, with a note.
-/// each has its own, and says so.
+/// Sets the same range for the panels of a row, so that runs can be compared. If one of them would be illegible, each
+/// panel has its own range and a note. each has its own, and says so.
 void share_range(std::span<Panel> row) {
   constexpr double kOwnScaleBeyond = 8;
   constexpr double kFar = std::numeric_limits<double>::infinity();
@@ -256,7 +255,7 @@ PairRun PairObserver::run() const {
     }
     ledgers[static_cast<std::size_t>(which)] = ledger(seen.steps, seen.ports);
   }
-  // At each step of either end, combined with the newest value of the other.
+  // The values are computed at each step of either end, with the newest value of the other end.
   const auto& [leader, follower] = ends_;
   double of_leader = 0;
   double of_follower = 0;

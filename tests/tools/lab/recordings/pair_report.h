@@ -15,7 +15,8 @@
 
 namespace tendon::lab {
 
-/// Time series of two coupled devices. Times are seconds since the first step of either, in the leader's clock.
+/// Time series of two coupled devices. Times are in seconds since the first step of either device, in the clock of the
+/// leader.
 struct PairRun {
   using Line = std::vector<std::pair<double, double>>;  ///< s, value
   struct End {
@@ -30,7 +31,7 @@ struct PairRun {
   End follower;
   Line felt;              ///< N, motor force of the leader along its main axis
   Line contact;           ///< N, contact force on the follower's tool along its main axis; empty: not measured
-  Line pair;              ///< J, sum of both ledgers: net energy put in at both ends
+  Line pair;              ///< J, the sum of both ledgers, which is the net energy put in at both ends
   double least_pair = 0;  ///< J; negative: the pair generated energy
 };
 
@@ -38,9 +39,9 @@ struct PairRun {
 ///
 ///     ledger = account − Σ credit + Σ withdraw    over the settlements of all previous steps
 ///
-/// so energy that one end has paid and the other has not received yet is in the sum of both ledgers. Energy discarded
-/// by a limiter is in neither: the sum is a lower bound of the net work put in. The ledgers are added without scaling,
-/// which is correct for equal products of position and force scale.
+/// so the sum of both ledgers includes the energy that one end has paid and the other one has not received yet. Energy
+/// discarded by a limiter is in neither: the sum is a lower bound of the net work put in. The ledgers are added without
+/// scaling, which is correct for equal products of position and force scale.
 ///
 /// Memory: 300 bytes a step. Thread-safe: no. Realtime-safe: no.
 class PairObserver {
@@ -79,8 +80,8 @@ class PairObserver {
 };
 
 /// `tendon-report --pairs` for recordings written by `tendon-replay --merge`. Writes a table or JSON and a sentence
-/// about each pair to `out`. Draws a column for each of at most two pairs: positions of both ends; forces felt and
-/// touched; accounts of both ends and of the pair.
+/// about each pair to `out`. Draws a column for each of at most two pairs. It shows the positions of both ends, the
+/// forces, and the accounts of both ends and of the pair.
 ///
 /// Throws the exceptions of `report`, and std::runtime_error if a recording is not such a merge.
 void report_pairs(const ReportOptions& options, std::ostream& out);

@@ -17,7 +17,7 @@ struct ReportOptions {
   /// One per recording. Empty: "limiter on" or "limiter off", according to the recorded steps.
   std::vector<std::string> labels = {};
   std::optional<std::filesystem::path> picture = {};  ///< .svg or .png
-  /// Devices to show. Empty: all devices, as far as there is room.
+  /// Devices to show. If this is empty, all devices are shown if there is enough room.
   std::vector<std::string> devices = {};
   bool json = false;  ///< one object per device and recording instead of the table
   /// Throws std::runtime_error after the report if any device violates the limiter's guarantee, even one without a
@@ -25,7 +25,8 @@ struct ReportOptions {
   bool check = false;
 };
 
-/// Throws std::invalid_argument unless there are recordings, and no labels or one per recording.
+/// Throws std::invalid_argument if there are no recordings, or if the number of labels is neither zero nor the number
+/// of recordings.
 void check(const ReportOptions& options);
 
 /// Maximum number of columns of a table.

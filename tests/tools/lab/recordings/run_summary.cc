@@ -19,7 +19,7 @@
 namespace tendon::lab {
 namespace {
 
-constexpr double kFastestChosenMotion = 3;  // Hz; above it, hands tremble or are shaken
+constexpr double kFastestChosenMotion = 3;  // Hz, the limit of voluntary motion
 constexpr double kSnap = 0.99;              // cosine of 8°
 
 constexpr std::uint32_t kLimits =
@@ -159,7 +159,7 @@ void RunObserver::observe_force(const StepRecord& step) {
   if (step.force_sequence == 0) return;
   if (step.force_sequence != force_in_use_) {
     if (newest_) asked_.observe(*std::exchange(newest_, std::nullopt));
-    // Excludes the steps with the last force, which stays constant after the engine has left.
+    // The steps with the last force are excluded, because this force is constant after the engine has left.
     for (const FeltStep& felt : felt_since_) felt_.observe(felt);
     felt_since_.clear();
     force_in_use_ = step.force_sequence;

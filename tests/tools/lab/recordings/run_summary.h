@@ -42,21 +42,23 @@ struct RunSummary {
   LocalTime start{};            ///< of the first step
   Duration span{};              ///< from the first step to the last
   std::uint64_t overruns = 0;   ///< intervals longer than the scene's longest_hold
-  std::uint64_t watchdogs = 0;  ///< intervals longer than the device's watchdog
+  std::uint64_t watchdogs = 0;  ///< intervals that exceed the watchdog of the device
   Duration longest_interval{};
 
   // Energy. E(n) is the recorded ledger.
   double energy_given_out = 0;  ///< J, max(0, max over n of −E(n)): net output
   /// True if the ledger was never below −1 nJ.
   bool passive() const noexcept { return std::max(energy_given_out, grip_energy_given_out.value_or(0)) <= kPromise; }
-  /// The same for the gripper's account; empty without a gripper.
+  /// The same value for the account of the gripper, if any.
   std::optional<double> grip_energy_given_out;
-  /// Intervals longer than the limiter's current T (Step::longest_hold), for which it guarantees nothing.
+  /// The number of intervals that are longer than the current T of the limiter (Step::longest_hold). The limiter does
+  /// not guarantee anything for these intervals.
   std::uint64_t holds_beyond_bound = 0;
-  /// J, minimum over all other steps of E(n) − D(n). D ≤ 0 is the energy below zero caused by holds beyond the bound,
-  /// until the ledger has recovered. The lesser of handle and gripper; +∞ if there is no other step.
+  /// J, minimum over all other steps of E(n) − D(n). D ≤ 0 is the energy that holds beyond the bound have drawn below
+  /// zero, until the ledger has recovered. The lesser of handle and gripper; +∞ if there is no other step.
   double least_energy = std::numeric_limits<double>::infinity();
-  /// The limiter's guarantee: never below −1 nJ except through holds beyond its bound.
+  /// Returns true if the ledger was never below −1 nJ, except for holds that are longer than the bound. This is what
+  /// the limiter guarantees.
   bool kept_its_promise() const noexcept { return least_energy >= -kPromise; }
   /// True if some step had a finite bound.
   bool limiter_on = false;
@@ -67,7 +69,7 @@ struct RunSummary {
   /// from the translational part of the account or from friction. Empty: orientation is not measured.
   std::optional<double> torque_work;
 
-  // Hand. Steps without a position do not count for motion.
+  // Hand. Steps without a position are ignored.
   double peak_speed = 0;      ///< m/s
   double peak_force = 0;      ///< N, applied
   Vec3 axis = Vec3::UnitX();  ///< main axis, see RunObserver
@@ -99,7 +101,8 @@ struct RunSummary {
 ///
 /// **Main axis.** The common direction of the requested forces, if there is one and the hand moves along it with a
 /// standard deviation of at least 0.1 mm. Otherwise the first principal component of the positions, with its largest
-/// component positive. A direction within 8° of a device axis is replaced by that axis; without motion it is x.
+/// component positive. If the direction is within 8° of an axis of the device, this axis is used. If there is no
+/// motion, the axis is x.
 ///
 /// **Contact.** Each remote force answers a motion `loop_age` before the step that uses it, so it describes the
 /// environment at *that* position regardless of delay. A force extrapolated by a model with the step's stiffness K is
@@ -112,8 +115,8 @@ struct RunSummary {
 ///     K_op = mean over n of  F(n) / depth(n)
 ///
 /// F is the part of the applied force that pushes out of the contact; n runs over the steps deeper than 0.1 × the
-/// largest depth while forces were fresh. The steps with the last force of a run are excluded: when an engine leaves,
-/// that force stays constant until its validity ends. Source: core/PROOFS.md, "Operational stiffness".
+/// largest depth while forces were fresh. The steps with the last force of a run are excluded, because this force is
+/// constant after an engine has left, until its validity ends. Source: core/PROOFS.md, "Operational stiffness".
 ///
 /// **Unstable** means that the device output net energy (the ledger is not passive) *and* the hand moved faster than
 /// voluntary motion. With v = v_slow + v_fast split by a first-order low-pass filter at 3 Hz, the latter means
@@ -123,8 +126,9 @@ struct RunSummary {
 /// Memory: under 16 MB. Thread-safe: no. Realtime-safe: no.
 class RunObserver {
  public:
-  /// `of_several`: the recording has other devices. A round trip then only counts if the datagram brought a force that
-  /// this device used, because device numbers in datagrams are those of their session.
+  /// If `of_several` is true, the recording contains other devices. In this case, a round trip is only counted if the
+  /// datagram contains a force that was used by this device, because the numbers of devices in a datagram are those of
+  /// its session.
   explicit RunObserver(bool of_several = false) : of_several_(of_several) {}
 
   /// Steps must come in order.
@@ -136,14 +140,14 @@ class RunObserver {
   RunSummary summary() const;
 
  private:
-  /// Statistics are exact for one minute at 1 kHz, or ten minutes of forces at 100 Hz.
+  /// The statistics are exact for up to one minute at 1 kHz, or ten minutes of forces at 100 Hz.
   static constexpr std::size_t kMostSamples = 65'536;
-  /// At 1 kHz, 8 s of motions; older answers are too old to be used.
+  /// This is 8 s at 1 kHz. Older answers cannot be used.
   static constexpr std::size_t kMostHistory = 8'192;
 
-  /// Maximum distance in a recording between a force's datagram and the step that uses it.
+  /// The maximum distance between the datagram of a force and the step that uses it.
   static constexpr std::size_t kMostBrought = 256;
-  /// Steps with one force: 8 s at 1 kHz.
+  /// The maximum number of steps with the same force. This is 8 s at 1 kHz.
   static constexpr std::size_t kMostHeld = 8'192;
   /// Maximum number of connections distinguished in a recording.
   static constexpr std::size_t kMostConnections = 4'096;
@@ -233,7 +237,7 @@ class RunObserver {
 
   DataReader reader_;
   std::map<std::uint32_t, Sent> sent_;  ///< by connection
-  std::deque<Brought> brought_;         ///< the newest, each without its counterpart
+  std::deque<Brought> brought_;         ///< the newest ones, still without their counterparts
   Thinned<Duration> round_trips_{kMostSamples};
 };
 

@@ -168,7 +168,7 @@ TEST(RunSummary, SaysForHowLongOverrunsMadeTheLimiterMoreCareful) {
   for (std::size_t n = 0; n < steps.size(); ++n)
     steps[n].longest_hold = std::chrono::microseconds(n < 3 ? 2000 : n < 7 ? 8000 - static_cast<int>(n) : 2000);
   EXPECT_DOUBLE_EQ(summarise(steps).share_careful, 0.4);
-  for (StepRecord& step : steps) step.longest_hold = {};  // as in recordings without this field
+  for (StepRecord& step : steps) step.longest_hold = {};  // old recordings do not contain this field
   EXPECT_EQ(summarise(steps).share_careful, 0);
 }
 
@@ -347,7 +347,7 @@ TEST(RunSummary, AnEchoThatTheServerRefusedIsNoRoundTrip) {
   observer.observe(sent_at(testing::at_ms(100), 0));
   observer.observe(force_of(1, PeerTime(-66'965'755'690ms)));  // before the session began
   observer.observe(force_of(2, PeerTime(146ms)));              // in the future
-  observer.observe(force_of(3, PeerTime(100ms), 7));           // echo of a datagram that was not sent yet
+  observer.observe(force_of(3, PeerTime(100ms), 7));           // the datagram has not been sent yet
   EXPECT_FALSE(observer.summary().round_trip);
 }
 

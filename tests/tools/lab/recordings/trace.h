@@ -10,7 +10,7 @@
 
 namespace tendon::lab {
 
-/// Minimum and maximum of a series, and which came first.
+/// The minimum and the maximum of a series, and which of them was first.
 struct Extremes {
   double least = std::numeric_limits<double>::infinity();
   double most = -std::numeric_limits<double>::infinity();
@@ -48,7 +48,7 @@ class Trace {
     bool empty() const noexcept { return energy.empty(); }
   };
 
-  /// Throws std::invalid_argument unless span and columns are positive.
+  /// Throws std::invalid_argument if the span or the number of columns is not positive.
   explicit Trace(const Config& config);
 
   /// Ignores steps outside [start, start + span] and positions that were not measured.

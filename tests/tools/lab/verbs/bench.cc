@@ -37,7 +37,7 @@ void add(CLI::App& verb, int& /*exit*/) {
       "usage.");
   verb.callback([] {
     options.progress = isatty(STDERR_FILENO) != 0;
-    std::signal(SIGPIPE, SIG_IGN);  // write errors instead of a signal, so that child processes are ended
+    std::signal(SIGPIPE, SIG_IGN);  // returns an error instead of a signal, so that child processes can be stopped
     bench::bench(options, std::cout);
   });
 }
