@@ -9,8 +9,8 @@
 
 namespace tendon::bench {
 
-/// Baseline of a fleet: empty datagrams of the same number, sizes and rate in both directions, between one socket and
-/// one socket per session in another process.
+/// The baseline of a fleet. The same number of datagrams with the same sizes, but without content, is sent in both
+/// directions between a socket and one socket for each session in another process.
 struct BareTraffic {
   std::size_t sessions = 0;
   Duration period = std::chrono::milliseconds(1);

@@ -21,7 +21,8 @@ struct Fleet {
   std::size_t channels = 1;  ///< per device
   /// If this is true, one session controls all devices of a bank. Otherwise, each channel has its own session.
   bool one_session_for_16 = false;
-  /// Number of sessions; those beyond the channels observe one device each. 0: one per channel.
+  /// The number of sessions. If there are more sessions than channels, the others observe one device each. If this is
+  /// 0, all devices or channels have their session.
   std::size_t sessions = 0;
   std::uint32_t state_hz = 1000;
   std::uint32_t force_hz = 1000;

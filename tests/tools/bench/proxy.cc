@@ -200,7 +200,8 @@ void compare_throughput(Run& run, const std::string& name, const std::string& pr
   run.add(row);
 }
 
-/// 1 kHz in each direction through 20 ± 5 ms with an echo at the other end, alternating with the baseline every second.
+/// Sends 1 kHz in each direction through 20 ± 5 ms with an echo at the other end. Alternates with the baseline every
+/// second.
 void compare_punctuality(Run& run, Duration spin, int rounds, Duration length) {
   UdpBatch server = UdpBatch::listening(loopback());
   RunningProxy proxy(server.local_address(), "delay=uniform(15ms,25ms)", spin);
@@ -245,8 +246,8 @@ void compare_punctuality(Run& run, Duration spin, int rounds, Duration length) {
   line("down", status.of(Direction::kDown).release_error);
 }
 
-/// Runs `work` in a thread with this priority. Threads that it starts inherit its priority and core; those of the
-/// caller remain unchanged.
+/// Runs `work` in a thread with this priority. Threads that are started by `work` have the same priority and core. The
+/// priority and the core of the caller are not changed.
 class Apart {
  public:
   template <class Work>

@@ -122,7 +122,7 @@ class BarePair {
   Name client_name_;
 };
 
-/// One of the two ends of a ping-pong without Tendon. With a `suite`, libsodium seals and opens all but the first 16
+/// An end of the ping-pong that is used as the baseline. With a `suite`, libsodium seals and opens all but the first 16
 /// bytes.
 class BareSocket {
  public:

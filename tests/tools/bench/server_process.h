@@ -17,8 +17,9 @@ namespace tendon::bench {
 /// Runs the `tendond` next to this program in a child process, which ends with this object.
 class ServerProcess {
  public:
-  /// Runs the scene file; output goes to files next to it. `priority`: SCHED_FIFO priority of all threads except the
-  /// haptic ones; 0: default scheduling. Throws std::runtime_error if it does not listen within 20 s.
+  /// Runs the server with the scene file. The output is written to files in the same folder. `priority`: SCHED_FIFO
+  /// priority of all threads except the haptic ones; 0: default scheduling. Throws std::runtime_error if it does not
+  /// listen within 20 s.
   ServerProcess(const std::filesystem::path& scene, int priority);
   ~ServerProcess();
   ServerProcess(const ServerProcess&) = delete;

@@ -250,7 +250,7 @@ std::optional<std::filesystem::path> dashboard_program() {
 
 enum class Kind { kAlone, kRecorder, kObservers, kDashboard };
 
-/// The measurements of all blocks of a kind.
+/// The results for all blocks of the same kind.
 struct Figures {
   std::vector<double> late;  ///< µs, of each wake-up
   std::uint64_t overruns = 0;

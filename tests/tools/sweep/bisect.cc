@@ -26,8 +26,7 @@ std::optional<Named> run_twice(const Plan& plan, const Units& half) {
   return differing_units(once, again, half);
 }
 
-/// Halves `part` while two runs of it differ, until units are identified. Returns none if the difference does not occur
-/// or stops occurring.
+/// Divides `part` into halves until the units are identified. Returns an empty list if two runs are not different.
 Named by_halves(const Plan& plan, Units part, std::ostream& out) {
   while (part.count > 1) {
     const Units left{.first = part.first, .count = part.count / 2};
@@ -46,8 +45,8 @@ Named by_halves(const Plan& plan, Units part, std::ostream& out) {
   return {};
 }
 
-/// Reports the results of a unit run alone. `here`: its result in the shard's run on this node. Returns true if all are
-/// equal.
+/// Reports the results of a unit run alone. `here` is the result of the unit when the shard was run on this node.
+/// Returns true if all are equal.
 bool run_alone(const Plan& plan, std::uint64_t unit, const std::string& here, std::ostream& out) {
   std::set<std::string> ends;
   for (int i = 0; i < kAlone; ++i) ends.insert(output_of(plan, {.first = unit, .count = 1}));

@@ -46,9 +46,9 @@ std::optional<std::string> other_result_of(const std::filesystem::path& folder, 
 /// Returns the lines of a unit in the output of a program. Can be empty.
 std::string lines_of(std::string_view output, std::uint64_t unit);
 
-/// Returns the units in which two outputs differ. Compares lines; if all lines are equal, uses the digests, which
-/// identify the unit if only one differs. Returns an empty list if several units differ without lines, or only the end
-/// line does.
+/// Returns the units that are different in two outputs. This compares the lines. If all lines are the same, it uses the
+/// digests, which identify the unit if there is only one. Returns an empty list if there are several such units without
+/// lines, or if only the end line is different.
 std::vector<std::uint64_t> differing_units(std::string_view one, std::string_view other, const Units& units);
 
 /// Describes where two outputs of the same units differ: "unit 13", "units 13, 17", "several units", "no unit, but in

@@ -12,7 +12,7 @@ namespace tendon::sweep {
 struct SlurmOptions {
   std::string partition{};        ///< empty: the cluster's default
   std::string time = "01:00:00";  ///< time limit of a task
-  std::uint64_t most = 1000;      ///< maximum number of tasks in an array: the cluster's MaxArraySize less 1
+  std::uint64_t most = 1000;      ///< maximum number of tasks in an array, which is MaxArraySize of the cluster minus 1
 };
 /// Returns a job array for sbatch that runs the missing shards. If there are more than `most` shards, its tasks take
 /// every Nth shard. Throws std::invalid_argument if every shard has a result.

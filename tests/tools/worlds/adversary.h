@@ -116,7 +116,7 @@ class AdversaryDevice final : public Device {
     const bool hostile = dice_.chance(config_.hostility);
     if (!hostile) {
       position_ += dice_.direction() * config_.largest_move * dice_.decades(-5, 0);
-      // Returns toward the origin at times, so walls are entered and left.
+      // Sometimes this moves back to the origin, so that walls are entered and left.
       if (position_.norm() > 0.05) position_ *= 0.5;
     } else if (const double size = force_.norm(); size > config_.friction.coulomb) {
       position_ += force_ / size * worst(size, config_.friction, held);

@@ -25,8 +25,8 @@ constexpr Duration kLook = milliseconds(400);
 constexpr std::uint32_t kHzX = 20;
 /// Each clock reading is truncated to whole nanoseconds.
 constexpr Duration kClockRounding{4};
-/// Fraction of its life after which a session may end by age: a fast clock shortens a day by 17 s. kAgeSlack is how
-/// much earlier one end may see the other leave.
+/// A session can end because of its age after this fraction of the maximum age, because a day is 17 s shorter for a
+/// fast clock. kAgeSlack is the additional time by which one end can see the other end leave.
 constexpr double kWholeLife = 1 - 1e-9 * kDriftPpb;
 constexpr Duration kAgeSlack = std::chrono::seconds(1);
 
@@ -336,8 +336,8 @@ class Day {
     recover(world_.now());
   }
 
-  /// Starts Z's key at another address while the first Z is in session. The first one is notified that it has been
-  /// replaced, and does not return. (If the notification could not reach it, because its address changed at that
+  /// Adds a client with the key of Z at another address while Z has a session. The first one is notified that it has
+  /// been replaced, and does not return. (If the notification could not reach it, because its address changed at that
   /// instant, it would return after its timeout and take the session back; hence no address changes here.)
   void take_over() {
     Network::Weather calm = fair();
@@ -436,7 +436,7 @@ class Day {
   std::array<Known, kHandles> known_{};
   std::size_t z_ = kZ;                ///< handle of the current Z
   std::uint64_t rearmed_ = 0;         ///< by Z in its current session, as counted by A
-  std::uint64_t denied_ = 0;          ///< denials of X's requests accounted for so far
+  std::uint64_t denied_ = 0;          ///< number of denials that have been counted for X
   std::deque<LocalTime> asked_by_x_;  ///< open requests of X, oldest first
   std::uint64_t states_of_x_ = 0;
   LocalTime x_served_ = began_;

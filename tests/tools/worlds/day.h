@@ -52,7 +52,7 @@ struct DayConfig {
 struct DayReport {
   std::optional<std::string> broken;  ///< the violated invariant and the time
   std::uint64_t troubles = 0;
-  std::uint64_t byes = 0;       ///< number of clients that left with a Bye
+  std::uint64_t byes = 0;       ///< how often a client left with a Bye
   std::uint64_t deaths = 0;     ///< clients killed, including under bad conditions
   std::uint64_t takeovers = 0;  ///< number of takeovers by Z's key from another address
   std::uint64_t sessions = 0;   ///< of all clients
@@ -64,7 +64,7 @@ struct DayReport {
   Network::Counts network;
   std::uint64_t forged = 0;       ///< datagrams that failed authentication at the server
   std::uint64_t requests = 0;     ///< requests of Z and X
-  std::uint64_t carried_out = 0;  ///< the sessions of all other requests have ended
+  std::uint64_t carried_out = 0;  ///< all other requests were lost because their session ended
   Duration slowest_recovery{};
   Duration longest_session{};
   Duration clock_error{};           ///< maximum under good conditions

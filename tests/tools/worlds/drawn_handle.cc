@@ -111,7 +111,8 @@ void draw_gripper(Dice& dice, DrawnWorld& world, bool motor) {
   std::get<SimulatedDevice::Config>(world.device).gripper = gripper;
 }
 
-/// Each press uses its own button; two of them come after recovery. Each press is longer than an interval of the loop.
+/// Each press uses its own button; two of them come after recovery. The presses are longer than any interval of the
+/// loop.
 void draw_presses(Dice& dice, DrawnWorld& world) {
   auto& device = std::get<SimulatedDevice::Config>(world.device);
   constexpr std::array<std::array<double, 2>, 4> kFrom{{{0, 3}, {2, 6}, {8.7, 8.8}, {9.2, 9.3}}};  // s

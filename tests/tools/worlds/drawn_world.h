@@ -45,8 +45,8 @@ struct DrawnClient {
   std::optional<Duration> restarted;  ///< restarted at the same address
 };
 
-/// Everything a seed determines except the fate of single datagrams, which the network draws from the same seed. The
-/// network conditions are bad at first. Then they become good, and they do not change any more.
+/// Everything a seed determines except the fate of single datagrams, which the network draws from the same seed. At the
+/// start, the network conditions are bad. Then they are good until the end.
 struct DrawnWorld {
   static constexpr Duration kLength = std::chrono::seconds(10);
 
@@ -56,7 +56,7 @@ struct DrawnWorld {
     Duration at{};
     Network::Weather weather;
   };
-  std::vector<Change> changes;  ///< changes of the network conditions, ending with the good ones
+  std::vector<Change> changes;  ///< changes of the network conditions. The last change makes them good.
   Duration clears{};            ///< time of the last change
   Duration one_way_up{};        ///< after that
   Duration one_way_down{};

@@ -28,7 +28,7 @@ struct Extras {
   Network::Watch watch{};      ///< sees every decision of the network
 };
 
-/// Runs a world to its end and checks its invariants. The outcome is deterministic. Thread-safe: yes.
+/// Runs a world and checks the invariants. The outcome is deterministic. Thread-safe: yes.
 Outcome run(const DrawnWorld& world, const Extras& extras = {});
 
 }  // namespace tendon::simulation

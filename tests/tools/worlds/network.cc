@@ -35,7 +35,7 @@ class Network::End final : public Link {
   }
 
   void arrive(const Address& from, std::span<const std::byte> datagram) {
-    if (datagram.empty()) return;  // Link::receive returns 0 for "nothing received"
+    if (datagram.empty()) return;  // Link::receive returns 0 if nothing is received
     if (count_ == letters_.size()) letters_.emplace_back();
     Letter& letter = letters_[count_++];
     letter.from = from;

@@ -16,9 +16,9 @@
 
 namespace tendon::simulation {
 
-/// Simulated links between one server and its clients; an injector decides when each datagram arrives. Each client has
-/// its own link (numbered from 0 in the order of `open`), and each direction its own decider, so clients do not affect
-/// each other.
+/// A set of simulated links between one server and its clients. An injector decides when each datagram arrives. Each
+/// client has its own link (numbered from 0 in the order of `open`), and each direction its own decider, so clients do
+/// not affect each other.
 ///
 /// After a NAT rebinding (`rebinds`) the server sees an unknown source address, and datagrams sent to the old port are
 /// dropped.

@@ -15,9 +15,9 @@
 
 namespace tendon::simulation {
 
-/// A malicious or faulty client that knows the protocol. It answers steps that never happened or are long past; sends
-/// non-finite forces or 10⁶ N; validities of zero or without end; and senseless requests. It stops without a Bye at the
-/// time `quits`.
+/// A malicious or faulty client that knows the protocol. It answers steps that do not exist or are too old. It sends
+/// forces that are not finite or 10⁶ N, validities that are zero or infinite, and requests that are not valid. It stops
+/// without a Bye at the time `quits`.
 class Rogue final : public Guest {
  public:
   struct Config {

@@ -23,8 +23,8 @@ struct SecondLookOptions {
 /// wall of `tendon_virtual_wall` is behind the network of a trace; everything but the law is equal. The summary is that
 /// of `tendon-report`.
 ///
-/// Only the first link of the trace is used, by time: each datagram gets the fate of the newest one recorded before it,
-/// so the network is bad at the same times regardless of what the session sends.
+/// Only the first link of the trace is used. Each datagram has the fate of the last recorded datagram before this time,
+/// so the network is bad at the same times for all sessions.
 ///
 /// Throws std::invalid_argument for an unknown law, and the exceptions of the file readers.
 void second_look(const SecondLookOptions& options, std::ostream& out);

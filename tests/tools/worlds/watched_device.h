@@ -12,8 +12,8 @@
 
 namespace tendon::simulation {
 
-/// Wraps a device and observes every position that is read and every force that is held. It uses these values, but no
-/// code under test, to compute the energy of the port:
+/// A wrapper for a device that observes all positions that are read and all forces that are held. It uses these values,
+/// but no code under test, to compute the energy of the port:
 ///
 ///     E = Σ [ −F·Δx + f_c ‖Δx‖ + b ‖Δx‖²/T ]
 ///

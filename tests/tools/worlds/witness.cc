@@ -158,8 +158,8 @@ void Witness::see_bounds(const StepRecord& step) {
   }
 }
 
-/// A hold longer than the bound used for an effort takes at most `may_take` below zero; then the account only rises
-/// until it is back at zero.
+/// The account must not fall below min(`last`, 0) − `may_take`, where `may_take` (J) is the most that a hold beyond the
+/// bound can take. Without such a hold, it must not decrease while it is below zero.
 void Witness::see_account(const char* whose, double& last, double now, double may_take) {
   const double before = std::exchange(last, now);
   const double may_leave = std::min(before, 0.0) - may_take;

@@ -90,7 +90,8 @@ class Witness {
   /// Number of button presses that observers have received.
   int presses() const { return presses_; }
   bool checked_recovery() const { return checked_recovery_; }
-  /// Minimum, J, of the port's account over times without a deficit from holds longer than the law's bound.
+  /// The minimum of the account of the port in J. This ignores times with a deficit because of holds that are longer
+  /// than the bound of the law.
   double least_energy() const { return least_energy_; }
 
  private:

@@ -29,8 +29,8 @@ inline constexpr std::uint16_t kFirstClientPort = 50000;
 class Guest {
  public:
   virtual ~Guest() = default;
-  /// Runs everything that is due at `now` and returns when it must be called again. Both times are of the peer's own
-  /// clock.
+  /// Runs everything that is due at `now` and returns when it must be called again. Both times are in the clock of the
+  /// peer.
   virtual LocalTime turn(LocalTime now) = 0;
 };
 
@@ -58,7 +58,7 @@ class World {
     Mailboxes::Capacities mail{.steps = 16, .flight = 2048, .datagrams = 1};
     std::size_t max_observers = 8;
     bool adapt_state_rate = false;
-    std::vector<ClientKey> keys{};  ///< accepted clients; empty: all, by suite 0
+    std::vector<ClientKey> keys{};  ///< If this is empty, all clients are accepted, with suite 0.
     /// For the server and the clients that have a key. Suite 2 requires a processor with AES; worlds of suite 1 are
     /// identical on all processors.
     Suites suites = {Suite::kNoise};

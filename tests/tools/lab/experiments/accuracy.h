@@ -22,7 +22,8 @@
 namespace tendon::lab {
 
 /// Errors of a model under one load, relative to the true stiffness: total = model + discretisation + solver. The parts
-/// are NaN if the model collapses on an infinitely fine mesh. For a worker, `solver` is the error bound that it sent.
+/// are NaN if the model cannot support the load on an infinitely fine mesh. For a worker, `solver` is the error bound
+/// that it sent.
 ///
 /// Two models converge to another material than their parameters: as-rigid-as-possible elements (projective) have µ but
 /// λ = 0. Springs along edges are, for small strains, a body with central forces: Cauchy's relations, ν = 1/4. The
@@ -81,7 +82,8 @@ AccuracyPoint measure(const Candidate& candidate, Truth& truth, const Meter& met
 /// are excluded if their parts are not known.
 std::vector<AccuracyPoint> pareto_front(std::vector<AccuracyPoint> points, std::size_t load);
 
-/// Returns p of update ∝ unknowns^p by least squares of the logarithms; Returns NaN if there are fewer than two sizes.
+/// Returns p in update ∝ unknowns^p, which is fitted to the logarithms by least squares. Returns NaN if there are fewer
+/// than two sizes.
 double cost_exponent(const std::vector<AccuracyPoint>& ladder);
 
 /// Returns false if, under each load, one of `others` is as fast and has a smaller error without luck, so that the loop
@@ -127,7 +129,7 @@ struct AccuracyOptions {
 /// `tendon-lab accuracy`: accuracy against time for each model and mesh.
 void accuracy(const AccuracyOptions& options, std::ostream& out);
 
-/// Returns one line of JSON; `commit` is that of the build.
+/// Returns one line of JSON; The `commit` is the one of the build.
 std::string to_json(const AccuracyPoint& point, Truth& truth);
 
 }  // namespace tendon::lab

@@ -79,7 +79,7 @@ Point point(const SampledSpring& spring, bool mapped) {
   return p;
 }
 
-/// Simulated results below and above the limit: the map behind the curves.
+/// Returns the simulated results below and above the limit, which are shown behind the curves.
 std::pair<Curve, Curve> field(std::span<const Point> points, double (*x)(const SampledSpring&)) {
   Curve rests{.name = "comes to rest", .colour = kSky, .style = Curve::Style::kPoints};
   Curve swings{.name = "swings up", .colour = kOrange, .style = Curve::Style::kPoints};
@@ -130,7 +130,7 @@ double simulated_stiffness_limit(const SampledSpring& spring) {
 
 namespace {
 
-/// The first rows are delays at 1 kHz. The other rows are rates without a delay.
+/// The rows with delays at 1 kHz are first, followed by the rows with rates and no delay.
 SampledSpring spring_of(const BoundaryOptions& options, std::uint64_t unit) {
   SampledSpring spring{.mass = options.mass, .viscous = options.viscous, .period = std::chrono::milliseconds(1)};
   if (unit < kDelays.size()) {

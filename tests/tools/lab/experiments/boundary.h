@@ -10,9 +10,9 @@
 
 namespace tendon::lab {
 
-/// Returns the K (N/m) above which SimulatedDevice without a hand does not come to rest on a sampled and held spring:
-/// from 1 mm, the amplitude grows over 60 of its periods. Found by bisection to 0.5 %. Mass, b, T and d are those of
-/// `spring`; no Coulomb friction or encoder counts.
+/// Returns the maximum K (N/m) for which a SimulatedDevice without a hand comes to rest on a sampled and held spring.
+/// Above this value, an initial amplitude of 1 mm increases over 60 periods. Found by bisection to 0.5 %. Mass, b, T
+/// and d are those of `spring`; no Coulomb friction or encoder counts.
 double simulated_stiffness_limit(const SampledSpring& spring);
 
 struct BoundaryOptions {

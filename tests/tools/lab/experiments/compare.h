@@ -14,7 +14,7 @@
 
 namespace tendon::lab {
 
-/// A spring (bilateral) behind a network, a device, and a hand that is free to move.
+/// A bilateral spring behind a network, with a device and a hand that is free to move.
 struct Situation {
   double stiffness = 0;  ///< N/m
   double delay_ms = 0;
@@ -25,7 +25,7 @@ struct Situation {
   bool firm = false;  ///< hand of 800 N/m, 3 N·s/m, 100 g; otherwise 400, 0.3, 50
 };
 
-/// Returns all combinations. They are the same for every law.
+/// Returns all combinations. All laws use the same situations.
 std::vector<Situation> comparison_grid();
 
 struct Cell {
@@ -54,10 +54,12 @@ Cell compare_cell(const Situation& situation, Preset preset, std::uint64_t seed)
 struct Verdict {
   std::size_t cells = 0;    ///< number of cells
   std::size_t passive = 0;  ///< cells in which AOL+ was passive
-  /// Cells in which another law that guarantees passivity, and was passive, has a lower force error.
+  /// The number of cells in which another law has a lower force error. The other law must guarantee passivity and must
+  /// be passive in this cell.
   std::size_t beaten = 0;
   std::size_t beaten_clearly = 0;  ///< cells in which the error of the other law is lower by more than 5 %
-  /// The number of beaten cells for each cause. The cause is the part of AOL+ without which it is not beaten.
+  /// The number of beaten cells for each cause. The cause is a part of AOL+. If this part is removed, AOL+ is not
+  /// beaten.
   std::size_t robust_ledger = 0, knee = 0, energy_cap = 0, bounded_acceleration = 0;
   std::size_t vibrating = 0;  ///< no single part; the other law is too soft to vibrate there, AOL+ vibrates
   std::size_t no_single_part = 0;

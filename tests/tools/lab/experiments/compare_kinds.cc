@@ -40,13 +40,13 @@ double median_of(std::vector<double> values) {
   return *middle;
 }
 
-/// Summary of a contender in a kind of situation.
+/// The results of a contender in all situations of a kind.
 struct Line {
   std::size_t cells = 0;
   double passive = 0, within8 = 0, within3 = 0, within1_5 = 0;  ///< shares
   double error = 0, vibration = 0, sensation = 0, noticed = 0;  ///< medians: %, mm/s, dB, share
   std::size_t beaten = 0;                                       ///< by more than 3 percentage points
-  /// Percentage points, largest excess over the best other law that guarantees passivity and was passive.
+  /// The maximum difference, in percentage points, from the best other law that guarantees passivity and was passive.
   double worst = 0;
   std::uint64_t worst_seed = 0;
 };
@@ -112,7 +112,7 @@ std::vector<Contender> chosen(const std::vector<std::string>& names) {
   return some;
 }
 
-/// Runs all situations of a kind on all processors. The results are sorted by seed.
+/// Runs all situations of the given kind on all processors. The results are sorted by seed.
 std::vector<Result> results_of(const std::string& kind, std::uint64_t first, std::size_t count,
                                const std::vector<Contender>& all, bool progress) {
   std::vector<Result> results(count);

@@ -68,7 +68,7 @@ class Remote {
     work(hand.at);
   }
 
-  /// Simulates the engine until `now`. All motions that arrive before `now` must be known.
+  /// Simulates the engine until `now`. This requires all motions that arrive before `now`.
   void work(LocalTime now) {
     while (true) {
       auto first = LocalTime::max();

@@ -22,8 +22,8 @@ struct Route {
   Duration compute{};       ///< per answer
 };
 
-/// A remote environment behind a network: its answer to a position and a time. Before the clock starts the hand has
-/// been at rest at its position, and the answer to that has arrived.
+/// A remote environment behind a network. The force depends on the position and the time. When the clock starts, the
+/// hand is at rest, and the answer to its position has already arrived.
 struct Environment {
   using Force = std::function<Vec3(double t, const Vec3& position)>;
   using Stiffness = std::function<Mat3(double t, const Vec3& position)>;
@@ -55,8 +55,9 @@ struct Experiment {
   Environment environment;
   std::variant<PrescribedMotion, FreeHand> hand;
   LimiterConfig limiter;  ///< longest_hold is set to `period`, max_force to that of the experiment
-  std::optional<OutputEstimator::Config> estimator{};   ///< used between forces; empty: holds the last force
-  std::optional<LearnedModel::Config> learned_model{};  ///< used between forces instead of the estimator
+  /// Used between two forces. If there is neither an estimator nor a model, the last force is held.
+  std::optional<OutputEstimator::Config> estimator{};
+  std::optional<LearnedModel::Config> learned_model{};
   Duration period = std::chrono::milliseconds(1);
   Duration length = std::chrono::seconds(5);
   double max_force = 0;    ///< N

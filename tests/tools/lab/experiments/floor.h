@@ -14,16 +14,16 @@ namespace tendon::lab {
 
 // Lower bounds of the force error of any law on a given motion, with motion and object known in advance.
 
-/// The passivity constraint of a held force. E is the account, ℓ that of core/ledger/output_bound.h.
+/// The constraint that makes a held force passive. E is the account, ℓ that of core/ledger/output_bound.h.
 enum class Passive : std::uint8_t {
   kOnThisMotion,   ///< E(n) ≥ 0, for this motion only
   kWhateverComes,  ///< ℓ(F) ≤ E, for every next motion; the constraint of unconditionally passive laws
   kAccelerating,   ///< ℓ(F) ≤ E with the travel possible under bounded acceleration
 };
 
-/// A motion along one axis and its true force.
+/// A motion along one axis, with the true force.
 struct FloorProblem {
-  std::vector<double> dx{};     ///< m, the travel while force k is held
+  std::vector<double> dx{};     ///< m, the distance while force k is held
   std::vector<double> truth{};  ///< N, on the hand. It must have the same size as dx.
   Friction friction{};          ///< of the device; viscous > 0
   Duration period{};            ///< T, of each hold

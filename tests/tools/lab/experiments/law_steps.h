@@ -9,9 +9,9 @@
 
 namespace tendon::lab {
 
-/// Steps of a limiter for cost measurements: the hand moves as in the paper, 15 mm at 0.25 Hz, against a spring of 2000
-/// N/m. A period has a thousand samples 4 ms apart; each step moves a quarter of the distance between samples, as in 1
-/// ms.
+/// The steps of a limiter whose cost is measured. The hand moves as in the paper, 15 mm at 0.25 Hz, against a spring of
+/// 2000 N/m. A period has a thousand samples 4 ms apart; each step moves a quarter of the distance between samples, as
+/// in 1 ms.
 class LawSteps {
  public:
   static constexpr std::size_t kPeriod = 1000;  ///< steps

@@ -269,7 +269,7 @@ JsonLine json_of(const PaperRow& row) {
   return line;
 }
 
-/// Parses a line of JSON. Fields that the line does not contain keep their defaults.
+/// Parses a line of JSON. Other fields have their default values.
 PaperRow row_of(const nlohmann::json& line) {
   PaperRow row;
   row.experiment = line.at("experiment");
@@ -284,7 +284,7 @@ PaperRow row_of(const nlohmann::json& line) {
   return row;
 }
 
-/// A row of an experiment, or of Tables II and III.
+/// This is either a row of an experiment or a row of Tables II and III.
 using AnyRow = std::variant<PaperRow, FrictionTable>;
 
 /// If `drawn` is true, the motion is kept for a figure.

@@ -7,8 +7,8 @@
 
 namespace tendon::lab {
 
-// Perceived intensity of vibration. Equal rms velocities at 20 and 200 Hz differ in perception: the latter is three
-// times as far above its threshold.
+// Perceived intensity of vibration. If the rms of the velocity is the same at 20 Hz and at 200 Hz, the second vibration
+// is three times as far above the threshold.
 
 /// Returns the detection threshold (m, peak amplitude) of a sine of this frequency (Hz, > 0):
 ///
@@ -29,8 +29,8 @@ inline constexpr double kNothing = -60;  ///< dB
 ///
 ///     10 log₁₀ Σ_f (x̂_f / detection_threshold(f))²,   x̂_f the amplitude (m) of the displacement; 10 Hz ≤ f
 ///
-/// `velocity`: m/s, one per `period`, without the intended motion (fast_velocity of experiment.h). Returns kNothing for
-/// fewer than four values.
+/// `velocity`: m/s, one per `period`, without the intended motion (fast_velocity of experiment.h). Returns kNothing if
+/// there are less than four values.
 double sensation_level(std::span<const Vec3> velocity, Duration period);
 
 /// Weber fractions: the smallest relative change that is noticed in half of the trials. Force: 7 % between 2.5 and 10 N

@@ -43,7 +43,7 @@ Contact surface(double t, const Vec3& x, bool with_table) {
 
 enum class Sent { kForce, kForceAndStiffness, kAndSurface, kAndTable };
 
-/// Returns the rms force error over the rms of the true force. An answer takes a period plus `late_ms`.
+/// Returns the rms force error over the rms of the true force. The time of an answer is a period plus `late_ms`.
 double error(double rate_hz, double late_ms, Sent sent) {
   Experiment set;
   set.environment = {

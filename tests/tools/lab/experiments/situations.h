@@ -25,12 +25,12 @@ struct SituationKind {
 /// Returns all kinds in the order of the tables.
 std::span<const SituationKind> situation_kinds() noexcept;
 
-/// Laws may be tuned on smaller seeds only; seeds from here on are held out for evaluation.
+/// Laws must only be tuned on smaller seeds. All other seeds are only used for the evaluation.
 inline constexpr std::uint64_t kHeldOutSeeds = 1'000'000;
 
-/// A situation, which is the same for every law.
+/// A situation that is used with every law.
 struct Trial {
-  Experiment experiment{};  ///< its limiter has the device's friction and no law
+  Experiment experiment{};  ///< the limiter has the friction of the device, but no law
   double encoder_step = 0;  ///< m
   double stiffness = 0;     ///< N/m, of the object where it is pressed
   std::string drawn{};      ///< drawn parameters, as text
@@ -40,7 +40,7 @@ struct Trial {
 /// all machines. Throws std::invalid_argument if there is no such kind.
 std::optional<Trial> draw_situation(std::string_view kind, std::uint64_t seed);
 
-/// Either a law with its parts or a preset.
+/// This is either a law with its parts or a preset.
 struct Contender {
   std::string_view name;
   Law law = Law::kAolPlus;

@@ -55,7 +55,8 @@ TEST(Situations, AnObjectWithAMemoryIsAskedApartFromItsTruth) {
   EXPECT_EQ(truth(0, Vec3(-0.0001, 0, 0)), Vec3(Vec3::Zero()));  // the second instance was not pressed
 }
 
-/// Regression: the damper turned the force around and held the hand; 64 points above three parts at seed 55.
+/// This is a regression test. The damper reversed the direction of the force and held the hand, and the error was 64
+/// points higher than with three parts at seed 55.
 TEST(Situations, AHandThatIsDrawnOutIsNotHeld) {
   for (std::uint64_t seed = 41; seed <= 60; ++seed) {
     const auto trial = draw_situation("drawn-out", seed);
@@ -82,8 +83,8 @@ Trial before_a_wall(std::string_view kind, std::uint64_t seed, const Friction& f
   return trial;
 }
 
-/// Stirring puts energy into the object without end, and the preset displays the following wall stiffer than three
-/// parts do: the hand bounces once, up to 1.7 times as fast. The specified limit was 1.2.
+/// Stirring adds energy to the object all the time, and the wall is stiffer with the preset than with three parts. The
+/// hand bounces once, and it is up to 1.7 times as fast. The specified limit was 1.2.
 TEST(Situations, AWallAfterWavingIsNoLouderThanWithThreeParts) {
   struct Case {
     Friction friction;

@@ -121,7 +121,7 @@ inline void record_devices(const std::filesystem::path& file, const std::vector<
   if (!sink.error().empty()) throw std::runtime_error(sink.error());
 }
 
-/// Writes a run to a file. `whole` false: without an end mark, as after the server was killed.
+/// Writes a run to a file. If `whole` is false, the file has no end mark, as if the server has been killed.
 inline void record(const std::filesystem::path& file, const std::vector<StepRecord>& run, bool whole = true) {
   record_devices(file, {run}, {}, whole);
 }

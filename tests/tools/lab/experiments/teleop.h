@@ -21,7 +21,7 @@ struct TeleopOptions {
   Part part{};  ///< the units are the trials, for each hand at each round trip of each method
 };
 
-/// Results of a method at a round trip: medians over the hands, and worst cases.
+/// The results of a method at a round trip, as medians and worst cases over the hands.
 struct TeleopRow {
   CouplingMethod method = CouplingMethod::kPositionPosition;
   int round_trip_ms = 0;

@@ -41,8 +41,7 @@ class Thinned {
 };
 
 /// Returns the smallest sample that is at least as large as the fraction `p` (0 < p ≤ 1) of all samples. Returns
-/// nullopt without samples.
-/// none.
+/// nullopt if there are no samples.
 template <class T>
 std::optional<T> percentile(std::vector<T> samples, double p) {
   if (samples.empty()) return std::nullopt;

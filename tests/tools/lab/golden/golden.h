@@ -22,8 +22,9 @@ struct GoldenTable {
   std::vector<Row> rows;
 };
 
-/// Runs every law in twelve situations (every 209th of comparison_grid(), which covers every value of every axis) and
-/// in the paper's experiments, on the prescribed motion and with the free hand. Takes some seconds.
+/// Runs every law in twelve situations and in the experiments of the paper, with the prescribed motion and with the
+/// free hand. The situations are every 209th of comparison_grid(), which covers all values of all axes. Takes some
+/// seconds.
 ///
 /// The result is bit-identical on all x86-64 processors and C libraries, because only correctly rounded IEEE 754
 /// operations of libm are used (core/base/portable_math.h).

@@ -17,15 +17,15 @@ namespace tendon::lab {
 struct RampPlan {
   Freedom freedom = Freedom::kMovement;
   double rate = 0.1;     ///< N/s, nonzero; negative: towards −x
-  double travel = 0.25;  ///< m, at which the run ends
+  double travel = 0.25;  ///< m, the run ends after this distance
   Duration period = std::chrono::milliseconds(1);
   Duration longest = std::chrono::seconds(20);
   /// Returns an additional motor force (N) for each period; empty: none.
   std::function<double()> disturbance{};
 };
 
-/// Runs the plan from `begin` on and records what a client could know: the positions read, and the force that the
-/// device reports without the disturbance. The force stays constant while readings fail. Ends with zero force.
+/// Runs the plan, starting at `begin`. The recording contains the positions that have been read and the force that is
+/// reported by the device, without the disturbance. The force stays constant while readings fail. Ends with zero force.
 RampRun run_ramp(Device& device, LocalTime begin, const RampPlan& plan);
 
 /// The friction experiment of Lee & Lee 2009 (Tables II, III) on a simulated device: from rest, the force rises at a

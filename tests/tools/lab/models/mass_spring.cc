@@ -11,7 +11,7 @@
 namespace tendon::softbody::compared {
 namespace {
 
-/// The relative length below which a spring has no direction, because its ends are in the same place.
+/// If the relative length of a spring is less than this, the direction of the spring is not defined.
 constexpr double kShortest = 1e-9;
 
 std::vector<double> factors_of(const Solid& solid) {

@@ -15,8 +15,8 @@ constexpr int kWidth = 1600;
 constexpr int kRow = 470;          ///< pixels per row of panels
 constexpr int kAbovePanels = 110;  ///< pixels above the first row
 constexpr std::size_t kMostPoints = 1200;
-constexpr std::size_t kNamesInRow = 4;  ///< of the legend; two rows fit, each further row needs kKeyRow pixels
-constexpr int kKeyRow = 18;             ///< pixels
+constexpr std::size_t kNamesInRow = 4;  ///< names in a row of the legend
+constexpr int kKeyRow = 18;             ///< pixels for each row of the legend after the second
 
 const char* words(Curve::Style style) {
   switch (style) {

@@ -40,7 +40,7 @@ struct Panel {
 /// Reduces points sorted by x to the resolution of a panel: minimum and maximum of each interval.
 std::vector<std::pair<double, double>> thinned(const std::vector<std::pair<double, double>>& points);
 
-/// Returns the gnuplot script that draws `panels`, two per row, under a heading and a line of figures.
+/// Returns a gnuplot script that draws the panels in rows of two, with a heading and a line of figures.
 std::string panels_script(const std::filesystem::path& path, const std::string& heading, const std::string& figures,
                           const std::vector<Panel>& panels);
 

@@ -29,7 +29,7 @@ void check_picture(const std::filesystem::path& path, std::size_t drawings);
 std::size_t trace_columns(std::size_t drawings);
 
 /// Draws runs side by side as an .svg or .png file of 1000 pixels height and 1600 width (800 per run from the third
-/// on). From top to bottom: the position; the wanted, permitted and applied force; the energy ledger. All columns share
+/// on). A column shows the position, the wanted, permitted and applied force, and the energy ledger. All columns share
 /// the scales of position, force and time. They also share the scale of energy if this is legible. Otherwise, each
 /// column has its own scale and a note.
 ///

@@ -33,7 +33,7 @@ std::string padded(const std::string& text, std::size_t to);
 /// Returns an aligned UTF-8 table with a row per quantity, followed by notes.
 std::string to_table(std::span<const Run> runs);
 
-/// Returns one line of JSON without line end. The keys end with the unit. Values that are not known are null.
+/// Returns one line of JSON without line end. Each key ends with the unit. Values that are not known are null.
 std::string to_json(const Run& run);
 
 }  // namespace tendon::lab

@@ -155,7 +155,7 @@ std::optional<Edge> find_edge(const std::vector<Answer>& answers, double least, 
   } else {
     edge.at = line->zero > gap->first ? gap->first : gap->without;
   }
-  // Without forces in free motion, the line is extrapolated by at most its own length.
+  // If there are no forces in free motion, the line is only extrapolated up to its own length.
   if (std::isinf(gap->without) && gap->first - edge.at > edge.deepest - gap->first) edge.error = kUnbounded;
   return edge;
 }

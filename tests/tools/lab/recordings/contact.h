@@ -8,8 +8,8 @@
 
 namespace tendon::lab {
 
-/// The contact with the remote environment along the main axis: beyond `above`, below `below`, or both (in a slot). A
-/// spring to a center has equal values.
+/// The contact with the remote environment along the main axis. It can be beyond `above`, below `below`, or both (for
+/// example in a slot). If it is a spring to a center, both values are the same.
 struct Contact {
   std::optional<double> above;  ///< m; the force is negative there
   std::optional<double> below;  ///< m; the force is positive there

@@ -25,14 +25,14 @@ namespace {
 using testing::spring_run;
 using testing::step_at;
 
-/// Springs along `normal`, beyond `above` and below `below`.
+/// The springs act along `normal`, beyond `above` and below `below`.
 struct Springs {
   Vec3 normal = Vec3::UnitX();
   double stiffness = 0;  // N/m
   std::optional<double> above{};
   std::optional<double> below{};
 
-  /// m, positive beyond `above`, negative below `below`.
+  /// In m. The value is positive beyond `above` and negative below `below`.
   double pressed(const Vec3& position) const {
     const double s = position.dot(normal);
     if (above && s > *above) return s - *above;

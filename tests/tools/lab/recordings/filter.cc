@@ -84,7 +84,7 @@ std::string cell_of(const TableReader& table, const TableReader::Column& column,
   return text;
 }
 
-/// Flushes `out` before it blocks, because another program may be waiting for the output.
+/// This flushes `out` if it has to wait, because another program can be waiting for the output.
 bool next_row(TableReader& table, std::istream& in, std::ostream& out) {
   if (in.rdbuf()->in_avail() <= 0) out.flush();
   return table.next_row();

@@ -15,7 +15,7 @@ struct FilterLaw {
   std::string name = "aol+";  ///< a name of core/control/limiter.h
   double viscous = 0;         ///< N·s/m, lower bound of the device's friction
   double coulomb = 0;         ///< N, lower bound of the device's friction
-  double period_us = 1000;    ///< µs, the longest time for which a force is held
+  double period_us = 1000;    ///< µs, the maximum time between two forces
   /// Scene settings "TABLE.KEY=VALUE" in the syntax of `parse_scene`, such as parts of AOL+. Applied after the fields
   /// above.
   std::vector<std::string> settings = {};

@@ -147,7 +147,7 @@ Curve curve(const std::string& name, const char* colour, const PairRun::Line& li
 }
 
 /// Sets the same range for the panels of a row, so that runs can be compared. If one of them would be illegible, each
-/// panel has its own range and a note. each has its own, and says so.
+/// panel has its own range and a note.
 void share_range(std::span<Panel> row) {
   constexpr double kOwnScaleBeyond = 8;
   constexpr double kFar = std::numeric_limits<double>::infinity();

@@ -39,9 +39,9 @@ struct PairRun {
 ///
 ///     ledger = account − Σ credit + Σ withdraw    over the settlements of all previous steps
 ///
-/// so the sum of both ledgers includes the energy that one end has paid and the other one has not received yet. Energy
-/// discarded by a limiter is in neither: the sum is a lower bound of the net work put in. The ledgers are added without
-/// scaling, which is correct for equal products of position and force scale.
+/// so the sum of both ledgers includes payments that have been sent but not received. Energy discarded by a limiter is
+/// in neither: the sum is a lower bound of the net work put in. The ledgers are added without scaling, which is correct
+/// for equal products of position and force scale.
 ///
 /// Memory: 300 bytes a step. Thread-safe: no. Realtime-safe: no.
 class PairObserver {
@@ -80,8 +80,8 @@ class PairObserver {
 };
 
 /// `tendon-report --pairs` for recordings written by `tendon-replay --merge`. Writes a table or JSON and a sentence
-/// about each pair to `out`. Draws a column for each of at most two pairs. It shows the positions of both ends, the
-/// forces, and the accounts of both ends and of the pair.
+/// about each pair to `out`. Draws a column for each of at most two pairs. The column shows the positions, the forces,
+/// and the accounts of both ends and of the pair.
 ///
 /// Throws the exceptions of `report`, and std::runtime_error if a recording is not such a merge.
 void report_pairs(const ReportOptions& options, std::ostream& out);

@@ -69,7 +69,7 @@ struct RunSummary {
   /// from the translational part of the account or from friction. Empty: orientation is not measured.
   std::optional<double> torque_work;
 
-  // Hand. Steps without a position are ignored.
+  // Hand. These values ignore all steps without a position.
   double peak_speed = 0;      ///< m/s
   double peak_force = 0;      ///< N, applied
   Vec3 axis = Vec3::UnitX();  ///< main axis, see RunObserver
@@ -94,7 +94,7 @@ struct RunSummary {
   std::optional<Spread> round_trip;  ///< of the controller's datagrams
   bool sealed = false;               ///< some datagrams were sealed; they have no round trip here
   std::uint64_t forces = 0;          ///< remote forces that were used
-  std::optional<double> forces_per_s;  ///< from the first to the last of them
+  std::optional<double> forces_per_s;  ///< in the time from the first force to the last force
 };
 
 /// Computes the summary of a run from its steps in one pass and bounded memory.

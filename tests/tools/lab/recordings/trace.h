@@ -10,7 +10,7 @@
 
 namespace tendon::lab {
 
-/// The minimum and the maximum of a series, and which of them was first.
+/// The minimum and the maximum of a series, and their order.
 struct Extremes {
   double least = std::numeric_limits<double>::infinity();
   double most = -std::numeric_limits<double>::infinity();

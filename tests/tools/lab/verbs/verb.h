@@ -15,9 +15,9 @@ namespace tendon::lab {
 ///
 ///     const Verb kNetem("netem", "What is left of …", [](CLI::App& verb, int& exit) { … });
 ///
-/// `add` is called once and gives `verb` its options and callback. The callback writes to standard output. It may set
-/// `exit` to 1 for a negative result; it throws std::invalid_argument for wrong usage (exit 2) and other exceptions for
-/// failures (exit 1). Options must outlive the program's run, so they are static in `add`.
+/// The function `add` is called once. It adds the options and the callback to `verb`. The callback writes to standard
+/// output. It may set `exit` to 1 for a negative result; it throws std::invalid_argument for wrong usage (exit 2) and
+/// other exceptions for failures (exit 1). Options must outlive the program's run, so they are static in `add`.
 class Verb {
  public:
   using Add = void (*)(CLI::App& verb, int& exit);
