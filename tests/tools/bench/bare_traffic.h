@@ -25,9 +25,9 @@ struct BareResult {
   double seconds = 0;
   std::uint64_t rounds = 0;
   std::uint64_t sent = 0;
-  std::uint64_t received = 0;       ///< answers
+  std::uint64_t received = 0;
   injector::DurationHistogram age;  ///< kernel receive time − start of the round
-  Duration host{};                  ///< processor time
+  Duration host{};
   Duration guests{};
 };
 BareResult run_bare(const BareTraffic& traffic);

@@ -27,7 +27,6 @@ struct BenchOptions {
   std::uint64_t seed = 1;
 };
 
-/// Collects the rows of all sections.
 class Run {
  public:
   Run(const BenchOptions& the_options, std::function<void(const Row&)> tell)

@@ -54,7 +54,6 @@ ForceCommand some_force() {
   return message;
 }
 
-/// A handle with rotation, gripper and force sensor.
 DeviceState handle_state() {
   DeviceState message = some_state();
   message.buttons = 1;
@@ -66,7 +65,6 @@ DeviceState handle_state() {
   return message;
 }
 
-/// A force with local models of force and torque.
 ForceCommand handle_force() {
   ForceCommand message = some_force();
   message.model = LocalModel{.at = {0.0123, -0.0456, 0.0789}, .stiffness = Mat3::Constant(123.4)};

@@ -57,7 +57,6 @@ HapticController::Config control_of(const Device& device) {
   return config;
 }
 
-/// The answer of an engine to the motion sampled at `now`.
 RemoteForce answer_to(const Vec3& position, std::uint64_t tick, LocalTime now) {
   RemoteForce force;
   force.sequence = tick;
@@ -69,7 +68,6 @@ RemoteForce answer_to(const Vec3& position, std::uint64_t tick, LocalTime now) {
   return force;
 }
 
-/// A device with its haptic thread's state and mailboxes.
 struct Lane {
   explicit Lane(std::size_t number) : device(number), haptic({.control = control_of(device)}, device, mail) {}
 
@@ -88,7 +86,6 @@ struct Lane {
   HapticLoop haptic;
 };
 
-/// The control law without mailboxes.
 struct BareLane {
   explicit BareLane(std::size_t number)
       : device(number), velocity(device.info().position_resolution), controller(control_of(device)) {}
@@ -118,7 +115,6 @@ struct Paced {
   double seconds = 0;
 };
 
-/// Runs the steps of all devices in one thread at 1 kHz.
 template <class AnyLane>
 Paced at_1_khz(std::size_t count, Duration length) {
   std::vector<std::unique_ptr<AnyLane>> lanes;

@@ -38,7 +38,6 @@ std::string scene_of(const Fleet& fleet, const fs::path& recording) {
   return text;
 }
 
-/// Writes the fleet's scene to `folder`, with a key for each plan.
 fs::path written_in(const fs::path& folder, const Fleet& fleet, const std::vector<Plan>& plans) {
   fs::create_directory(folder / "keys");
   for (std::size_t i = 0; i < plans.size(); ++i) {

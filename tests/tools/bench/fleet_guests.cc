@@ -50,7 +50,6 @@ std::vector<Plan> plans_of(const Fleet& fleet, Ratchet& secrets) {
 
 namespace {
 
-/// A client: a handshake, then a session that answers states with the force of a spring.
 class Guest {
  public:
   Guest(const Plan& plan, const Address& server, std::size_t number, const Fleet& fleet, Shared& shared)
@@ -198,7 +197,7 @@ class Guest {
   std::optional<ClientHandshake> handshake_;
   std::unique_ptr<Session> session_;
   std::vector<Grant> grants_;
-  std::vector<Answered> answered_;  ///< by device
+  std::vector<Answered> answered_;
 };
 
 }  // namespace

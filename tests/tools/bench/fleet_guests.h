@@ -15,15 +15,12 @@
 
 namespace tendon::bench {
 
-// The clients of a fleet and the process that runs them.
-
 inline constexpr Duration kPeriod = std::chrono::milliseconds(1);
 
 inline constexpr const char* kFleetName = "d";
 std::string device_name(const Fleet& fleet, std::size_t i);
 std::string channel_name(std::size_t i);
 
-/// The claims and the key of a client.
 struct Plan {
   std::vector<Claim> claims;
   bool controls = true;
@@ -32,12 +29,11 @@ struct Plan {
 
 std::vector<Plan> plans_of(const Fleet& fleet, Ratchet& secrets);
 
-/// Memory shared by both processes.
 struct Shared {
   enum Phase : int { kOpening, kMeasuring, kReporting, kQuit };
   std::atomic<int> phase{kOpening};
   std::atomic<int> at_work{kOpening};  ///< phase that the clients have reached
-  std::atomic<std::size_t> open{0};    ///< sessions
+  std::atomic<std::size_t> open{0};
   // Valid after the clients have set kReporting.
   injector::DurationHistogram state_age;
   injector::DurationHistogram loop_age;
@@ -46,7 +42,7 @@ struct Shared {
   std::atomic<std::uint64_t> states{0};
   std::uint64_t answered_in_time = 0;
   std::uint64_t lost = 0;
-  std::uint64_t out_datagrams = 0;  ///< to the clients
+  std::uint64_t out_datagrams = 0;
   std::uint64_t out_bytes = 0;
   std::uint64_t in_datagrams = 0;
   std::uint64_t in_bytes = 0;

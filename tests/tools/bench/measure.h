@@ -32,7 +32,7 @@ struct Turns {
   std::size_t n = 0;          ///< calls of each
   std::vector<double> times;  ///< ns per call, for each block
   std::vector<double> floor_times;
-  std::vector<double> ratios;            ///< per block
+  std::vector<double> ratios;
   std::optional<double> instructions{};  ///< of one call, median, if available
 };
 

@@ -18,14 +18,11 @@
 
 namespace tendon::bench {
 
-// Child processes of the benchmark and memory shared with them.
-
 /// Throws std::system_error with errno.
 [[noreturn]] void fail(const std::string& what);
 
 Duration read(clockid_t clock);
 
-/// Raises the limit of open files to the maximum allowed.
 void raise_file_limit();
 
 template <class T>

@@ -59,7 +59,6 @@ struct Options {
 enum class Wait : std::uint8_t { kBusy, kBlocking };
 enum class Way : std::uint8_t { kUdp, kUnix };
 
-/// Commands to the other process, in shared memory.
 struct Orders {
   enum Job : int { kRest, kEcho, kSealedEcho, kUdpEcho, kTendon, kQuit };
   std::atomic<int> job{kRest};
@@ -67,7 +66,6 @@ struct Orders {
   std::atomic<int> echo_bytes{0};   ///< size of its reply
 };
 
-/// A socket address.
 struct Name {
   sockaddr_storage bytes{};
   socklen_t size = sizeof bytes;

@@ -36,7 +36,6 @@ struct Row {
   std::vector<std::pair<std::string, double>> figures{};
 };
 
-/// Conditions of a measurement.
 struct Circumstances {
   std::string machine;
   std::string kernel;
@@ -54,7 +53,6 @@ struct Circumstances {
 
 /// Describes this machine and build; load, times and options are left empty.
 Circumstances look_around();
-/// Load average of the last minute.
 double load();
 
 inline constexpr std::string_view kPageBegins = "# What things cost";
@@ -66,7 +64,6 @@ std::string to_text(const Circumstances& circumstances);
 /// Returns a line of JSON without line end.
 std::string to_json(const Row& row);
 std::string to_json(const Circumstances& circumstances);
-/// Returns the whole page.
 std::string to_markdown(const Circumstances& circumstances, const std::vector<Row>& rows);
 
 }  // namespace tendon::bench

@@ -34,7 +34,6 @@ void write_to(int descriptor, const fs::path& file) {
   if (opened < 0 || ::dup2(opened, descriptor) < 0) fail(file.string());
 }
 
-/// Replaces this process by tendond.
 void run_tendond(const fs::path& program, const fs::path& scene) {
   write_to(STDOUT_FILENO, scene.parent_path() / kSaid);
   write_to(STDERR_FILENO, scene.parent_path() / kLog);

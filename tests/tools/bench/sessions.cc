@@ -42,7 +42,6 @@ BareResult floor_of(const Fleet& fleet, const FleetResult& result) {
   return run_bare(bare);
 }
 
-/// Processor time of all threads.
 Duration server_time(const FleetResult& result) { return result.haptic + result.network + result.log; }
 
 /// Age of a state when the client's kernel receives it, compared with a datagram that is sent immediately.

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-// Cost of a haptic step and of its parts.
 #include <array>
 #include <chrono>
 #include <cmath>

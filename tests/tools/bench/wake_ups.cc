@@ -193,7 +193,6 @@ class Page {
   int socket_;
 };
 
-/// tendon-dash in its own process, with a page.
 class Dashboard {
  public:
   Dashboard(const std::filesystem::path& program, const Address& server)
@@ -219,7 +218,6 @@ class Dashboard {
   Page page_;
 };
 
-/// Records to a temporary file.
 class Recording {
  public:
   Recording() : path_(make()), sink_(path_), recorder_({}, sink_) {}
@@ -250,13 +248,12 @@ std::optional<std::filesystem::path> dashboard_program() {
 
 enum class Kind { kAlone, kRecorder, kObservers, kDashboard };
 
-/// The results for all blocks of the same kind.
 struct Figures {
   std::vector<double> late;  ///< µs, of each wake-up
   std::uint64_t overruns = 0;
   std::uint64_t datagrams = 0;  ///< sent by the server
-  Duration network_thread{};    ///< processor time
-  Duration guests{};            ///< processor time of their process
+  Duration network_thread{};
+  Duration guests{};  ///< processor time of their process
   std::uint64_t page_bytes = 0;
 };
 
@@ -319,7 +316,7 @@ class WakeUps {
   }
 
   Figures asleep;
-  std::array<Figures, 4> of;  ///< indexed by Kind
+  std::array<Figures, 4> of;
   bool realtime = true;
   std::uint64_t welcomed() { return server_.network().stats().welcomed; }
 

@@ -40,7 +40,6 @@ class Environment {
   std::vector<char*> pointers_;
 };
 
-/// Both ends of a pipe. They are closed by the destructor.
 struct Pipe {
   std::array<int, 2> ends{-1, -1};
 

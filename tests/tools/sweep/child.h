@@ -13,8 +13,8 @@ struct Child {
 };
 
 struct ChildEnd {
-  int status = 0;        ///< exit status; 128 + n after signal n
-  std::string output{};  ///< standard output
+  int status = 0;  ///< exit status; 128 + n after signal n
+  std::string output{};
   std::string errors{};  ///< last 4 kB of standard error
 
   /// "exit status 3", "signal 9".

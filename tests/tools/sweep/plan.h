@@ -11,7 +11,6 @@
 
 namespace tendon::sweep {
 
-/// The contents of FOLDER/plan.json. This file never changes.
 struct Plan {
   std::filesystem::path program;         ///< absolute path, which must be the same on every node
   std::string sha256;                    ///< hash of the program file, 64 hexadecimal digits

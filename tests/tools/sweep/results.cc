@@ -125,7 +125,6 @@ Kept keep_result(const std::filesystem::path& folder, std::uint64_t shard, std::
 
 namespace {
 
-/// Returns nullopt if the file does not exist.
 std::optional<std::string> result_in(const std::filesystem::path& file, const Units& units) {
   if (!std::filesystem::exists(file)) return std::nullopt;
   std::string text = contents_of(file);

@@ -40,7 +40,6 @@ Kept keep_result(const std::filesystem::path& folder, std::uint64_t shard, std::
 /// Returns a shard's result, if any. Throws std::runtime_error if the file is not a result of this shard.
 std::optional<std::string> result_of(const std::filesystem::path& folder, const Plan& plan, std::uint64_t shard);
 
-/// Returns the second, different result of a shard, if any.
 std::optional<std::string> other_result_of(const std::filesystem::path& folder, const Plan& plan, std::uint64_t shard);
 
 /// Returns the lines of a unit in the output of a program. Can be empty.

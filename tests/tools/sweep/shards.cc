@@ -24,7 +24,6 @@ Child program_of(const Plan& plan, const std::vector<std::string>& more) {
   return child;
 }
 
-/// Returns the lines before the end line.
 std::string_view body_of(std::string_view result) {
   result.remove_suffix(1);
   const auto last = result.rfind('\n');

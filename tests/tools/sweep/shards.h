@@ -19,7 +19,6 @@ void expect_as_planned(const Plan& plan, const std::filesystem::path& self);
 /// Returns the fingerprint of a process with this arithmetic on this node.
 Fingerprint fingerprint_of(Arithmetic arithmetic, const std::filesystem::path& self);
 
-/// Returns "FIRST:COUNT".
 std::string text_of(const Units& units);
 
 /// Returns the program's output for these units. If the program fails, throws std::runtime_error with the end of its

@@ -10,7 +10,6 @@
 namespace tendon::sweep {
 namespace {
 
-/// Quotes `text` for sh.
 std::string quoted(const std::string& text) {
   std::string result = "'";
   for (const char one : text) result += one == '\'' ? std::string("'\\''") : std::string(1, one);
@@ -23,7 +22,6 @@ std::vector<std::uint64_t> missing(const std::filesystem::path& folder, const Pl
   return shards;
 }
 
-/// A job name valid for Slurm and Kubernetes.
 std::string name_of_job(const std::filesystem::path& folder) {
   std::string name = "tendon-" + std::filesystem::absolute(folder).lexically_normal().filename().string();
   if (name.ends_with('-')) name += "sweep";

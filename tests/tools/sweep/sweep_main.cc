@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-// Command line of tendon-sweep.
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>

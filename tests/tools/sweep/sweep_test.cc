@@ -26,7 +26,6 @@ std::string contents(const std::filesystem::path& file) {
   return {std::istreambuf_iterator<char>(in), {}};
 }
 
-/// A sweep of the toy program with injected faults.
 class Sweep : public ::testing::Test {
  protected:
   ChildEnd sweep(std::vector<std::string> arguments, std::vector<std::string> environment = {}) const {

@@ -303,7 +303,6 @@ class Day {
       come_back(z_);
     }
     world_.network().change(fair(), world_.now());
-    // Datagrams in flight may still arrive.
     recover(std::max(world_.now(), world_.network().latest_arrival()));
   }
 

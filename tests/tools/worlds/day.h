@@ -55,10 +55,10 @@ struct DayReport {
   std::uint64_t byes = 0;       ///< how often a client left with a Bye
   std::uint64_t deaths = 0;     ///< clients killed, including under bad conditions
   std::uint64_t takeovers = 0;  ///< number of takeovers by Z's key from another address
-  std::uint64_t sessions = 0;   ///< of all clients
-  std::uint64_t expired = 0;    ///< sessions ended by age
-  std::uint64_t rekeys = 0;     ///< both directions
-  std::uint64_t roamed = 0;     ///< address changes that the server followed
+  std::uint64_t sessions = 0;
+  std::uint64_t expired = 0;  ///< sessions ended by age
+  std::uint64_t rekeys = 0;
+  std::uint64_t roamed = 0;  ///< address changes that the server followed
   std::uint64_t steps = 0;
   std::uint64_t forces = 0;  ///< forces that reached the haptic loop
   Network::Counts network;

@@ -8,7 +8,6 @@
 
 namespace tendon::simulation {
 
-/// Formats with four digits.
 std::string number(double value);
 
 /// Adds rotation, gripper and buttons to the device of `world`. Rotation may be passive or have motors; only laws with

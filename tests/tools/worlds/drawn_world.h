@@ -20,10 +20,9 @@
 
 namespace tendon::simulation {
 
-/// Model of the remote physics engine.
 enum class Engine : std::uint8_t {
   kSpring,
-  kWall,         ///< with a local model
+  kWall,
   kMillion,      ///< 10⁶ N
   kSteps,        ///< force steps
   kNegative,     ///< spring and damper of the wrong sign

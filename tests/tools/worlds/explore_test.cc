@@ -61,7 +61,6 @@ TEST(Worlds, ItsRecordedNetworkMakesTheSameWorldAgain) {
   }
 }
 
-/// Number of worlds whose ledger is violated by a device with this sabotage.
 int broken_by(const Sabotage& sabotage) {
   int broken = 0;
   for (std::uint64_t seed = 1; seed <= 60; ++seed) {

@@ -34,7 +34,6 @@ class Network {
   };
   /// Returns a decider that replays a recorded network, or null to use an injector.
   using Players = std::function<std::unique_ptr<injector::Decider>(injector::Direction, std::uint32_t link)>;
-  /// A datagram that arrives at the server or at a client.
   struct Arrival {
     injector::Direction direction;
     std::uint32_t link;
@@ -64,7 +63,6 @@ class Network {
 
   /// Advances the clock; datagrams due by `now` are in the inboxes afterwards.
   void deliver(LocalTime now);
-  /// Arrival time of the next datagram in flight, if any.
   std::optional<LocalTime> next_arrival() const { return flight_.next_wake(); }
 
   /// Upper bound of the arrival times of all datagrams sent so far. A lost datagram counts if it would have arrived
@@ -81,16 +79,13 @@ class Network {
   /// Returns the number of datagrams that have arrived but have not been read.
   std::size_t unread_by_server() const;
   std::size_t unread_by(std::uint32_t link) const;
-  /// Returns the number of datagrams that have arrived.
   std::uint64_t arrived_at_server() const;
   std::uint64_t arrived_at(std::uint32_t link) const;
-  /// Datagrams in flight from a client to the server.
   std::size_t on_their_way_up(std::uint32_t link) const;
 
   /// Puts bytes into the inbox of `to` immediately, with the source address `from`.
   void forge(const Address& from, const Address& to, std::span<const std::byte> datagram);
 
-  /// The client's current address as seen by the server.
   Address outside(std::uint32_t link) const;
 
   const Counts& counts() const noexcept { return counts_; }

@@ -29,7 +29,6 @@ class Receipts {
   std::uint64_t accepted(std::uint32_t connection) const;
   /// The newest connection; 0 = none.
   std::uint32_t newest() const noexcept { return conversations_.empty() ? 0 : conversations_.rbegin()->first; }
-  /// Number of key changes over all connections.
   std::uint64_t new_keys() const noexcept { return new_keys_; }
 
  private:

@@ -56,7 +56,6 @@ struct Tally {
   }
 };
 
-/// State shared by the threads.
 class Exploration {
  public:
   explicit Exploration(const RunOptions& options) : options_(options) {}

@@ -10,7 +10,6 @@
 
 namespace tendon::simulation {
 
-/// Records the decisions of the network in this world.
 injector::Trace record_network(const DrawnWorld& world);
 
 /// Runs the same world with the network of a trace: datagram i of each link and direction gets the fate recorded for

@@ -86,7 +86,7 @@ class WatchedDevice final : public Device {
   double least_of_axes() const noexcept { return axes_.minCoeff(); }  ///< J, each axis with the full friction
   double sum_of_axes() const noexcept { return axes_.sum(); }         ///< J
   double grip_energy() const noexcept { return gripped_; }
-  const Effort& told() const noexcept { return told_; }  ///< last command
+  const Effort& told() const noexcept { return told_; }
   const Effort& held() const noexcept { return held_; }  ///< output held by the device
 
  private:

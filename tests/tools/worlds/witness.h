@@ -16,7 +16,6 @@
 
 namespace tendon::simulation {
 
-/// Invariants of every world.
 enum class Oracle : std::uint8_t {
   kLedger,
   kTruth,
@@ -42,7 +41,6 @@ struct OracleInfo {
 std::span<const OracleInfo> oracles() noexcept;
 const OracleInfo& info(Oracle oracle) noexcept;
 
-/// A violated invariant and its time.
 struct Breach {
   Oracle oracle{};
   LocalTime at{};
@@ -69,15 +67,12 @@ class Witness {
 
   void see(const StepRecord& step);
   void see(const World::Turn& turn);
-  /// An observer receives a state.
   void see_state(std::size_t handle, const DeviceState& state) { seen_[handle] |= state.buttons; }
   /// Call when the network has cleared or a client was killed on a good network.
   void weather_clears(LocalTime last_arrival_of_bad_weather);
   /// Deadline for every client to be served; empty before the network clears.
   std::optional<LocalTime> recovered_by() const { return recovered_by_; }
-  /// Call at the deadline.
   void see_recovered();
-  /// Call when the world ends.
   void see_end();
 
   const std::optional<Breach>& breach() const { return breach_; }
@@ -87,7 +82,6 @@ class Witness {
   bool limited() const { return limited_; }  ///< a remote force was limited by energy
   bool turned() const { return turned_; }    ///< a torque was commanded
   bool gripped() const { return gripped_; }  ///< a grip force was commanded
-  /// Number of button presses that observers have received.
   int presses() const { return presses_; }
   bool checked_recovery() const { return checked_recovery_; }
   /// The minimum of the account of the port in J. This ignores times with a deficit because of holds that are longer

@@ -62,8 +62,8 @@ class World {
     /// For the server and the clients that have a key. Suite 2 requires a processor with AES; worlds of suite 1 are
     /// identical on all processors.
     Suites suites = {Suite::kNoise};
-    Rekey rekey{};                                   ///< for the server's datagrams
-    Duration session_life = Session::Config{}.life;  ///< at the server
+    Rekey rekey{};
+    Duration session_life = Session::Config{}.life;
 
     static Network::Weather bad();
   };

@@ -65,7 +65,6 @@ struct Log {
   void attach(World& world) {
     world.watch_steps([this](const StepRecord& step) { steps.push_back(step); });
   }
-  // Largest increase of the applied force between steps, N.
   double largest_rise() const {
     double largest = 0;
     for (std::size_t i = 1; i < steps.size(); ++i) {

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-// Command line of tendon-worlds: simulated worlds, one per seed.
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>

@@ -282,7 +282,6 @@ std::vector<Candidate> families(const AccuracyOptions& options) {
   return all;
 }
 
-/// A candidate's results so far, and its engine for the rest.
 struct Trial {
   AccuracyPoint point;
   std::unique_ptr<PressedEngine> engine;
@@ -429,7 +428,6 @@ std::vector<Candidate> candidates(const AccuracyOptions& options) {
   return all;
 }
 
-/// Data shared by the meshes of a process.
 struct Bench {
   explicit Bench(const AccuracyOptions& options) : truth(options.block, options.truth), on_mesh(truth.block()) {
     truth.script();

@@ -59,7 +59,6 @@ struct AccuracyPoint {
   std::optional<Felt> felt{};            ///< behind the network, if requested
 };
 
-/// A network: a name in tendon-inject, or a line of its profiles.
 struct Network {
   std::string name;
   std::uint64_t seed = 1;
@@ -129,7 +128,7 @@ struct AccuracyOptions {
 /// `tendon-lab accuracy`: accuracy against time for each model and mesh.
 void accuracy(const AccuracyOptions& options, std::ostream& out);
 
-/// Returns one line of JSON; The `commit` is the one of the build.
+/// Returns one line of JSON. The `commit` is the one of the build.
 std::string to_json(const AccuracyPoint& point, Truth& truth);
 
 }  // namespace tendon::lab

@@ -39,7 +39,6 @@ Curve curve_of(const Candidate& candidate) {
           .style = for_comparison(candidate.model) ? Curve::Style::kDashed : Curve::Style::kLine};
 }
 
-/// Comparison models have rings as points.
 Curve::Style points_on(const Curve& line) {
   return line.style == Curve::Style::kDashed ? Curve::Style::kRings : Curve::Style::kPoints;
 }
@@ -78,7 +77,6 @@ std::vector<AccuracyPoint> points_of(const Ladders& ladders, const std::optional
   return points;
 }
 
-/// Formats as "condensed hex27-sri 8".
 std::string label_of(const Candidate& candidate) {
   return candidate.way() + " " + std::string(info(candidate.element).name) + " " + std::to_string(candidate.n);
 }

@@ -25,7 +25,6 @@
 namespace tendon::lab {
 namespace {
 
-/// All results of a point, in the order of CSV columns and JSON members.
 using Figure = std::variant<std::int64_t, double>;
 using Figures = std::vector<std::pair<const char*, Figure>>;
 std::int64_t count(std::size_t n) { return static_cast<std::int64_t>(n); }
@@ -86,7 +85,6 @@ void add(JsonLine& line, const char* name, const Figure& figure) {
   std::visit([&](auto value) { line.add(name, value); }, figure);
 }
 
-/// Formats as "420.2".
 std::string with_tenths(double value) {
   std::array<char, 32> text{};
   std::snprintf(text.data(), text.size(), "%.1f", value);

@@ -12,8 +12,6 @@
 
 namespace tendon::lab {
 
-// Output of `tendon-lab accuracy`: table rows, CSV, and the answer to --budget-ms.
-
 /// A ladder is one model and element on increasingly fine meshes. None is empty.
 using Ladders = std::vector<std::vector<AccuracyPoint>>;
 
@@ -26,7 +24,6 @@ struct TruthFigures {
 };
 TruthFigures figures_of(Truth& truth);
 
-/// Results of a mesh that do not depend on a clock.
 struct MeshErrors {
   AccuracyPoint point;
   TruthFigures truth{};
@@ -43,14 +40,12 @@ void write_felt(std::ostream& out, const AccuracyPoint& p);
 void write_truth(std::ostream& out, const TruthFigures& truth, const PressedBlock& block);
 /// Writes the cost exponent of each ladder.
 void write_exponents(std::ostream& out, const Ladders& ladders);
-/// Writes the recommended candidate.
 void write_answer(std::ostream& out, const AccuracyOptions& options, const std::optional<AccuracyPoint>& best,
                   Truth& truth);
 void write_csv(const std::filesystem::path& file, const std::vector<AccuracyPoint>& points, const TruthFigures& truth,
                const PressedBlock& block);
 std::string to_json(const AccuracyPoint& point, const TruthFigures& truth, const PressedBlock& block);
 
-/// Formats as "0.3 N".
 std::string load_text(double newtons);
 
 }  // namespace tendon::lab

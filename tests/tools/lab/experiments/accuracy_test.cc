@@ -255,7 +255,6 @@ TEST(Accuracy, OnlyWhatNothingElseIsAsQuickAndCloserThanMayBeBestAtTheHand) {
   EXPECT_TRUE(may_be_best(point(3, 0.06, 0.09), others));
   EXPECT_TRUE(may_be_best(point(1, 0.5, 0.5), others));
   EXPECT_TRUE(may_be_best(point(3, 0.5, 0.5), {}));
-  // A hundredth of a millisecond is not felt.
   EXPECT_FALSE(may_be_best(point(0.01, 0.06, 0.2), {point(0.05, 0.05, 0.1)}));
   // An answer cannot be faster than the step of the body.
   AccuracyPoint steps = point(1, 0.06, 0.2);

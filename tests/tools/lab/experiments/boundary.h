@@ -16,9 +16,9 @@ namespace tendon::lab {
 double simulated_stiffness_limit(const SampledSpring& spring);
 
 struct BoundaryOptions {
-  double mass = 0.075;                         ///< kg
-  double viscous = 0.26;                       ///< N·s/m
-  std::optional<std::filesystem::path> out{};  ///< folder for the figure
+  double mass = 0.075;    ///< kg
+  double viscous = 0.26;  ///< N·s/m
+  std::optional<std::filesystem::path> out{};
   bool json = false;
   Part part{};  ///< its units are the rows of the table, 0 to 17
 };

@@ -17,10 +17,8 @@
 
 namespace tendon::lab {
 
-/// A model of clients/softbody or a comparison model.
 using AnyModel = std::variant<softbody::ModelKind, softbody::compared::Kind>;
 
-/// Returns all models, comparison models last.
 std::vector<AnyModel> all_models();
 std::string names_of_models();  ///< "linear|condensed|…"
 std::optional<AnyModel> any_model_named(std::string_view name);

@@ -108,7 +108,6 @@ JsonLine json_of(const Cell& cell, std::uint64_t seed) {
   return line;
 }
 
-/// Summary of a law's cells.
 struct Summary {
   Contender contender;
   std::size_t cells = 0;

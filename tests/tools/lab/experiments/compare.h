@@ -20,12 +20,11 @@ struct Situation {
   double delay_ms = 0;
   double jitter_ms = 0;  ///< the maximum additional delay, so forces can overtake each other
   double rate_hz = 0;
-  double loss = 0;    ///< fraction
-  Friction friction;  ///< of the device
+  double loss = 0;  ///< fraction
+  Friction friction;
   bool firm = false;  ///< hand of 800 N/m, 3 N·s/m, 100 g; otherwise 400, 0.3, 50
 };
 
-/// Returns all combinations. All laws use the same situations.
 std::vector<Situation> comparison_grid();
 
 struct Cell {
@@ -44,10 +43,8 @@ struct Cell {
 /// has a model of the environment, the true values are used. AOL+ has its default parts, plus bounded acceleration if
 /// the device has little damping.
 Cell compare_cell(const Situation& situation, Law law, std::uint64_t seed);
-/// Runs AOL+ with these parts.
 Cell compare_cell(const Situation& situation, Law law, std::uint64_t seed, const AolPlus<1, 3>::Parts& parts);
 
-/// Runs a preset with its learned model.
 Cell compare_cell(const Situation& situation, Preset preset, std::uint64_t seed);
 
 /// Comparison of AOL+ without a preset with the other passive laws.

@@ -40,7 +40,6 @@ double median_of(std::vector<double> values) {
   return *middle;
 }
 
-/// The results of a contender in all situations of a kind.
 struct Line {
   std::size_t cells = 0;
   double passive = 0, within8 = 0, within3 = 0, within1_5 = 0;  ///< shares

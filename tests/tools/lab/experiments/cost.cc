@@ -30,7 +30,6 @@ constexpr double kStiffness = LawSteps::kStiffness;
 constexpr double kSoft = 300;  // N/m, with an estimator, so that the limiter causes no force error
 constexpr Duration kRare = LawSteps::kEnvironmentDelay;
 
-/// Keeps the compiler from removing `value`.
 template <class T>
 void keep(const T& value) {
   asm volatile("" : : "g"(&value) : "memory");

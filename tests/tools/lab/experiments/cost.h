@@ -9,7 +9,7 @@ namespace tendon::lab {
 
 struct CostOptions {
   int batches = 200;
-  std::optional<std::filesystem::path> out{};  ///< folder for the figure
+  std::optional<std::filesystem::path> out{};
   bool json = false;
 };
 

@@ -20,7 +20,6 @@ constexpr double kLongestLatency = 0.5;    // s
 constexpr std::uint32_t kDatagram = 200;   // bytes
 constexpr double kCorrelationStep = 2e-3;  // s, between the correlated samples
 
-/// The environment behind its network.
 class Remote {
  public:
   Remote(const Environment& environment, std::uint64_t seed) : environment_(environment), dice_(seed) {
@@ -269,7 +268,6 @@ double stiffness(const std::vector<Moment>& record) {
   return n > 0 ? sum / n : 0;
 }
 
-/// Returns the shift that maximizes the correlation between felt and true force.
 double latency(const std::vector<Moment>& record, Duration period) {
   const auto stride = std::max<std::size_t>(1, static_cast<std::size_t>(kCorrelationStep / seconds(period)));
   const auto longest = std::min(static_cast<std::size_t>(kLongestLatency / seconds(period)), record.size() / 2);

@@ -64,7 +64,6 @@ struct Experiment {
   std::uint64_t seed = 0;  ///< for jitter and loss
 };
 
-/// The step of the controller and the true state in one period.
 struct Moment {
   Step step;
   double t = 0;                    ///< s
@@ -74,7 +73,6 @@ struct Moment {
   double energy = 0;               ///< J, true ledger: exact positions and the device's true friction
 };
 
-/// Summary of a run.
 struct Outcome {
   double operational_stiffness = 0;  ///< N/m: mean of −(F − F₀)·d/‖d‖², d = x − x₀, where ‖d‖ > a tenth of its largest
   double least_energy = 0;    ///< J, of the true ledger. If it is negative, the device has generated energy.

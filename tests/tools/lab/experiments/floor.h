@@ -21,7 +21,6 @@ enum class Passive : std::uint8_t {
   kAccelerating,   ///< ℓ(F) ≤ E with the travel possible under bounded acceleration
 };
 
-/// A motion along one axis, with the true force.
 struct FloorProblem {
   std::vector<double> dx{};     ///< m, the distance while force k is held
   std::vector<double> truth{};  ///< N, on the hand. It must have the same size as dx.

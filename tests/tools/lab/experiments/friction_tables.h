@@ -26,7 +26,7 @@ FrictionTable friction_table(double damping);
 inline constexpr std::array kTableDampings = {0.26, 0.05, 0.005};  ///< N·s/m
 
 void write(std::ostream& out, const std::vector<FrictionTable>& tables);
-/// Returns one line of JSON; The `commit` is the one of the build.
+/// Returns one line of JSON. The `commit` is the one of the build.
 JsonLine json_of(const FrictionTable& table);
 /// Parses a line that was written by json_of(). Throws an exception if it is not valid.
 FrictionTable friction_table_of(const nlohmann::json& line);

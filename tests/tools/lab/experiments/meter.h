@@ -7,7 +7,6 @@
 
 namespace tendon::lab {
 
-/// A measurement exceeded its time limit.
 struct TooSlow : std::runtime_error {
   using std::runtime_error::runtime_error;
 };

@@ -75,7 +75,6 @@ Losses our_losses(double probability, double correlation, const NetemOptions& op
   return losses(lost);
 }
 
-/// Delays in ms with a requested correlation of 90 %.
 struct Delays {
   std::string name;
   const char* colour;

@@ -28,9 +28,9 @@ class NetemRandom {
 };
 
 struct NetemOptions {
-  std::size_t count = 1'000'000;               ///< datagrams per line
-  std::uint64_t seed = 7;                      ///< of both
-  std::optional<std::filesystem::path> out{};  ///< folder for the figure
+  std::size_t count = 1'000'000;  ///< datagrams per line
+  std::uint64_t seed = 7;         ///< of both
+  std::optional<std::filesystem::path> out{};
   bool json = false;
 };
 

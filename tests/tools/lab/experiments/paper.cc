@@ -24,7 +24,6 @@ using std::chrono::milliseconds;
 
 constexpr double kAmplitude = 0.015;  // m
 constexpr double kFrequency = 0.25;   // Hz
-/// A row of an experiment; the figures show the first three.
 struct RowKind {
   Law law;
   std::optional<Preset> preset{};
@@ -42,7 +41,6 @@ Environment with(Environment environment, Duration period, Duration delay) {
   return environment;
 }
 
-/// Triangle wave from 0 to `most` and back, once per `period` seconds.
 double triangle(double t, double period, double most) {
   const double phase = t / period - std::floor(t / period);
   return most * (1 - std::abs(2 * phase - 1));
@@ -269,7 +267,6 @@ JsonLine json_of(const PaperRow& row) {
   return line;
 }
 
-/// Parses a line of JSON. Other fields have their default values.
 PaperRow row_of(const nlohmann::json& line) {
   PaperRow row;
   row.experiment = line.at("experiment");
@@ -284,7 +281,6 @@ PaperRow row_of(const nlohmann::json& line) {
   return row;
 }
 
-/// This is either a row of an experiment or a row of Tables II and III.
 using AnyRow = std::variant<PaperRow, FrictionTable>;
 
 /// If `drawn` is true, the motion is kept for a figure.

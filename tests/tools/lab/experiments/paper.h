@@ -18,8 +18,8 @@ namespace tendon::lab {
 ///
 /// Table IV of the paper is lost. `assumed` names the values that replace it (core/PROOFS.md, "Paper's experiments").
 struct PaperExperiment {
-  std::string name;                   ///< "A" … "E", "12", "14"
-  std::string what;                   ///< one line
+  std::string name;  ///< "A" … "E", "12", "14"
+  std::string what;
   std::string assumed;                ///< values missing in the source
   std::string better;                 ///< features used by AOL+ that the paper's limiter lacks
   std::optional<double> k_op{};       ///< N/m, operational stiffness in the paper
@@ -68,7 +68,7 @@ struct PaperRow {
 PaperRow paper_row(const PaperExperiment& experiment, Law law, std::optional<Preset> preset = {});
 
 struct PaperOptions {
-  std::optional<std::filesystem::path> out{};  ///< folder for the figures
+  std::optional<std::filesystem::path> out{};
   bool json = false;
   /// The units are the rows of the table, which are four rows for each experiment and then the rows of Tables II and
   /// III. With `from`, the motions of the figures are simulated again, because lines do not contain them.

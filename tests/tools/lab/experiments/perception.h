@@ -41,12 +41,10 @@ inline constexpr double kStiffnessWeber = 0.23;
 /// N: smaller forces are not judged, because their Weber fraction is larger.
 inline constexpr double kLeastJudged = 0.5;
 
-/// Returns whether the hand notices the difference between felt and true force (N).
 inline bool notices(const Vec3& felt, const Vec3& truth) noexcept {
   return truth.norm() >= kLeastJudged && (felt - truth).norm() > kForceWeber * truth.norm();
 }
 
-/// Returns whether the hand notices the difference between displayed and true stiffness (N/m, > 0).
 inline bool notices_stiffness(double shown, double truth) noexcept {
   return !(shown >= (1 - kStiffnessWeber) * truth && shown <= (1 + kStiffnessWeber) * truth);
 }

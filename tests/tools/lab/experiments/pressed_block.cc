@@ -48,7 +48,6 @@ std::vector<double> layers(double low, double high, double middle, double around
   return all;
 }
 
-/// The block with a mesh refined for this patch.
 Solid graded(const PressedBlock& block, softbody::Law law, double cells) {
   // Selective integration is slightly less accurate; used only where locking requires it.
   const Element element =

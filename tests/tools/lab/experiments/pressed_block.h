@@ -35,7 +35,6 @@ struct Stiffness {
   double tangent = 0;  ///< N/m
 };
 
-/// Position of a tool and the force on it.
 struct Touched {
   softbody::Vec3 tool;
   softbody::Vec3 force;

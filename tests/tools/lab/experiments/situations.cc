@@ -22,7 +22,6 @@
 namespace tendon::lab {
 namespace {
 
-/// The parameters that a kind can change before the experiment is created.
 struct Draft {
   Dice& dice;
   Trial trial;
@@ -161,7 +160,6 @@ void circle(Draft& draft) {
   draft.frequency = 0;
 }
 
-/// The hand presses for a second and is withdrawn within 60 ms.
 void drawn_out(Draft& draft) {
   draft.object([k = draft.k](double, const Vec3& x) { return towards_x(x.x() > 0 ? -k * x.x() : 0); });
   draft.hand.hand->motion = ScriptedMotion(ScriptedMotion::MinimumJerk{
@@ -216,7 +214,6 @@ void stirring(Draft& draft) {
   into_a_wall(draft);
 }
 
-/// The hand presses for a second, then releases the handle.
 void letting_go(Draft& draft) {
   draft.object([k = draft.k](double, const Vec3& x) { return towards_x(x.x() > 0 ? -k * x.x() : 0); });
   const double depth = draft.dice.within(0.005, 0.015);
@@ -229,7 +226,6 @@ void letting_go(Draft& draft) {
   draft.say("pressed", depth * 1e3, "mm");
 }
 
-/// Folder of recordings, or null.
 const char* data_folder() { return std::getenv("TENDON_DATA"); }  // NOLINT(concurrency-mt-unsafe): nobody sets it
 
 /// A human hand recorded on a lever (TENDON_DATA/tue-1dof-teleop: its SOURCE.txt), used as the intended motion.

@@ -20,15 +20,13 @@ namespace tendon::lab {
 
 struct SituationKind {
   std::string_view name;
-  std::string_view what;  ///< one line
+  std::string_view what;
 };
-/// Returns all kinds in the order of the tables.
 std::span<const SituationKind> situation_kinds() noexcept;
 
 /// Laws must only be tuned on smaller seeds. All other seeds are only used for the evaluation.
 inline constexpr std::uint64_t kHeldOutSeeds = 1'000'000;
 
-/// A situation that is used with every law.
 struct Trial {
   Experiment experiment{};  ///< the limiter has the friction of the device, but no law
   double encoder_step = 0;  ///< m
@@ -40,17 +38,14 @@ struct Trial {
 /// all machines. Throws std::invalid_argument if there is no such kind.
 std::optional<Trial> draw_situation(std::string_view kind, std::uint64_t seed);
 
-/// This is either a law with its parts or a preset.
 struct Contender {
   std::string_view name;
   Law law = Law::kAolPlus;
   std::optional<Preset> preset{};
   bool promises = false;  ///< guarantees passivity
 };
-/// Returns every law, then every preset.
 std::vector<Contender> contenders();
 
-/// Runs a contender in a situation.
 Outcome outcome_of(const Contender& contender, const Trial& trial);
 
 }  // namespace tendon::lab

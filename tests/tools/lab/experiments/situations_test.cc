@@ -66,7 +66,6 @@ TEST(Situations, AHandThatIsDrawnOutIsNotHeld) {
   }
 }
 
-/// The waving or stirring of `seed` without a network, with `friction`.
 Trial before_a_wall(std::string_view kind, std::uint64_t seed, const Friction& friction, bool firm) {
   Trial trial = *draw_situation(kind, seed);
   auto& hand = std::get<FreeHand>(trial.experiment.hand);

@@ -17,8 +17,6 @@
 #include "server/recording/recorder.h"
 #include "server/recording/records.h"
 
-// Runs with known results for the tests of the lab.
-
 namespace tendon::lab::testing {
 
 inline constexpr Duration kPeriod = std::chrono::milliseconds(1);

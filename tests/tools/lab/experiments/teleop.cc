@@ -70,7 +70,6 @@ double median(std::vector<double>& of) {
   return *middle;
 }
 
-/// Results of one hand.
 struct Trial {
   double first = 0;  ///< as in TeleopRow
   double second = 0;

@@ -14,9 +14,9 @@
 namespace tendon::lab {
 
 struct TeleopOptions {
-  int hands = 21;                              ///< per method and round trip, 1 … 1000
-  std::uint64_t seed = 1;                      ///< of the first hand
-  std::optional<std::filesystem::path> out{};  ///< folder for the figure
+  int hands = 21;          ///< per method and round trip, 1 … 1000
+  std::uint64_t seed = 1;  ///< of the first hand
+  std::optional<std::filesystem::path> out{};
   bool json = false;
   Part part{};  ///< the units are the trials, for each hand at each round trip of each method
 };

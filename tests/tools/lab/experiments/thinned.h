@@ -29,7 +29,6 @@ class Thinned {
     kept_.push_back(sample);
   }
 
-  /// Samples in order of arrival.
   const std::vector<T>& kept() const noexcept { return kept_; }
   std::uint64_t seen() const noexcept { return seen_; }
 

@@ -36,7 +36,6 @@ void write(std::ostream& out, const GoldenTable& table);
 /// Throws std::runtime_error if the file cannot be read or is not a golden table.
 GoldenTable read_golden(const std::filesystem::path& file);
 
-/// A bitwise difference of two tables.
 struct GoldenDifference {
   std::string law;
   std::string situation;

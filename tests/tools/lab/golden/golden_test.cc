@@ -87,7 +87,6 @@ Ran shell(const std::string& command) {
   return result;
 }
 
-/// Helper process of the next test.
 TEST(GoldenChild, DISABLED_SaysTheBitsOfLibm) { std::cout << "bits of libm: " << bits_of_libm() << "\n"; }
 
 TEST(Golden, NoFigureDependsOnTheProcessorsFusedMultiplyAdd) {

@@ -21,7 +21,6 @@ struct CostTable {
   std::vector<Row> rows;
 };
 
-/// Maximum relative difference from the committed value.
 inline constexpr double kCostTolerance = 0.02;
 
 /// Returns compiler, flags and Eigen version of this build: the first line of a table.

@@ -10,7 +10,6 @@
 
 namespace tendon::lab {
 
-/// The degree of freedom that an experiment moves.
 enum class Freedom : std::uint8_t {
   kMovement,  ///< one axis of the position; m, N
   kRotation,  ///< rotation about one axis; rad, N·m

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-// Command line of tendon-identify: friction of a device from force ramps.
 #include <CLI/CLI.hpp>
 #include <iostream>
 #include <map>

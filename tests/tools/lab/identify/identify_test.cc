@@ -20,7 +20,6 @@ namespace {
 
 class Identify : public ::testing::Test {
  protected:
-  /// Factors that the columns are multiplied by.
   struct Mistake {
     double time = 1, position = 1, force = 1;
   };

@@ -39,7 +39,7 @@ struct RampExperiment {
   double force_noise = 0.005;                    ///< N, standard deviation of the motor force; not recorded
   double bias = 0;                               ///< N, constant force along +x, such as gravity; not recorded
   Duration period = std::chrono::milliseconds(1);
-  Duration longest = std::chrono::seconds(20);  ///< of one run
+  Duration longest = std::chrono::seconds(20);
   std::uint64_t seed = 1;
 };
 

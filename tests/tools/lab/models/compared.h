@@ -21,12 +21,11 @@ struct Info {
   Kind kind;
   Law law;
   std::string_view name;  ///< in tables and command lines
-  std::string_view what;  ///< one line
-  bool has_time;          ///< a press is a time step, which requires inertia
-  bool tetrahedra;        ///< requires Element::kTet4
+  std::string_view what;
+  bool has_time;    ///< a press is a time step, which requires inertia
+  bool tetrahedra;  ///< requires Element::kTet4
 };
 
-/// All models, in the order of the tables.
 std::span<const Info> models() noexcept;
 const Info& info(Kind kind) noexcept;
 std::optional<Kind> named(std::string_view name) noexcept;

@@ -17,7 +17,6 @@ SymmetricMatrix stiffness_at_rest(const Elastic& elastic) {
   return stiffness;
 }
 
-/// Expands free displacements to all nodes.
 VectorXd all_of(const Elastic& elastic, const VectorXd& free) {
   VectorXd all = VectorXd::Zero(elastic.size());
   elastic.add_free(free, all);

@@ -44,7 +44,6 @@ class SpringNet : public Elastic {
 /// Quasi-static or dynamic spring model, solved by the Newton method of the finite elements.
 class MassSpringModel : public Model {
  public:
-  /// Copies mesh and Young's modulus from the solid.
   MassSpringModel(const Solid& solid, const TouchSurface& surface, const QuasiStaticModel::Config& config,
                   const EffectsConfig& effects = {});
 

@@ -226,7 +226,6 @@ TEST(ComparedModels, EachIsFoundByTheNameThatItHasAndNoOtherIs) {
   EXPECT_EQ(named("linear"), std::nullopt);
 }
 
-/// Block B1 with another Young's modulus in one half.
 Solid half_stiff(const Info& model, double young) {
   const Solid whole = pressed_block(model.tetrahedra ? Element::kTet4 : Element::kHex8Sri, 4, 0.45, model.law);
   const Region half{.where = Region::Box{.middle = Vec3(-0.025, 0, 0.025), .size = Vec3(0.05, 0.2, 0.06)},

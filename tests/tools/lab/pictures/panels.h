@@ -9,7 +9,6 @@
 
 namespace tendon::lab {
 
-/// A curve of a panel.
 struct Curve {
   enum class Style {
     kLine,

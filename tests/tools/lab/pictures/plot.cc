@@ -92,7 +92,6 @@ std::vector<Scale> energy_scales(std::span<const Drawing> drawings) {
   return own;
 }
 
-/// The unit in which the values of a scale have one to three digits.
 struct Unit {
   const char* name;
   double per_si;
@@ -122,7 +121,6 @@ std::string stretched(double ratio) {
   return text.str();
 }
 
-/// Generates the gnuplot script.
 class Script {
  public:
   explicit Script(std::span<const Drawing> drawings)

@@ -11,7 +11,6 @@
 
 namespace tendon::lab {
 
-/// A run as a column of the picture.
 struct Drawing {
   std::string label;
   RunSummary summary;
@@ -38,7 +37,6 @@ std::size_t trace_columns(std::size_t drawings);
 /// Throws the exceptions of `check_picture`, and std::runtime_error if gnuplot is missing or fails.
 void draw(const std::filesystem::path& path, std::span<const Drawing> drawings);
 
-/// Returns the gnuplot script.
 std::string plot_script(const std::filesystem::path& path, std::span<const Drawing> drawings);
 
 }  // namespace tendon::lab

@@ -22,8 +22,8 @@ double ms(Duration d) { return seconds(d) * 1e3; }
 
 struct ReasonName {
   Reason reason;
-  const char* key;      ///< in JSON
-  const char* meaning;  ///< in the table
+  const char* key;
+  const char* meaning;
 };
 constexpr std::array kReasonNames = {
     ReasonName{Reason::kEnergy, "energy", "the limiter: energy was not earned"},

@@ -14,9 +14,9 @@ namespace tendon::lab {
 
 /// Summary of one recorded run and defects of its recording.
 struct Run {
-  std::string label;      ///< heading of the column
-  std::string recording;  ///< file name
-  std::string device;     ///< name; empty if the recording has one device
+  std::string label;  ///< heading of the column
+  std::string recording;
+  std::string device;  ///< name; empty if the recording has one device
   RunSummary summary;
   bool truncated = false;  ///< the recording has no end mark
   std::uint64_t lost_steps = 0;

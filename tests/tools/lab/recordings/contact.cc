@@ -89,7 +89,6 @@ std::optional<Fit> line_through(const std::vector<Answer>& pushes) {
   }
   const double slope = products / squares;
   const auto [nearest, deepest] = std::ranges::minmax(pushes, {}, &Answer::x);
-  // A wall with a constant force is not a spring.
   if (!(slope * (deepest.x - nearest.x) > kSmall * mean_f)) return std::nullopt;
   const double zero = mean_x - mean_f / slope;
   double residuals = 0;

@@ -25,7 +25,6 @@ namespace {
 using testing::spring_run;
 using testing::step_at;
 
-/// The springs act along `normal`, beyond `above` and below `below`.
 struct Springs {
   Vec3 normal = Vec3::UnitX();
   double stiffness = 0;  // N/m

@@ -53,7 +53,6 @@ std::string reasons_cell(Reasons reasons) {
   return text;
 }
 
-/// Splits a header at its commas.
 std::vector<std::string_view> names(std::string_view header) {
   std::vector<std::string_view> result;
   for (;;) {

@@ -10,7 +10,6 @@
 
 namespace tendon::lab {
 
-/// The law, as given on the command line.
 struct FilterLaw {
   std::string name = "aol+";  ///< a name of core/control/limiter.h
   double viscous = 0;         ///< N·s/m, lower bound of the device's friction

@@ -94,7 +94,6 @@ std::string sentence(const PairRun& run) {
          with_unit(std::max(run.least_pair, 0.0), "J") + ".";
 }
 
-/// Widths of the table's columns, in characters.
 constexpr std::size_t kName = 46;
 constexpr std::size_t kCell = 26;
 

@@ -26,7 +26,6 @@ struct Source {
   std::size_t device = 0;
 };
 
-/// Reads all devices of a recording that have steps.
 std::vector<Source> read_runs(const std::filesystem::path& recording, std::string& not_examined) {
   const std::vector<std::string> names = device_names(recording);
   const bool several = names.size() > 1;

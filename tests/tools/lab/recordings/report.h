@@ -29,7 +29,6 @@ struct ReportOptions {
 /// of recordings.
 void check(const ReportOptions& options);
 
-/// Maximum number of columns of a table.
 inline constexpr std::size_t kMostColumns = 6;
 
 /// Reads the recordings, writes the table (or JSON) to `out`, and draws the picture. Each device of each recording has

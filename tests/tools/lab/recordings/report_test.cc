@@ -32,7 +32,6 @@ std::string contents(const std::filesystem::path& file) {
   return {std::istreambuf_iterator<char>(in), {}};
 }
 
-/// The picture's data for a run.
 Drawing drawing_of(Law limiter, const std::string& label) {
   const auto steps = toy_run(limiter, 6000);
   const RunSummary summary = summarise(steps);

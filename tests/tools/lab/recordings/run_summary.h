@@ -60,7 +60,6 @@ struct RunSummary {
   /// Returns true if the ledger was never below −1 nJ, except for holds that are longer than the bound. This is what
   /// the limiter guarantees.
   bool kept_its_promise() const noexcept { return least_energy >= -kPromise; }
-  /// True if some step had a finite bound.
   bool limiter_on = false;
   /// Fraction of steps (0 to 1) in which T was above the scene's longest_hold because of overruns.
   double share_careful = 0;
@@ -82,14 +81,12 @@ struct RunSummary {
   double share_limited() const noexcept;         ///< fraction of served_steps, 0 to 1
   double share_limited(Reason why) const noexcept;
 
-  // Contact.
   bool pushed = false;             ///< a force was requested
   std::optional<Contact> contact;  ///< empty without requested forces that depend on position
   bool stable = true;
   /// N/m. Empty without a contact or if the error exceeds 5 %; meaningful only if `stable`.
   std::optional<double> operational_stiffness;
 
-  // Times.
   std::optional<Spread> loop_age;    ///< from sampling a motion to applying the force computed from it; once per force
   std::optional<Spread> round_trip;  ///< of the controller's datagrams
   bool sealed = false;               ///< some datagrams were sealed; they have no round trip here
@@ -149,7 +146,6 @@ class RunObserver {
   static constexpr std::size_t kMostBrought = 256;
   /// The maximum number of steps with the same force. This is 8 s at 1 kHz.
   static constexpr std::size_t kMostHeld = 8'192;
-  /// Maximum number of connections distinguished in a recording.
   static constexpr std::size_t kMostConnections = 4'096;
 
   struct Seen {
@@ -183,7 +179,6 @@ class RunObserver {
     LocalTime received;
     std::optional<Duration> round_trip;  ///< empty: the step came first
   };
-  /// Datagrams sent on a connection.
   struct Sent {
     LocalTime first;
     std::uint64_t highest_number;

@@ -302,7 +302,6 @@ TEST(RunSummary, ARunWithoutForcesHasNoLoopAgeAndNoRate) {
   EXPECT_FALSE(run.round_trip);
 }
 
-/// A Data datagram sent at `at`.
 DatagramRecord sent_at(LocalTime at, std::uint64_t number) {
   DatagramRecord datagram;
   datagram.at = at;

@@ -55,7 +55,6 @@ class Trace {
   void observe(const StepRecord& step);
 
   const std::vector<Column>& columns() const noexcept { return columns_; }
-  /// The middle of a column, in s after the start.
   double time(std::size_t column) const noexcept;
   const Config& config() const noexcept { return config_; }
 

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-// Command line of tendon-lab filter.
 #include "tests/tools/lab/recordings/filter.h"
 
 #include <CLI/CLI.hpp>

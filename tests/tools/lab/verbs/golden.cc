@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-// Command line of tendon-lab golden.
 #include "tests/tools/lab/golden/golden.h"
 
 #include <CLI/CLI.hpp>

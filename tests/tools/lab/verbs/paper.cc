@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-// Command line of tendon-lab paper.
 #include <CLI/CLI.hpp>
 #include <iostream>
 

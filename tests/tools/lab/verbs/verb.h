@@ -29,7 +29,6 @@ class Verb {
   Add add;
 };
 
-/// Returns all verbs, sorted by name.
 std::vector<Verb> verbs();
 
 /// Returns "a|b|c" for a catalogue whose rows have a `name`.
