@@ -27,7 +27,7 @@ struct BareResult {
   std::uint64_t sent = 0;
   std::uint64_t received = 0;
   injector::DurationHistogram age;  ///< kernel receive time − start of the round
-  Duration host{};
+  Duration host{};                  ///< processor time
   Duration guests{};
 };
 BareResult run_bare(const BareTraffic& traffic);

@@ -18,7 +18,7 @@ namespace tendon::bench {
 /// about as much as the server does.
 struct Fleet {
   std::size_t devices = 16;
-  std::size_t channels = 1;
+  std::size_t channels = 1;  ///< per device
   /// If this is true, one session controls all devices of a bank. Otherwise, each channel has its own session.
   bool one_session_for_16 = false;
   /// The number of sessions. If there are more sessions than channels, the others observe one device each. If this is
@@ -44,7 +44,7 @@ struct FleetResult {
   // Over the whole run:
   Duration started{};          ///< from exec to listening
   std::uint64_t resident = 0;  ///< resident memory of the server, bytes
-  std::uint64_t steps = 0;
+  std::uint64_t steps = 0;     ///< of all devices
   std::uint64_t overruns = 0;  ///< steps after an interval longer than the assumed bound
   std::uint64_t forces_sent = 0;
   std::uint64_t forces_taken = 0;  ///< handed to the haptic loops
@@ -59,12 +59,13 @@ struct FleetResult {
   /// This requires that the state reached the client and the force returned within a period.
   std::uint64_t answered_in_time = 0;
   std::uint64_t steps_owed = 0;
-  std::uint64_t out_datagrams = 0;
+  std::uint64_t out_datagrams = 0;  ///< server → clients
   std::uint64_t out_bytes = 0;
   std::uint64_t in_datagrams = 0;
   std::uint64_t in_bytes = 0;
   std::uint64_t lost = 0;  ///< lost in transit, both directions
 
+  // Processor time:
   Duration haptic{};
   Duration network{};
   Duration log{};  ///< rest of the server

@@ -29,6 +29,7 @@ struct Plan {
 
 std::vector<Plan> plans_of(const Fleet& fleet, Ratchet& secrets);
 
+/// Memory that is shared by both processes.
 struct Shared {
   enum Phase : int { kOpening, kMeasuring, kReporting, kQuit };
   std::atomic<int> phase{kOpening};

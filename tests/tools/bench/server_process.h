@@ -27,8 +27,8 @@ class ServerProcess {
 
   const Address& address() const { return address_; }
   Duration started() const { return started_; }  ///< from exec to listening
-  std::uint64_t resident() const;
-  void check() const { process_->check(); }  ///< throws if the server has exited
+  std::uint64_t resident() const;                ///< bytes
+  void check() const { process_->check(); }      ///< throws if the server has exited
 
   struct Spent {
     Duration haptic{};

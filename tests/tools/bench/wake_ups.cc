@@ -252,8 +252,8 @@ struct Figures {
   std::vector<double> late;  ///< µs, of each wake-up
   std::uint64_t overruns = 0;
   std::uint64_t datagrams = 0;  ///< sent by the server
-  Duration network_thread{};
-  Duration guests{};  ///< processor time of their process
+  Duration network_thread{};    ///< processor time
+  Duration guests{};            ///< processor time of their process
   std::uint64_t page_bytes = 0;
 };
 
@@ -316,7 +316,7 @@ class WakeUps {
   }
 
   Figures asleep;
-  std::array<Figures, 4> of;
+  std::array<Figures, 4> of;  ///< indexed by Kind
   bool realtime = true;
   std::uint64_t welcomed() { return server_.network().stats().welcomed; }
 
