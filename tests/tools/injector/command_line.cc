@@ -42,7 +42,7 @@ constexpr const char* kExamples =
     "for;\n"
     "2 wrong usage.";
 
-/// Not through CLI11: it takes -1 for 2⁶⁴ − 1.
+/// CLI11 would accept -1 as 2⁶⁴ − 1.
 std::uint64_t parse_seed(const std::string& text) {
   std::uint64_t seed = 0;
   const char* const end = text.data() + text.size();
@@ -53,7 +53,7 @@ std::uint64_t parse_seed(const std::string& text) {
   return seed;
 }
 
-/// An Address, or a ServerName, which is not looked up here.
+/// `Where` is an Address or a ServerName. Does not resolve names.
 template <class Where>
 Where parse_option(const char* option, const std::string& text) {
   try {
@@ -69,7 +69,7 @@ Where parse_option(const char* option, const std::string& text) {
 
 CLI::Validator between(double least, double most) { return CLI::Range(least, most).description(""); }
 
-/// All that can be said on the command line, as it was said.
+/// The raw option values.
 struct Said {
   NetworkOptions network;
   std::string seed;

@@ -14,7 +14,6 @@
 
 namespace tendon::injector {
 
-// What tendon-inject can be asked for.
 struct LiveTask {
   NetworkOptions network;
   LiveRun run;
@@ -48,7 +47,7 @@ struct HelpTask {
 };
 using Task = std::variant<LiveTask, DryTask, ProfilesTask, ControlTask, ImportTask, ExportTask, SelftestTask, HelpTask>;
 
-/// Throws std::invalid_argument, naming the option, its value and what was expected, when the command line is wrong.
+/// Throws std::invalid_argument that names the option, its value and the expected format.
 Task parse_command_line(int argc, const char* const* argv);
 
 }  // namespace tendon::injector

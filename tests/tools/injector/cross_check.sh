@@ -1,12 +1,12 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# tests/tools/injector/cross_check.sh [BUILD]: the proxy beside what the kernel itself can do to packets, measured by a third
-# party. irtt (a UDP round-trip tester) talks to its server through a pair of network namespaces, 1000 times a second:
+# tests/tools/injector/cross_check.sh [BUILD]: compares the proxy with the kernel's own packet loss and rate limits.
+# irtt (a UDP round-trip tester) talks to its server through a pair of network namespaces, 1000 times a second:
 #   loss   nft's `numgen random mod 100 < 10 drop` against `loss=10%`
-#   rate   tc's token bucket, 4 Mbit/s and 50 kB of queue, against `rate=4Mbit/s queue=50kB`; twice as much is sent
-#   floor  neither of them, without the proxy and with a proxy that was asked for nothing
-# Prints a table. Fails when proxy and kernel differ by more than chance (loss: five standard deviations) or by more than
-# 3 % (rate). Without root, or without irtt, nft or tc, it says so and does nothing.
+#   rate   tc's token bucket, 4 Mbit/s and a 50 kB queue, against `rate=4Mbit/s queue=50kB`, at twice the rate
+#   floor  a direct path, and the proxy without impairments
+# Prints a table. Fails if proxy and kernel differ by more than five standard deviations (loss) or 3 % (rate).
+# Prints a message and does nothing without root, irtt, nft or tc.
 #
 # Example: sudo tests/tools/injector/cross_check.sh build/release
 set -euo pipefail
@@ -45,7 +45,7 @@ done
 ip netns exec "$there" irtt server -i 0 -b 10.98.0.2:2112 >"$work/server.log" 2>&1 &
 sleep 0.5
 
-# measure NAME ADDRESS: one run of irtt; a line of the table, and its numbers in $work/results.
+# measure NAME ADDRESS: runs irtt once, prints a line of the table and appends its numbers to $work/results.
 measure() {
   local name=$1 address=$2
   ip netns exec "$here" irtt client -q -i 1ms -d "${seconds}s" -l $bytes --wait=1s "$address" >"$work/out" 2>&1 ||
@@ -62,7 +62,7 @@ measure() {
     }' "$work/out"
 }
 
-# through OPTIONS…: a proxy in front of the server, until the next one.
+# through OPTIONS…: starts a proxy in front of the server and stops the previous one.
 proxy=
 through() {
   [ -z "$proxy" ] || { kill "$proxy"; wait "$proxy" 2>/dev/null || true; }

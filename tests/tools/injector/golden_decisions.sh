@@ -1,12 +1,12 @@
 #!/bin/sh
 # SPDX-License-Identifier: Apache-2.0
-# golden_decisions.sh SOURCE_DIR SCRATCH_DIR PROGRAM: the decisions of PROGRAM (golden_decisions, as this build's compiler
-# made it) have the checksums in tests/golden/injector.sha256.
+# golden_decisions.sh SOURCE_DIR SCRATCH_DIR PROGRAM: compares the decisions of PROGRAM (this build's golden_decisions)
+# with the checksums in tests/golden/injector.sha256.
 #
-# golden_decisions.sh SOURCE_DIR SCRATCH_DIR --with COMPILER: so have those of the same sources compiled with COMPILER; exit
-# 77 (skipped) when it is not installed.
+# golden_decisions.sh SOURCE_DIR SCRATCH_DIR --with COMPILER: compiles the same sources with COMPILER and compares its
+# decisions. Exit code 77 (skipped) if the compiler is not installed.
 #
-# After a change that is meant: golden_decisions DIR && (cd DIR && sha256sum *.txt) > tests/golden/injector.sha256
+# To update after an intended change: golden_decisions DIR && (cd DIR && sha256sum *.txt) > tests/golden/injector.sha256
 set -eu
 source=$1 scratch=$2 program=$3
 mkdir -p "$scratch"

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Writes what the decision core decides, one file for each profile below, which together meet every model. The files
-// are the same for every compiler, C library and machine: tests/golden/injector.sha256 holds their checksums, and
-// golden_decisions.sh compares. A recorded run names its seed, so a change here breaks all that were recorded before.
+// Writes the decisions for each profile below to a file. Together the profiles use every model. The files are identical
+// for every compiler, C library and machine. tests/golden/injector.sha256 holds their checksums, which
+// golden_decisions.sh compares. A change here invalidates every recorded run, because such a run stores only its seed.
 #include <array>
 #include <cstdio>
 #include <cstdlib>
@@ -64,7 +64,7 @@ void write_decisions(const std::filesystem::path& file, const std::string& line)
   for (const Direction direction : {Direction::kUp, Direction::kDown}) {
     Injector injector(resolve_profile(line, direction), 42, 3, direction);
     out << to_string(injector.profile()) << "\ntables " << injector.table_hash() << "\n";
-    // Traffic: 0 to 2 ms apart, 2 to 1200 bytes, any content.
+    // Traffic: intervals of 0 to 2 ms, random payloads of 2 to 1200 bytes.
     const Draws traffic(1, 0, direction);
     LocalTime now(std::chrono::seconds(5));
     for (std::uint64_t i = 0; i < kDatagrams; ++i) {

@@ -112,7 +112,7 @@ LocalTime Injector::past_stalls(LocalTime at) const {
 std::optional<Cause> Injector::cause_of_loss(const Packet& packet, std::uint64_t index,
                                              std::optional<std::size_t> regime) {
   const Profile& p = network_.profile;
-  // Chains go on whatever else happens; that of a regime while it lasts.
+  // The profile's loss chain advances with every datagram, the chain of a regime only while that regime is active.
   LossModel* const special = regime && network_.regime_losses[*regime] ? &*network_.regime_losses[*regime] : nullptr;
   const bool plain_lost = network_.loss.lost(draws_, index);
   const bool lost = special != nullptr ? special->lost(draws_, index) : plain_lost;
@@ -141,7 +141,7 @@ Decision Injector::decide(const Packet& packet) {
   d.arrival = d.release = arrival;
   d.size = packet.size;
 
-  // Delays are drawn before the queue may refuse: a bottleneck shifts no draw.
+  // Delays are drawn before the queue can drop the datagram, so that the bottleneck does not shift any draw.
   const std::optional<std::size_t> regime = regimes_ ? std::optional(regimes_->at(arrival)) : std::nullopt;
   const auto drawn = [&](const QuantileTable& table, Copula& copula, Purpose purpose) {
     if (table.constant()) return Duration(table(0));

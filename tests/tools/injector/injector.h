@@ -20,117 +20,114 @@
 
 namespace tendon::injector {
 
-/// A datagram that enters the network.
 struct Packet {
   LocalTime arrival{};
   std::uint32_t size = 0;              ///< bytes of UDP payload
-  std::span<const std::byte> bytes{};  ///< the payload, for drop rules; may be empty: then no rule matches
+  std::span<const std::byte> bytes{};  ///< the payload, for drop rules; no rule matches if empty
 };
 
 enum class Verdict : std::uint8_t { kPass, kDrop, kDuplicate };
 
-/// Why a datagram met its fate: for a dropped one what dropped it, for one that passed what decided its release last.
+/// For a dropped datagram, what dropped it; for one that passed, the last step that determined its release time.
 enum class Cause : std::uint8_t {
   // passed
   kDelay,    ///< its own delay
-  kQueue,    ///< besides, it waited at the bottleneck
-  kStall,    ///< … and for the end of a stall
-  kFifo,     ///< … and for the one ahead
-  kReorder,  ///< it left ahead of its place
+  kQueue,    ///< waited at the bottleneck
+  kStall,    ///< waited for the end of a stall
+  kFifo,     ///< waited for its predecessor
+  kReorder,  ///< left early
   // dropped
   kQueueFull,
   kOutage,
   kHandover,
   kRule,
-  kRegime,  ///< the loss of the regime
+  kRegime,  ///< the loss model of the regime
   kLoss,
   // either
-  kReplay,  ///< a trace says so
+  kReplay,  ///< from a trace
 };
 
-/// "pass", "drop", "dup".
 std::string_view to_string(Verdict verdict) noexcept;
-/// "delay", "queue", "stall", "fifo", "reorder", "queue-full", "outage", "handover", "rule", "regime", "loss",
-/// "replay".
 std::string_view to_string(Cause cause) noexcept;
 std::optional<Verdict> parse_verdict(std::string_view text) noexcept;
 std::optional<Cause> parse_cause(std::string_view text) noexcept;
 
-/// The fate of one datagram, final when it is decided: at its arrival.
+/// The fate of one datagram, which is final on its arrival.
 struct Decision {
-  std::uint64_t index = 0;  ///< counts the datagrams of this direction of this link from 0
+  std::uint64_t index = 0;  ///< number of the datagram within its link and direction, from 0
   LocalTime arrival{};
   std::uint32_t size = 0;
   Verdict verdict = Verdict::kPass;
   Cause cause = Cause::kDelay;
-  LocalTime release{};                 ///< of the first copy; a dropped one has one too: when it would have left
-  std::optional<LocalTime> duplicate;  ///< release of the second copy, never before the first
-  /// Besides, whatever happens to this one, the payload of the datagram `back` before it (1, 2, …) leaves once more.
+  LocalTime release{};                 ///< release of the first copy; for a dropped datagram, when it would have left
+  std::optional<LocalTime> duplicate;  ///< release of the second copy, not before `release`
+  /// Sends the payload of the datagram `back` places earlier (1, 2, …) once more, independently of this datagram.
   struct Stale {
     LocalTime release{};
     std::uint32_t back = 0;
     bool operator==(const Stale&) const = default;
   };
   std::optional<Stale> stale;
-  std::optional<std::uint32_t> flipped_bit;   ///< of the payload: bit n % 8 of byte n/8; before it is cut
+  std::optional<std::uint32_t> flipped_bit;   ///< bit n % 8 of byte n / 8 of the payload before truncation
   std::optional<std::uint32_t> truncated_to;  ///< bytes
-  std::uint32_t rebinds = 0;                  ///< how often the source port has changed so far
+  std::uint32_t rebinds = 0;                  ///< number of changes of the source port so far
   bool operator==(const Decision&) const = default;
 };
 
-/// Decides the fate of each datagram of one direction of one link. Two kinds: Injector (a profile and a seed) and
-/// TracePlayer (recorded decisions).
+/// Decides the fate of each datagram of one direction of one link. Injector uses a profile and a seed, TracePlayer
+/// replays recorded decisions.
 class Decider {
  public:
   virtual ~Decider() = default;
   virtual Decision decide(const Packet& packet) = 0;
 };
 
-/// A replayable bad network in one direction: the same seed and the same arrivals give the same decisions, on every
-/// machine and compiler (integers over counter-based random numbers; no floating point, no libm).
+/// A reproducible network impairment in one direction. The same seed and the same arrivals give the same decisions on
+/// every
+/// machine and compiler, because it uses integers and counter-based random numbers, without floating point or libm.
 ///
-///     bottleneck  t₁ = when the queue has sent it                          — or kQueueFull, and nothing else happens
+///     bottleneck  t₁ = end of transmission from the queue, or kQueueFull and no further steps
 ///     delay       t₂ = t₁ + max(0, base + F⁻¹(u) + regime + step, ramp, spike, handover)
-///     stall       t₃ = t₂, or the end of the stall that t₂ falls into
-///     order       releaseₙ = max(releaseₙ₋₁, t₃)                           — fifo; free: t₃; a jump: earlier
+///     stall       t₃ = t₂, or the end of the stall that contains t₂
+///     order       releaseₙ = max(releaseₙ₋₁, t₃) for fifo, t₃ for free, an earlier time for a jump
 ///     loss        outage, handover, drop rules, the loss of the regime or else of the profile
 ///     copies      duplicate, stale replay; damage: flip, truncate
 ///
-/// Fields of a profile do not disturb each other. Each draws its own numbers for each datagram (see Draws), a datagram
-/// that is lost is lost at the end of the route (those behind it wait as if it had come through), and nobody waits for
-/// a second copy or for one that jumped: so adding loss, duplicates or damage to a profile leaves all other decisions
-/// as they were.
+/// The fields of a profile are independent. Each draws its own numbers for each datagram (see Draws). A lost datagram
+/// is
+/// lost at the end of the route, so its successors wait for it as for any other, and none waits for a second copy or a
+/// datagram that jumped. Adding loss, duplicates or damage to a profile therefore changes no other decision.
 ///
 /// Thread-safe: no.
 class Injector final : public Decider {
  public:
-  /// Throws std::invalid_argument as check(profile) does. The times of the profile count from `start`; when it is not
-  /// given, from the first arrival. Building the tables takes up to some milliseconds; copying an injector does not.
+  /// Throws std::invalid_argument as check(profile) does. The times of the profile count from `start`, or from the
+  /// first arrival if it is not given. Building the tables takes up to a few milliseconds; copying an injector does
+  /// not.
   Injector(const Profile& profile, std::uint64_t seed, std::uint32_t link, Direction direction,
            std::optional<LocalTime> start = std::nullopt);
 
-  /// The injector of another link, as if built for it, with the tables of this one. Only before the first decision.
+  /// Returns an injector for another link that shares the tables of this one. Call it only before the first decision.
   Injector for_link(std::uint32_t link) const;
-  /// … and the times of the profile count from `start`.
+  /// The times of the profile count from `start`.
   Injector for_link(std::uint32_t link, LocalTime start) const;
 
-  /// Arrivals should not go back in time; when they do, FIFO still holds. A datagram that does not fit into a
-  /// route of 60 s and its queue is not delayed further.
+  /// Arrivals should not decrease; if they do, FIFO order still holds. A datagram that exceeds a route of 60 s plus its
+  /// queue is not delayed further.
   Decision decide(const Packet& packet) override;
 
-  /// Another profile from now on, whose times count from `now`. Index, draws, queue, order and the states of correlated
-  /// delay and loss go on. Throws like the constructor, and then nothing has changed.
+  /// Switches to another profile, whose times count from `now`. Keeps the index, draws, queue, order and the states of
+  /// correlated delay and loss. Throws like the constructor, without any effect in that case.
   void change(const Profile& profile, LocalTime now);
-  /// The same with the profile and the tables of another injector: no table is built, and nothing is thrown.
+  /// Uses the profile and tables of another injector. Builds no tables and does not throw.
   void change(const Injector& prepared, LocalTime now);
 
   const Profile& profile() const { return network_.profile; }
 
-  /// Over all quantile tables in use: what a trace records to say what it was made with.
+  /// Hash of all quantile tables in use, which a trace records.
   std::uint64_t table_hash() const noexcept;
 
  private:
-  /// A profile made ready for deciding.
   struct Network {
     explicit Network(const Profile& profile);
     Profile profile;
@@ -163,11 +160,11 @@ class Injector final : public Decider {
   LocalTime start_{};
   std::optional<BottleneckQueue> bottleneck_;
   std::optional<RegimeChain> regimes_;
-  std::uint64_t next_visit_ = 0;  ///< of a regime, after those of profiles before this one
+  std::uint64_t next_visit_ = 0;  ///< next number of a visit to a regime, counted across profiles
   std::uint64_t next_index_ = 0;
-  std::uint32_t rebinds_before_ = 0;  ///< of profiles before this one
+  std::uint32_t rebinds_before_ = 0;  ///< by earlier profiles
   LocalTime last_release_ = LocalTime::min();
-  std::array<LocalTime, kMaxJump> releases_{};  ///< in their places, of the last ones, by index
+  std::array<LocalTime, kMaxJump> releases_{};  ///< ring buffer by index
 };
 
 }  // namespace tendon::injector

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// tendon-inject: a bad network that can be replayed, as a UDP proxy. command_line.cc has its options.
+// tendon-inject: a reproducible bad network as a UDP proxy. Options are in command_line.cc.
 #include <exception>
 #include <fstream>
 #include <iostream>
@@ -17,7 +17,7 @@
 namespace tendon::injector {
 namespace {
 
-/// One for each thing that can be asked for; returns the exit code.
+/// Runs each kind of task and returns the exit code.
 struct Runner {
   int operator()(const HelpTask& task) const {
     std::cout << task.text;

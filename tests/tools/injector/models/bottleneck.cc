@@ -58,7 +58,7 @@ LocalTime BottleneckQueue::sent_at_opportunities(LocalTime arrival, std::uint64_
   const std::uint64_t cycle = since_ms == 0 ? 0 : (since_ms - 1) / times.back();
   const auto in_cycle = std::ranges::lower_bound(times, since_ms - cycle * times.back());
   const std::uint64_t first = cycle * times.size() + static_cast<std::uint64_t>(in_cycle - times.begin());
-  if (first > opportunity_) {  // what the earlier ones had left is lost
+  if (first > opportunity_) {  // unused bytes of earlier opportunities are lost
     opportunity_ = first;
     bytes_left_ = kBytesPerOpportunity;
   }

@@ -11,20 +11,20 @@
 
 namespace tendon::injector {
 
-/// The narrowest place of a route: one datagram after the other, each for (size + overhead) · 8/rate, behind a bounded
-/// queue. Or at the opportunities of a Mahimahi trace, 1500 bytes at each.
+/// A bounded queue in front of a link that transmits one datagram at a time, for (size + overhead) · 8/rate. With a
+/// Mahimahi trace, the link instead sends 1500 bytes at each delivery opportunity.
 ///
 /// Thread-safe: no.
 class BottleneckQueue {
  public:
-  /// `bottleneck` must exist. The opportunities begin at `start`.
+  /// `bottleneck` must be enabled. The opportunities begin at `start`.
   BottleneckQueue(Bottleneck bottleneck, LocalTime start);
 
-  /// When a datagram that arrives now has passed; nothing when there is no room for it. `arrival` should not be earlier
-  /// than that of the call before; if it is, that of the call before counts.
+  /// Returns the end of transmission, or nullopt if the queue is full. An `arrival` before the previous one counts as
+  /// the previous one.
   std::optional<LocalTime> pass(LocalTime arrival, std::uint32_t size);
 
-  /// The datagrams in the queue of `before` are ahead of those to come.
+  /// Moves the datagrams in the queue of `before` to the head of this queue.
   void continue_from(BottleneckQueue&& before) noexcept;
 
  private:
@@ -35,11 +35,11 @@ class BottleneckQueue {
   Bottleneck bottleneck_;
   LocalTime start_;
   LocalTime last_arrival_;
-  LocalTime free_;                 ///< when all of the queue has left
-  std::uint64_t remainder_ = 0;    ///< of the division by the rate: what free_ is too early by, in units of 1 ns/rate
-  std::uint64_t opportunity_ = 0;  ///< the one in use, counted from the start through all repetitions
-  std::uint64_t bytes_left_;       ///< … of it
-  std::deque<std::pair<LocalTime, std::uint64_t>> waiting_;  ///< when each will have left, and its bytes
+  LocalTime free_;                 ///< when the queue is empty
+  std::uint64_t remainder_ = 0;    ///< remainder of the division by the rate, in units of 1 ns/rate, which free_ lacks
+  std::uint64_t opportunity_ = 0;  ///< current one, counted from the start through all repetitions
+  std::uint64_t bytes_left_;       ///< of the current opportunity
+  std::deque<std::pair<LocalTime, std::uint64_t>> waiting_;  ///< departure time and bytes of each datagram
   std::uint64_t bytes_waiting_ = 0;
 };
 

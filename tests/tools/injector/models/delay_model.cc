@@ -24,10 +24,10 @@ constexpr std::int64_t kMost = kMaxDelay.count();
 
 double ns(Duration d) { return static_cast<double>(d.count()); }
 
-/// The standard normal deviation with the share p below and q above.
+/// Standard normal quantile for the probability p below and q above.
 double deviate(double p, double q) { return p < q ? exact::normal_quantile(p) : -exact::normal_quantile(q); }
 
-/// One piece for each entry of positive weight; `width(i)` is the number of whole values that it spreads over.
+/// One piece for each entry of positive weight, which covers `width(i)` integer values.
 template <typename Width>
 QuantileTable weighted(const std::vector<Weighted>& entries, Width width) {
   double total = 0;
@@ -35,12 +35,12 @@ QuantileTable weighted(const std::vector<Weighted>& entries, Width width) {
   std::vector<Piece> pieces;
   double sum = 0;
   for (std::size_t i = 0; i < entries.size(); ++i) {
-    // Scaling by 2⁶⁴ is exact, and before the last entry of positive weight the sum is below the total.
+    // Scaling by 2⁶⁴ is exact, and the sum stays below the total before the last entry of positive weight.
     const double share = sum / total;
     sum += entries[i].weight;
     if (entries[i].weight == 0 || share >= 1) continue;
     const auto from = static_cast<std::uint64_t>(share * 0x1p64);
-    if (!pieces.empty() && from <= pieces.back().from) pieces.pop_back();  // too rare to ever be drawn
+    if (!pieces.empty() && from <= pieces.back().from) pieces.pop_back();  // probability below 2⁻⁶⁴
     pieces.push_back({from, entries[i].value.count(), width(i)});
   }
   pieces.front().from = 0;
@@ -79,7 +79,7 @@ struct Tabulate {
     return weighted(d.bins, [&](std::size_t i) -> std::uint64_t {
       const std::size_t n = d.bins.size();
       if (n == 1) return 1;
-      const std::size_t lower = std::min(i, n - 2);  // the last is as wide as the one before it
+      const std::size_t lower = std::min(i, n - 2);  // the last bin is as wide as its predecessor
       return static_cast<std::uint64_t>((d.bins[lower + 1].value - d.bins[lower].value).count());
     });
   }
@@ -99,15 +99,15 @@ constexpr std::int64_t kOneZ = std::int64_t{1} << kZBits;
 constexpr int kRhoBits = 30;
 constexpr std::int64_t kOneRho = std::int64_t{1} << kRhoBits;
 
-/// Φ⁻¹ in units of 2⁻²⁹, within ±7.04 (where the table ends).
+/// Φ⁻¹ in units of 2⁻²⁹, within ±7.04 (the end of the table).
 const QuantileTable& normal_table() {
   static const QuantileTable kTable =
       tabulate([](double p, double q) { return deviate(p, q) * static_cast<double>(kOneZ); }, -8 * kOneZ, 8 * kOneZ);
   return kTable;
 }
 
-/// 1 − Φ(z) in units of 2⁻⁶⁴ at z = i/256: linear in between it errs by less than 5e-7, and by less than 1e-4 of
-/// itself.
+/// 1 − Φ(z) in units of 2⁻⁶⁴ at z = i/256. Linear interpolation has an absolute error below 5e-7 and a relative error
+/// below 1e-4.
 constexpr int kTailStepBits = 8;
 constexpr std::size_t kTailPoints = 8 * (1 << kTailStepBits) + 1;
 
@@ -146,7 +146,7 @@ const std::vector<std::int64_t>& power_table() {
   return kTable;
 }
 
-/// ⌊√n⌋: Newton's method from above.
+/// ⌊√n⌋ by Newton's method from above.
 std::uint64_t integer_root(std::uint64_t n) {
   if (n == 0) return 0;
   std::uint64_t root = std::uint64_t{1} << ((std::bit_width(n) + 1) / 2);
@@ -157,8 +157,7 @@ std::uint64_t integer_root(std::uint64_t n) {
   }
 }
 
-/// What tells a smooth distribution from others of its kind. Nothing for the rest, whose tables are made as fast as
-/// they would be found.
+/// Cache key: the parameters of a smooth distribution, or nullopt for the others, whose tables are cheap to build.
 using Numbers = std::array<std::int64_t, 2>;
 struct NumbersOf {
   std::optional<Numbers> operator()(const NormalDelay& d) const { return {{d.mean.count(), d.deviation.count()}}; }
@@ -179,7 +178,7 @@ struct NumbersOf {
 QuantileTable delay_table(const Delay& delay) {
   const auto numbers = std::visit(NumbersOf{}, delay);
   if (!numbers) return std::visit(Tabulate{}, delay);
-  constexpr std::size_t kMostKept = 256;  // of 150 kB
+  constexpr std::size_t kMostKept = 256;  // tables of 150 kB
   thread_local std::map<std::pair<std::size_t, Numbers>, QuantileTable> kept;
   const auto name = std::pair(delay.index(), *numbers);
   const auto found = kept.find(name);

@@ -6,13 +6,13 @@
 
 namespace tendon::injector {
 
-/// Which way a datagram goes. The value is part of every recorded run.
+/// The values are stored in recorded runs.
 enum class Direction : std::uint8_t {
   kUp = 0,    ///< client to server
   kDown = 1,  ///< server to client
 };
 
-/// What a random number decides. The value is part of every recorded run: never reuse or renumber one.
+/// The decision that a random number makes. Recorded runs depend on the values: never reuse or renumber one.
 enum class Purpose : std::uint32_t {
   kDelay = 1,
   kLoss = 2,
@@ -32,16 +32,16 @@ enum class Purpose : std::uint32_t {
   kRegimeLoss = 16,
   kRegimeLossState = 17,
   kHandover = 18,
-  kRule = 256,  ///< … and upwards, one for each rule
+  kRule = 256,  ///< this and larger values: one for each rule
 };
 
 /// Philox4x32-10 (Salmon, Moraes, Dror, Shaw, "Parallel random numbers: as easy as 1, 2, 3", SC'11): 128 random bits
-/// for each counter and key, without state. The tests hold the known answers that its authors publish (Random123).
+/// for each counter and key, without state. The tests check the known answers of its authors (Random123).
 std::array<std::uint32_t, 4> philox4x32(std::array<std::uint32_t, 4> counter,
                                         std::array<std::uint32_t, 2> key) noexcept;
 
-/// The random numbers of one direction of one link: 64 uniform bits for each (purpose, index). Nothing that is drawn
-/// elsewhere, by another model, packet, direction or link, moves them, because there is no stream to shift:
+/// The random numbers of one direction of one link: 64 uniform bits for each (purpose, index). Draws by other models,
+/// packets, directions or links cannot shift them, because there is no stream:
 ///
 ///     key     = seed
 ///     counter = (index low, index high, purpose · 2 + direction, link)
@@ -60,8 +60,8 @@ class Draws {
   std::uint32_t direction_;
 };
 
-/// An event of a given probability p in 0…1, decided by 64 uniform bits: it happens when they are below p · 2⁶⁴. So
-/// whatever happens at p happens at every larger p, and 0 is never and 1 is always.
+/// A Bernoulli trial with probability p in 0…1 on 64 uniform bits: true if they are below p · 2⁶⁴. A draw that succeeds
+/// at p therefore succeeds at every larger p. p = 0 never succeeds and p = 1 always does.
 class Chance {
  public:
   // Scaling by 2⁶⁴ is exact: only the exponent changes.
@@ -76,7 +76,7 @@ class Chance {
   std::uint64_t below_;
 };
 
-/// A whole number in 0 … n − 1 from 64 uniform bits; n above zero. None is likelier than another by more than n/2⁶⁴.
+/// Maps 64 uniform bits to 0 … n − 1 for n > 0. The probabilities differ by at most n/2⁶⁴.
 std::uint64_t one_of(std::uint64_t n, std::uint64_t draw) noexcept;
 
 }  // namespace tendon::injector

@@ -54,7 +54,7 @@ constexpr double kF[] = {1.0,
                          1.42151175831644588870e-7,
                          2.04426310338993978564e-15};
 
-/// ln Γ(x) for x above zero: Stirling's series from 10 upwards, Γ(x) = Γ(x + 1)/x below.
+/// ln Γ(x) for x > 0: Stirling's series for x ≥ 10, and the recurrence Γ(x) = Γ(x + 1)/x below.
 double log_gamma(double x) noexcept {
   double product = 1;
   for (; x < 10; x += 1) product *= x;
@@ -63,8 +63,8 @@ double log_gamma(double x) noexcept {
   return (x - 0.5) * log(x) - x + kHalfLogTwoPi + polynomial(1 / (x * x), kStirling) / x - log(product);
 }
 
-/// P(a, x) and Q(a, x) = 1 − P: the shares of the gamma distribution below and above x. One of them is summed, the
-/// smaller one as far as may be: the series of P below x = a + 1, the continued fraction of Q above (Lentz's method).
+/// P(a, x) and Q(a, x) = 1 − P: the regularized incomplete gamma functions. Computes the smaller one where possible:
+/// the series of P below x = a + 1, the continued fraction of Q above it (Lentz's method).
 struct Shares {
   double below;
   double above;
@@ -123,21 +123,22 @@ double normal_tail(double z) noexcept {
     }
     return 0.5 - density * sum;
   }
-  double fraction = z;  // Laplace: φ(z)/(z + 1/(z + 2/(z + 3/(z + …)))), from its far end
+  double fraction = z;  // Laplace: φ(z)/(z + 1/(z + 2/(z + 3/(z + …)))), evaluated backward
   for (double n = 200; n > 0; --n) fraction = z + n / fraction;
   return density / fraction;
 }
 
 double gamma_quantile(double shape, double p, double q) noexcept {
   const double log_gamma_shape = log_gamma(shape);
-  // Near zero P = x^a/Γ(a + 1) alone. Elsewhere Wilson and Hilferty (1931): the cube root is nearly normal.
+  // Initial value: near zero the leading term P = x^a/Γ(a + 1), elsewhere Wilson and Hilferty (1931), by whom the cube
+  // root is approximately normal.
   double y = (log(p) + log_gamma_shape + log(shape)) / shape;  // y = ln x
   if (y < -690) return 0;
   const double ninth = 1 / (9 * shape);
   const double root = 1 - ninth + (p < q ? normal_quantile(p) : -normal_quantile(q)) * std::sqrt(ninth);
   if (shape > 0.5 && root > 0.1) y = log(shape * root * root * root);
   y = std::min(y, log(shape + 40 * (1 + std::sqrt(shape))));
-  // Newton on the logarithm of the smaller share: both logarithms are concave, so it does not overshoot far.
+  // Newton's method on the logarithm of the smaller probability. Both logarithms are concave, which limits overshoot.
   for (int i = 0; i < 60; ++i) {
     const double x = exp(y);
     const Shares shares = gamma_shares(shape, x, log_gamma_shape);
@@ -145,7 +146,7 @@ double gamma_quantile(double shape, double p, double q) noexcept {
     const double share = p < q ? shares.below : shares.above;
     const double step = share / slope * (p < q ? log(p / share) : log(share / q));
     y += std::clamp(step, -2.0, 2.0);
-    if (std::abs(step) < 1e-6) break;  // then the next one is about 1e-12
+    if (std::abs(step) < 1e-6) break;  // the next step would be about 1e-12
   }
   return y < -690 ? 0 : exp(y);
 }

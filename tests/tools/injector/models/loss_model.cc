@@ -29,7 +29,7 @@ LossModel::LossModel(const Loss& loss, Purpose event, Purpose state) : event_(ev
     rows_[3] = {kSure, kSure, kSure};
     loss_in_[2] = loss_in_[3] = Chance(1);
     const double d = p23 * p31 + p13 * p23 + p13 * p32 + p14 * p23 * p31;
-    // When bursts do not exist (p13 = 0), neither do states 2 and 3, whatever p23 and p31 are.
+    // If p13 = 0, there are no bursts, and states 2 and 3 are unreachable for every p23 and p31.
     const double gap = p13 > 0 ? p23 * p31 / d : 1 / (1 + p14);
     const double alone = gap * p14;
     const double received = p13 > 0 ? p13 * p32 / d : 0;

@@ -10,10 +10,10 @@
 
 namespace tendon::injector {
 
-/// Decides datagram by datagram who is lost; see the types of Loss in profile.h for what each does.
+/// Decides which datagrams are lost. The types of Loss in profile.h define the models.
 ///
-/// Random loss is the first draw below p, so that more loss loses the same datagrams and more. The chains are Markov:
-/// a state, and for each state the chances of what comes next.
+/// Random loss compares the first draw with p, so a higher p loses a superset of the datagrams. The other models are
+/// Markov chains with a row of transition probabilities for each state.
 ///
 /// Thread-safe: no.
 class LossModel {
@@ -21,10 +21,10 @@ class LossModel {
   /// `event` and `state` are the purposes of its two draws.
   LossModel(const Loss& loss, Purpose event, Purpose state);
 
-  /// To be asked for each datagram, lost or not: the chain goes on by one.
+  /// Must be called for each datagram, lost or not, because it advances the chain.
   bool lost(const Draws& draws, std::uint64_t index) noexcept;
 
-  /// Goes on from the state of `before`, where that is a chain of the same kind.
+  /// Takes over the state of `before` if that is a chain of the same kind.
   void continue_from(const LossModel& before) noexcept;
 
  private:
@@ -35,7 +35,7 @@ class LossModel {
   Purpose state_draw_;
   Kind kind_ = Kind::kNever;
   Chance random_{0};
-  /// Chances, added up, that the next state is 0, at most 1, at most 2; else it is 3.
+  /// Cumulative probabilities that the next state is 0, at most 1, at most 2; otherwise it is 3.
   using Row = std::array<Chance, 3>;
   static constexpr Chance kNo = Chance(0);
   static constexpr Chance kSure = Chance(1);

@@ -12,10 +12,10 @@ namespace tendon::injector {
 namespace {
 
 constexpr int kBodyBits = 12;    // 4096 cells
-constexpr int kTailFrom = 8;     // below 2⁻⁸ …
-constexpr int kTailTo = 40;      // … down to 2⁻⁴⁰
-constexpr int kTailCells = 16;   // for each halving
-constexpr int kSlopeScale = 26;  // a width below 2³⁷ and a normalized length of 2⁶³ leave that many bits
+constexpr int kTailFrom = 8;     // from a tail probability of 2⁻⁸
+constexpr int kTailTo = 40;      // down to 2⁻⁴⁰
+constexpr int kTailCells = 16;   // for each halving of the tail probability
+constexpr int kSlopeScale = 26;  // the bits left by a width below 2³⁷ and a normalized length of 2⁶³
 constexpr std::size_t kMaxGuideBits = 13;
 
 }  // namespace
@@ -92,7 +92,7 @@ QuantileTable tabulate(const std::function<double(double p, double q)>& quantile
     knots.push_back({0 - static_cast<std::uint64_t>(*v * 0x1p64), whole(1 - *v, *v), 1});
   }
   for (std::size_t i = 0; i + 1 < knots.size(); ++i) {
-    knots[i + 1].least = std::max(knots[i].least, knots[i + 1].least);  // a last bit may be wrong
+    knots[i + 1].least = std::max(knots[i].least, knots[i + 1].least);  // the last bit can be wrong
     knots[i].width = std::max<std::uint64_t>(1, static_cast<std::uint64_t>(knots[i + 1].least - knots[i].least));
   }
   knots.insert(knots.begin(), {0, knots.front().least, 1});

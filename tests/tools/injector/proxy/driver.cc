@@ -20,26 +20,26 @@
 namespace tendon::injector {
 namespace {
 
-// What an event of epoll is about; everything else is a ClientIndex.
+// Data of an epoll event. Smaller values are a ClientIndex.
 constexpr std::uint64_t kListener = std::uint64_t{1} << 32;
 constexpr std::uint64_t kTimer = kListener + 1;
 constexpr std::uint64_t kBell = kListener + 2;
 
-/// People look a few times per second, and copying the histograms takes some 10 µs …
+/// Copying the histograms takes some 10 µs, and a display needs only a few updates per second.
 constexpr Duration kPublishPeriod = std::chrono::milliseconds(200);
-/// … for which there should be time before the next release.
+/// Publishes only if the next release is at least this far away.
 constexpr Duration kPublishRoom = std::chrono::microseconds(100);
 
-/// The time until the next address is tried. A client repeats its Hello every 100 ms.
+/// Time without an answer before the next address is tried. A client repeats its Hello every 100 ms.
 constexpr Duration kServerPatience = std::chrono::milliseconds(500);
 
-/// Whether one system call can send both.
+/// Returns true if one system call can send both.
 bool by_the_same_socket(const TraceRecord& a, const TraceRecord& b) {
   if (a.direction != b.direction) return false;
   return a.direction == Direction::kDown || (a.link == b.link && a.rebinds == b.rebinds);
 }
 
-/// A hundred probes a second tell p99 within a few seconds, and cost a tenth of the wake-ups of a haptic loop.
+/// 100 probes per second give a p99 within a few seconds and add a tenth of the wake-ups of a haptic loop.
 constexpr Duration kProbePeriod = std::chrono::milliseconds(10);
 
 int checked(int result, const char* what) {
@@ -55,7 +55,7 @@ Driver::Driver(const Config& config, TraceRecorder* recorder)
       recorder_(recorder),
       listener_(UdpBatch::listening(config.listen)),
       epoll_(checked(::epoll_create1(EPOLL_CLOEXEC), "epoll_create1")),
-      // A timer of its own: the timeouts of poll and epoll are rounded up by 0.1 % of their length.
+      // Uses a timerfd, because timeouts of poll and epoll are extended by 0.1 % of their length.
       timer_(checked(::timerfd_create(CLOCK_MONOTONIC, TFD_NONBLOCK | TFD_CLOEXEC), "timerfd_create")),
       bell_(checked(::eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC), "eventfd")) {
   for (const Address& server : config.servers) UdpBatch::connected(server);  // or throws now, and not for a client
@@ -126,7 +126,6 @@ void Driver::run() {
 }
 
 void Driver::wait(LocalTime now) {
-  // Whatever comes first is what we are woken for.
   const std::optional<LocalTime> due = proxy_.next_wake();
   if (!probe_ && now >= next_probe_) probe_ = now + last_sleep_;
   LocalTime at = std::min(next_publish_, end_);
@@ -159,7 +158,7 @@ void Driver::wait(LocalTime now) {
   }
   if (timer_rang && why != Wake::kOther) now = monotonic_now();
   if (timer_rang && why == Wake::kProbe) timer_floor_.observe(now - at);
-  if (probe_ && now >= *probe_) {  // observed, or in vain: something else was going on at its time
+  if (probe_ && now >= *probe_) {  // taken, or obsolete because the thread was busy at that time
     probe_.reset();
     next_probe_ = now + kProbePeriod;
   }
@@ -184,7 +183,7 @@ void Driver::receive(std::uint64_t source) {
       proxy_.receive_from_server(client, arrival.datagram, arrival.at);
     }
   }
-  // Those that are due must not wait until all sockets have been read.
+  // Releases due datagrams between the sockets, so that they do not wait until all are read.
   send_due(monotonic_now());
 }
 
@@ -240,7 +239,7 @@ LocalTime Driver::send_due(LocalTime now) {
       due_.push_back(*next);
     }
     if (due_.empty()) return now;
-    // One system call for all that leave by the same socket: that of the first one not yet sent.
+    // One system call sends all datagrams that share the socket of the first unsent one.
     std::bitset<kUdpBatch> sent;
     for (std::size_t first = 0; first < due_.size(); ++first) {
       if (!sent.test(first)) sent |= send_with(first, sent);
@@ -266,8 +265,8 @@ std::bitset<kUdpBatch> Driver::send_with(std::size_t first, const std::bitset<kU
   const Duration took = monotonic_now() - begin;
   for (std::size_t k = 0; k < count; ++k) {
     const Proxy::Departure& departure = due_[places[k]];
-    // A datagram leaves when the kernel turns to it: the call takes them one after the other. Its work from then
-    // until the receiver wakes counts as the network's time, not ours.
+    // The kernel processes the datagrams of a call one by one, so their departures are spread evenly over its duration.
+    // The time from then until the receiver wakes counts as network time.
     const LocalTime left = begin + took * static_cast<std::int64_t>(k) / static_cast<std::int64_t>(count);
     refused.test(k) ? proxy_.not_sent(departure) : proxy_.left(departure, left);
   }

@@ -20,57 +20,58 @@
 
 namespace tendon::injector {
 
-/// The real network around a Proxy: sockets, the clock, and one thread that does nothing but take datagrams and release
-/// them when they are due. It never prints, opens no file, builds no tables and waits for no lock.
+/// Connects a Proxy to sockets and the clock. One thread receives datagrams and releases them when they are due. It
+/// does not print, open files, build tables or wait for a lock.
 class Driver {
  public:
   struct Config {
     Address listen;
-    /// The addresses of the server, in order of preference. They are tried in turn, for half a second each, until the
-    /// server answers.
+    /// The addresses of the server, in order of preference. Each is tried for half a second in turn until the server
+    /// answers.
     std::vector<Address> servers;
     Proxy::Config proxy;
 
-    /// Awake for this long before each release instead of asleep: exact, at the price of the processor. Zero: asleep.
+    /// Busy-waits for this long before each release, which is more exact but uses the processor. Zero: sleeps until the
+    /// release.
     Duration spin{};
 
-    /// Priority 1…99 of SCHED_FIFO for the thread that runs.
+    /// Priority 1…99 of SCHED_FIFO for the thread that calls run().
     std::optional<int> realtime = {};
 
-    /// Ends the run; none: until stop().
+    /// None: runs until stop().
     std::optional<Duration> duration = {};
   };
 
-  /// Opens the sockets. Throws std::runtime_error as UdpBatch does, std::invalid_argument as Proxy does. `recorder`,
-  /// when there is one, must outlive the driver and gets every decision.
+  /// Opens the sockets. Throws std::runtime_error as UdpBatch does and std::invalid_argument as Proxy does. `recorder`
+  /// can be null; it receives every decision and must outlive the driver.
   Driver(const Config& config, TraceRecorder* recorder);
   ~Driver();
   Driver(const Driver&) = delete;
   Driver& operator=(const Driver&) = delete;
 
-  /// Takes and releases datagrams until the duration is over or stop() is called. Throws std::system_error when the
-  /// system refuses what it needs: a priority, a descriptor.
+  /// Receives and releases datagrams until the duration has elapsed or stop() is called. Throws std::system_error if
+  /// the system refuses a priority or a descriptor.
   void run();
 
-  // From any other thread, while run() runs, before or after it:
+  // The following functions can be called from other threads, before, during and after run().
 
-  /// Async-signal-safe, too.
+  /// Async-signal-safe.
   void stop() noexcept;
-  /// Another network from now on.
+  /// Switches to another network.
   void change(Proxy::PreparedChange change);
-  /// As it was at most 0.2 s ago; complete when run() has returned.
+  /// At most 0.2 s old; final after run() has returned.
   Status status() const;
 
-  /// Where clients send to; the port is the real one.
+  /// The address for clients, with the actual port.
   Address local_address() const { return listener_.local_address(); }
 
  private:
   struct Upstream {
     UdpBatch socket;
     std::uint32_t rebinds = 0;
-    Address asked_at{};  ///< the local address that the client uses, if the listener is bound to all addresses
+    Address asked_at{};  ///< the local address to which the client sends, if the listener is bound to all addresses
   };
-  /// Why the timer is set.
+  /// What the timer is set for.
   enum class Wake : std::uint8_t { kOther, kRelease, kProbe };
 
   void wait(LocalTime now);
@@ -94,15 +95,15 @@ class Driver {
   UdpBatch listener_;
   UdpBatch::Inbox inbox_;
   std::unordered_map<ClientIndex, Upstream> upstreams_;
-  std::uint64_t closed_overflowed_ = 0;  // of upstream sockets that are no more
-  std::size_t server_ = 0;               // in use, of config_.servers
-  std::uint64_t asked_before_ = 0;       // the number of datagrams sent to the server at the last change of the address
-  LocalTime next_server_{};              // the time of the next change, if there is no answer
-  std::string no_socket_;                // the first error from the system
+  std::uint64_t closed_overflowed_ = 0;  // by upstream sockets that have been closed
+  std::size_t server_ = 0;               // index in config_.servers
+  std::uint64_t asked_before_ = 0;       // datagrams sent to the server when the address last changed
+  LocalTime next_server_{};              // when to try the next address
+  std::string no_socket_;                // the first error
   std::uint64_t late_rebinds_ = 0;
   int epoll_ = -1;
   int timer_ = -1;
-  int bell_ = -1;  // rung by stop() and change()
+  int bell_ = -1;  // eventfd, signaled by stop() and change()
 
   LocalTime start_{};
   LocalTime end_ = LocalTime::max();
@@ -111,12 +112,12 @@ class Driver {
   std::vector<TraceRecord> records_;
 
   DurationHistogram timer_floor_;
-  LocalTime next_probe_{};                              // not before
-  std::optional<LocalTime> probe_;                      // when the timer is to wake us for nothing
+  LocalTime next_probe_{};                              // earliest time
+  std::optional<LocalTime> probe_;                      // time of a wake-up that measures the timer's own latency
   Duration last_sleep_ = std::chrono::milliseconds(1);  // before the last release
 
   std::atomic<bool> stop_ = false;
-  mutable std::mutex mutex_;  // of what follows
+  mutable std::mutex mutex_;  // protects the members below
   std::vector<Proxy::PreparedChange> changes_;
   Status status_;
 };

@@ -11,7 +11,7 @@
 namespace tendon::injector {
 namespace {
 
-/// Written in pieces of this size.
+/// Bytes buffered before each write.
 constexpr std::size_t kPiece = 1 << 16;
 
 void append(std::string& text, std::integral auto number) {
@@ -63,7 +63,7 @@ void append_text(std::string& text, const TraceRecord& record) {
   text += '\n';
 }
 
-/// What decides in one direction, and the changes that a timeline makes to it.
+/// The decider of one direction with its timeline.
 class Way {
  public:
   Way(const PreparedNetwork& network, Direction direction) : timeline_(network.timeline), direction_(direction) {
@@ -117,7 +117,7 @@ void dry_run(const PreparedNetwork& network, const DryRun& options, std::ostream
     if (text.size() < kPiece) continue;
     out << text;
     text.clear();
-    if (!out) return;  // whoever reads has had enough
+    if (!out) return;  // the reader has closed the pipe
   }
   out << text << std::flush;
 }

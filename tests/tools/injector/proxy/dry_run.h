@@ -8,18 +8,19 @@
 
 namespace tendon::injector {
 
-/// The decisions alone, without sockets and in no time: what a network would do to packets of one size at one rate.
+/// Runs the decisions alone, without sockets or waiting, on packets of one size at one rate.
 struct DryRun {
-  std::uint64_t count = 10'000;  ///< packets in all, up and down by turns
-  std::uint64_t rate_hz = 1000;  ///< of each direction, 1…10⁹
-  std::uint32_t bytes = 200;     ///< of payload
+  std::uint64_t count = 10'000;  ///< total, alternating between up and down
+  std::uint64_t rate_hz = 1000;  ///< in each direction, 1…10⁹
+  std::uint32_t bytes = 200;     ///< payload
   bool json = false;
 };
 
 /// Writes one line per packet, in the order of sending. As JSON:
 ///     {"dir":"up","index":0,"t_in_ns":0,"verdict":"pass","cause":"delay","t_out_ns":20123456}
-/// t_out_ns is null for a dropped one; of one that is duplicated it is that of the first copy. Everything also goes to
-/// `trace`, unless that is null. Times count from the first packet.
+/// t_out_ns is null for a dropped packet, and the time of the first copy for a duplicated one. Times count from the
+/// first
+/// packet. Also writes all decisions to `trace` unless it is null.
 void dry_run(const PreparedNetwork& network, const DryRun& options, std::ostream& out, TraceWriter* trace);
 
 }  // namespace tendon::injector

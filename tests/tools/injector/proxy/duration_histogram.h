@@ -9,21 +9,22 @@
 
 namespace tendon::injector {
 
-/// How a length of time is distributed, in fixed memory: release errors, one-way delays, the timer's own lateness.
-/// Quantiles are exact below 64 ns and at most 1/32 too high above (32 buckets for each power of two, the upper edge is
-/// returned); the maximum is exact. Negative lengths count as zero.
+/// A histogram of durations in fixed memory. Quantiles are exact below 64 ns and at most 1/32 too high above: there are
+/// 32 buckets for each power of two, and the upper edge is returned. The maximum is exact. Negative durations count as
+/// zero.
 ///
 /// Thread-safe: no.
 class DurationHistogram {
  public:
   void observe(Duration length) noexcept;
 
-  /// The length that a share `q` (0…1) of them did not exceed; zero when there were none.
+  /// Returns the q-quantile (q in 0…1), or zero if the histogram is empty.
   Duration quantile(double q) const noexcept;
   Duration max() const noexcept { return max_; }
   std::uint64_t count() const noexcept { return count_; }
 
-  /// What was observed since `earlier`, an earlier copy of this one. Its maximum is the upper edge of a bucket.
+  /// Returns the observations since `earlier`, a previous copy of this histogram. Its maximum is the upper edge of a
+  /// bucket.
   DurationHistogram since(const DurationHistogram& earlier) const noexcept;
 
  private:

@@ -17,13 +17,13 @@
 
 namespace tendon::injector {
 
-/// The newest datagrams of one direction of one link, from which a stale replay takes its bytes. Keep one only where
-/// the profile replays: it copies every datagram.
+/// The most recent datagrams of one direction of one link, for stale replays. It copies every datagram, so use it only
+/// if the profile has replays.
 ///
 /// Thread-safe: no.
 class History {
  public:
-  /// The furthest back that a replay can reach.
+  /// The maximum distance of a replay, in datagrams.
   static constexpr std::size_t kDepth = kMaxReplayDepth;
 
   void remember(std::span<const std::byte> datagram) {
@@ -31,8 +31,7 @@ class History {
     place.assign(datagram.begin(), datagram.end());
   }
 
-  /// The datagram remembered `back` calls ago, 1 being the newest; empty when that is further than kDepth or than the
-  /// beginning.
+  /// Returns the datagram added `back` calls ago (1 is the newest), or nullopt if it is not available.
   std::optional<std::span<const std::byte>> back(std::size_t back) const {
     if (back == 0 || back > kDepth || back > count_) return std::nullopt;
     return ring_[(count_ - back) % kDepth];
@@ -43,32 +42,32 @@ class History {
   std::size_t count_ = 0;
 };
 
-/// Which of the datagrams that one decision may send on their way.
+/// The datagrams that one decision can send.
 enum class Copy : std::uint8_t {
-  kFirst,   ///< the datagram itself, damaged where the decision says so
-  kSecond,  ///< its duplicate, whole: copies are made before the damage
-  kStale,   ///< an earlier datagram once more, whole, even one that had been lost
+  kFirst,   ///< the datagram itself, with the damage of the decision
+  kSecond,  ///< its undamaged duplicate
+  kStale,   ///< an earlier datagram, undamaged, even if it was lost
 };
 
-/// Datagrams on their way, in order of due time; those due at the same time leave in the order in which they were
-/// launched. Carries out a Decision: copies, stale replays, truncation and bit flips. What `Tag` holds comes out with
-/// the datagram: where it goes, for whoever sends it.
+/// The datagrams in flight, ordered by due time and then by launch. Applies a Decision: copies, stale replays,
+/// truncation and bit flips. `Tag` is data of the sender, for example the destination, and is returned with the
+/// datagram.
 ///
-/// No allocation once warm: places and buffers (of powers of two, 64 bytes … 64 kB) are used again.
+/// Does not allocate in the steady state, because it reuses slots and buffers (powers of two, 64 bytes … 64 kB).
 ///
 /// Thread-safe: no.
 template <class Tag>
 class Flight {
  public:
-  /// 64 MB hold the longest delay (60 s) at 1 kHz in both directions with 400-byte datagrams.
+  /// 64 MB suffice for the longest delay (60 s) at 1 kHz in both directions with 400-byte datagrams.
   static constexpr std::size_t kDefaultMaxBytes = std::size_t{64} << 20;
 
-  /// `max_bytes`: what may be on its way at one time, buffers and bookkeeping; more is refused.
+  /// `max_bytes` limits buffers and bookkeeping of the datagrams in flight.
   explicit Flight(std::size_t max_bytes = kDefaultMaxBytes) : max_bytes_(max_bytes) {}
 
-  /// Sends on their way what `decision` lets through of `datagram`: nothing, the datagram, or copies besides.
-  /// `history` is that of the datagram's own direction and link; null means that nothing is replayed. A copy that does
-  /// not fit into the memory is left out. False when the datagram itself did not fit.
+  /// Queues the copies of `datagram` for which `decision` asks. `history` belongs to the direction and link of the
+  /// datagram; null disables stale replays. Omits a copy that exceeds the memory limit. Returns false if the datagram
+  /// itself exceeded it.
   bool launch(const Decision& decision, std::span<const std::byte> datagram, const Tag& tag,
               History* history = nullptr) {
     bool fits = true;
@@ -76,7 +75,7 @@ class Flight {
       const std::size_t size = std::min<std::size_t>(datagram.size(), decision.truncated_to.value_or(UINT32_MAX));
       std::byte* const bytes = take_off(datagram.first(size), decision.release, Copy::kFirst, tag);
       fits = bytes != nullptr;
-      // A bit that was cut off, or that a recorded decision flips in a shorter datagram, is not there to be flipped.
+      // The bit can be missing after truncation, or if a recorded decision meets a shorter datagram.
       if (fits && decision.flipped_bit && *decision.flipped_bit / 8 < size) {
         bytes[*decision.flipped_bit / 8] ^= std::byte{1} << (*decision.flipped_bit % 8);
       }
@@ -93,10 +92,10 @@ class Flight {
   struct Departure {
     Tag tag;
     Copy copy{};
-    LocalTime due{};                      ///< when it should leave
+    LocalTime due{};
     std::span<const std::byte> datagram;  ///< valid until the next launch
   };
-  /// Takes out the next datagram that is due at `now`; empty when there is none.
+  /// Removes and returns the next datagram due at `now`, or nullopt.
   std::optional<Departure> next_due(LocalTime now) {
     if (heap_.empty() || heap_.front().due > now) return std::nullopt;
     const Waiting next = heap_.front();
@@ -106,25 +105,25 @@ class Flight {
     free_places_.push_back(next.place);
     bytes_ -= cost(place.size_class);
     Departure departure{place.tag, place.copy, next.due, {place.buffer.get(), place.size}};
-    // The bytes stay as they are until a launch takes this buffer again.
+    // The bytes stay valid until a launch reuses this buffer.
     free_buffers_[place.size_class].push_back(std::move(place.buffer));
     return departure;
   }
 
-  /// When next_due will have something again; empty when nothing is on its way.
+  /// Returns the due time of the next datagram, or nullopt if none is in flight.
   std::optional<LocalTime> next_wake() const {
     if (heap_.empty()) return std::nullopt;
     return heap_.front().due;
   }
 
   std::size_t size() const noexcept { return heap_.size(); }
-  /// On their way: buffers and bookkeeping.
+  /// Buffers and bookkeeping in flight.
   std::size_t bytes() const noexcept { return bytes_; }
 
  private:
   using Buffer = std::unique_ptr<std::byte[]>;
   static constexpr std::size_t kSmallestBuffer = 64;
-  static constexpr std::size_t kSizeClasses = 11;  // 64 bytes … 64 kB, more than the largest UDP datagram
+  static constexpr std::size_t kSizeClasses = 11;  // 64 bytes … 64 kB, above the maximum size of a UDP datagram
 
   struct Place {
     Tag tag{};
@@ -149,7 +148,7 @@ class Flight {
     return (kSmallestBuffer << size_class) + sizeof(Place) + sizeof(Waiting);
   }
 
-  /// The copy's own bytes, or null when it does not fit.
+  /// Returns the copy's bytes, or null if it exceeds the memory limit.
   std::byte* take_off(std::span<const std::byte> datagram, LocalTime due, Copy copy, const Tag& tag) {
     const std::uint8_t size_class = size_class_of(datagram.size());
     if (size_class >= kSizeClasses || cost(size_class) > max_bytes_ - bytes_) return nullptr;
@@ -185,8 +184,8 @@ class Flight {
     return buffer;
   }
 
-  /// Buffers of all sizes that wait for another use: when the sizes of datagrams change for good, those of the sizes
-  /// before would stay for ever.
+  /// Frees all unused buffers. Otherwise, after a lasting change of datagram sizes, buffers of the old sizes would
+  /// remain allocated.
   void give_back() {
     for (std::size_t size_class = 0; size_class < kSizeClasses; ++size_class) {
       held_ -= free_buffers_[size_class].size() * (kSmallestBuffer << size_class);
@@ -196,7 +195,7 @@ class Flight {
 
   std::size_t max_bytes_;
   std::size_t bytes_ = 0;
-  std::size_t held_ = 0;  // in buffers, in use or free
+  std::size_t held_ = 0;  // bytes of buffers, used and free
   std::uint64_t launched_ = 0;
   std::vector<Place> places_;
   std::vector<std::uint32_t> free_places_;

@@ -31,7 +31,7 @@
 namespace tendon::injector {
 namespace {
 
-/// As often as the driver has something new to say.
+/// The interval at which the driver publishes its status.
 constexpr Duration kRedrawPeriod = std::chrono::milliseconds(200);
 constexpr Duration kReportPeriod = std::chrono::seconds(1);
 constexpr Duration kRefusedPeriod = std::chrono::seconds(10);
@@ -42,7 +42,7 @@ void request_stop(int /*signal*/) {
   if (Driver* const driver = driver_to_stop) driver->stop();
 }
 
-/// While it lives, SIGINT and SIGTERM stop the driver, and a reader of our output who leaves does not kill us.
+/// For its lifetime, lets SIGINT and SIGTERM stop the driver, and ignores SIGPIPE.
 class Signals {
  public:
   explicit Signals(Driver& driver) {
@@ -68,7 +68,7 @@ class Signals {
   std::array<struct sigaction, 3> before_{};
 };
 
-/// Runs the driver; its end can be polled for.
+/// Runs the driver in a thread, whose end can be polled.
 class DriverThread {
  public:
   explicit DriverThread(Driver& driver)
@@ -82,7 +82,7 @@ class DriverThread {
   DriverThread& operator=(const DriverThread&) = delete;
 
   int fd() const { return ended_; }
-  /// Waits for the end, and throws what it ended with.
+  /// Waits for the end, and rethrows the driver's exception.
   void join() {
     thread_.join();
     if (error_) std::rethrow_exception(error_);
@@ -105,7 +105,7 @@ class DriverThread {
   std::thread thread_;
 };
 
-/// Returns the addresses of the server that this machine can send to.
+/// Returns the addresses of the server to which this machine can send.
 std::vector<Address> addresses_of(const LiveRun& options) {
   const std::vector<Address> addresses = options.server.look_up().addresses;
   if (addresses.front().port == 0) {
@@ -144,7 +144,7 @@ Driver::Config driver_config(const PreparedNetwork& network, const LiveRun& opti
           .duration = options.duration};
 }
 
-/// What is said and heard while the driver runs.
+/// Terminal, reports and control socket while the driver runs.
 class Conversation {
  public:
   Conversation(const PreparedNetwork& network, const LiveRun& options, const Address& server, Driver& driver,
@@ -228,7 +228,7 @@ class Conversation {
     } else {
       std::cout << log_line(status, said_.back()) << std::endl;
     }
-    // The picture shows the last second, the reports what is new since the one before.
+    // The terminal shows the last second, a report the time since the previous report.
     said_.push_back(std::move(status));
     while (said_.size() > 1 && (!terminal_ || said_.back().elapsed - said_[1].elapsed >= kReportPeriod)) {
       said_.pop_front();
@@ -247,12 +247,12 @@ class Conversation {
       server_ = status.server;
       if (!terminal_) std::cerr << "tendon-inject: no answer from " << silent << ", trying " << heading_.server << "\n";
     }
-    if (terminal_) return;  // it shows the rest
+    if (terminal_) return;  // the terminal shows the rest
     tell_of_clients(status);
     tell_of_refused(status);
   }
 
-  /// Reports the first one immediately, and the others every few seconds.
+  /// Reports the first refused client immediately and later ones every few seconds.
   void tell_of_refused(const Status& status) {
     const std::uint64_t refused = status.of(Direction::kUp).counters.refused_clients;
     const LocalTime now = monotonic_now();
@@ -276,7 +276,7 @@ class Conversation {
     }
   }
 
-  /// The steps of the timeline, into the trace.
+  /// Records the completed steps of the timeline in the trace.
   void note_changes(const Status& status) {
     for (; noted_ < status.scenario_done; ++noted_) {
       if (recorder_ != nullptr) recorder_->note(network_.timeline[noted_].change.text);
@@ -290,7 +290,7 @@ class Conversation {
     draw(driver_.status());
   }
 
-  /// Does what the line says, and answers with one line.
+  /// Executes a command and returns a one-line answer.
   std::string answer(std::string_view line) {
     try {
       return execute(line);
@@ -310,7 +310,7 @@ class Conversation {
   std::unique_ptr<Terminal> terminal_;
   std::deque<Status> said_;
   std::string said_to_user_;
-  Address server_;  // in the last status
+  Address server_;  // as in the last status
   ClientIndex known_clients_ = 0;
   std::uint64_t told_refused_ = 0;
   LocalTime tell_refused_{};

@@ -13,12 +13,10 @@
 
 namespace tendon::injector {
 
-/// A timer wakes its thread some 35 µs late on the virtual machines that we measured (p50): awake a little before, the
-/// proxy releases most datagrams when they are due. For a haptic loop, 1 kHz each way, that is at most a tenth of a
-/// core.
+/// The measured virtual machines wake a thread about 35 µs after its timer (p50). With this margin the proxy releases
+/// most datagrams on time. A haptic loop at 1 kHz each way then costs at most a tenth of a core.
 inline constexpr Duration kSpin = std::chrono::microseconds(50);
 
-/// The proxy between real programs.
 struct LiveRun {
   Address listen;
   ServerName server = Address{};  ///< its addresses are tried in turn until the server answers
@@ -32,11 +30,10 @@ struct LiveRun {
   bool json = false;
 };
 
-/// Runs until its duration is over, or SIGINT or SIGTERM comes: the driver in a thread of its own, and here all that
-/// must not delay it: terminal or reports, control socket, the making of tables. Returns the exit code: 1 for a run
-/// that was INVALID. Looks the server's name up once, before it begins. Throws std::invalid_argument before it has
-/// begun, for addresses and files that cannot be used, and std::runtime_error for a name that has no address and for
-/// what went wrong on the way.
+/// Runs until the duration has elapsed, SIGINT or SIGTERM. The driver has its own thread; this thread does the work
+/// that must not delay it (terminal, reports, control socket, building tables). Resolves the server's name once at the
+/// start. Returns the exit code, which is 1 for an INVALID run. Throws std::invalid_argument before the start for
+/// unusable addresses and files, and std::runtime_error for a name without an address and for failures during the run.
 int live_run(const PreparedNetwork& network, const LiveRun& options);
 
 }  // namespace tendon::injector

@@ -16,7 +16,7 @@
 
 namespace tendon::injector {
 
-/// Which network, as users say it: a profile for both directions or one for each, or a scenario, or a trace.
+/// The network as given by the user: a profile for both directions, one for each, a scenario, or a trace.
 struct NetworkOptions {
   std::string profile = {};
   std::string up = {};
@@ -27,24 +27,23 @@ struct NetworkOptions {
   std::optional<std::uint64_t> seed = {};
 };
 
-/// The same with all files read and all tables built.
+/// A network with all files read and all tables built.
 struct PreparedNetwork {
   std::uint64_t seed = 0;
   std::array<Injector, 2> networks;  ///< by Direction
-  std::array<std::string, 2> text;   ///< the profiles as lines; what is replayed, when a trace is
+  std::array<std::string, 2> text;   ///< the profiles as lines of text, or a description of the replayed trace
   std::vector<Proxy::Step> timeline;
   std::unique_ptr<const Trace> replay;
   TracePlayer::By replay_by = TracePlayer::By::kIndex;
 
-  /// For a trace of what is decided with it.
+  /// Header for a trace of this network.
   TraceHeader header() const;
 };
 
-/// Throws std::invalid_argument naming the option or file, the value and what was expected. Without
-/// a seed in the options or the scenario, one is picked.
+/// Throws std::invalid_argument that names the option or file, the value and the expected format. Picks a seed if
+/// neither the options nor the scenario contain one.
 PreparedNetwork prepare(const NetworkOptions& options);
 
-/// A change as a script or a command asks for it, made ready.
 Proxy::PreparedChange prepare(const Change& change, std::uint64_t seed);
 
 }  // namespace tendon::injector

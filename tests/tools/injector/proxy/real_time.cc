@@ -19,7 +19,7 @@ LocalTime monotonic_now() noexcept { return LocalTime(read(CLOCK_MONOTONIC)); }
 ClockPair read_both_clocks() noexcept {
   ClockPair best{};
   Duration narrowest = Duration::max();
-  // Three readings take 0.2 µs; that all of them are interrupted does not happen.
+  // Three readings take 0.2 µs; an interruption of all of them is practically excluded.
   for (int i = 0; i < 3; ++i) {
     const Duration before = read(CLOCK_MONOTONIC);
     const Duration calendar = read(CLOCK_REALTIME);

@@ -5,20 +5,20 @@
 
 namespace tendon::injector {
 
-/// CLOCK_MONOTONIC: the only clock of the proxy. Everything below the driver is told the time.
+/// CLOCK_MONOTONIC, the only clock of the proxy. Classes below the driver receive the time as an argument.
 ///
-/// Thread-safe.
+/// Thread-safe: yes.
 LocalTime monotonic_now() noexcept;
 
-/// The calendar's clock beside our own: the kernel stamps datagrams with the former.
+/// Converts the kernel's datagram time stamps, which are Unix time, to local time.
 struct ClockPair {
   LocalTime now;
   Duration unix_offset;  ///< Unix time − local time
 };
 
-/// Both clocks, read so close to each other that being interrupted in between cannot spoil the offset.
+/// Reads both clocks close enough together that an interruption cannot spoil the offset.
 ///
-/// Thread-safe.
+/// Thread-safe: yes.
 ClockPair read_both_clocks() noexcept;
 
 }  // namespace tendon::injector

@@ -15,7 +15,7 @@ std::string fixed(double value, int digits) {
 
 std::string us(Duration d) { return fixed(static_cast<double>(d.count()) / 1e3, 1); }
 
-/// Tenths of a microsecond: a histogram knows no more.
+/// Rounds to 0.1 µs, the resolution of the histogram.
 double rounded_us(Duration d) { return with_decimals(static_cast<double>(d.count()) / 1e3, 1); }
 
 JsonLine quantiles_json(const DurationHistogram& of) {

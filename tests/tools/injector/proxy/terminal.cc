@@ -25,7 +25,7 @@ winsize size_of_terminal() {
 }  // namespace
 
 std::unique_ptr<Terminal> Terminal::take() {
-  // In the background, asking for the terminal would stop the whole program.
+  // A background process that configures the terminal would be stopped (SIGTTOU).
   if (::isatty(STDIN_FILENO) != 1 || ::isatty(STDOUT_FILENO) != 1 || ::tcgetpgrp(STDIN_FILENO) != ::getpgrp()) {
     return nullptr;
   }
@@ -57,7 +57,7 @@ void Terminal::draw(std::string_view lines) {
   const std::size_t rows = size_of_terminal().ws_row;
   if (all.size() > rows) all.erase(all.begin() + static_cast<std::ptrdiff_t>(rows) - 1, all.end() - 1);
 
-  // Up to the first line of the picture before; each line clears what is left of the old one.
+  // Moves to the first line of the previous picture. Each new line clears the rest of the old one.
   std::string text;
   if (drawn_ > 1) text += "\033[" + std::to_string(std::min(drawn_, rows) - 1) + "A";
   text += '\r';
@@ -83,7 +83,7 @@ std::optional<std::string> Terminal::next_line() {
     unread_.erase(0, 1);
     if (c == '\n' || c == '\r') return std::exchange(typed_, {});
     if (c == '\b' || c == '\x7f') {
-      // A character of UTF-8 goes as a whole.
+      // Removes a whole UTF-8 character.
       while (!typed_.empty() && (static_cast<unsigned char>(typed_.back()) & 0xc0) == 0x80) typed_.pop_back();
       if (!typed_.empty()) typed_.pop_back();
     } else if (c == '\x15') {  // ^U

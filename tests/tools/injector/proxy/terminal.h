@@ -11,30 +11,30 @@
 
 namespace tendon::injector {
 
-/// The terminal that this program was started from: a picture that is drawn again in place, and a line that the user
-/// types meanwhile, which the picture shows. ^C, ^Z and the like work as ever.
+/// The controlling terminal: a picture that is redrawn in place, with the line that the user is typing. ^C and ^Z keep
+/// their function.
 ///
 /// Thread-safe: no.
 class Terminal {
  public:
-  /// Null when standard input and output are not both the terminal in whose foreground we run.
+  /// Returns null unless standard input and output are the terminal and this process is in its foreground.
   static std::unique_ptr<Terminal> take();
   Terminal(const Terminal&) = delete;
   Terminal& operator=(const Terminal&) = delete;
-  /// Leaves the last picture standing, and gives the terminal back as it was.
+  /// Keeps the last picture and restores the terminal.
   ~Terminal();
 
   std::size_t columns() const;
 
-  /// Draws `lines` over those of the call before. They must not be wider than columns(); those that do not fit above
-  /// the bottom of the terminal are left out from the middle of the bottom up, the last one stays.
+  /// Draws `lines` over the previous picture. They must not exceed columns(). If they do not fit on the screen, lines
+  /// above the last one are omitted.
   void draw(std::string_view lines);
 
   /// For poll(2).
   static int fd();
-  /// Takes what the user has typed, never waits; a whole line when there is one.
+  /// Returns a complete line if the user has typed one. Never blocks.
   std::optional<std::string> next_line();
-  /// Of a line that is not complete.
+  /// The incomplete line.
   const std::string& typed() const noexcept { return typed_; }
 
  private:

@@ -28,7 +28,6 @@ double in_us(Duration d) { return static_cast<double>(d.count()) / 1e3; }
 
 const char* name_of(Direction direction) { return direction == Direction::kUp ? "up" : "down"; }
 
-/// How many of `count` per second, per hundred of what came in.
 double percent(std::uint64_t count, std::uint64_t of) {
   return of == 0 ? 0 : 100 * static_cast<double>(count) / static_cast<double>(of);
 }
@@ -43,7 +42,7 @@ std::string losses_by_cause(const ProxyCounters& n) {
   return text;
 }
 
-/// What else happened to datagrams, where it did.
+/// The nonzero counts of other fates.
 std::string other_fates(const ProxyCounters& n) {
   std::string text;
   const auto add = [&](const char* what, std::uint64_t count) {
@@ -65,7 +64,7 @@ double rate_per_s(const Status& now, const Status& before, Direction direction) 
   return elapsed > 0 ? static_cast<double>(count) / elapsed : 0;
 }
 
-/// Cut to `columns` characters (not bytes) …
+/// Cuts to `columns` characters (not bytes).
 std::string cut(std::string_view line, std::size_t columns) {
   std::size_t characters = 0;
   std::size_t bytes = 0;

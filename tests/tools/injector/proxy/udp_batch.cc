@@ -22,21 +22,21 @@
 namespace tendon::injector {
 namespace {
 
-/// What we ask of the kernel for datagrams that nobody has read yet. Virtual machines pause for up to 40 ms; at 100 000
-/// datagrams a second 4000 come in that time, and the kernel books about 1 kB for a small one.
+/// Requested receive buffer. Virtual machines pause for up to 40 ms; at 100 000 datagrams per second 4000 arrive in
+/// that time, and the kernel accounts about 1 kB for a small one.
 constexpr int kReceiveBufferBytes = 4 << 20;
 
-/// Any UDP datagram fits.
+/// Above the maximum size of a UDP datagram.
 constexpr std::size_t kLargestDatagram = 65'536;
 
-/// Buffers at multiples of 64 kB would all compete for the same few lines of every cache.
+/// Buffers at multiples of 64 kB would map to the same few cache sets.
 constexpr std::size_t kStride = kLargestDatagram + 5 * 64;
 
 /// SCM_TIMESTAMPNS, SO_RXQ_OVFL, and the local address.
 constexpr std::size_t kControlBytes =
     CMSG_SPACE(sizeof(timespec)) + CMSG_SPACE(sizeof(std::uint32_t)) + local_address::kControlBytes;
 
-/// Older than this, a time of arrival says that the calendar's clock was set.
+/// An older arrival time means that the real-time clock was set.
 constexpr Duration kOldestArrival = std::chrono::seconds(1);
 
 socklen_t to_system(const Address& address, sockaddr_storage& storage) noexcept {
@@ -113,7 +113,7 @@ UdpBatch::UdpBatch(const Address& family, const Address* bind_to, const Address*
       connected_(connect_to != nullptr),
       on_all_addresses_(bind_to != nullptr && is_unspecified(*bind_to)) {
   if (fd_ >= 0) {
-    // Beyond the system's limit where we may (CAP_NET_ADMIN), otherwise up to net.core.rmem_max.
+    // SO_RCVBUFFORCE exceeds net.core.rmem_max but needs CAP_NET_ADMIN.
     const int wanted = kReceiveBufferBytes;
     if (setsockopt(fd_, SOL_SOCKET, SO_RCVBUFFORCE, &wanted, sizeof wanted) != 0) {
       set_option(fd_, SOL_SOCKET, SO_RCVBUF, wanted);
@@ -166,7 +166,7 @@ std::span<const UdpBatch::Arrival> UdpBatch::receive(Inbox& inbox) {
   int got = -1;
   do {
     got = ::recvmmsg(fd_, m.messages.data(), kUdpBatch, MSG_DONTWAIT, nullptr);
-    // Refused: an earlier datagram found nobody at the server's port, and the kernel tells us once.
+    // ECONNREFUSED reports once that an earlier datagram reached a closed port of the server.
   } while (got < 0 && (errno == EINTR || errno == ECONNREFUSED));
   if (got <= 0) return {};
 
@@ -202,7 +202,7 @@ std::bitset<kUdpBatch> UdpBatch::send(std::span<const Outgoing> batch) {
   struct Control {
     alignas(cmsghdr) std::array<char, local_address::kControlBytes> bytes;
   };
-  std::array<Control, kUdpBatch> control;  // written where it is used
+  std::array<Control, kUdpBatch> control;  // uninitialized; written before use
   const std::size_t count = std::min(batch.size(), kUdpBatch);
   for (std::size_t i = 0; i < count; ++i) {
     // sendmmsg does not write through the pointer.
@@ -226,7 +226,7 @@ std::bitset<kUdpBatch> UdpBatch::send(std::span<const Outgoing> batch) {
       next += static_cast<std::size_t>(sent);
       told = false;
     } else if (errno == ECONNREFUSED && !told) {
-      told = true;  // about an earlier datagram; this one has not been tried yet
+      told = true;  // the error belongs to an earlier datagram; this one has not been tried yet
     } else if (errno != EINTR) {
       refused.set(next++);
       told = false;

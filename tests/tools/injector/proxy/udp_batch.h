@@ -12,23 +12,20 @@
 
 namespace tendon::injector {
 
-/// Datagrams that one system call takes or gives. More would hardly be faster, and would let those that are due wait
-/// behind those that come in.
+/// Maximum datagrams per system call. More would be hardly faster, and due datagrams would wait behind incoming ones.
 inline constexpr std::size_t kUdpBatch = 64;
 
-/// One UDP socket, IPv4 or IPv6, that takes and gives datagrams by the batch (recvmmsg(2), sendmmsg(2)) and never
-/// waits.
+/// One non-blocking UDP socket, IPv4 or IPv6, that receives and sends in batches (recvmmsg(2), sendmmsg(2)).
 ///
 /// Thread-safe: no.
 class UdpBatch {
  public:
-  /// Binds to `address`. 0.0.0.0 means all IPv4 addresses, and [::] means all addresses of both families. If the port is
-  /// 0, the system chooses one. Throws std::runtime_error when the system refuses: "cannot listen on
-  /// 127.0.0.1:47100: Address already in use".
+  /// Binds to `address`. 0.0.0.0 means all IPv4 addresses, and [::] means all addresses of both families. If the port
+  /// is 0, the system chooses one. Throws std::runtime_error on failure, for example "cannot listen on 127.0.0.1:47100:
+  /// Address already in use".
   static UdpBatch listening(const Address& address);
 
-  /// From any free port to `server` only: what others send to that port, the kernel throws away. Throws
-  /// std::runtime_error when the system refuses.
+  /// Opens a socket on a free port that exchanges datagrams only with `server`. Throws std::runtime_error on failure.
   static UdpBatch connected(const Address& server);
 
   UdpBatch(UdpBatch&& other) noexcept;
@@ -36,16 +33,17 @@ class UdpBatch {
   ~UdpBatch();
 
   struct Arrival {
-    Address from;      ///< only of a listening socket
+    Address from;      ///< only from a listening socket
     Address asked_at;  ///< the local address, without a port; only if bound to all addresses
-    LocalTime at;      ///< when the kernel got it (SO_TIMESTAMPNS), which may be long before we read it
+    LocalTime at;      ///< kernel receive time (SO_TIMESTAMPNS), possibly long before the call
     std::span<const std::byte> datagram;
   };
-  /// Memory for one batch of arrivals of any size; several sockets can share one, one after the other.
+  /// Memory for one batch of arrivals. Several sockets can share it if they receive one after the other.
   class Inbox;
 
-  /// Takes up to kUdpBatch datagrams, which are valid until `inbox` is used again. No time of arrival is in the future,
-  /// nor more than a second in the past: then the calendar's clock was set, and the time is that of this call.
+  /// Receives up to kUdpBatch datagrams, which are valid until `inbox` is used again. Arrival times are at most the
+  /// current time. If the kernel's stamp is more than a second old, the real-time clock was set, and the arrival is the
+  /// time of this call.
   std::span<const Arrival> receive(Inbox& inbox);
 
   struct Outgoing {
@@ -53,15 +51,15 @@ class UdpBatch {
     std::span<const std::byte> datagram;
     Address from = {};  ///< the local address to send from, or zeros to let the kernel choose
   };
-  /// Gives up to kUdpBatch datagrams to the kernel, in order. Says which of them it did not take (full buffer, no
-  /// route, larger than the path allows): they are passed over.
+  /// Sends up to kUdpBatch datagrams in order. Returns the set of those that the kernel refused (full buffer, no route,
+  /// larger than the path allows), which are skipped.
   std::bitset<kUdpBatch> send(std::span<const Outgoing> batch);
 
-  /// Datagrams that came when the socket's buffer was full, so that the kernel threw them away (SO_RXQ_OVFL), as far as
-  /// datagrams received since then told.
+  /// Datagrams that the kernel dropped because the receive buffer was full (SO_RXQ_OVFL), as of the last received
+  /// datagram.
   std::uint64_t overflowed() const noexcept { return overflowed_; }
 
-  /// Where peers can reach this socket.
+  /// The address at which peers reach this socket.
   Address local_address() const;
 
   int fd() const noexcept { return fd_; }
@@ -82,7 +80,7 @@ class UdpBatch::Inbox {
 
  private:
   friend class UdpBatch;
-  struct Memory;  // keeps the system's headers out of this one
+  struct Memory;  // keeps system headers out of this one
   std::unique_ptr<Memory> memory_;
 };
 
