@@ -18,11 +18,11 @@ namespace {
 
 using std::chrono::milliseconds;
 
-/// An interpreter may take so long to start.
+/// Allows for the start of an interpreter.
 constexpr Duration kStart = std::chrono::seconds(30);
-/// A client that comes back after the end of a session does so within this.
+/// Time for a client to send a new Hello after the end of a session.
 constexpr Duration kComeBack = milliseconds(1500);
-/// SESSION.md's timeout.
+/// The timeout of SESSION.md.
 constexpr Duration kTimeout = std::chrono::seconds(2);
 
 class ClientJudge {
@@ -38,9 +38,9 @@ class ClientJudge {
   };
 
   Sixteen random16();
-  /// The next Hello, judged. Data that comes meanwhile is kept in strays_.
+  /// Returns the next Hello after judging it. Keeps Data received meanwhile in strays_.
   std::optional<Greeting> next_hello(Duration patience);
-  /// All that come within `window`.
+  /// Returns all Hellos within `window`.
   std::vector<Greeting> hellos(Duration window);
   void start();
   std::optional<Greeting> first_hello();
@@ -65,7 +65,7 @@ class ClientJudge {
   std::set<Sixteen> issued_;           ///< cookies
   std::map<Sixteen, Bytes> attempts_;  ///< client random → Hello without its cookie
   std::vector<Bytes> strays_;          ///< Data
-  std::set<std::uint64_t> ticks_;      ///< said
+  std::set<std::uint64_t> ticks_;      ///< of sent states
 };
 
 Sixteen ClientJudge::random16() {
@@ -127,7 +127,7 @@ std::optional<Greeting> ClientJudge::first_hello() {
   return std::nullopt;
 }
 
-/// False when there is no client to talk to.
+/// Returns false if no client connects.
 bool ClientJudge::check_hellos() {
   const auto first = first_hello();
   if (!first) {
@@ -155,7 +155,7 @@ bool ClientJudge::check_hellos() {
                   "no cookie: the Retry was for another");
   }
 
-  // The true one, and then too many of them.
+  // Sends the correct Retry, followed by too many others.
   const auto invited = invite();
   report_.judge("cookie-returned", invited.has_value(), "no Hello with the cookie", "the cookie of the Retry");
   if (!invited) return false;
@@ -184,7 +184,7 @@ bool ClientJudge::check_hellos() {
   return true;
 }
 
-/// A Hello with a cookie of ours.
+/// Returns a Hello with one of the issued cookies.
 std::optional<Greeting> ClientJudge::invite() {
   for (const LocalTime end = wire_.now() + kStart; wire_.now() < end && guest_.running();) {
     auto greeting = first_hello();
@@ -202,7 +202,7 @@ std::optional<Greeting> ClientJudge::invite() {
   return std::nullopt;
 }
 
-/// Answers that must be ignored, each with a connection id of its own: Data would tell which one was believed.
+/// Sends Answers that must be ignored. Each has its own connection id, so that Data would show which one was accepted.
 void ClientJudge::check_bad_answers() {
   const auto greeting = invite();
   if (!greeting) return;
@@ -361,7 +361,7 @@ void ClientJudge::check_conversation(Session& session) {
   check_forces(session, ticks_);
 }
 
-/// The client's, if it has any.
+/// Checks the client's requests, if it sends any.
 void ClientJudge::check_requests(Conversation& talk) {
   std::map<std::uint32_t, std::size_t> times;
   std::string first_words;
@@ -383,7 +383,7 @@ void ClientJudge::check_requests(Conversation& talk) {
   for (const auto& [id, count] : times) {
     report_.judge("request-repeated", count >= 2, "request " + std::to_string(id) + " came once",
                   "until it is answered");
-    // 20, 40, 80 … 640 ms, then one a second.
+    // Resend intervals of 20, 40, 80 … 640 ms, then 1 s.
     const double open_s = seconds(talk.now() - talk.heard().front().at);
     const double most = 2 * (6 + open_s) + 2;
     report_.judge("request-resend-rate", static_cast<double>(count) <= most,
@@ -442,7 +442,7 @@ void ClientJudge::check_forces(const Session& session, const std::set<std::uint6
 
 // ---- The end ----
 
-/// Whether the client says Hello again by itself.
+/// Returns true if the client sends a new Hello by itself.
 bool ClientJudge::comes_back() { return next_hello(kComeBack).has_value(); }
 
 void ClientJudge::check_refused() {
@@ -457,7 +457,7 @@ void ClientJudge::check_refused() {
   std::ranges::copy(random16(), ephemeral.begin());
   const Bytes datagram = answer_to(*greeting, 0, no, Key(ephemeral)).datagram;
   wire_.send(port_, datagram);
-  hellos(milliseconds(100));  // what was under way
+  hellos(milliseconds(100));  // datagrams in flight
   strays_.clear();
   const auto after = hellos(milliseconds(500));
   const bool again = std::ranges::any_of(after, [&](const Greeting& next) { return next.random == greeting->random; });

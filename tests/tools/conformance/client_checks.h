@@ -7,8 +7,8 @@
 
 namespace tendon::conformance {
 
-/// Is the server of `guest`, a client that talks to `wire`, and judges it: Report(Side::kClient). A controller is
-/// expected to compute one force from each state that it is shown.
+/// Acts as the server of the client `guest` on `wire`, and judges it with Report(Side::kClient). A controller must
+/// compute one force from each state that it receives.
 void judge_client(Wire& wire, Guest& guest, const Options& options, Report& report);
 
 }  // namespace tendon::conformance

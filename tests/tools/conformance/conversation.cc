@@ -120,7 +120,7 @@ void Conversation::renew_key() {
 void Conversation::return_to_old_key() {
   send_key_ = *previous_key_;
   --epoch_;
-  skip_to(next_ + 40);  // what was said under the new one is beyond the reach of the ack vector
+  skip_to(next_ + 40);  // packets sent under the new key are beyond the reach of the ack vector
 }
 
 // ---- Hearing ----
@@ -255,7 +255,7 @@ void Conversation::judge_echo(std::uint64_t number, const pb::Datagram& body) {
                   times("T2 " + std::to_string(first->second) + ", as it was told before"));
   }
 
-  auto known = said;  // the oldest packet that we sent at or after `other`
+  auto known = said;  // the oldest packet sent at or after `other`
   for (std::uint64_t i = 0; i < 32 && i < told; ++i) {
     const std::uint64_t other = told - 1 - i;
     if (known != said_.begin() && std::prev(known)->first == other) --known;

@@ -12,8 +12,8 @@
 
 #include "tendon.pb.h"
 
-// WIRE.md read a second time: the kit's own bytes around protobuf, which owe nothing to protocol/wire/codec.cc. Here
-// anything can be said, also what no correct peer says.
+// An independent implementation of WIRE.md around protobuf, which shares no code with protocol/wire/codec.cc. It can
+// also encode invalid datagrams.
 
 namespace tendon::conformance {
 
@@ -31,7 +31,7 @@ inline constexpr std::uint8_t kRetryType = 2;
 inline constexpr std::uint8_t kDataType = 3;
 inline constexpr std::uint8_t kAnswerType = 4;
 
-/// The 16 bytes in the clear, as they stand there.
+/// The 16 unencrypted header bytes.
 struct Head {
   std::uint8_t magic = 0x54;
   std::uint8_t version = 1;
@@ -43,7 +43,7 @@ struct Head {
   bool operator==(const Head&) const = default;
 };
 Bytes write(const Head& head);
-/// Empty when there are fewer than 16 bytes; nothing else is judged.
+/// Returns nullopt for fewer than 16 bytes. Does not validate the fields.
 std::optional<Head> read_head(Span datagram);
 
 /// A Hello of 1200 bytes, a Retry of 48, an Answer.
@@ -51,24 +51,24 @@ Bytes hello(std::uint8_t suite, const Sixteen& random, const Sixteen& cookie, Sp
 Bytes retry(std::uint8_t suite, const Sixteen& random, const Sixteen& cookie);
 Bytes answer(std::uint8_t suite, std::uint32_t connection_id, const Sixteen& random, Span body);
 
-/// Bytes `at` … `at` + 15.
+/// Returns bytes `at` … `at` + 15.
 Sixteen sixteen(Span datagram, std::size_t at);
 
 Bytes operator+(Bytes a, Span b);
 Bytes bytes_of(std::string_view text);
 Bytes bytes_of(const google::protobuf::MessageLite& message);
-/// Reads `message`; false when the bytes are not one.
+/// Parses `message`; returns false for malformed bytes.
 bool read(Span bytes, google::protobuf::MessageLite& message);
 
-/// Beyond what any quantity may be: |x| > 10¹², or not a number.
+/// Returns true for |x| > 10¹² and NaN, which are invalid for every quantity.
 bool far(double value);
 bool far(const pb::Vec3& vector);
-/// WIRE.md's bounds of a ForceCommand, but for its sequence, device and channel.
+/// Checks the bounds of a ForceCommand in WIRE.md, except its sequence, device and channel.
 bool within_bounds(const pb::ForceCommand& force);
 
-/// "54 11 00 …", cut after `most` bytes.
+/// For example "54 11 00 …", truncated after `most` bytes.
 std::string hex(Span bytes, std::size_t most = 32);
-/// The bytes that lower-case or upper-case digits, white space allowed, stand for.
+/// Decodes hexadecimal digits of either case. White space is ignored.
 Bytes from_hex(std::string_view digits);
 
 }  // namespace tendon::conformance

@@ -15,7 +15,7 @@
 namespace tendon::conformance::documents_test {
 namespace {
 
-/// "WIRE.md" or "stream.h", whose text is that of its comments.
+/// Returns the text of "WIRE.md", or the comments of "stream.h".
 std::string text_of_file(const std::string& name) {
   const std::filesystem::path source(TENDON_SOURCE);
   const bool is_header = name.ends_with(".h");
@@ -28,7 +28,7 @@ std::string text_of_file(const std::string& name) {
   return text;
 }
 
-/// Without emphasis, code marks and line breaks.
+/// Removes emphasis, code marks and line breaks.
 std::string words(std::string_view text) {
   std::string out;
   for (const char c : text) {
@@ -40,7 +40,8 @@ std::string words(std::string_view text) {
   return out;
 }
 
-/// What stands between this heading and the next of its rank or above; empty when there is none. All, without a title.
+/// Returns the text from this heading to the next one of the same or a higher rank, or an empty string. Without a
+/// title, returns the whole text.
 std::string section(const std::string& text, std::string_view title) {
   if (title.empty()) return text;
   std::string heading = "\n## ";

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// What the kit says word for word as WIRE.md's golden datagrams do. tests/tools/conformance/documents_test.cc compares
+// Parts of WIRE.md's golden datagrams that the kit sends unchanged. tests/tools/conformance/documents_test.cc compares
 // them with protocol/vectors/plain.json.
 
 namespace tendon::conformance::golden {
@@ -9,7 +9,7 @@ namespace tendon::conformance::golden {
 inline constexpr const char* kRandom = "a0a1a2a3a4a5a6a7a8a9aaabacadaeaf";
 /// The body of the Hello.
 inline constexpr const char* kHello = "080110011802220477616c6c2a0b6c6f63616c2d6d6f64656c";
-/// Frames: the state, tick 1000, and the control, id 7.
+/// Frames: the state with tick 1000, and the control with id 7.
 inline constexpr const char* kState =
     "0a5508e8071100ca9a3b000000001a12097b14ae47e17a843f197b14ae47e17a94bf220909000000000000e03f2a0909000000000000"
     "00c031000000000000d03f3900000000000020404503000000486350e0c65b5802";

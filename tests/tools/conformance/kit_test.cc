@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The kit is judged too: a toy that keeps all rules passes, and one that breaks a rule fails the check of that rule and
-// no other.
+//
+// Tests the kit itself. A toy peer that obeys all rules passes. A toy that violates one rule fails the check for that
+// rule only.
 #include <gtest/gtest.h>
 
 #include <fstream>
@@ -25,10 +26,10 @@ namespace {
 struct Broken {
   Fault fault;
   std::string_view check;
-  int suites = 2;  ///< 0: shows in suite 0 only; 1: where there is a key; 2: in all
+  int suites = 2;  ///< 0: detectable in suite 0 only; 1: with a key; 2: in all suites
 };
 
-/// Those that this processor can speak.
+/// Number of suites that this processor supports.
 int suites_here() { return contains(suites_of_this_machine(), Suite::kAesGcm) ? 3 : 2; }
 
 std::optional<Key> key_of(int suite) {

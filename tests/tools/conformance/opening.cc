@@ -11,7 +11,7 @@ constexpr std::size_t kLengthAt = 48;
 constexpr std::size_t kBodyAt = 50;
 constexpr std::size_t kAnswerAt = 32;
 
-/// Why a Hello is out of bounds; empty when it is not.
+/// Describes the field of a Hello that is out of bounds; empty if none is.
 std::string out_of_bounds(const pb::Hello& hello) {
   if (hello.version_min() < 1 || hello.version_min() > hello.version_max()) return "the versions";
   if (hello.role() != pb::ROLE_OBSERVER && hello.role() != pb::ROLE_CONTROLLER) return "the role";
@@ -27,7 +27,7 @@ std::string out_of_bounds(const pb::Hello& hello) {
   return {};
 }
 
-/// By suite 2 when the Answer names it.
+/// Uses suite 2 if the Answer names it.
 void take_keys(const NoiseSplit& split, Answered& out) {
   const bool aes = out.body.has_welcome() && names_aes(out.body.welcome());
   const auto key_of = [&](const Key& key) {

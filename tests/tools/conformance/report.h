@@ -10,24 +10,23 @@
 
 namespace tendon::conformance {
 
-/// Who is judged.
 enum class Side : std::uint8_t { kServer = 1, kClient = 2, kBoth = 3, kWorker = 4 };
 
-/// One rule of the documents. `sentence` stands there word for word, below the heading `section`, or in the header's
-/// comments (tests/tools/conformance/documents_test.cc looks it up).
+/// One rule of the documents. `sentence` is a literal quotation from the section `section`, or from the comments of a
+/// header, which tests/tools/conformance/documents_test.cc verifies.
 struct Check {
   std::string_view name;
   Side side;
   std::string_view document;  ///< "WIRE.md", "SESSION.md", "stream.h" (of clients/cpp/worker)
-  std::string_view section;   ///< empty in a header
+  std::string_view section;   ///< empty for a header
   std::string_view sentence;
 };
 
-/// Every check there is, in the order in which they are reported.
+/// All checks, in the order of the report.
 std::span<const Check> checks();
 
-/// "WIRE.md#type-2-retry-server--client-48-bytes": where a web page of the document has the section. A header has none:
-/// "stream.h".
+/// Returns the document and the anchor of the section on its web page, for example
+/// "WIRE.md#type-2-retry-server--client-48-bytes". For a header returns its name only: "stream.h".
 std::string anchor(const Check& check);
 
 enum class Outcome : std::uint8_t { kUnreached, kPassed, kFailed, kNotApplicable };
@@ -35,22 +34,22 @@ enum class Outcome : std::uint8_t { kUnreached, kPassed, kFailed, kNotApplicable
 struct Verdict {
   const Check* check;
   Outcome outcome = Outcome::kUnreached;
-  std::string seen;  ///< what failed; why it does not apply; empty when it passed
+  std::string seen;  ///< the failure, or why the check does not apply; empty if it passed
   std::string expected;
 };
 
-/// What has been judged of one peer so far.
+/// The results of all checks of one peer.
 ///
 /// Thread-safe: no.
 class Report {
  public:
-  /// All checks of a `side`, unreached.
+  /// Begins with all checks of `side` unreached.
   explicit Report(Side side);
 
-  /// One observation of the rule `name`. The first that fails stays. `name` must be one of the checks of this side, or
-  /// std::logic_error is thrown.
+  /// Records one observation of the rule `name` and keeps the first failure. Throws std::logic_error if `name` is not a
+  /// check of this side.
   void judge(std::string_view name, bool kept, std::string seen, std::string expected);
-  /// Calls `words` for the two texts, and only on failure. Use it for rules that every datagram is checked against.
+  /// Calls `words` for the two texts only on failure. For rules that are checked on every datagram.
   template <class Words>
   void judge(std::string_view name, bool kept, const Words& words) {
     if (kept) return judge(name, true, {}, {});
@@ -62,7 +61,7 @@ class Report {
   std::span<const Verdict> verdicts() const noexcept { return verdicts_; }
   std::size_t count(Outcome outcome) const noexcept;
   bool failed(std::string_view name) const noexcept;
-  /// Nothing failed and nothing was left unreached.
+  /// True if no check failed and none is unreached.
   bool passed() const noexcept;
 
  private:
@@ -70,7 +69,7 @@ class Report {
   std::vector<Verdict> verdicts_;
 };
 
-/// One line for people, one JSON object for programs.
+/// One line of text, one JSON object.
 std::string text_of(const Verdict& verdict);
 std::string json_of(const Verdict& verdict);
 

@@ -22,7 +22,7 @@ constexpr double kLeastAboveZero = std::numeric_limits<double>::denorm_min();
 constexpr double kEndless = std::numeric_limits<double>::infinity();
 constexpr double kNotANumber = std::numeric_limits<double>::quiet_NaN();
 
-/// The bounds of a number, of an enumeration, or of the length of a text in bytes.
+/// The bounds of a number or an enumeration, or of the length of a text in bytes.
 struct Bounds {
   std::string_view field;  ///< path from Control
   double least;

@@ -6,7 +6,7 @@
 
 #include "tests/tools/conformance/datagram.h"
 
-// The bounds of the requests from WIRE.md. This does not use protocol/wire.
+// The bounds of the requests from WIRE.md, independent of protocol/wire.
 
 namespace tendon::conformance {
 

@@ -22,7 +22,7 @@ pb::Claim claim(pb::Role role, const std::string& device = {}, const std::string
   return out;
 }
 
-/// Whether these are the grants to an observer of device 0 who also controls its channel 0, which is free.
+/// Checks the grants to an observer of device 0 who also controls its free channel 0.
 bool first_of_both(const pb::Welcome& welcome) {
   if (welcome.grants_size() != 2) return false;
   const pb::Grant& sees = welcome.grants(0);
@@ -31,7 +31,7 @@ bool first_of_both(const pb::Welcome& welcome) {
          controls.role() == pb::ROLE_CONTROLLER;
 }
 
-/// Whether all that a description tells is within its bounds.
+/// Checks the bounds of all fields of a description.
 bool within_bounds(const pb::DeviceDescription& device) {
   const auto size = [](double value) { return value >= 0 && value <= 1e12; };
   const auto dof = [](std::uint32_t count) { return count >= 1 && count <= 6; };
@@ -138,7 +138,7 @@ void ChannelChecks::check_description(Conversation& talk, const pb::Welcome& wel
   const bool agrees = device.model() == welcome.device_name() && device.max_force_n() == welcome.max_force_n() &&
                       device.position_resolution_m() == welcome.position_resolution_m() &&
                       device.loop_hz() == welcome.loop_hz();
-  // Of a Welcome that is wrong itself nothing follows.
+  // An invalid Welcome cannot be compared.
   guest_.report.judge("describe", agrees || guest_.report.failed("welcome"), device.ShortDebugString(),
                       "as in the Welcome: " + welcome.ShortDebugString());
 
@@ -205,7 +205,8 @@ void ChannelChecks::check_deadband(Conversation& talk, const pb::Welcome& welcom
                         "CODE_INVALID to " + what);
   }
 
-  // Of the states heard from index `since` on: all, and those that the one before foretells. No clock of ours is in it.
+  // Counts the states received from index `since` on, and those that their predecessor predicts. Uses only the states'
+  // own times.
   struct Count {
     std::size_t all = 0;
     std::size_t foretold = 0;
@@ -238,11 +239,11 @@ void ChannelChecks::check_deadband(Conversation& talk, const pb::Welcome& welcom
   std::size_t before = talk.heard().size();
   talk.listen(milliseconds(500));
   const Count with = count(before);
-  // 25, or as many as there are steps.
+  // One per 20 ms gives 25 states, or fewer at a low loop rate; requires about half.
   const std::size_t least = std::min<std::size_t>(12, welcome.loop_hz() / 4);
   guest_.report.judge("deadband", with.all >= least, said(with) + ", in 500 ms",
                       "one at least each 20 ms; at least " + std::to_string(least));
-  // One that was replaced before it left is one that we do not see, so the next may look foretold.
+  // A state replaced before it was sent is not visible here, so its successor can look as if it was predicted.
   guest_.report.judge("deadband", 10 * with.foretold <= with.all, said(with), "none that the one before foretells");
 
   const pb::ControlAck off = set(0, 0, 0);
@@ -250,7 +251,7 @@ void ChannelChecks::check_deadband(Conversation& talk, const pb::Welcome& welcom
                       "CODE_OK to 0, every state is sent");
   before = talk.heard().size();
   constexpr std::size_t kMany = 20;
-  if (welcome.loop_hz() < 100) return;  // the states are too far apart for any to be foretold
+  if (welcome.loop_hz() < 100) return;  // the states are too far apart to be predicted
   const bool all = talk.listen_until(kPatience, [&] { return count(before).foretold >= kMany; });
   guest_.report.judge("deadband", all, said(count(before)) + ", after it was switched off",
                       "every state, also " + std::to_string(kMany) + " that the one before foretells");

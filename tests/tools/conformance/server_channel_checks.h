@@ -9,20 +9,20 @@
 
 namespace tendon::conformance {
 
-/// Devices, channels and leases, for a server that offers the feature "channels"; the checks of any other are not
-/// applicable. check_claims() comes first: it finds out which one this is.
+/// Checks of devices, channels and leases for a server with the feature "channels". For other servers they are not
+/// applicable. Call check_claims() first, because it detects the feature.
 class ChannelChecks {
  public:
   explicit ChannelChecks(ServerGuest& guest) : guest_(guest) {}
 
-  /// Nobody controls the device, and nobody does afterwards: each Hello stays half-open.
+  /// No client may control the device. Leaves each Hello half-open, so none controls it afterwards.
   void check_claims();
-  /// Of one who has not claimed the channel as a controller. `id`: its next request.
+  /// The observer has not claimed the channel as a controller. `id`: its next request.
   void check_from_outside(Conversation& observer, std::uint32_t id);
-  /// A session that has claimed by name, with the features for check_coupling(), and still goes on. `id`: its newest
+  /// Returns an open session that has claimed by name and requested the features for check_coupling(). `id`: its newest
   /// request.
   std::optional<ServerGuest::Session> check_channels(std::uint32_t& id);
-  /// The link reports in all that was heard.
+  /// Judges the link reports received so far.
   void check_reports(const Conversation& talk);
 
  private:
@@ -32,7 +32,7 @@ class ChannelChecks {
   void check_deadband(Conversation& talk, const pb::Welcome& welcome, std::uint32_t& id);
 
   ServerGuest& guest_;
-  bool channels_ = false;                       ///< it offers the feature
+  bool channels_ = false;                       ///< whether the server offers the feature
   std::optional<pb::DeviceDescription> about_;  ///< device 0
 };
 

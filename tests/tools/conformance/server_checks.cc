@@ -35,7 +35,7 @@ void damage_force(std::vector<std::function<void(pb::Frame&)>>& out, void (*chan
   out.push_back([change](pb::Frame& frame) { change(*frame.mutable_force()); });
 }
 
-/// Sound as they are made.
+/// The result is valid.
 pb::Contact& contact(pb::ForceCommand& force) {
   force.mutable_model()->add_stiffness_npm(0);
   pb::Contact& made = *force.mutable_model()->mutable_contact();
@@ -49,7 +49,7 @@ pb::ForceTable& table(pb::ForceCommand& force) {
   return made;
 }
 
-/// Whether a column has an entry for each of `count` states, or none where it may have none.
+/// Whether a column has an entry for each of `count` states, or none if it is optional.
 bool has_its_entries(const pb::DeviceStates& columns, int count) {
   const auto each = [count](const auto& column, int width) { return column.size() == width * count; };
   const auto each_or_none = [&](const auto& column) { return column.empty() || each(column, 1); };
@@ -59,10 +59,10 @@ bool has_its_entries(const pb::DeviceStates& columns, int count) {
          each_or_none(columns.force_age_ns()) && each_or_none(columns.channel()) && each_or_none(columns.buttons());
 }
 
-/// Whether entry `k` of columns that have their entries says what `whole` says, the state of that device at that step.
+/// Whether entry `k` of the columns equals `whole`, the state of that device at that step.
 bool says(const pb::DeviceStates& columns, int k, const pb::DeviceState& whole) {
   const auto near = [](double single, double exact) {
-    constexpr double kLeast = std::numeric_limits<float>::min();  // below it single precision has fewer digits
+    constexpr double kLeast = std::numeric_limits<float>::min();  // single precision has fewer digits below this
     return single == exact || std::abs(single - exact) <= 6e-8 * std::abs(exact) + kLeast;
   };
   const auto vector = [k](const auto& column, const pb::Vec3& exact, auto same) {
@@ -83,7 +83,7 @@ bool says(const pb::DeviceStates& columns, int k, const pb::DeviceState& whole) 
          count(columns.buttons(), whole.buttons());
 }
 
-/// States in columns, beside those that `whole` is sent: an observer that has not named the feature.
+/// Compares states in columns with the ordinary states that the observer `whole` receives.
 void check_columns(ServerGuest& guest, Conversation& whole, Conversation& controller) {
   pb::Hello words = guest.hello(pb::ROLE_OBSERVER);
   words.add_features(std::string(kFeatureStateColumns));
@@ -99,7 +99,7 @@ void check_columns(ServerGuest& guest, Conversation& whole, Conversation& contro
   for (const LocalTime end = whole.now() + kPatience; compared < kEnough && whole.now() < end;) {
     session->talk.listen(milliseconds(50));
     whole.listen(milliseconds(50));
-    controller.say();  // we are still there
+    controller.say();  // keep-alive
     std::map<std::uint64_t, pb::DeviceState> of_tick;
     whole.for_each_frame(before, [&](const pb::Frame& frame) {
       if (frame.has_state()) of_tick[frame.state().tick()] = frame.state();
@@ -111,7 +111,7 @@ void check_columns(ServerGuest& guest, Conversation& whole, Conversation& contro
       const bool entries = has_its_entries(columns, std::popcount(columns.devices()));
       guest.report.judge("columns", entries, columns.ShortDebugString(), "an entry for each device in each column");
       const auto at = of_tick.find(columns.tick());
-      // The other observer sees device 0, the first where it is among them.
+      // The other observer receives device 0, which is the first entry if present.
       if (!entries || at == of_tick.end() || (columns.devices() & 1U) == 0) return;
       ++compared;
       guest.report.judge("columns", says(columns, 0, at->second), columns.ShortDebugString(),
@@ -156,7 +156,7 @@ void check_observer(ServerGuest& guest, ChannelChecks& channels, Conversation& c
   disarm.set_id(2);
   disarm.mutable_disarm();
   const auto refused = talk.ask(disarm);
-  // A server may be older than this request.
+  // An older server may not support this request.
   const bool not_done = refused && (refused->code() == pb::CODE_DENIED || refused->code() == pb::CODE_UNSUPPORTED);
   guest.report.judge("disarm-by-controller", not_done, refused ? refused->ShortDebugString() : "nothing",
                      "CODE_DENIED to an observer");
@@ -185,7 +185,7 @@ void check_roaming(ServerGuest& guest, Conversation& talk) {
   talk.move_to(elsewhere);
   guest.report.judge("roaming", talk.confirmed(talk.say()), "nothing comes to the new address",
                      "the session goes on there");
-  // What comes late from the old address does not bring it back.
+  // A late datagram from the old address must not move the session back.
   talk.move_to(before);
   talk.attribute(late, "reordering");
   talk.say_at(late, {});
@@ -302,7 +302,7 @@ void check_conversation(ServerGuest& guest, ChannelChecks& channels, ServerGuest
   check_second_controller(guest);
   check_requests(guest, talk);
   check_unasked(guest, talk, 22);
-  // More than a second after the others: there is one more report to come.
+  // More than a second after the previous forces, so another report must follow.
   pb::Datagram last_force;
   *last_force.add_frames() = forces.frame(forces.next++);
   talk.confirmed(talk.say(last_force));
@@ -315,7 +315,7 @@ void check_conversation(ServerGuest& guest, ChannelChecks& channels, ServerGuest
                                 "this server waits for " + std::to_string(session.welcome.timeout_ms()) + " ms");
   } else {
     check_timeout(talk, milliseconds(session.welcome.timeout_ms()));
-    say_bye(talk);  // should it still be there
+    say_bye(talk);  // if it is still there
   }
   check_states(guest.report, talk);
   channels.check_reports(talk);
@@ -347,7 +347,7 @@ void judge_server(Wire& wire, const Options& options, Report& report) {
   ChannelChecks channels(guest);
   crypto::start();
   check_retry(guest);
-  if (report.count(Outcome::kFailed) > 0) return;  // nobody is there, or nobody of ours
+  if (report.count(Outcome::kFailed) > 0) return;  // no server, or not one for this key
   check_bad_hellos(guest);
   check_bad_bodies(guest);
   check_cookie(guest);

@@ -29,7 +29,7 @@ pb::Couple fitting() {
   return out;
 }
 
-/// One controller, who numbers his requests.
+/// A controller that numbers its requests.
 class Asker {
  public:
   Asker(Conversation& talk, std::uint32_t first) : talk_(talk), next_(first) {}
@@ -76,7 +76,7 @@ void check_outputs(ServerGuest& guest, Asker& asker, const pb::Welcome& welcome)
               "output " + std::to_string(count) + " of a device that has " + std::to_string(count));
 }
 
-/// The same for a device that has no coupling and for a follower of one leader.
+/// Works for a device without a coupling and for a follower of one leader.
 void check_orders(ServerGuest& guest, Asker& asker) {
   const std::string to = "a device that does not lead";
   expect_code(guest.report, "engage-at-leader", asker.ask([](pb::Control& control) { control.mutable_engage(); }),
@@ -107,7 +107,7 @@ void check_differences(ServerGuest& guest, Asker& asker) {
   }
 }
 
-/// Of those heard from index `since` on.
+/// Judges the port states received from index `since` on.
 void judge_ports(Report& report, const Conversation& talk, std::size_t since) {
   const pb::PortState* previous = nullptr;
   talk.for_each_frame(since, [&](const pb::Frame& frame) {
@@ -133,7 +133,7 @@ void judge_ports(Report& report, const Conversation& talk, std::size_t since) {
 void check_couple(ServerGuest& guest, Asker& asker, Conversation& talk) {
   expect_code(guest.report, "couple", asker.couple(fitting()), pb::CODE_OK, "values that fit");
   if (guest.report.failed("couple")) return;
-  talk.listen(milliseconds(100));  // a state that was due may still come
+  talk.listen(milliseconds(100));  // a due state may still arrive
   const std::size_t before = talk.heard().size();
   const auto ports = [&] {
     return talk.count_frames(before, [](const pb::Frame& frame) { return frame.has_port_state(); });

@@ -33,7 +33,7 @@ void check_bad_hellos(ServerGuest& guest) {
     out[at] = std::byte{value};
     return out;
   };
-  // One after the other would take seconds; where all are met with silence, none was answered.
+  // Sends all of them together, because one by one would take seconds. Silence means that none was answered.
   const std::vector<std::pair<std::string, Bytes>> all = {
       {"a Hello of 1199 bytes", Bytes(bytes.begin(), bytes.end() - 1)},
       {"a Hello of 1201 bytes", bytes + bytes_of(std::string_view("\0", 1))},

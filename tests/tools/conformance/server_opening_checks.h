@@ -3,7 +3,7 @@
 
 #include "tests/tools/conformance/server_guest.h"
 
-// Before a session, and beside one. Each function judges the checks it is named after.
+// Checks before and besides a session. Each function judges the checks in its name.
 
 namespace tendon::conformance {
 
@@ -17,9 +17,9 @@ void check_keys(ServerGuest& guest);
 void check_half_open(ServerGuest& guest);
 void check_stray_data(ServerGuest& guest);
 void check_hello_limit(ServerGuest& guest);
-/// The Hello of an open session comes once more.
+/// Repeats the Hello of an open session.
 void check_answer_again(ServerGuest& guest, ServerGuest::Session& session);
-/// Another asks for the device that a session controls.
+/// A second client requests a device that a session controls.
 void check_second_controller(ServerGuest& guest);
 
 }  // namespace tendon::conformance

@@ -33,9 +33,9 @@ void check_requests(ServerGuest& guest, Conversation& talk) {
     return talk.count_frames(before, [](const pb::Frame& frame) { return frame.has_state(); });
   };
   constexpr Duration kWindow = milliseconds(600);
-  constexpr std::size_t kBetween = 120;  // states in the window: 30 at 50 Hz, 300 at 500 Hz
+  constexpr std::size_t kBetween = 120;  // threshold of states in the window: 30 at 50 Hz, 300 at 500 Hz
 
-  // 2 before 1.
+  // Request 2 before 1.
   std::size_t before = talk.heard().size();
   talk.confirmed(say(rate(2, 50)));
   talk.listen(milliseconds(120));
@@ -48,7 +48,7 @@ void check_requests(ServerGuest& guest, Conversation& talk) {
                      "more than " + std::to_string(kBetween) + " states in 600 ms",
                      "about 30: request 2, 50 per second, was delivered last");
 
-  // 1 again: an old answer, and nothing else.
+  // Request 1 again must return the old answer without any effect.
   const auto again = talk.ask(rate(1, 500));
   guest.report.judge("answer-kept",
                      again && first && again->code() == first->code() && again->detail() == first->detail(),
@@ -68,7 +68,7 @@ void check_requests(ServerGuest& guest, Conversation& talk) {
   guest.report.judge("request-unknown", refused && refused->code() == pb::CODE_UNSUPPORTED,
                      refused ? refused->ShortDebugString() : "nothing", "CODE_UNSUPPORTED");
 
-  // Sixteen in the wrong order, the first answers lost on the way to us; 7 is WIRE.md's golden one.
+  // Sixteen requests in reverse order, without receiving the first answers; 7 is the golden one of WIRE.md.
   before = talk.heard().size();
   for (std::uint32_t id = 19; id >= 4; --id) {
     pb::Datagram body;
@@ -103,7 +103,7 @@ void check_requests(ServerGuest& guest, Conversation& talk) {
   guest.report.judge("request-bounds", acks(before, 0) == 0 && acks(before, 36) == 0, "an answer to request 0 or 36",
                      "dropped: 0 is no id, and 36 is more than 16 after 19, the last answered");
 
-  // Nothing to say but once a second.
+  // One state per second, so the server must send keep-alives.
   guest.report.judge("request-order", talk.ask(rate(20, 1)).has_value(), "no answer to 20", "an answer");
   check_keep_alive(talk);
   talk.ask(rate(21, 1'000'000));

@@ -5,7 +5,7 @@
 
 namespace tendon::conformance {
 
-/// Requests of an open session: their order, their answers, and each once only. Ends with the server's keep-alive.
+/// Checks the order, the answers and the single execution of requests. Ends with the server's keep-alive.
 void check_requests(ServerGuest& guest, Conversation& talk);
 
 }  // namespace tendon::conformance

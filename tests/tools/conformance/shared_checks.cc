@@ -15,7 +15,7 @@ namespace {
 
 using std::chrono::milliseconds;
 
-/// What a peer that has nothing else to say may keep us waiting for, many times over.
+/// Longer than the interval of keep-alives, by several times.
 constexpr Duration kMoment = milliseconds(150);
 
 pb::Datagram of(const pb::Frame& frame) {
@@ -37,11 +37,11 @@ Bytes with(Bytes bytes, std::size_t at, std::byte difference) {
 
 struct Bad {
   std::string_view check;
-  std::string_view wrong;  ///< what is wrong with it: "magic 0x55"
+  std::string_view wrong;  ///< the error, for example "magic 0x55"
   std::function<Bytes(std::uint64_t number, const pb::Datagram& body)> make;
 };
 
-/// Datagrams with a good body and, with a key, sealed as they stand: only the header is wrong.
+/// Datagrams with a valid body and, with a key, a valid seal; only the header is wrong.
 std::vector<Bad> foreign_headers(Conversation& talk) {
   const auto changed = [&talk](auto change) {
     return [&talk, change](std::uint64_t number, const pb::Datagram& body) {
@@ -105,7 +105,7 @@ std::vector<Bad> forgeries(Conversation& talk) {
        [&talk](std::uint64_t number, const pb::Datagram&) { return write(talk.head(number)); }}};
 }
 
-/// Says each under a number of its own; none may be believed. The first of these numbers.
+/// Sends each under its own number; the peer must accept none. Returns the first of these numbers.
 std::uint64_t say_all(Conversation& talk, Evidence& evidence, const std::vector<Bad>& all, bool numbers_stay_free) {
   const std::uint64_t first = talk.next_number();
   const std::uint64_t unseen = evidence.next;
@@ -115,8 +115,8 @@ std::uint64_t say_all(Conversation& talk, Evidence& evidence, const std::vector<
     talk.stamp(body);
     talk.say_bad(all[i].check, first + i, all[i].make(first + i, body), all[i].wrong);
   }
-  if (!numbers_stay_free) talk.overhear(kMoment);  // so that an echo of the last of them would be told
-  // Where the numbers are used up, the ack vector may hold them: it reaches 32 back.
+  if (!numbers_stay_free) talk.overhear(kMoment);  // gives the peer time to echo the last of them
+  // If the numbers are used up, the ack vector may contain them; it reaches back 32 numbers.
   talk.skip_to(first + all.size() + (numbers_stay_free ? 0 : 40));
   const bool lives = talk.confirmed(talk.say());
   talk.listen(kMoment);
@@ -152,7 +152,7 @@ void check_bad_datagrams(Conversation& talk, Evidence& evidence) {
     talk.report().judge("damaged-copy", talk.confirmed(talk.say()), "no echo", "an echo");
   }
   if (!sealed) return talk.report().not_applicable("forged", "suite 0 has no tag");
-  // An authentic body uses its number up, whatever it says.
+  // An authentic datagram uses its number regardless of the body.
   if (!evidence.any) return talk.report().not_applicable("malformed-body", "a sealed observer does not show it");
   say_all(talk, evidence, malformed_bodies(talk), false);
 }
@@ -191,7 +191,7 @@ void check_window(Conversation& talk, Evidence& evidence) {
   }
   talk.skip_to(talk.next_number() + 3000);
   talk.confirmed(talk.say());
-  // From here on no keep-alive of ours until both are out: it would move the window on.
+  // No keep-alives until both are sent, because they would advance the window.
   const std::uint64_t edge = talk.next_number() - 1 - 1984;
   const std::uint64_t too_old = evidence.next++;
   const std::uint64_t just_in_time = evidence.next++;
@@ -227,7 +227,7 @@ void check_out_of_bounds(Conversation& talk, Evidence& evidence,
                          const std::vector<std::function<void(pb::Frame&)>>& damages) {
   std::vector<std::uint64_t> bad;
   for (const auto& damage : damages) {
-    // Each with a good frame of a lower number after it, so that it would win if it were believed.
+    // Each also contains a valid frame with a lower number, so that the invalid one would win if it were accepted.
     const std::uint64_t good = evidence.next++;
     bad.push_back(evidence.next);
     pb::Frame frame = evidence.frame(evidence.next);
@@ -256,7 +256,7 @@ void check_bad_requests(Conversation& talk, std::uint32_t id) {
     talk.report().judge("request-invalid", named || unknown,
                         (ack ? ack->ShortDebugString() : "no answer") + " to " + bad.control.ShortDebugString(),
                         "CODE_INVALID, with \"" + std::string(name) + "\" in its detail");
-    if (!ack) return;  // there would not be an answer to any of the others
+    if (!ack) return;  // the others would not be answered either
   }
   pb::Control sound;
   sound.set_id(id);
@@ -287,7 +287,7 @@ void check_rekey(Conversation& talk) {
   }
   talk.renew_key();
   const LocalTime moved_on = talk.now();
-  // Not so long that it takes us for gone.
+  // Shorter than the peer's timeout.
   const bool followed = talk.confirmed(talk.say(), std::chrono::seconds(1));
   talk.report().judge("rekey-followed", followed, "no echo of a datagram of the next epoch", "an echo");
   if (!followed) {
@@ -369,7 +369,7 @@ void check_bye_silence(Conversation& talk) {
   pb::Frame bye;
   bye.mutable_bye()->set_code(pb::CODE_OK);
   for (int i = 0; i < 3; ++i) talk.say(of(bye));
-  talk.overhear(kMoment);  // what was under way
+  talk.overhear(kMoment);  // datagrams in flight
   const std::size_t before = talk.heard().size();
   talk.overhear(milliseconds(300));
   const std::size_t after = talk.heard().size() - before;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// tendon-conformance: is this peer one that WIRE.md and SESSION.md describe, or this worker one for a front?
+// tendon-conformance: checks a peer against WIRE.md and SESSION.md, or a worker against stream.h of clients/cpp/worker.
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <exception>

@@ -20,7 +20,7 @@
 namespace tendon::conformance {
 namespace {
 
-/// A second of states from every session that is not being listened to.
+/// Holds a second of states from every session that is not being read.
 constexpr int kReceiveBuffer = 4 << 20;
 
 }  // namespace
@@ -37,7 +37,7 @@ LocalTime UdpWire::now() { return LocalTime(std::chrono::steady_clock::now().tim
 
 void UdpWire::add(const Address& local) {
   ports_.push_back({std::make_unique<UdpLink>(local, Reach::kAnywhere), {}});
-  // As much as the system grants.
+  // Best effort: the system may grant less.
   ::setsockopt(ports_.back().link->fd(), SOL_SOCKET, SO_RCVBUF, &kReceiveBuffer, sizeof kReceiveBuffer);
 }
 
@@ -101,7 +101,7 @@ void GuestProgram::start() {
   posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
   posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, log_.c_str(), O_WRONLY | O_CREAT | O_APPEND, 0644);
   posix_spawn_file_actions_adddup2(&actions, STDOUT_FILENO, STDERR_FILENO);
-  // A group of its own: a client that is a shell script takes its children with it.
+  // A new process group, so that ending a client that is a shell script also ends its children.
   posix_spawnattr_t attributes;
   posix_spawnattr_init(&attributes);
   posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETPGROUP);

@@ -12,18 +12,18 @@
 
 namespace tendon::conformance {
 
-/// The real wire. All ports are emptied whenever one is listened to, so that none overflows.
+/// A wire over UDP. Receiving on one port drains all ports, so that none overflows.
 ///
 /// Thread-safe: no.
 class UdpWire : public Wire {
  public:
-  /// Towards the server at `peer`.
+  /// Talks to the server at `peer`.
   static UdpWire to_server(const Address& peer);
-  /// Where a client will come: the one port there is, open at once.
+  /// Opens the only port, to which a client will connect.
   static UdpWire for_client(const Address& listen);
 
   LocalTime now() override;
-  /// Throws std::runtime_error when the system refuses.
+  /// Throws std::runtime_error on failure.
   int open_port() override;
   void send(int port, Span datagram) override;
   std::optional<Arrival> receive(int port, LocalTime deadline) override;
@@ -45,16 +45,16 @@ class UdpWire : public Wire {
   std::vector<Port> ports_;
 };
 
-/// A client program. It is gone when this object is.
+/// A client program, which is killed with this object.
 class GuestProgram : public Guest {
  public:
-  /// `command` is looked up in PATH. What it says goes to `log`, a file, or nowhere.
+  /// `command` is looked up in PATH. Its output goes to the file `log`, or is discarded if `log` is empty.
   GuestProgram(std::vector<std::string> command, std::string log);
   ~GuestProgram() override { kill(); }
   GuestProgram(const GuestProgram&) = delete;
   GuestProgram& operator=(const GuestProgram&) = delete;
 
-  /// Throws std::system_error when it cannot be started.
+  /// Throws std::system_error if the program cannot be started.
   void start() override;
   void ask_to_end() override;
   void kill() override;

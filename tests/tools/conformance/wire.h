@@ -8,10 +8,10 @@
 
 namespace tendon::conformance {
 
-/// Where the kit's datagrams go to and come from, and its clock: real UDP, or a peer in this process and virtual time.
+/// The datagram transport and clock of the kit: UDP, or a peer in this process with virtual time.
 ///
-/// A port is a local socket of the kit. Towards a server each talks to that server; towards a client there is one,
-/// which talks to whoever said Hello last.
+/// A port is a local socket of the kit. Every port toward a server talks to that server. Toward a client there is one
+/// port, which talks to the sender of the last Hello.
 class Wire {
  public:
   struct Arrival {
@@ -23,20 +23,20 @@ class Wire {
   virtual LocalTime now() = 0;
   virtual int open_port() = 0;
   virtual void send(int port, Span datagram) = 0;
-  /// The next datagram at `port`; waits until `deadline` for it.
+  /// Returns the next datagram at `port`, or nullopt at `deadline`.
   virtual std::optional<Arrival> receive(int port, LocalTime deadline) = 0;
-  /// All that is random: unpredictable over UDP, the same each time in virtual time.
+  /// The only source of randomness: unpredictable over UDP, reproducible in virtual time.
   virtual std::uint64_t random() = 0;
 };
 
-/// The client under test, as a program that can be started and asked to end.
+/// The client under test, as a program.
 class Guest {
  public:
   virtual ~Guest() = default;
   virtual void start() = 0;
-  /// Politely: SIGTERM.
+  /// Sends SIGTERM.
   virtual void ask_to_end() = 0;
-  /// Not politely.
+  /// Sends SIGKILL.
   virtual void kill() = 0;
   virtual bool running() = 0;
 };

@@ -21,19 +21,20 @@ using std::chrono::seconds;
 using worker::Record;
 using Road = WorkerWire::Road;
 
-/// From the start of the program to its opening: MPI and an interpreter on a busy machine. A front waits as long.
+/// From the start of the program to its opening record. MPI and an interpreter are slow on a busy machine. A front
+/// waits as long.
 constexpr Duration kStart = std::chrono::minutes(2);
-/// For an answer: the first one may compile or factor something.
+/// For an answer. The first one may include compilation or factorization.
 constexpr Duration kAnswer = seconds(30);
-/// From the end of the stream to that of the program.
+/// From the end of the stream to the end of the program.
 constexpr Duration kEnd = seconds(10);
-/// In which nothing must come.
+/// The worker must be silent for this long.
 constexpr Duration kQuiet = milliseconds(300);
-/// Between two pieces of one record.
+/// Between two fragments of a record.
 constexpr Duration kPause = milliseconds(20);
 constexpr int kFirstStates = 3;
 constexpr int kInARow = 100;
-/// Odd numbers from here on are none of a double.
+/// A double cannot represent odd integers from here on.
 constexpr std::uint64_t kFirstTick = (std::uint64_t{1} << 53U) + 1;
 
 const char* name_of(Road road) { return road == Road::kUnix ? "over a Unix socket: " : "over TCP: "; }
@@ -44,7 +45,7 @@ void set(pb::Vec3& vector, double x, double y, double z) {
   vector.set_z(z);
 }
 
-/// All that a state may say of a device that has everything: 16 buttons, all of them held, and 8 joints.
+/// Sets all optional fields: 16 pressed buttons and 8 joints.
 void add_handle(pb::DeviceState& state) {
   state.set_reasons(0xFFFF);
   state.set_permitted_force_n(HUGE_VAL);
@@ -89,9 +90,9 @@ class WorkerJudge {
   pb::DeviceState next_state();
   bool ask(const pb::DeviceState& state, std::string_view check, std::span<const std::size_t> cuts = {});
   void judge_answer(const Record& record, const pb::DeviceState& state);
-  /// Whether it waits for a state until `deadline`.
+  /// Returns true if the worker sends nothing until `deadline`.
   bool silent(LocalTime deadline);
-  /// The next record; empty at the deadline and at the end of the stream, which `over_` then tells.
+  /// Returns the next record, or nullopt at the deadline or the end of the stream, which sets `over_`.
   std::optional<Record> next(LocalTime deadline);
   void judge(std::string_view check, bool kept, std::string_view seen, std::string_view expected) {
     report_.judge(check, kept, name_of(road_) + std::string(seen), std::string(expected));
@@ -168,7 +169,8 @@ pb::DeviceState WorkerJudge::next_state() {
   return state;
 }
 
-/// Sends a state, in pieces that end at `cuts`, and judges its answer. False: there was none, and `check` has failed.
+/// Sends a state in fragments that end at `cuts`, and judges its answer. Returns false if there was none; then `check`
+/// has failed.
 bool WorkerJudge::ask(const pb::DeviceState& state, std::string_view check, std::span<const std::size_t> cuts) {
   if (!silent(wire_.now())) return false;
   pb::Datagram body;
@@ -226,7 +228,7 @@ void WorkerJudge::converse() {
   for (int i = 0; i < kFirstStates; ++i) {
     if (!ask(next_state(), "answer-comes")) return;
   }
-  // In the length, after it, in the sequence, in the body, near its end.
+  // Within the length, after it, within the sequence, within the body, near its end.
   pb::DeviceState state = next_state();
   const std::size_t size = 12 + state.ByteSizeLong();
   const std::array<std::size_t, 5> cuts = {2, 4, 9, 30, size};

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The kit for workers is judged as that for peers is (kit_test.cc): a toy that keeps all rules passes, and one that
-// breaks a rule fails the check of that rule and no other.
+//
+// Tests the kit for workers. A toy worker that obeys all rules passes. A toy that violates one rule fails the check for
+// that rule only.
 #include <gtest/gtest.h>
 
 #include <algorithm>

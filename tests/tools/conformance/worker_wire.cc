@@ -27,9 +27,9 @@ namespace {
 
 using std::chrono::milliseconds;
 
-/// How often to look whether the program still runs.
+/// Interval at which to check whether the program still runs.
 constexpr milliseconds kLook{20};
-/// A program that was asked to end is ended after this. mpirun takes its ranks with it meanwhile.
+/// Time between SIGTERM and SIGKILL, in which mpirun can end its ranks.
 constexpr Duration kPolite = std::chrono::seconds(2);
 
 [[noreturn]] void fail_with(const std::string& what) { throw std::system_error(errno, std::generic_category(), what); }
@@ -94,7 +94,7 @@ bool WorkerProgram::accept_one() {
   stream_ = ::accept4(listener_, nullptr, nullptr, SOCK_CLOEXEC);
   if (stream_ < 0) return false;
   const int yes = 1;
-  ::setsockopt(stream_, IPPROTO_TCP, TCP_NODELAY, &yes, sizeof yes);  // a Unix socket refuses, and has no delay
+  ::setsockopt(stream_, IPPROTO_TCP, TCP_NODELAY, &yes, sizeof yes);  // fails for a Unix socket, which does not need it
   close(listener_);
   return true;
 }
@@ -123,7 +123,7 @@ void WorkerProgram::send(Span bytes) {
   for (std::size_t done = 0; done < bytes.size();) {
     const ssize_t sent = ::send(stream_, bytes.data() + done, bytes.size() - done, MSG_NOSIGNAL);
     if (sent < 0 && errno == EINTR) continue;
-    if (sent <= 0) return;  // receive() tells
+    if (sent <= 0) return;  // receive() reports the error
     done += static_cast<std::size_t>(sent);
   }
 }

@@ -11,23 +11,23 @@
 
 namespace tendon::conformance {
 
-/// The real one: the worker's program, and the socket that it connects to. Only the first connection counts.
+/// A worker's process and the socket to which it connects. Accepts only the first connection.
 ///
-/// It is no Crew (clients/cpp/worker/crew.h), because a front never sends half a record, nor ends a stream and lets the
-/// program live.
+/// Does not use Crew (clients/cpp/worker/crew.h), because a front never sends half a record, nor ends a stream while
+/// its program lives.
 ///
 /// Thread-safe: no.
 class WorkerProgram : public WorkerWire {
  public:
-  /// `command` is looked up in PATH. What it says goes to `log`, a file, or nowhere. `listen`: where to wait for it over
-  /// TCP; port 0: any.
+  /// `command` is looked up in PATH. Its output goes to the file `log`, or is discarded if `log` is empty. `listen`:
+  /// the TCP address; port 0 selects a free port.
   WorkerProgram(std::vector<std::string> command, std::string log, const Address& listen);
   ~WorkerProgram() override;
   WorkerProgram(const WorkerProgram&) = delete;
   WorkerProgram& operator=(const WorkerProgram&) = delete;
 
   LocalTime now() override;
-  /// Throws std::system_error when the system has no such socket, or the program cannot be started.
+  /// Throws std::system_error if the socket cannot be opened or the program cannot be started.
   void start(Road road, const std::string& secret) override;
   std::optional<Heard> receive(LocalTime deadline) override;
   void send(Span bytes) override;
@@ -37,13 +37,13 @@ class WorkerProgram : public WorkerWire {
   std::uint64_t random() override;
 
  private:
-  /// Listens, and says where: what the program is told.
+  /// Listens and returns the address in the form that the program expects.
   std::string listen(Road road);
   bool accept_one();
 
   GuestProgram program_;
   Address tcp_;
-  std::string folder_;  ///< of the Unix socket; empty: there is none
+  std::string folder_;  ///< of the Unix socket, or empty
   int listener_ = -1;
   int stream_ = -1;
 };

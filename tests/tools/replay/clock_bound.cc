@@ -7,12 +7,12 @@
 namespace tendon::replay {
 namespace {
 
-/// What clocks that drift by `most_drift` may differ by more after `time`, rounded up.
+/// Maximum growth of the difference of two clocks over `time`, rounded up.
 Duration drifted(Duration time, double most_drift) {
   return Duration(static_cast<Duration::rep>(most_drift * std::abs(static_cast<double>(time.count()))) + 1);
 }
 
-/// Keeps the crossing whose bound is the least at every later time of a sweep.
+/// Finds the crossing with the smallest bound at each later time of a sweep.
 class Tightest {
  public:
   explicit Tightest(double most_drift) : most_drift_(most_drift) {}
@@ -31,7 +31,7 @@ class Tightest {
   Crossing best_;
 };
 
-/// The least of bound_i + ρ |t − t_i| at each of `times`, which rise, as the crossings do.
+/// min_i (bound_i + ρ |t − t_i|) at each of `times`. Crossings and `times` must be sorted.
 std::vector<Duration> tightest(const std::vector<Crossing>& crossings, const std::vector<LocalTime>& times,
                                double most_drift) {
   std::vector<Duration> least(times.size());

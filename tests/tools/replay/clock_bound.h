@@ -8,54 +8,56 @@
 
 namespace tendon::replay {
 
-/// How far apart the clocks of two machines were, proved by the messages that went between them.
+/// Rigorous bounds on the offset between the clocks of two machines, from the messages between them.
 ///
-/// θ(t) = the second clock minus the first one, at the time t of the first. A message that leaves at s and has come by r
-/// was under way for no less than nothing, whatever the network did:
+/// θ(t) = second clock − first clock at the time t of the first. A message sent at s and received by r took at least
+/// zero
+/// time, whatever the network did:
 ///
-///     first → second, sent at s, there by r:      θ ≤ r − s
-///     second → first, sent at s, there by r:      θ ≥ s − r
+///     first → second, sent at s, received by r:      θ ≤ r − s
+///     second → first, sent at s, received by r:      θ ≥ s − r
 ///
-/// and clocks drift against each other by at most `most_drift`, so that each message bounds θ at every other time too:
+/// The clocks drift by at most ρ = `most_drift` against each other, so each message bounds θ at every other time:
 ///
-///     U(t) = min_i (u_i + ρ |t − t_i|),   L(t) = max_i (l_i − ρ |t − t_i|),   ρ = most_drift
+///     U(t) = min_i (u_i + ρ |t − t_i|),   L(t) = max_i (l_i − ρ |t − t_i|)
 ///     θ = (U + L)/2 ± (U − L)/2
 ///
-/// So the error is never more than half of the least round trip, and no less than what the two ways differ by can make
-/// of it: no message can tell a slow way there from a slow way back.
+/// The error bound is at most half of the minimum round-trip time. It cannot be less than the error due to asymmetric
+/// delays, which no message can detect.
 struct ClockBound {
   LocalTime at{};     ///< of the first clock
   Duration offset{};  ///< θ
-  Duration error{};   ///< θ lies within offset ± this; below 0: no such clocks exist, one of them stepped
+  Duration error{};   ///< θ lies within offset ± error; negative: inconsistent, because one of the clocks was stepped
 };
 
-/// One message. `at`: of the first clock, when it was sent or had come there.
+/// One message. `at` is its event on the first clock, sending or reception.
 struct Crossing {
   LocalTime at{};
   Duration bound{};  ///< second clock − first clock of its two events: r − s there, s − r back
 };
 
-/// Two quartz crystals, each wrong by 100 ppm.
+/// Two quartz crystals with an error of 100 ppm each.
 inline constexpr double kMostDrift = 200e-6;
 
-/// The bound once in each `every`, from the first crossing to the last. Both lists in the order of time; empty when one
-/// of them is.
+/// Returns a bound for each interval `every` from the first crossing to the last. Both lists must be sorted by time.
+/// Returns an empty list if one of them is empty.
 std::vector<ClockBound> clock_bounds(const std::vector<Crossing>& there, const std::vector<Crossing>& back,
                                      Duration every, double most_drift = kMostDrift);
 
-/// The rate of θ in s/s over all of the messages, and the bound of its error.
+/// The mean rate of θ in s/s over all messages, and the bound of its error.
 struct ClockDrift {
   double rate = 0;
   double error = 0;
 };
 
-/// Estimates the drift from the first and the last of `bounds`, which should allow far more than the expected drift.
+/// Estimates the drift from the first and the last of `bounds`, whose `most_drift` should be well above the expected
+/// drift.
 ClockDrift drift_over(const std::vector<ClockBound>& bounds);
 
 /// Whether an offset exists that satisfies all of `bounds`.
 bool is_possible(const std::vector<ClockBound>& bounds);
 
-/// Between two of `bounds` (at least one), and held beyond the ends.
+/// Interpolates between `bounds` (at least one) and holds the first and last value outside.
 Duration offset_at(const std::vector<ClockBound>& bounds, LocalTime at);
 
 }  // namespace tendon::replay

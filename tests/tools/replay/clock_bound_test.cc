@@ -14,7 +14,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-/// Two clocks, and the messages of some minutes between them.
+/// Two clocks with messages between them for some minutes.
 struct Clocks {
   double offset = 0;  // s
   double drift = 0;
@@ -22,7 +22,7 @@ struct Clocks {
   double least_back = 0;
   double jitter = 0;
   double loss = 0;
-  double step = 0;  // s, of the second clock after half the time
+  double step = 0;  // s, of the second clock halfway through
 
   static constexpr double kLength = 120;
 
@@ -80,7 +80,7 @@ TEST(ClockBound, AClockThatStepsIsFoundOut) {
 }
 
 TEST(ClockBound, ClocksThatDriftMoreThanAllowedAreNotBelieved) {
-  // The bound rests on the drift: with none allowed, a drift of 100 ppm cannot be.
+  // A drift of 100 ppm contradicts an allowed drift of zero.
   const Clocks clocks{.drift = 1e-4, .least_there = 1e-4, .least_back = 1e-4};
   std::vector<Crossing> there;
   std::vector<Crossing> back;

@@ -10,8 +10,6 @@
 #include "server/recording/mcap_reader.h"
 #include "server/recording/mcap_writer.h"
 
-// Functions to copy the messages of a recording.
-
 namespace tendon::replay {
 
 /// Opens a recording. Throws std::runtime_error if it cannot be read.

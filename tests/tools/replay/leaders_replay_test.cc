@@ -37,11 +37,11 @@ struct Running {
 
 struct Recorded {
   Scene scene;
-  std::vector<std::vector<PortRecord>> ports;  ///< of each step
+  std::vector<std::vector<PortRecord>> ports;  ///< by step
   std::vector<StepRecord> steps;
 };
 
-/// A hand holds the follower, and two others lead it; the second joins later, and takes over.
+/// A hand holds a follower with two leaders. The second leader joins later and takes over.
 Recorded recorded() {
   const std::string leading =
       std::string(testing::kTapping) + "[teleoperation]\nrole = \"leader\"\n[teleoperation.coupling]\n";
@@ -83,7 +83,7 @@ Recorded recorded() {
   return all;
 }
 
-/// The first difference when of each step the couplings from `first` on count.
+/// Returns the first difference if each step uses only the couplings from `first` on.
 std::string first_difference(const Recorded& all, std::size_t first) {
   Rerun rerun(all.scene.loop.control, Rerun::Held::kRecorded);
   for (std::size_t i = 0; i < all.steps.size(); ++i) {

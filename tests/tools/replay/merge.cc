@@ -23,9 +23,9 @@
 namespace tendon::replay {
 namespace {
 
-/// What one end recorded of the coupling; times are those of the recording.
+/// One end's record of the coupling, in the time of its recording.
 struct End {
-  std::map<std::pair<std::uint64_t, std::uint64_t>, LocalTime> sent;  ///< (epoch, sequence) → when
+  std::map<std::pair<std::uint64_t, std::uint64_t>, LocalTime> sent;  ///< (epoch, sequence) → time
   struct Came {
     std::pair<std::uint64_t, std::uint64_t> which;
     LocalTime by;
@@ -51,10 +51,10 @@ End read_end(const std::filesystem::path& path) {
   return end;
 }
 
-/// 10 times kMostDrift: whoever drifts faster has stepped.
+/// 10 · kMostDrift. A higher rate means that a clock was stepped.
 constexpr double kFastDrift = 10 * kMostDrift;
 
-/// "260 ± 12 ppm"
+/// For example "260 ± 12 ppm".
 std::string text_of(const ClockDrift& drift) {
   std::ostringstream text;
   text << std::lround(drift.rate * 1e6) << " ± " << std::lround(drift.error * 1e6) << " ppm";
@@ -99,7 +99,7 @@ Clocks compare_clocks(const End& leader, const End& follower, const MergeOptions
   return clocks;
 }
 
-/// The channels by which the leader's states came to the follower.
+/// The channels on which the follower received the leader's states.
 std::set<std::uint32_t> channels_of(const End& leader, const End& follower) {
   std::set<std::uint32_t> channels;
   for (const End::Came& came : follower.came) {
@@ -108,7 +108,7 @@ std::set<std::uint32_t> channels_of(const End& leader, const End& follower) {
   return channels;
 }
 
-/// Copies the messages of one recording, in its order. Of the ports of its couplings those by `channels`.
+/// Copies the messages of one recording in their order. Keeps only the coupling ports on `channels`.
 class Copy {
  public:
   Copy(const std::filesystem::path& path, std::string prefix, std::set<std::uint32_t> channels)

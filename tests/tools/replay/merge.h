@@ -6,7 +6,7 @@
 
 namespace tendon::replay {
 
-/// `tendon-replay --merge`: the recordings of both ends of a coupling as one, in the leader's time.
+/// Options of `tendon-replay --merge`, which merges the recordings of both ends of a coupling on the leader's clock.
 struct MergeOptions {
   std::filesystem::path leader;
   std::filesystem::path follower;
@@ -14,16 +14,15 @@ struct MergeOptions {
   bool json = false;
 };
 
-/// Writes an MCAP file with every message of both, the leader's channels under /leader and the follower's under
-/// /follower (/leader/haptic/step), their bytes as they were recorded and the follower's times moved by the offset of
-/// the clocks; and /merge/clock, a ClockBound (recording.proto) each second. The bound comes from the PortStates that
-/// both recorded (clock_bound.h). Of a server with several devices its first device is the coupled one. Of a follower
-/// with several leaders the ports of this one are taken, and those of the others left out.
+/// Writes an MCAP file with every message of both recordings. The leader's channels move to /leader and the follower's
+/// to /follower (for example /leader/haptic/step). Message bytes do not change; the follower's times are corrected by
+/// the clock offset. /merge/clock contains a ClockBound (recording.proto) for each second, computed from the PortStates
+/// in both recordings (clock_bound.h). If a server has several devices, the first must be the coupled one. If a
+/// follower has several leaders, only the ports of this leader are copied.
 ///
-/// Prints the offset, the bound, the drift and the damaged regions to `out`, and warns if the drift is probably more than
-/// kMostDrift. Throws std::runtime_error when a file cannot be read
-/// or written, when `out` exists, when the two are not the two ends of one coupling, when one of the clocks stepped, or when they drift by
-/// more than kMostDrift.
+/// Prints the offset, the bound, the drift and the damaged regions to `out`, and warns if the drift is probably more
+/// than kMostDrift. Throws std::runtime_error if a file cannot be read or written, `out` exists, the recordings are not
+/// the two ends of one coupling, a clock was stepped, or the drift exceeds kMostDrift.
 void merge(const MergeOptions& options, std::ostream& out);
 
 }  // namespace tendon::replay

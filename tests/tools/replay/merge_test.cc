@@ -24,8 +24,8 @@ using tendon::testing::ScratchFolder;
 
 constexpr Duration kAhead = 250ms;  // of the follower's clock
 
-/// Ten seconds of a coupling, as one of its ends records it. `epoch`: the leader's 1, the follower's 2.
-/// `drift` is that of its clock, and `way` the delay of what it receives.
+/// Records ten seconds of a coupling at one end. `epoch`: 1 for the leader, 2 for the follower. `drift` belongs to the
+/// clock of this end, and `way` is the delay of its received datagrams.
 void record(const std::filesystem::path& file, std::uint64_t epoch, Duration ahead, double drift = 0,
             Duration way = 2980us) {
   FileSink sink(file);
@@ -93,7 +93,7 @@ TEST_F(Merge, PutsBothEndsIntoTheLeadersTime) {
     EXPECT_EQ(both.messages.at(end + "/haptic/step"), 10'000) << end;
     EXPECT_EQ(both.messages.at(end + "/haptic/port"), 10'000) << end;
     EXPECT_EQ(both.messages.at(end + "/scene"), 1) << end;
-    // The ways there and back take the same time, so that the offset is exact.
+    // The delays in both directions are equal, so the offset is exact.
     const auto first = static_cast<std::int64_t>(both.first.at(end + "/haptic/step"));
     EXPECT_NEAR(static_cast<double>(first - 1'000'001'000'000), 0, 2e3) << end;
   }
@@ -131,7 +131,7 @@ TEST_F(Merge, SaysHowTheClocksDriftAndWarnsAndRefusesAboveTheBound) {
   EXPECT_FALSE(std::filesystem::exists(both_));
 }
 
-/// As a follower of several leaders records it: a port for each of them in each step.
+/// Records a follower with several leaders: each step has a port for each leader.
 void record_follower_of(const std::filesystem::path& file, const std::vector<std::uint64_t>& leaders, Duration ahead) {
   FileSink sink(file);
   Recorder recorder({.scene = {.text = "", .seed = 1, .version = "1", .commit = "c", .unix_offset = 1000s},
@@ -165,7 +165,7 @@ TEST_F(Merge, FindsTheStatesOfOneLeaderAmongThoseOfSeveral) {
   record_follower_of(shared, {7, 1}, kAhead);
   std::ostringstream out;
   merge({.leader = leader_, .follower = shared, .out = both_, .json = true}, out);
-  // The way from this leader takes a millisecond longer than the way back.
+  // The delay from this leader is 1 ms longer than the delay back.
   EXPECT_NE(out.str().find("\"offset_s\":0.2504"), std::string::npos) << out.str();
   EXPECT_EQ(read(both_).messages.at("/follower/haptic/port"), 10'000) << "those of the other leader are left out";
   EXPECT_EQ(read(both_).messages.at("/leader/haptic/port"), 10'000);

@@ -34,7 +34,7 @@ namespace {
 
 constexpr std::size_t kMostDrawn = lab::kMostDrawings / 2;  // devices in a picture
 
-/// What may stand in the way of reading a recording as one run.
+/// Gaps that prevent a comparison of the following steps.
 struct Gaps {
   std::uint64_t lost_steps = 0;
   std::uint64_t lost_datagrams = 0;
@@ -50,7 +50,7 @@ HapticController::Config control_of(const SceneRecord& scene, const Options& opt
   HapticController::Config recorded;
   try {
     recorded = parse({});
-  } catch (const SceneError& error) {  // The file is wrong, and not the command line.
+  } catch (const SceneError& error) {  // An error of the file, not of the command line.
     throw std::runtime_error(options.recording.string() + ": " + error.what());
   }
   std::vector<std::string> settings;
@@ -61,7 +61,7 @@ HapticController::Config control_of(const SceneRecord& scene, const Options& opt
 
 /// The selected devices, by their number in the recording.
 struct Chosen {
-  std::vector<std::string> names;  ///< of all
+  std::vector<std::string> names;  ///< of all devices
   std::vector<bool> is_chosen;
 
   std::size_t count() const { return static_cast<std::size_t>(std::ranges::count(is_chosen, true)); }
@@ -92,8 +92,8 @@ Chosen choose(const Options& options) {
   return chosen;
 }
 
-/// Reads the parts of the recording. Calls `visit` with the number of the device, the recorded step and the replayed step
-/// for each selected device. Each part starts with the scenes. The scenes of the first part are used.
+/// Reads the parts of the recording. Calls `visit` with the number of the device, the recorded step and the replayed
+/// step for each selected device. Each part starts with the scenes, of which only those of the first part are used.
 template <class Visit, class VisitDatagram>
 Gaps read_run(const Options& options, const Chosen& chosen, Rerun::Held held, const Visit& visit,
               const VisitDatagram& visit_datagram) {
@@ -130,7 +130,7 @@ Gaps read_run(const Options& options, const Chosen& chosen, Rerun::Held held, co
   return gaps;
 }
 
-/// Bit for bit, as far as that can be said.
+/// Bitwise comparison of the steps.
 struct Comparison {
   std::uint64_t steps = 0;
   std::uint64_t same = 0;
@@ -174,7 +174,7 @@ struct Comparison {
   }
 };
 
-/// A row for each step; what is not a number is left empty.
+/// A row for each step. NaN becomes an empty field.
 class Csv {
  public:
   explicit Csv(const std::filesystem::path& path) : path_(path) {
@@ -233,7 +233,7 @@ class Csv {
   bool started_ = false;
 };
 
-/// A line on a terminal that is written over, and gone at the end.
+/// A progress line on a terminal, erased at the end.
 class Progress {
  public:
   explicit Progress(bool on) : on_(on) {}
@@ -275,7 +275,7 @@ lab::Run run_of(const std::string& label, const Options& options, const lab::Run
           .damage = gaps.damage};
 }
 
-/// A second look at the recording: what is drawn depends on what it comes down to.
+/// Reads the recording a second time, because the drawings depend on the summary.
 void draw_all(const Options& options, const Chosen& chosen, Rerun::Held held, const std::deque<Both>& devices) {
   std::vector<lab::Drawing> drawings;
   std::vector<std::size_t> first(devices.size());  // drawing of each device
@@ -300,7 +300,7 @@ void draw_all(const Options& options, const Chosen& chosen, Rerun::Held held, co
   lab::draw(*options.picture, drawings);
 }
 
-/// Selects up to `most` devices in their order. Devices that differ are preferred.
+/// Selects up to `most` devices in their order, preferring devices that differ.
 std::vector<std::size_t> with_columns(const std::deque<Both>& devices, const std::vector<std::size_t>& examined) {
   std::vector<std::size_t> shown;
   for (const bool held : {false, true}) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// tendon-replay: a recording through the control law again.
+// tendon-replay: runs a recording through the control law again.
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>

@@ -31,7 +31,7 @@ kind = "aol+"
 )";
 constexpr std::uint64_t kSteps = 2000;
 
-/// Two seconds of a remote wall over a bad network, as a server records them.
+/// Two seconds of a remote wall over a bad network, as recorded by a server.
 std::vector<StepRecord> tapping() {
   const Scene scene = parse_scene(kScene, "scene", ".");
   SimulatedDevice device(scene.simulated());
@@ -63,7 +63,7 @@ std::filesystem::path write(const std::filesystem::path& file, const std::vector
   return file;
 }
 
-/// The same run of each of so many devices; step `wrong` of the last one has another force.
+/// Records the same run for `devices` devices; step `wrong` of the last device has a different force.
 std::filesystem::path write_fleet(const std::filesystem::path& file, std::size_t devices, std::size_t wrong) {
   const std::vector<StepRecord> steps = tapping();
   FileSink sink(file);

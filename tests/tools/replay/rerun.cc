@@ -14,7 +14,7 @@ namespace tendon::replay {
 
 namespace {
 
-/// What the forces' keeper found, of all reasons of a step.
+/// The reasons of a step that come from the input of the law.
 constexpr std::uint32_t kUpstream =
     static_cast<std::uint32_t>(Reason::kRampIn) | static_cast<std::uint32_t>(Reason::kHeld) |
     static_cast<std::uint32_t>(Reason::kDecaying) | static_cast<std::uint32_t>(Reason::kSafeStop);
@@ -36,7 +36,7 @@ ForceChannels::Wanted wanted_in(const StepRecord& recorded) {
   return wanted;
 }
 
-/// Empty for a device that has a position only.
+/// Empty for a device that has only a position.
 std::optional<HandleSample> handle_in(const StepRecord& recorded, const Effort& held) {
   if (!recorded.turn() && !recorded.grip()) return std::nullopt;
   HandleSample handle{.torque = held.torque, .grip_force = held.grip};
@@ -64,7 +64,7 @@ std::string digits(const Vec3& value) {
 bool same(double a, double b) { return std::bit_cast<std::uint64_t>(a) == std::bit_cast<std::uint64_t>(b); }
 bool same(const Vec3& a, const Vec3& b) { return same(a.x(), b.x()) && same(a.y(), b.y()) && same(a.z(), b.z()); }
 
-/// The device clamps after the law has spoken.
+/// Removes the device's clamp, which is applied after the law.
 Reasons of_the_law(Reasons reasons) {
   return Reasons::from_bits(reasons.bits() & ~static_cast<std::uint32_t>(Reason::kDeviceClamp));
 }
@@ -81,7 +81,7 @@ Step Rerun::take(const StepRecord& recorded, const Effort& held) {
     return controller_.step(recorded.hand, applied, recorded.hand_force, wanted_in(recorded), handle,
                             has_port ? settled_ : Purse::Settlement{}, has_port ? grip_settled_ : Purse::Settlement{});
   }
-  // Of a position that was not believed the record has only that it was not.
+  // For a rejected position the record contains only the rejection.
   ++missed_;
   Motion hand = recorded.hand;
   const bool jumped = recorded.mode == Mode::kFault && controller_.fault() == HapticController::Fault::kNone;
@@ -104,7 +104,7 @@ StepRecord Rerun::step(const StepRecord& recorded) {
   if (recorded.disarmed) controller_.disarm();
   StepRecord again = recorded;
   static_cast<Step&>(again) = take(recorded, held_ == Held::kRecorded ? was_held(recorded) : own_);
-  // Of the force in use the record knows more than the law.
+  // The law does not compute these fields.
   again.force_sequence = recorded.force_sequence;
   again.loop_age = recorded.loop_age;
   again.force_error = recorded.force_error;

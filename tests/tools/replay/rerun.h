@@ -10,25 +10,26 @@
 
 namespace tendon::replay {
 
-/// Takes recorded steps again, one by one: the motion, the sensor and the forces that were wanted come from the record,
-/// all else from a controller of its own.
+/// Replays recorded steps one by one with a new controller. The motion, the sensor and the requested forces come from
+/// the
+/// record.
 ///
-///     kRecorded   the interval is booked with the force that the device held then: the same law gives the same bits
-///     kOwn        … with the force that this law gave. Another law then keeps its own account. The hand still moves as
-///     it
-///                 was recorded; with other forces it would have moved otherwise
+///     kRecorded   accounts each interval with the recorded force: the same law gives identical bits
+///     kOwn        accounts each interval with the force of this law, for another law. The hand still moves as
+///     recorded,
+///                 although other forces would have changed its motion
 ///
 /// Thread-safe: no. Realtime-safe: no.
 class Rerun {
  public:
   enum class Held { kRecorded, kOwn };
 
-  /// Throws what HapticController throws.
+  /// Throws as HapticController does.
   Rerun(const HapticController::Config& control, Held held)
       : controller_(without_coupling(control)), max_missed_(control.max_missed), held_(held) {}
 
-  /// What the purse of a coupling settled in the next step, if that has this tick. The couplings of a step follow each
-  /// other as they were recorded. The rest of a coupling is in the force that was wanted.
+  /// Adds the energy that a coupling's tank settles in the next step, if that has the tick of `port`. Couplings of a
+  /// step are passed in their recorded order. All other effects of a coupling are in the recorded requested force.
   void settled(const PortRecord& port) {
     if (std::exchange(settled_at_, port.tick) != port.tick) settled_ = {};
     settled_.credit += port.settled.credit;
@@ -36,7 +37,8 @@ class Rerun {
     grip_settled_ = port.grip_settled;
   }
 
-  /// `recorded` with what this controller makes of it. `applied` is its own force with kOwn, else the recorded one.
+  /// Returns `recorded` with the results of this controller. `applied` is its own force with kOwn, else the recorded
+  /// one.
   StepRecord step(const StepRecord& recorded);
 
  private:
@@ -49,16 +51,16 @@ class Rerun {
 
   HapticController controller_;
   std::uint32_t max_missed_;
-  std::uint32_t missed_ = 0;  ///< readings in a row
+  std::uint32_t missed_ = 0;  ///< consecutive readings
   Held held_;
   Effort own_;
-  Purse::Settlement settled_;       ///< of all couplings
-  Purse::Settlement grip_settled_;  ///< of the grippers, which only a single coupling ties
+  Purse::Settlement settled_;       ///< sum over all couplings
+  Purse::Settlement grip_settled_;  ///< grip part, used by a single coupling only
   std::uint64_t settled_at_ = 0;    ///< tick; 0: none yet
 };
 
-/// What of a step a law decides, and that is not the same bit for bit: "energy_j: recorded 0.1, again 0.2". Empty when
-/// all is.
+/// Returns the first result of the law that is not bitwise identical, for example "energy_j: recorded 0.1, again 0.2",
+/// or an empty string.
 std::string difference(const StepRecord& recorded, const StepRecord& again);
 
 }  // namespace tendon::replay

@@ -26,7 +26,7 @@ Scene scene_with(const std::vector<std::string>& settings) {
   return parse_scene(std::string(testing::kTapping), "scene", ".", settings);
 }
 
-/// What a server recorded while a remote wall of 2000 N/m answered over a bad network.
+/// A server's record of a remote wall of 2000 N/m over a bad network.
 std::vector<StepRecord> recorded(const Scene& scene) {
   SimulatedDevice device(scene.simulated());
   simulation::World::Config config;
@@ -46,7 +46,7 @@ std::vector<StepRecord> recorded(const Scene& scene) {
   return steps;
 }
 
-/// The first difference; empty when there is none.
+/// Returns the first difference, or an empty string.
 std::string first_difference(const HapticController::Config& control, const std::vector<StepRecord>& steps) {
   Rerun rerun(control, Rerun::Held::kRecorded);
   for (const StepRecord& step : steps) {
@@ -107,7 +107,7 @@ INSTANTIATE_TEST_SUITE_P(Rerun, EveryLaw, ::testing::ValuesIn(cases()), [](const
   return name;
 });
 
-/// A device that can be out of order, with a hand that swings.
+/// A device that can fail, with a swinging hand.
 class Flaky : public Device {
  public:
   const DeviceInfo& info() const noexcept override { return info_; }
@@ -126,7 +126,7 @@ class Flaky : public Device {
   std::uint64_t reads_ = 0;
 };
 
-/// The steps of a loop that a force of 3 N into a wall keeps busy, with faults of all kinds, each followed by a rearm.
+/// Steps of a loop with a force of 3 N into a wall and faults of all kinds, each followed by a rearm.
 std::vector<StepRecord> troubled(const HapticLoop::Config& config) {
   Flaky device;
   const auto mail = std::make_unique<Mailboxes>();

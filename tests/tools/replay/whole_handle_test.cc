@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A stylus that turns and grips, at an engine that is 20 ms away: what the server does, and that a recording of it is
-// taken again to the last bit.
+//
+// A stylus that turns and grips, with an engine 20 ms away: checks the server, and that its recording replays to the
+// last bit.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -69,7 +70,7 @@ viscous_friction_n_s_per_m = 0.25
 
 Scene stylus(const std::vector<std::string>& settings) { return parse_scene(kStylus, "scene", ".", settings); }
 
-/// A wall at x > 0, a torsion spring about z, and something soft between the fingers.
+/// A wall at x > 0, a torsion spring about z, and a soft object between the fingers.
 Touch peg(const DeviceState& state) {
   Touch touch(Vec3(-1000 * std::max(0.0, state.position.x()), 0, 0));
   const Mat3 stiffness = Vec3(0.1, 0.1, 0.5).asDiagonal();
@@ -79,7 +80,7 @@ Touch peg(const DeviceState& state) {
   return touch;
 }
 
-/// 4 s at an engine of 100 Hz, 20 ± 5 ms away, that loses 2 % of its datagrams.
+/// 4 s with an engine of 100 Hz, 20 ± 5 ms away, and 2 % loss.
 std::vector<StepRecord> lived(const Scene& scene, const Physics& physics = peg) {
   SimulatedDevice device(scene.simulated());
   simulation::World::Config config;

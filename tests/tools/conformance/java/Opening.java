@@ -11,7 +11,7 @@ final class Opening {
   static final int HEADER = 16;
   static final int LARGEST = 1200;
   private static final long REPEAT_NS = 100_000_000;
-  private static final String AES = "aes-256-gcm"; // the feature by which suite 2 is offered and chosen
+  private static final String AES = "aes-256-gcm"; // the feature that offers and selects suite 2
 
   private final int suite;
   private final byte[] random = new byte[16];
@@ -85,7 +85,7 @@ final class Opening {
     if (datagram.length < 32 || datagram.length > LARGEST || datagram[0] != 0x54 || datagram[3] != suite) return;
     if (!Arrays.equals(datagram, 16, 32, random, 0, 16)) return;
     if (datagram[1] == 0x12 && datagram.length == 48) {
-      due = due || cookie == null; // at once to the first Retry only
+      due = due || cookie == null; // only the first Retry is answered immediately
       cookie = Arrays.copyOfRange(datagram, 32, 48);
     } else if (datagram[1] == 0x14) {
       settle(now, datagram);

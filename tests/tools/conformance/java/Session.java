@@ -24,7 +24,7 @@ final class Session {
   private final int suite;
   private final long opened;
 
-  // Out.
+  // Sending.
   private byte[] sendKey;
   private int sendEpoch;
   private long sealed;
@@ -32,12 +32,12 @@ final class Session {
   private long next;
   private Long lastSent;
   private long sequence;
-  private Tendon.DeviceState unanswered; // the newest state, when no force has answered it yet
-  private boolean asked = true; // one request: id 1, 500 states per second
+  private Tendon.DeviceState unanswered; // the newest state, if no force has answered it yet
+  private boolean asked = true; // the only request: id 1, 500 states per second
   private long askAt;
   private int timesAsked;
 
-  // In.
+  // Receiving.
   private byte[] receiveKey;
   private byte[] previousKey;
   private int receiveEpoch;
@@ -45,7 +45,7 @@ final class Session {
   private long highest = -1;
   private final BitSet seen = new BitSet(RING);
   private long lastHeard;
-  private long echoNumber = -1; // of the newest datagram that was accepted
+  private long echoNumber = -1; // of the newest accepted datagram
   private long echoSent;
   private long echoAt;
   private Long newestTick;

@@ -49,7 +49,7 @@ public final class Spring {
         new InetSocketAddress(arguments[0].substring(0, colon), Integer.parseInt(arguments[0].substring(colon + 1)));
     Spring spring = new Spring(server, arguments.length == 2 ? readKey(Path.of(arguments[1])) : null);
     Thread main = Thread.currentThread();
-    // SIGTERM and Ctrl-C: the JVM waits for this thread, and it for the Byes.
+    // On SIGTERM and Ctrl-C the JVM waits for this thread, which waits until the Byes are sent.
     Runtime.getRuntime()
         .addShutdownHook(
             new Thread(
@@ -111,7 +111,7 @@ public final class Spring {
   private static void pull(Tendon.DeviceState hand, Tendon.ForceCommand.Builder answer) {
     Tendon.Vec3 at = hand.getPositionM();
     answer.setForceN(times(-STIFFNESS, at.getX(), at.getY(), at.getZ()));
-    if (!hand.hasOrientation()) return; // as from a server that has not granted "handle"
+    if (!hand.hasOrientation()) return; // the server has not granted "handle"
     Tendon.Quat q = hand.getOrientation();
     answer
         .setTorqueNm(times(-2 * ANGULAR_STIFFNESS * q.getW(), q.getX(), q.getY(), q.getZ()))
@@ -128,12 +128,12 @@ public final class Spring {
     try {
       channel.write(ByteBuffer.wrap(datagram));
     } catch (PortUnreachableException nobodyThere) {
-      // As if it were lost.
+      // Treated as a lost datagram.
     }
   }
 
   private byte[] receive() throws IOException {
-    ByteBuffer buffer = ByteBuffer.allocate(2048); // one that is longer than 1200 bytes is seen to be
+    ByteBuffer buffer = ByteBuffer.allocate(2048); // detects datagrams longer than 1200 bytes
     try {
       return channel.read(buffer) > 0 ? Arrays.copyOf(buffer.array(), buffer.position()) : null;
     } catch (PortUnreachableException nobodyThere) {

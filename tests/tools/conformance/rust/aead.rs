@@ -40,7 +40,7 @@ extern "C" {
     fn crypto_aead_aes256gcm_is_available() -> c_int;
 }
 
-/// After noise::start().
+/// Call noise::start() first.
 pub fn has_aes() -> bool {
     unsafe { crypto_aead_aes256gcm_is_available() == 1 }
 }
@@ -83,7 +83,7 @@ impl Cipher {
         out
     }
 
-    /// Nothing when it is not authentic.
+    /// None unless authentic.
     pub fn open(self, key: &Key, nonce: &[u8; 12], associated: &[u8], sealed: &[u8]) -> Option<Vec<u8>> {
         let mut out = vec![0; sealed.len().checked_sub(16)?];
         let decrypt = match self {
@@ -110,7 +110,7 @@ impl Cipher {
     }
 }
 
-/// What seals one direction: a cipher with its key.
+/// Seals one direction: a cipher with its key.
 #[derive(Clone, Copy)]
 pub struct Sealing {
     pub cipher: Cipher,
@@ -122,12 +122,12 @@ impl Sealing {
         self.cipher.seal(&self.key, &self.cipher.nonce(number), associated, text)
     }
 
-    /// Nothing when it is not authentic.
+    /// None unless authentic.
     pub fn open(&self, number: u64, associated: &[u8], sealed: &[u8]) -> Option<Vec<u8>> {
         self.cipher.open(&self.key, &self.cipher.nonce(number), associated, sealed)
     }
 
-    /// The next of this direction.
+    /// The next key of this direction.
     pub fn next(&self) -> Sealing {
         Sealing { cipher: self.cipher, key: self.seal(u64::MAX, &[], &[0; 32])[..32].try_into().unwrap() }
     }

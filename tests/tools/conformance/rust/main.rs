@@ -45,7 +45,7 @@ extern "C" fn on_signal(_: c_int) {
     END.store(true, Ordering::SeqCst);
 }
 
-/// The remote environment: a function of the state, and of what the server says about the handle.
+/// The remote environment: a function of the state and the server's description of the handle.
 #[derive(Default)]
 struct Spring {
     sequence: u64,
@@ -56,13 +56,13 @@ struct Spring {
     max_gripper_force_n: Option<f64>,
 }
 
-/// Shortens a vector to a length. True: it was longer.
+/// Limits the length of a vector. Returns true if it was longer.
 fn shorten<const N: usize>(vector: &mut [f64; N], most: f64) -> bool {
     let length = vector.iter().map(|part| part * part).sum::<f64>().sqrt();
     if length <= most {
         return false;
     }
-    // A hair shorter, so that rounding does not leave it longer than the limit.
+    // The margin covers rounding, which could exceed the limit.
     vector.iter_mut().for_each(|part| *part *= most * (1.0 - 1e-12) / length);
     true
 }
@@ -102,14 +102,14 @@ impl Spring {
         command.0
     }
 
-    /// Torque, grip force and the torque's model, each only where the device has motors for it.
+    /// Torque, grip force and the torque's model, each only if the device has motors for it.
     fn answer_turn(&self, state: &Node, command: &mut Writer) {
         let orientation = state.sub(15).map(Node::reals::<4>);
         let mut model = None;
         if let (Some(at), true) = (orientation, state.has(18)) {
             let [w, x, y, z] = at;
             let speed: [f64; 3] = state.sub(16).map(Node::reals).unwrap_or_default();
-            // The turn from upright is the orientation itself, so this is the gradient of 2 vᵀ K v (WIRE.md).
+            // The rotation from upright is the orientation itself, so this is the gradient of 2 vᵀ K v (WIRE.md).
             let mut torque = [x, y, z].map(|part| -2.0 * ANGULAR_STIFFNESS_NMPRAD * w * part);
             for (part, speed) in torque.iter_mut().zip(speed) {
                 *part -= ANGULAR_DAMPING_NMSPRAD * speed;
@@ -133,7 +133,7 @@ impl Spring {
     }
 }
 
-/// What a session showed, for the words at its end.
+/// Summary of a session, printed at its end.
 #[derive(Debug, Default)]
 struct Seen {
     states: u64,
@@ -194,7 +194,7 @@ impl Client {
         self.start.elapsed().as_nanos() as i64
     }
 
-    /// An error is the answer to an earlier datagram that nobody was there to receive, or a full queue: as if lost.
+    /// An error means that an earlier datagram met a closed port or that a queue is full. Treats it as a loss.
     fn send(&self, bytes: &[u8]) {
         let _ = self.socket.send(bytes);
     }
@@ -247,7 +247,7 @@ impl Client {
         }
     }
 
-    /// Takes what the session has to say. The code with which it is over, if it is.
+    /// Handles the session's events. Returns the code if the session has ended.
     fn take_events(&mut self) -> Option<i128> {
         let (session, welcome) = match &mut self.phase {
             Phase::Open(session, welcome) => (session, welcome),
@@ -286,7 +286,7 @@ impl Client {
         None
     }
 
-    /// Sends what is due, and says when to look again.
+    /// Sends what is due and returns the time of the next call.
     fn advance(&mut self) -> i64 {
         let now_ns = self.now_ns();
         match &mut self.phase {
@@ -322,7 +322,7 @@ impl Client {
         let mut buffer = [0; 2048];
         self.attempt();
         while !END.load(Ordering::SeqCst) {
-            // A state is answered before the next one is read.
+            // Answers a state before reading the next one.
             if let Some(code) = self.take_events() {
                 if code == CODE_REPLACED {
                     exit(1);

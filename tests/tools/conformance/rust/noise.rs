@@ -16,7 +16,7 @@ extern "C" {
 
 pub type Key = [u8; 32];
 
-/// Before anything else of this file. libsodium reads the system's source of randomness here.
+/// Call this before any other function of this file. libsodium initializes its random number generator here.
 pub fn start() {
     assert!(unsafe { sodium_init() } >= 0, "libsodium does not start");
 }
@@ -52,7 +52,7 @@ fn public_of(secret: &Key) -> Key {
     out
 }
 
-/// Nothing for a public key of low order: libsodium refuses a result of 32 zeros.
+/// None for a public key of low order: libsodium refuses a result of 32 zeros.
 pub fn x25519(secret: &Key, public: &Key) -> Option<Key> {
     let mut out = [0; 32];
     let failed = unsafe { crypto_scalarmult_curve25519(out.as_mut_ptr(), secret.as_ptr(), public.as_ptr()) } != 0;
@@ -66,7 +66,7 @@ pub fn key_id(key: &Key) -> [u8; 8] {
     sha256(&[b"tendon-key-id", key.as_slice()].concat())[..8].try_into().unwrap()
 }
 
-/// What seals Data, client → server and server → client.
+/// Seals Data, client → server and server → client.
 #[derive(Clone, Copy)]
 pub struct Keys {
     pub send: Sealing,
@@ -90,7 +90,7 @@ impl Finished {
     }
 }
 
-/// A client's half of one attempt. The state after message 1 stays as it is, whatever messages 2 come.
+/// The client side of one attempt. Invalid messages 2 do not change the state after message 1.
 pub struct Handshake {
     ephemeral: Key,
     state: Symmetric,
@@ -142,14 +142,13 @@ impl Handshake {
         state.mix_key_and_hash(psk);
         let public = public_of(&ephemeral);
         state.mix_hash(&public);
-        state.mix_key(&public); // with a psk an ephemeral key goes into the key, too
+        state.mix_key(&public); // with a psk, Noise also mixes an ephemeral key into the key
         let sealed = state.sealing().seal(state.nonce, &state.hash, text);
         state.nonce += 1;
         state.mix_hash(&sealed);
         (Handshake { ephemeral, state }, [public.as_slice(), &sealed].concat())
     }
 
-    /// Reads Noise message 2.
     pub fn finish(&self, message: &[u8]) -> Option<Finished> {
         let theirs: Key = message.get(..32)?.try_into().ok()?;
         let mut state = self.state.clone();
@@ -164,7 +163,7 @@ impl Handshake {
     }
 }
 
-/// Whether a server grants no more than to observe, and the key. The error is a sentence for people.
+/// Returns whether the key grants only observation, and the key. The error is a sentence for users.
 pub fn read_key(text: &str) -> Result<(bool, Key), &'static str> {
     let mut lines = text.lines().map(str::trim).filter(|line| !line.is_empty() && !line.starts_with('#'));
     let words: Vec<&str> = lines.next().ok_or("no key in it")?.split_ascii_whitespace().collect();

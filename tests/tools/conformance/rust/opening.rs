@@ -13,7 +13,7 @@ pub const ANSWER_TYPE: u8 = 4;
 pub const OBSERVER: i128 = 1;
 pub const CONTROLLER: i128 = 2;
 pub const FEATURES: [&str; 2] = ["local-model", "handle"];
-const AES: &str = "aes-256-gcm"; // offers suite 2, and chooses it
+const AES: &str = "aes-256-gcm"; // offers and selects suite 2
 const VERSION: i128 = 1;
 const REPETITION_NS: i64 = 100_000_000;
 
@@ -25,7 +25,6 @@ pub fn header(kind: u8, epoch: u8, suite: u8, connection: u32, number: u64) -> [
     bytes
 }
 
-/// What the server has said yes to.
 pub struct Welcome {
     pub connection: u32,
     pub controls: bool,
@@ -33,7 +32,7 @@ pub struct Welcome {
     pub handle: bool,
     pub max_force_n: f64,
     pub device_name: String,
-    /// Nothing in suite 0.
+    /// None in suite 0.
     pub keys: Option<Keys>,
 }
 
@@ -48,7 +47,7 @@ pub struct Attempt {
     cookie: Option<[u8; 16]>,
     noise: Option<Handshake>,
     controls: bool,
-    body: Vec<u8>, // all of the Hello from its length on
+    body: Vec<u8>, // the Hello from its length field on
     pub due_ns: i64,
 }
 
@@ -80,12 +79,12 @@ impl Attempt {
         Attempt { random, cookie: None, noise: state, controls, body, due_ns: now_ns }
     }
 
-    /// Of the handshake: 0 or 1.
+    /// Suite of the handshake: 0 or 1.
     fn suite(&self) -> u8 {
         u8::from(self.noise.is_some())
     }
 
-    /// The Hello, when it is due.
+    /// Returns the Hello when it is due.
     pub fn next(&mut self, now_ns: i64) -> Option<Vec<u8>> {
         if now_ns < self.due_ns {
             return None;
@@ -101,7 +100,7 @@ impl Attempt {
     }
 
     pub fn receive(&mut self, bytes: &[u8], now_ns: i64) -> Outcome {
-        // A header with the number of the connection, which only an Answer has.
+        // Only an Answer has a connection id in its header.
         let connection = match bytes.get(4..8) {
             Some(field) => u32::from_le_bytes(field.try_into().unwrap()),
             None => return Outcome::Nothing,
@@ -112,7 +111,7 @@ impl Attempt {
         };
         if bytes.len() == 48 && is(RETRY, 0) {
             if self.cookie.is_none() {
-                self.due_ns = now_ns; // only the first is answered at once
+                self.due_ns = now_ns; // only the first Retry is answered immediately
             }
             self.cookie = Some(bytes[32..].try_into().unwrap());
             return Outcome::Nothing;

@@ -18,10 +18,10 @@ pub enum Kind {
 }
 
 pub enum Label {
-    /// Absent is 0, and 0 has to be within the bounds.
+    /// An absent field is 0, which must be within the bounds.
     One,
     Optional,
-    /// Absent is refused.
+    /// An absent field is an error.
     Required,
     Many(fn(usize) -> bool),
 }
@@ -30,9 +30,9 @@ pub enum Bound {
     Any,
     Whole(i128, i128),
     Between(f64, f64),
-    /// The lower end is excluded.
+    /// Excludes the lower end.
     Above(f64, f64),
-    /// +infinity is allowed besides.
+    /// Also allows +infinity.
     OrInfinite(f64, f64),
     Bytes(usize),
 }
@@ -41,9 +41,9 @@ pub struct Field(pub u32, pub Kind, pub Label, pub Bound);
 
 pub struct Schema {
     pub fields: &'static [Field],
-    /// Of these at most one is present: the last that came.
+    /// At most one of these is present: the last one received.
     pub oneof: &'static [u32],
-    /// What the bounds of single fields do not say.
+    /// Constraints beyond the bounds of single fields.
     pub rule: fn(&Node) -> bool,
 }
 
@@ -55,7 +55,7 @@ pub enum Value {
     Sub(Node),
 }
 
-/// A message that was read: the values of each field that is present, by number.
+/// A parsed message: the values of each present field, by number.
 #[derive(Clone, Debug, Default)]
 pub struct Node(BTreeMap<u32, Vec<Value>>);
 
@@ -96,7 +96,7 @@ impl Node {
             _ => None,
         })
     }
-    /// Fields 1 … N, all of them numbers: a vector, or a quaternion.
+    /// Fields 1 … N, all of them numbers: a vector or a quaternion.
     pub fn reals<const N: usize>(&self) -> [f64; N] {
         let mut values = [0.0; N];
         for (i, value) in values.iter_mut().enumerate() {
@@ -106,7 +106,7 @@ impl Node {
     }
 }
 
-/// Not protobuf, or text that is not UTF-8.
+/// Malformed protobuf, or text that is not UTF-8.
 #[derive(Debug)]
 pub struct Malformed;
 
@@ -117,7 +117,7 @@ impl<'a> Reader<'a> {
         let mut value = 0u64;
         for i in 0..10 {
             let byte = *self.take(1)?.first().ok_or(Malformed)?;
-            value |= u64::from(byte & 0x7f) << (7 * i); // what the tenth byte has beyond 64 bits is cut off
+            value |= u64::from(byte & 0x7f) << (7 * i); // bits beyond 64 in the tenth byte are discarded
             if byte & 0x80 == 0 {
                 return Ok(value);
             }
@@ -258,7 +258,7 @@ fn value_fits(value: &Value, kind: &Kind, bound: &Bound) -> bool {
     }
 }
 
-/// Whether all of the message is within its bounds. What is absent is judged as 0, unless it may be absent.
+/// Whether the whole message is within its bounds. A missing field counts as 0 unless it is optional.
 pub fn fits(schema: &Schema, node: &Node) -> bool {
     let fields_fit = schema.fields.iter().all(|Field(number, kind, label, bound)| {
         let values = node.all(*number);
@@ -278,7 +278,7 @@ pub fn fits(schema: &Schema, node: &Node) -> bool {
     fields_fit && (schema.rule)(node)
 }
 
-/// Writes a message. Fields are written in the order of the calls; zeros are left out, as proto3 does.
+/// Writes a message. Fields are written in the order of the calls. Zeros are omitted, as in proto3.
 #[derive(Default)]
 pub struct Writer(pub Vec<u8>);
 
@@ -311,13 +311,13 @@ impl Writer {
             self.0.extend(value.to_le_bytes());
         }
     }
-    /// −0 is not left out: its bits are not zero.
+    /// −0 is written, because its bits are not zero.
     pub fn real(&mut self, number: u32, value: f64) {
         if value.to_bits() != 0 {
             self.present_real(number, value);
         }
     }
-    /// A field that says something even when it is 0.
+    /// A field whose presence matters even if it is 0.
     pub fn present_real(&mut self, number: u32, value: f64) {
         self.tag(number, 1);
         self.0.extend(value.to_le_bytes());
@@ -332,7 +332,7 @@ impl Writer {
             self.bytes(number, value.as_bytes());
         }
     }
-    /// A vector or a quaternion, present even when it is zero.
+    /// A vector or a quaternion, written even if it is zero.
     pub fn reals(&mut self, number: u32, values: &[f64]) {
         let mut inner = Writer::default();
         for (i, value) in values.iter().enumerate() {

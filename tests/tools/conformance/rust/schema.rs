@@ -172,7 +172,7 @@ static VIBRATION: Schema = Schema {
     rule: |node| node.real(2) == 0.0 || node.real(2) >= 20.0,
 };
 
-/// One of the two settings has to be there.
+/// Requires one of the two settings.
 static SET_OUTPUT: Schema = Schema {
     fields: &[
         Field(1, Unsigned32, One, DEVICE),
@@ -337,7 +337,7 @@ static PORT_GRIP: Schema = message(&[
     Field(7, Real, One, Between(0.0, 1e6)),
 ]);
 
-/// A scale of 0 stands for the one in Couple.
+/// A scale of 0 selects the scale of Couple.
 fn scale_or_none(scale: f64) -> bool {
     scale == 0.0 || scale >= 0.01
 }
@@ -405,7 +405,7 @@ pub static ECHO: Schema = Schema {
     rule: |_| true,
 };
 
-/// Its frames and its echo are judged one by one, so `fits` is not asked about the whole.
+/// Frames and echo are validated separately, so `fits` is not used on the whole message.
 pub static DATAGRAM: Schema = message(&[
     Field(1, Fixed64, One, TIME),
     Field(2, Sub(&ECHO), Optional, Any),

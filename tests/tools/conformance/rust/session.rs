@@ -15,7 +15,7 @@ const CODE_TIMED_OUT: i128 = 7;
 pub const CODE_EXPIRED: i128 = 8;
 const MS: i64 = 1_000_000;
 const KEEP_ALIVE_NS: i64 = 50 * MS;
-const KEY_AGE_NS: i64 = 590_000 * MS; // 10 s before the key has to be renewed
+const KEY_AGE_NS: i64 = 590_000 * MS; // 10 s before the latest renewal of the key
 const KEY_DATAGRAMS: u64 = 1 << 20;
 const OVERLAP_NS: i64 = 2_000 * MS;
 const SESSION_AGE_NS: i64 = 86_400_000 * MS;
@@ -23,7 +23,7 @@ const NUMBERS: u64 = 1 << 60;
 const OPEN_REQUESTS: u32 = 16;
 const ROOM: usize = 1200 - 16 - 16 - 64; // for frames: without header, tag, time and echo
 
-/// What stands for an answer that is out of bounds.
+/// Replaces an answer that is out of bounds.
 fn invalid_answer(id: i128) -> Node {
     let mut answer = Writer::default();
     answer.whole(1, id as u64);
@@ -50,7 +50,7 @@ impl Window {
             _ => false,
         }
     }
-    /// Whether it is the newest so far.
+    /// Returns true if the number is the newest so far.
     pub fn remember(&mut self, number: u64) -> bool {
         let newer = self.newest.map_or(true, |newest| number > newest);
         if newer {
@@ -119,7 +119,7 @@ pub struct Session {
     opened_ns: i64,
     heard_ns: i64,
     sent_ns: i64,
-    send_key: Option<Sealing>, // nothing in suite 0
+    send_key: Option<Sealing>, // None in suite 0
     send_epoch: u8,
     send_number: u64,
     key_number: u64,
@@ -179,7 +179,7 @@ impl Session {
         self.events.pop_front()
     }
 
-    /// Takes the place of a force that has not left yet. False: a number in it is out of bounds, and it is not sent.
+    /// Replaces a force that has not been sent yet. Returns false and sends nothing if a value is out of bounds.
     pub fn send_force(&mut self, force: Vec<u8>) -> bool {
         let good = decode(&FORCE, &force).map_or(false, |node| fits(&FORCE, &node));
         if good {
@@ -188,7 +188,7 @@ impl Session {
         good
     }
 
-    /// `operation`: the number of the field of Control. Nothing while 16 requests are open.
+    /// `operation`: the field number in Control. None while 16 requests are open.
     pub fn request(&mut self, operation: u32, body: &[u8], now_ns: i64) -> Option<u32> {
         if self.requests.len() >= OPEN_REQUESTS as usize {
             return None;
@@ -238,7 +238,7 @@ impl Session {
             None => return,
         };
         if sealed {
-            self.window.remember(number); // authentic, so it uses up its number whatever it says
+            self.window.remember(number); // authentic, so the number is used up regardless of the body
         }
         let datagram = match decode(&DATAGRAM, &text) {
             Ok(datagram) if usable_time(datagram.whole(1)) && datagram.all(3).len() <= 64 => datagram,
@@ -338,12 +338,12 @@ impl Session {
     fn take_frame(&mut self, frame: &Node) {
         let kind = match FRAME.oneof.iter().find(|kind| frame.has(**kind)) {
             Some(kind) => *kind,
-            None => return, // of a version to come
+            None => return, // from a later version
         };
         let body = frame.sub(kind).unwrap();
         if kind == 2 || !fits(&FRAME, frame) {
             self.counters.invalid += 1;
-            // A request or an answer with a number counts all the same: later ones wait for it.
+            // An invalid request or answer still uses its number, because later ones wait for it.
             match kind {
                 3 if body.whole(1) > 0 => self.take_request(body),
                 4 if body.whole(1) > 0 => self.take_answer(&invalid_answer(body.whole(1))),
@@ -360,7 +360,7 @@ impl Session {
                 self.end(body.whole(1), reason);
             }
             6 => self.take_newest(kind, (0, 0), body.whole(1), Event::Report(body.clone())),
-            _ => {} // DeviceReport and PeerReport are for `diagnostics`, which this client does not name
+            _ => {} // DeviceReport and PeerReport need `diagnostics`, which this client does not request
         }
     }
 
@@ -374,7 +374,7 @@ impl Session {
         self.events.push_back(event);
     }
 
-    /// Each once and in order. This client understands none, so that the answer is always the same.
+    /// Handles each request once and in order. This client supports no requests, so the answer is always the same.
     fn take_request(&mut self, control: &Node) {
         let id = control.whole(1) as u32;
         if id >= self.next_asked.saturating_add(OPEN_REQUESTS) {
@@ -403,7 +403,7 @@ impl Session {
     fn take_answer(&mut self, ack: &Node) {
         let id = ack.whole(1);
         if id >= i128::from(self.next_request) {
-            self.counters.invalid += 1; // never asked
+            self.counters.invalid += 1; // never requested
             return;
         }
         if let Some(request) = self.requests.iter_mut().find(|request| i128::from(request.id) == id) {
@@ -420,7 +420,7 @@ impl Session {
         self.events.push_back(Event::Closed { code, reason });
     }
 
-    /// Ends the session when its time has come, and returns the last words of this side then.
+    /// Ends the session after its timeout and returns its final datagrams.
     pub fn tick(&mut self, now_ns: i64) -> Vec<Vec<u8>> {
         if self.closed {
             return Vec::new();
@@ -437,7 +437,7 @@ impl Session {
         Vec::new()
     }
 
-    /// Says Bye, three times.
+    /// Sends Bye three times.
     pub fn close(&mut self, code: i128, reason: &str, now_ns: i64) -> Vec<Vec<u8>> {
         let mut bye = Writer::default();
         bye.whole(1, code as u64);
@@ -449,7 +449,7 @@ impl Session {
         byes
     }
 
-    /// What is due now, one datagram after the other.
+    /// Returns the next due datagram.
     pub fn next(&mut self, now_ns: i64) -> Option<Vec<u8>> {
         if self.closed {
             return None;
@@ -490,7 +490,7 @@ impl Session {
         Some(self.write(&frames, now_ns))
     }
 
-    /// When there may be something to do, though nothing comes in.
+    /// The time of the next action if nothing is received.
     pub fn wake_ns(&self) -> i64 {
         let requests = self.requests.iter().filter(|request| request.answer.is_none()).map(|request| request.due_ns);
         requests.fold((self.sent_ns + KEEP_ALIVE_NS).min(self.heard_ns + self.timeout_ns), i64::min)

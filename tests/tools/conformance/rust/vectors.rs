@@ -11,7 +11,7 @@ use crate::schema::{usable_time, ANSWER, DATAGRAM, ECHO, FORCE, FRAME};
 use crate::session::{Counters, Event, Session, Window};
 use crate::Spring;
 
-/// As much of JSON as the vectors have.
+/// A JSON parser for the subset that the vectors use.
 #[derive(Debug)]
 enum Json {
     Text(String),
@@ -137,7 +137,7 @@ fn sealed_keys(file: &Json) -> Keys {
     Keys { send: key("client_to_server_key"), receive: key("server_to_client_key") }
 }
 
-/// The files of suites 1 and 2; not of 2 where the processor has no AES.
+/// The files of suites 1 and 2; suite 2 only if the processor has AES.
 fn sealed_files() -> Vec<Json> {
     noise::start();
     let names: &[&str] = if aead::has_aes() { &["sealed", "sealed_aes"] } else { &["sealed"] };
@@ -153,7 +153,7 @@ fn primitives_are_those_of_the_rfcs() {
         assert_eq!(result.unwrap().to_vec(), case.at("result").bytes());
     }
     for case in file.at("hmac_sha256").list() {
-        // RFC 4231 has a result that is cut, too.
+        // RFC 4231 includes a truncated result.
         let result = case.at("result").bytes();
         assert_eq!(noise::hmac(&case.at("key").bytes(), &case.at("data").bytes())[..result.len()], result);
     }
@@ -261,14 +261,14 @@ fn key_files_are_read_or_refused() {
     }
 }
 
-/// Of messages that a client receives, and of a force, which it checks before it sends it.
+/// The vectors for messages to a client, and for forces, which the client checks before sending.
 #[test]
 fn every_bound_is_kept() {
     let mut judged = 0;
     for case in Json::load("bounds").at("bounds").list() {
         let (field, body) = (case.at("field").text(), case.at("body").bytes());
         if field.starts_with("DeviceStates.") {
-            continue; // only who names `state-columns` is sent them
+            continue; // needs the feature `state-columns`
         }
         let accepted = match case.at("message").text() {
             "Hello" => continue,

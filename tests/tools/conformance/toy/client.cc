@@ -55,7 +55,7 @@ void ToyClient::say_hello() {
   if (is(Fault::kHelloWithConnection)) out[4] = std::byte{1};
   if (is(Fault::kDirtyPadding)) out.back() = std::byte{1};
   if (is(Fault::kHelloChanges) && hellos_ % 2 == 1) {
-    // The same random, other words: in suite 1 the same ephemeral key seals two texts.
+    // The same random with another body: in suite 1 one ephemeral key would seal two texts.
     pb::Hello hello;
     hello.set_version_min(1);
     hello.set_version_max(1);

@@ -45,7 +45,7 @@ class ToyClient : public ToyPeer, public Guest {
   bool answered_ = false;
   int asked_ = 0;
   LocalTime ask_at_{};
-  std::vector<pb::ControlAck> answers_;  ///< to the requests of the server
+  std::vector<pb::ControlAck> answers_;  ///< to requests of the server
   std::vector<pb::ControlAck> due_;
 };
 

@@ -8,15 +8,14 @@
 #include "tests/tools/conformance/opening.h"
 #include "tests/tools/conformance/wire.h"
 
-// The smallest server and client that pass, and what happens to them when one rule is broken on purpose: the kit is
-// tested with these. In virtual time, without a socket.
+// Minimal conforming peers, and faults that break one rule each, for testing the kit in virtual time without sockets.
 
 namespace tendon::conformance {
 
-/// Which rule is broken.
+/// The rule that a toy breaks.
 enum class Fault : std::uint8_t {
   kNone,
-  // Data, either end.
+  // Data, either side.
   kWrongVersion,
   kSkipsNumbers,
   kTimeGoesBack,
@@ -47,7 +46,7 @@ enum class Fault : std::uint8_t {
   kSilentToBadRequests,
   kKnowsNoAes,
   kLittleEndianNonce,  ///< in suite 2
-  // A server's.
+  // Server.
   kLongRetry,
   kTwoRetries,
   kAnswersShortHellos,
@@ -112,10 +111,10 @@ enum class Fault : std::uint8_t {
   kSharesOneLeader,
   kSetsOutputsUnasked,
   kSetsAnyOutput,
-  kKnowsNoChannels,  ///< no fault: an older server
-  kKnowsNoCoupling,  ///< nor that
-  kKnowsNoColumns,   ///< nor that
-  // A client's.
+  kKnowsNoChannels,  ///< not a fault: an older server
+  kKnowsNoCoupling,  ///< not a fault
+  kKnowsNoColumns,   ///< not a fault
+  // Client.
   kShortHello,
   kHelloWithConnection,
   kDirtyPadding,
@@ -145,7 +144,7 @@ enum class Fault : std::uint8_t {
   kAsksForEver,
 };
 
-/// A peer in this process. Port numbers stand for addresses.
+/// A peer in this process. Port numbers replace addresses.
 class ToyPeer {
  public:
   struct Outgoing {
@@ -154,7 +153,7 @@ class ToyPeer {
   };
   virtual ~ToyPeer() = default;
   virtual void receive(LocalTime now, int port, Span datagram) = 0;
-  /// Every millisecond.
+  /// Called every millisecond.
   virtual void tick(LocalTime now) = 0;
   std::vector<Outgoing> take() { return std::exchange(out_, {}); }
 

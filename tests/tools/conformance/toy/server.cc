@@ -14,11 +14,10 @@ using std::chrono::seconds;
 
 namespace {
 
-/// A toy has one device with one channel.
 constexpr std::string_view kDevice = "arm";
 constexpr std::string_view kChannel = "wall";
 
-/// Whether a toy has what is claimed, and the role is the highest of it.
+/// Whether the claimed channels exist, and the role is the highest of the claims.
 bool claims_good(const pb::Hello& hello) {
   std::set<pb::Role> roles;
   for (const pb::Claim& claim : hello.claims()) {
@@ -30,7 +29,7 @@ bool claims_good(const pb::Hello& hello) {
   return roles.empty() || *roles.rbegin() == hello.role();
 }
 
-/// In what a leader does not fit this toy, a follower; empty: it does.
+/// Returns the first difference between a leader's options and this follower; empty if there is none.
 std::string difference(const pb::Couple& theirs) {
   if (theirs.role() != pb::PORT_ROLE_LEADER) return "role: yours and mine follower";
   if (theirs.method() != pb::COUPLING_METHOD_POSITION_POSITION) return "method: mine position-position";
@@ -368,7 +367,7 @@ void ToyServer::tick(LocalTime now) {
     std::vector<pb::Frame> frames = std::exchange(member.due, {});
     if (auto told = report(now, member)) frames.push_back(std::move(*told));
     if (member.coupled && !is(Fault::kCoupledInSilence)) frames.push_back(port(now, member));
-    const bool foretold = tick_ - member.said_at < member.silence;  // its hand rests
+    const bool foretold = tick_ - member.said_at < member.silence;  // the simulated hand does not move
     const bool sees = !member.coupled || is(Fault::kStatesWhileCoupled);
     if (sees && tick_ % member.every == 0 && !foretold && !(member.silence > 0 && is(Fault::kSilentWithDeadband))) {
       member.said_at = tick_;
@@ -387,7 +386,7 @@ void ToyServer::tick(LocalTime now) {
       if (asked && !is(Fault::kNoColumns)) frames.back() = in_columns(state);
       if (!asked && is(Fault::kColumnsUnasked)) frames.push_back(in_columns(state));
     }
-    // What is due may be more than fits: eight frames a time.
+    // Splits the due frames into datagrams of eight.
     do {
       const auto count = std::min<std::ptrdiff_t>(8, std::ssize(frames));
       const std::vector<pb::Frame> some(frames.begin(), frames.begin() + count);

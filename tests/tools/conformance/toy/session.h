@@ -13,19 +13,19 @@
 namespace tendon::conformance {
 
 inline std::int64_t ns(LocalTime time) { return time.time_since_epoch().count(); }
-/// A key that says whose it is.
+/// Returns a key that is recognizable by its first byte.
 inline Key key_from(std::uint8_t first) { return Key(Bytes32{std::byte{first}, std::byte{0x5A}}); }
 
-/// Either end of a toy's open conversation.
+/// One side of a toy's open session.
 class ToySession {
  public:
-  /// This is shorter than in WIRE.md so that the tests are fast.
+  /// Shorter than in WIRE.md to keep the tests fast.
   static constexpr std::chrono::seconds kKeyAge{60};
   ToySession(std::uint8_t suite, std::uint32_t connection_id, const Key& send, const Key& receive, Fault fault,
              LocalTime now);
   bool is(Fault fault) const noexcept { return fault_ == fault; }
 
-  /// The frames to believe; empty when the datagram was dropped. `newest`: it was the highest number.
+  /// The accepted frames; empty if the datagram was dropped. `newest`: the packet number was the highest so far.
   struct Content {
     std::vector<pb::Frame> frames;
     bool newest = false;

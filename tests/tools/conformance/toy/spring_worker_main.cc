@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The smallest worker in C++: a spring that pulls the hand to the origin.
+// A minimal worker in C++: a spring that pulls the hand to the origin.
 #include <cstdio>
 #include <exception>
 

@@ -10,7 +10,7 @@
 
 namespace tendon::conformance {
 
-/// Virtual time: a millisecond each way.
+/// Virtual time with a one-way delay of 1 ms.
 class ToyWire : public Wire {
  public:
   explicit ToyWire(ToyPeer& peer, bool peer_is_server) : peer_(peer), peer_is_server_(peer_is_server) {}

@@ -10,7 +10,7 @@
 
 namespace tendon::conformance {
 
-/// Which rule a worker breaks.
+/// The rule that a worker breaks.
 enum class WorkerFault : std::uint8_t {
   kNone,
   kNeverOpens,
@@ -18,7 +18,7 @@ enum class WorkerFault : std::uint8_t {
   kWrongSecret,
   kOpensWithASequence,
   kKnowsNoTcp,
-  kCountsItself,  ///< its lengths are those of the whole record
+  kCountsItself,  ///< its lengths include the length field
   kNoLength,
   kTalksUnasked,
   kAnswersTwice,
@@ -41,10 +41,10 @@ enum class WorkerFault : std::uint8_t {
   kDiesOfTheUnknown,
   kTiresOfStates,
   kOutlivesItsStream,
-  kKnowsNoForce,  ///< no fault
+  kKnowsNoForce,  ///< not a fault
 };
 
-/// The smallest worker that passes, a spring, in virtual time, and what becomes of it when one rule is broken.
+/// A minimal conforming worker (a spring) in virtual time, which can break one rule.
 class ToyWorker : public WorkerWire {
  public:
   explicit ToyWorker(WorkerFault fault) : fault_(fault) {}
