@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// If the input is not valid, the program prints an error message to stderr. The exit code is 2 if the command line or
-// the scene is wrong, and 1 if a file or a port cannot be used.
+//
+// Invalid input causes an error message on stderr. The exit code is 2 if the command line or the scene is wrong, and 1
+// if a file or a port cannot be used.
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A server whose network thread never sleeps. Its sleeps are counted, not timed.
+//
+// A server whose network thread never sleeps. The test counts sleeps instead of measuring times.
 #include <gtest/gtest.h>
 
 #include <cstdint>

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Diagnostics that an observer receives: the real server's loop, an engine behind a bad network, a device's safety.
-// No test measures a time; delays are bounded from below only.
+//
+// Diagnostics for an observer: the server's loop, an engine behind a bad network, a device's safety. No test measures a
+// time; delays have lower bounds only.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -24,7 +25,7 @@ namespace {
 
 using testing::ScratchFolder;
 
-/// A guest in this process.
+/// A client in this process.
 class Guest {
  public:
   Guest(const std::string& server, Watch watch) : address_(parse_address(server)), link_(address_) {
@@ -46,7 +47,7 @@ class Guest {
   static ForceClient::Config named(const std::string& name) {
     ForceClient::Config config;
     config.name = name;
-    config.seed = std::hash<std::string>()(name);  // nobody listens in here
+    config.seed = std::hash<std::string>()(name);  // not security relevant in a test
     return config;
   }
   Address address_;
@@ -54,7 +55,7 @@ class Guest {
   std::optional<ForceClient> client_;
 };
 
-/// Turns until `done`; false when patience is over.
+/// Runs the clients until `done`; returns false after kPatience.
 bool turn_until(std::vector<Guest*> guests, const std::function<bool()>& done) {
   const LocalTime end = clock::now() + kPatience;
   while (!done()) {
@@ -101,14 +102,14 @@ TEST(Diagnostics, AnObserverSeesWantedForcesTheLoopAndTheNetwork) {
   server.stop();
 }
 
-// In virtual time, with each way in which a force can be wrong: tests/server (BadForces, SealedServer).
+// tests/server (BadForces, SealedServer) covers each fault of a force in virtual time.
 TEST(Diagnostics, AnEngineThatSleepsOnThisMachineIsBlamedAndNeverTheNetwork) {
   const ScratchFolder folder;
   Server server(folder.path(), write(folder.path() / "scene.toml", kPressingHand));
   Guest watcher(server.address(), [](const DeviceState&, const LinkStats&) {});
   Guest engine(server.address(), [](const DeviceState& hand) { return Touch(Vec3(-1000 * hand.position.x(), 0, 0)); });
 
-  // A machine that pauses for a moment may be taken for a slow network; one that pauses for half a second is none.
+  // Exceeds short pauses of a machine, which can look like a slow network.
   constexpr Duration kAsleep = std::chrono::milliseconds(500);
   std::uint64_t last = 0;
   int told = 0;
@@ -125,7 +126,7 @@ TEST(Diagnostics, AnEngineThatSleepsOnThisMachineIsBlamedAndNeverTheNetwork) {
   };
   ASSERT_TRUE(turn_until({&engine, &watcher}, [&] { return engine.client().stats().forces > 200; }));
 
-  const LocalTime wakes = clock::now() + std::chrono::milliseconds(2500);  // the server ends its session meanwhile
+  const LocalTime wakes = clock::now() + std::chrono::milliseconds(2500);  // the server ends the session in this time
   ASSERT_TRUE(turn_until({&watcher}, [&] {
     read();
     return clock::now() > wakes;
@@ -157,7 +158,7 @@ back_and_forth = true
 [safety.speed_trip]
 max_m_per_s = 0.05
 )";
-  // Where the recording is no file, there is no "beside it".
+  // A recording to a device file has no sibling files.
   Server server(folder.path(), write(folder.path() / "scene.toml", scene), {"--record", "/dev/null"});
   Guest watcher(server.address(), [](const DeviceState&, const LinkStats&) {});
   Guest engine(server.address(), [](const DeviceState&) { return Touch(Vec3::Zero()); });

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Real programs that find each other through an Avahi of the test's; deploy/discovery/drill has a real one.
+//
+// Programs that discover each other through a fake Avahi. deploy/discovery/drill uses a real one.
 #include <gtest/gtest.h>
 
 #include <chrono>
@@ -23,13 +24,13 @@ using testing::FakeAvahi;
 
 constexpr const char* kName = "falcon at bench 3";
 
-/// tendond where its scene says, which is not on this machine alone.
+/// tendond on the address of its scene, which is not limited to this machine.
 class Tendond : public Process {
  public:
   Tendond(const std::filesystem::path& folder, std::vector<std::string> scenes, std::vector<std::string> environment)
       : Process(program("tendond"), std::move(scenes), folder, std::move(environment)) {}
 
-  /// SIGTERM; its summary.
+  /// Sends SIGTERM and returns the summary.
   std::string stop() {
     signal(SIGTERM);
     EXPECT_EQ(wait(), 0) << err();
@@ -55,7 +56,7 @@ class Discovery : public ::testing::Test {
     return {folder.path(), std::move(scenes), environment};
   }
 
-  /// Puts on the network what is announced, at loopback.
+  /// Publishes the announced services at the loopback address.
   void carry() {
     std::vector<FakeAvahi::Announced> all;
     for (const auto end = std::chrono::steady_clock::now() + kPatience;
@@ -121,7 +122,7 @@ TEST_F(Discovery, ANameLeadsToItsOwnDeviceOfSeveral) {
   carry();
   Process wall(program("virtual_wall"), to_the_name({"--key", "keys/wall.key"}), folder.path(), environment);
   wall.wait_for_line("connected to falcon");
-  std::this_thread::sleep_for(std::chrono::milliseconds(300));  // forces go out meanwhile
+  std::this_thread::sleep_for(std::chrono::milliseconds(300));  // time for forces to be sent
   wall.signal(SIGTERM);
   EXPECT_EQ(wall.wait(), 0);
   const std::string end = both.stop();

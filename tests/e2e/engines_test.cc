@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Several engines on one device and several devices on one server, each a process of its own. Nothing here measures a
-// time.
+//
+// Several engines on one device, and several devices on one server, each in its own process. No test measures a time.
 #include <gtest/gtest.h>
 
 #include <nlohmann/json.hpp>
@@ -33,7 +33,8 @@ TEST(Engines, TheForcesOfTwoAddUpOnOneDevice) {
   wait_until_felt(echo, 0.3);
   Client two("virtual_wall", server.address(), folder.path(), {"--channel", "two", "--stiffness-n-per-m", "150"});
   two.wait_for_line("connected");
-  // Alone, 150 N/m against a grip of 300 N/m meet at 15 mm / 3: 1.5 N. Together, 300 N/m: at 7.5 mm, 2.25 N.
+  // One wall of 150 N/m against a grip of 300 N/m, 15 mm deep: equilibrium at 15 mm / 3, 1.5 N. Two walls, 300 N/m in
+  // total: at 7.5 mm, 2.25 N.
   wait_until_felt(echo, 1.9);
   const std::string end = server.stop();
   EXPECT_NE(end.find(R"("name":"one","forces":)"), std::string::npos) << end;
@@ -53,7 +54,7 @@ TEST(Engines, ALeaseIsTakenFromAnEngineThatHangs) {
   wait_until_felt(echo, 0.5);
   Client second("virtual_wall", server.address(), folder.path(), {"--channel", "tissue", "--take-lease"});
   second.wait_for_line("connected");
-  first.signal(SIGSTOP);  // its session lives on for a minute
+  first.signal(SIGSTOP);  // its session remains for a minute
   server.process().wait_for_line("takes device/tissue from");
   wait_until_felt(echo, 0.5);
   first.signal(SIGCONT);
@@ -97,7 +98,7 @@ TEST_P(NetworkThreads, OfManyCountedDevicesEachIsFoundByItsName) {
 
 INSTANTIATE_TEST_SUITE_P(Are, NetworkThreads, ::testing::Values(1, 2));
 
-/// The lines of `tendond --json` that tell of sessions.
+/// The lines of `tendond --json` about sessions.
 std::vector<nlohmann::json> session_lines(const std::string& output) {
   std::vector<nlohmann::json> found;
   std::istringstream lines(output);
@@ -115,7 +116,7 @@ TEST(Engines, EachSessionIsToldByOneNameFromItsBeginningToItsEnd) {
   write(scene, std::string(kPressingHand));
   Server server(folder.path(), scene);
   Client echo("echo_motion", server.address(), folder.path(), {"--json"});
-  wait_until_felt(echo, -1);  // it has come
+  wait_until_felt(echo, -1);  // the first force has arrived
   Client wall("virtual_wall", server.address(), folder.path());
   wait_until_felt(echo, 0.3);
   wall.signal(SIGTERM);
@@ -139,7 +140,7 @@ TEST(Engines, EachSessionIsToldByOneNameFromItsBeginningToItsEnd) {
   EXPECT_EQ(lines[1]["client"], "virtual_wall");
   EXPECT_EQ(lines[1]["role"], "controller");
   EXPECT_EQ(lines[3]["why"], "the server is going down");
-  // The same run of the server, and a connection each.
+  // Session names consist of the server's run and the connection.
   const std::string first = lines[0]["session"];
   const std::string second = lines[1]["session"];
   EXPECT_EQ(first.substr(0, 24), second.substr(0, 24));

@@ -30,7 +30,8 @@ double quantile(std::vector<double>& values, double share) {
   return *at;
 }
 
-/// How late, in µs, a thread is that asks for what the haptic thread asks for and only sleeps: the floor.
+/// Latency in µs of a thread with the scheduling of the haptic thread that only sleeps: the lower bound of this
+/// machine.
 class Floor {
  public:
   Floor()
@@ -57,7 +58,7 @@ class Floor {
   std::thread thread_;
 };
 
-/// {"name":value,…} or, in words, a line for each.
+/// As JSON {"name":value,…}, or one line of text for each value.
 class Report {
  public:
   explicit Report(const std::string& event) : event_(event) {}
@@ -83,7 +84,7 @@ class Report {
   std::ostringstream words_;
 };
 
-/// A hand that goes into the wall, to and fro in it, and out again, with a new grip each time.
+/// Moves the hand into the wall, back and forth in it, and out again, with a new grip each time.
 void use(FalconStage& stage, double duration_s) {
   for (const LocalTime end = clock::now() + from_seconds(duration_s); clock::now() < end;) {
     stage.arm();

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The whole server on a Falcon: tendond as it is, through the real libusb, with a remote wall in a process of its own.
-// The tests check what the motors do at the end of the wire. falcon-server prints what is felt, and how late.
+//
+// tendond with a Falcon model through the real libusb, and a remote wall in its own process. The tests check the motor
+// commands at the end of the cable. falcon-server prints the rendered forces and their latency.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -24,8 +25,8 @@ namespace {
 
 constexpr std::uint8_t kOut = 0x02;  // the endpoint
 
-/// Runs `claim` on its own stage. The scene's watchdogs assume a machine that does not pause: after a pause, a failed
-/// claim is tried again, at most twice.
+/// Runs `claim` on its own stage. The scene's watchdogs assume that the machine does not pause, so a claim that failed
+/// after a pause is repeated, at most twice.
 template <class Claim>
 void on_a_stage(const FalconStage::Config& config, const Claim& claim) {
   for (int left = 2;; --left) {
@@ -40,7 +41,7 @@ void on_a_stage(const FalconStage::Config& config, const Claim& claim) {
   }
 }
 
-/// A fault is the machine's when the machine paused.
+/// Accepts faults only after a pause of the machine.
 void expect_no_fault(FalconStage& stage, const std::string& end) {
   const auto faults = count_in(end.substr(end.find("\"safety\"")), "faults");
   if (faults + count_in(end, "fault") == 0) return;
@@ -204,7 +205,7 @@ TEST(FalconServer, UnpluggedInMidForceItPushesAgainOnlyAfterHomingAndArming) {
     const std::string flight = server.wait_for_line("the steps before the fault are in ");
     EXPECT_NE(server.err().find("no force any more: the device was unplugged"), std::string::npos) << server.err();
     const auto pushes_begun = stage.falcon().seen().pushes_begun;
-    stage.falcon().plug();  // its firmware is gone, and its origin; the hand is in the wall, the button is held
+    stage.falcon().plug();  // loses its firmware and origin; the hand is in the wall and the button is pressed
     server.wait_for_line("the device has to be homed");
     stage.wait_for_commands(100);
     EXPECT_EQ(stage.falcon().seen().pushes_begun, pushes_begun) << "before it was homed";

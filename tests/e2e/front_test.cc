@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A front (tendon-fem serve) in front of a hand, with workers that go wrong in every way. Nothing here measures a time.
+//
+// A front (tendon-fem serve) with a hand and with faulty workers. No test measures a time.
 #include <gtest/gtest.h>
 #include <signal.h>
 
@@ -21,14 +22,14 @@ namespace {
 
 using testing::ScratchFolder;
 
-/// kPressingHand, whose forces fade so soon that a gap of half a second, which a front leaves at least, has every stage.
+/// kPressingHand with forces that fade so fast that a gap of 0.5 s, the minimum of a front, passes through every stage.
 std::string pressing_hand() {
   std::string text(kPressingHand);
   const auto force = text.find("[force]");
   return text.replace(force, std::string::npos, "[force]\nhold_ms = 100\nsafe_stop_ms = 200\n");
 }
 
-/// What came of a front with the worker `fake_worker WAY`.
+/// The result of a front with the worker `fake_worker WAY`.
 struct Outcome {
   std::string out;  ///< of the front
   std::string err;
@@ -39,7 +40,7 @@ struct Outcome {
 
   std::uint64_t workers(const std::string& key) const { return count_in(out.substr(out.rfind(R"({"workers")")), key); }
   std::uint64_t sessions() const { return count_in(out.substr(out.rfind(R"({"summary")")), "sessions"); }
-  /// Whether these modes followed each other, others between them or not.
+  /// Returns true if `wanted` is a subsequence of the modes.
   bool went_through(const std::vector<Mode>& wanted) const {
     auto next = wanted.begin();
     for (const Mode mode : modes) {
@@ -160,7 +161,7 @@ TEST(Front, AnswersFromATableUntilTheNextWorker) {
     if (begun) {
       EXPECT_NE(step.mode, Mode::kSafeStop) << "never worse than fading";
     }
-    with_error += step.force_error && *step.force_error > 0.02 ? 1 : 0;  // a live answer says 0.01
+    with_error += step.force_error && *step.force_error > 0.02 ? 1 : 0;  // a current answer reports 0.01
     const double grows = step.force.norm() - step.was_applied.norm();
     EXPECT_LE(grows, 1.001 * hand.loop.control.max_slew * 1e-9 * static_cast<double>(step.held.count()) + 1e-9);
   }

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A disk that is full stops the recording, not the run; with room again it goes on. The exit code says that something
-// is missing.
+//
+// A full disk pauses the recording, not the run. The recording continues once there is room, and the exit code reports
+// the gap.
 #include <gtest/gtest.h>
 
 #include <cstddef>

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A driver streams forces to a device and dies. The device is the other end of a socket. For usbfs, this program's own
-// ioctl replaces the kernel's and writes endpoint and bytes to that socket.
+//
+// A driver process streams forces to a device and dies. The device is a socket. For usbfs, this program replaces
+// ioctl() and writes the endpoint and the bytes to that socket.
 #include "devices/safety/guardian.h"
 
 #include <fcntl.h>
@@ -34,7 +35,7 @@
 #include "tests/devices/falcon/socket_cable.h"
 
 namespace {
-int busy_times = 0;  ///< so often the device does not take a transfer
+int busy_times = 0;  ///< number of transfers that the device refuses
 }
 
 extern "C" int ioctl(int fd, unsigned long request, ...) noexcept {
@@ -65,7 +66,7 @@ const std::string kZero = "<AAAAAAAAAAAAAA>";
 ZeroPacket written(const std::string& bytes) { return ZeroPacket::written(std::as_bytes(std::span(bytes))); }
 ZeroPacket usb(const std::string& bytes) { return ZeroPacket::usb(2, std::as_bytes(std::span(bytes))); }
 
-/// The device: receives every packet written to it, whole.
+/// The device: receives complete packets.
 class Heard {
  public:
   Heard() {
@@ -87,13 +88,13 @@ class Heard {
     if (far_ >= 0) close(far_);
     far_ = -1;
   }
-  /// The next packet; empty when nobody can write any more.
+  /// Returns the next packet, or an empty string when all writers have closed the socket.
   std::string next() {
     std::array<char, 128> bytes{};
     const ssize_t size = read(near_, bytes.data(), bytes.size());
     return size > 0 ? std::string(bytes.data(), static_cast<std::size_t>(size)) : "";
   }
-  /// The very last packet; `heard` when none has come after it.
+  /// Returns the last packet, or `heard` if there are no more.
   std::string last(const std::string& heard = "") {
     std::string last = heard;
     for (std::string packet = next(); !packet.empty(); packet = next()) last = packet;
@@ -105,7 +106,7 @@ class Heard {
   int far_ = -1;
 };
 
-/// A process that runs `drive`, in which the guardian has to be made.
+/// Forks a process that runs `drive`, which must create the guardian.
 template <class Drive>
 pid_t driver(const Drive& drive) {
   const pid_t pid = fork();
@@ -132,12 +133,12 @@ TEST(Guardian, WritesTheZeroPacketWhenTheDriverIsKilledHoweverItDies) {
     SCOPED_TRACE(strsignal(signal));
     Heard device;
     const pid_t pid = driver([&] {
-      std::signal(signal, SIG_DFL);  // a sanitizer's handler would make an ordinary end of it
+      std::signal(signal, SIG_DFL);  // a sanitizer's handler would turn the signal into a normal exit
       Guardian guardian;
       guardian.guard(0, device.end_of_the_driver(), written(kZero));
       stream(device.end_of_the_driver());
     });
-    device.unplug();  // of this process
+    device.unplug();  // this process's copy
     for (int i = 0; i < 10; ++i) ASSERT_EQ(device.next(), kForce);
     kill(pid, signal);
     EXPECT_EQ(device.last(), kZero);
@@ -185,8 +186,8 @@ TEST(Guardian, OutlivesWhatEndsTheDriversProcessGroup) {
   ended_by(pid);
 }
 
-// A process under load gives its memory back for tens of milliseconds before it closes its files. Here it is stretched
-// for as long as we like: somebody else has the same files open.
+// A process under load frees its memory for tens of milliseconds before it closes its files. Another holder of the same
+// files prolongs this here.
 TEST(Guardian, WritesZeroWhenItsParentDiesAndAgainWhenTheFilesClose) {
   Heard device;
   std::array<int, 2> lingering{};
@@ -274,7 +275,7 @@ TEST(Guardian, WritesNothingWhileThereIsNoForceOrStepsCome) {
   ended_by(pid);
 }
 
-// No claim about time, because virtual machines pause.
+// Does not check the time, because virtual machines pause.
 TEST(Guardian, SaysHowLongTheForceOutlivesADriverThatIsStopped) {
   std::vector<double> ms;
   for (int i = 0; i < 20; ++i) {
@@ -331,7 +332,7 @@ TEST(Guardian, WritesZeroAlsoWhenAllEndsWellAndKeepsNothingOpen) {
   ASSERT_EQ(pipe(said.data()), 0);
   {
     Guardian guardian;
-    close(said[1]);  // the guardian's copy has to be closed too, or the next read never ends
+    close(said[1]);  // the guardian's copy must be closed too, or the next read never ends
     char nothing = 0;
     EXPECT_EQ(read(said[0], &nothing, 1), 0);
     EXPECT_TRUE(guardian.guard(0, device.end_of_the_driver(), written(kZero)));
@@ -360,7 +361,7 @@ TEST(Guardian, KnowsNoDeviceBeyondItsLast) {
   EXPECT_THROW(written(std::string(65, 'A')), std::invalid_argument);
 }
 
-// No claim about time, because virtual machines pause. The figure goes into a device's page.
+// Does not check the time, because virtual machines pause. The figure is for the device's documentation.
 TEST(Guardian, SaysHowLongTheForceOutlivesTheDriver) {
   std::vector<double> ms;
   for (int i = 0; i < 50; ++i) {
@@ -387,11 +388,11 @@ TEST(Guardian, SaysHowLongTheForceOutlivesTheDriver) {
 
 LocalTime now() { return LocalTime(std::chrono::duration_cast<Duration>(Clock::now().time_since_epoch())); }
 
-/// A Falcon model in this process, while its driver in another process is killed as it pushes.
+/// The result for a Falcon model in this process when its driver process is killed while it pushes.
 struct Killed {
   double pushed_for_ms = 0;             ///< after the kill
-  bool pushes = true;                   ///< when nobody is left who could tell it to stop
-  std::vector<std::uint8_t> last_word;  ///< that it has heard: endpoint and packet
+  bool pushes = true;                   ///< when no process is left that could stop it
+  std::vector<std::uint8_t> last_word;  ///< received by the device: endpoint and packet
   std::uint8_t lamps = 0;
 };
 
@@ -411,7 +412,7 @@ Killed kill_the_driver_of_a_falcon(bool guarded) {
       usleep(1000);
     }
   });
-  cable.unplug();  // of this process
+  cable.unplug();  // this process's copy
   FakeFalcon falcon({.has_firmware = true, .is_homed = true});
   socket_cable::Plug plug(falcon, cable.end_of_the_device());
   std::optional<LocalTime> killed;
@@ -436,7 +437,7 @@ Killed kill_the_driver_of_a_falcon(bool guarded) {
   return result;
 }
 
-// The driver is the real one, and so are the guardian and the deaths; the cable is a socket, and the Falcon a model.
+// Uses the real driver, guardian and signals; the cable is a socket, and the Falcon a model.
 TEST(Guardian, AFalconWhoseDriverIsKilledIsLeftWithoutForce) {
   const auto zero = falcon::encode(falcon::kLastCommand);
   std::vector<std::uint8_t> last_word = {socket_cable::kOut};

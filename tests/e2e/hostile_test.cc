@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Junk sent to the server's port is counted and changes nothing. The server's counters are compared with the datagrams
-// that it says have arrived, so a datagram dropped by the kernel breaks no claim.
+//
+// Invalid datagrams to the server's port are counted without any other effect. The counters are compared with the
+// datagrams that the server recorded as arrived, so drops by the kernel do not matter.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -39,7 +40,7 @@ Datagram garbage(std::mt19937_64& bits, std::size_t size) {
   return datagram;
 }
 
-/// Lets the server read before its socket's buffer is full; where this is not enough, the kernel drops.
+/// Lets the server read before its receive buffer is full. If this is too short, the kernel drops datagrams.
 void breathe() { std::this_thread::sleep_for(std::chrono::milliseconds(1)); }
 
 void wait_until_said(const Relay& relay, std::size_t count) {
@@ -50,7 +51,7 @@ void wait_until_said(const Relay& relay, std::size_t count) {
   }
 }
 
-/// How many recorded datagrams are nobody's conversation. The recording holds only a sample of those.
+/// Counts the recorded datagrams that belong to no session. The recording contains only a sample of those.
 std::uint64_t strangers_in(const std::vector<DatagramRecord>& arrived, const Address& client) {
   return static_cast<std::uint64_t>(std::count_if(arrived.begin(), arrived.end(), [&](const DatagramRecord& record) {
     if (record.size > kMaxDatagram) return true;
@@ -84,8 +85,8 @@ TEST(HostileDatagrams, AreCountedAndChangeNothing) {
   }
   const std::vector<Datagram> said = relay.said();
   for (const Datagram& datagram : said) {
-    relay.forge(datagram);             // once more, from its own place
-    stranger.send(address, datagram);  // and from a stranger's
+    relay.forge(datagram);             // once more, from the client's address
+    stranger.send(address, datagram);  // and from another address
     relay.forge(std::span(datagram).first(below(bits, kHeaderSize)));
     breathe();
   }
@@ -101,16 +102,16 @@ TEST(HostileDatagrams, AreCountedAndChangeNothing) {
   const std::uint64_t strangers = count_in(end, "malformed") + count_in(end, "unknown_connection");
   const std::uint64_t duplicated = count_in(end, "duplicated");
   const std::uint64_t sampled = strangers_in(recording.arrived, relay.clients_address());
-  // The kernel may have dropped some; not more than half.
+  // Allows the kernel to drop up to half of them.
   EXPECT_GE(strangers, static_cast<std::uint64_t>(kGarbage) / 2);
   EXPECT_GE(duplicated, said.size() / 2);
   EXPECT_LE(duplicated, said.size());
   EXPECT_GE(sampled, 1U);
   EXPECT_LT(sampled, strangers) << "the recording holds a sample";
   EXPECT_GE(sampled + count_in(end, "strangers_left_out"), strangers) << "and a count of the rest";
-  EXPECT_GE(count_in(end, "lost"), static_cast<std::uint64_t>(kCut));  // the cut ones were not taken for whole ones
+  EXPECT_GE(count_in(end, "lost"), static_cast<std::uint64_t>(kCut));  // truncated datagrams were not accepted
 
-  // And nothing else: one guest, who stayed; its forces went on, each newer than the one before.
+  // There was exactly one client, which stayed connected, and its forces continued in order.
   EXPECT_EQ(count_in(end, "welcomed"), 1U);
   EXPECT_EQ(count_in(end, "refused"), 0U);
   EXPECT_EQ(wall.err().find("lost 127"), std::string::npos) << wall.err();

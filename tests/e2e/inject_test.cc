@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// tendon-inject as strangers use it: between two programs that know nothing of Tendon. Nothing here measures a time.
+//
+// tendon-inject between two programs unrelated to Tendon. No test measures a time.
 #include <gtest/gtest.h>
 #include <poll.h>
 
@@ -23,7 +24,7 @@ using injector::UdpBatch;
 using injector::Verdict;
 using testing::ScratchFolder;
 
-/// The proxy may be as late as it likes.
+/// Disables the limit of the release error.
 const std::vector<std::string> kAnyReleaseError = {"--max-release-error-us", "1e9"};
 
 std::vector<std::string> with(std::vector<std::string> arguments, const std::vector<std::string>& more) {
@@ -47,7 +48,7 @@ void send_through(UdpBatch& server, const std::string& proxy, int count) {
   }
 }
 
-/// What became of each datagram up, by index.
+/// The fate of each datagram up, by index.
 std::string fates(const Trace& trace) {
   std::string result;
   for (const TraceRecord& record : trace.records) {
@@ -86,7 +87,7 @@ TEST(Inject, AServerIsFoundByItsHostName) {
   const ScratchFolder folder;
   UdpBatch server = UdpBatch::listening(parse_address("127.0.0.1:0"));
   const std::string port = to_string(server.local_address()).substr(std::string("127.0.0.1").size());
-  // Neither numeric nor "localhost" as parse_address() reads them: /etc/hosts answers.
+  // parse_address() accepts neither this spelling nor names in general, so /etc/hosts resolves it.
   Service proxy("tendon-inject", with(kAnyReleaseError, {"--to", "LOCALHOST" + port, "--record", "run.csv"}),
                 folder.path(), "start", "listen");
   send_through(server, proxy.address(), 3);
@@ -106,7 +107,7 @@ TEST(Inject, AHostThatNobodyKnowsIsNamedAndFails) {
 TEST(Inject, ARunThatCouldNotKeepUpIsInvalidAndFails) {
   const ScratchFolder folder;
   UdpBatch server = UdpBatch::listening(parse_address("127.0.0.1:0"));
-  // No machine releases a datagram in no time.
+  // A limit of zero is always exceeded.
   Service proxy("tendon-inject", {"--to", to_string(server.local_address()), "--max-release-error-us", "0"},
                 folder.path(), "start", "listen");
   send_through(server, proxy.address(), 3);

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A hand, a server, a bad network and a remote wall, each a process of its own, and what happens to the others when one
-// of them is killed. Nothing here measures a time, because virtual machines pause. All claims are checked in the
-// recordings.
+//
+// A hand, a server, a bad network and a remote wall, each in its own process, and the effects of killing one of them.
+// No test measures a time, because virtual machines pause. All claims are checked in the recordings.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -26,7 +26,7 @@ struct Stretch {
   std::size_t begin;  ///< index of its first step
 };
 
-/// The steps as stretches of one mode each.
+/// Groups consecutive steps of the same mode.
 std::vector<Stretch> stretches_of(const std::vector<StepRecord>& steps) {
   std::vector<Stretch> stretches;
   for (std::size_t i = 0; i < steps.size(); ++i) {
@@ -42,7 +42,7 @@ TEST(MainJob, AHandFeelsALateLossyRemoteWallAndTheDeviceNeverGivesOutEnergy) {
   Server server(folder.path(), demo_scene(), {"--record", file.string()});
   Service network("tendon-inject",
                   {"--to", server.address(), "--profile", "delay=uniform(15ms,25ms) loss=2%", "--seed", "7",
-                   "--max-release-error-us", "1e9"},  // nothing here depends on when datagrams leave
+                   "--max-release-error-us", "1e9"},  // no claim depends on when datagrams leave
                   folder.path(), "start", "listen");
   Process wall(program("virtual_wall"), {"--server", network.address(), "--duration-s", "3", "--json"}, folder.path());
   EXPECT_EQ(wall.wait(), 0) << wall.err();
@@ -69,8 +69,8 @@ TEST(MainJob, AHandFeelsALateLossyRemoteWallAndTheDeviceNeverGivesOutEnergy) {
     if (step.force_sequence == 0) continue;
     ASSERT_GE(step.loop_age, 2 * std::chrono::milliseconds(15)) << "tick " << step.tick;
   }
-  EXPECT_GT(peak, 1);  // N: it is felt
-  // The claim holds of these without exception. Of 3000, where others take the processors.
+  EXPECT_GT(peak, 1);  // N
+  // The claim holds for all of these. On a busy machine only some of the 3000 steps qualify.
   EXPECT_GT(in_time, 100U);
 
   EXPECT_FALSE(recording.truncated);
@@ -142,7 +142,7 @@ TEST(MainJob, AKilledServerLeavesARecordingThatReadsUpToItsLastSecond) {
   expect_passive(recording, read_scene(demo_scene()));
   EXPECT_TRUE(recording.truncated);
   ASSERT_FALSE(recording.steps.empty());
-  // Steps are 1 ms apart, or more.
+  // Steps are at least 1 ms apart.
   EXPECT_GE(recording.steps.back().tick + 1000, last_seen);
   EXPECT_FALSE(recording.arrived.empty());
 }

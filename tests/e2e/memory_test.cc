@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// How much memory a server takes, and how much a device and a session add. Each bound is a quarter or so above what was
-// measured; that of the whole server is the goal, 12 MB, which the libraries that it lists keep.
+//
+// Memory of a server, and of each device and session. The bounds are about 25 % above the measured values. The bound
+// for the whole server is the goal of 12 MB, which depends on the listed libraries.
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -23,7 +24,7 @@ namespace {
 
 constexpr std::int64_t kMegabyte = 1 << 20;
 
-/// In bytes, a row of /proc/PID/status.
+/// A row of /proc/PID/status, converted to bytes.
 std::int64_t bytes(pid_t process, const std::string& row) {
   std::ifstream status("/proc/" + std::to_string(process) + "/status");
   for (std::string line; std::getline(status, line);) {
@@ -32,7 +33,7 @@ std::int64_t bytes(pid_t process, const std::string& row) {
   throw std::runtime_error("no " + row + " of process " + std::to_string(process));
 }
 
-/// Page faults that needed no disk.
+/// Minor page faults.
 std::int64_t faults(pid_t process) {
   std::ifstream stat("/proc/" + std::to_string(process) + "/stat");
   const std::string all{std::istreambuf_iterator<char>(stat), {}};
@@ -42,7 +43,7 @@ std::int64_t faults(pid_t process) {
   return std::stoll(word);
 }
 
-/// The shared libraries in a process, without their versions: "libz".
+/// The shared libraries of a process, without versions, for example "libz".
 std::set<std::string> libraries(pid_t process) {
   std::set<std::string> names;
   std::ifstream maps("/proc/" + std::to_string(process) + "/maps");
@@ -53,7 +54,7 @@ std::set<std::string> libraries(pid_t process) {
   return names;
 }
 
-/// A server with `count` devices that records nothing, and has taken some hundred steps.
+/// A server with `count` devices that does not record and has run some hundred steps.
 class Fleet {
  public:
   explicit Fleet(std::size_t count) {
@@ -89,8 +90,8 @@ TEST(Memory, OfAServerWithADeviceIsSmall) {
 
 TEST(Memory, HasNoLibraryThatTheSceneDoesNotNeed) {
   Fleet one(1);
-  // What every scene needs: the languages, the scene file, the wire and its secrets, the log. What a scene may list, USB
-  // and discovery, brings libusb and libsystemd, with the seven that these need.
+  // Libraries that every scene needs: language runtimes, the scene file, the protocol and its cryptography, the log.
+  // USB and discovery in a scene also load libusb and libsystemd with seven dependencies.
   const std::set<std::string> needed = {"ld-linux-x86-64", "libc",        "libm", "libgcc_s",  "libstdc++",
                                         "libtomlplusplus", "libprotobuf", "libz", "libsodium", "libfmt"};
   for (const std::string& library : libraries(one.pid())) EXPECT_TRUE(needed.contains(library)) << library;

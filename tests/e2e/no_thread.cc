@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Preloaded into a program: its n-th call of pthread_create is refused, n being in TENDON_REFUSED_THREAD.
+//
+// Preloaded library: refuses the n-th call of pthread_create, where n is TENDON_REFUSED_THREAD.
 #include <dlfcn.h>
 #include <pthread.h>
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A server that the system refuses a thread.
+//
+// A server for which the system refuses to create a thread.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -18,7 +19,7 @@ class NoThread : public ::testing::TestWithParam<const char*> {};
 
 TEST_P(NoThread, AServerWithoutIsStoppedInOrderAndSaysWhich) {
   const tendon::testing::ScratchFolder folder;
-  // The server's first thread tries whether small stacks are enough; it ends at once, and nothing needs it.
+  // The server's first thread only tests whether small stacks suffice and ends immediately.
   const std::array<std::string, 4> in_order = {"output", "log", "network", "haptic-0"};
   const auto number = 2 + (std::ranges::find(in_order, GetParam()) - in_order.begin());
   const std::string scenes = TENDON_SCENES;

@@ -10,7 +10,7 @@
 namespace tendon::e2e::pipe_test {
 namespace {
 
-// bash keeps the other end of the filter's input open: an answer can come only if no row waits for the next.
+// bash keeps the filter's input open, so an answer arrives only if the filter does not wait for the next row.
 TEST(TendonLabFilter, AnswersEachRowOfALivePipeBeforeTheNextComes) {
   const std::string script =
       "coproc FILTER { \"$0\" filter --law aol --b 0.26 --fc 0.005; }\n"

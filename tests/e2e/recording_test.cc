@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// What becomes of recordings that matter: none is overwritten, none is filled by strangers, and each has in it what it
-// takes to run it again.
+//
+// Recordings are not overwritten, cannot be filled by unauthenticated senders, and suffice to replay the run.
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 
@@ -35,7 +35,7 @@ void wait_for_tick(Process& echo, std::uint64_t tick) {
   }
 }
 
-/// Steps that tendon-replay finds the same, bit for bit; it must find no other.
+/// Returns the number of bitwise identical steps of tendon-replay, and expects no others.
 std::uint64_t replayed(const std::filesystem::path& file) {
   Process replay(program("tendon-replay"), {file.string(), "--json"}, file.parent_path());
   EXPECT_EQ(replay.wait(), 0) << replay.out() << replay.err();
@@ -43,7 +43,7 @@ std::uint64_t replayed(const std::filesystem::path& file) {
   return count_in(replay.out(), "same");
 }
 
-// As under the shipped unit: the same scene in the same folder, killed, and started again.
+// As under the shipped unit: the same scene in the same folder, killed and restarted.
 TEST(Recordings, ACrashedServersRecordingIsLeftAloneByTheNextStart) {
   const ScratchFolder folder;
   const auto first = folder.path() / "demo.mcap";
@@ -89,7 +89,7 @@ TEST(Recordings, WhatIsNoRecordingIsRefusedBeforeAnythingRuns) {
   EXPECT_EQ(content_of(scene), content_of(demo_scene()));
 }
 
-// README's own example, far-off.mcap.
+// The README's example far-off.mcap.
 TEST(Recordings, ARunWithoutALimiterReplaysBitForBit) {
   const ScratchFolder folder;
   const auto file = folder.path() / "far-off.mcap";

@@ -8,7 +8,7 @@
 namespace tendon::e2e::replay_test {
 namespace {
 
-// Late wake-ups, paused machines and real datagrams included: whatever a server has lived through is in its recording.
+// Includes late wake-ups, pauses of the machine and real datagrams.
 TEST(TendonReplay, TakesEveryStepOfARealServerAgainBitForBit) {
   const testing::ScratchFolder folder;
   const auto file = folder.path() / "run.mcap";

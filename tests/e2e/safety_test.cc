@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Whatever ends the server ends the force.
+//
+// The force ends whenever the server ends.
 #include <gtest/gtest.h>
 
 #include <csignal>
@@ -16,7 +17,7 @@ using testing::ScratchFolder;
 
 bool felt(double force) { return force < -0.5; }  // N along x, away from the wall
 
-/// A hand that rests for half a second before it goes into the wall.
+/// The hand rests for half a second before it moves into the wall.
 std::string resting_hand(const std::string& safety) {
   return R"([device]
 kind = "simulated"

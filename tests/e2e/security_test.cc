@@ -10,14 +10,14 @@
 #include "tests/e2e/stage/stage.h"
 #include "tests/server/scratch_folder.h"
 
-// Real programs and suite 1: making keys, who gets in, who does not.
+// Programs with suite 1: creating keys, accepted and refused clients.
 
 namespace tendon::e2e::security_test {
 namespace {
 
 using testing::ScratchFolder;
 
-/// A server with the keys of `wall` and of `screen`, an observer; listens on all addresses.
+/// A server with keys for `wall` and for the observer `screen`, which listens on all addresses.
 class Lab {
  public:
   Lab() {
@@ -63,7 +63,7 @@ TEST(Security, AClientWithItsKeyControlsAndAnObserverWatches) {
        {"forged", "old_key", "hellos_plain", "hellos_limited", "hellos_unknown_key", "hellos_forged"}) {
     EXPECT_EQ(count_in(end, cause), 0U) << cause;
   }
-  // Each said Bye three times; what comes in a turn after the first belongs to nobody.
+  // Each client sends Bye three times; copies that arrive in a later turn belong to no session.
   EXPECT_LE(count_in(end, "unknown_connection"), 4U);
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// tendond as a service manager sees it: the datagrams of sd_notify(3) on a socket of ours.
+//
+// tendond under a service manager: the test receives its datagrams of sd_notify(3).
 #include <gtest/gtest.h>
 #include <sys/socket.h>
 #include <sys/un.h>
@@ -23,7 +24,7 @@ namespace {
 
 class Manager {
  public:
-  /// `path` is a file, or "@" and a name that is no file.
+  /// `path` is a file, or "@" and an abstract name.
   explicit Manager(const std::string& path) : socket_(socket(AF_UNIX, SOCK_DGRAM, 0)) {
     sockaddr_un address{};
     address.sun_family = AF_UNIX;
@@ -46,7 +47,7 @@ class Manager {
   Manager(const Manager&) = delete;
   Manager& operator=(const Manager&) = delete;
 
-  /// What it hears next; empty after kPatience.
+  /// Returns the next datagram, or an empty string after kPatience.
   std::string next() const {
     std::array<char, 256> bytes{};
     const ssize_t size = recv(socket_, bytes.data(), bytes.size(), 0);
@@ -80,7 +81,7 @@ TEST(Service, IsSaidToAManagerWhoseSocketIsNoFile) {
 TEST(Service, WithoutAWatchdogNothingIsSaidBetweenTheBeginningAndTheEnd) {
   const testing::ScratchFolder folder;
   const Manager manager((folder.path() / "notify").string());
-  // The watchdog of another process, whose variables this one has inherited.
+  // Inherited variables for the watchdog of another process.
   setenv("WATCHDOG_USEC", "100000", 1);
   setenv("WATCHDOG_PID", "1", 1);
   Server server(folder.path(), demo_scene());

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The reference physics engine as people start it: a process of its own, in front of a hand that presses into it.
+//
+// The reference physics engine in its own process, with a hand that presses into the body.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -34,8 +35,8 @@ TEST(Softbody, AHandFeelsASoftBlockAsStiffAsTheSceneMakesIt) {
 
   const Recording recording = read_recording(file);
   expect_passive(recording, scene);
-  // The block gives 457.9 N/m. The local model that comes with each force lets the server follow the hand, so what is
-  // wanted is that much at every depth; the first forces are ramped in, and late ones fade.
+  // The stiffness of the block is 457.9 N/m. The local model of each force lets the server follow the hand, so this
+  // stiffness is expected at every depth, except that the first forces are ramped in and late forces fade.
   double peak = 0;
   std::size_t deep = 0;
   std::size_t as_stiff = 0;
@@ -52,7 +53,7 @@ TEST(Softbody, AHandFeelsASoftBlockAsStiffAsTheSceneMakesIt) {
   EXPECT_GT(as_stiff, deep / 2);
 }
 
-/// Where two threads may not factorise at once, the engine says so and answers all the same.
+/// If two threads must not factorize concurrently, the engine reports it and still answers.
 TEST(Softbody, ANearFieldAndACutAreMadeBesideTheAnswers) {
   const ScratchFolder folder;
   std::ifstream liver(demo_scene().replace_filename("liver_near.toml"));
@@ -90,7 +91,7 @@ towards_hand = [-1, 0, 0]
     if (body.err().find("this OpenBLAS is built for one thread") != std::string::npos) continue;
     if (scene.ends_with("near.toml")) {
       EXPECT_NE(body.out().find(R"({"answers":{"linear":)"), std::string::npos) << body.out();
-      // The server tells by which of them the forces were answered, and how wrong the least sure one may be.
+      // The server's summary counts the solver paths and the largest error estimate.
       EXPECT_GT(number_in(end, "worst_error_n"), 0) << end;
       const auto answered_by = [&](const std::string& way) {
         return end.find(R"("ways":{")" + way) != std::string::npos;

@@ -11,15 +11,15 @@
 #include "tests/e2e/stage/stage.h"
 #include "tests/server/scratch_folder.h"
 
-// A hand that leads the device of another server, in real processes. Each method, whole handles and several leaders, in
-// virtual time: tests/server/guests/couple_test.cc and leaders_test.cc.
+// A hand that leads the device of another server, in separate processes. tests/server/guests/couple_test.cc and
+// leaders_test.cc cover each method, whole handles and several leaders in virtual time.
 
 namespace tendon::e2e::teleoperation_test {
 namespace {
 
 std::filesystem::path scene(const std::string& name) { return demo_scene().parent_path() / name; }
 
-/// Every force of both ends was within its limiter's bound, and every step is the same when it is taken again.
+/// Checks that every force was within its limiter's bound and that every step replays identically.
 void expect_sound(const std::filesystem::path& file, const std::filesystem::path& folder) {
   const Recording recording = read_recording(file);
   EXPECT_GT(recording.steps.size(), 500U);
@@ -60,12 +60,12 @@ TEST(Teleoperation, AHandLeadsTheDeviceOfAnotherServerThroughABadNetwork) {
     return high - low;
   };
   EXPECT_GT(spread(hand), 0.01);
-  // The wall behind it is 8 mm away. How far it gets to the other side depends on where the hand was at the act, and
-  // on how soft a machine that pauses has made the spring.
+  // The wall behind it is 8 mm away. The range toward the other side depends on where the hand engaged and on how far
+  // pauses of the machine have softened the spring.
   EXPECT_GT(spread(tool), 0.004) << "it follows";
 }
 
-/// What the two must not do with limiters: it shows that the demonstration demonstrates something.
+/// The control experiment: shows that the limiters are necessary.
 TEST(Teleoperation, WithoutLimitersTheSamePairGivesOutEnergyThatNobodyPutIn) {
   const testing::ScratchFolder folder;
   const auto led = folder.path() / "leader.mcap";

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// server/THREADS.md against the server.
+//
+// Compares server/THREADS.md with the server.
 #include "tests/e2e/stage/threads.h"
 
 #include <gtest/gtest.h>
@@ -16,7 +17,7 @@
 namespace tendon::e2e::threads_test {
 namespace {
 
-/// … as soon as they are the expected ones.
+/// Returns the threads, waiting until they are the expected ones.
 std::set<std::string> threads_when(const std::set<std::string>& expected, Server& server) {
   std::set<std::string> threads;
   for (const auto end = std::chrono::steady_clock::now() + kPatience;
@@ -82,7 +83,7 @@ TEST(Threads, OfAServerAreThoseOfThePage) {
   server.process().wait_for_line("listens on");
   const std::set<std::string> page = threads_of_the_page();
   ASSERT_TRUE(page.contains("haptic-N"));
-  // It listens before its threads have begun.
+  // The server listens before its threads have started.
   const std::set<std::string> expected = {"haptic-0", "log", "network", "output", "tendond"};
   const std::set<std::string> threads = threads_when(expected, server);
   EXPECT_EQ(threads, expected);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The tools that ship, with files and readers that fail them.
+//
+// The shipped tools with invalid files and with readers that close the pipe.
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -46,7 +47,7 @@ TEST(Tools, ANamedPipeIsNoInputAndIsNotWaitedFor) {
   }
 }
 
-/// Every program of this build that people start.
+/// Every user program of this build.
 std::vector<std::filesystem::path> programs() {
   std::vector<std::filesystem::path> found;
   const auto shown = program("tendond").parent_path();
@@ -149,7 +150,7 @@ TEST(Tools, ATableThatTheDiskHasNoRoomForIsAFailureWithASentence) {
   EXPECT_NE(replay.err().find(table.string()), std::string::npos) << replay.err();
 }
 
-// Through bash, because `head` goes while the bench writes. 124 would be timeout's.
+// Uses bash, because `head` must exit while the bench writes. Exit code 124 would be timeout's.
 TEST(Tools, TheBenchEndsWhenItsReaderGoes) {
   const ScratchFolder folder;
   Process bash(
@@ -270,7 +271,7 @@ TEST(ExitCodes, OfTheSameMistakeAreTheSameInEveryProgram) {
   for (const Mistake& mistake : mistakes) {
     for (std::vector<std::string> words : mistake.made_by) {
       const auto path = program(words.front());
-      if (!std::filesystem::exists(path)) continue;  // this program has not been built
+      if (!std::filesystem::exists(path)) continue;  // not built
       std::string line;
       for (const std::string& word : words) line += word + " ";
       SCOPED_TRACE(mistake.what + ": " + line);

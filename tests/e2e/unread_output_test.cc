@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Tests programs if their output is not read. The output is a full pipe, or a terminal in which Ctrl-S was pressed.
+//
+// Programs whose output is not read, either from a full pipe or from a terminal stopped with Ctrl-S.
 #include <fcntl.h>
 #include <gtest/gtest.h>
 #include <poll.h>
@@ -58,7 +59,7 @@ class FullPipe : public Reader {
  public:
   explicit FullPipe(const std::filesystem::path& folder) : path_(folder / "pipe") {
     if (::mkfifo(path_.c_str(), 0600) != 0) throw std::runtime_error("mkfifo");
-    // The test opens both ends of the pipe so that there is no end of file.
+    // Opens both ends of the pipe to avoid an end of file.
     fd_ = ::open(path_.c_str(), O_RDWR | O_NONBLOCK | O_CLOEXEC);
     const std::string block(512, 'x');
     while (::write(fd_, block.data(), block.size()) > 0) {
@@ -80,7 +81,7 @@ class StoppedTerminal : public Reader {
     std::array<char, 64> name{};
     if (::ptsname_r(fd_, name.data(), name.size()) != 0) throw std::runtime_error("a terminal without a name");
     name_ = name.data();
-    slave_ = ::open(name_.c_str(), O_RDWR | O_NOCTTY | O_CLOEXEC);  // the terminal needs one open file
+    slave_ = ::open(name_.c_str(), O_RDWR | O_NOCTTY | O_CLOEXEC);  // a terminal needs an open slave
     press('\x13');
   }
   ~StoppedTerminal() override {
@@ -176,7 +177,7 @@ TEST_P(UnreadOutput, ThatIsReadAtLastSaysHowManyLinesAreMissing) {
                           {"--server", server.address(), "--rate-hz", "1000", "--duration-s", "60", "--json"}),
                folder_.path());
   echo.wait_for_line("connected to");
-  std::this_thread::sleep_for(6s);  // some 600 kB
+  std::this_thread::sleep_for(6s);  // about 600 kB
   std::string text = reader_->read();
   echo.signal(SIGTERM);
   EXPECT_EQ(echo.wait(kEnd), 0);
@@ -193,7 +194,7 @@ TEST_P(UnreadOutput, OfTheInjectorLetsItEndAtASignal) {
                                 {"--listen", "127.0.0.1:0", "--to", "127.0.0.1:9", "--profile", "delay=1ms",
                                  "--duration-s", "60", stream == "1" ? "--json" : "--seed=1"}),
                      folder_.path());
-    std::this_thread::sleep_for(1500ms);  // it reports once a second
+    std::this_thread::sleep_for(1500ms);  // reports once a second
     injector.signal(SIGTERM);
     EXPECT_GE(injector.wait(kEnd), 0) << stream;
   }

@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// decode_lines: reads datagrams, one a line in hexadecimal digits, and prints what C++ takes each for, one line each. A
-// client in another language prints the same of the same bytes (tests/clients/python/differential.py), or one of the
-// two is wrong.
+// decode_lines: reads datagrams, one per line in hexadecimal digits, and prints one line for each with the values that
+// C++ decodes. A client in another language prints the same for comparison (tests/clients/python/differential.py).
 //
-// Numbers are in decimal, floating-point ones as the 16 hexadecimal digits of their bits, texts and bytes in
-// hexadecimal digits; vectors and matrices row by row. A "-" stands for a refused one.
+// Integers are decimal, floating-point numbers are the 16 hexadecimal digits of their bits, strings and bytes are
+// hexadecimal digits. Vectors and matrices are printed row by row. "-" means rejected.
 #include <bit>
 #include <cstddef>
 #include <cstdint>
@@ -37,7 +36,6 @@ std::vector<std::byte> from_hex(std::string_view text) {
   return bytes;
 }
 
-/// One line of words.
 class Line {
  public:
   Line& operator<<(std::string_view word) {
@@ -65,7 +63,7 @@ class Line {
   }
   Line& operator<<(const Vec3& v) { return *this << v.x() << v.y() << v.z(); }
   Line& operator<<(const Quat& q) { return *this << q.w << q.x << q.y << q.z; }
-  /// Zero, added, turns −0 into 0: k · 0 is either.
+  /// Adding zero turns −0 into 0, because the sign of k · 0 varies.
   Line& operator<<(const Mat3& m) {
     for (int row = 0; row < 3; ++row) *this << Vec3(m.row(row).transpose() + Vec3::Zero());
     return *this;
@@ -279,7 +277,7 @@ std::string verdict(std::span<const std::byte> datagram) {
   if (!header) return "-";
   line << header->type << header->suite << std::uint32_t{header->epoch} << header->connection_id
        << header->packet_number;
-  const bool plain = header->suite == Suite::kPlain;  // otherwise the body is sealed
+  const bool plain = header->suite == Suite::kPlain;  // otherwise the body is encrypted
   if (header->type == DatagramType::kData) {
     if (plain) print_data(line, datagram.subspan(kHeaderSize));
   } else if (const auto hello = decode_hello(datagram)) {

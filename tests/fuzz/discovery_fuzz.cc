@@ -6,8 +6,8 @@
 #include "protocol/discovery.h"
 #include "tests/fuzz/target.h"
 
-// The name of an instance and the data of its TXT record, from anybody: a name is refused, or is one and the same after
-// it has been written; what a text says can be written and read again.
+// An untrusted instance name and TXT record. A name is rejected or survives writing and parsing unchanged; a parsed TXT
+// record can be written and parsed again.
 
 using namespace tendon;
 

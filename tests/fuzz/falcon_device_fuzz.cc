@@ -5,9 +5,8 @@
 #include "devices/falcon/falcon_device.h"
 #include "tests/fuzz/target.h"
 
-// Decisions: what a Falcon's cable brings, when it takes something, when it is out. However they fall, no packet with
-// torque is written but by a device that is homed, no torque is beyond what the motors are given, and what `apply`
-// returns is finite.
+// The input decides what a Falcon's cable returns, when it accepts data and when it is disconnected. Torque is sent
+// only to a homed device and within the motor limits, and the result of `apply` is finite.
 
 using namespace tendon;
 
@@ -22,7 +21,7 @@ class Cable final : public usb::Pipe {
   bool write(std::span<const std::uint8_t> bytes) noexcept override {
     if (full) return false;
     if (bytes.size() != falcon::kPacketBytes) return true;
-    // Torques are coded as encoders are.
+    // Torques have the encoding of encoders.
     const auto packet = falcon::decode(bytes.first<falcon::kPacketBytes>());
     fuzz::require(packet.has_value());
     for (const std::int16_t torque : packet->encoders) {
@@ -40,7 +39,7 @@ class Cable final : public usb::Pipe {
       std::transform(noise.begin(), noise.end(), packet.begin(), std::to_integer<std::uint8_t>);
       return noise.size();
     }
-    // A reply, mostly of a homed device about where it was before.
+    // Usually a reply of a homed device near its previous position.
     std::array<std::uint8_t, falcon::kPacketBytes> reply =
         falcon::encode({.torque = {static_cast<std::int16_t>(decision), 0, static_cast<std::int16_t>(-decision)}});
     reply[13] = static_cast<std::uint8_t>('A' + (decision % 16 == 0 ? 0x30 : 0x70));

@@ -5,9 +5,8 @@
 #include "devices/falcon/firmware.h"
 #include "tests/fuzz/target.h"
 
-// Decisions: what a boot loader answers, when, and when the cable takes nothing. However they fall, the loader says
-// that it is done only after it has sent the whole image in order and has heard each piece of it, and nothing else,
-// come back.
+// The input decides the answers of a boot loader and their timing, and when the cable accepts no data. The loader
+// reports success only after it has sent the whole image in order and received an exact echo of each piece.
 
 using namespace tendon;
 
@@ -21,10 +20,10 @@ class Cable final : public usb::Pipe {
     if (full) return false;
     fuzz::require(bytes.size() <= usb::kPacketSize);
     if (sending) {
-      fuzz::require(sent.empty() || heard == last);  // nothing new before the last piece is back
+      fuzz::require(sent.empty() || heard == last);  // nothing new before the echo of the last piece
       sent.insert(sent.end(), bytes.begin(), bytes.end());
     } else if (bytes.size() == 1) {
-      sending = true;  // the letter for the baud rate: what follows is the image
+      sending = true;  // the letter for the baud rate; the image follows
     }
     last.assign(bytes.begin(), bytes.end());
     heard.clear();
@@ -37,8 +36,8 @@ class Cable final : public usb::Pipe {
   bool full = false;
   bool sending = false;
   std::vector<std::uint8_t> sent;   ///< of the image
-  std::vector<std::uint8_t> last;   ///< what was written last
-  std::vector<std::uint8_t> heard;  ///< since then
+  std::vector<std::uint8_t> last;   ///< the last written piece
+  std::vector<std::uint8_t> heard;  ///< received since then
 };
 
 }  // namespace

@@ -4,8 +4,8 @@
 #include "devices/falcon/packet.h"
 #include "tests/fuzz/target.h"
 
-// What a Falcon says, cut into pieces anywhere: the replies are those that a look at every 16 bytes of the whole finds,
-// one after the other, and every byte is in one of them, left out, or the beginning of one that may still come.
+// A Falcon's output in arbitrary fragments. The parsed replies equal those found by scanning the whole stream for
+// 16-byte replies. Every byte belongs to a reply, is skipped, or may begin the next reply.
 
 using namespace tendon;
 using namespace tendon::falcon;

@@ -6,8 +6,8 @@
 
 #include "tests/fuzz/target.h"
 
-// Strangers at the door and strangers who answer: no reply is longer than what asked, nobody gets in without the key, no
-// answer that we did not write ends a sealed handshake, and both ends of one end with the same suite and keys.
+// Unauthenticated clients and servers. No reply is longer than its request, no client is accepted without the key, only
+// a genuine Answer completes an encrypted handshake, and both ends of a handshake agree on suite and keys.
 
 using namespace tendon;
 
@@ -17,7 +17,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   LocalTime now{std::chrono::seconds(1000)};
   const ClientKey key{.name = "a", .role = Role::kController, .key = random.next()};
   const Suites all = suites_of_this_machine();
-  // The other seals by its first suite only; both know the same cookies.
+  // The second server supports only the first suite; both share the cookie secret.
   Doorman every({.keys = {key}, .suites = all});
   Doorman strict({.keys = {key}, .suites = {all.front()}});
   const auto client_of = [&](const Suites& suites) {
@@ -27,14 +27,15 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     if (!suites.empty()) config.suites = suites;
     return ClientHandshake(config, now);
   };
-  // Made once and copied: half of what a run costs is the curve. In the clear, of suite 1 only, and of all.
+  // Created once and copied, because half of the cost of a run is the elliptic curve. Without a key, with suite 1 only,
+  // with all suites.
   static const std::array<ClientHandshake, 3> fresh = {client_of({}), client_of({Suite::kNoise}), client_of(all)};
   std::array<ClientHandshake, 3> clients = fresh;
   const Address here = parse_address("127.0.0.1:4000");
   const Address there = parse_address("192.0.2.1:4000");
   std::array<std::byte, kMaxDatagram> buffer;
   std::array<std::byte, kMaxDatagram> answer;
-  const auto change = [&](std::size_t length) {  // true when something is other than it was
+  const auto change = [&](std::size_t length) {  // returns true if it changed a byte
     bool changed = false;
     for (std::uint8_t changes = input.byte() % 4; changes > 0; --changes) {
       const std::size_t at = (std::size_t{input.byte()} << 8U | input.byte()) % length;
@@ -61,7 +62,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     std::size_t length = reply.size;
     std::optional<SessionKeys> its;
     if (reply.guest) {
-      // In suite 1 only what the holder of the key wrote gets here; its cookie apart, every byte counts.
+      // In suite 1 only the holder of the key can get here. Every byte except the cookie is authenticated.
       if (reply.guest->key != nullptr) fuzz::require(reply.guest->hello.name == "a");
       Welcome welcome;
       welcome.version = 1;
@@ -79,7 +80,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     const bool true_answer = !change(length) && untouched;
     const bool was_open = client.outcome().has_value();
     client.receive(now, std::span(buffer).first(length));
-    // The connection id is the one thing that is not authentic by itself.
+    // Only the connection id is not authenticated.
     if (sealed && !was_open && client.outcome() && !true_answer) {
       fuzz::require(std::equal(buffer.begin() + kHeaderSize, buffer.begin() + static_cast<long>(length),
                                answer.begin() + kHeaderSize));

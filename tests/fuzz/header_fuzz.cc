@@ -3,7 +3,7 @@
 #include "protocol/wire/header.h"
 #include "tests/fuzz/target.h"
 
-// The clear header and the layout of the handshake: what is read comes out again as it was.
+// The unencrypted header and the layout of the handshake: parsed values encode to the same bytes.
 
 using namespace tendon;
 

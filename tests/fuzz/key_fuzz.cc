@@ -7,8 +7,8 @@
 #include "protocol/secrets/client_key.h"
 #include "tests/fuzz/target.h"
 
-// The text of a key file, and its permissions: refused with a sentence that does not hold the key, or taken for a key
-// that only its owner can read, that is not weak, and that is the same after it has been written again.
+// The text of a key file and its permissions. A file is rejected with a message that does not contain the key, or
+// accepted as a key that only its owner can read, that is not weak, and that survives writing and parsing.
 
 using namespace tendon;
 
@@ -24,7 +24,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   } catch (const std::invalid_argument& refused) {
     constexpr std::string_view kDigits = "0123456789abcdefABCDEF";
     const std::string_view sentence = refused.what();
-    for (std::size_t at = 0; at < sentence.size(); ++at) {  // the longest key that is short of nothing but a digit
+    for (std::size_t at = 0; at < sentence.size(); ++at) {  // the longest key that lacks only one digit
       const std::size_t end = std::min(sentence.find_first_not_of(kDigits, at), sentence.size());
       fuzz::require(end - at < 63);
     }

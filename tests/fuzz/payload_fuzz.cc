@@ -4,8 +4,8 @@
 #include "tests/fuzz/target.h"
 #include "tests/protocol/wire/told.h"
 
-// What an honest key says that its holder should not: the input is sealed as the peer would, and a session takes it.
-// Both ways of reading it agree: as it is, and as if its fields were not in order.
+// Invalid content from an authenticated peer: the input is sealed with the peer's key and given to a session. The fast
+// parser and the one for fields in arbitrary order agree.
 
 using namespace tendon;
 

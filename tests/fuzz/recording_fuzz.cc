@@ -9,8 +9,7 @@
 #include "server/recording/recording_reader.h"
 #include "tests/fuzz/target.h"
 
-// A recording: every byte sequence gives records and then ends, or is refused by name. A record that was read
-// is the same after it has been written and read again.
+// Every byte sequence yields records and then the end, or an error. A record survives encoding and decoding unchanged.
 
 using namespace tendon;
 
@@ -21,7 +20,7 @@ void require_same_again(const RecordingReader::Record& record, const Ways& ways)
   if (const auto* scene = std::get_if<SceneRecord>(&record)) {
     fuzz::require(recording::decode_scene(recording::encode(*scene)) == *scene);
   } else if (const auto* step = std::get_if<StepRecord>(&record)) {
-    // Compared as bytes: a NaN is not equal to itself.
+    // Compares bytes, because NaN differs from itself.
     const auto bytes = recording::encode(*step, ways.name_of(step->force_way));
     Ways own;
     const StepRecord again = recording::decode_step(bytes, step->hand.at, own);

@@ -8,7 +8,7 @@
 #include <iterator>
 #include <vector>
 
-// A fuzz target over the files of a folder, without libFuzzer: any compiler and any sanitizer can do it.
+// Runs a fuzz target over the files of a folder without libFuzzer, for any compiler and sanitizer.
 
 // NOLINTNEXTLINE(readability-identifier-naming): libFuzzer's name
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size);
@@ -29,7 +29,7 @@ int main(int argc, char** argv) {
       std::cerr << path.string() << ": cannot read it\n";
       return 2;
     }
-    std::cerr << path.filename().string() << '\n';  // the last one is to blame
+    std::cerr << path.filename().string() << '\n';  // identifies the file after a crash
     LLVMFuzzerTestOneInput(reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size());
   }
   std::cout << files.size() << " inputs\n";

@@ -4,13 +4,13 @@
 #include "server/scene/scene.h"
 #include "tests/fuzz/target.h"
 
-// A scene file: refused by a SceneError, or a scene that the device and the haptic loop take without a complaint.
+// A scene file is rejected with a SceneError, or the device and the haptic loop accept the scene.
 
 using namespace tendon;
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const std::string_view text = fuzz::text(std::as_bytes(std::span(data, size)));
-  if (text.find('/') != std::string_view::npos) return -1;  // a recorded motion may be any file of this machine
+  if (text.find('/') != std::string_view::npos) return -1;  // a recorded motion could name any file of this machine
   try {
     const Scene scene = parse_scene(text, "scene", "/nowhere");
     static Mailboxes mail({.steps = 2, .flight = 2, .datagrams = 2});

@@ -6,8 +6,9 @@
 #include "protocol/session.h"
 #include "tests/fuzz/target.h"
 
-// Two sessions and a network that does what the input says: loses, repeats, reorders, damages, waits. What one end is
-// told, the other has said; requests come once and in order; a session ends by silence, by Bye or by age only.
+// Two sessions over a network that loses, repeats, reorders, damages and delays datagrams as the input decides. Each
+// end receives only what the other has sent, requests arrive once and in order, and a session ends only by timeout, Bye
+// or age.
 
 using namespace tendon;
 

@@ -10,7 +10,7 @@
 #include <streambuf>
 #include <string_view>
 
-// Helpers that the fuzz targets share. A property that fails ends the process: that is how libFuzzer is told.
+// Helpers of the fuzz targets. A violated property aborts the process, which libFuzzer reports.
 
 namespace tendon::fuzz {
 
@@ -22,7 +22,7 @@ inline std::string_view text(std::span<const std::byte> bytes) {
   return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
 }
 
-/// The input as a file that can be read and sought in, without a copy of it.
+/// A seekable stream over the input, without a copy.
 class InputBuffer : public std::streambuf {
  public:
   explicit InputBuffer(std::span<const std::byte> bytes) {
@@ -44,7 +44,7 @@ class InputBuffer : public std::streambuf {
   }
 };
 
-/// The input as a sequence of small decisions and of pieces; when it is used up, zeros and empty pieces.
+/// Splits the input into small decisions and pieces. After the end returns zeros and empty pieces.
 class Input {
  public:
   Input(const std::uint8_t* data, std::size_t size) : left_(std::as_bytes(std::span(data, size))) {}

@@ -9,8 +9,8 @@
 #include "tests/tools/injector/traces/trace.h"
 #include "tests/tools/injector/traces/trace_player.h"
 
-// A recorded network: refused with file and line, or a trace that reads back as itself, that can be played, and
-// whose fates never come before what they happen to.
+// A recorded network is rejected with file and line, or it survives writing and parsing, can be replayed, and has no
+// release before its arrival.
 
 using namespace tendon;
 using namespace tendon::injector;

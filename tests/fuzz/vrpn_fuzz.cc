@@ -7,8 +7,8 @@
 #include "tests/clients/plug/vrpn/program.h"
 #include "tests/fuzz/target.h"
 
-// What a VRPN program sends, in pieces by TCP and in datagrams: whatever comes, what is drawn is a finite force, what
-// is answered can be read, and no more is kept than the limits say.
+// Data of a VRPN program in TCP fragments and datagrams. Rendered forces are finite, answers can be parsed, and stored
+// data stays within the limits.
 
 using namespace tendon;
 using namespace tendon::plug;
@@ -23,7 +23,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   vrpn::Reader reader;
   bool first = true;
   const vrpn::Program program;
-  if ((input.byte() & 1U) != 0) {  // introduced; else the input has to find the cookie
+  if ((input.byte() & 1U) != 0) {  // otherwise the input has to contain the right cookie
     peer.take_stream(now, program.hello());
     peer.take_stream(now, vrpn::Program::description(vrpn::Program::kSender, vrpn::kSenderDescription, "Phantom0"));
     peer.take_stream(now, vrpn::Program::all_types(0));

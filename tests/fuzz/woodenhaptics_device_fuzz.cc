@@ -6,9 +6,9 @@
 #include "devices/woodenhaptics/woodenhaptics_device.h"
 #include "tests/fuzz/target.h"
 
-// Decisions: what a WoodenHaptics' cable brings, when it takes something, when it is out. However they fall, no report
-// with a current is written but by a device that is homed, no current is beyond what the motors are given, the counters
-// are set only after the button was pressed, and what `apply` returns is finite.
+// The input decides what a WoodenHaptics' cable returns, when it accepts data and when it is disconnected. Current is
+// sent only to a homed device and within the motor limits, the counters are set only after the button was pressed, and
+// the result of `apply` is finite.
 
 using namespace tendon;
 
@@ -20,7 +20,7 @@ class Cable final : public usb::Pipe {
 
   std::uint32_t connection() noexcept override { return number; }
   bool request(const usb::Request&) noexcept override {
-    fuzz::require(false);  // it is no serial chip
+    fuzz::require(false);  // not a serial chip
     return false;
   }
   bool write(std::span<const std::uint8_t> bytes) noexcept override {
@@ -72,7 +72,7 @@ class Cable final : public usb::Pipe {
   std::uint32_t number = 1;
   bool full = false;
   bool flag = false;
-  int asked = 0;  ///< reports in a row that said that the button was pressed
+  int asked = 0;  ///< consecutive reports with a pressed button
   std::array<std::int16_t, 3> counters{};
 
  private:

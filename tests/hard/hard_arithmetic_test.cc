@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Cases that break programs below their mathematics: rounding, compiler optimisations, denormals (slow numbers), and
-// NaN.
+//
+// Numerical cases: rounding, compiler optimizations, denormals, and NaN.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -44,7 +44,7 @@ std::string text(double value) {
   return out.str();
 }
 
-// Oracle: 1e8 times the number next to 1e-6 is 100 to the last bit.
+// Oracle: 1e8 times the double next to 1e-6 is exactly 100.
 TEST(HardArithmetic, AHundredMillionStepsOfTheLedgerAddUpToTheLastBit) {
   constexpr int kSteps = 100'000'000;
   EnergyLedger ledger({0, 0});
@@ -71,7 +71,7 @@ TEST(HardArithmetic, AHundredMillionStepsOfTheLedgerAddUpToTheLastBit) {
        .without = "a plain double: " + text(std::abs(plain - 100)) + " J off; a float ends at " + text(single) + " J"});
 }
 
-/// A program's output and exit status.
+/// Returns a program's exit status and output.
 std::pair<int, std::string> run(const std::string& command) {
   std::pair<int, std::string> result;
   FILE* pipe = popen((command + " 2>&1").c_str(), "r");
@@ -82,7 +82,7 @@ std::pair<int, std::string> run(const std::string& command) {
   return result;
 }
 
-// Oracle: the compiler itself, run on the sources that catch NaN or compensate rounding.
+// Oracle: the compiler itself, run on the sources that detect NaN or compensate rounding.
 TEST(HardArithmetic, FastMathStopsTheBuildOfEveryRoomThatCatchesNaN) {
   const std::string sentence = "Tendon is not built with -ffast-math";
   const std::string preprocess =
@@ -114,7 +114,7 @@ TEST(HardArithmetic, FastMathStopsTheBuildOfEveryRoomThatCatchesNaN) {
           .without = "the #error left out: everything compiles"});
 }
 
-/// A device with a careless library: it notes the thread's floating-point mode and leaves it changed.
+/// A device whose library reads the thread's floating-point mode and changes it without restoring it.
 class CarelessDevice final : public Device {
  public:
   const DeviceInfo& info() const noexcept override { return info_; }
@@ -196,8 +196,8 @@ TEST(HardArithmetic, DenormalsAreOffInHapticStepsAndSoftBodyAnswers) {
        .without = "DenormalsOff left out: " + std::to_string(slow_without) + " answers"});
 }
 
-/// A tool that presses into a soft block behind a bad network. Twins of one seed are the same to the last bit, until a
-/// datagram is put between.
+/// A tool that presses into a soft block behind a bad network. Two twins with the same seed are bitwise identical until
+/// a datagram is inserted.
 struct Twin {
   explicit Twin(std::uint64_t seed)
       : device(hand()), world(config(seed), device), body(softbody::parse_scene(scene(), "s.toml", ".")) {
@@ -235,7 +235,7 @@ struct Twin {
     config.loop.control.max_slew = 1000;
     return config;
   }
-  /// Dynamic, so that the body has a state which a bad position could spoil.
+  /// Dynamic, so that the body has a state that an invalid position could corrupt.
   static std::string scene() {
     std::string scene = softbody::testing::with("\"condensed\"", "\"linear\"");
     const std::string_view effects = "[\"contact\"]";
@@ -249,7 +249,7 @@ struct Twin {
     for (const double number : vector) bits.push_back(std::bit_cast<std::uint64_t>(number));
   }
 
-  /// A datagram forged by an attacker who has seen the session: the next one of one end, with a frame or without.
+  /// Inserts a forged datagram with the sender's next packet number, with or without a frame.
   template <class Frame>
   void forge(bool to_server, std::uint64_t number, const std::optional<Frame>& frame) {
     std::array<std::byte, kMaxDatagram> buffer{};
@@ -268,8 +268,8 @@ struct Twin {
   std::vector<std::uint64_t> bits;
 };
 
-// Oracle: a twin whose datagram has no frame instead of a bad one. Every number that the device, the hand and the
-// engine see is the same to the last bit.
+// Oracle: a twin that receives a datagram without a frame instead of the invalid one. All values at the device, the
+// hand and the engine are bitwise identical.
 TEST(HardArithmetic, NaNIsCountedAndLeavesServerAndEngineAsTheyWere) {
   constexpr double kInf = std::numeric_limits<double>::infinity();
   const std::array bad = {std::nan(""), -std::nan(""), kInf, -kInf, 1e300, -1e300, 1.1e12};
@@ -313,7 +313,7 @@ TEST(HardArithmetic, NaNIsCountedAndLeavesServerAndEngineAsTheyWere) {
     refused += more_by_server + more_by_engine;
     compared += spoilt.bits.size();
 
-    // The smallest denormal is a number: it is accepted and does no harm.
+    // The smallest denormal is a valid number.
     const auto before = spoilt.world.server().stats().controller;
     ForceCommand command;
     command.sequence = 1'000'001;

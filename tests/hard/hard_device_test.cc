@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
+//
 // Estimators, clocks and devices that break the loop of hand, device, network and engine (loop_case.h).
 #include <gtest/gtest.h>
 
@@ -17,7 +18,7 @@
 namespace tendon::hard::hard_device_test {
 namespace {
 
-/// Along the normal: 12 mm into the wall, and from `since` on out and in, and at rest again `then` later.
+/// Moves along the normal: 12 mm into the wall, from `since` on out and in, and to rest again `then` later.
 ScriptedMotion press(Case& set, Duration since, Duration then, double shallow, double deep) {
   ScriptedMotion::MinimumJerk reach;
   reach.back_and_forth = false;
@@ -41,7 +42,7 @@ Observed estimator_blow_up(std::uint64_t seed, bool bounds, bool limiter) {
   estimator.model = OutputEstimator::Model::kOutputError;
   if (!bounds) estimator.max_stiffness = estimator.max_force = 1e9;
   if (!limiter) set.let_all_through();
-  // For two seconds no model has the environment's structure; then it is the wall.
+  // For two seconds the environment fits no model structure; then it is the wall.
   set.physics = [wall = set.physics, n = set.into, dice = Dice(seed)](const DeviceState& hand) mutable -> Touch {
     if (hand.tick < 1000 || hand.tick > 3200) return wall(hand);
     return Vec3((dice.within(-8000, 8000) * hand.position.dot(n) + dice.within(-20, 20)) * n + dice.direction());
@@ -59,8 +60,8 @@ Observed estimator_blow_up(std::uint64_t seed, bool bounds, bool limiter) {
   return bench.seen();
 }
 
-// Oracle: passive, bounded, quiet, and even what is wanted is no more than 30 N on an axis, while the estimator learns
-// from an environment that springs and damps one way now and the other way 40 ms later.
+// Oracle: passive, bounded, quiet, and the requested force is at most 30 N on an axis, while the estimator learns from
+// an environment whose stiffness and damping change every 40 ms.
 TEST(HardLoop, AnEstimatorThatLearnsNonsenseDoesNotBlowUp) {
   constexpr Duration kWithin = seconds(1);
   const Observed seen = kept(kWithin, [](std::uint64_t seed) { return estimator_blow_up(seed, true, true); });
@@ -78,7 +79,7 @@ TEST(HardLoop, AnEstimatorThatLearnsNonsenseDoesNotBlowUp) {
 Observed wind_up(std::uint64_t seed, double prior_variance) {
   constexpr double kMostError = 1;  // N
   Case set(seed);
-  // A grip that hardly gives way, and nothing sticks: the noise moves the hand by micrometres.
+  // A stiff grip without static friction, so that the noise moves the hand by micrometers.
   set.device.hand->stiffness = 20'000;
   set.device.hand->damping = 50;
   set.device.coulomb_friction.reset();
@@ -105,9 +106,8 @@ Observed wind_up(std::uint64_t seed, double prior_variance) {
   return bench.seen();
 }
 
-// Oracle: passive, bounded, quiet, and never more than 1 N beside the wall's force, when a hand that a vice holds has
-// been still for 30 s (750 answers with 0.05 N of noise, half of what is known forgotten every 14) and moves again, 10
-// mm between two answers.
+// Oracle: passive, bounded, quiet, and at most 1 N above the wall's force. A clamped hand is still for 30 s (750
+// answers with 0.05 N of noise, a forgetting half-life of 14 answers) and then moves 10 mm between two answers.
 TEST(HardLoop, AnEstimatorThatHasLongSeenNothingNewDoesNotWindUp) {
   constexpr Duration kWithin = seconds(1);
   const double prior = OutputEstimator::Config{}.prior_variance;
@@ -120,8 +120,8 @@ TEST(HardLoop, AnEstimatorThatHasLongSeenNothingNewDoesNotWindUp) {
               without("cap of 1e30 in place of 2e8", kWithin, [](std::uint64_t seed) { return wind_up(seed, 1e30); })});
 }
 
-/// The lowest account (J) that an adversary with this friction reaches: the adversary moves along the force whenever
-/// the law lets that earn energy, while an engine pushes it about.
+/// The lowest account (J) that an adversary with this friction reaches. The adversary moves along the force whenever
+/// the law lets it gain energy, while an engine pushes it back and forth.
 double left_by_adversary(const Case& set, const Friction& friction) {
   AdversaryDevice device({.friction = friction}, set.world.seed);
   WatchedDevice port(device, {.friction = friction});
@@ -158,9 +158,9 @@ Observed jitter(std::uint64_t seed, bool told) {
   return seen;
 }
 
-// Oracle: passive also against an adversary, bounded, with periods of 1 to 2 ms, and besides with one step in 200 that
-// comes 3 to 60 ms late; quiet though the periods vary (in a pause the device lets go, and the hand sinks in). The
-// limiter is told how long a force may be held: 2 ms, and with pauses the 5 ms after which the device itself lets go.
+// Oracle: passive, also against an adversary, and bounded, with periods of 1 to 2 ms, and additionally with one step in
+// 200 late by 3 to 60 ms; quiet if only the periods vary (in a pause the device releases the force, and the hand sinks
+// in). The limiter's longest hold is 2 ms, or with pauses the 5 ms after which the device itself releases the force.
 TEST(HardLoop, PeriodsThatVaryAndPeriodsThatAreMissedStayPassive) {
   constexpr Duration kWithin = seconds(2);
   const Observed seen = kept(kWithin, [](std::uint64_t seed) { return jitter(seed, true); });
@@ -182,7 +182,7 @@ Observed wrap(std::uint64_t seed, bool guarded) {
   if (guarded) set.control().max_speed = 10;
   Bench bench(set);
   bench.run(milliseconds(1200));
-  // The encoder's end lies where the hand leaves the wall: there the position jumps from 5 mm to 205 mm.
+  // The encoder wraps where the hand leaves the wall, from 5 mm to 205 mm.
   bench.encoder.range = 0.2;
   bench.encoder.middle = Vec3(0.105, 0, 0);
   bench.run(milliseconds(2100));
@@ -196,8 +196,8 @@ Observed wrap(std::uint64_t seed, bool guarded) {
   return bench.seen();
 }
 
-// Oracle: passive, bounded, quiet, and after a re-arm all is well. A wrap by 0.2 m in 1 ms looks like 32 J of friction,
-// and 1.6 J of work.
+// Oracle: passive, bounded, quiet, and normal operation after a re-arm. A wrap by 0.2 m in 1 ms corresponds to 32 J of
+// friction and 1.6 J of work.
 TEST(HardLoop, AnEncoderThatWrapsIsAFaultAndNoIncome) {
   constexpr Duration kWithin = seconds(1);
   const Observed seen = kept(kWithin, [](std::uint64_t seed) { return wrap(seed, true); });
@@ -219,9 +219,9 @@ Observed stuck(std::uint64_t seed, bool limiter) {
   Bench bench(set);
   bench.run(milliseconds(1480));
   bench.encoder.stuck = bench.owes = true;
-  bench.run(milliseconds(400));  // the hand goes out, and is pushed
+  bench.run(milliseconds(400));  // the force pushes the hand out
   bench.encoder.stuck = false;
-  // The way that it jumps then passes for viscous friction in one window of the ledger.
+  // The jump then counts as viscous friction in one window of the ledger.
   const double never_paid = kFriction.viscous * kHidden * kHidden / (robust.window * 1e-3);
   const LocalTime paid = bench.world.now() + milliseconds(1500);
   bench.expect_of_steps([&bench, never_paid, paid](const StepRecord& step) -> std::string {
@@ -236,9 +236,9 @@ Observed stuck(std::uint64_t seed, bool limiter) {
   return bench.seen();
 }
 
-// Oracle: passive except for unseen motion. While the encoder stands still the hand gains at most
-// ‖F‖ · travel = 64 mJ. The ledger books that as debt when the encoder moves again, and it is paid back within 1.5 s,
-// except for 5.1 mJ that the jump passes off as viscous friction. Bounded, quiet.
+// Oracle: passive except for hidden motion. While the encoder is stuck the hand gains at most ‖F‖ · travel = 64 mJ. The
+// ledger books this as debt when the encoder moves again and recovers it within 1.5 s, except for 5.1 mJ that the jump
+// counts as viscous friction. Bounded, quiet.
 TEST(HardLoop, AnEncoderThatSticksOwesWhatItHidAndPaysItBack) {
   constexpr Duration kWithin = seconds(1);
   const Observed seen = kept(kWithin, [](std::uint64_t seed) { return stuck(seed, true); });
@@ -268,8 +268,8 @@ Observed overestimated(std::uint64_t seed, bool corrected) {
   return seen;
 }
 
-// Oracle: passive with the true friction, also against an adversary, bounded, quiet, where the scene claims twice the
-// friction and an identification over the workspace says what it is: the bounds go down at once.
+// Oracle: passive with the true friction, also against an adversary, bounded, quiet. The scene claims twice the
+// friction, and an identification over the workspace reports the true value, which lowers the bounds immediately.
 TEST(HardLoop, FrictionClaimedTwiceTooHighIsCorrectedByTheMapOfTheWorkspace) {
   constexpr Duration kWithin = seconds(1);
   const Observed seen = kept(kWithin, [](std::uint64_t seed) { return overestimated(seed, true); });
@@ -289,13 +289,13 @@ Observed clock_goes_back(std::uint64_t seed, bool decay) {
   if (!decay) set.control().hold.hold = set.control().hold.safe_stop = seconds(100);
   Bench bench(set);
   bench.run(milliseconds(1500));
-  // What the device says of its time, too.
+  // The time stamps of the device jump back as well.
   bench.encoder.behind = milliseconds(50);
   bench.run(milliseconds(300));
   bench.encoder.behind = Duration::zero();
   bench.run(milliseconds(200));
   const LocalTime silent = bench.world.now() + kSilence + milliseconds(20);
-  const LocalTime again = bench.world.now() + back;  // until then it waits
+  const LocalTime again = bench.world.now() + back;  // waits until then
   bench.expect_of_steps([stopped = no_force_from(silent), again](const StepRecord& step) {
     return step.hand.at < again ? stopped(step) : std::string();
   });
@@ -306,10 +306,10 @@ Observed clock_goes_back(std::uint64_t seed, bool decay) {
   return bench.seen();
 }
 
-// Oracle: passive, bounded, quiet; an engine whose clock is set back waits for so long, its force fades meanwhile, and
-// it is back after it: at once, or where the session has ended meanwhile, when it has noticed that. The server itself
-// has one clock, CLOCK_MONOTONIC (server/machine/clock.cc; tests/rules/rooms sees that nobody reads another), which
-// cannot be set; a device whose time stamps go back changes no force by it.
+// Oracle: passive, bounded, quiet. An engine whose clock is set back waits for that time while its force fades. It then
+// returns immediately, or after it has detected that the session has ended. The server has only one clock,
+// CLOCK_MONOTONIC (server/machine/clock.cc; tests/rules/rooms forbids reading others), which cannot be set. Time stamps
+// of a device that go back change no force.
 TEST(HardLoop, AClockThatIsSetBackKicksNobody) {
   constexpr Duration kWithin = seconds(5);
   const Observed seen = kept(kWithin, [](std::uint64_t seed) { return clock_goes_back(seed, true); });
@@ -320,7 +320,7 @@ TEST(HardLoop, AClockThatIsSetBackKicksNobody) {
           .without = without("decay off", kWithin, [](std::uint64_t seed) { return clock_goes_back(seed, false); })});
 }
 
-/// Energy (J) that an active burst of 2 s takes out of the account after `dissipation`.
+/// Energy (J) that an active burst of 2 s extracts after a calm phase of dissipation.
 double burst_after(Duration calm, bool capped, Observed& seen) {
   constexpr double kDrag = 2;  // N·s/m, of the environment
   Case set(1);
@@ -338,7 +338,7 @@ double burst_after(Duration calm, bool capped, Observed& seen) {
   LocalTime now{seconds(1)};
   const LocalTime burst = now + calm;
   for (LocalTime end = burst + seconds(2); now < end; loop.step(now), now += set.world.loop.period) {
-    // At 100 Hz: drag, and in the burst a push along whichever way the hand moves.
+    // Runs at 100 Hz: drag, and in the burst a push along the direction of motion.
     if (const DeviceState* hand = mail.state.take(); hand != nullptr && hand->tick % 5 == 0) {
       RemoteForce force;
       force.sequence = ++sequence;
@@ -359,8 +359,8 @@ double burst_after(Duration calm, bool capped, Observed& seen) {
   return before - least;
 }
 
-// Oracle: a hand dissipates energy for an hour by waving through drag. A burst that then pushes it along gets at most
-// the 5 mJ that the cap leaves, plus what the last contact may have stored.
+// Oracle: a hand dissipates energy for an hour by moving through drag. A burst that then pushes it extracts at most the
+// 5 mJ of the energy cap plus the energy that the last contact may have stored.
 TEST(HardLoop, AnHourOfDissipationPaysForNoBurst) {
   constexpr double kMostOut = 0.025;  // J
   Observed seen;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
+//
 // Engines and networks that break the loop of hand, device, network and engine (loop_case.h).
 #include <gtest/gtest.h>
 
@@ -22,16 +23,16 @@ Observed rate_collapse(std::uint64_t seed, bool limiter) {
   if (!limiter) set.let_all_through();
   Bench bench(set);
   bench.run(seconds(1));
-  // It sees a state every 200 ms, and its answer takes so long.
+  // Receives a state every 200 ms, with an answer delay of the same length.
   bench.world.network().change(Case::weather("base=199ms", "outage(at=0ms,every=200ms,for=199ms)"), bench.world.now());
-  bench.run(milliseconds(2200));  // the hand comes to rest in it
+  bench.run(milliseconds(2200));  // the hand comes to rest
   bench.world.network().change(Case::fair(), bench.world.now());
   bench.disturbance_is_over();
   bench.run(seconds(3));
   return bench.seen();
 }
 
-// Oracle: passive, bounded, quiet. The forces in those two seconds are 200 to 400 ms old, and the hand moves on.
+// Oracle: passive, bounded, quiet. The forces in those two seconds are 200 to 400 ms old while the hand moves.
 TEST(HardLoop, AnEngineThatFallsFrom1000To5HzInContactStaysPassive) {
   constexpr Duration kWithin = seconds(1);
   const Observed seen = kept(kWithin, [](std::uint64_t seed) { return rate_collapse(seed, true); });
@@ -65,7 +66,7 @@ Observed bad_network(std::uint64_t seed, bool limiter, bool decay) {
   return bench.seen();
 }
 
-// Oracle: passive, bounded, quiet, and no force from 760 ms after the last arrival on, until the engine is back.
+// Oracle: passive, bounded, quiet, and no force from 760 ms after the last arrival until the engine returns.
 TEST(HardLoop, FiveHertzOutOfOrderThenSilenceIsPassiveAndFadesToZero) {
   constexpr Duration kWithin = seconds(1);
   const Observed seen = kept(kWithin, [](std::uint64_t seed) { return bad_network(seed, true, true); });
@@ -103,7 +104,7 @@ Observed restart(std::uint64_t seed, bool ramp) {
   return bench.seen();
 }
 
-// Oracle: passive, bounded, quiet; the force returns over 100 ms, although the hand has sunk in meanwhile.
+// Oracle: passive, bounded, quiet; the force returns over 100 ms although the hand has sunk in meanwhile.
 TEST(HardLoop, AnEngineKilledInContactAndRestartedDoesNotKick) {
   constexpr Duration kWithin = seconds(1);
   const Observed seen = kept(kWithin, [](std::uint64_t seed) { return restart(seed, true); });
@@ -116,7 +117,7 @@ TEST(HardLoop, AnEngineKilledInContactAndRestartedDoesNotKick) {
 
 Observed teleport(std::uint64_t seed, bool limits, bool limiter) {
   Case set(seed);
-  // MuJoCo's tool: 20 mm from the hand it pulled with 153 N.
+  // MuJoCo's tool pulled with 153 N at a distance of 20 mm from the hand.
   const Vec3 pull = 153 * set.dice.direction();
   set.physics = [wall = set.physics, pull](const DeviceState& hand) -> Touch {
     if (hand.tick >= 2800 && hand.tick < 3100) return pull;
@@ -134,7 +135,7 @@ Observed teleport(std::uint64_t seed, bool limits, bool limiter) {
   return bench.seen();
 }
 
-// Oracle: passive, bounded, quiet, while the engine asks for 153 N from one step to the next, for 0.3 s.
+// Oracle: passive, bounded, quiet, while the engine requests 153 N from one step to the next for 0.3 s.
 TEST(HardLoop, AToolThatTeleports20MillimetresDoesNotThrowTheHand) {
   constexpr Duration kWithin = seconds(1);
   const Observed seen = kept(kWithin, [](std::uint64_t seed) { return teleport(seed, true, true); });
@@ -162,7 +163,7 @@ Observed edge(std::uint64_t seed, bool limiter) {
   reach.back_and_forth = false;
   reach.points = {Vec3(-0.01 * (u + w)), Vec3(0.012 * (u + w))};
   reach.durations = {milliseconds(800)};
-  for (int i = 0; i < 10; ++i) {  // about the edge
+  for (int i = 0; i < 10; ++i) {  // around the edge
     reach.points.emplace_back(0.012 * (u + w) + set.dice.within(-0.002, 0.002) * (u - w));
     reach.durations.emplace_back(milliseconds(200));
   }
@@ -178,8 +179,8 @@ Observed edge(std::uint64_t seed, bool limiter) {
   return bench.seen();
 }
 
-// Oracle: passive, bounded, and quiet once the hand is on one face. On the edge the normal turns by 90° from one answer
-// to the next, 20 ms late.
+// Oracle: passive, bounded, and quiet once the hand is on one face. On the edge the normal rotates by 90° between two
+// answers, 20 ms late.
 TEST(HardLoop, ContactThatChattersOnAnEdgeStaysPassive) {
   constexpr Duration kWithin = seconds(1);
   const Observed seen = kept(kWithin, [](std::uint64_t seed) { return edge(seed, true); });
@@ -192,10 +193,12 @@ TEST(HardLoop, ContactThatChattersOnAnEdgeStaysPassive) {
 
 Observed pull_through(std::uint64_t seed, bool limiter) {
   Case set(seed);
-  // A plate of 8 mm that pushes out of the nearer side; what has touched it sticks to it, up to 5 mm away.
+  // A plate of 8 mm that pushes toward the nearer side. A hand that has touched it sticks to it up to a distance of 5
+  // mm.
   set.physics = [n = set.into, k = set.stiffness, stuck = false](const DeviceState& hand) mutable -> Touch {
     const double depth = hand.position.dot(n);
-    const double out = depth < 0.004 ? depth : depth - 0.008;  // of the nearer side: > 0 is inside on the first
+    const double out = depth < 0.004 ? depth : depth - 0.008;  // distance to the nearer side; > 0 is inside near the
+                                                               // first side
     stuck = stuck ? std::abs(out) < 0.005 : depth > 0 && depth < 0.008;
     return stuck ? Vec3(-k * out * n) : Vec3(0, 0, 0);
   };
@@ -216,7 +219,7 @@ Observed pull_through(std::uint64_t seed, bool limiter) {
   return bench.seen();
 }
 
-// Oracle: passive, bounded, quiet. In the middle of the plate the force turns round, and what sticks pulls back.
+// Oracle: passive, bounded, quiet. In the middle of the plate the force reverses, and adhesion pulls back.
 TEST(HardLoop, PullingThroughAThinPlateThatSticksStaysPassive) {
   constexpr Duration kWithin = seconds(1);
   const Observed seen = kept(kWithin, [](std::uint64_t seed) { return pull_through(seed, true); });

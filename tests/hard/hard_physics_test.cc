@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Cases that break the physics of soft bodies: element, solver and time step. Figures of other programs are for the
+//
+// Cases that break the physics of soft bodies: element, solver and time step. Figures of other programs refer to the
 // pressed block B1 (tests/clients/softbody/pressed_block.h).
 #include <gtest/gtest.h>
 
@@ -47,7 +48,7 @@ using testing::pressed_block;
 using testing::pressed_body;
 using testing::PressedByNewton;
 
-/// A number as a person writes it in a table.
+/// Formats a number for a table.
 std::string text(double value, int digits = 3) {
   std::ostringstream out;
   out.precision(digits);
@@ -88,7 +89,7 @@ TEST(HardPhysics, ANearlyIncompressibleBlockDoesNotLock) {
           .without = "tet4, which the warning names: +" + text(locked, 4) + " %"});
 }
 
-/// B1 with its free nodes mirrored below the floor, or anywhere.
+/// B1 with its free nodes mirrored below the floor, or at random positions.
 VectorXd turned_inside_out(const Solid& solid, bool scattered, std::uint64_t seed) {
   Dice dice(seed);
   VectorXd u = VectorXd::Zero(solid.size());
@@ -102,9 +103,9 @@ VectorXd turned_inside_out(const Solid& solid, bool scattered, std::uint64_t see
   return u;
 }
 
-// Oracle: let go, a body is at rest where it began, |u| < 1 µm, and det F > 0 in every element. From nodes that are
-// scattered anywhere the corotational law comes back too; the neo-Hookean one has other minima there, in which an edge
-// of the block is wound once around itself: at rest, with det F > 0.
+// Oracle: a released body comes to rest in its initial shape, |u| < 1 µm, with det F > 0 in every element. From random
+// positions the corotational law recovers too. The neo-Hookean law has other minima there, in which an edge of the
+// block is wound once around itself, at rest and with det F > 0.
 TEST(HardPhysics, ABlockTurnedInsideOutComesBackRightWayRound) {
   double farthest = 0;
   int elsewhere = 0;
@@ -142,7 +143,8 @@ TEST(HardPhysics, ABlockTurnedInsideOutComesBackRightWayRound) {
                      "ends in NaN"});
 }
 
-// Oracle: the oracle of the case above must fail here: St. Venant-Kirchhoff's energy is as low in the mirror image.
+// Oracle: the oracle of the previous case must fail here, because the mirror image minimizes the energy of St.
+// Venant-Kirchhoff as well.
 TEST(HardPhysics, FiniteAndAtRestIsNoOracleStVenantKirchhoffEndsSoInsideOut) {
   PressedByNewton pressed(Element::kTet4, 4, Law::kStVenantKirchhoff, 300);
   pressed.model.set_displacements(turned_inside_out(pressed.solid, false, 0));
@@ -173,8 +175,9 @@ std::string gmsh_of(std::initializer_list<Vec3> nodes, const std::string& elemen
   return out.str();
 }
 
-// Oracle: closed form. A tetrahedron whose fourth node lies on its opposite face has no volume; with the node h above
-// it, h/6 of the unit's: the swing of h over the speed of sound is the fastest, so that the step goes with h.
+// Oracle: closed form. A tetrahedron whose fourth node lies on the opposite face has no volume. With the node at height
+// h its volume is h/6 of the unit's. The highest frequency corresponds to h divided by the speed of sound, so the
+// stable step is proportional to h.
 TEST(HardPhysics, AnElementWithoutVolumeIsNamedAndASliverStepRefused) {
   const auto mesh = [](double height) {
     return gmsh_of({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0.25, 0.25, -1}, {0.25, 0.25, height}},
@@ -193,7 +196,7 @@ TEST(HardPhysics, AnElementWithoutVolumeIsNamedAndASliverStepRefused) {
   const double thin = 6 * 3.6e-6;  // its volume is 3.6e-6 of the cube of its edges
   const Solid sliver = solid(thin);
   const double limit = largest_step(sliver, 1000);
-  // The mass of its top goes with h as well, and the stiffness with 1/h: 2/ω goes with h.
+  // The mass of its top is proportional to h and the stiffness to 1/h, so 2/ω is proportional to h.
   EXPECT_NEAR(limit / largest_step(solid(10 * thin), 1000), 0.1, 1e-3);
   const TouchSurface top(sliver.mesh(), Vec3::UnitZ(), 0.004);
   const auto engine = [&](double step) {
@@ -227,13 +230,13 @@ Sparse sparse_of(const SymmetricMatrix& matrix) {
   return all;
 }
 
-// Oracle: conjugate gradients with Jacobi's preconditioner, which are Eigen's and not CHOLMOD's, find the same
-// displacements: 1e-6 in the norm of the energy.
+// Oracle: Eigen's conjugate gradients with Jacobi's preconditioner, independent of CHOLMOD, find the same displacements
+// to 1e-6 in the energy norm.
 TEST(HardPhysics, StiffnessesAMillionTimesApartAreSolvedAsAnotherSolverDoes) {
   const Solid whole = pressed_block(Element::kTet4, 8, 0.45);
   SymmetricMatrix stiffness = whole.pattern();
   whole.stiffness(VectorXd::Zero(whole.size()), Elastic::Curvature::kExact, stiffness);
-  // The half x > 0 is a million times as stiff: its elements once more, 999 999 times.
+  // The half x > 0 is a million times as stiff: adds its elements 999 999 times.
   Mesh half = whole.mesh();
   half.elements.clear();
   for (int e = 0; e < whole.mesh().element_count(); ++e) {
@@ -279,7 +282,7 @@ TEST(HardPhysics, StiffnessesAMillionTimesApartAreSolvedAsAnotherSolverDoes) {
           .without = "a factor in floats: " + text(float_error, 2)});
 }
 
-/// Amplitude of the explicit rule after `steps`, relative to the small disturbance it started with.
+/// Amplitude of the explicit rule after `steps`, relative to the small initial disturbance.
 double swung_out(const Solid& solid, double density, double dt, int steps) {
   SymmetricMatrix stiffness = solid.pattern();
   solid.stiffness(VectorXd::Zero(solid.size()), Elastic::Curvature::kExact, stiffness);
@@ -295,8 +298,8 @@ double swung_out(const Solid& solid, double density, double dt, int steps) {
   return u.norm() / start;
 }
 
-// Oracle: damped, a body that nothing drives has less energy after each step (implicit Euler); the patch is where the
-// tool holds it.
+// Oracle: the energy of a damped body without external forces decreases in each step (implicit Euler), and the patch
+// follows the tool.
 TEST(HardPhysics, MassesAMillionTimesApartStayBoundedAndOnlyLoseEnergy) {
   const double layers[] = {-0.05, 0, 0.0005};
   const double heights[] = {0, 0.05, 0.0505};
@@ -345,7 +348,7 @@ TEST(HardPhysics, MassesAMillionTimesApartStayBoundedAndOnlyLoseEnergy) {
        .without = "an explicit step of 10 ms, above 2/ω = " + text(1e3 * limit, 2) + " ms: beyond 1e100 in 100 steps"});
 }
 
-// Oracle: the static solution. The effect of the step size is gone when the body is at rest.
+// Oracle: the static solution, which does not depend on the step size.
 TEST(HardPhysics, TheRestOfABodyDoesNotDependOnTheStep) {
   double worst = 0;
   for (const ModelKind kind : {ModelKind::kLinear, ModelKind::kCorotational, ModelKind::kNeoHookean}) {
@@ -376,14 +379,14 @@ TEST(HardPhysics, TheRestOfABodyDoesNotDependOnTheStep) {
                   " % deeper with 10 ms than with 1 ms"});
 }
 
-// Oracle: 2/ω, ω by Lanczos' method; the bare rule swings within bounds at 0.95 of it and leaves them at 1.05.
+// Oracle: 2/ω, with ω from Lanczos' method. The undamped rule stays bounded at 0.95 of it and diverges at 1.05.
 TEST(HardPhysics, AnExplicitStepIsStableBelowItsLimitAndRefusedAboveIt) {
   const Solid solid = pressed_block(Element::kTet4, 4, 0.45);
   const double limit = largest_step(solid, 1000);
   const double below = swung_out(solid, 1000, 0.95 * limit, 3000);
   const double above = swung_out(solid, 1000, 1.05 * limit, 3000);
   EXPECT_LT(below, 100);
-  EXPECT_FALSE(above < 1e100);  // or not a number any more
+  EXPECT_FALSE(above < 1e100);  // true for NaN as well
 
   const auto tensor_mass = [&](double step) {
     compared::Config config;
@@ -404,7 +407,8 @@ TEST(HardPhysics, AnExplicitStepIsStableBelowItsLimitAndRefusedAboveIt) {
           .without = "the check of the step left out: 1.05 is accepted, and beyond 1e100"});
 }
 
-// Oracle: the shape of a body is that of before in the instant of the cut, so its energy is too; then it can only fall.
+// Oracle: a cut does not change the shape of the body at that instant, so it does not change the energy, which can only
+// decrease afterwards.
 TEST(HardPhysics, ACutUnderLoadPutsInNoEnergyAndTheBodyGivesWayWithEach) {
   double rise = -1;
   double forgotten = 0;
@@ -455,7 +459,7 @@ TEST(HardPhysics, ACutUnderLoadPutsInNoEnergyAndTheBodyGivesWayWithEach) {
               "new nodes begin at rest instead of where their twins are: " + text(forgotten, 3) + " times the energy"});
 }
 
-/// B1's nodes, all of them, turned as a rigid body.
+/// All nodes of B1 after a rigid rotation.
 VectorXd turned(const Mesh& mesh, double degrees) {
   const Mat3 turn = Eigen::AngleAxisd(degrees * 3.14159265358979323846 / 180, Vec3(1, 2, 3).normalized()).matrix();
   VectorXd u(3 * static_cast<Eigen::Index>(mesh.nodes.size()));
@@ -465,7 +469,7 @@ VectorXd turned(const Mesh& mesh, double degrees) {
   return u;
 }
 
-// Oracle: a rigid turn strains nothing, so there is no force.
+// Oracle: a rigid rotation causes no strain, so there is no force.
 TEST(HardPhysics, ARigidTurnMakesGhostForcesOnlyInTheLinearLaw) {
   double ghost = 0;
   double worst = 0;
@@ -487,7 +491,7 @@ TEST(HardPhysics, ARigidTurnMakesGhostForcesOnlyInTheLinearLaw) {
   }
   EXPECT_GT(ghost, 10);
 
-  // Pressing so deep that the linear law would rotate material gives a warning that names the depth.
+  // A press depth at which the linear law would rotate material gives a warning that names the depth.
   for (const ModelInfo& model : models()) {
     const Body body(pressed_body(model.kind, Element::kHex8Sri, 4));
     if (model.always.has(EffectKind::kGeometricNonlinearity)) {
@@ -517,7 +521,7 @@ TEST(HardPhysics, ARigidTurnMakesGhostForcesOnlyInTheLinearLaw) {
           .without = "linear: " + text(ghost) + " N on a node, which pull at a body that nothing strains"});
 }
 
-// Oracle: the force at 2 mm before and after the jump is the same.
+// Oracle: the force at 2 mm is the same before and after the jump.
 TEST(HardPhysics, AToolThatJumps20MillimetresDeepMeetsAFiniteForce) {
   PressedByNewton pressed(Element::kHex8Sri, 4, Law::kNeoHookean);
   const double before = pressed.model.press(pressed.patch, Given::kDepth, 0.002).force;

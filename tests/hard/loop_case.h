@@ -2,15 +2,15 @@
 #pragma once
 
 // Cases that break the loop of hand, device, network and engine. Each case runs the whole server with AOL+, a real
-// client, a virtual clock, a hand that moves about in contact and then rests, and a disturbance. The witness at the
-// device's port keeps its own energy account. In every case, for every seed:
+// client, a virtual clock, a hand that moves in contact and then rests, and a disturbance. An observer at the device's
+// port keeps its own energy account. For every case and seed:
 //
-//     passive   E ≥ −1e-9 J at every step, E = Σ [−F·Δx + f_c ‖Δx‖ + b ‖Δx‖²/T] with what was really held and moved,
-//               and the hand has never got back more than it gave (∫ F_hand·dx ≥ 0)
-//     bounded   ‖F‖ ≤ 8 N; in one step no more than 1000 N/s · T is added (the limiter may cut faster)
-//     quiet     ‖v‖ ≤ 5 mm/s for good, a stated time after the disturbance has ended
+//     passive   E ≥ −1e-9 J at every step, E = Σ [−F·Δx + f_c ‖Δx‖ + b ‖Δx‖²/T] with the actual force and motion,
+//               and the hand never receives more energy than it gave (∫ F_hand·dx ≥ 0)
+//     bounded   ‖F‖ ≤ 8 N; the force grows by at most 1000 N/s · T per step (the limiter may cut faster)
+//     quiet     ‖v‖ ≤ 5 mm/s permanently, from a stated time after the end of the disturbance
 //
-// Then the same run without the protection that the case tests: at least one of these must break.
+// The same run without the protection under test must violate at least one of these.
 
 #include <gtest/gtest.h>
 
@@ -40,7 +40,7 @@ using simulation::World;
 using std::chrono::milliseconds;
 using std::chrono::seconds;
 
-constexpr Friction kFriction{.coulomb = 0.3, .viscous = 0.8};  // of the device, and what the limiter is told
+constexpr Friction kFriction{.coulomb = 0.3, .viscous = 0.8};  // of the device and in the limiter's configuration
 constexpr double kMaxForce = 8;                                // N
 constexpr double kMaxSlew = 1000;                              // N/s
 constexpr double kQuiet = 0.005;                               // m/s
@@ -62,7 +62,7 @@ inline std::uint64_t seeds() {
   return count == nullptr ? kSeeds : std::strtoull(count, nullptr, 10);
 }
 
-/// An encoder that can fail in several ways, in front of the true position.
+/// An encoder with several faults, in front of the true position.
 class Encoder final : public Device {
  public:
   explicit Encoder(Device& truth) : truth_(truth) {}
@@ -81,26 +81,26 @@ class Encoder final : public Device {
   }
   Vec3 apply(const Vec3& force) noexcept override { return truth_.apply(force); }
 
-  std::optional<double> range;  ///< m: its counter holds so much, on each axis, about `middle`, and wraps
+  std::optional<double> range;  ///< m: range of its counter on each axis about `middle`, where it wraps
   Vec3 middle = Vec3::Zero();   ///< m
   bool stuck = false;
-  Duration behind{};  ///< what its time stamps are
+  Duration behind{};  ///< delay of its time stamps
 
  private:
   Device& truth_;
   Vec3 last_ = Vec3::Zero();
 };
 
-/// What the hand felt at the port; for several runs, the worst of each.
+/// Observations at the port; for several runs the worst of each.
 struct Observed {
   double least_energy = 0;  ///< J
   double least_work = 0;    ///< J, of the hand
   double most_force = 0;    ///< N
   double most_rate = 0;     ///< N/s
   Duration noisy_for{};     ///< after the end of the disturbance
-  bool felt = false;        ///< a force of the engine's was rendered
-  double figure = 0;        ///< what else the case is about, in its own unit
-  std::string also{};       ///< what else was promised by the case, and broken
+  bool felt = false;        ///< a force of the engine was rendered
+  double figure = 0;        ///< measured value of the case, in its own unit
+  std::string also{};       ///< a violated additional promise of the case
 
   void add(const Observed& other) {
     least_energy = std::min(least_energy, other.least_energy);
@@ -114,7 +114,7 @@ struct Observed {
   }
 };
 
-/// Names the first bound that was exceeded; empty when none was.
+/// Names the first exceeded bound; empty if there is none.
 inline std::string broken(const Observed& seen, Duration quiet_within) {
   std::string text;
   const auto say = [&text](const std::string& what) { text += (text.empty() ? "" : ", ") + what; };
@@ -131,13 +131,13 @@ inline std::string result_of(const Observed& seen) {
   return "least energy " + text_of(1e3 * seen.least_energy, "mJ") + ", ≤ " + text_of(seen.most_force, "N") + ", ≤ " +
          text_of(seen.most_rate, "N/s") + ", quiet after " + text_of(seen.noisy_for);
 }
-/// Margins of time and force only: the slew limit is met exactly whenever the engine asks for more.
+/// Margins of time and force only, because the slew limit is reached exactly whenever the engine requests more.
 inline double margin_of(const Observed& seen, Duration quiet_within) {
   const double time = tendon::seconds(quiet_within) / tendon::seconds(std::max<Duration>(seen.noisy_for, Duration(1)));
   return std::min(time, kMaxForce / seen.most_force);
 }
 
-/// Runs a case with every seed: all promises are kept, and the hand feels a force.
+/// Runs a case with every seed. All promises must hold, and the hand must feel a force.
 template <class Run>
 inline Observed kept(Duration quiet_within, Run run) {
   Observed worst;
@@ -150,7 +150,7 @@ inline Observed kept(Duration quiet_within, Run run) {
   return worst;
 }
 
-/// Runs it without its protection: a promise must break. Returns which one.
+/// Runs a case without its protection and returns the promise that breaks; one must.
 template <class Run>
 inline std::string without(const std::string& what, Duration quiet_within, Run run) {
   Observed worst;
@@ -225,7 +225,6 @@ struct Case {
   injector::DriftingClock clock;
 };
 
-/// One running case.
 class Bench {
  public:
   explicit Bench(const Case& set)
@@ -241,7 +240,7 @@ class Bench {
   void run(Duration duration) { world.run_for(duration); }
   /// From now on the hand must become quiet.
   void disturbance_is_over() { over_ = world.now(); }
-  /// An extra check of every step; returns what is broken, or nothing.
+  /// Adds a check of every step, which returns the violation or an empty string.
   void expect_of_steps(std::function<std::string(const StepRecord&)> promise) { promise_ = std::move(promise); }
   const Observed& seen() const { return seen_; }
   void note(double figure) { seen_.figure = std::max(seen_.figure, figure); }
@@ -258,7 +257,7 @@ class Bench {
   Encoder encoder;
   World world;
   std::size_t engine = 0;
-  bool owes = false;  ///< the account may be below zero as long as this is set
+  bool owes = false;  ///< the account may be negative while this is set
 
  private:
   void see(const StepRecord& step) {
@@ -269,7 +268,7 @@ class Bench {
       const bool cut = step.reasons.has(Reason::kEnergy) || step.reasons.has(Reason::kUnseen);
       const double change =
           cut ? step.applied.norm() - step.was_applied.norm() : (step.applied - step.was_applied).norm();
-      // In a pause, or when the device's time leaps ahead, the force may grow only for the longest hold.
+      // In a pause, or when the device's time jumps ahead, the force may grow only for the longest hold.
       const Duration held = std::min(std::max<Duration>(world.now() - *last_, step.held), longest_hold_);
       seen_.most_rate = std::max(seen_.most_rate, change / tendon::seconds(held));
     }
@@ -286,8 +285,8 @@ class Bench {
   std::function<std::string(const StepRecord&)> promise_;
 };
 
-/// An engine that has been silent this long exerts no force: its force is valid for 500 ms, the safe stop follows
-/// 250 ms later, and the slew limit needs 8 ms.
+/// An engine that has been silent this long exerts no force: its force is valid for 500 ms, the safe stop follows 250
+/// ms later, and the slew limit needs 8 ms.
 constexpr Duration kSilence = milliseconds(500 + 250 + 10);
 
 inline std::function<std::string(const StepRecord&)> no_force_from(LocalTime when) {

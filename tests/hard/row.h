@@ -6,17 +6,17 @@
 
 namespace tendon::hard {
 
-/// One row of README.md's table, left by a hard case.
+/// One row of README.md's table.
 struct Row {
-  std::string hard;                   ///< why it is hard: what a naive program does
-  std::string oracle;                 ///< what must hold; the same in every run
-  std::string result;                 ///< what came out, with units
-  std::optional<double> margin = {};  ///< bound / measured: above 1 where a bound is kept; none where it is yes or no
-  std::string without;                ///< what happens without the protection, and which one that is
+  std::string hard;                   ///< why it is hard: the behavior of a naive program
+  std::string oracle;                 ///< the required property; the same in every run
+  std::string result;                 ///< the outcome, with units
+  std::optional<double> margin = {};  ///< bound / measured, above 1 if the bound holds; none for yes/no properties
+  std::string without;                ///< the outcome without the protection, which it names
 };
 
-/// Fails the running test when README.md has no line for it with the same `hard` and `oracle`. Writes the row as
-/// $TENDON_HARD_ROWS/Suite.Test.json where that is set, from which `tests/hard/table` writes README.md.
+/// Fails the running test if README.md has no line with the same `hard` and `oracle`. If $TENDON_HARD_ROWS is set,
+/// writes the row to $TENDON_HARD_ROWS/Suite.Test.json, from which `tests/hard/table` writes README.md.
 void report(const Row& row);
 
 }  // namespace tendon::hard

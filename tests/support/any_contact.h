@@ -6,8 +6,8 @@
 
 namespace tendon {
 
-/// A random but sound (core/remote/answer.h) answer of an engine whose tool is at `position`: true for a wall at x = 0
-/// or for no surface.
+/// A random valid answer (core/remote/answer.h) of an engine whose tool is at `position`: of a wall at x = 0 or without
+/// a surface.
 inline Contact any_contact(Dice& dice, const Vec3& position) {
   Contact contact{.normal = -Vec3::UnitX(), .gap = -position.x()};
   if (dice.chance(0.3)) contact = {.normal = dice.direction(), .gap = dice.within(-0.01, 0.01)};

@@ -11,16 +11,16 @@
 
 namespace tendon::testing {
 
-/// One line that a program printed, and the instructions counted for it.
+/// A line printed by a program, and the number of instructions for it.
 struct Counted {
   std::string line;
-  double instructions = 0;  ///< of the longer of two runs, beyond those of the shorter
+  double instructions = 0;  ///< the longer of two runs minus the shorter
 };
 
-/// Runs `program argument` under callgrind. The program calls its extern "C" function `function` twice for every line
-/// that it prints, at first for the shorter run; instructions are counted within that function alone.
+/// Runs `program argument` under callgrind. For every line that it prints, the program calls its extern "C" function
+/// `function` twice, first for the shorter run. Only instructions within that function are counted.
 ///
-/// Throws std::runtime_error when the program fails, or when there is no valgrind.
+/// Throws std::runtime_error if the program fails or valgrind is missing.
 inline std::vector<Counted> count_instructions(const std::string& program, const std::string& argument,
                                                const std::string& function) {
   struct Folder {

@@ -14,15 +14,15 @@
 
 namespace tendon::testing {
 
-/// A D-Bus system bus with an avahi-daemon on it, both in a thread of the test, on a socket of its own. It takes the
-/// calls that Tendon makes, and answers as a test wants.
+/// A D-Bus system bus with a fake avahi-daemon, in a thread of the test, on its own socket. Implements the calls that
+/// Tendon makes, with answers chosen by the test.
 ///
-/// Thread-safe.
+/// Thread-safe: yes.
 class FakeAvahi {
  public:
   struct Service {
     std::uint16_t port = 0;
-    std::string ip;  ///< "192.0.2.7", or one of IPv6
+    std::string ip;  ///< "192.0.2.7", or an IPv6 address
     std::vector<std::string> txt{};
     std::string host = "bench.local";
   };
@@ -36,7 +36,7 @@ class FakeAvahi {
     bool operator==(const Announced&) const = default;
   };
 
-  /// Listens at `socket`, which is made.
+  /// Creates `socket` and listens there.
   explicit FakeAvahi(const std::filesystem::path& socket);
   ~FakeAvahi();
   FakeAvahi(const FakeAvahi&) = delete;
@@ -45,19 +45,19 @@ class FakeAvahi {
   /// The value of DBUS_SYSTEM_BUS_ADDRESS.
   const std::string& address() const { return address_; }
 
-  /// On the network from now on.
+  /// Adds a service to the network.
   void put(const std::string& name, const Service& service);
   void take(const std::string& name);
-  /// A name that another host has.
+  /// Reserves a name for another host.
   void occupy(const std::string& name);
-  /// avahi-daemon is not there: `true` answers every call with ServiceUnknown.
+  /// While `absent`, avahi-daemon is not running: every call fails with ServiceUnknown.
   void set_absent(bool absent);
-  /// Calls are not answered at all.
+  /// While silent, calls get no answer.
   void set_silent(bool silent) { silent_ = silent; }
-  /// avahi-daemon has been started again.
+  /// Simulates a restart of avahi-daemon.
   void come_back();
 
-  /// What is announced now, by all that are connected.
+  /// The services announced by all connected programs.
   std::vector<Announced> announced();
 
  private:
@@ -66,7 +66,7 @@ class FakeAvahi {
 
   std::string address_;
   int listening_;
-  std::mutex mutex_;  ///< of all below
+  std::mutex mutex_;  ///< protects the members below
   std::map<std::string, Service> services_;
   std::set<std::string> occupied_;
   bool absent_ = false;

@@ -12,7 +12,7 @@
 namespace tendon::files_test {
 namespace {
 
-/// A folder of its own, gone at the end.
+/// Creates a temporary folder for each test.
 class Files : public ::testing::Test {
  protected:
   Files() {

@@ -12,9 +12,8 @@
 
 namespace tendon {
 
-/// One JSON object on one line, in the order in which its members are added. A number that is not finite is null; a
-/// byte that is not UTF-8 becomes U+FFFD. This is the tools' one way to write JSON: nlohmann's library is behind it,
-/// and its header is in json_line.cc only.
+/// A JSON object on one line, with members in the order of their addition. Non-finite numbers become null; invalid
+/// UTF-8 becomes U+FFFD. All tools write JSON with this class, which includes nlohmann's header in json_line.cc only.
 class JsonLine {
  public:
   JsonLine();
@@ -37,12 +36,12 @@ class JsonLine {
   }
   JsonLine& add(std::string_view key, const JsonLine& object);
   JsonLine& add(std::string_view key, const std::vector<std::string>& texts);
-  /// null when there is none.
+  /// Adds null for nullopt.
   template <class T>
   JsonLine& add(std::string_view key, const std::optional<T>& value) {
     return value ? add(key, *value) : add_null(key);
   }
-  /// All members of `other`, after those that are here.
+  /// Appends all members of `other`.
   JsonLine& add_all(const JsonLine& other);
 
   std::string str() const;
@@ -55,7 +54,7 @@ class JsonLine {
   std::unique_ptr<nlohmann::ordered_json> members_;
 };
 
-/// `value` with so many decimals and no more, as a figure for JsonLine.
+/// Rounds `value` to `decimals` decimals for JsonLine.
 double with_decimals(double value, int decimals);
 
 }  // namespace tendon

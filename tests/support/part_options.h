@@ -10,8 +10,8 @@
 
 namespace tendon {
 
-/// `--units` and `--from` of a program or verb that can be swept. `units`: says to people which units there are, "0 to
-/// 17: the rows of the table".
+/// Adds `--units` and `--from` to a program or verb with SweptWork. `units` describes the available units in the help,
+/// for example "0 to 17: the rows of the table".
 inline void add_part_options(CLI::App& verb, Part& part, const std::string& units) {
   part.progress = isatty(STDERR_FILENO) != 0;
   CLI::Option* const these = verb.add_option_function<std::string>(

@@ -12,10 +12,10 @@
 
 namespace tendon {
 
-/// How each tool ends: 0 done; 1 something failed; 2 wrong usage.
+/// Parses the command line and calls `body`, which returns the exit code.
 ///
-/// Parses the command line and calls `body`, which returns the exit code. A complaint is one line on stderr that begins
-/// with the tool's name. The exit code is 2 if a value or a scene is not valid, and 1 if a file cannot be read.
+/// An error is one line on stderr that begins with the tool's name. Exit codes: 0 success; 1 failure, for example a
+/// file that cannot be read; 2 for wrong usage, including invalid values and scenes.
 template <class Body>
 int run_tool(CLI::App& app, int argc, char** argv, const Body& body) {
   constexpr int kFailed = 1;

@@ -23,30 +23,30 @@
 
 namespace tendon {
 
-/// Which part of its work a process is asked for (part_options.h has it from the command line): all, unless one of
-/// `units` and `from` is there.
+/// The part of the work for this process (part_options.h reads it from the command line). Without `units` and `from` it
+/// is everything.
 struct Part {
-  std::optional<Units> units{};                 ///< these, as a shard of a sweep
-  std::optional<std::filesystem::path> from{};  ///< none: what the shards of a sweep came to is in this file
-  bool progress = false;                        ///< is told on standard error
+  std::optional<Units> units{};                 ///< runs only these, as a shard of a sweep
+  std::optional<std::filesystem::path> from{};  ///< reads the results of a sweep's shards from this file instead of
+                                                ///< running units
+  bool progress = false;                        ///< prints progress on standard error
 };
 
-/// Work that can be swept. A program says what a unit is and how its outcome is written and read; outcomes() does the
-/// rest, whichever part is asked for.
+/// Work that can be swept. A program defines a unit and how its outcome is written and read; outcomes() does the rest.
 template <class Outcome>
 struct SweptWork {
-  std::string_view what;    ///< the units are: "situations"
-  std::uint64_t units = 0;  ///< … numbered from 0
+  std::string_view what;    ///< plural name of the units, for example "situations"
+  std::uint64_t units = 0;  ///< number of units, from 0
   std::function<Outcome(std::uint64_t unit)> run{};
-  /// One or more, without the unit's number. They have all of an outcome that the program's judgement needs.
+  /// One or more lines without the unit's number. They must contain everything that the evaluation needs.
   std::function<std::vector<JsonLine>(std::uint64_t unit, const Outcome& outcome)> lines{};
-  /// Reads what lines() wrote. May throw whatever it likes for anything else.
+  /// Parses the result of lines(). May throw any exception for other input.
   std::function<Outcome(std::uint64_t unit, const std::vector<nlohmann::json>& lines)> read{};
   /// Adds an outcome to the totals and extremes of a shard.
   std::function<void(const Outcome& outcome, ShardEnd& end)> count{};
 };
 
-/// A number of a line; NaN where JsonLine has written null.
+/// A number of a line; NaN where JsonLine wrote null.
 inline double number_of(const nlohmann::json& line, const std::string& key) {
   const nlohmann::json& value = line.at(key);
   return value.is_null() ? std::numeric_limits<double>::quiet_NaN() : value.get<double>();
@@ -63,7 +63,7 @@ std::string text_of(const SweptWork<Outcome>& work, std::uint64_t unit, const Ou
   return text;
 }
 
-/// Throws std::invalid_argument unless this work writes the same of what it has read.
+/// Throws std::invalid_argument unless the parsed outcome is written back to the same lines.
 template <class Outcome>
 Outcome outcome_of(const SweptWork<Outcome>& work, std::uint64_t unit, const std::string& text) {
   const std::string name = "unit " + std::to_string(unit) + " of the " + std::string(work.what) + ": ";
@@ -84,10 +84,10 @@ Outcome outcome_of(const SweptWork<Outcome>& work, std::uint64_t unit, const std
 
 }  // namespace swept
 
-/// All outcomes, in the order of their units: of this process, or from the lines of a sweep. Empty when the part is a
-/// shard: its lines are on `out` now, and there is nothing to judge. `each` sees them one by one, as they come.
-/// Throws std::invalid_argument when there are no such units, and when a line is not what this program writes with these
-/// arguments; what the work throws.
+/// Returns all outcomes in the order of their units, computed by this process or parsed from the lines of a sweep.
+/// Returns nullopt for a shard, whose lines are then on `out`. Calls `each` with each outcome as it becomes available.
+/// Throws std::invalid_argument if the units do not exist or a line is not the output of this program with these
+/// arguments. Passes exceptions of the work on.
 template <class Outcome>
 std::optional<std::vector<Outcome>> outcomes(const SweptWork<Outcome>& work, const Part& part, std::ostream& out,
                                              const std::function<void(const Outcome& outcome)>& each = {}) {

@@ -14,7 +14,7 @@
 namespace tendon {
 namespace {
 
-constexpr std::size_t kDigits = 16;  // of a half
+constexpr std::size_t kDigits = 16;  // of one half
 
 bool whole(std::string_view text, std::uint64_t& value, int base = 10) {
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value, base);
@@ -55,7 +55,7 @@ void join(std::vector<std::pair<std::string, Value>>& sums, const std::vector<st
   }
 }
 
-/// The figure of that name; a new one is `first`.
+/// Returns the figure with this name, initialized with `first` if it is new.
 template <class Value>
 Value& named(std::vector<std::pair<std::string, Value>>& figures, std::string_view name, Value first) {
   const auto found = std::ranges::find(figures, name, &std::pair<std::string, Value>::first);
@@ -116,7 +116,7 @@ UnitDigest UnitDigest::parse(std::string_view text, std::string_view moment) {
 
 std::optional<std::uint64_t> UnitDigest::differs_at(const UnitDigest& other, const Units& units) const noexcept {
   if (*this == other) return std::nullopt;
-  // Where unit u alone differs, the moments differ by u times what the digests differ by.
+  // If only unit u differs, the difference of the moments is u times the difference of the digests.
   const std::uint64_t apart = low_ - other.low_;
   const std::uint64_t moments_apart = moment_ - other.moment_;
   std::optional<std::uint64_t> found;

@@ -15,12 +15,12 @@
 
 namespace tendon {
 
-// What a program does that `tendon-sweep` can cut into shards. It numbers its work in units (a seed, a situation with
-// all laws), takes `--units FIRST:COUNT --json`, and runs all of them: a broken promise is a result, not a reason to
-// stop. It prints lines for each unit that is worth one, {"unit":17,…}, in their order, and one end line. What it prints
-// depends on the units and the program alone: on no time, host, number of threads or order.
+// Work that `tendon-sweep` can split into shards. The program numbers its work in units (a seed, a situation with all
+// laws) and accepts `--units FIRST:COUNT --json`. It runs all of them, because a broken promise is a result. It prints
+// lines {"unit":17,…} in the order of the units and one end line. The output must depend only on the units and the
+// program, not on time, host, number of threads or order.
 //
-// swept_work.h does all of this for work whose every unit has a line.
+// swept_work.h implements this for work with lines for every unit.
 
 /// A range of units.
 struct Units {
@@ -30,13 +30,13 @@ struct Units {
   bool operator==(const Units&) const = default;
 };
 
-/// "FIRST:COUNT". Throws std::invalid_argument, saying what was expected, unless COUNT is 1 or more and the last unit
-/// is a number of 64 bits.
+/// Parses "FIRST:COUNT". Throws std::invalid_argument with the expected format unless COUNT ≥ 1 and the last unit fits
+/// into 64 bits.
 Units parse_units(std::string_view text);
 
-/// The sum modulo 2¹²⁸ of XXH3's 128-bit hash of each unit's whole outcome, with the unit's number as its seed. It is the
-/// same however the units are cut, and in whatever order they come; it finds what tallies hide. Its moment, the sum
-/// modulo 2⁶⁴ of each unit's number times the low half of its hash, is so too, and tells where two digests differ.
+/// The sum modulo 2¹²⁸ of XXH3's 128-bit hash of each unit's whole outcome, with the unit's number as the seed. It does
+/// not depend on the partition or order of the units, and detects differences that totals hide. The moment, the sum
+/// modulo 2⁶⁴ of each unit's number times the low half of its hash, has the same property and locates a difference.
 class UnitDigest {
  public:
   void add(std::uint64_t unit, std::string_view outcome) noexcept;
@@ -45,11 +45,11 @@ class UnitDigest {
   std::string text() const;
   /// 16 hexadecimal digits.
   std::string moment() const;
-  /// Of text() and moment(). Throws std::invalid_argument for anything else.
+  /// Parses text() and moment(). Throws std::invalid_argument for anything else.
   static UnitDigest parse(std::string_view text, std::string_view moment);
 
-  /// Of digests of the same units: the one in which they differ, if it is one; empty when they are the same, and when
-  /// several units differ. A wrong answer has a chance of `units.count` in 2⁶⁴.
+  /// Returns the unit in which two digests of the same units differ. Returns nullopt if they are equal or several units
+  /// differ. A wrong answer has a probability of `units.count`/2⁶⁴.
   std::optional<std::uint64_t> differs_at(const UnitDigest& other, const Units& units) const noexcept;
 
   bool operator==(const UnitDigest&) const = default;
@@ -60,8 +60,9 @@ class UnitDigest {
   std::uint64_t moment_ = 0;
 };
 
-/// The end of a shard, or of many that are merged: whole numbers that add up, and extremes. No sum of numbers with a
-/// fraction: its last bit would depend on the cut.
+/// The end of a shard or of merged shards, with integer totals and extremes. It has no floating-point sums, because
+/// their
+/// last bit would depend on the partition.
 ///
 ///     {"kind":"end","first":1,"count":500,"totals":{…},"least":{…},"largest":{…},"digest":"…","moment":"…"}
 struct ShardEnd {
@@ -71,38 +72,38 @@ struct ShardEnd {
   std::vector<std::pair<std::string, double>> largest{};
   UnitDigest digest{};
 
-  /// What one more unit has of a figure. Each unit of a program names the same figures, with finite numbers.
+  /// Adds one unit's contribution to a figure. All units of a program must use the same names and finite numbers.
   void count(std::string_view name, std::uint64_t number);
   void lower(std::string_view name, double value);
   void raise(std::string_view name, double value);
 
-  /// The shard that follows this one. Throws std::invalid_argument when it does not follow, or has other names.
+  /// Appends the next shard. Throws std::invalid_argument if it is not contiguous or has different names.
   void add(const ShardEnd& next);
   std::string line() const;
-  /// Of line(). Throws std::invalid_argument for anything else.
+  /// Parses line(). Throws std::invalid_argument for anything else.
   static ShardEnd parse(std::string_view line);
 
-  /// Throws std::invalid_argument for a name that is not there.
+  /// Throws std::invalid_argument if the name does not exist.
   std::uint64_t total(std::string_view name) const;
   double least_of(std::string_view name) const;
 };
 
-/// The number of a unit that a line begins with, {"unit":17,…}; empty when it begins with something else.
+/// Returns the unit of a line that begins with {"unit":17,…}, or nullopt for other lines.
 std::optional<std::uint64_t> unit_of(std::string_view line);
 
-/// Runs `units` of the `all` that there are, numbered from 0, and prints their lines and their end. `run` gives a unit's
-/// lines, each with its '\n', and counts it; the digest is of these lines. Throws std::invalid_argument when there are no
-/// such units, std::runtime_error when `out` fails.
+/// Runs `units` out of the units 0 to `all` − 1 and prints their lines and the end line. `run` returns a unit's lines,
+/// each with '\n', and counts it; the digest covers these lines. Throws std::invalid_argument if the units do not
+/// exist, and std::runtime_error if `out` fails.
 void write_shard(const Units& units, std::uint64_t all,
                  const std::function<std::string(std::uint64_t unit, ShardEnd& end)>& run, std::ostream& out);
 
-/// The lines of one shard, or of many that were merged: `take` gets all but the end. Throws std::invalid_argument, naming
-/// the line, when `take` does, and when the end is missing or not the last.
+/// Reads the lines of a shard or of merged shards and calls `take` for all but the end line. Throws
+/// std::invalid_argument that names the line if `take` throws, or if the end line is missing or not the last.
 ShardEnd read_to_end(std::istream& lines, const std::function<void(const std::string& line)>& take);
 
-/// The lines of each of the units 0 to `all` − 1, that write_shard has printed in one shard or in many that were merged.
-/// Throws std::invalid_argument, naming the line or unit, unless they are all there, once, with an end whose digest is
-/// theirs.
+/// Returns the lines of each of the units 0 to `all` − 1, as printed by write_shard in one shard or in merged shards.
+/// Throws std::invalid_argument that names the line or unit unless each is present once and the digest of the end line
+/// matches.
 std::vector<std::string> read_shards(std::istream& lines, std::uint64_t all);
 
 }  // namespace tendon

@@ -19,8 +19,7 @@ struct Datagram {
   Bytes bytes;
 };
 
-/// All datagrams under way, oldest first. Nothing moves by itself: a test may read, change and insert datagrams, and
-/// delivers them to an inbox.
+/// All datagrams in flight, oldest first. Tests can read, change and insert datagrams, and deliver them to an inbox.
 using Wire = std::deque<Datagram>;
 
 /// One end of the wire.
@@ -42,7 +41,7 @@ class End : public Link {
   LocalTime present(LocalTime now) const override { return std::max(now, taken); }
 
   Address self;
-  LocalTime taken{};  ///< when it was read, where that is later than the turn's time
+  LocalTime taken{};  ///< receive time, if later than the time of the turn
   std::deque<Datagram> inbox;
   std::size_t sent = 0;  ///< bytes
 

@@ -22,8 +22,8 @@ using namespace std::chrono_literals;
 
 constexpr double kOutside = -0.015;     // m
 constexpr double kPressed = 0.004;      // m
-constexpr std::uint8_t kCentreKey = 4;  // button 2, the dead man's of the scene
-/// So often a test looks whether what it waits for has come.
+constexpr std::uint8_t kCentreKey = 4;  // button 2, the deadman switch of the scene
+/// Polling interval of the waits.
 constexpr auto kLook = 1ms;
 
 std::string text_of(const std::filesystem::path& file) {
@@ -32,7 +32,7 @@ std::string text_of(const std::filesystem::path& file) {
   return text.str();
 }
 
-/// deploy/scenes/falcon.toml, after `tendon-identify` and with sealed sessions.
+/// deploy/scenes/falcon.toml after `tendon-identify`, with encrypted sessions.
 std::string falcon_scene() {
   std::string text = text_of(std::filesystem::path(TENDON_SCENES) / "falcon.toml");
   const auto set = [&text](const std::string& key, const std::string& value) {
@@ -72,7 +72,7 @@ FalconStage::FalconStage(const Config& config)
 Scene FalconStage::scene() const { return read_scene(scene_); }
 
 void FalconStage::use(FakeFalcon& falcon, LocalTime now) {
-  // A hand that was not looked at for a while has not moved meanwhile: nothing jumps when the machine stands still.
+  // Limits the motion between two readings, so that the position does not jump after a pause of the machine.
   const double most = speed_ * std::min(used_ ? seconds(now - *used_) : 0.0, 2e-3);
   used_ = now;
   const double x = x_ + std::clamp(wanted_x_ - x_, -most, most);
@@ -97,7 +97,7 @@ void FalconStage::arm() {
   wait_until([](const FakeFalcon& falcon) { return falcon.lamps() == falcon::kGreen; }, "green lamps");
   button_ = false;
   go_to(kOutside);
-  wait_for_commands(20);  // so that the button is seen to be up
+  wait_for_commands(20);  // time to detect that the button is released
   button_ = true;
   wait_for_commands(600);  // 50 of rest, and the ramp
 }

@@ -16,7 +16,7 @@
 namespace tendon::e2e {
 namespace {
 
-/// What a failure shows of each stream: its end.
+/// Bytes at the end of each stream that a failure shows.
 constexpr std::size_t kShown = 4000;
 
 [[noreturn]] void fail(int error, const std::string& what) {
@@ -28,7 +28,7 @@ struct Pipe {
   int write = -1;
 };
 
-/// Not inherited: a copy in another program would keep the stream from ending.
+/// Close-on-exec: a copy in another program would keep the stream open.
 Pipe make_pipe() {
   std::array<int, 2> ends{};
   if (::pipe2(ends.data(), O_CLOEXEC) != 0) fail(errno, "pipe2");
@@ -117,7 +117,7 @@ int Process::wait(std::chrono::nanoseconds patience) {
   const Deadline deadline = std::chrono::steady_clock::now() + patience;
   while (!ended()) listen(deadline, "its end");
   if (!exit_code_) {
-    // Both streams have ended, so it is on its way out: this does not wait for long.
+    // Both streams have ended, so the process is about to exit.
     int status = 0;
     while (::waitpid(pid_, &status, 0) < 0) {
       if (errno != EINTR) fail(errno, "waitpid");

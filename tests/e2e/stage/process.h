@@ -14,36 +14,35 @@
 
 namespace tendon::e2e {
 
-/// How long a test waits for anything before it fails. Nothing here takes longer than a few seconds; virtual machines
-/// pause, and builds run beside us.
+/// Timeout of every wait in a test. Nothing takes longer than a few seconds, but virtual machines pause and builds run
+/// in parallel.
 inline constexpr std::chrono::seconds kPatience{30};
 
-/// A running program, what it has said so far, and how it ended. It is gone when this object is.
+/// A running program with its output and exit code. Killed by the destructor.
 ///
-/// What the program says is read only while one of the two waits below waits: it must not say more than fits into a
-/// pipe (64 kB) in between.
-///
-/// A wait throws std::runtime_error with the program's whole output when patience runs out or the wait became futile.
+/// The output is read only during wait_for_line() and wait(), so the program must not write more than a pipe holds (64
+/// kB) between these calls. Both throw std::runtime_error with the whole output on a timeout or if the wait cannot
+/// succeed any more.
 ///
 /// Thread-safe: no.
 class Process {
  public:
-  /// Starts `program` in `folder`, with no standard input and, beside our own environment, `more_environment`
-  /// ("NAME=value"). Throws std::system_error when it cannot be started.
+  /// Starts `program` in `folder` without standard input. `more_environment` ("NAME=value") is added to the
+  /// environment. Throws std::system_error on failure.
   Process(const std::filesystem::path& program, const std::vector<std::string>& arguments,
           const std::filesystem::path& folder, std::vector<std::string> more_environment = {});
-  /// SIGKILL, when it still runs.
+  /// Sends SIGKILL if the program still runs.
   ~Process();
   Process(const Process&) = delete;
   Process& operator=(const Process&) = delete;
 
-  /// The next line of stdout or stderr with `text` in it. On that stream, later calls begin after it.
+  /// Returns the next line of stdout or stderr that contains `text`. Later calls search that stream after this line.
   std::string wait_for_line(std::string_view text, std::chrono::nanoseconds patience = kPatience);
 
   void signal(int number);
   pid_t pid() const noexcept { return pid_; }
 
-  /// Waits for the end. Returns the exit code, or −N when signal N has ended it.
+  /// Waits for the end. Returns the exit code, or −N if signal N ended the program.
   int wait(std::chrono::nanoseconds patience = kPatience);
 
   /// All output so far.
@@ -55,7 +54,7 @@ class Process {
   struct Stream {
     int fd = -1;  ///< −1 after its end
     std::string text;
-    std::size_t next = 0;  ///< where wait_for_line goes on
+    std::size_t next = 0;  ///< where wait_for_line continues
   };
 
   static std::optional<std::string> next_line(Stream& stream, std::string_view text);

@@ -8,7 +8,7 @@
 namespace tendon::e2e {
 namespace {
 
-constexpr int kWaitMs = 10;  // also how late a stop is noticed
+constexpr int kWaitMs = 10;  // also the maximum delay of a stop
 
 }  // namespace
 

@@ -16,10 +16,10 @@ namespace tendon::e2e {
 
 using Datagram = std::vector<std::byte>;
 
-/// A man in the middle between one client and the server: forwards both ways, keeps the client's datagrams, and can
-/// send more in the client's name.
+/// A man in the middle between one client and the server. Forwards in both directions, stores the client's datagrams,
+/// and can send forged ones in the client's name.
 ///
-/// Thread-safe: yes. It has a thread of its own.
+/// Thread-safe: yes. It has its own thread.
 class Relay {
  public:
   explicit Relay(const Address& server);
@@ -27,17 +27,17 @@ class Relay {
   Relay(const Relay&) = delete;
   Relay& operator=(const Relay&) = delete;
 
-  /// Where the client finds it.
+  /// The address for the client.
   Address address() const;
-  /// Where the server believes the client to be.
+  /// The client's address as seen by the server.
   Address clients_address() const;
 
-  /// The client's datagrams so far that reached the server uncut.
+  /// The client's datagrams that have been forwarded without truncation.
   std::vector<Datagram> said() const;
 
-  /// Sends to the server in the client's name.
+  /// Sends a datagram to the server in the client's name.
   void forge(std::span<const std::byte> datagram);
-  /// The client's next `count` datagrams lose their last byte.
+  /// Truncates the last byte of the client's next `count` datagrams.
   void cut_next(int count);
 
  private:
@@ -45,7 +45,7 @@ class Relay {
   void hand_on();
 
   const Address server_;
-  mutable std::mutex mutex_;  ///< of all that follows
+  mutable std::mutex mutex_;  ///< protects the members below
   UdpLink front_;
   UdpLink back_;
   std::optional<Address> client_;

@@ -13,14 +13,14 @@
 
 namespace tendon::e2e {
 
-/// A built program: tendond, tendon-inject, virtual_wall …
+/// Path of a built program: tendond, tendon-inject, virtual_wall …
 std::filesystem::path program(const std::string& name);
 
 /// The shipped scene, deploy/scenes/demo.toml.
 std::filesystem::path demo_scene();
 
-/// A hand that goes into the wall and stays there. Forces are held and fade for longer than a machine pauses, so that
-/// every stage of the age policy is seen.
+/// A hand that moves into the wall and stays there. Forces are held and fade for longer than a machine pauses, so that
+/// every stage of the age policy occurs.
 inline constexpr std::string_view kPressingHand = R"([device]
 kind = "simulated"
 profile = "falcon"
@@ -41,28 +41,27 @@ hold_ms = 200
 safe_stop_ms = 1000
 )";
 
-/// Writes `file`; its path as text, for a command line.
+/// Writes `file` and returns its path for a command line.
 std::string write(const std::filesystem::path& file, std::string_view text);
 
-/// The number, or the first number of the array, that one of our JSON lines has under `key`. Throws
-/// std::runtime_error when there is none.
+/// Returns the number, or the first number of the array, under `key` of a JSON line. Throws std::runtime_error if there
+/// is none.
 double number_in(std::string_view json, const std::string& key);
 std::uint64_t count_in(std::string_view json, const std::string& key);
-/// The text under `key`, without escapes.
+/// Returns the text under `key`, which must not contain escapes.
 std::string text_in(std::string_view json, const std::string& key);
 
-/// A program of ours that has been started on port 0 and has told its address. It ends by itself after two minutes,
-/// should the test be killed.
+/// A program started on port 0 that has reported its address. It exits after two minutes in case the test is killed.
 class Service {
  public:
-  /// Starts `name` in `folder`; `event` is the JSON event that tells the address under `key`.
+  /// Starts `name` in `folder` and reads the address from `key` of the JSON event `event`.
   Service(const std::string& name, std::vector<std::string> arguments, const std::filesystem::path& folder,
           const std::string& event, const std::string& key, std::vector<std::string> more_environment = {});
 
   const std::string& address() const noexcept { return address_; }
   Process& process() noexcept { return process_; }
 
-  /// SIGTERM; the last line on stdout. Throws std::runtime_error when the exit code is another one.
+  /// Sends `signal` and returns the last line of stdout. Throws std::runtime_error for any other exit code.
   std::string stop(int signal = SIGTERM, int exit_code = 0);
 
  private:
@@ -77,33 +76,33 @@ class Server : public Service {
          std::vector<std::string> more_environment = {});
 };
 
-/// A client of ours: "virtual_wall", "echo_motion". As Service, it ends by itself.
+/// A client program, "virtual_wall" or "echo_motion". It exits by itself like Service.
 class Client : public Process {
  public:
   Client(const std::string& name, const std::string& server, const std::filesystem::path& folder,
          std::vector<std::string> more = {});
 };
 
-/// Watches through echo_motion until `enough` says so of the force along x, N; gives up after kPatience.
+/// Reads the force along x (N) from echo_motion until `enough` returns true. Fails after kPatience.
 template <class Enough>
 void watch_force(Process& echo, Enough enough) {
   while (!enough(number_in(echo.wait_for_line(R"("force_n")"), "force_n"))) {
   }
 }
 
-/// A recording that has been read back.
+/// The content of a recording.
 struct Recording {
   std::vector<StepRecord> steps;
-  std::vector<DatagramRecord> arrived;  ///< of the datagrams, those that came in
-  std::uint64_t losses = 0;             ///< reports of records that are missing, and not left out on purpose
+  std::vector<DatagramRecord> arrived;  ///< received datagrams
+  std::uint64_t losses = 0;             ///< records of losses, excluding intended omissions
   std::uint64_t strangers_left_out = 0;
   bool truncated = false;
 };
 Recording read_recording(const std::filesystem::path& file);
 
-/// Checks every recording made with the limiter on: steps follow each other; no force exceeds the limiter's bound; the
-/// ledger never falls below −1 nJ, except through an overrun. After that only another overrun lets it fall further, and
-/// no force exceeds the Coulomb friction that the limiter assumes.
+/// Checks a recording made with the limiter on. Steps are consecutive. No force exceeds the limiter's bound. The ledger
+/// never falls below −1 nJ except through an overrun; after that only another overrun lets it fall further, and no
+/// force exceeds the Coulomb friction that the limiter assumes.
 void expect_passive(const Recording& recording, const Scene& scene);
 
 }  // namespace tendon::e2e
