@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-//
 // Diagnostics for an observer: the server's loop, an engine behind a bad network, a device's safety. No test measures a
 // time; delays have lower bounds only.
 #include <gtest/gtest.h>

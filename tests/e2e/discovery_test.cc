@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-//
 // Programs that discover each other through a fake Avahi. deploy/discovery/drill uses a real one.
 #include <gtest/gtest.h>
 

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-//
 // Several engines on one device, and several devices on one server, each in its own process. No test measures a time.
 #include <gtest/gtest.h>
 

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-//
 // tendond with a Falcon model through the real libusb, and a remote wall in its own process. The tests check the motor
 // commands at the end of the cable. falcon-server prints the rendered forces and their latency.
 #include <gtest/gtest.h>

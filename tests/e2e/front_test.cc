@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-//
 // A front (tendon-fem serve) with a hand and with faulty workers. No test measures a time.
 #include <gtest/gtest.h>
 #include <signal.h>

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-//
 // A driver process streams forces to a device and dies. The device is a socket. For usbfs, this program replaces
 // ioctl() and writes the endpoint and the bytes to that socket.
 #include "devices/safety/guardian.h"

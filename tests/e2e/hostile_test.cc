@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-//
 // Invalid datagrams to the server's port are counted without any other effect. The counters are compared with the
 // datagrams that the server recorded as arrived, so drops by the kernel do not matter.
 #include <gtest/gtest.h>

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-//
 // tendon-inject between two programs unrelated to Tendon. No test measures a time.
 #include <gtest/gtest.h>
 #include <poll.h>

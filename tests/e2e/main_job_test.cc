@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-//
 // A hand, a server, a bad network and a remote wall, each in its own process, and the effects of killing one of them.
 // No test measures a time, because virtual machines pause. All claims are checked in the recordings.
 #include <gtest/gtest.h>

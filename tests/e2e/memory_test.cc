@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-//
 // Memory of a server, and of each device and session. The bounds are about 25 % above the measured values. The bound
 // for the whole server is the goal of 12 MB, which depends on the listed libraries.
 #include <gtest/gtest.h>

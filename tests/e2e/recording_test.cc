@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-//
 // Recordings are not overwritten, cannot be filled by unauthenticated senders, and suffice to replay the run.
 #include <gtest/gtest.h>
 #include <sys/stat.h>

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-//
 // The force ends whenever the server ends.
 #include <gtest/gtest.h>
 

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-//
 // The reference physics engine in its own process, with a hand that presses into the body.
 #include <gtest/gtest.h>
 

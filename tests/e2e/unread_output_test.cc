@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-//
 // Programs whose output is not read, either from a full pipe or from a terminal stopped with Ctrl-S.
 #include <fcntl.h>
 #include <gtest/gtest.h>

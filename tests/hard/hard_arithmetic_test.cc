@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-//
 // Numerical cases: rounding, compiler optimizations, denormals, and NaN.
 #include <gtest/gtest.h>
 

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-//
 // Estimators, clocks and devices that break the loop of hand, device, network and engine (loop_case.h).
 #include <gtest/gtest.h>
 

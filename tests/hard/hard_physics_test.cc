@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-//
 // Cases that break the physics of soft bodies: element, solver and time step. Figures of other programs refer to the
 // pressed block B1 (tests/clients/softbody/pressed_block.h).
 #include <gtest/gtest.h>

@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-// How often each thing happens, and by which law, is the business of selftest_test.cc.
+// selftest_test.cc checks the distributions and rates.
 namespace tendon::injector::injector_test {
 namespace {
 
@@ -20,7 +20,7 @@ using namespace std::chrono_literals;
 
 constexpr LocalTime kStart = LocalTime(5s);
 
-/// The decisions on `count` datagrams of 100 bytes, one each `period`, the first at kStart.
+/// The decisions on `count` datagrams of 100 bytes at intervals of `period`, from kStart on.
 std::vector<Decision> decisions(const std::string& profile, int count, Duration period, std::uint64_t seed = 7) {
   Injector injector(parse_profile(profile), seed, 0, Direction::kUp);
   std::vector<Decision> all;
@@ -35,7 +35,7 @@ double count_if(const std::vector<Decision>& all, const std::function<bool(const
   return static_cast<double>(std::ranges::count_if(all, what));
 }
 
-/// Four standard deviations of the binomial distribution: a right injector fails for one seed in 16 000.
+/// Four standard deviations of the binomial distribution: a correct injector fails for one seed in 16 000.
 double four_sigma(double n, double p) { return 4 * std::sqrt(n * p * (1 - p)); }
 
 TEST(Injector, SameSeedSameDecisions) {
@@ -104,7 +104,7 @@ constexpr const char* kPlain = "base=5ms delay=uniform(0ms,30ms) rho=0.5";
 
 TEST(Injector, AFieldThatIsAddedToAProfileMovesNoOtherRelease) {
   const auto plain = decisions(kPlain, 10'000, 1ms);
-  // 1 kHz with 30 ms of jitter: most datagrams wait for one ahead of them, so waiting is in the claim.
+  // 1 kHz with 30 ms of jitter: most datagrams wait for a predecessor, so the claim includes waiting.
   EXPECT_GT(count_if(plain, [](const Decision& d) { return d.cause == Cause::kFifo; }), 5000);
   for (const std::string added :
        {"loss=30%", "loss=burst(10%,4)", "loss=gilbert(1%,10%,90%,1%)", "loss=fourstate(1%,20%,10%,30%,1%)",
@@ -139,7 +139,7 @@ TEST(Injector, ABottleneckThatRefusesShiftsNoDraw) {
       continue;
     }
     ASSERT_EQ(lost(wide[i]), lost(narrow[i])) << i;
-    // 800 bits take 800 ns here and 1143 µs there.
+    // 800 bits take 800 ns on one link and 1143 µs on the other.
     const Duration later = narrow[i].release - wide[i].release;
     EXPECT_GE(later, 1142us) << i;
     EXPECT_LT(later, 1143us + 1ns) << i;
@@ -177,7 +177,7 @@ TEST(Injector, ForAnotherLinkIsAsIfBuiltForIt) {
 
 // ---- What each field does -------------------------------------------------------------------------------------------
 
-/// Delay in ms of datagrams sent each `period`, by time since the first in ms.
+/// Delay in ms of datagrams at intervals of `period`, by time since the first in ms.
 std::vector<double> delays_ms(const std::string& profile, int count, Duration period) {
   std::vector<double> all;
   for (const Decision& d : decisions(profile, count, period)) all.push_back(seconds(delay(d)) * 1e3);
@@ -227,7 +227,7 @@ TEST(Injector, ADropRuleMeetsOnlyTheDatagramsOfItsType) {
   EXPECT_NEAR(threes, 125, four_sigma(250, 0.5));
   const std::vector<std::byte> marked(4, std::byte{0xff});
   EXPECT_TRUE(lost(injector.decide({.arrival = kStart, .size = 4, .bytes = marked})));
-  EXPECT_FALSE(lost(injector.decide({.arrival = kStart, .size = 4})));  // its bytes are not known
+  EXPECT_FALSE(lost(injector.decide({.arrival = kStart, .size = 4})));  // bytes unknown
 }
 
 TEST(Injector, RegimesTakeTurnsInTheSharesOfTheirDwellTimesWhateverIsSent) {
@@ -240,7 +240,7 @@ TEST(Injector, RegimesTakeTurnsInTheSharesOfTheirDwellTimesWhateverIsSent) {
   double changes = 0;
   for (std::size_t i = 1; i < often.size(); ++i) changes += lost(often[i]) != lost(often[i - 1]) ? 1 : 0;
   EXPECT_NEAR(changes / 2, 1000, 4 * std::sqrt(1000.0));
-  EXPECT_EQ(often.front().verdict, Verdict::kPass);  // the first begins
+  EXPECT_EQ(often.front().verdict, Verdict::kPass);  // starts with the first regime
 }
 
 TEST(Injector, TheLossOfTheProfileGoesOnUnderTheLossOfARegime) {
@@ -265,15 +265,15 @@ TEST(Injector, AJumpOvertakesAsManyDatagramsAsItSaysAndMovesNoOther) {
     }
   }
   EXPECT_NEAR(jumps, 500, four_sigma(5000, 0.1));
-  // Nor where others wait for those ahead of them.
+  // Also if datagrams wait for their predecessors.
   const auto waiting = decisions(kPlain, 5000, 1ms);
   const auto overtaken = decisions(kPlain + std::string(" jump(10%,3)"), 5000, 1ms);
   for (std::size_t i = 0; i < waiting.size(); ++i) {
     ASSERT_TRUE(overtaken[i].cause == Cause::kReorder || overtaken[i].release == waiting[i].release) << i;
   }
-  // Nobody to overtake: the one before has long left.
+  // The predecessor has already left.
   for (const Decision& d : decisions("delay=10ms jump(100%,1)", 100, 50ms)) EXPECT_EQ(delay(d), 10ms);
-  // Not earlier than the road is long.
+  // The release is not before arrival + base.
   for (const Decision& d : decisions("base=9.5ms delay=0.5ms jump(100%,1)", 100, 1ms)) EXPECT_GE(delay(d), 9500us);
 }
 

@@ -35,7 +35,7 @@ std::optional<std::string> complaint(const Weighted* previous, const Weighted& e
 
 namespace {
 
-constexpr Duration kLongest = std::chrono::hours(24);  // what units.h reads
+constexpr Duration kLongest = std::chrono::hours(24);  // limit of units.h
 constexpr std::uint64_t kMaxQueuePackets = 1'000'000;
 constexpr std::size_t kMaxPattern = 65'536;
 constexpr std::size_t kMaxName = 32;
@@ -77,7 +77,7 @@ struct DelayCheck {
     check_duration(field + ": mean", mean);
     check_duration(field + ": standard deviation", deviation);
   }
-  /// Beyond that a distribution of one sign is all zeros and 60 s.
+  /// Beyond this, a distribution with a fixed lower bound would consist of zeros and 60 s.
   void shaped(Duration mean, Duration deviation) const {
     check_duration(field + ": mean", mean, Duration(1));
     const Duration least = (mean + Duration(99)) / 100;
@@ -185,7 +185,7 @@ void check(const Profile& p) {
     if (r.name.empty() || r.name.size() > kMaxName || r.name.find_first_of(" \t\r\n,()=\"") != std::string::npos) {
       refuse("regime: name", in_quotes(r.name), "a word of 1 to 32 letters");
     }
-    // Shorter ones would take long to catch up with after a silence.
+    // Shorter dwell times make catching up after a silence slow.
     check_duration("regime " + r.name + ": dwell", r.dwell, std::chrono::milliseconds(1), kLongest);
     std::visit(DelayCheck{"regime " + r.name + ": delay"}, r.delay);
     if (r.loss) std::visit(LossCheck{"regime " + r.name + ": loss"}, *r.loss);

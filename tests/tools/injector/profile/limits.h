@@ -10,16 +10,16 @@
 
 namespace tendon::injector {
 
-// What a profile may hold. limits.cc has check(Profile), which asks for all of it; the readers of tables and fields ask
-// for the parts below, so that a complaint names the line that it is about.
+// Limits of a profile. check(Profile) in limits.cc applies all of them. The readers of tables and fields call the
+// functions below, so that errors name the line.
 
 inline constexpr std::uint64_t kMaxQueueBytes = std::uint64_t{1} << 30;
 inline constexpr std::uint64_t kMaxRate = 1'000'000'000'000;  ///< bit/s
 
-/// Throws std::invalid_argument when `value` is not within `least` … `most`.
+/// Throws std::invalid_argument unless `least` ≤ `value` ≤ `most`.
 void check_duration(const std::string& field, Duration value, Duration least = {}, Duration most = kMaxDelay);
 
-/// What is wrong with `entry`, which follows `previous`, if anything.
+/// Describes the error in `entry`, which follows `previous`, or returns nullopt.
 std::optional<std::string> complaint(const Weighted* previous, const Weighted& entry);
 
 }  // namespace tendon::injector

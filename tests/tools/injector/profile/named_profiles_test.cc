@@ -62,7 +62,7 @@ struct Moments {
   double deviation = 0;
 };
 
-/// Of a delay, by its table: the middles of a million equal shares.
+/// Moments of a delay table, from the midpoints of a million equal probabilities.
 Moments moments(const Profile& profile) {
   const QuantileTable table = delay_table(profile.delay);
   constexpr std::uint64_t kShares = 1'000'000;

@@ -16,7 +16,7 @@
 namespace tendon::injector {
 namespace {
 
-/// "name(a,b)" or "name", with the field it belongs to for complaints.
+/// "name(a,b)" or "name". `field` is used in error messages.
 struct Call {
   std::string field;
   std::string_view text;
@@ -59,7 +59,7 @@ std::uint64_t whole(const std::string& field, std::string_view text, std::uint64
   return *value;
 }
 
-/// VALUE:WEIGHT,… written out; nothing when the arguments are not that.
+/// Parses inline VALUE:WEIGHT,…; returns nullopt if the arguments have another form.
 std::optional<std::vector<Weighted>> inline_table(const Call& c) {
   std::vector<Weighted> table;
   for (std::string_view entry : c.arguments) {
@@ -78,7 +78,6 @@ std::vector<Weighted> table(const Call& c) {
   return c.name == "samples" ? samples_from_csv(file) : histogram_from_csv(file);
 }
 
-/// netem(FILE.dist,MEAN,SD).
 SampledDelay netem(const Call& c) {
   c.expect(3, "netem(FILE.dist,MEAN,SD)");
   const Duration mean = duration(c.field + ": mean", c.arguments[1]);
@@ -138,7 +137,7 @@ Loss loss(const std::string& field, std::string_view text) {
   refuse(field, in_quotes(c.name), "burst, gilbert, fourstate or pattern");
 }
 
-/// The arguments of an event: "key=value" ones by key, and at most one without a key.
+/// The arguments of an event: "key=value" pairs, and at most one without a key.
 class Arguments {
  public:
   Arguments(const Call& c, std::string form) : call_(c), form_(std::move(form)) {
@@ -235,7 +234,7 @@ constexpr std::string_view kFields =
     "base, delay, rho, memory, loss, drop(…), regime(…), step(…), ramp(…), spike(…), stall(…), handover(…), outage(…), "
     "duplicate, replay(…), flip, truncate, rebind(…), order, jump(…), rate, opportunities(…), queue or overhead";
 
-/// "field=value": false when there is no such field.
+/// "field=value". Returns false for an unknown field.
 bool set_field(Profile& p, const std::string& field, std::string_view value) {
   if (field == "base") {
     p.base = duration(field, value);
@@ -271,7 +270,7 @@ bool set_field(Profile& p, const std::string& field, std::string_view value) {
   return true;
 }
 
-/// "field(…)": false when there is no such field.
+/// "field(…)". Returns false for an unknown field.
 bool add_event(Profile& p, const Call& c) {
   if (c.name == "drop") {
     Arguments a(c, "drop(byte=16,mask=0x0f,value=3,50%)");
@@ -321,7 +320,7 @@ bool add_event(Profile& p, const Call& c) {
   return true;
 }
 
-/// "field(…)", at most once: false when there is no such field.
+/// "field(…)", at most once. Returns false for an unknown field.
 bool set_call(Profile& p, const Call& c) {
   if (c.name == "replay") {
     c.expect(2, "replay(1%,64)");

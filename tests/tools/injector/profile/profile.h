@@ -15,15 +15,14 @@ namespace tendon::injector {
 
 // ---- How long a datagram takes --------------------------------------------------------------------------------------
 
-/// A value, or the lower edge of a bin, and how much of the whole it is: share or count, only the ratio to the sum of
-/// all weights matters.
+/// A value, or the lower edge of a bin, with its share or count. Weights are relative to their sum.
 struct Weighted {
   Duration value{};
   double weight = 0;
   bool operator==(const Weighted&) const = default;
 };
 
-// One-way delays. What would be below zero is zero, what would be above kMaxDelay is kMaxDelay.
+// One-way delays, clamped to 0 … kMaxDelay.
 
 struct ConstantDelay {  ///< delay=20ms
   Duration value{};
@@ -54,15 +53,15 @@ struct GammaDelay {  ///< delay=gamma(MEAN,SD): shape (MEAN/SD)²
   Duration mean{}, deviation{};
   bool operator==(const GammaDelay&) const = default;
 };
-/// delay=histogram(LOWER:WEIGHT,…) or histogram(FILE.csv). Within a bin the delay is uniform; the last bin is as wide
-/// as the one before it, and a histogram of one bin is one constant delay.
+/// delay=histogram(LOWER:WEIGHT,…) or histogram(FILE.csv). Uniform within a bin. The last bin is as wide as its
+/// predecessor; a histogram with one bin is a constant delay.
 struct HistogramDelay {
-  std::vector<Weighted> bins;  ///< rising
+  std::vector<Weighted> bins;  ///< increasing
   bool operator==(const HistogramDelay&) const = default;
 };
-/// delay=samples(VALUE:WEIGHT,…), samples(FILE.csv) or netem(FILE.dist,MEAN,SD): these values and no others.
+/// delay=samples(VALUE:WEIGHT,…), samples(FILE.csv) or netem(FILE.dist,MEAN,SD): exactly these values.
 struct SampledDelay {
-  std::vector<Weighted> values;  ///< rising
+  std::vector<Weighted> values;  ///< increasing
   bool operator==(const SampledDelay&) const = default;
 };
 using Delay = std::variant<ConstantDelay, UniformDelay, NormalDelay, ExponentialDelay, LognormalDelay, ParetoDelay,
@@ -70,39 +69,40 @@ using Delay = std::variant<ConstantDelay, UniformDelay, NormalDelay, Exponential
 
 // ---- Who is lost ----------------------------------------------------------------------------------------------------
 
-struct RandomLoss {  ///< loss=2%: each by itself
+struct RandomLoss {  ///< loss=2%: independent losses
   double probability = 0;
   bool operator==(const RandomLoss&) const = default;
 };
-/// loss=burst(2%,4): this share of all, in bursts of this mean length: Gilbert's chain with P(G→B) = p/(1 − p)/L and
-/// P(B→G) = 1/L. (As in WebRTC's SimulatedNetwork.)
+/// loss=burst(2%,4): loss rate and mean burst length, as a Gilbert chain with P(G→B) = p/(1 − p)/L and P(B→G) = 1/L (as
+/// WebRTC's SimulatedNetwork).
 struct BurstLoss {
   double probability = 0;
   double length = 1;
   bool operator==(const BurstLoss&) const = default;
 };
-/// loss=gilbert(P,R,BAD,GOOD): Gilbert and Elliott's chain. P = P(G→B), R = P(B→G) per datagram, lost with probability
-/// BAD (netem's 1−h) in B and GOOD (netem's 1−k) in G. As in the kernel the state before the transition decides; unlike
-/// there the chain begins in its stationary distribution, not in G, so that short runs are not better than long ones.
+/// loss=gilbert(P,R,BAD,GOOD): the Gilbert-Elliott chain. P = P(G→B), R = P(B→G) per datagram; the loss probability is
+/// BAD (netem's 1−h) in B and GOOD (netem's 1−k) in G. As in the kernel, the state before the transition decides.
+/// Unlike the kernel, the chain starts in its stationary distribution instead of G, so that short runs are not better
+/// than long ones.
 struct GilbertLoss {
   double to_bad = 0, to_good = 1, lost_in_bad = 1, lost_in_good = 0;
   bool operator==(const GilbertLoss&) const = default;
 };
 /// loss=fourstate(P13,P31,P32,P23,P14), in netem's order. States: 1 received in a gap, 2 received in a burst, 3 lost in
-/// a burst, 4 lost alone (then always 1). Each datagram makes a transition, and is lost when that ends in 3 or 4.
-/// Begins in its stationary distribution.
+/// a burst, 4 lost alone (then always 1). Each datagram makes a transition and is lost if that ends in 3 or 4. Starts
+/// in the stationary distribution.
 struct FourStateLoss {
   double p13 = 0, p31 = 0, p32 = 0, p23 = 0, p14 = 0;
   bool operator==(const FourStateLoss&) const = default;
 };
-struct PatternLoss {  ///< loss=pattern(0001): 1 is lost; begins with the first datagram and repeats
+struct PatternLoss {  ///< loss=pattern(0001): 1 is lost; starts with the first datagram and repeats
   std::string pattern;
   bool operator==(const PatternLoss&) const = default;
 };
 using Loss = std::variant<RandomLoss, BurstLoss, GilbertLoss, FourStateLoss, PatternLoss>;
 
-/// drop(byte=16,mask=0xf,value=3,50%): datagrams with (payload[byte] & mask) == value are lost with this probability:
-/// loss by message type.
+/// drop(byte=16,mask=0xf,value=3,50%): datagrams with (payload[byte] & mask) == value are lost with this probability,
+/// for losses by message type.
 struct DropRule {
   std::uint32_t byte = 0;
   std::uint8_t mask = 0xff;
@@ -112,11 +112,11 @@ struct DropRule {
 };
 
 // ---- What changes with time -----------------------------------------------------------------------------------------
-// Times count from when the profile came into force (for the first one: from the injector's start).
+// Times count from the activation of the profile, for the first profile from the injector's start.
 
-/// regime(NAME,dwell=4s,delay=…,loss=…): one state of a Markov chain in continuous time, independent of the traffic. It
-/// lasts for an exponential time of this mean, then one of the others follows, each as likely. The first begins. While
-/// it lasts, its delay is added and its loss, when it has one, replaces the profile's.
+/// regime(NAME,dwell=4s,delay=…,loss=…): a state of a continuous-time Markov chain that is independent of the traffic.
+/// The dwell time is exponential with this mean; all other states are equally likely successors. The chain starts with
+/// the first regime. The regime's delay is added, and its loss, if given, replaces the profile's.
 struct Regime {
   std::string name;
   Duration dwell{};
@@ -133,65 +133,65 @@ struct Window {
   bool operator==(const Window&) const = default;
 };
 
-struct Step {  ///< step(at=5s,20ms): from then on so much more (or less, when negative)
+struct Step {  ///< step(at=5s,20ms): added from then on; may be negative
   Duration at{}, change{};
   bool operator==(const Step&) const = default;
 };
-struct Ramp {  ///< ramp(from=5s,to=10s,30ms): grows to so much more (or less), and stays there
+struct Ramp {  ///< ramp(from=5s,to=10s,30ms): grows linearly to this value, which may be negative, and stays there
   Duration from{}, to{}, change{};
   bool operator==(const Ramp&) const = default;
 };
-struct Spike {  ///< spike(every=15s,for=50ms,80ms): datagrams that arrive in the window take so much longer
+struct Spike {  ///< spike(every=15s,for=50ms,80ms): added to datagrams that arrive in the window
   Window when;
   Duration extra{};
   bool operator==(const Spike&) const = default;
 };
-struct Stall {  ///< stall(every=2s,for=100ms): nothing leaves in the window, and all of it together at its end
+struct Stall {  ///< stall(every=2s,for=100ms): datagrams leave at the end of the window instead of within it
   Window when;
   bool operator==(const Stall&) const = default;
 };
-/// handover(every=15s,for=60ms,10ms): what arrives in the window is lost, and from its end on (until the next one) the
-/// path is longer by an amount that is uniform in ±10 ms.
+/// handover(every=15s,for=60ms,10ms): arrivals in the window are lost. From its end until the next handover, the path
+/// is longer by a uniform amount in ±10 ms.
 struct Handover {
   Window when;
   Duration change{};
   bool operator==(const Handover&) const = default;
 };
-struct Outage {  ///< outage(at=5s,for=300ms): what arrives in the window is lost
+struct Outage {  ///< outage(at=5s,for=300ms): arrivals in the window are lost
   Window when;
   bool operator==(const Outage&) const = default;
 };
 
 // ---- Copies, damage, order ------------------------------------------------------------------------------------------
 
-struct Replay {  ///< replay(1%,64): with this probability one of the last 64 datagrams comes once more
+struct Replay {  ///< replay(1%,64): with this probability one of the last 64 datagrams is sent once more
   double probability = 0;
   std::uint32_t depth = 0;
   bool operator==(const Replay&) const = default;
 };
 /// jump(1%,3): with this probability a datagram leaves just ahead of the one 3 before it, or of as many as it can still
-/// overtake when its own delay is `base` alone; jump(1%,1) swaps neighbours. The others are not moved by it.
+/// overtake if its own delay is only `base`. jump(1%,1) swaps neighbors. Other datagrams do not move.
 struct Jump {
   double probability = 0;
   std::uint32_t places = 0;
   bool operator==(const Jump&) const = default;
 };
 enum class Order : std::uint8_t {
-  kFifo,  ///< order=fifo: release is monotone whatever the jitter, because a route does not reorder
-  kFree,  ///< order=free: each leaves when its own delay is over, as netem does it
+  kFifo,  ///< order=fifo: releases are monotone despite jitter, because a route does not reorder
+  kFree,  ///< order=free: each leaves after its own delay, as in netem
 };
 
 // ---- The bottleneck -------------------------------------------------------------------------------------------------
 
-/// rate=10Mbit/s or opportunities(FILE), queue=64kB or queue=50packets, overhead=28. A datagram costs its payload and
-/// the overhead; one that finds no room in the queue is dropped (tail drop). The one being sent is still in the queue.
+/// rate=10Mbit/s or opportunities(FILE), queue=64kB or queue=50packets, overhead=28. A datagram costs its payload plus
+/// the overhead. If the queue is full, it is dropped (tail drop). The queue includes the datagram in transmission.
 ///
-/// There is no head drop: whether a datagram dies of it, and when those behind it leave, depends on what arrives later,
-/// and a decision is final when it is made.
+/// There is no head drop, because its effect on a datagram and its successors depends on later arrivals, whereas a
+/// decision is final.
 struct Bottleneck {
   std::uint64_t bits_per_second = 0;  ///< zero: none
-  /// Mahimahi's packet-delivery opportunities (mm-link): at each of these times, in ms, up to 1500 bytes leave; rising,
-  /// repeated with the period of the last one. Bytes that nobody waits for are lost. Not together with a rate.
+  /// Mahimahi's packet-delivery opportunities (mm-link): up to 1500 bytes leave at each of these times, in ms.
+  /// Increasing, repeated with the period of the last one. Unused bytes are lost. Excludes a rate.
   std::vector<std::uint32_t> opportunities_ms;
   std::uint64_t queue = 1000;  ///< netem's default, in packets
   bool queue_in_bytes = false;
@@ -200,18 +200,19 @@ struct Bottleneck {
   bool operator==(const Bottleneck&) const = default;
 };
 
-/// What one direction of a bad network does to datagrams. As text it is one line, fields in any order, each at most
-/// once except drop, regime, step, ramp, spike, stall, handover and outage:
+/// The behavior of a bad network in one direction. The text form is one line, with fields in any order, each at most
+/// once
+/// except drop, regime, step, ramp, spike, stall, handover and outage:
 ///
 ///     base=5ms delay=lognormal(20ms,5ms) rho=0.9 loss=burst(2%,4) spike(every=15s,for=50ms,80ms) rate=10Mbit/s
 ///     queue=64kB
 ///
-/// Durations are numbers with their unit (ns, us, ms, s), rounded to whole nanoseconds; probabilities 2% or 0.02.
+/// Durations are numbers with a unit (ns, us, ms, s), rounded to nanoseconds; probabilities are 2% or 0.02.
 struct Profile {
-  Duration base{};  ///< base=5ms: constant part, added to everything else
+  Duration base{};  ///< base=5ms: constant delay
   Delay delay;
-  /// Correlation of consecutive delays: a Gaussian copula AR(1), z' = ρz + √(1 − ρ²)e, delay = F⁻¹(Φ(z)), so that the
-  /// distribution of delays is exact for every ρ. By packet (rho=0.9), or by time (memory=20ms): ρ = exp(−Δt/memory).
+  /// Correlation of consecutive delays: a Gaussian copula AR(1), z' = ρz + √(1 − ρ²)e, delay = F⁻¹(Φ(z)), which keeps
+  /// the distribution of delays exact for every ρ. By packet (rho=0.9), or by time (memory=20ms): ρ = exp(−Δt/memory).
   double rho = 0;
   Duration memory{};  ///< zero: none
   Loss loss;
@@ -223,11 +224,11 @@ struct Profile {
   std::vector<Stall> stalls;
   std::vector<Handover> handovers;
   std::vector<Outage> outages;
-  double duplicate = 0;  ///< duplicate=1%: a second copy, with a delay of its own, never ahead of the first
+  double duplicate = 0;  ///< duplicate=1%: a second copy with its own delay, never ahead of the first
   Replay replay;
-  double flip = 0;      ///< flip=0.1%: one bit of the payload is flipped
-  double truncate = 0;  ///< truncate=0.1%: the payload is cut to 0 … size − 1 bytes
-  Duration rebind{};    ///< rebind(every=10s): the source port changes, as a NAT does it; zero: never
+  double flip = 0;      ///< flip=0.1%: flips one bit of the payload
+  double truncate = 0;  ///< truncate=0.1%: truncates the payload to 0 … size − 1 bytes
+  Duration rebind{};    ///< rebind(every=10s): changes the source port, as a NAT does; zero: never
   Order order = Order::kFifo;
   Jump jump;
   Bottleneck bottleneck;
@@ -235,35 +236,35 @@ struct Profile {
   bool operator==(const Profile&) const = default;
 };
 
-/// Nobody feels a force that is later than this, and it bounds what a proxy has to keep in memory.
+/// Longer delays are irrelevant for haptics, and this bounds the memory of a proxy.
 inline constexpr Duration kMaxDelay = std::chrono::seconds(60);
 
-/// Events of one kind, drop rules, regimes. Each is looked at for each datagram.
+/// Limit for events of one kind, drop rules and regimes, which are all evaluated for each datagram.
 inline constexpr std::size_t kMaxEvents = 64;
 
 /// Measured histograms have about 100 bins; the tables of netem 4096 values; a minute of 1 kHz 60 000 samples.
 inline constexpr std::size_t kMaxValues = 65'536;
 
-/// The longest traces that come with Mahimahi are 15 minutes of LTE: 700 000 opportunities.
+/// The longest traces of Mahimahi are 15 minutes of LTE: 700 000 opportunities.
 inline constexpr std::size_t kMaxOpportunities = 1'000'000;
 
-/// How far back a stale replay may reach: as many datagrams a driver keeps.
+/// Maximum distance of a stale replay, and the number of datagrams that a driver stores.
 inline constexpr std::uint32_t kMaxReplayDepth = 64;
 inline constexpr std::uint32_t kMaxJump = 64;
 
-/// Throws std::invalid_argument naming field, value and what was expected, when `profile` is impossible:
-/// "loss is 150%, expected a probability from 0% to 100%".
+/// Throws std::invalid_argument that names field, value and expected format if `profile` is invalid, for example "loss
+/// is 150%, expected a probability from 0% to 100%".
 void check(const Profile& profile);
 
-/// The profile as one line; what is as by default is left out. Tables are written out (histogram(0.56ms:72,…)), so that
-/// the line alone replays a run. parse_profile(to_string(p)) == p exactly, for every p that passes check().
+/// Formats a profile as one line without default values. Tables are written inline (histogram(0.56ms:72,…)), so that
+/// the line suffices to reproduce a run. parse_profile(to_string(p)) == p exactly for every p that passes check().
 std::string to_string(const Profile& profile);
 
-/// Reads such a line, and the files that it names. Throws std::invalid_argument naming field, value and what was
-/// expected; the result has passed check().
+/// Parses a profile line and reads the files that it names. Throws std::invalid_argument that names field, value and
+/// expected format. The result has passed check().
 Profile parse_profile(std::string_view line);
 
-/// The same on top of a profile: fields of the line replace those that are there, events are added to them.
+/// Applies the line to a profile: fields replace the existing ones, events are added.
 Profile parse_profile(std::string_view line, Profile onto);
 
 }  // namespace tendon::injector

@@ -29,7 +29,7 @@ std::string complaint_about(const std::string& line) {
   return thrown_by<std::exception>([&] { parse_profile(line); });
 }
 
-/// A file that is gone at the end of the test.
+/// A file that is removed at the end of the test.
 class TemporaryFile {
  public:
   explicit TemporaryFile(const std::string& content)
@@ -228,7 +228,7 @@ RC_GTEST_PROP(Profile, ReadsBackExactlyWhatItWrote, ()) {
 }
 
 RC_GTEST_PROP(Profile, AnyTextIsReadOrRefusedAndNothingElseHappens, ()) {
-  // Valid lines with a few characters changed come further than noise.
+  // Mutated valid lines reach deeper code than random text.
   std::string line = to_string(any_profile());
   for (int n = *rc::gen::inRange(0, 6); n > 0; --n) {
     const auto where = *rc::gen::inRange<std::size_t>(0, line.size());

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-// A profile as one line.
 #include <array>
 #include <cstdint>
 #include <string>

@@ -18,9 +18,9 @@
 namespace tendon::injector {
 namespace {
 
-constexpr std::size_t kMaxScenarioBytes = std::size_t{32} << 20;  // profiles may bring their tables along
+constexpr std::size_t kMaxScenarioBytes = std::size_t{32} << 20;  // profiles may contain inline tables
 
-/// Sets what `key` (up, down or both) of a change speaks of.
+/// Sets the profiles of a change that `key` (up, down or both) selects.
 void set_profiles(Change& change, std::string_view key, std::string_view profile) {
   if (key != "down") change.up = resolve_profile(profile, Direction::kUp);
   if (key != "up") change.down = resolve_profile(profile, Direction::kDown);
@@ -29,12 +29,12 @@ void set_profiles(Change& change, std::string_view key, std::string_view profile
 void append(std::string& text, std::string_view key, std::string_view value) {
   if (!text.empty()) text += ", ";
   text.append(key).append(" ").append(value);
-  // In a trace it is one line.
+  // A trace stores it on one line.
   std::ranges::replace_if(
       text, [](char c) { return c == '\n' || c == '\r'; }, ' ');
 }
 
-/// One table of a file; every mistake in it is an exception that names file, line and key.
+/// One table of a file. Errors are exceptions that name file, line and key.
 class Keys {
  public:
   Keys(const std::string& file, const toml::table& table, std::string path)
@@ -70,7 +70,7 @@ class Keys {
     return **value;
   }
 
-  /// `unit_ns`: of the unit that the key's name ends with. A day at the most.
+  /// `unit_ns` is the unit in the key's suffix. At most one day.
   std::optional<Duration> duration(std::string_view key, double unit_ns, bool may_be_negative) const {
     const std::optional<double> value = number(key);
     if (!value) return std::nullopt;
@@ -89,7 +89,7 @@ class Keys {
     return value;
   }
 
-  /// The tables of an array [[key]]; none when there is none.
+  /// Calls `take` for the tables of an array [[key]], if it exists.
   template <class Take>
   void each(std::string_view key, std::size_t most, const Take& take) const {
     const toml::node* const node = find(key);

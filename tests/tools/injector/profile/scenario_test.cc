@@ -110,7 +110,7 @@ TEST(Scenario, WhatIsWrongIsNamedWithFileLineAndKey) {
   EXPECT_EQ(refusal("seed = 7\n= 8").substr(0, 22), "storm.toml:2: not TOML");
 }
 
-// The same fates, however often the driver looks for changes between two datagrams, or only right before one.
+// The decisions do not depend on how often the driver polls for changes.
 TEST(Scenario, InVirtualTimeTheSameSeedMeetsTheSameFates) {
   const auto run = [](Duration poll) {
     const Scenario scenario = parse_scenario(kStorm, "storm.toml");
@@ -131,7 +131,7 @@ TEST(Scenario, InVirtualTimeTheSameSeedMeetsTheSameFates) {
       for (; poll > Duration::zero() && looked < now; looked += poll) look(looked);
       look(now);
       for (const Direction direction : {Direction::kUp, Direction::kDown}) {
-        // The second client comes in the middle of a regime of the scenario.
+        // The second client joins in the middle of a regime of the scenario.
         for (std::uint32_t link = 0; link < (i < 700 ? 1U : 2U); ++link) {
           auto injector = injectors.find({direction, link});
           if (injector == injectors.end()) {
@@ -150,7 +150,7 @@ TEST(Scenario, InVirtualTimeTheSameSeedMeetsTheSameFates) {
   EXPECT_EQ(run(333us), decisions);
   EXPECT_EQ(run(17ms), decisions);
   EXPECT_EQ(run(0ms), decisions);
-  // The outage of link 1: from 1.1004 s to 1.3004 s, of nobody else.
+  // The outage affects link 1 only, from 1.1004 s to 1.3004 s.
   std::map<Duration, int> outage;
   for (const Decision& decision : decisions) {
     if (decision.cause == Cause::kOutage) ++outage[decision.arrival - at(100s)];
@@ -209,7 +209,6 @@ TEST(Command, IsOneLineOfText) {
   EXPECT_EQ(parse_command("stop"), Command(Request::kStop));
 }
 
-// A file and a command say the same change in the same words.
 TEST(Command, IsHowAScenariosChangeIsWrittenIntoTheTrace) {
   const Scenario scenario = parse_scenario("[[at]]\nt_s = 1\nlink = 2\nboth = \"delay=3ms\"", "x");
   EXPECT_EQ(parse_command(scenario.changes[0].change.text), Command(scenario.changes[0].change));

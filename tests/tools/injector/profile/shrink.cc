@@ -19,7 +19,7 @@ bool is_benign(const TraceRecord& record, Duration benign, std::uint32_t rebinds
          !record.flipped_bit && !record.truncated_to && record.rebinds == rebinds_before;
 }
 
-/// [from, to) of `whole`, or all the rest.
+/// [from, to) of `whole`, and its complement.
 Part stretch(const Part& whole, std::size_t from, std::size_t to) {
   const auto at = [&whole](std::size_t i) { return whole.begin() + static_cast<std::ptrdiff_t>(i); };
   return {at(from), at(to)};
@@ -50,7 +50,7 @@ class Shrinking {
       if (!is_benign(record, benign, first ? 0 : rebinds)) part_.push_back(record);
       rebinds = record.rebinds;
     }
-    // In the order of time, so that what happens together is left out together.
+    // Sorts by time, so that simultaneous records are removed together.
     std::ranges::stable_sort(part_, {}, &TraceRecord::arrival);
   }
 
@@ -66,7 +66,7 @@ class Shrinking {
   }
 
  private:
-  /// False when the runs are used up, as if it passed: then nothing is left out any more.
+  /// Returns false when the runs are used up, which ends the reduction.
   bool still_fails(const Part& part) {
     if (runs_ == max_runs_) return false;
     ++runs_;
@@ -74,7 +74,7 @@ class Shrinking {
     return fails_(sparse_);
   }
 
-  /// ddmin. `part_` fails and has two datagrams or more; true when in the end each of them is needed.
+  /// ddmin. `part_` fails and has at least two datagrams. Returns true if each of the remaining ones is necessary.
   bool minimize() {
     std::size_t pieces = 2;
     while (part_.size() >= 2 && runs_ < max_runs_) {
@@ -104,7 +104,7 @@ class Shrinking {
     return false;
   }
 
-  /// Of two pieces one is what remains without the other: nothing new.
+  /// With two pieces, the complement of one is the other, which has already been tested.
   bool reduce_by_piece(std::size_t pieces) {
     for (std::size_t i = 0; pieces > 2 && i < pieces; ++i) {
       Part rest = without(part_, cut(i, pieces), cut(i + 1, pieces));

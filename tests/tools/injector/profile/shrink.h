@@ -8,29 +8,28 @@
 
 namespace tendon::injector {
 
-/// A trace that still fails, with as few datagrams as were found.
+/// A failing trace with as few datagrams as were found.
 struct Shrunk {
-  Trace trace;           ///< sparse: for TracePlayer by index, or as a file for a test to load
-  std::size_t from = 0;  ///< datagrams that were not benign in the trace that was given
+  Trace trace;           ///< sparse: for TracePlayer by index, or as a file for a test
+  std::size_t from = 0;  ///< datagrams of the given trace that were not benign
   std::size_t runs = 0;  ///< of the predicate
-  /// Leaving out any one of its datagrams makes it pass; false when the runs were used up before that was shown.
+  /// True if the trace passes without any one of its datagrams; false if the runs were used up before this was shown.
   bool minimal = false;
 };
 
-/// Which datagrams make it fail? Reduces a trace that makes a test fail to the few datagrams that matter, by delta
-/// debugging (ddmin: Zeller and Hildebrandt, "Simplifying and isolating failure-inducing input", IEEE Transactions on
-/// Software Engineering 28(2), 2002).
+/// Reduces a trace that makes a test fail to the few relevant datagrams, by delta debugging (ddmin: Zeller and
+/// Hildebrandt, "Simplifying and isolating failure-inducing input", IEEE Transactions on Software Engineering 28(2),
+/// 2002).
 ///
-/// A datagram that matters keeps its fate; every other one is benign: it passes after the median delay of its
-/// direction, undamaged and once. Whole stretches are made benign first, then ever smaller ones; what remains is not
-/// the least there could be, but none of it can be left out. Needs some |remaining| · log |given| runs when it goes
-/// well, and in the worst case the square of |given|, which is why `max_runs` ends it.
+/// A relevant datagram keeps its fate. All others become benign: they pass once, undamaged, after the median delay of
+/// their direction. Whole stretches become benign first, then smaller ones. The result is a local minimum, of which no
+/// datagram can be removed. Needs about |remaining| · log |given| runs in good cases and |given|² in the worst case,
+/// which `max_runs` limits.
 ///
-/// `fails` must play its trace by index and answer the same whenever it is asked the same. It is called first with the
-/// whole trace made sparse, where it must be true, else std::invalid_argument is thrown: with benign delays for what
-/// was nearly benign the failure is gone; and then with no datagram listed at all: when that fails too, the network is
-/// not to blame, and the result is empty. Deterministic: the same trace and predicate give the same result and number
-/// of runs.
+/// `fails` must play its trace by index and be deterministic. It is called first with the whole trace made sparse. If
+/// that passes, throws std::invalid_argument, because the failure depends on nearly benign delays. It is called next
+/// without any listed datagram. If that fails, the network is not the cause, and the result is empty. The same trace
+/// and predicate give the same result and number of runs.
 Shrunk shrink(const Trace& failing, const std::function<bool(const Trace&)>& fails, std::size_t max_runs = 5000);
 
 }  // namespace tendon::injector

@@ -33,7 +33,7 @@ Trace recorded(const char* profile) {
   return trace;
 }
 
-/// What a test sees of a trace: the fates of its packets.
+/// The fates of the packets, as a test observes them.
 std::vector<Decision> played(const Trace& trace) {
   TracePlayer player(trace, Direction::kUp, 0, TracePlayer::By::kIndex);
   std::vector<Decision> decisions;
@@ -84,7 +84,7 @@ TEST(Shrink, TheResultFailsFromAFileToo) {
 }
 
 TEST(Shrink, NoneOfWhatRemainsCanBeLeftOut) {
-  // At least five of those divisible by 7 that are lost, and one late one.
+  // Fails with at least five lost datagrams whose index is divisible by 7, and one late datagram.
   const Trace failing = recorded("delay=lognormal(20ms,5ms) loss=30%");
   const auto fails = [](const Trace& trace) {
     const auto decisions = played(trace);
@@ -148,7 +148,7 @@ TEST(Shrink, ATraceThatDoesNotFailIsRefused) {
 TEST(Shrink, ASourcePortThatChangesOnceIsOneDatagram) {
   const Shrunk shrunk = shrink(recorded("delay=20ms rebind(every=300ms)"),
                                [](const Trace& trace) { return played(trace).back().rebinds >= 2; });
-  // Changed three times in a second; the second and third each bring the number to two or more.
+  // Three changes in a second; the second and the third each suffice to reach two changes.
   EXPECT_EQ(shrunk.from, 3U);
   EXPECT_EQ(shrunk.trace.records.size(), 1U);
 }

@@ -14,11 +14,10 @@
 
 namespace tendon::injector {
 
-// The files that a profile can name. All throw std::invalid_argument with the file, the line and what was expected, and
-// refuse a file that is not a regular one.
+// Readers for the files that a profile can name. All throw std::invalid_argument with the file, the line and the
+// expected format, and reject anything but a regular file.
 
-/// Calls `take(line, where)` for each line of a file that holds more than blanks and a comment (#). `where` is
-/// "FILE:LINE: ".
+/// Calls `take(line, where)` for each line that is not blank or a comment (#). `where` is "FILE:LINE: ".
 void for_each_line(const std::filesystem::path& file, const std::string& expected,
                    const std::function<void(std::string_view, const std::string&)>& take);
 
@@ -37,18 +36,18 @@ struct DelayList {
   TableReader table;
   TableReader::Column delay;                  ///< ms
   std::optional<TableReader::Column> t;       ///< ms
-  std::optional<TableReader::Column> weight;  ///< how often this delay occurs
+  std::optional<TableReader::Column> weight;  ///< number of occurrences
   std::optional<std::size_t> dir;             ///< up or down
 };
 
-/// Opens a list of delays and reads its first line. It throws std::runtime_error, and the message begins with `name`. It
-/// refuses two columns without a header, because they could be a time and a delay, or one delay with a decimal comma.
+/// Opens a list of delays and reads its first line. Throws std::runtime_error with a message that begins with `name`.
+/// Rejects two columns without a header, which could be a time and a delay, or one delay with a decimal comma.
 DelayList open_delays(std::istream& from, const std::string& name);
 
-/// A table of netem (iproute2's *.dist): whole numbers in units of a standard deviation/8192.
+/// Reads a table of netem (iproute2's *.dist): integers in units of a standard deviation/8192.
 std::vector<Weighted> netem_table(const std::filesystem::path& file, Duration mean, Duration deviation);
 
-/// In order, each value once.
+/// Sorts the values and merges equal ones.
 std::vector<Weighted> merged(std::vector<Weighted> values);
 
 }  // namespace tendon::injector

@@ -19,7 +19,7 @@ const QuantileTable& exponential_table() {
   return kTable;
 }
 
-/// value · numerator/denominator, towards zero, without overflow.
+/// value · numerator/denominator, rounded toward zero, without overflow.
 Duration scaled(Duration value, Duration numerator, Duration denominator) {
   return Duration(static_cast<std::int64_t>(Int128{value.count()} * numerator.count() / denominator.count()));
 }

@@ -11,39 +11,37 @@
 
 namespace tendon::injector {
 
-/// Where a time lies among the repetitions of a window.
+/// The position of a time relative to the repetitions of a window.
 struct WindowState {
   bool open = false;
-  std::uint64_t begun = 0;  ///< how many have begun so far, an open one included
+  std::uint64_t begun = 0;  ///< number of repetitions begun, including an open one
   Duration until_end{};     ///< of the open one
 };
 WindowState state_of(const Window& window, Duration since) noexcept;
 
-// What the events of a profile do to a datagram that arrives `since` the profile came into force.
+// Effects of a profile's events on a datagram that arrives at `since` after the profile's activation.
 
-/// Steps, ramps, spikes and the paths after handovers, added up. What the n-th handover draws depends on n, not on the
-/// traffic.
+/// The sum of steps, ramps, spikes and path changes after handovers. The draw of the n-th handover depends on n, not on
+/// the traffic.
 Duration extra_delay(const Profile& profile, Duration since, const Draws& draws) noexcept;
 bool in_outage(const Profile& profile, Duration since) noexcept;
 bool in_handover(const Profile& profile, Duration since) noexcept;
 
-/// When something that would leave at `since` leaves: at the end of the stall that it runs into, of the next one when
-/// that is open by then, and so on, but at most a thousand.
+/// Delays a release at `since` to the end of its stall, repeatedly if that is within another one (at most 1000 times).
 Duration past_stalls(const Profile& profile, Duration since) noexcept;
 
-/// Which regime holds: a Markov chain in continuous time that depends on the seed and on nothing that is sent.
+/// The active regime: a continuous-time Markov chain that depends only on the seed.
 ///
 /// Thread-safe: no.
 class RegimeChain {
  public:
-  /// Begins at `start` with the first of `profile.regimes`, which must outlive the chain. `first_visit` counts the
-  /// draws.
+  /// Starts at `start` with the first of `regimes`, which must outlive the chain. `first_visit` is the index of the
+  /// first draw.
   RegimeChain(const std::vector<Regime>& regimes, const Draws& draws, LocalTime start, std::uint64_t first_visit);
 
-  /// The regime at `now`, as an index. Does not go back in time. Costs some 30 ns for each change since the last call.
+  /// The index of the regime at `now`, which must not decrease. Costs about 30 ns for each change since the last call.
   std::size_t at(LocalTime now);
 
-  /// The number of the next visit.
   std::uint64_t next_visit() const { return visit_ + 1; }
 
  private:

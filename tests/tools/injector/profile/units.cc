@@ -15,7 +15,7 @@ namespace tendon::injector {
 namespace {
 
 std::string number_text(double value, std::chars_format format) {
-  std::array<char, 512> text{};  // the smallest double takes 327 characters in fixed notation
+  std::array<char, 512> text{};  // the smallest double has 327 characters in fixed notation
   const auto [end, error] = std::to_chars(text.data(), text.data() + text.size(), value, format);
   return {text.data(), end};
 }
@@ -32,7 +32,7 @@ std::optional<double> parse_number(std::string_view text) {
 
 std::optional<Duration> to_duration(double value, double unit_ns) {
   const double ns = value * unit_ns;
-  // Beyond a day it would not be a delay, and beyond 2⁶³ ns not an integer.
+  // More than a day is not a delay, and more than 2⁶³ ns overflows.
   if (std::abs(ns) > 86'400e9) return std::nullopt;
   return Duration(exact::round(ns));
 }
@@ -42,7 +42,7 @@ std::optional<Duration> parse_duration(std::string_view text) {
     std::string_view name;
     double ns;
   };
-  // "s" is last: the other names end with it.
+  // "s" is last, because it is a suffix of the other units.
   constexpr std::array<Unit, 4> kUnits = {Unit{"ns", 1}, Unit{"us", 1e3}, Unit{"ms", 1e6}, Unit{"s", 1e9}};
   for (const Unit& unit : kUnits) {
     if (!text.ends_with(unit.name)) continue;
@@ -69,7 +69,7 @@ std::optional<double> parse_probability(std::string_view text) {
   if (!text.ends_with('%')) return parse_number(text);
   text.remove_suffix(1);
   if (text.find_first_not_of("-0123456789.") != std::string_view::npos) return std::nullopt;
-  // Moves the decimal point in the text, not in the number: 7% is then exactly the double 0.07.
+  // Shifts the decimal point in the text instead of dividing, so that 7% is exactly the double 0.07.
   return parse_number(std::string(text) + "e-2");
 }
 

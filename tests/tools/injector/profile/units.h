@@ -10,24 +10,24 @@
 
 namespace tendon::injector {
 
-/// Numbers with their units, as profiles, scenarios and traces write them. Each parse takes the whole of its text or
-/// gives nothing; what the text functions write reads back as exactly the same value.
+/// Numbers with units in profiles, scenarios and traces. The parsers consume the whole text or return nullopt. The text
+/// functions write values that parse back exactly.
 
 /// A finite number.
 std::optional<double> parse_number(std::string_view text);
-std::string number_text(double value);  ///< the shortest that reads back exactly
+std::string number_text(double value);  ///< the shortest that parses back exactly
 
-/// A whole number of zero or more, "64" or "0x40".
+/// A nonnegative integer, "64" or "0x40".
 std::optional<std::uint64_t> parse_whole(std::string_view text);
 
-/// A number with its unit (ns, us, ms, s), to the nearest nanosecond; at most a day.
+/// A number with its unit (ns, us, ms, s), rounded to nanoseconds; at most a day.
 std::optional<Duration> parse_duration(std::string_view text);
 std::string duration_text(Duration duration);  ///< whole seconds in s, all else in ms with up to six decimals
 
-/// `value` units of `unit_ns` each, to the nearest nanosecond; at most a day.
+/// `value` · `unit_ns`, rounded to nanoseconds; at most a day.
 std::optional<Duration> to_duration(double value, double unit_ns);
 
-/// "2%" or "0.02"; 7% is exactly the double 0.07. Not checked to be in 0…1.
+/// "2%" or "0.02"; 7% is exactly the double 0.07. Does not check the range 0…1.
 std::optional<double> parse_probability(std::string_view text);
 std::string probability_text(double probability);  ///< in percent
 

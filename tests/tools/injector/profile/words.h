@@ -7,19 +7,19 @@
 
 namespace tendon::injector {
 
-// How the text of a profile is taken to pieces, and how a complaint about it is worded.
+// Helpers to tokenize a profile and to report errors in it.
 
 inline constexpr std::string_view kBlanks = " \t\r\n";
 
-/// `text` without the blanks around it.
+/// `text` without surrounding blanks.
 std::string_view trimmed(std::string_view text);
 
-/// The text up to the first of `separators` outside brackets, taken off `rest` together with the separator.
+/// Removes and returns the text up to the first of `separators` outside brackets; also removes the separator.
 std::string_view take_until(std::string_view& rest, std::string_view separators);
 
 std::string in_quotes(std::string_view text);
 
-/// "0x0f".
+/// For example "0x0f".
 std::string hexadecimal(std::uint8_t byte);
 
 /// Throws std::invalid_argument "FIELD is VALUE, expected EXPECTED".

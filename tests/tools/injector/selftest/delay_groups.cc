@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Delays: their laws, their correlation, and that streams have nothing in common.
+// Distributions of delays, their correlation, and the independence of streams.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -32,15 +32,15 @@ std::vector<DelayLaw> delay_laws() {
   return {
       {"delay=uniform(5ms,15ms)", [](double x) { return std::clamp((x - 5 * kMs) / (10 * kMs), 0.0, 1.0); }},
       {"delay=normal(20ms,4ms)", [](double x) { return x < 0 ? 0 : normal_cdf((x - 20 * kMs) / (4 * kMs)); }},
-      // Below zero is zero: an atom of 16 % there.
+      // Negative values become zero: an atom of 16 %.
       {"delay=normal(2ms,2ms)", [](double x) { return x < 0 ? 0 : normal_cdf((x - 2 * kMs) / (2 * kMs)); }, false},
       {"delay=exponential(2ms,8ms)", [](double x) { return x < 2 * kMs ? 0 : -std::expm1((2 * kMs - x) / (6 * kMs)); }},
       {"delay=lognormal(20ms,10ms)", lognormal_law(20 * kMs, 10 * kMs)},
       {"delay=pareto(5ms,2.5)", [](double x) { return x < 5 * kMs ? 0 : 1 - std::pow(5 * kMs / x, 2.5); }},
       {"delay=gamma(10ms,7ms)", gamma_law(10 * kMs, 7 * kMs)},
-      // A thousandth of it below 100 ns: whole nanoseconds are too coarse to tell the draw from the delay.
+      // A thousandth of it is below 100 ns, where rounding to nanoseconds hides the draw.
       {"delay=gamma(10ms,14ms)", gamma_law(10 * kMs, 14 * kMs), false},
-      // Bins of 1 ms: shares 0.1, 0.6, 0, 0.3.
+      // Bins of 1 ms with shares 0.1, 0.6, 0, 0.3.
       {"delay=histogram(3ms:1,4ms:6,5ms:0,6ms:3)",
        [](double x) {
          const double ms = x / kMs - 3;
@@ -75,7 +75,7 @@ std::vector<Check> all_delays(const SelftestOptions& options) {
 std::vector<Check> memory(const SelftestOptions& options) {
   const std::string line = "delay=lognormal(20ms,10ms) memory=20ms order=free";
   const DelayLaw law = delay_laws()[4];
-  const std::array gaps = {0.5, 7.0, 0.1, 30.0, 2.0};  // ms before datagram i, in turn
+  const std::array gaps = {0.5, 7.0, 0.1, 30.0, 2.0};  // ms before datagram i, cyclic
   const double round = 39.6;
   Traffic traffic;
   traffic.at = [&](std::size_t i) {
@@ -93,7 +93,7 @@ std::vector<Check> first_datagrams(const SelftestOptions& options) {
   const Injector any_link(parse_profile(line), options.seed, 0, Direction::kDown);
   std::vector<double> samples;
   std::vector<bool> losses;
-  // A hundredth, for an injector costs more than a decision.
+  // One percent of the count, because creating an injector costs more than a decision.
   for (std::uint32_t link = 0; link < options.count / 100; ++link) {
     const Decision first = any_link.for_link(link).decide({.arrival = kStart, .size = 200});
     samples.push_back(ns(delay(first)));
@@ -134,7 +134,8 @@ std::vector<Check> check_delays(std::string_view line, const Cdf& law, double rh
   if (!continuous) return checks;
   const auto n = static_cast<double>(samples.size());
   if (rho == 0) {
-    // No distance sees far out; counting does. A hundred expected, so that their law is normal enough.
+    // Counts the tails, to which the Kolmogorov distance is insensitive. About 100 are expected, enough for the normal
+    // approximation.
     const double far = std::max(1e-4, 100 / n);
     const auto high = std::ranges::count_if(samples, [&](double x) { return law(x) > 1 - far; });
     const auto low = std::ranges::count_if(samples, [&](double x) { return law(x) < far; });
@@ -142,7 +143,7 @@ std::vector<Check> check_delays(std::string_view line, const Cdf& law, double rh
     checks.push_back(rate(model, "share of the shortest", static_cast<double>(low), n, far));
   }
   const auto z = normal_scores(samples, law);
-  // Its standard deviation and its bias are those of AR(1): Bartlett 1946, Kendall 1954.
+  // Standard deviation and bias of the AR(1) estimate: Bartlett 1946, Kendall 1954.
   checks.push_back({model, "autocorrelation of z against rho", std::abs(autocorrelation(z, 1) - rho),
                     most_deviations() * std::sqrt((1 - rho * rho) / n) + (1 + 3 * rho) / n});
   if (rho > 0) append(checks, check_innovations(model, innovations(z, [rho](std::size_t) { return rho; })));

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-// Events of a profile at their times.
 #include <algorithm>
 #include <cmath>
 #include <functional>
@@ -18,7 +17,7 @@ using std::chrono::milliseconds;
 
 namespace {
 
-/// Which of the windows first, first + every, … lasting `lasts` the time t is in; none when in none.
+/// Whether t is in one of the windows first, first + every, … of length `lasts`.
 bool in_window(Duration t, Duration first, Duration every, Duration lasts) {
   return t >= first && (t - first) % every < lasts;
 }
@@ -27,9 +26,9 @@ bool in_window(Duration t, Duration first, Duration every, Duration lasts) {
 
 std::vector<Check> events(const SelftestOptions& options) {
   std::vector<Check> checks;
-  // At times that no datagram meets to the nanosecond.
+  // A period at which no datagram arrives exactly at an event.
   const Traffic traffic{.period = Duration(1'000'003)};
-  /// Deviations of the delay from a function of the arrival, in ns at the most.
+  /// Maximum deviation of the delay from a function of the arrival, in ns.
   const auto worst = [&](const std::string& line, const std::function<double(double)>& expected_ms) {
     double most = 0;
     play(parse_profile(line), traffic, options, [&](std::size_t, const Decision& decision) {

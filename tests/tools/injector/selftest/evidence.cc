@@ -10,7 +10,7 @@ namespace tendon::injector {
 namespace {
 
 constexpr double kSignificance = 1e-7;
-constexpr std::size_t kLongestRun = 2000;  // told apart; all longer ones are one class
+constexpr std::size_t kLongestRun = 2000;  // longer runs are one class
 
 }  // namespace
 

@@ -8,10 +8,9 @@
 
 namespace tendon::injector {
 
-// Groups of checks, in the order in which `selftest` makes them. Each asks one part of the injector for decisions and
-// holds them against their laws.
+// Groups of checks in the order of `selftest`. Each compares the decisions of one part of the injector with their laws.
 
-/// A model of delay, as text, and its distribution function in ns.
+/// A delay model as text, and its distribution function in ns.
 struct DelayLaw {
   std::string line;
   Cdf law;
@@ -20,14 +19,14 @@ struct DelayLaw {
 std::vector<DelayLaw> delay_laws();
 
 std::vector<Check> all_delays(const SelftestOptions& options);
-/// Correlation by time: ρ = exp(−Δt / memory), for datagrams that come unevenly.
+/// Correlation by time, ρ = exp(−Δt / memory), for datagrams at irregular intervals.
 std::vector<Check> memory(const SelftestOptions& options);
-/// Many links, one datagram each: what begins, begins as if it had always been so, and no link knows of another.
+/// First datagrams of many links: processes start in their stationary distribution, and links are independent.
 std::vector<Check> first_datagrams(const SelftestOptions& options);
-/// Two streams of delays that should have nothing in common.
+/// Independence of two streams of delays.
 std::vector<Check> independence(const SelftestOptions& options);
 std::vector<Check> all_losses(const SelftestOptions& options);
-/// A lossy profile does nothing to delays.
+/// Loss does not change delays.
 std::vector<Check> separation(const SelftestOptions& options);
 std::vector<Check> regimes(const SelftestOptions& options);
 std::vector<Check> order(const SelftestOptions& options);

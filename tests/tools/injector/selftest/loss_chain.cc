@@ -13,8 +13,8 @@ namespace {
 
 using Row = std::vector<double>;
 
-constexpr double kNothing = 1e-13;       // probability left over when a series has been summed
-constexpr std::size_t kForgotten = 500;  // bursts; far more than any chain that is of use needs
+constexpr double kNothing = 1e-13;       // remaining probability at which a series is truncated
+constexpr std::size_t kForgotten = 500;  // bursts; far more than practical chains need
 
 double sum(const Row& row) { return std::accumulate(row.begin(), row.end(), 0.0); }
 
@@ -44,7 +44,8 @@ Row scaled_to_one(Row row) {
   return row;
 }
 
-/// From a datagram that was one of those that `kind` says, in a state by `row`: the state of the first that is not.
+/// From a datagram of the given `kind` with state distribution `row`: the state distribution of the first datagram that
+/// is not of this kind.
 Row after_run(Row row, const LossChain& chain, const Row& kind) {
   Row result(row.size());
   while (sum(row) > kNothing) {
@@ -75,7 +76,7 @@ LossChain LossChain::four_state(double p13, double p31, double p32, double p23, 
 
 LossChain LossChain::regimes(const std::vector<double>& dwell, double period, std::vector<double> loss) {
   const std::size_t n = dwell.size();
-  // exp(A) = exp(A / 2ᵏ)^(2ᵏ), with so small an A / 2ᵏ that eight terms of the series are exact.
+  // exp(A) = exp(A / 2ᵏ)^(2ᵏ), with A / 2ᵏ so small that eight terms of the series are exact.
   constexpr int kHalvings = 8;
   std::vector<Row> rate(n, Row(n));
   for (std::size_t i = 0; i < n; ++i) {
@@ -101,7 +102,8 @@ LossChain LossChain::regimes(const std::vector<double>& dwell, double period, st
 }
 
 std::vector<double> LossChain::shares() const {
-  // Gauss–Jordan on πS = π with one equation replaced by Σπ = 1: no assumption about periods, as iterating would need.
+  // Gauss–Jordan elimination on πS = π with one equation replaced by Σπ = 1. Unlike iteration, it also works for
+  // periodic chains.
   const std::size_t n = loss.size();
   std::vector<Row> rows(n, Row(n + 1));
   for (std::size_t i = 0; i < n; ++i) {
@@ -128,7 +130,7 @@ double LossChain::rate() const { return sum(times(shares(), loss)); }
 double LossChain::variance_factor() const {
   const double p = rate();
   const Row pi = shares();
-  // What having lost one says about the states to come, as the difference from what they are anyway.
+  // The change of the state distribution due to the knowledge of one loss.
   Row known = times(pi, loss);
   std::ranges::transform(known, pi, known.begin(), [p](double lost, double share) { return lost - p * share; });
   double covariances = 0;
@@ -154,7 +156,8 @@ std::vector<double> LossChain::bursts(std::size_t longest) const {
 }
 
 std::size_t LossChain::bursts_to_forget() const {
-  std::vector<Row> starts;  // one for each state in which a burst can begin: the state in which a later one begins
+  std::vector<Row> starts;  // one for each state in which a burst can begin: the distribution of the state in which a
+                            // later one begins
   for (std::size_t i = 0; i < loss.size(); ++i) {
     Row state(loss.size());
     state[i] = 1;

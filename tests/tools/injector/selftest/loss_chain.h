@@ -6,48 +6,47 @@
 
 namespace tendon::injector {
 
-/// A hidden Markov chain of losses, and in closed form what it does in the long run: the oracle for every loss model,
-/// for each of them is such a chain. In state i a datagram is lost with probability loss[i]; then, before the next one,
-/// the chain goes to j with probability step[i][j]. Every state must be reachable from every other.
+/// A hidden Markov chain of losses with its stationary statistics in closed form. It is the oracle for every loss
+/// model, because each of them is such a chain. In state i a datagram is lost with probability loss[i]; the chain then
+/// goes to j with probability step[i][j]. Every state must be reachable from every other.
 ///
 /// Thread-safe: yes, once made.
 struct LossChain {
   std::vector<std::vector<double>> step;
   std::vector<double> loss;
 
-  /// Each datagram for itself with probability p.
+  /// Independent losses with probability p.
   static LossChain bernoulli(double p);
-  /// A share `loss` of all in bursts of `mean_burst` datagrams: Gilbert 1960 with r = 1 / mean_burst,
-  /// p = r · loss / (1 − loss), as WebRTC's SimulatedNetwork has it.
+  /// Loss rate `loss` in bursts of `mean_burst` datagrams: Gilbert 1960 with r = 1 / mean_burst, p = r · loss / (1 −
+  /// loss), as WebRTC's SimulatedNetwork.
   static LossChain burst(double loss, double mean_burst);
-  /// Gilbert and Elliott: p = P(good → bad), r = P(bad → good), and what is lost in either state. (netem's `loss
-  /// gemodel`.)
+  /// Gilbert and Elliott: p = P(good → bad), r = P(bad → good), and the loss probability in each state (netem's `loss
+  /// gemodel`).
   static LossChain gilbert(double p, double r, double loss_in_bad, double loss_in_good);
   /// netem's `loss state` (Salsano et al. 2012): 1 received in a gap, 2 received in a burst, 3 lost in a burst, 4 lost
-  /// alone in a gap, after which always 1.
+  /// alone in a gap, followed by 1.
   static LossChain four_state(double p13, double p31, double p32, double p23, double p14);
 
-  /// A Markov chain in continuous time, looked at every `period`: state i lasts for an exponential time of mean
-  /// dwell[i], then each of the others follows with the same probability. step = exp(Q · period), exactly, with the
-  /// changes that happen between two looks.
+  /// A continuous-time Markov chain sampled every `period`: state i lasts for an exponential time of mean dwell[i]; all
+  /// others are equally likely successors. step = exp(Q · period), exactly, including changes between two samples.
   static LossChain regimes(const std::vector<double>& dwell, double period, std::vector<double> loss);
 
-  /// Shares of time in the states: π = π · step.
+  /// Stationary distribution: π = π · step.
   std::vector<double> shares() const;
 
-  /// Share of all datagrams that is lost: Σ π_i loss_i.
+  /// Loss rate: Σ π_i loss_i.
   double rate() const;
 
-  /// By how much the variance of the number lost among many exceeds that of independent losses of the same rate:
+  /// Ratio of the variance of the number of losses to that of independent losses with the same rate:
   ///     1 + 2 Σ_k cov(lost₀, lost_k) / var(lost₀)
   double variance_factor() const;
 
-  /// Probabilities that a burst of losses has exactly 1, 2, … `longest` − 1 datagrams, and, last, `longest` or more:
+  /// Probabilities of burst lengths 1, 2, … `longest` − 1, and finally of `longest` or more:
   ///     P(L ≥ k) = α (S D)^(k−1) 1,   α ∝ π (1 − D) S D,   S = step, D = diag(loss)
   std::vector<double> bursts(std::size_t longest) const;
 
-  /// Every how many bursts must one be taken so that the state in which it begins says less than 1e-3 about the state
-  /// in which the next taken one begins? Those lengths can be tested as independent ones. 1: they all can.
+  /// The smallest m for which the initial states of every m-th burst depend on each other by less than 1e-3, so that
+  /// their lengths can be tested as independent. 1: all bursts.
   std::size_t bursts_to_forget() const;
 };
 

@@ -13,7 +13,7 @@
 namespace tendon::injector::loss_chain_test {
 namespace {
 
-/// The chain played with dice: what the closed forms must agree with.
+/// A Monte Carlo simulation of the chain.
 std::vector<bool> played(const LossChain& chain, std::size_t n, std::uint64_t seed) {
   Dice dice(seed);
   std::size_t state = 0;
@@ -52,7 +52,7 @@ TEST(LossChain, ElliottsRateIsTheMixtureOfItsStates) {
   EXPECT_NEAR(LossChain::gilbert(p, r, 0.8, 0.01).rate(), (p * 0.8 + r * 0.01) / (p + r), 1e-15);
 }
 
-// The shares in closed form: D = p23 p31 + p13 p23 + p13 p32 + p14 p23 p31.
+// The stationary distribution in closed form: D = p23 p31 + p13 p23 + p13 p32 + p14 p23 p31.
 TEST(LossChain, FourStatesShareTheTimeAsTheClosedFormSays) {
   const double p13 = 0.01, p31 = 0.3, p32 = 0.2, p23 = 0.4, p14 = 0.005;
   const auto shares = LossChain::four_state(p13, p31, p32, p23, p14).shares();

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-// Losses, and what they leave alone.
 #include <algorithm>
 #include <array>
 #include <string>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What happens to datagrams on the way besides delay and loss: order, copies, damage, the bottleneck.
+// Order, copies, damage and the bottleneck.
 #include <algorithm>
 #include <cmath>
 #include <deque>
@@ -20,7 +20,8 @@ using std::chrono::milliseconds;
 
 namespace {
 
-/// A queue of `places` datagrams of equal cost, played by itself: when each leaves, none for one that found it full.
+/// An independent simulation of a queue of `places` datagrams of equal cost. Returns each departure, or nullopt if the
+/// queue was full.
 class FifoQueue {
  public:
   FifoQueue(Duration service, std::size_t places) : service_(service), places_(places) {}
@@ -89,7 +90,7 @@ std::vector<Check> copies_and_damage(const SelftestOptions& options) {
     if (decision.duplicate) second.push_back(ns(*decision.duplicate - decision.arrival));
   });
   checks.push_back(rate(twice, "duplicate rate", static_cast<double>(second.size()), n, 0.1));
-  // A delay of its own, but never ahead of the first: the later of two.
+  // A second copy has its own delay but is never ahead of the first: the maximum of two.
   const Cdf one = delay_laws()[3].law;
   checks.push_back(kolmogorov(twice, "second copies, Kolmogorov", second, [&](double x) { return one(x) * one(x); }));
 
@@ -136,7 +137,7 @@ std::vector<Check> copies_and_damage(const SelftestOptions& options) {
 std::vector<Check> bottleneck(const SelftestOptions& options) {
   std::vector<Check> checks;
   const auto n = static_cast<double>(options.count);
-  // 972 bytes and 28 of headers: 0.8 ms at 10 Mbit/s. No two events at the same time.
+  // 972 bytes and 28 of headers take 0.8 ms at 10 Mbit/s. No two events coincide.
   constexpr Duration kService = microseconds(800);
   for (const char* const limit : {"queue=20packets", "queue=20kB"}) {
     const std::string line = std::string("rate=10Mbit/s overhead=28 ") + limit;
@@ -172,8 +173,8 @@ std::vector<Check> bottleneck(const SelftestOptions& options) {
        [&](std::size_t, const Decision& decision) { off += delay(decision) == kService ? 0U : 1U; });
   checks.push_back(none(idle, "waits in a queue that is never full", off));
 
-  // Three opportunities in 10 ms carry 4500 bytes: of datagrams of 1000 bytes, sent at twice that, two leave with the
-  // second half of one … the k-th when 1000 (k + 1) bytes have been carried.
+  // Three opportunities in 10 ms carry 4500 bytes, for datagrams of 1000 bytes at twice that rate. An opportunity can
+  // end within a datagram; the k-th leaves when 1000 (k + 1) bytes have been carried.
   Profile opportunities = parse_profile("overhead=28 queue=20packets");
   opportunities.bottleneck.opportunities_ms = {3, 4, 10};
   const std::string line = "opportunities at 3, 4, 10 ms, queue=20packets";

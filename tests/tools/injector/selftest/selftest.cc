@@ -17,9 +17,8 @@
 namespace tendon::injector {
 namespace {
 
-constexpr std::size_t kFewest = 1000;  // datagrams: below that a check says next to nothing
+constexpr std::size_t kFewest = 1000;  // datagrams; with fewer, the checks have no power
 
-/// A measured histogram, and where it was read from.
 struct Histogram {
   std::filesystem::path file;
   Cdf law;

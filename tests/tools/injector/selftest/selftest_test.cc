@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The self-test passes, and it can fail: laws that are slightly wrong do not.
-// $TENDON_SELFTEST_COUNT datagrams for each model of the whole run (a million in the release build); $TENDON_DATA for
-// the histograms.
+// The self-test passes, and detects slightly wrong laws. $TENDON_SELFTEST_COUNT is the number of datagrams for each
+// model of the whole run (a million in the release build); $TENDON_DATA is the folder of histograms.
 #include "tests/tools/injector/selftest/selftest.h"
 
 #include <gtest/gtest.h>
@@ -25,7 +24,7 @@ namespace {
 
 constexpr double kMs = 1e6;  // ns
 
-/// Enough to see every wrong law below.
+/// Large enough to detect every wrong law below.
 const SelftestOptions kSome{.count = 100'000};
 const SelftestOptions kMany{.count = 500'000};
 
@@ -110,14 +109,14 @@ struct Fit {
   const char* profile;
   Direction direction;
   const char* histogram;
-  double bound;  ///< Kolmogorov's distance; what the fit by mean and deviation reaches, rounded up: not worse unseen
+  double bound;  ///< Kolmogorov distance of the fit by mean and deviation, rounded up, to detect regressions
 };
 
 void PrintTo(const Fit& fit, std::ostream* out) { *out << fit.profile << " against " << fit.histogram; }
 
 class NamedProfileFit : public testing::TestWithParam<Fit> {};
 
-/// Of 100 000 delays, each for itself: without order and without loss.
+/// Uses 100 000 independent delays, without order and loss.
 double distance_from(const Fit& fit, const Cdf& law) {
   Profile profile = resolve_profile(fit.profile, fit.direction);
   profile.order = Order::kFree;

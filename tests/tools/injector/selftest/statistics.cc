@@ -11,9 +11,9 @@
 namespace tendon::injector {
 namespace {
 
-constexpr double kFewestExpected = 10;  // below that a cell's count is too skewed for the chi-square law
+constexpr double kFewestExpected = 10;  // with fewer, a cell's count is too skewed for the chi-square law
 
-/// ln Γ(a). Not std::lgamma, which writes the sign into a global variable.
+/// ln Γ(a). std::lgamma is not thread-safe, because it writes the sign into a global variable.
 double log_gamma(double a) {
   int sign = 0;
   return ::lgamma_r(a, &sign);
@@ -49,7 +49,7 @@ double gamma_fraction(double a, double x) {
   return product * std::exp(a * std::log(x) - x - log_gamma(a));
 }
 
-/// 1 − P(a, x), without the cancellation where P is almost 1.
+/// 1 − P(a, x), without cancellation for P near 1.
 double upper_gamma(double a, double x) {
   if (x <= 0) return 1;
   return x < a + 1 ? 1 - gamma_series(a, x) : gamma_fraction(a, x);
@@ -167,7 +167,7 @@ double normal_cdf(double x) { return std::erfc(-x / std::numbers::sqrt2) / 2; }
 double normal_quantile(double p) {
   if (p <= 0) return -std::numeric_limits<double>::infinity();
   if (p >= 1) return std::numeric_limits<double>::infinity();
-  // The upper half by symmetry is exact only as far as 1 − p is, which is all that p itself says.
+  // Symmetry for the upper half. It is as exact as 1 − p.
   if (p > 0.5) return -normal_quantile(1 - p);
   constexpr std::array kA = {-3.969683028665376e+01, 2.209460984245205e+02,  -2.759285104469687e+02,
                              1.383577518672690e+02,  -3.066479806614716e+01, 2.506628277459239e+00};

@@ -9,63 +9,61 @@
 
 namespace tendon::injector {
 
-// What the self-test measures with: how far samples are from the law they were asked to follow, and how far chance
-// alone would take them. Doubles and <cmath>, for nothing here decides the fate of a datagram. Nothing keeps state. All
-// sample values may be in any unit, as long as the law is in the same.
+// Statistics of the self-test: distances of samples from a law, and their bounds under chance. Uses doubles and
+// <cmath>, which is allowed because no decision depends on them. The functions have no state. Sample values can have
+// any unit that the law has.
 
-/// A distribution function F(x) = P(X ≤ x): from 0 to 1, never falling, continuous from the right. It may have steps.
+/// A cumulative distribution function F(x) = P(X ≤ x), which may have steps.
 using Cdf = std::function<double(double)>;
 
-/// Kolmogorov and Smirnov's distance sup |Fₙ(x) − F(x)| of samples, ascending, from a law; exact where either has
-/// steps. 0 for no samples.
+/// Kolmogorov-Smirnov distance sup |Fₙ(x) − F(x)| of ascending samples from a law; exact for steps. 0 without samples.
 double kolmogorov_distance(std::span<const double> ascending, const Cdf& law);
 
-/// What that distance exceeds with probability `significance` at the most, if n independent samples follow the law:
+/// Bound that the distance of n independent samples of the law exceeds with probability `significance` at most:
 ///     ε = √( ln(2 / significance) / 2n )
 /// (Dvoretzky, Kiefer, Wolfowitz 1956, with the constant of Massart, Ann. Probab. 18(3), 1990; holds for every n and
-/// law). n may be a fraction: of dependent samples, as many as independent ones would say as much.
+/// law). n can be the effective number of independent samples, a fraction.
 double kolmogorov_bound(double n, double significance);
 
-/// How many independent samples say as much about the distribution as n of an AR(1) Gaussian copula do, where that
-/// is least, at the median:
+/// Effective number of independent samples of an AR(1) Gaussian copula of length n, at the median, where it is
+/// smallest:
 ///     n / (1 + 2 Σ_k (2/π) asin ρᵏ),  k = 1 … n − 1       as P(z₀ < 0, z_k < 0) = 1/4 + asin(ρᵏ) / 2π (Sheppard 1899)
-/// A first order correction: the supremum over a dependent path is not the supremum over an independent one, and the
-/// bounds made with it are taken as approximate.
+/// A first-order correction: the supremum over a dependent path has another distribution, so the resulting bounds are
+/// approximate.
 double independent_samples(std::size_t n, double rho);
 
-/// Pearson's Σ (observed − expected)² / expected, and how many cells were free to differ.
+/// Pearson's Σ (observed − expected)² / expected, and the degrees of freedom.
 struct ChiSquare {
   double value = 0;
   std::size_t freedom = 0;
 };
 
-/// Of counts against the probabilities of their cells, which should sum to 1. Neighbouring cells are merged until each
-/// expects at least ten. Fewer than two cells then: {0, 0}, which says nothing.
+/// Compares counts with the probabilities of their cells, which should sum to 1. Merges neighboring cells until each
+/// expects at least ten. With fewer than two cells left, returns {0, 0}.
 ChiSquare chi_square(std::span<const std::uint64_t> counts, std::span<const double> probabilities);
 
-/// P(X ≥ value) for a chi-square law: the p-value. 1 when freedom is 0.
+/// P(X ≥ value) for a chi-square law: the p-value. 1 if freedom is 0.
 double chi_square_tail(double value, std::size_t freedom);
 
-/// The value that a chi-square law exceeds with probability `significance`. 0 when freedom is 0.
+/// The value that a chi-square law exceeds with probability `significance`. 0 if freedom is 0.
 double chi_square_bound(std::size_t freedom, double significance);
 
-/// The share of the variance that samples have in common with those `lag` later:
-///     Σ (x_t − x̄)(x_{t+lag} − x̄) / Σ (x_t − x̄)².  0 when all are equal or there are not more than `lag`.
+/// Autocorrelation at `lag`:
+///     Σ (x_t − x̄)(x_{t+lag} − x̄) / Σ (x_t − x̄)².  0 if all samples are equal or there are not more than `lag`.
 double autocorrelation(std::span<const double> samples, std::size_t lag);
 
-/// How often each run length occurs among the runs of `true`: [k − 1] counts the runs of exactly k. Runs that touch
-/// either end are left out, for they may have been longer. `every` m takes each m-th run only, the m-th first.
+/// Histogram of the lengths of runs of `true`: [k − 1] counts the runs of exactly k. Omits runs at either end, which
+/// may be incomplete. Uses only each `every`-th run, starting with that one.
 std::vector<std::uint64_t> run_lengths(const std::vector<bool>& events, std::size_t every = 1);
 
-/// The regularised incomplete gamma function P(a, x) = ∫₀ˣ t^(a−1) e^(−t) dt / Γ(a), a > 0: the law of a gamma variate
+/// The regularized incomplete gamma function P(a, x) = ∫₀ˣ t^(a−1) e^(−t) dt / Γ(a), a > 0: the CDF of a gamma variate
 /// of shape a and scale 1. Series below a + 1, Lentz's continued fraction above (Press et al., Numerical Recipes, 6.2);
 /// relative error below 1e-12. 0 for x ≤ 0.
 double incomplete_gamma(double a, double x);
 
-/// Φ(x) of the standard normal law.
 double normal_cdf(double x);
 
-/// Φ⁻¹(p): Acklam's rational function and one step of Halley's; relative error below 1e-13. ∓∞ at 0 and 1.
+/// Φ⁻¹(p): Acklam's rational approximation and one Halley step; relative error below 1e-13. ∓∞ at 0 and 1.
 double normal_quantile(double p);
 
 }  // namespace tendon::injector

@@ -65,7 +65,7 @@ TEST(Statistics, CorrelatedSamplesCountForFewer) {
   EXPECT_NEAR(independent_samples(100'000'000, 0.9999) / 1e8 * 2 * std::log(2.0) * 1e4, 1, 0.01);
 }
 
-// The law of a dependent sample is not the one that the correction assumes: here is how far off it is.
+// The correction is approximate for dependent samples; this test measures its error.
 TEST(Statistics, CorrelatedGaussiansKeepTheBoundOfFewerIndependentSamples) {
   for (const double rho : {0.5, 0.9}) {
     int broken = 0;
@@ -103,7 +103,7 @@ TEST(Statistics, ChiSquareMergesCellsThatExpectFewerThanTen) {
   EXPECT_EQ(chi_square(counts, std::vector<double>{1.0}).freedom, 0U);
 }
 
-// From the printed tables: upper 5 % points of chi-square, and one far out.
+// From the printed tables: upper 5 % points of chi-square, and one in the far tail.
 TEST(Statistics, ChiSquareBoundsAreThoseOfTheTables) {
   EXPECT_NEAR(chi_square_bound(1, 0.05), 3.841458820694124, 1e-8);
   EXPECT_NEAR(chi_square_bound(2, 0.05), 5.991464547107979, 1e-8);

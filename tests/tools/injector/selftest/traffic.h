@@ -14,26 +14,25 @@
 
 namespace tendon::injector {
 
-// Datagrams that the self-test sends through a profile, and what the injector decides about them.
+// Traffic of the self-test and the injector's decisions on it.
 
 inline constexpr double kMs = 1e6;                                 // ns
-inline constexpr Duration kPeriod = std::chrono::milliseconds(1);  // between datagrams, unless said otherwise
+inline constexpr Duration kPeriod = std::chrono::milliseconds(1);  // default interval of datagrams
 
 inline double ns(Duration d) { return static_cast<double>(d.count()); }
 
-/// Datagrams as the profile meets them.
 struct Traffic {
   Duration period = kPeriod;
   std::uint32_t size = 200;
   std::uint32_t link = 0;
   Direction direction = Direction::kUp;
-  /// Arrival of datagram i after the start, where they are not evenly spaced.
+  /// Arrival of datagram i after the start, for irregular intervals.
   std::function<Duration(std::size_t)> at = {};
   /// The first byte of datagram i, for rules by message type.
   std::function<std::uint8_t(std::size_t)> type = {};
 };
 
-/// Not zero: an injector that takes absolute times for times since its start would be caught.
+/// Not zero, to detect an injector that mistakes absolute times for times since its start.
 inline constexpr LocalTime kStart{std::chrono::hours(1)};
 
 /// Calls `visit(i, decision)` for each of `options.count` datagrams.
@@ -52,7 +51,7 @@ inline bool lost(const Decision& decision) { return decision.verdict == Verdict:
 
 inline Duration delay(const Decision& decision) { return decision.release - decision.arrival; }
 
-/// How long each datagram takes, in ns.
+/// The delay of each datagram in ns.
 std::vector<double> delays(const Profile& profile, const Traffic& traffic, const SelftestOptions& options);
 
 }  // namespace tendon::injector

@@ -22,7 +22,7 @@
 namespace tendon::injector {
 namespace {
 
-/// What became of one datagram in one direction. No fate at all: nobody knows.
+/// The fate of one datagram in one direction. An empty optional means that it is unknown.
 struct Fate {
   bool lost = false;
   Duration delay{};
@@ -62,13 +62,14 @@ Fates shared(Share share, const std::optional<Duration>& delay) {
   return {Fate{false, *delay / 2}, Fate{false, *delay - *delay / 2}};
 }
 
-/// A trace under construction: one measurement after the other, in order of time.
+/// Builds a trace from measurements in order of time.
 class Building {
  public:
   explicit Building(const std::string& name) : name_(name) { trace_.notes.push_back({0, "imported from " + name}); }
 
   void add(Duration at, Share share, const Fates& fates, std::uint32_t size = 0) {
-    // In a round trip an empty fate is that of a datagram too, and the way back begins where the way there ended.
+    // In a round trip, an unknown fate still belongs to a datagram, and the way back begins at the end of the way
+    // there.
     const bool round_trip = share == Share::kHalves || share == Share::kMeasured;
     if (fates.up || round_trip) put(Direction::kUp, at, fates.up, size);
     if (round_trip && fates.up) at += fates.up->delay;
@@ -79,7 +80,7 @@ class Building {
 
  private:
   void put(Direction direction, Duration at, const std::optional<Fate>& fate, std::uint32_t size) {
-    // Half of it, so that a delay is still within.
+    // Half the limit leaves room for a delay.
     if (at > kMaxTraceTime / 2 || at < -kMaxTraceTime / 2) {
       throw std::runtime_error(name_ + ": expected less than 36 years from its first to its last packet");
     }
@@ -109,7 +110,7 @@ class Building {
   std::array<Flow, 2> flows_;
 };
 
-/// When the packet with this number was sent, if all were sent evenly.
+/// The sending time of packet `number` at regular intervals.
 Duration evenly(std::int64_t number, Duration interval) {
   return interval > kMaxTraceTime / std::max<std::int64_t>(number, 1) ? kMaxTraceTime : number * interval;
 }
@@ -126,12 +127,12 @@ void each_line(std::istream& from, const std::string& name, const Take& take) {
   if (from.bad()) throw std::runtime_error(name + ": cannot be read");
 }
 
-/// One number in a file makes no more than so many losses, so that a small file does not fill the memory.
+/// Maximum number of losses from one number in a file, so that a small file cannot exhaust the memory.
 constexpr std::uint64_t kMostLost = 65'536;
 
 // ---- ping -----------------------------------------------------------------------------------------------------------
 
-/// The whole number after the last `label` in the line: "icmp_seq=" in "… icmp_seq=3 ttl=64 time=26.3 ms".
+/// The integer after the last `label` in the line, for example "icmp_seq=" in "… icmp_seq=3 ttl=64 time=26.3 ms".
 std::optional<std::uint64_t> whole_after(std::string_view line, std::string_view label) {
   const std::size_t at = line.rfind(label);
   if (at == std::string_view::npos) return std::nullopt;
@@ -144,7 +145,7 @@ class PingTimes {
  public:
   explicit PingTimes(const std::string& name) : name_(name) {}
 
-  /// Returns the time in this line. It reads a single comma as a decimal comma, and check() confirms this later.
+  /// Returns the time in this line. Reads a single comma as a decimal comma, which check() verifies later.
   Duration in(std::string_view line, std::size_t number) {
     const std::size_t at = line.rfind("time=");
     const std::string_view text = line.substr(std::min(at, line.size()));
@@ -214,11 +215,11 @@ class PingTimes {
   const std::string& name_;
   // The number of the first line with each kind of number, or 0.
   std::size_t whole_ = 0, point_ = 0, comma_ = 0;
-  std::size_t either_ = 0;  ///< "1,012"
+  std::size_t either_ = 0;  ///< for example "1,012"
   std::string either_text_;
 };
 
-/// The "[1699459200.123456] " of ping -D, as time since 1970.
+/// Parses the "[1699459200.123456] " of ping -D, the time since 1970.
 std::optional<Duration> time_stamp(std::string_view line) {
   if (!line.starts_with('[')) return std::nullopt;
   const std::string_view text = line.substr(1, line.find(']') - 1);
@@ -234,9 +235,9 @@ struct PingLog {
     Duration round_trip{};
     std::optional<Duration> received;
   };
-  std::map<std::int64_t, Answer> answers;  ///< by sequence number, which goes on beyond 16 bits here
-  std::int64_t first = 0, last = 0;        ///< of all that were sent, answered or not
-  std::optional<Duration> interval;        ///< as the summary says
+  std::map<std::int64_t, Answer> answers;  ///< by unwrapped sequence number
+  std::int64_t first = 0, last = 0;        ///< of all requests, answered or not
+  std::optional<Duration> interval;        ///< from the summary
   std::uint32_t size = 0;
 };
 
@@ -261,7 +262,7 @@ PingLog read_ping(std::istream& from, const std::string& name) {
       if (answer) refuse(name, number, "expected icmp_seq=0 to 65535 in " + start_of(line));
       return;
     }
-    // 16 bits, which a long run goes through several times: the number that is nearest to the one before.
+    // Unwraps the 16-bit number to the value nearest to its predecessor.
     const std::int64_t before = newest.value_or(static_cast<std::int64_t>(*sequence));
     const auto step =
         static_cast<std::int16_t>(static_cast<std::uint16_t>(*sequence) - static_cast<std::uint16_t>(before));
@@ -270,7 +271,7 @@ PingLog read_ping(std::istream& from, const std::string& name) {
     oldest = std::min(oldest.value_or(index), index);
     latest = std::max(latest.value_or(index), index);
     if (!answer) return;
-    // Of a duplicate the first one counts.
+    // Keeps the first of duplicate answers.
     log.answers.try_emplace(index, PingLog::Answer{times.in(line, number), time_stamp(line)});
     const std::string_view counted =
         line.starts_with('[') ? line.substr(std::min(line.find("] "), line.size() - 2) + 2) : line;
@@ -284,7 +285,7 @@ PingLog read_ping(std::istream& from, const std::string& name) {
   times.check();
   log.first = *oldest;
   log.last = *latest;
-  // iputils counts from 1, busybox from 0. What the summary has besides was lost at the beginning or the end.
+  // iputils counts from 1, busybox from 0. Further packets in the summary were lost at the beginning or the end.
   const std::int64_t begin = std::min<std::int64_t>(log.first, 1);
   const auto most = static_cast<std::uint64_t>(log.last - begin) + kMostLost;
   if (transmitted && *transmitted <= most && begin + static_cast<std::int64_t>(*transmitted) > log.last) {
@@ -301,7 +302,7 @@ PingLog read_ping(std::istream& from, const std::string& name) {
 
 using Json = nlohmann::json;
 
-/// Null where the path ends before.
+/// Null if the path does not exist.
 const Json* look_up(const Json& json, std::initializer_list<const char*> path) {
   const Json* at = &json;
   for (const char* key : path) {
@@ -343,7 +344,7 @@ class IrttTrip {
  private:
   [[noreturn]] void refuse(const std::string& sentence) const { throw std::runtime_error(place_ + '.' + sentence); }
 
-  /// A string since version 0.9, true or false before.
+  /// A string since version 0.9, a boolean before.
   std::string lost_text() const {
     const Json* const lost = look_up(json_, {"lost"});
     if (lost != nullptr && lost->is_boolean()) return lost->get<bool>() ? "true" : "false";
@@ -390,7 +391,7 @@ Trace import_ping(std::istream& from, const std::string& name, const ImportOptio
   const bool stamped = std::ranges::all_of(log.answers, [](const auto& a) { return a.second.received.has_value(); });
 
   Building building(name);
-  // When the nearest answered one before, and after, was sent; those between are spread evenly.
+  // Sending times of the nearest answered requests before and after; those in between are spread evenly.
   const auto sent = [](const auto& answer) { return *answer.second.received - answer.second.round_trip; };
   const Duration zero = stamped ? sent(*log.answers.begin()) - evenly(log.answers.begin()->first - log.first, interval)
                                 : Duration::zero();
@@ -426,7 +427,7 @@ Trace import_irtt(std::istream& from, const std::string& name, const ImportOptio
     throw std::runtime_error(name + ": config.params.interval: expected above zero, and at most a day");
   }
   const auto place = [&name](std::size_t i) { return name + ": round_trips[" + std::to_string(i) + "]"; };
-  // One clock for all: which the first has.
+  // Uses the clock of the first trip for all.
   const char* const clock = IrttTrip((*trips)[0], place(0)).sent("monotonic") ? "monotonic" : "wall";
   const auto zero = IrttTrip((*trips)[0], place(0)).sent(clock);
   Building building(name);
@@ -454,7 +455,7 @@ Trace import_csv(std::istream& from, const std::string& name, const ImportOption
   TableReader& table = list.table;
   if (list.weight) table.fail("expected one row for each datagram, found a column weight, which is for samples(FILE)");
   std::optional<Duration> zero;
-  std::array<Duration, 2> before = {Duration::min(), Duration::min()};  // by direction, where there are some
+  std::array<Duration, 2> before = {Duration::min(), Duration::min()};  // by direction, if given
   std::int64_t count = 0;
   const auto duration = [&table](const TableReader::Column& column, double most_ms) -> std::optional<Duration> {
     const auto ms = table.number(column);
@@ -483,7 +484,7 @@ Trace import_csv(std::istream& from, const std::string& name, const ImportOption
     Duration& newest = before[list.dir && share == Share::kDown ? 1 : 0];
     if (at < newest) table.fail("the time is earlier than the one before");
     newest = at;
-    // With directions the times are those of a trace, and both begin together.
+    // With directions, the times belong to a trace with a common origin.
     if (!zero) zero = list.dir ? Duration::zero() : at;
     ++count;
     building.add(at - *zero, share, shared(share, delay));

@@ -33,7 +33,7 @@ std::string refusal(Import reader, const std::string& text, const ImportOptions&
   return thrown_by<std::runtime_error>([&] { import(reader, text, options); });
 }
 
-/// "index:t_in:delay" of one direction in ms, "lost" instead of a delay; for short expectations.
+/// Formats one direction as "index:t_in:delay" in ms, with "lost" for a loss.
 std::string told(const Trace& trace, Direction direction) {
   std::ostringstream text;
   for (const TraceRecord& record : trace.records) {
@@ -77,7 +77,7 @@ TEST(ImportPing, GapsAndWhatWasNeverAnsweredAreLosses) {
 TEST(ImportPing, ARoundTripIsHalvedAndALostOneIsLostOnce) {
   const Trace trace = import(import_ping, kPing);
   EXPECT_EQ(up(trace), "0:0:lost 1:1002:10 2:2004:lost 3:3006:lost 4:4008:505.5 5:5010:5.25 6:6012:lost 7:7014:lost ");
-  // The way back begins where the way there ends.
+  // The way back begins at the end of the way there.
   EXPECT_EQ(down(trace), "1:1012:10 4:4513.5:505.5 5:5015.25:5.25 ");
   EXPECT_EQ(down(import(import_ping, kPing, {.share = Share::kDown})).substr(0, 20), "0:0:lost 1:1002:20 2");
 }
@@ -159,7 +159,7 @@ TEST(ImportPing, WhatIsNotPingIsRefused) {
             "file: holds one delay for each packet, expected a choice whose it is");
 }
 
-// From the documentation of irtt, shortened; the third and later ones have losses of each kind.
+// From the documentation of irtt, shortened; entries from the third on have losses of each kind.
 constexpr const char* kIrtt = R"({
   "version": {"irtt": "0.9.0"},
   "config": {"params": {"interval": 200000000, "length": 48}},
@@ -264,7 +264,7 @@ TEST(ImportCsv, ASummarySaysHowManyWhenAndHowLong) {
             "down: 1 datagrams from 0ms to 0ms, 0 lost; delay 5ms to 5ms, median 5ms\n");
 }
 
-// Export and import of delays: the fates stay, to the nanosecond.
+// Fates survive export and import of delays to the nanosecond.
 TEST(ImportCsv, ReadsBackExportedDelays) {
   Trace trace;
   trace.start = LocalTime(5s);
@@ -345,8 +345,8 @@ TEST(Import, NoBytesWhateverDoMoreThanAnError) {
   }
 }
 
-// The three pings of the DETERMINISTIC6G project: as many packets, losses and the median that ping itself, or sorting
-// its lines, says.
+// Three pings of the DETERMINISTIC6G project. The packets, losses and medians are those of ping's summary or of its
+// sorted lines.
 TEST(ImportPing, TheRealPingsHaveThePacketsAndDelaysThatTheirLinesSay) {
   const char* const data = std::getenv("TENDON_DATA");
   if (data == nullptr) GTEST_SKIP() << "TENDON_DATA is not set: the measured pings are not part of this repository";

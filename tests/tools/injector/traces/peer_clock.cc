@@ -51,8 +51,8 @@ LocalTime DriftingClock::reading(LocalTime truth) const noexcept {
 }
 
 LocalTime DriftingClock::truth(LocalTime reading, LocalTime earliest) const noexcept {
-  // Between two steps: elapsed + ⌊elapsed · drift⌋ ≥ wanted, and as elapsed is whole, ⌊elapsed · (1 + drift)⌋ ≥ wanted,
-  // so elapsed ≥ ⌈wanted / (1 + drift)⌉.
+  // Between two steps: elapsed + ⌊elapsed · drift⌋ ≥ wanted. As elapsed is an integer, ⌊elapsed · (1 + drift)⌋ ≥
+  // wanted, so elapsed ≥ ⌈wanted / (1 + drift)⌉.
   Duration ahead = config_.offset;
   Duration from = earliest == LocalTime::min() ? Duration::min() : earliest - start_;
   for (auto step = config_.steps.begin();; ++step) {

@@ -73,7 +73,7 @@ void write_text(std::ostream& to, std::string_view key, std::string_view text) {
 
 // ---- Reading --------------------------------------------------------------------------------------------------------
 
-/// In quotes, cut, and without what would do things to the terminal: a trace may be any file.
+/// Quotes and truncates text of an untrusted file, and removes terminal control characters.
 std::string shown(std::string_view text) {
   constexpr std::size_t kShown = 40;
   std::string start(text.substr(0, kShown));
@@ -121,7 +121,7 @@ class Reader {
     throw std::runtime_error(name_ + ':' + std::to_string(number_) + ": " + sentence);
   }
 
-  /// False at the end. A line without its line break was cut off while it was written, so nothing in it can be trusted.
+  /// Returns false at the end. Rejects a last line without a line break, which was truncated while it was written.
   bool next_line() {
     ++number_;
     line_.clear();
@@ -230,7 +230,7 @@ class Reader {
     return record;
   }
 
-  /// Most traces are in order; check_order() looks at the others more closely.
+  /// Detects traces in order, which most are; check_order() handles the others.
   void place(const TraceRecord& record) {
     const auto [at, first] = flows_.try_emplace({record.direction, record.link}, Newest{record.index, record.arrival});
     Newest& newest = at->second;
@@ -314,7 +314,7 @@ class Reader {
   bool in_order_ = true;
 };
 
-/// Milliseconds with all their decimals, exactly.
+/// Exact milliseconds with all decimals.
 std::string milliseconds(Duration duration) {
   const std::int64_t ns = duration.count();
   std::string decimals = std::to_string(1'000'000 + std::abs(ns % 1'000'000)).substr(1);

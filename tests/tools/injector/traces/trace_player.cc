@@ -94,7 +94,7 @@ Decision TracePlayer::decide(const Packet& packet) {
     decision.release = moved(decision.release);
     if (decision.duplicate) decision.duplicate = moved(*decision.duplicate);
     if (decision.stale) decision.stale->release = moved(decision.stale->release);
-    // Counted on, because a driver takes another port when the number changes, and a smaller one would be no new port.
+    // Keeps increasing across cycles, because a driver changes its port when the number increases.
     rebinds_ = static_cast<std::uint32_t>(found.cycle * records_.back().rebinds + found.record->rebinds);
   }
   decision.index = index;

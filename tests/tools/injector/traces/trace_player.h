@@ -12,39 +12,41 @@
 
 namespace tendon::injector {
 
-/// One direction of one link of a recorded network, once more: each datagram meets the fate of a recorded one. Which
-/// one:
+/// Replays one direction of one link of a recorded network. Each datagram gets the fate of a recorded one:
 ///
-///     kIndex   datagram i meets the fate of datagram i: the same packets are lost. For the same traffic again, and for
-///              traces that shrink.h made
-///     kTime    a datagram that arrives at `start` + t meets the fate of the newest one recorded at or before the
-///     trace's
-///              start + t (before the first: of the first): the network is bad at the same times, however many
-///              datagrams there are. For other traffic through the same network
+///     kIndex   datagram i gets the fate of datagram i: the same packets are lost. For the same traffic, and for traces
+///     of
+///              shrink.h
+///     kTime    a datagram that arrives at `start` + t gets the fate of the newest record at or before the trace's
+///              start + t (before the first record: the fate of the first). The network is bad at the same times for
+///              any
+///              number of datagrams. For other traffic
 ///
-/// The fate is the record's, moved in time: what took 20 ms then takes 20 ms now. The same arrivals as in the record
-/// so give the same decisions, in every bit (by time: when no two of a flow arrive in the same nanosecond). When the
-/// arrivals are others, releases still keep the order in which they came, if in the record they did: release =
-/// max(release of the one ahead that passed, arrival + recorded delay).
+/// The fate is shifted in time and keeps its delay. The same arrivals as in the record give bitwise identical decisions
+/// (by
+/// time: if no two arrivals of a flow coincide in the same nanosecond). For other arrivals, releases remain in order if
+/// they
+/// were in order in the record: release = max(release of the predecessor that passed, arrival + recorded delay).
 ///
-/// What the trace does not hold:
-/// * A datagram of a sparse trace that is not listed takes TraceHeader::benign (or no time, where it says nothing of
-///   this direction), cause kReplay, and does not overtake the one ahead.
-/// * One that is missing in any other trace (a gap in the indices) takes the median delay of those that passed.
-/// * After its end a trace that is not sparse begins again, as files of Mahimahi do: by index after the last one, by
-/// time
-///   after the last one and the mean distance between two.
-/// * A link that is not in it gets one that is: of n links, taken in order, link i gets the (i modulo n)th. So many
-///   clients can share one imported trace.
-/// * A direction that is not in it at all passes without delay.
+/// Datagrams without a record:
+/// * In a sparse trace, an unlisted datagram takes TraceHeader::benign (or no time if that is not given for the
+///   direction),
+///   has the cause kReplay and does not overtake its predecessor.
+/// * In any other trace, a missing datagram (a gap in the indices) takes the median delay of those that passed.
+/// * After its end, a trace that is not sparse repeats, like Mahimahi's files: by index after the last record, by time
+///   after the last record plus the mean interval.
+/// * A link that is not in the trace uses another one: of n links in order, link i uses the (i modulo n)-th, so that
+///   many
+///   clients can share an imported trace.
+/// * A direction that is not in the trace passes without delay.
 ///
 /// Thread-safe: no.
 class TracePlayer final : public Decider {
  public:
   enum class By : std::uint8_t { kIndex, kTime };
 
-  /// `start` is when the trace's start is now; by index it does not matter. The player keeps a copy of what it needs.
-  /// Throws std::invalid_argument for a sparse trace by time: it says nothing about the time between its datagrams.
+  /// `start` corresponds to the trace's start; unused by index. Copies what it needs. Throws std::invalid_argument for
+  /// a sparse trace by time, which does not describe the time between its datagrams.
   TracePlayer(const Trace& trace, Direction direction, std::uint32_t link, By by, LocalTime start = {});
 
   Decision decide(const Packet& packet) override;
@@ -52,7 +54,7 @@ class TracePlayer final : public Decider {
  private:
   struct Found {
     const TraceRecord* record = nullptr;
-    std::uint64_t cycle = 0;  ///< how often the trace has begun again before it
+    std::uint64_t cycle = 0;  ///< previous repetitions of the trace
   };
   Found find_by_index(std::uint64_t index);
   Found find_by_time(LocalTime arrival) const;
@@ -64,16 +66,16 @@ class TracePlayer final : public Decider {
   Duration benign_{};
   bool wraps_;
   bool in_order_ = true;
-  std::uint64_t length_ = 0;  ///< by index: after so many it begins again
+  std::uint64_t length_ = 0;  ///< by index: number of indices before it repeats
   Duration period_{};         ///< by time
   std::uint64_t next_index_ = 0;
-  std::size_t cursor_ = 0;  ///< of the record that the last index found, or the first after it
+  std::size_t cursor_ = 0;  ///< the record at or after the last index
   LocalTime last_release_ = LocalTime::min();
   std::uint32_t rebinds_ = 0;
 };
 
-/// The median delay of the datagrams of one direction that passed, over all its links (the lower one of two); zero when
-/// none did.
+/// Returns the median delay (lower of two) of the datagrams of one direction that passed, over all links; zero if none
+/// passed.
 Duration median_delay(const Trace& trace, Direction direction);
 
 }  // namespace tendon::injector

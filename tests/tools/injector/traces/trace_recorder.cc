@@ -13,7 +13,7 @@
 namespace tendon::injector {
 namespace {
 
-/// How long a record waits at most before it goes to the file; not worth a system call of the thread that puts.
+/// Maximum delay of a record before it is written. Polling avoids a system call in the thread that calls put().
 constexpr auto kPeriod = std::chrono::milliseconds(50);
 
 std::ofstream open(const std::filesystem::path& file) {

@@ -14,29 +14,28 @@
 
 namespace tendon::injector {
 
-/// Writes a trace file in a thread of its own, so that no datagram waits for the disk.
+/// Writes a trace file in its own thread, so that no datagram waits for the disk.
 class TraceRecorder {
  public:
-  /// Records that wait for the disk at most, half a minute of 10 000 a second; more are lost and counted.
+  /// Maximum number of queued records, half a minute at 10 000 per second; more are lost and counted.
   static constexpr std::size_t kMaxWaiting = 300'000;
 
-  /// Creates or replaces `file`. Throws std::runtime_error when it cannot be written.
+  /// Creates or replaces `file`. Throws std::runtime_error if it cannot be written.
   TraceRecorder(const std::filesystem::path& file, const TraceHeader& header);
-  /// As finish() does, except that nobody is told of an error.
+  /// Like finish(), but ignores errors.
   ~TraceRecorder();
   TraceRecorder(const TraceRecorder&) = delete;
   TraceRecorder& operator=(const TraceRecorder&) = delete;
 
-  /// Takes over `records`, and leaves them empty; leaves them as they are when the writer is just fetching the last
-  /// ones and there is still room, so that the caller tries again with its next ones. By one thread, which never waits
-  /// here.
+  /// Takes the content of `records`. Leaves it unchanged while the writer is fetching the queue and there is room, so
+  /// that the caller retries with its next records. Must be called from one thread only. Never blocks.
   void put(std::vector<TraceRecord>& records);
-  /// A comment in the trace, after what was put before it. Thread-safe.
+  /// Adds a comment after the records put so far. Thread-safe.
   void note(std::string text);
-  /// Lost by put(). Thread-safe.
+  /// Number of records lost by put(). Thread-safe.
   std::uint64_t lost() const noexcept { return lost_; }
 
-  /// Writes what is left and ends the thread. Throws std::runtime_error when not all could be written.
+  /// Writes the rest and ends the thread. Throws std::runtime_error if something could not be written.
   void finish();
 
  private:
@@ -47,7 +46,7 @@ class TraceRecorder {
   TraceWriter writer_;
   std::atomic<std::uint64_t> lost_ = 0;
   std::atomic<bool> end_ = false;
-  std::mutex mutex_;  // of what follows
+  std::mutex mutex_;  // protects the members below
   std::vector<TraceRecord> waiting_;
   std::vector<std::string> notes_;
   std::thread thread_;

@@ -22,7 +22,7 @@ using namespace std::chrono_literals;
 
 LocalTime at(Duration since_zero) { return LocalTime(since_zero); }
 
-/// A record with each optional member there or not, as `bits` says.
+/// A record whose optional members are set according to `bits`.
 TraceRecord record_of(std::uint64_t index, std::uint64_t bits) {
   TraceRecord record;
   record.direction = (bits & 1) != 0 ? Direction::kDown : Direction::kUp;
@@ -104,7 +104,7 @@ TEST(Trace, ASparseTraceIsReadBackAsOne) {
   EXPECT_EQ(read(written(trace)), trace);
 }
 
-// The format itself: other programs read it, and traces are kept.
+// Pins the format, because other programs read it and traces are kept.
 TEST(Trace, TheTextIsTheOneThatIsDocumented) {
   Trace trace;
   trace.seed = 7;
@@ -161,7 +161,7 @@ TEST(Trace, WhatIsWrongIsNamedWithFileAndLine) {
   EXPECT_EQ(refusal("# tendon-trace 1\n# seed\n"), "run.csv:2: # seed has no value");
   EXPECT_EQ(refusal("# tendon-trace 1\n# benign up -1\n"),
             "run.csv:2: benign up is \"-1\", expected a delay of 0 ns or more");
-  // Nothing could write such a text again.
+  // Such a text could not be written back.
   EXPECT_EQ(refusal("# tendon-trace 1\n# down a\rb\n"),
             "run.csv:2: there is a carriage return, expected lines that end with \\n");
   EXPECT_EQ(refusal(with_lines("# note a\rb\n")),
@@ -200,7 +200,7 @@ TEST(Trace, WhatIsWrongIsNamedWithFileAndLine) {
             "run.csv:4: the last line is not complete; remove it to use the trace without it");
 }
 
-// What a libFuzzer target would do, with the bytes that matter most: a trace with a few of them changed, cut or moved.
+// A small fuzz test: a valid trace with a few bytes changed, removed or moved.
 TEST(Trace, NoBytesWhateverDoMoreThanAnError) {
   std::mt19937_64 random(1);
   const std::string good = written(any_trace(20));
