@@ -10,14 +10,14 @@ import javax.crypto.spec.GCMParameterSpec;
 import javax.crypto.spec.IvParameterSpec;
 import javax.crypto.spec.SecretKeySpec;
 
-/** The ciphers that seal Data, and what WIRE.md says of each: its nonce and the next key of a direction. */
+/** The ciphers for Data, with the nonce and key renewal of each (WIRE.md). */
 enum Aead {
   CHACHA_POLY(1),
   AES_GCM(2);
 
   static final int TAG = 16;
 
-  /** The number of the cipher suite, as headers have it. */
+  /** The number of the cipher suite in headers. */
   final int suite;
 
   Aead(int suite) {
@@ -32,7 +32,7 @@ enum Aead {
     }
   }
 
-  /** What `bytes` seals from index `at` on; null when it is not authentic. */
+  /** Decrypts `bytes` from index `at` on; null unless authentic. */
   byte[] open(byte[] key, long number, byte[] associated, byte[] bytes, int at) {
     if (bytes.length - at < TAG) return null;
     try {

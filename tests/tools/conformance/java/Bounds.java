@@ -2,7 +2,7 @@
 import java.nio.charset.StandardCharsets;
 import tendon.v1.Tendon;
 
-/** The bounds of WIRE.md, as far as a client meets them. */
+/** The bounds of WIRE.md that concern a client. */
 final class Bounds {
   private Bounds() {}
 
@@ -17,7 +17,7 @@ final class Bounds {
     return good(vector.getX()) && good(vector.getY()) && good(vector.getZ());
   }
 
-  /** A rotation. */
+  /** A unit quaternion. */
   private static boolean good(Tendon.Quat q) {
     double norm = Math.sqrt(q.getW() * q.getW() + q.getX() * q.getX() + q.getY() * q.getY() + q.getZ() * q.getZ());
     return Math.abs(norm - 1) <= 0.001;
@@ -50,7 +50,7 @@ final class Bounds {
         && goodHandle(state);
   }
 
-  /** What is told with the feature "handle"; a field that is absent reads as 0, which is good. */
+  /** Fields of the feature "handle"; an absent field is 0, which is valid. */
   private static boolean goodHandle(Tendon.DeviceState state) {
     return (!state.hasOrientation() || good(state.getOrientation()))
         && good(state.getAngularVelocityRadps())
@@ -69,7 +69,7 @@ final class Bounds {
     return goodCode(refused.getCodeValue()) && goodText(refused.getDetail(), 128);
   }
 
-  /** … to a Hello that offers version 1 only. */
+  /** For a Hello that offers version 1 only. */
   static boolean good(Tendon.Welcome welcome) {
     return welcome.getVersion() == 1
         && welcome.getFeaturesCount() <= 16

@@ -17,13 +17,13 @@ import javax.crypto.Mac;
 import javax.crypto.spec.SecretKeySpec;
 
 /**
- * Noise_NNpsk0_25519_ChaChaPoly_SHA256, the initiator's half, with nothing but what the JDK has (11 or newer). One object, one
- * attempt: message 1 is written once.
+ * The initiator of Noise_NNpsk0_25519_ChaChaPoly_SHA256, with the JDK's own primitives (11 or newer). Each object makes
+ * one attempt and writes message 1 once.
  */
 final class Noise {
   /** A key for each direction. */
   record Keys(byte[] clientToServer, byte[] serverToClient) {
-    /** Those of suite 2, from what Split() gives and h after message 2. */
+    /** Returns the keys of suite 2, from the output of Split() and h after message 2. */
     Keys ofSuite2(byte[] hash) {
       byte[] label = ascii("tendon-suite-2");
       return new Keys(hmac(clientToServer, label, hash), hmac(serverToClient, label, hash));
@@ -54,7 +54,7 @@ final class Noise {
     return message;
   }
 
-  /** Message 2; null when it is not authentic, and a later one may be. */
+  /** Reads message 2; null unless authentic. A later message may be. */
   Opened read(byte[] answer) {
     if (answer.length < 32 + Aead.TAG) return null;
     State next = state.copy();
@@ -148,7 +148,7 @@ final class Noise {
     return out;
   }
 
-  /** Null when the result is 32 zeros. */
+  /** Null if the result is 32 zeros. */
   static byte[] x25519(byte[] scalar, byte[] point) {
     try {
       byte[] bigEndian = new byte[32];

@@ -6,7 +6,7 @@ import java.security.SecureRandom;
 import java.util.Arrays;
 import tendon.v1.Tendon;
 
-/** One attempt to be let in: says Hello until it is answered. Time is passed, never taken; no socket. */
+/** One connection attempt, which repeats Hello until it is answered. Has no socket or clock; the caller passes the time. */
 final class Opening {
   static final int HEADER = 16;
   static final int LARGEST = 1200;
@@ -21,7 +21,7 @@ final class Opening {
   private boolean due = true;
   private long saidAt;
 
-  /** The answer, once there is one: either of the two. */
+  /** The answer, if received: one of the two. */
   Tendon.Refused refused;
   Session session;
 
@@ -62,7 +62,7 @@ final class Opening {
         .array();
   }
 
-  /** The Hello, when it is due; else null. */
+  /** Returns the Hello if it is due, else null. */
   byte[] nextDatagram(long now) {
     if (!due && now - saidAt < REPEAT_NS) return null;
     due = false;

@@ -7,7 +7,7 @@ import java.util.BitSet;
 import java.util.function.BiConsumer;
 import tendon.v1.Tendon;
 
-/** The client's end of an open conversation, as SESSION.md has it. Time is passed, never taken; no socket. */
+/** The client side of an open session (SESSION.md). Has no socket or clock; the caller passes the time. */
 final class Session {
   private static final long MS = 1_000_000;
   private static final long KEEP_ALIVE = 50 * MS;
@@ -54,7 +54,7 @@ final class Session {
   private long smoothed;
   private long variation;
 
-  /** Why it is over; null while it is not. */
+  /** Why the session ended; null while it is open. */
   String end;
 
   int endCode;
@@ -178,7 +178,7 @@ final class Session {
 
   // ---- Out ----
 
-  /** What is due; null when nothing is. `physics` answers the newest state with a force, and a torque if it likes. */
+  /** Returns the next due datagram, or null. `physics` answers the newest state with a force and optionally a torque. */
   byte[] nextDatagram(long now, BiConsumer<Tendon.DeviceState, Tendon.ForceCommand.Builder> physics) {
     if (end != null) return null;
     boolean askNow = asked && now >= askAt;

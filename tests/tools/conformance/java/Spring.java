@@ -17,7 +17,7 @@ import java.util.Set;
 import tendon.v1.Tendon;
 
 /**
- * A spring of 500 N/m that pulls the hand to the origin, and one of 0.1 N·m/rad that turns the handle upright where the
+ * A spring of 500 N/m toward the origin, and one of 0.1 N·m/rad that turns the handle upright if the
  * device measures its orientation.
  *
  * <pre>java -cp tendon-spring.jar:/usr/share/java/protobuf.jar Spring 127.0.0.1:47100 [wall.key]</pre>
@@ -68,7 +68,7 @@ public final class Spring {
     Runtime.getRuntime().halt(1);
   }
 
-  /** Until it is asked to end, or is refused: why. */
+  /** Runs until asked to end or refused. Returns the reason. */
   private String run() throws IOException {
     Opening opening = new Opening(key, source);
     Session session = null;

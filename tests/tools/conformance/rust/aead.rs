@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-//! The ciphers that seal Data (WIRE.md, cipher suites 1 and 2), with the nonce and the next key of each. They are
-//! libsodium's, whose AES wants a processor that has it.
+//! The ciphers for Data (WIRE.md, cipher suites 1 and 2), with the nonce and key renewal of each. Uses libsodium, whose
+//! AES needs hardware support.
 
 use std::os::raw::{c_int, c_uchar, c_ulonglong};
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-//! A client of six degrees of freedom: it pulls the hand to a point with a spring, turns the handle upright, and opens
-//! the gripper half. Button 0 carries the point along. Socket, clock, signals and physics; the rest is in the modules.
+//! A client with six degrees of freedom: pulls the hand to a point with a spring, turns the handle upright, and opens
+//! the gripper half. While button 0 is pressed, the point follows the hand. This file has socket, clock, signals and
+//! physics.
 
 mod aead;
 mod noise;

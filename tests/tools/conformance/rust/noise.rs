@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //! The handshake of cipher suites 1 and 2 (WIRE.md): Noise_NNpsk0_25519_ChaChaPoly_SHA256 of the client, key files, and
-//! the keys of a session. The primitives are libsodium's.
+//! the keys of a session. Uses libsodium's primitives.
 
 use std::os::raw::{c_int, c_uchar, c_ulonglong, c_void};
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-//! The handshake (SESSION.md, "Opening"), without socket or clock: datagrams and instants go in and come out.
+//! The handshake (SESSION.md, "Opening"), without socket or clock: its inputs and outputs are datagrams and times.
 
 use crate::aead;
 use crate::noise::{self, Handshake, Key, Keys};

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-//! Protocol Buffers by a table: a `Schema` says which fields a message has and between which bounds they lie. What is
-//! not protobuf is malformed; what is, but has a value out of bounds, is invalid (WIRE.md, "Ground rules").
+//! A table-driven Protocol Buffers parser: a `Schema` lists the fields of a message and their bounds. Bytes that are not
+//! protobuf are malformed; a message with a value out of bounds is invalid (WIRE.md, "Ground rules").
 
 use std::collections::BTreeMap;
 

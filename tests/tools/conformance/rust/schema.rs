@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-//! tendon.proto as tables, with the bounds of its comments and those rules of WIRE.md that concern several fields.
+//! tendon.proto as tables, with the bounds in its comments and the rules of WIRE.md for several fields.
 
 use crate::protobuf::{Bound, Field, Kind, Label, Schema, Value};
 use Bound::{Above, Any, Between, Bytes, OrInfinite, Whole};

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-//! SESSION.md after the Welcome, without socket or clock: datagrams and instants (ns) go in, datagrams and events out.
+//! SESSION.md after the Welcome, without socket or clock: datagrams and times (ns) in, datagrams and events out.
 
 use std::collections::{BTreeMap, VecDeque};
 
