@@ -24,7 +24,6 @@ namespace {
 
 using testing::ScratchFolder;
 
-/// A client in this process.
 class Guest {
  public:
   Guest(const std::string& server, Watch watch) : address_(parse_address(server)), link_(address_) {

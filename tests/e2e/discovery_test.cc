@@ -55,7 +55,6 @@ class Discovery : public ::testing::Test {
     return {folder.path(), std::move(scenes), environment};
   }
 
-  /// Publishes the announced services at the loopback address.
   void carry() {
     std::vector<FakeAvahi::Announced> all;
     for (const auto end = std::chrono::steady_clock::now() + kPatience;

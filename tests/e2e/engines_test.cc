@@ -97,7 +97,6 @@ TEST_P(NetworkThreads, OfManyCountedDevicesEachIsFoundByItsName) {
 
 INSTANTIATE_TEST_SUITE_P(Are, NetworkThreads, ::testing::Values(1, 2));
 
-/// The lines of `tendond --json` about sessions.
 std::vector<nlohmann::json> session_lines(const std::string& output) {
   std::vector<nlohmann::json> found;
   std::istringstream lines(output);

@@ -22,7 +22,7 @@
 namespace tendon::e2e::falcon_server_test {
 namespace {
 
-constexpr std::uint8_t kOut = 0x02;  // the endpoint
+constexpr std::uint8_t kOut = 0x02;
 
 /// Runs `claim` on its own stage. The scene's watchdogs assume that the machine does not pause, so a claim that failed
 /// after a pause is repeated, at most twice.
@@ -141,7 +141,6 @@ TEST(FalconServer, StoppedInMidForceItLetsGoAndPushesAgainOnlyAfterArming) {
   }
 }
 
-/// Returns the guardian of a server, its only child.
 pid_t guardian_of(pid_t server) {
   for (const auto& thread : std::filesystem::directory_iterator("/proc/" + std::to_string(server) + "/task")) {
     std::ifstream children(thread.path() / "children");

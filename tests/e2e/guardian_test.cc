@@ -87,13 +87,13 @@ class Heard {
     if (far_ >= 0) close(far_);
     far_ = -1;
   }
-  /// Returns the next packet, or an empty string when all writers have closed the socket.
+  /// Empty when all writers have closed the socket.
   std::string next() {
     std::array<char, 128> bytes{};
     const ssize_t size = read(near_, bytes.data(), bytes.size());
     return size > 0 ? std::string(bytes.data(), static_cast<std::size_t>(size)) : "";
   }
-  /// Returns the last packet, or `heard` if there are no more.
+  /// Returns `heard` if there are no more packets.
   std::string last(const std::string& heard = "") {
     std::string last = heard;
     for (std::string packet = next(); !packet.empty(); packet = next()) last = packet;

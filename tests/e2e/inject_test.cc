@@ -23,7 +23,6 @@ using injector::UdpBatch;
 using injector::Verdict;
 using testing::ScratchFolder;
 
-/// Disables the limit of the release error.
 const std::vector<std::string> kAnyReleaseError = {"--max-release-error-us", "1e9"};
 
 std::vector<std::string> with(std::vector<std::string> arguments, const std::vector<std::string>& more) {
@@ -47,7 +46,6 @@ void send_through(UdpBatch& server, const std::string& proxy, int count) {
   }
 }
 
-/// The fate of each datagram up, by index.
 std::string fates(const Trace& trace) {
   std::string result;
   for (const TraceRecord& record : trace.records) {

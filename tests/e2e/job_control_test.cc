@@ -25,7 +25,6 @@
 namespace tendon::e2e::job_control_test {
 namespace {
 
-/// An interactive shell in a new terminal.
 class Shell {
  public:
   explicit Shell(const std::filesystem::path& folder) {
@@ -72,7 +71,6 @@ class Shell {
     }
   }
 
-  /// Starts a job in the background and returns its process ID.
   pid_t start(const std::string& command) {
     type(command + " & echo started=$!.\n");
     wait_for("$!.");

@@ -22,7 +22,7 @@ bool felt(double force) { return force < -0.5; }  // N along x, away from the wa
 
 struct Stretch {
   Mode mode;
-  std::size_t begin;  ///< index of its first step
+  std::size_t begin;
 };
 
 /// Groups consecutive steps of the same mode.
@@ -68,7 +68,7 @@ TEST(MainJob, AHandFeelsALateLossyRemoteWallAndTheDeviceNeverGivesOutEnergy) {
     if (step.force_sequence == 0) continue;
     ASSERT_GE(step.loop_age, 2 * std::chrono::milliseconds(15)) << "tick " << step.tick;
   }
-  EXPECT_GT(peak, 1);  // N
+  EXPECT_GT(peak, 1);
   // The claim holds for all of these. On a busy machine only some of the 3000 steps qualify.
   EXPECT_GT(in_time, 100U);
 
@@ -141,7 +141,6 @@ TEST(MainJob, AKilledServerLeavesARecordingThatReadsUpToItsLastSecond) {
   expect_passive(recording, read_scene(demo_scene()));
   EXPECT_TRUE(recording.truncated);
   ASSERT_FALSE(recording.steps.empty());
-  // Steps are at least 1 ms apart.
   EXPECT_GE(recording.steps.back().tick + 1000, last_seen);
   EXPECT_FALSE(recording.arrived.empty());
 }

@@ -53,7 +53,7 @@ std::set<std::string> libraries(pid_t process) {
   return names;
 }
 
-/// A server with `count` devices that does not record and has run some hundred steps.
+/// Does not record and has run some hundred steps.
 class Fleet {
  public:
   explicit Fleet(std::size_t count) {

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// A server for which the system refuses to create a thread.
 #include <gtest/gtest.h>
 
 #include <algorithm>

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// The force ends whenever the server ends.
 #include <gtest/gtest.h>
 
 #include <csignal>
@@ -16,7 +14,6 @@ using testing::ScratchFolder;
 
 bool felt(double force) { return force < -0.5; }  // N along x, away from the wall
 
-/// The hand rests for half a second before it moves into the wall.
 std::string resting_hand(const std::string& safety) {
   return R"([device]
 kind = "simulated"

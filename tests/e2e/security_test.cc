@@ -10,8 +10,6 @@
 #include "tests/e2e/stage/stage.h"
 #include "tests/server/scratch_folder.h"
 
-// Programs with suite 1: creating keys, accepted and refused clients.
-
 namespace tendon::e2e::security_test {
 namespace {
 

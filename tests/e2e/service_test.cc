@@ -46,7 +46,6 @@ class Manager {
   Manager(const Manager&) = delete;
   Manager& operator=(const Manager&) = delete;
 
-  /// Returns the next datagram, or an empty string after kPatience.
   std::string next() const {
     std::array<char, 256> bytes{};
     const ssize_t size = recv(socket_, bytes.data(), bytes.size(), 0);

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// Compares server/THREADS.md with the server.
 #include "tests/e2e/stage/threads.h"
 
 #include <gtest/gtest.h>

@@ -46,7 +46,6 @@ TEST(Tools, ANamedPipeIsNoInputAndIsNotWaitedFor) {
   }
 }
 
-/// Every user program of this build.
 std::vector<std::filesystem::path> programs() {
   std::vector<std::filesystem::path> found;
   const auto shown = program("tendond").parent_path();
@@ -161,7 +160,6 @@ TEST(Tools, TheBenchEndsWhenItsReaderGoes) {
   EXPECT_NE(bash.out().find("exit 1\n"), std::string::npos) << bash.out() << bash.err();
 }
 
-/// A mistake, and the command lines that contain it.
 struct Mistake {
   std::string what;
   int exit_code;

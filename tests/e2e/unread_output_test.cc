@@ -26,16 +26,13 @@ namespace {
 
 using namespace std::chrono_literals;
 
-/// The time limit for the end of a program.
 constexpr auto kEnd = 5s;
 
-/// The reader of the output. It only reads when the test calls `read`.
+/// Reads only when the test calls `read`.
 class Reader {
  public:
   virtual ~Reader() = default;
-  /// The file for the output of the program.
   virtual std::string path() const = 0;
-  /// Reads for a second.
   std::string read() {
     prepare();
     std::string text;

@@ -15,7 +15,6 @@ using namespace tendon;
 
 namespace {
 
-/// `ways`: of the reader.
 void require_same_again(const RecordingReader::Record& record, const Ways& ways) {
   if (const auto* scene = std::get_if<SceneRecord>(&record)) {
     fuzz::require(recording::decode_scene(recording::encode(*scene)) == *scene);

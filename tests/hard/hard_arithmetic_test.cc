@@ -70,7 +70,6 @@ TEST(HardArithmetic, AHundredMillionStepsOfTheLedgerAddUpToTheLastBit) {
        .without = "a plain double: " + text(std::abs(plain - 100)) + " J off; a float ends at " + text(single) + " J"});
 }
 
-/// Returns a program's exit status and output.
 std::pair<int, std::string> run(const std::string& command) {
   std::pair<int, std::string> result;
   FILE* pipe = popen((command + " 2>&1").c_str(), "r");

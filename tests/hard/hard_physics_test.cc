@@ -47,7 +47,6 @@ using testing::pressed_block;
 using testing::pressed_body;
 using testing::PressedByNewton;
 
-/// Formats a number for a table.
 std::string text(double value, int digits = 3) {
   std::ostringstream out;
   out.precision(digits);

@@ -114,7 +114,7 @@ struct Observed {
   }
 };
 
-/// Names the first exceeded bound; empty if there is none.
+/// Names the first exceeded bound, or returns an empty string.
 inline std::string broken(const Observed& seen, Duration quiet_within) {
   std::string text;
   const auto say = [&text](const std::string& what) { text += (text.empty() ? "" : ", ") + what; };

@@ -6,7 +6,6 @@
 
 namespace tendon::hard {
 
-/// One row of README.md's table.
 struct Row {
   std::string hard;                   ///< why it is hard: the behavior of a naive program
   std::string oracle;                 ///< the required property; the same in every run

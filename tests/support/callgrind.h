@@ -11,7 +11,6 @@
 
 namespace tendon::testing {
 
-/// A line printed by a program, and the number of instructions for it.
 struct Counted {
   std::string line;
   double instructions = 0;  ///< the longer of two runs minus the shorter

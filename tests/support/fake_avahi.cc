@@ -44,7 +44,6 @@ void emit(sd_bus* bus, const char* path, const char* interface, const char* memb
 
 }  // namespace
 
-/// A connected program.
 struct FakeAvahi::Peer {
   struct Group {
     Announced service;

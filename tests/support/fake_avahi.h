@@ -36,16 +36,13 @@ class FakeAvahi {
     bool operator==(const Announced&) const = default;
   };
 
-  /// Creates `socket` and listens there.
   explicit FakeAvahi(const std::filesystem::path& socket);
   ~FakeAvahi();
   FakeAvahi(const FakeAvahi&) = delete;
   FakeAvahi& operator=(const FakeAvahi&) = delete;
 
-  /// The value of DBUS_SYSTEM_BUS_ADDRESS.
   const std::string& address() const { return address_; }
 
-  /// Adds a service to the network.
   void put(const std::string& name, const Service& service);
   void take(const std::string& name);
   /// Reserves a name for another host.
@@ -57,7 +54,6 @@ class FakeAvahi {
   /// Simulates a restart of avahi-daemon.
   void come_back();
 
-  /// The services announced by all connected programs.
   std::vector<Announced> announced();
 
  private:

@@ -12,7 +12,6 @@
 namespace tendon::files_test {
 namespace {
 
-/// Creates a temporary folder for each test.
 class Files : public ::testing::Test {
  protected:
   Files() {

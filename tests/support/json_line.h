@@ -36,12 +36,10 @@ class JsonLine {
   }
   JsonLine& add(std::string_view key, const JsonLine& object);
   JsonLine& add(std::string_view key, const std::vector<std::string>& texts);
-  /// Adds null for nullopt.
   template <class T>
   JsonLine& add(std::string_view key, const std::optional<T>& value) {
     return value ? add(key, *value) : add_null(key);
   }
-  /// Appends all members of `other`.
   JsonLine& add_all(const JsonLine& other);
 
   std::string str() const;

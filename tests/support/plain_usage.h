@@ -11,8 +11,8 @@ namespace tendon {
 
 /// Describes the command line of a simple test program that does not use CLI11.
 struct PlainUsage {
-  const char* help;                         ///< the output of --help
-  std::size_t most_arguments = 0;           ///< the maximum number of arguments, not counting options
+  const char* help;
+  std::size_t most_arguments = 0;
   std::vector<std::string_view> options{};  ///< the prefixes of the supported options
 };
 

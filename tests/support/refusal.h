@@ -22,7 +22,6 @@ std::string thrown_by(Call&& call) {
   return {};
 }
 
-/// Constructs a T of a configuration.
 template <class T>
 struct Makes {
   void operator()(const auto& config) const { [[maybe_unused]] const T made(config); }

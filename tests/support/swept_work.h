@@ -42,7 +42,6 @@ struct SweptWork {
   std::function<std::vector<JsonLine>(std::uint64_t unit, const Outcome& outcome)> lines{};
   /// Parses the result of lines(). May throw any exception for other input.
   std::function<Outcome(std::uint64_t unit, const std::vector<nlohmann::json>& lines)> read{};
-  /// Adds an outcome to the totals and extremes of a shard.
   std::function<void(const Outcome& outcome, ShardEnd& end)> count{};
 };
 

@@ -22,7 +22,6 @@ namespace tendon {
 //
 // swept_work.h implements this for work with lines for every unit.
 
-/// A range of units.
 struct Units {
   std::uint64_t first = 0;
   std::uint64_t count = 0;
@@ -83,7 +82,7 @@ struct ShardEnd {
   /// Parses line(). Throws std::invalid_argument for anything else.
   static ShardEnd parse(std::string_view line);
 
-  /// Throws std::invalid_argument if the name does not exist.
+  /// Throws std::invalid_argument for an unknown name.
   std::uint64_t total(std::string_view name) const;
   double least_of(std::string_view name) const;
 };

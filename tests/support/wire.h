@@ -22,7 +22,6 @@ struct Datagram {
 /// All datagrams in flight, oldest first. Tests can read, change and insert datagrams, and deliver them to an inbox.
 using Wire = std::deque<Datagram>;
 
-/// One end of the wire.
 class End : public Link {
  public:
   End(Wire& wire, const Address& address) : self(address), wire_(wire) {}
@@ -43,7 +42,7 @@ class End : public Link {
   Address self;
   LocalTime taken{};  ///< receive time, if later than the time of the turn
   std::deque<Datagram> inbox;
-  std::size_t sent = 0;  ///< bytes
+  std::size_t sent = 0;
 
  private:
   Wire& wire_;

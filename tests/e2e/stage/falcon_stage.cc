@@ -23,7 +23,6 @@ using namespace std::chrono_literals;
 constexpr double kOutside = -0.015;     // m
 constexpr double kPressed = 0.004;      // m
 constexpr std::uint8_t kCentreKey = 4;  // button 2, the deadman switch of the scene
-/// Polling interval of the waits.
 constexpr auto kLook = 1ms;
 
 std::string text_of(const std::filesystem::path& file) {

@@ -38,7 +38,6 @@ class FalconStage {
   Client& wall() noexcept { return *wall_; }
   std::filesystem::path recording() const { return folder_.path() / "run.mcap"; }
   const std::filesystem::path& folder() const noexcept { return folder_.path(); }
-  /// The scene as parsed by tendond.
   Scene scene() const;
 
   // The user. Initially the hand rests outside the wall and presses no button.
@@ -49,14 +48,11 @@ class FalconStage {
   /// Releases the button and presses it again outside the wall when the lamps are green. Returns after the time of the
   /// force ramp.
   void arm();
-  /// Calls arm(), then moves into the wall until it pushes the hand back.
   void arm_and_press();
 
   /// Waits until `what` holds for the model. Throws std::runtime_error after kPatience.
   void wait_until(const std::function<bool(const FakeFalcon&)>& what, const std::string& name);
-  /// Waits until the server has sent `count` more commands.
   void wait_for_commands(int count);
-  /// Returns true if the motors push the hand out of the wall.
   static bool pushed_out(const FakeFalcon& falcon) { return falcon.force().x() < -0.5; }
 
   /// Waits until no process has the device open. Returns the observations of the device.

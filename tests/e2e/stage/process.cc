@@ -16,7 +16,6 @@
 namespace tendon::e2e {
 namespace {
 
-/// Bytes at the end of each stream that a failure shows.
 constexpr std::size_t kShown = 4000;
 
 [[noreturn]] void fail(int error, const std::string& what) {
@@ -50,7 +49,8 @@ Process::Process(const std::filesystem::path& program, const std::vector<std::st
   for (std::string& word : words) argv.push_back(word.data());
   argv.push_back(nullptr);
   std::vector<char*> environment;
-  for (std::string& variable : more_environment) environment.push_back(variable.data());  // the first of a name counts
+  // The first definition of a name is used.
+  for (std::string& variable : more_environment) environment.push_back(variable.data());
   for (char** variable = environ; *variable != nullptr; ++variable) environment.push_back(*variable);
   environment.push_back(nullptr);
 

@@ -31,7 +31,6 @@ class Process {
   /// environment. Throws std::system_error on failure.
   Process(const std::filesystem::path& program, const std::vector<std::string>& arguments,
           const std::filesystem::path& folder, std::vector<std::string> more_environment = {});
-  /// Sends SIGKILL if the program still runs.
   ~Process();
   Process(const Process&) = delete;
   Process& operator=(const Process&) = delete;
@@ -45,7 +44,6 @@ class Process {
   /// Waits for the end. Returns the exit code, or −N if signal N ended the program.
   int wait(std::chrono::nanoseconds patience = kPatience);
 
-  /// All output so far.
   const std::string& out() const noexcept { return out_.text; }
   const std::string& err() const noexcept { return err_.text; }
 

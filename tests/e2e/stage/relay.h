@@ -27,7 +27,7 @@ class Relay {
   Relay(const Relay&) = delete;
   Relay& operator=(const Relay&) = delete;
 
-  /// The address for the client.
+  /// For the client.
   Address address() const;
   /// The client's address as seen by the server.
   Address clients_address() const;
@@ -35,7 +35,6 @@ class Relay {
   /// The client's datagrams that have been forwarded without truncation.
   std::vector<Datagram> said() const;
 
-  /// Sends a datagram to the server in the client's name.
   void forge(std::span<const std::byte> datagram);
   /// Truncates the last byte of the client's next `count` datagrams.
   void cut_next(int count);

@@ -23,7 +23,6 @@ std::vector<std::string> operator+(std::vector<std::string> a, std::vector<std::
   return a;
 }
 
-/// Returns the text after `"key":`.
 std::string_view value_in(std::string_view json, const std::string& key) {
   const std::string name = '"' + key + "\":";
   const auto found = json.find(name);

@@ -16,7 +16,6 @@ namespace tendon::e2e {
 /// Path of a built program: tendond, tendon-inject, virtual_wall …
 std::filesystem::path program(const std::string& name);
 
-/// The shipped scene, deploy/scenes/demo.toml.
 std::filesystem::path demo_scene();
 
 /// A hand that moves into the wall and stays there. Forces are held and fade for longer than a machine pauses, so that
@@ -41,7 +40,7 @@ hold_ms = 200
 safe_stop_ms = 1000
 )";
 
-/// Writes `file` and returns its path for a command line.
+/// Returns the path for a command line.
 std::string write(const std::filesystem::path& file, std::string_view text);
 
 /// Returns the number, or the first number of the array, under `key` of a JSON line. Throws std::runtime_error if there
@@ -69,7 +68,6 @@ class Service {
   std::string address_;
 };
 
-/// tendond with `scene`.
 class Server : public Service {
  public:
   Server(const std::filesystem::path& folder, const std::filesystem::path& scene, std::vector<std::string> more = {},
@@ -90,7 +88,6 @@ void watch_force(Process& echo, Enough enough) {
   }
 }
 
-/// The content of a recording.
 struct Recording {
   std::vector<StepRecord> steps;
   std::vector<DatagramRecord> arrived;  ///< received datagrams

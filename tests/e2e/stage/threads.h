@@ -9,10 +9,10 @@
 
 namespace tendon::e2e {
 
-/// Returns the names of a process's threads, as in `top -H`.
+/// As shown by `top -H`.
 std::set<std::string> threads_of(pid_t process);
 
-/// Returns the state of a process from /proc. 'T' means stopped.
+/// The state from /proc. 'T' means stopped.
 char state_of(pid_t process);
 
 /// Returns the number of voluntary context switches of the thread. Throws std::runtime_error if there is no such

@@ -40,7 +40,6 @@ class ClientJudge {
   Sixteen random16();
   /// Returns the next Hello after judging it. Keeps Data received meanwhile in strays_.
   std::optional<Greeting> next_hello(Duration patience);
-  /// Returns all Hellos within `window`.
   std::vector<Greeting> hellos(Duration window);
   void start();
   std::optional<Greeting> first_hello();
@@ -361,7 +360,6 @@ void ClientJudge::check_conversation(Session& session) {
   check_forces(session, ticks_);
 }
 
-/// Checks the client's requests, if it sends any.
 void ClientJudge::check_requests(Conversation& talk) {
   std::map<std::uint32_t, std::size_t> times;
   std::string first_words;
@@ -442,7 +440,6 @@ void ClientJudge::check_forces(const Session& session, const std::set<std::uint6
 
 // ---- The end ----
 
-/// Returns true if the client sends a new Hello by itself.
 bool ClientJudge::comes_back() { return next_hello(kComeBack).has_value(); }
 
 void ClientJudge::check_refused() {

@@ -49,9 +49,7 @@ class Conversation {
   // Sending.
   /// Sends `body` with the next packet number, the time and the echo. Returns the packet number.
   std::uint64_t say(pb::Datagram body = {});
-  /// Sends `body` with the given packet number.
   void say_at(std::uint64_t number, pb::Datagram body);
-  /// Returns the bytes that `say_at` sends.
   Bytes compose(std::uint64_t number, pb::Datagram body);
   /// Sends bytes that the peer must drop. If an echo of the peer contains `number` before a valid datagram used it, the
   /// peer violates the rule `check`. `wrong` describes the error for the report, for example "magic 0x55".
@@ -59,7 +57,6 @@ class Conversation {
   /// Seals `body` under the header `head`, with the key that is `epochs` later.
   Bytes seal(Head head, Span body, int epochs = 0) const;
   void say_bytes(Span datagram);
-  /// Returns the header of packet `number`.
   Head head(std::uint64_t number) const;
   std::uint64_t next_number() const noexcept { return next_; }
   /// Continues with packet number `number`, which leaves a gap.
@@ -68,11 +65,9 @@ class Conversation {
   void attribute(std::uint64_t number, std::string_view check) { owners_[number] = check; }
   /// Sends a keep-alive under the previous key.
   void say_old(std::uint64_t number);
-  /// Switches to the next key for sending.
   void renew_key();
   /// Returns to the previous key, because the peer did not follow.
   void return_to_old_key();
-  /// Switches to another local port.
   void move_to(int port) noexcept {
     setup_.port = port;
     moved_ = true;
@@ -109,9 +104,7 @@ class Conversation {
     }
   }
   std::size_t count_frames(std::size_t since, const std::function<bool(const pb::Frame&)>& wanted) const;
-  /// Datagrams received at our port that do not belong to this session.
   const std::vector<Bytes>& strangers() const noexcept { return strangers_; }
-  /// Number of key renewals by the peer.
   std::uint8_t peer_epoch() const noexcept { return receive_epoch_; }
   const Setup& setup() const noexcept { return setup_; }
   LocalTime now() { return wire_.now(); }

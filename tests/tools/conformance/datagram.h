@@ -51,7 +51,6 @@ Bytes hello(std::uint8_t suite, const Sixteen& random, const Sixteen& cookie, Sp
 Bytes retry(std::uint8_t suite, const Sixteen& random, const Sixteen& cookie);
 Bytes answer(std::uint8_t suite, std::uint32_t connection_id, const Sixteen& random, Span body);
 
-/// Returns bytes `at` … `at` + 15.
 Sixteen sixteen(Span datagram, std::size_t at);
 
 Bytes operator+(Bytes a, Span b);

@@ -7,7 +7,6 @@
 namespace tendon::conformance::golden {
 
 inline constexpr const char* kRandom = "a0a1a2a3a4a5a6a7a8a9aaabacadaeaf";
-/// The body of the Hello.
 inline constexpr const char* kHello = "080110011802220477616c6c2a0b6c6f63616c2d6d6f64656c";
 /// Frames: the state with tick 1000, and the control with id 7.
 inline constexpr const char* kState =

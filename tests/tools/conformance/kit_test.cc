@@ -28,7 +28,6 @@ struct Broken {
   int suites = 2;  ///< 0: detectable in suite 0 only; 1: with a key; 2: in all suites
 };
 
-/// Number of suites that this processor supports.
 int suites_here() { return contains(suites_of_this_machine(), Suite::kAesGcm) ? 3 : 2; }
 
 std::optional<Key> key_of(int suite) {

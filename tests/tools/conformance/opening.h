@@ -25,7 +25,7 @@ struct Options {
   std::uint8_t suite() const noexcept { return key ? 1 : 0; }  ///< of the handshake
 };
 
-/// The feature that offers and selects suite 2.
+/// Offers and selects suite 2.
 inline constexpr std::string_view kAesGcm = "aes-256-gcm";
 template <class Words>
 bool names_aes(const Words& words) {
@@ -62,7 +62,6 @@ class Attempt {
   std::optional<NoiseInitiator> noise_;
 };
 
-/// A parsed Hello.
 struct Greeting {
   Bytes datagram;
   Sixteen random{};
@@ -76,7 +75,7 @@ struct Flaw {
   std::string seen;
   std::string expected;
 };
-/// Parses a datagram of type 1 and appends its errors to `flaws`.
+/// Parses a datagram of type 1. Appends its errors to `flaws`.
 std::optional<Greeting> read_greeting(Span datagram, const Options& options, std::vector<Flaw>& flaws);
 
 /// Returns an Answer to `greeting`, sealed in suite 1 with a fresh ephemeral key.

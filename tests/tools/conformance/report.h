@@ -22,7 +22,7 @@ struct Check {
   std::string_view sentence;
 };
 
-/// All checks, in the order of the report.
+/// In the order of the report.
 std::span<const Check> checks();
 
 /// Returns the document and the anchor of the section on its web page, for example

@@ -132,7 +132,6 @@ void at(Message& message, std::string_view path, const std::function<void(Messag
   at(*message.GetReflection()->MutableMessage(&message, &field), rest(path), use);
 }
 
-/// Returns values that are just out of bounds.
 std::vector<double> values_beyond(const FieldDescriptor& field, const Bounds& bounds) {
   switch (field.cpp_type()) {
     case FieldDescriptor::CPPTYPE_DOUBLE:

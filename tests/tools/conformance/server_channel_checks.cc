@@ -31,7 +31,6 @@ bool first_of_both(const pb::Welcome& welcome) {
          controls.role() == pb::ROLE_CONTROLLER;
 }
 
-/// Checks the bounds of all fields of a description.
 bool within_bounds(const pb::DeviceDescription& device) {
   const auto size = [](double value) { return value >= 0 && value <= 1e12; };
   const auto dof = [](std::uint32_t count) { return count >= 1 && count <= 6; };

@@ -22,7 +22,6 @@ class ChannelChecks {
   /// Returns an open session that has claimed by name and requested the features for check_coupling(). `id`: its newest
   /// request.
   std::optional<ServerGuest::Session> check_channels(std::uint32_t& id);
-  /// Judges the link reports received so far.
   void check_reports(const Conversation& talk);
 
  private:
@@ -32,8 +31,8 @@ class ChannelChecks {
   void check_deadband(Conversation& talk, const pb::Welcome& welcome, std::uint32_t& id);
 
   ServerGuest& guest_;
-  bool channels_ = false;                       ///< whether the server offers the feature
-  std::optional<pb::DeviceDescription> about_;  ///< device 0
+  bool channels_ = false;  ///< whether the server offers the feature
+  std::optional<pb::DeviceDescription> about_;
 };
 
 }  // namespace tendon::conformance

@@ -29,7 +29,6 @@ pb::Couple fitting() {
   return out;
 }
 
-/// A controller that numbers its requests.
 class Asker {
  public:
   Asker(Conversation& talk, std::uint32_t first) : talk_(talk), next_(first) {}

@@ -10,7 +10,6 @@ namespace tendon::conformance {
 /// Checks requests of a controller that has named neither "teleoperation" nor "outputs". `id`: its next request.
 void check_unasked(ServerGuest& guest, Conversation& controller, std::uint32_t id);
 
-/// Adds the features that check_coupling() needs.
 pb::Hello with_coupling(pb::Hello hello);
 
 /// Checks outputs and the coupling of device 0. With Options::follower the device is a follower for a leader with

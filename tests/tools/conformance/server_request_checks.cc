@@ -35,7 +35,6 @@ void check_requests(ServerGuest& guest, Conversation& talk) {
   constexpr Duration kWindow = milliseconds(600);
   constexpr std::size_t kBetween = 120;  // threshold of states in the window: 30 at 50 Hz, 300 at 500 Hz
 
-  // Request 2 before 1.
   std::size_t before = talk.heard().size();
   talk.confirmed(say(rate(2, 50)));
   talk.listen(milliseconds(120));

@@ -17,10 +17,9 @@ namespace tendon::conformance {
 struct Evidence {
   /// Returns a frame with this tick or sequence number.
   std::function<pb::Frame(std::uint64_t)> frame;
-  /// Whether this number has ever been shown.
   std::function<bool(std::uint64_t)> shown;
-  std::uint64_t next = 1;  ///< the next unused number
-  bool any = true;         ///< false: this peer (an observer) does not show what it accepts
+  std::uint64_t next = 1;
+  bool any = true;  ///< false: this peer (an observer) does not show what it accepts
 };
 
 void check_bad_datagrams(Conversation& talk, Evidence& evidence);
@@ -39,7 +38,6 @@ void check_newest_wins(Conversation& talk, Evidence& evidence);
 void check_rekey(Conversation& talk);
 /// Checks that the peer rejects the old key more than 2 s after `renewed`.
 void check_old_key(Conversation& talk, LocalTime renewed);
-/// Checks the keep-alives of an otherwise silent peer.
 void check_keep_alive(Conversation& talk);
 /// Sends only invalid datagrams, which must not reset the timeout. `timeout` is the peer's.
 void check_timeout(Conversation& talk, Duration timeout);

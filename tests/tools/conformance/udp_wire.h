@@ -17,7 +17,6 @@ namespace tendon::conformance {
 /// Thread-safe: no.
 class UdpWire : public Wire {
  public:
-  /// Talks to the server at `peer`.
   static UdpWire to_server(const Address& peer);
   /// Opens the only port, to which a client will connect.
   static UdpWire for_client(const Address& listen);

@@ -29,7 +29,6 @@ class Wire {
   virtual std::uint64_t random() = 0;
 };
 
-/// The client under test, as a program.
 class Guest {
  public:
   virtual ~Guest() = default;

@@ -90,7 +90,6 @@ class WorkerJudge {
   pb::DeviceState next_state();
   bool ask(const pb::DeviceState& state, std::string_view check, std::span<const std::size_t> cuts = {});
   void judge_answer(const Record& record, const pb::DeviceState& state);
-  /// Returns true if the worker sends nothing until `deadline`.
   bool silent(LocalTime deadline);
   /// Returns the next record, or nullopt at the deadline or the end of the stream, which sets `over_`.
   std::optional<Record> next(LocalTime deadline);

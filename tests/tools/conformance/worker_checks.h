@@ -32,7 +32,6 @@ class WorkerWire {
   /// Waits until `deadline` for the program to exit. Returns true if it has.
   virtual bool ends(LocalTime deadline) = 0;
   virtual void kill() = 0;
-  /// The only source of randomness.
   virtual std::uint64_t random() = 0;
 };
 

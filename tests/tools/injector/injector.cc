@@ -112,7 +112,7 @@ LocalTime Injector::past_stalls(LocalTime at) const {
 std::optional<Cause> Injector::cause_of_loss(const Packet& packet, std::uint64_t index,
                                              std::optional<std::size_t> regime) {
   const Profile& p = network_.profile;
-  // The profile's loss chain advances with every datagram, the chain of a regime only while that regime is active.
+  // The profile's loss chain advances with every datagram, a regime's chain only while the regime is active.
   LossModel* const special = regime && network_.regime_losses[*regime] ? &*network_.regime_losses[*regime] : nullptr;
   const bool plain_lost = network_.loss.lost(draws_, index);
   const bool lost = special != nullptr ? special->lost(draws_, index) : plain_lost;

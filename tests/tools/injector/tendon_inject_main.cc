@@ -17,7 +17,6 @@
 namespace tendon::injector {
 namespace {
 
-/// Runs each kind of task and returns the exit code.
 struct Runner {
   int operator()(const HelpTask& task) const {
     std::cout << task.text;

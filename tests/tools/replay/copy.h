@@ -12,7 +12,7 @@
 
 namespace tendon::replay {
 
-/// Opens a recording. Throws std::runtime_error if it cannot be read.
+/// Throws std::runtime_error if the recording cannot be read.
 McapReader open_mcap(const std::filesystem::path& path);
 
 /// Creates the channels in the new file. The messages must be defined in recording.proto.

@@ -24,7 +24,6 @@ std::string bytes_of(const std::filesystem::path& file) {
   return {std::istreambuf_iterator<char>(in), {}};
 }
 
-/// Returns a recording of two seconds.
 std::string recording() {
   MemorySink sink;
   Recorder recorder(tendon::testing::sample_config(), sink);

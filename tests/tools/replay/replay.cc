@@ -254,7 +254,6 @@ class Progress {
   bool shown_ = false;
 };
 
-/// The recorded run and the replayed run of a device.
 struct Both {
   explicit Both(bool of_several) : recorded(of_several), again(of_several) {}
 

@@ -18,7 +18,6 @@ struct Options {
   std::vector<std::string> settings = {};  ///< "TABLE.KEY=VALUE", as for `parse_scene`; applied after `law`
   /// Folder of the files that the scene names.
   std::filesystem::path files = ".";
-  /// Replays only this device.
   std::optional<std::string> device = {};
   std::optional<std::filesystem::path> csv = {};      ///< a row for each step of a device
   std::optional<std::filesystem::path> picture = {};  ///< .svg or .png, both runs of at most two devices side by side

@@ -46,7 +46,6 @@ std::vector<StepRecord> recorded(const Scene& scene) {
   return steps;
 }
 
-/// Returns the first difference, or an empty string.
 std::string first_difference(const HapticController::Config& control, const std::vector<StepRecord>& steps) {
   Rerun rerun(control, Rerun::Held::kRecorded);
   for (const StepRecord& step : steps) {

@@ -12,7 +12,6 @@
 
 namespace tendon::conformance {
 
-/// The rule that a toy breaks.
 enum class Fault : std::uint8_t {
   kNone,
   // Data, either side.

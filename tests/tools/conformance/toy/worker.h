@@ -10,7 +10,6 @@
 
 namespace tendon::conformance {
 
-/// The rule that a worker breaks.
 enum class WorkerFault : std::uint8_t {
   kNone,
   kNeverOpens,

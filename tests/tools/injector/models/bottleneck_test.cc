@@ -68,8 +68,8 @@ TEST(Bottleneck, FifoHoldsForAClockThatGoesBack) {
   EXPECT_EQ(queue.pass(kStart, 125), kStart + 7ms);
 }
 
-/// mm-link as it works: at each opportunity in turn, up to 1500 bytes of those who wait leave. Returns when each has
-/// left with its last byte.
+/// A direct model of mm-link: each opportunity sends up to 1500 bytes of the waiting datagrams. Returns when the last
+/// byte of each has left.
 std::vector<LocalTime> mm_link(const std::vector<std::uint32_t>& opportunities,
                                const std::vector<std::pair<LocalTime, std::uint64_t>>& datagrams) {
   std::vector<LocalTime> left;

@@ -26,7 +26,7 @@ struct Law {
   std::function<double(double)> cdf;  ///< of the delay in ms
 };
 
-/// The closed form of each law, by libm.
+/// The laws in closed form, with libm.
 std::vector<Law> laws() {
   const double sigma = std::sqrt(std::log(1 + 0.25 * 0.25));  // of lognormal(20, 5)
   const double mu = std::log(20.0) - sigma * sigma / 2;
@@ -47,7 +47,7 @@ TEST(DelayTable, OfEachLawInvertsItsClosedForm) {
     for (double p = 0.5; p > 1e-9; p *= 0.77) {
       for (const double share : {p, 1 - p}) {
         const double x = static_cast<double>(table(static_cast<std::uint64_t>(share * 0x1p64))) * 1e-6;
-        const double near = 2e-6;  // ms: tables are in whole nanoseconds
+        const double near = 2e-6;  // ms; table values are integer nanoseconds
         const double allowed = 1e-3 * std::min(p, 1 - p) + 1e-12;
         EXPECT_LE(law.cdf(x - near), share + allowed) << law.delay << " " << p;
         EXPECT_GE(law.cdf(x + near), share - allowed) << law.delay << " " << p;
@@ -68,7 +68,7 @@ TEST(DelayTable, DelaysBelowZeroAreZeroAndNoneIsAboveTheLongest) {
   EXPECT_EQ(table_of("pareto(1s,0.1)")(~std::uint64_t{0}), kMaxDelay.count());
 }
 
-// A table is kept and found again by its numbers: those of another kind, or in another order, are another's.
+// The cache key includes the kind of the distribution and the order of its parameters.
 TEST(DelayTable, IsTheSameWhenAskedForAgainAndAnothersForOtherNumbers) {
   std::set<std::uint64_t> different;
   const auto ask_for_all = [&] {

@@ -20,7 +20,7 @@ TEST(ExactMath, NormalTailAgreesWithErfcAndIsTheInverseOfTheQuantile) {
   EXPECT_EQ(normal_quantile(0.75), -normal_quantile(0.25));
 }
 
-/// 1 − F of a gamma distribution of whole shape k: e⁻ˣ Σ xⁱ/i!, i < k.
+/// 1 − F of a gamma distribution with integer shape k: e⁻ˣ Σ xⁱ/i!, i < k.
 double erlang_tail(int k, double x) {
   double term = std::exp(-x);
   double sum = term;
@@ -34,18 +34,18 @@ TEST(ExactMath, GammaQuantileInvertsTheClosedFormsOfWholeAndHalfShapes) {
     for (const int k : {2, 4, 25, 400}) {
       EXPECT_NEAR(erlang_tail(k, gamma_quantile(k, 1 - q, q)) / q, 1, 1e-7) << k << " " << q;
     }
-    // Half of the square of a normal deviation.
+    // Shape ½ is half of the square of a standard normal variate.
     EXPECT_NEAR(std::erfc(std::sqrt(gamma_quantile(0.5, 1 - q, q))) / q, 1, 1e-7) << q;
   }
   for (double p = 0.5; p > 1e-12; p *= 0.7) {
     EXPECT_NEAR(gamma_quantile(1, p, 1 - p) / -std::log1p(-p), 1, 1e-9) << p;
     EXPECT_NEAR(std::erf(std::sqrt(gamma_quantile(0.5, p, 1 - p))) / p, 1, 1e-9) << p;
   }
-  // So far below shape 1, nearly all of it is at zero.
+  // Far below shape 1, nearly all of the distribution is at zero.
   EXPECT_EQ(gamma_quantile(0.01, 1e-12, 1 - 1e-12), 0);
 }
 
-/// The bits are the promise: this is what every compiler and libm must give.
+/// Every compiler and libm must give these bits.
 TEST(ExactMath, GivesTheSameBitsEverywhere) {
   std::uint64_t sum = 0;
   const auto feed = [&sum](double x) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Rates and bursts of each model: selftest_test.cc.
+// selftest_test.cc checks the rates and bursts of each model.
 #include "tests/tools/injector/models/loss_model.h"
 
 #include <gtest/gtest.h>
@@ -41,7 +41,7 @@ TEST(LossModel, AnotherModelOfTheSameKindGoesOnFromTheState) {
   const Draws draws(1, 0, Direction::kUp);
   LossModel bad(GilbertLoss{1, 0, 1, 0}, Purpose::kLoss, Purpose::kLossState);
   EXPECT_TRUE(bad.lost(draws, 0));
-  LossModel stays(GilbertLoss{0, 1e-9, 1, 0}, Purpose::kLoss, Purpose::kLossState);  // stationary: good
+  LossModel stays(GilbertLoss{0, 1e-9, 1, 0}, Purpose::kLoss, Purpose::kLossState);  // the stationary state is good
   LossModel fresh = stays;
   stays.continue_from(bad);
   EXPECT_TRUE(stays.lost(draws, 1));

@@ -44,7 +44,7 @@ TEST(QuantileTable, ASmoothFunctionIsFollowedToOneInATrillionOnBothSides) {
   for (double p = 0.499; p > 1e-12; p *= 0.83) {
     const auto u = static_cast<std::uint64_t>(p * 0x1p64);
     const double z = exact::normal_quantile(p);
-    // One cell of 1/16 of the tail errs by less than (1/16)²/8 of the distance over which the tail falls by e.
+    // The error of one cell, 1/16 of the tail, is below (1/16)²/8 of the distance over which the tail falls by e.
     const double allowed = 5e-4 * p / (std::exp(-z * z / 2) / std::sqrt(2 * M_PI)) * 1e6 + 2;
     EXPECT_NEAR(static_cast<double>(table(u)), 1e6 * z, allowed) << p;
     EXPECT_NEAR(static_cast<double>(table(~u)), -1e6 * z, allowed) << p;
@@ -55,13 +55,13 @@ TEST(QuantileTable, ASmoothFunctionIsFollowedToOneInATrillionOnBothSides) {
 
 RC_GTEST_PROP(QuantileTable, ALargerDrawNeverGivesLess, (std::uint64_t a, std::uint64_t z)) {
   static const QuantileTable kTable = normal();
-  const auto shift = *rc::gen::inRange(0, 40);  // so that tails are met
+  const auto shift = *rc::gen::inRange(0, 40);  // reaches the tails
   RC_ASSERT(kTable(std::min(a, z) >> shift) <= kTable(std::max(a, z) >> shift));
   RC_ASSERT(kTable(~(std::max(a, z) >> shift)) <= kTable(~(std::min(a, z) >> shift)));
 }
 
 RC_GTEST_PROP(QuantileTable, IsTheStraightLineOfWholeNumbersThatItSays, ()) {
-  // Any pieces, against the definition in 128 bits.
+  // Compares random pieces with the definition in 128 bits.
   std::map<std::uint64_t, std::uint64_t> widths;
   widths[0] = *rc::gen::inRange<std::uint64_t>(1, std::uint64_t{1} << 37);
   for (int n = *rc::gen::inRange(0, 30); n > 0; --n) {
@@ -74,7 +74,7 @@ RC_GTEST_PROP(QuantileTable, IsTheStraightLineOfWholeNumbersThatItSays, ()) {
   for (int n = 0; n < 50; ++n) {
     const std::uint64_t u = *rc::gen::arbitrary<std::uint64_t>() >> *rc::gen::inRange(0, 60);
     auto next = widths.upper_bound(u);
-    const std::uint64_t end = next == widths.end() ? 0 : next->first;  // 0: 2⁶⁴
+    const std::uint64_t end = next == widths.end() ? 0 : next->first;  // 0 stands for 2⁶⁴
     const auto& [from, width] = *std::prev(next);
     const long double length =
         end == 0 ? 0x1p64L - static_cast<long double>(from) : static_cast<long double>(end - from);

@@ -29,7 +29,6 @@ std::string complaint_about(const std::string& line) {
   return thrown_by<std::exception>([&] { parse_profile(line); });
 }
 
-/// A file that is removed at the end of the test.
 class TemporaryFile {
  public:
   explicit TemporaryFile(const std::string& content)

@@ -20,7 +20,6 @@ namespace {
 
 constexpr std::size_t kMaxScenarioBytes = std::size_t{32} << 20;  // profiles may contain inline tables
 
-/// Sets the profiles of a change that `key` (up, down or both) selects.
 void set_profiles(Change& change, std::string_view key, std::string_view profile) {
   if (key != "down") change.up = resolve_profile(profile, Direction::kUp);
   if (key != "up") change.down = resolve_profile(profile, Direction::kDown);
@@ -103,7 +102,6 @@ class Keys {
     }
   }
 
-  /// up, down, both.
   Change profiles() const {
     Change change;
     for (const std::string_view key : {"both", "up", "down"}) {

@@ -8,7 +8,6 @@
 
 namespace tendon::injector {
 
-/// A failing trace with as few datagrams as were found.
 struct Shrunk {
   Trace trace;           ///< sparse: for TracePlayer by index, or as a file for a test
   std::size_t from = 0;  ///< datagrams of the given trace that were not benign

@@ -33,7 +33,6 @@ Trace recorded(const char* profile) {
   return trace;
 }
 
-/// The fates of the packets, as a test observes them.
 std::vector<Decision> played(const Trace& trace) {
   TracePlayer player(trace, Direction::kUp, 0, TracePlayer::By::kIndex);
   std::vector<Decision> decisions;

@@ -32,7 +32,6 @@ std::ifstream open_table(const std::filesystem::path& file, const std::string& e
   return in;
 }
 
-/// Adds one row to a table.
 void add(std::vector<Weighted>& to, const TableReader& table, double value_ms, double weight, bool rising) {
   const std::optional<Duration> value = to_duration(value_ms, 1e6);
   if (!value) table.fail("value is " + number_text(value_ms) + "ms, expected 0ms to 60s");
@@ -42,7 +41,6 @@ void add(std::vector<Weighted>& to, const TableReader& table, double value_ms, d
   to.push_back(entry);
 }
 
-/// Calls `read` and converts its errors to std::invalid_argument.
 template <class Read>
 std::vector<Weighted> of_a_profile(const Read& read) {
   try {

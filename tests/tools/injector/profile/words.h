@@ -11,7 +11,6 @@ namespace tendon::injector {
 
 inline constexpr std::string_view kBlanks = " \t\r\n";
 
-/// `text` without surrounding blanks.
 std::string_view trimmed(std::string_view text);
 
 /// Removes and returns the text up to the first of `separators` outside brackets; also removes the separator.
@@ -19,7 +18,6 @@ std::string_view take_until(std::string_view& rest, std::string_view separators)
 
 std::string in_quotes(std::string_view text);
 
-/// For example "0x0f".
 std::string hexadecimal(std::uint8_t byte);
 
 /// Throws std::invalid_argument "FIELD is VALUE, expected EXPECTED".

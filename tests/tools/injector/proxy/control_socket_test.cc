@@ -20,7 +20,7 @@ namespace {
 
 using testing::ScratchFolder;
 
-/// Turns a socket until it is gone; answers with the line in brackets.
+/// Serves a socket in a thread for its lifetime. Answers with the line in brackets.
 class Answering {
  public:
   explicit Answering(ControlSocket& socket)

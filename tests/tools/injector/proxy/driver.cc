@@ -58,7 +58,8 @@ Driver::Driver(const Config& config, TraceRecorder* recorder)
       // Uses a timerfd, because timeouts of poll and epoll are extended by 0.1 % of their length.
       timer_(checked(::timerfd_create(CLOCK_MONOTONIC, TFD_NONBLOCK | TFD_CLOEXEC), "timerfd_create")),
       bell_(checked(::eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC), "eventfd")) {
-  for (const Address& server : config.servers) UdpBatch::connected(server);  // or throws now, and not for a client
+  // Throws here rather than at the first client.
+  for (const Address& server : config.servers) UdpBatch::connected(server);
   watch(listener_.fd(), kListener, EPOLLIN);
   watch(timer_, kTimer, EPOLLIN | EPOLLET);
   watch(bell_, kBell, EPOLLIN);
@@ -215,7 +216,6 @@ void Driver::replace_socket(ClientIndex client, Upstream& upstream, UdpBatch soc
   watch(upstream.socket.fd(), client, EPOLLIN);
 }
 
-/// Tries the next address if the server has not answered.
 void Driver::seek_server(LocalTime now) {
   if (config_.servers.size() == 1 || proxy_.measurements(Direction::kDown).counters.received > 0) return;
   const ProxyCounters& up = proxy_.measurements(Direction::kUp).counters;

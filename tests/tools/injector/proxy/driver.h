@@ -57,7 +57,6 @@ class Driver {
 
   /// Async-signal-safe.
   void stop() noexcept;
-  /// Switches to another network.
   void change(Proxy::PreparedChange change);
   /// At most 0.2 s old; final after run() has returned.
   Status status() const;
@@ -99,7 +98,7 @@ class Driver {
   std::size_t server_ = 0;               // index in config_.servers
   std::uint64_t asked_before_ = 0;       // datagrams sent to the server when the address last changed
   LocalTime next_server_{};              // when to try the next address
-  std::string no_socket_;                // the first error
+  std::string no_socket_;
   std::uint64_t late_rebinds_ = 0;
   int epoll_ = -1;
   int timer_ = -1;

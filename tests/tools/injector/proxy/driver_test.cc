@@ -21,7 +21,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-/// Virtual machines pause, and builds run beside us. Nothing is claimed about when datagrams leave.
+/// Virtual machines pause and builds run in parallel, so no test checks when datagrams leave.
 constexpr int kPatienceMs = 30'000;
 
 template <typename Condition>
@@ -33,7 +33,7 @@ bool eventually(Condition condition) {
   return false;
 }
 
-/// One end of a conversation, with text for datagrams.
+/// One end of a connection, with strings as datagrams.
 class Peer {
  public:
   explicit Peer(UdpBatch socket) : socket_(std::move(socket)) {}
@@ -72,7 +72,7 @@ class Peer {
   std::vector<Got> waiting_;
 };
 
-/// A driver that runs.
+/// Runs a driver in a thread.
 class Running {
  public:
   Running(const Address& server, const std::string& up, const std::string& down = "",
@@ -87,7 +87,7 @@ class Running {
                 nullptr),
         thread_([this] { driver_.run(); }) {}
   ~Running() { stop(); }
-  /// What it has to say at the end.
+  /// Returns the final status.
   Status stop() {
     driver_.stop();
     if (thread_.joinable()) thread_.join();
@@ -150,7 +150,7 @@ TEST(Driver, ARebindChangesThePortAndAnswersStillReachTheClient) {
   Running proxy(server_end.address(), "rebind(every=1ms)");
   Peer client = proxy.client();
   std::set<Address> ports;
-  // Whatever the machine does, so many datagrams that wait for each other's answers take some milliseconds.
+  // Waiting for each answer makes this loop take some milliseconds on any machine.
   for (int i = 0; i < 10'000 && ports.size() < 3; ++i) {
     client.send("ping");
     const auto got = server_end.receive();
@@ -177,7 +177,7 @@ TEST(Driver, AChangeIsInForceForWhatComesAfterIt) {
   client.send("lost");
   change.to[0].emplace(parse_profile(""), 7, 0, Direction::kUp);
   change.text = "up again";
-  // The loss must have been decided before the network is good again.
+  // The loss must be decided before the network becomes good.
   ASSERT_TRUE(eventually([&] { return proxy.driver().status().of(Direction::kUp).counters.lost() > 0; }));
   proxy.driver().change(change);
   ASSERT_TRUE(eventually([&] { return proxy.driver().status().last_change == change.text; }));
@@ -232,7 +232,7 @@ TEST(Driver, GoesOnToTheNextAddressOfAServerThatDoesNotAnswer) {
   ASSERT_TRUE(got);
   server_end.send("I am", got->from);
   EXPECT_EQ(client.text(), "I am");
-  // The proxy does not leave this address, even if the server is silent for longer.
+  // The proxy keeps this address even if the server is silent for longer.
   for (int i = 0; i < 120; ++i) {
     client.send("still there?");
     ::poll(nullptr, 0, 10);

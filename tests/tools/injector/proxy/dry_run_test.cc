@@ -41,7 +41,7 @@ TEST(DryRun, OfTheSameSeedIsTheSameAndOfAnotherAnother) {
 }
 
 TEST(DryRun, SizeAndRateMeetABottleneck) {
-  // 1000 bits take 1 ms: at 500 Hz nobody waits, at 2 kHz everybody behind the first does.
+  // 1000 bits take 1 ms: at 500 Hz no datagram waits, at 2 kHz all but the first do.
   const NetworkOptions network{.profile = "rate=1Mbit/s overhead=0", .seed = 7};
   EXPECT_NE(printed(network, {.count = 4, .rate_hz = 500, .bytes = 125})
                 .find("up   1  at 2.000000 ms  pass queue  after 1.000000 ms"),

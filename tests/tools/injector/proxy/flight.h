@@ -117,7 +117,6 @@ class Flight {
   }
 
   std::size_t size() const noexcept { return heap_.size(); }
-  /// Buffers and bookkeeping in flight.
   std::size_t bytes() const noexcept { return bytes_; }
 
  private:

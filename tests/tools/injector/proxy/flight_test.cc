@@ -28,7 +28,7 @@ Decision passes(Duration after) {
   return decision;
 }
 
-/// Everything that leaves up to `now`: "tag:payload", with ' for a second copy and " for a stale one.
+/// The departures until `now` as "tag:payload", with ' for a second copy and " for a stale one.
 std::vector<std::string> departures(Flight<int>& flight, LocalTime now) {
   std::vector<std::string> result;
   while (const auto departure = flight.next_due(now)) {
@@ -99,7 +99,7 @@ TEST(Flight, AStaleReplayIsTheDatagramThatManyBackEvenOneThatWasLost) {
   Decision replays = passes(1ms);
   replays.stale = Decision::Stale{.release = kStart + 2ms, .back = 2};
   flight.launch(replays, bytes("two"), 2, &history);
-  replays.stale = Decision::Stale{.release = kStart + 3ms, .back = 4};  // before the beginning
+  replays.stale = Decision::Stale{.release = kStart + 3ms, .back = 4};  // before the first datagram
   flight.launch(replays, bytes("three"), 3, &history);
   EXPECT_EQ(departures(flight, kStart + 1s), (Lines{"1:one", "2:two", "3:three", "2:zero\""}));
 }
@@ -172,7 +172,7 @@ TEST(Flight, RefusesWhatDoesNotFitAndTakesItAgainWhenThereIsRoom) {
   while (flight.next_due(kStart + 1s)) {
   }
   EXPECT_EQ(flight.bytes(), 0U);
-  // Buffers of another size displace those that are free, and nothing else.
+  // Buffers of another size replace unused ones only.
   EXPECT_TRUE(flight.launch(passes(1ms), std::vector<std::byte>(100), 5));
   EXPECT_TRUE(flight.launch(passes(1ms), std::vector<std::byte>(4000), 6));
   EXPECT_EQ(flight.size(), 2U);

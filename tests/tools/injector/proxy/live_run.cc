@@ -82,7 +82,6 @@ class DriverThread {
   DriverThread& operator=(const DriverThread&) = delete;
 
   int fd() const { return ended_; }
-  /// Waits for the end, and rethrows the driver's exception.
   void join() {
     thread_.join();
     if (error_) std::rethrow_exception(error_);
@@ -105,7 +104,6 @@ class DriverThread {
   std::thread thread_;
 };
 
-/// Returns the addresses of the server to which this machine can send.
 std::vector<Address> addresses_of(const LiveRun& options) {
   const std::vector<Address> addresses = options.server.look_up().addresses;
   if (addresses.front().port == 0) {
@@ -193,7 +191,6 @@ class Conversation {
     }
   }
 
-  /// Returns the verdict.
   bool end() {
     const Status last = driver_.status();
     tell(last);
@@ -290,7 +287,6 @@ class Conversation {
     draw(driver_.status());
   }
 
-  /// Executes a command and returns a one-line answer.
   std::string answer(std::string_view line) {
     try {
       return execute(line);

@@ -36,7 +36,6 @@ struct PreparedNetwork {
   std::unique_ptr<const Trace> replay;
   TracePlayer::By replay_by = TracePlayer::By::kIndex;
 
-  /// Header for a trace of this network.
   TraceHeader header() const;
 };
 

@@ -23,7 +23,8 @@ std::size_t Proxy::AddressHash::operator()(const Address& address) const noexcep
 }
 
 Proxy::Proxy(Config config) : config_(std::move(config)), flight_(config_.max_bytes_in_flight) {
-  if (config_.replay != nullptr) TracePlayer(*config_.replay, Direction::kUp, 0, config_.replay_by);  // or throws
+  // Throws if the trace is invalid.
+  if (config_.replay != nullptr) TracePlayer(*config_.replay, Direction::kUp, 0, config_.replay_by);
 }
 
 Proxy::Client& Proxy::add_client(const Address& address) {

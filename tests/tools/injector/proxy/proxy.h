@@ -35,12 +35,12 @@ struct ProxyCounters {
   std::uint64_t refused_clients = 0;             ///< from clients that could not be added or have been forgotten
   std::uint64_t refused_full = 0;                ///< exceeded Config::max_bytes_in_flight
   std::array<std::uint64_t, kCauses> dropped{};  ///< by the network, by Cause
-  std::uint64_t forwarded = 0;                   ///< first copies sent
-  std::uint64_t duplicated = 0;                  ///< second copies sent
-  std::uint64_t replayed = 0;                    ///< stale copies sent
-  std::uint64_t flipped = 0;                     ///< forwarded with a flipped bit
-  std::uint64_t truncated = 0;                   ///< forwarded truncated
-  std::uint64_t unsent = 0;                      ///< copies of all kinds that the kernel refused
+  std::uint64_t forwarded = 0;
+  std::uint64_t duplicated = 0;
+  std::uint64_t replayed = 0;
+  std::uint64_t flipped = 0;    ///< forwarded with a flipped bit
+  std::uint64_t truncated = 0;  ///< forwarded truncated
+  std::uint64_t unsent = 0;     ///< copies of all kinds that the kernel refused
 
   std::uint64_t lost() const noexcept;  ///< sum of `dropped`
 };
@@ -78,7 +78,6 @@ class Proxy {
     /// By Direction. Every client gets the same network with its own draws (Injector::for_link).
     std::array<Injector, 2> networks;
 
-    /// Sorted by time.
     std::vector<Step> timeline = {};
 
     /// Replays these decisions instead of `networks` and `timeline`. Must outlive the proxy.
@@ -110,7 +109,6 @@ class Proxy {
   std::optional<ClientIndex> receive_from_client(const Address& client, std::span<const std::byte> datagram,
                                                  LocalTime arrival, bool may_add = true);
 
-  /// Receives a datagram from the socket of `client`.
   void receive_from_server(ClientIndex client, std::span<const std::byte> datagram, LocalTime arrival);
 
   struct Departure {
@@ -124,9 +122,7 @@ class Proxy {
   /// result to `left` or `not_sent`.
   std::optional<Departure> next_due(LocalTime now);
 
-  /// The kernel accepted the datagram at `now`.
   void left(const Departure& departure, LocalTime now);
-  /// The kernel refused the datagram.
   void not_sent(const Departure& departure);
 
   /// Has no effect while a trace is replayed.
@@ -149,9 +145,7 @@ class Proxy {
   std::vector<TraceRecord>& records() noexcept { return records_; }
 
   const ProxyMeasurements& measurements(Direction direction) const { return measurements_[index_of(direction)]; }
-  /// The text of the last change, or empty.
   const std::string& last_change() const noexcept { return last_change_; }
-  /// Completed steps of the timeline.
   std::size_t steps_done() const noexcept { return steps_done_; }
   struct ClientSummary {
     ClientIndex index;

@@ -39,7 +39,7 @@ Proxy::Config config(const std::string& up, const std::string& down) {
                        Injector(parse_profile(down), 7, 0, Direction::kDown)}};
 }
 
-/// Everything that leaves up to `now`, as "payload@ms after the start>where".
+/// The departures until `now`, as "payload@ms after the start>destination".
 std::vector<std::string> departures(Proxy& proxy, LocalTime now) {
   std::vector<std::string> result;
   while (const auto d = proxy.next_due(now)) {
@@ -78,7 +78,7 @@ TEST(Proxy, BringsAnswersOnlyToTheClientTheyAreFor) {
   EXPECT_EQ(departures(proxy, kStart + 10ms), (Lines{"for z@10>Z", "for a@10>A"}));
 }
 
-/// The fates of A's datagrams up, one each ms, while `disturb` does what it likes to the proxy.
+/// The fates of A's datagrams up, one per ms, while `disturb` interferes with the proxy.
 template <typename Disturb>
 Lines fates_of_a(Disturb disturb) {
   Proxy proxy(config("delay=uniform(5ms,35ms) loss=20% duplicate=10%", "delay=uniform(5ms,35ms) loss=20%"));
@@ -190,7 +190,7 @@ TEST(Proxy, RefusesWhatDoesNotFitIntoItsMemory) {
 
 TEST(Proxy, EveryDatagramIsAccountedFor) {
   Proxy::Config o = config("delay=uniform(5ms,35ms) loss=20% duplicate=10% replay(5%,8) outage(at=100ms,for=50ms)", "");
-  o.max_bytes_in_flight = 6'000;  // so that some are refused
+  o.max_bytes_in_flight = 6'000;  // to refuse some
   Proxy proxy(o);
   std::uint64_t left = 0;
   for (int i = 0; i < 1000; ++i) {
@@ -243,7 +243,7 @@ TEST(Proxy, ATimelineCountsFromTheFirstDatagramWheneverItIsAsked) {
   slow.text = "up delay=50ms";
   o.timeline.push_back({10ms, slow});
   Proxy proxy(o);
-  proxy.follow_timeline(kStart + 5s);  // nobody has come yet: nothing begins
+  proxy.follow_timeline(kStart + 5s);  // no client yet, so the timeline has not started
   EXPECT_EQ(proxy.steps_done(), 0U);
   const LocalTime first = kStart + 6s;
   const auto a = proxy.receive_from_client(kA, bytes("0"), first);
@@ -293,7 +293,7 @@ TEST(Proxy, AnOutageHitsAllClientsAtTheSameTimeWheneverTheyCame) {
   EXPECT_EQ(departures(proxy, kStart + 1s), (Lines{"a@0>server", "z@8>server", "b@15>server", "b@15>server"}));
 }
 
-/// One run of 300 datagrams, one each ms and sometimes two, from `begin` on; what leaves leaves 7 µs late.
+/// A run of 300 datagrams, one or two per ms, from `begin` on. Departures are 7 µs late.
 struct Recorded {
   Lines left;
   Trace trace;

@@ -15,7 +15,6 @@
 
 namespace tendon::injector {
 
-/// A snapshot of a run of the proxy.
 struct Status {
   Duration elapsed{};                           ///< since the proxy began to listen
   std::array<ProxyMeasurements, 2> directions;  ///< by Direction

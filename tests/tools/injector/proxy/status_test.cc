@@ -14,7 +14,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-/// A thousand datagrams up, of which `late` left 2 ms late and the others 40 µs.
+/// 1000 datagrams up, of which `late` leave 2 ms late and the others 40 µs.
 Status status(int late) {
   Status s;
   s.elapsed = 10s;

@@ -30,11 +30,9 @@ class Terminal {
   /// above the last one are omitted.
   void draw(std::string_view lines);
 
-  /// For poll(2).
   static int fd();
   /// Returns a complete line if the user has typed one. Never blocks.
   std::optional<std::string> next_line();
-  /// The incomplete line.
   const std::string& typed() const noexcept { return typed_; }
 
  private:

@@ -42,7 +42,6 @@ std::string losses_by_cause(const ProxyCounters& n) {
   return text;
 }
 
-/// The nonzero counts of other fates.
 std::string other_fates(const ProxyCounters& n) {
   std::string text;
   const auto add = [&](const char* what, std::uint64_t count) {

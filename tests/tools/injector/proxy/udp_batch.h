@@ -59,7 +59,6 @@ class UdpBatch {
   /// datagram.
   std::uint64_t overflowed() const noexcept { return overflowed_; }
 
-  /// The address at which peers reach this socket.
   Address local_address() const;
 
   int fd() const noexcept { return fd_; }

@@ -18,7 +18,7 @@ namespace tendon::injector {
 /// `tendon-inject selftest`: compares many decisions of each model with its law in closed form. The laws use doubles
 /// and libm and share no code with the decision core.
 struct SelftestOptions {
-  std::size_t count = 1'000'000;  ///< datagrams for each model
+  std::size_t count = 1'000'000;
   std::uint64_t seed = 7;
   /// A folder: each histogram in it (*.csv, recursively) adds a model.
   std::optional<std::filesystem::path> data = {};

@@ -51,7 +51,6 @@ inline bool lost(const Decision& decision) { return decision.verdict == Verdict:
 
 inline Duration delay(const Decision& decision) { return decision.release - decision.arrival; }
 
-/// The delay of each datagram in ns.
 std::vector<double> delays(const Profile& profile, const Traffic& traffic, const SelftestOptions& options);
 
 }  // namespace tendon::injector

@@ -110,7 +110,6 @@ class Building {
   std::array<Flow, 2> flows_;
 };
 
-/// The sending time of packet `number` at regular intervals.
 Duration evenly(std::int64_t number, Duration interval) {
   return interval > kMaxTraceTime / std::max<std::int64_t>(number, 1) ? kMaxTraceTime : number * interval;
 }

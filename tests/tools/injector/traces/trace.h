@@ -61,8 +61,8 @@ struct TraceRecord : Decision {
 struct TraceHeader {
   std::uint64_t seed = 0;
   LocalTime start{};
-  std::string up, down;               ///< profiles, as written by to_string(); empty for imported traces
-  std::vector<std::uint64_t> tables;  ///< hashes of the quantile tables
+  std::string up, down;  ///< profiles, as written by to_string(); empty for imported traces
+  std::vector<std::uint64_t> tables;
   std::string build;
   /// In a sparse trace, by Direction: the delay of datagrams that are not among the records. A trace with either value
   /// is sparse: it lists only relevant datagrams (see shrink.h), and TracePlayer passes all others. In any other trace,
@@ -110,7 +110,6 @@ class TraceWriter {
   std::ostream& to_;
 };
 
-/// Writes a whole trace with TraceWriter.
 void write_trace(std::ostream& to, const Trace& trace);
 
 /// Reads the output of TraceWriter; read and write are exact inverses. `name` is the file in errors. Throws

@@ -20,7 +20,7 @@ class TraceRecorder {
   /// Maximum number of queued records, half a minute at 10 000 per second; more are lost and counted.
   static constexpr std::size_t kMaxWaiting = 300'000;
 
-  /// Creates or replaces `file`. Throws std::runtime_error if it cannot be written.
+  /// Throws std::runtime_error if `file` cannot be written.
   TraceRecorder(const std::filesystem::path& file, const TraceHeader& header);
   /// Like finish(), but ignores errors.
   ~TraceRecorder();
