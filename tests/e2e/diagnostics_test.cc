@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// Diagnostics for an observer: the server's loop, an engine behind a bad network, a device's safety. No test measures a
-// time; delays have lower bounds only.
+// Tests the diagnostics that an observer receives about the server, the network and the device. The tests do not check
+// upper bounds of times.
 #include <gtest/gtest.h>
 
 #include <algorithm>

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// Several engines on one device, and several devices on one server, each in its own process. No test measures a time.
+// Tests multiple engines on one device and multiple devices on one server, in separate processes.
 #include <gtest/gtest.h>
 
 #include <nlohmann/json.hpp>

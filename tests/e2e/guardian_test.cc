@@ -331,7 +331,7 @@ TEST(Guardian, WritesZeroAlsoWhenAllEndsWellAndKeepsNothingOpen) {
   ASSERT_EQ(pipe(said.data()), 0);
   {
     Guardian guardian;
-    close(said[1]);  // the guardian's copy must be closed too, or the next read never ends
+    close(said[1]);  // the descriptor of the guardian must also be closed
     char nothing = 0;
     EXPECT_EQ(read(said[0], &nothing, 1), 0);
     EXPECT_TRUE(guardian.guard(0, device.end_of_the_driver(), written(kZero)));

@@ -39,7 +39,7 @@ Datagram garbage(std::mt19937_64& bits, std::size_t size) {
   return datagram;
 }
 
-/// Lets the server read before its receive buffer is full. If this is too short, the kernel drops datagrams.
+/// Gives the server time to read its receive buffer. If the buffer is full, the kernel drops datagrams.
 void breathe() { std::this_thread::sleep_for(std::chrono::milliseconds(1)); }
 
 void wait_until_said(const Relay& relay, std::size_t count) {
@@ -84,8 +84,8 @@ TEST(HostileDatagrams, AreCountedAndChangeNothing) {
   }
   const std::vector<Datagram> said = relay.said();
   for (const Datagram& datagram : said) {
-    relay.forge(datagram);             // once more, from the client's address
-    stranger.send(address, datagram);  // and from another address
+    relay.forge(datagram);             // sends a copy from the address of the client
+    stranger.send(address, datagram);  // sends a copy from another address
     relay.forge(std::span(datagram).first(below(bits, kHeaderSize)));
     breathe();
   }

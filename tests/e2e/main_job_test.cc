@@ -41,7 +41,7 @@ TEST(MainJob, AHandFeelsALateLossyRemoteWallAndTheDeviceNeverGivesOutEnergy) {
   Server server(folder.path(), demo_scene(), {"--record", file.string()});
   Service network("tendon-inject",
                   {"--to", server.address(), "--profile", "delay=uniform(15ms,25ms) loss=2%", "--seed", "7",
-                   "--max-release-error-us", "1e9"},  // no claim depends on when datagrams leave
+                   "--max-release-error-us", "1e9"},  // the test does not depend on the release times
                   folder.path(), "start", "listen");
   Process wall(program("virtual_wall"), {"--server", network.address(), "--duration-s", "3", "--json"}, folder.path());
   EXPECT_EQ(wall.wait(), 0) << wall.err();

@@ -19,7 +19,7 @@ namespace {
 
 std::filesystem::path scene(const std::string& name) { return demo_scene().parent_path() / name; }
 
-/// Checks that every force was within its limiter's bound and that every step replays identically.
+/// Checks that the forces are within the bounds of the limiter and that the replay is identical.
 void expect_sound(const std::filesystem::path& file, const std::filesystem::path& folder) {
   const Recording recording = read_recording(file);
   EXPECT_GT(recording.steps.size(), 500U);

@@ -20,7 +20,7 @@ class Cable final : public usb::Pipe {
     if (full) return false;
     fuzz::require(bytes.size() <= usb::kPacketSize);
     if (sending) {
-      fuzz::require(sent.empty() || heard == last);  // nothing new before the echo of the last piece
+      fuzz::require(sent.empty() || heard == last);  // the loader must wait for the echo of the previous piece
       sent.insert(sent.end(), bytes.begin(), bytes.end());
     } else if (bytes.size() == 1) {
       sending = true;  // the letter for the baud rate; the image follows

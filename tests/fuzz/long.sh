@@ -1,9 +1,10 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# long.sh [RUNS [TARGET…]]: runs of each fuzz target of the preset `asan`, one after the other, at the lowest priority,
-# for hours: 10 000 000 unless told otherwise. Each target writes its finds to build/asan/long/TARGET/, and its log to
-# TARGET.log there. Afterwards TARGET/minimised holds the inputs that reach all that was reached. When they reach more
-# than the committed corpus, pack them (the last line printed says how), and commit that with the figures for README.md.
+# long.sh [RUNS [TARGET…]]: runs each fuzz target of the preset `asan` in turn, at the lowest priority, for RUNS
+# executions (default: 10 000 000), which takes hours. Each target writes its findings to build/asan/long/TARGET/ and
+# its log to TARGET.log there. TARGET/minimised then contains the inputs that reach the same coverage. If they reach
+# more than the committed corpus, pack them with the command in the last line of the output, and commit the result with
+# the figures for README.md.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 runs=${1:-10000000}
@@ -15,7 +16,7 @@ declare -A longest=([header]=64 [payload]=400 [handshake]=24 [session]=24 [key]=
   [falcon_reply]=200 [falcon_loader]=60 [falcon_device]=200 [spacemouse_report]=64
   [woodenhaptics_report]=64 [woodenhaptics_device]=200)
 cmake --preset asan && cmake --build --preset asan --target fuzzers
-# A stack trace for each allocation is of no use here, and entropic scheduling costs more than our targets do.
+# Omits stack traces of allocations and entropic scheduling, which are not worth their cost for these targets.
 export ASAN_OPTIONS=malloc_context_size=0:quarantine_size_mb=1:thread_local_quarantine_size_kb=16
 for target in "${targets[@]}"; do
   folder=build/asan/long/$target

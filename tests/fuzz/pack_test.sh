@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# pack_test.sh: unpacking a committed corpus and packing it again gives the same bytes, even from files of another time,
-# mode and order on the disk.
+# pack_test.sh: checks that unpacking and packing a committed corpus gives the same bytes, independent of the times,
+# modes and order of the files.
 set -euo pipefail
 cd "$(dirname "$0")"
 work=$(mktemp -d)

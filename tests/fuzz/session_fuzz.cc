@@ -6,9 +6,9 @@
 #include "protocol/session.h"
 #include "tests/fuzz/target.h"
 
-// Two sessions over a network that loses, repeats, reorders, damages and delays datagrams as the input decides. Each
-// end receives only what the other has sent, requests arrive once and in order, and a session ends only by timeout, Bye
-// or age.
+// Runs two sessions over a simulated network. The input determines which datagrams are lost, repeated, reordered,
+// damaged or delayed. Checks that the received data was sent by the peer, that requests arrive once and in order, and
+// that a session only ends due to a timeout, a Bye or its age.
 
 using namespace tendon;
 

@@ -194,8 +194,8 @@ TEST(HardArithmetic, DenormalsAreOffInHapticStepsAndSoftBodyAnswers) {
        .without = "DenormalsOff left out: " + std::to_string(slow_without) + " answers"});
 }
 
-/// A tool that presses into a soft block behind a bad network. Two twins with the same seed are bitwise identical until
-/// a datagram is inserted.
+/// A simulation of a tool that is pressed into a soft block over a bad network. Two twins with the same seed are
+/// bitwise identical until a datagram is inserted.
 struct Twin {
   explicit Twin(std::uint64_t seed)
       : device(hand()), world(config(seed), device), body(softbody::parse_scene(scene(), "s.toml", ".")) {

@@ -119,8 +119,8 @@ TEST(HardLoop, AnEstimatorThatHasLongSeenNothingNewDoesNotWindUp) {
               without("cap of 1e30 in place of 2e8", kWithin, [](std::uint64_t seed) { return wind_up(seed, 1e30); })});
 }
 
-/// The lowest account (J) that an adversary with this friction reaches. The adversary moves along the force whenever
-/// the law lets it gain energy, while an engine pushes it back and forth.
+/// Returns the lowest energy (J) of the account. The adversary moves in the direction of the force if it can gain
+/// energy from the controller.
 double left_by_adversary(const Case& set, const Friction& friction) {
   AdversaryDevice device({.friction = friction}, set.world.seed);
   WatchedDevice port(device, {.friction = friction});

@@ -91,7 +91,7 @@ class Encoder final : public Device {
   Vec3 last_ = Vec3::Zero();
 };
 
-/// Observations at the port; for several runs the worst of each.
+/// The values observed at the port. For multiple runs, each is the worst value.
 struct Observed {
   double least_energy = 0;  ///< J
   double least_work = 0;    ///< J, of the hand

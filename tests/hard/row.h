@@ -7,11 +7,11 @@
 namespace tendon::hard {
 
 struct Row {
-  std::string hard;                   ///< why it is hard: the behavior of a naive program
-  std::string oracle;                 ///< the required property; the same in every run
+  std::string hard;                   ///< the reason why this case is difficult
+  std::string oracle;                 ///< the property that the test checks; the same text in every run
   std::string result;                 ///< the outcome, with units
   std::optional<double> margin = {};  ///< bound / measured, above 1 if the bound holds; none for yes/no properties
-  std::string without;                ///< the outcome without the protection, which it names
+  std::string without;                ///< the result if the protection is disabled
 };
 
 /// Fails the running test if README.md has no line with the same `hard` and `oracle`. If $TENDON_HARD_ROWS is set,

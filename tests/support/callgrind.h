@@ -13,7 +13,7 @@ namespace tendon::testing {
 
 struct Counted {
   std::string line;
-  double instructions = 0;  ///< the longer of two runs minus the shorter
+  double instructions = 0;  ///< the difference between a longer and a shorter run
 };
 
 /// Runs `program argument` under callgrind. For every line that it prints, the program calls its extern "C" function

@@ -57,7 +57,7 @@ class FakeAvahi {
   std::vector<Announced> announced();
 
  private:
-  struct Peer;  // keeps libsystemd out of this header
+  struct Peer;  // defined in the source file to avoid including libsystemd
   void run();
 
   std::string address_;

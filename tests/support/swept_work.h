@@ -23,12 +23,11 @@
 
 namespace tendon {
 
-/// The part of the work for this process (part_options.h reads it from the command line). Without `units` and `from` it
-/// is everything.
+/// The part of the work that is done by this process. If neither `units` nor `from` is set, the process runs all units.
+/// The options are defined in part_options.h.
 struct Part {
-  std::optional<Units> units{};                 ///< runs only these, as a shard of a sweep
-  std::optional<std::filesystem::path> from{};  ///< reads the results of a sweep's shards from this file instead of
-                                                ///< running units
+  std::optional<Units> units{};                 ///< the units of this shard
+  std::optional<std::filesystem::path> from{};  ///< the file with the results of the shards
   bool progress = false;                        ///< prints progress on standard error
 };
 
@@ -62,7 +61,7 @@ std::string text_of(const SweptWork<Outcome>& work, std::uint64_t unit, const Ou
   return text;
 }
 
-/// Throws std::invalid_argument unless the parsed outcome is written back to the same lines.
+/// Throws std::invalid_argument if the lines differ from the output of lines() for the parsed outcome.
 template <class Outcome>
 Outcome outcome_of(const SweptWork<Outcome>& work, std::uint64_t unit, const std::string& text) {
   const std::string name = "unit " + std::to_string(unit) + " of the " + std::string(work.what) + ": ";

@@ -44,7 +44,7 @@ class UnitDigest {
   std::string text() const;
   /// 16 hexadecimal digits.
   std::string moment() const;
-  /// Parses text() and moment(). Throws std::invalid_argument for anything else.
+  /// Parses the output of text() and moment(). Throws std::invalid_argument if the input is malformed.
   static UnitDigest parse(std::string_view text, std::string_view moment);
 
   /// Returns the unit in which two digests of the same units differ. Returns nullopt if they are equal or several units
@@ -79,7 +79,7 @@ struct ShardEnd {
   /// Appends the next shard. Throws std::invalid_argument if it is not contiguous or has different names.
   void add(const ShardEnd& next);
   std::string line() const;
-  /// Parses line(). Throws std::invalid_argument for anything else.
+  /// Parses the output of line(). Throws std::invalid_argument if the input is malformed.
   static ShardEnd parse(std::string_view line);
 
   /// Throws std::invalid_argument for an unknown name.

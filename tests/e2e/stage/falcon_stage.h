@@ -27,7 +27,7 @@ class FalconStage {
     FakeFalcon::Options falcon = kReady;
     bool record = false;
   };
-  /// A Falcon after use: with firmware, and homed.
+  /// A Falcon that has already been homed.
   static constexpr FakeFalcon::Options kReady = {.has_firmware = true, .is_homed = true, .firmware_bytes = 4096};
   static constexpr double kWall = 500;  ///< N/m, at x = 0, in the path of a hand that moves along x
 
@@ -55,13 +55,13 @@ class FalconStage {
   void wait_for_commands(int count);
   static bool pushed_out(const FakeFalcon& falcon) { return falcon.force().x() < -0.5; }
 
-  /// Waits until no process has the device open. Returns the observations of the device.
+  /// Waits until the device is closed by all processes. Returns the data that the device has received.
   FarFalcon::Seen wait_for_release();
 
   /// Observations after a SIGKILL of the server, when no process has the device open.
   struct Killed {
     double pushed_for_ms = 0;          ///< after the signal was sent
-    double dead_ms = 0;                ///< until the parent process saw the exit, after the signal was sent
+    double dead_ms = 0;                ///< time from the signal to the exit of the process
     bool pushes = true;                ///< at the end
     std::vector<std::uint8_t> last{};  ///< the last received endpoint and packet
     std::uint64_t by_guardian = 0;     ///< packets written directly to the device node

@@ -18,8 +18,8 @@ std::filesystem::path program(const std::string& name);
 
 std::filesystem::path demo_scene();
 
-/// A hand that moves into the wall and stays there. Forces are held and fade for longer than a machine pauses, so that
-/// every stage of the age policy occurs.
+/// A scene with a hand that moves into the wall and stays there. Forces are held and fade for longer than a machine
+/// pauses, so that every stage of the age policy occurs.
 inline constexpr std::string_view kPressingHand = R"([device]
 kind = "simulated"
 profile = "falcon"
@@ -74,7 +74,7 @@ class Server : public Service {
          std::vector<std::string> more_environment = {});
 };
 
-/// A client program, "virtual_wall" or "echo_motion". It exits by itself like Service.
+/// A client program, "virtual_wall" or "echo_motion". It is stopped after two minutes if the test is killed.
 class Client : public Process {
  public:
   Client(const std::string& name, const std::string& server, const std::filesystem::path& folder,
@@ -98,8 +98,8 @@ struct Recording {
 Recording read_recording(const std::filesystem::path& file);
 
 /// Checks a recording made with the limiter on. Steps are consecutive. No force exceeds the limiter's bound. The ledger
-/// never falls below −1 nJ except through an overrun; after that only another overrun lets it fall further, and no
-/// force exceeds the Coulomb friction that the limiter assumes.
+/// does not fall below −1 nJ unless there is an overrun. After an overrun, it must not decrease further until the next
+/// overrun, and the forces must not exceed the Coulomb friction assumed by the limiter.
 void expect_passive(const Recording& recording, const Scene& scene);
 
 }  // namespace tendon::e2e

@@ -86,7 +86,7 @@ class Conversation {
     listen_until(
         duration, [] { return false; }, false);
   }
-  /// Sends keep-alives until the peer has acknowledged `number`. Returns false after `patience`.
+  /// Waits for an acknowledgement of `number` while sending keep-alives. Returns false after `patience`.
   bool confirmed(std::uint64_t number, Duration patience = kPatience);
   /// Repeats a request until it is answered, for at most kPatience.
   std::optional<pb::ControlAck> ask(const pb::Control& control);
@@ -114,7 +114,7 @@ class Conversation {
   struct Said {
     std::int64_t sent_ns;
     std::uint64_t order;           ///< among all datagrams sent
-    std::int64_t heard_before_ns;  ///< T3 of the newest datagram received before this one was sent
+    std::int64_t heard_before_ns;  ///< T3 of the last datagram that was received before this datagram was sent
   };
   void record(std::uint64_t number, const pb::Datagram& body);
   void hear(const Wire::Arrival& arrival);
@@ -146,7 +146,7 @@ class Conversation {
   std::uint64_t expected_ = 0;                      ///< the peer's next number
   bool moved_ = false;                              ///< datagrams to the old port are not received
   std::map<std::uint64_t, std::int64_t> arrivals_;  ///< T2 as reported by the peer, by our packet number
-  std::map<std::uint64_t, std::size_t> numbers_;    ///< the peer's packet number → index into heard_
+  std::map<std::uint64_t, std::size_t> numbers_;    ///< maps the packet number of the peer to an index of heard_
 };
 
 }  // namespace tendon::conformance

@@ -43,7 +43,7 @@ struct Head {
   bool operator==(const Head&) const = default;
 };
 Bytes write(const Head& head);
-/// Returns nullopt for fewer than 16 bytes. Does not validate the fields.
+/// Returns nullopt if there are fewer than 16 bytes. This does not check the values of the fields.
 std::optional<Head> read_head(Span datagram);
 
 /// A Hello of 1200 bytes, a Retry of 48, an Answer.

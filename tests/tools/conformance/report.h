@@ -26,7 +26,7 @@ struct Check {
 std::span<const Check> checks();
 
 /// Returns the document and the anchor of the section on its web page, for example
-/// "WIRE.md#type-2-retry-server--client-48-bytes". For a header returns its name only: "stream.h".
+/// "WIRE.md#type-2-retry-server--client-48-bytes". For headers, the result is the file name: "stream.h".
 std::string anchor(const Check& check);
 
 enum class Outcome : std::uint8_t { kUnreached, kPassed, kFailed, kNotApplicable };
@@ -43,7 +43,7 @@ struct Verdict {
 /// Thread-safe: no.
 class Report {
  public:
-  /// Begins with all checks of `side` unreached.
+  /// Creates a report in which all checks of `side` are unreached.
   explicit Report(Side side);
 
   /// Records one observation of the rule `name` and keeps the first failure. Throws std::logic_error if `name` is not a

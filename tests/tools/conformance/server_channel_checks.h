@@ -15,7 +15,8 @@ class ChannelChecks {
  public:
   explicit ChannelChecks(ServerGuest& guest) : guest_(guest) {}
 
-  /// No client may control the device. Leaves each Hello half-open, so none controls it afterwards.
+  /// The device must not be controlled by any client. The function does not complete the handshakes, so that the device
+  /// is still free afterwards.
   void check_claims();
   /// The observer has not claimed the channel as a controller. `id`: its next request.
   void check_from_outside(Conversation& observer, std::uint32_t id);

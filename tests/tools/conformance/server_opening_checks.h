@@ -3,7 +3,7 @@
 
 #include "tests/tools/conformance/server_guest.h"
 
-// Checks before and besides a session. Each function judges the checks in its name.
+// Checks for the handshake. The name of each function contains the name of the check.
 
 namespace tendon::conformance {
 

@@ -15,7 +15,7 @@ namespace {
 
 using std::chrono::milliseconds;
 
-/// Longer than the interval of keep-alives, by several times.
+/// This is longer than the interval between keep-alives.
 constexpr Duration kMoment = milliseconds(150);
 
 pb::Datagram of(const pb::Frame& frame) {
@@ -105,7 +105,8 @@ std::vector<Bad> forgeries(Conversation& talk) {
        [&talk](std::uint64_t number, const pb::Datagram&) { return write(talk.head(number)); }}};
 }
 
-/// Sends each under its own number; the peer must accept none. Returns the first of these numbers.
+/// Sends the datagrams with different packet numbers. The peer must not accept any of them. Returns the first packet
+/// number.
 std::uint64_t say_all(Conversation& talk, Evidence& evidence, const std::vector<Bad>& all, bool numbers_stay_free) {
   const std::uint64_t first = talk.next_number();
   const std::uint64_t unseen = evidence.next;

@@ -8,7 +8,8 @@
 #include "tests/tools/conformance/conversation.h"
 #include "tests/tools/conformance/opening.h"
 
-// Rules of an open session that apply to both sides. Each function judges the checks in its name.
+// Checks for an open session that apply to clients and servers. The name of each function contains the name of the
+// check.
 
 namespace tendon::conformance {
 

@@ -12,7 +12,7 @@
 
 namespace tendon::conformance {
 
-/// A wire over UDP. Receiving on one port drains all ports, so that none overflows.
+/// Sends and receives datagrams over UDP. To avoid an overflow, receive() reads the datagrams of all ports.
 ///
 /// Thread-safe: no.
 class UdpWire : public Wire {

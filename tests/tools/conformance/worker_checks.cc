@@ -24,13 +24,13 @@ using Road = WorkerWire::Road;
 /// From the start of the program to its opening record. MPI and an interpreter are slow on a busy machine. A front
 /// waits as long.
 constexpr Duration kStart = std::chrono::minutes(2);
-/// For an answer. The first one may include compilation or factorization.
+/// The maximum time for an answer. The first answer may require a compilation or a factorization.
 constexpr Duration kAnswer = seconds(30);
-/// From the end of the stream to the end of the program.
+/// The maximum time between the end of the stream and the exit of the program.
 constexpr Duration kEnd = seconds(10);
-/// The worker must be silent for this long.
+/// The worker must not send anything during this time.
 constexpr Duration kQuiet = milliseconds(300);
-/// Between two fragments of a record.
+/// The delay between two fragments of a record.
 constexpr Duration kPause = milliseconds(20);
 constexpr int kFirstStates = 3;
 constexpr int kInARow = 100;
@@ -227,7 +227,7 @@ void WorkerJudge::converse() {
   for (int i = 0; i < kFirstStates; ++i) {
     if (!ask(next_state(), "answer-comes")) return;
   }
-  // Within the length, after it, within the sequence, within the body, near its end.
+  // The record is split within the length, after the length, within the sequence number, and within the body.
   pb::DeviceState state = next_state();
   const std::size_t size = 12 + state.ByteSizeLong();
   const std::array<std::size_t, 5> cuts = {2, 4, 9, 30, size};

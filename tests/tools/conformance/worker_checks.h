@@ -18,7 +18,7 @@ class WorkerWire {
   enum class Road : std::uint8_t { kUnix = 1, kTcp = 2 };
   struct Heard {
     Bytes bytes{};
-    std::string ended{};  ///< why the stream has ended; empty if it is open
+    std::string ended{};  ///< the reason for the end of the stream, or empty
   };
 
   virtual ~WorkerWire() = default;

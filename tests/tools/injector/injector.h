@@ -28,7 +28,8 @@ struct Packet {
 
 enum class Verdict : std::uint8_t { kPass, kDrop, kDuplicate };
 
-/// For a dropped datagram, what dropped it; for one that passed, the last step that determined its release time.
+/// The reason for a decision. If the datagram was dropped, this is the model that dropped it. Otherwise, it is the last
+/// step that determined the release time.
 enum class Cause : std::uint8_t {
   // passed
   kDelay,    ///< its own delay
@@ -101,23 +102,23 @@ class Decider {
 /// Thread-safe: no.
 class Injector final : public Decider {
  public:
-  /// Throws std::invalid_argument as check(profile) does. The times of the profile count from `start`, or from the
-  /// first arrival if it is not given. Building the tables takes up to a few milliseconds; copying an injector does
+  /// Throws std::invalid_argument as check(profile) does. The times in the profile are relative to `start`, or to the
+  /// first arrival if `start` is not set. Building the tables takes up to a few milliseconds; copying an injector does
   /// not.
   Injector(const Profile& profile, std::uint64_t seed, std::uint32_t link, Direction direction,
            std::optional<LocalTime> start = std::nullopt);
 
   /// Returns an injector for another link that shares the tables of this one. Call it only before the first decision.
   Injector for_link(std::uint32_t link) const;
-  /// The times of the profile count from `start`.
+  /// The times in the profile are relative to `start`.
   Injector for_link(std::uint32_t link, LocalTime start) const;
 
   /// Arrivals should not decrease; if they do, FIFO order still holds. A datagram that exceeds a route of 60 s plus its
   /// queue is not delayed further.
   Decision decide(const Packet& packet) override;
 
-  /// Switches to another profile, whose times count from `now`. Keeps the index, draws, queue, order and the states of
-  /// correlated delay and loss. Throws like the constructor, without any effect in that case.
+  /// Changes the profile. The times of the new profile are relative to `now`. Keeps the index, draws, queue, order and
+  /// the states of correlated delay and loss. Throws like the constructor, without any effect in that case.
   void change(const Profile& profile, LocalTime now);
   /// Uses the profile and tables of another injector. Builds no tables and does not throw.
   void change(const Injector& prepared, LocalTime now);

@@ -20,7 +20,7 @@ using namespace std::chrono_literals;
 
 constexpr LocalTime kStart = LocalTime(5s);
 
-/// The decisions on `count` datagrams of 100 bytes at intervals of `period`, from kStart on.
+/// Returns the decisions for `count` datagrams of 100 bytes. The first datagram is sent at kStart.
 std::vector<Decision> decisions(const std::string& profile, int count, Duration period, std::uint64_t seed = 7) {
   Injector injector(parse_profile(profile), seed, 0, Direction::kUp);
   std::vector<Decision> all;
@@ -177,7 +177,7 @@ TEST(Injector, ForAnotherLinkIsAsIfBuiltForIt) {
 
 // ---- What each field does -------------------------------------------------------------------------------------------
 
-/// Delay in ms of datagrams at intervals of `period`, by time since the first in ms.
+/// Returns the delays in ms of `count` datagrams that are sent at intervals of `period`.
 std::vector<double> delays_ms(const std::string& profile, int count, Duration period) {
   std::vector<double> all;
   for (const Decision& d : decisions(profile, count, period)) all.push_back(seconds(delay(d)) * 1e3);

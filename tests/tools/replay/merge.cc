@@ -108,7 +108,7 @@ std::set<std::uint32_t> channels_of(const End& leader, const End& follower) {
   return channels;
 }
 
-/// Copies the messages of one recording in their order. Keeps only the coupling ports on `channels`.
+/// Copies the messages of a recording. Ports of other channels are not copied.
 class Copy {
  public:
   Copy(const std::filesystem::path& path, std::string prefix, std::set<std::uint32_t> channels)

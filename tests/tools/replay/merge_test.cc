@@ -24,8 +24,8 @@ using tendon::testing::ScratchFolder;
 
 constexpr Duration kAhead = 250ms;  // of the follower's clock
 
-/// Records ten seconds of a coupling at one end. `epoch`: 1 for the leader, 2 for the follower. `drift` belongs to the
-/// clock of this end, and `way` is the delay of its received datagrams.
+/// Writes a recording of ten seconds of a coupling. `epoch`: 1 for the leader, 2 for the follower. `drift` belongs to
+/// the clock of this end, and `way` is the delay of its received datagrams.
 void record(const std::filesystem::path& file, std::uint64_t epoch, Duration ahead, double drift = 0,
             Duration way = 2980us) {
   FileSink sink(file);

@@ -93,7 +93,7 @@ Chosen choose(const Options& options) {
 }
 
 /// Reads the parts of the recording. Calls `visit` with the number of the device, the recorded step and the replayed
-/// step for each selected device. Each part starts with the scenes, of which only those of the first part are used.
+/// step for each selected device. Each part starts with a copy of the scenes. Only the first copy is used.
 template <class Visit, class VisitDatagram>
 Gaps read_run(const Options& options, const Chosen& chosen, Rerun::Held held, const Visit& visit,
               const VisitDatagram& visit_datagram) {

@@ -25,7 +25,8 @@ struct Options {
   bool progress = false;  ///< rewrites a progress line on stderr
 };
 
-/// Replays every step of every device of a recording, with its parts as one run, in bounded memory.
+/// Replays all steps of all devices in a recording. The parts of a recording are treated as a single run. The memory
+/// usage is bounded.
 ///
 /// Without `law` and `settings`, runs the recorded scene. Each step uses the force that the device held then, and all
 /// results of the law must be bitwise identical: interval, account, bound, force, mode, reasons. Returns false at the

@@ -34,7 +34,7 @@ class QuantileTable {
 
   bool constant() const noexcept { return pieces_.size() == 1 && pieces_.front().slope == 0; }
 
-  /// FNV-1a of the pieces, for the trace. Tables with the same hash give the same decisions.
+  /// FNV-1a of the pieces, for the trace. The decisions are identical if the hashes of the tables are equal.
   std::uint64_t hash() const noexcept;
 
  private:
@@ -44,7 +44,7 @@ class QuantileTable {
     std::int64_t least_and_shift;  ///< least · 64 + shift, where shift is the number of leading zeros of the length
   };
   std::vector<Compiled> pieces_;
-  /// For each value of the leading bits of u, the last piece that begins at or before it. Shortens the search.
+  /// Lookup table for the leading bits of u. Contains the index of the last piece that starts at or before the value.
   std::vector<std::uint32_t> guide_;
   int guide_shift_ = 0;
 };

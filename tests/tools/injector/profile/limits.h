@@ -16,7 +16,7 @@ namespace tendon::injector {
 inline constexpr std::uint64_t kMaxQueueBytes = std::uint64_t{1} << 30;
 inline constexpr std::uint64_t kMaxRate = 1'000'000'000'000;  ///< bit/s
 
-/// Throws std::invalid_argument unless `least` ≤ `value` ≤ `most`.
+/// Throws std::invalid_argument if `value` is not in the range [least, most].
 void check_duration(const std::string& field, Duration value, Duration least = {}, Duration most = kMaxDelay);
 
 /// Describes the error in `entry`, which follows `previous`, or returns nullopt.

@@ -150,8 +150,8 @@ struct Stall {  ///< stall(every=2s,for=100ms): datagrams leave at the end of th
   Window when;
   bool operator==(const Stall&) const = default;
 };
-/// handover(every=15s,for=60ms,10ms): arrivals in the window are lost. From its end until the next handover, the path
-/// is longer by a uniform amount in ±10 ms.
+/// handover(every=15s,for=60ms,10ms): arrivals in the window are lost. After the window, the delay changes by a random
+/// value between −10 ms and 10 ms until the next handover.
 struct Handover {
   Window when;
   Duration change{};

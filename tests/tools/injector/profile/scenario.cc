@@ -28,7 +28,7 @@ void set_profiles(Change& change, std::string_view key, std::string_view profile
 void append(std::string& text, std::string_view key, std::string_view value) {
   if (!text.empty()) text += ", ";
   text.append(key).append(" ").append(value);
-  // A trace stores it on one line.
+  // The text must fit into a single line of the trace.
   std::ranges::replace_if(
       text, [](char c) { return c == '\n' || c == '\r'; }, ' ');
 }

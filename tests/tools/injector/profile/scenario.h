@@ -120,7 +120,7 @@ class ScenarioPlayer {
   /// Returns when next_due next has a result, or nullopt after the last change.
   std::optional<LocalTime> next_wake() const;
 
-  /// Applies a change that is not in the script, from `now` on.
+  /// Applies a change that is not part of the script.
   void change(const Change& change, LocalTime now);
 
   struct Weather {

@@ -50,7 +50,7 @@ class Shrinking {
       if (!is_benign(record, benign, first ? 0 : rebinds)) part_.push_back(record);
       rebinds = record.rebinds;
     }
-    // Sorts by time, so that simultaneous records are removed together.
+    // The records are sorted by time so that simultaneous records are removed together.
     std::ranges::stable_sort(part_, {}, &TraceRecord::arrival);
   }
 
@@ -66,7 +66,7 @@ class Shrinking {
   }
 
  private:
-  /// Returns false when the runs are used up, which ends the reduction.
+  /// Returns false if the number of runs is exceeded, which stops the reduction.
   bool still_fails(const Part& part) {
     if (runs_ == max_runs_) return false;
     ++runs_;

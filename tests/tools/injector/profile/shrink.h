@@ -27,8 +27,8 @@ struct Shrunk {
 ///
 /// `fails` must play its trace by index and be deterministic. It is called first with the whole trace made sparse. If
 /// that passes, throws std::invalid_argument, because the failure depends on nearly benign delays. It is called next
-/// without any listed datagram. If that fails, the network is not the cause, and the result is empty. The same trace
-/// and predicate give the same result and number of runs.
+/// without any listed datagram. If that fails, the network is not the cause, and the result is empty. The result is
+/// deterministic.
 Shrunk shrink(const Trace& failing, const std::function<bool(const Trace&)>& fails, std::size_t max_runs = 5000);
 
 }  // namespace tendon::injector

@@ -40,8 +40,9 @@ struct DelayList {
   std::optional<std::size_t> dir;             ///< up or down
 };
 
-/// Opens a list of delays and reads its first line. Throws std::runtime_error with a message that begins with `name`.
-/// Rejects two columns without a header, which could be a time and a delay, or one delay with a decimal comma.
+/// Opens a list of delays and reads its first line. Throws std::runtime_error if the input is malformed. The error
+/// message starts with `name`. Rejects two columns without a header, which could be a time and a delay, or one delay
+/// with a decimal comma.
 DelayList open_delays(std::istream& from, const std::string& name);
 
 /// Reads a table of netem (iproute2's *.dist): integers in units of a standard deviation/8192.

@@ -20,11 +20,11 @@ std::string number_text(double value);  ///< the shortest that parses back exact
 /// A nonnegative integer, "64" or "0x40".
 std::optional<std::uint64_t> parse_whole(std::string_view text);
 
-/// A number with its unit (ns, us, ms, s), rounded to nanoseconds; at most a day.
+/// Parses a number with a unit (ns, us, ms, s). The value is rounded to nanoseconds and must not exceed a day.
 std::optional<Duration> parse_duration(std::string_view text);
 std::string duration_text(Duration duration);  ///< whole seconds in s, all else in ms with up to six decimals
 
-/// `value` · `unit_ns`, rounded to nanoseconds; at most a day.
+/// Returns `value` · `unit_ns`, rounded to nanoseconds, or nullopt if the result exceeds a day.
 std::optional<Duration> to_duration(double value, double unit_ns);
 
 /// "2%" or "0.02"; 7% is exactly the double 0.07. Does not check the range 0…1.

@@ -20,8 +20,8 @@
 
 namespace tendon::injector {
 
-/// Connects a Proxy to sockets and the clock. One thread receives datagrams and releases them when they are due. It
-/// does not print, open files, build tables or wait for a lock.
+/// Connects a Proxy to sockets and the clock. The thread that calls run() receives the datagrams and sends them at
+/// their release time. It does not print, open files, build tables or wait for a lock.
 class Driver {
  public:
   struct Config {
@@ -58,7 +58,7 @@ class Driver {
   /// Async-signal-safe.
   void stop() noexcept;
   void change(Proxy::PreparedChange change);
-  /// At most 0.2 s old; final after run() has returned.
+  /// Returns the status, which is updated every 0.2 s and when run() returns.
   Status status() const;
 
   /// The address for clients, with the actual port.
@@ -70,7 +70,7 @@ class Driver {
     std::uint32_t rebinds = 0;
     Address asked_at{};  ///< the local address to which the client sends, if the listener is bound to all addresses
   };
-  /// What the timer is set for.
+  /// The reason for the next wake-up.
   enum class Wake : std::uint8_t { kOther, kRelease, kProbe };
 
   void wait(LocalTime now);
@@ -112,7 +112,7 @@ class Driver {
 
   DurationHistogram timer_floor_;
   LocalTime next_probe_{};                              // earliest time
-  std::optional<LocalTime> probe_;                      // time of a wake-up that measures the timer's own latency
+  std::optional<LocalTime> probe_;                      // the time of the next measurement of the timer latency
   Duration last_sleep_ = std::chrono::milliseconds(1);  // before the last release
 
   std::atomic<bool> stop_ = false;

@@ -33,7 +33,7 @@ bool eventually(Condition condition) {
   return false;
 }
 
-/// One end of a connection, with strings as datagrams.
+/// Sends and receives strings as datagrams.
 class Peer {
  public:
   explicit Peer(UdpBatch socket) : socket_(std::move(socket)) {}

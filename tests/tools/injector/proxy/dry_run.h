@@ -8,9 +8,9 @@
 
 namespace tendon::injector {
 
-/// Runs the decisions alone, without sockets or waiting, on packets of one size at one rate.
+/// Simulates packets with a fixed size and a fixed rate, without sockets.
 struct DryRun {
-  std::uint64_t count = 10'000;  ///< total, alternating between up and down
+  std::uint64_t count = 10'000;  ///< the total number of packets in both directions
   std::uint64_t rate_hz = 1000;  ///< in each direction, 1…10⁹
   std::uint32_t bytes = 200;     ///< payload
   bool json = false;

@@ -42,7 +42,7 @@ class History {
   std::size_t count_ = 0;
 };
 
-/// The datagrams that one decision can send.
+/// The type of a datagram that is sent due to a decision.
 enum class Copy : std::uint8_t {
   kFirst,   ///< the datagram itself, with the damage of the decision
   kSecond,  ///< its undamaged duplicate

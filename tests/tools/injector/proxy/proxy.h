@@ -51,9 +51,9 @@ struct ProxyMeasurements {
   DurationHistogram release_error;  ///< all copies: departure − due time
 };
 
-/// A bad network between many clients and one server, without sockets or a clock. Datagrams enter with their arrival
-/// time and leave when they are due. Each client and direction has its own Decider, so that the traffic of one client
-/// does not affect another.
+/// Simulates a bad network between multiple clients and a server. This class does not use sockets or a clock. Datagrams
+/// enter with their arrival time and leave when they are due. Each client and direction has its own Decider, so that
+/// the traffic of one client does not affect another.
 ///
 /// The driver owns one socket for clients and, for each client, one socket connected to the server, which receives the
 /// server's answers to that client.
@@ -87,7 +87,8 @@ class Proxy {
     /// Keeps a TraceRecord of every decision, see records().
     bool record = false;
 
-    /// Limit of concurrent clients; further ones are refused. Each client costs the driver a socket.
+    /// The maximum number of clients. Datagrams from additional clients are ignored. The driver needs one socket for
+    /// each client.
     std::size_t max_clients = 64;
 
     /// Forgets a client after this silence, once none of its datagrams are in flight. NATs keep a UDP mapping for 30 s
@@ -141,7 +142,8 @@ class Proxy {
   std::optional<LocalTime> next_wake() const;
 
   /// The decisions completed since the caller last cleared this vector. A dropped datagram's decision is complete on
-  /// arrival, others on departure. Times count from the first datagram. Without Config::record the vector stays empty.
+  /// arrival, others on departure. The times are relative to the first datagram. The vector is empty if Config::record
+  /// is not set.
   std::vector<TraceRecord>& records() noexcept { return records_; }
 
   const ProxyMeasurements& measurements(Direction direction) const { return measurements_[index_of(direction)]; }

@@ -21,15 +21,15 @@ struct Status {
   std::vector<Proxy::ClientSummary> clients;
   std::size_t in_flight = 0;
 
-  /// Latency of the machine's own timer: the same thread sleeps in the same system call for as long as before its last
-  /// release and wakes with nothing to send. The rest of a release error is due to the proxy.
+  /// The latency of the system's timer. It is measured by the thread of the driver, which sleeps for the same time as
+  /// before its last release. The remaining part of the release error is caused by the proxy.
   DurationHistogram timer_floor;
 
   std::uint64_t overflowed = 0;    ///< dropped by the kernel because the receive buffer was full
-  std::uint64_t unrecorded = 0;    ///< decisions dropped because the disk was too slow
+  std::uint64_t unrecorded = 0;    ///< number of decisions that were not recorded because the disk was too slow
   std::size_t scenario_steps = 0;  ///< in the timeline
   std::size_t scenario_done = 0;   ///< completed
-  std::string last_change;         ///< of the network, by the timeline or a command
+  std::string last_change;         ///< the last change of the network
   Address server{};                ///< current address
   std::string no_socket;           ///< the first error of opening a socket for a client, or empty
   std::uint64_t late_rebinds = 0;  ///< datagrams sent from the old port because the new one could not be opened

@@ -21,7 +21,7 @@ class Terminal {
   static std::unique_ptr<Terminal> take();
   Terminal(const Terminal&) = delete;
   Terminal& operator=(const Terminal&) = delete;
-  /// Keeps the last picture and restores the terminal.
+  /// Restores the state of the terminal.
   ~Terminal();
 
   std::size_t columns() const;

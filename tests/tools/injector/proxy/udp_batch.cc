@@ -22,11 +22,11 @@
 namespace tendon::injector {
 namespace {
 
-/// Requested receive buffer. Virtual machines pause for up to 40 ms; at 100 000 datagrams per second 4000 arrive in
-/// that time, and the kernel accounts about 1 kB for a small one.
+/// The size of the receive buffer. A virtual machine can pause for 40 ms. At 100 000 datagrams per second, this
+/// requires space for 4000 datagrams. The kernel needs about 1 kB for a small datagram.
 constexpr int kReceiveBufferBytes = 4 << 20;
 
-/// Above the maximum size of a UDP datagram.
+/// Must be larger than the maximum size of a UDP datagram.
 constexpr std::size_t kLargestDatagram = 65'536;
 
 /// Buffers at multiples of 64 kB would map to the same few cache sets.

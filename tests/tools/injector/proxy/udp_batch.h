@@ -79,7 +79,7 @@ class UdpBatch::Inbox {
 
  private:
   friend class UdpBatch;
-  struct Memory;  // keeps system headers out of this one
+  struct Memory;  // defined in the source file to avoid including system headers
   std::unique_ptr<Memory> memory_;
 };
 

@@ -8,7 +8,8 @@
 
 namespace tendon::injector {
 
-// Groups of checks in the order of `selftest`. Each compares the decisions of one part of the injector with their laws.
+// Groups of checks in the order of `selftest`. Each group compares the decisions of the injector with the expected
+// distribution.
 
 /// A delay model as text, and its distribution function in ns.
 struct DelayLaw {

@@ -137,7 +137,7 @@ std::vector<Check> copies_and_damage(const SelftestOptions& options) {
 std::vector<Check> bottleneck(const SelftestOptions& options) {
   std::vector<Check> checks;
   const auto n = static_cast<double>(options.count);
-  // 972 bytes and 28 of headers take 0.8 ms at 10 Mbit/s. No two events coincide.
+  // The transmission of 972 bytes and a header of 28 bytes takes 0.8 ms at 10 Mbit/s.
   constexpr Duration kService = microseconds(800);
   for (const char* const limit : {"queue=20packets", "queue=20kB"}) {
     const std::string line = std::string("rate=10Mbit/s overhead=28 ") + limit;

@@ -39,8 +39,8 @@ struct Check {
 
 /// Checks delays of `line` at 1 kHz against the law F (in ns) with the Kolmogorov distance. If F is continuous, also
 /// checks the AR(1) Gaussian copula with this rho: with z = Φ⁻¹(F(delay)), the lag-1 autocorrelation of z, and the
-/// innovations (z_t − ρ z_{t−1}) / √(1 − ρ²), which must be independent standard normal variates. Their Kolmogorov
-/// distance needs no allowance for correlation.
+/// innovations (z_t − ρ z_{t−1}) / √(1 − ρ²), which must be independent standard normal variates. The bound of their
+/// Kolmogorov distance does not depend on the correlation.
 std::vector<Check> check_delays(std::string_view line, const Cdf& law, double rho, bool continuous,
                                 const SelftestOptions& options);
 

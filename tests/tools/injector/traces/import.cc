@@ -68,8 +68,8 @@ class Building {
   explicit Building(const std::string& name) : name_(name) { trace_.notes.push_back({0, "imported from " + name}); }
 
   void add(Duration at, Share share, const Fates& fates, std::uint32_t size = 0) {
-    // In a round trip, an unknown fate still belongs to a datagram, and the way back begins at the end of the way
-    // there.
+    // In a round trip, an unknown fate still belongs to a datagram, and the return trip starts when the forward trip
+    // ends.
     const bool round_trip = share == Share::kHalves || share == Share::kMeasured;
     if (fates.up || round_trip) put(Direction::kUp, at, fates.up, size);
     if (round_trip && fates.up) at += fates.up->delay;
@@ -235,7 +235,7 @@ struct PingLog {
     std::optional<Duration> received;
   };
   std::map<std::int64_t, Answer> answers;  ///< by unwrapped sequence number
-  std::int64_t first = 0, last = 0;        ///< of all requests, answered or not
+  std::int64_t first = 0, last = 0;        ///< of all requests
   std::optional<Duration> interval;        ///< from the summary
   std::uint32_t size = 0;
 };
@@ -343,7 +343,7 @@ class IrttTrip {
  private:
   [[noreturn]] void refuse(const std::string& sentence) const { throw std::runtime_error(place_ + '.' + sentence); }
 
-  /// A string since version 0.9, a boolean before.
+  /// This is a string in version 0.9 and later, and a boolean in older versions.
   std::string lost_text() const {
     const Json* const lost = look_up(json_, {"lost"});
     if (lost != nullptr && lost->is_boolean()) return lost->get<bool>() ? "true" : "false";

@@ -24,8 +24,8 @@ namespace tendon::injector {
 /// How a measured delay is assigned to the directions.
 enum class Share : std::uint8_t {
   kHalves,    ///< half of a round trip for each direction (up the smaller one, by at most a nanosecond)
-  kUp,        ///< all of it from client to server; the way back has no delay
-  kDown,      ///< all of it from server to client
+  kUp,        ///< the delay from client to server; the other direction has no delay
+  kDown,      ///< the delay from server to client
   kBoth,      ///< a one-way delay, the same for each direction
   kMeasured,  ///< the file has one for each direction; irtt only
 };

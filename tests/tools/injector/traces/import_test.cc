@@ -77,7 +77,7 @@ TEST(ImportPing, GapsAndWhatWasNeverAnsweredAreLosses) {
 TEST(ImportPing, ARoundTripIsHalvedAndALostOneIsLostOnce) {
   const Trace trace = import(import_ping, kPing);
   EXPECT_EQ(up(trace), "0:0:lost 1:1002:10 2:2004:lost 3:3006:lost 4:4008:505.5 5:5010:5.25 6:6012:lost 7:7014:lost ");
-  // The way back begins at the end of the way there.
+  // The return trip starts when the forward trip ends.
   EXPECT_EQ(down(trace), "1:1012:10 4:4513.5:505.5 5:5015.25:5.25 ");
   EXPECT_EQ(down(import(import_ping, kPing, {.share = Share::kDown})).substr(0, 20), "0:0:lost 1:1002:20 2");
 }

@@ -45,8 +45,8 @@ class TracePlayer final : public Decider {
  public:
   enum class By : std::uint8_t { kIndex, kTime };
 
-  /// `start` corresponds to the trace's start; unused by index. Copies what it needs. Throws std::invalid_argument for
-  /// a sparse trace by time, which does not describe the time between its datagrams.
+  /// `start` corresponds to the trace's start; unused by index. Copies what it needs. Throws std::invalid_argument if a
+  /// sparse trace is replayed by time.
   TracePlayer(const Trace& trace, Direction direction, std::uint32_t link, By by, LocalTime start = {});
 
   Decision decide(const Packet& packet) override;
@@ -66,7 +66,7 @@ class TracePlayer final : public Decider {
   Duration benign_{};
   bool wraps_;
   bool in_order_ = true;
-  std::uint64_t length_ = 0;  ///< by index: number of indices before it repeats
+  std::uint64_t length_ = 0;  ///< the number of indices in the trace
   Duration period_{};         ///< by time
   std::uint64_t next_index_ = 0;
   std::size_t cursor_ = 0;  ///< the record at or after the last index
