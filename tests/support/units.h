@@ -60,8 +60,7 @@ class UnitDigest {
 };
 
 /// The end of a shard or of merged shards, with integer totals and extremes. It has no floating-point sums, because
-/// their
-/// last bit would depend on the partition.
+/// their last bit would depend on the partition.
 ///
 ///     {"kind":"end","first":1,"count":500,"totals":{…},"least":{…},"largest":{…},"digest":"…","moment":"…"}
 struct ShardEnd {

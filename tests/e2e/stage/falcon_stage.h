@@ -55,7 +55,7 @@ class FalconStage {
   void wait_for_commands(int count);
   static bool pushed_out(const FakeFalcon& falcon) { return falcon.force().x() < -0.5; }
 
-  /// Waits until the device is closed by all processes. Returns the data that the device has received.
+  /// Waits until the device is closed by all processes. Returns the state of the device node at that time.
   FarFalcon::Seen wait_for_release();
 
   /// Observations after a SIGKILL of the server, when no process has the device open.

@@ -84,8 +84,8 @@ class Decider {
 };
 
 /// A reproducible network impairment in one direction. The same seed and the same arrivals give the same decisions on
-/// every
-/// machine and compiler, because it uses integers and counter-based random numbers, without floating point or libm.
+/// every machine and compiler, because it uses integers and counter-based random numbers, without floating point or
+/// libm.
 ///
 ///     bottleneck  t₁ = end of transmission from the queue, or kQueueFull and no further steps
 ///     delay       t₂ = t₁ + max(0, base + F⁻¹(u) + regime + step, ramp, spike, handover)
@@ -95,9 +95,8 @@ class Decider {
 ///     copies      duplicate, stale replay; damage: flip, truncate
 ///
 /// The fields of a profile are independent. Each draws its own numbers for each datagram (see Draws). A lost datagram
-/// is
-/// lost at the end of the route, so its successors wait for it as for any other, and none waits for a second copy or a
-/// datagram that jumped. Adding loss, duplicates or damage to a profile therefore changes no other decision.
+/// is lost at the end of the route, so its successors wait for it as for any other, and none waits for a second copy or
+/// a datagram that jumped. Adding loss, duplicates or damage to a profile therefore changes no other decision.
 ///
 /// Thread-safe: no.
 class Injector final : public Decider {

@@ -11,8 +11,7 @@ namespace tendon::replay {
 /// Rigorous bounds on the offset between the clocks of two machines, from the messages between them.
 ///
 /// θ(t) = second clock − first clock at the time t of the first. A message sent at s and received by r took at least
-/// zero
-/// time, whatever the network did:
+/// zero time, whatever the network did:
 ///
 ///     first → second, sent at s, received by r:      θ ≤ r − s
 ///     second → first, sent at s, received by r:      θ ≥ s − r

@@ -11,8 +11,7 @@
 namespace tendon::replay {
 
 /// Replays recorded steps one by one with a new controller. The motion, the sensor and the requested forces come from
-/// the
-/// record.
+/// the record.
 ///
 ///     kRecorded   accounts each interval with the recorded force: the same law gives identical bits
 ///     kOwn        accounts each interval with the force of this law, for another law. The hand still moves as

@@ -20,9 +20,8 @@ QuantileTable delay_table(const Delay& delay);
 ///     e = Φ⁻¹(draw)     z' = ρz + √(1 − ρ²)e     draw' = Φ(z')
 ///
 /// z is standard normal for every ρ, so F⁻¹(draw') has exactly the distribution F. (netem mixes the uniforms
-/// themselves,
-/// xₙ = (1 − ρ)Uₙ + ρxₙ₋₁. These are not uniform, so distributions drawn from them are too narrow.) The autocorrelation
-/// of z at lag k is ρᵏ; that of the delays is slightly lower, depending on F.
+/// themselves, xₙ = (1 − ρ)Uₙ + ρxₙ₋₁. These are not uniform, so distributions drawn from them are too narrow.) The
+/// autocorrelation of z at lag k is ρᵏ; that of the delays is slightly lower, depending on F.
 ///
 /// Uses integers: z in units of 2⁻²⁹, ρ and √(1 − ρ²) in units of 2⁻³⁰, the latter computed from the rounded ρ.
 ///

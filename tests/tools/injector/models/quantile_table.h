@@ -9,8 +9,7 @@
 namespace tendon::injector {
 
 /// An inverse cumulative distribution in integers, from 64 uniform bits to an integer (nanoseconds). It is a chain of
-/// linear
-/// pieces, which map draws u in [from, next from) to
+/// linear pieces, which map draws u in [from, next from) to
 ///
 ///     least + ⌊width · (u − from)/(next from − from)⌋        in least … least + width − 1
 ///

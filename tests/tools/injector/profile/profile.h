@@ -201,8 +201,7 @@ struct Bottleneck {
 };
 
 /// The behavior of a bad network in one direction. The text form is one line, with fields in any order, each at most
-/// once
-/// except drop, regime, step, ramp, spike, stall, handover and outage:
+/// once except drop, regime, step, ramp, spike, stall, handover and outage:
 ///
 ///     base=5ms delay=lognormal(20ms,5ms) rho=0.9 loss=burst(2%,4) spike(every=15s,for=50ms,80ms) rate=10Mbit/s
 ///     queue=64kB

@@ -94,16 +94,14 @@ Command parse_command(std::string_view line);
 std::string command_help();
 
 /// Plays a scenario and accepts changes at run time. Drivers query it for the profile of a new link, and pass each
-/// change
-/// to the existing injectors:
+/// change to the existing injectors:
 ///
 ///     while (auto due = scenario.next_due(now))          // before any datagram of `now` is decided
 ///       for (each link and direction that due->change concerns)
 ///         injector.change(scenario.weather(direction, link).profile, due->at);
 ///
 /// A change applies to datagrams that arrive at its time or later. The result does not depend on when the driver polls,
-/// as
-/// long as it polls before each decision.
+/// as long as it polls before each decision.
 ///
 /// Thread-safe: no.
 class ScenarioPlayer {

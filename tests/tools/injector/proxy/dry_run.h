@@ -19,8 +19,7 @@ struct DryRun {
 /// Writes one line per packet, in the order of sending. As JSON:
 ///     {"dir":"up","index":0,"t_in_ns":0,"verdict":"pass","cause":"delay","t_out_ns":20123456}
 /// t_out_ns is null for a dropped packet, and the time of the first copy for a duplicated one. Times count from the
-/// first
-/// packet. Also writes all decisions to `trace` unless it is null.
+/// first packet. Also writes all decisions to `trace` unless it is null.
 void dry_run(const PreparedNetwork& network, const DryRun& options, std::ostream& out, TraceWriter* trace);
 
 }  // namespace tendon::injector

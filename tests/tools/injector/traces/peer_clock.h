@@ -11,15 +11,13 @@
 namespace tendon::injector {
 
 /// The clock of another machine with its errors, for simulations. Every simulated peer should have one, because code
-/// that
-/// compares two clocks must not rely on their being equal. Its reading at the true time t is
+/// that compares two clocks must not rely on their being equal. Its reading at the true time t is
 ///
 ///     reading(t) = t + offset + ⌊(t − start) · drift_ppb / 10⁹⌋ + Σ change of the steps with start + at ≤ t
 ///
 /// in integer nanoseconds, without floating point. Real clocks have arbitrary offsets (since their boot) and a drift of
-/// up
-/// to 100 ppm (10⁵ ppb; quartz; 16 ppm was measured between two hosts), and step when they are set. A monotonic clock
-/// steps only after a virtual machine was resumed.
+/// up to 100 ppm (10⁵ ppb; quartz; 16 ppm was measured between two hosts), and step when they are set. A monotonic
+/// clock steps only after a virtual machine was resumed.
 ///
 /// Thread-safe: yes, it has no state.
 class DriftingClock {

@@ -37,15 +37,12 @@ inline constexpr std::string_view kTraceBegins = "# tendon-trace 1";
 //   …
 //
 // The first line and the line of column names are required. All other lines with # are optional, and at most one of
-// each
-// kind precedes the column names. Times are integer nanoseconds; an empty field means none. The columns are the members
-// of
-// TraceRecord. The decided one-way delay of a datagram is t_out_ns − t_in_ns; in a run of the proxy the actual one is
-// t_actual_ns − t_in_ns (write_delays() lists both in milliseconds).
+// each kind precedes the column names. Times are integer nanoseconds; an empty field means none. The columns are the
+// members of TraceRecord. The decided one-way delay of a datagram is t_out_ns − t_in_ns; in a run of the proxy the
+// actual one is t_actual_ns − t_in_ns (write_delays() lists both in milliseconds).
 //
 // Datagrams can be in any order, but each index of a flow (a direction of a link) occurs only once, and t_in_ns must
-// not
-// decrease with the index of a flow.
+// not decrease with the index of a flow.
 
 /// One datagram: the decision and its execution.
 struct TraceRecord : Decision {

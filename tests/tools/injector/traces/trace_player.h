@@ -23,21 +23,18 @@ namespace tendon::injector {
 ///              number of datagrams. For other traffic
 ///
 /// The fate is shifted in time and keeps its delay. The same arrivals as in the record give bitwise identical decisions
-/// (by
-/// time: if no two arrivals of a flow coincide in the same nanosecond). For other arrivals, releases remain in order if
-/// they
-/// were in order in the record: release = max(release of the predecessor that passed, arrival + recorded delay).
+/// (by time: if no two arrivals of a flow coincide in the same nanosecond). For other arrivals, releases remain in
+/// order if they were in order in the record: release = max(release of the predecessor that passed, arrival + recorded
+/// delay).
 ///
 /// Datagrams without a record:
 /// * In a sparse trace, an unlisted datagram takes TraceHeader::benign (or no time if that is not given for the
-///   direction),
-///   has the cause kReplay and does not overtake its predecessor.
+///   direction), has the cause kReplay and does not overtake its predecessor.
 /// * In any other trace, a missing datagram (a gap in the indices) takes the median delay of those that passed.
 /// * After its end, a trace that is not sparse repeats, like Mahimahi's files: by index after the last record, by time
 ///   after the last record plus the mean interval.
 /// * A link that is not in the trace uses another one: of n links in order, link i uses the (i modulo n)-th, so that
-///   many
-///   clients can share an imported trace.
+///   many clients can share an imported trace.
 /// * A direction that is not in the trace passes without delay.
 ///
 /// Thread-safe: no.
