@@ -15,8 +15,7 @@ namespace tendon::replay {
 ///
 ///     kRecorded   accounts each interval with the recorded force: the same law gives identical bits
 ///     kOwn        accounts each interval with the force of this law, for another law. The hand still moves as
-///     recorded,
-///                 although other forces would have changed its motion
+///                 recorded, although other forces would have changed its motion
 ///
 /// Thread-safe: no. Realtime-safe: no.
 class Rerun {

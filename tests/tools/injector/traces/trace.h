@@ -31,7 +31,7 @@ inline constexpr std::string_view kTraceBegins = "# tendon-trace 1";
 //   # tables 3c0ffee0ddba11ad          hashes of the quantile tables in use, 16 hexadecimal digits each
 //   # build v0.1.0-12-gabc1234         the program that wrote it
 //   # benign up 20000000               only in a sparse trace: see Trace::benign
-// dir,link,index,t_in_ns,bytes,hash,verdict,cause,t_out_ns,t_actual_ns,duplicate_ns,stale_back,stale_ns,flipped_bit,truncated_to,rebinds
+//   dir,link,index,t_in_ns,bytes,hash,verdict,cause,t_out_ns,t_actual_ns,duplicate_ns,stale_back,stale_ns,flipped_bit,truncated_to,rebinds
 //   up,0,0,1000000,213,b1946ac92492d234,pass,delay,21340211,21391002,,,,,,0
 //   # note 5000000000 both wifi-bad    notes can stand between the datagrams
 //   …

@@ -14,13 +14,11 @@ namespace tendon::injector {
 
 /// Replays one direction of one link of a recorded network. Each datagram gets the fate of a recorded one:
 ///
-///     kIndex   datagram i gets the fate of datagram i: the same packets are lost. For the same traffic, and for traces
-///     of
-///              shrink.h
+///     kIndex   datagram i gets the fate of datagram i, so the same packets are lost. Use this for the same traffic and
+///              for traces of shrink.h.
 ///     kTime    a datagram that arrives at `start` + t gets the fate of the newest record at or before the trace's
-///              start + t (before the first record: the fate of the first). The network is bad at the same times for
-///              any
-///              number of datagrams. For other traffic
+///              start + t, or of the first record if there is none. The network is bad at the same times. Use this for
+///              other traffic.
 ///
 /// The fate is shifted in time and keeps its delay. The same arrivals as in the record give bitwise identical decisions
 /// (by time: if no two arrivals of a flow coincide in the same nanosecond). For other arrivals, releases remain in
