@@ -113,7 +113,7 @@ TEST(Engines, EachSessionIsToldByOneNameFromItsBeginningToItsEnd) {
   write(scene, std::string(kPressingHand));
   Server server(folder.path(), scene);
   Client echo("echo_motion", server.address(), folder.path(), {"--json"});
-  wait_until_felt(echo, -1);  // the first force has arrived
+  wait_until_felt(echo, -1);
   Client wall("virtual_wall", server.address(), folder.path());
   wait_until_felt(echo, 0.3);
   wall.signal(SIGTERM);

@@ -107,7 +107,7 @@ void add_steps(Report& report, const std::vector<StepRecord>& steps, Duration pe
   const StepRecord* before = nullptr;
   for (const StepRecord& step : steps) {
     const bool seen = !step.reasons.has(Reason::kUnseen);
-    if (before == nullptr && !seen) continue;  // not homed yet
+    if (before == nullptr && !seen) continue;
     late_us.push_back(seconds(step.hand.at - step.scheduled) * 1e6);
     least_energy = std::min(least_energy, step.energy);
     unseen += seen ? 0 : 1;

@@ -30,10 +30,10 @@ std::string pressing_hand() {
 
 /// The result of a front with the worker `fake_worker WAY`.
 struct Outcome {
-  std::string out;  ///< of the front
+  std::string out;
   std::string err;
   Recording recording;
-  std::vector<Mode> modes;  ///< each change
+  std::vector<Mode> modes;
   std::uint64_t late_engine = 0;
   std::uint64_t late_network = 0;
 

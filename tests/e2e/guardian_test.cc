@@ -65,7 +65,6 @@ const std::string kZero = "<AAAAAAAAAAAAAA>";
 ZeroPacket written(const std::string& bytes) { return ZeroPacket::written(std::as_bytes(std::span(bytes))); }
 ZeroPacket usb(const std::string& bytes) { return ZeroPacket::usb(2, std::as_bytes(std::span(bytes))); }
 
-/// The device: receives complete packets.
 class Heard {
  public:
   Heard() {
@@ -389,7 +388,7 @@ LocalTime now() { return LocalTime(std::chrono::duration_cast<Duration>(Clock::n
 
 /// The result for a Falcon model in this process when its driver process is killed while it pushes.
 struct Killed {
-  double pushed_for_ms = 0;             ///< after the kill
+  double pushed_for_ms = 0;
   bool pushes = true;                   ///< when no process is left that could stop it
   std::vector<std::uint8_t> last_word;  ///< received by the device: endpoint and packet
   std::uint8_t lamps = 0;

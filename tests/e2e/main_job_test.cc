@@ -25,7 +25,6 @@ struct Stretch {
   std::size_t begin;
 };
 
-/// Groups consecutive steps of the same mode.
 std::vector<Stretch> stretches_of(const std::vector<StepRecord>& steps) {
   std::vector<Stretch> stretches;
   for (std::size_t i = 0; i < steps.size(); ++i) {
@@ -112,7 +111,7 @@ TEST(MainJob, AKilledEnginesForceIsHeldFadesStopsAndTheNextOneRampsIn) {
   EXPECT_EQ((stop - 1)->mode, Mode::kDecaying);
   EXPECT_EQ((stop + 1)->mode, Mode::kActive);
 
-  EXPECT_GT(steps[(stop - 2)->begin].hand.position.x(), 0);  // in contact
+  EXPECT_GT(steps[(stop - 2)->begin].hand.position.x(), 0);
   EXPECT_GT(steps[(stop - 2)->begin].applied.norm(), 0);
   EXPECT_EQ(steps[(stop + 1)->begin - 1].applied.norm(), 0);
   EXPECT_TRUE(steps[(stop + 1)->begin].reasons.has(Reason::kRampIn));

@@ -32,7 +32,6 @@ std::int64_t bytes(pid_t process, const std::string& row) {
   throw std::runtime_error("no " + row + " of process " + std::to_string(process));
 }
 
-/// Minor page faults.
 std::int64_t faults(pid_t process) {
   std::ifstream stat("/proc/" + std::to_string(process) + "/stat");
   const std::string all{std::istreambuf_iterator<char>(stat), {}};

@@ -39,7 +39,7 @@ TEST(Safety, EverySignalToEndLeavesTheDeviceWithoutForce) {
     Client echo("echo_motion", server.address(), folder.path(), {"--json", "--rate-hz", "100"});
     Client wall("virtual_wall", server.address(), folder.path());
     watch_force(echo, felt);
-    const std::string end = server.stop(signal);  // throws unless the exit code is 0
+    const std::string end = server.stop(signal);
     EXPECT_EQ(text_in(end, "event"), "stopped");
     EXPECT_EQ(number_in(end, "force_n"), 0) << end;
   }

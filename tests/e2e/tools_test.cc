@@ -112,7 +112,6 @@ TEST(Tools, AMisspeltWordIsAnsweredWithTheOneThatWasMeant) {
   }
 }
 
-/// A recording of half a second without an engine.
 std::filesystem::path recording_in(const std::filesystem::path& folder) {
   Process server(
       program("tendond"),
@@ -268,7 +267,7 @@ TEST(ExitCodes, OfTheSameMistakeAreTheSameInEveryProgram) {
   for (const Mistake& mistake : mistakes) {
     for (std::vector<std::string> words : mistake.made_by) {
       const auto path = program(words.front());
-      if (!std::filesystem::exists(path)) continue;  // not built
+      if (!std::filesystem::exists(path)) continue;
       std::string line;
       for (const std::string& word : words) line += word + " ";
       SCOPED_TRACE(mistake.what + ": " + line);

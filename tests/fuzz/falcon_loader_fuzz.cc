@@ -35,7 +35,7 @@ class Cable final : public usb::Pipe {
 
   bool full = false;
   bool sending = false;
-  std::vector<std::uint8_t> sent;   ///< of the image
+  std::vector<std::uint8_t> sent;
   std::vector<std::uint8_t> last;   ///< the last written piece
   std::vector<std::uint8_t> heard;  ///< received since then
 };

@@ -26,7 +26,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   std::array<Session, 2> ends = {sealed ? Session(config, keys, now) : Session(config, now),
                                  sealed ? Session(config, turned, now) : Session(config, now)};
   using Datagram = std::vector<std::byte>;
-  std::array<std::deque<Datagram>, 2> flying;  // to each end
+  std::array<std::deque<Datagram>, 2> flying;
   std::uint64_t sequence = 0;
   std::uint64_t heard = 0;
   std::uint32_t requests = 0;

@@ -105,8 +105,8 @@ Observed wind_up(std::uint64_t seed, double prior_variance) {
   return bench.seen();
 }
 
-// Oracle: passive, bounded, quiet, and at most 1 N above the wall's force. A clamped hand is still for 30 s (750
-// answers with 0.05 N of noise, a forgetting half-life of 14 answers) and then moves 10 mm between two answers.
+// Oracle: passive, bounded, quiet, and within 1 N of the wall's force. A clamped hand is still for 30 s (750 answers
+// with 0.05 N of noise, a forgetting half-life of 14 answers) and then moves 10 mm between two answers.
 TEST(HardLoop, AnEstimatorThatHasLongSeenNothingNewDoesNotWindUp) {
   constexpr Duration kWithin = seconds(1);
   const double prior = OutputEstimator::Config{}.prior_variance;
@@ -218,7 +218,7 @@ Observed stuck(std::uint64_t seed, bool limiter) {
   Bench bench(set);
   bench.run(milliseconds(1480));
   bench.encoder.stuck = bench.owes = true;
-  bench.run(milliseconds(400));  // the force pushes the hand out
+  bench.run(milliseconds(400));
   bench.encoder.stuck = false;
   // The jump then counts as viscous friction in one window of the ledger.
   const double never_paid = kFriction.viscous * kHidden * kHidden / (robust.window * 1e-3);
@@ -294,7 +294,7 @@ Observed clock_goes_back(std::uint64_t seed, bool decay) {
   bench.encoder.behind = Duration::zero();
   bench.run(milliseconds(200));
   const LocalTime silent = bench.world.now() + kSilence + milliseconds(20);
-  const LocalTime again = bench.world.now() + back;  // waits until then
+  const LocalTime again = bench.world.now() + back;
   bench.expect_of_steps([stopped = no_force_from(silent), again](const StepRecord& step) {
     return step.hand.at < again ? stopped(step) : std::string();
   });

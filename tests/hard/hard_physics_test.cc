@@ -76,7 +76,7 @@ TEST(HardPhysics, ANearlyIncompressibleBlockDoesNotLock) {
     EXPECT_EQ(warnings(body).size(), element == Element::kHex8Sri ? 0U : 1U) << info(element).name;
   }
   BodyConfig body = pressed_body(ModelKind::kLinear, Element::kTet4, 2);
-  EXPECT_TRUE(warnings(body).empty());  // ν = 0.45
+  EXPECT_TRUE(warnings(body).empty());
   body.material.poisson = 0.499;
   ASSERT_EQ(warnings(body).size(), 1U);
   EXPECT_TRUE(warnings(body).front().starts_with("tet4 locks above a Poisson ratio of 0.45"));

@@ -98,9 +98,9 @@ struct Observed {
   double most_force = 0;    ///< N
   double most_rate = 0;     ///< N/s
   Duration noisy_for{};     ///< after the end of the disturbance
-  bool felt = false;        ///< a force of the engine was rendered
-  double figure = 0;        ///< measured value of the case, in its own unit
-  std::string also{};       ///< a violated additional promise of the case
+  bool felt = false;
+  double figure = 0;   ///< measured value of the case, in its own unit
+  std::string also{};  ///< a violated additional promise of the case
 
   void add(const Observed& other) {
     least_energy = std::min(least_energy, other.least_energy);

@@ -49,7 +49,6 @@ class FakeAvahi {
   void occupy(const std::string& name);
   /// While `absent`, avahi-daemon is not running: every call fails with ServiceUnknown.
   void set_absent(bool absent);
-  /// While silent, calls get no answer.
   void set_silent(bool silent) { silent_ = silent; }
   /// Simulates a restart of avahi-daemon.
   void come_back();

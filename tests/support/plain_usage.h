@@ -13,7 +13,7 @@ namespace tendon {
 struct PlainUsage {
   const char* help;
   std::size_t most_arguments = 0;
-  std::vector<std::string_view> options{};  ///< the prefixes of the supported options
+  std::vector<std::string_view> options{};
 };
 
 /// Handles --help and --version, and rejects unknown options and extra arguments. Returns the exit code, or nullopt if the

@@ -28,7 +28,7 @@ namespace tendon {
 struct Part {
   std::optional<Units> units{};                 ///< the units of this shard
   std::optional<std::filesystem::path> from{};  ///< the file with the results of the shards
-  bool progress = false;                        ///< prints progress on standard error
+  bool progress = false;
 };
 
 /// Work that can be swept. A program defines a unit and how its outcome is written and read; outcomes() does the rest.

@@ -52,7 +52,7 @@ class Process {
   struct Stream {
     int fd = -1;  ///< −1 after its end
     std::string text;
-    std::size_t next = 0;  ///< where wait_for_line continues
+    std::size_t next = 0;
   };
 
   static std::optional<std::string> next_line(Stream& stream, std::string_view text);

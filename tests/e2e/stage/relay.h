@@ -50,7 +50,7 @@ class Relay {
   std::optional<Address> client_;
   std::vector<Datagram> said_;
   int cut_ = 0;
-  std::atomic<bool> stop_{false};  // needs no lock
+  std::atomic<bool> stop_{false};
   std::thread thread_;
 };
 

@@ -90,8 +90,8 @@ void watch_force(Process& echo, Enough enough) {
 
 struct Recording {
   std::vector<StepRecord> steps;
-  std::vector<DatagramRecord> arrived;  ///< received datagrams
-  std::uint64_t losses = 0;             ///< records of losses, excluding intended omissions
+  std::vector<DatagramRecord> arrived;
+  std::uint64_t losses = 0;  ///< records of losses, excluding intended omissions
   std::uint64_t strangers_left_out = 0;
   bool truncated = false;
 };

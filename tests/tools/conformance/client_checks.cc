@@ -61,7 +61,7 @@ class ClientJudge {
   Report& report_;
   int port_;
   std::uint32_t next_id_ = 0x11223344;
-  std::set<Sixteen> issued_;           ///< cookies
+  std::set<Sixteen> issued_;
   std::map<Sixteen, Bytes> attempts_;  ///< client random → Hello without its cookie
   std::vector<Bytes> strays_;          ///< Data
   std::set<std::uint64_t> ticks_;      ///< of sent states
@@ -454,7 +454,7 @@ void ClientJudge::check_refused() {
   std::ranges::copy(random16(), ephemeral.begin());
   const Bytes datagram = answer_to(*greeting, 0, no, Key(ephemeral)).datagram;
   wire_.send(port_, datagram);
-  hellos(milliseconds(100));  // datagrams in flight
+  hellos(milliseconds(100));
   strays_.clear();
   const auto after = hellos(milliseconds(500));
   const bool again = std::ranges::any_of(after, [&](const Greeting& next) { return next.random == greeting->random; });

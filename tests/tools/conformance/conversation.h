@@ -46,7 +46,6 @@ class Conversation {
   /// `wire` and `report` must outlive this object.
   Conversation(Wire& wire, Report& report, const Setup& setup);
 
-  // Sending.
   /// Sends `body` with the next packet number, the time and the echo. Returns the packet number.
   std::uint64_t say(pb::Datagram body = {});
   void say_at(std::uint64_t number, pb::Datagram body);
@@ -133,9 +132,9 @@ class Conversation {
   Key receive_key_;
   std::uint8_t receive_epoch_ = 0;
   LocalTime last_said_{};
-  std::map<std::uint64_t, Said> said_;  ///< valid datagrams
+  std::map<std::uint64_t, Said> said_;
   struct Bad {
-    std::string_view check;  ///< the rule under test
+    std::string_view check;
     std::string wrong;
   };
   std::map<std::uint64_t, Bad> bad_;  ///< numbers used only by invalid datagrams
@@ -143,7 +142,7 @@ class Conversation {
   std::set<std::uint64_t> repeated_;
   std::vector<Heard> heard_;
   std::vector<Bytes> strangers_;
-  std::uint64_t expected_ = 0;                      ///< the peer's next number
+  std::uint64_t expected_ = 0;
   bool moved_ = false;                              ///< datagrams to the old port are not received
   std::map<std::uint64_t, std::int64_t> arrivals_;  ///< T2 as reported by the peer, by our packet number
   std::map<std::uint64_t, std::size_t> numbers_;    ///< maps the packet number of the peer to an index of heard_

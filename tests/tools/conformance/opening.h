@@ -16,9 +16,9 @@
 namespace tendon::conformance {
 
 struct Options {
-  std::optional<Key> key{};           ///< suite 1 if set
-  bool aes = false;                   ///< with a key: offers and selects suite 2 for Data
-  bool loopback = true;               ///< the peer is on this machine
+  std::optional<Key> key{};  ///< suite 1 if set
+  bool aes = false;          ///< with a key: offers and selects suite 2 for Data
+  bool loopback = true;
   bool long_checks = false;           ///< includes the check that waits until the peer renews its key
   std::chrono::seconds key_age{600};  ///< maximum age at which the peer renews its key
   bool follower = false;  ///< device 0 of the server is a follower that matches the kit (server_coupling_checks.h)

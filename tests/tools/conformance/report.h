@@ -69,7 +69,6 @@ class Report {
   std::vector<Verdict> verdicts_;
 };
 
-/// One line of text, one JSON object.
 std::string text_of(const Verdict& verdict);
 std::string json_of(const Verdict& verdict);
 

@@ -35,7 +35,6 @@ void damage_force(std::vector<std::function<void(pb::Frame&)>>& out, void (*chan
   out.push_back([change](pb::Frame& frame) { change(*frame.mutable_force()); });
 }
 
-/// The result is valid.
 pb::Contact& contact(pb::ForceCommand& force) {
   force.mutable_model()->add_stiffness_npm(0);
   pb::Contact& made = *force.mutable_model()->mutable_contact();
@@ -99,7 +98,7 @@ void check_columns(ServerGuest& guest, Conversation& whole, Conversation& contro
   for (const LocalTime end = whole.now() + kPatience; compared < kEnough && whole.now() < end;) {
     session->talk.listen(milliseconds(50));
     whole.listen(milliseconds(50));
-    controller.say();  // keep-alive
+    controller.say();
     std::map<std::uint64_t, pb::DeviceState> of_tick;
     whole.for_each_frame(before, [&](const pb::Frame& frame) {
       if (frame.has_state()) of_tick[frame.state().tick()] = frame.state();
@@ -315,7 +314,7 @@ void check_conversation(ServerGuest& guest, ChannelChecks& channels, ServerGuest
                                 "this server waits for " + std::to_string(session.welcome.timeout_ms()) + " ms");
   } else {
     check_timeout(talk, milliseconds(session.welcome.timeout_ms()));
-    say_bye(talk);  // if it is still there
+    say_bye(talk);
   }
   check_states(guest.report, talk);
   channels.check_reports(talk);

@@ -370,7 +370,7 @@ void check_bye_silence(Conversation& talk) {
   pb::Frame bye;
   bye.mutable_bye()->set_code(pb::CODE_OK);
   for (int i = 0; i < 3; ++i) talk.say(of(bye));
-  talk.overhear(kMoment);  // datagrams in flight
+  talk.overhear(kMoment);
   const std::size_t before = talk.heard().size();
   talk.overhear(milliseconds(300));
   const std::size_t after = talk.heard().size() - before;

@@ -22,7 +22,6 @@ class UdpWire : public Wire {
   static UdpWire for_client(const Address& listen);
 
   LocalTime now() override;
-  /// Throws std::runtime_error on failure.
   int open_port() override;
   void send(int port, Span datagram) override;
   std::optional<Arrival> receive(int port, LocalTime deadline) override;

@@ -23,7 +23,6 @@ class WorkerWire {
 
   virtual ~WorkerWire() = default;
   virtual LocalTime now() = 0;
-  /// Starts the program with the address of its stream and the secret. Ends the previous program.
   virtual void start(Road road, const std::string& secret) = 0;
   /// Returns data from the program, waiting until `deadline`.
   virtual std::optional<Heard> receive(LocalTime deadline) = 0;

@@ -69,7 +69,6 @@ Where parse_option(const char* option, const std::string& text) {
 
 CLI::Validator between(double least, double most) { return CLI::Range(least, most).description(""); }
 
-/// The raw option values.
 struct Said {
   NetworkOptions network;
   std::string seed;

@@ -32,11 +32,11 @@ enum class Verdict : std::uint8_t { kPass, kDrop, kDuplicate };
 /// step that determined the release time.
 enum class Cause : std::uint8_t {
   // passed
-  kDelay,    ///< its own delay
-  kQueue,    ///< waited at the bottleneck
-  kStall,    ///< waited for the end of a stall
-  kFifo,     ///< waited for its predecessor
-  kReorder,  ///< left early
+  kDelay,  ///< its own delay
+  kQueue,  ///< waited at the bottleneck
+  kStall,  ///< waited for the end of a stall
+  kFifo,
+  kReorder,
   // dropped
   kQueueFull,
   kOutage,
@@ -45,7 +45,7 @@ enum class Cause : std::uint8_t {
   kRegime,  ///< the loss model of the regime
   kLoss,
   // either
-  kReplay,  ///< from a trace
+  kReplay,
 };
 
 std::string_view to_string(Verdict verdict) noexcept;

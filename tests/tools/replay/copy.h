@@ -23,7 +23,7 @@ class CopiedChannels {
   std::uint16_t in(McapWriter& writer, const McapReader::Channel& from, const std::string& prefix = {});
 
  private:
-  std::map<std::string, std::uint16_t> ids_;  ///< by topic
+  std::map<std::string, std::uint16_t> ids_;
 };
 
 /// Throws std::runtime_error with the error message of `sink` if `written` is false.

@@ -37,7 +37,7 @@ struct Running {
 
 struct Recorded {
   Scene scene;
-  std::vector<std::vector<PortRecord>> ports;  ///< by step
+  std::vector<std::vector<PortRecord>> ports;
   std::vector<StepRecord> steps;
 };
 

@@ -99,7 +99,6 @@ Clocks compare_clocks(const End& leader, const End& follower, const MergeOptions
   return clocks;
 }
 
-/// The channels on which the follower received the leader's states.
 std::set<std::uint32_t> channels_of(const End& leader, const End& follower) {
   std::set<std::uint32_t> channels;
   for (const End::Came& came : follower.came) {

@@ -32,7 +32,7 @@ namespace tendon::replay {
 
 namespace {
 
-constexpr std::size_t kMostDrawn = lab::kMostDrawings / 2;  // devices in a picture
+constexpr std::size_t kMostDrawn = lab::kMostDrawings / 2;
 
 /// Gaps that prevent a comparison of the following steps.
 struct Gaps {
@@ -61,7 +61,7 @@ HapticController::Config control_of(const SceneRecord& scene, const Options& opt
 
 /// The selected devices, by their number in the recording.
 struct Chosen {
-  std::vector<std::string> names;  ///< of all devices
+  std::vector<std::string> names;
   std::vector<bool> is_chosen;
 
   std::size_t count() const { return static_cast<std::size_t>(std::ranges::count(is_chosen, true)); }
@@ -130,7 +130,6 @@ Gaps read_run(const Options& options, const Chosen& chosen, Rerun::Held held, co
   return gaps;
 }
 
-/// Bitwise comparison of the steps.
 struct Comparison {
   std::uint64_t steps = 0;
   std::uint64_t same = 0;
@@ -260,7 +259,7 @@ struct Both {
   lab::RunObserver recorded;
   lab::RunObserver again;
   Comparison comparison;
-  std::array<lab::Run, 2> runs;  ///< known at the end
+  std::array<lab::Run, 2> runs;
 };
 
 lab::Run run_of(const std::string& label, const Options& options, const lab::RunObserver& observer, const Gaps& gaps) {
@@ -277,7 +276,7 @@ lab::Run run_of(const std::string& label, const Options& options, const lab::Run
 /// Reads the recording a second time, because the drawings depend on the summary.
 void draw_all(const Options& options, const Chosen& chosen, Rerun::Held held, const std::deque<Both>& devices) {
   std::vector<lab::Drawing> drawings;
-  std::vector<std::size_t> first(devices.size());  // drawing of each device
+  std::vector<std::size_t> first(devices.size());
   for (std::size_t device = 0; device < devices.size(); ++device) {
     first[device] = drawings.size();
     if (!chosen.is_chosen[device]) continue;

@@ -19,7 +19,7 @@ struct Options {
   /// Folder of the files that the scene names.
   std::filesystem::path files = ".";
   std::optional<std::string> device = {};
-  std::optional<std::filesystem::path> csv = {};      ///< a row for each step of a device
+  std::optional<std::filesystem::path> csv = {};
   std::optional<std::filesystem::path> picture = {};  ///< .svg or .png, both runs of at most two devices side by side
   bool json = false;
   bool progress = false;  ///< rewrites a progress line on stderr

@@ -30,7 +30,7 @@ class ToyServer : public ToyPeer {
     std::uint32_t silence = 0;  ///< ms, of a deadband
     std::uint64_t said_at = 0;  ///< tick of the last state
     std::uint64_t sequence = 0;
-    std::uint64_t forces = 0;  ///< since the last report
+    std::uint64_t forces = 0;
     std::uint64_t reports = 0;
     LocalTime reported{};
     std::map<std::uint32_t, pb::Control> waiting;
@@ -61,7 +61,7 @@ class ToyServer : public ToyPeer {
   std::uint32_t next_id_ = 7;
   std::uint64_t tick_ = 0;
   std::uint64_t rendered_ = 0;
-  std::uint32_t holder_ = 0;  ///< connection id
+  std::uint32_t holder_ = 0;
   double hellos_ = 40;
   LocalTime hellos_at_{};
 };

@@ -38,7 +38,7 @@ class BottleneckQueue {
   LocalTime free_;                 ///< when the queue is empty
   std::uint64_t remainder_ = 0;    ///< remainder of the division by the rate, in units of 1 ns/rate, which free_ lacks
   std::uint64_t opportunity_ = 0;  ///< current one, counted from the start through all repetitions
-  std::uint64_t bytes_left_;       ///< of the current opportunity
+  std::uint64_t bytes_left_;
   std::deque<std::pair<LocalTime, std::uint64_t>> waiting_;  ///< departure time and bytes of each datagram
   std::uint64_t bytes_waiting_ = 0;
 };

@@ -31,7 +31,6 @@ class Copula {
   /// By packet (rho) or by time (memory: ρ = exp(−Δt/memory)), as in Profile.
   Copula(double rho, Duration memory);
 
-  /// Returns true if each draw stays unchanged.
   bool trivial() const noexcept { return rho_ == 0 && per_ns_ == 0; }
 
   std::uint64_t next(std::uint64_t draw, LocalTime at) noexcept;

@@ -11,7 +11,7 @@
 namespace tendon::injector {
 namespace {
 
-constexpr int kBodyBits = 12;    // 4096 cells
+constexpr int kBodyBits = 12;
 constexpr int kTailFrom = 8;     // from a tail probability of 2⁻⁸
 constexpr int kTailTo = 40;      // down to 2⁻⁴⁰
 constexpr int kTailCells = 16;   // for each halving of the tail probability
@@ -76,7 +76,7 @@ QuantileTable tabulate(const std::function<double(double p, double q)>& quantile
     if (x >= static_cast<double>(most)) return most;
     return exact::round(x);
   };
-  std::vector<double> tail;  // rising
+  std::vector<double> tail;
   for (int octave = kTailTo; octave > kTailFrom; --octave) {
     const double lower = 1 / static_cast<double>(std::uint64_t{1} << octave);
     for (int i = 0; i < kTailCells; ++i) tail.push_back(lower * (1 + i / double{kTailCells}));

@@ -13,7 +13,7 @@ namespace tendon::injector {
 /// A predefined network of two profiles. named_profiles.cc gives the source of each number.
 struct NamedProfile {
   std::string_view name;
-  std::string_view what;  ///< one line
+  std::string_view what;
   std::string_view up;    ///< client to server, as a profile line
   std::string_view down;  ///< server to client
 };

@@ -227,7 +227,6 @@ RC_GTEST_PROP(Profile, ReadsBackExactlyWhatItWrote, ()) {
 }
 
 RC_GTEST_PROP(Profile, AnyTextIsReadOrRefusedAndNothingElseHappens, ()) {
-  // Mutated valid lines reach deeper code than random text.
   std::string line = to_string(any_profile());
   for (int n = *rc::gen::inRange(0, 6); n > 0; --n) {
     const auto where = *rc::gen::inRange<std::size_t>(0, line.size());

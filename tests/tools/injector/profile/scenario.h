@@ -74,9 +74,9 @@ Scenario parse_scenario(std::string_view toml, const std::string& name);
 
 /// Commands other than a Change.
 enum class Request : std::uint8_t {
-  kStats,  ///< report the status
-  kHelp,   ///< print command_help()
-  kStop,   ///< end the run
+  kStats,
+  kHelp,
+  kStop,
 };
 using Command = std::variant<Change, Request>;
 
@@ -90,7 +90,6 @@ using Command = std::variant<Change, Request>;
 /// Throws std::invalid_argument with the expected format.
 Command parse_command(std::string_view line);
 
-/// Lists the commands on one line.
 std::string command_help();
 
 /// Plays a scenario and accepts changes at run time. Drivers query it for the profile of a new link, and pass each

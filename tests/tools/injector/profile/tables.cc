@@ -88,7 +88,7 @@ std::vector<Weighted> samples_from_csv(const std::filesystem::path& file) {
     std::vector<Weighted> values;
     while (table.next_row()) {
       const auto delay_ms = table.number(delays.delay);
-      if (!delay_ms) continue;  // lost
+      if (!delay_ms) continue;
       add(values, table, *delay_ms, delays.weight ? table.needed_number(*delays.weight) : 1, false);
     }
     return merged(std::move(values));

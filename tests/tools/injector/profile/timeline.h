@@ -15,7 +15,7 @@ namespace tendon::injector {
 struct WindowState {
   bool open = false;
   std::uint64_t begun = 0;  ///< number of repetitions begun, including an open one
-  Duration until_end{};     ///< of the open one
+  Duration until_end{};
 };
 WindowState state_of(const Window& window, Duration since) noexcept;
 

@@ -13,7 +13,6 @@ namespace tendon::injector {
 /// Numbers with units in profiles, scenarios and traces. The parsers consume the whole text or return nullopt. The text
 /// functions write values that parse back exactly.
 
-/// A finite number.
 std::optional<double> parse_number(std::string_view text);
 std::string number_text(double value);  ///< the shortest that parses back exactly
 

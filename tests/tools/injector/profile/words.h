@@ -7,8 +7,6 @@
 
 namespace tendon::injector {
 
-// Helpers to tokenize a profile and to report errors in it.
-
 inline constexpr std::string_view kBlanks = " \t\r\n";
 
 std::string_view trimmed(std::string_view text);

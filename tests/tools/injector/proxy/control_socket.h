@@ -39,7 +39,7 @@ class ControlSocket {
  private:
   struct Client {
     int fd;
-    std::string text;  ///< incomplete line
+    std::string text;
   };
   void accept_all();
   static bool serve(Client& client, const std::function<std::string(std::string_view)>& answer);

@@ -97,7 +97,7 @@ class Driver {
   std::uint64_t closed_overflowed_ = 0;  // by upstream sockets that have been closed
   std::size_t server_ = 0;               // index in config_.servers
   std::uint64_t asked_before_ = 0;       // datagrams sent to the server when the address last changed
-  LocalTime next_server_{};              // when to try the next address
+  LocalTime next_server_{};
   std::string no_socket_;
   std::uint64_t late_rebinds_ = 0;
   int epoll_ = -1;
@@ -111,7 +111,7 @@ class Driver {
   std::vector<TraceRecord> records_;
 
   DurationHistogram timer_floor_;
-  LocalTime next_probe_{};                              // earliest time
+  LocalTime next_probe_{};
   std::optional<LocalTime> probe_;                      // the time of the next measurement of the timer latency
   Duration last_sleep_ = std::chrono::milliseconds(1);  // before the last release
 

@@ -12,7 +12,7 @@ namespace tendon::injector {
 struct DryRun {
   std::uint64_t count = 10'000;  ///< the total number of packets in both directions
   std::uint64_t rate_hz = 1000;  ///< in each direction, 1…10⁹
-  std::uint32_t bytes = 200;     ///< payload
+  std::uint32_t bytes = 200;
   bool json = false;
 };
 

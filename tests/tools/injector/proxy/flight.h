@@ -44,9 +44,9 @@ class History {
 
 /// The type of a datagram that is sent due to a decision.
 enum class Copy : std::uint8_t {
-  kFirst,   ///< the datagram itself, with the damage of the decision
-  kSecond,  ///< its undamaged duplicate
-  kStale,   ///< an earlier datagram, undamaged, even if it was lost
+  kFirst,  ///< the datagram itself, with the damage of the decision
+  kSecond,
+  kStale,  ///< an earlier datagram, undamaged, even if it was lost
 };
 
 /// The datagrams in flight, ordered by due time and then by launch. Applies a Decision: copies, stale replays,
@@ -110,7 +110,6 @@ class Flight {
     return departure;
   }
 
-  /// Returns the due time of the next datagram, or nullopt if none is in flight.
   std::optional<LocalTime> next_wake() const {
     if (heap_.empty()) return std::nullopt;
     return heap_.front().due;

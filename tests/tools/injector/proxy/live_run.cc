@@ -68,7 +68,6 @@ class Signals {
   std::array<struct sigaction, 3> before_{};
 };
 
-/// Runs the driver in a thread, whose end can be polled.
 class DriverThread {
  public:
   explicit DriverThread(Driver& driver)
@@ -244,7 +243,7 @@ class Conversation {
       server_ = status.server;
       if (!terminal_) std::cerr << "tendon-inject: no answer from " << silent << ", trying " << heading_.server << "\n";
     }
-    if (terminal_) return;  // the terminal shows the rest
+    if (terminal_) return;
     tell_of_clients(status);
     tell_of_refused(status);
   }
@@ -306,11 +305,11 @@ class Conversation {
   std::unique_ptr<Terminal> terminal_;
   std::deque<Status> said_;
   std::string said_to_user_;
-  Address server_;  // as in the last status
+  Address server_;
   ClientIndex known_clients_ = 0;
   std::uint64_t told_refused_ = 0;
   LocalTime tell_refused_{};
-  std::size_t noted_ = 0;  // steps of the timeline
+  std::size_t noted_ = 0;
 };
 
 std::string Conversation::execute(std::string_view line) {

@@ -69,7 +69,7 @@ PreparedNetwork prepare(const NetworkOptions& options) {
     return prepare_or_throw(options);
   } catch (const UnreadableFile&) {
     throw;
-  } catch (const std::runtime_error& error) {  // invalid content of a file
+  } catch (const std::runtime_error& error) {
     throw std::invalid_argument(error.what());
   }
 }

@@ -42,7 +42,7 @@ struct ProxyCounters {
   std::uint64_t truncated = 0;  ///< forwarded truncated
   std::uint64_t unsent = 0;     ///< copies of all kinds that the kernel refused
 
-  std::uint64_t lost() const noexcept;  ///< sum of `dropped`
+  std::uint64_t lost() const noexcept;
 };
 
 struct ProxyMeasurements {
@@ -65,7 +65,7 @@ class Proxy {
   struct PreparedChange {
     std::optional<ClientIndex> client;          ///< none: all present and future clients
     std::array<std::optional<Injector>, 2> to;  ///< by Direction; none: unchanged
-    std::string text;                           ///< for display
+    std::string text;
   };
   struct Step {
     Duration at{};  ///< after the first datagram
@@ -102,7 +102,6 @@ class Proxy {
   /// Throws std::invalid_argument as TracePlayer does.
   explicit Proxy(Config config);
 
-  /// Returns true if a datagram from this address would add a client.
   bool is_new(const Address& client) const;
 
   /// Receives a datagram from a client to the server. Returns the index of the client, or nothing if the datagram was
@@ -186,7 +185,7 @@ class Proxy {
   void complete(TraceRecord record);
 
   Config config_;
-  std::optional<LocalTime> start_;  // time of the first datagram
+  std::optional<LocalTime> start_;
   struct Network {
     Injector injector;
     LocalTime since;  // origin of its times

@@ -25,12 +25,12 @@ struct Status {
   /// before its last release. The remaining part of the release error is caused by the proxy.
   DurationHistogram timer_floor;
 
-  std::uint64_t overflowed = 0;    ///< dropped by the kernel because the receive buffer was full
-  std::uint64_t unrecorded = 0;    ///< number of decisions that were not recorded because the disk was too slow
-  std::size_t scenario_steps = 0;  ///< in the timeline
-  std::size_t scenario_done = 0;   ///< completed
-  std::string last_change;         ///< the last change of the network
-  Address server{};                ///< current address
+  std::uint64_t overflowed = 0;  ///< dropped by the kernel because the receive buffer was full
+  std::uint64_t unrecorded = 0;  ///< number of decisions that were not recorded because the disk was too slow
+  std::size_t scenario_steps = 0;
+  std::size_t scenario_done = 0;
+  std::string last_change;  ///< the last change of the network
+  Address server{};
   std::string no_socket;           ///< the first error of opening a socket for a client, or empty
   std::uint64_t late_rebinds = 0;  ///< datagrams sent from the old port because the new one could not be opened
 

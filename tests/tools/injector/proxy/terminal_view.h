@@ -27,7 +27,6 @@ std::string terminal_view(const Heading& heading, const Status& now, const Statu
 /// The same as one line for a log.
 std::string log_line(const Status& now, const Status& before);
 
-/// Summary of the run and its verdict.
 std::string end_text(const Heading& heading, const Status& end);
 
 }  // namespace tendon::injector

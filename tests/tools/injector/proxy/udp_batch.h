@@ -47,7 +47,7 @@ class UdpBatch {
   std::span<const Arrival> receive(Inbox& inbox);
 
   struct Outgoing {
-    Address to;  ///< only for a listening socket
+    Address to;
     std::span<const std::byte> datagram;
     Address from = {};  ///< the local address to send from, or zeros to let the kernel choose
   };

@@ -17,7 +17,6 @@ using std::chrono::milliseconds;
 
 namespace {
 
-/// Whether t is in one of the windows first, first + every, … of length `lasts`.
 bool in_window(Duration t, Duration first, Duration every, Duration lasts) {
   return t >= first && (t - first) % every < lasts;
 }

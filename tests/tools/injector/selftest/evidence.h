@@ -29,7 +29,6 @@ Check pearson(std::string model, std::string what, std::span<const std::uint64_t
 /// Absolute deviation of the rate of `happened` out of n events of probability p.
 Check rate(std::string model, std::string what, double happened, double n, double p, double variance_factor = 1);
 
-/// A count that must be zero.
 Check none(std::string model, std::string what, std::size_t deviations);
 
 /// Compares the rate and the run lengths of events with `chain`.

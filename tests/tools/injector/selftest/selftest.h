@@ -29,8 +29,8 @@ struct SelftestOptions {
 /// correct injector exceeds the bound of a random quantity with a probability of 1e-7, so some hundred checks fail for
 /// one seed in 100 000.
 struct Check {
-  std::string model;      ///< a profile line
-  std::string statistic;  ///< name of the measured quantity
+  std::string model;  ///< a profile line
+  std::string statistic;
   double value = 0;
   double bound = 0;
 

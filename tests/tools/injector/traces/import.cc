@@ -22,7 +22,6 @@
 namespace tendon::injector {
 namespace {
 
-/// The fate of one datagram in one direction. An empty optional means that it is unknown.
 struct Fate {
   bool lost = false;
   Duration delay{};
@@ -114,7 +113,6 @@ Duration evenly(std::int64_t number, Duration interval) {
   return interval > kMaxTraceTime / std::max<std::int64_t>(number, 1) ? kMaxTraceTime : number * interval;
 }
 
-/// Calls `take(line, number)` for each line, without its line break.
 template <class Take>
 void each_line(std::istream& from, const std::string& name, const Take& take) {
   std::string line;
@@ -301,7 +299,6 @@ PingLog read_ping(std::istream& from, const std::string& name) {
 
 using Json = nlohmann::json;
 
-/// Null if the path does not exist.
 const Json* look_up(const Json& json, std::initializer_list<const char*> path) {
   const Json* at = &json;
   for (const char* key : path) {

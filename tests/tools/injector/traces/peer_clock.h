@@ -40,7 +40,6 @@ class DriftingClock {
   static constexpr Duration kMaxOffset = std::chrono::hours(24 * 3650);
   static constexpr std::size_t kMaxSteps = 1000;
 
-  /// An ideal clock.
   DriftingClock() = default;
   /// Throws std::invalid_argument for values beyond the limits or unsorted steps.
   explicit DriftingClock(Config config, LocalTime start = {});

@@ -22,7 +22,6 @@ class TraceRecorder {
 
   /// Throws std::runtime_error if `file` cannot be written.
   TraceRecorder(const std::filesystem::path& file, const TraceHeader& header);
-  /// Like finish(), but ignores errors.
   ~TraceRecorder();
   TraceRecorder(const TraceRecorder&) = delete;
   TraceRecorder& operator=(const TraceRecorder&) = delete;
