@@ -24,7 +24,7 @@ HapticController::Config config() {
   return c;
 }
 
-// A controller, a hand that moves as it is told and a device that applies what it is told.
+// Controller, prescribed hand motion, and a device that applies the commanded force.
 struct Bench {
   explicit Bench(const HapticController::Config& c) : controller(c) {}
 
@@ -70,7 +70,7 @@ TEST(HapticController, TheLedgerCountsTheForceAppliedNotTheForceWanted) {
     bench->want(-0.5);
     bench->move_to(51e-4);
   }
-  clamped.applied *= 0.5;  // the device's clamp
+  clamped.applied *= 0.5;  // saturation of the device
   const double before = clamped.last.energy;
   const double full = wanted_and_got.move_to(56e-4).energy - before;
   const double half = clamped.move_to(56e-4).energy - before;
@@ -96,7 +96,7 @@ TEST(HapticController, AnOverrunIsBookedAsItWasAndFlagged) {
   EXPECT_DOUBLE_EQ(step.energy, 0.05 * 1e-3 + 0.26 * 1e-6 / 5e-3);
 }
 
-// Earns some energy, wants a force, then pauses while the hand follows the force: the worst case.
+// Stores some energy, requests a force, then pauses while the hand follows the force (worst case).
 Step after_a_pause(Bench& bench, Duration pause) {
   bench.move_to(0);
   for (int i = 1; i <= 100; ++i) bench.move_to(i * 2e-4);
@@ -130,7 +130,7 @@ TEST(HapticController, AfterAnOverrunTheLedgerNeverFallsAndRecovers) {
 TEST(HapticController, TheSecondHoldAsLongAsALateOneTakesNothing) {
   Bench bench(config());
   const Step first = after_a_pause(bench, std::chrono::microseconds(2230));
-  // (T_act − T)(‖F‖ − f_c)²/(4b), because all that was there went, too.
+  // Deficit (T_act − T)(‖F‖ − f_c)²/(4b): the force spent the whole account.
   EXPECT_NEAR(first.energy, -1.23e-3 * std::pow(first.was_applied.norm() - 0.05, 2) / (4 * 0.26), 1e-12);
   EXPECT_EQ(first.longest_hold, Duration(2787500)) << "2.23 ms and a quarter more";
   double x = bench.last.hand.position.x();
@@ -153,7 +153,7 @@ TEST(HapticController, TheIntervalAfterAnUnseenStepIsBookedAtItsWorst) {
   bench.now += milliseconds(1);
   const Step unseen = bench.controller.step_unseen(LocalTime(bench.now), bench.applied);
   ASSERT_EQ(unseen.force, Vec3::Zero());
-  // The device was told zero, and holds its force for one more interval.
+  // The commanded force is zero, and the device holds the old one for one more interval.
   bench.applied = before.force;
   const Step seen = bench.move_to(0.02);
   EXPECT_NEAR(seen.energy, unseen.energy - 1e-3 * std::pow(before.force.norm() - 0.05, 2) / (4 * 0.26), 1e-12);
@@ -203,7 +203,7 @@ TEST(HapticController, APauseBeyondTheWatchdogIsChargedTheWorstNoMore) {
   for (int i = 1; i <= 100; ++i) bench.move_to(i * 2e-4);
   bench.want(-6);
   const Step before = bench.move_to(0.02);
-  const Step after = bench.move_to(0.07, milliseconds(60));  // far along with the force off: no credit for that
+  const Step after = bench.move_to(0.07, milliseconds(60));  // a long motion with the force off earns no credit
   EXPECT_TRUE(after.reasons.has(Reason::kWatchdog));
   EXPECT_NEAR(after.energy, before.energy - 5e-3 * std::pow(before.force.norm() - 0.05, 2) / (4 * 0.26), 1e-12);
 }
@@ -312,7 +312,7 @@ TEST(HapticController, DisarmedItGivesNoForceAtOnceUntilRearmed) {
 TEST(HapticController, ALawThatBrakesByItselfGivesNoForceEitherWhileDisarmed) {
   HapticController::Config c = config();
   c.limiter.law = Law::kPassivityController;
-  const auto push = [](Bench& bench, int i) {  // an engine that gives energy away
+  const auto push = [](Bench& bench, int i) {  // an engine that generates energy
     bench.want(5);
     return bench.move_to(i * 1e-4).force.x();
   };
@@ -428,7 +428,7 @@ TEST(HapticController, NamesTheBoundThatDecidedAndNotTheLooserOnes) {
   bench.move_to(0);
   bench.want(-100);
   const Step step = bench.move_to(1e-6);
-  EXPECT_TRUE(step.reasons.has(Reason::kEnergy));  // 0.06 N, where the slew limit allows 0.1 N and the device 2 N
+  EXPECT_TRUE(step.reasons.has(Reason::kEnergy));  // 0.06 N; the slew limit allows 0.1 N and the device 2 N
   EXPECT_FALSE(step.reasons.has(Reason::kSlew));
   EXPECT_FALSE(step.reasons.has(Reason::kMaxForce));
 }
@@ -500,7 +500,7 @@ TEST(HapticController, AnAdmittanceDevicePushesTheHandleAfterTheTool) {
   controller.step({LocalTime(milliseconds(1)), Vec3::Zero(), Vec3::Zero()}, Vec3::Zero(), Vec3::Zero());
   const Vec3 push(3, 0, 0);
   const Step step = controller.step({LocalTime(milliseconds(2)), Vec3::Zero(), Vec3::Zero()}, Vec3::Zero(), push);
-  // The tool has got 3 N for 1 ms: 1.5 mm/s, and the handle stands still.
+  // A force of 3 N accelerates the tool for 1 ms to 1.5 mm/s while the handle is at rest.
   EXPECT_NEAR(step.force.x(), 100 * 3 * 1e-3 / 2, 1e-9);
   EXPECT_EQ(step.hand_force, push);
 }
@@ -532,10 +532,10 @@ TEST(FrictionMap, TheLeastOfTheNearestPlaceAndOfAllWithinReachHolds) {
                                     {Vec3(0.1, 0, 0), {.coulomb = 0.2, .viscous = 0.4}}},
                          .reach = 0.06});
   EXPECT_EQ(map.at(Vec3(0.01, 0, 0)).coulomb, 0.3);
-  EXPECT_EQ(map.at(Vec3(0.05, 0, 0)).coulomb, 0.2);  // both
+  EXPECT_EQ(map.at(Vec3(0.05, 0, 0)).coulomb, 0.2);  // the larger of both
   EXPECT_EQ(map.at(Vec3(0.05, 0, 0)).viscous, 0.1);
   EXPECT_EQ(map.at(Vec3(0.09, 0, 0)).viscous, 0.4);
-  EXPECT_EQ(map.at(Vec3(5, 0, 0)).coulomb, 0.2);  // far from all: the nearest
+  EXPECT_EQ(map.at(Vec3(5, 0, 0)).coulomb, 0.2);  // outside all cells: the nearest
   EXPECT_THROW(FrictionMap({.places = {}, .reach = 0}), std::invalid_argument);
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// SESSION.md, "When forces stop coming": the table there is read, compared with the code's own times, and walked.
+// Compares the table in SESSION.md, "When forces stop coming", with the constants of the code, and runs through its
+// stages.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -21,7 +22,7 @@ using std::chrono::milliseconds;
 
 struct Rung {
   std::string name;
-  bool after_validity = false;  ///< "v + 20 ms": from the end of validity on, not from the force's arrival
+  bool after_validity = false;  ///< "v + 20 ms": counted from the end of validity, not from the arrival of the force
   Duration entered{};
   Mode mode{};
   Duration time_constant{};  ///< "e^(−t / 50 ms)", "t / 100 ms"
@@ -32,7 +33,7 @@ Duration milliseconds_in(const std::string& cell) {
   return std::regex_search(cell, found, std::regex("([0-9]+) ms")) ? milliseconds(std::stol(found[1])) : Duration{};
 }
 
-/// The lines `| rung | v + 20 ms | 4 decaying | … |` of the table under that heading.
+/// Reads the lines `| rung | v + 20 ms | 4 decaying | … |` of the table.
 std::vector<Rung> table() {
   std::ifstream page(TENDON_SESSION_MD);
   EXPECT_TRUE(page.is_open()) << TENDON_SESSION_MD;
@@ -71,18 +72,18 @@ TEST(Ladder, TheTimesOfThePageAreThoseOfTheCode) {
   EXPECT_EQ(rung(rungs, "re-engage").time_constant, code.ramp_in);
 }
 
-/// A hand that creeps into a wall whose engine falls silent and comes back.
+/// A hand moves slowly into a wall whose engine stops sending and resumes.
 class Walk : public ::testing::Test {
  protected:
   static constexpr Duration kValid = milliseconds(60);
   static constexpr double kSlew = 200;  // N/s: 0.2 N in a step of 1 ms
   static constexpr double kStiffness = 1000;
-  static constexpr int kSilent = 1000;  // ms: the engine's last force is one before
+  static constexpr int kSilent = 1000;  // ms: the last force is sent one period earlier
   static constexpr int kBack = 2000;
 
   Walk() {
     HapticController::Config config;
-    config.limiter.law = Law::kNone;  // it comes after all this, and may only cut
+    config.limiter.law = Law::kNone;  // a limiter would cut the force afterwards
     config.limiter.longest_hold = milliseconds(1);
     config.max_force = 10;
     config.max_slew = kSlew;
@@ -120,7 +121,7 @@ TEST_F(Walk, EachRungIsEnteredAtItsTime) {
     for (const char* name : {"hold", "decay", "safe stop"}) {
       const Rung& next = rung(rungs_, name);
       ASSERT_TRUE(next.after_validity) << name;
-      // A time belongs to the rung before, that of the safe stop to the safe stop.
+      // At its exact start time a stage has not begun, except the safe stop.
       const Duration from = kValid + next.entered;
       const bool there = next.mode == Mode::kSafeStop ? step.force_age >= from : step.force_age > from;
       if (there) expected = next.mode;
@@ -129,7 +130,7 @@ TEST_F(Walk, EachRungIsEnteredAtItsTime) {
     if (step.hand.at < LocalTime(milliseconds(kBack))) ++lasted[expected];
   }
   EXPECT_EQ(lasted[rung(rungs_, "hold").mode], 20);
-  EXPECT_EQ(lasted[rung(rungs_, "decay").mode], 229);  // of the ages 81 … 309 ms
+  EXPECT_EQ(lasted[rung(rungs_, "decay").mode], 229);  // ages 81 … 309 ms
   EXPECT_GT(lasted[rung(rungs_, "safe stop").mode], 600);
 }
 
@@ -149,10 +150,10 @@ TEST_F(Walk, NoStepOfTheForceExceedsTheSlewBound) {
 TEST_F(Walk, TheForceFollowsItsModelUntilItFadesAndComesBackOnARamp) {
   const auto at = [&](int ms) -> const Step& { return steps_[static_cast<std::size_t>(ms - 1)]; };
   const auto wall = [](int ms) { return kStiffness * depth(ms); };
-  // Fresh and held: at the hand's position, not at that of the last force, 990 ms.
+  // Fresh and held forces use the current position of the hand, not that at 990 ms.
   EXPECT_NEAR(-at(1040).wanted.x(), wall(1040), 1e-9);
   EXPECT_NEAR(-at(1065).wanted.x(), wall(1065), 1e-9);
-  // Decaying since v + 20 ms = 80 ms after 990.
+  // Decay starts v + 20 ms = 80 ms after 990 ms.
   const double decay = seconds(rung(rungs_, "decay").time_constant);
   EXPECT_NEAR(-at(1150).wanted.x(), wall(1150) * std::exp(-0.080 / decay), 1e-9);
   EXPECT_EQ(at(1500).wanted.norm(), 0);

@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The promise of the whole project at the level of the control law: whatever the hand does, whatever the
-// remote environment asks for and however late, the ledger never is negative, no force is above its
-// bound, and nothing that is not a number reaches the device. ctest asks RapidCheck for 10 000 seeds (see
-// CMakeLists.txt). Worlds with a network are in tests/tools/worlds.
+// Passivity at the level of the control law: for every hand motion and every remote force with any delay, the ledger
+// must stay nonnegative, the force must stay within its bound, and no NaN may reach the device. ctest asks RapidCheck
+// for 10 000 seeds (see CMakeLists.txt). tests/tools/worlds adds the network.
 #include <gtest/gtest.h>
 #include <rapidcheck.h>
 
@@ -27,20 +26,20 @@ namespace {
 
 struct Outcome {
   double least_energy = 0;
-  double worst_shortfall = 0;  // J, by which the account ever fell below what a hold of its length may leave
+  double worst_shortfall = 0;  // J, largest deficit below the minimum that the hold time permits
   double worst_excess = 0;     // N above the bound
   bool all_finite = true;
 };
 
-/// J: the most that a motion takes out of the account in each second of a hold, T (‖F‖ − f_c)₊²/(4b) for T = 1 s.
+/// J per second of hold: the largest loss of the account, T (‖F‖ − f_c)₊²/(4b) for T = 1 s.
 double worst_per_second(const Vec3& force, const Friction& friction, Law law) {
   const double size = law == Law::kAolPerAxis ? force.cwiseAbs().maxCoeff() : force.norm();
   const double excess = std::max(size - friction.coulomb, 0.0);
   return excess * excess / (4 * friction.viscous);
 }
 
-/// One run of 600 steps of a random controller against a random adversary. With `late`, one hold in 20 is longer than
-/// the law was told to expect, up to 32 ms.
+/// Runs 600 steps of a random controller against a random adversary. With `late`, one hold in 20 is longer than
+/// configured, up to 32 ms.
 Outcome run(std::uint64_t seed, Law limiter, bool late = false) {
   Dice dice(seed);
   HapticController::Config config;
@@ -53,7 +52,7 @@ Outcome run(std::uint64_t seed, Law limiter, bool late = false) {
   const double device_clamp =
       dice.chance(0.5) ? std::numeric_limits<double>::infinity() : config.max_force * dice.uniform();
   const double stiffness = dice.decades(1, 5);
-  const double hold_steps = dice.decades(0, 3);  // a force for every 1 … 1000 steps
+  const double hold_steps = dice.decades(0, 3);  // one force every 1 … 1000 steps
   const double hostility = dice.uniform();
 
   HapticController controller(config);
@@ -103,7 +102,7 @@ Outcome run(std::uint64_t seed, Law limiter, bool late = false) {
     if (late && dice.chance(0.05)) held = from_seconds(2e-3 * dice.decades(0, 1.2));
     now += held;
     const double force = applied.norm();
-    if (dice.chance(hostility)) {  // the worst motion there is, eq. (7): it follows the force
+    if (dice.chance(hostility)) {  // worst motion, eq. (7)
       for (int axis = 0; axis < 3; ++axis) {
         const double size = limiter == Law::kAolPerAxis ? std::abs(applied[axis]) : force;
         if (size <= config.limiter.friction.coulomb) continue;
@@ -153,13 +152,13 @@ TEST_P(Passivity, AHoldBeyondTheBoundTakesNoMoreThanIsSaid) {
   }));
 }
 
-// The adversary who searches: hand and environment are a list of genes, and hill climbing from random starts looks for
-// the list with which the device gives out the most energy for what ever was in the ledger.
+// A searching adversary: hand and environment are a list of genes, and hill climbing from random starts maximizes the
+// energy extracted relative to the peak of the ledger.
 struct Gene {
-  double follow = 0;           // the hand moves by this times the worst motion of eq. (7)
-  Vec3 move = Vec3::Zero();    // m, … and by this
+  double follow = 0;           // factor on the worst motion of eq. (7)
+  Vec3 move = Vec3::Zero();    // m, added motion
   Vec3 wanted = Vec3::Zero();  // N
-  double late = 1;             // the hold before it is so many times as long as the law expects
+  double late = 1;             // length of the preceding hold / configured hold
 };
 
 class Search {
@@ -167,8 +166,8 @@ class Search {
   Search(Law law, double bound_scale, std::uint64_t seed, bool late = false)
       : law_(law), bound_scale_(bound_scale), late_(late), dice_(seed) {}
 
-  /// How far the ledger fell below zero, or below what a hold beyond the bound may leave: the least, as a share of the
-  /// most that the ledger held.
+  /// Returns the lowest objective found. Negative: the ledger fell below zero, or below the minimum that an overlong
+  /// hold permits, as a share of its peak.
   double worst() {
     double worst = 0;
     for (int start = 0; start < 20; ++start) {
@@ -178,7 +177,7 @@ class Search {
       for (int climb = 0; climb < 200; ++climb) {
         std::vector<Gene> next = genes;
         for (int i = 0; i < 3; ++i) next[static_cast<std::size_t>(dice_.within(0, kSteps))] = random_gene();
-        if (dice_.chance(0.3)) {  // a gene that was good may be good again
+        if (dice_.chance(0.3)) {  // repeats a gene in the next step
           const auto from = static_cast<std::size_t>(dice_.within(0, kSteps - 1));
           next[from + 1] = next[from];
         }
@@ -206,10 +205,10 @@ class Search {
   }
 
   double objective(const std::vector<Gene>& genes) const {
-    // No Coulomb friction: laws that do not count on it would be given a margin.
+    // Zero Coulomb friction, or laws that ignore it would have a margin.
     const Friction friction{0, kViscous};
     Limiter limiter({.law = law_, .friction = friction, .longest_hold = std::chrono::milliseconds(1)});
-    // The accounts that the law promises: one, or one for each axis.
+    // Accounts that the law guarantees: one, or one per axis.
     const bool per_axis = law_ == Law::kAolPerAxis;
     Vec3 energy = Vec3::Zero();
     double least = 0;
@@ -268,7 +267,7 @@ std::vector<Law> passive_laws() {
 }
 
 std::string name_for_test(const ::testing::TestParamInfo<Law>& law) {
-  std::string name;  // GoogleTest takes letters and digits only
+  std::string name;  // GoogleTest accepts only letters and digits
   for (const char c : info(law.param).name) name += c == '-' ? "_" : c == '+' ? "Plus" : std::string(1, c);
   return name;
 }

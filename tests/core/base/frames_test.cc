@@ -19,7 +19,7 @@
 namespace tendon::frames_test {
 namespace {
 
-/// All 48 ways to lay three axes along x, y and z: 24 of them right-handed.
+/// Returns the 48 orthonormal bases along ±x, ±y and ±z, 24 of which are right-handed.
 std::vector<Mat3> axis_aligned_bases() {
   std::vector<Mat3> bases;
   std::array<Eigen::Index, 3> order = {0, 1, 2};
@@ -112,7 +112,6 @@ TEST(Axes, AQuaternionAndItsNegativeAreTheSameMatrix) {
   }
 }
 
-/// Where the axes of a frame point, by its own words: "x forward, y left, z up".
 TEST(Frames, EachMatrixIsWhatItsWordsSay) {
   const std::map<std::string, Vec3> ways = {{"right", {1, 0, 0}}, {"left", {-1, 0, 0}},    {"up", {0, 1, 0}},
                                             {"down", {0, -1, 0}}, {"forward", {0, 0, -1}}, {"user", {0, 0, 1}}};
@@ -140,7 +139,7 @@ TEST(Frames, HaveANameOfTheirOwnByWhichTheyAreFound) {
   EXPECT_EQ(find_frame("maya"), nullptr);
 }
 
-/// In all 48 bases, and so in every frame of the table: physics does not care where one looks from.
+/// Work and torque must not depend on the basis. The 48 bases include every frame of the table.
 TEST(Frames, WorkAndTurnsAreTheSameSeenFromAnyOfThe48Bases) {
   Dice random(7);
   for (const Mat3& basis : axis_aligned_bases()) {
@@ -148,14 +147,13 @@ TEST(Frames, WorkAndTurnsAreTheSameSeenFromAnyOfThe48Bases) {
     const Mat3 turn = any_rotation(random);
     const Vec3 place = any_vector(random);
     const Vec3 force = any_vector(random);
-    // A point of the handle, turned here, is where the turned point is seen from there.
+    // Rotating a point of the handle and changing the frame must commute.
     EXPECT_LT((frame.orientation(turn) * frame.position(place) - frame.position(turn * place)).norm(), 1e-12);
     EXPECT_NEAR(frame.orientation(turn).determinant(), 1, 1e-12);
-    // A torque is what a force does at a lever, and its work is the same.
+    // Torques transform like lever × force, so their work is invariant.
     EXPECT_LT((frame.torque(place.cross(force)) - (frame.position(place) / 100).cross(frame.force(force))).norm(),
               1e-12);
     EXPECT_NEAR(frame.force(force).dot(frame.position(place)) / 100, force.dot(place), 1e-12);
-    // And back.
     EXPECT_LT((frame.operator_position(frame.position(place)) - place).norm(), 1e-12);
     EXPECT_LT((frame.operator_force(frame.force(force)) - force).norm(), 1e-12);
     EXPECT_LT((frame.operator_torque(frame.torque(force)) - force).norm(), 1e-12);
@@ -163,7 +161,8 @@ TEST(Frames, WorkAndTurnsAreTheSameSeenFromAnyOfThe48Bases) {
   }
 }
 
-/// ZeroSimROSUnity #7: signs of the quaternion changed by hand gave the right yaw, with roll and pitch swapped.
+/// Regression test for ZeroSimROSUnity issue #7: changing quaternion signs by hand kept yaw correct and swapped roll
+/// and pitch.
 TEST(Frames, AYawToTheLeftTurnsNegativeAboutUnitysUp) {
   const Frame& unity = *find_frame("unity");
   const Mat3 left = Eigen::AngleAxisd(0.5, Vec3::UnitY()).toRotationMatrix();  // seen from above, counter-clockwise

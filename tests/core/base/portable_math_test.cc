@@ -16,7 +16,7 @@ namespace {
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 const double kNan = std::numeric_limits<double>::quiet_NaN();
 
-/// Three halves of the least that a double can say.
+/// Tolerance of about 1.5 units in the last place.
 double ulps(double right) { return std::max(3e-16 * std::abs(right), 1.2e-16); }
 
 TEST(PortableMath, RoundsEvenWhereAddingAHalfWouldNot) {
@@ -57,7 +57,7 @@ TEST(PortableMath, Expm1AndTanhKeepTheirPrecisionNearZero) {
   EXPECT_TRUE(std::isnan(tanh(kNan)));
 }
 
-/// eˣ or eˣ − 1, each sum after the one before; that far they are defined by what they compute.
+/// Computes eˣ (or eˣ − 1) with one rounding per operation, in the order of the definition.
 double defined(double x, bool less_one) {
   const std::int64_t k = round(x / std::numbers::ln2);
   const auto whole = static_cast<double>(k);
@@ -116,7 +116,7 @@ TEST(PortableMath, HypotNeitherOverflowsNorLosesTheSmallSide) {
   EXPECT_TRUE(std::isnan(hypot(kNan, 1.0)));
 }
 
-/// The promise itself: whoever computes other bits than the machine on which this was written is told so.
+/// Hash of many results. A different value means that this machine does not reproduce the reference bits.
 TEST(PortableMath, TheBitsAreThoseOfEveryOtherMachine) {
   std::uint64_t bits = 0;
   const auto feed = [&](double value) { bits = bits * 6364136223846793005U + std::bit_cast<std::uint64_t>(value); };

@@ -22,7 +22,7 @@ class Rotations : public ::testing::Test {
  protected:
   Vec3 vector(double longest) { return dice_.direction() * dice_.within(0, longest); }
   Quat rotation() { return rotation_by(vector(std::numbers::pi)); }
-  /// Symmetric, its eigenvalues between 0 and 2 N·m/rad.
+  /// Returns a random symmetric stiffness with eigenvalues between 0 and 2 N·m/rad.
   Mat3 stiffness() {
     const Mat3 turn = matrix_of(rotation());
     const Vec3 values(dice_.within(0, 2), dice_.within(0, 2), dice_.within(0, 2));
@@ -120,9 +120,10 @@ TEST_F(Rotations, ASpringIsStiffnessTimesAngleForSmallTurns) {
   }
 }
 
-/// The work of the hand against the spring along a closed way, J: below zero, the spring gave energy out.
+/// Returns the work of the hand against the spring along a closed path, J. Negative work means that the spring
+/// generated energy.
 double work_round(const Mat3& k, const Quat& rest, const std::vector<Quat>& way) {
-  constexpr int kParts = 40;  // of each leg, each by Gauss's rule with three points: exact but for some 1e-12 J
+  constexpr int kParts = 40;  // per leg; three Gauss points in each part leave an error of about 1e-12 J
   constexpr std::array<std::pair<double, double>, 3> kGauss{
       {{0.1127016653792583, 5.0 / 18}, {0.5, 8.0 / 18}, {0.8872983346207417, 5.0 / 18}}};
   double work = 0;

@@ -26,7 +26,7 @@ Vec<N> random_direction(Dice& dice) {
   return v.normalized();
 }
 
-/// The motion that takes most out of the ledger while `force` is held, eq. (7): it follows the force.
+/// Eq. (7): the motion along `force` that extracts the most energy while the force is held.
 template <int N>
 Vec<N> worst_motion(const Vec<N>& force, const Friction& friction, Duration held) {
   const double size = force.norm();
@@ -34,18 +34,17 @@ Vec<N> worst_motion(const Vec<N>& force, const Friction& friction, Duration held
   return force / size * (seconds(held) * (size - friction.coulomb) / (2 * friction.viscous));
 }
 
-/// What is demanded at a place. A law that is passive only in static worlds is given one.
+/// Demand as a function of position. Laws that are passive only in static worlds are tested with one of these.
 template <int N>
 using World = std::function<Demand<N>(const Vec<N>& position)>;
 
-/// The walls that make up a static world.
 struct Walls {
   std::size_t count = 3;   ///< 1 … 3
-  double bilateral = 0.4;  ///< share of them that pull too
+  double bilateral = 0.4;  ///< share of walls that also pull
 };
 
-/// −∇ of a convex potential, least at the origin: springs to random planes with random stiffness, together no steeper
-/// than `stiffest`. Those that pull too go through the origin; the others lie around it.
+/// Returns the force −∇ of a convex potential with its minimum at the origin: springs to random planes with random
+/// stiffness. Their total stiffness is at most `stiffest`. Planes of bilateral springs pass through the origin.
 template <int N>
 World<N> static_world(Dice& dice, double stiffest, const Walls& of) {
   struct Wall {
@@ -75,7 +74,7 @@ World<N> static_world(Dice& dice, double stiffest, const Walls& of) {
   };
 }
 
-/// `world`, answering the position of `periods` periods ago.
+/// Returns `world` evaluated at the position `periods` periods ago.
 template <int N>
 World<N> delayed(World<N> world, int periods) {
   return [world = std::move(world),
@@ -87,7 +86,7 @@ World<N> delayed(World<N> world, int periods) {
   };
 }
 
-/// Demands nothing sensible: huge, tiny, zero, not a number, along and against the motion, now soft and now hard.
+/// Returns arbitrary demands: huge, tiny, zero, NaN, along and against the motion, with changing stiffness.
 template <int N>
 World<N> hostile_world(Dice& dice) {
   return [&dice, last = Vec<N>(Vec<N>::Zero())](const Vec<N>& x) mutable {
@@ -124,21 +123,21 @@ World<N> hostile_world(Dice& dice) {
   };
 }
 
-/// An operator who knows the law and the force and wants energy: random motion of all sizes, the worst motion there is,
-/// and slowly in, then out in one go.
+/// An operator who knows the law and its force and tries to extract energy: random motion of all sizes, the worst
+/// motion of eq. (7), and slow entry followed by a fast exit.
 struct Adversary {
-  Friction friction;  ///< what the device really has
+  Friction friction;  ///< true friction of the device
   Duration longest_hold = std::chrono::milliseconds(1);
   double hostility = 0.5;
-  double largest_move = 1e-3;  ///< m, of a random motion
+  double largest_move = 1e-3;  ///< m, largest random motion
   int steps = 400;
-  bool jitter = true;     ///< holds of ¼ … 1 × longest_hold
-  bool clamps = true;     ///< the device sometimes writes less than it was told to
-  bool overlooks = true;  ///< intervals that nobody saw
+  bool jitter = true;     ///< hold time of ¼ … 1 × longest_hold
+  bool clamps = true;     ///< the device sometimes applies less than commanded
+  bool overlooks = true;  ///< some intervals are not observed
 };
 
 struct Fate {
-  double least_energy = 0;  ///< J, of the true ledger, relative to the energy that went to and fro (at least 1 J)
+  double least_energy = 0;  ///< J, minimum of the true ledger, relative to the energy exchanged (at least 1 J)
   bool all_finite = true;
   bool within_permitted = true;
 };
@@ -188,14 +187,12 @@ requires StabilityController<Law, N> Fate run_adversary(Law& law, const Adversar
   return fate;
 }
 
-/// The friction of a random device.
 inline Friction random_friction(Dice& dice) {
   return {dice.chance(0.3) ? 0.0 : dice.decades(-3, -0.3), dice.decades(-2, 0.3)};
 }
 
-/// Runs `make(claimed friction, longest hold)` in worlds that obey no rule, for `seeds` seeds, and counts the runs in
-/// which the port gave out energy. `overclaim` above 1 is the sabotage: the law believes in so much more viscous
-/// friction.
+/// Runs `make(claimed friction, longest hold)` in hostile worlds and returns the number of seeds for which the port
+/// generated energy. `overclaim` above 1 is the sabotage: it multiplies the viscous friction that the law assumes.
 template <int N, class Make>
 int broken_by_hostile_worlds(Make make, int seeds, double overclaim = 1) {
   int broken = 0;
@@ -214,8 +211,8 @@ int broken_by_hostile_worlds(Make make, int seeds, double overclaim = 1) {
   return broken;
 }
 
-/// The same for laws that are passive in static, convex worlds: `make(friction, longest hold, stiffest)`, where
-/// `stiffest`, N/m, is the slope of the world.
+/// Same count for laws that are passive in static, convex worlds. `make` also gets the slope of the world, `stiffest`
+/// in N/m.
 template <int N, class Make>
 int broken_by_static_worlds(Make make, int seeds, const Walls& walls = {}, int periods_late = 0) {
   int broken = 0;
@@ -238,8 +235,8 @@ int broken_by_static_worlds(Make make, int seeds, const Walls& walls = {}, int p
   return broken;
 }
 
-/// Holds for every law: what is not finite becomes zero with the reason and is not booked, and the ledger is the
-/// port's.
+/// Requirements on every law: a demand that is not finite becomes zero with the reason and is not booked, and the
+/// energy is the ledger of the port.
 template <int N, class Law>
 requires StabilityController<Law, N>
 void expect_the_common_promises(Law law, const Friction& friction) {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// What AOL+ promises, judged by the true ledger: exact positions, exact friction, the force really held. The law
-// itself sees what an encoder leaves of it.
+// Passivity of AOL+, judged by the true ledger: exact positions, exact friction and the applied force. The law itself
+// sees positions in encoder counts.
 #include "core/control/aol_plus.h"
 
 #include <gtest/gtest.h>
@@ -32,14 +32,14 @@ template <int Blocks, int Size>
 struct Case {
   using Law = AolPlus<Blocks, Size>;
   typename Law::Config config;
-  double encoder_step = 0;     // m, of every coordinate
-  bool jitter = false;         // holds of 0.3 T_max … T_max
-  double acceleration = kInf;  // m/s², what the adversary keeps to, per block
-  int latency = 0;             // holds between choosing a force and holding it
-  double force_scale = 1;      // sabotage: what is applied, above what was allowed
+  double encoder_step = 0;     // m, each coordinate
+  bool jitter = false;         // hold time of 0.3 T_max … T_max
+  double acceleration = kInf;  // m/s², acceleration limit of the adversary in each block
+  int latency = 0;             // holds between the choice of a force and its application
+  double force_scale = 1;      // sabotage: applied force / permitted force
 };
 
-/// A law with random friction, and any of the parts that `listed` names.
+/// Returns a law with random friction and the parts that `listed` names.
 template <int Blocks, int Size>
 Case<Blocks, Size> random_case(Dice& dice, const std::string& listed) {
   using Law = AolPlus<Blocks, Size>;
@@ -85,11 +85,11 @@ Case<Blocks, Size> random_case(Dice& dice, const std::string& listed) {
 }
 
 struct Outcome {
-  double least = 0;         // J, of the true ledger
-  double scale = 0;         // J, the largest it was: what rounding may be measured by
-  double worst_excess = 0;  // N above what the law itself said it permits
-  double felt = 0;          // N, the largest force
-  double over_credit = 0;   // J, by which the law's account was above the true ledger
+  double least = 0;         // J, minimum of the true ledger
+  double scale = 0;         // J, maximum of the true ledger, the scale of its rounding errors
+  double worst_excess = 0;  // N above `permitted`
+  double felt = 0;          // N, largest force
+  double over_credit = 0;   // J, largest difference between the law's account and the true ledger
 };
 
 template <int Blocks, int Size>
@@ -124,7 +124,7 @@ Outcome run(Dice& dice, const Case<Blocks, Size>& c, int steps) {
       const auto block = static_cast<std::size_t>(i);
       const Vec<Size> force = applied.template segment<Size>(i * Size);
       const double size = force.norm();
-      // The worst motion of eq. (7) follows the force.
+      // Eq. (7): the worst motion follows the force.
       Vec<Size> move = roam.template segment<Size>(i * Size);
       if (hostile && size > friction[block].coulomb) {
         move = force / size * held * (size - friction[block].coulomb) / (2 * friction[block].viscous);
@@ -154,7 +154,7 @@ Outcome run(Dice& dice, const Case<Blocks, Size>& c, int steps) {
     outcome.over_credit = std::max(outcome.over_credit, law.spendable() - energy);
 
     if (c.config.parts.adaptive_friction && dice.chance(0.02)) {
-      for (std::size_t i = 0; i < Blocks; ++i) {  // the true friction changes, and the law is told a bound of it
+      for (std::size_t i = 0; i < Blocks; ++i) {  // the true friction varies, and the law gets a lower bound
         friction[i] = {c.config.friction[i].coulomb * dice.within(0.2, 1),
                        c.config.friction[i].viscous * dice.within(0.2, 1)};
       }
@@ -179,8 +179,8 @@ Outcome run(Dice& dice, const Case<Blocks, Size>& c, int steps) {
   return outcome;
 }
 
-/// All seeds of one law with one list of parts. `f`: friction that changes leaves the friction of the interval in
-/// which it fell to be borne by the bound of before, so it is not mixed with the others.
+/// Runs all seeds of one law with one list of parts. Adaptive friction (`f`) is tested without other parts, because the
+/// interval in which the friction falls is booked with the previous bound.
 template <int Blocks, int Size>
 void expect_passive(const std::string& listed, int seeds = 150) {
   SCOPED_TRACE(std::to_string(Blocks) + " blocks of " + std::to_string(Size));
@@ -232,8 +232,8 @@ TEST(AolPlus, ABoundOnePercentTooHighIsFoundOut) {
   EXPECT_GT((broken_by<1, 3>("l", 1.01)), 5);
 }
 
-/// With every part: the promise whatever the hand does, or while it accelerates as the part says; exact positions, or in
-/// counts. `seeds` of each find no motion that draws energy, and find one when the force is 2 % larger.
+/// AOL+ with every part, for any motion of the hand or with the acceleration limit of the part, and with exact
+/// positions or encoder counts. Each adversary must fail at the permitted force and succeed at 1.02 times that force.
 TEST(AolPlus, FortyThousandAdversariesFindNothingAndTwoPercentMoreIsFound) {
   constexpr int kSeeds = 10'000;
   for (const char* listed : {"cksotd", "crksotd", "ckaotd", "crkaotd"}) {
@@ -276,14 +276,14 @@ TEST(AolPlus, AfterAnIntervalThatIsNoNumberThePlainBoundHolds) {
   const Interval<1> bad{.applied = Vec<1>(0), .dx = Vec<1>(std::nan("")), .held = kPeriod};
   law.observe(bad);
   EXPECT_EQ(law.limit(push).permitted, plain.limit(push).permitted);
-  // One good interval gives a velocity, and none to compare it with.
+  // A single interval yields a velocity but no acceleration.
   const Interval<1> good{.applied = Vec<1>(0), .dx = Vec<1>(1e-4), .held = kPeriod};
   law.observe(good);
   plain.observe(good);
   EXPECT_EQ(law.limit(push).permitted, plain.limit(push).permitted);
 }
 
-/// Half a minute of waving in free space: 4 Hz, 30 mm.
+/// Moves at 4 Hz with an amplitude of 30 mm in free space for 30 s.
 template <class Law>
 void wave(Law& law) {
   double x = 0;
@@ -306,7 +306,7 @@ TEST(AolPlus, WavingInFreeSpaceSwitchesThePlainLimiterOffButNotTheCappedOne) {
   EXPECT_NEAR(capped.limit({.force = Vec<1>(1e3)}).permitted, 0.02 + 2 * std::sqrt(0.26 * 0.005 / 1e-3), 1e-9);
 }
 
-/// Pushes a spring of `stiffness` to `depth` and lets it go, slowly; the share of steps in which it was limited.
+/// Pushes slowly into a spring of `stiffness` to `depth` and back. Returns the share of limited steps.
 template <class Law>
 double limited_share(Law& law, double stiffness, double depth) {
   double applied = 0;
@@ -330,7 +330,7 @@ TEST(AolPlus, WhatAHandPutIntoASoftSpringPaysForItsReleaseInSpiteOfTheCap) {
     config.parts.energy_cap.emplace();
     AolPlus<1> law(config);
     EXPECT_EQ(limited_share(law, stiffness, 0.02), 0) << stiffness << " N/m";
-    config.parts.energy_cap->most_contact = 0;  // the cap alone would cut it
+    config.parts.energy_cap->most_contact = 0;  // otherwise the cap alone would limit the force
     config.parts.energy_cap->energy = 1e-3;
     AolPlus<1> naive(config);
     EXPECT_GT(limited_share(naive, stiffness, 0.02), 0) << stiffness << " N/m";
@@ -342,12 +342,12 @@ TEST(AolPlus, AContactThatSoftensKeepsNoMoreThanItsForceCanGiveBack) {
   config.parts.energy_cap.emplace();
   AolPlus<1> law(config);
   double applied = 0;
-  for (int n = 0; n < 1000; ++n) {  // the first step begins the contact
+  for (int n = 0; n < 1000; ++n) {  // contact begins in the first step
     law.observe({.applied = Vec<1>(applied), .dx = Vec<1>(1e-5), .held = kPeriod});
     law.limit({.force = Vec<1>(-5)});
     applied = -5;
   }
-  // 0.05 J were put in; 1 N over 9.99 mm gives back 9.99 mJ.
+  // Input: 0.05 J. A force of 1 N over 9.99 mm returns 9.99 mJ.
   EXPECT_NEAR(law.limit({.force = Vec<1>(-1)}).permitted, 0.02 + 2 * std::sqrt(0.26 * (0.005 + 9.99e-3) / 1e-3), 1e-9);
 }
 
@@ -370,7 +370,7 @@ TEST(AolPlus, ASpringThatIsHeldForAMinuteIsStillPaidFor) {
 }
 
 TEST(AolPlus, DryFrictionDoesNotPumpUpTheCap) {
-  // Dragged to and fro over a rough surface the hand puts in ever more work, none of which comes back.
+  // Dragging over a rough surface adds work that is never returned.
   auto config = one_axis();
   config.parts.energy_cap.emplace();
   AolPlus<1> law(config);
@@ -403,7 +403,7 @@ TEST(AolPlus, AFlickeringCountCostsAMovingHandNoMoreThanTheFlicker) {
   auto config = one_axis(0, 0.05);
   config.parts.robust_ledger.emplace().encoder_step = {30e-6};
   AolPlus<1> law(config);
-  for (int n = 0; n < 3000; ++n) {  // two counts forth, one back
+  for (int n = 0; n < 3000; ++n) {  // two counts forward, one back
     law.observe({.applied = Vec<1>(0), .dx = Vec<1>(n % 3 == 2 ? -30e-6 : 30e-6), .held = kPeriod});
   }
   EXPECT_NEAR(law.spendable(), 0.05 * 1000 * 30e-6, 0.05 * 2 * 30e-6);
@@ -485,7 +485,7 @@ TEST(AolPlus, ABrokenAssumptionIsCountedAndThePlainBoundHoldsForThatStep) {
 }
 
 TEST(AolPlus, TheReserveMakesUpForAForceThatIsHeldLate) {
-  // Without the reserve the same adversary breaks the law (core/PROOFS.md, "Output latency").
+  // core/PROOFS.md, "Output latency": without the reserve the same adversary breaks the law.
   int broken = 0;
   for (std::uint64_t seed = 1; seed <= 50; ++seed) {
     Dice dice(seed);
@@ -522,7 +522,7 @@ TEST(AolPlus, StaysPassiveWhileTheBoundsOfFrictionMove) {
       config.parts.adaptive_friction.emplace().rise = milliseconds(20);
       return config;
     }());
-    // The device always has its friction, the law believes less, now more, now less.
+    // The law uses a varying lower bound of the constant true friction.
     const Friction true_friction{0.5, 1};
     double energy = 0;
     double applied = 0;

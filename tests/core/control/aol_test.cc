@@ -39,15 +39,15 @@ TEST(Aol, JointFormIsTheSameInEveryFrameAndBoxFormPermitsWhatAxesDo) {
     const Vec3 joint = here.limit({.force = wanted}).force;
     EXPECT_LT((turn * joint - there.limit({.force = turn * wanted}).force).norm(), 1e-9 * joint.norm());
     EXPECT_LT(joint.cross(wanted).norm(), 1e-9 * joint.norm() * wanted.norm());
-    // Whatever the axes allow by themselves is within the box form's set, so it lets it through unchanged.
+    // The box form must pass every force that the per-axis form permits.
     const Vec3 by_axes = axes.limit({.force = wanted}).force;
     EXPECT_LT((box.limit({.force = by_axes}).force - by_axes).norm(), 1e-9 * by_axes.norm());
   }
 }
 
 TEST(Aol, ThePaperFormLosesALateralForceThatTheJointFormKeeps) {
-  // core/PROOFS.md, "Several coordinates": motion along x only, demand (−35.9, −2) N. In a frame turned by 45° both
-  // axes have the same bound, so the lateral force vanishes.
+  // core/PROOFS.md, "Several coordinates": motion along x only, demand (−35.9, −2) N. In a frame rotated by 45° both
+  // axes have the same bound, so the lateral force is zero.
   const auto lateral = [](double angle, bool joint) {
     const Friction friction{0.0, 0.26};
     Mat3 frame = Mat3::Identity();

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The lists of laws and of AOL+'s parts, against each other and against core/control/README.md.
+// Compares the lists of laws and of AOL+ parts with each other and with core/control/README.md.
 #include <gtest/gtest.h>
 
 #include <fstream>
@@ -36,7 +36,7 @@ TEST(Catalogue, EveryPartOfAolPlusIsARowOfTheReadme) {
 }
 
 TEST(Catalogue, EachPartOfAolPlusIsListedOnce) {
-  // Does not compile when Parts gains a member: then kAolParts needs one more row, too.
+  // This binding fails to compile when Parts gains a member. Add a row to kAolParts then.
   PointAolPlus::Parts parts;
   const auto& [cap, robust, knee, reserve, bounded, shaping, adaptive, thrift, damper, fading] = parts;
   EXPECT_EQ(std::tuple_size_v<decltype(kAolParts)>, 10U);

@@ -41,7 +41,7 @@ TEST(EnergyBounding, TheSumOfForceTimesMotionCoversWhatIsStored) {
   expect_both_conditions<6>(kSlope, kSlope);
 }
 
-// The nearest feasible force: no random feasible force is nearer to the wanted one.
+// Compares the distance to the demand with that of random feasible forces.
 TEST(EnergyBounding, NoOtherFeasibleForceIsNearerToTheWantedOne) {
   Dice dice(7);
   for (int run = 0; run < 2000; ++run) {
@@ -61,7 +61,7 @@ TEST(EnergyBounding, NoOtherFeasibleForceIsNearerToTheWantedOne) {
   }
 }
 
-// Creeping in costs what is stored and no more; coming out in one step gives (c1 − b/T) Δx² when c1 is too large.
+// Slow entry costs the stored energy. Leaving in one step returns (c1 − b/T) Δx² when c1 exceeds b/T.
 double energy_after_creeping_in_and_stepping_out(double overclaim) {
   EnergyBounding<1> law({{0, kFriction.viscous * overclaim}, milliseconds(1)});
   EnergyLedger truth({0, kFriction.viscous});

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// What each of the parts for a quiet hand does by itself. That none of them costs the promise is in aol_plus_test.cc.
+// Effect of each AOL+ part that reduces vibration. aol_plus_test.cc tests their passivity.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -20,7 +20,7 @@ AolPlus<1>::Config device(Duration period, double viscous = 0.005, double coulom
   return {.friction = {Friction{coulomb, viscous}}, .longest_hold = period};
 }
 
-/// The stiffness that a hand feels which goes 10 mm into `stiffness` at 20 mm/s.
+/// Returns the displayed stiffness when the hand moves 10 mm into a spring of `stiffness` at 20 mm/s.
 double displayed(const AolPlus<1>::Config& config, double stiffness) {
   AolPlus<1> law(config);
   const double step = 0.02 * seconds(config.longest_hold);
@@ -40,7 +40,7 @@ TEST(Shaping, ShowsNoObjectStifferWhateverThePeriodIs) {
     config.parts.bounded_acceleration = {{.most = {100}}};
     config.parts.shaping = {{.stiffness = {900}}};
     EXPECT_LE(displayed(config, 20000), 900 * 1.06) << "friction earns, too; " << us << " us";
-    if (us > 1000) continue;  // 4 mm of reach in a hold are worth more than the spring
+    if (us > 1000) continue;  // the reach of 4 mm in a hold costs more energy than the spring stores
     EXPECT_GE(displayed(config, 20000), 900 * 0.9) << us << " us";
   }
 }
@@ -79,7 +79,8 @@ TEST(Thrift, AForceGrowsOnlyByWhatTheAccountCanPayTheCountsOf) {
   EXPECT_LT(-limited.force[0], 0.9 * limited.permitted) << "the bound itself is not what held it back";
 }
 
-/// A hand that vibrates by `amplitude` (m/s) at 20 Hz in a contact of 2 N: the work that the damper took in a second, J.
+/// Returns the work of the damper during one second of hand vibration at 20 Hz with `amplitude` (m/s), in a contact of
+/// 2 N, J.
 double damped(const AolPlus<1>::Config& config, double amplitude, double slow_speed = 0, double slow_hz = 0) {
   AolPlus<1> law(config);
   law.credit(0.05);
@@ -119,7 +120,7 @@ TEST(Damper, IsBlindToTheCountsOfASlowHand) {
   AolPlus<1> law(config);
   law.credit(0.05);
   Vec<1> applied = Vec<1>::Zero();
-  for (int n = 0; n < 2000; ++n) {  // a count every 20 ms: 1.5 mm/s
+  for (int n = 0; n < 2000; ++n) {  // one count every 20 ms: 1.5 mm/s
     law.observe({.applied = applied, .dx = Vec<1>(n % 20 == 0 ? 3e-5 : 0.0), .held = milliseconds(1)});
     const auto limited = law.limit({.force = Vec<1>(-2), .age = milliseconds(20)});
     const double pulse = 24 * 3e-5 / (std::numbers::e * 2.2e-3);
@@ -138,7 +139,7 @@ TEST(Damper, StopsWhenItOwesMoreThanItHasEarned) {
     AolPlus<1> law(config);
     law.credit(0.05);
     Vec<1> applied = Vec<1>::Zero();
-    for (int n = 0; n < 1000; ++n) {  // 10 mm/s: a count every 10 ms, nothing else moves
+    for (int n = 0; n < 1000; ++n) {  // 10 mm/s: one count every 10 ms
       law.observe({.applied = applied, .dx = Vec<1>(n % 10 == 0 ? 1e-4 : 0.0), .held = milliseconds(1)});
       applied = law.limit({.force = Vec<1>(-2), .age = milliseconds(20)}).force;
     }
@@ -162,7 +163,7 @@ TEST(Damper, IsOffInFreeSpaceAndWhereAFreshAnswerIsShownWell) {
 }
 
 TEST(Damper, NeverTurnsAForceRoundNorMoreThanDoublesIt) {
-  for (const double speed : {-0.4, 0.4}) {  // drawn out, pushed in
+  for (const double speed : {-0.4, 0.4}) {  // pulled out, pushed in
     AolPlus<1> law(with_damper(0));
     law.credit(0.05);
     Vec<1> applied = Vec<1>::Zero();
@@ -189,7 +190,7 @@ TEST(Damper, ASoftLateSpringIsDampedLessThanAStiffOne) {
     law.credit(0.05);
     Vec<1> applied = Vec<1>::Zero();
     double x = 0;
-    for (int n = 0; n < 200; ++n) {  // 10 mm in, and there a step of 10 mm/s
+    for (int n = 0; n < 200; ++n) {  // 10 mm into the object, with a velocity step of 10 mm/s
       const double dx = n < 100 ? 1e-4 : 1e-5;
       law.observe({.applied = applied, .dx = Vec<1>(n == 101 ? 4e-5 : dx), .held = milliseconds(1)});
       x += dx;
@@ -216,7 +217,7 @@ TEST(FadingContact, KeepsForAWhileWhatAContactHadPutIn) {
       applied = law.limit({.force = Vec<1>(wanted)}).force;
     };
     for (int n = 0; n < 500; ++n) step(2e-5, -400 * x);
-    for (int n = 0; n < pause_ms; ++n) step(0, 0);  // the object is gone
+    for (int n = 0; n < pause_ms; ++n) step(0, 0);  // the object is removed
     return law.spendable();
   };
   EXPECT_NEAR(left_after(false, 1), 1e-3, 1e-9);

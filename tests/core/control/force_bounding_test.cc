@@ -27,7 +27,7 @@ TEST(ForceBounding, WithoutCoulombFrictionItIsTheAdjustingOutputLimiter) {
       const double bound = 2 * std::sqrt(friction.viscous / seconds(milliseconds(2)) * ledger.energy());
       ASSERT_DOUBLE_EQ(limited.permitted, bound) << "seed " << seed << " step " << step;
       force = limited.force;
-      if (force == Vec3::Zero()) break;  // the rule of no contact
+      if (force == Vec3::Zero()) break;  // no-contact rule
     }
   }
 }
@@ -35,7 +35,7 @@ TEST(ForceBounding, WithoutCoulombFrictionItIsTheAdjustingOutputLimiter) {
 TEST(ForceBounding, ForgetsWhatFreeMotionEarnedButNeverADebt) {
   ForceBounding<1> law({kFriction, milliseconds(1)});
   for (int i = 0; i < 1000; ++i) law.observe({Vec<1>(0.0), Vec<1>(1e-4), milliseconds(1)});
-  EXPECT_DOUBLE_EQ(law.limit({Vec<1>(9.0)}).permitted, 2 * 0.26 * 1e-4 / 1e-3);  // of the last interval alone
+  EXPECT_DOUBLE_EQ(law.limit({Vec<1>(9.0)}).permitted, 2 * 0.26 * 1e-4 / 1e-3);  // depends only on the last interval
   law.observe({Vec<1>(5.0), Vec<1>(1e-3), milliseconds(1)});
   EXPECT_EQ(law.limit({Vec<1>(9.0)}).permitted, 0);
   law.observe({Vec<1>(0.0), Vec<1>(1e-4), milliseconds(1)});
@@ -56,7 +56,7 @@ TEST(MemorylessForceBounding, AHoldLongerThanAgreedIsCreditedWithItsFriction) {
   EXPECT_NEAR(law.limit({Vec<1>(9.0)}).permitted, 2 * std::sqrt(260 * 0.26 * 1e-6 / 4e-3), 1e-12);
 }
 
-// The invariant of its proof, with jitter.
+// Invariant of the proof, with jitter.
 TEST(MemorylessForceBounding, TheLedgerCoversTheWorstThatTheNextHoldCanDo) {
   for (std::uint64_t seed = 0; seed < 100; ++seed) {
     Dice dice(seed);
@@ -80,7 +80,7 @@ TEST(MemorylessForceBounding, AHeldForceLosesWhatTheHandHasComeBackAndNoMore) {
   double x = 0;
   double deepest = 0;
   for (int step = 0; step < 2000; ++step) {
-    const double dx = dice.within(-1e-3, 1e-3) - x;  // dithers about one place
+    const double dx = dice.within(-1e-3, 1e-3) - x;  // oscillates about one position
     law.observe({force, Vec<1>(dx), milliseconds(1)});
     x += dx;
     deepest = std::max(deepest, x);
@@ -97,7 +97,7 @@ TEST(MemorylessForceBounding, AForceDoesNotAppearWhileTheHandIsAtRest) {
   }
 }
 
-// f_c = 0, or the unclaimed Coulomb friction would hide it.
+// f_c = 0: unclaimed Coulomb friction would compensate for the overclaimed viscous friction.
 template <class Law>
 double least_energy(double overclaim) {
   double least = 0;

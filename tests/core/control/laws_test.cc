@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Tests that every control law must pass. Each test is a table with one row per law.
+// Tests that every control law must pass, as tables with one row per law.
 #include <gtest/gtest.h>
 
 #include <limits>
@@ -75,7 +75,7 @@ TEST(Laws, OfThePassiveOnesNoAdversaryDrawsEnergy) {
   row("memoryless force bounding", []<int N>(Friction f, Duration t) { return MemorylessForceBounding<N>({f, t}); });
 }
 
-/// The controllers of passivity and of the reference energy act one interval late.
+/// The passivity and reference-energy controllers react one interval late.
 TEST(Laws, OfTheOthersAdversariesDrawEnergyInMostWorlds) {
   const auto row = [](const char* law, int more_than, auto make) {
     EXPECT_GT(broken_by_hostile_worlds<3>([&](Friction f, Duration) { return make(f); }, 50), more_than) << law;

@@ -10,7 +10,6 @@ using std::chrono::milliseconds;
 
 constexpr Friction kFriction{0.05, 0.26};
 
-// The invariant of the proof.
 TEST(NonlinearCoupling, TheLedgerCoversTheSpringAndTheProxysAccount) {
   for (std::uint64_t seed = 0; seed < 100; ++seed) {
     Dice dice(seed);
@@ -52,7 +51,7 @@ TEST(NonlinearCoupling, AStaticFieldNoSteeperThanItMayBePassesUnchanged) {
 
 TEST(NonlinearCoupling, ASaturatingAndAHardeningSpringAreStaticFieldsToo) {
   const auto saturating = [](double x) { return 3 * std::tanh(519.0 / 3 * x); };
-  const auto hardening = [](double x) { return std::copysign(x * x, x) * 519 / (2 * 0.01); };  // slope 519 at 10 mm
+  const auto hardening = [](double x) { return std::copysign(x * x, x) * 519 / (2 * 0.01); };  // slope 519 N/m at 10 mm
   for (std::uint64_t seed = 0; seed < 50; ++seed) {
     Dice dice(seed);
     for (const bool first : {true, false}) {
@@ -89,7 +88,7 @@ TEST(NonlinearCoupling, AForceThatComesLateYieldsInsteadOfGivingEnergy) {
   EXPECT_TRUE(yielded);
 }
 
-// To and fro: each time back gives (K/2 − b/T) Δx² too much.
+// Moves forward and back. Each return yields an excess of (K/2 − b/T) Δx².
 double energy_of_shaking(double overclaim) {
   NonlinearCoupling<1> law({{0, 0.26 * overclaim}, milliseconds(1)});
   EnergyLedger truth({0, 0.26});

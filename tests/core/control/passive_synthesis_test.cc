@@ -15,7 +15,7 @@ constexpr Friction kFriction{0.05, 0.26};
 TEST(PassiveSynthesis, ScalesByWhatFrictionAffords) {
   PassiveSynthesis<3> law({kFriction, milliseconds(1), milliseconds(2)});  // 0.26 / 2.5 ms = 104 N/m
   Mat3 stiffness = Mat3::Zero();
-  stiffness(0, 1) = 1040;  // not symmetric: what counts is how fast the force can change
+  stiffness(0, 1) = 1040;  // not symmetric: the bound uses the largest rate of change of the force
   const LimitedForce<3> limited = law.limit({Vec3(1, -2, 3), stiffness});
   EXPECT_NEAR((limited.force - Vec3(0.1, -0.2, 0.3)).norm(), 0, 1e-12);
   EXPECT_TRUE(limited.reasons.has(Reason::kEnergy));
@@ -63,7 +63,7 @@ TEST(PassiveSynthesis, NoAdversaryDrawsEnergyFromAStaticFieldThatIsLate) {
   EXPECT_EQ(broken<3>(3, 150), 0);
 }
 
-// Many slow circles in a spring: the limit in which the bound is tight, with delay and without.
+// Many slow circles in a spring. The bound is tight in this limit, with and without delay.
 double energy_of_slow_waving(int periods_late, double overclaim) {
   const double viscous = 0.26;
   PassiveSynthesis<1> law({{0, viscous * overclaim}, milliseconds(1), milliseconds(periods_late), 20000});

@@ -15,7 +15,7 @@ using enum PassivityObserver;
 constexpr double kInf = std::numeric_limits<double>::infinity();
 constexpr Friction kFriction{0.05, 0.26};
 
-// The energy that a law observes of a plain spring on random motion, and the energy that the ledger shows.
+// Energy that the law observes for a spring under random motion, and the minimum of the ledger.
 struct Seen {
   double worst_of_sum = 0;  // J, |observed − (K x²/2 ± K/2 Σ Δx²)|
   double least_observed = 0;
@@ -38,7 +38,7 @@ Seen watch_a_spring(Law law, double sign_of_leak) {
     squares += dx * dx;
     const LimitedForce<1> limited = law.limit({Vec<1>(-kStiffness * x), Mat<1>(kStiffness)});
     if (!limited.reasons.empty()) ++seen.interventions;
-    force = Vec<1>(-kStiffness * x);  // the spring itself, whatever the law says
+    force = Vec<1>(-kStiffness * x);  // the unlimited spring
     seen.worst_of_sum =
         std::max(seen.worst_of_sum, std::abs(law.observed() - kStiffness * (x * x + sign_of_leak * squares) / 2));
     seen.least_observed = std::min(seen.least_observed, law.observed());
@@ -71,7 +71,7 @@ TEST(PassivityController, DampsAsMuchAsIsMissing) {
   const double predicted = -held.dot(dx) - wanted.dot(dx);
   ASSERT_LT(predicted, 0);
   const LimitedForce<3> limited = law.limit({wanted});
-  // One more such interval leaves the observed energy at zero.
+  // Another such interval leaves the observed energy at zero.
   EXPECT_NEAR(law.observed() - limited.force.dot(dx), 0, 1e-15);
   EXPECT_NEAR((limited.force - wanted).cross(dx).norm(), 0, 1e-15);
   EXPECT_TRUE(limited.reasons.has(Reason::kEnergy));
@@ -93,7 +93,7 @@ TEST(PassivityController, AsPublishedAStiffWallStillThrowsTheHandOff) {
   EXPECT_LT(published.least_work, -0.1);
 }
 
-// 2m/T = 250 N·s/m for device and hand.
+// 2m/T = 250 N·s/m for the mass of device and hand.
 TEST(PassivityController, ADamperWithoutLimitGivesBurstsUpToMaxForce) {
   const Press result = press(PassivityController<1>({kPressFriction, kZohExact, kInf}), 20000);
   EXPECT_GT(result.peak_force, 50);
@@ -102,9 +102,9 @@ TEST(PassivityController, ADamperWithoutLimitGivesBurstsUpToMaxForce) {
 
 TEST(ParallelPassivityController, TheEnvironmentIsLeftBehindByWhatIsMissing) {
   ParallelPassivityController<1> law({kFriction, kZohExact, kInf});
-  law.observe({Vec<1>(1.0), Vec<1>(1e-3), milliseconds(1)});  // 1 mJ given out
+  law.observe({Vec<1>(1.0), Vec<1>(1e-3), milliseconds(1)});  // 1 mJ generated
   const LimitedForce<1> limited = law.limit({Vec<1>(-4.0), Mat<1>(1000.0)});
-  // Σ f Δx is −1 mJ; one more such interval at 4 N brings +4 mJ: nothing is missing.
+  // Σ f Δx is −1 mJ, and another such interval at 4 N adds 4 mJ, so no damping is needed.
   EXPECT_EQ(limited.force[0], -4);
   law.observe({Vec<1>(-4.0), Vec<1>(-0.5e-3), milliseconds(1)});  // −3 mJ
   const double missing = 3e-3 + 3.5 * 0.5e-3;

@@ -15,7 +15,7 @@ using std::chrono::milliseconds;
 
 constexpr Friction kFriction{0.05, 0.26};
 
-// A hand that presses and lets go, with a tremor: depth in a wall at 0.
+// Depth of the hand in a wall at 0, m: a press and a release, with tremor.
 double depth(int step) {
   const double t = step * 1e-3;
   return std::abs(8e-3 * std::sin(3 * t) + 2e-3 * std::sin(17 * t) + 1e-4 * std::sin(190 * t));
@@ -57,10 +57,10 @@ TEST(PortHamiltonian, TheStateLagsBehindThePositionByWhatTheLeapsCost) {
   }
   std::sort(ratios.begin(), ratios.end());
   EXPECT_GT(ratios[ratios.size() / 2], 0.9);
-  EXPECT_GT(least_work, -1e-5);  // of the environment, without any friction; its spring moves 75 mJ to and fro
+  EXPECT_GT(least_work, -1e-5);  // J, environment only, without friction; its spring exchanges 75 mJ
 }
 
-// Whatever is demanded, and whatever K: the storage is never negative, nor more than has gone in, but for the debt.
+// For every demand and every K the storage must stay nonnegative and at most the energy received plus the debt.
 TEST(PortHamiltonian, HoldsNoMoreThanHasGoneInAndWhatItHasBookedAsDebt) {
   for (std::uint64_t seed = 0; seed < 200; ++seed) {
     Dice dice(seed);
@@ -85,7 +85,7 @@ TEST(PortHamiltonian, HoldsNoMoreThanHasGoneInAndWhatItHasBookedAsDebt) {
   }
 }
 
-// Its stiffness is its own here: the demand's, which is hostile, is hidden from it.
+// Hides the hostile stiffness of the demand, so the law uses its configured stiffness.
 template <int N>
 class WithItsOwnStiffness {
  public:
@@ -114,7 +114,7 @@ TEST(PortHamiltonian, UpToTwoBOverTNoAdversaryDrawsEnergy) {
   EXPECT_EQ(broken<6>(1, 100), 0);
 }
 
-// In by d from rest, out by the worst: b d²/T (1 − (K T/2b)²).
+// A move of d into the contact from rest, then the worst motion out, yields b d²/T (1 − (K T/2b)²).
 TEST(PortHamiltonian, FivePercentAboveTwoBOverTTheFirstLeapCanBeCashedIn) {
   const auto energy = [](double excess) {
     const Friction friction{0, 0.26};

@@ -9,17 +9,17 @@
 
 namespace tendon {
 
-/// What the hand finds when it presses into a wall and stays there.
+/// Result of a press into a wall.
 struct Press {
   double stiffness = 0;   ///< N/m, displayed: mean force / mean depth in the last 0.3 s
   double unrest = 0;      ///< m/s rms, velocity in the last 0.5 s
   double peak_force = 0;  ///< N
-  double least_work = 0;  ///< J, the lowest that work of the hand + kinetic energy at the start ever is
+  double least_work = 0;  ///< J, minimum of the hand's work plus the initial kinetic energy
 };
 
-/// Presses a hand into a wall of `wall` N/m, with every law in the same setting: device 75 g, hand 50 g with 400 N/m and
-/// 0.3 N·s/m, b = 0.26 N·s/m, f_c = 0.02 N, 1 kHz. The hand starts 20 mm in front of the wall, and its target is 10 mm
-/// inside. The device saturates at 60 N.
+/// Presses a hand into a wall of `wall` N/m, with identical conditions for every law: device 75 g, hand 50 g with 400
+/// N/m and 0.3 N·s/m, b = 0.26 N·s/m, f_c = 0.02 N, 1 kHz. The hand starts 20 mm in front of the wall and its target is
+/// 10 mm inside. The device saturates at 60 N.
 template <class Law>
 requires StabilityController<Law, 1> Press press(Law law, double wall) {
   using std::chrono::milliseconds;

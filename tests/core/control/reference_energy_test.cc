@@ -15,7 +15,7 @@ constexpr Friction kFriction{0.05, 0.26};
 TEST(ReferenceEnergyController, TheReferenceIsWhatASpringHoldsAtThatForce) {
   const ReferenceEnergyController<3> law({kFriction, 500, 20});
   const Vec3 force(1, -2, 3);
-  EXPECT_DOUBLE_EQ(law.reference({force}), force.squaredNorm() / 1000);  // not sent: the configured one
+  EXPECT_DOUBLE_EQ(law.reference({force}), force.squaredNorm() / 1000);  // default: the configured stiffness
   Mat3 stiffness;
   stiffness << 800, 100, 0, 100, 400, 50, 0, 50, 200;
   EXPECT_NEAR(law.reference({force, stiffness}), 0.5 * force.dot(stiffness.inverse() * force), 1e-15);
@@ -25,7 +25,7 @@ TEST(ReferenceEnergyController, TheReferenceIsWhatASpringHoldsAtThatForce) {
 
 TEST(ReferenceEnergyController, DampsUpToTheReferenceAndNotOnlyUpToZero) {
   ReferenceEnergyController<1> law({kFriction, 1000, 1e6});
-  law.observe({Vec<1>(-1.0), Vec<1>(1e-3), milliseconds(1)});     // 1 mJ in
+  law.observe({Vec<1>(-1.0), Vec<1>(1e-3), milliseconds(1)});     // 1 mJ received
   EXPECT_EQ(law.limit({Vec<1>(-1.0)}).force[0], -1);              // 2 mJ predicted ≥ 0.5 mJ
   law.observe({Vec<1>(-1.0), Vec<1>(-0.7e-3), milliseconds(1)});  // 0.3 mJ left, reference 0.5 mJ
   const LimitedForce<1> limited = law.limit({Vec<1>(-1.0)});

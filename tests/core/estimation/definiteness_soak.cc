@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The long version of RecursiveLeastSquares.*StaysDefinite*: see README.md.
+// Long version of RecursiveLeastSquares.*StaysDefinite*, see README.md.
 #include <unistd.h>
 
 #include <algorithm>
@@ -22,7 +22,8 @@ struct Options {
 
 constexpr std::uint64_t kSeed = 7;
 
-/// Runs one form on nearly collinear regressors; true when it was definite, and took every sample.
+/// Runs one form on nearly collinear regressors. Returns true if the covariance stayed definite and every sample was
+/// accepted.
 template <class Estimator, class Scalar>
 bool soak(const char* form, const char* scalar, const Options& options) {
   Estimator estimator({.forgetting = 0.999, .prior_variance = 1e6});

@@ -16,7 +16,7 @@
 namespace tendon::recursive_least_squares_test {
 namespace {
 
-/// The recursion of the textbooks: what the library does not do, to show why.
+/// Textbook recursion, which the library avoids because it loses definiteness.
 template <int M, class Scalar>
 struct Textbook {
   using Vector = Eigen::Matrix<Scalar, M, 1>;
@@ -54,7 +54,7 @@ void expect_equals_batch(std::uint64_t seed) {
     const Vec3 phi(gaussian(dice), gaussian(dice), gaussian(dice));
     regressors.row(i) = phi;
     outputs[i] = phi.dot(kTruth) + 0.1 * gaussian(dice);
-    // The cap on forgetting, as the header gives it, is at work during the first samples.
+    // The cap on forgetting of the header is active during the first samples.
     forgotten[i] = std::max(kForgetting, std::min(1.0, estimator.trace() / (3 * kPrior)));
     ASSERT_TRUE(estimator.observe(phi, outputs[i]));
   }
@@ -125,7 +125,7 @@ TEST(RecursiveLeastSquares, OnlyTheTextbookUpdateIsIndefiniteInFloat32) {
     ASSERT_GT(qr.pivots().minCoeff(), 0);
   }
   EXPECT_GT(indefinite, kSamples / 2);
-  // The sum of the two is what such regressors can tell.
+  // Such regressors determine only the sum of the two parameters.
   const auto told = [](const Eigen::Vector3f& theta) { return theta[0] + theta[1]; };
   EXPECT_NEAR(told(ud.estimate()), -1, 2e-3);
   EXPECT_NEAR(told(qr.estimate()), -1, 2e-3);
@@ -149,7 +149,8 @@ TEST(RecursiveLeastSquares, UdStaysDefiniteInFloat64) { expect_definite<UdLeastS
 TEST(RecursiveLeastSquares, QrStaysDefiniteInFloat32) { expect_definite<QrLeastSquares<3, float>, float>(); }
 TEST(RecursiveLeastSquares, QrStaysDefiniteInFloat64) { expect_definite<QrLeastSquares<3>, double>(); }
 
-/// 1200 of 2000 samples excite one of two directions. The largest error of θ once both are excited again.
+/// 1200 of 2000 samples excite only one of two directions. `error` is the largest error of θ after both are excited
+/// again.
 struct Return {
   double trace;
   double error;
@@ -172,7 +173,7 @@ Return wind_up(Estimator estimator, Trace trace, std::uint64_t seed) {
   return result;
 }
 
-/// Gives UdLeastSquares the look of Textbook.
+/// Adapts UdLeastSquares to the interface of Textbook.
 struct Capped {
   UdLeastSquares<2> fit{{.forgetting = 0.98, .prior_variance = 100}};
   Eigen::Vector2d estimate = Eigen::Vector2d::Zero();
@@ -197,9 +198,9 @@ TEST(RecursiveLeastSquares, TheCapOnForgettingEndsCovarianceWindUp) {
   }
   std::sort(plain.begin(), plain.end());
   std::sort(capped.begin(), capped.end());
-  EXPECT_GT(plain[50], 500);  // of a parameter of 500
+  EXPECT_GT(plain[50], 500);  // the parameter is 500
   EXPECT_LT(capped[50], 8);
-  EXPECT_LT(capped[100], 60);  // √(tr P)/2 of gain at most, on noise of 5
+  EXPECT_LT(capped[100], 60);  // gain of at most √(tr P)/2, noise of 5
 }
 
 TEST(RecursiveLeastSquares, AResetKeepsTheEstimateAndBelievesWhatComesNext) {

@@ -86,7 +86,7 @@ TEST(VelocityEstimator, SaysZeroForAHandleThatFlickersBetweenTwoCounts) {
     const double v = estimator.observe(LocalTime(milliseconds(i)), Vec3(i % 2 == 0 ? 0 : 30e-6, 0, 0)).x();
     if (i > 50) worst = std::max(worst, std::abs(v));
   }
-  EXPECT_LE(worst, 30e-6 / 15e-3 + 1e-12);  // one count over the window, where a difference says 30 mm/s
+  EXPECT_LE(worst, 30e-6 / 15e-3 + 1e-12);  // one count over the window; a finite difference has an error of 30 mm/s
 }
 
 TEST(VelocityEstimator, IgnoresWhatIsNotANumberAndWhatIsNotNewer) {
@@ -98,7 +98,7 @@ TEST(VelocityEstimator, IgnoresWhatIsNotANumberAndWhatIsNotNewer) {
   EXPECT_NEAR(estimator.observe(LocalTime(milliseconds(2)), Vec3(3e-3, 0, 0)).x(), 2, 1e-12);
 }
 
-// The definition, sample by sample, as the header has it.
+// Window definition of the header, evaluated sample by sample.
 double end_fit(const std::vector<Motion>& newest_first, int axis, double resolution) {
   const Motion& now = newest_first.front();
   double velocity = 0;
@@ -130,7 +130,7 @@ TEST(VelocityEstimator, IsTheLongestEndFitToTheLastBit) {
       }
       Motion seen = hand;
       if (count > 0) seen.position = count * (hand.position / count).array().round().matrix();
-      if (step % 300 < 60) seen.position.z() = step % 7 == 0 ? -0.0 : 0.0;  // it stands still, at either zero
+      if (step % 300 < 60) seen.position.z() = step % 7 == 0 ? -0.0 : 0.0;  // at rest, with both signed zeros
       newest_first.insert(newest_first.begin(), seen);
       if (newest_first.size() > 20) newest_first.pop_back();
       const Vec3 velocity = estimator.observe(seen.at, seen.position);

@@ -30,7 +30,7 @@ HapticController::Config config_of_a_stylus() {
   return config;
 }
 
-/// A stylus in a hand that only turns and squeezes.
+/// A stylus whose hand only rotates and squeezes.
 class Stylus {
  public:
   explicit Stylus(const HapticController::Config& config = config_of_a_stylus()) : controller(config) {}
@@ -59,7 +59,7 @@ class Stylus {
     if (step.grip()) held_.grip = step.grip()->force;
     return step;
   }
-  /// Turns to and fro, and opens and closes, so that the accounts have something to spend.
+  /// Rotates, opens and closes periodically to fill the accounts.
   void earn(int steps = 500) {
     for (int i = 0; i < steps; ++i) {
       step(rotation_by({0, 0, i % 2 == 0 ? 0.01 : 0.0}), i % 2 == 0 ? 0.02 : 0.0);
@@ -117,7 +117,8 @@ TEST(HandleControl, ForceAndTorqueShareOneAccount) {
   const double before = stylus.step({}).energy;
   stylus.ask({0, 0, 0.05});
   stylus.step({});
-  // The torque turns the handle by 0.1 rad: 5 mJ less 0.1 mJ·(friction), of the account that forces live on.
+  // The torque turns the handle by 0.1 rad and spends 5 mJ minus 0.1 mJ of friction, from the account shared with
+  // forces.
   const Step after = stylus.step(rotation_by({0, 0, 0.1}));
   EXPECT_NEAR(after.energy - before, -0.05 * 0.1 + 1e-4 * 0.1 + 1e-3 * 0.01 / 1e-3, 1e-12);
 }
@@ -180,7 +181,7 @@ TEST(HandleControl, TorqueAndGripAreRampedInFadeAndStopWithTheForce) {
   const Step whole = wanted_after(15);
   EXPECT_EQ(whole.turn()->wanted.z(), 0.05);
   EXPECT_EQ(whole.grip()->wanted, 2);
-  const Step fading = wanted_after(40);  // 20 ms of hold, then 20 ms of 50
+  const Step fading = wanted_after(40);  // 20 ms of hold, then 20 of the 50 ms ramp
   EXPECT_EQ(fading.mode, Mode::kDecaying);
   EXPECT_NEAR(fading.turn()->wanted.z(), 0.05 * std::exp(-0.4), 1e-12);
   EXPECT_NEAR(fading.grip()->wanted, 2 * std::exp(-0.4), 1e-12);
@@ -211,7 +212,7 @@ TEST(HandleControl, AGripperSpendsItsOwnAccountOnly) {
   const Step step = stylus.step({}, 0);
   EXPECT_EQ(step.grip()->force, 5) << "the largest that the gripper may";
   EXPECT_LT(step.turn()->torque.norm(), 0.001);
-  // N times m per radian: the fingers' travel is what the force works on.
+  // N times m/rad: the force does work over the travel of the fingers.
   const Step opened = stylus.step({}, 0.01);
   const double travel = 0.05 * 0.01;
   EXPECT_NEAR(opened.grip()->energy - step.grip()->energy, -5 * travel + 0.02 * travel + 0.26 * travel * travel / 1e-3,
@@ -233,7 +234,7 @@ TEST(HandleControl, DisarmAndFaultsEndTorqueAndGrip) {
   stylus.controller.rearm();
   stylus.controller.observe(answer);
   ASSERT_GT(stylus.step({}).turn()->torque.norm(), 0);
-  const Step broken = stylus.step({2, 0, 0, 0});  // no rotation
+  const Step broken = stylus.step({2, 0, 0, 0});  // not a unit quaternion
   EXPECT_EQ(stylus.controller.fault(), HapticController::Fault::kPositionNotFinite);
   EXPECT_TRUE(broken.reasons.has(Reason::kNotFinite));
   EXPECT_EQ(broken.turn()->torque, Vec3(0, 0, 0));

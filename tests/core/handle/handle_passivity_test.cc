@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The promise for a handle that turns and grips: whatever the hand does with it, whatever the engines ask for, the one
-// account of force and torque and the account of the gripper are never negative. The accounts are kept here a second
-// time, from the equations and the way the handle really went.
+// Passivity of a handle that rotates and grips: for every motion and every demand, the common account of force and
+// torque and the account of the gripper must stay nonnegative. The test recomputes both accounts from the equations and
+// the true motion.
 #include <gtest/gtest.h>
 #include <rapidcheck.h>
 
@@ -21,14 +21,14 @@ namespace {
 constexpr double kInf = std::numeric_limits<double>::infinity();
 constexpr Duration kLongest = std::chrono::milliseconds(2);
 
-/// What a motion adds to an account, J: −F·Δx + f_c ‖Δx‖ + b ‖Δx‖²/T.
+/// Energy that a motion adds to an account, J: −F·Δx + f_c ‖Δx‖ + b ‖Δx‖²/T.
 template <class Vector>
 double income(const Vector& force, const Vector& moved, const Friction& friction, Duration held) {
   const double way = moved.norm();
   return -force.dot(moved) + friction.coulomb * way + friction.viscous * way * way / seconds(held);
 }
 
-/// The motion that takes most out of an account, eq. (7): it follows the force.
+/// Eq. (7): the motion along the force that extracts the most energy.
 template <class Vector>
 Vector worst_motion(const Vector& force, const Friction& friction, Duration held) {
   const double size = force.norm();
@@ -72,7 +72,7 @@ RemoteForce any_answer(Dice& dice, const Vec3& x, const Quat& q, const Effort& a
   if (dice.chance(0.3)) torque.torque = applied.torque * 1e3;
   if (dice.chance(0.4)) {
     Mat3 stiffness = Mat3::Identity() * dice.decades(-2, 3);
-    if (dice.chance(0.3)) stiffness(0, 1) = dice.within(-100, 100);  // not symmetric: energy out of nothing
+    if (dice.chance(0.3)) stiffness(0, 1) = dice.within(-100, 100);  // not symmetric, so it generates energy
     torque.model = {.at = q, .stiffness = stiffness};
   }
   if (dice.chance(0.9)) answer.torque = torque;
@@ -81,7 +81,7 @@ RemoteForce any_answer(Dice& dice, const Vec3& x, const Quat& q, const Effort& a
 }
 
 struct Outcome {
-  double least_energy = kInf;  ///< J, of force and torque together
+  double least_energy = kInf;  ///< J, force and torque together
   double least_grip = kInf;    ///< J
   bool within_limits = true;
 };
@@ -100,7 +100,7 @@ Outcome run(std::uint64_t seed, Law law) {
   Effort applied;
   double energy = 0;
   double grip_energy = 0;
-  double turnover = 1;  // J, that went to and fro: rounding is a share of it
+  double turnover = 1;  // J, energy exchanged, the scale of rounding errors
   for (std::uint64_t i = 0; i < 300; ++i) {
     if (dice.chance(answers)) {
       RemoteForce answer = any_answer(dice, x, q, applied);
@@ -116,7 +116,7 @@ Outcome run(std::uint64_t seed, Law law) {
     if (dice.chance(hostility)) {
       dx = worst_motion(applied.force, config.limiter.friction, held);
       turn = worst_motion(applied.torque, config.rotation->friction, held);
-      if (turn.norm() > 3) turn *= 3 / turn.norm();  // further than half a turn would be another turn
+      if (turn.norm() > 3) turn *= 3 / turn.norm();  // more than half a turn is a different rotation
       const Vec<1> grip = worst_motion(Vec<1>(applied.grip), config.grip->friction, held);
       dopening = grip[0] / config.grip->arm;
     }
@@ -147,7 +147,7 @@ Outcome run(std::uint64_t seed, Law law) {
                             applied.torque.norm() <= config.rotation->max_torque * (1 + 1e-12) &&
                             std::abs(applied.grip) <= config.grip->max_force && step.force.allFinite() &&
                             applied.torque.allFinite() && std::isfinite(applied.grip);
-    if (dice.chance(0.1)) {  // the device wrote less
+    if (dice.chance(0.1)) {  // the device applied less
       applied.force *= 0.5;
       applied.torque *= 0.5;
     }
@@ -171,7 +171,7 @@ TEST_P(HandlePassivity, NoHandAndNoEngineMakesItsAccountsNegative) {
 INSTANTIATE_TEST_SUITE_P(Laws, HandlePassivity, ::testing::Values(Law::kAol, Law::kAolPlus),
                          [](const auto& test) { return test.param == Law::kAol ? "Aol" : "AolPlus"; });
 
-/// A hand that fills the account, then follows a wrench `scale` times as large as is permitted. The least energy, J.
+/// Fills the account, then moves along a wrench `scale` times the permitted one. Returns the minimum energy, J.
 double after_a_wrench(double scale, double share_of_torque) {
   const std::array friction{Friction{0.02, 0.26}, Friction{1e-4, 1e-3}};
   WrenchPort port({.law = Law::kAol, .friction = friction, .longest_hold = kLongest});

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The theorem of purse.h for handles: two ports that turn or grip pay each other through a network that delays, loses,
-// repeats and reorders. Every account and the sum of the two ledgers stay above −1 nJ, closed loops in SO(3) included.
-// The ledgers are kept here a second time, from the way the handles really went.
+// The energy-sharing theorem of purse.h for handles: two ports that rotate or grip pay each other over a network that
+// delays, loses, repeats and reorders. Every account and the sum of both ledgers must stay above −1 nJ, also on closed
+// loops in SO(3). The test recomputes the ledgers from the true motion.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -28,7 +28,7 @@ constexpr double kHandleTolerance = 1e-9;
 
 static_assert(SharesAccount<WrenchPort, 6> && SharesAccount<GripPort, 1>);
 
-/// One of the two ends: a limiter, its purse, and the ledger once more.
+/// One end: limiter, purse and an independent ledger.
 template <class Limits>
 struct HandleEnd {
   static constexpr int kSize = Limits::kSize;
@@ -41,7 +41,7 @@ struct HandleEnd {
   std::optional<Purse> purse;
   std::array<Friction, kBlocks> friction{};
   double truth = 0;                   ///< J
-  Vec<kSize> x = Vec<kSize>::Zero();  ///< of a wrench: position; where it has turned to is `q`
+  Vec<kSize> x = Vec<kSize>::Zero();  ///< position; a wrench keeps its orientation in `q`
   Quat q{};
   Quat loop_from{};
   Vec<kSize> force = Vec<kSize>::Zero();
@@ -51,7 +51,7 @@ struct HandleEnd {
 
 struct Balance {
   double least_account = kUnlimited;  ///< J
-  double least_sum = kUnlimited;      ///< J, of the two ledgers
+  double least_sum = kUnlimited;      ///< J, sum of the two ledgers
   double given = 0;                   ///< J
   bool finite = true;
   bool broken() const { return std::min(least_account, least_sum) < -kHandleTolerance; }
@@ -78,7 +78,7 @@ class HandlePair {
       end.period = from_seconds(dice_.chance(0.7) ? 1e-3 : dice_.decades(-3.3, -2.7));
       end.config.longest_hold = end.period;
       for (std::size_t i = 0; i < end.friction.size(); ++i) {
-        const double scale = i == 0 ? 1 : 1e-2;  // N·m for N
+        const double scale = i == 0 ? 1 : 1e-2;  // N·m per N
         end.friction[i] = {scale * (dice_.chance(0.3) ? 0.0 : dice_.decades(-3, -0.3)), scale * dice_.decades(-2, 0.3)};
         end.config.friction[i] = end.friction[i];
       }
@@ -115,7 +115,7 @@ class HandlePair {
  private:
   static double scale_of(int block) { return block == 0 ? 1 : 1e-2; }
 
-  /// A demand without any rule, or the spring to where the other really is.
+  /// Returns an arbitrary demand, or a spring to the true position of the other end.
   Vec<kSize> wanted(End& end, const End& other) {
     const int kind = static_cast<int>(dice_.within(0, 6));
     if (kind == 1) return end.force * 1e3;
@@ -152,16 +152,16 @@ class HandlePair {
       const Vec<kBlock> held_force = end.force.template segment<kBlock>(i * kBlock);
       const Friction& friction = end.config.friction[static_cast<std::size_t>(i)];
       const double size = held_force.norm();
-      if (hostile) {  // eq. (7): the worst there is
+      if (hostile) {  // worst motion, eq. (7)
         if (size <= friction.coulomb) continue;
         part = held_force / size * (seconds(held) * (size - friction.coulomb) / (2 * friction.viscous));
-        if (i > 0 && part.norm() > 3) part *= 3 / part.norm();  // further than half a turn would be another turn
+        if (i > 0 && part.norm() > 3) part *= 3 / part.norm();  // more than half a turn is a different rotation
       } else if (!resting) {
         part = any(dice_.decades(-7, -3) * (i == 0 ? 1 : 30));
       }
     }
     if (loops_ && !hostile) {
-      // Three turns about axes that do not commute, and the fourth one that closes the loop.
+      // Three rotations about axes that do not commute, then the one that closes the loop.
       if constexpr (kSize == 6) {
         out.template tail<3>() =
             now_ % 4 == 3 ? turn_between(end.q, end.loop_from) : Vec3(Vec3::Unit(now_ % 4) * dice_.within(-0.02, 0.02));
@@ -170,7 +170,8 @@ class HandlePair {
     return out;
   }
 
-  /// Moves the handle and books what that brings: one turn about one axis, and seen as the difference of two samples.
+  /// Moves the handle by one rotation about one axis and books the work. The limiter sees the difference of two
+  /// samples.
   void move(End& end, const Vec<kSize>& way, Duration held) {
     Vec<kSize> seen = way;
     if constexpr (kSize == 6) {
@@ -181,7 +182,7 @@ class HandlePair {
       end.q = to;
     }
     end.x.template head<kBlock>() += way.template head<kBlock>();
-    if (end.x.norm() > 0.1) end.x *= 0.5;  // away from the numbers: nothing was booked
+    if (end.x.norm() > 0.1) end.x *= 0.5;  // resets the position scale without booking
     for (int i = 0; i < End::kBlocks; ++i) {
       const Vec<kBlock> part = way.template segment<kBlock>(i * kBlock);
       const Friction& friction = end.config.friction[static_cast<std::size_t>(i)];

@@ -9,13 +9,13 @@
 
 namespace tendon::testing {
 
-/// A run that is the exact solution of m dv/dt = s t + bias − b v − f_c, from rest, and what an encoder sees of it.
+/// Exact solution of m dv/dt = s t + bias − b v − f_c from rest, with optional encoder rounding.
 struct ExactRamp {
-  double rate = 0.1;  ///< s, N/s, of either sign
+  double rate = 0.1;  ///< s, N/s, either sign
   double viscous = 0.26;
   double coulomb = 0.05;
   double mass = 0.075;
-  double bias = 0;       ///< N, not in the recorded force
+  double bias = 0;       ///< N, missing from the recorded force
   double travel = 0.25;  ///< m
   double encoder_step = 3e-5;
   double period = 1e-3;
@@ -32,7 +32,7 @@ struct ExactRamp {
     for (int i = 0; std::abs(position(i * period)) <= travel; ++i) {
       const double t = i * period;
       const double x = position(t);
-      // The force is held for the period that follows; it is the mean of the ramp over that period.
+      // The recorded force is the mean of the ramp over the following period.
       result.samples.push_back(
           {t, encoder_step > 0 ? std::round(x / encoder_step) * encoder_step : x, rate * (t + period / 2)});
     }

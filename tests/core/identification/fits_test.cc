@@ -39,8 +39,8 @@ TEST(KellyFit, DoesNotCareWhenTheClockStarted) {
 }
 
 TEST(KellyFit, OnADesktopSeesTheFrictionThatTheSpecSays) {
-  // 0.25 m of travel, true f_c = 0.05 N. The expected values are from a line fitted to velocities, and kelly_fit fits
-  // positions: hence 5 %.
+  // 0.25 m of travel, true f_c = 0.05 N. The expected values come from a line through velocities, while kelly_fit uses
+  // positions, hence the 5 % tolerance.
   struct Row {
     double viscous, rate, kelly_viscous, kelly_coulomb;
   };
@@ -79,7 +79,7 @@ TEST_P(IntegralFitOf, AnySlideFindsTheFrictionKnowingTheMass) {
 TEST_P(IntegralFitOf, AnySlideFindsTheMassToo) {
   const auto [viscous, rate] = GetParam();
   const IntegralFit fit = integral_fit(slide({.rate = rate, .viscous = viscous}), std::nullopt);
-  // Rounding to counts is all that is wrong with these.
+  // The only error is the rounding to counts.
   EXPECT_NEAR(fit.friction.viscous, viscous, 2e-3);
   EXPECT_NEAR(fit.friction.coulomb, 0.05, 1e-3);
   EXPECT_NEAR(fit.mass / kMass, 1, 0.08);
@@ -88,7 +88,7 @@ TEST_P(IntegralFitOf, AnySlideFindsTheMassToo) {
 TEST_P(IntegralFitOf, AnySlideToleratesALateLoop) {
   const auto [viscous, rate] = GetParam();
   const ExactRamp ramp{.rate = rate, .viscous = viscous};
-  // Every fifth sample was lost, and the force of the one before stayed.
+  // Every fifth sample is lost, and the previous force persists.
   RampRun run;
   for (std::size_t i = 0; const RampSample& sample : ramp.run().samples) {
     if (++i % 5 == 0) {

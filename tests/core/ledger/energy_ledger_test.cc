@@ -17,7 +17,7 @@ TEST(EnergyLedger, StartsAtZero) { EXPECT_EQ(EnergyLedger(kFriction).energy(), 0
 
 TEST(EnergyLedger, BooksEquationFiveTermByTerm) {
   EnergyLedger ledger(kFriction);
-  // The device pulled with 2 N along −x while the hand moved 3 mm along +x in 1 ms: 6 mJ of work, plus friction.
+  // The device pulls with 2 N along −x while the hand moves 3 mm along +x in 1 ms: 6 mJ of work plus friction.
   const double energy = ledger.observe(Vec3(-2, 0, 0), Vec3(0.003, 0, 0), milliseconds(1));
   EXPECT_NEAR(energy, 2 * 0.003 + 0.05 * 0.003 + 0.26 * 0.003 * 0.003 / 0.001, 1e-15);
 }
@@ -76,7 +76,7 @@ TEST(EnergyLedger, ChargesAnUnseenIntervalAtLeastAsMuchAsAnySeenOne) {
     worst = std::min(worst, seen.observe(Vec1(force), Vec1(i * 1e-5), milliseconds(2)));
   }
   EXPECT_LE(unseen.energy(), worst);
-  EXPECT_NEAR(unseen.energy(), worst, 1e-6);  // and no more than that
+  EXPECT_NEAR(unseen.energy(), worst, 1e-6);  // the bound is tight
 }
 
 TEST(EnergyLedger, RefusesImpossibleFriction) {

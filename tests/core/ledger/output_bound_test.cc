@@ -74,15 +74,15 @@ TEST(OutputBound, RefusesAHoldOfNoLength) {
   EXPECT_THROW(OutputBound::of(kFriction, Duration::zero()), std::invalid_argument);
 }
 
-// The motion that takes most out of the ledger while F is held for T, eq. (7): it follows the force.
+// Eq. (7): the motion along F that extracts the most energy while F is held for T.
 Vec3 worst_motion(const Vec3& force, const Friction& friction, Duration held) {
   const double size = force.norm();
   if (size <= friction.coulomb) return Vec3::Zero();
   return force / size * (seconds(held) * (size - friction.coulomb) / (2 * friction.viscous));
 }
 
-// Least energy that an adversary, who mixes random motion with the worst motion, reaches in `steps` steps
-// when forces obey `scale` times the bound.
+// Returns the minimum energy that an adversary reaches in `steps` steps of random and worst motion, with forces of
+// `scale` times the bound.
 double least_energy_against_adversary(double scale, std::uint64_t seed) {
   std::mt19937_64 random(seed);
   const auto uniform = [&random] { return static_cast<double>(random() >> 11) * 0x1p-53; };
@@ -171,7 +171,7 @@ TEST(OutputBound, NeverClipsASpringSofterThanTwoBOverT) {
   }
 }
 
-// core/PROOFS.md, "Operational stiffness": a slow, saturated push displays 2b/T, whatever the wall.
+// core/PROOFS.md, "Operational stiffness": a slow, saturated push displays 2b/T for any wall stiffness.
 TEST(OutputBound, ShowsAStiffWallAsASpringOfTwoBOverT) {
   const Friction friction{0.0, 0.26};
   const OutputBound bound = OutputBound::of(friction, milliseconds(1));
@@ -216,7 +216,7 @@ TEST(OutputBound, TheLargestScaleSpendsTheBudgetAndNotMore) {
   }
 }
 
-// World 29091: 2e-42 J were left, a corner rounded to just above Coulomb friction, and nothing bounded the wrench.
+// Regression: with a budget of 2e-42 J, a corner rounded to just above Coulomb friction left the wrench unbounded.
 TEST(OutputBound, AlmostNoBudgetPermitsFrictionAndNoMoreThanEachPartAlone) {
   Dice dice(29091);
   for (int trial = 0; trial < 20000; ++trial) {
@@ -232,7 +232,7 @@ TEST(OutputBound, AlmostNoBudgetPermitsFrictionAndNoMoreThanEachPartAlone) {
     const double scale = largest_scale(bounds, sizes, budget);
     ASSERT_GE(scale, friction) << "trial " << trial << ", " << budget << " J";
     for (std::size_t i = 0; i < 2; ++i) {
-      const double most = bounds[i].largest(budget) * (1 + 1e-12) + 1e-100;  // whose square is lost
+      const double most = bounds[i].largest(budget) * (1 + 1e-12) + 1e-100;  // its square underflows
       ASSERT_LE(scale * sizes[i], most) << "trial " << trial << ", " << budget << " J";
     }
   }

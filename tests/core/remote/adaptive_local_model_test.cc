@@ -72,12 +72,12 @@ TEST(AdaptiveLocalModel, NothingJumpsWhenAnAnswerArrivesEvenInABlend) {
     const Vec3 before = model.predict(now)->force;
     if (dice.chance(0.05)) model.observe(without_model(k, k, 5 * dice.direction()));
     EXPECT_LT((model.predict(now)->force - before).norm(), 1e-12);
-    EXPECT_LE(before.norm(), 5 + 1e-9);  // a blend is never more than its parts
+    EXPECT_LE(before.norm(), 5 + 1e-9);  // a blend never exceeds its parts
   }
 }
 
-/// The hand goes to and fro by a millimetre while a soft and a stiff spring alternate, the worst at each turn:
-/// the energy that the hand gets out of it, J.
+/// The hand oscillates by 1 mm while a soft and a stiff spring alternate, the worst one at each reversal. Returns the
+/// energy that the hand receives, J.
 double handed_out(const AdaptiveLocalModel::Config& config) {
   AdaptiveLocalModel model(config);
   double energy = 0;
@@ -106,7 +106,7 @@ TEST(AdaptiveLocalModel, ABlendHandsOutHalfOfWhatASwapDoes) {
 TEST(AdaptiveLocalModel, HoldsTheForceWhenTheEngineSendsNoStiffness) {
   AdaptiveLocalModel model({});
   model.observe(without_model(0, 5, Vec3(1, 2, 3)));
-  for (int k = 0; k < 100; ++k) {  // also for a motion sampled just before the arrival
+  for (int k = 0; k < 100; ++k) {  // includes motions sampled just before the arrival
     const Prediction prediction = *model.predict({at(k), hand(k), Vec3::Zero()});
     EXPECT_EQ(prediction.force, Vec3(1, 2, 3));
     EXPECT_EQ(prediction.stiffness, Mat3::Zero());
@@ -129,7 +129,7 @@ TEST(AdaptiveLocalModel, BeyondTheValidRadiusTheForceStaysWhatItIsAtItsEdge) {
   const Prediction far = *model.predict({at(0), Vec3(0.03, 0, 0), Vec3::Zero()});
   EXPECT_NEAR(far.force.x(), -5 - 500 * 0.002, 1e-12);
   EXPECT_EQ(far.stiffness, Mat3::Zero());
-  // The one before keeps its own edge while it is faded out.
+  // The previous model keeps its own edge while it fades out.
   model.observe(spring(40, 45, Vec3(0.02, 0, 0), 500 * Mat3::Identity()));
   EXPECT_NEAR(model.predict({at(45), Vec3(0.03, 0, 0), Vec3::Zero()})->force.x(), far.force.x(), 1e-12);
 }

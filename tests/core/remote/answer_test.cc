@@ -16,7 +16,7 @@ constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kInf = std::numeric_limits<double>::infinity();
 constexpr double kAnyStiffness = 1e9;
 
-/// A tool 4 mm deep in a surface that looks along +z, pushed out with 2 N and rubbed along x with 0.4 N.
+/// A tool 4 mm deep in a surface with normal +z: 2 N normal force, 0.4 N friction along x.
 RemoteForce pressed() {
   RemoteForce answer{.force = {0.4, 0, 2}};
   answer.model = LocalModel{.at = {0.01, 0.02, -0.004}, .stiffness = Vec3(100, 100, 500).asDiagonal()};
@@ -31,7 +31,7 @@ ForceTable table(double first, double step, std::initializer_list<double> force)
   return made;
 }
 
-/// From 1 mm above the surface to 7 mm below it, 1 mm apart: hardening.
+/// Hardening table from 1 mm above the surface to 7 mm below it, in steps of 1 mm.
 RemoteForce with_table() {
   RemoteForce answer = pressed();
   answer.model->contact = Contact{
@@ -80,7 +80,7 @@ TEST(Answer, BelievedIsOnlyAConservativeBoundedStiffness) {
     EXPECT_GE(values.minCoeff(), -1e-9);
     EXPECT_LE(values.maxCoeff(), 1000 + 1e-9);
   }
-  EXPECT_EQ(believed(pressed(), 1000).model->stiffness, pressed().model->stiffness);  // good ones stay what they are
+  EXPECT_EQ(believed(pressed(), 1000).model->stiffness, pressed().model->stiffness);  // plausible models stay unchanged
 }
 
 TEST(Answer, ASurfaceDoesNotPullAndIsNotFeltBeyondItself) {
@@ -91,9 +91,9 @@ TEST(Answer, ASurfaceDoesNotPullAndIsNotFeltBeyondItself) {
   EXPECT_NEAR(reconstruct(answer, deeper_by(-0.0039)).force.z(), 2 - 500 * 0.0039, 1e-12);
   EXPECT_EQ(reconstruct(answer, deeper_by(-0.0041)).force, Vec3::Zero());
   EXPECT_EQ(reconstruct(answer, deeper_by(-0.0041)).stiffness, Mat3::Zero());
-  answer.model->stiffness(2, 2) = 1000;  // on this line the force is over at half the depth
+  answer.model->stiffness(2, 2) = 1000;  // this linear model reaches zero force at half the depth
   EXPECT_EQ(reconstruct(answer, deeper_by(-0.003)).force, Vec3::Zero());
-  answer.model->stiffness(2, 2) = 100;  // and on this one not yet at the surface
+  answer.model->stiffness(2, 2) = 100;  // this one still has a force at the surface
   EXPECT_EQ(reconstruct(answer, deeper_by(-0.0041)).force, Vec3::Zero());
 }
 
@@ -118,7 +118,7 @@ TEST(Answer, ATableReplacesStiffnessAlongTheNormalWithinItsEnds) {
   EXPECT_EQ(along(0.1).stiffness(2, 2), 0);
   EXPECT_EQ(along(-0.1).force.z(), 0);
   EXPECT_EQ(along(1e12).force.z(), 8);
-  // Across it is the stiffness that counts, up to its radius; the table does not end there.
+  // Across the normal the stiffness applies up to its radius. The radius does not cut off the table.
   RemoteForce narrow = answer;
   narrow.model->valid_radius = 1e-6;
   EXPECT_NEAR(reconstruct(narrow, deeper_by(0.001)).force.z(), 3.5, 1e-12);
@@ -152,14 +152,14 @@ TEST(Answer, NoTableIsSteeperThanWhatIsBelieved) {
   RemoteForce answer = with_table();
   answer.model->contact->table = table(-0.002, 0.001, {-1e9, 0, 2, 1e9, 1e9});
   const ForceTable kept = *believed(answer, 1000).model->contact->table;
-  EXPECT_EQ(kept.force[2], 2);  // where it was answered
+  EXPECT_EQ(kept.force[2], 2);  // entry at the answered depth
   EXPECT_EQ(kept.force[1], 1);
   EXPECT_EQ(kept.force[0], 0);
   EXPECT_EQ(kept.force[3], 3);
   EXPECT_EQ(kept.force[4], 4);
   const ForceTable soft = *believed(with_table(), 1e4).model->contact->table;
   EXPECT_EQ(soft.force, with_table().model->contact->table->force);
-  // The answered depth may lie beyond either end.
+  // The answered depth may lie outside the table.
   answer.model->contact->table = table(1, 0.001, {2, 9});
   EXPECT_EQ(believed(answer, 1000).model->contact->table->force[1], 3);
   answer.model->contact->table = table(-1, 0.001, {2, 9});
@@ -217,7 +217,7 @@ TEST(Answer, IsSoundOnlyWithEveryNumberInItsRange) {
     damage(answer);
     EXPECT_FALSE(is_sound(answer)) << what;
   }
-  RemoteForce unused = with_table();  // an entry that does not count may be anything
+  RemoteForce unused = with_table();  // unused entries may have any value
   unused.model->contact->table->force[9] = kNaN;
   EXPECT_TRUE(is_sound(unused));
 }

@@ -44,7 +44,7 @@ TEST(ForceChannels, TheSumIsThatOfTheFreshForcesAndTheirStiffness) {
   const auto both = two.wanted(at(milliseconds(1), Vec3(0.01, 0, 0)));
   EXPECT_TRUE(both.force.isApprox(Vec3(1 - 100 * 0.01, 2, 0), 1e-12));
   EXPECT_EQ(both.stiffness(0, 0), 100);
-  // The first goes on, the second has stopped: it is gone from the sum, and the device is not stopped.
+  // The first engine keeps sending and the second stops: its force leaves the sum without a device stop.
   RemoteForce later = stiff;
   later.received = LocalTime(milliseconds(400));
   two.observe(0, later);
@@ -70,7 +70,7 @@ TEST(ForceChannels, ThePriorityOfAFreshForceFadesOverInTheTimeOfTheRamp) {
   EXPECT_TRUE(step(true).force.isApprox(Vec3(1, 0, 0), 1e-9));
   EXPECT_EQ(step(true).channel, 0U);
   Vec3 before = step(true).force;
-  for (int i = 0; i < 400; ++i) {  // the first falls silent: the second comes back, without a jump
+  for (int i = 0; i < 400; ++i) {  // the first stops sending, and the second returns without a jump
     const Vec3 now = step(false).force;
     EXPECT_LE((now - before).norm(), 0.03) << i;
     before = now;
@@ -103,9 +103,9 @@ TEST(ForceChannels, TheReleaseOfAnEngineThatIsNoLongerHeardChangesNothing) {
   EXPECT_EQ(one.wanted(at(milliseconds(2))).mode, Mode::kActive);
 }
 
-// Whatever engines say, the limiter sees their sum only: two that fight, one that sends no number, one that falls
-// silent, and a handover in mid-contact, on a hand that moves to and fro. Between two steps the force changes by no
-// more than the slew limit allows, but where the limiter cuts it; and the ledger is never overdrawn.
+// The limiter sees only the sum of the engines: two that oppose each other, one that sends NaN, one that stops sending,
+// and a handover in contact, with an oscillating hand. The force must change within the slew limit except where the
+// limiter cuts it, and the ledger must stay nonnegative.
 TEST(ForceChannels, NoEngineAndNoHandoverOverdrawsTheLedgerOrJumps) {
   HapticController::Config config;
   config.limiter.law = Law::kAol;
@@ -123,8 +123,8 @@ TEST(ForceChannels, NoEngineAndNoHandoverOverdrawsTheLedgerOrJumps) {
     const Motion hand{LocalTime(milliseconds(t)), Vec3(0.02 * std::sin(phase), 0, 0), Vec3::Zero()};
     const double x = hand.position.x();
     controller.observe(force_at(milliseconds(t), Vec3(-4000 * (x - 0.005), 0, 0), 1), 0);
-    // The second engine pushes in the opposite direction. It is replaced every 400 ms during contact, and does not send
-    // anything for a while.
+    // The second engine pushes in the opposite direction, is replaced every 400 ms during contact, and pauses for a
+    // while.
     if (t % 2000 < 1500)
       controller.observe(force_at(milliseconds(t), Vec3(3000 * x, 1, 0), 2 + static_cast<std::uint32_t>(t) / 400), 1);
     if (t % 3 == 0) {

@@ -63,7 +63,7 @@ TEST(HeldForce, SafeStopIsLeftOnlyByAFreshForceAndThatIsRampedIn) {
   HeldForce held({});
   held.observe(force_at(Duration::zero(), Vec3(2, 0, 0)));
   EXPECT_EQ(held.wanted(at(milliseconds(600))).mode, Mode::kSafeStop);
-  EXPECT_EQ(held.wanted(at(milliseconds(5))).mode, Mode::kSafeStop);  // even if the clock stepped back
+  EXPECT_EQ(held.wanted(at(milliseconds(5))).mode, Mode::kSafeStop);  // also after a backward clock step
   held.observe(force_at(milliseconds(1000), Vec3(2, 0, 0), milliseconds(400)));
   const auto half = held.wanted(at(milliseconds(1050)));
   EXPECT_EQ(half.mode, Mode::kActive);
@@ -75,7 +75,7 @@ TEST(HeldForce, SafeStopIsLeftOnlyByAFreshForceAndThatIsRampedIn) {
 TEST(HeldForce, AFreshForceWhileFadingIsRampedInOverTheShareThatWasLost) {
   HeldForce held({});
   held.observe(force_at(Duration::zero(), Vec3(2, 0, 0)));
-  // 100 ms after the hold has ended e⁻² is left: 13.5 %. The rest comes back in 86.5 % of the ramp's 100 ms.
+  // 100 ms after the hold has ended, e⁻² = 13.5 % is left. The rest returns in 86.5 % of the ramp's 100 ms.
   const double left = held.wanted(at(milliseconds(150))).force.x();
   EXPECT_NEAR(left, 2 * std::exp(-2.0), 1e-12);
   held.observe(force_at(milliseconds(150), Vec3(2, 0, 0), milliseconds(400)));
@@ -119,7 +119,7 @@ TEST(HeldForce, FollowsTheHandWithTheLocalModel) {
   RemoteForce remote = force_at(Duration::zero(), Vec3(-1, 0, 0));
   remote.model = LocalModel{Vec3(0.01, 0, 0), Vec3(100, 0, 0).asDiagonal()};
   held.observe(remote);
-  // 10 mm deeper than what the force was computed for, 100 N/m: 1 N more, along −x.
+  // 10 mm deeper than the model's position at 100 N/m: 1 N more along −x.
   EXPECT_NEAR((held.wanted(at(milliseconds(1), Vec3(0.02, 0.5, 0))).force - Vec3(-2, 0, 0)).norm(), 0, 1e-12);
 }
 
@@ -214,7 +214,7 @@ TEST(HeldForce, TheEstimatorFollowsASlowEnginesSpringAtTheLoopsRate) {
     if (estimate) config.output_estimator.emplace();
     HeldForce held(config);
     double square = 0;
-    for (int n = 0; n < 4000; ++n) {  // 25 Hz, 40 ms late
+    for (int n = 0; n < 4000; ++n) {  // 25 Hz, delay of 40 ms
       const auto position = [](int step) { return 0.01 * std::sin(0.006 * step); };
       if (n >= 40 && n % 40 == 0) {
         RemoteForce remote = force_at(milliseconds(n), Vec3(-700 * position(n - 40), 0, 0), milliseconds(100));

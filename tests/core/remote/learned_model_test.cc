@@ -24,12 +24,12 @@ using Object = std::function<Vec3(double t, const Vec3& x)>;
 constexpr double kInf = std::numeric_limits<double>::infinity();
 
 struct Link {
-  int every = 20;  ///< ms, between answers
-  int late = 30;   ///< ms
+  int every = 20;  ///< ms between answers
+  int late = 30;   ///< ms of delay
 };
 
-/// A hand that goes to and fro along `motion` while a model leads late answers to it. Calls `see` with the time, the
-/// prediction and the place.
+/// Moves the hand along `motion` while the model extrapolates late answers. Calls `see` with time, prediction and
+/// position.
 void follow(LearnedModel& model, const Object& object, const std::function<Vec3(double)>& motion, const Link& link,
             int length_ms, const std::function<void(double, const Vec3&, const Vec3&)>& see) {
   for (int n = 0; n < length_ms; ++n) {
@@ -49,7 +49,7 @@ void follow(LearnedModel& model, const Object& object, const std::function<Vec3(
 
 Vec3 sway(double t) { return {0.015 * portable::sin(std::numbers::pi * t), 0.003 * portable::sin(5 * t), 0}; }
 
-/// rms of prediction less truth over rms of truth, in the last half.
+/// Returns rms(prediction − truth)/rms(truth) over the second half.
 double error(const Object& object, const std::function<Vec3(double)>& motion, const Link& link, bool hold = false) {
   LearnedModel model({});
   double miss = 0;
@@ -111,7 +111,7 @@ TEST(LearnedModel, DoesNotPullEvenAtTheFirstEndOfAWallItCameToFromFreeSpace) {
 }
 
 TEST(LearnedModel, ForgetsOneSidednessOfAnObjectThatPullsToo) {
-  // A wall that becomes a spring: after its force has turned round it may be followed through zero.
+  // The wall becomes a bilateral spring, so the prediction may cross zero after the sign of the force has changed.
   const Object becomes = [](double t, const Vec3& x) {
     return t < 2 ? Vec3(x.x() > 0 ? -500 * x.x() : 0, 0, 0) : Vec3(-500 * x.x(), 0, 0);
   };
@@ -134,7 +134,7 @@ TEST(LearnedModel, AForceThatChangesInTimeIsNotTrusted) {
 }
 
 TEST(LearnedModel, AHandAtRestTeachesNothingHoweverNoisyTheAnswersAre) {
-  // The output estimator winds up here (output_estimator_test.cc).
+  // The output estimator diverges here (output_estimator_test.cc).
   int wild = 0;
   for (std::uint64_t seed = 1; seed <= 60; ++seed) {
     Dice dice(seed);
@@ -156,7 +156,7 @@ TEST(LearnedModel, AHandAtRestTeachesNothingHoweverNoisyTheAnswersAre) {
 }
 
 TEST(LearnedModel, DoesNotLeadAForceFarBeyondWhatFrictionLimitsItTo) {
-  // A bristle of 8000 N/m that slides at 1 N: between two answers it looks stiff, over the delay it is not.
+  // A bristle of 8000 N/m that slides at 1 N. It appears stiff between two answers but not over the delay.
   const auto slides = [] {
     return [foot = 0.0](double, const Vec3& x) mutable {
       foot = std::clamp(foot, x.x() - 1.0 / 8000, x.x() + 1.0 / 8000);

@@ -32,13 +32,13 @@ RemoteForce answer_to(LocalTime motion, const Vec3& force) {
   return answer;
 }
 
-/// The hand: 12 mm at 0.7 Hz and 3 mm at 2.3 Hz.
+/// Hand position, m: 12 mm at 0.7 Hz plus 3 mm at 2.3 Hz.
 double hand(int k) {
   const double t = k * 1e-3;
   return 0.012 * std::sin(2 * std::numbers::pi * 0.7 * t) + 0.003 * std::sin(2 * std::numbers::pi * 2.3 * t);
 }
 
-/// A hardening spring whose stiffness jumps 300 → 700 → 400 N/m; force on the hand.
+/// Force on the hand from a hardening spring whose stiffness steps 300 → 700 → 400 N/m.
 double environment(int k) {
   const double stiffness = k < 4000 ? 300 : k < 8000 ? 700 : 400;
   const double x = hand(k);
@@ -48,10 +48,10 @@ double environment(int k) {
 struct Errors {
   double rms = 0;
   double worst = 0;
-  double largest = 0;  ///< of the prediction
+  double largest = 0;  ///< largest prediction
 };
 
-/// Plays the sequence along the x axis; `delay(k)` steps after motion k, the answer to it arrives.
+/// Plays the sequence along x. The answer to motion k arrives `delay(k)` steps later.
 template <class Delay>
 Errors play(OutputEstimator& estimator, const Delay& delay) {
   std::vector<std::pair<int, int>> on_their_way;  // arrival, motion
@@ -136,7 +136,7 @@ TEST(OutputEstimator, DoesNotMindTheOrderInWhichAnswersArrive) {
 TEST(OutputEstimator, IgnoresAndCountsOldUnknownRepeatedAndNanAnswers) {
   OutputEstimator estimator({});
   const auto answer = [&](int k, double force) { return estimator.correct(answer_to(at(k), Vec3(force, 0, 0))); };
-  EXPECT_FALSE(answer(0, 1));  // nothing was observed yet
+  EXPECT_FALSE(answer(0, 1));  // before any observation
   for (int k = 1; k <= 2000; ++k) estimator.observe({at(k), Vec3(hand(k), 0, 0), Vec3::Zero()});
   EXPECT_FALSE(answer(2000 - static_cast<int>(OutputEstimator::kSlots), 1));
   EXPECT_FALSE(answer(2001, 1));
@@ -156,7 +156,7 @@ TEST(OutputEstimator, PassesThroughTheNewestAnswer) {
   for (int k = 1; k <= 500; ++k) {
     estimator.observe({at(k), Vec3(hand(k), hand(k + 9), 0), Vec3::Zero()});
     if (k % kAnswerEvery != 0) continue;
-    const Vec3 force(dice.within(-5, 5), dice.within(-5, 5), 1);  // fits no spring
+    const Vec3 force(dice.within(-5, 5), dice.within(-5, 5), 1);  // not consistent with a spring
     ASSERT_TRUE(estimator.correct(answer_to(at(k), force)));
     EXPECT_LT((estimator.predict({at(k), Vec3(hand(k), hand(k + 9), 0), Vec3::Zero()})->force - force).norm(), 1e-9);
   }
@@ -240,7 +240,7 @@ TEST(OutputEstimator, CooldownEndsConstantResettingWhenTheModelCannotFit) {
 }
 
 TEST(OutputEstimator, AnOutputRecursiveModelRunsAwayOnlyWithAFreePole) {
-  // The raw model: the same least squares, the pole free, run at 1 kHz between 25 Hz answers.
+  // The same least squares with a free pole, run at 1 kHz between 25 Hz answers.
   UdLeastSquares<2> raw({.forgetting = 0.95, .prior_variance = 1e8});
   std::vector<double> output(kSteps, 0.0);
   double largest_raw = 0;

@@ -10,7 +10,7 @@
 #include "core/stability/stability_boundary.h"
 #include "tests/support/refusal.h"
 
-/// The closed forms against each other, and against numbers that an independent program computed.
+/// Compares the closed forms with each other and with values of an independent program.
 
 namespace tendon::closed_forms_test {
 namespace {
@@ -40,8 +40,8 @@ TEST(ColgateSchenkel, DelayCostsAWholePeriodOfStiffnessEach) {
 }
 
 TEST(ColgateSchenkel, WithDelayADamperMayHelpSpringAndMayHurt) {
-  EXPECT_NEAR(passive_viscous_friction(spring(500, 0.2, 1)), 0.60625, 5e-6);  // from the independent program
-  // Never above the sufficient K(T/2 + dT) + |B|, never below the value at θ → 0.
+  EXPECT_NEAR(passive_viscous_friction(spring(500, 0.2, 1)), 0.60625, 5e-6);  // independent program
+  // At most the sufficient K(T/2 + dT) + |B|, at least the limit for θ → 0.
   for (const double b : {-1.0, -0.2, 0.2, 1.0}) {
     for (int d = 0; d <= 8; ++d) {
       const double k_age = 500 * (0.5 + d) * 1e-3;
@@ -120,7 +120,7 @@ TEST(Jury, HasNoSeamWhereTheSeriesTakesOver) {
 struct Ratio {
   double damping;
   int delay;
-  double exact_to_linear;  ///< from the independent program
+  double exact_to_linear;  ///< independent program
   double tolerance = 0.0006;
 };
 

@@ -10,7 +10,7 @@
 #include "core/stability/stability_boundary.h"
 #include "devices/simulated/simulated_device.h"
 
-/// The simulated device must have the boundaries of the closed forms: stable below, unstable above.
+/// The simulated device must be stable below and unstable above the boundaries of the closed forms.
 
 namespace tendon::simulated_boundary_test {
 namespace {
@@ -22,8 +22,8 @@ struct Swing {
   double late = 0;   ///< m/s, largest speed in the last tenth
 };
 
-/// A handle that starts with `speed` (m/s) at the resting point of the spring, and is left alone. With an encoder the
-/// resting point lies on the edge between two counts: the worst place.
+/// Releases a handle with `speed` (m/s) at the rest position of the spring. With an encoder this position lies on the
+/// edge between two counts, the worst case.
 Swing let_swing(const SampledSpring& spring, double speed, Duration span) {
   SimulatedDevice::Config config;
   config.mass = spring.mass;
@@ -105,7 +105,7 @@ TEST(DiolaitiSimulated, EachRegionDoesWhatItsNameSays) {
     ASSERT_EQ(diolaiti(spring).region, DiolaitiRegion::kLimitCycle);
     const Swing swing = let_swing(spring, 0.05, 3s);
     EXPECT_GT(swing.late, smaller);
-    // About one count, at the spring's own frequency; it does not grow.
+    // A limit cycle of about one count at the frequency of the spring, which does not grow.
     EXPECT_LT(swing.late, spring.encoder_step * std::sqrt(stiffness / spring.mass));
     smaller = swing.late;
   }

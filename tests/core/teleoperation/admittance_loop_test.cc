@@ -37,7 +37,7 @@ typename AdmittanceLoop<N>::Config tool(double mass, double damping, double prop
 Aol<1, 3> aol() { return Aol<1, 3>({{Friction{.coulomb = kCoulomb, .viscous = kViscous}}, kPeriod}); }
 
 struct Episode {
-  double least_energy = 0;     // J, of the ledger of what was really held
+  double least_energy = 0;     // J, ledger of the applied force
   double least_hand_work = 0;  // J
   double limited_share = 0;
   std::vector<Vec3> hand_force, velocity;
@@ -46,13 +46,13 @@ struct Episode {
 struct World {
   AdmittanceLoop<3>::Config tool;
   bool limited = true;
-  double wall = 20e3;      // N/m, from 15 mm on, felt by the tool
-  double frequency = 0.5;  // Hz, of the hand
+  double wall = 20e3;      // N/m, begins at 15 mm, acts on the tool
+  double frequency = 0.5;  // Hz, motion of the hand
   Duration duration = 4s;
   Vec3 direction = Vec3::UnitX();
 };
 
-// The heavy device in a hand that moves to and fro; the wall is where the tool is.
+// The heavy device with an oscillating hand. The wall acts on the tool.
 Episode run(const World& world) {
   auto config = admittance_device();
   config.hand =
@@ -111,8 +111,8 @@ TEST(AdmittanceLoop, TakesEnergyThatIsNotThereUnlessTheLimiterBoundsIt) {
   }
 }
 
-// Effective mass and damping that the hand feels at its own frequency: F = m a + b v, least squares. The fit
-// leaves out the first second, in which the motion starts.
+// Effective mass and damping at the frequency of the hand, from a least-squares fit F = m a + b v. The fit omits the
+// first second of transients.
 struct Felt {
   double mass, damping;
 };
@@ -139,8 +139,8 @@ TEST(AdmittanceLoop, TheHandFeelsTheToolsMassAndDampingWhenFrictionAllowsIt) {
   EXPECT_NEAR(felt(heavy).damping, 25, 1.25);
 }
 
-// To speed up a handle of m = 2 kg as if it were M = 0.3 kg the motors must put in ½ (m − M) v² ahead of what the hand
-// does. Only what the tool's damping has earned by then pays for it: nothing, for a tool without.
+// To accelerate a handle of m = 2 kg like M = 0.3 kg, the motors must supply ½ (m − M) v² in advance. Only energy
+// dissipated by the tool's damping can pay for this.
 TEST(AdmittanceLoop, AToolLighterThanTheDeviceIsClippedUnlessDampingEarns) {
   const auto light = [](double damping, bool limited) {
     return run(
@@ -162,8 +162,8 @@ TEST(AdmittanceLoop, AToolLighterThanTheDeviceIsClippedUnlessDampingEarns) {
 
 // ---- anti-windup -----------------------------------------------------------------------------------------------
 
-// A handle that is held fast while the hand's sensor says `push`, then the sensor says `then`. Returns the number of
-// steps for which the force stays at the bound after that.
+// Holds the handle fast while the force sensor reads `push`, then `then`. Returns the number of steps for which the
+// force stays at the bound afterwards.
 int steps_at_the_bound(double push, double then) {
   AdmittanceLoop<1> loop(tool<1>(1, 200, 10, 1000));
   constexpr double kBound = 2;
@@ -184,7 +184,7 @@ int steps_at_the_bound(double push, double then) {
 }
 
 TEST(AdmittanceLoop, TheForceLeavesItsBoundAsSoonAsTheErrorTurns) {
-  // The tool itself, 1 kg with 200 N·s/m, needs 1.4 ms to turn from 0.1 to −0.1 m/s under a push of −40 N.
+  // The tool (1 kg, 200 N·s/m) needs 1.4 ms to change from 0.1 to −0.1 m/s under −40 N.
   EXPECT_LE(steps_at_the_bound(20, -40), 4);
 }
 
@@ -197,7 +197,7 @@ TEST(AdmittanceLoop, TheIntegralKeepsNoMoreThanWasAppliedWhenTheBoundShrinks) {
     applied[0] = std::clamp(loop.command({Vec<1>(20), Vec<1>::Zero(), Vec<1>::Zero()}).force[0], -bound, bound);
   }
   ASSERT_EQ(applied[0], 0.5);
-  // Now the handle overtakes the tool by a hair: what is left of the command is the integral.
+  // With the handle slightly faster than the tool, the remaining command is the integral term.
   loop.observe({applied, Vec<1>(2e-4), kPeriod});
   const double wanted = loop.command({Vec<1>(20), Vec<1>::Zero(), Vec<1>(0.11)}).force[0];
   EXPECT_LT(wanted, 0.5);
@@ -212,7 +212,7 @@ TEST(AdmittanceLoop, TheIntegralDoesNotGrowWhileTheForceIsClipped) {
     applied[0] = std::clamp(loop.command({Vec<1>(20), Vec<1>::Zero(), Vec<1>::Zero()}).force[0], -2.0, 2.0);
   }
   ASSERT_EQ(applied[0], 2);
-  // The handle now moves as the tool does, 0.1 m/s: no error is left, and what is commanded is the integral.
+  // The handle moves with the tool at 0.1 m/s, so the error is zero and the command is the integral term.
   loop.observe({applied, Vec<1>(0.1 * kT), kPeriod});
   EXPECT_NEAR(loop.command({Vec<1>(20), Vec<1>::Zero(), Vec<1>(0.1)}).force[0], 0, 0.1);
 }
@@ -310,9 +310,9 @@ TEST(AdmittanceLoop, SaysWhatIsWrongWithItsConfiguration) {
 
 // ---- why there is no credit for kinetic energy --------------------------------------------------------------------
 
-// The adversary moves the 2 kg handle with never more than `a_max`: speeds it up, lets the motors push along for a
-// while at constant speed, and brings it to rest. Returns the least work of the hand, exact for this motion of
-// constant accelerations, with the bound f_c + 2 √(b (E + credit) / T).
+// The adversary moves the 2 kg handle with accelerations up to `a_max`: it accelerates, lets the motors push along at
+// constant speed, and stops. Returns the minimum of the hand's work, exact for this motion, with the bound f_c + 2 √(b
+// (E + credit) / T).
 double least_hand_work(bool credit, double a_max) {
   constexpr double kMass = 2;
   const OutputBound bound = OutputBound::of({.coulomb = kCoulomb, .viscous = kViscous}, kPeriod);
@@ -327,7 +327,7 @@ double least_hand_work(bool credit, double a_max) {
     const double a = i < ramp ? a_max : i < ramp + cruise ? 0.0 : -a_max;
     const double sure = std::max(std::abs(last_dx) / kT - a_max * kT, 0.0);
     const double lent = credit ? kMass / 2 * sure * sure : 0.0;
-    // On the hand, along with the motion; nothing while it speeds up, so that what it earns is kinetic energy only.
+    // No force during acceleration, so that the motion stores kinetic energy only.
     const bool push = i >= ramp;
     const double force = push ? bound.largest(ledger.energy() + lent) : 0.0;
     const double dx = v * kT + a * kT * kT / 2;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Absolute maps: a place of the leader is a place of the follower, and the act aligns the two first.
+// Absolute maps: each leader position corresponds to a follower position, and engagement first aligns the two.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -21,7 +21,7 @@ PortSetup end_of(PortRole role, double energy = 0) {
   return setup;
 }
 
-/// A hand that holds the handle there until `from`, s, and brings it to `to` within a second.
+/// Holds the handle at `begins` until `from` (s), then moves it to `to` within a second.
 PortSetup hand_that_goes(const Vec3& begins, const Vec3& to, double from) {
   PortSetup leader = end_of(PortRole::kLeader);
   for (int i = 0; i < 3; ++i) {
@@ -86,7 +86,7 @@ TEST(CouplingAbsolute, AHandThatDoesNotComeIsLeftAloneAfterFiveSeconds) {
   expect_no_engagement(ports, 300, "only another act");
 }
 
-/// Nobody holds the handle; friction is all that keeps it.
+/// Only friction holds the handle.
 TEST(CouplingAbsolute, AMotorWithEnergyOfItsOwnDrawsItThereAndGivesNoMore) {
   constexpr double kEnergy = 0.02;
   Ports ports(end_of(PortRole::kLeader, kEnergy), end_of(PortRole::kFollower));

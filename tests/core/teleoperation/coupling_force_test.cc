@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// What is felt of two couplings between two devices: no drift, no step, scales, the contact of position–force; and that
-// neither account nor the pair gives out energy in cases that ask for it.
+// Forces of two couplings between two devices: no drift, no steps, scales, and contact with position–force control.
+// Neither an account nor the pair may generate energy.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -16,10 +16,10 @@ namespace {
 
 using std::chrono::milliseconds;
 
-constexpr double kCoulomb = 0.02;  // N, of both devices
+constexpr double kCoulomb = 0.02;  // N, both devices
 constexpr double kTurn = 6.283185307179586;
 
-/// A hand that leads the handle, holding it with `stiffness`.
+/// A hand of `stiffness` that leads the handle.
 std::array<Surroundings, 3> hand_of(double stiffness, std::function<double(double)> along_x) {
   std::array<Surroundings, 3> hand{};
   for (Surroundings& axis : hand) axis = {.stiffness = stiffness, .damping = 3};
@@ -39,7 +39,7 @@ void expect_passive(const Ports& ports, const std::string& when) {
   EXPECT_GE(ports.least_sum, kRounding) << when;
 }
 
-/// The largest change of either wanted force from one period to the next.
+/// Largest change of either wanted force between two periods.
 class Steps {
  public:
   void look(const Ports& ports) {
@@ -61,7 +61,7 @@ class Steps {
 
 // --- drift ---
 
-/// A minute of waving; returns how far the two ends then disagree, m, and the bound.
+/// Oscillates the leader for a minute. Returns the position difference of the two ends (m) and its bound.
 std::pair<double, double> drift_after(int clutches, double loss, std::uint64_t seed) {
   constexpr double kCount = 20e-6;
   const auto wave = [](double t) { return t < 60 ? 0.02 * std::sin(kTurn * 0.7 * t) : 0.0; };
@@ -108,7 +108,7 @@ TEST(CouplingForce, AMinuteOfWavingWithAHundredClutchesLeavesNoDrift) {
 TEST(CouplingForce, EngagingAndClutchingInTheOpenMovesNothing) {
   PortSetup leader = leader_of([](double) { return 0.0; });
   PortSetup follower = port_of(PortRole::kFollower);
-  // Far apart, and not in the same place: only displacements count.
+  // Different positions: only displacements are coupled.
   leader.around[0].reference = [](double) { return 0.05; };
   Ports ports(leader, follower, {.delay = 7, .jitter = 4, .loss = 0.1, .seed = 3},
               {.delay = 7, .jitter = 4, .loss = 0.1, .seed = 4});
@@ -131,9 +131,9 @@ TEST(CouplingForce, EngagingAndClutchingInTheOpenMovesNothing) {
   EXPECT_LT((ports.leader.x() - Vec3(0.05, 0, 0)).norm(), 2 * 20e-6);
 }
 
-/// A leader that presses its follower against a wall, with 3 N at both ends.
+/// The leader presses its follower against a wall with 3 N at both ends.
 Ports pressing(int one_way, PortSetup follower = port_of(PortRole::kFollower)) {
-  // The hand moves 20 mm in half a second, long after the act.
+  // The hand moves 20 mm in half a second, long after engagement.
   PortSetup leader = leader_of([](double t) { return 0.02 * std::clamp((t - 1) / 0.5, 0.0, 1.0); });
   follower.around[0] = {.stiffness = 2000, .damping = 5, .reference = [](double) { return 0.005; }, .wall = true};
   leader.coupling.spring.adapt_to_delay = follower.coupling.spring.adapt_to_delay = false;
@@ -235,7 +235,7 @@ TEST(CouplingForce, AScaledAndTurnedPairHoldsScaledForcesAndStaysPassive) {
     double position_scale, force_scale;
   };
   for (const auto& [s_x, s_f] : {Case{0.2, 5}, Case{10, 0.1}, Case{0.5, 0.5}, Case{2, 3}}) {
-    // The follower is as heavy as its scales make it feel like the leader.
+    // The mass of the follower is chosen so that it feels like the leader's.
     PoseMap::Config map{.position_scale = s_x, .force_scale = s_f, .rotation = rotation_by(Vec3(0, 0, kTurn / 4))};
     PortSetup leader = leader_of([](double t) { return 0.02 * std::clamp((t - 1) / 0.5, 0.0, 1.0); });
     PortSetup follower = port_of(PortRole::kFollower);
@@ -243,7 +243,7 @@ TEST(CouplingForce, AScaledAndTurnedPairHoldsScaledForcesAndStaysPassive) {
     const double impedance = 1 / (s_x * s_f);
     follower.mass *= impedance;
     follower.friction = {kCoulomb / s_f, 0.26 * impedance};
-    // Its wall is along its y: 5 mm of the leader's x away.
+    // The wall is along the follower's y, 5 mm of the leader's x away.
     follower.around[1] = {.stiffness = 2000 * impedance,
                           .damping = 5 * impedance,
                           .reference = [s = s_x](double) { return 0.005 * s; },
@@ -297,7 +297,7 @@ TEST(CouplingForce, AnotherScaleInTheNextSessionIsNoStep) {
     port->begin(2);
   }
   Steps steps;
-  ports.run(1);  // what the sessions before held is gone with them
+  ports.run(1);  // discards the force held in the previous sessions
   steps.from(ports);
   ports.run(100, [&](int) { steps.look(ports); });
   ASSERT_TRUE(ports.leader.coupling->engage());
@@ -366,7 +366,7 @@ TEST(CouplingForce, HandsAtBothEndsThatPushEachOtherFeelTheSame) {
   EXPECT_GT(-ports.leader.applied.x(), 2);
   EXPECT_NEAR(-ports.leader.applied.x(), ports.follower.applied.x(), 2 * kCoulomb + 0.03);
   expect_passive(ports, "two hands");
-  // One lets go.
+  // One hand releases its handle.
   ports.follower.setup.around = {};
   ports.run(2000);
   expect_passive(ports, "one hand");

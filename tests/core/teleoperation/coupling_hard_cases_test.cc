@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The hard cases of teleoperation with the coupling that the server runs, by each method, with its limiters and
-// without.
+// Hard cases of teleoperation with the server's coupling, for each method, with and without limiters.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -16,7 +15,7 @@
 namespace tendon::coupling_hard_cases_test {
 namespace {
 
-/// Two ports and the ways between them, before they are built.
+/// Two ports and their network before construction.
 struct Draft {
   PortSetup leader, follower;
   Network there, back;
@@ -25,15 +24,16 @@ struct Draft {
 struct HardCase {
   const char* name;
   void (*make)(Draft& draft);
-  bool breaks_springs = true;  ///< springs without limiters give out energy
-  double bounces = 0;          ///< m/s, by position-force and passivity: the follower goes on bouncing on its wall
+  bool breaks_springs = true;  ///< springs without limiters generate energy
+  double bounces = 0;          ///< m/s, speed of a follower that keeps bouncing on its wall (position–force and
+                               ///< passivity)
 };
 
 constexpr HardCase kCases[] = {
     {"a wall of 500 N/m", [](Draft&) {}},
     {"the follower's motor gives 0.8 N", [](Draft& d) { d.follower.motor = 0.8; }},
     {"the leader's motor gives 0.5 N", [](Draft& d) { d.leader.motor = 0.5; }},
-    {"the follower's workspace ends",  // 5 mm to one side; the hand goes farther
+    {"the follower's workspace ends",  // 5 mm to one side; the hand moves farther
      [](Draft& d) {
        d.follower.around[0] = {
            .stiffness = 20000, .damping = 5, .reference = [](double) { return 0.005; }, .wall = true};
@@ -96,8 +96,8 @@ constexpr HardCase kCases[] = {
 struct Outcome {
   double sum = 0;      // J
   double account = 0;  // J
-  double most = 0;     // N, at the leader
-  double unrest = 0;   // m/s, the fastest handle in the last second
+  double most = 0;     // N at the leader
+  double unrest = 0;   // m/s, largest handle speed in the last second
 };
 
 Outcome run(const HardCase& hard, CouplingMethod method, int one_way, bool limited) {
@@ -119,7 +119,7 @@ Outcome run(const HardCase& hard, CouplingMethod method, int one_way, bool limit
   Outcome outcome;
   Vec3 leader_was = ports.leader.x();
   Vec3 follower_was = ports.follower.x();
-  const int end = 3000 + 5 * kPressMs;  // in the third press, held for 3.5 s
+  const int end = 3000 + 5 * kPressMs;  // during the third press, held for 3.5 s
   ports.run(end - ports.now, [&](int now) {
     outcome.most = std::max(outcome.most, ports.leader.applied.norm());
     if (now > end - 1000) {
@@ -145,7 +145,7 @@ TEST(CouplingHardCases, NoPairGivesOutEnergyAndAllButTheHeavyFollowerRest) {
       EXPECT_LE(outcome.most, 8 * (1 + 1e-9)) << which;
       const bool felt_late = method == CouplingMethod::kPositionForce || method == CouplingMethod::kPassivity;
       const double bounces = felt_late ? hard.bounces : 0;
-      // The handle of rate is held out, so that a follower without a wall goes on.
+      // In rate control the handle stays deflected, so a follower without a wall keeps moving.
       const double asked = method == CouplingMethod::kRate ? 0.06 : 0;
       EXPECT_LT(outcome.unrest, std::max({bounces, asked, 0.02})) << which;
     }
@@ -171,7 +171,7 @@ TEST(CouplingHardCases, AMotorThatCannotHoldTheForceOfWavesLosesNoPlace) {
     Ports ports(made.leader.setup, follower, bad_way(10, 5), bad_way(10, 6));
     ports.run(1200);
     ASSERT_TRUE(ports.engage());
-    ports.run(3000 + 2 * kPressMs - 200 - ports.now);  // the press is over, and the hand is back
+    ports.run(3000 + 2 * kPressMs - 200 - ports.now);  // the press is over, and the hand has returned
     EXPECT_GE(ports.least_sum, kRounding);
     const double apart = std::abs(ports.leader.x().x() - ports.follower.x().x());
     const double friction = 2 * 0.02 / ports.leader.coupling->stiffness();
@@ -189,7 +189,7 @@ TEST(CouplingHardCases, ANewActForgetsTheWavesThatTheLastOneLeftUnsent) {
   ASSERT_TRUE(ports.engage());
   ports.run(5000 - ports.now);
   ports.leader.coupling->disengage();
-  ports.run(9500 - ports.now);  // the hand is back, and rests
+  ports.run(9500 - ports.now);  // the hand has returned and rests
   const Vec3 before = ports.follower.x();
   ASSERT_TRUE(ports.engage());
   double most = 0;
@@ -210,7 +210,7 @@ TEST(CouplingHardCases, AFollowerForgetsThemToo) {
     played.step();
   };
   for (int i = 0; i < 3; ++i) period(PortPhase::kCoupled, 0, Vec3::Zero(), 0);
-  for (int i = 0; i < 10; ++i) period(PortPhase::kEngaged, 1, Vec3(1e-3, 0, 0), 0);  // nothing to pay for the line
+  for (int i = 0; i < 10; ++i) period(PortPhase::kEngaged, 1, Vec3(1e-3, 0, 0), 0);  // no energy to pay for the wave line
   EXPECT_TRUE(played.port.live());
   EXPECT_TRUE(played.told.wave_integral.isZero(0));
   for (int i = 0; i < 500; ++i) period(PortPhase::kCoupled, 1, Vec3::Zero(), 0);  // the ramp has ended

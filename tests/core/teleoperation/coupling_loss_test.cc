@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// What two couplings do when their peer falls silent, comes back, starts anew, or is heard late and twice: the ladder,
-// and no engagement without an act.
+// Couplings whose peer stops sending, returns, restarts, or is received late and twice: the decay stages, and no
+// engagement without a request.
 #include <gtest/gtest.h>
 
 #include <optional>
@@ -16,7 +16,7 @@ namespace {
 
 using std::chrono::milliseconds;
 
-/// The follower hears its last state at age 0 while the leader moves at 0.1 m/s, and the test looks at every age after.
+/// The follower receives its last state at age 0 while the leader moves at 0.1 m/s. The test checks every later age.
 struct Ladder {
   explicit Ladder(bool robot = false, int sent_every = 1) {
     PortSetup leader = port_of(PortRole::kLeader);
@@ -42,7 +42,7 @@ struct Ladder {
     });
   }
   std::optional<Ports> ports;
-  std::vector<double> forces;  ///< by age, ms
+  std::vector<double> forces;  ///< indexed by age, ms
   std::vector<PortPhase> phases;
 };
 
@@ -68,7 +68,7 @@ TEST(Coupling, ARobotHoldsTheLastPlaceAndThenWhereItsToolIs) {
   EXPECT_EQ(ladder.phases[271], PortPhase::kLost);
   EXPECT_EQ(force[271], force[270]) << "no step";
   for (std::size_t age = 271 + 50; age < force.size(); ++age) ASSERT_EQ(force[age], 0) << age;
-  // It is pushed away, and the link comes back.
+  // The follower is displaced, and the link returns.
   Ports& ports = *ladder.ports;
   ports.follower.setup.path = [](double) { return Vec3(0.002, 0.001, 0); };
   ports.run(2);
@@ -162,8 +162,8 @@ TEST(Coupling, AnEndThatHearsALostPeerIsCoupledWithoutForce) {
 }
 
 TEST(Coupling, AnActFromBeforeTheLossThatComesAfterItEngagesNobody) {
-  // The way there fails, the leader lets go and acts again, and the way is back when the follower has lost its peer but
-  // nobody has told the leader: the way back takes 250 ms.
+  // The forward link fails, and the leader disengages and requests engagement again. The link returns after the
+  // follower has declared the peer lost, before the leader knows: the return delay is 250 ms.
   for (int again = 1; again < 250; again += 9) {
     Ports ports(port_of(PortRole::kLeader), port_of(PortRole::kFollower), {.delay = 5, .seed = 1},
                 {.delay = 250, .seed = 2});
@@ -199,7 +199,7 @@ TEST(Coupling, AFaultAfterTheLossDoesNotMakeThePeerKnowOfIt) {
   follower.step(Vec3::Zero(), 0, false);
   for (int n = 0; n < 20; ++n) {
     PortState act = follower.state(PortPhase::kEngaged, 2);
-    act.answers = then.answers;  // it was made before the loss
+    act.answers = then.answers;  // issued before the loss
     follower.hear(act);
     follower.step();
     EXPECT_EQ(follower.port.phase(), PortPhase::kAlone);

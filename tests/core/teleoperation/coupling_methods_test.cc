@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Couplings by waves and by a surface that the follower finds: what is felt, where the two ends are, and that the pair
-// gives out no energy.
+// Couplings by waves and by estimated surfaces: forces, position differences, and passivity of the pair.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -27,7 +26,8 @@ double median(std::vector<double> of) {
   return of[of.size() / 2];
 }
 
-/// Hands of 150 … 600 N/m, each behind a bad network of its own: their shares of a rigid link's force, second press.
+/// Hands of 150 … 600 N/m, each with a different bad network. Returns their share of a rigid link's force in the second
+/// press.
 std::vector<double> shares(Pressing with, std::uint64_t first_seed, double& buzz) {
   std::vector<double> all;
   for (std::uint64_t seed = first_seed; seed < first_seed + 21; ++seed) {
@@ -46,7 +46,7 @@ TEST(CouplingMethods, WavesAreFeltAlikeAtBothEndsAndThePairIsPassive) {
     const Felt felt = feel({.one_way = one_way});
     print("waves, round trip " + std::to_string(2 * one_way) + " ms", felt);
     expect_passive(felt, std::to_string(one_way));
-    // From 600 ms on a press of 4 s is not over when it ends.
+    // With a delay of 600 ms or more, a press of 4 s ends before its force settles.
     if (one_way <= 100) {
       EXPECT_NEAR(felt.second, felt.wall, 0.04 + 0.02 * felt.wall) << one_way;
     }
@@ -142,7 +142,7 @@ TEST(CouplingMethods, RecordedMotionOfBothPortsOfARigGetsNoEnergyOut) {
 TEST(CouplingMethods, WavesAndASurfaceKeepTheScalesOfTheMap) {
   const PoseMap::Config maps[] = {{.position_scale = 0.2, .force_scale = 5}, {.position_scale = 2, .force_scale = 0.5}};
   for (const PoseMap::Config& map : maps) {
-    // The leader feels s_f s_x times the wall's stiffness.
+    // The leader feels s_f s_x times the stiffness of the wall.
     Pressing with{.wall = 500 / (map.position_scale * map.force_scale), .map = map, .one_way = 10};
     const Felt waves = feel(with);
     expect_passive(waves, "waves");
@@ -191,11 +191,11 @@ TEST(CouplingMethods, AClutchedLeaderHoldsTheFollowerOnTheLine) {
   Ports ports = press({.impedance = 10, .one_way = 5});
   ports.run(50);
   ASSERT_TRUE(ports.engage());
-  ports.run(14'000 - ports.now);  // into the second press
+  ports.run(14'000 - ports.now);  // during the second press
   const double pressed = ports.follower.outside().x();
   ASSERT_LT(pressed, -1.5);
   ports.leader.buttons = 1;
-  // The hand lets go, and leaves, while the follower goes on pressing.
+  // The hand releases the handle and retreats while the follower still presses.
   ports.run(1300);
   EXPECT_TRUE(ports.leader.applied.isZero());
   EXPECT_NEAR(ports.follower.outside().x(), pressed, 0.5) << "1 mm of the wall";
@@ -208,7 +208,7 @@ TEST(CouplingMethods, AWallThatIsGoneIsGoneForTheLeaderOnceTheToolPassed) {
       {.method = CouplingMethod::kSurface, .impedance = 2, .stiffness = 1000, .wall_until = 9, .one_way = kOneWay});
   ports.run(1200);
   ASSERT_TRUE(ports.engage());
-  ports.run(11'500 - ports.now);  // to the second press
+  ports.run(11'500 - ports.now);  // start of the second press
   int passed = 0;
   int felt = 0;
   ports.run(3500, [&](int now) {
@@ -229,8 +229,8 @@ TEST(CouplingMethods, AWallThatComesNearerIsWhereItIsOnTheNextPress) {
     Ports ports(made.leader.setup, follower, bad_way(one_way, 1), bad_way(one_way, 1001));
     ports.run(1200);
     ASSERT_TRUE(ports.engage());
-    ports.run(3000 + 3 * kPressMs - 100 - ports.now);  // to the end of the second press
-    const double nearer = 1.4 * rigid(with);           // by 8 of 20 mm
+    ports.run(3000 + 3 * kPressMs - 100 - ports.now);  // end of the second press
+    const double nearer = 1.4 * rigid(with);           // 8 of 20 mm closer
     EXPECT_NEAR(-ports.leader.applied.x(), nearer, 0.1 * nearer) << one_way;
     EXPECT_GE(ports.least_account(), kRounding) << one_way;
   }

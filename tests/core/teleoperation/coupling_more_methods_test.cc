@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Couplings by set positions, by two-channel passivity and by rate; and links that are too slow to be one.
+// Couplings by set positions, two-channel passivity and rate, and links too slow for coupling.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -19,10 +19,10 @@
 namespace tendon::coupling_more_methods_test {
 namespace {
 
-constexpr double kFriction = 0.02;  // N, Coulomb, of each port here
+constexpr double kFriction = 0.02;  // N, Coulomb friction of each port
 
-/// A hand that waves for `seconds`, with nothing in the follower's way: rms of the two places' distance, the way taken
-/// out of it, m.
+/// Moves the leader periodically for `seconds` with a free follower. Returns the rms position difference without the
+/// delay of the link, m.
 double apart_while_waving(CouplingMethod method, double drift_rate, int one_way, double* least_sum = nullptr) {
   PortSetup leader = port_of(PortRole::kLeader);
   PortSetup follower = port_of(PortRole::kFollower);
@@ -75,7 +75,7 @@ TEST(CouplingSetPosition, WithSeldomStatesAPaidStiffSpringIsQuiet) {
   EXPECT_GT(not_paid.buzz, 5e-3);
 }
 
-/// The account pays for the stretch, so the spring need not know the delay.
+/// The account pays for the stretch, so the stiffness need not depend on the delay.
 TEST(CouplingSetPosition, AStiffSpringThatDoesNotAdaptHoldsAtEveryDelay) {
   for (const int one_way : {0, 25, 100, 300}) {
     const Felt felt = feel({.method = CouplingMethod::kSetPosition, .one_way = one_way, .adapts = false});
@@ -88,7 +88,7 @@ TEST(CouplingSetPosition, AStiffSpringThatDoesNotAdaptHoldsAtEveryDelay) {
   }
 }
 
-/// Peak force in N, in free motion of ± 20 mm at 0.5 Hz.
+/// Returns the peak force in N for free motion of ±20 mm at 0.5 Hz.
 double drag(CouplingMethod method, bool adapts, int one_way) {
   Pressing with{.method = method, .one_way = one_way, .adapts = adapts};
   with.wall = 0;
@@ -117,7 +117,7 @@ TEST(CouplingSetPosition, ThePriceOfTheStiffSpringIsItsDragInFreeMotion) {
 }
 
 TEST(CouplingSetPosition, TheFollowerGoesWhereTheHandGoes) {
-  // K·T_loop of a late spring drags: 2 mm is the lag that friction and B leave at 131 N/m.
+  // A delayed spring drags with K·T_loop. The lag due to friction and B at 131 N/m is 2 mm.
   EXPECT_LT(apart_while_waving(CouplingMethod::kSetPosition, 100, 0), 0.6e-3);
   EXPECT_LT(apart_while_waving(CouplingMethod::kSetPosition, 100, 25), 2e-3);
 }
@@ -162,7 +162,7 @@ TEST(CouplingPassivity, TheDriftRateDecidesHowFarTheTwoPlacesAreApart) {
   EXPECT_GE(sum, kRounding);
 }
 
-/// A follower of passivity whose leader is played, with its handle `at` and that total.
+/// A passivity follower with a scripted leader, whose handle is `at` and whose energy total is given.
 class PlayedPassivity {
  public:
   PlayedPassivity()
@@ -172,7 +172,7 @@ class PlayedPassivity {
           return config;
         }()) {}
 
-  /// N, that the spring wants in the end.
+  /// Returns the final force of the spring, N.
   double run(int periods, double at, double energy_in, PortPhase phase = PortPhase::kEngaged) {
     Demand<3> demand{Vec3::Zero()};
     for (int i = 0; i < periods; ++i) {
@@ -182,7 +182,7 @@ class PlayedPassivity {
       peer.energy_in = energy_in;
       played.hear(peer);
       demand = played.port.command({Port::at(played.now++), Vec3::Zero(), Vec3::Zero()}, 0, true);
-      // The motor applies what is wanted, and the tool is stuck.
+      // The motor applies the wanted force, and the tool is blocked.
       played.port.conclude(demand.force, std::nullopt);
       played.told = played.port.message();
     }
@@ -240,7 +240,7 @@ TEST(CouplingRate, TheFollowerMovesAsFastAsTheHandleIsOut) {
     end->coupling.map.position_scale = 2;
     end->coupling.map.rotation = rotation_by(Vec3(0, 0, std::numbers::pi / 2));
   }
-  // From its centre 10 mm along x: 7 mm beyond the dead zone; then 40 mm, which is faster than it may be.
+  // Displacements from the center: 10 mm (7 mm beyond the dead zone), then 40 mm, which exceeds the speed limit.
   leader.path = [](double t) { return Vec3(t < 2 ? 0.0 : t < 4 ? 0.01 : t < 6 ? 0.04 : 0.0, 0, 0); };
   for (const int one_way : {0, 25, 100, 300}) {
     Ports ports(leader, follower, bad_way(one_way, 3), bad_way(one_way, 4));
@@ -263,7 +263,7 @@ TEST(CouplingRate, TheFollowerMovesAsFastAsTheHandleIsOut) {
   }
 }
 
-/// A follower of rate whose leader is played; its tool is stuck at 0.
+/// A rate follower with a scripted leader and a tool blocked at 0.
 class PlayedRate {
  public:
   PlayedRate()
@@ -375,7 +375,7 @@ TEST(CouplingRate, AContactIsFeltButNeverMovesTheFollower) {
   PortSetup leader = rate_port(PortRole::kLeader);
   PortSetup follower = rate_port(PortRole::kFollower);
   follower.measures_contact = true;
-  // A wall in the way; the hand holds its handle 10 mm out for 3 s, and lets go.
+  // The hand holds its handle 10 mm off center for 3 s against a wall, then releases it.
   leader.around[0] = {
       .stiffness = 1000, .damping = 3, .reference = [](double t) { return t < 2 ? 0.0 : 0.01; }, .until = 5};
   follower.around[0] = {.stiffness = 500, .damping = 1, .reference = [](double) { return 0.005; }, .wall = true};
@@ -466,14 +466,14 @@ TEST(CouplingMaxDelay, AWayThatHasBecomeShortAgainCouplesAndWaitsForAnAct) {
   PortSetup leader = port_of(PortRole::kLeader);
   PortSetup follower = port_of(PortRole::kFollower);
   leader.coupling.max_delay = follower.coupling.max_delay = std::chrono::milliseconds(50);
-  // It was longer for a second: what is sent then comes by the longer way.
+  // The delay grows for a second, and later messages take the longer delay.
   Network there{.delay = 100, .seed = 1};
   there.longer_from = 1000;
   there.longer_by = -80;
   Ports ports(leader, follower, there, {.delay = 20, .seed = 2});
   ports.run(900);
   EXPECT_FALSE(ports.leader.coupling->engage());
-  // The round trip in use falls after one to two stretches of 5 s.
+  // The round-trip estimate falls after one or two windows of 5 s.
   ports.run(11'500);
   EXPECT_EQ(phase(ports.leader), PortPhase::kCoupled);
   EXPECT_TRUE(ports.engage());

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Scales that change between clutches: who may change them, what moves, and what that does to the energy of the pair.
+// Scale changes between clutches: permission, motion, and the energy of the pair.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -16,7 +16,7 @@ namespace {
 
 constexpr double kTurn = 6.283185307179586;
 
-/// A hand that holds the handle and leads it along x.
+/// A hand that leads the handle along x.
 PortSetup led(std::function<double(double)> along_x) {
   PortSetup leader = port_of(PortRole::kLeader);
   leader.coupling.clutch = Coupling::Button{.bit = 0};
@@ -47,7 +47,7 @@ TEST(CouplingScale, IsSetByALeaderThatIsNotEngagedAndByNobodyElse) {
   EXPECT_FALSE(Coupling(waves.coupling).set_scale(2, 1)) << "sums of waves have one scale";
 }
 
-/// 0.1 → 10 while the clutch is held in the open: nothing moves, and then the follower goes ten times as far.
+/// Scale 0.1 → 10 while clutched in free space: no motion, then tenfold motion of the follower.
 TEST(CouplingScale, ATenthBecomesTenBetweenClutchesAndNothingMoves) {
   PortSetup leader = led([](double t) { return t < 2 ? 5e-3 * t : 0.01 + 1e-3 * std::min(t - 2, 2.0); });
   PortSetup follower = port_of(PortRole::kFollower);
@@ -82,8 +82,7 @@ TEST(CouplingScale, ATenthBecomesTenBetweenClutchesAndNothingMoves) {
   EXPECT_GE(ports.least_account(), kRounding);
 }
 
-/// A robot that presses while its leader is clutched has another spring afterwards: its force goes there, it does not
-/// jump.
+/// A robot that presses while its leader is clutched has a new spring afterwards. Its force must change without a jump.
 TEST(CouplingScale, UnderForceTheForceFadesToTheNewOne) {
   PortSetup leader = led([](double t) { return t < 0.5 ? 0 : 0.02; });
   PortSetup follower = port_of(PortRole::kFollower);
@@ -107,13 +106,13 @@ TEST(CouplingScale, UnderForceTheForceFadesToTheNewOne) {
   EXPECT_GE(ports.least_account(), kRounding);
 }
 
-/// So does that of a robot that holds its place while nothing is engaged: it has no law that settles by itself.
+/// A robot that holds its position while disengaged must change its force without a jump. No law settles it.
 TEST(CouplingScale, ARobotThatHoldsItsPlaceIsNotJolted) {
   PortSetup follower = port_of(PortRole::kFollower);
   follower.coupling.holds_place = true;
   Ports ports(led([](double) { return 0.0; }), follower);
   ports.run(100);
-  ports.follower.setup.path = [](double) { return Vec3(2e-3, 0, 0); };  // something holds it beside its place
+  ports.follower.setup.path = [](double) { return Vec3(2e-3, 0, 0); };  // an external object holds it off position
   ports.run(200);
   Vec3 force = ports.follower.demand.force;
   const double held = force.norm();
@@ -128,7 +127,7 @@ TEST(CouplingScale, ARobotThatHoldsItsPlaceIsNotJolted) {
   EXPECT_NEAR(force.norm(), held / 4, 0.05 * held);
 }
 
-/// The energy of the pair in the leader's joules, each of the follower's at its worth of that moment.
+/// Returns the minimum energy of the pair in joules of the leader, each joule of the follower at its current worth.
 double least_sum(std::uint64_t seed, double& given) {
   Dice dice(seed);
   PortSetup leader = port_of(PortRole::kLeader);
@@ -162,7 +161,7 @@ double least_sum(std::uint64_t seed, double& given) {
     led = ports.leader.truth.energy();
     followed = ports.follower.truth.energy();
     least = std::min(least, sum);
-    // From the interval that begins now.
+    // Valid from the interval that begins now.
     worth = ports.follower.coupling->force_scale() / ports.follower.coupling->position_scale();
     given += ports.leader.paid + ports.follower.paid;
   });

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Two couplings between two devices: phases, engagement by an act alone, the clutch, bad input. coupling_loss_test.cc
-// has the ladder, coupling_force_test.cc what is felt, coupling_world_test.cc the search.
+// Two couplings between two devices: phases, engagement by a request only, the clutch, and bad input.
+// coupling_loss_test.cc tests lost links, coupling_force_test.cc forces, and coupling_world_test.cc random worlds.
 #include "core/teleoperation/coupling.h"
 
 #include <gtest/gtest.h>
@@ -99,7 +99,7 @@ TEST(Coupling, AFaultOfEitherDisengagesBothAndItsEndEngagesNobody) {
   }
 }
 
-/// It comes with a lower epoch than the leader that it replaces, whose force fades and whose act is over.
+/// The new leader has a lower epoch than the previous one, whose force fades and whose engagement has ended.
 TEST(Coupling, AnotherLeaderIsHeardAfterARenewalAndEngagesByItsOwnAct) {
   Ports ports = far_apart(5);
   ports.leader.begin(9);
@@ -164,7 +164,7 @@ TEST(Coupling, ALeaderWaitsForTheAnswerButNotForOneThatDeclines) {
   int waited = 0;
   for (; leader.port.phase() == PortPhase::kEngaged && waited < 100'000; ++waited) {
     PortState late = leader.state(PortPhase::kCoupled);
-    late.answers = 2;  // made before it heard of the act
+    late.answers = 2;  // sent before it received the engagement
     leader.hear(late);
     leader.step();
   }
@@ -288,7 +288,7 @@ TEST(Coupling, AStateWithAValueOutOfItsBoundsChangesNothing) {
       [](PortState& s) { s.need = -1e-9; },
       [](PortState& s) { s.need = kNan; },
       [](PortState& s) { s.given = 1e7; },
-      [](PortState& s) { s.given = 0.001; },  // it has given more before
+      [](PortState& s) { s.given = 0.001; },  // claims earlier gifts
       [](PortState& s) { s.taken = 0.5; },    // we have given nothing
   };
   for (std::size_t n = 0; n < changes.size(); ++n) {

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// These tests run two couplings in random worlds. The devices, maps, networks, and hands are random, as well as all
-// acts, clutches, losses, restarts, faults, and replays. It is an error if an account or a pair generates energy, or if
-// something happens without an act. The bugs in tests/mutants/coupling must be found by these tests.
+// Two couplings in random worlds. Devices, maps, networks, hands and all engagements, clutches, losses, restarts,
+// faults and replays are random. Neither an account nor a pair may generate energy, and nothing may happen without an
+// engagement request. These tests must find the bugs in tests/mutants/coupling.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -21,7 +21,7 @@
 namespace tendon::coupling_world_test {
 namespace {
 
-/// Says which promise a world breaks first; empty: none.
+/// Returns the first broken promise of a world, or an empty string.
 class CouplingWorld {
  public:
   explicit CouplingWorld(std::uint64_t seed) : dice_(seed), ports_(draw()) {}
@@ -35,24 +35,24 @@ class CouplingWorld {
   }
 
   int acts() const { return acts_made_; }
-  int live() const { return live_; }  ///< ms, of both ends
+  int live() const { return live_; }  ///< ms, both ends
   int losses() const { return losses_; }
   double least_account() const { return ports_.least_account(); }
   double least_sum() const { return ports_.least_sum; }
 
  private:
-  /// What was seen of one port.
+  /// Observations of one port.
   struct Watch {
     PortState told{};
     bool live = false;
     int not_live_for = 1000;  ///< ms
     int live_for = 0;         ///< ms
-    bool from_rest = false;   ///< it had no force when it became live
-    int since = 0;            ///< acts before this engage it no more
+    bool from_rest = false;   ///< zero force when it became live
+    int since = 0;            ///< engagements requested earlier have expired
     Vec3 wanted = Vec3::Zero();
-    bool stepped = true;  ///< `wanted` is of a period with a position
-    int unready_for = 0;  ///< ms that are left
-    int cut_for = 0;      ///< ms that are left of its way out
+    bool stepped = true;  ///< `wanted` belongs to a period with a position
+    int unready_for = 0;  ///< ms remaining
+    int cut_for = 0;      ///< ms remaining, outgoing direction
     std::uint64_t epoch = 1;
   };
 
@@ -72,7 +72,7 @@ class CouplingWorld {
   }
 
   void draw_surroundings(PortSetup& setup) {
-    if (dice_.chance(0.25)) {  // the worst hand: it goes where it likes
+    if (dice_.chance(0.25)) {  // worst hand: arbitrary motion
       const auto x = wave();
       const auto y = wave();
       setup.path = [=](double t) { return Vec3(x(t), y(t), 0); };
@@ -84,7 +84,7 @@ class CouplingWorld {
       axis.wall = dice_.chance(0.3);
       if (axis.wall) axis.damping = 0;
       if (dice_.chance(0.7)) axis.reference = wave();
-      if (axis.wall) axis.reference = [](double) { return 0.005; };  // one that moves does work
+      if (axis.wall) axis.reference = [](double) { return 0.005; };  // a moving wall does work
     }
   }
 
@@ -203,7 +203,8 @@ class CouplingWorld {
       live_ += period;
     }
     const bool same_act = told.engagement == watch.told.engagement &&
-                          (leads || told.answers_epoch == watch.told.answers_epoch);  // the leader numbers its acts
+                          (leads || told.answers_epoch == watch.told.answers_epoch);  // the leader numbers the
+                                                                                      // engagements
     const bool recentred = leads && port.setup.coupling.method == CouplingMethod::kRate;
     if (ours && same_act && !(live && watch.live) && !recentred) {
       breaks(told.position != watch.told.position, "still");
@@ -237,7 +238,7 @@ class CouplingWorld {
   Ports ports_;
   Watch leader_;
   Watch follower_;
-  std::map<std::pair<std::uint64_t, std::uint64_t>, int> acts_;  ///< (leader's epoch, engagement) → when
+  std::map<std::pair<std::uint64_t, std::uint64_t>, int> acts_;  ///< (leader's epoch, engagement) → time
   std::vector<PortState> there_;
   std::vector<PortState> back_;
   int acting_ = -1;
@@ -275,7 +276,7 @@ TEST(CouplingWorlds, NoAccountNoPairAndNoForceWithoutAnAct) {
   expect_worlds_keep_their_promises(static_cast<std::uint64_t>(property_cases()) / 25, 3000);
 }
 
-// By hand: --gtest_also_run_disabled_tests --gtest_filter='*Thousands*'
+// Run by hand: --gtest_also_run_disabled_tests --gtest_filter='*Thousands*'
 TEST(CouplingWorlds, DISABLED_Thousands) { expect_worlds_keep_their_promises(5000, 3000); }
 
 }  // namespace

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Several leaders of one follower: shares, one account, loss. Each device has its whole haptic controller.
+// Several leaders of one follower: shares, one account, loss. Each device runs its complete haptic controller.
 #include "core/teleoperation/couplings.h"
 
 #include <gtest/gtest.h>
@@ -19,9 +19,9 @@
 namespace tendon::couplings_test {
 namespace {
 
-constexpr double kCoulomb = 0.02;  // N, of each device
+constexpr double kCoulomb = 0.02;  // N, each device
 
-/// A leader whose hand is led along x.
+/// A leader with a hand that moves along x.
 Star::Leader led(double share, const std::function<double(double)>& path, std::uint64_t seed = 1) {
   Star::Leader leader{.setup = port_of(PortRole::kLeader), .share = share};
   leader.setup.path = [path](double t) { return Vec3(path(t), 0, 0); };
@@ -30,12 +30,12 @@ Star::Leader led(double share, const std::function<double(double)>& path, std::u
   return leader;
 }
 
-/// From 0 at `from` s to `goal` m a second later.
+/// Ramp from 0 at `from` s to `goal` m within one second.
 std::function<double(double)> to(double goal, double from = 0.5) {
   return [goal, from](double t) { return goal * std::clamp(t - from, 0.0, 1.0); };
 }
 
-/// Each way takes 5 … 10 ms, and 10 % are lost.
+/// Each direction takes 5 … 10 ms and loses 10 %.
 void worsen(Star::Leader& leader, std::uint64_t seed) {
   leader.there = {.delay = 5, .jitter = 5, .loss = 0.1, .seed = 2 * seed};
   leader.back = {.delay = 5, .jitter = 5, .loss = 0.1, .seed = 2 * seed + 1};
@@ -43,7 +43,7 @@ void worsen(Star::Leader& leader, std::uint64_t seed) {
 
 PortSetup follower_setup() { return port_of(PortRole::kFollower); }
 
-/// Something springy holds the follower where it is.
+/// A spring holds the follower in place.
 PortSetup held_follower(double stiffness = 500) {
   PortSetup setup = follower_setup();
   setup.around[0] = {.stiffness = stiffness, .damping = 3};
@@ -149,7 +149,7 @@ TEST(Couplings, ALeaderThatIsNotEngagedCountsForNothing) {
   EXPECT_EQ(star.leaders[1].applied, Vec3(0, 0, 0));
   EXPECT_EQ(star.leaders[1].coupling().phase(), PortPhase::kCoupled);
   star.run(1300);
-  star.set_share(0, 1);  // nothing is stretched
+  star.set_share(0, 1);  // springs are at rest
   star.run(3000);
   EXPECT_NEAR(star.follower.applied.x(), 200 * 0.010, 0.05) << "unless somebody says so";
 }
@@ -176,7 +176,7 @@ TEST(Couplings, TheOwnDampingOfTheFollowerIsRenderedOnce) {
   EXPECT_NEAR(demand.stiffness(0, 0), 400, 1e-9);
 }
 
-/// The largest change of the force of any device within a period, of those with `which`.
+/// Returns the largest force change of any device within a period.
 double largest_step(Star& star, int ticks) {
   double most = 0;
   star.run(ticks, [&](int) {
@@ -195,7 +195,7 @@ TEST(Couplings, AHandOverUnderStretchMakesNoStepAndTakesNoEnergy) {
     star.run(4000 - star.now);
     const double before = star.follower.x().x();
     star.set_share(1, 0.9);
-    // K is lowered to 2B/T_loop; the follower's force moves by K Δα (x₁ − x₂), in half a second.
+    // K is lowered to 2B/T_loop. The follower's force changes by K Δα (x₁ − x₂) within half a second.
     const double slope = 400 * 0.8 * 0.025 / 500;
     const double most = largest_step(star, 700);
     EXPECT_LT(most, kCoulomb + slope) << seed;
@@ -212,8 +212,8 @@ TEST(Couplings, AHandOverUnderStretchMakesNoStepAndTakesNoEnergy) {
   }
 }
 
-/// Leader 0 swings about a follower that something stiff holds; leader 1 rests there. Leader 0 counts while its spring
-/// relaxes, and next to nothing while it is stretched: what the spring gives out at each swing nobody has put in.
+/// Leader 0 oscillates about a stiffly held follower while leader 1 rests. The share of leader 0 is large while its
+/// spring relaxes and near zero while it is stretched, so the spring generates energy in every cycle.
 Star pumped(bool limited) {
   constexpr double kPeriod = 4;  // s
   const auto swing = [](double t) { return t < 1 ? 0.0 : 0.02 * std::sin(2 * std::numbers::pi * (t - 1) / kPeriod); };
@@ -286,7 +286,7 @@ TEST(Couplings, AnEngineAndALeaderAreBoundedByTheSameAccount) {
     double account;
     bool both;
   };
-  // The fixture of an engine, late by 20 ms: 3000 N/m towards x = 0. It shakes whoever swings through it.
+  // A fixture force of an engine with 20 ms of delay: 3000 N/m towards x = 0, which excites any motion through it.
   const auto run = [](bool limited) {
     Star::Leader leader{.setup = port_of(PortRole::kLeader)};
     leader.setup.around[0] = {.stiffness = 300, .damping = 3, .reference = [](double t) {
@@ -348,7 +348,7 @@ TEST(Couplings, ByPositionForceALeaderFeelsItsShareOfTheContact) {
 TEST(Couplings, ARobotHoldsItsPlaceAsFarAsNobodyLeadsIt) {
   PortSetup robot = follower_setup();
   robot.coupling.holds_place = true;
-  // Something pulls it away.
+  // An external spring pulls the robot away.
   robot.around[0] = {.stiffness = 20, .reference = [](double) { return 0.05; }};
   Star star(robot, {led(0.5, to(0.010, 4)), led(0.5, to(0.010, 40), 2)});
   star.run(1000);
@@ -395,7 +395,7 @@ TEST(Couplings, TogetherGiveNoMoreThanTheAccountHas) {
       peer.answers_epoch = 1;
       peer.phase = ms < 10 ? PortPhase::kCoupled : PortPhase::kEngaged;
       peer.engagement = ms < 10 ? 0 : 1;
-      peer.need = 1;  // of all there is
+      peer.need = 1;  // share of the total
       couplings[i].receive(peer, Port::at(ms));
     }
     couplings.command({Port::at(ms), Vec3::Zero(), Vec3::Zero()}, 0, true);

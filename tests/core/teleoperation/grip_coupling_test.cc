@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Grippers that are coupled: the follower's fingers go to the leader's without a jump, what they squeeze is felt, and
-// nothing is dropped or crushed while the link is dead.
+// Coupled grippers: the follower's fingers move to the leader's without a jump, grip forces are reflected, and a dead
+// link neither drops nor crushes an object.
 #include "core/teleoperation/handle/grip_coupling.h"
 
 #include <gtest/gtest.h>
@@ -17,15 +17,15 @@ namespace {
 constexpr double kNanojoule = 1e-9;
 constexpr double kGripCoulomb = 0.05;  // N
 
-/// Fingers that are 12 mm open touch an egg.
+/// An egg that touches the fingers at an opening of 12 mm.
 Surroundings egg() {
   return {.stiffness = 2000, .damping = 1, .reference = [](double) { return -0.012; }, .wall = true};
 }
 
-/// m: fingers that close to 6 mm within a second. Closing earns what the follower's grip is paid from.
+/// Opening in m: closes to 6 mm within a second. Closing stores the energy that the follower's grip needs.
 double closing(double t) { return t < 1 ? 0.02 : std::max(0.02 - 0.014 * (t - 1), 0.006); }
 
-/// A hand of 300 N/m that wants the fingers `opening` m open.
+/// A hand of 300 N/m with a target of `opening` m.
 Surroundings squeezing(std::function<double(double)> opening) {
   return {.stiffness = 300, .damping = 3, .reference = [opening](double t) { return -opening(t); }};
 }
@@ -86,7 +86,7 @@ TEST(GripCoupling, ItHoldsWhileTheLeaderIsClutchedAndComesBackSlowly) {
   const double held = ports.follower.grip_force;
   EXPECT_LT(held, -0.3);
   ports.leader.buttons = 1;
-  ports.run(1000);  // meanwhile the leader lets go
+  ports.run(1000);  // the leader's hand lets go meanwhile
   EXPECT_NEAR(ports.follower.grip_force, held, 0.02 * std::abs(held));
   ports.leader.buttons = 0;
   double fastest = 0;
@@ -99,12 +99,12 @@ TEST(GripCoupling, ItHoldsWhileTheLeaderIsClutchedAndComesBackSlowly) {
   EXPECT_LT(fastest, 0.1 * 1e-3) << "with 50 mm/s, and what the egg gives back";
 }
 
-/// What becomes of the force on an egg, N, when the link is dead for three seconds and the leader acts again.
+/// Force on an egg, N, when the link fails for three seconds and the leader engages again.
 struct EggForce {
   double before = 0;
   double least_dead = 1e9;
   double most_dead = 0;
-  double most_again = 0;  ///< after the second act
+  double most_again = 0;  ///< after the second engagement
   double in_the_end = 0;
   double closed_further = 0;
   double least_sum = 0;
@@ -113,7 +113,7 @@ struct EggForce {
 EggForce hold_an_egg(bool holds_place, int one_way) {
   WholeSetup leader = whole_of(PortRole::kLeader);
   WholeSetup follower = whole_of(PortRole::kFollower);
-  // Of fingers that are led: a hand would close further by itself when nothing is felt.
+  // Prescribed finger motion. A hand would close further without a reflected force.
   leader.opened = [](double t) { return t < 12 ? closing(t) : 0.004; };
   follower.closing = egg();
   follower.coupling.holds_place = holds_place;
@@ -223,7 +223,7 @@ TEST(GripCoupling, AStateThatTheGripsPurseRefusesChangesNothing) {
   ASSERT_TRUE(good.grip);
   PortState bad = good;
   bad.phase = PortPhase::kFault;
-  bad.grip->taken = 1e3;  // we have given next to nothing
+  bad.grip->taken = 1e3;  // exceeds the total that we have given
   leader.receive(bad, WholePort::at(ports.now));
   EXPECT_EQ(leader.refused(), refused + 1);
   ports.leader.step(ports.now);

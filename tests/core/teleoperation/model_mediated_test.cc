@@ -29,10 +29,10 @@ SurfaceModel<3> surface(std::uint64_t sequence, double offset, double stiffness,
 
 // ---- the gate --------------------------------------------------------------------------------------------------
 
-// A hand that moves about near surfaces that change all the time. ½ K depth² is convex and its slope changes by no more
-// than K, so that a held force gives out at most what the surface loses of it plus ½ K ‖Δx‖², which the friction of
-// the device pays for K ≤ 2b/T. With this leak of sampling taken off, what the model gives out and still holds is
-// never more than what hand and budget have put in.
+// The hand moves near surfaces that change continuously. ½ K depth² is convex with a slope change of at most K, so a
+// held force returns at most the surface's energy loss plus ½ K ‖Δx‖². The friction of the device pays for the latter
+// if K ≤ 2b/T. Without this sampling leak, the energy that the model returned and stores must not exceed the input of
+// hand and budget.
 TEST(ModelMediated, NoUpdateOfTheModelPutsEnergyIn) {
   for (std::uint64_t seed = 1; seed <= 100; ++seed) {
     Dice dice(seed);
@@ -59,7 +59,7 @@ TEST(ModelMediated, NoUpdateOfTheModelPutsEnergyIn) {
   }
 }
 
-// The same against the ledger: with K ≤ 2b/T and the budget that the account can spare the ledger pays everything.
+// With K ≤ 2b/T and a budget that the account can spare, the ledger must stay nonnegative.
 TEST(ModelMediated, WithTheSpareEnergyAsBudgetTheLedgerIsNeverNegative) {
   for (std::uint64_t seed = 1; seed <= 100; ++seed) {
     Dice dice(seed);
@@ -167,8 +167,8 @@ struct Slide {
   double worst_friction = 0;
 };
 
-// A tool presses with 2 N ± 60 % at a wall 0.3 m from the origin and slides on it, friction 0.3, 0.02 N of noise in
-// each direction; looked at from 1.5 s on.
+// A tool presses with 2 N ± 60 % against a wall 0.3 m from the origin and slides with friction 0.3, with 0.02 N of
+// noise per axis. Errors count from 1.5 s on.
 Slide slide(std::uint64_t seed, double stiffness, double friction) {
   Dice dice(seed);
   SurfaceEstimator<3> estimator(
@@ -201,7 +201,7 @@ Slide slide(std::uint64_t seed, double stiffness, double friction) {
   return found;
 }
 
-// Before: K between 0 and 10 N/m for 500, and the force off by 2.5 N.
+// Regression: K was estimated as 0 … 10 N/m instead of 500 N/m, with a force error of 2.5 N.
 TEST(ModelMediated, FindsItUnderFrictionAndNoiseFarFromTheOrigin) {
   for (const double stiffness : {100.0, 500.0}) {
     Slide worst;
@@ -220,7 +220,8 @@ TEST(ModelMediated, FindsItUnderFrictionAndNoiseFarFromTheOrigin) {
   }
 }
 
-// A press of 2 N is 1 mm there, no more than friction tilts a slide: K can be off, but not what the hand feels.
+// A press of 2 N is 1 mm deep, no more than the tilt of a slide due to friction. K may be wrong but the force must be
+// right.
 TEST(ModelMediated, FeelsRightOnAWallTooHardToMeasure) {
   for (std::uint64_t seed = 1; seed <= 100; ++seed) ASSERT_LT(slide(seed, 2000, 0.3).worst_force, 0.15) << seed;
 }
@@ -235,7 +236,7 @@ TEST(ModelMediated, APressWithoutSlidingIsAsFarOffAsFrictionTiltsIt) {
   EXPECT_NEAR(found.stiffness * found.depth(Vec3(-0.004, 0, 0)), 2 * std::sqrt(1 + 0.3 * 0.3), 0.01);
 }
 
-// Before: 10 N at 20 mm, for ever.
+// Regression: 10 N remained at 20 mm indefinitely.
 TEST(ModelMediated, ASurfaceWithoutAForceInsideItIsGone) {
   SurfaceEstimator<3> estimator(kEstimator);
   SurfaceRenderer<3> renderer;
@@ -246,8 +247,8 @@ TEST(ModelMediated, ASurfaceWithoutAForceInsideItIsGone) {
     model = estimator.observe(x, Vec3(-500 * x.x(), 0, 0));
   }
   const double deepest = 2 * kEstimator.contact_force / 500;
-  const Vec3 ahead(-0.1, 0, 0);     // the hand is, by a round trip
-  for (int i = 0; i <= 100; ++i) {  // it is taken away, and the tool goes on to 20 mm
+  const Vec3 ahead(-0.1, 0, 0);     // the hand leads by a round trip
+  for (int i = 0; i <= 100; ++i) {  // the surface is removed, and the tool moves on to 20 mm
     x.x() = -0.2e-3 * i;
     model = estimator.observe(x, Vec3::Zero());
     if (-x.x() <= deepest) continue;
@@ -265,7 +266,7 @@ TEST(ModelMediated, ASurfaceStaysWhileTheToolIsNoDeeperThanTheNoise) {
   auto config = kEstimator;
   config.position_noise = 1e-3;
   SurfaceEstimator<3> estimator(config);
-  const auto touched = estimator.observe(Vec3(-0.01, 0, 0), Vec3(2, 0, 0));  // at 0 with 200 N/m
+  const auto touched = estimator.observe(Vec3(-0.01, 0, 0), Vec3(2, 0, 0));  // at 0, 200 N/m
   EXPECT_NEAR(touched.offset, 0, 1e-12);
   EXPECT_EQ(estimator.observe(Vec3(-1.4e-3, 0, 0), Vec3::Zero()).stiffness, touched.stiffness);
   EXPECT_EQ(estimator.observe(Vec3(-1.6e-3, 0, 0), Vec3::Zero()).stiffness, 0);

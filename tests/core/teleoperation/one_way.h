@@ -11,26 +11,26 @@
 
 namespace tendon {
 
-/// What one direction of a bad network does, in whole periods of the loop.
+/// Impairments of one network direction, in periods of the loop.
 struct Network {
   int delay = 0;
-  int jitter = 0;   ///< 0 … jitter is added to the delay of each message by itself: they overtake each other
+  int jitter = 0;   ///< 0 … jitter is added to each message independently, so messages overtake each other
   double loss = 0;  ///< probability
   std::uint64_t seed = 1;
-  double repeated = 0;  ///< probability that a message comes once more, up to 1000 periods later
-  /// From this period on the delay is so much longer.
+  double repeated = 0;  ///< probability of a duplicate, up to 1000 periods later
+  /// From period `longer_from` on, the delay grows by `longer_by`.
   int longer_from = std::numeric_limits<int>::max();
   int longer_by = 0;
-  /// Messages that are sent from one period until another wait for the end of their burst of so many periods.
+  /// Messages sent between `burst_from` and `burst_until` wait for the end of their burst of `burst` periods.
   int burst = 1;
   int burst_from = 0;
   int burst_until = std::numeric_limits<int>::max();
-  /// Messages that are sent from this period on, and before the other, are lost.
+  /// Messages sent in [cut_from, cut_until) are lost.
   int cut_from = std::numeric_limits<int>::max();
   int cut_until = 0;
 };
 
-/// One direction of a bad network between two loops that run in step. Virtual time: the number of the period.
+/// One direction of a bad network between two synchronous loops. Virtual time is the number of the period.
 template <class Message>
 class OneWay {
  public:
@@ -49,7 +49,7 @@ class OneWay {
     }
   }
 
-  /// Calls `receive` with every message that arrives in period `now`, in the order in which they were sent.
+  /// Calls `receive` for every message that arrives in period `now`, in sending order.
   template <class Receive>
   void deliver(int now, Receive receive) {
     const auto last = under_way_.upper_bound(now);
@@ -67,7 +67,7 @@ class OneWay {
   };
   Network network_;
   Dice dice_;
-  std::multimap<int, Parcel> under_way_;  ///< by the period in which it arrives
+  std::multimap<int, Parcel> under_way_;  ///< keyed by arrival period
   std::uint64_t sent_ = 0;
 };
 

@@ -16,19 +16,19 @@
 
 namespace tendon {
 
-/// What a device's handle is held by or runs into, along x.
+/// External force on a handle along x: a spring and damper, or a wall.
 struct Surroundings {
   double stiffness = 0;                       ///< N/m
   double damping = 0;                         ///< N·s/m
-  std::function<double(double)> reference{};  ///< t, s → m: where the spring is at rest; empty: 0
-  bool wall = false;                          ///< only while x is beyond `reference`
-  /// s: from then on there is nothing; the hand has let go, or the wall was removed.
+  std::function<double(double)> reference{};  ///< t, s → m: rest position of the spring; empty: 0
+  bool wall = false;                          ///< acts only while x is beyond `reference`
+  /// s: the contact ends (hand released or wall removed).
   double until = std::numeric_limits<double>::infinity();
-  std::function<double(double)> stiffer{};  ///< t, s → by which `stiffness` is multiplied; empty: 1
+  std::function<double(double)> stiffer{};  ///< t, s → factor on `stiffness`; empty: 1
 };
 
-/// A device with one degree of freedom: m dv/dt = F + F_surroundings − b v − f_c sgn(v), by the implicit midpoint rule
-/// with set-valued friction in substeps of 50 µs. It neither makes nor hides energy.
+/// Device with one degree of freedom: m dv/dt = F + F_surroundings − b v − f_c sgn(v), integrated by the implicit
+/// midpoint rule with set-valued friction in substeps of 50 µs. The integrator neither generates nor loses energy.
 class Body {
  public:
   Body(double mass, const Friction& friction, Surroundings around)
@@ -43,7 +43,7 @@ class Body {
 
   double x = 0;
   double v = 0;
-  double outside = 0;  ///< N, of the surroundings on the handle, in the last substep
+  double outside = 0;  ///< N, external force in the last substep
 
  private:
   void substep(double force, double middle, double h) {
@@ -70,7 +70,6 @@ class Body {
   Surroundings around_;
 };
 
-/// One of two coupled devices.
 struct EndConfig {
   double mass = 0.075;
   Friction friction{.coulomb = 0.02, .viscous = 0.26};
@@ -79,7 +78,7 @@ struct EndConfig {
   AolPlus<1, 3>::Parts parts{};
   PositionPosition<3>::Config spring{.stiffness = 400, .own_damping = 4};
   Surroundings around{};
-  std::function<double(double)> path{};  ///< t, s → m: the handle is led there and ignores forces
+  std::function<double(double)> path{};  ///< t, s → m: prescribed motion, forces have no effect
   double encoder_step = 0;               ///< m; 0: exact
 };
 
@@ -87,15 +86,15 @@ struct PairConfig {
   EndConfig leader{};
   EndConfig follower{};
   double position_scale = 1;  ///< s_x
-  double force_scale = 1;     ///< s_f; the springs' K, D, B are the caller's to scale: K_l = s_x s_f K_f
-  Network there{};            ///< in tenths of a millisecond
+  double force_scale = 1;     ///< s_f; the caller scales the springs' K, D, B: K_l = s_x s_f K_f
+  Network there{};            ///< tenths of a millisecond
   Network back{};
-  bool limited = true;  ///< false: no limiter and no purse
+  bool limited = true;  ///< false: without limiter and purse
   double max_account = 10;
   double max_power = 100;
 };
 
-/// Two devices, springs between them, limiters and purses, and a bad network: in virtual time.
+/// Two devices in virtual time with springs, limiters and purses, over a bad network.
 class Pair {
  public:
   struct End {
@@ -125,9 +124,9 @@ class Pair {
     EnergyLedger ledger;
     double wanted = 0;   ///< N
     double applied = 0;  ///< N
-    double speed = 0;    ///< m/s, mean of the last period
+    double speed = 0;    ///< m/s, mean over the last period
     std::uint64_t periods = 0;
-    std::uint64_t cut = 0;  ///< of these, limited
+    std::uint64_t cut = 0;  ///< of these, limited periods
   };
 
   explicit Pair(const PairConfig& config)
@@ -137,7 +136,7 @@ class Pair {
         there_(config.there),
         back_(config.back) {}
 
-  /// Runs for `duration` s; `look(t)` after every millisecond.
+  /// Runs for `duration` s and calls `look(t)` every millisecond.
   template <class Look>
   void run(double duration, Look look) {
     const int last = now_ + static_cast<int>(std::lround(duration * 1e4));
@@ -222,7 +221,7 @@ class Pair {
  public:
   End leader;
   End follower;
-  double least_account = std::numeric_limits<double>::infinity();  ///< J, of both
+  double least_account = std::numeric_limits<double>::infinity();  ///< J, both accounts
   double least_sum = 0;                                            ///< J, W_l + (s_f/s_x) W_f
 
  private:
@@ -231,7 +230,7 @@ class Pair {
   int now_ = 0;
 };
 
-/// There and back `round_trip` ms, each way longer by up to max(5 ms, 20 %), reordered, a tenth lost.
+/// A mean round trip of `round_trip` ms; each direction has jitter of max(5 ms, 20 %), reordering and 10 % loss.
 inline void make_bad(PairConfig& config, int round_trip, std::uint64_t seed) {
   const int one_way = round_trip * 5;
   config.there = {.delay = one_way, .jitter = std::max(50, one_way / 5), .loss = 0.1, .seed = seed};
@@ -239,7 +238,7 @@ inline void make_bad(PairConfig& config, int round_trip, std::uint64_t seed) {
   config.back.seed = seed + 1000;
 }
 
-/// The root mean square of what is above a frequency, of samples every millisecond: Butterworth, 2nd order.
+/// High-pass rms of samples at 1 kHz: Butterworth, 2nd order.
 class HighPass {
  public:
   explicit HighPass(double hertz) {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Two devices tied by position–position springs, limiters and purses, over bad networks: what is felt, how it feels in
-// free motion, how quiet it is, and that the pair gives out nothing.
+// Two devices coupled by position–position springs with limiters and purses over bad networks: contact force, free
+// motion, noise, and passivity of the pair.
 #include "tests/core/teleoperation/pair.h"
 
 #include <gtest/gtest.h>
@@ -20,13 +20,13 @@ constexpr std::array kRoundTrips = {0, 10, 50, 200, 600};  // ms
 
 constexpr AolPlus<1, 3>::Parts kCapped{.energy_cap = AolPlus<1, 3>::EnergyCap{}};
 
-/// From 0 to `far` in 0.5 s, as a half cosine.
+/// Half cosine from 0 to `far` within 0.5 s.
 double ramp(double t, double far) {
   if (t <= 0) return 0;
   return t >= 0.5 ? far : far * (1 - std::cos(2 * kPi * t)) / 2;
 }
 
-/// A hand presses 30 mm at a wall that is at 10 mm behind the follower.
+/// A hand with a target of 30 mm presses against the follower's wall at 10 mm.
 PairConfig pressing(double wall, double hand = 400, double depth = 0.03) {
   PairConfig config;
   config.leader.around = {.stiffness = hand, .damping = 2, .reference = [depth](double t) { return ramp(t, depth); }};
@@ -34,7 +34,7 @@ PairConfig pressing(double wall, double hand = 400, double depth = 0.03) {
   return config;
 }
 
-/// A hand that waves 20 mm to and fro at 1 Hz; nothing at the follower.
+/// A hand oscillates with 20 mm at 1 Hz and a free follower.
 PairConfig waving() {
   PairConfig config;
   config.leader.around = {
@@ -51,7 +51,7 @@ void use_law(PairConfig& config, Law law) {
 
 TEST(Pair, WithoutAPurseTheFollowerDoesNotFollow) {
   PairConfig config = waving();
-  config.max_account = 1e-12;  // nothing that comes is credited, and nothing is kept to be given
+  config.max_account = 1e-12;  // received energy is not credited, and none is kept for giving
   Pair pair(config);
   double farthest = 0;
   pair.run(3, [&](double) { farthest = std::max(farthest, std::abs(pair.follower.body.x)); });
@@ -116,7 +116,7 @@ TEST(Pair, FreeMotionDragsByStiffnessTimesRoundTripAndAllDamping) {
       work -= pair.leader.applied * pair.leader.speed;
       squares += pair.leader.speed * pair.leader.speed;
     });
-    // The leader goes first in a tick: what it sends is used at once, the answer in its next period.
+    // The leader steps first in a tick: the follower uses its state at once, and its answer is used one period later.
     const double loop = std::max(2 * c.one_way, 10) * 1e-4;
     EXPECT_NEAR(seconds(pair.leader.spring.round_trip()), loop, 1e-9);
     const double expected = c.stiffness * loop + 2 * c.own_damping + config.follower.friction.viscous +
@@ -128,7 +128,8 @@ TEST(Pair, FreeMotionDragsByStiffnessTimesRoundTripAndAllDamping) {
   }
 }
 
-/// N felt in a press at a hard wall, and J in both accounts before it, after `waves` s of waving.
+/// Returns the force in a press against a hard wall (N) and the energy of both accounts before it (J), after
+/// oscillating for `waves` s.
 std::pair<double, double> felt_after(Law law, double waves) {
   PairConfig config = pressing(5000, 400, 0.05);
   const auto press = config.leader.around.reference;
@@ -144,7 +145,7 @@ std::pair<double, double> felt_after(Law law, double waves) {
 }
 
 TEST(Pair, AnEnergyCapCutsNothingOfAForceThatIsPaidFor) {
-  // The cap keeps what free motion earns small, and leaves the account that a held force needs.
+  // The cap limits the energy stored in free motion but keeps enough for a held force.
   const auto [felt, none] = felt_after(Law::kAol, 0);
   const auto [felt_capped, waved_capped] = felt_after(Law::kAolPlus, 20);
   const auto [felt_waved, waved] = felt_after(Law::kAol, 20);
@@ -160,7 +161,7 @@ TEST(Pair, AHeldForceIsThatAtTheWallOverAnyNetwork) {
   for (const Law law : {Law::kAol, Law::kAolPlus}) {
     for (const double wall : {500.0, 5000.0}) {
       for (const int round_trip : kRoundTrips) {
-        for (std::uint64_t hand = 0; hand < 4; ++hand) {  // the first is the one of the README, the others are drawn
+        for (std::uint64_t hand = 0; hand < 4; ++hand) {  // hand 0 is the one of the README, the others are random
           Dice dice(2000 + hand);
           PairConfig config = pressing(wall, hand == 0 ? 400 : dice.within(150, 600));
           use_law(config, law);
@@ -224,7 +225,7 @@ TEST(Pair, ItIsQuietHeldAndFreeAtEveryRoundTrip) {
 }
 
 TEST(Pair, TheHandFeelsTheImpedanceThatLawrenceGives) {
-  // Beyond B_l, the hand feels C (Z_f + Z_e)/(C + Z_f + Z_e).
+  // In addition to B_l, the hand feels C (Z_f + Z_e)/(C + Z_f + Z_e).
   using Complex = std::complex<double>;
   for (const double stiffness_around : {0.0, 500.0}) {
     for (const double hertz : {0.1, 0.3, 1.0, 3.0, 10.0}) {

@@ -20,21 +20,21 @@
 
 namespace tendon {
 
-/// One device with its coupling and its limiter: three bodies, one along each axis of its base frame.
+/// One device with coupling and limiter: three bodies, one per axis of the base frame.
 struct PortSetup {
   Coupling::Config coupling{};
   double mass = 0.075;
   Friction friction{.coulomb = 0.02, .viscous = 0.26};
   int every = 1;                         ///< ms
-  std::array<Surroundings, 3> around{};  ///< what holds it or what it runs into, along each axis
-  std::function<Vec3(double)> path{};    ///< t, s → m: the handle is led there and ignores forces
+  std::array<Surroundings, 3> around{};  ///< external contact along each axis
+  std::function<Vec3(double)> path{};    ///< t, s → m: prescribed motion, forces have no effect
   double encoder_step = 0;               ///< m; 0: exact
   bool measures_contact = false;
-  double motor = std::numeric_limits<double>::infinity();  ///< N, the most that it gives
-  bool limited = true;                                     ///< false: what the coupling wants is applied
+  double motor = std::numeric_limits<double>::infinity();  ///< N, saturation
+  bool limited = true;                                     ///< false: applies the wanted force of the coupling
 };
 
-/// The springs, purse and period that both ends of these tests have.
+/// Springs, purse and period common to both ends.
 inline Coupling::Config coupling_of(PortRole role) {
   Coupling::Config config;
   config.role = role;
@@ -43,7 +43,7 @@ inline Coupling::Config coupling_of(PortRole role) {
   return config;
 }
 
-/// The same, by that method, with what it needs besides.
+/// Selects `method` with the parameters that it needs.
 inline void couple_by(CouplingMethod method, Coupling::Config& config) {
   config.method = method;
   if (method != CouplingMethod::kRate) return;
@@ -59,7 +59,7 @@ class Port {
     if (setup.path) put(setup.path(0));
   }
 
-  /// The server starts anew: nothing is left of coupling and account.
+  /// Server restart: coupling and account are new.
   void begin(std::uint64_t epoch) {
     auto config = setup.coupling;
     config.spring.epoch = epoch;
@@ -77,7 +77,7 @@ class Port {
     const double step = setup.encoder_step;
     return step > 0 ? Vec3(step * (x() / step).array().round()) : x();
   }
-  /// Of the surroundings on the tool.
+  /// External force on the tool.
   Vec3 outside() const { return {bodies_[0].outside, bodies_[1].outside, bodies_[2].outside}; }
 
   void put(const Vec3& x) {
@@ -86,7 +86,7 @@ class Port {
 
   static LocalTime at(int now) { return LocalTime(std::chrono::seconds(100) + std::chrono::milliseconds(now)); }
 
-  /// Everything of a period but the network: what came was received before.
+  /// One period after the reception of messages, without the network.
   PortState step(int now) {
     const double length = setup.every * 1e-3;
     const Duration held = setup.every * std::chrono::milliseconds(1);
@@ -138,7 +138,7 @@ class Port {
   Demand<3> demand{Vec3::Zero()};
   Vec3 applied = Vec3::Zero();
   bool cut = false;
-  double paid = 0;  ///< J, in this period
+  double paid = 0;  ///< J in this period
   double least_account = std::numeric_limits<double>::infinity();
 
  private:
@@ -147,7 +147,7 @@ class Port {
   bool began_ = false;
 };
 
-/// Two ports and the network between them, in virtual time: a tick is 1 ms.
+/// Two ports and their network in virtual time with ticks of 1 ms.
 class Ports {
  public:
   Ports(const PortSetup& of_leader, const PortSetup& of_follower, const Network& network_there,
@@ -156,7 +156,7 @@ class Ports {
   Ports(const PortSetup& of_leader, const PortSetup& of_follower)
       : Ports(of_leader, of_follower, {.delay = 0, .seed = 1}, {.delay = 0, .seed = 2}) {}
 
-  /// `look(now)` after every tick.
+  /// Calls `look(now)` after every tick.
   template <class Look>
   void run(int ticks, Look look) {
     for (const int last = now + ticks; now < last; ++now) {
@@ -172,7 +172,7 @@ class Ports {
     run(ticks, [](int) {});
   }
 
-  /// Until the leader is live by a new act; false when it is not within a second.
+  /// Runs until a new engagement is live. Returns false after one second.
   bool engage() {
     run(50);
     if (!leader.coupling->engage()) return false;
@@ -188,10 +188,10 @@ class Ports {
   OneWay<PortState> back;
   bool cut_there = false;
   bool cut_back = false;
-  PortState told_there{};  ///< newest sent
+  PortState told_there{};  ///< newest sent state
   PortState told_back{};
-  int copies = 1;     ///< of each state that is sent
-  int sent_each = 1;  ///< ms: the other states stay here
+  int copies = 1;     ///< of each sent state
+  int sent_each = 1;  ///< ms: only every such period is sent
   int now = 0;
   double least_sum = 0;  ///< J, W_l + (s_f/s_x) W_f
 
@@ -203,7 +203,7 @@ class Ports {
   }
 };
 
-/// Of the ports in these tests, as they are without anything special.
+/// Default port of these tests.
 inline PortSetup port_of(PortRole role) {
   PortSetup setup;
   setup.coupling = coupling_of(role);
@@ -219,12 +219,12 @@ inline Ports far_apart(int one_way) {
 
 inline PortPhase phase(const Port& port) { return port.coupling->phase(); }
 
-/// One port whose peer is played by the test.
+/// One port with a scripted peer.
 class Played {
  public:
   explicit Played(Coupling::Config config) : port(config) {}
 
-  /// The peer's state of this period, as a good peer would make it.
+  /// Valid state of the peer for this period.
   PortState state(PortPhase phase, std::uint64_t engagement = 0) {
     PortState peer;
     peer.epoch = 5;
@@ -251,7 +251,7 @@ class Played {
   int now = 0;
 };
 
-/// J: accounts may be so far below zero, by rounding.
+/// J: tolerated rounding of accounts.
 inline constexpr double kRounding = -1e-9;
 
 }  // namespace tendon

@@ -25,7 +25,7 @@ PoseMap::Config drawn(Dice& dice) {
 }
 
 TEST(PoseMap, AQuarterTurnAndScalesByHand) {
-  // The leader's x is the follower's y; the follower moves a fifth as far, and its force is felt fivefold.
+  // The leader's x is the follower's y. Motion is scaled by 1/5 and force by 5.
   const PoseMap map({.position_scale = 0.2, .force_scale = 5, .rotation = rotation_by(Vec3(0, 0, std::acos(-1) / 2))});
   EXPECT_LT((map.to_follower(Vec3(0.1, 0, 0.05)) - Vec3(0, 0.02, 0.01)).norm(), 1e-15);
   EXPECT_LT((map.to_leader(Vec3(0, 0.02, 0.01)) - Vec3(0.1, 0, 0.05)).norm(), 1e-15);
@@ -57,7 +57,7 @@ TEST(PoseMap, ThereAndBackIsTheCoupledPart) {
 }
 
 TEST(PoseMap, PowerAtTheLeaderIsThatAtTheFollowerInItsJoules) {
-  // F_l · u_l = (s_f/s_x) F_f · u_f: what the purse counts on.
+  // F_l · u_l = (s_f/s_x) F_f · u_f, the invariant that energy sharing relies on.
   Dice dice(2);
   for (int n = 0; n < 1000; ++n) {
     const PoseMap map(drawn(dice));

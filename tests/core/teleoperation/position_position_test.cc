@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// One end of a position–position coupling: its force, the round trip that it counts, and what it refuses. pair_test.cc
-// has two of them between devices.
+// One end of a position–position coupling: its force, its round-trip estimate, and rejected input. pair_test.cc couples
+// two of them.
 #include "core/teleoperation/methods/position_position.h"
 
 #include <gtest/gtest.h>
@@ -47,9 +47,9 @@ TEST(PositionPosition, BeforeTheFirstMessageThereIsOnlyDamping) {
   EXPECT_EQ(end.command(Vec3(1, 2, 3), Vec3(0.1, 0, 0)).force, Vec3(-0.4, 0, 0));
 }
 
-/// The other end answers at once what was sent `delay` periods ago.
+/// The peer answers immediately to the message sent `delay` periods ago.
 void talk(PositionPosition<3>& end, int delay, int periods) {
-  static constexpr int kOffset = 1'000'000;  // its clock is another one
+  static constexpr int kOffset = 1'000'000;  // the peer uses a different clock
   for (int n = 0; n < periods; ++n) {
     const std::uint64_t now = end.message().sequence + 1;
     const auto then = static_cast<std::int64_t>(now) - delay;
@@ -124,7 +124,7 @@ TEST(PositionPosition, SilenceLowersTheStiffnessAndEndsTheFeedForward) {
 }
 
 TEST(PositionPosition, ALateMessageIsCarriedOnWithItsVelocity) {
-  // A steady motion of 0.1 m/s seen through messages that come 5 to 10 ms late: y runs as if all came after 5 ms.
+  // Steady motion of 0.1 m/s, received with a delay of 5 to 10 ms: y moves as if every delay were 5 ms.
   auto config = config_of(100, 0);
   config.damping = 0;
   config.adapt_to_delay = false;
@@ -152,7 +152,7 @@ TEST(PositionPosition, AnEndThatStartsAnewIsHeardAndItsFormerMessagesAreNot) {
   EXPECT_DOUBLE_EQ(end.command(Vec3::Zero(), Vec3::Zero()).force.x(), 4) << "the round trip begins anew, too";
   end.receive({.epoch = 1, .sequence = 5'000'000, .position = Vec3(0.05, 0, 0)});
   EXPECT_DOUBLE_EQ(end.command(Vec3::Zero(), Vec3::Zero()).force.x(), 4);
-  // It answers what another epoch of ours sent: no measure of the round trip.
+  // Answers a different epoch of ours and gives no round-trip measurement.
   end.receive({.epoch = 2, .sequence = 2, .answers_epoch = 9, .answers = 1, .position = Vec3(0.02, 0, 0)});
   EXPECT_DOUBLE_EQ(end.command(Vec3::Zero(), Vec3::Zero()).force.x(), 8);
   EXPECT_EQ(end.round_trip(), Duration::zero());
@@ -175,7 +175,7 @@ TEST(PositionPosition, WhatIsWrongOrOldIsPassedOver) {
   EXPECT_EQ(end.refused(), 0U) << "late is not wrong";
   end.receive({.sequence = 3, .position = Vec3(kNan, 0, 0)});
   end.receive({.sequence = 3, .velocity = Vec3(0, kNan, 0)});
-  end.receive({.sequence = 3, .answers_epoch = 1, .answers = 1});  // we have sent none
+  end.receive({.sequence = 3, .answers_epoch = 1, .answers = 1});  // we have not sent that many
   end.receive({.sequence = 3, .round_trip = milliseconds(-1)});
   end.receive({.sequence = 3, .time = std::chrono::hours(1'000'000)});
   end.receive({.epoch = 0, .sequence = 3});

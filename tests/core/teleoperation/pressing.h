@@ -11,7 +11,7 @@
 namespace tendon {
 
 inline constexpr double kPressingHand = 400;    // N/m
-inline constexpr double kPressingDepth = 0.03;  // m, that the hand wants to be
+inline constexpr double kPressingDepth = 0.03;  // m, target of the hand
 inline constexpr double kPressingWallAt = 0.01;
 
 inline Network bad_way(int one_way, std::uint64_t seed) {
@@ -19,7 +19,7 @@ inline Network bad_way(int one_way, std::uint64_t seed) {
   return {.delay = one_way, .jitter = jitter, .loss = one_way > 0 ? 0.1 : 0, .seed = seed};
 }
 
-/// A hand that goes to kPressingDepth, holds it, leaves, and comes again; a wall in the follower's way.
+/// The hand moves to kPressingDepth, holds, retreats and repeats, with a wall in front of the follower.
 struct Pressing {
   CouplingMethod method = CouplingMethod::kWaves;
   double wall = 500;       // N/m
@@ -35,7 +35,7 @@ struct Pressing {
   bool adapts = true;
 };
 
-inline constexpr int kPressMs = 4000;  // ms there, as long away
+inline constexpr int kPressMs = 4000;  // ms in contact, and as long away
 
 inline Ports press(const Pressing& with) {
   PortSetup leader = port_of(PortRole::kLeader);
@@ -68,15 +68,15 @@ inline Ports press(const Pressing& with) {
 }
 
 struct Felt {
-  double first = 0;  // N, at the leader, mean of the press's last half second
+  double first = 0;  // N at the leader, mean over the last half second of the press
   double second = 0;
-  double wall = 0;    // N, at the follower on the second press
-  double ripple = 0;  // N rms of what is faster than 50 Hz, at the leader while it presses
-  double buzz = 0;    // m/s rms of what is faster than 20 Hz, at the leader away from the wall
+  double wall = 0;    // N at the follower in the second press
+  double ripple = 0;  // N rms above 50 Hz at the leader during the press
+  double buzz = 0;    // m/s rms above 20 Hz at the leader away from the wall
   double sum = 0;     // J
   double account = 0;
-  double stiffness = 0;  // N/m, as the leader says
-  bool live = false;     // to the end
+  double stiffness = 0;  // N/m, reported by the leader
+  bool live = false;     // at the end
 };
 
 /// First-order high pass, rms.
@@ -130,7 +130,7 @@ inline Felt feel(const Pressing& with) {
   return felt;
 }
 
-/// What a rigid link would give, N.
+/// Force with a rigid link, N.
 inline double rigid(const Pressing& with) {
   return (kPressingDepth - kPressingWallAt) / (1 / with.hand + 1 / with.wall);
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// What one purse does with what it is told: the rule of giving, scales, epochs, and a peer that lies.
+// One purse with scripted messages: rule of giving, scales, epochs, and a lying peer.
 #include "core/teleoperation/purse.h"
 
 #include <gtest/gtest.h>
@@ -23,7 +23,7 @@ using std::chrono::milliseconds;
 constexpr double kInf = std::numeric_limits<double>::infinity();
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
-/// A message of a peer of epoch 7 that has heard of our epoch 1.
+/// A message of a peer with epoch 7 that has received our epoch 1.
 PurseMessage from_peer(std::uint64_t sequence, double account, double need, double given = 0, double taken = 0) {
   return {.epoch = 7,
           .answers_epoch = 1,
@@ -54,7 +54,7 @@ TEST(Purse, CountsWhatIsUnderWay) {
   const auto first = purse.settle(period_of(0.05, 0.01));
   purse.receive(0, from_peer(2, 0.01, 0.03));  // the gift has not arrived yet
   EXPECT_NEAR(purse.settle(period_of(0.05 - first.withdraw, 0.01)).withdraw, 0, 1e-15);
-  purse.receive(0, from_peer(3, 0.01, 0.03, 0, first.withdraw));  // it has, and was spent
+  purse.receive(0, from_peer(3, 0.01, 0.03, 0, first.withdraw));  // the gift has arrived and was spent
   EXPECT_GT(purse.settle(period_of(0.05 - first.withdraw, 0.01)).withdraw, 1e-3);
 }
 
@@ -94,7 +94,7 @@ TEST(Purse, WhenItHasTooLittleAllAreCutInProportion) {
 
 TEST(Purse, ThreePeersAndItselfEndAtOneRatio) {
   Purse purse({.peers = 3, .max_account = 1});
-  const std::array<double, 3> accounts = {0.01, 0.02, 0.5};  // the last has more than its share: it is given nothing
+  const std::array<double, 3> accounts = {0.01, 0.02, 0.5};  // the last has more than its share and receives nothing
   const std::array<double, 3> needs = {0.05, 0.02, 0.1};
   for (std::size_t j = 0; j < 3; ++j) purse.receive(j, from_peer(1, accounts[j], needs[j]));
   const double left = 0.3 - purse.settle(period_of(0.3, 0.03 - 0.2e-3)).withdraw;
@@ -104,7 +104,7 @@ TEST(Purse, ThreePeersAndItselfEndAtOneRatio) {
 }
 
 TEST(Purse, AJouleOfThePeerIsWorthWhatTheScalesSay) {
-  // s_x 0.2, s_f 5: at the leader a joule of the follower is 25.
+  // s_x 0.2, s_f 5: a joule of the follower is 25 J at the leader.
   Purse leader({.joule = {25}, .max_account = 10});
   leader.receive(0, from_peer(1, 0.0002, 0.001, 0.004));
   const auto settlement = leader.settle(period_of(0, 0.025 - 0.2e-3));
@@ -113,7 +113,7 @@ TEST(Purse, AJouleOfThePeerIsWorthWhatTheScalesSay) {
   EXPECT_EQ(leader.message(0).taken, 0.004) << "totals are told as they were heard";
 }
 
-/// A joule that was given at one worth would else be credited at another.
+/// Otherwise a joule would be given at one worth and credited at another.
 TEST(Purse, AChangeOfWorthForgoesWhatIsUnderWay) {
   Purse purse({.max_power = 100, .max_account = 100});
   purse.receive(0, from_peer(1, 1, 1, 2));
@@ -131,7 +131,7 @@ TEST(Purse, ATotalIsCountedOnceHoweverOftenItComes) {
   Purse purse({});
   purse.receive(0, from_peer(2, 0, 0, 0.02));
   purse.receive(0, from_peer(2, 0, 0, 0.02));
-  purse.receive(0, from_peer(1, 0, 0, 0.01));  // overtaken: late, not wrong
+  purse.receive(0, from_peer(1, 0, 0, 0.01));  // overtaken: late but valid
   EXPECT_DOUBLE_EQ(purse.settle(period_of(0, 0)).credit, 0.02);
   EXPECT_EQ(purse.settle(period_of(0, 0)).credit, 0);
   EXPECT_EQ(purse.refused(), 0U);
@@ -157,7 +157,7 @@ TEST(Purse, WhatIsWrongIsRefusedAndCounted) {
   refuses(from_peer(7, 0, 0, 0.02, kNan), "taken");
   refuses(from_peer(0, 0, 0, 0.02), "sequence");
   refuses(PurseMessage{}, "epoch");
-  purse.receive(1, from_peer(1, 0, 0, 0.02));  // nobody
+  purse.receive(1, from_peer(1, 0, 0, 0.02));  // no such peer
   EXPECT_EQ(purse.refused(), refused);
   EXPECT_DOUBLE_EQ(purse.settle(period_of(0, 0)).credit, 0.02);
 }
@@ -176,12 +176,12 @@ TEST(Purse, ANewEpochOfThePeerVoidsTheTotalsAndTheOldNeverCountsAgain) {
   const PurseMessage answer = purse.message(0);
   EXPECT_EQ(answer.answers_epoch, 8U);
   EXPECT_GT(answer.sequence, sent) << "the peer may have heard the former ones";
-  purse.receive(0, from_peer(10, 0, 0.03, 0.05));  // of the former epoch, late
+  purse.receive(0, from_peer(10, 0, 0.03, 0.05));  // late, of the previous epoch
   EXPECT_EQ(purse.settle(period_of(0, 0)).credit, 0);
   EXPECT_EQ(purse.refused(), 0U);
 }
 
-/// Another peer may be of a lower epoch; the same one must not be credited again.
+/// A new peer may have a lower epoch. The same peer must not be credited twice.
 TEST(Purse, ARenewedPurseHearsAnyPeerAndCountsNoTotalTwice) {
   Purse purse({.max_power = 100, .max_account = 100});
   purse.receive(0, from_peer(9, 1, 1, 2));
@@ -200,7 +200,7 @@ TEST(Purse, ARenewedPurseHearsAnyPeerAndCountsNoTotalTwice) {
 
 TEST(Purse, TotalsThatAnswerAnEpochOfOursThatIsOverAreNotCounted) {
   Purse restarted({.epoch = 2});
-  restarted.receive(0, from_peer(50, 0, 0.03, 0.08));  // answers epoch 1: who had that epoch has already spent it
+  restarted.receive(0, from_peer(50, 0, 0.03, 0.08));  // answers epoch 1, whose total is already spent
   EXPECT_EQ(restarted.settle(period_of(0, 0)).credit, 0);
   PurseMessage anew = from_peer(51, 0, 0.03, 0.01);
   anew.answers_epoch = 2;
@@ -247,9 +247,9 @@ TEST(Purse, AgainstAnyPeerItsOwnPortLosesNoMoreThanTheAllowance) {
           lie.need = kNan;
           break;
         case 3:
-          lie.given = total / 2;  // falls
+          lie.given = total / 2;  // decreases
           break;
-        case 4:  // begins anew all the time
+        case 4:  // restarts repeatedly
           lie.epoch = 7 + static_cast<std::uint64_t>(n);
           lie.sequence = 1;
           lie.given = 1e6;

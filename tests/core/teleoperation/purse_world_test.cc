@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The theorem of purse.h, attacked: two to four ports, a network that delays, loses, repeats and reorders, forces that
-// obey no rule, the motion that takes most, pauses and restarts. Every account and the sum of all ledgers stay above
-// −1 nJ. The ledgers are kept here a second time. Each sabotage of the method is found within 100 worlds.
+// Attacks on the energy-sharing theorem of purse.h: two to four ports, a network that delays, loses, repeats and
+// reorders, arbitrary forces, the worst motion, pauses and restarts. Every account and the sum of all ledgers must stay
+// above −1 nJ. The ledgers are recomputed independently. Each sabotage must be found within 100 worlds.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -26,7 +26,7 @@ namespace {
 constexpr double kInf = std::numeric_limits<double>::infinity();
 constexpr double kNanojoule = 1e-9;
 
-/// What is done wrong on purpose.
+/// Deliberate error.
 enum class Sabotage { kNone, kBoundOnePercentUp, kTotalsTwice, kGiveAfterLimit, kEpochIgnored };
 
 struct Port {
@@ -46,8 +46,8 @@ struct Port {
 
 struct Outcome {
   double least_account = kInf;    ///< J
-  double least_sum = kInf;        ///< J, of all ledgers from the beginning
-  double least_unclaimed = kInf;  ///< J, that sum less all accounts: below zero when energy is claimed twice
+  double least_sum = kInf;        ///< J, sum of all ledgers since the start
+  double least_unclaimed = kInf;  ///< J, that sum minus all accounts: negative when energy is claimed twice
   double given = 0;               ///< J
   bool finite = true;
   bool broken() const { return std::min({least_account, least_sum, least_unclaimed}) < -kNanojoule; }
@@ -61,7 +61,7 @@ class World {
     restarts_ = dice_.chance(0.5) ? dice_.decades(-3.3, -1.7) : 0;
     pauses_ = dice_.chance(0.5) ? dice_.decades(-3.3, -2) : 0;
     duplicates_ = dice_.uniform();
-    silence_ = dice_.chance(0.5) ? 0 : dice_.uniform() * 0.95;  // share of periods in which nothing is sent
+    silence_ = dice_.chance(0.5) ? 0 : dice_.uniform() * 0.95;  // share of periods without a message
     scale_ = dice_.chance(0.5) ? 1 : dice_.decades(-1, 1);
     for (std::size_t i = 0; i < count; ++i) {
       Port port;
@@ -105,7 +105,7 @@ class World {
 
   std::size_t ports() const { return ports_.size(); }
 
-  /// The port is never heard of again. Its device's watchdog takes its force away; what is under way still comes.
+  /// The port disappears. Its device's watchdog removes the force, and messages under way still arrive.
   void lose(std::size_t i) { stop(ports_[i], std::numeric_limits<int>::max()); }
 
  private:
@@ -117,12 +117,12 @@ class World {
     look(port);
   }
 
-  /// Port 0 is the leader of a scaled net: a joule of any other is worth `scale_` there.
+  /// Port 0 is the leader of a scaled network: a joule of any other port is worth `scale_` there.
   double worth(std::size_t here, std::size_t there) const {
     return (here == 0 ? 1 : 1 / scale_) * (there == 0 ? 1 : scale_);
   }
   bool coupled(std::size_t i, std::size_t j) const { return i != j && (!star_ || i == 0 || j == 0); }
-  /// The number by which port i knows port j.
+  /// Index of port j among the peers of port i.
   static std::size_t number(std::size_t i, std::size_t j) { return j < i ? j : j - 1; }
 
   void start(std::size_t i) {
@@ -148,14 +148,14 @@ class World {
         return port.force * 1e3;
       case 2:
         return dice_.chance(0.1) ? Vec3(Vec3::Constant(kInf)) : Vec3(Vec3::Zero());
-      default:  // springs to the other ports, where they are and not where they were heard to be
+      default:  // springs to the true positions of the other ports
         return port.stiffness * (ports_[dice_.bits() % ports_.size()].x - port.x);
     }
   }
 
   Vec3 motion(Port& port, Duration held) {
     const double size = port.force.norm();
-    if (dice_.chance(port.hostility)) {  // eq. (7): the worst there is
+    if (dice_.chance(port.hostility)) {  // worst motion, eq. (7)
       const double excess = size - port.config.friction.coulomb;
       if (excess <= 0) return Vec3::Zero();
       return port.force / size * (seconds(held) * excess / (2 * port.config.friction.viscous));
@@ -169,10 +169,12 @@ class World {
       if (!coupled(i, j)) continue;
       links_[j * ports_.size() + i].deliver(now_, [&](PurseMessage message) {
         if (sabotage_ == Sabotage::kEpochIgnored) {
-          // A receiver that does not look: every message is of the peer's present epoch and about our present totals.
+          // A receiver without epoch checks: every message seems to have the peer's present epoch and our present
+          // totals.
           message.answers_epoch = port.epoch;
           message.epoch = 1;
-          message.taken = std::min(message.taken, port.purse->given(number(i, j)));  // else that alone gives it away
+          message.taken = std::min(message.taken, port.purse->given(number(i, j)));  // otherwise this check alone would
+                                                                                     // find it
         }
         port.purse->receive(number(i, j), message);
       });
@@ -196,7 +198,7 @@ class World {
 
   void step(std::size_t i) {
     Port& port = ports_[i];
-    if (port.pause > 0) {  // the device's watchdog took the force away; what comes meanwhile waits in the network
+    if (port.pause > 0) {  // the watchdog removed the force, and messages wait in the network
       --port.pause;
       return;
     }
@@ -211,7 +213,7 @@ class World {
       port.limiter->observe({port.force, dx, held});
       port.truth.observe(port.force, dx, held);
       port.x += dx;
-      if (port.x.norm() > 0.1) port.x *= 0.5;  // away from the numbers: nothing was booked
+      if (port.x.norm() > 0.1) port.x *= 0.5;  // resets the position scale without booking
     }
     look(port);
     deliver(i);
@@ -283,7 +285,7 @@ TEST(PurseWorlds, NoAccountAndNoSumOfLedgersIsEverNegative) {
   expect_no_world_gains(15 * static_cast<std::uint64_t>(property_cases()) / 100, 2000);
 }
 
-// By hand: --gtest_also_run_disabled_tests --gtest_filter='*TenThousand*'
+// Run by hand: --gtest_also_run_disabled_tests --gtest_filter='*TenThousand*'
 TEST(PurseWorlds, DISABLED_TenThousandWorldsOfTenSeconds) { expect_no_world_gains(10'000, 10'000); }
 
 TEST(PurseWorlds, OfThreePortsOrMoreOneMayBeLostForGood) {

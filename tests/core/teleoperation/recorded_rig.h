@@ -10,7 +10,7 @@
 
 namespace tendon {
 
-/// A column of a recording of the TU/e rig as a path of the handle, m.
+/// Handle path in m from one column of a recording of the TU/e rig.
 inline std::function<double(double)> recorded(const std::filesystem::path& file, const char* column) {
   std::ifstream csv(file);
   const ScriptedMotion motion(load_recorded_motion(csv, {.path = file, .position = column, .scale = 0.075}));

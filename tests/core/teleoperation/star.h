@@ -16,7 +16,7 @@
 
 namespace tendon {
 
-/// One device of a star with its whole haptic controller: three bodies, one along each axis.
+/// One device of a star with its complete haptic controller: three bodies, one per axis.
 class Node {
  public:
   Node(const PortSetup& with, const std::vector<CoupledLeader>& leaders, std::uint64_t epoch)
@@ -26,7 +26,7 @@ class Node {
     if (setup.path) put(setup.path(0));
   }
 
-  /// The server starts anew.
+  /// Server restart.
   void begin(std::uint64_t epoch) {
     HapticController::Config config;
     config.coupling = setup.coupling;
@@ -49,7 +49,7 @@ class Node {
     for (int i = 0; i < 3; ++i) bodies_[static_cast<std::size_t>(i)].x = x[i];
   }
 
-  /// A period, before what is sent.
+  /// First part of a period, before sending.
   void step(int now) {
     constexpr double kPeriod = 1e-3;
     const Vec3 before = x();
@@ -67,7 +67,7 @@ class Node {
     applied = taken.force;
     least_account = std::min(least_account, taken.energy);
   }
-  /// After the step: what one of its couplings sends.
+  /// Message of one coupling after the step.
   PortState message(std::size_t which) {
     const auto contact = setup.measures_contact ? std::optional<Vec3>(outside()) : std::nullopt;
     Coupling& coupling = (*controller->couplings())[which];
@@ -91,7 +91,7 @@ class Node {
   bool began_ = false;
 };
 
-/// A follower and its leaders, each leader with its own bad network, in virtual time: a tick is 1 ms.
+/// A follower and its leaders in virtual time with ticks of 1 ms, each leader with its own bad network.
 class Star {
  public:
   struct Leader {
@@ -100,7 +100,7 @@ class Star {
     Network there{};
     Network back{};
   };
-  /// One leader: a follower without shares.
+  /// With a single leader, the follower has no shares.
   Star(const PortSetup& follower_setup, const std::vector<Leader>& of) : follower(follower_setup, shares_of(of), 1) {
     for (const Leader& one : of) {
       leaders.emplace_back(one.setup, std::vector<CoupledLeader>{}, leaders.size() + 2);
@@ -139,7 +139,7 @@ class Star {
     run(ticks, [](int) {});
   }
 
-  /// Until that leader is live by a new act; false when it is not within a second.
+  /// Runs until a new engagement of that leader is live. Returns false after one second.
   bool engage(std::size_t which) {
     run(50);
     if (!leaders[which].coupling().engage()) return false;
@@ -149,10 +149,10 @@ class Star {
   void set_share(std::size_t which, double share) { follower.controller->couplings()->set_share(which, share); }
 
   Node follower;
-  std::deque<Node> leaders;  // a controller does not move
-  std::vector<bool> cut;     ///< the way of each leader, both directions
+  std::deque<Node> leaders;  // a controller must not move in memory
+  std::vector<bool> cut;     ///< per leader, both directions
   int now = 0;
-  double least_sum = 0;                                            ///< J, of all ledgers
+  double least_sum = 0;                                            ///< J, sum of all ledgers
   double least_account = std::numeric_limits<double>::infinity();  ///< J
 
  private:

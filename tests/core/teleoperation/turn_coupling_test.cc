@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Tests that the spring generates no energy on closed paths in SO(3), that both ends have the same torque, that the
-// torque has no steps, and that a pair with one account for force and torque is passive.
+// The spring must generate no energy on closed paths in SO(3), both ends must have the same torque without steps, and a
+// pair with one account for force and torque must be passive.
 #include "core/teleoperation/handle/turn_coupling.h"
 
 #include <gtest/gtest.h>
@@ -26,7 +26,7 @@ constexpr double kNanojoule = 1e-9;
 
 Quat minus(const Quat& q) { return {-q.w, -q.x, -q.y, -q.z}; }
 
-/// The law of a follower alone, of whole gain, that hears a leader at `there`.
+/// The law of a follower alone with full gain and a leader at `there`.
 class Spring {
  public:
   explicit Spring(double stiffness, const Quat& there = {})
@@ -68,7 +68,8 @@ TEST(TurnCoupling, DoesNotJumpWhereTheQuaternionChangesItsSign) {
   }
 }
 
-/// J that the spring gives out on the way from `from` to `to` about one axis: Simpson's rule in steps of 1 mrad.
+/// Returns the energy (J) that the spring generates on the single-axis rotation from `from` to `to`: Simpson's rule in
+/// steps of 1 mrad.
 double given_out(Spring& spring, const Quat& from, const Quat& to) {
   const Vec3 turn = turn_between(from, to);
   const int steps = 1 + static_cast<int>(turn.norm() / 1e-3);
@@ -97,7 +98,7 @@ TEST(TurnCoupling, GivesOutNothingOnClosedWaysOfTurns) {
       at = to;
     };
     for (int corner = 0; corner < 3; ++corner) {
-      // A way that stays where the spring is believed.
+      // Draws a path inside the valid range of the spring.
       for (Quat to = drawn();; to = drawn()) {
         const Quat half = product(rotation_by(Vec3(turn_between(at, to) / 2)), at);
         if (!is_within_reach(there, half)) continue;
@@ -261,7 +262,7 @@ TEST(TurnCoupling, WithoutASpringAtTheLeaderItFeelsItsDampingOnly) {
   }
 }
 
-/// Hands, maps and networks that ask for energy: of force and torque together, and of the grippers.
+/// Hands, maps and networks that try to extract energy from force and torque together, and from the grippers.
 TEST(WholeHandles, NoPairAndNoAccountGivesOutEnergy) {
   double least_pair = 0;
   double least_account = 0;
@@ -283,7 +284,7 @@ TEST(WholeHandles, NoPairAndNoAccountGivesOutEnergy) {
       end->coupling.method = kMethods[seed % 4];
       end->coupling.turn->stiffness = turn;
       end->coupling.grip->stiffness = grip;
-      // Above what is quiet.
+      // Stiffness above the quiet limit.
       end->coupling.spring.adapt_to_delay = seed % 3 != 0;
       end->limiter.law = seed % 5 == 0 ? Law::kAol : Law::kAolPlus;
       end->flips = seed % 2 == 0;
@@ -364,7 +365,7 @@ TEST(WholeHandles, APositionAloneIsCoupledOnADeviceWithMoreMotors) {
   EXPECT_GE(ports.least_sum, -kNanojoule);
 }
 
-/// Without the coupling: from what its step wanted, and what its two purses settled.
+/// Recomputes the step without the coupling, from its recorded demand and settlement of two purses.
 TEST(WholeHandles, ARecordedStepIsTakenAgainToTheLastBit) {
   WholeSetup leader = whole_of(PortRole::kLeader);
   leader.along_x = {.stiffness = 400, .damping = 3, .reference = [](double t) { return 0.02 * std::sin(4 * t); }};

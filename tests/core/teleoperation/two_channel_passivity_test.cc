@@ -21,11 +21,11 @@ constexpr Duration kPeriod = 1ms;
 constexpr double kT = 1e-3;
 
 struct Channel {
-  double least = 0;  // J, that the two ends together have put in
-  double drift = 0;  // m, of the tool against the leader, when both have come to rest in free space
+  double least = 0;  // J, energy absorbed by both ends
+  double drift = 0;  // m, tool position minus leader position, both at rest in free space
 };
 
-// The leader follows a prescribed motion; the massless tool presses against a spring of 400 N/m.
+// The leader follows a prescribed motion. The massless tool presses against a spring of 400 N/m.
 Channel run(bool on, const Network& network, double drift_rate) {
   constexpr int kPeriods = 22000;
   PassivityLeader<1> leader({.max_damping = 1e9, .period = kPeriod});
@@ -49,14 +49,14 @@ Channel run(bool on, const Network& network, double drift_rate) {
       leader.receive(m);
       raw_force = m.force;
     });
-    const bool resting = i >= 20000;  // after 16 whole cycles: where it started, with the tool off the spring
+    const bool resting = i >= 20000;  // after 16 cycles: at the start position with the tool off the spring
     const double v = resting ? 0.0 : 0.1 * std::sin(2 * std::numbers::pi * 0.8 * i * kT);
     const Vec<1> force = on ? leader.command(Vec<1>(v)).force : raw_force;
     energy -= force[0] * v * kT;
     there.send(i, leader.observe({force, Vec<1>(v * kT), kPeriod}));
     x_leader += v * kT;
 
-    const double tool_force = x > 0 ? 400 * x : 0.0;  // what it takes to hold it there
+    const double tool_force = x > 0 ? 400 * x : 0.0;  // force that holds the tool there
     const auto step = follower.step(Vec<1>(tool_force));
     const double tool_velocity = on ? step.velocity[0] : raw_velocity[0];
     energy -= tool_force * tool_velocity * kT;
@@ -96,7 +96,7 @@ TEST(TwoChannelPassivity, DriftIsMadeGoodWhenThatCostsNothing) {
   EXPECT_LT(std::abs(run(true, sixty, 2).drift), 0.002);
 }
 
-// Random motion and random forces in six dimensions, forces limited at the leader: nothing is assumed of either side.
+// Random motion and forces in six dimensions, with force limits at the leader and no assumption about either side.
 TEST(TwoChannelPassivity, IsPassiveForEveryMotionAndEveryForce) {
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
     Dice dice(seed);
@@ -127,7 +127,7 @@ TEST(TwoChannelPassivity, IsPassiveForEveryMotionAndEveryForce) {
   }
 }
 
-// The tool is stuck, and the controller's spring of 1000 N/m leans on it. Returns the least energy of both ends, J.
+// The tool is blocked, and the controller's spring of 1000 N/m acts on it. Returns the minimum energy of both ends, J.
 double least_with_a_spring(double booked_stiffness, double drift_rate) {
   constexpr double kStiffness = 1000;
   PassivityLeader<1> leader({.max_damping = 1e9, .period = kPeriod});

@@ -13,7 +13,7 @@
 
 namespace tendon {
 
-/// Two devices and a line of waves between them, in virtual time with periods of 1 ms, exact positions, no limiter.
+/// Two devices and a wave line between them in virtual time: periods of 1 ms, exact positions, no limiter.
 class WavePair {
  public:
   struct Config {
@@ -23,8 +23,8 @@ class WavePair {
     Friction friction{.coulomb = 0, .viscous = 0.26};
     Surroundings hand{};
     Surroundings tool{};
-    std::function<double(double)> path{};  ///< t, s → m: the leader is led there and ignores forces
-    Network there{};                       ///< in periods
+    std::function<double(double)> path{};  ///< t, s → m: prescribed motion of the leader, forces have no effect
+    Network there{};                       ///< periods
     Network back{};
     double tool_encoder_step = 0;  ///< m; 0: exact
   };
@@ -35,7 +35,7 @@ class WavePair {
         there_(config.there),
         back_(config.back) {}
 
-  /// Runs for `duration` s; `look(t)` after every period.
+  /// Runs for `duration` s and calls `look(t)` after every period.
   template <class Look>
   void run(double duration, Look look) {
     const int last = now_ + static_cast<int>(std::lround(duration * 1e3));
@@ -80,13 +80,13 @@ class WavePair {
     std::function<double(double)> path;
     double encoder_step;
     double force = 0;  ///< N, on the handle
-    double speed = 0;  ///< m/s, mean of the last period
-    double taken = 0;  ///< J, that the port has taken in
+    double speed = 0;  ///< m/s, mean over the last period
+    double taken = 0;  ///< J, absorbed by the port
   };
 
   End leader;
   End follower;
-  double least_sum = 0;  ///< J, that the ports together have taken in
+  double least_sum = 0;  ///< J, absorbed by both ports
 
  private:
   OneWay<WaveMessage<1>> there_;
@@ -94,21 +94,21 @@ class WavePair {
   int now_ = 0;
 };
 
-/// Where a hand that presses twice wants to be, m: 30 mm deep for `hold` s from 1 s and from hold + 6 s on.
+/// Target of a hand that presses twice, m: 30 mm deep for `hold` s, from 1 s and from hold + 6 s on.
 inline double two_presses(double t, double hold) {
   const auto ramp = [t](double from) { return std::clamp((t - from) / 0.3, 0.0, 1.0); };
   return 0.03 * (ramp(0.7) - ramp(1 + hold) + ramp(5.7 + hold));
 }
 
 struct Presses {
-  double first = 0, second = 0;  ///< N, felt, mean of the last half second
-  double contact = 0;            ///< N, at the wall, at the same time as `second`
-  double ripple = 0;             ///< N rms above 50 Hz while held
+  double first = 0, second = 0;  ///< N at the leader, mean over the last half second
+  double contact = 0;            ///< N at the wall during `second`
+  double ripple = 0;             ///< N rms above 50 Hz during the hold
   double least_sum = 0;          ///< J
 };
 
-/// A hand of `hand` N/m presses at a wall of `wall` N/m that begins at 10 mm. A line of 600 ms needs a minute to come
-/// to rest.
+/// A hand of `hand` N/m presses against a wall of `wall` N/m at 10 mm. A line with a round trip of 600 ms needs a
+/// minute to settle.
 inline Presses press(WavePair::Config config, double hand = 400, double wall = 500, double hold = 9) {
   config.hand = {.stiffness = hand, .damping = 2, .reference = [hold](double t) { return two_presses(t, hold); }};
   config.tool = {.stiffness = wall, .reference = [](double) { return 0.01; }, .wall = true};

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// What a hand feels of a line of waves: held force, ripple, inertia, and where the other end is afterwards.
+// A hand on a wave line: held force, ripple, inertia, and the final position of the other end.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -15,7 +15,7 @@ namespace {
 
 constexpr double kHand = 400;
 constexpr double kWall = 500;
-constexpr double kDeep = 0.02;  // m, that the hand wants to be behind the wall
+constexpr double kDeep = 0.02;  // m, target of the hand behind the wall
 
 WavePair::Config line(int round_trip, int jitter, double loss, std::uint64_t seed) {
   WavePair::Config config;
@@ -24,12 +24,12 @@ WavePair::Config line(int round_trip, int jitter, double loss, std::uint64_t see
   return config;
 }
 
-// d of the header, s: half the round trip, the playout, and T + (W − T)/2 with T = 1 ms and W = 20 ms.
+// Delay d of the header, s: half the round trip, the playout delay, and T + (W − T)/2 with T = 1 ms and W = 20 ms.
 double one_way(int round_trip, double playout) { return round_trip * 0.5e-3 + playout + 10.5e-3; }
 
 double felt(double d, double impedance = 4) { return kDeep / (1 / kHand + d / impedance + 1 / kWall); }
 
-// Before the sums were played out: 0.00 to 0.53 N, with 0.6 N of ripple at 3 ms.
+// Regression: without playout of the sums the force was 0.00 to 0.53 N, with 0.6 N of ripple at 3 ms.
 TEST(WavePair, HoldsTheForceThatItsStiffnessSays) {
   for (const int round_trip : {0, 1, 3, 10, 50, 200, 600}) {
     const Presses held = press(line(round_trip, 0, 0, 1), kHand, kWall, 9 + 0.1 * round_trip);
@@ -44,8 +44,8 @@ TEST(WavePair, HoldsTheForceThatItsStiffnessSays) {
   }
 }
 
-// Before: 0.12 to 0.23 N with 0.1 N of ripple, at every round trip. At 600 ms with 60 ms of jitter a steered playout
-// keeps the line moving: 0.20 N felt for 0.25 N at the wall after a minute.
+// Regression: 0.12 to 0.23 N with 0.1 N of ripple at every round trip. At 600 ms with 60 ms of jitter, an adaptive
+// playout keeps the line moving: 0.20 N felt for 0.25 N at the wall after a minute.
 TEST(WavePair, HoldsItThroughJitterLossAndReordering) {
   for (const int round_trip : {0, 1, 3, 10, 50, 200, 600}) {
     for (const std::uint64_t seed : {1U, 2U}) {
@@ -67,7 +67,7 @@ TEST(WavePair, HoldsItThroughJitterLossAndReordering) {
   }
 }
 
-// A hand holds. In bursts the line is softer, because it waits for them, and one second later the force is back.
+// The hand holds still. Bursts delay the line and so soften it, and the force recovers within a second.
 TEST(WavePair, BurstsSoftenItAsTheirDelaySaysAndLeaveNothingBehind) {
   for (const int burst : {10, 30, 60, 100}) {
     for (const bool both : {true, false}) {
@@ -88,7 +88,7 @@ TEST(WavePair, BurstsSoftenItAsTheirDelaySaysAndLeaveNothingBehind) {
       pair.run(9.2, [&](double t) {
         if (t >= 3 && t < 4) before -= pair.leader.force / 1000;
         if (t >= 5 && t < 7) during -= pair.leader.force / 2000;
-        // What is longer than 60 ms takes a second more.
+        // Bursts above 60 ms take one second longer.
         if (std::abs(t - (burst > 60 ? 9 : 8)) < 0.1) after -= pair.leader.force / 200;
       });
       std::cout << burst << (both ? " ms both ways: " : " ms one way: ") << before << ", " << during << ", " << after
@@ -101,7 +101,7 @@ TEST(WavePair, BurstsSoftenItAsTheirDelaySaysAndLeaveNothingBehind) {
   }
 }
 
-// Nothing is late, but what is lost leaves gaps that the playout has to wait for: else it stands still in each of them.
+// Nothing is late, but lost messages leave gaps. The playout has to wait for them or it would stop in each gap.
 TEST(WavePair, WaitsForGapsAndHoldsWithoutRipple) {
   for (const double loss : {0.1, 0.3}) {
     const Presses held = press(line(20, 0, loss, 1), kHand, kWall);
@@ -112,7 +112,7 @@ TEST(WavePair, WaitsForGapsAndHoldsWithoutRipple) {
   }
 }
 
-// Of short lines and stiff walls, where sampled waves rang.
+// Short lines and stiff walls, for which sampled waves rang.
 TEST(WavePair, DoesNotRingOnShortLinesWhateverItsImpedance) {
   for (const double impedance : {1.0, 4.0, 10.0}) {
     for (const double wall : {500.0, 5000.0}) {
@@ -130,14 +130,14 @@ TEST(WavePair, DoesNotRingOnShortLinesWhateverItsImpedance) {
 TEST(WavePair, FeelsLikeTheInertiaOfItsLineAndTheOtherDevice) {
   for (const int round_trip : {0, 10, 50, 200}) {
     WavePair::Config config = line(round_trip, 0, 0, 1);
-    const double w = 2 * std::numbers::pi * 0.25;  // well below where the line has a wave length
+    const double w = 2 * std::numbers::pi * 0.25;  // far below the frequency of one wavelength per line
     config.path = [w](double t) { return 0.02 * (1 - std::cos(w * t)); };
     WavePair pair(config);
     double against = 0;
     double squares = 0;
     pair.run(24, [&](double t) {
       if (t < 12) return;
-      const double acceleration = 0.02 * w * w * std::cos(w * (t + 0.5e-3));  // in the middle of the hold
+      const double acceleration = 0.02 * w * w * std::cos(w * (t + 0.5e-3));  // at the middle of the hold
       against -= pair.leader.force * acceleration;
       squares += acceleration * acceleration;
     });
@@ -148,7 +148,7 @@ TEST(WavePair, FeelsLikeTheInertiaOfItsLineAndTheOtherDevice) {
   }
 }
 
-// A hand waves for a minute and comes to rest: the tool is where the hand is, but for what friction can hold.
+// After a minute of motion the hand rests, and the tool must be at its position within the friction limit.
 TEST(WavePair, ComesToRestWhereTheHandIsHoweverMuchWasLost) {
   for (const double loss : {0.0, 0.01, 0.1, 0.3}) {
     WavePair::Config config = line(50, 5, loss, 7);
@@ -167,7 +167,7 @@ TEST(WavePair, ComesToRestWhereTheHandIsHoweverMuchWasLost) {
   }
 }
 
-// The peer falls silent while the hand presses: what is left of its waves is played within D + W and nothing after.
+// The peer stops sending during a press. Its remaining waves are played within D + W.
 TEST(WavePair, ASilentPeerIsADamperAfterTheSmoothing) {
   WavePort<1> port({.impedance = 4, .period = std::chrono::milliseconds(1)});
   for (std::uint64_t i = 1; i <= 100; ++i) {

@@ -21,11 +21,11 @@ constexpr Duration kPeriod = 1ms;
 constexpr double kT = 1e-3;
 
 struct Channel {
-  double least = 0;          // J, that the two ends together have put in
-  double least_account = 0;  // J, of either end
+  double least = 0;          // J, absorbed by both ends
+  double least_account = 0;  // J, either end
 };
 
-// Both ends are moved at random; what is applied is what is wanted, or anything between that and nothing.
+// Random motion at both ends. The applied force lies between zero and the wanted force.
 template <int N>
 Channel run(double impedance, const Network& network, Duration smoothing, bool clipped) {
   WavePort<N> leader({.impedance = impedance, .period = kPeriod, .smoothing = smoothing});
@@ -86,7 +86,7 @@ TEST(WaveVariables, ArePassiveThroughLossJitterReorderingAndBursts) {
   }
 }
 
-// Why a lost wave is not replaced by the last one: the textbook equations with hold-last, at an end that stands still.
+// Textbook equations with hold-last at a resting end: a lost wave replaced by the previous one uses its energy twice.
 TEST(WaveVariables, HoldingTheLastWaveWouldUseItsEnergyTwice) {
   const double impedance = 2;
   const double root = std::sqrt(2 * impedance);
@@ -98,7 +98,7 @@ TEST(WaveVariables, HoldingTheLastWaveWouldUseItsEnergyTwice) {
     for (int i = 0; i < 5000; ++i) {
       const double u = root * 0.1 * (i % 100 < 10 ? 1.0 : 0.0);
       sent += kT * u * u / 2;
-      const bool lost = i % 100 >= 9 && i % 100 < 40;  // a burst just after the push
+      const bool lost = i % 100 >= 9 && i % 100 < 40;  // burst directly after the push
       if (!lost) last = u;
       const double wave = !lost || hold ? last : 0.0;
       used += kT * wave * wave / 2;
@@ -115,7 +115,7 @@ TEST(WaveVariables, AnEndThatIsTerminatedWithTheImpedanceReflectsNothing) {
   const auto out = leader.observe({Vec<1>(-0.4), Vec<1>(0.2 * kT), kPeriod});  // F = −B v: u = √(2B) v
   EXPECT_NEAR(out.integral[0], 2 * 0.2 * kT, 1e-15);
   follower.receive(out);
-  const double v = 0.2;  // a tool with a damper of 2 N·s/m: F = B v
+  const double v = 0.2;  // tool with a damper of 2 N·s/m: F = B v
   const double force = follower.command(Vec<1>(v)).force[0];
   EXPECT_NEAR(force, 0.4, 1e-15);
   EXPECT_NEAR(follower.observe({Vec<1>(force), Vec<1>(v * kT), kPeriod}).integral[0], 0, 1e-15);
@@ -124,7 +124,7 @@ TEST(WaveVariables, AnEndThatIsTerminatedWithTheImpedanceReflectsNothing) {
 TEST(WaveVariables, SendsNothingWhileItsAccountIsShort) {
   WavePort<1> port({.impedance = 2, .period = kPeriod});
   port.command(Vec<1>(0));
-  // The device pushed along with a motion that no wave had paid for.
+  // The device pushed along a motion for which no wave had paid.
   const auto silent = port.observe({Vec<1>(1), Vec<1>(1e-3), kPeriod});
   EXPECT_EQ(silent.integral[0], 0);
   EXPECT_NEAR(port.energy(), -1e-3, 1e-15);
@@ -132,7 +132,8 @@ TEST(WaveVariables, SendsNothingWhileItsAccountIsShort) {
   const auto paid_back = port.observe({Vec<1>(-2), Vec<1>(1e-3), kPeriod});
   EXPECT_NEAR(port.energy(), 0, 1e-15);
   EXPECT_NEAR(paid_back.energy, 1e-3, 1e-15);
-  // Due were (B Δx − T F)/√(2B), 0.5 mm √(N·s/m) and 2 of them. A wave that the device did not use pays for the rest.
+  // Two waves (B Δx − T F)/√(2B) of 0.5 mm √(N·s/m) and 2 mm √(N·s/m) were due. Waves that the device does not use pay
+  // for the rest.
   for (std::uint64_t i = 1; i <= 4000; ++i) {
     const auto n = static_cast<double>(i);
     port.receive({i, i * 1ms, Vec<1>(1e-3 * n), 0.5e-3 * n});
@@ -173,7 +174,7 @@ TEST(WaveVariables, BelowTheReserveOfALimiterAFifthOfAWaveStays) {
   const auto sent = [](double payable, double reserve) {
     WavePort<1> port({.impedance = 2, .period = kPeriod, .smoothing = kPeriod});
     port.command(Vec<1>(0));
-    // Due is a wave of (2 N·s/m · 1 m/s + 2 N)/2 = 2 √W, of 2 mJ in the period.
+    // The due wave of (2 N·s/m · 1 m/s + 2 N)/2 = 2 √W carries 2 mJ in the period.
     const auto message =
         port.observe({Vec<1>(-2), Vec<1>(kT), kPeriod}, {.payable = payable, .reserve = reserve, .wanted = Vec<1>(-2)});
     EXPECT_NEAR(message.energy, port.given(), 1e-15);
@@ -228,7 +229,7 @@ TEST(WaveVariables, PassOverWhatIsNotFiniteOrOutOfPlace) {
 
 TEST(WaveVariables, MakeNoMoreOfASumThanTheEnergyThatCameWithIt) {
   WavePort<1> port({.impedance = 2, .period = kPeriod, .smoothing = kPeriod});
-  port.receive({1, 1ms, Vec<1>(kT), 0.125 * kT});  // a wave of 1 would take T/2
+  port.receive({1, 1ms, Vec<1>(kT), 0.125 * kT});  // a wave of 1 would need T/2
   EXPECT_NEAR(port.command(Vec<1>(0)).force[0], 2 * 0.5, 1e-12);
   port.observe({Vec<1>(1), Vec<1>(0), kPeriod});
   port.receive({2, 2ms, Vec<1>(kT), kT});
@@ -241,7 +242,7 @@ TEST(WaveVariables, MakeNoMoreOfASumThanTheEnergyThatCameWithIt) {
   EXPECT_NEAR(rest, 0.5 * kT, 1e-9) << "the other half of the sum, paid for since";
 }
 
-// A port that stands still hears a constant wave of 1. From 2 s to 3 s the messages come in bursts.
+// A port at rest receives a constant wave of 1, with bursts from 2 s to 3 s.
 TEST(WaveVariables, ABurstDelaysASteadyWaveAndTakesNothingOfIt) {
   for (const int burst : {20, 30, 40, 60, 80, 100, 120}) {
     WavePort<1> port({.impedance = 20, .period = kPeriod});
@@ -268,7 +269,7 @@ TEST(WaveVariables, ABurstDelaysASteadyWaveAndTakesNothingOfIt) {
   }
 }
 
-// The estimate is a fifth too small, and a tenth too large on the way back. What the peer hears is where the handle is.
+// The velocity estimate is 20 % low forward and 10 % high backward. The peer must still receive the true position.
 TEST(WaveVariables, AWrongVelocityDoesNotMoveThePeer) {
   const double impedance = 4;
   WavePort<1> port({.impedance = impedance, .period = kPeriod});

@@ -15,18 +15,18 @@
 
 namespace tendon {
 
-/// A handle that moves along x, turns about every axis and grips, with motors for all of that.
+/// A handle with motors that translates along x, rotates about all axes, and grips.
 struct WholeSetup {
   Coupling::Config coupling{};
   Surroundings along_x{};
-  /// s → the rotation vector (rad) that a hand of `turn_hand_stiffness` wants; empty: nobody turns it.
+  /// s → target rotation vector (rad) of a hand of `turn_hand_stiffness`; empty: no hand.
   std::function<Vec3(double)> turn_hand{};
   double turn_hand_stiffness = 0.4;        ///< N·m/rad
-  std::function<Quat(double)> turned{};    ///< s → it is led there and ignores torques
-  Surroundings closing{};                  ///< of the fingers along −g: what closes them or is between them
-  std::function<double(double)> opened{};  ///< s → m: they are led there and ignore forces
-  double opening = 0.02;                   ///< m, at the start
-  bool flips = false;                      ///< each second orientation is told as −q
+  std::function<Quat(double)> turned{};    ///< s → prescribed rotation, torques have no effect
+  Surroundings closing{};                  ///< closes or blocks the fingers, along −g
+  std::function<double(double)> opened{};  ///< s → m: prescribed opening, forces have no effect
+  double opening = 0.02;                   ///< m, initial
+  bool flips = false;                      ///< every second orientation is reported as −q
   LimiterConfig limiter{.law = Law::kAolPlus, .friction = {0.02, 0.26}, .longest_hold = std::chrono::milliseconds(1)};
 };
 
@@ -34,7 +34,6 @@ inline constexpr Friction kTurnFriction{1e-3, 1e-3};  // N·m, N·m·s/rad
 inline constexpr Friction kGripFriction{0.05, 0.5};
 inline constexpr double kFingerArm = 0.06;  // m/rad
 
-/// Both ends of the tests that use these.
 inline WholeSetup whole_of(PortRole role) {
   WholeSetup setup;
   Coupling::Config& config = setup.coupling;
@@ -46,7 +45,7 @@ inline WholeSetup whole_of(PortRole role) {
   return setup;
 }
 
-/// A body that turns: J dω/dt = τ + τ_hand − b ω − c ω/‖ω‖, by the midpoint rule in substeps of 50 µs.
+/// Rotating body J dω/dt = τ + τ_hand − b ω − c ω/‖ω‖, by the midpoint rule in substeps of 50 µs.
 class Turner {
  public:
   void advance(const Vec3& torque, const WholeSetup& setup, double from) {
@@ -134,16 +133,16 @@ class WholePort {
   std::uint32_t buttons = 0;
   bool ready = true;
   Step last;
-  HandleSample seen;  ///< by it
+  HandleSample seen;  ///< last sample of the controller
   Vec3 force = Vec3::Zero();
   Vec3 torque = Vec3::Zero();
   double grip_force = 0;
-  double ledger = 0;       ///< J, of force and torque, kept here a second time
+  double ledger = 0;       ///< J, force and torque, recomputed independently
   double grip_ledger = 0;  ///< J
   double least_account = std::numeric_limits<double>::infinity();
 
  private:
-  /// Through the millisecond before `now`; books what it brings.
+  /// Moves through the millisecond before `now` and books the work.
   void move(int now) {
     if (std::exchange(began_, true)) {
       const double from = (now - 1) * 1e-3;
@@ -184,7 +183,7 @@ class WholePort {
   bool began_ = false;
 };
 
-/// Two of them and the network between them, in virtual time: a tick is 1 ms.
+/// Two whole handles and their network in virtual time with ticks of 1 ms.
 class WholePorts {
  public:
   WholePorts(const WholeSetup& of_leader, const WholeSetup& of_follower, const Network& network_there,
@@ -208,7 +207,7 @@ class WholePorts {
     run(ticks, [] {});
   }
 
-  /// Until both are live by a new act; false when they are not within two seconds.
+  /// Runs until a new engagement is live at both ends. Returns false after two seconds.
   bool engage() {
     for (int i = 0; i < 1000 && !leader.coupling().engage(); ++i) run(1);
     for (int i = 0; i < 2000 && !(leader.coupling().live() && follower.coupling().live()); ++i) run(1);
@@ -221,9 +220,9 @@ class WholePorts {
   WholePort follower;
   OneWay<PortState> there;  ///< leader → follower
   OneWay<PortState> back;
-  bool cut = false;  ///< both ways
+  bool cut = false;  ///< both directions
   int now = 0;
-  double least_sum = 0;  ///< J, of wrenches or of grippers, in joules of the leader
+  double least_sum = 0;  ///< J, wrenches or grippers, in joules of the leader
 
  private:
   void turn(WholePort& port, OneWay<PortState>& in, OneWay<PortState>& out) {
