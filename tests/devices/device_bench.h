@@ -8,18 +8,18 @@
 
 namespace tendon {
 
-/// A device on the test bench: a clock that starts at an odd instant, and one verb.
+/// A device with a simulated clock that starts at an odd time.
 class Bench {
  public:
   explicit Bench(SimulatedDevice::Config config) : device_(std::move(config)) { device_.read(now_); }
 
-  /// Moves time on by `interval` with the force that is held; returns what the encoder says then.
+  /// Advances time by `interval` with the held force. Returns the encoder position.
   Vec3 wait(Duration interval) {
     now_ += interval;
     return device_.read(now_)->position;
   }
 
-  /// `apply`, then `wait`.
+  /// Calls `apply`, then `wait`.
   Vec3 push(const Vec3& force, Duration interval) {
     device_.apply(force);
     return wait(interval);
@@ -33,7 +33,6 @@ class Bench {
   SimulatedDevice device_;
 };
 
-/// Returns a vector with components from −`size` to `size`.
 inline Vec3 random_vector(Dice& dice, double size) {
   return {dice.within(-size, size), dice.within(-size, size), dice.within(-size, size)};
 }

@@ -12,18 +12,17 @@
 
 namespace tendon {
 
-/// A driver, a cable and a model of its device: one turn of the haptic loop after the other, in simulated time. `Bench`
-/// adds `device`, `step(force)`, which calls `drive` and `look`, and `home(force)`: what a user does to home the
-/// device.
+/// A driver, a cable and a device model in simulated time, one period of the haptic loop after another. `Bench` adds
+/// `device`, `step(force)`, which calls `drive` and `look`, and `home(force)`, which homes the device as a user would.
 template <class Bench>
 struct DriverBench {
-  /// The driver's part of a turn.
+  /// One period of the driver.
   void drive(Device& device, const Vec3& force) {
     sample = device.read(now);
     written = device.apply(force);
   }
 
-  /// An onlooker's: whether the device pushes, and whether it may.
+  /// Records whether the device pushes and whether it is allowed to.
   void look(bool pushes, bool lawful) {
     lawless = pushes && !lawful ? lawless + 1 : 0;
     most_lawless = std::max(most_lawless, lawless);
@@ -34,7 +33,7 @@ struct DriverBench {
     for (const LocalTime end = now + time; now < end;) bench().step(force);
   }
 
-  /// Whether it comes to `state`; homes where that is the way.
+  /// Runs until the device is in `state`, homing it if necessary. Returns false after `most`.
   bool reaches(Device::State state, Duration most, const Vec3& force = Vec3::Zero()) {
     for (const LocalTime end = now + most; now < end && bench().device.state() != state;) {
       bench().step(force);
@@ -46,16 +45,16 @@ struct DriverBench {
   LocalTime now{};
   std::optional<PositionSample> sample;
   Vec3 written = Vec3::Zero();
-  int lawless = 0;  ///< turns in a row in which the device pushed although it has no origin
+  int lawless = 0;  ///< consecutive periods in which the device pushed without an origin
   int most_lawless = 0;
-  int after_zero = 0;  ///< turns in a row in which it did not push
+  int after_zero = 0;  ///< consecutive periods without force
 
  private:
   Bench& bench() { return static_cast<Bench&>(*this); }
 };
 
-/// Checks that a device behind the safety layer is only driven while it is armed, and that it can be homed and armed
-/// again after it was unplugged. `home` is called to home the device, and `advance` to step the model to `now`.
+/// A device behind the safety layer must be driven only while armed, and it must be possible to home and arm it after a
+/// replug. `home` homes the device, and `advance` steps the model to `now`.
 template <class Bench, class Model, class Home, class Advance>
 void expect_homing_and_arming_after_a_replug(Bench& bench, Model& model, Home home, Advance advance) {
   using std::chrono::milliseconds;

@@ -9,8 +9,7 @@
 
 namespace tendon {
 
-/// The cable between a driver and a model of its device in one thread and in simulated time: `now` is the caller's
-/// clock.
+/// Cable between a driver and a device model in one thread. `now` is the caller's simulated clock.
 template <class Model>
 class ModelPipe final : public usb::Pipe {
  public:

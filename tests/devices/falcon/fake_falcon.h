@@ -16,36 +16,36 @@
 
 namespace tendon {
 
-/// A Falcon at the end of its cable, as far as this project knows one: FTDI chip, boot loader, firmware, encoders,
-/// motors. Shares no code with the driver.
+/// A Falcon at the end of its cable, as far as its protocol is known: FTDI chip, boot loader, firmware, encoders,
+/// motors. It shares no code with the driver.
 class FakeFalcon final : public UsbModel {
  public:
   struct Options {
     bool has_firmware = true;
     bool is_homed = false;
-    std::size_t firmware_bytes = 8192;   ///< it runs when it has got so many
-    bool answers_greeting_late = false;  ///< with the 00 in front that some machines see
+    std::size_t firmware_bytes = 8192;   ///< the image starts after this many bytes
+    bool answers_greeting_late = false;  ///< with the leading 00 seen on some machines
     bool knows_flush_character = true;
-    /// The cable feeds the chip only; the motors' own supply keeps firmware and home while it is out.
+    /// The cable powers only the chip. With its own supply the device keeps firmware and home while unplugged.
     bool own_supply = false;
     Duration thinking = std::chrono::microseconds(50);
   };
 
   enum class Fault {
     kNone,
-    kSilent,         ///< hears, and does what it is told, but says nothing more
-    kDropsSome,      ///< one reply of three is lost
-    kGarblesSome,    ///< one reply of three has a wrong byte
-    kGarblesAll,     ///< every reply has a nibble that is none
-    kCutsAll,        ///< of every reply the end is missing
-    kSplits,         ///< every reply comes in two IN packets
-    kBabbles,        ///< says bytes of its own beside the replies
-    kBabblesOnly,    ///< and nothing else
-    kJumps,          ///< the encoders have lost count
-    kLosesHome,      ///< says that a leg is not homed
-    kLosesFirmware,  ///< its supply was out: the boot loader runs, and has no firmware
-    kOutOfReach,     ///< encoders that belong to no position
-    kStalls,         ///< refuses requests and data
+    kSilent,         ///< executes commands but sends nothing
+    kDropsSome,      ///< loses one reply in three
+    kGarblesSome,    ///< corrupts a byte of one reply in three
+    kGarblesAll,     ///< puts an invalid nibble in every reply
+    kCutsAll,        ///< truncates every reply
+    kSplits,         ///< sends every reply in two IN packets
+    kBabbles,        ///< adds unsolicited bytes between the replies
+    kBabblesOnly,    ///< sends only unsolicited bytes
+    kJumps,          ///< the encoders lose count
+    kLosesHome,      ///< reports a leg that is not homed
+    kLosesFirmware,  ///< power loss: the boot loader runs without firmware
+    kOutOfReach,     ///< encoder counts without a valid position
+    kStalls,         ///< stalls requests and data
   };
   static constexpr std::array kFaults = {Fault::kSilent,  Fault::kDropsSome, Fault::kGarblesSome,   Fault::kGarblesAll,
                                          Fault::kCutsAll, Fault::kSplits,    Fault::kBabbles,       Fault::kBabblesOnly,
@@ -54,31 +54,32 @@ class FakeFalcon final : public UsbModel {
 
   explicit FakeFalcon(const Options& options);
 
-  // The host's side of the cable.
+  // Host side of the cable.
   bool plugged() const { return plugged_; }
   int times_plugged() const { return times_plugged_; }
   std::span<const std::uint8_t> descriptors() const override;
   bool request(LocalTime now, std::uint8_t request, std::uint16_t value) override;
   bool write(LocalTime now, std::span<const std::uint8_t> bytes) override;
   LocalTime next_in() const override;
-  /// The status bytes and up to 62 others.
+  /// Returns the status bytes and up to 62 data bytes.
   std::vector<std::uint8_t> take_in(LocalTime now) override;
 
-  // The user's side.
+  // User side.
   void plug() override { plugged_ = true, ++times_plugged_; }
   void unplug() override;
   void move_to(const Vec3& position) { position_ = position; }  ///< m, device frame
-  /// The grip all the way out and in again, as the user homes it. Counts only while the host asks for it.
+  /// Moves the grip all the way out and in, as a user homes the device. Has an effect only while the host requests
+  /// homing.
   void pull_through();
   void press(std::uint8_t buttons) { buttons_ = buttons; }
   void set_fault(Fault fault);
 
-  // What an onlooker sees.
+  // Observations.
   bool running() const { return mode_ == Mode::kRunning; }
   bool homed() const { return homed_ == 7; }
   const std::array<std::int16_t, 3>& torque() const { return torque_; }
   bool pushes() const { return torque_ != std::array<std::int16_t, 3>{}; }
-  /// N, on the hand, by virtual work from the published geometry.
+  /// Force on the hand, N, by virtual work from the published geometry.
   Vec3 force() const;
   const std::vector<std::uint8_t>& image() const { return image_; }
   int commands() const { return commands_; }
@@ -102,18 +103,18 @@ class FakeFalcon final : public UsbModel {
   bool plugged_ = true;
   int times_plugged_ = 1;
 
-  // The chip
+  // FTDI chip
   int latency_ms_ = 16;
   std::uint16_t divisor_ = 0x4138;
   std::uint8_t flush_at_ = 0;
   bool dtr_ = false;
   LocalTime last_in_{};
-  std::deque<std::pair<LocalTime, std::uint8_t>> rx_;  ///< when each byte has arrived from the processor
+  std::deque<std::pair<LocalTime, std::uint8_t>> rx_;  ///< arrival time of each byte from the processor
   LocalTime tx_free_{};
   LocalTime rx_free_{};
   std::size_t split_left_ = 0;
 
-  // The processor
+  // Processor
   Mode mode_;
   std::vector<std::uint8_t> heard_;
   bool heard_garbage_ = false;
@@ -125,10 +126,10 @@ class FakeFalcon final : public UsbModel {
   std::array<std::int16_t, 3> torque_{};
   std::uint8_t lamps_ = 0;
 
-  // The hand
+  // Hand
   Vec3 position_{0, 0, 0.125};
   std::uint8_t buttons_ = 0;
-  std::array<int, 3> origin_{};  ///< what the encoders say too much: unknown until homed
+  std::array<int, 3> origin_{};  ///< encoder offset, unknown until homed
 };
 
 }  // namespace tendon

@@ -7,7 +7,7 @@
 
 namespace tendon {
 
-/// What the loader takes for firmware: its key, and bytes that mean nothing. (Novint's own is never in this tree.)
+/// Image that the loader accepts: its key and arbitrary bytes. (Novint's firmware is not in this repository.)
 inline std::vector<std::uint8_t> fake_firmware(std::size_t size) {
   std::vector<std::uint8_t> bytes(size);
   std::uint32_t state = 1;
@@ -19,7 +19,7 @@ inline std::vector<std::uint8_t> fake_firmware(std::size_t size) {
   return bytes;
 }
 
-/// Of fake_firmware(8192), by another program.
+/// SHA-256 of fake_firmware(8192), from an independent program.
 inline constexpr const char* kFakeFirmwareSha256 = "5372ece9bb03f00dba6ccd932dbe71118da29143ebbc46c3055e97f0d694c4bd";
 
 }  // namespace tendon

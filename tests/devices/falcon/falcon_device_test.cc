@@ -19,7 +19,7 @@ using State = Device::State;
 using Fault = FakeFalcon::Fault;
 using namespace std::chrono_literals;
 
-/// A driver, a cable and a Falcon; lawful is torque in a Falcon that runs its firmware and is homed.
+/// A driver, a cable and a Falcon. Torque is allowed while the Falcon runs its firmware and is homed.
 struct Bench : DriverBench<Bench> {
   explicit Bench(const FakeFalcon::Options& options = {}, std::vector<std::uint8_t> firmware = fake_firmware(4096))
       : falcon(options), device({.firmware = std::move(firmware)}, std::make_unique<MemoryPipe>(falcon, now)) {}
@@ -32,7 +32,7 @@ struct Bench : DriverBench<Bench> {
 
   void home(const Vec3& /*force*/) { falcon.pull_through(); }
 
-  /// At 2 m/s to a place relative to the centre.
+  /// Moves at 2 m/s to a position relative to the center.
   void move_to(const Vec3& place) {
     const Vec3 from = grip;
     const int turns = static_cast<int>((place - from).norm() / 0.002) + 1;
@@ -60,7 +60,7 @@ TEST(FalconDevice, FromThePlugToTheForceItTakesEveryStep) {
   bench.falcon.plug();
   EXPECT_TRUE(bench.reaches(State::kOpening, 100ms, kForce));
   EXPECT_TRUE(bench.reaches(State::kFirmware, 1s, kForce));
-  EXPECT_TRUE(bench.reaches(State::kOpening, 2s, kForce));  // it has the firmware; does it answer?
+  EXPECT_TRUE(bench.reaches(State::kOpening, 2s, kForce));  // the loader waits for an answer of the firmware
   EXPECT_TRUE(bench.reaches(State::kUnhomed, 1s, kForce));
   EXPECT_EQ(bench.falcon.image(), fake_firmware(4096));
   bench.run(5s, kForce);
@@ -75,7 +75,7 @@ TEST(FalconDevice, FromThePlugToTheForceItTakesEveryStep) {
   EXPECT_TRUE(bench.sample);
   EXPECT_EQ(bench.falcon.lamps(), falcon::kGreen);
   EXPECT_NEAR((bench.falcon.force() - kForce).norm(), 0, 0.02);
-  EXPECT_NEAR((bench.written - bench.falcon.force()).norm(), 0, 1e-3);  // it knows its place to half a count
+  EXPECT_NEAR((bench.written - bench.falcon.force()).norm(), 0, 1e-3);  // the driver knows the position to half a count
 }
 
 TEST(FalconDevice, ItsRingShowsAClientsColourButNeverRedAloneWhileReady) {
@@ -163,8 +163,8 @@ TEST(FalconDevice, ButtonsComeWithThePosition) {
   EXPECT_EQ(bench.sample->buttons, 5U);
 }
 
-// The event character makes the chip send a reply when it is whole, so one is there in every period; without it the
-// latency timer of 1 ms may cost every second one.
+// The event character makes the chip send each complete reply, so every period has one. Without it the latency timer of
+// 1 ms may delay every second reply.
 TEST(FalconDevice, EveryPeriodOfAMillisecondHasItsSample) {
   for (const bool flush : {true, false}) {
     Bench bench({.has_firmware = true, .is_homed = true, .knows_flush_character = flush});
@@ -188,9 +188,9 @@ TEST(FalconDevice, WhatIsReturnedIsWhatTheMotorsGive) {
     const Vec3 wanted = dice.within(0, 40) * dice.direction();
     bench.run(5ms, wanted);
     ASSERT_TRUE(bench.sample);
-    // The driver knows the place to a count, so the force to some thousandths.
+    // The driver knows the position to a count, so the force has an error of a few thousandths.
     ASSERT_LT((bench.written - bench.falcon.force()).norm(), 0.01 * bench.written.norm() + 1e-3);
-    ASSERT_LE(bench.written.norm(), wanted.norm() + 0.005);  // each torque is rounded by itself
+    ASSERT_LE(bench.written.norm(), wanted.norm() + 0.005);  // each torque is rounded separately
     ASSERT_GT(bench.written.normalized().dot(wanted.normalized()), 0.99);
   }
 }
@@ -257,7 +257,7 @@ TEST(FalconDevice, AfterTheCableWasOutItTakesEveryStepAgain) {
     bench.falcon.plug();
     EXPECT_TRUE(bench.reaches(State::kOpening, 100ms, kForce));
     if (own_supply) {
-      // Nobody could tell it while the cable was out: it still pushes. The first command ends that.
+      // The Falcon still pushes, because commands could not reach it while unplugged. The first command ends the force.
       while (bench.falcon.commands() == before) bench.step(kForce);
       EXPECT_FALSE(bench.falcon.pushes());
     } else {
@@ -275,7 +275,7 @@ TEST(FalconDevice, ACableThatWasOutForAMomentIsNoticed) {
   Bench bench({.has_firmware = true, .is_homed = true, .own_supply = true});
   ASSERT_TRUE(bench.reaches(State::kHomed, 200ms));
   bench.falcon.unplug();
-  bench.falcon.plug();  // between two turns
+  bench.falcon.plug();  // between two periods
   bench.step(kForce);
   EXPECT_EQ(bench.device.state(), State::kAbsent);
   EXPECT_TRUE(bench.reaches(State::kHomed, 1s, kForce));
@@ -297,7 +297,7 @@ TEST(FalconDevice, AMomentaryEncoderJumpCostsOnlySamples) {
   ASSERT_TRUE(bench.reaches(State::kHomed, 200ms));
   bench.run(20ms, kForce);
   bench.falcon.set_fault(Fault::kJumps);
-  bench.run(1ms, kForce);  // takes the reply from before
+  bench.run(1ms, kForce);  // receives the reply to an earlier command
   const auto replies = bench.device.counts()[DeviceCount::kAnswers];
   bench.run(4ms, kForce);
   EXPECT_EQ(bench.device.counts()[DeviceCount::kAnswers], replies);
@@ -309,8 +309,7 @@ TEST(FalconDevice, AMomentaryEncoderJumpCostsOnlySamples) {
   EXPECT_TRUE(bench.falcon.pushes());
 }
 
-// It still says that it is homed, but its origin is not where it was: whatever we took for the hand's place would be
-// wrong.
+// The Falcon reports that it is homed although its origin has moved. Positions would be wrong.
 TEST(FalconDevice, AMovedOriginIsNotBelievedUntilHomedAnew) {
   for (const bool with_firmware : {false, true}) {
     Bench bench({.has_firmware = true, .is_homed = true, .firmware_bytes = 4096, .own_supply = true},
@@ -324,14 +323,14 @@ TEST(FalconDevice, AMovedOriginIsNotBelievedUntilHomedAnew) {
       EXPECT_EQ(bench.device.state(), State::kFirmware) << "which sets it back";
     } else {
       bench.run(2s, kForce);
-      bench.falcon.unplug();  // its motors' supply stays on, and its wrong origin with it
+      bench.falcon.unplug();  // its motor supply stays on and keeps the wrong origin
       bench.run(50ms, kForce);
       bench.falcon.plug();
       bench.run(2s, kForce);
       EXPECT_EQ(bench.device.state(), State::kUnhomed);
       EXPECT_TRUE(bench.falcon.homed());
       EXPECT_FALSE(bench.falcon.pushes());
-      bench.falcon.set_fault(Fault::kLosesHome);  // the user has switched it off and on
+      bench.falcon.set_fault(Fault::kLosesHome);  // power cycled by the user
     }
     bench.falcon.set_fault(Fault::kNone);
     bench.run(100ms, kForce);
@@ -414,12 +413,12 @@ TEST_P(FalconFault, EndsInZeroForceAtEveryState) {
         EXPECT_EQ(bench.device.state(), State::kHomed);
       }
     } else {
-      // It takes nothing any more, so what it holds is out of our hands.
+      // The device accepts no commands, so the driver cannot end its force.
       EXPECT_NE(bench.device.state(), State::kHomed);
       EXPECT_EQ(bench.written, Vec3::Zero());
     }
 
-    // Once the trouble is over it comes back by itself, and never pushes on the way.
+    // After the fault the device must recover without pushing meanwhile.
     bench.falcon.set_fault(Fault::kNone);
     bench.most_lawless = bench.lawless = 0;
     EXPECT_TRUE(bench.reaches(State::kHomed, 15s, kForce));

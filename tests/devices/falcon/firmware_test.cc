@@ -40,7 +40,6 @@ TEST(FalconFirmware, AFileThatNobodyKnowsHasToBeAcceptedExplicitly) {
   EXPECT_EQ(check_firmware(bytes, "a.bin", UnknownFirmware::kAccept), bytes);
   const std::string sentence = refusal(bytes, UnknownFirmware::kRefuse);
   EXPECT_NE(sentence.find("found another one, with the SHA-256 "), std::string::npos) << sentence;
-  // The hash as sha256sum prints it, of the same 8192 bytes.
   EXPECT_NE(sentence.find(kFakeFirmwareSha256), std::string::npos) << sentence;
 }
 
@@ -50,14 +49,13 @@ TEST(FalconFirmware, AFileIsReadWhole) {
   EXPECT_EQ(read_firmware(file, "a.bin", UnknownFirmware::kAccept), bytes);
 }
 
-/// A loader on a fake cable.
+/// A loader on a simulated cable.
 struct Load {
   explicit Load(const FakeFalcon::Options& options, std::size_t bytes = 4096)
       : falcon(options), image(fake_firmware(bytes)) {
     loader.restart();
   }
 
-  /// One turn of the loop.
   FirmwareLoader::Progress step() {
     now += std::chrono::milliseconds(1);
     std::array<std::uint8_t, usb::kPacketSize> packet{};
@@ -115,7 +113,7 @@ TEST(FalconFirmware, TheGreetingIsRepeatedUntilSomebodyAnswers) {
   Load load(kEmpty);
   load.falcon.set_fault(FakeFalcon::Fault::kSilent);
   EXPECT_EQ(load.run(1000), FirmwareLoader::Progress::kBusy);
-  load.falcon.plug();  // as if the supply had been switched on: the loader waits for a greeting
+  load.falcon.plug();  // as after power-on: the loader waits for a greeting
   load.falcon.set_fault(FakeFalcon::Fault::kLosesFirmware);
   load.falcon.set_fault(FakeFalcon::Fault::kNone);
   EXPECT_EQ(load.run(2000), FirmwareLoader::Progress::kDone);
@@ -129,7 +127,7 @@ TEST(FalconFirmware, NobodyIsGreetedForEver) {
   EXPECT_LT(load.now, LocalTime(std::chrono::seconds(12)));
 }
 
-// At each point of the load: the echo is wrong, cut, missing, or more than was said.
+// Wrong, truncated, missing and excess echoes at each point of the load.
 TEST(FalconFirmware, AnEchoThatDiffersEndsTheLoadWhereverItHappens) {
   using enum FakeFalcon::Fault;
   for (const auto fault : {kGarblesAll, kSilent, kStalls, kLosesFirmware}) {

@@ -14,7 +14,7 @@
 namespace tendon::falcon::kinematics_test {
 namespace {
 
-/// Evenly in a ball around the centre.
+/// Returns a uniformly distributed point in a ball around the center.
 Vec3 place(Dice& dice, double radius) { return kCentre + radius * std::cbrt(dice.uniform()) * dice.direction(); }
 
 Mat3 numeric_jacobian(const Vec3& position) {
@@ -69,11 +69,11 @@ TEST(FalconKinematics, TheJacobianIsTheDerivativeOfTheAngles) {
     ASSERT_TRUE(pose);
     worst = std::max(worst, (pose->jacobian - numeric_jacobian(position)).cwiseAbs().maxCoeff());
   }
-  EXPECT_LE(worst, 1e-8);  // rad/m, of some 20
+  EXPECT_LE(worst, 1e-8);  // rad/m, of about 20
 }
 
-// The known public driver's z column: sin² θ₂ where sin θ₂ sin θ₃ belongs. Over the ball of 50 mm it has between 60 and
-// 94 % of the truth, so a force along z pulls to the side by a third and more of what it should.
+// The z column of the known public driver has sin² θ₂ instead of sin θ₂ sin θ₃. Within the ball of 50 mm it is 60 to 94
+// % of the true value, so a force along z has a lateral error of a third or more.
 TEST(FalconKinematics, TheZColumnOfThePublicDriverIsTooSmallByUpTo40Percent) {
   Dice dice(5);
   double least = 1;
@@ -135,7 +135,7 @@ TEST(FalconKinematics, TorquesDoTheWorkOfTheForce) {
     const Vec3 torque = Vec3(counts[0], counts[1], counts[2]) * -1e-4;
     const Vec3 step = 1e-7 * dice.direction();
     const Vec3 turned = published::angles_at(position + step) - published::angles_at(position - step);
-    // A count of each motor is 1e-4 N·m, and the rounding less.
+    // Torque resolution of each motor: 1e-4 N·m.
     ASSERT_NEAR(torque.dot(turned), force.dot(2 * step), 1e-4 * turned.cwiseAbs().sum() + 1e-14);
     ASSERT_LT((force_of(*pose, counts) - numeric_jacobian(position).transpose() * torque).norm(), 1e-6);
   }
@@ -152,8 +152,7 @@ TEST(FalconKinematics, OneNewtonIs252CountsAlongZAnd606Across) {
   EXPECT_NEAR(largest(Vec3::UnitX()), 606, 6);
 }
 
-// What it cannot give it gives in the direction that was asked for; the public driver's clamp lets 16 bits wrap
-// instead.
+// Saturation must keep the direction of the force. The clamp of the public driver lets 16-bit values wrap instead.
 TEST(FalconKinematics, ATooLargeForceKeepsItsDirectionAndNeverWraps) {
   Dice dice(7);
   for (int i = 0; i < 20'000; ++i) {

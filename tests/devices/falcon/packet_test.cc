@@ -65,7 +65,7 @@ TEST(FalconPacket, AByteThatIsNoNibbleSpoilsTheReply) {
   }
 }
 
-/// All replies of a stream that comes in pieces.
+/// Parses a stream in random pieces and returns all replies.
 std::vector<Counts> parsed(ReplyParser& parser, std::span<const std::uint8_t> stream, Dice& dice) {
   std::vector<Counts> found;
   while (!stream.empty()) {
@@ -96,8 +96,8 @@ TEST(FalconPacket, RepliesComeThroughHoweverTheyAreCutIntoPieces) {
   EXPECT_EQ(parser.left_out(), 0U);
 }
 
-// Lost, spoilt and added bytes cost the replies they hit and no other: those that are whole are found, in order, and
-// nothing is made up but what really stands in the stream.
+// Lost, corrupted and added bytes may cost only the replies that they hit. All complete replies must be found in order,
+// and no other.
 TEST(FalconPacket, EveryWholeReplyIsFoundAmongAnyOtherBytes) {
   Dice dice(2);
   for (int round = 0; round < 200; ++round) {
@@ -108,14 +108,14 @@ TEST(FalconPacket, EveryWholeReplyIsFoundAmongAnyOtherBytes) {
       auto packet = packet_of(static_cast<std::int16_t>(dice.bits()));
       if (dice.chance(0.3)) {
         for (std::uint64_t n = dice.bits() % 40; n > 0; --n) {
-          // What frames are made of, often. A '<' would be taken for the beginning of a packet whose end is the next
-          // one.
+          // Noise often contains frame bytes. It must not contain '<', which would start a packet that takes the next
+          // packet's end.
           const auto noise = static_cast<std::uint8_t>(dice.chance(0.3) ? '>' : dice.bits());
           if (noise != '<') stream.push_back(noise);
         }
       }
       if (dice.chance(0.2)) {
-        packet.resize(1 + dice.bits() % 11);  // the end is lost; what noise would have to make good is too much
+        packet.resize(1 + dice.bits() % 11);  // truncated, with too many bytes missing for noise to complete it
       } else if (dice.chance(0.2)) {
         packet[1 + dice.bits() % 12] = 'Q';
       } else {
@@ -139,7 +139,7 @@ TEST(FalconPacket, WhatIsTakenAndWhatIsLeftOutIsAllThatCame) {
     while (parser.next()) ++replies;
   }
   const std::uint64_t out = parser.left_out() + kPacketBytes * replies;
-  EXPECT_LE(fed - out, kPacketBytes - 1);  // the beginning that it keeps
+  EXPECT_LE(fed - out, kPacketBytes - 1);  // incomplete start of a packet
   EXPECT_EQ(fed, 20000U * 62);
 }
 

@@ -7,8 +7,8 @@
 
 #include "core/base/motion.h"
 
-/// The Falcon's geometry as it was published: by the half-angle of Stamper's thesis, with the Jacobian of libnifalcon,
-/// wrong z column and all. A second derivation of what devices/falcon/kinematics.cc computes.
+/// Published geometry of the Falcon: half-angle form of Stamper's thesis and the Jacobian of libnifalcon with its wrong
+/// z column. This derivation is independent of devices/falcon/kinematics.cc.
 namespace tendon::published {
 
 struct Leg {
@@ -43,14 +43,14 @@ inline Leg leg_at(const Vec3& p, std::size_t leg) {
 
 inline Vec3 angles_at(const Vec3& p) { return {leg_at(p, 0).theta1, leg_at(p, 1).theta1, leg_at(p, 2).theta1}; }
 
-/// ∂θ₁/∂z of a leg as libnifalcon has it: sin² θ₂ in place of sin θ₃ sin θ₂.
+/// ∂θ₁/∂z of a leg in libnifalcon: sin² θ₂ in place of sin θ₃ sin θ₂.
 inline double wrong_z_column(const Vec3& p, std::size_t leg) {
   const Leg angles = leg_at(p, leg);
   return std::pow(std::sin(angles.theta2), 2) /
          (kA * std::sin(angles.theta3) * std::sin(angles.theta2 - angles.theta1));
 }
 
-/// ∂angles/∂position of any `angles_at` by central differences of fourth order.
+/// Returns ∂angles/∂position of `angles_at` by fourth-order central differences.
 template <class AnglesAt>
 Mat3 numeric_jacobian(const AnglesAt& angles_at, const Vec3& p) {
   constexpr double kStep = 1e-5;
@@ -64,7 +64,7 @@ Mat3 numeric_jacobian(const AnglesAt& angles_at, const Vec3& p) {
   return jacobian;
 }
 
-/// rad at count 0, and for each count.
+/// rad at count 0 and rad per count.
 inline constexpr double kAtZero = 35 * std::numbers::pi / 180;
 inline constexpr double kPerCount =
     (0.01425 * std::numbers::pi / 1280) / (std::numbers::pi * 0.110 / 360) * std::numbers::pi / 180;

@@ -12,15 +12,15 @@
 #include "devices/usb/pipe.h"
 #include "tests/devices/falcon/fake_falcon.h"
 
-/// The cable between a driver in one process and a FakeFalcon in another: a pair of SOCK_SEQPACKET sockets, that both
-/// ends are given. One message from the driver is a transfer to the OUT endpoint, behind its number, or a vendor
-/// request, behind 0; one from the Falcon is what an IN transfer brings.
+/// Cable between a driver and a FakeFalcon in different processes: a pair of SOCK_SEQPACKET sockets. A message of the
+/// driver is either the endpoint number and the data of an OUT transfer, or 0 and a vendor request. A message of the
+/// Falcon is the data of an IN transfer.
 namespace tendon::socket_cable {
 
 inline constexpr std::uint8_t kRequest = 0;
 inline constexpr std::uint8_t kOut = 0x02;
 
-/// The driver's end.
+/// Driver end.
 class Pipe final : public usb::Pipe {
  public:
   explicit Pipe(int end) : end_(end) {}
@@ -49,18 +49,18 @@ class Pipe final : public usb::Pipe {
   std::uint32_t connection_ = 1;
 };
 
-/// The Falcon's end.
+/// Falcon end.
 class Plug {
  public:
   Plug(FakeFalcon& falcon, int end) : falcon_(falcon), end_(end) {}
 
-  /// Hears all that has been sent, and answers. False when there is nobody left who could send.
+  /// Handles all received messages and answers. Returns false when the other end is closed.
   bool turn(LocalTime now) {
     std::array<std::uint8_t, 128> message;
     for (;;) {
       const ssize_t size = recv(end_, message.data(), message.size(), MSG_DONTWAIT);
       if (size == 0) return false;
-      if (size < 0 && errno == ECONNRESET) continue;  // they left without having read all; what they sent is still here
+      if (size < 0 && errno == ECONNRESET) continue;  // the peer closed with unread data; its messages remain readable
       if (size < 0) break;
       const auto bytes = std::span(message).first(static_cast<std::size_t>(size));
       if (bytes[0] == kRequest) {
@@ -78,9 +78,9 @@ class Plug {
     return true;
   }
 
-  /// The last transfer to the OUT endpoint, behind its number.
+  /// Endpoint number and data of the last OUT transfer.
   const std::vector<std::uint8_t>& last() const { return last_; }
-  /// What IN transfers have brought so far.
+  /// Bytes of all IN transfers so far.
   std::uint64_t said() const { return said_; }
 
  private:

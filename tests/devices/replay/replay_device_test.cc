@@ -19,7 +19,7 @@ using Sample = ReplayDevice::Sample;
 constexpr LocalTime kStart{5s};
 const Vec3 kHere(0.01, 0.02, 0.03);
 
-/// `count` samples, somewhere, at random times of which the mean is `interval`.
+/// Returns `count` samples at random positions and times with a mean spacing of `interval`.
 std::vector<Sample> recorded(Dice& dice, int count, Duration interval, double jitter = 0) {
   std::vector<Sample> samples;
   for (int i = 0; i < count; ++i) {
@@ -32,10 +32,10 @@ std::vector<Sample> recorded(Dice& dice, int count, Duration interval, double ji
 
 struct Replayed {
   std::vector<PositionSample> samples;
-  int without = 0;  ///< reads that gave none
+  int without = 0;  ///< reads without a sample
 };
 
-/// The device, read once each `period`, each time up to `jitter` of it too early or too late.
+/// Reads the device every `period` with a timing error of up to ±`jitter`.
 Replayed replayed(ReplayDevice& device, Dice& dice, Duration period, double jitter, Duration time) {
   Replayed out;
   for (Duration t{}; t <= time; t += period) {
@@ -89,7 +89,7 @@ TEST(ReplayDevice, AFasterLoopGetsEverySampleOnceAndNothingMadeUpBetween) {
   EXPECT_EQ(out.without, 791 - 99);
 }
 
-// The ledger books intervals between them.
+// The ledger integrates over the intervals between samples.
 TEST(ReplayDevice, TimesIncreaseWhateverTheLoopDoes) {
   Dice dice(4);
   for (const AtEnd at_end : {AtEnd::kHold, AtEnd::kRepeat}) {
@@ -98,7 +98,7 @@ TEST(ReplayDevice, TimesIncreaseWhateverTheLoopDoes) {
       LocalTime now = kStart;
       LocalTime last{};
       for (int i = 0; i < 200; ++i) {
-        const LocalTime seen = dice.chance(0.02) ? now - dice.milliseconds(0, 20) : now;  // a clock that goes back
+        const LocalTime seen = dice.chance(0.02) ? now - dice.milliseconds(0, 20) : now;  // backward clock step
         if (const auto sample = device.read(seen)) {
           ASSERT_TRUE(sample->at > last || sample->at == seen) << round << ' ' << i;
           last = std::max(last, sample->at);

@@ -167,11 +167,11 @@ TEST(SafeDevice, EveryFaultInEveryStateEndsInZeroForce) {
       trouble.cause(rig);
       rig.steps(static_cast<int>(kRamp / 1ms), kPush);
       const SafeDevice::Status after = rig.safe.status();
-      for (int i = 0; i < 1200; ++i) {  // longer than a request to arm is open
+      for (int i = 0; i < 1200; ++i) {  // longer than an arm request is valid
         ASSERT_EQ(rig.step(kPush), Vec3::Zero());
         ASSERT_EQ(rig.puppet.told, Vec3::Zero());
       }
-      // … also when the way to it were free: nobody has asked for it again.
+      // A clear path must not arm it either: no new request was made.
       rig.steps(2000);
       EXPECT_EQ(rig.steps(50, kPush), Vec3::Zero());
       EXPECT_NE(rig.state(), SafetyState::kArmed);
@@ -201,7 +201,7 @@ TEST(SafeDevice, DisarmedInAnyStateItGivesNoForceUntilTheOperatorArms) {
       situation.reach(rig);
       rig.step(kPush);
       const SafeDevice::Status before = rig.safe.status();
-      const bool fault = before.faults > 0;  // at fault already, or on its way there
+      const bool fault = before.faults > 0;  // faulted, or about to be
 
       for (int i = 0; i < times; ++i) rig.safe.disarm();
       const SafetyState expected = fault                                 ? SafetyState::kFault
@@ -212,7 +212,7 @@ TEST(SafeDevice, DisarmedInAnyStateItGivesNoForceUntilTheOperatorArms) {
         ASSERT_EQ(rig.step(kPush), Vec3::Zero());
         ASSERT_EQ(rig.puppet.told, Vec3::Zero());
       }
-      // Neither rest nor the button, nor a plug: nobody has asked for it.
+      // Rest, the button or a replug must not arm it without a request.
       for (const Device::State stage : {Device::State::kAbsent, Device::State::kHomed}) {
         rig.puppet.stage = stage;
         rig.steps(200);
@@ -310,7 +310,7 @@ void live(std::uint64_t seed, Seen& seen) {
       ASSERT_EQ(applied, Vec3::Zero());
       continue;
     }
-    // Never longer, never turned, and no component larger.
+    // The applied force must have the same direction and no larger component.
     for (int axis = 0; axis < 3; ++axis) {
       ASSERT_LE(std::abs(applied[axis]), std::abs(asked[axis]));
       ASSERT_GE(applied[axis] * asked[axis], 0);

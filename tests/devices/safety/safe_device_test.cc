@@ -109,7 +109,7 @@ TEST(SafeDevice, ForgetsARequestThatWasNotGrantedInTime) {
     Rig rig;
     rig.steps(60);
     rig.safe.arm();
-    rig.steps(late, kPush);  // in the way
+    rig.steps(late, kPush);  // held between the two positions
     rig.steps(10);
     EXPECT_EQ(rig.state() == SafetyState::kArmed, late < 1000) << late;
   }
@@ -157,7 +157,7 @@ TEST(SafeDevice, AHandleThatFliesIsLetGoForGoodAlsoWhenItRestsAgain) {
     ASSERT_EQ(rig.step(kPush), kPush);
   }
   Vec3 applied = kPush;
-  for (int i = 0; i < 17; ++i) {  // the estimate's window, at most
+  for (int i = 0; i < 17; ++i) {  // at most the window of the estimator
     rig.puppet.position.y() += 1.2e-3;
     applied = rig.step(kPush);
   }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The safety layer around a handle with motors that turn and grip.
+// Safety layer of a handle with motors for rotation and gripper.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -89,8 +89,8 @@ TEST(SafeWrench, ForceAndTorqueAreShortenedByOneShareAndTheGripByItsOwn) {
 
 TEST(SafeWrench, NothingGrowsFasterThanItsRateAndAllFallAtOnce) {
   SafeDevice::Config config;
-  config.torque_growth_limit = GrowthLimit::Config{.rate = 10};  // 10 mN·m in each step
-  config.grip_growth_limit = GrowthLimit::Config{.rate = 500};   // 0.5 N
+  config.torque_growth_limit = GrowthLimit::Config{.rate = 10};  // 10 mN·m per step
+  config.grip_growth_limit = GrowthLimit::Config{.rate = 500};   // 0.5 N per step
   Rig rig(config);
   rig.arm();
   for (int i = 1; i <= 12; ++i) {
@@ -196,7 +196,7 @@ TEST(SafeWrench, AHandleThatSpinsIsLetGo) {
     rig.puppet.orientation = Quat{};
     rig.arm();
     Effort given;
-    for (int i = 0; i < 1000; ++i) {  // past 180°, where the quaternion's sign may be either
+    for (int i = 0; i < 1000; ++i) {  // beyond 180°, where the sign of the quaternion is arbitrary
       const Quat q = rotation_by(Vec3(1, 2, 2) / 3 * (speed * 1e-3 * i));
       rig.puppet.orientation = i % 2 == 0 ? q : Quat{-q.w, -q.x, -q.y, -q.z};
       given = rig.step_all(kAll);

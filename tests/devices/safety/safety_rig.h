@@ -13,14 +13,14 @@ namespace tendon {
 
 inline constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
-/// Does and says what the test wants, and keeps what it was told.
+/// Device with scripted state that records its commands.
 struct Puppet final : Device {
   DeviceInfo about{.name = "puppet", .max_force = 10, .position_resolution = 50e-6, .watchdog = {}};
   State stage = State::kHomed;
   Vec3 position = Vec3::Zero();
   std::uint32_t buttons = 0;
   bool answers = true;
-  Duration age{};  ///< of the samples
+  Duration age{};  ///< age of the samples
   std::optional<Quat> orientation{};
   std::optional<double> opening{};
   Vec3 told = Vec3::Constant(kNaN);
@@ -43,17 +43,16 @@ struct Puppet final : Device {
   }
 };
 
-/// A safe device around a puppet, and the loop that steps it at 1 kHz.
+/// A safe device around a puppet, stepped at 1 kHz.
 struct Rig {
   explicit Rig(const SafeDevice::Config& config = {}) : safe(config, puppet) {}
 
-  /// One step; returns the force applied.
+  /// Returns the applied force.
   Vec3 step(const Vec3& asked = Vec3::Zero()) {
     now += std::chrono::milliseconds(1);
     seen = safe.read(now).has_value();
     return safe.apply(asked);
   }
-  /// The same with the whole effort.
   Effort step_all(const Effort& asked) {
     now += std::chrono::milliseconds(1);
     seen = safe.read(now).has_value();
@@ -69,7 +68,7 @@ struct Rig {
     for (int i = 0; i < count; ++i) last = step(asked);
     return last;
   }
-  /// The whole way, by the operator's request.
+  /// Performs the complete arming sequence of the operator.
   void arm() {
     steps(60);
     safe.arm();

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// What a scene's device does not list costs nothing: instructions for each read and apply, by callgrind, of a device in
-// a hand and without effects in the whole library, against one that was built without them (CMakeLists.txt says how).
+// Effects that a scene does not list must cost nothing. Callgrind counts the instructions of each read and apply for a
+// device in a hand without effects, and for a build without the effects (see CMakeLists.txt).
 #include <gtest/gtest.h>
 
 #include <iomanip>
@@ -13,7 +13,7 @@
 namespace tendon::effects_proof_test {
 namespace {
 
-constexpr double kSteps = 1000 - 500;  // between the two run lengths of device-proof
+constexpr double kSteps = 1000 - 500;  // the two run lengths of device-proof
 
 using DeviceEffectsProof = testing::InstructionTest;
 

@@ -31,13 +31,13 @@ SimulatedDevice::Config rubbing(const Mechanism::Kind& kind, const Vec3& coulomb
   return config;
 }
 
-/// Of the handle when one joint turns by itself, m/rad.
+/// Motion of the handle when only one joint rotates, m/rad.
 Vec3 way_of(const Mechanism::Kind& kind, const Vec3& at, Eigen::Index joint) {
   return Mechanism(kind).jacobian(at).inverse().col(joint);
 }
 
 TEST(JointFriction, OfOneTurningJointIsItsTorqueOverItsLever) {
-  // Pushed along the way of one joint, just below and just above what that joint's friction holds there.
+  // Forces along the motion of one joint, just below and just above the static friction of that joint.
   const Vec3 torques(0.02, 0.03, 0.04);
   for (const Mechanism::Kind& kind : all_kinds()) {
     double least = std::numeric_limits<double>::infinity();
@@ -64,7 +64,7 @@ TEST(JointFriction, OfOneTurningJointIsItsTorqueOverItsLever) {
 }
 
 TEST(JointFriction, AStuckJointLetsTheHandleGiveWayAside) {
-  // A force that only the first joint's friction cannot hold: the other two stay where they are.
+  // A force that exceeds only the friction of the first joint must not move the other two.
   for (const Mechanism::Kind& kind : all_kinds()) {
     auto config = rubbing(kind, Vec3(1e-4, 1, 1));
     Bench bench(config);
@@ -79,8 +79,8 @@ TEST(JointFriction, AStuckJointLetsTheHandleGiveWayAside) {
 }
 
 TEST(JointFriction, BrakesAHandleThatTurnsOneJointAsTheClosedFormSays) {
-  // Along the way of a joint, over so short a way that J stays: m a = −Jᵀτ, of which the other two joints, which stand,
-  // take what is across; along the way: a = τ / (m ‖way‖).
+  // Force along the motion of a joint over a distance so short that J is constant: m a = −Jᵀτ. The resting joints carry
+  // the lateral part, and along the motion a = τ / (m ‖way‖).
   const Vec3 torques(0.02, 0.02, 0.02);
   for (const Mechanism::Kind& kind : all_kinds()) {
     for (Eigen::Index joint = 0; joint < 3; ++joint) {
@@ -103,9 +103,9 @@ TEST(JointFriction, BrakesAHandleThatTurnsOneJointAsTheClosedFormSays) {
 }
 
 TEST(JointFriction, TurnsRoundWithoutAPauseUnderAForceThatItCannotHold) {
-  // Braked by force and friction until it stops, then pulled back by force less friction, all along the way of one
-  // joint. What is left of the 50 µs in which it turns may have the wrong sign of friction; a pause of that length
-  // would cost 2.5 mm/s.
+  // Force and friction stop the joint, then the force minus friction reverses it, along the motion of one joint.
+  // Friction may have the wrong sign for the rest of the 50 µs substep of the reversal. A pause of that length would
+  // cost 2.5 mm/s.
   const Vec3 torques(0.02, 0.02, 0.02);
   for (const Mechanism::Kind& kind : all_kinds()) {
     for (Eigen::Index joint = 0; joint < 3; ++joint) {
@@ -115,7 +115,7 @@ TEST(JointFriction, TurnsRoundWithoutAPauseUnderAForceThatItCannotHold) {
         const double friction = torques[joint] / way.norm();
         config.start_velocity = v0 * way.normalized();
         Bench bench(config);
-        // Along the way in so far as that does not turn the others: their friction holds the rest.
+        // Along the motion, unless the other joints rotate: their friction holds the rest.
         bench.push(-5 * way.normalized(), 2ms);
         const double back = 2e-3 - config.mass * v0 / (5 + friction);
         EXPECT_NEAR(bench.truth().velocity.dot(way.normalized()), -(5 - friction) / config.mass * back,
@@ -127,7 +127,7 @@ TEST(JointFriction, TurnsRoundWithoutAPauseUnderAForceThatItCannotHold) {
 }
 
 TEST(JointFriction, ViscousInTheJointsLetsASpeedFallAsTheExponential) {
-  // In the middle of a Phantom's workspace J is diagonal but for the order of the axes: 1/l on each.
+  // At the center of the Phantom's workspace J is diagonal with entries 1/l, up to the order of the axes.
   const Vec3 viscous(0.002, 0.004, 0.008);
   auto config = rubbing(kPhantom, Vec3::Zero(), viscous);
   config.mass = 0.1;
@@ -143,8 +143,8 @@ TEST(JointFriction, ViscousInTheJointsLetsASpeedFallAsTheExponential) {
 }
 
 TEST(JointFriction, ItsLawHoldsExactlyWithTheMeanVelocityOfEachSubstep) {
-  // What the hand and the motors have given less what friction took is what is left: friction is minus the change of
-  // momentum, so τ = J⁻ᵀ (momentum − resistance v̄) / (h/2), and must be at its most against q̇, or hold it at zero.
+  // The momentum change equals the impulse of hand and motors minus friction, so τ = J⁻ᵀ (momentum − resistance v̄) /
+  // (h/2). It must have its maximum against q̇, or hold q̇ at zero.
   for (const Mechanism::Kind& kind : all_kinds()) {
     Dice dice(5);
     int stood = 0;
@@ -177,7 +177,7 @@ TEST(JointFriction, ItsLawHoldsExactlyWithTheMeanVelocityOfEachSubstep) {
 }
 
 TEST(JointFriction, IsNowhereAndInNoDirectionLessThanItsLowerBound) {
-  // Power that friction takes, over |v| and |v|²: random places and directions, and the ways of single joints.
+  // Friction power divided by |v| and |v|², at random positions and directions and for motion of single joints.
   for (const Mechanism::Kind& kind : all_kinds()) {
     const JointFriction::Config config{
         .mechanism = kind, .coulomb = Vec3(0.02, 0.03, 0.025), .viscous = Vec3(1e-3, 2e-3, 3e-3)};
@@ -220,7 +220,7 @@ TEST(JointFriction, TorquesForAHandlesFrictionMakeThatTheLeastAnywhere) {
     EXPECT_NEAR(friction.least().coulomb, 0.4, 1e-15);
     EXPECT_GE(friction.least().coulomb, 0.4) << "what a limiter counts on is there";
   }
-  // A Falcon's levers are longest at the edge; two of an arm's are the same everywhere.
+  // The levers of a Falcon are longest at the edge of its workspace; two levers of an arm are constant.
   EXPECT_GT(
       JointFriction({.mechanism = Mechanism::Falcon{}, .coulomb = JointFriction::torques(Mechanism::Falcon{}, 0.4)})
           .least_at(Vec3::Zero())

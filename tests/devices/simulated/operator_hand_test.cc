@@ -58,7 +58,7 @@ TEST(OperatorHand, DragsTheDeviceByItsFrequencyResponse) {
   const std::complex<double> response = (k + c * s) / (k + (b + c) * s + 0.125 * s * s);
   for (int i = 1; i <= 3000; ++i) {
     bench.wait(1ms);
-    if (i < 2000) continue;  // the start has died out: e^(−12 · 2)
+    if (i < 2000) continue;  // startup transient: e^(−12 · 2)
     ASSERT_NEAR(bench.truth().position.y(), 0.01 * (response * std::exp(s * (1e-3 * i))).imag(), 1e-7);
   }
 }
@@ -66,7 +66,7 @@ TEST(OperatorHand, DragsTheDeviceByItsFrequencyResponse) {
 TEST(OperatorHand, PressesOnAHeldHandleWithItsSpring) {
   SimulatedDevice::Config config;
   config.mass = 0.075;
-  config.coulomb_friction = 100;  // nothing moves
+  config.coulomb_friction = 100;  // holds the handle
   config.hand = OperatorHand::Config{.stiffness = 400,
                                      .damping = 2,
                                      .mass = 0.05,

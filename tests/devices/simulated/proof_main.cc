@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// What effects_proof_test.cc counts instructions of: a simulated device in a hand, one after the other.
+// Simulated device in a hand whose instructions effects_proof_test.cc counts.
 //
-//     device-proof none     with nothing listed that it can do without
-//     device-proof each     with one effect more at a time
+//     device-proof none     without optional effects
+//     device-proof each     with one additional effect at a time
 //
-// A line for each: the name of the effect. Callgrind counts within `live_in_turn`, and writes a file each time it
-// returns.
+// Prints the name of each effect on one line. Callgrind counts within `live_in_turn` and writes a file at each return.
 #include <iostream>
 #include <string_view>
 
@@ -29,7 +28,7 @@ SimulatedDevice::Config bare() {
 
 }  // namespace
 
-/// A name that callgrind finds: not inlined, not mangled.
+/// Callgrind finds this function by its name, so it must be neither inlined nor mangled.
 extern "C" [[gnu::noinline]] void live_in_turn(SimulatedDevice& device, int from, int to) {
   for (int i = from; i < to; ++i) {
     const auto sample = device.read(LocalTime(std::chrono::milliseconds(i)));

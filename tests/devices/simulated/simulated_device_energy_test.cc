@@ -12,13 +12,12 @@ namespace {
 
 using namespace std::chrono_literals;
 
-/// Where the encoder is, and the motors push.
+/// Position of the encoder and the motors.
 Vec3 motor_side(const SimulatedDevice::Truth& truth) { return truth.position + truth.deflection; }
 
 double stored(const SimulatedDevice::Truth& truth) { return truth.kinetic_energy + truth.spring_energy; }
 
-/// The sum (5) of Lee and Lee (2009) in the form f = −(force on the hand), written out here once more so
-/// that the device is held against the equation and not against our ledger:
+/// Sum (5) of Lee and Lee (2009) with f = −(force on the hand), implemented independently of the ledger:
 ///     E = Σ −F·dx + f_c |dx| + b |dx|²/T
 struct Equation5 {
   double b;
@@ -32,7 +31,7 @@ struct Equation5 {
 
 struct World {
   SimulatedDevice::Config config;
-  bool pushes_along = false;  ///< the adversary: always in the direction of the motion
+  bool pushes_along = false;  ///< the adversary pushes along the motion
 
   explicit World(Dice& dice) {
     config.mass = dice.within(0.02, 0.5);
@@ -57,7 +56,7 @@ struct World {
                                          .motion = ScriptedMotion(script)};
     }
     pushes_along = dice.chance(0.3);
-    if (dice.chance(0.1)) put_in_joints(dice);  // ten times as dear as the others
+    if (dice.chance(0.1)) put_in_joints(dice);  // rare, because they cost ten times as much
     if (dice.chance(0.3)) {
       config.structural_mode = {.handle_mass = config.mass * dice.within(0.05, 0.95),
                                 .stiffness = std::pow(10.0, dice.within(2, 5)),
@@ -97,7 +96,7 @@ struct World {
 };
 
 TEST(SimulatedDeviceEnergy, HandAndWallsNeverDoLessWorkThanEquation5Demands) {
-  // 2000 worlds with random devices, hands, forces and intervals; exact position sensing.
+  // 2000 random devices, hands, forces and intervals, with exact position sensing.
   double least = 1e300;
   for (std::uint64_t seed = 0; seed < 2000; ++seed) {
     Dice dice(seed);
@@ -121,7 +120,7 @@ TEST(SimulatedDeviceEnergy, HandAndWallsNeverDoLessWorkThanEquation5Demands) {
 
       const double balance = brought + stored_at_start - stored(bench.truth()) - equation.energy;
       least = std::min(least, balance);
-      // Rounding grows with the energy that went to and fro: 1e-12 J, and 1e-13 of it where that is above 10 J.
+      // Rounding errors grow with the exchanged energy: 1e-12 J, and 1e-13 of the energy above 10 J.
       ASSERT_GE(balance, -1e-12 * std::max(1.0, turnover / 10)) << "seed " << seed << ", step " << step;
     }
   }
@@ -129,7 +128,7 @@ TEST(SimulatedDeviceEnergy, HandAndWallsNeverDoLessWorkThanEquation5Demands) {
 }
 
 TEST(SimulatedDeviceEnergy, NothingIsLostWhereNothingRubs) {
-  // No friction: the balance is an equation, also with a hand of its own mass and a stiff grip.
+  // Without friction the balance is exact, including a hand with mass and a stiff grip.
   SimulatedDevice::Config config;
   config.mass = 0.075;
   config.start_velocity = {0.1, -0.2, 0.3};
@@ -151,7 +150,7 @@ TEST(SimulatedDeviceEnergy, NothingIsLostWhereNothingRubs) {
 }
 
 TEST(SimulatedDeviceEnergy, UniformSlidingIsTheCaseWhereTheBoundIsReached) {
-  // At constant velocity equation (5) leaves nothing over: what the hand gives is just what friction takes.
+  // At constant velocity in equation (5), the work of the hand equals the friction loss.
   SimulatedDevice::Config config;
   config.mass = 0.075;
   config.viscous_friction = 0.26;
@@ -162,7 +161,7 @@ TEST(SimulatedDeviceEnergy, UniformSlidingIsTheCaseWhereTheBoundIsReached) {
   const double at_start = bench.truth().kinetic_energy;
   for (int i = 0; i < 1000; ++i) {
     const Vec3 before = bench.truth().position;
-    const Vec3 applied = bench.device().apply({0.26 * 0.1 + 0.04, 0, 0});  // holds the speed against the friction
+    const Vec3 applied = bench.device().apply({0.26 * 0.1 + 0.04, 0, 0});  // compensates for friction at this speed
     bench.wait(1ms);
     equation.add(applied, bench.truth().position - before, 1ms);
     ASSERT_NEAR(at_start - bench.truth().kinetic_energy - equation.energy, 0, 1e-12);

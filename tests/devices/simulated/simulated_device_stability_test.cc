@@ -10,8 +10,8 @@
 #include "devices/simulated/simulated_device.h"
 #include "tests/devices/device_bench.h"
 
-/// Known boundaries of what a real device does under a sampled spring. If the simulated one kept
-/// other ones, every experiment on a limiter would be about the simulator.
+/// Known stability boundaries of a real device with a sampled spring. With different boundaries, experiments on a
+/// limiter would only test the simulator.
 
 namespace tendon::simulated_device_stability_test {
 namespace {
@@ -25,8 +25,8 @@ SimulatedDevice::Config device(double m, double b) {
   return config;
 }
 
-/// The stiffness at which a spring, sampled and held for T, stops being stable on a mass with viscous
-/// friction and no hand (Jury's criterion on the exact discretisation):
+/// Stability limit of a spring, sampled and held for T, on a mass with viscous friction and no hand (Jury's criterion
+/// on the exact discretization):
 ///     K_max = b (1 − δ) / (m (1 − δ)/b − T δ),  δ = e^(−bT/m);   about 2b/T (1 + bT/(6m))
 double exact_k_max(double m, double b, double t) {
   const double delta = std::exp(-b * t / m);
@@ -62,7 +62,7 @@ TEST_P(SampledSpring, LosesStabilityAtTheStiffnessOfTheClosedForm) {
     const double middle = (stable + unstable) / 2;
     (spectral_radius(0.075, b, middle) < 1 ? stable : unstable) = middle;
   }
-  // What the substeps of 50 µs leave: 1.4e-6 at 0.26 N·s/m, 2.8e-5 at 5.
+  // Error of the 50 µs substeps: 1.4e-6 at 0.26 N·s/m, 2.8e-5 at 5 N·s/m.
   EXPECT_NEAR(stable / exact_k_max(0.075, b, 1e-3), 1, 6e-6 * b);
 }
 
@@ -90,8 +90,8 @@ TEST_P(SampledSpring, DiesOutJustBelowThatAndGrowsJustAbove) {
 
 INSTANTIATE_TEST_SUITE_P(PhantomLike, SampledSpring, testing::Values(Damping{0.26, 520.30}, Damping{5, 10112.35}));
 
-/// Largest speed in the last half second of 3 s on a spring whose resting point lies on the edge between
-/// two counts, the worst place for it. f_c = 0.05 N and a count of 0.2 mm: 2 f_c/Δ = 500 N/m.
+/// Returns the largest speed in the last half second of 3 s, on a spring whose rest position lies on the edge between
+/// two counts (worst case). f_c = 0.05 N and a count of 0.2 mm: 2 f_c/Δ = 500 N/m.
 double late_speed_on_a_count_edge(double stiffness) {
   const double step = 2e-4;
   auto config = device(0.075, 2);
@@ -123,8 +123,8 @@ TEST(QuantisedSpring, KeepsALimitCycleAboveThatThatGrowsWithTheStiffness) {
 }
 
 TEST(SampledSpring, BeyondTheViscousBoundOnlySlowMotionIsStable) {
-  // v_lim = (4/π) f_c/(K T/2 − b): Diolaiti et al., IEEE T-RO 22(2), 2006, with the describing function of
-  // the friction.
+  // v_lim = (4/π) f_c/(K T/2 − b), with the describing function of the friction: Diolaiti et al., IEEE T-RO 22(2),
+  // 2006.
   const double b = 0.05;
   const double f_c = 0.05;
   const double stiffness = 1000;

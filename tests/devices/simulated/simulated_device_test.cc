@@ -83,7 +83,7 @@ TEST(SimulatedDevice, DoesNotDependOnHowOftenItIsRead) {
 TEST(SimulatedDevice, AHandThatHasLetGoPushesNoMoreAndTakesItsMassWithIt) {
   auto config = bare();
   config.hand = waving_hand();
-  config.lets_go_after = 33'333us;  // between two reads, and within a substep
+  config.lets_go_after = 33'333us;  // between two reads and within a substep
   Bench often(config);
   Bench seldom(config);
   auto holding = config;
@@ -184,8 +184,8 @@ TEST(CoulombFriction, HoldsAgainstAForceThatBrakedTheDeviceToAStop) {
 }
 
 TEST(CoulombFriction, TurnsRoundWithoutAPauseUnderAForceThatItCannotHold) {
-  // Braked by F + f_c until it stops, then pulled back by F − f_c. What is left of the 50 µs in which it turns
-  // may have the wrong sign of friction; a pause of that length would cost 3 mm/s.
+  // F + f_c stops the handle, then F − f_c reverses it. Friction may have the wrong sign for the rest of the 50 µs
+  // substep of the reversal. A pause of that length would cost 3 mm/s.
   const double m = 0.075;
   const double error = 2 * 0.04 / m * seconds(SimulatedDevice::Config{}.max_substep);
   for (const double v0 : {0.1, 0.1003, 0.1011, 0.1017, 0.1026}) {
@@ -201,7 +201,7 @@ TEST(CoulombFriction, TurnsRoundWithoutAPauseUnderAForceThatItCannotHold) {
 }
 
 TEST(CoulombFriction, OpposesTheVelocityAlongACurvedPath) {
-  // Pushed sideways while sliding: against a Runge-Kutta solution of m dv/dt = F − f_c v/|v| in steps of 1 µs.
+  // A lateral force during sliding, compared with a Runge-Kutta solution of m dv/dt = F − f_c v/|v| in steps of 1 µs.
   const double m = 0.075;
   const double f_c = 0.04;
   const Vec3 force(0, 0.1, 0.05);
@@ -271,7 +271,7 @@ TEST(Encoder, HasCountsOfOneWidthAlsoAroundTheOrigin) {
   config.start_velocity = {1, 0, 0};
   config.start_position = Vec3(-3.5e-3, 0, 0);
   Bench bench(config);
-  bench.wait(5us);  // off the edge between two counts
+  bench.wait(5us);  // moves off the edge between two counts
   for (int count = -3; count <= 3; ++count) {
     for (int i = 0; i < 10; ++i) {
       ASSERT_NEAR(bench.wait(i == 0 ? 0us : 100us).x(), count * 1e-3, 1e-12);
@@ -346,15 +346,14 @@ TEST(Amplifier, FollowsAStepAsAFirstOrderLag) {
   for (int i = 1; i <= 50; ++i) {
     bench.wait(100us);
     const double t = 1e-4 * i;
-    // The impulse is exact; the force is known as its mean over the last 50 µs.
+    // The impulse is exact. The reported force is its mean over the last 50 µs.
     ASSERT_NEAR(bench.truth().velocity.x(), 2 / m * (t - tau * (1 - std::exp(-t / tau))), 1e-13);
     ASSERT_NEAR(bench.truth().device_force.x(), 2 * (1 - std::exp(-(t - 25e-6) / tau)), 2e-3);
   }
 }
 
 TEST(Amplifier, HasFallenByThreeDecibelsAtItsBandwidth) {
-  // A sine of commands at 10 kHz, read back from the momentum it leaves: in the steady state the velocity
-  // swings by F/(m ω) times the gain.
+  // Commands follow a sine at 10 kHz. The steady-state velocity amplitude is F/(m ω) times the gain.
   const double f = 50;
   auto config = bare(1);
   const auto swing = [&] {
@@ -379,7 +378,7 @@ TEST(Amplifier, HasFallenByThreeDecibelsAtItsBandwidth) {
 TEST(Watchdog, TakesTheForceAwayAfterExactlyItsTime) {
   auto config = bare(0.075);
   config.watchdog = 5ms;
-  // Read intervals that end on, before and far beyond the instant: the impulse is force × 5 ms in each case.
+  // Read intervals that end at, before and long after the watchdog time. The impulse is force × 5 ms in each case.
   for (const Duration interval : {Duration(5ms), Duration(1700us), Duration(333'333), Duration(1s)}) {
     Bench bench(config);
     bench.device().apply({0.3, -0.6, 0.6});
@@ -443,7 +442,7 @@ TEST(SimulatedDevice, TakesTheSamePathToTheLastBitWithEffectsThatNeverBite) {
   listed.watchdog = 1h;
   listed.force_sensor.emplace();
   listed.button_after = 1h;
-  listed.encoder_step = 1e-3;  // changes what is seen, and not what happens
+  listed.encoder_step = 1e-3;  // changes only the measurement
   Bench a(plain);
   Bench z(listed);
   Dice dice(5);

@@ -16,7 +16,7 @@ constexpr double kSubstep = 50e-6;
 
 using Hand = SimulatedGripper::Hand;
 
-/// A gripper on the bench, and its clock.
+/// A gripper with its simulated clock.
 class Fingers {
  public:
   explicit Fingers(const SimulatedGripper::Config& config) : gripper(config) {}
@@ -96,7 +96,7 @@ TEST(SimulatedGripper, AHandBringsItToItsOpeningOrPressesTheStop) {
 }
 
 TEST(SimulatedGripper, WorkOfTheHandIsNeverLessThanTheLedgerDemands) {
-  // 2000 worlds, at stops and between them. Exact where nothing rubs and no stop is met.
+  // 2000 random cases at the stops and between them. The balance is exact without friction and stops.
   double least = 1e300;
   int met = 0;
   for (std::uint64_t seed = 0; seed < 2000; ++seed) {

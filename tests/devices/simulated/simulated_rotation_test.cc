@@ -18,7 +18,7 @@ constexpr double kPi = std::numbers::pi;
 
 using Hand = SimulatedRotation::Hand;
 
-/// A handle on the bench, and its clock.
+/// A handle with its simulated clock.
 class Spindle {
  public:
   explicit Spindle(const SimulatedRotation::Config& config) : rotation(config) {}
@@ -52,7 +52,7 @@ TEST(SimulatedRotation, TurnsFreelyForEverAndKeepsItsEnergy) {
   config.start = Vec3(0.3, -0.2, 0.5);
   config.start_angular_velocity = {3, -4, 12};
   Spindle spindle(config);
-  spindle.turn(Vec3::Zero(), 200'000);  // 10 s, some 20 turns
+  spindle.turn(Vec3::Zero(), 200'000);  // 10 s, about 20 revolutions
   EXPECT_NEAR((spindle.truth().angular_velocity - Vec3(3, -4, 12)).norm(), 0, 1e-11);
   EXPECT_NEAR(spindle.truth().kinetic_energy, 2e-5 * 169 / 2, 1e-15);
   const Quat exact = product(rotation_by(Vec3(30, -40, 120)), rotation_by(Vec3(0.3, -0.2, 0.5)));
@@ -64,7 +64,7 @@ TEST(SimulatedRotation, ATorqueTurnsItAboutItsBaseFrameAxisHoweverItLies) {
   auto config = free_handle();
   config.start = Vec3(1, 2, -0.5);
   Spindle spindle(config);
-  spindle.turn({0, 1e-3, 0}, 2000);  // 0.1 s at 50 rad/s²: a quarter of a radian
+  spindle.turn({0, 1e-3, 0}, 2000);  // 0.1 s at 50 rad/s²: 0.25 rad
   EXPECT_NEAR((spindle.truth().angular_velocity - Vec3(0, 5, 0)).norm(), 0, 1e-12);
   EXPECT_NEAR((turn_between(rotation_by(*config.start), spindle.truth().orientation) - Vec3(0, 0.25, 0)).norm(), 0,
               1e-12);
@@ -72,7 +72,7 @@ TEST(SimulatedRotation, ATorqueTurnsItAboutItsBaseFrameAxisHoweverItLies) {
 
 TEST(SimulatedRotation, ViscousFrictionSlowsItAsTheClosedForm) {
   auto config = free_handle();
-  config.viscous_friction = 4e-4;  // 1/e in 50 ms
+  config.viscous_friction = 4e-4;  // time constant of 50 ms
   config.start_angular_velocity = {0, 0, 10};
   Spindle spindle(config);
   spindle.turn(Vec3::Zero(), 1000);
@@ -96,7 +96,7 @@ TEST(SimulatedRotation, SticksExactlyAndBreaksLooseAboveItsFriction) {
 }
 
 TEST(SimulatedRotation, AHandSwingsItAsASpringDoesAtAnyAngle) {
-  // A linear spring: its period √(J/K) 2π does not depend on how far it was turned.
+  // The period 2π √(J/K) of a linear spring does not depend on the amplitude.
   for (const double angle : {0.01, 0.5, 2.5}) {
     auto config = held_handle(Vec3::Zero());
     config.start = Vec3(0, angle, 0);
@@ -123,7 +123,8 @@ TEST(SimulatedRotation, AHandBringsItWhereItWantsFromAnySide) {
 }
 
 TEST(SimulatedRotation, AHandThatTurnsAboutChangingAxesIsFollowed) {
-  // The damper alone moves the handle with the script's angular velocity; a rate that were taken for it would drift.
+  // The damper alone moves the handle at the script's angular velocity. Using the rotation-vector rate instead would
+  // cause drift.
   auto config = free_handle();
   config.inertia = 1e-7;
   const ScriptedMotion motion(
@@ -151,7 +152,7 @@ TEST(SimulatedRotation, RecordedMotionAlongAnAxisIsATurnAboutIt) {
 
 struct World {
   SimulatedRotation::Config config;
-  bool pushes_along = false;  ///< the adversary: always in the direction of the turn
+  bool pushes_along = false;  ///< the adversary pushes along the rotation
 
   explicit World(Dice& dice) {
     config.inertia = std::pow(10.0, dice.within(-6, -3));
@@ -179,7 +180,7 @@ struct World {
 };
 
 TEST(SimulatedRotation, WorkOfTheHandIsNeverLessThanTheLedgerDemands) {
-  // 2000 worlds. Each interval is one substep, so that turn_between is what the handle turned, whatever its axis.
+  // 2000 random cases. Each interval is one substep, so turn_between gives the true rotation for every axis.
   double least = 1e300;
   for (std::uint64_t seed = 0; seed < 2000; ++seed) {
     Dice dice(seed);
@@ -236,12 +237,12 @@ TEST(SimulatedRotation, TheSampleIsTheNearestCountFromTheStart) {
   Spindle spindle(config);
   EXPECT_EQ(turn_between(rotation_by(*config.start), spindle.rotation.sample()), Vec3::Zero());
   double furthest = 0;
-  for (int i = 0; i < 2000; ++i) {  // past 180° from the start, several times
+  for (int i = 0; i < 2000; ++i) {  // passes 180° several times
     spindle.turn(Vec3::Zero(), 17);
     const Quat seen = spindle.rotation.sample();
     ASSERT_TRUE(is_rotation(seen));
     const Vec3 counts = turn_between(rotation_by(*config.start), seen) / 1e-3;
-    // Just short of 180° the rounded vector may be longer than π; what comes back is then the other way round.
+    // Just below 180° the rounded vector may exceed π, and the reported rotation then has the opposite sign.
     const double off = (counts - counts.array().round().matrix()).norm();
     ASSERT_LT(counts.norm() < 3140 ? off : 0.0, 1e-9);
     furthest = std::max(furthest, turn_between(spindle.truth().orientation, seen).norm());

@@ -21,7 +21,7 @@ constexpr double kMass = 0.075;
 constexpr double kHandle = 0.03;
 constexpr double kMotor = kMass - kHandle;
 
-/// With a resonance of `hz` and the damping ratio `zeta` when nobody holds it.
+/// Returns a free device with a resonance at `hz` and damping ratio `zeta`.
 SimulatedDevice::Config ringing(double hz, double zeta) {
   const double omega = 2 * std::numbers::pi * hz;
   const double stiffness = omega * omega / (1 / kMotor + 1 / kHandle);
@@ -31,7 +31,7 @@ SimulatedDevice::Config ringing(double hz, double zeta) {
   return config;
 }
 
-/// The deflection after a step of force, from rest: of a linear oscillator, closed form.
+/// Deflection of a linear oscillator after a force step from rest (closed form).
 double step_response(double force, double omega, double zeta, double t) {
   const double damped = omega * std::sqrt(1 - zeta * zeta);
   const double ring = std::cos(damped * t) + zeta * omega / damped * std::sin(damped * t);
@@ -54,7 +54,7 @@ TEST(StructuralMode, RingsWithTheFrequencyAndDampingOfTheClosedForm) {
           error[fine] = std::max(error[fine], std::abs(e - step_response(1, omega, zeta, 1e-3 * i)) / size);
         }
       }
-      // The phase after 50 ms is off by (ω h)²/12 of itself.
+      // The relative phase error after 50 ms is (ω h)²/12.
       EXPECT_LT(error[1], omega * 0.05 * std::pow(omega * 5e-6, 2) / 12 * 1.1 + 1e-9) << hz << " Hz, " << zeta;
       EXPECT_NEAR(error[0] / error[1], 100, 5) << "of second order";
     }
@@ -76,7 +76,7 @@ TEST(StructuralMode, WithoutDampingRingsForEverAtTheHeadersFrequency) {
 }
 
 TEST(StructuralMode, WithTheMotorSideHeldTheHandleRingsOnTheSpringAlone) {
-  // Friction that nothing overcomes holds the motor side; the handle starts at 1 mm/s.
+  // Friction holds the motor side while the handle starts at 1 mm/s.
   auto config = ringing(60, 0);
   config.coulomb_friction = 100;
   config.start_velocity = {1e-3, 0, 0};
@@ -96,7 +96,7 @@ TEST(StructuralMode, WithTheMotorSideHeldTheHandleRingsOnTheSpringAlone) {
 }
 
 TEST(StructuralMode, TheEncoderSeesTheMotorSideAndTheHandIsOnTheOther) {
-  // A hand of 500 N/m whose handle is pushed by 1 N: at rest the spring between gives way by 1 N / K.
+  // A force of 1 N acts on the handle in a hand of 500 N/m. At rest the structural spring deflects by 1 N / K.
   auto config = ringing(60, 0.1);
   config.viscous_friction = 5;
   config.hand = OperatorHand::Config{.stiffness = 500,
@@ -137,7 +137,7 @@ TEST(StructuralMode, AtAStiffnessBeyondAllTheDeviceIsOneMassAgain) {
 }
 
 TEST(StructuralMode, StoresWhatItHasTakenIn) {
-  // Nothing rubs: what the motors gave is in the masses and in the spring.
+  // Without friction, the energy of the motors is stored in the masses and the spring.
   auto config = ringing(80, 0);
   Bench bench(config);
   Dice dice(4);
@@ -156,7 +156,7 @@ TEST(StructuralMode, StoresWhatItHasTakenIn) {
 
 // ---- Stability: against the eigenvalues of the exact discretisation ------------------------------------------------
 
-/// e^(A t): scaled by 2⁻¹⁰, 14 terms, squared ten times.
+/// Matrix exponential: scaled by 2⁻¹⁰, 14 terms, squared ten times.
 Eigen::MatrixXd exponential(const Eigen::MatrixXd& exponent) {
   const Eigen::MatrixXd small = exponent / 1024;
   Eigen::MatrixXd result = Eigen::MatrixXd::Identity(exponent.rows(), exponent.cols());
@@ -169,7 +169,7 @@ Eigen::MatrixXd exponential(const Eigen::MatrixXd& exponent) {
   return result;
 }
 
-/// Of one period of a spring and damper that are sampled, differenced and held for 1 ms: states y, x, ẏ, v, y before.
+/// Spectral radius of one period with a sampled spring and damper held for 1 ms. States: y, x, ẏ, v, previous y.
 double spectral_radius(const SimulatedDevice::Config& config, double stiffness, double damping) {
   const auto& mode = *config.structural_mode;
   const double b = *config.viscous_friction;
@@ -189,7 +189,7 @@ double spectral_radius(const SimulatedDevice::Config& config, double stiffness, 
   return period.eigenvalues().cwiseAbs().maxCoeff();
 }
 
-/// The first value from which `radius` is 1 or more.
+/// Returns the smallest value for which `radius` is at least 1.
 double boundary(const std::function<double(double)>& radius) {
   double unstable = 1;
   while (radius(unstable) < 1) unstable *= 1.02;
@@ -201,7 +201,7 @@ double boundary(const std::function<double(double)>& radius) {
   return stable;
 }
 
-/// Late over early amplitude of a device on such a spring and damper.
+/// Returns the ratio of late to early amplitude on such a spring and damper.
 double growth(const SimulatedDevice::Config& config, double stiffness, double damping) {
   Bench bench(config);
   Vec3 before = bench.wait(0ms);
@@ -219,7 +219,8 @@ double growth(const SimulatedDevice::Config& config, double stiffness, double da
 }
 
 TEST(StructuralMode, RenderableDampingEndsWhereAnEigenvalueIsOne) {
-  // Without the mode 2 m/T = 150 N·s/m; with it some 2 (m − m_h)/T = 90, and less the nearer the mode is to the rate.
+  // The limit is 2 m/T = 150 N·s/m without the mode and about 2 (m − m_h)/T = 90 with it. It falls as the mode
+  // approaches the sampling rate.
   double before = 2 * kMotor / 1e-3;
   for (const double hz : {60.0, 100.0, 200.0}) {
     auto config = ringing(hz, 0.02);

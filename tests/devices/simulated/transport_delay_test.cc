@@ -25,7 +25,7 @@ SimulatedDevice::Config free_mass(std::optional<Duration> sample, std::optional<
 }
 
 TEST(TransportDelay, ASampleIsThatOfTheInstantThatItSays) {
-  // At 1 m/s: the position tells when it was taken. Intervals and delay are no multiples of each other.
+  // At 1 m/s the position shows the sampling time. Intervals are not multiples of the delay.
   for (const Duration delay : {Duration(1ms), Duration(1'700us), Duration(333'333ns), Duration(100ms)}) {
     auto config = free_mass(delay, std::nullopt);
     config.start_velocity = {1, 0, 0};
@@ -42,14 +42,14 @@ TEST(TransportDelay, ASampleIsThatOfTheInstantThatItSays) {
 }
 
 TEST(TransportDelay, AForceActsFromItsDelayUntilTheDelayOfTheNext) {
-  // 2 N for one period of 1 ms, then none: whatever the delay, the impulse is 2 mN·s, and the position tells when.
+  // 2 N for one period of 1 ms. The impulse is 2 mN·s for every delay, and the position shows the time of the force.
   for (const Duration delay : {Duration(1ns), Duration(999'999ns), Duration(300us), Duration(1ms), Duration(1'700us),
                                Duration(2ms), Duration(12'345'678ns)}) {
     Bench bench(free_mass(std::nullopt, delay));
     bench.push({2, 0, 0}, 1ms);
     for (int i = 0; i < 30; ++i) bench.push(Vec3::Zero(), 1ms);
     EXPECT_NEAR(bench.truth().velocity.x(), 0.02, 1e-14);
-    // x = v (t − delay − half the time that it was pushed)
+    // x = v (t − delay − half of the push duration)
     EXPECT_NEAR(bench.truth().position.x(), 0.02 * (31e-3 - seconds(delay) - 0.5e-3), 1e-14) << delay.count();
   }
 }
@@ -62,7 +62,7 @@ TEST(TransportDelay, UntilTheFirstForceHasArrivedThereIsNone) {
 }
 
 TEST(TransportDelay, ALoopFeelsOnlyTheSumOfBothDelays) {
-  // The same spring, whose delay lies before the loop, behind it, or on both ways.
+  // The same spring with the delay on the samples, on the forces, or on both.
   const auto seen = [](Duration sample, Duration force) {
     auto config = free_mass(sample > 0ms ? std::optional(sample) : std::nullopt,
                             force > 0ms ? std::optional(force) : std::nullopt);
@@ -105,7 +105,7 @@ TEST(TransportDelay, WithoutAForceNothingIsDifferentToTheLastBitButTheStamps) {
 }
 
 TEST(TransportDelay, ShiftsASampledSpringsStabilityAsTheClosedForm) {
-  // Whole periods, of either kind: core/stability has the exact boundary for forces that are so many samples late.
+  // Delays of whole periods of either kind: core/stability has the exact boundary for this number of samples.
   for (const int late : {1, 2, 5}) {
     SampledSpring spring{.mass = 0.075, .viscous = 0.26, .period = 1ms, .delay_samples = late};
     const double boundary = largest_stable_stiffness(spring);
@@ -135,8 +135,8 @@ TEST(TransportDelay, ShiftsASampledSpringsStabilityAsTheClosedForm) {
 }
 
 TEST(TransportDelay, EnergyIsBalancedByForcesThatHaveArrived) {
-  // A spring, two periods late, on a handle without friction: it gives out energy, which the account of what was
-  // returned does not see where it ought to.
+  // A spring with a delay of two periods on a handle without friction. It generates energy, and an account of the
+  // returned forces misses the time at which they act.
   auto config = free_mass(1ms, 1ms);
   config.start_position = Vec3(0.01, 0, 0);
   Bench bench(config);
@@ -173,14 +173,14 @@ TEST(TransportDelay, TheWatchdogCountsTheForcesThatArrive) {
 }
 
 TEST(TransportDelay, HasRoomForAllForcesOfTheFastestLoop) {
-  // 10 kHz and the longest delays: a force each 100 µs, each different; the momentum is the sum of all that arrived.
+  // 10 kHz with the longest delays: a different force every 100 µs. The momentum is the sum of all forces that arrived.
   Bench bench(free_mass(100ms, 100ms));
   double sum = 0;
   for (int i = 0; i < 5000; ++i) {
     const double force = (i % 7) - 3.0;
     bench.push({force, 0, 0}, 100us);
     if (i < 5000 - 2000) sum += force;
-    if (i == 1000) bench.push({9, 0, 0}, 0ms);  // no time passes until the next, which takes its place
+    if (i == 1000) bench.push({9, 0, 0}, 0ms);  // replaced by the next force at the same time
   }
   EXPECT_NEAR(bench.truth().velocity.x(), sum * 1e-4 / 0.1, 1e-12);
 }

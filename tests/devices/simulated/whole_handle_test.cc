@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A simulated device with a rotation and a gripper: what it shares among them.
+// A simulated device with rotation and gripper: state that these share.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -21,7 +21,7 @@ SimulatedDevice::Config point() {
   return config;
 }
 
-/// 6 degrees of freedom and a gripper, all with motors, free to move.
+/// 6 degrees of freedom and a gripper, all motorized and free.
 SimulatedDevice::Config whole() {
   SimulatedDevice::Config config = point();
   config.max_force = 4;

@@ -12,12 +12,13 @@
 
 namespace tendon {
 
-/// A SpaceMouse at its cable: a report waits until it is read, and is lost with the cable. Its descriptors are those of
-/// an HID device with one interrupt endpoint, as its driver assumes; nobody here has seen a real one's.
+/// A SpaceMouse at the end of its cable. A report waits until it is read and is lost with the cable. The descriptors
+/// are those of an HID device with one interrupt endpoint, as the driver assumes; they were not compared with a real
+/// device.
 class FakeSpaceMouse final : public UsbModel {
  public:
   bool split = false;                  ///< translation and rotation in two reports
-  spacemouse::Axes twist{2313, 9, 9};  ///< somebody twists it, too
+  spacemouse::Axes twist{2313, 9, 9};  ///< an additional twist
   std::uint32_t connection = 1;
   std::uint32_t connections = 1;
   std::deque<std::vector<std::uint8_t>> reports{};
@@ -64,7 +65,7 @@ class FakeSpaceMouse final : public UsbModel {
       0x85, 0x01, 0x16, 0xA2, 0xFE, 0x26, 0x5E, 0x01, 0x09, 0x30, 0x09, 0x31, 0x09, 0x32,  //
       0x09, 0x33, 0x09, 0x34, 0x09, 0x35, 0x75, 0x10, 0x95, 0x06, 0x81, 0x02,              //
       0x85, 0x03, 0x05, 0x09, 0x19, 0x01, 0x29, 0x08, 0x15, 0x00, 0x25, 0x01, 0x75, 0x01, 0x95, 0x08, 0x81, 0x02, 0xC0};
-  /// Of a SpaceNavigator (046d:c626): device, configuration, interface, HID, one interrupt endpoint each 8 ms.
+  /// SpaceNavigator (046d:c626): device, configuration, interface, HID, one interrupt endpoint every 8 ms.
   static constexpr std::array<std::uint8_t, 52> kDescriptors = {
       18,   1,    0,    2,    0,  0, 0,    64,
       0x6D, 0x04, 0x26, 0xC6, 0,  1, 0,    0,

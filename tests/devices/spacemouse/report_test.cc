@@ -20,7 +20,7 @@ std::optional<Kind> parsed(const Bytes& bytes) {
   return kind != nullptr ? std::optional(*kind) : std::nullopt;
 }
 
-// "Rotation about the second axis", as somebody has seen a SpaceNavigator send it: its Wireshark log is public.
+// "Rotation about the second axis" from a public Wireshark log of a SpaceNavigator.
 TEST(SpaceMouseReport, ANavigatorTellsTranslationAndRotationInTwoReports) {
   const auto still = parsed<Motion>({1, 0, 0, 0, 0, 0, 0});
   ASSERT_TRUE(still);
@@ -65,7 +65,7 @@ TEST(SpaceMouseReport, EveryNumberOf16BitsComesThroughOnEachAxis) {
   }
 }
 
-// Whatever comes: what is taken for a report has an id and a length that one has, and says what its bytes say.
+// For arbitrary bytes, an accepted report must have a valid id and length, and its values must match its bytes.
 TEST(SpaceMouseReport, OfBytesThatNobodyPlannedNothingElseIsTaken) {
   Dice dice(1);
   std::array<int, 3> taken{};

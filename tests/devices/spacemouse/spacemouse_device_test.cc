@@ -48,7 +48,7 @@ class MousePipe final : public usb::Pipe {
 struct Bench {
   explicit Bench(const SpaceMouseDevice::Config& config = {}) : device(config, std::make_unique<MousePipe>(mouse)) {}
 
-  /// The cap held at `cap` for so long: a report each 16 ms, a read each ms.
+  /// Holds the cap at `cap` for `time`: a report every 16 ms, a read every millisecond.
   void hold(const Axes& cap, Duration time) {
     for (Duration t{}; t < time; t += 1ms) {
       if (t % 16ms == Duration::zero()) mouse.push(cap);
@@ -175,7 +175,7 @@ TEST(SpaceMouseDevice, ItNeverLeavesItsWorkspaceAndComesBackAtOnce) {
   EXPECT_LT(bench.sample->position.x(), 0.03 - 0.5 * 14e-3);
 }
 
-// Nobody knows whether the cap is still pushed.
+// Without reports the position of the cap is unknown.
 TEST(SpaceMouseDevice, APushThatNoReportConfirmsIsOver) {
   Bench bench({.speed = 0.1, .dead_band = 0, .reach = 1});
   bench.hold({350, 0, 0}, 16ms);

@@ -9,7 +9,7 @@
 
 namespace tendon {
 
-/// What `act()` says in a process of its own, without root's rights where this one has them.
+/// Returns the result of `act()` from a child process without root privileges.
 template <class Act>
 std::string as_nobody(const Act& act) {
   std::array<int, 2> ends{};

@@ -16,7 +16,7 @@ namespace {
 using namespace std::chrono_literals;
 using Packet = std::vector<std::uint8_t>;
 
-/// A cable of which the test decides everything.
+/// Cable controlled by the test.
 struct Cable final : Pipe {
   std::uint32_t connection() noexcept override { return number; }
   bool request(const Request&) noexcept override { return false; }
@@ -50,7 +50,7 @@ struct Bench {
     dialogue.restart(patience);
   }
   void turn(Duration after = 1ms) { dialogue.begin(now += after); }
-  /// As a driver does: only when it may.
+  /// Sends only when allowed, like a driver.
   bool ask(bool exerts) { return dialogue.may_send(exerts) && dialogue.send(kRequest, exerts); }
   void answer() {
     dialogue.hear();
@@ -89,7 +89,7 @@ TEST(Dialogue, NoMoreRequestsAreUnderWayThanItIsAllowed) {
     int sent = 0;
     for (int i = 0; i < 5; ++i, bench.turn()) sent += bench.ask(true) ? 1 : 0;
     EXPECT_EQ(sent, most);
-    bench.answer();  // to all of them
+    bench.answer();  // all of them
     EXPECT_FALSE(bench.dialogue.awaits_answer());
     for (int i = 0; i < 5; ++i, bench.turn()) sent += bench.ask(true) ? 1 : 0;
     EXPECT_EQ(sent, 2 * most);
@@ -104,7 +104,7 @@ TEST(Dialogue, ALateAnswerIsAskedForAgainAndCounted) {
   ASSERT_TRUE(bench.ask(true));
   bench.turn(3ms);
   EXPECT_FALSE(bench.ask(true));
-  bench.turn();  // 5 ms after the first of the two
+  bench.turn();  // 5 ms after the first request
   EXPECT_TRUE(bench.ask(true));
   EXPECT_EQ(bench.count(DeviceCount::kUnanswered), 1U);
   bench.turn();

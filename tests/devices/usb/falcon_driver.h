@@ -18,14 +18,14 @@ inline LocalTime real_now() {
   return LocalTime(std::chrono::duration_cast<Duration>(std::chrono::steady_clock::now().time_since_epoch()));
 }
 
-/// Whether it holds within ten seconds.
+/// Returns whether `holds` becomes true within ten seconds.
 template <class Holds>
 bool comes_true(const Holds& holds) {
   for (int i = 0; i < 10'000 && !holds(); ++i) std::this_thread::sleep_for(std::chrono::milliseconds(1));
   return holds();
 }
 
-/// The driver of a Falcon, turned at 1 kHz in real time as the haptic thread does.
+/// A Falcon driver stepped at 1 kHz in real time, like the haptic thread.
 struct FalconDriver {
   explicit FalconDriver(std::unique_ptr<usb::Pipe> pipe) : device({.firmware = fake_firmware(4096)}, std::move(pipe)) {}
 
@@ -50,8 +50,8 @@ struct FalconDriver {
     return turns_until([&] { return device.state() == state; }, force);
   }
 
-  /// Homes it by `home()`, arms `safe` around it and asks for `force` until `pushes()`, each as often as it takes:
-  /// a machine that stands still for long loses what it had.
+  /// Homes the device with `home()`, arms `safe` and requests `force` until `pushes()`. Repeats each step as needed,
+  /// because a machine that stalls loses these states.
   template <class Home, class Pushes>
   bool comes_to_push(SafeDevice& safe, const Vec3& force, const Home& home, const Pushes& pushes) {
     const LocalTime end = real_now() + std::chrono::seconds(30);
@@ -65,7 +65,7 @@ struct FalconDriver {
   }
 
   FalconDevice device;
-  Device* turned = &device;  ///< or one around it
+  Device* turned = &device;  ///< or a wrapper around it
   std::optional<PositionSample> sample;
   Vec3 written = Vec3::Zero();
   std::chrono::steady_clock::time_point due = std::chrono::steady_clock::now();

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The haptic half of the server on a Falcon through the real libusb, in this process, so that the heap calls of a step
-// can be counted. The whole server, as a process: tests/e2e/falcon_server_test.cc.
+// The haptic half of the server with a Falcon through the real libusb, in this process, so that the heap calls of a
+// step can be counted. tests/e2e/falcon_server_test.cc runs the complete server.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -36,8 +36,8 @@ RemoteForce answer(const DeviceState& state, std::uint64_t number, LocalTime now
 
 bool near(const Vec3& felt, const Vec3& written) { return (felt - written).norm() <= 0.1 + 0.2 * written.norm(); }
 
-// Without a limiter: with one, a machine that stands still for periods on end leaves next to nothing of a wall, as it
-// should. What is expected holds however late all of it is: nothing here is a time, or a share of them.
+// No limiter: on a machine that stalls for several periods it would rightly remove most of the wall. The expectations
+// do not depend on time.
 TEST(FalconLoop, AWallIsFeltThroughTheRealLibraryWithoutAHeapCallInTheLoop) {
   UsbfsShim shim({.has_firmware = true, .is_homed = true});
   FalconDevice device({}, usb::open_pipe({.node = [&shim] { return shim.node(); }}));
@@ -81,7 +81,7 @@ TEST(FalconLoop, AWallIsFeltThroughTheRealLibraryWithoutAHeapCallInTheLoop) {
     if (++steps % 10 == 0) {
       if (const DeviceState* state = mail->state.take()) mail->forces[0].put(answer(*state, steps, now));
     }
-    // Deep, and with a new position twice in a row, the motors have what was written in one of the two steps.
+    // After two new positions in a row inside the wall, the motors must have the command of one of these two steps.
     if (x > 0.005 && seen && seen_before) {
       const Vec3 felt = shim.with([](FakeFalcon& falcon) { return falcon.force(); });
       if (!near(felt, written) && !near(felt, written_before)) ++at_odds;
@@ -90,9 +90,9 @@ TEST(FalconLoop, AWallIsFeltThroughTheRealLibraryWithoutAHeapCallInTheLoop) {
   }
   loop.stop();
   EXPECT_EQ(heap_calls, 0U);
-  EXPECT_GT(pushed, 0U);  // a wrong sign anywhere pulls
-  // A step that waited finds a hand, and with it an arm of each motor, somewhere else; a reply that was given up
-  // answers the next question.
+  EXPECT_GT(pushed, 0U);  // a sign error would pull
+  // After a stalled step the hand is elsewhere, with different motor levers. A reply that timed out answers the next
+  // request.
   EXPECT_LE(at_odds, loop.stats().overruns + loop.stats().unseen);
 }
 

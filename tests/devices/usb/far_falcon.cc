@@ -24,9 +24,9 @@ namespace {
 
 using namespace std::chrono_literals;
 
-/// Above the threads of the server, as a device is.
+/// Above the threads of the server, like hardware.
 constexpr int kPriority = kHapticPriority + 15;
-/// So often the user's hand is moved.
+/// Period of the hand motion.
 constexpr Duration kRound = 1ms;
 
 LocalTime now() {
@@ -43,7 +43,7 @@ void close_if_open(int& file) {
   file = -1;
 }
 
-/// What libusb reads of a node first, and beside it the node.
+/// Sends the descriptors that libusb reads first, and the file descriptor of the node.
 bool send_node(int to, std::span<const std::uint8_t> descriptors, int file) {
   std::vector<std::uint8_t> bytes(descriptors.begin(), descriptors.end());
   iovec part{.iov_base = bytes.data(), .iov_len = bytes.size()};
@@ -158,7 +158,7 @@ void FarFalcon::serve(Session& session, LocalTime at) {
       tcflow(session.slave, TCOON);  // NOLINT(concurrency-mt-unsafe): nobody else writes to it
     }
     if (!heard) {
-      // From now on the end of the master says that nobody has the node.
+      // From here on the master end reports that the node is closed.
       close_if_open(session.cable);
       close_if_open(session.slave);
     }

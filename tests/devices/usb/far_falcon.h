@@ -18,60 +18,60 @@
 
 namespace tendon {
 
-/// A FakeFalcon in this process and in real time, that the real libusb of *another* process finds, opens and speaks to
-/// when that process has been started with `environment()`: tendond, not one byte of it changed.
+/// A FakeFalcon of this process in real time, which the real libusb of *another* process finds when started with
+/// `environment()`: an unmodified tendond.
 ///
 ///     tendond ── libusb ── far_usbfs (preloaded) ══ cable: a socket ══ FarFalcon, a FakeFalcon and the hand on it
 ///        └ guardian ──────── the node: a pty, of which FarFalcon has the master end ─┘
 ///
-/// For each opening of the node there is a new cable and a new pty. What a guardian writes to the node that it has been
-/// given comes out at the master end, after all that the dead process has sent by cable.
+/// Each time the node is opened, it gets a new cable and a new pty. Data that a guardian writes to its node arrives at
+/// the master end after all data that the dead process sent by cable.
 ///
-/// A thread of its own with the highest real-time priority that the system grants: it is hardware.
+/// Runs in its own thread at the highest real-time priority that the system grants, like hardware.
 ///
 /// Thread-safe.
 class FarFalcon {
  public:
-  /// `folder` is where its socket will be. Throws std::system_error.
+  /// Creates its socket in `folder`. Throws std::system_error.
   FarFalcon(const FakeFalcon::Options& options, const std::filesystem::path& folder);
   ~FarFalcon();
   FarFalcon(const FarFalcon&) = delete;
   FarFalcon& operator=(const FarFalcon&) = delete;
 
-  /// "NAME=value", for the process that is to find it.
+  /// "NAME=value" entries for the process that must find it.
   std::vector<std::string> environment() const;
 
-  /// Calls `act(falcon)` while nobody else touches it.
+  /// Calls `act(falcon)` with exclusive access.
   template <class Act>
   auto with(const Act& act) {
     const std::lock_guard lock(mutex_);
     return act(falcon_);
   }
-  /// What the user does with the device: called at least once in a millisecond, in its thread.
+  /// User of the device, called at least once per millisecond in the thread of FarFalcon.
   void set_user(std::function<void(FakeFalcon&, LocalTime)> user);
 
   void plug();
   void unplug();
 
   struct Seen {
-    bool open = false;                 ///< some process has the node open
-    std::uint64_t by_node = 0;         ///< packets that came through the node itself: a guardian's
-    std::vector<std::uint8_t> last{};  ///< the newest packet: the endpoint and its bytes
-    std::optional<LocalTime> let_go;   ///< when the motors last went from some torque to none
-    std::uint64_t pushes_begun = 0;    ///< times when they went from none to some
-    Duration longest_gap{};            ///< between two rounds of its thread: how long it stood still
+    bool open = false;                 ///< a process has the node open
+    std::uint64_t by_node = 0;         ///< packets through the node itself, from a guardian
+    std::vector<std::uint8_t> last{};  ///< newest packet: endpoint and bytes
+    std::optional<LocalTime> let_go;   ///< when the motor torque last became zero
+    std::uint64_t pushes_begun = 0;    ///< transitions from zero to nonzero torque
+    Duration longest_gap{};            ///< longest time between two periods of its thread
   };
   Seen seen() const;
 
  private:
   /// An open node.
   struct Session {
-    int cable = -1;   ///< −1: the process that opened it has closed it, or is dead
-    int master = -1;  ///< −1: nobody has it any more
-    int slave = -1;   ///< for its gate
+    int cable = -1;   ///< −1: closed by the process that opened it
+    int master = -1;  ///< −1: closed by every process
+    int slave = -1;   ///< used as a gate
     std::unique_ptr<socket_cable::Plug> plug;
     std::uint64_t said = 0;
-    std::vector<std::uint8_t> frames{};  ///< from the master end, not taken apart yet
+    std::vector<std::uint8_t> frames{};  ///< unparsed data from the master end
   };
 
   void run();

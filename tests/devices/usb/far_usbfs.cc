@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A library to be preloaded (LD_PRELOAD) into a program that uses libusb, tendond as it is: the kernel's part of USB,
-// with one Falcon plugged in that another process plays (FarFalcon). Libusb is the real one; what it asks the kernel
-// for ends here. Its search for devices ends here too: behind it are udev and sysfs, of which a machine for tests may
-// have neither.
+// Preload library (LD_PRELOAD) for a program that uses libusb, such as an unmodified tendond. It replaces the kernel's
+// part of USB with one plugged-in Falcon, which FarFalcon simulates in another process. Device enumeration is replaced
+// as well, because test machines may have neither udev nor sysfs.
 //
-// Nothing here has a thread: FarFalcon wakes libusb, by opening the gate of the node once it has sent something.
+// This library has no thread: FarFalcon wakes libusb by opening the gate of the node after sending.
 #include <dlfcn.h>
 #include <fcntl.h>
 #include <libusb.h>
@@ -31,10 +30,10 @@
 namespace tendon {
 namespace {
 
-/// What libusb makes of a node that it did not find itself (bus 0), and of USBDEVFS_CONNECTINFO.
+/// Name that libusb gives to a wrapped node (bus 0), consistent with USBDEVFS_CONNECTINFO.
 constexpr std::string_view kNode = "/dev/bus/usb/000/007";
 
-/// The socket of FarFalcon.
+/// Connects to the socket of FarFalcon.
 int connect_to_falcon() {
   const char* const path = std::getenv("TENDON_FAR_FALCON");  // NOLINT(concurrency-mt-unsafe): nobody sets it
   if (path == nullptr) return -1;
@@ -48,7 +47,7 @@ int connect_to_falcon() {
   return cable;
 }
 
-/// The node that comes with the cable, beside its descriptors; below 0 when nothing is plugged in.
+/// Receives the node with its descriptors. Negative: nothing is plugged in.
 int take_node(int cable, std::vector<std::uint8_t>& descriptors) {
   descriptors.resize(1024);
   iovec part{.iov_base = descriptors.data(), .iov_len = descriptors.size()};
@@ -114,7 +113,7 @@ class FarNode final : public UsbfsNode {
   bool gone_ = false;
 };
 
-/// The open node. Opened, used and closed by one thread, that of the pipe.
+/// The open node, used only by the thread of the pipe.
 std::unique_ptr<FarNode>& the_node() {
   static std::unique_ptr<FarNode> node;
   return node;
@@ -160,7 +159,7 @@ int close(int file) {
   return static_cast<int>(syscall(SYS_close, file));
 }
 
-/// Whoever may connect to the socket may open the node.
+/// Access to the socket implies access to the node.
 int access(const char* path, int mode) noexcept {
   return path == tendon::kNode ? 0 : static_cast<int>(syscall(SYS_faccessat, AT_FDCWD, path, mode));
 }
@@ -170,7 +169,7 @@ int libusb_init(libusb_context** context) {
   return tendon::next("libusb_init", &libusb_init)(context);
 }
 
-/// The device of the node, as libusb knows it when it is asked to make one of an open node.
+/// The device that libusb creates for a wrapped node.
 ssize_t libusb_get_device_list(libusb_context* context, libusb_device*** list) {
   auto** const devices = static_cast<libusb_device**>(std::calloc(2, sizeof(libusb_device*)));  // libusb frees it
   *list = devices;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// A model of a Falcon, and one of a SpaceMouse, plugged into the real kernel, and driven through its usbfs and the real
-// libusb. To be run by deploy/test-usb-kernel, in a machine of its own: an emulated one, whose times are figures for
-// the pages of the devices. Those that decide are compared with the floor that was measured in the same run.
+// Models of a Falcon and a SpaceMouse plugged into the real kernel and driven through its usbfs and the real libusb.
+// deploy/test-usb-kernel runs this in an emulated machine. Measured times appear on the device pages; the tests compare
+// them with the round trip measured in the same run.
 #include <fcntl.h>
 #include <gtest/gtest.h>
 #include <linux/usbdevice_fs.h>
@@ -135,7 +135,7 @@ TEST(UsbKernel, FromThePlugToTheForce) {
                                  Vec3::Zero()));
 }
 
-/// How long a packet and its reply take with nothing of ours between: one thread, the kernel's blocking calls.
+/// Returns times of a packet and its reply with one thread and blocking calls of the kernel.
 std::vector<double> bare_round_trips_ms(const std::string& node, int count) {
   const int file = open(node.c_str(), O_RDWR | O_CLOEXEC);
   unsigned interface = 0;
@@ -144,7 +144,7 @@ std::vector<double> bare_round_trips_ms(const std::string& node, int count) {
   std::array<std::uint8_t, usb::kPacketSize> packet{};
   usbdevfs_bulktransfer out{.ep = 0x02, .len = bytes.size(), .timeout = 1000, .data = bytes.data()};
   usbdevfs_bulktransfer in{.ep = 0x81, .len = packet.size(), .timeout = 1000, .data = packet.data()};
-  // What the driver has asked for, and did not stay to hear.
+  // Discards replies that the driver requested and did not read.
   for (int silent = 0; silent < 20; ++silent) {
     if (ioctl(file, USBDEVFS_BULK, &in) > static_cast<int>(usb::ftdi::kStatusBytes)) silent = 0;
   }
@@ -160,7 +160,7 @@ std::vector<double> bare_round_trips_ms(const std::string& node, int count) {
   return times;
 }
 
-// Gated on the floor of the same run: the machine is an emulated one, and may have little of the real one's time.
+// The limit is relative to the bare round trip of the same run, because an emulated machine may get little time.
 TEST(UsbKernel, ExchangesAtAKilohertzOrAsFastAsThisMachineCan) {
   std::optional<LocalTime> before;
   std::vector<double> intervals_ms;
@@ -198,7 +198,7 @@ TEST(UsbKernel, ExchangesAtAKilohertzOrAsFastAsThisMachineCan) {
   record_quantiles("between_commands_at_the_device_ms", intervals);
   record_quantiles("bare_round_trip_ms", trips_ms);
   ASSERT_EQ(trips_ms.size(), 1000U);
-  // A reply that misses its step is there for the next one.
+  // A reply that misses its step is read in the next one.
   const double in_steps = std::ceil(quantile(trips_ms, 0.5)) + 1;
   EXPECT_GE(seen, 0.5 * kTurns / in_steps);
 }
@@ -248,12 +248,12 @@ TEST(UsbKernel, WithoutItsSupplyTooItWantsFirmwareAndHoming) {
   EXPECT_TRUE(driver.turns_until([&] { return pushes(cable, falcon); }, kForce));
 }
 
-/// What a driver does until it is killed: this program, started with this word.
+/// Arguments that start this program as a driver to be killed.
 constexpr const char* kDrive = "--drive-guarded";
 constexpr const char* kDriveAlone = "--drive-alone";
 
 [[noreturn]] void drive(bool guarded) {
-  std::optional<Guardian> guardian;  // before there are threads
+  std::optional<Guardian> guardian;  // created before any thread
   auto config = to_falcon();
   if (guarded) {
     guardian.emplace();
@@ -267,7 +267,7 @@ constexpr const char* kDriveAlone = "--drive-alone";
   for (;;) driver.step(kForce);
 }
 
-/// A Falcon that another process drives, and that remembers when it last was let go.
+/// A Falcon driven by another process. Records when its force last ended.
 class Driven {
  public:
   explicit Driven(const char* how) {
@@ -283,7 +283,7 @@ class Driven {
   Driven(const Driven&) = delete;
   Driven& operator=(const Driven&) = delete;
 
-  /// When the kill was sent, while the Falcon was being pushed; empty when that never came about.
+  /// Sends SIGKILL while the Falcon is pushed and returns the time, or nothing if it was never pushed.
   std::optional<LocalTime> kill_in_mid_force() {
     int pushing = 0;
     int commands = 0;
@@ -297,7 +297,7 @@ class Driven {
     return kill_and_wait();
   }
 
-  std::optional<LocalTime> let_go;  ///< since when it has not been pushed any more
+  std::optional<LocalTime> let_go;  ///< start of the present time without force
   FakeFalcon falcon{kReady};
   UsbIpCable cable{falcon, [this](LocalTime at) {
                      if (falcon.pushes()) {
@@ -319,8 +319,7 @@ class Driven {
   pid_t pid_ = -1;
 };
 
-// Half of the runs: within 20 ms; or within four bare round trips, where this machine gets so little time from its host
-// that these take longer than 5 ms.
+// Half of the runs: within 20 ms, or within four bare round trips where these take longer than 5 ms.
 TEST(UsbKernel, AGuardedFalconHasNoForce20MillisecondsAfterItsDriversSigkill) {
   std::vector<double> took_ms;
   std::vector<double> trips_ms;
@@ -330,7 +329,7 @@ TEST(UsbKernel, AGuardedFalconHasNoForce20MillisecondsAfterItsDriversSigkill) {
     const auto killed = driven.kill_in_mid_force();
     ASSERT_TRUE(killed);
     ASSERT_TRUE(comes_true([&] { return !pushes(driven.cable, driven.falcon); }));
-    std::this_thread::sleep_for(20ms);  // who should push again had time to
+    std::this_thread::sleep_for(20ms);  // time for a wrong push
     driven.cable.with([&] {
       EXPECT_TRUE(driven.let_go);
       EXPECT_EQ(driven.falcon.lamps(), falcon::kRed) << "the last word is the guardian's";
@@ -354,7 +353,7 @@ TEST(UsbKernel, WithoutAGuardianItGoesOnPushing) {
   EXPECT_TRUE(pushes(driven.cable, driven.falcon));
 }
 
-/// The kernel's driver of the only interface there is, as sysfs names it.
+/// Name in sysfs of the kernel driver of the only interface.
 std::string kernel_driver(const std::string& port) {
   std::array<char, 256> target{};
   const std::string link = "/sys/bus/usb/devices/" + port + ":1.0/driver";
@@ -390,7 +389,7 @@ TEST(UsbKernel, ASpaceMouseIsTakenFromUsbhidAndGivenBack) {
   EXPECT_TRUE(comes_true([&] { return find(kId) && kernel_driver(find(kId)->port) == "usbhid"; }));
 }
 
-/// One JSON object for each test, a line each. Names and figures need no escapes.
+/// Writes one JSON object per test and line. Names and values need no escapes.
 class Lines final : public testing::EmptyTestEventListener {
  public:
   explicit Lines(const std::string& path) : out_(path) {}
@@ -420,7 +419,6 @@ int main(int argc, char** argv) {
     std::cerr << "usage: usb-kernel-test [RESULTS]; see deploy/test-usb-kernel\n";
     return 2;
   }
-  // Deleted by GoogleTest.
   if (argc == 2) testing::UnitTest::GetInstance()->listeners().Append(new tendon::Lines(argv[1]));
   return RUN_ALL_TESTS();
 }

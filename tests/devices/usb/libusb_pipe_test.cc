@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The real libusb, with threads and in real time, against a model of the kernel and of a Falcon. Each wait has a limit
-// of seconds; no test depends on how fast this machine is.
+// Real libusb with threads in real time, on a model of the kernel and a Falcon. Waits are limited to seconds, and no
+// test depends on the speed of the machine.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -65,7 +65,7 @@ TEST(LibusbPipe, ItsEndIsZeroForceTakenByTheDeviceAndNothingLeftOpen) {
     ASSERT_TRUE(loop.reaches(State::kHomed, kForce));
     ASSERT_TRUE(loop.turns_until([&] { return pushes(shim); }, kForce));
     EXPECT_TRUE(shim.counts().claimed);
-    loop.device.apply(Vec3::Zero());  // and at once the end
+    loop.device.apply(Vec3::Zero());  // followed directly by the end
   }
   EXPECT_FALSE(pushes(shim));
   EXPECT_EQ(shim.counts().open_transfers, 0);
@@ -113,7 +113,7 @@ TEST(LibusbPipe, UnpluggedInMidTransferItIsAbsentAndComesBackWithZeroForce) {
 
 const std::vector<std::uint8_t> kPacket(16, 'A');
 
-// Nobody above it asks for that.
+// No layer above the pipe requests this.
 TEST(LibusbPipe, ATransferThatFailsEndsTheConnectionWhateverTheReason) {
   using enum UsbfsShim::Trouble;
   for (const auto trouble : {kOverflow, kStall, kHang}) {
@@ -146,7 +146,7 @@ TEST(LibusbPipe, ItsThreadWakesForAnOrderAndSleepsWithout) {
   const auto pipe = pipe_to(shim);
   ASSERT_TRUE(comes_true([&] { return pipe->connection() != 0; }));
   shim.set_trouble(UsbfsShim::Trouble::kMute);
-  std::this_thread::sleep_for(20ms);  // nothing that comes in wakes it any more
+  std::this_thread::sleep_for(20ms);  // no incoming data can wake it
   const auto before = shim.counts().out;
   EXPECT_TRUE(pipe->write(kPacket));
   EXPECT_TRUE(comes_true([&] { return shim.counts().out == before + 1; }));
@@ -209,7 +209,7 @@ TEST(LibusbPipe, OrdersForAnOlderConnectionAreThrownAway) {
   shim.unplug();
   ASSERT_TRUE(comes_true([&] { return shim.counts().open_transfers == 0; }));
   shim.plug();
-  ASSERT_TRUE(comes_true([&] { return shim.counts().open_transfers > 0; }));  // it has it again; we have not looked
+  ASSERT_TRUE(comes_true([&] { return shim.counts().open_transfers > 0; }));  // resubmitted, and not yet read
   EXPECT_TRUE(pipe->write(kPacket));
   EXPECT_TRUE(comes_true([&] { return pipe->settled(); }));
   EXPECT_EQ(shim.counts().out, 0U);
@@ -225,7 +225,7 @@ TEST(LibusbPipe, RequestsAndDataReachTheDeviceInOrder) {
   UsbfsShim shim({.has_firmware = false, .firmware_bytes = 4096});
   const auto pipe = pipe_to(shim);
   ASSERT_TRUE(comes_true([&] { return pipe->connection() != 0; }));
-  // The greeting is understood at 9600 baud only: it must not overtake, nor be overtaken.
+  // The greeting is valid only at 9600 baud, so its order relative to the requests matters.
   const std::vector<std::uint8_t> greeting = {0x0A, 0x43, 0x0D};
   EXPECT_TRUE(pipe->request(usb::ftdi::divisor(2)));
   EXPECT_TRUE(pipe->request(usb::ftdi::divisor(0x4138)));
@@ -248,8 +248,8 @@ double quantile(std::vector<double> values, double share) {
   return values[static_cast<std::size_t>(share * static_cast<double>(values.size() - 1))];
 }
 
-// At 1 kHz nearly every period has its sample. Asserted against the floor: how much a thread that only sleeps is late
-// by on this machine, in the same run.
+// At 1 kHz nearly every period has a sample. The limit is relative to the lateness of a sleeping thread in the same
+// run.
 TEST(LibusbPipe, KeepsUpWithAKilohertz) {
   UsbfsShim shim(kReady);
   Loop loop(shim);

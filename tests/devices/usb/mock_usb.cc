@@ -59,7 +59,7 @@ void check(bool done, GError* error) {
 struct Unref {
   void operator()(UMockdevIoctlData* data) const { umockdev_ioctl_data_unref(data); }
 };
-/// Memory of the caller of an ioctl, as it was; what is written to it the caller gets when the ioctl ends.
+/// Copy of the ioctl caller's memory. Writes to it reach the caller when the ioctl ends.
 using Data = std::unique_ptr<UMockdevIoctlData, Unref>;
 
 Data resolve(UMockdevIoctlData* in, std::size_t at, std::size_t size) {
@@ -75,7 +75,7 @@ T& as(UMockdevIoctlData* data) {
 
 struct MockUsb::Testbed {
   UMockdevTestbed* bed = nullptr;
-  int addresses = 1;  ///< the bus itself has the first
+  int addresses = 1;  ///< the root hub has address 1
 
   void add(const std::string& path, int address, std::span<const std::uint8_t> descriptors) {
     const std::string node = node_of(address);
@@ -93,7 +93,7 @@ struct MockUsb::Testbed {
 MockUsb::MockUsb() : testbed_(std::make_unique<Testbed>()) {
   testbed_->bed = umockdev_testbed_new();
   if (umockdev_in_mock_environment() == 0) throw std::runtime_error("this program is not linked with umockdev-preload");
-  // The hub that a controller is: full speed, one configuration, one interrupt endpoint.
+  // Root hub: full speed, one configuration, one interrupt endpoint.
   constexpr std::array<std::uint8_t, 43> kHub = {18, 1, 0x10, 1, 9, 0, 0,  64,   0x6B, 0x1D, 1, 0, 0, 1, 0, 0, 0, 1,  //
                                                  9,  2, 25,   0, 1, 1, 0,  0xE0, 0,                                   //
                                                  9,  4, 0,    0, 1, 9, 0,  0,    0,                                   //
@@ -111,9 +111,9 @@ std::string MockUsb::really(const std::string& path) const {
   return real;
 }
 
-/// Everything here is under the port's lock.
+/// All members require the lock of the port.
 struct MockPort::Inside {
-  /// A transfer as libusb gave it to us.
+  /// Transfer submitted by libusb.
   struct Urb {
     Data urb;
     Data buffer;
@@ -140,10 +140,10 @@ struct MockPort::Inside {
   Inside(const Inside&) = delete;
   Inside& operator=(const Inside&) = delete;
 
-  // What umockdev makes of a node is a file, on which poll() never waits: libusb's thread would spin. So the node leads
-  // to the slave end of a pseudo-terminal. Its output is stopped while no transfer waits to be fetched (no POLLOUT),
-  // and its master end is closed when the plug is pulled (POLLERR), as usbfs does. What it cannot do is to be read as a
-  // file of descriptors: that is done below.
+  // umockdev represents a node as a file, on which poll() never blocks, so libusb's thread would spin. The node
+  // therefore leads to the slave end of a pseudo-terminal. Like usbfs, its output stops while no transfer can be
+  // fetched (no POLLOUT), and its master end closes on unplug (POLLERR). Reading descriptors from the node is emulated
+  // below.
   void open_node() {
     std::array<char, 64> name{};
     if (openpty(&master, &slave, name.data(), nullptr, nullptr) != 0) throw std::runtime_error("no pseudo-terminal");
@@ -166,7 +166,7 @@ struct MockPort::Inside {
       *end = -1;
     }
   }
-  // Nothing is written to this terminal, by no thread.
+  // No thread writes to this terminal.
   // NOLINTNEXTLINE(concurrency-mt-unsafe)
   void gate(bool open) const { tcflow(slave, open ? TCOON : TCOOFF); }
 
@@ -175,7 +175,7 @@ struct MockPort::Inside {
     while (!stop) {
       const LocalTime at = now();
       while (plugged && !waiting.empty() && model.next_in() <= at) let_in(at);
-      // The model may be moved by others, who do not tell.
+      // The model may be changed without notification.
       changed.wait_for(lock, std::clamp<Duration>(plugged && !waiting.empty() ? model.next_in() - at : Duration::max(),
                                                   std::chrono::microseconds(10), std::chrono::milliseconds(5)));
     }
@@ -230,7 +230,7 @@ struct MockPort::Inside {
     return static_cast<off_t>(position);
   }
 
-  /// Result and errno.
+  /// Returns result and errno.
   std::pair<int, int> obey(unsigned long request, UMockdevIoctlData* argument) {
     if (!plugged && request != USBDEVFS_REAPURBNDELAY && request != USBDEVFS_DISCARDURB) return {-1, ENODEV};
     switch (request) {
@@ -244,11 +244,11 @@ struct MockPort::Inside {
             .devnum = static_cast<unsigned>(address), .slow = 0};
         return {0, 0};
       case USBDEVFS_GET_SPEED:
-        return {2, 0};  // full
+        return {2, 0};  // full speed
       case USBDEVFS_CONTROL: {
         const Data transfer = resolve(argument, 0, sizeof(usbdevfs_ctrltransfer));
         if (as<usbdevfs_ctrltransfer>(transfer.get()).bRequest != 8) return {-1, EPIPE};
-        // GET_CONFIGURATION is all that libusb asks for
+        // libusb sends only GET_CONFIGURATION
         as<std::uint8_t>(resolve(transfer.get(), offsetof(usbdevfs_ctrltransfer, data), 1).get()) = 1;
         return {1, 0};
       }
@@ -257,7 +257,7 @@ struct MockPort::Inside {
       case USBDEVFS_RELEASEINTERFACE:
         return {0, 0};
       case USBDEVFS_GETDRIVER:
-      case USBDEVFS_IOCTL:  // is a driver of the kernel bound? None is
+      case USBDEVFS_IOCTL:  // no kernel driver is bound
         return {-1, ENODATA};
       case USBDEVFS_SUBMITURB:
         submit(argument);
@@ -299,8 +299,8 @@ struct MockPort::Inside {
     return TRUE;
   }
 
-  static std::array<std::atomic<Inside*>, 10> all;  ///< by number
-  /// That whose node it is; null when of none.
+  static std::array<std::atomic<Inside*>, 10> all;  ///< indexed by port number
+  /// Returns the owner of a node, or null.
   static Inside* of(int file);
 
   MockUsb& usb;
@@ -314,7 +314,7 @@ struct MockPort::Inside {
   int master = -1;
   int slave = -1;
   std::atomic<dev_t> terminal{0};
-  std::size_t position = 0;  ///< of who reads the descriptors
+  std::size_t position = 0;  ///< read position in the descriptors
   std::deque<Urb> waiting;   ///< IN
   std::deque<Urb> done;
   int open_transfers = 0;
@@ -398,7 +398,7 @@ int MockPort::woken_for_nothing() const {
 
 }  // namespace tendon
 
-// libusb's calls find these before those of the preload and of the C library, because the program exports them.
+// The program exports these functions, so libusb's calls resolve to them before the preload and the C library.
 extern "C" {
 
 ssize_t read(int file, void* to, std::size_t size) {

@@ -9,20 +9,20 @@
 
 namespace tendon {
 
-/// A machine's USB as umockdev makes it up: the real libusb finds what is plugged in in its sysfs, hears of it by its
-/// udev, and reaches it through nodes whose ioctls end in this process. The paths of this process, and of those that it
-/// forks, are turned to it by umockdev-preload, which the program has to be linked with.
+/// The USB of a machine simulated by umockdev: the real libusb finds devices in its sysfs, gets its udev events, and
+/// reaches nodes whose ioctls end in this process. umockdev-preload, which the program must be linked with, redirects
+/// the paths of this process and its children.
 ///
-/// One in a process, made before there are other threads. No use for times: each ioctl is messages through a socket.
+/// One per process, constructed before other threads. Not for timing: each ioctl sends messages through a socket.
 class MockUsb {
  public:
   MockUsb();
-  /// Nobody may have a device open any more.
+  /// All devices must be closed.
   ~MockUsb();
   MockUsb(const MockUsb&) = delete;
   MockUsb& operator=(const MockUsb&) = delete;
 
-  /// Where a path of that machine is in the file system of this one.
+  /// Returns the path in the real file system of a path of the simulated machine.
   std::string really(const std::string& path) const;
 
  private:
@@ -31,25 +31,25 @@ class MockUsb {
   std::unique_ptr<Testbed> testbed_;
 };
 
-/// One of its plugs, and the model that belongs there, in real time. Thread-safe.
+/// One port of the machine and its device model, in real time. Thread-safe.
 class MockPort {
  public:
-  /// Port `number` of bus 1, 1 to 9. Nothing is plugged in. Both must outlive it.
+  /// Port `number` of bus 1, 1 to 9, initially empty. `usb` and `model` must outlive it.
   MockPort(MockUsb& usb, int number, UsbModel& model);
   ~MockPort();
   MockPort(const MockPort&) = delete;
   MockPort& operator=(const MockPort&) = delete;
 
-  /// Each time at another address, as a kernel does.
+  /// Uses a new address each time, like the kernel.
   void plug();
-  /// As a kernel does: transfers end, the node is dead, then the device is gone from sysfs, and udev says so.
+  /// Like the kernel: transfers end, the node fails, the device leaves sysfs, and udev sends an event.
   void unplug();
 
-  std::string node() const;       ///< of what is plugged in: "/dev/bus/usb/001/002"
-  int open_transfers() const;     ///< given to us, not fetched back yet
-  int woken_for_nothing() const;  ///< how often libusb was
+  std::string node() const;       ///< of the plugged device: "/dev/bus/usb/001/002"
+  int open_transfers() const;     ///< submitted and not yet reaped
+  int woken_for_nothing() const;  ///< wake-ups of libusb without a transfer
 
-  /// Calls `act()` while nobody else touches the model.
+  /// Calls `act()` with exclusive access to the model.
   template <class Act>
   auto with(const Act& act) const {
     const std::lock_guard lock(mutex_);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The real libusb and the real libudev on a machine that umockdev makes up. Each wait has a limit of seconds.
+// Real libusb and libudev on a machine simulated by umockdev. Waits are limited to seconds.
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -72,14 +72,14 @@ TEST_F(MockUsbTest, DevicesAreListedWhereTheyArePluggedInAndNotWhenTheyAreOut) {
   EXPECT_EQ(report(), "");
 }
 
-// As seen by who is not root, which a container's first user is, and who may open whatever there is.
+// The default user of a container is root and may open every node, so this runs without privileges.
 TEST_F(MockUsbTest, AForbiddenAnUnpluggedAndAMissingNodeAreToldApart) {
   const auto look = [] {
     const auto lacks = [] {
       const auto reports = report_devices(usb::plugged_in(), "");
       return reports.empty() ? "nothing" : reports[0].lacks.empty() ? "no lack" : reports[0].lacks[0].what;
     };
-    // Whoever has never seen the machine's udev may not write where umockdev's is.
+    // A process that has not connected to the machine's udev may not write to the socket of umockdev.
     return as_nobody(lacks);
   };
   ASSERT_EQ(chmod(usb.really("/").c_str(), 0777), 0);
@@ -109,7 +109,7 @@ TEST_F(MockUsbTest, ThePipeSaysOnceWhyItOpensNothing) {
     const std::lock_guard lock(mutex);
     return !told.empty();
   }));
-  std::this_thread::sleep_for(500ms);  // it looks five times a second
+  std::this_thread::sleep_for(500ms);  // it polls five times a second
   const std::lock_guard lock(mutex);
   EXPECT_EQ(told, (std::vector<std::string>{port.node() +
                                             " cannot be opened: No such file or directory; see `tendond devices`"}));

@@ -10,28 +10,29 @@
 
 namespace tendon {
 
-/// A full-speed device with one interface, as far as its cable shows it: what the adapters of all tiers are written for
-/// (tests/devices/README.md). A model says what the wire would say at the time it is asked; nothing in it waits or
-/// reads a clock, so it is the same behind a pipe in memory, the real libusb and a real kernel.
+/// Full-speed device with one interface, as seen from its cable. The adapters of all tiers use this interface
+/// (tests/devices/README.md). A model reports the state of the bus at the given time without waiting or reading a
+/// clock, so it behaves identically behind a memory pipe, the real libusb and a real kernel.
 class UsbModel {
  public:
   virtual ~UsbModel() = default;
 
-  /// As a usbfs node reads (USB 2.0, 9.6): 18 bytes of the device, then its one configuration with all that is in it.
+  /// Contents of the usbfs node (USB 2.0, 9.6): device descriptor of 18 bytes, then the complete configuration.
   virtual std::span<const std::uint8_t> descriptors() const = 0;
-  /// What an HID device says its reports mean (HID 1.11, 6.2.2).
+  /// HID report descriptor (HID 1.11, 6.2.2).
   virtual std::span<const std::uint8_t> report_descriptor() const { return {}; }
 
   virtual void plug() = 0;
   virtual void unplug() = 0;
 
-  /// A vendor request without data; false: stalled.
+  /// Vendor request without data. Returns false for a stall.
   virtual bool request(LocalTime now, std::uint8_t request, std::uint16_t value) = 0;
-  /// One OUT transfer; false: stalled.
+  /// OUT transfer. Returns false for a stall.
   virtual bool write(LocalTime now, std::span<const std::uint8_t> bytes) = 0;
-  /// When an IN transfer that waits would end, unless something else happens before; LocalTime::max(): then only.
+  /// Completion time of a waiting IN transfer unless another event precedes it; LocalTime::max() if only an event can
+  /// complete it.
   virtual LocalTime next_in() const = 0;
-  /// What it would bring.
+  /// Data of that transfer.
   virtual std::vector<std::uint8_t> take_in(LocalTime now) = 0;
 
  protected:
@@ -40,7 +41,7 @@ class UsbModel {
   UsbModel& operator=(const UsbModel&) = default;
 };
 
-/// Bytes of `descriptors` that are the device's; the rest is the configuration's.
+/// Length of the device descriptor at the start of `descriptors`.
 inline constexpr std::size_t kDeviceDescriptor = 18;
 
 }  // namespace tendon

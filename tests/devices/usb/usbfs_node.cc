@@ -23,8 +23,8 @@ int refuse(int error) {
   return -1;
 }
 
-/// Of a process that has been given the open node by the one that claimed it, and knows no more of it: a guardian. What
-/// it writes goes through the node itself, behind endpoint and size, to whoever has the master end.
+/// A guardian has only the open node, inherited from the process that claimed it. Its writes go through the node, after
+/// endpoint and size, to the holder of the master end.
 int bulk_through(int file, const usbdevfs_bulktransfer& transfer) {
   std::array<std::uint8_t, 66> frame{};
   if (transfer.len > frame.size() - 2) return refuse(EINVAL);
@@ -64,7 +64,7 @@ void UsbfsNode::set_file(int slave) {
   gate(false);
 }
 
-// Unsafe for threads that write to one terminal: while this process has the node, nobody does.
+// Not thread-safe for concurrent writes to the terminal. Nothing writes while this process has the node.
 // NOLINTNEXTLINE(concurrency-mt-unsafe)
 void UsbfsNode::gate(bool open) const { tcflow(file_, open ? TCOON : TCOOFF); }
 
@@ -133,7 +133,7 @@ int UsbfsNode::fetch(void** urb) {
   if (done_.empty()) {
     ++counts_.fetched_nothing;
     if (!gone()) gate(false);
-    look();  // what has come before the gate was closed
+    look();  // data from before the gate was closed
   }
   if (done_.empty()) return refuse(gone() ? ENODEV : EAGAIN);
   *urb = done_.front();
@@ -155,10 +155,10 @@ int UsbfsNode::control(unsigned long request, void* argument) {
       *static_cast<usbdevfs_connectinfo*>(argument) = {.devnum = 7, .slow = 0};
       return 0;
     case USBDEVFS_GET_SPEED:
-      return 2;  // full
+      return 2;  // full speed
     case USBDEVFS_CONTROL: {
       auto& transfer = *static_cast<usbdevfs_ctrltransfer*>(argument);
-      if (transfer.bRequest != 8) return refuse(EPIPE);  // GET_CONFIGURATION is all that libusb asks for
+      if (transfer.bRequest != 8) return refuse(EPIPE);  // libusb sends only GET_CONFIGURATION
       *static_cast<std::uint8_t*>(transfer.data) = 1;
       return 1;
     }
@@ -170,7 +170,7 @@ int UsbfsNode::control(unsigned long request, void* argument) {
       counts_.claimed = false;
       return 0;
     case USBDEVFS_GETDRIVER:
-    case USBDEVFS_IOCTL:  // is a driver of the kernel bound? None is
+    case USBDEVFS_IOCTL:  // no kernel driver is bound
       return refuse(ENODATA);
     case USBDEVFS_SUBMITURB:
       return submit(static_cast<usbdevfs_urb*>(argument));
@@ -205,7 +205,8 @@ off_t UsbfsNode::seek(off_t to) {
 
 }  // namespace tendon
 
-// libusb's calls find these before those of the C library: the program exports them, or they are preloaded.
+// libusb's calls resolve to these functions before the C library, because the program exports them or they are
+// preloaded.
 extern "C" {
 
 int ioctl(int file, unsigned long request, ...) noexcept {

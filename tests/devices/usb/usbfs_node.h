@@ -13,15 +13,14 @@
 
 namespace tendon {
 
-/// A node of usbfs (/dev/bus/usb/…) that the real libusb takes for one: the kernel's part of USB, as far as libusb asks
-/// for it. What is at the other end of the cable, a derived class says. usbfs_node.cc defines ioctl, read and lseek;
-/// libusb's calls of them end there when they name the node, and in the kernel when not.
+/// A usbfs node (/dev/bus/usb/…) for the real libusb that emulates the calls which libusb needs. A derived class
+/// implements the other end of the cable. usbfs_node.cc defines ioctl, read and lseek: calls for this node end there,
+/// and others go to the kernel.
 ///
-/// The node is the slave end of a pseudo-terminal, because poll() has to work on it: its output is stopped while no
-/// transfer waits to be fetched (no POLLOUT), and the master end is closed when the device is unplugged (POLLERR), as
-/// usbfs does.
+/// The node is the slave end of a pseudo-terminal, because poll() must work on it. Like usbfs, its output stops while
+/// no transfer can be fetched (no POLLOUT), and the master end closes on unplug (POLLERR).
 ///
-/// One at a time in a process. Thread-safe.
+/// One per process. Thread-safe.
 class UsbfsNode {
  public:
   UsbfsNode();
@@ -30,18 +29,18 @@ class UsbfsNode {
   UsbfsNode& operator=(const UsbfsNode&) = delete;
 
   struct Counts {
-    std::uint64_t in = 0;               ///< IN transfers that brought something
-    std::uint64_t out = 0;              ///< OUT transfers that were taken
-    std::uint64_t interrupt = 0;        ///< transfers of interrupt type, of those that were begun,
-    std::uint64_t bulk = 0;             ///< and of bulk type
-    std::uint64_t fetched_nothing = 0;  ///< times when libusb was woken for nothing
-    int open_transfers = 0;             ///< given to us, not fetched back yet
-    int most_in = 0;                    ///< IN transfers that waited at one time
+    std::uint64_t in = 0;               ///< IN transfers with data
+    std::uint64_t out = 0;              ///< accepted OUT transfers
+    std::uint64_t interrupt = 0;        ///< submitted interrupt transfers
+    std::uint64_t bulk = 0;             ///< submitted bulk transfers
+    std::uint64_t fetched_nothing = 0;  ///< wake-ups of libusb without a transfer
+    int open_transfers = 0;             ///< submitted and not yet reaped
+    int most_in = 0;                    ///< largest number of waiting IN transfers
     bool claimed = false;
   };
   Counts counts() const;
 
-  // What the three functions call.
+  // Called by the three functions.
   static UsbfsNode* of(int file);
   int control(unsigned long request, void* argument);
   ssize_t read(void* to, std::size_t size);
@@ -55,19 +54,18 @@ class UsbfsNode {
   virtual std::span<const std::uint8_t> descriptors() const = 0;
   virtual bool request(std::uint8_t request, std::uint16_t value) = 0;
   virtual Taken write(std::span<const std::uint8_t> bytes) = 0;
-  /// An IN transfer has begun to wait.
+  /// An IN transfer was submitted.
   virtual void awaited() = 0;
-  /// libusb looks whether a transfer has ended, and none has yet.
+  /// libusb polls, and no transfer has ended.
   virtual void look() {}
 
-  // For the derived class, with mutex_ held.
-  /// The slave end: ours from now on, closed with the node before it.
+  // For the derived class, with mutex_ held. Takes ownership of the slave end and closes the previous one.
   void set_file(int slave);
   int file() const { return file_; }
   void finish(usbdevfs_urb* urb, int status, int size);
-  /// The oldest waiting IN transfer brings `packet`.
+  /// Completes the oldest waiting IN transfer with `packet`.
   void bring(std::span<const std::uint8_t> packet);
-  /// All that wait end, as at the end of a device.
+  /// Completes all waiting transfers as on device removal.
   void finish_all();
   void gate(bool open) const;
 

@@ -10,7 +10,7 @@
 
 namespace tendon {
 
-/// A FakeFalcon behind a usbfs node, in this process and in real time.
+/// A FakeFalcon behind a usbfs node of this process, in real time.
 ///
 /// Thread-safe.
 class UsbfsShim final : public UsbfsNode {
@@ -18,23 +18,23 @@ class UsbfsShim final : public UsbfsNode {
   explicit UsbfsShim(const FakeFalcon::Options& options);
   ~UsbfsShim() override;
 
-  /// The open node; below 0 while nothing is plugged in.
+  /// Returns the open node, negative while nothing is plugged in.
   int node() const;
 
   void unplug();
   void plug();
 
-  /// Trouble below the device's own: how transfers end.
+  /// Transfer errors below the device's own faults.
   enum class Trouble {
     kNone,
-    kOverflow,  ///< IN: the device sends more than it was asked for
+    kOverflow,  ///< IN: more data than requested
     kStall,     ///< IN: the endpoint is halted
-    kMute,      ///< IN: brings nothing, not even the chip's status
-    kHang,      ///< OUT: takes nothing, and says nothing
+    kMute,      ///< IN: no data and no chip status
+    kHang,      ///< OUT: never completes
   };
   void set_trouble(Trouble trouble);
 
-  /// Calls `act(falcon)` while nobody else touches it.
+  /// Calls `act(falcon)` with exclusive access.
   template <class Act>
   auto with(const Act& act) const {
     const std::lock_guard lock(mutex_);

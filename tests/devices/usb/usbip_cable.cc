@@ -22,19 +22,19 @@ namespace {
 
 using namespace std::chrono_literals;
 
-// Numbers of the protocol are big-endian; a header has 48 bytes: five numbers that all have, five of the command's own,
-// and the set-up packet of a control transfer.
+// Numbers are big-endian. A header has 48 bytes: five common fields, five fields of the command, and the setup packet
+// of a control transfer.
 constexpr std::uint32_t kSubmit = 1;
 constexpr std::uint32_t kUnlink = 2;
 constexpr std::uint32_t kSubmitted = 3;
 constexpr std::uint32_t kUnlinked = 4;
 
-/// Bus 1, device 1 at the far side: what the kernel wants to be told, and does not use.
+/// Bus 1, device 1 at the remote side. The kernel requires these and ignores them.
 constexpr std::uint32_t kFarId = 0x10001;
 constexpr int kFullSpeed = 2;
 constexpr int kPorts = 8;
 
-// What the kernel asks of every device (USB 2.0, 9.4; HID 1.11, 7).
+// Standard requests of the kernel (USB 2.0, 9.4; HID 1.11, 7).
 constexpr std::uint8_t kVendorRequest = 0x40;
 constexpr std::uint8_t kFromDevice = 0x80;
 constexpr std::uint8_t kFromInterface = 0x81;
@@ -58,7 +58,7 @@ bool receive(int end, void* to, std::size_t size) {
   return recv(end, to, size, MSG_WAITALL) == static_cast<ssize_t>(size);
 }
 
-/// Which of its ports are free the kernel says by refusing the others; one that was just left is free a little later.
+/// The kernel rejects ports in use. A port becomes free some time after detaching.
 bool attach(int socket) {
   for (int tries = 0; tries < 500; ++tries) {
     for (int port = 0; port < kPorts; ++port) {
@@ -82,7 +82,7 @@ struct UsbIpCable::Order {
   std::uint32_t number = 0;
   bool in = false;
   std::uint32_t endpoint = 0;
-  std::uint32_t unlinked = 0;  ///< the transfer that is wanted back
+  std::uint32_t unlinked = 0;  ///< number of the transfer to cancel
   std::size_t size = 0;
   std::array<std::uint8_t, 8> setup{};
 };
@@ -123,7 +123,7 @@ void UsbIpCable::unplug() {
 
 void UsbIpCable::run() {
   while (!stop_) {
-    Duration most = 5ms;  // somebody may have moved the model
+    Duration most = 5ms;  // the model may have been changed
     {
       const std::lock_guard lock(mutex_);
       let_in(now());
@@ -186,7 +186,7 @@ void UsbIpCable::obey_control(const Order& order) {
   } else if (type == kFromInterface && request == kGetDescriptor && high == kDescribeReports) {
     give(model_.report_descriptor());
   } else if (type == kFromDevice && request == kGetStatus) {
-    give(std::array<std::uint8_t, 2>{1, 0});  // has its own supply
+    give(std::array<std::uint8_t, 2>{1, 0});  // self-powered
   } else if (!order.in && type <= 1) {
     answer(order.number, 0, 0);  // configuration, alternate setting, features
   } else {
@@ -225,7 +225,7 @@ void UsbIpCable::answer_unlink(std::uint32_t number, std::uint32_t unlinked) {
 }
 
 void UsbIpCable::send(std::span<const std::uint8_t> bytes) {
-  // Fails when the kernel has left: the next order is then the end.
+  // Fails after the kernel closes the socket. Reading the next order reports this.
   [[maybe_unused]] const ssize_t sent = ::send(end_, bytes.data(), bytes.size(), MSG_NOSIGNAL);
 }
 

@@ -14,19 +14,19 @@
 
 namespace tendon {
 
-/// A model at the end of a cable to the real kernel, in real time: it speaks USB/IP (Linux,
-/// Documentation/usb/usbip_protocol.rst) over one end of a pair of sockets, and the other end is given to the kernel's
-/// virtual host controller, vhci_hcd. Enumeration, usbfs, usbhid, disconnection are then the kernel's own.
+/// Connects a model to the real kernel in real time. It speaks USB/IP (Linux, Documentation/usb/usbip_protocol.rst)
+/// over one end of a socket pair, and the virtual host controller vhci_hcd gets the other end. Enumeration, usbfs,
+/// usbhid and disconnection are those of the kernel.
 ///
-/// Wants root, and vhci_hcd loaded: deploy/test-usb-kernel runs it in a machine of its own.
+/// Requires root and the vhci_hcd module. deploy/test-usb-kernel runs it in a separate machine.
 ///
 /// Thread-safe.
 class UsbIpCable {
  public:
-  /// After each OUT transfer that the model took: when that was. Nobody else touches the model meanwhile.
+  /// Called after each accepted OUT transfer with its time and with exclusive access to the model.
   using Watch = std::function<void(LocalTime)>;
 
-  /// Plugs it in. Throws std::runtime_error, with a sentence, when the kernel does not take it.
+  /// Plugs the device in. Throws std::runtime_error if the kernel rejects it.
   explicit UsbIpCable(UsbModel& model, Watch watch = {});
   ~UsbIpCable();
   UsbIpCable(const UsbIpCable&) = delete;
@@ -35,7 +35,7 @@ class UsbIpCable {
   void plug();
   void unplug();
 
-  /// Calls `act()` while nobody else touches the model.
+  /// Calls `act()` with exclusive access to the model.
   template <class Act>
   auto with(const Act& act) const {
     const std::lock_guard lock(mutex_);
@@ -43,9 +43,9 @@ class UsbIpCable {
   }
 
  private:
-  /// A transfer of the kernel's, or its wish to have one back, as it came.
+  /// Submit or unlink request of the kernel.
   struct Order;
-  /// An IN transfer that waits for the device.
+  /// IN transfer that waits for data.
   struct Waiting {
     std::uint32_t number = 0;
     std::size_t size = 0;

@@ -67,7 +67,7 @@ TEST(WoodenHapticsDevice, CountersNotSetAsToldAreNoCalibration) {
   EXPECT_TRUE(bench.reaches(State::kHomed, 1s));
 }
 
-// Found by tests/fuzz: whoever does not answer has not asked again.
+// Found by tests/fuzz: a board that stops answering has not requested a second calibration.
 TEST(WoodenHapticsDevice, TheCountersAreNotSetAgainUnlessItIsAskedForAgain) {
   int until_set = 0;
   for (const bool silent : {false, true}) {
@@ -81,20 +81,20 @@ TEST(WoodenHapticsDevice, TheCountersAreNotSetAgainUnlessItIsAskedForAgain) {
     }
     for (int i = 1; i < until_set; ++i) bench.step();
     ASSERT_EQ(bench.arm.calibrations(), 0) << "command 1 is on the bus";
-    bench.arm.set_fault(Fault::kSilent);  // the last that is heard of it is the request
+    bench.arm.set_fault(Fault::kSilent);  // the request is its last message
     bench.run(90ms);
     EXPECT_EQ(bench.arm.calibrations(), 1);
   }
 }
 
-// Nobody knows what became of its counters meanwhile.
+// The counters may have changed while unplugged.
 TEST(WoodenHapticsDevice, ABoardThatWasCalibratedBeforeIsNotBelievedToBe) {
   for (const bool own_supply : {false, true}) {
     Bench bench({.own_supply = own_supply});
     ASSERT_TRUE(bench.reaches(State::kHomed, 1s));
     bench.run(20ms, kForce);
     bench.arm.unplug();
-    bench.arm.plug();  // between two turns
+    bench.arm.plug();  // between two periods
     bench.step(kForce);
     EXPECT_EQ(bench.device.state(), State::kAbsent);
     EXPECT_FALSE(bench.sample);

@@ -27,7 +27,7 @@ int FakeWoodenHaptics::counts(std::size_t motor) const {
 }
 
 void FakeWoodenHaptics::reset() {
-  for (std::size_t i = 0; i < 3; ++i) origin_[i] = -counts(i);  // quadrature has no index: it begins at 0
+  for (std::size_t i = 0; i < 3; ++i) origin_[i] = -counts(i);  // quadrature without an index: counters start at 0
   begun_ = calibrate_ = calibrated_ = amplifiers_on_ = false;
   current_ma_ = {};
   told_.reset();
@@ -112,7 +112,7 @@ void FakeWoodenHaptics::frame(LocalTime at) {
   if (at >= *boots_ && fault_ != Fault::kHangs) run(at);
 }
 
-// One report of the firmware's loop in each frame: it says one, and then waits for the next.
+// One iteration of the firmware loop per frame: sends a report, then waits for the next one.
 void FakeWoodenHaptics::run(LocalTime at) {
   if (in_buffer_) return;
   if (begun_) {
@@ -157,12 +157,12 @@ void FakeWoodenHaptics::say(LocalTime at) {
   put(fault_ == Fault::kGarblesAll ? 7 : calibrate_ ? 1 : 0);
 
   const bool third = said_ % 3 == 0;
-  in_buffer_.emplace();  // of size 0: nothing is put on the bus
+  in_buffer_.emplace();  // a report of size 0 is not sent
   if (fault_ == Fault::kSilent || (fault_ == Fault::kDropsSome && third)) return;
   if (fault_ == Fault::kBabbles || fault_ == Fault::kBabblesOnly) {
     std::vector<std::uint8_t> noise(1 + dice_.bits() % 64);
     for (auto& byte : noise) byte = static_cast<std::uint8_t>(dice_.bits());
-    if (noise.size() == kReport) noise.pop_back();  // else it might be one
+    if (noise.size() == kReport) noise.pop_back();  // otherwise it might be a valid report
     if (plugged_ && host_) to_host_.emplace_back(at + kFrame, noise);
     if (fault_ == Fault::kBabblesOnly) return;
   }

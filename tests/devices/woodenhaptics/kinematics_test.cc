@@ -20,7 +20,7 @@ using published_arm::Arm;
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
-/// Evenly in the published workspace, where all of the force may be given.
+/// Returns a uniformly distributed pose in the published workspace with full force.
 Pose place(Dice& dice, const Model& model) {
   for (;;) {
     const auto pose = pose_at(model, model.workspace_radius * std::cbrt(dice.uniform()) * dice.direction());
@@ -80,7 +80,7 @@ TEST(WoodenHapticsKinematics, TheTipIsWhereTheTurnedLinksEnd) {
   }
 }
 
-// (0, 0, 6000) or (0, 0, -5000): the upper link upright, the lower one level, straight ahead.
+// (0, 0, 6000) or (0, 0, -5000): upper link upright, lower link level and straight ahead.
 TEST(WoodenHapticsKinematics, CalibratedTheUpperLinkIsUprightTheLowerLevel) {
   for (const char* name : {"woodenhaptics_v2019", "woodenhaptics_v2015", "polhem_v1"}) {
     const Model& model = *find_model(name);
@@ -118,7 +118,7 @@ TEST(WoodenHapticsKinematics, InverseUndoesForwardWithTheElbowOutwards) {
       const double b = dice.within(-1, 1.5);
       const Vec3 angles(dice.within(-3, 3), b, dice.within(0.05, 3) - b);
       const Pose pose = pose_with(model, angles);
-      if (force_share(model, pose) == 0) continue;  // also above the column, where A turns by half
+      if (force_share(model, pose) == 0) continue;  // includes points above the column, where A rotates by half a turn
       const auto again = pose_at(model, pose.position);
       ASSERT_TRUE(again);
       ASSERT_LT((again->angles - angles).norm(), 1e-9) << angles.transpose();
@@ -135,7 +135,7 @@ TEST(WoodenHapticsKinematics, TheJacobianIsTheDerivativeOfThePosition) {
       const Vec3 angles = 3 * dice.direction();
       worst = std::max(worst, (pose_with(model, angles).jacobian - arm.numeric_jacobian(angles)).cwiseAbs().maxCoeff());
     }
-    EXPECT_LE(worst, 1e-9) << model.name;  // m/rad, of some 0.2
+    EXPECT_LE(worst, 1e-9) << model.name;  // m/rad, of about 0.2
   }
 }
 
@@ -171,7 +171,7 @@ TEST(WoodenHapticsKinematics, CurrentsDoTheWorkOfTheForce) {
       const Vec3 torque = amperes.cwiseProduct(arm.per_ampere());
       const Vec3 turn = 1e-4 * dice.direction();
       const Vec3 moved = arm.position_at(pose.angles + turn) - arm.position_at(pose.angles - turn);
-      // A mA of each motor is lost by rounding.
+      // Rounding error: 1 mA per motor.
       const double lost = 1e-3 * arm.per_ampere().cwiseProduct(2 * turn).cwiseAbs().sum();
       ASSERT_NEAR(torque.dot(2 * turn), force.dot(moved), lost + 1e-11);
       const auto given = force_of(model, pose, currents);
@@ -181,14 +181,14 @@ TEST(WoodenHapticsKinematics, CurrentsDoTheWorkOfTheForce) {
   }
 }
 
-// Published: torque constant, capstan and lengths; the arithmetic here is by hand.
+// Torque constant, capstan and lengths are published; the arithmetic was done by hand.
 TEST(WoodenHapticsKinematics, ANewtonUpwardsTakesTheCurrentsOfTheDrawings) {
   const Model& model = *find_model("woodenhaptics_v2019");
   const auto pose = pose_at(model, Vec3::Zero());
   ASSERT_TRUE(pose);
-  // Sideways: arm 220 mm, gear 16, 0.321 N·m/A.
+  // Lateral: arm 220 mm, gear 16, 0.321 N·m/A.
   EXPECT_EQ(currents_for(model, *pose, {0, 4, 0}, 2000)[0], static_cast<int>(4e3 * 0.220 / 16 / 0.321));
-  // Upwards: gear 12, 0.0603 N·m/A; the upper link leans 19.7° forward and is pressed down, the lower stands 38.1° out.
+  // Vertical: gear 12, 0.0603 N·m/A. The upper link leans 19.7° forward and is pushed down; the lower one is at 38.1°.
   const Currents up = currents_for(model, *pose, {0, 0, 4}, 2000);
   EXPECT_NEAR(up[1], -4e3 * 0.205 * std::sin(pose->angles[1]) / 12 / 0.0603, 1);
   EXPECT_NEAR(up[2], 4e3 * 0.245 * std::sin(pose->angles[2]) / 12 / 0.0603, 1);
@@ -261,7 +261,7 @@ TEST(WoodenHapticsKinematics, TheForceFadesToNoneAtASingularPose) {
     for (int i = 0; i < 5000; ++i) {
       const Pose pose = pose_with(model, 4 * dice.direction());
       const auto given = force_of(model, pose, currents_for(model, pose, 3 * dice.direction(), 2000));
-      // A mA of each motor, where they tell forces apart worst.
+      // 1 mA per motor at the least sensitive pose.
       ASSERT_TRUE(!given || given->norm() < 3.5) << pose.angles.transpose();
     }
   }

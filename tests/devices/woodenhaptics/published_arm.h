@@ -11,12 +11,12 @@
 
 #include "core/base/motion.h"
 
-/// The arms as they were published, each number in its published place, with a kinematics of its own: turns of links
-/// instead of sums of sines, and circles that cross instead of the law of cosines. Nothing of devices/woodenhaptics.
+/// Published arm parameters in their published order, with independent kinematics: rotations of links instead of sums
+/// of sines, and circle intersection instead of the law of cosines. Uses no code of devices/woodenhaptics.
 namespace tendon::published_arm {
 
 /// variant; 3 capstans, 3 lengths, 3 bodies; origin, radius; 3 torque constants; full scale; 6 counts per turn; force,
-/// stiffness, damping; masses, centres of mass, g; 6 calibration counts; 3 of "motor and body aligned".
+/// stiffness, damping; masses, centers of mass, g; 6 calibration counts; 3 of "motor and body aligned".
 using Row = std::array<double, 41>;
 
 inline constexpr std::array<std::pair<std::string_view, Row>, 5> kRows = {{
@@ -55,11 +55,11 @@ struct Arm {
   Vec3 calibration() const { return three(32); }
   Vec3 direction() const { return Vec3::Ones() - 2 * three(38); }
 
-  /// Body angle for each count.
+  /// Body angle per count.
   Vec3 per_count() const {
     return (2 * std::numbers::pi * direction()).cwiseQuotient(three(18)).cwiseProduct(three(1)).cwiseQuotient(three(7));
   }
-  /// Torque at the body for each A.
+  /// Body torque per ampere.
   Vec3 per_ampere() const { return direction().cwiseProduct(three(14)).cwiseProduct(three(7)).cwiseQuotient(three(1)); }
 
   Vec3 position_at(const Vec3& angles) const {
@@ -69,7 +69,7 @@ struct Arm {
     return Vec3(0, 0, length()[0]) + about(angles[0], Vec3::UnitZ()) * Vec3(up + down) - origin();
   }
 
-  /// The elbow is where a circle around the shoulder crosses one around the tip, on its upper side.
+  /// The elbow is the upper intersection of circles around the shoulder and the tip.
   Vec3 angles_at(const Vec3& position) const {
     const Vec3 at = position + origin();
     const Eigen::Vector2d tip(std::hypot(at.x(), at.y()), at.z() - length()[0]);
@@ -84,7 +84,7 @@ struct Arm {
     return {std::atan2(at.y(), at.x()), std::atan2(elbow.x(), elbow.y()), std::atan2(rest.x(), -rest.y())};
   }
 
-  /// ∂position/∂angles by central differences of fourth order.
+  /// Returns ∂position/∂angles by fourth-order central differences.
   Mat3 numeric_jacobian(const Vec3& angles) const {
     constexpr double kStep = 1e-3;
     Mat3 jacobian;

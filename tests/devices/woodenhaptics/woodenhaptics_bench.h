@@ -19,7 +19,7 @@ namespace tendon {
 inline constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 inline const Vec3 kForce(1, -0.5, 1);
 
-/// A cable whose driver's end can be full.
+/// Cable with an output buffer that can be full.
 class Cable final : public usb::Pipe {
  public:
   Cable(FakeWoodenHaptics& arm, const LocalTime& now, const bool& full) : pipe_(arm, now), full_(full) {}
@@ -35,7 +35,7 @@ class Cable final : public usb::Pipe {
   const bool& full_;
 };
 
-/// A driver, a cable and an arm; lawful is current in an arm whose counters were set.
+/// A driver, a cable and an arm. Current is allowed once the counters are set.
 struct WoodenHapticsBench : DriverBench<WoodenHapticsBench> {
   explicit WoodenHapticsBench(const FakeWoodenHaptics::Options& options = {}, double max_current = 2)
       : arm(options),
@@ -53,7 +53,7 @@ struct WoodenHapticsBench : DriverBench<WoodenHapticsBench> {
     }
   }
 
-  /// At 2 m/s to a place relative to the centre.
+  /// Moves at 2 m/s to a position relative to the center.
   void move_to(const Vec3& place, const Vec3& force = Vec3::Zero()) {
     const Vec3 from = arm.position();
     const int turns = static_cast<int>((place - from).norm() / 0.002) + 1;
@@ -63,14 +63,14 @@ struct WoodenHapticsBench : DriverBench<WoodenHapticsBench> {
     }
   }
 
-  /// As the operator does: into the calibration pose, the button, and back to the centre.
+  /// Moves to the calibration pose, presses the button and returns to the center, like the operator.
   void home(const Vec3& force = Vec3::Zero()) {
     const Vec3 counts = arm.arm().calibration();
     arm.turn_to(counts.cwiseProduct(arm.arm().per_count()));
     run(std::chrono::milliseconds(20), force);
     if (device.state() != Device::State::kHomed) arm.press_calibrate();
     run(std::chrono::milliseconds(60), force);
-    // By turning: straight lines out of a folded arm are faster than a hand.
+    // Interpolates joint angles: a straight line out of a folded arm would be faster than a hand.
     const Vec3 from = counts.cwiseProduct(arm.arm().per_count());
     const Vec3 to = arm.arm().angles_at(Vec3::Zero());
     for (int turn = 1; turn <= 100; ++turn) {

@@ -41,7 +41,7 @@ TEST(WoodenHapticsDevice, FromThePlugToTheForceItTakesEveryStep) {
     ASSERT_TRUE(bench.sample);
     EXPECT_LT(bench.sample->position.norm(), 2 * bench.device.info().position_resolution);
     EXPECT_TRUE(bench.arm.pushes());
-    // What one of a wrong sign or scale would not come near; a count of each joint is some thousandths.
+    // Excludes sign and scale errors. One count per joint changes the force by a few thousandths.
     EXPECT_LT((bench.arm.force() - bench.written).norm(), 0.01 * bench.written.norm());
     EXPECT_GT(bench.written.normalized().dot(kForce.normalized()), 0.999);
   }
@@ -53,7 +53,7 @@ TEST(WoodenHapticsDevice, SaysWhatItIsAndWhenItsFirmwareLetsGo) {
   EXPECT_EQ(info.name, "woodenhaptics_v2019");
   EXPECT_EQ(info.max_force, 5);
   EXPECT_EQ(info.watchdog, 500ms);
-  // 2π/2000 of a turn, gear 12, the lower link of 245 mm.
+  // 2π/2000, gear 12, lower link of 245 mm.
   EXPECT_NEAR(info.position_resolution, 2 * std::numbers::pi / 2000 / 12 * 0.245, 1e-9);
   EXPECT_GT(info.force_resolution, 16 * 0.321e-3 / 0.220) << "a mA of the motor of body A alone";
   EXPECT_LT(info.force_resolution, 0.05);
@@ -75,7 +75,7 @@ TEST(WoodenHapticsDevice, RefusesTooHighCurrentsAndAMissingModel) {
                       std::make_unique<ModelPipe<FakeWoodenHaptics>>(arm, now));
 }
 
-// It flashes its lamps, and has room for one report until then.
+// During its LED test the board has room for a single report.
 TEST(WoodenHapticsDevice, ABoardThatIsStillStartingIsAskedOnceAndWaitedFor) {
   Bench bench({.boot = 1s});
   ASSERT_TRUE(bench.reaches(State::kOpening, 100ms));
@@ -125,7 +125,7 @@ TEST(WoodenHapticsDevice, JointsCarryTheTipAndTurnAsItMoves) {
   }
 }
 
-// 16 bits are one turn of the body: the arm goes round twice and half.
+// 16 bits are one revolution of the body. The arm makes two and a half.
 TEST(WoodenHapticsDevice, CountersThatWrapAreFollowed) {
   for (const double turns : {2.5, -2.5}) {
     Bench bench;
@@ -155,7 +155,7 @@ TEST(WoodenHapticsDevice, TheSwitchAtTheTipIsButton0) {
   EXPECT_EQ(bench.sample->buttons, 1U);
 }
 
-// A full-speed bus takes a frame each way, so two reports are under way.
+// A full-speed bus needs one frame per direction, so two reports are in flight.
 TEST(WoodenHapticsDevice, EveryPeriodOfAMillisecondHasItsSampleAndItsCommand) {
   Bench bench;
   ASSERT_TRUE(bench.reaches(State::kHomed, 1s));
@@ -196,15 +196,15 @@ TEST(WoodenHapticsDevice, ZeroDoesNotWaitForAnAnswer) {
   ASSERT_TRUE(bench.reaches(State::kHomed, 1s));
   bench.run(20ms, kForce);
   bench.arm.set_fault(Fault::kSilent);
-  bench.run(4ms, kForce);  // two reports are under way, and will never be answered
+  bench.run(4ms, kForce);  // two reports are in flight and stay unanswered
   ASSERT_TRUE(bench.arm.pushes());
   bench.step();
   EXPECT_EQ(bench.written, Vec3::Zero());
-  bench.step();  // the frame that brings it
+  bench.step();  // frame that transfers it
   EXPECT_FALSE(bench.arm.pushes());
 }
 
-// Of the model, which is the firmware step by step: no code of the driver is alive here.
+// This tests the firmware model only, without the driver.
 TEST(WoodenHapticsDevice, WhenTheHostIsDeadTheFirmwareLetsGoHalfASecondLater) {
   Bench bench;
   ASSERT_TRUE(bench.reaches(State::kHomed, 1s));
@@ -218,14 +218,14 @@ TEST(WoodenHapticsDevice, WhenTheHostIsDeadTheFirmwareLetsGoHalfASecondLater) {
   EXPECT_FALSE(bench.arm.amplifiers_on());
 }
 
-/// The guardian writes this packet if the server is killed, stops, or hangs (devices/safety/guardian.h).
+/// The guardian writes this packet if the server is killed, stops or hangs (devices/safety/guardian.h).
 TEST(WoodenHapticsDevice, ThePacketOfTheGuardianEndsTheForceAtOnce) {
   Bench bench;
   bench.home(kForce);
   bench.run(10ms, kForce);
   ASSERT_TRUE(bench.arm.pushes());
   ASSERT_TRUE(bench.arm.write(bench.now, woodenhaptics::driver({}).zero_packet));
-  bench.now += 3ms;  // The driver does nothing.
+  bench.now += 3ms;  // the driver does nothing
   bench.arm.advance(bench.now);
   EXPECT_FALSE(bench.arm.pushes());
 }
@@ -266,14 +266,14 @@ TEST(WoodenHapticsDevice, ReportsOfAnotherLengthDoNotFeedTheWatchdog) {
   EXPECT_FALSE(arm.pushes());
 }
 
-// The ledger counts the force that `apply` returns.
+// The ledger uses the force that `apply` returns.
 TEST(WoodenHapticsDevice, AfterAPauseBeyondTheWatchdogTheOldForceIsOver) {
   for (const Duration pause : {Duration(300ms), Duration(700ms)}) {
     Bench bench;
     ASSERT_TRUE(bench.reaches(State::kHomed, 1s));
     bench.run(20ms, kForce);
     bench.now += pause;
-    bench.full = true;  // nothing new can be written
+    bench.full = true;  // output buffer full
     bench.step(kForce);
     ASSERT_EQ(bench.device.state(), State::kHomed);
     EXPECT_EQ(bench.arm.pushes(), pause < 500ms);
@@ -300,7 +300,7 @@ TEST(WoodenHapticsDevice, AMomentaryEncoderJumpCostsOnlySamples) {
   ASSERT_TRUE(bench.reaches(State::kHomed, 1s));
   bench.run(20ms, kForce);
   bench.arm.set_fault(Fault::kJumps);
-  bench.run(2ms, kForce);  // takes the reports from before
+  bench.run(2ms, kForce);  // reads the earlier reports
   const DeviceCounts before = bench.device.counts();
   bench.run(4ms, kForce);
   EXPECT_EQ(bench.device.counts()[DeviceCount::kAnswers], before[DeviceCount::kAnswers]);

@@ -45,8 +45,8 @@ void go_to(Bench& bench, Place place) {
 
 class WoodenHapticsFault : public testing::TestWithParam<Fault> {};
 
-/// Those that cost reports and not the device. A wrong byte in one of three reports may say that the button was
-/// pressed, which costs the home: USB's own checksum makes it none that is seen.
+/// Faults that cost reports but not the device. Corrupting one report in three is not harmless: the byte may signal the
+/// button, which invalidates the calibration. On a real bus the checksum of USB rejects such reports.
 bool is_harmless(Fault fault) { return fault == Fault::kDropsSome || fault == Fault::kBabbles; }
 
 TEST_P(WoodenHapticsFault, EndsInZeroForceAtEveryState) {
@@ -69,7 +69,7 @@ TEST_P(WoodenHapticsFault, EndsInZeroForceAtEveryState) {
     } else if (fault == Fault::kGarblesSome) {
       EXPECT_EQ(bench.most_lawless, 0);
     } else if (fault == Fault::kStalls || fault == Fault::kHangs) {
-      // It takes nothing any more: what it holds is its watchdog's to end.
+      // The arm accepts no commands, so only its watchdog can end the force.
       EXPECT_LE(bench.arm.obeyed(), obeyed + 1);
       EXPECT_GE(bench.after_zero, 1000 - 502);
       EXPECT_NE(bench.device.state(), State::kHomed);
@@ -82,9 +82,9 @@ TEST_P(WoodenHapticsFault, EndsInZeroForceAtEveryState) {
       EXPECT_LE(bench.most_lawless, 15);
     }
 
-    // Once the trouble is over it comes back, calibrated anew, and never pushes on the way.
+    // After the fault the arm must recover with a new calibration, without pushing meanwhile.
     bench.arm.set_fault(Fault::kNone);
-    bench.run(2s);  // a button that was pressed before is pressed
+    bench.run(2s);  // the fault may have pressed the button
     bench.most_lawless = bench.lawless = 0;
     EXPECT_TRUE(bench.reaches(State::kHomed, 5s, kForce));
     bench.move_to(Vec3::Zero());
