@@ -15,7 +15,7 @@ using std::chrono::microseconds;
 
 const Address kPeer = parse_address("127.0.0.1:5");
 
-/// Datagrams that are named by their size; its clock runs a little with each question.
+/// A queue of datagrams, named by their size. Each query advances its clock slightly.
 class Queue : public Link {
  public:
   void send(const Address& /*to*/, std::span<const std::byte> /*datagram*/) override { ++sent; }
@@ -86,7 +86,7 @@ TEST(BusyLink, AfterAPauseItAsksForAllThatHasComeMeanwhile) {
   BusyLink busy(queue);
   for (const bool before_its_clock_was_read : {false, true}) {
     LocalTime now = queue.clock;
-    if (before_its_clock_was_read) queue.took = microseconds(21);  // the thread had no processor
+    if (before_its_clock_was_read) queue.took = microseconds(21);  // the thread was preempted
     busy.look(now);
     queue.took = microseconds(1);
     queue.sizes = {40, 50, 60};

@@ -12,7 +12,7 @@
 #include "protocol/wire/codec.h"
 #include "protocol/wire/handshake_codec.h"
 
-// One example of everything that is said: the golden datagrams of WIRE.md are made of these.
+// One example of each message. The golden datagrams of WIRE.md use them.
 
 namespace tendon::examples {
 
@@ -20,7 +20,7 @@ using Bytes = std::vector<std::byte>;
 
 inline constexpr std::uint32_t kConnection = 0x11223344;
 
-/// 16 bytes: first, first + 1, …
+/// Returns the 16 bytes first, first + 1, …
 inline std::array<std::byte, 16> sixteen(unsigned first) {
   std::array<std::byte, 16> out;
   for (std::size_t i = 0; i < out.size(); ++i) out[i] = static_cast<std::byte>(first + i);
@@ -53,8 +53,7 @@ inline ForceCommand force() {
           .valid_for = std::chrono::milliseconds(20)};
 }
 
-/// With all that an answer can say: 2 mm deep in a surface that looks along −x, and what more and less depth would
-/// give.
+/// An answer with every field: 2 mm deep in a surface with normal −x, and the forces at other depths.
 inline ForceCommand force_with_all() {
   ForceCommand all = force();
   all.sequence = 101;
@@ -68,7 +67,7 @@ inline ForceCommand force_with_all() {
   return all;
 }
 
-/// By the second way that its Hello names.
+/// Uses the second solver path of its Hello.
 inline ForceCommand force_with_way() {
   ForceCommand command = force();
   command.sequence = 102;
@@ -106,9 +105,9 @@ inline LinkReport report() {
           .words = "forces were late 3 times, by up to 75 ms: the network (round trip 131 ms, usually 41 ms)"};
 }
 
-// To an observer that named the feature "diagnostics".
+// Sent to an observer with the feature "diagnostics".
 
-/// Four times as much is wanted as is given, by a wall that resists along x.
+/// A wall along x demands four times the permitted force.
 inline DeviceState state_with_wanted() {
   DeviceState diagnosed = state();
   diagnosed.force_wanted = Vec3(-8, 0, 0.5);
@@ -116,7 +115,7 @@ inline DeviceState state_with_wanted() {
   return diagnosed;
 }
 
-/// It was armed and has tripped; three of its steps were not counted.
+/// Armed before, now tripped. Three of its steps were not counted.
 inline DeviceReport device_report() {
   DeviceReport report{.number = 7,
                       .until = PeerTime{Duration{1'000'000'000}},
@@ -139,7 +138,7 @@ inline PeerReport peer_report() {
   return {.device = 1, .channel = 1, .name = "wall", .state_one_in = 4, .forces_refused = true, .link = report()};
 }
 
-/// As above, of an engine that says how good its forces are.
+/// The same report for an engine that reports the accuracy of its forces.
 inline PeerReport peer_report_with_way() {
   PeerReport told = peer_report();
   told.error = 0.125;
@@ -163,9 +162,9 @@ inline Welcome welcome() {
           .server = "tendond"};
 }
 
-// A server with two devices; the second has two channels.
+// A server with two devices, the second of which has two channels.
 
-/// Looks at the first device, and wants the channel "tissue" of the second.
+/// Observes the first device and claims the channel "tissue" of the second.
 inline Hello hello_with_claims() {
   Hello hello = examples::hello();
   hello.features.emplace_back(kFeatureChannels);
@@ -174,7 +173,7 @@ inline Hello hello_with_claims() {
   return hello;
 }
 
-/// An engine that answers in two ways, and says of each force which one it was.
+/// An engine with two solver paths that names the path of each force.
 inline Hello hello_with_ways() {
   Hello hello = examples::hello();
   hello.features.emplace_back(kFeatureWays);
@@ -225,16 +224,16 @@ inline DeviceDescription description() {
                         .holder = "wall"}}};
 }
 
-// To a client that named the feature "handle".
+// Sent to a client with the feature "handle".
 
-/// A Falcon's "right" and "left" are held.
+/// The buttons "right" and "left" of a Falcon are pressed.
 inline DeviceState state_with_buttons() {
   DeviceState state = examples::state();
   state.buttons = 0b1001;
   return state;
 }
 
-/// A handle with all there is, turned by 106° about y: it turns on, its fingers close on something soft.
+/// A handle with all parts, rotated by 106° about y. It rotates while its fingers close on something soft.
 inline DeviceState state_with_handle() {
   DeviceState state = examples::state();
   state.buttons = 1;
@@ -246,14 +245,14 @@ inline DeviceState state_with_handle() {
   return state;
 }
 
-/// To a client that named "joints": three of them, two turn.
+/// Sent to a client with the feature "joints": three joints, two of them in motion.
 inline DeviceState state_with_joints() {
   DeviceState state = examples::state();
   state.joints = Joints::three({0.5, -0.25, 1.5}, {0.125, 0, -2});
   return state;
 }
 
-/// A detent about one axis, and soft fingers.
+/// A detent about one axis, and compliant fingers.
 inline ForceCommand force_with_torque() {
   ForceCommand command = force();
   command.sequence = 102;
@@ -264,7 +263,7 @@ inline ForceCommand force_with_torque() {
   return command;
 }
 
-/// Axes as a WoodenHaptics' would be, the buttons of a Falcon, and motors for all that a handle can do.
+/// Axes of a WoodenHaptics, buttons of a Falcon, and motors for all degrees of freedom.
 inline HandleDescription handle_description() {
   return {.device = 1,
           .operator_from_device = Quat{.w = 0.5, .x = -0.5, .y = 0.5, .z = 0.5},
@@ -277,14 +276,14 @@ inline HandleDescription handle_description() {
           .hand = Hand::kRight};
 }
 
-/// To a client that named "joints": those of a Phantom's arm.
+/// Sent to a client with the feature "joints": the joints of a Phantom.
 inline ControlAck joints_described(std::uint32_t id) {
   ControlAck ack{.id = id, .code = Code::kOk, .detail = {}};
   ack.handle = HandleDescription{.device = 1, .joints = {"turntable", "upper arm", "forearm"}};
   return ack;
 }
 
-/// To a client that named "outputs".
+/// Sent to a client with the feature "outputs".
 inline ControlAck outputs_described(std::uint32_t id) {
   ControlAck ack{.id = id, .code = Code::kOk, .detail = {}};
   ack.handle = HandleDescription{.device = 1};
@@ -299,9 +298,9 @@ inline SetOutput vibration() {
   return {.device = 1, .output = 1, .setting = pulse};
 }
 
-// Between peers that both named "teleoperation".
+// Sent between peers with the feature "teleoperation".
 
-/// A leader pulls its follower by 2 mm; the follower measures no contact, so that it is not this one.
+/// A leader pulls its follower by 2 mm. It measures no contact.
 inline PortFrame port() {
   PortFrame port;
   port.device = 1;
@@ -325,7 +324,7 @@ inline PortFrame port() {
   return port;
 }
 
-/// A follower that presses with its tool, and has no purse.
+/// A follower that presses with its tool and has no purse.
 inline PortFrame port_in_contact() {
   PortFrame port = examples::port();
   port.contact_force = Vec3(-2, 0, 0.5);
@@ -334,7 +333,7 @@ inline PortFrame port_in_contact() {
   return port;
 }
 
-/// One of the other two methods: a follower that has touched a floor; its line has sent waves.
+/// A follower with the other methods: it has found a floor, and its line has sent waves.
 inline PortFrame port_by_model() {
   PortFrame port = port_in_contact();
   port.surface = {.normal = {0, 0.6, 0.8}, .offset = -0.125, .stiffness = 500};
@@ -343,7 +342,7 @@ inline PortFrame port_by_model() {
   return port;
 }
 
-/// The other end makes half as large moves, and is turned by 106° about y.
+/// The other end has half the motion and is rotated by 106° about y.
 inline Couple couple() {
   return {.device = 1,
           .channel = 1,
@@ -361,7 +360,7 @@ inline Couple couple() {
           .period = std::chrono::milliseconds(1)};
 }
 
-/// To an observer: what no one end says together, of a whole handle that the leader is led to.
+/// Sent to an observer. Fields of a whole aligned handle that no single end sends together.
 inline PortFrame port_with_all() {
   PortFrame port = port_by_model();
   port.phase = PortPhase::kAligning;
@@ -376,7 +375,8 @@ inline PortFrame port_with_all() {
   return port;
 }
 
-/// Both handles whole, and places of one are places of the other; the follower moves as fast as the leader is far out.
+/// Whole handles with an absolute map in rate control: the follower's speed is proportional to the leader's
+/// displacement.
 inline Couple couple_with_all() {
   Couple couple = examples::couple();
   couple.method = CouplingMethod::kRate;
@@ -428,8 +428,8 @@ Bytes data(std::uint64_t packet_number, const std::optional<OutgoingEcho>& with_
   return {buffer.begin(), buffer.begin() + static_cast<std::ptrdiff_t>(writer.size())};
 }
 
-/// To a client that named "state-columns": the first and the third device at one step, with all that columns say. All
-/// numbers are such that single precision holds them.
+/// Sent to a client with the feature "state-columns": the first and the third device at one step, with all columns.
+/// Every value is exact in single precision.
 inline std::array<DeviceState, 2> states_in_columns() {
   DeviceState first = state();
   first.channel = 1;
@@ -463,7 +463,7 @@ Bytes encoded(const Handshake& message) {
   return {buffer.begin(), buffer.begin() + static_cast<std::ptrdiff_t>(size)};
 }
 
-/// In suite 0.
+/// Suite 0.
 inline Bytes hello_datagram(const Hello& hello) {
   return encoded(HelloDatagram{.random = random(), .cookie = {}, .body = write_body(hello)});
 }
@@ -476,7 +476,7 @@ struct Named {
   Bytes bytes;
 };
 
-/// One complete datagram of each type and, in type Data, of each frame.
+/// One complete datagram of each type, and for type Data of each frame.
 inline std::vector<Named> datagrams() {
   const Control control{.id = 7, .request = SetStateRate{.hz = 500}};
   const ControlAck ack{.id = 7, .code = Code::kOk, .detail = "500 Hz"};

@@ -23,7 +23,7 @@ Address address(std::uint8_t host, std::uint16_t port) {
   return a;
 }
 
-/// A is a client that wants in, Z the door it stands before.
+/// A is a client, and Z is the server side of its handshake.
 class Handshake : public ::testing::Test {
  protected:
   static ClientHandshake::Config client_config() {
@@ -47,7 +47,7 @@ class Handshake : public ::testing::Test {
     return {answer_.begin(), answer_.begin() + static_cast<std::ptrdiff_t>(size)};
   }
 
-  /// The Hello with a cookie that Z has given at `now_`.
+  /// Returns a Hello with a cookie that Z issued at `now_`.
   Bytes hello_with_cookie() {
     ClientHandshake client(client_config(), now_);
     const auto retry = knock(hello_of(client));
@@ -67,7 +67,7 @@ TEST_F(Handshake, HelloRetryHelloWelcomeOpensIt) {
   const Bytes first = hello_of(a_);
   EXPECT_EQ(first.size(), kMaxDatagram);
   const auto retry = knock(first);
-  EXPECT_FALSE(retry.guest.has_value());  // nothing is known of A before it has shown the cookie
+  EXPECT_FALSE(retry.guest.has_value());  // A has not yet returned the cookie
   ASSERT_GT(retry.size, 0U);
 
   a_.receive(now_, answer(retry.size));
@@ -123,7 +123,7 @@ TEST_F(Handshake, ACookieIsWorthNothingFromAnotherAddressOrPort) {
 
 TEST_F(Handshake, ACookieIsWorthNothingForAnotherAttempt) {
   Bytes other = hello_with_cookie();
-  other[kHeaderSize] ^= std::byte{1};  // of the client's random
+  other[kHeaderSize] ^= std::byte{1};  // part of the client's random
   EXPECT_FALSE(knock(other).guest.has_value());
 }
 

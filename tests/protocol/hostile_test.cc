@@ -10,7 +10,7 @@
 #include "tests/protocol/examples.h"
 #include "tests/support/property_cases.h"
 
-// Bytes that nobody of ours would send: never a crash, always counted, never a value out of bounds.
+// Invalid bytes must never crash a receiver or yield a value out of bounds, and must always be counted.
 
 namespace tendon::hostile_test {
 namespace {
@@ -19,11 +19,11 @@ using examples::Bytes;
 
 bool bounded(const Vec3& v) { return v.allFinite() && v.cwiseAbs().maxCoeff() <= limits::kMaxValue; }
 
-/// A session that is given bad bytes and looks at everything that comes of them.
+/// A session that receives invalid bytes and checks every result.
 class Target {
  public:
   Target() : session_({.connection_id = examples::kConnection}, LocalTime{}) {
-    // Packets and requests sent, so that the echoes and answers of the examples have something to hit.
+    // Outstanding packets and requests for the echoes and answers of the examples.
     std::array<std::byte, kMaxDatagram> buffer;
     for (int i = 0; i < 10; ++i) session_.request(Rearm{});
     for (std::uint64_t i = 1; i <= 4; ++i) {
@@ -32,7 +32,7 @@ class Target {
     }
   }
 
-  /// True when exactly one of the datagram counters took notice.
+  /// Returns true if exactly one datagram counter changed.
   bool take(const Bytes& datagram) {
     const auto total = [this] {
       const LinkStats& s = session_.stats();
@@ -76,7 +76,7 @@ class Target {
   Session session_;
 };
 
-/// Everything there is that takes bytes from strangers.
+/// Passes the datagram to every parser of unauthenticated bytes.
 bool take_everywhere(const Bytes& datagram) {
   std::array<std::byte, kMaxDatagram> buffer;
   ClientHandshake client({.hello = examples::hello(), .random = examples::random()}, LocalTime{});
@@ -99,7 +99,7 @@ TEST(HostileBytes, EveryTruncationOfEveryDatagramIsCounted) {
 }
 
 TEST(HostileBytes, EveryCorruptionOfOneByteIsCounted) {
-  // If this is false, only values that change one bit or all bits are used.
+  // The short run changes only one bit or all bits of a byte.
   const bool every_value = property_cases() >= 10'000;
   for (const auto& [name, bytes] : examples::datagrams()) {
     const bool padded = bytes.size() == kMaxDatagram;

@@ -17,7 +17,6 @@ constexpr LocalTime kNow = LocalTime(std::chrono::seconds(1));
 class LeaseRequests : public ::testing::Test {
  protected:
   void open_as(Role role) { lease.open({.device = 2, .channel = 3, .role = role}, kNow); }
-  /// The session counts its requests from 1.
   bool answer(std::uint32_t id, Code code, Duration wait = {}) {
     return lease.take({.id = id, .code = code, .detail = {}, .wait = wait}, kNow);
   }
@@ -76,7 +75,7 @@ TEST_F(LeaseRequests, TheLossOfAnotherChannelChangesNothing) {
   EXPECT_TRUE(lease.holds());
 }
 
-// SESSION.md: the loss may be older or newer than the grant that is under way.
+// SESSION.md: the loss may be older or newer than the grant in flight.
 TEST_F(LeaseRequests, ALossThatCrossesTheAnswerIsFollowedByANewRequest) {
   open_as(Role::kObserver);
   lease.ask(session);

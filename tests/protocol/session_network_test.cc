@@ -12,14 +12,14 @@ using std::chrono::milliseconds;
 using std::chrono::minutes;
 using std::chrono::seconds;
 
-/// A patient session: in half an hour of 50 % loss even two seconds of silence happen.
+/// Long timeout: half an hour of 50 % loss includes two seconds without a datagram.
 Session::Config patient() {
   Session::Config config;
   config.timeout = seconds(60);
   return config;
 }
 
-/// A asks for the rates 1, 2, 3 … whenever it may, Z answers each with its rate as the detail.
+/// A requests the rates 1, 2, 3 … whenever possible. Z answers each with the rate as detail.
 struct Conversation {
   explicit Conversation(World& the_world) : world(the_world) {
     world.on_z = [this](const Session::Event& event) {
@@ -117,7 +117,7 @@ TEST(SessionOverABadNetwork, TheTwoEndsAgreeOnTheLossOfEachDirection) {
     world.z.send(state);
     world.a.send(force);
   });
-  // Without reordering the ack vectors tell exactly what the other end counts, up to the datagrams in flight.
+  // Without reordering, the ack vectors match the losses counted by the other end, except for datagrams in flight.
   EXPECT_NEAR(static_cast<double>(world.a.stats().lost_outgoing), static_cast<double>(world.z.stats().lost), 10);
   EXPECT_NEAR(static_cast<double>(world.z.stats().lost_outgoing), static_cast<double>(world.a.stats().lost), 10);
   EXPECT_GT(world.z.stats().lost, 5 * world.a.stats().lost);
@@ -131,7 +131,7 @@ TEST(SessionOverAPerfectNetwork, TheRoundTripIsExactWhateverTheClocks) {
   EXPECT_EQ(world.a.stats().round_trip, there + back);
   EXPECT_EQ(world.z.stats().round_trip, there + back);
   EXPECT_EQ(world.a.stats().smoothed_round_trip, there + back);
-  EXPECT_LE(world.a.stats().round_trip_variation, Duration{4});  // decays to the rounding of its division
+  EXPECT_LE(world.a.stats().round_trip_variation, Duration{4});  // the rounding error of its division
   EXPECT_EQ(world.a.stats().lost, 0U);
 }
 
@@ -144,7 +144,7 @@ TEST(SessionOverAPerfectNetwork, BothEndsSendKeepAlivesAtTheirRate) {
 
 TEST(SessionOverAPerfectNetwork, ARequestAnsweredInTimeIsSentOnce) {
   World world(perfect(milliseconds(40)));
-  world.run(seconds(3));  // long enough to know the round trip
+  world.run(seconds(3));  // until the round trip is known
   bool answered = false;
   world.on_z = [&](const Session::Event& event) {
     world.z.answer(std::get<Session::RequestArrived>(event).id, Code::kOk, "");

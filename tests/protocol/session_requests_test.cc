@@ -32,11 +32,11 @@ TEST_F(TwoEnds, AnAnswerThatWasLostIsGivenAgainWhenTheRequestComesAgain) {
   deliver(z_, now_, pull(a_, now_));
   ASSERT_EQ(events(z_).size(), 1U);
   z_.answer(*id, Code::kDenied, "only from the controller");
-  EXPECT_EQ(pull(z_, now_).size(), 1U);  // is lost
+  EXPECT_EQ(pull(z_, now_).size(), 1U);  // lost
   EXPECT_TRUE(pull(z_, now_).empty());
 
   now_ += RoundTrip::kFirstTimeout;
-  EXPECT_EQ(pull(z_, now_).size(), 1U);  // This is a keep-alive.
+  EXPECT_EQ(pull(z_, now_).size(), 1U);  // a keep-alive
   deliver(z_, now_, pull(a_, now_));
   EXPECT_TRUE(events(z_).empty());
   EXPECT_LE(z_.next_tick(), now_);
@@ -102,7 +102,7 @@ TEST_F(TwoEnds, ASeventeenthOpenRequestIsRefused) {
   events(z_);
   z_.answer(1, Code::kOk, "");
   deliver(a_, now_, pull(z_, now_));
-  EXPECT_FALSE(a_.request(Rearm{}).has_value());  // The answer has arrived and was not taken.
+  EXPECT_FALSE(a_.request(Rearm{}).has_value());  // the answer has arrived but was not taken
   EXPECT_EQ(events(a_).size(), 1U);
   EXPECT_EQ(a_.request(Rearm{}), limits::kRequestWindow + 1);
 }
@@ -154,7 +154,7 @@ TEST_F(TwoEnds, ARequestOfANewerPeerIsAnsweredUnsupported) {
   EXPECT_EQ(std::get<ControlAck>(content->frames[0]).code, Code::kUnsupported);
 }
 
-// The request was never answered, so the later ones were not delivered. This included Disarm.
+// Regression: the request was never answered, so later ones, including Disarm, were not delivered.
 TEST_F(TwoEnds, ARequestOutOfBoundsIsAnsweredAndTheNextIsDelivered) {
   const auto bad = a_.request(SetScale{.device = 1, .position_scale = 0.001});
   const auto disarm = a_.request(Disarm{.device = 1});
@@ -200,7 +200,7 @@ TEST_F(TwoEnds, RequestsAndAnswersThatACorrectPeerCannotSendAreCounted) {
   EXPECT_EQ(z_.stats().invalid, 2U);
   z_.receive(now_, examples::data(2, {}, Control{.id = 1, .request = Rearm{}}));
   EXPECT_EQ(events(z_).size(), 1U);
-  z_.receive(now_, examples::data(3, {}, Control{.id = 17, .request = Rearm{}}));  // 1 is not answered yet
+  z_.receive(now_, examples::data(3, {}, Control{.id = 17, .request = Rearm{}}));  // request 1 is still unanswered
   EXPECT_EQ(z_.stats().invalid, 3U);
   EXPECT_TRUE(events(z_).empty());
 }

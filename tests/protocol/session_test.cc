@@ -90,7 +90,7 @@ TEST_F(TwoEnds, StatesOfSixteenDevicesShareThreeDatagrams) {
   }
 }
 
-/// 16 devices that move on all axes, at one step.
+/// 16 devices moving on all axes, at one step.
 std::vector<DeviceState> moving(std::uint64_t tick) {
   std::vector<DeviceState> states(limits::kMaxDevices, state(tick));
   for (std::uint32_t device = 0; device < states.size(); ++device) {
@@ -180,7 +180,7 @@ TEST_F(TwoEnds, AnOlderForceOrStateThatComesLateIsDroppedAndCounted) {
   EXPECT_EQ(z_.stats().stale, 1U);
   EXPECT_EQ(z_.stats().reordered, 1U);
 
-  a_.send(force(2));  // not newer either
+  a_.send(force(2));  // not newer
   deliver(z_, now_, pull(a_, now_));
   EXPECT_TRUE(events(z_).empty());
   EXPECT_EQ(z_.stats().stale, 2U);
@@ -236,7 +236,7 @@ TEST_F(TwoEnds, ReportsOnDevicesAndEnginesAreNewestWinsEachForItself) {
 
   z_.send(of_device(0, 2));
   z_.send(of_channel(1, 4));
-  z_.send(of_channel(0, 4));  // of its channel the newest
+  z_.send(of_channel(0, 4));  // newest of its channel
   deliver(a_, now_, pull(z_, now_));
   const auto then = events(a_);
   ASSERT_EQ(then.size(), 1U);
@@ -254,7 +254,7 @@ TEST_F(TwoEnds, OfPortsTheHighestSequenceOfTheHighestEpochWins) {
   };
   z_.send(port(0, 5, 8));
   z_.send(port(1, 2, 3));
-  z_.send(port(0, 5, 9));  // replaces the first, which has not left
+  z_.send(port(0, 5, 9));  // replaces the first, which was not sent yet
   z_.send(state(8));
   const auto together = pull(z_, now_);
   EXPECT_EQ(together.size(), 1U) << "ports go beside states";
@@ -272,7 +272,7 @@ TEST_F(TwoEnds, OfPortsTheHighestSequenceOfTheHighestEpochWins) {
   EXPECT_TRUE(events(a_).empty());
   EXPECT_EQ(a_.stats().stale, 3U);
 
-  z_.send(port(0, 6, 1));  // it has begun anew
+  z_.send(port(0, 6, 1));  // restarted
   deliver(a_, now_, pull(z_, now_));
   const auto anew = events(a_);
   ASSERT_EQ(anew.size(), 1U);
@@ -287,7 +287,7 @@ TEST_F(TwoEnds, TheTwoEndsOfACouplingAreStreamsOfTheirOwn) {
     return made;
   };
   z_.send(port(true, 9));
-  z_.send(port(false, 5));  // neither replaces the other before they have left …
+  z_.send(port(false, 5));  // neither replaces the other before sending
   deliver(a_, now_, pull(z_, now_));
   const auto at_a = events(a_);
   ASSERT_EQ(at_a.size(), 2U);
@@ -352,7 +352,7 @@ TEST_F(TwoEnds, TheRoundTripDoesNotCountTheTimeThatThePeerTook) {
   const auto there = pull(a_, now_);  // T1
   now_ += milliseconds(3);
   deliver(z_, now_, there);  // T2
-  pull(z_, now_);            // is lost
+  pull(z_, now_);            // lost
   now_ += milliseconds(500);
   const auto back = pull(z_, now_);  // T3
   now_ += milliseconds(4);
@@ -370,11 +370,11 @@ TEST_F(TwoEnds, AnImpossibleEchoIsCountedAndTheRestIsRead) {
   const Duration opened = kOpened.time_since_epoch();
   const Duration written = milliseconds(1000);  // examples::data writes at 1000.1 ms of the peer's clock
   const OutgoingEcho impossible[] = {
-      echoing(opened, written, 1),                    // a packet that A has not sent
-      echoing(opened - Duration{1}, written, 0),      // sent before there was a session
+      echoing(opened, written, 1),                    // A has not sent that packet
+      echoing(opened - Duration{1}, written, 0),      // sent before the session
       echoing(opened + Duration{1}, written, 0),      // sent in the future
       echoing(opened, written + milliseconds(1), 0),  // received after the echo was written
-      echoing(Duration::max(), written, 0),           // beyond all clocks
+      echoing(Duration::max(), written, 0),           // overflows every clock
   };
   std::uint64_t number = 0;
   for (const OutgoingEcho& echo : impossible) {
@@ -396,7 +396,7 @@ TEST_F(TwoEnds, EachEndLearnsWhatWasLostInWhichDirection) {
     z_.send(state(n));
     deliver(a_, now_, pull(z_, now_));
   }
-  EXPECT_EQ(z_.stats().lost, 4U);  // 20 was the last: not missed yet
+  EXPECT_EQ(z_.stats().lost, 4U);  // 20 was the last and is not yet missing
   EXPECT_EQ(a_.stats().lost_outgoing, 4U);
   EXPECT_EQ(a_.stats().lost, 0U);
   EXPECT_EQ(z_.stats().lost_outgoing, 0U);
@@ -492,7 +492,7 @@ TEST_F(TwoEnds, AReplayedDatagramIsCountedAndNothingElse) {
   EXPECT_EQ(z_.stats().duplicated, 5U);
   EXPECT_EQ(z_.stats().datagrams_received, 1U);
   z_.tick(now_ + seconds(2));
-  EXPECT_FALSE(z_.open());  // a replay does not keep the dead alive
+  EXPECT_FALSE(z_.open());  // a replay does not keep the session alive
 }
 
 TEST_F(TwoEnds, ADatagramOlderThanTheWindowIsDropped) {

@@ -57,7 +57,7 @@ inline DeviceState state(std::uint64_t tick) {
   return state;
 }
 
-/// A Data datagram with a body by hand.
+/// Returns a Data datagram with a hand-written body.
 inline Bytes raw(std::uint64_t packet_number, const RawProtobuf& body) {
   Bytes bytes = examples::data(packet_number, {});
   bytes.resize(kHeaderSize);
@@ -65,7 +65,7 @@ inline Bytes raw(std::uint64_t packet_number, const RawProtobuf& body) {
   return bytes;
 }
 
-/// A and Z in one time, passing datagrams by hand.
+/// A and Z with one clock. The test passes the datagrams.
 class TwoEnds : public ::testing::Test {
  protected:
   LocalTime now_ = kOpened;

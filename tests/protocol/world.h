@@ -13,17 +13,16 @@
 
 namespace tendon {
 
-/// What one direction of the test network does. Bad by default.
+/// Impairments of one network direction, bad by default.
 struct Weather {
   Duration delay = std::chrono::milliseconds(20);
-  Duration jitter = std::chrono::milliseconds(10);  ///< uniform in [0, jitter) is added: datagrams overtake each other
+  Duration jitter = std::chrono::milliseconds(10);  ///< uniform in [0, jitter), so datagrams overtake each other
   double loss = 0.05;
   double duplicate = 0.05;
 };
 inline Weather perfect(Duration delay) { return {.delay = delay, .jitter = {}, .loss = 0, .duplicate = 0}; }
 
-/// One direction of a network: datagrams in, and out again later, or never, or twice, or in another
-/// order. The same seed gives the same world.
+/// One network direction that delays, loses, duplicates and reorders datagrams, deterministically for each seed.
 class BadNetwork {
  public:
   BadNetwork(const Weather& weather, std::uint64_t seed) : weather_(weather), random_(seed) {}
@@ -53,18 +52,18 @@ class BadNetwork {
   std::multimap<LocalTime, std::vector<std::byte>> in_flight_;
 };
 
-/// Two sessions, A (say, the client) and Z (the server), with a network between them, in virtual time
-/// that hops to whatever is due next. Z's clock is not A's.
+/// Two sessions, A (the client) and Z (the server), on a network in virtual time, which jumps to the next due event. Z
+/// has a different clock.
 class World {
  public:
-  /// Z's clock minus A's: nothing may depend on it.
+  /// Z's clock minus A's. Nothing may depend on it.
   static constexpr Duration kClockOffset = std::chrono::hours(1234) + Duration{56789};
 
   explicit World(const Weather& weather, std::uint64_t seed = 1, const Session::Config& config = {})
       : World(weather, weather, seed, config) {}
   World(const Weather& there, const Weather& back, std::uint64_t seed, const Session::Config& config)
       : a(config, at_a()), z(config, at_z()), a_to_z(there, 2 * seed), z_to_a(back, 2 * seed + 1) {}
-  /// … in suite 1, with the keys as A has them.
+  /// Suite 1, with the keys of A.
   World(const Weather& there, const Weather& back, std::uint64_t seed, const Session::Config& config,
         const SessionKeys& keys)
       : a(config, keys, at_a()),
@@ -72,7 +71,7 @@ class World {
         a_to_z(there, 2 * seed),
         z_to_a(back, 2 * seed + 1) {}
 
-  /// Until `end`, takes every turn that is due. `each_turn` is called before anything is sent.
+  /// Runs all due turns until `end`. Calls `each_turn` before sending.
   void run(
       Duration length, const std::function<void()>& each_turn = [] {}) {
     const LocalTime end = now + length;
@@ -86,7 +85,7 @@ class World {
   LocalTime now{std::chrono::seconds(100)};
   std::function<void(const Session::Event&)> on_a = [](const Session::Event&) {};
   std::function<void(const Session::Event&)> on_z = [](const Session::Event&) {};
-  /// What the owners want to do next, besides what the sessions want: LocalTime::max() = nothing.
+  /// Next event of the owners in addition to those of the sessions; LocalTime::max(): none.
   LocalTime wake = LocalTime::max();
   Session a;
   Session z;

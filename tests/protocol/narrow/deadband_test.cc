@@ -20,7 +20,7 @@ TEST(Deadband, PassesWhatDiffersByMoreThanATenthAndHoldsBackTheRest) {
   EXPECT_FALSE(deadband.passes(kStart + milliseconds(1), {2.19, 0, 0}));
   EXPECT_FALSE(deadband.passes(kStart + milliseconds(2), {2, 0.19, 0}));
   EXPECT_TRUE(deadband.passes(kStart + milliseconds(3), {2.21, 0, 0}));
-  // Measured from what was sent, not from what was held back: slow changes are not lost.
+  // The reference is the last sent value, so slow changes accumulate.
   EXPECT_FALSE(deadband.passes(kStart + milliseconds(4), {2.42, 0, 0}));
   EXPECT_TRUE(deadband.passes(kStart + milliseconds(5), {2.44, 0, 0}));
 }
@@ -127,7 +127,7 @@ TEST(Foretell, TurnsAndGripsOnWithTheVelocitiesOfBoth) {
 }
 
 TEST(StateDeadband, SendsAHandThatTurnsOrGripsAnotherWayThanForetold) {
-  StateDeadband deadband(kAsked);  // 1 mm/s is 20 mrad/s at 50 mm
+  StateDeadband deadband(kAsked);  // 1 mm/s corresponds to 20 mrad/s at 50 mm
   EXPECT_TRUE(deadband.passes(turning(1, {0, 0, 0.5}, -0.5)));
   EXPECT_FALSE(deadband.passes(turning(2, {0, 0, 0.54}, -0.46)));
   EXPECT_TRUE(deadband.passes(turning(3, {0.06, 0, 0.5}, -0.5)));
@@ -156,8 +156,7 @@ TEST(HandleDeadband, LeavesOutNoTorqueOrGripForceThatAHandCanTell) {
   EXPECT_FALSE(passes({1, 0, 0}, {}, 0.06));
 }
 
-/// Of a hand that moves by `position(t)`: what the receiver foretells is off by no more than velocity may be, for as
-/// long as nothing is sent.
+/// The prediction error for a hand at `position(t)` is at most the velocity band times the silence.
 TEST(StateDeadband, WhatIsForetoldIsOffByAtMostTheBandTimesTheSilence) {
   StateDeadband deadband(kAsked);
   DeviceState believed;

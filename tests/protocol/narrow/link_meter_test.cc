@@ -11,10 +11,9 @@ using std::chrono::milliseconds;
 using std::chrono::seconds;
 
 constexpr LocalTime kStart{seconds(100)};
-/// The peer's clock is 7 s ahead.
 const ClockOffsetEstimator::Estimate kClock{.offset = seconds(7)};
 
-/// There in `there`, back in `back`, held by the peer for 3 ms.
+/// An exchange with the one-way delays `there` and `back`. The peer answers after 3 ms.
 ClockExchange exchange(LocalTime sent, Duration there, Duration back) {
   const PeerTime received = kClock.to_peer(sent + there);
   return {.sent = sent,
@@ -44,7 +43,7 @@ TEST(LinkMeter, AnExchangeToldAgainIsOneWayThereAndSeveralWaysBack) {
   }
   const auto report = meter.report(kStart + seconds(1));
   EXPECT_EQ(report.to_peer->median, milliseconds(90));    // 10, 90, 90
-  EXPECT_EQ(report.from_peer->median, milliseconds(40));  // ten times 40, twice 20
+  EXPECT_EQ(report.from_peer->median, milliseconds(40));  // ten of 40, two of 20
 }
 
 TEST(LinkMeter, ForgetsWithEachReportAndSaysNothingOfWhatItDidNotSee) {
@@ -61,7 +60,7 @@ TEST(LinkMeter, TheLongestGapIsBetweenTwoDatagramsOrSinceTheLast) {
   EXPECT_EQ(meter.report(kStart + milliseconds(100)).longest_gap, milliseconds(50));
   EXPECT_EQ(meter.report(kStart + milliseconds(300)).longest_gap, milliseconds(220));
   meter.heard(kStart + milliseconds(310));
-  EXPECT_EQ(meter.report(kStart + milliseconds(310)).longest_gap, milliseconds(230));  // it has begun before
+  EXPECT_EQ(meter.report(kStart + milliseconds(310)).longest_gap, milliseconds(230));  // began in the previous report
 }
 
 TEST(LinkMeter, AFloodIsThinnedEvenlyAndItsQuantilesHold) {

@@ -19,8 +19,8 @@ using std::chrono::seconds;
 
 constexpr LocalTime kStart{seconds(1)};
 
-/// A 1 kHz sender behind a first-come-first-served link of so many datagrams a second, 5 ms long each way, with an
-/// unbounded queue, whose peer answers each datagram at once.
+/// A 1 kHz sender on a FIFO link with limited datagrams per second, a delay of 5 ms each way and an unbounded queue.
+/// The peer answers each datagram immediately.
 class NarrowLink {
  public:
   explicit NarrowLink(const RateAdaptation::Config& config = {}) : adaptation_(config, kStart) {}
@@ -49,7 +49,7 @@ class NarrowLink {
   const RateAdaptation& adaptation() const { return adaptation_; }
   double queue_s() const { return queue_s_; }
   double longest_queue_s() const { return longest_queue_s_; }
-  /// Since the last call, by one_in().
+  /// Returns and clears the times recorded by one_in().
   std::map<std::uint32_t, Duration> take_times() { return std::exchange(time_at_, {}); }
 
  private:
@@ -104,7 +104,7 @@ TEST(RateAdaptation, TriesAHigherRateMoreAndMoreRarelyWhenThatKeepsFailing) {
   link.run(seconds(100), 700);
   link.take_times();
   link.run(seconds(300), 700);
-  EXPECT_LT(link.take_times()[1], seconds(6));  // of 300: a try of a few 100 ms every 80 s
+  EXPECT_LT(link.take_times()[1], seconds(6));  // of 300 s: a probe of a few 100 ms every 80 s
 }
 
 TEST(RateAdaptation, LossLowersTheRateAndATenthBreaksTheCircuitAtTheLowest) {

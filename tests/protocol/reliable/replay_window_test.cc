@@ -36,16 +36,16 @@ TEST(ReplayWindow, CountsTheNumbersThatNeverCame) {
 TEST(ReplayWindow, TellsThe32NumbersBeforeOne) {
   ReplayWindow window;
   for (const std::uint64_t n : {10U, 67U, 97U, 98U, 100U}) window.insert(n);
-  EXPECT_EQ(window.mask_before(100), (1U << 1U) | (1U << 2U));  // 98, 97; 67 is one too far
+  EXPECT_EQ(window.mask_before(100), (1U << 1U) | (1U << 2U));  // 98 and 97; 67 is out of range
   EXPECT_EQ(window.mask_before(99), 1U | (1U << 1U) | (1U << 31U));
   window.insert(128);
-  EXPECT_EQ(window.mask_before(128), 1U << 27U | 1U << 29U | 1U << 30U);  // across a word
+  EXPECT_EQ(window.mask_before(128), 1U << 27U | 1U << 29U | 1U << 30U);  // across a word boundary
 }
 
 TEST(ReplayWindow, TellsNothingOfWhatItNoLongerRemembers) {
   ReplayWindow window;
   for (std::uint64_t n = 0; n <= 3008; ++n) window.insert(n);
-  EXPECT_EQ(window.mask_before(3008 - 1960), (1U << 23U) - 1);  // of 1983 numbers below the highest, 23 are left
+  EXPECT_EQ(window.mask_before(3008 - 1960), (1U << 23U) - 1);  // 23 of the 1983 numbers below the highest are left
   EXPECT_EQ(window.mask_before(3008 - ReplayWindow::kRemembered + 1), 0U);
 }
 

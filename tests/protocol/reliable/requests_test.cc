@@ -11,8 +11,8 @@ namespace {
 using std::chrono::milliseconds;
 using std::chrono::seconds;
 
-// A link that has just been slow has a timeout of many seconds. Should the next copy be lost after all, that must not
-// be the time for which both ends wait on a link that is fast again.
+// After a slow period the timeout may be many seconds. If the next copy is lost, the ends must not wait that long on a
+// link that is fast again.
 TEST(OutgoingRequests, AreSentAgainWithinASecondHoweverSlowTheLink) {
   for (const Duration timeout : {Duration(milliseconds(20)), Duration(seconds(1)), Duration(seconds(12))}) {
     OutgoingRequests requests;

@@ -7,14 +7,14 @@
 
 #include "tests/protocol/examples.h"
 
-// The known answer of cacophony is in vectors_test.cc.
+// vectors_test.cc has the known answer of cacophony.
 
 namespace tendon::noise_test {
 namespace {
 
 using examples::Bytes;
 
-/// A and Z, who know the same key.
+/// A and Z share a key.
 class Noise : public ::testing::Test {
  protected:
   static Bytes text(std::string_view text) {
@@ -44,7 +44,7 @@ TEST_F(Noise, BothEndsEndWithTheSameKeysAndEachOthersWords) {
 TEST_F(Noise, TheKeysOfSuite2AreBoundToTheWholeHandshake) {
   const auto z = NoiseResponder::read(psk_, prologue_, a_.message());
   const Key ephemeral = random_.next();
-  // The same key agreement, two answers: what Split() gives does not know of the second payload, suite 2 does.
+  // The result of Split() does not depend on the second payload; the keys of suite 2 do.
   const NoiseSplit one = z->reply(ephemeral, text("welcome"))->split;
   const NoiseSplit other = z->reply(ephemeral, text("welcome to suite 2"))->split;
   ASSERT_EQ(one.initiator_to_responder.bytes(), other.initiator_to_responder.bytes());
@@ -52,7 +52,7 @@ TEST_F(Noise, TheKeysOfSuite2AreBoundToTheWholeHandshake) {
             split_of_suite_2(other).initiator_to_responder.bytes());
   EXPECT_NE(split_of_suite_2(one).responder_to_initiator.bytes(),
             split_of_suite_2(other).responder_to_initiator.bytes());
-  // And no key of one suite is a key of the other.
+  // The keys of both suites must differ.
   const std::set<Bytes32> all = {one.initiator_to_responder.bytes(), one.responder_to_initiator.bytes(),
                                  split_of_suite_2(one).initiator_to_responder.bytes(),
                                  split_of_suite_2(one).responder_to_initiator.bytes()};
@@ -62,7 +62,7 @@ TEST_F(Noise, TheKeysOfSuite2AreBoundToTheWholeHandshake) {
 TEST_F(Noise, EveryBitOfBothMessagesCounts) {
   const auto z = NoiseResponder::read(psk_, prologue_, a_.message());
   const Bytes reply = z->reply(random_.next(), text("welcome"))->message;
-  // The last bit of a public key is masked by X25519, but not by the hash that both ends have mixed it into.
+  // X25519 masks the last bit of a public key, but the handshake hash covers it.
   for (std::size_t bit = 0; bit < 8 * a_.message().size(); ++bit) {
     Bytes bad = a_.message();
     bad[bit / 8] ^= static_cast<std::byte>(1U << bit % 8);
@@ -73,7 +73,7 @@ TEST_F(Noise, EveryBitOfBothMessagesCounts) {
     bad[bit / 8] ^= static_cast<std::byte>(1U << bit % 8);
     EXPECT_FALSE(a_.read(bad).has_value()) << bit;
   }
-  EXPECT_TRUE(a_.read(reply).has_value());  // a forged answer does not spoil the true one
+  EXPECT_TRUE(a_.read(reply).has_value());  // a forged answer must not invalidate the true one
 }
 
 TEST_F(Noise, ACutMessageDoesNotOpen) {
@@ -95,7 +95,7 @@ TEST_F(Noise, AnotherKeyOrAnotherPrologueDoesNotOpen) {
 TEST_F(Noise, OneWhoKnowsTheKeyButNotTheEphemeralOnesCannotReadTheAnswer) {
   const auto z = NoiseResponder::read(psk_, prologue_, a_.message());
   const Bytes reply = z->reply(random_.next(), text("welcome"))->message;
-  // It has seen everything and holds the key now; its own attempt is another one.
+  // The thief has recorded everything and knows the key, but has a different ephemeral key.
   const NoiseInitiator thief(psk_, random_.next(), prologue_, text("hello"));
   EXPECT_FALSE(thief.read(reply).has_value());
 }

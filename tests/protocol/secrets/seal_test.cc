@@ -16,7 +16,7 @@ using std::chrono::seconds;
 
 constexpr LocalTime kOpened{seconds(100)};
 
-/// One direction, from the one who seals to the one who opens.
+/// One direction, from sender to receiver.
 class Seal : public ::testing::TestWithParam<Suite> {
  protected:
   explicit Seal(const Rekey& rekey = {}) : rekey_(rekey) {}
@@ -74,7 +74,7 @@ TEST_P(Seal, EveryBitOfADatagramCounts) {
     Bytes bad = good;
     bad[bit / 8] ^= static_cast<std::byte>(1U << bit % 8);
     const auto header = decode_header(bad);
-    if (!header) continue;  // no datagram of ours any more
+    if (!header) continue;  // not a valid datagram
     EXPECT_NE(opener_.open(kOpened, *header, bad, body_), Opener::Verdict::kOpened) << bit;
   }
   for (std::size_t size = kHeaderSize; size < good.size(); ++size) {
@@ -130,7 +130,7 @@ TEST_P(Seal, BytesOfAnyLengthOpenAsTheyWereAndOnlyUnderTheirNumber) {
     Bytes apart(size + crypto::kTagSize);
     Bytes in_place = plain;
     in_place.resize(apart.size());
-    const std::uint64_t number = (std::uint64_t{1} << 40) + size;  // of no palindrome
+    const std::uint64_t number = (std::uint64_t{1} << 40) + size;  // not a palindrome
     key_.seal(number, {}, plain, apart);
     key_.seal(number, {}, std::span(in_place).first(size), in_place);
     EXPECT_EQ(in_place, apart) << size;

@@ -11,7 +11,7 @@
 #include "tests/protocol/examples.h"
 #include "tests/support/property_cases.h"
 
-// The door in suite 1: who gets in, who hears nothing, and what it costs us.
+// Handshake in suite 1: who is admitted, who gets no answer, and what it costs.
 
 namespace tendon::sealed_handshake_test {
 namespace {
@@ -26,7 +26,7 @@ Bytes first(const Buffer& buffer, std::size_t size) {
   return {buffer.begin(), buffer.begin() + static_cast<std::ptrdiff_t>(size)};
 }
 
-/// A is a client with the key "wall", Z the door it stands before, far away.
+/// A is a client with the key "wall", and Z is the server side.
 class SealedHandshake : public ::testing::Test {
  protected:
   ClientHandshake::Config client_config() {
@@ -48,7 +48,7 @@ class SealedHandshake : public ::testing::Test {
   Doorman::Reply knock(const Bytes& datagram) { return z_.receive(now_, from_, datagram, answer_); }
   Bytes reply_to(const Bytes& datagram) { return first(answer_, knock(datagram).size); }
 
-  /// The Hello with a cookie that is good from `from_`.
+  /// Returns a Hello with a cookie valid for `from_`.
   Bytes hello_with_cookie(ClientHandshake& client) {
     client.receive(now_, reply_to(said_by(client)));
     return said_by(client);
@@ -212,7 +212,7 @@ TEST_F(SealedHandshake, SpoofedHellosChangeNothingButACounter) {
   EXPECT_EQ(mallinfo2().uordblks, memory);
   EXPECT_EQ(z_.stats().retries, before + hellos);
   EXPECT_EQ(z_.stats().limited + z_.stats().unknown_key + z_.stats().forged + z_.stats().malformed, 0U);
-  // And whoever really is at one of these addresses gets in.
+  // A client that really has one of these addresses is admitted.
   from_ = from;
   EXPECT_TRUE(knock(hello_with_cookie()).guest.has_value());
 }
@@ -243,21 +243,21 @@ TEST_F(SealedHandshake, NoReplyIsEverLongerThanWhatItAnswers) {
 
 // ---- Which suite ----
 
-const Suites kOld = {Suite::kNoise};  ///< as a peer from before suite 2, or one whose processor has no AES
+const Suites kOld = {Suite::kNoise};  ///< a peer without suite 2, or without hardware AES
 const Suites kNew = all_suites();
 const Suites kAesOnly = {Suite::kAesGcm};
 
-/// A client meets a door, each with its suites.
+/// A client and a server with different suites.
 class TwoSuites : public SealedHandshake {
  protected:
   void SetUp() override {
     if (!crypto::has_aes()) GTEST_SKIP() << "this processor has no AES";
   }
   struct Met {
-    std::optional<Suite> chosen;      ///< by the door; empty: it refuses
-    std::optional<SessionKeys> here;  ///< the client's
+    std::optional<Suite> chosen;      ///< of the server; empty: refused
+    std::optional<SessionKeys> here;  ///< of the client
     std::optional<SessionKeys> there;
-    std::optional<Refused> refused;  ///< what the client made of it
+    std::optional<Refused> refused;  ///< result of the client
     std::vector<std::string> features;
   };
   template <class OnTheWay>
@@ -290,7 +290,7 @@ class TwoSuites : public SealedHandshake {
   Met meet(const Suites& client_suites, const Suites& door_suites) {
     return meet(client_suites, door_suites, examples::welcome(), [](Bytes&) {});
   }
-  /// Whether what one end seals the other opens, both ways.
+  /// Returns true if each end opens what the other sealed.
   static bool talk(const Met& met) {
     if (!met.here || !met.there) return false;
     Session a({.connection_id = 77}, *met.here, LocalTime{seconds(1)});
@@ -341,8 +341,8 @@ TEST_F(TwoSuites, AClientThatForbidsSuite1LeavesWithASentence) {
 TEST_F(TwoSuites, NobodyOnTheWayCanTakeTheOfferOutOrSayItIsAnOlderOne) {
   for (std::size_t at = 0; at < 300; ++at) {
     const Met met = meet(kNew, kNew, examples::welcome(), [&](Bytes& hello) { hello[at] ^= std::byte{1}; });
-    EXPECT_FALSE(met.here) << at;  // it may be lost; it is never another offer
-    now_ += seconds(1);            // for the limit of Hellos
+    EXPECT_FALSE(met.here) << at;  // the offer may be lost but not altered
+    now_ += seconds(1);            // avoids the limit of Hellos
   }
 }
 

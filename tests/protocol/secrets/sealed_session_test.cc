@@ -5,7 +5,7 @@
 #include "tests/protocol/examples.h"
 #include "tests/protocol/world.h"
 
-// A conversation in suite 1: what is believed, what is dropped, and how it ends.
+// A session in suite 1: authentication, rejected datagrams, and its end.
 
 namespace tendon::sealed_session_test {
 namespace {
@@ -58,7 +58,7 @@ TEST_F(SealedSession, OnlyTheNewestAuthenticDatagramTellsWhereThePeerIs) {
   Bytes forged = force(3);
   forged.back() ^= std::byte{1};
   EXPECT_TRUE(z_.receive(now_, second));
-  EXPECT_FALSE(z_.receive(now_, first));   // late: the peer may have moved on since
+  EXPECT_FALSE(z_.receive(now_, first));   // late: the peer may have moved since
   EXPECT_FALSE(z_.receive(now_, second));  // replayed
   EXPECT_FALSE(z_.receive(now_, forged));
   EXPECT_EQ(z_.stats().datagrams_received, 2U);

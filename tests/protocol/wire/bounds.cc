@@ -29,7 +29,7 @@ using google::protobuf::Message;
 // ---- The grammar ----
 
 struct Range {
-  std::string least;      ///< as it is written
+  std::string least;      ///< as written
   std::string most;       ///< empty: none
   bool beyond = false;    ///< `least` itself is out of bounds
   bool infinity = false;  ///< +infinity is within bounds
@@ -43,7 +43,7 @@ struct Bound {
   std::set<int> too_few_or_many;
 };
 
-/// "[0, 16]" or "{1, 3, 9}" entries: the numbers at the bounds, and those next to them.
+/// Parses "[0, 16]" or "{1, 3, 9}" entries: the numbers at the bounds and their neighbors.
 void take_entries(const std::string& text, Bound& to) {
   static const std::regex kInterval(R"(\[(\d+), (\d+)\])");
   std::smatch found;
@@ -72,7 +72,7 @@ Range range(const std::string& open, const std::string& least, const std::string
           .zero = beside == " or 0"};
 }
 
-/// The bound at the front of a comment; empty when there is none.
+/// Returns the bound at the start of a comment, if any.
 std::optional<Bound> bound_of(const std::string& comment) {
   if (comment.empty() || std::string("[({").find(comment.front()) == std::string::npos) return {};
   static const std::string kRange = R"(([\[(])([^,\]]+), ([^\]]+)\])";
@@ -92,7 +92,7 @@ std::optional<Bound> bound_of(const std::string& comment) {
   return out;
 }
 
-/// By "Message.field".
+/// Returns the bounds by "Message.field".
 std::map<std::string, Bound> bounds_of(std::string_view proto) {
   static const std::regex kMessage(R"(message (\w+) \{)");
   static const std::regex kField(R"(\s+(?:optional |repeated )?[\w.]+ (\w+) = \d+(?: \[packed = true\])?;\s*// (.*))");
@@ -121,7 +121,7 @@ std::int64_t whole(const std::string& text) {
 
 // ---- The cases ----
 
-/// What depends on another field too: what is right beyond the bound is refused all the same.
+/// Fields whose validity also depends on another field. A value that passes its own bound may still be refused.
 bool is_bound_to_others(const std::string& path) {
   static const std::regex kOthers(R"(.*\.(normal|workspace_min_m|workspace_max_m|operator_from_device|orientation|)"
                                   R"(at_orientation|rotation|turn\.turn)\..*)");
@@ -132,7 +132,7 @@ class Maker {
  public:
   Maker(const std::map<std::string, Bound>& bounds, std::vector<Case>& out) : bounds_(bounds), out_(out) {}
 
-  /// All fields of `root`, and of the messages in it.
+  /// Creates the cases of `root` and all messages in it.
   void make(Message& root) {
     root_ = &root;
     visit(root, "");
@@ -147,7 +147,7 @@ class Maker {
     for (int i = 0; i < type.field_count(); ++i) {
       const FieldDescriptor& field = *type.field(i);
       const std::string name = (path.empty() ? type.name() : path) + '.' + field.name();
-      if (field.is_repeated() && reflection.FieldSize(message, &field) == 0) continue;  // a later example has some
+      if (field.is_repeated() && reflection.FieldSize(message, &field) == 0) continue;  // a later example has entries
       if (fresh(name)) mutate(message, field, name);
       lengthen(message, field, name);
       if (field.cpp_type() != FieldDescriptor::CPPTYPE_MESSAGE) continue;
@@ -164,7 +164,7 @@ class Maker {
     }
   }
 
-  /// Rotations and normals have the length 1 ± 0.001: values right within and right beyond that.
+  /// Rotations and normals must have the length 1 ± 0.001. Adds values on both sides of these limits.
   void lengthen(Message& message, const FieldDescriptor& field, const std::string& path) {
     const bool turns = field.cpp_type() == FieldDescriptor::CPPTYPE_MESSAGE && field.message_type()->name() == "Quat";
     if (!turns && field.name() != "normal") return;
@@ -185,7 +185,7 @@ class Maker {
     }
   }
 
-  /// The root as it is now.
+  /// Adds the current root as a case.
   void add(const std::string& path, const std::string& value, bool accepted) {
     const std::string bytes = root_->SerializeAsString();
     const auto* const begin = reinterpret_cast<const std::byte*>(bytes.data());
@@ -233,7 +233,7 @@ class Maker {
         });
       };
       constexpr double kInfinity = std::numeric_limits<double>::infinity();
-      // The numbers of single precision that are nearest within: a bound need not be one of them.
+      // Rounds into the bounds, which need not be exact in single precision.
       const auto held = [&](double value) {
         const auto single = static_cast<float>(value);
         if (!is_single) return value;
@@ -301,8 +301,8 @@ class Maker {
     for (const int size : bound.too_few_or_many) resized(size, false);
   }
 
-  /// New entries are zeros, letters, or copies of the last one (claims and grants of other devices, which are to be
-  /// there once each); a frame is an empty one, as a newer peer may send it.
+  /// New entries are zeros, letters or copies of the last one, with different devices in claims and grants. A new frame
+  /// is empty, as from a newer peer.
   static void resize(Message& message, const FieldDescriptor& field, int size) {
     const auto& reflection = *message.GetReflection();
     while (reflection.FieldSize(message, &field) > size) reflection.RemoveLast(&message, &field);
@@ -324,7 +324,7 @@ class Maker {
             entry.CopyFrom(reflection.GetRepeatedMessage(message, &field, last));
           }
           if (auto* const claim = dynamic_cast<pb::Claim*>(&entry)) claim->set_device("d" + std::to_string(last));
-          if (auto* const grant = dynamic_cast<pb::Grant*>(&entry)) {  // two for each device, none twice
+          if (auto* const grant = dynamic_cast<pb::Grant*>(&entry)) {  // two per device, none twice
             grant->set_device(static_cast<std::uint32_t>(last / 2));
             grant->set_channel(static_cast<std::uint32_t>(2 + last % 2));
           }
@@ -370,7 +370,7 @@ std::vector<Case> cases(std::string_view proto) {
   std::vector<Case> out;
   Maker maker(bounds, out);
   for (const auto& example : examples::datagrams()) {
-    const auto& datagram = example.bytes;  // clang 14 captures no structured binding
+    const auto& datagram = example.bytes;  // clang 14 cannot capture structured bindings
     const auto body = [&](std::size_t at) { return std::span(datagram).subspan(at); };
     const auto parse = [](Message& message, std::span<const std::byte> bytes) {
       if (!message.ParseFromArray(bytes.data(), static_cast<int>(bytes.size())))

@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// What codec_proof_test.cc counts instructions of: a datagram with a state, one with a force, and one with the states
-// of 16 devices in columns, written and read. Beside it, what libprotobuf takes to make the same bytes of its objects,
-// and its objects of these bytes. A line for each. Callgrind counts within `in_turn`, and writes a file each time it
-// returns.
+// Datagrams whose instructions codec_proof_test.cc counts: one with a state, one with a force, and one with the states
+// of 16 devices in columns, each written and read. For comparison, libprotobuf serializes and parses the same bytes.
+// Prints one line each. Callgrind counts within `in_turn` and writes a file at each return.
 #include <array>
 #include <cstdlib>
 #include <iostream>
@@ -21,13 +20,13 @@ struct Workplace {
   DataWriter writer;
   DataReader reader;
   std::array<std::byte, kMaxDatagram> buffer{};
-  std::size_t frames = 0;  ///< that were read
+  std::size_t frames = 0;  ///< frames read
   v1::Datagram object;
 };
 
 enum class What { kState, kForce, kColumns };
 
-/// The states of 16 devices at one step.
+/// States of 16 devices at one step.
 struct Step {
   std::array<DeviceState, limits::kMaxDevices> states;
   std::array<const DeviceState*, limits::kMaxDevices> each;
@@ -65,7 +64,7 @@ void read(Workplace& place, bool by_hand) {
 
 }  // namespace
 
-/// A name that callgrind finds: not inlined, not mangled.
+/// Callgrind finds this function by its name, so it must be neither inlined nor mangled.
 extern "C" [[gnu::noinline]] void in_turn(Workplace& place, bool writes, What what, bool by_hand, int times) {
   static const DeviceState state = examples::state();
   static const ForceCommand force = examples::force();

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// What the datagrams of each step cost to write and to read, in instructions by callgrind, beside protobuf.
+// Cost of writing and reading the datagrams of each step, in callgrind instructions, compared with protobuf.
 #include <gtest/gtest.h>
 
 #include <iostream>
@@ -14,14 +14,14 @@
 namespace tendon::codec_proof_test {
 namespace {
 
-constexpr double kTimes = 1100 - 100;  // between the two run lengths of codec-proof
+constexpr double kTimes = 1100 - 100;  // the two run lengths of codec-proof
 
 using CodecProof = testing::InstructionTest;
 
 struct Bound {
   std::string what;
-  double instructions;  ///< by hand, a few percent above what it takes
-  double times;         ///< as many by protobuf, at least, of objects that are there already
+  double instructions;  ///< limit of our codec, a few percent above the measured value
+  double times;         ///< protobuf needs at least this factor, with existing objects
 };
 
 TEST_F(CodecProof, StatesAndForcesCostLessThanByProtobuf) {

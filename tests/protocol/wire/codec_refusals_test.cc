@@ -153,14 +153,14 @@ TEST(Codec, AReportOutOfBoundsIsLeftOutAndCountedAndTheRestIsRead) {
     EXPECT_TRUE(std::holds_alternative<DeviceState>(content->frames[0])) << bad.what;
   }
   LinkReport wordy = examples::report();
-  wordy.words.assign(limits::kMaxDetail + 1, 'w');  // ours are cut; a stranger's are refused
+  wordy.words.assign(limits::kMaxDetail + 1, 'w');  // ours are truncated; those of other senders are refused
   DataReader reader;
   EXPECT_EQ(read(reader, data(1, {}, wordy))->frames.size(), 1U);
   const RawProtobuf report = RawProtobuf().varint(1, 1).text(20, wordy.words);
   EXPECT_EQ(reader.read(datagram_with(RawProtobuf().message(6, report)))->invalid, 1U);
 }
 
-/// Expects that the request is counted as invalid because of `field`, and that the state after it is read.
+/// Expects that `field` makes the request invalid, and that the state after it is still read.
 void expect_refused(const Request& request, std::string_view field, const std::string& what) {
   DataReader reader;
   const auto* content = read(reader, data(1, {}, Control{.id = 7, .request = request}, examples::state()));
@@ -174,7 +174,7 @@ void expect_refused(const Request& request, std::string_view field, const std::s
   EXPECT_TRUE(std::holds_alternative<DeviceState>(content->frames[1])) << what;
 }
 
-/// `report` is left out and counted, and the state beside it is read.
+/// Expects that `report` is dropped and counted, and that the state in the same datagram is still read.
 void expect_left_out(const auto& report, const std::string& what) {
   DataReader reader;
   const auto* content = read(reader, data(1, {}, report, examples::state()));
@@ -184,7 +184,7 @@ void expect_left_out(const auto& report, const std::string& what) {
   EXPECT_TRUE(std::holds_alternative<DeviceState>(content->frames[0])) << what;
 }
 
-/// How many of frames with `report` in field `field` are read: 0 or 1.
+/// Returns how many frames with `report` in field `field` are read: 0 or 1.
 std::size_t read_raw(unsigned field, const RawProtobuf& report) {
   DataReader reader;
   const auto* content = reader.read(datagram_with(RawProtobuf().message(field, report)));
@@ -218,13 +218,13 @@ TEST(Codec, AReportOnADeviceOutOfBoundsIsLeftOutAndCountedAndTheRestIsRead) {
     expect_left_out(report, bad.what);
   }
   const auto good = [] { return RawProtobuf().varint(1, 1).varint(10, 6); };
-  const std::string wordy(limits::kMaxDetail + 1, 'w');  // ours are cut; a stranger's are refused
+  const std::string wordy(limits::kMaxDetail + 1, 'w');  // ours are truncated; those of other senders are refused
   EXPECT_EQ(there(DeviceReport{.number = 1, .fault = wordy, .degraded = wordy}).degraded.size(), limits::kMaxDetail);
   EXPECT_EQ(read_raw(7, good()), 1U);
   EXPECT_EQ(read_raw(7, good().text(11, wordy)), 0U);
   EXPECT_EQ(read_raw(7, good().text(12, wordy)), 0U);
   EXPECT_EQ(read_raw(7, RawProtobuf().varint(1, 1)), 0U) << "no safety";
-  const std::string zeros(limits::kLatenessBuckets, '\0');  // each byte is an entry
+  const std::string zeros(limits::kLatenessBuckets, '\0');  // one entry per byte
   EXPECT_EQ(read_raw(7, good().text(9, zeros)), 1U);
   EXPECT_EQ(read_raw(7, good().text(9, zeros + '\0')), 0U) << "25 buckets";
 }
@@ -437,7 +437,7 @@ TEST(Codec, ZerosAtTheEndOfAHistogramDoNotTravel) {
   std::swap(report.lateness[13], report.lateness[12]);
   EXPECT_EQ(data(1, {}, report).size(), before - 1);
   report.lateness = {};
-  EXPECT_EQ(data(1, {}, report).size(), before - 2 - 15);  // key and length, 14 entries, one of two bytes
+  EXPECT_EQ(data(1, {}, report).size(), before - 2 - 15);  // key and length, 14 entries, one of which has two bytes
 }
 
 TEST(Codec, ABucketEndsWithItsPowerOfTwo) {
@@ -584,7 +584,7 @@ TEST(Codec, OurOwnTextIsCutToSizeAtACharacterAndWhereItIsNotUtf8) {
   EXPECT_EQ(reason("good\xC0\x80"), "good");          // overlong
   EXPECT_EQ(reason("good\xED\xA0\x80"), "good");      // surrogate
   EXPECT_EQ(reason("good\xF4\x90\x80\x80"), "good");  // beyond U+10FFFF
-  EXPECT_EQ(reason("good\xE2\x82"), "good");          // cut in two
+  EXPECT_EQ(reason("good\xE2\x82"), "good");          // truncated
 }
 
 TEST(Codec, AForceIsValidForWholeMicrosecondsRoundedUp) {

@@ -16,13 +16,13 @@
 #include "tests/protocol/wire/read_back.h"
 #include "tests/support/dice.h"
 
-// Random datagrams. Most are usual ones, and some have values that are hard to get right.
+// Random datagrams: mostly ordinary ones, some with difficult values.
 
 namespace tendon::drawn {
 
 using examples::Bytes;
 
-/// A number as engines and devices send them, and sometimes one that is hard to get right.
+/// Returns an ordinary number, sometimes a difficult one.
 inline double a_number(Dice& dice) {
   constexpr std::array kHard = {0.0,
                                 -0.0,
@@ -33,7 +33,7 @@ inline double a_number(Dice& dice) {
   return dice.chance(0.2) ? kHard[dice.bits() % kHard.size()] : dice.within(-10, 10);
 }
 inline Vec3 a_vector(Dice& dice) { return {a_number(dice), a_number(dice), a_number(dice)}; }
-/// Of any length as a varint.
+/// Varint of any length.
 inline std::uint64_t a_count(Dice& dice) { return dice.chance(0.1) ? 0 : dice.bits() >> (dice.bits() % 64); }
 inline Duration a_time(Dice& dice) {
   const auto ns = static_cast<std::int64_t>(a_count(dice) >> 4U);
@@ -102,7 +102,7 @@ inline ForceCommand a_force(Dice& dice) {
   return command;
 }
 
-/// Spoils one number of it, as a broken engine or device does.
+/// Replaces one number with an invalid one.
 inline void spoil(Dice& dice, DeviceState& state) {
   constexpr std::array kBad = {kNan, kInf, -kInf, 2 * limits::kMaxValue};
   const double bad = kBad[dice.bits() % kBad.size()];
@@ -130,7 +130,7 @@ inline std::optional<OutgoingEcho> an_echo(Dice& dice) {
                       .received_mask = static_cast<std::uint32_t>(a_count(dice))};
 }
 
-/// States as a session puts them into columns; `many`: as long as can be, else one, two or all devices.
+/// Returns the states of one step for columns, of one, two or all devices. A share `spoilt` is invalid.
 inline std::vector<DeviceState> states_of_a_step(Dice& dice, double spoilt) {
   DeviceState common = a_state(dice);
   std::vector<DeviceState> states;
@@ -163,7 +163,7 @@ inline std::vector<DeviceState> states_of_a_step(Dice& dice, double spoilt) {
   return states;
 }
 
-/// All other kinds of frames, with all of their fields.
+/// Frames of all other types with every field.
 inline const std::vector<Frame>& others() {
   static const std::vector<Frame> all = [] {
     std::vector<Frame> out = {
@@ -186,7 +186,7 @@ inline const std::vector<Frame>& others() {
   return all;
 }
 
-/// The body of a datagram of a few frames; `spoilt`: with the share of impossible states and forces.
+/// Returns the body of a datagram of a few frames. A share `spoilt` of its states and forces is invalid.
 inline Bytes a_datagram(Dice& dice, double spoilt) {
   std::array<std::byte, kMaxDatagram> buffer{};
   DataWriter writer;

@@ -26,7 +26,7 @@ using Bytes = std::span<const std::byte>;
 
 constexpr std::string_view kOpening = "```golden ";
 constexpr std::string_view kClosing = "```";
-constexpr std::size_t kAcross = 16;  ///< bytes in a line
+constexpr std::size_t kAcross = 16;  ///< bytes per line
 
 std::string hex(Bytes bytes) {
   constexpr std::string_view kDigits = "0123456789abcdef";
@@ -46,7 +46,7 @@ std::string hex_number(std::uint32_t value) {
   return "0x" + std::string(8 - text.size(), '0') + text;
 }
 
-/// In groups of three from 10 000 on.
+/// Groups digits by three from 10 000 on.
 std::string grouped(std::int64_t value) {
   std::string text = std::to_string(value);
   const std::size_t sign = value < 0 ? 1 : 0;
@@ -64,7 +64,7 @@ bool all_zero(Bytes bytes) {
   return std::all_of(bytes.begin(), bytes.end(), [](std::byte b) { return b == std::byte{0}; });
 }
 
-/// Takes a datagram from its front, and writes a line for each piece.
+/// Parses a datagram from its start and writes a line for each element.
 class Writer {
  public:
   explicit Writer(Bytes datagram) : rest_(datagram) {}
@@ -88,7 +88,7 @@ class Writer {
     text_ += '\n';
   }
 
-  /// In lines of 16 bytes; `words` stand beside the first.
+  /// Writes lines of 16 bytes, with `words` in the first.
   void lines(Bytes bytes, int depth, std::string_view words) {
     line(hex(bytes.first(std::min(kAcross, bytes.size()))), depth, words);
     for (std::size_t at = kAcross; at < bytes.size(); at += kAcross) {
@@ -96,7 +96,7 @@ class Writer {
     }
   }
 
-  /// The message in the next `size` bytes.
+  /// Writes the message in the next `size` bytes.
   void message(const Descriptor& type, std::size_t size, int depth) {
     const std::size_t end = rest_.size() - size;
     while (rest_.size() > end) field(type, depth);
@@ -144,7 +144,7 @@ class Writer {
     }
   }
 
-  /// Floating-point numbers have a line each; others stand beside one another.
+  /// Writes floating-point numbers on separate lines, others together.
   void packed(const FieldDescriptor& about, std::size_t size, int depth, const std::string& words,
               const std::string& head) {
     const Bytes all = rest_.first(std::min(size, rest_.size()));
@@ -165,7 +165,7 @@ class Writer {
     lines(all, depth + 1, values);
   }
 
-  /// The value of a field that is no string and no message, in words; empty for `true`, which needs none.
+  /// Returns the value of a scalar field as text, empty for `true`.
   std::string single(const FieldDescriptor& about) {
     switch (about.type()) {
       case FieldDescriptor::TYPE_DOUBLE:

@@ -54,7 +54,7 @@ TEST(Codec, TheFullestHelloAndWelcomeFit) {
                     .name = name,
                     .features = features,
                     .ways = ways};
-  EXPECT_LE(write_body(hello).size(), 882U);  // as limits.h says
+  EXPECT_LE(write_body(hello).size(), 882U);  // value in limits.h
   const std::size_t suite_1 = sizeof(KeyId) + kNoiseOverhead;
   EXPECT_LE(write_body(hello).size() + suite_1, kMaxHandshakeBody);
   const auto out = read_hello(write_body(hello));
@@ -74,7 +74,7 @@ TEST(Codec, TheFullestHelloAndWelcomeFit) {
                         .server = name,
                         .grants = std::vector<Grant>(limits::kMaxClaims + 1, {15, 7, Role::kController})};
   const Bytes bytes = examples::answer_datagram(1, welcome);
-  EXPECT_LE(bytes.size(), 874U);  // as limits.h says
+  EXPECT_LE(bytes.size(), 874U);  // value in limits.h
   EXPECT_LE(write_body(welcome).size() + suite_1, kMaxHandshakeBody);
   EXPECT_TRUE(read_answer(decode_answer(bytes)->body).has_value());
 }
@@ -187,7 +187,7 @@ TEST(Codec, TheLongestDescriptionOfAHandleFitsIntoADatagramOfItsOwn) {
   EXPECT_EQ(handle->buttons.back().size(), limits::kMaxLabel);
 }
 
-/// The worst of both: every component of every number takes its eight bytes, every counter ten.
+/// Worst case of both: eight bytes for every component, ten for every counter.
 TEST(Codec, AStateAndAForceAlwaysFitTogetherIntoASealedDatagram) {
   const Vec3 vector = Vec3::Constant(-1.0 / 3);
   const Mat3 matrix{{1.1, 2.1, 3.1}, {4.1, 5.1, 6.1}, {7.1, 8.1, 9.1}};

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // Compares our codec with libprotobuf. The Writer must produce the same bytes, and the DataReader must read the same
-// values, whatever the order of the fields. The fuzz target `payload` does this with random bytes.
+// values in any order of the fields. The fuzz target `payload` does this with random bytes.
 #include <google/protobuf/message.h>
 #include <google/protobuf/stubs/common.h>
 #include <gtest/gtest.h>
@@ -39,7 +39,7 @@ namespace {
 using examples::Bytes;
 using namespace drawn;
 
-constexpr int kDatagrams = 100'000;  ///< drawn by each of the tests that draw any
+constexpr int kDatagrams = 100'000;  ///< random datagrams per test
 
 Bytes bytes_of(const std::string& text) {
   const auto* const begin = reinterpret_cast<const std::byte*>(text.data());
@@ -49,7 +49,7 @@ Bytes bytes_of(const std::string& text) {
 /// Lets libprotobuf parse the body and serialize it again. Returns nothing if the body is malformed.
 std::optional<Bytes> by_protobuf(const Bytes& body) {
 #if GOOGLE_PROTOBUF_VERSION < 4022000
-  const google::protobuf::LogSilencer silence;  // it prints a line for each text that is not UTF-8
+  const google::protobuf::LogSilencer silence;  // protobuf logs every text that is not UTF-8
 #endif
   v1::Datagram parsed;
   if (!parsed.ParseFromArray(body.data(), static_cast<int>(body.size()))) return {};
@@ -57,7 +57,7 @@ std::optional<Bytes> by_protobuf(const Bytes& body) {
   return bytes_of(parsed.SerializeAsString());
 }
 
-/// All of a state, bit for bit.
+/// Encodes a state, bit for bit.
 Bytes told_of(const DeviceState& state) { return examples::data(0, {}, state); }
 
 std::string hex(const Bytes& bytes) {
@@ -129,7 +129,7 @@ TEST(Protobuf, ReadsOfScrambledFieldsTheValuesOfProtobuf) {
 }
 
 TEST(Protobuf, WhatIsMalformedForProtobufIsMalformedHere) {
-  const auto groups = [](std::size_t deep) {  // of number 10
+  const auto groups = [](std::size_t deep) {  // number 10
     return bytes_of(std::string(deep, '\x53') + std::string(deep, '\x54'));
   };
   const std::vector<std::pair<std::string, Bytes>> cases = {
@@ -159,35 +159,35 @@ TEST(Protobuf, WhatIsMalformedForProtobufIsMalformedHere) {
   for (const auto& [what, bytes] : cases) EXPECT_TRUE(readers.agree(bytes)) << what;
 }
 
-/// What a network, an old or a new peer, or an attacker may make of a datagram.
+/// Changes a datagram as a network, an older or newer peer, or an attacker may.
 void distort(Dice& dice, Bytes& body) {
   const auto somewhere = [&] { return body.begin() + static_cast<std::ptrdiff_t>(dice.bits() % (body.size() + 1)); };
   switch (body.empty() ? 1 : dice.bits() % 7) {
-    case 0:  // damage
+    case 0:  // a changed byte
       body[dice.bits() % body.size()] = static_cast<std::byte>(dice.bits());
       break;
-    case 1:  // a byte more
+    case 1:  // an added byte
       body.insert(somewhere(), static_cast<std::byte>(dice.bits()));
       break;
-    case 2:  // one less
+    case 2:  // a removed byte
       body.erase(body.begin() + static_cast<std::ptrdiff_t>(dice.bits() % body.size()));
       break;
-    case 3:  // cut
+    case 3:  // truncated
       body.resize(dice.bits() % body.size());
       break;
-    case 4: {  // some of it twice
+    case 4: {  // a repeated part
       const Bytes copy(body.begin(), somewhere());
       body.insert(body.end(), copy.begin(), copy.end());
       break;
     }
-    case 5: {  // a number in a longer form than it needs
+    case 5: {  // a number longer than necessary
       auto& byte = body[dice.bits() % body.size()];
       if ((byte & std::byte{0x80}) != std::byte{0}) break;
       byte |= std::byte{0x80};
       body.insert(body.begin() + (&byte - body.data()) + 1, std::byte{0});
       break;
     }
-    default:  // one bit: another field, another wire type, another length
+    default:  // one bit: other field, wire type or length
       body[dice.bits() % body.size()] ^= static_cast<std::byte>(1U << (dice.bits() % 8));
   }
 }
@@ -202,7 +202,7 @@ TEST(Protobuf, ReadsOfDistortedBytesWhatProtobufDoes) {
   }
 }
 
-/// One number in a longer form than it needs, and so on: what WIRE.md allows and our own writers never do.
+/// Encodings that WIRE.md allows and our writers never use, such as overlong numbers.
 TEST(Protobuf, WhatNoWriterOfOursDoesIsPutInOrder) {
   const auto frame = [](const RawProtobuf& state) { return datagram_with(RawProtobuf().message(1, state)); };
   const RawProtobuf usual = RawProtobuf().varint(1, 5).varint(11, 2);
@@ -234,7 +234,7 @@ TEST(Protobuf, WhatNoWriterOfOursDoesIsPutInOrder) {
     force.message(14, RawProtobuf().message(1, RawProtobuf().fixed64(1, 0x3FF0000000000000)).packed(2, {1.0}));
   }))))
       << "a model of rotation without a torque";
-  // The tick, 05, as 85 00: the lengths of state, frame and all grow by one.
+  // Encodes the tick 05 as 85 00. The lengths of state, frame and datagram grow by one.
   Bytes longer = frame(usual);
   const auto tick = std::find(longer.begin() + 9, longer.end(), std::byte{5});
   ASSERT_NE(tick, longer.end());
@@ -255,7 +255,7 @@ TEST(Protobuf, SixteenDevicesThatMoveOnAllAxesFitOneSealedDatagram) {
   for (std::uint32_t device = 0; device < states.size(); ++device) {
     DeviceState& state = states[device];
     state.device = device;
-    state.tick = 100'000'000;  // a day at 1 kHz
+    state.tick = 100'000'000;  // one day at 1 kHz
     state.position = {dice.within(-0.1, 0.1), dice.within(-0.1, 0.1), dice.within(-0.1, 0.1)};
     state.velocity = {dice.within(-1, 1), dice.within(-1, 1), dice.within(-1, 1)};
     state.force_applied = {dice.within(-8, 8), dice.within(-8, 8), dice.within(-8, 8)};
@@ -267,7 +267,7 @@ TEST(Protobuf, SixteenDevicesThatMoveOnAllAxesFitOneSealedDatagram) {
   const OutgoingEcho echo{PeerTime(std::chrono::hours(24)), LocalTime(std::chrono::hours(24)), 100'000'000, ~0U};
   std::array<std::byte, kMaxDatagram> buffer{};
   DataWriter writer;
-  const auto room = std::span(buffer).first(kMaxDatagram - 16);  // a seal's tag
+  const auto room = std::span(buffer).first(kMaxDatagram - 16);  // minus the tag of the seal
   writer.begin(room, {.packet_number = 100'000'000}, LocalTime(std::chrono::hours(24)), echo);
   EXPECT_EQ(writer.add(std::span<const DeviceState* const>(each)), each.size());
   const auto bytes = writer.size();
@@ -318,7 +318,7 @@ TEST(Protobuf, AStateWithAPartThatColumnsCannotSayStaysWhole) {
   }
 }
 
-/// One of a step's states that cannot be takes the others of its frame with it, and nothing else.
+/// An invalid state drops all states of its frame and nothing else.
 TEST(Protobuf, AColumnOfAnotherLengthOrAValueOutOfBoundsDropsTheFrame) {
   const auto columns = [](const std::function<void(v1::DeviceStates&)>& change) {
     const Bytes datagram = examples::data_in_columns(1, examples::states_in_columns());

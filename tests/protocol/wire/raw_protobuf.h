@@ -9,7 +9,7 @@
 
 namespace tendon {
 
-/// Protobuf by hand, to say what our own writer cannot.
+/// Hand-written protobuf for messages that our writer cannot produce.
 class RawProtobuf {
  public:
   RawProtobuf& varint(unsigned field, std::uint64_t value) {

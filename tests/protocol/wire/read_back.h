@@ -26,12 +26,12 @@ inline const DataContent* read(DataReader& reader, const examples::Bytes& datagr
   return reader.read(body(datagram));
 }
 
-/// A tx_time and one frame, given as the raw content of message Frame.
+/// Returns a tx_time and one frame from the raw content of message Frame.
 inline examples::Bytes datagram_with(const RawProtobuf& frame) {
   return RawProtobuf().fixed64(1, 1).message(3, frame).bytes();
 }
 
-/// A force command as `change` makes it, as raw content of message Frame.
+/// Returns a force command changed by `change`, as raw content of message Frame.
 inline RawProtobuf raw_force(const std::function<void(RawProtobuf&)>& change) {
   RawProtobuf force;
   force.varint(1, 1).varint(5, 1000);
@@ -39,7 +39,7 @@ inline RawProtobuf raw_force(const std::function<void(RawProtobuf&)>& change) {
   return RawProtobuf().message(2, force);
 }
 
-/// As it is after a way there; `in` is the only frame.
+/// Writes a datagram with the frame `in` and reads it back.
 template <class Message>
 Message there(const Message& in) {
   DataReader reader;

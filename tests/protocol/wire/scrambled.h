@@ -68,7 +68,7 @@ class Scrambled {
         return {};
     }
   }
-  /// Encodes one number or one text, with or without its tag.
+  /// Encodes one number or text, with or without its tag.
   std::string one(const google::protobuf::Message& message, const Field& field, int index, bool tag) {
     const auto alone = std::unique_ptr<google::protobuf::Message>(message.New());
     alone->CopyFrom(message);
@@ -85,7 +85,7 @@ class Scrambled {
     const std::string bytes = alone->SerializeAsString();
     const std::string front = field.number() < 16 ? bytes.substr(1) : bytes.substr(2);
     if (!field.is_packed()) return tag ? bytes : front;
-    const std::string element = front.substr(1);  // behind its length
+    const std::string element = front.substr(1);  // after its length
     const unsigned type = field.cpp_type() == Field::CPPTYPE_DOUBLE  ? 1
                           : field.cpp_type() == Field::CPPTYPE_FLOAT ? 5
                                                                      : 0;
@@ -98,7 +98,7 @@ class Scrambled {
     const auto add = [&](const google::protobuf::Message& sub) {
       const std::string whole = (*this)(sub);
       if (field.is_repeated() || dice_.chance(0.7)) return out.push_back(in(number, whole));
-      // Sends the message twice. The first one has no lists, because the receiver would join them.
+      // Sends the message twice. The first copy has no lists, because the receiver would join them.
       const auto first = std::unique_ptr<google::protobuf::Message>(sub.New());
       first->CopyFrom(sub);
       drop_lists(*first);

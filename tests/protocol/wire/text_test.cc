@@ -13,8 +13,8 @@ TEST(Text, CharactersHaveOneToFourBytes) {
   EXPECT_EQ(utf8_character("\xC3\xA4 and more"), 2U);   // ä
   EXPECT_EQ(utf8_character("\xE2\x82\xAC"), 3U);        // €
   EXPECT_EQ(utf8_character("\xF0\x9F\x98\x80"), 4U);    // 😀
-  EXPECT_EQ(utf8_character("\xF4\x8F\xBF\xBF"), 4U);    // U+10FFFF, the last one
-  EXPECT_EQ(utf8_character(std::string(1, '\0')), 1U);  // a NUL is a character
+  EXPECT_EQ(utf8_character("\xF4\x8F\xBF\xBF"), 4U);    // U+10FFFF, the largest
+  EXPECT_EQ(utf8_character(std::string(1, '\0')), 1U);  // NUL is a character
 }
 
 TEST(Text, BrokenCharactersAreNone) {

@@ -68,7 +68,7 @@ std::string indented(std::string_view text) {
   return out;
 }
 
-/// An object whose fields stay in order. A value is JSON already.
+/// JSON object with a fixed order of fields. Values are already JSON.
 class Object {
  public:
   Object& json(std::string_view name, std::string_view value) {
@@ -91,7 +91,7 @@ std::string list(const std::vector<std::string>& items) {
   return "[" + out + "\n]";
 }
 
-/// What the bytes say, in protobuf's own JSON.
+/// Returns the message in protobuf's JSON format.
 template <class Message>
 std::string meaning(std::span<const std::byte> body) {
   Message message;
@@ -105,7 +105,7 @@ std::string meaning(std::span<const std::byte> body) {
 
 std::span<const std::byte> text_bytes(std::string_view text) { return std::as_bytes(std::span(text)); }
 
-/// A fixed key. Nobody should use it for anything else.
+/// Returns a fixed key, for test vectors only.
 Key key_of(std::string_view what) { return Key(crypto::sha256({text_bytes("tendon vectors: "), text_bytes(what)})); }
 
 template <std::size_t Size>
@@ -117,7 +117,7 @@ using Buffer = std::array<std::byte, kMaxDatagram>;
 
 // ---- The conversation that is shown ----
 
-/// A Data datagram in the clear, as examples::datagrams() has it.
+/// A cleartext Data datagram of examples::datagrams().
 struct Shown {
   std::string name;
   bool to_server;
@@ -253,7 +253,7 @@ std::string plain_file() {
          "\n";
 }
 
-/// The server's answer to one Noise message 1, and the keys that seal by `suite` after it.
+/// The server's answer to one Noise message 1, and the keys of `suite` after it.
 struct Answered {
   std::string json;
   NoiseSplit split;
@@ -297,7 +297,7 @@ Key renewed(Suite suite, const Key& key) {
   return suite == Suite::kAesGcm ? crypto::AesGcm(key).renewed() : crypto::renewed(key);
 }
 
-/// The example with the word for suite 2, as a client adds it and a server puts it first.
+/// Returns the example with the token of suite 2, which a client appends and a server puts first.
 Hello offering(Suite suite) {
   Hello hello = examples::hello();
   if (suite == Suite::kAesGcm) hello.features.emplace_back(kFeatureAesGcm);
@@ -338,7 +338,7 @@ std::string sealed_file(Suite suite) {
   const Key next_up = renewed(suite, up);
   const Key next_down = renewed(suite, down);
   std::vector<Shown> all = shown(std::uint64_t{1} << 32);
-  // The bye stays last: of the key before, and late.
+  // The Bye stays last. It uses the previous key and is late.
   const std::uint64_t far = (std::uint64_t{1} << 32) + 1;
   all.insert(all.end() - 1,
              {{"force after the first rekey", true, far, 1, examples::data(far, examples::echo(), examples::force())},
@@ -360,7 +360,7 @@ std::string sealed_file(Suite suite) {
                        .str());
   }
 
-  // What a client that has just been welcomed drops, each sent to it as it is here.
+  // Datagrams that a client drops directly after the handshake.
   Bytes state = examples::data(1, examples::echo(), examples::state());
   state.erase(state.begin(), state.begin() + kHeaderSize);
   const Header good{.connection_id = examples::kConnection, .packet_number = 1};
@@ -393,7 +393,8 @@ std::string sealed_file(Suite suite) {
     const Key& split = welcome.split.responder_to_initiator;
     drop("in suite 1, with the key that Split() gave", "malformed", sealed(Suite::kNoise, split, good, state));
     drop("the key that Split() gave", "forged", sealed(suite, split, good, state));
-    // The number's bytes turned round, under a header that says the number itself: what a little-endian nonce makes.
+    // A reversed packet number in the nonce, as from a little-endian implementation, under a header with the correct
+    // number.
     const auto clear = encode_header({.suite = suite, .connection_id = examples::kConnection, .packet_number = 1});
     Bytes turned(clear.begin(), clear.end());
     turned.resize(kHeaderSize + state.size() + crypto::kTagSize);
@@ -486,7 +487,7 @@ std::string key_files() {
   };
   std::string counting;
   for (unsigned i = 0; i < 32; ++i) counting += hex(std::array{static_cast<std::byte>(i)});
-  // So many different bytes, in no order that repeats; and so many different steps between bytes that differ.
+  // Appends `count` different bytes without a repeating order, then as many different steps between bytes.
   const auto different_bytes = [](unsigned count) {
     std::string out;
     for (unsigned i = 0; i < 32; ++i) {

@@ -6,7 +6,7 @@
 
 namespace tendon::vectors {
 
-/// The files of protocol/vectors/ that our own code writes, by name: their text as it must be.
+/// Returns the generated files of protocol/vectors/ by name.
 std::map<std::string, std::string> files();
 
 }  // namespace tendon::vectors

@@ -18,7 +18,7 @@
 #include "protocol/session.h"
 #include "tests/protocol/examples.h"
 
-// protocol/vectors/ is what other languages check themselves against: it is true, and it is what we do.
+// Checks that protocol/vectors/, with which other languages test their code, is correct and matches our code.
 
 namespace tendon::vectors_test {
 namespace {
@@ -89,7 +89,7 @@ TEST(Vectors, ChaCha20Poly1305GivesTheAnswersOfRfc8439) {
     for (std::size_t i = 8; i-- > 0;) number = number << 8U | std::to_integer<std::uint64_t>(nonce[4 + i]);
     const bool as_in_noise =
         std::all_of(nonce.begin(), nonce.begin() + 4, [](std::byte b) { return b == std::byte{}; });
-    if (!as_in_noise) continue;  // for those whose library takes any nonce
+    if (!as_in_noise) continue;  // vector for libraries that accept any nonce
     Bytes out(sealed.size());
     crypto::seal(key(v, "key"), number, bytes(v, "associated_data"), plain, out);
     EXPECT_EQ(out, sealed) << text(v, "source");
@@ -108,7 +108,7 @@ TEST(Vectors, Aes256GcmGivesTheAnswersOfItsAuthors) {
     for (std::size_t i = 4; i < 12; ++i) number = number << 8U | std::to_integer<std::uint64_t>(nonce.at(i));
     const bool as_in_noise =
         std::all_of(nonce.begin(), nonce.begin() + 4, [](std::byte b) { return b == std::byte{}; });
-    if (!as_in_noise) continue;  // for those whose library takes any nonce
+    if (!as_in_noise) continue;  // vector for libraries that accept any nonce
     const Bytes plain = bytes(v, "text");
     const Bytes sealed = bytes(v, "sealed");
     const crypto::AesGcm aes(key(v, "key"));
@@ -171,7 +171,7 @@ TEST(Vectors, AreAllTested) {
   EXPECT_TRUE(names.empty());
 }
 
-/// Whether the codec takes a body with every value that is in it.
+/// Returns true if the codec accepts a body with all its values.
 bool is_taken(const Json& vector) {
   const Bytes body = bytes(vector, "body");
   if (vector.at("message") == "Hello") return read_hello(body).has_value();
@@ -189,7 +189,7 @@ TEST(Vectors, BoundsOfTheProtoFileAreThoseOfTheCodec) {
   EXPECT_GT(file.at("bounds").size(), 300U);
 }
 
-/// The session has to answer these requests, and it has to accept these answers.
+/// The session must answer these requests and accept these answers.
 TEST(Vectors, ARequestOrAnswerOutOfBoundsIsReadAsOneThatIsRefused) {
   const std::set<std::string> requests = {
       "SetStateRate", "Rearm",  "Describe", "TakeLease", "GiveLease", "LeaseLost", "SetStateDeadband",
@@ -225,7 +225,7 @@ TEST(Vectors, ARequestOrAnswerOutOfBoundsIsReadAsOneThatIsRefused) {
   EXPECT_EQ(seen, requests);
 }
 
-/// The client and the session in this test only use values from the file.
+/// The client and the session use only values of the file.
 class SealedVectors : public ::testing::TestWithParam<std::string> {
  protected:
   void SetUp() override {

@@ -11,14 +11,14 @@
 #include "tests/protocol/examples.h"
 #include "tests/protocol/wire/golden.h"
 
-// WIRE.md is the specification that other languages are written from: its golden datagrams are these bytes.
+// WIRE.md is the specification for other languages, so its golden datagrams must be correct.
 
 namespace tendon::wire_md_test {
 namespace {
 
 using examples::Bytes;
 
-/// One line of a golden block: hex bytes up to the semicolon; "00 x1117" is a byte so many times.
+/// Parses a line of a golden block: hex bytes up to the semicolon. "00 x1117" repeats a byte.
 Bytes bytes_of(const std::string& line) {
   Bytes out;
   std::istringstream words(line.substr(0, line.find(';')));
@@ -39,7 +39,7 @@ std::string page() {
   return {std::istreambuf_iterator<char>(file), {}};
 }
 
-/// The bytes of each golden block, by name.
+/// Returns the bytes of each golden block by name.
 std::map<std::string, Bytes> golden_datagrams() {
   std::map<std::string, Bytes> out;
   for (const auto& [name, block] : golden::blocks(page())) {

@@ -10,8 +10,8 @@
 #include "tests/protocol/wire/golden.h"
 #include "tests/protocol/wire/vectors.h"
 
-// After a change of the wire that was meant: writes protocol/vectors/ and the golden datagrams of WIRE.md anew. The
-// diff is the change. The target `wire` runs it, and protoc for the clients in Python and TypeScript.
+// Rewrites protocol/vectors/ and the golden datagrams of WIRE.md after an intended change of the wire format. The diff
+// shows the change. The target `wire` runs this program, and protoc for the Python and TypeScript clients.
 
 namespace {
 
