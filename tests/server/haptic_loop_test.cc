@@ -13,7 +13,7 @@ namespace {
 
 using std::chrono::milliseconds;
 
-/// A handle at rest, that can be unplugged.
+/// A handle at rest that can be unplugged.
 class Handle final : public Device {
  public:
   bool plugged = true;
@@ -54,7 +54,7 @@ TEST(HapticLoop, ASafetyFaultFreezesTheFlightRecorderAtItsStep) {
   force.force = Vec3(-2, 0, 0);
   force.valid_for = milliseconds(500);
   mail->forces[0].put(force);
-  for (int i = 0; i < 200; ++i) step();  // ramped in
+  for (int i = 0; i < 200; ++i) step();  // end of the ramp
   EXPECT_FALSE(mail->flight.frozen());
   handle.plugged = false;
   for (int i = 0; i < 5; ++i) step();
@@ -65,13 +65,13 @@ TEST(HapticLoop, ASafetyFaultFreezesTheFlightRecorderAtItsStep) {
   EXPECT_EQ(mail->flight[299].applied, Vec3(-2, 0, 0));
   EXPECT_EQ(mail->flight[300].applied, Vec3(0, 0, 0));
 
-  // Written down once, it records again.
+  // Recording resumes after the flight was written.
   mail->flight.thaw();
   for (int i = 0; i < 5; ++i) step();
   EXPECT_FALSE(mail->flight.frozen());
 }
 
-/// A loop whose engine pushes all the time, around any device.
+/// A loop around any device with an engine that always pushes.
 struct Pushed {
   explicit Pushed(Device& device) : loop(config(), device, *mail) {}
 
@@ -83,7 +83,7 @@ struct Pushed {
     config.control.max_slew = 100;
     return config;
   }
-  /// Returns the last step's record.
+  /// Returns the record of the last step.
   StepRecord steps(int count) {
     StepRecord last;
     for (int i = 0; i < count; ++i) {
@@ -109,7 +109,7 @@ struct Pushed {
   HapticLoop loop;
   LocalTime now{milliseconds(1)};
   std::uint64_t sequence = 0;
-  std::optional<double> error{};  ///< that the engine says, and so is `way`
+  std::optional<double> error{};  ///< reported by the engine, like `way`
   std::uint8_t way = 0;
 };
 
@@ -143,7 +143,7 @@ TEST(HapticLoop, TheButtonsAreInTheRecordAndTheStateOfTheirStep) {
   EXPECT_EQ(pushed.steps(1).buttons, 0U);
 }
 
-/// A hand that circles, on a device with these joints or without them.
+/// A device with a circling hand, with or without joints.
 SimulatedDevice::Config circling(bool jointed) {
   SimulatedDevice::Config config;
   config.mass = 0.1;
@@ -277,7 +277,8 @@ TEST(HapticLoop, OfTwoOrdersTheLaterOneCounts) {
   EXPECT_EQ(world.steps(400).applied, Vec3(-2, 0, 0));
 }
 
-/// What a loop applies whose engine, number 7, pushes with 2 N; then its last force and its release come in one period.
+/// Returns the applied force of a loop whose engine (number 7) pushes with 2 N and sends its last force and its release
+/// in one period.
 Vec3 applied_after_release(bool again) {
   Handle handle;
   Pushed pushed(handle);

@@ -20,7 +20,7 @@ using std::chrono::milliseconds;
 
 constexpr LocalTime kStart(std::chrono::seconds(1000));
 
-/// A device. The test calls the haptic loop.
+/// A device whose haptic loop is called by the test.
 struct Place {
   explicit Place(Scene the_scene)
       : scene(std::move(the_scene)), device(scene.simulated()), haptic(scene.loop, device, *mail) {}

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// What loop_proof_test.cc counts instructions of: the haptic loop's step, at first of a point, then of a handle that
-// turns and grips, then of a point that tells its joints. A line for each. Callgrind counts within `step_in_turn`, and writes a file each time it returns.
+// Haptic steps whose instructions loop_proof_test.cc counts: a point, a handle that rotates and grips, and a point that
+// reports its joints. Prints one line each. Callgrind counts within `step_in_turn` and writes a file at each return.
 #include <iostream>
 #include <memory>
 #include <string_view>
@@ -14,7 +14,7 @@ using namespace tendon;
 
 namespace {
 
-/// A hand that swings without libm, whose instructions depend on the processor.
+/// Hand motion without libm, whose instruction count depends on the processor.
 double swing(std::uint64_t tick, std::uint64_t period) {
   const double u = 2.0 * static_cast<double>(tick % period) / static_cast<double>(period) - 1;
   return u * (1 - u * u);
@@ -42,7 +42,7 @@ class Handle final : public Device {
     }
     return sample;
   }
-  /// What a Falcon's driver does, which has found its pose in `read`.
+  /// As in the Falcon driver, which computes the pose in `read`.
   Joints joints(const Motion& hand) const noexcept override {
     return Joints::three(pose_->angles, pose_->jacobian * hand.velocity);
   }
@@ -74,7 +74,7 @@ HapticLoop::Config config_of(bool whole) {
   return config;
 }
 
-/// What an engine of 100 Hz answers.
+/// Answer of an engine at 100 Hz.
 RemoteForce answer(std::uint64_t sequence, LocalTime now, bool whole) {
   RemoteForce force;
   force.sequence = sequence;
@@ -91,7 +91,7 @@ RemoteForce answer(std::uint64_t sequence, LocalTime now, bool whole) {
 
 }  // namespace
 
-/// A name that callgrind finds: not inlined, not mangled.
+/// Callgrind finds this function by its name, so it must be neither inlined nor mangled.
 extern "C" [[gnu::noinline]] void step_in_turn(HapticLoop& loop, Mailboxes& mail, bool whole, LocalTime& now,
                                                std::uint64_t steps) {
   for (std::uint64_t i = 0; i < steps; ++i) {

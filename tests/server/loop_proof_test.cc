@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// What a haptic step costs, in instructions by callgrind: of a point, which pays next to nothing for what other handles
-// can do, of a handle that turns and grips, and of a point that tells its joints.
+// Cost of a haptic step in callgrind instructions: a point, for which the features of other handles must be nearly
+// free, a handle that rotates and grips, and a point that reports its joints.
 #include <gtest/gtest.h>
 
 #include <iostream>
@@ -12,9 +12,9 @@
 namespace tendon::loop_proof_test {
 namespace {
 
-constexpr double kSteps = 3000 - 1000;  // between the two run lengths of loop-proof
+constexpr double kSteps = 3000 - 1000;  // the two run lengths of loop-proof
 
-/// Of a point's step at 38d7a6d, before handles turned and gripped: this program, without its handle.
+/// Step of a point at 38d7a6d, before rotation and grip existed.
 constexpr double kBeforeHandles = 2977.5;
 
 using LoopProof = testing::InstructionTest;
@@ -29,7 +29,7 @@ TEST_F(LoopProof, APointsStepIsNoSlowerAndAWholeHandleCostsTwoAndAHalf) {
             << " before there were handles), of a "
             << "handle that turns and grips " << handle << ": " << handle / point << " times as many; of a point "
             << "with three joints " << jointed << "\n";
-  EXPECT_LT(point, 0.9 * kBeforeHandles);  // its velocity has become cheaper since
+  EXPECT_LT(point, 0.9 * kBeforeHandles);  // the velocity estimate is cheaper since
   EXPECT_GT(point, 0.5 * kBeforeHandles) << "this is no step";
   EXPECT_LT(handle, 2.6 * point);
   EXPECT_GT(handle, 1.5 * point) << "this is no handle";

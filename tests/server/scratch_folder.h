@@ -9,7 +9,7 @@
 
 namespace tendon::testing {
 
-/// A new folder that is gone, with all in it, at the end of the test.
+/// A new folder, deleted with its contents at the end of the test.
 class ScratchFolder {
  public:
   ScratchFolder() {

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// What turn_proof_test.cc counts: the way of a state from its box to an engine, and of the force back into its own,
-// through the server's network loop and a client, both busy-polling, in the clear and without sockets. One line: clock
-// readings, looks at a link and datagrams of the longer run. Callgrind counts within `exchange_in_turn`, and writes a
-// file each time it returns.
+// Code whose cost turn_proof_test.cc counts: a state from its mailbox to an engine and the force back to its mailbox,
+// through the network loop of the server and a client. Both busy-poll, unencrypted and without sockets. Prints one
+// line: clock readings, link polls and datagrams of the longer run. Callgrind counts within `exchange_in_turn` and
+// writes a file at each return.
 #include <algorithm>
 #include <array>
 #include <cstdlib>
@@ -19,7 +19,7 @@ using namespace tendon;
 
 namespace {
 
-/// A clock that goes on by itself, so that a turn takes time; it counts who asks.
+/// A clock that advances at each reading and counts the readings.
 struct Clock {
   LocalTime now{std::chrono::seconds(1)};
   std::uint64_t readings = 0;
@@ -29,7 +29,7 @@ struct Clock {
   }
 };
 
-/// Half of the wire: the datagram under way to this end. There is never more than one, but while they shake hands.
+/// One direction of the wire with its datagram in flight. After the handshake there is at most one.
 struct Half {
   struct Datagram {
     std::array<std::byte, kMaxDatagram> bytes;
@@ -70,16 +70,16 @@ class MemoryLink final : public Link {
   Address peer_;
 };
 
-/// The server's network thread and the client's, one after the other.
+/// Alternates the network threads of the server and the client.
 class Pair {
  public:
-  /// The handshake, and what both ask each other first.
+  /// Performs the handshake and the first requests.
   Pair() {
     for (int i = 0; i < 20; ++i) exchange();
     if (client_.phase() != ForceClient::Phase::kOpen) std::abort();
   }
 
-  /// A state into its box, as a haptic step puts it, and the force out of its own.
+  /// Puts a state into its mailbox like a haptic step, and takes the force from the other one.
   void exchange() {
     clock_.now += std::chrono::microseconds(990);
     DeviceState& state = mail_->state.back();
@@ -94,7 +94,7 @@ class Pair {
     state.force_age = std::chrono::milliseconds(7);
     state.mode = Mode::kActive;
     mail_->state.put();
-    // Each end looks in vain before it finds something.
+    // Each end polls once without result before it finds a datagram.
     LocalTime at_client = clock_.now;
     LocalTime at_server = clock_.now;
     client_busy_.look(at_client);
@@ -110,7 +110,7 @@ class Pair {
   std::uint64_t readings() const noexcept { return clock_.readings; }
   std::uint64_t looks() const noexcept { return server_link_.looks + client_link_.looks; }
   std::uint64_t sent() const noexcept { return server_link_.sent + client_link_.sent; }
-  std::uint64_t forces = 0;  ///< that answered the state of their turn
+  std::uint64_t forces = 0;  ///< forces that answered the state of their turn
 
  private:
   static NetworkLoop::Config server_config(Mailboxes& mail) {
@@ -146,7 +146,7 @@ class Pair {
 
 }  // namespace
 
-/// A name that callgrind finds: not inlined, not mangled.
+/// Callgrind finds this function by its name, so it must be neither inlined nor mangled.
 extern "C" [[gnu::noinline]] void exchange_in_turn(Pair& pair, std::uint64_t times) {
   for (std::uint64_t i = 0; i < times; ++i) pair.exchange();
 }

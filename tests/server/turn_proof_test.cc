@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// What the loops do between a state in its box and its force in the other one, beside system calls: instructions by
-// callgrind, clock readings, and looks at a link, each of which would be a system call.
+// Cost of the loops from a state in its mailbox to the force in the other one, without system calls: callgrind
+// instructions, clock readings, and link polls, each of which would be a system call.
 #include <gtest/gtest.h>
 
 #include <cstdint>
@@ -14,10 +14,10 @@
 namespace tendon::turn_proof_test {
 namespace {
 
-constexpr std::uint64_t kTurns = 600;       // of the longer run of turn-proof
-constexpr double kCounted = 600.0 - 100.0;  // between its two lengths
+constexpr std::uint64_t kTurns = 600;       // turns of the longer run of turn-proof
+constexpr double kCounted = 600.0 - 100.0;  // difference of its two run lengths
 
-constexpr double kMost = 9150;  // a few percent above what it takes
+constexpr double kMost = 9150;  // a few percent above the measured value
 
 using TurnProof = testing::InstructionTest;
 
@@ -35,9 +35,9 @@ TEST_F(TurnProof, AStateAndItsForceTakeTwoDatagramsAndFewInstructions) {
             << static_cast<double>(sent) / kTurns << " datagrams\n";
   EXPECT_EQ(forces, kTurns) << "not every state was answered in its turn";
   EXPECT_EQ(sent, 2 * kTurns);
-  // Both ends look in vain, and then find something; the server looks once more when a state has left.
+  // Each end polls once without result and once with one. The server polls once more after sending a state.
   EXPECT_EQ(looks, 5 * kTurns);
-  // After each look but that last one, when the step has rung, and when the engine has answered.
+  // After each of the first four polls, after the doorbell of the step, and after the engine's answer.
   EXPECT_EQ(readings, 6 * kTurns);
   EXPECT_LE(instructions, kMost);
   EXPECT_GE(instructions, 0.5 * kMost) << "this is no whole turn, or this bound is old";

@@ -102,7 +102,7 @@ std::string hex4(std::uint16_t number) {
   return text.str();
 }
 
-// The rule that `tendond devices` speaks of is there, and is about each device that has a driver.
+// The udev rule named by `tendond devices` must exist and cover every device that has a driver.
 TEST(DevicesReport, TheUdevRulesNameEveryIdOfEveryDriver) {
   std::size_t ids = 0;
   for (const Driver* driver : drivers()) {

@@ -19,7 +19,7 @@ namespace {
 using namespace std::chrono_literals;
 using testing::ScratchFolder;
 
-/// A machine made of files.
+/// A machine simulated by files.
 class Machine {
  public:
   void say(const std::string& file, const std::string& text) {
@@ -109,7 +109,7 @@ TEST(Doctor, OfWhatTheKernelDoesNotSayItClaimsNothing) {
 }
 
 TEST(Doctor, MeasuresLatenessAgainstTheScheduleNotTheLastWakeUp) {
-  // Each wake-up is as many µs late as its number, from 0 to 99; the last one by a pause.
+  // Wake-up n is n µs late, from 0 to 99. The last one has an additional pause.
   LocalTime now{5s};
   int sleeps = 0;
   LocalTime first_due{};

@@ -20,14 +20,14 @@ using namespace std::chrono_literals;
 
 Scene shipped(const char* name) { return read_scene(std::filesystem::path(TENDON_SCENES) / name); }
 
-constexpr int kRounds = 4;  // a clock that ticks evenly tells in the first what it would in the eightieth
+constexpr int kRounds = 4;  // with an even clock all rounds give the same result
 
-/// Time that passes by 1 µs whenever somebody looks.
+/// Returns a clock that advances by 1 µs at each reading.
 std::function<Duration()> ticking() {
   return [now = Duration{}]() mutable { return now += 1us; };
 }
 
-/// Whatever a scene may leave out of a haptic step: the effects of the device, the tables that are parts, one key.
+/// Returns the optional parts of a haptic step: device effects, tables, and one key.
 std::set<std::string> optional_parts() {
   std::set<std::string> keys = {
       "device.hand", "device.environment", "device.rotation", "device.gripper",     "loop.max_speed_m_per_s", "safety",
@@ -38,7 +38,7 @@ std::set<std::string> optional_parts() {
     if (line.starts_with('[')) table = line.substr(1, line.find(']') - 1);
     const bool part = line.starts_with('[') && (table.starts_with("safety.") || table.starts_with("limiter.") ||
                                                 table.starts_with("force.") || table.starts_with("device.effects."));
-    // The bounds of a handle go with its motors.
+    // The bounds of a handle belong to its motors.
     const bool bounds = table == "limiter.rotation" || table == "limiter.gripper";
     if (part && !bounds) keys.insert(table);
     const bool key = line.starts_with("  ") && line.find_first_of(" ", 2) == std::string::npos;
@@ -107,11 +107,11 @@ TEST(Explain, SaysHowACouplingIsFeltByEachMethod) {
 }
 
 TEST(Explain, ACostIsTheDifferenceToTheSceneWithoutThePart) {
-  // The clock ticks once in each round of 200 steps, but not in the first trial without a part. This is the trial without
-  // viscous friction, so the cost of this part is the cost of a whole step.
+  // The clock ticks once in each round of 200 steps, except in the first trial without a part. That is the trial
+  // without viscous friction, so this part appears to cost a whole step.
   const Scene scene = shipped("demo_parts.toml");
   std::size_t looks = 0;
-  const std::size_t trials = 3 + 11;  // twice the whole scene, once without its device, and 11 parts
+  const std::size_t trials = 3 + 11;  // two with the whole scene, one without its device, and 11 without a part
   Duration now{};
   const auto time = [&] {
     const std::size_t trial = looks++ / 2 % trials;
@@ -129,7 +129,7 @@ TEST(Explain, ACostIsTheDifferenceToTheSceneWithoutThePart) {
 }
 
 TEST(Explain, TheDeviceNeverCostsMoreThanTheWholeStep) {
-  // Each look is further from the one before: what is measured later seems to cost more, as on a machine that slows.
+  // The intervals between readings grow, as on a machine that slows down, so later measurements seem to cost more.
   Duration now{};
   Duration between = 1us;
   const auto time = [&] { return now += between += 1us; };

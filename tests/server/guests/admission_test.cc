@@ -29,7 +29,7 @@ TEST_F(SealedServer, IsSilentForAKeyItDoesNotHave) {
   EXPECT_NE(phase(a), Phase::kOpen);
   EXPECT_EQ(a.client->stats().sessions, 0U);
   EXPECT_GT(loop_->stats().hellos.unknown_key, 10U);
-  const auto notices = loop_->take_notices();  // nobody has taken any meanwhile
+  const auto notices = loop_->take_notices();  // none were taken before
   ASSERT_EQ(notices.size(), 1U);
   EXPECT_EQ(notices[0].text, UnknownKeys::notice(parse_address("192.0.2.1:4000")));
   for (const Datagram& datagram : wire_) {
@@ -59,7 +59,7 @@ TEST_F(SealedServer, SealsByAesWhereBothCanAndServesWhoCannot) {
   EXPECT_EQ(phase(a), Phase::kOpen);
   Client old = of_suites(other_, "192.0.2.2:4000", {Suite::kNoise}, true);
   Client screen = of_suites(screen_, "192.0.2.3:4000", {Suite::kNoise}, false);
-  std::set<std::uint8_t> suites;  // of the datagrams of the session with the screen
+  std::set<std::uint8_t> suites;  // of the datagrams in the session with the screen
   run(milliseconds(300), {&a, &old, &screen}, [&](const Datagram& datagram) {
     if (datagram.to == screen.end->self && (datagram.bytes[1] & std::byte{0x0F}) == std::byte{3}) {
       suites.insert(std::to_integer<std::uint8_t>(datagram.bytes[3]));
@@ -134,7 +134,7 @@ TEST_F(SealedServer, TheSameKeyTakesItsPlaceAtOnceAndTheOneBeforeStaysAway) {
 TEST_F(SealedServer, AReplayedHelloTakesNothingFromAnybody) {
   Client a = controller(wall_, "192.0.2.1:4000");
   run(milliseconds(500), {&a});
-  // From its own address, where its cookie is good, and after the server has forgotten this attempt's Answer.
+  // From its own address, for which its cookie is valid, after the server has dropped the Answer of this attempt.
   Bytes hello;
   for (const Datagram& datagram : wire_) {
     if (datagram.to == server_.self && datagram.bytes.size() == kMaxDatagram) hello = datagram.bytes;
@@ -155,7 +155,7 @@ TEST_F(SealedServer, AReplayedHelloTakesNothingFromAnybody) {
   EXPECT_EQ(loop_->stats().replaced, 0U);
 }
 
-/// In suite 0 anybody on this machine may say an old Hello again, and the network may, from where it came.
+/// In suite 0, local programs and the network may replay an old Hello from its original address.
 TEST_F(SealedServer, AReplayedPlainHelloTakesNothingFromWhoCameAfterIt) {
   restart({});
   Client a = controller(std::nullopt, "127.0.0.1:4000");
@@ -166,19 +166,19 @@ TEST_F(SealedServer, AReplayedPlainHelloTakesNothingFromWhoCameAfterIt) {
   }
   a.client->stop(now_);
   run(milliseconds(10), {&a});
-  Client b = controller(std::nullopt, "127.0.0.1:4000");  // begun again, at the same address
+  Client b = controller(std::nullopt, "127.0.0.1:4000");  // restarted at the same address
   run(milliseconds(500), {&b});
   const std::uint64_t welcomed = loop_->stats().welcomed;
   const std::uint64_t forces = loop_->stats().forces;
   for (int i = 0; i < 10; ++i) {
-    deliver(a.end->self, hello);  // its cookie is good for two minutes
+    deliver(a.end->self, hello);  // its cookie is valid for two minutes
     run(milliseconds(100), {&b});
   }
   EXPECT_EQ(phase(b), Phase::kOpen);
   EXPECT_EQ(b.client->stats().sessions, 1U);
   EXPECT_EQ(loop_->stats().welcomed, welcomed);
   EXPECT_GT(loop_->stats().forces, forces + 950);
-  // Nor does it keep the device from anybody once b has gone.
+  // After b has left, the replay must not block the device.
   b.client->stop(now_);
   run(milliseconds(10), {&b});
   deliver(a.end->self, hello);
@@ -191,7 +191,7 @@ TEST_F(SealedServer, DatagramsOfAGuestThatHasLeftAreNobodysAtOnce) {
   restart({});
   Client a = controller(std::nullopt, "127.0.0.1:4000");
   run(milliseconds(500), {&a});
-  a.client->stop(now_);  // three Byes, in one turn of the server
+  a.client->stop(now_);  // three Byes in one turn of the server
   run(milliseconds(2), {&a});
   EXPECT_EQ(loop_->stats().unknown_connection, 2U);
 }
@@ -219,7 +219,7 @@ TEST_F(SealedServer, AControllersByeIsNoWarningAndItsSilenceIsOne) {
 
 TEST_F(SealedServer, AHalfOpenSessionIsToldNothingTakesNothingAndIsForgotten) {
   Client a = controller(wall_, "192.0.2.1:4000");
-  // The Answer never arrives.
+  // Drops every Answer.
   const auto no_answers = [&](Datagram& d) { return d.from != server_.self || d.bytes.size() == 48; };
   run(milliseconds(300), {&a}, no_answers);
   EXPECT_EQ(loop_->stats().welcomed, 0U);
@@ -227,7 +227,7 @@ TEST_F(SealedServer, AHalfOpenSessionIsToldNothingTakesNothingAndIsForgotten) {
   for (const Datagram& d : wire_) {
     if (d.from == server_.self) sizes.insert(d.bytes.size());
   }
-  EXPECT_EQ(sizes.size(), 2U);  // Retries, and one Answer again and again: no state
+  EXPECT_EQ(sizes.size(), 2U);  // Retries and the repeated Answer: no other state
   Client b = controller(other_, "192.0.2.2:4000");
   run(milliseconds(100), {&b});
   EXPECT_EQ(phase(b), Phase::kOpen);

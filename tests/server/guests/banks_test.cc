@@ -13,7 +13,7 @@ namespace {
 
 using std::chrono::milliseconds;
 
-/// A server with 20 devices in the clear, "d-0" to "d-19": a bank of 16, and one of 4.
+/// An unencrypted server with 20 devices, "d-0" to "d-19": banks of 16 and 4.
 class TwoBanks : public ::testing::Test {
  protected:
   static constexpr std::uint32_t kDevices = 20;
@@ -32,12 +32,12 @@ class TwoBanks : public ::testing::Test {
 
   static std::string name(std::uint32_t device) { return "d-" + std::to_string(device); }
 
-  /// A controller of those devices that sends each state's device back a force, and asks once for what is in `asks`.
+  /// A controller of these devices. It returns a force for each state and sends the requests in `asks` once.
   struct Outcome {
     std::optional<Refused> refused;
     std::optional<Welcome> welcome;
     std::vector<std::uint64_t> states = std::vector<std::uint64_t>(limits::kMaxDevices);  ///< by number
-    std::vector<std::uint32_t> seen{};  ///< places, as x of the states' positions says; by number
+    std::vector<std::uint32_t> seen{};  ///< device indices from the x positions of the states, by number
     std::vector<Session::RequestAnswered> answers{};
   };
   Outcome run(const std::vector<std::uint32_t>& devices, const std::vector<Request>& asks = {},
@@ -112,7 +112,7 @@ class TwoBanks : public ::testing::Test {
   End server_{wire_, parse_address("127.0.0.1:47100")};
   std::vector<std::unique_ptr<Mailboxes>> boxes_;
   std::unique_ptr<NetworkLoop> loop_;
-  bool says_bye_ = false;  ///< in its first datagram; the further ones are lost
+  bool says_bye_ = false;  ///< in the first datagram; later ones are lost
   std::uint64_t tick_ = 0;
   std::uint16_t port_ = 4000;
 };

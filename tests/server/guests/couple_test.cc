@@ -20,7 +20,7 @@
 #include "tests/support/dice.h"
 #include "tests/support/wire.h"
 
-// Two servers whose devices are coupled, each with its haptic loop, on virtual time; and clients that ask for it.
+// Two servers with coupled devices and haptic loops in virtual time, and clients that send requests.
 
 namespace tendon::couple_test {
 namespace {
@@ -28,7 +28,7 @@ namespace {
 using std::chrono::milliseconds;
 using std::chrono::seconds;
 
-/// An observer in the clear; it names the feature or does not.
+/// An unencrypted observer with or without the feature.
 class Viewer {
  public:
   Viewer(Wire& wire, const std::string& address, const Address& server, bool names_it, LocalTime now)
@@ -94,7 +94,7 @@ class Coupled : public ::testing::Test {
     Datagram datagram;
   };
 
-  /// `each` is called in each millisecond.
+  /// Calls `each` every millisecond.
   void run(Duration length, const std::function<void()>& each = {}) {
     for (const LocalTime until = now_ + length; now_ < until; now_ += milliseconds(1)) {
       for (Place* one : {leader_.get(), follower_.get()}) {
@@ -132,7 +132,7 @@ class Coupled : public ::testing::Test {
   double jitter_ms_ = 0;
   double loss_ = 0;
   bool cut_ = false;
-  bool without_clutch_ = false;  ///< of the leader
+  bool without_clutch_ = false;  ///< leader only
   Dice dice_{7};
   std::uint64_t epoch_ = 0;
   std::unique_ptr<Place> leader_;
@@ -215,7 +215,7 @@ TEST_F(Coupled, BothEndsTakeNewScalesWhileTheClutchIsHeld) {
   leader_->mail().orders.try_push(order);
   run(milliseconds(50));
   EXPECT_EQ(follower_->newest().sent.position_scale, 0) << "it is engaged: nothing changes";
-  run(milliseconds(4200));  // its hand holds the clutch from 6 s on
+  run(milliseconds(4200));  // the hand holds the clutch from 6 s on
   ASSERT_EQ(leader_->phase(), PortPhase::kClutched);
   leader_->mail().orders.try_push(order);
   run(milliseconds(10));
@@ -233,7 +233,7 @@ TEST_F(Coupled, BothEndsTakeNewScalesWhileTheClutchIsHeld) {
   EXPECT_GE(follower_->least_energy, -1e-9);
 }
 
-/// The leader's hand moves about a place 15 mm from the follower's, which its swing passes.
+/// The leader's hand oscillates about a point 15 mm from the follower and passes its position.
 TEST_F(Coupled, AnAbsoluteMapEngagesWhereTheTwoMeet) {
   const std::vector<std::string> absolute = {"teleoperation.map.absolute=true"};
   std::vector<std::string> of_leader = absolute;
@@ -248,7 +248,7 @@ TEST_F(Coupled, AnAbsoluteMapEngagesWhereTheTwoMeet) {
   EXPECT_LT((leader_->position - follower_->position).norm(), 6e-3) << "the places are each other's";
 }
 
-/// A sealed session is found by its number: the coupling does not even notice.
+/// A sealed session is identified by its number, so the coupling is not affected.
 TEST_F(Coupled, AnEndWhoseAddressChangesStaysEngaged) {
   const Key key = Ratchet(std::uint64_t{5}).next();
   follower_ = std::make_unique<Place>(wire_, scene_of("follower.toml"), ++epoch_, now_, true, key);
@@ -318,7 +318,7 @@ TEST_F(Coupled, APortWhoseHandleIsNotCoupledTellsNoTurnAndNoGrip) {
   EXPECT_FALSE(leader_->newest().sent.turn || leader_->newest().sent.grip);
 }
 
-/// The clock of its machine has gone back meanwhile: its epoch is below the one that the leader knows.
+/// The clock of its machine was set back, so its epoch is below the one that the leader knows.
 TEST_F(Coupled, AServerThatComesBackWithALowerEpochIsHeard) {
   epoch_ = 10;
   place();
@@ -330,7 +330,7 @@ TEST_F(Coupled, AServerThatComesBackWithALowerEpochIsHeard) {
   EXPECT_EQ(follower_->phase(), PortPhase::kCoupled);
 }
 
-/// It lies in the box while the loop is told of another end.
+/// The state is in the mailbox when the loop learns of the new peer.
 TEST_F(Coupled, AStateOfTheEndBeforeIsNotTakenForOneOfTheNew) {
   Place follower(wire_, scene_of("follower.toml"), 1, now_);
   PortState state;

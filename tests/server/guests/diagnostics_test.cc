@@ -23,7 +23,7 @@ TEST_F(SealedServer, TellsAnObserverThatAsksHowTheLoopAndTheEngineDo) {
   Client b = diagnosing(screen_, "192.0.2.2:4000", {}, &seen);
   wanted_ = Vec3(3, 0, -4);
   measured_ = true;
-  health_.steps = health_.lateness[2] = 1'000'000;  // since long before
+  health_.steps = health_.lateness[2] = 1'000'000;  // accumulated long before
   health_.safety = Safety::kArmed;
   run(milliseconds(1500), {&a, &b});
   ASSERT_TRUE(b.client->device_report().has_value());
@@ -58,7 +58,7 @@ TEST_F(SealedServer, TellsAnObserverThatAsksHowTheLoopAndTheEngineDo) {
   EXPECT_EQ(peer.name, "wall");
   EXPECT_EQ(peer.state_one_in, 1U);
   EXPECT_FALSE(peer.forces_refused);
-  // What the engine itself is told.
+  // The engine's own report.
   ASSERT_TRUE(a.client->report().has_value());
   const LinkReport& own = *a.client->report();
   EXPECT_EQ(peer.link.until, own.until);
@@ -165,7 +165,7 @@ TEST_F(SealedServer, AnEngineReceivesNotOneByteMoreWhereOthersDiagnose) {
   EXPECT_TRUE(to_engine(true) == before);
 }
 
-/// What a controller gets that offers the feature all the same, which ours refuses to.
+/// A client that requests the feature as a controller, which ours does not.
 TEST_F(SealedServer, AControllerIsNotGrantedTheFeatureAndIsToldNothingOfIt) {
   NetworkLoop::Config server;
   restart(server);
@@ -215,7 +215,8 @@ TEST_F(SealedServer, AControllerIsNotGrantedTheFeatureAndIsToldNothingOfIt) {
 TEST_F(TwoDevices, AnObserverIsToldOfItsDeviceAndOfEachEngineThere) {
   Client left = controller_of(wall_, "192.0.2.1:4000", "left", "main");
   Client right = controller_of(other_, "192.0.2.2:4000", "right", "tissue", true);
-  Client waits = controller_of(wall_, "192.0.2.5:4000", "right", "tissue");  // holds nothing: nobody is told of it
+  Client waits = controller_of(wall_, "192.0.2.5:4000", "right", "tissue");  // holds no lease, so it appears in no
+                                                                             // report
   Client watches_left = diagnosing(screen_, "192.0.2.3:4000", "left");
   Client watches_right = diagnosing(screen_, "192.0.2.4:4000", "right");
   measured_ = true;
@@ -260,8 +261,8 @@ TEST_F(SealedServer, WhereTheLogThreadSaysNothingThereIsNoReportOnADevice) {
   ASSERT_TRUE(b.client->device_report().has_value());
   measured_ = false;
   run(seconds(3), {&b});
-  EXPECT_EQ(b.client->device_report()->number, 2U);  // what it had said before it fell silent
-  health_.steps_lost += 100;                         // what the ring could not hold meanwhile
+  EXPECT_EQ(b.client->device_report()->number, 2U);  // from before it stopped sending
+  health_.steps_lost += 100;                         // exceeded the capacity of the ring
   measured_ = true;
   run(seconds(1), {&b});
   const DeviceReport& report = *b.client->device_report();
@@ -286,7 +287,7 @@ TEST_F(SealedServer, SaysThatAnEnginesWayIsFullAndThatItsForcesAreNotTaken) {
   EXPECT_TRUE(b.client->peer_reports().front().forces_refused);
 }
 
-/// An engine that says how it answers; `touch` is its answer.
+/// An engine that reports its solver path. `touch` is its answer.
 class EngineWithWays : public SealedServer {
  protected:
   Client engine(std::vector<std::string> ways) {
@@ -373,7 +374,7 @@ TEST_F(EngineWithWays, AnEngineThatSaysNoErrorIsShownByItsNewestWay) {
   EXPECT_EQ(doubt.way, 7);
 }
 
-/// The force of a client of another make is taken, and `way` counts for nothing.
+/// The force of a foreign client is accepted without its solver path.
 void expect_unsaid(const NetworkLoop& loop, Mailboxes& mail, const char* what) {
   const RemoteForce* const force = mail.forces[0].take();
   ASSERT_NE(force, nullptr) << what;

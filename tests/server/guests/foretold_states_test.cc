@@ -30,7 +30,7 @@ TEST_F(SealedServer, LeavesOutStatesThatAClientCanForetellWhenItAsksForIt) {
     const std::uint64_t unanswerable = loop_->stats().unanswerable;
     run(seconds(2), {&a});
     if (asks) {
-      EXPECT_LT(a.client->stats().states, 150U);  // a hand at rest: one in 20
+      EXPECT_LT(a.client->stats().states, 150U);  // hand at rest: one state in 20
       EXPECT_GT(loop_->stats().foretold, 1800U);
     } else {
       EXPECT_GT(a.client->stats().states, 1900U);
@@ -55,7 +55,7 @@ TEST_F(SealedServer, TakesForcesThatAnswerAForetoldStepWhichItWasTooLateToSee) {
   const std::uint64_t unanswerable = loop_->stats().unanswerable;
   const std::uint64_t forces = loop_->stats().forces;
   steps_a_turn_ = 5;
-  std::deque<std::pair<LocalTime, Datagram>> to_server;  // 10 ms under way: the step after the answered one is known
+  std::deque<std::pair<LocalTime, Datagram>> to_server;  // delay of 10 ms: the step after the answered one is known
   std::uint64_t unseen = 0;
   for (int i = 0; i < 500; ++i) {
     run(milliseconds(1), {&a}, [&](const Datagram& datagram) {
@@ -68,13 +68,13 @@ TEST_F(SealedServer, TakesForcesThatAnswerAForetoldStepWhichItWasTooLateToSee) {
     }
     const RemoteForce* const force = mail_->forces[0].take();
     if (force == nullptr) continue;
-    // A step a millisecond: when it was sampled is known exactly.
+    // With one step per millisecond, the sampling time is known exactly.
     EXPECT_EQ(force->answers - first_step, milliseconds(force->answers_tick - 1));
     if (force->answers_tick % steps_a_turn_ != 0) ++unseen;
   }
   EXPECT_EQ(loop_->stats().unanswerable, unanswerable);
   EXPECT_GT(loop_->stats().forces - forces, 450U);
-  EXPECT_GT(unseen, 90U);  // of those that were the newest in their turn
+  EXPECT_GT(unseen, 90U);  // of the newest states in their turns
 }
 
 }  // namespace

@@ -15,7 +15,7 @@ namespace {
 
 using std::chrono::milliseconds;
 
-/// A server whose device has four buttons and axes, and an observer of it that sees one state in 20.
+/// A device with four buttons and axes, and an observer that sees one state in 20.
 class Handle : public SealedServer {
  protected:
   Handle() {
@@ -41,7 +41,7 @@ class Handle : public SealedServer {
     return client;
   }
 
-  /// Runs for so many milliseconds with an observer of another make, which names `features`, and shows what it is sent.
+  /// Runs for `ms` with a foreign observer that names `features`, and calls `see` with each state.
   template <class See>
   void for_each_state_seen(const std::vector<std::string>& features, int ms, const See& see) {
     End end(wire_, parse_address("127.0.0.1:4000"));
@@ -165,7 +165,7 @@ TEST_F(Handle, TorqueAndGripOfAClientWithoutTheFeatureAreIgnoredAndCounted) {
   }
 }
 
-/// A client of another make names the features that it knows: none, or this one.
+/// The foreign client names either no feature or this one.
 TEST_F(Handle, IsSeenOnlyByThoseThatNamedTheFeature) {
   for (const bool names : {false, true}) {
     restart({});
@@ -191,7 +191,7 @@ TEST_F(Handle, IsSeenOnlyByThoseThatNamedTheFeature) {
   }
 }
 
-/// A client that did not name the feature, as all older ones, is sent the whole states of before.
+/// A client without the feature, such as an older one, receives complete states.
 TEST_F(Handle, ColumnsAreSentOnlyToThoseThatNamedTheFeature) {
   for (const bool names : {false, true}) {
     restart({});
@@ -211,7 +211,7 @@ TEST_F(Handle, ColumnsAreSentOnlyToThoseThatNamedTheFeature) {
   }
 }
 
-/// Those who name `joints` see them and their names; to others a state has no more bytes than before.
+/// Clients with the feature `joints` receive joints and their names. For others the states keep their size.
 TEST_F(Handle, JointsAreToldToThoseThatNamedTheFeature) {
   for (const bool asks : {false, true}) {
     NetworkLoop::Config config;

@@ -21,12 +21,12 @@ std::uint64_t sum(const LatenessHistogram& lateness) {
   return std::accumulate(lateness.begin(), lateness.end(), std::uint64_t{0});
 }
 
-/// A loop at 1 kHz whose thread wakes when the test says so.
+/// A loop at 1 kHz with wake-up times chosen by the test.
 class Loop {
  public:
   Loop() : loop_({.period = milliseconds(1), .control = control()}, device_, *mail_) {}
 
-  /// One step, `late` after it was due.
+  /// Performs one step, `late` after it was due.
   void step(Duration late) { due_ = loop_.step(due_ + late); }
   Health counted() const { return loop_.health(); }
 
@@ -69,9 +69,9 @@ TEST(HealthMeter, CountsEachStepInTheBucketOfItsLateness) {
 TEST(HealthMeter, APeriodWithoutAStepIsMissedAndTheStepAfterAnOverrun) {
   Loop loop;
   for (int i = 0; i < 10; ++i) loop.step(Duration{0});
-  loop.step(microseconds(999));  // late, but within its period
+  loop.step(microseconds(999));  // late but within its period
   EXPECT_EQ(loop.counted().missed, 0U);
-  loop.step(microseconds(5000));  // five have passed, the loop goes on from here
+  loop.step(microseconds(5000));  // skips five periods
   loop.step(Duration{0});
   EXPECT_EQ(loop.counted().missed, 5U);
   EXPECT_EQ(loop.counted().lateness[13], 1U);
@@ -80,7 +80,7 @@ TEST(HealthMeter, APeriodWithoutAStepIsMissedAndTheStepAfterAnOverrun) {
 
 TEST(HealthMeter, CountsStepsThatNobodyHasTaken) {
   Loop loop;
-  for (int i = 0; i < 20'000; ++i) loop.step(Duration{0});  // more than the ring of steps holds
+  for (int i = 0; i < 20'000; ++i) loop.step(Duration{0});  // exceeds the ring of steps
   EXPECT_EQ(loop.counted().steps, 20'000U);
   EXPECT_EQ(loop.counted().missed, 0U);
 }
@@ -164,7 +164,7 @@ TEST(Health, SaysAllThatTheServerDoesLessOfWithinTheBoundOfAText) {
   now.steps_lost = 1;
   now.broken_assumptions = 1;
   now.unsent = 1;
-  now.device.values[static_cast<std::size_t>(DeviceCount::kSilences)] = 1;  // the longest words of a counter
+  now.device.values[static_cast<std::size_t>(DeviceCount::kSilences)] = 1;  // counter with the longest text
   const std::string degraded = report({}, now).degraded;
   EXPECT_EQ(degraded,
             "no real time; the log thread does not follow; recording has stopped; unsent datagrams; "
@@ -172,7 +172,7 @@ TEST(Health, SaysAllThatTheServerDoesLessOfWithinTheBoundOfAText) {
   EXPECT_LE(degraded.size(), limits::kMaxDetail);
 }
 
-// DeviceCounters.HaveNamesOfTheirOwnAndWordsThatFitIntoAReport bounds the words of the others.
+// DeviceCounters.HaveNamesOfTheirOwnAndWordsThatFitIntoAReport covers the texts of the other counters.
 TEST(Health, EachCounterOfADriverThatMeansTroubleDegradesItsDevice) {
   for (const DeviceCounter& row : kDeviceCounters) {
     Health before;

@@ -11,12 +11,12 @@ namespace {
 using std::chrono::milliseconds;
 using std::chrono::seconds;
 
-/// An engine at 100 Hz behind a round trip of 40 ms, whose forces are valid for 30 ms.
+/// An engine at 100 Hz with a round trip of 40 ms and a force validity of 30 ms.
 class Engine {
  public:
   explicit Engine(bool same_machine = false) { lateness.begin(now_, same_machine); }
 
-  /// The next force; the parts are longer than usual by so much.
+  /// Delivers the next force, with the given additional delays.
   void answer(Duration ours = {}, Duration network = {}, Duration engine = {}, bool lost = false) {
     now_ += milliseconds(10) + ours + network + engine;
     const LocalTime sampled = now_ - milliseconds(46) - ours - network - engine;
@@ -107,7 +107,7 @@ TEST(Lateness, SilenceOfAnEngineOnThisMachineIsTheEngines) {
             "forces were late once, by up to 970 ms: the engine (nothing is heard of its program on this machine)");
 }
 
-/// Two datagrams of successive numbers whose time stamps are `apart`, and then a force with a long round trip.
+/// Two consecutive datagrams with time stamps `apart`, then a force with a long round trip.
 Lateness::Report after_silence(Duration apart, std::uint64_t lost) {
   Engine engine;
   engine.answer_times(200);
@@ -132,7 +132,7 @@ TEST(Lateness, AStandstillThatExplainsLittleOfTheDelayIsNotBlamed) {
   EXPECT_EQ(after_silence(milliseconds(150), 0).late_network, 1U);
 }
 
-/// Forces in time and a state each ms; then nothing of ours runs for `pause`.
+/// Forces in time and a state each millisecond, then our process is stopped for `pause`.
 Engine stopped(Duration pause, bool same_machine) {
   Engine engine(same_machine);
   for (int i = 0; i < 200; ++i) {
@@ -147,7 +147,7 @@ TEST(Lateness, APauseOfTheServerIsItsOwnWhateverTheRoundTripSays) {
   for (const bool same_machine : {false, true}) {
     Engine engine = stopped(milliseconds(190), same_machine);
     engine.lateness.heard(engine.now(), PeerTime(seconds(7)), 0);
-    engine.answer({}, milliseconds(190));  // it has waited in our socket
+    engine.answer({}, milliseconds(190));  // waited in our socket
     const auto report = engine.lateness.report(engine.now());
     EXPECT_EQ(report.late_ours, 1U);
     EXPECT_EQ(report.late(), 1U);
@@ -157,7 +157,7 @@ TEST(Lateness, APauseOfTheServerIsItsOwnWhateverTheRoundTripSays) {
 
 TEST(Lateness, APauseOfTheDevicesLoopAloneIsTheServersToo) {
   Engine engine = stopped(milliseconds(190), true);
-  engine.lateness.took_state(engine.now());  // the first state after it, and its answer comes quickly
+  engine.lateness.took_state(engine.now());  // first state after the pause, answered quickly
   engine.answer();
   const auto report = engine.lateness.report(engine.now());
   EXPECT_EQ(report.late_ours, 1U);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Three servers: a device with two leaders. And a guest at the follower's that moves the shares. On virtual time.
+// Three servers in virtual time: a device with two leaders, and a client of the follower that changes the shares.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -24,7 +24,7 @@ using std::chrono::seconds;
 constexpr std::uint32_t kTrainer = 1;  // channels of shared_follower.toml
 constexpr std::uint32_t kTrainee = 2;
 
-/// A guest that claims a channel and asks for things.
+/// A client that claims a channel and sends requests.
 class Desk {
  public:
   Desk(Wire& wire, const std::string& address, const Address& server, const std::string& channel, LocalTime now)
@@ -105,7 +105,7 @@ class TwoLeaders : public ::testing::Test {
   Wire wire_;
   std::size_t count_ = 0;
   LocalTime now_{seconds(1)};
-  std::optional<Address> cut_;  ///< nothing reaches it or comes from it
+  std::optional<Address> cut_;  ///< unreachable address
   std::unique_ptr<Place> follower_;
   std::unique_ptr<Place> trainer_;
   std::unique_ptr<Place> trainee_;
@@ -133,7 +133,7 @@ TEST_F(TwoLeaders, AGuestSetsTheScalesOfALeaderThatIsNotEngaged) {
   expect_sound();
 }
 
-/// The first was started later than the other, so that its epoch is the higher one.
+/// The first leader started later, so it has the higher epoch.
 TEST_F(TwoLeaders, WhoTakesAChannelOverIsHeardAndEngagesByAnActOfItsOwn) {
   follower_ = std::make_unique<Place>(wire_, scene_of("shared_follower.toml", {}), 1, now_);
   trainer_ = std::make_unique<Place>(wire_, scene_of("trainer.toml", {}), 20, now_);
@@ -170,7 +170,7 @@ TEST_F(TwoLeaders, EachEngagesByItsOwnButtonAndTheFollowerIsBetweenThem) {
   EXPECT_EQ(follower_->phase(kTrainee), PortPhase::kEngaged);
   EXPECT_EQ(trainee_->phase(), PortPhase::kEngaged);
   EXPECT_EQ(trainee_->newest(0).peer->share, 0.3);
-  run(milliseconds(400));  // the ramp
+  run(milliseconds(400));  // ramp time
   const std::array from{follower_->position, trainer_->position, trainee_->position};
   run(milliseconds(400));
   const Vec3 mean = 0.7 * (trainer_->position - from[1]) + 0.3 * (trainee_->position - from[2]);
@@ -233,7 +233,7 @@ TEST_F(TwoLeaders, WhoeverTakesTheChannelOfASilentLeaderMayCouple) {
   run(seconds(3));
   cut_ = trainer_->end.self;
   desk_ = std::make_unique<Desk>(wire_, "127.0.0.1:50002", follower_->end.self, "trainer", now_);
-  run(milliseconds(700));  // the lease is over, and the session is not
+  run(milliseconds(700));  // the lease has expired, the session has not
   ASSERT_EQ(asked(TakeLease{.device = 0, .channel = kTrainer}).code, Code::kOk);
   Couple couple = couple_of(*trainer_->scene.loop.control.coupling);
   couple.channel = kTrainer;

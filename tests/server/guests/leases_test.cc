@@ -10,7 +10,7 @@ using std::chrono::milliseconds;
 using std::chrono::seconds;
 
 TEST_F(TwoDevices, GivesEachEngineItsDeviceAndItsChannel) {
-  Client left = controller(wall_, "192.0.2.1:4000");  // knows of nothing but "the device"
+  Client left = controller(wall_, "192.0.2.1:4000");  // requests no particular device
   Client right = controller_of(other_, "192.0.2.2:4000", "right", "guidance");
   run(seconds(1), {&left, &right});
   const auto channels = loop_->stats().channels;
@@ -53,7 +53,7 @@ TEST_F(TwoDevices, ALeaseIsTakenFromAHolderThatHasFallenSilentAndNotBefore) {
   EXPECT_EQ(second.client->stats().forces, 0U);
   EXPECT_EQ(tissue().holder, "other");
 
-  const LocalTime silent = now_;  // its session lives on for 2 s, but nothing comes from it
+  const LocalTime silent = now_;  // its session lasts 2 s longer, without a datagram
   run(milliseconds(400), {&second});
   EXPECT_EQ(tissue().holder, "other");
   while (!second.client->holds() && now_ - silent < seconds(1)) run(milliseconds(10), {&second});
@@ -73,7 +73,7 @@ TEST_F(TwoDevices, ForcesThatTheHandNeverFeelsDoNotRenewALease) {
   Client second = controller_of(wall_, "192.0.2.2:4000", "right", "tissue", true);
   run(seconds(2), {&first, &second});
   ASSERT_TRUE(first.client->holds());
-  tick_step_ = 4096;  // each state takes the place of the one before, so that every force answers a forgotten one
+  tick_step_ = 4096;  // each state overwrites the previous one, so every force answers a forgotten state
   const std::uint64_t forces = first.client->stats().forces;
   run(seconds(1), {&first, &second});
   EXPECT_GT(first.client->stats().forces, forces + 400);

@@ -15,7 +15,7 @@ using std::chrono::seconds;
 
 constexpr Vibration kPulse{.amplitude = 0.5, .frequency = 200, .duration = milliseconds(40)};
 
-/// The device "right", with two channels, has a lamp, something that vibrates, and another lamp.
+/// The device "right" has two channels and three outputs: a lamp, a vibrator and another lamp.
 class OutputsOfADevice : public TwoDevices {
  protected:
   OutputsOfADevice() {
@@ -41,13 +41,13 @@ class OutputsOfADevice : public TwoDevices {
     return client;
   }
 
-  /// What the device's loop was told last.
+  /// Returns the last setting sent to the device's loop.
   OutputSetting told(std::size_t output) {
     if (const OutputSettings* const news = second_->outputs.take()) newest_ = *news;
     return newest_.of[output].setting;
   }
 
-  /// The answer to that request.
+  /// Returns the answer to the request.
   Session::RequestAnswered asked(Client& client, std::uint32_t output, const OutputSetting& setting) {
     EXPECT_TRUE(client.client->set_output(output, setting));
     run(milliseconds(50), {&client});

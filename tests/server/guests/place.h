@@ -17,7 +17,7 @@
 
 namespace tendon {
 
-/// The text of a shipped scene, and what it says with `settings`.
+/// Returns the text of a shipped scene and the scene with `settings`.
 inline std::string text_of(const std::string& scene) {
   std::ifstream file(std::filesystem::path(TENDON_SOURCE_DIR) / "deploy" / "scenes" / scene);
   return {std::istreambuf_iterator<char>(file), {}};
@@ -26,9 +26,9 @@ inline Scene scene_of(const std::string& name, const std::vector<std::string>& s
   return parse_scene(text_of(name), name, ".", settings);
 }
 
-/// A server with one coupled device, on virtual time; or one that knows of no coupling.
+/// A server with one coupled or uncoupled device in virtual time.
 struct Place {
-  /// `key`: with which the one dials and the other lets in.
+  /// `key`: of the connection between both servers.
   Place(Wire& wire, const Scene& the_scene, std::uint64_t epoch, LocalTime now, bool is_coupled = true,
         const std::optional<Key>& key = {})
       : scene(the_scene), end(wire, scene.network.listen), device(scene.simulated()) {
@@ -65,7 +65,7 @@ struct Place {
   }
 
   Mailboxes& mail() { return server->devices().front().mail; }
-  /// Of the coupling by that channel, in the newest step; of a device with one coupling channel 0.
+  /// Coupling record of a channel in the newest step; channel 0 if the device has one coupling.
   const PortRecord& newest(std::uint32_t channel = 0) { return ports_[channel]; }
   PortPhase phase(std::uint32_t channel = 0) { return newest(channel).sent.phase; }
   bool said(const std::string& words) const {
@@ -77,7 +77,7 @@ struct Place {
   End end;
   SimulatedDevice device;
   std::optional<Assembly> server;
-  double least_energy = 0;  ///< J, of all accounts of the device
+  double least_energy = 0;  ///< J, minimum over all accounts of the device
   Vec3 position = Vec3::Zero();
   Vec3 force = Vec3::Zero();
   HandleStep handle;

@@ -26,8 +26,8 @@ TEST_F(SealedServer, AFloodOfStrangersIsASampleAndACountAndGuestsAreWhole) {
   run(milliseconds(500), {&client});
   take_recorded(*mail_, client.end->self);
   const Bytes junk(1200, std::byte{0x5a});
-  const Bytes hello = wire_.front().bytes;  // its first, without a cookie
-  Bytes forged;                             // a datagram of the client's session, with its end changed
+  const Bytes hello = wire_.front().bytes;  // without a cookie
+  Bytes forged;                             // a datagram of the session with a modified end
   const std::size_t before = wire_.size();
   run(milliseconds(100), {&client});
   for (std::size_t i = before; i < wire_.size(); ++i) {
@@ -38,7 +38,7 @@ TEST_F(SealedServer, AFloodOfStrangersIsASampleAndACountAndGuestsAreWhole) {
   take_recorded(*mail_, client.end->self);
 
   const std::size_t on_the_wire = wire_.size();
-  constexpr int kFlood = 39;  // a millisecond, each of three kinds
+  constexpr int kFlood = 39;  // per millisecond, of each of three kinds
   run(seconds(1), {&client}, [&](Datagram& datagram) {
     if (datagram.from != client.end->self) return true;
     for (int i = 0; i < kFlood / 3; ++i) {

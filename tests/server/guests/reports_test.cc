@@ -30,15 +30,15 @@ TEST_F(SealedServer, TellsControllersAloneOnceASecondHowTheirForcesFare) {
   EXPECT_GT(report.received, 2900U);
   ASSERT_TRUE(report.round_trip && report.to_server && report.to_client);
   EXPECT_LE(report.round_trip->p99, milliseconds(2));
-  // Both ways and the clocks: one time here, so the offset is within its bound of 0.
+  // Both ends share one clock here, so the estimated offset must be zero within its bound.
   EXPECT_LE(std::chrono::abs(report.clock_offset), report.clock_error);
   EXPECT_LE(std::chrono::abs(report.to_server->median + report.to_client->median - report.round_trip->median),
             milliseconds(1));
   EXPECT_FALSE(b.client->report().has_value());
 }
 
-/// 20 ms each way, and one of the two ends loses its processor for 36 ms, once, in the middle of a turn: what has come
-/// meanwhile it takes by the time at which the turn began.
+/// 20 ms each way. One end is preempted for 36 ms once in the middle of a turn. Datagrams that arrive meanwhile are
+/// handled with the time at which the turn began.
 class InterruptedTurn : public SealedServer, public testing::WithParamInterface<bool> {};
 
 TEST_P(InterruptedTurn, MakesNoWayLookShort) {
@@ -95,7 +95,7 @@ TEST_F(SealedServer, SaysByNumbersAndInWordsThatTheNetworkWasLate) {
 TEST_F(SealedServer, APauseOfItsOwnIsBlamedOnNobodyElse) {
   Client a = controller(wall_, "192.0.2.1:4000");
   run(milliseconds(1500), {&a});
-  for (int ms = 0; ms < 200; ++ms) {  // SIGSTOP: what the engine sends waits in the socket
+  for (int ms = 0; ms < 200; ++ms) {  // SIGSTOP: datagrams of the engine wait in the socket
     now_ += milliseconds(1);
     a.client->turn(now_);
   }
@@ -158,7 +158,7 @@ INSTANTIATE_TEST_SUITE_P(
                                 "the engine (its sequence numbers do not grow)"}),
     [](const auto& test) { return std::string(test.param.name); });
 
-// The haptic loop reads a denormal number as 0.
+// The haptic loop flushes denormal numbers to zero.
 TEST_F(SealedServer, ATableWithADenormalStepReachesTheDeviceAsASoundOne) {
   restart({});
   run_foreign(milliseconds(300), [](ForceCommand& force) {
@@ -178,7 +178,7 @@ TEST_F(SealedServer, AnEngineThatSleptIsBlamedThoughItsRoundTripLooksLong) {
   run(milliseconds(1200), {&a});
   const std::size_t asleep = wire_.size();
   run(milliseconds(700), {});
-  // Its socket has kept the oldest datagrams; the newest ones found it full.
+  // The full socket kept the oldest datagrams and dropped the newest.
   for (std::size_t i = asleep; i < asleep + 300; ++i) a.end->inbox.push_back(wire_[i]);
   run(milliseconds(900), {&a});
   ASSERT_TRUE(a.client->report().has_value());

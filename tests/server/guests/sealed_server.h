@@ -15,7 +15,7 @@
 #include "server/network_loop.h"
 #include "tests/support/wire.h"
 
-// The server's network half against real clients and forgers, on virtual time, over a perfect network.
+// Network half of the server with real clients and forgers, in virtual time on a perfect network.
 
 namespace tendon {
 
@@ -23,7 +23,7 @@ inline ClientKey key_of(const std::string& name, Role role, std::uint64_t seed) 
   return {.name = name, .role = role, .key = Ratchet(seed).next()};
 }
 
-/// Z, the server, and whoever a test lets come.
+/// Z is the server; tests add the clients.
 class SealedServer : public ::testing::Test {
  protected:
   struct Client {
@@ -72,7 +72,7 @@ class SealedServer : public ::testing::Test {
     return client;
   }
 
-  /// A client that has these suites only: an older one, or one on another processor.
+  /// Returns a client restricted to these suites, like an older one or another processor.
   Client of_suites(const ClientKey& key, const std::string& address, const Suites& suites, bool controls) {
     Client client{std::make_unique<End>(wire_, parse_address(address)), nullptr};
     ForceClient::Config config = config_of(key, ++seed_);
@@ -87,7 +87,7 @@ class SealedServer : public ::testing::Test {
     return client;
   }
 
-  /// Time passes, 1 ms at a time; the device makes a step in each. `on_the_way` may change or drop.
+  /// Advances time by 1 ms and one device step at a time. `on_the_way` may change or drop datagrams.
   template <class OnTheWay>
   void run(Duration length, std::vector<Client*> clients, OnTheWay on_the_way) {
     for (const LocalTime end = now_ + length; now_ < end; now_ += std::chrono::milliseconds(1)) {
@@ -125,8 +125,8 @@ class SealedServer : public ::testing::Test {
     run(length, std::move(clients), [](Datagram&) { return true; });
   }
   void deliver(const Address& from, const Bytes& bytes) { server_.inbox.push_back({from, server_.self, bytes}); }
-  /// A controller of another make, in the clear, runs for `length`: it answers each state with what `spoil` makes of a
-  /// good force, and does nothing at all while `sleeps` says so. Returns the newest report that it got.
+  /// Runs a foreign, unencrypted controller for `length`. It answers each state with a valid force changed by `spoil`,
+  /// and does nothing while `sleeps` returns true. Returns its newest report.
   template <class Spoil, class Sleeps>
   std::optional<LinkReport> run_foreign(Duration length, Spoil spoil, Sleeps sleeps) {
     End end(wire_, parse_address("127.0.0.1:4000"));
@@ -146,7 +146,7 @@ class SealedServer : public ::testing::Test {
       run(std::chrono::milliseconds(1), {});
       count_ = 0;
       const Wire arrived = std::exchange(wire_, {});
-      if (!awake) continue;  // and its socket overflows
+      if (!awake) continue;  // its socket overflows
       for (const Datagram& datagram : arrived) {
         session ? void(session->receive(now_, datagram.bytes)) : handshake.receive(now_, datagram.bytes);
       }
@@ -173,7 +173,7 @@ class SealedServer : public ::testing::Test {
   std::optional<LinkReport> run_foreign(Duration length, Spoil spoil) {
     return run_foreign(length, spoil, [](Duration) { return false; });
   }
-  /// An observer that asks for all there is; `seen` is the newest state that it saw, if it matters.
+  /// Returns an observer that requests all features. `seen` receives its newest state.
   Client diagnosing(const std::optional<ClientKey>& key, const std::string& address, const std::string& device = {},
                     DeviceState* seen = nullptr) {
     Client client{std::make_unique<End>(wire_, parse_address(address)), nullptr};
@@ -195,18 +195,18 @@ class SealedServer : public ::testing::Test {
   ClientKey screen_ = key_of("screen", Role::kObserver, 3);
   LocalTime now_{std::chrono::seconds(1000)};
   Wire wire_;
-  std::size_t count_ = 0;  ///< of the wire, delivered
+  std::size_t count_ = 0;  ///< delivered datagrams of the wire
   End server_{wire_, parse_address("192.0.2.100:47100")};
   std::unique_ptr<Mailboxes> mail_ = std::make_unique<Mailboxes>();
   std::unique_ptr<Mailboxes> second_;  ///< of a second device
   std::unique_ptr<NetworkLoop> loop_;
   std::uint64_t tick_ = 0;
   std::uint64_t tick_step_ = 1;
-  std::uint64_t steps_a_turn_ = 1;  ///< more: the network thread is late, and sees only the newest of them
-  std::optional<Vec3> wanted_;      ///< as the device's loop says
-  std::uint32_t buttons_ = 0;       ///< likewise
-  DeviceState look_;                ///< likewise: all else
-  bool measured_ = false;           ///< the log thread tells how the loops do
+  std::uint64_t steps_a_turn_ = 1;  ///< above 1: the network thread is late and sees only the newest
+  std::optional<Vec3> wanted_;      ///< set by the device's loop
+  std::uint32_t buttons_ = 0;       ///< set by the device's loop
+  DeviceState look_;                ///< set by the device's loop: the other fields
+  bool measured_ = false;           ///< the log thread reports health
   Health health_;
   std::uint64_t seed_ = 10;
   Hello foreign_{.role = Role::kController, .name = "foreign", .features = {}};  ///< of run_foreign()
@@ -214,7 +214,7 @@ class SealedServer : public ::testing::Test {
 
 using Phase = ForceClient::Phase;
 
-/// A server with a device "left" of one channel, and a device "right" of two, the second of which has a lease.
+/// A server with a device "left" with one channel, and a device "right" with two, the second of which has a lease.
 class TwoDevices : public SealedServer {
  protected:
   TwoDevices() {

@@ -22,9 +22,8 @@ namespace {
 
 using std::chrono::milliseconds;
 
-/// This fixture runs a sealed server with two shards and 40 devices, "d-0" to "d-39". There is one bank in the first
-/// shard, and there are two in the second. As in UdpLink::several, data is delivered to the shard that owns the
-/// connection. All other datagrams are delivered to the first shard.
+/// A sealed server with two shards and 40 devices, "d-0" to "d-39": one bank in the first shard, two in the second. As
+/// in UdpLink::several, data goes to the shard that owns the connection, and other datagrams go to the first shard.
 class Shards : public ::testing::Test {
  protected:
   static constexpr std::uint32_t kDevices = 40;
@@ -86,7 +85,7 @@ class Shards : public ::testing::Test {
     ends_[of_session ? header->connection_id % 2 : 0].inbox.push_back(datagram);
   }
 
-  /// `hands_on`: whether a Hello reaches the shard that it is for.
+  /// `hands_on`: forwards each Hello to its shard.
   void run(Duration length, const std::vector<Client*>& clients, bool hands_on = true) {
     for (const LocalTime end = now_ + length; now_ < end; now_ += milliseconds(1)) {
       ++tick_;
@@ -124,7 +123,7 @@ class Shards : public ::testing::Test {
   std::vector<std::unique_ptr<Mailboxes>> boxes_;
   NetworkLoop::Config config_;
   std::array<std::unique_ptr<NetworkLoop>, 2> loops_;
-  std::map<std::uint32_t, std::vector<double>> seen_;  ///< by the client's port: x of the states, the device's place
+  std::map<std::uint32_t, std::vector<double>> seen_;  ///< by client port: x of the states, which is the device index
   std::uint64_t tick_ = 0;
   int handed_on_ = 0;
 };
@@ -163,7 +162,7 @@ TEST_F(Shards, AHelloThatIsLostOnItsWayToTheOtherShardIsSaidAgain) {
   EXPECT_EQ(loops_[1]->stats().welcomed, 1U);
 }
 
-// Two doormen with one secret that drew the same ephemeral keys would give away what both sessions say.
+// With equal ephemeral keys, two handshakes with one secret would expose both sessions.
 TEST_F(Shards, NoTwoSessionsHaveTheSameAnswer) {
   std::vector<Bytes> answers;
   for (const char* const device : {"d-0", "d-16"}) {

@@ -24,7 +24,7 @@ using testing::FakeAvahi;
 
 const dns_sd::About kFalcon{.version = 1, .device = "left", .hz = 1000, .suite = 1, .channels = {"main"}};
 
-/// An announcer in its thread, and what it has said.
+/// An announcer in its thread, and its messages.
 class Running {
  public:
   explicit Running(std::vector<Announcer::Device> devices, const std::string& listen = "0.0.0.0:47100")
@@ -135,7 +135,7 @@ TEST_F(Announcing, ABusThatComesLateIsFound) {
 }
 
 TEST_F(Announcing, OneAddressIsToldToItsOwnInterface) {
-  Running running({{"falcon", kFalcon}}, "[2001:db8::7]:5");  // of none
+  Running running({{"falcon", kFalcon}}, "[2001:db8::7]:5");  // no device
   ASSERT_TRUE(soon([&] { return avahi.announced().size() == 1; }));
   EXPECT_EQ(avahi.announced().front().protocol, 1);
   EXPECT_EQ(avahi.announced().front().interface, -1);

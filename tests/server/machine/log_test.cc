@@ -17,7 +17,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-/// What is written to std::cerr.
+/// Captures std::cerr.
 class Written {
  public:
   Written() : before_(std::cerr.rdbuf(text_.rdbuf())) {}

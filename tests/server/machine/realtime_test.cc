@@ -66,7 +66,7 @@ TEST(StayOn, SaysWhatToDoAboutAProcessorThatIsNotThereAndChangesNothing) {
   for (const std::uint32_t cpu : {1023U, 1024U, 4'000'000'000U}) {
     std::thread([cpu] {
       const cpu_set_t before = allowed();
-      if (CPU_ISSET(1023, &before)) return;  // a machine that has it
+      if (CPU_ISSET(1023, &before)) return;  // the machine has this CPU
       const auto refused = stay_on(cpu);
       ASSERT_TRUE(refused);
       EXPECT_NE(refused->find("processor " + std::to_string(cpu)), std::string::npos) << *refused;
@@ -108,7 +108,7 @@ TEST(WakefulProcessors, AreNoRefusalWhereTheKernelHasNoSuchFile) {
 }
 
 TEST(WakefulProcessors, SayWhatItWouldTakeWhenRefused) {
-  const ScratchFolder folder;  // a folder cannot be opened for writing, whoever asks
+  const ScratchFolder folder;  // opening a folder for writing fails even for root
   const WakefulProcessors wakeful(folder.path());
   EXPECT_FALSE(wakeful.held());
   ASSERT_TRUE(wakeful.refused());

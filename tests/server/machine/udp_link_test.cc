@@ -21,7 +21,7 @@ namespace {
 using Bytes = std::vector<std::byte>;
 using namespace std::chrono_literals;
 
-/// Longer than any wait that a right link makes here: reached only by a test that fails.
+/// Exceeds every wait of a correct link, so only a failing test reaches it.
 constexpr Duration kForever = 10s;
 
 constexpr Address kAnyPort4 = {.ip = {0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0xff, 0xff, 127, 0, 0, 1}, .port = 0};
@@ -43,14 +43,14 @@ bool is_readable(int fd) {
   return ::poll(&entry, 1, 0) == 1;
 }
 
-/// Of this process, the one that reads the folder among them.
+/// Returns the number of open files of this process, including the one that reads the folder.
 std::ptrdiff_t open_files() {
   return std::distance(std::filesystem::directory_iterator("/proc/self/fd"), std::filesystem::directory_iterator());
 }
 
 class UdpLinkTest : public ::testing::TestWithParam<Address> {};
 
-// An epoll that watched it would cost each datagram a wake-up for nobody.
+// An epoll instance on the socket would cost a useless wake-up per datagram.
 TEST_P(UdpLinkTest, HasASocketAndNoOtherFile) {
   const std::ptrdiff_t before = open_files();
   {
@@ -105,7 +105,7 @@ TEST_P(UdpLinkTest, SkipsEmptyDatagramsToReachTheOneBehindThem) {
 TEST_P(UdpLinkTest, CountsWhatItCouldNotSendAndLivesOn) {
   UdpLink a(GetParam());
   UdpLink z(GetParam());
-  a.send(z.local_address(), std::vector<std::byte>(70'000));  // larger than UDP can carry
+  a.send(z.local_address(), std::vector<std::byte>(70'000));  // exceeds the maximum of UDP
   EXPECT_EQ(a.send_failures(), 1U);
   a.send(GetParam() == kAnyPort4 ? parse_address("[::1]:9") : parse_address("127.0.0.1:9"), bytes(1, 1));
   EXPECT_EQ(a.send_failures(), 2U);
@@ -138,7 +138,7 @@ Address answered_from(UdpLink& client, const Address& asked_at, UdpLink& hears, 
   return from;
 }
 
-// A client with a connected socket drops an answer from any other address.
+// A client with a connected socket drops answers from other addresses.
 TEST(UdpLink, OnAllAddressesItAnswersFromTheOneThatWasAsked) {
   for (const char* all : {"0.0.0.0:0", "[::]:0"}) {
     UdpLink link(parse_address(all), Reach::kAnywhere);
@@ -163,7 +163,7 @@ TEST(UdpLink, OnAllAddressesOfIpv6ItHearsBothFamilies) {
   EXPECT_EQ(to_string(answered_from(four, parse_address("127.0.0.2" + port), link, link)), "127.0.0.2" + port);
 }
 
-// The first link receives each Hello, but the answer can be sent by another link.
+// The first link receives each Hello, but another link may send the answer.
 TEST(UdpLink, SeveralOnAllAddressesKnowWhereAPeerHasAskedOneOfThem) {
   for (const char* all : {"0.0.0.0:0", "[::]:0"}) {
     const auto links = UdpLink::several(parse_address(all), Reach::kAnywhere, 2);
@@ -199,7 +199,7 @@ TEST_P(UdpLinkTest, SeveralOnOneAddressEachGetTheDataOfTheirConnections) {
   const auto links = UdpLink::several(GetParam(), Reach::kThisMachine, 4);
   ASSERT_EQ(links.size(), 4U);
   for (const auto& link : links) EXPECT_EQ(link->local_address(), links[0]->local_address());
-  // The kernel would spread them by their senders: all must come from many to the right one.
+  // The kernel would distribute datagrams by sender. All of many senders must reach the right link.
   std::vector<std::unique_ptr<UdpLink>> guests;
   for (int i = 0; i < 8; ++i) guests.push_back(std::make_unique<UdpLink>(GetParam()));
   for (const std::uint32_t id : {4U, 5U, 6U, 7U, 0x12345602U, 0xFFFFFFFFU}) {

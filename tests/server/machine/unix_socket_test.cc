@@ -40,7 +40,7 @@ sockaddr_un name_of(const std::filesystem::path& file) {
   return name;
 }
 
-/// An engine's end.
+/// Engine end.
 class Peer {
  public:
   explicit Peer(const std::filesystem::path& file, bool named = true) : fd_(::socket(AF_UNIX, SOCK_DGRAM, 0)) {

@@ -100,7 +100,7 @@ TEST(FileSink, RefusesWhatIsNoFileAndDoesNotHang) {
   EXPECT_EQ(refusal(folder.path()), cannot + folder.path().string() + ": Is a directory");
 }
 
-/// A disk with room for part of the piece only: the kernel's limit on the size of a file plays it.
+/// A disk with room for a part of the write, simulated by the kernel's file size limit.
 TEST(FileSink, NoticesThatItsFileWasDeletedOrCutOff) {
   const ScratchFolder folder;
   const auto path = folder.path() / "run.mcap";

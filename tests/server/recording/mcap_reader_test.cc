@@ -17,7 +17,7 @@
 namespace tendon::mcap_reader_test {
 namespace {
 
-/// Two chunks of three messages each: "0", "1" … "5" at their number in ns.
+/// Two chunks of three messages: "0", "1" … "5", each at its number in ns.
 std::string sample_file() {
   MemorySink sink;
   McapWriter writer("lib", sink);
@@ -92,13 +92,13 @@ TEST(McapReader, GivesTheWholeChunksOfAFileCutAnywhere) {
   EXPECT_EQ(seen, 6U);
 }
 
-/// The positions of the chunks in `sample_file`, see McapWriter.WritesTheBytesOfTheSpecification. A chunk has three
-/// messages of 32 bytes. Its index has three entries of 16 bytes.
+/// Positions of the chunks in `sample_file`, see McapWriter.WritesTheBytesOfTheSpecification. A chunk has three
+/// messages of 32 bytes, and its index three entries of 16 bytes.
 constexpr std::size_t kFirstChunk = 8 + 20 + 26 + 28;
 constexpr std::size_t kChunk = 9 + 40 + 3 * 32;
 constexpr std::size_t kSecondChunk = kFirstChunk + kChunk + 9 + 6 + 3 * 16;
 
-/// Returns the messages of the chunks that do not overlap with the range [from, to).
+/// Returns the messages of the chunks outside the range [from, to).
 std::string outside_of(std::size_t from, std::size_t to) {
   const auto whole = [&](std::size_t chunk) { return to <= chunk || from >= chunk + kChunk; };
   return std::string(whole(kFirstChunk) ? "012" : "") + (whole(kSecondChunk) ? "345" : "");
@@ -192,7 +192,7 @@ TEST(McapReader, SaysThatAWholeChunkIsGone) {
 TEST(McapReader, NamesFileBytesAndTimesOfDamage) {
   std::string file = sample_file();
   ASSERT_EQ(file[kSecondChunk], '\x06');
-  file[kSecondChunk + 9 + 40 + 31] = 'x';  // the data of the first message
+  file[kSecondChunk + 9 + 40 + 31] = 'x';  // data of the first message
   const Outcome outcome = read(file);
   EXPECT_EQ(outcome.messages, "012");
   ASSERT_EQ(outcome.damage.size(), 1U);
@@ -200,7 +200,7 @@ TEST(McapReader, NamesFileBytesAndTimesOfDamage) {
                                    ": the CRC of a chunk does not match; 145 bytes are left out, after 0.000 s");
 }
 
-// A client could send a datagram that contains a chunk. It must not be used if the length of the outer chunk is
+// A recorded datagram of a client may contain a chunk. The reader must not use it if the length of the outer chunk is
 // damaged.
 TEST(McapReader, ReadsNoChunkWithinAChunkWhoseLengthIsDamaged) {
   const std::string whole = sample_file();

@@ -13,7 +13,7 @@
 namespace tendon::mcap_writer_test {
 namespace {
 
-/// Hexadecimal digits; spaces are for the eye.
+/// Parses hexadecimal digits and ignores spaces.
 std::string bytes(std::string_view hex) {
   std::string out;
   std::string digits;
@@ -42,7 +42,7 @@ class FailingSink final : public ByteSink {
   int calls = 0;
 };
 
-// Written by hand from https://mcap.dev/spec; the CRCs are those of Python's zlib.crc32.
+// Hand-written from https://mcap.dev/spec, with CRCs of Python's zlib.crc32.
 TEST(McapWriter, WritesTheBytesOfTheSpecification) {
   MemorySink sink;
   McapWriter writer("lib", sink);
@@ -57,7 +57,7 @@ TEST(McapWriter, WritesTheBytesOfTheSpecification) {
   const std::string schema_record = bytes("03 1100000000000000  0100  01000000 53  01000000 65  01000000 64");
   const std::string channel_record = bytes("04 1300000000000000  0100 0100  02000000 2f74  01000000 65  00000000");
   const std::string chunk = bytes(
-      "06 6800000000000000  0500000000000000 0700000000000000"  // first and last time, not the order of writing
+      "06 6800000000000000  0500000000000000 0700000000000000"  // first and last time, not in writing order
       "4000000000000000 ef8e05d5 00000000 4000000000000000"     // size, CRC, no compression, size
       "05 1700000000000000  0100 00000000 0700000000000000 0700000000000000 61"
       "05 1700000000000000  0100 01000000 0500000000000000 0500000000000000 62");
@@ -72,7 +72,7 @@ TEST(McapWriter, WritesTheBytesOfTheSpecification) {
   const std::string chunk_index = bytes(
       "08 4a00000000000000  0500000000000000 0700000000000000"
       "5200000000000000 7100000000000000"             // chunk at 82, 113 bytes
-      "0a000000 0100 c300000000000000"                // its index of channel 1 at 195
+      "0a000000 0100 c300000000000000"                // index of channel 1 at 195
       "2f00000000000000"                              // 47 bytes of indexes
       "00000000 4000000000000000 4000000000000000");  // not compressed: 64 bytes, 64 bytes
   const std::string summary_offsets = bytes(

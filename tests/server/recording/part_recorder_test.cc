@@ -42,7 +42,7 @@ Contents read_file(const fs::path& path) {
   return testing::read_all(reader);
 }
 
-/// What a run of `steps` steps from tick `first` on leaves; one tick of the log thread for each.
+/// Records `steps` steps from tick `first` on, with one tick of the log thread per step.
 void record_run(PartRecorder& recorder, std::uint64_t first, std::uint64_t steps) {
   for (std::uint64_t tick = first; tick < first + steps; ++tick) {
     recorder.record(sample_step(tick));
@@ -167,7 +167,7 @@ TEST(PartRecorder, AFileThatIsDeletedAsItClosesIsMissing) {
   EXPECT_FALSE(recorder.status().complete());
 }
 
-/// Ten steps in a second, of which those from `first_fault` to `last_fault` (s) are in a fault.
+/// Records ten steps per second, with a fault from `first_fault` to `last_fault` (s).
 void record_seconds(PartRecorder& recorder, int from, int until, int first_fault = -1, int last_fault = -1) {
   for (int tick = 10 * from; tick < 10 * until; ++tick) {
     StepRecord step = sample_step(static_cast<std::uint64_t>(100 * tick));
@@ -269,7 +269,7 @@ TEST(PartRecorder, ABudgetDeletesItsOwnOldestPartsAndNothingElse) {
   }
   PartRecorder::Config config = config_at(path);
   config.budget_bytes = 4'000'000;
-  for (int run = 0; run < 2; ++run) {  // the parts of an earlier run count too
+  for (int run = 0; run < 2; ++run) {  // includes the parts of an earlier run
     PartRecorder recorder(config);
     for (std::uint64_t tick = 0; tick < 20'000; ++tick) {
       recorder.record(sample_step(tick));
@@ -297,7 +297,7 @@ TEST(PartRecorder, ABudgetDeletesItsOwnOldestPartsAndNothingElse) {
   EXPECT_FALSE(fs::exists(folder.path() / "run-2.mcap"));
 }
 
-/// A disk that is full: the kernel's limit on the size of a file plays it, for the part that is open.
+/// A full disk for the open part, simulated by the kernel's file size limit.
 class FullDisk {
  public:
   FullDisk() : handler_(std::signal(SIGXFSZ, SIG_IGN)) {
@@ -378,7 +378,7 @@ TEST(PartRecorder, HoldsNoMoreMemoryAfterADayThanAfterTwoHours) {
     return static_cast<double>(heap.uordblks + heap.hblkhd);
   };
   double after_two_hours = 0;
-  for (std::int64_t quarter = 0; quarter < std::int64_t{4} * 86'400; ++quarter) {  // a flush each
+  for (std::int64_t quarter = 0; quarter < std::int64_t{4} * 86'400; ++quarter) {  // one flush each
     StepRecord step = sample_step(1);
     step.hand.at = ms(250 * quarter);
     recorder.record(step);
@@ -386,7 +386,7 @@ TEST(PartRecorder, HoldsNoMoreMemoryAfterADayThanAfterTwoHours) {
     if (quarter == std::int64_t{8} * 3600 - 10) after_two_hours = held();
   }
   EXPECT_GE(recorder.status().parts, 23U);
-  // Both at the end of an hour; a chunk's index takes some 150 bytes.
+  // Both at the end of an hour. The index of a chunk takes about 150 bytes.
   EXPECT_NEAR(held(), after_two_hours, 100e3);
 }
 

@@ -24,7 +24,7 @@ using testing::sample_config;
 using testing::sample_datagram;
 using testing::sample_step;
 
-/// A disk with room for `capacity` bytes that, as FileSink does, keeps whole pieces only.
+/// A disk of `capacity` bytes that, like FileSink, writes only complete pieces.
 class SmallDisk final : public ByteSink {
  public:
   explicit SmallDisk(std::size_t capacity) : capacity_(capacity) {}
@@ -40,7 +40,7 @@ class SmallDisk final : public ByteSink {
   std::string error() const override { return full_ ? "the disk is full" : ""; }
 
   MemorySink kept;
-  std::vector<std::size_t> borders;  ///< ends of the pieces that it took
+  std::vector<std::size_t> borders;  ///< end positions of the accepted pieces
 
  private:
   std::size_t capacity_;
@@ -73,7 +73,7 @@ TEST(Recorder, KeepsAllButTheLastQuarterSecondOfAKilledServer) {
   Recorder recorder(sample_config(), sink);
   for (std::uint64_t tick = 0; tick < 3000; ++tick) {
     recorder.record(sample_step(tick));
-    if (tick % 50 != 0) continue;  // killed here?
+    if (tick % 50 != 0) continue;  // server killed here
     const Contents contents = read_all(sink.bytes());
     EXPECT_EQ(contents.error, "");
     EXPECT_LE(tick + 1 - contents.steps.size(), 251U) << "at step " << tick;
@@ -150,13 +150,13 @@ TEST(Recorder, LeavesAReadableFileAndAnHonestCountOnADiskOfAnySize) {
     recorder.close();
   }
   ASSERT_GE(endless.borders.size(), 8U);
-  // What happens changes at the end of a piece only: the last byte that does not take it, and the first that does.
+  // Results change only at the end of a piece. Tests the capacities on both sides of each end.
   std::vector<std::size_t> capacities = {0};
   for (const std::size_t border : endless.borders) {
     capacities.push_back(border - 1);
     capacities.push_back(border);
   }
-  capacities.pop_back();  // that disk is large enough
+  capacities.pop_back();  // large enough
 
   for (const std::size_t capacity : capacities) {
     SmallDisk disk(capacity);

@@ -56,7 +56,7 @@ TEST(RecordingCodec, TheSchemaStandsAlone) {
     EXPECT_NE(pool.FindMessageTypeByName(std::string(kind.schema)), nullptr) << kind.schema;
 }
 
-// PlotJuggler takes a field of that name for the time in seconds, and its kind for double.
+// PlotJuggler would interpret such a field as the time in seconds and treat it as a double.
 TEST(RecordingCodec, NoFieldIsCalledTimestamp) {
   const auto* file = pb::Step::descriptor()->file();
   for (int m = 0; m < file->message_type_count(); ++m)

@@ -36,7 +36,7 @@ using testing::ScratchFolder;
 
 constexpr std::int64_t kYear = 31'557'600'000'000'000;  // ns
 
-/// Any double: NaN, infinities, subnormals and both zeros are as likely as in random bits and a bit more.
+/// Random doubles with additional NaN, infinities, subnormals and both zeros.
 double any_double() {
   return *rc::gen::weightedOneOf<double>(
       {{8, rc::gen::arbitrary<double>()},
@@ -126,7 +126,7 @@ TEST(RecordingReader, GivesTheRecordsOfEveryDeviceWhenAllAreAskedFor) {
   MemorySink sink;
   Recorder::Config config = sample_config();
   config.more_devices = {{.name = "left", .scene = config.scene, .ports = true}, {.name = "up", .scene = config.scene}};
-  config.more_devices[0].scene.unix_offset = std::chrono::hours(1);  // times are all by the offset of the first
+  config.more_devices[0].scene.unix_offset = std::chrono::hours(1);  // all times use the offset of the first device
   Recorder recorder(config, sink);
   recorder.record(sample_step(1), 2);
   recorder.record(sample_step(2), 0);
@@ -297,7 +297,7 @@ TEST(RecordingReader, ReadsARecordingWithoutItsSceneAndSaysSo) {
   EXPECT_NE(contents.damage[0].find("a record comes before the scene, which is missing"), std::string::npos);
 }
 
-/// A recording of 40 steps, and the positions of its chunks.
+/// A recording of 40 steps with the positions of its chunks.
 struct Chunked {
   struct Chunk {
     std::size_t from;
@@ -305,7 +305,7 @@ struct Chunked {
     std::vector<std::uint64_t> ticks;
   };
   std::string bytes;
-  std::vector<Chunk> chunks;  ///< except the first one, which contains the scene
+  std::vector<Chunk> chunks;  ///< without the first one, which contains the scene
 };
 
 Chunked chunked() {
@@ -334,7 +334,7 @@ Chunked chunked() {
   return file;
 }
 
-// The file has a flipped bit, a sector of zeros, a sector of random bytes, or some bytes are missing.
+// Damage: a flipped bit, a sector of zeros, a sector of random bytes, or missing bytes.
 RC_GTEST_PROP(RecordingReader, DamageLosesOnlyTheStepsOfTheChunksThatItMeets, ()) {
   static const Chunked file = chunked();
   RC_PRE(file.chunks.size() >= 4U);
@@ -355,7 +355,7 @@ RC_GTEST_PROP(RecordingReader, DamageLosesOnlyTheStepsOfTheChunksThatItMeets, ()
     default:
       damaged.erase(from, to - from);
   }
-  // If the server was killed, the file ends before a chunk and does not have a summary.
+  // After a kill, the file ends before a chunk and has no summary.
   const auto& last = file.chunks.back();
   const bool killed = from >= file.chunks.front().from && to <= last.from && *rc::gen::arbitrary<bool>();
   if (killed) damaged.resize(last.from - (file.bytes.size() - damaged.size()));
@@ -376,7 +376,7 @@ RC_GTEST_PROP(RecordingReader, DamageLosesOnlyTheStepsOfTheChunksThatItMeets, ()
   std::uint64_t lost = 0;
   for (const LossRecord& loss : contents.losses) lost += loss.steps;
   RC_ASSERT(lost <= 40U - given.size());
-  // The number of steps that are missing at the end is in the summary.
+  // The summary contains the number of steps missing at the end.
   if (!killed && to <= last.to) RC_ASSERT(lost == 40U - given.size());
 }
 

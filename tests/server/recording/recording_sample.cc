@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// recording_sample FOLDER: writes two seconds of a run as FOLDER/whole.mcap, and as FOLDER/killed.mcap what is left of
-// it when the server is killed in the middle of a write. For tests that read recordings with programs of others.
+// recording_sample FOLDER: writes a run of two seconds as FOLDER/whole.mcap, and the same run killed during a write as
+// FOLDER/killed.mcap. Used to test recordings with third-party readers.
 
 #include <exception>
 #include <filesystem>

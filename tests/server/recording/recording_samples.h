@@ -19,7 +19,7 @@
 #include "server/recording/recorder.h"
 #include "server/recording/recording_reader.h"
 
-// Records to record, and helpers to look at what came of them. Shared by the recording tests.
+// Sample records and helpers to inspect recordings.
 
 namespace tendon::testing {
 
@@ -35,7 +35,7 @@ inline Recorder::Config sample_config() {
   return config;
 }
 
-/// Step `tick` of a hand that swings at 1 Hz, one step a millisecond; every field differs from its default.
+/// Step `tick` of a hand oscillating at 1 Hz, one per millisecond. Every field differs from its default.
 inline StepRecord sample_step(std::uint64_t tick) {
   const auto t = static_cast<double>(tick) * 1e-3;
   const LocalTime due = ms(static_cast<std::int64_t>(tick));
@@ -104,7 +104,7 @@ inline DatagramRecord sample_datagram(LocalTime at, std::uint32_t size, bool in)
   return datagram;
 }
 
-/// `steps` steps, with a datagram out and one in at every tenth.
+/// Records `steps` steps, with one datagram in each direction at every tenth.
 inline void record_samples(Recorder& recorder, std::uint64_t steps) {
   for (std::uint64_t tick = 0; tick < steps; ++tick) {
     recorder.record(sample_step(tick));
@@ -115,7 +115,7 @@ inline void record_samples(Recorder& recorder, std::uint64_t steps) {
   }
 }
 
-/// The same double, bit for bit.
+/// Compares bit for bit.
 inline bool same(double a, double b) { return std::bit_cast<std::uint64_t>(a) == std::bit_cast<std::uint64_t>(b); }
 inline bool same(const Vec3& a, const Vec3& b) {
   return same(a.x(), b.x()) && same(a.y(), b.y()) && same(a.z(), b.z());
@@ -156,7 +156,7 @@ inline bool same(const DatagramRecord& a, const DatagramRecord& b) {
          std::ranges::equal(kept(a), kept(b));
 }
 
-/// What a recording holds.
+/// Contents of a recording.
 struct Contents {
   std::vector<SceneRecord> scenes;
   std::vector<StepRecord> steps;
@@ -164,7 +164,7 @@ struct Contents {
   std::vector<LossRecord> losses;
   bool truncated = false;
   std::vector<std::string> damage;
-  std::string error;  ///< what the reader threw
+  std::string error;  ///< exception of the reader
 
   std::size_t records() const { return scenes.size() + steps.size() + datagrams.size() + losses.size(); }
 };

@@ -51,7 +51,7 @@ TEST(KeyFolder, AKeyIsWrittenForItsOwnerOnlyAndNeverOverAnother) {
   EXPECT_EQ(read_key_folder(folder.path())[0].key.bytes(), some_key("wall", 1).key.bytes());
 }
 
-/// No file of this process can grow beyond `bytes` while this lives: a disk that is full.
+/// A full disk: limits every file of this process to `bytes`.
 class FullDisk {
  public:
   explicit FullDisk(rlim_t bytes) {

@@ -31,7 +31,7 @@ TEST(SceneError, NamesTheFileThatCannotBeRead) {
 }
 
 struct Broken {
-  std::string more;  ///< after kMinimal
+  std::string more;  ///< appended to kMinimal
   std::string error;
 };
 

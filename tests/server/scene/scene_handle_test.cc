@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The keys of a simulated handle that turns, grips and has buttons.
+// Keys of a simulated handle that rotates, grips and has buttons.
 #include <gtest/gtest.h>
 
 #include <cmath>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// [teleoperation]: what a coupling is, and what is refused.
+// [teleoperation]: accepted couplings and errors.
 #include <gtest/gtest.h>
 
 #include <string>
@@ -236,7 +236,7 @@ TEST(SceneTeleoperation, SaysWhatCannotBeTogether) {
             "s.toml:10: teleoperation.clutch: expected none: the leader clutches");
 }
 
-/// Twelve lines after those of kMinimal; what follows begins at line 16.
+/// Twelve lines after kMinimal, so the rest begins at line 16.
 const std::string kTwoLeaders =
     "[[channel]]\n"
     "name = \"trainer\"\n"

@@ -18,7 +18,7 @@ namespace {
 using namespace std::chrono_literals;
 using testing::ScratchFolder;
 
-// What a recording holds: the scene as it ran, command line and all.
+// A recording contains the scene with its command-line settings.
 TEST(Scene, WithSettingsItsTextIsTheSceneThatTheyMake) {
   const Scene as_written = read_scene(std::string(TENDON_SCENES) + "/demo.toml");
   const Friction friction = as_written.loop.control.limiter.friction;
@@ -383,7 +383,7 @@ TEST(Scene, AProfilesJointFrictionIsNoLessThanTheLimitersBound) {
   EXPECT_NEAR(least_friction(scene.simulated()).coulomb, falcon.coulomb_friction.value, 1e-12);
   EXPECT_EQ(least_friction(scene.simulated()).viscous, falcon.viscous_friction.value);
   EXPECT_EQ(scene.loop.control.limiter.friction.coulomb, falcon.coulomb_bound.value);
-  // What an operator has identified may be as much as there is, and no more.
+  // The identified friction may equal the device's friction but not exceed it.
   const std::string joints = "[device.effects.joint_friction]\nkind = \"falcon\"\n";
   EXPECT_EQ(minimal_and(joints + "[limiter]\ncoulomb_friction_n = 0.4\n").loop.control.limiter.friction.coulomb, 0.4);
   EXPECT_NE(error_of_minimal_and(joints + "[limiter]\ncoulomb_friction_n = 0.41\n")
@@ -400,8 +400,8 @@ upper_arm_mm = 140
 forearm_mm = 140
 [limiter]
 adaptive_friction = {places_mm = [[0, 0, 0]], viscous_friction_n_s_per_m = [0.5], coulomb_friction_n = [)";
-  // The torque that is 0.4 N at the turntable's longest lever, 0.14 m and the reach, is more where that is 0.14 m; the
-  // least at the centre is that of the other two, whose levers are the same everywhere.
+  // The torque of 0.4 N at the longest lever of the turntable (0.14 m plus the reach) gives a larger force at a lever
+  // of 0.14 m. The minimum at the center is set by the other two joints, whose levers are constant.
   EXPECT_TRUE(minimal_and(scene + "0.4]}\n").loop.control.friction_map);
   const std::string error = error_of_minimal_and(scene + "0.45]}\n");
   EXPECT_TRUE(error.starts_with("s.toml:11: limiter.adaptive_friction.coulomb_friction_n: expected at most 0.4"))

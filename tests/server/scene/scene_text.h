@@ -8,28 +8,28 @@
 #include "devices/simulated/scripted_motion.h"
 #include "server/scene/scene.h"
 
-// Scenes in memory for the tests of server/scene: their texts, and what reading them gives.
+// Scenes in memory: their text and the result of reading it.
 
 namespace tendon {
 
-/// Three lines: more begins at line 4.
+/// Three lines, so the rest begins at line 4.
 extern const std::string_view kMinimal;
-/// Four lines: more begins at line 5.
+/// Four lines, so the rest begins at line 5.
 extern const std::string_view kWithoutProfile;
-/// Nine lines, the last of which begins the hand's motion.
+/// Nine lines. The last one begins the motion of the hand.
 extern const std::string_view kHand;
 
-/// The scene of `text`, whose file is called s.toml.
+/// Reads `text` as the file s.toml.
 Scene parse(const std::string& text, const std::filesystem::path& directory = {});
 Scene minimal_and(const std::string& more);
 
-/// The sentence that refuses it; "no error" when nothing does.
+/// Returns the error message, or "no error".
 std::string error_of(const std::string& text, const std::filesystem::path& directory = {});
 std::string error_of_minimal_and(const std::string& more);
 
 void write(const std::filesystem::path& file, std::string_view text);
 
-/// Where the scene's hand wants to be after `t` seconds.
+/// Returns the target of the scene's hand after `t` seconds.
 ScriptedMotion::Point target(const Scene& scene, double t);
 
 }  // namespace tendon

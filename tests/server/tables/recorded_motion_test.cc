@@ -24,7 +24,7 @@ ScriptedMotion::Recorded load(const std::string& text, const RecordedMotionFile&
   return load_recorded_motion(csv, file);
 }
 
-/// Of a recording hand.csv with a header, whose positions are in the column x.
+/// Returns the error of a recording hand.csv with a header and its positions in the column x.
 std::string complaint(const std::string& text) {
   return thrown_by<std::runtime_error>([&] { load(text, {.path = "hand.csv", .position = "x"}); });
 }
@@ -82,7 +82,7 @@ TEST(RecordedMotion, RefusesAScaleThatWouldMakeThePositionVanish) {
 }
 
 TEST(RecordedMotion, AHumanHandOnAFoamDrivesTheDevice) {
-  // The recording is not ours to ship with the tests: 4.4 s of an operator at 2 kHz, lever arm 0.075 m.
+  // The recording cannot be distributed: 4.4 s of an operator at 2 kHz, lever arm 0.075 m.
   const char* data = std::getenv("TENDON_DATA");  // NOLINT(concurrency-mt-unsafe): one thread
   if (data == nullptr) GTEST_SKIP() << "TENDON_DATA is not set: the recorded human motion is not there";
 
@@ -107,7 +107,7 @@ TEST(RecordedMotion, AHumanHandOnAFoamDrivesTheDevice) {
   EXPECT_LT(furthest, 0.1);
   EXPECT_LT(fastest, 3) << "faster than a hand moves: the path between the samples is wrong";
 
-  // A firm grip on a light device goes where the hand wants to be.
+  // A firm grip on a light device follows the target of the hand.
   SimulatedDevice::Config config;
   config.mass = 0.075;
   config.coulomb_friction = 0.04;

@@ -47,8 +47,8 @@ const Rows kSome = {{0, 20.5}, {0.5, -3}};
 
 TEST(TableReader, ReadsWhatLoggersAndSpreadsheetsWrite) {
   for (const char* text : {"t_s,x_mm\n0,20.5\n0.5,-3\n", "0,20.5\n0.5,-3",
-                           "\xef\xbb\xbft_s,x_mm\r\n0,20.5\r\n0.5,-3\r\n",          // a spreadsheet of Windows
-                           "\xef\xbb\xbf\"t_s\";\"x_mm\"\r\n0;20,5\r\n0,5;-3\r\n",  // one where the comma is decimal
+                           "\xef\xbb\xbft_s,x_mm\r\n0,20.5\r\n0.5,-3\r\n",          // Windows spreadsheet
+                           "\xef\xbb\xbf\"t_s\";\"x_mm\"\r\n0;20,5\r\n0,5;-3\r\n",  // with a decimal comma
                            "\"t_s\",\"x_mm\"\n\"0\",\"20,5\"\n\"0,5\",\"-3\"\n", "t_s\tx_mm\n0\t20,5\n0,5\t-3\n",
                            "# by a logger\n\nt_s , x_mm\n 0 , +20.5\n\n# a pause\n5e-1, -3.0 \n\n",
                            "t_s x_mm\n0 20.5\n 0.5   -3\n", "\"time, \"\"true\"\"\";x\n0;20.5\n0.5;-3\n"}) {
@@ -95,7 +95,7 @@ TEST(TableReader, NamesFileLineAndWhatWasExpected) {
            {"\xff\xfe" + std::string("a\0", 2), "1: expected text in UTF-8, found UTF-16: save it as \"CSV UTF-8\""}}) {
     EXPECT_EQ(refusal(text), "t.csv:" + says) << text;
   }
-  // An earlier decimal comma or a semicolon makes the meaning clear.
+  // An earlier decimal comma or a semicolon removes the ambiguity.
   EXPECT_EQ(read("a\tb\n0,5\t1,012\n"), Rows({{0.5, 1.012}}));
   EXPECT_EQ(read("a;b\n1;1,012\n"), Rows({{1, 1.012}}));
 }
@@ -157,7 +157,7 @@ TEST(TableReader, AColumnThatIsMissingOrThereTwiceIsNamed) {
 struct Drawn {
   Rows rows;
   std::string plain;    ///< commas and decimal points
-  std::string dressed;  ///< the same numbers otherwise
+  std::string dressed;  ///< the same numbers in another format
 };
 
 Drawn drawn(std::mt19937_64& random) {
