@@ -210,7 +210,7 @@ TEST(CouplingHardCases, AFollowerForgetsThemToo) {
     played.step();
   };
   for (int i = 0; i < 3; ++i) period(PortPhase::kCoupled, 0, Vec3::Zero(), 0);
-  for (int i = 0; i < 10; ++i) period(PortPhase::kEngaged, 1, Vec3(1e-3, 0, 0), 0);  // no energy to pay for the wave line
+  for (int i = 0; i < 10; ++i) period(PortPhase::kEngaged, 1, Vec3(1e-3, 0, 0), 0);  // no energy for the wave line
   EXPECT_TRUE(played.port.live());
   EXPECT_TRUE(played.told.wave_integral.isZero(0));
   for (int i = 0; i < 500; ++i) period(PortPhase::kCoupled, 1, Vec3::Zero(), 0);  // the ramp has ended

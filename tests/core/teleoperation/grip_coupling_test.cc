@@ -86,7 +86,7 @@ TEST(GripCoupling, ItHoldsWhileTheLeaderIsClutchedAndComesBackSlowly) {
   const double held = ports.follower.grip_force;
   EXPECT_LT(held, -0.3);
   ports.leader.buttons = 1;
-  ports.run(1000);  // the leader's hand lets go meanwhile
+  ports.run(1000);  // the leader's fingers open meanwhile
   EXPECT_NEAR(ports.follower.grip_force, held, 0.02 * std::abs(held));
   ports.leader.buttons = 0;
   double fastest = 0;
