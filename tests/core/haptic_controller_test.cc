@@ -24,7 +24,6 @@ HapticController::Config config() {
   return c;
 }
 
-// Controller, prescribed hand motion, and a device that applies the commanded force.
 struct Bench {
   explicit Bench(const HapticController::Config& c) : controller(c) {}
 

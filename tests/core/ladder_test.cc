@@ -33,7 +33,6 @@ Duration milliseconds_in(const std::string& cell) {
   return std::regex_search(cell, found, std::regex("([0-9]+) ms")) ? milliseconds(std::stol(found[1])) : Duration{};
 }
 
-/// Reads the lines `| rung | v + 20 ms | 4 decaying | … |` of the table.
 std::vector<Rung> table() {
   std::ifstream page(TENDON_SESSION_MD);
   EXPECT_TRUE(page.is_open()) << TENDON_SESSION_MD;

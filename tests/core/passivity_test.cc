@@ -208,7 +208,6 @@ class Search {
     // Zero Coulomb friction, or laws that ignore it would have a margin.
     const Friction friction{0, kViscous};
     Limiter limiter({.law = law_, .friction = friction, .longest_hold = std::chrono::milliseconds(1)});
-    // Accounts that the law guarantees: one, or one per axis.
     const bool per_axis = law_ == Law::kAolPerAxis;
     Vec3 energy = Vec3::Zero();
     double least = 0;

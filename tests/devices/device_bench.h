@@ -19,7 +19,6 @@ class Bench {
     return device_.read(now_)->position;
   }
 
-  /// Calls `apply`, then `wait`.
   Vec3 push(const Vec3& force, Duration interval) {
     device_.apply(force);
     return wait(interval);

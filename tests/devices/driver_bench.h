@@ -16,7 +16,6 @@ namespace tendon {
 /// `device`, `step(force)`, which calls `drive` and `look`, and `home(force)`, which homes the device as a user would.
 template <class Bench>
 struct DriverBench {
-  /// One period of the driver.
   void drive(Device& device, const Vec3& force) {
     sample = device.read(now);
     written = device.apply(force);

@@ -90,7 +90,6 @@ TEST_F(TwoEnds, StatesOfSixteenDevicesShareThreeDatagrams) {
   }
 }
 
-/// 16 devices moving on all axes, at one step.
 std::vector<DeviceState> moving(std::uint64_t tick) {
   std::vector<DeviceState> states(limits::kMaxDevices, state(tick));
   for (std::uint32_t device = 0; device < states.size(); ++device) {

@@ -30,7 +30,6 @@ Scene scene_of(const std::string& name, const std::string& more = "") {
   return scene;
 }
 
-/// A server with one network loop per link.
 class Servers : public ::testing::Test {
  protected:
   void serve(const std::vector<Scene>& scenes, std::size_t networks = 1,

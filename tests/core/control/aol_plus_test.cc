@@ -124,7 +124,6 @@ Outcome run(Dice& dice, const Case<Blocks, Size>& c, int steps) {
       const auto block = static_cast<std::size_t>(i);
       const Vec<Size> force = applied.template segment<Size>(i * Size);
       const double size = force.norm();
-      // Eq. (7): the worst motion follows the force.
       Vec<Size> move = roam.template segment<Size>(i * Size);
       if (hostile && size > friction[block].coulomb) {
         move = force / size * held * (size - friction[block].coulomb) / (2 * friction[block].viscous);

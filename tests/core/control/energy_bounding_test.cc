@@ -41,7 +41,6 @@ TEST(EnergyBounding, TheSumOfForceTimesMotionCoversWhatIsStored) {
   expect_both_conditions<6>(kSlope, kSlope);
 }
 
-// Compares the distance to the demand with that of random feasible forces.
 TEST(EnergyBounding, NoOtherFeasibleForceIsNearerToTheWantedOne) {
   Dice dice(7);
   for (int run = 0; run < 2000; ++run) {

@@ -9,7 +9,6 @@
 
 namespace tendon {
 
-/// Result of a press into a wall.
 struct Press {
   double stiffness = 0;   ///< N/m, displayed: mean force / mean depth in the last 0.3 s
   double unrest = 0;      ///< m/s rms, velocity in the last 0.5 s

@@ -15,7 +15,7 @@ constexpr Friction kFriction{0.05, 0.26};
 TEST(ReferenceEnergyController, TheReferenceIsWhatASpringHoldsAtThatForce) {
   const ReferenceEnergyController<3> law({kFriction, 500, 20});
   const Vec3 force(1, -2, 3);
-  EXPECT_DOUBLE_EQ(law.reference({force}), force.squaredNorm() / 1000);  // default: the configured stiffness
+  EXPECT_DOUBLE_EQ(law.reference({force}), force.squaredNorm() / 1000);
   Mat3 stiffness;
   stiffness << 800, 100, 0, 100, 400, 50, 0, 50, 200;
   EXPECT_NEAR(law.reference({force, stiffness}), 0.5 * force.dot(stiffness.inverse() * force), 1e-15);

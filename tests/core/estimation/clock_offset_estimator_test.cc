@@ -20,7 +20,6 @@ using std::chrono::milliseconds;
 
 constexpr LocalTime kStart{std::chrono::seconds(100)};
 
-/// Two hosts with known true clocks.
 struct Hosts {
   Duration offset = hours(1000);
   double drift = 0;

@@ -173,7 +173,6 @@ Return wind_up(Estimator estimator, Trace trace, std::uint64_t seed) {
   return result;
 }
 
-/// Adapts UdLeastSquares to the interface of Textbook.
 struct Capped {
   UdLeastSquares<2> fit{{.forgetting = 0.98, .prior_variance = 100}};
   Eigen::Vector2d estimate = Eigen::Vector2d::Zero();

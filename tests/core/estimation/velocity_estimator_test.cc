@@ -98,7 +98,6 @@ TEST(VelocityEstimator, IgnoresWhatIsNotANumberAndWhatIsNotNewer) {
   EXPECT_NEAR(estimator.observe(LocalTime(milliseconds(2)), Vec3(3e-3, 0, 0)).x(), 2, 1e-12);
 }
 
-// Window definition of the header, evaluated sample by sample.
 double end_fit(const std::vector<Motion>& newest_first, int axis, double resolution) {
   const Motion& now = newest_first.front();
   double velocity = 0;

@@ -28,7 +28,6 @@ constexpr double kHandleTolerance = 1e-9;
 
 static_assert(SharesAccount<WrenchPort, 6> && SharesAccount<GripPort, 1>);
 
-/// One end: limiter, purse and an independent ledger.
 template <class Limits>
 struct HandleEnd {
   static constexpr int kSize = Limits::kSize;

@@ -79,7 +79,6 @@ TEST_P(IntegralFitOf, AnySlideFindsTheFrictionKnowingTheMass) {
 TEST_P(IntegralFitOf, AnySlideFindsTheMassToo) {
   const auto [viscous, rate] = GetParam();
   const IntegralFit fit = integral_fit(slide({.rate = rate, .viscous = viscous}), std::nullopt);
-  // The only error is the rounding to counts.
   EXPECT_NEAR(fit.friction.viscous, viscous, 2e-3);
   EXPECT_NEAR(fit.friction.coulomb, 0.05, 1e-3);
   EXPECT_NEAR(fit.mass / kMass, 1, 0.08);

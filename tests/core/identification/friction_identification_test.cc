@@ -17,7 +17,6 @@ using testing::ExactRamp;
 
 constexpr IdentificationConfig kConfig{.mass = 0.075, .encoder_step = 3e-5};
 
-/// Returns runs with three slopes in both directions, otherwise as `like`.
 std::vector<RampRun> experiment(ExactRamp like) {
   std::vector<RampRun> runs;
   for (const double rate : {0.05, 0.1, 0.5}) {

@@ -10,8 +10,6 @@
 #include "core/stability/stability_boundary.h"
 #include "tests/support/refusal.h"
 
-/// Compares the closed forms with each other and with values of an independent program.
-
 namespace tendon::closed_forms_test {
 namespace {
 

@@ -23,7 +23,7 @@ using namespace std::chrono_literals;
 
 constexpr Duration kPeriod = 1ms;
 constexpr double kT = 1e-3;
-constexpr double kViscous = 20;  // of admittance_device()
+constexpr double kViscous = 20;
 constexpr double kCoulomb = 1;
 
 template <int N>
@@ -52,7 +52,6 @@ struct World {
   Vec3 direction = Vec3::UnitX();
 };
 
-// The heavy device with an oscillating hand. The wall acts on the tool.
 Episode run(const World& world) {
   auto config = admittance_device();
   config.hand =

@@ -19,7 +19,6 @@ using std::chrono::milliseconds;
 constexpr double kCoulomb = 0.02;  // N, both devices
 constexpr double kTurn = 6.283185307179586;
 
-/// A hand of `stiffness` that leads the handle.
 std::array<Surroundings, 3> hand_of(double stiffness, std::function<double(double)> along_x) {
   std::array<Surroundings, 3> hand{};
   for (Surroundings& axis : hand) axis = {.stiffness = stiffness, .damping = 3};
@@ -39,7 +38,6 @@ void expect_passive(const Ports& ports, const std::string& when) {
   EXPECT_GE(ports.least_sum, kRounding) << when;
 }
 
-/// Largest change of either wanted force between two periods.
 class Steps {
  public:
   void look(const Ports& ports) {
@@ -366,7 +364,6 @@ TEST(CouplingForce, HandsAtBothEndsThatPushEachOtherFeelTheSame) {
   EXPECT_GT(-ports.leader.applied.x(), 2);
   EXPECT_NEAR(-ports.leader.applied.x(), ports.follower.applied.x(), 2 * kCoulomb + 0.03);
   expect_passive(ports, "two hands");
-  // One hand releases its handle.
   ports.follower.setup.around = {};
   ports.run(2000);
   expect_passive(ports, "one hand");

@@ -15,7 +15,6 @@
 namespace tendon::coupling_hard_cases_test {
 namespace {
 
-/// Two ports and their network before construction.
 struct Draft {
   PortSetup leader, follower;
   Network there, back;

@@ -68,7 +68,6 @@ TEST(Coupling, ARobotHoldsTheLastPlaceAndThenWhereItsToolIs) {
   EXPECT_EQ(ladder.phases[271], PortPhase::kLost);
   EXPECT_EQ(force[271], force[270]) << "no step";
   for (std::size_t age = 271 + 50; age < force.size(); ++age) ASSERT_EQ(force[age], 0) << age;
-  // The follower is displaced, and the link returns.
   Ports& ports = *ladder.ports;
   ports.follower.setup.path = [](double) { return Vec3(0.002, 0.001, 0); };
   ports.run(2);

@@ -16,7 +16,6 @@ namespace {
 
 constexpr double kTurn = 6.283185307179586;
 
-/// A hand that leads the handle along x.
 PortSetup led(std::function<double(double)> along_x) {
   PortSetup leader = port_of(PortRole::kLeader);
   leader.coupling.clutch = Coupling::Button{.bit = 0};

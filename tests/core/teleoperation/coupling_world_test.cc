@@ -41,7 +41,6 @@ class CouplingWorld {
   double least_sum() const { return ports_.least_sum; }
 
  private:
-  /// Observations of one port.
   struct Watch {
     PortState told{};
     bool live = false;

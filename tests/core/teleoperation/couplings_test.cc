@@ -21,7 +21,6 @@ namespace {
 
 constexpr double kCoulomb = 0.02;  // N, each device
 
-/// A leader with a hand that moves along x.
 Star::Leader led(double share, const std::function<double(double)>& path, std::uint64_t seed = 1) {
   Star::Leader leader{.setup = port_of(PortRole::kLeader), .share = share};
   leader.setup.path = [path](double t) { return Vec3(path(t), 0, 0); };
@@ -43,7 +42,6 @@ void worsen(Star::Leader& leader, std::uint64_t seed) {
 
 PortSetup follower_setup() { return port_of(PortRole::kFollower); }
 
-/// A spring holds the follower in place.
 PortSetup held_follower(double stiffness = 500) {
   PortSetup setup = follower_setup();
   setup.around[0] = {.stiffness = stiffness, .damping = 3};
@@ -176,7 +174,6 @@ TEST(Couplings, TheOwnDampingOfTheFollowerIsRenderedOnce) {
   EXPECT_NEAR(demand.stiffness(0, 0), 400, 1e-9);
 }
 
-/// Returns the largest force change of any device within a period.
 double largest_step(Star& star, int ticks) {
   double most = 0;
   star.run(ticks, [&](int) {
@@ -348,7 +345,6 @@ TEST(Couplings, ByPositionForceALeaderFeelsItsShareOfTheContact) {
 TEST(Couplings, ARobotHoldsItsPlaceAsFarAsNobodyLeadsIt) {
   PortSetup robot = follower_setup();
   robot.coupling.holds_place = true;
-  // An external spring pulls the robot away.
   robot.around[0] = {.stiffness = 20, .reference = [](double) { return 0.05; }};
   Star star(robot, {led(0.5, to(0.010, 4)), led(0.5, to(0.010, 40), 2)});
   star.run(1000);

@@ -14,7 +14,6 @@ inline void expect_coupled(const Ports& ports, const std::string& when) {
   EXPECT_EQ(phase(ports.follower), PortPhase::kCoupled) << when;
 }
 
-/// Runs and expects that neither end engages in any period.
 inline void expect_no_engagement(Ports& ports, int ticks, const std::string& when) {
   bool engaged = false;
   ports.run(ticks, [&](int) {

@@ -34,7 +34,6 @@ struct PortSetup {
   bool limited = true;                                     ///< false: applies the wanted force of the coupling
 };
 
-/// Springs, purse and period common to both ends.
 inline Coupling::Config coupling_of(PortRole role) {
   Coupling::Config config;
   config.role = role;
@@ -43,7 +42,6 @@ inline Coupling::Config coupling_of(PortRole role) {
   return config;
 }
 
-/// Selects `method` with the parameters that it needs.
 inline void couple_by(CouplingMethod method, Coupling::Config& config) {
   config.method = method;
   if (method != CouplingMethod::kRate) return;
@@ -59,7 +57,6 @@ class Port {
     if (setup.path) put(setup.path(0));
   }
 
-  /// Server restart: coupling and account are new.
   void begin(std::uint64_t epoch) {
     auto config = setup.coupling;
     config.spring.epoch = epoch;
@@ -77,7 +74,6 @@ class Port {
     const double step = setup.encoder_step;
     return step > 0 ? Vec3(step * (x() / step).array().round()) : x();
   }
-  /// External force on the tool.
   Vec3 outside() const { return {bodies_[0].outside, bodies_[1].outside, bodies_[2].outside}; }
 
   void put(const Vec3& x) {
@@ -203,7 +199,6 @@ class Ports {
   }
 };
 
-/// Default port of these tests.
 inline PortSetup port_of(PortRole role) {
   PortSetup setup;
   setup.coupling = coupling_of(role);
@@ -224,7 +219,6 @@ class Played {
  public:
   explicit Played(Coupling::Config config) : port(config) {}
 
-  /// Valid state of the peer for this period.
   PortState state(PortPhase phase, std::uint64_t engagement = 0) {
     PortState peer;
     peer.epoch = 5;

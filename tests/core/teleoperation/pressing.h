@@ -130,7 +130,6 @@ inline Felt feel(const Pressing& with) {
   return felt;
 }
 
-/// Force with a rigid link, N.
 inline double rigid(const Pressing& with) {
   return (kPressingDepth - kPressingWallAt) / (1 / with.hand + 1 / with.wall);
 }

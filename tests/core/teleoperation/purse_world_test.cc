@@ -26,7 +26,6 @@ namespace {
 constexpr double kInf = std::numeric_limits<double>::infinity();
 constexpr double kNanojoule = 1e-9;
 
-/// Deliberate error.
 enum class Sabotage { kNone, kBoundOnePercentUp, kTotalsTwice, kGiveAfterLimit, kEpochIgnored };
 
 struct Port {
@@ -122,7 +121,6 @@ class World {
     return (here == 0 ? 1 : 1 / scale_) * (there == 0 ? 1 : scale_);
   }
   bool coupled(std::size_t i, std::size_t j) const { return i != j && (!star_ || i == 0 || j == 0); }
-  /// Index of port j among the peers of port i.
   static std::size_t number(std::size_t i, std::size_t j) { return j < i ? j : j - 1; }
 
   void start(std::size_t i) {

@@ -26,7 +26,6 @@ class Node {
     if (setup.path) put(setup.path(0));
   }
 
-  /// Server restart.
   void begin(std::uint64_t epoch) {
     HapticController::Config config;
     config.coupling = setup.coupling;
@@ -49,7 +48,6 @@ class Node {
     for (int i = 0; i < 3; ++i) bodies_[static_cast<std::size_t>(i)].x = x[i];
   }
 
-  /// First part of a period, before sending.
   void step(int now) {
     constexpr double kPeriod = 1e-3;
     const Vec3 before = x();
@@ -67,7 +65,6 @@ class Node {
     applied = taken.force;
     least_account = std::min(least_account, taken.energy);
   }
-  /// Message of one coupling after the step.
   PortState message(std::size_t which) {
     const auto contact = setup.measures_contact ? std::optional<Vec3>(outside()) : std::nullopt;
     Coupling& coupling = (*controller->couplings())[which];

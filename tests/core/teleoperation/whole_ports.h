@@ -142,7 +142,6 @@ class WholePort {
   double least_account = std::numeric_limits<double>::infinity();
 
  private:
-  /// Moves through the millisecond before `now` and books the work.
   void move(int now) {
     if (std::exchange(began_, true)) {
       const double from = (now - 1) * 1e-3;

@@ -49,7 +49,6 @@ TEST(FalconFirmware, AFileIsReadWhole) {
   EXPECT_EQ(read_firmware(file, "a.bin", UnknownFirmware::kAccept), bytes);
 }
 
-/// A loader on a simulated cable.
 struct Load {
   explicit Load(const FakeFalcon::Options& options, std::size_t bytes = 4096)
       : falcon(options), image(fake_firmware(bytes)) {

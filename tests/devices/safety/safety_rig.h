@@ -43,11 +43,9 @@ struct Puppet final : Device {
   }
 };
 
-/// A safe device around a puppet, stepped at 1 kHz.
 struct Rig {
   explicit Rig(const SafeDevice::Config& config = {}) : safe(config, puppet) {}
 
-  /// Returns the applied force.
   Vec3 step(const Vec3& asked = Vec3::Zero()) {
     now += std::chrono::milliseconds(1);
     seen = safe.read(now).has_value();

@@ -28,7 +28,6 @@ Vec3 anywhere(Dice& dice, double reach) {
   return reach * x;
 }
 
-/// Forward kinematics as in the header.
 Vec3 handle_of(const Mechanism::Arm& arm, const Vec3& q) {
   const double r = arm.upper_arm * std::cos(q[1]) + arm.forearm * std::sin(q[2]);
   return {r * std::sin(q[0]), arm.forearm - arm.forearm * std::cos(q[2]) + arm.upper_arm * std::sin(q[1]),

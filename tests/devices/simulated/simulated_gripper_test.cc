@@ -16,7 +16,6 @@ constexpr double kSubstep = 50e-6;
 
 using Hand = SimulatedGripper::Hand;
 
-/// A gripper with its simulated clock.
 class Fingers {
  public:
   explicit Fingers(const SimulatedGripper::Config& config) : gripper(config) {}

@@ -18,7 +18,6 @@ constexpr double kPi = std::numbers::pi;
 
 using Hand = SimulatedRotation::Hand;
 
-/// A handle with its simulated clock.
 class Spindle {
  public:
   explicit Spindle(const SimulatedRotation::Config& config) : rotation(config) {}

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// A simulated device with rotation and gripper: state that these share.
 #include <gtest/gtest.h>
 
 #include <cmath>

@@ -16,7 +16,6 @@ namespace {
 using namespace std::chrono_literals;
 using Packet = std::vector<std::uint8_t>;
 
-/// Cable controlled by the test.
 struct Cable final : Pipe {
   std::uint32_t connection() noexcept override { return number; }
   bool request(const Request&) noexcept override { return false; }

@@ -18,7 +18,6 @@ inline LocalTime real_now() {
   return LocalTime(std::chrono::duration_cast<Duration>(std::chrono::steady_clock::now().time_since_epoch()));
 }
 
-/// Returns whether `holds` becomes true within ten seconds.
 template <class Holds>
 bool comes_true(const Holds& holds) {
   for (int i = 0; i < 10'000 && !holds(); ++i) std::this_thread::sleep_for(std::chrono::milliseconds(1));

@@ -41,7 +41,6 @@ class FarFalcon {
   /// "NAME=value" entries for the process that must find it.
   std::vector<std::string> environment() const;
 
-  /// Calls `act(falcon)` with exclusive access.
   template <class Act>
   auto with(const Act& act) {
     const std::lock_guard lock(mutex_);

@@ -33,7 +33,6 @@ namespace {
 /// Name that libusb gives to a wrapped node (bus 0), consistent with USBDEVFS_CONNECTINFO.
 constexpr std::string_view kNode = "/dev/bus/usb/000/007";
 
-/// Connects to the socket of FarFalcon.
 int connect_to_falcon() {
   const char* const path = std::getenv("TENDON_FAR_FALCON");  // NOLINT(concurrency-mt-unsafe): nobody sets it
   if (path == nullptr) return -1;

@@ -353,7 +353,6 @@ TEST(UsbKernel, WithoutAGuardianItGoesOnPushing) {
   EXPECT_TRUE(pushes(driven.cable, driven.falcon));
 }
 
-/// Name in sysfs of the kernel driver of the only interface.
 std::string kernel_driver(const std::string& port) {
   std::array<char, 256> target{};
   const std::string link = "/sys/bus/usb/devices/" + port + ":1.0/driver";

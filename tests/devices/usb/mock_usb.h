@@ -49,7 +49,6 @@ class MockPort {
   int open_transfers() const;     ///< submitted and not yet reaped
   int woken_for_nothing() const;  ///< wake-ups of libusb without a transfer
 
-  /// Calls `act()` with exclusive access to the model.
   template <class Act>
   auto with(const Act& act) const {
     const std::lock_guard lock(mutex_);

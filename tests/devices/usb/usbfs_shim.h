@@ -34,7 +34,6 @@ class UsbfsShim final : public UsbfsNode {
   };
   void set_trouble(Trouble trouble);
 
-  /// Calls `act(falcon)` with exclusive access.
   template <class Act>
   auto with(const Act& act) const {
     const std::lock_guard lock(mutex_);

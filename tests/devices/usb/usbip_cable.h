@@ -35,7 +35,6 @@ class UsbIpCable {
   void plug();
   void unplug();
 
-  /// Calls `act()` with exclusive access to the model.
   template <class Act>
   auto with(const Act& act) const {
     const std::lock_guard lock(mutex_);
@@ -45,7 +44,6 @@ class UsbIpCable {
  private:
   /// Submit or unlink request of the kernel.
   struct Order;
-  /// IN transfer that waits for data.
   struct Waiting {
     std::uint32_t number = 0;
     std::size_t size = 0;

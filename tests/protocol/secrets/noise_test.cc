@@ -14,7 +14,6 @@ namespace {
 
 using examples::Bytes;
 
-/// A and Z share a key.
 class Noise : public ::testing::Test {
  protected:
   static Bytes text(std::string_view text) {

@@ -16,7 +16,6 @@ using std::chrono::seconds;
 
 constexpr LocalTime kOpened{seconds(100)};
 
-/// One direction, from sender to receiver.
 class Seal : public ::testing::TestWithParam<Suite> {
  protected:
   explicit Seal(const Rekey& rekey = {}) : rekey_(rekey) {}

@@ -247,7 +247,6 @@ const Suites kOld = {Suite::kNoise};  ///< a peer without suite 2, or without ha
 const Suites kNew = all_suites();
 const Suites kAesOnly = {Suite::kAesGcm};
 
-/// A client and a server with different suites.
 class TwoSuites : public SealedHandshake {
  protected:
   void SetUp() override {
@@ -290,7 +289,6 @@ class TwoSuites : public SealedHandshake {
   Met meet(const Suites& client_suites, const Suites& door_suites) {
     return meet(client_suites, door_suites, examples::welcome(), [](Bytes&) {});
   }
-  /// Returns true if each end opens what the other sealed.
   static bool talk(const Met& met) {
     if (!met.here || !met.there) return false;
     Session a({.connection_id = 77}, *met.here, LocalTime{seconds(1)});

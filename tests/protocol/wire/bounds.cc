@@ -92,7 +92,6 @@ std::optional<Bound> bound_of(const std::string& comment) {
   return out;
 }
 
-/// Returns the bounds by "Message.field".
 std::map<std::string, Bound> bounds_of(std::string_view proto) {
   static const std::regex kMessage(R"(message (\w+) \{)");
   static const std::regex kField(R"(\s+(?:optional |repeated )?[\w.]+ (\w+) = \d+(?: \[packed = true\])?;\s*// (.*))");
@@ -185,7 +184,6 @@ class Maker {
     }
   }
 
-  /// Adds the current root as a case.
   void add(const std::string& path, const std::string& value, bool accepted) {
     const std::string bytes = root_->SerializeAsString();
     const auto* const begin = reinterpret_cast<const std::byte*>(bytes.data());

@@ -26,7 +26,6 @@ struct Workplace {
 
 enum class What { kState, kForce, kColumns };
 
-/// States of 16 devices at one step.
 struct Step {
   std::array<DeviceState, limits::kMaxDevices> states;
   std::array<const DeviceState*, limits::kMaxDevices> each;

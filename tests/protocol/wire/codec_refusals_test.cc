@@ -437,7 +437,7 @@ TEST(Codec, ZerosAtTheEndOfAHistogramDoNotTravel) {
   std::swap(report.lateness[13], report.lateness[12]);
   EXPECT_EQ(data(1, {}, report).size(), before - 1);
   report.lateness = {};
-  EXPECT_EQ(data(1, {}, report).size(), before - 2 - 15);  // key and length, 14 entries, one of which has two bytes
+  EXPECT_EQ(data(1, {}, report).size(), before - 2 - 15);
 }
 
 TEST(Codec, ABucketEndsWithItsPowerOfTwo) {

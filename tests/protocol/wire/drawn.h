@@ -33,7 +33,6 @@ inline double a_number(Dice& dice) {
   return dice.chance(0.2) ? kHard[dice.bits() % kHard.size()] : dice.within(-10, 10);
 }
 inline Vec3 a_vector(Dice& dice) { return {a_number(dice), a_number(dice), a_number(dice)}; }
-/// Varint of any length.
 inline std::uint64_t a_count(Dice& dice) { return dice.chance(0.1) ? 0 : dice.bits() >> (dice.bits() % 64); }
 inline Duration a_time(Dice& dice) {
   const auto ns = static_cast<std::int64_t>(a_count(dice) >> 4U);

@@ -64,7 +64,6 @@ bool all_zero(Bytes bytes) {
   return std::all_of(bytes.begin(), bytes.end(), [](std::byte b) { return b == std::byte{0}; });
 }
 
-/// Parses a datagram from its start and writes a line for each element.
 class Writer {
  public:
   explicit Writer(Bytes datagram) : rest_(datagram) {}
@@ -96,7 +95,6 @@ class Writer {
     }
   }
 
-  /// Writes the message in the next `size` bytes.
   void message(const Descriptor& type, std::size_t size, int depth) {
     const std::size_t end = rest_.size() - size;
     while (rest_.size() > end) field(type, depth);

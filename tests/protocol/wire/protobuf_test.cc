@@ -57,7 +57,6 @@ std::optional<Bytes> by_protobuf(const Bytes& body) {
   return bytes_of(parsed.SerializeAsString());
 }
 
-/// Encodes a state, bit for bit.
 Bytes told_of(const DeviceState& state) { return examples::data(0, {}, state); }
 
 std::string hex(const Bytes& bytes) {

@@ -91,7 +91,6 @@ std::string list(const std::vector<std::string>& items) {
   return "[" + out + "\n]";
 }
 
-/// Returns the message in protobuf's JSON format.
 template <class Message>
 std::string meaning(std::span<const std::byte> body) {
   Message message;

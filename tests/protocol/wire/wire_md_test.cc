@@ -39,7 +39,6 @@ std::string page() {
   return {std::istreambuf_iterator<char>(file), {}};
 }
 
-/// Returns the bytes of each golden block by name.
 std::map<std::string, Bytes> golden_datagrams() {
   std::map<std::string, Bytes> out;
   for (const auto& [name, block] : golden::blocks(page())) {

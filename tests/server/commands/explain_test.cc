@@ -20,7 +20,7 @@ using namespace std::chrono_literals;
 
 Scene shipped(const char* name) { return read_scene(std::filesystem::path(TENDON_SCENES) / name); }
 
-constexpr int kRounds = 4;  // with an even clock all rounds give the same result
+constexpr int kRounds = 4;
 
 /// Returns a clock that advances by 1 µs at each reading.
 std::function<Duration()> ticking() {

@@ -28,7 +28,6 @@ namespace {
 using std::chrono::milliseconds;
 using std::chrono::seconds;
 
-/// An unencrypted observer with or without the feature.
 class Viewer {
  public:
   Viewer(Wire& wire, const std::string& address, const Address& server, bool names_it, LocalTime now)

@@ -26,7 +26,6 @@ class Loop {
  public:
   Loop() : loop_({.period = milliseconds(1), .control = control()}, device_, *mail_) {}
 
-  /// Performs one step, `late` after it was due.
   void step(Duration late) { due_ = loop_.step(due_ + late); }
   Health counted() const { return loop_.health(); }
 

@@ -24,7 +24,6 @@ using std::chrono::seconds;
 constexpr std::uint32_t kTrainer = 1;  // channels of shared_follower.toml
 constexpr std::uint32_t kTrainee = 2;
 
-/// A client that claims a channel and sends requests.
 class Desk {
  public:
   Desk(Wire& wire, const std::string& address, const Address& server, const std::string& channel, LocalTime now)

@@ -41,13 +41,11 @@ class OutputsOfADevice : public TwoDevices {
     return client;
   }
 
-  /// Returns the last setting sent to the device's loop.
   OutputSetting told(std::size_t output) {
     if (const OutputSettings* const news = second_->outputs.take()) newest_ = *news;
     return newest_.of[output].setting;
   }
 
-  /// Returns the answer to the request.
   Session::RequestAnswered asked(Client& client, std::uint32_t output, const OutputSetting& setting) {
     EXPECT_TRUE(client.client->set_output(output, setting));
     run(milliseconds(50), {&client});

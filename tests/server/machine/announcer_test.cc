@@ -24,7 +24,6 @@ using testing::FakeAvahi;
 
 const dns_sd::About kFalcon{.version = 1, .device = "left", .hz = 1000, .suite = 1, .channels = {"main"}};
 
-/// An announcer in its thread, and its messages.
 class Running {
  public:
   explicit Running(std::vector<Announcer::Device> devices, const std::string& listen = "0.0.0.0:47100")

@@ -40,7 +40,6 @@ sockaddr_un name_of(const std::filesystem::path& file) {
   return name;
 }
 
-/// Engine end.
 class Peer {
  public:
   explicit Peer(const std::filesystem::path& file, bool named = true) : fd_(::socket(AF_UNIX, SOCK_DGRAM, 0)) {

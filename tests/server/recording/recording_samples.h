@@ -19,8 +19,6 @@
 #include "server/recording/recorder.h"
 #include "server/recording/recording_reader.h"
 
-// Sample records and helpers to inspect recordings.
-
 namespace tendon::testing {
 
 inline LocalTime ms(std::int64_t t) { return LocalTime(std::chrono::milliseconds(t)); }
@@ -115,7 +113,6 @@ inline void record_samples(Recorder& recorder, std::uint64_t steps) {
   }
 }
 
-/// Compares bit for bit.
 inline bool same(double a, double b) { return std::bit_cast<std::uint64_t>(a) == std::bit_cast<std::uint64_t>(b); }
 inline bool same(const Vec3& a, const Vec3& b) {
   return same(a.x(), b.x()) && same(a.y(), b.y()) && same(a.z(), b.z());
@@ -156,7 +153,6 @@ inline bool same(const DatagramRecord& a, const DatagramRecord& b) {
          std::ranges::equal(kept(a), kept(b));
 }
 
-/// Contents of a recording.
 struct Contents {
   std::vector<SceneRecord> scenes;
   std::vector<StepRecord> steps;

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// Keys of a simulated handle that rotates, grips and has buttons.
 #include <gtest/gtest.h>
 
 #include <cmath>

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// [teleoperation]: accepted couplings and errors.
 #include <gtest/gtest.h>
 
 #include <string>

@@ -8,8 +8,6 @@
 #include "devices/simulated/scripted_motion.h"
 #include "server/scene/scene.h"
 
-// Scenes in memory: their text and the result of reading it.
-
 namespace tendon {
 
 /// Three lines, so the rest begins at line 4.
