@@ -77,7 +77,7 @@ class Walk : public ::testing::Test {
   static constexpr Duration kValid = milliseconds(60);
   static constexpr double kSlew = 200;  // N/s: 0.2 N in a step of 1 ms
   static constexpr double kStiffness = 1000;
-  static constexpr int kSilent = 1000;  // ms: the last force is sent one period earlier
+  static constexpr int kSilent = 1000;  // ms; the last force is sent one period before this
   static constexpr int kBack = 2000;
 
   Walk() {
@@ -120,7 +120,7 @@ TEST_F(Walk, EachRungIsEnteredAtItsTime) {
     for (const char* name : {"hold", "decay", "safe stop"}) {
       const Rung& next = rung(rungs_, name);
       ASSERT_TRUE(next.after_validity) << name;
-      // At its exact start time a stage has not begun, except the safe stop.
+      // A stage begins after its time. Only the safe stop begins exactly at its time.
       const Duration from = kValid + next.entered;
       const bool there = next.mode == Mode::kSafeStop ? step.force_age >= from : step.force_age > from;
       if (there) expected = next.mode;

@@ -26,7 +26,7 @@ namespace {
 
 struct Outcome {
   double least_energy = 0;
-  double worst_shortfall = 0;  // J, largest deficit below the minimum that the hold time permits
+  double worst_shortfall = 0;  // J, the largest amount by which the account was below the minimum for its hold
   double worst_excess = 0;     // N above the bound
   bool all_finite = true;
 };
@@ -38,8 +38,8 @@ double worst_per_second(const Vec3& force, const Friction& friction, Law law) {
   return excess * excess / (4 * friction.viscous);
 }
 
-/// Runs 600 steps of a random controller against a random adversary. With `late`, one hold in 20 is longer than
-/// configured, up to 32 ms.
+/// Runs 600 steps of a random controller and a random adversary. If `late` is true, one hold in 20 is longer than
+/// configured. It can be up to 32 ms.
 Outcome run(std::uint64_t seed, Law limiter, bool late = false) {
   Dice dice(seed);
   HapticController::Config config;
@@ -158,7 +158,7 @@ struct Gene {
   double follow = 0;           // factor on the worst motion of eq. (7)
   Vec3 move = Vec3::Zero();    // m, added motion
   Vec3 wanted = Vec3::Zero();  // N
-  double late = 1;             // length of the preceding hold / configured hold
+  double late = 1;             // ratio of the preceding hold to the configured hold
 };
 
 class Search {
@@ -166,8 +166,8 @@ class Search {
   Search(Law law, double bound_scale, std::uint64_t seed, bool late = false)
       : law_(law), bound_scale_(bound_scale), late_(late), dice_(seed) {}
 
-  /// Returns the lowest objective found. Negative: the ledger fell below zero, or below the minimum that an overlong
-  /// hold permits, as a share of its peak.
+  /// Returns the lowest value of the objective. It is negative if the ledger fell below zero, or below the minimum that
+  /// is possible with a hold that is too long. The scale is the peak of the ledger.
   double worst() {
     double worst = 0;
     for (int start = 0; start < 20; ++start) {

@@ -13,7 +13,7 @@ class Bench {
  public:
   explicit Bench(SimulatedDevice::Config config) : device_(std::move(config)) { device_.read(now_); }
 
-  /// Advances time by `interval` with the held force. Returns the encoder position.
+  /// Advances the time by `interval` with the force that is held. Returns the position of the encoder.
   Vec3 wait(Duration interval) {
     now_ += interval;
     return device_.read(now_)->position;

@@ -52,8 +52,8 @@ struct DriverBench {
   Bench& bench() { return static_cast<Bench&>(*this); }
 };
 
-/// A device behind the safety layer must be driven only while armed, and it must be possible to home and arm it after a
-/// replug. `home` homes the device, and `advance` steps the model to `now`.
+/// A device with a safety layer must only be driven while it is armed. It must be possible to home and arm it again
+/// after it was unplugged. `home` is called to home the device, and `advance` to step the model to `now`.
 template <class Bench, class Model, class Home, class Advance>
 void expect_homing_and_arming_after_a_replug(Bench& bench, Model& model, Home home, Advance advance) {
   using std::chrono::milliseconds;

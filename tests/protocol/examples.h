@@ -53,7 +53,8 @@ inline ForceCommand force() {
           .valid_for = std::chrono::milliseconds(20)};
 }
 
-/// An answer with every field: 2 mm deep in a surface with normal −x, and the forces at other depths.
+/// An answer with all fields. The tool is 2 mm deep in a surface with the normal −x, and the table has the forces at
+/// other depths.
 inline ForceCommand force_with_all() {
   ForceCommand all = force();
   all.sequence = 101;
@@ -233,7 +234,7 @@ inline DeviceState state_with_buttons() {
   return state;
 }
 
-/// A handle with all parts, rotated by 106° about y. It rotates while its fingers close on something soft.
+/// A handle with all of its parts. It is rotated by 106° about y and moves while the fingers close on something soft.
 inline DeviceState state_with_handle() {
   DeviceState state = examples::state();
   state.buttons = 1;
@@ -245,14 +246,14 @@ inline DeviceState state_with_handle() {
   return state;
 }
 
-/// Sent to a client with the feature "joints": three joints, two of them in motion.
+/// This is sent to a client with the feature "joints". There are three joints, and two of them move.
 inline DeviceState state_with_joints() {
   DeviceState state = examples::state();
   state.joints = Joints::three({0.5, -0.25, 1.5}, {0.125, 0, -2});
   return state;
 }
 
-/// A detent about one axis, and compliant fingers.
+/// A detent about one axis and soft fingers.
 inline ForceCommand force_with_torque() {
   ForceCommand command = force();
   command.sequence = 102;
@@ -333,7 +334,7 @@ inline PortFrame port_in_contact() {
   return port;
 }
 
-/// A follower with the other methods: it has found a floor, and its line has sent waves.
+/// A follower with one of the other methods. It has found a floor, and waves have been sent.
 inline PortFrame port_by_model() {
   PortFrame port = port_in_contact();
   port.surface = {.normal = {0, 0.6, 0.8}, .offset = -0.125, .stiffness = 500};
@@ -342,7 +343,7 @@ inline PortFrame port_by_model() {
   return port;
 }
 
-/// The other end has half the motion and is rotated by 106° about y.
+/// The motion of the other end is half as large and is rotated by 106° about y.
 inline Couple couple() {
   return {.device = 1,
           .channel = 1,

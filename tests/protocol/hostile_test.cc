@@ -19,7 +19,7 @@ using examples::Bytes;
 
 bool bounded(const Vec3& v) { return v.allFinite() && v.cwiseAbs().maxCoeff() <= limits::kMaxValue; }
 
-/// A session that receives invalid bytes and checks every result.
+/// A session that receives invalid bytes. All of the results are checked.
 class Target {
  public:
   Target() : session_({.connection_id = examples::kConnection}, LocalTime{}) {

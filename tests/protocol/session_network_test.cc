@@ -144,7 +144,7 @@ TEST(SessionOverAPerfectNetwork, BothEndsSendKeepAlivesAtTheirRate) {
 
 TEST(SessionOverAPerfectNetwork, ARequestAnsweredInTimeIsSentOnce) {
   World world(perfect(milliseconds(40)));
-  world.run(seconds(3));  // until the round trip is known
+  world.run(seconds(3));  // this is enough to know the round trip
   bool answered = false;
   world.on_z = [&](const Session::Event& event) {
     world.z.answer(std::get<Session::RequestArrived>(event).id, Code::kOk, "");

@@ -17,7 +17,7 @@ namespace {
 constexpr std::uint64_t kTurns = 600;       // turns of the longer run of turn-proof
 constexpr double kCounted = 600.0 - 100.0;  // difference of its two run lengths
 
-constexpr double kMost = 9150;  // a few percent above the measured value
+constexpr double kMost = 9150;  // this is a few percent above the measured value
 
 using TurnProof = testing::InstructionTest;
 
@@ -35,7 +35,7 @@ TEST_F(TurnProof, AStateAndItsForceTakeTwoDatagramsAndFewInstructions) {
             << static_cast<double>(sent) / kTurns << " datagrams\n";
   EXPECT_EQ(forces, kTurns) << "not every state was answered in its turn";
   EXPECT_EQ(sent, 2 * kTurns);
-  // Each end polls once without result and once with one. The server polls once more after sending a state.
+  // Each end polls once without a result and once with a result. The server polls again after a state was sent.
   EXPECT_EQ(looks, 5 * kTurns);
   // After each of the first four polls, after the doorbell of the step, and after the engine's answer.
   EXPECT_EQ(readings, 6 * kTurns);

@@ -123,8 +123,8 @@ World<N> hostile_world(Dice& dice) {
   };
 }
 
-/// An operator who knows the law and its force and tries to extract energy: random motion of all sizes, the worst
-/// motion of eq. (7), and slow entry followed by a fast exit.
+/// An operator who knows the law and the force and tries to extract energy. This uses random motion of all sizes, the
+/// worst motion of eq. (7), and a slow entry that is followed by a fast exit.
 struct Adversary {
   Friction friction;  ///< true friction of the device
   Duration longest_hold = std::chrono::milliseconds(1);
@@ -132,7 +132,7 @@ struct Adversary {
   double largest_move = 1e-3;  ///< m, largest random motion
   int steps = 400;
   bool jitter = true;     ///< hold time of ¼ … 1 × longest_hold
-  bool clamps = true;     ///< the device sometimes applies less than commanded
+  bool clamps = true;     ///< if true, the device sometimes applies less than the command
   bool overlooks = true;  ///< some intervals are not observed
 };
 
@@ -191,8 +191,8 @@ inline Friction random_friction(Dice& dice) {
   return {dice.chance(0.3) ? 0.0 : dice.decades(-3, -0.3), dice.decades(-2, 0.3)};
 }
 
-/// Runs `make(claimed friction, longest hold)` in hostile worlds and returns the number of seeds for which the port
-/// generated energy. `overclaim` above 1 is the sabotage: it multiplies the viscous friction that the law assumes.
+/// Runs `make(claimed friction, longest hold)` in hostile worlds. Returns the number of seeds for which the port
+/// generated energy. If `overclaim` is larger than 1, the law assumes a viscous friction that is larger by this factor.
 template <int N, class Make>
 int broken_by_hostile_worlds(Make make, int seeds, double overclaim = 1) {
   int broken = 0;
@@ -235,8 +235,8 @@ int broken_by_static_worlds(Make make, int seeds, const Walls& walls = {}, int p
   return broken;
 }
 
-/// Requirements on every law: a demand that is not finite becomes zero with the reason and is not booked, and the
-/// energy is the ledger of the port.
+/// Checks the requirements for every law. A demand that is not finite is replaced by zero and is not booked. The energy
+/// is equal to the ledger of the port.
 template <int N, class Law>
 requires StabilityController<Law, N>
 void expect_the_common_promises(Law law, const Friction& friction) {

@@ -39,7 +39,7 @@ struct Case {
   double force_scale = 1;      // sabotage: applied force / permitted force
 };
 
-/// Returns a law with random friction and the parts that `listed` names.
+/// Returns a law with random friction and with the parts that are named in `listed`.
 template <int Blocks, int Size>
 Case<Blocks, Size> random_case(Dice& dice, const std::string& listed) {
   using Law = AolPlus<Blocks, Size>;
@@ -85,11 +85,11 @@ Case<Blocks, Size> random_case(Dice& dice, const std::string& listed) {
 }
 
 struct Outcome {
-  double least = 0;         // J, minimum of the true ledger
-  double scale = 0;         // J, maximum of the true ledger, the scale of its rounding errors
+  double least = 0;         // J, the minimum of the true ledger
+  double scale = 0;         // J, the maximum of the true ledger; this is the scale of the rounding errors
   double worst_excess = 0;  // N above `permitted`
-  double felt = 0;          // N, largest force
-  double over_credit = 0;   // J, largest difference between the law's account and the true ledger
+  double felt = 0;          // N, the largest force
+  double over_credit = 0;   // J, the largest difference between the account and the true ledger
 };
 
 template <int Blocks, int Size>
@@ -178,7 +178,7 @@ Outcome run(Dice& dice, const Case<Blocks, Size>& c, int steps) {
   return outcome;
 }
 
-/// Runs all seeds of one law with one list of parts. Adaptive friction (`f`) is tested without other parts, because the
+/// Runs a law with a list of parts for all seeds. Adaptive friction (`f`) is tested without other parts, because the
 /// interval in which the friction falls is booked with the previous bound.
 template <int Blocks, int Size>
 void expect_passive(const std::string& listed, int seeds = 150) {
@@ -282,7 +282,7 @@ TEST(AolPlus, AfterAnIntervalThatIsNoNumberThePlainBoundHolds) {
   EXPECT_EQ(law.limit(push).permitted, plain.limit(push).permitted);
 }
 
-/// Moves at 4 Hz with an amplitude of 30 mm in free space for 30 s.
+/// Simulates motion in free space at 4 Hz with an amplitude of 30 mm for 30 s.
 template <class Law>
 void wave(Law& law) {
   double x = 0;
@@ -329,7 +329,7 @@ TEST(AolPlus, WhatAHandPutIntoASoftSpringPaysForItsReleaseInSpiteOfTheCap) {
     config.parts.energy_cap.emplace();
     AolPlus<1> law(config);
     EXPECT_EQ(limited_share(law, stiffness, 0.02), 0) << stiffness << " N/m";
-    config.parts.energy_cap->most_contact = 0;  // otherwise the cap alone would limit the force
+    config.parts.energy_cap->most_contact = 0;  // without this, the cap would limit the force
     config.parts.energy_cap->energy = 1e-3;
     AolPlus<1> naive(config);
     EXPECT_GT(limited_share(naive, stiffness, 0.02), 0) << stiffness << " N/m";
@@ -341,7 +341,7 @@ TEST(AolPlus, AContactThatSoftensKeepsNoMoreThanItsForceCanGiveBack) {
   config.parts.energy_cap.emplace();
   AolPlus<1> law(config);
   double applied = 0;
-  for (int n = 0; n < 1000; ++n) {  // contact begins in the first step
+  for (int n = 0; n < 1000; ++n) {  // the contact begins in the first step
     law.observe({.applied = Vec<1>(applied), .dx = Vec<1>(1e-5), .held = kPeriod});
     law.limit({.force = Vec<1>(-5)});
     applied = -5;
@@ -484,7 +484,7 @@ TEST(AolPlus, ABrokenAssumptionIsCountedAndThePlainBoundHoldsForThatStep) {
 }
 
 TEST(AolPlus, TheReserveMakesUpForAForceThatIsHeldLate) {
-  // core/PROOFS.md, "Output latency": without the reserve the same adversary breaks the law.
+  // The same adversary breaks the law if there is no reserve (core/PROOFS.md, "Output latency").
   int broken = 0;
   for (std::uint64_t seed = 1; seed <= 50; ++seed) {
     Dice dice(seed);

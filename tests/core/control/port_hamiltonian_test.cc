@@ -57,7 +57,7 @@ TEST(PortHamiltonian, TheStateLagsBehindThePositionByWhatTheLeapsCost) {
   }
   std::sort(ratios.begin(), ratios.end());
   EXPECT_GT(ratios[ratios.size() / 2], 0.9);
-  EXPECT_GT(least_work, -1e-5);  // J, environment only, without friction; its spring exchanges 75 mJ
+  EXPECT_GT(least_work, -1e-5);  // J, for the environment without friction; the spring exchanges 75 mJ
 }
 
 // For every demand and every K the storage must stay nonnegative and at most the energy received plus the debt.

@@ -37,7 +37,7 @@ struct Hosts {
   }
 };
 
-/// Returns one-way delays of a bad Wi-Fi link: just above 1 ms, and one in 14 with a long-tailed stall.
+/// Returns the delays of a bad Wi-Fi link. They are just above 1 ms, but one in 14 is a stall with a long tail.
 Duration wifi(Dice& dice) {
   const double little = -0.15e-3 * std::log(1 - dice.uniform());
   const double stall = dice.chance(0.07) ? 4e-3 / (1 - dice.uniform()) : 0;
@@ -78,8 +78,8 @@ TEST(ClockOffsetEstimator, IsWithin350UsAtP99OverAWifiOf60MsRoundTrip) {
     const Score s = score(hosts, period, period * 9000, 1);
     RecordProperty("p99_us", std::to_string(s.p99 * 1e6));
     EXPECT_GT(s.round_trip_p99, 0.05);
-    // The documented limit is 350 µs; measured are 36 and 16 µs. Equal weights give 119 µs, and the newest instead of
-    // the best exchange of each block gives 275 µs.
+    // The documented limit is 350 µs. The measured values are 36 and 16 µs. They would be 119 µs with equal weights,
+    // and 275 µs with the newest exchange of each block instead of the best one.
     EXPECT_LT(s.p99, 100e-6) << "p50 " << s.p50 << ", round trip p99 " << s.round_trip_p99;
     EXPECT_EQ(s.broken_bounds, 0);
   }
@@ -98,7 +98,8 @@ TEST(ClockOffsetEstimator, ItsBoundHoldsForEveryPromisedDriftAndAsymmetry) {
   }
 }
 
-// A peer that receives nothing new from us keeps sending, and echoes our last datagram with a growing delay.
+// The peer does not receive anything new from us but continues to send. It echoes our last datagram with an increasing
+// delay.
 TEST(ClockOffsetEstimator, ItsBoundHoldsForAPeerThatDelaysAndDrifts) {
   for (std::uint64_t seed = 1; seed <= 60; ++seed) {
     Dice dice(seed);

@@ -22,7 +22,7 @@ struct Options {
 
 constexpr std::uint64_t kSeed = 7;
 
-/// Runs one form on nearly collinear regressors. Returns true if the covariance stayed definite and every sample was
+/// Runs one form with nearly collinear regressors. Returns true if the covariance stayed definite and all samples were
 /// accepted.
 template <class Estimator, class Scalar>
 bool soak(const char* form, const char* scalar, const Options& options) {

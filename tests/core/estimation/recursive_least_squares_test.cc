@@ -149,8 +149,8 @@ TEST(RecursiveLeastSquares, UdStaysDefiniteInFloat64) { expect_definite<UdLeastS
 TEST(RecursiveLeastSquares, QrStaysDefiniteInFloat32) { expect_definite<QrLeastSquares<3, float>, float>(); }
 TEST(RecursiveLeastSquares, QrStaysDefiniteInFloat64) { expect_definite<QrLeastSquares<3>, double>(); }
 
-/// 1200 of 2000 samples excite only one of two directions. `error` is the largest error of θ after both are excited
-/// again.
+/// Only one of two directions is excited in 1200 of 2000 samples. `error` is the largest error of θ after both
+/// directions are excited again.
 struct Return {
   double trace;
   double error;

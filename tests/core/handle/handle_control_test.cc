@@ -181,7 +181,7 @@ TEST(HandleControl, TorqueAndGripAreRampedInFadeAndStopWithTheForce) {
   const Step whole = wanted_after(15);
   EXPECT_EQ(whole.turn()->wanted.z(), 0.05);
   EXPECT_EQ(whole.grip()->wanted, 2);
-  const Step fading = wanted_after(40);  // 20 ms of hold, then 20 of the 50 ms ramp
+  const Step fading = wanted_after(40);  // 20 ms of the hold, followed by 20 ms of the ramp
   EXPECT_EQ(fading.mode, Mode::kDecaying);
   EXPECT_NEAR(fading.turn()->wanted.z(), 0.05 * std::exp(-0.4), 1e-12);
   EXPECT_NEAR(fading.grip()->wanted, 2 * std::exp(-0.4), 1e-12);

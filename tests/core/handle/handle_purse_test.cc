@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The energy-sharing theorem of purse.h for handles: two ports that rotate or grip pay each other over a network that
-// delays, loses, repeats and reorders. Every account and the sum of both ledgers must stay above −1 nJ, also on closed
-// loops in SO(3). The test recomputes the ledgers from the true motion.
+// Tests the energy-sharing theorem of purse.h for handles. Two ports that rotate or grip pay each other over a network
+// that delays, loses, repeats and reorders messages. The accounts and the sum of both ledgers must not fall below −1
+// nJ. This includes closed loops in SO(3). The ledgers are computed independently from the true motion.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -40,7 +40,7 @@ struct HandleEnd {
   std::optional<Purse> purse;
   std::array<Friction, kBlocks> friction{};
   double truth = 0;                   ///< J
-  Vec<kSize> x = Vec<kSize>::Zero();  ///< position; a wrench keeps its orientation in `q`
+  Vec<kSize> x = Vec<kSize>::Zero();  ///< position; the orientation of a wrench is in `q`
   Quat q{};
   Quat loop_from{};
   Vec<kSize> force = Vec<kSize>::Zero();
@@ -169,7 +169,7 @@ class HandlePair {
     return out;
   }
 
-  /// Moves the handle by one rotation about one axis and books the work. The limiter sees the difference of two
+  /// Moves the handle by a single rotation about one axis and books the work. The limiter uses the difference of two
   /// samples.
   void move(End& end, const Vec<kSize>& way, Duration held) {
     Vec<kSize> seen = way;

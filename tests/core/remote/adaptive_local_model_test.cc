@@ -72,7 +72,7 @@ TEST(AdaptiveLocalModel, NothingJumpsWhenAnAnswerArrivesEvenInABlend) {
     const Vec3 before = model.predict(now)->force;
     if (dice.chance(0.05)) model.observe(without_model(k, k, 5 * dice.direction()));
     EXPECT_LT((model.predict(now)->force - before).norm(), 1e-12);
-    EXPECT_LE(before.norm(), 5 + 1e-9);  // a blend never exceeds its parts
+    EXPECT_LE(before.norm(), 5 + 1e-9);  // a blend is not larger than its parts
   }
 }
 
@@ -129,7 +129,7 @@ TEST(AdaptiveLocalModel, BeyondTheValidRadiusTheForceStaysWhatItIsAtItsEdge) {
   const Prediction far = *model.predict({at(0), Vec3(0.03, 0, 0), Vec3::Zero()});
   EXPECT_NEAR(far.force.x(), -5 - 500 * 0.002, 1e-12);
   EXPECT_EQ(far.stiffness, Mat3::Zero());
-  // The previous model keeps its own edge while it fades out.
+  // The previous model uses its own edge while it is faded out.
   model.observe(spring(40, 45, Vec3(0.02, 0, 0), 500 * Mat3::Identity()));
   EXPECT_NEAR(model.predict({at(45), Vec3(0.03, 0, 0), Vec3::Zero()})->force.x(), far.force.x(), 1e-12);
 }

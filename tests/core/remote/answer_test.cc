@@ -118,7 +118,7 @@ TEST(Answer, ATableReplacesStiffnessAlongTheNormalWithinItsEnds) {
   EXPECT_EQ(along(0.1).stiffness(2, 2), 0);
   EXPECT_EQ(along(-0.1).force.z(), 0);
   EXPECT_EQ(along(1e12).force.z(), 8);
-  // Across the normal the stiffness applies up to its radius. The radius does not cut off the table.
+  // In the lateral direction, the stiffness is used up to its radius. The radius does not limit the table.
   RemoteForce narrow = answer;
   narrow.model->valid_radius = 1e-6;
   EXPECT_NEAR(reconstruct(narrow, deeper_by(0.001)).force.z(), 3.5, 1e-12);

@@ -44,7 +44,8 @@ TEST(ForceChannels, TheSumIsThatOfTheFreshForcesAndTheirStiffness) {
   const auto both = two.wanted(at(milliseconds(1), Vec3(0.01, 0, 0)));
   EXPECT_TRUE(both.force.isApprox(Vec3(1 - 100 * 0.01, 2, 0), 1e-12));
   EXPECT_EQ(both.stiffness(0, 0), 100);
-  // The first engine keeps sending and the second stops: its force leaves the sum without a device stop.
+  // The first engine continues to send and the second one stops. The sum must not contain the old force, and the device
+  // must not stop.
   RemoteForce later = stiff;
   later.received = LocalTime(milliseconds(400));
   two.observe(0, later);
@@ -103,9 +104,9 @@ TEST(ForceChannels, TheReleaseOfAnEngineThatIsNoLongerHeardChangesNothing) {
   EXPECT_EQ(one.wanted(at(milliseconds(2))).mode, Mode::kActive);
 }
 
-// The limiter sees only the sum of the engines: two that oppose each other, one that sends NaN, one that stops sending,
-// and a handover in contact, with an oscillating hand. The force must change within the slew limit except where the
-// limiter cuts it, and the ledger must stay nonnegative.
+// The limiter only sees the sum of the engines. Two engines oppose each other, one sends NaN, one stops sending, and
+// one is replaced during contact. The hand oscillates. The change of the force must be within the slew limit unless the
+// limiter reduces the force. The ledger must not become negative.
 TEST(ForceChannels, NoEngineAndNoHandoverOverdrawsTheLedgerOrJumps) {
   HapticController::Config config;
   config.limiter.law = Law::kAol;

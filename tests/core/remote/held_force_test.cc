@@ -63,7 +63,7 @@ TEST(HeldForce, SafeStopIsLeftOnlyByAFreshForceAndThatIsRampedIn) {
   HeldForce held({});
   held.observe(force_at(Duration::zero(), Vec3(2, 0, 0)));
   EXPECT_EQ(held.wanted(at(milliseconds(600))).mode, Mode::kSafeStop);
-  EXPECT_EQ(held.wanted(at(milliseconds(5))).mode, Mode::kSafeStop);  // also after a backward clock step
+  EXPECT_EQ(held.wanted(at(milliseconds(5))).mode, Mode::kSafeStop);  // the clock may also step back
   held.observe(force_at(milliseconds(1000), Vec3(2, 0, 0), milliseconds(400)));
   const auto half = held.wanted(at(milliseconds(1050)));
   EXPECT_EQ(half.mode, Mode::kActive);
@@ -119,7 +119,7 @@ TEST(HeldForce, FollowsTheHandWithTheLocalModel) {
   RemoteForce remote = force_at(Duration::zero(), Vec3(-1, 0, 0));
   remote.model = LocalModel{Vec3(0.01, 0, 0), Vec3(100, 0, 0).asDiagonal()};
   held.observe(remote);
-  // 10 mm deeper than the model's position at 100 N/m: 1 N more along −x.
+  // The position is 10 mm deeper than in the model. With 100 N/m this adds 1 N along −x.
   EXPECT_NEAR((held.wanted(at(milliseconds(1), Vec3(0.02, 0.5, 0))).force - Vec3(-2, 0, 0)).norm(), 0, 1e-12);
 }
 

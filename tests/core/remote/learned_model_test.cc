@@ -28,8 +28,8 @@ struct Link {
   int late = 30;   ///< ms of delay
 };
 
-/// Moves the hand along `motion` while the model extrapolates late answers. Calls `see` with time, prediction and
-/// position.
+/// Moves the hand along `motion` while the model extrapolates late answers. The function `see` is called with the time,
+/// the prediction and the position.
 void follow(LearnedModel& model, const Object& object, const std::function<Vec3(double)>& motion, const Link& link,
             int length_ms, const std::function<void(double, const Vec3&, const Vec3&)>& see) {
   for (int n = 0; n < length_ms; ++n) {
@@ -156,7 +156,7 @@ TEST(LearnedModel, AHandAtRestTeachesNothingHoweverNoisyTheAnswersAre) {
 }
 
 TEST(LearnedModel, DoesNotLeadAForceFarBeyondWhatFrictionLimitsItTo) {
-  // A bristle of 8000 N/m that slides at 1 N. It appears stiff between two answers but not over the delay.
+  // A bristle with 8000 N/m that slides at 1 N. It is stiff between two answers but not over the delay.
   const auto slides = [] {
     return [foot = 0.0](double, const Vec3& x) mutable {
       foot = std::clamp(foot, x.x() - 1.0 / 8000, x.x() + 1.0 / 8000);

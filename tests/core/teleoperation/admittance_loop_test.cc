@@ -46,7 +46,7 @@ struct Episode {
 struct World {
   AdmittanceLoop<3>::Config tool;
   bool limited = true;
-  double wall = 20e3;      // N/m, begins at 15 mm, acts on the tool
+  double wall = 20e3;      // N/m; the wall begins at 15 mm and acts on the tool
   double frequency = 0.5;  // Hz, motion of the hand
   Duration duration = 4s;
   Vec3 direction = Vec3::UnitX();
@@ -183,7 +183,7 @@ int steps_at_the_bound(double push, double then) {
 }
 
 TEST(AdmittanceLoop, TheForceLeavesItsBoundAsSoonAsTheErrorTurns) {
-  // The tool (1 kg, 200 N·s/m) needs 1.4 ms to change from 0.1 to −0.1 m/s under −40 N.
+  // The tool (1 kg, 200 N·s/m) needs 1.4 ms to change its velocity from 0.1 to −0.1 m/s with −40 N.
   EXPECT_LE(steps_at_the_bound(20, -40), 4);
 }
 
@@ -243,7 +243,7 @@ TEST(AdmittanceLoop, TheToolAnswersAStepOfForceAsItsEquationSays) {
   AdmittanceLoop<6> loop(config);
   Vec<6> push;
   push << 4, 0, 0, 0, 0, 1;
-  for (int i = 0; i <= 250; ++i) {  // one time constant of the first axis
+  for (int i = 0; i <= 250; ++i) {  // the time constant of the first axis
     if (i > 0) loop.observe({Vec<6>::Zero(), Vec<6>::Zero(), kPeriod});
     loop.command({push, Vec<6>::Zero(), Vec<6>::Zero()});
   }
@@ -309,9 +309,9 @@ TEST(AdmittanceLoop, SaysWhatIsWrongWithItsConfiguration) {
 
 // ---- why there is no credit for kinetic energy --------------------------------------------------------------------
 
-// The adversary moves the 2 kg handle with accelerations up to `a_max`: it accelerates, lets the motors push along at
-// constant speed, and stops. Returns the minimum of the hand's work, exact for this motion, with the bound f_c + 2 √(b
-// (E + credit) / T).
+// The adversary moves the 2 kg handle. The acceleration is at most `a_max`. It accelerates, lets the motors push in the
+// direction of motion at constant speed, and stops. Returns the minimum of the work of the hand. This is exact for the
+// motion. The bound is f_c + 2 √(b (E + credit) / T).
 double least_hand_work(bool credit, double a_max) {
   constexpr double kMass = 2;
   const OutputBound bound = OutputBound::of({.coulomb = kCoulomb, .viscous = kViscous}, kPeriod);

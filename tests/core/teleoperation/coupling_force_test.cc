@@ -59,7 +59,7 @@ class Steps {
 
 // --- drift ---
 
-/// Oscillates the leader for a minute. Returns the position difference of the two ends (m) and its bound.
+/// Moves the leader for a minute. Returns the difference of the two positions (m) and its bound.
 std::pair<double, double> drift_after(int clutches, double loss, std::uint64_t seed) {
   constexpr double kCount = 20e-6;
   const auto wave = [](double t) { return t < 60 ? 0.02 * std::sin(kTurn * 0.7 * t) : 0.0; };
@@ -129,7 +129,7 @@ TEST(CouplingForce, EngagingAndClutchingInTheOpenMovesNothing) {
   EXPECT_LT((ports.leader.x() - Vec3(0.05, 0, 0)).norm(), 2 * 20e-6);
 }
 
-/// The leader presses its follower against a wall with 3 N at both ends.
+/// The leader presses its follower against a wall. The force is 3 N at both ends.
 Ports pressing(int one_way, PortSetup follower = port_of(PortRole::kFollower)) {
   // The hand moves 20 mm in half a second, long after engagement.
   PortSetup leader = leader_of([](double t) { return 0.02 * std::clamp((t - 1) / 0.5, 0.0, 1.0); });

@@ -118,7 +118,7 @@ Outcome run(const HardCase& hard, CouplingMethod method, int one_way, bool limit
   Outcome outcome;
   Vec3 leader_was = ports.leader.x();
   Vec3 follower_was = ports.follower.x();
-  const int end = 3000 + 5 * kPressMs;  // during the third press, held for 3.5 s
+  const int end = 3000 + 5 * kPressMs;  // in the third press, which is held for 3.5 s
   ports.run(end - ports.now, [&](int now) {
     outcome.most = std::max(outcome.most, ports.leader.applied.norm());
     if (now > end - 1000) {
@@ -144,7 +144,7 @@ TEST(CouplingHardCases, NoPairGivesOutEnergyAndAllButTheHeavyFollowerRest) {
       EXPECT_LE(outcome.most, 8 * (1 + 1e-9)) << which;
       const bool felt_late = method == CouplingMethod::kPositionForce || method == CouplingMethod::kPassivity;
       const double bounces = felt_late ? hard.bounces : 0;
-      // In rate control the handle stays deflected, so a follower without a wall keeps moving.
+      // In rate control the handle is not released, so the follower continues to move if there is no wall.
       const double asked = method == CouplingMethod::kRate ? 0.06 : 0;
       EXPECT_LT(outcome.unrest, std::max({bounces, asked, 0.02})) << which;
     }
@@ -170,7 +170,7 @@ TEST(CouplingHardCases, AMotorThatCannotHoldTheForceOfWavesLosesNoPlace) {
     Ports ports(made.leader.setup, follower, bad_way(10, 5), bad_way(10, 6));
     ports.run(1200);
     ASSERT_TRUE(ports.engage());
-    ports.run(3000 + 2 * kPressMs - 200 - ports.now);  // the press is over, and the hand has returned
+    ports.run(3000 + 2 * kPressMs - 200 - ports.now);  // the hand has returned from the press
     EXPECT_GE(ports.least_sum, kRounding);
     const double apart = std::abs(ports.leader.x().x() - ports.follower.x().x());
     const double friction = 2 * 0.02 / ports.leader.coupling->stiffness();

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Couplings whose peer stops sending, returns, restarts, or is received late and twice: the decay stages, and no
-// engagement without a request.
+// Tests couplings with a peer that stops sending, returns, or restarts, and with messages that are late or repeated.
+// This includes the stages of the decay. There must be no engagement without a request.
 #include <gtest/gtest.h>
 
 #include <optional>
@@ -16,7 +16,7 @@ namespace {
 
 using std::chrono::milliseconds;
 
-/// The follower receives its last state at age 0 while the leader moves at 0.1 m/s. The test checks every later age.
+/// The follower receives its last state at age 0 while the leader moves at 0.1 m/s. Every later age is checked.
 struct Ladder {
   explicit Ladder(bool robot = false, int sent_every = 1) {
     PortSetup leader = port_of(PortRole::kLeader);

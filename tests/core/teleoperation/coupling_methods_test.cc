@@ -26,8 +26,8 @@ double median(std::vector<double> of) {
   return of[of.size() / 2];
 }
 
-/// Hands of 150 … 600 N/m, each with a different bad network. Returns their share of a rigid link's force in the second
-/// press.
+/// The hands have 150 … 600 N/m, and each of them has a different bad network. Returns the force in the second press
+/// relative to a rigid link.
 std::vector<double> shares(Pressing with, std::uint64_t first_seed, double& buzz) {
   std::vector<double> all;
   for (std::uint64_t seed = first_seed; seed < first_seed + 21; ++seed) {
@@ -46,7 +46,7 @@ TEST(CouplingMethods, WavesAreFeltAlikeAtBothEndsAndThePairIsPassive) {
     const Felt felt = feel({.one_way = one_way});
     print("waves, round trip " + std::to_string(2 * one_way) + " ms", felt);
     expect_passive(felt, std::to_string(one_way));
-    // With a delay of 600 ms or more, a press of 4 s ends before its force settles.
+    // If the delay is 600 ms or more, the force does not settle within a press of 4 s.
     if (one_way <= 100) {
       EXPECT_NEAR(felt.second, felt.wall, 0.04 + 0.02 * felt.wall) << one_way;
     }

@@ -182,7 +182,7 @@ class PlayedPassivity {
       peer.energy_in = energy_in;
       played.hear(peer);
       demand = played.port.command({Port::at(played.now++), Vec3::Zero(), Vec3::Zero()}, 0, true);
-      // The motor applies the wanted force, and the tool is blocked.
+      // The motor applies the demanded force. The tool does not move.
       played.port.conclude(demand.force, std::nullopt);
       played.told = played.port.message();
     }
@@ -375,7 +375,7 @@ TEST(CouplingRate, AContactIsFeltButNeverMovesTheFollower) {
   PortSetup leader = rate_port(PortRole::kLeader);
   PortSetup follower = rate_port(PortRole::kFollower);
   follower.measures_contact = true;
-  // The hand holds its handle 10 mm off center for 3 s against a wall, then releases it.
+  // The hand holds its handle 10 mm from the center for 3 s while the follower is at a wall. Then it is released.
   leader.around[0] = {
       .stiffness = 1000, .damping = 3, .reference = [](double t) { return t < 2 ? 0.0 : 0.01; }, .until = 5};
   follower.around[0] = {.stiffness = 500, .damping = 1, .reference = [](double) { return 0.005; }, .wall = true};

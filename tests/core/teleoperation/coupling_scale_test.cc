@@ -81,7 +81,8 @@ TEST(CouplingScale, ATenthBecomesTenBetweenClutchesAndNothingMoves) {
   EXPECT_GE(ports.least_account(), kRounding);
 }
 
-/// A robot that presses while its leader is clutched has a new spring afterwards. Its force must change without a jump.
+/// If a robot presses while its leader is clutched, it has a new spring afterwards. Its force must change without a
+/// jump.
 TEST(CouplingScale, UnderForceTheForceFadesToTheNewOne) {
   PortSetup leader = led([](double t) { return t < 0.5 ? 0 : 0.02; });
   PortSetup follower = port_of(PortRole::kFollower);
@@ -105,13 +106,13 @@ TEST(CouplingScale, UnderForceTheForceFadesToTheNewOne) {
   EXPECT_GE(ports.least_account(), kRounding);
 }
 
-/// A robot that holds its position while disengaged must change its force without a jump. No law settles it.
+/// A robot that holds its position while it is disengaged must also change its force without a jump.
 TEST(CouplingScale, ARobotThatHoldsItsPlaceIsNotJolted) {
   PortSetup follower = port_of(PortRole::kFollower);
   follower.coupling.holds_place = true;
   Ports ports(led([](double) { return 0.0; }), follower);
   ports.run(100);
-  ports.follower.setup.path = [](double) { return Vec3(2e-3, 0, 0); };  // an external object holds it off position
+  ports.follower.setup.path = [](double) { return Vec3(2e-3, 0, 0); };  // it is held at a different position
   ports.run(200);
   Vec3 force = ports.follower.demand.force;
   const double held = force.norm();
@@ -160,7 +161,7 @@ double least_sum(std::uint64_t seed, double& given) {
     led = ports.leader.truth.energy();
     followed = ports.follower.truth.energy();
     least = std::min(least, sum);
-    // Valid from the interval that begins now.
+    // This is valid for the interval that begins now.
     worth = ports.follower.coupling->force_scale() / ports.follower.coupling->position_scale();
     given += ports.leader.paid + ports.follower.paid;
   });

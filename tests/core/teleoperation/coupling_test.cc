@@ -164,7 +164,7 @@ TEST(Coupling, ALeaderWaitsForTheAnswerButNotForOneThatDeclines) {
   int waited = 0;
   for (; leader.port.phase() == PortPhase::kEngaged && waited < 100'000; ++waited) {
     PortState late = leader.state(PortPhase::kCoupled);
-    late.answers = 2;  // sent before it received the engagement
+    late.answers = 2;  // it was sent before the engagement was received
     leader.hear(late);
     leader.step();
   }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Several leaders of one follower: shares, one account, loss. Each device runs its complete haptic controller.
+// Tests a follower with several leaders: shares, a common account, and loss. Each device has a complete haptic
+// controller.
 #include "core/teleoperation/couplings.h"
 
 #include <gtest/gtest.h>
@@ -34,7 +35,7 @@ std::function<double(double)> to(double goal, double from = 0.5) {
   return [goal, from](double t) { return goal * std::clamp(t - from, 0.0, 1.0); };
 }
 
-/// Each direction takes 5 … 10 ms and loses 10 %.
+/// The delay is 5 … 10 ms in each direction, and 10 % of the messages are lost.
 void worsen(Star::Leader& leader, std::uint64_t seed) {
   leader.there = {.delay = 5, .jitter = 5, .loss = 0.1, .seed = 2 * seed};
   leader.back = {.delay = 5, .jitter = 5, .loss = 0.1, .seed = 2 * seed + 1};

@@ -22,7 +22,8 @@ Surroundings egg() {
   return {.stiffness = 2000, .damping = 1, .reference = [](double) { return -0.012; }, .wall = true};
 }
 
-/// Opening in m: closes to 6 mm within a second. Closing stores the energy that the follower's grip needs.
+/// The opening in m. It is reduced to 6 mm within a second. This stores the energy that is needed for the grip of the
+/// follower.
 double closing(double t) { return t < 1 ? 0.02 : std::max(0.02 - 0.014 * (t - 1), 0.006); }
 
 /// A hand of 300 N/m with a target of `opening` m.
@@ -223,7 +224,7 @@ TEST(GripCoupling, AStateThatTheGripsPurseRefusesChangesNothing) {
   ASSERT_TRUE(good.grip);
   PortState bad = good;
   bad.phase = PortPhase::kFault;
-  bad.grip->taken = 1e3;  // exceeds the total that we have given
+  bad.grip->taken = 1e3;  // this is more than we have given
   leader.receive(bad, WholePort::at(ports.now));
   EXPECT_EQ(leader.refused(), refused + 1);
   ports.leader.step(ports.now);

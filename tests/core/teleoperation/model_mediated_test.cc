@@ -220,8 +220,8 @@ TEST(ModelMediated, FindsItUnderFrictionAndNoiseFarFromTheOrigin) {
   }
 }
 
-// A press of 2 N is 1 mm deep, no more than the tilt of a slide due to friction. K may be wrong but the force must be
-// right.
+// A press of 2 N is only 1 mm deep. Friction tilts a slide by the same amount. The stiffness can be wrong, but the
+// force must be correct.
 TEST(ModelMediated, FeelsRightOnAWallTooHardToMeasure) {
   for (std::uint64_t seed = 1; seed <= 100; ++seed) ASSERT_LT(slide(seed, 2000, 0.3).worst_force, 0.15) << seed;
 }

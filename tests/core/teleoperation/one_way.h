@@ -18,7 +18,7 @@ struct Network {
   double loss = 0;  ///< probability
   std::uint64_t seed = 1;
   double repeated = 0;  ///< probability of a duplicate, up to 1000 periods later
-  /// From period `longer_from` on, the delay grows by `longer_by`.
+  /// The delay is increased by `longer_by` from period `longer_from` on.
   int longer_from = std::numeric_limits<int>::max();
   int longer_by = 0;
   /// Messages sent between `burst_from` and `burst_until` wait for the end of their burst of `burst` periods.
@@ -30,7 +30,7 @@ struct Network {
   int cut_until = 0;
 };
 
-/// One direction of a bad network between two synchronous loops. Virtual time is the number of the period.
+/// One direction of a bad network between two loops with the same period. Virtual time is the number of the period.
 template <class Message>
 class OneWay {
  public:

@@ -16,12 +16,12 @@
 
 namespace tendon {
 
-/// External force on a handle along x: a spring and damper, or a wall.
+/// The external force on a handle along x. This can be a spring with a damper, or a wall.
 struct Surroundings {
   double stiffness = 0;                       ///< N/m
   double damping = 0;                         ///< N·s/m
   std::function<double(double)> reference{};  ///< t, s → m: rest position of the spring; empty: 0
-  bool wall = false;                          ///< acts only while x is beyond `reference`
+  bool wall = false;                          ///< applies only if x is beyond `reference`
   /// s: the contact ends (hand released or wall removed).
   double until = std::numeric_limits<double>::infinity();
   std::function<double(double)> stiffer{};  ///< t, s → factor on `stiffness`; empty: 1
@@ -94,7 +94,8 @@ struct PairConfig {
   double max_power = 100;
 };
 
-/// Two devices in virtual time with springs, limiters and purses, over a bad network.
+/// Simulates two devices with springs, limiters and purses. They are connected by a bad network and run in virtual
+/// time.
 class Pair {
  public:
   struct End {
@@ -124,7 +125,7 @@ class Pair {
     EnergyLedger ledger;
     double wanted = 0;   ///< N
     double applied = 0;  ///< N
-    double speed = 0;    ///< m/s, mean over the last period
+    double speed = 0;    ///< m/s, the mean over the last period
     std::uint64_t periods = 0;
     std::uint64_t cut = 0;  ///< of these, limited periods
   };
@@ -238,7 +239,7 @@ inline void make_bad(PairConfig& config, int round_trip, std::uint64_t seed) {
   config.back.seed = seed + 1000;
 }
 
-/// High-pass rms of samples at 1 kHz: Butterworth, 2nd order.
+/// The high-pass rms of samples at 1 kHz. This is a Butterworth filter of second order.
 class HighPass {
  public:
   explicit HighPass(double hertz) {

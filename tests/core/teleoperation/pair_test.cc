@@ -145,7 +145,7 @@ std::pair<double, double> felt_after(Law law, double waves) {
 }
 
 TEST(Pair, AnEnergyCapCutsNothingOfAForceThatIsPaidFor) {
-  // The cap limits the energy stored in free motion but keeps enough for a held force.
+  // The cap limits the energy that is stored in free motion, but it must leave enough energy for a held force.
   const auto [felt, none] = felt_after(Law::kAol, 0);
   const auto [felt_capped, waved_capped] = felt_after(Law::kAolPlus, 20);
   const auto [felt_waved, waved] = felt_after(Law::kAol, 20);

@@ -31,7 +31,7 @@ struct PortSetup {
   double encoder_step = 0;               ///< m; 0: exact
   bool measures_contact = false;
   double motor = std::numeric_limits<double>::infinity();  ///< N, saturation
-  bool limited = true;                                     ///< false: applies the wanted force of the coupling
+  bool limited = true;  ///< if false, the demand of the coupling is applied without a limiter
 };
 
 inline Coupling::Config coupling_of(PortRole role) {
@@ -152,7 +152,7 @@ class Ports {
   Ports(const PortSetup& of_leader, const PortSetup& of_follower)
       : Ports(of_leader, of_follower, {.delay = 0, .seed = 1}, {.delay = 0, .seed = 2}) {}
 
-  /// Calls `look(now)` after every tick.
+  /// The function `look(now)` is called after every tick.
   template <class Look>
   void run(int ticks, Look look) {
     for (const int last = now + ticks; now < last; ++now) {

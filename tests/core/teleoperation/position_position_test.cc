@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// One end of a position–position coupling: its force, its round-trip estimate, and rejected input. pair_test.cc couples
-// two of them.
+// Tests one end of a position–position coupling: the force, the estimate of the round trip, and invalid input. Two of
+// them are coupled in pair_test.cc.
 #include "core/teleoperation/methods/position_position.h"
 
 #include <gtest/gtest.h>
@@ -152,7 +152,7 @@ TEST(PositionPosition, AnEndThatStartsAnewIsHeardAndItsFormerMessagesAreNot) {
   EXPECT_DOUBLE_EQ(end.command(Vec3::Zero(), Vec3::Zero()).force.x(), 4) << "the round trip begins anew, too";
   end.receive({.epoch = 1, .sequence = 5'000'000, .position = Vec3(0.05, 0, 0)});
   EXPECT_DOUBLE_EQ(end.command(Vec3::Zero(), Vec3::Zero()).force.x(), 4);
-  // Answers a different epoch of ours and gives no round-trip measurement.
+  // This answers a different epoch of ours, so it does not contain a measurement of the round trip.
   end.receive({.epoch = 2, .sequence = 2, .answers_epoch = 9, .answers = 1, .position = Vec3(0.02, 0, 0)});
   EXPECT_DOUBLE_EQ(end.command(Vec3::Zero(), Vec3::Zero()).force.x(), 8);
   EXPECT_EQ(end.round_trip(), Duration::zero());
@@ -175,7 +175,7 @@ TEST(PositionPosition, WhatIsWrongOrOldIsPassedOver) {
   EXPECT_EQ(end.refused(), 0U) << "late is not wrong";
   end.receive({.sequence = 3, .position = Vec3(kNan, 0, 0)});
   end.receive({.sequence = 3, .velocity = Vec3(0, kNan, 0)});
-  end.receive({.sequence = 3, .answers_epoch = 1, .answers = 1});  // we have not sent that many
+  end.receive({.sequence = 3, .answers_epoch = 1, .answers = 1});  // this number has not been sent yet
   end.receive({.sequence = 3, .round_trip = milliseconds(-1)});
   end.receive({.sequence = 3, .time = std::chrono::hours(1'000'000)});
   end.receive({.epoch = 0, .sequence = 3});

@@ -35,7 +35,7 @@ struct Pressing {
   bool adapts = true;
 };
 
-inline constexpr int kPressMs = 4000;  // ms in contact, and as long away
+inline constexpr int kPressMs = 4000;  // ms in contact, followed by the same time away from it
 
 inline Ports press(const Pressing& with) {
   PortSetup leader = port_of(PortRole::kLeader);
@@ -72,7 +72,7 @@ struct Felt {
   double second = 0;
   double wall = 0;    // N at the follower in the second press
   double ripple = 0;  // N rms above 50 Hz at the leader during the press
-  double buzz = 0;    // m/s rms above 20 Hz at the leader away from the wall
+  double buzz = 0;    // m/s rms above 20 Hz, at the leader when it is not at the wall
   double sum = 0;     // J
   double account = 0;
   double stiffness = 0;  // N/m, reported by the leader

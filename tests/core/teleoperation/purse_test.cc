@@ -52,7 +52,7 @@ TEST(Purse, CountsWhatIsUnderWay) {
   Purse purse({});
   purse.receive(0, from_peer(1, 0.01, 0.03));
   const auto first = purse.settle(period_of(0.05, 0.01));
-  purse.receive(0, from_peer(2, 0.01, 0.03));  // the gift has not arrived yet
+  purse.receive(0, from_peer(2, 0.01, 0.03));  // the gift has not been received yet
   EXPECT_NEAR(purse.settle(period_of(0.05 - first.withdraw, 0.01)).withdraw, 0, 1e-15);
   purse.receive(0, from_peer(3, 0.01, 0.03, 0, first.withdraw));  // the gift has arrived and was spent
   EXPECT_GT(purse.settle(period_of(0.05 - first.withdraw, 0.01)).withdraw, 1e-3);
@@ -94,7 +94,8 @@ TEST(Purse, WhenItHasTooLittleAllAreCutInProportion) {
 
 TEST(Purse, ThreePeersAndItselfEndAtOneRatio) {
   Purse purse({.peers = 3, .max_account = 1});
-  const std::array<double, 3> accounts = {0.01, 0.02, 0.5};  // the last has more than its share and receives nothing
+  const std::array<double, 3> accounts = {0.01, 0.02,
+                                          0.5};  // the last account is above its share, so it receives nothing
   const std::array<double, 3> needs = {0.05, 0.02, 0.1};
   for (std::size_t j = 0; j < 3; ++j) purse.receive(j, from_peer(1, accounts[j], needs[j]));
   const double left = 0.3 - purse.settle(period_of(0.3, 0.03 - 0.2e-3)).withdraw;
@@ -113,7 +114,7 @@ TEST(Purse, AJouleOfThePeerIsWorthWhatTheScalesSay) {
   EXPECT_EQ(leader.message(0).taken, 0.004) << "totals are told as they were heard";
 }
 
-/// Otherwise a joule would be given at one worth and credited at another.
+/// If this were not the case, a joule could be given at one worth and credited at another.
 TEST(Purse, AChangeOfWorthForgoesWhatIsUnderWay) {
   Purse purse({.max_power = 100, .max_account = 100});
   purse.receive(0, from_peer(1, 1, 1, 2));

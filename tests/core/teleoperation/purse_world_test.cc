@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Attacks on the energy-sharing theorem of purse.h: two to four ports, a network that delays, loses, repeats and
-// reorders, arbitrary forces, the worst motion, pauses and restarts. Every account and the sum of all ledgers must stay
-// above −1 nJ. The ledgers are recomputed independently. Each sabotage must be found within 100 worlds.
+// Tests the energy-sharing theorem of purse.h with two to four ports and a network that delays, loses, repeats and
+// reorders messages. The forces are arbitrary and include the worst motion, pauses and restarts. The accounts and the
+// sum of all ledgers must not fall below −1 nJ. The ledgers are computed independently. Each sabotage must be found
+// within 100 worlds.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -104,7 +105,7 @@ class World {
 
   std::size_t ports() const { return ports_.size(); }
 
-  /// The port disappears. Its device's watchdog removes the force, and messages under way still arrive.
+  /// The port disappears. The watchdog of its device removes the force. Messages that were sent before still arrive.
   void lose(std::size_t i) { stop(ports_[i], std::numeric_limits<int>::max()); }
 
  private:
@@ -116,7 +117,7 @@ class World {
     look(port);
   }
 
-  /// Port 0 is the leader of a scaled network: a joule of any other port is worth `scale_` there.
+  /// Port 0 is the leader of a scaled network. A joule of any other port is worth `scale_` at port 0.
   double worth(std::size_t here, std::size_t there) const {
     return (here == 0 ? 1 : 1 / scale_) * (there == 0 ? 1 : scale_);
   }

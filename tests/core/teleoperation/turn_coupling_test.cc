@@ -26,7 +26,7 @@ constexpr double kNanojoule = 1e-9;
 
 Quat minus(const Quat& q) { return {-q.w, -q.x, -q.y, -q.z}; }
 
-/// The law of a follower alone with full gain and a leader at `there`.
+/// The law of a follower with full gain. The leader is at `there`.
 class Spring {
  public:
   explicit Spring(double stiffness, const Quat& there = {})

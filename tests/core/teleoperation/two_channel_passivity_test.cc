@@ -22,7 +22,7 @@ constexpr double kT = 1e-3;
 
 struct Channel {
   double least = 0;  // J, energy absorbed by both ends
-  double drift = 0;  // m, tool position minus leader position, both at rest in free space
+  double drift = 0;  // m, difference between the positions of tool and leader when both are at rest in free space
 };
 
 // The leader follows a prescribed motion. The massless tool presses against a spring of 400 N/m.
@@ -49,14 +49,15 @@ Channel run(bool on, const Network& network, double drift_rate) {
       leader.receive(m);
       raw_force = m.force;
     });
-    const bool resting = i >= 20000;  // after 16 cycles: at the start position with the tool off the spring
+    const bool resting =
+        i >= 20000;  // after 16 cycles the tool is at its initial position and does not touch the spring
     const double v = resting ? 0.0 : 0.1 * std::sin(2 * std::numbers::pi * 0.8 * i * kT);
     const Vec<1> force = on ? leader.command(Vec<1>(v)).force : raw_force;
     energy -= force[0] * v * kT;
     there.send(i, leader.observe({force, Vec<1>(v * kT), kPeriod}));
     x_leader += v * kT;
 
-    const double tool_force = x > 0 ? 400 * x : 0.0;  // force that holds the tool there
+    const double tool_force = x > 0 ? 400 * x : 0.0;  // the force that is needed to hold the tool
     const auto step = follower.step(Vec<1>(tool_force));
     const double tool_velocity = on ? step.velocity[0] : raw_velocity[0];
     energy -= tool_force * tool_velocity * kT;
@@ -127,7 +128,8 @@ TEST(TwoChannelPassivity, IsPassiveForEveryMotionAndEveryForce) {
   }
 }
 
-// The tool is blocked, and the controller's spring of 1000 N/m acts on it. Returns the minimum energy of both ends, J.
+// The tool does not move, and the spring of the controller (1000 N/m) acts on it. Returns the minimum of the energy of
+// both ends, J.
 double least_with_a_spring(double booked_stiffness, double drift_rate) {
   constexpr double kStiffness = 1000;
   PassivityLeader<1> leader({.max_damping = 1e9, .period = kPeriod});

@@ -35,7 +35,7 @@ class WavePair {
         there_(config.there),
         back_(config.back) {}
 
-  /// Runs for `duration` s and calls `look(t)` after every period.
+  /// Runs for `duration` s. The function `look(t)` is called after every period.
   template <class Look>
   void run(double duration, Look look) {
     const int last = now_ + static_cast<int>(std::lround(duration * 1e3));
@@ -80,7 +80,7 @@ class WavePair {
     std::function<double(double)> path;
     double encoder_step;
     double force = 0;  ///< N, on the handle
-    double speed = 0;  ///< m/s, mean over the last period
+    double speed = 0;  ///< m/s, the mean over the last period
     double taken = 0;  ///< J, absorbed by the port
   };
 

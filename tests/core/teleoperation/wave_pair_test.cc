@@ -29,7 +29,7 @@ double one_way(int round_trip, double playout) { return round_trip * 0.5e-3 + pl
 
 double felt(double d, double impedance = 4) { return kDeep / (1 / kHand + d / impedance + 1 / kWall); }
 
-// Regression: without playout of the sums the force was 0.00 to 0.53 N, with 0.6 N of ripple at 3 ms.
+// This failed before the sums were played out: the force was between 0.00 and 0.53 N, and the ripple was 0.6 N at 3 ms.
 TEST(WavePair, HoldsTheForceThatItsStiffnessSays) {
   for (const int round_trip : {0, 1, 3, 10, 50, 200, 600}) {
     const Presses held = press(line(round_trip, 0, 0, 1), kHand, kWall, 9 + 0.1 * round_trip);
@@ -88,7 +88,7 @@ TEST(WavePair, BurstsSoftenItAsTheirDelaySaysAndLeaveNothingBehind) {
       pair.run(9.2, [&](double t) {
         if (t >= 3 && t < 4) before -= pair.leader.force / 1000;
         if (t >= 5 && t < 7) during -= pair.leader.force / 2000;
-        // Bursts above 60 ms take one second longer.
+        // The line needs one more second after bursts above 60 ms.
         if (std::abs(t - (burst > 60 ? 9 : 8)) < 0.1) after -= pair.leader.force / 200;
       });
       std::cout << burst << (both ? " ms both ways: " : " ms one way: ") << before << ", " << during << ", " << after
@@ -130,14 +130,14 @@ TEST(WavePair, DoesNotRingOnShortLinesWhateverItsImpedance) {
 TEST(WavePair, FeelsLikeTheInertiaOfItsLineAndTheOtherDevice) {
   for (const int round_trip : {0, 10, 50, 200}) {
     WavePair::Config config = line(round_trip, 0, 0, 1);
-    const double w = 2 * std::numbers::pi * 0.25;  // far below the frequency of one wavelength per line
+    const double w = 2 * std::numbers::pi * 0.25;  // the line is much shorter than the wavelength at this frequency
     config.path = [w](double t) { return 0.02 * (1 - std::cos(w * t)); };
     WavePair pair(config);
     double against = 0;
     double squares = 0;
     pair.run(24, [&](double t) {
       if (t < 12) return;
-      const double acceleration = 0.02 * w * w * std::cos(w * (t + 0.5e-3));  // at the middle of the hold
+      const double acceleration = 0.02 * w * w * std::cos(w * (t + 0.5e-3));  // in the middle of the hold
       against -= pair.leader.force * acceleration;
       squares += acceleration * acceleration;
     });

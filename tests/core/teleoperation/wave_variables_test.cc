@@ -25,7 +25,7 @@ struct Channel {
   double least_account = 0;  // J, either end
 };
 
-// Random motion at both ends. The applied force lies between zero and the wanted force.
+// The motion at both ends is random. The applied force is between zero and the demanded force.
 template <int N>
 Channel run(double impedance, const Network& network, Duration smoothing, bool clipped) {
   WavePort<N> leader({.impedance = impedance, .period = kPeriod, .smoothing = smoothing});

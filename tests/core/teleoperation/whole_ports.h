@@ -15,7 +15,7 @@
 
 namespace tendon {
 
-/// A handle with motors that translates along x, rotates about all axes, and grips.
+/// A handle with motors. It moves along x, rotates about all axes, and has a gripper.
 struct WholeSetup {
   Coupling::Config coupling{};
   Surroundings along_x{};
@@ -206,7 +206,7 @@ class WholePorts {
     run(ticks, [] {});
   }
 
-  /// Runs until a new engagement is live at both ends. Returns false after two seconds.
+  /// Runs until both ends are live with a new engagement. Returns false if this takes more than two seconds.
   bool engage() {
     for (int i = 0; i < 1000 && !leader.coupling().engage(); ++i) run(1);
     for (int i = 0; i < 2000 && !(leader.coupling().live() && follower.coupling().live()); ++i) run(1);

@@ -16,8 +16,8 @@
 
 namespace tendon {
 
-/// A Falcon at the end of its cable, as far as its protocol is known: FTDI chip, boot loader, firmware, encoders,
-/// motors. It shares no code with the driver.
+/// A model of a Falcon with its cable: FTDI chip, boot loader, firmware, encoders and motors. It implements what is
+/// known about the protocol. It does not share any code with the driver.
 class FakeFalcon final : public UsbModel {
  public:
   struct Options {
@@ -26,7 +26,8 @@ class FakeFalcon final : public UsbModel {
     std::size_t firmware_bytes = 8192;   ///< the image starts after this many bytes
     bool answers_greeting_late = false;  ///< with the leading 00 seen on some machines
     bool knows_flush_character = true;
-    /// The cable powers only the chip. With its own supply the device keeps firmware and home while unplugged.
+    /// The cable only powers the chip. If the device has its own supply, the firmware and the home position are kept
+    /// while it is unplugged.
     bool own_supply = false;
     Duration thinking = std::chrono::microseconds(50);
   };
@@ -36,9 +37,9 @@ class FakeFalcon final : public UsbModel {
     kSilent,         ///< executes commands but sends nothing
     kDropsSome,      ///< loses one reply in three
     kGarblesSome,    ///< corrupts a byte of one reply in three
-    kGarblesAll,     ///< puts an invalid nibble in every reply
-    kCutsAll,        ///< truncates every reply
-    kSplits,         ///< sends every reply in two IN packets
+    kGarblesAll,     ///< every reply has an invalid nibble
+    kCutsAll,        ///< every reply is truncated
+    kSplits,         ///< every reply is split into two IN packets
     kBabbles,        ///< adds unsolicited bytes between the replies
     kBabblesOnly,    ///< sends only unsolicited bytes
     kJumps,          ///< the encoders lose count
@@ -68,8 +69,8 @@ class FakeFalcon final : public UsbModel {
   void plug() override { plugged_ = true, ++times_plugged_; }
   void unplug() override;
   void move_to(const Vec3& position) { position_ = position; }  ///< m, device frame
-  /// Moves the grip all the way out and in, as a user homes the device. Has an effect only while the host requests
-  /// homing.
+  /// Moves the grip all the way out and in. This is how a user homes the device. It has no effect unless the host has
+  /// requested it.
   void pull_through();
   void press(std::uint8_t buttons) { buttons_ = buttons; }
   void set_fault(Fault fault);

@@ -323,7 +323,7 @@ TEST(FalconDevice, AMovedOriginIsNotBelievedUntilHomedAnew) {
       EXPECT_EQ(bench.device.state(), State::kFirmware) << "which sets it back";
     } else {
       bench.run(2s, kForce);
-      bench.falcon.unplug();  // its motor supply stays on and keeps the wrong origin
+      bench.falcon.unplug();  // the supply of the motors is still on, so the origin is still wrong
       bench.run(50ms, kForce);
       bench.falcon.plug();
       bench.run(2s, kForce);

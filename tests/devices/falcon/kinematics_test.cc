@@ -72,8 +72,8 @@ TEST(FalconKinematics, TheJacobianIsTheDerivativeOfTheAngles) {
   EXPECT_LE(worst, 1e-8);  // rad/m, of about 20
 }
 
-// The z column of the known public driver has sin² θ₂ instead of sin θ₂ sin θ₃. Within the ball of 50 mm it is 60 to 94
-// % of the true value, so a force along z has a lateral error of a third or more.
+// The z column of the public driver has sin² θ₂ instead of sin θ₂ sin θ₃. It is 60 to 94 % of the true value within the
+// ball of 50 mm. The lateral error of a force along z is one third or more.
 TEST(FalconKinematics, TheZColumnOfThePublicDriverIsTooSmallByUpTo40Percent) {
   Dice dice(5);
   double least = 1;
@@ -152,7 +152,7 @@ TEST(FalconKinematics, OneNewtonIs252CountsAlongZAnd606Across) {
   EXPECT_NEAR(largest(Vec3::UnitX()), 606, 6);
 }
 
-// Saturation must keep the direction of the force. The clamp of the public driver lets 16-bit values wrap instead.
+// If the force is saturated, its direction must not change. In the public driver the values wrap at 16 bits instead.
 TEST(FalconKinematics, ATooLargeForceKeepsItsDirectionAndNeverWraps) {
   Dice dice(7);
   for (int i = 0; i < 20'000; ++i) {

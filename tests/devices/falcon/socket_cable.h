@@ -54,7 +54,7 @@ class Plug {
  public:
   Plug(FakeFalcon& falcon, int end) : falcon_(falcon), end_(end) {}
 
-  /// Handles all received messages and answers. Returns false when the other end is closed.
+  /// Handles all messages that have been received. Returns false if the other end has been closed.
   bool turn(LocalTime now) {
     std::array<std::uint8_t, 128> message;
     for (;;) {
@@ -80,7 +80,7 @@ class Plug {
 
   /// Endpoint number and data of the last OUT transfer.
   const std::vector<std::uint8_t>& last() const { return last_; }
-  /// Bytes of all IN transfers so far.
+  /// The number of bytes in all IN transfers.
   std::uint64_t said() const { return said_; }
 
  private:

@@ -167,7 +167,7 @@ TEST(SafeDevice, EveryFaultInEveryStateEndsInZeroForce) {
       trouble.cause(rig);
       rig.steps(static_cast<int>(kRamp / 1ms), kPush);
       const SafeDevice::Status after = rig.safe.status();
-      for (int i = 0; i < 1200; ++i) {  // longer than an arm request is valid
+      for (int i = 0; i < 1200; ++i) {  // a request to arm expires before this
         ASSERT_EQ(rig.step(kPush), Vec3::Zero());
         ASSERT_EQ(rig.puppet.told, Vec3::Zero());
       }

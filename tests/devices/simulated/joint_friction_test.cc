@@ -115,7 +115,7 @@ TEST(JointFriction, TurnsRoundWithoutAPauseUnderAForceThatItCannotHold) {
         const double friction = torques[joint] / way.norm();
         config.start_velocity = v0 * way.normalized();
         Bench bench(config);
-        // Along the motion, unless the other joints rotate: their friction holds the rest.
+        // This is along the motion unless the other joints rotate. The friction of these joints holds the rest.
         bench.push(-5 * way.normalized(), 2ms);
         const double back = 2e-3 - config.mass * v0 / (5 + friction);
         EXPECT_NEAR(bench.truth().velocity.dot(way.normalized()), -(5 - friction) / config.mass * back,
@@ -143,8 +143,8 @@ TEST(JointFriction, ViscousInTheJointsLetsASpeedFallAsTheExponential) {
 }
 
 TEST(JointFriction, ItsLawHoldsExactlyWithTheMeanVelocityOfEachSubstep) {
-  // The momentum change equals the impulse of hand and motors minus friction, so τ = J⁻ᵀ (momentum − resistance v̄) /
-  // (h/2). It must have its maximum against q̇, or hold q̇ at zero.
+  // The change of momentum is equal to the impulse of the hand and the motors minus friction, so τ = J⁻ᵀ (momentum −
+  // resistance v̄) / (h/2). It must be at its maximum and opposite to q̇, or q̇ must be zero.
   for (const Mechanism::Kind& kind : all_kinds()) {
     Dice dice(5);
     int stood = 0;
@@ -220,7 +220,7 @@ TEST(JointFriction, TorquesForAHandlesFrictionMakeThatTheLeastAnywhere) {
     EXPECT_NEAR(friction.least().coulomb, 0.4, 1e-15);
     EXPECT_GE(friction.least().coulomb, 0.4) << "what a limiter counts on is there";
   }
-  // The levers of a Falcon are longest at the edge of its workspace; two levers of an arm are constant.
+  // The levers of a Falcon are longest at the edge of the workspace. Two levers of an arm are constant.
   EXPECT_GT(
       JointFriction({.mechanism = Mechanism::Falcon{}, .coulomb = JointFriction::torques(Mechanism::Falcon{}, 0.4)})
           .least_at(Vec3::Zero())

@@ -346,14 +346,14 @@ TEST(Amplifier, FollowsAStepAsAFirstOrderLag) {
   for (int i = 1; i <= 50; ++i) {
     bench.wait(100us);
     const double t = 1e-4 * i;
-    // The impulse is exact. The reported force is its mean over the last 50 µs.
+    // The impulse is exact. The force is the mean over the last 50 µs.
     ASSERT_NEAR(bench.truth().velocity.x(), 2 / m * (t - tau * (1 - std::exp(-t / tau))), 1e-13);
     ASSERT_NEAR(bench.truth().device_force.x(), 2 * (1 - std::exp(-(t - 25e-6) / tau)), 2e-3);
   }
 }
 
 TEST(Amplifier, HasFallenByThreeDecibelsAtItsBandwidth) {
-  // Commands follow a sine at 10 kHz. The steady-state velocity amplitude is F/(m ω) times the gain.
+  // The commands are a sine at 10 kHz. In the steady state the amplitude of the velocity is F/(m ω) times the gain.
   const double f = 50;
   auto config = bare(1);
   const auto swing = [&] {
@@ -378,7 +378,8 @@ TEST(Amplifier, HasFallenByThreeDecibelsAtItsBandwidth) {
 TEST(Watchdog, TakesTheForceAwayAfterExactlyItsTime) {
   auto config = bare(0.075);
   config.watchdog = 5ms;
-  // Read intervals that end at, before and long after the watchdog time. The impulse is force × 5 ms in each case.
+  // The read intervals end at the time of the watchdog, before it, or long after it. The impulse must be force × 5 ms
+  // in each case.
   for (const Duration interval : {Duration(5ms), Duration(1700us), Duration(333'333), Duration(1s)}) {
     Bench bench(config);
     bench.device().apply({0.3, -0.6, 0.6});

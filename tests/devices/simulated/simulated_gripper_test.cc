@@ -95,7 +95,8 @@ TEST(SimulatedGripper, AHandBringsItToItsOpeningOrPressesTheStop) {
 }
 
 TEST(SimulatedGripper, WorkOfTheHandIsNeverLessThanTheLedgerDemands) {
-  // 2000 random cases at the stops and between them. The balance is exact without friction and stops.
+  // 2000 random cases at the stops and between them. The balance is exact if there is no friction and no contact with a
+  // stop.
   double least = 1e300;
   int met = 0;
   for (std::uint64_t seed = 0; seed < 2000; ++seed) {

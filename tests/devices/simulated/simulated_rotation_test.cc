@@ -122,8 +122,8 @@ TEST(SimulatedRotation, AHandBringsItWhereItWantsFromAnySide) {
 }
 
 TEST(SimulatedRotation, AHandThatTurnsAboutChangingAxesIsFollowed) {
-  // The damper alone moves the handle at the script's angular velocity. Using the rotation-vector rate instead would
-  // cause drift.
+  // Only the damper moves the handle, with the angular velocity of the script. There would be a drift if the rate of
+  // the rotation vector were used.
   auto config = free_handle();
   config.inertia = 1e-7;
   const ScriptedMotion motion(

@@ -62,7 +62,7 @@ TEST(TransportDelay, UntilTheFirstForceHasArrivedThereIsNone) {
 }
 
 TEST(TransportDelay, ALoopFeelsOnlyTheSumOfBothDelays) {
-  // The same spring with the delay on the samples, on the forces, or on both.
+  // The same spring. The delay is in the samples, in the forces, or in both.
   const auto seen = [](Duration sample, Duration force) {
     auto config = free_mass(sample > 0ms ? std::optional(sample) : std::nullopt,
                             force > 0ms ? std::optional(force) : std::nullopt);
@@ -105,7 +105,7 @@ TEST(TransportDelay, WithoutAForceNothingIsDifferentToTheLastBitButTheStamps) {
 }
 
 TEST(TransportDelay, ShiftsASampledSpringsStabilityAsTheClosedForm) {
-  // Delays of whole periods of either kind: core/stability has the exact boundary for this number of samples.
+  // The delay is a number of whole periods. The exact boundary for this number of samples is in core/stability.
   for (const int late : {1, 2, 5}) {
     SampledSpring spring{.mass = 0.075, .viscous = 0.26, .period = 1ms, .delay_samples = late};
     const double boundary = largest_stable_stiffness(spring);
@@ -173,7 +173,8 @@ TEST(TransportDelay, TheWatchdogCountsTheForcesThatArrive) {
 }
 
 TEST(TransportDelay, HasRoomForAllForcesOfTheFastestLoop) {
-  // 10 kHz with the longest delays: a different force every 100 µs. The momentum is the sum of all forces that arrived.
+  // The period is 100 µs and the delays are the longest ones. Each force is different. The momentum must be the sum of
+  // all forces that have arrived.
   Bench bench(free_mass(100ms, 100ms));
   double sum = 0;
   for (int i = 0; i < 5000; ++i) {

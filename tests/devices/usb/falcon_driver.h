@@ -24,7 +24,7 @@ bool comes_true(const Holds& holds) {
   return holds();
 }
 
-/// A Falcon driver stepped at 1 kHz in real time, like the haptic thread.
+/// The driver of a Falcon. It is called at 1 kHz in real time, like the haptic thread does.
 struct FalconDriver {
   explicit FalconDriver(std::unique_ptr<usb::Pipe> pipe) : device({.firmware = fake_firmware(4096)}, std::move(pipe)) {}
 

@@ -248,8 +248,8 @@ double quantile(std::vector<double> values, double share) {
   return values[static_cast<std::size_t>(share * static_cast<double>(values.size() - 1))];
 }
 
-// At 1 kHz nearly every period has a sample. The limit is relative to the lateness of a sleeping thread in the same
-// run.
+// There must be a sample in nearly every period at 1 kHz. The limit depends on the lateness of a sleeping thread in the
+// same run.
 TEST(LibusbPipe, KeepsUpWithAKilohertz) {
   UsbfsShim shim(kReady);
   Loop loop(shim);

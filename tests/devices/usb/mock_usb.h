@@ -9,11 +9,12 @@
 
 namespace tendon {
 
-/// The USB of a machine simulated by umockdev: the real libusb finds devices in its sysfs, gets its udev events, and
-/// reaches nodes whose ioctls end in this process. umockdev-preload, which the program must be linked with, redirects
-/// the paths of this process and its children.
+/// The USB of a simulated machine. The real libusb finds the devices in the sysfs of umockdev and receives its udev
+/// events. The ioctls of the nodes end in this process. The paths of this process and of its children are redirected by
+/// umockdev-preload, which must be linked to the program.
 ///
-/// One per process, constructed before other threads. Not for timing: each ioctl sends messages through a socket.
+/// There can be only one per process. It must be constructed before any other thread. It cannot be used to measure
+/// times, because each ioctl sends messages through a socket.
 class MockUsb {
  public:
   MockUsb();
@@ -34,7 +35,7 @@ class MockUsb {
 /// One port of the machine and its device model, in real time. Thread-safe.
 class MockPort {
  public:
-  /// Port `number` of bus 1, 1 to 9, initially empty. `usb` and `model` must outlive it.
+  /// Port `number` of bus 1, 1 to 9. Nothing is plugged in. `usb` and `model` must outlive this object.
   MockPort(MockUsb& usb, int number, UsbModel& model);
   ~MockPort();
   MockPort(const MockPort&) = delete;

@@ -109,7 +109,7 @@ TEST_F(MockUsbTest, ThePipeSaysOnceWhyItOpensNothing) {
     const std::lock_guard lock(mutex);
     return !told.empty();
   }));
-  std::this_thread::sleep_for(500ms);  // it polls five times a second
+  std::this_thread::sleep_for(500ms);  // there are five polls per second
   const std::lock_guard lock(mutex);
   EXPECT_EQ(told, (std::vector<std::string>{port.node() +
                                             " cannot be opened: No such file or directory; see `tendond devices`"}));

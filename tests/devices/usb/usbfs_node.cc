@@ -34,7 +34,7 @@ int bulk_through(int file, const usbdevfs_bulktransfer& transfer) {
   tcflow(file, TCOON);  // NOLINT(concurrency-mt-unsafe): nobody else writes to it
   const ssize_t written = ::write(file, frame.data(), transfer.len + 2);
   if (written == static_cast<ssize_t>(transfer.len) + 2) return static_cast<int>(transfer.len);
-  return errno == EIO ? refuse(ENODEV) : -1;  // EIO: the master end is closed
+  return errno == EIO ? refuse(ENODEV) : -1;  // EIO: the master end has been closed
 }
 
 }  // namespace
@@ -64,7 +64,7 @@ void UsbfsNode::set_file(int slave) {
   gate(false);
 }
 
-// Not thread-safe for concurrent writes to the terminal. Nothing writes while this process has the node.
+// This is not thread-safe if several threads write to the terminal. Nothing is written while this process has the node.
 // NOLINTNEXTLINE(concurrency-mt-unsafe)
 void UsbfsNode::gate(bool open) const { tcflow(file_, open ? TCOON : TCOOFF); }
 

@@ -13,12 +13,13 @@
 
 namespace tendon {
 
-/// A usbfs node (/dev/bus/usb/…) for the real libusb that emulates the calls which libusb needs. A derived class
-/// implements the other end of the cable. usbfs_node.cc defines ioctl, read and lseek: calls for this node end there,
-/// and others go to the kernel.
+/// A usbfs node (/dev/bus/usb/…) for the real libusb. It implements the part of the kernel that is used by libusb. The
+/// other end of the cable is implemented by a derived class. The functions ioctl, read and lseek are defined in
+/// usbfs_node.cc. Calls for other files are passed to the kernel.
 ///
-/// The node is the slave end of a pseudo-terminal, because poll() must work on it. Like usbfs, its output stops while
-/// no transfer can be fetched (no POLLOUT), and the master end closes on unplug (POLLERR).
+/// The node is the slave end of a pseudo-terminal, because poll() must work. As in usbfs, there is no POLLOUT until a
+/// transfer can be fetched, and POLLERR is set when the device is unplugged. For this the output is stopped and the
+/// master end is closed.
 ///
 /// One per process. Thread-safe.
 class UsbfsNode {
@@ -49,14 +50,14 @@ class UsbfsNode {
  protected:
   enum class Taken : std::uint8_t { kYes, kRefused, kHangs };
 
-  // The cable. All are called with mutex_ held.
+  // The cable. These functions are called with mutex_ held.
   virtual bool gone() const = 0;
   virtual std::span<const std::uint8_t> descriptors() const = 0;
   virtual bool request(std::uint8_t request, std::uint16_t value) = 0;
   virtual Taken write(std::span<const std::uint8_t> bytes) = 0;
   /// An IN transfer was submitted.
   virtual void awaited() = 0;
-  /// libusb polls, and no transfer has ended.
+  /// libusb has called poll, but no transfer has ended.
   virtual void look() {}
 
   // For the derived class, with mutex_ held. Takes ownership of the slave end and closes the previous one.

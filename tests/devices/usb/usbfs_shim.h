@@ -10,7 +10,7 @@
 
 namespace tendon {
 
-/// A FakeFalcon behind a usbfs node of this process, in real time.
+/// A FakeFalcon with a usbfs node of this process. It runs in real time.
 ///
 /// Thread-safe.
 class UsbfsShim final : public UsbfsNode {
@@ -18,18 +18,18 @@ class UsbfsShim final : public UsbfsNode {
   explicit UsbfsShim(const FakeFalcon::Options& options);
   ~UsbfsShim() override;
 
-  /// Returns the open node, negative while nothing is plugged in.
+  /// Returns the open node. It is negative if nothing is plugged in.
   int node() const;
 
   void unplug();
   void plug();
 
-  /// Transfer errors below the device's own faults.
+  /// Errors of transfers. These are below the faults of the device.
   enum class Trouble {
     kNone,
     kOverflow,  ///< IN: more data than requested
     kStall,     ///< IN: the endpoint is halted
-    kMute,      ///< IN: no data and no chip status
+    kMute,      ///< IN: there is no data, not even the chip status
     kHang,      ///< OUT: never completes
   };
   void set_trouble(Trouble trouble);

@@ -23,7 +23,7 @@ namespace tendon {
 /// Thread-safe.
 class UsbIpCable {
  public:
-  /// Called after each accepted OUT transfer with its time and with exclusive access to the model.
+  /// This is called after each OUT transfer that was accepted. The argument is the time. The model is locked.
   using Watch = std::function<void(LocalTime)>;
 
   /// Plugs the device in. Throws std::runtime_error if the kernel rejects it.

@@ -81,7 +81,7 @@ TEST(WoodenHapticsDevice, TheCountersAreNotSetAgainUnlessItIsAskedForAgain) {
     }
     for (int i = 1; i < until_set; ++i) bench.step();
     ASSERT_EQ(bench.arm.calibrations(), 0) << "command 1 is on the bus";
-    bench.arm.set_fault(Fault::kSilent);  // the request is its last message
+    bench.arm.set_fault(Fault::kSilent);  // the request is the last message
     bench.run(90ms);
     EXPECT_EQ(bench.arm.calibrations(), 1);
   }

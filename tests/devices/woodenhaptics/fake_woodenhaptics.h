@@ -67,7 +67,7 @@ class FakeWoodenHaptics {
   std::vector<std::uint8_t> take_in(LocalTime now);
   /// The node is closed, which cancels waiting transfers.
   void cancel();
-  /// The host process died: nothing is sent or received any more.
+  /// The process of the host has died. Nothing is sent or received after this.
   void lose_host();
 
   void advance(LocalTime now);
@@ -122,7 +122,7 @@ class FakeWoodenHaptics {
   int most_waiting_ = 0;
 
   // Firmware
-  bool begun_ = false;           ///< has sent its first, unsolicited report
+  bool begun_ = false;           ///< the first report is sent without a request
   std::array<int, 3> origin_{};  ///< counter value at angle 0
   bool calibrate_ = false;       ///< set by the button
   bool calibrated_ = false;      ///< by command 1 since the last reset

@@ -11,7 +11,7 @@
 #include "tests/protocol/examples.h"
 #include "tests/support/property_cases.h"
 
-// Handshake in suite 1: who is admitted, who gets no answer, and what it costs.
+// Tests the handshake in suite 1: which clients are admitted, which of them do not get an answer, and what this costs.
 
 namespace tendon::sealed_handshake_test {
 namespace {

@@ -20,7 +20,7 @@ using CodecProof = testing::InstructionTest;
 
 struct Bound {
   std::string what;
-  double instructions;  ///< limit of our codec, a few percent above the measured value
+  double instructions;  ///< the limit for our codec; this is a few percent above the measured value
   double times;         ///< protobuf needs at least this factor, with existing objects
 };
 

@@ -153,7 +153,8 @@ TEST(Codec, AReportOutOfBoundsIsLeftOutAndCountedAndTheRestIsRead) {
     EXPECT_TRUE(std::holds_alternative<DeviceState>(content->frames[0])) << bad.what;
   }
   LinkReport wordy = examples::report();
-  wordy.words.assign(limits::kMaxDetail + 1, 'w');  // ours are truncated; those of other senders are refused
+  wordy.words.assign(limits::kMaxDetail + 1,
+                     'w');  // our texts are truncated, but the texts of other senders are rejected
   DataReader reader;
   EXPECT_EQ(read(reader, data(1, {}, wordy))->frames.size(), 1U);
   const RawProtobuf report = RawProtobuf().varint(1, 1).text(20, wordy.words);
@@ -218,7 +219,8 @@ TEST(Codec, AReportOnADeviceOutOfBoundsIsLeftOutAndCountedAndTheRestIsRead) {
     expect_left_out(report, bad.what);
   }
   const auto good = [] { return RawProtobuf().varint(1, 1).varint(10, 6); };
-  const std::string wordy(limits::kMaxDetail + 1, 'w');  // ours are truncated; those of other senders are refused
+  const std::string wordy(limits::kMaxDetail + 1,
+                          'w');  // our texts are truncated, but the texts of other senders are rejected
   EXPECT_EQ(there(DeviceReport{.number = 1, .fault = wordy, .degraded = wordy}).degraded.size(), limits::kMaxDetail);
   EXPECT_EQ(read_raw(7, good()), 1U);
   EXPECT_EQ(read_raw(7, good().text(11, wordy)), 0U);

@@ -13,7 +13,7 @@ namespace tendon::golden {
 /// and enumerators are those of tendon.proto.
 std::string block(std::span<const std::byte> datagram);
 
-/// Returns the blocks of a page that begin with "```golden NAME", by name.
+/// Returns the blocks of a page that start with "```golden NAME". The key is the name.
 std::map<std::string, std::string> blocks(std::string_view page);
 
 /// Returns `page` with its golden blocks generated from the examples of these names (examples.h). Throws

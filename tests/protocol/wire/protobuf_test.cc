@@ -46,7 +46,7 @@ Bytes bytes_of(const std::string& text) {
   return {begin, begin + text.size()};
 }
 
-/// Lets libprotobuf parse the body and serialize it again. Returns nothing if the body is malformed.
+/// Parses the body with libprotobuf and serializes it again. Returns nothing if the body is malformed.
 std::optional<Bytes> by_protobuf(const Bytes& body) {
 #if GOOGLE_PROTOBUF_VERSION < 4022000
   const google::protobuf::LogSilencer silence;  // protobuf logs every text that is not UTF-8
@@ -317,7 +317,7 @@ TEST(Protobuf, AStateWithAPartThatColumnsCannotSayStaysWhole) {
   }
 }
 
-/// An invalid state drops all states of its frame and nothing else.
+/// If a state is invalid, all states of its frame are dropped. Nothing else is dropped.
 TEST(Protobuf, AColumnOfAnotherLengthOrAValueOutOfBoundsDropsTheFrame) {
   const auto columns = [](const std::function<void(v1::DeviceStates&)>& change) {
     const Bytes datagram = examples::data_in_columns(1, examples::states_in_columns());

@@ -68,7 +68,7 @@ class Scrambled {
         return {};
     }
   }
-  /// Encodes one number or text, with or without its tag.
+  /// Encodes a single number or text. The tag is optional.
   std::string one(const google::protobuf::Message& message, const Field& field, int index, bool tag) {
     const auto alone = std::unique_ptr<google::protobuf::Message>(message.New());
     alone->CopyFrom(message);

@@ -107,11 +107,12 @@ TEST(Explain, SaysHowACouplingIsFeltByEachMethod) {
 }
 
 TEST(Explain, ACostIsTheDifferenceToTheSceneWithoutThePart) {
-  // The clock ticks once in each round of 200 steps, except in the first trial without a part. That is the trial
-  // without viscous friction, so this part appears to cost a whole step.
+  // The clock ticks once in each round of 200 steps. It does not tick in the first trial without a part. This is the
+  // trial without viscous friction, so the cost of this part is the cost of a whole step.
   const Scene scene = shipped("demo_parts.toml");
   std::size_t looks = 0;
-  const std::size_t trials = 3 + 11;  // two with the whole scene, one without its device, and 11 without a part
+  const std::size_t trials =
+      3 + 11;  // there are two with the whole scene, one without its device, and 11 without a part
   Duration now{};
   const auto time = [&] {
     const std::size_t trial = looks++ / 2 % trials;

@@ -134,7 +134,7 @@ TEST_F(SealedServer, TheSameKeyTakesItsPlaceAtOnceAndTheOneBeforeStaysAway) {
 TEST_F(SealedServer, AReplayedHelloTakesNothingFromAnybody) {
   Client a = controller(wall_, "192.0.2.1:4000");
   run(milliseconds(500), {&a});
-  // From its own address, for which its cookie is valid, after the server has dropped the Answer of this attempt.
+  // The address is the original one, so the cookie is valid. The server has already dropped the Answer of this attempt.
   Bytes hello;
   for (const Datagram& datagram : wire_) {
     if (datagram.to == server_.self && datagram.bytes.size() == kMaxDatagram) hello = datagram.bytes;
@@ -178,7 +178,7 @@ TEST_F(SealedServer, AReplayedPlainHelloTakesNothingFromWhoCameAfterIt) {
   EXPECT_EQ(b.client->stats().sessions, 1U);
   EXPECT_EQ(loop_->stats().welcomed, welcomed);
   EXPECT_GT(loop_->stats().forces, forces + 950);
-  // After b has left, the replay must not block the device.
+  // The device must not be blocked by the replay after b has left.
   b.client->stop(now_);
   run(milliseconds(10), {&b});
   deliver(a.end->self, hello);

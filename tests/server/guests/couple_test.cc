@@ -214,7 +214,7 @@ TEST_F(Coupled, BothEndsTakeNewScalesWhileTheClutchIsHeld) {
   leader_->mail().orders.try_push(order);
   run(milliseconds(50));
   EXPECT_EQ(follower_->newest().sent.position_scale, 0) << "it is engaged: nothing changes";
-  run(milliseconds(4200));  // the hand holds the clutch from 6 s on
+  run(milliseconds(4200));  // the clutch is held by the hand from 6 s on
   ASSERT_EQ(leader_->phase(), PortPhase::kClutched);
   leader_->mail().orders.try_push(order);
   run(milliseconds(10));
@@ -317,7 +317,7 @@ TEST_F(Coupled, APortWhoseHandleIsNotCoupledTellsNoTurnAndNoGrip) {
   EXPECT_FALSE(leader_->newest().sent.turn || leader_->newest().sent.grip);
 }
 
-/// The clock of its machine was set back, so its epoch is below the one that the leader knows.
+/// The clock of the machine was set back, so the epoch is smaller than the one that is known to the leader.
 TEST_F(Coupled, AServerThatComesBackWithALowerEpochIsHeard) {
   epoch_ = 10;
   place();

@@ -346,7 +346,7 @@ TEST_F(EngineWithWays, TheStepAndTheCountsOfTheServerSayTheWay) {
 TEST_F(EngineWithWays, TheNextEngineIsNotBlamedForTheDoubtsOfTheOneBefore) {
   Client a = engine({"tabulated", "near"});
   Client b = diagnosing(screen_, "192.0.2.2:4000");
-  run(milliseconds(1990), {&a, &b});  // a report is due at 2 s
+  run(milliseconds(1990), {&a, &b});  // there is a report at 2 s
   a.client->stop(now_);
   Client c = controller(other_, "192.0.2.3:4000");
   run(milliseconds(400), {&a, &b, &c});

@@ -55,7 +55,8 @@ TEST_F(SealedServer, TakesForcesThatAnswerAForetoldStepWhichItWasTooLateToSee) {
   const std::uint64_t unanswerable = loop_->stats().unanswerable;
   const std::uint64_t forces = loop_->stats().forces;
   steps_a_turn_ = 5;
-  std::deque<std::pair<LocalTime, Datagram>> to_server;  // delay of 10 ms: the step after the answered one is known
+  std::deque<std::pair<LocalTime, Datagram>>
+      to_server;  // the delay is 10 ms, so the step after the answered one is known
   std::uint64_t unseen = 0;
   for (int i = 0; i < 500; ++i) {
     run(milliseconds(1), {&a}, [&](const Datagram& datagram) {
@@ -74,7 +75,7 @@ TEST_F(SealedServer, TakesForcesThatAnswerAForetoldStepWhichItWasTooLateToSee) {
   }
   EXPECT_EQ(loop_->stats().unanswerable, unanswerable);
   EXPECT_GT(loop_->stats().forces - forces, 450U);
-  EXPECT_GT(unseen, 90U);  // of the newest states in their turns
+  EXPECT_GT(unseen, 90U);  // of the states that were the newest ones in their turn
 }
 
 }  // namespace

@@ -15,7 +15,7 @@ namespace {
 
 using std::chrono::milliseconds;
 
-/// A device with four buttons and axes, and an observer that sees one state in 20.
+/// A device with four buttons and axes. The observer receives one of 20 states.
 class Handle : public SealedServer {
  protected:
   Handle() {
@@ -211,7 +211,8 @@ TEST_F(Handle, ColumnsAreSentOnlyToThoseThatNamedTheFeature) {
   }
 }
 
-/// Clients with the feature `joints` receive joints and their names. For others the states keep their size.
+/// Clients with the feature `joints` receive the joints and their names. The size of the states does not change for
+/// other clients.
 TEST_F(Handle, JointsAreToldToThoseThatNamedTheFeature) {
   for (const bool asks : {false, true}) {
     NetworkLoop::Config config;

@@ -132,7 +132,7 @@ TEST(Lateness, AStandstillThatExplainsLittleOfTheDelayIsNotBlamed) {
   EXPECT_EQ(after_silence(milliseconds(150), 0).late_network, 1U);
 }
 
-/// Forces in time and a state each millisecond, then our process is stopped for `pause`.
+/// The forces are in time, and there is a state in each millisecond. Then our process is stopped for `pause`.
 Engine stopped(Duration pause, bool same_machine) {
   Engine engine(same_machine);
   for (int i = 0; i < 200; ++i) {

@@ -202,11 +202,12 @@ class SealedServer : public ::testing::Test {
   std::unique_ptr<NetworkLoop> loop_;
   std::uint64_t tick_ = 0;
   std::uint64_t tick_step_ = 1;
-  std::uint64_t steps_a_turn_ = 1;  ///< above 1: the network thread is late and sees only the newest
-  std::optional<Vec3> wanted_;      ///< set by the device's loop
-  std::uint32_t buttons_ = 0;       ///< set by the device's loop
-  DeviceState look_;                ///< set by the device's loop: the other fields
-  bool measured_ = false;           ///< the log thread reports health
+  std::uint64_t steps_a_turn_ =
+      1;  ///< if this is larger than 1, the network thread is late and only receives the newest step
+  std::optional<Vec3> wanted_;  ///< set by the device's loop
+  std::uint32_t buttons_ = 0;   ///< set by the device's loop
+  DeviceState look_;            ///< set by the loop of the device (other fields)
+  bool measured_ = false;       ///< the log thread reports health
   Health health_;
   std::uint64_t seed_ = 10;
   Hello foreign_{.role = Role::kController, .name = "foreign", .features = {}};  ///< of run_foreign()

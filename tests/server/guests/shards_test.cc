@@ -22,8 +22,9 @@ namespace {
 
 using std::chrono::milliseconds;
 
-/// A sealed server with two shards and 40 devices, "d-0" to "d-39": one bank in the first shard, two in the second. As
-/// in UdpLink::several, data goes to the shard that owns the connection, and other datagrams go to the first shard.
+/// A sealed server with two shards and 40 devices, "d-0" to "d-39". There is one bank in the first shard, and there are
+/// two in the second. As in UdpLink::several, data is delivered to the shard that owns the connection. All other
+/// datagrams are delivered to the first shard.
 class Shards : public ::testing::Test {
  protected:
   static constexpr std::uint32_t kDevices = 40;

@@ -17,7 +17,7 @@
 namespace tendon::mcap_reader_test {
 namespace {
 
-/// Two chunks of three messages: "0", "1" … "5", each at its number in ns.
+/// Two chunks with three messages each. The messages are "0", "1" … "5", and the time of each is its number in ns.
 std::string sample_file() {
   MemorySink sink;
   McapWriter writer("lib", sink);

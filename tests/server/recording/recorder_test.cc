@@ -150,7 +150,7 @@ TEST(Recorder, LeavesAReadableFileAndAnHonestCountOnADiskOfAnySize) {
     recorder.close();
   }
   ASSERT_GE(endless.borders.size(), 8U);
-  // Results change only at the end of a piece. Tests the capacities on both sides of each end.
+  // The result can only change at the end of a piece. The capacities on both sides of each end are tested.
   std::vector<std::size_t> capacities = {0};
   for (const std::size_t border : endless.borders) {
     capacities.push_back(border - 1);

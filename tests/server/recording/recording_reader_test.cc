@@ -305,7 +305,7 @@ struct Chunked {
     std::vector<std::uint64_t> ticks;
   };
   std::string bytes;
-  std::vector<Chunk> chunks;  ///< without the first one, which contains the scene
+  std::vector<Chunk> chunks;  ///< except the first one, which contains the scene
 };
 
 Chunked chunked() {
@@ -355,7 +355,7 @@ RC_GTEST_PROP(RecordingReader, DamageLosesOnlyTheStepsOfTheChunksThatItMeets, ()
     default:
       damaged.erase(from, to - from);
   }
-  // After a kill, the file ends before a chunk and has no summary.
+  // If the server was killed, the file ends before a chunk and does not have a summary.
   const auto& last = file.chunks.back();
   const bool killed = from >= file.chunks.front().from && to <= last.from && *rc::gen::arbitrary<bool>();
   if (killed) damaged.resize(last.from - (file.bytes.size() - damaged.size()));

@@ -14,7 +14,7 @@ namespace tendon {
 extern const std::string_view kMinimal;
 /// Four lines, so the rest begins at line 5.
 extern const std::string_view kWithoutProfile;
-/// Nine lines. The last one begins the motion of the hand.
+/// Nine lines. The motion of the hand begins in the last one.
 extern const std::string_view kHand;
 
 /// Reads `text` as the file s.toml.

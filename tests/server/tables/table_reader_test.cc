@@ -157,7 +157,7 @@ TEST(TableReader, AColumnThatIsMissingOrThereTwiceIsNamed) {
 struct Drawn {
   Rows rows;
   std::string plain;    ///< commas and decimal points
-  std::string dressed;  ///< the same numbers in another format
+  std::string dressed;  ///< the same numbers in a different format
 };
 
 Drawn drawn(std::mt19937_64& random) {
