@@ -77,7 +77,7 @@ class Walk : public ::testing::Test {
   static constexpr Duration kValid = milliseconds(60);
   static constexpr double kSlew = 200;  // N/s: 0.2 N in a step of 1 ms
   static constexpr double kStiffness = 1000;
-  static constexpr int kSilent = 1000;  // ms; the last force is sent one period before this
+  static constexpr int kSilent = 1000;  // ms; the last force is sent in the period before this
   static constexpr int kBack = 2000;
 
   Walk() {
@@ -120,7 +120,7 @@ TEST_F(Walk, EachRungIsEnteredAtItsTime) {
     for (const char* name : {"hold", "decay", "safe stop"}) {
       const Rung& next = rung(rungs_, name);
       ASSERT_TRUE(next.after_validity) << name;
-      // A stage begins after its time. Only the safe stop begins exactly at its time.
+      // The safe stop begins at its time, and the other stages after it.
       const Duration from = kValid + next.entered;
       const bool there = next.mode == Mode::kSafeStop ? step.force_age >= from : step.force_age > from;
       if (there) expected = next.mode;
@@ -149,7 +149,7 @@ TEST_F(Walk, NoStepOfTheForceExceedsTheSlewBound) {
 TEST_F(Walk, TheForceFollowsItsModelUntilItFadesAndComesBackOnARamp) {
   const auto at = [&](int ms) -> const Step& { return steps_[static_cast<std::size_t>(ms - 1)]; };
   const auto wall = [](int ms) { return kStiffness * depth(ms); };
-  // Fresh and held forces use the current position of the hand, not that at 990 ms.
+  // The current position of the hand is used for fresh and held forces, and not the position at 990 ms.
   EXPECT_NEAR(-at(1040).wanted.x(), wall(1040), 1e-9);
   EXPECT_NEAR(-at(1065).wanted.x(), wall(1065), 1e-9);
   // Decay starts v + 20 ms = 80 ms after 990 ms.

@@ -26,7 +26,7 @@ namespace {
 
 struct Outcome {
   double least_energy = 0;
-  double worst_shortfall = 0;  // J, the largest amount by which the account was below the minimum for its hold
+  double worst_shortfall = 0;  // J, how much the account was below the minimum for its hold
   double worst_excess = 0;     // N above the bound
   bool all_finite = true;
 };
@@ -158,7 +158,7 @@ struct Gene {
   double follow = 0;           // factor on the worst motion of eq. (7)
   Vec3 move = Vec3::Zero();    // m, added motion
   Vec3 wanted = Vec3::Zero();  // N
-  double late = 1;             // ratio of the preceding hold to the configured hold
+  double late = 1;             // the preceding hold relative to the configured hold
 };
 
 class Search {

@@ -16,7 +16,7 @@ namespace {
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 const double kNan = std::numeric_limits<double>::quiet_NaN();
 
-/// Tolerance of about 1.5 units in the last place.
+/// The tolerance is about 1.5 units in the last place.
 double ulps(double right) { return std::max(3e-16 * std::abs(right), 1.2e-16); }
 
 TEST(PortableMath, RoundsEvenWhereAddingAHalfWouldNot) {

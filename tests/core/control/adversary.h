@@ -123,8 +123,8 @@ World<N> hostile_world(Dice& dice) {
   };
 }
 
-/// An operator who knows the law and the force and tries to extract energy. This uses random motion of all sizes, the
-/// worst motion of eq. (7), and a slow entry that is followed by a fast exit.
+/// This is an operator who knows the law and the force and who tries to extract energy. The motion is random and of all
+/// sizes, or the worst motion of eq. (7), or a slow entry that is followed by a fast exit.
 struct Adversary {
   Friction friction;  ///< true friction of the device
   Duration longest_hold = std::chrono::milliseconds(1);

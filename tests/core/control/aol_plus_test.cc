@@ -39,7 +39,7 @@ struct Case {
   double force_scale = 1;      // sabotage: applied force / permitted force
 };
 
-/// Returns a law with random friction and with the parts that are named in `listed`.
+/// Returns a law with random friction and the parts that are given by `listed`.
 template <int Blocks, int Size>
 Case<Blocks, Size> random_case(Dice& dice, const std::string& listed) {
   using Law = AolPlus<Blocks, Size>;
@@ -178,8 +178,8 @@ Outcome run(Dice& dice, const Case<Blocks, Size>& c, int steps) {
   return outcome;
 }
 
-/// Runs a law with a list of parts for all seeds. Adaptive friction (`f`) is tested without other parts, because the
-/// interval in which the friction falls is booked with the previous bound.
+/// Runs a law with a list of parts for all seeds. Adaptive friction (`f`) must not be combined with other parts, because
+/// the interval in which the friction falls is booked with the previous bound.
 template <int Blocks, int Size>
 void expect_passive(const std::string& listed, int seeds = 150) {
   SCOPED_TRACE(std::to_string(Blocks) + " blocks of " + std::to_string(Size));
@@ -282,7 +282,7 @@ TEST(AolPlus, AfterAnIntervalThatIsNoNumberThePlainBoundHolds) {
   EXPECT_EQ(law.limit(push).permitted, plain.limit(push).permitted);
 }
 
-/// Simulates motion in free space at 4 Hz with an amplitude of 30 mm for 30 s.
+/// Moves the handle in free space for 30 s, at 4 Hz and with an amplitude of 30 mm.
 template <class Law>
 void wave(Law& law) {
   double x = 0;
@@ -341,7 +341,7 @@ TEST(AolPlus, AContactThatSoftensKeepsNoMoreThanItsForceCanGiveBack) {
   config.parts.energy_cap.emplace();
   AolPlus<1> law(config);
   double applied = 0;
-  for (int n = 0; n < 1000; ++n) {  // the contact begins in the first step
+  for (int n = 0; n < 1000; ++n) {  // this is where the contact begins
     law.observe({.applied = Vec<1>(applied), .dx = Vec<1>(1e-5), .held = kPeriod});
     law.limit({.force = Vec<1>(-5)});
     applied = -5;

@@ -40,7 +40,7 @@ TEST(Shaping, ShowsNoObjectStifferWhateverThePeriodIs) {
     config.parts.bounded_acceleration = {{.most = {100}}};
     config.parts.shaping = {{.stiffness = {900}}};
     EXPECT_LE(displayed(config, 20000), 900 * 1.06) << "friction earns, too; " << us << " us";
-    if (us > 1000) continue;  // a motion of 4 mm in a hold costs more energy than is stored in the spring
+    if (us > 1000) continue;  // this would cost more energy than is stored in the spring
     EXPECT_GE(displayed(config, 20000), 900 * 0.9) << us << " us";
   }
 }

@@ -86,7 +86,7 @@ TEST(VelocityEstimator, SaysZeroForAHandleThatFlickersBetweenTwoCounts) {
     const double v = estimator.observe(LocalTime(milliseconds(i)), Vec3(i % 2 == 0 ? 0 : 30e-6, 0, 0)).x();
     if (i > 50) worst = std::max(worst, std::abs(v));
   }
-  EXPECT_LE(worst, 30e-6 / 15e-3 + 1e-12);  // one count over the window; a finite difference has an error of 30 mm/s
+  EXPECT_LE(worst, 30e-6 / 15e-3 + 1e-12);  // one count over the window; the error of a finite difference is 30 mm/s
 }
 
 TEST(VelocityEstimator, IgnoresWhatIsNotANumberAndWhatIsNotNewer) {

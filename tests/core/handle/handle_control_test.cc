@@ -30,7 +30,7 @@ HapticController::Config config_of_a_stylus() {
   return config;
 }
 
-/// A stylus whose hand only rotates and squeezes.
+/// A stylus that is only rotated and squeezed.
 class Stylus {
  public:
   explicit Stylus(const HapticController::Config& config = config_of_a_stylus()) : controller(config) {}
@@ -181,7 +181,7 @@ TEST(HandleControl, TorqueAndGripAreRampedInFadeAndStopWithTheForce) {
   const Step whole = wanted_after(15);
   EXPECT_EQ(whole.turn()->wanted.z(), 0.05);
   EXPECT_EQ(whole.grip()->wanted, 2);
-  const Step fading = wanted_after(40);  // 20 ms of the hold, followed by 20 ms of the ramp
+  const Step fading = wanted_after(40);  // 20 ms of hold, then 20 ms of decay with a time constant of 50 ms
   EXPECT_EQ(fading.mode, Mode::kDecaying);
   EXPECT_NEAR(fading.turn()->wanted.z(), 0.05 * std::exp(-0.4), 1e-12);
   EXPECT_NEAR(fading.grip()->wanted, 2 * std::exp(-0.4), 1e-12);

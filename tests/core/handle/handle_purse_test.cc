@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Tests the energy-sharing theorem of purse.h for handles. Two ports that rotate or grip pay each other over a network
-// that delays, loses, repeats and reorders messages. The accounts and the sum of both ledgers must not fall below −1
-// nJ. This includes closed loops in SO(3). The ledgers are computed independently from the true motion.
+// Tests the energy-sharing theorem of purse.h for handles. There are two ports that rotate or grip. They pay each other
+// over a network that delays, loses, repeats and reorders messages. The accounts and the sum of both ledgers must not
+// fall below −1 nJ, even if the motion is a closed loop in SO(3). The ledgers are computed independently from the true
+// motion.
 #include <gtest/gtest.h>
 
 #include <algorithm>

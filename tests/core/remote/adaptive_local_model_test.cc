@@ -72,7 +72,7 @@ TEST(AdaptiveLocalModel, NothingJumpsWhenAnAnswerArrivesEvenInABlend) {
     const Vec3 before = model.predict(now)->force;
     if (dice.chance(0.05)) model.observe(without_model(k, k, 5 * dice.direction()));
     EXPECT_LT((model.predict(now)->force - before).norm(), 1e-12);
-    EXPECT_LE(before.norm(), 5 + 1e-9);  // a blend is not larger than its parts
+    EXPECT_LE(before.norm(), 5 + 1e-9);
   }
 }
 

@@ -31,7 +31,7 @@ ForceTable table(double first, double step, std::initializer_list<double> force)
   return made;
 }
 
-/// Hardening table from 1 mm above the surface to 7 mm below it, in steps of 1 mm.
+/// The table is for depths from 1 mm above the surface to 7 mm below it, in steps of 1 mm.
 RemoteForce with_table() {
   RemoteForce answer = pressed();
   answer.model->contact = Contact{
@@ -118,7 +118,7 @@ TEST(Answer, ATableReplacesStiffnessAlongTheNormalWithinItsEnds) {
   EXPECT_EQ(along(0.1).stiffness(2, 2), 0);
   EXPECT_EQ(along(-0.1).force.z(), 0);
   EXPECT_EQ(along(1e12).force.z(), 8);
-  // In the lateral direction, the stiffness is used up to its radius. The radius does not limit the table.
+  // The stiffness is used in the lateral direction. Its radius does not limit the table.
   RemoteForce narrow = answer;
   narrow.model->valid_radius = 1e-6;
   EXPECT_NEAR(reconstruct(narrow, deeper_by(0.001)).force.z(), 3.5, 1e-12);

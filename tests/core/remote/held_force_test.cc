@@ -63,7 +63,7 @@ TEST(HeldForce, SafeStopIsLeftOnlyByAFreshForceAndThatIsRampedIn) {
   HeldForce held({});
   held.observe(force_at(Duration::zero(), Vec3(2, 0, 0)));
   EXPECT_EQ(held.wanted(at(milliseconds(600))).mode, Mode::kSafeStop);
-  EXPECT_EQ(held.wanted(at(milliseconds(5))).mode, Mode::kSafeStop);  // the clock may also step back
+  EXPECT_EQ(held.wanted(at(milliseconds(5))).mode, Mode::kSafeStop);  // even if the clock steps back
   held.observe(force_at(milliseconds(1000), Vec3(2, 0, 0), milliseconds(400)));
   const auto half = held.wanted(at(milliseconds(1050)));
   EXPECT_EQ(half.mode, Mode::kActive);

@@ -240,7 +240,7 @@ TEST(OutputEstimator, CooldownEndsConstantResettingWhenTheModelCannotFit) {
 }
 
 TEST(OutputEstimator, AnOutputRecursiveModelRunsAwayOnlyWithAFreePole) {
-  // This is the same least-squares estimator with a free pole. It runs at 1 kHz between answers at 25 Hz.
+  // This is the same least-squares estimator with a free pole, which is run at 1 kHz between answers at 25 Hz.
   UdLeastSquares<2> raw({.forgetting = 0.95, .prior_variance = 1e8});
   std::vector<double> output(kSteps, 0.0);
   double largest_raw = 0;

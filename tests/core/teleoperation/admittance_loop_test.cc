@@ -309,9 +309,9 @@ TEST(AdmittanceLoop, SaysWhatIsWrongWithItsConfiguration) {
 
 // ---- why there is no credit for kinetic energy --------------------------------------------------------------------
 
-// The adversary moves the 2 kg handle. The acceleration is at most `a_max`. It accelerates, lets the motors push in the
-// direction of motion at constant speed, and stops. Returns the minimum of the work of the hand. This is exact for the
-// motion. The bound is f_c + 2 √(b (E + credit) / T).
+// The adversary moves the 2 kg handle with an acceleration of at most `a_max`. It speeds up, is pushed by the motors at
+// constant speed, and stops. Returns the minimum of the work of the hand. This is exact for the motion. The bound is
+// f_c + 2 √(b (E + credit) / T).
 double least_hand_work(bool credit, double a_max) {
   constexpr double kMass = 2;
   const OutputBound bound = OutputBound::of({.coulomb = kCoulomb, .viscous = kViscous}, kPeriod);

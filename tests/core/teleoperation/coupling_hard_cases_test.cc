@@ -118,7 +118,7 @@ Outcome run(const HardCase& hard, CouplingMethod method, int one_way, bool limit
   Outcome outcome;
   Vec3 leader_was = ports.leader.x();
   Vec3 follower_was = ports.follower.x();
-  const int end = 3000 + 5 * kPressMs;  // in the third press, which is held for 3.5 s
+  const int end = 3000 + 5 * kPressMs;  // this is in the third press
   ports.run(end - ports.now, [&](int now) {
     outcome.most = std::max(outcome.most, ports.leader.applied.norm());
     if (now > end - 1000) {

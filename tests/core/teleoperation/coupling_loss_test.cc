@@ -16,7 +16,7 @@ namespace {
 
 using std::chrono::milliseconds;
 
-/// The follower receives its last state at age 0 while the leader moves at 0.1 m/s. Every later age is checked.
+/// The leader moves at 0.1 m/s when the follower receives its last state, at age 0. Every later age is checked.
 struct Ladder {
   explicit Ladder(bool robot = false, int sent_every = 1) {
     PortSetup leader = port_of(PortRole::kLeader);

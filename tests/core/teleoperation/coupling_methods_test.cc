@@ -26,7 +26,7 @@ double median(std::vector<double> of) {
   return of[of.size() / 2];
 }
 
-/// The hands have 150 … 600 N/m, and each of them has a different bad network. Returns the force in the second press
+/// The hands have between 150 and 600 N/m, and each has a different bad network. Returns the force in the second press
 /// relative to a rigid link.
 std::vector<double> shares(Pressing with, std::uint64_t first_seed, double& buzz) {
   std::vector<double> all;

@@ -46,7 +46,8 @@ TEST(CouplingScale, IsSetByALeaderThatIsNotEngagedAndByNobodyElse) {
   EXPECT_FALSE(Coupling(waves.coupling).set_scale(2, 1)) << "sums of waves have one scale";
 }
 
-/// Scale 0.1 → 10 while clutched in free space: no motion, then tenfold motion of the follower.
+/// The scale changes from 0.1 to 10 while the clutch is held in free space. This must not cause any motion. After that
+/// the follower moves ten times as far.
 TEST(CouplingScale, ATenthBecomesTenBetweenClutchesAndNothingMoves) {
   PortSetup leader = led([](double t) { return t < 2 ? 5e-3 * t : 0.01 + 1e-3 * std::min(t - 2, 2.0); });
   PortSetup follower = port_of(PortRole::kFollower);
@@ -161,7 +162,7 @@ double least_sum(std::uint64_t seed, double& given) {
     led = ports.leader.truth.energy();
     followed = ports.follower.truth.energy();
     least = std::min(least, sum);
-    // This is valid for the interval that begins now.
+    // This is used for the interval that begins now.
     worth = ports.follower.coupling->force_scale() / ports.follower.coupling->position_scale();
     given += ports.leader.paid + ports.follower.paid;
   });

@@ -99,7 +99,8 @@ TEST(Coupling, AFaultOfEitherDisengagesBothAndItsEndEngagesNobody) {
   }
 }
 
-/// The new leader has a lower epoch than the previous one, whose force fades and whose engagement has ended.
+/// The new leader has a smaller epoch than the previous one. The force of the previous leader fades, and its engagement
+/// has ended.
 TEST(Coupling, AnotherLeaderIsHeardAfterARenewalAndEngagesByItsOwnAct) {
   Ports ports = far_apart(5);
   ports.leader.begin(9);

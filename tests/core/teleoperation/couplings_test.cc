@@ -210,8 +210,9 @@ TEST(Couplings, AHandOverUnderStretchMakesNoStepAndTakesNoEnergy) {
   }
 }
 
-/// Leader 0 oscillates about a stiffly held follower while leader 1 rests. The share of leader 0 is large while its
-/// spring relaxes and near zero while it is stretched, so the spring generates energy in every cycle.
+/// Leader 0 oscillates about a follower that is held stiffly, and leader 1 does not move. The share of leader 0 is
+/// large while its spring relaxes, and it is nearly zero while the spring is stretched. The spring therefore generates
+/// energy in each cycle.
 Star pumped(bool limited) {
   constexpr double kPeriod = 4;  // s
   const auto swing = [](double t) { return t < 1 ? 0.0 : 0.02 * std::sin(2 * std::numbers::pi * (t - 1) / kPeriod); };

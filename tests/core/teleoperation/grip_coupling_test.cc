@@ -114,7 +114,7 @@ struct EggForce {
 EggForce hold_an_egg(bool holds_place, int one_way) {
   WholeSetup leader = whole_of(PortRole::kLeader);
   WholeSetup follower = whole_of(PortRole::kFollower);
-  // Prescribed finger motion. A hand would close further without a reflected force.
+  // The fingers follow a path. A hand would close them further if there were no reflected force.
   leader.opened = [](double t) { return t < 12 ? closing(t) : 0.004; };
   follower.closing = egg();
   follower.coupling.holds_place = holds_place;

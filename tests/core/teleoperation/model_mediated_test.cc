@@ -29,10 +29,10 @@ SurfaceModel<3> surface(std::uint64_t sequence, double offset, double stiffness,
 
 // ---- the gate --------------------------------------------------------------------------------------------------
 
-// The hand moves near surfaces that change continuously. ½ K depth² is convex with a slope change of at most K, so a
-// held force returns at most the surface's energy loss plus ½ K ‖Δx‖². The friction of the device pays for the latter
-// if K ≤ 2b/T. Without this sampling leak, the energy that the model returned and stores must not exceed the input of
-// hand and budget.
+// The hand moves near surfaces that change all the time. The function ½ K depth² is convex and its slope changes by at
+// most K. A held force can therefore only return the energy that is lost by the surface plus ½ K ‖Δx‖². If K ≤ 2b/T,
+// the latter is covered by the friction of the device. Without this leak of sampling, the energy that was returned or
+// is stored must not be larger than the input of the hand and the budget.
 TEST(ModelMediated, NoUpdateOfTheModelPutsEnergyIn) {
   for (std::uint64_t seed = 1; seed <= 100; ++seed) {
     Dice dice(seed);

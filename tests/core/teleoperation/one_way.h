@@ -30,7 +30,7 @@ struct Network {
   int cut_until = 0;
 };
 
-/// One direction of a bad network between two loops with the same period. Virtual time is the number of the period.
+/// One direction of a bad network. The time is the number of the period, which is the same at both ends.
 template <class Message>
 class OneWay {
  public:

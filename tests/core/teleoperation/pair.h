@@ -27,8 +27,8 @@ struct Surroundings {
   std::function<double(double)> stiffer{};  ///< t, s → factor on `stiffness`; empty: 1
 };
 
-/// Device with one degree of freedom: m dv/dt = F + F_surroundings − b v − f_c sgn(v), integrated by the implicit
-/// midpoint rule with set-valued friction in substeps of 50 µs. The integrator neither generates nor loses energy.
+/// A device with one degree of freedom: m dv/dt = F + F_surroundings − b v − f_c sgn(v). The integrator is the implicit
+/// midpoint rule with set-valued friction in substeps of 50 µs. It does not generate or lose any energy.
 class Body {
  public:
   Body(double mass, const Friction& friction, Surroundings around)
@@ -137,7 +137,7 @@ class Pair {
         there_(config.there),
         back_(config.back) {}
 
-  /// Runs for `duration` s and calls `look(t)` every millisecond.
+  /// Runs for `duration` s. The function `look(t)` is called every millisecond.
   template <class Look>
   void run(double duration, Look look) {
     const int last = now_ + static_cast<int>(std::lround(duration * 1e4));
@@ -239,7 +239,7 @@ inline void make_bad(PairConfig& config, int round_trip, std::uint64_t seed) {
   config.back.seed = seed + 1000;
 }
 
-/// The high-pass rms of samples at 1 kHz. This is a Butterworth filter of second order.
+/// Computes the rms above a frequency of samples at 1 kHz, with a Butterworth filter of second order.
 class HighPass {
  public:
   explicit HighPass(double hertz) {

@@ -26,7 +26,7 @@ double ramp(double t, double far) {
   return t >= 0.5 ? far : far * (1 - std::cos(2 * kPi * t)) / 2;
 }
 
-/// A hand with a target of 30 mm presses against the follower's wall at 10 mm.
+/// The target of the hand is 30 mm. The wall of the follower is at 10 mm.
 PairConfig pressing(double wall, double hand = 400, double depth = 0.03) {
   PairConfig config;
   config.leader.around = {.stiffness = hand, .damping = 2, .reference = [depth](double t) { return ramp(t, depth); }};
@@ -51,7 +51,7 @@ void use_law(PairConfig& config, Law law) {
 
 TEST(Pair, WithoutAPurseTheFollowerDoesNotFollow) {
   PairConfig config = waving();
-  config.max_account = 1e-12;  // received energy is not credited, and none is kept for giving
+  config.max_account = 1e-12;  // this is too small to receive or to give any energy
   Pair pair(config);
   double farthest = 0;
   pair.run(3, [&](double) { farthest = std::max(farthest, std::abs(pair.follower.body.x)); });
@@ -145,7 +145,7 @@ std::pair<double, double> felt_after(Law law, double waves) {
 }
 
 TEST(Pair, AnEnergyCapCutsNothingOfAForceThatIsPaidFor) {
-  // The cap limits the energy that is stored in free motion, but it must leave enough energy for a held force.
+  // The cap limits the energy that is stored in free motion, but there must be enough energy for a held force.
   const auto [felt, none] = felt_after(Law::kAol, 0);
   const auto [felt_capped, waved_capped] = felt_after(Law::kAolPlus, 20);
   const auto [felt_waved, waved] = felt_after(Law::kAol, 20);

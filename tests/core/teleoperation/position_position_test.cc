@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Tests one end of a position–position coupling: the force, the estimate of the round trip, and invalid input. Two of
-// them are coupled in pair_test.cc.
+// Tests one end of a position–position coupling: the force, the estimate of the round trip, and invalid input. See
+// pair_test.cc for tests with two of them.
 #include "core/teleoperation/methods/position_position.h"
 
 #include <gtest/gtest.h>

@@ -94,8 +94,7 @@ TEST(Purse, WhenItHasTooLittleAllAreCutInProportion) {
 
 TEST(Purse, ThreePeersAndItselfEndAtOneRatio) {
   Purse purse({.peers = 3, .max_account = 1});
-  const std::array<double, 3> accounts = {0.01, 0.02,
-                                          0.5};  // the last account is above its share, so it receives nothing
+  const std::array<double, 3> accounts = {0.01, 0.02, 0.5};  // the last account already has more than its share
   const std::array<double, 3> needs = {0.05, 0.02, 0.1};
   for (std::size_t j = 0; j < 3; ++j) purse.receive(j, from_peer(1, accounts[j], needs[j]));
   const double left = 0.3 - purse.settle(period_of(0.3, 0.03 - 0.2e-3)).withdraw;

@@ -105,7 +105,8 @@ class World {
 
   std::size_t ports() const { return ports_.size(); }
 
-  /// The port disappears. The watchdog of its device removes the force. Messages that were sent before still arrive.
+  /// The port disappears. The watchdog of its device removes the force. Messages can still be received if they were
+  /// sent before.
   void lose(std::size_t i) { stop(ports_[i], std::numeric_limits<int>::max()); }
 
  private:

@@ -16,7 +16,7 @@
 
 namespace tendon {
 
-/// One device of a star with its complete haptic controller: three bodies, one per axis.
+/// A device in a star. It has a complete haptic controller and three bodies, one for each axis.
 class Node {
  public:
   Node(const PortSetup& with, const std::vector<CoupledLeader>& leaders, std::uint64_t epoch)
@@ -88,7 +88,7 @@ class Node {
   bool began_ = false;
 };
 
-/// A follower and its leaders in virtual time with ticks of 1 ms, each leader with its own bad network.
+/// A follower and its leaders. Each leader has a different bad network. The virtual time has ticks of 1 ms.
 class Star {
  public:
   struct Leader {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The spring must generate no energy on closed paths in SO(3), both ends must have the same torque without steps, and a
-// pair with one account for force and torque must be passive.
+// Tests that the spring does not generate energy on closed paths in SO(3), that the torque is the same at both ends and
+// has no steps, and that a pair with one account for force and torque is passive.
 #include "core/teleoperation/handle/turn_coupling.h"
 
 #include <gtest/gtest.h>

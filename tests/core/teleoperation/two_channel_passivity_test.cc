@@ -128,8 +128,8 @@ TEST(TwoChannelPassivity, IsPassiveForEveryMotionAndEveryForce) {
   }
 }
 
-// The tool does not move, and the spring of the controller (1000 N/m) acts on it. Returns the minimum of the energy of
-// both ends, J.
+// The spring of the controller (1000 N/m) acts on a tool that does not move. Returns the minimum of the energy of both
+// ends in J.
 double least_with_a_spring(double booked_stiffness, double drift_rate) {
   constexpr double kStiffness = 1000;
   PassivityLeader<1> leader({.max_damping = 1e9, .period = kPeriod});

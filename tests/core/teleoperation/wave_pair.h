@@ -13,7 +13,8 @@
 
 namespace tendon {
 
-/// Two devices and a wave line between them in virtual time: periods of 1 ms, exact positions, no limiter.
+/// Two devices with a wave line between them. The virtual time has periods of 1 ms. The positions are exact, and there
+/// is no limiter.
 class WavePair {
  public:
   struct Config {

@@ -25,7 +25,7 @@ struct Channel {
   double least_account = 0;  // J, either end
 };
 
-// The motion at both ends is random. The applied force is between zero and the demanded force.
+// Moves both ends at random. The applied force is between zero and the demanded force.
 template <int N>
 Channel run(double impedance, const Network& network, Duration smoothing, bool clipped) {
   WavePort<N> leader({.impedance = impedance, .period = kPeriod, .smoothing = smoothing});

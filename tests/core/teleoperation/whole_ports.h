@@ -15,7 +15,7 @@
 
 namespace tendon {
 
-/// A handle with motors. It moves along x, rotates about all axes, and has a gripper.
+/// A handle with motors for translation along x, for rotation, and for a gripper.
 struct WholeSetup {
   Coupling::Config coupling{};
   Surroundings along_x{};
@@ -137,7 +137,7 @@ class WholePort {
   Vec3 force = Vec3::Zero();
   Vec3 torque = Vec3::Zero();
   double grip_force = 0;
-  double ledger = 0;       ///< J, force and torque, recomputed independently
+  double ledger = 0;       ///< J, for force and torque; this is computed independently
   double grip_ledger = 0;  ///< J
   double least_account = std::numeric_limits<double>::infinity();
 
@@ -206,7 +206,7 @@ class WholePorts {
     run(ticks, [] {});
   }
 
-  /// Runs until both ends are live with a new engagement. Returns false if this takes more than two seconds.
+  /// Runs until there is a new engagement that is live at both ends. Returns false if this takes more than two seconds.
   bool engage() {
     for (int i = 0; i < 1000 && !leader.coupling().engage(); ++i) run(1);
     for (int i = 0; i < 2000 && !(leader.coupling().live() && follower.coupling().live()); ++i) run(1);

@@ -21,7 +21,7 @@ SafeDevice::Config by_button() {
 TEST(DeadMan, WhoHoldsTheButtonHasForcesAndWhoLetsGoHasNoneAtOnce) {
   Rig rig(by_button());
   rig.steps(60);
-  rig.safe.arm();  // the dead-man switch alone arms
+  rig.safe.arm();  // no effect: only the dead-man switch arms
   rig.steps(60);
   ASSERT_EQ(rig.state(), SafetyState::kHomed);
   for (int press = 0; press < 3; ++press) {

@@ -109,7 +109,7 @@ TEST(SafeDevice, ForgetsARequestThatWasNotGrantedInTime) {
     Rig rig;
     rig.steps(60);
     rig.safe.arm();
-    rig.steps(late, kPush);  // held between the two positions
+    rig.steps(late, kPush);  // a force demand prevents arming
     rig.steps(10);
     EXPECT_EQ(rig.state() == SafetyState::kArmed, late < 1000) << late;
   }
