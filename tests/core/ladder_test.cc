@@ -71,7 +71,6 @@ TEST(Ladder, TheTimesOfThePageAreThoseOfTheCode) {
   EXPECT_EQ(rung(rungs, "re-engage").time_constant, code.ramp_in);
 }
 
-/// A hand moves slowly into a wall whose engine stops sending and resumes.
 class Walk : public ::testing::Test {
  protected:
   static constexpr Duration kValid = milliseconds(60);

@@ -21,7 +21,6 @@ struct DriverBench {
     written = device.apply(force);
   }
 
-  /// Records whether the device pushes and whether it is allowed to.
   void look(bool pushes, bool lawful) {
     lawless = pushes && !lawful ? lawless + 1 : 0;
     most_lawless = std::max(most_lawless, lawless);

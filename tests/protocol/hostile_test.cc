@@ -32,7 +32,6 @@ class Target {
     }
   }
 
-  /// Returns true if exactly one datagram counter changed.
   bool take(const Bytes& datagram) {
     const auto total = [this] {
       const LinkStats& s = session_.stats();

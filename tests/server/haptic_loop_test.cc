@@ -13,7 +13,6 @@ namespace {
 
 using std::chrono::milliseconds;
 
-/// A handle at rest that can be unplugged.
 class Handle final : public Device {
  public:
   bool plugged = true;
@@ -83,7 +82,6 @@ struct Pushed {
     config.control.max_slew = 100;
     return config;
   }
-  /// Returns the record of the last step.
   StepRecord steps(int count) {
     StepRecord last;
     for (int i = 0; i < count; ++i) {

@@ -74,7 +74,6 @@ HapticLoop::Config config_of(bool whole) {
   return config;
 }
 
-/// Answer of an engine at 100 Hz.
 RemoteForce answer(std::uint64_t sequence, LocalTime now, bool whole) {
   RemoteForce force;
   force.sequence = sequence;

@@ -73,7 +73,6 @@ class MemoryLink final : public Link {
 /// Alternates the network threads of the server and the client.
 class Pair {
  public:
-  /// Performs the handshake and the first requests.
   Pair() {
     for (int i = 0; i < 20; ++i) exchange();
     if (client_.phase() != ForceClient::Phase::kOpen) std::abort();

@@ -56,7 +56,6 @@ TEST(MemorylessForceBounding, AHoldLongerThanAgreedIsCreditedWithItsFriction) {
   EXPECT_NEAR(law.limit({Vec<1>(9.0)}).permitted, 2 * std::sqrt(260 * 0.26 * 1e-6 / 4e-3), 1e-12);
 }
 
-// Invariant of the proof, with jitter.
 TEST(MemorylessForceBounding, TheLedgerCoversTheWorstThatTheNextHoldCanDo) {
   for (std::uint64_t seed = 0; seed < 100; ++seed) {
     Dice dice(seed);

@@ -30,7 +30,6 @@ HapticController::Config config_of_a_stylus() {
   return config;
 }
 
-/// A stylus that is only rotated and squeezed.
 class Stylus {
  public:
   explicit Stylus(const HapticController::Config& config = config_of_a_stylus()) : controller(config) {}
@@ -59,7 +58,6 @@ class Stylus {
     if (step.grip()) held_.grip = step.grip()->force;
     return step;
   }
-  /// Rotates, opens and closes periodically to fill the accounts.
   void earn(int steps = 500) {
     for (int i = 0; i < steps; ++i) {
       step(rotation_by({0, 0, i % 2 == 0 ? 0.01 : 0.0}), i % 2 == 0 ? 0.02 : 0.0);

@@ -115,7 +115,6 @@ class HandlePair {
  private:
   static double scale_of(int block) { return block == 0 ? 1 : 1e-2; }
 
-  /// Returns an arbitrary demand, or a spring to the true position of the other end.
   Vec<kSize> wanted(End& end, const End& other) {
     const int kind = static_cast<int>(dice_.within(0, 6));
     if (kind == 1) return end.force * 1e3;

@@ -159,7 +159,6 @@ TEST(Answer, NoTableIsSteeperThanWhatIsBelieved) {
   EXPECT_EQ(kept.force[4], 4);
   const ForceTable soft = *believed(with_table(), 1e4).model->contact->table;
   EXPECT_EQ(soft.force, with_table().model->contact->table->force);
-  // The answered depth may lie outside the table.
   answer.model->contact->table = table(1, 0.001, {2, 9});
   EXPECT_EQ(believed(answer, 1000).model->contact->table->force[1], 3);
   answer.model->contact->table = table(-1, 0.001, {2, 9});

@@ -86,7 +86,6 @@ TEST(CouplingAbsolute, AHandThatDoesNotComeIsLeftAloneAfterFiveSeconds) {
   expect_no_engagement(ports, 300, "only another act");
 }
 
-/// Only friction holds the handle.
 TEST(CouplingAbsolute, AMotorWithEnergyOfItsOwnDrawsItThereAndGivesNoMore) {
   constexpr double kEnergy = 0.02;
   Ports ports(end_of(PortRole::kLeader, kEnergy), end_of(PortRole::kFollower));

@@ -131,7 +131,6 @@ TEST(CouplingForce, EngagingAndClutchingInTheOpenMovesNothing) {
 
 /// Returns ports where the leader presses its follower against a wall with 3 N at both ends.
 Ports pressing(int one_way, PortSetup follower = port_of(PortRole::kFollower)) {
-  // The hand moves 20 mm in half a second, long after engagement.
   PortSetup leader = leader_of([](double t) { return 0.02 * std::clamp((t - 1) / 0.5, 0.0, 1.0); });
   follower.around[0] = {.stiffness = 2000, .damping = 5, .reference = [](double) { return 0.005; }, .wall = true};
   leader.coupling.spring.adapt_to_delay = follower.coupling.spring.adapt_to_delay = false;

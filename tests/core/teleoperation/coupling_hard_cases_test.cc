@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// Hard cases of teleoperation with the server's coupling, for each method, with and without limiters.
 #include <gtest/gtest.h>
 
 #include <algorithm>

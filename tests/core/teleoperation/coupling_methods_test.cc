@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// Couplings by waves and by estimated surfaces: forces, position differences, and passivity of the pair.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -195,7 +193,6 @@ TEST(CouplingMethods, AClutchedLeaderHoldsTheFollowerOnTheLine) {
   const double pressed = ports.follower.outside().x();
   ASSERT_LT(pressed, -1.5);
   ports.leader.buttons = 1;
-  // The hand releases the handle and retreats while the follower still presses.
   ports.run(1300);
   EXPECT_TRUE(ports.leader.applied.isZero());
   EXPECT_NEAR(ports.follower.outside().x(), pressed, 0.5) << "1 mm of the wall";

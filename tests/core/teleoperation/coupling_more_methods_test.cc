@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// Couplings by set positions, two-channel passivity and rate, and links too slow for coupling.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -162,7 +160,6 @@ TEST(CouplingPassivity, TheDriftRateDecidesHowFarTheTwoPlacesAreApart) {
   EXPECT_GE(sum, kRounding);
 }
 
-/// A passivity follower with a scripted leader, whose handle is `at` and whose energy total is given.
 class PlayedPassivity {
  public:
   PlayedPassivity()
@@ -182,7 +179,6 @@ class PlayedPassivity {
       peer.energy_in = energy_in;
       played.hear(peer);
       demand = played.port.command({Port::at(played.now++), Vec3::Zero(), Vec3::Zero()}, 0, true);
-      // The motor applies the demanded force. The tool does not move.
       played.port.conclude(demand.force, std::nullopt);
       played.told = played.port.message();
     }

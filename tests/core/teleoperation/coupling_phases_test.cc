@@ -21,7 +21,6 @@ using enum PortPhase;
 
 constexpr std::array kPhases = {kAlone, kCoupled, kAligning, kEngaged, kClutched, kLost, kFault};
 
-// Independent list of all phase transitions.
 PortPhase expected(PortPhase phase, PhaseInput input) {
   const bool in_act = phase == kEngaged || phase == kClutched;
   switch (input) {

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// Scale changes between clutches: permission, motion, and the energy of the pair.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -162,7 +160,6 @@ double least_sum(std::uint64_t seed, double& given) {
     led = ports.leader.truth.energy();
     followed = ports.follower.truth.energy();
     least = std::min(least, sum);
-    // This is used for the interval that begins now.
     worth = ports.follower.coupling->force_scale() / ports.follower.coupling->position_scale();
     given += ports.leader.paid + ports.follower.paid;
   });

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // Tests two couplings in random worlds. The devices, maps, networks and hands are random, and so are all engagements,
-// clutches, losses, restarts, faults and replays. It is an error if an account or a pair generates energy, or if there
-// is an engagement without a request. The bugs in tests/mutants/coupling must be found by these tests.
+// clutches, losses, restarts, faults and replays. It is an error if an account or a pair generates energy, or if
+// something happens without a request to engage. The bugs in tests/mutants/coupling must be found by these tests.
 #include <gtest/gtest.h>
 
 #include <algorithm>

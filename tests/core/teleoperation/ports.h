@@ -152,7 +152,6 @@ class Ports {
   Ports(const PortSetup& of_leader, const PortSetup& of_follower)
       : Ports(of_leader, of_follower, {.delay = 0, .seed = 1}, {.delay = 0, .seed = 2}) {}
 
-  /// The function `look(now)` is called after every tick.
   template <class Look>
   void run(int ticks, Look look) {
     for (const int last = now + ticks; now < last; ++now) {
@@ -214,7 +213,6 @@ inline Ports far_apart(int one_way) {
 
 inline PortPhase phase(const Port& port) { return port.coupling->phase(); }
 
-/// One port with a scripted peer.
 class Played {
  public:
   explicit Played(Coupling::Config config) : port(config) {}

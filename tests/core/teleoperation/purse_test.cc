@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// One purse with scripted messages: rule of giving, scales, epochs, and a lying peer.
 #include "core/teleoperation/purse.h"
 
 #include <gtest/gtest.h>

@@ -26,7 +26,6 @@ constexpr double kNanojoule = 1e-9;
 
 Quat minus(const Quat& q) { return {-q.w, -q.x, -q.y, -q.z}; }
 
-/// The law of a follower with full gain. The leader is at `there`.
 class Spring {
  public:
   explicit Spring(double stiffness, const Quat& there = {})
@@ -262,7 +261,6 @@ TEST(TurnCoupling, WithoutASpringAtTheLeaderItFeelsItsDampingOnly) {
   }
 }
 
-/// Hands, maps and networks that try to extract energy from force and torque together, and from the grippers.
 TEST(WholeHandles, NoPairAndNoAccountGivesOutEnergy) {
   double least_pair = 0;
   double least_account = 0;

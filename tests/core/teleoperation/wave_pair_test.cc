@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// A hand on a wave line: held force, ripple, inertia, and the final position of the other end.
 #include <gtest/gtest.h>
 
 #include <cmath>

@@ -104,7 +104,6 @@ class FakeFalcon final : public UsbModel {
   bool plugged_ = true;
   int times_plugged_ = 1;
 
-  // FTDI chip
   int latency_ms_ = 16;
   std::uint16_t divisor_ = 0x4138;
   std::uint8_t flush_at_ = 0;
@@ -115,7 +114,6 @@ class FakeFalcon final : public UsbModel {
   LocalTime rx_free_{};
   std::size_t split_left_ = 0;
 
-  // Processor
   Mode mode_;
   std::vector<std::uint8_t> heard_;
   bool heard_garbage_ = false;
@@ -127,7 +125,6 @@ class FakeFalcon final : public UsbModel {
   std::array<std::int16_t, 3> torque_{};
   std::uint8_t lamps_ = 0;
 
-  // Hand
   Vec3 position_{0, 0, 0.125};
   std::uint8_t buttons_ = 0;
   std::array<int, 3> origin_{};  ///< encoder offset, unknown until homed

@@ -19,7 +19,6 @@ using State = Device::State;
 using Fault = FakeFalcon::Fault;
 using namespace std::chrono_literals;
 
-/// A driver, a cable and a Falcon. Torque is allowed while the Falcon runs its firmware and is homed.
 struct Bench : DriverBench<Bench> {
   explicit Bench(const FakeFalcon::Options& options = {}, std::vector<std::uint8_t> firmware = fake_firmware(4096))
       : falcon(options), device({.firmware = std::move(firmware)}, std::make_unique<MemoryPipe>(falcon, now)) {}
@@ -418,7 +417,6 @@ TEST_P(FalconFault, EndsInZeroForceAtEveryState) {
       EXPECT_EQ(bench.written, Vec3::Zero());
     }
 
-    // After the fault the device must recover without pushing meanwhile.
     bench.falcon.set_fault(Fault::kNone);
     bench.most_lawless = bench.lawless = 0;
     EXPECT_TRUE(bench.reaches(State::kHomed, 15s, kForce));

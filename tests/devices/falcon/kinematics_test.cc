@@ -14,7 +14,6 @@
 namespace tendon::falcon::kinematics_test {
 namespace {
 
-/// Returns a uniformly distributed point in a ball around the center.
 Vec3 place(Dice& dice, double radius) { return kCentre + radius * std::cbrt(dice.uniform()) * dice.direction(); }
 
 Mat3 numeric_jacobian(const Vec3& position) {

@@ -65,7 +65,6 @@ TEST(FalconPacket, AByteThatIsNoNibbleSpoilsTheReply) {
   }
 }
 
-/// Parses a stream in random pieces and returns all replies.
 std::vector<Counts> parsed(ReplyParser& parser, std::span<const std::uint8_t> stream, Dice& dice) {
   std::vector<Counts> found;
   while (!stream.empty()) {

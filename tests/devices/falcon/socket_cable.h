@@ -20,7 +20,6 @@ namespace tendon::socket_cable {
 inline constexpr std::uint8_t kRequest = 0;
 inline constexpr std::uint8_t kOut = 0x02;
 
-/// Driver end.
 class Pipe final : public usb::Pipe {
  public:
   explicit Pipe(int end) : end_(end) {}
@@ -49,7 +48,6 @@ class Pipe final : public usb::Pipe {
   std::uint32_t connection_ = 1;
 };
 
-/// Falcon end.
 class Plug {
  public:
   Plug(FakeFalcon& falcon, int end) : falcon_(falcon), end_(end) {}

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// Safety layer of a handle with motors for rotation and gripper.
 #include <gtest/gtest.h>
 
 #include <algorithm>

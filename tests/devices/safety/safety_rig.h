@@ -13,7 +13,6 @@ namespace tendon {
 
 inline constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
-/// Device with scripted state that records its commands.
 struct Puppet final : Device {
   DeviceInfo about{.name = "puppet", .max_force = 10, .position_resolution = 50e-6, .watchdog = {}};
   State stage = State::kHomed;

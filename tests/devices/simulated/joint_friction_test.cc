@@ -177,7 +177,6 @@ TEST(JointFriction, ItsLawHoldsExactlyWithTheMeanVelocityOfEachSubstep) {
 }
 
 TEST(JointFriction, IsNowhereAndInNoDirectionLessThanItsLowerBound) {
-  // Friction power divided by |v| and |v|², at random positions and directions and for motion of single joints.
   for (const Mechanism::Kind& kind : all_kinds()) {
     const JointFriction::Config config{
         .mechanism = kind, .coulomb = Vec3(0.02, 0.03, 0.025), .viscous = Vec3(1e-3, 2e-3, 3e-3)};

@@ -19,7 +19,6 @@ SimulatedDevice::Config point() {
   return config;
 }
 
-/// 6 degrees of freedom and a gripper, all motorized and free.
 SimulatedDevice::Config whole() {
   SimulatedDevice::Config config = point();
   config.max_force = 4;

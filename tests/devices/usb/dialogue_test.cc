@@ -49,7 +49,6 @@ struct Bench {
     dialogue.restart(patience);
   }
   void turn(Duration after = 1ms) { dialogue.begin(now += after); }
-  /// Sends only when allowed, like a driver.
   bool ask(bool exerts) { return dialogue.may_send(exerts) && dialogue.send(kRequest, exerts); }
   void answer() {
     dialogue.hear();

@@ -63,7 +63,6 @@ class FarFalcon {
   Seen seen() const;
 
  private:
-  /// An open node.
   struct Session {
     int cable = -1;   ///< −1: closed by the process that opened it
     int master = -1;  ///< −1: closed by every process

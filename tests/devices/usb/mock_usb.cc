@@ -113,7 +113,6 @@ std::string MockUsb::really(const std::string& path) const {
 
 /// All members require the lock of the port.
 struct MockPort::Inside {
-  /// Transfer submitted by libusb.
   struct Urb {
     Data urb;
     Data buffer;

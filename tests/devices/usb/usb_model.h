@@ -32,7 +32,6 @@ class UsbModel {
   /// The time when a waiting IN transfer ends if there is no other event. This is LocalTime::max() if it can only be
   /// ended by an event.
   virtual LocalTime next_in() const = 0;
-  /// Data of that transfer.
   virtual std::vector<std::uint8_t> take_in(LocalTime now) = 0;
 
  protected:

@@ -41,7 +41,6 @@ class UsbfsNode {
   };
   Counts counts() const;
 
-  // Called by the three functions.
   static UsbfsNode* of(int file);
   int control(unsigned long request, void* argument);
   ssize_t read(void* to, std::size_t size);
@@ -55,7 +54,6 @@ class UsbfsNode {
   virtual std::span<const std::uint8_t> descriptors() const = 0;
   virtual bool request(std::uint8_t request, std::uint16_t value) = 0;
   virtual Taken write(std::span<const std::uint8_t> bytes) = 0;
-  /// An IN transfer was submitted.
   virtual void awaited() = 0;
   /// libusb has called poll, but no transfer has ended.
   virtual void look() {}

@@ -42,7 +42,6 @@ class UsbIpCable {
   }
 
  private:
-  /// Submit or unlink request of the kernel.
   struct Order;
   struct Waiting {
     std::uint32_t number = 0;

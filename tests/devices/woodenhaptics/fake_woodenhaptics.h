@@ -63,7 +63,6 @@ class FakeWoodenHaptics {
   bool write(LocalTime now, std::span<const std::uint8_t> bytes);
   /// Time at which a waiting IN transfer may complete.
   LocalTime next_in() const;
-  /// Data of that transfer, or empty.
   std::vector<std::uint8_t> take_in(LocalTime now);
   /// The node is closed, which cancels waiting transfers.
   void cancel();
@@ -112,7 +111,6 @@ class FakeWoodenHaptics {
   int times_plugged_ = 1;
   bool host_ = true;
 
-  // Bus
   std::optional<LocalTime> next_frame_;
   std::deque<std::vector<std::uint8_t>> from_host_;
   std::deque<std::pair<LocalTime, std::vector<std::uint8_t>>> to_host_;
@@ -121,7 +119,6 @@ class FakeWoodenHaptics {
   std::optional<LocalTime> boots_;
   int most_waiting_ = 0;
 
-  // Firmware
   bool begun_ = false;           ///< the first report is sent without a request
   std::array<int, 3> origin_{};  ///< counter value at angle 0
   bool calibrate_ = false;       ///< set by the button
@@ -133,7 +130,6 @@ class FakeWoodenHaptics {
   int calibrations_ = 0;
   int said_ = 0;
 
-  // Arm
   Vec3 angles_ = Vec3::Zero();
   bool switch_closed_ = false;
 };

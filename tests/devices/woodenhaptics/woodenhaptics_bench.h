@@ -19,7 +19,6 @@ namespace tendon {
 inline constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 inline const Vec3 kForce(1, -0.5, 1);
 
-/// Cable with an output buffer that can be full.
 class Cable final : public usb::Pipe {
  public:
   Cable(FakeWoodenHaptics& arm, const LocalTime& now, const bool& full) : pipe_(arm, now), full_(full) {}

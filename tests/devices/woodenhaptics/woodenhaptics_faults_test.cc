@@ -82,7 +82,6 @@ TEST_P(WoodenHapticsFault, EndsInZeroForceAtEveryState) {
       EXPECT_LE(bench.most_lawless, 15);
     }
 
-    // After the fault the arm must recover with a new calibration, without pushing meanwhile.
     bench.arm.set_fault(Fault::kNone);
     bench.run(2s);  // the fault may have pressed the button
     bench.most_lawless = bench.lawless = 0;

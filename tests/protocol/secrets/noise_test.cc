@@ -51,7 +51,6 @@ TEST_F(Noise, TheKeysOfSuite2AreBoundToTheWholeHandshake) {
             split_of_suite_2(other).initiator_to_responder.bytes());
   EXPECT_NE(split_of_suite_2(one).responder_to_initiator.bytes(),
             split_of_suite_2(other).responder_to_initiator.bytes());
-  // The keys of both suites must differ.
   const std::set<Bytes32> all = {one.initiator_to_responder.bytes(), one.responder_to_initiator.bytes(),
                                  split_of_suite_2(one).initiator_to_responder.bytes(),
                                  split_of_suite_2(one).responder_to_initiator.bytes()};

@@ -26,7 +26,6 @@ Bytes first(const Buffer& buffer, std::size_t size) {
   return {buffer.begin(), buffer.begin() + static_cast<std::ptrdiff_t>(size)};
 }
 
-/// A is a client with the key "wall", and Z is the server side.
 class SealedHandshake : public ::testing::Test {
  protected:
   ClientHandshake::Config client_config() {

@@ -131,7 +131,6 @@ class Maker {
  public:
   Maker(const std::map<std::string, Bound>& bounds, std::vector<Case>& out) : bounds_(bounds), out_(out) {}
 
-  /// Creates the cases of `root` and all messages in it.
   void make(Message& root) {
     root_ = &root;
     visit(root, "");

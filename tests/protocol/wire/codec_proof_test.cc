@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// Cost of writing and reading the datagrams of each step, in callgrind instructions, compared with protobuf.
 #include <gtest/gtest.h>
 
 #include <iostream>

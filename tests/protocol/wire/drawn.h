@@ -22,7 +22,6 @@ namespace tendon::drawn {
 
 using examples::Bytes;
 
-/// Returns an ordinary number, sometimes a difficult one.
 inline double a_number(Dice& dice) {
   constexpr std::array kHard = {0.0,
                                 -0.0,
@@ -101,7 +100,6 @@ inline ForceCommand a_force(Dice& dice) {
   return command;
 }
 
-/// Replaces one number with an invalid one.
 inline void spoil(Dice& dice, DeviceState& state) {
   constexpr std::array kBad = {kNan, kInf, -kInf, 2 * limits::kMaxValue};
   const double bad = kBad[dice.bits() % kBad.size()];
@@ -162,7 +160,6 @@ inline std::vector<DeviceState> states_of_a_step(Dice& dice, double spoilt) {
   return states;
 }
 
-/// Frames of all other types with every field.
 inline const std::vector<Frame>& others() {
   static const std::vector<Frame> all = [] {
     std::vector<Frame> out = {

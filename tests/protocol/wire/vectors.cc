@@ -116,7 +116,6 @@ using Buffer = std::array<std::byte, kMaxDatagram>;
 
 // ---- The conversation that is shown ----
 
-/// A cleartext Data datagram of examples::datagrams().
 struct Shown {
   std::string name;
   bool to_server;

@@ -225,7 +225,6 @@ TEST(Vectors, ARequestOrAnswerOutOfBoundsIsReadAsOneThatIsRefused) {
   EXPECT_EQ(seen, requests);
 }
 
-/// The client and the session use only values of the file.
 class SealedVectors : public ::testing::TestWithParam<std::string> {
  protected:
   void SetUp() override {

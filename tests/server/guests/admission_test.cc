@@ -178,7 +178,6 @@ TEST_F(SealedServer, AReplayedPlainHelloTakesNothingFromWhoCameAfterIt) {
   EXPECT_EQ(b.client->stats().sessions, 1U);
   EXPECT_EQ(loop_->stats().welcomed, welcomed);
   EXPECT_GT(loop_->stats().forces, forces + 950);
-  // The device must not be blocked by the replay after b has left.
   b.client->stop(now_);
   run(milliseconds(10), {&b});
   deliver(a.end->self, hello);
@@ -219,7 +218,6 @@ TEST_F(SealedServer, AControllersByeIsNoWarningAndItsSilenceIsOne) {
 
 TEST_F(SealedServer, AHalfOpenSessionIsToldNothingTakesNothingAndIsForgotten) {
   Client a = controller(wall_, "192.0.2.1:4000");
-  // Drops every Answer.
   const auto no_answers = [&](Datagram& d) { return d.from != server_.self || d.bytes.size() == 48; };
   run(milliseconds(300), {&a}, no_answers);
   EXPECT_EQ(loop_->stats().welcomed, 0U);

@@ -93,7 +93,6 @@ class Coupled : public ::testing::Test {
     Datagram datagram;
   };
 
-  /// Calls `each` every millisecond.
   void run(Duration length, const std::function<void()>& each = {}) {
     for (const LocalTime until = now_ + length; now_ < until; now_ += milliseconds(1)) {
       for (Place* one : {leader_.get(), follower_.get()}) {

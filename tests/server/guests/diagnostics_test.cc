@@ -58,7 +58,6 @@ TEST_F(SealedServer, TellsAnObserverThatAsksHowTheLoopAndTheEngineDo) {
   EXPECT_EQ(peer.name, "wall");
   EXPECT_EQ(peer.state_one_in, 1U);
   EXPECT_FALSE(peer.forces_refused);
-  // The engine's own report.
   ASSERT_TRUE(a.client->report().has_value());
   const LinkReport& own = *a.client->report();
   EXPECT_EQ(peer.link.until, own.until);
@@ -374,7 +373,6 @@ TEST_F(EngineWithWays, AnEngineThatSaysNoErrorIsShownByItsNewestWay) {
   EXPECT_EQ(doubt.way, 7);
 }
 
-/// The force of a foreign client is accepted without its solver path.
 void expect_unsaid(const NetworkLoop& loop, Mailboxes& mail, const char* what) {
   const RemoteForce* const force = mail.forces[0].take();
   ASSERT_NE(force, nullptr) << what;

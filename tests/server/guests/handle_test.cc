@@ -165,7 +165,6 @@ TEST_F(Handle, TorqueAndGripOfAClientWithoutTheFeatureAreIgnoredAndCounted) {
   }
 }
 
-/// The foreign client names either no feature or this one.
 TEST_F(Handle, IsSeenOnlyByThoseThatNamedTheFeature) {
   for (const bool names : {false, true}) {
     restart({});
@@ -191,7 +190,6 @@ TEST_F(Handle, IsSeenOnlyByThoseThatNamedTheFeature) {
   }
 }
 
-/// A client without the feature, such as an older one, receives complete states.
 TEST_F(Handle, ColumnsAreSentOnlyToThoseThatNamedTheFeature) {
   for (const bool names : {false, true}) {
     restart({});

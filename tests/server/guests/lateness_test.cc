@@ -16,7 +16,6 @@ class Engine {
  public:
   explicit Engine(bool same_machine = false) { lateness.begin(now_, same_machine); }
 
-  /// Delivers the next force, with the given additional delays.
   void answer(Duration ours = {}, Duration network = {}, Duration engine = {}, bool lost = false) {
     now_ += milliseconds(10) + ours + network + engine;
     const LocalTime sampled = now_ - milliseconds(46) - ours - network - engine;

@@ -13,7 +13,6 @@
 namespace tendon::mcap_writer_test {
 namespace {
 
-/// Parses hexadecimal digits and ignores spaces.
 std::string bytes(std::string_view hex) {
   std::string out;
   std::string digits;

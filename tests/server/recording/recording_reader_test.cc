@@ -297,7 +297,6 @@ TEST(RecordingReader, ReadsARecordingWithoutItsSceneAndSaysSo) {
   EXPECT_NE(contents.damage[0].find("a record comes before the scene, which is missing"), std::string::npos);
 }
 
-/// A recording of 40 steps with the positions of its chunks.
 struct Chunked {
   struct Chunk {
     std::size_t from;

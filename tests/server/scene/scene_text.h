@@ -27,7 +27,6 @@ std::string error_of_minimal_and(const std::string& more);
 
 void write(const std::filesystem::path& file, std::string_view text);
 
-/// Returns the target of the scene's hand after `t` seconds.
 ScriptedMotion::Point target(const Scene& scene, double t);
 
 }  // namespace tendon

@@ -107,7 +107,6 @@ TEST(RecordedMotion, AHumanHandOnAFoamDrivesTheDevice) {
   EXPECT_LT(furthest, 0.1);
   EXPECT_LT(fastest, 3) << "faster than a hand moves: the path between the samples is wrong";
 
-  // A firm grip on a light device follows the target of the hand.
   SimulatedDevice::Config config;
   config.mass = 0.075;
   config.coulomb_friction = 0.04;

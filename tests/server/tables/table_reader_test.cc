@@ -95,7 +95,6 @@ TEST(TableReader, NamesFileLineAndWhatWasExpected) {
            {"\xff\xfe" + std::string("a\0", 2), "1: expected text in UTF-8, found UTF-16: save it as \"CSV UTF-8\""}}) {
     EXPECT_EQ(refusal(text), "t.csv:" + says) << text;
   }
-  // An earlier decimal comma or a semicolon removes the ambiguity.
   EXPECT_EQ(read("a\tb\n0,5\t1,012\n"), Rows({{0.5, 1.012}}));
   EXPECT_EQ(read("a;b\n1;1,012\n"), Rows({{1, 1.012}}));
 }
