@@ -13,7 +13,7 @@ class Bench {
  public:
   explicit Bench(SimulatedDevice::Config config) : device_(std::move(config)) { device_.read(now_); }
 
-  /// Advances the time by `interval` with the force that is held. Returns the position of the encoder.
+  /// Waits for `interval` with the force that is held. Returns the position of the encoder.
   Vec3 wait(Duration interval) {
     now_ += interval;
     return device_.read(now_)->position;

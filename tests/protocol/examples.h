@@ -53,8 +53,8 @@ inline ForceCommand force() {
           .valid_for = std::chrono::milliseconds(20)};
 }
 
-/// An answer with all fields. The tool is 2 mm deep in a surface with the normal −x, and the table has the forces at
-/// other depths.
+/// This is an answer with all fields. The tool is 2 mm deep in a surface with the normal −x, and the table has the
+/// forces at other depths.
 inline ForceCommand force_with_all() {
   ForceCommand all = force();
   all.sequence = 101;
@@ -234,7 +234,8 @@ inline DeviceState state_with_buttons() {
   return state;
 }
 
-/// A handle with all of its parts. It is rotated by 106° about y and moves while the fingers close on something soft.
+/// This is a handle with all of its parts. It is rotated by 106° about y. It moves, and the fingers close on something
+/// soft.
 inline DeviceState state_with_handle() {
   DeviceState state = examples::state();
   state.buttons = 1;
@@ -253,7 +254,7 @@ inline DeviceState state_with_joints() {
   return state;
 }
 
-/// A detent about one axis and soft fingers.
+/// This is a detent about one axis, with soft fingers.
 inline ForceCommand force_with_torque() {
   ForceCommand command = force();
   command.sequence = 102;
@@ -301,7 +302,7 @@ inline SetOutput vibration() {
 
 // Sent between peers with the feature "teleoperation".
 
-/// A leader pulls its follower by 2 mm. It measures no contact.
+/// The leader pulls its follower by 2 mm. There is no measured contact.
 inline PortFrame port() {
   PortFrame port;
   port.device = 1;
@@ -325,7 +326,7 @@ inline PortFrame port() {
   return port;
 }
 
-/// A follower that presses with its tool and has no purse.
+/// This is a follower that presses with its tool. It does not have a purse.
 inline PortFrame port_in_contact() {
   PortFrame port = examples::port();
   port.contact_force = Vec3(-2, 0, 0.5);
@@ -343,7 +344,7 @@ inline PortFrame port_by_model() {
   return port;
 }
 
-/// The motion of the other end is half as large and is rotated by 106° about y.
+/// The other end makes half of the motion. It is rotated by 106° about y.
 inline Couple couple() {
   return {.device = 1,
           .channel = 1,

@@ -102,7 +102,7 @@ TEST_F(TwoEnds, ASeventeenthOpenRequestIsRefused) {
   events(z_);
   z_.answer(1, Code::kOk, "");
   deliver(a_, now_, pull(z_, now_));
-  EXPECT_FALSE(a_.request(Rearm{}).has_value());  // the answer has been received but was not taken
+  EXPECT_FALSE(a_.request(Rearm{}).has_value());  // the answer was received but not taken
   EXPECT_EQ(events(a_).size(), 1U);
   EXPECT_EQ(a_.request(Rearm{}), limits::kRequestWindow + 1);
 }

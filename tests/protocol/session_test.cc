@@ -369,7 +369,7 @@ TEST_F(TwoEnds, AnImpossibleEchoIsCountedAndTheRestIsRead) {
   const Duration opened = kOpened.time_since_epoch();
   const Duration written = milliseconds(1000);  // examples::data writes at 1000.1 ms of the peer's clock
   const OutgoingEcho impossible[] = {
-      echoing(opened, written, 1),                    // this packet was not sent by A
+      echoing(opened, written, 1),                    // A has not sent this packet
       echoing(opened - Duration{1}, written, 0),      // sent before the session
       echoing(opened + Duration{1}, written, 0),      // sent in the future
       echoing(opened, written + milliseconds(1), 0),  // received after the echo was written
@@ -491,7 +491,7 @@ TEST_F(TwoEnds, AReplayedDatagramIsCountedAndNothingElse) {
   EXPECT_EQ(z_.stats().duplicated, 5U);
   EXPECT_EQ(z_.stats().datagrams_received, 1U);
   z_.tick(now_ + seconds(2));
-  EXPECT_FALSE(z_.open());  // the session is not kept alive by a replay
+  EXPECT_FALSE(z_.open());  // this must not keep the session alive
 }
 
 TEST_F(TwoEnds, ADatagramOlderThanTheWindowIsDropped) {

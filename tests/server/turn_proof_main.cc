@@ -93,7 +93,7 @@ class Pair {
     state.force_age = std::chrono::milliseconds(7);
     state.mode = Mode::kActive;
     mail_->state.put();
-    // Each end polls once without a result before it finds a datagram.
+    // Each end polls once without a result, and then it finds a datagram.
     LocalTime at_client = clock_.now;
     LocalTime at_server = clock_.now;
     client_busy_.look(at_client);

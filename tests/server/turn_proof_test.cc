@@ -35,7 +35,7 @@ TEST_F(TurnProof, AStateAndItsForceTakeTwoDatagramsAndFewInstructions) {
             << static_cast<double>(sent) / kTurns << " datagrams\n";
   EXPECT_EQ(forces, kTurns) << "not every state was answered in its turn";
   EXPECT_EQ(sent, 2 * kTurns);
-  // Each end polls once without a result and once with a result. The server polls again after a state was sent.
+  // Each end polls once without a result and once with a result. The server polls again after it has sent a state.
   EXPECT_EQ(looks, 5 * kTurns);
   // After each of the first four polls, after the doorbell of the step, and after the engine's answer.
   EXPECT_EQ(readings, 6 * kTurns);

@@ -16,8 +16,8 @@
 
 namespace tendon {
 
-/// A model of a Falcon with its cable: FTDI chip, boot loader, firmware, encoders and motors. It implements what is
-/// known about the protocol. It does not share any code with the driver.
+/// A model of a Falcon and its cable, with the FTDI chip, the boot loader, the firmware, the encoders and the motors.
+/// It implements what is known about the protocol, and it does not share any code with the driver.
 class FakeFalcon final : public UsbModel {
  public:
   struct Options {
@@ -26,8 +26,8 @@ class FakeFalcon final : public UsbModel {
     std::size_t firmware_bytes = 8192;   ///< the image starts after this many bytes
     bool answers_greeting_late = false;  ///< with the leading 00 seen on some machines
     bool knows_flush_character = true;
-    /// The cable only powers the chip. If the device has its own supply, the firmware and the home position are kept
-    /// while it is unplugged.
+    /// The cable only powers the chip. With a separate supply, the firmware and the home position are not lost if it is
+    /// unplugged.
     bool own_supply = false;
     Duration thinking = std::chrono::microseconds(50);
   };
@@ -39,7 +39,7 @@ class FakeFalcon final : public UsbModel {
     kGarblesSome,    ///< corrupts a byte of one reply in three
     kGarblesAll,     ///< every reply has an invalid nibble
     kCutsAll,        ///< every reply is truncated
-    kSplits,         ///< every reply is split into two IN packets
+    kSplits,         ///< every reply is sent in two IN packets
     kBabbles,        ///< adds unsolicited bytes between the replies
     kBabblesOnly,    ///< sends only unsolicited bytes
     kJumps,          ///< the encoders lose count
@@ -69,8 +69,8 @@ class FakeFalcon final : public UsbModel {
   void plug() override { plugged_ = true, ++times_plugged_; }
   void unplug() override;
   void move_to(const Vec3& position) { position_ = position; }  ///< m, device frame
-  /// Moves the grip all the way out and in. This is how a user homes the device. It has no effect unless the host has
-  /// requested it.
+  /// Moves the grip all the way out and in. This is what a user does to home the device. It has no effect unless it was
+  /// requested by the host.
   void pull_through();
   void press(std::uint8_t buttons) { buttons_ = buttons; }
   void set_fault(Fault fault);

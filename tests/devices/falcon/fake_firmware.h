@@ -19,7 +19,7 @@ inline std::vector<std::uint8_t> fake_firmware(std::size_t size) {
   return bytes;
 }
 
-/// The SHA-256 of fake_firmware(8192). This was computed by a different program.
+/// The SHA-256 of fake_firmware(8192), as computed by a different program.
 inline constexpr const char* kFakeFirmwareSha256 = "5372ece9bb03f00dba6ccd932dbe71118da29143ebbc46c3055e97f0d694c4bd";
 
 }  // namespace tendon

@@ -322,7 +322,7 @@ TEST(FalconDevice, AMovedOriginIsNotBelievedUntilHomedAnew) {
       EXPECT_EQ(bench.device.state(), State::kFirmware) << "which sets it back";
     } else {
       bench.run(2s, kForce);
-      bench.falcon.unplug();  // the supply of the motors is still on, so the origin is still wrong
+      bench.falcon.unplug();  // the origin is still wrong, because the supply of the motors is still on
       bench.run(50ms, kForce);
       bench.falcon.plug();
       bench.run(2s, kForce);

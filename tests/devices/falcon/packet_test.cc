@@ -107,8 +107,8 @@ TEST(FalconPacket, EveryWholeReplyIsFoundAmongAnyOtherBytes) {
       auto packet = packet_of(static_cast<std::int16_t>(dice.bits()));
       if (dice.chance(0.3)) {
         for (std::uint64_t n = dice.bits() % 40; n > 0; --n) {
-          // The noise often contains bytes of frames. It must not contain '<', because this could start a packet that
-          // ends with the next one.
+          // The noise often contains bytes of frames. It must not contain '<', because a packet could start there and
+          // end with the next one.
           const auto noise = static_cast<std::uint8_t>(dice.chance(0.3) ? '>' : dice.bits());
           if (noise != '<') stream.push_back(noise);
         }

@@ -52,7 +52,7 @@ class Plug {
  public:
   Plug(FakeFalcon& falcon, int end) : falcon_(falcon), end_(end) {}
 
-  /// Handles all messages that have been received. Returns false if the other end has been closed.
+  /// Handles the messages that have been received. Returns false if the other end is closed.
   bool turn(LocalTime now) {
     std::array<std::uint8_t, 128> message;
     for (;;) {

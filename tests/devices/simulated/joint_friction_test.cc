@@ -219,7 +219,7 @@ TEST(JointFriction, TorquesForAHandlesFrictionMakeThatTheLeastAnywhere) {
     EXPECT_NEAR(friction.least().coulomb, 0.4, 1e-15);
     EXPECT_GE(friction.least().coulomb, 0.4) << "what a limiter counts on is there";
   }
-  // The levers of a Falcon are longest at the edge of the workspace. Two levers of an arm are constant.
+  // The levers of a Falcon are longest at the edge of the workspace, but two levers of an arm are constant.
   EXPECT_GT(
       JointFriction({.mechanism = Mechanism::Falcon{}, .coulomb = JointFriction::torques(Mechanism::Falcon{}, 0.4)})
           .least_at(Vec3::Zero())

@@ -25,8 +25,8 @@ SimulatedDevice::Config device(double m, double b) {
   return config;
 }
 
-/// Stability limit of a spring, sampled and held for T, on a mass with viscous friction and no hand (Jury's criterion
-/// on the exact discretization):
+/// The stability limit of a spring that is sampled and held for T. There is a mass with viscous friction but no hand.
+/// This is Jury's criterion for the exact discretization:
 ///     K_max = b (1 − δ) / (m (1 − δ)/b − T δ),  δ = e^(−bT/m);   about 2b/T (1 + bT/(6m))
 double exact_k_max(double m, double b, double t) {
   const double delta = std::exp(-b * t / m);

@@ -83,7 +83,7 @@ TEST(SimulatedDevice, DoesNotDependOnHowOftenItIsRead) {
 TEST(SimulatedDevice, AHandThatHasLetGoPushesNoMoreAndTakesItsMassWithIt) {
   auto config = bare();
   config.hand = waving_hand();
-  config.lets_go_after = 33'333us;  // between two reads and within a substep
+  config.lets_go_after = 33'333us;  // this is between two reads and within a substep
   Bench often(config);
   Bench seldom(config);
   auto holding = config;
@@ -353,7 +353,7 @@ TEST(Amplifier, FollowsAStepAsAFirstOrderLag) {
 }
 
 TEST(Amplifier, HasFallenByThreeDecibelsAtItsBandwidth) {
-  // The commands are a sine at 10 kHz. In the steady state the amplitude of the velocity is F/(m ω) times the gain.
+  // The commands are a sine at 10 kHz. The amplitude of the velocity is F/(m ω) times the gain in the steady state.
   const double f = 50;
   auto config = bare(1);
   const auto swing = [&] {
@@ -378,8 +378,8 @@ TEST(Amplifier, HasFallenByThreeDecibelsAtItsBandwidth) {
 TEST(Watchdog, TakesTheForceAwayAfterExactlyItsTime) {
   auto config = bare(0.075);
   config.watchdog = 5ms;
-  // The read intervals end at the time of the watchdog, before it, or long after it. The impulse must be force × 5 ms
-  // in each case.
+  // The intervals end when the watchdog does, before it, or long after it. The impulse must be force × 5 ms in each
+  // case.
   for (const Duration interval : {Duration(5ms), Duration(1700us), Duration(333'333), Duration(1s)}) {
     Bench bench(config);
     bench.device().apply({0.3, -0.6, 0.6});

@@ -83,7 +83,7 @@ TEST(SimulatedRotation, SticksExactlyAndBreaksLooseAboveItsFriction) {
   config.coulomb_friction = 2e-3;
   config.start_angular_velocity = {5, 0, 0};
   Spindle spindle(config);
-  spindle.turn(Vec3::Zero(), 1001);  // 5 rad/s at −100 rad/s²: 50 ms
+  spindle.turn(Vec3::Zero(), 1001);  // this takes 50 ms, from 5 rad/s at −100 rad/s²
   EXPECT_EQ(spindle.truth().angular_velocity, Vec3::Zero());
   EXPECT_NEAR(rotation_vector(spindle.truth().orientation).x(), 0.125, 1e-6);
   const Quat stuck = spindle.truth().orientation;

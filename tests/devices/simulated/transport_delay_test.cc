@@ -25,7 +25,7 @@ SimulatedDevice::Config free_mass(std::optional<Duration> sample, std::optional<
 }
 
 TEST(TransportDelay, ASampleIsThatOfTheInstantThatItSays) {
-  // At 1 m/s the position shows the sampling time. Intervals are not multiples of the delay.
+  // At 1 m/s the position shows when the sample was taken. The intervals are not multiples of the delay.
   for (const Duration delay : {Duration(1ms), Duration(1'700us), Duration(333'333ns), Duration(100ms)}) {
     auto config = free_mass(delay, std::nullopt);
     config.start_velocity = {1, 0, 0};
@@ -42,7 +42,8 @@ TEST(TransportDelay, ASampleIsThatOfTheInstantThatItSays) {
 }
 
 TEST(TransportDelay, AForceActsFromItsDelayUntilTheDelayOfTheNext) {
-  // 2 N for one period of 1 ms. The impulse is 2 mN·s for every delay, and the position shows the time of the force.
+  // The force is 2 N for one period of 1 ms. The impulse must be 2 mN·s for every delay. The position shows when the
+  // force was applied.
   for (const Duration delay : {Duration(1ns), Duration(999'999ns), Duration(300us), Duration(1ms), Duration(1'700us),
                                Duration(2ms), Duration(12'345'678ns)}) {
     Bench bench(free_mass(std::nullopt, delay));
@@ -105,7 +106,7 @@ TEST(TransportDelay, WithoutAForceNothingIsDifferentToTheLastBitButTheStamps) {
 }
 
 TEST(TransportDelay, ShiftsASampledSpringsStabilityAsTheClosedForm) {
-  // The delay is a number of whole periods. The exact boundary for this number of samples is in core/stability.
+  // The delay is a number of whole periods. See core/stability for the exact boundary.
   for (const int late : {1, 2, 5}) {
     SampledSpring spring{.mass = 0.075, .viscous = 0.26, .period = 1ms, .delay_samples = late};
     const double boundary = largest_stable_stiffness(spring);
@@ -173,7 +174,7 @@ TEST(TransportDelay, TheWatchdogCountsTheForcesThatArrive) {
 }
 
 TEST(TransportDelay, HasRoomForAllForcesOfTheFastestLoop) {
-  // The period is 100 µs and the delays are the longest ones. Each force is different. The momentum must be the sum of
+  // The period is 100 µs, the delays are the longest ones, and each force is different. The momentum must be the sum of
   // all forces that have arrived.
   Bench bench(free_mass(100ms, 100ms));
   double sum = 0;

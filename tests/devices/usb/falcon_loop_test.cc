@@ -91,8 +91,8 @@ TEST(FalconLoop, AWallIsFeltThroughTheRealLibraryWithoutAHeapCallInTheLoop) {
   loop.stop();
   EXPECT_EQ(heap_calls, 0U);
   EXPECT_GT(pushed, 0U);  // a sign error would pull
-  // After a stalled step the hand is at a different position, and so are the levers of the motors. If a reply has timed
-  // out, it is used as the answer to the next request.
+  // After a step that was late, the hand is at a different position, and the levers of the motors are different. If a
+  // reply has timed out, it is used as the answer to the next request.
   EXPECT_LE(at_odds, loop.stats().overruns + loop.stats().unseen);
 }
 

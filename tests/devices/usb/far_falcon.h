@@ -58,7 +58,7 @@ class FarFalcon {
     std::vector<std::uint8_t> last{};  ///< newest packet: endpoint and bytes
     std::optional<LocalTime> let_go;   ///< when the motor torque last became zero
     std::uint64_t pushes_begun = 0;    ///< transitions from zero to nonzero torque
-    Duration longest_gap{};            ///< the longest time between two periods of the thread
+    Duration longest_gap{};            ///< the longest time between two periods
   };
   Seen seen() const;
 

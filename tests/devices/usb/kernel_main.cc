@@ -135,7 +135,7 @@ TEST(UsbKernel, FromThePlugToTheForce) {
                                  Vec3::Zero()));
 }
 
-/// Returns the times of a packet and its reply. This uses a single thread and blocking calls.
+/// Returns the times of a packet and its reply, with a single thread and blocking calls.
 std::vector<double> bare_round_trips_ms(const std::string& node, int count) {
   const int file = open(node.c_str(), O_RDWR | O_CLOEXEC);
   unsigned interface = 0;
@@ -198,7 +198,7 @@ TEST(UsbKernel, ExchangesAtAKilohertzOrAsFastAsThisMachineCan) {
   record_quantiles("between_commands_at_the_device_ms", intervals);
   record_quantiles("bare_round_trip_ms", trips_ms);
   ASSERT_EQ(trips_ms.size(), 1000U);
-  // If a reply is too late for its step, it is read in the next one.
+  // If a reply is late for a step, it is read in the next step.
   const double in_steps = std::ceil(quantile(trips_ms, 0.5)) + 1;
   EXPECT_GE(seen, 0.5 * kTurns / in_steps);
 }
@@ -267,7 +267,7 @@ constexpr const char* kDriveAlone = "--drive-alone";
   for (;;) driver.step(kForce);
 }
 
-/// A Falcon that is driven by another process. It records when the force has ended.
+/// This is a Falcon that is driven by another process. It records when the force has ended.
 class Driven {
  public:
   explicit Driven(const char* how) {
@@ -319,7 +319,7 @@ class Driven {
   pid_t pid_ = -1;
 };
 
-// In half of the runs this must take at most 20 ms, or four bare round trips if these are longer than 5 ms.
+// In half of the runs, this must take at most 20 ms. If four bare round trips are longer, these are the limit.
 TEST(UsbKernel, AGuardedFalconHasNoForce20MillisecondsAfterItsDriversSigkill) {
   std::vector<double> took_ms;
   std::vector<double> trips_ms;

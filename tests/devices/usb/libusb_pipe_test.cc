@@ -248,8 +248,7 @@ double quantile(std::vector<double> values, double share) {
   return values[static_cast<std::size_t>(share * static_cast<double>(values.size() - 1))];
 }
 
-// There must be a sample in nearly every period at 1 kHz. The limit depends on the lateness of a sleeping thread in the
-// same run.
+// There must be a sample in nearly every period. The limit depends on how late a sleeping thread is in the same run.
 TEST(LibusbPipe, KeepsUpWithAKilohertz) {
   UsbfsShim shim(kReady);
   Loop loop(shim);

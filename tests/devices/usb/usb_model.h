@@ -29,8 +29,8 @@ class UsbModel {
   virtual bool request(LocalTime now, std::uint8_t request, std::uint16_t value) = 0;
   /// OUT transfer. Returns false for a stall.
   virtual bool write(LocalTime now, std::span<const std::uint8_t> bytes) = 0;
-  /// The time when a waiting IN transfer ends if there is no other event. This is LocalTime::max() if it can only be
-  /// ended by an event.
+  /// The time when a waiting IN transfer ends without another event. This is LocalTime::max() if it can only be ended
+  /// by an event.
   virtual LocalTime next_in() const = 0;
   virtual std::vector<std::uint8_t> take_in(LocalTime now) = 0;
 

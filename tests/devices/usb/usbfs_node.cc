@@ -34,7 +34,7 @@ int bulk_through(int file, const usbdevfs_bulktransfer& transfer) {
   tcflow(file, TCOON);  // NOLINT(concurrency-mt-unsafe): nobody else writes to it
   const ssize_t written = ::write(file, frame.data(), transfer.len + 2);
   if (written == static_cast<ssize_t>(transfer.len) + 2) return static_cast<int>(transfer.len);
-  return errno == EIO ? refuse(ENODEV) : -1;  // EIO: the master end has been closed
+  return errno == EIO ? refuse(ENODEV) : -1;  // EIO means that the master end was closed
 }
 
 }  // namespace

@@ -49,7 +49,7 @@ class UsbfsNode {
  protected:
   enum class Taken : std::uint8_t { kYes, kRefused, kHangs };
 
-  // The cable. These functions are called with mutex_ held.
+  // The cable. These are called with mutex_ held.
   virtual bool gone() const = 0;
   virtual std::span<const std::uint8_t> descriptors() const = 0;
   virtual bool request(std::uint8_t request, std::uint16_t value) = 0;

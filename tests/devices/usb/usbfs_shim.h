@@ -10,7 +10,7 @@
 
 namespace tendon {
 
-/// A FakeFalcon with a usbfs node of this process. It runs in real time.
+/// This is a FakeFalcon with a usbfs node in this process. It runs in real time.
 ///
 /// Thread-safe.
 class UsbfsShim final : public UsbfsNode {
@@ -24,12 +24,12 @@ class UsbfsShim final : public UsbfsNode {
   void unplug();
   void plug();
 
-  /// Errors of transfers. These are below the faults of the device.
+  /// These are errors of transfers, and not faults of the device.
   enum class Trouble {
     kNone,
     kOverflow,  ///< IN: more data than requested
     kStall,     ///< IN: the endpoint is halted
-    kMute,      ///< IN: there is no data, not even the chip status
+    kMute,      ///< IN: there is no data, and no chip status
     kHang,      ///< OUT: never completes
   };
   void set_trouble(Trouble trouble);

@@ -23,7 +23,7 @@ namespace tendon {
 /// Thread-safe.
 class UsbIpCable {
  public:
-  /// This is called after each OUT transfer that was accepted. The argument is the time. The model is locked.
+  /// This is called after each OUT transfer that is accepted, with its time. The model is locked.
   using Watch = std::function<void(LocalTime)>;
 
   /// Plugs the device in. Throws std::runtime_error if the kernel rejects it.

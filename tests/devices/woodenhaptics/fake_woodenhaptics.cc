@@ -27,7 +27,7 @@ int FakeWoodenHaptics::counts(std::size_t motor) const {
 }
 
 void FakeWoodenHaptics::reset() {
-  for (std::size_t i = 0; i < 3; ++i) origin_[i] = -counts(i);  // there is no index, so the counters start at 0
+  for (std::size_t i = 0; i < 3; ++i) origin_[i] = -counts(i);  // the counters start at 0, because there is no index
   begun_ = calibrate_ = calibrated_ = amplifiers_on_ = false;
   current_ma_ = {};
   told_.reset();

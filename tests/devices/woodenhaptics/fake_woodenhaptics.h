@@ -28,7 +28,7 @@ class FakeWoodenHaptics {
   struct Options {
     std::string_view model = "woodenhaptics_v2019";
     Duration boot{};  ///< from plug to the start of the firmware loop (LED test of one second)
-    /// With its own supply, counters and watchdog keep running while unplugged.
+    /// With a separate supply, the counters and the watchdog are not stopped if the board is unplugged.
     bool own_supply = false;
   };
 
@@ -66,7 +66,7 @@ class FakeWoodenHaptics {
   std::vector<std::uint8_t> take_in(LocalTime now);
   /// The node is closed, which cancels waiting transfers.
   void cancel();
-  /// The process of the host has died. Nothing is sent or received after this.
+  /// This is called when the process of the host has died. Nothing is sent or received after this.
   void lose_host();
 
   void advance(LocalTime now);
@@ -119,7 +119,7 @@ class FakeWoodenHaptics {
   std::optional<LocalTime> boots_;
   int most_waiting_ = 0;
 
-  bool begun_ = false;           ///< the first report is sent without a request
+  bool begun_ = false;           ///< this was sent without a request
   std::array<int, 3> origin_{};  ///< counter value at angle 0
   bool calibrate_ = false;       ///< set by the button
   bool calibrated_ = false;      ///< by command 1 since the last reset

@@ -261,7 +261,7 @@ TEST(WoodenHapticsKinematics, TheForceFadesToNoneAtASingularPose) {
     for (int i = 0; i < 5000; ++i) {
       const Pose pose = pose_with(model, 4 * dice.direction());
       const auto given = force_of(model, pose, currents_for(model, pose, 3 * dice.direction(), 2000));
-      // This is 1 mA per motor at the pose with the lowest sensitivity.
+      // This is 1 mA per motor where the sensitivity is the lowest.
       ASSERT_TRUE(!given || given->norm() < 3.5) << pose.angles.transpose();
     }
   }

@@ -125,7 +125,7 @@ TEST(WoodenHapticsDevice, JointsCarryTheTipAndTurnAsItMoves) {
   }
 }
 
-// A revolution of the body is 16 bits. The arm makes two and a half revolutions.
+// The value has 16 bits per revolution of the body. The arm makes two and a half revolutions.
 TEST(WoodenHapticsDevice, CountersThatWrapAreFollowed) {
   for (const double turns : {2.5, -2.5}) {
     Bench bench;
@@ -196,7 +196,7 @@ TEST(WoodenHapticsDevice, ZeroDoesNotWaitForAnAnswer) {
   ASSERT_TRUE(bench.reaches(State::kHomed, 1s));
   bench.run(20ms, kForce);
   bench.arm.set_fault(Fault::kSilent);
-  bench.run(4ms, kForce);  // there are two reports in flight, which are not answered
+  bench.run(4ms, kForce);  // there are two reports in flight, and they are not answered
   ASSERT_TRUE(bench.arm.pushes());
   bench.step();
   EXPECT_EQ(bench.written, Vec3::Zero());

@@ -46,7 +46,7 @@ TEST(ReplayWindow, TellsNothingOfWhatItNoLongerRemembers) {
   ReplayWindow window;
   for (std::uint64_t n = 0; n <= 3008; ++n) window.insert(n);
   EXPECT_EQ(window.mask_before(3008 - 1960),
-            (1U << 23U) - 1);  // there are 23 left of the 1983 numbers below the highest one
+            (1U << 23U) - 1);  // only 23 of the 1983 numbers below the highest one are left
   EXPECT_EQ(window.mask_before(3008 - ReplayWindow::kRemembered + 1), 0U);
 }
 

@@ -11,8 +11,8 @@ namespace {
 using std::chrono::milliseconds;
 using std::chrono::seconds;
 
-// The timeout can be many seconds after a slow period. If the next copy is lost, the ends must not wait this long when
-// the link is fast again.
+// The timeout can be many seconds if the link was slow. If the next copy is lost, the ends must not wait for this long
+// after the link is fast again.
 TEST(OutgoingRequests, AreSentAgainWithinASecondHoweverSlowTheLink) {
   for (const Duration timeout : {Duration(milliseconds(20)), Duration(seconds(1)), Duration(seconds(12))}) {
     OutgoingRequests requests;

@@ -71,7 +71,7 @@ TEST_F(Noise, EveryBitOfBothMessagesCounts) {
     bad[bit / 8] ^= static_cast<std::byte>(1U << bit % 8);
     EXPECT_FALSE(a_.read(bad).has_value()) << bit;
   }
-  EXPECT_TRUE(a_.read(reply).has_value());  // the true answer is still accepted after a forged one
+  EXPECT_TRUE(a_.read(reply).has_value());  // the true answer must still be accepted
 }
 
 TEST_F(Noise, ACutMessageDoesNotOpen) {

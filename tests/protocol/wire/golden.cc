@@ -46,7 +46,7 @@ std::string hex_number(std::uint32_t value) {
   return "0x" + std::string(8 - text.size(), '0') + text;
 }
 
-/// Inserts a space between groups of three digits from 10 000 on.
+/// Inserts spaces between groups of three digits if the value is at least 10 000.
 std::string grouped(std::int64_t value) {
   std::string text = std::to_string(value);
   const std::size_t sign = value < 0 ? 1 : 0;

@@ -46,7 +46,7 @@ Bytes bytes_of(const std::string& text) {
   return {begin, begin + text.size()};
 }
 
-/// Parses the body with libprotobuf and serializes it again. Returns nothing if the body is malformed.
+/// Uses libprotobuf to parse the body and to serialize it again. Returns nothing if the body is malformed.
 std::optional<Bytes> by_protobuf(const Bytes& body) {
 #if GOOGLE_PROTOBUF_VERSION < 4022000
   const google::protobuf::LogSilencer silence;  // protobuf logs every text that is not UTF-8

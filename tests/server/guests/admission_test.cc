@@ -134,7 +134,8 @@ TEST_F(SealedServer, TheSameKeyTakesItsPlaceAtOnceAndTheOneBeforeStaysAway) {
 TEST_F(SealedServer, AReplayedHelloTakesNothingFromAnybody) {
   Client a = controller(wall_, "192.0.2.1:4000");
   run(milliseconds(500), {&a});
-  // The address is the original one, so the cookie is valid. The server has already dropped the Answer of this attempt.
+  // The cookie is valid, because the address is the original one. The server has already dropped the Answer of this
+  // attempt.
   Bytes hello;
   for (const Datagram& datagram : wire_) {
     if (datagram.to == server_.self && datagram.bytes.size() == kMaxDatagram) hello = datagram.bytes;

@@ -112,7 +112,7 @@ class TwoBanks : public ::testing::Test {
   End server_{wire_, parse_address("127.0.0.1:47100")};
   std::vector<std::unique_ptr<Mailboxes>> boxes_;
   std::unique_ptr<NetworkLoop> loop_;
-  bool says_bye_ = false;  ///< in the first datagram; the following ones are lost
+  bool says_bye_ = false;  ///< this is in the first datagram; the others are lost
   std::uint64_t tick_ = 0;
   std::uint16_t port_ = 4000;
 };

@@ -316,7 +316,7 @@ TEST_F(Coupled, APortWhoseHandleIsNotCoupledTellsNoTurnAndNoGrip) {
   EXPECT_FALSE(leader_->newest().sent.turn || leader_->newest().sent.grip);
 }
 
-/// The clock of the machine was set back, so the epoch is smaller than the one that is known to the leader.
+/// The clock of the machine was set back. The epoch is therefore smaller than the one that the leader knows.
 TEST_F(Coupled, AServerThatComesBackWithALowerEpochIsHeard) {
   epoch_ = 10;
   place();

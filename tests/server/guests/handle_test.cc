@@ -15,7 +15,7 @@ namespace {
 
 using std::chrono::milliseconds;
 
-/// A device with four buttons and axes. The observer receives one of 20 states.
+/// This is a device with four buttons and axes. The observer receives one of 20 states.
 class Handle : public SealedServer {
  protected:
   Handle() {
@@ -209,8 +209,8 @@ TEST_F(Handle, ColumnsAreSentOnlyToThoseThatNamedTheFeature) {
   }
 }
 
-/// Clients with the feature `joints` receive the joints and their names. The size of the states does not change for
-/// other clients.
+/// Clients with the feature `joints` receive the joints and their names. For other clients, the size of the states is
+/// the same as before.
 TEST_F(Handle, JointsAreToldToThoseThatNamedTheFeature) {
   for (const bool asks : {false, true}) {
     NetworkLoop::Config config;

@@ -21,7 +21,7 @@ std::uint64_t sum(const LatenessHistogram& lateness) {
   return std::accumulate(lateness.begin(), lateness.end(), std::uint64_t{0});
 }
 
-/// A loop at 1 kHz. The test selects the times when the thread wakes up.
+/// A loop at 1 kHz. The test decides when the thread wakes up.
 class Loop {
  public:
   Loop() : loop_({.period = milliseconds(1), .control = control()}, device_, *mail_) {}

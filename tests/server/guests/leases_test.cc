@@ -53,7 +53,7 @@ TEST_F(TwoDevices, ALeaseIsTakenFromAHolderThatHasFallenSilentAndNotBefore) {
   EXPECT_EQ(second.client->stats().forces, 0U);
   EXPECT_EQ(tissue().holder, "other");
 
-  const LocalTime silent = now_;  // the session continues for 2 s, but no datagram is received from it
+  const LocalTime silent = now_;  // the session continues for 2 s, but nothing is received from it
   run(milliseconds(400), {&second});
   EXPECT_EQ(tissue().holder, "other");
   while (!second.client->holds() && now_ - silent < seconds(1)) run(milliseconds(10), {&second});

@@ -37,8 +37,8 @@ TEST_F(SealedServer, TellsControllersAloneOnceASecondHowTheirForcesFare) {
   EXPECT_FALSE(b.client->report().has_value());
 }
 
-/// The delay is 20 ms in each direction. One of the ends is preempted for 36 ms in the middle of a turn. Datagrams that
-/// arrive during this time are handled with the time at the beginning of the turn.
+/// The delay is 20 ms in each direction. One end is preempted for 36 ms in the middle of a turn. If a datagram arrives
+/// during this time, it is handled with the time at the beginning of the turn.
 class InterruptedTurn : public SealedServer, public testing::WithParamInterface<bool> {};
 
 TEST_P(InterruptedTurn, MakesNoWayLookShort) {

@@ -203,7 +203,7 @@ class SealedServer : public ::testing::Test {
   std::uint64_t tick_ = 0;
   std::uint64_t tick_step_ = 1;
   std::uint64_t steps_a_turn_ =
-      1;  ///< if this is larger than 1, the network thread is late and only receives the newest step
+      1;                        ///< if this is greater than 1, the network thread is late and only sees the newest step
   std::optional<Vec3> wanted_;  ///< set by the device's loop
   std::uint32_t buttons_ = 0;   ///< set by the device's loop
   DeviceState look_;            ///< set by the loop of the device (other fields)

@@ -386,7 +386,7 @@ TEST(PartRecorder, HoldsNoMoreMemoryAfterADayThanAfterTwoHours) {
     if (quarter == std::int64_t{8} * 3600 - 10) after_two_hours = held();
   }
   EXPECT_GE(recorder.status().parts, 23U);
-  // Both values are measured at the end of an hour. The index of a chunk needs about 150 bytes.
+  // Both are measured at the end of an hour. The index of a chunk has about 150 bytes.
   EXPECT_NEAR(held(), after_two_hours, 100e3);
 }
 
