@@ -2,10 +2,10 @@
 //
 // node check.mjs FILE [TOPIC=COUNT …]
 //
-// Reads an MCAP file the way Foxglove does: a whole file by its index, one without its end as a stream; each channel's
-// protobuf schema from the file itself. Decodes every message and prints one line of JSON. Exit status 1 when anything
-// is wrong with the file, or a topic has another count of messages than asked for ("TOPIC=COUNT"; "TOPIC=some": any
-// but none).
+// Reads an MCAP file like Foxglove: through its index, or as a stream if the file has no end. The protobuf schema of
+// each channel is taken from the file. Decodes all messages and prints one line of JSON. The exit status is 1 if there
+// is an error in the file, or if a topic does not have the expected number of messages ("TOPIC=COUNT", or "TOPIC=some"
+// for at least one).
 
 import { open, readFile } from "node:fs/promises";
 import { McapIndexedReader, McapStreamReader } from "@mcap/core";
